@@ -7,16 +7,12 @@ from dataclasses import dataclass
 
 from ...common.arrays import Array
 from .. import _core
-from ..fields.field_types import GROUND
 from ..joints.measure import Measure
 from ..model.planar_tree import PlanarTree
 from ..model.system import MechanismSystem
 from ..model.tree_layout import NotInTreeError
 from ..solve.state import State
 from .outcome import EarlierRun
-
-
-ALONE = "a body that is joined to no other"  # errors of forces are judged between bodies, not on the ground
 
 
 @dataclass(frozen=True)
@@ -41,10 +37,6 @@ def tree_start(
     """
     if earlier is not None and isinstance(earlier.continuation.checkpoint, _core.Checkpoint):
         return "as the run that it goes on with"
-    scene = assembly.model.scene
-    joined = {body for joint in scene.joint if GROUND not in joint.bodies for body in joint.bodies}
-    if any(body.name not in joined for body in assembly.model.links):
-        return ALONE
     try:
         tree = PlanarTree(assembly, motors)
         return TreeStart(tree, *tree.state(start.q, start.v))

@@ -1,8 +1,10 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <functional>
 #include <nanobind/nanobind.h>
 #include <string>
+#include <utility>
 
 // One function per folder of the core, in a file of that name; module.cpp calls them. Default arguments live in Python,
 // never here: only what may be absent is None.
@@ -14,6 +16,14 @@ void bind_actuation(nanobind::module_ &m);
 void bind_analysis(nanobind::module_ &m);
 void bind_recursion(nanobind::module_ &m);
 void bind_for_tests(nanobind::module_ &m); // of no use to the program
+
+// `call`, which has to outlive it, from where the interpreter is released: holds it meanwhile.
+template <class R, class... A> auto locked(const std::function<R(A...)> &call) {
+  return [&call](A... a) -> R {
+    const nanobind::gil_scoped_acquire held;
+    return call(std::forward<A>(a)...);
+  };
+}
 
 // Raises ValueError with both sizes where they differ.
 inline void check_size(const char *name, Eigen::Index got, Eigen::Index expected) {

@@ -88,33 +88,34 @@ class PlanarTree:
         )
 
     def state(self, q: Array, v: Array) -> tuple[Array, Array]:
-        """(q, v) of the tree for those of the system, (coordinates,) each.
-
-        Raises `NotInTreeError` where trajectories and loops depend on each other there.
-        """
+        """(q, v) of the tree for those of the system, (coordinates,) each."""
         found = self.motion(q, v, np.zeros_like(v))
-        if len(self.core.keep_independent_rows(found[0], found[1])) < len(self.constraints) + len(self._beside):
-            raise NotInTreeError("trajectories and loops that depend on each other")
         return found[0], found[1]
 
     def motion(self, q: Array, v: Array, a: Array) -> Array:
-        """Coordinates of the tree, their rates and accelerations (3, n_v), for those of the system (coordinates,)."""
-        found = np.zeros((3, self._layout.size))
+        """Coordinates of the tree, their rates and accelerations (3, …, n_v), for those of the system (…, coordinates).
+
+        The dots: nothing, or times.
+        """
+        times, system = q.shape[:-1], [np.ascontiguousarray(np.atleast_2d(values)) for values in (q, v, a)]
+        found = np.zeros((3, len(system[0]), self._layout.size))
         for number, node in zip(self.bodies, self._layout.nodes, strict=False):
             first, n = int(self._assembly.first[number]), node.body.n_modes
-            for of_tree, of_system in zip(found, (q, v, a), strict=True):
-                of_tree[node.modes : node.modes + n] = of_system[first + 3 : first + 3 + n]
+            for of_tree, of_system in zip(found, system, strict=True):
+                of_tree[:, node.modes : node.modes + n] = of_system[:, first + 3 : first + 3 + n]
                 if node.kind == FREE.kind:
-                    of_tree[node.first : node.modes] = of_system[first : first + 3]
+                    of_tree[:, node.first : node.modes] = of_system[:, first : first + 3]
         measures, coordinates = self._joints()
         along = [(measure, order) for order in range(3) for measure in measures]
-        readings = _core.Sensing(self._assembly.system, along, []).read(q[None], v[None], a[None])
+        readings = _core.Sensing(self._assembly.system, along, []).read(*system)
         indices, signs = [c.number for c in coordinates], np.array([c.sign for c in coordinates])
-        found[:, indices] = signs * readings[0].reshape(3, -1)
+        found[:, :, indices] = signs * readings.reshape(len(readings), 3, -1).swapaxes(0, 1)
         for row, node in self._beside.items():  # what is left of it where the rotor has not turned; linear
-            turned, rate = self.core.measure(found[0], found[1])
-            found[:, node.first] = turned[row], rate[row], self.core.measure(found[0], found[2])[1][row]
-        return found
+            for q_tree, v_tree, a_tree in found.swapaxes(0, 1):
+                turned, rate = self.core.measure(q_tree, v_tree)
+                q_tree[node.first], v_tree[node.first] = turned[row], rate[row]
+                a_tree[node.first] = self.core.measure(q_tree, a_tree)[1][row]
+        return found.reshape(3, *times, -1)
 
     @property
     def modes(self) -> dict[str, range]:

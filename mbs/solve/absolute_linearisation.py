@@ -9,7 +9,7 @@ that answer otherwise to the motion are held, and their derivatives added (`Answ
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -19,16 +19,13 @@ from ..joints.measure import Measure
 from ..model.masses import system_mass_matrix
 from ..model.model import Model
 from ..model.system import MechanismSystem
-from .answering_forces import AnsweringForces
+from .answering_forces import Answer, AnsweringForces
 from .gradients import gradient_rates, gradients
 from .tree_linearisation import Resistance
 
 STEP = 0.02  # of the size of a coordinate
 CENTRAL = (4 / 5, -1 / 5, 4 / 105, -1 / 280)
 """Weights of f(x + k h) − f(x − k h), k from 1 (Fornberg, Math. Comput. 51, 1988), of order 8."""
-
-Pulls = Sequence[tuple[Measure, float]]
-"""Forces along measures."""
 
 
 class AbsoluteLinearisation:
@@ -37,6 +34,7 @@ class AbsoluteLinearisation:
     def __init__(self, model: Model, independent: Sequence[Measure]) -> None:
         self._model, self._rows = model, [*(constraint.measure for constraint in model.joints), *independent]
         self._assembly = MechanismSystem(model, (), model.loads, self._rows)
+        self._forces = ForcesOfMotion(model, self._rows)
 
     def at(self, t: float, q: Array, v: Array, a: Array, H: Array, H_dot: Array) -> Resistance:
         """About a motion (coordinates,) with H = ∂q/∂s (coordinates, f), where δv = H δṡ + Ḣ δs.
@@ -49,9 +47,8 @@ class AbsoluteLinearisation:
         H_ddot = np.zeros_like(H)
         H_ddot[frames] = -np.linalg.solve(G[:, frames], 2 * G_dot @ H_dot + bent)
         f = self._assembly.system.required_forces(np.array([t]), q[None], v[None], a[None])[0]
-        pulls = list(zip(self._rows, np.linalg.solve(G[:, frames].T, f[frames]), strict=True))
-        forces, M = ForcesOfMotion(self._model, pulls, t, q, v), system_mass_matrix(self._assembly, q)
-        K, D = forces.stiffness(a), forces.damping(a)
+        forces = self._forces.at(t, q, v, np.linalg.solve(G[:, frames].T, f[frames]))
+        M, K, D = system_mass_matrix(self._assembly, q), forces.stiffness(a), forces.damping(a)
         return Resistance(H.T @ (D @ H + 2 * M @ H_dot), H.T @ (K @ H + D @ H_dot + M @ H_ddot))
 
     def _accelerations(self, q: Array, v: Array, a: Array) -> Array:
@@ -62,36 +59,61 @@ class AbsoluteLinearisation:
 
 
 class ForcesOfMotion:
-    """f = M a − Q of a motion through q with v (coordinates,) at time t, `pulls` held beside the model's loads."""
+    """f = M a − Q of motions of a model, with forces along `rows` held beside its loads: what is the same in all."""
 
-    def __init__(self, model: Model, pulls: Pulls, t: float, q: Array, v: Array) -> None:
-        answering = AnsweringForces(model)
-        self._answer = answering.at(t, q, v)
-        held = [*pulls, *zip(answering.measures, self._answer.force, strict=True)]
-        drives = [*model.loads, *((row, _core.TimeFunction.constant(float(pull))) for row, pull in held)]
+    def __init__(self, model: Model, rows: Sequence[Measure]) -> None:
+        self._answering = AnsweringForces(model)
         passive = replace(model, frictions=(), gears=(), state_forces=())
-        self._assembly = MechanismSystem(passive, (), drives, answering.measures)
-        self._t, self._q, self._v = t, q, v
+        held = [*rows, *self._answering.measures]
+        self._assembly, self._count = MechanismSystem(passive, (), model.loads, held), len(rows)
+
+    def at(self, t: float, q: Array, v: Array, pulls: Array) -> HeldForces:
+        """Of a motion through q with v (coordinates,) at time t, `pulls` (rows,) held."""
+        answer = self._answering.at(t, q, v)
+        return HeldForces(self._assembly, self._count, answer, np.concatenate([pulls, answer.force]), t, q, v)
+
+
+@dataclass(frozen=True)
+class HeldForces:
+    """Derivatives of the forces of one motion: through q with v (coordinates,) at time t.
+
+    `pulls` act along the measures of `assembly`: `rows` of them given ones, then what answers to the motion.
+    """
+
+    assembly: MechanismSystem
+    rows: int
+    answer: Answer
+    pulls: Array
+    t: float
+    q: Array
+    v: Array
 
     def stiffness(self, a: Array) -> Array:
         """∂f/∂q (coordinates, coordinates)."""
-        q, v, rows = self._q, self._v, self._assembly.motor_measures
-        K = position_derivative(self._assembly, lambda x: self._forces(x, *_tiled(len(x), v, a)), q)
-        E, E_dot = gradients(self._assembly, rows, q), gradient_rates(self._assembly, rows, q, v)
-        return K - E.T @ (self._answer.by_value @ E + self._answer.by_rate @ E_dot)
+        K = position_derivative(self.assembly, lambda x: self._forces(x, *_tiled(len(x), self.v, a)), self.q)
+        E, E_dot = self._gradients, gradient_rates(self.assembly, self._answering, self.q, self.v)
+        return K - E.T @ (self.answer.by_value @ E + self.answer.by_rate @ E_dot)
 
     def damping(self, a: Array) -> Array:
         """∂f/∂v (coordinates, coordinates)."""
-        q, v, scales = self._q, self._v, self._assembly.scales
+        v, scales, E = self.v, self.assembly.scales, self._gradients
         u = scales * max(1.0, np.abs(v / scales).max(initial=0.0))
-        at, under = _tiled(len(q), q, a)
+        at, under = _tiled(len(v), self.q, a)
         ahead, behind = (self._forces(at, v + sign * np.diag(u), under) for sign in (1.0, -1.0))
-        E = gradients(self._assembly, self._assembly.motor_measures, q)
-        found: Array = ((ahead - behind) / (2 * u[:, None])).T - E.T @ self._answer.by_rate @ E
+        found: Array = ((ahead - behind) / (2 * u[:, None])).T - E.T @ self.answer.by_rate @ E
         return found
 
+    @property
+    def _answering(self) -> Sequence[_core.Measure]:
+        return self.assembly.motor_measures[self.rows :]
+
+    @property
+    def _gradients(self) -> Array:
+        return gradients(self.assembly, self._answering, self.q)
+
     def _forces(self, q: Array, v: Array, a: Array) -> Array:
-        found: Array = self._assembly.system.required_forces(np.full(len(q), self._t), q, v, a)
+        pulls = list(zip(self.assembly.motor_measures, self.pulls, strict=True))
+        found: Array = self.assembly.system.required_forces(np.full(len(q), self.t), q, v, a, pulls)
         return found
 
 

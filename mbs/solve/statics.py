@@ -26,6 +26,7 @@ def static_equilibrium(assembly: MechanismSystem, start: State) -> State:
     """
     system, n = assembly.system, assembly.system.n_v
     rest, sizes = np.zeros(n), assembly.scales
+    forces: ForcesOfMotion | None = None  # made once, where a step is made
 
     def residual(q: Array, multipliers: Array) -> tuple[Array, float]:
         C, _, C_q = system.constraints(0.0, q, rest)
@@ -41,8 +42,9 @@ def static_equilibrium(assembly: MechanismSystem, start: State) -> State:
         closed = np.abs(r[n:] / assembly.measure_scales).max(initial=0.0) <= TOLERANCE
         if closed and (np.abs(r[:n]).max() <= TOLERANCE * size or largest <= ROUNDING):
             return with_rates(assembly, q, start.v)
+        forces = forces or _forces(assembly)
         try:
-            step = np.linalg.solve(_jacobian(assembly, q, multipliers), r)
+            step = np.linalg.solve(_jacobian(assembly, forces, q, multipliers), r)
         except np.linalg.LinAlgError:
             break
         largest = float(np.abs(step[:n] / sizes).max())
@@ -56,10 +58,14 @@ def static_equilibrium(assembly: MechanismSystem, start: State) -> State:
     )
 
 
-def _jacobian(assembly: MechanismSystem, q: Array, multipliers: Array) -> Array:
+def _forces(assembly: MechanismSystem) -> ForcesOfMotion:
+    model = replace(assembly.model, loads=assembly.drives)
+    return ForcesOfMotion(model, [constraint.measure for constraint in assembly.constraints])
+
+
+def _jacobian(assembly: MechanismSystem, forces: ForcesOfMotion, q: Array, multipliers: Array) -> Array:
     """Exact derivative of Q − C_qᵀλ and C with respect to (q, λ), at rest."""
     rest = np.zeros_like(q)
-    pulls = [(c.measure, -pull) for c, pull in zip(assembly.constraints, multipliers, strict=True)]
-    K = ForcesOfMotion(replace(assembly.model, loads=assembly.drives), pulls, 0.0, q, rest).stiffness(rest)
+    K = forces.at(0.0, q, rest, -multipliers).stiffness(rest)
     C_q = assembly.system.constraints(0.0, q, rest)[2]
     return np.block([[-K, -C_q.T], [C_q, np.zeros((len(C_q), len(C_q)))]])

@@ -176,3 +176,32 @@ def test_moments_that_do_not_fit_their_joint(joint, load, says):
                 analysis=[{"name": "fall", "kind": "forward", "end": 0.1, "output_step": 0.1}],
             )
         )  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", ["prismatic", "universal"])
+def test_forces_on_the_ground_of_a_link_alone(kind, tmp_path):
+    """They follow from nothing else that steps are judged by: unobserved, they erred by up to 78 tolerances."""
+    link = {
+        "material": {"youngs_modulus": 2.1e11, "density": 7850.0, "poissons_ratio": 0.3},
+        "geometry": {"kind": "beam", "length": 0.8, "section": {"shape": "rectangle", "height": 0.01, "width": 0.02}},
+        "mesh": {"elements": 14},
+        "reference": {"condition": "cantilever"},
+        "modes": {"count": 8, "family": "all"},
+    }
+    joint = {"name": "O", "type": kind, "between": ["ground", "b.root"], "axis": [0.0, 0.6, 0.8]}
+    runs = {"exact": 1e-9, "found": 1e-4}
+    scene = ffrobot.make_scene(
+        name="lone",
+        space="spatial",
+        gravity=[0.0, 0.0, -9.81],
+        body=[{"name": "b", "link": link}],
+        joint=[joint | ({"second_axis": [1.0, 0.0, 0.0]} if kind == "universal" else {})],
+        load=[{"point": "b.tip", "y": "20+3*sin(9*t)", "z": "30"}],
+        analysis=[
+            {"name": name, "kind": "forward", "end": 0.06, "output_step": 2e-4, "tolerance": at, "integrator": "dop853"}
+            for name, at in runs.items()
+        ],
+    )
+    with h5py.File(ffrobot.solve(scene).save(tmp_path / "lone.h5")) as file:
+        found, exact = (file[name]["joints/O/reaction"][()] for name in ("found", "exact"))
+    assert np.abs(found - exact).max() < 1e-4 * np.abs(exact).max()

@@ -62,6 +62,15 @@ def random_state(rng, mechanism, model, deflection=0.1):
     return q, v
 
 
+def state_near_rest(rng, mechanism, model, deflection, speed):
+    """Of small coordinates; joints with quaternions are not turned."""
+    q, v = deflection * rng.standard_normal(model.n_q), speed * rng.standard_normal(model.n_v)
+    for body, (_, p_q, *_) in zip(mechanism.bodies, model.first, strict=True):
+        if body.joint in (J.spherical, J.free):
+            q[p_q - 4 : p_q] = [1, 0, 0, 0]
+    return q, v
+
+
 def row(kind, a, b, f, g=(1, 0, 0), name="row"):
     row = r.RowModel()
     row.name, row.kind, row.a, row.b = name, kind, r.MarkerAt(*a), r.MarkerAt(*b)

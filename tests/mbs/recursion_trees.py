@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from mechanisms import random_state
 
 from ffrobot.mbs import _core
 
@@ -56,6 +57,10 @@ class Tree:
     bodies: list  # index in the assembly of each body of the tree
     rows: list  # index in the assembly's constraints of each row
     assembly: object
+
+    def random_state(self, rng):
+        """Any q and v."""
+        return random_state(rng, self.model.n_v)
 
     def from_tree(self, q, v, a=None):
         """q, v and, after an evaluation, accelerations of the assembly for those of the tree."""

@@ -54,13 +54,16 @@ def both_at_one_state(assembly, motors=(), **keys):
 
 
 def compare(assembly):
-    """Accelerations and all multipliers; those of joints come from an inverse sweep."""
+    """Accelerations, energies and all multipliers; those of joints come from an inverse sweep."""
     tree, found, expected = both_at_one_state(assembly)
     held = len(assembly.constraints)
     assert relative(found.a, expected.a) < 1e-11
     if held:
         assert relative(found.multipliers, expected.multipliers[:, :held]) < 1e-11
     assert found.residual.max() < 1e-12
+    q, v, _ = tree.motion(found.q, found.v, found.a)
+    energies, of_system = tree.both.energies(q, v), assembly.system.energies(found.q, found.v)
+    np.testing.assert_allclose(energies, of_system, rtol=1e-11, atol=1e-13 * np.abs(of_system).max())
     return tree
 
 

@@ -48,8 +48,7 @@ def case(request):
 
 def test_tangent_is_the_derivative_of_the_equations_of_motion(case):
     assembly, oracle, (q, v, a), multipliers = case
-    pulls = [(c.measure, -pull) for c, pull in zip(assembly.constraints, multipliers, strict=True)]
-    forces = ForcesOfMotion(assembly.model, pulls, T, q, v)
+    forces = ForcesOfMotion(assembly.model, [c.measure for c in assembly.constraints]).at(T, q, v, -multipliers)
 
     def residual(q, v):
         forces = oracle.mass_matrix(q) @ a - oracle.forces(T, q, v)
@@ -74,7 +73,7 @@ def test_tangent_of_a_force_that_depends_on_the_motion(name):
     q, v = random_state(np.random.default_rng(2), bare.system.coordinates)
 
     def tangents(assembly):
-        forces, rest = ForcesOfMotion(assembly.model, [], T, q, v), np.zeros_like(q)
+        forces, rest = ForcesOfMotion(assembly.model, []).at(T, q, v, np.zeros(0)), np.zeros_like(q)
         return forces.damping(rest), forces.stiffness(rest)
 
     def force(q, v):
@@ -117,8 +116,8 @@ def test_loads_take_part():
     q, v = random_state(np.random.default_rng(3), size)
     rest = np.zeros(size)
     given, cancelled, none = (
-        ForcesOfMotion(model, pulls, T, q, v).stiffness(rest)
-        for model, pulls in ((loaded, []), (loaded, [(measure, -2.0)]), (free, []))
+        ForcesOfMotion(model, [measure]).at(T, q, v, np.array([pull])).stiffness(rest)
+        for model, pull in ((loaded, 0.0), (loaded, -2.0), (free, 0.0))
     )
     assert np.abs(given - none).max() > 0.1
     assert relative(cancelled, none) < 1e-14

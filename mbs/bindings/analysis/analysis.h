@@ -5,4 +5,4 @@
 
 void bind_run(nanobind::module_ &m);     // integrated motions
 void bind_sampled(nanobind::module_ &m); // under a sampled controller
-void bind_replay(nanobind::module_ &m); // algebraic ones, and sources of actuation
+void bind_replay(nanobind::module_ &m);  // algebraic ones, and sources of actuation

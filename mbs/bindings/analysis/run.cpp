@@ -105,12 +105,8 @@ Run run_system(const System &system, std::vector<int> groups, std::vector<bool> 
   const nb::gil_scoped_release unlocked;
   ConstrainedMotion motion(
       system, {system, {std::move(groups), std::move(moments), std::move(joints), actuator_forces}}, external_loads);
-  const auto ask = [&](double t) {
-    const nb::gil_scoped_acquire locked;
-    return carry_on(t);
-  };
-  return run(motion, times, q, v, controls, {system, times.size(), external_loads, actuator_forces}, ask, recording,
-             checkpoint);
+  return run(motion, times, q, v, controls, {system, times.size(), external_loads, actuator_forces}, locked(carry_on),
+             recording, checkpoint);
 }
 
 } // namespace

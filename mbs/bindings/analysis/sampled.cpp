@@ -52,15 +52,8 @@ Run run_under_controller(const System &system, std::vector<int> groups, std::vec
   HeldCommands commands(motors, std::move(patches));
   commands.set(first_command);
   ConstrainedMotion motion(system, {system, {std::move(groups), std::move(moments), std::move(joints)}}, &commands);
-  const auto ask = [&](double t) {
-    const nb::gil_scoped_acquire locked;
-    return carry_on(t);
-  };
-  const auto command = [&](std::size_t k, double t, const VectorXd &y) {
-    const nb::gil_scoped_acquire locked;
-    return controller(k, t, y);
-  };
-  return run_sampled(motion, times, q, v, controls, commands, sensing, {samples, delay, command}, ask);
+  return run_sampled(motion, times, q, v, controls, commands, sensing, {samples, delay, locked(controller)},
+                     locked(carry_on));
 }
 
 } // namespace

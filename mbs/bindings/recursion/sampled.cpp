@@ -44,8 +44,7 @@ private:
 template <class Space> void check_held(const Model<Space> &model, const HeldForces &held) {
   check_size("rows of held forces", held.direction().rows(), model.mechanism.n_v);
   for (const auto &[input, share] : held.frame_motors()) {
-    check_index("input of a motor on frames", static_cast<int>(input),
-                static_cast<std::size_t>(held.direction().cols()));
+    check_index("input of a motor on frames", input, held.direction().cols());
     check_share(share, model.mechanism.n_q, model.mechanism.n_v);
   }
 }
@@ -64,10 +63,7 @@ TreeRun sampled_motion_of(const Model<Space> &model, const Scene &scene, const s
   RecursiveMotion<Space> motion(model.mechanism, scene, times.front(), q.data(), v.data(), &held);
   RecursiveMotion<Space> reader(model.mechanism, scene, times.front(), q.data(), v.data(), &held);
   Plant<Space> plant(model.mechanism, reader, held);
-  const Sampling sampling{samples, delay, [&](std::size_t k, double t, const VectorXd &state) {
-                            const nb::gil_scoped_acquire locked;
-                            return controller(k, t, state);
-                          }};
+  const Sampling sampling{samples, delay, locked(controller)};
   const SampledLoop loop(plant, sampling, times.back());
   return integrated(model, motion, reader, times, q, v, controls, carry_on, &loop.breaks(), nullptr);
 }

@@ -54,6 +54,20 @@ double violation_of(const SystemOnTree &both, double t, const VectorXd &q, const
   return acceleration_residual(both, recursion::targets_at(both.scene, t), a.data(), forces, motion.workspace());
 }
 
+recursion::RowMajorMatrix energies_of(const SystemOnTree &both, const recursion::RowMajorMatrix &q,
+                                      const recursion::RowMajorMatrix &v) {
+  check_size("q columns", q.cols(), both.tree.n_q);
+  check_size("v columns", v.cols(), both.tree.n_v);
+  check_size("v rows", v.rows(), q.rows());
+  recursion::Workspace<Planar, double> w(both.tree);
+  recursion::RowMajorMatrix found(q.rows(), 4);
+  for (Index i = 0; i < q.rows(); ++i) {
+    const recursion::Totals sum = totals(both.tree, both.scene, q.row(i).data(), v.row(i).data(), w);
+    found.row(i) << sum.kinetic, sum.strain, sum.gravitational, sum.dissipated;
+  }
+  return found;
+}
+
 Run run_tree(const SystemOnTree &both, const std::vector<double> &times, const VectorXd &q, const VectorXd &v,
              const IntegrationControls &controls, const std::function<bool(double)> &carry_on,
              ExternalLoads *external_loads, Recording *recording, recursion::TreeCheckpoint *checkpoint) {
@@ -67,12 +81,8 @@ Run run_tree(const SystemOnTree &both, const std::vector<double> &times, const V
     check_size("state of the checkpoint", checkpoint->integration.state.size(), state.size());
     motion.go_on(checkpoint->history);
   }
-  const auto ask = [&](double t) {
-    const nb::gil_scoped_acquire locked;
-    return carry_on(t);
-  };
   TreeOutputs outputs(both, times.size(), times.front(), state.data(), external_loads);
-  Run found = run(motion, times, state, controls, outputs, ask, recording, nullptr,
+  Run found = run(motion, times, state, controls, outputs, locked(carry_on), recording, nullptr,
                   checkpoint ? &checkpoint->integration : nullptr);
   if (checkpoint)
     checkpoint->history = motion.history();
@@ -92,15 +102,8 @@ Run run_tree_sampled(const SystemOnTree &both, const std::vector<double> &times,
   SteeredTree steering(both, commands);
   TreeMotion motion(both.tree, both.scene, times.front(), q.data(), v.data(), nullptr, &steering);
   TreeOutputs outputs(both, times.size(), times.front(), state.data(), &commands);
-  const auto ask = [&](double t) {
-    const nb::gil_scoped_acquire locked;
-    return carry_on(t);
-  };
-  const auto command = [&](std::size_t k, double t, const VectorXd &y) {
-    const nb::gil_scoped_acquire locked;
-    return controller(k, t, y);
-  };
-  return run_sampled(motion, times, state, controls, outputs, commands, sensing, {samples, delay, command}, ask);
+  return run_sampled(motion, times, state, controls, outputs, commands, sensing, {samples, delay, locked(controller)},
+                     locked(carry_on));
 }
 
 void bind_drives(nb::module_ &m) {
@@ -176,6 +179,8 @@ void bind_system_run(nb::module_ &m) {
       .def("__init__", &make_both, "system"_a, "tree"_a, "scene"_a, "bodies"_a, "drives"_a, "reactions"_a,
            nb::keep_alive<1, 2>(), nb::keep_alive<1, 3>(), nb::keep_alive<1, 4>(),
            "bodies: number in the system of each of the tree's.")
+      .def("energies", &energies_of, "q"_a, "v"_a,
+           "Kinetic, strain, gravitational energy and dissipated power (T, 4) of states q, v (T, n_v) of the tree.")
       .def("acceleration_violation", &violation_of, "t"_a, "q"_a, "v"_a, "a"_a,
            "Largest violation of C_ddot = 0 by accelerations a (n_v) of the tree, relative to the terms that cancel.");
   bind_prescribed(m);

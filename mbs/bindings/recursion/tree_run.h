@@ -2,6 +2,7 @@
 #pragma once
 
 #include "bindings/recursion/recursion.h"
+#include "core/check_index.h"
 #include "core/integrate/integrate.h"
 #include "core/recursion/observe.h"
 
@@ -13,23 +14,17 @@ namespace ffrobot::recursion {
 
 using RowMajorMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
-inline void check_index(const char *name, int got, std::size_t count) {
-  if (got < 0 || got >= static_cast<int>(count))
-    throw nanobind::value_error(
-        (std::string(name) + ": expected 0 to " + std::to_string(count) + " - 1, got " + std::to_string(got)).c_str());
-}
-
 inline void check_share(const FrameShare &share, int n_q, int n_v) {
   const auto last = static_cast<int>(share.Phi_r.cols()) - 1;
   for (const int k : {0, last}) {
-    check_index("q of a motor on frames", share.q + k, static_cast<std::size_t>(n_q));
-    check_index("v of a motor on frames", share.v + k, static_cast<std::size_t>(n_v));
+    check_index("q of a motor on frames", share.q + k, n_q);
+    check_index("v of a motor on frames", share.v + k, n_v);
   }
 }
 
 template <class Space> void check_scene(const Model<Space> &model, const Scene &scene) {
   check_size("targets", static_cast<Eigen::Index>(scene.targets.size()), model.rows());
-  const auto n_q = static_cast<std::size_t>(model.mechanism.n_q), n_v = static_cast<std::size_t>(model.mechanism.n_v);
+  const int n_q = model.mechanism.n_q, n_v = model.mechanism.n_v;
   for (const Load &load : scene.loads)
     for (const auto &[i, share] : load.along)
       check_index("coordinate of a load", i, n_v);
@@ -127,11 +122,7 @@ TreeRun integrated(const Model<Space> &model, RecursiveMotion<Space> &motion, Re
   run.report = integrate(
       motion, times, run.last, controls,
       [&](std::size_t i, double t, const double *state) { run.evaluate(i, t, state, reader, model.mechanism); },
-      [&](double t) {
-        const nanobind::gil_scoped_acquire locked;
-        return carry_on(t);
-      },
-      nullptr, breaks, checkpoint ? &checkpoint->integration : nullptr);
+      locked(carry_on), nullptr, breaks, checkpoint ? &checkpoint->integration : nullptr);
   if (checkpoint)
     checkpoint->history = motion.history(); // before what finish() looks at besides
   run.finish(motion);

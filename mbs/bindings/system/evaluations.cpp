@@ -1,12 +1,17 @@
 #include "core/system/motion.h"
 
+#include <optional>
 #include <tuple>
+#include <utility>
 #include <vector>
 
 #include <nanobind/eigen/dense.h>
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
+#include <nanobind/stl/optional.h>
+#include <nanobind/stl/pair.h>
 #include <nanobind/stl/tuple.h>
+#include <nanobind/stl/vector.h>
 
 #include "bindings/bindings.h"
 #include "bindings/system/system.h"
@@ -109,16 +114,24 @@ void force_at(const System &system, double t, const VectorXd &q, const VectorXd 
   }
 }
 
-// f (T, n_v) of motions
+// f (T, n_v) of motions, beside forces `pulls` along measures
 RowMajorMatrix required_forces(const System &system, const VectorXd &times, const RowMajorMatrix &q,
-                               const RowMajorMatrix &v, const RowMajorMatrix &a) {
+                               const RowMajorMatrix &v, const RowMajorMatrix &a,
+                               const std::optional<std::vector<std::pair<Measure, double>>> &pulls) {
   check_motions(system, times, q, v, a);
   Workspace w(system);
   RowMajorMatrix result(times.size(), system.n_v());
   VectorXd f(system.n_v());
   std::vector<Eigen::Matrix3Xd> wrench;
+  MeasureMotion motion;
+  const auto along = pulls.value_or(std::vector<std::pair<Measure, double>>{});
   for (Eigen::Index i = 0; i < times.size(); ++i) {
     force_at(system, times[i], q.row(i), v.row(i), a.row(i), w, f, wrench);
+    for (const auto &[row, pull] : along) {
+      evaluate(row, w.bodies, motion);
+      motion.coefficient_a *= -pull, motion.coefficient_b *= -pull;
+      jacobian(row, motion, system.bodies, w.bodies, system.first_coordinate, f);
+    }
     result.row(i) = f;
   }
   return result;
@@ -237,8 +250,10 @@ void bind_evaluations(nb::module_ &m, nb::class_<System> &system) {
       .def("constraint_jacobians", &constraint_jacobians, "q"_a, "C_q (T, constraints, n_v) at q (T, n_q).")
       .def("rotor_rows", &rotor_rows, "q"_a, "Gradients (rotors, n_v) of the rotors' angles and inertias (rotors,).")
       .def("force_at_rest", &force_at_rest, "t"_a, "q"_a, "Generalized forces (n_v,) of gravity, elasticity, drives.")
-      .def("required_forces", &required_forces, "times"_a, "q"_a, "v"_a, "a"_a,
-           "f = M a - Q (T, n_v), with the inertia of rotors: what constraints and actuators supply in a motion.")
+      .def(
+          "required_forces", &required_forces, "times"_a, "q"_a, "v"_a, "a"_a, "pulls"_a = nb::none(),
+          "f = M a - Q (T, n_v), with the inertia of rotors: what constraints and actuators supply in a motion, beside "
+          "`pulls`: (measure, N or N m) that are held.")
       .def("marker_wrenches", &marker_wrenches, "times"_a, "q"_a, "v"_a, "a"_a, "multipliers"_a,
            "Force and moment (T, 3 markers of all bodies), global axes, of drives, springs, rotors and multipliers.")
       .def("energies", &energies, "q"_a, "v"_a, "Kinetic, strain, gravitational energy and dissipated power (T, 4).");

@@ -14,7 +14,14 @@ inline void collect(const std::vector<Eigen::VectorXd> &of_bodies, std::size_t f
   }
 }
 
-// The other way round.
+// Those of all bodies, `size` numbers.
+inline Eigen::VectorXd joined(const std::vector<Eigen::VectorXd> &of_bodies, Eigen::Index size) {
+  Eigen::VectorXd found(size);
+  collect(of_bodies, 0, found);
+  return found;
+}
+
+// The other way round of collect().
 inline void distribute(const Eigen::VectorXd &joined, std::size_t first, std::vector<Eigen::VectorXd> &of_bodies) {
   for (Eigen::Index row = 0; row < joined.size(); ++first) {
     of_bodies[first] = joined.segment(row, of_bodies[first].size());

@@ -10,7 +10,8 @@ namespace planar = recursion::planar;
 
 MotorsOnTree::MotorsOnTree(const SystemOnTree &both)
     : both_(both), forces_(both.tree), lambda_(VectorXd::Zero(static_cast<Index>(both.tree.rows.size()))),
-      tau_(VectorXd::Zero(static_cast<Index>(both.reactions.motors.size()))), Q_(VectorXd::Zero(both.tree.n_v)) {
+      tau_(VectorXd::Zero(static_cast<Index>(both.reactions.motors.size()))), Q_(VectorXd::Zero(both.tree.n_v)),
+      modal_force_(both.system.bodies.size()) {
   std::vector<bool> is_trajectory(both.tree.rows.size(), false);
   for (const auto &row : both.reactions.rows)
     is_trajectory[static_cast<std::size_t>(row.row)] = row.is_trajectory;
@@ -65,6 +66,8 @@ void MotorsOnTree::turn_frames(int coordinate, double moment, const TreeWorkspac
     const auto port = static_cast<std::size_t>(node.parent_port - nodes[inner].first_port);
     add(inner, nodes[inner].body.ports[port].row + 2, -moment);
   }
+  for (std::size_t b = 0; b < modal_force_.size(); ++b)
+    modal_force_[b] = Q_.segment(both_.drives.modes[b], both_.system.bodies[b].modes());
 }
 
 // Takes what the cuts do off Q, so that nothing is left of it along joint coordinates without a motor.
@@ -83,10 +86,6 @@ void MotorsOnTree::close_loops(const double *q, const TreeWorkspace &w) {
   }
   lu_.compute(columns(joint_coordinates_, Eigen::all));
   Q_ -= cut_columns_ * lu_.solve(Q_(joint_coordinates_)).head(cuts);
-}
-
-Eigen::Map<const VectorXd> MotorsOnTree::modal_force(std::size_t body) const {
-  return {Q_.data() + both_.drives.modes[body], both_.system.bodies[body].modes()};
 }
 
 } // namespace ffrobot

@@ -21,8 +21,8 @@ public:
   // For multipliers lambda (rows of the tree), at the state of the accelerations() of w.
   void resolve(const double *q, const double *lambda, const recursion::Workspace<recursion::Planar, double> &w);
 
-  const Eigen::VectorXd &tau() const { return tau_; }                    // (motors)
-  Eigen::Map<const Eigen::VectorXd> modal_force(std::size_t body) const; // F_p of a body of the system
+  const Eigen::VectorXd &tau() const { return tau_; }                              // (motors)
+  const std::vector<Eigen::VectorXd> &modal_force() const { return modal_force_; } // F_p of each body of the system
 
 private:
   using TreeWorkspace = recursion::Workspace<recursion::Planar, double>;
@@ -35,8 +35,9 @@ private:
   recursion::NewtonEuler forces_;
   std::vector<int> joint_coordinates_, cuts_; // in v; rows of the tree
   Eigen::VectorXd lambda_, tau_, Q_;          // (rows), (motors), (n_v)
-  Eigen::MatrixXd cut_columns_;               // (n_v, cuts) -C_c^T
-  Eigen::PartialPivLU<Eigen::MatrixXd> lu_;   // of joint coordinates by cuts, then motors
+  std::vector<Eigen::VectorXd> modal_force_;
+  Eigen::MatrixXd cut_columns_;             // (n_v, cuts) -C_c^T
+  Eigen::PartialPivLU<Eigen::MatrixXd> lu_; // of joint coordinates by cuts, then motors
 };
 
 } // namespace ffrobot

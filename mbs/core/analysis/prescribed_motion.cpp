@@ -168,7 +168,7 @@ VectorXd PrescribedMotion::left() {
   motors_->resolve(q(), lambda_.data(), w_);
   Index column = 0;
   for (std::size_t b = 0; b < both_.system.bodies.size(); ++b) {
-    const auto F_p = motors_->modal_force(b);
+    const VectorXd &F_p = motors_->modal_force()[b];
     found.segment(column, F_p.size()) += F_p;
     column += F_p.size();
   }

@@ -1,5 +1,7 @@
 #include "core/analysis/run.h"
 
+#include "core/actuation/side_by_side.h"
+
 #include <stdexcept>
 
 namespace ffrobot {
@@ -46,11 +48,7 @@ void OutputEvaluator::operator()(std::size_t output, double t, const double *y) 
     return;
   actuator_forces_->resolve(workspace_);
   outputs_.tau.row(i) = actuator_forces_->tau().transpose();
-  Index column = 0;
-  for (const auto &F_p : actuator_forces_->modal_force()) {
-    outputs_.F_p.row(i).segment(column, F_p.size()) = F_p.transpose();
-    column += F_p.size();
-  }
+  outputs_.F_p.row(i) = joined(actuator_forces_->modal_force(), outputs_.F_p.cols()).transpose();
 }
 
 Outputs OutputEvaluator::take(std::size_t reached) {

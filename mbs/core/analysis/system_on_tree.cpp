@@ -1,42 +1,32 @@
 #include "core/analysis/system_on_tree.h"
 
+#include "core/check_index.h"
+
 #include <stdexcept>
-#include <string>
 
 namespace ffrobot {
 
 using Eigen::Index;
 using Eigen::VectorXd;
 
-namespace {
-
-void check_index(const char *name, Index got, Index count) {
-  if (got < 0 || got >= count)
-    throw std::invalid_argument(std::string(name) + ": expected 0 to " + std::to_string(count) + " - 1, got " +
-                                std::to_string(got));
-}
-
-} // namespace
-
 void SystemOnTree::check() const {
-  const auto count = static_cast<Index>(system.bodies.size()), drive_count = static_cast<Index>(system.drives.size());
-  const auto constraints = static_cast<Index>(system.n_bilateral());
-  bool fits = bodies.size() <= tree.nodes.size() && bodies.size() == system.bodies.size() &&
-              static_cast<Index>(drives.modes.size()) == count;
+  const std::size_t count = system.bodies.size();
+  const auto constraints = system.n_bilateral();
+  bool fits = bodies.size() <= tree.nodes.size() && bodies.size() == count && drives.modes.size() == count;
   for (std::size_t i = 0; fits && i < bodies.size(); ++i)
     fits = bodies[i] < system.bodies.size() && system.bodies[bodies[i]].modes() == tree.nodes[i].n() &&
            drives.modes[bodies[i]] == tree.nodes[i].p_v();
   if (!fits)
     throw std::invalid_argument("bodies: expected those of the system, with as many modes, found others");
   for (const auto &[drive, coordinate, share] : drives.along)
-    check_index("drive", static_cast<Index>(drive), drive_count), check_index("coordinate", coordinate, tree.n_v);
+    check_index("drive", drive, system.drives.size()), check_index("coordinate", coordinate, tree.n_v);
   for (const auto &[drive, wrench, component, share] : drives.at_points) {
-    check_index("drive", static_cast<Index>(drive), drive_count);
-    check_index("wrench", wrench, static_cast<Index>(tree.wrenches.size()));
+    check_index("drive", drive, system.drives.size());
+    check_index("wrench", wrench, tree.wrenches.size());
     check_index("component", component, recursion::Planar::dim);
   }
   for (const auto &[constraint, row, sign, is_trajectory] : reactions.rows)
-    check_index("constraint", constraint, constraints), check_index("row", row, static_cast<Index>(tree.rows.size()));
+    check_index("constraint", constraint, constraints), check_index("row", row, tree.rows.size());
   for (const auto &[constraint, node, component, backwards] : reactions.joints)
     check_index("constraint", constraint, constraints), check_index("node", node, count);
   for (const auto &[constraint, value] : reactions.weights)

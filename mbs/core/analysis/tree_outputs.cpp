@@ -1,5 +1,7 @@
 #include "core/analysis/tree_outputs.h"
 
+#include "core/actuation/side_by_side.h"
+
 #include <algorithm>
 #include <cmath>
 
@@ -104,12 +106,7 @@ void TreeOutputs::write(Index i, const std::vector<Jet> &targets, const TreeWork
     return;
   motors_->resolve(state_.data(), w.lambda.data(), w);
   outputs_.tau.row(i) = motors_->tau().transpose();
-  Index column = 0;
-  for (std::size_t b = 0; b < both_.system.bodies.size(); ++b) {
-    const auto F_p = motors_->modal_force(b);
-    outputs_.F_p.row(i).segment(column, F_p.size()) = F_p.transpose();
-    column += F_p.size();
-  }
+  outputs_.F_p.row(i) = joined(motors_->modal_force(), outputs_.F_p.cols()).transpose();
 }
 
 // Those of joints are, with their signs, components of what these transmit.

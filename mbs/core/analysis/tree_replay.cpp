@@ -34,7 +34,7 @@ void TreeSource::take(const double *state, const recursion::Workspace<recursion:
   motors_->resolve(state, w.lambda.data(), w);
   tau_ = motors_->tau();
   for (std::size_t b = 0; b < modal_force_.size(); ++b)
-    modal_force_[b] = motors_->modal_force(b) + shape_force_[b];
+    modal_force_[b] = motors_->modal_force()[b] + shape_force_[b];
 }
 
 ActuationSource::OnBody TreeSource::on_body(std::size_t body) {

@@ -107,9 +107,14 @@ void response(const Mechanism<Space> &m, const T *q, const T *residual, Workspac
 }
 
 template <class Space, class T>
-void measure(const Mechanism<Space> &m, const T *q, const T *v, Workspace<Space, T> &w, T *value, T *rate) {
-  kinematics(m, q, v, Forces<T>(), w);
+void place_all(const Mechanism<Space> &m, const T *q, const T *v, const Forces<T> &forces, Workspace<Space, T> &w) {
+  kinematics(m, q, v, forces, w);
   locate(m, q, w);
+}
+
+template <class Space, class T>
+void measure(const Mechanism<Space> &m, const T *q, const T *v, Workspace<Space, T> &w, T *value, T *rate) {
+  place_all(m, q, v, Forces<T>(), w);
   for (std::size_t r = 0; r < m.rows.size(); ++r) {
     const Row &row = m.rows[r];
     value[r] = rate[r] = T(0.);

@@ -68,12 +68,14 @@ void run_in_blocks(const Mechanism<Space> &m, const T *q, const T *v, const Forc
   T *S_all = w.factor.data(), *lambda = w.y.data() + 1;
   Schur<T, most_columns> S;
   Pack<T, most_columns> gamma;
+  Forces<T> acting = forces;
   int first = 0;
   for (Block<T> &block : w.blocks) {
     block.terms.clear();
     S.terms = &block.terms;
     exchange_rows(w, block);
-    sweep_block(m, q, v, forces, w, S, gamma);
+    sweep_block(m, q, v, acting, w, S, gamma);
+    acting.is_placed = false; // that of the first block alone
     const int count = static_cast<int>(w.active.size());
     for (int r = 0; r < count; ++r) {
       lambda[first + r] = gamma[r + 1] - S[r + 1][0] - target[w.active[r]];

@@ -18,13 +18,11 @@ struct CutJoint {
   Friction friction;
 };
 
-// Rates (cuts) rad/s, m/s at q, v.
+// Rates (cuts) rad/s, m/s at the state of the last place_all().
 template <class Space, class T>
-void cut_rates(const Mechanism<Space> &m, const std::vector<CutJoint> &cuts, const T *q, const T *v,
-               Workspace<Space, T> &w, T *rate);
+void cut_rates(const Mechanism<Space> &m, const std::vector<CutJoint> &cuts, const Workspace<Space, T> &w, T *rate);
 
-// Adds moments (N m) or forces (N) of `size` (cuts) along the coordinates to wrenches (wrenches, dim), at the state of
-// the last cut_rates().
+// Adds moments (N m) or forces (N) of `size` (cuts) along the coordinates to wrenches (wrenches, dim), at that state.
 template <class Space, class T>
 void add_along_cuts(const Mechanism<Space> &m, const std::vector<CutJoint> &cuts, const T *size,
                     const Workspace<Space, T> &w, T *wrench);

@@ -24,10 +24,7 @@ void cut_pose(const Mechanism<Space> &m, const CutJoint &cut, const Workspace<Sp
 
 // n . (Omega_b - Omega_a), or d/dt n . d with n turning with a
 template <class Space, class T>
-void cut_rates(const Mechanism<Space> &m, const std::vector<CutJoint> &cuts, const T *q, const T *v,
-               Workspace<Space, T> &w, T *rate) {
-  kinematics(m, q, v, Forces<T>(), w);
-  locate(m, q, w);
+void cut_rates(const Mechanism<Space> &m, const std::vector<CutJoint> &cuts, const Workspace<Space, T> &w, T *rate) {
   CutPose<T> at;
   for (std::size_t k = 0; k < cuts.size(); ++k) {
     cut_pose(m, cuts[k], w, at);

@@ -74,7 +74,8 @@ Derivatives derivatives(const Mechanism<Space> &m, const Workspace<Space, double
     if (!cuts.joints.empty()) {
       acting_wrench = wrench;
       acting.wrench = acting_wrench.data();
-      cut_rates(m, cuts.joints, at_q.data(), at_v.data(), w, along.data());
+      place_all(m, at_q.data(), at_v.data(), acting, w), acting.is_placed = true;
+      cut_rates(m, cuts.joints, w, along.data());
       for (std::size_t k = 0; k < along.size(); ++k)
         along[k] = Dual(cuts.loads[k]) - resistance(cuts.joints[k].friction, along[k]);
       add_along_cuts(m, cuts.joints, along.data(), w, acting_wrench.data());

@@ -51,7 +51,8 @@ template <class Space> void RecursiveMotion<Space>::find_coupling() {
   VectorXd unit = VectorXd::Zero(n_v());
   for (Index i = 0; i < n_v(); ++i) {
     unit[i] = 1;
-    cut_rates(mechanism_, scene_.cut_joints, evaluated_.data(), unit.data(), measured_, along_cuts_.data());
+    place_all(mechanism_, evaluated_.data(), unit.data(), Forces<double>(), measured_);
+    cut_rates(mechanism_, scene_.cut_joints, measured_, along_cuts_.data());
     coupling_.row(i) = along_cuts_.transpose();
     unit[i] = 0;
   }

@@ -144,6 +144,9 @@ inline void eliminate_joint(const Mechanism<Space> &m, const Node<Space> &node, 
   if (M != hinge.Lambda)
     for (int i = 0; i < d; ++i)
       hinge.Lambda[i] = M[i]; // in axes of the cross, or without the last row: `factors` knows
+  if (node.is_alone)
+    for (int i = 0; i < d; ++i)
+      H[i].write(w.answer.data() + (node.ground_slot() + i) * stride_of(W));
   if constexpr (d == 6) {
     if (universal) {
       const auto change = [&](auto *x) { from_cross(hinge, x); };

@@ -163,12 +163,14 @@ Mechanism<Space>::Mechanism(std::vector<BodyModel<Data>> bodies, std::vector<Mar
   nodes.resize(count);
   std::vector<std::vector<int>> used(count); // markers that are outboard ports
   // What hangs on what: a port for each child, ports of rows and wrenches where there is none yet
+  std::vector<char> carries(count); // another body
   for (std::size_t i = 0; i < count; ++i) {
     check(bodies[i], i, ground.size(), bodies, Space::dim);
     if (bodies[i].parent < 0 && turns(ground[static_cast<std::size_t>(bodies[i].parent_marker)]))
       refuse("body " + bodies[i].name + ": parent_marker: expected one that stands still, got one that turns");
     nodes[i].parent = bodies[i].parent, nodes[i].parent_port = bodies[i].parent_marker;
     if (bodies[i].parent >= 0) {
+      carries[static_cast<std::size_t>(bodies[i].parent)] = 1;
       auto &ports_there = used[static_cast<std::size_t>(bodies[i].parent)];
       nodes[i].parent_port = static_cast<int>(ports_there.size());
       ports_there.push_back(bodies[i].parent_marker);
@@ -248,7 +250,8 @@ Mechanism<Space>::Mechanism(std::vector<BodyModel<Data>> bodies, std::vector<Mar
     node.first_port = ports, ports += node.ports();
     const int n_ports = node.ports();
     node.first_cross = crosses, crosses += n_ports * (n_ports - 1) / 2;
-    node.first_slot = slots, slots = node.port_slot(node.outboard);
+    node.is_alone = node.parent < 0 && !carries[i] && !node.is_weightless && node.shape.freedoms.count < Space::dim;
+    node.first_slot = slots, slots = node.ground_slot() + (node.is_alone ? Space::dim : 0);
     if (node.shape.quaternion >= 0)
       rotations.push_back(n_v + node.shape.v_count - 3);
     n_q += node.shape.q_count + node.n(), n_v += node.shape.v_count + node.n();

@@ -56,13 +56,14 @@ RecursiveMotion<Space>::RecursiveMotion(const Mechanism<Space> &mechanism, const
   has_given_ = held_ || steering_ || !scene_.loads.empty() || !scene_.joint_forces.empty() ||
                !scene_.frame_motors.empty() || !scene_.gears.empty();
   update_targets(t);
-  keep_independent_rows(mechanism, q, v, workspace_);
+  if (!scene.is_strict)
+    keep_independent_rows(mechanism, q, v, workspace_);
+  else if (!mechanism.rows.empty())
+    evaluate(t, q, v, correction_.data()); // projections need its factors
   newton_.keep(workspace_.active);
   find_stiff_terms();
-  if (scene.has_loops && !workspace_.active.empty()) {
-    accelerations(mechanism, q, v, Forces<double>(), target_.data(), workspace_, unused_.data());
+  if (scene.has_loops && !workspace_.active.empty())
     loops_.emplace(mechanism, workspace_);
-  }
   for (const GearSpring &gear : scene_.gears)
     for (const Node<Space> &node : mechanism.nodes)
       if (node.v == gear.a.v)
@@ -110,14 +111,14 @@ template <class Space> Forces<double> RecursiveMotion<Space>::act(double t, cons
     wrench_.setZero();
     for (const PointLoad &load : scene_.point_loads)
       wrench_[Space::dim * load.wrench + load.component] += load.share * load.magnitude(t).value;
-    if (!scene_.point_forces.empty())
-      act_at_points(t, q, v);
-    if (!scene_.cut_joints.empty())
-      act_along_cuts(t, q, v);
+    if (steering_)
+      steering_->add(t, force_.data(), wrench_.data());
+    if (!scene_.point_forces.empty() || !scene_.cut_joints.empty()) {
+      place_all(mechanism_, q, v, forces, workspace_), forces.is_placed = true;
+      act_at_points(t), act_along_cuts(t);
+    }
     forces.wrench = wrench_.data();
   }
-  if (steering_)
-    steering_->add(t, force_.data(), wrench_.data());
   return forces;
 }
 
@@ -126,28 +127,26 @@ template <class Space> void RecursiveMotion<Space>::evaluate(double t, const dou
   accelerations(mechanism_, q, v, act(t, q, v), target_.data(), workspace_, a);
 }
 
-template <class Space> void RecursiveMotion<Space>::act_at_points(double t, const double *q, const double *v) {
-  if constexpr (Space::dim == 3) {
-    frame_poses(mechanism_, q, v, measured_);
+template <class Space> void RecursiveMotion<Space>::act_at_points(double t) {
+  if constexpr (Space::dim == 3)
     for (const PointForce &force : scene_.point_forces) {
-      const Pose<double> at = wrench_pose(mechanism_, static_cast<std::size_t>(force.wrench), measured_);
+      const Pose<double> at = wrench_pose(mechanism_, static_cast<std::size_t>(force.wrench), workspace_);
       const double position[] = {at.r[0], at.r[1], at.angle}, rate[] = {at.v[0], at.v[1], at.omega[2]};
       Eigen::Vector3d wrench = Eigen::Vector3d::Zero();
       force.function.call(t, position, rate, wrench.data());
       wrench_.template segment<3>(3 * force.wrench) += wrench;
     }
-  }
 }
 
-template <class Space> void RecursiveMotion<Space>::act_along_cuts(double t, const double *q, const double *v) {
-  cut_rates(mechanism_, scene_.cut_joints, q, v, measured_, along_cuts_.data());
+template <class Space> void RecursiveMotion<Space>::act_along_cuts(double t) {
+  cut_rates(mechanism_, scene_.cut_joints, workspace_, along_cuts_.data());
   for (std::size_t k = 0; k < scene_.cut_joints.size(); ++k) {
     double &along = along_cuts_[static_cast<Index>(k)];
     along = -scene_.cut_joints[k].friction.resistance(along);
   }
   for (const CutLoad &load : scene_.cut_loads)
     along_cuts_[load.joint] += load.share * load.magnitude(t).value;
-  add_along_cuts(mechanism_, scene_.cut_joints, along_cuts_.data(), measured_, wrench_.data());
+  add_along_cuts(mechanism_, scene_.cut_joints, along_cuts_.data(), workspace_, wrench_.data());
 }
 
 template <class Space> void RecursiveMotion<Space>::slope(double t, const double *z, double *z_dot) {
@@ -220,7 +219,7 @@ template <class Space> double RecursiveMotion<Space>::error_size(double t, const
   shifted_ = Eigen::Map<const VectorXd>(z, 2 * n_v()) + stretch * Eigen::Map<const VectorXd>(e, 2 * n_v());
   evaluate(t, local().state(shifted_.data()), shifted_.data() + n_v(), unused_.data());
   const double of_forces = norm_.of_observed(workspace_) / stretch;
-  return of_forces <= size ? size : of_forces; // keeps NaN
+  return of_forces <= size || std::isnan(size) ? size : of_forces; // keeps NaN
 }
 
 template <class Space>

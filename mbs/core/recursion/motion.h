@@ -110,7 +110,7 @@ struct Scene {
   bool has_loops = false; // closed by rows: steps do not lead across postures in which all rows depend on each other
   // As scenes in the plane have it: steps are limited where functions of time bend (OdeSystem::prescribe), errors of
   // forces between bodies count twice, and those of links that given forces hold straight are compared with what these
-  // would bend them.
+  // would bend them. No rows depend on others: who makes the scene has refused those that do.
   bool is_strict = false;
   std::vector<double> most_bent; // of each node, kg m^2: p^T p beyond it makes no sense; empty: none is too large
 };
@@ -130,8 +130,8 @@ template <class Space> class RecursiveMotion final : public ImplicitSystem {
 public:
   // The mechanism and the scene must outlive this. Rows that depend on others
   // at time t and (q, v) are left out of the equations from there on; they are
-  // to be consistent. What acts beside the scene's loads may be null, and must outlive this: `held`, which may change
-  // between steps, and `steering`.
+  // to be consistent. Strict scenes have none. What acts beside the scene's loads may be null, and must outlive this:
+  // `held`, which may change between steps, and `steering`.
   RecursiveMotion(const Mechanism<Space> &mechanism, const Scene &scene, double t, const double *q, const double *v,
                   const HeldForces *held = nullptr, Steering *steering = nullptr);
 
@@ -188,8 +188,8 @@ public:
 private:
   void update_targets(double t);
   void residuals(double t, const double *q, const double *v);
-  void act_at_points(double t, const double *q, const double *v);  // adds to wrench_
-  void act_along_cuts(double t, const double *q, const double *v); // adds to wrench_
+  void act_at_points(double t);  // after place_all(); adds to wrench_
+  void act_along_cuts(double t); // after place_all(); adds to wrench_
   void find_stiff_terms();
   void take_posture();
   void find_coupling();

@@ -14,7 +14,8 @@ using Eigen::VectorXd;
 namespace {
 
 constexpr double small_force = 2e-4; // of the largest: forces below count like this one
-constexpr double leverage = 2;       // of multipliers: motors' moments follow from them, and may be small beside them
+constexpr double leverage = 2;       // of multipliers: motors' moments follow from them, and may be small beside them;
+                                     // and where nothing else tells of the forces of fast modes
 constexpr double small_arm = 1e-2;   // of a body's length: moments count like the largest force at it
 constexpr double slow = 3e-4;        // of the natural pace: rates of joints below, times the peak of what they are of,
 constexpr double slow_if_strict = 0.01; // likewise, as in absolute coordinates (core/system/error_norm.*)
@@ -23,6 +24,9 @@ constexpr double small_twist = 1e-5;    // rad, of a spring: rounding of angles 
 constexpr double nothing = std::numeric_limits<double>::min(); // of groups without members
 
 double square(double x) { return x * x; }
+
+// The larger one; NaN where one is, as past the end of a load that has no value from there on
+double larger(double x, double y) { return x >= y || std::isnan(x) ? x : y; }
 
 } // namespace
 
@@ -63,17 +67,20 @@ MotionNorm<Space>::MotionNorm(const Mechanism<Space> &mechanism, bool is_strict)
       is_moment_.push_back(key.second);
     force_group_.push_back(at->second);
   }
-  levers_ = is_moment_.size();
+  leverage_.assign(is_moment_.size(), leverage);
+  const auto add_joint = [&](std::vector<std::size_t> &to, std::size_t at, double counts) {
+    const int force = static_cast<int>(is_moment_.size());
+    to.push_back(at);
+    is_moment_.insert(is_moment_.end(), {false, true}), leverage_.insert(leverage_.end(), 2, counts);
+    for (int i = 0; i < Space::dim; ++i)
+      force_group_.push_back(i < Space::linear ? force : force + 1);
+  };
   for (std::size_t port = 0; port < mechanism.children.size(); ++port)
-    if (mechanism.children[port] >= 0) {
-      const int force = static_cast<int>(is_moment_.size());
-      carriers_.push_back(port);
-      is_moment_.insert(is_moment_.end(), {false, true});
-      for (int i = 0; i < Space::dim; ++i)
-        force_group_.push_back(i < Space::linear ? force : force + 1);
-    }
-  if (is_strict)
-    levers_ = is_moment_.size();
+    if (mechanism.children[port] >= 0)
+      add_joint(carriers_, port, is_strict ? leverage : 1);
+  for (std::size_t i = 0; i < mechanism.nodes.size(); ++i)
+    if (mechanism.nodes[i].is_alone)
+      add_joint(alone_, i, leverage);
   find_pace();
   force_now_ = force_error_ = force_peak_ = std::vector<double>(is_moment_.size(), 0.0);
   observed_ = change_ = VectorXd::Zero(static_cast<Index>(force_group_.size()));
@@ -107,8 +114,7 @@ template <class Space> double MotionNorm<Space>::of_state(const double *e) const
   add_squares(e);
   double worst = 0;
   for (std::size_t g = 0; g < size_.size(); ++g)
-    if (const double size = std::sqrt(size_[g]) / std::max(peak_[g], nothing); !(size <= worst))
-      worst = size; // keeps NaN
+    worst = larger(worst, std::sqrt(size_[g]) / std::max(peak_[g], nothing));
   return worst;
 }
 
@@ -116,18 +122,22 @@ template <class Space> double MotionNorm<Space>::of_change(const double *change,
   const std::size_t groups = pace_.size();
   double worst = of_state(change);
   for (std::size_t g = 0; g < groups; ++g)
-    if (const double size = rate * std::sqrt(size_[groups + g]) / std::max(peak_[2 * groups + g], nothing);
-        !(size <= worst))
-      worst = size; // keeps NaN
+    worst = larger(worst, rate * std::sqrt(size_[groups + g]) / std::max(peak_[2 * groups + g], nothing));
   return worst;
 }
 
 template <class Space> void MotionNorm<Space>::forces(const Workspace<Space, double> &w, VectorXd &values) const {
   const auto rows = static_cast<Index>(mechanism_.rows.size());
   values.head(rows) = Eigen::Map<const VectorXd>(w.lambda.data(), rows);
-  for (std::size_t i = 0; i < carriers_.size(); ++i)
-    values.segment<Space::dim>(rows + static_cast<Index>(i) * Space::dim) =
-        Eigen::Map<const Eigen::Matrix<double, Space::dim, 1>>(w.ports[carriers_[i]].f);
+  Index first = rows;
+  const auto add = [&](const double *f) {
+    values.segment<Space::dim>(first) = Eigen::Map<const Eigen::Matrix<double, Space::dim, 1>>(f);
+    first += Space::dim;
+  };
+  for (const std::size_t port : carriers_)
+    add(w.ports[port].f);
+  for (const std::size_t node : alone_)
+    add(w.hinges[node].f);
 }
 
 template <class Space>
@@ -152,9 +162,7 @@ template <class Space> double MotionNorm<Space>::of_observed(const Workspace<Spa
     const double least = small_force * (is_moment_[g] ? moment : force);
     const double of_springs = is_moment_[g] ? of_springs_ : of_springs_ / sizes_.length();
     const double scale = std::max({force_peak_[g], force_now_[g], least, of_springs, nothing});
-    const double size = (g < levers_ ? leverage : 1) * force_error_[g] / scale;
-    if (!(size <= worst))
-      worst = size; // keeps NaN
+    worst = larger(worst, leverage_[g] * force_error_[g] / scale);
   }
   return worst;
 }
@@ -228,11 +236,14 @@ template <class Space> void MotionNorm<Space>::take_accelerations(const Workspac
 }
 
 template <class Space> void MotionNorm<Space>::set_peaks(const NormPeaks &peaks) {
-  const bool without_accelerations = peaks.state.size() == size_.size(); // as before 0.2.0
-  if ((peaks.state.size() != peak_.size() && !without_accelerations) || peaks.force.size() != force_peak_.size())
+  // both as before 0.2.0: without accelerations, without forces on the ground
+  const bool is_state = peaks.state.size() == peak_.size() || peaks.state.size() == size_.size();
+  const std::size_t on_ground = 2 * alone_.size(), forces = force_peak_.size();
+  if (!is_state || (peaks.force.size() != forces && peaks.force.size() + on_ground != forces))
     throw std::invalid_argument("peaks: expected those of the same mechanism, found those of another one");
   std::copy(peaks.state.begin(), peaks.state.end(), peak_.begin());
-  force_peak_ = peaks.force, inertial_ = peaks.inertial;
+  std::copy(peaks.force.begin(), peaks.force.end(), force_peak_.begin());
+  inertial_ = peaks.inertial;
 }
 
 template class MotionNorm<Planar>;

@@ -12,7 +12,8 @@ struct NormPeaks {
 };
 
 // Alike are all ways of joints, all their angles, each body's modes, the rates of each of these, the multipliers of one
-// joint or path that are forces, or moments, and so what one joint of the tree hands to the body that carries it.
+// joint or path that are forces, or moments, and so what one joint of the tree hands to the body that carries it, and
+// to the ground where no other body hangs on it: those on the ground of chains follow from what is between bodies.
 // Errors e and states z are local coordinates (space/local_coordinates.h).
 template <class Space> class MotionNorm {
 public:
@@ -70,9 +71,10 @@ private:
   mutable std::vector<double> size_;
   std::vector<double> by_forces_, by_given_, of_rates_; // as in take(), squared
   std::vector<std::size_t> carriers_;                   // of all ports: on which a joint of the tree hangs
-  std::vector<int> force_group_;                        // of each row, then of each component at these ports
-  std::vector<bool> is_moment_;                         // of each group of these
-  std::size_t levers_ = 0; // how many groups other forces follow from: those of rows, or all
+  std::vector<std::size_t> alone_;                      // nodes whose forces on the ground are judged
+  std::vector<int> force_group_; // of each row, then of each component at these ports, and of these nodes
+  std::vector<bool> is_moment_;  // of each group of these
+  std::vector<double> leverage_; // of each: more than 1 of those from which other forces follow, or that stand alone
   std::vector<double> force_peak_, force_now_, force_error_;
   Eigen::VectorXd observed_, change_;
   double of_springs_ = 0; // N m, moments below count like this one

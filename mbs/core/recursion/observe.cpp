@@ -70,6 +70,14 @@ Inertia inertia_of(const spatial::Body &b, const double *, const double *v, spat
   return to;
 }
 
+// p_dot^T D p_dot
+template <class Body> double damping_power(const Body &b, const double *p_dot) {
+  const Eigen::Map<const Eigen::VectorXd> rates(p_dot, b.n);
+  if (b.D_full.size())
+    return rates.dot(b.D_full * rates);
+  return rates.cwiseAbs2().dot(Eigen::Map<const Eigen::VectorXd>(b.D.data(), b.n));
+}
+
 // z of the section that the joint holds
 template <class Space>
 Vector3d joint_axis(const Mechanism<Space> &m, std::size_t i, const Workspace<Space, double> &w) {
@@ -86,8 +94,7 @@ Vector3d joint_axis(const Mechanism<Space> &m, std::size_t i, const Workspace<Sp
 template <class Space>
 const std::vector<Pose<double>> &frame_poses(const Mechanism<Space> &m, const double *q, const double *v,
                                              Workspace<Space, double> &w) {
-  kinematics(m, q, v, Forces<double>(), w);
-  locate(m, q, w);
+  place_all(m, q, v, Forces<double>(), w);
   return w.frames;
 }
 
@@ -119,8 +126,7 @@ std::vector<FrameMotion> frame_motions(const Mechanism<Space> &m, const double *
 
 template <class Space>
 Totals totals(const Mechanism<Space> &m, const double *q, const double *v, Workspace<Space, double> &w) {
-  kinematics(m, q, v, Forces<double>(), w);
-  locate(m, q, w);
+  place_all(m, q, v, Forces<double>(), w);
   Totals sum;
   Vector3d g = Vector3d::Zero();
   g.head(m.gravity.size()) = m.gravity;
@@ -137,6 +143,7 @@ Totals totals(const Mechanism<Space> &m, const double *q, const double *v, Works
         0.5 * (u.dot(linear) + omega.dot(angular) + u.dot(body.S_p_dot) + omega.dot(body.h_p_dot)) + body.modal;
     for (int k = 0; k < node.n(); ++k)
       sum.strain += 0.5 * node.body.K[static_cast<std::size_t>(k)] * p[k] * p[k];
+    sum.dissipated += damping_power(node.body, p_dot);
     sum.gravitational -= g.dot(body.mass * r + R * body.s);
     sum.momentum += R * linear;
     sum.angular_momentum += R * angular + r.cross(R * linear);
@@ -149,6 +156,27 @@ Totals totals(const Mechanism<Space> &m, const double *q, const double *v, Works
   return sum;
 }
 
+template <class Space>
+Totals totals(const Mechanism<Space> &m, const Scene &scene, const double *q, const double *v,
+              Workspace<Space, double> &w) {
+  Totals sum = totals(m, q, v, w);
+  for (const JointForce &joint : scene.joint_forces) {
+    const double way = q[joint.q] - joint.rest, rate = v[joint.v];
+    sum.strain += 0.5 * joint.stiffness * way * way;
+    sum.dissipated += joint.friction.resistance(rate) * rate;
+  }
+  for (const auto &[a, b, ratio, stiffness, damping] : scene.gears) {
+    const double twist = q[a.q] - ratio * q[b.q], rate = v[a.v] - ratio * v[b.v];
+    sum.strain += 0.5 * stiffness * twist * twist;
+    sum.dissipated += damping * rate * rate;
+  }
+  std::vector<double> rates(scene.cut_joints.size());
+  cut_rates(m, scene.cut_joints, w, rates.data());
+  for (std::size_t k = 0; k < rates.size(); ++k)
+    sum.dissipated += scene.cut_joints[k].friction.resistance(rates[k]) * rates[k];
+  return sum;
+}
+
 template const std::vector<Pose<double>> &frame_poses(const Mechanism<Planar> &, const double *, const double *,
                                                       Workspace<Planar, double> &);
 template Pose<double> wrench_pose(const Mechanism<Planar> &, std::size_t, const Workspace<Planar, double> &);
@@ -158,5 +186,7 @@ template std::vector<FrameMotion> frame_motions(const Mechanism<Spatial> &, cons
                                                 Workspace<Spatial, double> &);
 template Totals totals(const Mechanism<Planar> &, const double *, const double *, Workspace<Planar, double> &);
 template Totals totals(const Mechanism<Spatial> &, const double *, const double *, Workspace<Spatial, double> &);
+template Totals totals(const Mechanism<Planar> &, const Scene &, const double *, const double *,
+                       Workspace<Planar, double> &);
 
 } // namespace ffrobot::recursion

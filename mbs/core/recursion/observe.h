@@ -1,7 +1,7 @@
 // What a mechanism does at a state, in global axes: for outputs and tests, not for steps.
 #pragma once
 
-#include "core/recursion/workspace.h"
+#include "core/recursion/motion.h"
 
 namespace ffrobot::recursion {
 
@@ -28,12 +28,18 @@ template <class Space>
 std::vector<FrameMotion> frame_motions(const Mechanism<Space> &m, const double *q, const double *v,
                                        Workspace<Space, double> &w);
 
-// Kinetic, strain and gravitational energy (J), and momentum: linear, angular about the origin (3 each).
+// Kinetic, strain and gravitational energy (J), the power (W) that is dissipated, and momentum: linear, angular about
+// the origin (3 each).
 struct Totals {
-  double kinetic = 0, strain = 0, gravitational = 0;
+  double kinetic = 0, strain = 0, gravitational = 0, dissipated = 0;
   Eigen::Vector3d momentum = Eigen::Vector3d::Zero(), angular_momentum = Eigen::Vector3d::Zero();
 };
 template <class Space>
 Totals totals(const Mechanism<Space> &m, const double *q, const double *v, Workspace<Space, double> &w);
+
+// With what springs and friction of a scene store and dissipate
+template <class Space>
+Totals totals(const Mechanism<Space> &m, const Scene &scene, const double *q, const double *v,
+              Workspace<Space, double> &w);
 
 } // namespace ffrobot::recursion

@@ -23,10 +23,11 @@ FFROBOT_INLINE void answers_of(const Workspace<Space, T> &w, int slot, const Pac
   sums(products, to);
 }
 
-// Acceleration A of the section (in: as if the joint were stiff) and a of the joint
+// Acceleration A of the section (in: as if the joint were stiff) and a of the joint; the force on the ground of a body
+// that is alone
 template <class Space, class T, int W>
-inline void release_joint(const Node<Space> &node, const T *q, const Hinge<Space, T> &hinge,
-                          const Workspace<Space, T> &w, const Pack<T, W> &y, T *A, T *a) {
+inline void release_joint(const Node<Space> &node, const T *q, Hinge<Space, T> &hinge, const Workspace<Space, T> &w,
+                          const Pack<T, W> &y, T *A, T *a) {
   constexpr int d = Space::dim;
   T x[6];
   if constexpr (d == 6) {
@@ -34,6 +35,11 @@ inline void release_joint(const Node<Space> &node, const T *q, const Hinge<Space
       to_cross(hinge, A);
     else if (node.joint == JointKind::screw)
       A[2] -= node.lead * A[5];
+  }
+  if (node.is_alone) {
+    const auto by_section = symmetric_product<d, T>(hinge.Lambda, A);
+    for (int i = 0; i < d; ++i)
+      hinge.f[i] = -(by_section[i] + answer<Space, T, W>(w, node.ground_slot() + i, y));
   }
   for (int k = 0; k < node.shape.freedoms.count; ++k) {
     const int f = node.shape.freedoms.component[k];

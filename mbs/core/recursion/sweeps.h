@@ -11,9 +11,11 @@ namespace ffrobot::recursion {
 template <class Space, class T, int W>
 FFROBOT_INLINE void sweep_inward(const Mechanism<Space> &m, const T *q, const T *v, const Forces<T> &forces,
                                  Workspace<Space, T> &w, Schur<T, W> &S, Pack<T, W> &gamma) {
-  kinematics(m, q, v, forces, w);
-  if (m.needs_positions)
-    locate(m, q, w);
+  if (!forces.is_placed) {
+    kinematics(m, q, v, forces, w);
+    if (m.needs_positions)
+      locate(m, q, w);
+  }
   gamma = Pack<T, W>::zero();
   for (int r = 0; r < W; ++r)
     S[r] = Pack<T, W>::zero();

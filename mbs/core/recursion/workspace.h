@@ -47,6 +47,7 @@ template <class Space, class T> struct Hinge {
   T D_inverse[d];
   T A[packed<T, d>] = {}; // of the section
   T pin[2];               // U/D of a pin, in place of all that
+  T f[packed<T, d>] = {}; // on the ground, in axes of the section, of a body that is alone
   T spin;                 // rad/s of its rotor about z
   T gyro[2]; // moment on the inner section about x, y by which the rotor resists turning with it, opposite sign
 };
@@ -104,7 +105,13 @@ template <class Space, class T> struct Workspace {
 template <class T> struct Forces {
   const T *generalized = nullptr; // (n_v): of joints and on modes
   const T *wrench = nullptr;      // (wrenches, dim): force and moment on each, global axes
+  bool is_placed = false;         // place_all() was the last that was done with the workspace, at this state
 };
+
+// Kinematics of a state under given forces along v, and where all frames are (w.frames): what acts where sections are
+// asks for it before accelerations().
+template <class Space, class T>
+void place_all(const Mechanism<Space> &m, const T *q, const T *v, const Forces<T> &forces, Workspace<Space, T> &w);
 
 // Accelerations a (n_v), multipliers workspace.lambda for rows whose second time derivative is to be `target` (rows).
 template <class Space, class T>

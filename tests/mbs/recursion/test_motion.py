@@ -5,7 +5,7 @@ import pytest
 import zoo
 from mechanisms import assemble, core_run, relative
 from points_in_space import J, Mechanism, r
-from random_bodies import ground, random_body, row, three_links
+from random_bodies import ground, random_body, row, state_near_rest, three_links
 from recursion_trees import tree_of
 from rotations import exponential
 
@@ -102,11 +102,9 @@ def test_a_flexible_tree_keeps_momentum_and_energy():
     bodies[0].joint = J.free
     for body in bodies:
         body.damping *= 0
-    model = Mechanism(bodies, ground(rng), np.zeros(3)).model()
-    q, v = 0.02 * rng.standard_normal(model.n_q), 0.3 * rng.standard_normal(model.n_v)
-    for body, (_, p_q, *_) in zip(bodies, model.first, strict=True):
-        if body.joint in (J.spherical, J.free):
-            q[p_q - 4 : p_q] = [1, 0, 0, 0]
+    mechanism = Mechanism(bodies, ground(rng), np.zeros(3))
+    model = mechanism.model()
+    q, v = state_near_rest(rng, mechanism, model, 0.02, 0.3)
     states = _core.tree_motion(model, _core.TreeScene(), [0.0, 1.0], q, v, controls(1e-11), on).states
 
     def kept(y):
@@ -145,8 +143,7 @@ def test_dependent_rows_are_found_and_left_out():
     bodies, bases = three_links(rng), ground(rng, 2)
     mechanism = Mechanism(bodies, bases, np.array([0, 0, -9.81]), [x for x, _ in rows], [x for _, x in rows])
     model = mechanism.model()
-    q, v = 0.1 * rng.standard_normal(model.n_q), rng.standard_normal(model.n_v)
-    q[model.first[1][0] : model.first[1][0] + 4] = [1, 0, 0, 0]
+    q, v = state_near_rest(rng, mechanism, model, 0.1, 1.0)
     kept = model.keep_independent_rows(q, v)
     assert len(kept) == 3
     a, lambda_ = model.evaluate(q, v, np.ones(6), None, None)

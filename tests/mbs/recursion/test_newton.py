@@ -188,7 +188,7 @@ def test_mechanisms_of_the_plane(name, free):
     assembly = assemble(zoo.build(name))
     tree = tree_of(assembly, free=free)
     model, rng = tree.model, np.random.default_rng(1)
-    q = 0.1 * rng.standard_normal(model.n_q) + 0.5
+    q, _ = tree.random_state(rng)
     stiffness, damping, springs = np.zeros(model.n_v), np.zeros(model.n_v), []
     for i, (joint_q, _, joint_v, p_v) in zip(tree.bodies, model.first, strict=True):
         body = assembly.model.bodies[i]

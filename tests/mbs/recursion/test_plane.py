@@ -17,7 +17,8 @@ def compare(tree, seed=1, speed=1.0):
     """Largest relative differences of accelerations and of multipliers that both have."""
     rng = np.random.default_rng(seed)
     model, assembly = tree.model, tree.assembly
-    q, v = 0.1 * rng.standard_normal(model.n_q) + 0.5, speed * rng.standard_normal(model.n_v)
+    q, v = tree.random_state(rng)
+    v *= speed
     target = np.array([assembly.constraints[i].target(T)[2] for i in tree.rows])
     a, lambda_ = model.evaluate(q, v, target, None, None)
     Q, V, A = tree.from_tree(q, v, a)
@@ -45,8 +46,7 @@ def test_many_states_of_a_mixed_tree(seed):
 def test_rows_have_the_values_and_rates_of_the_core():
     assembly = assemble(zoo.build("mixed"))
     tree = tree_of(assembly, free=True)
-    rng = np.random.default_rng(3)
-    q, v = rng.standard_normal(tree.model.n_q), rng.standard_normal(tree.model.n_v)
+    q, v = tree.random_state(np.random.default_rng(3))
     tree.model.evaluate(q, v, np.zeros(len(tree.rows)), None, None)
     Q, V, _ = tree.from_tree(q, v)
     C, C_dot, _ = assembly.system.constraints(T, Q, V)
@@ -102,7 +102,7 @@ def test_derivatives_with_rows_in_several_blocks():
 
 def check_derivatives(tree):
     model, rng = tree.model, np.random.default_rng(5)
-    q, v = 0.1 * rng.standard_normal(model.n_q) + 0.5, rng.standard_normal(model.n_v)
+    q, v = tree.random_state(rng)
     target, force = rng.standard_normal(len(tree.rows)), rng.standard_normal(model.n_v)
     found = model.derivatives(q, v, target, force, None)
 

@@ -32,8 +32,7 @@ template <class T> FFROBOT_INLINE void load_pin(const Mechanism<Planar> &m, int 
 
 template <class T, int W>
 FFROBOT_INLINE void inward_pin(const Mechanism<Planar> &m, const Node<Planar> &node, const T *q, const T *v,
-                               const Forces<T> &forces, Workspace<Planar, T> &w, Schur<T, W> &S,
-                               Pack<T, W> &gamma) {
+                               const Forces<T> &forces, Workspace<Planar, T> &w, Schur<T, W> &S, Pack<T, W> &gamma) {
   constexpr int stride = stride_of(W);
   using Cols = Pack<T, W>;
   const planar::Body &body = node.body;
@@ -148,6 +147,11 @@ FFROBOT_INLINE void inward_pin(const Mechanism<Planar> &m, const Node<Planar> &n
   if (node.parent < 0) {
     if constexpr (W > 1)
       gamma += T(-m.gravity[0]) * P0 + T(-m.gravity[1]) * P1;
+    if (node.is_alone) {
+      T *on_ground = w.answer.data() + node.ground_slot() * stride;
+      H[0].write(on_ground), H[1].write(on_ground + stride);
+      hinge.Lambda[0].set(0, xx), hinge.Lambda[0].set(1, xy), hinge.Lambda[1].set(1, yy);
+    }
     return;
   }
   const int index = node.parent_port;
@@ -176,7 +180,7 @@ FFROBOT_INLINE void release_pin(const Mechanism<Planar> &m, const Node<Planar> &
   const planar::Body &body = node.body;
   const auto i_node = &node - m.nodes.data();
   planar::State<T> &s = w.bodies[i_node];
-  const Hinge<Planar, T> &hinge = w.hinges[i_node];
+  Hinge<Planar, T> &hinge = w.hinges[i_node];
   T Px, Py, P_rotation(0.);
   if (node.parent < 0)
     Px = T(by_multipliers ? 0. : -m.gravity[0]), Py = T(by_multipliers ? 0. : -m.gravity[1]);
@@ -186,6 +190,11 @@ FFROBOT_INLINE void release_pin(const Mechanism<Planar> &m, const Node<Planar> &
   }
   const T c = hinge.turn.c, n = hinge.turn.s;
   const T Ax = c * Px + n * Py, Ay = c * Py - n * Px;
+  if (node.is_alone) {
+    const T xx = hinge.Lambda[0][0], xy = hinge.Lambda[0][1], yy = hinge.Lambda[1][1];
+    hinge.f[0] = -(answer<Planar, T, W>(w, node.ground_slot(), y) + xx * Ax + xy * Ay);
+    hinge.f[1] = -(answer<Planar, T, W>(w, node.ground_slot() + 1, y) + xy * Ax + yy * Ay);
+  }
   const T Aa = -(answer<Planar, T, W>(w, node.joint_slot(0), y) + hinge.pin[0] * Ax + hinge.pin[1] * Ay);
   a[node.v] = Aa - P_rotation;
   s.A[0] = Ax, s.A[1] = Ay, s.A[2] = Aa;

@@ -13,9 +13,9 @@
 // need them); these are in W alone, not in `rows` and G, which the other products are made of.
 #pragma once
 
+#include "core/recursion/mode_matrix.h"
 #include "core/recursion/model.h"
 #include "core/recursion/small.h"
-#include "core/recursion/mode_matrix.h"
 #include "core/recursion/spatial/stiffening.h"
 
 #include <memory>
