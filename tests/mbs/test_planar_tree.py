@@ -15,7 +15,6 @@ from ffrobot.mbs.analysis.elastic_joints import with_compliance
 from ffrobot.mbs.fields.state_forces import state_function
 from ffrobot.mbs.joints.measure import Marker
 from ffrobot.mbs.model.planar_tree import PlanarTree
-from ffrobot.mbs.model.tree_layout import NotInTreeError
 from ffrobot.mbs.solve.initial_state import undeformed_state
 
 T = 0.0

@@ -18,8 +18,8 @@ from ffrobot.mbs.analysis.replay import ActuatorSet
 from ffrobot.mbs.fields.state_forces import state_function
 from ffrobot.mbs.joints.measure import Marker
 from ffrobot.mbs.model.planar_body import from_rigid_body
-from ffrobot.mbs.scene.bodies import RigidBody
 from ffrobot.mbs.model.planar_tree import PlanarTree
+from ffrobot.mbs.scene.bodies import RigidBody
 from ffrobot.mbs.solve.initial_state import undeformed_state
 
 KEYS = {"end": 0.05, "output_step": 0.005, "tolerance": 1e-10, "integrator": "dop853"}

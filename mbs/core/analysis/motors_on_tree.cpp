@@ -43,6 +43,8 @@ void MotorsOnTree::resolve(const double *q, const double *lambda, const TreeWork
     if (turns_frames)
       turn_frames(coordinate, along, w);
   }
+  for (std::size_t b = 0; b < modal_force_.size(); ++b)
+    modal_force_[b] = Q_.segment(both_.drives.modes[b], both_.system.bodies[b].modes());
 }
 
 // Of a moment between the frames of bodies in place of their sections: what it does less on modes, F_p does more.
@@ -66,8 +68,6 @@ void MotorsOnTree::turn_frames(int coordinate, double moment, const TreeWorkspac
     const auto port = static_cast<std::size_t>(node.parent_port - nodes[inner].first_port);
     add(inner, nodes[inner].body.ports[port].row + 2, -moment);
   }
-  for (std::size_t b = 0; b < modal_force_.size(); ++b)
-    modal_force_[b] = Q_.segment(both_.drives.modes[b], both_.system.bodies[b].modes());
 }
 
 // Takes what the cuts do off Q, so that nothing is left of it along joint coordinates without a motor.
