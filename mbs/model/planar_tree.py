@@ -110,11 +110,10 @@ class PlanarTree:
         readings = _core.Sensing(self._assembly.system, along, []).read(*system)
         indices, signs = [c.number for c in coordinates], np.array([c.sign for c in coordinates])
         found[:, :, indices] = signs * readings.reshape(len(readings), 3, -1).swapaxes(0, 1)
-        for row, node in self._beside.items():  # what is left of it where the rotor has not turned; linear
-            for q_tree, v_tree, a_tree in found.swapaxes(0, 1):
-                turned, rate = self.core.measure(q_tree, v_tree)
-                q_tree[node.first], v_tree[node.first] = turned[row], rate[row]
-                a_tree[node.first] = self.core.measure(q_tree, a_tree)[1][row]
+        for row, node in self._beside.items():  # by what is left of their rows, which are linear in these coordinates
+            for motion in found.swapaxes(0, 1):
+                (turned, rate), (_, acceleration) = (self.core.measure(motion[0], x) for x in motion[1:])
+                motion[:, node.first] += turned[row], rate[row], acceleration[row]
         return found.reshape(3, *times, -1)
 
     @property
