@@ -77,6 +77,9 @@ Run run_tree(const SystemOnTree &both, const std::vector<double> &times, const V
   if (external_loads)
     steering.emplace(both, *external_loads);
   TreeMotion motion(both.tree, both.scene, times.front(), q.data(), v.data(), nullptr, steering ? &*steering : nullptr);
+  std::optional<MotorsOnTree> motors;
+  if (!both.reactions.motors.empty())
+    motion.judge(motors.emplace(both));
   if (checkpoint && checkpoint->integration.has_begun()) {
     check_size("state of the checkpoint", checkpoint->integration.state.size(), state.size());
     motion.go_on(checkpoint->history);

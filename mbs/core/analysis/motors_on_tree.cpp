@@ -24,6 +24,20 @@ MotorsOnTree::MotorsOnTree(const SystemOnTree &both)
   cut_columns_.resize(both.tree.n_v, static_cast<Index>(cuts_.size()));
 }
 
+std::vector<bool> MotorsOnTree::are_moments() const {
+  std::vector<bool> found;
+  for (const auto &motor : both_.reactions.motors)
+    for (const auto &node : both_.tree.nodes)
+      if (const int k = motor.coordinate - node.v; k >= 0 && k < node.shape.freedoms.count)
+        found.push_back(node.shape.freedoms.component[k] >= recursion::Planar::linear);
+  return found;
+}
+
+const VectorXd &MotorsOnTree::find(const double *q, const TreeWorkspace &w) {
+  resolve(q, w.lambda.data(), w);
+  return tau_;
+}
+
 void MotorsOnTree::project(const double *q, const TreeWorkspace &w, Eigen::Ref<VectorXd> Q) {
   forces_.load(lambda_.data(), nullptr, w);
   forces_.project(q, w, Q.data());

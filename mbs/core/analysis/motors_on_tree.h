@@ -14,12 +14,16 @@ namespace ffrobot {
 //
 // with rows C_c where loops are cut and motors' T: the rows of joint coordinates give nu and tau, those of modes F_p.
 // Needs as many motors as the mechanism with rigid links has degrees of freedom.
-class MotorsOnTree {
+class MotorsOnTree final : public recursion::MotorForces<recursion::Planar> {
 public:
   explicit MotorsOnTree(const SystemOnTree &both); // which must outlive this
 
   // For multipliers lambda (rows of the tree), at the state of the accelerations() of w.
   void resolve(const double *q, const double *lambda, const recursion::Workspace<recursion::Planar, double> &w);
+
+  std::vector<bool> are_moments() const override;
+  const Eigen::VectorXd &find(const double *q,
+                              const recursion::Workspace<recursion::Planar, double> &w) override; // tau()
 
   const Eigen::VectorXd &tau() const { return tau_; }                              // (motors)
   const std::vector<Eigen::VectorXd> &modal_force() const { return modal_force_; } // F_p of each body of the system

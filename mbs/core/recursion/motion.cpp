@@ -206,9 +206,18 @@ template <class Space> bool RecursiveMotion<Space>::correct(double t, double *z)
   return left < 1e-11;
 }
 
+template <class Space> void RecursiveMotion<Space>::judge(MotorForces<Space> &motors) {
+  motors_ = &motors;
+  norm_.add_motors(motors.are_moments());
+}
+
+template <class Space> const VectorXd *RecursiveMotion<Space>::motors_at(const double *q) {
+  return motors_ && norm_.judges_motors() ? &motors_->find(q, workspace_) : nullptr;
+}
+
 template <class Space> double RecursiveMotion<Space>::error_size(double t, const double *z, const double *e) {
   const double size = norm_.of_state(e);
-  norm_.observe(workspace_);
+  norm_.observe(workspace_, motors_at(local().state(z)));
   if (!norm_.observes())
     return size;
   if (loops_ && !(loops_->cosine(local().state(z), workspace_) > 0)) // shorter steps end before that posture
@@ -217,8 +226,9 @@ template <class Space> double RecursiveMotion<Space>::error_size(double t, const
   // it is small, in a difference that rounding of forces does not disturb.
   const double stretch = size > 0 ? std::max(1.0, least_shift / size) : 1;
   shifted_ = Eigen::Map<const VectorXd>(z, 2 * n_v()) + stretch * Eigen::Map<const VectorXd>(e, 2 * n_v());
-  evaluate(t, local().state(shifted_.data()), shifted_.data() + n_v(), unused_.data());
-  const double of_forces = norm_.of_observed(workspace_) / stretch;
+  const double *q = local().state(shifted_.data());
+  evaluate(t, q, shifted_.data() + n_v(), unused_.data());
+  const double of_forces = norm_.of_observed(workspace_, motors_at(q)) / stretch;
   return of_forces <= size || std::isnan(size) ? size : of_forces; // keeps NaN
 }
 
@@ -229,7 +239,7 @@ double RecursiveMotion<Space>::change_size(const double *, const double *change,
 
 template <class Space> void RecursiveMotion<Space>::accepted(double t, const double *z, const double *z_dot) {
   if (accepted_ == 0)
-    norm_.observe(workspace_);
+    norm_.observe(workspace_, motors_at(local().state(z)));
   if (loops_ && loops_->is_far())
     loops_->begin_at(local().state(z), workspace_, newton_);
   norm_.take(z, z_dot, scene_.is_strict && has_given_ ? force_.data() : nullptr, workspace_);

@@ -95,6 +95,15 @@ public:
   virtual void add(double t, double *force, double *wrench) = 0;
 };
 
+// What motors must do in place of the forces on rows, where these hold trajectories.
+template <class Space> class MotorForces {
+public:
+  virtual ~MotorForces() = default;
+  virtual std::vector<bool> are_moments() const = 0; // N m, else N
+  // At q (n_q), of which w has the kinematics and the multipliers
+  virtual const Eigen::VectorXd &find(const double *q, const Workspace<Space, double> &w) = 0;
+};
+
 struct Scene {
   std::vector<Target> targets; // of rows
   std::vector<Load> loads;
@@ -136,6 +145,7 @@ public:
                   const HeldForces *held = nullptr, Steering *steering = nullptr);
 
   void plan(double duration) { norm_.plan(duration); } // s, of the run to come
+  void judge(MotorForces<Space> &motors);              // their errors, too; must outlive this
 
   void slope(double t, const double *z, double *z_dot) override;
   bool correct(double t, double *z) override;
@@ -188,8 +198,9 @@ public:
 private:
   void update_targets(double t);
   void residuals(double t, const double *q, const double *v);
-  void act_at_points(double t);  // after place_all(); adds to wrench_
-  void act_along_cuts(double t); // after place_all(); adds to wrench_
+  void act_at_points(double t);                      // after place_all(); adds to wrench_
+  void act_along_cuts(double t);                     // after place_all(); adds to wrench_
+  const Eigen::VectorXd *motors_at(const double *q); // of the last evaluation; null where they are not judged
   void find_stiff_terms();
   void take_posture();
   void find_coupling();
@@ -212,6 +223,7 @@ private:
   double target_time_;
   double fastest_ = 0; // 1/s, of modes
   MotionNorm<Space> norm_;
+  MotorForces<Space> *motors_ = nullptr;
   Eigen::VectorXd shifted_, unused_;
   // the worst posture along the path, and when
   double least_ratio_ = 1, singular_at_ = 0;

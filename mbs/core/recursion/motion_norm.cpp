@@ -16,6 +16,7 @@ namespace {
 constexpr double small_force = 2e-4; // of the largest: forces below count like this one
 constexpr double leverage = 2;       // of multipliers: motors' moments follow from them, and may be small beside them;
                                      // and where nothing else tells of the forces of fast modes
+constexpr double small_motor = 0.1;  // of the largest: what motors do is judged below
 constexpr double small_arm = 1e-2;   // of a body's length: moments count like the largest force at it
 constexpr double slow = 3e-4;        // of the natural pace: rates of joints below, times the peak of what they are of,
 constexpr double slow_if_strict = 0.01; // likewise, as in absolute coordinates (core/system/error_norm.*)
@@ -82,6 +83,15 @@ MotionNorm<Space>::MotionNorm(const Mechanism<Space> &mechanism, bool is_strict)
     if (mechanism.nodes[i].is_alone)
       add_joint(alone_, i, leverage);
   find_pace();
+  add_motors({});
+}
+
+template <class Space> void MotionNorm<Space>::add_motors(const std::vector<bool> &are_moments) {
+  for (const bool is_moment : are_moments) {
+    force_group_.push_back(static_cast<int>(is_moment_.size()));
+    is_moment_.push_back(is_moment), leverage_.push_back(1);
+  }
+  motors_ += are_moments.size();
   force_now_ = force_error_ = force_peak_ = std::vector<double>(is_moment_.size(), 0.0);
   observed_ = change_ = VectorXd::Zero(static_cast<Index>(force_group_.size()));
 }
@@ -126,7 +136,8 @@ template <class Space> double MotionNorm<Space>::of_change(const double *change,
   return worst;
 }
 
-template <class Space> void MotionNorm<Space>::forces(const Workspace<Space, double> &w, VectorXd &values) const {
+template <class Space>
+void MotionNorm<Space>::forces(const Workspace<Space, double> &w, const VectorXd *motors, VectorXd &values) const {
   const auto rows = static_cast<Index>(mechanism_.rows.size());
   values.head(rows) = Eigen::Map<const VectorXd>(w.lambda.data(), rows);
   Index first = rows;
@@ -138,6 +149,10 @@ template <class Space> void MotionNorm<Space>::forces(const Workspace<Space, dou
     add(w.ports[port].f);
   for (const std::size_t node : alone_)
     add(w.hinges[node].f);
+  if (motors)
+    values.tail(motors->size()) = *motors;
+  else
+    values.tail(static_cast<Index>(motors_)).setZero();
 }
 
 template <class Space>
@@ -149,15 +164,34 @@ void MotionNorm<Space>::sizes_of_forces(const VectorXd &values, std::vector<doub
     x = std::sqrt(x);
 }
 
-template <class Space> void MotionNorm<Space>::observe(const Workspace<Space, double> &w) { forces(w, observed_); }
+template <class Space> void MotionNorm<Space>::observe(const Workspace<Space, double> &w, const VectorXd *motors) {
+  forces(w, motors, observed_);
+}
 
-template <class Space> double MotionNorm<Space>::of_observed(const Workspace<Space, double> &w) {
-  forces(w, change_), change_ -= observed_;
-  sizes_of_forces(observed_, force_now_), sizes_of_forces(change_, force_error_);
-  double force = inertial_, moment = 0, worst = 0; // the largest of all
+template <class Space> typename MotionNorm<Space>::Largest MotionNorm<Space>::largest() const {
+  double force = inertial_, moment = 0;
   for (std::size_t g = 0; g < is_moment_.size(); ++g)
     (is_moment_[g] ? moment : force) = std::max(is_moment_[g] ? moment : force, force_peak_[g]);
-  force = std::max(force, moment / sizes_.length()), moment = std::max(moment, small_arm * sizes_.length() * force);
+  force = std::max(force, moment / sizes_.length());
+  return {force, std::max(moment, small_arm * sizes_.length() * force)};
+}
+
+template <class Space> bool MotionNorm<Space>::judges_motors() const {
+  if (motors_ == 0)
+    return false;
+  const auto [force, moment] = largest();
+  for (std::size_t g = is_moment_.size() - motors_; g < is_moment_.size(); ++g)
+    if (force_peak_[g] <= small_motor * (is_moment_[g] ? moment : force))
+      return true;
+  return false;
+}
+
+template <class Space>
+double MotionNorm<Space>::of_observed(const Workspace<Space, double> &w, const VectorXd *motors) {
+  forces(w, motors, change_), change_ -= observed_;
+  sizes_of_forces(observed_, force_now_), sizes_of_forces(change_, force_error_);
+  const auto [force, moment] = largest();
+  double worst = 0;
   for (std::size_t g = 0; g < is_moment_.size(); ++g) {
     const double least = small_force * (is_moment_[g] ? moment : force);
     const double of_springs = is_moment_[g] ? of_springs_ : of_springs_ / sizes_.length();

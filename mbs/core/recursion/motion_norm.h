@@ -34,10 +34,15 @@ public:
   // of_state, and the accelerations that a change of rates is worth at `rate` (1/s).
   double of_change(const double *change, double rate) const;
 
+  // Motors (moments, or forces) follow from multipliers, of which theirs may be a small difference: from here on they
+  // are judged by their own size while that is small.
+  void add_motors(const std::vector<bool> &are_moments);
+  bool judges_motors() const; // the next observe() and of_observed() are to be given theirs
+
   // Keeps the forces of the last evaluation: multipliers, then those at ports; then, of another at a state that an
-  // error has shifted, by how much these differ.
-  void observe(const Workspace<Space, double> &w);
-  double of_observed(const Workspace<Space, double> &w);
+  // error has shifted, by how much these differ. `motors`: theirs there; null where they are not judged.
+  void observe(const Workspace<Space, double> &w, const Eigen::VectorXd *motors = nullptr);
+  double of_observed(const Workspace<Space, double> &w, const Eigen::VectorXd *motors = nullptr);
   bool observes() const { return !force_group_.empty(); }
 
   // Peaks grow by the state z, its rate and the forces observed there; w: as at the last evaluation. `applied` (n_v):
@@ -50,9 +55,13 @@ public:
 private:
   void find_pace();
   void add_squares(const double *z) const;
-  void forces(const Workspace<Space, double> &w, Eigen::VectorXd &values) const;
+  void forces(const Workspace<Space, double> &w, const Eigen::VectorXd *motors, Eigen::VectorXd &values) const;
   void take_accelerations(const Workspace<Space, double> &w);
   void sizes_of_forces(const Eigen::VectorXd &values, std::vector<double> &size) const;
+  struct Largest {
+    double force, moment; // N, N m
+  };
+  Largest largest() const; // so far
 
   const Mechanism<Space> &mechanism_;
   bool is_strict_;
@@ -72,7 +81,8 @@ private:
   std::vector<double> by_forces_, by_given_, of_rates_; // as in take(), squared
   std::vector<std::size_t> carriers_;                   // of all ports: on which a joint of the tree hangs
   std::vector<std::size_t> alone_;                      // nodes whose forces on the ground are judged
-  std::vector<int> force_group_; // of each row, then of each component at these ports, and of these nodes
+  std::size_t motors_ = 0;                              // judged
+  std::vector<int> force_group_; // of each row, of each component at these ports, and of these nodes, of each motor
   std::vector<bool> is_moment_;  // of each group of these
   std::vector<double> leverage_; // of each: more than 1 of those from which other forces follow, or that stand alone
   std::vector<double> force_peak_, force_now_, force_error_;
