@@ -13,6 +13,7 @@ SAMPLES = 2001
 LOOKED_INTO = 5  # intervals between samples, the roughest ones
 HALVINGS = 25
 JUMP = 1e-4  # in terms of the largest value or velocity: less is rounded numbers in an expression
+SMOOTH = 0.1  # of that: what misses less in one of those intervals has no jump
 RESTING = 1e-6  # of the largest value, within the run: a path that moves less stands still, and what jumps is rounding
 
 
@@ -39,26 +40,34 @@ def check_smooth(assembly: MechanismSystem, end: float) -> None:
 def _jump(function: TimeFunction, end: float, order: int) -> tuple[float, float, float] | None:
     """Time, value before and after of the first jump that is found in a derivative of that order; None without one."""
     times = as_floats(np.linspace(0.0, end, SAMPLES))
-    values, *_ = derivatives = function.sample(times)
-    samples, still = derivatives[order], RESTING * float(np.abs(values).max())
+    derivatives = function.sample(times)
+    samples, still = derivatives[order], RESTING * float(np.abs(derivatives[0]).max())
     size = max(float(np.ptp(samples)), still) if order == 0 else max(float(np.abs(samples).max()), still / end)
     if not (np.isfinite(samples).all() and size > 0):
         return None
-    jumps = []
-    for i in np.argsort(-_misfits(function, times, order))[:LOOKED_INTO]:
-        a, b = times[i], times[i + 1]
-        for _ in range(HALVINGS):
-            middle = 0.5 * (a + b)
-            left, right = _misfits(function, np.array([a, middle, b]), order)
-            a, b = (a, middle) if left > right else (middle, b)
-        if _misfits(function, np.array([a, b]), order)[0] > JUMP * size:
-            before, after = function.sample(np.array([a, b]))[order]
-            jumps.append((float(b), float(before), float(after)))
-    return min(jumps, default=None)
+    misfits = _misfits(function, times, order)
+    rough = np.argsort(-misfits)[:LOOKED_INTO]
+    rough = rough[misfits[rough] > SMOOTH * JUMP * size]
+    if rough.size == 0:
+        return None
+    a, b = times[rough], times[rough + 1]
+    for _ in range(HALVINGS):
+        middle = 0.5 * (a + b)
+        halves = _misfits(function, np.stack([a, middle, b]), order)
+        a, b = np.where(halves[0] > halves[1], (a, middle), (middle, b))
+    jumps = _misfits(function, np.stack([a, b]), order)[0] > JUMP * size
+    if not jumps.any():
+        return None
+    first = np.flatnonzero(jumps)[np.argmin(b[jumps])]
+    before, after = function.sample(np.array([a[first], b[first]]))[order]
+    return float(b[first]), float(before), float(after)
 
 
 def _misfits(function: TimeFunction, times: Array, order: int) -> Array:
-    """What the trapezoidal rule on the next derivative misses of each change between neighbouring times (T − 1,)."""
-    value, slope = function.sample(times)[order : order + 2]
-    misfits: Array = np.abs(np.diff(value) - 0.5 * np.diff(times) * (slope[1:] + slope[:-1]))
+    """What the trapezoidal rule on the next derivative misses of each change between neighbouring times.
+
+    Of times (T, …) along the first axis; (T − 1, …).
+    """
+    value, slope = function.sample(times.ravel())[order : order + 2].reshape(2, *times.shape)
+    misfits: Array = np.abs(np.diff(value, axis=0) - 0.5 * np.diff(times, axis=0) * (slope[1:] + slope[:-1]))
     return np.nan_to_num(misfits, nan=0.0, posinf=0.0)
