@@ -63,7 +63,7 @@ def test_planar_arm_with_few_modes_in_space(tmp_path):
 
 
 def test_planar_arm_chooses_the_same_modes_in_space(tmp_path):
-    """The search takes the same steps, with estimates that differ by what integrations err: a small part of the tolerance."""
+    """The search takes the same steps; estimates differ by what integrations err, a small part of the tolerance."""
     tolerance = 3e-3
     tables = two_links("auto", tolerance=tolerance, integrator="dop853")
     planar, spatial = (results_of(t, tmp_path, n) for t, n in zip(tables, "ps", strict=True))

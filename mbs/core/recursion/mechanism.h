@@ -24,13 +24,13 @@ template <class Space> struct Node {
   int outboard = 0;    // how many
   int inboard =
       -1; // its port (of the body) where modes move the section that the joint holds; else its frame sits there
-  int q = 0, v = 0;   // first of the joint; those of the modes follow
-  int first_slot = 0; // of columns: the joint's freedoms; 2 dim where it has an inboard port; dim for each outboard
-                      // port, and for what a body that is alone does to the ground
-  int first_cross = 0;        // of blocks between ports: (0, 1), (0, 2) … (1, 2) …; none with a single port
-  bool is_pin = false;        // plane: a revolute joint, at most one port, which passes forces only (planar/pins.h)
-  bool has_rows = false;      // constraint rows that are coordinates of the joint
-  bool is_alone = false;      // hangs on the ground, and nothing on it: forces on the ground are kept (Hinge::f)
+  int q = 0, v = 0;      // first of the joint; those of the modes follow
+  int first_slot = 0;    // of columns: the joint's freedoms; 2 dim where it has an inboard port; dim for each outboard
+                         // port, and for what a body that is alone does to the ground
+  int first_cross = 0;   // of blocks between ports: (0, 1), (0, 2) … (1, 2) …; none with a single port
+  bool is_pin = false;   // plane: a revolute joint, at most one port, which passes forces only (planar/pins.h)
+  bool has_rows = false; // constraint rows that are coordinates of the joint
+  bool is_alone = false; // hangs on the ground, and nothing on it: forces on the ground are kept (Hinge::f)
   bool is_weightless = false; // nothing but a rotor's inertia, nothing hangs on it: what carries it feels no inertia
   Eigen::Vector3d origin = Eigen::Vector3d::Zero(); // of the body's data, in axes of the frame
   double turn = 0;                                  // in the plane: of the frame's axes in those of the body's data
