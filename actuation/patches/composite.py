@@ -23,7 +23,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -106,7 +105,7 @@ def _on_link(placed: Sequence[Placed], body: ModalBody) -> _OnLink:
     felt = np.unique(np.concatenate([felt_rows(layout) for layout, _ in placed]))
     intervals, covering = _intervals(placed)
     points = list(gauss_points(body, intervals))
-    B: Array = np.concatenate([_strains(body, at.x)[felt] for at in points])
+    B = _strains(body, np.array([at.x for at in points]))[:, felt].reshape(-1, body.mode_count)
     patches = sum(len(edges) for _, edges in placed)
     C, f = np.zeros((len(B), len(B))), np.zeros((len(B), patches))
     straight, exact = np.zeros_like(f), np.zeros(len(B))
@@ -130,24 +129,30 @@ def stiffness_ratios(placed: Placed, body: ModalBody) -> tuple[Array, Array]:
     voltage, in parts of c V/EI (c V/GJ), that of a link which does not feel the layers' stiffness.
     """
     layout, edges = placed
-    found, sections = np.zeros((len(edges), 3)), link_sections(body)
-    alike = sections.alike
+    sections = link_sections(body)
     own, felt = own_row(layout), felt_rows(layout)
 
-    @cache
-    def ratios(station: int) -> Array:
-        """(3,) of a length of one there: 1, ψ and the authority."""
+    def ratios(station: int) -> tuple[float, float]:
         rigidity = sections.rigidity[station]
         C, f = felt_loads(layout, sections, station)
-        strain = np.zeros(4)
-        strain[felt] = np.linalg.solve(np.diag(rigidity[felt]) + C[np.ix_(felt, felt)], f[felt])
-        ratio = rigidity[STRETCH] / (layout.modulus * layout.width * layout.layers * layout.thickness)
+        strain = np.linalg.solve(np.diag(rigidity[felt]) + C[np.ix_(felt, felt)], f[felt])[np.searchsorted(felt, own)]
+        psi = rigidity[STRETCH] / (layout.modulus * layout.width * layout.layers * layout.thickness)
         straight = straight_loads(layout, *place_of(layout, sections, station))[own]
-        return np.array([1.0, ratio, strain[own] * rigidity[own] / straight])
+        return psi, strain * rigidity[own] / straight
 
-    for at in gauss_points(body, edges):
-        found[at.interval] += at.weight * ratios(int(alike[at.station]))
-    return found[:, 1] / found[:, 0], found[:, 2] / found[:, 0]
+    lengths, alike = _lengths_between_stations(body, edges), sections.alike[:-1]
+    covered = np.unique(alike[lengths.any(axis=0)])
+    shares = np.stack([lengths[:, alike == station].sum(axis=1) for station in covered], axis=1)
+    found = shares @ np.array([ratios(int(station)) for station in covered]) / shares.sum(axis=1, keepdims=True)
+    return found[:, 0], found[:, 1]
+
+
+def _lengths_between_stations(body: ModalBody, intervals: Array) -> Array:
+    """(m, stations − 1) of `intervals` (m, 2) between one station and the next, m, without slivers."""
+    x = body.stations.position[:, 0]
+    starts, ends = (edge[:, None] for edge in intervals.clip(0.0, body.length).T)
+    lengths: Array = (np.minimum(ends, x[1:]) - np.maximum(starts, x[:-1])).clip(min=0.0)
+    return np.where(lengths > SLIVER * (ends - starts), lengths, 0.0)
 
 
 def gauss_points(body: ModalBody, intervals: Array) -> Iterator[GaussPoint]:
@@ -215,8 +220,9 @@ def _residual(exact: Array, of_modes: Array) -> Array:
     return np.asarray((scale[:, None] * turn * values.clip(min=0.0)) @ (turn.T * scale))
 
 
-def _strains(body: ModalBody, x: float) -> Array:
-    """B (4, n): e of the modes at x: differences inside an element, exact for its quadratics."""
+def _strains(body: ModalBody, x: Array) -> Array:
+    """B (m, 4, n): e of the modes at x (m,): differences inside an element, exact for its quadratics."""
     stations = body.stations.position[:, 0]
-    h = min(1e-3 * body.length, 0.5 * float(np.abs(stations - x).min()))
-    return as_floats((potentials(body.interpolate(x + h)) - potentials(body.interpolate(x - h))) / (2 * h))
+    h = np.minimum(1e-3 * body.length, 0.5 * np.abs(stations - x[:, None]).min(axis=1))
+    rise = potentials(body, x + h) - potentials(body, x - h)
+    return as_floats(rise / (2 * h)[:, None, None])

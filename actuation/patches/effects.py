@@ -52,20 +52,23 @@ def effects(key: str, placed: Sequence[Placed], body: ModalBody) -> list[Effects
 def _straight(key: str, placed: Placed, body: ModalBody) -> Effects:
     """On a link held straight: the loads of a volt times the differences of what they work on, stretch by stretch."""
     layout, edges = placed
-    own, sections, count = own_row(layout), link_sections(body), len(edges)
-    extent, c, lever = np.zeros((3, count))
-    turn, Phi_V = np.zeros((2, count, body.mode_count))
-    for k, (start, end) in enumerate(edges):
-        x, stations = _stretches(key, layout, body, sections, k + 1, start, end)
-        places = np.array([place_of(layout, sections, station) for station in stations])
-        differences = np.diff([potentials(body.interpolate(end)) for end in x], axis=0)
-        loads = np.array([straight_loads(layout, *place) for place in places])
-        means = [places[:, 0], load_per_volt(layout, *places.T), places[:, 1]]
-        extent[k], c[k], lever[k] = (np.average(values, weights=np.diff(x)) for values in means)
-        turn[k], Phi_V[k] = differences[:, own].sum(axis=0), np.einsum("ir,irn->n", loads, differences)
+    own, sections = own_row(layout), link_sections(body)
+    stretches = [_stretches(key, layout, body, sections, k + 1, *edge) for k, edge in enumerate(edges)]
+    starts, ends = (np.concatenate([x[side] for x, _ in stretches]) for side in (slice(None, -1), slice(1, None)))
+    first = np.cumsum([0, *(len(stations) for _, stations in stretches[:-1])])
+    alike, which = np.unique(sections.alike[np.concatenate([on for _, on in stretches])], return_inverse=True)
+    places = np.array([place_of(layout, sections, station) for station in alike.tolist()])
+    loads = np.array([straight_loads(layout, *place) for place in places])[which]
+    differences = potentials(body, ends) - potentials(body, starts)
+    of_stretch = np.stack([places[:, 0], load_per_volt(layout, *places.T), places[:, 1]])[:, which]
+    extent, c, lever = np.add.reduceat(of_stretch * (ends - starts), first, axis=1) / np.add.reduceat(
+        ends - starts, first
+    )
+    turn = np.add.reduceat(differences[:, own], first)
+    Phi_V = np.add.reduceat(np.einsum("ir,irn->in", loads, differences), first)
     if layout.coupling == "surface":
         Phi_V = (c / (layout.width * extent / 2))[:, None] * _outlined(key, layout, body, edges)
-    return Effects(extent, c, lever / 2 if layout.acts_in == "twist" else np.ones(count), turn, Phi_V)
+    return Effects(extent, c, lever / 2 if layout.acts_in == "twist" else np.ones(len(edges)), turn, Phi_V)
 
 
 def _stretches(

@@ -11,7 +11,7 @@ import numpy as np
 from ...common.arrays import Array, Indices
 from ...common.errors import InputError
 from ...fe_models.beam.section_stress import surface_shear
-from ...fe_models.modal_body import Interface, ModalBody
+from ...fe_models.modal_body import ModalBody
 
 BEND_Y, STRETCH, TWIST, BEND_Z = range(4)
 """Strains of a section, e = (φ_z', u', φ_x', −φ_y'): curvature towards y, stretch, twist, curvature towards z."""
@@ -96,9 +96,10 @@ def check_sections(key: str, body: ModalBody, normal: Literal["y", "z"], *, twis
         )
 
 
-def potentials(at: Interface) -> Array:
-    """(4, n) of a place whose differences are integrals of the strains e along the link: φ_z, u, φ_x, −φ_y."""
-    return np.stack([at.rotation[2], at.translation[0], at.rotation[0], -at.rotation[1]])
+def potentials(body: ModalBody, x: Array) -> Array:
+    """(m, 4, n) at x (m,) whose differences are integrals of the strains e along the link: φ_z, u, φ_x, −φ_y."""
+    _, translation, rotation = body.along_axis(x)
+    return np.stack([rotation[:, 2], translation[:, 0], rotation[:, 0], -rotation[:, 1]], axis=1)
 
 
 @lru_cache

@@ -10,7 +10,7 @@ import numpy as np
 
 from ...common.arrays import Array, Integers
 from ...common.errors import InputError
-from .interpolation import interpolate
+from .interpolation import AlongAxis, interpolate
 from .parts import Interface, MeasuredValues, OutlinedPatches, PictureMesh, Stations, StressPoint, freeze
 from .unit_loads import unit_load_names
 
@@ -138,14 +138,20 @@ class ModalBody:
         Raises:
             InputError: x is outside the body.
         """
+        position, translation, rotation = self.along_axis(np.array([x]))
+        return Interface(position[0], translation[0], rotation[0])
+
+    def along_axis(self, x: Array) -> AlongAxis:
+        """What the modes do at several places `x` (m,), m from the root: as `interpolate`, which raises the same."""
         positions = self.stations.position[:, 0]
         slack = 1e-9 * self.length
-        if not positions[0] - slack <= x <= positions[-1] + slack:
+        outside = x[~((positions[0] - slack <= x) & (x <= positions[-1] + slack))]
+        if outside.size:
             raise InputError(
-                f"modal body {self.name}: x: expected {positions[0]:g} … {positions[-1]:g} m, the body's, found {x:g} m"
+                f"modal body {self.name}: x: expected {positions[0]:g} … {positions[-1]:g} m, the body's, found"
+                f" {outside[0]:g} m"
             )
-        x = float(np.clip(x, positions[0], positions[-1]))
-        return interpolate(self.stations, x)
+        return interpolate(self.stations, x.clip(positions[0], positions[-1]))
 
 
 def _check(body: ModalBody) -> None:

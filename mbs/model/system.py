@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cached_property
 
 import numpy as np
 
@@ -65,13 +66,13 @@ class MechanismSystem:
         self.system.finish()
         self.first = np.array(self.system.first_coordinate, dtype=int)
 
-    @property
+    @cached_property
     def frame_coordinates(self) -> Indices:
         """Indices of (R, θ) of all bodies in q (3 bodies,)."""
         indices: Indices = (self.first[:, None] + np.arange(3)).ravel()
         return indices
 
-    @property
+    @cached_property
     def scales(self) -> Array:
         """Natural size of each coordinate (coordinates,): a length for R, 1 rad for θ, √I for p.
 
@@ -85,7 +86,7 @@ class MechanismSystem:
             scales[first + 3 : first + 3 + body.n_modes] = np.sqrt(body.inertia)
         return scales
 
-    @property
+    @cached_property
     def measure_scales(self) -> Array:
         """Natural size of each constraint's value (constraints,): a length, or 1 rad."""
         return np.where(self.moments, 1.0, self.system.length)

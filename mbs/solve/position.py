@@ -27,14 +27,14 @@ def solve_positions(assembly: MechanismSystem, t: float, q: Array) -> Array | No
     )
     rest = np.zeros(system.n_v)
     for _ in range(MOST_ITERATIONS):
-        C, _, _ = system.constraints(t, q, rest)
+        C, _, C_q = system.constraints(t, q, rest)
         size = 1.0 + np.abs(q / scales).max(initial=0.0)
         left = np.abs(C / measure_scales).max(initial=0.0)
         if left <= TOLERANCE * size:
             return q
         if not np.isfinite(left):
             return None
-        step = _least_step(assembly, t, q, C)
+        step = _least_step(assembly, C_q, C)
         largest = np.abs(step / scales[r]).max()
         change = np.zeros(system.n_v)
         change[r] = -step * min(1.0, LARGEST_TURN * size / largest) if largest else -step
@@ -44,15 +44,19 @@ def solve_positions(assembly: MechanismSystem, t: float, q: Array) -> Array | No
 
 def with_rates(assembly: MechanismSystem, q: Array, v: Array) -> State:
     """The state at q with (Ṙ, θ̇) moved onto Ċ = 0 by the least change, ṗ kept."""
-    _, rate, _ = assembly.system.constraints(0.0, q, v)
+    _, rate, C_q = assembly.system.constraints(0.0, q, v)
     v = v.copy()
-    v[assembly.frame_coordinates] -= _least_step(assembly, 0.0, q, rate)
+    v[assembly.frame_coordinates] -= _least_step(assembly, C_q, rate)
     return State(q, v)
 
 
 def frame_gradients(assembly: MechanismSystem, t: float, q: Array) -> Array:
     """∂C/∂(R, θ), (constraints, 3 bodies), relative to the natural sizes of both: the same in all units."""
     _, _, C_q = assembly.system.constraints(t, q, np.zeros_like(q))
+    return _on_frames(assembly, C_q)
+
+
+def _on_frames(assembly: MechanismSystem, C_q: Array) -> Array:
     r = assembly.frame_coordinates
     J: Array = C_q[:, r] * assembly.scales[r] / assembly.measure_scales[:, None]
     return J
@@ -74,8 +78,8 @@ def rank_ratio(assembly: MechanismSystem, t: float, q: Array) -> float:
     return float(values[-1] / values[0])
 
 
-def _least_step(assembly: MechanismSystem, t: float, q: Array, residual: Array) -> Array:
+def _least_step(assembly: MechanismSystem, C_q: Array, residual: Array) -> Array:
     """The smallest change of (R, θ), (3 bodies,), that takes `residual` off C (or, as a rate, off Ċ)."""
-    J = frame_gradients(assembly, t, q)
+    J = _on_frames(assembly, C_q)
     step = as_floats(np.linalg.lstsq(J, residual / assembly.measure_scales, rcond=None)[0])
     return step * assembly.scales[assembly.frame_coordinates]
