@@ -41,13 +41,21 @@ def _section(path: Path, page: Path) -> Iterator[str]:
     yield from ("", f"| {' | '.join(headings)} |", "|---" * len(headings) + "|")
     yield from (f"| {' | '.join(line)} |" for line in lines)
     yield ""
+    prefix = _FIGURES.get(record["part"])
     for picture in sorted(path.parent.glob("*.png")):
-        if picture.stem.startswith(_FIGURES[record["part"]]):
+        if prefix is not None and picture.stem.startswith(prefix):
             yield f"![{picture.stem}](../{picture.relative_to(page.parents[1]).as_posix()})"
     yield ""
 
 
-_FIGURES = {"work-precision": "work_precision", "axes": "error_", "growth": "growth", "aims": "-", "peer": "-"}
+_FIGURES = {
+    "work-precision": "work_precision",
+    "axes": "error_",
+    "growth": "growth",
+    "evaluations": "-",
+    "aims": "-",
+    "peer": "-",
+}
 
 
 if __name__ == "__main__":

@@ -21,6 +21,7 @@ from ..scene.scene import Scene
 from . import OF_A_SCENE, PEER
 from .aims import measure_aims
 from .axes import measure_axes
+from .evaluations import measure_evaluations
 from .figures import draw_axes, draw_growth, draw_work_precision
 from .growth import measure_growth
 from .machine import about_machine, content_hash, load
@@ -81,7 +82,7 @@ class Campaign:
         return swept
 
     def everything(self, repository: Path, parts: Sequence[str], peer_python: Path) -> None:
-        """Growth, aims, the two cases of the paper and the peer, as far as they are among `parts`."""
+        """Growth, evaluations, aims, the two cases of the paper and the peer, as far as they are among `parts`."""
         paths = {name: repository / "cases" / name / "scene.toml" for name in CASES}
         of_cases = [part for part in parts if part in OF_A_SCENE]
         if set(parts) - {"growth"} and not all(path.is_file() for path in paths.values()):
@@ -91,6 +92,8 @@ class Campaign:
             rows = measure_growth(self.settings.repeat, self.display)
             self._keep("growth", rows, {}, self.folder, "growth")
             self._drawn(draw_growth(rows, self.folder))
+        if "evaluations" in parts:
+            self._evaluations(repository)
         if "aims" in parts:
             self._aims(load_scene(paths["two_link"]), repository)
         swept = {name: self.scene(path, None, self.folder / name, of_cases) for name, path in paths.items() if of_cases}
@@ -118,6 +121,11 @@ class Campaign:
                 scene, repository, Path(folder), self.settings.repeat, self.settings.budget, self.display
             )
         self._keep("aims", rows, {"inputs": _inputs(scene, {})}, self.folder, "ratios to the hand-written version")
+
+    def _evaluations(self, repository: Path) -> None:
+        with tempfile.TemporaryDirectory(prefix="ffrobot-bench-") as folder:
+            rows = measure_evaluations(repository, Path(folder), self.display)
+        self._keep("evaluations", rows, {}, self.folder, "one evaluation of accelerations and multipliers")
 
     def _exudyn(self, scene_path: Path, repository: Path, python: Path) -> Exudyn:
         bodies = prepare(load_scene(scene_path), self.display).bodies

@@ -20,6 +20,7 @@ COLUMNS = {
     "work-precision": ("integrator", "ran", "tolerance", "status", "seconds_min", "steps", *ERRORS),
     "axes": ("axis", "elements", "modes", "tolerance", "status", "against", "seconds", *ERRORS),
     "growth": ("with", "size", "seconds_min", "order"),
+    "evaluations": ("what", "seconds_min", "seconds", "aim", "of_hand_written", "of_hand_written_median"),
     "aims": ("what", "run", "status", "integrator", "tolerance", "ratio", "ratio_median", "aim", "accurate"),
     "peer": ("step", "gravity", "status", "seconds", "error_force", "error_displacement", "error_force_at_start"),
 }

@@ -1,0 +1,39 @@
+"""`ffrobot bench --part evaluations`: every mechanism has its row, measured beside the program written by hand."""
+
+import csv
+from pathlib import Path
+
+import pytest
+
+REPOSITORY = Path(__file__).parents[2]
+
+pytestmark = pytest.mark.alone
+
+
+@pytest.fixture(scope="module")
+def rows(ffrobot, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("evaluations")
+    done = ffrobot("bench", "--part", "evaluations", "--source", REPOSITORY, "-o", folder)
+    assert done.returncode == 0, done.stderr
+    with (folder / "evaluations.csv").open(encoding="utf-8", newline="") as stream:
+        return {row["what"]: row for row in csv.DictReader(stream)}
+
+
+def seconds(rows, what):
+    return float(rows[what]["seconds_min"])
+
+
+def test_time_grows_linearly_with_links(rows):
+    """Ten times the links take about ten times as long; wide bounds for caches and a busy machine."""
+    few, many = (seconds(rows, f"chain of {n} links × 10 modes, 2 rows") for n in (5, 50))
+    assert 6.0 < many / few < 16.0
+
+
+def test_more_is_slower(rows):
+    """Six links than three, flexible ones than rigid; the program written by hand is the least and its own measure."""
+    arms = [f"arm of {n} links × 10 modes in space, {n} rows" for n in (3, 6)]
+    by_hand = rows["two links × 10 modes, by hand"]
+    assert seconds(rows, arms[0]) < seconds(rows, arms[1])
+    assert seconds(rows, "arm of 6 rigid links in space, 6 rows") < seconds(rows, arms[1])
+    assert float(by_hand["of_hand_written"]) == 1.0
+    assert all(float(row["of_hand_written"]) >= 1.0 for row in rows.values())
