@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
 
@@ -30,8 +31,7 @@ class PatchArray(Reach):
         height: (k,) t_b, of the link along their normal under each patch, its mean, m.
         moment_per_volt: (k,) c in N·m/V.
         turn: (n, k) φ'(x2) − φ'(x1) of the n modes of the body, rad per unit of modal coordinate; of twist φ_x.
-        stiffness_ratio: (k,) ψ of link to patch, and `authority`, the part of c V that bends the link: see
-            `composite.stiffness_ratios`.
+        link: the modal body of the link that they are on.
         lever: (k,) strain of the surface by unit turn per length and distance: 1 of bending.
         of_all_modes: where the `PlanarBody` has not all modes, but the patches reach all: the same patches
             on all modes, and (n_all, n) the modal forces on these from those on the `PlanarBody`. Of a link in pieces:
@@ -44,8 +44,7 @@ class PatchArray(Reach):
     height: Array
     moment_per_volt: Array
     turn: Array
-    stiffness_ratio: Array
-    authority: Array
+    link: ModalBody
     lever: Array
     pieces: tuple[str, ...] = ()
 
@@ -58,6 +57,20 @@ class PatchArray(Reach):
     def carriers(self) -> tuple[str, ...]:
         """The bodies of the model whose modes, side by side, the n modes are."""
         return self.pieces or (self.body,)
+
+    @cached_property
+    def _stiffness(self) -> tuple[Array, Array]:
+        return stiffness_ratios(Placed(self.layout, self.edges), self.link)
+
+    @property
+    def stiffness_ratio(self) -> Array:
+        """(k,) ψ of link to patch: see `composite.stiffness_ratios`."""
+        return self._stiffness[0]
+
+    @property
+    def authority(self) -> Array:
+        """(k,) the part of c V that bends the link, whose own stiffness takes the rest: see there."""
+        return self._stiffness[1]
 
     @property
     def stiffness_in_words(self) -> str:
@@ -109,7 +122,7 @@ def assembled(
     """The patches in modal coordinates p, of which T (n_file, n) makes those of the modal body; `stiffness` (n,)."""
     layout, edges = placed
     return PatchArray(
-        layout, edges, of.extent, of.per_volt, (of.turn @ T).T, *stiffness_ratios(placed, body), of.lever,
+        layout, edges, of.extent, of.per_volt, (of.turn @ T).T, body, of.lever,
         Phi_V=(of.Phi_V @ T).T, limit=np.full(len(edges), np.inf if layout.limit is None else layout.limit),
         W_sqrt=W_sqrt, frequency=np.sqrt(stiffness) / (2 * np.pi), served=served,
     )  # fmt: skip
