@@ -5,6 +5,7 @@ import pytest
 from stopped_runs import Stops, differences, edit, go_on, stop
 
 import ffrobot
+from ffrobot.common.checksum import seal
 
 END = 0.12
 SHORT = {"end = 1.0": f"end = {END}"}
@@ -144,6 +145,17 @@ def test_other_kinds_and_searches_for_modes_start_again(arm):
     assert 'resume=True) runs "inverse" again from its start' in stop(scene, "inverse", 0.0)
     results = go_on(scene)
     assert results.attributes("inverse")["status"] == "completed"
+
+
+def test_runs_in_absolute_coordinates_are_refused(arm):
+    """As versions before 0.2 have stopped them: with peaks of bodies beside the state."""
+    scene = arm()
+    stop(scene, "inverse", 0.03)
+    with h5py.File(scene.with_suffix(".h5"), "a") as file:
+        file["inverse/resume/checkpoint/peaks/velocity"] = [1.0, 2.0]
+    seal(scene.with_suffix(".h5"))
+    with pytest.raises(ffrobot.InputError, match=r"found one in absolute coordinates, which an earlier version"):
+        go_on(scene)
 
 
 def test_needs_a_file():

@@ -13,6 +13,7 @@ from ...mbs import _core
 from ...mbs.analysis.outcome import Outcome
 from ...mbs.model.model import ZERO, Constraint, Model
 from ...mbs.model.planar_body import PlanarBody, PlanarPoint
+from ...mbs.model.planar_tree import PlanarTree
 from ...mbs.model.system import MechanismSystem
 from ...mbs.solve.initial_state import undeformed_state
 
@@ -35,7 +36,8 @@ class RigidArm:
             )
         rigid = replace(model, bodies=tuple(_rigid(body) for body in model.bodies), modal_loads=(), loads=())
         self._at_rest = self._assembly(rigid, None)
-        self._moved = [self._assembly(rigid, name).system for name in model.motors]
+        self._still = PlanarTree(self._at_rest)
+        self._moved = [PlanarTree(self._assembly(rigid, name)) for name in model.motors]
         names = [c.owner if c.component == "motor" else "" for c in self._at_rest.constraints]
         self._motors = np.array([names.index(name) for name in model.motors])
         self._q, self._source = undeformed_state(self._at_rest).q, source
@@ -44,7 +46,7 @@ class RigidArm:
     def _assembly(model: Model, accelerated: str | None) -> MechanismSystem:
         one = _core.TimeFunction.polynomial(np.array([0.0, 1.0]), np.array([[0.5, 0.0, 0.0]]))
         motors = [
-            Constraint(row, one if name == accelerated else ZERO, name, "motor", is_trajectory=False)
+            Constraint(row, one if name == accelerated else ZERO, name, "motor", is_trajectory=True)
             for name, row in model.motors.items()
         ]
         # joint angles of the initial guess are met by no target: `_place` moves the arm to the angles it is asked for
@@ -80,8 +82,8 @@ class RigidArm:
         rates = np.zeros(len(C_q))
         rates[self._motors] = gamma_dot
         v = as_floats(np.linalg.solve(C_q, rates))
-        h = -self._at_rest.system.evaluate(0.0, q, v)[1][self._motors]
-        M = np.column_stack([-system.evaluate(0.0, q, v)[1][self._motors] - h for system in self._moved])
+        h = -self._still.evaluate(0.0, q, v)[1][self._motors]
+        M = np.column_stack([-tree.evaluate(0.0, q, v)[1][self._motors] - h for tree in self._moved])
         return M, h
 
     def moments(self, gamma: Array, gamma_dot: Array, gamma_ddot: Array) -> Array:

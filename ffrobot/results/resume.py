@@ -16,17 +16,7 @@ import h5py
 from ..common.errors import InputError
 from ..common.hdf5 import blaming
 from ..mbs import _core
-from ..mbs.analysis.outcome import (
-    BODY_PEAKS,
-    METHOD_HISTORY,
-    STEPS,
-    Continuation,
-    EarlierRun,
-    Forces,
-    Motion,
-    Outcome,
-    Statistics,
-)
+from ..mbs.analysis.outcome import Continuation, EarlierRun, Forces, Motion, Outcome, Statistics
 from ..mbs.scene.analysis import IntegratedAnalysis
 from ..mbs.solve.integrators import METHODS, Choice
 from ..run.prepare import prepare, stiffened
@@ -80,25 +70,12 @@ def _write_outcome(group: h5py.Group, outcome: Outcome) -> None:
             group[name] = rows
     assert outcome.continuation is not None
     checkpoint, recording = outcome.continuation.checkpoint, outcome.continuation.recording
-    if isinstance(checkpoint, _core.TreeCheckpoint):
-        write_tree_checkpoint(group, checkpoint)
-    else:
-        _write_checkpoint(group, checkpoint)
+    write_tree_checkpoint(group, checkpoint)
     if recording is not None:
         group["recording/times"] = recording.times
         group["recording/states"] = recording.states
         names = {kind: name for name, kind in METHODS.items()}
         group["recording"].attrs["methods"] = json.dumps([(first, names[kind]) for first, kind in recording.methods])
-
-
-def _write_checkpoint(group: h5py.Group, checkpoint: _core.Checkpoint) -> None:
-    group["checkpoint/state"] = checkpoint.state
-    for name in (*BODY_PEAKS, "groups"):
-        group[f"checkpoint/peaks/{name}"] = getattr(checkpoint.peaks, name)
-    about = {"time": checkpoint.time, "outputs": checkpoint.outputs}
-    about |= {name: getattr(checkpoint.steps, name) for name in STEPS}
-    about |= {name: getattr(checkpoint.methods, name) for name in METHOD_HISTORY}
-    group["checkpoint"].attrs.update(about)
 
 
 def _earlier_run(solution: Solution, file: Results, name: str) -> EarlierRun:
@@ -122,8 +99,12 @@ def _earlier_run(solution: Solution, file: Results, name: str) -> EarlierRun:
 def _continuation(solution: Solution, file: Results, name: str) -> Continuation:
     about, group = file.attributes(name), f"{name}/{GROUP}"
     where, expected = f"{group}/checkpoint", len(file.time(name))
-    in_system = file.has(f"{where}/peaks")  # else joint coordinates were integrated
-    checkpoint = _checkpoint(file, where) if in_system else read_tree_checkpoint(file, where)
+    if file.has(f"{where}/peaks"):
+        raise InputError(
+            f"{file.path}: {group}: expected a run in joint coordinates, found one in absolute coordinates, which an"
+            " earlier version of ffrobot has stopped: solve again without --resume"
+        )
+    checkpoint = read_tree_checkpoint(file, where)
     if checkpoint.outputs != expected or about["status"] not in (*STOPPED, "completed"):
         raise InputError(
             f"{file.path}: {group}: expected as many outputs as times, {expected}, found {checkpoint.outputs}"
@@ -150,20 +131,3 @@ def _methods(file: Results, group: str) -> list[tuple[int, _core.MethodKind]]:
     if firsts[:1] != [0] or firsts != sorted(firsts):
         raise InputError(f"{file.path}: {group}: methods: expected integrators from step 0 on, found {text!r}")
     return methods
-
-
-def _checkpoint(file: Results, group: str) -> _core.Checkpoint:
-    about = file.attributes(group)
-    try:
-        return _core.Checkpoint(
-            time=float(about["time"]),
-            state=row_of_numbers(file, f"{group}/state"),
-            steps=_core.StepHistory(**{name: about[name].item() for name in STEPS}),
-            peaks=_core.Peaks(
-                **{name: row_of_numbers(file, f"{group}/peaks/{name}") for name in (*BODY_PEAKS, "groups")}
-            ),
-            outputs=int(about["outputs"]),
-            methods=_core.MethodHistory(**{name: about[name].item() for name in METHOD_HISTORY}),
-        )
-    except (TypeError, ValueError, KeyError, AttributeError) as error:
-        raise InputError(f"{file.path}: {group}: expected where the run has stopped, found {error}") from None

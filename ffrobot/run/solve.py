@@ -255,8 +255,7 @@ def _actuator_set(solution: Solution, *, raised: bool) -> ActuatorSet:
 def _log(outcome: Outcome) -> None:
     run = outcome.statistics
     logger.info(
-        'analysis "%s": %s at t = %g s, %d steps, %d rejected, %d evaluations, %.3f s; integrator %s: %s;'
-        " coordinates %s",
+        'analysis "%s": %s at t = %g s, %d steps, %d rejected, %d evaluations, %.3f s; integrator %s: %s',
         outcome.analysis.name, run.status, outcome.time[-1], run.steps, run.rejected, run.evaluations,
-        run.wall_seconds, run.integrator.name, run.integrator.reason, run.coordinates or "not integrated",
+        run.wall_seconds, run.integrator.name, run.integrator.reason,
     )  # fmt: skip

@@ -1,7 +1,6 @@
 """Running the integrators of the core from an initial state to an outcome: all kinds that integrate do it here.
 
-Joint coordinates are integrated, and outputs evaluated in them, where the mechanism can be told in them
-(`model.planar_tree`), else those of the system.
+Joint coordinates are integrated, and outputs evaluated in them (`model.planar_tree`).
 """
 
 from __future__ import annotations
@@ -17,6 +16,7 @@ import numpy as np
 from ...common.arrays import Array, as_list
 from .. import _core
 from ..model.model import Model
+from ..model.planar_tree import PlanarTree, told_in_joints
 from ..model.system import MechanismSystem
 from ..scene.analysis import IntegratedAnalysis
 from ..solve.diagnosis import find_cause
@@ -26,7 +26,6 @@ from ..solve.state import State
 from ..solve.statics import static_equilibrium
 from .earlier_check import check_earlier, kept_of
 from .outcome import Continuation, EarlierRun, Forces, Motion, Outcome, Statistics
-from .tree_start import TreeStart, tree_size, tree_start
 
 Progress = Callable[[float], bool]
 """Called now and then with the time reached; False stops the run."""
@@ -72,7 +71,7 @@ def drive(
     times: Array | None = None,
     steering: _core.ExternalLoads | None = None,
     control: SampledControl | None = None,
-    resolver: _core.ActuatorForces | None = None,
+    finds_forces: bool = False,
     recording: _core.Recording | None = None,
     earlier: EarlierRun | None = None,
 ) -> Outcome:
@@ -81,14 +80,16 @@ def drive(
     It is in the coordinates of `reported`, the same mechanism with masses as they are, where those of `assembly` are
     raised.
 
-    Under `steering` from outside, or sampled `control`. It goes on with an `earlier` run of the same analysis. An
-    integration that ends early is kept with its cause.
+    Under `steering` from outside, or sampled `control`. `finds_forces`: of the motors, and on modes, in place of those
+    of trajectories. It goes on with an `earlier` run of the same analysis. An integration that ends early is kept with
+    its cause. Raises `InputError` for what joint coordinates cannot tell.
     """
     times = analysis.times if times is None else times
-    motors = len(assembly.motor_measures) if resolver is not None else None
+    motors = len(assembly.motor_measures) if finds_forces else None
+    tree = told_in_joints(assembly, analysis.kind, assembly.model.motors.values() if finds_forces else ())
+    if earlier is not None:
+        check_earlier(earlier, assembly, times, motors, recorded=recording is not None, tree_size=tree.core.n_v)
     if earlier is not None and earlier.statistics.status == "completed":
-        size = tree_size(assembly, earlier)
-        check_earlier(earlier, assembly, times, motors, recorded=recording is not None, tree_size=size)
         integrated = None if reported is None else assembly
         return Outcome(
             analysis, reported or assembly, earlier.motion, earlier.forces, earlier.statistics,
@@ -98,30 +99,22 @@ def drive(
     integrator = with_steps_of(
         analysis, float(times[-1]), lambda: choose_integrator(assembly, analysis, start, steering, len(times))
     )
-    wanted = list(assembly.model.motors.values()) if resolver is not None else []
-    tree = tree_start(assembly, start, earlier, wanted)
-    point = _core.TreeCheckpoint() if isinstance(tree, TreeStart) else _core.Checkpoint()
-    continuation = Continuation(point, recording)
+    continuation = Continuation(_core.TreeCheckpoint(), recording)
     if earlier is not None:  # with the same candidates, and what they have become since
-        size = None if isinstance(tree, str) else len(tree.q)
-        check_earlier(earlier, assembly, times, motors, recorded=recording is not None, tree_size=size)
         known, continuation = earlier.statistics.integrator, earlier.continuation
         integrator = replace(integrator, name=known.name, reason=known.reason)
     with nullcontext() if earlier is None else kept_of(earlier, times).gone_on_with():
-        run = _integrated(
-            assembly, analysis, start if isinstance(tree, str) else tree, times, integrator, steering, control,
-            resolver, continuation, progress,
-        )  # fmt: skip
+        controls = integration_controls(analysis, integrator)
+        run = _integrated(tree, start, times, controls, steering, control, continuation, progress)
     seconds, integrator = time.perf_counter() - began, integrator.changed_in(run)
     statistics = statistics_of(assembly, run, integrator, seconds)
-    statistics = replace(statistics, coordinates=f"absolute: {tree}" if isinstance(tree, str) else "joint")
     if statistics.status == "step underflow" and not statistics.cause:
         statistics = replace(statistics, cause=beyond_order(integrator, analysis) or unmet(integrator, run))
     outcome = Outcome(
         analysis=analysis,
         assembly=assembly,
         motion=motion_of(assembly, run, times),
-        forces=Forces(run.tau, run.F_p) if resolver else Forces(),
+        forces=Forces(run.tau, run.F_p) if finds_forces else Forces(),
         statistics=statistics,
         continuation=continuation if control is None else None,
     )
@@ -130,39 +123,26 @@ def drive(
 
 
 def _integrated(
-    assembly: MechanismSystem,
-    analysis: IntegratedAnalysis,
-    start: State | TreeStart,
+    tree: PlanarTree,
+    start: State,
     times: Array,
-    integrator: Choice,
+    controls: _core.IntegrationControls,
     steering: _core.ExternalLoads | None,
     control: SampledControl | None,
-    resolver: _core.ActuatorForces | None,
     continuation: Continuation,
     progress: Progress,
 ) -> _core.Run:
-    common: dict[str, Any] = {
-        "times": as_list(times), "q": start.q, "v": start.v, "controls": integration_controls(analysis, integrator),
-        "carry_on": progress,
-    }  # fmt: skip
+    q, v = tree.state(start.q, start.v)
+    common: dict[str, Any] = {"times": as_list(times), "q": q, "v": v, "controls": controls, "carry_on": progress}
     if control is None:
-        more: dict[str, Any] = {
-            "external_loads": steering, "recording": continuation.recording, "checkpoint": continuation.checkpoint,
-        }  # fmt: skip
-    else:
-        more = {
-            "motors": control.motors, "patches": control.voltages, "first_command": control.first,
-            "sensing": control.sensing, "samples": as_list(control.times), "delay": control.delay,
-            "controller": control.controller,
-        }  # fmt: skip
-    if isinstance(start, TreeStart):
-        run = _core.run_tree if control is None else _core.run_tree_sampled
-        return run(start.tree.both, **common, **more)
-    common |= {"system": assembly.system, "groups": assembly.groups, "moments": assembly.moments}
-    common["joints"] = assembly.joint_measures
-    if control is None:
-        return _core.run(**common, **more, actuator_forces=resolver)
-    return _core.run_sampled(**common, **more)
+        return _core.run_tree(
+            tree.both, **common, external_loads=steering, recording=continuation.recording,
+            checkpoint=continuation.checkpoint,
+        )  # fmt: skip
+    return _core.run_tree_sampled(
+        tree.both, **common, motors=control.motors, patches=control.voltages, first_command=control.first,
+        sensing=control.sensing, samples=as_list(control.times), delay=control.delay, controller=control.controller,
+    )  # fmt: skip
 
 
 def motion_of(assembly: MechanismSystem, run: _core.Run, times: Array) -> Motion:
@@ -203,10 +183,3 @@ def initial_state(assembly: MechanismSystem) -> State:
 def motors_fit(model: Model) -> bool:
     """Whether there is a path, and its forces can be told as those of the motors and on modes."""
     return bool(model.trajectories) and len(model.motors) == model.degrees_of_freedom
-
-
-def resolver_of(assembly: MechanismSystem) -> _core.ActuatorForces | None:
-    """What turns trajectory forces into motor and modal forces; None where the motors do not fit the mechanism."""
-    if not motors_fit(assembly.model):
-        return None
-    return _core.ActuatorForces(assembly.system, assembly.is_trajectory, assembly.motor_measures)

@@ -7,10 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...common.arrays import Array
-from .. import _core
 from ..model.system import MechanismSystem
 from .kept_check import Kept
-from .outcome import BODY_PEAKS, METHOD_HISTORY, STEPS, EarlierRun
+from .outcome import EarlierRun
 
 
 def check_earlier(
@@ -20,12 +19,12 @@ def check_earlier(
     motors: int | None,
     *,
     recorded: bool,
-    tree_size: int | None = None,
+    tree_size: int,
 ) -> None:
     """Make sure that `earlier` is a run of `assembly` with outputs at `times`.
 
     `motors`: as many as the analysis finds forces of; None where it finds none. `recorded`: whether a later analysis
-    replays it. `tree_size`: of q and of v of the tree; None where there is none.
+    replays it. `tree_size`: of q and of v of the tree.
 
     Raises `InputError` for sizes, times or numbers that are not those of such a run.
     """
@@ -43,7 +42,7 @@ class _Check:
     assembly: MechanismSystem
     times: Array
     kept: Kept
-    tree_size: int | None
+    tree_size: int
 
     def everything(self, motors: int | None, *, recorded: bool) -> None:
         outputs = len(self.earlier.motion.time)
@@ -52,7 +51,7 @@ class _Check:
         self.kept.expect(not self._completed or outputs == len(self.times), "status", "a run up to its end")
         self._rows(outputs, motors)
         if not self._completed:
-            self._checkpoint(motors)
+            self._checkpoint()
         self._recording(recorded)
 
     @property
@@ -72,25 +71,10 @@ class _Check:
             if of_forces is not None:
                 self.kept.numbers(name, found[name], (outputs, of_forces))
 
-    def _checkpoint(self, motors: int | None) -> None:
+    def _checkpoint(self) -> None:
         point = self.earlier.continuation.checkpoint
-        if isinstance(point, _core.Checkpoint):
-            self._of_system(point, motors)
-        else:
-            self.kept.tree_checkpoint(point, self._size_of_tree, self._size_of_tree)
+        self.kept.tree_checkpoint(point, self.tree_size, self.tree_size)
         self.kept.expect(point.steps.next_step > 0.0, "checkpoint", "a positive step")
-
-    def _of_system(self, point: _core.Checkpoint, motors: int | None) -> None:
-        self.kept.numbers("checkpoint/state", point.state, (self._state_size,))
-        for name in BODY_PEAKS:
-            values = getattr(point.peaks, name)
-            self.kept.numbers(f"checkpoint/peaks/{name}", values, (len(self.assembly.model.bodies),))
-        groups = max(self.assembly.groups, default=-1) + 1 + len(self.assembly.joint_measures)
-        groups += motors or 0
-        self.kept.numbers("checkpoint/peaks/groups", point.peaks.groups, (groups,))
-        for record, names in ((point.steps, STEPS), (point.methods, METHOD_HISTORY)):
-            self.kept.fields(record, names)
-        self.kept.stands_after_outputs(point)
 
     def _recording(self, recorded: bool) -> None:
         recording = self.earlier.continuation.recording
@@ -99,20 +83,9 @@ class _Check:
             return
         steps = recording.times
         self.kept.numbers("recording/times", steps, (len(steps),))
-        in_tree = isinstance(self.earlier.continuation.checkpoint, _core.TreeCheckpoint)
-        size = 2 * self._size_of_tree if in_tree else self._state_size
-        self.kept.numbers("recording/states", recording.states, (size * len(steps),))
+        self.kept.numbers("recording/states", recording.states, (2 * self.tree_size * len(steps),))
         last = self.times[-1] if self._completed else self.earlier.continuation.checkpoint.time
         fits = len(steps) > 0 and steps[0] == self.times[0] and bool(np.all(np.diff(steps) > 0.0))
         self.kept.expect(
             fits and abs(steps[-1] - last) <= self.kept.slack, "recording/times", f"steps up to t = {last:g} s"
         )
-
-    @property
-    def _size_of_tree(self) -> int:
-        self.kept.expect(self.tree_size is not None, "checkpoint", "what a run of this scene remembers")
-        return self.tree_size or 0
-
-    @property
-    def _state_size(self) -> int:
-        return int(self.assembly.system.n_q + self.assembly.system.n_v)

@@ -40,7 +40,7 @@ class Kept:
         """Of times, for rounding, s."""
         return float(1e-9 * (self.times[-1] - self.times[0]))
 
-    def stands_after_outputs(self, point: _core.Checkpoint | _core.TreeCheckpoint) -> None:
+    def stands_after_outputs(self, point: _core.TreeCheckpoint) -> None:
         """Raise `InputError` for a checkpoint at a time that does not fit its outputs."""
         until = self.times[min(self.outputs, len(self.times) - 1)]
         in_time = self.times[self.outputs - 1] - self.slack <= point.time <= until + self.slack  # False of NaN

@@ -72,7 +72,6 @@ class Statistics:
     """How a run went. `cause` is what was found wrong at `time_reached` (s, the last step's) where it ended early.
 
     `step_ends` (N,), in s, with which the run can be repeated, if it was asked for them; see `fields.steps`.
-    `coordinates`: "joint", or "absolute: …" and why, of what was integrated; "" where nothing was, or it is not known.
     """
 
     status: str = "completed"
@@ -84,7 +83,6 @@ class Statistics:
     time_reached: float | None = None
     cause: str = ""
     step_ends: Array = field(default_factory=lambda: np.zeros(0), repr=False, compare=False)
-    coordinates: str = ""
 
     def added_to(self, earlier: Statistics) -> Statistics:
         """With the work of the run that this one went on from."""
@@ -104,22 +102,15 @@ TREE_MEMORY = ("inertial_peak", "accepted", "least_ratio", "singular_at", "watch
 TREE_VECTORS = ("state", "state_peaks", "force_peaks", "singular_posture")
 """Arrays of the core's `TreeCheckpoint`."""
 
-BODY_PEAKS = (
-    "velocity", "angular_velocity", "modal_velocity", "modal", "acceleration", "angular_acceleration",
-    "modal_acceleration",
-)  # fmt: skip
-"""Of the core's `Peaks`, what there is of each body."""
-
 
 @dataclass(frozen=True)
 class Continuation:
     """Where an integration can be gone on with, and its steps where a later analysis replays them.
 
-    Both are in the coordinates of `assembly`, what was integrated, where that is not the outcome's: see `raised_mass`.
-    They are of its tree where joint coordinates were integrated.
+    Both are of the tree of `assembly`, what was integrated, where that is not the outcome's: see `raised_mass`.
     """
 
-    checkpoint: _core.Checkpoint | _core.TreeCheckpoint
+    checkpoint: _core.TreeCheckpoint
     recording: _core.Recording | None = None
     assembly: MechanismSystem | None = None
 
@@ -179,11 +170,8 @@ class Details:
         if outcome.continuation is None or outcome.continuation.recording is None:
             return None
         assembly = outcome.continuation.assembly or outcome.assembly
-        recording, resolver = outcome.continuation.recording, outcome.resolver(assembly)
-        if isinstance(outcome.continuation.checkpoint, _core.TreeCheckpoint):
-            motors = () if resolver is None else assembly.model.motors.values()
-            return _core.TreeActuation(PlanarTree(assembly, motors).both, recording)
-        return _core.RecordedActuation(assembly.system, recording, assembly.is_trajectory, resolver)
+        motors = () if outcome.tau is None else assembly.model.motors.values()
+        return _core.TreeActuation(PlanarTree(assembly, motors).both, outcome.continuation.recording)
 
 
 @dataclass(frozen=True)
@@ -275,16 +263,6 @@ class Outcome:
         motors = enumerate(self.assembly.model.motors)
         columns = [self.gears[joint].moment if joint in self.gears else self.tau[:, k] for k, joint in motors]
         return np.column_stack(columns)
-
-    def resolver(self, assembly: MechanismSystem | None = None) -> _core.ActuatorForces | None:
-        """What turned trajectory forces into motor and modal forces; None where motors do not fit the mechanism.
-
-        `assembly`: the outcome's unless given.
-        """
-        if self.tau is None:
-            return None
-        assembly = assembly or self.assembly
-        return _core.ActuatorForces(assembly.system, assembly.is_trajectory, assembly.motor_measures)
 
     def in_coordinates_of(self, reported: MechanismSystem) -> Outcome:
         """A motion with raised masses as one of `reported`, the same mechanism without."""

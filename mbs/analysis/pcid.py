@@ -14,7 +14,7 @@ from ..solve.initial_state import undeformed_state
 from ..solve.path_checks import check_smooth
 from ..solve.reach import check_reach
 from .context import Context
-from .drive import Progress, drive, initial_state, resolver_of
+from .drive import Progress, drive, initial_state, motors_fit
 from .elastic_joints import add_transmission
 from .outcome import EarlierRun, Outcome
 
@@ -67,7 +67,7 @@ def run_pcid(
         start,
         progress,
         reported=None if raised is model else _system(model),
-        resolver=resolver_of(assembly),
+        finds_forces=motors_fit(model),
         recording=recording,
         earlier=earlier,
     )

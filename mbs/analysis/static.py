@@ -10,13 +10,14 @@ import numpy as np
 
 from .. import _core
 from ..model.model import Model
+from ..model.planar_tree import told_in_joints
 from ..model.system import MechanismSystem
 from ..scene.analysis import Analysis
 from ..solve.initial_state import undeformed_state
 from ..solve.integrators import METHODS, NOT_INTEGRATED
 from ..solve.statics import static_equilibrium
 from .context import Context
-from .drive import motion_of, resolver_of, statistics_of
+from .drive import motion_of, motors_fit, statistics_of
 from .elastic_joints import add_transmission
 from .outcome import Forces, Outcome
 
@@ -43,19 +44,18 @@ def run_static(model: Model, analysis: Analysis) -> Outcome:
     held = [replace(c, target=_core.TimeFunction.constant(c.target(0.0)[0])) for c in model.trajectories]
     assembly = MechanismSystem(model, [*model.joints, *held], model.loads, list(model.motors.values()))
     state = static_equilibrium(assembly, undeformed_state(assembly))
-    at_rest, resolver, began = np.zeros_like(state.v), resolver_of(assembly), time.perf_counter()
+    finds_forces, began = motors_fit(model), time.perf_counter()
+    tree = told_in_joints(assembly, analysis.kind, model.motors.values() if finds_forces else ())
+    q, v = tree.state(state.q, np.zeros_like(state.v))
     controls = _core.IntegrationControls(
         tolerance=analysis.tolerance, max_steps=1, methods=[(METHODS["dop853"], 1.0, 0.0)], spectral_radius=0.0
     )
-    run = _core.run(  # no step is made: accelerations and multipliers of one state
-        system=assembly.system, groups=assembly.groups, moments=assembly.moments, joints=[], times=[0.0],
-        q=state.q, v=at_rest,
-        controls=controls, carry_on=lambda _: True, actuator_forces=resolver,
-    )  # fmt: skip
+    # no step is made: accelerations and multipliers of one state
+    run = _core.run_tree(tree.both, times=[0.0], q=q, v=v, controls=controls, carry_on=lambda _: True)
     return Outcome(
         analysis=analysis,
         assembly=assembly,
         motion=motion_of(assembly, run, np.zeros(1)),
-        forces=Forces(run.tau, run.F_p) if resolver else Forces(),
+        forces=Forces(run.tau, run.F_p) if finds_forces else Forces(),
         statistics=statistics_of(assembly, run, NOT_INTEGRATED, time.perf_counter() - began),
     )

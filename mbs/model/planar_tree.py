@@ -16,10 +16,10 @@ from ...common.errors import InputError
 from .. import _core
 from .._core import TimeFunction
 from ..joints.measure import Marker, Measure
-from ..joints.transmission import Friction
 from .model import ZERO, Constraint
 from .system import MechanismSystem
-from .tree_layout import FREE, Coordinate, Layout, Node, NotInTreeError, angle_between
+from .tree_cuts import TreeCuts
+from .tree_layout import FREE, Coordinate, Layout, Node, NotInTreeError, turned_by
 
 COMPONENTS = {_core.MeasureKind.x: 0, _core.MeasureKind.y: 1, _core.MeasureKind.angle: 2, _core.MeasureKind.gear: 2}
 """Of a planar wrench, of the force along a measure whose direction is that of the ground."""
@@ -50,7 +50,7 @@ class PlanarTree:
         drives: where those drives of the system act whose forces are set from outside.
         bodies: number in the system of each body of the tree; after these it has what rotors turn beside it.
         both: the system and the tree, with what is one in the other.
-        constraints: of the system that are rows of `core`: trajectories, and joints that close loops. After these come
+        constraints: of the system that are rows of `core`: trajectories, and joints that are cut. After these come
             those of rotors beside the tree.
     """
 
@@ -69,23 +69,22 @@ class PlanarTree:
         self._at_points: list[tuple[int, int, float, TimeFunction]] = []
         self._driven: set[int] = set(range(self._layout.size)) if is_forced else set()
         self._rotors: dict[int, tuple[float, float]] = {}
-        loops = self._layout.loops
-        self.constraints = tuple(c for c in assembly.constraints if c.is_trajectory or c.owner in loops)
+        self._cuts = TreeCuts(self.scene, self._wrench)
+        cut = self._layout.cut
+        self.constraints = tuple(c for c in assembly.constraints if c.is_trajectory or c.owner in cut)
         rows = [self._row(constraint) for constraint in self.constraints]
-        self._beside = {len(rows) + k: node for k, node in enumerate(self._layout.nodes[len(of_bodies) :])}
-        rows += [self._turned(node) for node in self._beside.values()]
+        rows += [self._turned(node) for node in self._layout.nodes[len(of_bodies) :]]
         self._add_loads()
         self._add_what_joints_have()
-        self.scene.is_strict, self.scene.has_loops = True, bool(loops)
+        reactions = self._reactions(motors)
+        self.scene.is_strict, self.scene.has_loops = True, bool(cut)
         self.scene.most_bent = [node.body.inertia for node in self._layout.nodes]
         wrenches = [self._layout.place(marker) for marker in self._wrenches]
         bodies = [self._body(number, node) for number, node in enumerate(self._layout.nodes)]
         self.core = _core.PlanarModel(
             bodies, self._layout.ground_markers(), rows, wrenches, np.array(model.scene.gravity)
         )
-        self.both = _core.SystemOnTree(
-            assembly.system, self.core, self.scene, self.bodies, self.drives, self._reactions(motors)
-        )
+        self.both = _core.SystemOnTree(assembly.system, self.core, self.scene, self.bodies, self.drives, reactions)
 
     def state(self, q: Array, v: Array) -> tuple[Array, Array]:
         """(q, v) of the tree for those of the system, (coordinates,) each."""
@@ -110,11 +109,17 @@ class PlanarTree:
         readings = _core.Sensing(self._assembly.system, along, []).read(*system)
         indices, signs = [c.number for c in coordinates], np.array([c.sign for c in coordinates])
         found[:, :, indices] = signs * readings.reshape(len(readings), 3, -1).swapaxes(0, 1)
-        for row, node in self._beside.items():  # by what is left of their rows, which are linear in these coordinates
-            for motion in found.swapaxes(0, 1):
-                (turned, rate), (_, acceleration) = (self.core.measure(motion[0], x) for x in motion[1:])
-                motion[:, node.first] += turned[row], rate[row], acceleration[row]
         return found.reshape(3, *times, -1)
+
+    def evaluate(
+        self, t: float, q: Array, v: Array, steering: _core.ExternalLoads | None = None
+    ) -> tuple[Array, Array]:
+        """Accelerations (coordinates,) and multipliers (constraints,) of the system at a state of it, as it is.
+
+        Under `steering` from outside, if any.
+        """
+        found = self.both.at(t, *self.state(q, v), steering)
+        return found.a[0], found.multipliers[0]
 
     @property
     def modes(self) -> dict[str, range]:
@@ -137,12 +142,15 @@ class PlanarTree:
         return force, wrench.ravel()
 
     def _joints(self) -> tuple[list[_core.Measure], list[Coordinate]]:
-        """Measures of all joints of the tree that move, and their coordinates; those of motors behind gears, too."""
+        """Measures that are coordinates of the tree: of joints, of motors behind gears, of rotors beside it."""
         joints = [joint.coordinate("section") for joint in self._assembly.model.scene.joint]
         moving = [m for m in joints if m is not None] + [gear.motor for gear in self._assembly.model.gears]
         measures = [*self._assembly.joint_measures, *self._assembly.gear_measures]
         found = [(core, self._layout.coordinate(m)) for core, m in zip(measures, moving, strict=True)]
         in_tree = [(core, coordinate) for core, coordinate in found if coordinate is not None]
+        for node in self._layout.nodes:
+            if node.beside is not None:
+                in_tree.append((self._assembly.core_measure(node.beside), self._in_tree(node.beside)))
         return [core for core, _ in in_tree], [coordinate for _, coordinate in in_tree]
 
     @property
@@ -159,6 +167,8 @@ class PlanarTree:
         if coordinate is not None:
             found.kind, found.coordinate = _core.RowKind.coordinate, coordinate.number
             return found
+        if measure.kind == _core.MeasureKind.gear:
+            raise NotInTreeError(f"a constraint of a ratio of angles ({measure.label})")
         if measure.kind == _core.MeasureKind.slide:
             found.kind, found.f = _core.RowKind.slide, np.array([*measure.direction, 0.0])
         else:
@@ -169,11 +179,12 @@ class PlanarTree:
         return found
 
     def _turned(self, node: Node) -> _core.RowModel:
-        """What a rotor beside the tree turns by is the angle that it measures."""
+        """What a rotor beside the tree turns by, or goes, is what it measures."""
         assert node.beside is not None
-        found = _core.RowModel()
-        found.name, found.kind, found.coordinate = node.beside.label, _core.RowKind.rotation, node.first
-        found.f = np.array([0.0, 0.0, 1.0])
+        found, turns = _core.RowModel(), node.beside.carries_moment
+        found.name, found.coordinate = node.beside.label, node.first
+        found.kind = _core.RowKind.rotation if turns else _core.RowKind.slide
+        found.f = np.array([0.0, 0.0, 1.0] if turns else [*node.beside.direction, 0.0])
         found.a, found.b = self._layout.place(node.beside.a), self._layout.place(node.beside.b)
         self.scene.add_target(ZERO, 1.0)
         return found
@@ -186,6 +197,11 @@ class PlanarTree:
                 self.drives.add_along(number, coordinate.number, coordinate.sign)
                 if magnitude is not ZERO:
                     self._along.append((coordinate.sign * np.eye(self._layout.size)[coordinate.number], magnitude))
+                continue
+            if measure.kind == _core.MeasureKind.slide:
+                self.drives.add_along_cut(number, self._cuts.along(measure))
+                if magnitude is not ZERO:
+                    self.scene.add_cut_load(self._cuts.along(measure), magnitude)
                 continue
             for marker, component, size in _shares(measure):
                 wrench = self._wrench(marker)
@@ -221,9 +237,10 @@ class PlanarTree:
                 component = TRANSMITTED[constraint.measure.kind]
                 found.add_joint(number, node, component, self._layout.nodes[node].backwards)
         for measure in motors:
-            if (motor := self._layout.motor(measure)) is None:
-                raise NotInTreeError(f"a motor along a coordinate that is none of the tree ({measure.label})")
-            found.add_motor(*motor)
+            if (motor := self._layout.motor(measure)) is not None:
+                found.add_motor(*motor)
+            else:
+                found.add_motor_along_cut(self._cuts.along(measure))
         return found
 
     def _wrench(self, marker: Marker) -> int:
@@ -234,36 +251,32 @@ class PlanarTree:
         model = self._assembly.model
         for measure, friction in model.frictions:
             if (coordinate := self._layout.coordinate(measure)) is None:
-                self._resist_between(measure, friction)
+                self._cuts.resist(measure, friction)
                 continue
             index = coordinate.number
             self._driven.add(index)
             self.scene.add_joint_force(index, index, 0.0, 0.0, friction.viscous, friction.coulomb, friction.speed)
         for measure, inertia in model.rotors:
             is_gear = measure.kind == _core.MeasureKind.gear
-            turned = measure if not is_gear else angle_between(measure)
-            index, sign = self._in_tree(turned, "a rotor")
+            index, sign = self._in_tree(turned_by(measure))
             # it sits on the first side and spins with N Ω_second − (N − 1) Ω_first
             N = measure.gear_ratios[0] if is_gear else 1.0
             self._rotors[index] = inertia, 1.0 - N if is_gear and sign < 0 else N
         for gear in model.gears:
-            motor, _ = self._in_tree(gear.motor, "a motor")
-            joint, sign = self._in_tree(gear.coordinate, "a gear")
-            self._driven |= {motor, joint}
+            motor, _ = self._in_tree(gear.motor)
+            self._driven.add(motor)
             self._rotors[motor] = gear.inertia, gear.ratio
-            self.scene.add_gear((motor, motor), (joint, joint), sign, gear.stiffness, gear.damping)
+            if (coordinate := self._layout.coordinate(gear.coordinate)) is not None:
+                joint, sign = coordinate
+                self._driven.add(joint)
+                self.scene.add_gear((motor, motor), (joint, joint), sign, gear.stiffness, gear.damping)
+            else:
+                self._cuts.add_gear(gear, motor)
 
-    def _resist_between(self, measure: Measure, friction: Friction) -> None:
-        """Friction on the motion of two markers that is no coordinate of the tree."""
-        turns = measure.carries_moment
-        axis = np.array([0.0, 0.0, 1.0] if turns else [*measure.direction, 0.0])
-        sides = self._wrench(measure.a), self._wrench(measure.b)
-        self.scene.add_cut_joint(*sides, turns, axis, friction.viscous, friction.coulomb, friction.speed)
-
-    def _in_tree(self, measure: Measure, what: str) -> Coordinate:
+    def _in_tree(self, measure: Measure) -> Coordinate:
+        """Of what has a coordinate of its own, in the tree or beside it."""
         coordinate = self._layout.coordinate(measure)
-        if coordinate is None:
-            raise NotInTreeError(f"{what} along a coordinate that is none of the tree ({measure.label})")
+        assert coordinate is not None, measure.label
         return coordinate
 
     def _body(self, number: int, node: Node) -> _core.PlanarBody:
@@ -291,9 +304,7 @@ def told_in_joints(assembly: MechanismSystem, kind: str, motors: Iterable[Measur
 
 
 def _shares(measure: Measure) -> Iterator[Share]:
-    """Of a force along a measure that is no coordinate of the tree. Raises `NotInTreeError` where it turns."""
-    if measure.kind not in COMPONENTS:
-        raise NotInTreeError(f"a load along a direction that turns with its body ({measure.label})")
+    """Of a force along a measure that is no coordinate of the tree, and does not turn with its first side."""
     of_b, of_a = measure.angle_ratios
     for marker, size in ((measure.b, of_b), (measure.a, -of_a)):
         if marker.body is not None:

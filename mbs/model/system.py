@@ -35,7 +35,7 @@ class MechanismSystem:
         self._markers: list[list[str]] = [[] for _ in model.bodies]
         self.constraints = tuple(constraints[i] for i in envelope_order([c.measure for c in constraints]))
         self.drives = tuple(drives)
-        core = self._core_measure
+        core = self.core_measure
         self.constraint_measures = [core(c.measure) for c in self.constraints]
         driven = [(core(measure), magnitude) for measure, magnitude in drives]
         rotors = [(core(measure), inertia) for measure, inertia in model.rotors]
@@ -158,7 +158,8 @@ class MechanismSystem:
             first += 3 * len(points)
         return wrenches
 
-    def _core_measure(self, measure: Measure) -> _core.Measure:
+    def core_measure(self, measure: Measure) -> _core.Measure:
+        """For the core; of markers that the system has."""
         a, b = self._marker(measure.a), self._marker(measure.b)
         direction, ratios = np.array(measure.direction), np.array(measure.gear_ratios)
         return _core.Measure(measure.kind, a, b, direction, ratios, measure.offset)

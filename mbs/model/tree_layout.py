@@ -33,14 +33,14 @@ JOINTS = {
     "prismatic": JointInTree(_core.JointKind.prismatic, 1),
     "weld": JointInTree(_core.JointKind.weld, 0),
 }
-"""By type of joint."""
+"""By type of joint; those of other types are cut: what they hold are rows, and no body hangs on them."""
 
 FREE = JointInTree(_core.JointKind.free, 3)
 """Of a body that nothing carries: (R, θ) of its frame."""
 
 
 class NotInTreeError(Exception):
-    """Says what of a mechanism cannot be integrated in joint coordinates."""
+    """Says what of a mechanism cannot be told in joint coordinates."""
 
 
 class Coordinate(NamedTuple):
@@ -78,12 +78,10 @@ class Node(NamedTuple):
 class Layout:
     """The tree of a model, and the markers on its bodies, which are made where they are asked for.
 
-    Raises `NotInTreeError` for a type of joint that the core does not know.
-
     Attributes:
         nodes: each after the one that carries it; after them outputs of gears that give, then rotors beside the tree,
             which are no bodies of the system.
-        loops: names of the joints that close loops.
+        cut: names of the joints that carry nothing: those that close loops, and of types that the core does not know.
         size: of q and of v.
     """
 
@@ -95,7 +93,7 @@ class Layout:
         self._markers: list[dict[tuple[Marker, float], int]] = [{} for _ in (None, *self._bodies)]  # the ground's first
         self._coordinates: dict[tuple[object, ...], Coordinate] = {}
         self._kept = {c.owner: c.measure.offset for c in model.joints if c.measure.kind == _core.MeasureKind.angle}
-        self.loops = {model.scene.joint[number].name for number in topology.loop_joints}
+        self.cut = {model.scene.joint[number].name for number in topology.loop_joints}
         self.nodes: list[Node] = []
         self.size = 0
         for body, carrier in zip(self._bodies, topology.carriers.values(), strict=False):
@@ -184,8 +182,6 @@ class Layout:
 
     def _node(self, body: PlanarBody, joint: JointRecord | None, carrier: Carrier | None) -> Node:
         first = self.size
-        if joint is not None and joint.type not in JOINTS:
-            raise NotInTreeError(f"{joint.label}, {joint.type}")
         kind, count = FREE if joint is None else JOINTS[joint.type]
         backwards = joint is not None and carrier is not None and joint.between[0] == carrier.own
         sides = [self.place(at, turn) for at, turn in self._sides(body, joint)]
@@ -205,20 +201,24 @@ class Layout:
         return Node(body, kind, self.place(a), self.place(b), first, first + count, gear=gear)
 
     def _is_beside(self, rotor: Measure) -> bool:
-        return rotor.carries_moment and self.coordinate(angle_between(rotor)) is None
+        return self.coordinate(turned_by(rotor)) is None
 
     def _beside(self, measure: Measure, inertia: float) -> Node:
-        """It turns on the first side of the measure as the second does, which a row says."""
-        first, turned = self.size, angle_between(measure)
-        J = inertia * measure.gear_ratios[0] ** 2
+        """It turns on the first side of the measure as the second does, which a row says.
+
+        One that feels the relative motion alone, and not the turn of the first side, does so on the ground.
+        """
+        first, turned = self.size, turned_by(measure)
+        J = inertia * measure.angle_ratios[0] ** 2
         body = from_rigid_body(measure.label, RigidBody(mass=J, inertia=J, center=(0.0, 0.0)))  # at 1 m: of no effect
         self._index[body.name] = len(self._bodies)
         self._bodies.append(body)
         self._markers.append({})
         self._coordinates[_key(turned)] = Coordinate(first, 1.0)
-        kind, count = JOINTS["revolute"]
+        kind, count = JOINTS["revolute" if measure.carries_moment else "prismatic"]
         self.size += count
-        sides = self.place(measure.a), self.place(Marker(body.name))
+        on = measure.a if measure.kind == _core.MeasureKind.gear else GROUND_FRAME
+        sides = self.place(on), self.place(Marker(body.name))
         return Node(body, kind, *sides, first, first + count, beside=turned)
 
     def _sides(self, body: PlanarBody, joint: JointRecord | None) -> list[tuple[Marker, float]]:
@@ -262,17 +262,21 @@ class Layout:
 
 
 def _forest(model: Model) -> Topology:
-    """Loops are cut at revolute joints, whose angles are linear in coordinates of the tree, where nothing acts, if any.
+    """Loops are cut at joints of types that the core does not know, which carry nothing in open chains either.
 
-    Else where friction does; where a motor, a rotor or a path is only if all of a loop have one.
+    Else at revolute joints, whose angles are linear in coordinates of the tree, where nothing acts, if any. Else where
+    friction does; where a motor, a rotor or a path is only if all of a loop have one.
     """
     scene = model.scene
-    if scene.topology.is_open_chain:
+    unknown = {number for number, joint in enumerate(scene.joint) if joint.type not in JOINTS}
+    if scene.topology.is_open_chain and not unknown:
         return scene.topology
     needed = {joint.name for joint in (*scene.motor_joints, *(j for j in scene.joint if j.rotor("section")))}
     needed |= {trajectory.joint for trajectory in scene.trajectory if trajectory.joint is not None}
 
     def rank(joint: JointRecord) -> int:
+        if joint.type not in JOINTS:
+            return 4
         if joint.type != "revolute":
             return 0
         if joint.name in needed:
@@ -280,12 +284,17 @@ def _forest(model: Model) -> Topology:
         return 2 if joint.friction else 3
 
     edges = [Edge(joint.between, rank(joint)) for joint in scene.joint]
-    return spanning_forest([body.name for body in scene.body], edges)
+    topology = spanning_forest([body.name for body in scene.body], edges)
+    carriers = {body: None if by is None or by.joint in unknown else by for body, by in topology.carriers.items()}
+    carrying = {by.joint for by in carriers.values() if by is not None}
+    return Topology(carriers, tuple(number for number in range(len(edges)) if number not in carrying))
 
 
-def angle_between(measure: Measure) -> Measure:
-    """The angle of the second side of a measure on its first."""
-    return Measure(measure.label, _core.MeasureKind.angle, measure.a, measure.b)
+def turned_by(rotor: Measure) -> Measure:
+    """What a rotor turns with: the angle of the second side of its measure on the first where there is a gear."""
+    if rotor.kind != _core.MeasureKind.gear:
+        return rotor
+    return Measure(rotor.label, _core.MeasureKind.angle, rotor.a, rotor.b)
 
 
 def _key(measure: Measure) -> tuple[object, ...]:

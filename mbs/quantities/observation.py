@@ -13,7 +13,6 @@ from ..fields.field_types import split_point
 from ..model.geometric_stiffening import second_order_displacement
 from ..model.planar_body import PlanarBody
 from ..model.planar_tree import PlanarTree
-from ..model.tree_layout import NotInTreeError
 
 
 @dataclass(frozen=True)
@@ -130,10 +129,7 @@ def joint_forces(outcome: Outcome, joint: str) -> JointForces:
 def energies(outcome: Outcome) -> dict[str, Array]:
     """Kinetic, strain and gravitational energy (J) and dissipated power (W), each (T,)."""
     outcome = outcome.computed
-    try:
-        tree = PlanarTree(outcome.assembly)
-        q, v, _ = tree.motion(outcome.q, outcome.v, np.zeros_like(outcome.v))
-        values = tree.both.energies(q, v)
-    except NotInTreeError:
-        values = outcome.assembly.system.energies(outcome.q, outcome.v)
+    tree = PlanarTree(outcome.assembly)
+    q, v, _ = tree.motion(outcome.q, outcome.v, np.zeros_like(outcome.v))
+    values = tree.both.energies(q, v)
     return dict(zip(("kinetic", "strain", "gravitational", "dissipated_power"), values.T, strict=True))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...common.arrays import Array
+from ..model.planar_tree import PlanarTree
 from ..model.system import MechanismSystem
 from .path_checks import JUMP
 from .position import frame_gradients
@@ -32,7 +33,7 @@ def _not_a_number(assembly: MechanismSystem, t: float, state: State) -> str:
     for constraint in assembly.constraints:
         if not np.isfinite(constraint.target(t)).all():
             return f"{constraint.measure.label} has no finite value, velocity or acceleration there"
-    if not np.isfinite(assembly.system.evaluate(t, state.q, state.v)[0]).all():
+    if not np.isfinite(PlanarTree(assembly).evaluate(t, state.q, state.v)[0]).all():
         return "the accelerations there are no finite numbers: a load or a target grows without bound"
     return ""
 

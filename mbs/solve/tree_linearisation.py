@@ -119,7 +119,7 @@ class TreeLinearisation:
         core.keep_independent_rows(y[:n], y_dot[:n])
         loads, wrench = self._tree.given_forces(t)
         rows = len(self._tree.constraints)
-        bare = core.derivatives(y[:n], y_dot[:n], np.zeros(rows), forces[:n] + loads, wrench)
+        bare = core.derivatives(y[:n], y_dot[:n], np.zeros(rows), forces[:n] + loads, wrench, self._tree.scene, t)
         beside = len(self._rotors)
         a_y, a_y_dot = (np.pad(found, (0, beside)) for found in (bare.a_q, bare.a_v))
         a_f = np.pad(bare.a_f, (0, beside))

@@ -9,6 +9,7 @@ import numpy as np
 from ...common.arrays import Array
 from .. import _core
 from ..model.masses import block_diagonal, system_mass_matrix
+from ..model.planar_tree import PlanarTree
 from ..model.system import MechanismSystem
 from .state import State
 
@@ -73,10 +74,11 @@ def modal_excitation(
     acceleration a or the jerk j about that with which it starts is the vibration v/ω, a/ω², j/ω³. What the robot does
     beside following statically is what changes its elastic forces: φᵀ K q̇ = ω² v, and so on.
     """
-    system, q, v = assembly.system, state.q, state.v
-    a, lambda_ = system.evaluate(0.0, q, v, steering)
+    q, v = state.q, state.v
+    tree = PlanarTree(assembly)
+    a, lambda_ = tree.evaluate(0.0, q, v, steering)
     dt = 1e-3 / modes.frequency.max(initial=1.0)
-    jerk = (system.evaluate(dt, system.integrate(q, dt * v), v + dt * a, steering)[0] - a) / dt
+    jerk = (tree.evaluate(dt, q + dt * v, v + dt * a, steering)[0] - a) / dt
     omega, project = modes.frequency, (modes.shape * _stiffness(assembly)[:, None]).T / modes.frequency[:, None] ** 2
     amplitude = np.abs(project @ v) / omega + np.abs(project @ a) / omega**2 + np.abs(project @ jerk) / omega**3
     if not len(lambda_):

@@ -128,8 +128,8 @@ def chain(count, condition, modes):
     )
 
 
-def errors(count, condition, modes, seed, old=False):
-    """Relative errors of λ and q̈ by the recursion in a random state, or by the core in absolute coordinates (`old`)."""
+def errors(count, condition, modes, seed):
+    """Relative errors of λ and q̈ by the recursion in a random state."""
     rng, model = np.random.default_rng(seed), chain(count, condition, modes)
     tree = tree_of(assembly := assemble(model))
     q, v = rng.standard_normal(tree.model.n_q), rng.standard_normal(tree.model.n_v)
@@ -144,10 +144,7 @@ def errors(count, condition, modes, seed, old=False):
     x_y = np.argsort([row.measure.kind.name for row in rows])
     target = np.array([row.target(1.0)[2] for row in rows])
     a, lambda_ = tree.model.evaluate(q, v, target, None, None)
-    Q, V, A = tree.from_tree(q, v, a)
-    if old:
-        A, lambda_ = assembly.system.evaluate(1.0, Q, V)
-        lambda_ = lambda_[tree.rows]
+    A = tree.from_tree(q, v, a)[2]
     exact_a, exact_lambda = accelerations(
         model.bodies, model.scene.gravity, q[first[:, 0]], v[first[:, 2]], p, p_rate, target[x_y]
     )
@@ -155,14 +152,11 @@ def errors(count, condition, modes, seed, old=False):
 
 
 def main():
-    print("| chain | λ | q̈ | λ, old core | q̈, old core |\n|---|---|---|---|---|")
+    print("| chain | λ | q̈ |\n|---|---|---|")
     for count, condition, modes in CHAINS:
         states = 20 if count * modes < 50 else 4
-        new, old = (
-            np.max([errors(count, condition, modes, seed, old) for seed in range(states)], axis=0)
-            for old in (False, True)
-        )
-        cells = " | ".join(f"{error:.0e}" for error in (*new, *old))
+        found = np.max([errors(count, condition, modes, seed) for seed in range(states)], axis=0)
+        cells = " | ".join(f"{error:.0e}" for error in found)
         print(f"| {count} links, {condition}, {modes} modes; {states} states | {cells} |", flush=True)
 
 

@@ -9,6 +9,7 @@ from ffrobot.mbs import _core
 from ffrobot.mbs.analysis.forward import Forward
 from ffrobot.mbs.analysis.pcid import Pcid
 from ffrobot.mbs.model.model import build_model
+from ffrobot.mbs.model.planar_tree import PlanarTree
 from ffrobot.mbs.model.system import MechanismSystem
 from ffrobot.scene.load import make_scene
 from ffrobot.scene.scene import Scene
@@ -72,15 +73,32 @@ def always(_):
     return True
 
 
-def core_run(assembly, q, v, times, tolerance=1e-6, max_steps=0, **keys):
-    """A run of the core itself from (q, v), with DOP853."""
+def core_run(assembly, q, v, times, tolerance=1e-6, max_steps=0, motors=(), **keys):
+    """A run of the core itself from (q, v) of the system, with DOP853; forces of `motors` (measures) are found."""
     controls = _core.IntegrationControls(
         tolerance=tolerance, max_steps=max_steps, methods=[(_core.MethodKind.dop853, 1.0, 0.0)], spectral_radius=0.8
     )
-    return _core.run(
-        system=assembly.system, groups=assembly.groups, moments=assembly.moments, joints=[], times=times, q=q, v=v,
-        controls=controls, carry_on=always, **keys,
-    )  # fmt: skip
+    tree = PlanarTree(assembly, motors)
+    q, v = tree.state(q, v)
+    return _core.run_tree(tree.both, times=times, q=q, v=v, controls=controls, carry_on=always, **keys)
+
+
+def evaluate(assembly, t, q, v):
+    """Accelerations and multipliers by the core, of a state that the joints of the tree allow."""
+    return PlanarTree(assembly).evaluate(t, q, v)
+
+
+def energies(assembly, q, v):
+    """Kinetic, strain, gravitational energy and dissipated power by the core, of such a state."""
+    tree = PlanarTree(assembly)
+    return tree.both.energies(*(x[None] for x in tree.state(q, v)))[0]
+
+
+def joint_state(rng, assembly, modal=0.1):
+    """Any q and v that the joints of the tree allow; what is held by rows may be violated."""
+    tree = PlanarTree(assembly)
+    found = tree.both.at(0.0, *random_state(rng, tree.core.n_v, modal))
+    return found.q[0], found.v[0]
 
 
 def relative(got, expected, scale=None):
@@ -95,8 +113,22 @@ def oracle_of(assembly):
         model.bodies,
         model.scene.gravity,
         [(constraint.measure, constraint.target) for constraint in assembly.constraints],
-        model.loads,
+        assembly.drives,
         [(load.body, load.vector, load.magnitude) for load in model.modal_loads],
         model.rotors,
         model.frictions,
+        [(gear.motor, gear.coordinate, gear.stiffness, gear.damping) for gear in model.gears],
+        model.state_forces,
     )
+
+
+def on_constraints(assembly, t, q, v):
+    """(q, v) moved onto the constraints by least steps, as the oracle has these."""
+    oracle = oracle_of(assembly)
+    for _ in range(20):
+        C, _, C_q = oracle.constraint_values(t, q, v)
+        if np.abs(C).max(initial=0.0) < 1e-15:
+            break
+        q = q - np.linalg.lstsq(C_q, C, rcond=None)[0]
+    _, rate, C_q = oracle.constraint_values(t, q, v)
+    return q, v - np.linalg.lstsq(C_q, rate, rcond=None)[0]

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from ffrobot.common.arrays import Array
 from ffrobot.common.errors import SolveError
+from ffrobot.mbs.model.planar_tree import PlanarTree
 from ffrobot.mbs.model.system import MechanismSystem
 from ffrobot.mbs.solve.state import State
 
@@ -64,7 +65,7 @@ def integrate_partitioned(
     """Q and multipliers λ (T, …) at `times`, by SciPy's DOP853 on the independent coordinates."""
     from scipy.integrate import solve_ivp
 
-    partition = choose_partition(assembly, start)
+    tree, partition = PlanarTree(assembly), choose_partition(assembly, start)
     i, n = partition.independent, len(partition.independent)
     near = start
 
@@ -77,7 +78,7 @@ def integrate_partitioned(
 
     def slope(t: float, y: Array) -> Array:
         state = state_at(t, y)
-        a, _ = assembly.system.evaluate(t, state.q, state.v)
+        a, _ = tree.evaluate(t, state.q, state.v)
         return np.concatenate([state.v[i], a[i]])
 
     y = np.concatenate([start.q[i], start.v[i]])
@@ -86,5 +87,5 @@ def integrate_partitioned(
         raise SolveError(f"coordinate partitioning: {solution.message}")
     near = start
     states = [state_at(t, y) for t, y in zip(times, solution.y.T, strict=True)]
-    lambda_ = [assembly.system.evaluate(t, s.q, s.v)[1] for t, s in zip(times, states, strict=True)]
+    lambda_ = [tree.evaluate(t, s.q, s.v)[1] for t, s in zip(times, states, strict=True)]
     return np.array([s.q for s in states]), np.array(lambda_)

@@ -4,13 +4,12 @@ import numpy as np
 import pytest
 import velocity_transformation
 import zoo
-from mechanisms import assemble, core_run, oracle_of, relative
+from mechanisms import assemble, core_run, on_constraints, oracle_of, relative
 
 from ffrobot.common.errors import InputError
-from ffrobot.mbs import _core
 from ffrobot.mbs.solve.initial_state import undeformed_state
 
-LONG = "chain of 24"  # its frames' system is sparse
+LONG = "chain of 24"
 OPEN = ["chain of 2", "chain of 3", "chain of 6", LONG, "backwards", "mixed", "mixed backwards", "tree", "loaded"]
 CLOSED = ["four-bar", "slider-crank"]
 
@@ -22,8 +21,8 @@ def resolved(assembly, seed=0):
     q, v = start.q.copy(), start.v + rng.standard_normal(len(start.v))
     for body, first in zip(assembly.model.bodies, assembly.first, strict=True):
         q[first + 3 : first + 3 + body.n_modes] = 0.05 * rng.standard_normal(body.n_modes)
-    forces = _core.ActuatorForces(assembly.system, assembly.is_trajectory, assembly.motor_measures)
-    run = core_run(assembly, q, v, [0.0, 1e-6], max_steps=1, actuator_forces=forces)
+    q, v = on_constraints(assembly, 0.0, q, v)
+    run = core_run(assembly, q, v, [0.0, 1e-6], max_steps=1, motors=assembly.model.motors.values())
     assert run.residual[0].max() < 1e-12
     return run.q[0], run.v[0], run.multipliers[0], run.tau[0], run.F_p[0]
 

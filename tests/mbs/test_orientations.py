@@ -2,8 +2,6 @@
 
 import numpy as np
 import pytest
-import zoo
-from mechanisms import assemble
 
 from ffrobot.mbs import _core
 
@@ -93,12 +91,3 @@ def test_adaptive_steps_and_their_outputs(exact, method, tolerance):
     states = _core.top_motion(*TOP, times.tolist(), START, SPIN, controls)
     assert np.abs(np.linalg.norm(states[:, :4], axis=1) - 1).max() < 1e-15
     assert max(distance(s, e) for s, e in zip(states, exact[::160], strict=True)) < tolerance
-
-
-def test_planar_coordinates_are_numbers():
-    system = assemble(zoo.build("mixed")).system
-    rng = np.random.default_rng(0)
-    q, dq = rng.standard_normal((2, system.n_q))
-    assert system.n_q == system.n_v == system.coordinates
-    np.testing.assert_array_equal(system.integrate(q, dq), q + dq)
-    np.testing.assert_allclose(system.difference(system.integrate(q, dq), q), dq, rtol=0, atol=1e-15)

@@ -1,4 +1,4 @@
-"""Planar mechanisms in joint coordinates have the numbers of their systems: every mechanism of the zoo, and others."""
+"""Planar mechanisms in joint coordinates have the numbers of the oracle: every mechanism of the zoo, and others."""
 
 import ctypes
 from dataclasses import replace
@@ -6,9 +6,10 @@ from types import MappingProxyType, SimpleNamespace
 
 import numpy as np
 import pytest
+import velocity_transformation
 import zoo
 from links import ritz_link
-from mechanisms import always, assemble, core_run, make_model, relative, revolute
+from mechanisms import always, assemble, make_model, on_constraints, oracle_of, relative, revolute
 
 from ffrobot.mbs import _core
 from ffrobot.mbs.analysis.elastic_joints import with_compliance
@@ -26,13 +27,13 @@ AS_BUILT = [(name, side) for name in ("mixed, as built", "slider-crank, as built
 
 
 def bent_state(assembly, seed=1):
-    """q and v at T on all constraints, with modes and twists of gears of any size and rate; a and multipliers there."""
+    """q and v at T on all constraints, with modes and twists of gears of any size and rate."""
     start, rng = undeformed_state(assembly), np.random.default_rng(seed)
     modal = np.ones(assembly.system.coordinates, dtype=bool)
     modal[assembly.frame_coordinates] = False
     modal[[assembly.first[assembly.index[gear.rotor]] + 2 for gear in assembly.model.gears]] = True
     q, v = start.q + 0.05 * rng.standard_normal(len(start.q)) * modal, start.v + rng.standard_normal(len(start.v))
-    return core_run(assembly, q, v, [T])
+    return on_constraints(assembly, T, q, v)
 
 
 def outputs(tree, q, v):
@@ -43,27 +44,38 @@ def outputs(tree, q, v):
     return _core.run_tree(tree.both, times=[T], q=q, v=v, controls=controls, carry_on=always)
 
 
-def both_at_one_state(assembly, motors=(), **keys):
-    """The tree, what it reports of a state, and what the system reports of the same."""
-    state, tree = bent_state(assembly), PlanarTree(assembly, motors)
-    found = outputs(tree, *tree.state(state.q[0], state.v[0]))
-    for of_tree, of_system in ((found.q, state.q), (found.v, state.v)):  # each is projected onto its own rows
-        np.testing.assert_allclose(of_tree, of_system, rtol=0, atol=1e-10)
-    return tree, found, core_run(assembly, found.q[0], found.v[0], [T], **keys)
+def at_one_state(assembly, motors=()):
+    """The tree, and what it reports of a state."""
+    (q, v), tree = bent_state(assembly), PlanarTree(assembly, motors)
+    found = outputs(tree, *tree.state(q, v))
+    for of_tree, expected in ((found.q[0], q), (found.v[0], v)):  # projected onto the rows of the tree
+        np.testing.assert_allclose(of_tree, expected, rtol=0, atol=1e-10)
+    return tree, found
 
 
 def compare(assembly):
     """Accelerations, energies and all multipliers; those of joints come from an inverse sweep."""
-    tree, found, expected = both_at_one_state(assembly)
-    held = len(assembly.constraints)
-    assert relative(found.a, expected.a) < 1e-11
-    if held:
-        assert relative(found.multipliers, expected.multipliers[:, :held]) < 1e-11
+    tree, found = at_one_state(assembly)
+    oracle, q, v = oracle_of(assembly), found.q[0], found.v[0]
+    a, multipliers = oracle.solve(T, q, v)
+    assert relative(found.a[0], a) < 1e-11
+    if len(multipliers):
+        assert relative(found.multipliers[0], multipliers) < 1e-11
     assert found.residual.max() < 1e-12
-    q, v, _ = tree.motion(found.q, found.v, found.a)
-    energies, of_system = tree.both.energies(q, v), assembly.system.energies(found.q, found.v)
-    np.testing.assert_allclose(energies, of_system, rtol=1e-11, atol=1e-13 * np.abs(of_system).max())
+    q_tree, v_tree, _ = tree.motion(found.q, found.v, found.a)
+    energies, expected = tree.both.energies(q_tree, v_tree)[0], oracle.energies(q, v)
+    np.testing.assert_allclose(energies, expected, rtol=1e-11, atol=1e-13 * np.abs(expected).max())
     return tree
+
+
+def motor_forces(assembly, found):
+    """(τ, F_p) by definition: −Dᵀ C_sᵀ λ_s, rates q̇ = D (ȧ, ṗ) of motors and modes."""
+    oracle, q, v = oracle_of(assembly), found.q[0], found.v[0]
+    C_q, is_trajectory = oracle.constraint_values(T, q, v)[2], np.array(assembly.is_trajectory)
+    T_q = np.array([oracle.row(row, q, v).gradient for row in assembly.model.motors.values()])
+    D = velocity_transformation.by_definition(oracle, C_q[~is_trajectory], T_q)
+    force = -D.T @ C_q[is_trajectory].T @ found.multipliers[0][is_trajectory]
+    return force[: len(T_q)], force[len(T_q) :]
 
 
 @pytest.mark.parametrize("name", zoo.ALL)
@@ -71,11 +83,19 @@ def test_zoo(name):
     compare(assemble(zoo.build(name)))
 
 
-@pytest.mark.parametrize("name", ["chain of 3", "backwards", "mixed", "mixed backwards", "tree", "loaded"])
-def test_gears_that_give(name):
-    model = with_compliance(zoo.geared(name))
+@pytest.mark.parametrize("motors", ["section", "frame"])
+@pytest.mark.parametrize("name", [*zoo.GEARED, "stiffened"])
+def test_gears_that_give(name, motors):
+    """Between frames, too, against which modes turn the sections at joints."""
+    model = with_compliance(zoo.geared(name, motors=motors))
     assert model.gears
     compare(assemble(model))
+
+
+def test_gears_that_give_in_all_joints_of_a_loop():
+    """The one at which it is cut has a spring all the same."""
+    tree = compare(assemble(with_compliance(zoo.geared("four-bar", motor=True, trajectory=[]))))
+    assert len(tree.layout.cut) == 1
 
 
 def held_at_root(rng, body, turns):
@@ -115,8 +135,9 @@ def test_forces_of_the_motion_of_points(name):
     points = [Marker(body.name, list(body.points)[-1]) for body in bare.bodies]
     model = replace(bare, state_forces=tuple((point, force) for point in points))
     compare(assemble(model))
-    moved = bent_state(assemble(bare)).a[0] - bent_state(assemble(model)).a[0]
-    assert np.abs(moved).max() > 1e-2  # the forces act
+    with_forces, without = (oracle_of(assemble(one)) for one in (model, bare))
+    q, v = bent_state(assemble(bare))
+    assert np.abs(with_forces.forces(T, q, v) - without.forces(T, q, v)).max() > 1e-2  # the forces act
 
 
 @pytest.mark.parametrize("motors", ["section", "frame"])
@@ -126,7 +147,7 @@ def test_friction_in_all_joints_of_a_loop(motors):
         joint |= {"viscous_friction": 0.1 + 0.05 * k, "coulomb_friction": 0.02, "friction_speed": 0.5}
     model = zoo.four_bar(np.random.default_rng(0), joint=joints, motors=motors)
     tree = compare(assemble(model))
-    assert len(tree.layout.loops) == 1
+    assert len(tree.layout.cut) == 1
 
 
 @pytest.mark.parametrize("motors", ["section", "frame"])
@@ -185,11 +206,9 @@ def test_states_there_and_back():
         models[f"{name}, geared"] = with_compliance(zoo.geared(name))
     for name, model in models.items():
         assembly = assemble(model)
-        expected, tree = bent_state(assembly), PlanarTree(assembly)
-        q, v = expected.q[0].copy(), expected.v[0]
-        q[assembly.first + 2] += 6 * np.pi
-        if name.startswith("mixed") or name == "four-bar":  # prismatic joints and the ground keep angles
-            q = expected.q[0]
+        (q, v), tree = bent_state(assembly), PlanarTree(assembly)
+        if not name.startswith("mixed") and name != "four-bar":  # prismatic joints and the ground keep angles
+            q[assembly.first + 2] += 6 * np.pi
         run = outputs(tree, *tree.state(q, v))
         np.testing.assert_allclose(run.q[0], q, rtol=0, atol=1e-12)
         np.testing.assert_allclose(run.v[0], v, rtol=0, atol=1e-11)
@@ -201,10 +220,10 @@ def test_states_there_and_back():
 def test_motor_and_modal_forces(name, motors):
     """τ and F_p in place of the forces on trajectories, of loops with a motor in the tree, too."""
     assembly = assemble(zoo.build(name, motors=motors))
-    forces = _core.ActuatorForces(assembly.system, assembly.is_trajectory, assembly.motor_measures)
-    _, found, expected = both_at_one_state(assembly, assembly.model.motors.values(), actuator_forces=forces)
-    assert relative(found.tau, expected.tau) < 1e-11
-    assert relative(found.F_p, expected.F_p) < 1e-11
+    _, found = at_one_state(assembly, assembly.model.motors.values())
+    tau, F_p = motor_forces(assembly, found)
+    assert relative(found.tau[0], tau) < 1e-11
+    assert relative(found.F_p[0], F_p) < 1e-11
 
 
 @pytest.mark.parametrize("driven", range(4))
@@ -213,18 +232,17 @@ def test_loops_are_cut_where_no_motor_is(driven):
     for k, joint in enumerate(joints):
         joint["motor"] = k == driven
     assembly = assemble(zoo.four_bar(np.random.default_rng(0), joint=joints))
-    forces = _core.ActuatorForces(assembly.system, assembly.is_trajectory, assembly.motor_measures)
-    tree, found, expected = both_at_one_state(assembly, assembly.model.motors.values(), actuator_forces=forces)
-    assert tree.layout.loops.isdisjoint(assembly.model.motors)
-    assert relative(found.tau, expected.tau) < 1e-11
+    tree, found = at_one_state(assembly, assembly.model.motors.values())
+    assert tree.layout.cut.isdisjoint(assembly.model.motors)
+    assert relative(found.tau[0], motor_forces(assembly, found)[0]) < 1e-11
 
 
 @pytest.mark.parametrize("name", ["chain of 2", "mixed", "mixed backwards", "four-bar", "slider-crank", "tree"])
 def test_accelerations_that_violate_a_row_are_seen(name):
     """By as much as the gradients of the rows say, which their rates are linear in."""
     assembly = assemble(zoo.build(name))
-    state, tree = bent_state(assembly), PlanarTree(assembly)
-    q, v = tree.state(state.q[0], state.v[0])
+    tree = PlanarTree(assembly)
+    q, v = tree.state(*bent_state(assembly))
     target = tree.row_signs * [constraint.target(T)[2] for constraint in tree.constraints]
     a = tree.core.evaluate(q, v, target, None, None)[0]
     assert tree.both.acceleration_violation(T, q, v, a) < 1e-13

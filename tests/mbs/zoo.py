@@ -163,9 +163,13 @@ def as_built(mechanism):
     return build
 
 
-def geared(name, **keys):
+GEARED = ("chain of 3", "backwards", "mixed", "mixed backwards", "tree", "loaded")
+
+
+def geared(name, motor=None, **keys):
     """A mechanism of `ALL` whose revolute joints have motors behind gears that give; rotors come with the analysis."""
     gear = {"gear_ratio": 7.0, "rotor_inertia": 0.02, "stiffness": 90.0, "damping": 0.3, "viscous_friction": 0.2}
+    gear |= {} if motor is None else {"motor": motor}
     joints = [joint.model_dump(exclude_unset=True) for joint in build(name).scene.joint]
     return build(name, joint=[joint | gear if joint["type"] == "revolute" else joint for joint in joints], **keys)
 

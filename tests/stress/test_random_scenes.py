@@ -8,7 +8,7 @@ import zoo
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from links import arm, quintic, ritz_link
-from mechanisms import always, assemble, forward, oracle_of, pcid, random_state, relative
+from mechanisms import always, assemble, energies, evaluate, forward, joint_state, oracle_of, pcid, relative
 from patch_sets import FULL
 from table import at_most
 
@@ -44,7 +44,7 @@ def systems(draw):
     rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
     gravity = tuple(draw(st.lists(st.floats(-20, 20), min_size=2, max_size=2)))
     assembly = assemble(zoo.ALL[name](rng, gravity=gravity))
-    q, v = random_state(rng, assembly.system.coordinates, modal=draw(st.sampled_from([1e-6, 0.01, 0.1])))
+    q, v = joint_state(rng, assembly, modal=draw(st.sampled_from([1e-6, 0.01, 0.1])))
     return assembly, q, v * draw(st.sampled_from([0.0, 1.0, 30.0]))
 
 
@@ -53,7 +53,7 @@ def systems(draw):
 def test_accelerations_are_those_of_the_equations(system):
     """Against the augmented system M q̈ + C_qᵀ λ = Q, C_q q̈ = γ, by its residual: conditioning is the scene's."""
     assembly, q, v = system
-    a, lambda_ = assembly.system.evaluate(T, q, v)
+    a, lambda_ = evaluate(assembly, T, q, v)
     oracle = oracle_of(assembly)
     _, _, C_q = assembly.system.constraints(T, q, v)
     M, Q = oracle.mass_matrix(q), oracle.forces(T, q, v)
@@ -84,11 +84,11 @@ def test_power_is_the_rate_of_energy(system):
     By central differences along q + v s + a s²/2; forces and rows from the readable equations.
     """
     assembly, q, v = system
-    a, lambda_ = assembly.system.evaluate(T, q, v)
+    a, lambda_ = evaluate(assembly, T, q, v)
     oracle, h = oracle_of(assembly), 1e-6 / max(1.0, np.abs(v).max(), np.abs(a).max())
 
     def energy(s):
-        parts = assembly.system.energies((q + s * v + s**2 / 2 * a)[None], (v + s * a)[None])[0]
+        parts = energies(assembly, q + s * v + s**2 / 2 * a, v + s * a)
         return parts[:3].sum(), np.abs(parts[:3]).sum(), parts[3]
 
     rate = (energy(h)[0] - energy(-h)[0]) / (2 * h)

@@ -259,6 +259,14 @@ void bind_tree_motion(nb::module_ &m) {
           "axis "
           "of a, or of its way along it.")
       .def(
+          "add_cut_gear",
+          [](Scene &s, int a, int b, int coordinate, double stiffness, double damping) {
+            s.cut_joints.push_back({a, b, true, Eigen::Vector3d::UnitZ(), {damping, 0, 1}, stiffness, coordinate});
+          },
+          "a"_a, "b"_a, "coordinate"_a, "stiffness"_a, "damping"_a,
+          "In the plane, between two wrenches of the model: spring and damper of the turn of b on a, less "
+          "v[coordinate].")
+      .def(
           "add_cut_load",
           [](Scene &s, int joint, const TimeFunction &magnitude, double share) {
             s.cut_loads.push_back({joint, magnitude, share});

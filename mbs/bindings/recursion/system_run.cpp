@@ -68,6 +68,14 @@ recursion::RowMajorMatrix energies_of(const SystemOnTree &both, const recursion:
   return found;
 }
 
+Run reported_at(const SystemOnTree &both, double t, const VectorXd &q, const VectorXd &v,
+                ExternalLoads *external_loads) {
+  const VectorXd state = state_of(both, q, v);
+  TreeOutputs outputs(both, 1, t, state.data(), external_loads);
+  outputs.at(0, t, state.data());
+  return {{}, outputs.take(1), {}};
+}
+
 Run run_tree(const SystemOnTree &both, const std::vector<double> &times, const VectorXd &q, const VectorXd &v,
              const IntegrationControls &controls, const std::function<bool(double)> &carry_on,
              ExternalLoads *external_loads, Recording *recording, recursion::TreeCheckpoint *checkpoint) {
@@ -113,7 +121,7 @@ void bind_drives(nb::module_ &m) {
   nb::class_<DrivesOnTree>(m, "DrivesOnTree", "Where drives and modal forces of a system act in a tree.")
       .def(
           "__init__",
-          [](DrivesOnTree *made, std::vector<int> modes) { new (made) DrivesOnTree{{}, {}, std::move(modes)}; },
+          [](DrivesOnTree *made, std::vector<int> modes) { new (made) DrivesOnTree{{}, {}, std::move(modes), {}}; },
           "modes"_a, "Of each body of the system the first index of its modes in v.")
       .def(
           "add_along",
@@ -121,6 +129,10 @@ void bind_drives(nb::module_ &m) {
             d.along.push_back({drive, coordinate, share});
           },
           "drive"_a, "coordinate"_a, "share"_a, "`share` times the drive acts along v[coordinate].")
+      .def(
+          "add_along_cut",
+          [](DrivesOnTree &d, std::size_t drive, int joint) { d.along_cuts.push_back({drive, joint}); }, "drive"_a,
+          "joint"_a, "The drive acts along a joint of add_cut_joint, by its number.")
       .def(
           "add_at_point",
           [](DrivesOnTree &d, std::size_t drive, int wrench, int component, double share) {
@@ -160,10 +172,13 @@ void bind_reactions(nb::module_ &m) {
       .def(
           "add_motor",
           [](ReactionsOnTree &r, int coordinate, double sign, bool turns_frames) {
-            r.motors.push_back({coordinate, sign, turns_frames});
+            r.motors.push_back({coordinate, sign, turns_frames, -1});
           },
           "coordinate"_a, "sign"_a, "turns_frames"_a,
-          "A motor along `sign` v[coordinate], or between the frames of the bodies there.");
+          "A motor along `sign` v[coordinate], or between the frames of the bodies there.")
+      .def(
+          "add_motor_along_cut", [](ReactionsOnTree &r, int joint) { r.motors.push_back({-1, 1, false, joint}); },
+          "joint"_a, "A motor along a joint of add_cut_joint, by its number.");
 }
 
 void make_actuation(TreeActuation *made, const SystemOnTree &both, const Recording &recording) {
@@ -184,6 +199,8 @@ void bind_system_run(nb::module_ &m) {
            "bodies: number in the system of each of the tree's.")
       .def("energies", &energies_of, "q"_a, "v"_a,
            "Kinetic, strain, gravitational energy and dissipated power (T, 4) of states q, v (T, n_v) of the tree.")
+      .def("at", &reported_at, "t"_a, "q"_a, "v"_a, "external_loads"_a = nb::none(),
+           "What a run reports of a state q, v (n_v) of the tree, which is not moved onto its rows.")
       .def("acceleration_violation", &violation_of, "t"_a, "q"_a, "v"_a, "a"_a,
            "Largest violation of C_ddot = 0 by accelerations a (n_v) of the tree, relative to the terms that cancel.");
   bind_prescribed(m);

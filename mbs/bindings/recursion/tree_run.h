@@ -43,9 +43,14 @@ template <class Space> void check_scene(const Model<Space> &model, const Scene &
   for (const GearSpring &gear : scene.gears)
     for (const GearSpring::Side &side : {gear.a, gear.b})
       check_index("q of a gear", side.q, n_q), check_index("v of a gear", side.v, n_v);
-  for (const CutJoint &cut : scene.cut_joints)
+  for (const CutJoint &cut : scene.cut_joints) {
     for (const int wrench : {cut.a, cut.b})
       check_index("wrench of a cut joint", wrench, model.mechanism.wrenches.size());
+    if (Space::dim != 3 && (cut.stiffness != 0 || cut.coordinate >= 0))
+      throw std::invalid_argument("springs and coordinates of cut joints: expected none in space");
+    if (cut.coordinate >= 0)
+      check_index("coordinate of a cut joint", cut.coordinate, n_v);
+  }
   for (const CutLoad &load : scene.cut_loads)
     check_index("joint of a load", load.joint, scene.cut_joints.size());
   if (!scene.most_bent.empty())

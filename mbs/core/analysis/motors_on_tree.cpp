@@ -21,15 +21,20 @@ MotorsOnTree::MotorsOnTree(const SystemOnTree &both)
   for (const auto &node : both.tree.nodes)
     for (int k = 0; k < node.shape.v_count; ++k)
       joint_coordinates_.push_back(node.v + k);
-  cut_columns_.resize(both.tree.n_v, static_cast<Index>(cuts_.size()));
+  columns_.resize(both.tree.n_v, static_cast<Index>(cuts_.size()) + tau_.size());
+  for (const auto &motor : both.reactions.motors)
+    is_along_coordinates_ = is_along_coordinates_ && motor.cut < 0;
 }
 
 std::vector<bool> MotorsOnTree::are_moments() const {
   std::vector<bool> found;
-  for (const auto &motor : both_.reactions.motors)
+  for (const auto &motor : both_.reactions.motors) {
+    if (motor.cut >= 0)
+      found.push_back(both_.scene.cut_joints[static_cast<std::size_t>(motor.cut)].turns);
     for (const auto &node : both_.tree.nodes)
       if (const int k = motor.coordinate - node.v; k >= 0 && k < node.shape.freedoms.count)
         found.push_back(node.shape.freedoms.component[k] >= recursion::Planar::linear);
+  }
   return found;
 }
 
@@ -48,10 +53,12 @@ void MotorsOnTree::resolve(const double *q, const double *lambda, const TreeWork
   for (const int row : cuts_)
     lambda_[row] = 0;
   project(q, w, Q_);
-  if (!cuts_.empty())
+  if (!cuts_.empty() || !is_along_coordinates_)
     close_loops(q, w);
   for (std::size_t k = 0; k < both_.reactions.motors.size(); ++k) {
-    const auto &[coordinate, sign, turns_frames] = both_.reactions.motors[k];
+    const auto &[coordinate, sign, turns_frames, cut] = both_.reactions.motors[k];
+    if (cut >= 0)
+      continue;
     const double along = Q_[coordinate];
     tau_[static_cast<Index>(k)] = sign * along;
     if (turns_frames)
@@ -84,22 +91,41 @@ void MotorsOnTree::turn_frames(int coordinate, double moment, const TreeWorkspac
   }
 }
 
-// Takes what the cuts do off Q, so that nothing is left of it along joint coordinates without a motor.
+// Takes off Q what the cuts do, and motors along cut joints, so that nothing is left of it along joint coordinates
+// without a motor.
 void MotorsOnTree::close_loops(const double *q, const TreeWorkspace &w) {
-  const auto cuts = static_cast<Index>(cuts_.size()), size = cuts + tau_.size();
-  Eigen::MatrixXd columns = Eigen::MatrixXd::Zero(both_.tree.n_v, size);
+  const auto cuts = static_cast<Index>(cuts_.size());
   for (Index k = 0; k < cuts; ++k) {
     lambda_.setZero();
     lambda_[cuts_[static_cast<std::size_t>(k)]] = 1;
-    project(q, w, cut_columns_.col(k));
-    columns.col(k) = cut_columns_.col(k);
+    project(q, w, columns_.col(k));
   }
-  for (Index k = 0; k < tau_.size(); ++k) {
-    const auto &motor = both_.reactions.motors[static_cast<std::size_t>(k)];
-    columns(motor.coordinate, cuts + k) = motor.sign;
+  for (Index k = 0; k < tau_.size(); ++k)
+    add_motor(k, q, w);
+  lu_.compute(columns_(joint_coordinates_, Eigen::all));
+  const VectorXd found = lu_.solve(Q_(joint_coordinates_));
+  Q_ -= columns_.leftCols(cuts) * found.head(cuts);
+  for (Index k = 0; k < tau_.size(); ++k)
+    if (both_.reactions.motors[static_cast<std::size_t>(k)].cut >= 0) {
+      tau_[k] = found[cuts + k];
+      Q_ -= tau_[k] * columns_.col(cuts + k);
+    }
+}
+
+void MotorsOnTree::add_motor(Index k, const double *q, const TreeWorkspace &w) {
+  const auto &motor = both_.reactions.motors[static_cast<std::size_t>(k)];
+  auto column = columns_.col(static_cast<Index>(cuts_.size()) + k);
+  if (motor.cut < 0) {
+    column.setZero();
+    column[motor.coordinate] = motor.sign;
+    return;
   }
-  lu_.compute(columns(joint_coordinates_, Eigen::all));
-  Q_ -= cut_columns_ * lu_.solve(Q_(joint_coordinates_)).head(cuts);
+  const std::vector<recursion::CutJoint> joint{both_.scene.cut_joints[static_cast<std::size_t>(motor.cut)]};
+  VectorXd wrench = VectorXd::Zero(recursion::Planar::dim * static_cast<Index>(both_.tree.wrenches.size()));
+  const double unit = 1;
+  add_along_cuts(both_.tree, joint, &unit, w, wrench.data());
+  forces_.load(nullptr, wrench.data(), w);
+  forces_.project(q, w, column.data());
 }
 
 } // namespace ffrobot

@@ -33,14 +33,16 @@ private:
   // Of rows with -lambda, into Q (n_v)
   void project(const double *q, const TreeWorkspace &w, Eigen::Ref<Eigen::VectorXd> Q);
   void close_loops(const double *q, const TreeWorkspace &w);
+  void add_motor(Eigen::Index k, const double *q, const TreeWorkspace &w); // its column
   void turn_frames(int coordinate, double moment, const TreeWorkspace &w);
 
   const SystemOnTree &both_;
   recursion::NewtonEuler forces_;
   std::vector<int> joint_coordinates_, cuts_; // in v; rows of the tree
+  bool is_along_coordinates_ = true;          // all motors: what they do is known without equations, but for cuts
   Eigen::VectorXd lambda_, tau_, Q_;          // (rows), (motors), (n_v)
   std::vector<Eigen::VectorXd> modal_force_;
-  Eigen::MatrixXd cut_columns_;             // (n_v, cuts) -C_c^T
+  Eigen::MatrixXd columns_;                 // (n_v, cuts, then motors) -C_c^T, T^T
   Eigen::PartialPivLU<Eigen::MatrixXd> lu_; // of joint coordinates by cuts, then motors
 };
 

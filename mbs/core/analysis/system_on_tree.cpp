@@ -31,8 +31,13 @@ void SystemOnTree::check() const {
     check_index("constraint", constraint, constraints), check_index("node", node, count);
   for (const auto &[constraint, value] : reactions.weights)
     check_index("constraint", constraint, constraints);
+  for (const auto &[drive, joint] : drives.along_cuts)
+    check_index("drive", drive, system.drives.size()), check_index("cut joint", joint, scene.cut_joints.size());
   for (const auto &motor : reactions.motors)
-    check_index("coordinate of a motor", motor.coordinate, tree.n_v);
+    if (motor.cut >= 0)
+      check_index("cut joint of a motor", motor.cut, scene.cut_joints.size());
+    else
+      check_index("coordinate of a motor", motor.coordinate, tree.n_v);
 }
 
 namespace {
@@ -102,6 +107,11 @@ void SteeredTree::add(double t, double *force, double *wrench) {
     const VectorXd &modal = workspace_.external_modal[b];
     Eigen::Map<VectorXd>(force + drives_.modes[b], modal.size()) += modal;
   }
+}
+
+void SteeredTree::add_along_cuts(double *along) {
+  for (const auto &[drive, joint] : drives_.along_cuts)
+    along[joint] += workspace_.external_drive[drive];
 }
 
 } // namespace ffrobot

@@ -23,9 +23,14 @@ struct DrivesOnTree {
     int wrench, component;
     double share;
   };
+  struct AlongCut {
+    std::size_t drive;
+    int joint; // of the scene's cut joints
+  };
   std::vector<Along> along;
   std::vector<AtPoint> at_points;
   std::vector<int> modes; // of each body of the system, in v
+  std::vector<AlongCut> along_cuts;
 };
 
 // What the constraints and motors of a system are in a tree.
@@ -46,9 +51,10 @@ struct ReactionsOnTree {
     double value; // N
   };
   struct Motor {
-    int coordinate; // in v
+    int coordinate; // in v; -1 of one along a cut joint
     double sign;
     bool turns_frames; // in place of the sections, which modes turn against these
+    int cut = -1;      // of the scene's cut joints
   };
   std::vector<OfRow> rows;
   std::vector<OfJoint> joints;
@@ -97,6 +103,7 @@ public:
       : loads_(loads), drives_(both.drives), workspace_(both.system) {}
 
   void add(double t, double *force, double *wrench) override;
+  void add_along_cuts(double *along) override;
 
 private:
   ExternalLoads &loads_;

@@ -75,6 +75,12 @@ void TreeOutputs::operator()(std::size_t output, double t, const double *state) 
   write(i, targets_at(both_.scene, t), motion_.workspace(), motion_.wrenches());
 }
 
+void TreeOutputs::at(std::size_t output, double t, const double *state) {
+  state_ = Eigen::Map<const VectorXd>(state, state_.size());
+  evaluate(t, state);
+  write(static_cast<Index>(output), targets_at(both_.scene, t), motion_.workspace(), motion_.wrenches());
+}
+
 void TreeOutputs::operator()(std::size_t output, PrescribedMotion &motion) {
   const auto i = static_cast<Index>(output);
   state_ = motion.state();

@@ -24,6 +24,7 @@ public:
 
   void operator()(std::size_t i, double t, const double *state); // (q, v) of the tree
   void operator()(std::size_t i, PrescribedMotion &motion);
+  void at(std::size_t i, double t, const double *state); // as it is: not moved onto its rows
   Outputs take(std::size_t reached);
 
   // Accelerations of the system's coordinates at a state of the tree

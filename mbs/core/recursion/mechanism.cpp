@@ -177,8 +177,9 @@ Mechanism<Space>::Mechanism(std::vector<BodyModel<Data>> bodies, std::vector<Mar
     }
   }
   for (const RowModel &model : row_models) {
-    if (model.coordinate >= 0 && model.kind != RowKind::coordinate && model.kind != RowKind::rotation)
-      refuse("row " + model.name + ": coordinate: expected one of a rotation alone, got one of another kind of row");
+    if (model.coordinate >= 0 && model.kind != RowKind::coordinate && model.kind != RowKind::rotation &&
+        model.kind != RowKind::slide)
+      refuse("row " + model.name + ": coordinate: expected one of a rotation or slide, got one of another kind of row");
     Row row{model, {}, {}, -1, 0};
     if (model.kind != RowKind::coordinate)
       row.a = attach(model.a, used), row.b = attach(model.b, used);

@@ -96,7 +96,7 @@ struct RowModel {
   RowKind kind = RowKind::point;
   MarkerAt a, b;
   Eigen::Vector3d f = Eigen::Vector3d::UnitX(), g = Eigen::Vector3d::UnitX(); // n is f
-  int coordinate = -1; // in v; of a rotation it is taken off, where there is one
+  int coordinate = -1; // in v; of a rotation or slide it is taken off, where there is one
 };
 
 } // namespace ffrobot::recursion

@@ -54,7 +54,8 @@ RecursiveMotion<Space>::RecursiveMotion(const Mechanism<Space> &mechanism, const
       unused_(VectorXd::Zero(mechanism.n_v)), evaluated_(VectorXd::Zero(mechanism.n_q)), rates_(force_),
       posture_(mechanism) {
   has_given_ = held_ || steering_ || !scene_.loads.empty() || !scene_.joint_forces.empty() ||
-               !scene_.frame_motors.empty() || !scene_.gears.empty();
+               !scene_.frame_motors.empty() || !scene_.gears.empty() ||
+               std::ranges::any_of(scene_.cut_joints, [](const CutJoint &cut) { return cut.coordinate >= 0; });
   update_targets(t);
   if (!scene.is_strict)
     keep_independent_rows(mechanism, q, v, workspace_);
@@ -68,6 +69,10 @@ RecursiveMotion<Space>::RecursiveMotion(const Mechanism<Space> &mechanism, const
     for (const Node<Space> &node : mechanism.nodes)
       if (node.v == gear.a.v)
         norm_.add_spring(gear.stiffness, node.rotor_inertia * node.gear_ratio * node.gear_ratio);
+  for (const CutJoint &cut : scene_.cut_joints)
+    for (const Node<Space> &node : mechanism.nodes)
+      if (node.v == cut.coordinate && cut.stiffness > 0)
+        norm_.add_spring(cut.stiffness, node.rotor_inertia * node.gear_ratio * node.gear_ratio);
   for (const Node<Space> &node : mechanism.nodes)
     for (int k = 0; k < node.n(); ++k)
       fastest_ = std::max(fastest_, std::sqrt(node.body.K[static_cast<std::size_t>(k)])), steps_between_postures_ = 10;
@@ -115,7 +120,7 @@ template <class Space> Forces<double> RecursiveMotion<Space>::act(double t, cons
       steering_->add(t, force_.data(), wrench_.data());
     if (!scene_.point_forces.empty() || !scene_.cut_joints.empty()) {
       place_all(mechanism_, q, v, forces, workspace_), forces.is_placed = true;
-      act_at_points(t), act_along_cuts(t);
+      act_at_points(t), act_along_cuts(t, q, v);
     }
     forces.wrench = wrench_.data();
   }
@@ -138,15 +143,39 @@ template <class Space> void RecursiveMotion<Space>::act_at_points(double t) {
     }
 }
 
-template <class Space> void RecursiveMotion<Space>::act_along_cuts(double t) {
-  cut_rates(mechanism_, scene_.cut_joints, workspace_, along_cuts_.data());
-  for (std::size_t k = 0; k < scene_.cut_joints.size(); ++k) {
+namespace {
+
+// k (turn - coordinate) of all cut joints
+VectorXd spring_moments(const Mechanism<Planar> &m, const std::vector<CutJoint> &cuts, const double *q,
+                        const Workspace<Planar, double> &w) {
+  VectorXd moments(static_cast<Index>(cuts.size()));
+  cut_turns(m, cuts, w, moments.data());
+  take_coordinates_off(cuts, q, moments.data());
+  for (std::size_t k = 0; k < cuts.size(); ++k)
+    moments[static_cast<Index>(k)] *= cuts[k].stiffness;
+  return moments;
+}
+
+} // namespace
+
+template <class Space> void RecursiveMotion<Space>::act_along_cuts(double t, const double *q, const double *v) {
+  const std::vector<CutJoint> &cuts = scene_.cut_joints;
+  cut_rates(mechanism_, cuts, workspace_, along_cuts_.data());
+  take_coordinates_off(cuts, v, along_cuts_.data());
+  for (std::size_t k = 0; k < cuts.size(); ++k) {
     double &along = along_cuts_[static_cast<Index>(k)];
-    along = -scene_.cut_joints[k].friction.resistance(along);
+    along = -cuts[k].friction.resistance(along);
   }
+  if constexpr (Space::dim == 3)
+    along_cuts_ -= spring_moments(mechanism_, cuts, q, workspace_);
+  if (steering_)
+    steering_->add_along_cuts(along_cuts_.data());
   for (const CutLoad &load : scene_.cut_loads)
     along_cuts_[load.joint] += load.share * load.magnitude(t).value;
-  add_along_cuts(mechanism_, scene_.cut_joints, along_cuts_.data(), workspace_, wrench_.data());
+  add_along_cuts(mechanism_, cuts, along_cuts_.data(), workspace_, wrench_.data());
+  for (std::size_t k = 0; k < cuts.size(); ++k)
+    if (cuts[k].coordinate >= 0)
+      force_[cuts[k].coordinate] -= along_cuts_[static_cast<Index>(k)];
 }
 
 template <class Space> void RecursiveMotion<Space>::slope(double t, const double *z, double *z_dot) {
@@ -266,7 +295,8 @@ template <class Space> void RecursiveMotion<Space>::watch_posture(double t, cons
 }
 
 template <class Space> Index RecursiveMotion<Space>::prescribed() const {
-  const std::size_t count = scene_.targets.size() + scene_.loads.size() + scene_.point_loads.size();
+  const std::size_t count =
+      scene_.targets.size() + scene_.loads.size() + scene_.point_loads.size() + scene_.cut_loads.size();
   return scene_.is_strict ? static_cast<Index>(count) : 0;
 }
 
@@ -276,6 +306,8 @@ template <class Space> void RecursiveMotion<Space>::prescribe(double t, double *
   for (const Load &load : scene_.loads)
     *f++ = load.magnitude(t).value;
   for (const PointLoad &load : scene_.point_loads)
+    *f++ = load.magnitude(t).value;
+  for (const CutLoad &load : scene_.cut_loads)
     *f++ = load.magnitude(t).value;
 }
 

@@ -93,6 +93,7 @@ public:
   virtual ~Steering() = default;
   // Adds those at time t along v (n_v), and on the wrenches of the mechanism (wrenches, dim).
   virtual void add(double t, double *force, double *wrench) = 0;
+  virtual void add_along_cuts(double *) {} // the same (cut joints) of the scene, at the time of the last add()
 };
 
 // What motors must do in place of the forces on rows, where these hold trajectories.
@@ -198,8 +199,8 @@ public:
 private:
   void update_targets(double t);
   void residuals(double t, const double *q, const double *v);
-  void act_at_points(double t);                      // after place_all(); adds to wrench_
-  void act_along_cuts(double t);                     // after place_all(); adds to wrench_
+  void act_at_points(double t);                                    // after place_all(); adds to wrench_
+  void act_along_cuts(double t, const double *q, const double *v); // the same; and to force_
   const Eigen::VectorXd *motors_at(const double *q); // of the last evaluation; null where they are not judged
   void find_stiff_terms();
   void take_posture();
