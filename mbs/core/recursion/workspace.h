@@ -90,6 +90,8 @@ template <class Space, class T> struct Workspace {
   Aligned<T> factor;              // factored()^2, L and 1/D of it
   std::vector<int> active;        // rows that are kept; others depend on them
   std::vector<int> column;        // of each row; 0: not kept, or not in the block at hand
+  Aligned<T> point_force;         // (actions, linear, columns) of rows of constant direction, on ports, global axes
+  Aligned<T> lift;                // (columns) what active rows of that kind measure of gravity, from 0 on
   std::vector<Block<T>> blocks;   // of active rows where they are more than columns; else none
   Aligned<T> lambda;              // (all rows)
   Aligned<T> y;                   // (columns, or 1 + all rows): 1, multipliers of active rows
@@ -97,7 +99,17 @@ template <class Space, class T> struct Workspace {
   std::vector<Turning> turning;   // of ground markers, in space: those that turn are to be kept up to date
   unsigned long evaluations = 0;
 
+  // A force of a row on a port, of constant direction: where it is in point_force
+  struct PointForce {
+    std::size_t place;
+    int row;
+    double force[Space::linear];
+  };
+  std::vector<PointForce> point_forces;
+  std::vector<double> lifts; // (all rows)
+
   void keep(std::vector<int> rows); // these alone
+  void put_in_columns();            // point_force and lift, after a change of `column`
   int factored() const { return blocks.empty() ? columns - 1 : static_cast<int>(active.size()); }
 };
 

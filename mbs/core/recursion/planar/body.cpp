@@ -101,6 +101,10 @@ void Body::fill_rows(const PlanarData &data, const std::vector<int> &used, int t
   for (int r = 0; r < width(); ++r)
     for (int i = 0; i < n; ++i)
       columns[static_cast<std::size_t>(i * width() + r)] = rows[static_cast<std::size_t>(r * padded + i)] = W(r, i);
+  for (int i = 0; blocks == 1 && i < padded; i += native_lanes)
+    for (int r = 0; r < width(); ++r)
+      for (int k = i; k < i + native_lanes; ++k)
+        tiles.push_back(rows[static_cast<std::size_t>(r * padded + k)]);
   fill_products(W);
 }
 

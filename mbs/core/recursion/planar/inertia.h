@@ -55,10 +55,11 @@ template <class T> void more_forces(const Body &b, const T *p, const T *v, State
 }
 
 // M_rr - m m^T and -(Q_r - m Q_f)
-template <class T> FFROBOT_INLINE Inertia<T> inertia(const Body &b, const T *p, const T *v, State<T> &s) {
+template <bool is_one_block = false, class T>
+FFROBOT_INLINE Inertia<T> inertia(const Body &b, const T *p, const T *v, State<T> &s) {
   Inertia<T> M;
   const T ww = s.omega * s.omega, w2 = 2. * s.omega;
-  const int width = b.width();
+  const int width = is_one_block ? 8 : b.width();
   if constexpr (std::is_same_v<T, double>)
     for (int r = 0; r < width; r += 8)
       (ww * Eight::load(s.u.data() + r) - Eight::load(s.Q.data() + r)).store(s.Q.data() + r);
@@ -93,25 +94,24 @@ template <bool by_multipliers>
 FFROBOT_INLINE void modal_accelerations(const Body &b, const double *p, double *z, State<double> &s, double *a) {
   if (b.has_more && b.stiffening)
     return bent_accelerations<by_multipliers>(b, z, s, a);
-  const double ww = s.omega * s.omega;
-  const int n = b.n, stride = b.padded, width = b.width();
-  for (int i = 0; i < n; i += 8) {
-    const int left = n - i;
+  const double ww = s.omega * s.omega, *elastic = s.elastic.data();
+  const long stride = b.padded, last = b.width() - 2;
+  in_registers(b.n, [&]<int w>(long i) {
+    using Part = Pack<double, w>;
     const double *W = b.rows.data() + i;
-    Eight sum = Eight::zero();
+    const auto row = [&](long r) { return Part::read(W + r * stride); };
+    Part sum = Part::zero(), sum2 = sum;
     if (!by_multipliers)
-      sum = ww * (left >= 8 ? Eight::load(p + i) : load_part(p + i, left)) - Eight::load(s.elastic.data() + i);
-    Eight sum2 = Eight::zero();
-    for (int r = 0; r < width; r += 2, W += 2 * stride)
-      sum += z[r] * Eight::load(W), sum2 += z[r + 1] * Eight::load(W + stride);
+      sum = ww * Part::read(p + i) - Part::read(elastic + i);
+    for (long r = 0; r <= last; r += 2)
+      sum += z[r] * row(r), sum2 += z[r + 1] * row(r + 1);
     if (b.has_more) {
-      sum += z[2] * Eight::load(s.h.data() + i);
+      sum += z[2] * Part::read(s.h.data() + i);
       if (!by_multipliers)
-        sum += Eight::load(s.more.data() + i);
+        sum += Part::read(s.more.data() + i);
     }
-    sum += sum2;
-    left >= 8 ? sum.store(a + i) : store_part(a + i, sum, left);
-  }
+    (sum + sum2).write(a + i);
+  });
 }
 
 template <bool by_multipliers, class T>
@@ -128,6 +128,26 @@ inline void modal_accelerations(const Body &b, const T *p, T *z, State<T> &s, T 
       sum += by_multipliers ? s.h[i] * z[2] : s.more[i] + s.h[i] * z[2];
     a[i] = sum;
   }
+}
+
+// The same of a body with one block on whose port no moment acts (pins.h)
+template <bool by_multipliers, class T>
+FFROBOT_APART void modes_of_pin(const Body &b, const T *p, T *z, State<T> &s, T *a) {
+  if constexpr (std::is_same_v<T, double>)
+    if (!b.has_more) {
+      const double ww = s.omega * s.omega, *elastic = s.elastic.data(), *tiles = b.tiles.data();
+      return in_registers(b.n, [&]<int w>(long i) {
+        using Part = Pack<double, w>;
+        const long first = i & -native_lanes; // of the tile
+        const auto row = [&](int r) { return Part::read(tiles + 8 * first + r * native_lanes + (i - first)); };
+        Part sum = z[0] * row(0) + z[2] * row(2) + z[4] * row(4);
+        Part sum2 = z[1] * row(1) + z[3] * row(3) + z[Body::TILT] * row(Body::TILT);
+        if (!by_multipliers)
+          sum += ww * Part::read(p + i) - Part::read(elastic + i);
+        (sum + sum2).write(a + i);
+      });
+    }
+  modal_accelerations<by_multipliers>(b, p, z, s, a);
 }
 
 } // namespace ffrobot::recursion::planar

@@ -55,16 +55,13 @@ FFROBOT_APART void kinematics(const Mechanism<Planar> &m, const T *q, const T *v
             s);
     if (node.body.stiffening)
       bend(node.body, q + node.p_q(), v + node.p_v(), s);
-    T angle = T(0.);
-    if (node.joint == JointKind::revolute || node.joint == JointKind::free)
-      angle = q[node.joint == JointKind::free ? node.q + 2 : node.q];
+    T angle = T(node.inner_angle);
+    if (node.parent >= 0)
+      angle += w.bodies[node.parent].u[node.inner_rotation];
+    if (node.angle >= 0)
+      angle += q[node.angle];
     if (node.body.is_tilted)
       angle -= s.u[planar::Body::TILT];
-    if (node.parent >= 0)
-      angle += section_angle(m.nodes[node.parent].body, node.parent_port - m.nodes[node.parent].first_port,
-                             w.bodies[node.parent]);
-    else
-      angle += m.ground[node.parent_port].angle;
     w.angle[i] = angle;
   }
   sines_and_cosines(w.angle.data(), w.sine.data(), w.cosine.data(), count);
@@ -76,9 +73,8 @@ FFROBOT_APART void kinematics(const Mechanism<Planar> &m, const T *q, const T *v
     hinge.turn = {cosine, sine};
     T omega(0.); // of the section that it hangs on
     if (node.parent >= 0) {
-      const Node<Planar> &parent = m.nodes[node.parent];
       const planar::State<T> &p = w.bodies[node.parent];
-      omega = p.omega + section_rate(parent.body, node.parent_port - parent.first_port, p);
+      omega = p.omega + p.u_dot[node.inner_rotation];
       s.absolute_cosine = p.absolute_cosine * cosine - p.absolute_sine * sine;
       s.absolute_sine = p.absolute_sine * cosine + p.absolute_cosine * sine;
     } else
@@ -96,7 +92,7 @@ FFROBOT_APART void kinematics(const Mechanism<Planar> &m, const T *q, const T *v
         hinge.r[k] = to.r[k], hinge.r_dot[k] = to.r_dot[k];
       hinge.c[0] = -(oo * to.r[0]) - o2 * to.r_dot[1], hinge.c[1] = o2 * to.r_dot[0] - oo * to.r[1], hinge.c[2] = T(0.);
     }
-    if (!node.is_pin || (node.parent >= 0 && !m.nodes[node.parent].is_pin)) {
+    if (!node.hangs_on_pin) {
       hinge.column[0][0] = cosine, hinge.column[0][1] = sine, hinge.column[0][2] = -hinge.r[1];
       hinge.column[1][0] = -sine, hinge.column[1][1] = cosine, hinge.column[1][2] = hinge.r[0];
       hinge.column[2][2] = T(1.);

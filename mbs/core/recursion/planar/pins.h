@@ -13,14 +13,11 @@
 
 namespace ffrobot::recursion {
 
-// What hangs on the port: Lambda of the child
+// What hangs on the port: Lambda of the child that is no pin (pins leave theirs there)
 template <class T> FFROBOT_INLINE void load_pin(const Mechanism<Planar> &m, int index, Workspace<Planar, T> &w) {
-  const int child = m.children[index];
   PortWork<Planar, T> &port = w.ports[index];
-  if (m.nodes[child].is_pin)
-    return; // has left it there
   T L[2][2];
-  const Hinge<Planar, T> &hinge = w.hinges[child];
+  const Hinge<Planar, T> &hinge = w.hinges[m.children[index]];
   for (int i = 0; i < 2; ++i)
     for (int j = 0; j < 2; ++j)
       L[i][j] = hinge.Lambda[i][j];
@@ -31,12 +28,14 @@ template <class T> FFROBOT_INLINE void load_pin(const Mechanism<Planar> &m, int 
 }
 
 template <class T, int W>
-FFROBOT_INLINE void inward_pin(const Mechanism<Planar> &m, const Node<Planar> &node, const T *q, const T *v,
+FFROBOT_INLINE void inward_pin(const Mechanism<Planar> &m, std::size_t i_node, const T *q, const T *v,
                                const Forces<T> &forces, Workspace<Planar, T> &w, Schur<T, W> &S, Pack<T, W> &gamma) {
   constexpr int stride = stride_of(W);
   using Cols = Pack<T, W>;
+  const Node<Planar> &node = m.nodes[i_node];
   const planar::Body &body = node.body;
-  planar::State<T> &s = w.bodies[&node - m.nodes.data()];
+  planar::State<T> &s = w.bodies[i_node];
+  Hinge<Planar, T> &hinge = w.hinges[i_node];
   T on_modes(0.);
   // Forces along the coordinate by columns; those of multipliers act on the modes, too, where these turn the section.
   Cols applied = multiplier_forces<T, W>(m, node, 0, w);
@@ -46,7 +45,7 @@ FFROBOT_INLINE void inward_pin(const Mechanism<Planar> &m, const Node<Planar> &n
     applied.set(0, forces.generalized[node.v]);
   if (body.is_tilted && forces.generalized)
     on_modes = forces.generalized[node.v];
-  planar::Inertia<T> I = inertia(body, q + node.p_q(), v + node.p_v(), s);
+  planar::Inertia<T> I = inertia<true>(body, q + node.p_q(), v + node.p_v(), s);
   if (body.is_tilted && forces.generalized) {
     constexpr int tilt = planar::Body::TILT;
     for (int r = 0; r < 8; ++r)
@@ -73,11 +72,12 @@ FFROBOT_INLINE void inward_pin(const Mechanism<Planar> &m, const Node<Planar> &n
     const T *from = w.force.data() + index * 3 * stride;
     const Cols P0 = Cols::read(from), P1 = Cols::read(from + stride);
     Cols E0 = P0, E1 = P1;
-    const bool loaded = m.children[index] >= 0;
+    const bool loaded = node.is_loaded;
     const T Gx = s.gram_of_block(3, 3), Gc = s.gram_of_block(3, 4), Gy = s.gram_of_block(4, 4);
     T Y_xx(0.), Y_xy(0.), Y_yy(0.);
     if (loaded) {
-      load_pin(m, index, w);
+      if (!node.carries_pin)
+        load_pin(m, index, w);
       const T Lx = port.Lambda_xx, Lc = port.Lambda_xy, Ly = port.Lambda_yy;
       if (constants.is_soft) {
         const T det = Lx * Ly - Lc * Lc, xG = Gx * Lx, yG = Gy * Ly, cG = Gc * Lc;
@@ -132,7 +132,6 @@ FFROBOT_INLINE void inward_pin(const Mechanism<Planar> &m, const Node<Planar> &n
   }
 
   // the joint
-  Hinge<Planar, T> &hinge = w.hinges[&node - m.nodes.data()];
   const T D_inverse = T(1.) / M_aa;
   const Cols su = forces.generalized || node.has_rows ? Cols(H[2] - applied) : H[2], sd = D_inverse * su;
   sd.write(w.answer.data() + node.joint_slot(0) * stride);
@@ -156,8 +155,8 @@ FFROBOT_INLINE void inward_pin(const Mechanism<Planar> &m, const Node<Planar> &n
   }
   const int index = node.parent_port;
   T *to = w.force.data() + index * 3 * stride;
-  const bool add = m.cleared[index];
-  if (m.nodes[node.parent].is_pin) {
+  const bool add = node.adds_up;
+  if (node.hangs_on_pin) {
     PortWork<Planar, T> &port = w.ports[index];
     const T cc = c * c, nn = n * n;
     port.Lambda_xx = cc * xx - twice + nn * yy;
@@ -175,10 +174,10 @@ FFROBOT_INLINE void inward_pin(const Mechanism<Planar> &m, const Node<Planar> &n
 
 // A_port (2): acceleration of the port that the body hangs on, in and out: of its own port
 template <bool by_multipliers, class T, int W>
-FFROBOT_INLINE void release_pin(const Mechanism<Planar> &m, const Node<Planar> &node, const T *q,
-                                Workspace<Planar, T> &w, const Pack<T, W> &y, T *a) {
+FFROBOT_INLINE void release_pin(const Mechanism<Planar> &m, std::size_t i_node, const T *q, Workspace<Planar, T> &w,
+                                const Pack<T, W> &y, T *a) {
+  const Node<Planar> &node = m.nodes[i_node];
   const planar::Body &body = node.body;
-  const auto i_node = &node - m.nodes.data();
   planar::State<T> &s = w.bodies[i_node];
   Hinge<Planar, T> &hinge = w.hinges[i_node];
   T Px, Py, P_rotation(0.);
@@ -208,7 +207,7 @@ FFROBOT_INLINE void release_pin(const Mechanism<Planar> &m, const Node<Planar> &
     const T Xx = s.X_of_block(0, 0) * Ax + s.X_of_block(0, 1) * Ay + port.X_xa * Aa;
     const T Xy = s.X_of_block(1, 0) * Ax + s.X_of_block(1, 1) * Ay + port.X_ya * Aa;
     T fx = -answer<Planar, T, W>(w, node.port_slot(0), y), fy = -answer<Planar, T, W>(w, node.port_slot(0) + 1, y);
-    if (m.children[node.first_port] >= 0) // Y beta is among the columns
+    if (node.is_loaded) // Y beta is among the columns
       fx -= port.Y_xx * Xx + port.Y_xy * Xy, fy -= port.Y_xy * Xx + port.Y_yy * Xy;
     z[3] = fx, z[4] = fy;
     port.f[0] = fx, port.f[1] = fy, port.f[2] = T(0.);
@@ -243,7 +242,7 @@ FFROBOT_INLINE void release_pin(const Mechanism<Planar> &m, const Node<Planar> &
       a[node.v] -= s.WH[tilt] * Aa;
   }
   if (body.n)
-    modal_accelerations<by_multipliers>(body, q + node.p_q(), z, s, a + node.p_v());
+    modes_of_pin<by_multipliers>(body, q + node.p_q(), z, s, a + node.p_v());
 }
 
 } // namespace ffrobot::recursion
