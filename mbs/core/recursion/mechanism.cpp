@@ -219,6 +219,7 @@ Mechanism<Space>::Mechanism(std::vector<BodyModel<Data>> bodies, std::vector<Mar
     node.lead = model.lead, node.rotor_inertia = model.rotor_inertia, node.gear_ratio = model.gear_ratio;
     node.rotor_turns = model.joint == JointKind::revolute ? 1 : 0;
     node.q = n_q, node.v = n_v;
+    node.modes_q = n_q + node.shape.q_count, node.modes_v = n_v + node.shape.v_count;
     for (Row &row : rows)
       if (row.model.coordinate >= n_v && row.model.coordinate < n_v + node.shape.v_count) {
         row.node = static_cast<int>(i), row.freedom = row.model.coordinate - n_v;
@@ -251,7 +252,8 @@ Mechanism<Space>::Mechanism(std::vector<BodyModel<Data>> bodies, std::vector<Mar
     const int n_ports = node.ports();
     node.first_cross = crosses, crosses += n_ports * (n_ports - 1) / 2;
     node.is_alone = node.parent < 0 && !carries[i] && !node.is_weightless && node.shape.freedoms.count < Space::dim;
-    node.first_slot = slots, slots = node.ground_slot() + (node.is_alone ? Space::dim : 0);
+    node.first_slot = slots, node.port_slots = node.inboard_slot() + (node.inboard >= 0 ? 2 * Space::dim : 0);
+    slots = node.ground_slot() + (node.is_alone ? Space::dim : 0);
     if (node.shape.quaternion >= 0)
       rotations.push_back(n_v + node.shape.v_count - 3);
     n_q += node.shape.q_count + node.n(), n_v += node.shape.v_count + node.n();

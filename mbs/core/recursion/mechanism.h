@@ -24,9 +24,11 @@ template <class Space> struct Node {
   int outboard = 0;    // how many
   int inboard =
       -1; // its port (of the body) where modes move the section that the joint holds; else its frame sits there
-  int q = 0, v = 0;    // first of the joint; those of the modes follow
+  int q = 0, v = 0; // first of the joint; those of the modes follow
+  long modes_q = 0, modes_v = 0;
   int first_slot = 0;  // of columns: the joint's freedoms; 2 dim where it has an inboard port; dim for each outboard
                        // port, and for what a body that is alone does to the ground
+  int port_slots = 0;  // the first of its ports' among them
   int first_cross = 0; // of blocks between ports: (0, 1), (0, 2) … (1, 2) …; none with a single port
   bool is_pin = false; // plane: a revolute joint, at most one port, which passes forces only (planar/pins.h)
   // … of a pin: so is what it hangs on, unless that is the ground; something hangs on its port, and that is a pin; what
@@ -44,11 +46,11 @@ template <class Space> struct Node {
   int n() const { return body.n; }
   int body_width() const { return body.row_count(); } // rows of W
   int ports() const { return static_cast<int>(body.ports.size()); }
-  int p_q() const { return q + shape.q_count; }
-  int p_v() const { return v + shape.v_count; }
+  long p_q() const { return modes_q; }
+  long p_v() const { return modes_v; }
   int joint_slot(int freedom) const { return first_slot + freedom; }
   int inboard_slot() const { return first_slot + shape.freedoms.count; }
-  int port_slot(int port) const { return inboard_slot() + (inboard >= 0 ? 2 * Space::dim : 0) + port * Space::dim; }
+  int port_slot(int port) const { return port_slots + port * Space::dim; }
   int ground_slot() const { return port_slot(outboard); }
 };
 

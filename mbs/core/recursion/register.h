@@ -53,7 +53,7 @@ struct Register<n> {
   V v;
 
   FFROBOT_INLINE static Register zero() { return {V{}}; }
-  FFROBOT_INLINE static Register all(double x) { return {V{} + x}; }
+  FFROBOT_INLINE static Register all(double x) { return {x - V{}}; } // + would keep an addition, for the sake of -0
   FFROBOT_INLINE static Register load(const double *x) { return {*reinterpret_cast<const InMemory *>(x)}; }
   FFROBOT_INLINE void store(double *x) const { *reinterpret_cast<InMemory *>(x) = v; }
   // Lane i alone: 1 in an integer mask
@@ -64,8 +64,8 @@ struct Register<n> {
     return lane == I{} + i;
   }
   FFROBOT_INLINE double operator[](int i) const { return v[i]; }
-  FFROBOT_INLINE void set(int i, double x) { v = only(i) ? V{} + x : v; }
-  FFROBOT_INLINE void add(int i, double x) { v += only(i) ? V{} + x : V{}; }
+  FFROBOT_INLINE void set(int i, double x) { v = only(i) ? x - V{} : v; }
+  FFROBOT_INLINE void add(int i, double x) { v += only(i) ? x - V{} : V{}; }
   // Zeros behind the first `count`
   FFROBOT_INLINE void keep(int count) {
     I lane;

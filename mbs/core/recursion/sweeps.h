@@ -20,7 +20,7 @@ FFROBOT_INLINE void sweep_inward(const Mechanism<Space> &m, const T *q, const T 
   for (int r = 0; r < W; ++r)
     S[r] = Pack<T, W>::zero();
   attach_all<Space, T, W>(m, forces, w, S);
-  for (std::size_t i = m.nodes.size(); i-- > 0;) {
+  for (std::size_t i = w.hinges.size(); i-- > 0;) {
     if constexpr (Space::dim == 3)
       if (m.nodes[i].is_pin) {
         inward_pin<T, W>(m, i, q, v, forces, w, S, gamma);
@@ -33,7 +33,7 @@ FFROBOT_INLINE void sweep_inward(const Mechanism<Space> &m, const T *q, const T 
 template <bool by_multipliers, class Space, class T, int W>
 FFROBOT_INLINE void release_all(const Mechanism<Space> &m, const T *q, const Pack<T, W> &y, Workspace<Space, T> &w,
                                 T *a) {
-  for (std::size_t i = 0; i < m.nodes.size(); ++i) {
+  for (std::size_t i = 0; i < w.hinges.size(); ++i) {
     if constexpr (Space::dim == 3)
       if (m.nodes[i].is_pin) {
         release_pin<by_multipliers, T, W>(m, i, q, w, y, a);

@@ -59,6 +59,11 @@ private:
 // The same body with its frame at `position`, turned by `angle`.
 PlanarData moved(const PlanarData &data, const Eigen::Vector2d &position, double angle);
 
+template <class T> struct Inertia {
+  T xx, xy, xa, yy, ya, aa; // M_rr - m m^T
+  T bx, by, ba;             // -(Q_r - m Q_f)
+};
+
 // Of a body with geometric stiffening (bent.h); names as in stiffening.h
 template <class T> struct Bent {
   using Fields = Pack<T, fields>;
@@ -69,8 +74,9 @@ template <class T> struct Bent {
   struct Affine { // of the fields
     Fields g, g_dot;
   };
-  Affine linear, all;   // without and with terms of second order
-  Fields bending;       // p_dot^T K p_dot
+  Affine linear, all; // without and with terms of second order
+  Fields bending;     // p_dot^T K p_dot
+  Inertia<T> inertia;
   Aligned<T> p, v;      // padded
   Aligned<T> K_p, K_v;  // one after the other
   Aligned<T> F;         // (n, 4) F(p) transposed

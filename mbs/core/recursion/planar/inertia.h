@@ -54,11 +54,10 @@ template <class T> void more_forces(const Body &b, const T *p, const T *v, State
     s.Q[Body::H] += s.h[i] * (ww * p[i] - s.elastic[i] + s.more[i]);
 }
 
-// M_rr - m m^T and -(Q_r - m Q_f)
+// W Q_f, in s.Q, and all that the common case has not
 template <bool is_one_block = false, class T>
-FFROBOT_INLINE Inertia<T> inertia(const Body &b, const T *p, const T *v, State<T> &s) {
-  Inertia<T> M;
-  const T ww = s.omega * s.omega, w2 = 2. * s.omega;
+FFROBOT_INLINE void forces_on_rows(const Body &b, const T *p, const T *v, State<T> &s) {
+  const T ww = s.omega * s.omega;
   const int width = is_one_block ? 8 : b.width();
   if constexpr (std::is_same_v<T, double>)
     for (int r = 0; r < width; r += 8)
@@ -66,16 +65,26 @@ FFROBOT_INLINE Inertia<T> inertia(const Body &b, const T *p, const T *v, State<T
   else
     for (int r = 0; r < width; ++r)
       s.Q[r] = ww * s.u[r] - s.Q[r];
+  if (!b.has_more)
+    return;
+  if (b.stiffening) {
+    modal_forces(b, p, v, s);
+    s.bent.inertia = bent_inertia(b, p, v, s);
+  } else
+    more_forces(b, p, v, s);
+}
+
+// M_rr - m m^T and -(Q_r - m Q_f), after that
+template <class T> FFROBOT_INLINE Inertia<T> inertia(const Body &b, const State<T> &s) {
+  if (b.has_more && b.stiffening)
+    return s.bent.inertia;
+  Inertia<T> M;
+  const T ww = s.omega * s.omega, w2 = 2. * s.omega;
   const T *u = s.u.data(), *Q = s.Q.data();
   T p_p = s.p_p;
   M.xa = b.residual[0][2] - u[Body::Sy], M.ya = b.residual[1][2] + u[Body::Sx];
   if (b.has_more) {
-    if (b.stiffening) {
-      modal_forces(b, p, v, s);
-      return bent_inertia(b, p, v, s);
-    }
-    more_forces(b, p, v, s);
-    p_p = s.p_p - 2. * s.WH[Body::H];
+    p_p -= 2. * s.WH[Body::H];
     for (int i = 0; i < b.n; ++i)
       p_p -= s.h[i] * s.h[i];
     M.xa -= s.WH[Body::Sx], M.ya -= s.WH[Body::Sy];

@@ -47,7 +47,7 @@ template <class T> FFROBOT_INLINE T section_rate(const planar::Body &b, int port
 template <class T>
 FFROBOT_APART void kinematics(const Mechanism<Planar> &m, const T *q, const T *v, const Forces<T> &forces,
                               Workspace<Planar, T> &w) {
-  const std::size_t count = m.nodes.size();
+  const std::size_t count = w.hinges.size();
   for (std::size_t i = 0; i < count; ++i) {
     const Node<Planar> &node = m.nodes[i];
     planar::State<T> &s = w.bodies[i];
@@ -118,7 +118,8 @@ template <class T> FFROBOT_INLINE PlanarTurn<T> inboard_tilt(const Node<Planar> 
 template <class T>
 FFROBOT_APART void evaluate_inertia(const Node<Planar> &node, const T *p, const T *v, planar::State<T> &s,
                                     Pack<T, 3> *M, T *b) {
-  const planar::Inertia<T> I = inertia(node.body, p, v, s);
+  forces_on_rows(node.body, p, v, s);
+  const planar::Inertia<T> I = inertia(node.body, s);
   const T rows[3][3] = {{I.xx, I.xy, I.xa}, {I.xy, I.yy, I.ya}, {I.xa, I.ya, I.aa}};
   for (int i = 0; i < 3; ++i) {
     M[i] = Pack<T, 3>::zero();

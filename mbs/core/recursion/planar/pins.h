@@ -27,6 +27,19 @@ template <class T> FFROBOT_INLINE void load_pin(const Mechanism<Planar> &m, int 
   port.Lambda_xy = c * n * (L[0][0] - L[1][1]) + (c * c - n * n) * L[0][1];
 }
 
+// A moment along the coordinate acts on the modes, too, where these turn the section.
+template <class T> inline void push_along_tilt(const planar::Body &body, const T &moment, planar::State<T> &s) {
+  constexpr int tilt = planar::Body::TILT;
+  const auto by_moment = [&](int row) { return s.gram_of_block(tilt, row) * moment; };
+  for (int r = 0; r < 8; ++r)
+    s.Q[r] += by_moment(r);
+  if (body.stiffening)
+    s.bent.inertia.bx += by_moment(0), s.bent.inertia.by += by_moment(1), s.bent.inertia.ba += by_moment(2);
+  else if (body.has_more)
+    s.Q[planar::Body::H] += s.WH[tilt] * moment;
+  s.on_modes = moment;
+}
+
 template <class T, int W>
 FFROBOT_INLINE void inward_pin(const Mechanism<Planar> &m, std::size_t i_node, const T *q, const T *v,
                                const Forces<T> &forces, Workspace<Planar, T> &w, Schur<T, W> &S, Pack<T, W> &gamma) {
@@ -36,25 +49,17 @@ FFROBOT_INLINE void inward_pin(const Mechanism<Planar> &m, std::size_t i_node, c
   const planar::Body &body = node.body;
   planar::State<T> &s = w.bodies[i_node];
   Hinge<Planar, T> &hinge = w.hinges[i_node];
-  T on_modes(0.);
   // Forces along the coordinate by columns; those of multipliers act on the modes, too, where these turn the section.
   Cols applied = multiplier_forces<T, W>(m, node, 0, w);
   const Cols multipliers = applied;
   const bool rows_on_modes = W > 1 && body.is_tilted && node.has_rows;
   if (forces.generalized)
     applied.set(0, forces.generalized[node.v]);
+  forces_on_rows<true>(body, q + node.p_q(), v + node.p_v(), s);
+  s.on_modes = T(0.);
   if (body.is_tilted && forces.generalized)
-    on_modes = forces.generalized[node.v];
-  planar::Inertia<T> I = inertia<true>(body, q + node.p_q(), v + node.p_v(), s);
-  if (body.is_tilted && forces.generalized) {
-    constexpr int tilt = planar::Body::TILT;
-    for (int r = 0; r < 8; ++r)
-      s.Q[r] += s.gram_of_block(tilt, r) * on_modes;
-    I.bx += s.gram_of_block(tilt, 0) * on_modes, I.by += s.gram_of_block(tilt, 1) * on_modes;
-    I.ba += (s.gram_of_block(tilt, 2) + s.WH[tilt]) * on_modes;
-  }
-  s.on_modes = on_modes;
-  T M_xx = I.xx, M_xy = I.xy, M_xa = I.xa, M_yy = I.yy, M_ya = I.ya, M_aa = I.aa;
+    push_along_tilt(body, forces.generalized[node.v], s);
+  T L_xx(0.), L_xy(0.), L_xa(0.), L_yy(0.), L_ya(0.), L_aa(0.); // X^T Y X of what hangs on the port
   Cols H[3];
   if (node.outboard) {
     const int index = node.first_port;
@@ -115,11 +120,14 @@ FFROBOT_INLINE void inward_pin(const Mechanism<Planar> &m, std::size_t i_node, c
     if (loaded) {
       const T p0 = x0 * Y_xx + y0 * Y_xy, p1 = x1 * Y_xx + y1 * Y_xy, p2 = X_xa * Y_xx + X_ya * Y_xy;
       const T r0 = x0 * Y_xy + y0 * Y_yy, r1 = x1 * Y_xy + y1 * Y_yy, r2 = X_xa * Y_xy + X_ya * Y_yy;
-      M_xx += x0 * p0 + y0 * r0, M_xy += x0 * p1 + y0 * r1, M_xa += x0 * p2 + y0 * r2;
-      M_yy += x1 * p1 + y1 * r1, M_ya += x1 * p2 + y1 * r2, M_aa += X_xa * p2 + X_ya * r2;
+      L_xx = x0 * p0 + y0 * r0, L_xy = x0 * p1 + y0 * r1, L_xa = x0 * p2 + y0 * r2;
+      L_yy = x1 * p1 + y1 * r1, L_ya = x1 * p2 + y1 * r2, L_aa = X_xa * p2 + X_ya * r2;
     }
   } else
     H[0] = H[1] = H[2] = Cols::zero();
+  const planar::Inertia<T> I = inertia(body, s);
+  const T M_xx = I.xx + L_xx, M_xy = I.xy + L_xy, M_xa = I.xa + L_xa;
+  const T M_yy = I.yy + L_yy, M_ya = I.ya + L_ya, M_aa = I.aa + L_aa;
   H[0].add(0, I.bx), H[1].add(0, I.by), H[2].add(0, I.ba);
   if (rows_on_modes) {
     for (int r = 0; r < 3; ++r)
