@@ -20,6 +20,7 @@ struct Port {
   double x = 0, y = 0, angle = 0; // undeformed, body axes
   int row = 3;                    // its first in W
   bool is_soft = false;           // modes move it
+  bool shifts = false;            // … along x or y
   bool turns = false;             // … and turn it
 };
 

@@ -84,7 +84,7 @@ FFROBOT_INLINE void inward_pin(const Mechanism<Planar> &m, std::size_t i_node, c
       if (!node.carries_pin)
         load_pin(m, index, w);
       const T Lx = port.Lambda_xx, Lc = port.Lambda_xy, Ly = port.Lambda_yy;
-      if (constants.is_soft) {
+      if (constants.shifts) {
         const T det = Lx * Ly - Lc * Lc, xG = Gx * Lx, yG = Gy * Ly, cG = Gc * Lc;
         const T i = T(1.) / (1. + xG + 2. * cG + yG + (Gx * Gy - Gc * Gc) * det);
         Y_xx = (Lx + Gy * det) * i, Y_yy = (Ly + Gx * det) * i, Y_xy = (Lc - Gc * det) * i;
@@ -96,7 +96,7 @@ FFROBOT_INLINE void inward_pin(const Mechanism<Planar> &m, std::size_t i_node, c
       port.Y_xx = Y_xx, port.Y_xy = Y_xy, port.Y_yy = Y_yy;
     }
     if constexpr (W > 1) {
-      if (constants.is_soft) {
+      if (constants.shifts) {
         gain(S, P0, Cols(Gx * E0 + Gc * E1));
         gain(S, P1, Cols(Gc * E0 + Gy * E1));
       }
@@ -225,17 +225,17 @@ FFROBOT_INLINE void release_pin(const Mechanism<Planar> &m, std::size_t i_node, 
       port.A[0] += s.gram_of_block(tilt, 3) * on_modes, port.A[1] += s.gram_of_block(tilt, 4) * on_modes;
       rotation += s.gram_of_block(tilt, 5) * on_modes;
     }
-    if (constants.is_soft) {
+    if (constants.shifts) {
       const T Gx = s.gram_of_block(3, 3), Gc = s.gram_of_block(3, 4), Gy = s.gram_of_block(4, 4);
       port.A[0] += Gx * fx + Gc * fy, port.A[1] += Gc * fx + Gy * fy;
-      if (constants.turns) {
-        if (!by_multipliers)
-          rotation += s.Q[5];
-        rotation += s.gram_of_block(5, 3) * fx + s.gram_of_block(5, 4) * fy - s.gram_of_block(5, 0) * Ax -
-                    s.gram_of_block(5, 1) * Ay - s.gram_of_block(5, 2) * Aa;
-        if (body.has_more)
-          rotation -= s.WH[5] * Aa;
-      }
+    }
+    if (constants.turns) {
+      if (!by_multipliers)
+        rotation += s.Q[5];
+      rotation += s.gram_of_block(5, 3) * fx + s.gram_of_block(5, 4) * fy - s.gram_of_block(5, 0) * Ax -
+                  s.gram_of_block(5, 1) * Ay - s.gram_of_block(5, 2) * Aa;
+      if (body.has_more)
+        rotation -= s.WH[5] * Aa;
     }
     port.A[2] = rotation;
   }
