@@ -58,8 +58,12 @@ template <class Space, class T, class F> FFROBOT_INLINE void with_columns(int co
     switch (columns) {
     case 1:
       return call(std::integral_constant<int, 1>());
-    case Space::linear + 1:
-      return call(std::integral_constant<int, Space::linear + 1>());
+    case 3:
+      if constexpr (Space::linear == 2)
+        return call(std::integral_constant<int, 3>());
+      break;
+    case 4:
+      return call(std::integral_constant<int, 4>());
     case 7:
       return call(std::integral_constant<int, 7>());
     }
@@ -151,7 +155,7 @@ Workspace<Space, T>::Workspace(const Mechanism<Space> &m) : hinges(m.nodes.size(
   cross.resize(static_cast<std::size_t>(m.crosses) * d), soft.resize(softs);
   force.assign(static_cast<std::size_t>(m.ports) * d * stride + 8, T(0.)), bias = force;
   answer.assign(static_cast<std::size_t>(m.slots) * stride + 8, T(0.));
-  angle.assign(m.nodes.size() + 4, T(0.)), sine = cosine = angle;
+  sine.assign(m.nodes.size() + 4, T(0.)), cosine = sine;
   z.assign(widest, T(0.));
   const std::size_t rows = m.rows.size(), factored = std::max(rows, static_cast<std::size_t>(columns - 1));
   schur.assign(rows * rows, T(0.)), factor.assign(factored * factored, T(0.));

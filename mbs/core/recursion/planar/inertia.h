@@ -149,10 +149,11 @@ FFROBOT_APART void modes_of_pin(const Body &b, const T *p, T *z, State<T> &s, T 
         using Part = Pack<double, w>;
         const long first = i & -native_lanes; // of the tile
         const auto row = [&](int r) { return Part::read(tiles + 8 * first + r * native_lanes + (i - first)); };
-        Part sum = z[0] * row(0) + z[2] * row(2) + z[4] * row(4);
-        Part sum2 = z[1] * row(1) + z[3] * row(3) + z[Body::TILT] * row(Body::TILT);
+        Part sum = z[3] * row(3), sum2 = z[4] * row(4); // what is known last, z[2], comes last
         if (!by_multipliers)
           sum += ww * Part::read(p + i) - Part::read(elastic + i);
+        sum += z[Body::TILT] * row(Body::TILT) + z[0] * row(0);
+        sum2 += z[1] * row(1) + z[2] * row(2);
         (sum + sum2).write(a + i);
       });
     }
