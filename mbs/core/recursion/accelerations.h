@@ -28,7 +28,7 @@ inline void run(const Mechanism<Space> &m, const T *q, const T *v, const Forces<
 #pragma GCC unroll 8
     for (int r = 1; r < W; ++r)
       if (r <= rows)
-        lambda[r - 1] = gamma[r] - S[r][0] - target[w.active[r - 1]];
+        lambda[r - 1] = gamma[r] - S[r][0] - (target[w.active[r - 1]] - w.lift[r - 1]);
       else
         S[r].set(r, T(1.)), lambda[r - 1] = T(0.);
     if (w.keeps_schur)
@@ -47,7 +47,8 @@ inline void run(const Mechanism<Space> &m, const T *q, const T *v, const Forces<
   else
     release_all<false, Space, T, W>(m, q, y, w, a);
   if constexpr (W > 1)
-    prescribe(m, target, w, a);
+    if (m.has_prescribed)
+      prescribe(m, target, w, a);
   ++w.evaluations;
 }
 
@@ -57,8 +58,12 @@ template <class Space, class T, class F> FFROBOT_INLINE void with_columns(int co
     switch (columns) {
     case 1:
       return call(std::integral_constant<int, 1>());
-    case Space::linear + 1:
-      return call(std::integral_constant<int, Space::linear + 1>());
+    case 3:
+      if constexpr (Space::linear == 2)
+        return call(std::integral_constant<int, 3>());
+      break;
+    case 4:
+      return call(std::integral_constant<int, 4>());
     case 7:
       return call(std::integral_constant<int, 7>());
     }
@@ -150,11 +155,22 @@ Workspace<Space, T>::Workspace(const Mechanism<Space> &m) : hinges(m.nodes.size(
   cross.resize(static_cast<std::size_t>(m.crosses) * d), soft.resize(softs);
   force.assign(static_cast<std::size_t>(m.ports) * d * stride + 8, T(0.)), bias = force;
   answer.assign(static_cast<std::size_t>(m.slots) * stride + 8, T(0.));
-  angle.assign(m.nodes.size() + 4, T(0.)), sine = cosine = angle;
+  sine.assign(m.nodes.size() + 4, T(0.)), cosine = sine;
   z.assign(widest, T(0.));
   const std::size_t rows = m.rows.size(), factored = std::max(rows, static_cast<std::size_t>(columns - 1));
   schur.assign(rows * rows, T(0.)), factor.assign(factored * factored, T(0.));
   lambda.assign(rows + 1, T(0.)), y.assign(std::max(stride, rows + 1), T(0.));
+  for (const Row &row : m.rows)
+    lifts.push_back(row.moves || row.follows ? 0 : row.lift);
+  for (const auto &actions : m.actions) {
+    for (const Action &action : actions.list)
+      if (action.is_point) {
+        point_forces.push_back({point_force.size(), action.row, {}});
+        std::copy_n(action.force, Space::linear, point_forces.back().force);
+      }
+    point_force.resize(point_force.size() + Space::linear * stride, T(0.));
+  }
+  lift.assign(std::max(stride, rows), T(0.));
   std::vector<int> all(rows);
   std::iota(all.begin(), all.end(), 0);
   keep(all);
@@ -170,12 +186,24 @@ Workspace<Space, T>::Workspace(const Mechanism<Space> &m) : hinges(m.nodes.size(
   }
 }
 
+template <class Space, class T> void Workspace<Space, T>::put_in_columns() {
+  const auto stride = static_cast<std::size_t>(stride_of(columns));
+  std::fill(point_force.begin(), point_force.end(), T(0.));
+  for (const PointForce &at : point_forces)
+    if (const int c = column[at.row]; c > 0 && c < columns)
+      for (std::size_t k = 0; k < Space::linear; ++k)
+        point_force[at.place + k * stride + static_cast<std::size_t>(c)] += T(at.force[k]);
+  for (std::size_t k = 0; k < active.size(); ++k)
+    lift[k] = T(lifts[static_cast<std::size_t>(active[k])]);
+}
+
 template <class Space, class T> void Workspace<Space, T>::keep(std::vector<int> rows) {
   active = std::move(rows);
   column.assign(lambda.size(), 0);
   std::fill(lambda.begin(), lambda.end(), T(0.));
   for (std::size_t k = 0; k < active.size(); ++k)
     column[static_cast<std::size_t>(active[k])] = static_cast<int>(k) + 1;
+  put_in_columns();
   blocks.clear();
   if (active.size() <= block_rows)
     return;

@@ -17,6 +17,7 @@ template <class Space, class T> void exchange_rows(Workspace<Space, T> &w, Block
   w.active.swap(block.rows);
   for (std::size_t k = 0; k < w.active.size(); ++k)
     w.column[w.active[k]] = static_cast<int>(k) + 1;
+  w.put_in_columns();
 }
 
 // Lower half of the part of C M^-1 C^T, (n, n), of rows of one block, from `first` on, by those of one before it
@@ -78,7 +79,7 @@ void run_in_blocks(const Mechanism<Space> &m, const T *q, const T *v, const Forc
     acting.is_placed = false; // that of the first block alone
     const int count = static_cast<int>(w.active.size());
     for (int r = 0; r < count; ++r) {
-      lambda[first + r] = gamma[r + 1] - S[r + 1][0] - target[w.active[r]];
+      lambda[first + r] = gamma[r + 1] - S[r + 1][0] - (target[w.active[r]] - w.lift[r]);
       for (int c = 0; c <= r; ++c)
         S_all[(first + r) * n + first + c] = S[r + 1][c + 1];
     }

@@ -220,6 +220,7 @@ Mechanism<Space>::Mechanism(std::vector<BodyModel<Data>> bodies, std::vector<Mar
     node.lead = model.lead, node.rotor_inertia = model.rotor_inertia, node.gear_ratio = model.gear_ratio;
     node.rotor_turns = model.joint == JointKind::revolute ? 1 : 0;
     node.q = n_q, node.v = n_v;
+    node.modes_q = n_q + node.shape.q_count, node.modes_v = n_v + node.shape.v_count;
     for (Row &row : rows)
       if (row.model.coordinate >= n_v && row.model.coordinate < n_v + node.shape.v_count) {
         row.node = static_cast<int>(i), row.freedom = row.model.coordinate - n_v;
@@ -252,7 +253,8 @@ Mechanism<Space>::Mechanism(std::vector<BodyModel<Data>> bodies, std::vector<Mar
     const int n_ports = node.ports();
     node.first_cross = crosses, crosses += n_ports * (n_ports - 1) / 2;
     node.is_alone = node.parent < 0 && !carries[i] && !node.is_weightless && node.shape.freedoms.count < Space::dim;
-    node.first_slot = slots, slots = node.ground_slot() + (node.is_alone ? Space::dim : 0);
+    node.first_slot = slots, node.port_slots = node.inboard_slot() + (node.inboard >= 0 ? 2 * Space::dim : 0);
+    slots = node.ground_slot() + (node.is_alone ? Space::dim : 0);
     if (node.shape.quaternion >= 0)
       rotations.push_back(n_v + node.shape.v_count - 3);
     n_q += node.shape.q_count + node.n(), n_v += node.shape.v_count + node.n();
@@ -277,6 +279,8 @@ Mechanism<Space>::Mechanism(std::vector<BodyModel<Data>> bodies, std::vector<Mar
     const auto port = static_cast<std::size_t>(node.parent_port);
     children[port] = static_cast<int>(i);
   }
+  for (const Row &row : rows)
+    has_prescribed = has_prescribed || row.model.kind == RowKind::coordinate;
   const auto finish = [&](Attachment &at) {
     if (at.node < 0)
       return;
@@ -289,6 +293,7 @@ Mechanism<Space>::Mechanism(std::vector<BodyModel<Data>> bodies, std::vector<Mar
       if (row.model.kind == RowKind::point)
         row.lift = gravity.dot(row.model.f.head(Space::linear)) * ((row.a.node < 0) - (row.b.node < 0));
       needs_positions = needs_positions || row.model.kind == RowKind::slide || row.model.kind == RowKind::dot;
+      has_moving_rows = has_moving_rows || row.moves || row.follows;
       finish(row.a), finish(row.b);
     }
   for (Attachment &at : wrenches)
@@ -299,7 +304,7 @@ Mechanism<Space>::Mechanism(std::vector<BodyModel<Data>> bodies, std::vector<Mar
   for (std::size_t i = 0; i < count; ++i)
     for (int k = 0; k < nodes[i].outboard; ++k)
       if (const int port = nodes[i].first_port + k; cleared[static_cast<std::size_t>(port)]) {
-        Actions found{static_cast<int>(i), k, port, {}};
+        Actions found{static_cast<int>(i), k, port, {}, false, false};
         for (std::size_t r = 0; r < rows.size(); ++r) {
           for (const double sign : {1., -1.})
             if ((sign > 0 ? rows[r].b : rows[r].a).global_port == port) {
@@ -311,8 +316,36 @@ Mechanism<Space>::Mechanism(std::vector<BodyModel<Data>> bodies, std::vector<Mar
         for (std::size_t k_wrench = 0; k_wrench < wrenches.size(); ++k_wrench)
           if (wrenches[k_wrench].global_port == port)
             found.list.push_back({-1, static_cast<int>(k_wrench), -1, false, {}});
+        for (const Action &action : found.list)
+          (action.is_point ? found.has_points : found.has_others) = true;
         actions.push_back(found);
       }
+  if constexpr (in_plane)
+    connect_pins();
+}
+
+// What the recursion in the plane would look up in other nodes at every evaluation
+template <class Space> void Mechanism<Space>::connect_pins() {
+  for (Node<Space> &node : nodes) {
+    if (node.joint == JointKind::revolute || node.joint == JointKind::free)
+      node.angle = node.joint == JointKind::free ? node.q + 2 : node.q;
+    const int child = node.outboard ? children[static_cast<std::size_t>(node.first_port)] : -1;
+    node.is_loaded = child >= 0;
+    node.carries_pin = child >= 0 && nodes[static_cast<std::size_t>(child)].is_pin;
+    node.hangs_on_pin = node.is_pin;
+    if (node.parent < 0) {
+      if constexpr (std::is_same_v<Space, Planar>)
+        node.inner_angle = ground[static_cast<std::size_t>(node.parent_port)].angle;
+      continue;
+    }
+    const Node<Space> &parent = nodes[static_cast<std::size_t>(node.parent)];
+    node.hangs_on_pin = node.is_pin && parent.is_pin;
+    node.adds_up = cleared[static_cast<std::size_t>(node.parent_port)];
+    if constexpr (std::is_same_v<Space, Planar>) {
+      const planar::Port &port = parent.body.ports[static_cast<std::size_t>(node.parent_port - parent.first_port)];
+      node.inner_angle = port.angle, node.inner_rotation = port.row + 2;
+    }
+  }
 }
 
 template struct Mechanism<Planar>;

@@ -24,13 +24,21 @@ template <class Space> struct Node {
   int outboard = 0;    // how many
   int inboard =
       -1; // its port (of the body) where modes move the section that the joint holds; else its frame sits there
-  int q = 0, v = 0;      // first of the joint; those of the modes follow
-  int first_slot = 0;    // of columns: the joint's freedoms; 2 dim where it has an inboard port; dim for each outboard
-                         // port, and for what a body that is alone does to the ground
-  int first_cross = 0;   // of blocks between ports: (0, 1), (0, 2) … (1, 2) …; none with a single port
-  bool is_pin = false;   // plane: a revolute joint, at most one port, which passes forces only (planar/pins.h)
-  bool has_rows = false; // constraint rows that are coordinates of the joint
-  bool is_alone = false; // hangs on the ground, and nothing on it: forces on the ground are kept (Hinge::f)
+  int q = 0, v = 0; // first of the joint; those of the modes follow
+  long modes_q = 0, modes_v = 0;
+  int first_slot = 0;  // of columns: the joint's freedoms; 2 dim where it has an inboard port; dim for each outboard
+                       // port, and for what a body that is alone does to the ground
+  int port_slots = 0;  // the first of its ports' among them
+  int first_cross = 0; // of blocks between ports: (0, 1), (0, 2) … (1, 2) …; none with a single port
+  bool is_pin = false; // plane: a revolute joint, at most one port, which passes forces only (planar/pins.h)
+  // … of a pin: so is what it hangs on, unless that is the ground; something hangs on its port, and that is a pin; what
+  // it hands to its port is added to what acts there
+  bool hangs_on_pin = false, is_loaded = false, carries_pin = false, adds_up = false;
+  int angle = -1;             // plane: of the joint, its place in q; -1 where it does not turn
+  int inner_rotation = -1;    // plane: row of W of the body it hangs on, the rotation of the section where it does
+  double inner_angle = 0;     // plane: of that section undeformed, in axes of its body; of a marker of the ground
+  bool has_rows = false;      // constraint rows that are coordinates of the joint
+  bool is_alone = false;      // hangs on the ground, and nothing on it: forces on the ground are kept (Hinge::f)
   bool is_weightless = false; // nothing but a rotor's inertia, nothing hangs on it: what carries it feels no inertia
   Eigen::Vector3d origin = Eigen::Vector3d::Zero(); // of the body's data, in axes of the frame
   double turn = 0;                                  // in the plane: of the frame's axes in those of the body's data
@@ -38,11 +46,11 @@ template <class Space> struct Node {
   int n() const { return body.n; }
   int body_width() const { return body.row_count(); } // rows of W
   int ports() const { return static_cast<int>(body.ports.size()); }
-  int p_q() const { return q + shape.q_count; }
-  int p_v() const { return v + shape.v_count; }
+  long p_q() const { return modes_q; }
+  long p_v() const { return modes_v; }
   int joint_slot(int freedom) const { return first_slot + freedom; }
   int inboard_slot() const { return first_slot + shape.freedoms.count; }
-  int port_slot(int port) const { return inboard_slot() + (inboard >= 0 ? 2 * Space::dim : 0) + port * Space::dim; }
+  int port_slot(int port) const { return port_slots + port * Space::dim; }
   int ground_slot() const { return port_slot(outboard); }
 };
 
@@ -89,13 +97,17 @@ template <class Space> struct Mechanism {
   struct Actions {
     int node, port, global_port; // of cleared ports
     std::vector<Action> list;
+    bool has_points, has_others; // forces of constant direction; anything else
   };
   std::vector<Actions> actions;
   bool needs_positions = false;        // rows have directions that move
+  bool has_moving_rows = false;        // or follow markers of the ground that turn
+  bool has_prescribed = false;         // rows that are joint coordinates
   std::vector<Eigen::Index> rotations; // index in v of the first of three components of each quaternion's rate
 
 private:
   Attachment attach(const MarkerAt &at, std::vector<std::vector<int>> &used) const;
+  void connect_pins();
 };
 
 extern template struct Mechanism<Planar>;

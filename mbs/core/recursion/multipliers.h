@@ -32,6 +32,15 @@ template <class T> inline void solve_again(const T *factor, int m, T *x) {
   }
 }
 
+// Two rows: both divisions at once
+template <class T, int W> FFROBOT_INLINE void solve_two(const Pack<T, W> *S, T *x, T *factor) {
+  const T a = S[1][1], b = S[2][1], c = S[2][2];
+  const T D_a = T(1.) / a, D_c = a / (a * c - b * b), L = b * D_a;
+  factor[0] = D_a, factor[2] = L, factor[3] = D_c;
+  x[1] = (x[1] - L * x[0]) * D_c;
+  x[0] = x[0] * D_a - L * x[1];
+}
+
 // Rows 1 … of S in the registers that the recursion has left; fewer rows than W - 1 are filled up by the caller.
 template <class T, int W> FFROBOT_INLINE void solve_multipliers(const Pack<T, W> *S, T *x, T *factor) {
   constexpr int m = W - 1;
@@ -43,6 +52,8 @@ template <class T, int W> FFROBOT_INLINE void solve_multipliers(const Pack<T, W>
     solve_again(factor, m, x);
     return;
   }
+  if constexpr (m == 2)
+    return solve_two<T, W>(S, x, factor);
   T M[m][m], D[m];
 #pragma GCC unroll 8
   for (int r = 0; r < m; ++r)

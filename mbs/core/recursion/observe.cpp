@@ -38,7 +38,7 @@ double half_square(int n, const double *v) { return 0.5 * Eigen::Map<const Eigen
 
 Inertia inertia_of(const planar::Body &b, const double *p, const double *v, planar::State<double> &s) {
   Inertia to{b.mass, Vector3d::Zero(), Vector3d::Zero(), Vector3d::Zero(), Matrix3d::Zero(), half_square(b.n, v)};
-  inertia(b, p, v, s);
+  forces_on_rows(b, p, v, s);
   to.s << b.sx, b.sy, 0;
   to.J(2, 2) = b.J;
   if (b.n) {

@@ -24,17 +24,21 @@ constexpr int native_lanes = 4;
 constexpr int native_lanes = 2;
 #endif
 
+// InMemory: where doubles lie. Compilers know then that writing one changes no pointer, which memcpy would leave open.
 template <int n> struct Vectors;
 template <> struct Vectors<2> {
   using V = double __attribute__((vector_size(16)));
+  using InMemory = double __attribute__((vector_size(16), aligned(8)));
   using I = std::int64_t __attribute__((vector_size(16)));
 };
 template <> struct Vectors<4> {
   using V = double __attribute__((vector_size(32)));
+  using InMemory = double __attribute__((vector_size(32), aligned(8)));
   using I = std::int64_t __attribute__((vector_size(32)));
 };
 template <> struct Vectors<8> {
   using V = double __attribute__((vector_size(64)));
+  using InMemory = double __attribute__((vector_size(64), aligned(8)));
   using I = std::int64_t __attribute__((vector_size(64)));
 };
 
@@ -45,16 +49,13 @@ template <int n>
 struct Register<n> {
   using V = typename Vectors<n>::V;
   using I = typename Vectors<n>::I;
+  using InMemory = typename Vectors<n>::InMemory;
   V v;
 
   FFROBOT_INLINE static Register zero() { return {V{}}; }
-  FFROBOT_INLINE static Register all(double x) { return {V{} + x}; }
-  FFROBOT_INLINE static Register load(const double *x) {
-    Register r;
-    std::memcpy(&r.v, x, sizeof r.v);
-    return r;
-  }
-  FFROBOT_INLINE void store(double *x) const { std::memcpy(x, &v, sizeof v); }
+  FFROBOT_INLINE static Register all(double x) { return {x - V{}}; } // + would keep an addition, for the sake of -0
+  FFROBOT_INLINE static Register load(const double *x) { return {*reinterpret_cast<const InMemory *>(x)}; }
+  FFROBOT_INLINE void store(double *x) const { *reinterpret_cast<InMemory *>(x) = v; }
   // Lane i alone: 1 in an integer mask
   FFROBOT_INLINE static I only(int i) {
     I lane;
@@ -63,8 +64,8 @@ struct Register<n> {
     return lane == I{} + i;
   }
   FFROBOT_INLINE double operator[](int i) const { return v[i]; }
-  FFROBOT_INLINE void set(int i, double x) { v = only(i) ? V{} + x : v; }
-  FFROBOT_INLINE void add(int i, double x) { v += only(i) ? V{} + x : V{}; }
+  FFROBOT_INLINE void set(int i, double x) { v = only(i) ? x - V{} : v; }
+  FFROBOT_INLINE void add(int i, double x) { v += only(i) ? x - V{} : V{}; }
   // Zeros behind the first `count`
   FFROBOT_INLINE void keep(int count) {
     I lane;

@@ -259,20 +259,18 @@ FFROBOT_APART void row_motion(const Mechanism<Space> &m, const Row &row, const W
   add_turning();
 }
 
-// A force and a moment (global axes) in axes of a port
-template <class T>
-FFROBOT_INLINE void force_in_port_axes(const planar::Body &, int, const planar::State<T> &s, const double *force,
-                                       T *to) {
+// Columns of forces, and a force and a moment (global axes) in axes of a port
+template <class T, class Cols>
+FFROBOT_INLINE void forces_in_port_axes(const planar::Body &, int, const planar::State<T> &s, const Cols *force,
+                                        Cols *to) {
   const T c = s.absolute_cosine, n = s.absolute_sine;
-  to[0] = force[0] * c + force[1] * n, to[1] = force[1] * c - force[0] * n;
+  to[0] = c * force[0] + n * force[1], to[1] = c * force[1] - n * force[0];
 }
-template <class T>
-FFROBOT_INLINE void force_in_port_axes(const spatial::Body &body, int port, const spatial::State<T> &s,
-                                       const double *force, T *to) {
-  T local[3];
-  for (int i = 0; i < 3; ++i)
-    local[i] = force[0] * s.absolute[0][i] + force[1] * s.absolute[1][i] + force[2] * s.absolute[2][i];
-  turn_back(body.ports[port].R, local, to);
+template <class T, class Cols>
+FFROBOT_INLINE void forces_in_port_axes(const spatial::Body &body, int port, const spatial::State<T> &s,
+                                        const Cols *force, Cols *to) {
+  Cols local[3];
+  turn_back(s.absolute, force, local), turn_back(body.ports[port].R, local, to);
 }
 template <class T>
 FFROBOT_INLINE void in_port_axes(const planar::Body &, int, const planar::State<T> &s, const T *force, const T *moment,
@@ -288,8 +286,8 @@ FFROBOT_INLINE void in_port_axes(const spatial::Body &body, int port, const spat
   turn_back(axes, force, to), turn_back(axes, moment, to + 3);
 }
 
-// What acts on ports before anything that hangs there: rows in their columns, wrenches in column 0. Of rows, S gets
-// what they measure by velocities and, at the ground, by its acceleration -g.
+// What acts on ports before anything that hangs there: rows in their columns, wrenches in column 0. Of rows that move,
+// S gets what they measure by velocities and, at the ground, by its acceleration -g; of others that is in w.lift.
 template <class Space, class T, int W>
 FFROBOT_INLINE void attach_all(const Mechanism<Space> &m, const Forces<T> &forces, Workspace<Space, T> &w,
                                Schur<T, W> &S) {
@@ -297,52 +295,51 @@ FFROBOT_INLINE void attach_all(const Mechanism<Space> &m, const Forces<T> &force
   using Cols = Pack<T, W>;
   RowMotion<T> motion;
   T x[d];
+  const T *point_force = w.point_force.data();
   for (const auto &actions : m.actions) {
-    Cols P[d];
+    Cols P[d], point[Space::linear];
     for (int i = 0; i < d; ++i)
       P[i] = Cols::zero();
     const auto &body = m.nodes[actions.node].body;
     const auto &state = w.bodies[actions.node];
-    for (const Action &action : actions.list) {
-      const int column = action.row >= 0 ? w.column[action.row] : 0;
-      if (action.row >= 0 ? W == 1 || column == 0 : !forces.wrench)
-        continue;
-      if (action.is_point) {
-        force_in_port_axes(body, actions.port, state, action.force, x);
-        for (int i = 0; i < Space::linear; ++i)
-          P[i].add(column, x[i]);
-        continue;
-      }
-      if (action.row >= 0) {
-        row_motion(m, m.rows[action.row], w, m.rows[action.row].moves, motion);
-        in_port_axes(body, actions.port, state, motion.force, action.sign > 0 ? motion.moment_b : motion.moment_a, x);
-      } else {
-        const T *from = forces.wrench + action.wrench * d;
-        T force[3] = {from[0], from[1], d == 3 ? T(0.) : from[2]}, moment[3] = {T(0.), T(0.), from[d - 1]};
-        if constexpr (d == 6)
-          moment[0] = from[3], moment[1] = from[4];
-        in_port_axes(body, actions.port, state, force, moment, x);
-      }
-      for (int i = 0; i < d; ++i)
-        P[i].add(column, action.sign * x[i]);
+    if (W > 1 && actions.has_points) {
+      for (int i = 0; i < Space::linear; ++i)
+        point[i] = Cols::read(point_force + i * stride);
+      forces_in_port_axes(body, actions.port, state, point, P);
     }
+    point_force += Space::linear * stride;
+    if (actions.has_others)
+      for (const Action &action : actions.list) {
+        const int column = action.row >= 0 ? w.column[action.row] : 0;
+        if (action.is_point || (action.row >= 0 ? W == 1 || column == 0 : !forces.wrench))
+          continue;
+        if (action.row >= 0) {
+          row_motion(m, m.rows[action.row], w, m.rows[action.row].moves, motion);
+          in_port_axes(body, actions.port, state, motion.force, action.sign > 0 ? motion.moment_b : motion.moment_a, x);
+        } else {
+          const T *from = forces.wrench + action.wrench * d;
+          T force[3] = {from[0], from[1], d == 3 ? T(0.) : from[2]}, moment[3] = {T(0.), T(0.), from[d - 1]};
+          if constexpr (d == 6)
+            moment[0] = from[3], moment[1] = from[4];
+          in_port_axes(body, actions.port, state, force, moment, x);
+        }
+        for (int i = 0; i < d; ++i)
+          P[i].add(column, action.sign * x[i]);
+      }
     for (int i = 0; i < d; ++i)
       P[i].write(w.force.data() + (actions.global_port * d + i) * stride);
   }
-  if (W == 1)
+  if (W == 1 || !m.has_moving_rows)
     return;
   for (std::size_t k = 0; k < w.active.size(); ++k) {
     const Row &row = m.rows[w.active[k]];
-    if (row.model.kind == RowKind::coordinate)
+    if (!row.moves && !row.follows)
       continue;
-    if (row.moves || row.follows) {
-      row_motion(m, row, w, row.moves, motion);
-      T along(0.);
-      for (int i = 0; i < Space::linear; ++i)
-        along += m.gravity[i] * motion.force[i];
-      S[k + 1].add(0, -(motion.bias + double((row.a.node < 0) - (row.b.node < 0)) * along));
-    } else if (row.lift != 0)
-      S[k + 1].add(0, T(-row.lift));
+    row_motion(m, row, w, row.moves, motion);
+    T along(0.);
+    for (int i = 0; i < Space::linear; ++i)
+      along += m.gravity[i] * motion.force[i];
+    S[k + 1].add(0, -(motion.bias + double((row.a.node < 0) - (row.b.node < 0)) * along));
   }
 }
 

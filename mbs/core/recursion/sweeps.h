@@ -20,26 +20,26 @@ FFROBOT_INLINE void sweep_inward(const Mechanism<Space> &m, const T *q, const T 
   for (int r = 0; r < W; ++r)
     S[r] = Pack<T, W>::zero();
   attach_all<Space, T, W>(m, forces, w, S);
-  for (auto node = m.nodes.rbegin(); node != m.nodes.rend(); ++node) {
+  for (std::size_t i = w.hinges.size(); i-- > 0;) {
     if constexpr (Space::dim == 3)
-      if (node->is_pin) {
-        inward_pin<T, W>(m, *node, q, v, forces, w, S, gamma);
+      if (m.nodes[i].is_pin) {
+        inward_pin<T, W>(m, i, q, v, forces, w, S, gamma);
         continue;
       }
-    inward<Space, T, W>(m, *node, q, v, forces, w, S, gamma);
+    inward<Space, T, W>(m, m.nodes[i], q, v, forces, w, S, gamma);
   }
 }
 
 template <bool by_multipliers, class Space, class T, int W>
 FFROBOT_INLINE void release_all(const Mechanism<Space> &m, const T *q, const Pack<T, W> &y, Workspace<Space, T> &w,
                                 T *a) {
-  for (const Node<Space> &node : m.nodes) {
+  for (std::size_t i = 0; i < w.hinges.size(); ++i) {
     if constexpr (Space::dim == 3)
-      if (node.is_pin) {
-        release_pin<by_multipliers, T, W>(m, node, q, w, y, a);
+      if (m.nodes[i].is_pin) {
+        release_pin<by_multipliers, T, W>(m, i, q, w, y, a);
         continue;
       }
-    release<Space, T, W>(m, node, q, by_multipliers, w, y, a);
+    release<Space, T, W>(m, m.nodes[i], q, by_multipliers, w, y, a);
   }
 }
 

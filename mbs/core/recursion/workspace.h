@@ -9,9 +9,9 @@
 namespace ffrobot::recursion {
 
 // Columns side by side: 0 is what acts without constraints, column r what a unit of multiplier r does. Sizes that are
-// compiled (the first with a row: of a point); where there are fewer rows the rest is zero. Of other scalars than
-// doubles the largest alone. More rows go in blocks, one after the other (blocks.h).
-template <class Space> constexpr int column_counts[] = {1, Space::linear + 1, 7, 16};
+// compiled (of a point in the plane, with a driven joint, and in space); where there are fewer rows the rest is zero.
+// Of other scalars than doubles the largest alone. More rows go in blocks, one after the other (blocks.h).
+template <class Space> constexpr int column_counts[] = {1, Space::linear + 1, 4, 7, 16};
 constexpr int most_columns = 16;
 constexpr int block_rows = most_columns - 1;
 
@@ -80,24 +80,36 @@ template <class Space, class T> struct Workspace {
   Aligned<Pack<T, d>> cross; // (crosses, d): G between ports
   Aligned<Pack<T, d>> soft;  // (nodes with an inboard port, 2 d): M^-1 X^T, and M^-1
   std::vector<int> first_soft;
-  Aligned<T> force;               // (ports, d, columns) on ports, with opposite sign: bias of what hangs there
-  Aligned<T> bias;                // (ports, d, columns) beta of ports, by columns; of bodies with several
-  Aligned<T> answer;              // (slots, columns)
-  Aligned<T> angle, sine, cosine; // (nodes) in the plane
-  Aligned<T> z;                   // of the widest body
-  Aligned<T> schur;               // (all rows)^2 C M^-1 C^T of active ones
-  bool keeps_schur = false;       // asked for
-  Aligned<T> factor;              // factored()^2, L and 1/D of it
-  std::vector<int> active;        // rows that are kept; others depend on them
-  std::vector<int> column;        // of each row; 0: not kept, or not in the block at hand
-  std::vector<Block<T>> blocks;   // of active rows where they are more than columns; else none
-  Aligned<T> lambda;              // (all rows)
-  Aligned<T> y;                   // (columns, or 1 + all rows): 1, multipliers of active rows
-  std::vector<Pose<T>> frames;    // of nodes
-  std::vector<Turning> turning;   // of ground markers, in space: those that turn are to be kept up to date
+  Aligned<T> force;             // (ports, d, columns) on ports, with opposite sign: bias of what hangs there
+  Aligned<T> bias;              // (ports, d, columns) beta of ports, by columns; of bodies with several
+  Aligned<T> answer;            // (slots, columns)
+  Aligned<T> sine, cosine;      // (nodes) in the plane
+  Aligned<T> z;                 // of the widest body
+  Aligned<T> schur;             // (all rows)^2 C M^-1 C^T of active ones
+  bool keeps_schur = false;     // asked for
+  Aligned<T> factor;            // factored()^2, L and 1/D of it
+  std::vector<int> active;      // rows that are kept; others depend on them
+  std::vector<int> column;      // of each row; 0: not kept, or not in the block at hand
+  Aligned<T> point_force;       // (actions, linear, columns) of rows of constant direction, on ports, global axes
+  Aligned<T> lift;              // (columns) what active rows of that kind measure of gravity, from 0 on
+  std::vector<Block<T>> blocks; // of active rows where they are more than columns; else none
+  Aligned<T> lambda;            // (all rows)
+  Aligned<T> y;                 // (columns, or 1 + all rows): 1, multipliers of active rows
+  std::vector<Pose<T>> frames;  // of nodes
+  std::vector<Turning> turning; // of ground markers, in space: those that turn are to be kept up to date
   unsigned long evaluations = 0;
 
+  // A force of a row on a port, of constant direction: where it is in point_force
+  struct PointForce {
+    std::size_t place;
+    int row;
+    double force[Space::linear];
+  };
+  std::vector<PointForce> point_forces;
+  std::vector<double> lifts; // (all rows)
+
   void keep(std::vector<int> rows); // these alone
+  void put_in_columns();            // point_force and lift, after a change of `column`
   int factored() const { return blocks.empty() ? columns - 1 : static_cast<int>(active.size()); }
 };
 

@@ -8,11 +8,6 @@
 
 namespace ffrobot::recursion::planar {
 
-template <class T> struct Inertia {
-  T xx, xy, xa, yy, ya, aa; // M_rr - m m^T
-  T bx, by, ba;             // -(Q_r - m Q_f)
-};
-
 // i: fields turned by a right angle, i (x, y, stretch, turn) = (-y, x, -turn, stretch)
 template <class T> FFROBOT_INLINE Pack<T, fields> quarter_turn(const Pack<T, fields> &x) {
   auto to = Pack<T, fields>::zero();
@@ -134,7 +129,7 @@ template <class T> inline void multiply_rows(const Body &b, State<T> &s) {
   }
 }
 
-// As `inertia`, after `modal_forces`
+// What `inertia` answers then, after `modal_forces`
 template <class T> FFROBOT_APART Inertia<T> bent_inertia(const Body &b, const T *p, const T *v, State<T> &s) {
   bend_forces(b, p, v, s);
   eliminate_modes(b, s), multiply_rows(b, s);

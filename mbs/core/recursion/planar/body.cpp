@@ -82,6 +82,7 @@ void Body::fill_rows(const PlanarData &data, const std::vector<int> &used, int t
     if (n) {
       W.middleRows<3>(port.row) = marker.Phi;
       port.is_soft = !vanishes(marker.Phi, 1 / std::sqrt(mass));
+      port.shifts = !vanishes(marker.Phi.topRows<2>(), 1 / std::sqrt(mass));
       port.turns = !vanishes(marker.Phi.row(2), 1 / std::sqrt(mass));
     }
     ports.push_back(port), first_rows.push_back(port.row);
@@ -91,7 +92,7 @@ void Body::fill_rows(const PlanarData &data, const std::vector<int> &used, int t
     for (Port &port : ports)
       for (const Stiffening::Row &curved : stiffening->at_ports)
         if (const int component = curved.row - port.row; component >= 0 && component < 3)
-          port.is_soft = true, port.turns = port.turns || component == 2;
+          port.is_soft = true, (component == 2 ? port.turns : port.shifts) = true;
   }
   is_tilted = n && tilted >= 0;
   if (is_tilted)
@@ -101,6 +102,10 @@ void Body::fill_rows(const PlanarData &data, const std::vector<int> &used, int t
   for (int r = 0; r < width(); ++r)
     for (int i = 0; i < n; ++i)
       columns[static_cast<std::size_t>(i * width() + r)] = rows[static_cast<std::size_t>(r * padded + i)] = W(r, i);
+  for (int i = 0; blocks == 1 && i < padded; i += native_lanes)
+    for (int r = 0; r < width(); ++r)
+      for (int k = i; k < i + native_lanes; ++k)
+        tiles.push_back(rows[static_cast<std::size_t>(r * padded + k)]);
   fill_products(W);
 }
 

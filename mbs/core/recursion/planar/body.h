@@ -20,6 +20,7 @@ struct Port {
   double x = 0, y = 0, angle = 0; // undeformed, body axes
   int row = 3;                    // its first in W
   bool is_soft = false;           // modes move it
+  bool shifts = false;            // … along x or y
   bool turns = false;             // … and turn it
 };
 
@@ -35,9 +36,10 @@ struct Body {
   double residual[3][3] = {}; // M_rr - m m^T, constant part
   Aligned<double> columns;    // (n, 8 blocks) W transposed
   Aligned<double> rows;       // (8 blocks, padded) W
-  Aligned<double> products;   // G (8 blocks, 8 blocks); of ports X - P m^T, (x, y, rotation) by A, (ports, 3, 3)
-  Aligned<double> K, D;       // (padded) stiffness; damping where it is diagonal
-  bool is_damped = false;     // by a diagonal
+  Aligned<double> tiles; // of one block: (padded / native_lanes, 8, native_lanes) W by modes that go through a register
+  Aligned<double> products; // G (8 blocks, 8 blocks); of ports X - P m^T, (x, y, rotation) by A, (ports, 3, 3)
+  Aligned<double> K, D;     // (padded) stiffness; damping where it is diagonal
+  bool is_damped = false;   // by a diagonal
   std::vector<Port> ports;
   // Where these are not empty, an evaluation takes the long way round: modal forces one by one.
   Eigen::MatrixXd D_full, S_tilde, m_xy;
@@ -58,6 +60,11 @@ private:
 // The same body with its frame at `position`, turned by `angle`.
 PlanarData moved(const PlanarData &data, const Eigen::Vector2d &position, double angle);
 
+template <class T> struct Inertia {
+  T xx, xy, xa, yy, ya, aa; // M_rr - m m^T
+  T bx, by, ba;             // -(Q_r - m Q_f)
+};
+
 // Of a body with geometric stiffening (bent.h); names as in stiffening.h
 template <class T> struct Bent {
   using Fields = Pack<T, fields>;
@@ -68,8 +75,9 @@ template <class T> struct Bent {
   struct Affine { // of the fields
     Fields g, g_dot;
   };
-  Affine linear, all;   // without and with terms of second order
-  Fields bending;       // p_dot^T K p_dot
+  Affine linear, all; // without and with terms of second order
+  Fields bending;     // p_dot^T K p_dot
+  Inertia<T> inertia;
   Aligned<T> p, v;      // padded
   Aligned<T> K_p, K_v;  // one after the other
   Aligned<T> F;         // (n, 4) F(p) transposed
@@ -107,37 +115,44 @@ template <class T> struct State {
 // --- W p, W p_dot, W (K p + D p_dot - force), p.p, p.p_dot; force (n) may be null
 
 FFROBOT_INLINE void project(const Body &b, const double *p, const double *v, const double *force, State<double> &s) {
-  const int n = b.n, width = b.width();
-  Eight pp = Eight::zero(), pv = Eight::zero();
-  double *elastic = s.elastic.data();
-  for (int i = 0; i < n; i += 8) {
-    const Eight x = n - i >= 8 ? Eight::load(p + i) : load_part(p + i, n - i);
-    const Eight y = n - i >= 8 ? Eight::load(v + i) : load_part(v + i, n - i);
-    Eight k = Eight::load(b.K.data() + i) * x;
+  const long n = b.n;
+  auto pp = Pack<double, native_lanes>::zero(), pv = pp;
+  double pp_rest = 0, pv_rest = 0, *elastic = s.elastic.data();
+  in_registers(n, [&]<int w>(long i) {
+    using Part = Pack<double, w>;
+    const Part x = Part::read(p + i), y = Part::read(v + i);
+    Part k = Part::read(b.K.data() + i) * x;
     if (b.is_damped)
-      k += Eight::load(b.D.data() + i) * y;
+      k += Part::read(b.D.data() + i) * y;
     if (force)
-      k -= n - i >= 8 ? Eight::load(force + i) : load_part(force + i, n - i);
-    k.store(elastic + i);
-    pp += x * x, pv += x * y;
-  }
-  s.p_p = pp.sum(), s.p_v = pv.sum();
-  for (int block = 0; block < width; block += 8) {
+      k -= Part::read(force + i);
+    k.write(elastic + i);
+    if constexpr (w == native_lanes)
+      pp += x * x, pv += x * y;
+    else
+      pp_rest += (x * x).sum(), pv_rest += (x * y).sum();
+  });
+  s.p_p = pp.sum() + pp_rest, s.p_v = pv.sum() + pv_rest;
+  const auto multiply = [&](long block, auto width) {
     Eight u = Eight::zero(), u_dot = u, k = u, u2 = u, u_dot2 = u, k2 = u;
     const double *column = b.columns.data() + block;
-    int i = 0;
+    long i = 0;
     for (; i + 2 <= n; i += 2, column += 2 * width) {
       const Eight w = Eight::load(column), w2 = Eight::load(column + width);
       u += p[i] * w, u_dot += v[i] * w, k += elastic[i] * w;
       u2 += p[i + 1] * w2, u_dot2 += v[i + 1] * w2, k2 += elastic[i + 1] * w2;
     }
-    if (i < n) {
+    if (n & 1) {
       const Eight w = Eight::load(column);
       u += p[i] * w, u_dot += v[i] * w, k += elastic[i] * w;
     }
     (u + u2).store(s.u.data() + block), (u_dot + u_dot2).store(s.u_dot.data() + block);
     (k + k2).store(s.Q.data() + block);
-  }
+  };
+  if (b.blocks == 1)
+    return multiply(0, std::integral_constant<long, 8>());
+  for (long block = 0; block < b.width(); block += 8)
+    multiply(block, static_cast<long>(b.width()));
 }
 
 template <class T> inline void project(const Body &b, const T *p, const T *v, const T *force, State<T> &s) {

@@ -54,27 +54,37 @@ template <class T> void more_forces(const Body &b, const T *p, const T *v, State
     s.Q[Body::H] += s.h[i] * (ww * p[i] - s.elastic[i] + s.more[i]);
 }
 
-// M_rr - m m^T and -(Q_r - m Q_f)
-template <class T> FFROBOT_INLINE Inertia<T> inertia(const Body &b, const T *p, const T *v, State<T> &s) {
-  Inertia<T> M;
-  const T ww = s.omega * s.omega, w2 = 2. * s.omega;
-  const int width = b.width();
+// W Q_f, in s.Q, and all that the common case has not
+template <bool is_one_block = false, class T>
+FFROBOT_INLINE void forces_on_rows(const Body &b, const T *p, const T *v, State<T> &s) {
+  const T ww = s.omega * s.omega;
+  const int width = is_one_block ? 8 : b.width();
   if constexpr (std::is_same_v<T, double>)
     for (int r = 0; r < width; r += 8)
       (ww * Eight::load(s.u.data() + r) - Eight::load(s.Q.data() + r)).store(s.Q.data() + r);
   else
     for (int r = 0; r < width; ++r)
       s.Q[r] = ww * s.u[r] - s.Q[r];
+  if (!b.has_more)
+    return;
+  if (b.stiffening) {
+    modal_forces(b, p, v, s);
+    s.bent.inertia = bent_inertia(b, p, v, s);
+  } else
+    more_forces(b, p, v, s);
+}
+
+// M_rr - m m^T and -(Q_r - m Q_f), after that
+template <class T> FFROBOT_INLINE Inertia<T> inertia(const Body &b, const State<T> &s) {
+  if (b.has_more && b.stiffening)
+    return s.bent.inertia;
+  Inertia<T> M;
+  const T ww = s.omega * s.omega, w2 = 2. * s.omega;
   const T *u = s.u.data(), *Q = s.Q.data();
   T p_p = s.p_p;
   M.xa = b.residual[0][2] - u[Body::Sy], M.ya = b.residual[1][2] + u[Body::Sx];
   if (b.has_more) {
-    if (b.stiffening) {
-      modal_forces(b, p, v, s);
-      return bent_inertia(b, p, v, s);
-    }
-    more_forces(b, p, v, s);
-    p_p = s.p_p - 2. * s.WH[Body::H];
+    p_p -= 2. * s.WH[Body::H];
     for (int i = 0; i < b.n; ++i)
       p_p -= s.h[i] * s.h[i];
     M.xa -= s.WH[Body::Sx], M.ya -= s.WH[Body::Sy];
@@ -93,25 +103,24 @@ template <bool by_multipliers>
 FFROBOT_INLINE void modal_accelerations(const Body &b, const double *p, double *z, State<double> &s, double *a) {
   if (b.has_more && b.stiffening)
     return bent_accelerations<by_multipliers>(b, z, s, a);
-  const double ww = s.omega * s.omega;
-  const int n = b.n, stride = b.padded, width = b.width();
-  for (int i = 0; i < n; i += 8) {
-    const int left = n - i;
+  const double ww = s.omega * s.omega, *elastic = s.elastic.data();
+  const long stride = b.padded, last = b.width() - 2;
+  in_registers(b.n, [&]<int w>(long i) {
+    using Part = Pack<double, w>;
     const double *W = b.rows.data() + i;
-    Eight sum = Eight::zero();
+    const auto row = [&](long r) { return Part::read(W + r * stride); };
+    Part sum = Part::zero(), sum2 = sum;
     if (!by_multipliers)
-      sum = ww * (left >= 8 ? Eight::load(p + i) : load_part(p + i, left)) - Eight::load(s.elastic.data() + i);
-    Eight sum2 = Eight::zero();
-    for (int r = 0; r < width; r += 2, W += 2 * stride)
-      sum += z[r] * Eight::load(W), sum2 += z[r + 1] * Eight::load(W + stride);
+      sum = ww * Part::read(p + i) - Part::read(elastic + i);
+    for (long r = 0; r <= last; r += 2)
+      sum += z[r] * row(r), sum2 += z[r + 1] * row(r + 1);
     if (b.has_more) {
-      sum += z[2] * Eight::load(s.h.data() + i);
+      sum += z[2] * Part::read(s.h.data() + i);
       if (!by_multipliers)
-        sum += Eight::load(s.more.data() + i);
+        sum += Part::read(s.more.data() + i);
     }
-    sum += sum2;
-    left >= 8 ? sum.store(a + i) : store_part(a + i, sum, left);
-  }
+    (sum + sum2).write(a + i);
+  });
 }
 
 template <bool by_multipliers, class T>
@@ -128,6 +137,27 @@ inline void modal_accelerations(const Body &b, const T *p, T *z, State<T> &s, T 
       sum += by_multipliers ? s.h[i] * z[2] : s.more[i] + s.h[i] * z[2];
     a[i] = sum;
   }
+}
+
+// The same of a body with one block on whose port no moment acts (pins.h)
+template <bool by_multipliers, class T>
+FFROBOT_APART void modes_of_pin(const Body &b, const T *p, T *z, State<T> &s, T *a) {
+  if constexpr (std::is_same_v<T, double>)
+    if (!b.has_more) {
+      const double ww = s.omega * s.omega, *elastic = s.elastic.data(), *tiles = b.tiles.data();
+      return in_registers(b.n, [&]<int w>(long i) {
+        using Part = Pack<double, w>;
+        const long first = i & -native_lanes; // of the tile
+        const auto row = [&](int r) { return Part::read(tiles + 8 * first + r * native_lanes + (i - first)); };
+        Part sum = z[3] * row(3), sum2 = z[4] * row(4); // what is known last, z[2], comes last
+        if (!by_multipliers)
+          sum += ww * Part::read(p + i) - Part::read(elastic + i);
+        sum += z[Body::TILT] * row(Body::TILT) + z[0] * row(0);
+        sum2 += z[1] * row(1) + z[2] * row(2);
+        (sum + sum2).write(a + i);
+      });
+    }
+  modal_accelerations<by_multipliers>(b, p, z, s, a);
 }
 
 } // namespace ffrobot::recursion::planar

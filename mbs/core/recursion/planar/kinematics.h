@@ -6,35 +6,44 @@
 
 namespace ffrobot::recursion {
 
-// All angles at once: 4 lanes, |x| below 1e5, within an ulp or two. Reduction after Cody and Waite, polynomials of
-// Cephes.
-FFROBOT_INLINE void sines_and_cosines(const double *x, double *s, double *c, std::size_t count) {
-  using V = double __attribute__((vector_size(32)));
-  using I = std::int64_t __attribute__((vector_size(32)));
-  for (std::size_t i = 0; i < count; i += 4) {
-    V y;
-    std::memcpy(&y, x + i, sizeof y);
-    const V shift = V{} + 6755399441055744.0, shifted = y * 0.63661977236758134308 + shift, k = shifted - shift;
-    const V r = ((y - k * 1.5707963267341256142) - k * 6.0771005063039659764e-11) - k * 2.0222662487959507324e-21;
-    const V z = r * r, z2 = z * z, z4 = z2 * z2;
-    const V sine = r + r * z *
-                           ((-1.66666666666666307295e-1 + z * 8.33333333332211858878e-3) +
-                            z2 * (-1.98412698295895385996e-4 + z * 2.75573136213857245213e-6) +
-                            z4 * (-2.50507477628578072866e-8 + z * 1.58962301576546568060e-10));
-    const V cosine = (1 - 0.5 * z) + z2 * ((4.16666666666665929218e-2 + z * -1.38888888888730564116e-3) +
-                                           z2 * (2.48015872888517045348e-5 + z * -2.75573141792967388112e-7) +
-                                           z4 * (2.08757008419747316778e-9 + z * -1.13585365213876817300e-11));
-    const I quadrant = __builtin_bit_cast(I, shifted), odd = -(quadrant & 1);
-    const I p = __builtin_bit_cast(I, sine), q = __builtin_bit_cast(I, cosine);
-    const I sine_bits = ((odd & q) | (~odd & p)) ^ ((quadrant & 2) << 62);
-    const I cosine_bits = ((odd & p) | (~odd & q)) ^ (((quadrant + 1) & 2) << 62);
-    std::memcpy(s + i, &sine_bits, sizeof sine_bits), std::memcpy(c + i, &cosine_bits, sizeof cosine_bits);
+using FourAngles = double __attribute__((vector_size(32)));
+using FourIntegers = std::int64_t __attribute__((vector_size(32)));
+
+// |x| below 1e5, within an ulp or two. Reduction after Cody and Waite, polynomials of Cephes.
+FFROBOT_INLINE void sines_and_cosines(const FourAngles &x, double *s, double *c) {
+  using V = FourAngles;
+  using I = FourIntegers;
+  const V shift = V{} + 6755399441055744.0, shifted = x * 0.63661977236758134308 + shift, k = shifted - shift;
+  const V r = (x - k * 1.5707963267341256142) - k * 6.077100506506192601e-11;
+  const V z = r * r, z2 = z * z, z4 = z2 * z2;
+  const V sine = r + r * z *
+                         ((-1.66666666666666307295e-1 + z * 8.33333333332211858878e-3) +
+                          z2 * (-1.98412698295895385996e-4 + z * 2.75573136213857245213e-6) +
+                          z4 * (-2.50507477628578072866e-8 + z * 1.58962301576546568060e-10));
+  const V cosine = (1 - 0.5 * z) + z2 * ((4.16666666666665929218e-2 + z * -1.38888888888730564116e-3) +
+                                         z2 * (2.48015872888517045348e-5 + z * -2.75573141792967388112e-7) +
+                                         z4 * (2.08757008419747316778e-9 + z * -1.13585365213876817300e-11));
+  const I quadrant = __builtin_bit_cast(I, shifted), odd = -(quadrant & 1);
+  const I p = __builtin_bit_cast(I, sine), q = __builtin_bit_cast(I, cosine);
+  const I sine_bits = ((odd & q) | (~odd & p)) ^ ((quadrant & 2) << 62);
+  const I cosine_bits = ((odd & p) | (~odd & q)) ^ (((quadrant + 1) & 2) << 62);
+  std::memcpy(s, &sine_bits, sizeof sine_bits), std::memcpy(c, &cosine_bits, sizeof cosine_bits);
+}
+
+// Takes angles one after the other, and leaves their sines and cosines: of doubles four at once. They are put together
+// in a register, since written one by one and read together they would wait for memory.
+template <class T> struct Angles {
+  FFROBOT_INLINE void take(std::size_t i, std::size_t, const T &x, T *s, T *c) { sine_and_cosine(x, s[i], c[i]); }
+};
+template <> struct Angles<double> {
+  FourAngles four{};
+  FFROBOT_INLINE void take(std::size_t i, std::size_t count, double x, double *s, double *c) {
+    const std::size_t lane = i % 4;
+    four = FourIntegers{0, 1, 2, 3} == FourIntegers{} + static_cast<std::int64_t>(lane) ? x - FourAngles{} : four;
+    if (lane == 3 || i + 1 == count)
+      sines_and_cosines(four, s + (i - lane), c + (i - lane));
   }
-}
-template <class T> inline void sines_and_cosines(const T *x, T *s, T *c, std::size_t count) {
-  for (std::size_t i = 0; i < count; ++i)
-    sine_and_cosine(x[i], s[i], c[i]);
-}
+};
 
 // Angle and its rate of the section at a port against the body
 template <class T> FFROBOT_INLINE T section_angle(const planar::Body &b, int port, const planar::State<T> &s) {
@@ -47,7 +56,8 @@ template <class T> FFROBOT_INLINE T section_rate(const planar::Body &b, int port
 template <class T>
 FFROBOT_APART void kinematics(const Mechanism<Planar> &m, const T *q, const T *v, const Forces<T> &forces,
                               Workspace<Planar, T> &w) {
-  const std::size_t count = m.nodes.size();
+  const std::size_t count = w.hinges.size();
+  Angles<T> angles;
   for (std::size_t i = 0; i < count; ++i) {
     const Node<Planar> &node = m.nodes[i];
     planar::State<T> &s = w.bodies[i];
@@ -55,19 +65,15 @@ FFROBOT_APART void kinematics(const Mechanism<Planar> &m, const T *q, const T *v
             s);
     if (node.body.stiffening)
       bend(node.body, q + node.p_q(), v + node.p_v(), s);
-    T angle = T(0.);
-    if (node.joint == JointKind::revolute || node.joint == JointKind::free)
-      angle = q[node.joint == JointKind::free ? node.q + 2 : node.q];
+    T angle = T(node.inner_angle);
+    if (node.parent >= 0)
+      angle += w.bodies[node.parent].u[node.inner_rotation];
+    if (node.angle >= 0)
+      angle += q[node.angle];
     if (node.body.is_tilted)
       angle -= s.u[planar::Body::TILT];
-    if (node.parent >= 0)
-      angle += section_angle(m.nodes[node.parent].body, node.parent_port - m.nodes[node.parent].first_port,
-                             w.bodies[node.parent]);
-    else
-      angle += m.ground[node.parent_port].angle;
-    w.angle[i] = angle;
+    angles.take(i, count, angle, w.sine.data(), w.cosine.data());
   }
-  sines_and_cosines(w.angle.data(), w.sine.data(), w.cosine.data(), count);
   for (std::size_t i = 0; i < count; ++i) {
     const Node<Planar> &node = m.nodes[i];
     planar::State<T> &s = w.bodies[i];
@@ -76,9 +82,8 @@ FFROBOT_APART void kinematics(const Mechanism<Planar> &m, const T *q, const T *v
     hinge.turn = {cosine, sine};
     T omega(0.); // of the section that it hangs on
     if (node.parent >= 0) {
-      const Node<Planar> &parent = m.nodes[node.parent];
       const planar::State<T> &p = w.bodies[node.parent];
-      omega = p.omega + section_rate(parent.body, node.parent_port - parent.first_port, p);
+      omega = p.omega + p.u_dot[node.inner_rotation];
       s.absolute_cosine = p.absolute_cosine * cosine - p.absolute_sine * sine;
       s.absolute_sine = p.absolute_sine * cosine + p.absolute_cosine * sine;
     } else
@@ -96,7 +101,7 @@ FFROBOT_APART void kinematics(const Mechanism<Planar> &m, const T *q, const T *v
         hinge.r[k] = to.r[k], hinge.r_dot[k] = to.r_dot[k];
       hinge.c[0] = -(oo * to.r[0]) - o2 * to.r_dot[1], hinge.c[1] = o2 * to.r_dot[0] - oo * to.r[1], hinge.c[2] = T(0.);
     }
-    if (!node.is_pin || (node.parent >= 0 && !m.nodes[node.parent].is_pin)) {
+    if (!node.hangs_on_pin) {
       hinge.column[0][0] = cosine, hinge.column[0][1] = sine, hinge.column[0][2] = -hinge.r[1];
       hinge.column[1][0] = -sine, hinge.column[1][1] = cosine, hinge.column[1][2] = hinge.r[0];
       hinge.column[2][2] = T(1.);
@@ -122,7 +127,8 @@ template <class T> FFROBOT_INLINE PlanarTurn<T> inboard_tilt(const Node<Planar> 
 template <class T>
 FFROBOT_APART void evaluate_inertia(const Node<Planar> &node, const T *p, const T *v, planar::State<T> &s,
                                     Pack<T, 3> *M, T *b) {
-  const planar::Inertia<T> I = inertia(node.body, p, v, s);
+  forces_on_rows(node.body, p, v, s);
+  const planar::Inertia<T> I = inertia(node.body, s);
   const T rows[3][3] = {{I.xx, I.xy, I.xa}, {I.xy, I.yy, I.ya}, {I.xa, I.ya, I.aa}};
   for (int i = 0; i < 3; ++i) {
     M[i] = Pack<T, 3>::zero();

@@ -97,7 +97,7 @@ void NewtonEuler::prepare(const double *q, const double *v, const double *genera
   locate(mechanism_, q, w);
   for (std::size_t i = 0; i < mechanism_.nodes.size(); ++i) {
     const Node<Planar> &node = mechanism_.nodes[i];
-    inertia(node.body, q + node.p_q(), v + node.p_v(), w.bodies[i]);
+    forces_on_rows(node.body, q + node.p_q(), v + node.p_v(), w.bodies[i]);
   }
 }
 

@@ -13,14 +13,11 @@
 
 namespace ffrobot::recursion {
 
-// What hangs on the port: Lambda of the child
+// What hangs on the port: Lambda of the child that is no pin (pins leave theirs there)
 template <class T> FFROBOT_INLINE void load_pin(const Mechanism<Planar> &m, int index, Workspace<Planar, T> &w) {
-  const int child = m.children[index];
   PortWork<Planar, T> &port = w.ports[index];
-  if (m.nodes[child].is_pin)
-    return; // has left it there
   T L[2][2];
-  const Hinge<Planar, T> &hinge = w.hinges[child];
+  const Hinge<Planar, T> &hinge = w.hinges[m.children[index]];
   for (int i = 0; i < 2; ++i)
     for (int j = 0; j < 2; ++j)
       L[i][j] = hinge.Lambda[i][j];
@@ -30,32 +27,39 @@ template <class T> FFROBOT_INLINE void load_pin(const Mechanism<Planar> &m, int 
   port.Lambda_xy = c * n * (L[0][0] - L[1][1]) + (c * c - n * n) * L[0][1];
 }
 
+// A moment along the coordinate acts on the modes, too, where these turn the section.
+template <class T> inline void push_along_tilt(const planar::Body &body, const T &moment, planar::State<T> &s) {
+  constexpr int tilt = planar::Body::TILT;
+  const auto by_moment = [&](int row) { return s.gram_of_block(tilt, row) * moment; };
+  for (int r = 0; r < 8; ++r)
+    s.Q[r] += by_moment(r);
+  if (body.stiffening)
+    s.bent.inertia.bx += by_moment(0), s.bent.inertia.by += by_moment(1), s.bent.inertia.ba += by_moment(2);
+  else if (body.has_more)
+    s.Q[planar::Body::H] += s.WH[tilt] * moment;
+  s.on_modes = moment;
+}
+
 template <class T, int W>
-FFROBOT_INLINE void inward_pin(const Mechanism<Planar> &m, const Node<Planar> &node, const T *q, const T *v,
+FFROBOT_INLINE void inward_pin(const Mechanism<Planar> &m, std::size_t i_node, const T *q, const T *v,
                                const Forces<T> &forces, Workspace<Planar, T> &w, Schur<T, W> &S, Pack<T, W> &gamma) {
   constexpr int stride = stride_of(W);
   using Cols = Pack<T, W>;
+  const Node<Planar> &node = m.nodes[i_node];
   const planar::Body &body = node.body;
-  planar::State<T> &s = w.bodies[&node - m.nodes.data()];
-  T on_modes(0.);
+  planar::State<T> &s = w.bodies[i_node];
+  Hinge<Planar, T> &hinge = w.hinges[i_node];
   // Forces along the coordinate by columns; those of multipliers act on the modes, too, where these turn the section.
   Cols applied = multiplier_forces<T, W>(m, node, 0, w);
   const Cols multipliers = applied;
   const bool rows_on_modes = W > 1 && body.is_tilted && node.has_rows;
   if (forces.generalized)
     applied.set(0, forces.generalized[node.v]);
+  forces_on_rows<true>(body, q + node.p_q(), v + node.p_v(), s);
+  s.on_modes = T(0.);
   if (body.is_tilted && forces.generalized)
-    on_modes = forces.generalized[node.v];
-  planar::Inertia<T> I = inertia(body, q + node.p_q(), v + node.p_v(), s);
-  if (body.is_tilted && forces.generalized) {
-    constexpr int tilt = planar::Body::TILT;
-    for (int r = 0; r < 8; ++r)
-      s.Q[r] += s.gram_of_block(tilt, r) * on_modes;
-    I.bx += s.gram_of_block(tilt, 0) * on_modes, I.by += s.gram_of_block(tilt, 1) * on_modes;
-    I.ba += (s.gram_of_block(tilt, 2) + s.WH[tilt]) * on_modes;
-  }
-  s.on_modes = on_modes;
-  T M_xx = I.xx, M_xy = I.xy, M_xa = I.xa, M_yy = I.yy, M_ya = I.ya, M_aa = I.aa;
+    push_along_tilt(body, forces.generalized[node.v], s);
+  T L_xx(0.), L_xy(0.), L_xa(0.), L_yy(0.), L_ya(0.), L_aa(0.); // X^T Y X of what hangs on the port
   Cols H[3];
   if (node.outboard) {
     const int index = node.first_port;
@@ -73,13 +77,14 @@ FFROBOT_INLINE void inward_pin(const Mechanism<Planar> &m, const Node<Planar> &n
     const T *from = w.force.data() + index * 3 * stride;
     const Cols P0 = Cols::read(from), P1 = Cols::read(from + stride);
     Cols E0 = P0, E1 = P1;
-    const bool loaded = m.children[index] >= 0;
+    const bool loaded = node.is_loaded;
     const T Gx = s.gram_of_block(3, 3), Gc = s.gram_of_block(3, 4), Gy = s.gram_of_block(4, 4);
     T Y_xx(0.), Y_xy(0.), Y_yy(0.);
     if (loaded) {
-      load_pin(m, index, w);
+      if (!node.carries_pin)
+        load_pin(m, index, w);
       const T Lx = port.Lambda_xx, Lc = port.Lambda_xy, Ly = port.Lambda_yy;
-      if (constants.is_soft) {
+      if (constants.shifts) {
         const T det = Lx * Ly - Lc * Lc, xG = Gx * Lx, yG = Gy * Ly, cG = Gc * Lc;
         const T i = T(1.) / (1. + xG + 2. * cG + yG + (Gx * Gy - Gc * Gc) * det);
         Y_xx = (Lx + Gy * det) * i, Y_yy = (Ly + Gx * det) * i, Y_xy = (Lc - Gc * det) * i;
@@ -91,7 +96,7 @@ FFROBOT_INLINE void inward_pin(const Mechanism<Planar> &m, const Node<Planar> &n
       port.Y_xx = Y_xx, port.Y_xy = Y_xy, port.Y_yy = Y_yy;
     }
     if constexpr (W > 1) {
-      if (constants.is_soft) {
+      if (constants.shifts) {
         gain(S, P0, Cols(Gx * E0 + Gc * E1));
         gain(S, P1, Cols(Gc * E0 + Gy * E1));
       }
@@ -115,11 +120,14 @@ FFROBOT_INLINE void inward_pin(const Mechanism<Planar> &m, const Node<Planar> &n
     if (loaded) {
       const T p0 = x0 * Y_xx + y0 * Y_xy, p1 = x1 * Y_xx + y1 * Y_xy, p2 = X_xa * Y_xx + X_ya * Y_xy;
       const T r0 = x0 * Y_xy + y0 * Y_yy, r1 = x1 * Y_xy + y1 * Y_yy, r2 = X_xa * Y_xy + X_ya * Y_yy;
-      M_xx += x0 * p0 + y0 * r0, M_xy += x0 * p1 + y0 * r1, M_xa += x0 * p2 + y0 * r2;
-      M_yy += x1 * p1 + y1 * r1, M_ya += x1 * p2 + y1 * r2, M_aa += X_xa * p2 + X_ya * r2;
+      L_xx = x0 * p0 + y0 * r0, L_xy = x0 * p1 + y0 * r1, L_xa = x0 * p2 + y0 * r2;
+      L_yy = x1 * p1 + y1 * r1, L_ya = x1 * p2 + y1 * r2, L_aa = X_xa * p2 + X_ya * r2;
     }
   } else
     H[0] = H[1] = H[2] = Cols::zero();
+  const planar::Inertia<T> I = inertia(body, s);
+  const T M_xx = I.xx + L_xx, M_xy = I.xy + L_xy, M_xa = I.xa + L_xa;
+  const T M_yy = I.yy + L_yy, M_ya = I.ya + L_ya, M_aa = I.aa + L_aa;
   H[0].add(0, I.bx), H[1].add(0, I.by), H[2].add(0, I.ba);
   if (rows_on_modes) {
     for (int r = 0; r < 3; ++r)
@@ -132,7 +140,6 @@ FFROBOT_INLINE void inward_pin(const Mechanism<Planar> &m, const Node<Planar> &n
   }
 
   // the joint
-  Hinge<Planar, T> &hinge = w.hinges[&node - m.nodes.data()];
   const T D_inverse = T(1.) / M_aa;
   const Cols su = forces.generalized || node.has_rows ? Cols(H[2] - applied) : H[2], sd = D_inverse * su;
   sd.write(w.answer.data() + node.joint_slot(0) * stride);
@@ -156,8 +163,8 @@ FFROBOT_INLINE void inward_pin(const Mechanism<Planar> &m, const Node<Planar> &n
   }
   const int index = node.parent_port;
   T *to = w.force.data() + index * 3 * stride;
-  const bool add = m.cleared[index];
-  if (m.nodes[node.parent].is_pin) {
+  const bool add = node.adds_up;
+  if (node.hangs_on_pin) {
     PortWork<Planar, T> &port = w.ports[index];
     const T cc = c * c, nn = n * n;
     port.Lambda_xx = cc * xx - twice + nn * yy;
@@ -175,10 +182,10 @@ FFROBOT_INLINE void inward_pin(const Mechanism<Planar> &m, const Node<Planar> &n
 
 // A_port (2): acceleration of the port that the body hangs on, in and out: of its own port
 template <bool by_multipliers, class T, int W>
-FFROBOT_INLINE void release_pin(const Mechanism<Planar> &m, const Node<Planar> &node, const T *q,
-                                Workspace<Planar, T> &w, const Pack<T, W> &y, T *a) {
+FFROBOT_INLINE void release_pin(const Mechanism<Planar> &m, std::size_t i_node, const T *q, Workspace<Planar, T> &w,
+                                const Pack<T, W> &y, T *a) {
+  const Node<Planar> &node = m.nodes[i_node];
   const planar::Body &body = node.body;
-  const auto i_node = &node - m.nodes.data();
   planar::State<T> &s = w.bodies[i_node];
   Hinge<Planar, T> &hinge = w.hinges[i_node];
   T Px, Py, P_rotation(0.);
@@ -208,7 +215,7 @@ FFROBOT_INLINE void release_pin(const Mechanism<Planar> &m, const Node<Planar> &
     const T Xx = s.X_of_block(0, 0) * Ax + s.X_of_block(0, 1) * Ay + port.X_xa * Aa;
     const T Xy = s.X_of_block(1, 0) * Ax + s.X_of_block(1, 1) * Ay + port.X_ya * Aa;
     T fx = -answer<Planar, T, W>(w, node.port_slot(0), y), fy = -answer<Planar, T, W>(w, node.port_slot(0) + 1, y);
-    if (m.children[node.first_port] >= 0) // Y beta is among the columns
+    if (node.is_loaded) // Y beta is among the columns
       fx -= port.Y_xx * Xx + port.Y_xy * Xy, fy -= port.Y_xy * Xx + port.Y_yy * Xy;
     z[3] = fx, z[4] = fy;
     port.f[0] = fx, port.f[1] = fy, port.f[2] = T(0.);
@@ -218,17 +225,17 @@ FFROBOT_INLINE void release_pin(const Mechanism<Planar> &m, const Node<Planar> &
       port.A[0] += s.gram_of_block(tilt, 3) * on_modes, port.A[1] += s.gram_of_block(tilt, 4) * on_modes;
       rotation += s.gram_of_block(tilt, 5) * on_modes;
     }
-    if (constants.is_soft) {
+    if (constants.shifts) {
       const T Gx = s.gram_of_block(3, 3), Gc = s.gram_of_block(3, 4), Gy = s.gram_of_block(4, 4);
       port.A[0] += Gx * fx + Gc * fy, port.A[1] += Gc * fx + Gy * fy;
-      if (constants.turns) {
-        if (!by_multipliers)
-          rotation += s.Q[5];
-        rotation += s.gram_of_block(5, 3) * fx + s.gram_of_block(5, 4) * fy - s.gram_of_block(5, 0) * Ax -
-                    s.gram_of_block(5, 1) * Ay - s.gram_of_block(5, 2) * Aa;
-        if (body.has_more)
-          rotation -= s.WH[5] * Aa;
-      }
+    }
+    if (constants.turns) {
+      if (!by_multipliers)
+        rotation += s.Q[5];
+      rotation += s.gram_of_block(5, 3) * fx + s.gram_of_block(5, 4) * fy - s.gram_of_block(5, 0) * Ax -
+                  s.gram_of_block(5, 1) * Ay - s.gram_of_block(5, 2) * Aa;
+      if (body.has_more)
+        rotation -= s.WH[5] * Aa;
     }
     port.A[2] = rotation;
   }
@@ -243,7 +250,7 @@ FFROBOT_INLINE void release_pin(const Mechanism<Planar> &m, const Node<Planar> &
       a[node.v] -= s.WH[tilt] * Aa;
   }
   if (body.n)
-    modal_accelerations<by_multipliers>(body, q + node.p_q(), z, s, a + node.p_v());
+    modes_of_pin<by_multipliers>(body, q + node.p_q(), z, s, a + node.p_v());
 }
 
 } // namespace ffrobot::recursion
