@@ -83,7 +83,7 @@ template <class Space, class T> struct Workspace {
   Aligned<T> force;               // (ports, d, columns) on ports, with opposite sign: bias of what hangs there
   Aligned<T> bias;                // (ports, d, columns) beta of ports, by columns; of bodies with several
   Aligned<T> answer;              // (slots, columns)
-  Aligned<T> angle, sine, cosine; // (nodes) in the plane
+  Aligned<T> angle, sine, cosine; // (nodes) of frames in the plane; of revolute joints in space
   Aligned<T> z;                   // of the widest body
   Aligned<T> schur;               // (all rows)^2 C M^-1 C^T of active ones
   bool keeps_schur = false;       // asked for
