@@ -283,9 +283,9 @@ FFROBOT_INLINE void in_port_axes(const planar::Body &, int, const planar::State<
 template <class T>
 FFROBOT_INLINE void in_port_axes(const spatial::Body &body, int port, const spatial::State<T> &s, const T *force,
                                  const T *moment, T *to) {
-  T axes[3][3];
-  product(s.absolute, body.ports[port].R, axes);
-  turn_back(axes, force, to), turn_back(axes, moment, to + 3);
+  T local[3];
+  turn_back(s.absolute, force, local), turn_back(body.ports[port].R, local, to);
+  turn_back(s.absolute, moment, local), turn_back(body.ports[port].R, local, to + 3);
 }
 
 // What acts on ports before anything that hangs there: rows in their columns, wrenches in column 0. Of rows, S gets
@@ -294,13 +294,12 @@ template <class Space, class T, int W>
 FFROBOT_INLINE void attach_all(const Mechanism<Space> &m, const Forces<T> &forces, Workspace<Space, T> &w,
                                Schur<T, W> &S) {
   constexpr int d = Space::dim, stride = stride_of(W);
-  using Cols = Pack<T, W>;
   RowMotion<T> motion;
   T x[d];
   for (const auto &actions : m.actions) {
-    Cols P[d];
+    T *P = w.force.data() + actions.global_port * d * stride; // number by number: columns are known at run time
     for (int i = 0; i < d; ++i)
-      P[i] = Cols::zero();
+      Pack<T, W>::zero().write(P + i * stride);
     const auto &body = m.nodes[actions.node].body;
     const auto &state = w.bodies[actions.node];
     for (const Action &action : actions.list) {
@@ -310,7 +309,7 @@ FFROBOT_INLINE void attach_all(const Mechanism<Space> &m, const Forces<T> &force
       if (action.is_point) {
         force_in_port_axes(body, actions.port, state, action.force, x);
         for (int i = 0; i < Space::linear; ++i)
-          P[i].add(column, x[i]);
+          P[i * stride + column] += x[i];
         continue;
       }
       if (action.row >= 0) {
@@ -324,10 +323,8 @@ FFROBOT_INLINE void attach_all(const Mechanism<Space> &m, const Forces<T> &force
         in_port_axes(body, actions.port, state, force, moment, x);
       }
       for (int i = 0; i < d; ++i)
-        P[i].add(column, action.sign * x[i]);
+        P[i * stride + column] += action.sign * x[i];
     }
-    for (int i = 0; i < d; ++i)
-      P[i].write(w.force.data() + (actions.global_port * d + i) * stride);
   }
   if (W == 1)
     return;
