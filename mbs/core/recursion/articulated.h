@@ -22,11 +22,13 @@ inline void hand_over(const Mechanism<Space> &m, const Node<Space> &node, Worksp
                       const Pack<T, Space::dim> *M, Pack<T, W> *H, Pack<T, W> &gamma) {
   constexpr int d = Space::dim, stride = stride_of(W);
   using Cols = Pack<T, W>;
-  const Hinge<Space, T> &hinge = w.hinges[&node - m.nodes.data()];
-  if (W > 1)
-    for (int i = 0; i < d; ++i)
+  const Hinge<Space, T> &hinge = w.hinges[node.index];
+  auto by_velocity = Pack<T, d>::zero(); // M c, M symmetric
+  for (int i = node.shape.is_centred ? Space::linear : 0; i < d; ++i) {
+    by_velocity += hinge.c[i] * M[i];
+    if (W > 1)
       gamma += hinge.c[i] * H[i];
-  const auto by_velocity = symmetric_product<d, T>(M, hinge.c);
+  }
   for (int i = 0; i < d; ++i)
     H[i].add(0, by_velocity[i]);
   if constexpr (d == 6)
@@ -57,9 +59,9 @@ inline void inward(const Mechanism<Space> &m, const Node<Space> &node, const T *
   constexpr int d = Space::dim;
   using Cols = Pack<T, W>;
   // M becomes Lambda, where that is in axes of the section
-  Pack<T, d> own[d], *M = node.shape.free_are_axes ? w.hinges[&node - m.nodes.data()].Lambda : own;
+  Pack<T, d> own[d], *M = node.shape.free_are_axes ? w.hinges[node.index].Lambda : own;
   T b[d];
-  auto &state = w.bodies[&node - m.nodes.data()];
+  auto &state = w.bodies[node.index];
   evaluate_inertia(node, q + node.p_q(), v + node.p_v(), state, M, b);
   Cols H[d];
   for (int i = 0; i < d; ++i)
@@ -67,7 +69,7 @@ inline void inward(const Mechanism<Space> &m, const Node<Space> &node, const T *
   if (node.ports())
     eliminate_ports<Space, T, W>(m, node, w, M, H, S, gamma);
   if (node.inboard >= 0)
-    move_to_section<Space, T, W>(m, node, w, M, H, S);
+    move_to_section<Space, T, W>(node, w, M, H, S);
   eliminate_joint<Space, T, W>(m, node, q + node.q, forces.generalized ? forces.generalized + node.v : nullptr, w, M, H,
                                S);
   hand_over<Space, T, W>(m, node, w, M, H, gamma);

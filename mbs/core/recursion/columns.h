@@ -39,14 +39,15 @@ template <class T, int W> FFROBOT_INLINE void lose(Schur<T, W> &S, const Pack<T,
 
 // Of `count` pairs, one row of S after the other: that stays in a register
 template <int count, class T, int W>
-FFROBOT_INLINE void gain_all(Schur<T, W> &S, const Pack<T, W> (&a)[count], const Pack<T, W> (&b)[count]) {
+FFROBOT_INLINE void lose_all(Schur<T, W> &S, const Pack<T, W> (&a)[count], const Pack<T, W> *b) {
   for (int i = 0; i < count; ++i)
-    S.keep(a[i], b[i]);
+    S.keep(T(-1.) * a[i], b[i]);
 #pragma GCC unroll 8
   for (int r = 1; r < W; ++r) {
     Pack<T, W> row = S[r];
+#pragma GCC unroll 6
     for (int i = 0; i < count; ++i)
-      row += a[i][r] * b[i];
+      row -= a[i][r] * b[i];
     S[r] = row;
   }
 }

@@ -67,51 +67,53 @@ FFROBOT_INLINE T multiplier_force(const Mechanism<Space> &m, const Node<Space> &
   return (multiplier_forces<T, W>(m, node, freedom, w) * y).sum();
 }
 
-// One freedom along component f: row and column of M leave, with what the rotor on the inner section adds.
-template <class Space, class T, int W>
+// One freedom along component f, `known` while compiling, or -1: row and column of M leave, with what the rotor on the
+// inner section adds.
+template <int known, class Space, class T, int W>
 FFROBOT_INLINE void eliminate_freedom(const Node<Space> &node, int freedom, const T *force, Hinge<Space, T> &hinge,
                                       const Mechanism<Space> &m, Workspace<Space, T> &w, Pack<T, Space::dim> *M,
                                       Pack<T, W> *H, Schur<T, W> &S) {
   constexpr int d = Space::dim, stride = stride_of(W);
   using Cols = Pack<T, W>;
-  const int f = node.shape.freedoms.component[freedom];
+  const int f = known >= 0 ? known : node.shape.freedoms.component[freedom];
   Cols applied = multiplier_forces<T, W>(m, node, freedom, w); // along the freedom
   if (force)
     applied.set(0, force[freedom]);
-  const Cols su = H[f] - applied;
-  Pack<T, d> &U = hinge.U[freedom];
-  U = M[f];
+  const Cols before = H[f], su = before - applied;
+  Pack<T, d> U = M[f];
   const double J = node.rotor_inertia, N = node.gear_ratio, c = node.rotor_turns;
-  const T M_ff = M[f][f], D = J > 0 ? M_ff + N * N * J : M_ff;
-  hinge.D_inverse[freedom] = T(1.) / D;
-  const Cols sd = hinge.D_inverse[freedom] * su;
+  const T M_ff = U[f], D_inverse = T(1.) / (J > 0 ? M_ff + N * N * J : M_ff);
+  const Cols sd = D_inverse * su;
   sd.write(w.answer.data() + node.joint_slot(freedom) * stride);
   if (W > 1)
     gain(S, sd, su);
-  for (int j = 0; j < d; ++j) {
-    const T U_j = U[j];
-    if (j != f) {
-      M[j] -= (U_j * hinge.D_inverse[freedom]) * U;
-      M[j].set(f, J > 0 ? T(U_j * (N * (N - c) * J) * hinge.D_inverse[freedom]) : T(0.));
+  const Pack<T, d> U_by_D = D_inverse * U;
+#pragma GCC unroll 6
+  for (int j = 0; j < d; ++j)
+    if (known != j) { // row f is written below
+      const T U_j = U[j];
+      M[j] -= U_j * U_by_D;
+      M[j].set(f, T(0.));
       H[j] -= U_j * sd;
     }
-  }
+  M[f] = Pack<T, d>::zero();
+  H[f] = applied;
   if (J > 0) {
-    M[f] = (N * (N - c) * J * hinge.D_inverse[freedom]) * U;
-    M[f].set(f, M_ff * ((N - c) * (N - c) * J) * hinge.D_inverse[freedom]);
+    M[f] = (N * (N - c) * J) * U_by_D;
+    for (int j = 0; j < d; ++j)
+      M[j].set(f, M[f][j]);
+    M[f].set(f, M_ff * ((N - c) * (N - c) * J) * D_inverse);
     U.set(f, M_ff + c * N * J);
-    H[f] -= U[f] * sd;
-  } else {
-    M[f] = Pack<T, d>::zero();
-    H[f] = applied;
+    H[f] = before - U[f] * sd;
   }
+  hinge.U[freedom] = U, hinge.D_inverse[freedom] = D_inverse;
 }
 
 template <class Space, class T, int W>
 inline void eliminate_joint(const Mechanism<Space> &m, const Node<Space> &node, const T *q, const T *force,
                             Workspace<Space, T> &w, Pack<T, Space::dim> *M, Pack<T, W> *H, Schur<T, W> &S) {
   constexpr int d = Space::dim;
-  Hinge<Space, T> &hinge = w.hinges[&node - m.nodes.data()];
+  Hinge<Space, T> &hinge = w.hinges[node.index];
   T applied[6], outer[6];
   if (force) {
     for (int i = 0; i < 6; ++i)
@@ -140,7 +142,10 @@ inline void eliminate_joint(const Mechanism<Space> &m, const Node<Space> &node, 
     }
   }
   for (int k = node.shape.freedoms.count - 1; k >= 0; --k)
-    eliminate_freedom<Space, T, W>(node, k, force ? applied : nullptr, hinge, m, w, M, H, S);
+    if (std::is_same_v<T, double> && node.shape.freedoms.component[k] == Space::axis)
+      eliminate_freedom<Space::axis, Space, T, W>(node, k, force ? applied : nullptr, hinge, m, w, M, H, S);
+    else
+      eliminate_freedom<-1, Space, T, W>(node, k, force ? applied : nullptr, hinge, m, w, M, H, S);
   if (M != hinge.Lambda)
     for (int i = 0; i < d; ++i)
       hinge.Lambda[i] = M[i]; // in axes of the cross, or without the last row: `factors` knows

@@ -168,7 +168,8 @@ Mechanism<Space>::Mechanism(std::vector<BodyModel<Data>> bodies, std::vector<Mar
     check(bodies[i], i, ground.size(), bodies, Space::dim);
     if (bodies[i].parent < 0 && turns(ground[static_cast<std::size_t>(bodies[i].parent_marker)]))
       refuse("body " + bodies[i].name + ": parent_marker: expected one that stands still, got one that turns");
-    nodes[i].parent = bodies[i].parent, nodes[i].parent_port = bodies[i].parent_marker;
+    nodes[i].index = static_cast<int>(i), nodes[i].parent = bodies[i].parent,
+    nodes[i].parent_port = bodies[i].parent_marker;
     if (bodies[i].parent >= 0) {
       carries[static_cast<std::size_t>(bodies[i].parent)] = 1;
       auto &ports_there = used[static_cast<std::size_t>(bodies[i].parent)];

@@ -18,6 +18,7 @@ template <class Space> struct Node {
   double lead = 0, rotor_inertia = 0, gear_ratio = 1;
   double rotor_turns = 1; // of a rotor per turn of the inner section: 0 in prismatic joints
 
+  int index = 0;       // among the nodes
   int parent = -1;     // node, or -1
   int parent_port = 0; // of all ports; on the ground: of ground markers
   int first_port = 0;  // of all ports; outboard ones first

@@ -4,8 +4,8 @@ namespace ffrobot::recursion {
 
 // Full where its columns, three instructions for eight entries, cost less than its entries one by one, five for each
 // and five for a row.
-ModeMatrix::ModeMatrix(const Eigen::MatrixXd &M) {
-  const int n = static_cast<int>(M.rows()), filled = static_cast<int>((M.array() != 0).count());
+ModeMatrix::ModeMatrix(const Eigen::MatrixXd &M) : n(static_cast<int>(M.rows())) {
+  const int filled = static_cast<int>((M.array() != 0).count());
   if (filled == 0)
     return;
   if (M.isDiagonal(0)) {

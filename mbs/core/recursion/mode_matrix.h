@@ -9,6 +9,8 @@
 #include <Eigen/Core>
 
 #include <algorithm>
+#include <cstddef>
+#include <type_traits>
 #include <vector>
 
 namespace ffrobot::recursion {
@@ -51,12 +53,27 @@ template <int n, class T> FFROBOT_INLINE void write_modes(const Pack<T, n> &x, i
     to[0] = x[0];
 }
 
+// `act` with the number of modes as it is, or with that of the one or two registers that they take: loops over modes
+// need no counting then
+template <class T, class F> FFROBOT_INLINE void with_modes(int n, const F &act) {
+  if constexpr (std::is_same_v<T, double>) {
+    if (n <= modes_at_once)
+      return act(std::integral_constant<int, modes_at_once>());
+    if (n <= 2 * modes_at_once)
+      return act(std::integral_constant<int, 2 * modes_at_once>());
+  }
+  act(std::integral_constant<int, 0>());
+}
+
 // n of them from where nothing is padded
 template <class T> FFROBOT_INLINE void read_modes(const T *from, int n, T *to) {
-  if constexpr (std::is_same_v<T, double>)
-    for (int k = 0; k < n; k += modes_at_once)
-      load_part(from + k, std::min(n - k, modes_at_once)).store(to + k);
-  else
+  if constexpr (std::is_same_v<T, double>) {
+    int k = 0;
+    for (; k + modes_at_once <= n; k += modes_at_once)
+      Eight::load(from + k).store(to + k);
+    if (k < n)
+      load_part(from + k, n - k).store(to + k);
+  } else
     std::copy_n(from, n, to);
 }
 
@@ -66,21 +83,23 @@ struct ModeMatrix {
   explicit ModeMatrix(const Eigen::MatrixXd &M);
 
   Kind kind = Kind::zero;
+  int n = 0;
   Aligned<double> values; // full: columns, padded; diagonal: padded; sparse: row after row
   std::vector<int> first; // sparse: of row i, first[i] … first[i + 1] - 1
   std::vector<int> column;
 };
 
-// Rows `first` … of y_c = M x_c, M full by columns `stride` apart, `even(n)` of them, for `count` vectors at once
+// `blocks` registers of rows of y_c = M x_c, M full by columns `stride` apart, `even(n)` of them, for `count` vectors
+// at once; `first`: of these rows
 template <int blocks, int count, class T>
-FFROBOT_INLINE void full_rows(const double *column, int stride, int n, const T *const (&x)[count], T *const (&y)[count],
-                              int first) {
+FFROBOT_INLINE void full_rows(const double *column, std::ptrdiff_t stride, int n, const T *const (&x)[count],
+                              T *const (&y)[count], std::ptrdiff_t first) {
   Modes<T> sum[count][blocks];
   for (auto &of : sum)
     for (auto &block : of)
       block = Modes<T>::zero();
   column += first;
-  for (int k = 0; k < n; k += 2, column += 2 * stride)
+  for (std::ptrdiff_t k = 0; k < n; k += 2, column += 2 * stride)
     for (int c = 0; c < count; ++c)
       for (int i = 0; i < blocks; ++i) {
         add_scaled(x[c][k], column + i * step<T>, sum[c][i]);
@@ -93,26 +112,26 @@ FFROBOT_INLINE void full_rows(const double *column, int stride, int n, const T *
 template <int count, class T>
 FFROBOT_INLINE void full_product(const double *columns, int stride, int rows, int n, const T *const (&x)[count],
                                  T *const (&y)[count]) {
-  int first = 0;
+  std::ptrdiff_t first = 0;
   for (; first + step<T> < rows; first += 2 * step<T>)
     full_rows<2, count, T>(columns, stride, n, x, y, first);
   if (first < rows)
     full_rows<1, count, T>(columns, stride, n, x, y, first);
 }
 
-// y_c = M x_c, all padded
+// y_c = M x_c, all padded; n: modes, padded or not
 template <int count, class T>
 FFROBOT_INLINE void multiply(const ModeMatrix &M, int n, const T *const (&x)[count], T *const (&y)[count]) {
   switch (M.kind) {
   case ModeMatrix::Kind::full:
-    return full_product<count, T>(M.values.data(), padded(n), n, n, x, y);
+    return full_product<count, T>(M.values.data(), padded(n), n, M.n, x, y);
   case ModeMatrix::Kind::diagonal:
     for (int i = 0; i < n; i += step<T>)
       for (int c = 0; c < count; ++c)
         (constants<T>(M.values.data() + i) * Modes<T>::read(x[c] + i)).write(y[c] + i);
     return;
   case ModeMatrix::Kind::sparse:
-    for (int i = 0; i < n; ++i)
+    for (int i = 0; i < M.n; ++i)
       for (int c = 0; c < count; ++c) {
         T sum(0.);
         for (int k = M.first[i]; k < M.first[i + 1]; ++k)

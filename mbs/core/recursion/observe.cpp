@@ -61,7 +61,7 @@ Inertia inertia_of(const spatial::Body &b, const double *, const double *v, spat
   to.s = vector(s.s);
   for (int i = 0; i < 3; ++i)
     for (int j = 0; j < 3; ++j)
-      to.J(i, j) = frame.J[i][3 + j];
+      to.J(i, j) = frame.J[symmetric_index(i, j)];
   if (b.n) {
     to.S_p_dot = vector(s.u_dot.data()), to.h_p_dot = vector(s.h_rate);
     if (b.stiffening)

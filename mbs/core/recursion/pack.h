@@ -114,6 +114,16 @@ template <class T> FFROBOT_INLINE Pack<T, 6> read_six(const T *from) {
   return x;
 }
 
+// Six numbers that are not side by side in memory
+template <class T>
+FFROBOT_INLINE Pack<T, 6> six(const T &a, const T &b, const T &c, const T &d, const T &e, const T &f) {
+  if constexpr (std::is_same_v<T, double>) {
+    const double x[8] = {a, b, c, d, e, f, 0., 0.};
+    return {Eight::of(x)};
+  } else
+    return {{a, b, c, d, e, f}};
+}
+
 // to_i = sum of x_i
 template <int count, class T, int n> FFROBOT_INLINE void sums(const Pack<T, n> (&x)[count], T *to) {
   if constexpr (std::is_same_v<T, double> && n > 1) {

@@ -63,9 +63,11 @@ inline void spread_to_later_ports(const Node<Space> &node, int k, bool loaded, c
 template <int d, class T, int W>
 FFROBOT_INLINE void gain_by_transpose(const Pack<T, d> *X, const Pack<T, W> *F, const Pack<T, d> *YX, Pack<T, W> *H,
                                       Pack<T, d> *M) {
+#pragma GCC unroll 6
   for (int r = 0; r < d; ++r) {
     Pack<T, W> h = H[r];
     Pack<T, d> m = M[r];
+#pragma GCC unroll 6
     for (int i = 0; i < d; ++i) {
       const T x = X[i][r];
       h += x * F[i], m += x * YX[i];
@@ -74,29 +76,80 @@ FFROBOT_INLINE void gain_by_transpose(const Pack<T, d> *X, const Pack<T, W> *F, 
   }
 }
 
+// X, beta and G of all ports; where there are several, beta as columns and what is between them
+template <class Space, class T, int W>
+FFROBOT_INLINE void prepare_ports(const Node<Space> &node, Workspace<Space, T> &w) {
+  constexpr int d = Space::dim, stride = stride_of(W);
+  const int n = node.ports();
+  auto &state = w.bodies[node.index];
+  for (int k = 0; k < n; ++k) {
+    PortWork<Space, T> &port = w.ports[node.first_port + k];
+    port_rows(node.body, k, state, port.X, port.beta, port.G);
+    if (n == 1)
+      return;
+    T *bias = w.bias.data() + (node.first_port + k) * d * stride;
+    for (int i = 0; i < d; ++i) {
+      auto B = Pack<T, W>::zero();
+      B.set(0, port.beta[i]);
+      B.write(bias + i * stride);
+    }
+    for (int l = k + 1; l < n; ++l)
+      if (node.body.ports[k].is_soft && node.body.ports[l].is_soft)
+        port_gram(node.body, state, k, l, w.cross.data() + (node.first_cross + cross_index(k, l, n)) * d);
+  }
+}
+
+// Forces F of a port, P where the body gives way alone: F = P + Y (B - G P), B its bias. With D = B - G P what rows
+// measure of it is -(D^T F + P^T B), where B has no column but that of the forces -(D^T F) and beta^T P of gamma.
+template <class Space, class T, int W>
+FFROBOT_INLINE void answer_of_port(PortWork<Space, T> &port, bool is_soft, bool loaded, const T *bias, Pack<T, W> *F,
+                                   Schur<T, W> &S, Pack<T, W> &gamma) {
+  constexpr int d = Space::dim, stride = stride_of(W);
+  using Cols = Pack<T, W>;
+  if (bias)
+    for (int i = 0; i < d; ++i)
+      lose(S, F[i], Cols::read(bias + i * stride));
+  else if (W > 1)
+    for (int i = 0; i < d; ++i)
+      gamma += port.beta[i] * F[i];
+  if (!is_soft && !bias) {
+    if (loaded) {
+      const auto Y_beta = symmetric_product<d, T>(port.Y, port.beta);
+      for (int i = 0; i < d; ++i)
+        F[i].add(0, Y_beta[i]);
+    }
+    return;
+  }
+  Cols D[d];
+#pragma GCC unroll 6
+  for (int i = 0; i < d; ++i) {
+    if (bias)
+      D[i] = Cols::read(bias + i * stride);
+    else
+      D[i] = Cols::zero(), D[i].set(0, port.beta[i]);
+    if (is_soft)
+#pragma GCC unroll 6
+      for (int j = 0; j < d; ++j)
+        D[i] -= port.G[i][j] * F[j];
+  }
+  if (loaded)
+#pragma GCC unroll 6
+    for (int i = 0; i < d; ++i)
+#pragma GCC unroll 6
+      for (int j = 0; j < d; ++j)
+        F[i] += port.Y[i][j] * D[j];
+  if (W > 1)
+    lose_all(S, D, F);
+}
+
 // Ports of the body, one after the other: M, H, S and gamma gain what hangs there.
 template <class Space, class T, int W>
 inline void eliminate_ports(const Mechanism<Space> &m, const Node<Space> &node, Workspace<Space, T> &w,
                             Pack<T, Space::dim> *M, Pack<T, W> *H, Schur<T, W> &S, Pack<T, W> &gamma) {
   constexpr int d = Space::dim, stride = stride_of(W);
   using Cols = Pack<T, W>;
-  auto &state = w.bodies[&node - m.nodes.data()];
   const bool several = node.ports() > 1;
-  for (int k = 0; k < node.ports(); ++k) {
-    PortWork<Space, T> &port = w.ports[node.first_port + k];
-    port_rows(node.body, k, state, port.X, port.beta, port.G);
-    if (several) {
-      T *bias = w.bias.data() + (node.first_port + k) * d * stride;
-      for (int i = 0; i < d; ++i) {
-        Cols B = Cols::zero();
-        B.set(0, port.beta[i]);
-        B.write(bias + i * stride);
-      }
-      for (int l = k + 1; l < node.ports(); ++l)
-        if (node.body.ports[k].is_soft && node.body.ports[l].is_soft)
-          port_gram(node.body, state, k, l, w.cross.data() + (node.first_cross + cross_index(k, l, node.ports())) * d);
-    }
-  }
+  prepare_ports<Space, T, W>(node, w);
   for (int k = 0; k < node.outboard; ++k) {
     const int index = node.first_port + k;
     PortWork<Space, T> &port = w.ports[index];
@@ -105,51 +158,20 @@ inline void eliminate_ports(const Mechanism<Space> &m, const Node<Space> &node, 
     const bool loaded = child >= 0;
     if (loaded)
       port_stiffness<Space, T>(m.nodes[child], w.hinges[child], is_soft, port.G, port.Y);
-    Cols P[d], E[d], F[d];
+    Cols F[d];
+    const T *P = w.force.data() + index * d * stride;
     for (int i = 0; i < d; ++i)
-      E[i] = P[i] = Cols::read(w.force.data() + (index * d + i) * stride);
-    Pack<T, d> YX[d];
-    if (loaded)
+      F[i] = Cols::read(P + i * stride);
+    answer_of_port<Space, T, W>(port, is_soft, loaded, several ? w.bias.data() + index * d * stride : nullptr, F, S,
+                                gamma);
+    T *answer = w.answer.data() + node.port_slot(k) * stride;
+    for (int i = 0; i < d; ++i)
+      F[i].write(answer + i * stride);
+    if (loaded) {
+      Pack<T, d> YX[d];
       apply<d, T>(port.Y, port.X, YX);
-    if (is_soft) {
-      Cols GP[d];
-      apply<d, T>(port.G, P, GP);
-      if (loaded)
-        for (int i = 0; i < d; ++i)
-          for (int j = 0; j < d; ++j)
-            E[i] -= port.Y[i][j] * GP[j];
-      if (W > 1) // P^T G E
-        gain_all(S, GP, E);
-    }
-    for (int i = 0; i < d; ++i)
-      F[i] = E[i];
-    if (several) {
-      const T *bias = w.bias.data() + index * d * stride;
-      Cols B[d];
-      for (int i = 0; i < d; ++i)
-        B[i] = Cols::read(bias + i * stride);
-      if (loaded)
-        for (int i = 0; i < d; ++i)
-          for (int j = 0; j < d; ++j)
-            F[i] += port.Y[i][j] * B[j];
-      if (W > 1)
-        for (int i = 0; i < d; ++i)
-          lose(S, B[i], F[i]), lose(S, E[i], B[i]);
-    } else {
-      if (W > 1)
-        for (int i = 0; i < d; ++i)
-          gamma += port.beta[i] * E[i];
-      if (loaded) {
-        const auto Y_beta = symmetric_product<d, T>(port.Y, port.beta);
-        for (int i = 0; i < d; ++i)
-          F[i].add(0, Y_beta[i]);
-      }
-    }
-    for (int i = 0; i < d; ++i)
-      F[i].write(w.answer.data() + (node.port_slot(k) + i) * stride);
-    if (loaded)
       gain_by_transpose<d, T, W>(port.X, F, YX, H, M);
-    else
+    } else
       for (int i = 0; i < d; ++i)
         for (int r = 0; r < d; ++r)
           H[r] += port.X[i][r] * F[i];
@@ -161,15 +183,14 @@ inline void eliminate_ports(const Mechanism<Space> &m, const Node<Space> &node, 
 // From the frame to the section that the joint holds, where modes move it: the inboard port is the last one, and force
 // and acceleration change their parts. f = N^-1 (A_section - B'), N = X M^-1 X^T + G, B' = B - X M^-1 H.
 template <class Space, class T, int W>
-inline void move_to_section(const Mechanism<Space> &m, const Node<Space> &node, Workspace<Space, T> &w,
-                            Pack<T, Space::dim> *M, Pack<T, W> *H, Schur<T, W> &S) {
+inline void move_to_section(const Node<Space> &node, Workspace<Space, T> &w, Pack<T, Space::dim> *M, Pack<T, W> *H,
+                            Schur<T, W> &S) {
   constexpr int d = Space::dim, stride = stride_of(W);
   using Row = Pack<T, d>;
   using Cols = Pack<T, W>;
-  const auto i_node = &node - m.nodes.data();
   const int index = node.first_port + node.inboard;
   PortWork<Space, T> &port = w.ports[index];
-  Row *R = w.soft.data() + w.first_soft[i_node]; // M^-1 X^T
+  Row *R = w.soft.data() + w.first_soft[node.index]; // M^-1 X^T
   invert<d, T>(M);
   for (int i = 0; i < d; ++i) {
     T row[d];
@@ -196,7 +217,7 @@ inline void move_to_section(const Mechanism<Space> &m, const Node<Space> &node, 
       B[r] -= port.X[r][i] * MH[i];
   }
   apply<d, T>(N, B, Pi);
-  const auto tilt = inboard_tilt(node, w.bodies[i_node]);
+  const auto tilt = inboard_tilt(node, w.bodies[node.index]);
   for (int i = 0; i < d; ++i) {
     Pi[i] = T(-1.) * Pi[i];
     if (W > 1)

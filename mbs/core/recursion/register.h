@@ -24,21 +24,22 @@ constexpr int native_lanes = 4;
 constexpr int native_lanes = 2;
 #endif
 
-// InMemory: where doubles lie. Compilers know then that writing one changes no pointer, which memcpy would leave open.
+// V: in a register; U: in memory, among other numbers. (A copy by memcpy could be of anything: after each one compilers
+// read all pointers again.)
 template <int n> struct Vectors;
 template <> struct Vectors<2> {
   using V = double __attribute__((vector_size(16)));
-  using InMemory = double __attribute__((vector_size(16), aligned(8)));
+  using U = double __attribute__((vector_size(16), aligned(8)));
   using I = std::int64_t __attribute__((vector_size(16)));
 };
 template <> struct Vectors<4> {
   using V = double __attribute__((vector_size(32)));
-  using InMemory = double __attribute__((vector_size(32), aligned(8)));
+  using U = double __attribute__((vector_size(32), aligned(8)));
   using I = std::int64_t __attribute__((vector_size(32)));
 };
 template <> struct Vectors<8> {
   using V = double __attribute__((vector_size(64)));
-  using InMemory = double __attribute__((vector_size(64), aligned(8)));
+  using U = double __attribute__((vector_size(64), aligned(8)));
   using I = std::int64_t __attribute__((vector_size(64)));
 };
 
@@ -48,14 +49,23 @@ template <int n>
   requires(n <= native_lanes)
 struct Register<n> {
   using V = typename Vectors<n>::V;
+  using U = typename Vectors<n>::U;
   using I = typename Vectors<n>::I;
-  using InMemory = typename Vectors<n>::InMemory;
   V v;
 
   FFROBOT_INLINE static Register zero() { return {V{}}; }
-  FFROBOT_INLINE static Register all(double x) { return {x - V{}}; } // + would keep an addition, for the sake of -0
-  FFROBOT_INLINE static Register load(const double *x) { return {*reinterpret_cast<const InMemory *>(x)}; }
-  FFROBOT_INLINE void store(double *x) const { *reinterpret_cast<InMemory *>(x) = v; }
+  FFROBOT_INLINE static V spread(double x) { return x - V{}; } // of either zero, too: no subtraction is left
+  FFROBOT_INLINE static Register all(double x) { return {spread(x)}; }
+  FFROBOT_INLINE static Register of(const double *x) {
+    if constexpr (n == 2)
+      return {V{x[0], x[1]}};
+    else if constexpr (n == 4)
+      return {V{x[0], x[1], x[2], x[3]}};
+    else
+      return {V{x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7]}};
+  }
+  FFROBOT_INLINE static Register load(const double *x) { return {*reinterpret_cast<const U *>(x)}; }
+  FFROBOT_INLINE void store(double *x) const { *reinterpret_cast<U *>(x) = v; }
   // Lane i alone: 1 in an integer mask
   FFROBOT_INLINE static I only(int i) {
     I lane;
@@ -64,8 +74,8 @@ struct Register<n> {
     return lane == I{} + i;
   }
   FFROBOT_INLINE double operator[](int i) const { return v[i]; }
-  FFROBOT_INLINE void set(int i, double x) { v = only(i) ? x - V{} : v; }
-  FFROBOT_INLINE void add(int i, double x) { v += only(i) ? x - V{} : V{}; }
+  FFROBOT_INLINE void set(int i, double x) { v = only(i) ? spread(x) : v; }
+  FFROBOT_INLINE void add(int i, double x) { v += only(i) ? spread(x) : V{}; }
   // Zeros behind the first `count`
   FFROBOT_INLINE void keep(int count) {
     I lane;
@@ -97,8 +107,15 @@ struct Register<n> {
   static constexpr int half = n / 2;
   Half low, high;
 
+  // Copied by registers, where compilers would take structures in pairs of numbers
+  Register() = default;
+  FFROBOT_INLINE Register(const Half &low_, const Half &high_) : low(low_), high(high_) {}
+  FFROBOT_INLINE Register(const Register &o) : low(o.low), high(o.high) {}
+  FFROBOT_INLINE Register &operator=(const Register &o) { return low = o.low, high = o.high, *this; }
+
   FFROBOT_INLINE static Register zero() { return {Half::zero(), Half::zero()}; }
   FFROBOT_INLINE static Register all(double x) { return {Half::all(x), Half::all(x)}; }
+  FFROBOT_INLINE static Register of(const double *x) { return {Half::of(x), Half::of(x + half)}; }
   FFROBOT_INLINE static Register load(const double *x) { return {Half::load(x), Half::load(x + half)}; }
   FFROBOT_INLINE void store(double *x) const { low.store(x), high.store(x + half); }
   FFROBOT_INLINE double operator[](int i) const { return i < half ? low[i] : high[i - half]; }

@@ -119,7 +119,7 @@ template <class Space, class T, int W>
 inline void release(const Mechanism<Space> &m, const Node<Space> &node, const T *q, bool by_multipliers,
                     Workspace<Space, T> &w, const Pack<T, W> &y, T *a) {
   constexpr int d = Space::dim;
-  const auto i_node = &node - m.nodes.data();
+  const int i_node = node.index;
   Hinge<Space, T> &hinge = w.hinges[i_node];
   auto &state = w.bodies[i_node];
   T *A = hinge.A;
@@ -140,8 +140,8 @@ inline void release(const Mechanism<Space> &m, const Node<Space> &node, const T 
   T frame[packed<T, d>] = {}, *A_frame = A;
   T *z = w.z.data();
   if (node.body.n)
-    for (int r = 0; r < node.body_width(); ++r)
-      z[r] = T(0.);
+    for (int r = 0; r < node.body_width(); r += lanes)
+      Pack<T, lanes>::zero().write(z + r);
   if (node.inboard >= 0) {
     PortWork<Space, T> &port = w.ports[node.first_port + node.inboard];
     const auto *R = w.soft.data() + w.first_soft[i_node];

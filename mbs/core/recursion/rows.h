@@ -281,9 +281,9 @@ FFROBOT_INLINE void in_port_axes(const planar::Body &, int, const planar::State<
 template <class T>
 FFROBOT_INLINE void in_port_axes(const spatial::Body &body, int port, const spatial::State<T> &s, const T *force,
                                  const T *moment, T *to) {
-  T axes[3][3];
-  product(s.absolute, body.ports[port].R, axes);
-  turn_back(axes, force, to), turn_back(axes, moment, to + 3);
+  T local[3];
+  turn_back(s.absolute, force, local), turn_back(body.ports[port].R, local, to);
+  turn_back(s.absolute, moment, local), turn_back(body.ports[port].R, local, to + 3);
 }
 
 // What acts on ports before anything that hangs there: rows in their columns, wrenches in column 0. Of rows that move,
@@ -297,37 +297,40 @@ FFROBOT_INLINE void attach_all(const Mechanism<Space> &m, const Forces<T> &force
   T x[d];
   const T *point_force = w.point_force.data();
   for (const auto &actions : m.actions) {
-    Cols P[d], point[Space::linear];
-    for (int i = 0; i < d; ++i)
-      P[i] = Cols::zero();
+    T *P = w.force.data() + actions.global_port * d * stride; // number by number: columns are known at run time
     const auto &body = m.nodes[actions.node].body;
     const auto &state = w.bodies[actions.node];
-    if (W > 1 && actions.has_points) {
+    const bool has_points = W > 1 && actions.has_points;
+    for (int i = has_points ? Space::linear : 0; i < d; ++i)
+      Cols::zero().write(P + i * stride);
+    if (has_points) {
+      Cols point[Space::linear], turned[Space::linear];
       for (int i = 0; i < Space::linear; ++i)
         point[i] = Cols::read(point_force + i * stride);
-      forces_in_port_axes(body, actions.port, state, point, P);
+      forces_in_port_axes(body, actions.port, state, point, turned);
+      for (int i = 0; i < Space::linear; ++i)
+        turned[i].write(P + i * stride);
     }
     point_force += Space::linear * stride;
-    if (actions.has_others)
-      for (const Action &action : actions.list) {
-        const int column = action.row >= 0 ? w.column[action.row] : 0;
-        if (action.is_point || (action.row >= 0 ? W == 1 || column == 0 : !forces.wrench))
-          continue;
-        if (action.row >= 0) {
-          row_motion(m, m.rows[action.row], w, m.rows[action.row].moves, motion);
-          in_port_axes(body, actions.port, state, motion.force, action.sign > 0 ? motion.moment_b : motion.moment_a, x);
-        } else {
-          const T *from = forces.wrench + action.wrench * d;
-          T force[3] = {from[0], from[1], d == 3 ? T(0.) : from[2]}, moment[3] = {T(0.), T(0.), from[d - 1]};
-          if constexpr (d == 6)
-            moment[0] = from[3], moment[1] = from[4];
-          in_port_axes(body, actions.port, state, force, moment, x);
-        }
-        for (int i = 0; i < d; ++i)
-          P[i].add(column, action.sign * x[i]);
+    if (!actions.has_others)
+      continue;
+    for (const Action &action : actions.list) {
+      const int column = action.row >= 0 ? w.column[action.row] : 0;
+      if (action.is_point || (action.row >= 0 ? W == 1 || column == 0 : !forces.wrench))
+        continue;
+      if (action.row >= 0) {
+        row_motion(m, m.rows[action.row], w, m.rows[action.row].moves, motion);
+        in_port_axes(body, actions.port, state, motion.force, action.sign > 0 ? motion.moment_b : motion.moment_a, x);
+      } else {
+        const T *from = forces.wrench + action.wrench * d;
+        T force[3] = {from[0], from[1], d == 3 ? T(0.) : from[2]}, moment[3] = {T(0.), T(0.), from[d - 1]};
+        if constexpr (d == 6)
+          moment[0] = from[3], moment[1] = from[4];
+        in_port_axes(body, actions.port, state, force, moment, x);
       }
-    for (int i = 0; i < d; ++i)
-      P[i].write(w.force.data() + (actions.global_port * d + i) * stride);
+      for (int i = 0; i < d; ++i)
+        P[i * stride + column] += action.sign * x[i];
+    }
   }
   if (W == 1 || !m.has_moving_rows)
     return;

@@ -14,10 +14,11 @@ FFROBOT_INLINE double angle_by_sine(double sine, double cosine) {
   return sine > 1e-9 ? std::atan2(sine, cosine) / sine : 1.;
 }
 
+// Results are written once all is read: compilers cannot know that they lie elsewhere.
+
 template <class A, class B, class C> FFROBOT_INLINE void cross(const A *a, const B *b, C *c) {
-  c[0] = a[1] * b[2] - a[2] * b[1];
-  c[1] = a[2] * b[0] - a[0] * b[2];
-  c[2] = a[0] * b[1] - a[1] * b[0];
+  const C x = a[1] * b[2] - a[2] * b[1], y = a[2] * b[0] - a[0] * b[2], z = a[0] * b[1] - a[1] * b[0];
+  c[0] = x, c[1] = y, c[2] = z;
 }
 
 template <class A, class B> FFROBOT_INLINE auto dot(const A *a, const B *b) {
@@ -26,17 +27,27 @@ template <class A, class B> FFROBOT_INLINE auto dot(const A *a, const B *b) {
 
 // y = R x and y = R^T x, R (3, 3)
 template <class M, class X> FFROBOT_INLINE void turn(const M &R, const X *x, X *y) {
+  X turned[3];
   for (int i = 0; i < 3; ++i)
-    y[i] = R[i][0] * x[0] + R[i][1] * x[1] + R[i][2] * x[2];
+    turned[i] = R[i][0] * x[0] + R[i][1] * x[1] + R[i][2] * x[2];
+  for (int i = 0; i < 3; ++i)
+    y[i] = turned[i];
 }
 template <class M, class X> FFROBOT_INLINE void turn_back(const M &R, const X *x, X *y) {
+  X turned[3];
   for (int i = 0; i < 3; ++i)
-    y[i] = R[0][i] * x[0] + R[1][i] * x[1] + R[2][i] * x[2];
+    turned[i] = R[0][i] * x[0] + R[1][i] * x[1] + R[2][i] * x[2];
+  for (int i = 0; i < 3; ++i)
+    y[i] = turned[i];
 }
-template <class A, class B, class C> FFROBOT_INLINE void product(const A &a, const B &b, C &c) {
+template <class A, class B, class C> FFROBOT_INLINE void product(const A &a, const B &b, C (&c)[3][3]) {
+  C found[3][3];
   for (int i = 0; i < 3; ++i)
     for (int j = 0; j < 3; ++j)
-      c[i][j] = a[i][0] * b[0][j] + a[i][1] * b[1][j] + a[i][2] * b[2][j];
+      found[i][j] = a[i][0] * b[0][j] + a[i][1] * b[1][j] + a[i][2] * b[2][j];
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j)
+      c[i][j] = found[i][j];
 }
 
 // Rotation vector x of R = exp(x~), which is no half turn
@@ -47,6 +58,15 @@ template <class M, class X> FFROBOT_INLINE void logarithm(const M &R, X *x) {
   const X factor = angle_by_sine(sqrt(dot(x, x)), 0.5 * (R[0][0] + R[1][1] + R[2][2] - 1.));
   for (int i = 0; i < 3; ++i)
     x[i] = factor * x[i];
+}
+
+// Symmetric (3, 3) matrices are kept as xx, yy, zz, xy, yz, zx.
+constexpr int symmetric_index(int i, int j) { return i == j ? i : 3 + ((i + 1) % 3 == j ? i : j); }
+template <class M, class X, class Y> FFROBOT_INLINE void symmetric_turn(const M &S, const X *x, Y *y) {
+  for (int i = 0; i < 3; ++i) {
+    const int j = (i + 1) % 3, k = (i + 2) % 3;
+    y[i] = S[i] * x[i] + S[symmetric_index(i, j)] * x[j] + S[symmetric_index(i, k)] * x[k];
+  }
 }
 
 // y = M x of rows; x has room for a Pack, with zeros behind its numbers

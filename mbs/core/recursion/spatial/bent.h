@@ -65,8 +65,8 @@ inline void add_affine(const Body &b, double sign, const X *F, const typename Be
     for (int c = 0; c < 3; ++c) {
       const int d = (c + 1) % 3, e = (c + 2) % 3; // c, d, e cyclic
       to.bias[3 + c] += g[d] * y[e][f] - g[e] * y[d][f];
-      to.J[c].add(3 + c, g[d] * affine.g[d][f] + g[e] * affine.g[e][f]);
-      to.J[c].add(3 + d, -(g[c] * affine.g[d][f])), to.J[c].add(3 + e, -(g[c] * affine.g[e][f]));
+      to.J[c] += g[d] * affine.g[d][f] + g[e] * affine.g[e][f];
+      to.J[symmetric_index(c, d)] -= g[c] * affine.g[d][f];
       const X *row = F + (c * fields + f) * stride;
       const T force = sign * y[c][f];
       for (int k = 0; k < b.n; ++k) {
@@ -158,8 +158,7 @@ template <class T> inline void take_factor(const Body &b, State<T> &s) {
 
 // M_rr - m m_ff^-1 m^T and -(Q_r - m m_ff^-1 Q_f), after `stretch` and `twist`, whose terms are in to.J, Q_f, h_change,
 // h_rate and Fw (twice the rate of J by modes, times w)
-template <class T>
-FFROBOT_APART void bent_inertia(const Body &b, State<T> &s, const Pack<T, 6> &Fw, FrameTerms<T> &to) {
+template <class T> FFROBOT_APART void bent_inertia(const Body &b, State<T> &s, const T *Fw, FrameTerms<T> &to) {
   Bent<T> &bent = s.bent;
   const T *w = s.omega;
   const int stride = padded(b.n), fields = b.stiffening->fields;
@@ -171,13 +170,13 @@ FFROBOT_APART void bent_inertia(const Body &b, State<T> &s, const Pack<T, 6> &Fw
       for (int k = 0; k < b.n; ++k)
         h[c * stride + k] += of.axis[3 + c] * h_c[k];
   }
+  T spin[3];
+  symmetric_turn(to.J, w, spin);
   for (int i = 0; i < 3; ++i)
-    to.J[i] += constant_row<6, T>(b.J0[i]);
-  const auto all = w[0] * to.J[0] + w[1] * to.J[1] + w[2] * to.J[2];
-  const T spin[3] = {all[3] + s.h_rate[0], all[4] + s.h_rate[1], all[5] + s.h_rate[2]};
+    spin[i] += s.h_rate[i];
   cross(w, spin, to.bias + 3);
   for (int i = 0; i < 3; ++i)
-    to.bias[3 + i] += Fw[3 + i];
+    to.bias[3 + i] += Fw[i];
 
   T y[3][most_fields];
   field_accelerations<T>(w, bent.linear, nullptr, fields, y);
@@ -196,22 +195,14 @@ FFROBOT_APART void bent_inertia(const Body &b, State<T> &s, const Pack<T, 6> &Fw
     auto row = Pack<T, 6>::zero();
     row.set(i, T(b.mass)), row.set(3 + j, s.s[k]), row.set(3 + k, -s.s[j]); // m, -s~
     to.M[i] = row - Pack<T, 6>::read(bent.gram.data() + i * b.width);
-    row = to.J[i];
-    row.add(j, -s.s[k]), row.add(k, s.s[j]);
+    row = Pack<T, 6>::zero();
+    row.set(j, -s.s[k]), row.set(k, s.s[j]);
+    for (int l = 0; l < 3; ++l)
+      row.set(3 + l, to.J[symmetric_index(i, l)]);
     to.M[3 + i] = row - Pack<T, 6>::read(bent.gram.data() + (3 + i) * b.width);
   }
   for (int i = 0; i < 6; ++i)
     to.bias[i] += s.Q[i];
-}
-
-// X = X_rigid - P m_ff^-1 m^T of a port but for the turn of its section, and Phi_r m_ff^-1 m^T
-template <class T>
-FFROBOT_INLINE void bent_port(const Body &b, const State<T> &s, int row, Pack<T, 6> *X, Pack<T, 6> (&P)[3]) {
-  const T *gram = s.bent.gram.data() + row * b.width;
-  for (int r = 0; r < 6; ++r)
-    X[r] -= Pack<T, 6>::read(gram + r * b.width);
-  for (int r = 0; r < 3; ++r)
-    P[r] = Pack<T, 6>::read(gram + (3 + r) * b.width);
 }
 
 // As `modal_accelerations`: L^-T of those of L^T p

@@ -46,6 +46,20 @@ MatrixXd symmetric_I_bar(const SpatialData &data) {
   return g;
 }
 
+// f with A = diag(f) G, f 2 or -2 or, where both are zero, 0; padded, empty where there is none
+Aligned<double> row_factors(const MatrixXd &A, const MatrixXd &G) {
+  Aligned<double> f(static_cast<std::size_t>(padded(static_cast<int>(A.rows()))), 0.0);
+  for (Index i = 0; i < A.rows(); ++i) {
+    if (A.row(i).isZero(0) && G.row(i).isZero(0))
+      continue;
+    const double factor = A.row(i).dot(G.row(i)) > 0 ? 2 : -2;
+    if ((A.row(i) - factor * G.row(i)).cwiseAbs().maxCoeff() > negligible)
+      return {};
+    f[static_cast<std::size_t>(i)] = factor;
+  }
+  return f;
+}
+
 int rows_that_are_not_zero(const MatrixXd &M) {
   int count = 0;
   for (Index r = 0; r < M.rows(); ++r)
@@ -210,8 +224,8 @@ void Body::fill_residuals(const SpatialData &data, const std::vector<int> &used)
     for (int c = 0; c < 6; ++c)
       residual[r][c] = static_cast<double>(M(r, c) - gram_(r, c));
   for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j)
-      J0[i][3 + j] = inertia(i, j);
+    for (int j = 0; j <= i; ++j)
+      J0[symmetric_index(i, j)] = inertia(i, j);
   for (std::size_t i = 0; i < ports.size(); ++i) {
     const SpatialMarker &marker = data.markers[static_cast<std::size_t>(used[i])];
     const Matrix3d R = marker.triad.transpose();
@@ -256,13 +270,16 @@ void Body::fill_tensors(const SpatialData &data, const Matrix3d &axes, const Mat
     return block;
   };
   const auto cleaned = [](const MatrixXd &M) { return MatrixXd((M.array().abs() > negligible).select(M, 0.0)); };
+  MatrixXd G[3][3];
+  int stretch_of[3][3] = {{-1, -1, -1}, {-1, -1, -1}, {-1, -1, -1}};
   Index ab = 0;
   for (int a = 0; a < 3; ++a)
     for (int b = a; b < 3; ++b, ++ab) {
       const Eigen::VectorXd g_ab = g.row(ab);
       Stretch of;
       const bool has_g = !g_ab.isZero(0);
-      of.G = ModeMatrix(cleaned(0.5 * (without_spin(3 * a + b) + without_spin(3 * b + a))));
+      G[a][b] = cleaned(0.5 * (without_spin(3 * a + b) + without_spin(3 * b + a)));
+      of.G = ModeMatrix(G[a][b]);
       if (!has_g && of.G.kind == ModeMatrix::Kind::zero)
         continue;
       of.g.assign(static_cast<std::size_t>(padded(n)), 0.0);
@@ -277,16 +294,22 @@ void Body::fill_tensors(const SpatialData &data, const Matrix3d &axes, const Mat
       const auto s = stretches.size();
       for (int i = 0; i < 3; ++i) {
         tension[i][s] = J(i, i), tension[3 + i][s] = 2 * J(i, (i + 1) % 3);
-        for (int j = 0; j < 3; ++j)
-          of.inertia[i][3 + j] = J(i, j);
+        for (int j = 0; j <= i; ++j)
+          of.inertia[symmetric_index(i, j)] = J(i, j);
       }
+      stretch_of[a][b] = static_cast<int>(s);
       stretches.push_back(std::move(of));
     }
   for (int c = 0; c < 3; ++c) {
     Twist of;
-    of.A = ModeMatrix(cleaned(without_spin(before[c]) - without_spin(after[c])));
+    const MatrixXd A = cleaned(without_spin(before[c]) - without_spin(after[c]));
+    of.A = ModeMatrix(A);
     if (of.A.kind == ModeMatrix::Kind::zero)
       continue;
+    const int a = std::min((c + 1) % 3, (c + 2) % 3), b = std::max((c + 1) % 3, (c + 2) % 3), like = stretch_of[a][b];
+    if (like >= 0 && of.A.kind == ModeMatrix::Kind::full)
+      if (of.by_stretch = row_factors(A, G[a][b]); !of.by_stretch.empty())
+        stretches[static_cast<std::size_t>(like)].twist = static_cast<int>(twists.size());
     for (int i = 0; i < 3; ++i)
       of.axis[3 + i] = axes(i, c);
     twists.push_back(std::move(of));

@@ -35,16 +35,19 @@ struct Port {
 
 // T_s and b_s
 struct Stretch {
-  double inertia[3][lanes] = {}; // (tr T) I - T, in the place of alpha
-  int g_row = -1;                // of W, -1: g is zero
+  double inertia[lanes] = {}; // (tr T) I - T, as symmetric matrices are kept (small.h)
+  int g_row = -1;             // of W, -1: g is zero
+  int twist = -1;             // whose A is made of G
   Aligned<double> g;
   ModeMatrix G;
 };
 
-// z_c and A_c
+// z_c and A_c. Where each mode moves along one axis alone, as those of straight beams do, A is G of these two axes, 2
+// or -2 times, mode by mode.
 struct Twist {
   double axis[lanes] = {}; // in the place of alpha
   ModeMatrix A;
+  Aligned<double> by_stretch; // A = diag(these) G; empty: A is known by itself
 };
 
 struct Body {
@@ -54,7 +57,7 @@ struct Body {
 
   int n = 0, width = 8;
   double mass = 0, s0[3] = {};
-  double J0[3][lanes] = {};       // inertia with that of spin, in the place of alpha
+  double J0[lanes] = {};          // inertia with that of spin, as symmetric matrices are kept
   double residual[6][lanes] = {}; // M_rr - m m^T of the undeformed body
   Aligned<double> W;              // (even n, width) transposed, with all g_s
   Aligned<double> rows;           // (width, padded n)

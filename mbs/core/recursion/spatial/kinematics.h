@@ -1,7 +1,7 @@
 // Outward, in space: orientations, angular velocities, what velocities do at joints.
 #pragma once
 
-#include "core/recursion/workspace.h"
+#include "core/recursion/planar/kinematics.h"
 
 namespace ffrobot::recursion {
 
@@ -41,10 +41,8 @@ FFROBOT_INLINE void inner_section(const Mechanism<Spatial> &m, const Node<Spatia
 
 // R = tilt R_z, A = (R^T omega) x e_z q_dot
 template <class T>
-FFROBOT_INLINE void turn_revolute(const InnerSection<T> &inner, const T &q, const T &v, Hinge<Spatial, T> &hinge,
-                                  T *omega) {
-  T s, c;
-  sine_and_cosine(q, s, c);
+FFROBOT_INLINE void turn_revolute(const InnerSection<T> &inner, const T &s, const T &c, const T &v,
+                                  Hinge<Spatial, T> &hinge, T *omega) {
   auto &R = hinge.turn.R;
   if (inner.tilt)
     for (int i = 0; i < 3; ++i) {
@@ -116,6 +114,9 @@ template <class T> FFROBOT_INLINE void force_columns(const Node<Spatial> &node, 
 template <class T>
 FFROBOT_APART void kinematics(const Mechanism<Spatial> &m, const T *q, const T *v, const Forces<T> &forces,
                               Workspace<Spatial, T> &w) {
+  for (std::size_t i = 0; i < m.nodes.size(); ++i)
+    w.angle[i] = m.nodes[i].joint == JointKind::revolute ? q[m.nodes[i].q] : T(0.);
+  sines_and_cosines(w.angle.data(), w.sine.data(), w.cosine.data(), m.nodes.size());
   for (std::size_t i = 0; i < m.nodes.size(); ++i) {
     const Node<Spatial> &node = m.nodes[i];
     spatial::State<T> &s = w.bodies[i];
@@ -125,7 +126,7 @@ FFROBOT_APART void kinematics(const Mechanism<Spatial> &m, const T *q, const T *
     spatial::InnerSection<T> inner;
     spatial::inner_section(m, node, w, inner);
     if (node.joint == JointKind::revolute)
-      spatial::turn_revolute(inner, q[node.q], v[node.v], hinge, s.omega);
+      spatial::turn_revolute(inner, w.sine[i], w.cosine[i], v[node.v], hinge, s.omega);
     else
       spatial::turn_any(node, inner, q + node.q, v + node.v, hinge, s.omega);
     if (node.rotor_inertia > 0)

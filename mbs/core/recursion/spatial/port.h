@@ -42,44 +42,48 @@ template <class T> FFROBOT_INLINE void port_bias(const Body &b, int i, const Sta
 
 // X = X_rigid - P m^T at p: P = H Phi, H = diag(1, J_l)
 template <class T> FFROBOT_INLINE void port_by_frame(const Body &b, int i, const State<T> &s, Pack<T, 6> *X) {
+  using Row = Pack<T, 6>;
   const Port &port = b.ports[i];
-  for (int r = 0; r < 6; ++r)
-    X[r] = constant_row<6, T>(port.T[r]);
-  if (!port.is_soft)
+  if (!port.is_soft) {
+    for (int r = 0; r < 6; ++r)
+      X[r] = constant_row<6, T>(port.T[r]);
     return;
+  }
+  const std::size_t twists = b.twists.size();
+  const Row z = twists ? constant_row<6, T>(b.twists[0].axis) : Row::zero(); // most bodies have one twist or none
+  const T *Wh = s.Wh[0].data() + port.row;
+  const auto change = [&](int r) { // what row r of Phi m^T has beside its constant part
+    if (b.stiffening)
+      return Row::read(s.bent.gram.data() + (port.row + r) * b.width);
+    Row x = Wh[r] * z;
+    for (std::size_t c = 1; c < twists; ++c)
+      add_scaled(s.Wh[c][port.row + r], b.twists[c].axis, x);
+    return x;
+  };
   const T *du = s.u.data() + port.row;
   for (int i1 = 0; i1 < 3; ++i1) { // e_k . (alpha x R du) = alpha . R (du x e_k)
     const int i2 = (i1 + 1) % 3, i3 = (i1 + 2) % 3;
-    add_scaled(du[i3], port.turning[i2], X[i1]), add_scaled(T(-1.) * du[i2], port.turning[i3], X[i1]);
+    Row x = constant_row<6, T>(port.T[i1]) - change(i1);
+    add_scaled(du[i3], port.turning[i2], x), add_scaled(T(-1.) * du[i2], port.turning[i3], x);
+    X[i1] = x;
   }
-  Pack<T, 6> P[3]; // Phi_r m^T
-  if (b.stiffening)
-    bent_port(b, s, port.row, X, P);
-  else
-    for (int r = 0; r < 3; ++r)
-      P[r] = constant_row<6, T>(b.gram(port.row + 3 + r, 0));
-  for (std::size_t c = 0; c < b.twists.size() && !b.stiffening; ++c) {
-    const double *z = b.twists[c].axis;
-    const T *Wh = s.Wh[c].data() + port.row;
-    for (int r = 0; r < 6; ++r)
-      add_scaled(T(-1.) * Wh[r], z, X[r]);
-    for (int r = 0; r < 3; ++r)
-      add_scaled(Wh[3 + r], z, P[r]);
+  Row P[3], left[3]; // Phi_r m^T; rows of X without J_l - 1
+  for (int r = 0; r < 3; ++r) {
+    const Row moved = change(3 + r);
+    left[r] = constant_row<6, T>(port.T[3 + r]) - moved;
+    P[r] = b.stiffening ? moved : constant_row<6, T>(b.gram(port.row + 3 + r, 0)) + moved;
   }
   const auto &excess = s.ports[i].excess;
   for (int r = 0; r < 3; ++r)
-    X[3 + r] -= excess[r][0] * P[0] + excess[r][1] * P[1] + excess[r][2] * P[2];
+    X[3 + r] = left[r] - (excess[r][0] * P[0] + excess[r][1] * P[1] + excess[r][2] * P[2]);
 }
 
 // G of forces on port j by accelerations of port i: H_i Phi_i Phi_j^T H_j^T
 template <class T> FFROBOT_APART void port_gram(const Body &b, const State<T> &s, int i, int j, Pack<T, 6> *G) {
-  const auto &L = s.ports[i].excess, &R = s.ports[j].excess;
-  Pack<T, 6> columns[3], left[3]; // of H_j^T - 1
-  for (int k = 0; k < 3; ++k) {
-    columns[k] = Pack<T, 6>::zero();
-    for (int c = 0; c < 3; ++c)
-      columns[k].set(3 + c, R[c][k]);
-  }
+  const auto &L = s.ports[i].excess;
+  Pack<T, 6> rows[3], left[3]; // rows of H_j^T - 1
+  for (int k = 0; k < 3; ++k)
+    rows[k] = Pack<T, 6>::read(s.ports[j].columns[k]);
   for (int r = 0; r < 6; ++r)
     G[r] = b.stiffening ? Pack<T, 6>::read(s.bent.gram.data() + (b.ports[i].row + r) * b.width + b.ports[j].row)
                         : constant_row<6, T>(b.gram(b.ports[i].row + r, b.ports[j].row));
@@ -88,7 +92,7 @@ template <class T> FFROBOT_APART void port_gram(const Body &b, const State<T> &s
   for (int r = 0; r < 3; ++r)
     G[3 + r] += left[r];
   for (int r = 0; r < 6; ++r)
-    G[r] += G[r][3] * columns[0] + G[r][4] * columns[1] + G[r][5] * columns[2];
+    G[r] += G[r][3] * rows[0] + G[r][4] * rows[1] + G[r][5] * rows[2];
 }
 
 // A_port = X A + beta + G f of a port, in axes of the undeformed section; f: force and moment on it
@@ -111,6 +115,26 @@ template <class T> FFROBOT_INLINE void put_force(const Body &b, const State<T> &
     z[port.row + k] = f[k], z[port.row + 3 + k] = f[3 + k] + moment[k];
 }
 
+// p_ddot of `blocks` registers of modes from the k-th on; `along`: z by twists
+template <int blocks, bool by_multipliers, class T>
+FFROBOT_INLINE void accelerate(const Body &b, int stride, const T *z, const T *along, const State<T> &s, int k, T *a) {
+  const int width = b.width;
+  const double *row = b.rows.data() + k;
+  Modes<T> sum[blocks];
+  for (int i = 0; i < blocks; ++i)
+    sum[i] = by_multipliers ? Modes<T>::zero() : Modes<T>::read(s.Q_f.data() + k + i * step<T>);
+  for (int first = 0; first < width; first += lanes, row += 2 * stride)
+#pragma GCC unroll 6
+    for (int r = 0; r < 6; ++r, row += stride)
+      for (int i = 0; i < blocks; ++i)
+        add_scaled(z[first + r], row + i * step<T>, sum[i]);
+  for (std::size_t c = 0; c < b.twists.size(); ++c)
+    for (int i = 0; i < blocks; ++i)
+      sum[i] += along[c] * Modes<T>::read(s.h_change[c].data() + k + i * step<T>);
+  for (int i = 0; i < blocks; ++i)
+    write_modes(sum[i], b.n - k - i * step<T>, a + k + i * step<T>);
+}
+
 // p_ddot = Q_f - m^T A + sum of P^T f, by multipliers without Q_f; z holds, by rows of W, -A and forces on ports, and
 // zeros elsewhere
 template <bool by_multipliers, class T>
@@ -122,15 +146,14 @@ inline void modal_accelerations(const Body &b, const T *z, const State<T> &s, T 
     const double *axis = b.twists[c].axis + 3;
     along[c] = axis[0] * z[3] + axis[1] * z[4] + axis[2] * z[5];
   }
-  for (int k = 0; k < b.n; k += step<T>) {
-    auto sum = by_multipliers ? Modes<T>::zero() : Modes<T>::read(s.Q_f.data() + k);
-    for (int first = 0; first < b.width; first += lanes)
-      for (int r = first; r < first + 6; ++r)
-        add_scaled(z[r], b.rows.data() + r * padded(b.n) + k, sum);
-    for (std::size_t c = 0; c < b.twists.size(); ++c)
-      sum += along[c] * Modes<T>::read(s.h_change[c].data() + k);
-    write_modes(sum, b.n - k, a + k);
-  }
+  with_modes<T>(b.n, [&](auto known) {
+    const int n = known ? known : b.n;
+    int k = 0;
+    for (; k + step<T> < n; k += 2 * step<T>)
+      accelerate<2, by_multipliers, T>(b, padded(n), z, along, s, k, a);
+    if (k < n)
+      accelerate<1, by_multipliers, T>(b, padded(n), z, along, s, k, a);
+  });
 }
 
 } // namespace ffrobot::recursion::spatial

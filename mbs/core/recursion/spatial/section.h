@@ -1,6 +1,7 @@
 // How the section of a port turns: by exp(phi), with the exact Jacobian J_l, so that reactions do no work.
 #pragma once
 
+#include "core/recursion/mode_matrix.h"
 #include "core/recursion/small.h"
 
 #include <array>
@@ -9,12 +10,13 @@ namespace ffrobot::recursion::spatial {
 
 // A port and the section there
 template <class T> struct PortMotion {
-  T r[3];               // body axes, deformed
-  T phi[3], phi_dot[3]; // rotation vector of the section and its rate, undeformed axes
-  T turn[3][3];         // exp(phi)
-  T excess[3][3];       // J_l(phi) - I
-  T rate[3];            // J_l phi_dot, angular velocity of the section against the body, undeformed axes
-  T drift[3];           // (d/dt J_l) phi_dot
+  T r[3];                   // body axes, deformed
+  T phi[3], phi_dot[3];     // rotation vector of the section and its rate, undeformed axes
+  T turn[3][3];             // exp(phi)
+  T excess[3][3];           // J_l(phi) - I
+  T columns[3][lanes] = {}; // its columns, in the place of a moment
+  T rate[3];                // J_l phi_dot, angular velocity of the section against the body, undeformed axes
+  T drift[3];               // (d/dt J_l) phi_dot
 };
 
 constexpr int series_terms = 9; // of the sums below: 1e-16 at 1.3 rad, 1e-13 at 2 rad, 4e-10 at half a turn
@@ -64,6 +66,9 @@ template <class T> inline void turn_section(PortMotion<T> &m) {
     m.excess[k][j] += a * f[i], m.excess[j][k] -= a * f[i];
     m.turn[k][j] += sinc * f[i], m.turn[j][k] -= sinc * f[i];
   }
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j)
+      m.columns[j][3 + i] = m.excess[i][j];
   cross(f, d, fd), cross(f, fd, ffd), cross(d, fd, dfd);
   turn(m.excess, d, m.rate);
   for (int i = 0; i < 3; ++i) {

@@ -27,8 +27,8 @@ template <class T> struct Bent {
 
 template <class T> struct State {
   explicit State(const Body &b)
-      : p(padded(b.n), T(0.)), v(p), Q_f(p), b(p), h_change{p, p, p}, u(b.width, T(0.)), u_dot(u), Q(u), Wh{u, u, u},
-        ports(b.ports.size()), bent(b) {}
+      : p(padded(b.n), T(0.)), v(p), Q_f(p), b(p), h_change{p, p, p}, by_rates{p, p, p}, u(b.width, T(0.)), u_dot(u),
+        Q(u), Wh{u, u, u}, ports(b.ports.size()), bent(b) {}
 
   T absolute[3][3];       // body axes to global ones
   T omega[3];             // body axes
@@ -39,17 +39,19 @@ template <class T> struct State {
   Aligned<T> Q_f;         // modal forces
   Aligned<T> b;           // b_s, one after the other
   Aligned<T> h_change[3]; // A_c p
+  Aligned<T> by_rates[3]; // A_c p_dot
   Aligned<T> u, u_dot, Q; // W p, W p_dot, W Q_f with the undeformed m_thetaf
   Aligned<T> Wh[3];       // W A_c p
   std::vector<PortMotion<T>> ports;
   Bent<T> bent; // empty without geometric stiffening
 };
 
-// What becomes of a body in its frame's six equations: J (in the place of alpha); where the caller wants them,
+// What becomes of a body in its frame's six equations: J (as symmetric matrices are kept); where the caller wants them,
 // M_rr - m m^T (6 rows) and -(Q_r - m Q_f) (6)
 template <class T> struct FrameTerms {
   FrameTerms(Pack<T, 6> *to_M, T *to_bias) : M(to_M), bias(to_bias) {}
-  Pack<T, 6> J[3], *M;
+  T J[packed<T, 6>];
+  Pack<T, 6> *M;
   T *bias;
 };
 
