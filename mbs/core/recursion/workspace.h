@@ -80,23 +80,23 @@ template <class Space, class T> struct Workspace {
   Aligned<Pack<T, d>> cross; // (crosses, d): G between ports
   Aligned<Pack<T, d>> soft;  // (nodes with an inboard port, 2 d): M^-1 X^T, and M^-1
   std::vector<int> first_soft;
-  Aligned<T> force;               // (ports, d, columns) on ports, with opposite sign: bias of what hangs there
-  Aligned<T> bias;                // (ports, d, columns) beta of ports, by columns; of bodies with several
-  Aligned<T> answer;              // (slots, columns)
-  Aligned<T> angle, sine, cosine; // (nodes) of frames in the plane; of revolute joints in space
-  Aligned<T> z;                   // of the widest body
-  Aligned<T> schur;               // (all rows)^2 C M^-1 C^T of active ones
-  bool keeps_schur = false;       // asked for
-  Aligned<T> factor;              // factored()^2, L and 1/D of it
-  std::vector<int> active;        // rows that are kept; others depend on them
-  std::vector<int> column;        // of each row; 0: not kept, or not in the block at hand
-  Aligned<T> point_force;         // (actions, linear, columns) of rows of constant direction, on ports, global axes
-  Aligned<T> lift;                // (columns) what active rows of that kind measure of gravity, from 0 on
-  std::vector<Block<T>> blocks;   // of active rows where they are more than columns; else none
-  Aligned<T> lambda;              // (all rows)
-  Aligned<T> y;                   // (columns, or 1 + all rows): 1, multipliers of active rows
-  std::vector<Pose<T>> frames;    // of nodes
-  std::vector<Turning> turning;   // of ground markers, in space: those that turn are to be kept up to date
+  Aligned<T> force;             // (ports, d, columns) on ports, with opposite sign: bias of what hangs there
+  Aligned<T> bias;              // (ports, d, columns) beta of ports, by columns; of bodies with several
+  Aligned<T> answer;            // (slots, columns)
+  Aligned<T> sine, cosine;      // (nodes) of frames in the plane; of revolute joints in space
+  Aligned<T> z;                 // of the widest body
+  Aligned<T> schur;             // (all rows)^2 C M^-1 C^T of active ones
+  bool keeps_schur = false;     // asked for
+  Aligned<T> factor;            // factored()^2, L and 1/D of it
+  std::vector<int> active;      // rows that are kept; others depend on them
+  std::vector<int> column;      // of each row; 0: not kept, or not in the block at hand
+  Aligned<T> point_force;       // (actions, linear, columns) of rows of constant direction, on ports, global axes
+  Aligned<T> lift;              // (columns) what active rows of that kind measure of gravity, from 0 on
+  std::vector<Block<T>> blocks; // of active rows where they are more than columns; else none
+  Aligned<T> lambda;            // (all rows)
+  Aligned<T> y;                 // (columns, or 1 + all rows): 1, multipliers of active rows
+  std::vector<Pose<T>> frames;  // of nodes
+  std::vector<Turning> turning; // of ground markers, in space: those that turn are to be kept up to date
   unsigned long evaluations = 0;
 
   // A force of a row on a port, of constant direction: where it is in point_force

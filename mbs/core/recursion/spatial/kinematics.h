@@ -114,9 +114,11 @@ template <class T> FFROBOT_INLINE void force_columns(const Node<Spatial> &node, 
 template <class T>
 FFROBOT_APART void kinematics(const Mechanism<Spatial> &m, const T *q, const T *v, const Forces<T> &forces,
                               Workspace<Spatial, T> &w) {
-  for (std::size_t i = 0; i < m.nodes.size(); ++i)
-    w.angle[i] = m.nodes[i].joint == JointKind::revolute ? q[m.nodes[i].q] : T(0.);
-  sines_and_cosines(w.angle.data(), w.sine.data(), w.cosine.data(), m.nodes.size());
+  Angles<T> angles;
+  for (std::size_t i = 0; i < m.nodes.size(); ++i) {
+    const bool turns = m.nodes[i].joint == JointKind::revolute;
+    angles.take(i, m.nodes.size(), turns ? q[m.nodes[i].q] : T(0.), w.sine.data(), w.cosine.data());
+  }
   for (std::size_t i = 0; i < m.nodes.size(); ++i) {
     const Node<Spatial> &node = m.nodes[i];
     spatial::State<T> &s = w.bodies[i];
