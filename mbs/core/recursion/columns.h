@@ -45,7 +45,6 @@ FFROBOT_INLINE void lose_all(Schur<T, W> &S, const Pack<T, W> (&a)[count], const
 #pragma GCC unroll 8
   for (int r = 1; r < W; ++r) {
     Pack<T, W> row = S[r];
-#pragma GCC unroll 6
     for (int i = 0; i < count; ++i)
       row -= a[i][r] * b[i];
     S[r] = row;

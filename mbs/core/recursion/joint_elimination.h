@@ -88,7 +88,6 @@ FFROBOT_INLINE void eliminate_freedom(const Node<Space> &node, int freedom, cons
   if (W > 1)
     gain(S, sd, su);
   const Pack<T, d> U_by_D = D_inverse * U;
-#pragma GCC unroll 6
   for (int j = 0; j < d; ++j)
     if (known != j) { // row f is written below
       const T U_j = U[j];

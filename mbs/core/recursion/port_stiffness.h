@@ -5,8 +5,6 @@
 
 namespace ffrobot::recursion {
 
-FFROBOT_INLINE double value_of(double x) { return x; }
-
 // What is left of a diagonal of Lambda by rounding where the body has no inertia there, of that diagonal
 constexpr double no_inertia = 1e-13;
 
@@ -125,21 +123,24 @@ FFROBOT_INLINE void turned_stiffness(const Hinge<Space, T> &hinge, Pack<T, Space
 template <int rank, int d, class T, class H>
 FFROBOT_INLINE void series_stiffness(const H &hinge, const Pack<T, d> *G, Pack<T, d> *Y) {
   using Row = Pack<T, d>;
-  Row M[rank], C[rank];
+  Row C[rank];
   Row products[rank * (rank + 1) / 2]; // of N's lower half, row after row
-  T N[rank][rank], lower[rank * (rank + 1) / 2], D_inverse[rank];
+  T M[rank][rank], N[rank][rank], lower[rank * (rank + 1) / 2], D_inverse[rank];
 #pragma GCC unroll 6
   for (int i = 0; i < rank; ++i)
-    M[i] = hinge.Lambda[i];
 #pragma GCC unroll 6
-  for (int j = 0; j < rank; ++j) {
+    for (int j = 0; j <= i; ++j)
+      M[i][j] = hinge.Lambda[i][j];
+#pragma GCC unroll 6
+  for (int j = 0; j < rank; ++j) { // number by number: what each step waits for is short
     D_inverse[j] = T(1.) / M[j][j];
-    Row L = D_inverse[j] * M[j];
     C[j] = Row::read(hinge.column[j]);
 #pragma GCC unroll 6
     for (int i = j + 1; i < rank; ++i) {
-      const T L_ij = L[i];
-      M[i] -= L_ij * M[j];
+      const T L_ij = M[i][j] * D_inverse[j];
+#pragma GCC unroll 6
+      for (int k = j + 1; k <= i; ++k)
+        M[i][k] -= L_ij * M[k][j];
       C[j] += L_ij * Row::read(hinge.column[i]);
     }
   }

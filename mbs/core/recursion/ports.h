@@ -63,17 +63,22 @@ inline void spread_to_later_ports(const Node<Space> &node, int k, bool loaded, c
 template <int d, class T, int W>
 FFROBOT_INLINE void gain_by_transpose(const Pack<T, d> *X, const Pack<T, W> *F, const Pack<T, d> *YX, Pack<T, W> *H,
                                       Pack<T, d> *M) {
-#pragma GCC unroll 6
-  for (int r = 0; r < d; ++r) {
+  const auto gain = [&](int r) {
     Pack<T, W> h = H[r];
     Pack<T, d> m = M[r];
-#pragma GCC unroll 6
     for (int i = 0; i < d; ++i) {
       const T x = X[i][r];
       h += x * F[i], m += x * YX[i];
     }
     H[r] = h, M[r] = m;
-  }
+  };
+  if constexpr (std::is_same_v<T, double> && W <= 8) { // else it would be much code
+#pragma GCC unroll 6
+    for (int r = 0; r < d; ++r)
+      gain(r);
+  } else
+    for (int r = 0; r < d; ++r)
+      gain(r);
 }
 
 // X, beta and G of all ports; where there are several, beta as columns and what is between them
@@ -121,21 +126,17 @@ FFROBOT_INLINE void answer_of_port(PortWork<Space, T> &port, bool is_soft, bool 
     return;
   }
   Cols D[d];
-#pragma GCC unroll 6
   for (int i = 0; i < d; ++i) {
     if (bias)
       D[i] = Cols::read(bias + i * stride);
     else
       D[i] = Cols::zero(), D[i].set(0, port.beta[i]);
     if (is_soft)
-#pragma GCC unroll 6
       for (int j = 0; j < d; ++j)
         D[i] -= port.G[i][j] * F[j];
   }
   if (loaded)
-#pragma GCC unroll 6
     for (int i = 0; i < d; ++i)
-#pragma GCC unroll 6
       for (int j = 0; j < d; ++j)
         F[i] += port.Y[i][j] * D[j];
   if (W > 1)

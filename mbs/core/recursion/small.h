@@ -7,6 +7,8 @@
 
 namespace ffrobot::recursion {
 
+FFROBOT_INLINE double value_of(double x) { return x; }
+
 FFROBOT_INLINE void sine_and_cosine(double x, double &s, double &c) { s = std::sin(x), c = std::cos(x); }
 
 // angle/sine of an angle from 0 to pi

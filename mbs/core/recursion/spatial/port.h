@@ -124,7 +124,6 @@ FFROBOT_INLINE void accelerate(const Body &b, int stride, const T *z, const T *a
   for (int i = 0; i < blocks; ++i)
     sum[i] = by_multipliers ? Modes<T>::zero() : Modes<T>::read(s.Q_f.data() + k + i * step<T>);
   for (int first = 0; first < width; first += lanes, row += 2 * stride)
-#pragma GCC unroll 6
     for (int r = 0; r < 6; ++r, row += stride)
       for (int i = 0; i < blocks; ++i)
         add_scaled(z[first + r], row + i * step<T>, sum[i]);

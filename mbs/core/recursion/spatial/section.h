@@ -20,6 +20,8 @@ template <class T> struct PortMotion {
 };
 
 constexpr int series_terms = 9; // of the sums below: 1e-16 at 1.3 rad, 1e-13 at 2 rad, 4e-10 at half a turn
+constexpr int few_terms = 5;    // 1e-18 as long as y is small
+constexpr double small_y = 1. / 256;
 
 // 1/(2 k + m)! with alternating signs, k = 0, 1, …
 template <int m> constexpr std::array<double, series_terms> alternating_factorials() {
@@ -35,18 +37,21 @@ template <int m> constexpr std::array<double, series_terms> alternating_factoria
 }
 
 // The sum of c_k y^k and its derivative
-template <class T>
+template <int terms, class T>
 FFROBOT_INLINE void power_series(const std::array<double, series_terms> &c, const T &y, T &sum, T &slope) {
-  sum = T(c[series_terms - 1]), slope = T(0.);
+  sum = T(c[terms - 1]), slope = T(0.);
 #pragma GCC unroll 8
-  for (int k = series_terms - 2; k >= 0; --k)
+  for (int k = terms - 2; k >= 0; --k)
     slope = slope * y + sum, sum = sum * y + c[k];
 }
 
 // (1 - cos)/x^2, (x - sin)/x^3 and their derivatives by y = x^2
 template <class T> inline void rotation_series(const T &y, T &a, T &b, T &a_rate, T &b_rate) {
   constexpr auto of_a = alternating_factorials<2>(), of_b = alternating_factorials<3>();
-  power_series(of_a, y, a, a_rate), power_series(of_b, y, b, b_rate);
+  if (value_of(y) < small_y)
+    power_series<few_terms>(of_a, y, a, a_rate), power_series<few_terms>(of_b, y, b, b_rate);
+  else
+    power_series<series_terms>(of_a, y, a, a_rate), power_series<series_terms>(of_b, y, b, b_rate);
 }
 
 // exp(phi) = I + (1 - y b) phi~ + a phi~^2, J_l = I + a phi~ + b phi~^2, y = |phi|^2, from phi and phi_dot
