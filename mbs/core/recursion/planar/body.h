@@ -134,20 +134,14 @@ FFROBOT_INLINE void project(const Body &b, const double *p, const double *v, con
   });
   s.p_p = pp.sum() + pp_rest, s.p_v = pv.sum() + pv_rest;
   const auto multiply = [&](long block, auto width) {
-    Eight u = Eight::zero(), u_dot = u, k = u, u2 = u, u_dot2 = u, k2 = u;
+    Eight u = Eight::zero(), u_dot = u, k = u;
     const double *column = b.columns.data() + block;
-    long i = 0;
-    for (; i + 2 <= n; i += 2, column += 2 * width) {
-      const Eight w = Eight::load(column), w2 = Eight::load(column + width);
-      u += p[i] * w, u_dot += v[i] * w, k += elastic[i] * w;
-      u2 += p[i + 1] * w2, u_dot2 += v[i + 1] * w2, k2 += elastic[i + 1] * w2;
-    }
-    if (n & 1) {
+#pragma GCC unroll 2
+    for (long i = 0; i < n; ++i, column += width) {
       const Eight w = Eight::load(column);
       u += p[i] * w, u_dot += v[i] * w, k += elastic[i] * w;
     }
-    (u + u2).store(s.u.data() + block), (u_dot + u_dot2).store(s.u_dot.data() + block);
-    (k + k2).store(s.Q.data() + block);
+    u.store(s.u.data() + block), u_dot.store(s.u_dot.data() + block), k.store(s.Q.data() + block);
   };
   if (b.blocks == 1)
     return multiply(0, std::integral_constant<long, 8>());
