@@ -85,9 +85,8 @@ RowMajorMatrix equal_steps(ImplicitSystem &system, const VectorXd &y, double end
   system.slope(0, z.data(), method.first_slope());
   system.accepted(0, z.data(), method.first_slope());
   for (int i = 0; i < steps; ++i) {
-    if (!method.step(i * h, z.data(), h, newton_tolerance) || !method.correct((i + 1) * h))
+    if (!method.step(i * h, z.data(), h, newton_tolerance) || !method.finish((i + 1) * h))
       throw std::runtime_error("the equations of step " + std::to_string(i) + " could not be solved");
-    system.slope((i + 1) * h, method.end(), method.last_slope());
     method.prepare_dense(i * h, z.data(), h);
     method.interpolate((i + 0.5) * h, middle.data());
     put(2 * i + 1, middle.data());

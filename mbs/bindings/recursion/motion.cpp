@@ -82,6 +82,7 @@ newton_step(const Model<Space> &model, const Scene &scene, double t, const Vecto
   state << q, v;
   motion.local().set_centre(state.data());
   motion.local().from_state(state.data(), z.data());
+  motion.remember_slopes();
   motion.slope(t, z.data(), slope.data());
   motion.factorise(damping_factor, stiffness_factor);
   Eigen::Matrix<Scalar, Eigen::Dynamic, 1> x(v.size());

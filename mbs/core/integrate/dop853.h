@@ -14,7 +14,7 @@ public:
   explicit Dop853(OdeSystem &system);
 
   bool step(double t, const double *y, double h, double tolerance) override;
-  bool correct(double t) override { return system_.correct(t, end_.data()); }
+  bool finish(double t) override { return system_.finish(t, end_.data(), last_slope()); }
 
   // Estimate of order 5, times a factor that the estimate of order 3 brings it down by: together they shrink as h^8.
   void estimate(double h, Eigen::VectorXd &error) override;

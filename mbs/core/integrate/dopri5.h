@@ -14,7 +14,7 @@ public:
   explicit Dopri5(OdeSystem &system);
 
   bool step(double t, const double *y, double h, double tolerance) override;
-  bool correct(double t) override { return system_.correct(t, end_.data()); }
+  bool finish(double t) override { return system_.finish(t, end_.data(), last_slope()); }
   void estimate(double h, Eigen::VectorXd &error) override;
   double error_order() const override { return 5; }
   double error_share(double fraction) const override { return std::min(std::sqrt(fraction) / 8, 3 * fraction); }

@@ -33,19 +33,21 @@ void advance(const double *K, Eigen::Index n, double h, const double *y, double 
     out[i] = y[i] + h * combine<Coefficients>(K, n, i, std::make_index_sequence<Count>());
 }
 
-// Slope number Stage of the tableau (nodes c, rows a) from the slopes before it
+// Slope number Stage of the tableau (rows a), at time t, from the slopes before it
 template <class Tableau, int Stage>
 void run_stage(OdeSystem &system, double t, const double *y, double h, Eigen::MatrixXd &K, Eigen::VectorXd &stage) {
   static constexpr auto &row = Tableau::a[Stage];
   advance<row, Stage>(K.data(), K.rows(), h, y, stage.data());
-  system.slope(t + Tableau::c[Stage] * h, stage.data(), K.col(Stage).data());
+  system.slope(t, stage.data(), K.col(Stage).data());
 }
 
-// Slopes First … Last of the tableau
+// Slopes First … Last of the tableau (nodes c)
 template <class Tableau, int First, int Last>
 void run_stages(OdeSystem &system, double t, const double *y, double h, Eigen::MatrixXd &K, Eigen::VectorXd &stage) {
   [&]<int... i>(std::integer_sequence<int, i...>) {
-    (run_stage<Tableau, First + i>(system, t, y, h, K, stage), ...);
+    const double times[] = {t + Tableau::c[First + i] * h...};
+    system.foresee(times, sizeof...(i));
+    (run_stage<Tableau, First + i>(system, times[i], y, h, K, stage), ...);
   }(std::make_integer_sequence<int, Last - First + 1>());
 }
 

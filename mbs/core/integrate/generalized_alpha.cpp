@@ -21,7 +21,9 @@ GeneralizedAlpha::GeneralizedAlpha(ImplicitSystem &system, double spectral_radiu
       gamma_(0.5 + alpha_f_ - alpha_m_), leading_((1 - alpha_m_) / (1 - alpha_f_)), v_dot_(n_), next_v_dot_(n_),
       previous_v_dot_(n_), drift_(n_), a_(n_), next_a_(n_), position_correction_(n_), end_(2 * n_), start_(2 * n_),
       first_slope_(2 * n_), last_slope_(2 * n_), change_(2 * n_), excess_(n_), force_(system.n_stiff()), x_(n_),
-      value_(system.constraints()), rate_(value_), c_(value_) {}
+      value_(system.constraints()), rate_(value_), c_(value_) {
+  system.remember_slopes();
+}
 
 // Consistent initial accelerations, C_tt included, are the first slope. The method's own lie alpha_m - alpha_f steps
 // ahead: their rate is taken from a difference.
@@ -103,6 +105,13 @@ bool GeneralizedAlpha::step(double t, const double *y, double h, double toleranc
     previous_size = size;
   }
   return false;
+}
+
+bool GeneralizedAlpha::finish(double t) {
+  if (!project_(t, end_.data()))
+    return false;
+  system_.slope(t, end_.data(), last_slope_.data());
+  return true;
 }
 
 // Against the integral of the parabola through the last three accelerations (order 3), smoothed by N^-1 M: a difference

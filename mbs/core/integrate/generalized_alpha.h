@@ -15,7 +15,7 @@ public:
   GeneralizedAlpha(ImplicitSystem &system, double spectral_radius);
 
   bool step(double t, const double *y, double h, double tolerance) override;
-  bool correct(double t) override { return project_(t, end_.data()); }
+  bool finish(double t) override;
   void estimate(double h, Eigen::VectorXd &error) override;
   double error_order() const override { return 3; }
   double error_share(double fraction) const override { return fraction; }

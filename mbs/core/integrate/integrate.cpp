@@ -147,12 +147,11 @@ private:
       steps_.next_step = report_.last_step = attempt.step;
       if (!may_go_on())
         return;
-      if (!method_->step(t_, z_.data(), attempt.step, rounding_of_errors) || !method_->correct(attempt.end)) {
+      if (!method_->step(t_, z_.data(), attempt.step, rounding_of_errors) || !method_->finish(attempt.end)) {
         report_.last_error = NAN;
         report_.status = IntegrationStatus::step_underflow;
         return;
       }
-      system_.slope(attempt.end, method_->end(), method_->last_slope());
       if (!delivery_.is_complete() && delivery_.next_time() < attempt.end)
         method_->prepare_dense(t_, z_.data(), attempt.step);
       take(attempt);
@@ -207,9 +206,8 @@ private:
 
   // Size of the step's error relative to the largest one allowed; NaN where it could not be made.
   double try_step(const Attempt &attempt, const Allowance &allowance) {
-    if (!method_->step(t_, z_.data(), attempt.step, allowance.to_iterate) || !method_->correct(attempt.end))
+    if (!method_->step(t_, z_.data(), attempt.step, allowance.to_iterate) || !method_->finish(attempt.end))
       return NAN;
-    system_.slope(attempt.end, method_->end(), method_->last_slope());
     method_->estimate(attempt.step, error_);
     double size = system_.error_size(attempt.end, method_->end(), error_.data()) / allowance.error;
     if (size > StepControl::target && attempt.step < radian * system_.initial_step() && !method_->damps())
@@ -249,7 +247,8 @@ private:
     const double asked = std::clamp(steps_.next_step, attempt.step, 2 * attempt.step);
     const bool ends_early = attempt.is_limited || (t_ == attempt.target && (breaks_ || jump_));
     if (!(ends_early && 2 * attempt.step < steps_.next_step))
-      steps_.next_step = control_.after_accepted(asked, size * std::pow(asked / attempt.step, method_->error_order()));
+      steps_.next_step = control_.after_accepted(
+          asked, asked > attempt.step ? size * std::pow(asked / attempt.step, method_->error_order()) : size);
     if (pass_breaks()) {
       system_.slope(t_, z_.data(), method_->first_slope());
       method_->restart();

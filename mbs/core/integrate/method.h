@@ -19,10 +19,10 @@ public:
   // `tolerance` bounds what iterations may leave. False where the equations of the step could not be solved.
   virtual bool step(double t, const double *y, double h, double tolerance) = 0;
 
-  // Moves end() back onto the invariants; false where that fails.
-  virtual bool correct(double t) = 0;
+  // Moves end() back onto the invariants, and finds last_slope() there; false where that fails.
+  virtual bool finish(double t) = 0;
 
-  // Error of the step of size h just made; needs last_slope(), the slope at end(), set by the caller.
+  // Error of the step of size h just made; needs last_slope().
   virtual void estimate(double h, Eigen::VectorXd &error) = 0;
 
   virtual double error_order() const = 0; // the estimate shrinks as h^error_order

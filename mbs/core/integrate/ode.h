@@ -25,8 +25,19 @@ public:
   // z_dot (2 n_v) at z
   virtual void slope(double t, const double *z, double *z_dot) = 0;
 
+  // The next slopes will be at these times (count): what depends on time alone can be found for all at once.
+  virtual void foresee([[maybe_unused]] const double *times, [[maybe_unused]] int count) {}
+
   // Moves z back onto the system's invariants after a step; false where that fails (the step is then rejected).
   virtual bool correct(double t, double *z) = 0;
+
+  // The same, and the slope there.
+  virtual bool finish(double t, double *z, double *z_dot) {
+    if (!correct(t, z))
+      return false;
+    slope(t, z, z_dot);
+    return true;
+  }
 
   // Size of the error e of z, relative to the peaks so far of the reported quantities: what the tolerance bounds.
   // The last slope() was that at (t, z); may evaluate slopes of its own.
@@ -66,6 +77,10 @@ public:
   explicit ImplicitSystem(const ConfigurationSpace &space) : OdeSystem(space), uncoupled_(n_v(), 0) {}
   using Complex = std::complex<double>;
 
+  // To be said before the slopes whose states factorise() goes by: explicit methods do without.
+  void remember_slopes() { remembers_slopes_ = true; }
+  bool remembers_slopes() const { return remembers_slopes_; }
+
   virtual Eigen::Index constraints() const = 0;                          // rows of C, and of multipliers
   virtual const Eigen::VectorXd &stiffness() const = 0;                  // (n_stiff), zero where nothing is stiff
   virtual const Eigen::VectorXd &damping() const = 0;                    // (n_stiff)
@@ -92,6 +107,7 @@ public:
   virtual double rate_size(const double *z, const Eigen::VectorXd &rate) const = 0;
 
 private:
+  bool remembers_slopes_ = false;
   Eigen::MatrixXd uncoupled_;
 };
 

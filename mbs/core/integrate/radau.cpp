@@ -51,7 +51,9 @@ Radau::Radau(ImplicitSystem &system)
     : system_(system), project_(system), n_(system.n_v()), Z_(Eigen::MatrixXd::Zero(2 * n_, 3)), W_(Z_), F_(Z_),
       change_(Z_), collocation_(Z_), slopes_(Z_), previous_slopes_(Z_), stage_(2 * n_), end_(2 * n_), start_(2 * n_),
       first_slope_(2 * n_), last_slope_(2 * n_), real_(2 * n_), force_(system.n_stiff()), unknown_(n_),
-      complex_(2 * n_), complex_force_(system.n_stiff()), complex_unknown_(n_) {}
+      complex_(2 * n_), complex_force_(system.n_stiff()), complex_unknown_(n_) {
+  system.remember_slopes();
+}
 
 // With b = r_v + mu r_q the equation (mu I - J) (dq, dv) = (r_q, r_v) is N dq + C_q^T nu = (M b + D r_q) / mu^2,
 // C_q dq = C_q b / mu^2, N = M + D / mu + K / mu^2; dq = b / mu^2 + x leaves forces on the modes alone.
@@ -192,6 +194,13 @@ bool Radau::correct(double t) {
   stale_ = true; // Newton's method in the steps did well with a geometry that the projection finds too old
   factorise(t, end_.data(), factorised_step_);
   return project_(t, end_.data());
+}
+
+bool Radau::finish(double t) {
+  if (!correct(t))
+    return false;
+  system_.slope(t, end_.data(), last_slope_.data());
+  return true;
 }
 
 // Order 5: the integral of the polynomial through the slopes at the stages, at the start and at two stages of the step

@@ -13,7 +13,7 @@ public:
   explicit Radau(ImplicitSystem &system);
 
   bool step(double t, const double *y, double h, double tolerance) override;
-  bool correct(double t) override;
+  bool finish(double t) override;
   void estimate(double h, Eigen::VectorXd &error) override;
   double error_order() const override { return 6; }
   // Half of what most runs need: where many modes ring undamped over a thousand radians and more, small errors of slow
@@ -36,6 +36,7 @@ private:
   using Complex = ImplicitSystem::Complex;
 
   void factorise(double t, const double *y, double h);
+  bool correct(double t); // moves end_ back onto the invariants
   void predict(double h);
   void iterate(double t, const double *y, double h);
   double largest_change(const double *y, double rate) const;

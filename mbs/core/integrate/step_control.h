@@ -19,12 +19,11 @@ public:
   // Size of the next step; error relative to the largest one allowed.
   double after_accepted(double step, double error) {
     constexpr double b = 8;
-    const double exponent = 1 / (b * order_);
     error = std::max(error, 1e-12);
-    double factor = std::pow(target / error, exponent);
-    factor *= previous_step_ > 0
-                  ? std::pow(target / previous_error_, exponent) * std::pow(step / previous_step_, -1 / b)
-                  : factor;
+    const double before = previous_step_ > 0 ? previous_error_ : error;
+    double factor = std::pow(square(target) / (error * before), 1 / (b * order_));
+    if (previous_step_ > 0)
+      factor *= std::sqrt(std::sqrt(std::sqrt(previous_step_ / step))); // to the power of 1/b
     previous_step_ = step;
     previous_error_ = error;
     return step * (1 + std::atan(factor - 1));
@@ -46,6 +45,8 @@ public:
   }
 
 private:
+  static double square(double x) { return x * x; }
+
   double order_;
   double previous_step_ = 0, previous_error_ = 1;
 };

@@ -21,12 +21,15 @@ public:
   IntegrationStatus look(double t, double next_step, unsigned long taken);
 
 private:
+  bool is_time_to_ask(unsigned long taken);
+
   OdeSystem &system_;
   double end_;
   unsigned long max_steps_;
   const std::function<bool(double)> &carry_on_;
   double t_asked_;
-  std::chrono::steady_clock::time_point asked_ = std::chrono::steady_clock::now();
+  std::chrono::steady_clock::time_point asked_ = std::chrono::steady_clock::now(), looked_ = asked_;
+  unsigned long next_look_ = 0, steps_between_looks_ = 1;
 };
 
 } // namespace ffrobot

@@ -1,6 +1,8 @@
 // What implicit integrators ask of a motion: its matrix of Newton's method, rows and their values.
 #include "core/recursion/motion.h"
 
+#include <stdexcept>
+
 namespace ffrobot::recursion {
 
 using Eigen::Index;
@@ -64,6 +66,8 @@ template <class Space> void RecursiveMotion<Space>::find_coupling() {
 template <class Space> void RecursiveMotion<Space>::take_posture() {
   if (!posture_is_old_)
     return;
+  if (!remembers_slopes())
+    throw std::logic_error("factorise: expected remember_slopes() before the slope");
   posture_.take(evaluated_.data(), newton_);
   if (coupling_.size() > 0)
     find_coupling();
@@ -135,7 +139,7 @@ template <class Space> void RecursiveMotion<Space>::constrain(const double *x, d
 
 template <class Space>
 void RecursiveMotion<Space>::constraint_values(double t, const double *z, double *value, double *rate) {
-  residuals(t, local().state(z), z + n_v());
+  residuals(t, local().state(z), z + n_v(), measured_);
   Eigen::Map<VectorXd>(value, value_.size()) = value_;
   Eigen::Map<VectorXd>(rate, rate_.size()) = rate_;
 }

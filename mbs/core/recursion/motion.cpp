@@ -56,6 +56,8 @@ RecursiveMotion<Space>::RecursiveMotion(const Mechanism<Space> &mechanism, const
   has_given_ = held_ || steering_ || !scene_.loads.empty() || !scene_.joint_forces.empty() ||
                !scene_.frame_motors.empty() || !scene_.gears.empty() ||
                std::ranges::any_of(scene_.cut_joints, [](const CutJoint &cut) { return cut.coordinate >= 0; });
+  has_wrenches_ =
+      steering_ || !scene_.point_loads.empty() || !scene_.point_forces.empty() || !scene_.cut_joints.empty();
   update_targets(t);
   if (!scene.is_strict)
     keep_independent_rows(mechanism, q, v, workspace_);
@@ -78,17 +80,30 @@ RecursiveMotion<Space>::RecursiveMotion(const Mechanism<Space> &mechanism, const
       fastest_ = std::max(fastest_, std::sqrt(node.body.K[static_cast<std::size_t>(k)])), steps_between_postures_ = 10;
 }
 
-template <class Space> void RecursiveMotion<Space>::update_targets(double t) {
-  if (t == target_time_)
-    return;
-  laws_(t, jets_.data());
-  for (std::size_t r = 0; r < scene_.targets.size(); ++r)
+template <class Space> void RecursiveMotion<Space>::find_targets(double t) {
+  const std::size_t rows = scene_.targets.size();
+  const auto begin = foreseen_times_.begin();
+  if (next_foreseen_ >= foreseen_times_.size() || foreseen_times_[next_foreseen_] != t)
+    next_foreseen_ = static_cast<std::size_t>(std::find(begin, foreseen_times_.end(), t) - begin);
+  if (next_foreseen_ < foreseen_times_.size())
+    std::copy_n(foreseen_.data() + rows * next_foreseen_++, rows, jets_.data());
+  else
+    laws_(t, jets_.data());
+  for (std::size_t r = 0; r < rows; ++r)
     jets_[r] = scene_.targets[r].of(jets_[r]), target_[static_cast<Index>(r)] = jets_[r].acceleration;
   for (const DrivenMarker &driven : scene_.driven) {
     const auto i = static_cast<std::size_t>(driven.marker);
     workspace_.turning[i] = measured_.turning[i] = newton_.turning[i] = driven.law(t);
   }
   target_time_ = t;
+}
+
+template <class Space> void RecursiveMotion<Space>::foresee(const double *times, int count) {
+  const auto size = static_cast<std::size_t>(count);
+  foreseen_times_.assign(times, times + size);
+  foreseen_.resize(size * scene_.targets.size());
+  laws_.at(times, count, foreseen_.data());
+  next_foreseen_ = 0;
 }
 
 template <class Space> Forces<double> RecursiveMotion<Space>::act(double t, const double *q, const double *v) {
@@ -112,7 +127,7 @@ template <class Space> Forces<double> RecursiveMotion<Space>::act(double t, cons
       held_->add(q, force_.data());
     forces.generalized = force_.data();
   }
-  if (steering_ || !scene_.point_loads.empty() || !scene_.point_forces.empty() || !scene_.cut_joints.empty()) {
+  if (has_wrenches_) {
     wrench_.setZero();
     for (const PointLoad &load : scene_.point_loads)
       wrench_[Space::dim * load.wrench + load.component] += load.share * load.magnitude(t).value;
@@ -129,7 +144,13 @@ template <class Space> Forces<double> RecursiveMotion<Space>::act(double t, cons
 
 template <class Space> void RecursiveMotion<Space>::evaluate(double t, const double *q, const double *v, double *a) {
   update_targets(t);
-  accelerations(mechanism_, q, v, act(t, q, v), target_.data(), workspace_, a);
+  Forces<double> forces;
+  if (has_given_ || has_wrenches_)
+    forces = act(t, q, v);
+  else
+    forces.is_placed = is_placed_;
+  is_placed_ = false;
+  accelerations(mechanism_, q, v, forces, target_.data(), workspace_, a);
 }
 
 template <class Space> void RecursiveMotion<Space>::act_at_points(double t) {
@@ -179,19 +200,23 @@ template <class Space> void RecursiveMotion<Space>::act_along_cuts(double t, con
 }
 
 template <class Space> void RecursiveMotion<Space>::slope(double t, const double *z, double *z_dot) {
+  const double *q = local().state(z), *v = z + n_v();
   local().rate(z, z_dot);
-  const double *q = local().state(z);
-  evaluate(t, q, z + n_v(), z_dot + n_v());
+  evaluate(t, q, v, z_dot + n_v());
   if (loops_ && !loops_->has_begun())
     loops_->begin_at(q, workspace_, newton_);
-  std::copy_n(q, mechanism_.n_q, evaluated_.data());
-  std::copy_n(z + n_v(), n_v(), rates_.data());
   posture_is_old_ = true;
+  if (!remembers_slopes())
+    return;
+  std::copy_n(q, mechanism_.n_q, evaluated_.data());
+  std::copy_n(v, n_v(), rates_.data());
 }
 
-template <class Space> void RecursiveMotion<Space>::residuals(double t, const double *q, const double *v) {
+template <class Space>
+void RecursiveMotion<Space>::residuals(double t, const double *q, const double *v, Workspace<Space, double> &w) {
   update_targets(t);
-  measure(mechanism_, q, v, measured_, value_.data(), rate_.data());
+  measure(mechanism_, q, v, w, value_.data(), rate_.data());
+  is_placed_ = &w == &workspace_;
   for (std::size_t r = 0; r < jets_.size(); ++r) {
     value_[static_cast<Index>(r)] -= jets_[r].value;
     rate_[static_cast<Index>(r)] -= jets_[r].rate;
@@ -199,6 +224,11 @@ template <class Space> void RecursiveMotion<Space>::residuals(double t, const do
 }
 
 template <class Space> double RecursiveMotion<Space>::project(double t, double *q, double *v) {
+  return project(t, q, v, measured_);
+}
+
+template <class Space>
+double RecursiveMotion<Space>::project(double t, double *q, double *v, Workspace<Space, double> &w) {
   // As in core/system/system.cpp: rounding of positions, moved into fast modes,
   // is noise in their forces.
   constexpr double tolerance = 1e-12;
@@ -208,12 +238,13 @@ template <class Space> double RecursiveMotion<Space>::project(double t, double *
   Eigen::Map<VectorXd> v_(v, n_v());
   double left = 0, previous = std::numeric_limits<double>::infinity();
   for (int i = 0; i < most_iterations; ++i) {
-    residuals(t, q, v);
+    residuals(t, q, v, w);
     const double position = norm_.sizes().of_values(value_, q);
     left = std::max(position, norm_.sizes().of_rates(rate_, v));
     if (!(left > tolerance) || (left < 1e-11 && left > 0.2 * previous)) // done, at the rounding floor, or NaN
       break;
     previous = left;
+    is_placed_ = false;
     if (i >= refresh_after)
       evaluate(t, q, v, correction_.data());
     response(mechanism_, q, rate_.data(), workspace_, correction_.data());
@@ -233,6 +264,17 @@ template <class Space> bool RecursiveMotion<Space>::correct(double t, double *z)
   const double left = project(t, state_.data(), state_.data() + mechanism_.n_q);
   local().from_state(state_.data(), z);
   return left < 1e-11;
+}
+
+// What rows leave is measured with the kinematics that the slope needs, too.
+template <class Space> bool RecursiveMotion<Space>::finish(double t, double *z, double *z_dot) {
+  if (has_given_ || has_wrenches_ || !local().space().is_flat())
+    return ImplicitSystem::finish(t, z, z_dot);
+  const bool is_on_rows = project(t, z, z + n_v(), workspace_) < 1e-11;
+  if (is_on_rows)
+    slope(t, z, z_dot);
+  is_placed_ = false;
+  return is_on_rows;
 }
 
 template <class Space> void RecursiveMotion<Space>::judge(MotorForces<Space> &motors) {
@@ -317,7 +359,8 @@ template <class Space> bool RecursiveMotion<Space>::is_sensible(const double *z)
     if (!(Eigen::Map<const VectorXd>(z + node.p_v(), node.n()).squaredNorm() <= scene_.most_bent[i]))
       return false;
   }
-  return least_ratio_ >= singular_ratio && Eigen::Map<const VectorXd>(z, 2 * n_v()).allFinite();
+  return least_ratio_ >= singular_ratio &&
+         (0 * Eigen::Map<const Eigen::ArrayXd>(z, 2 * n_v())).sum() == 0; // all finite
 }
 
 template <class Space> MotionHistory RecursiveMotion<Space>::history() const {

@@ -149,7 +149,9 @@ public:
   void judge(MotorForces<Space> &motors);              // their errors, too; must outlive this
 
   void slope(double t, const double *z, double *z_dot) override;
+  void foresee(const double *times, int count) override;
   bool correct(double t, double *z) override;
+  bool finish(double t, double *z, double *z_dot) override;
   double error_size(double t, const double *z, const double *e) override;
   double change_size(const double *z, const double *change, double rate) const override;
   void accepted(double t, const double *z, const double *z_dot) override;
@@ -197,10 +199,15 @@ public:
   Workspace<Space, double> &workspace() { return workspace_; }
 
 private:
-  void update_targets(double t);
-  void residuals(double t, const double *q, const double *v);
-  void act_at_points(double t);                                    // after place_all(); adds to wrench_
-  void act_along_cuts(double t, const double *q, const double *v); // the same; and to force_
+  void update_targets(double t) {
+    if (t != target_time_)
+      find_targets(t);
+  }
+  void find_targets(double t);
+  void residuals(double t, const double *q, const double *v, Workspace<Space, double> &w);
+  double project(double t, double *q, double *v, Workspace<Space, double> &w); // w: where residuals are measured
+  void act_at_points(double t);                                                // after place_all(); adds to wrench_
+  void act_along_cuts(double t, const double *q, const double *v);             // the same; and to force_
   const Eigen::VectorXd *motors_at(const double *q); // of the last evaluation; null where they are not judged
   void find_stiff_terms();
   void take_posture();
@@ -217,12 +224,15 @@ private:
   // of accelerations; of rows and of Newton's method, which must not disturb
   // these
   Workspace<Space, double> workspace_, measured_, newton_;
-  bool has_given_; // generalized forces: force_
+  bool has_given_, has_wrenches_; // generalized forces: force_, and wrench_
+  bool is_placed_ = false;        // workspace_ has the kinematics of the state that will be evaluated next
   Eigen::VectorXd force_, wrench_, along_cuts_, target_, value_, rate_, correction_, state_;
-  FunctionsOfTime laws_; // of the scene's targets
-  std::vector<Jet> jets_;
+  FunctionsOfTime laws_;             // of the scene's targets
+  std::vector<Jet> jets_, foreseen_; // at target_time_, and (times, rows) at foreseen_times_
   double target_time_;
-  double fastest_ = 0; // 1/s, of modes
+  std::vector<double> foreseen_times_;
+  std::size_t next_foreseen_ = 0; // most likely asked for next
+  double fastest_ = 0;            // 1/s, of modes
   MotionNorm<Space> norm_;
   MotorForces<Space> *motors_ = nullptr;
   Eigen::VectorXd shifted_, unused_;

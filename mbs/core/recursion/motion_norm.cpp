@@ -1,5 +1,7 @@
 #include "core/recursion/motion_norm.h"
 
+#include "core/linear/squares.h"
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -25,6 +27,25 @@ constexpr double small_twist = 1e-5;    // rad, of a spring: rounding of angles 
 constexpr double nothing = std::numeric_limits<double>::min(); // of groups without members
 
 double square(double x) { return x * x; }
+
+void grow(double &peak, double squared) {
+  if (squared > peak * peak)
+    peak = std::sqrt(squared);
+}
+
+// Of accelerations, of these times the radians of modes, and times their squares
+struct SquaresOfModes {
+  double plain = 0, rate = 0, way = 0;
+
+  SquaresOfModes(const double *a, const double *radian, Index count) {
+    FourSums of_plain, of_rate, of_way;
+    for_fours(count, [&](Index first, auto read) {
+      const auto x = read(a + first), s = read(radian + first), rate = x * s, way = rate * s;
+      of_plain.add(x * x), of_rate.add(rate * rate), of_way.add(way * way);
+    });
+    plain = of_plain(), rate = of_rate(), way = of_way();
+  }
+};
 
 // The larger one; NaN where one is, as past the end of a load that has no value from there on
 double larger(double x, double y) { return x >= y || std::isnan(x) ? x : y; }
@@ -54,7 +75,7 @@ MotionNorm<Space>::MotionNorm(const Mechanism<Space> &mechanism, bool is_strict)
     group_[n + i] = group_[i] + static_cast<int>(pace_.size());
   size_ = by_forces_ = by_given_ = std::vector<double>(2 * pace_.size(), 0.0);
   of_rates_.assign(pace_.size(), 0.0), peak_.assign(3 * pace_.size(), 0.0);
-  for (std::size_t i = 0; i < 2 * n; ++i) {
+  for (std::size_t i = 0; i < n; ++i) {
     const auto group = static_cast<std::size_t>(group_[i]);
     if (runs_.empty() || runs_.back().group != group)
       runs_.push_back({static_cast<Index>(i), 0, group});
@@ -116,16 +137,19 @@ template <class Space> void MotionNorm<Space>::add_spring(double stiffness, doub
 // size_: of all groups
 template <class Space> void MotionNorm<Space>::add_squares(const double *z) const {
   std::fill(size_.begin(), size_.end(), 0.0);
-  for (const auto &[first, count, group] : runs_)
-    size_[group] += Eigen::Map<const VectorXd>(z + first, count).squaredNorm();
+  const double *z_dot = z + radian_.size();
+  for (const auto &[first, count, group] : runs_) {
+    size_[group] += sum_of_squares(z + first, count);
+    size_[pace_.size() + group] += sum_of_squares(z_dot + first, count);
+  }
 }
 
 template <class Space> double MotionNorm<Space>::of_state(const double *e) const {
   add_squares(e);
   double worst = 0;
   for (std::size_t g = 0; g < size_.size(); ++g)
-    worst = larger(worst, std::sqrt(size_[g]) / std::max(peak_[g], nothing));
-  return worst;
+    worst = larger(worst, size_[g] / std::max(square(peak_[g]), nothing));
+  return std::sqrt(worst);
 }
 
 template <class Space> double MotionNorm<Space>::of_change(const double *change, double rate) const {
@@ -205,28 +229,29 @@ template <class Space>
 void MotionNorm<Space>::take(const double *z, const double *z_dot, const double *applied,
                              const Workspace<Space, double> &w) {
   const std::size_t n = radian_.size();
+  const std::size_t groups = pace_.size();
   // what the forces on modes will do to them, and what given ones would do alone, which may hold a link straight
   for (std::vector<double> *sizes : {&by_forces_, &by_given_, &of_rates_})
     std::fill(sizes->begin(), sizes->end(), 0.0);
   add_squares(z);
-  for (const auto &[first, count, group] : runs_)
-    if (group < pace_.size())
-      of_rates_[group] += Eigen::Map<const VectorXd>(z_dot + n + first, count).squaredNorm();
-  for (std::size_t i = 0; i < n; ++i)
-    if (const double radian = radian_[i]; radian > 0) {
-      const double rate = z_dot[n + i] * radian, way = rate * radian;
-      by_forces_[static_cast<std::size_t>(group_[i])] += square(way);
-      by_forces_[static_cast<std::size_t>(group_[n + i])] += square(rate);
-      if (applied) {
-        const double bent_rate = applied[i] * radian;
-        by_given_[static_cast<std::size_t>(group_[i])] += square(bent_rate * radian);
-        by_given_[static_cast<std::size_t>(group_[n + i])] += square(bent_rate);
-      }
+  for (const auto &[first, count, group] : runs_) {
+    const double *a = z_dot + n + first, *radian = radian_.data() + first;
+    if (group < 2) { // joints
+      of_rates_[group] += sum_of_squares(a, count);
+      continue;
     }
+    const SquaresOfModes by_forces(a, radian, count);
+    of_rates_[group] += by_forces.plain;
+    by_forces_[groups + group] += by_forces.rate, by_forces_[group] += by_forces.way;
+    if (applied) {
+      const SquaresOfModes by_given(applied + first, radian, count);
+      by_given_[groups + group] += by_given.rate, by_given_[group] += by_given.way;
+    }
+  }
   for (std::size_t g = 0; g < size_.size(); ++g)
-    peak_[g] = std::max(peak_[g], std::sqrt(std::max({size_[g], by_forces_[g], by_given_[g]})));
-  for (std::size_t g = 0; g < pace_.size(); ++g)
-    peak_[size_.size() + g] = std::max(peak_[size_.size() + g], std::sqrt(of_rates_[g]));
+    grow(peak_[g], std::max({size_[g], by_forces_[g], by_given_[g]}));
+  for (std::size_t g = 0; g < groups; ++g)
+    grow(peak_[size_.size() + g], of_rates_[g]);
   take_accelerations(w);
   // Rotation vectors start at zero in every step: an angle is compared with one radian at least, a way with a length.
   peak_[0] = std::max(peak_[0], sizes_.length()), peak_[1] = std::max(peak_[1], 1.0);

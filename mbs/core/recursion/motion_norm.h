@@ -69,7 +69,7 @@ private:
   double pace_of_springs_ = 0;   // 1/s, what a small twist makes
   double slow_acceleration_ = 0; // m/s^2: smaller ones count like this one
   std::vector<int> group_;       // of each of 2 n_v entries of z; those of rates follow those of what they are of
-  struct Run {                   // entries side by side of one group
+  struct Run {                   // entries of v side by side of one group
     Eigen::Index first, count;
     std::size_t group;
   };

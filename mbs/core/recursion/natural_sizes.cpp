@@ -23,7 +23,7 @@ double farthest(const spatial::Body &b) {
   return r;
 }
 
-double largest(const VectorXd &x, const VectorXd &size) {
+template <class Numbers> double largest(const Numbers &x, const VectorXd &size) {
   return x.cwiseQuotient(size).template lpNorm<Eigen::Infinity>();
 }
 

@@ -10,29 +10,46 @@ namespace ffrobot {
 
 inline constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 
-inline Jet operator+(const Jet &a, const Jet &b) {
+template <class T> [[gnu::always_inline]] inline JetOf<T> operator+(const JetOf<T> &a, const JetOf<T> &b) {
   return {a.value + b.value, a.rate + b.rate, a.acceleration + b.acceleration};
 }
-inline Jet operator-(const Jet &a, const Jet &b) {
+template <class T> [[gnu::always_inline]] inline JetOf<T> operator-(const JetOf<T> &a, const JetOf<T> &b) {
   return {a.value - b.value, a.rate - b.rate, a.acceleration - b.acceleration};
 }
-inline Jet operator-(const Jet &a) { return {-a.value, -a.rate, -a.acceleration}; }
+template <class T> [[gnu::always_inline]] inline JetOf<T> operator-(const JetOf<T> &a) {
+  return {-a.value, -a.rate, -a.acceleration};
+}
 
-inline Jet operator*(const Jet &a, const Jet &b) {
+template <class T> [[gnu::always_inline]] inline JetOf<T> operator*(const JetOf<T> &a, const JetOf<T> &b) {
   return {a.value * b.value, a.rate * b.value + a.value * b.rate,
           a.acceleration * b.value + 2.0 * a.rate * b.rate + a.value * b.acceleration};
 }
 
 /// Leibniz' rule on a = q b, solved for q.
-inline Jet operator/(const Jet &a, const Jet &b) {
-  const double value = a.value / b.value;
-  const double rate = (a.rate - value * b.rate) / b.value;
+template <class T> [[gnu::always_inline]] inline JetOf<T> operator/(const JetOf<T> &a, const JetOf<T> &b) {
+  const T value = a.value / b.value;
+  const T rate = (a.rate - value * b.rate) / b.value;
   return {value, rate, (a.acceleration - 2.0 * rate * b.rate - value * b.acceleration) / b.value};
 }
 
 /// Chain rule: f(u(t)) from f, df/du and d²f/du².
-inline Jet chain(const Jet &u, double f, double df, double ddf) {
+template <class T>
+[[gnu::always_inline]] inline JetOf<T> chain(const JetOf<T> &u, const T &f, const T &df, const T &ddf) {
   return {f, df * u.rate, ddf * u.rate * u.rate + df * u.acceleration};
+}
+
+/// Of an instruction that takes a constant for an operand
+template <class T> [[gnu::always_inline]] inline JetOf<T> apply_constant(Op op, const JetOf<T> &z, double constant) {
+  switch (op) {
+  case Op::add:
+    return {z.value + constant, z.rate, z.acceleration};
+  case Op::subtract:
+    return {z.value - constant, z.rate, z.acceleration};
+  case Op::multiply:
+    return {z.value * constant, z.rate * constant, z.acceleration * constant};
+  default:
+    return {z.value / constant, z.rate / constant, z.acceleration / constant};
+  }
 }
 
 inline Jet exp(const Jet &u) {
@@ -49,11 +66,6 @@ inline Jet log(const Jet &u) {
 inline Jet sqrt(const Jet &u) {
   const double f = std::sqrt(u.value);
   return chain(u, f, 0.5 / f, -0.25 / (f * u.value));
-}
-
-inline void sine_and_cosine(const Jet &u, Jet &sine, Jet &cosine) {
-  const double s = std::sin(u.value), c = std::cos(u.value); // one call of sincos
-  sine = chain(u, s, c, -s), cosine = chain(u, c, -s, -c);
 }
 
 inline Jet tan(const Jet &u) {
@@ -73,14 +85,15 @@ inline Jet abs(const Jet &u) {
 }
 
 /// u^n for a small integer n ≥ 2, by squaring: exact where the products are, and several times faster than pow.
-inline Jet integer_power(const Jet &u, int n) {
-  double lower = 1.0; // uⁿ⁻²
-  double square = u.value;
+template <class T> [[gnu::always_inline]] inline JetOf<T> integer_power(const JetOf<T> &u, int n) {
+  T lower = T{} + 1.0; // uⁿ⁻²
+  T square = u.value;
   for (int rest = n - 2; rest > 0; rest >>= 1, square *= square)
     if (rest & 1)
       lower *= square;
-  return chain(u, lower * u.value * u.value, n * lower * u.value, n * (n - 1) * lower);
+  return chain<T>(u, lower * u.value * u.value, n * lower * u.value, n * (n - 1) * lower);
 }
+inline bool is_small_integer(double n) { return n >= 2.0 && n <= 16.0 && n == std::floor(n); }
 
 inline Jet power(const Jet &u, const Jet &exponent) {
   if (exponent.rate != 0.0 || exponent.acceleration != 0.0)
@@ -90,7 +103,7 @@ inline Jet power(const Jet &u, const Jet &exponent) {
     return {1.0, 0.0, 0.0};
   if (n == 1.0)
     return u;
-  if (n >= 2.0 && n <= 16.0 && n == std::floor(n))
+  if (is_small_integer(n))
     return integer_power(u, static_cast<int>(n));
   return chain(u, std::pow(u.value, n), n * std::pow(u.value, n - 1.0), n * (n - 1.0) * std::pow(u.value, n - 2.0));
 }
@@ -114,16 +127,17 @@ inline Jet finite_or_nan(const Jet &jet) {
 
 // Of an instruction with operands: of one z, of two x and z, of three x, y and z
 [[gnu::always_inline]] inline Jet apply(const Expression::Instruction &i, const Jet &x, const Jet &y, const Jet &z) {
-  const double constant = i.constant;
+  if (i.takes_constant)
+    return apply_constant(i.op, z, i.constant);
   switch (i.op) {
   case Op::add:
-    return i.takes_constant ? Jet{z.value + constant, z.rate, z.acceleration} : x + z;
+    return x + z;
   case Op::subtract:
-    return i.takes_constant ? Jet{z.value - constant, z.rate, z.acceleration} : x - z;
+    return x - z;
   case Op::multiply:
-    return i.takes_constant ? Jet{z.value * constant, z.rate * constant, z.acceleration * constant} : x * z;
+    return x * z;
   case Op::divide:
-    return i.takes_constant ? Jet{z.value / constant, z.rate / constant, z.acceleration / constant} : x / z;
+    return x / z;
   case Op::power:
     return power(x, z);
   case Op::negate:
@@ -164,7 +178,7 @@ inline Jet finite_or_nan(const Jet &jet) {
   case Op::time:
     break;
   }
-  return {constant, 0.0, 0.0};
+  return {i.constant, 0.0, 0.0};
 }
 
 } // namespace ffrobot

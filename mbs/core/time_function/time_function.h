@@ -8,12 +8,14 @@
 
 namespace ffrobot {
 
-/// A function of time at one instant, with its exact first and second time derivative.
-struct Jet {
-  double value;
-  double rate;
-  double acceleration;
+/// A function of time at one instant, with its exact first and second time derivative; of several numbers T at as many
+/// instants.
+template <class T> struct JetOf {
+  T value;
+  T rate;
+  T acceleration;
 };
+using Jet = JetOf<double>;
 
 /// Instructions of an Expression. Operands stand on the stack in the order in which they are written.
 enum class Op : std::uint8_t {

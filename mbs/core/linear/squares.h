@@ -1,0 +1,45 @@
+// Sums of squares, four at once: the compiler does not reorder sums by itself.
+#pragma once
+
+#include "core/linear/four_doubles.h"
+
+#include <cstddef>
+#include <cstring>
+
+namespace ffrobot {
+
+class FourSums {
+public:
+  void add(const FourDoubles &x) { four_ += x; }
+  void add(double x) { rest_ += x; }
+  double operator()() const { return rest_ + ((four_[0] + four_[1]) + (four_[2] + four_[3])); }
+
+private:
+  FourDoubles four_{};
+  double rest_ = 0;
+};
+
+// visit(i, read) for i = 0, 4, … as long as four numbers follow, then for the others one by one; read(x + i) is what
+// stands there.
+template <class Visit> [[gnu::always_inline]] inline void for_fours(std::ptrdiff_t count, const Visit &visit) {
+  std::ptrdiff_t i = 0;
+  for (; i + 4 <= count; i += 4)
+    visit(i, [](const double *x) __attribute__((always_inline)) {
+      FourDoubles four;
+      std::memcpy(&four, x, sizeof four);
+      return four;
+    });
+  for (; i < count; ++i)
+    visit(i, [](const double *x) { return *x; });
+}
+
+[[gnu::always_inline]] inline double sum_of_squares(const double *x, std::ptrdiff_t count) {
+  FourSums sum;
+  for_fours(count, [&](std::ptrdiff_t i, auto read) __attribute__((always_inline)) {
+    const auto y = read(x + i);
+    sum.add(y * y);
+  });
+  return sum();
+}
+
+} // namespace ffrobot
