@@ -199,8 +199,7 @@ template <class Space> void RecursiveMotion<Space>::residuals(double t, const do
 }
 
 template <class Space> double RecursiveMotion<Space>::project(double t, double *q, double *v) {
-  // As in core/system/system.cpp: rounding of positions, moved into fast modes,
-  // is noise in their forces.
+  // Rounding of positions, moved into fast modes, is noise in their forces.
   constexpr double tolerance = 1e-12;
   constexpr int refresh_after = 3, most_iterations = 12;
   if (mechanism_.rows.empty())
