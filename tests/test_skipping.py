@@ -122,7 +122,7 @@ def test_algebraic_analyses_integrate_nothing(folder, monkeypatch):
     def refuse(*_):
         raise AssertionError
 
-    monkeypatch.setattr(_core, "run", refuse)
+    monkeypatch.setattr(_core, "run_tree", refuse)
     assert fcid._core is _core
     analysis = {"name": "stiff", "kind": "fcid", "shape": "static", "end": 0.1, "output_step": 0.01}
     solution = solve(arm(folder, "bending", analysis=[analysis]))

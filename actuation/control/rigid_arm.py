@@ -82,9 +82,9 @@ class RigidArm:
         rates = np.zeros(len(C_q))
         rates[self._motors] = gamma_dot
         v = as_floats(np.linalg.solve(C_q, rates))
-        h = -self._still.evaluate(0.0, q, v)[1][self._motors]
-        M = np.column_stack([-tree.evaluate(0.0, q, v)[1][self._motors] - h for tree in self._moved])
-        return M, h
+        state = self._still.state(q, v)  # the same in all of these trees
+        h, *moved = (-tree.both.at(0.0, *state).multipliers[0][self._motors] for tree in (self._still, *self._moved))
+        return np.column_stack(moved) - h[:, None], h
 
     def moments(self, gamma: Array, gamma_dot: Array, gamma_ddot: Array) -> Array:
         """τ (motors,) N·m."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from statistics import median
@@ -13,7 +13,7 @@ from ..run.watcher import Watcher
 from ..scene.load import make_scene
 from ..scene.scene import Scene
 from .errors import KINDS
-from .evaluation import State, evaluation_seconds, tree_evaluation_seconds
+from .evaluation import State, tree_evaluation_seconds
 from .hand_written import TIME, HandWritten, general_state
 from .precision import Point, Row, fastest, find_reference, measure_points, repeat_point
 
@@ -49,29 +49,26 @@ AIMS = (
 def measure_aims(
     scene: Scene, repository: Path, folder: Path, repeat: int, budget: float, display: Watcher
 ) -> list[Row]:
-    """Rows of the right-hand sides and of each aim; `scene` is cases/two_link, `repository` the source tree.
+    """Rows of the right-hand side and of each aim; `scene` is cases/two_link, `repository` the source tree.
 
     Raises `InputError` or `SolveError` where the hand-written program is not to be had.
     """
     model = prepare(scene).model
     display.stage("compiling the hand-written version")
     hand_written = HandWritten(repository, model, folder)
-    state = general_state(model)
-    rows = [
-        _right_hand_side("joint coordinates", tree_evaluation_seconds, hand_written, state, display),
-        _right_hand_side("absolute coordinates", evaluation_seconds, hand_written, state, display),
-    ]
+    rows = [_right_hand_side(hand_written, general_state(model), display)]
     for aim in AIMS:
         rows += _rows(aim, _scene(scene, aim), hand_written, repeat, budget, display)
     return rows
 
 
-def _right_hand_side(
-    run: str, seconds: Callable[[State, float, int], float], hand_written: HandWritten, state: State, display: Watcher
-) -> Row:
-    display.stage(f"right-hand side, {run}")
-    pairs = [(seconds(state, TIME, EVALUATIONS), hand_written.evaluation_seconds(EVALUATIONS)) for _ in range(ROUNDS)]
-    return {"what": "right-hand side", "within": "", "run": run, **_ratio(pairs, 1.5)}
+def _right_hand_side(hand_written: HandWritten, state: State, display: Watcher) -> Row:
+    display.stage("right-hand side")
+    pairs = [
+        (tree_evaluation_seconds(state, TIME, EVALUATIONS), hand_written.evaluation_seconds(EVALUATIONS))
+        for _ in range(ROUNDS)
+    ]
+    return {"what": "right-hand side", "within": "", "run": "joint coordinates", **_ratio(pairs, 1.5)}
 
 
 def _scene(scene: Scene, aim: Aim) -> Scene:

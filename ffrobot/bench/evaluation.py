@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import time
-
 import numpy as np
 
 from ..common.arrays import Array
-from ..mbs import _core
 from ..mbs.model.planar_tree import PlanarTree
 from ..mbs.model.system import MechanismSystem
 
@@ -15,19 +12,8 @@ State = tuple[MechanismSystem, Array, Array]
 """Equations, q and v."""
 
 
-def evaluation_seconds(state: State, t: float, evaluations: int) -> float:
-    """Seconds of one of so many `evaluations`, in absolute coordinates."""
-    assembly, q, v = state
-    began = time.perf_counter()
-    _core.time_evaluations(assembly.system, t, q, v, evaluations)
-    return (time.perf_counter() - began) / evaluations
-
-
 def tree_evaluation_seconds(state: State, t: float, evaluations: int) -> float:
-    """Seconds of one of so many `evaluations` in joint coordinates, without loads.
-
-    Raises `NotInTreeError` for a mechanism that cannot be told in them.
-    """
+    """Seconds of one of so many `evaluations` in joint coordinates, without loads."""
     assembly, q, v = state
     tree = PlanarTree(assembly)
     target = tree.row_signs * [constraint.target(t)[2] for constraint in tree.constraints]

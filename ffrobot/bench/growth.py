@@ -19,7 +19,7 @@ from ..mbs.model.planar_body import PlanarBody, PlanarPoint
 from ..mbs.model.system import MechanismSystem
 from ..run.watcher import Watcher
 from ..scene.scene import Scene
-from .evaluation import State, evaluation_seconds
+from .evaluation import State, tree_evaluation_seconds
 from .precision import Row
 
 MASS, LENGTH, STIFFNESS = 1.0, 1.0, 100.0  # kg, m, EI in N·m²
@@ -107,7 +107,7 @@ def _scene(bodies: Sequence[PlanarBody], angles: dict[str, float], closed: bool)
 
 def evaluation_timer(state: State, evaluations: int = EVALUATIONS) -> Callable[[], float]:
     """Measures the seconds of one of so many `evaluations` (over the number of coordinates, at least one)."""
-    return partial(evaluation_seconds, state, 0.0, max(1, evaluations // len(state[1])))
+    return partial(tree_evaluation_seconds, state, 0.0, max(1, evaluations // len(state[1])))
 
 
 def output_timer(outputs: int) -> Callable[[], float]:

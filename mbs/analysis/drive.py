@@ -147,15 +147,14 @@ def _integrated(
 
 def motion_of(assembly: MechanismSystem, run: _core.Run, times: Array) -> Motion:
     """The motion of a run of the core, as far as it got."""
-    reached, held = len(run.q), len(assembly.constraints)
-    return Motion(times[:reached], run.q, run.v, run.a, run.multipliers[:, :held], run.residual)
+    return Motion(times[: len(run.q)], run.q, run.v, run.a, run.multipliers, run.residual)
 
 
 def statistics_of(assembly: MechanismSystem, run: _core.Run, integrator: Choice, seconds: float) -> Statistics:
     """How a run of the core went, and why it ended where it failed."""
     status, cause = STATUS[run.status], ""
     if status not in ("completed", "interrupted"):
-        cause = find_cause(assembly, run.time_reached, State(*np.split(run.last, [assembly.system.n_q])))
+        cause = find_cause(assembly, run.time_reached, State(*np.split(run.last, [assembly.system.coordinates])))
     return Statistics(
         status, integrator, run.steps, run.rejected, run.evaluations, seconds, run.time_reached, cause,
         np.array(run.step_ends),

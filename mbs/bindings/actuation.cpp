@@ -1,4 +1,3 @@
-#include "core/actuation/actuator_forces.h"
 #include "core/actuation/actuators.h"
 #include "core/actuation/allocation.h"
 #include "core/actuation/points.h"
@@ -7,7 +6,6 @@
 
 #include <nanobind/eigen/dense.h>
 #include <nanobind/nanobind.h>
-#include <nanobind/stl/optional.h>
 #include <nanobind/stl/shared_ptr.h>
 #include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
@@ -57,10 +55,6 @@ std::tuple<RowMajorMatrix, RowMajorMatrix> sample(ActuationSource &source, const
 }
 
 void bind_sources(nb::module_ &m) {
-  nb::class_<ActuatorForces>(m, "ActuatorForces", "Trajectory forces as motor forces and modal forces.")
-      .def(nb::init<const System &, std::vector<bool>, std::vector<Measure>>(), "system"_a, "trajectory"_a, "motors"_a,
-           nb::keep_alive<1, 2>());
-
   nb::class_<ExternalLoads>(m, "ExternalLoads", "Loads from outside a system's own.");
   nb::class_<ActuationSource>(m, "ActuationSource", "What an inverse analysis found, at any time of it.")
       .def("sample", &sample, "times"_a, "tau (T, motors) and F_p (T, modes of all bodies).");

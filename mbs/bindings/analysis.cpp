@@ -4,6 +4,5 @@
 
 void bind_analysis(nanobind::module_ &m) {
   bind_run(m);
-  bind_sampled(m);
-  bind_replay(m);
+  bind_sensing(m);
 }

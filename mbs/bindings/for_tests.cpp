@@ -1,7 +1,7 @@
 // What tests alone look at: single pieces of the integrators, and a system with an orientation.
+#include "core/analysis/system_on_tree.h"
 #include "core/integrate/integrate.h"
 #include "core/space/rotation.h"
-#include "core/system/motion.h"
 
 #include <nanobind/eigen/dense.h>
 #include <nanobind/nanobind.h>
@@ -106,12 +106,12 @@ VectorXd joined(const VectorXd &q, const VectorXd &v) {
   return y;
 }
 
-RowMajorMatrix fixed_steps(const System &system, double end, int steps, const VectorXd &q, const VectorXd &v,
+RowMajorMatrix fixed_steps(const SystemOnTree &both, double end, int steps, const VectorXd &q, const VectorXd &v,
                            MethodKind kind, double spectral_radius) {
-  check_size("q", q.size(), system.n_q());
-  check_size("v", v.size(), system.n_v());
-  ConstrainedMotion motion(system);
-  motion.norm().plan(end);
+  check_size("q", q.size(), both.tree.n_q);
+  check_size("v", v.size(), both.tree.n_v);
+  TreeMotion motion(both.tree, both.scene, 0, q.data(), v.data());
+  motion.plan(end);
   return equal_steps(motion, joined(q, v), end, steps, {kind, spectral_radius});
 }
 
@@ -139,30 +139,11 @@ RowMajorMatrix top_motion(const Vector3d &inertia, const Vector3d &r, const Vect
   return states;
 }
 
-// x of N x + C_q^T nu = r, C_q x = c (iteration_matrix.h)
-VectorXd newton_step(const System &system, double t, const VectorXd &q, const VectorXd &v, double damping_factor,
-                     double stiffness_factor, const VectorXd &r, const VectorXd &c) {
-  check_size("q", q.size(), system.n_q());
-  check_size("v", v.size(), system.n_v());
-  check_size("r", r.size(), system.n_v());
-  check_size("c", c.size(), static_cast<Index>(system.n_bilateral()));
-  VectorXd all = VectorXd::Zero(static_cast<Index>(system.rows.size())); // nothing holds rotors
-  all.head(c.size()) = c;
-  ConstrainedMotion motion(system);
-  VectorXd x(system.n_v()), slope(motion.size());
-  motion.slope(t, joined(q, v).data(), slope.data());
-  motion.factorise(damping_factor, stiffness_factor);
-  motion.solve(r.data(), all.data(), x.data());
-  return x;
-}
-
 } // namespace
 
 void bind_for_tests(nb::module_ &m) {
-  m.def("fixed_steps", &fixed_steps, "system"_a, "end"_a, "steps"_a, "q"_a, "v"_a, "method"_a, "spectral_radius"_a,
-        "States after equal steps and in their middle (2 steps + 1, n_q + n_v), for convergence studies.");
-  m.def("newton_step", &newton_step, "system"_a, "t"_a, "q"_a, "v"_a, "damping_factor"_a, "stiffness_factor"_a, "r"_a,
-        "c"_a, "x of (M + damping_factor D + stiffness_factor K) x + C_q^T nu = r, C_q x = c; r on modes alone.");
+  m.def("fixed_steps", &fixed_steps, "both"_a, "end"_a, "steps"_a, "q"_a, "v"_a, "method"_a, "spectral_radius"_a,
+        "States of the tree after equal steps and in their middle (2 steps + 1, n_q + n_v), for convergence studies.");
   m.def("top_fixed_steps", &top_fixed_steps, "inertia"_a, "r"_a, "f"_a, "end"_a, "steps"_a, "q"_a, "v"_a, "method"_a,
         "spectral_radius"_a, "As fixed_steps, of a heavy top: q = (w, x, y, z), v = omega in body axes.");
   m.def("top_motion", &top_motion, "inertia"_a, "r"_a, "f"_a, "times"_a, "q"_a, "v"_a, "controls"_a,

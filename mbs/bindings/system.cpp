@@ -16,11 +16,9 @@ void bind_system(nb::module_ &m) {
       .def(
           "__init__", [](System *s, const Eigen::Vector2d &gravity) { (new (s) System())->gravity = gravity; },
           "gravity"_a)
-      .def_prop_ro("n_q", &System::n_q, "Length of q.")
-      .def_prop_ro("n_v", &System::n_v, "Length of v, a and increments of q.")
-      .def_prop_ro("coordinates", &System::n_v, "As n_v.")
+      .def_ro("coordinates", &System::coordinates, "Length of q, v and a.")
       .def_ro("length", &System::length)
       .def_ro("first_coordinate", &System::first_coordinate);
   bind_parts(system);
-  bind_evaluations(m, system);
+  bind_evaluations(system);
 }

@@ -9,6 +9,7 @@ import numpy as np
 
 from ...common.arrays import Array
 from ...common.plane import perpendicular, rotation
+from .. import _core
 from .geometric_stiffening import GeometricStiffening
 from .planar_body import PlanarBody, PlanarPoint, diagonalised
 from .system import MechanismSystem
@@ -93,8 +94,10 @@ def system_mass_matrix(system: MechanismSystem, q: Array) -> Array:
     """M (coordinates, coordinates) of all bodies and of the rotors in joints, at q (coordinates,)."""
     blocks = zip(system.model.bodies, system.first, strict=True)
     M = block_diagonal([mass_matrix(body, q[first : first + 3 + body.n_modes]) for body, first in blocks])
-    gradient, inertia = system.system.rotor_rows(q)
-    return M + gradient.T @ (inertia[:, None] * gradient)
+    sensing = _core.Sensing(system.system, [(measure, 1) for measure, _ in system.rotors], [])
+    at = np.tile(q, (len(q), 1))
+    gradient = sensing.read(at, np.eye(len(q)), np.zeros_like(at))  # rates of unit velocities
+    return M + gradient * [inertia for _, inertia in system.rotors] @ gradient.T
 
 
 def block_diagonal(blocks: Sequence[Array]) -> Array:

@@ -18,7 +18,7 @@ from .._core import TimeFunction
 from ..joints.measure import Marker, Measure
 from .model import ZERO, Constraint
 from .system import MechanismSystem
-from .tree_cuts import TreeCuts
+from .tree_cuts import TreeCuts, axis_of
 from .tree_layout import FREE, Coordinate, Layout, Node, NotInTreeError, turned_by
 
 COMPONENTS = {_core.MeasureKind.x: 0, _core.MeasureKind.y: 1, _core.MeasureKind.angle: 2, _core.MeasureKind.gear: 2}
@@ -181,10 +181,9 @@ class PlanarTree:
     def _turned(self, node: Node) -> _core.RowModel:
         """What a rotor beside the tree turns by, or goes, is what it measures."""
         assert node.beside is not None
-        found, turns = _core.RowModel(), node.beside.carries_moment
-        found.name, found.coordinate = node.beside.label, node.first
-        found.kind = _core.RowKind.rotation if turns else _core.RowKind.slide
-        found.f = np.array([0.0, 0.0, 1.0] if turns else [*node.beside.direction, 0.0])
+        found = _core.RowModel()
+        found.name, found.coordinate, found.f = node.beside.label, node.first, axis_of(node.beside)
+        found.kind = _core.RowKind.rotation if node.beside.carries_moment else _core.RowKind.slide
         found.a, found.b = self._layout.place(node.beside.a), self._layout.place(node.beside.b)
         self.scene.add_target(ZERO, 1.0)
         return found

@@ -1,4 +1,4 @@
-"""The equations of motion of a model under some of its constraints and drives, as the core evaluates them."""
+"""A model under some of its constraints and drives in absolute coordinates, as the core describes it."""
 
 from __future__ import annotations
 
@@ -19,8 +19,7 @@ class MechanismSystem:
     """A core `System` with the numbering that leads back from its measures to the scene.
 
     q, v and a are (…, coordinates): (R, θ, p) of each body, one body after the other, from `first` on; m, rad, √kg·m.
-    `constraints` are in the core's order: joints and trajectories sorted for a small envelope of C M⁻¹ Cᵀ. Rotors of
-    joints come after them in the core, where they are measures, too, and friction after the drives.
+    Motions are found in joint coordinates (`planar_tree`); in these they are told, measured, and their forces found.
     """
 
     def __init__(
@@ -33,12 +32,12 @@ class MechanismSystem:
         self.model = model
         self.index = {body.name: i for i, body in enumerate(model.bodies)}
         self._markers: list[list[str]] = [[] for _ in model.bodies]
-        self.constraints = tuple(constraints[i] for i in envelope_order([c.measure for c in constraints]))
+        self.constraints = tuple(constraints)
         self.drives = tuple(drives)
         core = self.core_measure
         self.constraint_measures = [core(c.measure) for c in self.constraints]
         driven = [(core(measure), magnitude) for measure, magnitude in drives]
-        rotors = [(core(measure), inertia) for measure, inertia in model.rotors]
+        self.rotors = [(core(measure), inertia) for measure, inertia in model.rotors]
         frictions = [(core(measure), friction) for measure, friction in model.frictions]
         state_forces = [(self._marker(marker), function) for marker, function in model.state_forces]
         self.motor_measures = [core(measure) for measure in motors]
@@ -51,7 +50,7 @@ class MechanismSystem:
             self.system.add_body(**core_arguments(body, [_point(body, name) for name in markers], markers))
         for constraint, measure in zip(self.constraints, self.constraint_measures, strict=True):
             self.system.add_constraint(measure, constraint.target)
-        for measure, inertia in rotors:
+        for measure, inertia in self.rotors:
             self.system.add_rotor(measure, inertia)
         for measure, magnitude in driven:
             self.system.add_drive(measure, magnitude)
@@ -178,15 +177,3 @@ def _point(body: PlanarBody, name: str) -> PlanarPoint:
     if name != FRAME:
         return body.points[name]
     return PlanarPoint(np.zeros(2), np.zeros((2, body.n_modes)), np.zeros(body.n_modes))
-
-
-def envelope_order(measures: Sequence[Measure]) -> list[int]:
-    """Order of constraints that keeps the envelope of C M⁻¹ Cᵀ small: reverse Cuthill–McKee on shared bodies."""
-    touched = [{marker.body for marker in (measure.a, measure.b)} - {None} for measure in measures]
-    if len({body for bodies in touched for body in bodies}) <= 2:
-        return list(range(len(measures)))
-    from scipy.sparse import csr_array
-    from scipy.sparse.csgraph import reverse_cuthill_mckee
-
-    graph = np.array([[not a.isdisjoint(b) for b in touched] for a in touched], dtype=float)
-    return [int(i) for i in reverse_cuthill_mckee(csr_array(graph), symmetric_mode=True)]

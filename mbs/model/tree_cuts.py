@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from ...common.arrays import Array
 from .. import _core
 from ..joints.measure import Marker, Measure
 from ..joints.transmission import ElasticGear, Friction
@@ -32,20 +33,9 @@ class TreeCuts:
 
     def resist(self, measure: Measure, friction: Friction) -> int:
         """Friction along a measure; the number of its joint. Raises `NotInTreeError` as `along`."""
-        a, b = measure.a, measure.b
-        if measure.carries_moment:
-            axis = (0.0, 0.0)
-        elif measure.kind == _core.MeasureKind.slide:
-            axis = measure.direction
-        elif a.body is None:
-            axis = (1.0, 0.0) if measure.kind == _core.MeasureKind.x else (0.0, 1.0)
-        else:  # it would turn with the first body
-            raise NotInTreeError(f"a motor or friction along a direction of the ground ({measure.label})")
-        along = np.array([*axis, 1.0 if measure.carries_moment else 0.0])
-        self._scene.add_cut_joint(
-            self._wrench(a), self._wrench(b), measure.carries_moment, along, friction.viscous, friction.coulomb,
-            friction.speed,
-        )  # fmt: skip
+        sides, axis = (self._wrench(measure.a), self._wrench(measure.b)), axis_of(measure)
+        how = friction.viscous, friction.coulomb, friction.speed
+        self._scene.add_cut_joint(*sides, measure.carries_moment, axis, *how)
         return self._numbered()
 
     def add_gear(self, gear: ElasticGear, motor: int) -> None:
@@ -57,3 +47,17 @@ class TreeCuts:
     def _numbered(self) -> int:
         self._count += 1
         return self._count - 1
+
+
+def axis_of(measure: Measure) -> Array:
+    """Direction along which a measure goes, or about which it turns, (3,) in axes of its first side.
+
+    Raises `NotInTreeError` for a direction of the ground between two bodies, which would turn with the first one.
+    """
+    if measure.carries_moment:
+        return np.array([0.0, 0.0, 1.0])
+    if measure.kind == _core.MeasureKind.slide:
+        return np.array([*measure.direction, 0.0])
+    if measure.a.body is not None:
+        raise NotInTreeError(f"a rotor, a motor or friction along a direction of the ground ({measure.label})")
+    return np.array([1.0, 0.0, 0.0] if measure.kind == _core.MeasureKind.x else [0.0, 1.0, 0.0])

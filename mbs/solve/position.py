@@ -25,7 +25,7 @@ def solve_positions(assembly: MechanismSystem, t: float, q: Array) -> Array | No
         assembly.scales,
         assembly.measure_scales,
     )
-    rest = np.zeros(system.n_v)
+    rest = np.zeros(system.coordinates)
     for _ in range(MOST_ITERATIONS):
         C, _, C_q = system.constraints(t, q, rest)
         size = 1.0 + np.abs(q / scales).max(initial=0.0)
@@ -36,9 +36,9 @@ def solve_positions(assembly: MechanismSystem, t: float, q: Array) -> Array | No
             return None
         step = _least_step(assembly, C_q, C)
         largest = np.abs(step / scales[r]).max()
-        change = np.zeros(system.n_v)
+        change = np.zeros(system.coordinates)
         change[r] = -step * min(1.0, LARGEST_TURN * size / largest) if largest else -step
-        q = system.integrate(q, change)
+        q = q + change
     return q if left <= 1e3 * TOLERANCE * size else None
 
 

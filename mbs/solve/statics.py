@@ -24,7 +24,7 @@ def static_equilibrium(assembly: MechanismSystem, start: State) -> State:
 
     Raises `SolveError` where the robot has no equilibrium near the start.
     """
-    system, n = assembly.system, assembly.system.n_v
+    system, n = assembly.system, assembly.system.coordinates
     rest, sizes = np.zeros(n), assembly.scales
     forces: ForcesOfMotion | None = None  # made once, where a step is made
 
@@ -49,7 +49,7 @@ def static_equilibrium(assembly: MechanismSystem, start: State) -> State:
             break
         largest = float(np.abs(step[:n] / sizes).max())
         change = -step * min(1.0, LARGEST_STEP / largest if largest else 1.0)
-        q, multipliers = system.integrate(q, change[:n]), multipliers + change[n:]
+        q, multipliers = q + change[:n], multipliers + change[n:]
         if not np.all(np.isfinite(change)):
             break
     raise SolveError(

@@ -54,7 +54,7 @@ class TreeLinearisation:
         bare = _bare(model)
         assembly = MechanismSystem(bare, bare.joints, bare.loads)
         self._tree, self._model = PlanarTree(assembly, is_forced=True), model
-        self._bare_size, self._n = assembly.system.n_v, self._tree.core.n_v
+        self._bare_size, self._n = assembly.system.coordinates, self._tree.core.n_v
         self._rotors = {gear.rotor: self._n + k for k, gear in enumerate(model.gears)}
         self._p = [k for body in bare.bodies for k in self._tree.modes[body.name]]
         self._S = np.vstack([self._lines(independent), self._identity[self._p]])

@@ -40,11 +40,11 @@ def evaluate(core, count):
     module = importlib.util.module_from_spec(spec)
     sys.modules[spec.name] = ffrobot.mbs._core = module
     spec.loader.exec_module(module)
+    from ffrobot.bench.evaluation import tree_evaluation_seconds
     from ffrobot.bench.hand_written import TIME, general_state
     from ffrobot.run.prepare import prepare
 
-    assembly, q, v = general_state(prepare(SCENE).model)
-    module.time_evaluations(assembly.system, TIME, q, v, count)
+    tree_evaluation_seconds(general_state(prepare(SCENE).model), TIME, count)
 
 
 def counted(*command):

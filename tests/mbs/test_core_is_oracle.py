@@ -5,6 +5,7 @@ import pytest
 import zoo
 from mechanisms import assemble, energies, evaluate, joint_state, oracle_of, random_state, relative
 
+from ffrobot.mbs import _core
 from ffrobot.mbs.fields.expressions import parse_expression
 from ffrobot.mbs.model.model import ModalLoad
 
@@ -38,6 +39,30 @@ def test_constraints_rates_and_jacobian(case):
     system, oracle, q, v = case
     for got, expected in zip(system.constraints(T, q, v), oracle.constraint_values(T, q, v), strict=True):
         assert relative(got, expected) < 1e-14
+
+
+def test_forces_of_a_motion(case):
+    """M a − Q of any a, with rotors, friction and loads."""
+    system, oracle, q, v = case
+    a = np.random.default_rng(5).standard_normal(len(q))
+    expected = oracle.mass_matrix(q) @ a - oracle.forces(T, q, v)
+    assert relative(system.required_forces(np.array([T]), q[None], v[None], a[None])[0], expected) < 1e-13
+
+
+@pytest.mark.parametrize("name", zoo.ALL)
+def test_what_sensors_read_of_rows(name):
+    """Values, rates and accelerations."""
+    assembly = assemble(zoo.build(name))
+    oracle, rng = oracle_of(assembly), np.random.default_rng(6)
+    (q, v), a = random_state(rng, oracle.size), rng.standard_normal(oracle.size)
+    measures = [*assembly.constraint_measures, *(measure for measure, _ in assembly.rotors)]
+    rows = [*(row for row, _ in oracle.constraints), *(row for row, _ in oracle.rotors)]
+    if not rows:
+        return
+    states = [oracle.row(row, q, v) for row in rows]
+    expected = [[at.value, at.rate, at.gradient @ a + at.bias] for at in states]
+    sensing = _core.Sensing(assembly.system, [(measure, order) for measure in measures for order in range(3)], [])
+    assert relative(sensing.read(q[None], v[None], a[None])[0], np.ravel(expected)) < 1e-13
 
 
 def test_forces_at_rest(case):

@@ -30,7 +30,7 @@ from ffrobot.mbs.analysis.pcid import run_pcid
 from ffrobot.mbs.analysis.replay import ActuatorSet, actuation_source
 from ffrobot.mbs.fields.field_types import Vector2
 from ffrobot.mbs.joints.joints import JOINT_TYPES, Joint
-from ffrobot.mbs.joints.measure import relative_angle, slide
+from ffrobot.mbs.joints.measure import Measure, relative_angle, slide
 from ffrobot.mbs.joints.moving_joint import MovingJoint
 from ffrobot.mbs.joints.transmission import Rotor
 from ffrobot.mbs.model.model import ZERO, build_model
@@ -74,10 +74,24 @@ class GuideJoint(SlotJoint):
         return Rotor(self.coordinate(motors), self.rotor_inertia * self.gear_ratio**2)
 
 
+class RailJoint(GuideJoint):
+    """A pin on a line along the ground's x axis, the second side of it; its coordinate is the way in x."""
+
+    type: Literal["rail"]
+
+    def constraints(self, angle):
+        return (Measure(f"{self.label}, y", _core.MeasureKind.y, *self.markers),)
+
+    def coordinate(self, motors):
+        return Measure(f"{self.label}, x", _core.MeasureKind.x, *self.markers)
+
+
 class SceneWithSlots(Scene):
     """A scene whose list of types has more entries."""
 
-    joint: tuple[Annotated[get_args(Joint)[0] | SlotJoint | GuideJoint, Field(discriminator="type")], ...] = ()
+    joint: tuple[
+        Annotated[get_args(Joint)[0] | SlotJoint | GuideJoint | RailJoint, Field(discriminator="type")], ...
+    ] = ()
 
 
 def scene_with(joint, trajectory=()):
@@ -108,7 +122,7 @@ def test_a_pin_slides_in_an_inclined_slot_and_turns():
 
 
 def on_arm(slot=None, **tables):
-    """An arm on a pin, and a disk whose pin slides along it and turns there."""
+    """An arm on a pin, and a disk whose pin slides along it and turns there, or does so on the ground."""
     arm = {"mass": 1.5, "inertia": 0.2, "center": [0.4, 0.1], "points": {"root": [0.0, 0.0], "slot": [0.3, 0.05]}}
     disk = {"mass": 2.0, "inertia": 0.5, "center": [0.1, 0.2], "points": {"pin": [0.05, 0.0], "rim": [0.3, 0.1]}}
     keys = {"name": "slot", "gravity": [0.0, -9.81], "path": "slot.toml", "text": "", **tables}
@@ -132,7 +146,7 @@ AS_BUILT = {
 }
 
 
-@pytest.mark.parametrize("kind", ["slot", "guide"])
+@pytest.mark.parametrize("kind", ["slot", "guide", "rail"])
 @pytest.mark.parametrize("what", [None, *AS_BUILT])
 @pytest.mark.parametrize("paths", [(), PATHS])
 def test_what_acts_along_its_coordinate(kind, what, paths):
@@ -141,6 +155,8 @@ def test_what_acts_along_its_coordinate(kind, what, paths):
     Along the way, a direction that turns with the arm, as about the pin.
     """
     slot = AS_BUILT.get(what, {}) | {"type": kind}
+    if kind == "rail":  # it holds one direction of the place
+        slot, paths = slot | {"between": ["ground", "disk.pin"], "at": [0.5, 0.2]}, paths[1:]
     model = on_arm(slot, trajectory=list(paths), load=[{"joint": "S", "moment": "2+t"}])
     assembly = assemble(model)
     start, rng = undeformed_state(assembly), np.random.default_rng(0)
@@ -152,6 +168,15 @@ def test_what_acts_along_its_coordinate(kind, what, paths):
     assert relative(found, multipliers) < 1e-12
     energies = tree.both.energies(*(x[None] for x in tree.state(q, v)))[0]
     np.testing.assert_allclose(energies, oracle.energies(q, v), rtol=1e-12, atol=1e-14)
+
+
+@pytest.mark.parametrize("what", AS_BUILT)
+def test_what_would_act_along_a_direction_of_the_ground_between_two_bodies_is_refused(what):
+    """It would turn with the first of them."""
+    model = on_arm(AS_BUILT[what] | {"type": "rail"})
+    expected = r'kind = "forward" what joint coordinates can tell, found .* direction of the ground \(.*joint "S", x\)'
+    with pytest.raises(InputError, match=expected):
+        run_forward(model, forward(end=0.3), None, {}, always)
 
 
 def test_forces_of_paths_carry_the_motion_out_again():
@@ -231,10 +256,10 @@ def test_its_keys_are_checked():
     between = {"name": "S", "between": ["ground", "a.pin"]}
     with pytest.raises(InputError, match='joint "S": way: expected a value, since this key is required'):
         scene_with(between | {"type": "slot"})
-    with pytest.raises(InputError, match='joint "S": expected the key "way" only in slot or guide joints, found it in'):
+    with pytest.raises(InputError, match='joint "S": expected the key "way" only in slot or guide or rail joints'):
         scene_with(between | {"type": "revolute", "way": [1.0, 0.0]})
     with pytest.raises(
-        InputError, match='joint "S": type: expected "revolute", "prismatic", "weld", "slot" or "guide"'
+        InputError, match='joint "S": type: expected "revolute", "prismatic", "weld", "slot", "guide" or "rail"'
     ):
         scene_with(between | {"type": "slit"})
     with pytest.raises(InputError, match=r'joint "S": wy: expected one of the keys .*did you mean "way"'):

@@ -6,7 +6,7 @@ from types import MappingProxyType
 import numpy as np
 import zoo
 from links import arm, arm_links
-from mechanisms import always, assemble, pcid, random_state, relative
+from mechanisms import always, assemble, evaluate, joint_state, pcid, relative
 
 from ffrobot.mbs.analysis.pcid import run_pcid
 from ffrobot.mbs.model.planar_body import PlanarPoint
@@ -60,12 +60,14 @@ def test_general_modes_do_not_depend_on_the_signs():
     bodies = zoo.clouds(rng, 2)
     signs = [np.array([1, -1, -1, 1]), np.array([-1, -1, 1, 1])]
     tables = {"joint": zoo.serial_joints(2), "trajectory": [zoo.tip_path("b2")]}
-    systems = [
-        assemble(zoo.make_model(b, **tables)).system
+    assemblies = [
+        assemble(zoo.make_model(b, **tables))
         for b in (bodies, [with_signs(body, s) for body, s in zip(bodies, signs, strict=True)])
     ]
-    q, v = random_state(rng, systems[0].coordinates)
+    q, v = joint_state(rng, assemblies[0])
     flip = np.concatenate([np.ones(3), signs[0], np.ones(3), signs[1]])
-    (a, lambda_), (a_flipped, lambda_flipped) = systems[0].evaluate(0, q, v), systems[1].evaluate(0, flip * q, flip * v)
+    (a, lambda_), (a_flipped, lambda_flipped) = (
+        evaluate(assembly, 0.0, signs * q, signs * v) for assembly, signs in zip(assemblies, (1.0, flip), strict=True)
+    )
     assert relative(flip * a_flipped, a) < 1e-12
     assert relative(lambda_flipped, lambda_) < 1e-12

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from links import arm
-from mechanisms import always, forward, make_model, pcid, revolute
+from mechanisms import always, evaluate, forward, make_model, pcid, revolute
 from patch_sets import FULL
 from robots import free_run
 from rods import rod
@@ -34,7 +34,7 @@ def fastest_growth(assembly, q):
         for _ in range(3):
             C, _, J = system.constraints(0.0, state, rest)
             state = state - np.linalg.lstsq(J, C, rcond=None)[0]
-        return system.evaluate(0.0, state, rest)[0]
+        return evaluate(assembly, 0.0, state, rest)[0]
 
     A = np.array([free.T @ (acceleration(d, h) - acceleration(d, -h)) / (2 * h) for d in free.T]).T
     return np.sqrt(np.linalg.eigvals(A).astype(complex)).real.max()

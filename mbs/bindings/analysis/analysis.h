@@ -3,6 +3,5 @@
 
 #include <nanobind/nanobind.h>
 
-void bind_run(nanobind::module_ &m);     // integrated motions
-void bind_sampled(nanobind::module_ &m); // under a sampled controller
-void bind_replay(nanobind::module_ &m);  // algebraic ones, and sources of actuation
+void bind_run(nanobind::module_ &m);     // what motions report
+void bind_sensing(nanobind::module_ &m); // what is read of them

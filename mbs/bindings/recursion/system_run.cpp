@@ -208,7 +208,9 @@ void bind_system_run(nb::module_ &m) {
       .def("__init__", &make_actuation, "both"_a, "recording"_a, nb::keep_alive<1, 2>(), nb::keep_alive<1, 3>());
   m.def("run_tree", &run_tree, "both"_a, nb::kw_only(), "times"_a, "q"_a, "v"_a, "controls"_a, "carry_on"_a,
         "external_loads"_a = nb::none(), "recording"_a = nb::none(), "checkpoint"_a = nb::none(),
-        "As `run`, but integrates the tree from (q, v) of its own, in which recording and checkpoint are, too.");
+        "Integrates the motion from (q, v) of the tree, or on from a checkpoint, which it moves, and reports it at "
+        "`times`.\n"
+        "Recording and checkpoint are of the tree, too.");
   m.def("run_tree_sampled", &run_tree_sampled, "both"_a, nb::kw_only(), "times"_a, "q"_a, "v"_a, "controls"_a,
         "carry_on"_a, "motors"_a, "patches"_a, "first_command"_a, "sensing"_a, "samples"_a, "delay"_a, "controller"_a,
         "As `run_tree`, under commands that `controller`(k, t, readings) gives at samples.");

@@ -29,7 +29,7 @@ void add_body(System &system, double mass, double inertia, const Vector2d &first
        {std::pair("damping", damping.rows()), {"j", j.size()}, {"S_tilde", S_tilde.rows()}, {"m_xy", m_xy.rows()}})
     if (size)
       check_size(name, size, n);
-  PlanarBody body{mass, inertia, first_moment, stiffness, damping, W, j, S_tilde, m_xy, marker_positions, {}, {}, {}};
+  PlanarBody body{mass, inertia, first_moment, stiffness, damping, W, j, S_tilde, m_xy, marker_positions, {}, {}};
   for (std::size_t row = 0; row < second_order.size(); ++row)
     if (second_order[row].size()) {
       check_size("second_order", second_order[row].rows(), n);
@@ -46,7 +46,7 @@ void add_constraint(System &system, const Measure &row, const TimeFunction &targ
   system.constraints.push_back({row, target});
 }
 
-void add_rotor(System &system, const Measure &row, double inertia) { system.rotors.push_back({row, 1 / inertia}); }
+void add_rotor(System &system, const Measure &row, double inertia) { system.rotors.push_back({row, inertia}); }
 
 void add_friction(System &system, const Measure &row, double viscous, double coulomb, double speed) {
   system.drives.push_back({row, Constant(0.0), {viscous, coulomb, speed}});

@@ -5,5 +5,5 @@
 
 #include <nanobind/nanobind.h>
 
-void bind_parts(nanobind::class_<ffrobot::System> &system);                             // bodies, constraints, loads
-void bind_evaluations(nanobind::module_ &m, nanobind::class_<ffrobot::System> &system); // what is computed of a state
+void bind_parts(nanobind::class_<ffrobot::System> &system);       // bodies, constraints, loads
+void bind_evaluations(nanobind::class_<ffrobot::System> &system); // what is computed of a state

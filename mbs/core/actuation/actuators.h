@@ -2,9 +2,9 @@
 #pragma once
 
 #include "core/actuation/allocation.h"
+#include "core/actuation/external_loads.h"
 #include "core/actuation/points.h"
 #include "core/actuation/source.h"
-#include "core/system/motion.h"
 
 #include <memory>
 #include <optional>
@@ -13,18 +13,18 @@
 namespace ffrobot {
 
 // Turns the findings of an inverse analysis, evaluated for the time in question, into loads on the forward system:
-// adds to external_drive (from `first_drive` of the actuator on) or external_modal.
+// sets drives (from `first_drive` of the actuator on) or modal forces.
 class Actuator {
 public:
   virtual ~Actuator() = default;
-  virtual void act(ActuationSource &source, Workspace &forward) = 0;
+  virtual void act(ActuationSource &source, ExternalForces &forward) = 0;
 };
 
 // The forces -lambda_s on their points: one drive per trajectory constraint.
 class TrajectoryForces final : public Actuator {
 public:
   explicit TrajectoryForces(std::size_t first_drive) : first_drive_(first_drive) {}
-  void act(ActuationSource &source, Workspace &forward) override;
+  void act(ActuationSource &source, ExternalForces &forward) override;
 
 private:
   std::size_t first_drive_;
@@ -34,7 +34,7 @@ private:
 class Motors final : public Actuator {
 public:
   Motors(std::size_t first_drive, Eigen::VectorXd limit) : first_drive_(first_drive), limit_(std::move(limit)) {}
-  void act(ActuationSource &source, Workspace &forward) override;
+  void act(ActuationSource &source, ExternalForces &forward) override;
 
 private:
   std::size_t first_drive_;
@@ -47,7 +47,7 @@ class Patches final : public Actuator {
 public:
   Patches(std::size_t body, Allocation allocation)
       : body_(body), allocation_(std::move(allocation)), force_(allocation_.Phi().rows()) {}
-  void act(ActuationSource &source, Workspace &forward) override;
+  void act(ActuationSource &source, ExternalForces &forward) override;
 
 private:
   std::size_t body_;
@@ -60,7 +60,7 @@ class PointForces final : public Actuator {
 public:
   PointForces(std::size_t first_drive, std::size_t body, ActuationPoints points)
       : first_drive_(first_drive), body_(body), points_(std::move(points)) {}
-  void act(ActuationSource &source, Workspace &forward) override;
+  void act(ActuationSource &source, ExternalForces &forward) override;
 
 private:
   std::size_t first_drive_, body_;
@@ -72,7 +72,7 @@ public:
   Actuation(std::shared_ptr<ActuationSource> source, std::vector<std::shared_ptr<Actuator>> actuators)
       : source_(std::move(source)), actuators_(std::move(actuators)) {}
 
-  void apply(double t, Workspace &forward) override;
+  void apply(double t, ExternalForces &forward) override;
 
 private:
   std::shared_ptr<ActuationSource> source_;

@@ -9,20 +9,23 @@ using Eigen::MatrixXd;
 using Eigen::Vector2d;
 using Eigen::VectorXd;
 
-void driving_force(const System &system, const Workspace &w, const std::function<bool(std::size_t)> &is_trajectory,
-                   const VectorXd &shape_force, std::size_t body, VectorXd &Q_a) {
-  VectorXd gradient(system.n_v());
+VectorXd driving_force(const System &system, const Workspace &w, const std::vector<TrajectoryForce> &forces,
+                       const VectorXd &shape_force, std::size_t body) {
+  VectorXd gradient(system.coordinates);
   const Index first = system.first_coordinate[body], n = system.bodies[body].modes();
-  Q_a = VectorXd::Zero(3 + n);
+  VectorXd Q_a = VectorXd::Zero(3 + n);
   Q_a.tail(n) = shape_force;
-  for (std::size_t r = 0; r < system.n_bilateral(); ++r) {
-    const Measure &row = system.rows[r];
-    if (!is_trajectory(r) || (row.a.body != static_cast<int>(body) && row.b.body != static_cast<int>(body)))
+  MeasureMotion motion;
+  for (const auto &[constraint, force] : forces) {
+    const Measure &row = system.constraints[constraint].row;
+    if (row.a.body != static_cast<int>(body) && row.b.body != static_cast<int>(body))
       continue;
+    evaluate(row, w.bodies, motion);
     gradient.setZero();
-    jacobian(row, w.rows[r], system.bodies, w.bodies, system.first_coordinate, gradient);
-    Q_a -= w.lambda[static_cast<Index>(r)] * gradient.segment(first, 3 + n);
+    jacobian(row, motion, system.bodies, w.bodies, system.first_coordinate, gradient);
+    Q_a += force * gradient.segment(first, 3 + n);
   }
+  return Q_a;
 }
 
 ActuationPoints::ActuationPoints(Eigen::Matrix2Xd direction, Eigen::Matrix2Xd position, MatrixXd Phi, VectorXd scale)

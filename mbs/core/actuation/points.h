@@ -5,13 +5,19 @@
 
 #include <Eigen/LU>
 #include <Eigen/QR>
-#include <functional>
+#include <vector>
 
 namespace ffrobot {
 
-// Q_a = -C_sq^T lambda_s - (0, 0, lambda_p) on (R, theta, p) of one body.
-void driving_force(const System &system, const Workspace &w, const std::function<bool(std::size_t)> &is_trajectory,
-                   const Eigen::VectorXd &shape_force, std::size_t body, Eigen::VectorXd &Q_a);
+// The force -lambda_s on a trajectory, constraint by constraint.
+struct TrajectoryForce {
+  std::size_t constraint;
+  double force; // N, N m
+};
+
+// Q_a = -C_sq^T lambda_s - (0, 0, lambda_p) on (R, theta, p) of one body, at the kinematics of w.
+Eigen::VectorXd driving_force(const System &system, const Workspace &w, const std::vector<TrajectoryForce> &forces,
+                              const Eigen::VectorXd &shape_force, std::size_t body);
 
 // Components of force at points, along axes of the body frame: L_a F_a = Q_a (Eq. 9), where the column of a component
 // along e at the point x is, with R in body axes,

@@ -25,7 +25,7 @@ const VectorXd &Sensing::read(const double *q, const double *v, const double *a)
     evaluate(row, workspace_.bodies, motion);
     readings_[i++] = order == 0   ? motion.value
                      : order == 1 ? motion.rate
-                                  : row_acceleration(system_, row, motion, q, a, workspace_);
+                                  : row_acceleration(system_, row, motion, a, workspace_);
   }
   for (const auto &[first, vector, order] : modes_) {
     double reading = 0;
@@ -57,37 +57,11 @@ void HeldCommands::set(const VectorXd &u) {
   }
 }
 
-void HeldCommands::apply(double, Workspace &workspace) {
-  std::copy(drive_.begin(), drive_.end(), workspace.external_drive.begin());
-  workspace.has_external_modal = !patches_.empty();
+void HeldCommands::apply(double, ExternalForces &forces) {
+  std::copy(drive_.begin(), drive_.end(), forces.drive.begin());
+  forces.has_modal = !patches_.empty();
   for (std::size_t i = 0; i < patches_.size(); ++i)
-    distribute(modal_[i], patches_[i].first, workspace.external_modal);
-}
-
-Run run_sampled(ConstrainedMotion &motion, const std::vector<double> &times, const VectorXd &q, const VectorXd &v,
-                const IntegrationControls &controls, HeldCommands &commands, Sensing &sensing, const Sampling &sampling,
-                const std::function<bool(double)> &carry_on) {
-  const System &system = motion.system();
-  OutputEvaluator evaluate(system, times.size(), &commands, nullptr);
-  VectorXd y(q.size() + v.size());
-  y << q, v;
-  VectorXd a = VectorXd::Zero(system.n_v());
-  HeldPlant plant(commands, sensing, [&](double t, const double *state) -> HeldPlant::Observed {
-    const double *rates = state + system.n_q();
-    if (sensing.needs_accelerations()) {
-      commands.apply(t, motion.workspace());
-      accelerations(system, t, state, rates, motion.workspace(), a.data());
-    }
-    return {state, rates, a.data()};
-  });
-  const SampledLoop loop(plant, sampling, times.back());
-  Run result;
-  result.report = integrate(
-      motion, times, y, controls, [&](std::size_t i, double t, const double *state) { evaluate(i, t, state); },
-      carry_on, nullptr, &loop.breaks());
-  result.outputs = evaluate.take(result.report.outputs);
-  result.last = y;
-  return result;
+    distribute(modal_[i], patches_[i].first, forces.modal);
 }
 
 } // namespace ffrobot

@@ -1,8 +1,9 @@
 // A motion under a sampled controller: sensors are read at samples, commands are held in between.
 #pragma once
 
-#include "core/analysis/run.h"
+#include "core/actuation/external_loads.h"
 #include "core/integrate/sampled_loop.h"
+#include "core/system/system.h"
 
 #include <functional>
 #include <utility>
@@ -50,7 +51,7 @@ public:
 
   // u: motors, then the patches of one body after the other.
   void set(const Eigen::VectorXd &u);
-  void apply(double t, Workspace &workspace) override;
+  void apply(double t, ExternalForces &forces) override;
 
 private:
   std::vector<double> drive_;
@@ -80,10 +81,5 @@ private:
   Sensing &sensing_;
   Observe observe_;
 };
-
-// As run(); `commands` are the external loads of `motion`, and hold what they were set to until the first command acts.
-Run run_sampled(ConstrainedMotion &motion, const std::vector<double> &times, const Eigen::VectorXd &q,
-                const Eigen::VectorXd &v, const IntegrationControls &controls, HeldCommands &commands, Sensing &sensing,
-                const Sampling &sampling, const std::function<bool(double)> &carry_on);
 
 } // namespace ffrobot

@@ -11,7 +11,7 @@ using Eigen::VectorXd;
 
 void SystemOnTree::check() const {
   const std::size_t count = system.bodies.size();
-  const auto constraints = system.n_bilateral();
+  const auto constraints = system.constraints.size();
   bool fits = bodies.size() <= tree.nodes.size() && bodies.size() == count && drives.modes.size() == count;
   for (std::size_t i = 0; fits && i < bodies.size(); ++i)
     fits = bodies[i] < system.bodies.size() && system.bodies[bodies[i]].modes() == tree.nodes[i].n() &&
@@ -51,7 +51,7 @@ double rotor_over_ratio(const recursion::Node<recursion::Planar> &node, double t
 } // namespace
 
 AbsoluteState::AbsoluteState(const SystemOnTree &both)
-    : both_(both), workspace_(both.tree), state_(VectorXd::Zero(both.system.n_q() + both.system.n_v())) {}
+    : both_(both), workspace_(both.tree), state_(VectorXd::Zero(2 * both.system.coordinates)) {}
 
 const VectorXd &AbsoluteState::operator()(const double *state) {
   return (*this)(state, recursion::frame_poses(both_.tree, state, state + both_.tree.n_q, workspace_));
@@ -65,7 +65,7 @@ const VectorXd &AbsoluteState::operator()(const double *state, const std::vector
     const auto &[r, r_dot, omega, R, angle] = frames[i];
     const double x = node.origin[0], y = node.origin[1]; // of the body's frame, in axes of the tree's
     const double d_x = R[0][0] * x + R[0][1] * y, d_y = R[1][0] * x + R[1][1] * y;
-    const Index at = system.first_coordinate[both_.bodies[i]], at_rate = system.n_q() + at;
+    const Index at = system.first_coordinate[both_.bodies[i]], at_rate = system.coordinates + at;
     if (node.is_weightless) {
       const double theta = q[node.q], theta_dot = v[node.v];
       state_.segment<3>(at) << 0, 0, rotor_over_ratio(node, theta, angle);
@@ -95,23 +95,29 @@ void AbsoluteState::accelerations(const std::vector<recursion::FrameMotion> &fra
   }
 }
 
+SteeredTree::SteeredTree(const SystemOnTree &both, ExternalLoads &loads) : loads_(loads), drives_(both.drives) {
+  forces_.drive.assign(both.system.drives.size(), 0.0);
+  for (const auto &body : both.system.bodies)
+    forces_.modal.emplace_back(VectorXd::Zero(body.modes()));
+}
+
 void SteeredTree::add(double t, double *force, double *wrench) {
-  loads_.apply(t, workspace_);
+  loads_.apply(t, forces_);
   for (const auto &[drive, coordinate, share] : drives_.along)
-    force[coordinate] += share * workspace_.external_drive[drive];
+    force[coordinate] += share * forces_.drive[drive];
   for (const auto &[drive, at, component, share] : drives_.at_points)
-    wrench[recursion::Planar::dim * at + component] += share * workspace_.external_drive[drive];
-  if (!workspace_.has_external_modal)
+    wrench[recursion::Planar::dim * at + component] += share * forces_.drive[drive];
+  if (!forces_.has_modal)
     return;
   for (std::size_t b = 0; b < drives_.modes.size(); ++b) {
-    const VectorXd &modal = workspace_.external_modal[b];
+    const VectorXd &modal = forces_.modal[b];
     Eigen::Map<VectorXd>(force + drives_.modes[b], modal.size()) += modal;
   }
 }
 
 void SteeredTree::add_along_cuts(double *along) {
   for (const auto &[drive, joint] : drives_.along_cuts)
-    along[joint] += workspace_.external_drive[drive];
+    along[joint] += forces_.drive[drive];
 }
 
 } // namespace ffrobot

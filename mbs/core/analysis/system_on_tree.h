@@ -2,9 +2,10 @@
 // and motor forces of the one are told in the other.
 #pragma once
 
+#include "core/actuation/external_loads.h"
 #include "core/recursion/motion.h"
 #include "core/recursion/observe.h"
-#include "core/system/motion.h"
+#include "core/system/system.h"
 
 namespace ffrobot {
 
@@ -84,9 +85,9 @@ public:
   const Eigen::VectorXd &operator()(const double *state);
   const Eigen::VectorXd &operator()(const double *state, const std::vector<recursion::Pose<double>> &frames);
 
-  Eigen::Index n_q() const { return both_.system.n_q(); }
+  Eigen::Index coordinates() const { return both_.system.coordinates; } // of q and of v
 
-  // a (n_v of the system) for that of the tree, where frames move as they do
+  // a (coordinates of the system) for that of the tree, where frames move as they do
   void accelerations(const std::vector<recursion::FrameMotion> &frames, const double *a_tree, double *a) const;
 
 private:
@@ -99,8 +100,7 @@ private:
 class SteeredTree final : public recursion::Steering {
 public:
   // All must outlive this.
-  SteeredTree(const SystemOnTree &both, ExternalLoads &loads)
-      : loads_(loads), drives_(both.drives), workspace_(both.system) {}
+  SteeredTree(const SystemOnTree &both, ExternalLoads &loads);
 
   void add(double t, double *force, double *wrench) override;
   void add_along_cuts(double *along) override;
@@ -108,7 +108,7 @@ public:
 private:
   ExternalLoads &loads_;
   const DrivesOnTree &drives_;
-  Workspace workspace_;
+  ExternalForces forces_;
 };
 
 } // namespace ffrobot

@@ -26,14 +26,14 @@ TreeOutputs::TreeOutputs(const SystemOnTree &both, std::size_t count, double t, 
                          ExternalLoads *external_loads)
     : both_(both), steering_(external_loads ? std::make_optional<SteeredTree>(both, *external_loads) : std::nullopt),
       motion_(both.tree, both.scene, t, state, state + both.tree.n_q, nullptr, steering_ ? &*steering_ : nullptr),
-      absolute_(both), forces_(both.tree), state_(both.state_size()), a_(both.tree.n_v), system_a_(both.system.n_v()),
-      value_(VectorXd::Zero(static_cast<Index>(both.tree.rows.size()))), rate_(value_) {
+      absolute_(both), forces_(both.tree), state_(both.state_size()), a_(both.tree.n_v),
+      system_a_(both.system.coordinates), value_(VectorXd::Zero(static_cast<Index>(both.tree.rows.size()))),
+      rate_(value_) {
   const auto T = static_cast<Index>(count);
   const System &system = both.system;
-  outputs_.q.resize(T, system.n_q());
-  for (auto *x : {&outputs_.v, &outputs_.a})
-    x->resize(T, system.n_v());
-  outputs_.lambda = RowMajorMatrix::Zero(T, static_cast<Index>(system.n_bilateral()));
+  for (auto *x : {&outputs_.q, &outputs_.v, &outputs_.a})
+    x->resize(T, system.coordinates);
+  outputs_.lambda = RowMajorMatrix::Zero(T, static_cast<Index>(system.constraints.size()));
   outputs_.residual = RowMajorMatrix::Zero(T, 3);
   if (both.reactions.motors.empty())
     return;
@@ -104,8 +104,8 @@ void TreeOutputs::write_violation(Index i, const VectorXd &value, const VectorXd
 void TreeOutputs::write(Index i, const std::vector<Jet> &targets, const TreeWorkspace &w, const double *wrenches) {
   outputs_.residual(i, 2) = acceleration_residual(both_, targets, a_.data(), forces_, w);
   const VectorXd &absolute = absolute_(state_.data(), w.frames);
-  outputs_.q.row(i) = absolute.head(both_.system.n_q()).transpose();
-  outputs_.v.row(i) = absolute.tail(both_.system.n_v()).transpose();
+  outputs_.q.row(i) = absolute.head(both_.system.coordinates).transpose();
+  outputs_.v.row(i) = absolute.tail(both_.system.coordinates).transpose();
   outputs_.a.row(i) = system_a_.transpose();
   write_multipliers(i, w, wrenches);
   if (!motors_)

@@ -1,5 +1,4 @@
-// What is reported of a planar system that is integrated in joint coordinates: the quantities of OutputEvaluator, from
-// the recursion.
+// What is reported of a planar system, which is integrated in joint coordinates: from the recursion.
 #pragma once
 
 #include "core/analysis/motors_on_tree.h"

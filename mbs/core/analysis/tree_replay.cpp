@@ -40,20 +40,14 @@ void TreeSource::take(const double *state, const recursion::Workspace<recursion:
 ActuationSource::OnBody TreeSource::on_body(std::size_t body) {
   const System &system = both_.system;
   const VectorXd &y = absolute_(state_.data());
-  update_kinematics(system, y.data(), y.data() + system.n_q(), workspace_);
-  std::vector<bool> is_trajectory(system.n_bilateral(), false);
-  Index k = 0;
+  update_kinematics(system, y.data(), y.data() + system.coordinates, workspace_);
+  std::vector<TrajectoryForce> forces;
   for (const auto &row : both_.reactions.rows)
-    if (row.is_trajectory) {
-      const auto r = static_cast<std::size_t>(row.constraint);
-      is_trajectory[r] = true;
-      workspace_.lambda[row.constraint] = -trajectory_force_[k++];
-      ffrobot::evaluate(system.rows[r], workspace_.bodies, workspace_.rows[r]);
-    }
-  OnBody found{y.segment(system.first_coordinate[body], 3 + system.bodies[body].modes()), {}};
-  driving_force(
-      system, workspace_, [&](std::size_t r) { return is_trajectory[r]; }, shape_force_[body], body, found.Q_a);
-  return found;
+    if (row.is_trajectory)
+      forces.push_back(
+          {static_cast<std::size_t>(row.constraint), trajectory_force_[static_cast<Index>(forces.size())]});
+  return {y.segment(system.first_coordinate[body], 3 + system.bodies[body].modes()),
+          driving_force(system, workspace_, forces, shape_force_[body], body)};
 }
 
 namespace {

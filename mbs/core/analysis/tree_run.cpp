@@ -21,7 +21,7 @@ Run run_sampled(TreeMotion &motion, const std::vector<double> &times, Eigen::Vec
   HeldPlant plant(commands, sensing, [&](double t, const double *y) -> HeldPlant::Observed {
     const double *a = sensing.needs_accelerations() ? outputs.accelerations(t, y).data() : nullptr;
     const Eigen::VectorXd &absolute = outputs.absolute()(y);
-    return {absolute.data(), absolute.data() + outputs.absolute().n_q(), a};
+    return {absolute.data(), absolute.data() + outputs.absolute().coordinates(), a};
   });
   const SampledLoop loop(plant, sampling, times.back());
   return run(motion, times, std::move(state), controls, outputs, carry_on, nullptr, &loop.breaks(), nullptr);

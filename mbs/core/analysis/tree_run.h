@@ -6,8 +6,9 @@
 
 namespace ffrobot {
 
-// As the run() of a system, but `motion`, `state`, `recording` and `checkpoint` are of the tree, and so is all that
-// `motion` remembers. `recording`, `breaks` and `checkpoint` may be null.
+// Integrates `motion` from `state` over `times`. State, recording and checkpoint are of the tree; `recording`, `breaks`
+// and `checkpoint` may be null. Where the run goes on from a checkpoint, rows of outputs that were delivered before are
+// left as they are: undefined.
 Run run(TreeMotion &motion, const std::vector<double> &times, Eigen::VectorXd state,
         const IntegrationControls &controls, TreeOutputs &outputs, const std::function<bool(double)> &carry_on,
         Recording *recording, const Breaks *breaks, IntegrationCheckpoint *checkpoint);

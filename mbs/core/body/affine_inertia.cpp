@@ -14,8 +14,6 @@ using VectorMap = Eigen::Map<const VectorXd>;
 
 namespace {
 
-constexpr std::array<Index, 4> order = {0, 2, 1, 3}; // x and stretch, those of foreshortening, first
-
 template <class Rows> auto quarter_turn(const Rows &x) {
   Eigen::Matrix<double, 4, Rows::ColsAtCompileTime> turned(4, x.cols());
   turned << -x.row(1), x.row(0), -x.row(3), x.row(2);
@@ -37,56 +35,13 @@ AffineInertia::AffineInertia(double mass, const Vector2d &first_moment, double J
   m_xy_rest = m_xy - affine;
   m_ff_rest = MatrixXd::Identity(modes(), modes()) - affine;
   S_tilde_rest = S_tilde - quarter_turn(F).transpose() * N_inverse * F;
-
-  moving = K[1].size() || K[3].size() || first_moment.y() != 0 ? 4 : 2;
-  const auto moved = [&](const MatrixXd &x) {
-    MatrixXd chosen(moving, x.cols());
-    for (Index i = 0; i < moving; ++i)
-      chosen.row(i) = x.row(order[static_cast<std::size_t>(i)]);
-    return chosen;
-  };
-  constant = moved(F).isZero(0) ? 0 : moving;
-  const MatrixXd N_moved = moved(moved(N).transpose());
-  C = C_inverse = MatrixXd::Zero(rank(), rank());
-  C.topLeftCorner(moving, moving) = N_moved.inverse();
-  C_inverse.topLeftCorner(moving, moving) = N_moved;
-  C.bottomRightCorner(constant, constant) = -C.topLeftCorner(constant, constant);
-  C_inverse.bottomRightCorner(constant, constant) = -N_moved.topLeftCorner(constant, constant);
-}
-
-void AffineInertia::rows(const Matrix4Xd &F_p, Eigen::Ref<MatrixXd, 0, Eigen::OuterStride<>> U) const {
-  for (Index i = 0; i < 4; ++i) {
-    const Index field = order[static_cast<std::size_t>(i)];
-    if (i < moving) {
-      U.row(i) = F_p.row(field);
-      if (constant)
-        U.row(moving + i) = F.row(field);
-    } else {
-      U.row(constant + i) = F.row(field);
-    }
-  }
-}
-
-void AffineInertia::spread(const Vector4d &a, const Vector4d &b, double *x) const {
-  for (Index i = 0; i < 4; ++i) {
-    const Index field = order[static_cast<std::size_t>(i)];
-    if (i < moving) {
-      x[i] = a[field];
-      if (constant)
-        x[moving + i] = b[field];
-    } else {
-      x[constant + i] = a[field] + b[field];
-    }
-  }
 }
 
 void update(const AffineInertia &inertia, const double *p, const double *p_dot, AffineMotion &motion) {
   const Index n = inertia.modes();
   const VectorMap p_(p, n), p_dot_(p_dot, n);
-  motion.F_p = inertia.F * p_;
-  motion.F_p_dot = inertia.F * p_dot_;
-  motion.g = inertia.N.col(2) + motion.F_p;
-  motion.g_dot = motion.F_p_dot;
+  motion.g = inertia.N.col(2) + inertia.F * p_;
+  motion.g_dot = inertia.F * p_dot_;
   motion.curvature.setZero();
   motion.F = inertia.F;
   for (Index i = 0; i < 4; ++i) {
@@ -100,35 +55,6 @@ void update(const AffineInertia &inertia, const double *p, const double *p_dot, 
     motion.K_p.noalias() = K * p_dot_;
     motion.curvature[i] = p_dot_.dot(motion.K_p);
   }
-  motion.u = inertia.N_inverse * motion.g;
-}
-
-// u^T g + p^T (m_xy - F^T N^-1 F) p
-double rotary_inertia(const AffineInertia &inertia, const AffineMotion &motion, double p_m_xy_p) {
-  return motion.u.dot(motion.g) + p_m_xy_p - motion.F_p.dot(inertia.N_inverse * motion.F_p);
-}
-
-// (i u)^T F(p) - (i N^-1 F p)^T F
-void coupling(const AffineInertia &inertia, const AffineMotion &motion, double *x) {
-  const Vector4d of_rest = inertia.N_inverse * motion.F_p;
-  inertia.spread(quarter_turn(motion.u), -quarter_turn(of_rest), x);
-}
-
-// On the modes F(p)^T N^-1 y + F^T N^-1 y_rest, on theta (i g)^T N^-1 y + 2 theta_dot (F p)^T N^-1 F p_dot.
-double velocity_force(const AffineInertia &inertia, const AffineMotion &motion, double w, double *x) {
-  const Vector4d y = w * w * motion.g - 2 * w * quarter_turn(motion.g_dot) + motion.curvature;
-  const Vector4d y_rest = -w * w * motion.F_p + 2 * w * quarter_turn(motion.F_p_dot);
-  inertia.spread(inertia.N_inverse * y, inertia.N_inverse * y_rest, x);
-  return quarter_turn(motion.u).dot(y) + 2 * w * motion.F_p.dot(inertia.N_inverse * motion.F_p_dot);
-}
-
-double kinetic_energy(const AffineInertia &inertia, const AffineMotion &motion, const double *p, const double *p_dot,
-                      const Vector2d &R_dot, double w) {
-  const VectorMap p_(p, inertia.modes()), p_dot_(p_dot, inertia.modes());
-  const Vector4d momentum = inertia.N.leftCols<2>() * R_dot + w * quarter_turn(motion.g) + motion.g_dot;
-  return 0.5 * (momentum.dot(inertia.N_inverse * momentum) + w * w * p_.dot(inertia.m_xy_rest * p_) +
-                p_dot_.dot(inertia.m_ff_rest * p_dot_)) +
-         w * p_.dot(inertia.S_tilde_rest * p_dot_);
 }
 
 // f = X^T N^-1 gamma + that of the rest, gamma = X a - theta_dot^2 g + 2 i theta_dot g_dot - p_dot^T K p_dot

@@ -39,42 +39,17 @@ struct AffineInertia {
   Matrix4Xd F;
   std::array<Eigen::MatrixXd, 4> K;
   Eigen::MatrixXd m_xy_rest, S_tilde_rest, m_ff_rest; // of what the modes have beside affine fields
-
-  // m_ff = I - F^T N^-1 F + F(p)^T N^-1 F(p) = I + U^T C U, U: the rows of F(p) that move, then the same of F where
-  // they are not zero. `rows` are these, and behind them those of F that do not move.
-  Eigen::Index moving = 0, constant = 0;
-  Eigen::MatrixXd C, C_inverse;
-  Eigen::Index rank() const { return moving + constant; }
-  Eigen::Index row_count() const { return constant + 4; }
-  void rows(const Matrix4Xd &F_p, Eigen::Ref<Eigen::MatrixXd, 0, Eigen::OuterStride<>> into) const;
-  // x (row_count) with rows(F(p))^T x = F(p)^T a + F^T b
-  void spread(const Eigen::Vector4d &a, const Eigen::Vector4d &b, double *x) const;
 };
 
 // The affine part of a body's motion at (p, p_dot).
 struct AffineMotion {
-  Matrix4Xd F;                  // F(p)
-  Eigen::Vector4d g, u, g_dot;  // g_dot = F(p) p_dot
-  Eigen::Vector4d curvature;    // p_dot^T K p_dot
-  Eigen::Vector4d F_p, F_p_dot; // F p, F p_dot of the linear body
-  Eigen::VectorXd K_p;          // (n) for one field after the other
+  Matrix4Xd F;               // F(p)
+  Eigen::Vector4d g, g_dot;  // g_dot = F(p) p_dot
+  Eigen::Vector4d curvature; // p_dot^T K p_dot
+  Eigen::VectorXd K_p;       // (n) for one field after the other
 };
 
 void update(const AffineInertia &inertia, const double *p, const double *p_dot, AffineMotion &motion);
-
-// m_thetatheta, of which p^T m_xy p is known
-double rotary_inertia(const AffineInertia &inertia, const AffineMotion &motion, double p_m_xy_p);
-
-// m_thetaf less p^T S_tilde, as x of `spread`
-void coupling(const AffineInertia &inertia, const AffineMotion &motion, double *x);
-
-// Quadratic velocity forces: on the modes less theta_dot^2 m_xy p + 2 theta_dot S_tilde p_dot, as x of `spread`; on
-// theta, the result, less -2 theta_dot p^T m_xy p_dot.
-double velocity_force(const AffineInertia &inertia, const AffineMotion &motion, double theta_dot, double *x);
-
-// J, R_dot in body axes
-double kinetic_energy(const AffineInertia &inertia, const AffineMotion &motion, const double *p, const double *p_dot,
-                      const Eigen::Vector2d &R_dot, double theta_dot);
 
 // Inertia forces M a - Q (3 + n), R in body axes, under accelerations a = (A^T (R_ddot - g), theta_ddot, p_ddot).
 Eigen::VectorXd inertia_force(const AffineInertia &inertia, const AffineMotion &motion, const double *p,

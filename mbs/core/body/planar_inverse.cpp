@@ -10,15 +10,10 @@ using VectorMap = Eigen::Map<const VectorXd>;
 
 namespace {
 
-Vector2d perpendicular(const Vector2d &v) { return {-v.y(), v.x()}; }
-
 // Takes the applied loads off f, in global axes.
 void subtract_loads(const PlanarBody &body, const PlanarBodyState &s, Eigen::Map<VectorXd> f) {
   auto f_f = f.tail(body.modes());
-  if (s.has_modal_load)
-    f_f -= s.modal_load;
-  if (!s.has_wrench)
-    return;
+  f_f -= s.modal_load;
   for (Index k = 0; k < body.markers(); ++k) {
     const Vector2d force = s.wrench.col(k).head<2>();
     f.head<2>() -= force;
@@ -41,7 +36,7 @@ void subtract_loads(const PlanarBody &body, const PlanarBodyState &s, Eigen::Map
 //
 // With geometric stiffening the inertia forces are those of affine_inertia.h.
 void required_force(const PlanarBody &body, const double *q, const double *v, const double *a, const Vector2d &gravity,
-                    PlanarBodyState &s, double *f) {
+                    const PlanarBodyState &s, double *f) {
   const Index n = body.modes();
   const VectorMap p(q + 3, n), p_dot(v + 3, n), p_ddot(a + 3, n);
   const double theta_dot = v[2], theta_ddot = a[2];

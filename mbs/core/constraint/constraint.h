@@ -14,14 +14,10 @@ struct Constraint {
   TimeFunction target;
 };
 
-// The kinetic energy 1/2 J row_dot^2 of a rotor whose angle is the row; compliance = 1/J, 1/(kg m^2).
-//
-// M q_ddot + J d d^T q_ddot with the gradient d of the row is the multiplier mu = J d^T q_ddot of one more row, with
-// -1/J on the diagonal: d^T q_ddot - mu/J = 0 beside M q_ddot + d mu = Q. C M^-1 C^T gets 1/J there and stays positive
-// definite. Nothing holds such a row: as a constraint its value and rate are 0.
+// The kinetic energy 1/2 J row_dot^2 of a rotor whose angle is the row.
 struct Rotor {
   Measure row;
-  double compliance;
+  double inertia; // J, kg m^2
 };
 
 // -(c v + tau_c tanh(v / v_s)) along a row whose rate is v: viscous and Coulomb friction, the latter smooth about rest.

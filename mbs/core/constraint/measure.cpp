@@ -74,18 +74,4 @@ void jacobian(const Measure &row, const MeasureMotion &motion, const std::vector
   add(row.b, motion.coefficient_b);
 }
 
-void add_frame_gradient(const Measure &row, const MeasureMotion &motion, const std::vector<PlanarBodyState> &states,
-                        Eigen::Ref<Eigen::VectorXd> gradient) {
-  const auto add = [&](const MarkerReference &m, const Vector3d &coefficient) {
-    if (m.body < 0)
-      return;
-    const auto &arm = states[static_cast<std::size_t>(m.body)].markers[static_cast<std::size_t>(m.marker)].arm;
-    auto g = gradient.segment<3>(3 * m.body);
-    g.head<2>() += coefficient.head<2>();
-    g[2] += arm.x() * coefficient[1] - arm.y() * coefficient[0] + coefficient[2];
-  };
-  add(row.a, motion.coefficient_a);
-  add(row.b, motion.coefficient_b);
-}
-
 } // namespace ffrobot

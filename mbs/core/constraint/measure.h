@@ -31,15 +31,6 @@ enum class MeasureKind {
          // on a that turns N times as fast as b does on a
 };
 
-// Whether a force along it is a moment.
-constexpr bool carries_moment(MeasureKind kind) { return kind == MeasureKind::angle || kind == MeasureKind::gear; }
-
-// Whether the directions of such rows, and with them their coefficients below, move with the bodies.
-constexpr bool moves(MeasureKind kind) { return kind == MeasureKind::slide; }
-
-// The only coefficient (x, y, angle) that is not zero in rows that do not move.
-constexpr int component_of(MeasureKind kind) { return kind == MeasureKind::gear ? 2 : static_cast<int>(kind); }
-
 struct Measure {
   MeasureKind kind;
   MarkerReference a, b;
@@ -64,9 +55,5 @@ void add_wrench(const Measure &row, const MeasureMotion &motion, double force, s
 void jacobian(const Measure &row, const MeasureMotion &motion, const std::vector<PlanarBody> &bodies,
               const std::vector<PlanarBodyState> &states, const std::vector<Eigen::Index> &first_coordinate,
               Eigen::Ref<Eigen::VectorXd> gradient);
-
-// The part of it that belongs to the frames: (R, theta) of all bodies, three entries each. Adds to `gradient`.
-void add_frame_gradient(const Measure &row, const MeasureMotion &motion, const std::vector<PlanarBodyState> &states,
-                        Eigen::Ref<Eigen::VectorXd> gradient);
 
 } // namespace ffrobot

@@ -229,8 +229,7 @@ template <class Space> double RecursiveMotion<Space>::project(double t, double *
 
 template <class Space>
 double RecursiveMotion<Space>::project(double t, double *q, double *v, Workspace<Space, double> &w) {
-  // As in core/system/system.cpp: rounding of positions, moved into fast modes,
-  // is noise in their forces.
+  // Rounding of positions, moved into fast modes, is noise in their forces.
   constexpr double tolerance = 1e-12;
   constexpr int refresh_after = 3, most_iterations = 12;
   if (mechanism_.rows.empty())

@@ -17,8 +17,8 @@ struct NormPeaks {
 // Errors e and states z are local coordinates (space/local_coordinates.h).
 template <class Space> class MotionNorm {
 public:
-  // `is_strict`: forces between bodies stand for those on the ground, too, which are not observed; rates are judged as
-  // in absolute coordinates (core/system/error_norm.*), where those of modes are parts of a body's velocity.
+  // `is_strict`: forces between bodies stand for those on the ground, too, which are not observed; rates of modes are
+  // judged as parts of a body's velocity.
   explicit MotionNorm(const Mechanism<Space> &mechanism, bool is_strict = false);
 
   // The run will last `duration` s. Rates are slow, and accelerations small, beside the natural pace.
