@@ -25,14 +25,14 @@ bool Dop853::step(double t, const double *y, double h, double) {
 // far below that of order 3, would bring the error of fast vibration down as well.
 void Dop853::estimate(double h, Eigen::VectorXd &error) {
   constexpr double least = std::numeric_limits<double>::min(); // where nothing moves there is no error
-  combine_all<Tableau::e5, Tableau::stages + 1>(K_.data(), n_, error.data());
-  combine_all<Tableau::e3, Tableau::stages + 1>(K_.data(), n_, stage_.data());
+  constexpr std::make_index_sequence<Tableau::stages + 1> slopes;
+  const auto of5 = [&](Index i) { return combine<Tableau::e5>(K_.data(), n_, i, slopes); };
+  const auto of3 = [&](Index i) { return combine<Tableau::e3>(K_.data(), n_, i, slopes); };
   const Index n_v = n_ / 2;
-  double *q = error.data(), *v = q + n_v;
-  const double *of_q = stage_.data(), *of_v = of_q + n_v;
+  double *__restrict q = error.data(), *__restrict v = q + n_v;
 #pragma GCC ivdep
   for (Index i = 0; i < n_v; ++i) {
-    const double q5 = q[i], v5 = h * v[i], q3 = of_q[i], v3 = h * of_v[i];
+    const double q5 = of5(i), v5 = h * of5(n_v + i), q3 = of3(i), v3 = h * of3(n_v + i);
     const double square5 = q5 * q5 + v5 * v5, square = square5 + 0.01 * (q3 * q3 + v3 * v3);
     const double factor = std::sqrt(square5 / std::max(square, least));
     q[i] = h * factor * q5;

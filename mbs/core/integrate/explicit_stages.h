@@ -9,7 +9,8 @@ namespace ffrobot {
 
 // sum of coefficient[j] * K_j[i] over the nonzero coefficients
 template <const auto &Coefficients, std::size_t... j>
-double combine(const double *K, Eigen::Index n, Eigen::Index i, std::index_sequence<j...>) {
+[[gnu::always_inline]] inline double combine(const double *K, Eigen::Index n, Eigen::Index i,
+                                             std::index_sequence<j...>) {
   const auto term = [&]<std::size_t J>() {
     if constexpr (Coefficients[J] != 0)
       return Coefficients[J] * K[static_cast<Eigen::Index>(J) * n + i];
@@ -19,14 +20,7 @@ double combine(const double *K, Eigen::Index n, Eigen::Index i, std::index_seque
   return (term.template operator()<j>() + ...);
 }
 
-// out = sum of coefficients times slopes; K holds the slopes one after the other
-template <const auto &Coefficients, int Count>
-void combine_all(const double *K, Eigen::Index n, double *__restrict out) {
-  for (Eigen::Index i = 0; i < n; ++i)
-    out[i] = combine<Coefficients>(K, n, i, std::make_index_sequence<Count>());
-}
-
-// out = y + h times that sum
+// out = y + h times that sum; K holds the slopes one after the other
 template <const auto &Coefficients, int Count>
 void advance(const double *K, Eigen::Index n, double h, const double *y, double *__restrict out) {
   for (Eigen::Index i = 0; i < n; ++i)

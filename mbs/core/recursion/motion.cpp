@@ -85,12 +85,15 @@ template <class Space> void RecursiveMotion<Space>::find_targets(double t) {
   const auto begin = foreseen_times_.begin();
   if (next_foreseen_ >= foreseen_times_.size() || foreseen_times_[next_foreseen_] != t)
     next_foreseen_ = static_cast<std::size_t>(std::find(begin, foreseen_times_.end(), t) - begin);
+  const Jet *found = jets_.data();
   if (next_foreseen_ < foreseen_times_.size())
-    std::copy_n(foreseen_.data() + rows * next_foreseen_++, rows, jets_.data());
+    found = foreseen_.data() + rows * next_foreseen_++;
   else
     laws_(t, jets_.data());
-  for (std::size_t r = 0; r < rows; ++r)
-    jets_[r] = scene_.targets[r].of(jets_[r]), target_[static_cast<Index>(r)] = jets_[r].acceleration;
+  for (std::size_t r = 0; r < rows; ++r) {
+    const Jet jet = scene_.targets[r].of(found[r]);
+    jets_[r] = jet, target_[static_cast<Index>(r)] = jet.acceleration;
+  }
   for (const DrivenMarker &driven : scene_.driven) {
     const auto i = static_cast<std::size_t>(driven.marker);
     workspace_.turning[i] = measured_.turning[i] = newton_.turning[i] = driven.law(t);

@@ -23,8 +23,8 @@ double farthest(const spatial::Body &b) {
   return r;
 }
 
-template <class Numbers> double largest(const Numbers &x, const VectorXd &size) {
-  return x.cwiseQuotient(size).template lpNorm<Eigen::Infinity>();
+template <class Numbers> double largest(const Numbers &x, const VectorXd &inverse_size) {
+  return x.cwiseProduct(inverse_size).template lpNorm<Eigen::Infinity>();
 }
 
 } // namespace
@@ -59,6 +59,8 @@ template <class Space> NaturalSizes<Space>::NaturalSizes(const Mechanism<Space> 
     of_q_.segment(node.p_q(), node.n()).setConstant(of_modes);
     of_v_.segment(node.p_v(), node.n()).setConstant(of_modes);
   }
+  for (VectorXd *sizes : {&of_row_, &of_q_, &of_v_})
+    *sizes = sizes->cwiseInverse();
 }
 
 template <class Space> void NaturalSizes<Space>::plan(double duration) { pace_ = std::max(1 / duration, by_gravity_); }

@@ -29,7 +29,7 @@ private:
   double by_gravity_ = 0, pace_ = 1;
   double length_ = 0;
   std::vector<double> reach_;
-  Eigen::VectorXd of_row_, of_q_, of_v_; // (rows), (n_q), (n_v): 1 rad, length_, of p sqrt(mass) times it
+  Eigen::VectorXd of_row_, of_q_, of_v_; // (rows), (n_q), (n_v): 1 over 1 rad, length_, of p sqrt(mass) times it
 };
 
 } // namespace ffrobot::recursion
