@@ -48,9 +48,9 @@ def test_momentum_of_a_free_chain(end, record):
     record(
         GROUP,
         f"two flexible links fly freely for {end:g} s at a tolerance of 1e-6",
-        "momentum at most {momentum}, energy {energy} of its kinetic part",
+        "momentum at most {momentum}, energy at most {energy} of its kinetic part",
         momentum=at_most(1e-11 if end < 100 else 1e-7, momentum),
-        energy=energy,
+        energy=at_most(1e-8 if end < 100 else 1e-6, energy),  # builds that round otherwise differ by a factor of 3
     )
 
 

@@ -24,7 +24,7 @@ ModalMotion modes_at(const std::vector<ModalShape> &shape, double t) {
 
 PrescribedMotion::PrescribedMotion(const SystemOnTree &both, const VectorXd &q)
     : both_(both), w_(both.tree), forces_(both.tree), state_(VectorXd::Zero(both.state_size())),
-      a_(VectorXd::Zero(both.tree.n_v)), f_(a_) {
+      a_(VectorXd::Zero(both.tree.n_v)), f_(a_), Q_(a_) {
   const auto rows = static_cast<Index>(both.tree.rows.size());
   for (const auto &node : both.tree.nodes)
     for (int k = 0; k < node.shape.v_count; ++k)
@@ -35,8 +35,8 @@ PrescribedMotion::PrescribedMotion(const SystemOnTree &both, const VectorXd &q)
   if (q.size() != both.tree.n_q)
     throw std::invalid_argument("q: expected " + std::to_string(both.tree.n_q) + " coordinates, got " +
                                 std::to_string(q.size()));
-  lambda_ = value_ = rate_ = VectorXd::Zero(rows);
-  C_v_.resize(rows, both.tree.n_v);
+  lambda_ = value_ = rate_ = unit_ = VectorXd::Zero(rows);
+  C_J_.resize(rows, rows);
   targets_.resize(both.tree.rows.size());
   state_.head(both.tree.n_q) = q;
   if (!both.reactions.motors.empty())
@@ -69,18 +69,18 @@ void PrescribedMotion::measure() {
   }
 }
 
-// C_v, row by row from the generalized forces of its unit multiplier, at the state that was measured.
+// C_J, row by row from the generalized forces of its unit multiplier, at the state that was measured.
 void PrescribedMotion::factorise() {
-  const Index rows = C_v_.rows();
-  VectorXd unit = VectorXd::Zero(rows), Q(both_.tree.n_v);
+  const Index rows = lambda_.size();
   for (Index r = 0; r < rows; ++r) {
-    unit[r] = -1;
-    forces_.load(unit.data(), nullptr, w_);
-    forces_.project(q(), w_, Q.data());
-    C_v_.row(r) = Q.transpose();
-    unit[r] = 0;
+    unit_[r] = -1;
+    forces_.load(unit_.data(), nullptr, w_);
+    forces_.project_on_joints(q(), w_, Q_.data());
+    for (Index k = 0; k < rows; ++k)
+      C_J_(r, k) = Q_[joints_[static_cast<std::size_t>(k)]];
+    unit_[r] = 0;
   }
-  C_J_.compute(C_v_(Eigen::all, joints_));
+  factors_.compute(C_J_);
 }
 
 void PrescribedMotion::put_on_joints(const VectorXd &values, double *to) const {
@@ -101,7 +101,7 @@ bool PrescribedMotion::find_position() {
     if (!std::isfinite(left))
       return false;
     previous = left;
-    put_on_joints(-C_J_.solve(value_), state_.data());
+    put_on_joints(-factors_.solve(value_), state_.data());
   }
   return false;
 }
@@ -123,15 +123,15 @@ bool PrescribedMotion::follow(double t, const ModalMotion &modes, std::vector<Je
   time_ = t;
   if (!find_position())
     return false;
-  put_on_joints(-C_J_.solve(rate_), v); // linear in v: exact in one step
+  put_on_joints(-factors_.solve(rate_), v); // linear in v: exact in one step
   measure();
   acting_ = motion_->act(t, q, v);
   forces_.prepare(q, v, acting_.generalized, w_);
   forces_.accelerate(q, a_.data(), w_);
-  VectorXd bias(C_v_.rows());
+  VectorXd bias(lambda_.size());
   for (std::size_t r = 0; r < targets_.size(); ++r)
     bias[static_cast<Index>(r)] = forces_.of_row(r, a_.data(), w_).value - targets_[r].acceleration;
-  put_on_joints(-C_J_.solve(bias), a_.data());
+  put_on_joints(-factors_.solve(bias), a_.data());
   return a_.allFinite();
 }
 
@@ -156,8 +156,10 @@ void PrescribedMotion::balance() {
   for (const int i : joints_)
     f_[i] -= acting_.generalized ? acting_.generalized[i] : 0;
   const VectorXd of_others = -f_(joints_);
-  lambda_ = C_J_.transpose().solve(of_others);
-  f_ += C_v_.transpose() * lambda_;
+  lambda_ = factors_.transpose().solve(of_others);
+  forces_.load(lambda_.data(), nullptr, w_);
+  forces_.project(q(), w_, Q_.data()); // -C_v^T lambda
+  f_ -= Q_;
   std::copy_n(lambda_.data(), lambda_.size(), w_.lambda.data());
 }
 

@@ -77,8 +77,9 @@ private:
   std::vector<int> joints_; // their coordinates in v, which are in q at the same places
   std::vector<Jet> targets_;
   Eigen::VectorXd state_, a_, lambda_, f_, value_, rate_;
-  Eigen::MatrixXd C_v_; // (rows, n_v)
-  Eigen::PartialPivLU<Eigen::MatrixXd> C_J_;
+  Eigen::VectorXd unit_, Q_; // (rows) zero between calls, (n_v)
+  Eigen::MatrixXd C_J_;      // (rows, rows)
+  Eigen::PartialPivLU<Eigen::MatrixXd> factors_;
   double time_ = 0;
   bool goes_on_ = false;
 };

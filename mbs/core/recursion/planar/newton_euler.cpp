@@ -224,13 +224,20 @@ void NewtonEuler::collect_ports(std::size_t i, VectorXd &z) const {
     z[Body::TILT] = at_section_[i][2];
 }
 
-void NewtonEuler::project(const double *q, const Workspace<Planar, double> &w, double *Q) {
+void NewtonEuler::project_on_joints(const double *q, const Workspace<Planar, double> &w, double *Q) {
   inward(false, w);
   for (std::size_t i = 0; i < mechanism_.nodes.size(); ++i) {
     const Node<Planar> &node = mechanism_.nodes[i];
     const Vector along = along_joint(i, q);
     for (int k = 0; k < node.shape.freedoms.count; ++k)
       Q[node.v + k] = on_coordinates_[node.v + k] - along[static_cast<std::size_t>(k)];
+  }
+}
+
+void NewtonEuler::project(const double *q, const Workspace<Planar, double> &w, double *Q) {
+  project_on_joints(q, w, Q);
+  for (std::size_t i = 0; i < mechanism_.nodes.size(); ++i) {
+    const Node<Planar> &node = mechanism_.nodes[i];
     if (node.n() == 0)
       continue;
     VectorXd z = VectorXd::Zero(node.body.width());

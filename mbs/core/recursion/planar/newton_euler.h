@@ -33,8 +33,9 @@ public:
   // Inward: what joints do to their outer sections, so that the loads and what bodies take are balanced.
   void transmit(const Workspace<Planar, double> &w);
 
-  // Inward: generalized forces Q (n_v) of the loads.
+  // Inward: generalized forces Q (n_v) of the loads; only those along joints, others in Q are left as they are.
   void project(const double *q, const Workspace<Planar, double> &w, double *Q);
+  void project_on_joints(const double *q, const Workspace<Planar, double> &w, double *Q);
 
   // Inward, after accelerate() and load(): M a - Q (n_v), with Q of gravity, elasticity, damping, the loads, and the
   // generalized forces on modes of prepare(), not those along joints.
