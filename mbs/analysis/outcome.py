@@ -99,7 +99,7 @@ METHOD_HISTORY = ("second", "pace_of_other", "since", "measured", "tries", "wind
 TREE_MEMORY = ("inertial_peak", "accepted", "least_ratio", "singular_at", "watched_at", "determinant")
 """Numbers of the core's `TreeCheckpoint` beside those of its steps and methods."""
 
-TREE_VECTORS = ("state", "state_peaks", "force_peaks", "singular_posture")
+TREE_VECTORS = ("state", "state_peaks", "force_peaks", "singular_posture", "ranges")
 """Arrays of the core's `TreeCheckpoint`."""
 
 

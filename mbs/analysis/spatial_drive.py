@@ -17,7 +17,7 @@ from ..model.spatial_system import SpatialSystem
 from ..scene.analysis import IntegratedAnalysis
 from ..solve.integrators import integration_controls, with_steps_of
 from ..solve.spatial_integrators import choose_integrator_in_space
-from ..solve.spatial_limits import left_ranges
+from ..solve.spatial_limits import left_ranges, watch_limits
 from ..solve.spatial_posture import NEARLY_SINGULAR, SINGULAR, robot_size, told_posture
 from ..solve.state import State
 from .drive import STATUS, Progress
@@ -76,6 +76,7 @@ def spatial_drive(
     system.integrated.scene.watch_posture(
         [model.rows[k].is_trajectory for k in system.integrated.rows], robot_size(model)
     )
+    watch_limits(system.integrated.scene, model.tree)
     checkpoint = _core.TreeCheckpoint() if earlier is None else earlier.checkpoint
     with nullcontext() if earlier is None else earlier.checked(model, times):
         run = _integrated(system, times, start, controls, control, progress, checkpoint)
@@ -83,7 +84,7 @@ def spatial_drive(
     in_posture = _ends_in_posture(run)
     posture = told_posture(model, run.least_ratio, run.singular_at, run.singular_posture, is_end=in_posture)
     cause = f"{posture}: move the path, or start in another posture" if in_posture else ""
-    told = (*warnings, *([posture] if posture else []), *left_ranges(model, times[: len(q)], q, v))
+    told = (*warnings, *([posture] if posture else []), *left_ranges(model, run.ranges, times[: len(q)], q, v))
 
     def again(others: Array) -> SpatialRun:
         return spatial_drive(model, analysis, start, progress, drives=drives, times=others)

@@ -5,7 +5,7 @@ import re
 import h5py
 import numpy as np
 import pytest
-from stopped_runs import Stops, differences, go_on, stop
+from stopped_runs import Stops, differences, edit, go_on, stop
 
 import ffrobot
 
@@ -72,6 +72,24 @@ def test_a_resumed_run_is_the_uninterrupted_one(arm, stopped):
             assert results.attributes(analysis)[key] == expected.attributes(analysis)[key]
     assert 1 < outputs < len(expected.time(stopped))
     assert not results.has(f"{stopped}/resume")
+
+
+def test_joints_that_leave_their_ranges_are_told_as_of_a_whole_run(arm):
+    """The elbow has left its own before the run is stopped."""
+    joint = 'between = ["upper.tip", "fore.root"]'
+    scene = arm()
+    plain = ffrobot.solve(scene)
+    t, q = plain.time("inverse"), plain["inverse/joints/elbow/coordinate"]
+    early = np.interp([0.0, 0.015], t, q)
+    lowest, highest = (-9.0, early[1]) if early[1] > early[0] else (early[1], 9.0)
+    edit(scene, {joint: f"{joint}\nposition_limit = [{lowest}, {highest}]"})
+    expected = [text for text in ffrobot.solve(scene).warnings["inverse"] if "leaves its position_limit" in text]
+    assert len(expected) == 1
+    stop(scene, "inverse", 0.02)
+    found = go_on(scene)
+    assert [text for text in found.warnings["inverse"] if "leaves its position_limit" in text] == expected
+    for name, values in plain.columns("inverse").items():
+        np.testing.assert_array_equal(found.columns("inverse")[name], values, err_msg=name)
 
 
 def test_a_run_that_is_stopped_before_it_begins_goes_on(arm):

@@ -5,6 +5,7 @@
 
 #include <nanobind/stl/complex.h>
 #include <nanobind/stl/function.h>
+#include <nanobind/stl/optional.h>
 #include <nanobind/stl/pair.h>
 #include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
@@ -34,7 +35,7 @@ TreeRun motion_of(const Model<Space> &model, const Scene &scene, const std::vect
     check_size("state of the checkpoint", checkpoint->integration.state.size(), q.size() + v.size());
     motion.go_on(checkpoint->history);
   }
-  return integrated(model, motion, reader, times, q, v, controls, carry_on, nullptr, checkpoint);
+  return integrated(model, scene, motion, reader, times, q, v, controls, carry_on, nullptr, checkpoint);
 }
 
 // The same of states (T, n_q + n_v) that are known
@@ -119,11 +120,29 @@ VectorXd as_vector(const std::vector<double> &values) {
   return Eigen::Map<const VectorXd>(values.data(), static_cast<Index>(values.size()));
 }
 
+// Four numbers each: least, largest, whether it has left its range, and when
+std::vector<double> numbers_of(const std::vector<RangeSeen> &ranges) {
+  std::vector<double> found;
+  for (const auto &[least, largest, left_at] : ranges)
+    for (const double number : {least, largest, left_at ? 1. : 0., left_at.value_or(0)})
+      found.push_back(number);
+  return found;
+}
+
+std::vector<RangeSeen> ranges_of(const std::vector<double> &numbers) {
+  if (numbers.size() % 4 != 0)
+    throw std::invalid_argument("ranges of coordinates: expected four numbers each");
+  std::vector<RangeSeen> found;
+  for (auto x = numbers.begin(); x != numbers.end(); x += 4)
+    found.push_back({x[0], x[1], x[2] != 0 ? std::optional(x[3]) : std::nullopt});
+  return found;
+}
+
 void make_checkpoint(TreeCheckpoint *made, double time, VectorXd state, const StepHistory &steps, std::size_t outputs,
                      const MethodHistory &methods, const std::vector<double> &state_peaks,
                      const std::vector<double> &force_peaks, double inertial_peak, unsigned long accepted,
                      double least_ratio, double singular_at, VectorXd singular_posture, double watched_at,
-                     double determinant) {
+                     double determinant, const std::vector<double> &ranges) {
   new (made) TreeCheckpoint{{time, std::move(state), steps, outputs, methods},
                             {{state_peaks, force_peaks, inertial_peak},
                              accepted,
@@ -131,7 +150,8 @@ void make_checkpoint(TreeCheckpoint *made, double time, VectorXd state, const St
                              singular_at,
                              std::move(singular_posture),
                              watched_at,
-                             determinant}};
+                             determinant},
+                            ranges_of(ranges)};
 }
 
 void bind_checkpoint(nb::module_ &m) {
@@ -139,7 +159,7 @@ void bind_checkpoint(nb::module_ &m) {
       .def(nb::init<>())
       .def("__init__", &make_checkpoint, nb::kw_only(), "time"_a, "state"_a, "steps"_a, "outputs"_a, "methods"_a,
            "state_peaks"_a, "force_peaks"_a, "inertial_peak"_a, "accepted"_a, "least_ratio"_a, "singular_at"_a,
-           "singular_posture"_a, "watched_at"_a, "determinant"_a, "state (n_q + n_v,).")
+           "singular_posture"_a, "watched_at"_a, "determinant"_a, "ranges"_a, "state (n_q + n_v,).")
       .def_prop_ro("time", [](const TreeCheckpoint &c) { return c.integration.time; })
       .def_prop_ro("state", [](const TreeCheckpoint &c) { return c.integration.state; })
       .def_prop_ro("steps", [](const TreeCheckpoint &c) { return c.integration.steps; })
@@ -153,7 +173,10 @@ void bind_checkpoint(nb::module_ &m) {
       .def_prop_ro("singular_at", [](const TreeCheckpoint &c) { return c.history.singular_at; })
       .def_prop_ro("singular_posture", [](const TreeCheckpoint &c) { return c.history.singular_posture; })
       .def_prop_ro("watched_at", [](const TreeCheckpoint &c) { return c.history.watched_at; })
-      .def_prop_ro("determinant", [](const TreeCheckpoint &c) { return c.history.determinant; });
+      .def_prop_ro("determinant", [](const TreeCheckpoint &c) { return c.history.determinant; })
+      .def_prop_ro(
+          "ranges", [](const TreeCheckpoint &c) { return as_vector(numbers_of(c.ranges)); },
+          "(4 limits,) of each: least and largest value, whether it has left its range, and when.");
 }
 
 void bind_run_and_laws(nb::module_ &m) {
@@ -173,6 +196,15 @@ void bind_run_and_laws(nb::module_ &m) {
               "Of the scene's watch: 1 without; see mbs/core/recursion/posture.h.")
       .def_ro("singular_at", &TreeRun::singular_at, "When that was, s.")
       .def_ro("singular_posture", &TreeRun::singular_posture, "(n_q) q there; empty without a watch.")
+      .def_prop_ro(
+          "ranges",
+          [](const TreeRun &r) {
+            std::vector<std::tuple<double, double, std::optional<double>>> found;
+            for (const auto &[least, largest, left_at] : r.ranges)
+              found.emplace_back(least, largest, left_at);
+            return found;
+          },
+          "Of each limit of the scene: least and largest value, and when it was left first (s) or None.")
       .def_ro("last", &TreeRun::last, "(q, v) of the last accepted step.")
       .def_ro("states", &TreeRun::states, "(T, n_q + n_v) q, then v.")
       .def_ro("accelerations", &TreeRun::accelerations, "(T, n_v)")
@@ -281,6 +313,11 @@ void bind_tree_motion(nb::module_ &m) {
           },
           "is_path"_a, "length"_a,
           "Watch how well the joints can follow the rows of the path; the run diverges where they cannot at all.")
+      .def(
+          "add_limit",
+          [](Scene &s, Index v, double lowest, double highest) { s.limits.push_back({v, lowest, highest}); }, "v"_a,
+          "lowest"_a, "highest"_a,
+          "Watch whether the coordinate with this index in v, a number, stays in a range; the run does not end there.")
       .def_rw("has_loops", &Scene::has_loops, "Whether rows close loops: the run ends where these are singular.")
       .def_rw("is_strict", &Scene::is_strict, "Whether steps are limited and errors judged as in planar scenes.")
       .def_rw("most_bent", &Scene::most_bent, "(bodies) kg m^2: largest p^T p of each that makes sense; empty: any.")

@@ -65,7 +65,7 @@ TreeRun sampled_motion_of(const Model<Space> &model, const Scene &scene, const s
   Plant<Space> plant(model.mechanism, reader, held);
   const Sampling sampling{samples, delay, locked(controller)};
   const SampledLoop loop(plant, sampling, times.back());
-  return integrated(model, motion, reader, times, q, v, controls, carry_on, &loop.breaks(), nullptr);
+  return integrated(model, scene, motion, reader, times, q, v, controls, carry_on, &loop.breaks(), nullptr);
 }
 
 template <class Space> void bind_sampled_motion(nb::module_ &m) {

@@ -7,6 +7,7 @@
 #include "core/recursion/observe.h"
 
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -53,6 +54,12 @@ template <class Space> void check_scene(const Model<Space> &model, const Scene &
   }
   for (const CutLoad &load : scene.cut_loads)
     check_index("joint of a load", load.joint, scene.cut_joints.size());
+  for (const LimitedCoordinate &limited : scene.limits) {
+    check_index("coordinate of a limit", limited.v, n_v);
+    for (const Eigen::Index first : model.mechanism.rotations)
+      if (first <= limited.v && limited.v < first + 3)
+        throw std::invalid_argument("coordinate of a limit: expected a number, found a part of an orientation");
+  }
   if (!scene.most_bent.empty())
     check_size("most_bent", static_cast<Eigen::Index>(scene.most_bent.size()),
                static_cast<Eigen::Index>(model.mechanism.nodes.size()));
@@ -66,6 +73,7 @@ template <class Space> void check_scene(const Model<Space> &model, const Scene &
 struct TreeCheckpoint {
   IntegrationCheckpoint integration;
   MotionHistory history;
+  std::vector<RangeSeen> ranges; // of the scene's limits
 };
 
 // As far as it got.
@@ -77,6 +85,7 @@ struct TreeRun {
   RowMajorMatrix energy;                        // (T, 3) kinetic, strain, gravitational
   double least_ratio = 1, singular_at = 0;      // of the scene's watch
   Eigen::VectorXd singular_posture;
+  std::vector<RangeSeen> ranges; // of the scene's limits
 
   template <class Space> TreeRun(const Model<Space> &model, std::size_t count) {
     const auto T = static_cast<Eigen::Index>(count);
@@ -117,19 +126,30 @@ struct TreeRun {
 // The motion from (q, v) at the first of `times`, or on from a checkpoint, with outputs at all of them, which `reader`
 // evaluates. `breaks` and `checkpoint` may be null.
 template <class Space>
-TreeRun integrated(const Model<Space> &model, RecursiveMotion<Space> &motion, RecursiveMotion<Space> &reader,
-                   const std::vector<double> &times, const Eigen::VectorXd &q, const Eigen::VectorXd &v,
-                   const IntegrationControls &controls, const std::function<bool(double)> &carry_on,
-                   const Breaks *breaks, TreeCheckpoint *checkpoint) {
+TreeRun integrated(const Model<Space> &model, const Scene &scene, RecursiveMotion<Space> &motion,
+                   RecursiveMotion<Space> &reader, const std::vector<double> &times, const Eigen::VectorXd &q,
+                   const Eigen::VectorXd &v, const IntegrationControls &controls,
+                   const std::function<bool(double)> &carry_on, const Breaks *breaks, TreeCheckpoint *checkpoint) {
   TreeRun run(model, times.size());
   run.last << q, v;
   motion.plan(times.back() - times.front());
+  std::optional<LimitWatch> limits; // the reader is free while a step is looked at
+  if (!scene.limits.empty())
+    limits.emplace(scene.limits, motion, reader);
+  if (checkpoint && checkpoint->integration.has_begun()) {
+    check_size("ranges of coordinates", static_cast<Eigen::Index>(checkpoint->ranges.size()),
+               static_cast<Eigen::Index>(scene.limits.size()));
+    if (limits)
+      limits->go_on(checkpoint->ranges);
+  }
   run.report = integrate(
       motion, times, run.last, controls,
       [&](std::size_t i, double t, const double *state) { run.evaluate(i, t, state, reader, model.mechanism); },
-      locked(carry_on), nullptr, breaks, checkpoint ? &checkpoint->integration : nullptr);
+      locked(carry_on), nullptr, breaks, checkpoint ? &checkpoint->integration : nullptr, limits ? &*limits : nullptr);
+  if (limits)
+    run.ranges = limits->seen();
   if (checkpoint)
-    checkpoint->history = motion.history(); // before what finish() looks at besides
+    checkpoint->history = motion.history(), checkpoint->ranges = run.ranges; // before what finish() looks at besides
   run.finish(motion);
   return run;
 }

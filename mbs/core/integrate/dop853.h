@@ -22,7 +22,8 @@ public:
   double error_share(double fraction) const override { return std::min(std::sqrt(fraction) / 10, 16 * fraction); }
 
   bool lands_on_outputs() const override { return false; }
-  void prepare_dense(double t, const double *y, double h) override; // three more slopes
+  bool needs_slopes_between() const override { return true; } // three more
+  void prepare_dense(double t, const double *y, double h) override;
   bool estimate_dense(Eigen::VectorXd &error) const override;
   void interpolate(double t, double *y) const override;
 

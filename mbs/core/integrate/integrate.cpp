@@ -50,8 +50,10 @@ class Integration {
 public:
   Integration(OdeSystem &system, const std::vector<double> &times, const Eigen::VectorXd &y,
               const IntegrationControls &controls, const StateFunctionOfTime &output,
-              const std::function<bool(double)> &carry_on, Recording *recording, const Breaks *breaks)
-      : system_(system), controls_(controls), breaks_(breaks), delivery_(system, times, output, recording),
+              const std::function<bool(double)> &carry_on, Recording *recording, const Breaks *breaks,
+              LimitWatch *limits)
+      : system_(system), controls_(controls), breaks_(breaks), limits_(limits),
+        delivery_(system, times, output, recording),
         watch_(system, times.front(), times.back(), controls.max_steps, carry_on),
         limit_(system, times.front(), times.back(), controls.tolerance),
         methods_(controls.methods, times.front(), times.back()), method_(make_method(methods_.at_work(), system)),
@@ -69,6 +71,8 @@ public:
     delivery_.record(t_, z_.data());
     delivery_.record_method(methods_.at_work());
     delivery_.output(z_.data());
+    if (limits_)
+      limits_->begin(t_, z_.data());
   }
 
   void go_on(const IntegrationCheckpoint &checkpoint) {
@@ -259,6 +263,8 @@ private:
   bool take(const Attempt &attempt) {
     ++report_.steps;
     delivery_.outputs_of_step(*method_, attempt.end);
+    if (limits_)
+      limits_->look(*method_, methods_.at_work(), t_, z_.data(), attempt.step);
     move_to_end(attempt);
     if (controls_.keep_steps)
       report_.step_ends.push_back(t_);
@@ -317,6 +323,7 @@ private:
   OdeSystem &system_;
   const IntegrationControls &controls_;
   const Breaks *breaks_;
+  LimitWatch *limits_;
   Delivery delivery_;
   Watch watch_;
   StepLimit limit_;
@@ -344,8 +351,8 @@ const MethodChoice &Recording::method_of(std::size_t step) const {
 IntegrationReport integrate(OdeSystem &system, const std::vector<double> &times, Eigen::VectorXd &y,
                             const IntegrationControls &controls, const StateFunctionOfTime &output,
                             const std::function<bool(double)> &carry_on, Recording *recording, const Breaks *breaks,
-                            IntegrationCheckpoint *checkpoint) {
-  Integration integration(system, times, y, controls, output, carry_on, recording, breaks);
+                            IntegrationCheckpoint *checkpoint, LimitWatch *limits) {
+  Integration integration(system, times, y, controls, output, carry_on, recording, breaks, limits);
   if (checkpoint && checkpoint->has_begun())
     integration.go_on(*checkpoint);
   else

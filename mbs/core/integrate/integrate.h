@@ -4,6 +4,7 @@
 
 #include "core/integrate/error_allowance.h"
 #include "core/integrate/faster_method.h"
+#include "core/integrate/limit_watch.h"
 #include "core/integrate/ode.h"
 
 #include <functional>
@@ -84,12 +85,14 @@ struct Breaks {
 
 // Integrates y = (q, v) from times.front() to times.back() and calls output(i, t, y) at every entry of times, in order.
 // carry_on(t) is asked every thousand steps, and about five times a second. y ends at the last accepted step.
-// `recording`, `breaks` and `checkpoint` may be null. Of a `checkpoint` that has begun in an earlier call with the same
-// `times` the integration goes on: neither outputs nor the `recording`, which has to be the same, begin again, and
-// max_steps counts anew. It ends as that of this call.
+// `recording`, `breaks`, `checkpoint` and `limits`, which looks at all steps, may be null. Of a `checkpoint` that has
+// begun in an earlier call with the same `times` the integration goes on: neither outputs nor the `recording`, which
+// has to be the same, begin again, and max_steps counts anew; `limits` has to go on as well. It ends as that of this
+// call.
 IntegrationReport integrate(OdeSystem &system, const std::vector<double> &times, Eigen::VectorXd &y,
                             const IntegrationControls &controls, const StateFunctionOfTime &output,
                             const std::function<bool(double)> &carry_on, Recording *recording,
-                            const Breaks *breaks = nullptr, IntegrationCheckpoint *checkpoint = nullptr);
+                            const Breaks *breaks = nullptr, IntegrationCheckpoint *checkpoint = nullptr,
+                            LimitWatch *limits = nullptr);
 
 } // namespace ffrobot

@@ -48,7 +48,8 @@ public:
   // Whether steps have to end at output times, or there is an interpolation as good as the steps.
   virtual bool lands_on_outputs() const = 0;
 
-  // Coefficients for interpolate() within the step just made.
+  // Coefficients for interpolate() within the step just made, and whether they take slopes between its ends.
+  virtual bool needs_slopes_between() const { return false; }
   virtual void prepare_dense(double t, const double *y, double h) = 0;
 
   // Largest error of interpolate() within the step, once prepared; false where it is never much more than that of the

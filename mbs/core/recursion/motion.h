@@ -6,7 +6,7 @@
 
 #include "core/constraint/constraint.h"
 #include "core/constraint/state_force.h"
-#include "core/integrate/ode.h"
+#include "core/integrate/limit_watch.h"
 #include "core/recursion/cut.h"
 #include "core/recursion/frame_motor.h"
 #include "core/recursion/held_forces.h"
@@ -117,6 +117,7 @@ struct Scene {
   std::vector<CutLoad> cut_loads;
   std::vector<DrivenMarker> driven;
   std::optional<PostureWatch> watch;
+  std::vector<LimitedCoordinate> limits; // of joints; told, nothing acts there
   bool has_loops = false; // closed by rows: steps do not lead across postures in which all rows depend on each other
   // As scenes in the plane have it: steps are limited where functions of time bend (OdeSystem::prescribe), errors of
   // forces between bodies count twice, and those of links that given forces hold straight are compared with what these

@@ -1,0 +1,50 @@
+"""Limits of positions, told of whole runs in space: of what joints do between outputs, too."""
+
+import numpy as np
+import pytest
+
+import ffrobot
+
+BOX = {"mass": 1.0, "center": [0.0, 0.0, 0.0], "inertia": [0.02, 0.03, 0.04], "points": {"in": [0.0, 0.0, 0.0]}}
+
+
+def told(joint, analysis, **others):
+    scene = ffrobot.make_scene(
+        name="box", space="spatial", body=[{"name": "box", "rigid": BOX}], joint=[{"name": "j"} | joint],
+        analysis=[{"name": "a", "tolerance": 1e-9} | analysis], **{"gravity": [0.0, 0.0, 0.0]} | others,
+    )  # fmt: skip
+    with ffrobot.solve(scene) as results:
+        return [text.partition("leaves its ")[2] for text in results.warnings.get("a", ()) if "leaves its" in text]
+
+
+@pytest.mark.parametrize("backwards", [False, True])
+def test_an_excursion_between_two_outputs(backwards):
+    """A pulse of the path whose flanks alone are outputs; the coordinate of the joint is that of the scene."""
+    between = ["box.in", "ground"] if backwards else ["ground", "box.in"]
+    joint = {"type": "revolute", "between": between, "axis": [0.0, 1.0, 0.0], "position_limit": [0.0, 0.65]}
+    path = {"name": "turn", "joint": "j", "value": "0.5 + 0.3*exp(-((t - 0.25)/0.05)**2)"}
+    analysis = {"kind": "pcid", "end": 0.5, "output_step": 0.1}
+    (text,) = told(joint, analysis, trajectory=[path], initial={"joints": {"j": 0.5}})
+    left_at = 0.25 - 0.05 * np.sqrt(np.log(2.0))
+    assert text == f"position_limit [0, 0.65] rad at t = {left_at:.6g} s; it goes from 0.5 to 0.8 rad"
+
+
+FALL = {"kind": "forward", "end": 0.6, "output_step": 0.1}
+
+
+def test_one_side_is_left():
+    joint = {"type": "prismatic", "between": ["ground", "box.in"], "axis": [1.0, 0.0, 0.0]}
+    limited = joint | {"position_limit": [-0.1, 9.0]}
+    (text,) = told(limited, FALL, gravity=[-1.0, 0.0, 0.0])
+    assert text == f"position_limit [-0.1, 9] m at t = {np.sqrt(0.2):.6g} s; it goes from -0.18 to 0 m"
+    assert not told(limited, FALL, gravity=[1.0, 0.0, 0.0])
+
+
+@pytest.mark.parametrize(("backwards", "left_at"), [(False, np.sqrt(0.2)), (True, 0.5)])
+def test_planar_joints_that_lead_backwards_are_looked_at_in_outputs(backwards, left_at):
+    """Their ways turn with the body: no entries of the state."""
+    between, far = (["box.in", "ground"], [-0.3, 0.1]) if backwards else (["ground", "box.in"], [-0.1, 0.3])
+    limits = [far, [-1.0, 1.0], [-1.0, 1.0]]
+    joint = {"type": "planar", "between": between, "axis": [0.0, 0.0, 1.0], "position_limit": limits}
+    (text,) = told(joint, FALL, gravity=[-1.0, 0.0, 0.0])
+    assert f"m at t = {left_at:.6g} s; it goes from" in text
