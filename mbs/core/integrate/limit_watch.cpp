@@ -20,10 +20,36 @@ constexpr double unsure = 0.5;
 
 bool is_outside(const LimitedCoordinate &limited, double q) { return q < limited.lowest || q > limited.highest; }
 
-// A coordinate at the ends of a step, and its rates there times the step's length.
+// A coordinate at the ends of a step, its rates there times the step's length h, and accelerations times h^2.
 struct Ends {
-  double q0, q1, v0, v1;
+  double q0, q1, v0, v1, a0, a1;
 };
+
+struct Value {
+  double q, rate;
+};
+
+// Hermite's polynomial of degree 5 through them
+Value between_ends(const Ends &e, double x) {
+  const double d = e.q1 - e.q0 - e.v0 - e.a0 / 2, dv = e.v1 - e.v0 - e.a0, da = e.a1 - e.a0;
+  const double c3 = 10 * d - 4 * dv + da / 2, c4 = -15 * d + 7 * dv - da, c5 = 6 * d - 3 * dv + da / 2;
+  return {e.q0 + x * (e.v0 + x * (e.a0 / 2 + x * (c3 + x * (c4 + x * c5)))),
+          e.v0 + x * (e.a0 + x * (3 * c3 + x * (4 * c4 + x * 5 * c5)))};
+}
+
+// Of a step, with the rates at its ends
+struct Part {
+  double from, to, first, last;
+};
+
+// Where the rate of `at` changes from one sign, that of `first`, to the other
+template <class At> double turning_point(const At &at, double first, double begin, double end) {
+  while (end - begin > precision) {
+    const double x = std::midpoint(begin, end);
+    (at(x).rate * first > 0 ? begin : end) = x;
+  }
+  return end;
+}
 
 // Of the cubic through them: what is reached where it turns back, and the part of the step, which may lie outside,
 // where its rate is largest or smallest.
@@ -71,11 +97,14 @@ void LimitWatch::look(Method &method, const MethodChoice &choice, double t, cons
     look_at(limited_[k], seen_[k]);
 }
 
-// Dense output is asked where a coordinate turns back beyond all that was seen, and where it first leaves its range.
+// A coordinate that only moves on costs a comparison. Where it turns back beyond all that was seen, how far it goes is
+// read off the ends of the step, or off dense output: where that is to be had, or it may be outside. Dense output tells
+// when it first leaves its range.
 void LimitWatch::look_at(const LimitedCoordinate &limited, RangeSeen &seen) {
-  const Index rate = system_.n_v() + limited.v;
-  const double *end = step_.method->end(), h = step_.h;
-  const Ends ends{step_.z[limited.v], end[limited.v], h * step_.z[rate], h * end[rate]};
+  const Index v = limited.v, rate = system_.n_v() + v;
+  Method &method = *step_.method;
+  const double *end = method.end(), h = step_.h;
+  Ends ends{step_.z[v], end[v], h * step_.z[rate], h * end[rate], 0, 0};
   const Guess guessed = guess(ends);
   const bool turns = guessed.least < seen.least || guessed.largest > seen.largest;
   if (!turns && ends.q1 >= seen.least && ends.q1 <= seen.largest)
@@ -84,16 +113,25 @@ void LimitWatch::look_at(const LimitedCoordinate &limited, RangeSeen &seen) {
   const auto reach = [&](double x, double q) {
     seen.least = std::min(seen.least, q), seen.largest = std::max(seen.largest, q);
     if (!seen.left_at && is_outside(limited, q))
-      seen.left_at = step_.t + leave(limited, before, x) * step_.h;
+      seen.left_at = step_.t + leave(limited, before, x) * h;
     before = x;
   };
   if (turns) {
-    const double middle = guessed.inflection > 0 && guessed.inflection < 1 ? guessed.inflection : 1;
-    const double rates[] = {ends.v0, middle < 1 ? between(middle)[rate] : ends.v1, ends.v1};
-    for (int part = 0; part < 2; ++part)
-      if (rates[part] * rates[part + 1] < 0) {
-        const double x = turn(rate, part == 0 ? 0 : middle, part == 0 ? middle : 1);
-        reach(x, between(x)[limited.v]);
+    ends.a0 = h * h * method.first_slope()[rate], ends.a1 = h * h * method.last_slope()[rate];
+    const bool is_dense =
+        !method.needs_slopes_between() || is_outside(limited, guessed.least) || is_outside(limited, guessed.largest);
+    const auto at = [&](double x) {
+      if (!is_dense)
+        return between_ends(ends, x);
+      const double *z = between(x);
+      return Value{z[v], z[rate]};
+    };
+    const bool is_split = guessed.inflection > 0 && guessed.inflection < 1;
+    const double middle = is_split ? guessed.inflection : 1, in_middle = is_split ? at(middle).rate : ends.v1;
+    for (const auto &[from, to, first, last] : {Part{0, middle, ends.v0, in_middle}, {middle, 1, in_middle, ends.v1}})
+      if (first * last < 0) {
+        const double x = turning_point(at, first, from, to);
+        reach(x, at(x).q);
       }
   }
   reach(1, ends.q1);
@@ -121,16 +159,6 @@ const double *LimitWatch::between(double x) {
     prepare_dense();
   dense_->interpolate(step_.t + x * step_.h, z_.data());
   return z_.data();
-}
-
-double LimitWatch::turn(Index rate, double begin, double end) {
-  const double *at_end = step_.method->end();
-  const bool rises = (end < 1 ? between(end) : at_end)[rate] > 0;
-  while (end - begin > precision) {
-    const double x = std::midpoint(begin, end);
-    ((between(x)[rate] > 0) == rises ? end : begin) = x;
-  }
-  return end;
 }
 
 double LimitWatch::leave(const LimitedCoordinate &limited, double begin, double end) {

@@ -46,9 +46,8 @@ private:
   };
 
   void look_at(const LimitedCoordinate &limited, RangeSeen &seen);
-  void prepare_dense();                                     // once a step, where it is needed
-  const double *between(double x);                          // the state at this part of the step
-  double turn(Eigen::Index rate, double begin, double end); // where it is zero between, having two signs there
+  void prepare_dense();                                                     // once a step, where it is needed
+  const double *between(double x);                                          // the state at this part of the step
   double leave(const LimitedCoordinate &limited, double begin, double end); // where it is first outside
 
   std::vector<LimitedCoordinate> limited_;
