@@ -25,7 +25,8 @@ class MovingSpatialJoint(SpatialJoint):
     motor: bool | None = None
     """Whether motors drive it; by default in open chains only, and spherical and free joints not."""
     position_limit: Range | tuple[Range, ...] | None = None
-    """Least and largest coordinate, [lo, hi], rad (m where it slides)."""
+    """Least and largest coordinate, [lo, hi], rad (m where it slides). Nothing acts there; integrated runs tell when
+    it is left, and how far."""
     moment_limit: Limit | None = None
     """Largest moment, N·m (force where it slides, N), at the joint: behind the gear."""
     speed_limit: Limit | None = None
