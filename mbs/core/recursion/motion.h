@@ -7,6 +7,7 @@
 #include "core/constraint/constraint.h"
 #include "core/constraint/state_force.h"
 #include "core/integrate/limit_watch.h"
+#include "core/integrate/ode.h"
 #include "core/recursion/cut.h"
 #include "core/recursion/frame_motor.h"
 #include "core/recursion/held_forces.h"

@@ -168,6 +168,20 @@ def test_both_coordinates_of_a_universal_joint(backwards):
         np.testing.assert_allclose(found["cross", number], expected, rtol=0, atol=1e-8)
 
 
+@pytest.mark.parametrize("backwards", [False, True])
+def test_entries_of_a_cylindrical_joint(backwards):
+    """The core has the way first; it moves the other way where the joint leads backwards."""
+    between = ["a.top", "ground"] if backwards else ["ground", "a.top"]
+    joint = {"name": "c", "type": "cylindrical", "between": between, "axis": [0.0, 0.0, 1.0],
+             "position_limit": [[-1.0, 2.0], [-3.0, 4.0]]}  # fmt: skip
+    system, _ = system_of([joint], ["a"])
+    found = [(one.number, one.v, one.limits) for one in watched(system.model.tree)]
+    expected = [(0, 1, (-2.0, 1.0)), (1, 0, (-4.0, 3.0))] if backwards else [(0, 1, (-1.0, 2.0)), (1, 0, (-3.0, 4.0))]
+    assert found == expected
+    one = watched(system.model.tree)[0]
+    assert one.seen((0.5, 2.5, 0.1)) == ((-2.5, -0.5, 0.1) if backwards else (0.5, 2.5, 0.1))
+
+
 def test_beside_orientations():
     """A pendulum on a body that tumbles: steps are made in local coordinates about each other centre."""
     joints = [
