@@ -11,13 +11,31 @@ namespace ffrobot {
 using Eigen::Index;
 using Tableau = Dop853Tableau;
 
+namespace {
+
+double square_root(double x) { return std::sqrt(x); }
+FourDoubles square_root(FourDoubles x) {
+  for (int i = 0; i < 4; ++i)
+    x[i] = std::sqrt(x[i]);
+  return x;
+}
+
+} // namespace
+
 Dop853::Dop853(OdeSystem &system)
     : system_(system), n_(system.size()), K_(Eigen::MatrixXd::Zero(n_, Tableau::dense_stages)), stage_(n_), end_(n_),
-      start_(n_), F_(n_, Tableau::dense_order) {}
+      start_(n_), mean_(n_), F_(n_, Tableau::dense_order) {}
 
 bool Dop853::step(double t, const double *y, double h, double) {
   run_stages<Tableau, 1, Tableau::stages - 1>(system_, t, y, h, K_, stage_);
-  advance<Tableau::b, Tableau::stages>(K_.data(), n_, h, y, end_.data());
+  for_entries<6>(n_, [&]<class T, int parts>(Index i) __attribute__((always_inline)) {
+    const Combination<Tableau::b, Tableau::stages, T, parts> of(K_.data(), n_, i);
+#pragma GCC unroll 8
+    for (int part = 0; part < parts; ++part, i += of.width) {
+      write_at(mean_.data() + i, of.sum[part]);
+      write_at(end_.data() + i, read_at<T>(y + i) + h * of.sum[part]);
+    }
+  });
   return true;
 }
 
@@ -25,19 +43,21 @@ bool Dop853::step(double t, const double *y, double h, double) {
 // far below that of order 3, would bring the error of fast vibration down as well.
 void Dop853::estimate(double h, Eigen::VectorXd &error) {
   constexpr double least = std::numeric_limits<double>::min(); // where nothing moves there is no error
-  constexpr std::make_index_sequence<Tableau::stages + 1> slopes;
-  const auto of5 = [&](Index i) { return combine<Tableau::e5>(K_.data(), n_, i, slopes); };
-  const auto of3 = [&](Index i) { return combine<Tableau::e3>(K_.data(), n_, i, slopes); };
   const Index n_v = n_ / 2;
-  double *__restrict q = error.data(), *__restrict v = q + n_v;
-#pragma GCC ivdep
-  for (Index i = 0; i < n_v; ++i) {
-    const double q5 = of5(i), v5 = h * of5(n_v + i), q3 = of3(i), v3 = h * of3(n_v + i);
-    const double square5 = q5 * q5 + v5 * v5, square = square5 + 0.01 * (q3 * q3 + v3 * v3);
-    const double factor = std::sqrt(square5 / std::max(square, least));
-    q[i] = h * factor * q5;
-    v[i] = factor * v5;
-  }
+  for_entries<1>(n_v, [&]<class T, int>(Index i) __attribute__((always_inline)) {
+    const Index i_v = n_v + i;
+    const auto of5 = [&](Index at) __attribute__((always_inline)) {
+      return Combination<Tableau::e5, Tableau::stages, T, 1>(K_.data(), n_, at).sum[0];
+    };
+    const auto of3 = [&](Index at) __attribute__((always_inline)) {
+      return read_at<T>(mean_.data() + at) +
+             Combination<Tableau::e3_beside_b, Tableau::stages, T, 1>(K_.data(), n_, at).sum[0];
+    };
+    const T q5 = of5(i), v5 = h * of5(i_v), q3 = of3(i), v3 = h * of3(i_v);
+    const T square5 = q5 * q5 + v5 * v5, square = square5 + 0.01 * (q3 * q3 + v3 * v3);
+    const T factor = square_root(square5 / (square < least ? T{} + least : square)); // keeps NaN
+    write_at(error.data() + i, h * factor * q5), write_at(error.data() + i_v, factor * v5);
+  });
 }
 
 void Dop853::prepare_dense(double t, const double *y, double h) {

@@ -36,7 +36,8 @@ private:
   Eigen::Index n_;
   Eigen::MatrixXd K_; // slopes, (n, dense_stages)
   Eigen::VectorXd stage_, end_, start_;
-  Eigen::MatrixXd F_; // (n, dense_order)
+  Eigen::VectorXd mean_; // of the slopes of the step, by weights
+  Eigen::MatrixXd F_;    // (n, dense_order)
   double t0_ = 0, h_ = 0;
 };
 

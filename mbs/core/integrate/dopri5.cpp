@@ -18,8 +18,10 @@ bool Dopri5::step(double t, const double *y, double h, double) {
 }
 
 void Dopri5::estimate(double h, Eigen::VectorXd &error) {
-  for (Index i = 0; i < n_; ++i)
-    error[i] = h * combine<Tableau::e>(K_.data(), n_, i, std::make_index_sequence<Tableau::stages + 1>());
+  for_entries<1>(n_, [&]<class T, int>(Index i) __attribute__((always_inline)) {
+    const Combination<Tableau::e, Tableau::stages + 1, T, 1> of(K_.data(), n_, i);
+    write_at(error.data() + i, h * of.sum[0]);
+  });
 }
 
 void Dopri5::prepare_dense(double t, const double *y, double h) {

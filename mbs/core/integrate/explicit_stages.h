@@ -2,29 +2,69 @@
 #pragma once
 
 #include "core/integrate/ode.h"
+#include "core/linear/four_doubles.h"
 
+#include <cstddef>
 #include <utility>
 
 namespace ffrobot {
 
-// sum of coefficient[j] * K_j[i] over the nonzero coefficients
-template <const auto &Coefficients, std::size_t... j>
-[[gnu::always_inline]] inline double combine(const double *K, Eigen::Index n, Eigen::Index i,
-                                             std::index_sequence<j...>) {
-  const auto term = [&]<std::size_t J>() {
-    if constexpr (Coefficients[J] != 0)
-      return Coefficients[J] * K[static_cast<Eigen::Index>(J) * n + i];
-    else
-      return 0.0;
+// sum of coefficient[j] * K_j over the nonzero coefficients, of which the first is one, of `parts` T side by side from
+// entry i on; K holds the slopes (n) one after the other. All parts of a slope are read before those of the next: sums
+// stay in registers, and one address and one coefficient after the other will do.
+template <const auto &Coefficients, int Count, class T, int parts> struct Combination {
+  static constexpr Eigen::Index width = sizeof(T) / sizeof(double);
+  T sum[parts];
+
+  [[gnu::always_inline]] Combination(const double *K, Eigen::Index n, Eigen::Index i) {
+    static_assert(Coefficients[0] != 0); // sums do not begin with a zero, which would be added
+    K += i;
+#pragma GCC unroll 8
+    for (int part = 0; part < parts; ++part)
+      sum[part] = Coefficients[0] * read_at<T>(K + part * width);
+    const auto add = [&]<std::size_t j>() __attribute__((always_inline)) {
+      K += n;
+      if constexpr (Coefficients[j] != 0) {
+#pragma GCC unroll 8
+        for (int part = 0; part < parts; ++part)
+          sum[part] += Coefficients[j] * read_at<T>(K + part * width);
+      }
+    };
+    [&]<std::size_t... j>(std::index_sequence<j...>) __attribute__((always_inline)) {
+      (add.template operator()<j + 1>(), ...);
+    }(std::make_index_sequence<Count - 1>());
+  }
+};
+
+// visit.operator()<T, parts>(i) for all entries, many at once. The last ones reach back into those before, which come
+// out the same again, in place of a remainder one by one.
+template <int most_parts, class Visit>
+[[gnu::always_inline]] inline void for_entries(Eigen::Index n, const Visit &visit) {
+  const auto all = [&]<class T, int parts>() __attribute__((always_inline)) {
+    constexpr Eigen::Index count = parts * sizeof(T) / sizeof(double);
+    Eigen::Index i = 0;
+    for (; i + count <= n; i += count)
+      visit.template operator()<T, parts>(i);
+    if (i < n)
+      visit.template operator()<T, parts>(n - count);
   };
-  return (term.template operator()<j>() + ...);
+  if (n >= 4 * most_parts)
+    all.template operator()<FourDoubles, most_parts>();
+  else if (n >= 4)
+    all.template operator()<FourDoubles, 1>();
+  else
+    all.template operator()<double, 1>();
 }
 
-// out = y + h times that sum; K holds the slopes one after the other
+// out = y + h times that sum
 template <const auto &Coefficients, int Count>
-void advance(const double *K, Eigen::Index n, double h, const double *y, double *__restrict out) {
-  for (Eigen::Index i = 0; i < n; ++i)
-    out[i] = y[i] + h * combine<Coefficients>(K, n, i, std::make_index_sequence<Count>());
+void advance(const double *K, Eigen::Index n, double h, const double *y, double *out) {
+  for_entries<6>(n, [&]<class T, int parts>(Eigen::Index i) __attribute__((always_inline)) {
+    const Combination<Coefficients, Count, T, parts> of(K, n, i);
+#pragma GCC unroll 8
+    for (int part = 0; part < parts; ++part, i += of.width)
+      write_at(out + i, read_at<T>(y + i) + h * of.sum[part]);
+  });
 }
 
 // Slope number Stage of the tableau (rows a), at time t, from the slopes before it

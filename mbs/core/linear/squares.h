@@ -4,7 +4,6 @@
 #include "core/linear/four_doubles.h"
 
 #include <cstddef>
-#include <cstring>
 
 namespace ffrobot {
 
@@ -24,11 +23,7 @@ private:
 template <class Visit> [[gnu::always_inline]] inline void for_fours(std::ptrdiff_t count, const Visit &visit) {
   std::ptrdiff_t i = 0;
   for (; i + 4 <= count; i += 4)
-    visit(i, [](const double *x) __attribute__((always_inline)) {
-      FourDoubles four;
-      std::memcpy(&four, x, sizeof four);
-      return four;
-    });
+    visit(i, [](const double *x) __attribute__((always_inline)) { return read_at<FourDoubles>(x); });
   for (; i < count; ++i)
     visit(i, [](const double *x) { return *x; });
 }

@@ -11,8 +11,8 @@
 namespace ffrobot::recursion {
 
 template <class Space, class T, int W>
-inline void run(const Mechanism<Space> &m, const T *q, const T *v, const Forces<T> &forces, const T *target,
-                Workspace<Space, T> &w, T *a) {
+FFROBOT_APART void run(const Mechanism<Space> &m, const T *q, const T *v, const Forces<T> &forces, const T *target,
+                       Workspace<Space, T> &w, T *a) {
   using Cols = Pack<T, W>;
   Schur<T, W> S;
   Cols gamma;
@@ -120,10 +120,17 @@ void place_all(const Mechanism<Space> &m, const T *q, const T *v, const Forces<T
 template <class Space, class T>
 void measure(const Mechanism<Space> &m, const T *q, const T *v, Workspace<Space, T> &w, T *value, T *rate) {
   place_all(m, q, v, Forces<T>(), w);
+  T d[3], d_dot[3]; // between two points, of which several rows in turn are components
+  const Row *of = nullptr;
   for (std::size_t r = 0; r < m.rows.size(); ++r) {
     const Row &row = m.rows[r];
     value[r] = rate[r] = T(0.);
-    if (row.model.kind != RowKind::coordinate) {
+    if (row.model.kind == RowKind::point) {
+      if (!of || !(of->a == row.a && of->b == row.b))
+        separation(m, row, w, d, d_dot), of = &row;
+      for (int i = 0; i < 3; ++i)
+        value[r] += row.model.f[i] * d[i], rate[r] += row.model.f[i] * d_dot[i];
+    } else if (row.model.kind != RowKind::coordinate) {
       RowMotion<T> motion;
       row_motion(m, row, w, true, motion);
       value[r] = motion.value, rate[r] = motion.rate;

@@ -59,6 +59,8 @@ template <class Space> struct Node {
 struct Attachment {
   int node = -1, port = 0; // of the node; node -1: ground marker
   int global_port = -1;    // of all ports
+
+  bool operator==(const Attachment &) const = default;
 };
 
 // What acts on a port: side b (+1) or a (-1) of a row, or a wrench.

@@ -17,11 +17,20 @@ namespace {
 constexpr double singular_ratio = 1e-6; // of Posture: below, joints cannot follow
 constexpr double least_shift = 1e-8;    // of a state, relative: forces change by more than their rounding
 
-std::vector<TimeFunction> laws_of(const Scene &scene) {
+// Of all rows; those without a target stay where they are.
+std::vector<TimeFunction> laws_of(const Scene &scene, std::size_t rows) {
   std::vector<TimeFunction> laws;
   for (const Target &target : scene.targets)
     laws.push_back(target.law);
+  laws.resize(rows, Constant(0));
   return laws;
+}
+
+VectorXd signs_of(const Scene &scene, std::size_t rows) {
+  VectorXd signs = VectorXd::Ones(static_cast<Index>(rows));
+  for (std::size_t r = 0; r < scene.targets.size(); ++r)
+    signs[static_cast<Index>(r)] = scene.targets[r].sign;
+  return signs;
 }
 
 } // namespace
@@ -47,9 +56,9 @@ RecursiveMotion<Space>::RecursiveMotion(const Mechanism<Space> &mechanism, const
       force_(VectorXd::Zero(mechanism.n_v)),
       wrench_(VectorXd::Zero(Space::dim * static_cast<Index>(mechanism.wrenches.size()))),
       along_cuts_(VectorXd::Zero(static_cast<Index>(scene.cut_joints.size()))),
-      target_(VectorXd::Zero(static_cast<Index>(mechanism.rows.size()))), value_(target_), rate_(target_),
-      correction_(force_), state_(VectorXd::Zero(mechanism.n_q + mechanism.n_v)), laws_(laws_of(scene)),
-      jets_(mechanism.rows.size()), target_time_(std::numeric_limits<double>::quiet_NaN()),
+      value_(VectorXd::Zero(static_cast<Index>(mechanism.rows.size()))), rate_(value_), correction_(force_),
+      state_(VectorXd::Zero(mechanism.n_q + mechanism.n_v)), laws_(laws_of(scene, mechanism.rows.size())),
+      sign_(signs_of(scene, mechanism.rows.size())), target_time_(std::numeric_limits<double>::quiet_NaN()),
       norm_(mechanism, scene.is_strict), shifted_(VectorXd::Zero(2 * mechanism.n_v)),
       unused_(VectorXd::Zero(mechanism.n_v)), evaluated_(VectorXd::Zero(mechanism.n_q)), rates_(force_),
       posture_(mechanism) {
@@ -80,32 +89,28 @@ RecursiveMotion<Space>::RecursiveMotion(const Mechanism<Space> &mechanism, const
       fastest_ = std::max(fastest_, std::sqrt(node.body.K[static_cast<std::size_t>(k)])), steps_between_postures_ = 10;
 }
 
-template <class Space> void RecursiveMotion<Space>::find_targets(double t) {
-  const std::size_t rows = scene_.targets.size();
-  const auto begin = foreseen_times_.begin();
-  if (next_foreseen_ >= foreseen_times_.size() || foreseen_times_[next_foreseen_] != t)
-    next_foreseen_ = static_cast<std::size_t>(std::find(begin, foreseen_times_.end(), t) - begin);
-  const Jet *found = jets_.data();
-  if (next_foreseen_ < foreseen_times_.size())
-    found = foreseen_.data() + rows * next_foreseen_++;
-  else
-    laws_(t, jets_.data());
-  for (std::size_t r = 0; r < rows; ++r) {
-    const Jet jet = scene_.targets[r].of(found[r]);
-    jets_[r] = jet, target_[static_cast<Index>(r)] = jet.acceleration;
-  }
+template <class Space> void RecursiveMotion<Space>::look_up(double t) {
+  const auto begin = foreseen_times_.begin(), end = foreseen_times_.end();
+  now_ = static_cast<std::size_t>(std::find(begin, end, t) - begin);
+  if (now_ == foreseen_times_.size())
+    find_laws(&t, 1), now_ = 0;
+}
+
+template <class Space> void RecursiveMotion<Space>::turn_markers(double t) {
   for (const DrivenMarker &driven : scene_.driven) {
     const auto i = static_cast<std::size_t>(driven.marker);
     workspace_.turning[i] = measured_.turning[i] = newton_.turning[i] = driven.law(t);
   }
-  target_time_ = t;
 }
 
 template <class Space> void RecursiveMotion<Space>::foresee(const double *times, int count) {
-  const auto size = static_cast<std::size_t>(count);
-  foreseen_times_.assign(times, times + size);
-  foreseen_.resize(size * scene_.targets.size());
-  laws_.at(times, count, foreseen_.data());
+  find_laws(times, count);
+  target_time_ = std::numeric_limits<double>::quiet_NaN();
+}
+
+template <class Space> void RecursiveMotion<Space>::find_laws(const double *times, int count) {
+  foreseen_times_.assign(times, times + count);
+  laws_.find(times, count), laws_.accelerations(sign_.data(), targets_);
   next_foreseen_ = 0;
 }
 
@@ -145,7 +150,9 @@ template <class Space> Forces<double> RecursiveMotion<Space>::act(double t, cons
   return forces;
 }
 
-template <class Space> void RecursiveMotion<Space>::evaluate(double t, const double *q, const double *v, double *a) {
+template <class Space>
+[[gnu::always_inline]] inline void RecursiveMotion<Space>::evaluate_here(double t, const double *q, const double *v,
+                                                                         double *a) {
   update_targets(t);
   Forces<double> forces;
   if (has_given_ || has_wrenches_)
@@ -153,7 +160,11 @@ template <class Space> void RecursiveMotion<Space>::evaluate(double t, const dou
   else
     forces.is_placed = is_placed_;
   is_placed_ = false;
-  accelerations(mechanism_, q, v, forces, target_.data(), workspace_, a);
+  accelerations(mechanism_, q, v, forces, target_, workspace_, a);
+}
+
+template <class Space> void RecursiveMotion<Space>::evaluate(double t, const double *q, const double *v, double *a) {
+  evaluate_here(t, q, v, a);
 }
 
 template <class Space> void RecursiveMotion<Space>::act_at_points(double t) {
@@ -205,7 +216,7 @@ template <class Space> void RecursiveMotion<Space>::act_along_cuts(double t, con
 template <class Space> void RecursiveMotion<Space>::slope(double t, const double *z, double *z_dot) {
   const double *q = local().state(z), *v = z + n_v();
   local().rate(z, z_dot);
-  evaluate(t, q, v, z_dot + n_v());
+  evaluate_here(t, q, v, z_dot + n_v());
   if (loops_ && !loops_->has_begun())
     loops_->begin_at(q, workspace_, newton_);
   posture_is_old_ = true;
@@ -220,9 +231,9 @@ void RecursiveMotion<Space>::residuals(double t, const double *q, const double *
   update_targets(t);
   measure(mechanism_, q, v, w, value_.data(), rate_.data());
   is_placed_ = &w == &workspace_;
-  for (std::size_t r = 0; r < jets_.size(); ++r) {
-    value_[static_cast<Index>(r)] -= jets_[r].value;
-    rate_[static_cast<Index>(r)] -= jets_[r].rate;
+  for (Index r = 0; r < value_.size(); ++r) {
+    const Jet law = laws_.jet(now_, static_cast<std::size_t>(r));
+    value_[r] -= sign_[r] * law.value, rate_[r] -= sign_[r] * law.rate;
   }
 }
 
@@ -346,7 +357,7 @@ template <class Space> Index RecursiveMotion<Space>::prescribed() const {
 
 template <class Space> void RecursiveMotion<Space>::prescribe(double t, double *f) {
   update_targets(t);
-  f = std::copy_n(target_.data(), scene_.targets.size(), f);
+  f = std::copy_n(target_, scene_.targets.size(), f);
   for (const Load &load : scene_.loads)
     *f++ = load.magnitude(t).value;
   for (const PointLoad &load : scene_.point_loads)

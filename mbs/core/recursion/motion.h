@@ -84,8 +84,10 @@ struct Target {
   TimeFunction law;
   double sign = 1;
 
-  Jet of(const Jet &jet) const { return {sign * jet.value, sign * jet.rate, sign * jet.acceleration}; }
-  Jet operator()(double t) const { return of(law(t)); }
+  Jet operator()(double t) const {
+    const Jet jet = law(t);
+    return {sign * jet.value, sign * jet.rate, sign * jet.acceleration};
+  }
 };
 
 // Forces from outside that depend on time alone.
@@ -164,7 +166,7 @@ public:
   unsigned long evaluations() const override { return workspace_.evaluations; }
 
   // implicit.cpp
-  Eigen::Index constraints() const override { return target_.size(); }
+  Eigen::Index constraints() const override { return value_.size(); }
   const Eigen::VectorXd &stiffness() const override { return stiffness_; }
   const Eigen::VectorXd &damping() const override { return damping_; }
   const Eigen::MatrixXd &coupling() const override { return coupling_; }
@@ -202,10 +204,21 @@ public:
 
 private:
   void update_targets(double t) {
-    if (t != target_time_)
-      find_targets(t);
+    if (t == target_time_)
+      return;
+    now_ = next_foreseen_;
+    if (now_ >= foreseen_times_.size() || foreseen_times_[now_] != t)
+      look_up(t);
+    next_foreseen_ = now_ + 1;
+    target_time_ = t;
+    target_ = targets_.data() + now_ * static_cast<std::size_t>(value_.size());
+    if (!scene_.driven.empty())
+      turn_markers(t);
   }
-  void find_targets(double t);
+  void evaluate_here(double t, const double *q, const double *v, double *a); // evaluate(), inline
+  void look_up(double t);                                                    // now_
+  void turn_markers(double t);
+  void find_laws(const double *times, int count);
   void residuals(double t, const double *q, const double *v, Workspace<Space, double> &w);
   double project(double t, double *q, double *v, Workspace<Space, double> &w); // w: where residuals are measured
   void act_at_points(double t);                                                // after place_all(); adds to wrench_
@@ -228,13 +241,15 @@ private:
   Workspace<Space, double> workspace_, measured_, newton_;
   bool has_given_, has_wrenches_; // generalized forces: force_, and wrench_
   bool is_placed_ = false;        // workspace_ has the kinematics of the state that will be evaluated next
-  Eigen::VectorXd force_, wrench_, along_cuts_, target_, value_, rate_, correction_, state_;
-  FunctionsOfTime laws_;             // of the scene's targets
-  std::vector<Jet> jets_, foreseen_; // at target_time_, and (times, rows) at foreseen_times_
+  Eigen::VectorXd force_, wrench_, along_cuts_, value_, rate_, correction_, state_;
+  FunctionsOfTime laws_; // that rows follow, up to their signs, at foreseen_times_
+  Eigen::VectorXd sign_;
+  std::vector<double> foreseen_times_, targets_; // accelerations of rows (times, rows)
+  std::size_t next_foreseen_ = 0;                // of these times, most likely asked for next
+  std::size_t now_ = 0;                          // of these, target_time_
   double target_time_;
-  std::vector<double> foreseen_times_;
-  std::size_t next_foreseen_ = 0; // most likely asked for next
-  double fastest_ = 0;            // 1/s, of modes
+  const double *target_ = nullptr; // (rows) accelerations there
+  double fastest_ = 0;             // 1/s, of modes
   MotionNorm<Space> norm_;
   MotorForces<Space> *motors_ = nullptr;
   Eigen::VectorXd shifted_, unused_;

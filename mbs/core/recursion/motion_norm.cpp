@@ -39,7 +39,7 @@ struct SquaresOfModes {
 
   SquaresOfModes(const double *a, const double *radian, Index count) {
     FourSums of_plain, of_rate, of_way;
-    for_fours(count, [&](Index first, auto read) {
+    for_fours(count, [&](Index first, auto read) __attribute__((always_inline)) {
       const auto x = read(a + first), s = read(radian + first), rate = x * s, way = rate * s;
       of_plain.add(x * x), of_rate.add(rate * rate), of_way.add(way * way);
     });
@@ -136,11 +136,17 @@ template <class Space> void MotionNorm<Space>::add_spring(double stiffness, doub
 
 // size_: of all groups
 template <class Space> void MotionNorm<Space>::add_squares(const double *z) const {
-  std::fill(size_.begin(), size_.end(), 0.0);
+  double *of_z = size_.data(), *of_rates = of_z + pace_.size();
+  for (double &size : size_)
+    size = 0;
   const double *z_dot = z + radian_.size();
   for (const auto &[first, count, group] : runs_) {
-    size_[group] += sum_of_squares(z + first, count);
-    size_[pace_.size() + group] += sum_of_squares(z_dot + first, count);
+    FourSums sum, sum_of_rates;
+    for_fours(count, [&](Index i, auto read) __attribute__((always_inline)) {
+      const auto x = read(z + first + i), x_dot = read(z_dot + first + i);
+      sum.add(x * x), sum_of_rates.add(x_dot * x_dot);
+    });
+    of_z[group] += sum(), of_rates[group] += sum_of_rates();
   }
 }
 
@@ -162,21 +168,17 @@ template <class Space> double MotionNorm<Space>::of_change(const double *change,
 
 template <class Space>
 void MotionNorm<Space>::forces(const Workspace<Space, double> &w, const VectorXd *motors, VectorXd &values) const {
-  const auto rows = static_cast<Index>(mechanism_.rows.size());
-  values.head(rows) = Eigen::Map<const VectorXd>(w.lambda.data(), rows);
-  Index first = rows;
+  double *to = std::copy_n(w.lambda.data(), mechanism_.rows.size(), values.data());
   const auto add = [&](const double *f) {
-    values.segment<Space::dim>(first) = Eigen::Map<const Eigen::Matrix<double, Space::dim, 1>>(f);
-    first += Space::dim;
+    for (int i = 0; i < Space::dim; ++i)
+      *to++ = f[i];
   };
   for (const std::size_t port : carriers_)
     add(w.ports[port].f);
   for (const std::size_t node : alone_)
     add(w.hinges[node].f);
-  if (motors)
-    values.tail(motors->size()) = *motors;
-  else
-    values.tail(static_cast<Index>(motors_)).setZero();
+  for (std::size_t i = 0; i < motors_; ++i)
+    *to++ = motors ? (*motors)[static_cast<Index>(i)] : 0;
 }
 
 template <class Space>

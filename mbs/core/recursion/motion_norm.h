@@ -83,7 +83,7 @@ private:
   std::vector<std::size_t> alone_;                      // nodes whose forces on the ground are judged
   std::size_t motors_ = 0;                              // judged
   std::vector<int> force_group_; // of each row, of each component at these ports, and of these nodes, of each motor
-  std::vector<bool> is_moment_;  // of each group of these
+  std::vector<char> is_moment_;  // of each group of these
   std::vector<double> leverage_; // of each: more than 1 of those from which other forces follow, or that stand alone
   std::vector<double> force_peak_, force_now_, force_error_;
   Eigen::VectorXd observed_, change_;

@@ -7,29 +7,35 @@ namespace ffrobot::recursion {
 
 // --- frames and sections in global axes, after kinematics()
 
-template <class T> FFROBOT_INLINE void ground_pose(const PlanarMarker &marker, Pose<T> &to) {
-  const double c = std::cos(marker.angle), s = std::sin(marker.angle);
-  const double R[3][3] = {{c, -s, 0}, {s, c, 0}, {0, 0, 1}};
-  for (int i = 0; i < 3; ++i) {
+// Motions are poses without axes, which take sines or products of matrices.
+
+template <class T> FFROBOT_INLINE void ground_motion(const PlanarMarker &marker, Pose<T> &to) {
+  for (int i = 0; i < 3; ++i)
     to.r[i] = T(i < 2 ? marker.position[i] : 0.), to.v[i] = to.omega[i] = T(0.);
-    for (int j = 0; j < 3; ++j)
-      to.R[i][j] = T(R[i][j]);
-  }
   to.angle = T(marker.angle);
 }
-template <class T> FFROBOT_INLINE void ground_pose(const SpatialMarker &marker, Pose<T> &to) {
-  for (int i = 0; i < 3; ++i) {
-    to.r[i] = T(marker.position[i]), to.v[i] = to.omega[i] = T(0.);
+template <class T> FFROBOT_INLINE void ground_axes(const PlanarMarker &marker, Pose<T> &to) {
+  const double c = std::cos(marker.angle), s = std::sin(marker.angle);
+  const double R[3][3] = {{c, -s, 0}, {s, c, 0}, {0, 0, 1}};
+  for (int i = 0; i < 3; ++i)
     for (int j = 0; j < 3; ++j)
-      to.R[i][j] = T(marker.triad(i, j));
-  }
+      to.R[i][j] = T(R[i][j]);
+}
+template <class T> FFROBOT_INLINE void ground_motion(const SpatialMarker &marker, Pose<T> &to) {
+  for (int i = 0; i < 3; ++i)
+    to.r[i] = T(marker.position[i]), to.v[i] = to.omega[i] = T(0.);
   to.angle = T(0.);
 }
+template <class T> FFROBOT_INLINE void ground_axes(const SpatialMarker &marker, Pose<T> &to) {
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j)
+      to.R[i][j] = T(marker.triad(i, j));
+}
 
-// A section of a body whose frame is known
+// Of a section of a body whose frame is known
 template <class T>
-inline void section_pose(const planar::Body &body, int port, const planar::State<T> &s, const Pose<T> &frame,
-                         Pose<T> &to) {
+inline void section_motion(const planar::Body &body, int port, const planar::State<T> &s, const Pose<T> &frame,
+                           Pose<T> &to) {
   const planar::Port &constants = body.ports[port];
   const T *u = s.u.data() + constants.row, *u_dot = s.u_dot.data() + constants.row;
   const T x = constants.x + u[0], y = constants.y + u[1];
@@ -39,6 +45,9 @@ inline void section_pose(const planar::Body &body, int port, const planar::State
   to.v[0] = frame.v[0] + c * x_dot - n * y_dot, to.v[1] = frame.v[1] + n * x_dot + c * y_dot, to.v[2] = T(0.);
   to.omega[0] = to.omega[1] = T(0.), to.omega[2] = s.omega + u_dot[2];
   to.angle = frame.angle + constants.angle + u[2];
+}
+template <class T>
+inline void section_axes(const planar::Body &, int, const planar::State<T> &, Pose<T> &to) { // after section_motion()
   T sine, cosine;
   sine_and_cosine(to.angle, sine, cosine);
   const T R[3][3] = {{cosine, -sine, T(0.)}, {sine, cosine, T(0.)}, {T(0.), T(0.), T(1.)}};
@@ -47,8 +56,8 @@ inline void section_pose(const planar::Body &body, int port, const planar::State
       to.R[i][j] = R[i][j];
 }
 template <class T>
-inline void section_pose(const spatial::Body &body, int port, const spatial::State<T> &s, const Pose<T> &frame,
-                         Pose<T> &to) {
+inline void section_motion(const spatial::Body &body, int port, const spatial::State<T> &s, const Pose<T> &frame,
+                           Pose<T> &to) {
   const spatial::Port &constants = body.ports[port];
   const spatial::PortMotion<T> &motion = s.ports[port];
   T r[3], v[3], omega[3], turned[3];
@@ -56,25 +65,35 @@ inline void section_pose(const spatial::Body &body, int port, const spatial::Sta
   cross(s.omega, motion.r, v);
   for (int i = 0; i < 3; ++i)
     omega[i] = s.omega[i];
-  product(s.absolute, constants.R, to.R);
   if (constants.is_soft) {
     turn(constants.R, s.u_dot.data() + constants.row, turned);
     for (int i = 0; i < 3; ++i)
       v[i] += turned[i];
-    T axes[3][3];
     turn(constants.R, motion.rate, turned);
-    for (int i = 0; i < 3; ++i) {
+    for (int i = 0; i < 3; ++i)
       omega[i] += turned[i];
-      for (int j = 0; j < 3; ++j)
-        axes[i][j] = to.R[i][j];
-    }
-    product(axes, motion.turn, to.R);
   }
   turn(s.absolute, v, turned);
   turn(s.absolute, omega, to.omega);
   for (int i = 0; i < 3; ++i)
     to.r[i] = frame.r[i] + r[i], to.v[i] = frame.v[i] + turned[i];
   to.angle = T(0.);
+}
+template <class T>
+inline void section_axes(const spatial::Body &body, int port, const spatial::State<T> &s, Pose<T> &to) {
+  const spatial::Port &constants = body.ports[port];
+  product(s.absolute, constants.R, to.R);
+  if (constants.is_soft) {
+    T axes[3][3];
+    for (int i = 0; i < 3; ++i)
+      for (int j = 0; j < 3; ++j)
+        axes[i][j] = to.R[i][j];
+    product(axes, s.ports[port].turn, to.R);
+  }
+}
+template <class Body, class State, class T>
+inline void section_pose(const Body &body, int port, const State &s, const Pose<T> &frame, Pose<T> &to) {
+  section_motion(body, port, s, frame, to), section_axes(body, port, s, to);
 }
 
 template <class T> FFROBOT_INLINE void frame_axes(const planar::State<T> &s, Pose<T> &to) {
@@ -110,10 +129,10 @@ FFROBOT_APART void locate(const Mechanism<Space> &m, const T *q, Workspace<Space
     const Hinge<Space, T> &hinge = w.hinges[i];
     Pose<T> inner, at{};
     if (node.parent < 0)
-      ground_pose(m.ground[node.parent_port], inner);
+      ground_motion(m.ground[node.parent_port], inner);
     else
-      section_pose(m.nodes[node.parent].body, node.parent_port - m.nodes[node.parent].first_port, w.bodies[node.parent],
-                   w.frames[node.parent], inner);
+      section_motion(m.nodes[node.parent].body, node.parent_port - m.nodes[node.parent].first_port,
+                     w.bodies[node.parent], w.frames[node.parent], inner);
     Pose<T> &frame = w.frames[i];
     frame_axes(w.bodies[i], frame);
     // origin and velocity of the outer section; its axes are those of the frame, or of the inboard port
@@ -147,22 +166,29 @@ FFROBOT_APART void locate(const Mechanism<Space> &m, const T *q, Workspace<Space
 }
 
 template <class Space, class T>
+FFROBOT_INLINE void attachment_motion(const Mechanism<Space> &m, const Attachment &at, const Workspace<Space, T> &w,
+                                      Pose<T> &to) {
+  if (at.node >= 0)
+    return section_motion(m.nodes[at.node].body, at.port, w.bodies[at.node], w.frames[at.node], to);
+  ground_motion(m.ground[at.port], to);
+  if constexpr (Space::dim == 6)
+    if (m.ground[at.port].turns)
+      for (int i = 0; i < 3; ++i)
+        to.omega[i] = T(w.turning[at.port].omega[i]);
+}
+
+template <class Space, class T>
 FFROBOT_INLINE void attachment_pose(const Mechanism<Space> &m, const Attachment &at, const Workspace<Space, T> &w,
                                     Pose<T> &to) {
-  if (at.node >= 0) {
-    section_pose(m.nodes[at.node].body, at.port, w.bodies[at.node], w.frames[at.node], to);
-    return;
-  }
-  ground_pose(m.ground[at.port], to);
+  attachment_motion(m, at, w, to);
+  if (at.node >= 0)
+    return section_axes(m.nodes[at.node].body, at.port, w.bodies[at.node], to);
+  ground_axes(m.ground[at.port], to);
   if constexpr (Space::dim == 6)
-    if (m.ground[at.port].turns) {
-      const Turning &axes = w.turning[at.port];
-      for (int i = 0; i < 3; ++i) {
-        to.omega[i] = T(axes.omega[i]);
+    if (m.ground[at.port].turns)
+      for (int i = 0; i < 3; ++i)
         for (int j = 0; j < 3; ++j)
-          to.R[i][j] = T(axes.A(i, j));
-      }
-    }
+          to.R[i][j] = T(w.turning[at.port].A(i, j));
 }
 
 // What a moment does with the angular acceleration of a marker that turns as it is told
@@ -186,6 +212,16 @@ template <class T> inline T turn_about(const T *n, const T (&A)[3][3], const T (
       R[i][j] = dot(B[i], A[j]);
   logarithm(R, x);
   return dot(n, x);
+}
+
+// From a to b, and its rate
+template <class Space, class T>
+FFROBOT_INLINE void separation(const Mechanism<Space> &m, const Row &row, const Workspace<Space, T> &w, T *d,
+                               T *d_dot) {
+  Pose<T> a, b;
+  attachment_motion(m, row.a, w, a), attachment_motion(m, row.b, w, b);
+  for (int i = 0; i < 3; ++i)
+    d[i] = b.r[i] - a.r[i], d_dot[i] = b.v[i] - a.v[i];
 }
 
 template <class T> struct RowMotion {

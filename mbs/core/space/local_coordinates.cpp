@@ -47,9 +47,8 @@ void LocalCoordinates::shift(double *z, double h, const double *dq) const {
   from_state(y, z);
 }
 
-void LocalCoordinates::rate(const double *z, double *z_dot) const {
+void LocalCoordinates::rates_of_rotations(const double *z, double *z_dot) const {
   const double *v = z + space_.n_v();
-  std::copy_n(v, space_.n_v(), z_dot);
   for (const auto &of : space_.rotations())
     Eigen::Map<Vector3d>(z_dot + of.v) =
         rotation_vector_rate(Eigen::Map<const Vector3d>(z + of.v), Eigen::Map<const Vector3d>(v + of.v));

@@ -8,6 +8,8 @@
 
 #include "core/space/configuration_space.h"
 
+#include <algorithm>
+
 namespace ffrobot {
 
 class LocalCoordinates {
@@ -28,13 +30,18 @@ public:
   void shift(double *z, double h, const double *dq) const;
 
   // The position part of z_dot (n_v) at z
-  void rate(const double *z, double *z_dot) const;
+  void rate(const double *z, double *z_dot) const {
+    std::copy_n(z + space_.n_v(), space_.n_v(), z_dot);
+    if (!space_.is_flat())
+      rates_of_rotations(z, z_dot);
+  }
 
   // Takes z for the centre, z and its rate along; false where the space is flat: nothing has changed
   bool recentre(double *z, double *z_dot);
 
 private:
   const double *curved_state(const double *z) const;
+  void rates_of_rotations(const double *z, double *z_dot) const;
 
   ConfigurationSpace space_;
   Eigen::VectorXd centre_;        // q, with zeros for its numbers; empty where the space is flat

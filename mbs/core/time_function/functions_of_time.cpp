@@ -15,7 +15,10 @@ Jets all(const Jet &jet) {
   return {FourDoubles{} + jet.value, FourDoubles{} + jet.rate, FourDoubles{} + jet.acceleration};
 }
 
-Jet one_of(const Jets &jets, int i) { return {jets.value[i], jets.rate[i], jets.acceleration[i]}; }
+Jet one_of(const Jets &jets, std::size_t i) { return {jets.value[i], jets.rate[i], jets.acceleration[i]}; }
+void put(const Jet &jet, Jets &to, std::size_t i) {
+  to.value[i] = jet.value, to.rate[i] = jet.rate, to.acceleration[i] = jet.acceleration;
+}
 
 [[gnu::always_inline]] inline void make_finite_or_nan(FourDoubles &x) { x = (x - x == 0) ? x : FourDoubles{} + nan; }
 
@@ -111,31 +114,43 @@ void FunctionsOfTime::evaluate(const Part &part) {
       sine_and_cosine(z, to, values_[part.value + 1]);
       break;
     default:
-      for (int i = 0; i < together; ++i) {
-        const Jet jet = apply(part.what, one_of(x, i), one_of(values_[part.operands[1]], i), one_of(z, i));
-        to.value[i] = jet.value, to.rate[i] = jet.rate, to.acceleration[i] = jet.acceleration;
-      }
+      for (std::size_t i = 0; i < together; ++i)
+        put(apply(part.what, one_of(x, i), one_of(values_[part.operands[1]], i), one_of(z, i)), to, i);
     }
 }
 
-void FunctionsOfTime::at(const double *times, int count, Jet *jets) {
-  if (!expressions_.empty())
-    for (int first = 0; first < count; first += together) {
-      const int last = std::min(first + together, count);
-      for (int i = 0; i < together; ++i)
-        values_[0].value[i] = times[std::min(first + i, last - 1)];
-      for (const Part &part : parts_)
-        evaluate(part);
-      for (const auto &[function, value] : expressions_) {
-        Jets known = values_[value];
-        make_finite_or_nan(known.value), make_finite_or_nan(known.rate), make_finite_or_nan(known.acceleration);
-        for (int i = first; i < last; ++i)
-          jets[static_cast<std::size_t>(i) * size_ + function] = one_of(known, i - first);
-      }
+void FunctionsOfTime::find(const double *times, int count) {
+  const auto size = static_cast<std::size_t>(count);
+  fours_ = (size + together - 1) / together;
+  if (found_.size() < fours_ * size_)
+    found_.resize(fours_ * size_);
+  for (std::size_t first = 0; first < size; first += together) {
+    Jets *to = found_.data() + first / together * size_;
+    FourDoubles &time = values_[0].value;
+    for (std::size_t i = 0; i < together; ++i)
+      time[i] = times[std::min(first + i, size - 1)];
+    for (const Part &part : parts_)
+      evaluate(part);
+    for (const auto &[function, value] : expressions_) {
+      Jets jets = values_[value];
+      make_finite_or_nan(jets.value), make_finite_or_nan(jets.rate), make_finite_or_nan(jets.acceleration);
+      to[function] = jets;
     }
-  for (const auto &[function, law] : others_)
-    for (int i = 0; i < count; ++i)
-      jets[static_cast<std::size_t>(i) * size_ + function] = law(times[i]);
+    for (const auto &[function, law] : others_)
+      for (std::size_t i = 0; i < std::min(together, size - first); ++i)
+        put(law(times[first + i]), to[function], i);
+  }
+}
+
+void FunctionsOfTime::accelerations(const double *sign, std::vector<double> &to) const {
+  if (to.size() < fours_ * together * size_)
+    to.resize(fours_ * together * size_);
+  for (std::size_t four = 0; four < fours_; ++four)
+    for (std::size_t function = 0; function < size_; ++function) {
+      const FourDoubles now = sign[function] * found_[four * size_ + function].acceleration;
+      double *first = to.data() + four * together * size_ + function;
+      first[0] = now[0], first[size_] = now[1], first[2 * size_] = now[2], first[3 * size_] = now[3];
+    }
 }
 
 } // namespace ffrobot

@@ -15,14 +15,20 @@ class FunctionsOfTime {
 public:
   explicit FunctionsOfTime(const std::vector<TimeFunction> &functions);
 
-  /// At time t, as TimeFunction has them but for rounding.
-  void operator()(double t, Jet *jets) { at(&t, 1, jets); }
+  /// At several times (count), as TimeFunction has them but for rounding; the same as at one time alone. They are kept,
+  /// four times side by side, until the next call.
+  void find(const double *times, int count);
 
-  /// At several times (count): jets (count, functions), the same as one by one.
-  void at(const double *times, int count, Jet *jets);
+  /// Of what find() found at the time number i
+  Jet jet(std::size_t i, std::size_t function) const {
+    const JetOf<FourDoubles> &jets = found_[i / together * size_ + function];
+    return {jets.value[i % together], jets.rate[i % together], jets.acceleration[i % together]};
+  }
+  /// Times `sign` (functions), of all these times: (times, functions)
+  void accelerations(const double *sign, std::vector<double> &to) const;
 
 private:
-  static constexpr int together = 4;
+  static constexpr std::size_t together = 4;
   using Jets = JetOf<FourDoubles>;
 
   /// A value that follows from others; that of a cosine is kept behind that of the sine.
@@ -36,8 +42,9 @@ private:
   std::size_t take(const Expression::Instruction &what, const std::array<std::size_t, 3> &operands);
   void evaluate(const Part &part);
 
-  std::size_t size_;
-  std::vector<Jets> values_; // time, constants and parts
+  std::size_t size_, fours_ = 0; // functions; of times
+  std::vector<Jets> found_;      // (fours of times, functions)
+  std::vector<Jets> values_;     // time, constants and parts
   std::vector<Part> parts_;
   std::vector<std::pair<std::size_t, std::size_t>> expressions_; // functions, and their values
   std::vector<std::pair<std::size_t, TimeFunction>> others_;
