@@ -23,7 +23,7 @@ void Patches::act(ActuationSource &source, ExternalForces &forward) {
   forward.has_modal = true;
   collect(source.modal_force(), body_, force_);
   const Eigen::VectorXd &V = allocation_.solve(force_);
-  force_.noalias() = allocation_.Phi() * V;
+  force_.noalias() = allocation_.Phi().lazyProduct(V);
   distribute(force_, body_, forward.modal);
 }
 

@@ -73,6 +73,8 @@ public:
       : source_(std::move(source)), actuators_(std::move(actuators)) {}
 
   void apply(double t, ExternalForces &forward) override;
+  void foresee(const double *times, int count) override { source_->foresee(times, count); }
+  double end_of_step(double t, double h) override { return source_->end_of_step(t, h); }
 
 private:
   std::shared_ptr<ActuationSource> source_;

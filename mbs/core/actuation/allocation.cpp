@@ -42,7 +42,7 @@ Allocation::Allocation(MatrixXd Phi, const MatrixXd &W_sqrt, MatrixXd gain, Vect
 }
 
 const VectorXd &Allocation::solve(const Eigen::Ref<const VectorXd> &F) {
-  V_.noalias() = gain_ * F;
+  V_.noalias() = gain_.lazyProduct(F);
   if ((V_.array().abs() <= limit_.array()).all()) {
     u_ = V_.cwiseQuotient(scale_);
     std::fill(held_.begin(), held_.end(), 0);

@@ -16,6 +16,10 @@ class ExternalLoads {
 public:
   virtual ~ExternalLoads() = default;
   virtual void apply(double t, ExternalForces &forces) = 0; // sets those of time t
+
+  // As OdeSystem has them: the stages of a step that is tried, and where one had best end.
+  virtual void foresee(const double *, int) {}
+  virtual double end_of_step(double t, double h) { return t + h; }
 };
 
 } // namespace ffrobot

@@ -17,13 +17,19 @@ public:
   // meet.
   void evaluate(double t) {
     if (t != time_)
-      find(t);
-    time_ = t;
+      time_ = find(t) ? t : nowhere;
   }
 
+  // As OdeSystem has them: the next times will be the stages of a step, and where one had best end.
+  void foresee(const double *times, int count) {
+    time_ = nowhere;
+    prepare(times, count);
+  }
+  virtual double end_of_step(double t, double h) { return t + h; }
+
   const Eigen::VectorXd &trajectory_force() const { return trajectory_force_; } // -lambda_s, constraint by constraint
-  const Eigen::VectorXd &tau() const { return tau_; }                           // (motors)
-  const std::vector<Eigen::VectorXd> &modal_force() const { return modal_force_; } // F_p of each body
+  virtual const Eigen::VectorXd &tau() { return tau_; }                         // (motors)
+  virtual const std::vector<Eigen::VectorXd> &modal_force() { return modal_force_; } // F_p of each body
 
   // Q_a of what holds trajectories, and a shape that is prescribed, on the coordinates (R, theta, p) of one body, and q
   // of these.
@@ -35,13 +41,17 @@ public:
 protected:
   explicit ActuationSource(const System &system);
 
-  virtual void find(double t) = 0; // fills what is below; tau and F_p where motors fit the mechanism
+  // Fills what is below; tau and F_p where motors fit the mechanism. False where it is of a stage of a step, not of
+  // time t at any other moment.
+  virtual bool find(double t) = 0;
+  virtual void prepare(const double *, int) {}
 
   Eigen::VectorXd trajectory_force_, tau_;
   std::vector<Eigen::VectorXd> modal_force_;
 
 private:
-  double time_ = std::numeric_limits<double>::quiet_NaN();
+  static constexpr double nowhere = std::numeric_limits<double>::quiet_NaN();
+  double time_ = nowhere;
 };
 
 } // namespace ffrobot

@@ -104,6 +104,8 @@ public:
 
   void add(double t, double *force, double *wrench) override;
   void add_along_cuts(double *along) override;
+  void foresee(const double *times, int count) override { loads_.foresee(times, count); }
+  double end_of_step(double t, double h) override { return loads_.end_of_step(t, h); }
 
 private:
   ExternalLoads &loads_;

@@ -17,9 +17,9 @@ TreeSource::TreeSource(const SystemOnTree &both)
     motors_.emplace(both);
 }
 
-void TreeSource::take(const double *state, const recursion::Workspace<recursion::Planar, double> &w,
-                      const VectorXd &shape_force) {
-  state_ = Eigen::Map<const VectorXd>(state, both_.state_size());
+void TreeSource::take(const double *state, const TreeWorkspace &w, const VectorXd &shape_force) {
+  state_ = state, found_ = &w;
+  motors_are_known_ = !motors_;
   Index k = 0, column = 0;
   for (const auto &[constraint, row, sign, is_trajectory] : both_.reactions.rows)
     if (is_trajectory)
@@ -29,17 +29,31 @@ void TreeSource::take(const double *state, const recursion::Workspace<recursion:
       of_body = shape_force.segment(column, of_body.size());
       column += of_body.size();
     }
-  if (!motors_)
+}
+
+void TreeSource::find_motors() {
+  if (motors_are_known_)
     return;
-  motors_->resolve(state, w.lambda.data(), w);
+  motors_are_known_ = true;
+  motors_->resolve(state_, found_->lambda.data(), *found_);
   tau_ = motors_->tau();
   for (std::size_t b = 0; b < modal_force_.size(); ++b)
     modal_force_[b] = motors_->modal_force()[b] + shape_force_[b];
 }
 
+const VectorXd &TreeSource::tau() {
+  find_motors();
+  return tau_;
+}
+
+const std::vector<VectorXd> &TreeSource::modal_force() {
+  find_motors();
+  return modal_force_;
+}
+
 ActuationSource::OnBody TreeSource::on_body(std::size_t body) {
   const System &system = both_.system;
-  const VectorXd &y = absolute_(state_.data());
+  const VectorXd &y = absolute_(state_);
   update_kinematics(system, y.data(), y.data() + system.coordinates, workspace_);
   std::vector<TrajectoryForce> forces;
   for (const auto &row : both_.reactions.rows)
@@ -62,13 +76,11 @@ TreeMotion motion_of(const SystemOnTree &both, const Recording &recording) {
 } // namespace
 
 TreeActuation::TreeActuation(const SystemOnTree &both, const Recording &recording)
-    : TreeSource(both), steps_(motion_of(both, recording)), motion_(motion_of(both, recording)),
-      recorded_(steps_, recording), a_(both.tree.n_v) {}
+    : TreeSource(both), motion_(motion_of(both, recording)), recorded_(motion_, recording) {}
 
-void TreeActuation::find(double t) {
-  state_ = Eigen::Map<const VectorXd>(recorded_.state(t), both_.state_size());
-  motion_.evaluate(t, state_.data(), state_.data() + both_.tree.n_q, a_.data());
-  take(state_.data(), motion_.workspace());
+bool TreeActuation::find(double t) {
+  take(recorded_.state(t), motion_.workspace());
+  return !recorded_.is_at_stage();
 }
 
 PrescribedActuation::PrescribedActuation(PrescribedMotion &motion, std::vector<ModalShape> shape, const VectorXd &q)
@@ -76,11 +88,12 @@ PrescribedActuation::PrescribedActuation(PrescribedMotion &motion, std::vector<M
   motion_.start_at(q);
 }
 
-void PrescribedActuation::find(double t) {
+bool PrescribedActuation::find(double t) {
   // was found at all output times before; a failure in between shows as a step that is refused
   if (motion_.move(t, modes_at(shape_, t)))
     motion_.balance();
   take(motion_.q(), motion_.workspace(), motion_.shape_force());
+  return true;
 }
 
 } // namespace ffrobot

@@ -13,38 +13,46 @@ namespace ffrobot {
 class TreeSource : public ActuationSource {
 public:
   OnBody on_body(std::size_t body) override;
+  const Eigen::VectorXd &tau() override;
+  const std::vector<Eigen::VectorXd> &modal_force() override;
 
 protected:
-  // tau and modal forces are those of the motors of `both`, which must outlive this; without any they are not asked
-  // for.
+  using TreeWorkspace = recursion::Workspace<recursion::Planar, double>;
+
+  // tau and modal forces are those of the motors of `both`, which must outlive this; without any they are not known.
   explicit TreeSource(const SystemOnTree &both);
 
   // Of a state (q, v) of the tree: w has its kinematics and multipliers, shape_force (modes of all bodies) may be
-  // empty.
-  void take(const double *state, const recursion::Workspace<recursion::Planar, double> &w,
-            const Eigen::VectorXd &shape_force = {});
+  // empty. State and w stay as they are until the next find().
+  void take(const double *state, const TreeWorkspace &w, const Eigen::VectorXd &shape_force = {});
 
   const SystemOnTree &both_;
 
 private:
+  void find_motors(); // unless they are known
+
   std::optional<MotorsOnTree> motors_;
+  bool motors_are_known_ = true;
   AbsoluteState absolute_;
   Workspace workspace_;
-  Eigen::VectorXd state_;
+  const double *state_ = nullptr;
+  const TreeWorkspace *found_ = nullptr;
   std::vector<Eigen::VectorXd> shape_force_; // of each body
 };
 
-// From the dense output of a recorded run.
+// From the recorded steps of a run.
 class TreeActuation final : public TreeSource {
 public:
   TreeActuation(const SystemOnTree &both, const Recording &recording); // both must outlive this
 
-private:
-  void find(double t) override;
+  double end_of_step(double t, double h) override { return recorded_.end_of_step(t, h); }
 
-  TreeMotion steps_, motion_; // that are made again; at the time asked for
+private:
+  bool find(double t) override;
+  void prepare(const double *times, int count) override { recorded_.foresee(times, count); }
+
+  TreeMotion motion_; // that is made again
   RecordedMotion recorded_;
-  Eigen::VectorXd state_, a_;
 };
 
 // Of a motion that is wholly prescribed, which must outlive this: solved anew at every time, first from the posture q
@@ -54,7 +62,7 @@ public:
   PrescribedActuation(PrescribedMotion &motion, std::vector<ModalShape> shape, const Eigen::VectorXd &q);
 
 private:
-  void find(double t) override;
+  bool find(double t) override;
 
   PrescribedMotion &motion_;
   std::vector<ModalShape> shape_;

@@ -192,7 +192,7 @@ private:
     return report_.status == IntegrationStatus::completed;
   }
 
-  Attempt next_attempt() const {
+  Attempt next_attempt() {
     bool lands = method_->lands_on_outputs();
     double target = lands ? delivery_.next_time() : end_;
     const auto end_at = [&](double t) {
@@ -205,7 +205,11 @@ private:
       end_at(jump_->before);
     const double wanted = next_step(steps_.next_step, target - t_, lands);
     const double step = limit_.of(t_, wanted);
-    return {target, step, step == target - t_ ? target : t_ + step, step < wanted};
+    const bool is_limited = step < wanted;
+    if (step == target - t_)
+      return {target, step, target, is_limited};
+    const double end = lands || is_limited ? t_ + step : std::min(system_.end_of_step(t_, step), target);
+    return {target, end == t_ + step ? step : end - t_, end, is_limited};
   }
 
   // Size of the step's error relative to the largest one allowed; NaN where it could not be made.

@@ -105,6 +105,8 @@ template <class Space> void RecursiveMotion<Space>::turn_markers(double t) {
 
 template <class Space> void RecursiveMotion<Space>::foresee(const double *times, int count) {
   find_laws(times, count);
+  if (steering_)
+    steering_->foresee(times, count);
   target_time_ = std::numeric_limits<double>::quiet_NaN();
 }
 

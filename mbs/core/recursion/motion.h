@@ -96,7 +96,9 @@ public:
   virtual ~Steering() = default;
   // Adds those at time t along v (n_v), and on the wrenches of the mechanism (wrenches, dim).
   virtual void add(double t, double *force, double *wrench) = 0;
-  virtual void add_along_cuts(double *) {} // the same (cut joints) of the scene, at the time of the last add()
+  virtual void add_along_cuts(double *) {}     // the same (cut joints) of the scene, at the time of the last add()
+  virtual void foresee(const double *, int) {} // as OdeSystem has it
+  virtual double end_of_step(double t, double h) { return t + h; }
 };
 
 // What motors must do in place of the forces on rows, where these hold trajectories.
@@ -154,6 +156,7 @@ public:
 
   void slope(double t, const double *z, double *z_dot) override;
   void foresee(const double *times, int count) override;
+  double end_of_step(double t, double h) override { return steering_ ? steering_->end_of_step(t, h) : t + h; }
   bool correct(double t, double *z) override;
   bool finish(double t, double *z, double *z_dot) override;
   double error_size(double t, const double *z, const double *e) override;

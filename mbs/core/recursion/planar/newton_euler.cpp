@@ -26,7 +26,7 @@ std::array<double, 2> place(const planar::Port &port, const State &s) {
 VectorXd elastic_accelerations(const Node<Planar> &node, const State &s, const double *a) {
   if (node.n() == 0)
     return VectorXd::Zero(node.body.width());
-  VectorXd found = planar::rows_of(node.body, s) * Eigen::Map<const VectorXd>(a + node.p_v(), node.n());
+  VectorXd found = planar::rows_of(node.body, s).lazyProduct(Eigen::Map<const VectorXd>(a + node.p_v(), node.n()));
   if (node.body.stiffening)
     found -= Eigen::Map<const VectorXd>(s.bent.curvature.data(), found.size());
   return found;
@@ -242,7 +242,7 @@ void NewtonEuler::project(const double *q, const Workspace<Planar, double> &w, d
       continue;
     VectorXd z = VectorXd::Zero(node.body.width());
     collect_ports(i, z);
-    Eigen::Map<VectorXd>(Q + node.p_v(), node.n()) = planar::rows_of(node.body, w.bodies[i]).transpose() * z;
+    Eigen::Map<VectorXd>(Q + node.p_v(), node.n()) = planar::rows_of(node.body, w.bodies[i]).transpose().lazyProduct(z);
   }
 }
 
