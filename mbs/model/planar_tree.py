@@ -65,6 +65,7 @@ class PlanarTree:
         modes = {number: node.modes for number, node in zip(self.bodies, of_bodies, strict=True)}
         self.scene, self.drives = _core.TreeScene(), _core.DrivesOnTree([modes[k] for k in range(len(modes))])
         self._wrenches: dict[Marker, int] = {}
+        self._turned_by_wrenches: set[Marker] = set()
         self._along: list[tuple[Array, TimeFunction]] = []
         self._at_points: list[tuple[int, int, float, TimeFunction]] = []
         self._driven: set[int] = set(range(self._layout.size)) if is_forced else set()
@@ -80,6 +81,8 @@ class PlanarTree:
         self.scene.is_strict, self.scene.has_loops = True, bool(cut)
         self.scene.most_bent = [node.body.inertia for node in self._layout.nodes]
         wrenches = [self._layout.place(marker) for marker in self._wrenches]
+        for at, marker in zip(wrenches, self._wrenches, strict=True):
+            at.only_forces = marker not in self._turned_by_wrenches
         bodies = [self._body(number, node) for number, node in enumerate(self._layout.nodes)]
         self.core = _core.PlanarModel(
             bodies, self._layout.ground_markers(), rows, wrenches, np.array(model.scene.gravity)
@@ -203,7 +206,7 @@ class PlanarTree:
                     self.scene.add_cut_load(self._cuts.along(measure), magnitude)
                 continue
             for marker, component, size in _shares(measure):
-                wrench = self._wrench(marker)
+                wrench = self._wrench(marker, has_moment=component == COMPONENTS[_core.MeasureKind.angle])
                 self.drives.add_at_point(number, wrench, component, size)
                 if magnitude is not ZERO:
                     self._at_points.append((wrench, component, size, magnitude))
@@ -242,7 +245,9 @@ class PlanarTree:
                 found.add_motor_along_cut(self._cuts.along(measure))
         return found
 
-    def _wrench(self, marker: Marker) -> int:
+    def _wrench(self, marker: Marker, *, has_moment: bool = True) -> int:
+        if has_moment:
+            self._turned_by_wrenches.add(marker)
         return self._wrenches.setdefault(marker, len(self._wrenches))
 
     def _add_what_joints_have(self) -> None:

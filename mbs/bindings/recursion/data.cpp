@@ -82,7 +82,8 @@ void bind_rows(nb::module_ &m) {
       .def(
           "__init__", [](MarkerAt *at, int body, int marker) { new (at) MarkerAt{body, marker}; }, "body"_a, "marker"_a)
       .def_ro("body", &MarkerAt::body)
-      .def_ro("marker", &MarkerAt::marker);
+      .def_ro("marker", &MarkerAt::marker)
+      .def_rw("only_forces", &MarkerAt::only_forces, "Of a wrench in the plane: its moment is zero at all times.");
   nb::class_<RowModel>(m, "RowModel", "A constraint row between markers a and b; see mbs/core/recursion/model.h.")
       .def(nb::init<>())
       .def_rw("name", &RowModel::name)

@@ -198,26 +198,28 @@ Mechanism<Space>::Mechanism(std::vector<BodyModel<Data>> bodies, std::vector<Mar
   int first = 0;
   for (BodyModel<Data> &body : bodies) {
     const int own = Space::shape(body.joint).v_count;
+    bool has_rows = false;
     for (const Row &row : rows)
       if (row.model.coordinate >= first && row.model.coordinate < first + own)
-        body.driven = true;
+        body.driven = has_rows = true;
     first += own + static_cast<int>(body.data.modes());
-    if (body.parent >= 0 && (body.joint != JointKind::revolute || body.driven || body.rotor_inertia > 0))
+    if (body.parent >= 0 && (body.joint != JointKind::revolute || has_rows || body.rotor_inertia > 0))
       passes_moment[static_cast<std::size_t>(body.parent)] = 1;
   }
   for (const Row &row : rows)
     for (const Attachment &at : {row.a, row.b})
       if (at.node >= 0 && row.model.kind != RowKind::point)
         passes_moment[static_cast<std::size_t>(at.node)] = 1;
-  for (const Attachment &at : wrenches)
-    if (at.node >= 0)
-      passes_moment[static_cast<std::size_t>(at.node)] = 1;
+  for (std::size_t k = 0; k < wrenches.size(); ++k)
+    if (wrenches[k].node >= 0 && !loaded[k].only_forces)
+      passes_moment[static_cast<std::size_t>(wrenches[k].node)] = 1;
 
   // Coordinates, ports, columns
   for (std::size_t i = 0; i < count; ++i) {
     BodyModel<Data> &model = bodies[i];
     Node<Space> &node = nodes[i];
-    node.name = model.name, node.joint = model.joint, node.shape = Space::shape(model.joint);
+    node.name = model.name, node.joint = model.joint, node.is_driven = model.driven,
+    node.shape = Space::shape(model.joint);
     node.lead = model.lead, node.rotor_inertia = model.rotor_inertia, node.gear_ratio = model.gear_ratio;
     node.rotor_turns = model.joint == JointKind::revolute ? 1 : 0;
     node.q = n_q, node.v = n_v;
@@ -333,6 +335,8 @@ template <class Space> void Mechanism<Space>::connect_pins() {
     const int child = node.outboard ? children[static_cast<std::size_t>(node.first_port)] : -1;
     node.is_loaded = child >= 0;
     node.carries_pin = child >= 0 && nodes[static_cast<std::size_t>(child)].is_pin;
+    if (node.is_pin && child >= 0 && nodes[static_cast<std::size_t>(child)].is_driven)
+      node.moment_on_port = nodes[static_cast<std::size_t>(child)].v;
     node.hangs_on_pin = node.is_pin;
     if (node.parent < 0) {
       if constexpr (std::is_same_v<Space, Planar>)

@@ -31,13 +31,16 @@ template <class Space> struct Node {
                        // port, and for what a body that is alone does to the ground
   int port_slots = 0;  // the first of its ports' among them
   int first_cross = 0; // of blocks between ports: (0, 1), (0, 2) … (1, 2) …; none with a single port
-  bool is_pin = false; // plane: a revolute joint, at most one port, which passes forces only (planar/pins.h)
+  bool is_pin = false; // plane: a revolute joint, at most one port, which passes forces, and moments that are given
+                       // (planar/pins.h)
   // … of a pin: so is what it hangs on, unless that is the ground; something hangs on its port, and that is a pin; what
   // it hands to its port is added to what acts there
   bool hangs_on_pin = false, is_loaded = false, carries_pin = false, adds_up = false;
+  int moment_on_port = -1;    // … of v, along which given forces act on its port, too; -1 where none do
   int angle = -1;             // plane: of the joint, its place in q; -1 where it does not turn
   int inner_rotation = -1;    // plane: row of W of the body it hangs on, the rotation of the section where it does
   double inner_angle = 0;     // plane: of that section undeformed, in axes of its body; of a marker of the ground
+  bool is_driven = false;     // forces or rows act along the joint's coordinates
   bool has_rows = false;      // constraint rows that are coordinates of the joint
   bool is_alone = false;      // hangs on the ground, and nothing on it: forces on the ground are kept (Hinge::f)
   bool is_weightless = false; // nothing but a rotor's inertia, nothing hangs on it: what carries it feels no inertia

@@ -80,6 +80,7 @@ template <class Data> struct BodyModel {
 
 struct MarkerAt {
   int body = -1, marker = 0; // body -1: of the ground
+  bool only_forces = false;  // of a wrench in the plane: its moment is zero at all times
 };
 
 // Constraint rows between two markers: what is zero, or follows a target. In the plane axes have two components, and

@@ -98,6 +98,7 @@ template <class T> struct State {
   T omega;                          // of the frame
   T A[3];                           // of the last evaluation
   T on_modes = T(0.);               // moment along the coordinate of a pin, where modes turn its section
+  T on_port = T(0.);                // the one that is given at its port
   T p_p, p_v;
   Aligned<T> u, u_dot, Q; // W p, W p_dot, W Q_f
   Aligned<T> elastic;     // (n) K p + D p_dot - applied modal forces

@@ -139,7 +139,7 @@ inline void modal_accelerations(const Body &b, const T *p, T *z, State<T> &s, T 
   }
 }
 
-// The same of a body with one block on whose port no moment acts (pins.h)
+// The same of a body with one block (pins.h)
 template <bool by_multipliers, class T>
 FFROBOT_APART void modes_of_pin(const Body &b, const T *p, T *z, State<T> &s, T *a) {
   if constexpr (std::is_same_v<T, double>)
@@ -153,7 +153,8 @@ FFROBOT_APART void modes_of_pin(const Body &b, const T *p, T *z, State<T> &s, T 
         if (!by_multipliers)
           sum += ww * Part::read(p + i) - Part::read(elastic + i);
         sum += z[Body::TILT] * row(Body::TILT) + z[0] * row(0);
-        sum2 += z[1] * row(1) + z[2] * row(2);
+        sum2 += z[5] * row(5) + z[1] * row(1);
+        sum2 += z[2] * row(2);
         (sum + sum2).write(a + i);
       });
     }

@@ -74,6 +74,11 @@ Vector in_port_axes_of(const Mechanism<Planar> &m, const Mechanism<Planar>::Acti
     in_port_axes(body, at.port, s, force, moment, x.data());
     return x;
   }
+  if (action.is_point) {
+    const double moment[3] = {};
+    in_port_axes(body, at.port, s, action.force, moment, x.data());
+    return x;
+  }
   const Row &row = m.rows[static_cast<std::size_t>(action.row)];
   RowMotion<double> motion;
   row_motion(m, row, w, row.moves, motion);
@@ -209,19 +214,20 @@ NewtonEuler::Vector NewtonEuler::along_joint(std::size_t i, const double *q) con
   return found;
 }
 
-// By rows of W: forces on the ports of body i, and what its joint does to the section that modes move against the frame
-void NewtonEuler::collect_ports(std::size_t i, VectorXd &z) const {
+// act(row of W, force): on the ports of body i, and what its joint does to the section that modes move against the
+// frame
+template <class Act> void NewtonEuler::on_rows(std::size_t i, const Act &act) const {
   const Node<Planar> &node = mechanism_.nodes[i];
   const auto put = [&](int port, const Vector &f) {
     for (Index k = 0; k < 3; ++k)
-      z[node.body.ports[static_cast<std::size_t>(port)].row + k] += f[static_cast<std::size_t>(k)];
+      act(node.body.ports[static_cast<std::size_t>(port)].row + k, f[static_cast<std::size_t>(k)]);
   };
   for (int k = 0; k < node.outboard; ++k)
     put(k, with_joints_[static_cast<std::size_t>(node.first_port + k)]);
   if (node.inboard >= 0)
     put(node.inboard, at_section_[i]);
   else if (node.body.is_tilted)
-    z[Body::TILT] = at_section_[i][2];
+    act(Body::TILT, at_section_[i][2]);
 }
 
 void NewtonEuler::project_on_joints(const double *q, const Workspace<Planar, double> &w, double *Q) {
@@ -240,9 +246,10 @@ void NewtonEuler::project(const double *q, const Workspace<Planar, double> &w, d
     const Node<Planar> &node = mechanism_.nodes[i];
     if (node.n() == 0)
       continue;
-    VectorXd z = VectorXd::Zero(node.body.width());
-    collect_ports(i, z);
-    Eigen::Map<VectorXd>(Q + node.p_v(), node.n()) = planar::rows_of(node.body, w.bodies[i]).transpose().lazyProduct(z);
+    Eigen::Map<VectorXd> modal(Q + node.p_v(), node.n());
+    modal.setZero();
+    const auto W = planar::rows_of(node.body, w.bodies[i]);
+    on_rows(i, [&](Index row, double force) { modal += force * W.row(row).transpose(); });
   }
 }
 
@@ -260,7 +267,7 @@ void NewtonEuler::require(const double *q, const double *a, Workspace<Planar, do
     VectorXd z = VectorXd::Zero(node.body.width()), by_forces(node.n());
     for (std::size_t k = 0; k < 3; ++k)
       z[static_cast<Index>(k)] = -frames_[i][k];
-    collect_ports(i, z);
+    on_rows(i, [&](Index row, double force) { z[row] += force; });
     modal_accelerations<false>(node.body, q + node.p_q(), z.data(), w.bodies[i], by_forces.data());
     const VectorXd beside = Eigen::Map<const VectorXd>(a + node.p_v(), node.n()) - by_forces;
     Eigen::Map<VectorXd> modal(f + node.p_v(), node.n());

@@ -56,7 +56,7 @@ public:
 private:
   void inward(bool with_inertia, const Workspace<Planar, double> &w);
   Vector along_joint(std::size_t i, const double *q) const;
-  void collect_ports(std::size_t i, Eigen::VectorXd &z) const;
+  template <class Act> void on_rows(std::size_t i, const Act &act) const;
 
   const Mechanism<Planar> &mechanism_;
   std::vector<Vector> ports_, on_ports_, with_joints_; // of all ports: accelerations; loads; loads and what hangs there

@@ -1,6 +1,6 @@
 // The recursion for what most planar mechanisms consist of: a body whose frame's origin sits at a revolute joint, with
-// at most one port, which passes forces only. Ports have two rows then, Y is 2 x 2 in closed form without a
-// subtraction,
+// at most one port, which passes forces, and moments that are given along the joint there. Ports have two rows then, Y
+// is 2 x 2 in closed form without a subtraction,
 //     Y = (Lambda + det Lambda adj G) / (1 + tr Lambda G + det Lambda det G)
 // and numbers stay in registers. The same steps as in articulated.h and release.h.
 //
@@ -27,17 +27,16 @@ template <class T> FFROBOT_INLINE void load_pin(const Mechanism<Planar> &m, int 
   port.Lambda_xy = c * n * (L[0][0] - L[1][1]) + (c * c - n * n) * L[0][1];
 }
 
-// A moment along the coordinate acts on the modes, too, where these turn the section.
-template <class T> inline void push_along_tilt(const planar::Body &body, const T &moment, planar::State<T> &s) {
-  constexpr int tilt = planar::Body::TILT;
-  const auto by_moment = [&](int row) { return s.gram_of_block(tilt, row) * moment; };
+// What a moment does to the modes that turn a section by a row of W: along the coordinate of the joint (TILT), and
+// that along the joint of what hangs on the port.
+template <int turn, class T> inline void push_modes(const planar::Body &body, const T &moment, planar::State<T> &s) {
+  const auto by_moment = [&](int row) { return s.gram_of_block(turn, row) * moment; };
   for (int r = 0; r < 8; ++r)
     s.Q[r] += by_moment(r);
   if (body.stiffening)
     s.bent.inertia.bx += by_moment(0), s.bent.inertia.by += by_moment(1), s.bent.inertia.ba += by_moment(2);
   else if (body.has_more)
-    s.Q[planar::Body::H] += s.WH[tilt] * moment;
-  s.on_modes = moment;
+    s.Q[planar::Body::H] += s.WH[turn] * moment;
 }
 
 template <class T, int W>
@@ -56,9 +55,11 @@ FFROBOT_INLINE void inward_pin(const Mechanism<Planar> &m, std::size_t i_node, c
   if (forces.generalized)
     applied.set(0, forces.generalized[node.v]);
   forces_on_rows<true>(body, q + node.p_q(), v + node.p_v(), s);
-  s.on_modes = T(0.);
+  s.on_modes = s.on_port = T(0.);
   if (body.is_tilted && forces.generalized)
-    push_along_tilt(body, forces.generalized[node.v], s);
+    s.on_modes = forces.generalized[node.v], push_modes<planar::Body::TILT>(body, s.on_modes, s);
+  if (node.moment_on_port >= 0 && forces.generalized)
+    s.on_port = -forces.generalized[node.moment_on_port], push_modes<5>(body, s.on_port, s);
   T L_xx(0.), L_xy(0.), L_xa(0.), L_yy(0.), L_ya(0.), L_aa(0.); // X^T Y X of what hangs on the port
   Cols H[3];
   if (node.outboard) {
@@ -128,7 +129,7 @@ FFROBOT_INLINE void inward_pin(const Mechanism<Planar> &m, std::size_t i_node, c
   const planar::Inertia<T> I = inertia(body, s);
   const T M_xx = I.xx + L_xx, M_xy = I.xy + L_xy, M_xa = I.xa + L_xa;
   const T M_yy = I.yy + L_yy, M_ya = I.ya + L_ya, M_aa = I.aa + L_aa;
-  H[0].add(0, I.bx), H[1].add(0, I.by), H[2].add(0, I.ba);
+  H[0].add(0, I.bx), H[1].add(0, I.by), H[2].add(0, I.ba - s.on_port);
   if (rows_on_modes) {
     for (int r = 0; r < 3; ++r)
       H[r] += s.gram_of_block(planar::Body::TILT, r) * multipliers;
@@ -208,7 +209,14 @@ FFROBOT_INLINE void release_pin(const Mechanism<Planar> &m, std::size_t i_node, 
   constexpr int tilt = planar::Body::TILT;
   const bool rows_on_modes = W > 1 && body.is_tilted && node.has_rows;
   const T on_modes = rows_on_modes ? multiplier_force<T, W>(m, node, 0, w, y) : T(0.); // by multipliers
-  T z[8] = {-Ax, -Ay, -Aa, T(0.), T(0.), T(0.), by_multipliers ? on_modes : s.on_modes + on_modes, T(0.)};
+  T z[8] = {-Ax,
+            -Ay,
+            -Aa,
+            T(0.),
+            T(0.),
+            by_multipliers ? T(0.) : s.on_port,
+            by_multipliers ? on_modes : s.on_modes + on_modes,
+            T(0.)};
   if (node.outboard) {
     const planar::Port &constants = body.ports[0];
     PortWork<Planar, T> &port = w.ports[node.first_port];
@@ -218,7 +226,7 @@ FFROBOT_INLINE void release_pin(const Mechanism<Planar> &m, std::size_t i_node, 
     if (node.is_loaded) // Y beta is among the columns
       fx -= port.Y_xx * Xx + port.Y_xy * Xy, fy -= port.Y_xy * Xx + port.Y_yy * Xy;
     z[3] = fx, z[4] = fy;
-    port.f[0] = fx, port.f[1] = fy, port.f[2] = T(0.);
+    port.f[0] = fx, port.f[1] = fy, port.f[2] = z[5];
     port.A[0] = by_multipliers ? Xx : Xx + port.beta_x, port.A[1] = by_multipliers ? Xy : Xy + port.beta_y;
     T rotation = Aa;
     if (rows_on_modes) {
