@@ -54,6 +54,7 @@ _FIGURES = {
     "growth": "growth",
     "evaluations": "-",
     "aims": "-",
+    "replays": "-",
     "peer": "-",
 }
 

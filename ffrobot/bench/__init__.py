@@ -9,10 +9,11 @@ evaluations  of several mechanisms in the plane and in space, beside the two-lin
 growth       time per evaluation against modes and links, time of a run against outputs
 hand_written the two-link case written by hand, compiled
 aims         ratios to it
+replays      forward runs that replay PCID, beside that
 peer         EXUDYN on the same modal bodies
 campaign     what runs in which order, what is written and printed
 """
 
 OF_A_SCENE = ("work-precision", "axes")
-PARTS = (*OF_A_SCENE, "growth", "evaluations", "aims")
+PARTS = (*OF_A_SCENE, "growth", "evaluations", "aims", "replays")
 PEER = "peer"  # where asked for: it needs another program

@@ -40,8 +40,8 @@ class Aim:
 
 
 AIMS = (
-    Aim("undeformed start, paper's path: forces", "undeformed", ("force",), 1.5),
-    Aim("static start, quintic path: moments and deflections", "static", ("moment", "displacement"), 0.2, QUINTIC),
+    Aim("undeformed start, paper's path: forces", "undeformed", ("force",), 1.6),
+    Aim("static start, quintic path: moments and deflections", "static", ("moment", "displacement"), 0.25, QUINTIC),
     Aim("static start, paper's path: deflections", "static", ("displacement",), 1 / 3),
 )
 
@@ -68,7 +68,7 @@ def _right_hand_side(hand_written: HandWritten, state: State, display: Watcher) 
         (tree_evaluation_seconds(state, TIME, EVALUATIONS), hand_written.evaluation_seconds(EVALUATIONS))
         for _ in range(ROUNDS)
     ]
-    return {"what": "right-hand side", "within": "", "run": "joint coordinates", **_ratio(pairs, 1.5)}
+    return {"what": "right-hand side", "within": "", "run": "joint coordinates", **_ratio(pairs, 1.6)}
 
 
 def _scene(scene: Scene, aim: Aim) -> Scene:

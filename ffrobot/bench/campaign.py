@@ -29,6 +29,7 @@ from .measuring import find_analysis
 from .peer import Exudyn, measure_peer
 from .precision import INTEGRATORS, TIGHTER, Point, Reference, Row, find_reference, measure_points
 from .record import as_text, write_record
+from .replays import measure_replays
 
 CASES = ("two_link", "slider_crank")  # of the paper, in the source tree
 
@@ -82,7 +83,7 @@ class Campaign:
         return swept
 
     def everything(self, repository: Path, parts: Sequence[str], peer_python: Path) -> None:
-        """Growth, evaluations, aims, the two cases of the paper and the peer, as far as they are among `parts`."""
+        """All that needs no scene, as far as it is among `parts`, and the two cases of the paper."""
         paths = {name: repository / "cases" / name / "scene.toml" for name in CASES}
         of_cases = [part for part in parts if part in OF_A_SCENE]
         if set(parts) - {"growth"} and not all(path.is_file() for path in paths.values()):
@@ -96,6 +97,8 @@ class Campaign:
             self._evaluations(repository)
         if "aims" in parts:
             self._aims(load_scene(paths["two_link"]), repository)
+        if "replays" in parts:
+            self._replays(load_scene(paths["two_link"]))
         swept = {name: self.scene(path, None, self.folder / name, of_cases) for name, path in paths.items() if of_cases}
         if exudyn is not None:
             self._peer(exudyn, load_scene(paths["two_link"]), swept.get("two_link"))
@@ -121,6 +124,10 @@ class Campaign:
                 scene, repository, Path(folder), self.settings.repeat, self.settings.budget, self.display
             )
         self._keep("aims", rows, {"inputs": _inputs(scene, {})}, self.folder, "ratios to the hand-written version")
+
+    def _replays(self, scene: Scene) -> None:
+        rows = measure_replays(scene, self.settings.repeat, self.display)
+        self._keep("replays", rows, {"inputs": _inputs(scene, {})}, self.folder, "forward runs that replay PCID")
 
     def _evaluations(self, repository: Path) -> None:
         with tempfile.TemporaryDirectory(prefix="ffrobot-bench-") as folder:

@@ -47,9 +47,7 @@ def test_full_actuation_stays_on_the_inverse_solution(model, apply, tolerance):
 @pytest.mark.parametrize("apply", ["joints+pzt", "trajectory"])
 def test_of_other_steps_the_difference_falls_with_the_tolerance(model, apply):
     """Both lie far below the tolerance, where chance in the two runs' steps counts."""
-    loose, tight = (
-        departure(*pair(model, apply, tolerance, integrator="dopri5")).max() for tolerance in (1e-4, 1e-7)
-    )
+    loose, tight = (departure(*pair(model, apply, tolerance, integrator="dopri5")).max() for tolerance in (1e-4, 1e-7))
     assert tight < 0.05 * loose
 
 

@@ -1,6 +1,7 @@
 #include "core/actuation/actuators.h"
 
 #include "core/actuation/side_by_side.h"
+#include "core/actuation/small_product.h"
 
 #include <algorithm>
 
@@ -23,7 +24,7 @@ void Patches::act(ActuationSource &source, ExternalForces &forward) {
   forward.has_modal = true;
   collect(source.modal_force(), body_, force_);
   const Eigen::VectorXd &V = allocation_.solve(force_);
-  force_.noalias() = allocation_.Phi().lazyProduct(V);
+  multiply_small(allocation_.Phi(), V.data(), force_.data());
   distribute(force_, body_, forward.modal);
 }
 

@@ -1,5 +1,7 @@
 #include "core/actuation/allocation.h"
 
+#include "core/actuation/small_product.h"
+
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
@@ -44,7 +46,7 @@ Allocation::Allocation(MatrixXd Phi, const MatrixXd &W_sqrt, MatrixXd gain, Vect
 const VectorXd &Allocation::solve(const Eigen::Ref<const VectorXd> &F) {
   if (is_free_)
     last_free_.swap(V_);
-  V_.noalias() = gain_.lazyProduct(F);
+  multiply_small(gain_, F.data(), V_.data());
   const bool was_free = is_free_;
   is_free_ = (V_.array().abs() <= limit_.array()).all();
   if (is_free_)

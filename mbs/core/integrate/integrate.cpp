@@ -52,10 +52,10 @@ public:
               const IntegrationControls &controls, const StateFunctionOfTime &output,
               const std::function<bool(double)> &carry_on, Recording *recording, const Breaks *breaks,
               LimitWatch *limits)
-      : system_(system), controls_(controls), breaks_(breaks), limits_(limits),
+      : system_(system), controls_(controls), breaks_(breaks), limit_watch_(limits),
         delivery_(system, times, output, recording),
         watch_(system, times.front(), times.back(), controls.max_steps, carry_on),
-        limit_(system, times.front(), times.back(), controls.tolerance),
+        step_limit_(system, times.front(), times.back(), controls.tolerance),
         methods_(controls.methods, times.front(), times.back()), method_(make_method(methods_.at_work(), system)),
         control_(method_->error_order()), t_(times.front()), end_(times.back()),
         duration_(times.back() - times.front()), rounding_(system), z_(system.size()), error_(system.size()) {
@@ -71,8 +71,8 @@ public:
     delivery_.record(t_, z_.data());
     delivery_.record_method(methods_.at_work());
     delivery_.output(z_.data());
-    if (limits_)
-      limits_->begin(t_, z_.data());
+    if (limit_watch_)
+      limit_watch_->begin(t_, z_.data());
   }
 
   void go_on(const IntegrationCheckpoint &checkpoint) {
@@ -204,7 +204,7 @@ private:
     if (jump_)
       end_at(jump_->before);
     const double wanted = next_step(steps_.next_step, target - t_, lands);
-    const double step = limit_.of(t_, wanted);
+    const double step = step_limit_.of(t_, wanted);
     const bool is_limited = step < wanted;
     if (step == target - t_)
       return {target, step, target, is_limited};
@@ -267,8 +267,8 @@ private:
   bool take(const Attempt &attempt) {
     ++report_.steps;
     delivery_.outputs_of_step(*method_, attempt.end);
-    if (limits_)
-      limits_->look(*method_, methods_.at_work(), t_, z_.data(), attempt.step);
+    if (limit_watch_)
+      limit_watch_->look(*method_, methods_.at_work(), t_, z_.data(), attempt.step);
     move_to_end(attempt);
     if (controls_.keep_steps)
       report_.step_ends.push_back(t_);
@@ -327,10 +327,10 @@ private:
   OdeSystem &system_;
   const IntegrationControls &controls_;
   const Breaks *breaks_;
-  LimitWatch *limits_;
+  LimitWatch *limit_watch_;
   Delivery delivery_;
   Watch watch_;
-  StepLimit limit_;
+  StepLimit step_limit_;
   FasterMethod methods_;
   std::unique_ptr<Method> method_;
   StepControl control_;

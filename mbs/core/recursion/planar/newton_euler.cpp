@@ -248,8 +248,20 @@ void NewtonEuler::project(const double *q, const Workspace<Planar, double> &w, d
       continue;
     Eigen::Map<VectorXd> modal(Q + node.p_v(), node.n());
     modal.setZero();
-    const auto W = planar::rows_of(node.body, w.bodies[i]);
-    on_rows(i, [&](Index row, double force) { modal += force * W.row(row).transpose(); });
+    pushed_.clear();
+    on_rows(i, [&](Index row, double force) { pushed_.emplace_back(row, force); });
+    if (node.body.stiffening) {
+      for (const auto &[row, force] : pushed_)
+        modal += force * planar::rows_of(node.body, w.bodies[i]).row(row).transpose();
+      continue;
+    }
+    in_registers(node.n(), [&]<int width>(long k) { // the same of rows that are constant
+      using Part = Pack<double, width>;
+      Part sum = Part::zero();
+      for (const auto &[row, force] : pushed_)
+        sum += force * Part::read(node.body.rows.data() + row * node.body.padded + k);
+      sum.write(modal.data() + k);
+    });
   }
 }
 

@@ -1,0 +1,33 @@
+"""`ffrobot bench --part replays`: replays are measured beside the PCID that they follow."""
+
+import csv
+from pathlib import Path
+
+import pytest
+
+REPOSITORY = Path(__file__).parents[2]
+
+pytestmark = pytest.mark.alone
+
+
+@pytest.fixture(scope="module")
+def rows(ffrobot, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("replays")
+    done = ffrobot("bench", "--part", "replays", "--repeat", "3", "--source", REPOSITORY, "-o", folder)
+    assert done.returncode == 0, done.stderr
+    with (folder / "replays.csv").open(encoding="utf-8", newline="") as stream:
+        return {(row["what"], row["integrator"]): row for row in csv.DictReader(stream)}
+
+
+@pytest.mark.parametrize(("apply", "largest"), [("trajectory", 2.9), ("joints+pzt", 4.0)])
+def test_with_all_forces_the_steps_are_those_of_pcid(rows, apply, largest):
+    """Quiet machines show 2.1 and 2.8 times PCID; the dense output of its steps instead would take 4.8 and 6."""
+    row = rows[apply, "dop853"]
+    assert row["steps"] == row["steps_of_pcid"]
+    assert float(row["of_pcid"]) < largest
+
+
+def test_motors_alone_take_shorter_steps(rows):
+    """Links ring without the modal forces: steps fit those of PCID no more."""
+    row = rows["joints", "dop853"]
+    assert int(row["steps"]) > 1.5 * int(row["steps_of_pcid"])
