@@ -8,6 +8,7 @@ evaluation   time of one evaluation of the equations
 evaluations  of several mechanisms in the plane and in space, beside the two-link case written by hand
 growth       time per evaluation against modes and links, time of a run against outputs
 hand_written the two-link case written by hand, compiled
+ratio        of times that were taken in turn
 aims         ratios to it
 replays      forward runs that replay PCID, beside that
 peer         EXUDYN on the same modal bodies

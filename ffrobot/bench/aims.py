@@ -16,6 +16,7 @@ from .errors import KINDS
 from .evaluation import State, tree_evaluation_seconds
 from .hand_written import TIME, HandWritten, general_state
 from .precision import Point, Row, fastest, find_reference, measure_points, repeat_point
+from .ratio import ratios
 
 ACCURACY = 1e-4
 INTEGRATORS = ("auto", "dop853", "radau")
@@ -112,11 +113,12 @@ def _row(aim: Aim, label: str, point: Point | None, pairs: Sequence[tuple[float,
 def _ratio(pairs: Sequence[tuple[float, float]], aim: float) -> Row:
     """Medians of interleaved repetitions, (general, by hand) in s; ratio of the minima, and median of ratios."""
     general, by_hand = zip(*pairs, strict=True)
+    of_minima, of_neighbours = ratios(general, by_hand)
     return {
         "seconds": median(general),
         "hand_written": median(by_hand),
-        "ratio": min(general) / min(by_hand),
-        "ratio_median": median(a / b for a, b in pairs),
+        "ratio": of_minima,
+        "ratio_median": of_neighbours,
         "aim": aim,
         "repetitions": len(pairs),
         "status": "completed",

@@ -83,7 +83,7 @@ class Campaign:
         return swept
 
     def everything(self, repository: Path, parts: Sequence[str], peer_python: Path) -> None:
-        """All that needs no scene, as far as it is among `parts`, and the two cases of the paper."""
+        """Those of `parts` that are told no scene, and the two cases of the paper."""
         paths = {name: repository / "cases" / name / "scene.toml" for name in CASES}
         of_cases = [part for part in parts if part in OF_A_SCENE]
         if set(parts) - {"growth"} and not all(path.is_file() for path in paths.values()):

@@ -30,6 +30,7 @@ from .evaluation import State, tree_evaluation_seconds
 from .growth import LINKS, chain
 from .hand_written import TIME, HandWritten, general_state
 from .precision import Row
+from .ratio import ratios
 
 ROUNDS = 30
 SECONDS = 1e-3  # of a round, about
@@ -138,12 +139,13 @@ def _path(tip: str, rows: int) -> list[dict[str, object]]:
 
 
 def _row(one: Timed, seconds: list[float], by_hand: list[float]) -> Row:
+    of_minima, of_neighbours = ratios(seconds, by_hand)
     row: Row = {
         "what": one.what,
         "seconds": median(seconds),
         "seconds_min": min(seconds),
-        "of_hand_written": min(seconds) / min(by_hand),
-        "of_hand_written_median": median(a / b for a, b in zip(seconds, by_hand, strict=True)),
+        "of_hand_written": of_minima,
+        "of_hand_written_median": of_neighbours,
         "repetitions": len(seconds),
     }
     return row if one.aim is None else row | {"aim": one.aim}

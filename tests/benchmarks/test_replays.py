@@ -21,7 +21,7 @@ def rows(ffrobot, tmp_path_factory):
 
 @pytest.mark.parametrize(("apply", "largest"), [("trajectory", 2.9), ("joints+pzt", 4.0)])
 def test_with_all_forces_the_steps_are_those_of_pcid(rows, apply, largest):
-    """Quiet machines show 2.1 and 2.8 times PCID; the dense output of its steps instead would take 4.8 and 6."""
+    """Quiet machines show 2.0 and 3.2 times PCID; the dense output of its steps instead would take 4.8 and 6."""
     row = rows[apply, "dop853"]
     assert row["steps"] == row["steps_of_pcid"]
     assert float(row["of_pcid"]) < largest
