@@ -39,21 +39,16 @@ Allocation::Allocation(MatrixXd Phi, const MatrixXd &W_sqrt, MatrixXd gain, Vect
   H_.diagonal().array() += added;
   back_ = A.transpose() * W_sqrt;
   bound_ = limit_.cwiseQuotient(scale_);
-  V_ = last_free_ = u_ = b_ = gradient_ = VectorXd::Zero(k);
+  V_ = u_ = b_ = gradient_ = VectorXd::Zero(k);
   held_.assign(static_cast<std::size_t>(k), 0);
 }
 
 const VectorXd &Allocation::solve(const Eigen::Ref<const VectorXd> &F) {
-  if (is_free_)
-    last_free_.swap(V_);
   multiply_small(gain_, F.data(), V_.data());
-  const bool was_free = is_free_;
-  is_free_ = (V_.array().abs() <= limit_.array()).all();
-  if (is_free_)
-    return V_;
-  if (was_free) { // begin at those before
-    u_ = last_free_.cwiseQuotient(scale_);
+  if ((V_.array().abs() <= limit_.array()).all()) {
+    u_ = V_.cwiseQuotient(scale_);
     std::fill(held_.begin(), held_.end(), 0);
+    return V_;
   }
   b_.noalias() = back_ * F;
   for (int i = 0; i < most_changes; ++i) {

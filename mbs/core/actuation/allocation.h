@@ -34,8 +34,7 @@ private:
 
   Eigen::MatrixXd Phi_, gain_, H_, back_; // in u = V / scale: H = A^T A, b = back F with A = W_sqrt Phi scale
   Eigen::VectorXd limit_, scale_, bound_; // bound: limits of u
-  Eigen::VectorXd V_, last_free_, u_, b_, gradient_, target_;
-  bool is_free_ = false;  // V is within all limits: u and held are not up to date
+  Eigen::VectorXd V_, u_, b_, gradient_, target_;
   std::vector<int> held_; // sign of the limit at which a voltage is held, 0 where free
   std::vector<Eigen::Index> free_, factorised_;
   Eigen::LLT<Eigen::MatrixXd> llt_{Eigen::MatrixXd::Identity(1, 1)}; // copied before it is of anything

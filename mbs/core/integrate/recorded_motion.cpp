@@ -84,14 +84,19 @@ const double *RecordedMotion::at_end(std::size_t i) {
   return state;
 }
 
+bool RecordedMotion::is_stage(int i, double t) const {
+  return t == followed_.method->stage_time(i, followed_.begin, followed_.length);
+}
+
 void RecordedMotion::foresee(const double *times, int count) {
   stages_ = 0;
   find_interval(times[0]);
   set_off(followed_);
   Method &method = *followed_.method;
-  const auto is_stage = [&](int i) { return times[i] == method.stage_time(i, followed_.begin, followed_.length); };
+  if (count != method.stages())
+    return;
   for (int i = 0; i < count; ++i)
-    if (count != method.stages() || !is_stage(i))
+    if (!is_stage(i, times[i]))
       return;
   if (end_ != hint_)
     at_end(hint_);
@@ -118,8 +123,7 @@ double RecordedMotion::end_of_step(double t, double h) {
 }
 
 const double *RecordedMotion::state(double t) {
-  is_at_stage_ =
-      next_stage_ < stages_ && t == followed_.method->stage_time(next_stage_, followed_.begin, followed_.length);
+  is_at_stage_ = next_stage_ < stages_ && is_stage(next_stage_, t);
   if (is_at_stage_)
     return motion_.local().state(
         followed_.method->stage(next_stage_++, followed_.begin, followed_.start.data(), followed_.length));

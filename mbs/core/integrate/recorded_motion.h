@@ -46,6 +46,7 @@ private:
   void between_ends(const Step &step, double t); // into z_
   const double *at_end(std::size_t i);           // of a step
   const double *evaluated(double t);             // z_
+  bool is_stage(int i, double t) const;          // of the step that is followed
 
   ImplicitSystem &motion_;
   const Recording &recording_;

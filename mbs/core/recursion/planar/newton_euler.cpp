@@ -246,22 +246,21 @@ void NewtonEuler::project(const double *q, const Workspace<Planar, double> &w, d
     const Node<Planar> &node = mechanism_.nodes[i];
     if (node.n() == 0)
       continue;
-    Eigen::Map<VectorXd> modal(Q + node.p_v(), node.n());
-    modal.setZero();
-    pushed_.clear();
-    on_rows(i, [&](Index row, double force) { pushed_.emplace_back(row, force); });
-    if (node.body.stiffening) {
-      for (const auto &[row, force] : pushed_)
-        modal += force * planar::rows_of(node.body, w.bodies[i]).row(row).transpose();
-      continue;
-    }
-    in_registers(node.n(), [&]<int width>(long k) { // the same of rows that are constant
-      using Part = Pack<double, width>;
-      Part sum = Part::zero();
-      for (const auto &[row, force] : pushed_)
-        sum += force * Part::read(node.body.rows.data() + row * node.body.padded + k);
-      sum.write(modal.data() + k);
-    });
+    const Body &body = node.body;
+    double *modal = Q + node.p_v();
+    if (body.stiffening) {
+      const auto W = planar::rows_of(body, w.bodies[i]);
+      Eigen::Map<VectorXd> sum(modal, node.n());
+      sum.setZero();
+      on_rows(i, [&](Index row, double force) { sum += force * W.row(row).transpose(); });
+    } else
+      in_registers(node.n(), [&]<int width>(long k) { // the same of rows that are constant
+        using Part = Pack<double, width>;
+        const double *W = body.rows.data() + k;
+        Part sum = Part::zero();
+        on_rows(i, [&](Index row, double force) { sum += force * Part::read(W + row * body.padded); });
+        sum.write(modal + k);
+      });
   }
 }
 

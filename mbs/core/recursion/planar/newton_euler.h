@@ -8,7 +8,6 @@
 #include <Eigen/Core>
 
 #include <array>
-#include <utility>
 
 namespace ffrobot::recursion {
 
@@ -68,7 +67,6 @@ private:
   Eigen::VectorXd on_coordinates_;                     // (n_v) what rows that are joint coordinates do to these
   std::vector<Vector> of_joint_, in_global_axes_, at_section_; // by nodes; at_section_: in axes of the body
   std::vector<double> about_inner_;
-  std::vector<std::pair<Eigen::Index, double>> pushed_; // rows of W of one body, by forces
 };
 
 } // namespace ffrobot::recursion

@@ -209,14 +209,8 @@ FFROBOT_INLINE void release_pin(const Mechanism<Planar> &m, std::size_t i_node, 
   constexpr int tilt = planar::Body::TILT;
   const bool rows_on_modes = W > 1 && body.is_tilted && node.has_rows;
   const T on_modes = rows_on_modes ? multiplier_force<T, W>(m, node, 0, w, y) : T(0.); // by multipliers
-  T z[8] = {-Ax,
-            -Ay,
-            -Aa,
-            T(0.),
-            T(0.),
-            by_multipliers ? T(0.) : s.on_port,
-            by_multipliers ? on_modes : s.on_modes + on_modes,
-            T(0.)};
+  const T on_port = by_multipliers ? T(0.) : s.on_port;
+  T z[8] = {-Ax, -Ay, -Aa, T(0.), T(0.), on_port, by_multipliers ? on_modes : s.on_modes + on_modes, T(0.)};
   if (node.outboard) {
     const planar::Port &constants = body.ports[0];
     PortWork<Planar, T> &port = w.ports[node.first_port];
@@ -226,7 +220,7 @@ FFROBOT_INLINE void release_pin(const Mechanism<Planar> &m, std::size_t i_node, 
     if (node.is_loaded) // Y beta is among the columns
       fx -= port.Y_xx * Xx + port.Y_xy * Xy, fy -= port.Y_xy * Xx + port.Y_yy * Xy;
     z[3] = fx, z[4] = fy;
-    port.f[0] = fx, port.f[1] = fy, port.f[2] = z[5];
+    port.f[0] = fx, port.f[1] = fy, port.f[2] = on_port;
     port.A[0] = by_multipliers ? Xx : Xx + port.beta_x, port.A[1] = by_multipliers ? Xy : Xy + port.beta_y;
     T rotation = Aa;
     if (rows_on_modes) {
