@@ -1,4 +1,4 @@
-"""Actuation points (Shaban 2022, Eqs. 5–10): generalized driving forces of a body as forces at points of it."""
+"""Actuation points (Shabana 2022, Eqs. 5–10): generalized driving forces of a body as forces at points of it."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ Place = float | Name
 
 
 class ActuationPoints(Record):
-    """Components of force on one body that carry its generalized driving forces (Shaban 2022, sec. 4).
+    """Components of force on one body that carry its generalized driving forces (Shabana 2022, sec. 4).
 
     `axial` and `transverse` say at which places a component along x or y of the body's frame acts. Without either,
     as many as the body has coordinates are chosen.

@@ -1,4 +1,4 @@
-"""Actuation points in space (Shaban 2022, Eqs. 5–10): generalized driving forces of a body as forces along x, y, z.
+"""Actuation points in space (Shabana 2022, Eqs. 5–10): generalized driving forces of a body as forces along x, y, z.
 
 Forces F_a at points of a body do L_a F_a on it, with a column [e; u × e; Φᵀe] for a unit force along e at u = x + Φp:
 on R and on the rotation, both in axes of the body, and on its modes. Q_a are the forces that the trajectories have on
@@ -31,7 +31,7 @@ AXES = "xyz"
 
 
 class SpatialActuationPoints(Record):
-    """Components of force on one body that carry its generalized driving forces (Shaban 2022, sec. 4).
+    """Components of force on one body that carry its generalized driving forces (Shabana 2022, sec. 4).
 
     `x`, `y` and `z` say at which places a component along that axis of the body's frame acts. Without any, as many as
     are independent of each other are chosen.

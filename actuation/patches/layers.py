@@ -98,8 +98,8 @@ def load_per_volt(layout: PatchKeys, extent: Array, lever: Array) -> Array:
     """Moment (k,) c per volt, N·m/V, of a link held straight; the layers' own stiffness takes of it: see `composite`.
 
     Of bending, E_p d31 w_p N (t_b + N t_p)/2 of N layers on one face, twice that on both: the layers' arms,
-    t_b/2 + (i − ½) t_p, are summed. One layer on one face is Eq. 14 of Shaban 2022. Of twist, the shear force per width
-    of a volt in place of E_p d31, times β.
+    t_b/2 + (i − ½) t_p, are summed. One layer on one face is Eq. 14 of Shabana 2022. Of twist, the shear force per
+    width of a volt instead of E_p d31, times β.
     """
     row = own_row(layout)
     return np.array([layer_loads(layout, *place).f[row] for place in zip(extent, lever, strict=True)])

@@ -1,4 +1,4 @@
-"""The voltage equations of the patches, Φ_V V = F_p (Shaban 2022, Eqs. 22–23), as patches with limits can meet them."""
+"""Voltage equations of the patches, Φ_V V = F_p (Shabana 2022, Eqs. 22–23), as patches with limits can meet them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Fully constrained inverse dynamics (Shaban 2022, sec. 5.1): p(t) is prescribed too, and everything is algebraic."""
+"""Fully constrained inverse dynamics (Shabana 2022, sec. 5.1): p(t) is prescribed too, and everything is algebraic."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Partially constrained inverse dynamics (Shaban 2022, sec. 5): joints and trajectories hold, p is free."""
+"""Partially constrained inverse dynamics (Shabana 2022, sec. 5): joints and trajectories hold, p is free."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from .outcome import EarlierRun, Outcome
 
 
 class Pcid(IntegratedAnalysis):
-    """Forces that move the robot along its trajectories while the links vibrate as they do (Shaban 2022).
+    """Forces that move the robot along its trajectories while the links vibrate as they do (Shabana 2022).
 
     `check` "finer" replays them on links with twice the modes, and tells how far the end effector is off.
     """

@@ -1,4 +1,4 @@
-"""Fully constrained inverse dynamics in space: p(t) is prescribed too, and all is algebraic (Shaban 2022, sec. 5.1)."""
+"""Fully constrained inverse dynamics in 3D: p(t) is prescribed too, and all is algebraic (Shabana 2022, sec. 5.1)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Partially constrained inverse dynamics in space: joints and trajectories hold, p is free (Shaban 2022, sec. 5)."""
+"""Partially constrained inverse dynamics in space: joints and trajectories hold, p is free (Shabana 2022, sec. 5)."""
 
 from __future__ import annotations
 

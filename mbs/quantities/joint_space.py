@@ -23,7 +23,7 @@ def motor_rates(outcome: Outcome) -> Array:
 def held_joint_motion(outcome: Outcome) -> Array:
     """∂q/∂p (T, coordinates, modes of all bodies) with all joints closed and all motors at rest.
 
-    The modal columns of the velocity transformation D of Shaban 2022, Eq. 18: C_mq δq = 0 and T_q δq = 0 give δ(R, θ).
+    The modal columns of the velocity transformation D of Shabana 2022, Eq. 18: C_mq δq = 0 and T_q δq = 0 give δ(R, θ).
     Needs as many motors as the mechanism with rigid links has degrees of freedom.
     """
     frames = outcome.assembly.frame_coordinates

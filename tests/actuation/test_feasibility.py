@@ -79,7 +79,7 @@ def test_patches_peak_by_peak(arm):
     t = outcome.time
     theta, acceleration = 0.1 * np.sin(2 * t), -0.4 * np.sin(2 * t)
     F_p = np.outer(9.81 * np.cos(theta), body.S_bar[1]) + np.outer(acceleration, body.I_bar[0, 1])
-    # Shaban 2022, eq. 14: M = E_p d31 w_p (t_b + t_p)/2 per volt works on the rotations at a patch's ends.
+    # Shabana 2022, eq. 14: M = E_p d31 w_p (t_b + t_p)/2 per volt works on the rotations at a patch's ends.
     moment = 63e9 * 110e-12 * 0.025 * (0.015 + 0.75e-3) / 2
     centers = (np.arange(10) + 0.5) / 10
     ends = [np.array([body.interpolate(x).rotation[2] for x in centers + side * 0.025]) for side in (-1, 1)]

@@ -16,7 +16,7 @@ from ffrobot.mbs.model.masses import with_payload
 from ffrobot.mbs.model.planar_body import from_modal_body
 
 EI = 2.068427e11 * 0.025 * 0.015**3 / 12
-C = 63e9 * 110e-12 * 0.025 * (0.75e-3 + 0.015) / 2  # Shaban 2022, Eq. 14
+C = 63e9 * 110e-12 * 0.025 * (0.75e-3 + 0.015) / 2  # Shabana 2022, Eq. 14
 
 
 def patches(body, planar=None, **keys):

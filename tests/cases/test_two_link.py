@@ -96,7 +96,7 @@ def _tip(group, link):
 
 
 def modal_force_per_volt(body):
-    """Φ_V (modes, patches) by hand: Shaban 2022, eq. 14, times the turn of a patch's end sections.
+    """Φ_V (modes, patches) by hand: Shabana 2022, eq. 14, times the turn of a patch's end sections.
 
     Ten patches of 0.05 m, 0.025 m wide and 0.75 mm thick, on a bar 0.015 m high; sections turn by cubics in an element.
     """

@@ -1,4 +1,4 @@
-"""Motor and modal forces in place of those that hold a trajectory: F_je = −Dᵀ C_sqᵀ λ_s (Shaban 2022, Eq. 21)."""
+"""Motor and modal forces in place of those that hold a trajectory: F_je = −Dᵀ C_sqᵀ λ_s (Shabana 2022, Eq. 21)."""
 
 import numpy as np
 import pytest

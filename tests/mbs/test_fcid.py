@@ -68,7 +68,7 @@ def test_equations_of_motion_hold_with_the_forces_reported(name):
 @pytest.mark.parametrize("motors", ["section", "frame"])
 @pytest.mark.parametrize("name", OPEN + CLOSED)
 def test_motor_and_modal_forces_are_those_of_the_velocity_transformation(name, motors):
-    """[τ; F_p] = Dᵀ (M q̈ − Q) (Shaban 2022, Eqs. 18–21), D by its definition: one system for both."""
+    """[τ; F_p] = Dᵀ (M q̈ − Q) (Shabana 2022, Eqs. 18–21), D by its definition: one system for both."""
     _, outcome = solved(name, motors=motors)
     mechanism = oracle_of(outcome.assembly)
     trajectory = np.array(outcome.assembly.is_trajectory)

@@ -60,7 +60,7 @@ def test_with_the_steps_of_the_inverse_run_rounding_is_all_that_is_left(model, a
 
 
 def test_joint_moments_alone_leave_the_path(model):
-    """The modal forces are missing: the links deflect and ring at once (Shaban 2022, Fig. 17)."""
+    """The modal forces are missing: the links deflect and ring at once (Shabana 2022, Fig. 17)."""
     departures = departure(*pair(model, "joints", 1e-6))
     assert departures[0] == 0
     assert departures[:11].max() > 1e-3  # within a tenth of a second

@@ -1,4 +1,4 @@
-"""q̇ = D (ȧ, ṗ): motor coordinates a and modal coordinates p as the independent ones (Shaban 2022, Eqs. 18–21)."""
+"""q̇ = D (ȧ, ṗ): motor coordinates a and modal coordinates p as the independent ones (Shabana 2022, Eqs. 18–21)."""
 
 import numpy as np
 from oracle import rotation

@@ -1,4 +1,4 @@
-// Actuation points: generalized forces of one body as forces at points of it (Shaban 2022, Eqs. 5-10).
+// Actuation points: generalized forces of one body as forces at points of it (Shabana 2022, Eqs. 5-10).
 #pragma once
 
 #include "core/system/system.h"

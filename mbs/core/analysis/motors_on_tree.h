@@ -8,7 +8,7 @@
 
 namespace ffrobot {
 
-// Q_a = -C_sq^T lambda_s (Shaban 2022, Eq. 13 and below) along joints and modes,
+// Q_a = -C_sq^T lambda_s (Shabana 2022, Eq. 13 and below) along joints and modes,
 //
 //     -C_s^T lambda_s = C_c^T nu + T^T tau + (0, F_p)
 //

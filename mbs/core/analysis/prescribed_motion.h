@@ -1,4 +1,4 @@
-// A motion in joint coordinates that is wholly prescribed (Shaban 2022, sec. 5.1): the modes by what they are told, the
+// A motion in joint coordinates that is wholly prescribed (Shabana 2022, sec. 5.1): the modes by what they are told, the
 // joints by the rows C = 0, as many as joints have coordinates. With J columns of joints and p of modes
 //
 //     C_J v_J = C_t - C_p p_dot,    C_J a_J = -(C_ddot with a_J = 0)
