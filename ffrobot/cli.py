@@ -5,6 +5,7 @@ from __future__ import annotations
 import signal
 import sys
 import traceback
+from copy import copy
 
 import click
 
@@ -58,6 +59,9 @@ for command in (
     import_, export, bench,
 ):  # fmt: skip
     cli.add_command(command)
+optimize = copy(optimise)
+optimize.hidden = True  # the American spelling
+cli.add_command(optimize, "optimize")
 
 
 def main() -> None:

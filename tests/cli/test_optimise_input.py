@@ -51,3 +51,10 @@ OUTER = "links.arm.geometry.section.outer"
 def test_mistakes_are_told_before_any_run(refused, tmp_path, arguments, message):
     (tmp_path / "scene.toml").write_text(SCENE, encoding="utf-8")
     assert message in refused(tmp_path, "optimise", "scene.toml", *arguments)
+
+
+def test_american_spellings_are_accepted(refused, tmp_path):
+    (tmp_path / "scene.toml").write_text(SCENE, encoding="utf-8")
+    message = refused(tmp_path, "optimize", "scene.toml", "--minimize", "weight", *PAYLOAD)
+    assert message == refused(tmp_path, "optimise", "scene.toml", "--minimise", "weight", *PAYLOAD)
+    assert 'found "weight"' in refused(tmp_path, "optimize", "scene.toml", "--maximize", "weight", *PAYLOAD)
