@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import h5py
@@ -12,6 +13,7 @@ from ..actuation.control.loop_record import LoopRecord
 from ..actuation.control.placing import Placed
 from ..common.checksum import sealed
 from ..common.files import write_atomically
+from ..mbs.analysis.spatial_run import SpatialRun
 from ..mbs.model.truncation import modes_kept
 from ..mbs.quantities.spatial_motion import SpatialMotion
 from ..mbs.solve.spatial_redundancy import resolving_joints
@@ -46,6 +48,8 @@ def spatial_image(solution: SpatialSolution) -> bytes:
                 write_spatial_linear(file[name], result.motion, result.run.details)
             if result.actuation is not None:
                 write_actuation(file[name], solution, result.actuation)
+        if (run := solution.unread) is not None:
+            _write_run(file.create_group(run.analysis.name), run, run.warnings)
         write_state_in_space(file, solution)
         file.flush()
         image: bytes = file.id.get_file_image()
@@ -54,18 +58,10 @@ def spatial_image(solution: SpatialSolution) -> bytes:
 
 def _write_analysis(group: h5py.Group, solution: SpatialSolution, result: SpatialResult) -> None:
     run, motion = result.run, result.motion
-    analysis = run.analysis
-    group.attrs.update({"kind": analysis.kind, "tolerance": analysis.tolerance})
-    group.attrs["actuation"] = (analysis.source or "") if analysis.takes_actuation else ""
-    group.attrs["apply"] = getattr(analysis, "apply", None) or ""  # of every kind, for those who read the file
-    group.attrs.update({"integrator": run.integrator.name, "integrator_reason": run.integrator.reason})
-    for key in ("steps", "evaluations", "wall_seconds", "status"):
-        group.attrs[key] = getattr(run, key)
+    _write_run(group, run, result.warnings)
     group.attrs["stiffening_effect"] = result.stiffening_effect
-    group.attrs.create("warnings", list(result.warnings), dtype=h5py.string_dtype())
     if joints := resolving_joints(motion.model):
         group.attrs.update({"redundancy": motion.model.scene.redundancy, "resolved_by": joints})
-    group["time"] = run.time
     write_check(group, result.check)
     write_steps(group, run.step_ends, run.integrator.name)
     _write_bodies(group, solution, result)
@@ -91,6 +87,19 @@ def _write_analysis(group: h5py.Group, solution: SpatialSolution, result: Spatia
             group[f"{'energy' if part == 'energies' else part}/{key}"] = values
     violation = group.create_dataset("constraint_violation", data=motion.violation)
     violation.attrs["columns"] = ["position", "velocity"]
+
+
+def _write_run(group: h5py.Group, run: SpatialRun, warnings: Sequence[str]) -> None:
+    """What is known of a run whether it has outputs or not."""
+    analysis = run.analysis
+    group.attrs.update({"kind": analysis.kind, "tolerance": analysis.tolerance})
+    group.attrs["actuation"] = (analysis.source or "") if analysis.takes_actuation else ""
+    group.attrs["apply"] = getattr(analysis, "apply", None) or ""  # of every kind, for those who read the file
+    group.attrs.update({"integrator": run.integrator.name, "integrator_reason": run.integrator.reason})
+    for key in ("steps", "evaluations", "wall_seconds", "status"):
+        group.attrs[key] = getattr(run, key)
+    group.attrs.create("warnings", list(warnings), dtype=h5py.string_dtype())
+    group["time"] = run.time
 
 
 def _write_bodies(group: h5py.Group, solution: SpatialSolution, result: SpatialResult) -> None:

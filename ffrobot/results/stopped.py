@@ -15,7 +15,7 @@ if TYPE_CHECKING:  # else every solve in the plane would load what is of space
     from ..run.spatial_solution import SpatialSolution
 
 GROUP = "resume"  # in the group of an analysis
-STOPPED = ("interrupted", "too many steps")
+STOPPED = ("interrupted", "too many steps", "not evaluated")
 
 
 def how_to_go_on(solution: Solution | SpatialSolution, command: str) -> str:

@@ -13,13 +13,14 @@ from ..actuation.control.spatial_kinds import IN_SPACE
 from ..actuation.feasibility import Feasibility
 from ..actuation.spatial_context import ActuatedSpatialContext
 from ..actuation.spatial_points import forces_at_points, solve_spatial_points, spatial_point_set, with_spatial_points
-from ..common.errors import SolveError, of_file
+from ..common.errors import FfrobotError, SolveError, of_file
 from ..mbs.analysis.operating_points import InstantAnalysis
 from ..mbs.analysis.spatial_run import SpatialRun
 from ..mbs.quantities.spatial_energy import energies, momentum
 from ..mbs.quantities.spatial_reactions import reactions
 from ..mbs.quantities.stiffening import NOTABLE
 from ..mbs.scene.analysis import Analysis
+from ..results.stopped import goes_on
 from ..scene.spatial import SpatialScene, load_spatial_scene
 from .enough import with_enough_modes, with_enough_pieces
 from .mode_search import ModeSearch, error_tolerances
@@ -94,7 +95,7 @@ def run_spatial(solution: SpatialSolution, watcher: Watcher, keep: Keep | None =
         else:
             solution = _completed(solution, watcher, interruption)
         solution = checked_in_space(solution, prepare_spatial, watcher)
-        if keep is not None and solution.analyses:
+        if keep is not None and solution.outcomes:
             keep(solution)
     if solution.failure is not None:
         raise solution.failure
@@ -128,7 +129,11 @@ def _judged(
 ) -> Feasibility | None:
     """What the one analysis of a scene asks of motors and patches; None where it fails."""
     try:
-        (result,) = _completed(with_scene_in_space(solution, trial), watcher, interruption).analyses.values()
+        found = _completed(with_scene_in_space(solution, trial), watcher, interruption)
+        if found.unread is not None:
+            assert found.failure is not None
+            raise found.failure
+        (result,) = found.analyses.values()
     except SolveError:
         return None
     return None if result.run.failed or result.actuation is None else result.actuation.feasibility
@@ -155,11 +160,15 @@ def _run_all(solution: SpatialSolution, watcher: Watcher, interruption: Interrup
         try:
             with of_file(solution.scene.path):
                 run = IN_SPACE[analysis.kind](_context(solution, analysis, results, watcher, interruption), analysis)
-                result = _evaluated(solution, run)
         except Exception as error:  # raised once the analyses before it are kept
             if not results:
                 raise
             return replace(solution, analyses=results, seconds=seconds, failure=error)
+        try:
+            with of_file(solution.scene.path):
+                result = _evaluated(solution, run)
+        except Exception as error:  # raised once the integration is kept
+            return _unread(replace(solution, analyses=results, seconds=seconds), run, error)
         automatic = solution.scene.geometric_stiffening == "auto" and not solution.stiffened
         if automatic and result.stiffening_effect > NOTABLE and run.status != "interrupted":
             return None
@@ -169,6 +178,24 @@ def _run_all(solution: SpatialSolution, watcher: Watcher, interruption: Interrup
         if run.failed:
             break
     return replace(solution, analyses=results, seconds=seconds)
+
+
+def _unread(solution: SpatialSolution, run: SpatialRun, error: Exception) -> SpatialSolution:
+    """The solution with a run whose outputs failed with `error`: its states are kept where `resume` takes them up."""
+    kept = replace(run, status="not evaluated")
+    if run.checkpoint is None or not goes_on(solution, kept):
+        if not solution.analyses:
+            raise error
+        return replace(solution, failure=error)
+    if isinstance(error, FfrobotError):
+        return replace(solution, unread=kept, failure=error)
+    logger.error('analysis "%s": outputs failed', run.analysis.name, exc_info=error)
+    failure = SolveError(
+        f'{solution.scene.path}: analysis "{run.analysis.name}": outputs failed after the integration, which is kept'
+        f" for --resume: {type(error).__name__}: {error}"
+    )
+    failure.__cause__ = error
+    return replace(solution, unread=kept, failure=failure)
 
 
 def _context(

@@ -87,6 +87,7 @@ class SpatialSolution:
         analyses: by name, in the order of the scene.
         seconds: wall time by stage.
         failure: what ended the run after these analyses; None where all ran, or the last of them did not complete.
+        unread: the run of the analysis of which outputs failed; its integration is kept.
         path_notes: what was found of paths before the analyses, one line each.
         points: actuation points, by body.
         earlier: runs of analyses to go on with, from a results file: see `results.spatial_resume`.
@@ -103,6 +104,7 @@ class SpatialSolution:
     analyses: Mapping[str, SpatialResult]
     seconds: Mapping[str, float]
     failure: Exception | None = None
+    unread: SpatialRun | None = None
     path_notes: tuple[str, ...] = ()
     points: Mapping[str, SpatialPointSet] = field(default_factory=dict)
     earlier: Mapping[str, EarlierSpatialRun] = field(default_factory=dict)
@@ -115,7 +117,8 @@ class SpatialSolution:
     @property
     def outcomes(self) -> dict[str, SpatialRun]:
         """How each analysis went, by its name."""
-        return {name: result.run for name, result in self.analyses.items()}
+        runs = [*(result.run for result in self.analyses.values()), *([self.unread] if self.unread else [])]
+        return {run.analysis.name: run for run in runs}
 
     @property
     def links(self) -> dict[str, ModalBody]:

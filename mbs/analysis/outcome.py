@@ -23,6 +23,7 @@ ADVICE = {
     "step underflow": "no step is small enough there",
     "too many steps": "raise max_steps, loosen the tolerance or leave out high modes",
     "interrupted": "stopped on request",
+    "not evaluated": "its outputs could not be made from the states that it found",
     "mesh too coarse": "motors do not get close enough to the path: vibrations of the zero dynamics that are hardly"
     " damped take too fine a mesh; add damping, leave out high modes, smooth the path or loosen the tolerance",
     "inversion not converged": "no motion was found that motors alone carry along the path: slow the path down, add"

@@ -237,3 +237,19 @@ def test_on_the_command_line(arm, ffrobot):
     assert len(messages) > 1
     assert "; ffrobot solve scene.toml -o r.h5 --resume goes on from t = 0.0" in messages[0].stderr
     assert ffrobot(*command, cwd=scene.parent).stdout == "r.h5: complete, nothing to go on with\n"
+
+
+def test_outputs_that_fail_leave_the_integration(arm, monkeypatch):
+    """It is kept as if it had been stopped at its end: outputs are made from it without another step."""
+    scene = arm()
+    expected, path = ffrobot.solve(scene), scene.with_suffix(".h5")
+    with monkeypatch.context() as fault:
+        fault.setattr("ffrobot.run.spatial.energies", lambda motion: 1 / 0)
+        with pytest.raises(ffrobot.SolveError, match=r'"inverse": outputs failed .* kept .*ZeroDivisionError'):
+            ffrobot.solve(scene, path)
+    kept = ffrobot.Results(path)
+    assert kept.attributes("inverse")["status"] == "not evaluated"
+    assert len(kept.time("inverse")) == len(expected.time("inverse"))
+    results = go_on(scene)
+    assert max(difference for _, difference in differences(results, expected)) == 0.0
+    assert results.attributes("inverse")["evaluations"] < expected.attributes("inverse")["evaluations"] + 5
