@@ -19,6 +19,7 @@ from ..mbs import _core
 from ..mbs.analysis.outcome import Continuation, EarlierRun, Forces, Motion, Outcome, Statistics
 from ..mbs.scene.analysis import IntegratedAnalysis
 from ..mbs.solve.integrators import METHODS, Choice
+from ..run.enough import goes_on
 from ..run.prepare import prepare, stiffened
 from ..run.solution import Solution
 from ..run.solve import Keep, run_analyses
@@ -26,7 +27,7 @@ from ..run.watcher import Watcher
 from ..scene.scene import Scene
 from .file import Results
 from .same_input import check_same_input, input_files
-from .stopped import GROUP, STOPPED, analyses, goes_on, is_kept, row_of_numbers
+from .stopped import GROUP, STOPPED, analyses, is_kept, row_of_numbers
 from .tree_checkpoint import read_tree_checkpoint, write_tree_checkpoint
 
 ROWS = ("q", "v", "a", "lambda_", "tau", "F_p")  # what results files do not hold anyway

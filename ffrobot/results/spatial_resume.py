@@ -15,6 +15,7 @@ from ..mbs import _core
 from ..mbs.analysis.spatial_earlier import ROWS, EarlierSpatialRun
 from ..mbs.analysis.spatial_run import SpatialRun
 from ..mbs.solve.integrators import Choice
+from ..run.enough import goes_on
 from ..run.spatial import Keep, prepare_spatial, run_spatial
 from ..run.spatial_prepare import stiffened_in_space
 from ..run.spatial_solution import SpatialSolution
@@ -22,7 +23,7 @@ from ..run.watcher import Watcher
 from ..scene.spatial import SpatialScene
 from .file import Results
 from .same_input import check_same_input, input_files
-from .stopped import GROUP, STOPPED, analyses, goes_on, is_kept
+from .stopped import GROUP, STOPPED, analyses, is_kept
 from .tree_checkpoint import read_tree_checkpoint, write_tree_checkpoint
 
 COUNTS = ("steps", "evaluations", "wall_seconds")

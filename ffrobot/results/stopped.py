@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from ..common.arrays import Array
 from ..common.errors import InputError
 from ..mbs.analysis.outcome import Outcome
+from ..run.enough import goes_on
 from ..run.solution import Solution
 from .file import Results
 
@@ -43,14 +44,6 @@ def is_kept(solution: Solution | SpatialSolution) -> bool:
 def stopped(solution: Solution | SpatialSolution) -> Outcome | SpatialRun | None:
     """The analysis that was stopped."""
     return next((outcome for outcome in solution.outcomes.values() if outcome.status in STOPPED), None)
-
-
-def goes_on(solution: Solution | SpatialSolution, outcome: Outcome | SpatialRun) -> bool:
-    """Whether `outcome` is of use to `resume`; a search for modes or pieces has its own bodies and starts again."""
-    searched = any(
-        "auto" in (getattr(body, "modes", None), getattr(body, "pieces", None)) for body in solution.scene.body
-    )
-    return not searched and outcome.analysis.is_resumable
 
 
 def analyses(solution: Solution | SpatialSolution) -> list[str]:

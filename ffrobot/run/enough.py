@@ -6,6 +6,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any, TypeVar
 
+from ..mbs.analysis.outcome import Outcome
+from ..mbs.analysis.spatial_run import SpatialRun
 from ..mbs.model.planar_body import PlanarBody
 from ..mbs.model.spatial_body import SpatialBody
 from .mode_search import ModeSearch, Reported
@@ -56,3 +58,11 @@ def with_enough_pieces(
     while solution.failure is None and not interruption.requested and (more := wanted(solution)):
         solution = solved(divided(solution, {**given, **more}))
     return solution
+
+
+def goes_on(solution: Solution | SpatialSolution, outcome: Outcome | SpatialRun) -> bool:
+    """Whether `outcome` is of use to `resume`; a search for modes or pieces has its own bodies and starts again."""
+    searched = any(
+        "auto" in (getattr(body, "modes", None), getattr(body, "pieces", None)) for body in solution.scene.body
+    )
+    return not searched and outcome.analysis.is_resumable

@@ -20,9 +20,8 @@ from ..mbs.quantities.spatial_energy import energies, momentum
 from ..mbs.quantities.spatial_reactions import reactions
 from ..mbs.quantities.stiffening import NOTABLE
 from ..mbs.scene.analysis import Analysis
-from ..results.stopped import goes_on
 from ..scene.spatial import SpatialScene, load_spatial_scene
-from .enough import with_enough_modes, with_enough_pieces
+from .enough import goes_on, with_enough_modes, with_enough_pieces
 from .mode_search import ModeSearch, error_tolerances
 from .paths import with_paths_in_space
 from .spatial_actuation import actuated_in_space, patches_in_space, supplied_by_patches
