@@ -1,8 +1,10 @@
 """Collocation of second-order equations r(t, p, ṗ, p̈) = 0 between two boundary conditions.
 
-On each interval p̈ is a polynomial through its values K at a few points; p and ṗ are its integrals, continuous at the
-breaks (Ascher, Christiansen and Russell 1981). Gauss points carry growing and decaying solutions alike, whatever the
-size of an interval (Ascher, Mattheij and Russell 1995, ch. 10).
+On each interval p̈ is a polynomial through its values K at the Gauss points; p and ṗ are its integrals, continuous at
+the breaks. At the points themselves p is what Gauss's method has for (p, ṗ) as a system of first order, A²K: then
+solutions decay, grow or vibrate as they do, whatever the size of an interval (Ascher, Mattheij and Russell 1995,
+ch. 10). With the second integral of the polynomial there (Ascher, Christiansen and Russell 1981) fast vibrations leave
+their side of the imaginary axis (van der Houwen, Sommeijer and Nguyen huu Cong 1991).
 """
 
 from __future__ import annotations
@@ -66,10 +68,8 @@ def gauss(stages: int = STAGES) -> Scheme:
     m = np.arange(stages)
     to_powers = np.linalg.inv(c[:, None] ** m)
     once, twice = 1 / (m + 1), 1 / ((m + 1) * (m + 2))
-    return Scheme(
-        c, to_powers, c[:, None] ** (m + 1) * once @ to_powers, c[:, None] ** (m + 2) * twice @ to_powers,
-        once @ to_powers, twice @ to_powers,
-    )  # fmt: skip
+    stage_once = c[:, None] ** (m + 1) * once @ to_powers
+    return Scheme(c, to_powers, stage_once, stage_once @ stage_once, once @ to_powers, twice @ to_powers)
 
 
 GAUSS = gauss()

@@ -54,34 +54,68 @@ def test_intervals_need_not_resolve_fast_growing_and_decaying_motions():
     assert error_at_breaks(40)[1] < 1e-4
 
 
-def test_curve_meets_the_equations_at_gauss_points_and_is_smooth():
-    breaks = np.linspace(0, 2, 41)
+def unmet(intervals):
+    """Largest |r| / σ² of each component at the Gauss points and between them."""
+    breaks = np.linspace(0, 2, intervals + 1)
     problem = dichotomy()
     curve = collocate(problem, breaks, zero).curve
-    c = (np.polynomial.legendre.leggauss(4)[0] + 1) / 2
-    t = (breaks[:-1, None] + np.diff(breaks)[:, None] * c).ravel()
+    t = (breaks[:-1, None] + np.diff(breaks)[:, None] * np.linspace(0.01, 0.99, 12)).ravel()
     r = problem.residual(t, curve(t), curve.derivative()(t), curve.derivative(2)(t))
-    assert np.abs(r).max() < 1e-9 * SIGMA.max() ** 2
+    return np.abs(r / SIGMA**2).max(axis=0)
+
+
+def test_what_the_curve_leaves_of_the_equations_falls_as_that_of_a_cubic():
+    """p̈ is a cubic on each interval: h⁴ where intervals resolve the motion, and h³ where σh is a thousand."""
+    slow, fast = np.log2(unmet(40) / unmet(80))
+    assert slow > 3.9
+    assert fast > 3.0
+
+
+def test_curve_is_smooth():
+    breaks = np.linspace(0, 2, 41)
+    curve = collocate(dichotomy(), breaks, zero).curve
     for derivative in (curve, curve.derivative()):
         jumps = derivative(breaks[1:-1]) - derivative(np.nextafter(breaks[1:-1], 0))
         assert np.abs(jumps).max() < 1e-9
 
 
-def test_all_conditions_at_the_start_make_an_initial_value_problem():
-    """p̈ = −ω² p from p = 1, ṗ = 0 is cos ωt."""
-    omega = np.array([7.0])
+def vibration(omega, zeta, state, breaks):
+    """p̈ + 2ζω ṗ + ω² p = 0 from (p, ṗ) at the first break: both at the last."""
+    one = np.array([omega])
     problem = Problem(
-        lambda t, p, v, a: a + omega**2 * p,
-        lambda t: (np.ones((len(t), 1, 1)), np.zeros((len(t), 1, 1)), np.full((len(t), 1, 1), 49.0)),
+        lambda t, p, v, a: a + 2 * zeta * omega * v + omega**2 * p,
+        lambda t: (np.full((len(t), 1, 1), x) for x in (1.0, 2 * zeta * omega, omega**2)),
+        one,
         omega,
-        1.0,
-        Boundary(np.eye(2), np.array([1.0, 0.0])),
+        Boundary(np.eye(2), np.array(state)),
         Boundary(np.zeros((0, 2)), np.zeros(2)),
     )
-    breaks = np.linspace(0, 3, 31)
     found = collocate(problem, breaks, lambda t: (np.zeros((len(t), 1)),) * 3)
     assert found.converged
-    np.testing.assert_allclose(found.curve(breaks)[:, 0], np.cos(7 * breaks), atol=1e-9)
+    return found.curve(breaks[-1])[0], found.curve.derivative()(breaks[-1])[0]
+
+
+def pade(z):
+    """The diagonal Padé approximant (4, 4) of e^z, by which a step of Gauss's method multiplies solutions of ẏ = λy."""
+    P = np.polynomial.Polynomial([1, 1 / 2, 3 / 28, 1 / 84, 1 / 1680])
+    return P(z) / P(-z)
+
+
+def test_initial_value_problem_is_that_of_gauss_method():
+    """p̈ = −ω² p from p = 1, ṗ = 0: Re R(iωh)ⁿ, with R of Hairer, Nørsett and Wanner, II.7."""
+    breaks = np.linspace(0, 3, 31)
+    assert vibration(7.0, 0.0, [1.0, 0.0], breaks)[0] == pytest.approx((pade(0.7j) ** 30).real, abs=1e-12)
+
+
+@pytest.mark.parametrize("zeta", [-0.01, 0.0, 0.01])
+def test_vibrations_grow_or_decay_as_they_do_however_long_the_interval(zeta):
+    """The sides of all zeros stay: |multiplier| < 1 for damped ones, 1 for undamped ones, > 1 for growing ones."""
+    for omega in np.geomspace(0.1, 1e4, 60):
+        columns = [vibration(omega, zeta, [p, omega * v], np.array([0.0, 1.0])) for p, v in np.eye(2)]
+        size = np.abs(np.linalg.eigvals(np.array(columns).T / np.array([[1.0], [omega]])))
+        s = omega * (-zeta + 1j * np.sqrt(1 - zeta**2))
+        np.testing.assert_allclose(size, abs(pade(s)), rtol=1e-7)
+        assert np.all(np.sign(np.round(size - 1, 10)) == np.sign(-zeta))
 
 
 def test_equations_without_numbers_are_reported():
