@@ -11,7 +11,7 @@
 #include <chrono>
 #include <optional>
 
-#include "bindings/recursion/tree_run.h"
+#include "bindings/recursion/known_motion.h"
 
 namespace nb = nanobind;
 using namespace nb::literals;
@@ -162,6 +162,14 @@ template <class Space> auto bind_model(nb::module_ &m, const char *name, const c
             return totals(model.mechanism, q.data(), v.data(), model.w);
           },
           "q"_a, "v"_a, "Energies and momentum.")
+      .def("required_forces", &required_forces<Space>, "scene"_a, "times"_a, "q"_a, "v"_a, "a"_a,
+           "M a - Q (T, n_v) along v at states q (T, n_q), v and a (T, n_v): what gravity, elasticity, damping and the "
+           "forces of the scene leave for others.")
+      .def("row_accelerations", &row_accelerations<Space>, "scene"_a, "times"_a, "q"_a, "v"_a, "a"_a,
+           "Second derivatives of the values of rows (T, rows), less those of their targets.")
+      .def("transmitted_forces", &transmitted_forces<Space>, "scene"_a, "times"_a, "q"_a, "v"_a, "a"_a, "multipliers"_a,
+           "Of the joint of each body (T, bodies 2 dim): force on its outer section and moment about its origin, in "
+           "global axes, then in axes of the joint.")
       .def("time_evaluations", &time_of<Space>, "q"_a, "v"_a, "target"_a, "repetitions"_a,
            "Seconds of one evaluation.");
 }

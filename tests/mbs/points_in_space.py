@@ -263,7 +263,12 @@ class Mechanism:
         return np.array([c[1], 2 * c[2]])
 
     def residual(self, model, q, v, a, lambda_, force=None, wrench=None):
-        """Violation of d'Alembert's principle (n_v) and of what rows shall do, with the size of the terms."""
+        """Violation of d'Alembert's principle (n_v), over the size of its terms, and accelerations of rows."""
+        Q, size, accelerations = self.forces(model, q, v, a, lambda_, force, wrench)
+        return Q / size, accelerations
+
+    def forces(self, model, q, v, a, lambda_, force=None, wrench=None):
+        """Forces along v that this motion takes beside the given ones, the size of their terms, and what rows do."""
         n_v, bodies = model.n_v, self.bodies
         z = [Series([0.0, v[k], a[k] / 2]) for k in range(n_v)]
         frames, points = self.motion(model, q, z)
@@ -288,7 +293,7 @@ class Mechanism:
                 load = wrench[6 * i : 6 * i + 6]
                 Q[k] -= load[:3] @ position.c[1] + load[3:] @ [W[2, 1], W[0, 2], W[1, 0]]
         accelerations = np.array([self.row(i, frames)[1] for i in range(len(self.rows))])
-        return Q / size, accelerations
+        return Q, size, accelerations
 
 
 def Phi_times(Phi, p):

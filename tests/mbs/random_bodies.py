@@ -87,7 +87,7 @@ def three_links(rng, modes=3, **keys):
 
 
 def check_balance(mechanism, rng, bound=1e-11, force=False, deflection=0.1):
-    """Accelerations of the recursion against d'Alembert's principle, over all points."""
+    """Accelerations of the recursion, and forces that others take, against d'Alembert's principle over all points."""
     model = mechanism.model()
     q, v = random_state(rng, mechanism, model, deflection=deflection)
     target = rng.standard_normal(len(mechanism.rows))
@@ -98,3 +98,17 @@ def check_balance(mechanism, rng, bound=1e-11, force=False, deflection=0.1):
     assert np.abs(residual).max() < bound
     if len(target):
         assert np.abs(accelerations - target).max() < bound * (1 + np.abs(a).max())
+    check_known_motion(mechanism, model, q, v, a + rng.standard_normal(len(a)), bound)
+
+
+def check_known_motion(mechanism, model, q, v, a, bound):
+    """Newton–Euler: M a − Q and second derivatives of rows at accelerations that no forces of the mechanism make."""
+    scene, unloaded = r.TreeScene(), np.zeros(6 * len(mechanism.wrenches))
+    for _ in mechanism.rows:
+        scene.add_target(r.TimeFunction.constant(0.0), 1.0)
+    expected, size, accelerations = mechanism.forces(model, q, v, a, np.zeros(len(mechanism.rows)), None, unloaded)
+    state = [0.0], q[None], v[None], a[None]
+    required, of_rows = model.required_forces(scene, *state)[0], model.row_accelerations(scene, *state)[0]
+    np.testing.assert_allclose(required, expected, rtol=0, atol=bound * size)
+    if len(of_rows):
+        np.testing.assert_allclose(of_rows, accelerations, rtol=0, atol=bound * (1 + np.abs(a).max()))

@@ -61,6 +61,35 @@ def test_gears_that_give_take_no_force(turned):
         np.testing.assert_allclose(run.accelerations[0], a, atol=1e-12 * np.abs(a).max())
 
 
+FRICTION = {"viscous_friction": 0.3, "coulomb_friction": 0.2, "friction_speed": 0.5}
+ROTOR = {"rotor_inertia": 0.02, "gear_ratio": 7.0}
+
+
+@pytest.mark.parametrize(
+    ("joint", "as_built"),
+    [
+        ("screw", {}),
+        ("cylindrical", {}),
+        ("prismatic", ROTOR),
+        ("revolute", ROTOR),
+        ("revolute", ROTOR | {"stiffness": 9.0, "damping": 0.6}),
+    ],
+    ids=["screw", "cylindrical", "prismatic with rotor", "revolute with rotor", "compliant gear"],
+)
+def test_the_core_finds_the_same_forces(joint, as_built):
+    """Rotors, gears and friction, at accelerations that nothing makes: the equations of each body against the core."""
+    rng = np.random.default_rng(TYPES.index(joint))
+    for kinds in (("rigid",), ("beam",), ("solid",), ("supported beam",)):
+        plain, tables = as_scene(random_tree(rng, [joint] * 3, kinds, chain=True, size=SMALL), False)
+        model = with_compliance_in_space(tree_model(plain, [table | FRICTION | as_built for table in tables]))
+        tree, system = model.tree, SpatialSystem(model)
+        q, v, a = SMALL * rng.standard_normal(tree.n_q), *rng.standard_normal((2, tree.n_v))
+        state = Accelerated(tree, q[None], v[None], a[None], tree.frames(q[None]))
+        expected = required_forces(model, state, NOW)
+        found = system.core.required_forces(system.scene, NOW, q[None], v[None], a[None])
+        np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12 * np.abs(expected).max())
+
+
 @pytest.mark.parametrize("seed", range(4))
 def test_rows_of_loops_keep_their_accelerations(seed):
     motion, _ = moving(np.random.default_rng(seed), ["revolute"] * 3, ("rigid", "solid", "beam"), loops=1)

@@ -49,7 +49,7 @@ double violation_of(const SystemOnTree &both, double t, const VectorXd &q, const
   TreeMotion motion(both.tree, both.scene, t, q.data(), v.data());
   VectorXd solved(a.size());
   motion.evaluate(t, q.data(), v.data(), solved.data());
-  recursion::NewtonEuler forces(both.tree);
+  recursion::NewtonEuler<recursion::Planar> forces(both.tree);
   forces.accelerate(q.data(), a.data(), motion.workspace());
   return acceleration_residual(both, recursion::targets_at(both.scene, t), a.data(), forces, motion.workspace());
 }

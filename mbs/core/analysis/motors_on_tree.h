@@ -2,7 +2,7 @@
 #pragma once
 
 #include "core/analysis/system_on_tree.h"
-#include "core/recursion/planar/newton_euler.h"
+#include "core/recursion/newton_euler.h"
 
 #include <Eigen/LU>
 
@@ -37,7 +37,7 @@ private:
   void turn_frames(int coordinate, double moment, const TreeWorkspace &w);
 
   const SystemOnTree &both_;
-  recursion::NewtonEuler forces_;
+  recursion::NewtonEuler<recursion::Planar> forces_;
   std::vector<int> joint_coordinates_, cuts_; // in v; rows of the tree
   bool is_along_coordinates_ = true;          // all motors: what they do is known without equations, but for cuts
   Eigen::VectorXd lambda_, tau_, Q_;          // (rows), (motors), (n_v)

@@ -1,5 +1,5 @@
-// A motion in joint coordinates that is wholly prescribed (Shabana 2022, sec. 5.1): the modes by what they are told, the
-// joints by the rows C = 0, as many as joints have coordinates. With J columns of joints and p of modes
+// A motion in joint coordinates that is wholly prescribed (Shabana 2022, sec. 5.1): the modes by what they are told,
+// the joints by the rows C = 0, as many as joints have coordinates. With J columns of joints and p of modes
 //
 //     C_J v_J = C_t - C_p p_dot,    C_J a_J = -(C_ddot with a_J = 0)
 //     C_J^T lambda = -f_J,          shape force = f_p + C_p^T lambda        with f = M a - Q
@@ -72,7 +72,7 @@ private:
   std::unique_ptr<TreeMotion> motion_; // what acts
   recursion::Forces<double> acting_;
   Workspace w_;
-  recursion::NewtonEuler forces_;
+  recursion::NewtonEuler<recursion::Planar> forces_;
   std::optional<MotorsOnTree> motors_;
   std::vector<int> joints_; // their coordinates in v, which are in q at the same places
   std::vector<Jet> targets_;

@@ -11,7 +11,7 @@ using Eigen::Index;
 using Eigen::VectorXd;
 
 double acceleration_residual(const SystemOnTree &both, const std::vector<Jet> &targets, const double *a,
-                             const recursion::NewtonEuler &forces,
+                             const recursion::NewtonEuler<recursion::Planar> &forces,
                              const recursion::Workspace<recursion::Planar, double> &w) {
   double worst = 0;
   for (std::size_t r = 0; r < both.tree.rows.size(); ++r) {
@@ -137,7 +137,7 @@ void TreeOutputs::write_multipliers(Index i, const TreeWorkspace &w, const doubl
       on_outer = forces_.in_global_axes(at)[1];
       break;
     case moment: // about the marker of the second side, where measures take it
-      on_outer = backwards ? forces_.about_inner(at) : forces_.in_joint_axes(at)[2];
+      on_outer = backwards ? forces_.about_inner(at)[2] : forces_.in_joint_axes(at)[2];
       break;
     case across:
       on_outer = forces_.in_joint_axes(at)[1];

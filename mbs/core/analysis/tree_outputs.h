@@ -12,7 +12,7 @@ namespace ffrobot {
 // Largest violation of C_ddot = `targets` by accelerations of the tree, a (n_v), relative to the terms that cancel in
 // it. Computed from a alone, not from the elimination that made it: after the accelerate() of a, with its workspace.
 double acceleration_residual(const SystemOnTree &both, const std::vector<Jet> &targets, const double *a,
-                             const recursion::NewtonEuler &forces,
+                             const recursion::NewtonEuler<recursion::Planar> &forces,
                              const recursion::Workspace<recursion::Planar, double> &w);
 
 class TreeOutputs {
@@ -45,7 +45,7 @@ private:
   std::optional<SteeredTree> steering_;
   TreeMotion motion_;
   AbsoluteState absolute_;
-  recursion::NewtonEuler forces_;
+  recursion::NewtonEuler<recursion::Planar> forces_;
   std::optional<MotorsOnTree> motors_;
   Eigen::VectorXd state_, a_, system_a_, value_, rate_;
   Outputs outputs_;

@@ -1,0 +1,96 @@
+// What motions that are known take: mbs/core/recursion/newton_euler.h, at many states of a mechanism and its scene.
+#pragma once
+
+#include "core/recursion/newton_euler.h"
+
+#include "bindings/recursion/tree_run.h"
+
+namespace ffrobot::recursion {
+
+// q (T, n_q), v and a (T, n_v) at times (T)
+struct KnownStates {
+  const std::vector<double> &times;
+  const RowMajorMatrix &q, &v, &a;
+};
+
+// each(i, what acts, forces, workspace) at state i, after accelerate()
+template <class Space, class Each>
+void at_known_states(Model<Space> &model, const Scene &scene, const KnownStates &states, const Each &each) {
+  const auto &[times, q, v, a] = states;
+  const auto count = static_cast<Eigen::Index>(times.size());
+  check_scene(model, scene);
+  const Eigen::Index columns[] = {model.mechanism.n_q, model.mechanism.n_v, model.mechanism.n_v};
+  for (const int k : {0, 1, 2}) {
+    const RowMajorMatrix &of = k == 0 ? q : k == 1 ? v : a;
+    check_size("states", of.rows(), count), check_size("coordinates", of.cols(), columns[k]);
+  }
+  if (count == 0)
+    return;
+  const nanobind::gil_scoped_release unlocked;
+  RecursiveMotion<Space> motion(model.mechanism, scene, times[0], q.row(0).data(), v.row(0).data());
+  NewtonEuler<Space> forces(model.mechanism);
+  Workspace<Space, double> w(model.mechanism);
+  for (Eigen::Index i = 0; i < count; ++i) {
+    const double t = times[static_cast<std::size_t>(i)];
+    for (const DrivenMarker &driven : scene.driven)
+      w.turning[static_cast<std::size_t>(driven.marker)] = driven.law(t);
+    const Forces<double> acting = motion.act(t, q.row(i).data(), v.row(i).data());
+    forces.prepare(q.row(i).data(), v.row(i).data(), acting.generalized, w);
+    forces.accelerate(q.row(i).data(), a.row(i).data(), w);
+    each(i, acting, forces, w);
+  }
+}
+
+// (T, n_v) M a - Q, with Q of gravity, elasticity, damping and all forces of the scene
+template <class Space>
+RowMajorMatrix required_forces(Model<Space> &model, const Scene &scene, const std::vector<double> &times,
+                               const RowMajorMatrix &q, const RowMajorMatrix &v, const RowMajorMatrix &a) {
+  RowMajorMatrix found(a.rows(), a.cols());
+  at_known_states(model, scene, {times, q, v, a}, [&](Eigen::Index i, const auto &acting, auto &forces, auto &w) {
+    forces.load(nullptr, acting.wrench, w);
+    forces.require(q.row(i).data(), a.row(i).data(), w, found.row(i).data());
+    for (const auto &node : model.mechanism.nodes)
+      for (int k = 0; acting.generalized && k < node.shape.v_count; ++k)
+        found(i, node.v + k) -= acting.generalized[node.v + k];
+  });
+  return found;
+}
+
+// (T, rows) second derivatives of the rows' values, less those that their targets have
+template <class Space>
+RowMajorMatrix row_accelerations(Model<Space> &model, const Scene &scene, const std::vector<double> &times,
+                                 const RowMajorMatrix &q, const RowMajorMatrix &v, const RowMajorMatrix &a) {
+  RowMajorMatrix found(a.rows(), model.rows());
+  at_known_states(model, scene, {times, q, v, a}, [&](Eigen::Index i, const auto &, auto &forces, auto &w) {
+    for (std::size_t r = 0; r < scene.targets.size(); ++r)
+      found(i, static_cast<Eigen::Index>(r)) = forces.of_row(r, a.row(i).data(), w).value -
+                                               scene.targets[r](times[static_cast<std::size_t>(i)]).acceleration;
+  });
+  return found;
+}
+
+// (T, bodies, 2 dim): what the joint of each body does to its outer section and to nothing else, force and moment about
+// that section's origin, in global axes, then in axes of the joint; with multipliers (T, rows)
+template <class Space>
+RowMajorMatrix transmitted_forces(Model<Space> &model, const Scene &scene, const std::vector<double> &times,
+                                  const RowMajorMatrix &q, const RowMajorMatrix &v, const RowMajorMatrix &a,
+                                  const RowMajorMatrix &multipliers) {
+  check_size("times of multipliers", multipliers.rows(), a.rows());
+  check_size("multipliers", multipliers.cols(), model.rows());
+  constexpr int d = Space::dim;
+  const auto nodes = static_cast<Eigen::Index>(model.mechanism.nodes.size());
+  RowMajorMatrix found(a.rows(), 2 * d * nodes);
+  at_known_states(model, scene, {times, q, v, a}, [&](Eigen::Index i, const auto &acting, auto &forces, auto &w) {
+    forces.load(multipliers.row(i).data(), acting.wrench, w);
+    forces.transmit(w);
+    for (Eigen::Index k = 0; k < nodes; ++k) {
+      const auto at = static_cast<std::size_t>(k);
+      double *to = found.row(i).data() + 2 * d * k;
+      std::copy_n(forces.in_global_axes(at).data(), d, to);
+      std::copy_n(forces.in_joint_axes(at).data(), d, to + d);
+    }
+  });
+  return found;
+}
+
+} // namespace ffrobot::recursion
