@@ -11,7 +11,8 @@ import numpy as np
 
 from .arrays import Array, as_floats
 
-TERMS = 20  # of the series below: rounding for |φ| up to 2π
+NEAR = 1.0  # rad²: up to here the series below are exact to round-off, from here on closed forms lose no digits
+TERMS = 10  # of the series
 # Σ (−x)ᵏ/(2k + m)! by m, the highest power of x = φ² first: sin φ/φ, (1 − cos φ)/φ², (φ − sin φ)/φ³.
 _SERIES = {m: np.array([(-1) ** k / factorial(2 * k + m) for k in reversed(range(TERMS))]) for m in (1, 2, 3)}
 
@@ -56,15 +57,25 @@ def left_jacobian_rate(vectors: Array, rates: Array) -> Array:
 
 
 def series(m: int, x: Array) -> tuple[Array, Array]:
-    """Σ (−x)ᵏ/(2k + m)! of x = φ² and its derivative: (1 − cos φ)/φ² for m = 2, (φ − sin φ)/φ³ for m = 3."""
-    coefficients = _SERIES[m]
-    return np.polyval(coefficients, x), np.polyval(coefficients[:-1] * np.arange(TERMS - 1, 0, -1), x)
+    """c_m = Σ (−x)ᵏ/(2k + m)! of any x = φ² ≥ 0, and its derivative by x.
+
+    c_1 = sin φ/φ, c_2 = (1 − cos φ)/φ², c_3 = (φ − sin φ)/φ³; c_m' = (c_{m−1} − m c_m)/(2x), with c_0 = cos φ.
+    """
+    near, far = np.minimum(x, NEAR), np.maximum(x, NEAR)
+    phi = np.sqrt(far)
+    sine, cosine = np.sin(phi), np.cos(phi)
+    closed = (cosine, sine / phi, (1 - cosine) / far, (phi - sine) / (far * phi))
+    slope = (closed[m - 1] - m * closed[m]) / (2 * far)
+    coefficients, is_near = _SERIES[m], np.asarray(x) <= NEAR
+    value: Array = np.where(is_near, np.polyval(coefficients, near), closed[m])
+    near_slope = np.polyval(coefficients[:-1] * np.arange(TERMS - 1, 0, -1), near)
+    return value, np.where(is_near, near_slope, slope)
 
 
 def _of_skew(vectors: Array, first: int, second: int) -> Array:
-    """The sum a φ~ + b φ~² with the series a and b of φ²."""
+    """The sum c_first φ~ + c_second φ~²."""
     S, x = skew(vectors), np.sum(np.square(vectors), axis=-1)[..., None, None]
-    found: Array = np.polyval(_SERIES[first], x) * S + np.polyval(_SERIES[second], x) * (S @ S)
+    found: Array = series(first, x)[0] * S + series(second, x)[0] * (S @ S)
     return found
 
 
@@ -106,7 +117,13 @@ def logarithm(C: Array) -> Array:
 
 def about(axis: int, angles: Array | float) -> Array:
     """Rotations (…, 3, 3) about coordinate axis 0, 1 or 2 by `angles` (…)."""
-    return exponential(np.asarray(angles)[..., None] * np.eye(3)[axis])
+    cosine, sine = np.cos(angles), np.sin(angles)
+    found = np.zeros((*np.shape(angles), 3, 3))
+    j, k = (axis + 1) % 3, (axis + 2) % 3
+    found[..., axis, axis] = 1.0
+    found[..., j, j] = found[..., k, k] = cosine
+    found[..., j, k], found[..., k, j] = -sine, sine
+    return found
 
 
 def of_rpy(roll: float, pitch: float, yaw: float) -> Array:

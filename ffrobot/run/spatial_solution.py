@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 
 from ..actuation.control.loop_record import LoopRecord
 from ..actuation.patches.spatial_patches import LinkPatches
@@ -16,6 +17,7 @@ from ..mbs.analysis.spatial_run import SpatialRun
 from ..mbs.model.spatial_model import SpatialModel
 from ..mbs.model.spatial_wrench import Wrench
 from ..mbs.model.truncation import modes_kept
+from ..mbs.quantities.spatial_doubts import doubts
 from ..mbs.quantities.spatial_energy import Energies, Momentum
 from ..mbs.quantities.spatial_motion import SpatialMotion
 from ..mbs.quantities.stress import BodyStress
@@ -65,10 +67,14 @@ class SpatialResult:
         """Why results may be wrong, or not mean what they seem to, a text each, the most serious first."""
         missed = None if self.actuation is None else self.actuation.unsupplied
         bent = deflection_warning(self.bending)
-        told = (*([bent] if bent else []), *self.run.warnings, *unresolved_gears(self.motion.gears))
+        told = (*([bent] if bent else []), *self._doubts, *self.run.warnings, *unresolved_gears(self.motion.gears))
         if isinstance(self.run.details, LoopRecord):
             told = (*told, *self.run.details.warnings)
         return told if missed is None else (*told, missed.in_words)
+
+    @cached_property
+    def _doubts(self) -> tuple[str, ...]:
+        return tuple(doubts(self.motion, self.run.analysis.tolerance))
 
     @property
     def stiffening_effect(self) -> float:

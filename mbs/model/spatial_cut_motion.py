@@ -14,11 +14,19 @@ from .spatial_tree import Motion
 
 
 class CutMotion(NamedTuple):
-    """Coordinate (T,), full turns counted, rate (T,), and the force (T,) of friction and loads along it, N·m or N."""
+    """Of a coordinate along a joint at which a loop is cut.
+
+    Attributes:
+        coordinate: (T,), full turns counted.
+        rate: (T,).
+        force: (T,) of friction and loads along it, N·m or N.
+        is_counted: whether the times are close enough together to count its turns.
+    """
 
     coordinate: Array
     rate: Array
     force: Array
+    is_counted: bool
 
 
 def cut_motions(
@@ -29,8 +37,8 @@ def cut_motions(
     values, gradients = measured(tree, model.cut, q, tree.frames(q) if frames is None else frames)
     for one, value, G, guess in zip(model.cut, values.T, gradients.swapaxes(0, 1), _guesses(model), strict=True):
         rate = np.einsum("tj,tj->t", G, v)
-        coordinate = _unwound(value, rate, times, guess) if one.row.kind == "turn" else value
-        found.append(CutMotion(coordinate, rate, one.given(times) - one.resistance(rate)))
+        coordinate, is_counted = _unwound(value, rate, times, guess) if one.row.kind == "turn" else (value, True)
+        found.append(CutMotion(coordinate, rate, one.given(times) - one.resistance(rate), is_counted))
     return found
 
 
@@ -43,9 +51,18 @@ def _guesses(model: SpatialModel) -> Iterator[float]:
             yield from (float(value) for value in of_joint)
 
 
-def _unwound(angle: Array, rate: Array, times: Array, guess: float) -> Array:
-    """The angle (T,) with full turns: each the nearest to where the rates lead from the one before."""
-    way = np.diff(times) * (rate[1:] + rate[:-1]) / 2
+def _unwound(angle: Array, rate: Array, times: Array, guess: float) -> tuple[Array, bool]:
+    """The angle (T,) with full turns: each the nearest to where the rates lead from the one before.
+
+    Rates lead there by a cubic spline. Turns are counted where it is near the trapezoidal rule and the angle found.
+    """
+    if len(times) < 2:
+        return angle + 2 * np.pi * np.round((guess - angle) / (2 * np.pi)), True
+    from scipy.interpolate import CubicSpline
+
+    way = np.diff(CubicSpline(times, rate).antiderivative()(times))
     turns = np.round((np.append(guess, way) - np.append(angle[0], np.diff(angle))) / (2 * np.pi))
     found: Array = angle + 2 * np.pi * np.cumsum(turns)
-    return found
+    rough = np.diff(times) * (rate[1:] + rate[:-1]) / 2
+    off = np.abs(way - np.array([rough, np.diff(found)])).max()
+    return found, bool(off < np.pi / 2)

@@ -138,8 +138,7 @@ class SpatialMotion:
     def joint(self, name: str) -> tuple[Array, Array] | None:
         """Coordinates, unwrapped, and rates (T, k) of a joint; None where it has none."""
         if of_cut := [motion for one, motion in self.cut if one.joint.name == name]:
-            x, x_dot, _ = (np.array(values).T for values in zip(*of_cut, strict=True))
-            return x, x_dot
+            return np.array([one.coordinate for one in of_cut]).T, np.array([one.rate for one in of_cut]).T
         number = self.model.tree.carried.get(name)
         if number is None or not self.model.tree.nodes[number].joint.units:
             return None

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import rotations as plain
+from scipy.spatial.transform import Rotation
 
 from ffrobot.common import rotations
 
@@ -50,3 +51,51 @@ def test_smallest_turn(axis):
     assert np.linalg.det(C) == pytest.approx(1.0)
     np.testing.assert_allclose(C[:, 2], np.array(axis) / np.linalg.norm(axis), atol=1e-15)
     np.testing.assert_allclose(np.linalg.norm(rotations.logarithm(C)), np.arccos(C[2, 2]), atol=1e-7)
+
+
+@pytest.fixture(params=[0.99, 1.01, 3.0, 6.2, 6.3, 20.0, 1e3, 1e6])
+def far(request):
+    """Rotation vectors of one size, beyond all turns."""
+    axes = np.random.default_rng(5).standard_normal((7, 3))
+    return request.param * axes / np.linalg.norm(axes, axis=1)[:, None]
+
+
+def test_any_angle_against_scipy(far):
+    round_off = 4e-16 * np.linalg.norm(far[0]) + 1e-15
+    np.testing.assert_allclose(rotations.exponential(far), Rotation.from_rotvec(far).as_matrix(), atol=round_off)
+    for k, axis in enumerate("xyz"):
+        turned = Rotation.from_euler(axis, far[:, k]).as_matrix()
+        np.testing.assert_allclose(rotations.about(k, far[:, k]), turned, atol=round_off)
+    for angles in far:
+        expected = Rotation.from_euler("xyz", angles).as_matrix()
+        np.testing.assert_allclose(rotations.of_rpy(*angles), expected, atol=3 * round_off)
+
+
+def test_left_jacobian_of_any_angle(far):
+    """What defines it: φ~ J_l = exp φ~ − I, and J_l φ = φ."""
+    J_l = rotations.left_jacobian(far)
+    expected = Rotation.from_rotvec(far).as_matrix() - np.eye(3)
+    round_off = 1e-15 * (np.linalg.norm(far[0]) + 1)
+    np.testing.assert_allclose(rotations.skew(far) @ J_l, expected, atol=3 * round_off)
+    np.testing.assert_allclose(np.einsum("tij,tj->ti", J_l, far), far, atol=3 * round_off)
+
+
+@pytest.mark.parametrize("size", [1e-9, 0.3, 0.9, 1.1, 3.0, 9.0, 40.0])
+def test_slope_and_rate_of_the_left_jacobian(size):
+    """Against differences of ∫ exp(s φ~) ds, found by eigenvectors of φ~."""
+    rng = np.random.default_rng(6)
+    phi, x, phi_dot = rng.standard_normal((3, 3))
+    phi *= size / np.linalg.norm(phi)
+
+    def of(vector):
+        values, vectors = np.linalg.eig(plain.skew(vector))
+        mean = np.where(np.abs(values) < 1e-12, 1.0, np.expm1(values) / np.where(values == 0, 1.0, values))
+        return vectors @ np.diag(mean) @ np.linalg.inv(vectors)
+
+    h = 1e-5 * max(size, 0.1)
+    steps = h * np.array([-2, -1, 1, 2])
+    weights = np.array([1, -8, 8, -1]) / 12 / h
+    slope = np.stack([sum(w * of(phi + s * e).real @ x for w, s in zip(weights, steps)) for e in np.eye(3)], axis=1)
+    rate = sum(w * of(phi + s * phi_dot).real @ phi_dot for w, s in zip(weights, steps))
+    np.testing.assert_allclose(rotations.left_jacobian_slope(phi, x), slope, atol=3e-9)
+    np.testing.assert_allclose(rotations.left_jacobian_rate(phi, phi_dot), rate, atol=3e-9)

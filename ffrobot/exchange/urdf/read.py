@@ -62,7 +62,17 @@ def robot_of(root: Element) -> Robot:
     check_mimics(by_name)
     base = root_of([link.name for link in links], joints)
     name = root.get("name", "").strip() or base
-    return Robot(name, {link.name: link for link in links}, by_name, base)
+    return Robot(name, {link.name: link for link in links}, by_name, base, tuple(_turned(root)))
+
+
+def _turned(root: Element) -> Iterable[str]:
+    """Remarks on angles of more than a turn, which are degrees as a rule."""
+    for each in (*root.findall("link"), *root.findall("joint")):
+        turned = each.find("inertial") if each.tag == "link" else each
+        rpy = (0.0, 0.0, 0.0) if turned is None else _origin(turned, each.tag).rpy
+        if max(map(abs, rpy)) > 2 * math.pi:
+            angles = " ".join(f"{angle:g}" for angle in rpy)
+            yield f'{each.tag} "{shown(_name(each))}": rpy {angles} is more than a turn: URDF has rad, not degrees'
 
 
 def _check_once(kind: str, names: Iterable[str]) -> None:

@@ -127,12 +127,16 @@ class UrdfJoint:
 
 @dataclass(frozen=True)
 class Robot:
-    """Links and joints by name, in the order of the file; `root` is the link that no joint carries."""
+    """Links and joints by name, in the order of the file; `root` is the link that no joint carries.
+
+    `turned` are remarks on angles of more than a turn.
+    """
 
     name: str
     links: Mapping[str, UrdfLink]
     joints: Mapping[str, UrdfJoint]
     root: str
+    turned: tuple[str, ...] = ()
 
     def joints_of(self, link: str) -> list[UrdfJoint]:
         """Those whose parent is this link."""

@@ -35,7 +35,7 @@ class SceneOfRobot:
 
     def __init__(self, robot: Robot, found: Mechanism, flexible: Mapping[str, FlexibleLink]) -> None:
         self.robot, self.found, self.flexible = robot, found, flexible
-        self.remarks = list(found.remarks)
+        self.remarks = [*robot.turned, *found.remarks]
         self.bodies, self.joints = Names((GROUND,)), Names()
         self.points = {body.top: Names((ORIGIN,)) for body in found.bodies}
         joints = [self._joint(joint) for joint in found.joints]  # first: they name points

@@ -31,6 +31,9 @@ constexpr double radian = 10;
 // end before it and begin behind it, and are as long as usual.
 constexpr double may_have_met_jump = 0.1;
 
+// Steps turn orientations by no more than that (rad), below half a turn: see LocalCoordinates.
+constexpr double most_turn = 3;
+
 // Length of the next step: no sliver before `left`, or, where the method lands there, equal parts of the way.
 double next_step(double h, double left, bool lands) {
   if (h >= left)
@@ -204,7 +207,8 @@ private:
     if (jump_)
       end_at(jump_->before);
     const double wanted = next_step(steps_.next_step, target - t_, lands);
-    const double step = step_limit_.of(t_, wanted);
+    const double fastest = system_.local().fastest_rotation(z_.data() + system_.n_v());
+    const double step = std::min(step_limit_.of(t_, wanted), most_turn / fastest);
     const bool is_limited = step < wanted;
     if (step == target - t_)
       return {target, step, target, is_limited};
@@ -214,7 +218,8 @@ private:
 
   // Size of the step's error relative to the largest one allowed; NaN where it could not be made.
   double try_step(const Attempt &attempt, const Allowance &allowance) {
-    if (!method_->step(t_, z_.data(), attempt.step, allowance.to_iterate) || !method_->finish(attempt.end))
+    if (!method_->step(t_, z_.data(), attempt.step, allowance.to_iterate) ||
+        !system_.local().is_within_half_turns(method_->end()) || !method_->finish(attempt.end))
       return NAN;
     method_->estimate(attempt.step, error_);
     double size = system_.error_size(attempt.end, method_->end(), error_.data()) / allowance.error;

@@ -3,13 +3,21 @@
 
 #include "core/linear/four_doubles.h"
 
+#include <cmath>
 #include <cstdint>
 
 namespace ffrobot {
 
-constexpr double largest_of_four_sines = 1e5;
+constexpr double largest_reduced = 1e5; // beyond it the reduction below loses digits, and means nothing at last
 
-// |x| below that, within an ulp or two. Reduction after Cody and Waite, polynomials of Cephes.
+// One by one, of lanes whose |x| is larger than that, or not finite
+[[gnu::noinline]] inline void large_sines_and_cosines(const FourDoubles &x, FourDoubles &s, FourDoubles &c) {
+  for (int i = 0; i < 4; ++i)
+    if (!(std::abs(x[i]) < largest_reduced))
+      s[i] = std::sin(x[i]), c[i] = std::cos(x[i]);
+}
+
+// Of any x, within an ulp or two. Reduction after Cody and Waite, polynomials of Cephes.
 [[gnu::always_inline]] inline void sines_and_cosines(const FourDoubles &x, FourDoubles &s, FourDoubles &c) {
   using V = FourDoubles;
   using I = std::int64_t __attribute__((vector_size(32)));
@@ -28,6 +36,9 @@ constexpr double largest_of_four_sines = 1e5;
   const I sine_bits = ((odd & q) | (~odd & p)) ^ ((quadrant & 2) << 62);
   const I cosine_bits = ((odd & p) | (~odd & q)) ^ (((quadrant + 1) & 2) << 62);
   s = __builtin_bit_cast(V, sine_bits), c = __builtin_bit_cast(V, cosine_bits);
+  const auto is_small = (x < largest_reduced) & (x > -largest_reduced);
+  if (!(is_small[0] & is_small[1] & is_small[2] & is_small[3])) [[unlikely]]
+    large_sines_and_cosines(x, s, c);
 }
 
 } // namespace ffrobot

@@ -10,9 +10,8 @@
 
 namespace ffrobot::recursion {
 
-// Takes angles one after the other, |x| below largest_of_four_sines, and leaves their sines and cosines: of doubles
-// four at once. They are put together in a register, since written one by one and read together they would wait for
-// memory.
+// Takes angles one after the other and leaves their sines and cosines: of doubles four at once. They are put together
+// in a register, since written one by one and read together they would wait for memory.
 template <class T> struct Angles {
   FFROBOT_INLINE void take(std::size_t i, std::size_t, const T &x, T *s, T *c) { sine_and_cosine(x, s[i], c[i]); }
 };

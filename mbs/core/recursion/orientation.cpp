@@ -15,10 +15,15 @@ struct Vectors {
   Vector3d x, rate, acceleration;
 };
 
-// Sum of (-x)^k / (2 k + m)!, x = |psi|^2, and its derivative by x: (1 - cos)/|psi|^2 for m = 2, (|psi| - sin)/|psi|^3
-// for m = 3. To rounding for |psi| up to 2 pi.
+// (1 - cos)/|psi|^2 for m = 2, (|psi| - sin)/|psi|^3 for m = 3, and their derivatives by x = |psi|^2. For small x by
+// the sum of (-x)^k / (2 k + m)!, which is exact to rounding there; closed forms lose digits there, and only there.
 std::pair<double, double> series(int m, double x) {
-  constexpr int terms = 20;
+  if (x > 1) {
+    const double angle = std::sqrt(x), a = (1 - std::cos(angle)) / x, sinc = std::sin(angle) / angle;
+    const double b = (1 - sinc) / x;
+    return m == 2 ? std::pair{a, 0.5 * (sinc - 2 * a) / x} : std::pair{b, 0.5 * (a - 3 * b) / x};
+  }
+  constexpr int terms = 10;
   double value = 0, slope = 0;
   for (int k = terms; k >= 0; --k) { // value = 1/m! - x/(m + 2)! + …, by Horner with ratios of neighbours
     const double ratio = 1.0 / ((2 * k + m + 1) * (2 * k + m + 2));

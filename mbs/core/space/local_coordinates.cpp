@@ -3,6 +3,7 @@
 #include "core/space/rotation.h"
 
 #include <algorithm>
+#include <numbers>
 
 namespace ffrobot {
 
@@ -37,6 +38,20 @@ void LocalCoordinates::from_state(const double *y, double *z) const {
     space_.difference(y, centre_.data(), z);
     std::copy_n(y + space_.n_q(), space_.n_v(), z + space_.n_v());
   }
+}
+
+bool LocalCoordinates::is_within_half_turns(const double *z) const {
+  for (const auto &of : space_.rotations())
+    if (!(Eigen::Map<const Vector3d>(z + of.v).norm() < std::numbers::pi))
+      return false;
+  return true;
+}
+
+double LocalCoordinates::fastest_rotation(const double *v) const {
+  double fastest = 0;
+  for (const auto &of : space_.rotations())
+    fastest = std::max(fastest, Eigen::Map<const Vector3d>(v + of.v).norm());
+  return fastest;
 }
 
 void LocalCoordinates::shift(double *z, double h, const double *dq) const {

@@ -1,8 +1,8 @@
 // Coordinates in which one-step methods are those of a vector space, whatever the configuration space.
 //
 // The local coordinates z (2 n_v) of a state y = (q, v) are the numbers in q as they are, rotation vectors that lead
-// there from a centre, and v. A step starts at its centre, where rotation vectors are zero: every method keeps its
-// order, and quaternions their norm (H. Munthe-Kaas, BIT 38, 1998; generalized-alpha becomes that of O. Bruels,
+// there from a centre, and v. A step starts at its centre, where rotation vectors are zero, and turns by less than half
+// a turn, beyond which a state says nothing of the way to it: every method keeps its order, and quaternions their norm (H. Munthe-Kaas, BIT 38, 1998; generalized-alpha becomes that of O. Bruels,
 // A. Cardona and M. Arnold, Mech. Mach. Theory 48, 2012). With numbers alone z is y, and nothing is computed here.
 #pragma once
 
@@ -25,6 +25,12 @@ public:
   // y of z; points to z itself where the space is flat, and else to what the next call overwrites
   const double *state(const double *z) const { return space_.is_flat() ? z : curved_state(z); }
   void from_state(const double *y, double *z) const;
+
+  // Whether no rotation vector of z is half a turn or more: state() then says all of z.
+  bool is_within_half_turns(const double *z) const;
+
+  // Largest angular velocity (rad/s) among v (n_v) of rotations
+  double fastest_rotation(const double *v) const;
 
   // The position part of z moved by h dq (n_v)
   void shift(double *z, double h, const double *dq) const;

@@ -22,19 +22,10 @@ void put(const Jet &jet, Jets &to, std::size_t i) {
 
 [[gnu::always_inline]] inline void make_finite_or_nan(FourDoubles &x) { x = (x - x == 0) ? x : FourDoubles{} + nan; }
 
-bool are_small(const FourDoubles &x) {
-  const auto is = (x < largest_of_four_sines) & (x > -largest_of_four_sines);
-  return (is[0] & is[1] & is[2] & is[3]) != 0;
-}
-
 // By lanes that do not look at each other: the same whatever is evaluated together
 void sine_and_cosine(const Jets &u, Jets &sine, Jets &cosine) {
   FourDoubles s, c;
   sines_and_cosines(u.value, s, c);
-  if (!are_small(u.value))
-    for (int i = 0; i < 4; ++i)
-      if (const double x = u.value[i]; !(std::abs(x) < largest_of_four_sines))
-        s[i] = std::sin(x), c[i] = std::cos(x);
   sine = chain<FourDoubles>(u, s, c, -s), cosine = chain<FourDoubles>(u, c, -s, -c);
 }
 

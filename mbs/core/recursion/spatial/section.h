@@ -5,6 +5,7 @@
 #include "core/recursion/small.h"
 
 #include <array>
+#include <cmath>
 
 namespace ffrobot::recursion::spatial {
 
@@ -19,9 +20,9 @@ template <class T> struct PortMotion {
   T drift[3];               // (d/dt J_l) phi_dot
 };
 
-constexpr int series_terms = 9; // of the sums below: 1e-16 at 1.3 rad, 1e-13 at 2 rad, 4e-10 at half a turn
+constexpr int series_terms = 9; // of the sums below: 1e-16 up to 1.3 rad, beyond which closed forms lose no digits
 constexpr int few_terms = 5;    // 1e-18 as long as y is small
-constexpr double small_y = 1. / 256;
+constexpr double small_y = 1. / 256, large_y = 1.69;
 
 // 1/(2 k + m)! with alternating signs, k = 0, 1, …
 template <int m> constexpr std::array<double, series_terms> alternating_factorials() {
@@ -45,13 +46,21 @@ FFROBOT_INLINE void power_series(const std::array<double, series_terms> &c, cons
     slope = slope * y + sum, sum = sum * y + c[k];
 }
 
-// (1 - cos)/x^2, (x - sin)/x^3 and their derivatives by y = x^2
+// (1 - cos)/x^2, (x - sin)/x^3 and their derivatives by y = x^2, of any x
 template <class T> inline void rotation_series(const T &y, T &a, T &b, T &a_rate, T &b_rate) {
   constexpr auto of_a = alternating_factorials<2>(), of_b = alternating_factorials<3>();
   if (value_of(y) < small_y)
     power_series<few_terms>(of_a, y, a, a_rate), power_series<few_terms>(of_b, y, b, b_rate);
-  else
+  else if (value_of(y) < large_y)
     power_series<series_terms>(of_a, y, a, a_rate), power_series<series_terms>(of_b, y, b, b_rate);
+  else {
+    using std::sqrt;
+    const T x = sqrt(y);
+    T sine, cosine;
+    sine_and_cosine(x, sine, cosine);
+    a = (1. - cosine) / y, b = (x - sine) / (x * y);
+    a_rate = 0.5 * (sine / x - 2. * a) / y, b_rate = 0.5 * (a - 3. * b) / y;
+  }
 }
 
 // exp(phi) = I + (1 - y b) phi~ + a phi~^2, J_l = I + a phi~ + b phi~^2, y = |phi|^2, from phi and phi_dot
