@@ -78,7 +78,7 @@ def _write_analysis(group: h5py.Group, solution: SpatialSolution, result: Spatia
     for trajectory in motion.followed:
         entry = group.create_group(f"trajectories/{trajectory.name}")
         entry["force"] = motion.path_force(trajectory.name)
-        entry.attrs["components"] = list(trajectory.components)
+        entry.attrs["components"] = list(trajectory.force_components)
         if functions := list(trajectory.components.values()):
             entry["target"] = np.stack([function.sample(run.time)[0] for function in functions], axis=1)
         write_path(entry, trajectory)
@@ -121,7 +121,7 @@ def _write_bodies(group: h5py.Group, solution: SpatialSolution, result: SpatialR
 
 
 def _write_joints(group: h5py.Group, solution: SpatialSolution, result: SpatialResult) -> None:
-    motion = result.motion
+    motion, motors = result.motion, solution.scene.motor_joints
     for joint in solution.scene.joint:
         entry = group.create_group(f"joints/{joint.name}")
         entry.attrs["type"] = joint.type
@@ -131,9 +131,8 @@ def _write_joints(group: h5py.Group, solution: SpatialSolution, result: SpatialR
             entry["coordinate"], entry["rate"] = (
                 np.squeeze(values, 1) if len(joint.units) == 1 else values for values in found
             )
-        supplied = result.run.commanded if motion.motor_forces is None else motion.motor_forces.moments
-        moment = supplied.get(joint.name)
-        if moment is not None:
+        moment = motion.motor_moments.get(joint.name)
+        if moment is not None and joint in motors:
             entry["moment"] = np.squeeze(moment, 1) if len(joint.units) == 1 else moment
         _write_gear(entry, motion, joint.name)
 
@@ -142,6 +141,7 @@ def _write_gear(entry: h5py.Group, motion: SpatialMotion, joint: str) -> None:
     """What a gear that gives adds to a joint."""
     if (motor := motion.motor_motion(joint)) is not None:
         entry["motor_angle"], entry["motor_rate"] = motor
+    if (moment := motion.gear_moment(joint)) is not None:
+        entry["gear_moment"] = moment
     if (gear := motion.gears.get(joint)) is not None:
-        entry["gear_moment"] = gear.gear_moment
         entry.attrs["unresolved"] = gear.unresolved

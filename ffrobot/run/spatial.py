@@ -222,7 +222,7 @@ def _evaluated(solution: SpatialSolution, run: SpatialRun) -> SpatialResult:
     """What is read off a run."""
     motion = MotionOfLinks(
         run.model, run.time, run.q, run.v, run.a, run.multipliers, run.required, run.is_at_rest, run.applied,
-        divided_links(solution),
+        run.commanded, divided_links(solution),
     )  # fmt: skip
     actuation = None
     is_judged = motion.motor_forces is not None and not isinstance(run.analysis, InstantAnalysis)

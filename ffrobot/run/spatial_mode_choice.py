@@ -17,7 +17,7 @@ from .spatial_solution import SpatialResult
 
 def reported_in_space(result: SpatialResult) -> Reported:
     """Everything of an analysis whose error counts; moments on joints and paths as forces at the arm of a link."""
-    motion, run = result.motion, result.run
+    motion = result.motion
     nodes = [node for node in motion.model.tree.nodes if node.body.n_modes]
     size = max((node.body.length or 0.0 for node in nodes), default=0.0) or 1.0
     forces: dict[str, Array] = {}
@@ -34,7 +34,7 @@ def reported_in_space(result: SpatialResult) -> Reported:
             for label in node.body.points
         },
         "forces": {name: values for name, values in forces.items() if values.size},
-        "motors": run.commanded if motion.motor_forces is None else motion.motor_forces.moments,
+        "motors": motion.motor_moments,
         "voltages": {}
         if result.actuation is None
         else {name: of.required for name, of in result.actuation.voltages.items()},

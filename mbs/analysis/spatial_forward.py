@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -25,11 +26,18 @@ from .spatial_gears import wound_up
 from .spatial_replay import motor_forces_of, path_wrenches, replay_times, replayed
 from .spatial_run import SpatialContext, SpatialRun
 
+Moments = Mapping[str, Sequence[TimeFunction]]
+"""By joint, on its second side along each coordinate, N·m or N."""
+
 
 class Applied(NamedTuple):
-    """What acts, how far its functions of time are off (share of the largest value), and whether that was stopped."""
+    """What acts, how far its functions of time are off (share of the largest value), and whether that was stopped.
+
+    `moments` are those of `drives` that act along joints.
+    """
 
     drives: Drives
+    moments: Moments
     unresolved: float
     was_stopped: bool
 
@@ -57,11 +65,23 @@ def run_spatial_forward(context: SpatialContext, analysis: Forward) -> SpatialRu
     if applied.unresolved > analysis.tolerance:
         off = f"off by {applied.unresolved:.1e} of the largest"
         warnings = (f'the forces of "{analysis.actuation}" change too fast to be replayed: {off}',)
-    times = replay_times(source, analysis)
-    return spatial_drive(
-        model, analysis, start, progress,
-        drives=applied.drives, warnings=warnings, times=times, earlier=context.earlier,
+    run = spatial_drive(
+        model, analysis, start, progress, drives=applied.drives, warnings=warnings,
+        times=replay_times(source, analysis), earlier=context.earlier,
     )  # fmt: skip
+    return _commanded(run, applied.moments)
+
+
+def _commanded(run: SpatialRun, moments: Moments) -> SpatialRun:
+    """With what acts along joints at its outputs."""
+    commanded = {name: np.stack([f.sample(run.time)[0] for f in of], axis=1) for name, of in moments.items() if of}
+    return replace(run, commanded=commanded)
+
+
+def _by_joint(model: SpatialModel, functions: Iterable[TimeFunction]) -> dict[str, list[TimeFunction]]:
+    """The next functions of each motor, in the order of `SpatialModel.motors`."""
+    following = iter(functions)
+    return {joint: [next(following) for _ in columns] for joint, columns in model.motors.items()}
 
 
 def _behind_gears(source: SpatialRun, model: SpatialModel, analysis: Forward, context: SpatialContext) -> SpatialRun:
@@ -84,11 +104,11 @@ def _behind_gears(source: SpatialRun, model: SpatialModel, analysis: Forward, co
     given = np.clip(wanted, -most, most)
     sizes = spline(source.time, given, 1 if np.any(given != wanted) else DEGREE)
     along = [Drive(direction, size) for direction, size in zip(_directions(model), sizes, strict=True)]
-    times = replay_times(source, analysis)
-    return spatial_drive(
-        model, analysis, State(wound.q[0], wound.v[0]), context.progress,
-        drives=Drives(tuple(along)), times=times, earlier=context.earlier,
+    run = spatial_drive(
+        model, analysis, State(wound.q[0], wound.v[0]), context.progress, drives=Drives(tuple(along)),
+        times=replay_times(source, analysis), earlier=context.earlier,
     )  # fmt: skip
+    return _commanded(run, _by_joint(model, sizes))
 
 
 def _stop(t: float) -> bool:
@@ -114,18 +134,19 @@ def _paths(source: SpatialRun, analysis: Forward) -> Applied:
     rows = [(k, row) for k, row in enumerate(model.rows) if row.is_trajectory and row.kind == "coordinate"]
 
     def forces(run: SpatialRun) -> Array:
-        along = [-run.multipliers[:, k : k + 1] * row.sign for k, row in rows]
+        along = [-run.multipliers[:, k : k + 1] for k, _ in rows]
         return np.hstack([*along, *path_wrenches(run).values()])
 
     found = replayed(source, forces, replay_times(source, analysis), analysis.tolerance)
-    directions = np.eye(model.tree.n_v)[[row.coordinate for _, row in rows]]
-    along = [Drive(direction, size) for direction, size in zip(directions, found.functions, strict=False)]
+    unit, moments = np.eye(model.tree.n_v), found.functions[: len(rows)]
+    along = [Drive(row.sign * unit[row.coordinate], size) for (_, row), size in zip(rows, moments, strict=True)]
     sizes = iter(found.functions[len(rows) :])
     points = [
         PointDrive(point, {component: next(sizes) for component in OF_POINT})
         for point in path_wrenches(source.rows(slice(0, 1)))
     ]
-    return Applied(Drives(tuple(along), tuple(points)), found.unresolved, found.was_stopped)
+    by_joint = {model.joint_of(row): [size] for (_, row), size in zip(rows, moments, strict=True)}
+    return Applied(Drives(tuple(along), tuple(points)), by_joint, found.unresolved, found.was_stopped)
 
 
 def _points(context: SpatialContext, source: SpatialRun, analysis: Forward) -> Applied:
@@ -140,7 +161,7 @@ def _points(context: SpatialContext, source: SpatialRun, analysis: Forward) -> A
         PointDrive(point, {axis: next(sizes) for axis in "xyz"})
         for point in context.at_points(source.rows(slice(0, 1)))
     )
-    return Applied(Drives(at_points=points), found.unresolved, found.was_stopped)
+    return Applied(Drives(at_points=points), {}, found.unresolved, found.was_stopped)
 
 
 def _actuators(context: SpatialContext, source: SpatialRun, analysis: Forward) -> Applied:
@@ -161,7 +182,8 @@ def _actuators(context: SpatialContext, source: SpatialRun, analysis: Forward) -
     modal = tuple(drive for body in with_patches for drive in modal_drives(model, body, sizes))
     along = tuple(drive for drive in motors if isinstance(drive, Drive))
     on_frames = tuple(drive for drive in motors if isinstance(drive, FrameDrive))
-    return Applied(Drives(along + modal, on_frames=on_frames), found.unresolved, found.was_stopped)
+    moments = _by_joint(model, found.functions)
+    return Applied(Drives(along + modal, on_frames=on_frames), moments, found.unresolved, found.was_stopped)
 
 
 def _supplied(context: SpatialContext, analysis: Forward, found: MotorForces) -> dict[str, Array]:

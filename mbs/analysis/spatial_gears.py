@@ -5,7 +5,7 @@ The equations are those of the plane (`elastic_joints`), with the rotor's accele
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -82,7 +82,12 @@ def wound_up(run: SpatialRun, model: SpatialModel) -> WoundUp:
         )
     state = Accelerated(tree, run.q, run.v, run.a, tree.frames(run.q))
     gears = gears_of_motion(run.model, state, run.time, motor_forces_of(run).moments)
+    q, v, a = with_motors(model, (run.q, run.v, run.a), gears)
+    return WoundUp(q, v, a, gears)
+
+
+def with_motors(model: SpatialModel, firm: Sequence[Array], gears: Mapping[str, GearMotion]) -> list[Array]:
+    """Q, v, a (T, …) of `model`, whose gears give, from those of a robot with `firm` gears, and of its motors."""
     known = [gears[gear.joint.joint.name] for gear in model.tree.gears]
     more = (np.column_stack([getattr(of, order) for of in known]) for order in ("angle", "rate", "acceleration"))
-    q, v, a = (np.hstack(pair) for pair in zip((run.q, run.v, run.a), more, strict=True))
-    return WoundUp(q, v, a, gears)
+    return [np.hstack(pair) for pair in zip(firm, more, strict=True)]

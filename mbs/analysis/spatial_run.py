@@ -39,7 +39,8 @@ class SpatialRun:
         before, after: s, how long it acts before t = 0 and after the end of the analysis.
         warnings: on what is left open.
         cause: why it ended early, where more is known than its status says.
-        commanded: (T, k) moments of motors by joint, N·m or N, where a controller commands them.
+        commanded: (T, k) moments by joint that act along joints beside the scene's loads, N·m or N: what a controller
+            commands, or a replay applies.
         details: what only its kind finds.
         checkpoint: where its integration can be gone on with; None where that cannot be done.
         step_ends: (N,) s, with which it can be repeated, if it was asked for them; see `fields.steps`.

@@ -49,6 +49,11 @@ class SpatialModel:
         """Indices in v of the coordinates of a joint of the tree, in the scene's order; none of a spherical one."""
         return _in_order(self.tree.nodes[self.tree.carried[joint]])
 
+    def joint_of(self, row: SpatialRow) -> str:
+        """The joint of the scene whose coordinate, or whose motor's, a "coordinate" row measures."""
+        behind = {gear.motor.v.start: gear.joint.joint.name for gear in self.tree.gears}
+        return behind.get(row.coordinate, self.tree.nodes[row.b.body].joint.name)
+
     def along(self, joint: str) -> Array:
         """Directions in v (k, n_v) of moments on the second side of a joint along its k coordinates."""
         directions: Array = self.sign(joint) * np.eye(self.tree.n_v)[_in_order(self.driven(joint))]

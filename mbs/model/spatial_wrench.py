@@ -9,7 +9,7 @@ import numpy as np
 
 from ...common.arrays import Array
 from .spatial_rows import SpatialRow
-from .spatial_tree import Motion, SpatialTree
+from .spatial_tree import Motion, Node, SpatialTree
 
 
 class Wrench(NamedTuple):
@@ -27,6 +27,17 @@ class Wrench(NamedTuple):
         return Wrench(self.force + sign * other.force, self.moment + sign * other.moment)
 
 
+def along_joint(tree: SpatialTree, node: Node, force: Array, q: Array, frames: Sequence[Motion]) -> Wrench:
+    """What `force` (T, freedoms) along the joint that carries a body does on its outer side, about the global origin.
+
+    The opposite acts on its inner side.
+    """
+    F, r = tree.motion(node.inner, q, frames).F, tree.motion(node.outer, q, frames).r
+    acting = np.einsum("tij,tj->ti", node.joint.action(q[:, node.q]), force)
+    on_outer = (np.einsum("tij,tj->ti", F, part) for part in (acting[:, :3], acting[:, 3:]))
+    return Wrench(*on_outer).seen_from(r)
+
+
 def row_wrenches(
     tree: SpatialTree, row: SpatialRow, size: Array, q: Array, times: Array, frames: Sequence[Motion]
 ) -> tuple[Wrench, Wrench]:
@@ -36,10 +47,8 @@ def row_wrenches(
     """
     zero = np.zeros((len(times), 3))
     a, b = (tree.motion(section, q, frames) for section in (row.a, row.b))
-    if row.kind == "coordinate":  # a moment or force between the two sides, along the joint's own axis
-        S = tree.nodes[row.b.body].joint.motion(q[:, tree.nodes[row.b.body].q])[:, :, 0]
-        force, moment = (row.sign * size[:, None] * np.einsum("tij,tj->ti", a.F, x) for x in (S[:, :3], S[:, 3:]))
-        on_b = Wrench(force, moment).seen_from(b.r)
+    if row.kind == "coordinate":
+        on_b = along_joint(tree, tree.nodes[row.b.body], row.sign * size[:, None], q, frames)
     elif row.kind in ("point", "slide"):
         f = np.einsum("tij,j->ti", a.F, row.f) if row.kind == "slide" else np.broadcast_to(row.f, a.r.shape)
         on_b = Wrench(size[:, None] * f, zero).seen_from(b.r)

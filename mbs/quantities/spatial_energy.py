@@ -34,9 +34,10 @@ class Momentum:
 def energies(motion: SpatialMotion) -> Energies:
     """Of all bodies: ½ (m Ṙ² + ωᵀJω + ṗᵀṗ) + Ṙ·(ω × s + S̄ṗ) + ω·hṗ, in axes of the body; ½ pᵀKp; −g·(mR + As).
 
-    Gears that give store ½ k δ² beside. With geometric stiffening, less what affine fields have of the kinetic energy,
-    and with what they have to second order.
+    Gears that give store ½ k δ² beside, and their motors turn as they have to. With geometric stiffening, less what
+    affine fields have of the kinetic energy, and with what they have to second order.
     """
+    motion = motion.behind_gears
     count, gravity = len(motion.time), np.array(motion.model.scene.gravity)
     kinetic, strain, gravitational, dissipated = np.zeros((4, count))
     for node, frame in zip(motion.model.tree.nodes, motion.frames, strict=True):
@@ -65,6 +66,7 @@ def energies(motion: SpatialMotion) -> Energies:
 
 def momentum(motion: SpatialMotion) -> Momentum:
     """Of all bodies: A (m Ṙ + ω × s + S̄ṗ), and R × that + A (s × Ṙ + Jω + hṗ), in axes of the body."""
+    motion = motion.behind_gears
     linear, angular = np.zeros((2, len(motion.time), 3))
     for node, frame in zip(motion.model.tree.nodes, motion.frames, strict=True):
         body, p, p_dot = node.body, motion.q[:, node.p_q], motion.v[:, node.p_v]

@@ -5,7 +5,8 @@ All arrays are over the output times (T, …), SI units, global axes unless a na
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -13,12 +14,13 @@ import numpy as np
 from ...common.arrays import Array, as_floats
 from ...common.rotations import quaternions
 from ..analysis.outcome import GearMotion
-from ..analysis.spatial_gears import gears_of_motion
+from ..analysis.spatial_gears import gears_of_motion, with_motors
 from ..model.spatial_accelerations import Accelerated
 from ..model.spatial_bending import bent_section
 from ..model.spatial_cut import CutCoordinate
 from ..model.spatial_cut_motion import CutMotion, cut_motions
 from ..model.spatial_drives import PointDrive
+from ..model.spatial_gears import with_compliance_in_space
 from ..model.spatial_model import SpatialModel, row_values, target_rates
 from ..model.spatial_motors import MotorForces, motor_forces, path_forces
 from ..model.spatial_rows import SpatialRow
@@ -56,6 +58,7 @@ class SpatialMotion:
 
     `required` (T, n_v): generalized forces that prescribed motion takes, of links that are held to a shape as well.
     `is_at_rest`: targets stand still, as in an equilibrium. `applied`: forces on points beside the scene's loads.
+    `commanded`: moments (T, k) by joint that act along joints beside the scene's loads, N·m or N.
     """
 
     model: SpatialModel
@@ -67,6 +70,7 @@ class SpatialMotion:
     required: Array | None = None
     is_at_rest: bool = False
     applied: tuple[PointDrive, ...] = ()
+    commanded: Mapping[str, Array] = field(default_factory=dict)
 
     @cached_property
     def frames(self) -> list[Motion]:
@@ -181,6 +185,11 @@ class SpatialMotion:
         """
         return self._found_motor_forces()
 
+    @property
+    def motor_moments(self) -> Mapping[str, Array]:
+        """By joint (T, k), N·m or N: what motors do, or have to do in place of what is prescribed."""
+        return self.commanded if self.motor_forces is None else self.motor_forces.moments
+
     def _found_motor_forces(self) -> MotorForces | None:
         if not self.is_prescribed:
             return None
@@ -198,6 +207,25 @@ class SpatialMotion:
         if not self.is_prescribed:
             return {}
         return gears_of_motion(self.model, self.accelerated, self.time, self._with_rigid_gears.moments)
+
+    @cached_property
+    def behind_gears(self) -> SpatialMotion:
+        """The same with motors as far ahead of gears that give as they have to be; itself where gears give in it."""
+        if not self.gears:
+            return self
+        model = with_compliance_in_space(self.model)
+        q, v, a = with_motors(model, (self.q, self.v, self.a), self.gears)
+        return SpatialMotion(model, self.time, q, v, a, self.multipliers, applied=self.applied)
+
+    def gear_moment(self, joint: str) -> Array | None:
+        """What a gear that gives transmits to the second side of its joint (T,), N·m; else None."""
+        if joint in self.gears:
+            return self.gears[joint].gear_moment
+        for gear in self.model.tree.gears:
+            if gear.joint.joint.name == joint:
+                way, rate = gear.twist(self.q, self.v)
+                return gear.stiffness * way + gear.damping * rate
+        return None
 
     def motor_motion(self, joint: str) -> tuple[Array, Array] | None:
         """Angle and rate (T,), rad, rad/s, of the motor behind a gear that gives, reduced to its joint; else None."""

@@ -6,18 +6,19 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from ...common.arrays import Array
 from .._core import TimeFunction
 from ..model.spatial_inverse import body_forces
 from ..model.spatial_transmission import rotors
-from ..model.spatial_wrench import Wrench, row_wrenches
+from ..model.spatial_wrench import Wrench, along_joint, row_wrenches
 from .spatial_motion import SpatialMotion
 
 
 def reactions(motion: SpatialMotion) -> Mapping[str, Wrench]:
     """By joint: force on its second side, and moment about where that side is, N and N·m.
 
-    A joint of the tree carries what its body and all that hangs on it need, less what else acts there; one that closes
-    a loop has its multipliers, and what acts along it.
+    A joint of the tree carries what its body and all that hangs on it need, less what else acts there and what drives
+    the joint; one that closes a loop has its multipliers, and friction and loads along it.
     """
     tree, state, gravity, totals = motion.model.tree, motion.accelerated, np.array(motion.model.scene.gravity), []
     for node, of_frame, frame in zip(tree.nodes, state.of_frames(), motion.frames, strict=True):
@@ -26,6 +27,8 @@ def reactions(motion: SpatialMotion) -> Mapping[str, Wrench]:
     loops: dict[str, Wrench] = {}
     # What acts along a joint that closes a loop is part of what it carries, as in the tree.
     for row, size in (*zip(motion.model.rows, -motion.multipliers.T, strict=True), *motion.along_cut):
+        if row.kind == "coordinate":  # drives its joint
+            continue
         on_a, on_b = row_wrenches(tree, row, size, motion.q, motion.time, motion.frames)
         for section, acting in ((row.a, on_a), (row.b, on_b)):
             if section.body >= 0:
@@ -42,15 +45,37 @@ def reactions(motion: SpatialMotion) -> Mapping[str, Wrench]:
         if rotor.first.body >= 0:
             moment = rotor.torque[:, None] * rotor.axis + rotor.gyroscopic
             totals[rotor.first.body] = totals[rotor.first.body].plus(Wrench(np.zeros_like(moment), moment))
-    found = dict(loops)
+    found, driving = dict(loops), _driving(motion)
     for number in reversed(range(len(tree.nodes))):
         node = tree.nodes[number]
         if node.inner.body >= 0:
             totals[node.inner.body] = totals[node.inner.body].plus(totals[number])
         at = tree.motion(node.inner if node.backwards else node.outer, motion.q, motion.frames).r
-        sign = -1.0 if node.backwards else 1.0
-        acting = Wrench(sign * totals[number].force, sign * totals[number].moment)
-        found[node.joint.name] = acting.seen_from(-at)
+        carried, sign = totals[number], -1.0 if node.backwards else 1.0
+        if node.joint.name in driving:
+            drive = along_joint(tree, node, driving[node.joint.name], motion.q, motion.frames)
+            carried = carried.plus(drive, -1.0)
+        found[node.joint.name] = Wrench(sign * carried.force, sign * carried.moment).seen_from(-at)
+    return found
+
+
+def _driving(motion: SpatialMotion) -> dict[str, Array]:
+    """By joint what drives it (T, freedoms), along v of the tree: forces of paths, or motors where these act.
+
+    Behind a gear that gives it is the moment of the motor.
+    """
+    model, found = motion.model, dict[str, Array]()
+    is_held = any(row.is_trajectory for row in model.rows)
+    moments = {} if is_held else dict(motion.motor_moments)
+    for row, size in zip(model.rows, -motion.multipliers.T, strict=True):
+        if row.kind == "coordinate":
+            joint = model.joint_of(row)
+            moments[joint] = motion.gears[joint].moment[:, None] if joint in motion.gears else size[:, None]
+    for joint, moment in moments.items():
+        node = model.tree.nodes[model.tree.carried[joint]]
+        along = np.zeros((len(motion.time), node.v.stop - node.v.start))
+        along[:, model.columns(joint) - node.v.start] = -moment if node.backwards else moment
+        found[joint] = along
     return found
 
 

@@ -93,9 +93,8 @@ def test_slope_and_rate_of_the_left_jacobian(size):
         return vectors @ np.diag(mean) @ np.linalg.inv(vectors)
 
     h = 1e-5 * max(size, 0.1)
-    steps = h * np.array([-2, -1, 1, 2])
-    weights = np.array([1, -8, 8, -1]) / 12 / h
-    slope = np.stack([sum(w * of(phi + s * e).real @ x for w, s in zip(weights, steps)) for e in np.eye(3)], axis=1)
-    rate = sum(w * of(phi + s * phi_dot).real @ phi_dot for w, s in zip(weights, steps))
+    differences = [(s * h, w / (12 * h)) for s, w in ((-2, 1), (-1, -8), (1, 8), (2, -1))]
+    slope = np.stack([sum(w * of(phi + s * e).real @ x for s, w in differences) for e in np.eye(3)], axis=1)
+    rate = sum(w * of(phi + s * phi_dot).real @ phi_dot for s, w in differences)
     np.testing.assert_allclose(rotations.left_jacobian_slope(phi, x), slope, atol=3e-9)
     np.testing.assert_allclose(rotations.left_jacobian_rate(phi, phi_dot), rate, atol=3e-9)

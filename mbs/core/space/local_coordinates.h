@@ -1,9 +1,10 @@
 // Coordinates in which one-step methods are those of a vector space, whatever the configuration space.
 //
 // The local coordinates z (2 n_v) of a state y = (q, v) are the numbers in q as they are, rotation vectors that lead
-// there from a centre, and v. A step starts at its centre, where rotation vectors are zero, and turns by less than half
-// a turn, beyond which a state says nothing of the way to it: every method keeps its order, and quaternions their norm (H. Munthe-Kaas, BIT 38, 1998; generalized-alpha becomes that of O. Bruels,
-// A. Cardona and M. Arnold, Mech. Mach. Theory 48, 2012). With numbers alone z is y, and nothing is computed here.
+// there from a centre, and v. A step starts at its centre, where rotation vectors are zero, and makes less than half a
+// turn, beyond which a state says nothing of the way to it: every method keeps its order, and quaternions their norm
+// (H. Munthe-Kaas, BIT 38, 1998; generalized-alpha becomes that of O. Bruels, A. Cardona and M. Arnold, Mech. Mach.
+// Theory 48, 2012). With numbers alone z is y, and nothing is computed here.
 #pragma once
 
 #include "core/space/configuration_space.h"

@@ -99,6 +99,14 @@ class SpatialJoint(JointKeys):
         """(…, 6): Ṡ v in axes of the inner triad, what v̇ = 0 leaves of the acceleration; S is `motion`."""
         return np.zeros((*q.shape[:-1], 6))
 
+    def action(self, q: Array) -> Array:
+        """(…, 6, freedoms): force and moment of motors on the outer side, at its triad, by generalized forces along v.
+
+        In axes of the inner triad. Motors act along axes of the joint: a force where it slides, a moment where it
+        turns, `action`ᵀ `motion` = 1.
+        """
+        return self.motion(q)  # its columns are of length one and at right angles
+
     def turned_around(self, coordinates: Array) -> Array:
         """Coordinates (…, k) with the sides exchanged: of the first on the second; done twice, the same again."""
         return -coordinates

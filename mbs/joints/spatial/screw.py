@@ -43,3 +43,7 @@ class SpatialScrew(AxialJoint):
         """Along and about z."""
         unit = np.array([0.0, 0.0, self.rise, 0.0, 0.0, 1.0])[:, None]
         return np.broadcast_to(unit, (*q.shape[:-1], 6, 1))
+
+    def action(self, q: Array) -> Array:
+        """A moment about z: the thread makes of it what force there is."""
+        return np.broadcast_to(np.eye(6)[:, 5:], (*q.shape[:-1], 6, 1))

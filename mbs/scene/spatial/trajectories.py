@@ -158,6 +158,13 @@ class SpatialTrajectory(MotionKeys):
         """The joint whose coordinate, or whose motor's, follows it."""
         return self.joint if self.motor is None else self.motor
 
+    @property
+    def force_components(self) -> tuple[str, ...]:
+        """What its forces are: those of `components`, then moments about global axes, or two about a tool's axis."""
+        if self.orientation is None:
+            return tuple(self.components)
+        return (*self.components, *(("mx", "my", "mz") if self.tool_axis is None else ("tool 1", "tool 2")))
+
     @cached_property
     def path(self) -> Piecewise | None:
         """The motion of the place, or of the joint, where it is made of polynomials; None where expressions give it."""
