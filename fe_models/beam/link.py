@@ -20,13 +20,14 @@ from ..link_records import FAMILIES, BeamLink, Family
 from ..modal_body import Interface, ModalBody, PictureMesh, Stations
 from ..modal_body.attachment_modes import DEFAULT_COUNT
 from ..modal_body.damping import damping_ratio
-from ..modal_body.lumped_masses import lump_weights, lumps, with_lumped_loads, with_lumped_masses
+from ..modal_body.lumped_masses import lump_weights, lumps, with_lumped_masses, with_lumped_stiffness
 from ..modal_body.signs import canonical_signs
 from .attachment_modes import attachment_modes
 from .beam import R_X, FamilyModel, family_model, shear_modulus
 from .eigen import lowest_modes
 from .fixed_interfaces import fixed_interfaces, ritz_modes
-from .invariants import StationSpace, geometric_stiffness, shape_integrals, station_space
+from .geometric_stiffness import geometric_stiffness
+from .invariants import StationSpace, shape_integrals, station_space
 from .section_outline import section_outlines
 from .stress import beam_stresses, segments, stress_loads
 
@@ -84,7 +85,7 @@ def beam_modal_body(link: BeamLink, path: Path, progress: Progress) -> ModalBody
         damping_of=link.damping.of,
         family=families,
         residual=residual,
-        geometric_stiffness=with_lumped_loads(geometric_stiffness(link, stations, fields, named), attached),
+        geometric_stiffness=with_lumped_stiffness(geometric_stiffness(link, stations, fields, named), attached),
         interfaces=interfaces,
         stations=kept,
         stress=beam_stresses(link, kept, omega**2, families, attached, residual, interfaces),

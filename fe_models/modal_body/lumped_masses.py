@@ -18,7 +18,7 @@ from ..link_records import InterfaceRecord
 from .invariants import Invariants
 from .parts import Interface
 from .tensors import LEVI_CIVITA
-from .unit_loads import inertia_wrenches, interface_load_names
+from .unit_loads import PAIRS, inertia_wrenches, interface_load_names
 
 
 @dataclass(frozen=True)
@@ -104,3 +104,32 @@ def with_lumped_loads(of_loads: Mapping[str, Array], attached: Iterable[Lump]) -
                 if size:
                     total[load] = total[load] + size * of_loads[unit]
     return total
+
+
+def with_lumped_stiffness(matrices: Mapping[str, Array], attached: Iterable[Lump]) -> dict[str, Array]:
+    """Geometric stiffness (n, n) by load with that of lumps: their inertia loads, and their points that turn."""
+    attached = list(attached)
+    total = with_lumped_loads(matrices, attached)
+    for lump in attached:
+        phi = lump.at.rotation
+        for load, more in of_turning(lump.spread, np.einsum("am,bn->abmn", phi, phi)).items():
+            total[load] = total[load] + more
+    return total
+
+
+def of_turning(E: Array, products: Array) -> dict[str, Array]:
+    """(n, n) by load: geometric stiffness of d'Alembert's loads on a rigid body that turns to second order.
+
+    A point d from its center moves by ½ φ × (φ × d) = −½ (d φ² − φ φ·d) besides φ × d. Of d φ² − φ φ·d = pᵀG p are
+    K_x,kl = ∫ρ d_k G_l dV, and from them K_ω = 1 tr K_x − sym K_x and K_r,a = ε_abc K_x,bc (docs/theory.md).
+
+    Args:
+        E: (3, 3) ∫ρ d dᵀ dV, kg·m².
+        products: (3, 3, n, n) φ_a φ_b.
+    """
+    products = 0.5 * (products + products.transpose(0, 1, 3, 2))
+    K_x = np.einsum("kl,aamn->klmn", E, products) - np.einsum("kb,blmn->klmn", E, products)
+    K_omega = np.einsum("ij,kkmn->ijmn", np.eye(3), K_x) - 0.5 * (K_x + K_x.transpose(1, 0, 2, 3))
+    K_r = np.einsum("abc,bcmn->amn", LEVI_CIVITA, K_x)
+    found = {f"r_{axis}": -K_r[a] for a, axis in enumerate("xyz")}  # of d'Alembert's loads
+    return found | {f"omega_{name}": K_omega[i, j] * (1.0 if i == j else 2.0) for name, (i, j) in PAIRS.items()}

@@ -22,7 +22,7 @@ from ...mesh.solid_mesh import SolidMesh, solid_mesh
 from ..link_records import HOLDING_ROOT, SolidLink
 from ..modal_body import Interface, ModalBody, PictureMesh, Stations
 from ..modal_body.damping import damping_ratio
-from ..modal_body.lumped_masses import lump_weights, lumps, with_lumped_loads, with_lumped_masses
+from ..modal_body.lumped_masses import lump_weights, lumps, with_lumped_loads, with_lumped_masses, with_lumped_stiffness
 from ..modal_body.signs import canonical_signs
 from .attachment_modes import attachment_modes
 from .eigen import Mass
@@ -132,7 +132,7 @@ def solid_modal_body(
         damping_of=link.damping.of,
         family=tuple(modes.families),
         residual=np.repeat([0, 1], [count, omega.size - count]),
-        geometric_stiffness=with_lumped_loads(prestressed(model, X, shapes), attached),
+        geometric_stiffness=with_lumped_stiffness(prestressed(model, X, shapes), attached),
         interfaces=interfaces,
         stations=_stations(link, sections, x, element, translation * signs, rotation * signs),
         mesh=mesh,

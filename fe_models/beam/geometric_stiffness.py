@@ -1,0 +1,157 @@
+"""Geometric stiffness of a beam: work of section forces under unit loads when it bends, twists and stretches.
+
+Let the modes say what the curvatures and strains of the sections are, exactly. With the rotations Th = (φ, θ_y, θ_z)
+and the strains Γ = (u', v' − θ_z, w' + θ_y) of the linear beam, sections then turn by the rotation vector Th + ψ and
+the axis moves by r₂ more (R' = R k~, r' = R (e1 + Γ), integrated to second order):
+
+    ψ' = ½ Th × Th'        r₂' = ψ × e1 + ½ Th × (Th × e1) + Th × Γ
+
+By virtual work a unit load with the section forces n, m in the straight link moves along itself by −½ pᵀK p, where
+
+    pᵀK p = −∫ n·(Th × (Th × e1) + 2 Th × Γ) + m·(Th × Th') dx
+
+K of a moment belongs to the rotation vector. Sections are rigid and the axis keeps its length under twist: what solids
+have besides, N (I_p/A) φ'² of fibres that twist shortens, is left out, as in the rods of Kirchhoff and Reissner.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from scipy.special import roots_legendre
+
+from ...common.arrays import Array
+from ..link_records import BeamLink
+from ..modal_body.lumped_masses import of_turning
+from ..modal_body.tensors import LEVI_CIVITA
+from ..modal_body.unit_loads import inertia_wrenches, interface_load_names, unit_load_names
+from .beam import R_X, Property
+from .invariants import StationSpace, weighted
+
+POINTS = 5  # Gauss points of an element: exact, since of cubics no product is of a degree above 8
+
+
+def geometric_stiffness(
+    link: BeamLink, stations: StationSpace, fields: Array, interfaces: dict[str, float]
+) -> dict[str, Array]:
+    """(n, n) K by unit load (`unit_loads`), of the link as its reference condition holds it.
+
+    Euler–Bernoulli links are a line of mass: their spin inertia has no second-order motion.
+
+    Args:
+        link: for density and sections.
+        stations: k of them; every interface is a vertex of their mesh.
+        fields: (6, k, n) rows U_X … R_Z at the stations.
+        interfaces: position of each in m.
+    """
+    x, weight, values, slopes = _at_gauss_points(stations, fields)
+    section_forces = _section_forces(link, x, interfaces)
+    names, n = unit_load_names(interfaces), fields.shape[2]
+    weighted_forces = np.array([section_forces[name] for name in names]) * weight  # (loads, 6, g)
+    total = np.zeros((len(names), n, n))
+    for row, products in enumerate(_products(values, slopes)):
+        total += np.tensordot(weighted_forces[:, row], products, axes=1)
+    matrices = dict(zip(names, 0.5 * (total + total.transpose(0, 2, 1)), strict=True))
+    if link.model.theory == "timoshenko":
+        for name, matrix in _of_turning_sections(link, stations, fields[R_X:]):
+            matrices[name] = matrices[name] + matrix
+    return matrices
+
+
+def _at_gauss_points(stations: StationSpace, fields: Array) -> tuple[Array, Array, Array, Array]:
+    """Points x (g,) m with their weights (g,) m, and fields (6, g, n) there with their derivatives by x."""
+    x = stations.x[stations.element]  # (e, 4)
+    nodes, weights = roots_legendre(POINTS)
+    start, length = x[:, :1], x[:, -1:] - x[:, :1]
+    X = 0.5 * (nodes + 1)
+    inverse = np.linalg.inv(((x - start) / length)[:, :, None] ** np.arange(4))  # coefficients of powers, by node
+    basis = X[:, None] ** np.arange(4) @ inverse  # (e, g, 4)
+    slope = np.arange(1, 4) * X[:, None] ** np.arange(3) @ inverse[:, 1:] / length[:, :, None]
+    of_element = fields[:, stations.element]  # (6, e, 4, n)
+    at = (start + length * X).ravel()
+    values, slopes = (np.reshape(B @ of_element, (6, at.size, -1)) for B in (basis, slope))
+    return at, (0.5 * length * weights).ravel(), values, slopes
+
+
+def _products(values: Array, slopes: Array) -> Array:
+    """(6, g, n, n) what n_x … m_z do work on: see the module."""
+    Th, rate, Gamma = values[R_X:], slopes[R_X:], slopes[:R_X].copy()
+    turned = np.stack([np.zeros_like(Th[0]), Th[2], -Th[1]])  # Th × e1
+    Gamma[1:] -= turned[1:]
+    on_forces, on_moments = (
+        -np.einsum("cab,agm,bgn->cgmn", LEVI_CIVITA, Th, other, optimize=True) for other in (turned + 2 * Gamma, rate)
+    )
+    return np.concatenate([on_forces, on_moments])
+
+
+def _section_forces(link: BeamLink, x: Array, interfaces: dict[str, float]) -> dict[str, Array]:
+    """(6, g) n and m at x (g,) in the straight link under each unit load, as its reference condition holds it."""
+    found = _of_inertia(link, x)
+    for name, position in interfaces.items():
+        beyond = np.where(x < position, 1.0, 0.0)
+        for load, unit in zip(interface_load_names([name]), np.eye(6), strict=True):
+            found[load] = _of_load(unit, position - x) * beyond, _of_load(unit, np.array([position]))[:, 0]
+    if link.reference.holds_root:
+        return {load: forces for load, (forces, _) in found.items()}
+    return {load: forces + _of_tip_support(link, x, at_root) for load, (forces, at_root) in found.items()}
+
+
+def _of_load(unit: Array, arm: Array) -> Array:
+    """(6, g) of a force and moment (6,) that act further along the axis by arm (g,)."""
+    force, moment = unit[:3, None], unit[3:, None]
+    return np.concatenate([np.broadcast_to(force, (3, arm.size)), moment + _lever(force * arm)])
+
+
+def _lever(force: Array) -> Array:
+    """e1 × f of f (3, …)."""
+    return np.stack([np.zeros_like(force[0]), -force[2], force[1]])
+
+
+def _of_tip_support(link: BeamLink, x: Array, at_root: Array) -> Array:
+    """(6, g) of the forces across with which a support at the tip takes the moments of a load about the root (6,)."""
+    L = link.geometry.length
+    return _of_load(np.array([0.0, -at_root[5] / L, at_root[4] / L, 0.0, 0.0, 0.0]), L - x)
+
+
+def _of_inertia(link: BeamLink, x: Array) -> dict[str, tuple[Array, Array]]:
+    """(6, g) of d'Alembert's loads on the link held at its root, and their sums about the root (6,).
+
+    Sections at s bear forces ρA (a + b s), of small bodies at 0 and 1 m, and, with rotary inertia, moments.
+    """
+    e1, nothing = np.eye(3)[:1], np.zeros(1)
+    M = [_beyond(link, np.append(x, 0.0), lambda s: s.area, power) for power in range(3)]
+    extents = [(lambda s: s.I_yy, [1.0, 0.0, 1.0]), (lambda s: s.I_zz, [1.0, 1.0, 0.0])]
+    rotary = [
+        (_beyond(link, np.append(x, 0.0), moment, 0), inertia_wrenches(0 * e1, nothing, np.array([inertia])))
+        for moment, inertia in (extents if link.model.theory == "timoshenko" else [])
+    ]
+    at_0, at_1 = (inertia_wrenches(place, np.ones(1), np.zeros((1, 3))) for place in (0 * e1, e1))
+    found = {}
+    for load in at_0:
+        a = at_0[load][0, :3, None]
+        b = at_1[load][0, :3, None] - a
+        n = a * M[0] + b * M[1]
+        m = _lever(a * M[1] + b * M[2] - np.append(x, 0.0) * n)
+        m = m + sum(wrenches[load][0, 3:, None] * J for J, wrenches in rotary)
+        both = np.concatenate([n, m])
+        found[load] = both[:, :-1], both[:, -1]
+    return found
+
+
+def _beyond(link: BeamLink, x: Array, moment: Property, power: int) -> Array:
+    """∫_x^L ρ·moment·sᵖ ds for each x (g,)."""
+    total = np.zeros_like(x)
+    points = link.geometry.breakpoints
+    for start, end, section in zip(points[:-1], points[1:], link.sections, strict=True):
+        lower = np.clip(x, start, end)
+        total += link.material.density * moment(section) * (end ** (power + 1) - lower ** (power + 1)) / (power + 1)
+    return total
+
+
+def _of_turning_sections(link: BeamLink, stations: StationSpace, phi: Array) -> Iterator[tuple[str, Array]]:
+    """What sections with rotary inertia that turn by φ (3, k, n) add to K (n, n) of d'Alembert's loads."""
+    for k, moment in ((1, lambda s: s.I_yy), (2, lambda s: s.I_zz)):
+        W = weighted(link, stations, moment, link.material.density)
+        products = np.array([[a.T @ (W @ b) for b in phi] for a in phi])
+        yield from of_turning(np.diag(np.eye(3)[k]), products).items()

@@ -1,0 +1,152 @@
+"""Beams that bend and twist: a clamped link under loads at its tip that stay or follow, against an exact rod."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from exact_rod import rigidities, tip_of
+from scipy.optimize import fsolve
+from scipy.spatial.transform import Rotation
+
+from ffrobot.fe_models.link import computed_modal_body
+from ffrobot.fe_models.link_file import LinkTable
+from ffrobot.mbs.model.spatial_bending import bent_section
+from ffrobot.mbs.model.spatial_body import from_modal_body
+
+E, L = 70e9, 0.5
+BENDING = ("in-plane-bending", "out-of-plane-bending")
+COUNTS = {"in-plane-bending": 3, "out-of-plane-bending": 3, "torsion": 2}
+
+
+@dataclass(frozen=True)
+class Case:
+    """A section (mm, height y and width z) and what loads the tip; its exact and its second-order displacement (mm)."""
+
+    section: tuple[float, float]
+    nu: float
+    force: tuple[float, float, float]
+    moment: tuple[float, float, float]
+    exact: tuple[float, float, float]
+    exact_rotation: tuple[float, float, float]
+    complete: tuple[float, float, float]
+    arm: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    follows: bool = False
+
+
+FORCE, TORQUE = (0.0, 1.6, 3.0), (0.35, 0.0, 0.0)
+# Exact: collocation and shooting of a Kirchhoff rod, both alike to 1e-14 of its length; complete: NumPy alone.
+CASES = {
+    "A": Case((4, 20), 0.33, (0, 0, -4.9), (0, 0, 0), (-0.0014490, 0.0903215, -1.0942233),
+              (-0.014987402, 0.003280939, 0.000375066), (-0.0014485, 0.0903377, -1.0942536), (0, 0.06, 0)),
+    "B": Case((4, 20), 0.33, (0, 0, -15), (0, 0, 0), (-0.0146514, 0.8532886, -3.3620076),
+              (-0.046058676, 0.010035808, 0.003539838), (-0.0146152, 0.8547427, -3.3629277), (0, 0.06, 0)),
+    "C": Case((5, 12), 0.3, (0, 1.6, 0), TORQUE, (-0.0696339, 7.6172022, 0.0376464),
+              (0.017619342, 0.000037512, 0.022853908), (-0.0696664, 7.6193248, 0.0376611)),
+    "D": Case((12, 5), 0.3, (0, 9, 0), TORQUE, (-0.0664386, 7.4396157, -0.1004179),
+              (0.017635602, 0.000524024, 0.022317385), (-0.0664624, 7.4415558, -0.1006384)),
+    "E": Case((5, 12), 0.3, FORCE, (0, 0, 0), (-0.0770363, 7.6181798, 2.4806037),
+              (0.000237733, -0.007440069, 0.022857124), (-0.0770764, 7.6205879, 2.4809805)),
+    "F": Case((5, 12), 0.3, FORCE, TORQUE, (-0.0779378, 7.6515253, 2.5185412),
+              (0.017858429, -0.007402572, 0.023032593), (-0.0779837, 7.6542954, 2.5190297)),
+    "G": Case((5, 12), 0.3, FORCE, TORQUE, (-0.0740580, 7.4350716, 2.5214191),
+              (0.017856460, -0.007396262, 0.022420440), (-0.0740986, 7.4376375, 2.5218883), follows=True),
+    "H": Case((5, 12), 0.3, (0, 0, 0), (0.35, 0.5, 0.3), (-0.0261042, 4.2589590, -1.2144245),
+              (0.017799637, 0.004957887, 0.016939290), (-0.0261047, 4.2591791, -1.2144867)),
+    "I": Case((5, 12), 0.3, (0, 0, 0), (0.35, 0.5, 0.3), (-0.0272657, 4.3595703, -1.2161155),
+              (0.017442996, 0.004964962, 0.017343574), (-0.0272663, 4.3597961, -1.2161779), follows=True),
+}  # fmt: skip
+ROTATIONS = {"B": (-0.046071074, 0.010037987, 0.003544797), "G": (0.017858626, -0.007397055, 0.022427066)}
+CHORD = {"B": (-0.0146527, 0.8538782, -3.3627106), "F": (-0.0779379, 7.6515001, 2.5185705)}
+
+
+def link(section, nu, condition="cantilever", **modes):
+    return {
+        "name": "rod",
+        "material": {"youngs_modulus": E, "poissons_ratio": nu, "density": 2700.0},
+        "geometry": {
+            "kind": "beam",
+            "length": L,
+            "section": {"shape": "rectangle", "height": section[0] / 1e3, "width": section[1] / 1e3},
+        },
+        "mesh": {"elements": 20},
+        "reference": {"condition": condition},
+        "modes": {"family": [*BENDING, "torsion"], **modes},
+    }
+
+
+@pytest.fixture(scope="module")
+def body(tmp_path_factory):
+    """Of a section, with the eigenmodes of `COUNTS` and the static shapes of loads at the tip."""
+    folder, known = tmp_path_factory.mktemp("rods"), {}
+
+    def of(section, nu, condition="cantilever"):
+        key = section, nu, condition
+        if key not in known:
+            table = LinkTable(link(*key, count=30, attachment_modes=False), folder / "rod.toml")
+            family = np.array(computed_modal_body(table).family)
+            indices = sorted(int(i) + 1 for f, n in COUNTS.items() for i in np.flatnonzero(family == f)[:n])
+            table = LinkTable(link(*key, indices=indices, attachment_modes=True), folder / "rod.toml")
+            known[key] = from_modal_body("rod", computed_modal_body(table), stiffened=True)
+        return known[key]
+
+    return of
+
+
+def tip_at_rest(body, force, moment, arm=(0.0, 0.0, 0.0), follows=False):
+    """Displacement and rotation vector of the tip of a body whose root section is clamped: K p = work of the load."""
+    force, moment, arm = (np.asarray(v, dtype=float) for v in (force, moment, arm))
+
+    def placed(p):
+        root, tip = (bent_section(body, name, p) for name in ("root", "tip"))
+        to_root = Rotation.from_rotvec(root.phi).inv()
+        return to_root.apply(tip.u - root.u), to_root * Rotation.from_rotvec(tip.phi)
+
+    def forces(p):
+        R = placed(p)[1]
+        f, m = (R.apply(force), R.apply(moment)) if follows else (force, moment)
+        m = m + np.cross(R.apply(arm), f)
+        found = -body.stiffness * p
+        for k, h in enumerate(1e-3 / np.sqrt(body.stiffness)):
+            (r, turned), (r_before, before) = (placed(p + sign * h * np.eye(len(p))[k]) for sign in (1, -1))
+            found[k] += ((r - r_before) @ f + (turned * before.inv()).as_rotvec() @ m) / (2 * h)
+        return found
+
+    root = np.sqrt(body.stiffness)
+    scaled = fsolve(lambda x: forces(x / root) / root, np.zeros(body.n_modes), xtol=1e-11)
+    r, R = placed(scaled / root)
+    return r - [L, 0.0, 0.0], R.as_rotvec()
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_checkpoints(body, name):
+    """All digits of the second-order solution with the same modes; the exact ones by an integration of its own."""
+    case = CASES[name]
+    load = (case.force, case.moment, case.arm, case.follows)
+    exact, turned = tip_of(rigidities(*(x / 1e3 for x in case.section), E, case.nu), L, *load)
+    np.testing.assert_allclose(1e3 * exact, case.exact, atol=2e-7)
+    np.testing.assert_allclose(turned, case.exact_rotation, atol=2e-9)
+    u, phi = tip_at_rest(body(case.section, case.nu), *load)
+    np.testing.assert_allclose(1e3 * u, case.complete, atol=2e-7)
+    if name in ROTATIONS:
+        np.testing.assert_allclose(phi, ROTATIONS[name], atol=2e-9)
+
+
+@pytest.mark.parametrize("name", CHORD)
+def test_frame_along_the_chord(body, name):
+    """Simple supports: the frame turns with the ends of the link, and not about it at the root."""
+    case = CASES[name]
+    u, _ = tip_at_rest(body(case.section, case.nu, "simply-supported"), case.force, case.moment, case.arm)
+    np.testing.assert_allclose(1e3 * u, CHORD[name], atol=2e-5)  # of other modes: they differ in the fifth digit
+
+
+@pytest.mark.parametrize("condition", ["cantilever", "simply-supported"])
+@pytest.mark.parametrize("name", ["B", "C", "D", "F", "G", "H", "I"])
+def test_order_in_the_load(body, name, condition):
+    """What is left out is of third order: halved loads have an eighth of the error, in positions and rotations."""
+    case, errors = CASES[name], []
+    for size in (0.5, 0.25):
+        load = (size * np.array(case.force), size * np.array(case.moment), case.arm, case.follows)
+        exact = tip_of(rigidities(*(x / 1e3 for x in case.section), E, case.nu), L, *load)
+        found = tip_at_rest(body(case.section, case.nu, condition), *load)
+        errors.append([np.linalg.norm(a - b) for a, b in zip(found, exact, strict=True)])
+    assert np.all(np.log2(np.divide(*errors)) > 2.9)
