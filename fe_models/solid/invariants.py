@@ -65,15 +65,14 @@ def unit_loads(model: SolidModel, interfaces: Mapping[str, Array]) -> dict[str, 
     return loads
 
 
-def static_shapes(flexibility: Flexibility, interfaces: Mapping[str, Array]) -> dict[str, Array]:
+def static_shapes(flexibility: Flexibility, loads: Mapping[str, Array]) -> dict[str, Array]:
     """(3 owned,) displacements under each unit load, the body held by its reference condition; collective.
 
     Args:
         flexibility: of the held body.
-        interfaces: as in `unit_loads`.
+        loads: as `unit_loads` finds them.
     """
     model = flexibility.model
-    loads = unit_loads(model, interfaces)
     forces = np.stack(list(loads.values()), axis=1)
     displacements = flexibility @ forces
     # Bending stresses cancel over a section: the rounding errors of an assembled K, small as they are, would show.

@@ -30,11 +30,12 @@ from .elasticity import MaterialMap, SolidModel, material_map, solid_model
 from .families import section_motion
 from .fixed_interfaces import fixed_interfaces, ritz_modes
 from .functionals import Averages, face_averages, section_averages
-from .invariants import prestressed, shape_integrals, static_shapes
+from .invariants import prestressed, shape_integrals, static_shapes, unit_loads
 from .modes import wanted_modes
 from .stress import recovered_stresses
 from .supports import Flexibility, RigidFace
 from .surface_patches import outlined_patches
+from .turned_interfaces import without_their_turn
 
 Progress = Callable[[str], None]
 
@@ -116,7 +117,12 @@ def solid_modal_body(
     attached = lumps(link.interface, interfaces)
     integrals = with_lumped_masses(shape_integrals(model, X), attached)
     omega = np.sqrt(modes.omega2)
-    shapes = static_shapes(flexibility, places.rows)
+    loads = unit_loads(model, places.rows)
+    shapes = static_shapes(flexibility, loads)
+    supports = {} if link.coupling == "rigid" else HELD[link.reference.condition]
+    stiffness = without_their_turn(
+        prestressed(model, X, shapes), flexibility, loads, shapes, places.rows, interfaces, supports
+    )
     mesh = _picture(solid, model, seen)
     recovered = recovered_stresses(link, model, seen, with_lumped_loads(shapes, attached), mesh.points, path)
     return ModalBody(
@@ -132,7 +138,7 @@ def solid_modal_body(
         damping_of=link.damping.of,
         family=tuple(modes.families),
         residual=np.repeat([0, 1], [count, omega.size - count]),
-        geometric_stiffness=with_lumped_stiffness(prestressed(model, X, shapes), attached),
+        geometric_stiffness=with_lumped_stiffness(stiffness, attached),
         interfaces=interfaces,
         stations=_stations(link, sections, x, element, translation * signs, rotation * signs),
         mesh=mesh,
@@ -188,7 +194,7 @@ def _held(link: SolidLink, model: SolidModel, solid: SolidMesh, places: Places, 
         taken[own] = True
         supported = held.get(name, ()) if link.coupling == "rigid" else ()
         free = [component for component in range(6) if component not in supported]
-        faces.append(RigidFace(own, places.averages[name].centroid[0], free))
+        faces.append(RigidFace(name, own, places.averages[name].centroid[0], free))
     if link.coupling == "rigid":
         return Flexibility(model, faces, None)
     rows = [places.rows[name][list(components)] for name, components in held.items()]

@@ -36,11 +36,13 @@ class RigidFace:
     """A face that moves as a plate.
 
     Attributes:
+        name: of the interface.
         nodes: (f,) its nodes among this rank's own.
         centroid: (3,) in m.
         free: (k,) which of its translations (0 … 2) and rotations (3 … 5) no support holds.
     """
 
+    name: str
     nodes: Integers
     centroid: Array
     free: Sequence[int]
@@ -59,7 +61,7 @@ class Flexibility:
     """
 
     def __init__(self, model: SolidModel, faces: Sequence[RigidFace], B: Array | None) -> None:
-        self.model = model
+        self.model, self.faces = model, faces
         self.R = rigid_motions(model.x)
         self.B = B
         clamped = np.zeros((model.owned, 3), dtype=bool)
@@ -107,7 +109,7 @@ class Flexibility:
 
     def __matmul__(self, loads: Array) -> Array:
         """F f of loads (3 owned, k); collective."""
-        result: Array = self._projected(self._condensed_solve(self._projected_load(loads)))
+        result: Array = self._projected(self._condensed_solve(self.supported(loads)))
         return result
 
     @property
@@ -133,11 +135,15 @@ class Flexibility:
             return U
         return np.asarray(U - self.R @ (self._BR_inverse @ self.model.total(self.B @ U)))
 
-    def _projected_load(self, loads: Array) -> Array:
-        """Pᵀ f."""
+    def reactions(self, loads: Array) -> Array:
+        """(6, k) forces along the rows of B with which mean supports bear `loads` (3 owned, k); none of rigid faces."""
         if self.B is None:
-            return loads
-        return np.asarray(loads - self.B.T @ (self._BR_inverse.T @ self.model.total(self.R.T @ loads)))
+            return np.empty((0, loads.shape[1]))
+        return np.asarray(-self._BR_inverse.T @ self.model.total(self.R.T @ loads))
+
+    def supported(self, loads: Array) -> Array:
+        """Pᵀ f: `loads` with the forces of mean supports."""
+        return loads if self.B is None else np.asarray(loads + self.B.T @ self.reactions(loads))
 
     def _solve(self, loads: Array) -> Array:
         """K_0⁻¹ f, all columns at once: several times as fast as one by one."""
