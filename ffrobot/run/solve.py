@@ -180,7 +180,11 @@ def _run_all(solution: Solution, watcher: Watcher, interruption: Interruption) -
             return replace(solution, analyses=results, failure=error)
         changes = stiffness_changes(outcome, stiffening)
         automatic = solution.scene.geometric_stiffening == "auto" and not solution.stiffened
-        if automatic and max(changes.values(), default=0.0) > NOTABLE and outcome.status != "interrupted":
+        if (
+            automatic
+            and max((of.largest for of in changes.values()), default=0.0) > NOTABLE
+            and outcome.status != "interrupted"
+        ):
             return None
         voltages = {} if outcome.F_p is None else {
             body: solve_voltages(array, outcome.F_p[:, outcome.modal_columns(*array.carriers)])

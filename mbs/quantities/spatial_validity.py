@@ -11,6 +11,7 @@ from ...fe_models.modal_body import ModalBody
 from ..model.spatial_body import SpatialBody
 from .spatial_link_loads import loads_in_equations
 from .spatial_motion import SpatialMotion
+from .stiffness_change import StiffnessChange, stiffness_change
 from .validity import IN_SPACE, Bending, bending_of_link
 
 
@@ -21,23 +22,20 @@ def bending_in_space(motion: SpatialMotion, links: Mapping[str, ModalBody]) -> d
     for name, link in links.items():
         node, sizes = motion.node(name), loads[name].sizes if name in loads else {}
         p = motion.q[:, node.p_q] @ node.body.modal_transform.T
-        change = stiffness_change(link, node.body, sizes)
+        change = change_by_loads(link, node.body, sizes)
         force = _largest_force(node.body, sizes, len(p))
         found[name] = bending_of_link(link, p, force, change, node.body.stiffening is not None, IN_SPACE)
     return found
 
 
-def stiffness_change(link: ModalBody, body: SpatialBody, sizes: Mapping[str, Array]) -> float:
-    """Largest relative change of a mode's stiffness by loads of `sizes` (T,), whether it is in the equations or not.
+def change_by_loads(link: ModalBody, body: SpatialBody, sizes: Mapping[str, Array]) -> StiffnessChange:
+    """By loads of `sizes` (T,) on a body, whether it is in the equations or not.
 
-    Loads by the names of `fe_models.modal_body.unit_loads`; 0 by those of which the file has no geometric stiffness.
+    Loads by the names of `fe_models.modal_body.unit_loads`; none by those of which the file has no geometric stiffness.
     """
-    T = body.modal_transform
-    changes: Array = np.zeros((1, body.n_modes))
-    for load, K in link.geometric_stiffness.items():
-        if load in sizes:
-            changes = changes + np.outer(sizes[load], np.einsum("mi,mn,ni->i", T, K, T))
-    return float((np.abs(changes) / body.stiffness).max(initial=0.0))
+    T, known = body.modal_transform, [load for load in sizes if load in link.geometric_stiffness]
+    matrices = [T.T @ link.geometric_stiffness[load] @ T for load in known]
+    return stiffness_change([sizes[load] for load in known], matrices, body.stiffness)
 
 
 def _largest_force(body: SpatialBody, sizes: Mapping[str, Array], count: int) -> Array:

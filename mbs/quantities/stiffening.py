@@ -11,33 +11,35 @@ from ...common.plane import rotated
 from ..analysis.outcome import Outcome
 from ..model.geometric_stiffening import GeometricStiffening
 from ..model.planar_body import PlanarBody
+from .stiffness_change import StiffnessChange, stiffness_change
 
-NOTABLE = 0.01  # relative change of a mode's stiffness from which on the summary warns, and "auto" switches it on
+NOTABLE = 0.01  # relative change of a link's stiffness from which on the summary warns, and "auto" switches it on
 
 
-def stiffness_changes(outcome: Outcome, stiffening: Mapping[str, GeometricStiffening | None]) -> dict[str, float]:
-    """Largest relative change of a mode's stiffness by the loads of a run, by body, whether it was on or not.
+def stiffness_changes(
+    outcome: Outcome, stiffening: Mapping[str, GeometricStiffening | None]
+) -> dict[str, StiffnessChange]:
+    """By body, of the loads of a run, whether it was on or not.
 
     `stiffening` by the names of bodies; those without have no entry. Loads are those of θ̇², of the frame's acceleration
     less gravity, of θ̈, and of the constraints.
     """
     assembly, gravity = outcome.assembly, np.array(outcome.assembly.model.scene.gravity)
     wrenches = assembly.constraint_wrenches(outcome.q, outcome.lambda_)
-    changes = {}
+    changes: dict[str, StiffnessChange] = {}
     for body in assembly.model.bodies:
         known = stiffening.get(body.name)
         if known is None or not body.n_modes:
             continue
         columns = outcome.coordinates(body.name)
         q, v, a = outcome.q[:, columns], outcome.v[:, columns], outcome.a[:, columns]
-        diagonal = np.outer(v[:, 2] ** 2, np.diag(known.K_omega)) - np.outer(a[:, 2], np.diag(known.K_h))
         pull = rotated(-q[:, 2], gravity - a[:, :2])
-        diagonal += pull @ np.einsum("kii->ki", known.K_s)
+        sizes, K = [v[:, 2] ** 2, -a[:, 2], *pull.T], [known.K_omega, known.K_h, *known.K_s]
         for point, wrench in wrenches.get(body.name, {}).items():
             if point in known.K_points:
-                loads = np.column_stack([rotated(-q[:, 2], wrench[:, :2]), wrench[:, 2]])
-                diagonal += loads @ np.einsum("kii->ki", known.K_points[point])
-        changes[body.name] = float((np.abs(diagonal) / body.stiffness).max(initial=0.0))
+                sizes += [*rotated(-q[:, 2], wrench[:, :2]).T, wrench[:, 2]]
+                K += [*known.K_points[point]]
+        changes[body.name] = stiffness_change(sizes, K, body.stiffness)
     return changes
 
 

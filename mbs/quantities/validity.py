@@ -20,6 +20,7 @@ from ...fe_models.modal_body import ModalBody
 from ..analysis.outcome import Outcome
 from .observation import modes_of_file
 from .stiffening import NOTABLE
+from .stiffness_change import NO_CHANGE, StiffnessChange
 
 IN_PLANE, IN_SPACE = (1,), (1, 2)  # axes across a link along which it bends
 
@@ -43,11 +44,13 @@ class Bending:
         rotation: angle between a section's normal and the chord, rad.
         foreshortening: ½∫w'² dx over its length, in its own frame, m.
         foreshortening_moment: N·m, that times the largest force at an interface at the same time: what moments miss.
-        stiffness_change: of a mode by the loads of the run, relative; 0 where the modal body file does not tell.
+        stiffness_change: by the loads of the run, relative, of the shape where it is largest; 0 where the modal body
+            file does not tell.
         length: m, of the link.
         is_stiffened: whether geometric stiffening is in the equations.
         pieces: into how many it is divided; the values are then those of its worst piece.
         is_divisible: whether the scene lets it be divided.
+        buckling: how many times the loads under which the link buckles are reached, from 1 on.
     """
 
     deflection: float
@@ -59,6 +62,7 @@ class Bending:
     is_stiffened: bool
     pieces: int = 1
     is_divisible: bool = False
+    buckling: float = 0.0
 
     @property
     def shortening(self) -> float:
@@ -86,15 +90,17 @@ class Bending:
             self.deflection > DEFLECTION_LIMIT[self.is_stiffened]
             or self.shortening > SHORTENING_LIMIT[self.is_stiffened]
             or (not self.is_stiffened and self.stiffness_change > NOTABLE)
+            or self.buckling >= 1.0
         )
 
     @property
     def in_words(self) -> str:
         """What was measured."""
         stiffening = "with geometric stiffening" if self.is_stiffened else "geometric stiffening is off"
+        times = f" and are {self.buckling:.3g} times those under which it buckles" if self.buckling >= 1.0 else ""
         return (
-            f"bends by {_percent(self.deflection)} of its length, loads change a mode's stiffness by"
-            f" {_percent(self.stiffness_change)} ({stiffening})"
+            f"bends by {_percent(self.deflection)} of its length, loads change its stiffness by"
+            f" {_percent(self.stiffness_change)}{times} ({stiffening})"
         )
 
     @property
@@ -128,7 +134,10 @@ def enough_pieces(shortening: float, count: int) -> int:
 
 
 def bending(
-    outcome: Outcome, links: Mapping[str, ModalBody], stiffness_changes: Mapping[str, float], is_stiffened: bool
+    outcome: Outcome,
+    links: Mapping[str, ModalBody],
+    stiffness_changes: Mapping[str, StiffnessChange],
+    is_stiffened: bool,
 ) -> dict[str, Bending]:
     """Of the flexible `links` of a run, by name. They are modal bodies as their files have them."""
     wrenches = outcome.assembly.constraint_wrenches(outcome.q, outcome.lambda_)
@@ -137,12 +146,12 @@ def bending(
         p = modes_of_file(outcome, outcome.assembly.model.body(name))
         forces = [np.linalg.norm(w[:, :2], axis=1) for w in wrenches.get(name, {}).values()]
         force = np.max(forces, axis=0) if forces else np.zeros(len(p))
-        found[name] = bending_of_link(link, p, force, stiffness_changes.get(name, 0.0), is_stiffened, IN_PLANE)
+        found[name] = bending_of_link(link, p, force, stiffness_changes.get(name, NO_CHANGE), is_stiffened, IN_PLANE)
     return found
 
 
 def bending_of_link(
-    link: ModalBody, p: Array, force: Array, change: float, is_stiffened: bool, axes: Sequence[int]
+    link: ModalBody, p: Array, force: Array, change: StiffnessChange, is_stiffened: bool, axes: Sequence[int]
 ) -> Bending:
     """Of one link of modal coordinates p (T, n) of its file, across along `axes`; see `Bending`.
 
@@ -151,7 +160,7 @@ def bending_of_link(
     deflection, rotation, shortening = shape_from_chord(link, p, axes)
     peaks = (deflection / link.length, rotation, shortening, force * shortening)
     w, phi, s, moment = (float(x.max(initial=0.0)) for x in peaks)
-    return Bending(w, phi, s, moment, change, link.length, is_stiffened)
+    return Bending(w, phi, s, moment, change.largest, link.length, is_stiffened, buckling=change.buckling)
 
 
 def shape_from_chord(link: ModalBody, p: Array, axes: Sequence[int]) -> tuple[Array, Array, Array]:
