@@ -4,16 +4,21 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterator
-from types import CodeType
+from types import CodeType, ModuleType
 from typing import Any
 
 import numpy as np
+
+from .python_files import own_file, sha256_of
 
 DEPTH = 6  # of functions in functions, lists in lists
 
 
 def digest_of_function(function: object) -> str:
-    """Of code, constants, defaults, enclosed and global values that it uses; of objects that can be called, theirs."""
+    """Of code, constants, defaults, enclosed and global values that it uses; of objects that can be called, theirs.
+
+    Of the user's own modules that it names, of their files.
+    """
     digest = hashlib.sha256()
     for part in _parts(function, DEPTH):
         digest.update(part + b"\0")
@@ -40,9 +45,13 @@ def _parts(value: Any, depth: int) -> Iterator[bytes]:  # noqa: ANN401 (whatever
     elif hasattr(value, "__wrapped__") or hasattr(value, "func"):  # compiled by numba, functools.partial
         for name in ("__wrapped__", "func", "args", "keywords"):
             yield from _parts(getattr(value, name, None), depth - 1)
-    else:  # an object that can be called, or a module: by its name and what it holds
+    elif isinstance(value, ModuleType):
+        yield value.__name__.encode()
+        if (file := own_file(value)) is not None:
+            yield sha256_of(file).encode()
+    else:  # an object that can be called: by its name and what it holds
         yield f"{type(value).__module__}.{type(value).__qualname__}".encode()
-        if type(value).__name__ not in ("module", "type", "builtin_function_or_method"):
+        if type(value).__name__ not in ("type", "builtin_function_or_method"):
             yield from _parts(getattr(type(value).__call__, "__func__", type(value).__call__), depth - 1)
             yield from _parts(getattr(value, "__dict__", None), depth - 1)
 

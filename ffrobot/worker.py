@@ -3,7 +3,8 @@
 It loads the program once, and forks for every scene: what a run does to its process (a crash, memory, the folder it is
 in, modules and caches that a scene's Python functions leave) ends with that run, and a run finds what one of
 `ffrobot solve` finds. Requests and answers are lines of JSON on the standard streams, `{"arguments": ["solve", …]}` and
-`{"code": 0}`, the exit code as `subprocess` has it. What runs print on the error stream goes where this process's does.
+`{"code": 0, "imported": {}}`, the exit code as `subprocess` has it and the run's `python_files.imported_files`. What
+runs print on the error stream goes where this process's does.
 """
 
 from __future__ import annotations
@@ -19,10 +20,12 @@ import warnings
 from collections.abc import Sequence
 from contextlib import suppress
 from importlib import import_module
+from tempfile import TemporaryFile
 from types import FrameType
-from typing import BinaryIO, NoReturn
+from typing import Any, BinaryIO, NoReturn
 
 from .common.interrupts import SIGNALS, EndOfCommand
+from .common.python_files import imported_files
 from .common.validation import USED
 
 LOADED = (  # by every run; what else a run has loaded, the next one finds
@@ -31,28 +34,35 @@ LOADED = (  # by every run; what else a run has loaded, the next one finds
     "ffrobot.scene.spatial",
 )  # fmt: skip
 KEPT = ("ffrobot.", "scipy.")  # packages of which the next run finds what one has loaded
-PIPE = 1 << 15  # bytes that a pipe takes without a reader
 
 
 def main() -> None:
     """Answer requests until there are no more, or SIGTERM, which the run under way has first."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # of a terminal: runs have it, whoever asks for them decides
     requests, answers = _private_streams()
+    report = TemporaryFile()  # noqa: SIM115 (as long as the worker)
     _load(LOADED)
     for line in requests:
-        names, report = os.pipe()
+        report.truncate(0)
+        report.seek(0)
         child = _fork()
         if child == 0:
             for stream in (requests, answers):  # of a worker that dies nothing may stay open
                 stream.close()
-            os.close(names)
             _run(json.loads(line)["arguments"], report)
-        os.close(report)
-        code = _wait(child)
-        answers.write(json.dumps({"code": code}).encode() + b"\n")
+        code, told = _wait(child), _told(report)
+        answers.write(json.dumps({"code": code, "imported": told.get("imported", {})}).encode() + b"\n")
         answers.flush()
-        with open(names, "rb") as stream:
-            _load(stream.read().decode().split())
+        _load(told.get("loaded", []))
+
+
+def _told(report: BinaryIO) -> dict[str, Any]:
+    """What a run has left in `report`: nothing where it was killed, or the disk is full."""
+    report.seek(0)
+    with suppress(ValueError):
+        told: dict[str, Any] = json.loads(report.read())
+        return told
+    return {}
 
 
 def _wait(child: int) -> int:
@@ -69,8 +79,8 @@ def _wait(child: int) -> int:
     return code
 
 
-def _run(arguments: Sequence[str], report: int) -> NoReturn:
-    """`ffrobot ARGUMENTS` in the process of one run, which ends with it; what it has loaded is told on `report`."""
+def _run(arguments: Sequence[str], report: BinaryIO) -> NoReturn:
+    """`ffrobot ARGUMENTS` in the process of one run, which ends with it; what it has loaded it writes to `report`."""
     _end_with_parent()
     for number in SIGNALS:
         signal.signal(number, EndOfCommand())
@@ -88,7 +98,10 @@ def _run(arguments: Sequence[str], report: int) -> NoReturn:
     loaded = set(sys.modules) - before
     names = sorted(name for name in loaded if name.startswith(KEPT))
     names += [f"{record.__module__}:{record.__qualname__}" for record in USED]
-    os.write(report, " ".join(names).encode()[:PIPE])
+    imported = {str(file): digest for file, digest in imported_files().items()}
+    with suppress(OSError):
+        report.write(json.dumps({"loaded": names, "imported": imported}).encode())
+        report.flush()
     if "mpi4py.MPI" in loaded:  # it has to be finished where it was begun
         sys.exit(code)
     atexit._run_exitfuncs()

@@ -57,7 +57,8 @@ def make_controller(record: Record, setup: Setup, beside: Sequence[Record]) -> C
 
         return LqrControl(record, setup, [other for other in beside if isinstance(other, JointPid)])
     label = f"{setup.robot.path}: controller: {record.python}"
-    function = load_function(record.python) if isinstance(record.python, str) else record.python
+    folder = setup.robot.path.parent
+    function = load_function(record.python, folder) if isinstance(record.python, str) else record.python
     return PythonControl(function, setup, label)
 
 

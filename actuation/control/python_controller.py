@@ -25,6 +25,7 @@ import numpy as np
 
 from ...common.arrays import Array
 from ...common.errors import InputError, SolveError
+from ...common.python_files import count_failed, count_imports, imported_files
 from .controllers import Setup
 
 
@@ -58,17 +59,25 @@ class PythonControl:
 
 def _in_words(error: BaseException) -> str:
     """What the user's code has raised, and in which line."""
+    count_failed(error)
     last = traceback.extract_tb(error.__traceback__)[-1]
     return f"{type(error).__name__}: {error} (line {last.lineno} of {Path(last.filename).name}, in {last.name})"
 
 
-def load_function(reference: str) -> Callable[[Setup], Callable[[int, Array], Array]]:
-    """The function of "FILE.py:FUNCTION". Raises `InputError` where the file fails or does not have it."""
+def load_function(reference: str, folder: Path) -> Callable[[Setup], Callable[[int, Array], Array]]:
+    """The function of "FILE.py:FUNCTION" of a scene in `folder`.
+
+    What the file imports from below there counts among `python_files.imported_files`. Raises `InputError` where the
+    file fails or does not have the function.
+    """
     path, _, name = reference.rpartition(":")
+    count_imports(folder, Path(path).parent)
     try:
         found = runpy.run_path(path)
     except (Exception, SystemExit) as error:
         raise InputError(f"{path}: controller: {_in_words(error)}") from error
+    finally:
+        imported_files()  # as they are now
     if not callable(found.get(name)):
         raise InputError(f'{path}: controller: expected the function "{name}", found none')
     function: Callable[[Setup], Callable[[int, Array], Array]] = found[name]

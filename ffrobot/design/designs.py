@@ -103,7 +103,9 @@ class Designs:
         Raises `InputError` where the scene or its files are others than at first.
         """
         claim_folder(self._sweep)
-        if what := changed(self._inputs, _digests(self._sweep.scene)):
+        imported = {name: one.row.inputs[name] for one in self._designs.values() for name in one.row.imported}
+        now = _digests(self._sweep.scene) | {name: digest_of_file(Path(name)) for name in imported}
+        if what := changed(self._inputs | imported, now):
             raise InputError(f"{self._sweep.folder}: {' and '.join(what)} changed while designs were run")
         wanted, folders = self._lot(points, changes), self.folders(points, changes)
         new = {folder: point for folder, point in zip(folders, points, strict=True) if folder not in self._designs}

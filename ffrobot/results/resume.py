@@ -26,7 +26,7 @@ from ..run.solve import Keep, run_analyses
 from ..run.watcher import Watcher
 from ..scene.scene import Scene
 from .file import Results
-from .same_input import check_same_input, input_files
+from .same_input import check_same_input, write_input_files
 from .stopped import GROUP, STOPPED, analyses, is_kept, row_of_numbers
 from .tree_checkpoint import read_tree_checkpoint, write_tree_checkpoint
 
@@ -59,7 +59,7 @@ def resume(
 
 def write_state(file: h5py.File, solution: Solution) -> None:
     """Add to a results file, where the run was stopped, what `resume` needs."""
-    file.attrs["input_files"] = json.dumps(input_files(solution.scene))
+    write_input_files(file, solution.scene)
     for name, outcome in solution.outcomes.items() if is_kept(solution) else ():
         if goes_on(solution, outcome):
             _write_outcome(file[name].create_group(GROUP), outcome.computed)

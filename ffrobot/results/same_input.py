@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import json
+import os
 import tomllib
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+import h5py
+
 from ..common.errors import InputError
+from ..common.python_files import allowed_python, imported_files
 from ..common.tables import key_path
 from ..common.version import program_version
-from ..run.inputs import digest_of_file, named_files
+from ..run.inputs import digest_of_file, named_files, python_files
 from ..run.loaded_body import Loaded
 from ..scene.any_space import AnyScene
 from .file import Results
@@ -43,6 +47,9 @@ def _changes(scene: AnyScene, bodies: Mapping[str, Loaded], file: Results) -> It
     for name, digest in input_files(scene).items():
         if files.get(name) != digest:
             yield name
+    for name, digest in json.loads(file.attributes("/").get("imported_files", "{}")).items():
+        if digest_of_file(scene.path.parent / name) != digest:
+            yield f"the file {name}, which a Python file imports,"
 
 
 def _without_limits(scene: Mapping[str, Any]) -> dict[str, Any]:
@@ -62,6 +69,16 @@ def _first_difference(then: object, now: object, loc: tuple[int | str, ...] = ()
         return loc
     found = (_first_difference(old, new, (*loc, key)) for key, old, new in inner)
     return next((place for place in found if place is not None), loc)
+
+
+def write_input_files(file: h5py.File, scene: AnyScene) -> None:
+    """Attributes `input_files`, and `imported_files` where the scene runs Python files: names from its folder on."""
+    file.attrs["input_files"] = json.dumps(input_files(scene))
+    folder = scene.path.parent
+    if python := python_files(tomllib.loads(scene.text), folder):
+        found = imported_files(folder, *(file.parent for file in python), *allowed_python())
+        names = {os.path.relpath(file, folder.resolve()): digest for file, digest in found.items()}
+        file.attrs["imported_files"] = json.dumps(names)
 
 
 def input_files(scene: AnyScene) -> dict[str, str]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -22,7 +21,7 @@ from ..run.spatial_solution import SpatialSolution
 from ..run.watcher import Watcher
 from ..scene.spatial import SpatialScene
 from .file import Results
-from .same_input import check_same_input, input_files
+from .same_input import check_same_input, write_input_files
 from .stopped import GROUP, STOPPED, analyses, is_kept
 from .tree_checkpoint import read_tree_checkpoint, write_tree_checkpoint
 
@@ -54,7 +53,7 @@ def resume_spatial(
 
 def write_state_in_space(file: h5py.File, solution: SpatialSolution) -> None:
     """Add to a results file, where the run was stopped, what `resume_spatial` needs."""
-    file.attrs["input_files"] = json.dumps(input_files(solution.scene))
+    write_input_files(file, solution.scene)
     for name, run in solution.outcomes.items() if is_kept(solution) else ():
         if goes_on(solution, run) and run.checkpoint is not None:
             _write_run(file[name].create_group(GROUP), run, run.checkpoint)

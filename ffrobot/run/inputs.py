@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from ..common.errors import InputError
+from ..common.python_files import sha256_of
 from ..common.toml_files import parse_toml, read_text
 from ..common.version import program_version
 
@@ -36,6 +37,11 @@ def _named(data: Any, folder: Path) -> Iterator[tuple[str, Path]]:  # noqa: ANN4
             yield from _named(value, folder)
         elif key in FILE_KEYS and isinstance(value, str):
             yield key, folder / (value.rpartition(":")[0] if key == "python" else value)
+
+
+def python_files(tables: Mapping[str, Any], folder: Path) -> list[Path]:
+    """The Python files that the tables of a scene in `folder` name."""
+    return [file for key, file in _named(dict(tables), folder) if key == "python"]
 
 
 def read_tables(path: Path) -> dict[str, Any]:
@@ -75,10 +81,7 @@ def digest_of_file(path: Path) -> str:
     """SHA-256 of a file's content; "" where it cannot be read."""
     if path.suffix == ".toml" and (tables := read_tables(path)):
         return digest_of_tables(tables)
-    try:
-        return hashlib.sha256(path.read_bytes()).hexdigest()
-    except (OSError, ValueError):  # the latter where it is no name of a file
-        return ""
+    return sha256_of(path)
 
 
 def changed(then: Mapping[str, str], now: Mapping[str, str]) -> list[str]:

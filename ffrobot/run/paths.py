@@ -58,7 +58,7 @@ def _shaped(scene: AnyScene, frequencies: Frequencies) -> tuple[AnyScene, Notes]
     begin, end = _span(scene)
     found = frequencies(begin, end, max(shaper.modes for shaper in asking.values()))
     shapers: Mapping[str, Shaper] = {name: _for_robot(shaper, found) for name, shaper in asking.items()}
-    changed = [one.changed(shaper=shapers.get(one.name, one.shaper)) for one in scene.trajectory]
+    changed = [one.changed(shaper=shapers[one.name]) if one.name in shapers else one for one in scene.trajectory]
     notes = tuple(f"{name}: {_in_words(shaper, found)}" for name, shaper in asking.items())
     return scene.model_copy(update={"trajectory": tuple(changed)}), notes
 

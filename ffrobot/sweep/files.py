@@ -12,6 +12,8 @@ import tomli_w
 
 from ..common.errors import InputError
 from ..common.files import write_atomically
+from ..common.names import check_name
+from ..common.tables import shown
 from ..common.toml_files import load_toml
 from ..common.validation import did_you_mean, quoted
 from ..run.inputs import FILE_KEYS, digest_of_file, fingerprints, named_files
@@ -61,7 +63,7 @@ def run_files(scene_path: Path, changes: Mapping[tuple[str, ...], Value], folder
     inputs = fingerprints(scene, scene_path.absolute())
     copies = {}
     for body, link in links.items():
-        path = (folder / f"{body}.toml").absolute()
+        path = (folder / f"{body}.link.toml").absolute()  # no name of a body has a dot: none meets another file
         origin = Path(_body(scene, body)["link"])
         inputs |= {str(path): digest_of_file(path) for path in named_files(link, origin.parent)}
         copies[path] = link
@@ -120,6 +122,10 @@ def _link_of(
             f' ({quoted(with_links)}), found "{found}"' + (did_you_mean(key[1], with_links) if len(key) > 1 else "")
         )
     if key[1] not in links:
+        try:
+            check_name(key[1])  # before a file gets it
+        except ValueError as error:
+            raise InputError(f'{scene_path}: body "{shown(key[1])}": name: {error}') from None
         link = _body(scene, key[1])["link"]
         if isinstance(link, dict):
             return link
@@ -130,7 +136,10 @@ def _link_of(
 
 
 def _body(scene: Table, name: str) -> Table:
-    return next(body for body in _bodies(scene) if body["name"] == name)
+    found = next((body for body in _bodies(scene) if body["name"] == name), None)
+    if found is None:
+        raise InputError(f'--vary: expected no other name of the body "{shown(name)}" beside {LINKS}.{shown(name)}')
+    return found
 
 
 def _bodies(scene: Table) -> list[Table]:

@@ -17,6 +17,7 @@ from ..common.arrays import Array
 from ..common.errors import InputError
 from ..common.files import write_atomically
 from ..results.file import Results
+from ..run.inputs import changed, digest_of_file
 from .files import SCENE
 from .workers import Workers
 
@@ -56,7 +57,8 @@ class Run:
 class Row:
     """What a run left: `status` is "completed", "wrong input", "failed" or "crashed", with the program's message.
 
-    `inputs` are the fingerprints of what it was made from: see `run.inputs`.
+    `inputs` are the fingerprints of what it was made from: see `run.inputs`; among them those of the files `imported`
+    by the scene's Python files, which nobody knows before the run.
     """
 
     number: int
@@ -65,6 +67,11 @@ class Row:
     message: str = ""
     quantities: dict[str, float] = field(default_factory=dict)
     inputs: dict[str, str] = field(default_factory=dict)
+    imported: tuple[str, ...] = ()
+
+    def changes(self, inputs: Mapping[str, str]) -> list[str]:
+        """What differs from the `inputs` of the same run now, by name: see `run.inputs.changed`."""
+        return changed(self.inputs, {**inputs, **{name: digest_of_file(Path(name)) for name in self.imported}})
 
 
 def perform(run: Run, workers: Workers) -> Row | None:
@@ -73,13 +80,13 @@ def perform(run: Run, workers: Workers) -> Row | None:
     arguments = ["solve", str(run.folder / SCENE), "-o", str(results)]
     arguments += [f"--allow-python={path}" for path in run.allow_python]
     results.unlink(missing_ok=True)  # of other input, maybe
-    code, told = workers.perform(arguments)
+    code, told, imported = workers.perform(arguments)
     if code in STOPPED:
         return None
     status = {0: "completed", 1: "failed", 2: "wrong input"}.get(code, "crashed")
     message = "" if code == 0 else _last_message(told, run.folder) or _ended(code)
     quantities = _quantities(results, run.collect) if results.exists() else {}
-    return Row(run.number, run.values, status, message, quantities, run.inputs)
+    return Row(run.number, run.values, status, message, quantities, run.inputs | imported, tuple(imported))
 
 
 _of_process = Workers()
@@ -99,7 +106,7 @@ def finished_row(folder: Path) -> Row | None:
     """The row that an earlier run left in `folder`, if it came to its end and can be read."""
     with suppress(OSError, ValueError, TypeError, KeyError, RecursionError):
         data = json.loads((folder / ROW).read_text(encoding="utf-8"))
-        return Row(**(data | {"values": tuple(data["values"])}))
+        return Row(**(data | {key: tuple(data.get(key, ())) for key in ("values", "imported")}))
     return None
 
 

@@ -17,7 +17,7 @@ from ..common.errors import InputError, StoppedError
 from ..common.files import check_folder, write_atomically
 from ..common.parallel import is_first, processes
 from ..common.python_files import allowed_python, python_allowed
-from ..run.inputs import PROGRAM, changed
+from ..run.inputs import PROGRAM
 from ..run.watcher import Watcher
 from .files import SCENE, RunFiles, run_files
 from .runs import RESULTS, ROW, Row, Run, collected, finished_row, keep_row, perform, perform_under_mpi
@@ -137,7 +137,7 @@ def run_sweep(sweep: Sweep, side_by_side: int, watcher: Watcher, workers: Worker
             if row is None:
                 raise StoppedError(f"{sweep.folder}: stopped; the same command takes it up again", signal.SIGINT)
             run = waiting[row.number]
-            if what := changed(row.inputs, _files(sweep, run).inputs):
+            if what := row.changes(_files(sweep, run).inputs):
                 raise InputError(
                     f"{sweep.folder}: {' and '.join(what)} changed while the sweep ran, and the runs under way with it;"
                     " the same command takes it up again, and computes what is out of date"
@@ -155,7 +155,7 @@ def stale_rows(sweep: Sweep) -> str:
     count = 0
     for run in sweep.runs:
         row = finished_row(run.folder)
-        if row is None or not (what := changed(row.inputs, _files(sweep, run).inputs)):
+        if row is None or not (what := row.changes(_files(sweep, run).inputs)):
             continue
         stale |= dict.fromkeys(what if row.inputs else [PROGRAM])
         count += 1
@@ -169,7 +169,7 @@ def _rows_and_runs(sweep: Sweep) -> tuple[dict[int, Row], dict[int, Run]]:
     rows, waiting = {}, {}
     for run in sweep.runs:
         files, row = _files(sweep, run), finished_row(run.folder)
-        if row is not None and row.inputs == files.inputs and _is_whole(sweep, run, row):
+        if row is not None and not row.changes(files.inputs) and _is_whole(sweep, run, row):
             rows[run.number] = replace(row, number=run.number, values=run.values)
         else:
             files.write(run.folder)

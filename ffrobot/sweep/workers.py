@@ -11,6 +11,7 @@ from pathlib import Path
 from subprocess import PIPE, Popen
 from tempfile import TemporaryFile
 from threading import Lock
+from typing import Any, NamedTuple
 
 from ..common.parallel import environment_without_mpi
 
@@ -21,6 +22,14 @@ ALONE = {
     "OMPI_MCA_btl": "self",
     "OMPI_MCA_ess_singleton_isolated": "1",  # nor a daemon
 }
+
+
+class Done(NamedTuple):
+    """Of a run: exit code, error messages, SHA-256 of the modules that the scene's Python files imported, by file."""
+
+    code: int
+    messages: str
+    imported: dict[str, str]
 
 
 class Worker:
@@ -36,17 +45,18 @@ class Worker:
         assert self._process.stdout is not None
         self._requests, self._answers = self._process.stdin, self._process.stdout
 
-    def perform(self, arguments: list[str]) -> tuple[int, str]:
-        """Exit code and error messages of `ffrobot ARGUMENTS`; those of the worker where it ends with the run."""
+    def perform(self, arguments: list[str]) -> Done:
+        """`ffrobot ARGUMENTS`; exit code and messages are those of the worker where it ends with the run."""
         self._told.truncate(0)
         answer = b""
         with suppress(BrokenPipeError):
             self._requests.write(json.dumps({"arguments": arguments}).encode() + b"\n")
             self._requests.flush()
             answer = self._answers.readline()
-        code = json.loads(answer)["code"] if answer.endswith(b"\n") else self._process.wait()
+        found: dict[str, Any] = json.loads(answer) if answer.endswith(b"\n") else {}
+        code = int(found["code"]) if found else self._process.wait()
         self._told.seek(0)
-        return code, self._told.read().decode(errors="replace")
+        return Done(code, self._told.read().decode(errors="replace"), found.get("imported", {}))
 
     @property
     def is_alive(self) -> bool:
@@ -75,7 +85,7 @@ class Workers:
         self._lock = Lock()
         weakref.finalize(self, _close, self._idle)
 
-    def perform(self, arguments: list[str]) -> tuple[int, str]:
+    def perform(self, arguments: list[str]) -> Done:
         """As `Worker.perform`, by any of them; from several threads at once."""
         worker = self._take()
         try:

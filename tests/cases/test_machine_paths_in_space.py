@@ -51,6 +51,21 @@ def joints(**keys):
     return [{"name": joint, "joint": joint, "via": places, **keys} for joint, places in TURNS.items()]
 
 
+@pytest.mark.parametrize("held", [{"value": "60*deg"}, {"waypoints": "constant.csv"}])
+def test_a_shaper_that_asks_the_robot_beside_a_held_joint(held, tmp_path):
+    """In the plane as in space: the motion is over half a period of the frequency later (a ZV shaper)."""
+    (tmp_path / "constant.csv").write_text(f"t,value\n0,{np.pi / 3!r}\n1,{np.pi / 3!r}\n", encoding="utf-8")
+    moved = {"name": "O", "joint": "O", "via": [0.0, "20*deg"], "duration": 0.2, "shaper": {"kind": "zv"}}
+    plane, space = both([moved, {"name": "A", "joint": "A", **held}], tmp_path)
+    with plane, space:
+        same(plane, space, [moved])
+        kept = plane["inverse/joints/A/coordinate"]
+        np.testing.assert_allclose(kept, np.pi / 3, rtol=0, atol=1e-9)
+        about = plane.attributes("inverse/trajectories/O")
+        (frequency,) = about["shaper_frequency"]
+        assert about["end"] - about["begin"] == pytest.approx(0.2 + 0.5 / frequency, rel=1e-3)  # half a period later
+
+
 @pytest.mark.parametrize(
     "keys",
     [

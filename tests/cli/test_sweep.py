@@ -206,3 +206,36 @@ def test_stopped_runs_leave_no_row(ffrobot, short_scene):
     _, message = process.communicate(timeout=30)
     assert process.returncode == 143, message
     assert list(runs.glob("*/row.json")) == []
+
+
+@pytest.mark.parametrize("command", ["sweep", "sensitivity", "uncertainty", "optimise"])
+def test_bodies_named_like_paths_write_nothing(ffrobot, short_scene, tmp_path, command):
+    """The file that the name leads to stays, and none is made."""
+    precious = tmp_path / "precious.toml"
+    precious.write_text("mine = 1\n", encoding="utf-8")
+    name = str(precious.with_suffix(""))
+    scene = tomllib.loads(short_scene.read_text(encoding="utf-8"))
+    next(body for body in scene["body"] if body["name"] == "rod")["name"] = name
+    short_scene.write_text(tomli_w.dumps(scene), encoding="utf-8")
+    key = f"links.{name}.damping.ratio"
+    of = ["peak joints.crank.moment"] if command != "sweep" else []
+    arguments = {
+        "sweep": ["--vary", f"{key}=0.01,0.02"],
+        "sensitivity": ["--of", *of, "--to", key],
+        "uncertainty": ["--of", *of, "--spread", f"{key}=normal(0.01, 0.001)"],
+        "optimise": ["--minimise", *of, "--vary", f"{key}=0.01:0.02"],
+    }[command]
+    before = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
+    done = ffrobot(command, short_scene, *arguments)
+    assert done.returncode == 2, done.stderr
+    assert 'expected a name without "/"' in done.stderr
+    assert {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()} == before
+
+
+def test_a_body_named_scene_has_its_own_file(ffrobot, short_scene):
+    """In the folder of a run, where the scene has one of this name."""
+    text = short_scene.read_text(encoding="utf-8").replace('"rod', '"scene').replace("rod = ", "scene = ")
+    short_scene.write_text(text.replace('link = "scene.toml"', 'link = "rod.toml"'), encoding="utf-8")
+    done = ffrobot("sweep", short_scene, "--vary", HEIGHTS.replace("links.rod", "links.scene"))
+    assert done.returncode == 0, done.stderr
+    assert [row["status"] for row in table(short_scene)] == ["completed"] * 3

@@ -117,3 +117,21 @@ def test_what_is_refused(changes, expected, tmp_path, ffrobot):
     assert done.returncode == 2
     assert expected in re.sub(r"\s+", " ", done.stderr)
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("name", ["a\n[[load]]\nx.toml", "../outside", "scene", "\u2028a"])
+def test_links_of_any_name_get_files_of_their_own_in_the_folder(name, tmp_path, ffrobot):
+    """Both files are what they are without such names, but for names: no line of one is read as a key."""
+    assert import_with(ffrobot, tmp_path).returncode == 0
+    plain = {path.name: tomllib.loads(path.read_text(encoding="utf-8")) for path in (tmp_path / "out").iterdir()}
+    (tmp_path / "arm.urdf").write_text(ARM.replace('"upper"', f'"{name}"'.replace("\n", "&#10;")), encoding="utf-8")
+    done = ffrobot("import", "arm.urdf", "-o", "other", "--flexible", f"{name}=bar.toml", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert {path.name for path in tmp_path.iterdir()} == {"arm.urdf", "bar.toml", "out", "other"}
+    found = {path.name: tomllib.loads(path.read_text(encoding="utf-8")) for path in (tmp_path / "other").iterdir()}
+    (link,) = (value for key, value in found.items() if key != "scene.toml")
+    assert {key: link[key] for key in link if key != "name"} == {
+        key: value for key, value in plain["upper.toml"].items() if key != "name"
+    }
+    assert found["scene.toml"].keys() == plain["scene.toml"].keys()
+    assert len(found["scene.toml"]["body"]) == len(plain["scene.toml"]["body"])

@@ -51,8 +51,8 @@ class FlexibleLink:
     remarks: tuple[str, ...]
 
 
-def flexible_link(robot: Robot, name: str, source: Path, folder: Path) -> FlexibleLink:
-    """The link `name` from the link file at `source`, for a scene in `folder`.
+def flexible_link(robot: Robot, name: str, source: Path, folder: Path, stem: str) -> FlexibleLink:
+    """The link `name` from the link file at `source`, for a scene in `folder`, where its file is `stem`.toml.
 
     Raises:
         InputError: there is no such link or file, a joint is off the axis of a beam, the file has another length.
@@ -70,10 +70,10 @@ def flexible_link(robot: Robot, name: str, source: Path, folder: Path) -> Flexib
     place = Place(np.zeros(3), axes.T)
     remarks = list[str]()
     length = _set_length(geometry, tip, name, source, remarks)
-    keys["name"] = str(keys.get("name", name))
+    keys["name"] = str(keys.get("name", stem))
     part = _place_part(geometry, axes, source, remarks)
     point_of = _interfaces(keys, beyond, tip, place, length, f"{source}: link {shown(name)}")
-    file_name = f"{Names()[name]}.toml"
+    file_name = f"{stem}.toml"
     read_link(LinkTable(keys, folder / file_name))
     if part is not None:  # only now: the check above cannot go up from a folder that is not there yet
         geometry["file"] = os.path.relpath(part, folder.resolve())

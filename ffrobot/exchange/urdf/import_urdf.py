@@ -12,6 +12,7 @@ from ...common.files import check_folder, write_atomically
 from .bodies import mechanism
 from .flexible import FlexibleLink, flexible_link
 from .meshes import MeshMass, mesh_masses
+from .names import Names
 from .read import read_urdf
 from .robot import Robot
 from .scale import remarks_on_scale
@@ -65,7 +66,8 @@ def import_urdf(urdf: Path, folder: Path, flexible: Mapping[str, Path], *, force
         SolveError: a file cannot be written.
     """
     robot = read_urdf(urdf)
-    links = {name: flexible_link(robot, name, source, folder) for name, source in flexible.items()}
+    stems = Names([Path(SCENE).stem])
+    links = {name: flexible_link(robot, name, source, folder, stems[name]) for name, source in flexible.items()}
     try:
         scene = SceneOfRobot(robot, mechanism(robot, {name: link.place for name, link in links.items()}), links)
     except InputError as error:
@@ -86,19 +88,22 @@ def _remarks_on_links(links: Mapping[str, FlexibleLink]) -> Iterator[str]:
 
 def _scene_text(urdf: Path, keys: Mapping[str, Any], remarks: list[str]) -> str:
     head = [
-        f"# From {urdf.name} by `ffrobot import`. Each link is rigid, as its <inertial> says, unless it names a file."
+        f"From {urdf.name} by `ffrobot import`. Each link is rigid, as its <inertial> says, unless it names a file.",
+        *(f"* {remark}" for remark in remarks),
     ]
-    head += [f"# * {remark}" for remark in remarks]
     joint = next((entry["name"] for entry in keys["joint"] if entry["type"] in ("revolute", "prismatic")), "JOINT")
     tail = TO_BE_APPENDED.format(joint=joint)
-    return "\n".join(head) + "\n\n" + toml_text(keys) + "\n" + tail
+    return "\n".join(map(_comment, head)) + "\n\n" + toml_text(keys) + "\n" + tail
+
+
+def _comment(text: str) -> str:
+    """A comment of one line, whatever names in `text` hold."""
+    return "# " + "".join(c if c.isprintable() else "_" for c in text)
 
 
 def _link_text(urdf: Path, link: FlexibleLink) -> str:
-    head = (
-        f'# Link "{link.name}" of {urdf.name}: x from the joint that carries it to the next, y in its plane of swing.'
-    )
-    return f"{head}\n\n{toml_text(link.keys)}"
+    head = f'Link "{link.name}" of {urdf.name}: x from the joint that carries it to the next, y in its plane of swing.'
+    return f"{_comment(head)}\n\n{toml_text(link.keys)}"
 
 
 def _write(folder: Path, files: Mapping[str, str], *, force: bool) -> tuple[Path, ...]:
