@@ -17,12 +17,14 @@ import tempfile
 import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from errno import ENOSPC
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from platformdirs import user_cache_path
 
+from ..common.errors import SolveError
 from ..common.locks import held, is_running, this_process
 
 if TYPE_CHECKING:
@@ -31,6 +33,8 @@ if TYPE_CHECKING:
 READY = ".c.cached"  # FFCx writes it last
 CHECKSUMS = "checksums.json"
 OWN = ".of-"  # begins the names of folders of single processes
+ROOM = 32 << 20  # bytes that compiling takes at most
+LEAST = 2 << 20  # bytes: with less a compilation has failed for want of them
 PATIENCE = 60.0  # s, then a form that another process compiles is compiled twice
 
 
@@ -49,7 +53,12 @@ def form_folder(comm: MPI.Comm, compiler: str) -> Iterator[Path]:
     with held(shared / "compiling.lock", PATIENCE):  # others wait, and find what this process compiles
         _forget_unfinished(own)
         _fetch(shared, own)
-        yield own
+        try:
+            yield own
+        except Exception as error:  # of FFCx, cffi or the compiler
+            if full := [place for place in (own, tempfile.gettempdir()) if shutil.disk_usage(place).free < LEAST]:
+                raise SolveError(f"{full[0]}: cannot compile finite elements: {os.strerror(ENOSPC)}") from error
+            raise
         _publish(own, shared)
 
 
@@ -62,6 +71,8 @@ def _folders(compiler: str) -> tuple[Path, Path]:
     shared = user_cache_path("ffrobot") / "forms" / f"{sys.implementation.cache_tag}-{platform.machine()}-{compiler}"
     try:
         shared.mkdir(parents=True, exist_ok=True)
+        if shutil.disk_usage(shared).free < ROOM:
+            raise OSError(ENOSPC, os.strerror(ENOSPC))
         for folder in shared.glob(f"{OWN}*"):
             if not is_running(folder.name.removeprefix(OWN).rpartition(".")[0]):
                 shutil.rmtree(folder, ignore_errors=True)

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import os
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from io import TextIOWrapper
 
 from ..common.errors import FfrobotError
 from ..common.extras import missing
@@ -18,8 +21,31 @@ def describe(error: Exception) -> str | None:
     if isinstance(error, MemoryError):
         return "not enough memory: fewer outputs, elements or modes take less"
     if isinstance(error, OSError) and error.strerror:
-        return f"{error.filename or 'standard output'}: {error.strerror}"
+        return f"{error.filename or 'a file that a library reads or writes'}: {error.strerror}"
     return None
+
+
+class _Output(TextIOWrapper):
+    """Standard output whose errors have its name: libraries raise others without one."""
+
+    def write(self, text: str, /) -> int:
+        """As every stream."""
+        with _named():
+            return super().write(text)
+
+    def flush(self) -> None:
+        """As every stream."""
+        with _named():
+            super().flush()
+
+
+@contextmanager
+def _named() -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        error.filename = "standard output"
+        raise
 
 
 def ready_streams() -> None:
@@ -30,6 +56,9 @@ def ready_streams() -> None:
             setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))  # noqa: SIM115 (for good)
         elif hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="backslashreplace")
+    if type(sys.stdout) is TextIOWrapper:
+        encoding, at_lines = sys.stdout.encoding, sys.stdout.line_buffering
+        sys.stdout = _Output(sys.stdout.detach(), encoding, "backslashreplace", line_buffering=at_lines)
 
 
 def without_output() -> None:

@@ -11,6 +11,7 @@ import platform
 import re
 import sys
 from collections.abc import Callable
+from contextlib import suppress
 from os import PathLike
 from pathlib import Path
 from typing import TypeVar
@@ -80,13 +81,30 @@ def _log_file(context: click.Context, parameter: click.Parameter, path: Path | N
     if not _is_log(path):
         raise click.BadParameter(f"expected a new file or a log, found {path}, a file of another kind")
     try:
-        _add(logging.FileHandler(path, encoding="utf-8"), "%(asctime)s %(levelname)s %(message)s")
+        _add(_LogFile(path, encoding="utf-8"), "%(asctime)s %(levelname)s %(message)s")
     except OSError as error:
         raise click.BadParameter(f"cannot write {path}: {error.strerror}") from None
     from ..common.version import program_version
 
     LOGGER.info("ffrobot %s, Python %s, %s", program_version(), platform.python_version(), platform.platform())
     LOGGER.info("%s", " ".join(sys.argv))
+
+
+class _LogFile(logging.FileHandler):
+    """A log that ends where it cannot be written, with one message: what it is about goes on."""
+
+    def handleError(self, record: logging.LogRecord) -> None:
+        """Say so, and write no more."""
+        error = sys.exc_info()[1]
+        LOGGER.removeHandler(self)
+        click.echo(
+            f"ffrobot: {self.baseFilename}: log ends here: {getattr(error, 'strerror', None) or error}", err=True
+        )
+
+    def close(self) -> None:
+        """Without what cannot be written any more."""
+        with suppress(OSError):
+            super().close()
 
 
 def _is_log(path: Path) -> bool:

@@ -33,3 +33,12 @@ def test_log_file_that_cannot_be_written(ffrobot, case_copy):
     assert done.returncode == 2
     assert "No such file" in done.stderr
     assert not scene.with_suffix(".results.h5").exists()
+
+
+def test_a_log_that_cannot_be_written_ends_with_one_message(two_link_copy, ffrobot):
+    """The command itself goes on."""
+    folder = two_link_copy()
+    done = ffrobot("link", "link1.toml", "--log-file", "/dev/full", cwd=folder)
+    assert done.returncode == 0
+    assert done.stderr == "ffrobot: /dev/full: log ends here: No space left on device\n"
+    assert (folder / "link1.h5").exists()
