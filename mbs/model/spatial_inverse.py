@@ -17,7 +17,6 @@ from .spatial_bending import affine_motions
 from .spatial_body import SpatialBody
 from .spatial_cut import cut_loads
 from .spatial_model import SpatialModel
-from .spatial_transmission import gear_forces, resistance, rotor_forces
 from .spatial_tree import Motion, Node
 
 
@@ -65,20 +64,6 @@ def body_forces(node: Node, state: Accelerated, of_frame: Acceleration, gravity:
             along, about, on_modes = motion.forces(motion.accelerations(pull, w_dot, w, p_dot, p_2dot))
             force, moment, modal = force + sign * along, moment + sign * about, modal + sign * on_modes
     return BodyForces(np.einsum("tij,tj->ti", A, force), np.einsum("tij,tj->ti", A, moment), modal)
-
-
-def required_forces(model: SpatialModel, state: Accelerated, times: Array) -> Array:
-    """M v̇ − Q (T, n_v) along v: what gravity, elasticity, friction and given loads leave for others to supply."""
-    gravity = np.array(model.scene.gravity)
-    found = resistance(model, state.q, state.v, state.frames) + rotor_forces(state)
-    found -= given_forces(model, state.q, state.frames, times)
-    found -= gear_forces(model.tree, state.q, state.v)
-    for node, frame, of_frame in zip(model.tree.nodes, state.frames, state.of_frames(), strict=True):
-        needed = body_forces(node, state, of_frame, gravity)
-        found += np.einsum("tij,ti->tj", frame.L[:, :3], needed.force)
-        found += np.einsum("tij,ti->tj", frame.L[:, 3:], needed.moment)
-        found[:, node.p_v] += needed.modal
-    return found
 
 
 def given_forces(model: SpatialModel, q: Array, frames: Sequence[Motion], times: Array) -> Array:

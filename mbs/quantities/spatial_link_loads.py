@@ -14,7 +14,8 @@ import numpy as np
 from ...common.arrays import Array
 from ...fe_models.modal_body.unit_loads import PAIRS, interface_load_names
 from ..fields.field_types import split_point
-from ..model.spatial_inverse import BodyForces, body_forces, required_forces
+from ..model.spatial_inverse import BodyForces, body_forces
+from ..model.spatial_known_motion import required_forces
 from ..model.spatial_motors import split_forces
 from ..model.spatial_payloads import turns_as_a_body
 from ..model.spatial_rows import SpatialRow

@@ -22,7 +22,7 @@ from ...common.errors import InputError, SolveError
 from ...common.rotations import skew
 from ..model.spatial_accelerations import Accelerated
 from ..model.spatial_cut import measured
-from ..model.spatial_inverse import required_forces
+from ..model.spatial_known_motion import required_forces
 from ..model.spatial_model import SpatialModel, row_values
 from ..model.spatial_motors import FrameShare, frame_share, turning_motors
 from ..model.spatial_system import SpatialSystem

@@ -8,8 +8,8 @@ import numpy as np
 
 from ...common.arrays import Array
 from ...common.errors import SolveError
-from ..model.spatial_accelerations import Accelerated, row_accelerations
-from ..model.spatial_inverse import required_forces
+from ..model.spatial_accelerations import Accelerated
+from ..model.spatial_known_motion import required_forces, row_accelerations
 from ..model.spatial_model import SpatialModel, row_values, target_rates
 from ..model.spatial_motors import split_forces
 from .quasi_static import quasi_static_shape

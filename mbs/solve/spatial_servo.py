@@ -14,7 +14,7 @@ from ...common.arrays import Array, as_floats
 from ...common.errors import InputError
 from .._core import TimeFunction
 from ..model.spatial_accelerations import Accelerated
-from ..model.spatial_inverse import required_forces
+from ..model.spatial_known_motion import required_forces
 from ..model.spatial_model import SpatialModel, row_values
 from ..model.spatial_motors import SplitForces, split_forces
 from ..model.spatial_rows import SpatialRow

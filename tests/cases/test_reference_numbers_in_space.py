@@ -5,7 +5,7 @@ import pytest
 from space import solved
 
 from ffrobot.mbs.model.spatial_accelerations import Accelerated
-from ffrobot.mbs.model.spatial_inverse import required_forces
+from ffrobot.mbs.model.spatial_known_motion import required_forces
 from ffrobot.mbs.model.spatial_model import build_spatial_model
 from ffrobot.run.spatial_bodies import load_spatial_bodies
 from ffrobot.scene.spatial import load_spatial_scene

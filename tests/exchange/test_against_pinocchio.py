@@ -8,7 +8,7 @@ import pytest
 from rigid_robots import ROBOTS, random_urdf
 
 from ffrobot.mbs.model.spatial_accelerations import Accelerated
-from ffrobot.mbs.model.spatial_inverse import required_forces
+from ffrobot.mbs.model.spatial_known_motion import required_forces
 from ffrobot.mbs.model.spatial_model import build_spatial_model
 from ffrobot.mbs.model.spatial_system import SpatialSystem
 from ffrobot.run.spatial_bodies import load_spatial_bodies

@@ -5,7 +5,7 @@ import pytest
 from closed_chains import NOW, closed_chain, evaluated
 
 from ffrobot.mbs import _core
-from ffrobot.mbs.model.spatial_inverse import required_forces
+from ffrobot.mbs.model.spatial_known_motion import required_forces
 from ffrobot.mbs.model.spatial_model import row_values
 from ffrobot.mbs.model.spatial_system import SpatialSystem
 from ffrobot.mbs.quantities.spatial_energy import energies

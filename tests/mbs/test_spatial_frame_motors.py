@@ -10,7 +10,7 @@ from spatial_trees import random_tree
 from ffrobot.mbs import _core
 from ffrobot.mbs.model.spatial_accelerations import Accelerated
 from ffrobot.mbs.model.spatial_drives import Drive, Drives, FrameDrive
-from ffrobot.mbs.model.spatial_inverse import required_forces
+from ffrobot.mbs.model.spatial_known_motion import required_forces
 from ffrobot.mbs.model.spatial_system import SpatialSystem
 from ffrobot.mbs.solve.spatial_linearisation import SpatialLinearisation
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from body_equations import required_forces
 from moving_trees import NOW, SMALL, moving
 from spatial_scenes import as_scene, tree_model
 from spatial_trees import TYPES, random_tree
@@ -10,7 +11,6 @@ from ffrobot.mbs import _core
 from ffrobot.mbs.model.spatial_accelerations import Accelerated, row_accelerations
 from ffrobot.mbs.model.spatial_drives import Drive, Drives
 from ffrobot.mbs.model.spatial_gears import with_compliance_in_space
-from ffrobot.mbs.model.spatial_inverse import required_forces
 from ffrobot.mbs.model.spatial_motors import path_forces
 from ffrobot.mbs.model.spatial_system import SpatialSystem
 from ffrobot.mbs.model.spatial_transmission import gear_forces

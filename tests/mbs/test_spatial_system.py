@@ -13,7 +13,7 @@ from ffrobot.mbs import _core
 from ffrobot.mbs.fields.expressions import parse_expression
 from ffrobot.mbs.joints.transmission import Friction
 from ffrobot.mbs.model.spatial_accelerations import Accelerated
-from ffrobot.mbs.model.spatial_inverse import required_forces
+from ffrobot.mbs.model.spatial_known_motion import required_forces
 from ffrobot.mbs.model.spatial_system import SpatialSystem
 
 SMALL = 0.01  # modal coordinates: sections turn by about 0.1 rad
