@@ -143,6 +143,8 @@ def _optional(file: h5py.File) -> dict[str, Any]:
         found["damping_of"] = _text(file["modes"].attrs["damping_of"])
     if "measured" in file["modes"]:
         found["measured"] = MeasuredValues(**_arrays(file["modes/measured"], MeasuredValues))
+    if "remarks" in file:
+        found["remarks"] = tuple(_text(remark) for remark in read(file["remarks"]))
     if "surface_patches" in file:
         found["surface_patches"] = OutlinedPatches(**_arrays(file["surface_patches"], OutlinedPatches))
     return found
@@ -203,6 +205,8 @@ def _image(body: ModalBody) -> bytes:
         for name, point in sorted(body.stress.items()):
             _write_arrays(file.create_group(f"stress/points/{name}"), vars(point))
         _write_arrays(file, {"stress/surface": body.surface_stress, "stress/surface_static": body.surface_static})
+        if body.remarks:
+            _write_names(file, "remarks", body.remarks)
         if body.stress_loads:
             _write_names(file, "stress/loads", body.stress_loads)
         if body.reference_condition == "craig-bampton":

@@ -56,3 +56,36 @@ CELLS: dict[CellName, Cell] = {"tetrahedron": TETRAHEDRON, "hexahedron": HEXAHED
 # Six tetrahedra around the diagonal 0–6 of a hexahedron (Kuhn): they fill it and meet those of equally numbered
 # neighbours face to face.
 KUHN = np.array([[0, 1, 2, 6], [0, 2, 3, 6], [0, 3, 7, 6], [0, 7, 4, 6], [0, 4, 5, 6], [0, 5, 1, 6]])
+
+# gmsh's numbers of element types: of volume elements, under the names that meshio uses, and the nodes of all of them.
+VOLUME_ELEMENTS = {
+    4: "tetra",
+    11: "tetra10",
+    29: "tetra20",
+    5: "hexahedron",
+    17: "hexahedron20",
+    12: "hexahedron27",
+    6: "wedge",
+    7: "pyramid",
+    13: "wedge18",
+    14: "pyramid14",
+    18: "wedge15",
+    19: "pyramid13",
+}
+GMSH_NODES = {
+    1: 2, 2: 3, 3: 4, 4: 4, 5: 8, 6: 6, 7: 5, 8: 3, 9: 6, 10: 9, 11: 10, 12: 27, 13: 18, 14: 14, 15: 1, 16: 8, 17: 20,
+    18: 15, 19: 13, 20: 9, 21: 10, 22: 12, 23: 15, 24: 15, 25: 21, 26: 4, 27: 5, 28: 6, 29: 20, 30: 35, 31: 56,
+}  # fmt: skip
+GMSH_CORNERS = {2: 3, 9: 3, 20: 3, 21: 3, 22: 3, 23: 3, 24: 3, 25: 3, 3: 4, 10: 4, 16: 4}  # of surface elements
+
+# VTK and meshio number nodes otherwise: edges of the hexahedron around the lower face, the upper face, then upright.
+_VTK_HEXAHEDRON_EDGES = [
+    (0, 1), (1, 2), (2, 3), (0, 3), (4, 5), (5, 6), (6, 7), (4, 7), (0, 4), (1, 5), (2, 6), (3, 7),
+]  # fmt: skip
+_HEXAHEDRON20 = [*range(8), *(8 + _VTK_HEXAHEDRON_EDGES.index((int(a), int(b))) for a, b in np.sort(HEXAHEDRON.edges))]
+TO_GMSH = {
+    "tetra10": [0, 1, 2, 3, 4, 5, 6, 7, 9, 8],
+    "hexahedron20": _HEXAHEDRON20,
+    "hexahedron27": [*_HEXAHEDRON20, 24, 22, 20, 21, 23, 25, 26],
+}
+"""Type of element → which of VTK's nodes gmsh's nodes are."""

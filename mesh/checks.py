@@ -26,20 +26,22 @@ _NAMES = {"m": "metres", "mm": "millimetres", "in": "inches"}
 _LENGTHS = (0.2, 5.0)
 
 
-def check_size(size: float, volume: float, where: str) -> None:
-    """Check that tetrahedra of so many m can fill a `volume` in m³ before the end of time.
+def check_size(size: float, volume: float, where: str) -> float:
+    """How many tetrahedra of so many m about fill a `volume` in m³.
 
     Raises:
         InputError: there would be more than `MOST_CELLS`.
     """
     cubes = volume / size**3
     side = cubes ** (1 / 3) * size
+    count = 6 * 2**0.5 * cubes  # regular tetrahedra
     check_count(
-        6 * 2**0.5 * cubes,  # regular tetrahedra
+        count,
         f"{size:.3g} m for the volume of a cube of {side:.3g} m",
         where,
         ' Is it drawn in another unit (unit = "mm")?',
     )
+    return count
 
 
 def check_count(count: float, found: str, where: str, hint: str = "") -> None:
@@ -70,6 +72,27 @@ def check_shape(part: PartMesh, geometry: SolidGeometry, where: str) -> None:
     likely = [unit for unit, corrected in others.items() if 0.8 < corrected < 1.25]
     hint = f': looks like {_NAMES[likely[0]]}: geometry.unit = "{likely[0]}"' if likely else ""
     raise InputError(f"{where}: expected a part {geometry.length:g} m long, found {extent[0]:g} m along x{hint}")
+
+
+def check_neighbours(part: PartMesh, where: str) -> None:
+    """Check that cells, right-handed as they are, lie on either side of the facets that they share.
+
+    Raises:
+        InputError: three cells or more have a facet, or two on the same side of it: some lie in one another.
+    """
+    facets = part.corners[:, part.shape.facets].reshape(-1, part.shape.facets.shape[1])
+    smallest = np.argmin(facets, axis=1)[:, None]
+    sides, rows = facets.shape[1], np.arange(len(facets))[:, None]
+    after, before = facets[rows, (smallest + 1) % sides], facets[rows, (smallest - 1) % sides]
+    # Seen from the cells on its two sides, the corners of a facet run round it in opposite senses.
+    keys = 2 * np.unique(facet_keys(facets, len(part.points)), return_inverse=True)[1].reshape(-1)
+    sided = keys + (after < before)[:, 0]
+    _, number, count = np.unique(sided, return_inverse=True, return_counts=True)
+    bad = count[number.reshape(-1)] > 1
+    if np.any(bad):
+        cells = np.zeros(len(part.cells), dtype=bool)
+        cells[np.flatnonzero(bad) // len(part.shape.facets)] = True
+        _reject_cells(part, cells, "elements that lie in one another", "elements side by side", where)
 
 
 def check_connected(part: PartMesh, where: str) -> None:

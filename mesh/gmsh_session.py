@@ -10,32 +10,17 @@ import signal
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path
 
 import gmsh
 import numpy as np
 
 from ..common.arrays import Array, Integers
 from ..common.errors import InputError
+from .cells import VOLUME_ELEMENTS
 from .defaults import CIRCLE, GROWTH
 from .jacobian import SLIVER, cell_quality
 from .source import RawMesh
 
-# gmsh's numbers of volume elements, under the names that meshio uses.
-VOLUME_ELEMENTS = {
-    4: "tetra",
-    11: "tetra10",
-    29: "tetra20",
-    5: "hexahedron",
-    17: "hexahedron20",
-    12: "hexahedron27",
-    6: "wedge",
-    7: "pyramid",
-    13: "wedge18",
-    14: "pyramid14",
-    18: "wedge15",
-    19: "pyramid13",
-}
 # gmsh's newer algorithm, HXT, makes better meshes faster, but other ones in every run.
 _DELAUNAY = 1
 # A mesh too coarse for the shape crosses itself: then finer ones along curved faces are tried. Now and then one has a
@@ -166,23 +151,34 @@ def extract_mesh() -> RawMesh:
     """The model's volume elements, with the names of its physical groups; of all volumes where no group has any."""
     number, points = _points()
     groups = {dim: {tag: _group_name(dim, tag) for _, tag in gmsh.model.getPhysicalGroups(dim)} for dim in (2, 3)}
-    region_of = {
-        int(entity): name
-        for tag, name in groups[3].items()
-        for entity in gmsh.model.getEntitiesForPhysicalGroup(3, tag)
-    }
-    blocks: list[tuple[str, Integers, str | None]] = []
+    blocks: list[tuple[str, Integers]] = []
+    numbers: dict[int, Integers] = {}  # of the cells of each volume
+    count = 0
     for _, volume in gmsh.model.getEntities(3):
+        before = count
         for kind, cells in _elements(3, volume, number):
-            blocks.append((VOLUME_ELEMENTS.get(kind, f"gmsh type {kind}"), cells, region_of.get(volume)))
+            blocks.append((VOLUME_ELEMENTS.get(kind, f"gmsh type {kind}"), cells))
+            count += len(cells)
+        numbers[int(volume)] = np.arange(before, count)
+    regions = {name: np.empty(0, dtype=np.int64) for name in groups[3].values()}
+    for tag, name in groups[3].items():
+        volumes = map(int, gmsh.model.getEntitiesForPhysicalGroup(3, tag))
+        regions[name] = np.concatenate([regions[name], *(numbers[volume] for volume in volumes)])
     faces: dict[str, list[Integers]] = {}
     for tag, name in groups[2].items():
         for entity in gmsh.model.getEntitiesForPhysicalGroup(2, tag):
             for kind, cells in _elements(2, int(entity), number):
                 corners = gmsh.model.mesh.getElementProperties(kind)[5]
                 faces.setdefault(name, []).append(cells[:, :corners])
-    surfaces = sum(cells.shape[0] for _, face in gmsh.model.getEntities(2) for _, cells in _elements(2, face, number))
-    return RawMesh(points, tuple(blocks), faces, {}, surfaces)
+    surfaces, lines = (
+        tuple(
+            cells[:, : gmsh.model.mesh.getElementProperties(kind)[5]]
+            for _, entity in gmsh.model.getEntities(dim)
+            for kind, cells in _elements(dim, entity, number)
+        )
+        for dim in (2, 1)
+    )
+    return RawMesh(points, tuple(blocks), regions, faces, {}, surfaces, lines)
 
 
 def _group_name(dim: int, tag: int) -> str:
@@ -200,19 +196,3 @@ def _points() -> tuple[Integers, Array]:
 def _elements(dim: int, entity: int, number: Integers) -> Iterator[tuple[int, Integers]]:
     for kind, tags, nodes in zip(*gmsh.model.mesh.getElements(dim, entity), strict=True):
         yield int(kind), number[np.asarray(nodes, dtype=np.int64)].reshape(len(tags), -1)
-
-
-def read_msh(path: Path, where: str) -> RawMesh:
-    """A mesh in gmsh's own format.
-
-    Raises:
-        InputError: gmsh cannot read it.
-    """
-    with gmsh_session():
-        try:
-            gmsh.open(str(path))
-            return extract_mesh()
-        except Exception as error:  # gmsh raises nothing more special
-            raise InputError(
-                f"{where}: expected a mesh that gmsh can read, found one that it cannot: {error}"
-            ) from None

@@ -21,6 +21,7 @@ from platformdirs import user_cache_path
 from ..common.errors import SolveError
 from ..common.files import write_atomically
 from .cells import CELLS, CellName
+from .included import files_of
 from .part_mesh import PartMesh
 from .records import Outlines, PlaceRecord, SolidGeometry, SolidMeshRecord
 
@@ -33,10 +34,13 @@ _OF_PLACES = set(PlaceRecord.model_fields)  # what else a record of an interface
 
 
 def geometry_content(geometry: SolidGeometry) -> dict[str, Any]:
-    """The keys of `[geometry]`, the content of a part's file in place of its name."""
+    """The keys of `[geometry]`, the content of a part's file, and of files that it includes, in place of its name."""
     record = geometry.model_dump(mode="json")
     if geometry.file is not None:
-        record["file"] = hashlib.sha256(geometry.file.read_bytes()).hexdigest()
+        first, *others = (hashlib.sha256(file.read_bytes()).hexdigest() for file in files_of(geometry.file))
+        record["file"] = first
+        if others:
+            record["included"] = others
     return record
 
 
@@ -71,6 +75,7 @@ def kept_part(path: Path) -> PartMesh | None:
                 degree=int(file["degree"]),
                 regions=names["regions"],
                 faces=names["faces"],
+                remarks=tuple(map(str, file["remarks"])),
                 **{key: file[key] for key in _ARRAYS},
             )
     except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
@@ -86,6 +91,7 @@ def keep_part(path: Path, part: PartMesh) -> None:
             key: np.array(list(tags), dtype=np.str_),
             f"{key}_tag": np.array(list(tags.values()), dtype=np.int32),
         }
+    arrays["remarks"] = np.array(part.remarks, dtype=np.str_)
     image = BytesIO()
     np.savez(image, **arrays)
     with suppress(SolveError):

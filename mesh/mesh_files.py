@@ -1,108 +1,130 @@
-"""Ready meshes in foreign formats (Abaqus, Nastran, VTK …), through meshio. Importing this loads meshio."""
+"""Ready meshes: which reader a file gets, and those in formats that meshio reads (VTK, MED, XDMF …).
+
+meshio is loaded where it is used, in a process of its own.
+"""
 
 from __future__ import annotations
 
 import io
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-import meshio
 import numpy as np
 from numpy.typing import NDArray
 
-from ..common.arrays import Booleans, Integers
+from ..common.arrays import Integers
 from ..common.errors import InputError
-from .cells import HEXAHEDRON
+from .cells import TO_GMSH
+from .part_reader import read_apart
 from .source import RawMesh
+
+if TYPE_CHECKING:
+    import meshio
 
 _VOLUMES = re.compile(r"tetra|hexahedron|wedge|pyramid|polyhedron")
 _SURFACES = {"triangle": 3, "triangle6": 3, "quad": 4, "quad8": 4, "quad9": 4}
+_LINES = ("line", "line3")
+# Integer data of cells with more values than this number cells, not groups.
+_MOST_GROUPS = 1000
 
-# meshio numbers nodes as VTK does: edges of the hexahedron around the lower face, the upper face, then upright.
-_VTK_HEXAHEDRON_EDGES = [
-    (0, 1), (1, 2), (2, 3), (0, 3), (4, 5), (5, 6), (6, 7), (4, 7), (0, 4), (1, 5), (2, 6), (3, 7),
-]  # fmt: skip
-_HEXAHEDRON20 = [*range(8), *(8 + _VTK_HEXAHEDRON_EDGES.index((int(a), int(b))) for a, b in np.sort(HEXAHEDRON.edges))]
-_TO_GMSH = {
-    "tetra10": [0, 1, 2, 3, 4, 5, 6, 7, 9, 8],
-    "hexahedron20": _HEXAHEDRON20,
-    "hexahedron27": [*_HEXAHEDRON20, 24, 22, 20, 21, 23, 25, 26],
-}
+
+def read_mesh(path: Path, where: str) -> RawMesh:
+    """The mesh in `path`, whose ending tells the format; `where` (file and key) begins the message of an error.
+
+    Raises:
+        InputError: it cannot be read.
+    """
+    ending = path.suffix.lower()
+    if ending == ".inp":
+        from .abaqus import read_abaqus
+
+        return read_abaqus(path, where)
+    if ending in (".bdf", ".nas", ".fem"):
+        from .nastran import read_nastran
+
+        return read_nastran(path, where)
+    if ending == ".msh":
+        from .msh import read_msh
+
+        return read_apart(read_msh, path.stat().st_size, where, path, where)
+    return read_apart(read_foreign, path.stat().st_size, where, path, where)
 
 
 def read_foreign(path: Path, where: str) -> RawMesh:
-    """The mesh in `path`, whose ending tells the format; `where` (file and key) begins the message of an error.
+    """The mesh in `path` by meshio.
 
-    Element sets (Abaqus), property numbers (Nastran) and integer cell data name regions and faces; so do node sets.
+    Integer data of cells, groups and sets of the format name regions and faces; so do sets of nodes.
 
     Raises:
         InputError: meshio cannot read it.
     """
+    import meshio
+
     said = io.StringIO()
     try:
         with redirect_stdout(said), redirect_stderr(said):
-            mesh = meshio.read(path)
-            names = _names_of_cells(mesh, path)
-            points = np.zeros((len(mesh.points), 3))
-            points[:, : mesh.points.shape[1]] = mesh.points
+            return _raw_mesh(meshio.read(path))
     except (Exception, SystemExit) as error:  # whatever a reader meets in a corrupt file, it raises as it comes
         reason = said.getvalue() if isinstance(error, SystemExit) else f"{said.getvalue()} {error!r}"
         reason = " ".join(reason.replace(str(path), path.name).split())
         raise InputError(f"{where}: expected a mesh that meshio can read, found one that it cannot: {reason}") from None
-    blocks: list[tuple[str, Integers, str | None]] = []
+
+
+def _raw_mesh(mesh: meshio.Mesh) -> RawMesh:
+    points = np.zeros((len(mesh.points), 3))
+    points[:, : mesh.points.shape[1]] = mesh.points
+    blocks: list[tuple[str, Integers]] = []
+    regions: dict[str, list[Integers]] = {}
     faces: dict[str, list[Integers]] = {}
-    surfaces = 0
-    for block, labels in zip(mesh.cells, names, strict=True):
+    surfaces, lines = list[Integers](), list[Integers]()
+    count = 0
+    for block, groups in zip(mesh.cells, _groups(mesh), strict=True):
+        if block.type not in (*_SURFACES, *_LINES) and not _VOLUMES.match(block.type):
+            continue
         cells = np.asarray(block.data, dtype=np.int64)
-        if _VOLUMES.match(block.type):
-            order = _TO_GMSH.get(block.type)
-            ordered = cells if order is None else cells[:, order]
-            blocks.extend((block.type, ordered[rows], label) for label, rows in _by_label(labels))
-        elif block.type in _SURFACES:
-            surfaces += len(cells)
-            for label, rows in _by_label(labels):
-                if label is not None:
-                    faces.setdefault(label, []).append(cells[rows][:, : _SURFACES[block.type]])
+        if block.type in _SURFACES:
+            surfaces.append(cells[:, : _SURFACES[block.type]])
+            for name, rows in groups.items():
+                faces.setdefault(name, []).append(surfaces[-1][rows])
+        elif block.type in _LINES:
+            lines.append(cells[:, :2])
+        else:
+            order = TO_GMSH.get(block.type)
+            blocks.append((block.type, cells if order is None else cells[:, order]))
+            for name, rows in groups.items():
+                regions.setdefault(name, []).append(count + rows)
+            count += len(cells)
+    whole = {name: np.concatenate(rows) for name, rows in regions.items()}
     point_groups = {name: np.asarray(group, dtype=np.int64) for name, group in (mesh.point_sets or {}).items()}
-    return RawMesh(points, tuple(blocks), faces, point_groups, surfaces)
+    return RawMesh(points, tuple(blocks), whole, faces, point_groups, tuple(surfaces), tuple(lines))
 
 
-Labels = NDArray[np.object_]
+def _groups(mesh: meshio.Mesh) -> Iterator[Mapping[str, Integers]]:
+    """For each block, the cells of each group that has any in it."""
+    values = _numbered(mesh)
+    titles = {int(tag): name for name, (tag, *_) in mesh.field_data.items()}
+    titles |= {int(tag): "_".join(names) for tag, names in getattr(mesh, "cell_tags", {}).items()}  # MED
+    for k, block in enumerate(mesh.cells):
+        found: dict[str, Integers] = {}
+        if values is not None:
+            for value in np.unique(values[k]).tolist():
+                found[titles.get(value, str(value))] = np.flatnonzero(values[k] == value)
+        for name, sets in mesh.cell_sets.items():
+            rows = np.asarray(sets[k] if k < len(sets) and sets[k] is not None else [], dtype=np.int64)
+            if np.any((rows < 0) | (rows >= len(block.data))):
+                raise ValueError(f"cells of the set {name} that are not there")
+            found[name] = rows
+        yield {name: rows for name, rows in found.items() if rows.size}
 
 
-def _by_label(labels: Labels) -> Iterator[tuple[str | None, Booleans]]:
-    for label in dict.fromkeys(labels.tolist()):
-        yield label, np.array([item == label for item in labels], dtype=bool)
-
-
-def _names_of_cells(mesh: meshio.Mesh, path: Path) -> list[Labels]:
-    """For each block, the name of the set that each of its cells belongs to, the smallest where there are several."""
-    names: list[Labels] = [np.full(len(block.data), None, dtype=object) for block in mesh.cells]
-    for key, values in mesh.cell_data.items():
-        if all(np.issubdtype(np.asarray(value).dtype, np.integer) for value in values):
-            titles = {int(tag): name for name, (tag, *_) in mesh.field_data.items()} if "physical" in key else {}
-            names = [np.array([titles.get(int(v), str(int(v))) for v in value], dtype=object) for value in values]
-            break
-    sets = {name: [np.asarray(rows, dtype=np.int64) for rows in found] for name, found in mesh.cell_sets.items()}
-    if path.suffix.lower() == ".inp":
-        sets |= _abaqus_element_sets(mesh, path)
-    for name, found in sorted(sets.items(), key=lambda item: -sum(rows.size for rows in item[1])):
-        for block, rows in zip(names, found, strict=False):
-            block[rows] = name
-    return names
-
-
-def _abaqus_element_sets(mesh: meshio.Mesh, path: Path) -> dict[str, list[Integers]]:
-    """The sets that *ELEMENT lines name: meshio 5.0 takes them for other blocks unless each line names one."""
-    lines = re.findall(r"^\*ELEMENT\b(?! *OUTPUT)(.*)$", path.read_text(errors="replace"), re.MULTILINE | re.IGNORECASE)
-    if len(lines) != len(mesh.cells):
-        return {}
-    sets: dict[str, list[Integers]] = {}
-    for k, line in enumerate(lines):
-        named = re.search(r"ELSET\s*=\s*([^,\s]+)", line, re.IGNORECASE)
-        if named:
-            found = sets.setdefault(named[1], [np.empty(0, dtype=np.int64) for _ in lines])
-            found[k] = np.arange(len(mesh.cells[k].data))
-    return sets
+def _numbered(mesh: meshio.Mesh) -> list[NDArray[np.generic]] | None:
+    """The first integer data of cells that number groups, by block."""
+    for values in mesh.cell_data.values():
+        arrays = [np.asarray(value) for value in values]
+        is_group = all(np.issubdtype(array.dtype, np.integer) and array.ndim == 1 for array in arrays)
+        if is_group and np.unique(np.concatenate(arrays)).size <= _MOST_GROUPS:
+            return arrays
+    return None

@@ -18,6 +18,7 @@ from .checks import (
     METRES,
     check_connected,
     check_count,
+    check_neighbours,
     check_quality,
     check_shape,
     check_volume,
@@ -27,7 +28,9 @@ from .checks import (
 from .defaults import default_order, default_size
 from .faces import named_faces
 from .kept_parts import keep_part, kept_part, kept_path
+from .mesh_files import read_mesh
 from .part_mesh import PartMesh
+from .part_reader import read_apart
 from .records import Outlines, PlaceRecord, RectangleSection, SolidGeometry, SolidMeshRecord
 from .source import Source, source_from
 from .structured import Divisions, structured_box
@@ -89,6 +92,7 @@ def part_mesh(
         curved, part = part, straightened(part)
         check_volume(part, curved, where)
     check_quality(part, where)
+    check_neighbours(part, where)
     check_connected(part, where)
     return named_faces(replace(source, part=part), geometry, places, outlines, path)
 
@@ -117,19 +121,13 @@ def _source(
     if _is_step(file):
         from .step import mesh_step
 
-        return mesh_step(file, record, METRES[geometry.unit], where)
+        return read_apart(mesh_step, file.stat().st_size, where, file.absolute(), record, METRES[geometry.unit], where)
     for key in ("cell", "size", "divisions"):
         if getattr(record, key) is not None:
             raise InputError(
                 f"{path}: mesh.{key}: expected none, since {file.name} is a mesh, found {getattr(record, key)}"
             )
-    if file.suffix.lower() == ".msh":
-        from .gmsh_session import read_msh
-
-        return source_from(read_msh(file, where), where)
-    from .mesh_files import read_foreign
-
-    return source_from(read_foreign(file, where), where)
+    return source_from(read_mesh(file.absolute(), where), where)
 
 
 def _box(geometry: SolidGeometry, record: SolidMeshRecord, where: str) -> PartMesh:

@@ -24,10 +24,12 @@ class PartMesh:
         cell: their shape.
         degree: 1 (corners only) or 2 (curved cells: gmsh's 10 or 27 nodes).
         cell_tag: (c,) which region each cell belongs to.
-        regions: volume group → its tag.
+        regions: volume group → its tag, the largest group first.
+        overlaps: volume group → further tags, of its cells that belong to other groups too.
         facets: (f, 3 or 4) corners of the tagged facets, all of them on the boundary.
         facet_tag: (f,) which face each belongs to; a facet has one tag.
         faces: name → tag in `facet_tag`; two names may share a face.
+        remarks: what the part's file holds and the link does not, a sentence each.
     """
 
     points: Array
@@ -39,6 +41,8 @@ class PartMesh:
     facets: Integers = field(default_factory=lambda: np.empty((0, 3), dtype=np.int64))
     facet_tag: Tags = field(default_factory=lambda: np.empty(0, dtype=np.int32))
     faces: Mapping[str, int] = field(default_factory=dict)
+    overlaps: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
+    remarks: tuple[str, ...] = ()
 
     @property
     def shape(self) -> Cell:

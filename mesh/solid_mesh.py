@@ -6,7 +6,7 @@ The part is read or made, checked and its faces found on rank 0; dolfinx distrib
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -39,11 +39,13 @@ class SolidMesh:
         cell: shape of the cells.
         cell_tags: region of every local cell.
         facet_tags: the facets of the named faces, all of them on the boundary.
-        regions: volume group → tag in `cell_tags`; cells of none have the tag 0.
+        regions: volume group → tag in `cell_tags`, the largest group first; cells of none have the tag 0.
         faces: "root", "tip", the interfaces that are faces, "patch/K/top", "patch/K/bottom" → tag in `facet_tags`; two
             names may have one tag.
         size: mean extent of the cells along x, in m.
         surface: what a picture shows.
+        overlaps: volume group → further tags in `cell_tags`, of its cells that belong to other groups too.
+        remarks: what the part's file holds and the link does not, a sentence each.
     """
 
     mesh: Mesh
@@ -54,6 +56,12 @@ class SolidMesh:
     faces: Mapping[str, int]
     size: float
     surface: Surface
+    overlaps: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
+    remarks: tuple[str, ...] = ()
+
+    def cells_of(self, region: str) -> tuple[int, ...]:
+        """The tags in `cell_tags` of all cells of a volume group."""
+        return self.regions[region], *self.overlaps.get(region, ())
 
 
 def solid_mesh(
@@ -116,6 +124,8 @@ def distributed(part: PartMesh | None, comm: MPI.Comm = MPI.COMM_WORLD) -> Solid
         described["faces"],
         described["size"],
         surface_of(mesh),
+        described["overlaps"],
+        described["remarks"],
     )
 
 
@@ -129,6 +139,8 @@ def _description(part: PartMesh) -> dict[str, Any]:
         "points": len(part.points),
         "cell_tag": part.cell_tag,
         "regions": dict(part.regions),
+        "overlaps": dict(part.overlaps),
+        "remarks": part.remarks,
         "faces": dict(part.faces),
         "keys": facet_keys(part.facets, len(part.points)),
         "facet_tag": part.facet_tag,

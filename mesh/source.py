@@ -5,15 +5,16 @@ Names of element types are meshio's; nodes are in gmsh's order.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..common.arrays import Array, Integers
 from ..common.errors import InputError
 from .cells import CELLS, CellName
-from .part_mesh import PartMesh
+from .part_mesh import PartMesh, facet_keys
 
 _SUPPORTED: dict[str, tuple[CellName, int]] = {
     "tetra": ("tetrahedron", 1),
@@ -22,8 +23,9 @@ _SUPPORTED: dict[str, tuple[CellName, int]] = {
     "hexahedron20": ("hexahedron", 2),
     "hexahedron27": ("hexahedron", 2),
 }
-# Mid-side nodes closer to the middle of their edge than this, relative to its length, make a straight edge.
-STRAIGHT = 1e-9
+# Mid-side nodes closer to the middle of their edge than this, relative to the part, make a straight edge: files carry
+# as few as five digits.
+STRAIGHT = 5e-6
 
 
 @dataclass(frozen=True)
@@ -32,17 +34,23 @@ class RawMesh:
 
     Attributes:
         points: (p, 3) in the source's unit and axes; some may belong to no volume.
-        blocks: of volume elements: type, (c, v) points, region or None.
+        blocks: of volume elements: type, (c, v) points.
+        regions: name → (k,) elements, counted through all `blocks`; an element may belong to several.
         facet_groups: name → facets, as arrays (k, ≥ 3) of corners.
         point_groups: name → (k,) points: a face is what has all its corners among them.
-        surface_elements: how many triangles and quadrilaterals there are.
+        surfaces: corners of all triangles and quadrilaterals, as arrays (k, 3 or 4).
+        lines: ends of all elements that are lines, as arrays (k, 2).
+        remarks: what the file holds and the link does not, a sentence each.
     """
 
     points: Array
-    blocks: Sequence[tuple[str, Integers, str | None]]
+    blocks: Sequence[tuple[str, Integers]]
+    regions: Mapping[str, Integers]
     facet_groups: Mapping[str, Sequence[Integers]]
     point_groups: Mapping[str, Integers]
-    surface_elements: int
+    surfaces: Sequence[Integers] = ()
+    lines: Sequence[Integers] = ()
+    remarks: Sequence[str] = ()
 
 
 @dataclass(frozen=True)
@@ -61,19 +69,19 @@ class Source:
 
 
 def source_from(raw: RawMesh, where: str) -> Source:
-    """One mesh from the blocks of `raw`; `where` (file and key) begins the messages.
+    """One mesh from the blocks of `raw`, each cell once; `where` (file and key) begins the messages.
 
     Raises:
-        InputError: no volume elements, unsupported or mixed ones, or curved hexahedra of 20 nodes.
+        InputError: no volume elements, unsupported or mixed ones, curved hexahedra of 20 nodes, or nodes that are not
+            there or nowhere.
     """
     kind = _only_kind(raw, where)
     cell, degree = _SUPPORTED[kind]
-    cells = np.concatenate([block[1] for block in raw.blocks])
-    names = list(dict.fromkeys(block[2] for block in raw.blocks if block[2] is not None))
-    regions = {name: k + 1 for k, name in enumerate(names)}
-    cell_tag = np.concatenate(
-        [np.full(len(block[1]), regions.get(block[2] or "", 0), dtype=np.int32) for block in raw.blocks]
-    )
+    cells = np.concatenate([block for _, block in raw.blocks])
+    _check_nodes(raw, cells, where)
+    cells, once = _each_once(cells)
+    regions = {name: np.unique(once[members]) for name, members in raw.regions.items() if members.size}
+    cell_tag, tags = _tags(len(cells), regions)
     straight = degree == 2 and _is_straight(raw.points, cells, cell)
     if kind == "hexahedron20" and not straight:
         raise InputError(
@@ -84,21 +92,101 @@ def source_from(raw: RawMesh, where: str) -> Source:
     used, flat = np.unique(cells, return_inverse=True)
     number = np.full(len(raw.points), -1, dtype=np.int64)
     number[used] = np.arange(used.size)
-    part = PartMesh(raw.points[used], flat.reshape(cells.shape), cell, degree, cell_tag, regions)
-    facets = {name: number[np.concatenate(list(pieces))] for name, pieces in raw.facet_groups.items()}
+    remarks = [*raw.remarks, *_left_out(raw, cells, cell)]
+    if doubles := len(once) - len(cells):
+        remarks.append(f"{doubles} of {len(once)} cells stand in the file again, and count once")
+    part = PartMesh(
+        raw.points[used],
+        flat.reshape(cells.shape),
+        cell,
+        degree,
+        cell_tag,
+        {name: of[0] for name, of in tags.items()},
+        overlaps={name: of[1:] for name, of in tags.items() if of[1:]},
+        remarks=tuple(remarks),
+    )
+    facets = {name: _facets(pieces, number, part) for name, pieces in raw.facet_groups.items()}
     points = {name: number[group][number[group] >= 0] for name, group in raw.point_groups.items()}
     return Source(part, facets, points)
+
+
+def _facets(pieces: Sequence[Integers], number: Integers, part: PartMesh) -> Integers:
+    """(k, 3 or 4) corners of the facets of a group, in the numbers of `part`; -1 where its cells have no such ones."""
+    sides = part.shape.facets.shape[1]
+    strange = [np.full((len(piece), sides), -1) for piece in pieces if piece.shape[1] != sides]
+    return np.concatenate([*(number[piece] for piece in pieces if piece.shape[1] == sides), *strange])
+
+
+def _check_nodes(raw: RawMesh, cells: Integers, where: str) -> None:
+    """Check that `cells` and groups have nodes of the file, and that those of cells are at some place."""
+    groups = [piece for pieces in raw.facet_groups.values() for piece in pieces]
+    for what, nodes in [("cells", cells), *(("facets", piece) for piece in groups)]:
+        outside = np.any((nodes < 0) | (nodes >= len(raw.points)), axis=1)
+        if np.any(outside):
+            first = int(np.argmax(outside)) + 1
+            raise InputError(
+                f"{where}: expected {what} of the {len(raw.points)} nodes of the file, found {np.sum(outside)} of "
+                f"{len(nodes)} with nodes that are not there, number {first} the first"
+            )
+    if any(np.any((group < 0) | (group >= len(raw.points))) for group in raw.point_groups.values()):
+        raise InputError(f"{where}: expected sets of the nodes of the file, found nodes that are not there")
+    with np.errstate(over="ignore"):
+        lost = ~np.isfinite(np.sum(raw.points[np.unique(cells)] ** 2, axis=1))
+    if np.any(lost):
+        raise InputError(f"{where}: expected nodes with finite coordinates, found {np.sum(lost)} without")
+
+
+def _left_out(raw: RawMesh, cells: Integers, cell: CellName) -> Iterator[str]:
+    """What to say of surfaces and lines that are no sides and edges of `cells`: shells and beams, it may be."""
+    shape, count = CELLS[cell], len(raw.points)
+    sides = facet_keys(cells[:, shape.facets].reshape(-1, shape.facets.shape[1]), count)
+    loose = sum(int(np.sum(~np.isin(facet_keys(surface, count), sides))) for surface in raw.surfaces)
+    if loose:
+        yield f"{loose} triangles or quadrilaterals that are no side of a volume element (shells?) are left out"
+    if raw.lines:
+        edges = np.sort(cells[:, shape.edges].reshape(-1, 2), axis=1) @ np.array([count, 1])
+        lines = np.sort(np.concatenate(list(raw.lines)), axis=1) @ np.array([count, 1])
+        if loose := int(np.sum(~np.isin(lines, edges))):
+            yield f"{loose} lines that are no edge of a volume element (beams?) are left out"
+
+
+def _each_once(cells: Integers) -> tuple[Integers, Integers]:
+    """The different ones of `cells` in their order, and (c,) which of these each of `cells` is."""
+    _, first, like = np.unique(np.sort(cells, axis=1), axis=0, return_index=True, return_inverse=True)
+    kept = np.sort(first)
+    return cells[kept], np.searchsorted(kept, first)[like.reshape(-1)]
+
+
+def _tags(count: int, regions: Mapping[str, Integers]) -> tuple[NDArray[np.int32], dict[str, tuple[int, ...]]]:
+    """A tag for each set of regions that a cell belongs to, and the tags of each region, the largest region first.
+
+    The first of a region's tags is that of cells of the fewest other regions.
+    """
+    tag = np.zeros(count, dtype=np.int32)
+    owners: list[tuple[str, ...]] = [()]
+    for name, members in sorted(regions.items(), key=lambda item: -item[1].size):
+        before, which = np.unique(tag[members], return_inverse=True)
+        tag[members] = len(owners) + which
+        owners += [(*owners[old], name) for old in before]
+    found: dict[str, list[int]] = {}
+    for number in np.unique(tag).tolist():
+        for name in owners[number]:
+            found.setdefault(name, []).append(number)
+    ordered = {name: sorted(of, key=lambda number: len(owners[number])) for name, of in found.items()}
+    largest = sorted(ordered, key=lambda name: -regions[name].size)
+    return tag, {name: tuple(ordered[name]) for name in largest}
 
 
 def _only_kind(raw: RawMesh, where: str) -> str:
     """The type of all the volume elements."""
     counts: dict[str, int] = {}
-    for kind, cells, _ in raw.blocks:
+    for kind, cells in raw.blocks:
         counts[kind] = counts.get(kind, 0) + len(cells)
     listed = ", ".join(f"{count} {kind}" for kind, count in counts.items() if count)
     if not listed:
-        hint = f": {raw.surface_elements} triangles or quadrilaterals (shells) only" if raw.surface_elements else ""
-        raise InputError(f"{where}: expected a mesh of volume elements, found none{hint}")
+        shells = sum(map(len, raw.surfaces))
+        hint = f": {shells} triangles or quadrilaterals (shells) only" if shells else ""
+        raise InputError(f"{where}: expected a mesh of volume elements, found none{'; '.join((hint, *raw.remarks))}")
     unsupported = [kind for kind in counts if kind not in _SUPPORTED]
     if unsupported:
         known = "tetrahedra of 4 or 10 nodes, hexahedra of 8 or 27 nodes"
@@ -115,4 +203,4 @@ def _is_straight(points: Array, cells: Integers, cell: CellName) -> bool:
     first, second = corners[:, shape.edges[:, 0]], corners[:, shape.edges[:, 1]]
     middles = points[cells[:, len(shape.corners) : len(shape.corners) + len(shape.edges)]]
     off = np.linalg.norm(middles - (first + second) / 2, axis=2)
-    return bool(np.all(off <= STRAIGHT * np.linalg.norm(second - first, axis=2)))
+    return bool(np.all(off <= STRAIGHT * np.ptp(points[cells.ravel()], axis=0).max()))

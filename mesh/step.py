@@ -13,6 +13,7 @@ from ..common.errors import InputError
 from .checks import check_size
 from .defaults import default_order, default_size
 from .gmsh_session import extract_mesh, gmsh_session, mesh_model, volume_and_surface
+from .part_reader import MESHING, MESHING_CELL, allow
 from .records import SolidMeshRecord
 from .source import Source, source_from
 
@@ -35,11 +36,14 @@ def mesh_step(file: Path, record: SolidMeshRecord, scale: float, where: str) -> 
     Raises:
         InputError: the file is corrupt, holds no closed volume, or cannot be meshed.
     """
-    declared = _declared_unit(file)
+    text = file.read_text(encoding="latin-1")
+    if "ISO-10303-21" not in text[:4096]:
+        raise InputError(f"{where}: expected a STEP file, which begins with ISO-10303-21, found none")
+    declared = _declared_unit(text)
     with gmsh_session():
         gmsh.option.setNumber("Geometry.OCCImportLabels", 1)
         try:
-            gmsh.model.occ.importShapes(str(file), highestDimOnly=False)
+            gmsh.model.occ.importShapes(str(file), highestDimOnly=False, format="step")
             gmsh.model.occ.synchronize()
         except Exception as error:  # gmsh raises nothing more special
             raise InputError(
@@ -52,15 +56,15 @@ def mesh_step(file: Path, record: SolidMeshRecord, scale: float, where: str) -> 
         volume, surface = volume_and_surface()
         size = record.size / scale * declared if record.size else default_size(volume, surface, order)
         metres = scale / declared
-        check_size(size * metres, volume * metres**3, where)
+        allow(MESHING + MESHING_CELL * check_size(size * metres, volume * metres**3, where))
         mesh_model(size, where)
         source = source_from(extract_mesh(), where)
     return replace(source, part=source.part.moved(as_floats(source.part.points / declared)))
 
 
-def _declared_unit(file: Path) -> float:
+def _declared_unit(content: str) -> float:
     """The unit of length that the file declares, in mm; millimetres if none."""
-    text = re.sub(r"\s+", "", file.read_text(encoding="latin-1")).upper()
+    text = re.sub(r"\s+", "", content).upper()
     units = [entity for entity in text.split(";") if "LENGTH_UNIT()" in entity]
     # An inch is declared as so many millimetres: the conversion comes first.
     for entity in units:

@@ -74,7 +74,7 @@ class Region(Record):
     """The part of a solid inside a physical volume `group` of its mesh file, of another material."""
 
     group: Title
-    """Name of the physical volume in the mesh file."""
+    """Name of the physical volume, element set or property in the mesh file; where two overlap, the smaller counts."""
     material: SolidMaterial
     """What it is made of."""
 

@@ -60,6 +60,7 @@ class ModalBody:
         input_hash: of the link file's content.
         modes_hash: of that part of it on which the modes depend; empty where not known.
         ffrobot_version: that made it.
+        remarks: what the file of a solid's part holds and the body does not, a sentence each.
 
     Raises:
         InputError: shapes do not fit together, something is not finite, or an identity does not hold.
@@ -98,6 +99,7 @@ class ModalBody:
     input_hash: str = ""
     modes_hash: str = ""
     ffrobot_version: str = ""
+    remarks: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         if not np.size(self.residual):

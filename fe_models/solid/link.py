@@ -151,19 +151,31 @@ def solid_modal_body(
             else None
         ),
         ffrobot_version=program_version(),
+        remarks=solid.remarks,
     )
 
 
 def _materials(link: SolidLink, solid: SolidMesh, path: Path) -> MaterialMap:
-    """Materials of the cells, by region."""
-    regions = []
+    """Materials of the cells, by region: of cells of several regions, that of the smallest."""
     for region in link.region:
         if region.group not in solid.regions:
-            found = ", ".join(solid.regions) or "none"
+            found = ", ".join(sorted(solid.regions)) or "none"
             raise InputError(
                 f"{path}: region.group: expected a volume group of the mesh ({found}), found {region.group}"
             )
-        regions.append((solid.cell_tags.find(solid.regions[region.group]), region.material))
+    largest_first = list(solid.regions)
+    ordered = sorted(link.region, key=lambda region: largest_first.index(region.group))
+    for k, region in enumerate(ordered):
+        inside = [other.group for other in ordered[k + 1 :]]
+        if set(solid.cells_of(region.group)) <= {tag for group in inside for tag in solid.cells_of(group)}:
+            raise InputError(
+                f"{path}: region.group of {region.group}: expected a volume group with cells of its own, found all of"
+                f" them in {', '.join(inside)} too"
+            )
+    find = solid.cell_tags.find
+    regions = [
+        (np.concatenate([find(tag) for tag in solid.cells_of(region.group)]), region.material) for region in ordered
+    ]
     return material_map(solid.mesh, link.material, regions)
 
 

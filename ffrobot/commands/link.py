@@ -36,3 +36,5 @@ def link(link_file: Path, output: Path | None, force: bool) -> None:
     verb = f"computed in {outcome.seconds:.2f} s{reused}" if outcome.computed else "up to date"
     highest = body.frequency[body.eigenmode_count - 1]
     click.echo(f"{outcome.path}: {verb}; {body.modes_in_words}, {body.frequency[0]:.6g} … {highest:.6g} Hz")
+    for remark in body.remarks:
+        click.echo(f"remark     {remark}")

@@ -93,6 +93,7 @@ def _optional(body: ModalBody) -> Iterator[str]:
         yield f"modal{_and_static(body)} stresses at {name}, {_place(body, point.position)}"
     if body.surface_stress is not None:
         yield f"modal{_and_static(body)} stresses on the surface, at {len(body.surface_stress)} points"
+    yield from (f"remark: {remark}" for remark in body.remarks)
     if (patches := body.surface_patches) is not None:
         faces = " and ".join(face for face in ("top", "bottom") if getattr(patches, face) is not None)
         places = ", ".join(f"{start:g} … {end:g}" for start, end in patches.edges)

@@ -153,6 +153,7 @@ stress/surface_static | Pa per unit | of unit loads
 stress/loads | | names of the unit loads
 craig_bampton/** | | matrices for other programs
 surface_patches/** | | outlines and modal forces of patches
+remarks | | what the part's file holds and the body does not
 """)
 
 

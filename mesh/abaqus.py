@@ -1,0 +1,232 @@
+"""Meshes from Abaqus and CalculiX decks: parts and their instances where the assembly puts them, ties, sets, surfaces.
+
+What makes or moves nodes and elements is read, or rejected by keyword and line; what else a deck says (materials,
+sections, loads, steps) the link file says. Elements beside solids are left out, and said to be.
+"""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ..common.arrays import Integers
+from ..common.errors import InputError
+from .abaqus_deck import Keyword, Sets
+from .abaqus_model import Deck, Instance
+from .cells import TO_GMSH
+from .included import number_of
+from .source import RawMesh
+
+# Corners of the sides S1, S2 … (Abaqus Analysis User's Guide, "Three-dimensional solid element library").
+_SIDES: dict[int, list[tuple[int, ...]]] = {
+    4: [(0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0)],
+    8: [(0, 1, 2, 3), (4, 7, 6, 5), (0, 4, 5, 1), (1, 5, 6, 2), (2, 6, 7, 3), (3, 7, 4, 0)],
+}
+_CORNERS = {"tetra": 4, "tetra10": 4, "hexahedron": 8, "hexahedron20": 8}
+# Nodes of tied surfaces closer than this, relative to the part, are one.
+_COINCIDENT = 1e-5
+
+
+def read_abaqus(path: Path, where: str) -> RawMesh:
+    """The mesh of an Abaqus or CalculiX deck; `where` (file and key) begins the message of an error.
+
+    Sets of elements name regions and, where they are shells, faces; so do surfaces and sets of nodes. Sets of a part
+    mean all its instances.
+
+    Raises:
+        InputError: something is not as it should be, or cannot be read; names keyword and line.
+    """
+    try:
+        return _Assembled(Deck(path)).mesh()
+    except InputError as error:
+        raise InputError(f"{where}: {error}") from None
+
+
+class _Assembled:
+    """The instances of a deck with one numbering of nodes and solid elements; "" is the assembly itself."""
+
+    def __init__(self, deck: Deck) -> None:
+        self.deck = deck
+        self.scopes = {"": Instance(deck.assembly), **deck.instances}
+        self.node: dict[str, dict[int, int]] = {}
+        self.solid: dict[str, dict[int, int]] = {}
+        count = cells = 0
+        for name, instance in self.scopes.items():
+            self.node[name] = {number: count + k for k, number in enumerate(instance.scope.nodes)}
+            count += len(instance.scope.nodes)
+            by_kind = sorted(instance.scope.solids.items(), key=lambda item: item[1][0])
+            instance.scope.solids = dict(by_kind)
+            self.solid[name] = {number: cells + k for k, (number, _) in enumerate(by_kind)}
+            cells += len(by_kind)
+        self.points = np.concatenate([instance.points() for instance in self.scopes.values()])
+
+    def mesh(self) -> RawMesh:
+        kinds: list[str] = []
+        cells: list[tuple[int, ...]] = []
+        for name, instance in self.scopes.items():
+            for number, (kind, nodes) in instance.scope.solids.items():
+                kinds.append(kind)
+                cells.append(tuple(self._node(name, node, f"element {number}") for node in nodes))
+        same, remarks = self._tied()
+        blocks = list[tuple[str, Integers]]()
+        for begin, end in _runs(kinds):
+            order = TO_GMSH.get(kinds[begin])
+            block = same[np.array(cells[begin:end], dtype=np.int64)]
+            blocks.append((kinds[begin], block if order is None else block[:, order]))
+        faces = {name: [same[piece] for piece in pieces] for name, pieces in self._faces().items()}
+        groups = {name: same[group] for name, group in self._node_sets().items()}
+        return RawMesh(
+            self.points, tuple(blocks), self._regions(), faces, groups, (), (), (*remarks, *self._left_out())
+        )
+
+    def _node(self, instance: str, number: int, of: str) -> int:
+        try:
+            return self.node[instance][number]
+        except KeyError:
+            where = f" of instance {instance}" if instance else ""
+            raise InputError(f"{of}{where}: expected nodes that are there, found node {number}") from None
+
+    def _regions(self) -> dict[str, Integers]:
+        found: dict[str, list[int]] = {}
+        for name, scope, instance, number in self._members("elsets"):
+            place = self.solid.get(instance, {}).get(number)
+            if place is not None:
+                found.setdefault(name, []).append(place)
+            elif number not in self.scopes[instance].scope.others:
+                raise InputError(f"*ELSET {name}{scope}: expected elements that are there, found element {number}")
+        return {name: np.array(cells, dtype=np.int64) for name, cells in found.items()}
+
+    def _node_sets(self) -> dict[str, Integers]:
+        found: dict[str, list[int]] = {}
+        for name, scope, instance, number in self._members("nsets"):
+            found.setdefault(name, []).append(self._node(instance, number, f"*NSET {name}{scope}"))
+        return {name: np.unique(np.array(nodes, dtype=np.int64)) for name, nodes in found.items()}
+
+    def _members(self, kind: str) -> Iterator[tuple[str, str, str, int]]:
+        """Name of each set as it is spelled, its scope in words, instance and number of its members."""
+        for own, instance in self.scopes.items():
+            sets: Sets = getattr(instance.scope, kind)
+            for key, name in sets.spelled.items():
+                for of, number, place in sets.numbers(key):
+                    if (of or own) not in self.scopes:
+                        raise InputError(f"{place}: expected an instance of the assembly, found {of}")
+                    yield name, f" of instance {own}" if own else "", of or own, number
+
+    def _faces(self) -> dict[str, list[Integers]]:
+        """Sides of solids by *SURFACE, and surface elements by set."""
+        found: dict[str, list[Integers]] = {}
+        for own, instance in self.scopes.items():
+            for keyword in instance.scope.faces.values():
+                corners = [face for face in self._sides(own, keyword) if face]
+                for size in {len(face) for face in corners}:
+                    rows = np.array([face for face in corners if len(face) == size], dtype=np.int64)
+                    found.setdefault(keyword.options["NAME"], []).append(rows)
+        for name, _, own, number in self._members("elsets"):
+            if (nodes := self.scopes[own].scope.surfaces.get(number)) is not None:
+                row = [self._node(own, node, f"element {number}") for node in nodes]
+                found.setdefault(name, []).append(np.array([row], dtype=np.int64))
+        return found
+
+    def _sides(self, own: str, keyword: Keyword) -> Iterator[tuple[int, ...]]:
+        """Corners of the sides of solids that a surface consists of."""
+        if keyword.options.get("TYPE", "ELEMENT").upper() != "ELEMENT":
+            return
+        sets = self.scopes[own].scope.elsets
+        for row, place in keyword.rows():
+            side = re.fullmatch(r"S([1-6])", row[1].upper()) if len(row) > 1 else None
+            if side is None:
+                continue
+            for instance, number, _ in sets.meant(row[0], place):
+                if (instance or own) not in self.scopes:
+                    raise InputError(f"{place}: expected an instance of the assembly, found {instance}")
+                if (solid := self.scopes[instance or own].scope.solids.get(number)) is None:
+                    continue
+                for corners in _SIDES.get(_CORNERS.get(solid[0], 0), [])[int(side[1]) - 1 : int(side[1])]:
+                    yield tuple(self._node(instance or own, solid[1][corner], place) for corner in corners)
+
+    def _tied(self) -> tuple[Integers, list[str]]:
+        """Which node each node is once tied surfaces share theirs, and what to say of it."""
+        same, remarks = np.arange(len(self.points)), list[str]()
+        used = np.unique([
+            self.node[name][node] for name, one in self.scopes.items() for _, nodes in one.scope.solids.values()
+            for node in nodes if node in self.node[name]
+        ]).astype(np.int64)  # fmt: skip
+        for tie in self.deck.ties:
+            for row, place in tie.rows():
+                pair = [self._surface_nodes(entry) for entry in row[:2]]
+                slave, master = (used if nodes is None else np.intersect1d(nodes, used) for nodes in pair)
+                joined = self._join(same, slave, master)
+                known = all(nodes is not None for nodes in pair) and len(pair) == 2
+                wanted = np.setdiff1d(slave, master).size
+                if joined < (wanted if known else 1) or joined == 0:
+                    raise InputError(
+                        f"*TIE, {place}: expected the nodes of {row[0]} where {' '.join(row[1:2])} has some, found"
+                        f" {joined} of {wanted} there: meshes that do not match cannot be tied"
+                    )
+                if not known:
+                    remarks.append(
+                        f"*TIE, {place}: its surfaces are not in the deck as sides of solids or nodes; all nodes of"
+                        f" instances that coincide are tied, {joined} pairs"
+                    )
+        while not np.array_equal(same, same[same]):
+            same = same[same]
+        return same, remarks
+
+    def _join(self, same: Integers, slave: Integers, master: Integers) -> int:
+        """Have nodes of `slave` be those of `master` that they coincide with; how many do."""
+        if not slave.size or not master.size:
+            return 0
+        near = _COINCIDENT * float(np.ptp(self.points[master], axis=0).max() or 1.0)
+        pairs = cKDTree(self.points[slave]).query_ball_tree(cKDTree(self.points[master]), near)
+        joined = 0
+        for node, partners in zip(slave.tolist(), pairs, strict=True):
+            others = [int(master[k]) for k in partners if int(master[k]) != node]
+            if others and same[others[0]] != same[node]:
+                low, high = sorted((int(same[others[0]]), int(same[node])))
+                same[same == high] = low
+            joined += bool(others)
+        return joined
+
+    def _surface_nodes(self, name: str) -> Integers | None:
+        """The nodes of a surface of sides of solids, or of nodes; None where the deck has no such surface."""
+        of, _, short = name.strip("\"'").upper().rpartition(".")
+        for own, instance in self.scopes.items():
+            keyword = instance.scope.faces.get(short)
+            if keyword is None or (of and of != own):
+                continue
+            nodes = [node for face in self._sides(own, keyword) for node in face]
+            if keyword.options.get("TYPE", "ELEMENT").upper() == "NODE":
+                for row, place in keyword.rows():
+                    found = instance.scope.nsets.meant(row[0], place)
+                    nodes += [self._node(of_node or own, node, place) for of_node, node, _ in found]
+            if nodes:
+                return np.unique(np.array(nodes, dtype=np.int64))
+        return None
+
+    def _left_out(self) -> Iterator[str]:
+        others = Counter(kind for one in self.scopes.values() for kind in one.scope.others.values())
+        if others:
+            listed = ", ".join(f"{count} {kind}" for kind, count in others.items())
+            yield f"elements beside solids are left out, with their stiffness and mass: {listed}"
+        for keyword in self.deck.masses:
+            value = next((number_of(row[0], place) for row, place in keyword.rows()), 0.0)
+            name = keyword.options.get("ELSET", "").upper()
+            sets = [one.scope.elsets for one in self.scopes.values()]
+            count = sum(1 for of in sets if name in of.members for _ in of.numbers(name))
+            yield f"{keyword}: left out, {count} of {value:g} each: give an interface its `mass`"
+        if unread := [f"*{name}" for name, count in self.deck.not_read.items() if count]:
+            yield f"not read: {', '.join(unread)}"
+
+
+def _runs(kinds: list[str]) -> Iterator[tuple[int, int]]:
+    """Begin and end of each run of equal entries."""
+    begin = 0
+    for end in range(1, len(kinds) + 1):
+        if end == len(kinds) or kinds[end] != kinds[begin]:
+            yield begin, end
+            begin = end

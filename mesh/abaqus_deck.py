@@ -1,0 +1,168 @@
+"""Abaqus and CalculiX decks as text: keywords with their options and data lines, sets that name others."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from ..common.errors import InputError
+from .included import Line, included, lines_of, whole_of
+
+MOST = 1e7  # members of a set
+_OF_DATA = ("NODE", "ELEMENT", "NSET", "ELSET", "SURFACE")  # whose data may stand in a file of their own
+
+
+@dataclass
+class Keyword:
+    """`*NAME, OPTION=value, …` in upper case (values as they are), where it stands, and its data lines."""
+
+    name: str
+    options: Mapping[str, str]
+    place: str
+    data: list[Line] = field(default_factory=list)
+
+    def __str__(self) -> str:
+        return f"*{self.name}, {self.place}"
+
+    def rows(self) -> Iterator[tuple[list[str], str]]:
+        """The entries of each data line, without empty ones at its end, and its place."""
+        for line in self.data:
+            entries = [entry.strip() for entry in line.text.split(",")]
+            while entries and not entries[-1]:
+                entries.pop()
+            if entries:
+                yield entries, line.place
+
+    def option(self, name: str) -> str:
+        """A required option. Raises `InputError` where it is not there."""
+        if not self.options.get(name):
+            raise InputError(f"{self}: expected {name}=…, found none")
+        return self.options[name]
+
+
+def keywords(path: Path) -> Iterator[Keyword]:
+    """The keywords of a deck, of included files too; comments and empty lines left out.
+
+    Raises:
+        InputError: an included file is not there.
+    """
+    current: Keyword | None = None
+    lines = lines_of(path, _included)
+    for line in lines:
+        text = line.text.strip()
+        if not text or text.startswith("**"):
+            continue
+        if not text.startswith("*"):
+            if current is None:
+                raise InputError(f'expected a keyword (*NODE …) first, found "{text[:40]}" ({line.place})')
+            current.data.append(line)
+            continue
+        if current is not None:
+            yield current
+        while text.endswith(","):
+            following = next(lines, None)
+            if following is None:
+                break
+            text = text if following.text.startswith("**") else text + following.text.strip()
+        current = _keyword(text, line.place)
+        if current.name in _OF_DATA and "INPUT" in current.options:
+            current.data.extend(_data_of(current, path))
+    if current is not None:
+        yield current
+
+
+def _data_of(keyword: Keyword, path: Path) -> Iterator[Line]:
+    """The data lines of *NODE, INPUT=FILE."""
+    name = keyword.options["INPUT"]
+    file = included(name, path, path)
+    if file is None:
+        raise InputError(f"{keyword}: expected a file of data, found none called {name}")
+    for line in lines_of(file, lambda *_: None):
+        if not line.text.startswith("**"):
+            yield Line(line.text, f"{file.name}, {line.place}")
+
+
+def _included(following: Iterator[str], line: str) -> str | None:
+    """The file of *INCLUDE."""
+    text = line.lstrip()
+    if not text.startswith("*") or text.startswith("**") or "INCLUDE" not in text.upper():
+        return None
+    keyword = _keyword(text.strip(), "")
+    if keyword.name == "INCLUDE":
+        while text.rstrip().endswith(","):
+            text = text.rstrip() + next(following, "").strip()
+        return _keyword(text.strip(), "").options.get("INPUT", "")
+    return None
+
+
+def _keyword(text: str, place: str) -> Keyword:
+    first, *others = re.findall(r'(?:"[^"]*"|[^,"])+', text[1:]) or [""]
+    options = {}
+    for other in others:
+        name, _, value = other.partition("=")
+        options[" ".join(name.split()).upper()] = value.strip().strip("\"'")
+    return Keyword(" ".join(first.split()).upper(), options, place)
+
+
+@dataclass
+class Sets:
+    """Named sets whose members are numbers, INSTANCE.NUMBER, or other sets; names in any case.
+
+    A member is (instance, entry, place), instance "" for the scope that the set stands in; `of_instances` are the sets
+    that names of the form INSTANCE.SET mean.
+    """
+
+    what: str
+    members: dict[str, list[tuple[str, str | int, str]]] = field(default_factory=dict)
+    spelled: dict[str, str] = field(default_factory=dict)
+    of_instances: Mapping[str, Sets] = field(default_factory=dict)
+
+    def copy(self) -> Sets:
+        """Sets of the same members, which can be added to."""
+        return Sets(self.what, {name: list(of) for name, of in self.members.items()}, dict(self.spelled))
+
+    def add(self, name: str, entries: Iterable[tuple[str, str | int, str]]) -> None:
+        """Add (instance, entry, place) to a set."""
+        self.spelled.setdefault(name.upper(), name)
+        self.members.setdefault(name.upper(), []).extend(entries)
+
+    def read(self, keyword: Keyword, name: str) -> None:
+        """Add what the data lines of *NSET or *ELSET say."""
+        instance = keyword.options.get("INSTANCE", "").upper()
+        if "GENERATE" not in keyword.options:
+            self.add(name, ((instance, entry, place) for row, place in keyword.rows() for entry in row if entry))
+            return
+        for row, place in keyword.rows():
+            first, last, step = (whole_of(entry, place) for entry in [*row, "1"][:3])
+            if len(row) < 2 or step == 0 or abs(last - first) > abs(step) * MOST:
+                raise InputError(f"{place}: expected first, last and step of {self.what}, found {', '.join(row)}")
+            self.add(name, ((instance, number, place) for number in range(first, last + (step > 0) - (step < 0), step)))
+
+    def numbers(self, name: str, within: tuple[str, ...] = ()) -> Iterator[tuple[str, int, str]]:
+        """(instance, number, place) of the members of a set, those of sets in it too.
+
+        Raises:
+            InputError: a set in it is not there, or contains itself.
+        """
+        for instance, entry, place in self.members[name]:
+            if isinstance(entry, int):
+                yield instance, entry, place
+                continue
+            for found, number, _ in self.meant(entry, place, (name, *within)):
+                yield instance or found, number, place
+
+    def meant(self, entry: str, place: str, within: tuple[str, ...] = ()) -> Iterator[tuple[str, int, str]]:
+        """Likewise of what `entry` means: NUMBER, INSTANCE.NUMBER, SET or INSTANCE.SET."""
+        name = entry.strip("\"'").upper()
+        of, _, short = name.rpartition(".")
+        if short.isdigit():
+            yield of, int(short), place
+        elif name in self.members and name not in within:
+            yield from self.numbers(name, within)
+        elif of in self.of_instances and short in self.of_instances[of].members:
+            for found, number, _ in self.of_instances[of].numbers(short):
+                yield found or of, number, place
+        else:
+            raise InputError(f'{place}: expected {self.what} or a set of them, found "{entry}"')

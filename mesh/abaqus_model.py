@@ -1,0 +1,245 @@
+"""What an Abaqus or CalculiX deck says of meshes: parts, their instances, and the assembly, keyword by keyword."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from ..common.arrays import Array
+from ..common.errors import InputError
+from .abaqus_deck import Keyword, Sets, keywords
+from .frames import GLOBAL, Frame
+from .included import number_of, whole_of
+
+_SOLID = re.compile(r"C3D(4|5|6|8|10|15|20)[A-Z]*")
+_KINDS = {4: "tetra", 5: "pyramid", 6: "wedge", 8: "hexahedron", 10: "tetra10", 15: "wedge15", 20: "hexahedron20"}
+# Surface elements, which name faces; the digit is their number of nodes.
+_SURFACE = re.compile(r"(?:STRI|S|DS|CPS|CPE|CPEG|CAX|M3D|R3D|SFM3D)(3|4|65|6|8|9)(?![0-9]{2})[A-Z0-9]*")
+_MAKING = (
+    "ELCOPY", "ELGEN", "IMPORT", "MATRIX ASSEMBLE", "MATRIX INPUT", "MODEL CHANGE", "NCOPY", "NFILL", "NGEN", "NMAP",
+    "PARAMETER", "SUBSTRUCTURE GENERATE", "SYMMETRIC MODEL GENERATION", "USER ELEMENT",
+)  # fmt: skip
+# Beside these, a keyword that is not read is named in a remark.
+_OF_THE_LINK = (
+    "AMPLITUDE", "ASSEMBLY", "CONDUCTIVITY", "DAMPING", "DENSITY", "ELASTIC", "END ASSEMBLY", "END INSTANCE",
+    "END PART", "EXPANSION", "HEADING", "INITIAL CONDITIONS", "MASS", "MATERIAL", "ORIENTATION", "PART",
+    "PHYSICAL CONSTANTS", "PLASTIC", "PREPRINT", "RESTART", "SHELL SECTION", "SOLID SECTION", "SPECIFIC HEAT",
+    "TRANSFORM", "BEAM SECTION", "SURFACE INTERACTION", "FRICTION", "SURFACE BEHAVIOR", "BOUNDARY",
+)  # fmt: skip
+
+
+@dataclass
+class Scope:
+    """A part, an instance, or the assembly: `nodes` number → coordinates, `solids` number → (type, nodes), and sets."""
+
+    frame: Frame = GLOBAL
+    nodes: dict[int, tuple[float, float, float]] = field(default_factory=dict)
+    solids: dict[int, tuple[str, tuple[int, ...]]] = field(default_factory=dict)
+    surfaces: dict[int, tuple[int, ...]] = field(default_factory=dict)
+    others: dict[int, str] = field(default_factory=dict)
+    nsets: Sets = field(default_factory=lambda: Sets("nodes"))
+    elsets: Sets = field(default_factory=lambda: Sets("elements"))
+    faces: dict[str, Keyword] = field(default_factory=dict)
+
+    def copy(self) -> Scope:
+        """One of the same content, which can be added to."""
+        return replace(
+            self, nodes=dict(self.nodes), solids=dict(self.solids), surfaces=dict(self.surfaces),
+            others=dict(self.others), nsets=self.nsets.copy(), elsets=self.elsets.copy(), faces=dict(self.faces),
+        )  # fmt: skip
+
+    def read(self, keyword: Keyword) -> bool:
+        """Take in what `keyword` says of a mesh; whether it says any."""
+        readers: dict[str, Callable[[Keyword], None]] = {
+            "NODE": self._nodes, "ELEMENT": self._elements, "SYSTEM": self._system, "NSET": self._nset,
+            "ELSET": self._elset, "SURFACE": self._surface,
+        }  # fmt: skip
+        if keyword.name not in readers:
+            return False
+        readers[keyword.name](keyword)
+        return True
+
+    def _system(self, keyword: Keyword) -> None:
+        values = [[number_of(entry or "0", place) for entry in row] for row, place in keyword.rows()]
+        numbers = np.array([value for row in values for value in row])
+        if numbers.size not in (0, 3, 6, 9):
+            raise InputError(f"{keyword}: expected three points, found {numbers.size} coordinates")
+        points = numbers.reshape(-1, 3)
+        if len(points) == 2:  # the z axis stays
+            x = points[1] - points[0]
+            points = np.array([points[0], points[0] + [x[0], x[1], 0], points[0] + [-x[1], x[0], 0]])
+        try:
+            frames = {0: GLOBAL, 1: Frame(points[0], np.eye(3)) if len(points) else GLOBAL}
+            self.frame = frames[len(points)] if len(points) < 2 else Frame.through(points, "xy")
+        except ValueError as error:
+            raise InputError(f"{keyword}: expected three points that span a plane, found {error}") from None
+
+    def _nodes(self, keyword: Keyword) -> None:
+        system = (keyword.options.get("SYSTEM") or "R").upper()
+        if system not in ("R", "C"):
+            raise InputError(f"{keyword}: expected SYSTEM=R or C, found {system} (spherical): write Cartesian ones")
+        read: dict[int, tuple[list[float], str]] = {}
+        for row, place in keyword.rows():
+            number = whole_of(row[0], place)
+            coordinates = [number_of(entry or "0", place) for entry in row[1:4]]
+            coordinates += [0.0] * (3 - len(coordinates))
+            if number in read and read[number][0] != coordinates:
+                raise InputError(f"{place}: expected one place of each node, found another one of node {number}")
+            read[number] = coordinates, place
+        if not read:
+            return
+        frame = replace(self.frame, kind="cylindrical" if system == "C" else "rectangular")
+        given = np.array([coordinates for coordinates, _ in read.values()])
+        for (number, (_, place)), point in zip(read.items(), frame.points(given).tolist(), strict=True):
+            if self.nodes.setdefault(number, tuple(point)) != tuple(point):
+                raise InputError(f"{place}: expected one place of each node, found another one of node {number}")
+        if name := keyword.options.get("NSET"):
+            self.nsets.add(name, (("", number, place) for number, (_, place) in read.items()))
+
+    def _elements(self, keyword: Keyword) -> None:
+        kind = keyword.option("TYPE").upper()
+        solid, surface = _SOLID.fullmatch(kind), _SURFACE.fullmatch(kind)
+        count = int(solid[1]) if solid else {"65": 6}.get(surface[1], int(surface[1])) if surface else 0
+        found: list[tuple[int, str]] = []
+        for entries, place in _of_length(keyword, count + 1) if count else keyword.rows():
+            if not count:
+                if entries[0].isdigit():
+                    self.others[int(entries[0])] = kind
+                    found.append((int(entries[0]), place))
+                continue
+            number = whole_of(entries[0], place)
+            found.append((number, place))
+            nodes = tuple(whole_of(entry, place) for entry in entries[1:])
+            if solid:
+                entry = _KINDS[count], nodes
+                if self.solids.setdefault(number, entry) != entry:
+                    raise InputError(f"{place}: expected elements with numbers of their own, found {number} again")
+            else:
+                self.others[number] = kind
+                self.surfaces[number] = nodes[: 3 if count in (3, 6) else 4]
+        if name := keyword.options.get("ELSET"):
+            self.elsets.add(name, (("", number, place) for number, place in found))
+
+    def _nset(self, keyword: Keyword) -> None:
+        if "ELSET" in keyword.options:
+            raise InputError(f"{keyword}: expected a list of nodes, found those of the elements of a set (ELSET=)")
+        self.nsets.read(keyword, keyword.option("NSET"))
+
+    def _elset(self, keyword: Keyword) -> None:
+        self.elsets.read(keyword, keyword.option("ELSET"))
+
+    def _surface(self, keyword: Keyword) -> None:
+        self.faces[keyword.option("NAME").upper()] = keyword
+
+
+def _of_length(keyword: Keyword, length: int) -> Iterator[tuple[list[str], str]]:
+    """Entries of elements of so many, over as many data lines as they take, and the place of the first."""
+    entries: list[str] = []
+    begin = ""
+    for row, place in keyword.rows():
+        begin = begin if entries else place
+        entries += row
+        if len(entries) > length:
+            raise InputError(f"{begin}: expected {length - 1} nodes of an element, found {len(entries) - 1}")
+        if len(entries) == length:
+            yield entries, begin
+            entries = []
+    if entries:
+        raise InputError(f"{begin}: expected {length - 1} nodes of an element, found {len(entries) - 1}")
+
+
+@dataclass
+class Instance:
+    """A part in the assembly: `place` of its keyword, turned by `rotation` about `center` after it has been `moved`."""
+
+    scope: Scope
+    place: str = ""
+    moved: Array = field(default_factory=lambda: np.zeros(3))
+    center: Array = field(default_factory=lambda: np.zeros(3))
+    rotation: Rotation = field(default_factory=Rotation.identity)
+
+    @classmethod
+    def of(cls, keyword: Keyword, parts: dict[str, Scope]) -> Instance:
+        """From *INSTANCE and its data lines: a translation, then a turn about an axis through two points."""
+        name = keyword.option("PART")
+        if name.upper() not in parts:
+            raise InputError(f"{keyword}: expected PART= one of {', '.join(parts) or 'none'}, found {name}")
+        part = parts[name.upper()]
+        own = part.copy()
+        rows = [([number_of(entry or "0", place) for entry in row], place) for row, place in keyword.rows()]
+        found = cls(own, str(keyword))
+        if len(rows) > 2 or (rows and len(rows[0][0]) > 3):
+            raise InputError(f"{keyword}: expected a line of 3 numbers (translation) and one of 7 (rotation) at most")
+        if rows:
+            found.moved = np.array([*rows[0][0], 0.0, 0.0, 0.0][:3])
+        if len(rows) > 1:
+            values, place = rows[1]
+            axis = np.subtract(values[3:6], values[:3]) if len(values) == 7 else np.zeros(3)
+            if not np.linalg.norm(axis) > 0:
+                raise InputError(f"{place}: expected two points on an axis and an angle, found {values}")
+            found.center = np.array(values[:3])
+            found.rotation = Rotation.from_rotvec(np.radians(values[6]) * axis / np.linalg.norm(axis))
+        return found
+
+    def points(self) -> Array:
+        """(p, 3) of its nodes, in the assembly."""
+        own = np.array(list(self.scope.nodes.values()), dtype=np.float64).reshape(-1, 3) + self.moved
+        placed: Array = self.center + self.rotation.apply(own - self.center) if len(own) else own
+        return placed
+
+
+class Deck:
+    """What a deck says, gathered keyword by keyword: in `instances` those of parts, in `assembly` all else."""
+
+    def __init__(self, path: Path) -> None:
+        self.parts: dict[str, Scope] = {}
+        self.assembly = Scope()
+        self.instances: dict[str, Instance] = {}
+        self.ties: list[Keyword] = []
+        self.masses: list[Keyword] = []
+        self.not_read: Counter[str] = Counter()
+        scope, in_step = self.assembly, False
+        for keyword in keywords(path):
+            if keyword.name in _MAKING:
+                raise InputError(f"{keyword}: expected nodes and elements one by one, found *{keyword.name}")
+            if keyword.name == "STEP":
+                in_step = True
+            elif in_step:
+                in_step = keyword.name != "END STEP"
+            elif keyword.name == "PART":
+                scope = self._new_part(keyword)
+            elif keyword.name == "INSTANCE":
+                scope = self._new_instance(keyword)
+            elif keyword.name in ("END PART", "END INSTANCE"):
+                scope = self.assembly
+            elif keyword.name == "TIE":
+                self.ties.append(keyword)
+            elif not scope.read(keyword):
+                self.masses += [keyword] if keyword.name == "MASS" else []
+                self.not_read[keyword.name] += keyword.name not in _OF_THE_LINK
+        self.assembly.nsets.of_instances = {name: one.scope.nsets for name, one in self.instances.items()}
+        self.assembly.elsets.of_instances = {name: one.scope.elsets for name, one in self.instances.items()}
+        if not self.instances and self.parts:
+            if len(self.parts) > 1:
+                raise InputError(f"expected an *INSTANCE of each part, found none of {', '.join(self.parts)}")
+            self.instances = {name: Instance(part) for name, part in self.parts.items()}
+
+    def _new_part(self, keyword: Keyword) -> Scope:
+        name = keyword.option("NAME").upper()
+        if name in self.parts:
+            raise InputError(f"{keyword}: expected parts with names of their own, found {name} again")
+        return self.parts.setdefault(name, Scope())
+
+    def _new_instance(self, keyword: Keyword) -> Scope:
+        if {"LIBRARY", "INSTANCE"} & keyword.options.keys():
+            raise InputError(f"{keyword}: expected an instance of a part in this deck, found one of results (LIBRARY=)")
+        name = keyword.option("NAME").upper()
+        if name in self.instances:
+            raise InputError(f"{keyword}: expected instances with names of their own, found {name} again")
+        return self.instances.setdefault(name, Instance.of(keyword, self.parts)).scope

@@ -1,0 +1,59 @@
+"""Local axes that files of meshes give their nodes in: rectangular, cylindrical, spherical."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from ..common.arrays import Array
+
+Kind = Literal["rectangular", "cylindrical", "spherical"]
+
+
+@dataclass(frozen=True)
+class Frame:
+    """Axes `C` (3, 3; columns are the axes) at `origin` (3,), both in global axes, and what coordinates mean in them.
+
+    Cylindrical ones are r, θ, z; spherical ones r, θ from the z axis, φ about it from the x axis (Nastran); degrees.
+    """
+
+    origin: Array
+    C: Array
+    kind: Kind = "rectangular"
+
+    @classmethod
+    def through(cls, points: Array, axes: str, kind: Kind = "rectangular") -> Frame:
+        """From `points` (3, 3): the origin, one on the axis `axes[0]` from there, one on the side of `axes[1]`.
+
+        `axes` are in cyclic order: "xy", "yz" or "zx".
+
+        Raises:
+            ValueError: the three points lie on one line.
+        """
+        origin = points[0]
+        a, b = points[1:] - origin
+        c = np.cross(a, b)
+        if not np.linalg.norm(c) > 1e-9 * np.linalg.norm(a) * np.linalg.norm(b):
+            raise ValueError("three points on one line")
+        a, c = a / np.linalg.norm(a), c / np.linalg.norm(c)
+        unit = {axes[0]: a, axes[1]: np.cross(c, a)}
+        return cls(origin, np.stack([unit.get(axis, c) for axis in "xyz"], axis=1), kind)
+
+    def points(self, coordinates: Array) -> Array:
+        """(p, 3) global coordinates of points with `coordinates` (p, 3) in this frame."""
+        a, b, c = np.asarray(coordinates, dtype=np.float64).T
+        if self.kind == "rectangular":
+            local = np.stack([a, b, c], axis=1)
+        elif self.kind == "cylindrical":
+            local = np.stack([a * np.cos(np.radians(b)), a * np.sin(np.radians(b)), c], axis=1)
+        else:
+            across = a * np.sin(np.radians(b))
+            around = np.radians(c)
+            local = np.stack([across * np.cos(around), across * np.sin(around), a * np.cos(np.radians(b))], axis=1)
+        placed: Array = self.origin + local @ self.C.T
+        return placed
+
+
+GLOBAL = Frame(np.zeros(3), np.eye(3))

@@ -1,0 +1,119 @@
+"""Text files that include others, as Abaqus and Nastran decks do: their lines, and which files they consist of.
+
+NumPy is not needed: input hashes are made of `files_of`.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+from ..common.errors import InputError
+
+_ABAQUS = re.compile(  # the keyword line goes on after a comma at its end
+    rb"""^[ \t]*\*(?:[^*\n,]|,[ \t]*+(?:\r?\n)?+)*?\bINPUT[ \t]*=[ \t]*["']?([^"',\r\n]+)""",
+    re.MULTILINE | re.IGNORECASE,
+)
+_NASTRAN = re.compile(rb"""^[ \t]*INCLUDE[ \t]*["']([^"']+)["']""", re.MULTILINE | re.IGNORECASE)
+_XDMF = re.compile(rb">\s*([^<>:]+?)\s*:")
+_REFERENCES = {
+    ".inp": _ABAQUS, ".bdf": _NASTRAN, ".nas": _NASTRAN, ".fem": _NASTRAN, ".xdmf": _XDMF, ".xmf": _XDMF,
+}  # fmt: skip
+DEEPEST = 20
+
+
+class Line(NamedTuple):
+    """A line of a deck: its `text` without the line end, and the `place` that it has, as messages name it."""
+
+    text: str
+    place: str
+
+
+def files_of(path: Path) -> list[Path]:
+    """`path`, and the files that there are of those that it includes, in order."""
+    pattern = _REFERENCES.get(path.suffix.lower())
+    found: dict[Path, None] = {}
+
+    def add(file: Path) -> None:
+        found[file] = None
+        if pattern is None:
+            return
+        for name in pattern.findall(file.read_bytes()):
+            other = included(name.decode("utf-8", errors="replace"), file, path)
+            if other is not None and other not in found:
+                add(other)
+
+    add(path)
+    return list(found)
+
+
+def included(name: str, file: Path, first: Path) -> Path | None:
+    """The file that `file` calls `name`: beside it, or beside the `first` one of the deck; None where it is not."""
+    name = re.sub(r"\s*[\r\n]\s*", "", name).strip()
+    try:
+        return next((path for path in (file.parent / name, first.parent / name) if name and path.is_file()), None)
+    except (OSError, ValueError):  # no name of a file at all
+        return None
+
+
+def lines_of(first: Path, include: Callable[[Iterator[str], str], str | None]) -> Iterator[Line]:
+    """The lines of a deck, those of included files in place of the line that includes them.
+
+    Args:
+        first: file of the deck.
+        include: gets the lines that follow, and a line; the name of the file that this includes, None if it does not.
+
+    Raises:
+        InputError: an included file is not there, includes itself, or inclusions are nested too deeply.
+    """
+
+    def of(file: Path, within: tuple[Path, ...]) -> Iterator[Line]:
+        text = file.read_bytes().decode("utf-8-sig", errors="replace")
+        number = 0
+
+        def counted() -> Iterator[str]:
+            nonlocal number
+            for line in re.split(r"\r\n|\n|\r", text):
+                number += 1
+                yield line
+
+        following = counted()
+        for line in following:
+            place = f"line {number}" if file == first else f"{file.name}, line {number}"
+            name = include(following, line)
+            if name is None:
+                yield Line(line, place)
+                continue
+            other = included(name, file, first)
+            if other is None:
+                raise InputError(f"{place}: expected a file to include, found none called {name}")
+            if other in within or len(within) > DEEPEST:
+                raise InputError(f"{place}: expected files that do not include themselves, found {name} again")
+            yield from of(other, (*within, other))
+
+    return of(first, (first,))
+
+
+def number_of(token: str, place: str) -> float:
+    """A number as Fortran writes it: 1.5, 1.D-3, and Nastran's 1.5-3.
+
+    Raises:
+        InputError: it is none.
+    """
+    try:
+        return float(token)
+    except ValueError:
+        exponent = re.fullmatch(r"([+-]?(?:\d+\.?\d*|\.\d+))[DdEe]?([+-]?\d+)", token.strip())
+        if exponent is None:
+            raise InputError(f'{place}: expected a number, found "{token}"') from None
+        return float(f"{exponent[1]}e{exponent[2]}")
+
+
+def whole_of(token: str, place: str) -> int:
+    """A whole number. Raises `InputError` where `token` is none."""
+    try:
+        return int(token)
+    except ValueError:
+        raise InputError(f'{place}: expected a whole number, found "{token}"') from None

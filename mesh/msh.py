@@ -1,0 +1,165 @@
+"""Meshes in gmsh's own format. Importing this loads gmsh.
+
+gmsh takes what it does not know for a script, and runs it: so the header is checked, and gmsh sees a copy of the file
+in an empty folder alone (beside `x.msh` it would run `x.msh.opt`). Version 2 is read here, since gmsh puts all elements
+of one elementary entity into all physical groups that any of them has. See "MSH file format" in the manual of gmsh.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import gmsh
+import numpy as np
+
+from ..common.arrays import Array, Integers
+from ..common.errors import InputError
+from .cells import GMSH_CORNERS, GMSH_NODES, VOLUME_ELEMENTS
+from .gmsh_session import extract_mesh, gmsh_session
+from .source import RawMesh
+
+_HEADER = b"$MeshFormat"
+
+
+def read_msh(path: Path, where: str) -> RawMesh:
+    """A mesh in gmsh's format of version 2 or 4; `where` (file and key) begins the message of an error.
+
+    Raises:
+        InputError: it is none, or damaged.
+    """
+    content = path.read_bytes().removeprefix(b"\xef\xbb\xbf").lstrip()
+    while content.startswith(b"$Comments"):
+        content = content.partition(b"$EndComments")[2].lstrip()
+    if not content.startswith(_HEADER):
+        began = content[:20].decode("ascii", errors="replace").split("\n")[0]
+        raise InputError(
+            f'{where}: expected a mesh in gmsh\'s format, which begins with $MeshFormat, found "{began}" '
+            "(gmsh's scripts are not run: save the mesh that they make)"
+        )
+    try:
+        version = float(content[len(_HEADER) :].split(maxsplit=1)[0])
+        if version < 4:
+            return _Version2(content).mesh()
+        return _by_gmsh(content)
+    except InputError as error:
+        raise InputError(f"{where}: {error}") from None
+    except Exception as error:  # gmsh raises nothing more special; of a damaged file, numbers that are none or too few
+        reason = " ".join(str(error).split())
+        raise InputError(f"{where}: expected a mesh in gmsh's format, found a damaged one: {reason}") from None
+
+
+def _by_gmsh(content: bytes) -> RawMesh:
+    with TemporaryDirectory() as folder, gmsh_session():
+        alone = Path(folder) / "mesh.msh"
+        alone.write_bytes(content)
+        gmsh.merge(str(alone))
+        return extract_mesh()
+
+
+class _Version2:
+    """A file of version 2: `$Nodes`, `$Elements` with the tag of their physical group first, `$PhysicalNames`."""
+
+    def __init__(self, content: bytes) -> None:
+        header = self._section(content, b"MeshFormat").split(b"\n")
+        self._is_binary = header[0].split()[1] != b"0"
+        if self._is_binary and header[1][:4] != np.int32(1).tobytes():
+            raise InputError("expected little-endian numbers, found big-endian ones")
+        self._content = content
+
+    def mesh(self) -> RawMesh:
+        number, points = self._nodes()
+        names = self._names()
+        blocks: list[tuple[str, Integers]] = []
+        regions: dict[str, list[Integers]] = {}
+        facets: dict[str, list[Integers]] = {}
+        surfaces, lines = list[Integers](), list[Integers]()
+        count = 0
+        for kind, groups, tags in (self._binary_elements if self._is_binary else self._text_elements)():
+            cells = number(tags)
+            volume = kind in VOLUME_ELEMENTS
+            for group in np.unique(groups[groups != 0]).tolist():
+                name = names.get((3 if volume else 2, abs(group)), str(abs(group)))
+                rows = np.flatnonzero(groups == group)
+                if volume:
+                    regions.setdefault(name, []).append(count + rows)
+                elif kind in GMSH_CORNERS:
+                    facets.setdefault(name, []).append(cells[rows, : GMSH_CORNERS[kind]])
+            if volume:
+                blocks.append((VOLUME_ELEMENTS[kind], cells))
+                count += len(cells)
+            elif kind in GMSH_CORNERS:
+                surfaces.append(cells[:, : GMSH_CORNERS[kind]])
+            elif GMSH_NODES[kind] > 1:
+                lines.append(cells[:, :2])
+        whole = {name: np.concatenate(rows) for name, rows in regions.items()}
+        return RawMesh(points, tuple(blocks), whole, facets, {}, tuple(surfaces), tuple(lines))
+
+    @staticmethod
+    def _section(content: bytes, name: bytes) -> bytes:
+        """What stands between $NAME and $EndNAME, without the line ends around it; empty where there is none."""
+        _, found, rest = content.partition(b"$" + name)
+        inside, end, _ = rest.partition(b"$End" + name)
+        if found and not end:
+            raise InputError(f"expected ${name.decode()} to end with $End{name.decode()}, found the end of the file")
+        return inside.partition(b"\n")[2]
+
+    def _nodes(self) -> tuple[Callable[[Integers], Integers], Array]:
+        """How tags of nodes become places among them, and (p, 3) coordinates."""
+        count, _, data = self._section(self._content, b"Nodes").partition(b"\n")
+        if self._is_binary:
+            rows = np.frombuffer(data, dtype=[("tag", "<i4"), ("x", "<f8", 3)], count=int(count))
+            tags, points = rows["tag"].astype(np.int64), rows["x"].astype(np.float64)
+        else:
+            values = np.array(data.split(), dtype=np.float64).reshape(int(count), 4)
+            tags, points = values[:, 0].astype(np.int64), values[:, 1:]
+        order = np.argsort(tags, kind="stable")
+        ordered = tags[order]
+        if np.any(ordered[1:] == ordered[:-1]):
+            raise InputError("expected nodes with numbers of their own, found two nodes of one number")
+
+        def number(wanted: Integers) -> Integers:
+            place = np.minimum(np.searchsorted(ordered, wanted), max(len(ordered) - 1, 0))
+            if not len(ordered) or np.any(ordered[place] != wanted):
+                raise InputError("expected elements of the nodes in $Nodes, found some of others")
+            found: Integers = order[place]
+            return found
+
+        return number, points
+
+    def _names(self) -> dict[tuple[int, int], str]:
+        """Names of physical groups by dimension and tag."""
+        lines = self._section(self._content, b"PhysicalNames").decode("utf-8", errors="replace").splitlines()[1:]
+        rows = [line.split(maxsplit=2) for line in lines if line.strip()]
+        return {(int(row[0]), int(row[1])): row[2].strip().strip('"') for row in rows}
+
+    def _text_elements(self) -> Iterator[tuple[int, Integers, Integers]]:
+        """Type, (c,) physical group of each element (0: none) and (c, v) tags of its nodes."""
+        lines = self._section(self._content, b"Elements").splitlines()
+        rows: dict[tuple[int, int, int], list[list[bytes]]] = {}
+        found = 0
+        for line in filter(None, (line.split() for line in lines[1:])):
+            rows.setdefault((int(line[1]), int(line[2]), len(line)), []).append(line)
+            found += 1
+        if found != int(lines[0]):
+            raise InputError(f"expected the {int(lines[0])} elements that $Elements announces, found {found}")
+        for (kind, tags, length), of in rows.items():
+            data = np.array(of, dtype=np.int64)
+            if length - 3 - tags != GMSH_NODES.get(kind):
+                known = GMSH_NODES.get(kind, "elements of a known type, not")
+                raise InputError(f"expected {known} nodes of elements of type {kind}, found {length - 3 - tags}")
+            yield kind, data[:, 3] if tags else np.zeros(len(of), dtype=np.int64), data[:, 3 + tags :]
+
+    def _binary_elements(self) -> Iterator[tuple[int, Integers, Integers]]:
+        announced, _, data = self._section(self._content, b"Elements").partition(b"\n")
+        at = found = 0
+        while found < int(announced):
+            kind, count, tags = (int(value) for value in np.frombuffer(data, dtype="<i4", count=3, offset=at))
+            if kind not in GMSH_NODES or count < 1 or tags < 0:
+                raise InputError(f"expected elements of a known type, found {count} of type {kind}")
+            width = 1 + tags + GMSH_NODES[kind]
+            rows = np.frombuffer(data, dtype="<i4", count=count * width, offset=at + 12).reshape(count, width)
+            at, found = at + 12 + 4 * count * width, found + count
+            values = rows.astype(np.int64)
+            yield kind, values[:, 1] if tags else np.zeros(count, dtype=np.int64), values[:, 1 + tags :]

@@ -1,0 +1,210 @@
+"""Meshes from Nastran's bulk data: grid points in any coordinate system, solid elements by property.
+
+Elements beside solids are left out, and said to be; materials, properties, loads and constraints the link file says.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from ..common.arrays import Array, Integers
+from ..common.errors import InputError
+from .cells import TO_GMSH
+from .frames import GLOBAL, Frame, Kind
+from .nastran_cards import Card, cards
+from .source import RawMesh
+
+# Solid elements: corners, all nodes, names of both types.
+_SOLIDS = {
+    "CTETRA": (4, 10, "tetra", "tetra10"),
+    "CHEXA": (8, 20, "hexahedron", "hexahedron20"),
+    "CPENTA": (6, 15, "wedge", "wedge15"),
+    "CPYRAM": (5, 13, "pyramid", "pyramid13"),
+    "CPYRA": (5, 13, "pyramid", "pyramid13"),
+}
+# Nastran numbers the upright edges of a hexahedron before those of its upper face, VTK after them.
+_AS_VTK = {"hexahedron20": [*range(12), *range(16, 20), *range(12, 16)]}
+_SHELLS = {"CTRIA3": 3, "CTRIAR": 3, "CTRIA6": 3, "CQUAD4": 4, "CQUADR": 4, "CQUAD8": 4}
+_OTHERS = (
+    "CBAR", "CBEAM", "CBEAM3", "CBEND", "CBUSH", "CBUSH1D", "CDAMP1", "CDAMP2", "CDAMP3", "CDAMP4", "CELAS1", "CELAS2",
+    "CELAS3", "CELAS4", "CFAST", "CGAP", "CMASS1", "CMASS2", "CMASS3", "CMASS4", "CONM1", "CONM2", "CONROD", "CROD",
+    "CSEAM", "CSHEAR", "CTUBE", "CVISC", "CWELD", "GENEL", "RBAR", "RBAR1", "RBE1", "RBE2", "RBE3", "RJOINT", "RROD",
+    "RSPLINE", "RSSCON", "RTRPLT",
+)  # fmt: skip
+_SYSTEMS: dict[str, Kind] = {"R": "rectangular", "C": "cylindrical", "S": "spherical"}
+# Beside these, a card that is not read is named in a remark.
+_OF_THE_LINK = (
+    "PARAM", "PSOLID", "PSHELL", "PBAR", "PBARL", "PBEAM", "PBEAML", "PROD", "PELAS", "PBUSH", "MAT1", "MAT2", "MAT8",
+    "MAT9", "SPC", "SPC1", "SPCADD", "LOAD", "FORCE", "MOMENT", "PLOAD", "PLOAD2", "PLOAD4", "GRAV", "EIGR", "EIGRL",
+    "SUPORT", "ASET", "ASET1", "SET1", "TEMP", "TEMPD", "PLOTEL", "MDLPRM", "SEQGP", "TABLED1", "FREQ", "FREQ1",
+)  # fmt: skip
+
+
+def read_nastran(path: Path, where: str) -> RawMesh:
+    """The mesh in Nastran's bulk data; `where` (file and key) begins the message of an error.
+
+    Properties name regions, and faces where they are those of shells.
+
+    Raises:
+        InputError: something is not as it should be, or cannot be read; names card and line.
+    """
+    try:
+        return _Deck(path).mesh()
+    except InputError as error:
+        raise InputError(f"{where}: {error}") from None
+
+
+class _Deck:
+    """The cards that make a mesh, by number."""
+
+    def __init__(self, path: Path) -> None:
+        self.grids: dict[int, Card] = {}
+        self.systems: dict[int, tuple[Card, int]] = {}  # with the field where a CORD1x's points begin
+        self.solids: dict[int, Card] = {}
+        self.shells: dict[int, Card] = {}
+        self.others: Counter[str] = Counter()
+        self.masses: list[float] = []
+        self.not_read: Counter[str] = Counter()
+        self.system = 0  # of grid points that name none
+        self._frames: dict[int, Frame | None] = {0: GLOBAL}
+        for card in cards(path):
+            self._take(card)
+
+    def _take(self, card: Card) -> None:
+        name = card.name
+        if name == "GRID":
+            _add(self.grids, card, card.whole(0))
+        elif name == "GRDSET":
+            self.system = card.whole(1, 0)
+        elif name in _SOLIDS:
+            _add(self.solids, card, card.whole(0))
+        elif name[:5] in ("CORD1", "CORD2") and name[5:] in _SYSTEMS:
+            for begin in (0, 4) if name[4] == "1" else (0,):
+                if card.text(begin):
+                    self._add_system(card, begin)
+        elif name in _SHELLS:
+            _add(self.shells, card, card.whole(0))
+            self.others[name] += 1
+        elif name in _OTHERS:
+            self.others[name] += 1
+            if name in ("CONM1", "CONM2"):
+                self.masses.append(card.real(3))
+        else:
+            self.not_read[name] += name not in _OF_THE_LINK
+
+    def _add_system(self, card: Card, begin: int) -> None:
+        number = card.whole(begin)
+        if number in self.systems and self.systems[number][0].fields != card.fields:
+            raise InputError(f"{card}: expected coordinate systems with numbers of their own, found {number} again")
+        self.systems[number] = card, begin
+
+    def mesh(self) -> RawMesh:
+        if not self.grids and not self.solids:
+            raise InputError("expected GRID and CTETRA or CHEXA cards, found none")
+        place = {number: k for k, number in enumerate(self.grids)}
+        cells: dict[str, list[list[int]]] = {}
+        properties: dict[str, list[int]] = {}
+        for card in self.solids.values():
+            kind, nodes = _nodes(card)
+            cells.setdefault(kind, []).append([self._place(place, node, card) for node in nodes])
+            properties.setdefault(kind, []).append(card.whole(1, card.whole(0)))
+        blocks = list[tuple[str, Integers]]()
+        for kind, rows in cells.items():
+            block = np.array(rows, dtype=np.int64)
+            for order in (_AS_VTK.get(kind), TO_GMSH.get(kind)):
+                block = block if order is None else block[:, order]
+            blocks.append((kind, block))
+        owner = np.array([number for of in properties.values() for number in of], dtype=np.int64)
+        regions = {str(number): np.flatnonzero(owner == number) for number in np.unique(owner).tolist()}
+        faces: dict[str, list[Integers]] = {}
+        for card in self.shells.values():
+            corners = [self._place(place, card.whole(2 + k), card) for k in range(_SHELLS[card.name])]
+            faces.setdefault(str(card.whole(1, card.whole(0))), []).append(np.array([corners], dtype=np.int64))
+        return RawMesh(self._points(), tuple(blocks), regions, faces, {}, (), (), tuple(self._left_out()))
+
+    @staticmethod
+    def _place(place: dict[int, int], node: int, card: Card) -> int:
+        if node not in place:
+            raise InputError(f"{card}: expected grid points that are there, found {node}")
+        return place[node]
+
+    def _points(self) -> Array:
+        """(p, 3) of all grid points, in the basic system."""
+        given = np.array([[card.real(k) for k in (2, 3, 4)] for card in self.grids.values()]).reshape(-1, 3)
+        system = np.array([card.whole(1, self.system) for card in self.grids.values()], dtype=np.int64)
+        points = np.empty_like(given)
+        first: dict[int, Card] = {}
+        for card, number in zip(self.grids.values(), system.tolist(), strict=True):
+            first.setdefault(number, card)
+        for number, card in first.items():
+            own = system == number
+            points[own] = self._frame(number, card).points(given[own])
+        return points
+
+    def _frame(self, number: int, asked: Card) -> Frame:
+        """A coordinate system in the basic one."""
+        if number in self._frames:
+            frame = self._frames[number]
+            if frame is None:
+                raise InputError(
+                    f"{asked}: expected coordinate systems that do not refer to themselves, found {number}"
+                )
+            return frame
+        if number not in self.systems:
+            raise InputError(f"{asked}: expected a coordinate system of CORD1x or CORD2x cards, found {number}")
+        self._frames[number] = None
+        card, begin = self.systems[number]
+        if card.name[4] == "2":
+            given = np.array([[card.real(2 + 3 * k + i) for i in range(3)] for k in range(3)])
+            points = self._frame(card.whole(1, 0), card).points(given)
+        else:
+            points = np.array([self._point(card.whole(begin + 1 + k), card) for k in range(3)])
+        try:
+            frame = Frame.through(points, "zx", _SYSTEMS[card.name[5]])
+        except ValueError as error:
+            raise InputError(f"{card}: expected three points that span a plane, found {error}") from None
+        self._frames[number] = frame
+        return frame
+
+    def _point(self, number: int, asked: Card) -> Array:
+        """(3,) of a grid point, in the basic system."""
+        if number not in self.grids:
+            raise InputError(f"{asked}: expected grid points that are there, found {number}")
+        card = self.grids[number]
+        given = np.array([[card.real(k) for k in (2, 3, 4)]])
+        point: Array = self._frame(card.whole(1, self.system), card).points(given)[0]
+        return point
+
+    def _left_out(self) -> Iterator[str]:
+        if self.others:
+            listed = ", ".join(f"{count} {name}" for name, count in self.others.items())
+            mass = f" (concentrated masses: {sum(self.masses):g} in all)" if self.masses else ""
+            yield f"elements beside solids are left out, with their stiffness and mass: {listed}{mass}"
+        if unread := [name for name, count in self.not_read.items() if count]:
+            yield f"not read: {', '.join(unread)}"
+
+
+def _add(cards: dict[int, Card], card: Card, number: int) -> None:
+    """Add a card by its number; twice the same is once."""
+    other = cards.setdefault(number, card)
+    if other is not card and (other.name, other.fields) != (card.name, card.fields):
+        raise InputError(f"{card}: expected cards with numbers of their own, found {number} again ({other.place})")
+
+
+def _nodes(card: Card) -> tuple[str, list[int]]:
+    """Type of a solid element, and its nodes."""
+    corners, most, linear, quadratic = _SOLIDS[card.name]
+    fields = card.fields[2:]
+    if any(fields[most:]):
+        raise InputError(f"{card}: expected {corners} or {most} grid points, found {len(fields)}")
+    nodes = [card.whole(2 + k, None if k < corners else 0) for k in range(most)]
+    middles = [node for node in nodes[corners:] if node]
+    if not middles:
+        return linear, nodes[:corners]
+    if len(middles) < most - corners:
+        raise InputError(f"{card}: expected a grid point in the middle of all edges or none, found {len(middles)}")
+    return quadratic, nodes

@@ -1,0 +1,105 @@
+"""Files of parts, read in a process of its own: what a library does to that process ends with it.
+
+The process takes a pickled function with its arguments, and hands back what comes of it. It starts in an empty folder
+(nothing that lies where a user works is imported) and without what an MPI has left in the environment. It ends with its
+parent, and at a limit of processor time.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import pickle
+import resource
+import signal
+import subprocess
+import sys
+from collections.abc import Callable
+from contextlib import suppress
+from tempfile import TemporaryDirectory
+from typing import Any, TypeVar
+
+from ..common.errors import FfrobotError, InputError
+from ..common.parallel import environment_without_mpi
+
+Found = TypeVar("Found")
+
+# Processor time, s: to read a file and a further MB of it, to mesh and for a further tetrahedron. Sound files need a
+# tenth of it; OpenCASCADE does not end on some damaged ones. The variable of the environment takes the place of both.
+READING, READING_MB = 30.0, 30.0
+MESHING, MESHING_CELL = 60.0, 1e-3
+SECONDS = "FFROBOT_CAD_SECONDS"
+_is_apart = False  # whether this is such a process
+
+
+def read_apart(read: Callable[..., Found], size: int, where: str, *arguments: object) -> Found:
+    """`read(*arguments)` in a process of its own.
+
+    Args:
+        read: a function of a module; what it takes and returns can be pickled.
+        size: of the file, bytes.
+        where: file and key, the beginning of the message of an error.
+        arguments: of `read`.
+
+    Raises:
+        InputError: `read` has raised it, or its process has crashed, or has not ended in the processor time allowed.
+    """
+    request = pickle.dumps((read, arguments, READING + READING_MB * size / 1e6, where))
+    environment = environment_without_mpi() | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
+    with TemporaryDirectory() as folder:
+        command = [sys.executable, "-c", f"from {__name__} import main; main()"]
+        done = subprocess.run(command, input=request, capture_output=True, check=False, cwd=folder, env=environment)
+    if done.returncode == 0:
+        found = pickle.loads(done.stdout)
+        if isinstance(found, FfrobotError):
+            raise found
+        result: Found = found
+        return result
+    if done.returncode == -signal.SIGXCPU:
+        seconds = done.stderr.decode().split()[-1]
+        raise InputError(
+            f"{where}: expected a part that is read and meshed within {float(seconds):.0f} s of processor time, found"
+            f" no end: a damaged file, or one that needs longer, which {SECONDS}=SECONDS in the environment allows"
+        )
+    if done.returncode < 0:
+        name = signal.Signals(-done.returncode).name
+        raise InputError(f"{where}: expected a sound file, found one at which the library that reads it ends by {name}")
+    reason = " ".join(done.stderr.decode(errors="replace").split()[-40:])
+    raise InputError(f"{where}: expected a sound file, found one that cannot be read: {reason}")
+
+
+def allow(seconds: float) -> None:
+    """Let a process that reads a part go on for so many s of processor time from now on."""
+    if not _is_apart:
+        return
+    with suppress(KeyError, ValueError):
+        seconds = float(os.environ[SECONDS])
+    usage, (_, most) = resource.getrusage(resource.RUSAGE_SELF), resource.getrlimit(resource.RLIMIT_CPU)
+    limit = int(usage.ru_utime + usage.ru_stime + seconds) + 1
+    limit = limit if most == resource.RLIM_INFINITY else min(limit, most)
+    resource.setrlimit(resource.RLIMIT_CPU, (limit, most))
+    sys.stderr.write(f"{limit}\n")  # told by the parent where the limit is met
+    sys.stderr.flush()
+
+
+def main() -> None:
+    """Answer the one request on standard input."""
+    global _is_apart
+    _is_apart = True
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # of a terminal: the parent decides
+    ctypes.CDLL(None).prctl(1, int(signal.SIGKILL), 0, 0, 0)  # PR_SET_PDEATHSIG
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    answer = os.fdopen(os.dup(1), "wb")
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, 1)  # OpenCASCADE writes to it
+    read, arguments, seconds, where = pickle.load(sys.stdin.buffer)
+    allow(seconds)
+    found: Any
+    try:
+        found = read(*arguments)
+    except FfrobotError as error:
+        found = error
+    except MemoryError:
+        found = InputError(f"{where}: expected a part that fits into memory, found one that does not")
+    answer.write(pickle.dumps(found))
+    answer.flush()

@@ -1,0 +1,201 @@
+"""Abaqus and CalculiX decks: what they say is read, or rejected by keyword and line; nothing is dropped silently."""
+
+import numpy as np
+import pytest
+from decks import HEIGHT, VOLUME, bar, elements, nodes, tetrahedra
+from solid_parts import face_area, integrate
+
+from ffrobot.common.errors import InputError
+from ffrobot.mesh.included import files_of
+from ffrobot.mesh.records import PlaceRecord
+
+POINTS, CELLS = bar()
+PLAIN = nodes(POINTS) + elements(CELLS)
+TETRAHEDRA = nodes(POINTS) + elements(tetrahedra(CELLS), "C3D4")
+HALF, HALF_CELLS = bar(ny=1, y=(-HEIGHT / 2, 0.0))
+PART = "*Part, name=HALF\n" + nodes(HALF) + elements(HALF_CELLS) + "{}*End Part\n*Assembly, name=A\n"
+SECOND = "*Instance, name=H-2, part=HALF\n0., 0.1, 0.\n*End Instance\n"
+TWO = PART + "*Instance, name=H-1, part=HALF\n*End Instance\n" + SECOND
+# Sides of the hexahedra: S5 looks along +y, S3 along −y, by the order of corners in decks.py.
+SURFACES = "*Surface, name=UP, type=ELEMENT\nH-1.E, S5\n*Surface, name=DOWN\nH-2.E, S3\n"
+
+
+@pytest.fixture
+def read(solid, mesh_part, tmp_path):
+    """The part that a deck describes."""
+
+    def make(text, interfaces=(), **keys):
+        path = tmp_path / "part.inp"
+        path.write_bytes(text if isinstance(text, bytes) else text.encode())
+        return mesh_part(solid(file=path, **keys), interfaces)
+
+    return make
+
+
+def moved_first(text):
+    """The nodes in two blocks."""
+    lines = text.splitlines(keepends=True)
+    return "".join([*lines[:9], "*NODE\n", *lines[9:]])
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        PLAIN.lower(),
+        "\n".join(line + "," if line[0].isdigit() else line for line in PLAIN.splitlines()),
+        b"\xef\xbb\xbf" + PLAIN.encode(),
+        PLAIN.replace("\n", "\r\n"),
+        PLAIN.replace("\n", "\r"),
+        PLAIN.replace("*ELEMENT, TYPE=C3D8, ELSET=E", "** comment\n\n * element , type = c3d8 ,\n  elset = E"),
+        PLAIN.replace("*NODE", "*HEADING\na bar\n*NODE, NSET=ALL"),
+        moved_first(PLAIN),
+        "\n".join(  # elements over several lines, as C3D20 are
+            line.replace(", ", ",\n", 5) if line.count(",") == 8 else line for line in PLAIN.splitlines()
+        ),
+        PLAIN.replace("0.333333333333", "3.33333333333D-01"),
+        PLAIN.replace("-0.05", "-0.05, 0., 0., 1."),  # direction cosines of a normal
+        "*Part, name=BAR\n" + PLAIN + "*End Part\n*Assembly, name=A\n*Instance, name=B-1, part=bar\n*End Instance\n"
+        "*Node\n1, 5., 0., 0.\n*Nset, nset=RP\n1,\n*End Assembly\n*Step\n*Static\n*Node file\nU\n*End step\n",
+        "*Part, name=BAR\n*End Part\n*Assembly, name=A\n*Instance, name=B-1, part=BAR\n" + PLAIN + "*End Instance\n",
+    ],
+)  # fmt: skip
+def test_dialects(read, text):
+    part = read(text)
+    assert integrate(part) == pytest.approx(VOLUME, rel=1e-9)
+    assert part.remarks == ()
+    assert set(part.regions) <= {"E", "e"}
+
+
+@pytest.mark.parametrize(
+    "tie",
+    [SURFACES + "*Tie, name=glue, adjust=yes\nDOWN, UP\n",
+     "*Nset, nset=U, instance=H-1, generate\n1, 16\n*Surface, name=UP, type=NODE\nU,\n"
+     "*Surface, name=DOWN\nH-2.E, S3\n*Tie, name=glue\nDOWN, UP\n"],
+)  # fmt: skip
+def test_tied_instances_share_their_nodes(read, tie):
+    part = read((TWO + tie).format(""))
+    assert integrate(part) == pytest.approx(VOLUME, rel=1e-9)
+    assert len(part.points) == len(POINTS)
+    assert len(part.regions) == 1
+    assert part.remarks == ()
+
+
+def test_undefined_surfaces_of_a_tie_are_told(read):
+    part = read(TWO.format("") + "*Tie, name=glue\nS2, S1\n")
+    assert integrate(part) == pytest.approx(VOLUME, rel=1e-9)
+    assert "*TIE" in part.remarks[0]
+    assert "all nodes of instances that coincide" in part.remarks[0]
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        (TWO.format(""), "one connected part, found 2"),  # they touch, and nothing ties them
+        (TWO.format("") + SURFACES.replace("S5", "S3") + "*Tie, name=g\nDOWN, UP\n", "nodes of DOWN where"),
+        (TWO.format("").replace("0.1, 0.", "0.1, 0.01") + SURFACES + "*Tie, name=g\nDOWN, UP\n", "cannot be tied"),
+        (TWO.format("").replace("part=HALF\n0.", "part=NONE\n0."), "expected PART= one of HALF, found NONE"),
+        (TWO.format("").replace("H-2", "H-1"), "instances with names of their own, found H-1"),
+        (TWO.format("").replace("0., 0.1, 0.", "0., 0.1, 0., 0., 0., 0., 90."), r"\*INSTANCE, line \d+: "),
+        (PLAIN.replace("*NODE", "*NODE, SYSTEM=S"), r"\*NODE, line 1: expected SYSTEM=R or C, found S"),
+        (PLAIN + "*NGEN\n1, 5, 1\n", r"\*NGEN, line \d+: expected nodes and elements one by one"),
+        (PLAIN + "*INCLUDE, INPUT=nowhere.txt\n", "expected a file to include, found none called nowhere.txt"),
+        (PLAIN + "*INCLUDE, INPUT=part.inp\n", "files that do not include themselves"),
+        (PLAIN.replace("1, 0, -0.1", "1, 0, -0.x"), 'line 2: expected a number, found "-0.x"'),
+        (PLAIN + "*NODE\n3, 9., 9., 9.\n", "expected one place of each node, found another one of node 3"),
+        (PLAIN + elements(CELLS[:1, ::-1]), "elements with numbers of their own, found 1 again"),
+        (PLAIN + elements(CELLS[:1] + 100, first=50), "element 50: expected nodes that are there, found node 101"),
+        (PLAIN + "*ELEMENT, TYPE=C3D8\n50, 1, 2, 3, 4\n", "line .*: expected 8 nodes of an element, found 4"),
+        (PLAIN + "*ELEMENT, TYPE=C3D8\n50, 1, 2, 3, 4, 5, 6, 7, 8, 9\n", "expected 8 nodes of an element, found 9"),
+        (PLAIN + "*ELEMENT\n50, 1\n", r"\*ELEMENT, line \d+: expected TYPE="),
+        (PLAIN + "*ELSET, ELSET=F\nG\n", 'expected elements or a set of them, found "G"'),
+        (PLAIN + "*ELSET, ELSET=F\nF\n", 'expected elements or a set of them, found "F"'),
+        (PLAIN + "*ELSET, ELSET=F\n77\n", "F: expected elements that are there, found element 77"),
+        (PLAIN + "*NSET, NSET=N, GENERATE\n1, 2147483648, 1\n", "expected first, last and step of nodes"),
+        (PLAIN + "*NSET, NSET=N, GENERATE\n1, 9, 0\n", "expected first, last and step of nodes"),
+        (PLAIN.replace("0.333333333333", "nan"), "expected nodes with finite coordinates"),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_is_rejected_by_name(read, text, says):
+    with pytest.raises(InputError, match=rf"part\.inp: (.|\n)*{says}"):
+        read(text)
+
+
+@pytest.mark.parametrize(
+    ("lines", "axes"),
+    [
+        ("1., 2., 3.\n", ((1, 0, 0), (0, 1, 0))),
+        ("1., 2., 3.\n1., 2., 3., 1., 2., 4., 90.\n", ((0, 1, 0), (-1, 0, 0))),  # about z, through where it is
+        ("0., 0., 0.\n0., 0., 0., 1., 0., 0., 90.\n", ((1, 0, 0), (0, 0, 1))),
+    ],
+)
+def test_instances_are_moved_then_turned(read, lines, axes):
+    """Abaqus: the translation first, then the rotation about an axis in the assembly."""
+    text = f"*Part, name=P\n{PLAIN}*End Part\n*Assembly, name=A\n*Instance, name=I, part=P\n{lines}*End Instance\n"
+    origin = tuple(float(value) for value in lines.splitlines()[0].split(","))
+    part = read(text, origin=origin, x_axis=axes[0], y_axis=axes[1])
+    np.testing.assert_allclose(part.points, POINTS, atol=1e-12)
+
+
+def test_local_axes(read):
+    """*SYSTEM with a turn of 90° about z and a shift; then without data: global again; cylindrical ones within."""
+    system = "*SYSTEM\n0.5, 0.25, 0.125, 0.5, -1., 0.125\n2., 0.25, 0.125\n"
+    r, theta = np.hypot(POINTS[:, 0], POINTS[:, 1]), np.degrees(np.arctan2(POINTS[:, 1], POINTS[:, 0]))
+    text = system + nodes(np.stack([r, theta, POINTS[:, 2]], axis=1)[:11], "*NODE, SYSTEM=C")
+    text += nodes(POINTS[11:], "*NODE", 12) + "*SYSTEM\n" + "*NODE\n99, 7., 7., 7.\n" + elements(CELLS)
+    part = read(text, origin=(0.5, 0.25, 0.125), x_axis=(0.0, -1.0, 0.0), y_axis=(1.0, 0.0, 0.0))
+    assert integrate(part) == pytest.approx(VOLUME, rel=1e-9)
+    np.testing.assert_allclose(part.points, POINTS, atol=1e-9)
+
+
+def test_sets_of_sets_and_surfaces(read):
+    text = PLAIN + (
+        "*ELSET, ELSET=ROOT, GENERATE\n1, 2\n*ELSET, ELSET=BOTH\nroot,\n3, 4\n*NSET, NSET=LEFT\n1, 2, 3, 4, 5, 6\n"
+        "*NSET, NSET=ENDS\nLEFT, 19, 20, 21, 22, 23, 24\n*SURFACE, NAME=SIDE, TYPE=ELEMENT\nROOT, S6\n"
+    )
+    part = read(text, (PlaceRecord(name="left", group="LEFT"),))
+    assert integrate(part) == pytest.approx(VOLUME, rel=1e-9)
+    assert list(part.regions) == ["E", "BOTH", "ROOT"]
+    owners = {name: {part.regions[name], *part.overlaps.get(name, ())} for name in part.regions}
+    counts = {name: int(np.isin(part.cell_tag, list(tags)).sum()) for name, tags in owners.items()}
+    assert counts == {"E": 6, "BOTH": 4, "ROOT": 2}
+    assert face_area(part, "left") == pytest.approx(VOLUME)
+    ends = read(text, (PlaceRecord(name="root", group="ENDS"), PlaceRecord(name="tip", group="ENDS")))
+    assert face_area(ends, "root") == pytest.approx(2 * VOLUME)
+
+
+def test_sides_of_a_surface(read):
+    """S6 of a hexahedron has the corners 4, 8, 5, 1: here x = 0."""
+    text = PLAIN + "*SURFACE, NAME=SIDE, TYPE=ELEMENT\n1, S6\n2, S6\n"
+    assert face_area(read(text, (PlaceRecord(name="side", group="SIDE"),)), "side") == pytest.approx(VOLUME)
+    text = TETRAHEDRA + "*SURFACE, NAME=SIDE\n" + "".join(f"{k}, S{s}\n" for k, s in ((3, 3), (4, 1)))
+    with pytest.raises(InputError, match="expected a face on the boundary"):  # sides inside the bar
+        read(text, (PlaceRecord(name="side", group="SIDE"),))
+
+
+@pytest.mark.parametrize(
+    ("more", "says"),
+    [
+        ("*ELEMENT, TYPE=B31, ELSET=RIB\n9001, 1, 7\n9002, 7, 13\n", "2 B31"),
+        ("*ELEMENT, TYPE=S4R, ELSET=SKIN\n9001, 1, 2, 8, 7\n*SHELL SECTION, ELSET=SKIN\n0.002\n", "1 S4R"),
+        ("*ELEMENT, TYPE=MASS, ELSET=M\n9001, 1\n*MASS, ELSET=M\n5.\n", "1 of 5 each"),
+        ("*MPC\nBEAM, 1, 2\n", r"not read: \*MPC"),
+        ("*ELEMNT, TYPE=C3D8\n9, 1, 2, 3, 4, 5, 6, 7, 8\n", r"not read: \*ELEMNT"),
+        (elements(CELLS[2:4], elset="AGAIN", first=101), "2 of 8 cells stand in the file again"),
+    ],
+)
+def test_what_is_left_out_is_told(read, more, says):
+    part = read(PLAIN + more)
+    assert integrate(part) == pytest.approx(VOLUME, rel=1e-9)
+    assert any(says.replace("\\", "") in remark for remark in part.remarks)
+
+
+def test_included_files_count(read, tmp_path):
+    (tmp_path / "sub").mkdir()
+    (tmp_path / "sub" / "mesh.txt").write_text(nodes(POINTS) + "*INCLUDE, INPUT=cells.txt\n")
+    (tmp_path / "sub" / "cells.txt").write_text(elements(CELLS))
+    part = read('*include,\ninput = "sub/mesh.txt"\n*NSET, NSET=N\n1, 2\n')
+    assert integrate(part) == pytest.approx(VOLUME, rel=1e-9)
+    (tmp_path / "part.inp").write_text("*INCLUDE, INPUT=sub/mesh.txt\n")
+    assert [path.name for path in files_of(tmp_path / "part.inp")] == ["part.inp", "mesh.txt", "cells.txt"]
+    (tmp_path / "rows.txt").write_text(nodes(POINTS).partition("\n")[2])
+    assert integrate(read("*NODE, INPUT=rows.txt\n" + elements(CELLS))) == pytest.approx(VOLUME, rel=1e-9)

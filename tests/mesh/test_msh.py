@@ -1,0 +1,112 @@
+"""Meshes in gmsh's format: never run as a script; groups of elements, not of entities; every element once."""
+
+import numpy as np
+import pytest
+from decks import VOLUME, bar, tetrahedra
+from solid_parts import face_area, integrate
+
+from ffrobot.common.errors import InputError
+from ffrobot.mesh.records import PlaceRecord
+
+POINTS, CELLS = bar()
+LEFT = [(1, 2, 4, 3), (3, 4, 6, 5)]
+
+
+def version_2(cells, groups, kind=5, binary=False, names=((3, 8, "all"), (3, 9, "insert"), (2, 4, "left"))):
+    """A mesh of one elementary entity, with a physical group for each element, and two quadrilaterals at x = 0."""
+    text = (
+        b"$MeshFormat\n2.2 %d 8\n" % binary + (np.int32(1).tobytes() + b"\n" if binary else b"") + b"$EndMeshFormat\n"
+    )
+    listed = "".join(f'{dim} {tag} "{name}"\n' for dim, tag, name in names)
+    text += f"$PhysicalNames\n{len(names)}\n{listed}$EndPhysicalNames\n".encode()
+    text += b"$Nodes\n%d\n" % len(POINTS)
+    rows = [(3, 4, np.array(row) - 1) for row in LEFT] + list(zip([kind] * len(cells), groups, cells, strict=True))
+    if binary:
+        nodes = np.zeros(len(POINTS), dtype=[("tag", "<i4"), ("x", "<f8", 3)])
+        nodes["tag"], nodes["x"] = 10 * np.arange(1, len(POINTS) + 1), POINTS
+        text += nodes.tobytes() + b"\n$EndNodes\n$Elements\n%d\n" % len(rows)
+        for k, (of, group, cell) in enumerate(rows):
+            text += np.array([of, 1, 2, k + 1, group, 1, *(10 * (cell + 1))], dtype="<i4").tobytes()
+    else:
+        text += "".join(f"{10 * (k + 1)} {x!r} {y!r} {z!r}\n" for k, (x, y, z) in enumerate(POINTS.tolist())).encode()
+        text += b"$EndNodes\n$Elements\n%d\n" % len(rows)
+        for k, (of, group, cell) in enumerate(rows):
+            text += f"{k + 1} {of} 2 {group} 1 {' '.join(str(10 * (node + 1)) for node in cell)}\n".encode()
+    return text + b"\n$EndElements\n"
+
+
+@pytest.fixture
+def read(solid, mesh_part, tmp_path):
+    def make(content, interfaces=()):
+        (tmp_path / "part.msh").write_bytes(content)
+        return mesh_part(solid(file=tmp_path / "part.msh"), interfaces)
+
+    return make
+
+
+@pytest.mark.parametrize("binary", [False, True])
+def test_elements_of_one_entity_in_two_groups(read, binary):
+    """gmsh would put all of the entity's elements into both groups."""
+    part = read(version_2(CELLS, [8, 8, 9, 9, 8, 0], binary=binary), (PlaceRecord(name="root", group="left"),))
+    assert integrate(part) == pytest.approx(VOLUME, rel=1e-12)
+    assert list(part.regions) == ["all", "insert"]
+    assert part.overlaps == {}
+    assert part.cell_tag.tolist() == [part.regions["all"]] * 2 + [part.regions["insert"]] * 2 + [part.regions["all"], 0]
+    assert face_area(part, "root") == pytest.approx(VOLUME)
+
+
+@pytest.mark.parametrize("binary", [False, True])
+@pytest.mark.parametrize("cells", [CELLS, tetrahedra(CELLS)])
+def test_elements_that_stand_in_the_file_twice_count_once(read, cells, binary):
+    half = len(cells) // 2
+    kind = 5 if cells.shape[1] == 8 else 4
+    groups = [8] * len(cells) + [9] * half
+    part = read(version_2(np.concatenate([cells, cells[:half]]), groups, kind, binary))
+    assert integrate(part) == pytest.approx(VOLUME, rel=1e-12)
+    assert len(part.cells) == len(cells)
+    assert [len({part.regions[name], *part.overlaps.get(name, ())}) for name in ("all", "insert")] == [2, 1]
+    assert np.sum(part.cell_tag == part.regions["insert"]) == half
+    assert f"{half} of {len(cells) + half} cells stand in the file again" in part.remarks[-1]
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        ((b"$Elements\n8", b"$Elements\n9"), "the 9 elements that .Elements announces, found 8"),
+        ((b"\n20 0.0", b"\n10 0.0"), "found two nodes of one number"),
+        ((b" 240 180\n", b" 250 180\n"), "elements of the nodes in .Nodes, found some of others"),
+        ((b"$EndNodes", b"$EndNode"), ".Nodes to end with .EndNodes, found the end of the file"),
+        ((b" 5 2 8 1", b" 5 3 8 1"), "8 nodes of elements of type 5, found 7"),
+        ((b"\n2.2 0", b"\n2.2 1"), "found big-endian ones"),
+        ((b" 5 2 8 1", b" 55 2 8 1"), "elements of a known type"),
+        ((b"-0.05", b"x"), "damaged one"),
+    ],
+)
+def test_damaged_files_are_rejected(read, change, says):
+    content = version_2(CELLS, [8] * 6)
+    assert change[0] in content
+    with pytest.raises(InputError, match=rf"part\.msh: expected .*{says}"):
+        read(content.replace(*change, 1))
+
+
+def test_scripts_do_not_run(read, tmp_path):
+    """gmsh runs what it does not know, comments before it or not, and NAME.opt beside a mesh."""
+    ran = tmp_path / "ran"
+    script = f'SystemCall "touch {ran}";\nPrintf("x") > "{ran}";\nMerge "{tmp_path}/other.geo";\n'
+    sound = version_2(CELLS, [8] * 6)
+    for text in (script, f"// mesh\n{script}", f"$Foo\n{script}", f"\n{script}", f"$Comments\n$EndComments\n{script}"):
+        with pytest.raises(InputError, match=r"expected a mesh in gmsh's format, .* \$MeshFormat, found"):
+            read(text.encode())
+    (tmp_path / "part.msh.opt").write_text(script)
+    assert integrate(read(sound)) == pytest.approx(VOLUME)
+    fourth = b"$MeshFormat\n4.1 0 8\n$EndMeshFormat\n" + script.encode()
+    for text in (fourth, fourth.replace(b"4.1", b"2.2"), fourth.replace(b"4.1", b"4.0")):
+        with pytest.raises(InputError, match="expected a mesh"):
+            read(text)
+    assert not ran.exists()
+
+
+def test_what_stands_before_the_header(read):
+    content = version_2(CELLS, [8] * 6)
+    for before in (b"\xef\xbb\xbf", b"\n \n", b"$Comments\nby hand\n$EndComments\n"):
+        assert integrate(read(before + content)) == pytest.approx(VOLUME)

@@ -1,0 +1,188 @@
+"""Nastran decks: cards in all forms and coordinate systems describe the same bar, or are rejected by name and line."""
+
+import numpy as np
+import pytest
+from decks import VOLUME, bar, fixed, free, tetrahedra
+from solid_parts import face_area, integrate
+
+from ffrobot.common.errors import InputError
+from ffrobot.mesh.included import files_of
+from ffrobot.mesh.records import PlaceRecord
+
+POINTS, CELLS = bar()
+PLAIN = free(POINTS, CELLS)
+HEAD = "SOL 103\nCEND\nTITLE = GRID of a bar\nBEGIN BULK\n"
+
+
+@pytest.fixture
+def read(solid, mesh_part, tmp_path):
+    """The part that a deck describes."""
+
+    def make(text, interfaces=(), name="part.bdf", **keys):
+        (tmp_path / name).write_bytes(text.encode())
+        return mesh_part(solid(file=tmp_path / name, **keys), interfaces)
+
+    return make
+
+
+def marked(text):
+    """Every line that goes on with the next one by a mark of its own, and all cards sorted."""
+    lines, cards = text.splitlines(), []
+    for number, line in enumerate(lines):
+        goes_on = number + 1 < len(lines) and lines[number + 1].startswith("        ")
+        if line.startswith("        "):
+            line = f"+{number:<7}" + line[8:]
+        cards.append(f"{line:72}+{number + 1:<7}" if goes_on else line)
+    return "\n".join(sorted(cards)) + "\n"
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        PLAIN,
+        HEAD + PLAIN + "ENDDATA\nGRID,1,,9.,9.,9.\n",
+        HEAD.lower() + PLAIN.lower(),
+        free(POINTS, CELLS).replace("\n,", ",+\n+,"),
+        fixed(POINTS, CELLS),
+        fixed(POINTS, CELLS, mark="+"),
+        "$ head\n" + fixed(POINTS, CELLS, mark="+A").replace("\n", " $ tail\n", 3),
+        fixed(POINTS, CELLS, wide=True),
+        marked(fixed(POINTS, tetrahedra(CELLS), "CTETRA") + fixed(POINTS[:0], CELLS[:0])),
+        PLAIN.replace("0.333333333", "3.33333333-1").replace("0.1", "1.D-1"),
+        PLAIN.replace("GRID,1,,0,-0.1,-0.05", "GRID\t1\t\t0.0\t-0.1\t-0.05"),
+        PLAIN.replace("\n", "\r\n"),
+        PLAIN + "GRDSET,,7\nCORD2R,7,0,0.,0.,0.,0.,0.,1.\n,1.,0.,0.\n",
+        PLAIN + "PLOTEL,9,1,2\nPSOLID,1,1\nMAT1,1,7.+10,,.3,2700.\nSPC1,1,123456,1\n",
+    ],
+)
+def test_cards_in_all_forms(read, text):
+    part = read(text)
+    assert integrate(part) == pytest.approx(VOLUME, rel=2e-6)  # fixed field of 8 columns has 6 digits
+    assert part.remarks == ()
+    assert list(part.regions) == ["1"]
+
+
+def test_marks_tell_what_goes_on(read):
+    text = marked(fixed(POINTS, CELLS))
+    assert text.index("+") < text.index("CHEXA")  # lines before the cards that go on with them
+    assert integrate(read(text)) == pytest.approx(VOLUME, rel=2e-6)
+
+
+def spherical(points):
+    """r, θ from z, φ from x; degrees."""
+    r = np.linalg.norm(points, axis=1)
+    across = np.hypot(points[:, 0], points[:, 1])
+    around = np.degrees(np.arctan2(points[:, 1], points[:, 0]))
+    return np.stack([r, np.degrees(np.arctan2(across, points[:, 2])), around], axis=1)
+
+
+def cylindrical(points):
+    r, theta = np.hypot(points[:, 0], points[:, 1]), np.degrees(np.arctan2(points[:, 1], points[:, 0]))
+    return np.stack([r, theta, points[:, 2]], axis=1)
+
+
+# The system 7: origin at (1, 2, 3), its z along x, its x along y.
+CORD2 = "CORD2{},7,{},1.,2.,3.,2.,2.,3.\n,1.,3.,3.\n"
+INTO_7 = np.array([[0, 1, 0], [0, 0, 1], [1, 0, 0]])
+
+
+@pytest.mark.parametrize(("kind", "as_given"), [("R", lambda x: x), ("C", cylindrical), ("S", spherical)])
+def test_coordinate_systems(read, kind, as_given):
+    local = as_given((POINTS - [1, 2, 3]) @ INTO_7.T)
+    part = read(free(local, CELLS, cp="7") + CORD2.format(kind, 0))
+    np.testing.assert_allclose(part.points, POINTS, atol=1e-7)
+
+
+def test_nested_coordinate_systems(read):
+    """9 by grid points given in the cylindrical 8, which stands in 7; the bar's own axes come out again."""
+    inner = "CORD2C,8,7,0.,0.,0.,0.,0.,1.\n,1.,0.,0.\nCORD1R,9,501,502,503\n"
+    grids = "GRID,501,8,0.,0.,0.\nGRID,502,8,0.,0.,1.\nGRID,503,8,1.,0.,0.\n"
+    local = (POINTS - [1, 2, 3]) @ INTO_7.T
+    part = read(free(local, CELLS, cp="9") + inner + grids + CORD2.format("R", 0))
+    np.testing.assert_allclose(part.points, POINTS, atol=1e-7)
+
+
+def with_middles(points, cells, edges):
+    """Nodes in the middle of all `edges`, behind the corners of each cell."""
+    pairs = np.sort(cells[:, edges].reshape(-1, 2), axis=1)
+    unique, number = np.unique(pairs, axis=0, return_inverse=True)
+    more = len(points) + number.reshape(len(cells), -1)
+    return np.concatenate([points, points[unique].mean(axis=1)]), np.concatenate([cells, more], axis=1)
+
+
+LOWER, UPPER = [(0, 1), (1, 2), (2, 3), (3, 0)], [(4, 5), (5, 6), (6, 7), (7, 4)]
+
+
+@pytest.mark.parametrize(
+    ("card", "cells", "edges"),
+    [
+        ("CTETRA", tetrahedra(CELLS), [(0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3)]),
+        ("CHEXA", CELLS, [*LOWER, (0, 4), (1, 5), (2, 6), (3, 7), *UPPER]),
+    ],
+)
+def test_nodes_on_edges(read, card, cells, edges):
+    points, cells = with_middles(POINTS, cells, edges)
+    text = "".join(f"GRID,{k + 1},,{x:.9g},{y:.9g},{z:.9g}\n" for k, (x, y, z) in enumerate(points))
+    for k, cell in enumerate(cells):
+        fields = [k + 1, 1, *(node + 1 for node in cell)]
+        lines = [",".join(map(str, fields[at : at + 8])) for at in range(0, len(fields), 8)]
+        text += f"{card}," + "\n,".join(lines) + "\n"
+    part = read(text)
+    assert part.degree == 1  # in the middle: straight
+    assert integrate(part) == pytest.approx(VOLUME, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        (PLAIN.replace("GRID,2,,", "GRID,2,5,"), "GRID, line 2: expected a coordinate system .*, found 5"),
+        (PLAIN.replace("GRID,2,,", "GRID,2,7,") + CORD2.format("R", 7), "do not refer to themselves, found 7"),
+        (PLAIN.replace("GRID,2,,", "GRID,2,7,") + CORD2.format("R", 0).replace("2.,2.,3.", "1.,4.,3."), "span a plane"),
+        (PLAIN + "GRID,2,,9.,9.,9.\n", r"with numbers of their own, found 2 again \(line 2\)"),
+        (PLAIN.replace("GRID,2,,", "GRID,2000,,"), r"CHEXA, line \d+: expected grid points that are there, found 2"),
+        (PLAIN + "CTETRA,99,1,1,2,3\n", r'CTETRA, line \d+: expected a whole number, found ""'),
+        (PLAIN + "CTETRA,99,1,1,2,3,4,5\n", "expected a grid point in the middle of all edges or none, found 1"),
+        (PLAIN + "CTETRA,99,1,1,2,3,4,5,6\n,7,8,9,10,11,12\n", "expected 4 or 10 grid points"),
+        (PLAIN.replace("-0.1", "-0.x", 1), 'GRID, line 1: expected a number, found "-0.x"'),
+        (PLAIN + "=,*(1),=,*(.1)\n", r"line \d+: expected cards one by one, found replicated ones"),
+        (PLAIN + "INCLUDE 'nowhere.bdf'\n", "expected a file to include, found none called nowhere.bdf"),
+        ("SOL 103\nCEND\n" + PLAIN, "expected BEGIN BULK after CEND, found none"),
+        (HEAD + PLAIN + "BEGIN SUPER=1\n", "expected one BEGIN BULK, found another"),
+        (fixed(POINTS, CELLS, mark="+A").replace("\n+A ", "\n+B ", 1), "expected one card that this line goes on with"),
+        (PLAIN + "CPENTA,99,1,1,2,3,4,5,6\n", "found unsupported elements: 6 hexahedron, 1 wedge"),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_is_rejected_by_name(read, text, says):
+    with pytest.raises(InputError, match=rf"part\.bdf: (.|\n)*{says}"):
+        read(text)
+
+
+@pytest.mark.parametrize(
+    ("more", "says"),
+    [
+        ("CONM2,99,1,,5.\nCONM2,98,2,,2.5\n", "2 CONM2 (concentrated masses: 7.5 in all)"),
+        ("CBAR,99,3,1,2,0.,0.,1.\n", "1 CBAR"),
+        ("CQUAD4,99,4,1,2,8,7\n", "1 CQUAD4"),
+        ("RBE2,99,1,123456,2,3\n", "1 RBE2"),
+        ("CHEAX,99,1,1,2,3,4,5,6\n", "not read: CHEAX"),
+        ("CHEXA,99,1,1,7,9,3,2,8\n,10,4\n", "1 of 7 cells stand in the file again"),
+    ],
+)
+def test_what_is_left_out_is_told(read, more, says):
+    part = read(PLAIN + more)
+    assert integrate(part) == pytest.approx(VOLUME, rel=1e-6)
+    assert any(says in remark for remark in part.remarks)
+
+
+def test_properties_name_regions_and_faces(read):
+    text = PLAIN.replace("CHEXA,1,1,", "CHEXA,1,8,") + "CQUAD4,99,4,1,2,4,3\nCQUAD4,98,4,3,4,6,5\n"
+    part = read(text, (PlaceRecord(name="root", group="4"),))
+    assert list(part.regions) == ["1", "8"]
+    assert face_area(part, "root") == pytest.approx(VOLUME)
+
+
+def test_included_files_count(read, tmp_path):
+    (tmp_path / "grids.bdf").write_text(PLAIN[: PLAIN.index("CHEXA")])
+    part = read(HEAD + "include 'gri\nds.bdf'\n" + PLAIN[PLAIN.index("CHEXA") :], name="part.nas")
+    assert integrate(part) == pytest.approx(VOLUME, rel=1e-6)
+    assert [path.name for path in files_of(tmp_path / "part.nas")] == ["part.nas", "grids.bdf"]
