@@ -127,6 +127,8 @@ def _write_joints(group: h5py.Group, solution: SpatialSolution, result: SpatialR
         entry.attrs["type"] = joint.type
         acting = result.reactions[joint.name]
         entry["reaction"], entry["reaction_moment"] = acting.force, acting.moment
+        if result.sharing is not None and joint.name in result.sharing.components:
+            entry.attrs["indeterminate"] = list(result.sharing.components[joint.name])
         if (found := motion.joint(joint.name)) is not None:
             entry["coordinate"], entry["rate"] = (
                 np.squeeze(values, 1) if len(joint.units) == 1 else values for values in found

@@ -18,6 +18,7 @@ from ..mbs.analysis.operating_points import InstantAnalysis
 from ..mbs.analysis.spatial_run import SpatialRun
 from ..mbs.quantities.spatial_energy import energies, momentum
 from ..mbs.quantities.spatial_reactions import reactions
+from ..mbs.quantities.spatial_sharing import shared_evenly
 from ..mbs.quantities.stiffening import NOTABLE
 from ..mbs.scene.analysis import Analysis
 from ..scene.spatial import SpatialScene, load_spatial_scene
@@ -220,10 +221,11 @@ def _context(
 
 def _evaluated(solution: SpatialSolution, run: SpatialRun) -> SpatialResult:
     """What is read off a run."""
-    motion = MotionOfLinks(
+    found = MotionOfLinks(
         run.model, run.time, run.q, run.v, run.a, run.multipliers, run.required, run.is_at_rest, run.applied,
         run.commanded, divided_links(solution),
     )  # fmt: skip
+    motion, sharing = shared_evenly(found)
     actuation = None
     is_judged = motion.motor_forces is not None and not isinstance(run.analysis, InstantAnalysis)
     if is_judged:  # else nothing is asked of motors and patches
@@ -237,7 +239,7 @@ def _evaluated(solution: SpatialSolution, run: SpatialRun) -> SpatialResult:
         at_points = {name: solve_spatial_points(points, run) for name, points in solution.points.items()}
     return SpatialResult(
         run, motion, reactions(motion), energies(motion), momentum(motion), actuation, stresses, at_points,
-        bending=bending_of_links(solution, motion),
+        bending=bending_of_links(solution, motion), sharing=sharing,
     )  # fmt: skip
 
 

@@ -20,6 +20,7 @@ from ..mbs.model.truncation import modes_kept
 from ..mbs.quantities.spatial_doubts import doubts
 from ..mbs.quantities.spatial_energy import Energies, Momentum
 from ..mbs.quantities.spatial_motion import SpatialMotion
+from ..mbs.quantities.spatial_sharing import Sharing
 from ..mbs.quantities.stress import BodyStress
 from ..mbs.quantities.validity import Bending, deflection_warning
 from ..scene.pieces import BodyInPieces
@@ -44,6 +45,7 @@ class SpatialResult:
         point_forces: at actuation points, by body.
         check: what a replay on finer links found, where that is asked for.
         bending: how far flexible bodies leave small deformations, and what loads do to their stiffness.
+        sharing: reactions that redundant constraints leave open; None where there are none.
     """
 
     run: SpatialRun
@@ -56,6 +58,7 @@ class SpatialResult:
     point_forces: Mapping[str, PointForces] = field(default_factory=dict)
     check: FinerCheck | None = None
     bending: Mapping[str, Bending] = field(default_factory=dict)
+    sharing: Sharing | None = None
 
     @property
     def status(self) -> str:
@@ -68,6 +71,7 @@ class SpatialResult:
         missed = None if self.actuation is None else self.actuation.unsupplied
         bent = deflection_warning(self.bending)
         told = (*([bent] if bent else []), *self._doubts, *self.run.warnings, *unresolved_gears(self.motion.gears))
+        told = told if self.sharing is None else (*told, self.sharing.in_words)
         if isinstance(self.run.details, LoopRecord):
             told = (*told, *self.run.details.warnings)
         return told if missed is None else (*told, missed.in_words)

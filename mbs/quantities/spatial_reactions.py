@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from ...common.arrays import Array
 from .._core import TimeFunction
 from ..model.spatial_inverse import body_forces
+from ..model.spatial_rows import SpatialRow
 from ..model.spatial_transmission import rotors
 from ..model.spatial_wrench import Wrench, along_joint, row_wrenches
 from .spatial_motion import SpatialMotion
@@ -20,23 +21,26 @@ def reactions(motion: SpatialMotion) -> Mapping[str, Wrench]:
     A joint of the tree carries what its body and all that hangs on it need, less what else acts there and what drives
     the joint; one that closes a loop has its multipliers, and friction and loads along it.
     """
+    rows = zip(motion.model.rows, -motion.multipliers.T, strict=True)
+    along_rows = [(row, size) for row, size in rows if row.kind != "coordinate"]  # that drives its joint
+    # What acts along a joint that closes a loop is part of what it carries, as in the tree.
+    return _carried(motion, _needed(motion), [*along_rows, *motion.along_cut], _driving(motion))
+
+
+def reactions_of_loops(motion: SpatialMotion, forces: Array) -> Mapping[str, Wrench]:
+    """What forces (T, rows that close loops) along these rows are in `reactions`."""
+    none = np.zeros((len(motion.time), 3))
+    rows = [row for row in motion.model.rows if not row.is_trajectory]
+    totals = [Wrench(none, none) for _ in motion.model.tree.nodes]
+    return _carried(motion, totals, list(zip(rows, forces.T, strict=True)), {})
+
+
+def _needed(motion: SpatialMotion) -> list[Wrench]:
+    """By body what it needs for its motion, less loads and what rotors do; moments about the global origin."""
     tree, state, gravity, totals = motion.model.tree, motion.accelerated, np.array(motion.model.scene.gravity), []
     for node, of_frame, frame in zip(tree.nodes, state.of_frames(), motion.frames, strict=True):
         needed = body_forces(node, state, of_frame, gravity)
         totals.append(Wrench(needed.force, needed.moment).seen_from(frame.r))
-    loops: dict[str, Wrench] = {}
-    # What acts along a joint that closes a loop is part of what it carries, as in the tree.
-    for row, size in (*zip(motion.model.rows, -motion.multipliers.T, strict=True), *motion.along_cut):
-        if row.kind == "coordinate":  # drives its joint
-            continue
-        on_a, on_b = row_wrenches(tree, row, size, motion.q, motion.time, motion.frames)
-        for section, acting in ((row.a, on_a), (row.b, on_b)):
-            if section.body >= 0:
-                totals[section.body] = totals[section.body].plus(acting, -1.0)
-        if not row.is_trajectory:
-            second, on_second = (row.b, on_b) if row.sign > 0 else (row.a, on_a)
-            at_joint = on_second.seen_from(-tree.motion(second, motion.q, motion.frames).r)
-            loops[row.owner] = loops[row.owner].plus(at_joint) if row.owner in loops else at_joint
     loads = [(load.point, load.components) for load in motion.model.scene.load if load.point is not None]
     for point, components in (*loads, *motion.applied):
         number = tree.index[point.partition(".")[0]]
@@ -45,7 +49,27 @@ def reactions(motion: SpatialMotion) -> Mapping[str, Wrench]:
         if rotor.first.body >= 0:
             moment = rotor.torque[:, None] * rotor.axis + rotor.gyroscopic
             totals[rotor.first.body] = totals[rotor.first.body].plus(Wrench(np.zeros_like(moment), moment))
-    found, driving = dict(loops), _driving(motion)
+    return totals
+
+
+def _carried(
+    motion: SpatialMotion,
+    totals: list[Wrench],
+    along_rows: Sequence[tuple[SpatialRow, Array]],
+    driving: Mapping[str, Array],
+) -> dict[str, Wrench]:
+    """By joint what it carries of what bodies need, `totals`, under forces (T,) along rows, less what drives it."""
+    tree, loops = motion.model.tree, dict[str, Wrench]()
+    for row, size in along_rows:
+        on_a, on_b = row_wrenches(tree, row, size, motion.q, motion.time, motion.frames)
+        for section, acting in ((row.a, on_a), (row.b, on_b)):
+            if section.body >= 0:
+                totals[section.body] = totals[section.body].plus(acting, -1.0)
+        if not row.is_trajectory:
+            second, on_second = (row.b, on_b) if row.sign > 0 else (row.a, on_a)
+            at_joint = on_second.seen_from(-tree.motion(second, motion.q, motion.frames).r)
+            loops[row.owner] = loops[row.owner].plus(at_joint) if row.owner in loops else at_joint
+    found = dict(loops)
     for number in reversed(range(len(tree.nodes))):
         node = tree.nodes[number]
         if node.inner.body >= 0:

@@ -46,7 +46,7 @@ def initial_state(model: SpatialModel) -> State:
 
 def holding_multipliers(model: SpatialModel, q: Array) -> Array:
     """λ (rows,) with C_vᵀλ = Q at rest at q (n_q,), t = 0; of least size where rows depend on others."""
-    sizes = _sizes(model)
+    sizes = natural_sizes(model)
     C_v = row_values(model, q[None], np.zeros(1))[1][0]
     found: Array = np.linalg.lstsq(C_v.T * sizes[:, None], forces_at_rest(model, q[None])[0] * sizes, rcond=1e-12)[0]
     return found
@@ -58,7 +58,7 @@ def static_equilibrium(model: SpatialModel, start: State, t: float = 0.0) -> Sta
     Raises `SolveError` where there is no equilibrium near the start.
     """
     tree, n, m, length = model.tree, model.tree.n_v, len(model.rows), robot_size(model)
-    sizes = _sizes(model)
+    sizes = natural_sizes(model)
     row_scales = np.array([1.0 if row.carries_moment else length for row in model.rows])
     q = start.q
     C_v = row_values(model, q[None], np.array([t]))[1][0]
@@ -81,7 +81,7 @@ def static_equilibrium(model: SpatialModel, start: State, t: float = 0.0) -> Sta
     )
 
 
-def _sizes(model: SpatialModel) -> Array:
+def natural_sizes(model: SpatialModel) -> Array:
     """(n_v,) natural sizes: 1 rad or the robot's size of joints, √J of modes, bent by about their length."""
     sizes, length = np.ones(model.tree.n_v), robot_size(model)
     for node in model.tree.nodes:
@@ -99,7 +99,7 @@ def _force_scale(size: float, row_scales: Array) -> Array:
 def _residual(model: SpatialModel, q: Array, t: float, multipliers: Array, row_scales: Array) -> tuple[Array, float]:
     """(T, n_v + rows): forces left, and C over its natural sizes; and the size of the largest force term."""
     C, C_v = row_values(model, q, np.full(len(q), t))
-    Q, held, sizes = forces_at_rest(model, q, t), np.einsum("tij,i->tj", C_v, multipliers), _sizes(model)
+    Q, held, sizes = forces_at_rest(model, q, t), np.einsum("tij,i->tj", C_v, multipliers), natural_sizes(model)
     elastic = np.zeros_like(Q)  # in equilibrium Q is nothing but rounding where no row holds anything
     for node in model.tree.nodes:
         elastic[:, node.p_v] = node.body.stiffness * q[:, node.p_q]

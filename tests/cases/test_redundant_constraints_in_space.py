@@ -1,0 +1,146 @@
+"""Reactions that redundant constraints of loops leave open are named; what is written of them is the least split."""
+
+import numpy as np
+import pytest
+
+import ffrobot
+
+Z = {"axis": [0.0, 0.0, 1.0], "motor": False}
+WEIGHT, ARM, HEIGHT = 50.0, 0.4, 1.8
+NAMES = ("j1", "j2", "j3", "j4")
+
+
+def bar(name, length, mass):
+    inertia = [1e-4, mass * length**2 / 12, mass * length**2 / 12]
+    points = {"root": [0.0, 0.0, 0.0], "tip": [length, 0.0, 0.0], "mid": [length / 2, 0.0, 0.0]}
+    return {
+        "name": name,
+        "rigid": {"mass": mass, "center": [length / 2, 0.0, 0.0], "inertia": inertia, "points": points},
+    }
+
+
+def coupler(family):
+    return {
+        "name": "coupler",
+        "link": {
+            "name": "coupler",
+            "material": {"youngs_modulus": 70e9, "poissons_ratio": 0.33, "density": 2700.0},
+            "geometry": {"kind": "beam", "length": 0.4, "section": {"shape": "circle", "diameter": 0.012}},
+            "mesh": {"elements": 4},
+            "reference": {"condition": "cantilever"},
+            "modes": {"count": 2, "family": family},
+            "damping": {"rayleigh": [0.0, 2e-4]},
+        },
+    }
+
+
+def four_bar(middle, gravity, order="1234", third=False):
+    """Cranks of 0.2 m and a coupler of 0.4 m on four parallel axes; the third crank stands in the middle."""
+    joints = {
+        "1": {"name": "j1", "type": "revolute", "between": ["ground", "left.root"], **Z, "motor": True},
+        "2": {"name": "j2", "type": "revolute", "between": ["left.tip", "coupler.root"], **Z},
+        "3": {"name": "j3", "type": "revolute", "between": ["coupler.tip", "right.tip"], **Z},
+        "4": {"name": "j4", "type": "revolute", "between": ["ground", "right.root"], "at": [0.4, 0.0, 0.0], **Z},
+    }
+    bodies, joints = [bar("left", 0.2, 0.5), middle, bar("right", 0.2, 0.6)], [joints[k] for k in order]
+    if third:
+        bodies.append(bar("third", 0.2, 0.3))
+        joints.append({"name": "j5", "type": "revolute", "between": ["ground", "third.root"], "at": [0.2, 0, 0], **Z})
+        joints.append({"name": "j6", "type": "revolute", "between": ["third.tip", "coupler.mid"], **Z})
+    scene = ffrobot.make_scene(
+        name="four_bar",
+        space="spatial",
+        gravity=gravity,
+        body=bodies,
+        joint=joints,
+        trajectory=[{"name": "t", "joint": "j1", "value": "0.9 + 0.5*sin(4*t)"}],
+        initial={"joints": {"j1": 0.9, "j2": -0.9, "j3": 0.9, "j4": 0.9} | ({"j5": 0.9, "j6": -0.9} if third else {})},
+        analysis=[{"name": "inv", "kind": "pcid", "end": 0.3, "output_step": 0.1}],
+    )
+    return ffrobot.solve(scene)
+
+
+def opened(results):
+    return {name: list(results.attributes(f"inv/joints/{name}").get("indeterminate", [])) for name in NAMES}
+
+
+def redundant(results):
+    return [text for text in results.warnings.get("inv", ()) if "redundant" in text]
+
+
+def test_a_door_on_two_hinges():
+    """Of the least 2F² + 2m²/h² with Fh + 2m = Wb, where each hinge has F across and m: F = Wb/5h, m = 2Wb/5."""
+    hinges = {"low": [0.0, 0.0, 0.0], "high": [0.0, 0.0, HEIGHT]}
+    leaf = {"mass": WEIGHT / 10, "center": [ARM, 0.0, HEIGHT / 2], "inertia": [1.0, 1.0, 1.0], "points": hinges}
+    scene = ffrobot.make_scene(
+        name="door",
+        space="spatial",
+        gravity=[0.0, 0.0, -10.0],
+        body=[{"name": "leaf", "rigid": leaf}],
+        joint=[
+            {"name": name, "type": "revolute", "between": ["ground", f"leaf.{name}"], "at": at, **Z}
+            for name, at in hinges.items()
+        ],
+        analysis=[{"name": "inv", "kind": "forward", "end": 0.1, "output_step": 0.1}],
+    )
+    with pytest.warns(ffrobot.FfrobotWarning, match=r'5 constraints .* redundant.*"low" \(x, y, z, mx, my\)'):
+        results = ffrobot.solve(scene)
+    for name, sign in (("low", 1.0), ("high", -1.0)):
+        found = [results[f"inv/joints/{name}/{part}"][0] for part in ("reaction", "reaction_moment")]
+        expected = [[sign * WEIGHT * ARM / (5 * HEIGHT), 0.0, WEIGHT / 2], [0.0, -2 * WEIGHT * ARM / 5, 0.0]]
+        np.testing.assert_allclose(found, expected, atol=1e-9)
+        assert list(results.attributes(f"inv/joints/{name}")["indeterminate"]) == ["x", "y", "z", "mx", "my"]
+
+
+@pytest.mark.filterwarnings("ignore::ffrobot.FfrobotWarning")
+def test_parallel_axes_of_rigid_links():
+    """Open is what acts along the axes and across them; the weight along these is carried, in-plane forces stay."""
+    flat, along = (four_bar(bar("coupler", 0.4, 0.7), [0.0, -9.8, g]) for g in (0.0, -3.0))
+    assert opened(along) == {name: ["z", "mx", "my"] for name in NAMES}
+    (text,) = redundant(along)
+    assert text.startswith("3 constraints of closed loops are redundant")
+    assert '"j4" (z, mx, my)' in text
+    of_ground = sum(along[f"inv/joints/{name}/reaction"][:, 2] for name in ("j1", "j4"))
+    np.testing.assert_allclose(of_ground, 3.0 * 1.8, rtol=1e-12)
+    for name in opened(along):
+        in_plane = [results[f"inv/joints/{name}/reaction"][:, :2] for results in (flat, along)]
+        np.testing.assert_allclose(*in_plane, atol=1e-9)
+
+
+@pytest.mark.filterwarnings("ignore::ffrobot.FfrobotWarning")
+@pytest.mark.parametrize("order", ["4321", "1342"])
+def test_the_split_does_not_depend_on_the_order_of_joints(order):
+    first, other = (four_bar(bar("coupler", 0.4, 0.7), [0.0, -9.8, -3.0], order) for order in ("1234", order))
+    for name in opened(first):
+        for part in ("reaction", "reaction_moment"):
+            path = f"inv/joints/{name}/{part}"
+            np.testing.assert_allclose(other[path], first[path], atol=1e-8)
+
+
+@pytest.mark.filterwarnings("ignore::ffrobot.FfrobotWarning")
+def test_a_third_parallel_crank():
+    """In the plane one more is open: how cranks share what acts along them."""
+    results = four_bar(bar("coupler", 0.4, 0.7), [0.0, -9.8, 0.0], third=True)
+    assert redundant(results)[0].startswith("7 constraints")
+    assert opened(results) == {name: ["x", "y", "z", "mx", "my"] for name in NAMES}
+    lift = sum(results[f"inv/joints/{name}/reaction"][0] for name in ("j1", "j4", "j5"))
+    assert lift[2] == pytest.approx(0.0, abs=1e-12)
+
+
+@pytest.mark.filterwarnings("ignore::ffrobot.FfrobotWarning")
+@pytest.mark.parametrize(
+    ("family", "at_cranks", "at_coupler"),
+    [
+        ("all", [], []),
+        ("in-plane-bending", ["z", "mx", "my"], ["z", "mx", "my"]),
+        ("torsion", ["z", "mx", "my"], ["z", "my"]),
+    ],
+)
+def test_modes_settle_what_they_carry(family, at_cranks, at_coupler):
+    """A coupler that bends in two planes and twists settles all; bent in the plane, nothing; twisted, mx at its ends.
+
+    It stays along x.
+    """
+    results = four_bar(coupler(family), [0.0, -9.8, -3.0])
+    assert opened(results) == {"j1": at_cranks, "j2": at_coupler, "j3": at_coupler, "j4": at_cranks}
+    assert len(redundant(results)) == bool(at_cranks)
