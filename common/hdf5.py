@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from . import checksum
 from .errors import FfrobotError, InputError
-from .outputs import protected
+from .outputs import check_regular, protected
 
 MOST_COMPRESSED = 1100  # gzip makes 1032 bytes of one at best
 
@@ -27,6 +27,7 @@ def open_checked(path: Path) -> h5py.File:
         InputError: the checksum does not fit or is missing, or a link leads out of the file.
         OSError: there is no such file, or it is not HDF5.
     """
+    check_regular(path)
     state = checksum.state(path)
     if state == "damaged":
         raise checksum.refuse(path)

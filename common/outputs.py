@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import stat
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar
@@ -17,6 +18,7 @@ from .tables import shown
 HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
 _KINDS = {HDF5_SIGNATURE: "HDF5", b"\x89PNG": "PNG", b"%PDF": "PDF", b"PK\x03\x04": "zip", b"MATLAB": "MATLAB"}
 DAMAGED = "HDF5 damaged"
+_SPECIAL = {stat.S_ISFIFO: "a pipe (FIFO)", stat.S_ISSOCK: "a socket"}
 _START = 4096  # bytes that tell the kind of a file
 
 _inputs: ContextVar[tuple[Path, ...]] = ContextVar("inputs", default=())
@@ -51,7 +53,7 @@ def check_not_an_input(path: Path) -> None:
 
 
 def check_file_name(text: str) -> Path:
-    """`text` as a path. Raises `InputError` where it can be the name of no file, whether there or not."""
+    """`text` as a path. Raises `InputError` where it can be the name of no file, or is that of no regular one."""
     path = Path(text)
     try:
         path.resolve()
@@ -59,7 +61,20 @@ def check_file_name(text: str) -> Path:
             os.stat(path)  # `exists` and, from Python 3.13 on, `resolve` are silent about circles
     except (OSError, RuntimeError, ValueError) as error:
         raise InputError(f"{shown(text)}: expected the name of a file, found {why_no_file(error)}") from None
+    check_regular(path)
     return path
+
+
+def check_regular(path: Path) -> None:
+    """Raise `InputError` where a pipe, a device or a socket is at `path`: reading it may never end.
+
+    What is not there, and folders, are for others to refuse.
+    """
+    with suppress(OSError, ValueError):
+        mode = path.stat().st_mode
+        if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):
+            kind = next((word for is_kind, word in _SPECIAL.items() if is_kind(mode)), "a device")
+            raise InputError(f"{path}: expected a regular file, found {kind}")
 
 
 def why_no_file(error: Exception) -> str:

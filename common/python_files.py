@@ -98,6 +98,6 @@ def _is_installed(file: Path) -> bool:
 def sha256_of(file: Path) -> str:
     """SHA-256 of a file's content; "" where it cannot be read."""
     try:
-        return hashlib.sha256(file.read_bytes()).hexdigest()
+        return hashlib.sha256(file.read_bytes()).hexdigest() if file.is_file() else ""  # a pipe may have no end
     except (OSError, ValueError):  # the latter where it is no name of a file
         return ""

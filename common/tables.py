@@ -1,16 +1,47 @@
-"""Tables as TOML has them: where in a file a key is, and limits that hold for whatever a file may contain."""
+"""Tables as TOML and CSV have them: where in a file a key is, limits of what any file may contain, cells as text."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+import csv
+from collections.abc import Iterable, Iterator, Sequence
 from datetime import date, time
-from typing import Any
+from typing import Any, TextIO
 
 DEEPEST = 32  # tables and lists within each other
 LONGEST_TEXT = 20_000  # characters; expressions have a limit of their own below this
 LARGEST = 1e30  # of any number: products of a few of them are still finite
 SMALLEST = 1e-30  # of what has to be positive
 LARGEST_INTEGER = 2**63 - 1  # TOML promises no more
+
+
+FORMULA = ("=", "+", "-", "@", "\t", "\r")
+"""Begins what spreadsheets take for a formula, which may run programs (OWASP, CSV Injection)."""
+
+
+class TableWriter:
+    """Lines of a CSV file (RFC 4180) to `stream`; text that a spreadsheet would run has an apostrophe before it."""
+
+    def __init__(self, stream: TextIO) -> None:
+        self._writer = csv.writer(stream, lineterminator="\n")
+
+    def writerow(self, cells: Iterable[object]) -> None:
+        """One line; numbers with all their digits."""
+        self._writer.writerow([f"'{cell}" if _is_formula(cell) else cell for cell in cells])
+
+    def writerows(self, rows: Iterable[Iterable[object]]) -> None:
+        """A line each."""
+        for row in rows:
+            self.writerow(row)
+
+
+def _is_formula(cell: object) -> bool:
+    if not isinstance(cell, str) or not cell.startswith(FORMULA):
+        return False
+    try:
+        float(cell)
+    except ValueError:
+        return len(cell) > 1
+    return False
 
 
 def key_path(loc: Sequence[int | str], data: dict[str, Any], kind: str = "missing") -> str:

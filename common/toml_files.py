@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from .errors import InputError
+from .outputs import check_regular
 from .tables import DEEPEST, beyond_limits
 
 # The key that makes a file one of its kind, and the command for it.
@@ -19,6 +20,7 @@ _KINDS: Mapping[str, tuple[str, str]] = {
 
 def read_text(path: Path, kind: str) -> str:
     """The text of the file at `path`, UTF-8 with or without a byte order mark; messages call it `kind`."""
+    check_regular(path)
     try:
         return path.read_text(encoding="utf-8-sig")
     except FileNotFoundError:

@@ -79,9 +79,10 @@ def _links(pairs: tuple[str, ...]) -> Mapping[str, Path]:
     metavar="NAME",
     help="Of this analysis; if absent the first with moving joints, of fmu the first linear or forward one.",
 )
-@click.option("-o", "--output", metavar="FILE", type=FILE, help="Where to write [beside the input].")
+@click.option("-o", "--output", metavar="FILE", type=FILE, help="Where to write [beside the input, by analysis].")
+@click.option("--force", is_flag=True, help="Replace a file that is there.")
 @logging_options
-def export(file: Path, file_format: str, analysis: str | None, output: Path | None) -> None:
+def export(file: Path, file_format: str, analysis: str | None, output: Path | None, *, force: bool) -> None:
     """Write results, a modal body or a scene in a format of other programs.
 
     \b
@@ -103,4 +104,4 @@ def export(file: Path, file_format: str, analysis: str | None, output: Path | No
     from ..present.summary import summary_console
 
     with reading(file):
-        print_export(export_file(file, file_format, analysis, output), summary_console())
+        print_export(export_file(file, file_format, analysis, output, force=force), summary_console())

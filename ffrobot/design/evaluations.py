@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import io
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -11,6 +10,7 @@ from typing import Any
 
 from ..common.errors import InputError
 from ..common.files import write_atomically
+from ..common.tables import TableWriter
 from ..sweep.runs import RESULTS
 from ..sweep.sweep import Key
 from .designs import Design, Designs, Point
@@ -170,7 +170,7 @@ class Evaluations:
 def write_designs(found: Evaluations, path: Path) -> None:
     """One line for each design of a search: values of keys and goals, the largest excess of a limit, its folder."""
     problem, text = found.problem, io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
+    writer = TableWriter(text)
     goals = [problem.objective.text, *(limit.text for limit in problem.limits)]
     writer.writerow(["design", *map(".".join, found.space.keys), "status", *goals, "violation", "folder", "message"])
     for k, one in enumerate(found.searched):

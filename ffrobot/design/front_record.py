@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import io
 from collections.abc import Iterator
 from pathlib import Path
@@ -11,6 +10,7 @@ import numpy as np
 from rich.console import Console
 
 from ..common.files import write_atomically
+from ..common.tables import TableWriter
 from ..present.tables import print_table
 from .front import Front, FrontPoint
 from .study_parts import with_unit
@@ -49,7 +49,7 @@ def front_remarks(found: Front) -> Iterator[str]:
 def write_front(found: Front, path: Path) -> None:
     """One line for each design, as CSV; `price` is ∂goal/∂against along the front."""
     text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
+    writer = TableWriter(text)
     writer.writerow([*found.goals, "price", *found.keys, "converged", "feasible", "message"])
     for one in found.points:
         price = one.price if np.isfinite(one.price) else ""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import io
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -13,6 +12,7 @@ from rich.console import Console
 
 from ..common.arrays import Array, as_floats
 from ..common.files import write_atomically
+from ..common.tables import TableWriter
 from ..present.tables import plain_table
 from ..results.verdict import Verdict
 from .evaluations import Evaluated
@@ -179,7 +179,7 @@ def prices_in_words(found: Optimum) -> Iterator[str]:
 def write_optimum(found: Optimum, path: Path) -> None:
     """Goal, keys and limits with their prices, one line each, as CSV."""
     text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
+    writer = TableWriter(text)
     writer.writerow(COLUMNS)
     problem, starts = found.problem, found.start.values or (np.nan,) * len(found.best.values)
     writer.writerow(["goal", problem.objective.text, starts[0], found.value, "", "", "", ""])

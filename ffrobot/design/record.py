@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import io
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -13,6 +12,7 @@ from rich.console import Console
 
 from ..common.arrays import Array, as_floats
 from ..common.files import write_atomically
+from ..common.tables import TableWriter
 from ..present.tables import plain_table
 from .derivatives import Entry
 from .readings import Reading
@@ -90,7 +90,7 @@ class Sensitivity:
 def write_sensitivity(found: Sensitivity, path: Path) -> None:
     """One line for each goal and key, as CSV."""
     text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
+    writer = TableWriter(text)
     writer.writerow(COLUMNS)
     for g, (goal, reading) in enumerate(zip(found.goals, found.readings, strict=True)):
         for k, (key, value) in enumerate(zip(found.keys, found.values, strict=True)):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import io
 from collections.abc import Iterator
 from pathlib import Path
@@ -11,6 +10,7 @@ import numpy as np
 from rich.console import Console
 
 from ..common.files import write_atomically
+from ..common.tables import TableWriter
 from ..pictures.studies.diagrams import Points
 from ..pictures.studies.study import Study
 from ..present.tables import print_table
@@ -53,7 +53,7 @@ def remarks(found: Screening) -> Iterator[str]:
 def write_screening(found: Screening, folder: Path) -> Path:
     """`screening.csv`, one line for each goal and key; the file written."""
     text, e = io.StringIO(), found.effects
-    writer = csv.writer(text, lineterminator="\n")
+    writer = TableWriter(text)
     writer.writerow(COLUMNS)
     for g, (goal, reading) in enumerate(zip(found.goals, found.readings, strict=True)):
         for k, one in enumerate(found.spreads):

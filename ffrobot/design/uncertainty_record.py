@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import io
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -12,6 +11,7 @@ from rich.console import Console
 
 from ..common.arrays import Array
 from ..common.files import write_atomically
+from ..common.tables import TableWriter
 from ..present.tables import print_table
 from .readings import Reading
 from .statistics import LEVELS, Statistics
@@ -167,7 +167,7 @@ def _numbers(s: Statistics, k: int) -> list[float]:
 
 def _write(path: Path, columns: Sequence[str], rows: Iterator[list[object]]) -> None:
     text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
+    writer = TableWriter(text)
     writer.writerow(columns)
     writer.writerows(rows)
     write_atomically(path, text.getvalue().encode(), "table of uncertainties", ours=True)

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
-from ..common.errors import InputError, of_file
-from ..common.files import check_new_folder, check_output, write_atomically
+from ..common.errors import InputError, SolveError, of_file
+from ..common.files import check_new_file, check_new_folder, check_output, write_atomically
 from ..common.outputs import check_not_an_input
 from ..common.toml_files import read_text
 from ..common.validation import quoted
@@ -37,35 +38,50 @@ class Exported:
     remarks: tuple[str, ...]
 
 
-def _csv(path: Path, analysis: str | None) -> tuple[str, str, tuple[str, ...]]:
+class Made(NamedTuple):
+    """What a file is to hold, the analysis that it is of ("" of none), a few words on it, remarks."""
+
+    content: Content
+    analysis: str
+    what: str
+    remarks: tuple[str, ...]
+
+
+def _csv(path: Path, analysis: str | None) -> Made:
     motion = robot_motion(path, analysis)
-    return csv_text(motion), f"{len(motion.joints)} joints of {motion.analysis}", motion.remarks
+    return Made(csv_text(motion), motion.analysis, f"{len(motion.joints)} joints of {motion.analysis}", motion.remarks)
 
 
-def _joint_trajectory(path: Path, analysis: str | None) -> tuple[str, str, tuple[str, ...]]:
+def _joint_trajectory(path: Path, analysis: str | None) -> Made:
     motion = robot_motion(path, analysis)
     text, remarks = joint_trajectory_text(motion)
-    return text, f"{len(motion.time)} points of {motion.analysis}", remarks
+    return Made(text, motion.analysis, f"{len(motion.time)} points of {motion.analysis}", remarks)
 
 
-def _rosbag(path: Path, analysis: str | None) -> tuple[Mapping[str, bytes], str, tuple[str, ...]]:
+def _rosbag(path: Path, analysis: str | None) -> Made:
     motion = robot_motion(path, analysis)
     files, remarks = joint_trajectory_bag(motion)
-    return files, f"a JointTrajectory with {len(motion.time)} points of {motion.analysis}", remarks
+    what = f"a JointTrajectory with {len(motion.time)} points of {motion.analysis}"
+    return Made(files, motion.analysis, what, remarks)
 
 
-OF_RESULTS: Mapping[str, tuple[str, Callable[[Path, str | None], tuple[Content, str, tuple[str, ...]]]]] = {
+def _urdf(path: Path, analysis: str | None) -> Made:
+    text, what, remarks = scene_as_urdf(path)
+    return Made(text, "", what, remarks)
+
+
+OF_RESULTS: Mapping[str, tuple[str, Callable[[Path, str | None], Made]]] = {
     "csv": (".csv", _csv),
     "joint-trajectory": (".joint-trajectory.json", _joint_trajectory),
     "rosbag2": (".rosbag2", _rosbag),
-    "fmu": (".fmu", linear_fmu),
+    "fmu": (".fmu", lambda path, analysis: Made(*linear_fmu(path, analysis))),
 }
-"""Formats of results: end of the file's name, and what makes the content, a few words on it, remarks."""
+"""Formats of results: end of the file's name, and what makes the content."""
 
 
-OF_SCENES: Mapping[str, tuple[str, Callable[[Path, str | None], tuple[Content, str, tuple[str, ...]]]]] = {
-    "urdf": (".urdf", lambda path, _: scene_as_urdf(path)),
-    "fmu": (".fmu", forward_fmu),
+OF_SCENES: Mapping[str, tuple[str, Callable[[Path, str | None], Made]]] = {
+    "urdf": (".urdf", _urdf),
+    "fmu": (".fmu", lambda path, analysis: Made(*forward_fmu(path, analysis))),
 }
 """Formats of scenes, likewise."""
 
@@ -79,13 +95,17 @@ OF_BODIES: Mapping[str, tuple[str, Callable[[ModalBody], tuple[str | bytes, tupl
 """Formats of bodies: end of the file's name, and what makes the content and remarks on what it does not carry."""
 
 
-def export_file(path: Path, file_format: str, analysis: str | None, output: Path | None) -> Exported:
-    """Write a scene, a modal body or a results file in another format.
+def export_file(
+    path: Path, file_format: str, analysis: str | None, output: Path | None, *, force: bool = False
+) -> Exported:
+    """Write a scene, a modal body or a results file in another format; by default beside it, with the analysis' name.
 
     Raises:
-        InputError: the file is of another kind, or has nothing to export.
+        InputError: the file is of another kind, or has nothing to export, or one would be replaced without `force`.
         SolveError: it cannot be written.
     """
+    if not path.exists():
+        raise InputError(f"{path}: expected a scene, a modal body or a results file, found no such file")
     is_scene = path.suffix.lower() == ".toml"
     is_body = not is_scene and is_modal_body_file(path)
     known: Collection[str] = OF_SCENES if is_scene else OF_BODIES if is_body else OF_RESULTS
@@ -95,23 +115,32 @@ def export_file(path: Path, file_format: str, analysis: str | None, output: Path
     if analysis is not None and (is_body or file_format == "urdf"):
         raise InputError(f"{path}: --analysis: expected it with results and FMUs only, found {kind} as {file_format}")
     if is_body:
-        return _export_body(path, file_format, output)
+        return _export_body(path, file_format, output, force=force)
     suffix, make = (OF_SCENES if is_scene else OF_RESULTS)[file_format]
-    target = output or path.with_suffix(suffix)
-    check_not_an_input(target)
-    content, what, remarks = make(path, analysis)
-    _write(target, content)
-    return Exported(target, what, remarks)
+    if output is not None:
+        _check(output, force=force)
+    made = make(path, analysis)
+    target = output or path.with_suffix(f".{made.analysis}{suffix}" if made.analysis else suffix)
+    _check(target, force=force)
+    _write(target, made.content)
+    return Exported(target, made.what, made.remarks)
 
 
-def _export_body(path: Path, file_format: str, output: Path | None) -> Exported:
+def _export_body(path: Path, file_format: str, output: Path | None, *, force: bool) -> Exported:
     suffix, write = OF_BODIES[file_format]
     target = output or path.with_suffix(suffix)
-    check_not_an_input(target)
+    _check(target, force=force)
     body = read_modal_body(path)
     content, remarks = write(body)
     _write(target, content)
     return Exported(target, f"{body.name}, {body.modes_in_words}", remarks)
+
+
+def _check(target: Path, *, force: bool) -> None:
+    """Refuse what would cost another file; a folder is for `_write` to refuse."""
+    check_not_an_input(target)
+    if not target.is_dir():
+        check_new_file(target, replace=force)
 
 
 def _write(target: Path, content: Content) -> None:
@@ -138,8 +167,11 @@ def import_body(path: Path, output: Path) -> Exported:
         SolveError: the modal body file cannot be written.
     """
     text = read_text(path, "file of a flexible body")
-    with of_file(path):
-        body, remarks = READERS[path.suffix.lower()](text, path.stem)
+    try:
+        with of_file(path):
+            body, remarks = READERS[path.suffix.lower()](text, path.stem)
+    except (InputError, SolveError) as error:  # of a point "tip.x", say, whose name looks like that of a file
+        raise type(error)(str(error) if str(error).startswith(f"{path}:") else f"{path}: {error}") from None
     check_output(output, FORMAT)
     write_modal_body(output, body)
     return Exported(output, f"{body.name}, {body.modes_in_words}, interfaces {', '.join(body.interfaces)}", remarks)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import io
 from collections.abc import Sequence
 from pathlib import Path
@@ -11,6 +10,7 @@ from rich.console import Console
 from rich.table import Table
 
 from ..common.files import write_atomically
+from ..common.tables import TableWriter
 from .runs import Row
 
 SHOWN = 5  # quantities on the screen
@@ -21,7 +21,7 @@ def write_table(path: Path, keys: Sequence[str], rows: Sequence[Row]) -> None:
     """One line for each run: number, values of the keys, status, quantities, message."""
     quantities = _quantities(rows)
     text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
+    writer = TableWriter(text)
     writer.writerow(["run", *keys, "status", *quantities, "message"])
     for row in rows:
         found = [row.quantities.get(name, "") for name in quantities]

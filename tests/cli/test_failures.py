@@ -72,7 +72,7 @@ def test_full_disk(two_link_copy, ffrobot, small_disk, command):
         ("nowhere/r.h5", "found no folder nowhere"),
         (".", "found a folder"),
         ("/proc/r.h5", "expected a writable folder"),  # not even for root
-        ("/dev/null", "found a file of another kind"),  # a rename would replace the device
+        ("/dev/null", "expected a regular file, found a device"),  # a rename would replace it
         ("link1.toml", "another file than the input"),
     ],
 )

@@ -1,5 +1,7 @@
 """Names, files and streams that are out of the ordinary: they work, or one message says why not; never a traceback."""
 
+import csv
+import io
 import os
 import subprocess
 import sys
@@ -8,6 +10,12 @@ from pathlib import Path
 import h5py
 import pytest
 from loops import OWN_CONTROLLER
+
+import ffrobot as ffrobot_library
+from ffrobot import InputError
+from ffrobot.common.tables import TableWriter
+from ffrobot.common.toml_files import read_text
+from ffrobot.fe_models.modal_body_file import read_modal_body
 
 SHORT = {"end = 1.0": "end = 0.004"}
 HIDE = "import sys; sys.modules[{!r}] = None; sys.argv[0] = 'ffrobot'; from ffrobot.cli import main; main()"
@@ -199,3 +207,42 @@ def test_a_cache_without_room_does_no_harm(two_link_copy, ffrobot, small_disk):
     (message,) = done.stderr.splitlines()
     assert "cannot compile finite elements: No space left on device" in message
     assert str(small_disk) in message
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("solve", "pipe"),
+        ("link", "pipe"),
+        ("info", "pipe"),
+        ("report", "pipe"),
+        ("import", "pipe", "-o", "out"),
+        ("solve", "/dev/zero"),
+    ],
+)
+def test_pipes_and_devices_are_refused(refused, two_link_copy, arguments):
+    """Reading them may never end."""
+    folder = two_link_copy()
+    os.mkfifo(folder / "pipe")
+    what = "pipe: expected a regular file, found a pipe (FIFO)" if "pipe" in arguments else "found a device"
+    assert what in refused(folder, *arguments, timeout=60)
+
+
+def read_text_of(path):
+    return read_text(path, "file")
+
+
+@pytest.mark.parametrize("read", [ffrobot_library.load_scene, ffrobot_library.Results, read_modal_body, read_text_of])
+def test_pipes_in_python(read, tmp_path):
+    os.mkfifo(tmp_path / "pipe")
+    with pytest.raises(InputError, match="pipe"):
+        read(tmp_path / "pipe")
+
+
+def test_cells_that_spreadsheets_would_run():
+    """They are text to them, and numbers stay numbers."""
+    stream = io.StringIO()
+    cells = ["=cmd|' /C calc'!A0", "+1+cmd|'x'", "-2-1", "@SUM(1)", "\t=1", "arm", "-", -1.5, "-1.5", 'a"b', ""]
+    TableWriter(stream).writerow(cells)
+    (found,) = csv.reader(io.StringIO(stream.getvalue(), newline=""))
+    assert found == [*("'" + str(cell) for cell in cells[:5]), *map(str, cells[5:])]

@@ -208,7 +208,7 @@ def robot(request, tmp_path_factory, ffrobot):
     for command in (("export", scene, "--analysis", "swing", "--format", "fmu"), ("solve", loaded)):
         done = ffrobot(*command)
         assert done.returncode == 0, done.stderr
-    return request.param, folder / "scene.fmu", Results(folder / "loaded.results.h5")
+    return request.param, folder / "scene.swing.fmu", Results(folder / "loaded.results.h5")
 
 
 def modal(results, body):

@@ -140,9 +140,9 @@ def folder(ffrobot, tmp_path_factory):
 def robot(ffrobot, folder):
     done = ffrobot("export", "scene.results.h5", "--format", "fmu", cwd=folder)
     assert done.returncode == 0, done.stderr
-    assert "written    scene.results.fmu: at_rest, 14 states, 5 inputs, 9 outputs" in done.stdout
+    assert "written    scene.results.at_rest.fmu: at_rest, 14 states, 5 inputs, 9 outputs" in done.stdout
     assert "sources only" not in done.stdout
-    return Robot(folder, folder / "scene.results.fmu")
+    return Robot(folder, folder / "scene.results.at_rest.fmu")
 
 
 def test_fmpy_finds_no_fault(robot):
@@ -334,8 +334,8 @@ def test_a_linear_model_in_space(ffrobot, folder):
     for command in (("solve", "space.toml"), ("export", "space.results.h5", "--format", "fmu")):
         done = ffrobot(*command, cwd=folder)
         assert done.returncode == 0, done.stderr
-    assert validate_fmu(str(folder / "space.results.fmu")) == []
-    variables = read_model_description(str(folder / "space.results.fmu")).modelVariables
+    assert validate_fmu(str(folder / "space.results.at_rest.fmu")) == []
+    variables = read_model_description(str(folder / "space.results.at_rest.fmu")).modelVariables
     units = {each.name: each.unit for each in variables}
     assert [units[name] for name in ("joint/shaft 1", "joint/shaft 2", "point/arm.tip/z")] == ["rad", "m", "m"]
     assert units["force/arm.tip/z"] == "N"

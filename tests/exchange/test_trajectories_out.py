@@ -2,11 +2,17 @@
 
 import csv
 import json
+import shutil
+from dataclasses import replace
 
 import h5py
 import numpy as np
 import pytest
 from rigid_robots import ROBOTS, with_motion
+
+from ffrobot import Results
+from ffrobot.exchange.export import export_file
+from ffrobot.exchange.motion.joints import JointMotion, csv_text, robot_motion
 
 # Fields in the order of the message definitions of ROS 2 (common_interfaces: trajectory_msgs/msg).
 TRAJECTORY = ["header", "joint_names", "points"]
@@ -113,3 +119,29 @@ def test_what_is_refused(ur5, ffrobot, tmp_path):
     done = ffrobot("export", ur5, "--format", "xls")
     assert done.returncode == 2
     assert '--format: expected one of "csv", "joint-trajectory", "rosbag2", "fmu" of results' in done.stderr
+
+
+def test_each_analysis_has_a_file_and_none_is_replaced(crank, ffrobot, tmp_path):
+    """By its name; what is there is replaced with --force alone. A joint's name is no formula for spreadsheets."""
+    results = tmp_path / "arm.results.h5"
+    shutil.copy(crank, results)
+    with Results(results) as file:
+        names = [name for name in file.analyses if file.has(f"{name}/joints")]
+    assert len(names) > 1
+    made = [export_file(results, "csv", name, None).path for name in names]
+    assert [path.name for path in made] == [f"arm.results.{name}.csv" for name in names]
+    made[0].write_text("mine\n")
+    done = ffrobot("export", results, "--format", "csv", "--analysis", names[0])
+    assert (done.returncode, made[0].read_text()) == (2, "mine\n")
+    assert f"{made[0].name}: output: expected a new name, or --force to replace it" in done.stderr
+    done = ffrobot("export", results, "--format", "csv", "--analysis", names[0], "--force")
+    assert done.returncode == 0, done.stderr
+    assert len(made[0].read_text().splitlines()) > 2
+    motion = replace(robot_motion(results, names[0]), joints=(JointMotion("=cmd|' /C calc'!A0", *3 * (np.zeros(2),)),))
+    assert csv_text(replace(motion, time=np.zeros(2))).startswith("time,'=cmd|' /C calc'!A0.coordinate,")
+
+
+def test_a_file_that_is_not_there(ffrobot, tmp_path):
+    done = ffrobot("export", "nosuch.h5", "--format", "sid", cwd=tmp_path)
+    assert done.returncode == 2
+    assert done.stderr == ("ffrobot: nosuch.h5: expected a scene, a modal body or a results file, found no such file\n")

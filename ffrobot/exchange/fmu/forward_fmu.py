@@ -34,8 +34,8 @@ LIBRARY = "ffrobot_fmu.so"  # beside the core (CMakeLists.txt)
 RESOURCE = "resources/model.bin"  # mbs/fmu/forward.cpp
 
 
-def forward_fmu(path: Path, analysis: str | None) -> tuple[bytes, str, tuple[str, ...]]:
-    """The FMU of an analysis of kind "forward", the first if not named; a few words on it, remarks.
+def forward_fmu(path: Path, analysis: str | None) -> tuple[bytes, str, str, tuple[str, ...]]:
+    """The FMU of an analysis of kind "forward", the first if not named; its name, a few words on it, remarks.
 
     Raises:
         InputError: there is no such analysis, or something acts that the FMU does not have.
@@ -61,7 +61,7 @@ def forward_fmu(path: Path, analysis: str | None) -> tuple[bytes, str, tuple[str
         f"binaries/{folder}/{identifier}{suffix}": library.read_bytes(),
     }
     what = f"{chosen.name}, {len(unit.inputs)} inputs, {len(unit.outputs)} outputs"
-    return zipped(content), what, tuple(_remarks(unit, _silent(model), folder))
+    return zipped(content), chosen.name, what, tuple(_remarks(unit, _silent(model), folder))
 
 
 class _Logged(Watcher):

@@ -18,8 +18,8 @@ from .source import binary, numbers, sources
 from .variables import inputs_of, joint_units, outputs_of, states_of
 
 
-def linear_fmu(path: Path, analysis: str | None) -> tuple[bytes, str, tuple[str, ...]]:
-    """The FMU of an analysis of kind "linear", the first if not named; a few words on it, remarks.
+def linear_fmu(path: Path, analysis: str | None) -> tuple[bytes, str, str, tuple[str, ...]]:
+    """The FMU of an analysis of kind "linear", the first if not named; its name, a few words on it, remarks.
 
     Raises:
         InputError: there is no such analysis, it has several times, or its model has no inputs or is not finite.
@@ -51,7 +51,7 @@ def linear_fmu(path: Path, analysis: str | None) -> tuple[bytes, str, tuple[str,
     else:
         content[compiled[0]] = compiled[1]
     what = f"{name}, {len(unit.states)} states, {len(unit.inputs)} inputs, {len(unit.outputs)} outputs"
-    return zipped(content), what, tuple(remarks)
+    return zipped(content), name, what, tuple(remarks)
 
 
 def make_unit(scene: str, analysis: str, model: LinearModel, units: Mapping[str, str]) -> Unit:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,6 +11,7 @@ import numpy as np
 
 from ...common.arrays import Array, as_rows
 from ...common.errors import InputError
+from ...common.tables import TableWriter
 from ...common.validation import did_you_mean, quoted
 from ...results.file import Results
 
@@ -88,11 +90,7 @@ def csv_text(motion: RobotMotion) -> str:
         columns |= {f"{joint.name}.coordinate": joint.coordinate, f"{joint.name}.rate": joint.rate}
         if joint.moment is not None:
             columns[f"{joint.name}.moment"] = joint.moment
-    lines = [",".join(map(_quoted, columns))]
-    lines += [",".join(map(repr, row)) for row in as_rows(np.stack(list(columns.values()), axis=1))]
-    return "\n".join(lines) + "\n"
-
-
-def _quoted(text: str) -> str:
-    """As RFC 4180 has it."""
-    return '"' + text.replace('"', '""') + '"' if any(c in text for c in ',"') else text
+    text = io.StringIO()
+    TableWriter(text).writerow(columns)
+    lines = [",".join(map(repr, row)) for row in as_rows(np.stack(list(columns.values()), axis=1))]
+    return text.getvalue() + "\n".join(lines) + "\n"
