@@ -24,8 +24,9 @@ from .protect import protect
     help="A link, and the link file that says what it is; repeatable.",
 )
 @click.option("--force", is_flag=True, help="Replace files that are there.")
+@click.option("--fix-inertia", is_flag=True, help="Change inertias that no body has, as little as can be, and say so.")
 @logging_options
-def import_(file: Path, output: Path, flexible: tuple[str, ...], *, force: bool) -> None:
+def import_(file: Path, output: Path, flexible: tuple[str, ...], *, force: bool, fix_inertia: bool) -> None:
     """Make a scene in space of a robot description (URDF), or a modal body of one of other programs.
 
     DIR/scene.toml gets bodies and joints: every link rigid, as its <inertial> says, unless --flexible names a link
@@ -42,13 +43,13 @@ def import_(file: Path, output: Path, flexible: tuple[str, ...], *, force: bool)
 
     links = _links(flexible)
     if file.suffix.lower() in READERS:
-        if links or force:
-            raise InputError(f"{file}: expected --flexible and --force with a URDF only, found a body")
+        if links or force or fix_inertia:
+            raise InputError(f"{file}: expected --flexible, --force and --fix-inertia with a URDF only, found a body")
         protect([file])
         print_export(import_body(file, output), summary_console())
         return
     protect([file, *links.values()])
-    print_import(import_urdf(file, output, links, force=force), summary_console())
+    print_import(import_urdf(file, output, links, force=force, fix_inertia=fix_inertia), summary_console())
 
 
 def _links(pairs: tuple[str, ...]) -> Mapping[str, Path]:

@@ -366,6 +366,6 @@ def test_what_is_refused(robot, ffrobot, tmp_path):
         assert message in " ".join(done.stderr.split())
         assert not (tmp_path / "x.fmu").exists()
     shutil.copy(robot.folder / "scene.toml", tmp_path / "scene.toml")
-    done = ffrobot("export", results, "--format", "fmu", "-o", tmp_path / "scene.toml")
+    done = ffrobot("export", results, "--format", "fmu", "-o", tmp_path / "scene.toml", "--force")
     assert done.returncode == 2
     assert "expected a new name or a file of kind zip" in " ".join(done.stderr.split())

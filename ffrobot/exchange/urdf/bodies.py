@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
-from ...common.arrays import as_rows
+import numpy as np
+
+from ...common.arrays import Array, as_rows
 from ...common.errors import InputError
 from ...common.numbers import SMALLEST
 from ...common.tables import shown
 from ...common.validation import quoted
-from ...mbs.scene.spatial.bodies import check_inertia
+from ...mbs.scene.spatial.bodies import ROUNDING, check_inertia
 from .robot import HERE, MASSLESS, Inertial, Origin, Place, Robot, UrdfJoint
 
 
@@ -58,12 +60,13 @@ class Mechanism:
     remarks: tuple[str, ...]
 
 
-def mechanism(robot: Robot, flexible: Mapping[str, Place]) -> Mechanism:
+def mechanism(robot: Robot, flexible: Mapping[str, Place], *, fix_inertia: bool = False) -> Mechanism:
     """The bodies of a robot.
 
     Args:
         robot: as read.
         flexible: links that shall be flexible, and where their URDF frame stands in the axes of the link file.
+        fix_inertia: whether principal moments that no body has are changed, as little as can be; see `least_change`.
 
     Raises:
         InputError: a body that moves has no mass but carries others, or an inertia that no body has.
@@ -86,9 +89,19 @@ def mechanism(robot: Robot, flexible: Mapping[str, Place]) -> Mechanism:
             bodies.append(_start(robot, joint.child, flexible, body_of))
     kept, carried, remarks = _with_mass(bodies, joints, body_of)
     if not kept:
-        raise InputError(f'expected a link with mass that moves on "{shown(robot.root)}", found none')
+        raise InputError(_without_mass(robot))
+    remarks += _fixed(kept) if fix_inertia else []
     _check_inertias(kept)
     return Mechanism(tuple(kept), tuple(carried), body_of, tuple(remarks))
+
+
+def _without_mass(robot: Robot) -> str:
+    if any(link.inertial is not None and link.inertial.mass > 0 for link in robot.links.values()):
+        return f'expected a link with mass that moves on "{shown(robot.root)}", found none'
+    return (
+        "expected links with mass, found no <inertial> with one in the whole file, which is made to be looked at: add"
+        " <inertial> to its links, from CAD or a data sheet, or take a description of the robot for dynamics"
+    )
 
 
 def _weld_to_ground(robot: Robot) -> UrdfJoint:
@@ -140,6 +153,42 @@ def _with_mass(
     return kept, [joint for joint in joints if below[id(body_of[joint.child])]], remarks
 
 
+def least_change(inertia: Array) -> Array:
+    """The inertia (3, 3) nearest to `inertia`, in the sense of Frobenius, of which no principal moment is too large.
+
+    Principal axes stay. With d = J₃ − J₁ − J₂ > 0 it is the projection on the plane J₃ = J₁ + J₂: J₁ + d/3, J₂ + d/3,
+    J₃ − d/3. Moments that are not positive stay so, unless d/3 makes them.
+    """
+    moments, axes = np.linalg.eigh((inertia + inertia.T) / 2)
+    excess = max(moments[2] - moments[0] - moments[1], 0.0)
+    if excess == 0.0:
+        return inertia
+    fixed: Array = (axes * (moments + excess / 3 * np.array([1.0, 1.0, -1.0]))) @ axes.T
+    return (fixed + fixed.T) / 2
+
+
+def _fixed(bodies: list[Body]) -> list[str]:
+    """Change inertias that no body has; a remark on each."""
+    remarks = []
+    for body in bodies:
+        before = body.inertial.inertia
+        if body.flexible or (after := least_change(before)) is before or _is_possible(before):
+            continue
+        body.inertial = replace(body.inertial, inertia=after)
+        then, now = (", ".join(f"{moment:.6g}" for moment in np.linalg.eigvalsh(J)) for J in (before, after))
+        share = np.linalg.norm(after - before) / np.linalg.norm(before)
+        remarks.append(
+            f"{body.label}: principal moments of inertia {then} kg m², which no body has, are now {now}: changed by"
+            f" {100 * share:.2g} %, the least that makes them possible"
+        )
+    return remarks
+
+
+def _is_possible(inertia: Array) -> bool:
+    moments = np.linalg.eigvalsh(inertia)
+    return bool(moments[2] <= moments[0] + moments[1] + ROUNDING * np.abs(inertia).max())
+
+
 def _check_inertias(bodies: list[Body]) -> None:
     found = []
     for body in bodies:
@@ -149,6 +198,7 @@ def _check_inertias(bodies: list[Body]) -> None:
             xx, yy, zz = (tuple(row) for row in as_rows(body.inertial.inertia))
             check_inertia((xx, yy, zz), SMALLEST)
         except ValueError as error:
-            found.append(f"{body.label}: <inertia>: {error}")
+            way = "" if _is_possible(body.inertial.inertia) else ": --fix-inertia makes the least change"
+            found.append(f"{body.label}: <inertia>: {error}{way}")
     if found:
         raise InputError("\n".join(found))

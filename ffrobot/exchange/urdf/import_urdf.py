@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ...common.errors import InputError
+from ...common.errors import InputError, of_file
 from ...common.files import check_folder, write_atomically
+from ...common.tables import beyond_limits
 from .bodies import mechanism
 from .flexible import FlexibleLink, flexible_link
 from .meshes import MeshMass, mesh_masses
@@ -58,20 +59,30 @@ class Imported:
     files: tuple[Path, ...]
 
 
-def import_urdf(urdf: Path, folder: Path, flexible: Mapping[str, Path], *, force: bool = False) -> Imported:
-    """Write DIR/scene.toml, and a link file for each link of `flexible`.
+def import_urdf(
+    urdf: Path, folder: Path, flexible: Mapping[str, Path], *, force: bool = False, fix_inertia: bool = False
+) -> Imported:
+    """Write DIR/scene.toml, and a link file for each link of `flexible`; `fix_inertia` as of `bodies.mechanism`.
 
     Raises:
         InputError: wrong input, or files that would be replaced without `force`.
         SolveError: a file cannot be written.
     """
+    with of_file(urdf):
+        return _imported(urdf, folder, flexible, force=force, fix_inertia=fix_inertia)
+
+
+def _imported(urdf: Path, folder: Path, flexible: Mapping[str, Path], *, force: bool, fix_inertia: bool) -> Imported:
     robot = read_urdf(urdf)
     stems = Names([Path(SCENE).stem])
     links = {name: flexible_link(robot, name, source, folder, stems[name]) for name, source in flexible.items()}
     try:
-        scene = SceneOfRobot(robot, mechanism(robot, {name: link.place for name, link in links.items()}), links)
+        places = {name: link.place for name, link in links.items()}
+        scene = SceneOfRobot(robot, mechanism(robot, places, fix_inertia=fix_inertia), links)
     except InputError as error:
         raise InputError("\n".join(f"{urdf}: {line}" for line in str(error).splitlines())) from None
+    if found := list(beyond_limits(dict(scene.keys))):
+        raise InputError("\n".join(f"{urdf}: {line}" for line in found))
     masses, about_meshes = mesh_masses(robot, urdf)
     remarks = [*scene.remarks, *_remarks_on_links(links), *about_meshes, *remarks_on_scale(robot)]
     files = {SCENE: _scene_text(urdf, scene.keys, remarks)}

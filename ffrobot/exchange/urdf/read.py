@@ -11,7 +11,7 @@ import numpy as np
 
 from ...common.errors import InputError
 from ...common.rotations import of_rpy
-from ...common.tables import shown
+from ...common.tables import LARGEST, shown
 from ...common.toml_files import read_text
 from ...common.validation import quoted
 from .robot import TYPES, Inertial, MeshFile, Mimic, Numbers3, Origin, Robot, UrdfJoint, UrdfLink
@@ -208,4 +208,6 @@ def _finite(text: str, label: str) -> float:
         value = math.nan
     if not math.isfinite(value):
         raise InputError(f'{label}: expected a finite number, found "{shown(text)}"')
+    if abs(value) > LARGEST:
+        raise InputError(f"{label}: expected a number between -{LARGEST:g} and {LARGEST:g}, found {value:g}")
     return value

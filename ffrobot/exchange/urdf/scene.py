@@ -135,9 +135,19 @@ class SceneOfRobot:
         return keys
 
     def _remark_on_mimic(self, joint: UrdfJoint) -> None:
-        if (mimic := joint.mimic) is not None:
+        if (mimic := joint.mimic) is None:
+            return
+        leader, name = self.robot.joints[mimic.joint], f'joint "{shown(joint.name)}"'
+        if leader.type == "fixed":
             self.remarks.append(
-                f'joint "{shown(joint.name)}" follows "{shown(mimic.joint)}": give it a trajectory of its own,'
+                f'{name} follows "{shown(mimic.joint)}", which is fixed: it stands still at {mimic.offset:g}; give it a'
+                " trajectory of that value"
+            )
+        elif leader not in self.found.joints:
+            self.remarks.append(f'{name} follows "{shown(mimic.joint)}", which is left out: give it its own trajectory')
+        else:
+            self.remarks.append(
+                f'{name} follows "{shown(mimic.joint)}": give it a trajectory of its own,'
                 f" {mimic.multiplier:g} times that one plus {mimic.offset:g}; the motor of that one then has to supply"
                 f" {mimic.multiplier:g} times this one's moment beside its own"
             )

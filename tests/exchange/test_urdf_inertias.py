@@ -1,0 +1,122 @@
+"""What a URDF may have that no body has, and what is said of numbers, limits and followers that are odd."""
+
+import re
+import tomllib
+
+import numpy as np
+import pytest
+
+from ffrobot import FfrobotError
+from ffrobot.exchange.urdf.bodies import least_change
+from ffrobot.exchange.urdf.import_urdf import import_urdf
+
+INERTIA = 'ixx="0.01" ixy="0" ixz="0" iyy="0.02" iyz="0" izz="0.025"'
+TIAGO = 'ixx="0.0019" ixy="0" ixz="0" iyy="0.00846" iyz="0" izz="0.01059"'  # its first arm link, 2 % off
+
+
+def link(name, inertia=INERTIA, mass="1.0"):
+    return f'<link name="{name}"><inertial><mass value="{mass}"/><inertia {inertia}/></inertial></link>'
+
+
+def joint(name, parent, child, kind="revolute", origin="", more='<limit lower="-3" upper="3"/>'):
+    ends = f'<parent link="{parent}"/><child link="{child}"/>'
+    return f'<joint name="{name}" type="{kind}">{ends}<origin {origin}/><axis xyz="0 0 1"/>{more}</joint>'
+
+
+def imported(folder, *parts, **options):
+    (folder / "r.urdf").write_text(f'<robot name="r">{"".join(parts)}</robot>', encoding="utf-8")
+    return import_urdf(folder / "r.urdf", folder / "out", {}, **options)
+
+
+def test_the_least_change():
+    """It makes any inertia one of a body, and nothing else that is one is nearer: 20 000 others were tried."""
+    draw = np.random.default_rng(3)
+    for _ in range(10):
+        Q = np.linalg.qr(draw.standard_normal((3, 3)))[0]
+        J = Q @ np.diag([1.0, 2.0, 3.0 * draw.uniform(1.01, 1.6)]) @ Q.T
+        fixed = least_change(J)
+        low, middle, high = np.linalg.eigvalsh(fixed)
+        assert high == pytest.approx(low + middle, rel=1e-14)
+        steps = draw.standard_normal((2000, 3, 3)) * draw.uniform(0, 0.5, (2000, 1, 1))
+        others = fixed + steps + np.swapaxes(steps, 1, 2)
+        moments = np.linalg.eigvalsh(others)
+        possible = others[(moments[:, 0] > 0) & (moments[:, 2] <= moments[:, 0] + moments[:, 1])]
+        assert len(possible) > 100
+        assert np.linalg.norm(possible - J, axis=(1, 2)).min() >= np.linalg.norm(fixed - J)
+    sound = np.diag([1.0, 2.0, 2.9])
+    assert least_change(sound) is sound
+
+
+def test_inertias_a_little_impossible(tmp_path):
+    parts = link("base"), link("arm", TIAGO, "2.0"), joint("j", "base", "arm")
+    with pytest.raises(FfrobotError, match=r'link "arm".*sum of the others.*--fix-inertia makes the least change'):
+        imported(tmp_path, *parts)
+    found = imported(tmp_path, *parts, fix_inertia=True)
+    (remark,) = (line for line in found.remarks if "moments of inertia" in line)
+    excess = 0.01059 - 0.00846 - 0.0019
+    assert "0.0019, 0.00846, 0.01059 kg m², which no body has, are now 0.00197667, 0.00853667, 0.0105133" in remark
+    share = 100 * excess / np.sqrt(3) / np.linalg.norm([0.0019, 0.00846, 0.01059])
+    assert f"changed by {share:.2g} %" in remark
+    (body,) = tomllib.loads((tmp_path / "out" / "scene.toml").read_text(encoding="utf-8"))["body"]
+    assert body["rigid"]["inertia"] == pytest.approx([0.0019 + excess / 3, 0.00846 + excess / 3, 0.01059 - excess / 3])
+    imported(tmp_path, link("base"), link("arm"), joint("j", "base", "arm"), fix_inertia=True, force=True)
+
+
+def test_inertias_that_are_not_positive_stay_refused(tmp_path):
+    nothing = 'ixx="0" ixy="0" ixz="0" iyy="0" iyz="0" izz="0"'
+    with pytest.raises(FfrobotError, match="greater than 0"):
+        imported(tmp_path, link("base"), link("arm", nothing), joint("j", "base", "arm"), fix_inertia=True)
+
+
+@pytest.mark.parametrize("huge", ["18446744073709551616", "999999999999999999999", "1e31", "-1e29"])
+def test_huge_numbers(huge, tmp_path):
+    """Refused with the file's name, or taken."""
+    thin = f'ixx="{huge}" ixy="0" ixz="0" iyy="0.01" iyz="0" izz="0.01"'
+    skew = f'ixx="1" ixy="{huge}" ixz="0" iyy="1" iyz="{huge}" izz="1"'
+    far = joint("k", "a", "b", "fixed", f'xyz="0 0 {huge}"')
+    refusals = []
+    for parts in (
+        (link("base"), link("arm", thin), joint("j", "base", "arm")),
+        (link("base"), link("arm", skew), joint("j", "base", "arm")),
+        (link("base"), link("a"), link("b"), joint("j", "base", "a"), far),
+        (link("base"), link("a"), joint("j", "base", "a", origin=f'rpy="{huge} {huge} 0" xyz="{huge} 0 0"')),
+        (link("base"), link("a", mass=huge), joint("j", "base", "a")),
+    ):  # fmt: skip
+        for fix in (False, True):
+            try:
+                found = imported(tmp_path, *parts, fix_inertia=fix, force=True)
+            except FfrobotError as error:
+                refusals.append(str(error))
+            else:
+                assert all(np.isfinite(body["rigid"]["inertia"]).all() for body in found.scene["body"])
+    assert all(message.startswith(str(tmp_path / "r.urdf")) for message in refusals)
+
+
+ODD = {
+    "degrees": ([joint("j", "base", "a", more='<limit lower="-180" upper="180"/>')], "-180 … 180 rad are many turns"),
+    "turned in degrees": ([joint("j", "base", "a", origin='rpy="90 0 0"')], "rpy 90 0 0 rad: is it in degrees?"),
+    "follows a fixed joint": (
+        [link("b"), joint("j", "base", "a", "fixed"), joint("k", "a", "b", more='<mimic joint="j" offset="0.2"/>')],
+        'joint "k" follows "j", which is fixed: it stands still at 0.2',
+    ),
+}
+
+
+@pytest.mark.parametrize("name", ODD)
+def test_remarks(name, tmp_path):
+    parts, expected = ODD[name]
+    found = imported(tmp_path, link("base"), link("a"), *parts)
+    assert sum(expected in remark for remark in found.remarks) == 1
+
+
+def test_no_remarks_on_sound_robots(tmp_path):
+    limits = '<limit lower="-6.2832" upper="6.2832"/>'
+    found = imported(
+        tmp_path, link("base"), link("a"), joint("j", "base", "a", origin='rpy="3.15 -1.6 6.28"', more=limits)
+    )
+    assert not [remark for remark in found.remarks if "degrees" in remark]
+
+
+def test_no_masses_at_all(tmp_path):
+    with pytest.raises(FfrobotError, match=re.escape("found no <inertial> with one in the whole file")):
+        imported(tmp_path, '<link name="base"/><link name="a"/>', joint("j", "base", "a"))
