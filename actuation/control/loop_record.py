@@ -72,10 +72,10 @@ def between(times: Array, known: Array, values: Array) -> Array:
     return result
 
 
-def held_commands(times: Array, setup: Setup, loop: Loop) -> Array:
-    """Commands (T, inputs) that act at `times`."""
+def held_commands(times: Array, setup: Setup, loop: Loop, after: float = 1e-9) -> Array:
+    """Commands (T, inputs) that act at `times`, or `after` (s) them: accelerations are those before a change."""
     taken = slice(loop.taken)
-    which = np.searchsorted(setup.times[taken] + setup.delay, times + 1e-9, side="right")
+    which = np.searchsorted(setup.times[taken] + setup.delay, times + after, side="right")
     return np.vstack([loop.first, loop.commands[taken]])[which]
 
 

@@ -97,7 +97,8 @@ def run_spatial_closed_loop(context: ActuatedSpatialContext, analysis: SpatialCl
     followed = _followed(run, source, held, place_of(whole, analysis.tip))
     record = loop_record(analysis, setup, loop, acting, followed, bool(plant.model.tree.gears))
     record = judged(record, analysis, loop_models_in_space(plant.model, source.time, plant.source))
-    return replace(run, commanded=_by_joint(context.model, held), details=record)
+    driving = _by_joint(context.model, held_commands(run.time, setup, loop, -1e-9))
+    return replace(run, commanded=_by_joint(context.model, held), driving=driving, details=record)
 
 
 def _robot(context: ActuatedSpatialContext, source: SpatialRun) -> SpatialRobot:

@@ -223,7 +223,7 @@ def _evaluated(solution: SpatialSolution, run: SpatialRun) -> SpatialResult:
     """What is read off a run."""
     found = MotionOfLinks(
         run.model, run.time, run.q, run.v, run.a, run.multipliers, run.required, run.is_at_rest, run.applied,
-        run.commanded, divided_links(solution),
+        run.commanded, run.driving, divided_links(solution),
     )  # fmt: skip
     motion, sharing = shared_evenly(found)
     actuation = None

@@ -41,6 +41,7 @@ class SpatialRun:
         cause: why it ended early, where more is known than its status says.
         commanded: (T, k) moments by joint that act along joints beside the scene's loads, N·m or N: what a controller
             commands, or a replay applies.
+        driving: the same as accelerations have it, where that is something else: before a command changes.
         details: what only its kind finds.
         checkpoint: where its integration can be gone on with; None where that cannot be done.
         step_ends: (N,) s, with which it can be repeated, if it was asked for them; see `fields.steps`.
@@ -67,6 +68,7 @@ class SpatialRun:
     warnings: tuple[str, ...] = ()
     cause: str = ""
     commanded: Mapping[str, Array] = field(default_factory=dict)
+    driving: Mapping[str, Array] = field(default_factory=dict)
     details: Details = field(default=Details(), repr=False)
     checkpoint: _core.TreeCheckpoint | None = field(default=None, repr=False)
     again: Callable[[Array], SpatialRun] | None = field(default=None, repr=False)

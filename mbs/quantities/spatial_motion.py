@@ -58,7 +58,8 @@ class SpatialMotion:
 
     `required` (T, n_v): generalized forces that prescribed motion takes, of links that are held to a shape as well.
     `is_at_rest`: targets stand still, as in an equilibrium. `applied`: forces on points beside the scene's loads.
-    `commanded`: moments (T, k) by joint that act along joints beside the scene's loads, N·m or N.
+    `commanded`: moments (T, k) by joint that act along joints beside the scene's loads, N·m or N; `driving`: the same
+    before they change at an output, as accelerations are.
     """
 
     model: SpatialModel
@@ -71,6 +72,7 @@ class SpatialMotion:
     is_at_rest: bool = False
     applied: tuple[PointDrive, ...] = ()
     commanded: Mapping[str, Array] = field(default_factory=dict)
+    driving: Mapping[str, Array] = field(default_factory=dict)
 
     @cached_property
     def frames(self) -> list[Motion]:

@@ -90,7 +90,7 @@ def _driving(motion: SpatialMotion) -> dict[str, Array]:
     """
     model, found = motion.model, dict[str, Array]()
     is_held = any(row.is_trajectory for row in model.rows)
-    moments = {} if is_held else dict(motion.motor_moments)
+    moments = {} if is_held else dict(motion.driving or motion.motor_moments)
     for row, size in zip(model.rows, -motion.multipliers.T, strict=True):
         if row.kind == "coordinate":
             joint = model.joint_of(row)

@@ -151,6 +151,40 @@ def test_motors_behind_gears_carry_out_an_inverse_analysis(tmp_path):
             assert np.abs(off).max() < 0.02 * np.abs(twist).max()
 
 
+@pytest.mark.parametrize(("kind", "followed"), [("pcid", "joint"), ("pcid", "motor"), ("fcid", "joint")])
+def test_inverse_analyses_account_for_what_gears_store_and_lose(tmp_path, kind, followed):
+    """What motors put in is in kinetic, strain and gravitational energy, or dissipated; springs k δ² / 2, c δ̇²."""
+    soft, firm = GEARED | {"viscous_friction": 0.3}, {"gear_ratio": 30.0, "rotor_inertia": 1e-4}
+    joints = [
+        revolute("O", "ground", "a.root", AXIS, **soft),
+        revolute("A", "b.root", "a.tip", [0.3, 1.0, -0.2], **firm, viscous_friction=0.1),
+    ]
+    bodies = [rigid(name, [0.02, 0.03, 0.04], 1.5, [0.2, 0.05, -0.1]) for name in "ab"]
+    paths = [
+        {"name": "o", followed: "O", "value": "0.8*sin(pi*t)**4"},
+        {"name": "a", followed: "A", "value": "0.5-0.6*sin(pi*t)**4"},
+    ]
+    run = {"name": "run", "kind": kind, "end": 1.0, "output_step": 1e-3, "tolerance": 1e-10}
+    run |= {"shape": "zero"} if kind == "fcid" else {"integrator": "dop853"}
+    tables = scene(bodies, joints, run, trajectory=paths, initial={"state": "static", "joints": {"A": 0.5}})
+    with solve(tables | {"gravity": [1.0, -3.0, 9.0]}, tmp_path) as found:
+        t = found["run/time"]
+        twist, rate = (
+            found[f"run/joints/O/motor_{key}"] - found[f"run/joints/O/{of}"]
+            for key, of in (("angle", "coordinate"), ("rate", "rate"))
+        )
+        np.testing.assert_allclose(found["run/energy/strain"], 1500 * twist**2, rtol=1e-9, atol=1e-15)
+        moment = 3e3 * twist + 2.0 * rate
+        np.testing.assert_allclose(found["run/joints/O/gear_moment"], moment, atol=1e-9 * np.abs(moment).max())
+        power = found["run/joints/O/moment"] * found["run/joints/O/motor_rate"]
+        power = power + found["run/joints/A/moment"] * found["run/joints/A/rate"]
+        energy = sum(found[f"run/energy/{key}"] for key in ("kinetic", "strain", "gravitational"))
+        left = power - found["run/energy/dissipated_power"]
+        for last in (250, 500, 800):
+            assert simpson(left[: last + 1], x=t[: last + 1]) == pytest.approx(energy[last] - energy[0], abs=1e-8)
+        assert np.ptp(energy) > 1.0
+
+
 @pytest.mark.parametrize("tolerance", [1e-9, 1e-10])
 def test_moments_that_set_out_from_nothing(tmp_path, tolerance):
     """Springs that hold nothing, in no gravity: moments of their rounding are not what steps follow.

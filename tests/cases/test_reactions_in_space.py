@@ -1,0 +1,161 @@
+"""What joints carry, by its definition: no force or moment of a motor along its joint, in all kinds of analysis."""
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+import ffrobot
+
+END, STEP = 0.2, 0.02
+POSE = {"cylindrical": [0.2, 0.1], "universal": [0.3, -0.2], "revolute": 0.4, "prismatic": 0.1, "screw": -0.3}
+KINDS = ["rest", "straight", "inverse", "again", "along", "held"]
+
+
+def body(name, tip):
+    tensor = {"mass": 0.7, "inertia": [4e-3, 5e-3, 6e-3], "center": [0.1, 0.02, -0.01]}
+    return {"name": name, "rigid": tensor | {"points": {"root": [0.0, 0.0, 0.0], "tip": tip}}}
+
+
+def analyses(paths_only):
+    inverse = {"end": END, "output_step": STEP, "tolerance": 1e-9}
+    replay = {"kind": "forward", "actuation": "inverse", "tolerance": 1e-9}
+    found = [
+        {"name": "rest", "kind": "static"},
+        {"name": "straight", "kind": "fcid", "shape": "zero", "end": END, "output_step": STEP},
+        {"name": "inverse", "kind": "pcid", **inverse},
+        {"name": "again", "apply": "joints", **replay},
+        {"name": "along", "apply": "trajectory", **replay},
+    ]
+    held = {"name": "held", "kind": "closed-loop", "actuation": "inverse", "sample_time": 0.002}
+    return [*found, held | {"controller": [{"kind": "joint-pid", "proportional": paths_only}]}]
+
+
+def chain(types, turned):
+    """Joints of these types one after the other; every second one leads inwards where `turned`."""
+    rng = np.random.default_rng(3)
+    bodies = [body(f"b{k}", (0.3 * rng.standard_normal(3)).tolist()) for k in range(len(types))]
+    joints, guess = [], {}
+    for k, kind in enumerate(types):
+        sides = ["ground" if k == 0 else f"b{k - 1}.tip", f"b{k}.root"]
+        axis, across = rng.standard_normal((2, 3))
+        keys = {"axis": axis.tolist()}
+        if kind == "universal":
+            keys["second_axis"] = np.cross(axis, across).tolist()
+        if kind == "screw":
+            keys["lead"] = 0.08
+        inwards = turned and k % 2
+        joints.append({"name": f"j{k}", "type": kind, "between": sides[:: -1 if inwards else 1]} | keys)
+        guess[f"j{k}"] = POSE[kind]
+    return {
+        "name": "chain", "space": "spatial", "gravity": [1.0, 2.0, -9.0], "body": bodies, "joint": joints,
+        "initial": {"joints": guess},
+    }  # fmt: skip
+
+
+def along_joint(results, analysis, joint):
+    """Sᵀ (reaction, reaction_moment) (T, k): what of them does work along the joint's coordinates."""
+    force, moment = (results[f"{analysis}/joints/{joint['name']}/{key}"] for key in ("reaction", "reaction_moment"))
+
+    def turned(side, axis):
+        if side == "ground":
+            return np.tile(np.array(axis) / np.linalg.norm(axis), (len(force), 1))
+        e = np.roll(results[f"{analysis}/bodies/{side.partition('.')[0]}/quaternion"], -1, axis=1)
+        return Rotation.from_quat(e).apply(np.array(axis) / np.linalg.norm(axis))
+
+    z = turned(joint["between"][0], joint["axis"])
+    of_force, of_moment = np.sum(z * force, axis=1), np.sum(z * moment, axis=1)
+    if joint["type"] == "universal":
+        return np.array([of_moment, np.sum(turned(joint["between"][1], joint["second_axis"]) * moment, axis=1)])
+    return {
+        "revolute": np.array([of_moment]), "prismatic": np.array([of_force]),
+        "cylindrical": np.array([of_force, of_moment]),
+        "screw": np.array([joint.get("lead", 0.0) / 2 / np.pi * of_force + of_moment]),
+    }[joint["type"]]  # fmt: skip
+
+
+@pytest.mark.parametrize("turned", [False, True], ids=["outwards", "inwards"])
+def test_reactions_do_no_work_along_joints_that_follow_paths(turned):
+    scene = chain(["prismatic", "screw", "revolute", "screw"], turned)
+    scene["trajectory"] = [
+        {"name": f"t{k}", "joint": joint["name"], "value": f"{POSE[joint['type']]}+0.3*t**2*sin({k + 4}*t)"}
+        for k, joint in enumerate(scene["joint"])
+    ]
+    stiff = {joint["name"]: 5.0 for joint in scene["joint"]}
+    results = ffrobot.solve(ffrobot.make_scene(**scene, analysis=analyses(stiff)))
+    for name in KINDS:
+        for joint in scene["joint"]:
+            assert np.abs(results[f"{name}/joints/{joint['name']}/moment"]).max() > 1e-3
+            assert np.abs(along_joint(results, name, joint)).max() < 1e-7, (name, joint["name"])
+
+
+@pytest.mark.parametrize("turned", [False, True], ids=["outwards", "inwards"])
+def test_reactions_do_no_work_along_joints_with_several_coordinates(turned):
+    """A tool in six coordinates that follows a pose, or motors that do."""
+    scene = chain(["cylindrical", "universal", "revolute", "prismatic"], turned)
+    joints, tip = scene["joint"], f"b{len(scene['joint']) - 1}.tip"
+    start = ffrobot.solve(
+        ffrobot.make_scene(**scene, analysis=[{"name": "a", "kind": "forward", "end": 1e-3, "output_step": 1e-3}])
+    )
+    x = start[f"a/points/{tip}/position"][0]
+    turn = Rotation.from_quat(np.roll(start[f"a/points/{tip}/quaternion"][0], -1)).as_rotvec()
+    path = {key: f"{value}+0.4*t**2" for key, value in zip("xyz", x, strict=True)}
+    path |= {"rotation_vector": ["t**2", "0", "-t**2"], "reference_rotation_vector": turn.tolist()}
+    scene["trajectory"] = [{"name": "t", "point": tip, **path}]
+    stiff = {f"{joint['name']}": 5.0 for joint in joints}
+    results = ffrobot.solve(ffrobot.make_scene(**scene, analysis=analyses(stiff)))
+    for name in KINDS:
+        for joint in joints:
+            assert np.abs(along_joint(results, name, joint)).max() < 1e-7, (name, joint["name"])
+
+
+@pytest.mark.parametrize("unit", [1.0, 1e3])
+def test_a_screw_jack_in_closed_form(unit):
+    """A nut lifts a mass along z: the thread gives m (g + a), and turns it back by that times the rise per radian."""
+    m, lead, J = 2.0, 0.05 * unit, 0.03 * unit**2
+    nut = body("nut", [0.0, 0.0, unit])
+    nut["rigid"] |= {"mass": m, "center": [0.0, 0.0, 0.0], "inertia": [J, J, J]}
+    joint = {"name": "jack", "type": "screw", "between": ["ground", "nut.root"], "axis": [0, 0, 1], "lead": lead}
+    results = ffrobot.solve(
+        ffrobot.make_scene(
+            name="jack", space="spatial", gravity=[0.0, 0.0, -9.81 * unit], body=[nut], joint=[joint],
+            trajectory=[{"name": "t", "joint": "jack", "value": "20*t**3"}], analysis=analyses({"jack": 5.0 * unit**2}),
+        )
+    )  # fmt: skip
+    h = lead / (2 * np.pi)
+    for name in ("straight", "inverse", "again", "along"):
+        alpha = 120.0 * results[f"{name}/time"]
+        force = m * (9.81 * unit + h * alpha)
+        size = np.abs(force).max()
+        np.testing.assert_allclose(results[f"{name}/joints/jack/reaction"][:, 2], force, atol=1e-9 * size)
+        np.testing.assert_allclose(
+            results[f"{name}/joints/jack/reaction_moment"][:, 2], -h * force, atol=1e-9 * h * size
+        )
+        np.testing.assert_allclose(results[f"{name}/joints/jack/moment"], J * alpha + h * force, atol=1e-8 * J * 24)
+
+
+def test_motors_only_keeps_motors_out_of_reactions():
+    """A beam on a hub: what the motor does there is no part of the reaction, as in the replay."""
+    link = {
+        "name": "arm",
+        "material": {"youngs_modulus": 7e10, "density": 2700.0, "poissons_ratio": 0.33},
+        "geometry": {"kind": "beam", "length": 0.5, "section": {"shape": "rectangle", "height": 0.01, "width": 0.02}},
+        "mesh": {"elements": 8},
+        "reference": {"condition": "cantilever"},
+        "modes": {"count": 2, "family": "in-plane-bending"},
+        "damping": {"ratio": 0.02},
+    }
+    joint = {"name": "hub", "type": "revolute", "between": ["ground", "arm.root"], "axis": [0, 0, 1]}
+    rest = "0.4*(10*(t/0.4)**3-15*(t/0.4)**4+6*(t/0.4)**5)"
+    path = {"name": "t", "joint": "hub", "value": rest}
+    only = {"name": "only", "kind": "motors-only", "end": 0.4, "output_step": 0.02, "tolerance": 1e-6}
+    again = {"name": "again", "kind": "forward", "actuation": "only", "apply": "joints", "tolerance": 1e-8}
+    results = ffrobot.solve(
+        ffrobot.make_scene(
+            name="arm", space="spatial", gravity=[0.0, 0.0, -9.81], body=[{"name": "arm", "link": link}],
+            joint=[joint], trajectory=[path], analysis=[only, again],
+        )
+    )  # fmt: skip
+    for name in ("only", "again"):
+        assert np.abs(results[f"{name}/joints/hub/moment"]).max() > 0.1
+        assert np.abs(results[f"{name}/joints/hub/reaction_moment"][:, 2]).max() < 1e-6
+        assert np.abs(results[f"{name}/joints/hub/reaction"][:, 2]).min() > 1.0
