@@ -38,7 +38,7 @@ def files_of(path: Path) -> list[Path]:
 
     def add(file: Path) -> None:
         found[file] = None
-        if pattern is None:
+        if pattern is None or not file.is_file():
             return
         for name in pattern.findall(file.read_bytes()):
             other = included(name.decode("utf-8", errors="replace"), file, path)

@@ -14,6 +14,7 @@ from ..common.errors import InputError
 from ..common.python_files import sha256_of
 from ..common.toml_files import parse_toml, read_text
 from ..common.version import program_version
+from ..mesh.included import files_of as files_with_included
 
 FILE_KEYS = {"link", "modal", "waypoints", "file", "python", "table", "repeat_steps"}
 """Keys of scene and link files whose text names a file, "FILE.py:FUNCTION" of Python."""
@@ -25,9 +26,10 @@ PROGRAM = "ffrobot"
 def named_files(data: Any, folder: Path) -> Iterator[Path]:  # noqa: ANN401 (whatever TOML may hold)
     """The files that tables read from a file in `folder` name, and those that link files among them name in turn."""
     for key, file in _named(data, folder):
-        yield file
+        yield from files_with_included(file)
         if key == "link":  # whose own links, which are none, are not followed: they might lead in a circle
-            yield from (part for _, part in _named(read_tables(file), file.parent))
+            for _, part in _named(read_tables(file), file.parent):
+                yield from files_with_included(part)
 
 
 def _named(data: Any, folder: Path) -> Iterator[tuple[str, Path]]:  # noqa: ANN401

@@ -38,6 +38,11 @@ def robot_damping_ratios(bodies: Mapping[str, Loaded]) -> dict[str, float]:
     }
 
 
+def remarks_on_parts(bodies: Mapping[str, Loaded]) -> list[str]:
+    """What the files of solid links' parts hold and the links do not, a line each."""
+    return [f"{name}: {text}" for name, body in bodies.items() if body.modal for text in body.modal.remarks]
+
+
 class _OnPoint(Protocol):
     @property
     def point(self) -> str:

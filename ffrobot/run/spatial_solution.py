@@ -25,6 +25,7 @@ from ..mbs.quantities.stress import BodyStress
 from ..mbs.quantities.validity import Bending, deflection_warning
 from ..scene.pieces import BodyInPieces
 from ..scene.spatial import SpatialScene
+from .loaded_body import remarks_on_parts
 from .mode_search import ModeChoice
 from .solution import FinerCheck
 from .spatial_actuation import SpatialActuation
@@ -149,4 +150,4 @@ class SpatialSolution:
                 found.append(f"{name}: rigid in {', '.join(body.rigid_in)}, of which its file has no modes")
             if body.spatial.reduction is not None:
                 found.append(f"{name}: all modes but {modes_kept(body.spatial)}")
-        return tuple(found)
+        return (*found, *remarks_on_parts(self.bodies))

@@ -1,6 +1,14 @@
 """No file of data runs as a program: meshes, CAD, what lies beside them and where the user works."""
 
+import sys
+from pathlib import Path
+
 import pytest
+
+from ffrobot import read_modal_body
+
+sys.path.append(str(Path(__file__).parents[1] / "mesh"))
+from decks import bar, elements, nodes
 
 LINK = """
 name = "part"
@@ -53,3 +61,22 @@ def test_by_way_of_other_commands(hostile, refused, command):
     write, ran = hostile
     assert "msh" in refused(write("msh"), *command)
     assert not ran.exists()
+
+
+def test_what_a_link_leaves_out_is_told_by_all_who_show_it(tmp_path, ffrobot):
+    """A mass of 5 kg on a bar, in a deck that includes its cells: by link, info and solve; anew when these change."""
+    points, cells = bar()
+    points = points * [0.3, 1, 1]
+    (tmp_path / "cells.txt").write_text(elements(cells))
+    mass = "*ELEMENT, TYPE=MASS, ELSET=M\n99, 1\n*MASS, ELSET=M\n5.\n"
+    (tmp_path / "part.inp").write_text(nodes(points) + "*INCLUDE, INPUT=cells.txt\n" + mass)
+    (tmp_path / "link.toml").write_text(LINK.replace("FILE", "part.inp"))
+    (tmp_path / "scene.toml").write_text(SCENE)
+    for command in (("link", "link.toml"), ("link", "link.toml"), ("info", "link.h5"), ("solve", "scene.toml")):
+        done = ffrobot(*command, cwd=tmp_path)
+        assert done.returncode == 0, done.stderr
+        assert "1 MASS" in done.stdout + done.stderr, command
+    assert abs(read_modal_body(tmp_path / "link.h5").mass / (2700 * 0.3 * 0.2 * 0.1) - 1) < 1e-9
+    (tmp_path / "cells.txt").write_text(elements(cells[[0, 1, 2, 4, 5]]))  # less one element
+    assert "computed" in ffrobot("link", "link.toml", cwd=tmp_path).stdout
+    assert abs(read_modal_body(tmp_path / "link.h5").mass / (2700 * 0.3 * 0.2 * 0.1 * 5 / 6) - 1) < 1e-9

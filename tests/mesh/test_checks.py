@@ -7,8 +7,16 @@ import pytest
 from solid_parts import integrate, shape_functions
 
 from ffrobot.common.errors import InputError
-from ffrobot.mesh.checks import check_connected, check_quality, check_shape, oriented, straightened
+from ffrobot.mesh.checks import (
+    check_connected,
+    check_neighbours,
+    check_quality,
+    check_shape,
+    oriented,
+    straightened,
+)
 from ffrobot.mesh.jacobian import jacobians, reference_nodes
+from ffrobot.mesh.part_mesh import PartMesh
 from ffrobot.mesh.structured import structured_box
 
 SECTION = (0.015, 0.025)
@@ -22,6 +30,7 @@ def box(request):
 def test_a_sound_box_passes(box, solid):
     check_shape(box, solid(), "here")
     check_connected(box, "here")
+    check_neighbours(box, "here")
     check_quality(box, "here")
 
 
@@ -51,6 +60,19 @@ def test_flat_elements_are_told():
     assert abs(np.linalg.det(x[1:] - x[0])) < 1e-12
     with pytest.raises(InputError, match=r"found 1 flat elements \(slivers\) of 61, e.g. at \(0.05"):
         check_quality(flat, "here")
+
+
+def test_elements_in_one_another_are_told():
+    """A tetrahedron's mirror image through one side is its neighbour; one on the same side lies in it."""
+    points = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [0.2, 0.2, -1], [0.2, 0.2, 0.5]], dtype=float)
+
+    def part(*cells):
+        return PartMesh(points, np.array(cells), "tetrahedron", 1, np.zeros(len(cells), dtype=np.int32))
+
+    check_neighbours(part((0, 1, 2, 3), (0, 2, 1, 4)), "here")
+    for cells in [((0, 1, 2, 3), (0, 1, 2, 5)), ((0, 1, 2, 3), (0, 2, 1, 4), (0, 1, 2, 5))]:
+        with pytest.raises(InputError, match=r"here: expected elements side by side, found 2 elements that lie in one"):
+            check_neighbours(part(*cells), "here")
 
 
 def test_a_plane_mesh_has_no_elements_across_the_thickness(box, solid):

@@ -294,3 +294,18 @@ def test_a_size_for_another_unit_is_refused_at_once(solid, mesh_part, step_file)
     geometry = solid(file=step_file(lambda cad: cad.addBox(0, -20, -5, 300, 40, 10)), length=0.3)
     with pytest.raises(InputError, match=r"mesh\.size that fits the part, found 0\.012 m .* another unit"):
         mesh_part(geometry, size=0.012)
+
+
+@pytest.mark.parametrize("number", [2147483648, -1, 81])
+def test_nodes_that_are_not_there_are_refused(solid, mesh_part, tmp_path, number):
+    """In a VTK file of 81 nodes, which count from 0."""
+    box = structured_box(1.0, (0.015, 0.025), (0.015, 0.025), (8, 2, 2), "tetrahedron")
+    path = tmp_path / "part.vtk"
+    meshio.Mesh(box.points, [("tetra", box.cells)]).write(path, binary=False)
+    first = " ".join(map(str, box.cells[0]))
+    text = path.read_text()
+    assert first in " ".join(text.split())
+    at = text.index("CONNECTIVITY" if "CONNECTIVITY" in text else "CELLS")
+    path.write_text(text[:at] + text[at:].replace(f"\n{box.cells[0][0]}", f"\n{number}", 1))
+    with pytest.raises(InputError, match=r"geometry.file: part.vtk: expected .*, found "):
+        mesh_part(solid(file=path))

@@ -18,6 +18,9 @@ from .robot import Inertial, MeshFile, Robot
 if TYPE_CHECKING:
     import trimesh
 
+READ = (".3mf", ".dae", ".glb", ".gltf", ".obj", ".off", ".ply", ".stl")
+"""Endings of meshes that are read: formats that trimesh reads itself, all of them without a program of others."""
+
 NOT_LOOKED_AT = "meshes were not looked at, which needs trimesh: pip install 'ffrobot[urdf]'"
 
 
@@ -86,6 +89,8 @@ def _loaded(mesh: MeshFile, path: Path) -> trimesh.Trimesh:
     """The mesh in the axes of its link, m."""
     import trimesh
 
+    if path.suffix.lower() not in READ:
+        raise ValueError(f"expected one of {', '.join(READ)}, found {path.name}")
     loaded = trimesh.load(path, force="mesh")
     loaded.merge_vertices(merge_tex=True, merge_norm=True)  # of faces that meet with several normals
     place = mesh.origin.place
