@@ -41,6 +41,10 @@ PER_COORDINATE = ("coordinate", "rate", "moment")
 """Datasets of joints whose columns are coordinates of one joint, no vector."""
 
 
+PER_MODE = ("frequency", "damping_ratio")
+"""Datasets of linear models whose columns are the robot's vibrations, the lowest first, no vector."""
+
+
 @dataclass(frozen=True)
 class Run:
     """One combination of values: where its files are, what is collected of its results, and what it is made from."""
@@ -147,23 +151,31 @@ def _standard(results: Results, analysis: str) -> Iterator[str]:
 
 
 def _reduce(results: Results, name: str, reduction: str) -> float:
-    """Of a history, of the lengths of vectors (T, 2 or 3), or of the largest of several columns; NaN if absent."""
+    """Of a history, of the lengths of vectors (T, 2 or 3), or of the largest of several columns; NaN if absent.
+
+    Of spectra "max" is that of all vibrations, the others are of the lowest one.
+    """
     try:
         values = results.data(name)
     except InputError:
         return float("nan")
     vector = is_vector(results, name, values)
     history = np.linalg.norm(values, axis=1) if vector else values[:, 0]
-    if values.shape[1] > 1 and not vector:
+    if values.shape[1] > 1 and not vector and (reduction == "max" or not is_spectrum(name)):
         history = np.abs(values).max(axis=1)
     return float(REDUCTIONS[reduction](history))
+
+
+def is_spectrum(name: str) -> bool:
+    """Whether columns of the dataset `name` are vibrations."""
+    return name.rpartition("/")[2] in PER_MODE and "linear" in name.split("/")
 
 
 def is_vector(results: Results, name: str, values: Array) -> bool:
     """Whether columns of the dataset `name`, `values` (T, columns), are components of one vector."""
     parts = name.split("/")
     dimension = 3 if results.scene.get("space") == "spatial" else 2
-    return values.shape[1] == dimension and "pzt" not in parts and parts[-1] not in PER_COORDINATE
+    return values.shape[1] == dimension and "pzt" not in parts and parts[-1] not in (*PER_COORDINATE, *PER_MODE)
 
 
 def collected(request: str) -> tuple[str, str]:

@@ -1,6 +1,7 @@
 """`ffrobot sweep`: grids and samples over any key, failures as rows, taken up again, several processes."""
 
 import csv
+import math
 import signal
 import subprocess
 import time
@@ -12,6 +13,25 @@ import tomli_w
 
 HEIGHTS = "links.rod.geometry.section.diameter=0.004:0.008:3"
 MASSES = "body.crank.rigid.mass=0.03,0.04"
+
+PENDULUM = """
+name = "pendulum"
+gravity = [0.0, -9.81]
+joint = [
+  { name = "A", type = "revolute", between = ["ground", "upper.root"] },
+  { name = "B", type = "revolute", between = ["upper.tip", "lower.root"] },
+]
+initial = { angles = { upper = "-90*deg", lower = "-90*deg" } }
+analysis = [{ name = "at_rest", kind = "linear" }]
+
+[[body]]
+name = "upper"
+rigid = { mass = 1.0, inertia = 1e-9, center = [0.5, 0.0], points = { root = [0.0, 0.0], tip = [0.5, 0.0] } }
+
+[[body]]
+name = "lower"
+rigid = { mass = 1.0, inertia = 1e-9, center = [0.5, 0.0], points = { root = [0.0, 0.0], tip = [0.5, 0.0] } }
+"""
 
 
 @pytest.fixture
@@ -239,3 +259,19 @@ def test_a_body_named_scene_has_its_own_file(ffrobot, short_scene):
     done = ffrobot("sweep", short_scene, "--vary", HEIGHTS.replace("links.rod", "links.scene"))
     assert done.returncode == 0, done.stderr
     assert [row["status"] for row in table(short_scene)] == ["completed"] * 3
+
+
+def test_spectra(ffrobot, tmp_path):
+    """`first` is the lowest frequency, not the largest of all: of a double pendulum both are known.
+
+    Two point masses m on massless rods l that hang down: ω² = (2 ∓ √2) g/l. Rods of mass would have other numbers.
+    """
+    (tmp_path / "scene.toml").write_text(PENDULUM, encoding="utf-8")
+    asked = [f"at_rest/linear/frequency{one}" for one in (":first", ":last", ":rms", ":max", "[0]:first", "[1]:first")]
+    collect = [word for one in asked for word in ("--collect", one)]
+    done = ffrobot("sweep", tmp_path / "scene.toml", "--vary", "gravity.1=-9.81,-1.62", *collect)
+    assert done.returncode == 0, done.stderr
+    for row, g in zip(table(tmp_path / "scene.toml"), (9.81, 1.62), strict=True):
+        low, high = (math.sqrt((2 + sign * math.sqrt(2)) * g / 0.5) / (2 * math.pi) for sign in (-1, 1))
+        found = [float(row[one.replace(":", " ")]) for one in asked]
+        assert found == pytest.approx([low, low, low, high, low, high], rel=1e-6)
