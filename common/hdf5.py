@@ -58,11 +58,14 @@ def check_links(file: h5py.File, path: Path) -> None:
 def read(dataset: h5py.Dataset) -> Any:  # noqa: ANN401 (as h5py)
     """All of a dataset.
 
-    Raises `InputError` where its data are elsewhere (virtual and external datasets), or fewer than its shape says.
+    Raises `InputError` where its data are elsewhere (virtual and external datasets), fewer than its shape says, or
+    complex, which ffrobot never writes.
     """
     name = f"{dataset.file.filename}: dataset {dataset.name}"
     if dataset.is_virtual or dataset.external:
         raise InputError(f"{name}: expected data in the file itself, found a virtual or external dataset")
+    if dataset.dtype.kind == "c":
+        raise InputError(f"{name}: expected real numbers, found complex ones")
     stored, declared = dataset.id.get_storage_size(), math.prod(dataset.shape or ()) * dataset.dtype.itemsize
     if declared > stored * (MOST_COMPRESSED if dataset.id.get_create_plist().get_nfilters() else 1):
         raise InputError(f"{name}: expected {declared:.4g} bytes, as its shape {dataset.shape} says, found {stored}")

@@ -11,7 +11,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from ..common.arrays import Array
+from ..common.arrays import Array, Integers
 from ..common.checksum import MARK, METHOD, sealed
 from ..common.errors import InputError
 from ..common.files import write_atomically
@@ -138,7 +138,7 @@ def _optional(file: h5py.File) -> dict[str, Any]:
     if "stress/surface_static" in file:
         found["surface_static"] = _array(file, "stress/surface_static")
     if "modes/residual" in file:
-        found["residual"] = np.asarray(file["modes/residual"][()], dtype=np.int64)
+        found["residual"] = _whole_numbers(file["modes/residual"])
     if "damping_of" in file["modes"].attrs:
         found["damping_of"] = _text(file["modes"].attrs["damping_of"])
     if "measured" in file["modes"]:
@@ -170,6 +170,12 @@ def _geometric_stiffness(file: h5py.File) -> dict[str, Array]:
 
 def _array(group: h5py.Group, name: str) -> Array:
     return np.asarray(read(group[name]), dtype=np.float64)
+
+
+def _whole_numbers(dataset: h5py.Dataset) -> Integers:
+    if dataset.dtype.kind not in "iu":
+        raise InputError(f"{dataset.name}: expected whole numbers, found {dataset.dtype}")
+    return np.asarray(read(dataset), dtype=np.int64)
 
 
 def _text(value: object) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import signal
 import sys
 import traceback
+import warnings
 from copy import copy
 
 import click
@@ -23,7 +24,7 @@ from .common.errors import FfrobotError
 from .common.interrupts import SIGNALS, EndOfCommand
 from .common.parallel import end_all, is_first
 from .present.failures import describe, ready_streams, without_output
-from .present.logs import LOGGER
+from .present.logs import LOGGER, log_warning
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"]})
@@ -72,6 +73,7 @@ def main() -> None:
     stop = EndOfCommand()
     LOGGER.propagate = False  # libraries give the root logger handlers of their own
     ready_streams()
+    warnings.showwarning = log_warning
     for number in SIGNALS:
         signal.signal(number, stop)
     try:

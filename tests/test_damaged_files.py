@@ -292,3 +292,27 @@ def test_what_lacks_is_named(results):
     assert checksum.state(results) == "changed"
     with pytest.raises(InputError, match='expected the attribute "wall_seconds", found none'), reading(results):
         describe(results)
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("dataset", ["modes/frequency", "stations/rotation", "geometric_stiffness/omega_zz", "length"])
+def test_complex_numbers_are_refused(modal, dataset):
+    _change(modal, dataset, lambda values: np.asarray(values, dtype=complex))
+    with pytest.raises(InputError, match=r"link1.h5: .*expected real numbers, found complex ones"):
+        read_modal_body(modal)
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("dataset", ["modes/frequency", "stations/rotation"])
+def test_numbers_whose_squares_are_infinite_are_refused(modal, dataset):
+    _change(modal, dataset, lambda values: np.full_like(values, 1e300))
+    with pytest.raises(InputError, match=r"link1.h5: .*expected .*, found a difference"):
+        read_modal_body(modal)
+
+
+def _change(path, dataset, change):
+    with h5py.File(path, "a") as file:
+        values = file[dataset][()]
+        del file[dataset]
+        file[dataset] = change(values)
+    checksum.seal(path)

@@ -14,7 +14,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from os import PathLike
 from pathlib import Path
-from typing import TypeVar
+from typing import TextIO, TypeVar
 
 import click
 
@@ -105,6 +105,18 @@ class _LogFile(logging.FileHandler):
         """Without what cannot be written any more."""
         with suppress(OSError):
             super().close()
+
+
+def log_warning(
+    message: Warning | str,
+    category: type[Warning],
+    filename: str,
+    lineno: int,
+    file: TextIO | None = None,
+    line: str | None = None,
+) -> None:
+    """What libraries warn of, as `warnings.showwarning`: it is for developers, and for the log."""
+    LOGGER.info("%s line %d: %s: %s", filename, lineno, category.__name__, message)
 
 
 def _is_log(path: Path) -> bool:
