@@ -137,8 +137,10 @@ def smallest_turn(axis: Array) -> Array:
     Of −z, a half turn about x.
     """
     z = np.asarray(axis, dtype=float) / np.linalg.norm(axis)
-    across = np.cross([0.0, 0.0, 1.0], z)
-    size = float(np.linalg.norm(across))
-    if size == 0.0:
-        return np.diag([1.0, np.sign(z[2]), np.sign(z[2])])
-    return exponential(across / size * np.arctan2(size, z[2]))
+    S, cosine, square = skew(np.cross([0.0, 0.0, 1.0], z)), z[2], z[0] ** 2 + z[1] ** 2  # Rodrigues: S = sin φ n~
+    if cosine > 0.0:
+        return as_floats(np.eye(3) + S + S @ S / (1.0 + cosine))
+    if square == 0.0:
+        return np.diag([1.0, -1.0, -1.0])
+    found: Array = np.eye(3) + S + S @ S * ((1.0 - cosine) / square)
+    return found

@@ -98,3 +98,18 @@ def test_slope_and_rate_of_the_left_jacobian(size):
     rate = sum(w * of(phi + s * phi_dot).real @ phi_dot for s, w in differences)
     np.testing.assert_allclose(rotations.left_jacobian_slope(phi, x), slope, atol=3e-9)
     np.testing.assert_allclose(rotations.left_jacobian_rate(phi, phi_dot), rate, atol=3e-9)
+
+
+@pytest.mark.parametrize("axis", [[1, 0, 0], [0, 1, 0], [-1, 0, 0], [0, -1, 0], [0, 0, -1], [1e-180, 0, -1]])
+def test_smallest_turn_to_axes_is_exact(axis):
+    """No rounding: what axes of coordinates do not move is not moved by 1e-17 either."""
+    C = rotations.smallest_turn(np.array(axis, dtype=float))
+    assert set(np.unique(C)) <= {-1.0, 0.0, 1.0}
+    np.testing.assert_allclose(C[:, 2], np.round(axis), atol=0)
+
+
+@pytest.mark.parametrize("off", [1e-3, 1e-7, 1e-12])
+def test_smallest_turn_next_to_half_a_turn(off):
+    C = rotations.smallest_turn(np.array([0.6 * off, -0.8 * off, -1.0]))
+    np.testing.assert_allclose(C @ C.T, np.eye(3), atol=1e-14)
+    np.testing.assert_allclose(C @ [0.8, 0.6, 0.0], [0.8, 0.6, 0.0], atol=1e-9)  # about which it turns

@@ -10,12 +10,17 @@ namespace {
 // A row counts as dependent below this part of its own mobility: rounding leaves 1e-13, a badly placed constraint 1e-7.
 constexpr double dependent = 1e-10;
 
+// Nothing moves a row whose mobility is below this part of the largest: rounding leaves 1e-30, and units of rows (m,
+// mm, rad) make a difference of 1e6.
+constexpr double immobile = 1e-24;
+
 std::vector<int> pivots(Eigen::MatrixXd S) {
   const Eigen::VectorXd own = S.diagonal();
+  const double least = immobile * own.maxCoeff();
   std::vector<int> left(static_cast<std::size_t>(S.rows())), kept;
   std::iota(left.begin(), left.end(), 0);
   while (!left.empty()) {
-    const auto part = [&](int i) { return own[i] > 0 ? S(i, i) / own[i] : 0; };
+    const auto part = [&](int i) { return own[i] > least ? S(i, i) / own[i] : 0; };
     const auto best = std::max_element(left.begin(), left.end(), [&](int i, int j) { return part(i) < part(j); });
     const int k = *best;
     if (!(part(k) > dependent))
