@@ -8,11 +8,13 @@ from typing import NoReturn
 import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
 
 from ..common.arrays import Array, Booleans
 from ..common.errors import InputError
+from .cells import KUHN
 from .jacobian import SLIVER, cell_quality, jacobians, reference_nodes, volume_of_tetrahedra
-from .part_mesh import PartMesh, facet_keys
+from .part_mesh import PartMesh, boundary_facets, facet_geometry, facet_keys
 from .records import SolidGeometry
 
 # Smallest determinant of a curved cell's Jacobian relative to its largest.
@@ -22,6 +24,10 @@ _VOLUME = 0.005
 MOST_CELLS = 1e7  # far more than fit into the memory of the machines this runs on
 METRES = {"m": 1.0, "mm": 1e-3, "in": 0.0254}
 _NAMES = {"m": "metres", "mm": "millimetres", "in": "inches"}
+# How far outside a free side the part must not be, relative to the side; and how far inside a cell is inside it.
+_OUTSIDE, _INSIDE = 1e-3, 1e-6
+# A point on a facet, by its corners, that lies on no plane through some of them.
+_ON_FACET = {3: np.array([0.4, 0.35, 0.25]), 4: np.array([0.65 * 0.58, 0.35 * 0.58, 0.35 * 0.42, 0.65 * 0.42])}
 # A part may reach beyond its interfaces (bosses around joints); farther out than this it is taken for a slip.
 _LENGTHS = (0.2, 5.0)
 
@@ -117,6 +123,42 @@ def check_connected(part: PartMesh, where: str) -> None:
         f"{where}: expected one connected part, found {count}: {'; '.join(listed)}{more}. Parts that touch must share "
         "their nodes"
     )
+
+
+def check_boundary(part: PartMesh, where: str) -> None:
+    """Check that what lies just outside the facets that only one cell has is outside the part.
+
+    Raises:
+        InputError: it is not: elements overlap, or nodes at one place are not one, which is a crack.
+    """
+    facets, owner = boundary_facets(part)
+    _, normal, area = facet_geometry(part.points, facets)
+    corners = part.points[facets]
+    bent = np.linalg.norm(corners.mean(axis=1) - corners[:, ::2].mean(axis=1), axis=1) if corners.shape[1] == 4 else 0.0
+    on_facets = np.einsum("k,fki->fi", _ON_FACET[corners.shape[1]], corners)
+    probes = on_facets + (_OUTSIDE * np.sqrt(area) + 2 * bent)[:, None] * normal
+    split = KUHN if part.cell == "hexahedron" else np.arange(4)[None]
+    x = part.points[part.corners[:, split].reshape(-1, 4)]  # (t, 4, 3) tetrahedra
+    middle = x.mean(axis=1)
+    reach = np.linalg.norm(x - middle[:, None], axis=2).max(axis=1)
+    tree = cKDTree(probes)
+    near = np.flatnonzero(tree.query(middle)[0] <= reach)
+    found = tree.query_ball_point(middle[near], reach[near])
+    inside = np.zeros(len(facets), dtype=bool)
+    for some in np.array_split(np.arange(near.size), near.size // 100_000 + 1):
+        probe = np.array([k for of in found[some] for k in of], dtype=np.int64)
+        of = np.repeat(near[some], [len(found[k]) for k in some])
+        other = of // len(split) != owner[probe]
+        probe, of = probe[other], of[other]
+        edges = (x[of, 1:] - x[of, :1]).transpose(0, 2, 1)
+        share = np.linalg.solve(edges, (probes[probe] - x[of, 0])[..., None])[..., 0]  # of the corners but the first
+        inside[probe[(share.min(axis=1, initial=1.0) > _INSIDE) & (share.sum(axis=1) < 1 - _INSIDE)]] = True
+    if np.any(inside):
+        listed = ", ".join(_show(place) for place in on_facets[inside][:3])
+        raise InputError(
+            f"{where}: expected elements beside one another, found {np.sum(inside)} of their free sides inside others,"
+            f" e.g. at {listed} m: elements overlap, or nodes at one place are not one"
+        )
 
 
 def oriented(part: PartMesh) -> PartMesh:

@@ -19,7 +19,8 @@ _ABAQUS = re.compile(  # the keyword line goes on after a comma at its end
 _NASTRAN = re.compile(rb"""^[ \t]*INCLUDE[ \t]*["']([^"']+)["']""", re.MULTILINE | re.IGNORECASE)
 _XDMF = re.compile(rb">\s*([^<>:]+?)\s*:")
 _REFERENCES = {
-    ".inp": _ABAQUS, ".bdf": _NASTRAN, ".nas": _NASTRAN, ".fem": _NASTRAN, ".xdmf": _XDMF, ".xmf": _XDMF,
+    ".inp": _ABAQUS, ".bdf": _NASTRAN, ".nas": _NASTRAN, ".fem": _NASTRAN, ".dat": _NASTRAN, ".xdmf": _XDMF,
+    ".xmf": _XDMF,
 }  # fmt: skip
 DEEPEST = 20
 

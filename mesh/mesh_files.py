@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 _VOLUMES = re.compile(r"tetra|hexahedron|wedge|pyramid|polyhedron")
 _SURFACES = {"triangle": 3, "triangle6": 3, "quad": 4, "quad8": 4, "quad9": 4}
 _LINES = ("line", "line3")
+_TECPLOT = re.compile(rb"^\s*ZONE\b", re.MULTILINE | re.IGNORECASE)  # other files with the ending .dat are Nastran's
 # Integer data of cells with more values than this number cells, not groups.
 _MOST_GROUPS = 1000
 
@@ -42,7 +43,7 @@ def read_mesh(path: Path, where: str) -> RawMesh:
         from .abaqus import read_abaqus
 
         return read_abaqus(path, where)
-    if ending in (".bdf", ".nas", ".fem"):
+    if ending in (".bdf", ".nas", ".fem") or (ending == ".dat" and not _TECPLOT.search(path.read_bytes())):
         from .nastran import read_nastran
 
         return read_nastran(path, where)
@@ -105,13 +106,15 @@ def _raw_mesh(mesh: meshio.Mesh) -> RawMesh:
 def _groups(mesh: meshio.Mesh) -> Iterator[Mapping[str, Integers]]:
     """For each block, the cells of each group that has any in it."""
     values = _numbered(mesh)
-    titles = {int(tag): name for name, (tag, *_) in mesh.field_data.items()}
-    titles |= {int(tag): "_".join(names) for tag, names in getattr(mesh, "cell_tags", {}).items()}  # MED
+    titles = {int(tag): [name] for name, (tag, *_) in mesh.field_data.items()}
+    titles |= {int(tag): names for tag, names in getattr(mesh, "cell_tags", {}).items()}  # families of MED, with groups
     for k, block in enumerate(mesh.cells):
-        found: dict[str, Integers] = {}
+        found: dict[str, Integers] = {}  # cells may belong to several
         if values is not None:
             for value in np.unique(values[k]).tolist():
-                found[titles.get(value, str(value))] = np.flatnonzero(values[k] == value)
+                for name in titles.get(value, [str(value)]):
+                    rows = np.flatnonzero(values[k] == value)
+                    found[name] = np.concatenate([found.get(name, rows[:0]), rows])
         for name, sets in mesh.cell_sets.items():
             rows = np.asarray(sets[k] if k < len(sets) and sets[k] is not None else [], dtype=np.int64)
             if np.any((rows < 0) | (rows >= len(block.data))):

@@ -77,6 +77,8 @@ class _Deck:
     def _take(self, card: Card) -> None:
         name = card.name
         if name == "GRID":
+            if len(card.fields) > 8:
+                raise InputError(f"{card}: expected 8 fields of a grid point at most, found {len(card.fields)}")
             _add(self.grids, card, card.whole(0))
         elif name == "GRDSET":
             self.system = card.whole(1, 0)

@@ -16,6 +16,7 @@ from ..common.arrays import Array
 from ..common.errors import InputError
 from .checks import (
     METRES,
+    check_boundary,
     check_connected,
     check_count,
     check_neighbours,
@@ -94,6 +95,8 @@ def part_mesh(
     check_quality(part, where)
     check_neighbours(part, where)
     check_connected(part, where)
+    if geometry.file is not None and not _is_step(geometry.file):
+        check_boundary(part, where)
     return named_faces(replace(source, part=part), geometry, places, outlines, path)
 
 

@@ -8,6 +8,7 @@ from solid_parts import integrate, shape_functions
 
 from ffrobot.common.errors import InputError
 from ffrobot.mesh.checks import (
+    check_boundary,
     check_connected,
     check_neighbours,
     check_quality,
@@ -73,6 +74,39 @@ def test_elements_in_one_another_are_told():
     for cells in [((0, 1, 2, 3), (0, 1, 2, 5)), ((0, 1, 2, 3), (0, 2, 1, 4), (0, 1, 2, 5))]:
         with pytest.raises(InputError, match=r"here: expected elements side by side, found 2 elements that lie in one"):
             check_neighbours(part(*cells), "here")
+
+
+def test_cracks_are_told(box):
+    """Nodes of one plane doubled above the middle: both sides of the crack; none of a bent bar."""
+    check_boundary(box, "here")
+    check_boundary(box.moved(box.points * [1, 1, 1 + 0.5] + box.points[:, [1]] ** 2 * [1, 0, 3]), "here")
+    plane = np.flatnonzero((np.abs(box.points[:, 0] - 0.5) < 1e-9) & (box.points[:, 1] > 0.003))
+    beyond = box.points[box.corners, 0].mean(axis=1) > 0.5
+    other = np.arange(len(box.points))
+    other[plane] = len(box.points) + np.arange(plane.size)
+    cells = np.where(beyond[:, None], other[box.cells], box.cells)
+    cracked = replace(box, points=np.concatenate([box.points, box.points[plane]]), cells=cells)
+    check_connected(cracked, "here")
+    with pytest.raises(InputError, match=r"found \d+ of their free sides inside others, e.g. at \(0.5, 0.00"):
+        check_boundary(cracked, "here")
+
+
+def test_elements_that_reach_over_others_are_told():
+    """A cell's fourth corner becomes a node 0.3 m further on, so that it crosses the cells between."""
+    box = structured_box(1.0, SECTION, SECTION, (10, 1, 1), "tetrahedron")
+    beyond = np.flatnonzero(np.abs(box.points[:, 0] - 0.4) < 1e-9)
+    changed = []
+    for node in beyond:
+        cells = box.cells.copy()
+        cells[0, 3] = node
+        x = box.points[cells[0]]
+        if np.linalg.det(x[1:] - x[0]) > 1e-9:
+            changed.append(replace(box, cells=cells))
+    assert changed
+    for part in changed:
+        check_quality(part, "here")
+        with pytest.raises(InputError, match="free sides inside others"):
+            check_boundary(part, "here")
 
 
 def test_a_plane_mesh_has_no_elements_across_the_thickness(box, solid):

@@ -181,6 +181,11 @@ def test_properties_name_regions_and_faces(read):
     assert face_area(part, "root") == pytest.approx(VOLUME)
 
 
+@pytest.mark.parametrize("name", ["part.nas", "part.fem", "part.dat", "PART.BDF"])
+def test_endings(read, name):
+    assert integrate(read(HEAD + PLAIN, name=name)) == pytest.approx(VOLUME, rel=1e-6)
+
+
 def test_included_files_count(read, tmp_path):
     (tmp_path / "grids.bdf").write_text(PLAIN[: PLAIN.index("CHEXA")])
     part = read(HEAD + "include 'gri\nds.bdf'\n" + PLAIN[PLAIN.index("CHEXA") :], name="part.nas")
