@@ -23,8 +23,10 @@ def link(link_file: Path, output: Path | None, force: bool) -> None:
     dynamics needs. Nothing is computed when the output is up to date with the content of LINK.toml.
     """
     from ..fe_models.link import make_link
+    from ..fe_models.link_file import read_link
     from ..present.progress import Display
     from ..run.inputs import files_of
+    from ..scene.plausibility import remarks_on_link
 
     protect(files_of(link_file))
     with Display() as display:
@@ -36,5 +38,5 @@ def link(link_file: Path, output: Path | None, force: bool) -> None:
     verb = f"computed in {outcome.seconds:.2f} s{reused}" if outcome.computed else "up to date"
     highest = body.frequency[body.eigenmode_count - 1]
     click.echo(f"{outcome.path}: {verb}; {body.modes_in_words}, {body.frequency[0]:.6g} … {highest:.6g} Hz")
-    for remark in body.remarks:
+    for remark in (*body.remarks, *remarks_on_link(read_link(link_file), link_file.name)):
         click.echo(f"remark     {remark}")

@@ -85,9 +85,13 @@ def _in_space() -> _Stage2:
 def _solve(program: _Stage2, scene_file: Path, path: Path, again: str, *, resume: bool, strict: bool) -> None:
     """Solve, write and tell; `again` is the command that goes on with it."""
     from ..present.progress import Display
+    from ..present.start_posture import chosen_posture
     from ..present.summary import summary_console
     from ..results.file import Results
+    from ..scene.plausibility import remarks_on_file
 
+    for remark in remarks_on_file(scene_file):  # first: they may be why the run fails
+        click.echo(f"note       {remark}")
     writing = 0.0
 
     def keep(solution: Solution | SpatialSolution) -> None:
@@ -105,8 +109,10 @@ def _solve(program: _Stage2, scene_file: Path, path: Path, again: str, *, resume
         click.echo(f"{path}: complete, nothing to go on with")
         return
     with Results(path) as results:
-        verdict = results.verdict
+        verdict, posture = results.verdict, chosen_posture(results)
     program.print_summary(solution, verdict, path, {**solution.seconds, "writing": writing}, summary_console())
+    if posture:
+        click.echo(f"note       {posture}")
     _check_ended(solution, display, scene_file, again)
     if strict:
         _check_without_warnings(solution, scene_file)

@@ -89,6 +89,8 @@ class Results:
             self._file = h5py.File(content, "r") if isinstance(content, h5py.h5f.FileID) else open_checked(path)
         except OSError as error:
             reason = "no such file" if not self.path.exists() else f"not a readable HDF5 file ({error})"
+            if self.path.suffix.lower() == ".toml" and self.path.exists():
+                reason = f"a scene or link file: solve it first (ffrobot solve {path}, which writes .results.h5)"
             raise InputError(f"{path}: expected a results file, found {reason}") from None
         if "scene" not in self._file.attrs:
             self._file.close()

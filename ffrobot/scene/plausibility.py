@@ -1,0 +1,107 @@
+"""What is allowed in a scene but looks like another unit or a slip; a remark each, for nothing here is certain."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from ..common.errors import InputError
+from ..fe_models.link_file import read_link
+from ..fe_models.link_records import Link
+from .any_space import AnyScene
+
+TURNS = 4 * np.pi  # rad: joints of robots that come to rest do so within two turns
+SPINNING = 0.1  # rate at the end over the largest: what still turns then is a wheel
+LONGEST = 50.0  # m: booms of concrete pumps and cranes have less
+LIGHTEST, HEAVIEST = 1.0, 3e4  # kg/m³: foams have more, osmium has 2.3e4
+SLOWEST, FASTEST = 20.0, 5e4  # m/s, √(E/ρ): silicone rubber has 30, diamond 1.8e4
+RESTING = 3.0  # how many times longer than its path a run may take
+SAMPLES = 201
+
+
+def remarks(scene: AnyScene) -> Iterator[str]:
+    """Of a scene that is valid, one line each: units of links and bodies, angles, times of paths."""
+    for body in scene.body:
+        if body.link is not None:
+            try:
+                yield from remarks_on_link(read_link(body.link), f'link "{body.name}"')
+            except InputError:  # which stage 1 tells
+                continue
+        elif body.rigid is not None:
+            places = [body.rigid.center, *body.rigid.points.values()]
+            yield from _long(max(float(np.linalg.norm(place)) for place in places), f'body "{body.name}"')
+    yield from _angles(scene)
+    yield from _times(scene)
+
+
+def remarks_on_link(link: Link, label: str) -> Iterator[str]:
+    """Of a link, which `label` names: its length, its material."""
+    yield from _long(link.geometry.length, label)
+    density, modulus = link.material.density, float(np.max(link.material.youngs_modulus))
+    if not LIGHTEST <= density <= HEAVIEST:
+        yield f"{label}: density {density:g} kg/m³: units are SI; is it in g/cm³ or t/mm³?"
+    elif not SLOWEST <= (speed := np.sqrt(modulus / density)) <= FASTEST:
+        yield (
+            f"{label}: youngs_modulus {modulus:g} Pa, at {density:g} kg/m³ a speed of sound of {speed:.2g} m/s: units"
+            " are SI; is it in MPa or GPa?"
+        )
+
+
+def _long(length: float, label: str) -> Iterator[str]:
+    if length > LONGEST:
+        yield f"{label} is {length:g} m long: units are SI; is this in mm?"
+
+
+def _angles(scene: AnyScene) -> Iterator[str]:
+    """Paths of angles that come to rest many turns away."""
+    turning = {joint.name for joint in scene.joint if joint.type == "revolute"}
+    for one in scene.trajectory:
+        if (
+            getattr(one, "angle", None) is None
+            and one.joint not in turning
+            and getattr(one, "motor", None) not in turning
+        ):
+            continue
+        last = max((analysis.last_time for analysis in scene.analysis if analysis.follows_trajectories), default=0.0)
+        for function in one.components.values():
+            value, rate, _ = np.abs(function.sample(np.linspace(0.0, last, SAMPLES)))
+            spins = rate[-1] > SPINNING * rate.max() > 0
+            if np.isfinite(value).all() and value.max() > TURNS and not spins:
+                yield (
+                    f'trajectory "{one.name}" reaches {value.max():.4g} rad, {value.max() / (2 * np.pi):.3g} turns:'
+                    " angles are in rad; is it in degrees (45*deg)?"
+                )
+
+
+def _times(scene: AnyScene) -> Iterator[str]:
+    """Paths with times of their own that do not fit those of the analyses that follow them."""
+    for analysis in scene.analysis:
+        if not analysis.follows_trajectories:
+            continue
+        for one in scene.trajectory:
+            if (path := one.path) is None:
+                continue
+            label, last = f'analysis "{analysis.name}": trajectory "{one.name}"', analysis.last_time
+            rounding = 1e-9 * max(abs(path.begin), abs(path.end), last)
+            if path.begin >= last:
+                yield f"{label} begins at {path.begin:g} s, when the run is over ({last:g} s): none of it is followed"
+            elif path.end > last + rounding:
+                yield f"{label} ends at {path.end:g} s, the run at {last:g} s: the rest of it is not followed"
+            elif path.end <= 0.0:
+                yield f"{label} is over at {path.end:g} s, before the run begins: it rests where it ends"
+            elif path.begin < -rounding:
+                yield f"{label} begins at {path.begin:g} s, before the run: what is before 0 s is not followed"
+            elif last > RESTING * path.end:
+                yield f"{label} ends at {path.end:g} s, and rests for the other {last - path.end:g} s of the run"
+
+
+def remarks_on_file(path: Path) -> list[str]:
+    """Of the scene file at `path`; nothing where it is wrong, which whoever solves it tells."""
+    from .any_space import load_any_scene
+
+    try:
+        return list(remarks(load_any_scene(path)))
+    except InputError:
+        return []

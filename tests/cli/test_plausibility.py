@@ -1,0 +1,106 @@
+"""Notes on what is allowed but looks like another unit or a slip; and none on what is right."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import ffrobot as program
+from ffrobot.fe_models.link_file import LinkTable, read_link
+from ffrobot.scene.plausibility import remarks, remarks_on_file, remarks_on_link
+
+CASES = Path(__file__).parents[2] / "cases"
+BAR = {"mass": 1.0, "inertia": 0.1, "center": [0.5, 0.0], "points": {"root": [0.0, 0.0], "tip": [1.0, 0.0]}}
+LINK = {
+    "name": "arm",
+    "material": {"youngs_modulus": 70e9, "density": 2700.0},
+    "geometry": {"kind": "beam", "length": 0.6, "section": {"shape": "tube", "outer": 0.02, "inner": 0.016}},
+    "mesh": {"elements": 4},
+    "reference": {"condition": "cantilever"},
+    "modes": {"count": 1, "family": "in-plane-bending"},
+}
+
+
+def arm(end=1.0, body=BAR, **path):
+    return program.make_scene(
+        name="arm",
+        gravity=[0.0, -9.81],
+        body=[{"name": "arm", "rigid": body}],
+        joint=[{"name": "hub", "type": "revolute", "between": ["ground", "arm.root"]}],
+        trajectory=[{"name": "turn", "joint": "hub", **path}],
+        analysis=[{"name": "inverse", "kind": "pcid", "end": end, "output_step": 0.1}],
+    )
+
+
+@pytest.mark.parametrize(
+    ("path", "expected"),
+    [
+        ({"value": "-45"}, "reaches 45 rad, 7.16 turns"),
+        ({"value": "45*(1 - cos(pi*t))"}, "reaches 90 rad"),
+        ({"via": [0.0, 90.0], "duration": 1.0}, "reaches 90 rad"),
+        ({"via": [0.0, 1.0], "duration": 2.0}, "ends at 2 s, the run at 1 s: the rest of it is not followed"),
+        ({"via": [0.0, 1.0], "duration": 2.0, "start": 1.5}, "begins at 1.5 s, when the run is over (1 s)"),
+        ({"via": [0.0, 1.0], "duration": 0.2}, "ends at 0.2 s, and rests for the other 0.8 s"),
+        ({"value": "t", "body": {**BAR, "center": [500.0, 0.0]}}, "is 500 m long: units are SI; is this in mm?"),
+        ({"value": "-45*deg"}, None),
+        ({"value": "45*deg*(1 - cos(pi*t))"}, None),
+        ({"value": "150*t"}, None),  # a crank that turns on
+        ({"value": "2*pi*(10*t**3 - 15*t**4 + 6*t**5)"}, None),  # once around
+        ({"via": [0.0, 1.0], "duration": 1.0}, None),
+    ],
+)
+def test_scenes(path, expected):
+    found = list(remarks(arm(**path)))
+    assert len(found) == (expected is not None)
+    assert expected is None or expected in found[0]
+
+
+def test_waypoints_before_and_after_the_run(tmp_path):
+    for times, expected in (((-2.0, -1.0), "before the run begins"), ((-1.0, 1.0), "what is before 0 s"), ((0, 1), "")):
+        rows = [f"{t},{value}" for t, value in zip(np.linspace(*times, 4), (0, 0.1, 0.2, 0.3), strict=True)]
+        (tmp_path / "path.csv").write_text("t,value\n" + "\n".join(rows) + "\n", encoding="utf-8")
+        found = list(remarks(arm(waypoints=str(tmp_path / "path.csv"))))
+        assert expected in " ".join(found)
+        assert bool(found) == bool(expected)
+
+
+@pytest.mark.parametrize(
+    ("keys", "expected"),
+    [
+        ({}, None),
+        ({"material": {"youngs_modulus": 70e3, "density": 2700.0}}, "is it in MPa or GPa?"),
+        ({"material": {"youngs_modulus": 210.0, "density": 7850.0}}, "is it in MPa or GPa?"),
+        ({"material": {"youngs_modulus": 70e9, "density": 2.7e-9}}, "is it in g/cm³ or t/mm³?"),
+        ({"geometry": {**LINK["geometry"], "length": 600.0}}, "arm is 600 m long: units are SI; is this in mm?"),
+        ({"material": {"youngs_modulus": 1e6, "density": 1100.0}}, None),  # silicone rubber
+        ({"material": {"youngs_modulus": 1050e9, "density": 3515.0}}, None),  # diamond
+    ],
+)
+def test_links(keys, expected, tmp_path):
+    found = list(remarks_on_link(read_link(LinkTable({**LINK, **keys}, tmp_path / "arm.toml")), "arm"))
+    assert len(found) == (expected is not None)
+    assert expected is None or expected in found[0]
+
+
+def test_cases_have_no_remarks_on_units():
+    found = [line for path in CASES.glob("*/scene*.toml") for line in remarks_on_file(path)]
+    assert not [line for line in found if "?" in line]
+
+
+def test_a_posture_that_nobody_chose_is_told(two_link_copy, ffrobot):
+    """Without a guess the scene may start on another elbow: its angles are printed, as results have them."""
+    folder = two_link_copy({"scene.toml": {"end = 1.0": "end = 0.004"}})
+    assert "no guess in [initial]" not in ffrobot("solve", "scene.toml", cwd=folder).stdout
+    text = (folder / "scene.toml").read_text(encoding="utf-8")
+    lines = [line for line in text.splitlines() if not line.startswith(("angles", "initial"))]
+    (folder / "scene.toml").write_text("\n".join(lines), encoding="utf-8")
+    done = ffrobot("solve", "scene.toml", cwd=folder)
+    (line,) = (line for line in done.stdout.splitlines() if "no guess in [initial]" in line)
+    with program.Results(folder / "scene.results.h5") as results:
+        for joint in ("O", "A"):
+            angle = np.degrees(results[f"inverse/joints/{joint}/coordinate"][0])
+            assert f"{joint} {round(angle, 6) + 0.0:.4g}°" in line
+
+
+def test_plotting_a_scene(two_link_copy, refused):
+    assert "scene.toml, which writes .results.h5)" in refused(two_link_copy(), "plot", "scene.toml")
