@@ -140,9 +140,10 @@ def point_set(scene_path: Path, layout: ActuationPoints, body: ModalBody | None,
         )
     points = [_point(key, place, body, planar) for _, place in places]
     axes = tuple(axis for axis, _ in places)
+    near = 1e-9 * (planar.length or 0.0)
     for k, (axis, point) in enumerate(zip(axes, points, strict=True)):
         for earlier in range(k):
-            if axis == axes[earlier] and np.allclose(point.position, points[earlier].position, rtol=0, atol=1e-9):
+            if axis == axes[earlier] and np.allclose(point.position, points[earlier].position, rtol=0, atol=near):
                 raise InputError(
                     f"{key}: {axis}: expected points apart from each other, found two at {places[earlier][1]} and"
                     f" {places[k][1]} that coincide"

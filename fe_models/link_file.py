@@ -216,7 +216,8 @@ def _check_shape(link: SolidLink, path: Path) -> None:
         _reject(path, "geometry.tip_section", "a taper between two rectangles without wall", "another shape")
     if geometry.file is not None and geometry.hole:
         _reject(path, "geometry.hole", "no holes where geometry.file gives the part", len(geometry.hole))
-    if np.linalg.norm(np.cross(geometry.x_axis, geometry.y_axis)) < 1e-6:
+    sizes = np.linalg.norm(geometry.x_axis) * np.linalg.norm(geometry.y_axis)
+    if np.linalg.norm(np.cross(geometry.x_axis, geometry.y_axis)) <= 1e-6 * sizes:
         _reject(path, "geometry.y_axis", f"a direction across x_axis, {list(geometry.x_axis)}", list(geometry.y_axis))
 
 
@@ -248,6 +249,10 @@ def _check_solid_interfaces(link: SolidLink, path: Path) -> None:
                 _reject(path, key.format("position"), f"within the length, {link.geometry.length}", interface.position)
             if interface.coupling == "rigid":
                 _reject(path, key.format("coupling"), '"mean" for a cross section inside the part', '"rigid"')
+        is_held = interface.name == "root" or (interface.name == "tip" and not link.reference.holds_root)
+        if is_held and interface.coupling == "mean" and link.coupling == "rigid":
+            expected = '"rigid", or coupling = "mean" in [reference], which holds this face'
+            _reject(path, key.format("coupling"), expected, '"mean"')
         if interface.group is None and interface.position is None and interface.name not in ("root", "tip"):
             _reject(path, key.format("position"), "either group or position", "neither")
 

@@ -70,11 +70,12 @@ def volume_and_surface() -> tuple[float, float]:
     return sum(occ.getMass(*e) for e in gmsh.model.getEntities(3)), sum(occ.getMass(*e) for e in faces)
 
 
-def mesh_model(size: float, where: str, around: int = CIRCLE) -> None:
+def mesh_model(size: float, metres: float, where: str, around: int = CIRCLE) -> None:
     """Fill the model with tetrahedra of edge length `size`, finer along curved faces, and bend them to these.
 
     Args:
         size: in the model's unit.
+        metres: of that unit.
         where: beginning of the error's message: file and key.
         around: elements on a full circle of a curved face.
 
@@ -96,7 +97,9 @@ def mesh_model(size: float, where: str, around: int = CIRCLE) -> None:
                 return
             problem = "some are flat"
         gmsh.model.mesh.clear()
-    raise InputError(f"{where}: expected a shape that elements of {size:g} can fill, found that they cannot: {problem}")
+    raise InputError(
+        f"{where}: expected a shape that elements of {size * metres:g} m can fill, found that they cannot: {problem}"
+    )
 
 
 def _has_slivers() -> bool:

@@ -1,13 +1,19 @@
-"""Solid shapes drawn out along x, by gmsh's OpenCASCADE kernel: box, cylinder, tube, hollow rectangle, taper, holes."""
+"""Solid shapes drawn out along x, by gmsh's OpenCASCADE kernel: box, cylinder, tube, hollow rectangle, taper, holes.
+
+They are drawn about 1 long, in a power of ten of metres: gmsh and OpenCASCADE take points closer than 1e-7 for one.
+"""
 
 from __future__ import annotations
 
+from dataclasses import replace
+from math import log10
 from pathlib import Path
-from typing import NoReturn
+from typing import NoReturn, TypeVar, cast
 
 import gmsh
 
 from ..common.errors import InputError
+from ..common.validation import Record
 from .checks import check_size
 from .defaults import BAR, CIRCLE, default_order, default_size
 from .gmsh_session import extract_mesh, gmsh_session, mesh_model, volume_and_surface
@@ -24,6 +30,7 @@ from .source import Source, source_from
 
 _VOLUME, _FACE = 3, 2
 DimTags = list[tuple[int, int]]
+Lengths = TypeVar("Lengths")
 
 
 def mesh_shape(geometry: SolidGeometry, record: SolidMeshRecord, outlines: Outlines | None, path: Path) -> Source:
@@ -33,6 +40,8 @@ def mesh_shape(geometry: SolidGeometry, record: SolidMeshRecord, outlines: Outli
         InputError: a hole leaves the section, or the shape cannot be meshed.
     """
     _check_holes(geometry, path)
+    unit, where = 10.0 ** round(log10(geometry.length)), f"{path}: geometry"
+    geometry, outlines = _in(unit, geometry), outlines and _in(unit, outlines)
     with gmsh_session():
         body = _body(geometry)
         for hole in geometry.hole:
@@ -41,11 +50,27 @@ def mesh_shape(geometry: SolidGeometry, record: SolidMeshRecord, outlines: Outli
             _outline(body, geometry, outlines)
         gmsh.model.occ.synchronize()
         volume, surface = volume_and_surface()
-        size = record.size or default_size(volume, surface, record.order or default_order("tetrahedron"))
-        check_size(size, volume, f"{path}: geometry")
+        order = record.order or default_order("tetrahedron")
+        size = _in(unit, record.size) if record.size else default_size(volume, surface, order)
+        check_size(size * unit, volume * unit**3, where)
         around = BAR if isinstance(geometry.section, CircleSection) else CIRCLE
-        mesh_model(size, f"{path}: geometry", around)
-        return source_from(extract_mesh(), f"{path}: geometry")
+        mesh_model(size, unit, where, around)
+        source = source_from(extract_mesh(), where)
+    return replace(source, part=source.part.moved(source.part.points * unit))
+
+
+def _in(unit: float, lengths: Lengths) -> Lengths:
+    """Lengths in m, in a number, tuple or record, as multiples of `unit`; to 12 digits, the same in m and mm."""
+    found: object = lengths
+    if isinstance(lengths, float):
+        found = float(f"{lengths / unit:.12g}")
+    elif isinstance(lengths, tuple):
+        found = tuple(_in(unit, item) for item in lengths)
+    elif isinstance(lengths, Record):
+        found = lengths.model_copy(update={name: _in(unit, value) for name, value in lengths})
+    elif isinstance(lengths, Outlines):
+        found = replace(lengths, edges=_in(unit, lengths.edges), width=_in(unit, lengths.width))
+    return cast(Lengths, found)
 
 
 def _body(geometry: SolidGeometry) -> DimTags:

@@ -57,7 +57,7 @@ def mesh_step(file: Path, record: SolidMeshRecord, scale: float, where: str) -> 
         size = record.size / scale * declared if record.size else default_size(volume, surface, order)
         metres = scale / declared
         allow(MESHING + MESHING_CELL * check_size(size * metres, volume * metres**3, where))
-        mesh_model(size, where)
+        mesh_model(size, metres, where)
         source = source_from(extract_mesh(), where)
     return replace(source, part=source.part.moved(as_floats(source.part.points / declared)))
 

@@ -16,25 +16,24 @@ from .beam import R_X, FamilyModel
 def attachment_modes(
     models: Mapping[Family, FamilyModel], known: Mapping[Family, Array], places: Iterable[int], length: float
 ) -> list[tuple[float, Family, Array]]:
-    """ω², family and degrees of freedom x (m,) of that family's model, xᵀMx = 1, of each attachment mode by frequency.
+    """ω², family and degrees of freedom x (m,) of that family's model, xᵀMx = 1, of attachment modes, by family.
 
     Args:
         models: by family.
         known: of each family (m, n), its eigenmodes in the file.
         places: the stations of the interfaces.
-        length: of the link in m, by which moments are divided to be compared with forces.
+        length: of the link in m: a unit force goes with a moment of force times length.
     """
     found = list[tuple[float, Family, Array]]()
     for family, model in models.items():
         modes = _of_family(family, model, known[family], list(places), length)
         found += [(float(square), family, x) for square, x in zip(modes.omega2, modes.X.T, strict=True)]
-    families = list(models)
-    return sorted(found, key=lambda mode: (float(f"{mode[0]:.9e}"), families.index(mode[1])))
+    return found
 
 
 def _of_family(family: Family, model: FamilyModel, X: Array, places: list[int], length: float) -> ResidualModes:
     rows = [row for row in COMPONENTS[family] if row in model.fields]
-    loads = [model.fields[row][place].toarray()[0] / (1.0 if row < R_X else length) for place in places for row in rows]
+    loads = [model.fields[row][place].toarray()[0] * (1.0 if row < R_X else length) for place in places for row in rows]
     B = np.array(loads).T
     static = splu(model.K.tocsc()).solve(B)
 

@@ -64,9 +64,13 @@ def orthonormalised(M: sp.csr_matrix, X: Array) -> Array:
 
 
 def _krylov_schur(K: sp.csr_matrix, M: sp.csr_matrix, count: int) -> Array:
-    """Eigenvectors (m, count). PETSc's own Cholesky, ordered to a narrow band, has no fill on the matrices of beams."""
+    """Eigenvectors (m, count). PETSc's own Cholesky, ordered to a narrow band, has no fill on the matrices of beams.
+
+    PETSc compares pivots with a bare number: K gets a unit diagonal, for pivots without unit.
+    """
+    scale = sp.diags(1.0 / np.sqrt(K.diagonal()))
     solver = SLEPc.EPS().create(MPI.COMM_SELF)
-    solver.setOperators(_petsc(K), _petsc(M))
+    solver.setOperators(_petsc(scale @ K @ scale), _petsc(scale @ M @ scale))
     solver.setProblemType(SLEPc.EPS.ProblemType.GHEP)
     solver.setDimensions(count, _subspace(count, K.shape[0]))
     solver.setTolerances(TOLERANCE, 1000)
@@ -91,7 +95,7 @@ def _krylov_schur(K: sp.csr_matrix, M: sp.csr_matrix, count: int) -> Array:
         solver.getEigenvector(k, vector)
         X[:, k] = vector.array
     solver.destroy()
-    return X
+    return np.asarray(scale @ X)
 
 
 def _subspace(count: int, size: int) -> int:

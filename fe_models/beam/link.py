@@ -18,7 +18,7 @@ from ...common.version import program_version
 from ...mesh.interval import graded_nodes, interval_mesh, with_points
 from ..link_records import FAMILIES, BeamLink, Family
 from ..modal_body import Interface, ModalBody, PictureMesh, Stations
-from ..modal_body.attachment_modes import DEFAULT_COUNT
+from ..modal_body.attachment_modes import DEFAULT_COUNT, ascending
 from ..modal_body.damping import damping_ratio
 from ..modal_body.lumped_masses import lump_weights, lumps, with_lumped_masses, with_lumped_stiffness
 from ..modal_body.signs import canonical_signs
@@ -145,7 +145,7 @@ def _modes(
         return modes, []
     known = {family: _together(models[family], family, modes) for family in models}
     static = [Mode(*mode) for mode in attachment_modes(models, known, places, link.geometry.length)]
-    return _ritz(models, modes, static) if is_fixed else (modes, static)
+    return _ritz(models, modes, static) if is_fixed else (modes, _by_frequency(static))
 
 
 def _ritz(
@@ -157,7 +157,7 @@ def _ritz(
         pair = ritz_modes(model, family, _together(model, family, modes), _together(model, family, static))
         for found, of_family in zip((lower, higher), pair, strict=True):
             found += [Mode(*mode) for mode in of_family]
-    return sorted(lower, key=_by_frequency), sorted(higher, key=_by_frequency)
+    return _by_frequency(lower), _by_frequency(higher)
 
 
 def _loaded(model: FamilyModel, link: BeamLink, stations: Array) -> FamilyModel:
@@ -182,7 +182,7 @@ def select(models: Mapping[Family, FamilyModel], wanted: Sequence[int]) -> list[
     for family, model in models.items():
         omega2, X = lowest_modes(model.K, model.M, model.strain, min(wanted[-1], model.K.shape[0]))
         modes += [Mode(square, family, x) for square, x in zip(omega2, X.T, strict=True)]
-    modes.sort(key=_by_frequency)
+    modes = _by_frequency(modes)
     return [modes[number - 1] for number in wanted]
 
 
@@ -192,11 +192,12 @@ def select_default(models: Mapping[Family, FamilyModel]) -> list[Mode]:
     for family, model in models.items():
         count = min(DEFAULT_COUNT[family], model.K.shape[0])
         modes += select({family: model}, range(1, count + 1))
-    return sorted(modes, key=_by_frequency)
+    return _by_frequency(modes)
 
 
-def _by_frequency(mode: Mode) -> tuple[float, int]:
-    return float(f"{mode.omega2:.9e}"), FAMILIES.index(mode.family)
+def _by_frequency(modes: Sequence[Mode]) -> list[Mode]:
+    families = np.array([FAMILIES.index(mode.family) for mode in modes], dtype=np.int64)
+    return [modes[k] for k in ascending(np.array([mode.omega2 for mode in modes]), families)]
 
 
 def _together(model: FamilyModel, family: Family, modes: Sequence[Mode]) -> Array:

@@ -29,6 +29,8 @@ IMMOBILE = 1e-10
 STIFFEST = 1e4
 # Coupling of families by stiffness, relative to their own: less is rounding.
 COUPLED = 1e-10
+# ω² that differ by less, relative, are equal but for rounding: bending of round and square sections in both planes.
+ALIKE = 1e-6
 # Eigenmodes of each family where the link file leaves their number out: attachment modes have the statics.
 DEFAULT_COUNT: Mapping[Family, int] = {
     "in-plane-bending": 6,
@@ -84,7 +86,7 @@ def residual_modes(static: Mapping[Family, tuple[Array, Array]], X: Array, inert
     """Attachment modes from static shapes, by family of their loads.
 
     Args:
-        static: for each family K⁻¹B (m, loads) and the loads B (m, loads), moments divided by a length.
+        static: for each family K⁻¹B (m, loads) and the loads B (m, loads): forces, and moments of these times a length.
         X: (m, n) eigenmodes, XᵀMX = I.
         inertia: of the model.
     """
@@ -127,9 +129,16 @@ def _uncoupled(X: Array, families: Sequence[Family], inertia: Inertia) -> Residu
     """Principal axes of the strain energy: in each family by itself, unless the link couples families."""
     of = np.array([FAMILIES.index(family) for family in families], dtype=np.int64)
     squares, turn, of = uncoupled(inertia.energy(X), of)
-    # Equal frequencies of different families are ordered by these, not by rounding.
-    order = sorted(range(of.size), key=lambda k: (float(f"{squares[k]:.6e}"), int(of[k])))
+    order = ascending(squares, of)
     return ResidualModes(squares[order], tuple(FAMILIES[of[k]] for k in order), X @ turn[:, order])
+
+
+def ascending(omega2: Array, family: Integers) -> Integers:
+    """Order (n,) of modes by ω² (n,), equal ones by the number of their family (n,): rounding has no say."""
+    order = np.argsort(omega2, kind="stable")
+    steps = np.diff(omega2[order]) > ALIKE * omega2[order][1:]
+    level = np.concatenate([[0], np.cumsum(steps)])[: len(order)]
+    return np.asarray(order[np.lexsort((family[order], level))])
 
 
 def uncoupled(K: Array, of: Integers) -> tuple[Array, Array, Integers]:

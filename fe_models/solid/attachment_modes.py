@@ -30,10 +30,10 @@ def attachment_modes(
         mass: with what is attached.
         X: (3 owned, n) eigenmodes.
         interfaces: B (6, 3 owned), mean motion of each; its transpose spreads a force.
-        length: of the link in m, by which moments are divided to be compared with forces.
+        length: of the link in m: a unit force goes with a moment of force times length.
     """
     model = flexibility.model
-    scale = np.array([1.0, 1.0, 1.0, 1.0 / length, 1.0 / length, 1.0 / length])
+    scale = np.repeat([1.0, length], 3)
     rows = [(family, row) for family in families for _ in interfaces for row in COMPONENTS[family]]
     B = np.array(
         [scale[row] * at[row] for family in families for at in interfaces.values() for row in COMPONENTS[family]]

@@ -18,7 +18,7 @@ from ..scene.pieces import places_on_pieces
 from .spatial_pieces import MotionOfLinks, divided_links
 from .spatial_solution import SpatialSolution
 
-STEP = 1e-5  # s, along a motion, of central differences of modal velocities
+STEP = 1e-3  # of the links' longest 1/ω, along a motion: of central differences of modal velocities
 
 
 def whole_links_in_space(solution: SpatialSolution) -> WholeLinksInSpace | None:
@@ -49,7 +49,8 @@ def _told(solution: SpatialSolution, run: SpatialRun) -> SpatialRun:
     assert whole is not None
     q = np.zeros((len(run.time), whole.tree.n_q))
     v, a = np.zeros((2, len(run.time), whole.tree.n_v))
-    now, *beside = (_modal(solution, run, step) for step in (0.0, -STEP, STEP))
+    step = STEP / np.sqrt(min(float(node.body.stiffness.min()) for node in whole.tree.nodes if node.body.n_modes))
+    now, *beside = (_modal(solution, run, dt) for dt in (0.0, -step, step))
     for node in whole.tree.nodes:
         if node.joint.freedoms:
             _take_joint(whole, node, run, (q, v, a))
@@ -57,7 +58,7 @@ def _told(solution: SpatialSolution, run: SpatialRun) -> SpatialRun:
         if node.body.n_modes:
             q[:, node.p_q], v[:, node.p_v] = (values @ to_own for values in now[name])
             behind, ahead = (of[name][1] for of in beside)
-            a[:, node.p_v] = (ahead - behind) @ to_own / (2 * STEP)
+            a[:, node.p_v] = (ahead - behind) @ to_own / (2 * step)
     multipliers = np.zeros((len(run.time), len(whole.rows)))
     return replace(run, model=whole, q=q, v=v, a=a, multipliers=multipliers, required=None, again=None)
 

@@ -245,7 +245,7 @@ def _check_path(trajectory: SpatialTrajectory, times: Array, label: str) -> None
             check_derivatives(function, float(times[-1]), key)
     if law is not None and law.kind == "direction":
         sizes = np.linalg.norm([function.sample(times)[0] for function in law.functions], axis=0)
-        if sizes.min() < 1e-9:
+        if sizes.min() <= 1e-9 * sizes.max():
             raise InputError(
                 f"{label}: direction: expected a direction at all times, found none at t ="
                 f" {times[sizes.argmin()]:.9g} s"

@@ -67,7 +67,7 @@ class InstantAnalysis(Analysis):
         if self.instants is None and self.needs_times:
             yield f'times: expected the times of "{source.name}" about which to be linear, found none'
         for t in self.instants or ():
-            if t - source.last_time > NEAR * max(1.0, source.last_time):
+            if t - source.last_time > NEAR * source.last_time:
                 yield f'times: expected at most {source.last_time!r}, where "{source.name}" ends, found {t!r}'
 
 
@@ -92,7 +92,7 @@ def operating_points(model: Model, analysis: Analysis, source: Outcome | None) -
 def row_at(path: Path, analysis: Analysis, source: Outcome | SpatialRun, t: float) -> int:
     """The output of an earlier analysis at time t. Raises `InputError` where there is none."""
     row = int(np.abs(source.time - t).argmin())
-    if abs(source.time[row] - t) > NEAR * max(1.0, source.analysis.last_time):
+    if abs(source.time[row] - t) > NEAR * source.analysis.last_time:
         every = f"every {source.analysis.output_step:g} s " if isinstance(source.analysis, TimedAnalysis) else ""
         raise InputError(
             f'{path}: analysis "{analysis.name}": times: expected output times of "{source.analysis.name}",'

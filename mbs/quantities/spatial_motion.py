@@ -11,7 +11,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ...common.arrays import Array, as_floats
+from ...common.arrays import Array
 from ...common.rotations import quaternions
 from ..analysis.outcome import GearMotion
 from ..analysis.spatial_gears import gears_of_motion, with_motors
@@ -152,11 +152,7 @@ class SpatialMotion:
         x, x_dot = (node.joint.coordinates(values) for values in (self.q[:, node.q], self.v[:, node.v]))
         if not node.backwards:
             return x, x_dot
-        h = 1e-6  # of a linear map, but for planar joints
-        ahead, behind = (node.joint.turned_around(x + s * x_dot) for s in (h, -h))
-        linear = node.joint.type != "planar"
-        rate = node.joint.turned_around(x_dot) if linear else as_floats((ahead - behind) / (2 * h))
-        return node.joint.turned_around(x), rate
+        return node.joint.turned_around(x), node.joint.rate_turned_around(x, x_dot)
 
     def path_force(self, trajectory: str) -> Array:
         """−λ (T, m) of its rows: forces on the point, then moments on the section about global axes."""

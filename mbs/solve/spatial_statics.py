@@ -46,10 +46,8 @@ def initial_state(model: SpatialModel) -> State:
 
 def holding_multipliers(model: SpatialModel, q: Array) -> Array:
     """λ (rows,) with C_vᵀλ = Q at rest at q (n_q,), t = 0; of least size where rows depend on others."""
-    sizes = natural_sizes(model)
     C_v = row_values(model, q[None], np.zeros(1))[1][0]
-    found: Array = np.linalg.lstsq(C_v.T * sizes[:, None], forces_at_rest(model, q[None])[0] * sizes, rcond=1e-12)[0]
-    return found
+    return _least_multipliers(C_v, forces_at_rest(model, q[None])[0], natural_sizes(model), _row_scales(model))
 
 
 def static_equilibrium(model: SpatialModel, start: State, t: float = 0.0) -> State:
@@ -57,12 +55,11 @@ def static_equilibrium(model: SpatialModel, start: State, t: float = 0.0) -> Sta
 
     Raises `SolveError` where there is no equilibrium near the start.
     """
-    tree, n, m, length = model.tree, model.tree.n_v, len(model.rows), robot_size(model)
-    sizes = natural_sizes(model)
-    row_scales = np.array([1.0 if row.carries_moment else length for row in model.rows])
+    tree, n, m = model.tree, model.tree.n_v, len(model.rows)
+    sizes, row_scales = natural_sizes(model), _row_scales(model)
     q = start.q
     C_v = row_values(model, q[None], np.array([t]))[1][0]
-    multipliers = np.linalg.lstsq(C_v.T * sizes[:, None], forces_at_rest(model, q[None], t)[0] * sizes, rcond=None)[0]
+    multipliers = _least_multipliers(C_v, forces_at_rest(model, q[None], t)[0], sizes, row_scales)
     for _ in range(MOST_ITERATIONS):
         residual, size = _residual(model, q[None], t, multipliers, row_scales)
         if np.abs(residual[0, :n] * sizes).max() <= TOLERANCE * size and (
@@ -70,7 +67,7 @@ def static_equilibrium(model: SpatialModel, start: State, t: float = 0.0) -> Sta
         ):
             return with_rates(model, q, start.v, t)
         jacobian = _jacobian(model, q, t, multipliers, sizes, row_scales)
-        step = -np.linalg.lstsq(jacobian, residual[0] * np.concatenate([sizes, np.ones(m)]), rcond=1e-14)[0]
+        step = -_equilibrated_solution(jacobian, residual[0] * np.concatenate([sizes, np.ones(m)]))
         if not np.all(np.isfinite(step)):
             break
         step *= min(1.0, LARGEST_STEP / max(float(np.abs(step[:n]).max()), 1e-300))
@@ -90,6 +87,28 @@ def natural_sizes(model: SpatialModel) -> Array:
         sizes[node.v] = node.joint.state(of_joint) if node.joint.units else of_joint
         sizes[node.p_v] = np.sqrt(np.linalg.eigvalsh(node.body.inertia)[-1])
     return sizes
+
+
+def _row_scales(model: SpatialModel) -> Array:
+    """(rows,) natural sizes of C: 1 rad, or the robot's size."""
+    length = robot_size(model)
+    return np.array([1.0 if row.carries_moment else length for row in model.rows])
+
+
+def _least_multipliers(C_v: Array, Q: Array, sizes: Array, row_scales: Array) -> Array:
+    """λ (rows,) with C_vᵀλ = Q (n_v,), of least work on natural motions where rows depend on others."""
+    work = (C_v / row_scales[:, None] * sizes).T
+    return np.asarray(np.linalg.lstsq(work, Q * sizes, rcond=1e-12)[0] / row_scales)
+
+
+def _equilibrated_solution(A: Array, b: Array) -> Array:
+    """Solution of A x = b, the least where A is singular; rows and columns scaled to 1, since forces have a unit."""
+    rows = np.abs(A).max(axis=1, initial=0.0)
+    rows[rows == 0.0] = 1.0
+    columns = np.linalg.norm(A / rows[:, None], axis=0)
+    columns[columns == 0.0] = 1.0
+    scaled = A / rows[:, None] / columns
+    return np.asarray(np.linalg.lstsq(scaled, b / rows, rcond=1e-14)[0] / columns)
 
 
 def _force_scale(size: float, row_scales: Array) -> Array:

@@ -111,6 +111,10 @@ class SpatialJoint(JointKeys):
         """Coordinates (…, k) with the sides exchanged: of the first on the second; done twice, the same again."""
         return -coordinates
 
+    def rate_turned_around(self, coordinates: Array, rate: Array) -> Array:
+        """Rate (…, k) of `turned_around(coordinates)` while the coordinates have this rate (…, k)."""
+        return self.turned_around(rate)
+
     def state(self, coordinates: Array) -> Array:
         """Q (q_count,) from the numbers by which the scene gives its place."""
         return coordinates

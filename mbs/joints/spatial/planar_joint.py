@@ -41,3 +41,10 @@ class SpatialPlanar(AxialJoint):
         x, y, angle = np.moveaxis(coordinates, -1, 0)
         c, s = np.cos(angle), np.sin(angle)
         return np.stack([-(c * x + s * y), s * x - c * y, -angle], axis=-1)
+
+    def rate_turned_around(self, coordinates: Array, rate: Array) -> Array:
+        """As `turned_around` of displacements, whose axes turn besides."""
+        X, Y, _ = np.moveaxis(self.turned_around(coordinates), -1, 0)
+        turn = rate[..., 2]
+        x, y, _ = np.moveaxis(self.turned_around(np.concatenate([rate[..., :2], coordinates[..., 2:]], axis=-1)), -1, 0)
+        return np.stack([x + turn * Y, y - turn * X, -turn], axis=-1)

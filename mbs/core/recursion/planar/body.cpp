@@ -55,8 +55,7 @@ Body::Body(const PlanarData &data, const std::vector<int> &used, int tilted) : n
   padded = (n + 7) / 8 * 8;
   fill_rows(data, used, tilted);
   fill_damping(data);
-  const double length = std::sqrt(J / std::max(mass, 1e-300));
-  if (n && !vanishes(data.j, length))
+  if (n && !vanishes(data.j, std::sqrt(J))) // a unit mode with all motion turning
     j = data.j;
   if (n && !vanishes(data.S_tilde, 1))
     S_tilde = data.S_tilde;

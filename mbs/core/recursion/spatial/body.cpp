@@ -33,14 +33,14 @@ MatrixXd complete_I_bar(const SpatialData &data) {
 
 // g_ab, a <= b, of data along the axes of T_s; zero where it is nothing but rounding
 MatrixXd symmetric_I_bar(const SpatialData &data) {
-  const double reach = std::sqrt(std::max(data.J2.trace(), 1e-300) / std::max(data.mass, 1e-300));
+  const double size = std::sqrt(data.J2.trace()); // of the integral over rho x Phi, where that of rho Phi Phi is 1
   const MatrixXd I = complete_I_bar(data);
   MatrixXd g = MatrixXd::Zero(6, data.modes());
   Index s = 0;
   for (int a = 0; a < 3; ++a)
     for (int b = a; b < 3; ++b, ++s) {
       const Eigen::RowVectorXd row = 0.5 * (I.row(3 * a + b) + I.row(3 * b + a));
-      if (row.cwiseAbs().maxCoeff() > negligible * reach)
+      if (row.cwiseAbs().maxCoeff() > negligible * size)
         g.row(s) = row;
     }
   return g;

@@ -1,0 +1,228 @@
+"""Links drawn at random, in m, mm, µm and km, in kg and kt, in s and h: every number scales with its dimension."""
+
+import copy
+import random
+import re
+
+import h5py
+import numpy as np
+import pytest
+
+import ffrobot
+
+# Of a metre, a kilogram, a second in the other unit.
+SYSTEMS = {
+    "mm": (1e3, 1.0, 1.0),
+    "mm, t, s": (1e3, 1e-3, 1.0),
+    "µm, mg, ms": (1e6, 1e6, 1e3),
+    "km": (1e-3, 1.0, 1.0),
+}
+# Powers of length, mass and time of each dataset.
+DIMENSIONS = {
+    r"length|stations/(height|width|outline)|.*position|mesh/points": (1, 0, 0),
+    r"mass": (0, 1, 0),
+    r"first_moment": (1, 1, 0),
+    r"second_moment|invariants/J_spin": (2, 1, 0),
+    r"modes/frequency": (0, 0, -1),
+    r"modes/stiffness": (0, 0, -2),
+    r"modes/(mass|damping_ratio|residual)|invariants/(S_bar_kl|S_spin)": (0, 0, 0),
+    r"(stations|mesh)/(element|cells|edges)": (0, 0, 0),
+    r"invariants/S_bar": (0, 0.5, 0),
+    r"invariants/(I_bar|h_spin)": (1, 0.5, 0),
+    r".*translation|mesh/mode_shapes": (0, -0.5, 0),
+    r".*rotation": (-1, -0.5, 0),
+    r"stations/(EI|out_of_plane_rigidity|torsional_rigidity)": (3, 1, -2),
+    r"stations/EA": (1, 1, -2),
+    r"geometric_stiffness/t_.": (-1, 0, 0),
+    r"geometric_stiffness/(r_|omega_).*": (0, 0, 0),
+    r"geometric_stiffness/force/.*": (-1, -1, 0),
+    r"geometric_stiffness/moment/.*": (-2, -1, 0),
+    r"stress/points/.*/strain": (-1, -0.5, 0),
+    r"stress/points/.*/stress": (-2, 0.5, -2),
+}
+LENGTHS = {"length", "height", "width", "wall", "diameter", "outer", "inner", "until", "position", "size"}
+
+
+def in_other_units(keys, L, M, T):
+    """The tables of a link file in SI units, in units of which L are a metre, M a kilogram, T a second."""
+    factors = dict.fromkeys(LENGTHS, L) | {
+        "youngs_modulus": M / L / T**2,
+        "density": M / L**3,
+        "mass": M,
+        "inertia": M * L**2,
+    }
+
+    def scaled(value, factor):
+        return [factor * item for item in value] if isinstance(value, list) else factor * value
+
+    def of_tables(tables):
+        for key, value in tables.items():
+            if isinstance(value, dict):
+                of_tables(value)
+            elif key in factors:
+                tables[key] = scaled(value, factors[key])
+            elif isinstance(value, list) and value and isinstance(value[0], dict):
+                for table in value:
+                    of_tables(table)
+        return tables
+
+    found = of_tables(copy.deepcopy(keys))
+    if "rayleigh" in keys.get("damping", {}):
+        a, b = keys["damping"]["rayleigh"]
+        found["damping"]["rayleigh"] = [a / T, b * T]
+    for name, point in keys.get("stress", {}).get("points", {}).items():
+        found["stress"]["points"][name] = scaled(point, L)
+    return found
+
+
+def numbers(keys):
+    """All datasets of the body that a link file makes, and the families of its modes."""
+    found = {}
+
+    def take(name, item):
+        # Written for other programs from the rest; loads of stresses follow from the modes.
+        if isinstance(item, h5py.Dataset) and item.dtype.kind in "fi" and not name.startswith("craig_bampton"):
+            found[name] = np.asarray(item[()], dtype=np.float64)
+
+    with h5py.File(ffrobot.make_link(keys).path) as file:
+        file.visititems(take)
+        families = [name.decode() for name in file["modes/family"][()]]
+    found["stations/EA"], found["stations/EI"] = found.pop("stations/rigidity").T
+    found = {name: values for name, values in found.items() if not name.endswith("/static")}
+    return found, families
+
+
+def unit_of(name, L, M, T):
+    powers = next(powers for pattern, powers in DIMENSIONS.items() if re.fullmatch(pattern, name))
+    return L ** powers[0] * M ** powers[1] * T ** powers[2]
+
+
+def natural(name, expected):
+    """A size of the quantity below which it is nothing but rounding: of the body's mass, length and first frequency."""
+    L, M, T = expected["length"], expected["mass"], 1.0 / expected["modes/frequency"].min()
+    return unit_of(name, L, M, T)
+
+
+def check(keys, systems=SYSTEMS, rounding=1e-9):
+    expected, families = numbers(keys)
+    for system in systems.values():
+        found, found_families = numbers(in_other_units(keys, *system))
+        assert found_families == families
+        assert found.keys() == expected.keys()
+        for name, values in expected.items():
+            error = np.abs(found[name] / unit_of(name, *system) - values).max(initial=0.0)
+            size = max(np.abs(values).max(initial=0.0), rounding * natural(name, expected))
+            assert error <= 1e-5 * size, (name, system, error / size)
+    return families
+
+
+def drawn_section(draw, size):
+    height = size * draw.uniform(0.7, 1.4)
+    shape = draw.choice(["rectangle", "circle", "tube"])
+    if shape == "rectangle":
+        return {"shape": shape, "height": height, "width": height * draw.choice([1.0, draw.uniform(0.2, 4.0)])}
+    if shape == "circle":
+        return {"shape": shape, "diameter": height}
+    return {"shape": shape, "outer": height, "inner": height * draw.uniform(0.2, 0.9)}
+
+
+def drawn_beam(seed):
+    draw = random.Random(seed)
+    length, slenderness = 10 ** draw.uniform(-3.5, 1.5), 10 ** draw.uniform(-2.3, -0.8)
+    geometry = {"kind": "beam", "length": length}
+    if draw.random() < 0.7:
+        geometry["section"] = drawn_section(draw, length * slenderness)
+    else:
+        ends = draw.uniform(0.2, 0.8) * length, length
+        geometry["segment"] = [{"until": end, "section": drawn_section(draw, length * slenderness)} for end in ends]
+    families = ["in-plane-bending", "out-of-plane-bending", "axial", "torsion"]
+    keys = {
+        "name": "link",
+        "material": {
+            "youngs_modulus": 10 ** draw.uniform(9, 11.5),
+            "density": draw.uniform(900, 8000),
+            "poissons_ratio": draw.uniform(0, 0.45),
+        },
+        "geometry": geometry,
+        "mesh": {"elements": draw.randint(3, 24)},
+        "model": {"theory": draw.choice(["euler-bernoulli", "timoshenko"])},
+        "reference": {"condition": draw.choice(["cantilever", "simply-supported", "craig-bampton"])},
+        "modes": {"family": draw.choice(["all", *families, draw.sample(families, 2)])},
+        "damping": {"rayleigh": [draw.uniform(0, 1), 1e-5 * draw.random()]},
+        "interface": [],
+    }
+    if draw.random() < 0.6:
+        keys["modes"]["count"] = draw.randint(1, 6)
+    for k in range(draw.choice([0, 1, 2])):
+        mass = draw.uniform(0, 2000) * length**3 * slenderness**2
+        inertia = [mass * (length * slenderness) ** 2 * draw.uniform(0.6, 1.0) for _ in range(3)]
+        place = length * draw.choice([draw.uniform(0.05, 0.95), draw.uniform(0.001, 0.05)])
+        keys["interface"].append({"name": f"place{k}", "position": place, "mass": mass, "inertia": inertia})
+    return keys
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_beams(seed):
+    check(drawn_beam(seed))
+
+
+@pytest.mark.parametrize("length", [7e-10, 7e-4, 0.7, 700.0, 7e5])
+@pytest.mark.parametrize("condition", ["cantilever", "simply-supported"])
+def test_bars_of_any_length_have_the_same_modes(condition, length):
+    """In SI; frequencies go with 1/length. A cantilever has of each bending family two shapes of loads at its tip."""
+    keys = {
+        "name": "bar",
+        "material": {"youngs_modulus": 2.07e11, "density": 7850.0, "poissons_ratio": 0.3},
+        "geometry": {"kind": "beam", "length": length, "section": {"shape": "circle", "diameter": length / 35}},
+        "mesh": {"elements": 10},
+        "reference": {"condition": condition},
+        "modes": {"count": 2, "family": "in-plane-bending"},
+    }
+    body = ffrobot.make_link(keys).body
+    keys["geometry"] |= {"length": 1.0, "section": {"shape": "circle", "diameter": 1 / 35}}
+    expected = ffrobot.make_link(keys).body.frequency / length
+    assert body.residual.tolist() == [0, 0, 1, 1]
+    np.testing.assert_allclose(body.frequency, expected, rtol=1e-9)
+
+
+def solid(condition, size, mesh, section, **more):
+    return {
+        "name": "link",
+        "material": {"youngs_modulus": 7e10, "density": 2700.0, "poissons_ratio": 0.33},
+        "geometry": {"kind": "solid", "length": 10 * size, "section": section, **more.pop("geometry", {})},
+        "mesh": mesh,
+        "reference": {"condition": condition},
+        "modes": {"count": 3},
+        **more,
+    }
+
+
+SOLIDS = {
+    "box of 0.2 mm": solid(
+        "craig-bampton",
+        2e-4,
+        {"cell": "hexahedron", "order": 2, "divisions": [6, 1, 1]},
+        {"shape": "rectangle", "height": 2e-4, "width": 1.4e-4},
+        interface=[{"name": "cut", "position": 8e-4, "mass": 1e-7}],
+        stress={"points": {"inside": [6e-4, 4e-5, 2e-5]}},
+    ),
+    "box, simply supported": solid(
+        "simply-supported",
+        0.02,
+        {"cell": "tetrahedron", "order": 1, "divisions": [8, 2, 2]},
+        {"shape": "rectangle", "height": 0.02, "width": 0.014},
+    ),
+    "round bar that gmsh meshes": solid("cantilever", 1e-4, {"order": 1}, {"shape": "circle", "diameter": 1.1e-4}),
+    "hole in a thin bar that gmsh meshes": solid(
+        "cantilever",
+        3e-5,
+        {"order": 2, "size": 2.7e-5},
+        {"shape": "rectangle", "height": 3e-5, "width": 2.1e-5},
+        geometry={"hole": [{"position": 1.4e-4, "diameter": 1.2e-5}]},
+    ),
+}
+
+
+@pytest.mark.parametrize("keys", SOLIDS.values(), ids=SOLIDS)
+def test_solids(keys):
+    check(keys, {name: SYSTEMS[name] for name in ("mm", "µm, mg, ms")}, rounding=1e-7)
