@@ -15,7 +15,7 @@ from ..common.arrays import Array, Integers
 from ..common.checksum import MARK, METHOD, sealed
 from ..common.errors import InputError
 from ..common.files import write_atomically
-from ..common.hdf5 import open_checked, read
+from ..common.hdf5 import numbers, open_checked, read
 from .modal_body import Interface, MeasuredValues, ModalBody, OutlinedPatches, PictureMesh, Stations, StressPoint
 
 if TYPE_CHECKING:
@@ -25,6 +25,7 @@ Found = TypeVar("Found")
 
 FORMAT = "ffrobot-modal-body"
 FORMAT_VERSION = 1
+LARGEST = 1e100  # of any number: products of three of them are still finite
 
 _ATTRIBUTES = ("name", "kind", "reference_condition", "ffrobot_version", "input_hash")
 # Field of ModalBody → dataset.
@@ -119,11 +120,15 @@ def _body(file: h5py.File) -> ModalBody:
         modes_hash=_text(file.attrs.get("modes_hash", "")),
         family=tuple(_text(name) for name in read(file["modes/family"])),
         geometric_stiffness=_geometric_stiffness(file),
-        interfaces={name: Interface(**_arrays(interfaces[name], Interface)) for name in interfaces},
+        interfaces={name: _interface(interfaces[name]) for name in interfaces},
         stations=Stations(**_arrays(stations, Stations)),
         mesh=PictureMesh(**_arrays(file["mesh"], PictureMesh)),
         **_optional(file),
     )
+
+
+def _interface(group: h5py.Group) -> Interface:
+    return Interface(**_arrays(group, Interface) | {"coupling": _text(group.attrs.get("coupling", ""))})
 
 
 def _optional(file: h5py.File) -> dict[str, Any]:
@@ -153,7 +158,7 @@ def _optional(file: h5py.File) -> dict[str, Any]:
 def _arrays(group: h5py.Group, record: type[DataclassInstance]) -> dict[str, Any]:
     """The datasets of `group` that are fields of `record`; those without default must be there."""
     required = {item.name: item.default is MISSING for item in fields(record)}
-    return {name: read(group[name]) for name, needed in required.items() if needed or name in group}
+    return {name: _numbers(group[name]) for name, needed in required.items() if needed or name in group}
 
 
 def _geometric_stiffness(file: h5py.File) -> dict[str, Array]:
@@ -161,7 +166,7 @@ def _geometric_stiffness(file: h5py.File) -> dict[str, Array]:
 
     def collect(name: str, item: h5py.Dataset | h5py.Group) -> None:
         if isinstance(item, h5py.Dataset):
-            found[name] = np.asarray(read(item), dtype=np.float64)
+            found[name] = np.asarray(_numbers(item), dtype=np.float64)
 
     if "geometric_stiffness" in file:
         file["geometric_stiffness"].visititems(collect)
@@ -169,7 +174,18 @@ def _geometric_stiffness(file: h5py.File) -> dict[str, Array]:
 
 
 def _array(group: h5py.Group, name: str) -> Array:
-    return np.asarray(read(group[name]), dtype=np.float64)
+    return np.asarray(_numbers(group[name]), dtype=np.float64)
+
+
+def _numbers(item: object) -> NDArray[Any]:
+    """A dataset of whole or real numbers, none so large that products of a few were infinite."""
+    name = getattr(item, "name", "").lstrip("/")
+    values = numbers(item, name)
+    if np.any(np.abs(values) > LARGEST):
+        worst = values.flat[np.abs(values).argmax()]
+        raise InputError(f"{name}: expected numbers up to {LARGEST:g}, found {worst:.3g}")
+    whole = isinstance(item, h5py.Dataset) and item.dtype.kind in "iu"
+    return values.astype(np.int64) if whole else values
 
 
 def _whole_numbers(dataset: h5py.Dataset) -> Integers:
@@ -205,7 +221,10 @@ def _image(body: ModalBody) -> bytes:
             _write_arrays(group, vars(body.measured))
         _write_arrays(file.create_group("geometric_stiffness"), dict(sorted(body.geometric_stiffness.items())))
         for name, interface in sorted(body.interfaces.items()):
-            _write_arrays(file.create_group(f"interfaces/{name}"), vars(interface))
+            group = file.create_group(f"interfaces/{name}")
+            _write_arrays(group, {key: value for key, value in vars(interface).items() if key != "coupling"})
+            if interface.coupling:
+                group.attrs["coupling"] = interface.coupling
         _write_arrays(file.create_group("stations"), vars(body.stations))
         _write_arrays(file.create_group("mesh"), vars(body.mesh))
         for name, point in sorted(body.stress.items()):

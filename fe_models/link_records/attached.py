@@ -18,7 +18,7 @@ class InterfaceRecord(PlaceRecord):
 
     coupling: Coupling | None = None
     """How a solid's face is held to the interface: its mean moves with it, or all of it; by default that of
-    [reference]."""
+    [reference], and the mean for cross sections inside and for a tip that the reference condition leaves free."""
     mass: NotNegative = 0.0
     """Mass that sits on the interface, its center there, kg."""
     inertia: tuple[NotNegative, NotNegative, NotNegative] = (0.0, 0.0, 0.0)

@@ -101,7 +101,8 @@ class Reference(Record):
     """The frame moves with the root's section, or its x axis goes through root and tip; "craig-bampton" is on the root,
     too, with modes of the link held at all interfaces beside static shapes of unit motions of these."""
     coupling: Coupling | None = None
-    """How a solid's end faces are held; by default mean for simply-supported, else rigid."""
+    """How a solid's end faces are held, and the default of [[interface]]; by default mean for simply-supported, else
+    rigid."""
 
     @property
     def holds_root(self) -> bool:
@@ -234,6 +235,19 @@ class SolidLink(_Link):
     def coupling(self) -> Coupling:
         """How the supports of the reference condition hold the end faces."""
         return self.reference.coupling or ("rigid" if self.reference.holds_root else "mean")
+
+    @property
+    def couplings(self) -> dict[str, Coupling]:
+        """How each interface takes its face along: "rigid" or "mean"; cross sections inside always by their mean.
+
+        The others follow [reference] where they do not say it themselves; a tip that nothing holds has its mean.
+        """
+        tip: Coupling = "mean" if self.reference.holds_root else self.coupling
+        found: dict[str, Coupling] = {"root": self.coupling, "tip": tip}
+        for record in self.interface:
+            inside = isinstance(record.position, float)
+            found[record.name] = "mean" if inside else record.coupling or found.get(record.name, self.coupling)
+        return found
 
 
 Link = BeamLink | SolidLink

@@ -23,11 +23,13 @@ class Interface:
         position: (3,) in m, undeformed.
         translation: (3, n) displacement of mode l in column l, in m per unit of its modal coordinate.
         rotation: (3, n) small rotation of the cross section, in rad per unit of modal coordinate.
+        coupling: of a solid's face, "mean" or "rigid": its mean moves so, or all of it; empty where nothing says so.
     """
 
     position: Array
     translation: Array
     rotation: Array
+    coupling: str = ""
 
     def __post_init__(self) -> None:
         freeze(self)

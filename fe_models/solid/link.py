@@ -19,7 +19,7 @@ from ...mesh.compat import lagrange_element, node_map
 from ...mesh.defaults import default_order
 from ...mesh.interval import with_points
 from ...mesh.solid_mesh import SolidMesh, solid_mesh
-from ..link_records import HOLDING_ROOT, SolidLink
+from ..link_records import HOLDING_ROOT, Coupling, SolidLink
 from ..modal_body import Interface, ModalBody, PictureMesh, Stations
 from ..modal_body.damping import damping_ratio
 from ..modal_body.lumped_masses import lump_weights, lumps, with_lumped_loads, with_lumped_masses, with_lumped_stiffness
@@ -51,17 +51,18 @@ HELD = {
 
 
 class Places(NamedTuple):
-    """The interfaces by name: their mean motion, of modes and as rows B (6, 3 owned)."""
+    """The interfaces by name: their mean motion, of modes and as rows B (6, 3 owned), and their couplings."""
 
     averages: dict[str, Averages]
     rows: dict[str, Array]
+    couplings: dict[str, Coupling]
 
     def motion(self, model: SolidModel, modes: Array) -> dict[str, Interface]:
         """What `modes` (3 (owned + ghosts), n) do at each; collective."""
         found = {}
         for name, averages in self.averages.items():
             translation, rotation = averages.of(model, modes)
-            found[name] = Interface(averages.centroid[0], translation[0], rotation[0])
+            found[name] = Interface(averages.centroid[0], translation[0], rotation[0], self.couplings[name])
         return found
 
 
@@ -185,23 +186,21 @@ def _places(link: SolidLink, model: SolidModel, solid: SolidMesh) -> Places:
     faces = [name for name in ("root", "tip", *(record.name for record in link.interface)) if name not in sections]
     averages = {name: face_averages(model, solid.facet_tags, [solid.faces[name]]) for name in dict.fromkeys(faces)}
     averages |= {name: section_averages(model, np.array([x])) for name, x in sections.items()}
-    return Places(averages, {name: one.rows(model)[0] for name, one in averages.items()})
+    return Places(averages, {name: one.rows(model)[0] for name, one in averages.items()}, link.couplings)
 
 
 def _held(link: SolidLink, model: SolidModel, solid: SolidMesh, places: Places, path: Path) -> Flexibility:
     """The body held by its reference condition, faces with rigid coupling made plates."""
     held = HELD[link.reference.condition]
-    plates = {record.name for record in link.interface if record.coupling == "rigid"}
-    if link.coupling == "rigid":
-        plates |= {name for name, components in held.items() if components}
+    plates = sorted(name for name, coupling in link.couplings.items() if coupling == "rigid")
     faces, taken = [], np.zeros(model.owned, dtype=bool)
-    for name in sorted(plates):
+    for name in plates:
         nodes = fem.locate_dofs_topological(model.V, 2, solid.facet_tags.find(solid.faces[name]))
         own = nodes[nodes < model.owned]
         if model.total(np.array([np.sum(taken[own])]))[0]:
             raise InputError(
                 f"{path}: interface.coupling of {name}: expected rigid faces that do not touch each other "
-                f"({', '.join(sorted(plates))}), found nodes that two of them share"
+                f'({", ".join(plates)}), found nodes that two of them share: coupling = "mean" lets a face deform'
             )
         taken[own] = True
         supported = held.get(name, ()) if link.coupling == "rigid" else ()

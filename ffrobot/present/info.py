@@ -15,7 +15,7 @@ from rich.table import Table
 from ..common.arrays import Array, as_floats
 from ..common.errors import InputError
 from ..common.hdf5 import open_checked
-from ..fe_models.modal_body import ModalBody
+from ..fe_models.modal_body import Interface, ModalBody
 from ..fe_models.modal_body_file import FORMAT as MODAL_FORMAT
 from ..fe_models.modal_body_file import read_modal_body
 from ..results.control import read_metrics
@@ -52,7 +52,8 @@ def _modal_body(body: ModalBody) -> str:
         f"modal body {body.name!r}: {body.kind}, {body.reference_condition} reference condition, {body.length:g} m",
         f"made by ffrobot {body.ffrobot_version} from input {body.input_hash[:12]}",
         f"mass {body.mass:.6g} kg, center of mass {center}",
-        "interfaces: " + ", ".join(f"{name} at {_place(body, i.position)}" for name, i in body.interfaces.items()),
+        "interfaces: "
+        + ", ".join(f"{name} at {_place(body, i.position)}{_of(i)}" for name, i in body.interfaces.items()),
         f"stations: {len(body.stations.position)} along the axis",
         f"geometric stiffness: {', '.join(body.geometric_stiffness) or 'none'}",
         *_optional(body),
@@ -72,6 +73,10 @@ def _modes(body: ModalBody) -> Table:
             row.insert(1, f"{computed[k]:.6f}")
         table.add_row(f"{k + 1}", kind, *row)
     return table
+
+
+def _of(interface: Interface) -> str:
+    return f" ({interface.coupling})" if interface.coupling else ""
 
 
 def _place(body: ModalBody, position: Array) -> str:
