@@ -20,12 +20,12 @@ import numpy as np
 from ...common.arrays import Array, Integers
 from ...common.errors import InputError
 from ..link_records import FAMILIES, Family
-from .attachment_modes import COMPONENTS, uncoupled
+from .attachment_modes import COMPONENTS, ascending, uncoupled
 from .body import ModalBody
 from .parts import Interface
 from .tensors import LEVI_CIVITA
 
-ROOT = "root"
+CONDITION, ROOT = "craig-bampton", "root"
 AXES = ("x", "y", "z", "rx", "ry", "rz")
 
 
@@ -62,8 +62,8 @@ def in_order(K: Array, families: Sequence[str], is_static: Sequence[bool]) -> Mo
         static = int(np.count_nonzero(of[np.array(is_static)] == family))
         own = np.flatnonzero(of_modes == family)
         residual[own[np.argsort(squares[own], kind="stable")][own.size - static :]] = 1
-    # Equal frequencies of different families are ordered by these, not by rounding.
-    order = sorted(range(of.size), key=lambda k: (residual[k], float(f"{squares[k]:.6e}"), of_modes[k]))
+    order = ascending(squares, of_modes)
+    order = order[np.argsort(residual[order], kind="stable")]
     return ModesInOrder(squares[order], [FAMILIES[of_modes[k]] for k in order], turn[:, order], residual[order])
 
 
@@ -82,6 +82,30 @@ class InterfaceCoordinates:
     rows: Array
     constraint: Array
     fixed: Array
+
+
+# Of the largest motion of its kind: less is rounding, of a coordinate that modes do not move.
+IMMOBILE = 1e-9
+INDEPENDENT = 1e-6  # singular values of interface coordinates, each scaled to 1
+
+
+def constraint_modes(omega2: Array, families: Sequence[str], interfaces: Mapping[str, Interface]) -> int:
+    """How many of n modes stand for unit motions of interfaces; 0 where interfaces cannot move so by themselves.
+
+    For bodies of other programs, whose modes say no more than ω² (n,), families, and what they do at interfaces.
+    """
+    families = [str(family) for family in families]
+    moving = {k for family in FAMILIES if family in families for k in COMPONENTS[family]}
+    others = [at for name, at in interfaces.items() if name != ROOT]
+    rows = np.concatenate([np.concatenate([at.translation, at.rotation]) for at in others]) / np.sqrt(omega2)
+    size = np.linalg.norm(rows, axis=1).reshape(-1, 2, 3)
+    moved = (size > IMMOBILE * size.max(axis=(0, 2), keepdims=True)).ravel()
+    expected = np.tile([k in moving for k in range(6)], len(others))
+    if not np.array_equal(moved, expected):
+        return 0
+    values = np.linalg.svd(rows[moved] / size.ravel()[moved, None], compute_uv=False)
+    count = int(np.count_nonzero(values > INDEPENDENT * values.max(initial=0.0)))
+    return count if count == np.count_nonzero(moved) else 0
 
 
 def interface_coordinates(
@@ -155,6 +179,8 @@ def craig_bampton(body: ModalBody) -> CraigBampton:
     frame = np.zeros((6, recovery.shape[1]))
     frame[:, :6] = np.eye(6)
     turn = np.einsum("akl,kln->an", LEVI_CIVITA, body.I_bar)  # ∫ρ x × Φ dV
+    if body.h_spin is not None:
+        turn[0] += body.h_spin  # of a line of mass, about itself
     coupling = np.concatenate([body.S_bar, turn])
     cross = frame.T @ coupling @ recovery
     mass = frame.T @ _rigid_mass(body) @ frame + cross + cross.T + recovery.T @ recovery
@@ -178,4 +204,5 @@ def _rigid_mass(body: ModalBody) -> Array:
     coupling = np.einsum("akl,k->al", LEVI_CIVITA, body.first_moment)  # ∫ρ x × e_l dV, (rotation, translation)
     second = body.second_moment
     J = np.trace(second) * np.eye(3) - second
+    J[0, 0] += body.J_spin or 0.0
     return np.asarray(np.block([[body.mass * np.eye(3), coupling.T], [coupling, J]]))

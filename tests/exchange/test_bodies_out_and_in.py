@@ -13,6 +13,7 @@ from ffrobot.exchange.bodies.exudyn import exudyn_file
 from ffrobot.exchange.bodies.integrals import integrals_of
 from ffrobot.exchange.bodies.mbdyn import fem_text, read_fem
 from ffrobot.exchange.bodies.sid import read_sid, sid_text
+from ffrobot.fe_models.modal_body.craig_bampton import craig_bampton
 from ffrobot.fe_models.modal_body_file import read_modal_body, write_modal_body
 
 LINK = {
@@ -213,11 +214,44 @@ def test_craig_bampton_matrices(bodies, tmp_path):
     assert np.sum(np.linalg.eigvalsh(file["K"]) > 1e-7 * np.abs(file["K"]).max() * 1e-3) == len(file["K"]) - 6
     inertia = rigid.T @ file["M"] @ rigid
     np.testing.assert_allclose(inertia[:3, :3], body.mass * np.eye(3), atol=1e-12)
-    J = np.trace(body.second_moment) * np.eye(3) - body.second_moment
+    J = np.trace(body.second_moment) * np.eye(3) - body.second_moment + np.diag([body.J_spin, 0.0, 0.0])
     np.testing.assert_allclose(inertia[3:, 3:], J, atol=1e-12)
     moved = (file["recovery"] @ rigid).reshape(-1, 3, 6)
     np.testing.assert_allclose(moved[:, :, :3], np.broadcast_to(np.eye(3), moved[:, :, :3].shape), atol=1e-9)
     np.testing.assert_allclose(moved[:, :, 5], np.cross([0, 0, 1.0], file["points"]), atol=1e-9)
+
+
+@pytest.mark.parametrize("form", FORMATS)
+@pytest.mark.parametrize("family", ["all", ["in-plane-bending", "axial"]])
+def test_craig_bampton_bodies_out_and_in(tmp_path, form, family):
+    """The same modes, and the same matrices of interfaces and fixed-interface modes (but for signs of these)."""
+    section = {"shape": "rectangle", "height": 0.02, "width": 0.013}
+    link = HELD | {
+        "geometry": {"kind": "beam", "length": 0.6, "section": section},
+        "modes": {"count": 4, "family": family},
+        "interface": [{"name": "middle", "position": 0.25}],
+    }
+    body = make_link(link).body
+    write, read = FORMATS[form]
+    write_modal_body(tmp_path / "back.h5", read(write(body)[0], "arm")[0])
+    back = read_modal_body(tmp_path / "back.h5")
+    assert back.reference_condition == "craig-bampton"
+    assert back.residual.tolist() == body.residual.tolist()
+    assert max(differences(body, back, KEPT).values()) < 1e-9
+    first, second = craig_bampton(body), craig_bampton(back)
+    order = [second.coordinates.index(name) for name in first.coordinates]
+    for matrix, other in ((first.mass, second.mass), (first.stiffness, second.stiffness)):
+        size = np.sqrt(np.abs(np.diag(matrix)).max())
+        np.testing.assert_allclose(np.abs(other[np.ix_(order, order)]), np.abs(matrix), atol=1e-8 * size**2)
+
+
+def test_craig_bampton_bodies_whose_interfaces_say_too_little(bodies):
+    """More interfaces than modes can move by themselves: the root holds them all the same."""
+    text, _ = sid_text(bodies["held"])
+    named = "ffrobot: craig-bampton; root=1, tip=25, a=5, b=9"
+    back, _ = read_sid(re.sub(r"ffrobot: craig-bampton; .*", named, text, count=1), "a")
+    assert back.reference_condition == "cantilever"
+    assert not back.residual.any()
 
 
 def test_exudyn_matrices_are_those_of_its_own_assembly(bodies, tmp_path):

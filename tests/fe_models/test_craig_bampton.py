@@ -166,3 +166,37 @@ def test_interfaces_at_one_place_are_refused(bar):
     near = '[[interface]]\nname = "grip"\nposition = 0.39999999\n'
     with pytest.raises(InputError, match="expected interfaces that can move by themselves"):
         bar(more=near)
+
+
+@pytest.mark.parametrize("theory", ["euler-bernoulli", "timoshenko"])
+def test_a_shaft_that_turns_about_itself(tmp_path, theory):
+    """ρI_pL [1/3, 1/6; 1/6, 1/3] of the twist of its ends; a rigid turn has ρI_pL, and no motion is without energy."""
+    length, height, width, rho = 0.6, 0.02, 0.01, 2700.0
+    path = tmp_path / "shaft.toml"
+    path.write_text(f"""
+        name = "shaft"
+        material = {{ youngs_modulus = 70e9, poissons_ratio = 0.33, density = {rho} }}
+        [geometry]
+        kind = "beam"
+        length = {length}
+        section = {{ shape = "rectangle", height = {height}, width = {width} }}
+        [mesh]
+        elements = 20
+        [model]
+        theory = "{theory}"
+        [reference]
+        condition = "craig-bampton"
+        [modes]
+        count = 12
+    """)
+    found = craig_bampton(make_link(path).body)
+    spin = rho * (height * width**3 + width * height**3) / 12 * length
+    ends = [found.coordinates.index(name) for name in ("root/rx", "tip/rx")]
+    expected = spin * np.array([[1 / 3, 1 / 6], [1 / 6, 1 / 3]])
+    np.testing.assert_allclose(found.mass[np.ix_(ends, ends)], expected, rtol=1e-6)
+    turn = np.zeros(len(found.coordinates))
+    turn[ends] = 1.0
+    assert turn @ found.mass @ turn == pytest.approx(spin, rel=1e-9)
+    assert np.abs(found.stiffness @ turn).max() < 1e-9 * np.abs(found.stiffness).max()
+    scale = np.sqrt(np.diag(found.mass))
+    assert np.linalg.eigvalsh(found.mass / np.outer(scale, scale))[0] > 1e-6

@@ -15,9 +15,8 @@ from ...common.arrays import Array
 from ...common.errors import InputError
 from ...common.rotations import skew
 from ...fe_models.modal_body import ModalBody
-from ...fe_models.modal_body.craig_bampton import AXES, ROOT, craig_bampton
+from ...fe_models.modal_body.craig_bampton import AXES, CONDITION, ROOT, craig_bampton
 
-CONDITION = "craig-bampton"
 REMARKS = (
     "not carried by Craig–Bampton matrices: centrifugal and Coriolis terms of the deformation, geometric stiffness",
 )

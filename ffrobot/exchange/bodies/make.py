@@ -13,6 +13,8 @@ from ...common.arrays import Array
 from ...common.errors import InputError
 from ...common.version import program_version
 from ...fe_models.modal_body import Interface, ModalBody, PictureMesh, Stations
+from ...fe_models.modal_body.craig_bampton import CONDITION as CRAIG_BAMPTON
+from ...fe_models.modal_body.craig_bampton import constraint_modes
 from .integrals import Node, ShapeIntegrals, interfaces_of, section_inertia
 
 ORTHONORMAL = 1e-12  # of M_e = E and of K_e diagonal: then modes stay as they are
@@ -40,18 +42,23 @@ def modal_body(
     sections = section_inertia(found)
     S_bar_kl[2, 2] += sections["S_spin"]  # as `ModalBody` books it
     omega = np.sqrt(omega2)
+    families = _families(S_bar_kl, np.asarray(sections["S_spin"]))
+    constraint = constraint_modes(omega2, families, interfaces) if condition == CRAIG_BAMPTON else 0
+    if condition == CRAIG_BAMPTON and not constraint:
+        condition = "cantilever"  # which holds the root alike
     return ModalBody(
         name=name,
         kind="beam" if sections["J_spin"] else "solid",
         reference_condition=condition or _condition(interfaces),
         length=length,
+        residual=np.repeat([0, 1], [found.n_modes - constraint, constraint]),
         mass=found.mass,
         first_moment=found.first_moment,
         frequency=omega / (2 * np.pi),
         stiffness=np.diag(omega2),
         modal_mass=np.eye(found.n_modes),
         damping_ratio=np.diag(found.damping) / (2 * omega),
-        family=_families(S_bar_kl, np.asarray(sections["S_spin"])),
+        family=families,
         S_bar=found.S_bar,
         I_bar=_without_sections(found, np.asarray(sections["h_spin"])),
         S_bar_kl=S_bar_kl,
