@@ -7,7 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
-from ..common.errors import InputError, SolveError, of_file
+import numpy as np
+
+from ..common.errors import InputError
 from ..common.files import check_new_file, check_new_folder, check_output, write_atomically
 from ..common.outputs import check_not_an_input
 from ..common.toml_files import read_text
@@ -168,10 +170,12 @@ def import_body(path: Path, output: Path) -> Exported:
     """
     text = read_text(path, "file of a flexible body")
     try:
-        with of_file(path):
+        with np.errstate(over="raise", divide="raise", invalid="raise"):
             body, remarks = READERS[path.suffix.lower()](text, path.stem)
-    except (InputError, SolveError) as error:  # of a point "tip.x", say, whose name looks like that of a file
-        raise type(error)(str(error) if str(error).startswith(f"{path}:") else f"{path}: {error}") from None
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
+    except (FloatingPointError, np.linalg.LinAlgError) as error:
+        raise InputError(f"{path}: expected numbers of a body, found ones that are too large: {error}") from None
     check_output(output, FORMAT)
     write_modal_body(output, body)
     return Exported(output, f"{body.name}, {body.modes_in_words}, interfaces {', '.join(body.interfaces)}", remarks)

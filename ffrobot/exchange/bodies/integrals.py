@@ -9,13 +9,15 @@ codes, Mech. Struct. Mach. 22, 1994, 283–304), to first order in the modal coo
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import re
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ...common.arrays import Array, as_floats
 from ...common.errors import InputError
+from ...common.tables import shown
 from ...fe_models.modal_body import Interface, ModalBody
 from ...fe_models.modal_body.tensors import LEVI_CIVITA
 from ...mbs.model.spatial_body import from_modal_body
@@ -200,6 +202,27 @@ def nodes_of(body: ModalBody) -> tuple[list[Node], dict[str, int]]:
             nodes.append(Node(same := len(nodes) + 1, at))
         numbers[name] = same
     return nodes, numbers
+
+
+NOTE = re.compile(r"ffrobot: (?P<condition>[\w-]+); (?P<numbers>.*)")
+
+
+def noted(text: str, nodes: Sequence[Node]) -> tuple[str | None, dict[str, int]]:
+    """Reference condition and number of each interface, where this program wrote them into `text`; None and {} else.
+
+    Raises:
+        InputError: they are no numbers of `nodes`.
+    """
+    match = NOTE.search(text)
+    if match is None:
+        return None, {}
+    numbers, known = dict[str, int](), {node.number for node in nodes}
+    for pair in match["numbers"].strip().split(", "):
+        name, _, number = pair.rpartition("=")
+        if not name or not number.isdecimal() or int(number) not in known:
+            raise InputError(f'interfaces: expected NAME=NUMBER of nodes in the file, found "{shown(pair)}"')
+        numbers[name] = int(number)
+    return match["condition"], numbers
 
 
 def _is_same(first: Interface, second: Interface) -> bool:

@@ -18,11 +18,10 @@ from ...common.errors import InputError
 from ...common.tables import shown
 from ...fe_models.modal_body import Interface, ModalBody
 from ...fe_models.modal_body.tensors import LEVI_CIVITA
-from .integrals import Node, ShapeIntegrals, integrals_of, nodes_of, slopes, with_agreed_masses
+from .integrals import Node, ShapeIntegrals, integrals_of, nodes_of, noted, slopes, with_agreed_masses
 from .make import NOT_IN_THE_FILE, modal_body
 
 GROUP = re.compile(r"\*\*\s*RECORD GROUP\s+(\d+)")
-NOTE = re.compile(r"\*\* ffrobot: (?P<condition>[\w-]+); (?P<numbers>.*)")
 TITLES = {
     2: "FINITE ELEMENT NODE LIST", 3: "INITIAL MODAL DISPLACEMENTS", 4: "INITIAL MODAL VELOCITIES",
     5: "NODAL X COORDINATES", 6: "NODAL Y COORDINATES", 7: "NODAL Z COORDINATES", 9: "MODAL MASS MATRIX",
@@ -118,11 +117,7 @@ def read_fem(text: str, name: str) -> tuple[ModalBody, tuple[str, ...]]:
         Node(label, Interface(place, phi[:3], phi[3:]))
         for label, place, phi in zip(labels, x, shapes.transpose(1, 2, 0), strict=True)
     ]
-    match = next((hit for line in text.splitlines()[:5] if (hit := NOTE.match(line))), None)
-    numbers, condition = dict[str, int](), None
-    if match is not None:
-        pairs = (pair.rpartition("=") for pair in match["numbers"].split(", "))
-        numbers, condition = {key: int(number) for key, _, number in pairs}, match["condition"]
+    condition, numbers = noted("\n".join(line for line in text.splitlines()[:5] if line.startswith("**")), nodes)
     found, told = with_agreed_masses(found)
     return modal_body(name, found, nodes, numbers, condition), (*remarks, *told)
 

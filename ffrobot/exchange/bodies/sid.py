@@ -6,7 +6,6 @@ Read in other dialects too: J as (3, 3), M1 as (row, column, mode).
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator
 
 import numpy as np
@@ -14,13 +13,12 @@ import numpy as np
 from ...common.arrays import Array
 from ...common.errors import InputError
 from ...fe_models.modal_body import Interface, ModalBody
-from .integrals import Node, ShapeIntegrals, integrals_of, nodes_of, with_agreed_masses
+from .integrals import Node, ShapeIntegrals, integrals_of, nodes_of, noted, with_agreed_masses
 from .make import NOT_IN_THE_FILE, modal_body
 from .sid_text import Layout, Section, Taylor, fortran, layout_of, lines_of, parse, taylor
 
 ROWS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 """Entries of a symmetric matrix in the six rows of J."""
-NOTE = re.compile(r"ffrobot: (?P<condition>[\w-]+); (?P<numbers>.*)")
 LARGEST_ASYMMETRY = 1e-6  # of C_r's M1: a symmetric part is geometric stiffness, or wrong
 SAME = 1e-3  # symmetric parts of G_e and C_r, of the largest
 
@@ -101,11 +99,7 @@ def read_sid(text: str, name: str) -> tuple[ModalBody, tuple[str, ...]]:
     nodes = [_node(section, layout) for section in modal["frame"].inside if section.name == "node"]
     if not nodes:
         raise InputError("frame: expected at least one node, found none")
-    match = NOTE.search(head)
-    numbers, condition = dict[str, int](), None
-    if match is not None:
-        pairs = (pair.rpartition("=") for pair in match["numbers"].split(", "))
-        numbers, condition = {key: int(number) for key, _, number in pairs}, match["condition"]
+    condition, numbers = noted(head, nodes)
     agreed, told = with_agreed_masses(found)
     remarks = (NOT_IN_THE_FILE, *told, *_checks(modal, found, layout))
     return modal_body(name, agreed, nodes, numbers, condition), remarks
@@ -118,13 +112,15 @@ def _modal(top: Section) -> Section:
 
 def _node(section: Section, layout: Layout) -> Node:
     number = int(section.number("number"))
-    phi, psi = (taylor(section[key], layout).m0 for key in ("phi", "psi"))
-    return Node(number, Interface(taylor(section["origin"], layout).m0[:, 0], phi, psi))
+    phi, psi = (taylor(section[key], layout, (3, layout.modes)).m0 for key in ("phi", "psi"))
+    return Node(number, Interface(taylor(section["origin"], layout, (3, 1)).m0[:, 0], phi, psi))
 
 
 def _integrals(modal: Section, layout: Layout) -> ShapeIntegrals:
-    mdCM, J, Cr, Oe = (taylor(modal[key], layout) for key in ("mdCM", "J", "Cr", "Oe"))
-    Me, Ke, De = (taylor(modal[key], layout).m0 for key in ("Me", "Ke", "De"))
+    n = layout.modes
+    mdCM, J = taylor(modal["mdCM"], layout, (3, 1)), taylor(modal["J"], layout, (6, 1), (3, 3))
+    Cr, Oe = taylor(modal["Cr"], layout, (n, 3)), taylor(modal["Oe"], layout, (n, 6))
+    Me, Ke, De = (taylor(modal[key], layout, (n, n)).m0 for key in ("Me", "Ke", "De"))
     J0, J1 = _inertia(J)
     slope = Cr.m1.transpose(2, 0, 1)
     if _symmetric_part(slope, Me) is not None and not _is_in_both(modal, slope, layout):
@@ -169,7 +165,8 @@ def _inertia(J: Taylor) -> tuple[Array, Array]:
 
 def _checks(modal: Section, found: ShapeIntegrals, layout: Layout) -> Iterator[str]:
     """What the file says twice, held against itself: a line each where it differs."""
-    Gr = taylor(modal["Gr"], layout).m0
+    n = layout.modes
+    Gr = taylor(modal["Gr"], layout, (3, 3 * n)).m0
     wanted = found.inertia_slope
     layouts = (Gr.reshape(3, layout.modes, 3).transpose(0, 2, 1), Gr.reshape(3, 3, layout.modes))
     scale = max(float(np.abs(wanted).max(initial=0.0)), 1e-300)
@@ -183,7 +180,7 @@ def _checks(modal: Section, found: ShapeIntegrals, layout: Layout) -> Iterator[s
             " and geometric stiffness would have in Cr alone: left out"
         )
     identities = (
-        ("Ct", taylor(modal["Ct"], layout).m0, found.S_bar.T, "the slope of mdCM"),
+        ("Ct", taylor(modal["Ct"], layout, (n, 3)).m0, found.S_bar.T, "the slope of mdCM"),
         ("Oe", taylor(modal["Oe"], layout).m0, found.centrifugal, "−½ and −1 times the slope of J"),
     )
     for name, given, expected, what in identities:

@@ -96,12 +96,13 @@ class Layout(NamedTuple):
     mode_is_last: bool
 
 
-def taylor(section: Section, layout: Layout) -> Taylor:
-    """The matrix of an object."""
+def taylor(section: Section, layout: Layout, *sizes: tuple[int, int]) -> Taylor:
+    """The matrix of an object, which has one of these numbers of rows and columns; any where none is given."""
     modes = layout.modes
     nrow, ncol = (int(section.number(key)) for key in ("nrow", "ncol"))
-    if not (nrow > 0 and ncol > 0 and nrow * ncol * (modes + 1) <= MOST):
-        raise InputError(f"{section.name}: expected a matrix, found {nrow} rows and {ncol} columns")
+    if not (nrow > 0 and ncol > 0 and nrow * ncol * (modes + 1) <= MOST) or (sizes and (nrow, ncol) not in sizes):
+        wanted = " or ".join(f"{rows} × {columns}" for rows, columns in sizes) or "rows × columns"
+        raise InputError(f"{section.name}: expected a matrix of {wanted}, found nrow = {nrow}, ncol = {ncol}")
     found = Taylor(np.zeros((nrow, ncol)), np.zeros((nrow, modes, ncol)))
     structure = int(section.number("structure"))
     if structure == IDENTITY:
@@ -123,7 +124,10 @@ def _entries(section: Section) -> Iterator[tuple[int, tuple[int, ...], float]]:
     """Order, indices from 0, value."""
     for key, value in section.keys.items():
         if match := ENTRY.fullmatch(key):
-            index = tuple(int(part) - 1 for part in match[2].split(","))
+            try:
+                index = tuple(int(part) - 1 for part in match[2].split(","))
+            except ValueError:
+                raise InputError(f'{section.name}: expected whole numbers in indices, found "{shown(key)}"') from None
             yield int(match[1]), index, real(value, f"{section.name}: {key}")
 
 

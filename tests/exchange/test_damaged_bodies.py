@@ -1,0 +1,80 @@
+"""Damaged SID and .fem files: read, or refused in one line; numbers that no body has, in modal body files."""
+
+import re
+import warnings
+
+import h5py
+import numpy as np
+import pytest
+from mutated_bodies import campaign, texts
+
+import ffrobot
+from ffrobot.common.errors import InputError
+from ffrobot.exchange.export import import_body
+from ffrobot.fe_models.modal_body_file import read_modal_body
+
+
+def test_random_changes(tmp_path):
+    counts, bad = campaign(300, "suite", tmp_path)
+    assert not bad, "\n".join(bad)
+    assert min(counts["read"], counts["refused"]) > 30
+
+
+@pytest.fixture(scope="module")
+def given():
+    return texts()
+
+
+CHANGES = {
+    "size": (".SID_FEM", r"(phi\n(?:.*\n){2}\s*ncol\s*=)\s*\d+", r"\g<1> 1", r"phi: expected a matrix of 3 × \d+"),
+    "index": (".SID_FEM", r"(mdCM\n(?:.*\n)*?\s*m0\( 1,) 1", r"\g<1> ", r"mdCM: expected whole numbers in indices"),
+    "interface": (".SID_FEM", r"tip=\d+", "tip=99", 'expected NAME=NUMBER of nodes in the file, found "tip=99"'),
+    "no number": (".fem", r"tip=\d+", "tip", 'interfaces: expected NAME=NUMBER of nodes in the file, found "tip"'),
+    "record": (".fem", r"\*\* RECORD GROUP 5", "**", r"expected a \.fem file of MBDyn with records 1, 2 and 5 to 10"),
+    "huge": (".fem", r"(RECORD GROUP 14.*\n)\S+", r"\g<1>1e200", "numbers of a body, found ones that are too large"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("suffix", "old", "new", "told"), CHANGES.values(), ids=CHANGES)
+def test_messages(given, tmp_path, suffix, old, new, told):
+    text = given["cantilever", suffix]
+    changed = re.sub(old, new, text, count=1)
+    assert changed != text
+    path = tmp_path / f"arm{suffix}"
+    path.write_text(changed)
+    with pytest.raises(InputError, match=rf"^{re.escape(str(path))}: .*{told}"):
+        import_body(path, tmp_path / "arm.h5")
+    assert not (tmp_path / "arm.h5").exists()
+
+
+DATASETS = ("mass", "second_moment", "invariants/I_bar", "interfaces/tip/rotation", "stations/position", "mesh/points")
+
+
+@pytest.mark.parametrize("dataset", DATASETS)
+@pytest.mark.parametrize(("value", "found"), [(1e300, "1e+300"), (1 + 2j, "dataset"), ("text", "dataset")])
+def test_numbers_of_modal_bodies(tmp_path, dataset, value, found):
+    """By name, and in no words of NumPy's."""
+    link = {
+        "name": "arm",
+        "material": {"youngs_modulus": 70e9, "poissons_ratio": 0.33, "density": 2700.0},
+        "geometry": {"kind": "beam", "length": 0.6, "section": {"shape": "circle", "diameter": 0.02}},
+        "mesh": {"elements": 4},
+        "reference": {"condition": "cantilever"},
+        "modes": {"count": 2},
+    }
+    path = tmp_path / "arm.h5"
+    path.write_bytes(ffrobot.make_link(link).path.read_bytes())
+    with h5py.File(path, "r+") as file:
+        del file.attrs["checksum"]  # as another program would write it
+        values = np.asarray(file[dataset][()])
+        del file[dataset]
+        if isinstance(value, str):
+            file.create_dataset(dataset, data=np.full(values.shape, value, object), dtype=h5py.string_dtype())
+        else:
+            values = values.astype(np.result_type(values, value))
+            values[(0,) * values.ndim] = value
+            file[dataset] = values
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        with pytest.raises(InputError, match=rf"^{re.escape(str(path))}: {dataset}: expected .*{re.escape(found)}"):
+            read_modal_body(path)
