@@ -42,6 +42,7 @@ _DATASETS = {
     "I_bar": "invariants/I_bar",
     "S_bar_kl": "invariants/S_bar_kl",
 }
+_KINDS = {"c": "complex ones", "O": "text", "S": "text", "V": "records"}
 # Those that files of earlier versions lack.
 _SPIN = {name: f"invariants/{name}" for name in ("J_spin", "h_spin", "S_spin")}
 _UNITS = {"length": "m", "mass": "kg", "first_moment": "kg m", "second_moment": "kg m2", "modes/frequency": "Hz"}
@@ -180,6 +181,8 @@ def _array(group: h5py.Group, name: str) -> Array:
 def _numbers(item: object) -> NDArray[Any]:
     """A dataset of whole or real numbers, none so large that products of a few were infinite."""
     name = getattr(item, "name", "").lstrip("/")
+    if isinstance(item, h5py.Dataset) and item.dtype.kind not in "fiub":
+        raise InputError(f"{name}: expected real numbers, found {_KINDS.get(item.dtype.kind, item.dtype)}")
     values = numbers(item, name)
     if np.any(np.abs(values) > LARGEST):
         worst = values.flat[np.abs(values).argmax()]

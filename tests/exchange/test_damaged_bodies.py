@@ -51,7 +51,7 @@ DATASETS = ("mass", "second_moment", "invariants/I_bar", "interfaces/tip/rotatio
 
 
 @pytest.mark.parametrize("dataset", DATASETS)
-@pytest.mark.parametrize(("value", "found"), [(1e300, "1e+300"), (1 + 2j, "dataset"), ("text", "dataset")])
+@pytest.mark.parametrize(("value", "found"), [(1e300, "1e+300"), (1 + 2j, "complex ones"), ("text", "text")])
 def test_numbers_of_modal_bodies(tmp_path, dataset, value, found):
     """By name, and in no words of NumPy's."""
     link = {
