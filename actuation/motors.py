@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..common.arrays import Array, Booleans, as_floats
+from ..common.peaks import largest, root_mean_square, shares
 from ..mbs._core import TimeFunction
 from ..mbs.analysis.motors_only import InvertedPath
 from ..mbs.analysis.outcome import Outcome
@@ -17,6 +18,7 @@ from ..mbs.quantities.joint_motion import joint_motions, motor_motion
 
 SHORT = 0.01  # of the time: a peak that lasts less is one of its own
 APART = 1.1  # times the moment of the other 99 % of the time: likewise
+NEARBY = 1e-3  # of the path's duration: a jump of the path this near to a peak may have made it
 INSTANT = 1e-4  # of the path's duration: over which one-sided derivatives are taken
 JUMP = 0.05  # of the largest acceleration or jerk of the path: less is none
 
@@ -28,9 +30,9 @@ class MotorFeasibility:
     Attributes:
         moment, speed, power: largest absolute values.
         saturation_time: when a limit is first exceeded, s; NaN where none is.
-        rms_moment: root mean square over the run: losses in the windings go with its square, so that a constant moment
-            of this size heats the motor as much (the thermal-equivalent moment).
-        usual_moment: that is not exceeded for 99 % of the time.
+        rms_moment: root mean square over the path, from t = 0 to the end of the analysis: losses in the windings go
+            with its square, so that a constant moment of this size heats the motor as much (thermal-equivalent moment).
+        usual_moment: that is not exceeded for 99 % of the time, pre- and post-actuation included.
         moment_time: when the moment is largest, s.
         share_beyond: of the time that any of them is.
         jump: "acceleration" or "jerk" of the path where that jumps at a short peak which follows from it; else "".
@@ -88,22 +90,26 @@ def judge_motors(outcome: Outcome, joints: Mapping[str, JointRecord]) -> dict[st
 
 
 def _judge(outcome: Outcome, joint: JointRecord, moment: Array, rate: Array) -> MotorFeasibility:
-    judged = judge_motion(outcome.time, moment, rate, joint.motor_limits)
-    return replace(judged, jump=path_jump(outcome, int(np.abs(moment).argmax()))) if judged.has_spike else judged
+    judged = judge_motion(outcome.time, moment, rate, joint.motor_limits, outcome.analysis.last_time)
+    return replace(judged, jump=path_jump(outcome, judged.moment_time)) if judged.has_spike else judged
 
 
-def judge_motion(time: Array, moment: Array, rate: Array, limits: MotorLimits) -> MotorFeasibility:
-    """What a motor has to do that gives `moment` (T,) at `rate` (T,) of its joint over `time` (T,); SI units."""
-    size, speed, power = np.abs(moment), np.abs(rate), np.abs(moment * rate)
-    beyond = (size > limits.moment) | (speed > limits.speed) | (power > limits.power)
-    shares, peak, usual = _shares(time), int(size.argmax()), _not_exceeded(time, size, 1.0 - SHORT)
+def judge_motion(time: Array, moment: Array, rate: Array, limits: MotorLimits, end: float) -> MotorFeasibility:
+    """What a motor has to do that gives `moment` (T,) at `rate` (T,) of its joint over `time` (T,); SI units.
+
+    Root mean square and shares of time are those from 0 to `end` (s), without what comes before and after the path.
+    """
+    (peak, at), (speed, _), (power, _) = (largest(time, values) for values in (moment, rate, moment * rate))
+    beyond = (np.abs(moment) > limits.moment) | (np.abs(rate) > limits.speed) | (np.abs(moment * rate) > limits.power)
+    path = (time >= 0.0) & (time <= end)
+    on_path = time[path]
     return MotorFeasibility(
-        float(size[peak]), limits.moment, float(speed.max()), limits.speed, float(power.max()), limits.power,
-        float(first_time(time, beyond[:, None])[0]),
-        rms_moment=float(np.sqrt(shares @ moment**2)),
-        usual_moment=usual,
-        moment_time=float(time[peak]),
-        share_beyond=float(shares @ beyond),
+        peak, limits.moment, speed, limits.speed, power, limits.power,
+        float(first_time(time, beyond[:, None])[0]) if beyond.any() or peak <= limits.moment else at,
+        rms_moment=root_mean_square(on_path, moment[path]),
+        usual_moment=_not_exceeded(time, np.abs(moment), 1.0 - SHORT),
+        moment_time=at,
+        share_beyond=float(shares(on_path) @ beyond[path]),
     )  # fmt: skip
 
 
@@ -112,16 +118,16 @@ def first_time(time: Array, beyond: Booleans) -> Array:
     return np.where(beyond.any(axis=0), time[beyond.argmax(axis=0)], np.nan)
 
 
-def path_jump(outcome: Outcome, output: int) -> str:
-    """Which derivative of a trajectory jumps within one output of the given one, if moments follow from it.
+def path_jump(outcome: Outcome, at: float) -> str:
+    """Which derivative of a trajectory jumps near the time `at` (s), if moments follow from it.
 
     "acceleration", in motors-only analyses "jerk" too, else "": a path is held before t = 0 and after its end.
     """
-    end, time = outcome.analysis.last_time, outcome.time
-    if end <= 0.0 or len(time) < 2:
+    end = outcome.analysis.last_time
+    if end <= 0.0 or len(outcome.time) < 2:
         return ""
     h = INSTANT * end
-    near = time[max(0, output - 1) : output + 2]
+    near = NEARBY * end * (round(at / end / NEARBY) + np.arange(-1.0, 2.0))
     for target in (constraint.target for constraint in outcome.assembly.model.trajectories):
 
         def acceleration(t: Array, target: TimeFunction = target) -> Array:
@@ -141,17 +147,8 @@ def path_jump(outcome: Outcome, output: int) -> str:
     return ""
 
 
-def _shares(time: Array) -> Array:
-    """What each output stands for of the time (T,), by the trapezoidal rule; 1 of a single one."""
-    if len(time) == 1:
-        return np.ones(1)
-    steps = np.diff(time)
-    shares: Array = (np.append(steps, 0.0) + np.append(0.0, steps)) / (2 * (time[-1] - time[0]))
-    return shares
-
-
 def _not_exceeded(time: Array, values: Array, share: float) -> float:
     """The value that is exceeded for no more than the rest of the time."""
     order = np.argsort(values)
-    part = np.cumsum(_shares(time)[order])
+    part = np.cumsum(shares(time)[order])
     return float(values[order][min(int(np.searchsorted(part, share)), len(values) - 1)])

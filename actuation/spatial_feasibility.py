@@ -94,6 +94,7 @@ def judge_in_space(
     links: Mapping[str, LinkInMotion],
     patches: Mapping[str, LinkPatches],
     voltages: Mapping[str, Voltages],
+    end: float,
 ) -> tuple[Feasibility, UnsuppliedInSpace | None]:
     """Required against available of motors by joint ("JOINT 2" of a second coordinate) and of patches by layout."""
     judged: dict[str, PatchFeasibility] = {}
@@ -105,11 +106,11 @@ def judge_in_space(
             trial = partial(with_count, path, array.layout, link.modal, link.spatial)
             modal = ModalMotion(motion.time, modes.coordinates(link.p), modes.forces(link.F_p))
             judged[name] = judge_patches(array, voltages[name], modal, trial)
-    return Feasibility(judge_motors_in_space(motion), judged), unsupplied_in_space(links, patches, voltages)
+    return Feasibility(judge_motors_in_space(motion, end), judged), unsupplied_in_space(links, patches, voltages)
 
 
-def judge_motors_in_space(motion: SpatialMotion) -> dict[str, MotorFeasibility]:
-    """What the motors have to do against their limits; those of several coordinates have a number behind the joint."""
+def judge_motors_in_space(motion: SpatialMotion, end: float) -> dict[str, MotorFeasibility]:
+    """What the motors have to do up to the `end` (s) of the path; a number behind the joint tells coordinates apart."""
     forces, found = motion.motor_forces, {}
     assert forces is not None
     for joint in motion.model.scene.motor_joints:
@@ -119,7 +120,7 @@ def judge_motors_in_space(motion: SpatialMotion) -> dict[str, MotorFeasibility]:
         moments, rates = forces.moments[joint.name], of_joint[1] if motor is None else motor[1][:, None]
         for k, limits in enumerate(joint.motor_limits):
             name = joint.name if len(joint.units) == 1 else f"{joint.name} {k + 1}"
-            found[name] = judge_motion(motion.time, moments[:, k], rates[:, k], limits)
+            found[name] = judge_motion(motion.time, moments[:, k], rates[:, k], limits, end)
     return found
 
 

@@ -255,12 +255,14 @@ def test_verdict_says_what_the_file_holds(folder, tmp_path, capsys):
     found = results.verdict["inverse"]
     moment, deflection = results["inverse/joints/shoulder/moment"], results["inverse/points/arm.tip/deflection"]
     motor = found.motors["shoulder"]
-    assert motor.moment == np.abs(moment).max() > 0.4
+    assert motor.moment == results.attributes("inverse/joints/shoulder/moment")["peak"] > 0.4
+    assert motor.moment == pytest.approx(np.abs(moment).max(), rel=1e-5)  # of outputs, which may miss the top
     square = (moment[1:] ** 2 + moment[:-1] ** 2).mean() / 2
-    assert motor.rms_moment == pytest.approx(np.sqrt(square), rel=1e-9)
+    assert motor.rms_moment == pytest.approx(np.sqrt(square), rel=1e-5)
     assert found.feasible is False
     assert found.answer.startswith("beyond their limits: motor shoulder (factor ")
-    assert found.deflection == (np.linalg.norm(deflection, axis=1).max(), "arm.tip", pytest.approx(0.0))
+    largest = pytest.approx(np.linalg.norm(deflection, axis=1).max(), rel=1e-5)
+    assert found.deflection == (largest, "arm.tip", pytest.approx(0.0, abs=5e-4))
     assert any("slower path" in text for text in found.advice)
     (folder / "limited.toml").write_text(scene.text, encoding="utf-8")
     cli(["solve", str(folder / "limited.toml"), "-o", str(tmp_path / "r.h5")], standalone_mode=False)

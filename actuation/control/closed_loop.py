@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
+from functools import cache, partial
 from typing import Self
 
 import numpy as np
@@ -32,7 +33,7 @@ from .controllers import Setup
 from .linear_model import LinearModel, linear_model
 from .loop import Loop
 from .loop_keys import SampledAnalysis
-from .loop_record import between, held_commands, held_until, judged, loop_record, sample_times
+from .loop_record import between, held_commands, held_until, loop_record, sample_times
 from .metrics import Followed, place_of_tip
 from .planar_robot import PlanarRobot
 from .robot import Robot, input_names
@@ -104,13 +105,20 @@ def run_closed_loop(
         driven = _assembly(model, raised, analysis, source, read, whole)
         sensor = sensing(driven, read)
     voltages = [(driven.index[array.carriers[0]], array.Phi_V) for array in patches.values()]
-    control = SampledControl(len(model.motors), voltages, loop.first, sensor, setup.times, analysis.delay, loop)
+    held = partial(held_commands, setup=setup, loop=loop)
+    before = partial(held, after=-1e-9)  # of accelerations
+    control = SampledControl(len(model.motors), voltages, loop.first, sensor, setup.times, analysis.delay, loop, before)
     outcome = drive(driven, analysis, start, progress, reported=assembly, times=outputs, control=control)
-    held = held_commands(outcome.time, setup, loop)
-    run = _followed(outcome, source, held, place_of(whole, analysis.tip))
-    record = loop_record(analysis, setup, loop, acting, run, bool(built.gears))
-    record = judged(record, analysis, loop_models(built, moved))
-    return replace(outcome, forces=Forces(tau=held[:, : len(model.motors)]), details=record)
+    known = source.closer if source.in_pieces is None else source
+    runs = [_followed(of, known, held(of.time), place_of(whole, analysis.tip)) for of in (outcome, outcome.closer)]
+    record = loop_record(
+        analysis, setup, loop, acting, (runs[0], runs[1]), loop_models(built, moved), gears=bool(built.gears)
+    )
+
+    def told(of: Outcome) -> Outcome:
+        return replace(of, forces=Forces(tau=held(of.time)[:, : len(model.motors)]), details=record)
+
+    return replace(told(outcome), look_closer=cache(lambda: told(outcome.closer)))
 
 
 def loop_models(model: Model, reference: Outcome) -> tuple[LinearModel, ...]:
@@ -193,7 +201,7 @@ def _followed(outcome: Outcome, source: Outcome, held: Array, tip: str | None) -
     error = point_motion(outcome, tip).position - place
     is_disturbed = bool(outcome.analysis.disturbance)
     completed = outcome.status == "completed"
-    return Followed(outcome.time, error, motor_rates(outcome), held, completed, is_disturbed)
+    return Followed(outcome.time, error, place, motor_rates(outcome), held, completed, is_disturbed)
 
 
 def default_tip(outcome: Outcome) -> str:

@@ -13,7 +13,7 @@ from .controllers import Controller, Setup
 from .linear_model import LinearModel
 from .loop import Loop
 from .loop_keys import SampledAnalysis
-from .margins import Margins, joint_gains, margins
+from .margins import Margins, joint_gains, lowest_frequency, margins
 from .metrics import Followed, Metrics, measure
 from .records import ComputedTorque, JointPid, Lqr
 from .suggestion import advice
@@ -80,19 +80,31 @@ def held_commands(times: Array, setup: Setup, loop: Loop, after: float = 1e-9) -
 
 
 def loop_record(
-    analysis: SampledAnalysis, setup: Setup, loop: Loop, acting: Sequence[Controller], run: Followed, gears: bool
+    analysis: SampledAnalysis,
+    setup: Setup,
+    loop: Loop,
+    acting: Sequence[Controller],
+    runs: tuple[Followed, Followed],
+    models: Sequence[LinearModel],
+    *,
+    gears: bool,
 ) -> LoopRecord:
-    """Of a run; `gears`: some give."""
-    taken = slice(loop.taken)
-    tip_error, metrics = measure(run, setup, loop)
+    """Of a run at its outputs, and at these and between; `models` on the reference, none where it is singular.
+
+    `gears`: some give.
+    """
+    taken, (at_outputs, run) = slice(loop.taken), runs
+    lowest = lowest_frequency(models, analysis.controller, analysis.sample_time, analysis.delay)
+    tip_error, metrics = np.linalg.norm(at_outputs.error, axis=1), measure(run, setup, loop, lowest)
     warnings = tuple(_warnings(analysis, acting, metrics, gears))
-    return LoopRecord(
+    record = LoopRecord(
         setup.inputs, setup.outputs, setup.times[taken], loop.readings[taken], setup.reference[taken],
         loop.commands[taken], loop.wanted[taken], tip_error, metrics, warnings,
     )  # fmt: skip
+    return _judged(record, analysis, models)
 
 
-def judged(record: LoopRecord, analysis: SampledAnalysis, models: Sequence[LinearModel]) -> LoopRecord:
+def _judged(record: LoopRecord, analysis: SampledAnalysis, models: Sequence[LinearModel]) -> LoopRecord:
     """With margins of the loop, and advice where it is not stable, by linear models on the reference."""
     pids = [controller for controller in analysis.controller if isinstance(controller, JointPid)]
     if not models or not pids or len(pids) < len(analysis.controller):

@@ -12,15 +12,20 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...common.arrays import Array, as_floats
+from ...common.arrays import Array, ComplexArray, as_floats
 from .linear_model import LinearModel
-from .records import JointPid
+from .modes import held_frequencies
+from .records import ControllerRecord, JointPid, ModalVelocity
 from .sampling import sampled
 
 STABLE = 1.0 + 1e-6  # of a spectral radius: undamped modes and joints without a controller are at 1, to rounding
 LARGEST_GAIN, LEAST_GAIN, LONGEST_DELAY = 1e4, 1e-2, 50.0  # that margins are sought to: factors, and sample times
 GRID = 60  # points of the search for the first crossing, before bisection
 RELATIVE = 1e-3  # to which margins are found
+LIGHTLY = 0.2  # damping ratio, above which motion of a loop is no vibration
+GONE = 1e-6  # eigenvalues below are commands on their way
+SAMPLED = 0.99  # of half the sampling frequency, where eigenvalues are that of no motion
+RIGID = 1e-6  # of the fastest eigenvalue: slower ones are rounding of motion without stiffness
 
 
 @dataclass(frozen=True)
@@ -85,6 +90,33 @@ def motor_inputs(model: LinearModel) -> list[int]:
 
 def spectral_radius(model: LinearModel, gains: JointGains, T: float, delay: float) -> float:
     """The largest |eigenvalue| of the sampled loop."""
+    return float(np.abs(loop_eigenvalues(model, gains, T, delay)).max())
+
+
+def lowest_frequency(
+    models: Sequence[LinearModel], controllers: Sequence[ControllerRecord], T: float, delay: float
+) -> float:
+    """Of the vibrations of the robot with its joints controlled or locked, Hz; NaN where nothing vibrates.
+
+    The lowest with all motors held and, where joints have PID controllers alone, of the sampled loop: its eigenvalues
+    e^{sT} that are damped by less than `LIGHTLY`. With others half of the lowest with motors held.
+    """
+    locked = min((float(held_frequencies(model).min(initial=np.inf)) for model in models), default=np.inf)
+    pids = [record for record in controllers if isinstance(record, JointPid)]
+    if any(not isinstance(record, JointPid | ModalVelocity) for record in controllers):
+        locked *= 0.5
+    elif pids and models:
+        gains = joint_gains(models[0], pids)
+        z = np.concatenate([loop_eigenvalues(model, gains, T, delay) for model in models])
+        s = np.log(z[np.abs(z) > GONE]) / T
+        ringing = s[(s.imag > 0.0) & (-s.real < LIGHTLY * np.abs(s)) & (np.abs(s.imag) * T < np.pi * SAMPLED)]
+        vibrating = ringing[np.abs(ringing) > RIGID * np.abs(s).max(initial=0.0)]
+        locked = min(locked, float(vibrating.imag.min(initial=np.inf)) / (2 * np.pi))
+    return locked if np.isfinite(locked) else float("nan")
+
+
+def loop_eigenvalues(model: LinearModel, gains: JointGains, T: float, delay: float) -> ComplexArray:
+    """Those of the matrix F of the sampled loop."""
     f, m, o = model.freedom, len(gains.P), len(model.output_names)
     plant = sampled(model.A, model.B[:, motor_inputs(model)], T, delay)
     n = len(plant.A)
@@ -101,7 +133,7 @@ def spectral_radius(model: LinearModel, gains: JointGains, T: float, delay: floa
     F[:n] -= plant.B @ feedback
     F[n : n + o, :n] = value
     F[n + o :, :n], F[n + o :, n + o :] = T * value, np.eye(o)
-    return float(np.abs(np.linalg.eigvals(F[np.ix_(used, used)])).max())
+    return np.asarray(np.linalg.eigvals(F[np.ix_(used, used)]), dtype=complex)
 
 
 def margins(models: Sequence[LinearModel], gains: JointGains, T: float, delay: float) -> Margins:

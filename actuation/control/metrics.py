@@ -1,4 +1,9 @@
-"""How well a closed loop did: error of the tip, settling, vibration, effort."""
+"""How well a closed loop did: error of the tip, settling, overshoot, vibration, effort: see `DEFINITIONS`.
+
+Vibration is measured in the last period of the lowest frequency that the robot has with its joints controlled or
+locked. What is slower, a drift or an error that dies out, is the cubic of the least-squares fit of a cubic and one
+vibration to the last `PERIODS`: the cubic alone would take a part of the vibration for drift.
+"""
 
 from __future__ import annotations
 
@@ -9,28 +14,46 @@ from typing import Any
 import numpy as np
 
 from ...common.arrays import Array
+from ...common.peaks import largest, root_mean_square
 from .controllers import Setup
 from .loop import Loop
 
 SETTLED = 0.05  # of the largest error
-WINDOW, CUBIC = 0.1, 3  # s, over which motion that a cubic follows is no vibration: below about 80 rad/s
+PERIODS = 3.0  # of the lowest frequency, over which what is slower is found
+LEAST_PERIODS = 1.5  # likewise, where the tip rests at its last place for no longer
+RESTING = 0.1  # of a run, for which it rests at least
+CUBIC = 3
+NEARBY = np.geomspace(0.6, 1.6, 41)  # times the frequency of the linear model: that of the loop is sought there
+EXPLAINED = 0.25  # of what the cubic leaves: what is left beside a vibration, if there is one
+MOST_ROWS = 2000  # that are fitted
+WINDOW = 0.1  # s at least, over which motion that a cubic follows is no vibration, for the verdict
 GROWTH = 4.0  # of the vibration's peak, from the second quarter of a run to its last
+AT_REST = 1e-6  # of the way to the last place
+
+DEFINITIONS = (
+    "settled: when the distance of the tip from its place stays below 5 % of its largest; overshoot: beyond the last"
+    " place, on along the way to it; vibration: peak to peak in the last period of the lowest frequency of the robot"
+    " with its joints controlled or locked, less what is slower; at end: distance from its place at the end"
+)
 
 
 @dataclass(frozen=True)
 class Metrics:
-    """One run in numbers.
+    """One run in numbers; see `DEFINITIONS`.
 
     Attributes:
         verdict: "stable", "grows" (vibration, quarter by quarter of an undisturbed run) or "diverges".
         tip_error_rms, tip_error_max: distance of the tip from its place, m.
         settling_time: s, after which that stays below 5 % of its largest value; NaN where it does not before the end.
-        vibration: root mean square of the tip's error, less the cubics that follow it best over 0.1 s, m.
-        residual: the largest such difference in 0.1 s near the end, m.
+        vibration: of the tip at the end of the run, peak to peak, m.
+        residual: distance of the tip from its place at the end of the run, m.
         motor_work: ∫ Σ |τ γ̇| dt, J.
         voltage_effort: ∫ Σ V² dt, V² s.
         peak_moment: N·m; peak_voltage: V.
         saturated: part of the samples at which a command was cut.
+        overshoot: of the tip beyond its last place along the line from the first place to it, m.
+        lowest_frequency: about which vibration is measured, Hz, see `ringing`; NaN where the linear model has none.
+        vibration_window: before the end of the run, over which what is slower is found, s.
     """
 
     verdict: str
@@ -44,15 +67,19 @@ class Metrics:
     peak_moment: float
     peak_voltage: float
     saturated: float
+    overshoot: float = np.nan  # these are not in files of version 0.1
+    lowest_frequency: float = np.nan
+    vibration_window: float = np.nan
 
 
 @dataclass(frozen=True)
 class Followed:
-    """What a loop did, at the outputs of its run.
+    """What a loop did, at the outputs of its run and between.
 
     Attributes:
         time: (T,) s.
         error: (T, d) m, of the tip from its place.
+        place: (T, d) m, where the tip should be.
         rates: (T, motors) rad/s, m/s.
         held: (T, inputs) commands.
         completed: whether it came to its end.
@@ -61,34 +88,90 @@ class Followed:
 
     time: Array
     error: Array
+    place: Array
     rates: Array
     held: Array
     completed: bool
     is_disturbed: bool
 
 
-def measure(run: Followed, setup: Setup, loop: Loop) -> tuple[Array, Metrics]:
-    """Distance of the tip from its place (T,), and the metrics."""
+def measure(run: Followed, setup: Setup, loop: Loop, lowest: float) -> Metrics:
+    """The metrics of a run; `lowest`: frequency of the robot with its joints controlled or locked, Hz, or NaN."""
     t, motors = run.time, len(setup.robot.motors)
     distance = np.linalg.norm(run.error, axis=1)
-    shaking = np.linalg.norm(run.error - _slow(t, run.error), axis=1)
     taken = slice(loop.taken)
     moments, volts = loop.commands[taken, :motors], loop.commands[taken, motors:]
     work = np.abs(run.held[:, :motors] * run.rates).sum(axis=1)
     cut = (loop.commands[taken] != loop.wanted[taken]).any(axis=1)
-    return distance, Metrics(
-        _verdict(run, shaking),
-        float(np.sqrt(np.mean(distance**2))),
-        float(distance.max()),
+    lowest, window = ringing(t, run.place, lowest)
+    return Metrics(
+        _verdict(run, lowest),
+        root_mean_square(t, distance),
+        largest(t, distance)[0],
         _settling(t, distance),
-        float(np.sqrt(np.mean(shaking**2))),
-        _residual(t, shaking),
+        vibration(t, run.error, window, lowest),
+        float(distance[-1]),
         float(((work[1:] + work[:-1]) / 2 * np.diff(t)).sum()),
         float((volts**2).sum() * setup.sample_time),
         float(np.abs(moments).max(initial=0.0)),
         float(np.abs(volts).max(initial=0.0)),
         float(cut.mean()),
+        overshoot(run.place, run.error),
+        lowest,
+        window,
     )
+
+
+def ringing(time: Array, place: Array, lowest: float) -> tuple[float, float]:
+    """About which frequency (Hz) vibration is measured, and how long before the end of `time` (T,), s, in all.
+
+    `PERIODS` of the frequency `lowest`, Hz, within the time for which the `place` (T, d) of the tip rests, or in half
+    of the run where it does not rest. Where `LEAST_PERIODS`, or these, do not fit there, of the lowest that do.
+    """
+    whole = float(time[-1] - time[0])
+    way = np.linalg.norm(place - place[-1], axis=1)
+    moving = np.flatnonzero(way > AT_REST * way.max(initial=0.0))
+    rest = float(time[-1] - time[moving[-1] + 1]) if moving.size else whole
+    room, periods = (rest, LEAST_PERIODS) if rest >= RESTING * whole else (0.5 * whole, PERIODS)
+    if not lowest > 0.0 or not room > 0.0:
+        return lowest, whole
+    frequency = max(lowest, periods / room)
+    return frequency, min(room, PERIODS / frequency)
+
+
+def vibration(time: Array, error: Array, window: float, lowest: float) -> float:
+    """Peak to peak (m) of `error` (T, d) in the last period of `lowest` (Hz), where it is largest, less what is slower.
+
+    That is found over the last `window` (s) of `time` (T,).
+    """
+    late = np.flatnonzero(time >= time[-1] - window)
+    late = late[:: -(-len(late) // MOST_ROWS)]
+    if len(late) < 2 * CUBIC:
+        return 0.0
+    t, left = time[late], error[late] - error[late].mean(axis=0)
+    x = 2.0 * (t - t[0]) / (t[-1] - t[0]) - 1.0
+    slow = np.vander(x, CUBIC + 1)
+    found = left - slow @ np.linalg.lstsq(slow, left, rcond=None)[0]
+    fits = []
+    for omega in 2.0 * np.pi * lowest * NEARBY if lowest > 0.0 else ():
+        both = np.column_stack([slow, np.cos(omega * t), np.sin(omega * t)])
+        parts = np.linalg.lstsq(both, left, rcond=None)[0]
+        fits.append((float(((left - both @ parts) ** 2).sum()), parts))
+    if fits:
+        least, parts = min(fits, key=lambda fit: fit[0])
+        if least < EXPLAINED * float((found**2).sum()):
+            found = left - slow @ parts[: CUBIC + 1]
+    last = found[t >= t[-1] - min(window, 1.0 / lowest)] if lowest > 0.0 else found
+    direction = np.linalg.svd(last, full_matrices=False)[2][0]
+    return float(np.ptp(last @ direction))
+
+
+def overshoot(place: Array, error: Array) -> float:
+    """How far (m) the tip, at `place` + `error` (T, d), gets beyond its last place along the line to it."""
+    way = place[-1] - place[0]
+    length = float(np.linalg.norm(way))
+    beyond = (place + error - place[-1]) @ way
+    return float(max(0.0, beyond.max())) / length if length > 0.0 else 0.0
 
 
 def place_of_tip(time: Array, end: float, known: tuple[Array, Array], paths: Sequence[Mapping[str, Any]]) -> Array:
@@ -108,20 +191,15 @@ def _interpolated(times: Array, known: Array, values: Array) -> Array:
     return np.column_stack([np.interp(times, known, column) for column in values.T])
 
 
-def _slow(t: Array, values: Array) -> Array:
-    """The part of (T, columns) that is no vibration: least-squares cubics over `WINDOW` (Savitzky and Golay 1964)."""
+def _slow(t: Array, values: Array, window: float) -> Array:
+    """The part of (T, columns), evenly spaced, that is no vibration: cubics over a window (Savitzky and Golay 1964)."""
     from scipy.signal import savgol_filter
 
-    count = 2 * round(WINDOW / (2 * (t[1] - t[0]))) + 1 if len(t) > 1 else 1
+    count = 2 * round(window / (2 * (t[1] - t[0]))) + 1 if len(t) > 1 else 1
     if not CUBIC < count <= len(t):
         return np.broadcast_to(values.mean(axis=0), values.shape)
     smooth: Array = savgol_filter(values, count, CUBIC, axis=0)
     return smooth
-
-
-def _residual(t: Array, shaking: Array) -> float:
-    late = (t > t[-1] - 1.5 * WINDOW) & (t < t[-1] - 0.5 * WINDOW)
-    return float(shaking[late].max(initial=0.0))
 
 
 def _settling(t: Array, distance: Array) -> float:
@@ -131,9 +209,14 @@ def _settling(t: Array, distance: Array) -> float:
     return float(t[outside[-1] + 1]) if outside[-1] + 1 < len(t) else float("nan")
 
 
-def _verdict(run: Followed, shaking: Array) -> str:
+def _verdict(run: Followed, lowest: float) -> str:
+    """Of vibration as fast as `lowest` (Hz), quarter by quarter."""
     if not run.completed:
         return "diverges"
+    even = np.linspace(run.time[0], run.time[-1], len(run.time))
+    error = np.column_stack([np.interp(even, run.time, column) for column in run.error.T])
+    window = WINDOW if not lowest > 0.0 else max(WINDOW, min(PERIODS / lowest, np.ptp(even) / 4))
+    shaking = np.linalg.norm(error - _slow(even, error, window), axis=1)
     quarters = [part.max(initial=0.0) for part in np.array_split(shaking, 4)]
     growing = quarters[1] < quarters[2] < quarters[3] and quarters[3] > GROWTH * quarters[1]
     return "grows" if growing and not run.is_disturbed else "stable"

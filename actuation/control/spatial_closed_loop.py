@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
+from functools import cache, partial
 from typing import NamedTuple
 
 import numpy as np
@@ -30,7 +31,7 @@ from .controllers import Setup
 from .linear_model import LinearModel, state_space
 from .loop import Loop
 from .loop_keys import SampledAnalysis
-from .loop_record import between, held_commands, held_until, judged, loop_record, sample_times
+from .loop_record import between, held_commands, held_until, loop_record, sample_times
 from .metrics import Followed, place_of_tip
 from .robot import input_names
 from .signals import merged
@@ -86,19 +87,25 @@ def run_spatial_closed_loop(context: ActuatedSpatialContext, analysis: SpatialCl
     def at_sample(k: int, t: float, state: Array) -> Array:
         return loop(k, t, sensing.read(*(part[None] for part in np.split(state, splits)))[0])
 
-    control = SpatialControl(_commands(context, plant.model), loop.first, setup.times, analysis.delay, at_sample)
+    held = partial(held_commands, setup=setup, loop=loop)
+    before, inputs = partial(held, after=-1e-9), _commands(context, plant.model)
+    control = SpatialControl(inputs, loop.first, setup.times, analysis.delay, at_sample, before)
     disturbing = ((place_of(whole, str(load.point)), load.components) for load in analysis.disturbance)
     drives = Drives(at_points=tuple(PointDrive(*load) for load in disturbing))
     run = spatial_drive(
         plant.model, analysis, _start(context, analysis, plant), context.progress, drives=drives, times=outputs,
         control=control,
     )  # fmt: skip
-    held = held_commands(run.time, setup, loop)
-    followed = _followed(run, source, held, place_of(whole, analysis.tip))
-    record = loop_record(analysis, setup, loop, acting, followed, bool(plant.model.tree.gears))
-    record = judged(record, analysis, loop_models_in_space(plant.model, source.time, plant.source))
-    driving = _by_joint(context.model, held_commands(run.time, setup, loop, -1e-9))
-    return replace(run, commanded=_by_joint(context.model, held), driving=driving, details=record)
+    models = loop_models_in_space(plant.model, source.time, plant.source)
+    runs = [_followed(of, source.closer, held(of.time), place_of(whole, analysis.tip)) for of in (run, run.closer)]
+    gears = bool(plant.model.tree.gears)
+    record = loop_record(analysis, setup, loop, acting, (runs[0], runs[1]), models, gears=gears)
+
+    def told(of: SpatialRun) -> SpatialRun:
+        commanded, driving = (_by_joint(context.model, commands(of.time)) for commands in (held, before))
+        return replace(of, commanded=commanded, driving=driving, details=record)
+
+    return replace(told(run), look_closer=cache(lambda: told(run.closer)))
 
 
 def _robot(context: ActuatedSpatialContext, source: SpatialRun) -> SpatialRobot:
@@ -217,11 +224,19 @@ def _followed(run: SpatialRun, source: SpatialRun, held: Array, tip: str | None)
     tip = tip or _default_tip(model)
     paths = [path.components for path in model.scene.trajectory if path.point == tip]
     known = source.time, _position(source, tip)
-    error = _position(run, tip) - place_of_tip(run.time, analysis.last_time, known, paths)
+    place = place_of_tip(run.time, analysis.last_time, known, paths)
     columns = np.concatenate([*model.motors.values(), np.zeros(0, dtype=int)]).astype(int)
     signs = np.array([model.sign(joint) for joint, of in model.motors.items() for _ in of])
     completed = run.status == "completed"
-    return Followed(run.time, error, signs * run.v[:, columns], held, completed, bool(analysis.disturbance))
+    return Followed(
+        run.time,
+        _position(run, tip) - place,
+        place,
+        signs * run.v[:, columns],
+        held,
+        completed,
+        bool(analysis.disturbance),
+    )
 
 
 def _position(run: SpatialRun, point: str) -> Array:

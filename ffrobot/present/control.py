@@ -9,7 +9,7 @@ from rich.table import Table
 
 from ..actuation.control.linear import LinearModels
 from ..actuation.control.loop_record import LoopRecord
-from ..actuation.control.metrics import Metrics
+from ..actuation.control.metrics import DEFINITIONS, Metrics
 from ..actuation.control.placing import Placed
 from ..mbs.analysis.outcome import Details
 from .tables import plain_table
@@ -18,8 +18,8 @@ FREQUENCIES = 5  # that are listed, and damping ratios
 UNDAMPED = 1e-9  # ratios below are rounding
 
 LOOP_COLUMNS = (
-    "closed loop", "verdict", "rms (m)", "max (m)", "settled (s)", "vibration (m)", "at end (m)", "work (J)",
-    "moment\n(N·m)", "voltage\n(V)", "at\nlimits",
+    "closed loop", "verdict", "rms (m)", "max (m)", "settled\n(s)", "overshoot\n(m)", "vibration\n(m)", "at end (m)",
+    "work (J)", "moment\n(N·m)", "voltage\n(V)", "at\nlimits",
 )  # fmt: skip
 
 
@@ -30,8 +30,10 @@ def loop_row(name: str, metrics: Metrics) -> Iterator[str]:
     for value in (metrics.tip_error_rms, metrics.tip_error_max):
         yield f"{value:.3g}"
     yield "no" if np.isnan(metrics.settling_time) else f"{metrics.settling_time:.3g}"
-    for value in (metrics.vibration, metrics.residual, metrics.motor_work, metrics.peak_moment, metrics.peak_voltage):
-        yield f"{value:.3g}"
+    yield from (
+        f"{value:.3g}" for value in (metrics.overshoot, metrics.vibration, metrics.residual, metrics.motor_work)
+    )
+    yield from (f"{value:.3g}" for value in (metrics.peak_moment, metrics.peak_voltage))
     yield f"{100 * metrics.saturated:.2g} %"
 
 
@@ -76,7 +78,13 @@ def _placement(name: str, placed: Placed) -> tuple[str, ...]:
 
 
 def control_lines(details: Mapping[str, Details]) -> Iterator[str]:
-    """Damping ratios, zeros, modes that nothing moves or sees, and places of patches, each in a line."""
+    """Meaning of columns of closed loops, damping ratios, zeros, modes out of reach, places of patches: a line each."""
+    loops = {name: found.metrics for name, found in details.items() if isinstance(found, LoopRecord)}
+    if loops:
+        yield f"closed loops: {DEFINITIONS}"
+    for name, metrics in loops.items():
+        if np.isfinite(metrics.lowest_frequency):
+            yield f"{name}: vibration at {metrics.lowest_frequency:.3g} Hz and above"
     for name, found in details.items():
         if isinstance(found, LinearModels):
             yield from _damping(name, found)

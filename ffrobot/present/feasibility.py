@@ -130,7 +130,7 @@ def _remedy_line(judged: h5py.Group) -> str:
 
 
 def _verdict(factor: float, since: float) -> tuple[str, str, str]:
-    return _number(factor), "" if np.isnan(since) else f"{since:g}", "yes" if factor <= 1 else "no"
+    return _number(factor), "" if np.isnan(since) else f"{since:.4g}", "yes" if factor <= 1 else "no"
 
 
 def _number(value: float) -> str:

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-import numpy as np
 from rich.console import Console
 from rich.table import Table
 
+from ..common.peaks import largest
 from ..results.verdict import Verdict
 from ..run.spatial_solution import SpatialSolution
 from .control import control_lines, control_tables
@@ -31,10 +31,11 @@ def print_spatial_summary(
         off = f"{result.motion.violation.max(initial=0.0):.1e}"
         counts = f"{run.steps}", f"{run.evaluations}"
         table.add_row(name, run.analysis.kind, run.status, run.integrator.name, *counts, off)
-        found = result.motion.motor_forces
+        motion = (result.closer or result).motion
+        found = motion.motor_forces
         for joint, moments in {} if found is None else found.moments.items():
             for unit, values in zip(units[joint], moments.T, strict=True):
-                motors.add_row(name, joint, f"{np.abs(values).max():.5g}", "N·m" if unit == "rad" else "N")
+                motors.add_row(name, joint, f"{largest(motion.time, values)[0]:.5g}", "N·m" if unit == "rad" else "N")
     console.print(table)
     if motors.row_count:
         console.print()
@@ -43,14 +44,15 @@ def print_spatial_summary(
     for table in control_tables(details):
         console.print()
         console.print(table)
+    closest = {name: one.closer or one for name, one in solution.analyses.items()}
     voltages = voltage_table(
         (name, layout, array, result.actuation.voltages[layout])
-        for name, result in solution.analyses.items()
+        for name, result in closest.items()
         if result.actuation is not None
         for of_link in solution.patches.values()
         for layout, array in of_link.arrays.items()
     )
-    stresses = stress_table((name, one.run.time, one.stresses) for name, one in solution.analyses.items())
+    stresses = stress_table((name, one.run.time, one.stresses) for name, one in closest.items())
     for table in (voltages, stresses):
         if table.row_count:
             console.print()

@@ -15,7 +15,7 @@ from ..mbs.analysis.outcome import Details, Outcome
 from ..mbs.model.raised_mass import raised_in_words
 from ..results.verdict import Verdict
 from ..run.loaded_body import remarks_on_parts
-from ..run.solution import Solution
+from ..run.solution import AnalysisResult, Solution
 from .accuracy import error_budget
 from .control import control_lines, control_tables
 from .lines import integrator_lines, warning_lines
@@ -58,6 +58,11 @@ def print_summary(
     console.print(f"results    {path}", soft_wrap=True)
 
 
+def _closest(solution: Solution) -> Iterator[tuple[str, AnalysisResult]]:
+    """The analyses by name, at outputs and between."""
+    yield from ((name, one.closer or one) for name, one in solution.analyses.items())
+
+
 def _details(solution: Solution) -> dict[str, Details]:
     """What only kinds of analyses find, by analysis."""
     return {name: outcome.details for name, outcome in solution.outcomes.items()}
@@ -68,7 +73,7 @@ def _tables(solution: Solution) -> Iterator[Table]:
     if any(result.voltages for result in solution.analyses.values()):
         yield _voltages(solution)
     if any(result.stresses for result in solution.analyses.values()):
-        yield stress_table((name, one.outcome.time, one.stresses) for name, one in solution.analyses.items())
+        yield stress_table((name, one.outcome.time, one.stresses) for name, one in _closest(solution))
     yield from control_tables(_details(solution))
 
 
@@ -133,7 +138,7 @@ def _voltages(solution: Solution) -> Table:
     return voltage_table(
         (name, body, solution.patches[body], values)
         for name, result in solution.analyses.items()
-        for body, values in result.voltages.items()
+        for body, values in (result.closer or result).voltages.items()
     )
 
 

@@ -29,4 +29,4 @@ def write_loop(group: h5py.Group, record: LoopRecord) -> None:
 
 def read_metrics(attributes: Mapping[str, Any]) -> Metrics:
     """The metrics among the attributes of control/."""
-    return Metrics(**{key: attributes[key] for key in Metrics.__dataclass_fields__})
+    return Metrics(**{key: attributes[key] for key in Metrics.__dataclass_fields__ if key in attributes})

@@ -327,6 +327,18 @@ class Results:
             raise InputError(f'{self.path}: expected column {k} of "{dataset}", found {values.shape[1]} columns')
         return values[:, k : k + 1]
 
+    def peak(self, name: str) -> tuple[float, float]:
+        """The largest size of a history and when it has that, s, between outputs too where the file says so.
+
+        Of all columns, of one of them, `name[k]`, or of the length of a deflection or a reaction.
+        """
+        from .peaks import peak_of
+
+        match = COLUMN.fullmatch(name)
+        dataset = match["dataset"] if match else name
+        self[dataset]  # raises where there is none
+        return peak_of(self._file[dataset], self.time(dataset), int(match["column"]) if match else None)
+
     def columns(self, analysis: str) -> dict[str, Array]:
         """Everything an analysis holds over time, one (T,) array each.
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 
 import h5py
@@ -23,6 +24,7 @@ from .bodies import write_bending, write_stress
 from .control import write_loop
 from .forces import write_path
 from .linear import write_spatial_linear
+from .peaks import write_peaks
 from .spatial_actuation import write_actuation
 from .spatial_resume import write_state_in_space
 from .write import write_check, write_head, write_mode_errors, write_steps
@@ -41,13 +43,13 @@ def spatial_image(solution: SpatialSolution) -> bytes:
         file.attrs["geometric_stiffening"] = solution.is_stiffened
         file.attrs.create("skipped", list(solution.notes), dtype=h5py.string_dtype())
         for name, result in solution.analyses.items():
-            _write_analysis(file.create_group(name), solution, result)
+            group, closer = file.create_group(name), result.closer
+            _write_analysis(group, solution, result)
+            write_peaks(group, None if closer is None else partial(_write_analysis, solution=solution, result=closer))
             if solution.mode_choice is not None:
                 write_mode_errors(file[name], name, solution.mode_choice)
             if isinstance(result.run.details, LinearModels):
                 write_spatial_linear(file[name], result.motion, result.run.details)
-            if result.actuation is not None:
-                write_actuation(file[name], solution, result.actuation)
         if (run := solution.unread) is not None:
             _write_run(file.create_group(run.analysis.name), run, run.warnings)
         write_state_in_space(file, solution)
@@ -85,6 +87,8 @@ def _write_analysis(group: h5py.Group, solution: SpatialSolution, result: Spatia
     for part in ("energies", "momentum"):
         for key, values in vars(getattr(result, part)).items():
             group[f"{'energy' if part == 'energies' else part}/{key}"] = values
+    if result.actuation is not None:
+        write_actuation(group, solution, result.actuation)
     violation = group.create_dataset("constraint_violation", data=motion.violation)
     violation.attrs["columns"] = ["position", "velocity"]
 

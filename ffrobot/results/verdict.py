@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import h5py
 import numpy as np
@@ -13,6 +13,7 @@ from ..common.arrays import Array
 from .actuators import read_motors, read_unsupplied
 from .joints import Coordinates, Scene, labelled_coordinates
 from .off_path import off_path_in_words
+from .peaks import POWER, peak_of
 
 Place = tuple[float, str, float]
 """A largest value, where it is, and when (s)."""
@@ -78,7 +79,8 @@ class AnalysisVerdict:
     @property
     def motor_texts(self) -> dict[str, str]:
         """Peaks and RMS of each motor, with limits where it has them."""
-        return {name: _motor(motor, self.units[name]) for name, motor in self.motors.items()}
+        interval = " over the path" if self.kind == "motors-only" else ""
+        return {name: _motor(motor, self.units[name], interval) for name, motor in self.motors.items()}
 
 
 @dataclass(frozen=True)
@@ -146,7 +148,14 @@ def _motors(group: h5py.Group, coordinates: Coordinates) -> dict[str, MotorFeasi
         if entry is not None and "moment" in entry and "rate" in entry:
             rate_of = "motor_rate" if "motor_rate" in entry else "rate"
             moment, rate = (coordinate.of(entry[dataset][()]) for dataset in ("moment", rate_of))
-            found[label] = judge_motion(time, moment, rate, coordinate.limits)
+            found[label] = judge_motion(time, moment, rate, coordinate.limits, float(time[-1]))
+            if POWER in entry.attrs:
+                of_moment, of_rate = entry["moment"].attrs, entry[rate_of].attrs
+                found[label] = replace(
+                    found[label], moment=float(of_moment["peak"]), speed=float(of_rate["peak"]),
+                    power=float(entry.attrs[POWER]), moment_time=float(of_moment["peak_time"]),
+                    rms_moment=float(of_moment["rms"]),
+                )  # fmt: skip
     return found
 
 
@@ -204,8 +213,9 @@ def _short(
 
 def _deflection(group: h5py.Group) -> Place | None:
     """Of all points of flexible bodies."""
-    found = [_peak(np.linalg.norm(point["deflection"][()], axis=1), name, group["time"][()])
-             for name, point in group.get("points", {}).items() if "deflection" in point]  # fmt: skip
+    time = group["time"][()]
+    found = [_peak(point["deflection"], name, time) for name, point in group.get("points", {}).items()
+             if "deflection" in point]  # fmt: skip
     worst = max(found, default=None)
     return worst if worst is not None and worst[0] > 0.0 else None
 
@@ -215,15 +225,15 @@ def _stress(group: h5py.Group) -> Place | None:
     time, found = group["time"][()], []
     for body, entry in group.get("stress", {}).items():
         points = entry.get("points", {}).items()
-        found += [_peak(point["von_mises"][()], f"{body}, {name}", time) for name, point in points]
+        found += [_peak(point["von_mises"], f"{body}, {name}", time) for name, point in points]
         if "surface" in entry:
-            found.append(_peak(entry["surface/von_mises_max"][()], f"the surface of {body}", time))
+            found.append(_peak(entry["surface/von_mises_max"], f"the surface of {body}", time))
     return max(found, default=None)
 
 
-def _peak(values: Array, where: str, time: Array) -> Place:
-    k = int(np.argmax(values))
-    return float(values[k]), where, float(time[k])
+def _peak(dataset: h5py.Dataset, where: str, time: Array) -> Place:
+    value, at = peak_of(dataset, time)
+    return value, where, at
 
 
 def _advice(
@@ -278,10 +288,10 @@ def _margins(group: h5py.Group) -> str:
     return f"margins (linear model): {', '.join(texts)}"
 
 
-def _motor(motor: MotorFeasibility, unit: str) -> str:
+def _motor(motor: MotorFeasibility, unit: str, interval: str) -> str:
     speed = "rad/s" if unit == "N·m" else "m/s"
     parts = [
-        f"peak {_of(motor.moment, motor.moment_limit)} {unit}, RMS {motor.rms_moment:.4g} {unit}",
+        f"peak {_of(motor.moment, motor.moment_limit)} {unit}, RMS {motor.rms_moment:.4g} {unit}{interval}",
         f"{_of(motor.speed, motor.speed_limit)} {speed}",
         f"{_of(motor.power, motor.power_limit)} W",
     ]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +30,7 @@ from .control import write_loop
 from .file import FORMAT
 from .forces import write_forces, write_inversion
 from .linear import write_linear
+from .peaks import write_peaks
 from .resume import write_state
 
 FORMAT_VERSION = 1
@@ -54,7 +56,10 @@ def results_image(solution: Solution) -> bytes:
         file.attrs["skipped"] = list(solution.omissions)
         file.attrs["geometric_stiffening"] = solution.stiffened
         for name, result in solution.analyses.items():
-            _write_analysis(file.create_group(name), solution, result)
+            group = file.create_group(name)
+            _write_analysis(group, solution, result)
+            closer = result.closer
+            write_peaks(group, None if closer is None else partial(_write_analysis, solution=solution, result=closer))
         write_state(file, solution)
         file.flush()
         image: bytes = file.id.get_file_image()

@@ -54,6 +54,7 @@ class AnalysisResult:
         outcome: motion, forces, and what only its kind finds.
         bending: how far flexible bodies leave small deformations, and what loads do to their stiffness.
         seconds: wall time, with all that follows from the outcome.
+        closer: the same at the outputs and between, from which all peaks are; None where nothing is between.
         voltages: of patches, by body.
         point_forces: at actuation points, by body.
         predicted_shift: by point, (T, 2) m: what voltages within their limits leave undone.
@@ -77,6 +78,7 @@ class AnalysisResult:
     start_jolt: float = 0.0
     check: FinerCheck | None = None
     warnings: tuple[str, ...] = ()
+    closer: AnalysisResult | None = field(default=None, repr=False)
 
     @property
     def status(self) -> str:

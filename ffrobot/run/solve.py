@@ -36,6 +36,7 @@ from .paths import with_paths
 from .pieces import as_one_link, wanted_pieces
 from .prepare import prepare, stiffened, with_bodies, with_pieces
 from .solution import AnalysisResult, Solution
+from .warnings import warnings_of
 from .watcher import Interruption, Watcher
 
 logger = logging.getLogger(__name__)
@@ -85,10 +86,21 @@ def _evaluated(solution: Solution) -> Solution:
     for name, result in results.items():
         try:
             with of_file(solution.scene.path):
-                results[name] = evaluated(solution, told_of_links(solution, result))
+                results[name] = _with_peaks(solution, result)
         except Exception as error:
             failure = failure or error
     return replace(solution, analyses=results, failure=failure)
+
+
+def _with_peaks(solution: Solution, result: AnalysisResult) -> AnalysisResult:
+    """The result with all that follows from its outcome; what is judged by peaks, by those between outputs."""
+    found, closer = evaluated(solution, told_of_links(solution, result)), result.outcome.closer
+    if closer is result.outcome:
+        return found
+    voltages = _voltages(solution, closer)
+    between = evaluated(solution, told_of_links(solution, replace(result, outcome=closer, voltages=voltages)))
+    found = replace(found, feasibility=between.feasibility, closer=between)
+    return replace(found, warnings=tuple(warnings_of(solution.scene, found)))
 
 
 def told_of_links(solution: Solution, result: AnalysisResult) -> AnalysisResult:
@@ -178,7 +190,7 @@ def _run_all(solution: Solution, watcher: Watcher, interruption: Interruption) -
             if not results:
                 raise
             return replace(solution, analyses=results, failure=error)
-        changes = stiffness_changes(outcome, stiffening)
+        changes = stiffness_changes(outcome.closer, stiffening)
         automatic = solution.scene.geometric_stiffening == "auto" and not solution.stiffened
         if (
             automatic
@@ -186,16 +198,23 @@ def _run_all(solution: Solution, watcher: Watcher, interruption: Interruption) -
             and outcome.status != "interrupted"
         ):
             return None
-        voltages = {} if outcome.F_p is None else {
-            body: solve_voltages(array, outcome.F_p[:, outcome.modal_columns(*array.carriers)])
-            for body, array in solution.acting_patches.items()
-        }  # fmt: skip
-        bent = bending(outcome, links, changes, solution.stiffened)
+        voltages = _voltages(solution, outcome)
+        bent = bending(outcome.closer, links, changes, solution.stiffened)
         results[analysis.name] = AnalysisResult(outcome, bent, time.perf_counter() - began, voltages)
         _log(outcome)
         if outcome.failed:
             break
     return replace(solution, analyses=results)
+
+
+def _voltages(solution: Solution, outcome: Outcome) -> dict[str, Voltages]:
+    """Of the patches, by link."""
+    if outcome.F_p is None:
+        return {}
+    return {
+        body: solve_voltages(array, outcome.F_p[:, outcome.modal_columns(*array.carriers)])
+        for body, array in solution.acting_patches.items()
+    }
 
 
 def _context(

@@ -166,7 +166,7 @@ def _run_all(solution: SpatialSolution, watcher: Watcher, interruption: Interrup
             return replace(solution, analyses=results, seconds=seconds, failure=error)
         try:
             with of_file(solution.scene.path):
-                result = _evaluated(solution, run)
+                result = _with_peaks(solution, run)
         except Exception as error:  # raised once the integration is kept
             return _unread(replace(solution, analyses=results, seconds=seconds), run, error)
         automatic = solution.scene.geometric_stiffening == "auto" and not solution.stiffened
@@ -219,6 +219,19 @@ def _context(
     )  # fmt: skip
 
 
+def _with_peaks(solution: SpatialSolution, run: SpatialRun) -> SpatialResult:
+    """What is read off a run; what is judged by peaks, by those between outputs."""
+    found, closer = _evaluated(solution, run), run.closer
+    if closer is run or found.motion.gears:  # their twists are splines through even outputs
+        return found
+    between = _evaluated(solution, closer)
+    actuation = found.actuation
+    if actuation is not None and between.actuation is not None:
+        judged = between.actuation
+        actuation = replace(actuation, feasibility=judged.feasibility, unsupplied=judged.unsupplied)
+    return replace(found, actuation=actuation, bending=between.bending, closer=between)
+
+
 def _evaluated(solution: SpatialSolution, run: SpatialRun) -> SpatialResult:
     """What is read off a run."""
     found = MotionOfLinks(
@@ -229,7 +242,7 @@ def _evaluated(solution: SpatialSolution, run: SpatialRun) -> SpatialResult:
     actuation = None
     is_judged = motion.motor_forces is not None and not isinstance(run.analysis, InstantAnalysis)
     if is_judged:  # else nothing is asked of motors and patches
-        actuation = actuated_in_space(solution.scene, motion, solution.bodies, solution.patches)
+        actuation = actuated_in_space(solution.scene, motion, run.analysis.last_time, solution.bodies, solution.patches)
         if actuation.unsupplied is not None and set(actuation.unsupplied.bodies) <= solution.points.keys():
             actuation = replace(actuation, unsupplied=None)  # forces at actuation points supply it
     whole = {name: body for name, body in solution.bodies.items() if name not in solution.divided}

@@ -75,9 +75,12 @@ def supplied_by_patches(patches: Mapping[str, LinkPatches], wanted: ModalForces,
 
 
 def actuated_in_space(
-    scene: SpatialScene, motion: SpatialMotion, bodies: Bodies, patches: Mapping[str, LinkPatches]
+    scene: SpatialScene, motion: SpatialMotion, end: float, bodies: Bodies, patches: Mapping[str, LinkPatches]
 ) -> SpatialActuation:
-    """Voltages that produce the modal forces of a motion, or as much of them as they can, and what is asked by it."""
+    """Voltages that produce the modal forces of a motion, or as much of them as they can, and what is asked by it.
+
+    `end` (s) of the path: see `actuation.motors.judge_motion`.
+    """
     flexible = {name: (body.modal, body.carrying) for name, body in bodies.items() if body.modal is not None}
     links = links_in_motion(motion, flexible)
     voltages: dict[str, Voltages] = {}
@@ -87,4 +90,4 @@ def actuated_in_space(
         within = np.concatenate([of_layout.within_limit for of_layout in found.values()], axis=1)
         unmet[name] = of_link.unmet(links[name].F_p, within)
         voltages |= found
-    return SpatialActuation(voltages, unmet, *judge_in_space(scene.path, motion, links, patches, voltages))
+    return SpatialActuation(voltages, unmet, *judge_in_space(scene.path, motion, links, patches, voltages, end))

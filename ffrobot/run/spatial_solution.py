@@ -17,6 +17,7 @@ from ..mbs.analysis.spatial_run import SpatialRun
 from ..mbs.model.spatial_model import SpatialModel
 from ..mbs.model.spatial_wrench import Wrench
 from ..mbs.model.truncation import modes_kept
+from ..mbs.quantities.path_seen import path_warnings
 from ..mbs.quantities.spatial_doubts import doubts
 from ..mbs.quantities.spatial_energy import Energies, Momentum
 from ..mbs.quantities.spatial_motion import SpatialMotion
@@ -47,6 +48,7 @@ class SpatialResult:
         check: what a replay on finer links found, where that is asked for.
         bending: how far flexible bodies leave small deformations, and what loads do to their stiffness.
         sharing: reactions that redundant constraints leave open; None where there are none.
+        closer: the same at the outputs and between, from which all peaks are; None where nothing is between.
     """
 
     run: SpatialRun
@@ -60,6 +62,7 @@ class SpatialResult:
     check: FinerCheck | None = None
     bending: Mapping[str, Bending] = field(default_factory=dict)
     sharing: Sharing | None = None
+    closer: SpatialResult | None = field(default=None, repr=False)
 
     @property
     def status(self) -> str:
@@ -75,6 +78,8 @@ class SpatialResult:
         told = told if self.sharing is None else (*told, self.sharing.in_words)
         if isinstance(self.run.details, LoopRecord):
             told = (*told, *self.run.details.warnings)
+        elif self.motion.is_prescribed:
+            told = (*told, *path_warnings(self.run.analysis, self.run.time, self.motion.model.scene.trajectory))
         return told if missed is None else (*told, missed.in_words)
 
     @cached_property

@@ -6,7 +6,9 @@ from collections.abc import Iterator
 
 from ..actuation.control.loop_record import LoopRecord
 from ..mbs.analysis.elastic_joints import unresolved_gears
+from ..mbs.analysis.motors_only import InvertedPath
 from ..mbs.analysis.outcome import Outcome
+from ..mbs.quantities.path_seen import path_warnings
 from ..mbs.quantities.validity import deflection_warning
 from ..mbs.solve.reach import turned_guesses
 from ..scene.scene import Scene
@@ -26,6 +28,8 @@ def warnings_of(scene: Scene, result: AnalysisResult) -> Iterator[str]:
     if result.outcome.analysis.name == scene.analysis[0].name:  # once
         yield from turned_guesses(scene)
     yield from unresolved_gears(result.outcome.gears)
+    if any(result.outcome.assembly.is_trajectory) or isinstance(result.outcome.details, InvertedPath):
+        yield from path_warnings(result.outcome.analysis, result.outcome.time, scene.trajectory)
 
 
 def _free_to_swing(outcome: Outcome) -> str:

@@ -159,6 +159,11 @@ def _reduce(results: Results, name: str, reduction: str) -> float:
         values = results.data(name)
     except InputError:
         return float("nan")
+    peaks = results.attributes(name)
+    if reduction == "max" and "peak" in peaks and "[" not in name:
+        return float(np.max(peaks["peak"]))
+    if reduction == "rms" and "[" not in name and np.size(peaks.get("rms", ())) == 1:
+        return float(peaks["rms"])
     vector = is_vector(results, name, values)
     history = np.linalg.norm(values, axis=1) if vector else values[:, 0]
     if values.shape[1] > 1 and not vector and (reduction == "max" or not is_spectrum(name)):

@@ -9,11 +9,12 @@ import time
 from collections.abc import Callable, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
+from functools import cache
 from typing import Any
 
 import numpy as np
 
-from ...common.arrays import Array, as_list
+from ...common.arrays import Array, Indices, as_list
 from .. import _core
 from ..model.model import Model
 from ..model.planar_tree import PlanarTree, told_in_joints
@@ -26,6 +27,7 @@ from ..solve.state import State
 from ..solve.statics import static_equilibrium
 from .earlier_check import check_earlier, kept_of
 from .outcome import Continuation, EarlierRun, Forces, Motion, Outcome, Statistics
+from .samples import in_order, new_samples, stops, worth_a_look
 
 Progress = Callable[[float], bool]
 """Called now and then with the time reached; False stops the run."""
@@ -50,6 +52,7 @@ class SampledControl:
         sensing: what is read of the state.
         times: (K,) s, of the samples; the commands of each act `delay` (s) later.
         controller: commands (inputs,) from sample number, time and readings.
+        held: commands (T, inputs) that have acted up to times (T,), s, after a run.
     """
 
     motors: int
@@ -59,6 +62,7 @@ class SampledControl:
     times: Array
     delay: float
     controller: Callable[[int, float, Array], Array]
+    held: Callable[[Array], Array]
 
 
 def drive(
@@ -99,13 +103,15 @@ def drive(
     integrator = with_steps_of(
         analysis, float(times[-1]), lambda: choose_integrator(assembly, analysis, start, steering, len(times))
     )
-    continuation = Continuation(_core.TreeCheckpoint(), recording)
+    continuation, samples = Continuation(_core.TreeCheckpoint(), recording), new_samples(times, analysis)
     if earlier is not None:  # with the same candidates, and what they have become since
         known, continuation = earlier.statistics.integrator, earlier.continuation
         integrator = replace(integrator, name=known.name, reason=known.reason)
     with nullcontext() if earlier is None else kept_of(earlier, times).gone_on_with():
         controls = integration_controls(analysis, integrator)
-        run = _integrated(tree, start, times, controls, steering, control, continuation, progress)
+        if any(assembly.is_trajectory):
+            controls.stops = as_list(stops(times, assembly.model.scene.trajectory))
+        run = _integrated(tree, start, times, controls, steering, control, continuation, progress, samples)
     seconds, integrator = time.perf_counter() - began, integrator.changed_in(run)
     statistics = statistics_of(assembly, run, integrator, seconds)
     if statistics.status == "step underflow" and not statistics.cause:
@@ -118,8 +124,52 @@ def drive(
         statistics=statistics,
         continuation=continuation if control is None else None,
     )
-    outcome = outcome if reported is None else outcome.in_coordinates_of(reported)
-    return outcome if earlier is None else _joined(earlier, outcome)
+    found = outcome if reported is None else outcome.in_coordinates_of(reported)
+    found = found if earlier is None else _joined(earlier, found)
+    if samples is None or not len(samples.times):
+        return found
+
+    @cache
+    def look_closer() -> Outcome:
+        between = _between(tree, samples, outcome, steering, control)
+        return _in_time(found, between if reported is None else between.in_coordinates_of(reported))
+
+    return replace(found, look_closer=look_closer)
+
+
+def _between(
+    tree: PlanarTree,
+    samples: _core.Samples,
+    outcome: Outcome,
+    steering: _core.ExternalLoads | None,
+    control: SampledControl | None,
+) -> Outcome:
+    """The outcome at samples of its run."""
+    reached = samples.times <= outcome.time[-1]
+    times = samples.times[reached]
+    states = samples.states.reshape(len(reached), -1)[reached]
+
+    def at(rows: Indices) -> _core.Run:
+        found = as_list(times[rows]), np.ascontiguousarray(states[rows])
+        if control is None:
+            return tree.both.outputs(*found, steering)
+        return tree.both.outputs_under(*found, control.motors, control.voltages, control.held(times[rows]))
+
+    def read(rows: Indices) -> Array:
+        run = at(rows)
+        return np.hstack([x for x in (run.multipliers, run.tau, run.F_p) if len(x) == len(rows)])
+
+    rows = worth_a_look(len(times), read)
+    run, forces = at(rows), outcome.forces
+    forces = forces if forces.tau is None else Forces(run.tau, run.F_p)
+    return replace(outcome, motion=motion_of(outcome.assembly, run, times[rows]), forces=forces)
+
+
+def _in_time(outcome: Outcome, between: Outcome) -> Outcome:
+    """An outcome with another at times between its outputs, of the same coordinates."""
+    order = in_order(outcome.time, between.time)
+    motion = outcome.motion.with_rows_of(between.motion, order)
+    return replace(outcome, motion=motion, forces=outcome.forces.with_rows_of(between.forces, order))
 
 
 def _integrated(
@@ -131,17 +181,19 @@ def _integrated(
     control: SampledControl | None,
     continuation: Continuation,
     progress: Progress,
+    samples: _core.Samples | None,
 ) -> _core.Run:
     q, v = tree.state(start.q, start.v)
     common: dict[str, Any] = {"times": as_list(times), "q": q, "v": v, "controls": controls, "carry_on": progress}
     if control is None:
         return _core.run_tree(
             tree.both, **common, external_loads=steering, recording=continuation.recording,
-            checkpoint=continuation.checkpoint,
+            checkpoint=continuation.checkpoint, samples=samples,
         )  # fmt: skip
     return _core.run_tree_sampled(
         tree.both, **common, motors=control.motors, patches=control.voltages, first_command=control.first,
         sensing=control.sensing, samples=as_list(control.times), delay=control.delay, controller=control.controller,
+        between=samples,
     )  # fmt: skip
 
 

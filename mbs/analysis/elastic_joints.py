@@ -103,7 +103,7 @@ def add_transmission(outcome: Outcome) -> Outcome:
         where = f'{outcome.assembly.model.scene.path}: joint "{gear.joint}"'
         spring = GearSpring(gear.stiffness, gear.damping, gear.inertia * gear.ratio**2, where)
         motions[gear.joint] = gear_motion(spring, outcome.time, tau, gear.inertia * gear.ratio * psi_ddot, gamma)
-    return replace(outcome, gears=motions)
+    return replace(outcome, gears=motions, look_closer=None)  # twists are splines through even outputs
 
 
 def _angles(outcome: Outcome, gear: ElasticGear) -> tuple[Array, Array]:

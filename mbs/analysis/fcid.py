@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
 from typing import Literal, Self
 
@@ -32,6 +33,7 @@ from .context import Context
 from .drive import motion_of, motors_fit
 from .elastic_joints import add_transmission
 from .outcome import Details, Forces, Outcome, Statistics
+from .samples import path_times
 
 FEWEST_NODES = 201  # of the spline through a static shape; half as many as outputs where that is more
 
@@ -126,21 +128,41 @@ def run_fcid(model: Model, analysis: Fcid) -> Outcome:
         import scipy.interpolate  # noqa: F401, loading takes longer than solving
     began = time.perf_counter()
     shape = prescribed_shape(model, analysis, motion, posture)
-    p, p_dot, p_ddot = sampled(shape, analysis.times)
-    run = motion.outputs(as_list(analysis.times), p, p_dot, p_ddot, posture)
-    seconds = time.perf_counter() - began
-    if len(run.q) < len(analysis.times):
-        t = analysis.times[len(run.q)]
+    found = _at(assembly, analysis, motion, shape, posture, analysis.times, has_motors=has_motors)
+    found = replace(found, statistics=Statistics(wall_seconds=time.perf_counter() - began))
+
+    @cache
+    def look_closer() -> Outcome:
+        times = path_times(analysis.times, assembly.model.scene.trajectory, analysis.end)
+        return _at(assembly, analysis, motion, shape, posture, times, has_motors=has_motors)
+
+    return replace(found, look_closer=look_closer)
+
+
+def _at(
+    assembly: MechanismSystem,
+    analysis: Fcid,
+    motion: _core.PrescribedMotion,
+    shape: Shape,
+    posture: Array,
+    times: Array,
+    *,
+    has_motors: bool,
+) -> Outcome:
+    """The outcome at `times` (T,), s."""
+    p, p_dot, p_ddot = sampled(shape, times)
+    run = motion.outputs(as_list(times), p, p_dot, p_ddot, posture)
+    if len(run.q) < len(times):
+        t = times[len(run.q)]
         raise SolveError(
-            f'{model.scene.path}: analysis "{analysis.name}": no position was found at t = {t:g} s: the'
+            f'{assembly.model.scene.path}: analysis "{analysis.name}": no position was found at t = {t:g} s: the'
             " prescribed shape takes the trajectory out of reach"
         )
     return Outcome(
         analysis=analysis,
         assembly=assembly,
-        motion=motion_of(assembly, run, analysis.times),
+        motion=motion_of(assembly, run, times),
         forces=Forces(run.tau, run.F_p) if has_motors else Forces(),
-        statistics=Statistics(wall_seconds=seconds),
         details=PrescribedShape(shape, run.shape_force),
     )
 

@@ -10,8 +10,8 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
-from functools import partial
+from dataclasses import dataclass, replace
+from functools import cache, partial
 from typing import Annotated, Literal, Self
 
 import numpy as np
@@ -36,6 +36,7 @@ from .drive import Progress, motion_of
 from .elastic_joints import add_transmission
 from .fcid import sampled
 from .outcome import Details, Forces, Outcome, Statistics
+from .samples import path_times
 
 DECAY = 23.0  # times the slowest time constant of zeros: what is left is 1e-10
 FACTOR_STEP = 0.02  # of the search for the largest factor
@@ -240,8 +241,20 @@ def cause_of(inversion: Inversion[S]) -> str:
 
 
 def _outcome(analysis: MotorsOnly, found: InvertedPath, seconds: float) -> Outcome:
-    inversion, servo = found.inversion, found.inversion.servo
     times = output_times(analysis.end, analysis.output_step, found.pre_actuation, found.post_actuation)
+    outcome = _at(analysis, found, seconds, times)
+
+    @cache
+    def look_closer() -> Outcome:
+        between = path_times(outcome.time, outcome.assembly.model.scene.trajectory, analysis.end)
+        return _at(analysis, found, seconds, between)
+
+    return replace(outcome, look_closer=look_closer)
+
+
+def _at(analysis: MotorsOnly, found: InvertedPath, seconds: float, times: Array) -> Outcome:
+    """The outcome at `times` (T,), s."""
+    inversion, servo = found.inversion, found.inversion.servo
     inside = times <= inversion.curve.x[-1] + 1e-9 * analysis.end  # what an integration reached
     p, p_dot, p_ddot = sampled(inversion.shape, times[inside])
     run = servo.motion.outputs(as_list(times[inside]), p, p_dot, p_ddot, servo.near[0])

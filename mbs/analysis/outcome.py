@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Self
 
 import numpy as np
 
-from ...common.arrays import Array
+from ...common.arrays import Array, Indices
 from ...common.errors import SolveError
 from .. import _core
 from .._core import TimeFunction
@@ -40,6 +40,15 @@ class _Rows:
         """These rows alone."""
         chosen = {name: None if x is None else x[rows] for name, x in vars(self).items()}
         return replace(self, **chosen)  # type: ignore[type-var]
+
+    def with_rows_of(self, other: Self, order: Indices) -> Self:
+        """With the rows of another behind these, all in another order."""
+        return type(self)(
+            **{
+                name: None if x is None else np.concatenate([x, getattr(other, name)])[order]
+                for name, x in vars(self).items()
+            }
+        )
 
     def followed_by(self, later: Self) -> Self:
         """With the rows that `later` has beyond those that are here."""
@@ -180,7 +189,7 @@ class Outcome:
     """What an analysis computed; `gears` by joint, of inverse analyses with elastic gears.
 
     Where links were divided, it is told of the one link; `in_pieces` is what was computed, and `point_names` say which
-    point of which piece a point of the link is there.
+    point of which piece a point of the link is there. `look_closer` finds the same, as computed, with times between.
     """
 
     analysis: Analysis
@@ -192,12 +201,19 @@ class Outcome:
     gears: Mapping[str, GearMotion] = field(default_factory=dict)
     continuation: Continuation | None = field(default=None, repr=False)
     in_pieces: Outcome | None = field(default=None, repr=False)
+    look_closer: Callable[[], Outcome] | None = field(default=None, repr=False)
     point_names: Mapping[str, str] = field(default_factory=dict, repr=False)
 
     @property
     def computed(self) -> Outcome:
         """The outcome as computed: that of the pieces where links were divided, else itself."""
         return self.in_pieces or self
+
+    @property
+    def closer(self) -> Outcome:
+        """The outcome as computed, at its outputs and between: see `samples`. Itself where nothing is between."""
+        found = self.computed
+        return found if found.look_closer is None else found.look_closer()
 
     @property
     def time(self) -> Array:

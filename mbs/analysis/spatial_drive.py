@@ -6,10 +6,11 @@ import time
 from collections.abc import Callable
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 
-from ...common.arrays import Array, as_list
+from ...common.arrays import Array, Indices, as_list
 from .. import _core
 from ..model.spatial_drives import NO_DRIVES, Command, Drives
 from ..model.spatial_model import SpatialModel
@@ -21,6 +22,7 @@ from ..solve.spatial_limits import left_ranges, watch_limits
 from ..solve.spatial_posture import NEARLY_SINGULAR, SINGULAR, robot_size, told_posture
 from ..solve.state import State
 from .drive import STATUS, Progress
+from .samples import new_samples, stops, worth_a_look
 from .spatial_earlier import ROWS, EarlierSpatialRun
 from .spatial_run import SpatialRun
 
@@ -34,6 +36,7 @@ class SpatialControl:
         first: (inputs,) before those of the first sample act.
         times: (K,) s, of the samples; the commands of each act `delay` (s) later.
         controller: commands (inputs,) from sample number, time and what was read: q (n_q,), v (n_v,), a (n_v,) in one.
+        held: commands (T, inputs) that have acted up to times (T,), s, after a run.
     """
 
     commands: tuple[Command, ...]
@@ -41,6 +44,7 @@ class SpatialControl:
     times: Array
     delay: float
     controller: Callable[[int, float, Array], Array]
+    held: Callable[[Array], Array]
 
 
 def spatial_drive(
@@ -54,12 +58,13 @@ def spatial_drive(
     times: Array | None = None,
     control: SpatialControl | None = None,
     earlier: EarlierSpatialRun | None = None,
+    is_looked_into: bool = True,
 ) -> SpatialRun:
     """The run of an integration from `start`, with outputs at `times`, those of the analysis where not given.
 
     Sampled `control` and `drives` act beside the loads of the scene. The rows of `model` hold. It ends early where
     `progress` says so, and in a posture in which the joints cannot follow the path, with a warning. It goes on with an
-    `earlier` run of the same analysis.
+    `earlier` run of the same analysis. `is_looked_into`: between its outputs, too.
     """
     times = analysis.times if times is None else times
     commands = control.commands if control is not None else ()
@@ -73,13 +78,16 @@ def spatial_drive(
     if earlier is not None:  # with the same candidates, and what they have become since
         integrator = replace(integrator, name=earlier.integrator.name, reason=earlier.integrator.reason)
     controls = integration_controls(analysis, integrator)
+    if any(row.is_trajectory for row in model.rows):
+        controls.stops = as_list(stops(times, model.scene.trajectory))
     system.integrated.scene.watch_posture(
         [model.rows[k].is_trajectory for k in system.integrated.rows], robot_size(model)
     )
     watch_limits(system.integrated.scene, model.tree)
     checkpoint = _core.TreeCheckpoint() if earlier is None else earlier.checkpoint
+    samples = new_samples(times, analysis) if is_looked_into else None
     with nullcontext() if earlier is None else earlier.checked(model, times):
-        run = _integrated(system, times, start, controls, control, progress, checkpoint)
+        run = _integrated(system, times, start, controls, control, progress, checkpoint, samples)
     q, v, a, multipliers = _rows(system, run, earlier)
     in_posture = _ends_in_posture(run)
     posture = told_posture(model, run.least_ratio, run.singular_at, run.singular_posture, is_end=in_posture)
@@ -87,7 +95,7 @@ def spatial_drive(
     told = (*warnings, *([posture] if posture else []), *left_ranges(model, run.ranges, times[: len(q)], q, v))
 
     def again(others: Array) -> SpatialRun:
-        return spatial_drive(model, analysis, start, progress, drives=drives, times=others)
+        return spatial_drive(model, analysis, start, progress, drives=drives, times=others, is_looked_into=False)
 
     found = SpatialRun(
         analysis, model, times[: len(q)], q, v, a, multipliers, applied=drives.at_points,
@@ -96,7 +104,31 @@ def spatial_drive(
         checkpoint=checkpoint if control is None else None, again=again if control is None else None,
         step_ends=np.array(run.step_ends),
     )  # fmt: skip
-    return found if earlier is None else found.added_to(earlier)
+    found = found if earlier is None else found.added_to(earlier)
+    if samples is None or not len(samples.times):
+        return found
+    look_closer = cache(lambda: found.among(_between(system, samples, found, control)))
+    return replace(found, look_closer=look_closer)
+
+
+def _between(
+    system: SpatialSystem, samples: _core.Samples, found: SpatialRun, control: SpatialControl | None
+) -> SpatialRun:
+    """The run at samples of it."""
+    core, scene, _ = system.integrated
+    reached = samples.times <= (found.time[-1] if len(found.time) else -np.inf)
+    times, states = samples.times[reached], samples.states.reshape(len(reached), -1)[reached]
+
+    def at(rows: Indices) -> _core.TreeRun:
+        chosen, of_rows = as_list(times[rows]), np.ascontiguousarray(states[rows])
+        if control is None:
+            return _core.tree_outputs(core, scene, chosen, of_rows)
+        held = system.held_forces(control.commands)
+        return _core.tree_outputs_under(core, scene, chosen, of_rows, held, control.held(times[rows]))
+
+    rows = worth_a_look(len(times), lambda rows: system.multipliers(at(rows).multipliers))
+    q, v, a, multipliers = _rows(system, at(rows), None)
+    return replace(found, time=times[rows], q=q, v=v, a=a, multipliers=multipliers)
 
 
 def _rows(system: SpatialSystem, run: _core.TreeRun, earlier: EarlierSpatialRun | None) -> list[Array]:
@@ -124,12 +156,13 @@ def _integrated(
     control: SpatialControl | None,
     progress: Progress,
     checkpoint: _core.TreeCheckpoint,
+    samples: _core.Samples | None,
 ) -> _core.TreeRun:
     core, scene, _ = system.integrated
     if control is None:
-        return _core.tree_motion(core, scene, as_list(times), start.q, start.v, controls, progress, checkpoint)
+        return _core.tree_motion(core, scene, as_list(times), start.q, start.v, controls, progress, checkpoint, samples)
     return _core.tree_sampled(
         model=core, scene=scene, times=as_list(times), q=start.q, v=start.v, controls=controls,
         carry_on=progress, held=system.held_forces(control.commands), first_command=control.first,
-        samples=as_list(control.times), delay=control.delay, controller=control.controller,
+        samples=as_list(control.times), delay=control.delay, controller=control.controller, between=samples,
     )  # fmt: skip

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 
@@ -18,6 +19,7 @@ from ..solve.spatial_prescribed import prescribed_motion, spatial_quasi_static_s
 from ..solve.spatial_redundancy import resolved
 from ..solve.state import State
 from .fcid import Fcid, Shape, given_shape, sampled, shape_nodes
+from .samples import path_times
 from .spatial_run import SpatialContext, SpatialRun
 
 
@@ -41,7 +43,13 @@ def run_spatial_fcid(context: SpatialContext, analysis: Fcid) -> SpatialRun:
     fits = sum(len(columns) for columns in model.motors.values()) == found.freedom
     shape = _shape(model, analysis, start, by_motors=fits)
     run = _run(model, analysis, shape, start, analysis.times, warnings)
-    return replace(run, wall_seconds=time.perf_counter() - began)
+    run = replace(run, wall_seconds=time.perf_counter() - began)
+
+    @cache
+    def look_closer() -> SpatialRun:
+        return _run(model, analysis, shape, start, path_times(run.time, model.scene.trajectory, analysis.end), warnings)
+
+    return replace(run, look_closer=look_closer)
 
 
 def _run(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import replace
-from functools import partial
+from functools import cache, partial
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from ..solve.internal_dynamics import is_unstable
 from ..solve.spatial_servo import SpatialServo, make_spatial_servo
 from ..solve.stable_inversion import Inversion, invert
 from .motors_only import MotorsOnly, cause_of, check_rest, choose_output, durations
+from .samples import path_times
 from .spatial_run import SpatialContext, SpatialRun
 
 NOTABLE = 1e-9  # m, rad: of a path that is left
@@ -37,8 +38,15 @@ def run_spatial_motors_only(context: SpatialContext, analysis: MotorsOnly) -> Sp
     times = output_times(analysis.end, analysis.output_step, pre, post)
     times = times[times <= inversion.curve.x[-1] + 1e-9 * analysis.end]  # what an integration reached
     run = _run(analysis, model, inversion, times)
+    seconds = time.perf_counter() - began
+
+    @cache
+    def look_closer() -> SpatialRun:
+        between = path_times(run.time, model.scene.trajectory, analysis.end)
+        return replace(_run(analysis, model, inversion, between), before=pre, after=post)
+
     return replace(
-        run, before=pre, after=post, wall_seconds=time.perf_counter() - began, warnings=_told(inversion, run)
+        run, before=pre, after=post, wall_seconds=seconds, warnings=_told(inversion, run), look_closer=look_closer
     )
 
 

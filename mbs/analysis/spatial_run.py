@@ -16,7 +16,11 @@ from ..scene.analysis import Analysis
 from ..solve.integrators import NOT_INTEGRATED, Choice
 from .drive import Progress
 from .outcome import ADVICE, Details
+from .samples import in_order
 from .spatial_earlier import EarlierSpatialRun
+
+OF_TIME = ("time", "q", "v", "a", "multipliers", "required")
+"""Arrays of a run with a row for each time."""
 
 
 @dataclass(frozen=True)
@@ -46,6 +50,7 @@ class SpatialRun:
         checkpoint: where its integration can be gone on with; None where that cannot be done.
         step_ends: (N,) s, with which it can be repeated, if it was asked for them; see `fields.steps`.
         again: the same run with outputs at other times (T,), between its first and its last; None where it has none.
+        look_closer: the same with times between its outputs; None where nothing is between.
     """
 
     analysis: Analysis
@@ -73,6 +78,12 @@ class SpatialRun:
     checkpoint: _core.TreeCheckpoint | None = field(default=None, repr=False)
     again: Callable[[Array], SpatialRun] | None = field(default=None, repr=False)
     step_ends: Array = field(default_factory=lambda: np.zeros(0), repr=False)
+    look_closer: Callable[[], SpatialRun] | None = field(default=None, repr=False)
+
+    @property
+    def closer(self) -> SpatialRun:
+        """The run at its outputs and between: see `samples`. Itself where nothing is between."""
+        return self if self.look_closer is None else self.look_closer()
 
     @property
     def time_reached(self) -> float:
@@ -88,9 +99,15 @@ class SpatialRun:
 
     def rows(self, chosen: slice | Sequence[int]) -> SpatialRun:
         """These outputs alone."""
-        names = ("time", "q", "v", "a", "multipliers", "required")
-        of_time = {name: getattr(self, name) for name in names}
+        of_time = {name: getattr(self, name) for name in OF_TIME}
         return replace(self, **{name: values[chosen] for name, values in of_time.items() if values is not None})
+
+    def among(self, between: SpatialRun) -> SpatialRun:
+        """With the rows of the same run at times between its outputs."""
+        order = in_order(self.time, between.time)
+        of_time = {name: (getattr(self, name), getattr(between, name)) for name in OF_TIME}
+        joined = {name: np.concatenate(both)[order] for name, both in of_time.items() if both[0] is not None}
+        return replace(self, **joined)
 
     def added_to(self, earlier: EarlierSpatialRun) -> SpatialRun:
         """With the work of the run that this one went on from."""

@@ -106,9 +106,22 @@ void bind_integrate(nb::module_ &m) {
            "expected of it, in s of the run per cost.")
       .def_rw("keep_steps", &IntegrationControls::keep_steps,
               "Whether ends of steps are reported, if they can be repeated.")
+      .def_rw("stops", &IntegrationControls::stops, "Times (s), ascending, at which steps end, too.")
       .def_rw("repeated_steps", &IntegrationControls::repeated_steps,
               "Ends (s) of the steps to take, with the first method and whatever their error; none: as the tolerance\n"
               "wants them.");
+  nb::class_<Samples>(m, "Samples", "States within a run, closer than its outputs: mbs/core/integrate/integrate.h.")
+      .def(
+          "__init__",
+          [](Samples *s, double longest, std::size_t most) {
+            if (!(longest > 0) || most < 2)
+              throw std::invalid_argument("samples: expected a positive time between them, and at least two");
+            new (s) Samples{longest, most};
+          },
+          "longest"_a, "most"_a, "longest: s between two of them, where steps are longer; most: of them.")
+      .def_prop_ro("times", [](const Samples &s) { return as_vector(s.times); })
+      .def_prop_ro(
+          "states", [](const Samples &s) { return as_vector(s.states); }, "(q, v) of each, one after the other.");
   nb::class_<Recording>(m, "Recording", "The accepted steps of a run, from which its dense output can be made again.")
       .def(nb::init<>())
       .def("__init__", &make_recording, "times"_a, "states"_a, "methods"_a, "spectral_radius"_a, "tolerance"_a,

@@ -45,17 +45,17 @@ def _jump(function: TimeFunction, end: float, order: int) -> tuple[float, float,
     size = max(float(np.ptp(samples)), still) if order == 0 else max(float(np.abs(samples).max()), still / end)
     if not (np.isfinite(samples).all() and size > 0):
         return None
-    misfits = _misfits(function, times, order)
-    rough = np.argsort(-misfits)[:LOOKED_INTO]
-    rough = rough[misfits[rough] > SMOOTH * JUMP * size]
+    missed = misfits(function, times, order)
+    rough = np.argsort(-missed)[:LOOKED_INTO]
+    rough = rough[missed[rough] > SMOOTH * JUMP * size]
     if rough.size == 0:
         return None
     a, b = times[rough], times[rough + 1]
     for _ in range(HALVINGS):
         middle = 0.5 * (a + b)
-        halves = _misfits(function, np.stack([a, middle, b]), order)
+        halves = misfits(function, np.stack([a, middle, b]), order)
         a, b = np.where(halves[0] > halves[1], (a, middle), (middle, b))
-    jumps = _misfits(function, np.stack([a, b]), order)[0] > JUMP * size
+    jumps = misfits(function, np.stack([a, b]), order)[0] > JUMP * size
     if not jumps.any():
         return None
     first = np.flatnonzero(jumps)[np.argmin(b[jumps])]
@@ -63,11 +63,11 @@ def _jump(function: TimeFunction, end: float, order: int) -> tuple[float, float,
     return float(b[first]), float(before), float(after)
 
 
-def _misfits(function: TimeFunction, times: Array, order: int) -> Array:
+def misfits(function: TimeFunction, times: Array, order: int) -> Array:
     """What the trapezoidal rule on the next derivative misses of each change between neighbouring times.
 
     Of times (T, …) along the first axis; (T − 1, …).
     """
     value, slope = function.sample(times.ravel())[order : order + 2].reshape(2, *times.shape)
-    misfits: Array = np.abs(np.diff(value, axis=0) - 0.5 * np.diff(times, axis=0) * (slope[1:] + slope[:-1]))
-    return np.nan_to_num(misfits, nan=0.0, posinf=0.0)
+    missed: Array = np.abs(np.diff(value, axis=0) - 0.5 * np.diff(times, axis=0) * (slope[1:] + slope[:-1]))
+    return np.nan_to_num(missed, nan=0.0, posinf=0.0)

@@ -252,7 +252,7 @@ def test_short_peaks_of_motors_only_are_laid_to_the_jerk():
         about = dict(results.attributes("motors/feasibility/joints/shoulder"))
         spikes.append((about["moment"] > 1.1 * about["usual_moment"], about["jump"]))
         peak = np.abs(results["motors/joints/shoulder/moment"]).argmax()
-        assert about["moment_time"] == results.time("motors")[peak]
+        assert about["moment_time"] == pytest.approx(results.time("motors")[peak], abs=0.0005)  # between outputs
     assert spikes == [(True, "jerk"), (False, "")]
 
 

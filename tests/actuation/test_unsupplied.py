@@ -141,7 +141,7 @@ def test_what_is_said(tmp_path):
     assert list(about["bodies"]) == ["link1"]
     assert not results.attributes("inverse/feasibility")["feasible"]
     shift = np.linalg.norm(results["inverse/points/link1.tip/predicted_shift"], axis=1)
-    assert about["angles_kept"] == shift.max()
+    assert about["angles_kept"] == pytest.approx(shift.max(), rel=1e-4)  # which may be between outputs
     assert about["at_start"] == shift[0]
 
 

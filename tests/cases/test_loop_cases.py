@@ -85,8 +85,8 @@ def test_motors_and_joints_as_places_of_encoders(compliant):
 
 def test_closed_loops(loops):
     metrics = check_runs(loops, "two_link_closed_loop")
-    assert metrics["pd_patches_blow"]["residual"] < metrics["pd_blow"]["residual"] / 10
-    assert metrics["lqr_blow"]["residual"] < metrics["moments_blow"]["residual"] / 1000
+    assert metrics["lqr"]["vibration"] < metrics["pd"]["vibration"] / 10
+    assert metrics["lqr"]["vibration"] < metrics["moments"]["vibration"] / 290
 
 
 def test_all_ways_along_one_path(rest_to_rest):
@@ -96,7 +96,7 @@ def test_all_ways_along_one_path(rest_to_rest):
     assert all(metrics[run]["peak_voltage"] <= 200 for run in driven_by_patches)
     table = "two_link_rest_to_rest", "times less"
     factors, allowed = readme_table(*table), TABLES[table]
-    for label, key in (("rms", "tip_error_rms"), ("at the end", "residual")):
+    for label, key in (("rms", "tip_error_rms"), ("vibration", "vibration")):
         for way, run in (("PD and patches", "pd_patches"), ("LQR", "lqr")):
             found = [metrics[f"{run}{blow}"][key] / metrics[f"moments{blow}"][key] for blow in ("", "_blow")]
             np.testing.assert_allclose(1 / np.array(found), factors[f"{label}, {way}"], rtol=allowed)

@@ -163,12 +163,6 @@ def test_sets_of_sets_and_surfaces(read):
     assert face_area(ends, "root") == pytest.approx(2 * VOLUME)
 
 
-def test_nodes_of_a_set_of_elements(read):
-    """The two elements at the tip have the nodes of x = 2/3 and 1."""
-    text = PLAIN + "*ELSET, ELSET=TIP\n5, 6\n*NSET, NSET=END, ELSET=TIP\n"
-    assert face_area(read(text, (PlaceRecord(name="tip", group="END"),)), "tip") > VOLUME
-
-
 def test_sides_of_a_surface(read):
     """S6 of a hexahedron has the corners 4, 8, 5, 1: here x = 0."""
     text = PLAIN + "*SURFACE, NAME=SIDE, TYPE=ELEMENT\n1, S6\n2, S6\n"

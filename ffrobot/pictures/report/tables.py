@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...common.arrays import Array
+from ...common.peaks import largest
 from ...results.file import Results, status_in_words
 from ...results.joints import joint_coordinates
 from ..figures.shared import bending_points
@@ -66,27 +66,26 @@ def bending_table(runs: Sequence[Run]) -> Table:
 
 def peaks_table(runs: Sequence[Run]) -> Table:
     """The largest absolute value of what a reader asks for first, in every run."""
-    rows = [
-        (run.label, what, f"{np.max(np.abs(values)):.4g} {unit}", f"{run.results.time(run.analysis)[_peak(values)]:g}")
-        for run in runs
-        for what, unit, values in _peaks(run)
-    ]
+    found = ((run.label, *peak) for run in runs for peak in _peaks(run))
+    rows = [(label, what, f"{value:.4g} {unit}", f"{at:.4g}") for label, what, unit, value, at in found]
     return Table(("analysis", "largest", "value", "at (s)"), rows)
 
 
-def _peaks(run: Run) -> Iterator[tuple[str, str, Array]]:
-    """(quantity, unit, its values (T, …)) of a run."""
+def _peaks(run: Run) -> Iterator[tuple[str, str, float, float]]:
+    """(quantity, unit, its largest size, when it has that) of a run."""
     results, analysis = run.results, run.analysis
     for target in targets(run.results, run.analysis):
-        yield f"distance of {target.point} from its path", "mm", 1e3 * path_error(run, target)
+        error = 1e3 * path_error(run, target)
+        found = largest(results.time(analysis)[: len(error)], error)
+        yield f"distance of {target.point} from its path", "mm", *found
     for joint in (keys["name"] for keys in results.scene.get("joint", [])):
         for coordinate in joint_coordinates(results.scene, joint):
             if results.has(moment := f"{analysis}/joints/{joint}/moment"):
                 name = f"motor of joint {joint}{coordinate.label}"
-                yield name, coordinate.force_unit, results.data(moment + coordinate.column)
+                yield name, coordinate.force_unit, *results.peak(moment + coordinate.column)
     for point in bending_points(results, analysis):
-        deflection = np.linalg.norm(results[f"{analysis}/points/{point}/deflection"], axis=1)
-        yield f"deflection of {point}", "mm", 1e3 * deflection
+        deflection, at = results.peak(f"{analysis}/points/{point}/deflection")
+        yield f"deflection of {point}", "mm", 1e3 * deflection, at
 
 
 def voltages_table(runs: Sequence[Run]) -> Table:
@@ -96,7 +95,8 @@ def voltages_table(runs: Sequence[Run]) -> Table:
     for run in runs:
         for body in run.results.names(f"{run.analysis}/pzt"):
             group = f"{run.analysis}/pzt/{body}"
-            about, required = run.results.attributes(group), np.abs(run.results[f"{group}/required_voltage"])
+            about, patches = run.results.attributes(group), range(run.results[f"{group}/required_voltage"].shape[1])
+            required = np.array([run.results.peak(f"{group}/required_voltage[{k}]")[0] for k in patches])
             limits = np.atleast_1d(about["limit"])  # one for all patches, or one each
             times = np.max(required / limits)
             limit = (f"{limits.min():g}", f"{times:.3g}") if np.isfinite(limits).any() else ("none", "")
@@ -119,11 +119,6 @@ def origins_table(files: Sequence[Results], studies: Sequence[StudyPart]) -> Tab
         rows.append(("", "written by", f"ffrobot {part.study.ffrobot_version}", ""))
         rows.append(("", "scene file", part.study.scene, ""))
     return Table(("results", "what", "where", "SHA-256"), rows)
-
-
-def _peak(values: Array) -> int:
-    """At which output the largest absolute value is."""
-    return int(np.unravel_index(np.argmax(np.abs(values)), values.shape)[0])
 
 
 def _sha256(content: bytes) -> str:

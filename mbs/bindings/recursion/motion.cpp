@@ -25,7 +25,7 @@ namespace {
 template <class Space>
 TreeRun motion_of(const Model<Space> &model, const Scene &scene, const std::vector<double> &times, const VectorXd &q,
                   const VectorXd &v, const IntegrationControls &controls, const std::function<bool(double)> &carry_on,
-                  TreeCheckpoint *checkpoint) {
+                  TreeCheckpoint *checkpoint, Samples *samples) {
   model.check_state(q, v);
   check_scene(model, scene);
   const nb::gil_scoped_release unlocked;
@@ -35,7 +35,7 @@ TreeRun motion_of(const Model<Space> &model, const Scene &scene, const std::vect
     check_size("state of the checkpoint", checkpoint->integration.state.size(), q.size() + v.size());
     motion.go_on(checkpoint->history);
   }
-  return integrated(model, scene, motion, reader, times, q, v, controls, carry_on, nullptr, checkpoint);
+  return integrated(model, scene, motion, reader, times, q, v, controls, carry_on, nullptr, checkpoint, samples);
 }
 
 // The same of states (T, n_q + n_v) that are known
@@ -104,7 +104,7 @@ template <class Space> void bind_motion(nb::module_ &m) {
   bind_newton_step(&newton_step<Space, double>);
   bind_newton_step(&newton_step<Space, std::complex<double>>);
   m.def("tree_motion", &motion_of<Space>, "model"_a, "scene"_a, "times"_a, "q"_a, "v"_a, "controls"_a, "carry_on"_a,
-        "checkpoint"_a = nb::none(),
+        "checkpoint"_a = nb::none(), "samples"_a = nb::none(),
         "Integrates the motion from (q, v) at the first of `times`, or on from a checkpoint, which it moves, and "
         "reports\n"
         "it at all of them; rows of outputs that were delivered before mean nothing. carry_on(t), which is called now "

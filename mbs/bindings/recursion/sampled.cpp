@@ -53,7 +53,8 @@ template <class Space>
 TreeRun sampled_motion_of(const Model<Space> &model, const Scene &scene, const std::vector<double> &times,
                           const VectorXd &q, const VectorXd &v, const IntegrationControls &controls,
                           const std::function<bool(double)> &carry_on, HeldForces held, const VectorXd &first_command,
-                          const std::vector<double> &samples, double delay, const Controller &controller) {
+                          const std::vector<double> &samples, double delay, const Controller &controller,
+                          Samples *between) {
   model.check_state(q, v);
   check_scene(model, scene);
   check_held(model, held);
@@ -65,14 +66,40 @@ TreeRun sampled_motion_of(const Model<Space> &model, const Scene &scene, const s
   Plant<Space> plant(model.mechanism, reader, held);
   const Sampling sampling{samples, delay, locked(controller)};
   const SampledLoop loop(plant, sampling, times.back());
-  return integrated(model, scene, motion, reader, times, q, v, controls, carry_on, &loop.breaks(), nullptr);
+  return integrated(model, scene, motion, reader, times, q, v, controls, carry_on, &loop.breaks(), nullptr, between);
+}
+
+template <class Space>
+TreeRun held_outputs_of(const Model<Space> &model, const Scene &scene, const std::vector<double> &times,
+                        const RowMajorMatrix &states, HeldForces held, const RowMajorMatrix &commands) {
+  check_scene(model, scene);
+  check_held(model, held);
+  check_size("states", states.cols(), model.mechanism.n_q + model.mechanism.n_v);
+  check_size("times", static_cast<Index>(times.size()), states.rows());
+  check_size("commands", commands.rows(), states.rows());
+  check_size("inputs", commands.cols(), held.direction().cols());
+  TreeRun run(model, times.size());
+  if (times.empty())
+    return run;
+  const double *first = states.row(0).data();
+  held.hold(commands.row(0).transpose());
+  RecursiveMotion<Space> reader(model.mechanism, scene, times.front(), first, first + model.mechanism.n_q, &held);
+  for (std::size_t i = 0; i < times.size(); ++i) {
+    const auto row = static_cast<Index>(i);
+    held.hold(commands.row(row).transpose());
+    run.evaluate(i, times[i], states.row(row).data(), reader, model.mechanism);
+  }
+  return run;
 }
 
 template <class Space> void bind_sampled_motion(nb::module_ &m) {
   m.def("tree_sampled", &sampled_motion_of<Space>, nb::kw_only(), "model"_a, "scene"_a, "times"_a, "q"_a, "v"_a,
         "controls"_a, "carry_on"_a, "held"_a, "first_command"_a, "samples"_a, "delay"_a, "controller"_a,
+        "between"_a = nb::none(),
         "As tree_motion, under commands that `controller`(k, t, (q, v, a)) gives at samples and that act as `held` "
         "says.");
+  m.def("tree_outputs_under", &held_outputs_of<Space>, "model"_a, "scene"_a, "times"_a, "states"_a, "held"_a,
+        "commands"_a, "As tree_outputs, under commands (T, inputs).");
 }
 
 } // namespace

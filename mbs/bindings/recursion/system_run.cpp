@@ -76,9 +76,39 @@ Run reported_at(const SystemOnTree &both, double t, const VectorXd &q, const Vec
   return {{}, outputs.take(1), {}};
 }
 
+Run reported(const SystemOnTree &both, const std::vector<double> &times, const recursion::RowMajorMatrix &states,
+             ExternalLoads *external_loads, const std::function<void(std::size_t)> &before) {
+  check_size("states", states.cols(), both.state_size());
+  check_size("times", static_cast<Index>(times.size()), states.rows());
+  if (times.empty())
+    throw nb::value_error("times: expected some, found none");
+  before(0);
+  TreeOutputs outputs(both, times.size(), times.front(), states.row(0).data(), external_loads);
+  for (std::size_t i = 0; i < times.size(); ++i) {
+    before(i);
+    outputs(i, times[i], states.row(static_cast<Index>(i)).data());
+  }
+  return {{}, outputs.take(times.size()), {}};
+}
+
+Run reported_of(const SystemOnTree &both, const std::vector<double> &times, const recursion::RowMajorMatrix &states,
+                ExternalLoads *external_loads) {
+  return reported(both, times, states, external_loads, [](std::size_t) {});
+}
+
+Run reported_under(const SystemOnTree &both, const std::vector<double> &times, const recursion::RowMajorMatrix &states,
+                   std::size_t motors, std::vector<HeldCommands::Patches> patches,
+                   const recursion::RowMajorMatrix &held) {
+  check_size("held commands", held.rows(), states.rows());
+  HeldCommands commands(motors, std::move(patches));
+  return reported(both, times, states, &commands,
+                  [&](std::size_t i) { commands.set(held.row(static_cast<Index>(i)).transpose()); });
+}
+
 Run run_tree(const SystemOnTree &both, const std::vector<double> &times, const VectorXd &q, const VectorXd &v,
              const IntegrationControls &controls, const std::function<bool(double)> &carry_on,
-             ExternalLoads *external_loads, Recording *recording, recursion::TreeCheckpoint *checkpoint) {
+             ExternalLoads *external_loads, Recording *recording, recursion::TreeCheckpoint *checkpoint,
+             Samples *samples) {
   const VectorXd state = state_of(both, q, v);
   const nb::gil_scoped_release unlocked;
   std::optional<SteeredTree> steering;
@@ -94,7 +124,7 @@ Run run_tree(const SystemOnTree &both, const std::vector<double> &times, const V
   }
   TreeOutputs outputs(both, times.size(), times.front(), state.data(), external_loads);
   Run found = run(motion, times, state, controls, outputs, locked(carry_on), recording, nullptr,
-                  checkpoint ? &checkpoint->integration : nullptr);
+                  checkpoint ? &checkpoint->integration : nullptr, samples);
   if (checkpoint)
     checkpoint->history = motion.history();
   return found;
@@ -105,7 +135,8 @@ using Controller = std::function<VectorXd(std::size_t, double, const VectorXd &)
 Run run_tree_sampled(const SystemOnTree &both, const std::vector<double> &times, const VectorXd &q, const VectorXd &v,
                      const IntegrationControls &controls, const std::function<bool(double)> &carry_on,
                      std::size_t motors, std::vector<HeldCommands::Patches> patches, const VectorXd &first_command,
-                     Sensing &sensing, const std::vector<double> &samples, double delay, const Controller &controller) {
+                     Sensing &sensing, const std::vector<double> &samples, double delay, const Controller &controller,
+                     Samples *between) {
   const VectorXd state = state_of(both, q, v);
   const nb::gil_scoped_release unlocked;
   HeldCommands commands(motors, std::move(patches));
@@ -114,7 +145,7 @@ Run run_tree_sampled(const SystemOnTree &both, const std::vector<double> &times,
   TreeMotion motion(both.tree, both.scene, times.front(), q.data(), v.data(), nullptr, &steering);
   TreeOutputs outputs(both, times.size(), times.front(), state.data(), &commands);
   return run_sampled(motion, times, state, controls, outputs, commands, sensing, {samples, delay, locked(controller)},
-                     locked(carry_on));
+                     locked(carry_on), between);
 }
 
 void bind_drives(nb::module_ &m) {
@@ -201,6 +232,10 @@ void bind_system_run(nb::module_ &m) {
            "Kinetic, strain, gravitational energy and dissipated power (T, 4) of states q, v (T, n_v) of the tree.")
       .def("at", &reported_at, "t"_a, "q"_a, "v"_a, "external_loads"_a = nb::none(),
            "What a run reports of a state q, v (n_v) of the tree, which is not moved onto its rows.")
+      .def("outputs", &reported_of, "times"_a, "states"_a, "external_loads"_a = nb::none(),
+           "What a run reports of states (T, n_q + n_v) of the tree near its rows, at times (T,).")
+      .def("outputs_under", &reported_under, "times"_a, "states"_a, "motors"_a, "patches"_a, "commands"_a,
+           "As `outputs`, under commands (T, inputs) of motors and patches.")
       .def("acceleration_violation", &violation_of, "t"_a, "q"_a, "v"_a, "a"_a,
            "Largest violation of C_ddot = 0 by accelerations a (n_v) of the tree, relative to the terms that cancel.");
   bind_prescribed(m);
@@ -208,10 +243,11 @@ void bind_system_run(nb::module_ &m) {
       .def("__init__", &make_actuation, "both"_a, "recording"_a, nb::keep_alive<1, 2>(), nb::keep_alive<1, 3>());
   m.def("run_tree", &run_tree, "both"_a, nb::kw_only(), "times"_a, "q"_a, "v"_a, "controls"_a, "carry_on"_a,
         "external_loads"_a = nb::none(), "recording"_a = nb::none(), "checkpoint"_a = nb::none(),
+        "samples"_a = nb::none(),
         "Integrates the motion from (q, v) of the tree, or on from a checkpoint, which it moves, and reports it at "
         "`times`.\n"
-        "Recording and checkpoint are of the tree, too.");
+        "Recording, checkpoint and samples are of the tree, too.");
   m.def("run_tree_sampled", &run_tree_sampled, "both"_a, nb::kw_only(), "times"_a, "q"_a, "v"_a, "controls"_a,
         "carry_on"_a, "motors"_a, "patches"_a, "first_command"_a, "sensing"_a, "samples"_a, "delay"_a, "controller"_a,
-        "As `run_tree`, under commands that `controller`(k, t, readings) gives at samples.");
+        "between"_a = nb::none(), "As `run_tree`, under commands that `controller`(k, t, readings) gives at samples.");
 }

@@ -124,12 +124,13 @@ struct TreeRun {
 };
 
 // The motion from (q, v) at the first of `times`, or on from a checkpoint, with outputs at all of them, which `reader`
-// evaluates. `breaks` and `checkpoint` may be null.
+// evaluates. `breaks`, `checkpoint` and `samples` may be null.
 template <class Space>
 TreeRun integrated(const Model<Space> &model, const Scene &scene, RecursiveMotion<Space> &motion,
                    RecursiveMotion<Space> &reader, const std::vector<double> &times, const Eigen::VectorXd &q,
                    const Eigen::VectorXd &v, const IntegrationControls &controls,
-                   const std::function<bool(double)> &carry_on, const Breaks *breaks, TreeCheckpoint *checkpoint) {
+                   const std::function<bool(double)> &carry_on, const Breaks *breaks, TreeCheckpoint *checkpoint,
+                   Samples *samples = nullptr) {
   TreeRun run(model, times.size());
   run.last << q, v;
   motion.plan(times.back() - times.front());
@@ -145,7 +146,8 @@ TreeRun integrated(const Model<Space> &model, const Scene &scene, RecursiveMotio
   run.report = integrate(
       motion, times, run.last, controls,
       [&](std::size_t i, double t, const double *state) { run.evaluate(i, t, state, reader, model.mechanism); },
-      locked(carry_on), nullptr, breaks, checkpoint ? &checkpoint->integration : nullptr, limits ? &*limits : nullptr);
+      locked(carry_on), nullptr, breaks, checkpoint ? &checkpoint->integration : nullptr, limits ? &*limits : nullptr,
+      samples);
   if (limits)
     run.ranges = limits->seen();
   if (checkpoint)

@@ -1,5 +1,8 @@
 #include "core/integrate/delivery.h"
 
+#include <algorithm>
+#include <cmath>
+
 namespace ffrobot {
 
 void Delivery::outputs_at(double t, const double *z) {
@@ -21,6 +24,43 @@ void Delivery::record(double t, const double *z) {
   const double *y = state(z);
   recording_->times.push_back(t);
   recording_->states.insert(recording_->states.end(), y, y + system_.local().state_size());
+}
+
+void Delivery::sample_step(Method &method, double t, const double *z, double h, double end) {
+  if (!samples_)
+    return;
+  const int parts = static_cast<int>(std::ceil(h / samples_->longest));
+  if (parts > 1) {
+    method.prepare_dense(t, z, h);
+    for (int i = 1; i < parts; ++i) {
+      method.interpolate(t + i * h / parts, z_output_.data());
+      sample(t + i * h / parts, z_output_.data());
+    }
+    if (method.needs_slopes_between()) // the system is where it was
+      system_.slope(end, method.end(), method.last_slope());
+  }
+  if (++steps_ % every_ == 0)
+    sample(end, method.end());
+}
+
+void Delivery::sample(double t, const double *z) {
+  if (!samples_)
+    return;
+  auto &[longest, most, times, states] = *samples_;
+  const std::size_t n = static_cast<std::size_t>(system_.local().state_size());
+  if (times.size() >= most) {
+    std::size_t kept = 0;
+    for (std::size_t i = 0; i < times.size(); i += 2, ++kept) {
+      times[kept] = times[i];
+      std::copy_n(states.begin() + static_cast<std::ptrdiff_t>(i * n), n,
+                  states.begin() + static_cast<std::ptrdiff_t>(kept * n));
+    }
+    times.resize(kept), states.resize(kept * n);
+    every_ *= 2;
+  }
+  const double *y = state(z);
+  times.push_back(t);
+  states.insert(states.end(), y, y + n);
 }
 
 void Delivery::record_method(const MethodChoice &method) {

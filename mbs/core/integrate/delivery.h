@@ -1,4 +1,4 @@
-// What a run delivers: outputs at given times, and the recording of its steps.
+// What a run delivers: outputs at given times, the recording of its steps, and samples of them.
 #pragma once
 
 #include "core/integrate/integrate.h"
@@ -7,9 +7,11 @@ namespace ffrobot {
 
 class Delivery {
 public:
-  // `times` in s, ascending; `recording` may be null.
-  Delivery(OdeSystem &system, const std::vector<double> &times, const StateFunctionOfTime &output, Recording *recording)
-      : system_(system), times_(times), output_(output), recording_(recording), z_output_(system.size()) {}
+  // `times` in s, ascending; `recording` and `samples` may be null.
+  Delivery(OdeSystem &system, const std::vector<double> &times, const StateFunctionOfTime &output, Recording *recording,
+           Samples *samples)
+      : system_(system), times_(times), output_(output), recording_(recording), samples_(samples),
+        z_output_(system.size()) {}
 
   std::size_t outputs() const { return outputs_; }
   void go_on(std::size_t outputs) { outputs_ = outputs; }
@@ -27,6 +29,9 @@ public:
   void outputs_of_step(Method &method, double t);
 
   void record(double t, const double *z);
+  // Of a step of size h from (t, z), which the method has just made; slopes at its end are as they were.
+  void sample_step(Method &method, double t, const double *z, double h, double end);
+  void sample(double t, const double *z);
   void record_method(const MethodChoice &method); // that of the steps from the last recorded time on
 
 private:
@@ -36,7 +41,9 @@ private:
   const std::vector<double> &times_;
   const StateFunctionOfTime &output_;
   Recording *recording_;
+  Samples *samples_;
   std::size_t outputs_ = 0;
+  unsigned long steps_ = 0, every_ = 1; // of steps, the ends that are sampled
   Eigen::VectorXd z_output_;
 };
 

@@ -54,9 +54,9 @@ public:
   Integration(OdeSystem &system, const std::vector<double> &times, const Eigen::VectorXd &y,
               const IntegrationControls &controls, const StateFunctionOfTime &output,
               const std::function<bool(double)> &carry_on, Recording *recording, const Breaks *breaks,
-              LimitWatch *limits)
+              LimitWatch *limits, Samples *samples)
       : system_(system), controls_(controls), breaks_(breaks), limit_watch_(limits),
-        delivery_(system, times, output, recording),
+        delivery_(system, times, output, recording, samples),
         watch_(system, times.front(), times.back(), controls.max_steps, carry_on),
         step_limit_(system, times.front(), times.back(), controls.tolerance),
         methods_(controls.methods, times.front(), times.back()), method_(make_method(methods_.at_work(), system)),
@@ -73,6 +73,7 @@ public:
     system_.accepted(t_, z_.data(), method_->first_slope());
     delivery_.record(t_, z_.data());
     delivery_.record_method(methods_.at_work());
+    delivery_.sample(t_, z_.data());
     delivery_.output(z_.data());
     if (limit_watch_)
       limit_watch_->begin(t_, z_.data());
@@ -206,6 +207,10 @@ private:
       end_at(breaks_->times[next_break_]);
     if (jump_)
       end_at(jump_->before);
+    while (next_stop_ < controls_.stops.size() && controls_.stops[next_stop_] <= at_once())
+      ++next_stop_;
+    if (next_stop_ < controls_.stops.size())
+      end_at(controls_.stops[next_stop_]);
     const double wanted = next_step(steps_.next_step, target - t_, lands);
     const double fastest = system_.local().fastest_rotation(z_.data() + system_.n_v());
     const double step = std::min(step_limit_.of(t_, wanted), most_turn / fastest);
@@ -258,7 +263,8 @@ private:
     // shortened much, to end at a break or a jump or by what is prescribed, tells nothing: the next step stays as long
     // as the control had asked for.
     const double asked = std::clamp(steps_.next_step, attempt.step, 2 * attempt.step);
-    const bool ends_early = attempt.is_limited || (t_ == attempt.target && (breaks_ || jump_));
+    const bool ends_early =
+        attempt.is_limited || (t_ == attempt.target && (breaks_ || jump_ || !controls_.stops.empty()));
     if (!(ends_early && 2 * attempt.step < steps_.next_step))
       steps_.next_step = control_.after_accepted(
           asked, asked > attempt.step ? size * std::pow(asked / attempt.step, method_->error_order()) : size);
@@ -272,6 +278,7 @@ private:
   bool take(const Attempt &attempt) {
     ++report_.steps;
     delivery_.outputs_of_step(*method_, attempt.end);
+    delivery_.sample_step(*method_, t_, z_.data(), attempt.step, attempt.end);
     if (limit_watch_)
       limit_watch_->look(*method_, methods_.at_work(), t_, z_.data(), attempt.step);
     move_to_end(attempt);
@@ -313,6 +320,7 @@ private:
     t_ = jump_->after;
     jump_.reset();
     delivery_.record(t_, z_.data());
+    delivery_.sample(t_, z_.data());
     delivery_.outputs_at(at_once(), z_.data());
     pass_breaks();
     system_.slope(t_, z_.data(), method_->first_slope());
@@ -342,7 +350,7 @@ private:
   StepHistory steps_;
   IntegrationReport report_;
   double t_, end_, duration_;
-  std::size_t next_break_ = 0;
+  std::size_t next_break_ = 0, next_stop_ = 0;
   bool is_repeatable_;         // by the ends of steps alone
   std::optional<Jump> jump_;   // the next one that is known
   double searched_until_ = t_; // there is no other before
@@ -360,8 +368,8 @@ const MethodChoice &Recording::method_of(std::size_t step) const {
 IntegrationReport integrate(OdeSystem &system, const std::vector<double> &times, Eigen::VectorXd &y,
                             const IntegrationControls &controls, const StateFunctionOfTime &output,
                             const std::function<bool(double)> &carry_on, Recording *recording, const Breaks *breaks,
-                            IntegrationCheckpoint *checkpoint, LimitWatch *limits) {
-  Integration integration(system, times, y, controls, output, carry_on, recording, breaks, limits);
+                            IntegrationCheckpoint *checkpoint, LimitWatch *limits, Samples *samples) {
+  Integration integration(system, times, y, controls, output, carry_on, recording, breaks, limits, samples);
   if (checkpoint && checkpoint->has_begun())
     integration.go_on(*checkpoint);
   else

@@ -23,6 +23,16 @@ struct Recording {
   const MethodChoice &method_of(std::size_t step) const;
 };
 
+// States within a run, closer than its outputs: ends of steps, and times between them where steps are longer than
+// `longest`. With more than `most` of them every other one is dropped, and of later steps every second end taken, then
+// every fourth.
+struct Samples {
+  double longest;               // s
+  std::size_t most;             // at least 2
+  std::vector<double> times{};  // s
+  std::vector<double> states{}; // (q, v) of each, one after the other
+};
+
 // Where an integration has stopped, and all that its next step depends on: the same candidates given, it goes on with
 // the method that was at work. Explicit ones go on as if nothing had been; what implicit ones extrapolate from earlier
 // steps is lost.
@@ -66,6 +76,8 @@ struct IntegrationControls {
   unsigned long max_steps = 0;        // 0: no limit
   std::vector<Candidate> methods{{}}; // one, or two of which the faster is found out
 
+  std::vector<double> stops; // s, ascending: steps end there, too, so that none passes what happens between two
+
   // Whether ends of steps are reported, if one explicit method makes the whole run without breaks and jumps; and those
   // of such a run, whose steps are taken again with the first method: no step is rejected, no error estimated. Then the
   // result depends on parameters of the system as smoothly as its slopes do, and differences of such runs have no noise
@@ -85,14 +97,14 @@ struct Breaks {
 
 // Integrates y = (q, v) from times.front() to times.back() and calls output(i, t, y) at every entry of times, in order.
 // carry_on(t) is asked every thousand steps, and about five times a second. y ends at the last accepted step.
-// `recording`, `breaks`, `checkpoint` and `limits`, which looks at all steps, may be null. Of a `checkpoint` that has
-// begun in an earlier call with the same `times` the integration goes on: neither outputs nor the `recording`, which
-// has to be the same, begin again, and max_steps counts anew; `limits` has to go on as well. It ends as that of this
-// call.
+// `recording`, `breaks`, `checkpoint`, `limits`, which looks at all steps, and `samples` may be null. Of a `checkpoint`
+// that has begun in an earlier call with the same `times` the integration goes on: neither outputs nor the `recording`,
+// which has to be the same, begin again, and max_steps counts anew; `limits` has to go on as well. It ends as that of
+// this call.
 IntegrationReport integrate(OdeSystem &system, const std::vector<double> &times, Eigen::VectorXd &y,
                             const IntegrationControls &controls, const StateFunctionOfTime &output,
                             const std::function<bool(double)> &carry_on, Recording *recording,
                             const Breaks *breaks = nullptr, IntegrationCheckpoint *checkpoint = nullptr,
-                            LimitWatch *limits = nullptr);
+                            LimitWatch *limits = nullptr, Samples *samples = nullptr);
 
 } // namespace ffrobot

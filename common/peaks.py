@@ -1,0 +1,52 @@
+"""Largest values and root mean squares of what is known at some times, between these times too."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .arrays import Array
+
+ALIKE = 4.0  # ratio of curvatures about a value within which it is the top of something smooth
+
+
+def largest(time: Array, values: Array) -> tuple[float, float]:
+    """The largest |value| of `values` (T,) over `time` (T,), s, and when that is; 0 and NaN of none.
+
+    Where neighbours show a smooth top, that of the polynomial of degree 4 through five values; next to jumps and ends
+    the largest value itself.
+    """
+    return top_at(time, values, int(np.abs(values).argmax())) if len(values) else (0.0, float("nan"))
+
+
+def top_at(time: Array, values: Array, k: int) -> tuple[float, float]:
+    """Likewise of the local maximum of |values| at values[k]."""
+    peak, at = float(abs(values[k])), float(time[k])
+    if not 2 <= k < len(values) - 2:
+        return peak, at
+    t, x = time[k - 2 : k + 3] - at, np.sign(values[k]) * values[k - 2 : k + 3]
+    slopes = np.diff(x) / np.diff(t)
+    curvatures = -np.diff(slopes) / (t[2:] - t[:-2])
+    if not 0.0 < curvatures.max() <= ALIKE * curvatures.min():
+        return peak, at
+    width = t[4] - t[0]
+    curve = np.polyfit(t / width, x, 4)
+    tops = np.roots(np.polyder(curve))
+    tops = tops[np.isreal(tops)].real * width
+    inside = tops[(tops > t[1]) & (tops < t[3])]
+    heights = np.polyval(curve, inside / width)
+    best = int(heights.argmax()) if inside.size else -1
+    return (float(heights[best]), at + float(inside[best])) if best >= 0 and heights[best] > peak else (peak, at)
+
+
+def shares(time: Array) -> Array:
+    """What each of the times (T,) stands for of all, by the trapezoidal rule; 1 of a single one."""
+    if len(time) == 1:
+        return np.ones(1)
+    steps = np.diff(time)
+    found: Array = (np.append(steps, 0.0) + np.append(0.0, steps)) / (2 * (time[-1] - time[0]))
+    return found
+
+
+def root_mean_square(time: Array, values: Array) -> float:
+    """Over time, of `values` (T,)."""
+    return float(np.sqrt(shares(time) @ values**2)) if len(values) else 0.0

@@ -1,0 +1,125 @@
+"""Where a run is looked at between its outputs: what is largest in it does not depend on where these are.
+
+An integration keeps the ends of its steps, which resolve whatever rings above its tolerance, and times between them
+where steps are long. A prescribed motion is known at any time: it is looked at where its paths change.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+
+import numpy as np
+
+from ...common.arrays import Array, Indices, as_floats
+from .. import _core
+from .._core import TimeFunction
+from ..scene.analysis import IntegratedAnalysis
+from ..scene.spatial.trajectories import SpatialTrajectory
+from ..scene.trajectories import Trajectory
+from ..solve.path_checks import misfits
+
+FEWEST = 2000  # intervals of a run
+KEPT = 16_384  # states of an integration at most
+LOOKED_AT = 2000  # of these, and all others next to the largest values
+HIGHEST = 4  # local maxima of each quantity
+MOST = 20_000  # times of a prescribed motion
+RESOLVED = 1e-6  # of the largest value or rate of a path: what the trapezoidal rule may miss between two times
+ROUNDS = 30  # of halving
+SHORTEST = 1e-9  # of a run, between two times
+BRIEF, FAR = 0.01, 20.0  # of a run; times the longest way of a piece in the time of the run: see `stops`
+PARTS = 16  # of such a piece
+
+
+Path = Trajectory | SpatialTrajectory
+
+
+def new_samples(times: Array, analysis: IntegratedAnalysis) -> _core.Samples | None:
+    """Samples for an integration over the output `times` (T,), s; None where there is nothing to integrate.
+
+    And of one that is repeated: how its outputs differ from those of another run is all that it is for.
+    """
+    duration = float(times[-1] - times[0])
+    return _core.Samples(duration / FEWEST, KEPT) if duration > 0.0 and not analysis.is_repeated else None
+
+
+def worth_a_look(count: int, read: Callable[[Indices], Array]) -> Indices:
+    """Which of `count` samples to evaluate: some of all, and all about the highest values of the columns of `read`.
+
+    `read` gives quantities (T, columns) at samples (T,).
+    """
+    every = -(-count // LOOKED_AT)
+    some: Indices = np.unique(np.append(np.arange(0, count, every), count - 1))
+    if every == 1:
+        return some
+    sizes = np.abs(read(some))
+    tops = {k for column in sizes.T for k in _highest(column)}
+    about = [np.arange(some[max(k - 1, 0)], some[min(k + 1, len(some) - 1)] + 1) for k in sorted(tops)]
+    found: Indices = np.unique(np.concatenate([some, *about]))
+    return found
+
+
+def _highest(values: Array) -> list[int]:
+    """Numbers of the highest local maxima of values (T,)."""
+    inner = np.pad(values, 1, constant_values=-np.inf)
+    tops = np.flatnonzero((values >= inner[:-2]) & (values >= inner[2:]) & (values > 0.0))
+    return [int(k) for k in tops[np.argsort(-values[tops], kind="stable")[:HIGHEST]]]
+
+
+def in_order(outputs: Array, samples: Array) -> Indices:
+    """Rows of outputs with samples behind them, in the order of time; of equal times the output alone."""
+    found: Indices = np.unique(np.concatenate([outputs, samples]), return_index=True)[1]
+    return found
+
+
+def stops(times: Array, paths: Iterable[Path]) -> Array:
+    """(n,) s within `times`: parts of brief pieces in which a path moves far, at whose ends steps of integrations end.
+
+    Steps look at a path at their stages alone, and might pass one.
+    """
+    duration, found = times[-1] - times[0], [np.zeros(0)]
+    for path in paths:
+        if path.path is not None and duration > 0.0:
+            breaks = path.path.breaks
+            way = np.abs(np.diff(path.path.sample(breaks), axis=0)).max(axis=1, initial=0.0)
+            last = np.diff(breaks)
+            brief = (last < BRIEF * duration) & (way * duration > FAR * last * way.max(initial=0.0))
+            found.append(np.linspace(breaks[:-1][brief], breaks[1:][brief], PARTS + 1).ravel())
+    every = np.unique(np.concatenate(found))
+    within: Array = every[(every > times[0]) & (every < times[-1])]
+    return within
+
+
+def path_times(times: Array, paths: Iterable[Path], end: float) -> Array:
+    """(T,) s: the outputs `times`, and as many between them as the motion along `paths` from 0 to `end` (s) needs."""
+    paths = list(paths)
+    found = np.unique(np.concatenate([times, np.linspace(times[0], times[-1], FEWEST + 1)]))
+    for path in paths:
+        if path.path is not None:
+            breaks = path.path.breaks
+            found = np.union1d(found, breaks[(breaks > times[0]) & (breaks < times[-1])])
+    moving = (found >= 0.0) & (found <= end)
+    inside = found[moving]
+    for target in (target for path in paths for target in targets_of(path)):
+        inside = _resolved(target, inside)
+    return np.union1d(found[~moving], inside)
+
+
+def targets_of(path: Path) -> tuple[TimeFunction, ...]:
+    """What a path prescribes: places, a coordinate, an orientation."""
+    law = path.orientation if isinstance(path, SpatialTrajectory) else None
+    return (*path.components.values(), *(() if law is None else law.functions))
+
+
+def _resolved(target: TimeFunction, times: Array) -> Array:
+    """The times with others between them, where value or rate change more than their derivatives at both ends say."""
+    value, rate, _ = target.sample(times)
+    sizes = float(np.ptp(value)), float(np.abs(rate).max())
+    for _ in range(ROUNDS):
+        rough = np.zeros(len(times) - 1, dtype=bool)
+        for order, size in enumerate(sizes):
+            rough |= misfits(target, times, order) > RESOLVED * size
+        rough &= np.diff(times) > SHORTEST * (times[-1] - times[0])
+        if not rough.any() or len(times) + np.count_nonzero(rough) > MOST:
+            break
+        times = np.sort(np.concatenate([times, as_floats(0.5 * (times[:-1] + times[1:])[rough])]))
+    return times

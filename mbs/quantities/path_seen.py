@@ -1,0 +1,62 @@
+"""Whether the outputs of a run show how its paths move, and whether the run is as long as its paths."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+
+import numpy as np
+
+from ...common.arrays import Array
+from .._core import TimeFunction
+from ..analysis.samples import Path, path_times, targets_of
+from ..scene.analysis import TimedAnalysis
+
+MISSED = 1.5  # times the largest rate at outputs: faster motion between them
+STILL = 0.5  # of a run, in which way points are over: the other part is rest
+
+
+def path_warnings(analysis: object, times: Array, paths: Iterable[Path]) -> Iterator[str]:
+    """Of an `analysis` with outputs at `times` (T,), s, that follows `paths`: what these hide, a text each."""
+    if not isinstance(analysis, TimedAnalysis) or len(times) < 2:
+        return
+    for path in paths:
+        yield from _outside(path, analysis)
+        yield from _unseen(path, times, analysis)
+
+
+def _outside(path: Path, analysis: TimedAnalysis) -> Iterator[str]:
+    """Way points that the run does not come to, and a table that is over early."""
+    if path.path is None:
+        return
+    begin, over, end = path.path.begin, path.path.end, analysis.end
+    where, by_rounding = f'trajectory "{path.name}"', 1e-9 * end
+    if begin < -by_rounding:
+        yield f"{where}: begins at t = {begin:g} s, and the run at 0: what is before is left out"
+    if over > end + by_rounding:
+        share = f"{max(0.0, 100 * end / over):.3g} % of its time"
+        yield f'{where}: is over at t = {over:g} s, beyond the end of "{analysis.name}" at {end:g} s, which has {share}'
+    elif path.waypoints is not None and over < STILL * end:
+        yield f'{where}: its way points are over at t = {over:g} s, and "{analysis.name}" rests until {end:g} s'
+
+
+def _unseen(path: Path, times: Array, analysis: TimedAnalysis) -> Iterator[str]:
+    """The fastest of its components that moves faster between outputs than at any of them."""
+    every = path_times(times, [path], analysis.end)
+    between, seen = (some[(some >= 0.0) & (some <= analysis.end)] for some in (every, times))
+    for target in targets_of(path):
+        rate = np.abs(target.sample(between)[1])
+        k = int(rate.argmax())
+        if rate[k] > MISSED * (at_outputs := float(np.abs(target.sample(seen)[1]).max())):
+            yield (
+                f'trajectory "{path.name}": moves between outputs, at t = {between[k]:.4g} s with a rate of'
+                f" {rate[k]:.4g}, and no output has more than {at_outputs:.4g} (SI units): peaks and verdicts count it,"
+                f" histories and figures do not show it; an output_step of {_enough(target, between, k):.1g} s does"
+            )
+            return
+
+
+def _enough(target: TimeFunction, times: Array, k: int) -> float:
+    """A fifth of the time (s) for which the rate about times[k] is at least half as large."""
+    slow = np.abs(target.sample(times)[1]) < 0.5 * abs(target.sample(times[[k]])[1][0])
+    before, after = times[:k][slow[:k]], times[k:][slow[k:]]
+    return float((after[0] if len(after) else times[-1]) - (before[-1] if len(before) else times[0])) / 5.0

@@ -1,0 +1,101 @@
+"""Vibration and overshoot of closed loops: closed forms, and arms that ring below 10 Hz in plane and space."""
+
+import warnings
+
+import numpy as np
+import pytest
+
+import ffrobot
+from ffrobot.actuation.control.metrics import overshoot, ringing, vibration
+
+TIME = np.linspace(0.0, 2.0, 2001)
+TRAVEL = np.column_stack([np.clip(TIME / 0.3, 0.0, 1.0), 0.0 * TIME])
+
+
+def measured(error, lowest):
+    """Along a direction across both axes."""
+    both = np.outer(error, [0.6, 0.8])
+    frequency, window = ringing(TIME, TRAVEL, lowest)
+    assert frequency == lowest
+    return vibration(TIME, both, window, lowest)
+
+
+@pytest.mark.parametrize("lowest", [2.8, 6.5, 20.0])
+@pytest.mark.parametrize("off", [0.9, 1.0, 1.2])
+@pytest.mark.parametrize("zeta", [0.0, 0.01])
+def test_a_decaying_oscillator_beside_a_drift(lowest, off, zeta):
+    """The loop rings at `off` times the frequency of the linear model: two amplitudes of the last period."""
+    omega = 2 * np.pi * lowest * off
+    ringing = 0.02 * np.exp(-zeta * omega * TIME) * np.cos(omega * TIME + 1.0)
+    drift = 0.01 * np.exp(-TIME / 0.5) + 0.003 * TIME
+    true = np.ptp(ringing[TIME[-1] - TIME <= 1.0 / lowest])
+    assert measured(ringing + drift, lowest) == pytest.approx(true, rel=0.05)
+
+
+@pytest.mark.parametrize("lasts", [0.05, 0.1, 0.2, 0.5])
+def test_an_error_that_dies_out_is_no_vibration(lasts):
+    assert measured(0.02 * np.exp(-TIME / lasts), 2.8) < 0.002 * 0.02
+
+
+def test_a_run_too_short_for_the_lowest_frequency_is_measured_about_one_that_fits():
+    short = TIME <= 0.7
+    frequency, window = ringing(TIME[short], TRAVEL[short], 2.8)
+    assert (frequency, window) == pytest.approx((1.5 / 0.4, 0.4), rel=0.01)
+    frequency, window = ringing(TIME, np.column_stack([TIME, TIME]), 2.0)  # which never rests
+    assert (frequency, window) == pytest.approx((3.0, 1.0))
+
+
+def test_overshoot_is_beyond_the_last_place_along_the_way():
+    error = np.column_stack([0.1 * np.exp(-5 * TIME) * np.sin(9 * TIME), 0.3 * np.sin(7 * TIME)])
+    beyond = (TRAVEL + error)[:, 0].max() - 1.0
+    assert overshoot(TRAVEL, error) == pytest.approx(beyond, rel=1e-12)
+    assert overshoot(np.ones((5, 2)), np.ones((5, 2))) == 0.0
+
+
+def arm(*, space, thickness, step):
+    """A soft arm turned by 4° in 0.3 s, its hub held by PD with a rotor of 10 kg m²."""
+    spatial = {"space": "spatial", "gravity": [0.0, 0.0, 0.0]}
+    link = {
+        "material": {"youngs_modulus": 70e9, "poissons_ratio": 0.33, "density": 2700.0},
+        "geometry": {
+            "kind": "beam", "length": 0.6, "section": {"shape": "rectangle", "height": thickness, "width": 0.02},
+        },
+        "mesh": {"elements": 20}, "reference": {"condition": "cantilever"},
+        "modes": {"count": 2, "family": "in-plane-bending"}, "damping": {"ratio": 0.005},
+    }  # fmt: skip
+    joint = {"name": "hub", "type": "revolute", "between": ["ground", "arm.root"], "gear_ratio": 100.0}
+    return {
+        "name": "arm", "gravity": [0.0, 0.0], "body": [{"name": "arm", "link": link}],
+        "joint": [joint | {"rotor_inertia": 1e-3} | ({"axis": [0.0, 0.0, 1.0]} if space else {})],
+        "payload": [{"point": "arm.tip", "mass": 0.3}],
+        "trajectory": [{"name": "swing", "joint": "hub", "via": ["0*deg", "4*deg"], "duration": 0.3}],
+        "analysis": [
+            {"name": "rigid", "kind": "fcid", "shape": "zero", "end": 2.0, "output_step": step},
+            {"name": "held", "kind": "closed-loop", "actuation": "rigid", "sample_time": 0.001, "tip": "arm.tip",
+             "controller": [{"kind": "joint-pid", "proportional": {"hub": 2000.0}, "derivative": {"hub": 200.0}}]},
+        ],
+    } | (spatial if space else {})  # fmt: skip
+
+
+@pytest.mark.parametrize(("space", "thickness", "hertz"), [(False, 0.004, 2.82), (True, 0.007, 6.31)])
+def test_an_arm_that_rings_below_ten_hertz_is_said_to(space, thickness, hertz):
+    """By its own tip: peak to peak in the last period; the frequency √(3 E I/((m + 33/140 ρ A L) L³))."""
+    inertia, area = 0.02 * thickness**3 / 12, 0.02 * thickness
+    stiffness, mass = 3 * 70e9 * inertia / 0.6**3, 0.3 + 33 / 140 * 2700 * area * 0.6
+    assert np.sqrt(stiffness / mass) / (2 * np.pi) == pytest.approx(hertz, rel=0.01)
+    found = []
+    for step in (0.002, 0.02):
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", ffrobot.FfrobotWarning)
+            results = ffrobot.solve(ffrobot.make_scene(**arm(space=space, thickness=thickness, step=step)))
+        about = results.attributes("held/control")
+        found.append([about[key] for key in ("vibration", "tip_error_max", "overshoot", "residual")])
+        if step == 0.002:
+            time, tip = results.time("held"), results["held/points/arm.tip/position"]
+            swing = np.ptp(tip[time >= 2.0 - 1.0 / hertz, 1])
+            assert about["vibration"] == pytest.approx(swing, rel=0.02)
+            assert about["lowest_frequency"] == pytest.approx(hertz, rel=0.01)
+            assert about["residual"] == pytest.approx(results["held/tip_error"][-1], rel=1e-9)
+    assert found[0] == pytest.approx(found[1], rel=5e-3)  # feed-forward is that of the outputs' spline
+    if not space:
+        assert found[0][0] == pytest.approx(0.051, rel=0.02)

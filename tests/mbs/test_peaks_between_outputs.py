@@ -1,0 +1,149 @@
+"""Peaks, limits and RMS do not depend on `output_step`: closed forms, and runs with a hundred times as many outputs."""
+
+import warnings
+from copy import deepcopy
+
+import numpy as np
+import pytest
+
+import ffrobot
+
+J, M, C, G = 0.024, 0.2, 0.3, 9.81  # kg m² about the joint, kg, m, m/s²
+QUINTIC = 10 / np.sqrt(3)  # largest acceleration of a quintic over a unit way in a unit time
+ROD = {"mass": M, "inertia": J - M * C**2, "center": [C, 0.0], "points": {"root": [0.0, 0.0], "tip": [0.6, 0.0]}}
+LINK = {
+    "material": {"youngs_modulus": 70e9, "poissons_ratio": 0.33, "density": 2700.0},
+    "geometry": {"kind": "beam", "length": 0.6, "section": {"shape": "tube", "outer": 0.02, "inner": 0.016}},
+    "mesh": {"elements": 10},
+    "reference": {"condition": "cantilever"},
+    "modes": {"count": 3, "family": "in-plane-bending"},
+    "damping": {"ratio": 0.01},
+}
+
+
+def rod(path, step, kind="pcid", joint=(), **keys):
+    joint = {"name": "O", "type": "revolute", "between": ["ground", "arm.root"]} | dict(joint)
+    analysis = {"name": "inverse", "kind": kind, "end": 1.0, "output_step": step}
+    shape = {"shape": "zero"} if kind == "fcid" else {}
+    return {
+        "name": "rod", "gravity": [0.0, 0.0], "body": [{"name": "arm", "rigid": ROD}], "joint": [joint],
+        "trajectory": [{"name": "swing", "joint": "O"} | path], "analysis": [analysis | shape],
+    } | keys  # fmt: skip
+
+
+def flexible(step, space):
+    """An arm that rings at its first mode, 22 Hz, and others, since its path starts with a jolt."""
+    spatial = {"space": "spatial", "gravity": [0.0, 0.0, -G]}
+    axis = {"axis": [0.0, -1.0, 0.0]} if space else {}
+    family = ["in-plane-bending", "out-of-plane-bending"]
+    link = LINK | {"modes": {"count": 3, "family": family}} if space else LINK
+    return {
+        "name": "arm", "gravity": [0.0, -G], "body": [{"name": "arm", "link": link}],
+        "joint": [{"name": "O", "type": "revolute", "between": ["ground", "arm.root"], "moment_limit": 6.0} | axis],
+        "payload": [{"point": "arm.tip", "mass": 0.5}], "initial": {"state": "static"},
+        "trajectory": [{"name": "swing", "joint": "O", "value": "pi/4*(1 - cos(pi*t))"}],
+        "analysis": [{"name": "inverse", "kind": "pcid", "end": 1.0, "output_step": step}],
+    } | (spatial if space else {})  # fmt: skip
+
+
+def solve(scene):
+    with warnings.catch_warnings():  # what tests look for is in the results
+        warnings.simplefilter("ignore", ffrobot.FfrobotWarning)
+        return ffrobot.solve(ffrobot.make_scene(**scene))
+
+
+def motor(results):
+    return results.verdict["inverse"].motors["O"]
+
+
+@pytest.mark.parametrize("kind", ["pcid", "fcid"])
+@pytest.mark.parametrize("step", [0.5, 0.1, 0.01])
+def test_a_quintic_has_its_closed_form_at_any_output_step(kind, step):
+    """τ = J θ̈ at most 10/√3 J/T², at (3 − √3)/6 T; θ̇ 15/8; RMS of θ̈ over the run √(120/7)."""
+    found = motor(solve(rod({"via": [0.0, 1.0], "duration": 1.0, "smoothness": 2}, step, kind)))
+    assert found.moment == pytest.approx(QUINTIC * J, rel=1e-7)
+    assert min(abs(found.moment_time - t) for t in ((3 - np.sqrt(3)) / 6, (3 + np.sqrt(3)) / 6)) < 1e-5
+    assert found.speed == pytest.approx(15 / 8, rel=1e-7)
+    assert found.rms_moment == pytest.approx(J * np.sqrt(120 / 7), rel=1e-5)
+
+
+@pytest.mark.parametrize(("begin", "lasts"), [(0.51, 0.02), (0.5001, 0.0005)])
+@pytest.mark.parametrize("kind", ["pcid", "fcid"])
+def test_a_jump_of_the_path_between_outputs_is_in_the_peaks_and_reported(tmp_path, kind, begin, lasts):
+    table = tmp_path / "jump.csv"
+    table.write_text(f"t,value\n0,0\n{begin},0\n{begin + lasts},0.1\n1,0.1\n", encoding="utf-8")
+    scene = rod({"waypoints": str(table)}, 0.1, kind, joint={"moment_limit": 1.0, "speed_limit": 2.0})
+    results = solve(scene)
+    one, found = results.verdict["inverse"], motor(results)
+    assert not one.feasible
+    assert found.moment == pytest.approx(QUINTIC * 0.1 / lasts**2 * J, rel=1e-5)
+    assert found.speed == pytest.approx(15 / 8 * 0.1 / lasts, rel=1e-5)
+    assert any('trajectory "swing": moves between outputs' in text for text in one.warnings)
+    told = solve(finer(scene, lasts / 20)).verdict["inverse"].warnings
+    assert not any("between outputs" in text for text in told)
+
+
+def finer(scene, step):
+    new = deepcopy(scene)
+    new["analysis"][0]["output_step"] = 1.0 / round(1.0 / step)
+    return new
+
+
+@pytest.mark.parametrize("space", [False, True])
+def test_peaks_of_a_ringing_arm_are_those_of_a_hundred_times_as_many_outputs(space):
+    fine = solve(flexible(5e-5, space))
+    moment = np.abs(fine["inverse/joints/O/moment"])
+    power = np.abs(fine["inverse/joints/O/moment"] * fine["inverse/joints/O/rate"])
+    deflection = np.linalg.norm(fine["inverse/points/arm.tip/deflection"], axis=1)
+    for step in (0.5, 0.25, 0.05):
+        results = solve(flexible(step, space))
+        one, found = results.verdict["inverse"], motor(results)
+        assert not one.feasible
+        assert found.moment == pytest.approx(moment.max(), rel=1e-5)
+        assert found.moment_time == pytest.approx(fine.time("inverse")[moment.argmax()], abs=1e-4)
+        assert found.power == pytest.approx(power.max(), rel=1e-4)
+        assert found.rms_moment == pytest.approx(np.sqrt(np.mean(moment**2)), rel=1e-4)
+        assert one.deflection[0] == pytest.approx(deflection.max(), rel=1e-5)
+        peak = results.attributes("inverse/joints/O/moment")["peak"]
+        assert peak == found.moment > np.abs(results["inverse/joints/O/moment"]).max() * 1.02
+
+
+def test_looking_between_outputs_leaves_the_outputs_as_they_are():
+    """Steps do not end elsewhere: outputs of a coarse run are those of a fine one, to rounding of the interpolation."""
+    coarse, fine = (solve(flexible(step, space=False)) for step in (0.25, 0.125))
+    assert coarse.attributes("inverse")["steps"] > 1000
+    for name in ("joints/O/moment", "points/arm.tip/position"):
+        of_both = fine[f"inverse/{name}"][::2], coarse[f"inverse/{name}"]
+        assert np.abs(of_both[0] - of_both[1]).max() < 1e-6 * np.abs(of_both[0]).max()
+
+
+@pytest.mark.parametrize(
+    ("times", "text"),
+    [
+        ((0.0, 2.0), "beyond the end"),
+        ((0.0, 0.2), "rests until 1 s"),
+        ((-0.5, 1.0), "begins at t = -0.5 s"),
+        ((0.0, 1.0), ""),
+    ],
+)
+def test_way_points_outside_the_run_are_reported(tmp_path, times, text):
+    table = tmp_path / "path.csv"
+    table.write_text("t,value\n{},0\n{},0.3\n".format(*times), encoding="utf-8")
+    told = solve(rod({"waypoints": str(table)}, 0.01)).verdict["inverse"].warnings
+    assert any(text in line for line in told) if text else not told
+
+
+def test_rms_of_motors_alone_is_that_of_the_path():
+    """Pre- and post-actuation, half a second each, leave the mean over the path as it is."""
+    scene = flexible(0.002, space=False)
+    scene["trajectory"][0]["value"] = "0.3*(126*t**5 - 420*t**6 + 540*t**7 - 315*t**8 + 70*t**9)"
+    scene["joint"][0] |= {"gear_ratio": 100.0, "rotor_inertia": 1e-5}
+    more = {"kind": "motors-only", "pre_actuation": 0.5, "post_actuation": 0.5}
+    scene["analysis"] = [scene["analysis"][0] | more]
+    results = solve(scene)
+    time, moment = results.time("inverse"), results["inverse/joints/O/moment"]
+    assert time[[0, -1]].tolist() == pytest.approx([-0.5, 1.5])
+    path = moment[(time >= 0.0) & (time <= 1.0)]
+    assert motor(results).rms_moment == pytest.approx(np.sqrt(np.trapz(path**2, dx=0.002)), rel=1e-5)  # noqa: NPY201
+    assert "RMS" in str(results.verdict)
+    assert "over the path" in str(results.verdict)
