@@ -16,6 +16,7 @@ from .readings import Followed, Goal, Reading
 
 SIZES = (1.0, 0.5, 0.25)  # of the first steps
 AIM = 1e-5  # estimated error, of the largest percent per percent of a goal, or of 1, that needs no other steps
+RESOLVING = 8.0  # times nearer are values between outputs, at least, than with every second output
 ROUGH = 1e-2  # of a derivative: beyond, the goal is hardly smooth
 
 
@@ -153,7 +154,10 @@ def _entry(base: Base, g: int, k: int, known: Known) -> Entry:
     samples = known.of_key(k)
     whole = [one for one in samples if one.goals and np.isfinite(one.goals[g].value)]
     offsets = np.array([0.0, *(one.offset for one in whole)])
-    found = derivative(offsets, np.array([base.readings[g].value, *(one.goals[g].value for one in whole)]))
+    nominal, beside = base.readings[g], [one.goals[g] for one in whole]
+    found = derivative(offsets, np.array([nominal.value, *(one.value for one in beside)]))
+    by_coarse = derivative(offsets, np.array([nominal.coarse, *(one.coarse for one in beside)])).value
+    unresolved = abs(by_coarse - found.value) / RESOLVING if np.isfinite(by_coarse) else 0.0
     if k in known.pairs and not known.left[g] / known.pairs[k] >= found.error:
         h = known.pairs[k]
         above, below = (
@@ -162,7 +166,7 @@ def _entry(base: Base, g: int, k: int, known: Known) -> Entry:
         found = Derivative((above - below) / (2.0 * h), float(known.left[g]) / h, h)
     # Steps that are the same for all runs err alike: no difference of runs tells of that.
     size = abs(base.readings[g].value) / (abs(base.point[k]) or 1.0)
-    found = found._replace(error=found.error + base.repeats * max(abs(found.value), size))
+    found = found._replace(error=found.error + unresolved + base.repeats * max(abs(found.value), size))
     notes = tuple(_notes(base, g, k, samples, found.error, found.value))
     return Entry(*found, _method(base, offsets, found.value), notes)
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..common.errors import InputError
+from ..common.peaks import root_mean_square
 from ..common.validation import did_you_mean, either, quoted
 from ..fe_models.modal_body import ModalBody
 from ..results.file import Results
@@ -151,8 +152,8 @@ def _mean(history: History) -> float:
 
 
 def _rms(history: History) -> float:
-    """Over the outputs, as in tables of sweeps."""
-    return float(np.sqrt(np.mean(history.values[:, 0] ** 2)))
+    """Over time."""
+    return root_mean_square(history.time, history.values[:, 0])
 
 
 REDUCTIONS: Mapping[str, Callable[[History], float]] = {"rms": _rms, "mean": _mean, "integral": _integral}

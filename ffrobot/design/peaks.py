@@ -1,9 +1,10 @@
 """Peaks of histories, and the local ones that may take turns as the largest.
 
 A peak belongs to a time and a column: its derivative by a parameter is that of the history there (envelope theorem,
-Danskin 1966), as long as no other time overtakes it. Where others do, the largest of several is no smooth function of
-the parameters, but each local peak is one: `parts` divides the outputs of a history into windows with one of them each,
-whose largest values together are the peak wherever they move.
+Danskin 1966), as long as no other time overtakes it. The time is that of the top itself, where d/dt = 0, which lies
+between outputs. Where others overtake it, the largest of several is no smooth function of the parameters, but each
+local peak is one: `parts` divides the outputs of a history into windows with one of them each, whose largest values
+together are the peak wherever they move.
 """
 
 from __future__ import annotations
@@ -15,12 +16,14 @@ from typing import Literal
 import numpy as np
 
 from ..common.arrays import Array
+from ..common.peaks import top_at
 from ..results.file import Results
 from .histories import History, read_history
 from .readings import Followed, Goal, Reading
 
 NEAR = 0.5  # of the largest value: local peaks that have a window of their own
 MOST = 12  # of them: vibrations have thousands
+COARSE = 2  # every second output: what a peak is with these tells how well all of them resolve it
 NOISE = 1e-6  # of a peak: a valley that is less deep lies between no two peaks
 
 
@@ -40,11 +43,11 @@ class Peak(Goal):
         """The value, when it is reached, and in which column."""
         history = self._history(results)
         k, column = _largest(self._seen(history).values)
-        value = history.values[k, column]
+        sign = -1.0 if history.values[k, column] < 0.0 else 1.0
+        _, time = top_at(history.time, history.values[:, column], k)
         edge: Literal["", "first", "last"] = "first" if k == 0 else "last" if k == history.time.size - 1 else ""
-        return Reading(
-            float(abs(value)), history.unit, float(history.time[k]), edge, column, -1.0 if value < 0.0 else 1.0
-        )
+        value, coarse = (sign * history.at(time, column, every) for every in (1, COARSE))
+        return Reading(value, history.unit, time, edge, column, sign, coarse=coarse)
 
     def follow(self, results: Results, nominal: Reading) -> Followed:
         """At the time, in the column and with the sign of the `nominal` peak."""
@@ -52,8 +55,8 @@ class Peak(Goal):
         time = {"first": history.time[0], "last": history.time[-1]}.get(nominal.edge, nominal.time)
         if not history.time[0] <= time <= history.time[-1]:
             return Followed(float("nan"), f"the run ends at t = {history.time[-1]:g} s")
-        value = nominal.sign * history.at(float(time), nominal.column)
-        return Followed(value, _overtaken(self._seen(history), nominal, float(time), value))
+        value, coarse = (nominal.sign * history.at(float(time), nominal.column, every) for every in (1, COARSE))
+        return Followed(value, _overtaken(self._seen(history), nominal, float(time), value), coarse)
 
     def _seen(self, history: History) -> History:
         """What the largest value is sought in."""

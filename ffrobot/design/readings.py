@@ -19,6 +19,7 @@ class Reading:
         edge: "first" or "last" where that is an end of the run, which may move.
         column, sign: of its history, and of the value there.
         mode: of a frequency, the family and its number in it.
+        coarse: of a peak, its value by every second output; NaN of all else.
     """
 
     value: float
@@ -28,14 +29,19 @@ class Reading:
     column: int = 0
     sign: float = 1.0
     mode: str = ""
+    coarse: float = float("nan")
 
 
 @dataclass(frozen=True)
 class Followed:
-    """The value of a goal by other results, a peak at its own place; `elsewhere`: where the largest value is now."""
+    """The value of a goal by other results, a peak at its own place; `elsewhere`: where the largest value is now.
+
+    `coarse`: as of `Reading`.
+    """
 
     value: float
     elsewhere: str = ""
+    coarse: float = float("nan")
 
 
 class Goal:

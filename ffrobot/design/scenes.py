@@ -4,18 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from copy import deepcopy
+from math import ceil
 from pathlib import Path
 from typing import Any
 
 from ..fe_models.link_file import LinkTable, read_link
 from ..fe_models.link_records import Link
 from ..mbs.fields.steps import DATASET
+from ..mbs.scene.analysis import TimedAnalysis
 from ..results.file import Results
 from ..scene.any_space import AnyScene, load_any_scene
 from ..sweep.files import run_files
 from ..sweep.sweep import Key
 from .readings import Goal
 
+OUTPUTS = 1000  # at least, where goals are peaks or means over time: they do not depend on those of the scene
 ALGEBRAIC = ("static", "pcid")
 """Kinds of analysis that, where they take no steps, solve equations to rounding at every time."""
 
@@ -25,7 +28,8 @@ def changes_for(
 ) -> dict[Key, Any]:
     """Changes of the scene at `path`: analyses that no goal needs are left out, the others have at most `tolerance`.
 
-    Replays of inverse analyses on finer links, which change no result, are left out too. `keep_steps`: of integrations.
+    Replays of inverse analyses on finer links, which change no result, are left out too. There are `OUTPUTS` at least.
+    `keep_steps`: of integrations.
     """
     scene = load_any_scene(path)
     needed = _needed(scene, goals)
@@ -37,6 +41,8 @@ def changes_for(
             table["tolerance"] = min(tolerance, record.tolerance)
         if keep_steps and record.is_integrated:
             table["keep_steps"] = True
+        if isinstance(record, TimedAnalysis) and any(goal.needs_motion for goal in goals):
+            table["output_step"] = record.output_step / ceil(OUTPUTS * record.output_step / record.end * (1 - 1e-9))
     return {("analysis",): tables}
 
 
