@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -19,6 +20,7 @@ LIGHTEST, HEAVIEST = 1.0, 3e4  # kg/m³: foams have more, osmium has 2.3e4
 SLOWEST, FASTEST = 20.0, 5e4  # m/s, √(E/ρ): silicone rubber has 30, diamond 1.8e4
 RESTING = 3.0  # how many times longer than its path a run may take
 SAMPLES = 201
+OUTPUT = 5e3  # bytes for each body and output, while results are evaluated: a link of four modes in space takes 5.5e3
 
 
 def remarks(scene: AnyScene) -> Iterator[str]:
@@ -34,6 +36,10 @@ def remarks(scene: AnyScene) -> Iterator[str]:
             yield from _long(max(float(np.linalg.norm(place)) for place in places), f'body "{body.name}"')
     yield from _angles(scene)
     yield from _times(scene)
+    for analysis in scene.analysis:
+        if step := getattr(analysis, "output_step", None):
+            outputs = round(analysis.last_time / step) + 1
+            yield from remarks_on_memory(outputs, len(scene.body), memory(), f'analysis "{analysis.name}"')
 
 
 def remarks_on_link(link: Link, label: str) -> Iterator[str]:
@@ -47,6 +53,23 @@ def remarks_on_link(link: Link, label: str) -> Iterator[str]:
             f"{label}: youngs_modulus {modulus:g} Pa, at {density:g} kg/m³ a speed of sound of {speed:.2g} m/s: units"
             " are SI; is it in MPa or GPa?"
         )
+
+
+def remarks_on_memory(outputs: int, bodies: int, available: float, label: str) -> Iterator[str]:
+    """Of an analysis with so many outputs, where they may take more than half of the `available` bytes."""
+    if (needed := outputs * bodies * OUTPUT) > available / 2:
+        yield (
+            f"{label}: {outputs} outputs may take {needed / 1e9:.2g} GB of memory, of {available / 1e9:.2g} GB that"
+            " there are: a larger output_step takes less, and steps of the integrator do not depend on it"
+        )
+
+
+def memory() -> float:
+    """Bytes of this machine; infinite where the system does not say."""
+    try:
+        return float(os.sysconf("SC_PHYS_PAGES")) * os.sysconf("SC_PAGE_SIZE")
+    except (AttributeError, OSError, ValueError):
+        return np.inf
 
 
 def _long(length: float, label: str) -> Iterator[str]:

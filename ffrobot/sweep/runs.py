@@ -16,12 +16,14 @@ import numpy as np
 from ..common.arrays import Array
 from ..common.errors import InputError
 from ..common.files import write_atomically
+from ..common.locks import is_running, this_process
 from ..results.file import Results
 from ..run.inputs import changed, digest_of_file
 from .files import SCENE
 from .workers import Workers
 
 ROW, RESULTS = "row.json", "results.h5"
+MAKING = "results.of-"  # begins the names of results that a process is about to write
 
 STOPPED = [code for number in (signal.SIGINT, signal.SIGTERM) for code in (-number, 128 + number)]
 """Exit codes of a run that was asked to end: nothing of the run itself."""
@@ -79,12 +81,21 @@ class Row:
 
 
 def perform(run: Run, workers: Workers) -> Row | None:
-    """Solve the scene in the run's folder; None where a signal has asked it to stop."""
-    results = run.folder / RESULTS
-    arguments = ["solve", str(run.folder / SCENE), "-o", str(results)]
+    """Solve the scene in the run's folder; None where a signal has asked it to stop.
+
+    Earlier results are replaced in one step: another command in the same folder may be reading them.
+    """
+    results, made = run.folder / RESULTS, run.folder / f"{MAKING}{this_process()}.{run.number}.h5"
+    for left in run.folder.glob(f"{MAKING}*.h5"):
+        if not is_running(left.name.removeprefix(MAKING).rsplit(".", 2)[0]):
+            left.unlink(missing_ok=True)
+    arguments = ["solve", str(run.folder / SCENE), "-o", str(made)]
     arguments += [f"--allow-python={path}" for path in run.allow_python]
-    results.unlink(missing_ok=True)  # of other input, maybe
     code, told, imported = workers.perform(arguments)
+    if made.exists():
+        made.replace(results)
+    else:  # earlier ones are of other input, maybe
+        results.unlink(missing_ok=True)
     if code in STOPPED:
         return None
     status = {0: "completed", 1: "failed", 2: "wrong input"}.get(code, "crashed")

@@ -7,7 +7,7 @@ import pytest
 
 import ffrobot as program
 from ffrobot.fe_models.link_file import LinkTable, read_link
-from ffrobot.scene.plausibility import remarks, remarks_on_file, remarks_on_link
+from ffrobot.scene.plausibility import remarks, remarks_on_file, remarks_on_link, remarks_on_memory
 
 CASES = Path(__file__).parents[2] / "cases"
 BAR = {"mass": 1.0, "inertia": 0.1, "center": [0.5, 0.0], "points": {"root": [0.0, 0.0], "tip": [1.0, 0.0]}}
@@ -80,6 +80,13 @@ def test_links(keys, expected, tmp_path):
     found = list(remarks_on_link(read_link(LinkTable({**LINK, **keys}, tmp_path / "arm.toml")), "arm"))
     assert len(found) == (expected is not None)
     assert expected is None or expected in found[0]
+
+
+def test_outputs_that_do_not_fit_into_memory():
+    """A link of four modes in space took 0.55 GB for 1e5 outputs, and over 12 GB for 1e7."""
+    (remark,) = remarks_on_memory(10_000_001, 1, 16e9, "long")
+    assert "10000001 outputs may take 50 GB of memory, of 16 GB" in remark
+    assert not list(remarks_on_memory(100_001, 1, 16e9, "short"))
 
 
 def test_cases_have_no_remarks_on_units():

@@ -2,16 +2,20 @@
 
 import csv
 import os
+import platform
 import signal
 import subprocess
 import time
+from pathlib import Path
 
 import h5py
 import numpy as np
 import pytest
 import tomli_w
 
-from ffrobot.sweep.workers import Workers
+import ffrobot
+from ffrobot.sweep.runs import Run, perform
+from ffrobot.sweep.workers import Done, Workers
 
 CONTROLLER = '''
 """A motor's constant command, by functions that do much else to their process."""
@@ -238,3 +242,25 @@ def _is_running(pid):
         return False
     with open(f"/proc/{pid}/stat") as file:
         return file.read().rpartition(")")[2].split()[0] != "Z"
+
+
+def test_results_are_replaced_in_one_step(scene, tmp_path):
+    """Another command in the same folder may read them at any time: two equal studies at once, for one."""
+    run = Run(0, (), tmp_path / "run")
+    run.folder.mkdir()
+    results, seen = run.folder / "results.h5", []
+
+    class Watched(Workers):
+        def perform(self, arguments):
+            seen.append(results.read_bytes() if results.exists() else b"")
+            Path(arguments[arguments.index("-o") + 1]).write_bytes(image)
+            return Done(0, "", {})
+
+    solved = ffrobot.solve(scene, tmp_path / "made.h5", allow_python=[tmp_path])
+    solved.close()
+    image = (tmp_path / "made.h5").read_bytes()
+    (run.folder / f"results.of-{platform.node()}-999999999-0.7.h5").write_bytes(b"left by a process that was killed")
+    for _ in range(2):
+        assert perform(run, Watched()).status == "completed"
+    assert seen == [b"", image]
+    assert [path.name for path in run.folder.iterdir()] == ["results.h5"]

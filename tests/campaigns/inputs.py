@@ -1,0 +1,204 @@
+"""Files that users bring (URDF, tables, HDF5), and arguments of studies, with one change each: refused, or taken.
+
+    python tests/campaigns/inputs.py [--count 100] [--seed 0] [--kind urdf|csv|modal|results|study …] [--record]
+
+Run by hand, some 0.3 s each. Attributes, cells and datasets get values of other types, huge, tiny, not finite, empty,
+names that lead elsewhere, and text that programs would run: a file CANARY must not appear, nor anything beside the
+folder. Commands run as in mutations.py. Exit code 1 where anything fell over.
+"""
+
+import argparse
+import os
+import random
+import shutil
+import sys
+import tempfile
+from collections import Counter
+from pathlib import Path
+from xml.etree import ElementTree
+
+import h5py
+import numpy as np
+from forked_command import BAD, load_once, outcome, run
+from record import record
+
+from ffrobot.common.checksum import seal
+
+ROOT = Path(__file__).parents[2]
+ROBOTS = ROOT / "tests" / "exchange" / "robots"
+NUMBERS = tuple(
+    "0 -1 1e-320 1e300 -1e29 18446744073709551616 999999999999999999999 nan inf 1,5 0x10 1_0 180 1e9".split(" ")  # noqa: SIM905
+)
+RUN = ("=cmd|' /C calc'!A0", '__import__("os").system("touch CANARY")', "$(touch CANARY)", "`touch CANARY`", "{{7*7}}")
+ODD = (
+    "",
+    " ",
+    "/",
+    "..",
+    "../../out",
+    "/tmp/ffrobot_out",
+    "a\nb",
+    "a" * 300,
+    "é関",
+    "\u202e",
+    "\0",
+    "<script>",
+    "%s%n",
+)
+TEXTS = (*NUMBERS, *RUN, *ODD)
+SCENE = """
+name = "arm"
+gravity = [0.0, -9.81]
+body = [{ name = "arm", link = "arm.toml" }]
+joint = [{ name = "shoulder", type = "revolute", between = ["ground", "arm.root"] }]
+trajectory = [{ name = "swing", joint = "shoulder", waypoints = "path.csv" }]
+payload = [{ point = "arm.tip", mass = 0.5 }]
+analysis = [{ name = "inverse", kind = "pcid", end = 0.05, output_step = 0.005, tolerance = 1e-4, max_steps = 20000 }]
+"""
+LINK = """
+name = "arm"
+material = { youngs_modulus = 70e9, poissons_ratio = 0.33, density = 2700.0 }
+geometry = { kind = "beam", length = 0.6, section = { shape = "tube", outer = 0.02, inner = 0.016 } }
+mesh = { elements = 6 }
+reference = { condition = "cantilever" }
+modes = { count = 2, family = "in-plane-bending" }
+"""
+TABLE = "t,value\n0,0\n0.02,0.1\n0.04,0.15\n0.06,0.2\n"
+
+
+class Campaign:
+    def __init__(self, folder: Path, seed: int) -> None:
+        self.draw, self.counts, self.bad = random.Random(seed), Counter[str](), list[str]()
+        self.place, self.ready = folder / "place" / "try", folder / "ready"
+        os.environ["XDG_CACHE_HOME"] = str(folder / "cache")
+        self.ready.mkdir()
+        for name, text in (("scene.toml", SCENE), ("arm.toml", LINK), ("path.csv", TABLE)):
+            (self.ready / name).write_text(text, encoding="utf-8")
+        for command in (["link", "arm.toml"], ["solve", "scene.toml"]):
+            code, told = run(command, self.ready)
+            assert code == 0, told
+
+    def one(self, kind: str, number: int) -> None:
+        shutil.rmtree(self.place.parent, ignore_errors=True)
+        shutil.copytree(self.ready, self.place)
+        label, name, commands = getattr(self, kind)()
+        for command in commands:
+            code, told = run(command, self.place)
+            found = outcome(code, told, [name, "scene.toml", *(["expected"] if kind == "study" else [])])
+            if (self.place / "CANARY").exists() or os.listdir(self.place.parent) != ["try"]:
+                found = "crash"
+            self.counts[f"{kind}: {found}"] += 1
+            if found in BAD:
+                self.bad.append(
+                    f"{number} {kind} {found} {command[0]}, exit code {code}: {label}: {told.strip()[-500:]}"
+                )
+                print(self.bad[-1], flush=True)
+
+    def urdf(self):
+        root = ElementTree.parse(self.draw.choice(sorted(ROBOTS.glob("*.urdf")))).getroot()
+        parents = {child: parent for parent in root.iter() for child in parent}
+        element, how = self.draw.choice(list(parents)), self.draw.choice(("value", "value", "value", "drop", "double"))
+        if how == "drop":
+            parents[element].remove(element)
+        elif how == "double" or not element.attrib:
+            parents[element].append(element)
+        else:
+            element.set(self.draw.choice(list(element.attrib)), self.draw.choice(TEXTS).replace("\0", ""))
+        (self.place / "robot.urdf").write_bytes(ElementTree.tostring(root))
+        options = ["--fix-inertia"] if self.draw.random() < 0.3 else []
+        return f"{how} {element.tag} {element.attrib}", "robot.urdf", [["import", "robot.urdf", "-o", "out", *options]]
+
+    def csv(self):
+        lines = TABLE.splitlines()
+        row = self.draw.randrange(len(lines))
+        cells = lines[row].split(",")
+        how = self.draw.choice(("cell", "cell", "cell", "row", "twice", "column"))
+        if how == "cell":
+            cells[self.draw.randrange(2)] = self.draw.choice(TEXTS)
+        lines[row] = {"row": self.draw.choice(TEXTS), "column": lines[row] + ",1"}.get(how, ",".join(cells))
+        lines += [lines[row]] if how == "twice" else []
+        encoding = self.draw.choice(("utf-8", "utf-8", "utf-16", "utf-8-sig"))
+        (self.place / "path.csv").write_bytes(self.draw.choice(("\n", "\r\n")).join(lines).encode(encoding))
+        return f"{how} {lines[row]!r} {encoding}", "path.csv", [["solve", "scene.toml"]]
+
+    def modal(self):
+        label = self.damaged(self.place / "arm.h5")
+        os.utime(self.place / "arm.toml", (0, 0))
+        commands = [["info", "arm.h5"], ["export", "arm.h5", "--format", self.draw.choice(("sid", "mbdyn", "exudyn"))]]
+        return label, "arm.h5", commands
+
+    def results(self):
+        label, name = self.damaged(self.place / "scene.results.h5"), "scene.results.h5"
+        reads = [["info", name], ["feasibility", name], ["export", name, "--format", "csv"], ["linear", name],
+                 ["report", name], ["plot", name, "--format", "svg"]]  # fmt: skip
+        return label, name, self.draw.sample(reads, 2)
+
+    def damaged(self, path: Path) -> str:
+        """One dataset or attribute is another; the checksum fits again."""
+        value = self.draw.choice((1e300, np.nan, np.inf, -1, 0, 1j, "text", b"\xff", [], [[[1.0]]], 2**62))
+        with h5py.File(path, "a") as file:
+            names = list[str]()
+            file.visit(names.append)
+            name = self.draw.choice(names)
+            item = file[name]
+            if self.draw.random() < 0.3:
+                owner = file if self.draw.random() < 0.5 or not item.attrs else item
+                name = f"{name} @ {(key := self.draw.choice(list(owner.attrs)))}"
+                owner.attrs[key] = self.draw.choice(TEXTS).replace("\0", "") if self.draw.random() < 0.5 else value
+            elif self.draw.random() < 0.3:
+                file.move(name, f"{name[: name.rfind('/') + 1]}{self.draw.choice(('..', '=x', 'a b', '関', 'tip'))}")
+            elif isinstance(item, h5py.Dataset) and item.shape and not isinstance(value, str | bytes | list):
+                content = np.array(item[()], dtype=complex if value == 1j else None)
+                if content.dtype.kind in "fc":
+                    content.flat[self.draw.randrange(max(content.size, 1)) if content.size else slice(0)] = value
+                del file[name]
+                file[name] = content
+            else:
+                del file[name]
+                file[name] = value
+        seal(path)
+        return f"{name} = {value!r}"
+
+    def study(self):
+        arm = "links.arm.geometry.section.outer"
+        keys = ("payload.0.mass", arm, "links.arm.x", "gravity.1", "body.arm.link", "..", "links..", "x")
+        values = ("0.1,0.2", "0.1:0.2:2", "1:2:1e9", "a:b:c", "0.1", "=1", "1e400", "-1,1", "in {1:2}", *TEXTS)
+        goals = ("peak joints.shoulder.moment", *TEXTS)
+        key, value, of = (self.draw.choice(texts).replace("\0", "") for texts in (keys, values, goals))
+        commands = [
+            ["sweep", "scene.toml", f"--vary={key}={value}", "-o", "output"],
+            ["sensitivity", "scene.toml", f"--of={of}", f"--to={key}", "-o", "output"],
+            ["optimise", "scene.toml", f"--minimise={of}", f"--vary={key}={value}", "--runs", "2", "-o", "output"],
+            ["uncertainty", "scene.toml", f"--of={of}", f"--spread={key}={value}", "--samples", "2", "-o", "output"],
+        ]  # fmt: skip
+        command = self.draw.choice(commands)
+        return " ".join(command), "scene.toml", [command]
+
+
+KINDS = ("urdf", "csv", "modal", "results", "study")
+
+
+def main() -> None:
+    """Prints what was found."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--count", type=int, default=100)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--kind", action="append", choices=KINDS, help="only this one; repeatable")
+    parser.add_argument("--record", action="store_true", help="write what was found, for docs/stability.md")
+    options = parser.parse_args()
+    load_once()
+    kinds = options.kind or KINDS
+    with tempfile.TemporaryDirectory() as folder:
+        campaign = Campaign(Path(folder), options.seed)
+        for number in range(options.count):
+            campaign.one(kinds[number % len(kinds)], number)
+    for name, count in sorted(campaign.counts.items()):
+        print(f"{name}: {count}")
+    if options.record:
+        found = ", ".join(f"{name} {count}" for name, count in sorted(campaign.counts.items()))
+        record("inputs", tried=f"{options.count} changed files and arguments", found=found)
+    sys.exit(1 if campaign.bad else 0)
+
+
+if __name__ == "__main__":
+    main()
