@@ -57,6 +57,21 @@ class Fit:
         return self.relative_deviation * self.value
 
     @property
+    def degrees_of_freedom(self) -> int | None:
+        """From how many remaining errors the deviations are estimated; None where uncertainties were given."""
+        return None if self.uncertainty is not None else len(self.measured) - len(self.keys)
+
+    def coverage_factor(self, probability: float) -> float:
+        """How many deviations to both sides of a fitted value hold the true one with this probability.
+
+        Student's t where the deviation is estimated from the remaining errors (JCGM 100:2008, G.3); NaN of none.
+        """
+        from scipy.stats import norm, t
+
+        quantile, freedom = 0.5 + 0.5 * probability, self.degrees_of_freedom
+        return float(norm.ppf(quantile) if freedom is None else t.ppf(quantile, freedom) if freedom else np.nan)
+
+    @property
     def error(self) -> Array:
         """(m,) of the fitted frequencies, relative to the measured ones."""
         return self.after / self.measured - 1.0

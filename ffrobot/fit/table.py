@@ -10,6 +10,7 @@ from rich.console import Console
 from ..present.tables import plain_table
 from .least_squares import Fit
 
+FEW = 30  # degrees of freedom below which two standard deviations are less than a range of 95 %
 ALIKE = 0.95  # correlation of two parameters' errors from which their values are hardly told apart
 
 
@@ -36,6 +37,13 @@ def remarks(fit: Fit) -> Iterator[str]:
         yield (
             "as many frequencies as keys: they fit whatever their errors, so no uncertainty is known; give a column"
             " uncertainty (Hz), or more modes"
+        )
+    if fit.degrees_of_freedom and fit.degrees_of_freedom < FEW:
+        wide, narrow = fit.coverage_factor(0.95), fit.coverage_factor(0.6827)
+        yield (
+            f"standard deviations are estimated from {fit.degrees_of_freedom} degrees of freedom: the range of 95 % is"
+            f" ± {wide:.3g} of them, that of 68 % ± {narrow:.3g} (Student's t); a column"
+            " uncertainty (Hz), or more modes, make it narrower"
         )
     for i, j in zip(*np.triu_indices(len(fit.keys), 1), strict=True):
         if abs(fit.correlation[i, j]) > ALIKE:

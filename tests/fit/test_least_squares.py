@@ -5,6 +5,7 @@ import pytest
 
 from ffrobot.common.errors import InputError
 from ffrobot.fit.least_squares import fit_frequencies
+from ffrobot.fit.table import remarks
 
 LABELS = [f"mode {k}" for k in range(1, 6)]
 KEYS = ("k1", "k2", "mass")
@@ -47,6 +48,32 @@ def test_uncertainty_is_that_of_a_monte_carlo(is_known):
     np.testing.assert_allclose(correlation, np.corrcoef(errors.T), atol=4 / np.sqrt(count))
     if is_known:  # χ²/(m − n) has the mean 1 and, over 600 fits of 2 degrees of freedom, a deviation of 4 %
         assert np.mean([fit.misfit**2 for fit in fits]) == pytest.approx(1.0, abs=0.16)
+
+
+@pytest.mark.parametrize("is_known", [True, False], ids=["uncertainty given", "uncertainty from the residuals"])
+@pytest.mark.parametrize("probability", [0.6827, 0.95])
+def test_ranges_hold_the_true_values_as_often_as_said(is_known, probability):
+    """600 measurements, two degrees of freedom: the share of true values within is known to 2 % (one σ), bound 4 σ."""
+    spread, count, rng = 0.002, 600, np.random.default_rng(36)
+    exact = chain(TRUE)
+    inside = []
+    for noisy in exact * (1.0 + spread * rng.standard_normal((count, 5))):
+        fit = fit_frequencies(chain, KEYS, 1.3 * TRUE, LABELS, noisy, spread * exact if is_known else None)
+        assert fit.degrees_of_freedom == (None if is_known else 2)
+        inside.append(np.abs(np.log(fit.value / TRUE)) <= fit.coverage_factor(probability) * fit.relative_deviation)
+    bound = 4 * np.sqrt(probability * (1 - probability) / count)
+    np.testing.assert_allclose(np.mean(inside, axis=0), probability, rtol=0, atol=bound)
+
+
+def test_few_degrees_of_freedom_are_named():
+    """t of two degrees of freedom in closed form: p √(2/(1 − p²))."""
+    noisy = chain(TRUE) * [1.001, 0.999, 1.0, 1.002, 0.999]
+    fit = fit_frequencies(chain, KEYS, 1.3 * TRUE, LABELS, noisy)
+    assert fit.coverage_factor(0.95) == pytest.approx(0.95 * np.sqrt(2 / (1 - 0.95**2)), rel=1e-9)
+    told = "\n".join(remarks(fit))
+    assert "estimated from 2 degrees of freedom: the range of 95 % is ± 4.3 of them" in told
+    known = fit_frequencies(chain, KEYS, 1.3 * TRUE, LABELS, noisy, 0.01 * noisy)
+    assert "degrees of freedom" not in "\n".join(remarks(known))
 
 
 def test_as_many_frequencies_as_parameters_leave_the_uncertainty_open():
