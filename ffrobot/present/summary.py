@@ -14,7 +14,7 @@ from ..mbs.analysis.motors_only import InvertedPath, describe_zeros, is_minimum_
 from ..mbs.analysis.outcome import Details, Outcome
 from ..mbs.model.raised_mass import raised_in_words
 from ..results.verdict import Verdict
-from ..run.loaded_body import remarks_on_parts
+from ..run.loaded_body import remarks_on_parts, rigid_in_words
 from ..run.solution import AnalysisResult, Solution
 from .accuracy import error_budget
 from .control import control_lines, control_tables
@@ -93,7 +93,7 @@ def _notes(solution: Solution, seconds: Mapping[str, float]) -> Iterator[tuple[s
         yield "pieces", pieces_in_words(solution.divided)
     elif (raised := raised_in_words(solution.model)) and any(one.analysis.is_integrated for one in outcomes.values()):
         yield "modes", raised
-    yield from (("links", remark) for remark in remarks_on_parts(solution.bodies))
+    yield from (("links", remark) for remark in remarks_on_parts(solution.bodies) + rigid_in_words(solution.bodies))
     yield "accuracy", "\n".join(error_budget(solution))
     yield "wall time", ", ".join(f"{stage} {value:.2f} s" for stage, value in seconds.items())
     if solution.omissions:

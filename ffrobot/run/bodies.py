@@ -18,6 +18,8 @@ from .loaded_body import Loaded, payloads_on
 class LoadedBody(Loaded):
     """A body of the scene with its planar equations."""
 
+    MOTIONS = ("in-plane-bending",)  # stretch: see `omissions`
+
     planar: PlanarBody
 
 

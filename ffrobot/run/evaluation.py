@@ -40,6 +40,7 @@ def evaluated(solution: Solution, result: AnalysisResult) -> AnalysisResult:
     """The result with all that follows from its outcome."""
     began, outcome = time.perf_counter(), result.outcome
     shift, unsupplied = _unmet(solution, result)
+    is_rigid = any(body.rigid_in for body in solution.bodies.values())  # modes know nothing of those that are not there
     feasibility = _feasibility(solution, result)
     result = replace(
         result,
@@ -47,7 +48,7 @@ def evaluated(solution: Solution, result: AnalysisResult) -> AnalysisResult:
         predicted_shift=shift,
         feasibility=feasibility and replace(feasibility, unsupplied=unsupplied),
         stresses=_stresses(solution, outcome),
-        mode_error=mode_error(outcome.computed) if outcome.analysis.is_integrated else None,
+        mode_error=mode_error(outcome.computed) if outcome.analysis.is_integrated and not is_rigid else None,
         start_jolt=start_jolt(outcome.computed) if outcome.analysis.is_integrated else 0.0,
     )
     result = replace(result, warnings=tuple(warnings_of(solution.scene, result)))

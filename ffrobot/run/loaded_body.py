@@ -6,10 +6,11 @@ import hashlib
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol, TypeVar
+from typing import ClassVar, Protocol, TypeVar
 
 from ..common.errors import InputError
 from ..common.validation import did_you_mean, quoted
+from ..fe_models.link_records import FAMILIES, Family
 from ..fe_models.modal_body import ModalBody
 from ..mbs.fields.field_types import split_point
 
@@ -17,6 +18,9 @@ from ..mbs.fields.field_types import split_point
 @dataclass(frozen=True, kw_only=True)
 class Loaded:
     """The modal body and its file (None where the body is rigid), and whether stage 1 ran for it."""
+
+    MOTIONS: ClassVar[tuple[Family, ...]] = FAMILIES
+    """Families of motion that the scene can ask of a link."""
 
     modal: ModalBody | None = None
     path: Path | None = None
@@ -27,6 +31,11 @@ class Loaded:
     def file_hash(self) -> str:
         """SHA-256 of the modal body file; empty where rigid."""
         return hashlib.sha256(self.path.read_bytes()).hexdigest() if self.path else ""
+
+    @property
+    def rigid_in(self) -> tuple[Family, ...]:
+        """Motions that a link cannot follow, since its file has no modes of them; none of a rigid body."""
+        return () if self.modal is None else tuple(one for one in self.MOTIONS if one not in self.modal.family)
 
 
 def robot_damping_ratios(bodies: Mapping[str, Loaded]) -> dict[str, float]:
@@ -41,6 +50,15 @@ def robot_damping_ratios(bodies: Mapping[str, Loaded]) -> dict[str, float]:
 def remarks_on_parts(bodies: Mapping[str, Loaded]) -> list[str]:
     """What the files of solid links' parts hold and the links do not, a line each."""
     return [f"{name}: {text}" for name, body in bodies.items() if body.modal for text in body.modal.remarks]
+
+
+def rigid_in_words(bodies: Mapping[str, Loaded]) -> list[str]:
+    """Which links are rigid in which motions, a line each."""
+    return [
+        f"{name}: rigid in {', '.join(body.rigid_in)}, of which its file has no modes"
+        for name, body in bodies.items()
+        if body.rigid_in
+    ]
 
 
 class _OnPoint(Protocol):

@@ -12,7 +12,6 @@ from ..actuation.patches.spatial_records import SpatialPztLayout
 from ..actuation.patches.spatial_structure import structure_effect_in_space, with_patches_in_space
 from ..actuation.patches.structure import StructureEffect
 from ..common.errors import of_file
-from ..fe_models.link_records import FAMILIES
 from ..fe_models.modal_body_file import read_modal_body
 from ..mbs.model.spatial_body import SpatialBody, from_modal_body, rigid_body
 from ..mbs.model.spatial_masses import with_payload
@@ -33,13 +32,6 @@ class LoadedSpatialBody(Loaded):
     spatial: SpatialBody
     carrying: SpatialBody
     structure: StructureEffect | None = None
-
-    @property
-    def rigid_in(self) -> tuple[str, ...]:
-        """Families in which a link does not move; none of a rigid body."""
-        if self.modal is None:
-            return ()
-        return tuple(family for family in FAMILIES if family not in self.modal.family)
 
 
 def load_spatial_bodies(scene: SpatialScene, stage: Callable[[str], None]) -> list[LoadedSpatialBody]:

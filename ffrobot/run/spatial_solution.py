@@ -26,7 +26,7 @@ from ..mbs.quantities.stress import BodyStress
 from ..mbs.quantities.validity import Bending, deflection_warning
 from ..scene.pieces import BodyInPieces
 from ..scene.spatial import SpatialScene
-from .loaded_body import remarks_on_parts
+from .loaded_body import remarks_on_parts, rigid_in_words
 from .mode_search import ModeChoice
 from .solution import FinerCheck
 from .spatial_actuation import SpatialActuation
@@ -150,9 +150,8 @@ class SpatialSolution:
     def notes(self) -> tuple[str, ...]:
         """What patches do to the stiffness of their links, what links cannot do, modes left out, one line each."""
         found = [array.stiffness_in_words for of in self.patches.values() for array in of.arrays.values()]
+        found += rigid_in_words(self.bodies)
         for name, body in self.bodies.items():
-            if body.rigid_in:
-                found.append(f"{name}: rigid in {', '.join(body.rigid_in)}, of which its file has no modes")
             if body.spatial.reduction is not None:
                 found.append(f"{name}: all modes but {modes_kept(body.spatial)}")
         return (*found, *remarks_on_parts(self.bodies))

@@ -3,6 +3,7 @@
 import h5py
 import numpy as np
 import pytest
+import tomli_w
 from space import close, write_scene
 from spatial_checkpoints import load
 
@@ -105,6 +106,39 @@ def test_links_say_what_they_cannot_do(tmp_path, ffrobot):
     done = ffrobot("solve", scene)
     assert done.returncode == 0, done.stderr
     assert "fore: rigid in in-plane-bending, axial, torsion" in done.stdout.replace("\n", " ")
+
+
+@pytest.mark.parametrize(("family", "is_rigid"), [("axial", True), ("torsion", True), ("in-plane-bending", False)])
+def test_links_say_what_they_cannot_do_in_the_plane(tmp_path, ffrobot, family, is_rigid):
+    """Likewise; and nothing is claimed of what modes that are not there would do."""
+    link = {
+        "name": "arm",
+        "material": {"youngs_modulus": 70e9, "poissons_ratio": 0.33, "density": 2700.0},
+        "geometry": {"kind": "beam", "length": 0.6, "section": {"shape": "circle", "diameter": 0.02}},
+        "mesh": {"elements": 8},
+        "reference": {"condition": "cantilever"},
+        "modes": {"count": 3, "family": family},
+    }
+    scene = {
+        "name": "arm",
+        "space": "planar",
+        "gravity": [0.0, -9.81],
+        "body": [{"name": "arm", "link": "arm.toml"}],
+        "joint": [{"name": "j", "type": "revolute", "between": ["ground", "arm.root"]}],
+        "initial": {"state": "static"},
+        "trajectory": [{"name": "path", "joint": "j", "value": "0.5*(10*t**3 - 15*t**4 + 6*t**5)"}],
+        "analysis": [{"name": "run", "kind": "pcid", "end": 1.0, "output_step": 0.1}],
+    }
+    for name, tables in (("arm", link), ("scene", scene)):
+        (tmp_path / f"{name}.toml").write_text(tomli_w.dumps(tables))
+    done = ffrobot("solve", tmp_path / "scene.toml", "-o", tmp_path / "results.h5")
+    assert done.returncode == 0, done.stderr
+    told = " ".join(done.stdout.split())
+    assert ("arm: rigid in in-plane-bending, of which its file has no modes" in told) == is_rigid
+    assert ("modes: not estimated: rigid for want of modes: arm in in-plane-bending" in told) == is_rigid
+    assert ("of peaks, estimated" in told) != is_rigid
+    with Results(tmp_path / "results.h5") as results:
+        assert ("mode_error" in results.attributes("run")) != is_rigid
 
 
 def test_motor_that_is_not_there_is_told(tmp_path, ffrobot):
