@@ -5,6 +5,7 @@ NumPy is not needed: input hashes are made of `files_of`.
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -104,12 +105,13 @@ def number_of(token: str, place: str) -> float:
         InputError: it is none.
     """
     try:
-        return float(token)
+        value = float(token)
     except ValueError:
         exponent = re.fullmatch(r"([+-]?(?:\d+\.?\d*|\.\d+))[DdEe]?([+-]?\d+)", token.strip())
-        if exponent is None:
-            raise InputError(f'{place}: expected a number, found "{token}"') from None
-        return float(f"{exponent[1]}e{exponent[2]}")
+        value = float(f"{exponent[1]}e{exponent[2]}") if exponent else math.nan
+    if not math.isfinite(value):
+        raise InputError(f'{place}: expected a number, found "{token}"')
+    return value
 
 
 def whole_of(token: str, place: str) -> int:

@@ -55,7 +55,22 @@ def _by_gmsh(content: bytes) -> RawMesh:
         alone = Path(folder) / "mesh.msh"
         alone.write_bytes(content)
         gmsh.merge(str(alone))
+        for name, tags in (
+            (b"Nodes", [gmsh.model.mesh.getNodes()[0]]),
+            (b"Elements", gmsh.model.mesh.getElements()[1]),
+        ):
+            announced, found = _announced(content, name), sum(map(len, tags))
+            if announced != found:
+                what = name.decode()
+                raise InputError(f"expected the {announced} {what.lower()} that ${what} announces, found {found}")
         return extract_mesh()
+
+
+def _announced(content: bytes, name: bytes) -> int:
+    """How many nodes or elements a file of version 4 says that it has."""
+    is_binary = content.split(maxsplit=3)[2] != b"0"
+    data = content.partition(b"$" + name)[2].partition(b"\n")[2]
+    return int(np.frombuffer(data, dtype="<u8", count=2)[1] if is_binary else data.split(maxsplit=2)[1])
 
 
 class _Version2:

@@ -112,7 +112,9 @@ def test_undefined_surfaces_of_a_tie_are_told(read):
         (PLAIN + "*ELSET, ELSET=F\n77\n", "F: expected elements that are there, found element 77"),
         (PLAIN + "*NSET, NSET=N, GENERATE\n1, 2147483648, 1\n", "expected first, last and step of nodes"),
         (PLAIN + "*NSET, NSET=N, GENERATE\n1, 9, 0\n", "expected first, last and step of nodes"),
-        (PLAIN.replace("0.333333333333", "nan"), "expected nodes with finite coordinates"),
+        (PLAIN.replace("0.333333333333", "nan"), 'expected a number, found "nan"'),
+        (PLAIN.replace("0.333333333333", "1e400"), 'expected a number, found "1e400"'),
+        (PLAIN.replace("0.333333333333", "1e200"), "expected nodes with finite coordinates"),
     ],
 )  # fmt: skip
 def test_what_cannot_be_is_rejected_by_name(read, text, says):
