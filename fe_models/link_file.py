@@ -159,7 +159,7 @@ def _check_modes(link: Link, path: Path) -> None:
     modes, damping = link.modes, link.damping
     if modes.count is not None and modes.indices is not None:
         _reject(path, "modes", "either count or indices", "both")
-    if modes.count is None and modes.indices is None and not modes.attachment_modes:
+    if modes.are_default and not modes.attachment_modes:
         _reject(path, "modes", "either count or indices", "neither")
     if modes.indices and sorted(set(modes.indices)) != list(modes.indices):
         _reject(path, "modes.indices", "ascending numbers, each once", modes.indices)

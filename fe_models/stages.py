@@ -28,7 +28,7 @@ from .modal_body.measured import as_computed, with_measured
 from .modal_body_file import FORMAT_VERSION
 
 # To be raised whenever the same link file gives other numbers than before, or further ones.
-ALGORITHM_VERSION = {"beam": 6, "solid": 6}
+ALGORITHM_VERSION = {"beam": 7, "solid": 7}
 
 # Likewise, of what files of links with stresses hold of these: 1 without static ones of unit loads.
 STRESS_VERSION = 3

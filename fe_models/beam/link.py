@@ -138,13 +138,13 @@ def _modes(
     if is_fixed:
         for family, model in models.items():
             held[family], Z[family] = fixed_interfaces(model, family, places)
-    modes = select(held, _wanted(link, held, path)) if _is_numbered(link) else select_default(held)
+    modes = select_default(held) if link.modes.are_default else select(held, _wanted(link, held, path))
     if is_fixed:
         modes = [mode._replace(x=Z[mode.family] @ mode.x) for mode in modes]
     if not link.modes.attachment_modes:
         return modes, []
     known = {family: _together(models[family], family, modes) for family in models}
-    static = [Mode(*mode) for mode in attachment_modes(models, known, places, link.geometry.length)]
+    static = [Mode(*mode) for mode in attachment_modes(models, known, places, link.geometry.length, not is_fixed)]
     return _ritz(models, modes, static) if is_fixed else (modes, _by_frequency(static))
 
 
@@ -203,10 +203,6 @@ def _by_frequency(modes: Sequence[Mode]) -> list[Mode]:
 def _together(model: FamilyModel, family: Family, modes: Sequence[Mode]) -> Array:
     """(m, n) those of `modes` that belong to a family."""
     return np.array([mode.x for mode in modes if mode.family == family]).reshape(-1, model.K.shape[0]).T
-
-
-def _is_numbered(link: BeamLink) -> bool:
-    return link.modes.count is not None or link.modes.indices is not None
 
 
 def station_fields(models: Mapping[Family, FamilyModel], modes: Sequence[Mode], stations: int) -> Array:

@@ -113,8 +113,9 @@ class Reference(Record):
 class Modes(Record):
     """The lowest `count` eigenmodes of one or several families, or those numbered `indices` (1 is the lowest).
 
-    `attachment_modes` adds the static shapes of loads at interfaces, as far as the eigenmodes do not have them; false:
-    eigenmodes alone. With them `count` may be left out: six of each bending family, one axial, one of torsion.
+    `attachment_modes` adds the static shapes of loads at interfaces, and of torques along a bent link, as far as the
+    eigenmodes do not have them; false: eigenmodes alone. With them `count` may be left out: six of each bending family,
+    one axial, one of torsion.
     """
 
     count: ModeCount | None = None
@@ -125,6 +126,11 @@ class Modes(Record):
     """Family or families that they are taken from."""
     attachment_modes: bool = True
     """Add static shapes of loads at the interfaces."""
+
+    @property
+    def are_default(self) -> bool:
+        """Whether their number is left to the program."""
+        return self.count is None and self.indices is None
 
 
 class Damping(Record):

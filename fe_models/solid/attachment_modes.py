@@ -10,6 +10,7 @@ from ...common.arrays import Array
 from ..link_records import Family
 from ..modal_body.attachment_modes import COMPONENTS, Inertia, ResidualModes, residual_modes
 from .eigen import Mass
+from .elasticity import SolidModel
 from .strain_energy import internal_forces, strain_energy
 from .supports import Flexibility
 
@@ -21,6 +22,7 @@ def attachment_modes(
     X: Array,
     interfaces: Mapping[str, Array],
     length: float,
+    twists_along: bool,
 ) -> ResidualModes:
     """Those of the loads that belong to `families`; collective.
 
@@ -31,6 +33,7 @@ def attachment_modes(
         X: (3 owned, n) eigenmodes.
         interfaces: B (6, 3 owned), mean motion of each; its transpose spreads a force.
         length: of the link in m: a unit force goes with a moment of force times length.
+        twists_along: whether torsion has the shape under a torque along the link, which bent links bear, too.
     """
     model = flexibility.model
     scale = np.repeat([1.0, length], 3)
@@ -38,6 +41,9 @@ def attachment_modes(
     B = np.array(
         [scale[row] * at[row] for family in families for at in interfaces.values() for row in COMPONENTS[family]]
     ).T
+    if twists_along and "torsion" in families:
+        rows.append(("torsion", 3))
+        B = np.column_stack([B, _torque_along(model) * length])
     shapes = flexibility @ B
     # As for prestress: without the rounding errors of an assembled K.
     shapes += flexibility @ (B - internal_forces(model, model.with_ghosts(shapes)))
@@ -47,3 +53,10 @@ def attachment_modes(
         lambda U: mass @ U, lambda U: strain_energy(model, np.ascontiguousarray(model.with_ghosts(U))), model.total
     )
     return residual_modes(static, X, inertia)
+
+
+def _torque_along(model: SolidModel) -> Array:
+    """(3 owned,) of the part's inertia about the axis, in all 1 N·m; collective."""
+    turn = np.cross([1.0, 0.0, 0.0], model.x).reshape(-1, 1)
+    torque = model.mass @ turn
+    return np.asarray((torque / model.total(turn.T @ torque))[:, 0])

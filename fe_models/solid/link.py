@@ -105,7 +105,8 @@ def solid_modal_body(
     )
     count = modes.omega2.size
     if link.modes.attachment_modes:
-        residual = attachment_modes(link.families, flexibility, mass, modes.X, places.rows, link.geometry.length)
+        length = link.geometry.length
+        residual = attachment_modes(link.families, flexibility, mass, modes.X, places.rows, length, not fixed)
         modes = modes.followed_by(residual)
     if fixed:
         modes = ritz_modes(model, modes, count)
