@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from ffrobot.fe_models.link import computed_modal_body
 from ffrobot.fe_models.link_file import LinkTable
 from ffrobot.mbs.model.spatial_bending import bent_section
-from ffrobot.mbs.model.spatial_body import from_modal_body
+from ffrobot.mbs.model.spatial_body import from_modal_body, transformed
 
 E, L = 70e9, 0.5
 BENDING = ("in-plane-bending", "out-of-plane-bending")
@@ -74,6 +74,17 @@ def link(section, nu, condition="cantilever", **modes):
     }
 
 
+def with_one_static_twist(modal):
+    """Of static shapes in torsion only that of a moment at the tip, as the checkpoints have it."""
+    body = from_modal_body("rod", modal, stiffened=True)
+    twists = np.flatnonzero((np.array(modal.family) == "torsion") & (modal.residual == 1))
+    shape = body.points["tip"].rotation[0, twists] / body.stiffness[twists]
+    T = np.eye(body.n_modes)
+    T[np.ix_(twists, twists[:1])] = (shape / np.linalg.norm(shape))[:, None]
+    T = np.delete(T, twists[1:], axis=1)
+    return transformed(body, T, np.diag(T.T @ (body.stiffness[:, None] * T)).copy())
+
+
 @pytest.fixture(scope="module")
 def body(tmp_path_factory):
     """Of a section, with the eigenmodes of `COUNTS` and the static shapes of loads at the tip."""
@@ -86,7 +97,7 @@ def body(tmp_path_factory):
             family = np.array(computed_modal_body(table).family)
             indices = sorted(int(i) + 1 for f, n in COUNTS.items() for i in np.flatnonzero(family == f)[:n])
             table = LinkTable(link(*key, indices=indices, attachment_modes=True), folder / "rod.toml")
-            known[key] = from_modal_body("rod", computed_modal_body(table), stiffened=True)
+            known[key] = with_one_static_twist(computed_modal_body(table))
         return known[key]
 
     return of
@@ -150,3 +161,28 @@ def test_order_in_the_load(body, name, condition):
         found = tip_at_rest(body(case.section, case.nu, condition), *load)
         errors.append([np.linalg.norm(a - b) for a, b in zip(found, exact, strict=True)])
     assert np.all(np.log2(np.divide(*errors)) > 2.9)
+
+
+def test_mass_beside_the_axis(body):
+    """As part of the link, four points that turn with its tip: what they move by in second order, by differences."""
+    strip = body((4, 20), 0.33)
+    mass, arm = 0.4, np.array([0.02, 0.06, -0.03])
+    spread = np.array([[0.01, 0.02, 0.0], [0.0, -0.01, 0.03]])
+    ends = np.concatenate([spread, -spread])
+    E_center = mass / 4 * ends.T @ ends
+    at = strip.points["tip"]
+    loaded = strip.stiffening.with_payload("tip", at.position, at.rotation, mass, arm, E_center)
+    p, h = np.random.default_rng(7).normal(size=strip.n_modes) / np.sqrt(strip.stiffness), 1e-2
+
+    def places(q):
+        tip = bent_section(strip, "tip", q)
+        return tip.u + Rotation.from_rotvec(tip.phi).apply(arm + ends)
+
+    def curvature(h):
+        return (places(h * p) + places(-h * p) - 2 * places(0 * p)) / (2 * h**2)
+
+    second = (4 * curvature(h / 2) - curvature(h)) / 3
+    change = {key: -0.5 * p @ (getattr(loaded, key) - getattr(strip.stiffening, key)) @ p for key in ("K_s", "K_x")}
+    np.testing.assert_allclose(change["K_s"], mass / 4 * second.sum(axis=0), rtol=1e-6)
+    moments = mass / 4 * np.einsum("ik,il->kl", places(0 * p), second)
+    np.testing.assert_allclose(change["K_x"], moments, rtol=1e-6, atol=1e-6 * np.abs(moments).max())
