@@ -87,7 +87,7 @@ class AnalysisResult:
 
     @property
     def stiffening_effect(self) -> float:
-        """Largest relative change of a mode's stiffness by the loads of the run."""
+        """Largest relative change of a link's stiffness by the loads of the run."""
         return max((link.stiffness_change for link in self.bending.values()), default=0.0)
 
     @property

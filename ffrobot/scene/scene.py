@@ -16,7 +16,7 @@ from .kinds import Analysis
 class SceneKeys(MechanismKeys):
     """Everything a scene file may contain; lists of tables keep the singular name they have in the file.
 
-    `geometric_stiffening` "auto": where the loads of a run change the stiffness of a mode by more than 1 %.
+    `geometric_stiffening` "auto": where the loads of a run change the stiffness of a link by more than 1 %.
     """
 
     pzt: tuple[PztLayout, ...] = ()

@@ -23,7 +23,7 @@ from .trajectories import Trajectory
 class MechanismKeys(Record):
     """The keys of a scene file that concern the mechanism; lists of tables keep the singular name they have there.
 
-    `geometric_stiffening` "auto": where the loads of a run change the stiffness of a mode by more than 1 %.
+    `geometric_stiffening` "auto": where the loads of a run change the stiffness of a link by more than 1 %.
     """
 
     name: Title
@@ -35,7 +35,7 @@ class MechanismKeys(Record):
     motors: Literal["section", "frame"] = "section"
     """What motors and joint coordinates turn: the sections at the joint, or the frames of the bodies."""
     geometric_stiffening: bool | Literal["auto"] = False
-    """Loads change the stiffness of links; "auto": where they change that of a mode by more than 1 %."""
+    """Loads change the stiffness of links; "auto": where they change that of a link by more than 1 %."""
     body: Annotated[tuple[Body, ...], NotEmpty]
     """Links and rigid bodies."""
     joint: tuple[Joint, ...] = ()

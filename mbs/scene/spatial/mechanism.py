@@ -31,7 +31,7 @@ class SpatialMechanismKeys(Record):
     motors: Literal["section", "frame"] = "section"
     """What motors turn: the sections at the joint, or the frames of the bodies."""
     geometric_stiffening: bool | Literal["auto"] | None = None
-    """Loads change the stiffness of links; "auto": where they change that of a mode by more than 1 %. Left out: of
+    """Loads change the stiffness of links; "auto": where they change that of a link by more than 1 %. Left out: of
     links in pieces alone, but those with loads between the ends of a piece."""
     redundancy: Literal["least-torque", "least-motion"] | None = None
     """What settles the freedom that trajectories leave to joints, found with undeformed links: from the state at t = 0
