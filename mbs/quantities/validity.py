@@ -31,7 +31,7 @@ ENOUGH = 1e-3  # shortening of a piece by bending: tips are then right to some 1
 
 # Estimates are 0.4 to 5 times the errors of falling double pendulums with deflections of 0.1 to 10 %, and the errors
 # of cantilevers under tip forces: tests/test_large_deflections.py; docs/theory.md, Limits.
-GROWTH = 2.0  # times the change of stiffness: what is wrong with deflections and moments without geometric stiffening
+GROWTH = 1.7  # times the change of stiffness: what is wrong with deflections and moments without geometric stiffening
 SECOND_ORDER = 0.5  # of the foreshortening is wrong with geometric stiffening
 
 
@@ -196,4 +196,4 @@ def deflection_warning(bodies: Mapping[str, Bending]) -> str:
 
 
 def _percent(value: float) -> str:
-    return f"{100 * value:.2g} %"
+    return f"{100 * value:.0f} %" if value >= 1.0 else f"{100 * value:.2g} %"
