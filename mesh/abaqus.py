@@ -158,14 +158,16 @@ class _Assembled:
         ]).astype(np.int64)  # fmt: skip
         for tie in self.deck.ties:
             for row, place in tie.rows():
-                pair = [self._surface_nodes(entry) for entry in row[:2]]
+                if len(row) != 2:
+                    raise InputError(f"*TIE, {place}: expected two surfaces, found {len(row)}")
+                pair = [self._surface_nodes(entry) for entry in row]
                 slave, master = (used if nodes is None else np.intersect1d(nodes, used) for nodes in pair)
                 joined = self._join(same, slave, master)
-                known = all(nodes is not None for nodes in pair) and len(pair) == 2
+                known = all(nodes is not None for nodes in pair)
                 wanted = np.setdiff1d(slave, master).size
                 if joined < (wanted if known else 1) or joined == 0:
                     raise InputError(
-                        f"*TIE, {place}: expected the nodes of {row[0]} where {' '.join(row[1:2])} has some, found"
+                        f"*TIE, {place}: expected the nodes of {row[0]} where {row[1]} has some, found"
                         f" {joined} of {wanted} there: meshes that do not match cannot be tied"
                     )
                 if not known:

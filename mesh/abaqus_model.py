@@ -127,9 +127,12 @@ class Scope:
             self.elsets.add(name, (("", number, place) for number, place in found))
 
     def _nset(self, keyword: Keyword) -> None:
-        if "ELSET" in keyword.options:
-            raise InputError(f"{keyword}: expected a list of nodes, found those of the elements of a set (ELSET=)")
-        self.nsets.read(keyword, keyword.option("NSET"))
+        if "ELSET" not in keyword.options:
+            self.nsets.read(keyword, keyword.option("NSET"))
+            return
+        for _, number, place in self.elsets.meant(keyword.option("ELSET"), str(keyword)):
+            nodes = self.solids[number][1] if number in self.solids else self.surfaces.get(number, ())
+            self.nsets.add(keyword.option("NSET"), (("", node, place) for node in nodes))
 
     def _elset(self, keyword: Keyword) -> None:
         self.elsets.read(keyword, keyword.option("ELSET"))

@@ -39,14 +39,17 @@ def read_mesh(path: Path, where: str) -> RawMesh:
         InputError: it cannot be read.
     """
     ending = path.suffix.lower()
-    if ending == ".inp":
-        from .abaqus import read_abaqus
+    try:
+        if ending == ".inp":
+            from .abaqus import read_abaqus
 
-        return read_abaqus(path, where)
-    if ending in (".bdf", ".nas", ".fem") or (ending == ".dat" and not _TECPLOT.search(path.read_bytes())):
-        from .nastran import read_nastran
+            return read_abaqus(path, where)
+        if ending in (".bdf", ".nas", ".fem") or (ending == ".dat" and not _TECPLOT.search(path.read_bytes())):
+            from .nastran import read_nastran
 
-        return read_nastran(path, where)
+            return read_nastran(path, where)
+    except (ArithmeticError, LookupError, RecursionError, TypeError, ValueError) as error:  # of a deck like no other
+        raise InputError(f"{where}: expected a deck that can be read, found one that cannot: {error!r}") from None
     if ending == ".msh":
         from .msh import read_msh
 

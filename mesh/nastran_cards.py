@@ -46,7 +46,10 @@ class Card:
 
 @dataclass
 class _Row:
-    """A line of a card; `begin` and `end` are the marks that tell which line goes on with which."""
+    """A line of a card; `begin` and `end` are the marks that tell which line goes on with which.
+
+    `is_half` is of lines of 16 columns that end with *: another line has to follow.
+    """
 
     name: str
     place: str
@@ -54,6 +57,7 @@ class _Row:
     begin: str
     end: str
     follows: bool
+    is_half: bool
 
 
 def cards(path: Path) -> Iterator[Card]:
@@ -81,6 +85,8 @@ def cards(path: Path) -> Iterator[Card]:
             raise InputError(f"{row.place}: expected one card that this line goes on with, found none or several")
         after[before] = k
     for k, row in enumerate(rows):
+        if row.is_half and k not in after:
+            raise InputError(f"{row.place}: expected a line that goes on with this one (*), found none")
         if row.follows:
             continue
         fields = list(row.fields)
@@ -142,4 +148,5 @@ def _row(line: Line) -> _Row:
     return _Row(
         name.rstrip("*").strip().upper(), line.place, entries[1 : width + 1],
         name.lstrip("+* ") if follows else "", entries[width + 1].lstrip("+* "), follows,
+        entries[width + 1].startswith("*"),
     )  # fmt: skip

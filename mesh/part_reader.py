@@ -87,7 +87,8 @@ def main() -> None:
     global _is_apart
     _is_apart = True
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # of a terminal: the parent decides
-    ctypes.CDLL(None).prctl(1, int(signal.SIGKILL), 0, 0, 0)  # PR_SET_PDEATHSIG
+    with suppress(AttributeError):  # Linux has it
+        ctypes.CDLL(None).prctl(1, int(signal.SIGKILL), 0, 0, 0)  # PR_SET_PDEATHSIG
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     answer = os.fdopen(os.dup(1), "wb")
     nowhere = os.open(os.devnull, os.O_WRONLY)

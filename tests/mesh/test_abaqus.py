@@ -96,6 +96,7 @@ def test_undefined_surfaces_of_a_tie_are_told(read):
         (TWO.format("").replace("part=HALF\n0.", "part=NONE\n0."), "expected PART= one of HALF, found NONE"),
         (TWO.format("").replace("H-2", "H-1"), "instances with names of their own, found H-1"),
         (TWO.format("").replace("0., 0.1, 0.", "0., 0.1, 0., 0., 0., 0., 90."), r"\*INSTANCE, line \d+: "),
+        (TWO.format("") + SURFACES + "*Tie, name=g\nDOWN\n", r"\*TIE, line \d+: expected two surfaces, found 1"),
         (PLAIN.replace("*NODE", "*NODE, SYSTEM=S"), r"\*NODE, line 1: expected SYSTEM=R or C, found S"),
         (PLAIN + "*NGEN\n1, 5, 1\n", r"\*NGEN, line \d+: expected nodes and elements one by one"),
         (PLAIN + "*INCLUDE, INPUT=nowhere.txt\n", "expected a file to include, found none called nowhere.txt"),
@@ -163,6 +164,12 @@ def test_sets_of_sets_and_surfaces(read):
     assert face_area(part, "left") == pytest.approx(VOLUME)
     ends = read(text, (PlaceRecord(name="root", group="ENDS"), PlaceRecord(name="tip", group="ENDS")))
     assert face_area(ends, "root") == pytest.approx(2 * VOLUME)
+
+
+def test_nodes_of_a_set_of_elements(read):
+    """The two elements at the tip have the nodes of x = 2/3 and 1."""
+    text = PLAIN + "*ELSET, ELSET=TIP\n5, 6\n*NSET, NSET=END, ELSET=TIP\n"
+    assert face_area(read(text, (PlaceRecord(name="tip", group="END"),)), "tip") > VOLUME
 
 
 def test_sides_of_a_surface(read):
