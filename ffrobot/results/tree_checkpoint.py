@@ -32,7 +32,7 @@ def read_tree_checkpoint(file: Results, group: str) -> _core.TreeCheckpoint:
         found: _core.TreeCheckpoint = _core.TreeCheckpoint(
             time=float(about["time"]),
             outputs=int(about["outputs"]),
-            steps=_core.StepHistory(**{name: about[name].item() for name in STEPS}),
+            steps=_core.StepHistory(**{name: about[name].item() for name in STEPS if name in about}),
             methods=_core.MethodHistory(**{name: about[name].item() for name in METHOD_HISTORY}),
             **memory,
         )

@@ -100,7 +100,7 @@ class Statistics:
         return replace(self, **{name: getattr(earlier, name) + getattr(self, name) for name in counts})
 
 
-STEPS = ("next_step", "usual_step", "reserve", "previous_step", "previous_error", "in_transient")
+STEPS = ("next_step", "usual_step", "reserve", "previous_step", "previous_error", "in_transient", "without_look")
 """Of the core's `StepHistory`, all."""
 
 METHOD_HISTORY = ("second", "pace_of_other", "since", "measured", "tries", "window", "trial")

@@ -67,17 +67,19 @@ void bind_histories(nb::module_ &m) {
       .def(
           "__init__",
           [](StepHistory *s, double next_step, double usual_step, double reserve, double previous_step,
-             double previous_error, bool in_transient) {
-            new (s) StepHistory{next_step, usual_step, reserve, previous_step, previous_error, in_transient};
+             double previous_error, bool in_transient, int without_look) {
+            new (s)
+                StepHistory{next_step, usual_step, reserve, previous_step, previous_error, in_transient, without_look};
           },
           nb::kw_only(), "next_step"_a, "usual_step"_a, "reserve"_a, "previous_step"_a, "previous_error"_a,
-          "in_transient"_a)
+          "in_transient"_a, "without_look"_a = 0)
       .def_ro("next_step", &StepHistory::next_step)
       .def_ro("usual_step", &StepHistory::usual_step)
       .def_ro("reserve", &StepHistory::reserve)
       .def_ro("previous_step", &StepHistory::previous_step)
       .def_ro("previous_error", &StepHistory::previous_error)
-      .def_ro("in_transient", &StepHistory::in_transient);
+      .def_ro("in_transient", &StepHistory::in_transient)
+      .def_ro("without_look", &StepHistory::without_look);
   nb::class_<MethodHistory>(m, "MethodHistory", "What the choice between two integrators follows from during a run.")
       .def(
           "__init__",

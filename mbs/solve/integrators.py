@@ -190,7 +190,19 @@ def beyond_order(choice: Choice, analysis: IntegratedAnalysis) -> str:
     )
 
 
-def unmet(choice: Choice, run: _core.Run) -> str:
+def beyond_rounding(tolerance: float, rounding: float) -> str:
+    """A sentence where round-off, which may add errors of `rounding` in all, needs a larger tolerance; else ""."""
+    if not rounding > tolerance:
+        return ""
+    digit = 10.0 ** np.floor(np.log10(rounding))
+    return (
+        f"a tolerance of {tolerance:g} is below round-off here: accelerations of joints scatter, as parts with next to"
+        f" no inertia amplify round-off of forces; errors may reach {rounding:.1g} of the peaks, within tolerance ="
+        f" {np.ceil(rounding / digit) * digit:.1g}"
+    )
+
+
+def unmet(choice: Choice, run: _core.Run | _core.TreeRun) -> str:
     """What the integrator saw where steps have become too short and no cause is found in loads or positions."""
     if np.isfinite(run.last_error):
         saw = f"a step of {run.last_step:.2g} s still errs by {run.last_error:.2g} times what it may"

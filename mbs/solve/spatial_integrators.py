@@ -6,8 +6,10 @@ import numpy as np
 
 from ...common.arrays import Array
 from .. import _core
+from ..model.spatial_cut import cut_damping
 from ..model.spatial_model import SpatialModel
 from ..model.spatial_system import SpatialSystem
+from ..model.spatial_transmission import tree_resistance_slope
 from ..scene.analysis import IntegratedAnalysis
 from .integrators import ASKED_FOR, Choice, faster_of
 from .spatial_frequencies import SpatialVibrations, vibrations_in_space, without_rows
@@ -17,6 +19,8 @@ from .state import State
 # again here: once at work, it is given time to damp vibrations away (core/integrate/faster_method.cpp), which has to be
 # worth it.
 COST_OF_RADAU = 4.2
+
+TOO_STIFF = 1e6  # rates of friction in a run above which explicit steps, a few of its times long, are too many
 
 
 def integrator_of(model: SpatialModel, name: str) -> str:
@@ -42,10 +46,12 @@ def choose_integrator_in_space(
         return Choice(analysis.integrator, ASKED_FOR)
     if outputs == 1:
         return Choice("dop853", "nothing to integrate")
-    if not any(node.body.n_modes for node in model.tree.nodes):
-        return Choice("dop853", "nothing vibrates")
     if _sticks(model):
         return Choice("radau", "dry friction is a stiff damper to the light ends of links")
+    if (rate := fastest_friction(system, start)[0]) * analysis.end > TOO_STIFF:
+        return Choice("radau", f"friction is a stiff damper: joints come to rest within {1 / rate:.1e} s")
+    if not any(node.body.n_modes for node in model.tree.nodes):
+        return Choice("dop853", "nothing vibrates")
     if model.tree.gears:
         return Choice("dop853", "springs in joints are not among the stiff forces of implicit integrators")
     if is_sampled:
@@ -55,6 +61,23 @@ def choose_integrator_in_space(
         return Choice("dop853", "nothing vibrates")
     excited = _excitation(system, start, found)
     return faster_of(found.frequency, found.damping_ratio, excited, analysis, outputs, COST_OF_RADAU)
+
+
+def fastest_friction(system: SpatialSystem, at: State) -> tuple[float, str]:
+    """Rate (1/s) at which friction brings a joint to rest, in the state `at`, at most; and which: 0 without friction.
+
+    With D the slopes of friction at zero rates, the largest eigenvalue of M⁻¹ D, under what rows hold.
+    """
+    model, nothing = system.model, np.zeros(system.model.tree.n_v)
+    D = np.diag(tree_resistance_slope(model.tree, nothing[None])[0]) + cut_damping(model.tree, model.cut, at.q)
+    if not D.any():
+        return 0.0, ""
+    by_forces = system.derivatives(0.0, at.q, at.v, nothing).a_f
+    rates, shapes = np.linalg.eig(by_forces @ D)
+    fastest = int(np.argmax(rates.real))
+    share = np.abs(shapes[:, fastest])
+    joint = max(model.tree.nodes, key=lambda node: share[node.v].max(initial=0.0)).joint
+    return float(rates[fastest].real), joint.label
 
 
 def _sticks(model: SpatialModel) -> bool:

@@ -186,6 +186,11 @@ void bind_run_and_laws(nb::module_ &m) {
       .def_prop_ro("rejected", [](const TreeRun &r) { return r.report.rejected; })
       .def_prop_ro("evaluations", [](const TreeRun &r) { return r.report.evaluations; })
       .def_prop_ro("time_reached", [](const TreeRun &r) { return r.report.time; })
+      .def_prop_ro("last_step", [](const TreeRun &r) { return r.report.last_step; })
+      .def_prop_ro("last_error", [](const TreeRun &r) { return r.report.last_error; })
+      .def_prop_ro(
+          "rounding", [](const TreeRun &r) { return r.report.rounding; },
+          "What rounding may have added to errors, in the unit of the tolerance.")
       .def_prop_ro(
           "changes", [](const TreeRun &r) { return changes_of(r.report); },
           "Of integrators: (time, from, to, mean step before) of each.")

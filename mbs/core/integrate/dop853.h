@@ -34,6 +34,9 @@ public:
   double *first_slope() override { return K_.data(); }
   double *last_slope() override { return K_.col(Dop853Tableau::stages).data(); }
 
+protected:
+  double weight_of_rounding() const override { return 4.4; }
+
 private:
   OdeSystem &system_;
   Eigen::Index n_;

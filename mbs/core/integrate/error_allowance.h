@@ -12,6 +12,7 @@ struct StepHistory {
   double reserve = 1;                           // what is left of it, in terms of the tolerance
   double previous_step = 0, previous_error = 1; // s, and relative to the largest error allowed; of StepControl
   bool in_transient = false;                    // vibrations of the start are still being damped away
+  int without_look = 0;                         // tries to come that are not looked at for rounding
 };
 
 // Of one step: as parts of the tolerance, without and with the reserve, and in the unit of errors.

@@ -24,8 +24,12 @@ namespace {
 constexpr double radians_too_long = 5, notable = 0.1;
 
 // Steps below a radian of the fastest vibration, in first steps, are looked at for rounding: vibrations do not ask for
-// steps that are much shorter. Methods that damp what they do not resolve need no such look.
+// steps that are much shorter. Of methods that damp what they do not resolve all steps are.
 constexpr double radian = 10;
+
+// Rounding of a single step beyond the tolerance and this part of the peaks is none that a run could go on with: rows
+// hardly differ there, and steps that collapse say so.
+constexpr double hopeless = 1e-7;
 
 // Steps that are rejected until they are this part of the usual ones may have met a jump, which is looked for. Steps
 // end before it and begin behind it, and are as long as usual.
@@ -86,7 +90,9 @@ public:
     t_ = checkpoint.time;
     watch_.begin_at(t_);
     methods_.go_on(checkpoint.methods);
+    const bool is_repeatable = is_repeatable_ && controls_.methods.size() == 1;
     make_method_at_work();
+    is_repeatable_ = is_repeatable;
     steps_ = checkpoint.steps;
     control_.go_on(steps_.previous_step, steps_.previous_error);
     system_.slope(t_, z_.data(), method_->first_slope());
@@ -101,7 +107,7 @@ public:
     report_.time = t_;
     report_.outputs = delivery_.outputs();
     report_.evaluations = system_.evaluations();
-    if (!is_repeatable_ || report_.status != IntegrationStatus::completed)
+    if (!is_repeatable_)
       report_.step_ends.clear();
     return report_;
   }
@@ -228,7 +234,8 @@ private:
       return NAN;
     method_->estimate(attempt.step, error_);
     double size = system_.error_size(attempt.end, method_->end(), error_.data()) / allowance.error;
-    if (size > StepControl::target && attempt.step < radian * system_.initial_step() && !method_->damps())
+    by_rounding_ = 0;
+    if (size > StepControl::target && (method_->damps() || attempt.step < radian * system_.initial_step()))
       size = beyond_rounding(attempt, allowance, size);
     const bool is_dense = size <= 1 && delivery_.next_time() < attempt.end;
     return is_dense ? std::max(dense_size(attempt), size) : size; // keeps NaN
@@ -236,11 +243,15 @@ private:
 
   // What of that size is more than rounding
   double beyond_rounding(const Attempt &attempt, const Allowance &allowance, double size) {
-    const Eigen::VectorXd &left = rounding_.error(t_, z_.data(), method_->first_slope(), attempt.step, error_);
+    const Eigen::VectorXd &left =
+        rounding_.error(t_, z_.data(), method_->first_slope(), attempt.step, *method_, error_, steps_.without_look);
     if (left.isZero(0))
       return size;
     system_.slope(attempt.end, method_->end(), method_->last_slope());
     const double by_rounding = system_.error_size(attempt.end, method_->end(), left.data());
+    if (!(by_rounding <= std::max(controls_.tolerance, hopeless)))
+      return size;
+    by_rounding_ = by_rounding;
     return std::max(size - by_rounding / allowance.error, 0.0);
   }
 
@@ -256,6 +267,7 @@ private:
   }
 
   void accept(const Attempt &attempt, const Allowance &allowance, double size) {
+    report_.rounding += by_rounding_;
     size = take_from_reserve(attempt.step, allowance, size, steps_);
     if (!take(attempt))
       return;
@@ -355,6 +367,7 @@ private:
   std::optional<Jump> jump_;   // the next one that is known
   double searched_until_ = t_; // there is no other before
   Rounding rounding_;
+  double by_rounding_ = 0;    // part of the error of the step just tried
   Eigen::VectorXd z_, error_; // local coordinates (ode.h)
 };
 

@@ -67,6 +67,7 @@ struct IntegrationReport {
   std::size_t outputs = 0; // delivered
   double last_step = 0;    // s, tried
   double last_error = 0;   // of it, relative to the largest one allowed; NaN where its equations could not be solved
+  double rounding = 0;     // what rounding may have added to errors of accepted steps, in the unit of the tolerance
   std::vector<MethodChange> changes;
   std::vector<double> step_ends; // s, as controls ask for them; empty where the run cannot be repeated by them
 };

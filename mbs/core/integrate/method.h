@@ -31,6 +31,14 @@ public:
   // Error of the step of size h just made; needs last_slope().
   virtual void estimate(double h, Eigen::VectorXd &error) = 0;
 
+  // Slopes `x` off by as much at every stage, each by another amount, become the error that the estimate of such a step
+  // sees, at most.
+  virtual void slopes_to_error(double h, Eigen::VectorXd &x) {
+    const Eigen::Index n = x.size() / 2;
+    x *= h * weight_of_rounding();
+    x.head(n) += h * x.tail(n); // a coordinate, by its rate
+  }
+
   virtual double error_order() const = 0; // the estimate shrinks as h^error_order
 
   // Part of the tolerance that the estimate of one step may take, which covers `fraction` of the run. The estimates of
@@ -66,6 +74,9 @@ public:
   virtual double *end() = 0;
   virtual double *first_slope() = 0;
   virtual double *last_slope() = 0;
+
+protected:
+  virtual double weight_of_rounding() const { return 1; } // of slopes in the estimate, twice the root of their squares
 };
 
 enum class MethodKind { dopri5, dop853, radau, generalized_alpha };

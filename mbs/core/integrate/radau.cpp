@@ -210,6 +210,7 @@ void Radau::estimate(double h, Eigen::VectorXd &error) {
   slopes_.noalias() = Z_ * (A_inverse.transpose() / h);
   if (previous_step_ == 0) {
     error = first_slope_ + Z_ * (error_weights / h);
+    weight_ = 1;
   } else {
     const double ratio = previous_step_ / h;
     const double x[6] = {(node[0] - 1) * ratio, (node[1] - 1) * ratio, 0, node[0], node[1], node[2]};
@@ -221,15 +222,23 @@ void Radau::estimate(double h, Eigen::VectorXd &error) {
       integral += product;
     }
     error.setZero();
+    weight_ = 0;
     for (int i = 0; i < 6; ++i) {
       double weight = integral * mu_real;
       for (int j = 0; j < 6; ++j)
         if (j != i)
           weight /= x[i] - x[j];
       error += weight * (i < 3 ? previous_slopes_.col(i) : slopes_.col(i - 3));
+      weight_ += weight * weight;
     }
+    weight_ = std::sqrt(weight_);
   }
   solve(mu_real / h, error);
+}
+
+void Radau::slopes_to_error(double h, Eigen::VectorXd &x) {
+  x *= 2 * weight_;
+  solve(mu_real / h, x);
 }
 
 void Radau::accept(double h) {

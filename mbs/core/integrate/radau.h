@@ -15,6 +15,7 @@ public:
   bool step(double t, const double *y, double h, double tolerance) override;
   bool finish(double t) override;
   void estimate(double h, Eigen::VectorXd &error) override;
+  void slopes_to_error(double h, Eigen::VectorXd &x) override;
   double error_order() const override { return 6; }
   // Half of what most runs need: where many modes ring undamped over a thousand radians and more, small errors of slow
   // motion grow to phases of the fastest.
@@ -51,7 +52,7 @@ private:
   Eigen::MatrixXd slopes_, previous_slopes_; // (2n, 3) of that polynomial at its stages, and of the one before
   Eigen::VectorXd stage_, end_, start_, first_slope_, last_slope_, real_, force_, unknown_;
   Eigen::VectorXcd complex_, complex_force_, complex_unknown_;
-  double factorised_step_ = 0, previous_step_ = 0, contraction_ = 1, t0_ = 0, h_ = 0;
+  double factorised_step_ = 0, previous_step_ = 0, contraction_ = 1, t0_ = 0, h_ = 0, weight_ = 1;
   bool stale_ = true, at_start_ = true;
 };
 

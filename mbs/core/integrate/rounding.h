@@ -1,7 +1,7 @@
 // What of a step's error estimate is rounding of its states.
 #pragma once
 
-#include "core/integrate/ode.h"
+#include "core/integrate/method.h"
 
 namespace ffrobot {
 
@@ -9,19 +9,23 @@ class Rounding {
 public:
   explicit Rounding(OdeSystem &system);
 
-  // The error that slopes of states apart by their rounding leave in a step of `step` s from (t, z) with the slope
-  // z_dot; zero where that is no notable part of `error`. Stiff springs between angles make it, where nothing moves and
-  // nothing else is as large; what they leave in rates moves coordinates during the step. It is in proportion to the
-  // step, as is the part of the tolerance that one step of many may take: no shorter step would do better. Takes one
-  // slope; none for some calls after one that found next to nothing. Valid until the next call.
-  const Eigen::VectorXd &error(double t, const double *z, const double *z_dot, double step,
-                               const Eigen::VectorXd &error);
+  // The error that rounding of slopes leaves in the `error` that `method` has estimated of its step of `step` s from
+  // (t, z) with the slope z_dot; zero where that is no notable part of it. It is in proportion to the step, as is the
+  // part of the tolerance that one step of many may take: no shorter step would do better. Two kinds are looked for.
+  // Stiff springs between angles amplify the rounding of states, where nothing moves and nothing else is as large.
+  // Sections with next to no inertia of their own, as tips of beams and rods about their axes, amplify the rounding of
+  // the forces that rows balance: there slopes scatter however little states differ. Takes two slopes; none for some
+  // calls, `without_look`, after one that found next to nothing. Valid until the next call.
+  const Eigen::VectorXd &error(double t, const double *z, const double *z_dot, double step, Method &method,
+                               const Eigen::VectorXd &error, int &without_look);
 
 private:
+  // left_: what rounding by `reach` roundings does, for one of these; its size
+  double look(double t, const double *z, const double *z_dot, double step, Method &method, double reach);
+
   OdeSystem &system_;
-  Eigen::ArrayXd shift_; // (n) factors of a state's entries
-  Eigen::VectorXd shifted_, left_;
-  int resting_ = 0; // calls without a look
+  Eigen::ArrayXd shift_; // (n) of a state's entries, in roundings
+  Eigen::VectorXd shifted_, left_, larger_;
 };
 
 } // namespace ffrobot

@@ -1,0 +1,159 @@
+"""Round-off that light parts amplify ends no run in space: it is told from errors of steps, and reported."""
+
+import re
+
+import numpy as np
+import pytest
+
+import ffrobot
+
+TIGHT = 1e-9
+
+
+def beam(name, length, height, width, condition, ratio):
+    return {
+        "name": name,
+        "link": {
+            "name": name,
+            "material": {"youngs_modulus": 70e9, "poissons_ratio": 0.33, "density": 2700.0},
+            "geometry": {
+                "kind": "beam",
+                "length": length,
+                "section": {"shape": "rectangle", "height": height, "width": width},
+            },
+            "mesh": {"elements": 8},
+            "reference": {"condition": condition},
+            "modes": {"count": 1, "attachment_modes": False},
+            "damping": {"ratio": ratio},
+        },
+    }
+
+
+def joint(name, type_, between, rpy, **keys):
+    motor = {} if type_ == "spherical" else {"motor": name == "O"}
+    turned = {} if rpy is None else {"rpy": rpy}
+    return {"name": name, "type": type_, "between": between, **turned, **motor, **keys}
+
+
+@pytest.fixture(scope="module")
+def four_bar():
+    """A crank of 0.4 g, whose tip turns the rod by a universal joint, in static equilibrium: runs by their keys."""
+
+    def solved(**keys):
+        scene = ffrobot.make_scene(
+            name="four_bar",
+            space="spatial",
+            gravity=[0.6571, -8.558, 4.7503],
+            body=[
+                beam("crank", 0.06577, 0.0013, 0.00183, "simply-supported", 0.01),
+                beam("rod", 0.39146, 0.00705, 0.01092, "cantilever", 0.0),
+                beam("rock", 0.3461, 0.00721, 0.01041, "simply-supported", 0.01),
+            ],
+            joint=[
+                joint("O", "revolute", ["ground", "crank.root"], DRIVE, axis=[0.46033, 0.8619, -0.21267]),
+                joint("U", "universal", ["crank.tip", "rod.root"], UNIVERSAL, axis=FIRST, second_axis=SECOND),
+                joint("S", "spherical", ["rod.tip", "rock.tip"], None),
+                joint("Q", "revolute", ["ground", "rock.root"], ROCKER, axis=[0.8398, -0.49703, 0.21842], at=PIVOT),
+            ],
+            initial={"state": "static", "joints": {"O": -0.49315}},
+            trajectory=[{"name": "d", "joint": "O", "value": MOTION}],
+            analysis=[{"name": "inv", "kind": "pcid", "end": 0.3, "output_step": 0.01, "max_steps": 20000, **keys}],
+        )  # fmt: skip
+        return ffrobot.solve(scene)
+
+    return solved
+
+
+MOTION = "-0.49315 + 0.00597*(10*(t/0.3)**3 - 15*(t/0.3)**4 + 6*(t/0.3)**5)"
+DRIVE, ROCKER = [-2.28683, 0.66224, -2.624], [-0.82132, 0.58578, -2.81788]
+PIVOT = [0.10956, -0.1357, -0.18527]
+FIRST = [-0.3624011439914209, 0.8698454308570439, 0.3347153077629302]
+SECOND = [-0.7642044079087118, 0.5449168110059214, -0.3450467968494014]
+UNIVERSAL = [-0.9549194277130745, 0.04012673226025898, 0.1575400414727917]
+
+
+def rates(results):
+    """Of the joints that are angles: (T, 4) rad/s."""
+    found = [results[f"inv/joints/{name}/rate"] for name in "OUQ"]
+    return np.column_stack(found)
+
+
+def relative(found, expected):
+    return np.abs(found - expected).max() / np.abs(expected).max()
+
+
+@pytest.mark.filterwarnings("ignore::ffrobot.FfrobotWarning")
+def test_a_light_crank_in_equilibrium(four_bar):
+    """It ended at 1e-4 s as no step was small enough. Two integrators that estimate errors otherwise agree."""
+    by_dop853 = four_bar(integrator="dop853", tolerance=1e-6)
+    by_dopri5 = four_bar(integrator="dopri5", tolerance=1e-6)
+    assert by_dop853.attributes("inv")["status"] == "completed"
+    assert relative(rates(by_dop853), rates(by_dopri5)) < 1e-5
+
+
+@pytest.mark.filterwarnings("ignore::ffrobot.FfrobotWarning")
+def test_a_tolerance_below_rounding_is_named(four_bar):
+    """The tolerance that is said to do bounds what a run with another integrator differs by."""
+    tight, other = (four_bar(integrator=name, tolerance=TIGHT) for name in ("dop853", "dopri5"))
+    (text,) = [text for text in tight.warnings["inv"] if "below round-off" in text]
+    would_do = float(re.search(r"tolerance = ([\d.e-]+)", text)[1])
+    assert TIGHT < would_do < 1e-4
+    assert relative(rates(tight), rates(other)) < would_do
+
+
+def arm_of_six_joints(tolerance):
+    """Two tubes between rigid parts; the pose of the last one is prescribed, from the equilibrium on."""
+
+    def part(name, mass, size, end):
+        points = {"a": [0.0, 0.0, 0.0], "b": end}
+        return {
+            "name": name,
+            "rigid": {"mass": mass, "center": [0, 0.02, 0.01], "inertia": [size] * 3, "points": points},
+        }
+
+    def tube(name, length, outer, inner):
+        link = beam(name, length, 0.1, 0.1, "cantilever", 0.0)["link"]
+        section = {"shape": "tube", "outer": outer, "inner": inner}
+        link["geometry"]["section"], link["mesh"] = section, {"elements": 16}
+        link["damping"] = {"rayleigh": [0.0, 1.5e-4]}
+        del link["modes"]
+        return {"name": name, "link": link}
+
+    axes = [[0, 0, 1], [0.1, 1, 0.05], [0.05, 1, -0.12], [1, 0.1, 0.2], [0.1, 0.9, 0.3], [1, -0.2, 0.15]]
+    turns = [[0, 0, 0], [0.1, -1.2, 0.2], [-0.2, 1.4, 0.1], [0.3, 0.2, -0.4], [0, 0.1, 0.7], [0.2, 0, 0]]
+    ends = ["ground", "t.a", "t.b", "up.root", "up.tip", "e.a", "e.b", "fo.root", "fo.tip", "w.a", "w.b", "f.a"]
+    joints = [
+        {"name": f"j{k + 1}", "type": "revolute", "between": ends[2 * k : 2 * k + 2], "axis": axes[k], "rpy": turns[k]}
+        for k in range(6)
+    ]
+    guess = [0.3, -0.2, 0.5, -0.4, 0.6, 0.2]
+    way = "where(t < 0.7, 10*(t/0.7)**3 - 15*(t/0.7)**4 + 6*(t/0.7)**5, 1)"
+    ways = [("0.359", -0.11), ("0.226", 0.14), ("0.356", 0.09), ("0.922", 0.35), ("0.968", -0.3), ("1.233", 0.6)]
+    x, y, z, *rpy = (f"{start} + {change}*{way}" for start, change in ways)
+    return ffrobot.make_scene(
+        name="pose",
+        space="spatial",
+        gravity=[0.0, 0.3, -9.8],
+        body=[
+            part("t", 4.1, 0.022, [-0.0392, -0.0088, 0.0007]),
+            tube("up", 0.43, 0.03, 0.025),
+            part("e", 1.7, 0.005, [0.0667, 0.0207, 0.0023]),
+            tube("fo", 0.36, 0.023, 0.019),
+            part("w", 0.9, 0.0012, [0.0016, 0.0555, 0.0224]),
+            part("f", 0.55, 0.0007, [-0.0193, 0.0766, 0.0144]),
+        ],
+        joint=joints,
+        initial={"state": "static", "joints": {f"j{k + 1}": angle for k, angle in enumerate(guess)}},
+        trajectory=[{"name": "p", "point": "f.b", "x": x, "y": y, "z": z, "rpy": rpy}],
+        analysis=[
+            {"name": "inv", "kind": "pcid", "end": 0.85, "output_step": 0.05, "tolerance": tolerance, "max_steps": 9000}
+        ],
+    )
+
+
+@pytest.mark.filterwarnings("ignore::ffrobot.FfrobotWarning")
+def test_a_pose_at_the_default_tolerance():
+    """Steps of 1e-9 s went on for ever, by two integrators in turn; a run that is 100 times as loose bounds errors."""
+    loose, found = (ffrobot.solve(arm_of_six_joints(tolerance)) for tolerance in (1e-4, 1e-6))
+    for name in ("j2/moment", "j5/moment", "j3/reaction"):
+        assert relative(loose[f"inv/joints/{name}"], found[f"inv/joints/{name}"]) < 1e-4, name
