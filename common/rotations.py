@@ -131,12 +131,18 @@ def of_rpy(roll: float, pitch: float, yaw: float) -> Array:
     return about(2, yaw) @ about(1, pitch) @ about(0, roll)
 
 
+def unit(vector: Array) -> Array:
+    """A vector (3,) of length 1 along one of any length that is not 0, also where squares of that are no numbers."""
+    scaled: Array = vector / np.abs(vector).max()
+    return scaled / np.linalg.norm(scaled)
+
+
 def smallest_turn(axis: Array) -> Array:
     """The triad (3, 3), columns its axes, whose z is along `axis`: the smallest rotation that brings z there.
 
     Of −z, a half turn about x.
     """
-    z = np.asarray(axis, dtype=float) / np.linalg.norm(axis)
+    z = unit(np.asarray(axis, dtype=float))
     S, cosine, square = skew(np.cross([0.0, 0.0, 1.0], z)), z[2], z[0] ** 2 + z[1] ** 2  # Rodrigues: S = sin φ n~
     if cosine > 0.0:
         return as_floats(np.eye(3) + S + S @ S / (1.0 + cosine))

@@ -79,6 +79,8 @@ def main() -> None:
     try:
         cli(standalone_mode=False)
         sys.stdout.flush()
+        if stop.number:  # the exception was raised where Python ignores it, as in a finaliser
+            sys.exit(128 + stop.number)
     except click.ClickException as error:
         error.show()
         sys.exit(error.exit_code)

@@ -84,27 +84,36 @@ def _in_space() -> _Stage2:
 
 def _solve(program: _Stage2, scene_file: Path, path: Path, again: str, *, resume: bool, strict: bool) -> None:
     """Solve, write and tell; `again` is the command that goes on with it."""
+    from ..common.errors import SolveError, StoppedError
     from ..present.progress import Display
     from ..present.start_posture import chosen_posture
     from ..present.summary import summary_console
     from ..results.file import Results
+    from ..results.stopped import how_to_go_on
     from ..scene.plausibility import remarks_on_file
 
     for remark in remarks_on_file(scene_file):  # first: they may be why the run fails
         click.echo(f"note       {remark}")
-    writing = 0.0
+    writing, kept = 0.0, []
 
     def keep(solution: Solution | SpatialSolution) -> None:
         nonlocal writing
         began = time.perf_counter()
         program.write(solution, path)
         writing = time.perf_counter() - began
+        kept.append(solution)
 
     with Display() as display:
-        if resume:
-            solution = program.resume(scene_file, path, display, keep)
-        else:
-            solution = program.solve(scene_file, display, keep)
+        try:
+            if resume:
+                solution = program.resume(scene_file, path, display, keep)
+            else:
+                solution = program.solve(scene_file, display, keep)
+        except SolveError as error:  # what a signal has cut short may fail for that
+            if not display.signal:
+                raise
+            go_on = "".join(how_to_go_on(one, again) for one in kept[-1:])
+            raise StoppedError(f"{error}{go_on}", display.signal) from error
     if solution is None:
         click.echo(f"{path}: complete, nothing to go on with")
         return

@@ -65,7 +65,6 @@ def _write_analysis(group: h5py.Group, solution: SpatialSolution, result: Spatia
     if joints := resolving_joints(motion.model):
         group.attrs.update({"redundancy": motion.model.scene.redundancy, "resolved_by": joints})
     write_check(group, result.check)
-    write_steps(group, run.step_ends, run.integrator.name)
     _write_bodies(group, solution, result)
     write_bending(group, result.bending)
     _write_joints(group, solution, result)
@@ -104,6 +103,7 @@ def _write_run(group: h5py.Group, run: SpatialRun, warnings: Sequence[str]) -> N
         group.attrs[key] = getattr(run, key)
     group.attrs.create("warnings", list(warnings), dtype=h5py.string_dtype())
     group["time"] = run.time
+    write_steps(group, run.step_ends, run.integrator.name)
 
 
 def _write_bodies(group: h5py.Group, solution: SpatialSolution, result: SpatialResult) -> None:

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import h5py
+import numpy as np
 
 from ..common.errors import InputError
 from ..common.hdf5 import blaming
@@ -22,7 +23,7 @@ from ..run.watcher import Watcher
 from ..scene.spatial import SpatialScene
 from .file import Results
 from .same_input import check_same_input, write_input_files
-from .stopped import GROUP, STOPPED, analyses, is_kept
+from .stopped import GROUP, STOPPED, analyses, is_kept, row_of_numbers
 from .tree_checkpoint import read_tree_checkpoint, write_tree_checkpoint
 
 COUNTS = ("steps", "evaluations", "wall_seconds")
@@ -83,4 +84,5 @@ def _earlier_run(file: Results, name: str) -> EarlierSpatialRun:
         **kept,
         checkpoint=checkpoint,
         where=f"{file.path}: {group}",
+        step_ends=row_of_numbers(file, f"{name}/step_ends") if file.has(f"{name}/step_ends") else np.zeros(0),
     )

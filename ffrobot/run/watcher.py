@@ -7,7 +7,7 @@ import threading
 from collections.abc import Callable
 from types import FrameType, TracebackType
 
-from ..common.interrupts import SIGNALS
+from ..common.interrupts import SIGNALS, EndOfCommand
 
 
 class Watcher:
@@ -41,6 +41,9 @@ class Interruption:
     def __enter__(self) -> Interruption:
         if self._is_main:
             self._previous = {number: signal.signal(number, self._request) for number in SIGNALS}
+            for handler in self._previous.values():  # asked before, where Python ignores exceptions
+                if isinstance(handler, EndOfCommand) and handler.number and not self.requested:
+                    self._request(handler.number, None)
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, tb: TracebackType | None) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -32,6 +32,7 @@ class EarlierSpatialRun:
         wall_seconds: of all.
         checkpoint: where it goes on.
         where: what messages call the place that it was read from.
+        step_ends: (N,) s, of all its steps, if it was asked for them.
     """
 
     time: Array
@@ -46,6 +47,7 @@ class EarlierSpatialRun:
     wall_seconds: float
     checkpoint: _core.TreeCheckpoint
     where: str
+    step_ends: Array = field(default_factory=lambda: np.zeros(0), repr=False)
 
     @contextmanager
     def checked(self, model: SpatialModel, times: Array) -> Iterator[None]:

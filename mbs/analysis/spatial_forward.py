@@ -17,13 +17,13 @@ from ..model.spatial_gears import with_compliance_in_space
 from ..model.spatial_model import SpatialModel, modal_direction, without_paths
 from ..model.spatial_motors import MotorForces
 from ..scene.spatial.loads import OF_POINT
-from ..solve.spatial_statics import initial_state
+from ..solve.spatial_statics import hanging_joints, initial_state
 from ..solve.state import State
 from .elastic_joints import DEGREE
 from .forward import Forward
 from .spatial_drive import spatial_drive
 from .spatial_gears import wound_up
-from .spatial_replay import motor_forces_of, path_wrenches, replay_times, replayed
+from .spatial_replay import left_paths, motor_forces_of, path_wrenches, replay_times, replayed
 from .spatial_run import SpatialContext, SpatialRun
 
 Moments = Mapping[str, Sequence[TimeFunction]]
@@ -50,7 +50,9 @@ def run_spatial_forward(context: SpatialContext, analysis: Forward) -> SpatialRu
     """
     model, progress = with_compliance_in_space(without_paths(context.model)), context.progress
     if analysis.actuation is None:
-        return spatial_drive(model, analysis, initial_state(model), progress, earlier=context.earlier)
+        start = initial_state(model)
+        told = tuple(hanging_joints(model, start))
+        return spatial_drive(model, analysis, start, progress, warnings=told, earlier=context.earlier)
     source = context.runs[analysis.actuation]
     if model.tree.gears:
         return _behind_gears(source, model, analysis, context)
@@ -69,6 +71,8 @@ def run_spatial_forward(context: SpatialContext, analysis: Forward) -> SpatialRu
         model, analysis, start, progress, drives=applied.drives, warnings=warnings,
         times=replay_times(source, analysis), earlier=context.earlier,
     )  # fmt: skip
+    if analysis.apply == "trajectory":  # others act without what makes up for vibrations
+        run = replace(run, warnings=(*run.warnings, *left_paths(source, run)))
     return _commanded(run, applied.moments)
 
 

@@ -6,7 +6,7 @@ outputs alone would alias fast modes.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -18,12 +18,14 @@ from ..model.spatial_model import row_values
 from ..model.spatial_motors import MotorForces, motor_forces, path_forces
 from ..model.spatial_wrench import row_wrenches
 from ..scene.analysis import TimedAnalysis, output_times
+from ..solve.spatial_posture import robot_size
 from .spatial_run import SpatialRun
 
 FEWEST_NODES = 401
 MOST_NODES = 200_000
 CHUNK = 2000  # states that are looked at at once
 SHARE = 0.3  # of the tolerance that the splines may take
+OFF_PATH = 0.01  # sizes of the robot, rad: a replay that is off by more has left its path
 GAIN = 32.0  # at least: by how much half the step makes a quintic spline better (64 where it is smooth)
 
 
@@ -96,3 +98,22 @@ def path_wrenches(run: SpatialRun) -> dict[str, Array]:
 def in_parts(run: SpatialRun, read: Callable[[SpatialRun], Array]) -> Array:
     """`read` of a long run, part by part: Jacobians of all states at once would not fit into memory."""
     return np.concatenate([read(run.rows(slice(k, k + CHUNK))) for k in range(0, len(run.time), CHUNK)])
+
+
+def left_paths(source: SpatialRun, run: SpatialRun) -> Iterator[str]:
+    """Of a replay under the forces on all rows, which would move as `source` did: a warning where it does not."""
+    now = (run.time >= 0.0) & (run.time <= source.time[-1])
+    model, times, q = source.model, run.time[now], run.q[now]
+    if not len(times):
+        return
+    sizes = np.array([robot_size(model) if model.measures_way(row) else 1.0 for row in model.rows])
+    share = np.abs(row_values(model, q, times)[0]) / sizes
+    for path in dict.fromkeys(row.owner for row in model.rows if row.is_trajectory):
+        off = share[:, [row.is_trajectory and row.owner == path for row in model.rows]].max(axis=1)
+        if off.max() > OFF_PATH:
+            yield (
+                f'the forces of "{source.analysis.name}" do not keep trajectory "{path}": from'
+                f" t = {times[int(np.argmax(off > OFF_PATH))]:.4g} s on it is left, by up to {100 * off.max():.3g} % of"
+                " the robot's size, or of 1 rad: forces of time alone are unstable near singular postures; apply ="
+                ' "joints", or a controller, keeps to the path'
+            )

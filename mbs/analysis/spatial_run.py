@@ -112,7 +112,9 @@ class SpatialRun:
     def added_to(self, earlier: EarlierSpatialRun) -> SpatialRun:
         """With the work of the run that this one went on from."""
         counts = ("steps", "evaluations", "wall_seconds")
-        return replace(self, **{name: getattr(earlier, name) + getattr(self, name) for name in counts})
+        whole = replace(self, **{name: getattr(earlier, name) + getattr(self, name) for name in counts})
+        ends = np.concatenate([earlier.step_ends, self.step_ends])
+        return replace(whole, step_ends=ends if len(ends) == whole.steps else np.zeros(0))
 
     def check_completed(self, how_to_go_on: str = "") -> None:
         """Raise `SolveError` with advice where it ended early."""

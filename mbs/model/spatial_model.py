@@ -54,6 +54,12 @@ class SpatialModel:
         behind = {gear.motor.v.start: gear.joint.joint.name for gear in self.tree.gears}
         return behind.get(row.coordinate, self.tree.nodes[row.b.body].joint.name)
 
+    def measures_way(self, row: SpatialRow) -> bool:
+        """Whether a row measures a way, m; others measure angles, rad, or cosines of these."""
+        if row.kind == "coordinate":
+            return self.tree.nodes[row.b.body].joint.units == ("m",)
+        return row.kind in ("point", "slide")
+
     def along(self, joint: str) -> Array:
         """Directions in v (k, n_v) of moments on the second side of a joint along its k coordinates."""
         directions: Array = self.sign(joint) * np.eye(self.tree.n_v)[_in_order(self.driven(joint))]

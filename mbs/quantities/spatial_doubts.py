@@ -7,7 +7,6 @@ from collections.abc import Iterator
 import numpy as np
 
 from ...common.arrays import Array
-from ..model.spatial_rows import SpatialRow
 from .spatial_motion import SpatialMotion
 
 TURN = 2 * np.pi
@@ -34,7 +33,7 @@ def _violated(motion: SpatialMotion, allowed: float) -> Iterator[str]:
     if not motion.model.rows or not len(motion.time):
         return
     C = np.abs(motion.rows[0])
-    is_way = np.array([_measures_way(motion, row) for row in motion.model.rows])
+    is_way = np.array([motion.model.measures_way(row) for row in motion.model.rows])
     share = np.where(is_way, C / _extent(motion), C)
     at, k = np.unravel_index(int(np.argmax(share)), share.shape)  # the first NaN, if there is one
     if not share[at, k] <= allowed:
@@ -44,12 +43,6 @@ def _violated(motion: SpatialMotion, allowed: float) -> Iterator[str]:
             f" {'m' if is_way[k] else 'rad'} at t = {motion.time[at]:.6g} s: what was found is no motion of this robot;"
             " choose a smaller tolerance or another integrator"
         )
-
-
-def _measures_way(motion: SpatialMotion, row: SpatialRow) -> bool:
-    if row.kind == "coordinate":
-        return motion.model.tree.nodes[row.b.body].joint.units == ("m",)
-    return row.kind in ("point", "slide")
 
 
 def _extent(motion: SpatialMotion) -> float:

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from ...common.arrays import Array, as_floats
 from ...common.errors import SolveError
+from ...common.validation import quoted
 from ..model.spatial_bending import first_moment
 from ..model.spatial_inverse import given_forces
 from ..model.spatial_model import SpatialModel, row_values
@@ -16,6 +19,7 @@ from .state import State
 MOST_ITERATIONS = 60
 TOLERANCE = 1e-12  # residual forces relative to the largest of their terms, positions to the size of the robot
 LARGEST_STEP = 0.3  # rad, sizes of the robot, and of p the same in sizes of its own
+AWAY = 0.1  # rad, sizes of the robot: by more than links bend in equilibrium
 DIFFERENCE = 6e-6  # of natural sizes: central differences of first derivatives
 
 
@@ -42,6 +46,27 @@ def initial_state(model: SpatialModel) -> State:
     """
     start = undeformed_posture(model)
     return static_equilibrium(model, start) if model.scene.initial.state == "static" else start
+
+
+def hanging_joints(model: SpatialModel, start: State) -> Iterator[str]:
+    """A warning where the equilibrium `start` has joints elsewhere than [initial], as nothing holds them there."""
+    if model.scene.initial.state != "static":
+        return
+    away, length = np.abs(start.q - undeformed_posture(model).q), robot_size(model)
+    moved = []
+    for node in model.tree.nodes:
+        units = node.joint.units or node.joint.guess_units
+        ways = np.array([length if unit == "m" else 1.0 for unit in units])
+        scales = (
+            node.joint.state(ways) if node.joint.units else np.append(ways, np.ones(node.joint.q_count - len(ways)))
+        )
+        if (away[node.q] / scales).max(initial=0.0) > AWAY:
+            moved.append(node.joint.name)
+    if moved:
+        yield (
+            f"starts in the equilibrium in which joints {quoted(moved)} hang, away from [initial]: nothing holds them"
+            ' there; state = "undeformed" starts from [initial]'
+        )
 
 
 def holding_multipliers(model: SpatialModel, q: Array) -> Array:
@@ -111,6 +136,11 @@ def _equilibrated_solution(A: Array, b: Array) -> Array:
     return np.asarray(np.linalg.lstsq(scaled, b / rows, rcond=1e-14)[0] / columns)
 
 
+def _weight(model: SpatialModel) -> float:
+    """Of all bodies, N."""
+    return float(np.linalg.norm(model.scene.gravity)) * sum(node.body.mass for node in model.tree.nodes)
+
+
 def _force_scale(size: float, row_scales: Array) -> Array:
     return as_floats(max(size, 1e-300) / row_scales)
 
@@ -123,6 +153,8 @@ def _residual(model: SpatialModel, q: Array, t: float, multipliers: Array, row_s
     for node in model.tree.nodes:
         elastic[:, node.p_v] = node.body.stiffness * q[:, node.p_q]
     size = max(float(np.abs(force * sizes).max(initial=0.0)) for force in (Q + elastic, elastic, held))
+    if not any(node.body.n_modes for node in model.tree.nodes):  # where rigid bodies hang, all of them are
+        size = max(size, _weight(model) * robot_size(model))
     return np.concatenate([Q - held, C / row_scales], axis=1), size
 
 

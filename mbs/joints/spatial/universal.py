@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import model_validator
 
 from ....common.arrays import Array
-from ....common.rotations import about
+from ....common.rotations import about, unit
 from ...fields.field_types import Vector3
 from .joint import NOT_TURNED, POINT, Along, Place
 from .moving_joint import AxialJoint, check_direction
@@ -36,8 +36,8 @@ class SpatialUniversal(AxialJoint):
     @model_validator(mode="after")
     def _axes_are_square(self) -> SpatialUniversal:
         check_direction("second_axis", self.second_axis)
-        x, y = np.array(self.axis), self.orientation @ self.second_axis
-        cosine = float(x @ y / np.linalg.norm(x) / np.linalg.norm(y))
+        x, y = unit(np.array(self.axis)), unit(self.orientation @ self.second_axis)
+        cosine = float(x @ y)
         if abs(cosine) > SQUARE:
             angle = np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0)))
             raise ValueError(
@@ -48,9 +48,8 @@ class SpatialUniversal(AxialJoint):
 
     def triads(self) -> tuple[Array, Array]:
         """Their x is along the first axis, y along the second."""
-        x, y = np.array(self.axis), self.orientation @ self.second_axis
-        x, y = x / np.linalg.norm(x), y / np.linalg.norm(y)
-        z = np.cross(x, y) / np.linalg.norm(np.cross(x, y))
+        x, y = unit(np.array(self.axis)), unit(self.orientation @ self.second_axis)
+        z = unit(np.cross(x, y))
         first = np.stack([x, np.cross(z, x), z], axis=1)
         return first, self.orientation.T @ first
 
