@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -77,9 +78,13 @@ def run_spatial_forward(context: SpatialContext, analysis: Forward) -> SpatialRu
 
 
 def _commanded(run: SpatialRun, moments: Moments) -> SpatialRun:
-    """With what acts along joints at its outputs."""
-    commanded = {name: np.stack([f.sample(run.time)[0] for f in of], axis=1) for name, of in moments.items() if of}
-    return replace(run, commanded=commanded)
+    """With what acts along joints at its outputs, and at times between."""
+
+    def told(of: SpatialRun) -> SpatialRun:
+        sampled = {joint: [f.sample(of.time)[0] for f in sizes] for joint, sizes in moments.items() if sizes}
+        return replace(of, commanded={joint: np.stack(values, axis=1) for joint, values in sampled.items()})
+
+    return told(run) if run.look_closer is None else replace(told(run), look_closer=cache(lambda: told(run.closer)))
 
 
 def _by_joint(model: SpatialModel, functions: Iterable[TimeFunction]) -> dict[str, list[TimeFunction]]:
