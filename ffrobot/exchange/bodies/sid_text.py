@@ -105,6 +105,8 @@ def taylor(section: Section, layout: Layout, *sizes: tuple[int, int]) -> Taylor:
         raise InputError(f"{section.name}: expected a matrix of {wanted}, found nrow = {nrow}, ncol = {ncol}")
     found = Taylor(np.zeros((nrow, ncol)), np.zeros((nrow, modes, ncol)))
     structure = int(section.number("structure"))
+    if structure == SYMMETRIC and nrow != ncol:
+        raise InputError(f"{section.name}: expected a square matrix of structure {SYMMETRIC}, found {nrow} × {ncol}")
     if structure == IDENTITY:
         found.m0[:] = np.eye(nrow, ncol)
     for order, index, value in _entries(section):
