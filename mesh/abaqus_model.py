@@ -226,6 +226,8 @@ class Deck:
             elif not scope.read(keyword):
                 self.masses += [keyword] if keyword.name == "MASS" else []
                 self.not_read[keyword.name] += keyword.name not in _OF_THE_LINK
+        if scope is not self.assembly:
+            raise InputError("expected *END PART or *END INSTANCE, found the end of the file: it is cut off")
         self.assembly.nsets.of_instances = {name: one.scope.nsets for name, one in self.instances.items()}
         self.assembly.elsets.of_instances = {name: one.scope.elsets for name, one in self.instances.items()}
         if not self.instances and self.parts:

@@ -96,6 +96,7 @@ def test_undefined_surfaces_of_a_tie_are_told(read):
         (TWO.format("").replace("part=HALF\n0.", "part=NONE\n0."), "expected PART= one of HALF, found NONE"),
         (TWO.format("").replace("H-2", "H-1"), "instances with names of their own, found H-1"),
         (TWO.format("").replace("0., 0.1, 0.", "0., 0.1, 0., 0., 0., 0., 90."), r"\*INSTANCE, line \d+: "),
+        (PART[: PART.index("{}")], "expected \\*END PART or \\*END INSTANCE, found the end"),
         (TWO.format("") + SURFACES + "*Tie, name=g\nDOWN\n", r"\*TIE, line \d+: expected two surfaces, found 1"),
         (PLAIN.replace("*NODE", "*NODE, SYSTEM=S"), r"\*NODE, line 1: expected SYSTEM=R or C, found S"),
         (PLAIN + "*NGEN\n1, 5, 1\n", r"\*NGEN, line \d+: expected nodes and elements one by one"),
