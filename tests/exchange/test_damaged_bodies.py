@@ -27,7 +27,7 @@ def given():
 
 CHANGES = {
     "size": (".SID_FEM", r"(phi\n(?:.*\n){2}\s*ncol\s*=)\s*\d+", r"\g<1> 1", r"phi: expected a matrix of 3 × \d+"),
-    "symmetry": (".SID_FEM", r"(phi\n(?:.*\n){4}\s*structure\s*=)\s*\d+", r"\g<1> 2", r"phi: expected a square matrix"),
+    "symmetry": (".SID_FEM", r"(phi\n(?:.*\n){5}\s*structure\s*=)\s*\d+", r"\g<1> 2", r"phi: expected a square matrix"),
     "index": (".SID_FEM", r"(mdCM\n(?:.*\n)*?\s*m0\( 1,) 1", r"\g<1> ", r"mdCM: expected whole numbers in indices"),
     "interface": (".SID_FEM", r"tip=\d+", "tip=99", 'expected NAME=NUMBER of nodes in the file, found "tip=99"'),
     "no number": (".fem", r"tip=\d+", "tip", 'interfaces: expected NAME=NUMBER of nodes in the file, found "tip"'),
