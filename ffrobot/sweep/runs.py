@@ -170,7 +170,7 @@ def _reduce(results: Results, name: str, reduction: str) -> float:
         values = results.data(name)
     except InputError:
         return float("nan")
-    peaks = results.attributes(name)
+    peaks = results.attributes(name.partition("[")[0])
     if reduction == "max" and "peak" in peaks and "[" not in name:
         return float(np.max(peaks["peak"]))
     if reduction == "rms" and "[" not in name and np.size(peaks.get("rms", ())) == 1:
