@@ -158,7 +158,7 @@ def _run_all(solution: SpatialSolution, watcher: Watcher, interruption: Interrup
         watcher.stage(f'analysis "{analysis.name}"')
         began = time.perf_counter()
         try:
-            with of_file(solution.scene.path):
+            with of_file(f'{solution.scene.path}: analysis "{analysis.name}"'):
                 run = IN_SPACE[analysis.kind](_context(solution, analysis, results, watcher, interruption), analysis)
         except Exception as error:  # raised once the analyses before it are kept
             if not results:

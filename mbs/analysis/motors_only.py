@@ -12,6 +12,7 @@ import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cache, partial
+from pathlib import Path
 from typing import Annotated, Literal, Self
 
 import numpy as np
@@ -30,12 +31,12 @@ from ..scene.analysis import Check, Need, TimedAnalysis, output_times
 from ..solve.integrators import Choice
 from ..solve.internal_dynamics import Output, is_unstable
 from ..solve.servo import Servo, make_servo
-from ..solve.stable_inversion import Inversion, Linearisation, S, invert, linearise
+from ..solve.stable_inversion import SAMPLES, Inversion, Linearisation, S, invert, linearise, shape_along
 from .context import Context
 from .drive import Progress, motion_of
 from .elastic_joints import add_transmission
 from .fcid import sampled
-from .outcome import Details, Forces, Outcome, Statistics
+from .outcome import ADVICE, Details, Forces, Outcome, Statistics
 from .samples import path_times
 
 DECAY = 23.0  # times the slowest time constant of zeros: what is left is 1e-10
@@ -115,12 +116,17 @@ def run_motors_only(model: Model, analysis: MotorsOnly, progress: Progress) -> O
     found.
     """
     began = time.perf_counter()
-    servo, linear = choose_output(partial(make_servo, model, analysis.end), analysis)
+    servo, linear = choose_output(partial(make_servo, model, analysis.end, where(model.scene.path, analysis)), analysis)
     needs_future = bool(is_unstable(linear.zeros[0]).any())
     check_rest(servo, analysis, needs_future)
     pre, post = durations(analysis, linear, needs_future)
     inversion = invert(servo, linear, pre, post, analysis.tolerance, progress)
     return _outcome(analysis, InvertedPath(inversion, pre, post, servo.loads), time.perf_counter() - began)
+
+
+def where(scene_path: Path, analysis: MotorsOnly) -> str:
+    """Scene and analysis, as messages begin."""
+    return f'{scene_path}: analysis "{analysis.name}"'
 
 
 def path_error(inversion: Inversion[Servo], times: Array, q: Array) -> Array:
@@ -143,32 +149,32 @@ def choose_output(make: Callable[[float], S], analysis: MotorsOnly) -> tuple[S, 
         _check_relative_degree(servo, linear)
         if analysis.output == "redefined" and not is_minimum_phase(linear):
             raise InputError(
-                f'{servo.scene_path}: analysis "{analysis.name}": factor: expected one whose output is minimum phase,'
-                f" since it is integrated forward, found {analysis.factor:g} with zeros in the right half plane:"
-                f' {describe_zeros(linear)}; use a smaller factor, leave it out, or use output = "tip"'
+                f"{servo.where}: factor: expected one whose output is minimum phase, since it is integrated forward,"
+                f" found {analysis.factor:g} with zeros in the right half plane: {describe_zeros(linear)}; use a"
+                ' smaller factor, leave it out, or use output = "tip"'
             )
-        return (servo, linear) if analysis.output == "tip" else _with_expected_deflections(servo, linear)
+        return (servo, linear) if analysis.output == "tip" else _with_expected_deflections(servo, end)
     joints = make(0.0)
     for k in range(round(1 / FACTOR_STEP) + 1):
         servo = joints.with_factor(max(0.0, 1.0 - k * FACTOR_STEP))
-        linear = linearise(servo, end)
-        if is_minimum_phase(linear):
-            return _with_expected_deflections(servo.with_factor(MARGIN * servo.factor), linear)
+        linear = linearise(servo, end, samples=2)
+        if not is_unstable(linear.zeros).any() and is_minimum_phase(linearise(servo, end)):
+            return _with_expected_deflections(servo.with_factor(MARGIN * servo.factor), end)
     raise InputError(
-        f'{joints.scene_path}: analysis "{analysis.name}": output: expected a robot whose joint motion is minimum phase'
-        f' for "redefined", found zeros in the right half plane even then: {describe_zeros(linear)}'
+        f'{joints.where}: output: expected a robot whose joint motion is minimum phase for "redefined", found zeros in'
+        f" the right half plane even then: {describe_zeros(linear)}"
     )
 
 
-def _with_expected_deflections(servo: S, linear: Linearisation) -> tuple[S, Linearisation]:
+def _with_expected_deflections(servo: S, end: float) -> tuple[S, Linearisation]:
     """The part of the deflections that the output leaves out, replaced by what the path's loads bend without vibration.
 
     A function of time alone: it changes the output's target, not its zeros.
     """
-    sag = linearise(servo.with_factor(1.0), float(linear.times[-1])).shape
-    offset = [f.held(0.0, linear.times[-1]) for f in spline(linear.times, (1 - servo.factor) * sag, at_rest=True)]
+    times, sag = shape_along(servo.with_factor(1.0), end, SAMPLES)
+    offset = [f.held(0.0, end) for f in spline(times, (1 - servo.factor) * sag, at_rest=True)]
     servo = servo.with_offset(tuple(offset))
-    return servo, linearise(servo, float(linear.times[-1]))
+    return servo, linearise(servo, end)
 
 
 def is_minimum_phase(linear: Linearisation) -> bool:
@@ -192,7 +198,7 @@ def _check_relative_degree(servo: Output, linear: Linearisation) -> None:
     worst = int((values[:, -1] / values[:, 0]).argmin())
     if values[worst, -1] < SINGULAR * values[worst, 0]:
         raise InputError(
-            f"{servo.scene_path}: expected motors that accelerate every component of the path, found at"
+            f"{servo.where}: expected motors that accelerate every component of the path, found at"
             f" t = {linear.times[worst]:g} s a singular coupling: take another number of modes or another factor"
         )
 
@@ -207,7 +213,7 @@ def check_rest(servo: Output, analysis: MotorsOnly, needs_future: bool) -> None:
             rate = target.function(t)[1]
             if abs(rate) > REST * max(mean, 1.0):
                 raise InputError(
-                    f'{servo.scene_path}: trajectory "{target.owner}": {target.component}: expected'
+                    f'{servo.where}: trajectory "{target.owner}": {target.component}: expected'
                     f' a path at rest at t = {t:g} s, before or after which "{analysis.name}" holds it, found the rate'
                     f" {rate:.4g}: start and end with zero speed, as 10*s**3 - 15*s**4 + 6*s**5 does"
                 )
@@ -226,12 +232,14 @@ def durations(analysis: MotorsOnly, linear: Linearisation, needs_future: bool) -
 
 
 def cause_of(inversion: Inversion[S]) -> str:
-    """Whether the zeros explain that no motion was found: where their sides change, no bounded one need exist."""
+    """Why no motion was found and when it was worst; where zeros change sides, no bounded one need exist."""
     linear = inversion.linearisation
     count = is_unstable(linear.zeros).sum(axis=1)
     changed = np.flatnonzero(count != count[0])
-    if inversion.status != "inversion not converged" or not len(changed):
+    if inversion.status not in ("inversion not converged", "mesh too coarse"):
         return ""
+    if inversion.status == "mesh too coarse" or not len(changed):
+        return f"{ADVICE[inversion.status]} (worst at t = {inversion.worst:.4g} s)"
     k = changed[0]
     return (
         f"zeros change sides along the path: {count[0]} of them are in the right half plane at t = 0,"

@@ -9,14 +9,15 @@ from functools import cache, partial
 import numpy as np
 
 from ...common.arrays import Array
+from ...common.errors import SolveError
 from ..model.spatial_gears import refuse_held_motors
 from ..model.spatial_model import SpatialModel, row_values, without_paths
 from ..scene.analysis import output_times
 from ..solve.integrators import Choice
-from ..solve.internal_dynamics import is_unstable
+from ..solve.internal_dynamics import Stopped, is_unstable
 from ..solve.spatial_servo import SpatialServo, make_spatial_servo
 from ..solve.stable_inversion import Inversion, invert
-from .motors_only import MotorsOnly, cause_of, check_rest, choose_output, durations
+from .motors_only import MotorsOnly, cause_of, check_rest, choose_output, durations, where
 from .samples import path_times
 from .spatial_run import SpatialContext, SpatialRun
 
@@ -26,15 +27,26 @@ NOTABLE = 1e-9  # m, rad: of a path that is left
 def run_spatial_motors_only(context: SpatialContext, analysis: MotorsOnly) -> SpatialRun:
     """Motion and motor forces for the trajectories, no other force acting; before and after the path it is held.
 
-    Raises `InputError` and `SolveError` as `motors_only.run_motors_only`.
+    Raises `InputError` and `SolveError` as `motors_only.run_motors_only`, and `SolveError` where it is stopped before
+    any motion is found.
     """
-    model, began = context.model, time.perf_counter()
+    model, began, reached = context.model, time.perf_counter(), 0.0
+    place = where(model.scene.path, analysis)
+
+    def progress(t: float | None = None) -> bool:
+        nonlocal reached
+        reached = reached if t is None else t
+        return context.progress(reached)
+
     refuse_held_motors(model, analysis)
-    servo, linear = choose_output(partial(make_spatial_servo, model, analysis.end), analysis)
-    needs_future = bool(is_unstable(linear.zeros[0]).any())
-    check_rest(servo, analysis, needs_future)
-    pre, post = durations(analysis, linear, needs_future)
-    inversion = invert(servo, linear, pre, post, analysis.tolerance, context.progress)
+    try:
+        servo, linear = choose_output(partial(make_spatial_servo, model, analysis.end, place, progress), analysis)
+        needs_future = bool(is_unstable(linear.zeros[0]).any())
+        check_rest(servo, analysis, needs_future)
+        pre, post = durations(analysis, linear, needs_future)
+        inversion = invert(servo, linear, pre, post, analysis.tolerance, progress)
+    except Stopped:
+        raise SolveError(f"{place}: stopped on request before any of its motion was found") from None
     times = output_times(analysis.end, analysis.output_step, pre, post)
     times = times[times <= inversion.curve.x[-1] + 1e-9 * analysis.end]  # what an integration reached
     run = _run(analysis, model, inversion, times)
@@ -62,13 +74,13 @@ def _run(analysis: MotorsOnly, model: SpatialModel, inversion: Inversion[Spatial
     return SpatialRun(
         analysis, without_paths(model), times[kept], found.q[kept], found.v[kept], found.a[kept],
         -found.split.loops[kept], found.required[kept], status=inversion.status, integrator=Choice("collocation", ""),
-        steps=len(curve.x) - 1, evaluations=inversion.iterations, again=again,
+        steps=len(curve.x) - 1, evaluations=inversion.iterations, again=again, cause=cause_of(inversion),
     )  # fmt: skip
 
 
 def _told(inversion: Inversion[SpatialServo], run: SpatialRun) -> tuple[str, ...]:
-    """Why the inversion failed, and how far a redefined output leaves the path itself."""
-    told = [cause_of(inversion)] if run.failed else []
+    """How far a redefined output leaves the path itself."""
+    told = []
     if not run.failed and inversion.servo.factor < 1:
         held = inversion.servo.model
         C = row_values(held, run.q, run.time)[0][:, ~held.loop_rows]
@@ -77,4 +89,4 @@ def _told(inversion: Inversion[SpatialServo], run: SpatialRun) -> tuple[str, ...
                 f"a point with {inversion.servo.factor:.2g} of the vibration follows the path: that of the trajectory"
                 f" is off by up to {off:.3g} (m or rad)"
             )
-    return tuple(text for text in told if text)
+    return tuple(told)

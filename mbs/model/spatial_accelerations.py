@@ -7,7 +7,7 @@ r̈ = R̈ + ω̇ × Au + ω × (ω × Au) + 2ω × AΦṗ + AΦp̈ and Ω̇ = ω
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -16,7 +16,7 @@ import numpy as np
 from ...common.arrays import Array, as_floats
 from ...common.rotations import left_jacobian, left_jacobian_rate
 from .spatial_bending import bent_section, curvature
-from .spatial_model import SpatialModel
+from .spatial_model import SpatialModel, by_section
 from .spatial_rows import SpatialRow
 from .spatial_tree import Motion, Node, Section, SpatialTree
 
@@ -125,18 +125,22 @@ def row_accelerations(model: SpatialModel, state: Accelerated, times: Array) -> 
     """C̈ (T, rows) at `times` (T,), less what their targets ask for: 0 where the motion keeps to the constraints."""
     frames = state.of_frames()
     found = np.zeros((len(times), len(model.rows)))
+    motion = by_section(
+        lambda section: (state.tree.motion(section, state.q, state.frames), state.of_section(section, frames))
+    )
     for k, row in enumerate(model.rows):
-        found[:, k] = _row(row, state, frames, times)
+        found[:, k] = _row(row, state, motion, times)
     return found
 
 
-def _row(row: SpatialRow, state: Accelerated, frames: Sequence[Acceleration], times: Array) -> Array:
+def _row(
+    row: SpatialRow, state: Accelerated, motion: Callable[[Section], tuple[Motion, Acceleration]], times: Array
+) -> Array:
     target = 0.0 if row.target is None else row.target.sample(times)[2]
     if row.kind == "coordinate":
         found: Array = row.sign * state.a[:, row.coordinate] - target
         return found
-    a, b = (state.tree.motion(section, state.q, state.frames) for section in (row.a, row.b))
-    of_a, of_b = (state.of_section(section, frames) for section in (row.a, row.b))
+    (a, of_a), (b, of_b) = motion(row.a), motion(row.b)
     if row.kind == "rotation":
         assert row.law is not None
         found = (of_b.Omega - row.law.rates(times)[1]) @ row.f

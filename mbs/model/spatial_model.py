@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 
@@ -20,6 +21,8 @@ from .spatial_drives import Drive
 from .spatial_payloads import welded_payloads
 from .spatial_rows import SpatialRow, value_and_gradient
 from .spatial_tree import Motion, Node, Section, SpatialTree
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -174,15 +177,29 @@ def row_values(
     """C (T, rows) at q (T, n_q) and `times` (T,), and its Jacobian C_v (T, rows, n_v); `frames` of q where known."""
     frames = model.tree.frames(q) if frames is None else frames
     values, gradients = np.zeros((len(q), len(model.rows))), np.zeros((len(q), len(model.rows), model.tree.n_v))
+    motion = by_section(lambda section: model.tree.motion(section, q, frames))
     for k, row in enumerate(model.rows):
-        a, b = (model.tree.motion(section, q, frames) for section in (row.a, row.b))
+        a, b = motion(row.a), motion(row.b)
         values[:, k], gradients[:, k] = value_and_gradient(row, a, b, q, times)
     return values, gradients
 
 
-def target_rates(model: SpatialModel, q: Array, times: Array) -> Array:
-    """What C_v v has to be (T, rows), for Ċ = 0."""
-    frames, found = model.tree.frames(q), np.zeros((len(q), len(model.rows)))
+def by_section(compute: Callable[[Section], T]) -> Callable[[Section], T]:
+    """`compute` with what it found of each section kept: rows of one point share theirs."""
+    known: dict[int, T] = {}
+
+    def found(section: Section) -> T:
+        if id(section) not in known:
+            known[id(section)] = compute(section)
+        return known[id(section)]
+
+    return found
+
+
+def target_rates(model: SpatialModel, q: Array, times: Array, frames: Sequence[Motion] | None = None) -> Array:
+    """What C_v v has to be (T, rows), for Ċ = 0; `frames` of q where known."""
+    frames = model.tree.frames(q) if frames is None else frames
+    found = np.zeros((len(q), len(model.rows)))
     for k, row in enumerate(model.rows):
         if row.target is not None:
             found[:, k] = row.target.sample(times)[1]

@@ -77,11 +77,15 @@ GAUSS = gauss()
 
 @dataclass(frozen=True)
 class Found:
-    """p(t) as piecewise polynomials, (n,) values; whether Newton's method converged, and its iterations."""
+    """p(t) as piecewise polynomials, (n,) values; whether Newton's method converged, and its iterations.
+
+    `worst` is the time at which its last step was largest, or the residual no number.
+    """
 
     curve: PPoly
     converged: bool
     iterations: int
+    worst: float
 
 
 def collocate(problem: Problem, breaks: Array, guess: Callable[[Array], tuple[Array, Array, Array]]) -> Found:
@@ -93,22 +97,24 @@ def collocate(problem: Problem, breaks: Array, guess: Callable[[Array], tuple[Ar
     linear = _LinearSystem(problem, breaks, derivatives)
     p, v = guess(breaks)[:2]
     K = guess(times.ravel())[2].reshape(*times.shape, n)
-    previous, converged, iteration = np.inf, False, 0
+    previous, converged, iteration, worst = np.inf, False, 0, float(breaks[0])
     while not converged and iteration < MOST_ITERATIONS:
         iteration += 1
         stages = _stages(h, p, v, K)
         r = problem.residual(times.ravel(), *(x.reshape(-1, n) for x in (*stages, K))).reshape(K.shape)
         if not np.all(np.isfinite(r)):
+            worst = float(times[~np.isfinite(r).all(axis=2)][0])
             break
         p_step, v_step, K_step = linear.solve(r, p, v, K)
         p, v, K = p + p_step, v + v_step, K + K_step
         peak = max(np.abs(problem.scale * p).max(), np.abs(v).max(), problem.size)
-        size = max(np.abs(problem.scale * p_step).max(), np.abs(v_step).max()) / peak
+        steps = np.maximum(np.abs(problem.scale * p_step), np.abs(v_step)).max(axis=1) / peak
+        size, worst = float(steps.max()), float(breaks[steps.argmax()])
         converged = size <= TOLERANCE or (size <= ROUNDING and size > 0.3 * previous)
         if not np.isfinite(size):
             break
         previous = size
-    return Found(_curve(breaks, p, v, K), bool(converged), iteration)
+    return Found(_curve(breaks, p, v, K), bool(converged), iteration, worst)
 
 
 def _stages(h: Array, p: Array, v: Array, K: Array) -> tuple[Array, Array]:

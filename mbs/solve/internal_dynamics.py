@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from pathlib import Path
 from typing import NamedTuple, Protocol, Self
 
 import numpy as np
@@ -21,6 +20,10 @@ DIFFERENCE = 1e-6  # of √J, by which a mode bends its link by about its length
 MOST_ITERATIONS = 50
 TOLERANCE = 1e-12  # of an equilibrium's last Newton step
 CENTRE = 1e-6  # |Re s| / |s| of zeros that count as undamped
+
+
+class Stopped(Exception):  # noqa: N818 (nothing is wrong)
+    """Whoever watches asked for an end."""
 
 
 class Target(NamedTuple):
@@ -50,8 +53,8 @@ class Output(Protocol):
         ...
 
     @property
-    def scene_path(self) -> Path:
-        """Of the scene, for messages."""
+    def where(self) -> str:
+        """The scene, and the analysis where it is known, for messages."""
         ...
 
     @property
@@ -60,7 +63,10 @@ class Output(Protocol):
         ...
 
     def residuals(self, times: Array, p: Array, v: Array, a: Array, /) -> Array:
-        """Forces r (N, n) on modes that nobody supplies, at `times` (N,), p, ṗ and p̈ (N, n); NaN out of reach."""
+        """Forces r (N, n) on modes that nobody supplies, at `times` (N,), p, ṗ and p̈ (N, n); NaN out of reach.
+
+        May raise `Stopped`.
+        """
         ...
 
     def targets(self) -> Iterator[Target]:
@@ -100,15 +106,26 @@ def linear_dynamics(servo: Output, times: Array, p: Array, v: Array, a: Array) -
 
     By central differences; r is quadratic in ṗ and linear in p̈, so that these are exact there.
     """
-    n = p.shape[1]
-    modes, at, found = np.array([p, v, a]), np.repeat(times, 2 * n), []
-    for k, step in enumerate((DIFFERENCE * servo.mode_sizes, np.ones(n), np.ones(n))):
-        moved = np.repeat(modes[:, :, None], 2 * n, axis=2)
-        moved[k] += np.concatenate([np.diag(step), -np.diag(step)])
-        r = servo.residuals(at, *moved.reshape(3, -1, n)).reshape(-1, 2, n, n)
-        found.append(((r[:, 0] - r[:, 1]) / (2 * step[:, None])).transpose(0, 2, 1))
-    K, D, M = found
+    modes, one = np.array([p, v, a]), np.ones(p.shape[1])
+    K, D, M = (
+        _derivative(servo, times, modes, k, step) for k, step in enumerate((DIFFERENCE * servo.mode_sizes, one, one))
+    )
     return LinearDynamics(times, M, D, K)
+
+
+def stiffness(servo: Output, times: Array, p: Array) -> Array:
+    """K (N, n, n) alone, at times (N,) and p (N, n) at rest."""
+    return _derivative(servo, times, np.array([p, 0 * p, 0 * p]), 0, DIFFERENCE * servo.mode_sizes)
+
+
+def _derivative(servo: Output, times: Array, modes: Array, k: int, step: Array) -> Array:
+    """Of r by modes[k] (N, n, n), about `modes` (3, N, n)."""
+    n = len(step)
+    moved = np.repeat(modes[:, :, None], 2 * n, axis=2)
+    moved[k] += np.concatenate([np.diag(step), -np.diag(step)])
+    r = servo.residuals(np.repeat(times, 2 * n), *moved.reshape(3, -1, n)).reshape(-1, 2, n, n)
+    found: Array = ((r[:, 0] - r[:, 1]) / (2 * step[:, None])).transpose(0, 2, 1)
+    return found
 
 
 def equilibrium(servo: Output, t: float) -> Array:
@@ -117,7 +134,7 @@ def equilibrium(servo: Output, t: float) -> Array:
     rest, now = np.zeros_like(p), np.array([t])
     for _ in range(MOST_ITERATIONS):
         r = servo.residuals(now, p, rest, rest)[0]
-        K = linear_dynamics(servo, now, p, rest, rest).K[0]
+        K = stiffness(servo, now, p)[0]
         if not (np.all(np.isfinite(r)) and np.all(np.isfinite(K))):
             break
         step = np.linalg.solve(K, r)
@@ -125,8 +142,8 @@ def equilibrium(servo: Output, t: float) -> Array:
         if np.linalg.norm(step) <= TOLERANCE * (np.linalg.norm(p) + 1e-12):
             return np.asarray(p[0])
     raise SolveError(
-        f"{servo.scene_path}: no equilibrium under the motors was found at t = {t:g} s: the links are too"
-        " soft for their loads there"
+        f"{servo.where}: no equilibrium under the motors was found at t = {t:g} s: the links are too soft for their"
+        " loads there: stiffen them, or take less payload"
     )
 
 

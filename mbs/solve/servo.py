@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
-from pathlib import Path
 
 import numpy as np
 
@@ -34,6 +33,7 @@ class Servo:
         path_tree, driven_tree: both in joint coordinates, with what motors do.
         near_times, near: along the path, (N,) s, postures of the trees without deflections (N, n_q).
         loads: of the scene, held before and after the path as it is.
+        where: scene and analysis, for messages.
         offset: one for each mode of all bodies, or none.
     """
 
@@ -45,6 +45,7 @@ class Servo:
     near_times: Array
     near: Array
     loads: tuple[tuple[Measure, TimeFunction], ...]
+    where: str
     offset: tuple[TimeFunction, ...] = ()
 
     @cached_property
@@ -81,11 +82,6 @@ class Servo:
         return np.concatenate([np.full(body.n_modes, np.sqrt(body.inertia)) for body in self.path.model.bodies])
 
     @property
-    def scene_path(self) -> Path:
-        """Of the scene, for messages."""
-        return self.path.model.scene.path
-
-    @property
     def mode_counts(self) -> list[int]:
         """By body."""
         return [body.n_modes for body in self.path.model.bodies]
@@ -104,7 +100,7 @@ class Servo:
         return replace(self, offset=offset)
 
 
-def make_servo(model: Model, end: float, factor: float) -> Servo:
+def make_servo(model: Model, end: float, where: str, factor: float) -> Servo:
     """The equations for a path that is held before 0 and after `end`.
 
     Raises `InputError` unless there are as many motors and specified components as degrees of freedom, and modes, and
@@ -113,12 +109,12 @@ def make_servo(model: Model, end: float, factor: float) -> Servo:
     for found, what in ((len(model.motors), "motors"), (len(model.trajectories), "trajectory components")):
         if found != model.degrees_of_freedom:
             raise InputError(
-                f'{model.scene.path}: expected for kind = "motors-only" as many {what} as the mechanism has degrees of'
+                f'{where}: expected for kind = "motors-only" as many {what} as the mechanism has degrees of'
                 f" freedom ({model.degrees_of_freedom}), found {found}"
             )
     if not any(body.n_modes for body in model.bodies):
         raise InputError(
-            f'{model.scene.path}: expected at least one flexible body for kind = "motors-only", found only rigid ones:'
+            f'{where}: expected at least one flexible body for kind = "motors-only", found only rigid ones:'
             ' kind = "pcid" gives their motors\' forces'
         )
     rows = list(model.motors.values())
@@ -130,4 +126,4 @@ def make_servo(model: Model, end: float, factor: float) -> Servo:
     path_tree, driven_tree = (told_in_joints(system, "motors-only", rows) for system in (path, driven))
     near = check_reach(path, undeformed_state(path), as_floats(np.linspace(0.0, end, REACH_CHECKS)))
     postures = np.array([path_tree.motion(q, 0 * q, 0 * q)[0] for q in near.q])
-    return Servo(path, driven, path_tree, driven_tree, factor, near.times, postures, loads)
+    return Servo(path, driven, path_tree, driven_tree, factor, near.times, postures, loads, where)

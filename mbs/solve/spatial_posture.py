@@ -81,17 +81,18 @@ def solve_postures(model: SpatialModel, times: Array, q: Array) -> tuple[Array, 
         return q, np.ones(len(q), dtype=bool)
     scales, length = joint_scales(model), robot_size(model)
     row_scales = np.array([1.0 if row.carries_moment else length for row in model.rows])
-    going = np.arange(len(q))
+    going, joints = np.arange(len(q)), scales > 0
     for _ in range(MOST_ITERATIONS):
         with np.errstate(over="ignore", invalid="ignore"):  # from anywhere: what is not finite ends there
             C, C_v = row_values(model, q[going], times[going])
-        left[going] = np.abs(C / row_scales).max(axis=1)
-        on = (left[going] > TOLERANCE) & np.isfinite(left[going])
+            J = C_v[:, :, joints] * scales[joints] / row_scales[:, None]
+        left[going] = np.where(np.isfinite(J).all(axis=(1, 2)), np.abs(C / row_scales).max(axis=1), np.nan)
+        on = left[going] > TOLERANCE
         going = going[on]
         if not len(going):
             break
-        inverse = np.linalg.pinv(C_v[on] * scales / row_scales[:, None], rcond=1e-10)
-        step = -np.einsum("tij,tj->ti", inverse, C[on] / row_scales)
+        step = np.zeros((len(going), len(scales)))
+        step[:, joints] = -np.einsum("tij,tj->ti", np.linalg.pinv(J[on], rcond=1e-10), C[on] / row_scales)
         longest = np.abs(step).max(axis=1, keepdims=True)
         step *= np.minimum(1.0, LARGEST_TURN / np.maximum(longest, 1e-300))
         q[going] = model.tree.integrate(q[going], step * scales)

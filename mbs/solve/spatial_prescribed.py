@@ -72,7 +72,7 @@ def _moved(model: SpatialModel, modes: Array, times: Array, q: Array) -> tuple[A
     frames = tree.frames(q)
     C_v = row_values(model, q, times, frames)[1]
     by_joints = np.linalg.pinv(C_v[:, :, joints])
-    rates = target_rates(model, q, times) - np.einsum("tij,tj->ti", C_v, v)
+    rates = target_rates(model, q, times, frames) - np.einsum("tij,tj->ti", C_v, v)
     v[:, joints] = np.einsum("tij,tj->ti", by_joints, rates)
     bias = row_accelerations(model, Accelerated(tree, q, v, a, frames), times)
     a[:, joints] = -np.einsum("tij,tj->ti", by_joints, bias)

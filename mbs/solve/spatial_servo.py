@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -18,12 +17,12 @@ from ..model.spatial_known_motion import required_forces
 from ..model.spatial_model import SpatialModel, row_values
 from ..model.spatial_motors import SplitForces, split_forces
 from ..model.spatial_rows import SpatialRow
-from .internal_dynamics import Target
+from .internal_dynamics import Stopped, Target
 from .spatial_posture import BoolArray, mobility, solve_posture, undeformed_posture
 from .spatial_prescribed import modal_places, motion_near
 
 POSTURES = 201  # along the path, from which others are looked for
-MOST_STATES = 4000  # that are evaluated at once
+MOST_STATES = 1000  # that are evaluated at once, a fraction of a second
 
 
 class ServoMotion(NamedTuple):
@@ -40,7 +39,8 @@ class ServoMotion(NamedTuple):
 class SpatialServo:
     """The robot under its path, held before 0 and after `end`; `factor` and `offset` as in `servo.Servo`.
 
-    `near` (N, n_q): postures along the path without deflections, at `near_times`.
+    `near` (N, n_q): postures along the path without deflections, at `near_times`. `where` are scene and analysis, for
+    messages; `goes_on` is asked again and again whether to go on.
     """
 
     model: SpatialModel
@@ -48,6 +48,8 @@ class SpatialServo:
     factor: float
     near_times: Array
     near: Array
+    where: str
+    goes_on: Callable[[], bool]
     offset: tuple[TimeFunction, ...] = ()
 
     @cached_property
@@ -62,11 +64,6 @@ class SpatialServo:
         nodes = self.model.tree.nodes
         largest = [np.linalg.eigvalsh(node.body.inertia)[-1] for node in nodes]
         return np.concatenate([np.full(node.body.n_modes, J**0.5) for node, J in zip(nodes, largest, strict=True)])
-
-    @property
-    def scene_path(self) -> Path:
-        """Of the scene, for messages."""
-        return self.model.scene.path
 
     @property
     def mode_counts(self) -> list[int]:
@@ -105,24 +102,27 @@ class SpatialServo:
         return ServoMotion(q, v, a, required, split), is_met
 
     def residuals(self, times: Array, p: Array, v: Array, a: Array) -> Array:
-        """Modal forces r (N, n) that motors do not supply; NaN where no posture is found."""
+        """Modal forces r (N, n) that motors do not supply; NaN where no posture is found. Raises `Stopped`."""
         modes = np.array([p, v, a])
         parts = range(0, len(times), MOST_STATES)
         return np.concatenate([self._left(times[k : k + MOST_STATES], modes[:, k : k + MOST_STATES]) for k in parts])
 
     def _left(self, times: Array, modes: Array) -> Array:
+        if not self.goes_on():
+            raise Stopped
         found, is_met = self.motion(times, modes)
         left: Array = np.where(is_met[:, None], found.split.left[:, ~self.model.tree.joint_columns], np.nan)
         return left
 
 
-def make_spatial_servo(model: SpatialModel, end: float, factor: float) -> SpatialServo:
+def make_spatial_servo(
+    model: SpatialModel, end: float, where: str, goes_on: Callable[[], bool], factor: float
+) -> SpatialServo:
     """The equations for a path that is held before 0 and after `end`.
 
     Raises `InputError` unless there are as many motors and specified components as degrees of freedom, and modes, and
     for a path that the undeformed robot cannot follow.
     """
-    path = model.scene.path
     held = replace(model, rows=tuple(_held(row, end) for row in model.rows))
     start = undeformed_posture(held).q
     freedom = mobility(held, start).freedom
@@ -130,17 +130,17 @@ def make_spatial_servo(model: SpatialModel, end: float, factor: float) -> Spatia
     for found, what in ((motors, "motors"), (np.count_nonzero(~model.loop_rows), "trajectory components")):
         if found != freedom:
             raise InputError(
-                f'{path}: expected for kind = "motors-only" as many {what} as the mechanism has degrees of freedom'
+                f'{where}: expected for kind = "motors-only" as many {what} as the mechanism has degrees of freedom'
                 f" ({freedom}), found {found}"
             )
     if not any(node.body.n_modes for node in model.tree.nodes):
         raise InputError(
-            f'{path}: expected at least one flexible body for kind = "motors-only", found only rigid ones: kind ='
+            f'{where}: expected at least one flexible body for kind = "motors-only", found only rigid ones: kind ='
             ' "pcid" gives their motors\' forces'
         )
     if factor != 1.0 and model.loop_rows.any():
         raise InputError(
-            f'{path}: expected an open chain for output = "redefined" in space = "spatial", found a closed loop: use'
+            f'{where}: expected an open chain for output = "redefined" in space = "spatial", found a closed loop: use'
             ' output = "tip"'
         )
     times = as_floats(np.linspace(0.0, end, POSTURES))
@@ -148,9 +148,9 @@ def make_spatial_servo(model: SpatialModel, end: float, factor: float) -> Spatia
     for t in times[1:]:
         q = solve_posture(held, float(t), near[-1])
         if q is None:
-            raise InputError(f"{path}: trajectory: expected a path within reach, found no posture at t = {t:.6g} s")
+            raise InputError(f"{where}: trajectory: expected a path within reach, found no posture at t = {t:.6g} s")
         near.append(q)
-    return SpatialServo(held, end, factor, times, np.array(near))
+    return SpatialServo(held, end, factor, times, np.array(near), where, goes_on)
 
 
 def _held(row: SpatialRow, end: float) -> SpatialRow:

@@ -2,14 +2,16 @@
 
 Where zeros lie in the right half plane, integrating forward diverges. Decaying motions are told by the past, growing
 ones by the future: at rest long before the path the part in the stable subspace vanishes, at rest long after it the
-part in the unstable one. Collocation solves this two-point problem at once. Without such zeros it is an initial value
-problem, solved window by window. Intervals are cut where r(t) ≠ 0 between the collocation points.
+part in the unstable one. Collocation solves this two-point problem at once, on intervals that are cut where r(t) ≠ 0
+between the collocation points. Without such zeros it is an initial value problem, solved window by window, each with
+intervals as short as r(t) asks for.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Generic, TypeVar
 
 import numpy as np
@@ -17,8 +19,18 @@ import numpy as np
 from ...common.arrays import Array, ComplexArray, as_floats
 from ...common.errors import SolveError
 from .. import _core
-from .collocation import GAUSS, Boundary, Found, Problem, collocate
-from .internal_dynamics import LinearDynamics, Output, equilibrium, first_order, is_unstable, linear_dynamics, zeros
+from .collocation import GAUSS, Boundary, Problem, collocate
+from .internal_dynamics import (
+    LinearDynamics,
+    Output,
+    Stopped,
+    equilibrium,
+    first_order,
+    is_unstable,
+    linear_dynamics,
+    stiffness,
+    zeros,
+)
 
 if TYPE_CHECKING:
     from scipy.interpolate import PPoly
@@ -26,8 +38,8 @@ if TYPE_CHECKING:
 SAMPLES = 33  # of the linear dynamics along the path
 FIRST_INTERVALS = 24  # of each of: before, on and after the path
 SHAPE_ITERATIONS = 8  # of that shape, each a hundred times closer for links that are not very soft
-RESOLVED = 5.0  # largest interval times the fastest zero where it is integrated forward
 WINDOW = 32  # intervals integrated forward at once
+SHORTEST = 1e-7  # of all the time, an interval of them
 MOST_INTERVALS = 3000  # solved at once
 MOST_REFINEMENTS = 14
 MOST_PARTS = 6  # an interval is cut into at once
@@ -37,14 +49,22 @@ PROBES = np.sort(np.concatenate([(GAUSS.c[1:] + GAUSS.c[:-1]) / 2, [0.01, 0.5, 0
 States = Callable[[Array], tuple[Array, Array, Array]]
 """(p, ṗ, p̈), each (N, n), at any times (N,)."""
 
+Derivatives = Callable[[Array], tuple[Array, Array, Array]]
+"""M, D and K, each (N, n, n), at any times (N,)."""
+
 
 @dataclass(frozen=True)
 class Linearisation:
-    """The internal dynamics along the path, with the shape (N, n) that the links sag to there, at its times."""
+    """The internal dynamics along the path, with the shape (N, n) that links sag to there; `scale` of the output."""
 
     dynamics: LinearDynamics
     shape: Array
-    zeros: ComplexArray  # (N, 2n) 1/s
+    scale: Array
+
+    @cached_property
+    def zeros(self) -> ComplexArray:
+        """Of the equations frozen at each time (N, 2n), 1/s."""
+        return zeros(self.dynamics, self.scale)
 
     @property
     def times(self) -> Array:
@@ -60,7 +80,8 @@ class Inversion(Generic[S]):
     """p(t) from −pre to end + post, and how it was found.
 
     `unmet` is the largest modal force that nobody supplies between collocation points, relative to the largest elastic
-    one; `off_rest` how far from rest the start is: ‖(ω(p − p_0), ṗ)‖ relative to its peak.
+    one, and `worst` when that is (s), or when the iteration is farthest from its end; `off_rest` how far from rest the
+    start is: ‖(ω(p − p_0), ṗ)‖ relative to its peak.
     """
 
     servo: S
@@ -69,6 +90,7 @@ class Inversion(Generic[S]):
     status: str
     iterations: int
     unmet: float
+    worst: float
     off_rest: float
 
     @property
@@ -81,25 +103,36 @@ class Inversion(Generic[S]):
         ]
 
 
-def linearise(servo: Output, end: float) -> Linearisation:
-    """About links that follow their loads on the path as springs would: r(t, p, 0, 0) = 0.
+def shape_along(servo: Output, end: float, samples: int) -> tuple[Array, Array]:
+    """Times (N,) from 0 to `end`, and p (N, n) of links that follow their loads as springs would: r(t, p, 0, 0) = 0.
 
     Raises `SolveError` where they are too soft for that.
     """
-    times = as_floats(np.linspace(0.0, end, SAMPLES))
-    rest: Array = np.zeros((SAMPLES, len(servo.scale)))
-    p = rest
-    K = linear_dynamics(servo, times, rest, rest, rest).K
+    times = as_floats(np.linspace(0.0, end, samples))
+    rest: Array = np.zeros((samples, len(servo.scale)))
+    p, K = rest, stiffness(servo, times, rest)
     for _ in range(SHAPE_ITERATIONS):
+        _check_numbers(servo, times, K, p)
         p = p - np.linalg.solve(K, servo.residuals(times, p, rest, rest)[:, :, None])[:, :, 0]
-    dynamics = linear_dynamics(servo, times, p, rest, rest)
-    lost = ~np.isfinite(dynamics.M.sum(axis=(1, 2)) + dynamics.D.sum(axis=(1, 2)) + dynamics.K.sum(axis=(1, 2)))
+    return times, p
+
+
+def linearise(servo: Output, end: float, samples: int = SAMPLES) -> Linearisation:
+    """About `shape_along`. Raises `SolveError` as it does."""
+    times, p = shape_along(servo, end, samples)
+    dynamics = linear_dynamics(servo, times, p, 0 * p, 0 * p)
+    _check_numbers(servo, times, dynamics.M, dynamics.D, dynamics.K)
+    return Linearisation(dynamics, p, servo.scale)
+
+
+def _check_numbers(servo: Output, times: Array, *found: Array) -> None:
+    """Raise `SolveError` for the first of the times (N,) at which one of `found` (N, …) is no number."""
+    lost = np.any([~np.isfinite(x.reshape(len(times), -1)).all(axis=1) for x in found], axis=0)
     if lost.any():
         raise SolveError(
-            f"{servo.scene_path}: motors alone cannot carry the path at t = {times[lost.argmax()]:g} s: the"
-            " links are too soft for their loads there; slow the path down"
+            f"{servo.where}: motors alone cannot carry the path at t = {times[lost.argmax()]:g} s: the links are too"
+            " soft for their loads there; slow the path down"
         )
-    return Linearisation(dynamics, p, zeros(dynamics, servo.scale))
 
 
 def invert(
@@ -113,7 +146,7 @@ def invert(
     start, finish = _boundary(servo, -pre, unstable=False), _boundary(servo, end + post, unstable=True)
     if len(start.rows) + len(finish.rows) != 2 * len(servo.scale):
         raise SolveError(
-            f"{servo.scene_path}: stable inversion needs as many zeros in the right half plane before the"
+            f"{servo.where}: stable inversion needs as many zeros in the right half plane before the"
             f" path as after it, found {2 * len(servo.scale) - len(start.rows)} and {len(finish.rows)}"
         )
     problem = Problem(
@@ -122,17 +155,18 @@ def invert(
     )  # fmt: skip
     force = max(TINY, float(np.abs(servo.scale**2 * linear.shape).max()))
     solver = _Solver(problem, tolerance * force, progress)
-    if len(finish.rows):
-        solver.solve(_breaks(pre, end, post), _constant(start.state[: len(servo.scale)]))
-    else:
-
-        def about(times: Array, p: Array, v: Array) -> LinearDynamics:
-            one = np.ones((len(times), 1))
-            return linear_dynamics(servo, times, one * p, one * v, 0 * one * p)
-
-        solver.march(_breaks(pre, end, post, RESOLVED / float(np.abs(linear.zeros).max())), about)
+    try:
+        if len(finish.rows):
+            solver.solve(_breaks(pre, end, post), _constant(start.state[: len(servo.scale)]))
+        else:
+            solver.march(np.unique([-pre, 0.0, end, end + post]), partial(_about, servo, linear.dynamics))
+    except Stopped:
+        if solver.curve is None:
+            raise
+        solver.status = "interrupted"
+    assert solver.curve is not None
     return Inversion(
-        servo, linear, solver.curve, solver.status, solver.iterations, solver.unmet / force,
+        servo, linear, solver.curve, solver.status, solver.iterations, solver.unmet / force, solver.worst,
         _off_rest(servo, solver.curve, start.state),
     )  # fmt: skip
 
@@ -140,22 +174,25 @@ def invert(
 class _Solver:
     """Collocation on intervals that are cut until r is below `most` everywhere; keeps what was found last."""
 
-    curve: PPoly
+    curve: PPoly | None = None
 
     def __init__(self, problem: Problem, most: float, progress: Callable[[float], bool]) -> None:
         self.problem, self.most, self.progress = problem, most, progress
-        self.status, self.iterations, self.unmet = "", 0, 0.0
+        self.status, self.iterations, self.unmet, self.worst = "", 0, 0.0, 0.0
 
-    def solve(self, breaks: Array, guess: States) -> Found:
+    def solve(self, breaks: Array, guess: States) -> None:
         """On all breaks at once."""
         for refinement in range(MOST_REFINEMENTS):
             found = collocate(self.problem, breaks, guess)
-            self.curve, self.iterations = found.curve, self.iterations + found.iterations
-            unmet = self._unmet(found.curve) if found.converged else np.full(len(breaks) - 1, np.inf)
+            self.iterations += found.iterations
+            unmet, self.worst = np.full(len(breaks) - 1, np.inf), found.worst
             self.status = "mesh too coarse" if found.converged else "inversion not converged"
+            if found.converged:
+                self.curve, unmet = found.curve, self._unmet(found.curve)
+                self.worst = float(breaks[unmet.argmax()])
             if unmet.max() <= self.most:
-                self.status, self.unmet = "completed", max(self.unmet, float(unmet.max()))
-                return found
+                self.status, self.unmet = "completed", float(unmet.max())
+                return
             finer = _refined(breaks, as_floats(unmet / self.most)) if found.converged else _halved(breaks)
             if len(finer) > MOST_INTERVALS + 1:
                 break
@@ -163,30 +200,43 @@ class _Solver:
                 self.status = "interrupted"
                 break
             breaks, guess = finer, _states(found.curve) if found.converged else guess
-        self.unmet = max(self.unmet, float(unmet.max()))
-        return found
+        self.unmet, self.curve = float(unmet.max()), self.curve or found.curve
 
-    def march(self, breaks: Array, about: Callable[[Array, Array, Array], LinearDynamics]) -> None:
-        """One window after the other, each from where the last one ended; about(times, p, ṗ) linearises there.
+    def march(self, corners: Array, about: Callable[[float, Array], Derivatives]) -> None:
+        """One window after the other between `corners`, each from where the last one ended, as long as r lets it be.
 
-        Iterations with derivatives from elsewhere get out of phase with fast vibrations within a window.
+        about(t, y) has the derivatives near the state y (2n,) at time t: iterations with others get out of phase with
+        fast vibrations within a window.
         """
-        start, n = self.problem.start.state, len(self.problem.scale)
-        pieces: list[PPoly] = []
-        for first in range(0, len(breaks) - 1, WINDOW):
-            window = breaks[first : first + WINDOW + 1]
-            derivatives = about(window[[0, len(window) // 2, -1]], start[:n], start[n:])
-            self.problem = replace(self.problem, derivatives=derivatives, start=Boundary(np.eye(2 * n), start))
-            self.solve(window, _constant(start[:n]))
-            pieces.append(self.curve)
-            if self.status != "completed" or not self.progress(float(self.curve.x[-1])):
-                self.status = "interrupted" if self.status == "completed" else self.status
+        y, n, t, end = self.problem.start.state, len(self.problem.scale), float(corners[0]), float(corners[-1])
+        width = (end - t) / FIRST_INTERVALS
+        while t < end:
+            last = min(float(corners[corners > t][0]), t + WINDOW * width)
+            window = as_floats(np.linspace(t, last, int(np.ceil((last - t) / width - 1e-6)) + 1))
+            self.problem = replace(self.problem, derivatives=about(t, y), start=Boundary(np.eye(2 * n), y))
+            found = collocate(self.problem, window, _constant(y[:n]))
+            self.iterations += found.iterations
+            unmet = float(self._unmet(found.curve).max()) if found.converged else np.inf
+            wider = float(np.clip(0.9 * (self.most / max(unmet, TINY)) ** 0.25, 0.2, 4.0))
+            width = float(window[1] - window[0]) * wider
+            if unmet <= self.most:
+                self.unmet, t = max(self.unmet, unmet), last
+                self._append(found.curve)
+                p, v, _ = _states(found.curve)(window[-1:])
+                y = np.concatenate([p[0], v[0]])
+                self.status = "completed" if t >= end else "interrupted"
+                if not self.progress(t):
+                    break
+            elif width < SHORTEST * (end - float(corners[0])):
+                self.status = "mesh too coarse" if found.converged else "inversion not converged"
+                self.curve, self.worst = self.curve or found.curve, found.worst
                 break
-            p, v, _ = _states(self.curve)(self.curve.x[-1:])
-            start = np.concatenate([p[0], v[0]])
-        self.curve = pieces[0]
-        for piece in pieces[1:]:
-            self.curve.extend(piece.c, piece.x[1:])
+
+    def _append(self, curve: PPoly) -> None:
+        if self.curve is None:
+            self.curve = curve
+        else:
+            self.curve.extend(curve.c, curve.x[1:])
 
     def _unmet(self, curve: PPoly) -> Array:
         """Largest |r| between the collocation points of each interval (N,)."""
@@ -194,6 +244,19 @@ class _Solver:
         r = np.abs(self.problem.residual(times, *_states(curve)(times))).max(axis=1)
         largest: Array = np.nan_to_num(r, nan=np.inf).reshape(-1, len(PROBES)).max(axis=1)
         return largest
+
+
+def _about(servo: Output, along: LinearDynamics, t: float, y: Array) -> Derivatives:
+    """Those `along` the path, with what the state y (2n,) at time t changes of them."""
+    now, (p, v) = np.array([t]), y.reshape(2, 1, -1)
+    here = linear_dynamics(servo, now, p, v, 0 * p)
+    M, D, K = (x - known for x, known in zip((here.M, here.D, here.K), along(now), strict=True))
+
+    def derivatives(times: Array) -> tuple[Array, Array, Array]:
+        known = along(times)
+        return known[0] + M, known[1] + D, known[2] + K
+
+    return derivatives
 
 
 def _boundary(servo: Output, t: float, unstable: bool) -> Boundary:
@@ -211,10 +274,10 @@ def _boundary(servo: Output, t: float, unstable: bool) -> Boundary:
     return Boundary(rows, np.concatenate([p, rest[0]]))
 
 
-def _breaks(pre: float, end: float, post: float, widest: float = np.inf) -> Array:
+def _breaks(pre: float, end: float, post: float) -> Array:
     """Even breaks before, on and after the path, whose ends are breaks; (N+1,)."""
     parts = [(-pre, 0.0), (0.0, end), (end, end + post)]
-    pieces = [np.linspace(a, b, max(FIRST_INTERVALS, int((b - a) / widest)) + 1) for a, b in parts if b > a]
+    pieces = [np.linspace(a, b, FIRST_INTERVALS + 1) for a, b in parts if b > a]
     breaks: Array = np.unique(np.concatenate(pieces))
     return breaks
 

@@ -38,7 +38,7 @@ def single_link(path, modes=4, damping_ratio=0.0, **keys):
 
 def at_rest(model, factor=1.0):
     """The equations of motors only with the robot at rest at t = 0: output, M, D and K."""
-    servo = make_servo(model, 1.0, factor)
+    servo = make_servo(model, 1.0, "scene", factor)
     p, rest = equilibrium(servo, 0.0), np.zeros((1, len(servo.scale)))
     return servo, linear_dynamics(servo, np.zeros(1), p[None], rest, rest)
 
@@ -199,7 +199,7 @@ def test_shorter_pre_actuation_starts_off_rest_as_told(two_links, carried):
 def test_motors_of_a_redefined_output_are_those_of_less_deflection(name, motors):
     """The motors' coordinates are those on the path with a p + p_e; r is what the oracle finds unbalanced on modes."""
     factor, rng = 0.6, np.random.default_rng(4)
-    servo = make_servo(zoo.build(name, motors=motors), 0.2, factor)
+    servo = make_servo(zoo.build(name, motors=motors), 0.2, "scene", factor)
     n, times = len(servo.scale), np.array([0.0, 0.1])
     servo = servo.with_offset(tuple(TimeFunction.constant(float(p)) for p in 0.01 * rng.standard_normal(n)))
     offset = np.array([function(0.0)[0] for function in servo.offset])
