@@ -31,7 +31,8 @@ from ..scene.analysis import Check, Need, TimedAnalysis, output_times
 from ..solve.integrators import Choice
 from ..solve.internal_dynamics import Output, is_unstable
 from ..solve.servo import Servo, make_servo
-from ..solve.stable_inversion import SAMPLES, Inversion, Linearisation, S, invert, linearise, shape_along
+from ..solve.stable_inversion import Inversion, S, invert
+from ..solve.zero_dynamics import GROWTH, SAMPLES, Linearisation, linearise, shape_along
 from .context import Context
 from .drive import Progress, motion_of
 from .elastic_joints import add_transmission
@@ -42,7 +43,6 @@ from .samples import path_times
 DECAY = 23.0  # times the slowest time constant of zeros: what is left is 1e-10
 FACTOR_STEP = 0.02  # of the search for the largest factor
 MARGIN = 0.9  # of it that is taken: at the limit hardly damped motions are excited most
-GROWTH = 1.0  # ln of what a motion of the zero dynamics may grow by along a path and count as bounded
 SINGULAR = 1e-13  # of M of the internal dynamics, scaled
 REST = 1e-9  # speed of a path at rest, relative to its mean speed
 
@@ -117,7 +117,7 @@ def run_motors_only(model: Model, analysis: MotorsOnly, progress: Progress) -> O
     """
     began = time.perf_counter()
     servo, linear = choose_output(partial(make_servo, model, analysis.end, where(model.scene.path, analysis)), analysis)
-    needs_future = bool(is_unstable(linear.zeros[0]).any())
+    needs_future = bool(linear.is_future[0].any())
     check_rest(servo, analysis, needs_future)
     pre, post = durations(analysis, linear, needs_future)
     inversion = invert(servo, linear, pre, post, analysis.tolerance, progress)
@@ -221,9 +221,10 @@ def check_rest(servo: Output, analysis: MotorsOnly, needs_future: bool) -> None:
 
 def durations(analysis: MotorsOnly, linear: Linearisation, needs_future: bool) -> tuple[float, float]:
     """Pre- and post-actuation (s): as given, or until the zero dynamics has died out; whole output steps."""
-    s = linear.zeros[[0, -1]]
-    grow, decay = s.real[is_unstable(s)], -s.real[s.real < 0]
-    pre = DECAY / grow.min() if needs_future else 0.0
+    first, last, light = linear.zeros[0].real, linear.zeros[-1].real, linear.is_light[0]
+    is_ahead = linear.is_future[0] & (first > 0)
+    grow, growing_vibrations, decay = first[is_ahead & ~light], first[is_ahead & light], -last[last < 0]
+    pre = max(DECAY / grow.min(initial=np.inf), min(DECAY / growing_vibrations.min(initial=np.inf), analysis.end))
     post = min(DECAY / decay.min(initial=np.inf), analysis.end) if needs_future else 0.0
     given = analysis.pre_actuation, analysis.post_actuation
     chosen = [automatic if value is None else value for automatic, value in zip((pre, post), given, strict=True)]
@@ -234,7 +235,7 @@ def durations(analysis: MotorsOnly, linear: Linearisation, needs_future: bool) -
 def cause_of(inversion: Inversion[S]) -> str:
     """Why no motion was found and when it was worst; where zeros change sides, no bounded one need exist."""
     linear = inversion.linearisation
-    count = is_unstable(linear.zeros).sum(axis=1)
+    count = linear.is_future.sum(axis=1)
     changed = np.flatnonzero(count != count[0])
     if inversion.status not in ("inversion not converged", "mesh too coarse"):
         return ""
@@ -268,7 +269,7 @@ def _at(analysis: MotorsOnly, found: InvertedPath, seconds: float, times: Array)
     run = servo.motion.outputs(as_list(times[inside]), p, p_dot, p_ddot, servo.near[0])
     reached = len(run.q)
     rows = slice(reached)
-    how = "two-point problem" if is_unstable(inversion.linearisation.zeros[0]).any() else "integrated forward"
+    how = "two-point problem" if inversion.linearisation.is_future[0].any() else "integrated forward"
     outcome = Outcome(
         analysis=analysis,
         assembly=servo.driven,

@@ -14,7 +14,7 @@ from ..model.spatial_gears import refuse_held_motors
 from ..model.spatial_model import SpatialModel, row_values, without_paths
 from ..scene.analysis import output_times
 from ..solve.integrators import Choice
-from ..solve.internal_dynamics import Stopped, is_unstable
+from ..solve.internal_dynamics import Stopped
 from ..solve.spatial_servo import SpatialServo, make_spatial_servo
 from ..solve.stable_inversion import Inversion, invert
 from .motors_only import MotorsOnly, cause_of, check_rest, choose_output, durations, where
@@ -41,7 +41,7 @@ def run_spatial_motors_only(context: SpatialContext, analysis: MotorsOnly) -> Sp
     refuse_held_motors(model, analysis)
     try:
         servo, linear = choose_output(partial(make_spatial_servo, model, analysis.end, place, progress), analysis)
-        needs_future = bool(is_unstable(linear.zeros[0]).any())
+        needs_future = bool(linear.is_future[0].any())
         check_rest(servo, analysis, needs_future)
         pre, post = durations(analysis, linear, needs_future)
         inversion = invert(servo, linear, pre, post, analysis.tolerance, progress)

@@ -2,42 +2,31 @@
 
 Where zeros lie in the right half plane, integrating forward diverges. Decaying motions are told by the past, growing
 ones by the future: at rest long before the path the part in the stable subspace vanishes, at rest long after it the
-part in the unstable one. Collocation solves this two-point problem at once, on intervals that are cut where r(t) ≠ 0
-between the collocation points. Without such zeros it is an initial value problem, solved window by window, each with
-intervals as short as r(t) asks for.
+part in the unstable one (of lightly damped vibrations: `zero_dynamics`). Collocation solves this two-point
+problem at once, on intervals that are cut where r(t) ≠ 0 between the collocation points. Without such zeros it is an
+initial value problem, solved window by window, each with intervals as short as r(t) asks for.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import partial
 from typing import TYPE_CHECKING, Generic, TypeVar
 
 import numpy as np
 
-from ...common.arrays import Array, ComplexArray, as_floats
+from ...common.arrays import Array, Booleans, ComplexArray, as_floats
 from ...common.errors import SolveError
 from .. import _core
 from .collocation import GAUSS, Boundary, Problem, collocate
-from .internal_dynamics import (
-    LinearDynamics,
-    Output,
-    Stopped,
-    equilibrium,
-    first_order,
-    is_unstable,
-    linear_dynamics,
-    stiffness,
-    zeros,
-)
+from .internal_dynamics import LinearDynamics, Output, Stopped, equilibrium, first_order, linear_dynamics
+from .zero_dynamics import Linearisation
 
 if TYPE_CHECKING:
     from scipy.interpolate import PPoly
 
-SAMPLES = 33  # of the linear dynamics along the path
 FIRST_INTERVALS = 24  # of each of: before, on and after the path
-SHAPE_ITERATIONS = 8  # of that shape, each a hundred times closer for links that are not very soft
 WINDOW = 32  # intervals integrated forward at once
 SHORTEST = 1e-7  # of all the time, an interval of them
 MOST_INTERVALS = 3000  # solved at once
@@ -51,25 +40,6 @@ States = Callable[[Array], tuple[Array, Array, Array]]
 
 Derivatives = Callable[[Array], tuple[Array, Array, Array]]
 """M, D and K, each (N, n, n), at any times (N,)."""
-
-
-@dataclass(frozen=True)
-class Linearisation:
-    """The internal dynamics along the path, with the shape (N, n) that links sag to there; `scale` of the output."""
-
-    dynamics: LinearDynamics
-    shape: Array
-    scale: Array
-
-    @cached_property
-    def zeros(self) -> ComplexArray:
-        """Of the equations frozen at each time (N, 2n), 1/s."""
-        return zeros(self.dynamics, self.scale)
-
-    @property
-    def times(self) -> Array:
-        """From 0 to the end of the path (N,)."""
-        return self.dynamics.times
 
 
 S = TypeVar("S", bound=Output)
@@ -103,38 +73,6 @@ class Inversion(Generic[S]):
         ]
 
 
-def shape_along(servo: Output, end: float, samples: int) -> tuple[Array, Array]:
-    """Times (N,) from 0 to `end`, and p (N, n) of links that follow their loads as springs would: r(t, p, 0, 0) = 0.
-
-    Raises `SolveError` where they are too soft for that.
-    """
-    times = as_floats(np.linspace(0.0, end, samples))
-    rest: Array = np.zeros((samples, len(servo.scale)))
-    p, K = rest, stiffness(servo, times, rest)
-    for _ in range(SHAPE_ITERATIONS):
-        _check_numbers(servo, times, K, p)
-        p = p - np.linalg.solve(K, servo.residuals(times, p, rest, rest)[:, :, None])[:, :, 0]
-    return times, p
-
-
-def linearise(servo: Output, end: float, samples: int = SAMPLES) -> Linearisation:
-    """About `shape_along`. Raises `SolveError` as it does."""
-    times, p = shape_along(servo, end, samples)
-    dynamics = linear_dynamics(servo, times, p, 0 * p, 0 * p)
-    _check_numbers(servo, times, dynamics.M, dynamics.D, dynamics.K)
-    return Linearisation(dynamics, p, servo.scale)
-
-
-def _check_numbers(servo: Output, times: Array, *found: Array) -> None:
-    """Raise `SolveError` for the first of the times (N,) at which one of `found` (N, …) is no number."""
-    lost = np.any([~np.isfinite(x.reshape(len(times), -1)).all(axis=1) for x in found], axis=0)
-    if lost.any():
-        raise SolveError(
-            f"{servo.where}: motors alone cannot carry the path at t = {times[lost.argmax()]:g} s: the links are too"
-            " soft for their loads there; slow the path down"
-        )
-
-
 def invert(
     servo: S, linear: Linearisation, pre: float, post: float, tolerance: float, progress: Callable[[float], bool]
 ) -> Inversion[S]:
@@ -143,11 +81,16 @@ def invert(
     Raises `SolveError` where there is no equilibrium to start from or to end in, or where zeros change sides.
     """
     end = float(linear.times[-1])
-    start, finish = _boundary(servo, -pre, unstable=False), _boundary(servo, end + post, unstable=True)
+    start, finish = (
+        _boundary(servo, t, linear.zeros[k], linear.is_future[k] == future)
+        for t, k, future in ((-pre, 0, False), (end + post, -1, True))
+    )
     if len(start.rows) + len(finish.rows) != 2 * len(servo.scale):
         raise SolveError(
-            f"{servo.where}: stable inversion needs as many zeros in the right half plane before the"
-            f" path as after it, found {2 * len(servo.scale) - len(start.rows)} and {len(finish.rows)}"
+            f"{servo.where}: stable inversion needs as many zeros in the right half plane before the path, at t = 0 s,"
+            f" as after it, found {2 * len(servo.scale) - len(start.rows)} and {len(finish.rows)}: take fewer modes"
+            " of the links, or other families, end the path in a posture more like the first, or use output ="
+            ' "redefined"'
         )
     problem = Problem(
         servo.residuals, linear.dynamics, servo.scale,
@@ -259,17 +202,16 @@ def _about(servo: Output, along: LinearDynamics, t: float, y: Array) -> Derivati
     return derivatives
 
 
-def _boundary(servo: Output, t: float, unstable: bool) -> Boundary:
-    """No part of y − y_rest in the unstable subspace of the equilibrium at time t, or none in the rest.
+def _boundary(servo: Output, t: float, s: ComplexArray, is_held: Booleans) -> Boundary:
+    """No part of y − y_rest in the subspace of the zeros s (2n,) that are held, of the equilibrium at time t.
 
-    An orthonormal basis of the left invariant subspace, from the ordered Schur form of 𝒜ᵀ. Undamped motions count as
-    decaying ones: at rest before the path, ringing on after it.
+    An orthonormal basis of the left invariant subspace, from the ordered Schur form of 𝒜ᵀ with eigenvalues near s.
     """
     from scipy.linalg import schur
 
     p, rest = equilibrium(servo, t), np.zeros((1, len(servo.scale)))
     A = first_order(linear_dynamics(servo, np.array([t]), p[None], rest, rest), 0, servo.scale)
-    _, U, count = schur(A.T, sort=lambda re, im: bool(is_unstable(np.asarray(complex(re, im)))) == unstable)
+    _, U, count = schur(A.T, sort=lambda re, im: bool(is_held[np.abs(s - complex(re, abs(im))).argmin()]))
     rows = U[:, :count].T * np.concatenate([servo.scale, np.ones_like(servo.scale)])
     return Boundary(rows, np.concatenate([p, rest[0]]))
 

@@ -1,0 +1,110 @@
+"""The zero dynamics along a path: the internal dynamics about quasi-static links, its zeros, and what tells its motions.
+
+What decays is told by the past, what grows by the future (Devasia, Chen and Paden 1996). Lightly damped vibrations, whose
+zeros may cross the imaginary axis along the path, are told by the past unless they grow too far.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...common.arrays import Array, Booleans, ComplexArray, as_floats
+from ...common.errors import SolveError
+from .internal_dynamics import LinearDynamics, Output, is_unstable, linear_dynamics, stiffness, zeros
+
+SAMPLES = 33  # of the linear dynamics along the path
+LIGHT = 0.1  # |Re s| / |s| of a lightly damped vibration
+GROWTH = 1.0  # ln of what it may grow by along a path and count as bounded
+SHAPE_ITERATIONS = 8  # of that shape, each a hundred times closer for links that are not very soft
+TINY = 1e-300
+
+
+@dataclass(frozen=True)
+class Linearisation:
+    """The internal dynamics along the path, with the shape (N, n) that links sag to there; `scale` of the output."""
+
+    dynamics: LinearDynamics
+    shape: Array
+    scale: Array
+
+    @cached_property
+    def zeros(self) -> ComplexArray:
+        """Of the equations frozen at each time (N, 2n), 1/s."""
+        return zeros(self.dynamics, self.scale)
+
+    @cached_property
+    def is_future(self) -> Booleans:
+        """Which of the zeros (N, 2n) belong to motions that the future tells.
+
+        Those in the right half plane; but lightly damped vibrations, whose zeros may cross the imaginary axis along the
+        path, only where they grow too far over all of it, by exp ∫ Re s dt. Else they start at rest and ring on: a jump
+        in jerk excites them by about 10/(|s| T) of a deflection, of which they may come to a tenth.
+        """
+        from scipy.integrate import trapezoid
+
+        places = self._followed
+        s, T = np.take_along_axis(self.zeros, places, axis=1), float(self.times[-1])
+        most = np.maximum(GROWTH, np.log(np.maximum(np.abs(s).mean(axis=0) * T / 100, TINY)))
+        is_light = (np.abs(s.real) <= LIGHT * np.abs(s)).any(axis=0)
+        future = np.where(is_light, trapezoid(s.real, self.times, axis=0) > most, is_unstable(s[0]))
+        found = np.zeros(s.shape, dtype=bool)
+        np.put_along_axis(found, places, np.broadcast_to(future, s.shape), axis=1)
+        return found
+
+    @property
+    def _followed(self) -> NDArray[np.int_]:
+        """Where the zeros at t = 0 stand (N, 2n) at all times: those that move least in all."""
+        from scipy.optimize import linear_sum_assignment
+
+        places = np.tile(np.arange(self.zeros.shape[1]), (len(self.zeros), 1))
+        for k in range(1, len(places)):
+            before = self.zeros[k - 1, places[k - 1]]
+            places[k] = linear_sum_assignment(np.abs(before[:, None] - self.zeros[k]))[1]
+        return places
+
+    @property
+    def is_light(self) -> Booleans:
+        """Which of the zeros (N, 2n) are those of lightly damped vibrations, or lightly growing ones."""
+        light: Booleans = np.abs(self.zeros.real) <= LIGHT * np.abs(self.zeros)
+        return light
+
+    @property
+    def times(self) -> Array:
+        """From 0 to the end of the path (N,)."""
+        return self.dynamics.times
+
+
+def shape_along(servo: Output, end: float, samples: int) -> tuple[Array, Array]:
+    """Times (N,) from 0 to `end`, and p (N, n) of links that follow their loads as springs would: r(t, p, 0, 0) = 0.
+
+    Raises `SolveError` where they are too soft for that.
+    """
+    times = as_floats(np.linspace(0.0, end, samples))
+    rest: Array = np.zeros((samples, len(servo.scale)))
+    p, K = rest, stiffness(servo, times, rest)
+    for _ in range(SHAPE_ITERATIONS):
+        _check_numbers(servo, times, K, p)
+        p = p - np.linalg.solve(K, servo.residuals(times, p, rest, rest)[:, :, None])[:, :, 0]
+    return times, p
+
+
+def linearise(servo: Output, end: float, samples: int = SAMPLES) -> Linearisation:
+    """About `shape_along`. Raises `SolveError` as it does."""
+    times, p = shape_along(servo, end, samples)
+    dynamics = linear_dynamics(servo, times, p, 0 * p, 0 * p)
+    _check_numbers(servo, times, dynamics.M, dynamics.D, dynamics.K)
+    return Linearisation(dynamics, p, servo.scale)
+
+
+def _check_numbers(servo: Output, times: Array, *found: Array) -> None:
+    """Raise `SolveError` for the first of the times (N,) at which one of `found` (N, …) is no number."""
+    lost = np.any([~np.isfinite(x.reshape(len(times), -1)).all(axis=1) for x in found], axis=0)
+    if lost.any():
+        raise SolveError(
+            f"{servo.where}: motors alone cannot carry the path at t = {times[lost.argmax()]:g} s: the links are too"
+            " soft for their loads there; slow the path down"
+        )
