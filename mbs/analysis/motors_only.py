@@ -194,12 +194,17 @@ def describe_zeros(linear: Linearisation) -> str:
 
 def _check_relative_degree(servo: Output, linear: Linearisation) -> None:
     """Raise `InputError` where some time of the path the motors cannot accelerate its output."""
-    values = np.linalg.svd(linear.dynamics.M, compute_uv=False)
-    worst = int((values[:, -1] / values[:, 0]).argmin())
+    values, sides = np.linalg.svd(linear.dynamics.M, compute_uv=False), np.linalg.slogdet(linear.dynamics.M)[0]
+    worst, when = int((values[:, -1] / values[:, 0]).argmin()), ""
     if values[worst, -1] < SINGULAR * values[worst, 0]:
+        when = f"at t = {linear.times[worst]:.4g} s"
+    elif (changed := np.flatnonzero(sides[1:] != sides[:-1])).size:
+        when = f"between t = {linear.times[changed[0]]:.4g} and {linear.times[changed[0] + 1]:.4g} s"
+    if when:
         raise InputError(
-            f"{servo.where}: expected motors that accelerate every component of the path, found at"
-            f" t = {linear.times[worst]:g} s a singular coupling: take another number of modes or another factor"
+            f"{servo.where}: expected motors that accelerate every component of the path, found {when} a singular"
+            " coupling, where a zero of the modes passes through infinity: take another number of modes in the link"
+            ' files, or output = "redefined"'
         )
 
 

@@ -121,7 +121,7 @@ def make_spatial_servo(
     """The equations for a path that is held before 0 and after `end`.
 
     Raises `InputError` unless there are as many motors and specified components as degrees of freedom, and modes, and
-    for a path that the undeformed robot cannot follow.
+    for a path that the undeformed robot cannot follow; `Stopped`.
     """
     held = replace(model, rows=tuple(_held(row, end) for row in model.rows))
     start = undeformed_posture(held).q
@@ -146,6 +146,8 @@ def make_spatial_servo(
     times = as_floats(np.linspace(0.0, end, POSTURES))
     near = [start]
     for t in times[1:]:
+        if not goes_on():
+            raise Stopped
         q = solve_posture(held, float(t), near[-1])
         if q is None:
             raise InputError(f"{where}: trajectory: expected a path within reach, found no posture at t = {t:.6g} s")

@@ -87,10 +87,9 @@ def invert(
     )
     if len(start.rows) + len(finish.rows) != 2 * len(servo.scale):
         raise SolveError(
-            f"{servo.where}: stable inversion needs as many zeros in the right half plane before the path, at t = 0 s,"
-            f" as after it, found {2 * len(servo.scale) - len(start.rows)} and {len(finish.rows)}: take fewer modes"
-            " of the links, or other families, end the path in a posture more like the first, or use output ="
-            ' "redefined"'
+            f"{servo.where}: stable inversion needs as many zeros in the right half plane at t = 0 s as at t ="
+            f" {end:g} s, found {2 * len(servo.scale) - len(start.rows)} and {len(finish.rows)}: take another number of"
+            ' modes in the link files, end the path in a posture more like the first, or use output = "redefined"'
         )
     problem = Problem(
         servo.residuals, linear.dynamics, servo.scale,
