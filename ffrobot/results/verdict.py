@@ -15,6 +15,8 @@ from .joints import Coordinates, Scene, labelled_coordinates
 from .off_path import off_path_in_words
 from .peaks import POWER, peak_of
 
+AT_REST = 0.3  # of the mean rate of a path: what its first and last steps have at most
+
 Place = tuple[float, str, float]
 """A largest value, where it is, and when (s)."""
 
@@ -260,7 +262,8 @@ def _advice(
                 " would: ffrobot feasibility"
             )
     if asked and read_unsupplied(group["feasibility"]) is not None:
-        yield 'kind = "motors-only", or patches ([[pzt]]) on the links'
+        inversion = 'kind = "motors-only", or ' if _is_from_rest_to_rest(group) else ""
+        yield f"{inversion}patches ([[pzt]]) on the links"
     if "linear" in group and (text := str(group["linear"].attrs.get("advice", ""))):
         yield text
     if "control" in group:
@@ -271,6 +274,16 @@ def _advice(
             if len(about.get("advice", ()))
             else (general if about["verdict"] != "stable" else ())
         )
+
+
+def _is_from_rest_to_rest(group: h5py.Group) -> bool:
+    """Whether the paths begin and end at rest, as inversion with motors alone needs: next to their mean rates."""
+    for entry in group.get("trajectories", {}).values():
+        target = entry["target"][()] if "target" in entry else np.zeros((0, 1))
+        steps = np.abs(np.diff(target.reshape(len(target), -1), axis=0))
+        if len(steps) and (steps[[0, -1]].max(axis=0) > AT_REST * steps.mean(axis=0)).any():
+            return False
+    return True
 
 
 def _margins(group: h5py.Group) -> str:

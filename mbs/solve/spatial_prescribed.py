@@ -57,10 +57,14 @@ def prescribed_motion(
 
 
 def motion_near(model: SpatialModel, modes: Array, times: Array, guess: Array) -> tuple[Array, Array, Array, BoolArray]:
-    """Q, v and a with `modes` (3, T, n) at `times`, from guesses (T, n_q) of postures; and where one was found (T,)."""
+    """Q, v and a with `modes` (3, T, n) at `times`, from guesses (T, n_q) of postures; and where one was found (T,).
+
+    Elsewhere they are those of the guess.
+    """
     q = guess.copy()
     q[:, modal_places(model)] = modes[0]
     q, is_met = solve_postures(model, times, q)
+    q = np.where(is_met[:, None], q, guess)
     return *_moved(model, modes, times, q)[:3], is_met
 
 

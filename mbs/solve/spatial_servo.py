@@ -95,6 +95,7 @@ class SpatialServo:
         if self.offset:
             seen = seen + np.array([f.sample(times) for f in self.offset]).transpose(1, 2, 0)
         q, v, a, is_met = motion_near(model, seen, times, guess)
+        modes = np.where(is_met[:, None], modes, 0.0)
         q[:, modal_places(model)], v[:, ~tree.joint_columns], a[:, ~tree.joint_columns] = modes
         frames = tree.frames(q)
         required = required_forces(model, Accelerated(tree, q, v, a, frames), np.clip(times, 0.0, self.end))
@@ -110,7 +111,8 @@ class SpatialServo:
     def _left(self, times: Array, modes: Array) -> Array:
         if not self.goes_on():
             raise Stopped
-        found, is_met = self.motion(times, modes)
+        with np.errstate(over="ignore", invalid="ignore"):  # of an iteration that leaves the numbers r is none
+            found, is_met = self.motion(times, modes)
         left: Array = np.where(is_met[:, None], found.split.left[:, ~self.model.tree.joint_columns], np.nan)
         return left
 

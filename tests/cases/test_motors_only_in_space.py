@@ -8,9 +8,14 @@ import planar_in_space
 import pytest
 import tomli_w
 from checkpoints import CASES
+from drawn_arms import drawn_arm
 from patched_arms import ARM, LINK
+from scipy.interpolate import CubicSpline
+from spatial_rod_chain import Body, RodChain, X, Y, Z, bar
 
 import ffrobot
+from ffrobot.run.spatial import solve_spatial
+from ffrobot.run.watcher import Watcher
 
 KEPT = ("exact", "redefined")
 
@@ -105,3 +110,107 @@ def test_mistakes(old, new, message, tmp_path):
     with pytest.raises(ffrobot.InputError) as error:
         ffrobot.solve(tmp_path / "scene.toml")
     assert message in " ".join(str(error.value).split())
+
+
+@pytest.fixture(scope="module")
+def leaning_arm(solved):
+    return solved("arm_3r_motors_only")
+
+
+def off_its_line(case, run):
+    """Largest distance of the tip from its path, m."""
+    t = case.file[f"{run}/time"][()]
+    u = np.clip(t / 0.5, 0.0, 1.0)
+    line = np.array([[0.65, 0.10, 0.50], [0.40, 0.45, 0.65]])
+    law = case.file["exact/trajectories/tool/target"][()]
+    target = law[np.abs(case.file["exact/time"][()][:, None] - t).argmin(axis=0)]
+    np.testing.assert_allclose(target[u == 1.0], np.tile(line[1], (np.count_nonzero(u == 1.0), 1)), atol=1e-9)
+    return np.linalg.norm(case.file[f"{run}/points/fore.tip/position"] - target, axis=1).max()
+
+
+def test_leaning_arm_keeps_to_its_line(leaning_arm):
+    """Offsets, a leaning axis, bending in both planes, gravity, a payload: the replay in the nonlinear model."""
+    assert off_its_line(leaning_arm, "exact_forward") < 5e-6
+    assert off_its_line(leaning_arm, "joints_only") > 2e-3
+    for body in ("upper", "fore"):
+        bent = np.abs(leaning_arm.file[f"exact/points/{body}.tip/deflection"]).max(axis=0)
+        assert bent[1:].min() > 5e-4
+
+
+def test_moments_carry_an_arm_of_rods_along_the_same_line(leaning_arm):
+    """Rods and springs of another program: within what 1/(4 · 3²) of too much stiffness is of the deflections."""
+    axis = np.array([0.0, -1.0, 0.2]) / np.hypot(1.0, 0.2)
+    column = Body(np.zeros(3), Z, 4.0, 0.2 * Z, np.diag([0.06, 0.06, 0.02]))
+    upper = bar(0.5, 0.010, 0.014, 3, np.array([0.0, 0.1, 0.4]), -Y)
+    fore = bar(0.4, 0.008, 0.010, 3, 0.5 / 6 * X, axis, payload=0.2)
+    arm = RodChain([column, *upper, *fore], 0.4 / 6 * X, [0, 1, 1 + len(upper)])
+    file, names = leaning_arm.file, ("waist", "shoulder", "elbow")
+    t = file["exact/time"][()]
+    t = t[t < 0.55]
+    found = np.array([file[f"exact/joints/{name}/moment"][: len(t)] for name in names]).T
+    guess = [file[f"exact/joints/{name}/coordinate"][0] for name in names]
+    target = file["exact/trajectories/tool/target"][: len(t)]
+    q, holding = arm.at_rest(target[0], guess)
+    np.testing.assert_allclose(holding, found[0], atol=1e-4)  # N·m of 2: the weight alone
+    moments = CubicSpline(t, found - found[0] + holding)
+    tip = arm.moved(moments, t, q, damping=0.0)
+    assert np.linalg.norm(tip - target, axis=1).max() < 0.15e-3
+
+
+@pytest.mark.parametrize("seed", [0, 1, 4])
+def test_drawn_arms_follow_their_paths(seed, tmp_path):
+    """Three joints or six, any axes and sections, undamped or not, zeros that cross the imaginary axis (1 and 4)."""
+    path, tool = drawn_arm(seed, tmp_path)
+    with ffrobot.solve(path) as results:
+        target, replayed = (results[f"{run}/points/{tool}/position"] for run in ("exact", "again"))
+        way = np.linalg.norm(target[-1] - target[0])
+        assert way > 0.03
+        assert np.linalg.norm(replayed - target, axis=1).max() < 2e-4 * way
+        zeros = results["exact/zero_dynamics/zeros"]
+        growing = np.count_nonzero(zeros[:, :, 0] > 1e-6 * np.linalg.norm(zeros, axis=2), axis=1)
+        assert (np.ptp(growing) > 0) == (seed in (1, 4))
+
+
+def test_zero_that_passes_through_infinity_is_named(tmp_path):
+    path, _ = drawn_arm(8, tmp_path)
+    with pytest.raises(ffrobot.InputError) as error:
+        ffrobot.solve(path)
+    message = " ".join(str(error.value).split())
+    assert 'analysis "exact"' in message
+    assert "singular coupling" in message
+    assert "take another number of modes" in message
+
+
+class StopsAfter(Watcher):
+    """Stops an analysis at its n-th question, or at the first beyond a time."""
+
+    def __init__(self, questions=10**9, time=np.inf):
+        self.questions, self.time = questions, time
+
+    def advance(self, t, end):
+        self.questions -= 1
+        return self.questions > 0 and t < self.time
+
+
+def stopped(tmp_path, watcher, analysis=""):
+    modes = 'count = 2\nfamily = ["in-plane-bending", "out-of-plane-bending"]'
+    (tmp_path / "link.toml").write_text(LINK.format(name="link", length=0.4, modes=modes, height=0.006, width=0.012))
+    path = PATH.format(s=S).partition('[[analysis]]\nname = "again"')[0] + analysis
+    (tmp_path / "scene.toml").write_text(ARM.format(motors="section") + path)
+    return solve_spatial(tmp_path / "scene.toml", watcher)
+
+
+@pytest.mark.parametrize("questions", [1, 3, 250])
+def test_stop_before_a_motion_is_found_says_so(questions, tmp_path):
+    """At the first posture, among postures, and in the linearisation."""
+    with pytest.raises(ffrobot.SolveError, match=r'analysis "exact": stopped on request before any of its motion'):
+        stopped(tmp_path, StopsAfter(questions))
+
+
+def test_stop_keeps_the_motion_that_was_found(tmp_path):
+    run = stopped(tmp_path, StopsAfter(time=0.1), 'output = "redefined"\n').outcomes["exact"]
+    assert run.status == "interrupted"
+    assert 0.1 < run.time[-1] < 0.4
+    assert np.isfinite(run.q).all()
+    with pytest.raises(ffrobot.SolveError, match=r'"exact" ended at t = 0\.\d+ s \(interrupted\): stopped on request'):
+        run.check_completed()
