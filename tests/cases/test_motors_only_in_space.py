@@ -114,7 +114,7 @@ def test_mistakes(old, new, message, tmp_path):
 
 @pytest.fixture(scope="module")
 def leaning_arm(solved):
-    return solved("arm_3r_motors_only")
+    return solved("arm_3r_motors_only", timeout=600)  # a few seconds where nothing else runs
 
 
 def off_its_line(case, run):
