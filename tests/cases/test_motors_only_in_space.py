@@ -118,20 +118,20 @@ def leaning_arm(solved):
 
 
 def off_its_line(case, run):
-    """Largest distance of the tip from its path, m."""
-    t = case.file[f"{run}/time"][()]
-    u = np.clip(t / 0.5, 0.0, 1.0)
-    line = np.array([[0.65, 0.10, 0.50], [0.40, 0.45, 0.65]])
-    law = case.file["exact/trajectories/tool/target"][()]
-    target = law[np.abs(case.file["exact/time"][()][:, None] - t).argmin(axis=0)]
-    np.testing.assert_allclose(target[u == 1.0], np.tile(line[1], (np.count_nonzero(u == 1.0), 1)), atol=1e-9)
-    return np.linalg.norm(case.file[f"{run}/points/fore.tip/position"] - target, axis=1).max()
+    """Largest distance of the tip from the straight line, m."""
+    start, end = np.array([[0.65, 0.10, 0.50], [0.40, 0.45, 0.65]])
+    way = (end - start) / np.linalg.norm(end - start)
+    tip = case.file[f"{run}/points/fore.tip/position"][()] - start
+    return np.linalg.norm(tip - np.outer(tip @ way, way), axis=1).max()
 
 
 def test_leaning_arm_keeps_to_its_line(leaning_arm):
     """Offsets, a leaning axis, bending in both planes, gravity, a payload: the replay in the nonlinear model."""
+    assert off_its_line(leaning_arm, "exact") < 1e-9
     assert off_its_line(leaning_arm, "exact_forward") < 5e-6
-    assert off_its_line(leaning_arm, "joints_only") > 2e-3
+    assert off_its_line(leaning_arm, "joints_only") > 1e-3
+    last = leaning_arm.file["exact_forward/points/fore.tip/position"][-1]
+    np.testing.assert_allclose(last, [0.40, 0.45, 0.65], atol=5e-6)
     for body in ("upper", "fore"):
         bent = np.abs(leaning_arm.file[f"exact/points/{body}.tip/deflection"]).max(axis=0)
         assert bent[1:].min() > 5e-4
@@ -149,7 +149,7 @@ def test_moments_carry_an_arm_of_rods_along_the_same_line(leaning_arm):
     t = t[t < 0.55]
     found = np.array([file[f"exact/joints/{name}/moment"][: len(t)] for name in names]).T
     guess = [file[f"exact/joints/{name}/coordinate"][0] for name in names]
-    target = file["exact/trajectories/tool/target"][: len(t)]
+    target = file["exact/points/fore.tip/position"][: len(t)]
     q, holding = arm.at_rest(target[0], guess)
     np.testing.assert_allclose(holding, found[0], atol=1e-4)  # N·m of 2: the weight alone
     moments = CubicSpline(t, found - found[0] + holding)
@@ -166,13 +166,10 @@ def test_drawn_arms_follow_their_paths(seed, tmp_path):
         way = np.linalg.norm(target[-1] - target[0])
         assert way > 0.03
         assert np.linalg.norm(replayed - target, axis=1).max() < 2e-4 * way
-        zeros = results["exact/zero_dynamics/zeros"]
-        growing = np.count_nonzero(zeros[:, :, 0] > 1e-6 * np.linalg.norm(zeros, axis=2), axis=1)
-        assert (np.ptp(growing) > 0) == (seed in (1, 4))
 
 
 def test_zero_that_passes_through_infinity_is_named(tmp_path):
-    path, _ = drawn_arm(8, tmp_path)
+    path, _ = drawn_arm(6, tmp_path)
     with pytest.raises(ffrobot.InputError) as error:
         ffrobot.solve(path)
     message = " ".join(str(error.value).split())
@@ -200,7 +197,7 @@ def stopped(tmp_path, watcher, analysis=""):
     return solve_spatial(tmp_path / "scene.toml", watcher)
 
 
-@pytest.mark.parametrize("questions", [1, 3, 250])
+@pytest.mark.parametrize("questions", [1, 3, 205])
 def test_stop_before_a_motion_is_found_says_so(questions, tmp_path):
     """At the first posture, among postures, and in the linearisation."""
     with pytest.raises(ffrobot.SolveError, match=r'analysis "exact": stopped on request before any of its motion'):
