@@ -2,46 +2,47 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from ..mbs.quantities.attachment_error import JOLT
 from ..run.solution import AnalysisResult, Solution
+from ..run.spatial_solution import SpatialResult, SpatialSolution
 from .lines import deflection_in_words
 
 NOT_ESTIMATED = "not estimated"
 RESOLVED = 0.3  # an estimated error of modes beyond is none: they do not resolve the motion
 
 
-def error_budget(solution: Solution) -> Iterator[str]:
+def error_budget(solution: Solution | SpatialSolution) -> Iterator[str]:
     """A line each: time integration, modes, deflection, patches."""
-    if aims := [result.outcome.analysis.tolerance for result in integrated(solution)]:
+    results = integrated(solution)
+    if aims := [result.analysis.tolerance for result in results]:
         asked = " … ".join(f"{aim:.0e}" for aim in sorted({min(aims), max(aims)}))
         yield f"time integration: {asked} of peaks, asked for"
-    yield f"modes: {_modes(solution)}"
+    yield f"modes: {_modes(solution, results)}"
     yield f"deflection: {deflection_in_words(result.bending for result in solution.analyses.values())}"
     for name, result in solution.analyses.items():
         if result.check is not None:
             yield f"{name}, {result.check.in_words}"
-    yield from (f"patches of {patches.stiffness_in_words}" for patches in solution.patches.values())
+    yield from (f"patches of {patches.stiffness_in_words}" for patches in solution.patch_arrays)
 
 
-def integrated(solution: Solution) -> list[AnalysisResult]:
+def integrated(solution: Solution | SpatialSolution) -> list[AnalysisResult | SpatialResult]:
     """The analyses that went through time."""
-    return [result for result in solution.analyses.values() if result.outcome.analysis.is_integrated]
+    return [result for result in solution.analyses.values() if result.analysis.is_integrated]
 
 
-def _modes(solution: Solution) -> str:
+def _modes(solution: Solution | SpatialSolution, results: Sequence[AnalysisResult | SpatialResult]) -> str:
     if rigid := [f"{name} in {', '.join(body.rigid_in)}" for name, body in solution.bodies.items() if body.rigid_in]:
         return f"{NOT_ESTIMATED}: rigid for want of modes: {'; '.join(rigid)}"
     if solution.mode_choice is not None:
         known = [error for of in solution.mode_choice.errors.values() for error in of.values()]
         return f"{max(known):.0e} of peaks, against all modes of the files" if any(known) else NOT_ESTIMATED
-    if any(result.start_jolt >= JOLT for result in integrated(solution)):
+    if any(result.start_jolt >= JOLT for result in results):
         return f"{NOT_ESTIMATED}: the motion starts with a jolt, in which missing modes take part"
-    found = [result.mode_error for result in integrated(solution)]
-    known = [error for error in found if error is not None]
-    if not found or len(known) < len(found):
+    errors = [error for result in results if (error := result.mode_error) is not None]
+    if not errors or len(errors) < len(results):
         return NOT_ESTIMATED
-    if max(known) > RESOLVED:
+    if max(errors) > RESOLVED:
         return "too few: vibrations faster than the highest take part"
-    return f"{max(known):.0e} of peaks, estimated"
+    return f"{max(errors):.0e} of peaks, estimated"

@@ -11,8 +11,9 @@ from rich.table import Table
 from ..common.peaks import largest
 from ..results.verdict import Verdict
 from ..run.spatial_solution import SpatialSolution
+from .accuracy import error_budget
 from .control import control_lines, control_tables
-from .lines import deflection_in_words, integrator_lines, warning_lines
+from .lines import integrator_lines, warning_lines
 from .modes import chosen_modes, pieces_in_words
 from .stresses import stress_table
 from .tables import plain_table
@@ -69,10 +70,7 @@ def print_spatial_summary(
     chosen = {name: one.run.integrator for name, one in solution.analyses.items() if one.run.analysis.is_integrated}
     for line in integrator_lines(chosen):
         notes.add_row("integrator", line)
-    notes.add_row("accuracy", f"deflection: {deflection_in_words(bending.values())}")
-    for name, result in solution.analyses.items():
-        if result.check is not None:
-            notes.add_row("accuracy", f"{name}, {result.check.in_words}")
+    notes.add_row("accuracy", "\n".join(error_budget(solution)))
     for line in control_lines(details):
         notes.add_row("linear", line)
     for note in solution.path_notes:

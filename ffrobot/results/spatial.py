@@ -27,7 +27,7 @@ from .linear import write_spatial_linear
 from .peaks import write_peaks
 from .spatial_actuation import write_actuation
 from .spatial_resume import write_state_in_space
-from .write import write_check, write_head, write_mode_errors, write_steps
+from .write import write_check, write_head, write_judgement, write_mode_errors, write_steps
 
 
 def write_spatial_results(solution: SpatialSolution, path: Path) -> None:
@@ -62,6 +62,7 @@ def _write_analysis(group: h5py.Group, solution: SpatialSolution, result: Spatia
     run, motion = result.run, result.motion
     _write_run(group, run, result.warnings)
     group.attrs["stiffening_effect"] = result.stiffening_effect
+    write_judgement(group, result)
     if joints := resolving_joints(motion.model):
         group.attrs.update({"redundancy": motion.model.scene.redundancy, "resolved_by": joints})
     write_check(group, result.check)

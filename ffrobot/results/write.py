@@ -24,6 +24,7 @@ from ..mbs.fields.steps import DATASET, METHOD
 from ..run.loaded_body import Loaded
 from ..run.mode_search import ModeChoice
 from ..run.solution import AnalysisResult, FinerCheck, Solution
+from ..run.spatial_solution import SpatialResult
 from .actuators import write_actuators, write_placement
 from .bodies import write_bending, write_motion, write_stress
 from .control import write_loop
@@ -86,10 +87,7 @@ def _write_analysis(group: h5py.Group, solution: Solution, result: AnalysisResul
     outcome, name = result.outcome, result.outcome.analysis.name
     _write_attributes(group, outcome)
     group.attrs["stiffening_effect"] = result.stiffening_effect
-    if outcome.analysis.is_integrated:
-        group.attrs["start_jolt"] = result.start_jolt
-    if result.mode_error is not None:
-        group.attrs["mode_error"] = result.mode_error
+    write_judgement(group, result)
     group.attrs.create("warnings", list(result.warnings), dtype=h5py.string_dtype())
     if solution.mode_choice is not None:
         write_mode_errors(group, name, solution.mode_choice)
@@ -106,6 +104,14 @@ def _write_analysis(group: h5py.Group, solution: Solution, result: AnalysisResul
     for found, write in DETAILS.items():
         if isinstance(outcome.details, found):
             write(group, outcome, outcome.details)
+
+
+def write_judgement(group: h5py.Group, result: AnalysisResult | SpatialResult) -> None:
+    """How well modes resolve a motion that was integrated."""
+    if result.analysis.is_integrated:
+        group.attrs["start_jolt"] = result.start_jolt
+    if result.mode_error is not None:
+        group.attrs["mode_error"] = result.mode_error
 
 
 def write_steps(group: h5py.Group, ends: Array, method: str) -> None:

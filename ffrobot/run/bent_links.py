@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 from ..common.errors import InputError
+from ..mbs.quantities.second_order import missing_in_pieces
 from ..mbs.quantities.validity import Bending
 from ..scene.pieces import BodyInPieces
 
@@ -17,8 +18,16 @@ def worst_of_pieces(bending: Mapping[str, Bending], divided: Mapping[str, BodyIn
     for piece, found in bending.items():
         name = link_of.get(piece, piece)
         if name not in worst or found.position_error > worst[name].position_error:
-            worst[name] = replace(found, pieces=len(divided[name].names)) if name in divided else found
-    return worst
+            worst[name] = found
+    return {
+        name: _in_pieces(found, len(divided[name].names)) if name in divided else found for name, found in worst.items()
+    }
+
+
+def _in_pieces(piece: Bending, count: int) -> Bending:
+    """A link in `count` pieces as its worst one."""
+    missing = missing_in_pieces(piece.rotations, count) if piece.is_stiffened else piece.missing
+    return replace(piece, pieces=count, missing=missing)
 
 
 def with_advice(

@@ -18,7 +18,7 @@ from ..actuation.points import PointForces, solve_point_forces
 from ..actuation.prediction import Unsupplied, predicted_shift, unmet_modal_forces, unsupplied
 from ..common.arrays import Array
 from ..mbs.analysis.outcome import Outcome
-from ..mbs.quantities.attachment_error import mode_error, start_jolt
+from ..mbs.quantities.attachment_error import mode_error, modes_in_motion, start_jolt, start_of
 from ..mbs.quantities.link_loads import LinkLoads, link_loads
 from ..mbs.quantities.observation import modes_of_file
 from ..mbs.quantities.stress import (
@@ -40,7 +40,8 @@ def evaluated(solution: Solution, result: AnalysisResult) -> AnalysisResult:
     """The result with all that follows from its outcome."""
     began, outcome = time.perf_counter(), result.outcome
     shift, unsupplied = _unmet(solution, result)
-    is_rigid = any(body.rigid_in for body in solution.bodies.values())  # modes know nothing of those that are not there
+    # modes know nothing of those that are not there
+    is_resolved = outcome.analysis.is_integrated and not any(body.rigid_in for body in solution.bodies.values())
     feasibility = _feasibility(solution, result)
     result = replace(
         result,
@@ -48,8 +49,8 @@ def evaluated(solution: Solution, result: AnalysisResult) -> AnalysisResult:
         predicted_shift=shift,
         feasibility=feasibility and replace(feasibility, unsupplied=unsupplied),
         stresses=_stresses(solution, outcome),
-        mode_error=mode_error(outcome.computed) if outcome.analysis.is_integrated and not is_rigid else None,
-        start_jolt=start_jolt(outcome.computed) if outcome.analysis.is_integrated else 0.0,
+        mode_error=mode_error(modes_in_motion(outcome.computed)) if is_resolved else None,
+        start_jolt=start_jolt(start_of(outcome.computed)) if outcome.analysis.is_integrated else 0.0,
     )
     result = replace(result, warnings=tuple(warnings_of(solution.scene, result)))
     return replace(result, seconds=result.seconds + time.perf_counter() - began)

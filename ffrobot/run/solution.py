@@ -16,6 +16,7 @@ from ..mbs.analysis.outcome import EarlierRun, Outcome
 from ..mbs.model.model import Model
 from ..mbs.quantities.stress import BodyStress
 from ..mbs.quantities.validity import Bending
+from ..mbs.scene.analysis import Analysis
 from ..scene.pieces import BodyInPieces
 from ..scene.scene import Scene
 from .bodies import LoadedBody
@@ -86,6 +87,11 @@ class AnalysisResult:
         return self.outcome.status
 
     @property
+    def analysis(self) -> Analysis:
+        """What was asked for."""
+        return self.outcome.analysis
+
+    @property
     def stiffening_effect(self) -> float:
         """Largest relative change of a link's stiffness by the loads of the run."""
         return max((link.stiffness_change for link in self.bending.values()), default=0.0)
@@ -138,6 +144,11 @@ class Solution:
     def outcomes(self) -> Mapping[str, Outcome]:
         """The outcome of each analysis, by its name."""
         return {name: result.outcome for name, result in self.analyses.items()}
+
+    @property
+    def patch_arrays(self) -> tuple[PatchArray, ...]:
+        """Of all bodies."""
+        return tuple(self.patches.values())
 
     @property
     def acting_patches(self) -> Mapping[str, PatchArray]:

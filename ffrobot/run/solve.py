@@ -20,7 +20,7 @@ from ..common.errors import of_file
 from ..mbs.analysis.outcome import Outcome
 from ..mbs.analysis.replay import ActuatorSet
 from ..mbs.model.raised_mass import by_body
-from ..mbs.quantities.stiffening import NOTABLE, stiffness_changes
+from ..mbs.quantities.stiffening import NOTABLE, loads_on_modes
 from ..mbs.quantities.validity import bending
 from ..scene.kinds import AnyKind
 from ..scene.pieces import bodies_in_pieces, places_on_pieces
@@ -190,16 +190,12 @@ def _run_all(solution: Solution, watcher: Watcher, interruption: Interruption) -
             if not results:
                 raise
             return replace(solution, analyses=results, failure=error)
-        changes = stiffness_changes(outcome.closer, stiffening)
+        bent = bending(outcome.closer, links, loads_on_modes(outcome.closer, stiffening), solution.stiffened)
+        change = max((of.stiffness_change for of in bent.values()), default=0.0)
         automatic = solution.scene.geometric_stiffening == "auto" and not solution.stiffened
-        if (
-            automatic
-            and max((of.largest for of in changes.values()), default=0.0) > NOTABLE
-            and outcome.status != "interrupted"
-        ):
+        if automatic and change > NOTABLE and outcome.status != "interrupted":
             return None
         voltages = _voltages(solution, outcome)
-        bent = bending(outcome.closer, links, changes, solution.stiffened)
         results[analysis.name] = AnalysisResult(outcome, bent, time.perf_counter() - began, voltages)
         _log(outcome)
         if outcome.failed:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 from ..actuation.control.loop_record import LoopRecord
+from ..actuation.patches.patches import PatchArray
 from ..actuation.patches.spatial_patches import LinkPatches
 from ..actuation.points import PointForces
 from ..actuation.spatial_points import SpatialPointSet
@@ -17,6 +18,7 @@ from ..mbs.analysis.spatial_run import SpatialRun
 from ..mbs.model.spatial_model import SpatialModel
 from ..mbs.model.spatial_wrench import Wrench
 from ..mbs.model.truncation import modes_kept
+from ..mbs.quantities.attachment_error import mode_error, modes_in_3d_motion, start_jolt, start_of_3d_motion
 from ..mbs.quantities.path_seen import path_warnings
 from ..mbs.quantities.spatial_doubts import doubts
 from ..mbs.quantities.spatial_energy import Energies, Momentum
@@ -24,6 +26,7 @@ from ..mbs.quantities.spatial_motion import SpatialMotion
 from ..mbs.quantities.spatial_sharing import Sharing
 from ..mbs.quantities.stress import BodyStress
 from ..mbs.quantities.validity import Bending, deflection_warning
+from ..mbs.scene.analysis import Analysis
 from ..scene.pieces import BodyInPieces
 from ..scene.spatial import SpatialScene
 from .loaded_body import remarks_on_parts, rigid_in_words
@@ -63,6 +66,25 @@ class SpatialResult:
     bending: Mapping[str, Bending] = field(default_factory=dict)
     sharing: Sharing | None = None
     closer: SpatialResult | None = field(default=None, repr=False)
+
+    @property
+    def analysis(self) -> Analysis:
+        """What was asked for."""
+        return self.run.analysis
+
+    @cached_property
+    def mode_error(self) -> float | None:
+        """Estimated for too few modes, of peaks; None where it is not known. It does not see what a jolt does."""
+        return mode_error(modes_in_3d_motion(self.motion)) if self._is_integrated else None
+
+    @cached_property
+    def start_jolt(self) -> float:
+        """See `attachment_error`."""
+        return start_jolt(start_of_3d_motion(self.motion)) if self._is_integrated else 0.0
+
+    @property
+    def _is_integrated(self) -> bool:
+        return self.analysis.is_integrated and len(self.motion.time) > 0
 
     @property
     def status(self) -> str:
@@ -147,10 +169,14 @@ class SpatialSolution:
         return self.stiffened or any(node.body.stiffening is not None for node in self.model.tree.nodes)
 
     @property
+    def patch_arrays(self) -> tuple[PatchArray, ...]:
+        """Of all layouts."""
+        return tuple(array for of in self.patches.values() for array in of.arrays.values())
+
+    @property
     def notes(self) -> tuple[str, ...]:
-        """What patches do to the stiffness of their links, what links cannot do, modes left out, one line each."""
-        found = [array.stiffness_in_words for of in self.patches.values() for array in of.arrays.values()]
-        found += rigid_in_words(self.bodies)
+        """What links cannot do, and modes left out, one line each."""
+        found = [*rigid_in_words(self.bodies)]
         for name, body in self.bodies.items():
             if body.spatial.reduction is not None:
                 found.append(f"{name}: all modes but {modes_kept(body.spatial)}")

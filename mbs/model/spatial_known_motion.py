@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from ...common.arrays import Array
+import numpy as np
+
+from ...common.arrays import Array, as_floats
 from .spatial_accelerations import Accelerated
 from .spatial_model import SpatialModel
 from .spatial_system import SpatialSystem
@@ -18,3 +20,12 @@ def row_accelerations(model: SpatialModel, state: Accelerated, times: Array) -> 
     """C̈ (T, rows) at `times` (T,), less what their targets ask for: 0 where the motion keeps to the constraints."""
     system = SpatialSystem(model)
     return system.core.row_accelerations(system.scene, times.tolist(), state.q, state.v, state.a) * system.row_signs
+
+
+def mass_matrix(model: SpatialModel, q: Array, t: float) -> Array:
+    """M (n_v, n_v) at q (n_q,): what unit accelerations take more than none."""
+    count = model.tree.n_v
+    system, a = SpatialSystem(model), np.vstack([np.zeros(count), np.eye(count)])
+    states = np.tile(q, (count + 1, 1)), np.zeros((count + 1, count)), a
+    found = system.core.required_forces(system.scene, [t] * (count + 1), *states)
+    return as_floats((found[1:] - found[0]).T)

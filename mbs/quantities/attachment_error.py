@@ -2,16 +2,42 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
+from typing import NamedTuple
+
 import numpy as np
 
+from ...common.arrays import Array
 from ..analysis.outcome import Outcome
 from ..model.masses import system_mass_matrix
+from ..model.planar_body import PlanarBody
+from ..model.spatial_body import SpatialBody
+from ..model.spatial_known_motion import mass_matrix
+from .spatial_motion import SpatialMotion
 
 JOLT = 0.01  # of the largest deformation: where more begins to ring at once, modes that are not there would ring, too
 DEPENDENT, RIGID = 1e-10, 1e-9  # of the largest singular value of C_q, and of the largest ω²
 
 
-def mode_error(outcome: Outcome) -> float | None:
+class ModesInMotion(NamedTuple):
+    """Of one flexible body: p and p̈ (T, n)."""
+
+    body: PlanarBody | SpatialBody
+    p: Array
+    p_ddot: Array
+
+
+class Start(NamedTuple):
+    """First state of a run: M (n_v, n_v), C_q (rows, n_v), accelerations (n_v,), stiffness of coordinates (n_v,)."""
+
+    M: Array
+    C_q: Array
+    a: Array
+    stiffness: Array
+    largest: float  # Σ pᵀ K p over the run, J
+
+
+def mode_error(links: Iterable[ModesInMotion]) -> float | None:
     """Estimated error of moments and deflections for too few modes, of their peaks; None where nothing is known.
 
     Attachment modes carry what the eigenmodes left out do statically. What these do besides, by their inertia, is at
@@ -22,22 +48,18 @@ def mode_error(outcome: Outcome) -> float | None:
     of a solve. Nothing is known of links without attachment modes.
     """
     ratios = []
-    for body in outcome.assembly.model.links:
-        if not body.n_modes:
-            continue
+    for body, p, p_ddot in links:
         if not body.attachment_modes or not body.n_eigenmodes:
             return None
         highest = np.sort(body.stiffness)[body.n_eigenmodes - 1]
         late = np.maximum(1.0 / highest - 1.0 / body.stiffness, 0.0)
-        columns = outcome.coordinates(body.name)
-        p, p_ddot = outcome.q[:, columns][:, 3:], outcome.a[:, columns][:, 3:]
         wrong = np.sqrt(((late * p_ddot) ** 2 * body.stiffness).sum(axis=1).max(initial=0.0))
         whole = np.sqrt((p**2 * body.stiffness).sum(axis=1).max(initial=0.0))
         ratios.append(float(wrong / whole) if whole else 0.0)
     return max(ratios, default=None)
 
 
-def start_jolt(outcome: Outcome) -> float:
+def start_jolt(start: Start) -> float:
     """How much of a motion's deformation begins to ring at its start all at once, of the largest there is in it.
 
     The vibrations φ_i, ω_i of the robot under the constraints of the run, about its first configuration, have of the
@@ -45,17 +67,47 @@ def start_jolt(outcome: Outcome) -> float:
     largest √(Σ pᵀ K p) of all links. It is 0 on smooth paths from equilibrium, 0.1 to 1 where links start undeformed
     under gravity, or a path with a jump of its acceleration.
     """
+    if not start.largest:
+        return 0.0
+    sizes, directions = np.linalg.svd(start.C_q)[1:]
+    free = directions[np.count_nonzero(sizes > DEPENDENT * sizes.max(initial=0.0)) :].T
+    inverse = np.linalg.inv(np.linalg.cholesky(free.T @ start.M @ free))
+    squares, shapes = np.linalg.eigh(inverse @ (free.T * start.stiffness) @ free @ inverse.T)
+    accelerations = shapes.T @ inverse @ free.T @ start.M @ start.a
+    elastic = squares > RIGID * squares.max(initial=0.0)
+    return float(np.sqrt((accelerations[elastic] ** 2 / squares[elastic]).sum() / start.largest))
+
+
+def modes_in_motion(outcome: Outcome) -> Iterator[ModesInMotion]:
+    """Of the flexible links of a planar run."""
+    for body in outcome.assembly.model.links:
+        if body.n_modes:
+            columns = outcome.coordinates(body.name)
+            yield ModesInMotion(body, outcome.q[:, columns][:, 3:], outcome.a[:, columns][:, 3:])
+
+
+def modes_in_3d_motion(motion: SpatialMotion) -> Iterator[ModesInMotion]:
+    """Of the flexible bodies of a 3D run."""
+    for node in motion.model.tree.nodes:
+        if node.body.n_modes:
+            yield ModesInMotion(node.body, motion.q[:, node.p_q], motion.a[:, node.p_v])
+
+
+def start_of(outcome: Outcome) -> Start:
+    """Of a planar run."""
     assembly, bodies = outcome.assembly, outcome.assembly.model.bodies
     stiffness = np.concatenate([np.append(np.zeros(3), body.stiffness) for body in bodies])
-    largest = float((outcome.q**2 @ stiffness).max(initial=0.0))
-    if not largest:
-        return 0.0
     C_q = assembly.system.constraint_jacobians(outcome.q[:1])[0]
-    _, sizes, directions = np.linalg.svd(C_q)
-    free = directions[np.count_nonzero(sizes > DEPENDENT * sizes.max(initial=0.0)) :].T
-    M = system_mass_matrix(assembly, outcome.q[0])
-    inverse = np.linalg.inv(np.linalg.cholesky(free.T @ M @ free))
-    squares, shapes = np.linalg.eigh(inverse @ (free.T * stiffness) @ free @ inverse.T)
-    accelerations = shapes.T @ inverse @ free.T @ M @ outcome.a[0]
-    elastic = squares > RIGID * squares.max(initial=0.0)
-    return float(np.sqrt((accelerations[elastic] ** 2 / squares[elastic]).sum() / largest))
+    largest = float((outcome.q**2 @ stiffness).max(initial=0.0))
+    return Start(system_mass_matrix(assembly, outcome.q[0]), C_q, outcome.a[0], stiffness, largest)
+
+
+def start_of_3d_motion(motion: SpatialMotion) -> Start:
+    """Of a 3D run."""
+    tree, stiffness = motion.model.tree, np.zeros(motion.model.tree.n_v)
+    energy: Array = np.zeros(len(motion.time))
+    for node in tree.nodes:
+        stiffness[node.p_v] = node.body.stiffness
+        energy += motion.q[:, node.p_q] ** 2 @ node.body.stiffness
+    M = mass_matrix(motion.model, motion.q[0], float(motion.time[0]))
+    return Start(M, motion.rows[1][0], motion.a[0], stiffness, float(energy.max(initial=0.0)))

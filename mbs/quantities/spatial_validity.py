@@ -11,8 +11,8 @@ from ...fe_models.modal_body import ModalBody
 from ..model.spatial_body import SpatialBody
 from .spatial_link_loads import loads_in_equations
 from .spatial_motion import SpatialMotion
-from .stiffness_change import StiffnessChange, stiffness_change
-from .validity import IN_SPACE, Bending, bending_of_link
+from .stiffness_change import LoadedPoint, ModalLoads
+from .validity import IN_SPACE, Bending, LinkInRun, bending_of_link
 
 
 def bending_in_space(motion: SpatialMotion, links: Mapping[str, ModalBody]) -> dict[str, Bending]:
@@ -20,22 +20,31 @@ def bending_in_space(motion: SpatialMotion, links: Mapping[str, ModalBody]) -> d
     loads = loads_in_equations(motion, links) if len(motion.time) else {}
     found = {}
     for name, link in links.items():
-        node, sizes = motion.node(name), loads[name].sizes if name in loads else {}
-        p = motion.q[:, node.p_q] @ node.body.modal_transform.T
-        change = change_by_loads(link, node.body, sizes)
-        force = _largest_force(node.body, sizes, len(p))
-        found[name] = bending_of_link(link, p, force, change, node.body.stiffening is not None, IN_SPACE)
+        body, sizes = motion.node(name).body, loads[name].sizes if name in loads else {}
+        p = motion.q[:, motion.node(name).p_q] @ body.modal_transform.T
+        run = LinkInRun(
+            p, body.modal_transform, _on_modes(link, body, sizes), body.stiffening is not None, motion.is_at_rest
+        )
+        found[name] = bending_of_link(link, run, _largest_force(body, sizes, len(p)), IN_SPACE)
     return found
 
 
-def change_by_loads(link: ModalBody, body: SpatialBody, sizes: Mapping[str, Array]) -> StiffnessChange:
-    """By loads of `sizes` (T,) on a body, whether it is in the equations or not.
+def _on_modes(link: ModalBody, body: SpatialBody, sizes: Mapping[str, Array]) -> ModalLoads:
+    """Loads of `sizes` (T,) on a body, whether their geometric stiffness is in the equations or not.
 
-    Loads by the names of `fe_models.modal_body.unit_loads`; none by those of which the file has no geometric stiffness.
+    Loads by the names of `fe_models.modal_body.unit_loads`; those alone of which the file has a geometric stiffness.
     """
-    T, known = body.modal_transform, [load for load in sizes if load in link.geometric_stiffness]
-    matrices = [T.T @ link.geometric_stiffness[load] @ T for load in known]
-    return stiffness_change([sizes[load] for load in known], matrices, body.stiffness)
+    T, n = body.modal_transform, len(body.stiffness)
+    K = {load: T.T @ of_load @ T for load, of_load in link.geometric_stiffness.items()}
+    known = [load for load in sizes if load in K]
+    f = np.stack([sizes[load] for load in known], axis=1) if known else np.zeros((0, 0))
+    along = {point: [f"force/{point}/{axis}" for axis in "xyz"] for point in link.interfaces}
+    points = tuple(
+        LoadedPoint(link.interfaces[point].translation @ T, np.stack([K[load] for load in of]))
+        for point, of in along.items()
+        if all(load in K for load in of)
+    )
+    return ModalLoads(f, np.array([K[load] for load in known]).reshape(-1, n, n), body.stiffness, points)
 
 
 def _largest_force(body: SpatialBody, sizes: Mapping[str, Array], count: int) -> Array:

@@ -11,22 +11,20 @@ from ...common.plane import rotated
 from ..analysis.outcome import Outcome
 from ..model.geometric_stiffening import GeometricStiffening
 from ..model.planar_body import PlanarBody
-from .stiffness_change import StiffnessChange, stiffness_change
+from .stiffness_change import LoadedPoint, ModalLoads
 
 NOTABLE = 0.01  # relative change of a link's stiffness from which on the summary warns, and "auto" switches it on
 
 
-def stiffness_changes(
-    outcome: Outcome, stiffening: Mapping[str, GeometricStiffening | None]
-) -> dict[str, StiffnessChange]:
-    """By body, of the loads of a run, whether it was on or not.
+def loads_on_modes(outcome: Outcome, stiffening: Mapping[str, GeometricStiffening | None]) -> dict[str, ModalLoads]:
+    """By body, of a run, whether geometric stiffening was on or not.
 
     `stiffening` by the names of bodies; those without have no entry. Loads are those of θ̇², of the frame's acceleration
     less gravity, of θ̈, and of the constraints.
     """
     assembly, gravity = outcome.assembly, np.array(outcome.assembly.model.scene.gravity)
     wrenches = assembly.constraint_wrenches(outcome.q, outcome.lambda_)
-    changes: dict[str, StiffnessChange] = {}
+    found: dict[str, ModalLoads] = {}
     for body in assembly.model.bodies:
         known = stiffening.get(body.name)
         if known is None or not body.n_modes:
@@ -39,8 +37,9 @@ def stiffness_changes(
             if point in known.K_points:
                 sizes += [*rotated(-q[:, 2], wrench[:, :2]).T, wrench[:, 2]]
                 K += [*known.K_points[point]]
-        changes[body.name] = stiffness_change(sizes, K, body.stiffness)
-    return changes
+        points = tuple(LoadedPoint(body.points[name].translation, of[:2]) for name, of in known.K_points.items())
+        found[body.name] = ModalLoads(np.stack(sizes, axis=1), np.stack(K), body.stiffness, points)
+    return found
 
 
 def shortenings(outcome: Outcome, stiffening: Mapping[str, GeometricStiffening | None]) -> dict[str, Array]:

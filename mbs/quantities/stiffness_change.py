@@ -7,7 +7,7 @@ stiffness of any shape; at −1 a shape has none left (Bathe, Finite Element Pro
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -27,29 +27,53 @@ class StiffnessChange(NamedTuple):
     buckling: float = 0.0
 
 
-NO_CHANGE = StiffnessChange()
+class LoadedPoint(NamedTuple):
+    """An interface: translation (c, n) by modes along c axes, and K (c, n, n) of forces along these."""
+
+    translation: Array
+    K: Array
 
 
-def stiffness_change(sizes: Sequence[Array], matrices: Sequence[Array], stiffness: Array) -> StiffnessChange:
-    """Of loads of `sizes` (T,) with geometric stiffness `matrices` (n, n), on modes of `stiffness` K_ff (n,)."""
+class ModalLoads(NamedTuple):
+    """Loads of sizes f (T, J) with geometric stiffness K (J, n, n), on modes of stiffness K_ff (n,)."""
+
+    f: Array
+    K: Array
+    stiffness: Array
+    points: tuple[LoadedPoint, ...] = ()
+
+    @property
+    def relative(self) -> Array:
+        """(J, n, n) K_ff^-½ K K_ff^-½."""
+        root = 1 / np.sqrt(self.stiffness)
+        return as_floats(self.K * root * root[:, None])
+
+    @property
+    def squares(self) -> Array:
+        """(T,) squares of the Frobenius norms of K_ff^-½ S K_ff^-½."""
+        flat = self.relative.reshape(len(self.K), -1)
+        return as_floats(np.maximum(np.einsum("tj,jk,tk->t", self.f, flat @ flat.T, self.f, optimize=True), 0.0))
+
+
+def stiffness_change(loads: ModalLoads) -> StiffnessChange:
+    """By the loads of a run."""
     largest, lowest = 0.0, 0.0
-    for bound, mu in _eigenvalues(sizes, matrices, stiffness):
+    for bound, mu in _eigenvalues(loads):
         largest, lowest = max(largest, float(np.abs(mu).max())), min(lowest, float(mu.min()))
         if bound <= largest and bound <= max(1.0, -lowest):
             break
     return StiffnessChange(largest, -lowest)
 
 
-def _eigenvalues(sizes: Sequence[Array], matrices: Sequence[Array], stiffness: Array) -> Iterator[tuple[float, Array]]:
+def _eigenvalues(loads: ModalLoads) -> Iterator[tuple[float, Array]]:
     """μ (…, n) of some outputs, and a bound of |μ| at all others: largest Frobenius norms of S first."""
-    if not len(sizes) or not len(stiffness):
+    if not loads.f.size or not len(loads.stiffness):
         return
-    f, root, n = np.stack(sizes, axis=1), 1 / np.sqrt(stiffness), len(stiffness)
-    K = (np.stack(matrices) * root * root[:, None]).reshape(len(f[0]), -1)
-    squares = np.einsum("tj,jk,tk->t", f, K @ K.T, f, optimize=True)
+    f, K, squares = loads.f, loads.relative, loads.squares
     known = np.flatnonzero(np.isfinite(squares))
     order = known[np.argsort(-squares[known])]
-    norms = np.append(np.sqrt(np.maximum(squares[order], 0.0)), 0.0)
+    norms = np.append(np.sqrt(squares[order]), 0.0)
     for start in range(0, len(order), AT_ONCE):
         some = order[start : start + AT_ONCE]
-        yield float(norms[start + len(some)]), as_floats(np.linalg.eigvalsh((f[some] @ K).reshape(-1, n, n)))
+        S = np.einsum("tj,jmn->tmn", f[some], K)
+        yield float(norms[start + len(some)]), as_floats(np.linalg.eigvalsh(S))

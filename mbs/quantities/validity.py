@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import ceil, sqrt
+from typing import NamedTuple
 
 import numpy as np
 
@@ -19,8 +20,16 @@ from ...common.arrays import Array
 from ...fe_models.modal_body import ModalBody
 from ..analysis.outcome import Outcome
 from .observation import modes_of_file
+from .second_order import (
+    Missing,
+    Rotations,
+    largest_displacement,
+    largest_rotations,
+    missing_to_first_order,
+    missing_to_second_order,
+)
 from .stiffening import NOTABLE
-from .stiffness_change import NO_CHANGE, StiffnessChange
+from .stiffness_change import ModalLoads, StiffnessChange, stiffness_change
 
 IN_PLANE, IN_SPACE = (1,), (1, 2)  # axes across a link along which it bends
 
@@ -28,11 +37,6 @@ DEFLECTION_LIMIT = {False: 0.02, True: 0.05}  # of the length, from the chord; w
 SHORTENING_LIMIT = {False: 1e-3, True: 1e-2}  # of the length: a half wave at 2 %; where the second order ends
 USELESS = 0.1  # of the length, in the position of points
 ENOUGH = 1e-3  # shortening of a piece by bending: tips are then right to some 1e-4 of the length (docs/theory.md)
-
-# Estimates are 0.4 to 5 times the errors of falling double pendulums with deflections of 0.1 to 10 %, and the errors
-# of cantilevers under tip forces: tests/test_large_deflections.py; docs/theory.md, Limits.
-GROWTH = 1.7  # times the change of stiffness: what is wrong with deflections and moments without geometric stiffening
-SECOND_ORDER = 0.5  # of the foreshortening is wrong with geometric stiffening
 
 
 @dataclass(frozen=True)
@@ -48,6 +52,8 @@ class Bending:
             file does not tell.
         length: m, of the link.
         is_stiffened: whether geometric stiffening is in the equations.
+        missing: errors as `second_order` estimates them.
+        rotations: largest rotations of sections.
         pieces: into how many it is divided; the values are then those of its worst piece.
         is_divisible: whether the scene lets it be divided.
         buckling: how many times the loads under which the link buckles are reached, from 1 on.
@@ -60,6 +66,8 @@ class Bending:
     stiffness_change: float
     length: float
     is_stiffened: bool
+    missing: Missing
+    rotations: Rotations
     pieces: int = 1
     is_divisible: bool = False
     buckling: float = 0.0
@@ -72,16 +80,12 @@ class Bending:
     @property
     def relative_error(self) -> float:
         """Estimated error of deflections, forces and moments, of their peaks."""
-        if self.is_stiffened:
-            return SECOND_ORDER * self.shortening
-        return min(1.0, self.shortening + GROWTH * self.stiffness_change)
+        return self.missing.of_deflections
 
     @property
     def position_error(self) -> float:
         """Estimated error of positions, of the link's length."""
-        if self.is_stiffened:
-            return SECOND_ORDER * self.shortening
-        return self.shortening + GROWTH * self.stiffness_change * self.deflection
+        return self.missing.of_length
 
     @property
     def is_beyond(self) -> bool:
@@ -136,31 +140,48 @@ def enough_pieces(shortening: float, count: int) -> int:
 def bending(
     outcome: Outcome,
     links: Mapping[str, ModalBody],
-    stiffness_changes: Mapping[str, StiffnessChange],
+    loads: Mapping[str, ModalLoads],
     is_stiffened: bool,
 ) -> dict[str, Bending]:
     """Of the flexible `links` of a run, by name. They are modal bodies as their files have them."""
     wrenches = outcome.assembly.constraint_wrenches(outcome.q, outcome.lambda_)
     found = {}
     for name, link in links.items():
-        p = modes_of_file(outcome, outcome.assembly.model.body(name))
+        body, is_at_rest = outcome.assembly.model.body(name), not outcome.analysis.is_integrated
+        run = LinkInRun(modes_of_file(outcome, body), body.modal_transform, loads.get(name), is_stiffened, is_at_rest)
         forces = [np.linalg.norm(w[:, :2], axis=1) for w in wrenches.get(name, {}).values()]
-        force = np.max(forces, axis=0) if forces else np.zeros(len(p))
-        found[name] = bending_of_link(link, p, force, stiffness_changes.get(name, NO_CHANGE), is_stiffened, IN_PLANE)
+        force = np.max(forces, axis=0) if forces else np.zeros(len(run.p))
+        found[name] = bending_of_link(link, run, force, IN_PLANE)
     return found
 
 
-def bending_of_link(
-    link: ModalBody, p: Array, force: Array, change: StiffnessChange, is_stiffened: bool, axes: Sequence[int]
-) -> Bending:
-    """Of one link of modal coordinates p (T, n) of its file, across along `axes`; see `Bending`.
+class LinkInRun(NamedTuple):
+    """A link in a run: p (T, n_file) of its file, which is T times that of the equations, and its loads if known."""
 
-    `force` (T,) N: the largest at an interface.
-    """
-    deflection, rotation, shortening = shape_from_chord(link, p, axes)
+    p: Array
+    T: Array
+    loads: ModalLoads | None
+    is_stiffened: bool
+    is_at_rest: bool
+
+
+def bending_of_link(link: ModalBody, run: LinkInRun, force: Array, axes: Sequence[int]) -> Bending:
+    """Of one link, across along `axes`; see `Bending`. `force` (T,) N: the largest at an interface."""
+    deflection, rotation, shortening = shape_from_chord(link, run.p, axes)
     peaks = (deflection / link.length, rotation, shortening, force * shortening)
     w, phi, s, moment = (float(x.max(initial=0.0)) for x in peaks)
-    return Bending(w, phi, s, moment, change.largest, link.length, is_stiffened, buckling=change.buckling)
+    change = StiffnessChange() if run.loads is None else stiffness_change(run.loads)
+    rotations = largest_rotations(link, run.p)
+    if run.is_stiffened:
+        missing = missing_to_second_order(largest_displacement(link, run.p), s / link.length, rotations, change.largest)
+    elif run.loads is None:
+        missing = Missing(s / link.length, min(1.0, s / link.length))
+    else:
+        p, stations = run.p @ np.linalg.pinv(run.T).T, link.stations.translation @ run.T
+        missing = missing_to_first_order(run.loads, p, stations, link.length, is_at_rest=run.is_at_rest)
+    return Bending(
+        w, phi, s, moment, change.largest, link.length, run.is_stiffened, missing, rotations, buckling=change.buckling
+    )
 
 
 def shape_from_chord(link: ModalBody, p: Array, axes: Sequence[int]) -> tuple[Array, Array, Array]:

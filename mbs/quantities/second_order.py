@@ -1,0 +1,109 @@
+"""What the equations of one link miss of bending and twist, estimated from its modal coordinates and its loads.
+
+Loads of sizes f_j with geometric stiffness K_j change the stiffness of the modes by S = Σ f_j K_j, and move the points
+of the link by −½ pᵀK p besides Φp. Without geometric stiffening both are missing: p is off by
+Δp = −(K_ff + S)⁻¹ S p, a point by |ΦΔp − ½ pᵀK p|. With it, what is missing is of third order in the rotations θ of
+sections, θ²/3, and grows near buckling as 1/(1 − μ)², μ the largest relative change of stiffness.
+Measured against exact rods: docs/theory.md, Limits.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ...common.arrays import Array, Indices
+from ...fe_models.modal_body import ModalBody
+from .stiffness_change import ModalLoads
+
+OUTPUTS = 64  # at which Δp is found: those with the largest ‖S‖ ‖p‖, and as many with the largest ‖p‖
+IN_MOTION = 2.0  # times the static Δp: loads that come at once
+# Of a link in N pieces, from rotations in the worst one, of its length: θ³/N of bending in one plane, N φ² θ with a
+# twist φ, N θ² ϑ with bending ϑ in the other plane.
+IN_ONE_PLANE, WITH_TWIST, IN_TWO_PLANES = 0.015, 0.05, 0.4
+
+
+class Missing(NamedTuple):
+    """Estimated errors of one link: of points, of its length; of deflections and forces, of their peaks."""
+
+    of_length: float
+    of_deflections: float
+
+
+class Rotations(NamedTuple):
+    """Largest rotations of sections (rad): twist from the root on, about y and z from the chord."""
+
+    twist: float
+    bending_y: float
+    bending_z: float
+
+
+def missing_to_first_order(loads: ModalLoads, p: Array, stations: Array, length: float, *, is_at_rest: bool) -> Missing:
+    """What a link without geometric stiffening misses; infinite where its loads at rest buckle it.
+
+    p (T, n) and `stations` (k, c, n), the translations of stations, in the modes of the equations.
+    """
+    if not len(p) or not loads.f.size:
+        return Missing(0.0, 0.0)
+    at = _worst_outputs(loads, p)
+    S = np.einsum("tj,jmn->tmn", loads.f[at], loads.K)
+    stiffness = np.diag(loads.stiffness) + S
+    whole = _largest(p, stations)
+    if np.linalg.eigvalsh(stiffness)[:, 0].min() <= 0.0:  # buckles for good, or for a moment
+        return Missing(np.inf, np.inf) if is_at_rest else Missing(whole / length, 1.0)
+    change = -np.linalg.solve(stiffness, np.einsum("tmn,tn->tm", S, p[at])[:, :, None])[:, :, 0]
+    change *= 1.0 if is_at_rest else IN_MOTION
+    missed = _largest(change, stations)
+    for translation, K in loads.points:
+        moved = change @ translation.T - 0.5 * np.einsum("tm,kmn,tn->tk", p[at], K, p[at])
+        missed = max(missed, float(np.linalg.norm(moved, axis=1).max()))
+    return Missing(missed / length, min(1.0, missed / whole) if whole else 0.0)
+
+
+def missing_to_second_order(
+    displacement: float, shortening: float, rotations: Rotations, stiffness_change: float
+) -> Missing:
+    """What a link with geometric stiffening misses: of d and s, of its length, the rotations of sections, and μ."""
+    if stiffness_change >= 1.0:
+        return Missing(np.inf, np.inf)
+    of_deflections = sum(angle**2 for angle in rotations) / 3 / (1 - stiffness_change) ** 2
+    return Missing(min(of_deflections * displacement, shortening / 2), min(1.0, of_deflections))
+
+
+def missing_in_pieces(rotations: Rotations, count: int) -> Missing:
+    """What a link misses in `count` pieces with geometric stiffening, by the rotations in its worst piece."""
+    phi, less, most = rotations.twist, *sorted((rotations.bending_y, rotations.bending_z))
+    of_length = IN_ONE_PLANE * most**3 / count + count * (WITH_TWIST * phi**2 + IN_TWO_PLANES * most * less) * most
+    whole = 2 / 3 * count * most  # of a cantilever under a force, whose slope is N θ at its tip
+    return Missing(of_length, min(1.0, of_length / whole) if whole else 0.0)
+
+
+def largest_rotations(link: ModalBody, p: Array) -> Rotations:
+    """Of sections over p (T, n) of the file."""
+    if not len(p):
+        return Rotations(0.0, 0.0, 0.0)
+    stations, x = link.stations, link.stations.position[:, 0]
+    turned, moved = (np.einsum("tn,kan->tka", p, of) for of in (stations.rotation, stations.translation))
+    chord = (moved[:, -1] - moved[:, 0]) / (x[-1] - x[0])
+    off = turned - np.stack([turned[:, 0, 0], -chord[:, 2], chord[:, 1]], axis=1)[:, None]
+    return Rotations(*(float(angle) for angle in np.abs(off).max(axis=(0, 1))))
+
+
+def largest_displacement(link: ModalBody, p: Array) -> float:
+    """Of stations over p (T, n) of the file, from the undeformed link, of its length."""
+    return _largest(p, link.stations.translation) / link.length
+
+
+def _worst_outputs(loads: ModalLoads, p: Array) -> Indices:
+    """Indices of outputs whose Δp, or whose −½ pᵀK p, may be the largest."""
+    energy = np.sqrt((p**2 * loads.stiffness).sum(axis=1))
+    at = [np.argsort(-values)[:OUTPUTS] for values in (np.sqrt(loads.squares) * energy, energy)]
+    found: Indices = np.unique(np.concatenate(at))
+    return found
+
+
+def _largest(p: Array, shapes: Array) -> float:
+    """Largest displacement (m) of stations of `shapes` (k, 3, n)."""
+    moved = np.einsum("tn,kan->tka", p, shapes)
+    return float(np.linalg.norm(moved, axis=2).max(initial=0.0))

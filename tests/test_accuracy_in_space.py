@@ -1,0 +1,62 @@
+"""What a run says of its errors where links bend and twist in 3D, against exact rods."""
+
+import numpy as np
+import pytest
+from exact_rod import rigidities, tip_of
+
+import ffrobot as library
+
+E, NU, LENGTH = 70e9, 0.3, 0.5
+LEAST = 4e-8  # of the length: stretch of the links, which exact rods have not
+VARIANTS = {"off": ({}, {}), "on": ({}, {"geometric_stiffening": True}), "pieces": ({"pieces": 4}, {})}
+
+
+def drawn(seed):
+    """Height and width of a section (m), force (N) and moment (N·m) that bend it by 0.3 to 2.5 % of its length."""
+    rng = np.random.default_rng(seed)
+    height, width = np.exp(rng.uniform(np.log(4e-3), np.log(20e-3), 2))
+    GJ, EI_y, EI_z = rigidities(height, width, E, NU)
+    size = rng.uniform(0.003, 0.025) * LENGTH * rng.uniform(-1, 1, 3)
+    force = np.array([0.0, 3 * EI_z * size[0] / LENGTH**3, 3 * EI_y * size[1] / LENGTH**3])
+    critical = 4.0126 * np.sqrt(GJ * min(EI_y, EI_z)) / LENGTH**2  # lateral buckling, Timoshenko and Gere, §6.3
+    force *= min(1.0, 0.5 * critical / np.abs(force).max())
+    return height, width, force, np.array([4 * GJ * size[2] / LENGTH**2, 0.0, 0.0])
+
+
+def solved(height, width, force, moment, body, keys):
+    link = {
+        "name": "rod",
+        "material": {"youngs_modulus": E, "poissons_ratio": NU, "density": 1e-3},
+        "geometry": {
+            "kind": "beam", "length": LENGTH, "section": {"shape": "rectangle", "height": height, "width": width},
+        },
+        "mesh": {"elements": 16},
+        "reference": {"condition": "cantilever"},
+    }  # fmt: skip
+    load = dict(zip(("x", "y", "z", "mx", "my", "mz"), map(str, (*force, *moment)), strict=True))
+    scene = library.make_scene(
+        name="rod", space="spatial", gravity=[0.0, 0.0, 0.0],
+        body=[{"name": "rod", "link": link, **body}],
+        joint=[{"name": "clamp", "type": "weld", "between": ["ground", "rod.root"]}],
+        load=[{"point": "rod.tip", **load}], analysis=[{"name": "rest", "kind": "static"}], **keys,
+    )  # fmt: skip
+    results = library.solve(scene)
+    tip = results["rest/points/rod.tip/position"][-1] - [LENGTH, 0.0, 0.0]
+    return tip, results.attributes("rest/bodies/rod")
+
+
+@pytest.mark.parametrize("variant", list(VARIANTS))
+@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.filterwarnings("ignore::ffrobot.FfrobotWarning")
+def test_stated_errors_are_true_within_a_factor_of_five(variant, seed):
+    height, width, force, moment = drawn(seed)
+    exact = tip_of(rigidities(height, width, E, NU), LENGTH, force, moment)[0]
+    tip, about = solved(height, width, force, moment, *VARIANTS[variant])
+    error = float(np.linalg.norm(tip - exact))
+    for true, stated in (
+        (error / LENGTH, about["position_error"]),
+        (error / np.linalg.norm(exact), about["relative_error"]),
+    ):
+        least = LEAST if stated == about["position_error"] else LEAST * LENGTH / np.linalg.norm(exact)
+        assert true < 5 * stated + least
+        assert stated < 5 * true + least
