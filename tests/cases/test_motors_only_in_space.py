@@ -168,16 +168,6 @@ def test_drawn_arms_follow_their_paths(seed, tmp_path):
         assert np.linalg.norm(replayed - target, axis=1).max() < 2e-4 * way
 
 
-def test_zero_that_passes_through_infinity_is_named(tmp_path):
-    path, _ = drawn_arm(6, tmp_path)
-    with pytest.raises(ffrobot.InputError) as error:
-        ffrobot.solve(path)
-    message = " ".join(str(error.value).split())
-    assert 'analysis "exact"' in message
-    assert "singular coupling" in message
-    assert "take another number of modes" in message
-
-
 class StopsAfter(Watcher):
     """Stops an analysis at its n-th question, or at the first beyond a time."""
 

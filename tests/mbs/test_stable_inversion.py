@@ -11,12 +11,19 @@ from ffrobot.common.errors import InputError, SolveError
 from ffrobot.mbs import _core
 from ffrobot.mbs._core import TimeFunction
 from ffrobot.mbs.analysis.forward import run_forward
-from ffrobot.mbs.analysis.motors_only import MotorsOnly, is_minimum_phase, path_error, run_motors_only
+from ffrobot.mbs.analysis.motors_only import (
+    MotorsOnly,
+    _check_relative_degree,
+    is_minimum_phase,
+    path_error,
+    run_motors_only,
+)
 from ffrobot.mbs.analysis.replay import ActuatorSet
 from ffrobot.mbs.quantities.observation import point_motion
 from ffrobot.mbs.solve import stable_inversion
-from ffrobot.mbs.solve.internal_dynamics import equilibrium, is_unstable, linear_dynamics, zeros
+from ffrobot.mbs.solve.internal_dynamics import LinearDynamics, equilibrium, is_unstable, linear_dynamics, zeros
 from ffrobot.mbs.solve.servo import make_servo
+from ffrobot.mbs.solve.zero_dynamics import Linearisation
 
 C = np.sqrt(30.0)  # √(EI/ρA)/L² of `ritz_link`, 1/s
 
@@ -311,3 +318,38 @@ def test_failed_inversion_keeps_what_it_found(monkeypatch):
     assert np.all(np.isfinite(outcome.tau))
     with pytest.raises(SolveError, match="add damping, leave out high modes"):
         outcome.check_completed()
+
+
+def along(M, D, K, scale):
+    """The zero dynamics of two uncoupled modes with these diagonals (N, 2) at N times of a second."""
+    times = np.linspace(0.0, 1.0, len(M))
+    M, D, K = (np.einsum("ki,ij->kij", np.asarray(x, dtype=float), np.eye(2)) for x in (M, D, K))
+    return Linearisation(LinearDynamics(times, M, D, K), np.zeros((len(times), 2)), np.array(scale))
+
+
+class Named:
+    """Of an output what messages need."""
+
+    where = 'scene.toml: analysis "exact"'
+
+
+def test_zero_that_passes_through_infinity_is_named_with_its_time():
+    """The second mode's inertia changes sign at t = 0.55, where the motors lose it."""
+    t = np.linspace(0.0, 1.0, 11)
+    linear = along(np.column_stack([1 + 0 * t, 0.55 - t]), np.zeros((11, 2)), np.tile([1e4, -1e4], (11, 1)), [1e2, 1e2])
+    with pytest.raises(InputError, match=r'analysis "exact": .* between t = 0.5 and 0.6 s a singular coupling'):
+        _check_relative_degree(Named(), linear)
+
+
+@pytest.mark.parametrize(("growth", "future"), [(0.5, False), (2.0, False), (4.0, True)])
+def test_light_vibrations_that_cross_the_axis_are_of_the_past_until_they_grow_too_far(growth, future):
+    """Re s = −D/2M rises from −1, so that ∫ Re s dt = growth; ln(|s| T/100) is 2.3."""
+    t = np.linspace(0.0, 1.0, 33)
+    real = -1.0 + 2 * (growth + 1.0) * t
+    M, D = np.ones((33, 2)), np.column_stack([-2 * real, 0 * t])
+    linear = along(M, D, np.tile([1e6, -4e4], (33, 1)), [1e3, 2e2])
+    is_vibration = np.abs(linear.zeros.imag) > 1.0
+    assert is_unstable(linear.zeros[-1][is_vibration[-1]]).all()
+    assert not is_unstable(linear.zeros[0][is_vibration[0]]).any()
+    assert (linear.is_future[is_vibration] == future).all()
+    np.testing.assert_array_equal(linear.is_future[~is_vibration], linear.zeros[~is_vibration].real > 0)
