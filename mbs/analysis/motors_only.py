@@ -44,6 +44,10 @@ DECAY = 23.0  # times the slowest time constant of zeros: what is left is 1e-10
 FACTOR_STEP = 0.02  # of the search for the largest factor
 MARGIN = 0.9  # of it that is taken: at the limit hardly damped motions are excited most
 SINGULAR = 1e-13  # of M of the internal dynamics, scaled
+INFINITE = (
+    "where a zero of the modes passes through infinity: take another number of modes in the link files, or output ="
+    ' "redefined"'
+)
 REST = 1e-9  # speed of a path at rest, relative to its mean speed
 
 
@@ -194,17 +198,12 @@ def describe_zeros(linear: Linearisation) -> str:
 
 def _check_relative_degree(servo: Output, linear: Linearisation) -> None:
     """Raise `InputError` where some time of the path the motors cannot accelerate its output."""
-    values, sides = np.linalg.svd(linear.dynamics.M, compute_uv=False), np.linalg.slogdet(linear.dynamics.M)[0]
-    worst, when = int((values[:, -1] / values[:, 0]).argmin()), ""
+    values = np.linalg.svd(linear.dynamics.M, compute_uv=False)
+    worst = int((values[:, -1] / values[:, 0]).argmin())
     if values[worst, -1] < SINGULAR * values[worst, 0]:
-        when = f"at t = {linear.times[worst]:.4g} s"
-    elif (changed := np.flatnonzero(sides[1:] != sides[:-1])).size:
-        when = f"between t = {linear.times[changed[0]]:.4g} and {linear.times[changed[0] + 1]:.4g} s"
-    if when:
         raise InputError(
-            f"{servo.where}: expected motors that accelerate every component of the path, found {when} a singular"
-            " coupling, where a zero of the modes passes through infinity: take another number of modes in the link"
-            ' files, or output = "redefined"'
+            f"{servo.where}: expected motors that accelerate every component of the path, found at"
+            f" t = {linear.times[worst]:.4g} s a singular coupling, {INFINITE}"
         )
 
 
@@ -240,13 +239,16 @@ def durations(analysis: MotorsOnly, linear: Linearisation, needs_future: bool) -
 def cause_of(inversion: Inversion[S]) -> str:
     """Why no motion was found and when it was worst; where zeros change sides, no bounded one need exist."""
     linear = inversion.linearisation
-    count = linear.is_future.sum(axis=1)
-    changed = np.flatnonzero(count != count[0])
     if inversion.status not in ("inversion not converged", "mesh too coarse"):
         return ""
+    count = (linear.is_future if linear.is_light.any() else is_unstable(linear.zeros)).sum(axis=1)
+    changed = np.flatnonzero(count != count[0])
+    k = linear.singular_after
+    if inversion.status == "inversion not converged" and k is not None:
+        return f"singular coupling between t = {linear.times[k]:.4g} and {linear.times[k + 1]:.4g} s, {INFINITE}"
     if inversion.status == "mesh too coarse" or not len(changed):
         return f"{ADVICE[inversion.status]} (worst at t = {inversion.worst:.4g} s)"
-    k = changed[0]
+    k = int(changed[0])
     return (
         f"zeros change sides along the path: {count[0]} of them are in the right half plane at t = 0,"
         f" {count[k]} at t = {linear.times[k]:.4g} s, and no bounded motion need exist then: leave out axial and high"

@@ -4,7 +4,8 @@ On each interval p̈ is a polynomial through its values K at the Gauss points; p
 the breaks. At the points themselves p is what Gauss's method has for (p, ṗ) as a system of first order, A²K: then
 solutions decay, grow or vibrate as they do, whatever the size of an interval (Ascher, Mattheij and Russell 1995,
 ch. 10). With the second integral of the polynomial there (Ascher, Christiansen and Russell 1981) fast vibrations leave
-their side of the imaginary axis (van der Houwen, Sommeijer and Nguyen huu Cong 1991).
+their side of the imaginary axis (van der Houwen, Sommeijer and Nguyen huu Cong 1991), but equations may lose their
+p̈ for a moment, as where a zero passes through infinity.
 """
 
 from __future__ import annotations
@@ -33,6 +34,34 @@ class Boundary(NamedTuple):
     state: Array
 
 
+class Scheme(NamedTuple):
+    """Points c (s,) on [0, 1] and what integrals of the polynomial through values there are: once, twice."""
+
+    c: Array
+    to_powers: Array  # (s, s) values → coefficients of 1, ξ, ξ² …
+    stage_once: Array  # (s, s)
+    stage_twice: Array
+    end_once: Array  # (s,)
+    end_twice: Array
+
+
+def gauss(stages: int = STAGES, *, of_second_order: bool = False) -> Scheme:
+    """Collocation at the zeros of the Legendre polynomial (Hairer, Nørsett and Wanner, II.7).
+
+    `of_second_order`: p at the points is the second integral of the polynomial for p̈ there.
+    """
+    c = (np.polynomial.legendre.leggauss(stages)[0] + 1) / 2  # type: ignore[no-untyped-call, unused-ignore]
+    m = np.arange(stages)
+    to_powers = np.linalg.inv(c[:, None] ** m)
+    once, twice = 1 / (m + 1), 1 / ((m + 1) * (m + 2))
+    stage_once = c[:, None] ** (m + 1) * once @ to_powers
+    stage_twice = c[:, None] ** (m + 2) * twice @ to_powers if of_second_order else stage_once @ stage_once
+    return Scheme(c, to_powers, stage_once, stage_twice, once @ to_powers, twice @ to_powers)
+
+
+GAUSS, OF_SECOND_ORDER = gauss(), gauss(of_second_order=True)
+
+
 @dataclass(frozen=True)
 class Problem:
     """The equations, for N nodes at once: times (N,), p, ṗ, p̈ (N, n).
@@ -49,30 +78,7 @@ class Problem:
     size: float
     start: Boundary
     end: Boundary
-
-
-class Scheme(NamedTuple):
-    """Points c (s,) on [0, 1] and what integrals of the polynomial through values there are: once, twice."""
-
-    c: Array
-    to_powers: Array  # (s, s) values → coefficients of 1, ξ, ξ² …
-    stage_once: Array  # (s, s)
-    stage_twice: Array
-    end_once: Array  # (s,)
-    end_twice: Array
-
-
-def gauss(stages: int = STAGES) -> Scheme:
-    """Collocation at the zeros of the Legendre polynomial (Hairer, Nørsett and Wanner, II.7)."""
-    c = (np.polynomial.legendre.leggauss(stages)[0] + 1) / 2  # type: ignore[no-untyped-call, unused-ignore]
-    m = np.arange(stages)
-    to_powers = np.linalg.inv(c[:, None] ** m)
-    once, twice = 1 / (m + 1), 1 / ((m + 1) * (m + 2))
-    stage_once = c[:, None] ** (m + 1) * once @ to_powers
-    return Scheme(c, to_powers, stage_once, stage_once @ stage_once, once @ to_powers, twice @ to_powers)
-
-
-GAUSS = gauss()
+    scheme: Scheme = GAUSS
 
 
 @dataclass(frozen=True)
@@ -91,7 +97,7 @@ class Found:
 def collocate(problem: Problem, breaks: Array, guess: Callable[[Array], tuple[Array, Array, Array]]) -> Found:
     """Solve on the given breaks (N+1,) from a guess of (p, ṗ, p̈) at any times."""
     h = np.diff(breaks)
-    times = breaks[:-1, None] + h[:, None] * GAUSS.c
+    times = breaks[:-1, None] + h[:, None] * problem.scheme.c
     n = len(problem.scale)
     derivatives = [x.reshape(*times.shape, n, n) for x in problem.derivatives(times.ravel())]
     linear = _LinearSystem(problem, breaks, derivatives)
@@ -100,7 +106,7 @@ def collocate(problem: Problem, breaks: Array, guess: Callable[[Array], tuple[Ar
     previous, converged, iteration, worst = np.inf, False, 0, float(breaks[0])
     while not converged and iteration < MOST_ITERATIONS:
         iteration += 1
-        stages = _stages(h, p, v, K)
+        stages = _stages(problem.scheme, h, p, v, K)
         r = problem.residual(times.ravel(), *(x.reshape(-1, n) for x in (*stages, K))).reshape(K.shape)
         if not np.all(np.isfinite(r)):
             worst = float(times[~np.isfinite(r).all(axis=2)][0])
@@ -114,23 +120,23 @@ def collocate(problem: Problem, breaks: Array, guess: Callable[[Array], tuple[Ar
         if not np.isfinite(size):
             break
         previous = size
-    return Found(_curve(breaks, p, v, K), bool(converged), iteration, worst)
+    return Found(_curve(problem.scheme, breaks, p, v, K), bool(converged), iteration, worst)
 
 
-def _stages(h: Array, p: Array, v: Array, K: Array) -> tuple[Array, Array]:
+def _stages(scheme: Scheme, h: Array, p: Array, v: Array, K: Array) -> tuple[Array, Array]:
     """States p and ṗ (N, s, n) at the Gauss points, from their values at the breaks and K (N, s, n)."""
     step = h[:, None, None]
-    once, twice = (np.einsum("ij,Njn->Nin", a, K) for a in (GAUSS.stage_once, GAUSS.stage_twice))
-    p_stages = p[:-1, None] + GAUSS.c[:, None] * step * v[:-1, None] + step**2 * twice
+    once, twice = (np.einsum("ij,Njn->Nin", a, K) for a in (scheme.stage_once, scheme.stage_twice))
+    p_stages = p[:-1, None] + scheme.c[:, None] * step * v[:-1, None] + step**2 * twice
     return p_stages, v[:-1, None] + step * once
 
 
-def _curve(breaks: Array, p: Array, v: Array, K: Array) -> PPoly:
+def _curve(scheme: Scheme, breaks: Array, p: Array, v: Array, K: Array) -> PPoly:
     """Coefficients in powers of t − left break, highest first."""
     from scipy.interpolate import PPoly
 
     h = np.diff(breaks)[:, None]
-    powers = np.einsum("mi,Nin->mNn", GAUSS.to_powers, K)
+    powers = np.einsum("mi,Nin->mNn", scheme.to_powers, K)
     integrated = [x / ((m + 1) * (m + 2) * h**m) for m, x in enumerate(powers)]
     return PPoly(np.array([*integrated[::-1], v[:-1], p[:-1]]), breaks)
 
@@ -142,15 +148,15 @@ class _LinearSystem:
         from scipy.linalg.lapack import dgbtrf
 
         M, D, K = derivatives
-        self.problem, self.h = problem, np.diff(breaks)
+        self.problem, self.h, scheme = problem, np.diff(breaks), problem.scheme
         N, s, n = M.shape[:3]
         h = self.h[:, None, None, None, None]
-        E = h * GAUSS.stage_once[:, None, :, None] * D[:, :, :, None] + h**2 * (
-            GAUSS.stage_twice[:, None, :, None] * K[:, :, :, None]
+        E = h * scheme.stage_once[:, None, :, None] * D[:, :, :, None] + h**2 * (
+            scheme.stage_twice[:, None, :, None] * K[:, :, :, None]
         )  # (N, s, n, s, n)
         for i in range(s):
             E[:, i, :, i] += M[:, i]
-        self.G = np.concatenate([K, D + GAUSS.c[:, None, None] * h[..., 0] * K], axis=3).reshape(N, s * n, 2 * n)
+        self.G = np.concatenate([K, D + scheme.c[:, None, None] * h[..., 0] * K], axis=3).reshape(N, s * n, 2 * n)
         self.E_inverse = np.linalg.inv(E.reshape(N, s * n, s * n))
         self.S = np.concatenate([problem.scale, np.ones(n)])
         response = -(self.E_inverse @ self.G).reshape(N, s, n, 2 * n)
@@ -166,7 +172,8 @@ class _LinearSystem:
     def _at_end(self, p: Array, v: Array, K: Array) -> tuple[Array, Array]:
         """States p and ṗ (N, n, …) at the ends of intervals for p, ṗ at their starts and K (N, s, n, …)."""
         h = self.h.reshape(-1, *(1 for _ in K.shape[2:]))
-        once, twice = (np.einsum("i,Ni...->N...", b, K) for b in (GAUSS.end_once, GAUSS.end_twice))
+        scheme = self.problem.scheme
+        once, twice = (np.einsum("i,Ni...->N...", b, K) for b in (scheme.end_once, scheme.end_twice))
         return p + h * v + h**2 * twice, v + h * once
 
     def _banded(self, blocks: Array) -> Array:

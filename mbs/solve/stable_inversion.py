@@ -19,7 +19,7 @@ import numpy as np
 from ...common.arrays import Array, Booleans, ComplexArray, as_floats
 from ...common.errors import SolveError
 from .. import _core
-from .collocation import GAUSS, Boundary, Problem, collocate
+from .collocation import GAUSS, OF_SECOND_ORDER, Boundary, Problem, collocate
 from .internal_dynamics import LinearDynamics, Output, Stopped, equilibrium, first_order, linear_dynamics
 from .zero_dynamics import Linearisation
 
@@ -94,6 +94,7 @@ def invert(
     problem = Problem(
         servo.residuals, linear.dynamics, servo.scale,
         max(TINY, float(np.abs(servo.scale * linear.shape).max())), start, finish,
+        GAUSS if linear.is_light.any() and linear.singular_after is None else OF_SECOND_ORDER,
     )  # fmt: skip
     force = max(TINY, float(np.abs(servo.scale**2 * linear.shape).max()))
     solver = _Solver(problem, tolerance * force, progress)

@@ -73,6 +73,13 @@ class Linearisation:
         return light
 
     @property
+    def singular_after(self) -> int | None:
+        """Which of the times is the last before a zero passes through infinity, where det M changes its sign."""
+        sides = np.linalg.slogdet(self.dynamics.M)[0]
+        changed = np.flatnonzero(sides[1:] != sides[:-1])
+        return int(changed[0]) if changed.size else None
+
+    @property
     def times(self) -> Array:
         """From 0 to the end of the path (N,)."""
         return self.dynamics.times
