@@ -39,9 +39,9 @@ def top_at(time: Array, values: Array, k: int) -> tuple[float, float]:
 
 
 def shares(time: Array) -> Array:
-    """What each of the times (T,) stands for of all, by the trapezoidal rule; 1 of a single one."""
-    if len(time) == 1:
-        return np.ones(1)
+    """What each of the times (T,) stands for of all, by the trapezoidal rule; 1 of a single one, nothing of none."""
+    if len(time) < 2:
+        return np.ones(len(time))
     steps = np.diff(time)
     found: Array = (np.append(steps, 0.0) + np.append(0.0, steps)) / (2 * (time[-1] - time[0]))
     return found

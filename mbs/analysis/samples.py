@@ -99,8 +99,9 @@ def path_times(times: Array, paths: Iterable[Path], end: float) -> Array:
             found = np.union1d(found, breaks[(breaks > times[0]) & (breaks < times[-1])])
     moving = (found >= 0.0) & (found <= end)
     inside = found[moving]
-    for target in (target for path in paths for target in targets_of(path)):
-        inside = _resolved(target, inside)
+    if len(inside) > 1:  # a run may end before the path begins
+        for target in (target for path in paths for target in targets_of(path)):
+            inside = _resolved(target, inside)
     return np.union1d(found[~moving], inside)
 
 

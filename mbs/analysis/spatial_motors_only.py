@@ -50,6 +50,8 @@ def run_spatial_motors_only(context: SpatialContext, analysis: MotorsOnly) -> Sp
     times = output_times(analysis.end, analysis.output_step, pre, post)
     times = times[times <= inversion.curve.x[-1] + 1e-9 * analysis.end]  # what an integration reached
     run = _run(analysis, model, inversion, times)
+    if not len(run.time):
+        raise SolveError(f"{servo.where}: no motion was found ({inversion.status}): {cause_of(inversion)}")
     seconds = time.perf_counter() - began
 
     @cache

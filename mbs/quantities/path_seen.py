@@ -17,8 +17,8 @@ STILL = 0.5  # of a run, in which way points are over: the other part is rest
 
 def path_warnings(analysis: object, times: Array, paths: Iterable[Path]) -> Iterator[str]:
     """Of an `analysis` with outputs at `times` (T,), s, that follows `paths`: what these hide, a text each."""
-    if not isinstance(analysis, TimedAnalysis) or len(times) < 2:
-        return
+    if not isinstance(analysis, TimedAnalysis) or np.count_nonzero((times >= 0.0) & (times <= analysis.end)) < 2:
+        return  # it ended before the path began
     for path in paths:
         yield from _outside(path, analysis)
         yield from _unseen(path, times, analysis)
