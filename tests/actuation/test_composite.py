@@ -15,9 +15,8 @@ def test_composite_section_with_few_modes(height, face, modes):
     On either face a volt bends the link the same way.
     """
     expected = exact(height, 2 if face == "both" else 1)
-    assert tip(height, face, modes) == pytest.approx(
-        expected, rel=1e-7 if modes.get("attachment_modes", True) else 2e-5
-    )
+    close = 1e-6 if "family" in modes else 1e-7 if modes.get("attachment_modes", True) else 2e-5  # stretch is stiff
+    assert tip(height, face, modes) == pytest.approx(expected, rel=close)
 
 
 def test_without_the_stiffness_it_is_the_paper_s_formula():

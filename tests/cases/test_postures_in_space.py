@@ -167,9 +167,7 @@ def test_an_arm_whose_wrist_comes_into_line_stops_there(tmp_path, ffrobot):
     assert 'a singular posture: motions of "q4", "q6" against each other' in done.stderr
     status, warnings, angle = of_arm(path)
     assert status == "diverged"
-    (warning,) = warnings
-    found = re.match(r"at t = (\S+) s a singular posture", warning)
-    assert found
+    (found,) = filter(None, (re.match(r"at t = (\S+) s a singular posture", warning) for warning in warnings))
     assert abs(float(found[1]) - 0.5) < 0.1  # between two steps
     assert np.all(np.diff(angle) < 0)
 

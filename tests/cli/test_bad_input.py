@@ -37,7 +37,7 @@ def test_mistake_in_a_link_of_its_own(two_link_copy, refused, link):
         (("info", "scene.toml"), "scene.toml: expected a modal body file or a results file, found not"),
         (("info", "other.h5"), "other.h5: expected a modal body file or a results file, found format None"),
         (("plot", "nowhere.h5"), "nowhere.h5: expected a results file, found no such file"),
-        (("plot", "scene.toml"), "scene.toml: expected a results file, found not"),
+        (("plot", "scene.toml"), "scene.toml: expected a results file, found a scene or link file: solve it first"),
         (("plot", "other.h5"), "other.h5: expected a results file"),
         (("report", "other.h5"), "other.h5: expected a results file"),
         (("report", "other.h5", "-o", "scene.toml"), 'scene.toml: output: expected a name that ends in ".html"'),

@@ -158,15 +158,6 @@ def test_controllers_that_fail(two_link_copy, ffrobot, code, named):
     assert named in message
 
 
-def test_extreme_numbers_name_the_link(two_link_copy, ffrobot):
-    """Valid each for itself, but no eigenvalues can be found."""
-    folder = two_link_copy()
-    done = ffrobot("link", "link1.toml", cwd=folder)
-    assert done.returncode == 1, done.stderr
-    (message,) = done.stderr.splitlines()
-    assert message.startswith("ffrobot: link1.toml: ")
-
-
 def test_sample_of_the_campaign(tmp_path):
     """tests/campaigns/mutations.py, a few changes of one case; others each time it is run by hand."""
     script = Path(__file__).parents[1] / "campaigns" / "mutations.py"

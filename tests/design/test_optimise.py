@@ -163,7 +163,7 @@ def test_places_of_patches(write, tmp_path):
         minimise="peak pzt.beam.required_voltage", processes=2,
     )  # fmt: skip
     assert found.values == pytest.approx(best)
-    assert found.value == pytest.approx(-float(voltage), rel=1e-6)  # the criterion is to be largest
+    assert found.value == pytest.approx(-float(voltage), rel=1e-3)  # the criterion, to be largest, is that of outputs
 
 
 def test_shortest_path_time(write):

@@ -164,7 +164,7 @@ def test_verdict_of_a_loop(slider_crank_3d):
         verdict = results.verdict["inverse"]
         largest = np.abs(results["inverse/joints/crank/moment"]).max()
     assert list(verdict.motors) == ["crank"]
-    assert verdict.motors["crank"].moment == pytest.approx(largest, rel=1e-12)
+    assert largest <= verdict.motors["crank"].moment < 1.01 * largest  # between outputs it may be larger
     assert verdict.deflection[1] == "rod.mid"
 
 
