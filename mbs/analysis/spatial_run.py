@@ -100,12 +100,12 @@ class SpatialRun:
     def rows(self, chosen: slice | Sequence[int]) -> SpatialRun:
         """These outputs alone."""
         of_time = {name: getattr(self, name) for name in OF_TIME}
-        along_joints = {
-            name: {joint: values[chosen] for joint, values in getattr(self, name).items()}
-            for name in ("commanded", "driving")
-        }
-        of_time = {name: values[chosen] for name, values in of_time.items() if values is not None}
-        return replace(self, **of_time, **along_joints)
+        return replace(
+            self,
+            commanded={joint: values[chosen] for joint, values in self.commanded.items()},
+            driving={joint: values[chosen] for joint, values in self.driving.items()},
+            **{name: values[chosen] for name, values in of_time.items() if values is not None},
+        )
 
     def among(self, between: SpatialRun) -> SpatialRun:
         """With the rows of the same run at times between its outputs."""
