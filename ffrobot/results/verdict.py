@@ -322,4 +322,4 @@ def _of(peak: float, limit: float) -> str:
 
 
 def _place(value: float, unit: str, where: str, time: float) -> str:
-    return f"{value:.4g} {unit}: {where}, t = {time:g} s"
+    return f"{value:.4g} {unit}: {where}, t = {time:.4g} s"
