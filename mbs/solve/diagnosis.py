@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
+
 import numpy as np
 
 from ...common.arrays import Array
+from .._core import TimeFunction
 from ..model.planar_tree import PlanarTree
 from ..model.system import MechanismSystem
 from .path_checks import JUMP
@@ -24,7 +27,7 @@ def find_cause(assembly: MechanismSystem, t: float, state: State) -> str:
     return (
         _not_a_number(assembly, t, state)
         or _bent(assembly, state.q)
-        or _load_jumps(assembly, t)
+        or load_jump(_loads(assembly), t)
         or _singular(assembly, t, state.q)
     )
 
@@ -38,11 +41,14 @@ def _not_a_number(assembly: MechanismSystem, t: float, state: State) -> str:
     return ""
 
 
-def _load_jumps(assembly: MechanismSystem, t: float) -> str:
-    """Whether a load jumps there: its size just after t is not what its value and slope just before t make of it."""
+def _loads(assembly: MechanismSystem) -> Iterator[tuple[str, TimeFunction]]:
+    yield from ((row.label, size) for row, size in assembly.model.loads)
+    yield from ((f'load of the patches of "{load.body}"', load.magnitude) for load in assembly.model.modal_loads)
+
+
+def load_jump(loads: Iterable[tuple[str, TimeFunction]], t: float) -> str:
+    """Which of the loads, each with its label, jumps at t: its size just after t does not follow from that before."""
     dt = 1e-9 * max(t, 1e-9)
-    loads = [(row.label, size) for row, size in assembly.model.loads]
-    loads += [(f'load of the patches of "{load.body}"', load.magnitude) for load in assembly.model.modal_loads]
     for label, size in loads:
         before, after = (size(s) for s in (t - dt, t + dt))
         if not np.isfinite(after).all():

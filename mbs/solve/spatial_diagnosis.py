@@ -10,8 +10,8 @@ from .. import _core
 from .._core import TimeFunction
 from ..model.spatial_system import SpatialSystem
 from ..scene.analysis import IntegratedAnalysis
+from .diagnosis import load_jump
 from .integrators import EXPLICIT, Choice, beyond_order, unmet
-from .path_checks import JUMP
 from .spatial_integrators import TOO_STIFF, fastest_friction
 from .state import State
 
@@ -24,7 +24,7 @@ def cause_of_short_steps(
     """A sentence with advice, the more certain causes first: loads, links bent too far, friction, the integrator."""
     t, at = run.time_reached, State(*np.split(np.array(run.last), [system.model.tree.n_q]))
     return (
-        _load_jumps(system, t)
+        load_jump(_loads(system), t)
         or _bent(system, at)
         or _friction(system, analysis, choice, at)
         or beyond_order(choice, analysis)
@@ -36,19 +36,6 @@ def _loads(system: SpatialSystem) -> Iterator[tuple[str, TimeFunction]]:
     for load in system.model.scene.load:
         for name, size in load.components.items():
             yield f'load on "{load.point or load.joint or load.pzt}", {name},', size
-
-
-def _load_jumps(system: SpatialSystem, t: float) -> str:
-    """Whether a load jumps there: its size just after t is not what its value and slope just before t make of it."""
-    dt = 1e-9 * max(t, 1e-9)
-    for label, size in _loads(system):
-        before, after = (np.array(size(s)) for s in (t - dt, t + dt))
-        if not np.isfinite(after).all():
-            return f"{label} has no finite value, slope or curvature after that time"
-        change = after[0] - before[0] - dt * (before[1] + after[1])
-        if abs(change) > JUMP * max(abs(before[0]), abs(after[0])):
-            return f"{label} jumps from {before[0]:.6g} to {after[0]:.6g} there: round it off, or loosen the tolerance"
-    return ""
 
 
 def _bent(system: SpatialSystem, at: State) -> str:

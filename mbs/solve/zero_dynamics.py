@@ -49,7 +49,7 @@ class Linearisation:
         places = self._followed
         s, T = np.take_along_axis(self.zeros, places, axis=1), float(self.times[-1])
         most = np.maximum(GROWTH, np.log(np.maximum(np.abs(s).mean(axis=0) * T / 100, TINY)))
-        is_light = (np.abs(s.real) <= LIGHT * np.abs(s)).any(axis=0)
+        is_light = np.take_along_axis(self.is_light, places, axis=1).any(axis=0)
         future = np.where(is_light, trapezoid(s.real, self.times, axis=0) > most, is_unstable(s[0]))
         found = np.zeros(s.shape, dtype=bool)
         np.put_along_axis(found, places, np.broadcast_to(future, s.shape), axis=1)

@@ -5,19 +5,11 @@ import tomllib
 
 import pytest
 import tomli_w
+from loops import OWN_CONTROLLER
 
 import ffrobot as program
 from ffrobot.common.function_content import digest_of_function
 
-LOOP = """
-[[analysis]]
-name = "loop"
-kind = "closed-loop"
-actuation = "inverse"
-sample_time = 0.001
-controller = [{ kind = "python", python = "own.py:controller" }]
-sensor = [{ joint = "O" }]
-"""
 HERE = "import os, sys\nsys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), {!r}))\n"
 CONTROLLER = """
 def controller(setup):
@@ -51,7 +43,7 @@ def folder(case_copy):
         file, head, inside = WAYS[way]
         folder = case_copy("two_link").parent
         text = (folder / "scene.toml").read_text(encoding="utf-8").replace("end = 1.0", "end = 0.004")
-        (folder / "scene.toml").write_text(text + LOOP, encoding="utf-8")
+        (folder / "scene.toml").write_text(text + OWN_CONTROLLER, encoding="utf-8")
         (folder / "own.py").write_text(
             "import numpy as np\n" + head + CONTROLLER.format(inside=inside), encoding="utf-8"
         )
