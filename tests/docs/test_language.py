@@ -1,0 +1,49 @@
+"""What users read stays in plain words: private expressions, long sentences and history may become fewer, not more.
+
+If it fails: `python docs/language.py NAME` shows the sentences of a file, `python docs/language.py` writes the counts.
+"""
+
+import sys
+from pathlib import Path
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parents[2] / "docs"))
+
+import language
+
+TEXTS = language.texts()
+
+
+@pytest.mark.parametrize("name", TEXTS)
+def test_no_more_private_words_history_and_long_sentences(name):
+    """Pages without counts begin with none."""
+    before = language.read_counts().get(name, language.Count(0, 0, 0, 0))
+    now = language.count(TEXTS[name])
+    assert now.private <= before.private, sorted(set(language.found(TEXTS[name])))
+    assert now.history <= before.history
+    assert now.long <= before.long, [
+        text for text in language.sentences(TEXTS[name]) if language.length(text) > language.LONG
+    ]
+
+
+def test_few_sentences_of_documents_are_long():
+    """At most 6 % of them; messages and help have none to spare, either."""
+    counts = [language.count(text) for text in TEXTS.values()]
+    assert sum(count.long for count in counts) <= 0.06 * sum(count.sentences for count in counts)
+
+
+def test_words_are_found_in_prose_alone():
+    code = "    is told in code\n\n```\nis told\n```\n"
+    text = f"A spring\nis told.\n\n{code}The key `is told` and [links](is told.md) stay.\n\n* It no longer is.\n"
+    count = language.count(language.prose(text))
+    assert (count.private, count.history, count.sentences) == (1, 1, 3)
+
+
+@pytest.mark.parametrize(("words", "long"), [(35, 0), (36, 1)])
+def test_a_sentence_of_more_than_35_words_is_long(words, long):
+    assert language.count(language.prose("One. " + "word " * (words - 1) + "end.")).long == long
+
+
+def test_every_expression_has_a_replacement():
+    assert all(plain for _, plain in language.vocabulary())
