@@ -1,8 +1,10 @@
-"""The version of the program, as installed."""
+"""The version of the program, as installed, and of its code."""
 
 from __future__ import annotations
 
+import hashlib
 from functools import cache
+from pathlib import Path
 
 
 @cache
@@ -11,3 +13,12 @@ def program_version() -> str:
     from importlib.metadata import version
 
     return version("ffrobot")
+
+
+@cache
+def digest_of_code(folder: Path) -> str:
+    """SHA-256 of the Python files below `folder`: what another state of the program has made is not up to date."""
+    digest = hashlib.sha256()
+    for file in sorted(folder.rglob("*.py")):
+        digest.update(f"{file.relative_to(folder).as_posix()}\0".encode() + file.read_bytes() + b"\0")
+    return digest.hexdigest()

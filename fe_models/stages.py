@@ -15,40 +15,29 @@ import hashlib
 import json
 from collections.abc import Mapping
 from dataclasses import asdict, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ..mesh.kept_parts import geometry_content
+from ..common.version import digest_of_code
+from ..mesh.kept_parts import digest_of_mesh_code, geometry_content
 from .link_records import FAMILIES, BeamLink, Link, SolidLink, read_measured
 from .modal_body import ModalBody, StressPoint
 from .modal_body.damping import damping_ratio
 from .modal_body.lumped_masses import lumps
 from .modal_body.measured import as_computed, with_measured
-from .modal_body_file import FORMAT_VERSION
-
-# To be raised whenever the same link file gives other numbers than before, or further ones.
-ALGORITHM_VERSION = {"beam": 7, "solid": 7}
-
-# Likewise, of what files of links with stresses hold of these: 1 without static ones of unit loads.
-STRESS_VERSION = 3
-
-# And of links by Timoshenko's theory: 1 without the geometric stiffness of sections that turn.
-SECTIONS_VERSION = 2
 
 _AFTER_THE_MODES = ("name", "damping", "stress", "measured")
 
 
 def input_hash(link: Link) -> str:
-    """SHA-256 of what a modal body depends on: the link as checked, defaults filled in, and the program's algorithm.
+    """SHA-256 of what a modal body depends on: the link as checked, defaults filled in, and the code that computes it.
 
     A part's file and a table of measured modes count by their content. Comments, the order of keys, 1 for 1.0, dates
     of files change nothing.
     """
-    content = _content(link)
-    if link.stress.points or link.stress.surface:
-        content["stresses"] = STRESS_VERSION
-    return _digest(content)
+    return _digest(_content(link))
 
 
 def modes_hash(link: Link) -> str:
@@ -58,19 +47,15 @@ def modes_hash(link: Link) -> str:
 
 def _content(link: Link) -> dict[str, Any]:
     record = link.model_dump(mode="json")
-    if isinstance(link, BeamLink) and link.model.theory == "timoshenko":
-        record["sections"] = SECTIONS_VERSION
     if isinstance(link, SolidLink):
         record["geometry"] = geometry_content(link.geometry)
-    del record["measured"]  # links without it keep the hash that they had before it was a key
     if link.measured is not None:
         record["measured"] = [asdict(row) for row in read_measured(link.measured.table, FAMILIES)]
     return record
 
 
 def _digest(record: Mapping[str, Any]) -> str:
-    algorithm = ALGORITHM_VERSION[record["geometry"]["kind"]]
-    content = {"format": FORMAT_VERSION, "algorithm": algorithm, "link": record}
+    content = {"link": record, "fe_models": digest_of_code(Path(__file__).parent), "mesh": digest_of_mesh_code()}
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
 

@@ -20,17 +20,20 @@ from platformdirs import user_cache_path
 
 from ..common.errors import SolveError
 from ..common.files import write_atomically
+from ..common.version import digest_of_code
 from .cells import CELLS, CellName
 from .included import files_of
 from .part_mesh import PartMesh
 from .records import Outlines, PlaceRecord, SolidGeometry, SolidMeshRecord
 
-# To be raised whenever the same keys make another mesh.
-MESH_VERSION = 2
-
 _ARRAYS = ("points", "cells", "cell_tag", "facets", "facet_tag")
 _NAMES = ("regions", "faces")
 _OF_PLACES = set(PlaceRecord.model_fields)  # what else a record of an interface holds has no influence on the mesh
+
+
+def digest_of_mesh_code() -> str:
+    """SHA-256 of the code that makes meshes and reads them."""
+    return digest_of_code(Path(__file__).parent)
 
 
 def geometry_content(geometry: SolidGeometry) -> dict[str, Any]:
@@ -52,7 +55,7 @@ def kept_path(
 ) -> Path:
     """Where in the cache the mesh of a part is, or would be."""
     content = {
-        "version": MESH_VERSION,
+        "code": digest_of_mesh_code(),
         "geometry": geometry_content(geometry),
         "suffix": geometry.file.suffix.lower() if geometry.file is not None else "",
         "mesh": record.model_dump(mode="json"),

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from ffrobot.common.checksum import seal
+from ffrobot.common.version import digest_of_code
 from ffrobot.fe_models.link import cached_modal_body, make_link
 from ffrobot.fe_models.link_file import read_link
 from ffrobot.fe_models.stages import input_hash, modes_hash, restated
@@ -115,6 +116,23 @@ def test_files_without_the_hash_of_their_modes_are_still_read(link_file, cache):
     seal(made)
     assert not make_link(path).computed
     assert make_link(link_file(replace={'"link1"': '"arm"'}), path.with_suffix(".h5")).reused == ""
+
+
+def test_what_another_state_of_the_program_made_is_not_up_to_date(link_file, cache, tmp_path, monkeypatch):
+    """Modes of links in mm were once read from the cache that the program, since mended, had made too few of."""
+    code = tmp_path / "code" / "beam"
+    code.mkdir(parents=True)
+    (code / "beam.py").write_text("TOLERANCE = 1e-10\n")
+    before = digest_of_code(code.parent)
+    (code / "beam.py").write_text("TOLERANCE = 1e-9\n")
+    digest_of_code.cache_clear()
+    assert digest_of_code(code.parent) != before
+
+    cached_modal_body(link_file())
+    assert not cached_modal_body(link_file()).computed
+    monkeypatch.setattr("ffrobot.fe_models.stages.digest_of_code", lambda _: before)
+    again = cached_modal_body(link_file())
+    assert (again.computed, again.reused) == (True, "")
 
 
 def test_solids_keep_their_mesh_and_their_modes(solid, cache):
