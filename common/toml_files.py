@@ -20,13 +20,20 @@ _KINDS: Mapping[str, tuple[str, str]] = {
 
 def read_text(path: Path, kind: str) -> str:
     """The text of the file at `path`, UTF-8 with or without a byte order mark; messages call it `kind`."""
-    check_regular(path)
     try:
-        return path.read_text(encoding="utf-8-sig")
-    except FileNotFoundError:
-        raise InputError(f"{path}: {kind} not found") from None
+        text = read_bytes(path, kind).decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise InputError(f"{path}: cannot read the {kind}: {error}") from None
+    return text.replace("\r\n", "\n").replace("\r", "\n")
+
+
+def read_bytes(path: Path, kind: str) -> bytes:
+    """The content of the file at `path`; messages call it `kind`."""
+    check_regular(path)
+    try:
+        return path.read_bytes()
+    except FileNotFoundError:
+        raise InputError(f"{path}: {kind} not found") from None
     except (OSError, ValueError) as error:  # no name of a file at all
         raise InputError(f"{path}: cannot read the {kind}: {getattr(error, 'strerror', None) or error}") from None
 

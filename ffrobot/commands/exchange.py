@@ -11,6 +11,8 @@ from ..common.errors import InputError
 from ..present.logs import FILE, logging_options
 from .protect import protect
 
+POSITIVE = click.FloatRange(0.0, min_open=True)
+
 
 @click.command(name="import")
 @click.argument("file", metavar="ROBOT.urdf|BODY.SID_FEM|BODY.fem", type=FILE)
@@ -25,8 +27,35 @@ from .protect import protect
 )
 @click.option("--force", is_flag=True, help="Replace files that are there.")
 @click.option("--fix-inertia", is_flag=True, help="Change inertias that no body has, as little as can be, and say so.")
+@click.option(
+    "--density",
+    metavar="KG/M3",
+    type=POSITIVE,
+    help="Estimate masses of links without <inertial> from their shapes, filled with this density.",
+)
+@click.option(
+    "--radius",
+    metavar="M",
+    type=POSITIVE,
+    help="With --density: of cylinders along links whose shapes are missing.",
+)
+@click.option(
+    "--keep-rest",
+    is_flag=True,
+    help="Keep the mass that a link has beyond its flexible link file, as a payload on the flexible link.",
+)
 @logging_options
-def import_(file: Path, output: Path, flexible: tuple[str, ...], *, force: bool, fix_inertia: bool) -> None:
+def import_(
+    file: Path,
+    output: Path,
+    flexible: tuple[str, ...],
+    density: float | None,
+    radius: float | None,
+    *,
+    force: bool,
+    fix_inertia: bool,
+    keep_rest: bool,
+) -> None:
     """Make a scene in space of a robot description (URDF), or a modal body of one of other programs.
 
     DIR/scene.toml gets bodies and joints: every link rigid, as its <inertial> says, unless --flexible names a link
@@ -39,17 +68,26 @@ def import_(file: Path, output: Path, flexible: tuple[str, ...], *, force: bool,
     from ..exchange.export import READERS, import_body
     from ..exchange.present import print_export, print_import
     from ..exchange.urdf.import_urdf import import_urdf
+    from ..exchange.urdf.shape_masses import Filling
     from ..present.summary import summary_console
 
     links = _links(flexible)
     if file.suffix.lower() in READERS:
-        if links or force or fix_inertia:
-            raise InputError(f"{file}: expected --flexible, --force and --fix-inertia with a URDF only, found a body")
+        if links or force or fix_inertia or density or radius or keep_rest:
+            raise InputError(f"{file}: expected a URDF for the options beside --output, found a body")
         protect([file])
         print_export(import_body(file, output), summary_console())
         return
+    if radius and density is None:
+        raise InputError("--radius: expected --density with it, found none")
+    if keep_rest and not links:
+        raise InputError("--keep-rest: expected --flexible with it, found none")
     protect([file, *links.values()])
-    print_import(import_urdf(file, output, links, force=force, fix_inertia=fix_inertia), summary_console())
+    filling = None if density is None else Filling(density, radius)
+    imported = import_urdf(
+        file, output, links, force=force, fix_inertia=fix_inertia, filling=filling, keep_rest=keep_rest
+    )
+    print_import(imported, summary_console())
 
 
 def _links(pairs: tuple[str, ...]) -> Mapping[str, Path]:

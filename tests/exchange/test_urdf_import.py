@@ -133,7 +133,7 @@ WRONG = {
     "another root": ("<sdf/>", "whose root is <robot>, found <sdf>"),
     "xacro": (
         '<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro"><xacro:include filename="a"/></robot>',
-        "found <xacro:include>: run xacro first",
+        "found <xacro:include>: run `xacro FILE.xacro > ROBOT.urdf` first",
     ),
     "no links": (robot(), "expected at least one <link>, found none"),
     "two roots": (robot(BASE, ARM), 'expected one link that no joint carries, found 2: "base", "arm"'),

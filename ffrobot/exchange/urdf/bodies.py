@@ -100,7 +100,8 @@ def _without_mass(robot: Robot) -> str:
         return f'expected a link with mass that moves on "{shown(robot.root)}", found none'
     return (
         "expected links with mass, found no <inertial> with one in the whole file, which is made to be looked at: add"
-        " <inertial> to its links, from CAD or a data sheet, or take a description of the robot for dynamics"
+        " <inertial> to its links, from CAD or a data sheet, take a description of the robot for dynamics, or estimate"
+        " masses by --density"
     )
 
 
@@ -141,7 +142,7 @@ def _with_mass(
         raise InputError(
             "\n".join(
                 f"{body.label}: expected a mass of a body that moves and carries others, found none: give it an"
-                " <inertial>, or make the joint that carries it fixed"
+                " <inertial>, make the joint that carries it fixed, or estimate masses by --density"
                 for body in bare
             )
         )
@@ -172,7 +173,7 @@ def _fixed(bodies: list[Body]) -> list[str]:
     remarks = []
     for body in bodies:
         before = body.inertial.inertia
-        if body.flexible or (after := least_change(before)) is before or _is_possible(before):
+        if body.flexible or (after := least_change(before)) is before or is_possible(before):
             continue
         body.inertial = replace(body.inertial, inertia=after)
         then, now = (", ".join(f"{moment:.6g}" for moment in np.linalg.eigvalsh(J)) for J in (before, after))
@@ -184,7 +185,8 @@ def _fixed(bodies: list[Body]) -> list[str]:
     return remarks
 
 
-def _is_possible(inertia: Array) -> bool:
+def is_possible(inertia: Array) -> bool:
+    """Whether no principal moment is larger than the sum of the others, but for round-off."""
     moments = np.linalg.eigvalsh(inertia)
     return bool(moments[2] <= moments[0] + moments[1] + ROUNDING * np.abs(inertia).max())
 
@@ -198,7 +200,7 @@ def _check_inertias(bodies: list[Body]) -> None:
             xx, yy, zz = (tuple(row) for row in as_rows(body.inertial.inertia))
             check_inertia((xx, yy, zz), SMALLEST)
         except ValueError as error:
-            way = "" if _is_possible(body.inertial.inertia) else ": --fix-inertia makes the least change"
+            way = "" if is_possible(body.inertial.inertia) else ": --fix-inertia makes the least change"
             found.append(f"{body.label}: <inertia>: {error}{way}")
     if found:
         raise InputError("\n".join(found))

@@ -21,10 +21,10 @@ from ...scene.any_space import load_any_scene
 from ...scene.spatial import SpatialScene
 from .names import Names
 from .not_carried import not_carried
-from .robot import Inertial, Mimic, Numbers3, Origin, Robot, UrdfJoint, UrdfLink
+from .robot import Inertial, Mimic, Numbers3, Origin, Primitive, Robot, UrdfJoint, UrdfLink
 from .scene import rpy_of
 from .steps import Step, follows, steps_outward
-from .visuals import SLENDER, Visual, bars, beam_visuals
+from .visuals import SLENDER, bars, beam_visuals
 from .write import urdf_text
 
 logger = logging.getLogger(__name__)
@@ -70,7 +70,7 @@ class UrdfOfScene:
         self._joint_names = Names(joint.name for joint in scene.joint)
         self._links = {GROUND: UrdfLink(GROUND, None)}
         self._joints = dict[str, UrdfJoint]()
-        self.visuals = dict[str, list[Visual]]()
+        self.visuals = dict[str, list[Primitive]]()
         for node in self.tree.nodes:
             self._add_body(node)
         for node in self.tree.nodes:

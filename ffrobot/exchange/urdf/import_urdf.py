@@ -15,9 +15,11 @@ from .flexible import FlexibleLink, flexible_link
 from .meshes import MeshMass, mesh_masses
 from .names import Names
 from .read import read_urdf
+from .replaced import compared
 from .robot import Robot
 from .scale import remarks_on_scale
 from .scene import SceneOfRobot
+from .shape_masses import Filling, with_masses, without_mass
 from .toml import toml_text
 
 SCENE = "scene.toml"
@@ -60,22 +62,50 @@ class Imported:
 
 
 def import_urdf(
-    urdf: Path, folder: Path, flexible: Mapping[str, Path], *, force: bool = False, fix_inertia: bool = False
+    urdf: Path,
+    folder: Path,
+    flexible: Mapping[str, Path],
+    *,
+    force: bool = False,
+    fix_inertia: bool = False,
+    filling: Filling | None = None,
+    keep_rest: bool = False,
 ) -> Imported:
-    """Write DIR/scene.toml, and a link file for each link of `flexible`; `fix_inertia` as of `bodies.mechanism`.
+    """Write DIR/scene.toml, and a link file for each link of `flexible`.
+
+    Args:
+        urdf: the robot.
+        folder: DIR.
+        flexible: link files by link.
+        force: replace files that are there.
+        fix_inertia: see `bodies.mechanism`.
+        filling: fills the shapes of links without mass; None leaves them massless.
+        keep_rest: what a link of the URDF weighs beyond its flexible link becomes a payload on that one.
 
     Raises:
         InputError: wrong input, or files that would be replaced without `force`.
         SolveError: a file cannot be written.
     """
     with of_file(urdf):
-        return _imported(urdf, folder, flexible, force=force, fix_inertia=fix_inertia)
+        robot, remarks = read_urdf(urdf), list[str]()
+        if filling is not None:
+            robot, remarks = with_masses(robot, urdf, filling)
+        remarks += without_mass(robot)
+        stems = Names([Path(SCENE).stem])
+        links = {name: flexible_link(robot, name, source, folder, stems[name]) for name, source in flexible.items()}
+        scene = _scene(urdf, robot, links, fix_inertia=fix_inertia)
+        masses, about_meshes = mesh_masses(robot, urdf)
+        remarks += [*scene.remarks, *_remarks_on_links(links)]
+        payloads, about_rest = _compared(robot, links, folder, scene, keep_rest=keep_rest)
+        keys = {**scene.keys, **({"payload": payloads} if payloads else {})}
+        remarks += [*about_rest, *about_meshes, *remarks_on_scale(robot)]
+        files = {SCENE: _scene_text(urdf, keys, remarks)}
+        files |= {link.file_name: _link_text(urdf, link) for link in links.values()}
+        written = _write(folder, files, force=force)
+        return Imported(robot, keys, tuple(links.values()), tuple(remarks), tuple(masses), written)
 
 
-def _imported(urdf: Path, folder: Path, flexible: Mapping[str, Path], *, force: bool, fix_inertia: bool) -> Imported:
-    robot = read_urdf(urdf)
-    stems = Names([Path(SCENE).stem])
-    links = {name: flexible_link(robot, name, source, folder, stems[name]) for name, source in flexible.items()}
+def _scene(urdf: Path, robot: Robot, links: Mapping[str, FlexibleLink], *, fix_inertia: bool) -> SceneOfRobot:
     try:
         places = {name: link.place for name, link in links.items()}
         scene = SceneOfRobot(robot, mechanism(robot, places, fix_inertia=fix_inertia), links)
@@ -83,12 +113,20 @@ def _imported(urdf: Path, folder: Path, flexible: Mapping[str, Path], *, force: 
         raise InputError("\n".join(f"{urdf}: {line}" for line in str(error).splitlines())) from None
     if found := list(beyond_limits(dict(scene.keys))):
         raise InputError("\n".join(f"{urdf}: {line}" for line in found))
-    masses, about_meshes = mesh_masses(robot, urdf)
-    remarks = [*scene.remarks, *_remarks_on_links(links), *about_meshes, *remarks_on_scale(robot)]
-    files = {SCENE: _scene_text(urdf, scene.keys, remarks)}
-    files |= {link.file_name: _link_text(urdf, link) for link in links.values()}
-    written = _write(folder, files, force=force)
-    return Imported(robot, scene.keys, tuple(links.values()), tuple(remarks), tuple(masses), written)
+    return scene
+
+
+def _compared(
+    robot: Robot, links: Mapping[str, FlexibleLink], folder: Path, scene: SceneOfRobot, *, keep_rest: bool
+) -> tuple[list[dict[str, Any]], list[str]]:
+    """Payloads that make up for what flexible links lack of the URDF's masses, and remarks on what they replace."""
+    payloads, remarks = [], list[str]()
+    for link in links.values():
+        payload, about = compared(robot, link, folder, keep_rest=keep_rest)
+        remarks += about
+        if payload is not None:
+            payloads.append(payload | {"point": f"{scene.bodies[link.name]}.{payload['point']}"})
+    return payloads, remarks
 
 
 def _remarks_on_links(links: Mapping[str, FlexibleLink]) -> Iterator[str]:

@@ -53,7 +53,7 @@ def mesh_masses(robot: Robot, urdf: Path) -> tuple[list[MeshMass], list[str]]:
         return [], [NOT_LOOKED_AT] if any(link.visual or link.collision for link in robot.links.values()) else []
     found, missing, remarks = list[MeshMass](), list[str](), list[str]()
     for link in robot.links.values():
-        meshes = link.visual or link.collision
+        meshes = [shape for shape in link.visual or link.collision if isinstance(shape, MeshFile)]
         if link.inertial is None or not link.inertial.mass or not meshes:
             continue
         paths = [mesh_path(mesh.filename, urdf) for mesh in meshes]
@@ -61,7 +61,7 @@ def mesh_masses(robot: Robot, urdf: Path) -> tuple[list[MeshMass], list[str]]:
             missing += [mesh.filename for mesh, path in zip(meshes, paths, strict=True) if path is None]
             continue
         try:
-            parts = [_loaded(mesh, path) for mesh, path in zip(meshes, paths, strict=True) if path is not None]
+            parts = [loaded_mesh(mesh, path) for mesh, path in zip(meshes, paths, strict=True) if path is not None]
         except Exception as error:  # whatever a reader of damaged or unknown files raises
             remarks.append(f'link "{shown(link.name)}": mesh not read: {type(error).__name__}: {shown(str(error))}')
             continue
@@ -85,8 +85,8 @@ def mesh_path(filename: str, urdf: Path) -> Path | None:
     return next((path for path in candidates if path.is_file()), None)
 
 
-def _loaded(mesh: MeshFile, path: Path) -> trimesh.Trimesh:
-    """The mesh in the axes of its link, m."""
+def loaded_mesh(mesh: MeshFile, path: Path) -> trimesh.Trimesh:
+    """The mesh in the axes of its link, m. Raises `ModuleNotFoundError` without trimesh, else what a reader raises."""
     import trimesh
 
     if path.suffix.lower() not in READ:

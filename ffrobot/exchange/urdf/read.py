@@ -12,9 +12,9 @@ import numpy as np
 from ...common.errors import InputError
 from ...common.rotations import of_rpy
 from ...common.tables import LARGEST, shown
-from ...common.toml_files import read_text
+from ...common.toml_files import read_bytes
 from ...common.validation import quoted
-from .robot import TYPES, Inertial, MeshFile, Mimic, Numbers3, Origin, Robot, UrdfJoint, UrdfLink
+from .robot import TYPES, Inertial, MeshFile, Mimic, Numbers3, Origin, Primitive, Robot, UrdfJoint, UrdfLink
 from .topology import check_mimics, root_of
 
 Element = ElementTree.Element
@@ -29,7 +29,7 @@ def read_urdf(path: Path) -> Robot:
         InputError: it cannot be read, is no URDF, an element or number is missing or wrong, links do not form one tree.
     """
     try:
-        return robot_of(_root_element(read_text(path, "URDF file")))
+        return robot_of(_root_element(read_bytes(path, "URDF file")))
     except InputError as error:
         text = str(error)
         raise InputError(text if text.startswith(f"{path}:") else _in_file(path, text)) from None
@@ -39,16 +39,19 @@ def _in_file(path: Path, text: str) -> str:
     return "\n".join(f"{path}: {line}" for line in text.splitlines())
 
 
-def _root_element(text: str) -> Element:
+def _root_element(content: bytes) -> Element:
     try:
-        root = ElementTree.fromstring(text.encode())
-    except ElementTree.ParseError as error:
+        root = ElementTree.fromstring(content)  # bytes: in the encoding that the XML declares
+    except (ElementTree.ParseError, LookupError, ValueError) as error:
         raise InputError(f"expected a URDF file, found XML that is not well-formed: {error}") from None
     if root.tag != "robot":
         raise InputError(f"expected a URDF file, whose root is <robot>, found <{shown(root.tag)}>")
     if xacro := next((each.tag for each in root.iter() if "ros.org/wiki/xacro" in str(each.tag)), None):
         name = xacro.partition("}")[2]
-        raise InputError(f"expected a URDF file, found <xacro:{name}>: run xacro first, which writes the URDF")
+        raise InputError(
+            f"expected a URDF file, found <xacro:{name}>: run `xacro FILE.xacro > ROBOT.urdf` first,"
+            " in an environment with ROS or with PyPI's xacro"
+        )
     return root
 
 
@@ -96,8 +99,8 @@ def _link(element: Element) -> UrdfLink:
     return UrdfLink(
         name,
         None if inertial is None else _inertial(inertial, f"{label}: <inertial>"),
-        tuple(_meshes(element, "visual", label)),
-        tuple(_meshes(element, "collision", label)),
+        tuple(_shapes(element, "visual", label)),
+        tuple(_shapes(element, "collision", label)),
     )
 
 
@@ -115,13 +118,29 @@ def _inertial(element: Element, label: str) -> Inertial:
     return Inertial(mass, np.array(origin.xyz), C @ J @ C.T if any(origin.rpy) else J)
 
 
-def _meshes(link: Element, kind: str, label: str) -> Iterable[MeshFile]:
+def _shapes(link: Element, kind: str, label: str) -> Iterable[MeshFile | Primitive]:
     for element in link.findall(kind):
-        mesh = element.find("geometry/mesh")
-        if mesh is not None and (filename := mesh.get("filename")):
-            where = f"{label}: <{kind}>"
-            scale = _triple(mesh, "scale", (1.0, 1.0, 1.0), f"{where}: <mesh>")
-            yield MeshFile(filename, scale, _origin(element, where))
+        where = f"{label}: <{kind}>"
+        for geometry in element.iterfind("geometry/*"):
+            if geometry.tag == "mesh" and (filename := geometry.get("filename")):
+                scale = _triple(geometry, "scale", (1.0, 1.0, 1.0), f"{where}: <mesh>")
+                yield MeshFile(filename, scale, _origin(element, where))
+            elif geometry.tag == "box":
+                yield Primitive("box", _sizes(geometry, "size", 3), _origin(element, where))
+            elif geometry.tag == "cylinder":
+                sizes = *_sizes(geometry, "radius"), *_sizes(geometry, "length")
+                yield Primitive("cylinder", sizes, _origin(element, where))
+            elif geometry.tag == "sphere":
+                yield Primitive("sphere", _sizes(geometry, "radius"), _origin(element, where))
+
+
+def _sizes(shape: Element, key: str, count: int = 1) -> tuple[float, ...]:
+    """Sizes, m; NaN where there are none: a shape that only viewers need may be wrong."""
+    try:
+        sizes = tuple(map(float, shape.get(key, "").split()))
+    except ValueError:
+        sizes = ()
+    return sizes if len(sizes) == count and min(sizes) >= 0 else (math.nan,) * count
 
 
 def _joint(element: Element) -> UrdfJoint:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -87,14 +88,23 @@ class MeshFile:
     origin: Origin
 
 
+@dataclass(frozen=True)
+class Primitive:
+    """A shape about its center: a box of `size` x, y, z; a cylinder along z (radius, length); a sphere (radius,). m."""
+
+    shape: Literal["box", "cylinder", "sphere"]
+    size: tuple[float, ...]
+    origin: Origin
+
+
 @dataclass(frozen=True, eq=False)
 class UrdfLink:
-    """A link: what it weighs (None: the URDF does not say), and its meshes, visual ones and collision ones."""
+    """A link: its mass and inertia (None: the URDF has none), and its shapes, to be seen and for collisions."""
 
     name: str
     inertial: Inertial | None
-    visual: tuple[MeshFile, ...] = ()
-    collision: tuple[MeshFile, ...] = ()
+    visual: tuple[MeshFile | Primitive, ...] = ()
+    collision: tuple[MeshFile | Primitive, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -3,31 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
 from ...common.arrays import Array
 from ...common.rotations import smallest_turn
 from ...fe_models.modal_body import ModalBody
-from .robot import Numbers3, Origin
+from .robot import Numbers3, Origin, Primitive
 from .scene import rpy_of
 
 SLENDER = 40.0  # bars: length of the longest by their radius
 ALIKE = 1e-9  # sections whose sizes differ by less, relative, are one shape
 
 
-@dataclass(frozen=True)
-class Visual:
-    """A shape about its center: a box of `size` x, y, z; a cylinder along z (radius, length); a sphere (radius,). m."""
-
-    shape: Literal["box", "cylinder", "sphere"]
-    size: tuple[float, ...]
-    origin: Origin
-
-
-def beam_visuals(body: ModalBody, anchor: Array) -> Iterator[Visual]:
+def beam_visuals(body: ModalBody, anchor: Array) -> Iterator[Primitive]:
     """The undeformed beam by the outer sizes of its sections, a shape for each length over which they are the same.
 
     `anchor` (3,) is where the link's frame is, in axes of the body. Round where the outline has more than four corners.
@@ -44,22 +33,22 @@ def beam_visuals(body: ModalBody, anchor: Array) -> Iterator[Visual]:
         a, b = stations.position[first], stations.position[end]
         length, center = float(np.linalg.norm(b - a)), (a + b) / 2 - anchor
         if is_round:
-            yield Visual(
+            yield Primitive(
                 "cylinder", (float(sizes[first].max()) / 2, length), Origin(_three(center), (0.0, np.pi / 2, 0.0))
             )
         else:
-            yield Visual("box", (length, float(height[first]), float(width[first])), Origin(_three(center)))
+            yield Primitive("box", (length, float(height[first]), float(width[first])), Origin(_three(center)))
         first = end
 
 
-def bars(points: Sequence[Array], radius: float) -> Iterator[Visual]:
+def bars(points: Sequence[Array], radius: float) -> Iterator[Primitive]:
     """From the frame to each of `points` (3,), axes of the link; a sphere where there is none away from it."""
     away = [point for point in points if np.any(point)]
     for point in away:
         rpy = rpy_of(smallest_turn(point))
-        yield Visual("cylinder", (radius, float(np.linalg.norm(point))), Origin(_three(point / 2), _three(rpy)))
+        yield Primitive("cylinder", (radius, float(np.linalg.norm(point))), Origin(_three(point / 2), _three(rpy)))
     if not away:
-        yield Visual("sphere", (2 * radius,), Origin())
+        yield Primitive("sphere", (2 * radius,), Origin())
 
 
 def _three(values: Sequence[float] | Array) -> Numbers3:

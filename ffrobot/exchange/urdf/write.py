@@ -5,13 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from xml.etree import ElementTree
 
-from .robot import Inertial, Origin, Robot, UrdfJoint
-from .visuals import Visual
+from .robot import Inertial, Origin, Primitive, Robot, UrdfJoint
 
 Element = ElementTree.Element
 
 
-def urdf_text(robot: Robot, visuals: Mapping[str, Sequence[Visual]]) -> str:
+def urdf_text(robot: Robot, visuals: Mapping[str, Sequence[Primitive]]) -> str:
     """The file, numbers with all their digits; `visuals` by link, in axes of the link."""
     root = Element("robot", name=robot.name)
     for link in robot.links.values():
@@ -49,7 +48,7 @@ def _add_inertial(link: Element, inertial: Inertial) -> None:
     _add(element, "inertia", ixx=J[0, 0], ixy=J[0, 1], ixz=J[0, 2], iyy=J[1, 1], iyz=J[1, 2], izz=J[2, 2])
 
 
-def _add_visual(link: Element, visual: Visual) -> None:
+def _add_visual(link: Element, visual: Primitive) -> None:
     element = _add(link, "visual")
     _add_origin(element, visual.origin)
     geometry = _add(element, "geometry")

@@ -1,0 +1,139 @@
+"""Masses of links without <inertial>, from their shapes filled with one density: an estimate that a user asks for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import reduce
+from operator import add
+from pathlib import Path
+
+import numpy as np
+
+from ...common.arrays import Array
+from ...common.errors import InputError
+from ...common.tables import shown
+from .meshes import loaded_mesh, mesh_path
+from .robot import Inertial, MeshFile, Primitive, Robot, UrdfLink
+
+
+@dataclass(frozen=True)
+class Filling:
+    """What fills the shapes of links without mass.
+
+    Attributes:
+        density: kg/m³.
+        radius: m, of a cylinder along a link that has no shape of its own; None for no cylinder.
+    """
+
+    density: float
+    radius: float | None = None
+
+
+def with_masses(robot: Robot, urdf: Path, filling: Filling) -> tuple[Robot, list[str]]:
+    """The robot with masses for the links that have none but have shapes, and a remark on each of these links.
+
+    Shapes for collisions come before those to be seen: they are closed and simple as a rule. The root stands still and
+    needs no mass.
+
+    Raises:
+        InputError: a mesh is missing or cannot be read, and no cylinder takes its place; a shape has no volume.
+    """
+    links, remarks = dict[str, UrdfLink](robot.links), list[str]()
+    for name, link in robot.links.items():
+        if name == robot.root or (link.inertial is not None and link.inertial.mass > 0):
+            continue
+        inertial, what = _filled(robot, link, urdf, filling)
+        if inertial is not None:
+            links[name] = replace(link, inertial=inertial)
+            remarks.append(f'link "{shown(name)}" has no mass: {inertial.mass:.6g} kg by {what}')
+    return replace(robot, links=links), remarks
+
+
+def without_mass(robot: Robot) -> list[str]:
+    """A remark on each link that has shapes but no mass, and moves."""
+    return [
+        f'link "{shown(name)}" has shapes but no mass: --density estimates it from them'
+        for name, link in robot.links.items()
+        if name != robot.root and (link.visual or link.collision) and not (link.inertial and link.inertial.mass)
+    ]
+
+
+def _filled(robot: Robot, link: UrdfLink, urdf: Path, filling: Filling) -> tuple[Inertial | None, str]:
+    """Mass and inertia of a link, and what they are made of; None where nothing says how large the link is."""
+    with_density = f"with {filling.density:g} kg/m³"
+    for kind, shapes in (("collision", link.collision), ("visual", link.visual)):
+        if not shapes or (filling.radius is not None and _missing(shapes, urdf)):
+            continue
+        label = f'link "{shown(link.name)}": <{kind}>'
+        parts = [_of_shape(shape, urdf, filling.density, label) for shape in shapes]
+        hulls = ", convex hulls of open meshes" if any(is_hull for _, is_hull in parts) else ""
+        return reduce(add, (part for part, _ in parts)), f"its <{kind}> filled {with_density}{hulls}"
+    beyond = max(robot.joints_of(link.name), key=lambda joint: float(np.linalg.norm(joint.origin.xyz)), default=None)
+    if filling.radius is None or beyond is None or not any(beyond.origin.xyz):
+        return None, ""
+    rod = _cylinder_along(np.array(beyond.origin.xyz), filling.radius, filling.density)
+    return rod, f'a cylinder of radius {filling.radius:g} m to joint "{shown(beyond.name)}" {with_density}'
+
+
+def _missing(shapes: tuple[MeshFile | Primitive, ...], urdf: Path) -> bool:
+    return any(isinstance(shape, MeshFile) and mesh_path(shape.filename, urdf) is None for shape in shapes)
+
+
+def _of_shape(shape: MeshFile | Primitive, urdf: Path, density: float, label: str) -> tuple[Inertial, bool]:
+    """Of a filled shape in axes of the link, and whether it is the convex hull of an open mesh."""
+    if isinstance(shape, Primitive):
+        found, is_hull = _of_primitive(shape, density), False
+    else:
+        found, is_hull = _of_mesh(shape, urdf, density, label)
+    if not (np.isfinite(found.mass) and found.mass > 0):
+        raise InputError(f"{label}: expected a shape with a volume, found {_name(shape)} without one")
+    return found, is_hull
+
+
+def _name(shape: MeshFile | Primitive) -> str:
+    return shown(shape.filename) if isinstance(shape, MeshFile) else f"a {shape.shape}"
+
+
+def _of_primitive(shape: Primitive, density: float) -> Inertial:
+    """Solid box, cylinder or sphere: the textbook's moments about the center."""
+    moments: Array
+    if shape.shape == "box":
+        x, y, z = shape.size
+        mass, moments = density * x * y * z, np.array([y * y + z * z, x * x + z * z, x * x + y * y]) / 12
+    elif shape.shape == "cylinder":
+        radius, length = shape.size
+        across = (3 * radius**2 + length**2) / 12
+        mass, moments = density * np.pi * radius**2 * length, np.array([across, across, radius**2 / 2])
+    else:
+        (radius,) = shape.size
+        mass, moments = density * 4 / 3 * np.pi * radius**3, np.full(3, 0.4 * radius**2)
+    return Inertial(mass, np.zeros(3), mass * np.diag(moments)).seen_from(shape.origin.place)
+
+
+def _cylinder_along(way: Array, radius: float, density: float) -> Inertial:
+    """A solid cylinder from the link's frame along `way` (3,), m."""
+    length = float(np.linalg.norm(way))
+    mass, unit = density * np.pi * radius**2 * length, way / length
+    across = (3 * radius**2 + length**2) / 12
+    along = radius**2 / 2
+    return Inertial(mass, way / 2, mass * (across * np.eye(3) + (along - across) * np.outer(unit, unit)))
+
+
+def _of_mesh(shape: MeshFile, urdf: Path, density: float, label: str) -> tuple[Inertial, bool]:
+    if (path := mesh_path(shape.filename, urdf)) is None:
+        raise InputError(
+            f"{label}: expected its mesh beside the URDF, found no file {shown(shape.filename)}; --radius takes"
+            " cylinders where there are no meshes"
+        )
+    try:
+        mesh = loaded_mesh(shape, path)
+        is_hull = not mesh.is_watertight
+        solid = mesh.convex_hull if is_hull else mesh
+        mass = density * float(solid.volume)
+        inertia = density * np.array(solid.moment_inertia)
+    except ModuleNotFoundError:
+        raise InputError(f"{label}: masses of meshes need trimesh: pip install 'ffrobot[urdf]'") from None
+    except Exception as error:  # whatever a reader of damaged or unknown files raises
+        raise InputError(f"{label}: mesh not read: {type(error).__name__}: {shown(str(error))}") from None
+    sign = np.sign(mass)  # of a mesh whose faces look inward
+    return Inertial(sign * mass, np.array(solid.center_mass), sign * inertia), is_hull
