@@ -15,9 +15,14 @@ POSITIVE = click.FloatRange(0.0, min_open=True)
 
 
 @click.command(name="import")
-@click.argument("file", metavar="ROBOT.urdf|BODY.SID_FEM|BODY.fem", type=FILE)
+@click.argument("file", metavar="ROBOT.urdf|BODY|MOTION", type=FILE)
 @click.option(
-    "-o", "--output", metavar="DIR|BODY.h5", type=FILE, required=True, help="Folder of the scene; of a body, its file."
+    "-o",
+    "--output",
+    metavar="DIR|BODY.h5|PATH.csv",
+    type=FILE,
+    required=True,
+    help="Folder of the scene; file of a body or of waypoints.",
 )
 @click.option(
     "--flexible",
@@ -56,7 +61,7 @@ def import_(
     fix_inertia: bool,
     keep_rest: bool,
 ) -> None:
-    """Make a scene in space of a robot description (URDF), or a modal body of one of other programs.
+    """Make a scene in space of a robot description (URDF), a modal body or waypoints of those of other programs.
 
     DIR/scene.toml gets bodies and joints: every link rigid, as its <inertial> says, unless --flexible names a link
     file for it; links that fixed joints hold together are one body, what the root carries that way stands still.
@@ -64,17 +69,27 @@ def import_(
 
     BODY.SID_FEM (standard input data, Wallrapp) and BODY.fem (MBDyn) become modal body files, which scenes take as
     `modal = "BODY.h5"`.
+
+    MOTION.json (a JointTrajectory) and bags of ROS (the first JointTrajectory, else JointStates) become waypoints,
+    which trajectories of joints take as `waypoints = "PATH.csv"`.
     """
-    from ..exchange.export import READERS, import_body
+    from ..exchange.export import MOTIONS, READERS, import_body, import_motion
     from ..exchange.present import print_export, print_import
     from ..exchange.urdf.import_urdf import import_urdf
     from ..exchange.urdf.shape_masses import Filling
     from ..present.summary import summary_console
 
     links = _links(flexible)
+    of_urdf = links or fix_inertia or density or radius or keep_rest
+    if file.suffix.lower() in MOTIONS or file.is_dir():
+        if of_urdf:
+            raise InputError(f"{file}: expected a URDF for options other than --output and --force, found a motion")
+        protect([file])
+        print_export(import_motion(file, output, force=force), summary_console())
+        return
     if file.suffix.lower() in READERS:
-        if links or force or fix_inertia or density or radius or keep_rest:
-            raise InputError(f"{file}: expected a URDF for the options beside --output, found a body")
+        if of_urdf or force:
+            raise InputError(f"{file}: expected a URDF for options other than --output, found a body")
         protect([file])
         print_export(import_body(file, output), summary_console())
         return

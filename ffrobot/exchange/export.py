@@ -12,6 +12,7 @@ import numpy as np
 from ..common.errors import InputError
 from ..common.files import check_new_file, check_new_folder, check_output, write_atomically
 from ..common.outputs import check_not_an_input
+from ..common.tables import shown
 from ..common.toml_files import read_text
 from ..common.validation import quoted
 from ..fe_models.modal_body import ModalBody
@@ -24,6 +25,7 @@ from .fmu.forward_fmu import forward_fmu
 from .fmu.linear_fmu import linear_fmu
 from .motion.joint_trajectory import joint_trajectory_text
 from .motion.joints import csv_text, robot_motion
+from .motion.read_motion import read_motion
 from .motion.rosbag import joint_trajectory_bag
 from .urdf.export_urdf import scene_as_urdf
 
@@ -159,6 +161,25 @@ READERS: Mapping[str, Callable[[str, str], tuple[ModalBody, tuple[str, ...]]]] =
     ".fem": read_fem,
 }
 """What reads bodies of other programs, by the end of the file's name."""
+
+
+MOTIONS = (".json", ".bag", ".db3", ".mcap")
+"""Ends of files with motions of joints; a folder is a bag of ROS 2."""
+
+
+def import_motion(path: Path, output: Path, *, force: bool = False) -> Exported:
+    """Write the waypoints of a motion of joints as CSV.
+
+    Raises:
+        InputError: it cannot be read, or is no motion; a file would be replaced without `force`.
+        SolveError: the file cannot be written, or `rosbags` is not installed.
+    """
+    motion = read_motion(path)
+    _check(output, force=force)
+    _write(output, motion.csv_text())
+    what = f"{len(motion.time)} points of {len(motion.joints)} joints over {motion.time[-1] - motion.time[0]:.6g} s"
+    use = f'a [[trajectory]] with joint = "{shown(motion.joints[0])}" takes waypoints = "{output.name}"'
+    return Exported(output, what, (*motion.remarks, use))
 
 
 def import_body(path: Path, output: Path) -> Exported:

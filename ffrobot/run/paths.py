@@ -51,16 +51,18 @@ def with_paths_in_space(
 
 
 def _shaped(scene: AnyScene, frequencies: Frequencies) -> tuple[AnyScene, Notes]:
-    """The scene with shapers for frequencies of the robot where they ask for these."""
+    """The scene with shapers for frequencies of the robot where they ask for these; notes on them and on tables."""
     asking = {one.name: one.shaper for one in scene.trajectory if one.shaper and one.shaper.asks_robot}
+    tables = (one.waypoints for one in scene.trajectory if one.waypoints is not None)
+    of_tables: Notes = tuple(dict.fromkeys(remark for table in tables for remark in table.remarks))
     if not asking:
-        return scene, ()
+        return scene, of_tables
     begin, end = _span(scene)
     found = frequencies(begin, end, max(shaper.modes for shaper in asking.values()))
     shapers: Mapping[str, Shaper] = {name: _for_robot(shaper, found) for name, shaper in asking.items()}
     changed = [one.changed(shaper=shapers[one.name]) if one.name in shapers else one for one in scene.trajectory]
-    notes = tuple(f"{name}: {_in_words(shaper, found)}" for name, shaper in asking.items())
-    return scene.model_copy(update={"trajectory": tuple(changed)}), notes
+    of_shapers: Notes = tuple(f"{name}: {_in_words(shaper, found)}" for name, shaper in asking.items())
+    return scene.model_copy(update={"trajectory": tuple(changed)}), (*of_tables, *of_shapers)
 
 
 def _for_robot(shaper: Shaper, found: PathFrequencies) -> Shaper:

@@ -4,25 +4,47 @@ from __future__ import annotations
 
 import csv
 import math
-from dataclasses import dataclass
+import re
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
-from ...common.arrays import Array
+from ...common.arrays import Array, Indices
 from ...common.errors import InputError
 from ...common.tables import LARGEST, shown
 from .._core import TimeFunction
 from .piecewise import Piecewise, superposed
 
+TIME = re.compile(r"_*(t|time|times?tamp|stamp|sec(?:ond)?s?)[ _.]*[(\[]?(s|sec|ms|us|µs|ns)?[)\]]?", re.IGNORECASE)
+"""Names of the column of times, as programs write them, with or without a unit: t, time, time [ms], timestamp_ns."""
+UNITS = {"ms": 1e-3, "us": 1e-6, "µs": 1e-6, "ns": 1e-9}
+SINCE_1970 = ((1e17, 1e-9), (1e14, 1e-6), (1e11, 1e-3), (1e8, 1.0))
+"""Clocks of computers by their number now: from so many on, and the unit in s that this then is."""
+OF_A_JOINT = ("value", "{0}", "{0}.coordinate", "{0}.position", "position", "positions", "angle")
+"""Names of the column of a joint, {0} being the joint's, the first that is there."""
+MANY, GAP = 20, 20.0  # intervals of a table with a step; how many times the usual one a gap is
+
 
 @dataclass(frozen=True)
 class Waypoints:
-    """The `columns` of a waypoint table after t, their values (T, columns) and times (T,), s, strictly increasing."""
+    """The `columns` of a waypoint table after t, their values (T, columns) and times (T,), s, strictly increasing.
+
+    `remarks` say what was taken for what in it, a line each.
+    """
 
     columns: tuple[str, ...]
     times: Array
     values: Array
+    remarks: tuple[str, ...] = ()
+
+    def of_joint(self, joint: str) -> Waypoints:
+        """The column of a joint, as "value": see `OF_A_JOINT`. The whole table where it has none."""
+        for name in (pattern.format(joint) for pattern in OF_A_JOINT):
+            if name in self.columns:
+                k = self.columns.index(name)
+                return replace(self, columns=("value",), values=self.values[:, [k]])
+        return self
 
     def spline(self) -> Piecewise:
         """The quintic spline (four continuous derivatives) through the rows, from rest to rest.
@@ -42,12 +64,53 @@ class Waypoints:
 
 
 def load_waypoints(path: Path) -> Waypoints:
-    """Read the CSV table at `path`: header `t,x,y` or `t,value` …; at least two rows; t (s) strictly increasing.
+    """Read the CSV table at `path`: header `t,x,y` or `t,value` …; at least two rows; t increasing.
+
+    Times are in s, or in the unit that the header says. Those of a computer's clock begin at zero; rows that stand
+    there twice count once: both with a remark.
 
     Raises `InputError` naming file and line.
     """
-    columns, table = _read_table(path)
-    return Waypoints(tuple(columns[1:]), table[:, 0], table[:, 1:])
+    columns, table, lines = _read_table(path)
+    times, remarks = _seconds(columns[0], table[:, 0])
+    again = np.append(False, (np.diff(table, axis=0) == 0).all(axis=1))
+    if again.any():
+        remarks.append(f"line {lines[int(again.argmax())]}: {again.sum()} rows that repeat the one before count once")
+    times, values, lines = times[~again], table[~again, 1:], lines[~again]
+    late = np.flatnonzero(np.diff(times) <= 0.0)
+    if late.size:
+        before, after = times[late[0]], times[late[0] + 1]
+        raise InputError(
+            f"{path}: line {lines[late[0] + 1]}: expected times that increase, found t = {after:g} after {before:g}"
+        )
+    if len(times) < 2:
+        raise InputError(f"{path}: expected at least 2 waypoints, found {len(times)}")
+    remarks += _gaps(times)
+    return Waypoints(tuple(columns[1:]), times, values, tuple(f"{path.name}: {remark}" for remark in remarks))
+
+
+def _seconds(header: str, times: Array) -> tuple[Array, list[str]]:
+    """Times in s, and a remark where they are those of a clock."""
+    found = TIME.fullmatch(header)
+    unit = None if found is None or found[2] is None else UNITS.get(found[2].lower(), 1.0)
+    first = float(times[0]) if len(times) else 0.0
+    clock = next((scale for least, scale in SINCE_1970 if first * (unit or 1.0) >= least), None)
+    if clock is None:
+        return times * (unit or 1.0), []
+    scale = unit or clock
+    # From the first one before they are scaled: those of a clock have few digits left.
+    return (times - first) * scale, [f"times are those of a clock, in {scale:g} s since 1970; the first is taken as 0"]
+
+
+def _gaps(times: Array) -> list[str]:
+    steps = np.diff(times)
+    if len(steps) < MANY or steps.max() <= GAP * (usual := float(np.median(steps))):
+        return []
+    k = int(steps.argmax())
+    return [
+        f"no rows between t = {times[k]:g} and {times[k + 1]:g} s, where others are {usual:.3g} s apart: the path there"
+        " is the spline's alone"
+    ]
 
 
 def _from_zero(part: Piecewise, first: Array) -> Array:
@@ -57,8 +120,8 @@ def _from_zero(part: Piecewise, first: Array) -> Array:
     return coefficients
 
 
-def _read_table(path: Path) -> tuple[list[str], Array]:
-    """Column names and the numbers (rows, columns) of the CSV table at `path`."""
+def _read_table(path: Path) -> tuple[list[str], Array, Indices]:
+    """Column names, numbers (rows, columns) and lines (rows,) of the CSV table at `path`."""
     try:
         with path.open(encoding="utf-8-sig", newline="") as file:
             reader = csv.reader(file, skipinitialspace=True)
@@ -69,17 +132,12 @@ def _read_table(path: Path) -> tuple[list[str], Array]:
         about = getattr(error, "strerror", None) or error
         raise InputError(f"{path}: cannot read the waypoint table: {about}") from None
     header = [name.strip() for name in rows[0][1]] if rows else []
-    if len(header) < 2 or header[0] != "t" or not all(header) or len(set(header)) < len(header):
+    if len(header) < 2 or TIME.fullmatch(header[0]) is None or not all(header) or len(set(header)) < len(header):
         raise InputError(f"{path}: line 1: expected a header such as t,x,y or t,value, found {','.join(header)!r}")
     table = np.array([_numbers(path, line, row, len(header)) for line, row in rows[1:]])
     if len(rows) < 3:
         raise InputError(f"{path}: expected at least 2 waypoints, found {len(rows) - 1}")
-    late = np.flatnonzero(np.diff(table[:, 0]) <= 0.0)
-    if late.size:
-        before, after = table[late[0], 0], table[late[0] + 1, 0]
-        line = rows[late[0] + 2][0]
-        raise InputError(f"{path}: line {line}: expected times that increase, found t = {after:g} after {before:g}")
-    return header, table
+    return header, table, np.array([line for line, _ in rows[1:]])
 
 
 def _numbers(path: Path, line: int, row: list[str], count: int) -> list[float]:

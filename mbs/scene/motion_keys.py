@@ -8,7 +8,7 @@ from math import inf
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from ...common.arrays import Array
 from ...common.validation import Record, quoted
@@ -91,6 +91,12 @@ class MotionKeys(Record):
     """Seek the smallest `stretch` at which motors and patches keep their limits in the first inverse analysis."""
     shaper: Shaper | None = None
     """Shapes the motion so that it leaves vibrations of certain frequencies at rest."""
+
+    @field_validator("waypoints", check_fields=False)
+    @classmethod
+    def _of_its_joint(cls, table: Waypoints | None, info: ValidationInfo) -> Waypoints | None:
+        joint = info.data.get("joint") or info.data.get("motor")
+        return table if table is None or joint is None else table.of_joint(joint)
 
     def check_motion(self, places: Mapping[int, str], waypoints: Waypoints | None) -> None:
         """Raise `ValueError` for keys that do not fit each other, or places that are none of these.

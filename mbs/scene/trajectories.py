@@ -43,7 +43,7 @@ class Trajectory(MotionKeys):
     value: Expression | None = None
     """Of the joint's coordinate (rad, or m where prismatic) or the angle (rad); expression in t (s)."""
     waypoints: WaypointTable | None = None
-    """CSV file with the columns t (s) and x, y (m) or value (rad, m)."""
+    """CSV file with the columns t (s) and x, y (m); of a joint value, or a column of the joint's name (rad, m)."""
 
     @model_validator(mode="after")
     def _consistent(self) -> Trajectory:

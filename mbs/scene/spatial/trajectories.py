@@ -68,7 +68,8 @@ class SpatialTrajectory(MotionKeys):
     value: Expression | None = None
     """Of the joint's coordinate, rad, or m where it slides; expression in t (s)."""
     waypoints: WaypointTable | None = None
-    """CSV file with the columns t (s) and x, y, z (m), and qw, qx, qy, qz for the orientation; or value (rad, m)."""
+    """CSV file with the columns t (s) and x, y, z (m), and qw, qx, qy, qz for the orientation; of a joint value, or a
+    column of the joint's name (rad, m)."""
 
     @model_validator(mode="after")
     def _consistent(self) -> SpatialTrajectory:
@@ -97,7 +98,7 @@ class SpatialTrajectory(MotionKeys):
         wanted = ("value",) if allowed == ("value",) else (*PLACES, *QUATERNION)
         turned = set(columns) & set(QUATERNION)
         if not set(columns) <= set(wanted) or (turned and turned != set(QUATERNION)):
-            header = "t,value" if allowed == ("value",) else "t,x,y,z or t,x,y,z,qw,qx,qy,qz"
+            header = "t,value or t,JOINT" if allowed == ("value",) else "t,x,y,z or t,x,y,z,qw,qx,qy,qz"
             raise ValueError(f'expected waypoints with the header {header}, found "{",".join(("t", *columns))}"')
         if turned:
             try:

@@ -1,0 +1,186 @@
+"""Motions of other programs as waypoints: tables with clocks and other names, JointTrajectory, bags of ROS."""
+
+import json
+
+import numpy as np
+import pytest
+
+from ffrobot import InputError
+from ffrobot.common.validation import validate
+from ffrobot.exchange.motion.read_motion import read_motion
+from ffrobot.mbs.fields.waypoints import load_waypoints
+from ffrobot.mbs.scene.spatial.trajectories import SpatialTrajectory
+
+ROWS = [(0.0, 0.1, -0.4), (0.5, 0.3, -0.2), (1.25, 0.2, 0.6)]
+EPOCH = 1_700_000_000
+
+
+def write(path, header, rows, separator=","):
+    path.write_text("\n".join([header, *(separator.join(map(repr, row)) for row in rows)]) + "\n", encoding="utf-8")
+    return path
+
+
+@pytest.mark.parametrize(
+    ("header", "factor", "offset", "remark"),
+    [
+        ("t", 1, 0, None),
+        ("Time", 1, 0, None),
+        ("time [ms]", 1000, 0, None),
+        ("timestamp_us", 10**6, 0, None),
+        ("time", 1, EPOCH, "in 1 s since 1970"),
+        ("__time", 1000, EPOCH * 1000, "in 0.001 s since 1970"),
+        ("stamp (ns)", 10**9, EPOCH * 10**9, "in 1e-09 s since 1970"),
+        ("timestamp", 10**9, EPOCH * 10**9, "in 1e-09 s since 1970"),
+    ],
+)
+def test_columns_of_times(header, factor, offset, remark, tmp_path):
+    """All say 0, 0.5, 1.25 s."""
+    rows = [(offset + round(t * factor) if offset else t * factor, a, b) for t, a, b in ROWS]
+    if factor == 1:
+        rows = [(offset + t, a, b) for t, a, b in ROWS]
+    table = load_waypoints(write(tmp_path / "path.csv", f"{header},hip,knee", rows))
+    np.testing.assert_allclose(table.times, [0, 0.5, 1.25], rtol=0, atol=3e-7 if offset else 0)
+    assert len(table.remarks) == (remark is not None)
+    assert remark is None or remark in table.remarks[0]
+
+
+@pytest.mark.parametrize("header", ["seconds from start", "x", "tt", "date", "time (min)"])
+def test_what_is_no_column_of_times(header, tmp_path):
+    with pytest.raises(InputError, match="expected a header"):
+        load_waypoints(write(tmp_path / "path.csv", f"{header},value", [(0, 1), (1, 2)]))
+
+
+@pytest.mark.parametrize(
+    ("names", "column"), [("hip,knee", 1), ("hip.coordinate,knee.coordinate", 1), ("value,knee", 0)]
+)
+def test_the_column_of_a_joint(names, column, tmp_path):
+    write(tmp_path / "path.csv", f"t,{names}", ROWS)
+    keys = {"name": "bend", "joint": "knee", "waypoints": "path.csv"}
+    trajectory = validate(SpatialTrajectory, keys, tmp_path / "scene.toml")
+    sampled = trajectory.components["value"].sample(np.array([0.0, 0.5, 1.25]))[0]
+    np.testing.assert_allclose(sampled, [row[1 + column] for row in ROWS], rtol=0, atol=1e-14)
+
+
+def test_a_table_without_the_joint(tmp_path):
+    write(tmp_path / "path.csv", "t,hip,knee", ROWS)
+    with pytest.raises(InputError, match=r'header t,value or t,JOINT, found "t,hip,knee"'):
+        validate(SpatialTrajectory, {"name": "n", "joint": "toe", "waypoints": "path.csv"}, tmp_path / "scene.toml")
+
+
+def test_rows_twice_and_gaps(tmp_path):
+    rows = [(0.01 * k, 0.02 * k) for k in range(40)]
+    rows = [*rows[:9], rows[8], *rows[9:], (5.0, 1.0)]
+    table = load_waypoints(write(tmp_path / "path.csv", "t,value", rows))
+    assert len(table.times) == 41
+    assert table.remarks == (
+        "path.csv: line 11: 1 rows that repeat the one before count once",
+        "path.csv: no rows between t = 0.39 and 5 s, where others are 0.01 s apart: the path there is the spline's"
+        " alone",
+    )
+    with pytest.raises(InputError, match=r"line 3: expected times that increase, found t = 0 after 0"):
+        load_waypoints(write(tmp_path / "path.csv", "t,value", [(0, 1), (0, 2)]))
+
+
+def test_remarks_are_printed(tmp_path, ffrobot):
+    write(tmp_path / "path.csv", "time,value", [(EPOCH + t, a) for t, a, _ in ROWS])
+    (tmp_path / "scene.toml").write_text(
+        """
+name = "pendulum"
+space = "spatial"
+gravity = [0.0, 0.0, -9.81]
+joint = [{ name = "hip", type = "revolute", between = ["ground", "arm.root"], axis = [0.0, 1.0, 0.0] }]
+trajectory = [{ name = "swing", joint = "hip", waypoints = "path.csv" }]
+analysis = [{ name = "inverse", kind = "pcid", end = 1.25, output_step = 0.25 }]
+
+[[body]]
+name = "arm"
+rigid.mass = 1.0
+rigid.center = [0.3, 0.0, 0.0]
+rigid.inertia = [0.01, 0.02, 0.02]
+rigid.points.root = [0.0, 0.0, 0.0]
+"""
+    )
+    done = ffrobot("solve", tmp_path / "scene.toml")
+    assert done.returncode == 0, done.stderr
+    assert "path.csv: times are those of a clock" in done.stdout
+
+
+def points(time):
+    return [{"positions": [a, b], "time_from_start": time(t)} for t, a, b in ROWS]
+
+
+MESSAGES = {
+    "ROS 2": {
+        "joint_names": ["hip", "knee"],
+        "points": points(lambda t: {"sec": int(t), "nanosec": round(t % 1 * 1e9)}),
+    },
+    "ROS 1": {
+        "joint_names": ["hip", "knee"],
+        "points": points(lambda t: {"secs": int(t), "nsecs": round(t % 1 * 1e9)}),
+    },
+    "numbers": {"trajectory": {"joint_trajectory": {"joint_names": ["hip", "knee"], "points": points(float)}}},
+}
+
+
+@pytest.mark.parametrize("kind", MESSAGES)
+def test_joint_trajectories(kind, tmp_path):
+    (tmp_path / "plan.json").write_text(json.dumps(MESSAGES[kind]))
+    motion = read_motion(tmp_path / "plan.json")
+    assert motion.joints == ("hip", "knee")
+    np.testing.assert_array_equal(np.column_stack([motion.time, motion.positions]), ROWS)
+
+
+WRONG = {
+    "[1, 2]": "expected a JointTrajectory",
+    "{": "expected JSON",
+    '{"joint_names": ["a"], "points": 3}': "expected points",
+    '{"joint_names": ["a"], "points": []}': "at least 2 points",
+    '{"joint_names": ["a"], "points": [{"positions": [1, 2], "time_from_start": 0}]}': "expected 1 positions",
+    '{"joint_names": ["a"], "points": [{"positions": ["x"], "time_from_start": 0}]}': "expected points",
+    '{"joint_names": ["a"], "points": [{"positions": [1]}]}': "expected points",
+    '{"joint_names": ["a"], "points": [{"positions": [NaN], "time_from_start": 0},'
+    ' {"positions": [1], "time_from_start": 1}]}': "finite positions",
+    '{"joint_names": ["a"], "points": [{"positions": [0], "time_from_start": 1},'
+    ' {"positions": [1], "time_from_start": 1}]}': "point 1: expected times that increase, found 1 s after 1 s",
+    '{"joint_names": ["a", "a"], "points": [{"positions": [0, 1], "time_from_start": 1}]}': "joints of different names",
+}
+
+
+@pytest.mark.parametrize("text", WRONG)
+def test_wrong_motions(text, tmp_path):
+    (tmp_path / "plan.json").write_text(text)
+    with pytest.raises(InputError) as error:
+        read_motion(tmp_path / "plan.json")
+    assert str(error.value).startswith(f"{tmp_path / 'plan.json'}: ")
+    assert WRONG[text] in str(error.value)
+
+
+@pytest.mark.parametrize("version", [8, 9])
+def test_joint_states_of_a_bag(version, tmp_path, ffrobot):
+    """Written by rosbags, whose messages name joints in any order."""
+    from rosbags.rosbag2 import Writer
+    from rosbags.typesys import Stores, get_typestore
+
+    types = get_typestore(Stores.ROS2_HUMBLE)
+    of = types.types
+    kind = "sensor_msgs/msg/JointState"
+    with Writer(tmp_path / "bag", version=version) as writer:
+        topic = writer.add_connection("/joint_states", kind, typestore=types)
+        for k, (t, hip, knee) in enumerate(ROWS):
+            stamp = of["builtin_interfaces/msg/Time"](sec=EPOCH + int(t), nanosec=round(t % 1 * 1e9))
+            header = of["std_msgs/msg/Header"](stamp=stamp, frame_id="")
+            pairs = [("hip", hip), ("knee", knee)][:: 1 if k % 2 == 0 else -1]
+            none = np.zeros(0)
+            message = of[kind](header, [name for name, _ in pairs], np.array([q for _, q in pairs]), none, none)
+            writer.write(topic, EPOCH * 10**9 + k, types.serialize_cdr(message, kind))
+    done = ffrobot("import", tmp_path / "bag", "-o", tmp_path / "path.csv")
+    assert done.returncode == 0, done.stderr
+    assert "measured positions of /joint_states" in done.stdout
+    table = load_waypoints(tmp_path / "path.csv")
+    assert table.columns == ("hip", "knee")
+    np.testing.assert_array_equal(np.column_stack([table.times, table.values]), ROWS)
+    again = ffrobot("import", tmp_path / "bag", "-o", tmp_path / "path.csv")
+    assert again.returncode == 2
+    (tmp_path / "bag" / "metadata.yaml").write_text("not: a bag\n")
+    broken = ffrobot("import", tmp_path / "bag", "-o", tmp_path / "other.csv")
+    assert (broken.returncode, "expected a bag of ROS" in broken.stderr) == (2, True)
