@@ -8,7 +8,7 @@ from typing import Protocol, TypeVar
 
 from ..fe_models.modal_body import ModalBody
 from ..mbs.analysis.context import Context
-from ..mbs.analysis.outcome import Outcome
+from ..mbs.analysis.planar_outcome import PlanarOutcome
 from ..mbs.model.divided_link import DividedLink
 from ..mbs.model.model import Model
 from .patches.patches import PatchArray
@@ -29,7 +29,7 @@ class WholeLinks:
     patches: Mapping[str, PatchArray]
     divided: Mapping[str, DividedLink]
     places: Mapping[str, str]
-    told: Callable[[Outcome], Outcome]
+    told: Callable[[PlanarOutcome], PlanarOutcome]
 
 
 Point = TypeVar("Point", str, str | None)

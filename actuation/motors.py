@@ -11,7 +11,7 @@ from ..common.arrays import Array, Booleans, as_floats
 from ..common.peaks import largest, root_mean_square, shares
 from ..mbs._core import TimeFunction
 from ..mbs.analysis.motors_only import InvertedPath
-from ..mbs.analysis.outcome import Outcome
+from ..mbs.analysis.planar_outcome import PlanarOutcome
 from ..mbs.joints.joint import JointRecord
 from ..mbs.joints.transmission import MotorLimits
 from ..mbs.quantities.joint_motion import joint_motions, motor_motion
@@ -78,7 +78,7 @@ class MotorFeasibility:
         )
 
 
-def judge_motors(outcome: Outcome, joints: Mapping[str, JointRecord]) -> dict[str, MotorFeasibility]:
+def judge_motors(outcome: PlanarOutcome, joints: Mapping[str, JointRecord]) -> dict[str, MotorFeasibility]:
     """What every motor has to do against its limits; behind a gear that gives it turns otherwise than its joint."""
     moments = outcome.motor_moments
     assert moments is not None
@@ -89,7 +89,7 @@ def judge_motors(outcome: Outcome, joints: Mapping[str, JointRecord]) -> dict[st
     }
 
 
-def _judge(outcome: Outcome, joint: JointRecord, moment: Array, rate: Array) -> MotorFeasibility:
+def _judge(outcome: PlanarOutcome, joint: JointRecord, moment: Array, rate: Array) -> MotorFeasibility:
     judged = judge_motion(outcome.time, moment, rate, joint.motor_limits, outcome.analysis.last_time)
     return replace(judged, jump=path_jump(outcome, judged.moment_time)) if judged.has_spike else judged
 
@@ -118,7 +118,7 @@ def first_time(time: Array, beyond: Booleans) -> Array:
     return np.where(beyond.any(axis=0), time[beyond.argmax(axis=0)], np.nan)
 
 
-def path_jump(outcome: Outcome, at: float) -> str:
+def path_jump(outcome: PlanarOutcome, at: float) -> str:
     """Which derivative of a trajectory jumps near the time `at` (s), if moments follow from it.
 
     "acceleration", in motors-only analyses "jerk" too, else "": a path is held before t = 0 and after its end.

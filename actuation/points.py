@@ -16,7 +16,7 @@ from ..common.plane import rotated
 from ..common.validation import Record, did_you_mean, quoted
 from ..fe_models.modal_body import Interface, ModalBody
 from ..mbs import _core
-from ..mbs.analysis.outcome import Outcome
+from ..mbs.analysis.planar_outcome import PlanarOutcome
 from ..mbs.analysis.replay import PointActuator
 from ..mbs.fields.field_types import Name
 from ..mbs.fields.references import Reference
@@ -159,7 +159,7 @@ def with_points(planar: PlanarBody, chosen: PointSet) -> PlanarBody:
     return replace(planar, points=MappingProxyType({**planar.points, **own}))
 
 
-def solve_point_forces(chosen: PointSet, outcome: Outcome) -> PointForces:
+def solve_point_forces(chosen: PointSet, outcome: PlanarOutcome) -> PointForces:
     """L_a F_a = Q_a at every output time."""
     Q_a = driving_forces(outcome, chosen.body)
     q = outcome.q[:, outcome.coordinates(chosen.body)]
@@ -173,7 +173,7 @@ def solve_point_forces(chosen: PointSet, outcome: Outcome) -> PointForces:
     return PointForces(force, unmet, np.linalg.norm(unmet * chosen.scale, axis=1), rank, condition)
 
 
-def driving_forces(outcome: Outcome, body: str) -> Array:
+def driving_forces(outcome: PlanarOutcome, body: str) -> Array:
     """Q_a = −C_sqᵀ λ_s, less λ_p where p is prescribed: (T, 3 + n) on (R, θ, p) of a body, R in global axes."""
     assembly, columns = outcome.assembly, outcome.coordinates(body)
     C_q = assembly.system.constraint_jacobians(outcome.q)[:, assembly.is_trajectory][:, :, columns]

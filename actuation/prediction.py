@@ -9,7 +9,7 @@ import numpy as np
 
 from ..common.arrays import Array
 from ..common.plane import rotated
-from ..mbs.analysis.outcome import Outcome
+from ..mbs.analysis.planar_outcome import PlanarOutcome
 from ..mbs.model.masses import system_mass_matrix
 from ..mbs.quantities.joint_space import held_joint_motion, motor_joint_motion
 from .patches.voltages import Voltages
@@ -51,7 +51,7 @@ class Unsupplied:
         )
 
 
-def unmet_modal_forces(outcome: Outcome, voltages: Mapping[str, Voltages]) -> Array:
+def unmet_modal_forces(outcome: PlanarOutcome, voltages: Mapping[str, Voltages]) -> Array:
     """F_p (T, modes of all bodies) less what patches do within their limits; all of it on links without patches."""
     assert outcome.F_p is not None
     unmet = outcome.F_p.copy()
@@ -60,7 +60,7 @@ def unmet_modal_forces(outcome: Outcome, voltages: Mapping[str, Voltages]) -> Ar
     return unmet
 
 
-def predicted_shift(outcome: Outcome, unmet: Array) -> dict[str, Array]:
+def predicted_shift(outcome: PlanarOutcome, unmet: Array) -> dict[str, Array]:
     """Shift (T, 2), m, global axes, of every point by unmet modal forces r, where motors keep their angles.
 
     To first order, and slowly: δp = −K⁻¹ r, δq = ∂q/∂p δp, δr = δR + A_θ u δθ + A Φ δp. Vibration that a sudden lack of
@@ -70,7 +70,7 @@ def predicted_shift(outcome: Outcome, unmet: Array) -> dict[str, Array]:
 
 
 def unsupplied(
-    outcome: Outcome, unmet: Array, shift: Mapping[str, Array], bodies: tuple[str, ...], *, with_patches: bool
+    outcome: PlanarOutcome, unmet: Array, shift: Mapping[str, Array], bodies: tuple[str, ...], *, with_patches: bool
 ) -> Unsupplied:
     """What motors miss by the `unmet` modal forces, of `bodies` above all; their `shift` (T, 2) of points is known."""
     trajectories = outcome.assembly.model.scene.trajectory
@@ -83,14 +83,14 @@ def unsupplied(
     return Unsupplied(bodies, with_patches, point, float(kept.max()), float(kept[0]), RINGING * float(freed.max()))
 
 
-def _held_shift(outcome: Outcome, unmet: Array) -> Array:
+def _held_shift(outcome: PlanarOutcome, unmet: Array) -> Array:
     """δq (T, coordinates) with the angles of motors kept."""
     stiffness = np.concatenate([body.stiffness for body in outcome.assembly.model.bodies])
     shift: Array = np.einsum("tkn,tn->tk", held_joint_motion(outcome), -unmet / stiffness)
     return shift
 
 
-def _freed_shift(outcome: Outcome, unmet: Array, rows: slice) -> Array:
+def _freed_shift(outcome: PlanarOutcome, unmet: Array, rows: slice) -> Array:
     """δq of these rows with the moments of motors kept: the robot recoils by γ, no momentum comes from within.
 
     δq = δq_held + R γ with Rᵀ M δq = 0, R = ∂q/∂γ: unmet modal forces do no work while p stands still.
@@ -102,7 +102,7 @@ def _freed_shift(outcome: Outcome, unmet: Array, rows: slice) -> Array:
     return shift
 
 
-def _shift_of_points(outcome: Outcome, delta_q: Array, rows: slice) -> dict[str, Array]:
+def _shift_of_points(outcome: PlanarOutcome, delta_q: Array, rows: slice) -> dict[str, Array]:
     """δr (outputs, 2) of every point for δq (outputs, coordinates) of these rows."""
     shifts = {}
     for body in outcome.assembly.model.bodies:

@@ -6,7 +6,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 from ..fe_models.modal_body import ModalBody
-from ..mbs.analysis.spatial_run import SpatialContext, SpatialRun
+from ..mbs.analysis.outcome import Outcome
+from ..mbs.analysis.spatial_run import SpatialContext
 from ..mbs.model.divided_link import DividedLink
 from ..mbs.model.spatial_body import SpatialBody
 from ..mbs.model.spatial_model import SpatialModel
@@ -27,7 +28,7 @@ class WholeLinksInSpace:
     model: SpatialModel
     divided: Mapping[str, DividedLink]
     places: Mapping[str, str]
-    told: Callable[[SpatialRun], SpatialRun]
+    told: Callable[[Outcome], Outcome]
 
 
 @dataclass(frozen=True)

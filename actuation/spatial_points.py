@@ -18,7 +18,7 @@ from ..common.arrays import Array
 from ..common.errors import InputError
 from ..common.validation import Record
 from ..fe_models.modal_body import ModalBody
-from ..mbs.analysis.spatial_run import SpatialRun
+from ..mbs.analysis.outcome import Outcome
 from ..mbs.fields.references import Reference
 from ..mbs.model.spatial_body import SpatialBody, SpatialPoint
 from ..mbs.model.spatial_model import SpatialModel, row_values
@@ -122,7 +122,7 @@ def with_spatial_points(spatial: SpatialBody, chosen: SpatialPointSet) -> Spatia
     return replace(spatial, points=MappingProxyType({**spatial.points, **own}))
 
 
-def solve_spatial_points(chosen: SpatialPointSet, run: SpatialRun) -> PointForces:
+def solve_spatial_points(chosen: SpatialPointSet, run: Outcome) -> PointForces:
     """L_a F_a = Q_a at every output time; `unmet` (T, 6 + n) with force and moment on the frame in axes of the body."""
     node = run.model.tree.nodes[run.model.tree.index[chosen.body]]
     Q_a = driving_forces_in_space(run)[chosen.body]
@@ -136,7 +136,7 @@ def solve_spatial_points(chosen: SpatialPointSet, run: SpatialRun) -> PointForce
     return PointForces(force, unmet, np.linalg.norm(unmet * chosen.scale, axis=1), rank, condition)
 
 
-def forces_at_points(chosen: Mapping[str, SpatialPointSet], run: SpatialRun) -> dict[str, Array]:
+def forces_at_points(chosen: Mapping[str, SpatialPointSet], run: Outcome) -> dict[str, Array]:
     """By "BODY.POINT" the force (T, 3) there, N, global axes, along the motion of a run.
 
     Raises `InputError` where a body without points has driving forces.
@@ -159,7 +159,7 @@ def forces_at_points(chosen: Mapping[str, SpatialPointSet], run: SpatialRun) -> 
     return found
 
 
-def driving_forces_in_space(run: SpatialRun) -> dict[str, Array]:
+def driving_forces_in_space(run: Outcome) -> dict[str, Array]:
     """Q_a by body, (T, 6 + n): force and moment on its frame, both in its axes, and on its modes."""
     model, frames = run.model, run.model.tree.frames(run.q)
     found: dict[str, Array] = {
@@ -172,9 +172,9 @@ def driving_forces_in_space(run: SpatialRun) -> dict[str, Array]:
                 if section.body >= 0:
                     body = model.tree.nodes[section.body].body
                     found[body.name] += _on_body(model, run.q, frames, section, wrench)
-    if run.required is not None:  # a shape is held besides, by forces on the modes alone
+    if run.forces.required is not None:  # a shape is held besides, by forces on the modes alone
         C_v = row_values(model, run.q, run.time, frames)[1]
-        held = run.required - path_forces(model, C_v, run.multipliers)
+        held = run.forces.required - path_forces(model, C_v, run.multipliers)
         for node in model.tree.nodes:
             found[node.body.name][:, 6:] += held[:, node.p_v]
     return found

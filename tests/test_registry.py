@@ -13,7 +13,8 @@ from typing import Literal
 
 import numpy as np
 
-from ffrobot.mbs.analysis.outcome import Motion, Outcome
+from ffrobot.mbs.analysis.outcome import Motion
+from ffrobot.mbs.analysis.planar_outcome import PlanarOutcome
 from ffrobot.mbs.fields.field_types import Positive
 from ffrobot.mbs.fields.references import Reference
 from ffrobot.mbs.model.system import MechanismSystem
@@ -42,7 +43,7 @@ class Turntable(TimedAnalysis):
         v[:, 2] = self.rate
         held = len(system.constraints)
         motion = Motion(t, q, v, np.zeros_like(q), np.zeros((len(t), held)), np.zeros((len(t), 3)))
-        return Outcome(self, system, motion)
+        return PlanarOutcome(analysis=self, assembly=system, motion=motion)
 '''
 
 SOLVE = """

@@ -15,7 +15,8 @@ from ...common.arrays import Array, as_list
 from ...common.errors import SolveError
 from ...mbs.analysis.drive import Progress, SampledControl, drive, initial_state
 from ...mbs.analysis.elastic_joints import rotors_like, with_compliance, with_rotors
-from ...mbs.analysis.outcome import Forces, Outcome
+from ...mbs.analysis.outcome import Forces
+from ...mbs.analysis.planar_outcome import PlanarOutcome
 from ...mbs.analysis.replay import motor_limits, replay_times
 from ...mbs.model.model import ZERO, Model, load_measures
 from ...mbs.model.raised_mass import coordinate_factors, factors_of, integrated, modal_factors
@@ -61,7 +62,7 @@ class ClosedLoop(SampledAnalysis):
                 )
         return self
 
-    def run(self, context: ActuatedContext) -> Outcome:
+    def run(self, context: ActuatedContext) -> PlanarOutcome:
         """Motion and commands."""
         source = context.source(self.actuation)
         assert source is not None
@@ -71,11 +72,11 @@ class ClosedLoop(SampledAnalysis):
 def run_closed_loop(
     model: Model,
     analysis: ClosedLoop,
-    source: Outcome,
+    source: PlanarOutcome,
     patches: Mapping[str, PatchArray],
     progress: Progress,
     whole: WholeLinks | None = None,
-) -> Outcome:
+) -> PlanarOutcome:
     """The closed loop of `analysis` about the motion of the inverse analysis `source`, from its initial state.
 
     Controllers know the `whole` links of a robot in which some are in pieces, sensors and patches act on the pieces.
@@ -115,13 +116,13 @@ def run_closed_loop(
         analysis, setup, loop, acting, (runs[0], runs[1]), loop_models(built, moved), gears=bool(built.gears)
     )
 
-    def told(of: Outcome) -> Outcome:
+    def told(of: PlanarOutcome) -> PlanarOutcome:
         return replace(of, forces=Forces(tau=held(of.time)[:, : len(model.motors)]), details=record)
 
     return replace(told(outcome), look_closer=cache(lambda: told(outcome.closer)))
 
 
-def loop_models(model: Model, reference: Outcome) -> tuple[LinearModel, ...]:
+def loop_models(model: Model, reference: PlanarOutcome) -> tuple[LinearModel, ...]:
     """The robot at rest on its reference at start, middle and end; none where it is singular."""
     rows = sorted({0, len(reference.time) // 2, len(reference.time) - 1})
     linearisation, rest = Linearisation(model, reference.q[0]), np.zeros_like(reference.v[0])
@@ -148,7 +149,7 @@ def _assembly(
     model: Model,
     built: Model,
     analysis: ClosedLoop,
-    source: Outcome,
+    source: PlanarOutcome,
     read: Sequence[Signal],
     whole: WholeLinks | None,
 ) -> MechanismSystem:
@@ -164,7 +165,7 @@ def _setup(
     robot: PlanarRobot,
     model: Model,
     analysis: ClosedLoop,
-    source: Outcome,
+    source: PlanarOutcome,
     patches: Mapping[str, PatchArray],
     read: Sequence[Signal],
     outputs: Array,
@@ -179,11 +180,11 @@ def _setup(
     )  # fmt: skip
 
 
-def _states(outcome: Outcome) -> tuple[Array, ...]:
+def _states(outcome: PlanarOutcome) -> tuple[Array, ...]:
     return tuple(np.ascontiguousarray(x) for x in (outcome.q, outcome.v, outcome.a))
 
 
-def _start(assembly: MechanismSystem, analysis: ClosedLoop, source: Outcome, rigid: Model) -> State:
+def _start(assembly: MechanismSystem, analysis: ClosedLoop, source: PlanarOutcome, rigid: Model) -> State:
     """As `source` starts, or as the scene says, with the rotors of elastic gears wound as in `source`."""
     if analysis.start == "actuation":
         return State(source.q[0].copy(), source.v[0].copy())
@@ -191,7 +192,7 @@ def _start(assembly: MechanismSystem, analysis: ClosedLoop, source: Outcome, rig
     return rotors_like(assembly.model, start, source)
 
 
-def _followed(outcome: Outcome, source: Outcome, held: Array, tip: str | None) -> Followed:
+def _followed(outcome: PlanarOutcome, source: PlanarOutcome, held: Array, tip: str | None) -> Followed:
     """Where the tip went against where it should be; `tip` is the point that the scene names, if any."""
     tip = tip or default_tip(outcome)
     paths = [path.components for path in outcome.assembly.model.scene.trajectory if path.point == tip]
@@ -204,7 +205,7 @@ def _followed(outcome: Outcome, source: Outcome, held: Array, tip: str | None) -
     return Followed(outcome.time, error, place, motor_rates(outcome), held, completed, is_disturbed)
 
 
-def default_tip(outcome: Outcome) -> str:
+def default_tip(outcome: PlanarOutcome) -> str:
     """The point whose error is reported: that of the first trajectory of a point, or the last tip."""
     scene = outcome.assembly.model.scene
     driven = [trajectory.point for trajectory in scene.trajectory if trajectory.point is not None]
@@ -215,7 +216,7 @@ def default_tip(outcome: Outcome) -> str:
 
 
 def _feed_forward(
-    model: Model, analysis: ClosedLoop, source: Outcome, patches: Mapping[str, PatchArray], times: Array
+    model: Model, analysis: ClosedLoop, source: PlanarOutcome, patches: Mapping[str, PatchArray], times: Array
 ) -> Array:
     """(K, inputs) moments and voltages of the inverse analysis, in the middle of the time for which each is held."""
     voltages: list[Array] = [np.zeros((len(times), len(array.edges))) for array in patches.values()]
@@ -233,7 +234,7 @@ def _feed_forward(
     return np.hstack([moments, *voltages])
 
 
-def _found(source: Outcome, times: Array) -> tuple[Array, Array | None]:
+def _found(source: PlanarOutcome, times: Array) -> tuple[Array, Array | None]:
     """τ and F_p that an inverse analysis found, at any time where it was recorded or is algebraic, else by a spline."""
     moments, F_p = source.motor_moments, source.F_p
     assert moments is not None
@@ -241,6 +242,6 @@ def _found(source: Outcome, times: Array) -> tuple[Array, Array | None]:
     if anytime is None:
         return between(times, source.time, moments), None if F_p is None else between(times, source.time, F_p)
     tau, F_p = anytime.sample(as_list(times))
-    if source.continuation is not None and source.continuation.assembly is not None and F_p is not None:
+    if source.integrated is not None and F_p is not None:
         F_p = F_p * modal_factors(source.assembly.model)
     return between(times, source.time, moments) if source.gears else tau, F_p

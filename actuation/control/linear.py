@@ -8,7 +8,8 @@ from itertools import combinations
 from typing import Literal
 
 from ...mbs.analysis.operating_points import InstantAnalysis, operating_points
-from ...mbs.analysis.outcome import Details, Outcome
+from ...mbs.analysis.outcome import Details
+from ...mbs.analysis.planar_outcome import PlanarOutcome
 from ...mbs.fields.field_types import PointReference
 from ...mbs.fields.references import Reference
 from ...mbs.model.model import Model
@@ -38,7 +39,7 @@ class Linear(InstantAnalysis):
         for point in self.points or ():
             yield Reference("points", point, needs_marker=True)
 
-    def run(self, context: ActuatedContext) -> Outcome:
+    def run(self, context: ActuatedContext) -> PlanarOutcome:
         """The operating points, with `LinearModels` about them."""
         outcome = operating_points(context.model, self, context.source(self.source))
         whole = context.whole
@@ -74,7 +75,7 @@ class LinearModels(Details):
 
 
 def linear_models(
-    outcome: Outcome, patches: Mapping[str, PatchArray], points: Sequence[str] | Mapping[str, str] | None = None
+    outcome: PlanarOutcome, patches: Mapping[str, PatchArray], points: Sequence[str] | Mapping[str, str] | None = None
 ) -> tuple[LinearModel, ...]:
     """The linear models about the rows of `outcome`, which know of the `points`, or of those of trajectories.
 

@@ -12,7 +12,7 @@ import numpy as np
 from ...common.errors import InputError
 from ...fe_models.modal_body import ModalBody
 from ...mbs.analysis.operating_points import InstantAnalysis, operating_points
-from ...mbs.analysis.outcome import Outcome
+from ...mbs.analysis.planar_outcome import PlanarOutcome
 from ...mbs.fields.references import Reference
 from ...mbs.model.planar_body import PlanarBody
 from ...mbs.scene.analysis import Surroundings
@@ -60,14 +60,16 @@ class PatchPlacement(InstantAnalysis):
                 )
         yield from super().problems(among)
 
-    def run(self, context: ActuatedContext) -> Outcome:
+    def run(self, context: ActuatedContext) -> PlanarOutcome:
         """The operating point, or those of the path, with what was `Placed`."""
         source = context.source(self.source)
         outcome = operating_points(context.model, self, source)
         return replace(outcome, details=_placed(self, context, outcome, source))
 
 
-def _placed(analysis: PatchPlacement, context: ActuatedContext, outcome: Outcome, source: Outcome | None) -> Placed:
+def _placed(
+    analysis: PatchPlacement, context: ActuatedContext, outcome: PlanarOutcome, source: PlanarOutcome | None
+) -> Placed:
     """The best places for the patches of one body, about `outcome` or over the path of its `source`."""
     robot, wanted, model, F_p = context.model, analysis.placement, None, None
     if analysis.is_over_path:

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from ...common.arrays import Array
-from ...mbs.analysis.outcome import Outcome
+from ...mbs.analysis.planar_outcome import PlanarOutcome
 from ...mbs.model.model import Model
 from ...mbs.solve.linearisation import LinearMechanism, linearise
 from ..patches.patches import PatchArray
@@ -27,7 +27,7 @@ class PlanarRobot:
 
     model: Model
     arrays: Mapping[str, PatchArray]
-    source: Outcome
+    source: PlanarOutcome
 
     @property
     def path(self) -> Path:

@@ -10,7 +10,7 @@ import numpy as np
 from ...common.arrays import Array, as_floats
 from ...common.errors import InputError
 from ...mbs import _core
-from ...mbs.analysis.outcome import Outcome
+from ...mbs.analysis.planar_outcome import PlanarOutcome
 from ...mbs.model.model import ZERO, Constraint, Model
 from ...mbs.model.planar_body import PlanarBody, PlanarPoint
 from ...mbs.model.planar_tree import PlanarTree
@@ -27,7 +27,7 @@ class RigidArm:
     Raises `InputError` where the motors do not fit the mechanism.
     """
 
-    def __init__(self, model: Model, source: Outcome | None = None) -> None:
+    def __init__(self, model: Model, source: PlanarOutcome | None = None) -> None:
         """`source` is the motion at whose start its `angles` are."""
         if len(model.motors) != model.degrees_of_freedom:
             raise InputError(

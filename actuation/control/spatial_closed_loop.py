@@ -12,11 +12,11 @@ import numpy as np
 
 from ...common.arrays import Array
 from ...common.errors import InputError, SolveError
+from ...mbs.analysis.outcome import Outcome
 from ...mbs.analysis.spatial_drive import SpatialControl, spatial_drive
 from ...mbs.analysis.spatial_forward import largest_moments
 from ...mbs.analysis.spatial_gears import WoundUp, wound_up
 from ...mbs.analysis.spatial_replay import in_parts, motor_forces_of, replay_times
-from ...mbs.analysis.spatial_run import SpatialRun
 from ...mbs.model.spatial_drives import Command, Drives, PointDrive
 from ...mbs.model.spatial_gears import with_compliance_in_space
 from ...mbs.model.spatial_model import SpatialModel, modal_direction, without_paths
@@ -62,7 +62,7 @@ class _Plant(NamedTuple):
     source: WoundUp
 
 
-def run_spatial_closed_loop(context: ActuatedSpatialContext, analysis: SpatialClosedLoop) -> SpatialRun:
+def run_spatial_closed_loop(context: ActuatedSpatialContext, analysis: SpatialClosedLoop) -> Outcome:
     """The closed loop of `analysis` about the motion of an inverse analysis, from its initial state.
 
     The run's details are a `LoopRecord`. One that diverges ends there and is kept. Raises `InputError` for controllers
@@ -101,14 +101,14 @@ def run_spatial_closed_loop(context: ActuatedSpatialContext, analysis: SpatialCl
     gears = bool(plant.model.tree.gears)
     record = loop_record(analysis, setup, loop, acting, (runs[0], runs[1]), models, gears=gears)
 
-    def told(of: SpatialRun) -> SpatialRun:
+    def told(of: Outcome) -> Outcome:
         commanded, driving = (_by_joint(context.model, commands(of.time)) for commands in (held, before))
-        return replace(of, commanded=commanded, driving=driving, details=record)
+        return replace(of, forces=replace(of.forces, commanded=commanded, driving=driving), details=record)
 
     return replace(told(run), look_closer=cache(lambda: told(run.closer)))
 
 
-def _robot(context: ActuatedSpatialContext, source: SpatialRun) -> SpatialRobot:
+def _robot(context: ActuatedSpatialContext, source: Outcome) -> SpatialRobot:
     """What controllers know of: whole links also where the plant has their pieces."""
     if context.whole is None:
         return SpatialRobot(without_paths(context.model), context.patches, source)
@@ -124,7 +124,7 @@ def loop_models_in_space(model: SpatialModel, time: Array, reference: WoundUp) -
     return ()
 
 
-def _plant(context: ActuatedSpatialContext, source: SpatialRun) -> _Plant:
+def _plant(context: ActuatedSpatialContext, source: Outcome) -> _Plant:
     model = with_compliance_in_space(without_paths(context.model))
     return _Plant(model, wound_up(source, model))
 
@@ -132,7 +132,7 @@ def _plant(context: ActuatedSpatialContext, source: SpatialRun) -> _Plant:
 def _setup(
     context: ActuatedSpatialContext,
     analysis: SpatialClosedLoop,
-    source: SpatialRun,
+    source: Outcome,
     robot: SpatialRobot,
     plant: _Plant,
     read: Sequence[SpatialSignal],
@@ -149,12 +149,12 @@ def _setup(
 
 
 def _feed_forward(
-    context: ActuatedSpatialContext, analysis: SpatialClosedLoop, source: SpatialRun, plant: _Plant, times: Array
+    context: ActuatedSpatialContext, analysis: SpatialClosedLoop, source: Outcome, plant: _Plant, times: Array
 ) -> Array:
     """(K, inputs) moments and voltages of the inverse analysis, in the middle of the time for which each is held."""
     middle = held_until(times, analysis, source.time[-1])
 
-    def found(run: SpatialRun) -> Array:
+    def found(run: Outcome) -> Array:
         forces = motor_forces_of(run)
         moments = np.hstack([*forces.moments.values(), np.zeros((len(run.time), 0))])
         if analysis.feed_forward == "none":
@@ -217,7 +217,7 @@ def _start(context: ActuatedSpatialContext, analysis: SpatialClosedLoop, plant: 
     return State(q, v)
 
 
-def _followed(run: SpatialRun, source: SpatialRun, held: Array, tip: str | None) -> Followed:
+def _followed(run: Outcome, source: Outcome, held: Array, tip: str | None) -> Followed:
     """Where the tip went against where it should be; `tip` is the point that the scene names, if any."""
     analysis, model = run.analysis, run.model
     assert isinstance(analysis, SpatialClosedLoop)
@@ -239,7 +239,7 @@ def _followed(run: SpatialRun, source: SpatialRun, held: Array, tip: str | None)
     )
 
 
-def _position(run: SpatialRun, point: str) -> Array:
+def _position(run: Outcome, point: str) -> Array:
     tree = run.model.tree
     return tree.motion(tree.section(point, np.eye(3)), run.q, tree.frames(run.q)).r
 

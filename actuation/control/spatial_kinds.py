@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from ...mbs.analysis.outcome import Outcome
 from ...mbs.analysis.spatial_kinds import MECHANICAL_IN_SPACE
-from ...mbs.analysis.spatial_run import SpatialRun
 from .spatial_closed_loop import run_spatial_closed_loop
 from .spatial_linear import run_spatial_linear
 from .spatial_placement import run_spatial_placement
 
-IN_SPACE: Mapping[str, Callable[[Any, Any], SpatialRun]] = {
+IN_SPACE: Mapping[str, Callable[[Any, Any], Outcome]] = {
     **MECHANICAL_IN_SPACE,
     "linear": run_spatial_linear,
     "closed-loop": run_spatial_closed_loop,

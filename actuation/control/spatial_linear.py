@@ -10,9 +10,9 @@ import numpy as np
 
 from ...common.arrays import Array
 from ...mbs._core import TimeFunction
-from ...mbs.analysis.operating_points import InstantAnalysis, row_at
+from ...mbs.analysis.operating_points import InstantAnalysis, of_earlier, row_at
+from ...mbs.analysis.outcome import Outcome
 from ...mbs.analysis.spatial_gears import wound_up
-from ...mbs.analysis.spatial_run import SpatialRun
 from ...mbs.analysis.spatial_static import run_spatial_static
 from ...mbs.model.spatial_gears import with_compliance_in_space
 from ...mbs.model.spatial_model import SpatialModel, without_paths
@@ -28,7 +28,7 @@ from .linear import Linear, LinearModels, analyse
 from .linear_model import LinearModel, state_space
 
 
-def run_spatial_linear(context: ActuatedSpatialContext, analysis: Linear) -> SpatialRun:
+def run_spatial_linear(context: ActuatedSpatialContext, analysis: Linear) -> Outcome:
     """The posture or instants that it is about, with `LinearModels`. Raises `SolveError` in singular postures."""
     run, about = operating_points_in_space(context, analysis)
     return replace(run, details=linear_models_in_space(context, analysis, about))
@@ -49,7 +49,7 @@ class OperatingPoints(NamedTuple):
 
 def operating_points_in_space(
     context: ActuatedSpatialContext, analysis: InstantAnalysis
-) -> tuple[SpatialRun, OperatingPoints]:
+) -> tuple[Outcome, OperatingPoints]:
     """The equilibrium, or the instants of a motion, that an analysis is about, as they were found, and their states."""
     model = with_compliance_in_space(without_paths(context.model))
     if analysis.source is None:
@@ -58,7 +58,7 @@ def operating_points_in_space(
     else:
         source = context.runs[analysis.source]
         rows = [row_at(model.scene.path, analysis, source, float(t)) for t in analysis.times]
-        run = replace(source.rows(rows), analysis=analysis, steps=0, evaluations=0, warnings=(), again=None)
+        run = of_earlier(source, analysis).at(rows)
     q, v, a, _ = wound_up(source, model)
     return run, OperatingPoints(model, run.time, q[rows], v[rows], a[rows])
 
@@ -76,7 +76,7 @@ def linear_models_in_space(context: ActuatedSpatialContext, analysis: Linear, ab
     return analyse(tuple(models))
 
 
-def _equilibrium(context: ActuatedSpatialContext, analysis: Analysis) -> SpatialRun:
+def _equilibrium(context: ActuatedSpatialContext, analysis: Analysis) -> Outcome:
     """Static; where nothing is followed, motors keep the initial posture."""
     model = context.model
     if not any(row.is_trajectory for row in model.rows):

@@ -8,8 +8,9 @@ import numpy as np
 
 from ...common.arrays import as_floats
 from ...common.errors import InputError
+from ...mbs.analysis.operating_points import of_earlier
+from ...mbs.analysis.outcome import Outcome
 from ...mbs.analysis.spatial_replay import motor_forces_of
-from ...mbs.analysis.spatial_run import SpatialRun
 from ...mbs.solve.spatial_linearisation import SpatialLinearisation
 from ..patches.patches import PatchArray
 from ..patches.spatial_patches import link_patches
@@ -21,7 +22,7 @@ from .placing import PatchableLink, elsewhere, place
 from .spatial_linear import operating_points_in_space
 
 
-def run_spatial_placement(context: ActuatedSpatialContext, analysis: PatchPlacement) -> SpatialRun:
+def run_spatial_placement(context: ActuatedSpatialContext, analysis: PatchPlacement) -> Outcome:
     """The operating point, or those of the path, with what was `Placed`.
 
     Raises `InputError` for a link with several layouts, or without room for the patches.
@@ -31,7 +32,7 @@ def run_spatial_placement(context: ActuatedSpatialContext, analysis: PatchPlacem
     if analysis.is_over_path:
         assert analysis.source is not None
         source = context.runs[analysis.source]
-        run = replace(source, analysis=analysis, steps=0, evaluations=0, warnings=(), again=None)
+        run = of_earlier(source, analysis)
         reached = context.patches[wanted.body].modes[link.layout.label]
         F_p = reached.forces(motor_forces_of(source).modal[wanted.body])
         return replace(run, details=place(model.scene.path, wanted, link, None, F_p))

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from ...common.arrays import Array, as_floats
-from ...mbs.analysis.spatial_run import SpatialRun
+from ...mbs.analysis.outcome import Outcome
 from ...mbs.model.spatial_model import SpatialModel
 from ...mbs.solve.linearisation import LinearMechanism
 from ...mbs.solve.spatial_linearisation import SpatialLinearisation, labelled
@@ -28,7 +28,7 @@ class SpatialRobot:
 
     model: SpatialModel
     of_links: Mapping[str, LinkPatches]
-    source: SpatialRun
+    source: Outcome
 
     @property
     def path(self) -> Path:

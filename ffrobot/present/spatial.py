@@ -28,10 +28,10 @@ def print_spatial_summary(
     motors = plain_table("analysis", "motor", "largest", "unit")
     units = {joint.name: joint.units for joint in solution.scene.joint}
     for name, result in solution.analyses.items():
-        run = result.run
+        run, how = result.run, result.run.statistics
         off = f"{result.motion.violation.max(initial=0.0):.1e}"
-        counts = f"{run.steps}", f"{run.evaluations}"
-        table.add_row(name, run.analysis.kind, run.status, run.integrator.name, *counts, off)
+        counts = f"{how.steps}", f"{how.evaluations}"
+        table.add_row(name, run.analysis.kind, run.status, how.integrator.name, *counts, off)
         motion = (result.closer or result).motion
         found = motion.motor_forces
         for joint, moments in {} if found is None else found.moments.items():
@@ -67,8 +67,8 @@ def print_spatial_summary(
             notes.add_row("verdict", f"{one.name}: {one.answer}")
         for text in (*([one.margins] if one.margins else []), *(f"to try: {text}" for text in one.advice)):
             notes.add_row("", f"{one.name}: {text}")
-    chosen = {name: one.run.integrator for name, one in solution.analyses.items() if one.run.analysis.is_integrated}
-    for line in integrator_lines(chosen):
+    runs = {name: one.run for name, one in solution.analyses.items() if one.analysis.is_integrated}
+    for line in integrator_lines({name: run.statistics.integrator for name, run in runs.items()}):
         notes.add_row("integrator", line)
     notes.add_row("accuracy", "\n".join(error_budget(solution)))
     for line in control_lines(details):

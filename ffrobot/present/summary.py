@@ -11,7 +11,8 @@ from rich.console import Console
 from rich.table import Table
 
 from ..mbs.analysis.motors_only import InvertedPath, describe_zeros, is_minimum_phase, path_error
-from ..mbs.analysis.outcome import Details, Outcome
+from ..mbs.analysis.outcome import Details
+from ..mbs.analysis.planar_outcome import PlanarOutcome
 from ..mbs.model.raised_mass import raised_in_words
 from ..results.verdict import Verdict
 from ..run.loaded_body import remarks_on_parts, rigid_in_words
@@ -100,7 +101,7 @@ def _notes(solution: Solution, seconds: Mapping[str, float]) -> Iterator[tuple[s
         yield "skipped", "; ".join(solution.omissions)
 
 
-def _inversion(outcome: Outcome, found: InvertedPath) -> str:
+def _inversion(outcome: PlanarOutcome, found: InvertedPath) -> str:
     """What the zeros are, how the path was inverted, and what that leaves of it."""
     inversion = found.inversion
     linear, factor = inversion.linearisation, inversion.servo.factor
@@ -142,6 +143,6 @@ def _voltages(solution: Solution) -> Table:
     )
 
 
-def _violation(outcome: Outcome) -> str:
+def _violation(outcome: PlanarOutcome) -> str:
     """The largest of position, velocity and acceleration level."""
     return f"{outcome.residual.max():.0e}" if outcome.residual.size else ""

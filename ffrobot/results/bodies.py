@@ -7,14 +7,14 @@ from collections.abc import Mapping
 import h5py
 
 from ..common.arrays import Array
-from ..mbs.analysis.outcome import Outcome
+from ..mbs.analysis.planar_outcome import PlanarOutcome
 from ..mbs.model.truncation import modes_kept
 from ..mbs.quantities.observation import body_motion, energies, modal_force, point_motion, stored_coordinates
 from ..mbs.quantities.stress import BodyStress, Recovery, SectionLoads, mode_displacement
 from ..mbs.quantities.validity import Bending
 
 
-def write_motion(group: h5py.Group, outcome: Outcome) -> None:
+def write_motion(group: h5py.Group, outcome: PlanarOutcome) -> None:
     """Of an analysis: bodies/, points/, energy/, and how far the constraints are violated."""
     group["time"] = outcome.time
     for body in outcome.assembly.model.links:

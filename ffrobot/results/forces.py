@@ -6,14 +6,14 @@ import h5py
 import numpy as np
 
 from ..mbs.analysis.motors_only import InvertedPath, is_minimum_phase, path_error
-from ..mbs.analysis.outcome import Outcome
+from ..mbs.analysis.planar_outcome import PlanarOutcome
 from ..mbs.quantities.joint_motion import joint_motions, motor_motion
 from ..mbs.quantities.observation import joint_forces, trajectory_force, trajectory_target
 from ..mbs.scene.spatial.trajectories import SpatialTrajectory
 from ..mbs.scene.trajectories import Trajectory
 
 
-def write_forces(group: h5py.Group, outcome: Outcome) -> None:
+def write_forces(group: h5py.Group, outcome: PlanarOutcome) -> None:
     """Of an analysis: trajectories/ that hold in it, and joints/."""
     held = {c.owner for c in outcome.assembly.constraints if c.is_trajectory}
     for trajectory in outcome.assembly.model.scene.trajectory:
@@ -44,7 +44,7 @@ def write_forces(group: h5py.Group, outcome: Outcome) -> None:
             entry.attrs["unresolved"] = gear.unresolved
 
 
-def write_inversion(group: h5py.Group, outcome: Outcome, found: InvertedPath) -> None:
+def write_inversion(group: h5py.Group, outcome: PlanarOutcome, found: InvertedPath) -> None:
     """Of motors-only inverse dynamics: no force acts on the path's points, which may be off it."""
     inversion = found.inversion
     error, column = path_error(inversion, outcome.time, outcome.q), 0

@@ -13,7 +13,7 @@ from ..actuation.control.linear import LinearModels
 from ..actuation.control.linear_model import LinearModel, save_arrays
 from ..actuation.control.zeros import Zeros
 from ..common.arrays import Array
-from ..mbs.analysis.outcome import Outcome
+from ..mbs.analysis.planar_outcome import PlanarOutcome
 from ..mbs.quantities.spatial_motion import SpatialMotion
 
 MATRICES = ("A", "B", "C", "D", "mass", "transformation")
@@ -24,7 +24,7 @@ Shapes = Mapping[str, Mapping[str, Array]]
 """By body, what the robot's modes (T, f) do to it: displacement, turn, modal coordinates."""
 
 
-def write_linear(group: h5py.Group, outcome: Outcome, linear: LinearModels) -> None:
+def write_linear(group: h5py.Group, outcome: PlanarOutcome, linear: LinearModels) -> None:
     """Of an analysis in the plane: linear/."""
     motion, shapes = _motion(linear), {}
     for body in outcome.assembly.model.links:

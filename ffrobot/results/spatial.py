@@ -14,7 +14,7 @@ from ..actuation.control.loop_record import LoopRecord
 from ..actuation.control.placing import Placed
 from ..common.checksum import sealed
 from ..common.files import write_atomically
-from ..mbs.analysis.spatial_run import SpatialRun
+from ..mbs.analysis.outcome import Outcome
 from ..mbs.model.truncation import modes_kept
 from ..mbs.quantities.spatial_motion import SpatialMotion
 from ..mbs.solve.spatial_redundancy import resolving_joints
@@ -51,7 +51,7 @@ def spatial_image(solution: SpatialSolution) -> bytes:
             if isinstance(result.run.details, LinearModels):
                 write_spatial_linear(file[name], result.motion, result.run.details)
         if (run := solution.unread) is not None:
-            _write_run(file.create_group(run.analysis.name), run, run.warnings)
+            _write_run(file.create_group(run.analysis.name), run, run.statistics.warnings)
         write_state_in_space(file, solution)
         file.flush()
         image: bytes = file.id.get_file_image()
@@ -93,18 +93,18 @@ def _write_analysis(group: h5py.Group, solution: SpatialSolution, result: Spatia
     violation.attrs["columns"] = ["position", "velocity"]
 
 
-def _write_run(group: h5py.Group, run: SpatialRun, warnings: Sequence[str]) -> None:
+def _write_run(group: h5py.Group, run: Outcome, warnings: Sequence[str]) -> None:
     """What is known of a run whether it has outputs or not."""
-    analysis = run.analysis
+    analysis, how = run.analysis, run.statistics
     group.attrs.update({"kind": analysis.kind, "tolerance": analysis.tolerance})
     group.attrs["actuation"] = (analysis.source or "") if analysis.takes_actuation else ""
     group.attrs["apply"] = getattr(analysis, "apply", None) or ""  # of every kind, for those who read the file
-    group.attrs.update({"integrator": run.integrator.name, "integrator_reason": run.integrator.reason})
+    group.attrs.update({"integrator": how.integrator.name, "integrator_reason": how.integrator.reason})
     for key in ("steps", "evaluations", "wall_seconds", "status"):
-        group.attrs[key] = getattr(run, key)
+        group.attrs[key] = getattr(how, key)
     group.attrs.create("warnings", list(warnings), dtype=h5py.string_dtype())
     group["time"] = run.time
-    write_steps(group, run.step_ends, run.integrator.name)
+    write_steps(group, how.step_ends, how.integrator.name)
 
 
 def _write_bodies(group: h5py.Group, solution: SpatialSolution, result: SpatialResult) -> None:

@@ -4,29 +4,20 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import h5py
-import numpy as np
 
-from ..common.errors import InputError
 from ..common.hdf5 import blaming
-from ..mbs import _core
-from ..mbs.analysis.spatial_earlier import ROWS, EarlierSpatialRun
-from ..mbs.analysis.spatial_run import SpatialRun
-from ..mbs.solve.integrators import Choice
 from ..run.enough import goes_on
 from ..run.spatial import Keep, prepare_spatial, run_spatial
 from ..run.spatial_prepare import stiffened_in_space
 from ..run.spatial_solution import SpatialSolution
 from ..run.watcher import Watcher
 from ..scene.spatial import SpatialScene
+from .earlier_runs import earlier_runs, write_earlier_run
 from .file import Results
 from .same_input import check_same_input, write_input_files
-from .stopped import GROUP, STOPPED, analyses, is_kept, row_of_numbers
-from .tree_checkpoint import read_tree_checkpoint, write_tree_checkpoint
-
-COUNTS = ("steps", "evaluations", "wall_seconds")
+from .stopped import GROUP, analyses, is_kept
 
 
 def resume_spatial(
@@ -47,8 +38,7 @@ def resume_spatial(
             return None
         if solution.scene.geometric_stiffening == "auto" and file.attributes("/")["geometric_stiffening"]:
             solution = stiffened_in_space(solution)
-        kept = [name for name in file.analyses if file.has(f"{name}/{GROUP}")]
-        solution = replace(solution, earlier={name: _earlier_run(file, name) for name in kept})
+        solution = replace(solution, earlier=earlier_runs(file, solution.scene.analysis))
     return run_spatial(solution, watcher, keep)
 
 
@@ -56,33 +46,5 @@ def write_state_in_space(file: h5py.File, solution: SpatialSolution) -> None:
     """Add to a results file, where the run was stopped, what `resume_spatial` needs."""
     write_input_files(file, solution.scene)
     for name, run in solution.outcomes.items() if is_kept(solution) else ():
-        if goes_on(solution, run) and run.checkpoint is not None:
-            _write_run(file[name].create_group(GROUP), run, run.checkpoint)
-
-
-def _write_run(group: h5py.Group, run: SpatialRun, checkpoint: _core.TreeCheckpoint) -> None:
-    for name in ROWS:
-        group[name] = getattr(run, name)
-    write_tree_checkpoint(group, checkpoint)
-
-
-def _earlier_run(file: Results, name: str) -> EarlierSpatialRun:
-    about, group = file.attributes(name), f"{name}/{GROUP}"
-    if missing := [row for row in ROWS if not file.has(f"{group}/{row}")]:
-        raise InputError(f"{file.path}: {group}/{missing[0]}: expected a dataset, found none")
-    checkpoint, expected = read_tree_checkpoint(file, f"{group}/checkpoint"), len(file.time(name))
-    if checkpoint.outputs != expected or about["status"] not in (*STOPPED, "completed"):
-        raise InputError(
-            f"{file.path}: {group}: expected as many outputs as times, {expected}, found {checkpoint.outputs}"
-        )
-    kept: dict[str, Any] = {row: file[f"{group}/{row}"] for row in ROWS}
-    kept |= {count: about[count].item() for count in COUNTS}
-    return EarlierSpatialRun(
-        time=file.time(name),
-        integrator=Choice(about["integrator"], about["integrator_reason"]),
-        status=about["status"],
-        **kept,
-        checkpoint=checkpoint,
-        where=f"{file.path}: {group}",
-        step_ends=row_of_numbers(file, f"{name}/step_ends") if file.has(f"{name}/step_ends") else np.zeros(0),
-    )
+        if goes_on(solution, run) and run.continuation is not None:
+            write_earlier_run(file[name].create_group(GROUP), run, is_spatial=True)

@@ -6,13 +6,12 @@ from typing import TYPE_CHECKING
 
 from ..common.arrays import Array
 from ..common.errors import InputError
-from ..mbs.analysis.outcome import Outcome
+from ..mbs.analysis.outcome import AnyOutcome
 from ..run.enough import goes_on
 from ..run.solution import Solution
 from .file import Results
 
 if TYPE_CHECKING:  # else every solve in the plane would load what is of space
-    from ..mbs.analysis.spatial_run import SpatialRun
     from ..run.spatial_solution import SpatialSolution
 
 GROUP = "resume"  # in the group of an analysis
@@ -41,7 +40,7 @@ def is_kept(solution: Solution | SpatialSolution) -> bool:
     return stopped(solution) is not None or bool(left_out(solution))
 
 
-def stopped(solution: Solution | SpatialSolution) -> Outcome | SpatialRun | None:
+def stopped(solution: Solution | SpatialSolution) -> AnyOutcome | None:
     """The analysis that was stopped."""
     return next((outcome for outcome in solution.outcomes.values() if outcome.status in STOPPED), None)
 

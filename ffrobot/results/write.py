@@ -19,7 +19,8 @@ from ..common.checksum import METHOD as CHECKSUM
 from ..common.files import write_atomically
 from ..common.version import program_version
 from ..mbs.analysis.motors_only import InvertedPath
-from ..mbs.analysis.outcome import Details, Outcome
+from ..mbs.analysis.outcome import Details
+from ..mbs.analysis.planar_outcome import PlanarOutcome
 from ..mbs.fields.steps import DATASET, METHOD
 from ..run.loaded_body import Loaded
 from ..run.mode_search import ModeChoice
@@ -36,7 +37,7 @@ from .resume import write_state
 
 FORMAT_VERSION = 1
 
-DETAILS: dict[type[Details], Callable[[h5py.Group, Outcome, Any], None]] = {
+DETAILS: dict[type[Details], Callable[[h5py.Group, PlanarOutcome, Any], None]] = {
     InvertedPath: write_inversion,
     LinearModels: write_linear,
     LoopRecord: lambda group, _outcome, record: write_loop(group, record),
@@ -134,7 +135,7 @@ def write_mode_errors(group: h5py.Group, analysis: str, choice: ModeChoice) -> N
         group.attrs[f"mode_error_{kind}"] = error
 
 
-def _write_attributes(group: h5py.Group, outcome: Outcome) -> None:
+def _write_attributes(group: h5py.Group, outcome: PlanarOutcome) -> None:
     analysis, run = outcome.analysis, outcome.statistics
     group.attrs["kind"] = analysis.kind
     group.attrs["integrator"] = run.integrator.name if analysis.is_integrated else "none"

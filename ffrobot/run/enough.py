@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any, TypeVar
 
-from ..mbs.analysis.outcome import Outcome
-from ..mbs.analysis.spatial_run import SpatialRun
+from ..mbs.analysis.outcome import AnyOutcome
 from ..mbs.model.planar_body import PlanarBody
 from ..mbs.model.spatial_body import SpatialBody
 from .mode_search import ModeSearch, Reported
 from .solution import AnalysisResult, Solution
 from .spatial_solution import SpatialResult, SpatialSolution
 from .watcher import Interruption
+
+logger = logging.getLogger(__name__)
 
 B = TypeVar("B", PlanarBody, SpatialBody)
 R = TypeVar("R", AnalysisResult, SpatialResult)
@@ -60,9 +62,19 @@ def with_enough_pieces(
     return solution
 
 
-def goes_on(solution: Solution | SpatialSolution, outcome: Outcome | SpatialRun) -> bool:
+def goes_on(solution: Solution | SpatialSolution, outcome: AnyOutcome) -> bool:
     """Whether `outcome` is of use to `resume`; a search for modes or pieces has its own bodies and starts again."""
     searched = any(
         "auto" in (getattr(body, "modes", None), getattr(body, "pieces", None)) for body in solution.scene.body
     )
     return not searched and outcome.analysis.is_resumable
+
+
+def log_outcome(outcome: AnyOutcome) -> None:
+    """One line on how an analysis went."""
+    run = outcome.statistics
+    logger.info(
+        'analysis "%s": %s at t = %g s, %d steps, %d rejected, %d evaluations, %.3f s; integrator %s: %s',
+        outcome.analysis.name, run.status, outcome.time[-1] if len(outcome.time) else 0.0, run.steps, run.rejected,
+        run.evaluations, run.wall_seconds, run.integrator.name, run.integrator.reason,
+    )  # fmt: skip

@@ -17,7 +17,7 @@ from ..actuation.patches.voltages import voltage_gain
 from ..actuation.points import PointForces, solve_point_forces
 from ..actuation.prediction import Unsupplied, predicted_shift, unmet_modal_forces, unsupplied
 from ..common.arrays import Array
-from ..mbs.analysis.outcome import Outcome
+from ..mbs.analysis.planar_outcome import PlanarOutcome
 from ..mbs.quantities.attachment_error import mode_error, modes_in_motion, start_jolt, start_of
 from ..mbs.quantities.link_loads import LinkLoads, link_loads
 from ..mbs.quantities.observation import modes_of_file
@@ -56,7 +56,7 @@ def evaluated(solution: Solution, result: AnalysisResult) -> AnalysisResult:
     return replace(result, seconds=result.seconds + time.perf_counter() - began)
 
 
-def _point_forces(solution: Solution, outcome: Outcome) -> dict[str, PointForces]:
+def _point_forces(solution: Solution, outcome: PlanarOutcome) -> dict[str, PointForces]:
     if not (outcome.analysis.allocates_patches and any(outcome.assembly.is_trajectory)):
         return {}
     return {body: solve_point_forces(points, outcome) for body, points in solution.points.items()}
@@ -115,11 +115,11 @@ def _feasibility(solution: Solution, result: AnalysisResult) -> Feasibility | No
     return Feasibility(_judge_motors(solution, outcome), patches)
 
 
-def _judge_motors(solution: Solution, outcome: Outcome) -> dict[str, MotorFeasibility]:
+def _judge_motors(solution: Solution, outcome: PlanarOutcome) -> dict[str, MotorFeasibility]:
     return judge_motors(outcome, {joint.name: joint for joint in solution.scene.joint})
 
 
-def _stresses(solution: Solution, outcome: Outcome) -> dict[str, BodyStress]:
+def _stresses(solution: Solution, outcome: PlanarOutcome) -> dict[str, BodyStress]:
     """Of the bodies whose files hold modal stresses; by mode acceleration where files and loads allow it."""
     links = {name: link for name, link in solution.links.items() if has_stresses(link)}
     known = [name for name, link in links.items() if link.stress_loads]

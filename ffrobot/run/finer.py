@@ -22,7 +22,7 @@ from ..fe_models.modal_body import ModalBody
 from ..mbs._core import TimeFunction
 from ..mbs.analysis.drive import drive
 from ..mbs.analysis.forward import Forward, has_raised_masses
-from ..mbs.analysis.outcome import Outcome
+from ..mbs.analysis.planar_outcome import PlanarOutcome
 from ..mbs.analysis.replay import actuation_source, replay_times
 from ..mbs.fields.waypoints import spline
 from ..mbs.model.model import ModalLoad, Model
@@ -95,7 +95,7 @@ def _twice_the_modes(keys: dict[str, Any], modal: ModalBody) -> dict[str, Any]:
     return keys | {"modes": modes | {"count": 2 * modal.eigenmode_count}, "damping": damping}
 
 
-def check_on(source: Outcome, solution: Solution, finer: Solution, watcher: Watcher) -> FinerCheck:
+def check_on(source: PlanarOutcome, solution: Solution, finer: Solution, watcher: Watcher) -> FinerCheck:
     """Replay `source`, an outcome of `solution`, on the same robot with the links of `finer`."""
     model = solution.model
     if source.tau is None or model.gears or source.gears:
@@ -119,7 +119,7 @@ def check_on(source: Outcome, solution: Solution, finer: Solution, watcher: Watc
     return FinerCheck(modes, worst, errors[worst], run.status)
 
 
-def _histories(source: Outcome, model: Model, patches: Mapping[str, PatchArray]) -> Histories:
+def _histories(source: PlanarOutcome, model: Model, patches: Mapping[str, PatchArray]) -> Histories:
     """Splines through what the source found, as dense as the fastest vibration asks for."""
     fastest = max((float(np.sqrt(body.stiffness.max(initial=0.0))) for body in model.bodies), default=0.0)
     begin, end = float(source.time[0]), float(source.time[-1])
@@ -136,7 +136,9 @@ def _histories(source: Outcome, model: Model, patches: Mapping[str, PatchArray])
     return Histories(spline(times, tau, 3), voltages)
 
 
-def _replayed(source: Outcome, exact: Model, moments: list[TimeFunction], start: State, watcher: Watcher) -> Outcome:
+def _replayed(
+    source: PlanarOutcome, exact: Model, moments: list[TimeFunction], start: State, watcher: Watcher
+) -> PlanarOutcome:
     """Forward dynamics of the model under moments of its motors."""
     assert isinstance(source.analysis, TimedAnalysis)
     given = source.analysis
@@ -160,7 +162,7 @@ def _replayed(source: Outcome, exact: Model, moments: list[TimeFunction], start:
     return drive(assembly, analysis, start, progress, reported=reported, times=times)
 
 
-def _start(source: Outcome, model: Model) -> State:
+def _start(source: PlanarOutcome, model: Model) -> State:
     """Where the source starts: on its trajectories, or of motors alone with their angles.
 
     Links are in equilibrium there, or undeformed where those of the source are.
@@ -173,7 +175,7 @@ def _start(source: Outcome, model: Model) -> State:
     return static_equilibrium(assembly, state) if p.any() else state
 
 
-def _distance(source: Outcome, run: Outcome, point: str) -> float:
+def _distance(source: PlanarOutcome, run: PlanarOutcome, point: str) -> float:
     """The largest, m, between where the two runs have a point."""
     path, found = (point_motion(outcome, point).position for outcome in (source, run))
     rows = min(len(path), len(found))

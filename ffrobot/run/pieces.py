@@ -17,7 +17,8 @@ from ..common.arrays import Array, as_floats
 from ..common.plane import perpendicular, rotated
 from ..fe_models.link_records import HOLDING_ROOT
 from ..fe_models.modal_body import ModalBody
-from ..mbs.analysis.outcome import Details, Forces, Motion, Outcome
+from ..mbs.analysis.outcome import Details, Forces, Motion
+from ..mbs.analysis.planar_outcome import PlanarOutcome
 from ..mbs.model.model import Constraint, Model
 from ..mbs.model.planar_body import PlanarBody
 from ..mbs.model.system import MechanismSystem
@@ -55,12 +56,12 @@ def wanted_pieces(solution: Solution) -> dict[str, int]:
 
 
 def as_one_link(
-    outcome: Outcome,
+    outcome: PlanarOutcome,
     whole: Model,
     links: Mapping[str, LoadedBody],
     divided: Mapping[str, BodyInPieces],
     pieces: Mapping[str, LoadedBody],
-) -> Outcome:
+) -> PlanarOutcome:
     """The outcome of the scene of pieces, in the coordinates of the model without.
 
     Args:
@@ -84,7 +85,7 @@ def as_one_link(
 
 
 def _modal_forces(
-    outcome: Outcome,
+    outcome: PlanarOutcome,
     whole: Model,
     links: Mapping[str, LoadedBody],
     divided: Mapping[str, BodyInPieces],
@@ -105,7 +106,7 @@ def _modal_forces(
 
 
 def _details(
-    outcome: Outcome,
+    outcome: PlanarOutcome,
     whole: Model,
     links: Mapping[str, LoadedBody],
     divided: Mapping[str, BodyInPieces],
@@ -136,7 +137,7 @@ def _details(
 
 
 def _motions(
-    outcome: Outcome,
+    outcome: PlanarOutcome,
     whole: Model,
     links: Mapping[str, LoadedBody],
     divided: Mapping[str, BodyInPieces],
@@ -156,7 +157,9 @@ def _key(constraint: Constraint) -> tuple[bool, str, str]:
     return constraint.is_trajectory, constraint.owner, constraint.component
 
 
-def _motion_of_link(outcome: Outcome, link: LoadedBody, body: BodyInPieces, pieces: Mapping[str, LoadedBody]) -> Array:
+def _motion_of_link(
+    outcome: PlanarOutcome, link: LoadedBody, body: BodyInPieces, pieces: Mapping[str, LoadedBody]
+) -> Array:
     """(R, θ, p) of the one link, with rates and accelerations: (3, T, 3 + n)."""
     modal = link.modal
     assert modal is not None
@@ -174,7 +177,7 @@ def _motion_of_link(outcome: Outcome, link: LoadedBody, body: BodyInPieces, piec
     return np.concatenate([root, theta[:, :, None], p], axis=2)
 
 
-def _point_on_axis(outcome: Outcome, body: BodyInPieces, pieces: Mapping[str, LoadedBody], x: float) -> Array:
+def _point_on_axis(outcome: PlanarOutcome, body: BodyInPieces, pieces: Mapping[str, LoadedBody], x: float) -> Array:
     """Position, velocity and acceleration (3, T, 2) of the point of the axis at x (m from the root), global axes."""
     k = int(np.clip(np.searchsorted(body.cut.starts, x, side="right") - 1, 0, len(body.names) - 1))
     piece = pieces[body.names[k]]
@@ -183,7 +186,7 @@ def _point_on_axis(outcome: Outcome, body: BodyInPieces, pieces: Mapping[str, Lo
     return point_track(outcome, piece.planar, at.position[:2], at.translation[:2] @ piece.planar.modal_transform)
 
 
-def point_track(outcome: Outcome, body: PlanarBody, position: Array, Phi: Array) -> Array:
+def point_track(outcome: PlanarOutcome, body: PlanarBody, position: Array, Phi: Array) -> Array:
     """R = R + A(x + Φp), with rate and acceleration: (3, T, 2)."""
     columns = outcome.coordinates(body.name)
     q, v, a = (each[:, columns] for each in (outcome.q, outcome.v, outcome.a))
@@ -201,7 +204,7 @@ def point_track(outcome: Outcome, body: PlanarBody, position: Array, Phi: Array)
     )
 
 
-def _section_angle(outcome: Outcome, body: BodyInPieces, pieces: Mapping[str, LoadedBody]) -> Array:
+def _section_angle(outcome: PlanarOutcome, body: BodyInPieces, pieces: Mapping[str, LoadedBody]) -> Array:
     """Angle of the section at the root, rate and acceleration (3, T)."""
     planar = pieces[body.names[0]].planar
     columns, phi = outcome.coordinates(planar.name), planar.points["root"].rotation
@@ -210,7 +213,7 @@ def _section_angle(outcome: Outcome, body: BodyInPieces, pieces: Mapping[str, Lo
     )
 
 
-def _chord(outcome: Outcome, body: BodyInPieces, root: Array, tip: Array) -> Array:
+def _chord(outcome: PlanarOutcome, body: BodyInPieces, root: Array, tip: Array) -> Array:
     """Angle of the line from root to tip, rate and acceleration (3, T)."""
     d, d_dot, d_ddot = tip - root
     near = outcome.q[:, outcome.coordinates(body.names[0])][:, 2]  # keeps count of turns

@@ -12,7 +12,8 @@ from ..actuation.patches.voltages import Voltages
 from ..actuation.points import PointForces, PointSet
 from ..common.arrays import Array
 from ..fe_models.modal_body import ModalBody
-from ..mbs.analysis.outcome import EarlierRun, Outcome
+from ..mbs.analysis.outcome import EarlierRun
+from ..mbs.analysis.planar_outcome import PlanarOutcome
 from ..mbs.model.model import Model
 from ..mbs.quantities.stress import BodyStress
 from ..mbs.quantities.validity import Bending
@@ -67,7 +68,7 @@ class AnalysisResult:
         warnings: why results may be wrong, or not mean what they seem to, a text each.
     """
 
-    outcome: Outcome
+    outcome: PlanarOutcome
     bending: Mapping[str, Bending] = field(default_factory=dict)
     seconds: float = 0.0
     voltages: Mapping[str, Voltages] = field(default_factory=dict)
@@ -141,7 +142,7 @@ class Solution:
     on_pieces: Mapping[str, PatchArray] = field(default_factory=dict)
 
     @property
-    def outcomes(self) -> Mapping[str, Outcome]:
+    def outcomes(self) -> Mapping[str, PlanarOutcome]:
         """The outcome of each analysis, by its name."""
         return {name: result.outcome for name, result in self.analyses.items()}
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -17,7 +16,7 @@ from ..actuation.patches.voltages import Voltages, allocation, solve_voltages
 from ..actuation.points import with_factors as points_with
 from ..common.arrays import Array
 from ..common.errors import of_file
-from ..mbs.analysis.outcome import Outcome
+from ..mbs.analysis.planar_outcome import PlanarOutcome
 from ..mbs.analysis.replay import ActuatorSet
 from ..mbs.model.raised_mass import by_body
 from ..mbs.quantities.stiffening import NOTABLE, loads_on_modes
@@ -27,7 +26,7 @@ from ..scene.pieces import bodies_in_pieces, places_on_pieces
 from ..scene.scene import Scene
 from .bent_links import with_advice, worst_of_pieces
 from .divided import as_divided
-from .enough import with_enough_modes, with_enough_pieces
+from .enough import log_outcome, with_enough_modes, with_enough_pieces
 from .evaluation import evaluated
 from .finer import check_on, finer_scene
 from .mode_choice import mode_levels, reported
@@ -39,9 +38,6 @@ from .solution import AnalysisResult, Solution
 from .warnings import warnings_of
 from .watcher import Interruption, Watcher
 
-logger = logging.getLogger(__name__)
-
-
 Keep = Callable[[Solution], None]
 
 
@@ -51,7 +47,7 @@ def solve(scene: Scene | Path, watcher: Watcher | None = None, keep: Keep | None
     Shapers for the robot's frequencies and the fastest motion are found first (see `paths`).
     With `modes = "auto"` they are run with more and more modes, until the estimated error meets the tolerances.
 
-    An analysis that does not reach its end is kept as far as it got, and ends the run: see `Outcome.check_completed`.
+    An analysis that does not reach its end is kept as far as it got, and ends the run: see `check_completed`.
     So does Ctrl-C during an analysis. `keep` is given what there is before an error is raised, and before Ctrl-C
     interrupts again.
     Raises `InputError` for anything wrong with the scene or the files it names, `SolveError` where no state is found.
@@ -197,13 +193,13 @@ def _run_all(solution: Solution, watcher: Watcher, interruption: Interruption) -
             return None
         voltages = _voltages(solution, outcome)
         results[analysis.name] = AnalysisResult(outcome, bent, time.perf_counter() - began, voltages)
-        _log(outcome)
+        log_outcome(outcome)
         if outcome.failed:
             break
     return replace(solution, analyses=results)
 
 
-def _voltages(solution: Solution, outcome: Outcome) -> dict[str, Voltages]:
+def _voltages(solution: Solution, outcome: PlanarOutcome) -> dict[str, Voltages]:
     """Of the patches, by link."""
     if outcome.F_p is None:
         return {}
@@ -249,7 +245,7 @@ def _whole_links(solution: Solution) -> WholeLinks | None:
     )
 
 
-def _told(solution: Solution, outcome: Outcome) -> Outcome:
+def _told(solution: Solution, outcome: PlanarOutcome) -> PlanarOutcome:
     """An outcome of the pieces as that of the links."""
     assert solution.whole is not None
     return as_one_link(outcome, solution.whole, solution.bodies, solution.divided, solution.parts)
@@ -269,12 +265,3 @@ def _actuator_set(solution: Solution, *, raised: bool) -> ActuatorSet:
         {name: allocation(array, limited=True) for name, array in patches.items()},
         {name: one.actuator() for name, one in points.items()},
     )
-
-
-def _log(outcome: Outcome) -> None:
-    run = outcome.statistics
-    logger.info(
-        'analysis "%s": %s at t = %g s, %d steps, %d rejected, %d evaluations, %.3f s; integrator %s: %s',
-        outcome.analysis.name, run.status, outcome.time[-1], run.steps, run.rejected, run.evaluations,
-        run.wall_seconds, run.integrator.name, run.integrator.reason,
-    )  # fmt: skip

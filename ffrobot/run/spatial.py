@@ -15,14 +15,14 @@ from ..actuation.spatial_context import ActuatedSpatialContext
 from ..actuation.spatial_points import forces_at_points, solve_spatial_points, spatial_point_set, with_spatial_points
 from ..common.errors import FfrobotError, SolveError, of_file
 from ..mbs.analysis.operating_points import InstantAnalysis
-from ..mbs.analysis.spatial_run import SpatialRun
+from ..mbs.analysis.outcome import Outcome
 from ..mbs.quantities.spatial_energy import energies, momentum
 from ..mbs.quantities.spatial_reactions import reactions
 from ..mbs.quantities.spatial_sharing import shared_evenly
 from ..mbs.quantities.stiffening import NOTABLE
 from ..mbs.scene.analysis import Analysis
 from ..scene.spatial import SpatialScene, load_spatial_scene
-from .enough import goes_on, with_enough_modes, with_enough_pieces
+from .enough import goes_on, log_outcome, with_enough_modes, with_enough_pieces
 from .mode_search import ModeSearch, error_tolerances
 from .paths import with_paths_in_space
 from .spatial_actuation import actuated_in_space, patches_in_space, supplied_by_patches
@@ -54,7 +54,7 @@ def solve_spatial(scene: SpatialScene | Path, watcher: Watcher, keep: Keep | Non
     Shapers for the robot's frequencies and the fastest motion are found first (see `paths`).
     With `modes = "auto"` they are run with more and more modes, until the estimated error meets the tolerances.
 
-    An analysis that does not reach its end is kept as far as it got, and ends the run (`SpatialRun.check_completed`).
+    An analysis that does not reach its end is kept as far as it got, and ends the run (`Outcome.check_completed`).
     So does Ctrl-C during an analysis. `keep` is given what there is before an error is raised.
     Raises `InputError` for anything wrong with the scene or the files it names, `SolveError` where no state is found.
     """
@@ -174,16 +174,16 @@ def _run_all(solution: SpatialSolution, watcher: Watcher, interruption: Interrup
             return None
         results[analysis.name] = result
         seconds[analysis.name] = time.perf_counter() - began
-        _log(run)
+        log_outcome(run)
         if run.failed:
             break
     return replace(solution, analyses=results, seconds=seconds)
 
 
-def _unread(solution: SpatialSolution, run: SpatialRun, error: Exception) -> SpatialSolution:
+def _unread(solution: SpatialSolution, run: Outcome, error: Exception) -> SpatialSolution:
     """The solution with a run whose outputs failed with `error`: its states are kept where `resume` takes them up."""
-    kept = replace(run, status="not evaluated")
-    if run.checkpoint is None or not goes_on(solution, kept):
+    kept = replace(run, statistics=replace(run.statistics, status="not evaluated"))
+    if run.continuation is None or not goes_on(solution, kept):
         if not solution.analyses:
             raise error
         return replace(solution, failure=error)
@@ -219,7 +219,7 @@ def _context(
     )  # fmt: skip
 
 
-def _with_peaks(solution: SpatialSolution, run: SpatialRun) -> SpatialResult:
+def _with_peaks(solution: SpatialSolution, run: Outcome) -> SpatialResult:
     """What is read off a run; what is judged by peaks, by those between outputs."""
     found, closer = _evaluated(solution, run), run.closer
     if closer is run or found.motion.gears:  # their twists are splines through even outputs
@@ -232,11 +232,12 @@ def _with_peaks(solution: SpatialSolution, run: SpatialRun) -> SpatialResult:
     return replace(found, actuation=actuation, bending=between.bending, closer=between)
 
 
-def _evaluated(solution: SpatialSolution, run: SpatialRun) -> SpatialResult:
+def _evaluated(solution: SpatialSolution, run: Outcome) -> SpatialResult:
     """What is read off a run."""
+    forces = run.forces
     found = MotionOfLinks(
-        run.model, run.time, run.q, run.v, run.a, run.multipliers, run.required, run.is_at_rest, run.applied,
-        run.commanded, run.driving, divided_links(solution),
+        run.model, run.time, run.q, run.v, run.a, run.multipliers, forces.required, run.motion.is_at_rest,
+        forces.applied, forces.commanded, forces.driving, divided_links(solution),
     )  # fmt: skip
     motion, sharing = shared_evenly(found)
     actuation = None
@@ -253,12 +254,4 @@ def _evaluated(solution: SpatialSolution, run: SpatialRun) -> SpatialResult:
     return SpatialResult(
         run, motion, reactions(motion), energies(motion), momentum(motion), actuation, stresses, at_points,
         bending=bending_of_links(solution, motion), sharing=sharing,
-    )  # fmt: skip
-
-
-def _log(run: SpatialRun) -> None:
-    logger.info(
-        'analysis "%s": %s at t = %g s, %d steps, %d evaluations, %.3f s; integrator %s',
-        run.analysis.name, run.status, run.time[-1] if len(run.time) else 0.0, run.steps, run.evaluations,
-        run.wall_seconds, run.integrator.name,
     )  # fmt: skip

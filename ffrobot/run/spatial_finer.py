@@ -11,10 +11,10 @@ from ..actuation.control.spatial_linear import held_by_motors
 from ..common.arrays import Array, as_floats
 from ..common.errors import InputError
 from ..mbs.analysis.forward import Forward
+from ..mbs.analysis.outcome import Outcome
 from ..mbs.analysis.spatial_drive import spatial_drive
 from ..mbs.analysis.spatial_forward import motor_drives
 from ..mbs.analysis.spatial_replay import in_parts, motor_forces_of, replay_times
-from ..mbs.analysis.spatial_run import SpatialRun
 from ..mbs.fields.waypoints import spline
 from ..mbs.model.spatial_drives import Drive, Drives, FrameDrive
 from ..mbs.model.spatial_model import SpatialModel, modal_direction, without_paths
@@ -62,7 +62,7 @@ def _finer_scene(solution: SpatialSolution) -> SpatialScene:
     return scene.model_copy(update=changed)
 
 
-def _check(solution: SpatialSolution, source: SpatialRun, finer: SpatialSolution, watcher: Watcher) -> FinerCheck:
+def _check(solution: SpatialSolution, source: Outcome, finer: SpatialSolution, watcher: Watcher) -> FinerCheck:
     """Replay `source`, a run of `solution`, on the same robot with finer links."""
     scene = solution.scene
     if not source.model.motors or finer.model.tree.gears or any(getattr(j, "stiffness", None) for j in scene.joint):
@@ -80,7 +80,7 @@ def _check(solution: SpatialSolution, source: SpatialRun, finer: SpatialSolution
     return FinerCheck(modes, worst, errors[worst], run.status)
 
 
-def _drives(solution: SpatialSolution, source: SpatialRun, finer: SpatialSolution) -> Drives:
+def _drives(solution: SpatialSolution, source: Outcome, finer: SpatialSolution) -> Drives:
     """Splines through what the source found, as dense as its fastest vibration asks for, on the finer links."""
     assert source.again is not None
     fastest = max(float(np.sqrt(node.body.stiffness.max(initial=0.0))) for node in source.model.tree.nodes)
@@ -91,7 +91,7 @@ def _drives(solution: SpatialSolution, source: SpatialRun, finer: SpatialSolutio
     made_again.check_completed()
     layouts = list(_layouts(solution)) if "joints+pzt" in source.analysis.applicable else []
 
-    def found(run: SpatialRun) -> Array:
+    def found(run: Outcome) -> Array:
         forces = motor_forces_of(run)
         voltages = {b: solution.patches[b].voltages(forces.modal[b]) for b in dict.fromkeys(b for b, _ in layouts)}
         return np.hstack([*forces.moments.values(), *(voltages[b][layout].required for b, layout in layouts)])
@@ -114,7 +114,7 @@ def _layouts(solution: SpatialSolution) -> Iterator[tuple[str, str]]:
             yield body, layout
 
 
-def _replayed(source: SpatialRun, finer: SpatialModel, drives: Drives, watcher: Watcher) -> SpatialRun:
+def _replayed(source: Outcome, finer: SpatialModel, drives: Drives, watcher: Watcher) -> Outcome:
     """Forward dynamics of the finer robot under moments of its motors and voltages of its patches."""
     given = source.analysis
     assert isinstance(given, TimedAnalysis)
@@ -131,7 +131,7 @@ def _replayed(source: SpatialRun, finer: SpatialModel, drives: Drives, watcher: 
     return spatial_drive(without_paths(finer), analysis, _start(source, finer), progress, drives=drives, times=times)
 
 
-def _start(source: SpatialRun, finer: SpatialModel) -> State:
+def _start(source: Outcome, finer: SpatialModel) -> State:
     """Where the source starts: on its trajectories, or of motors alone with their coordinates.
 
     Links are in equilibrium there, or undeformed where those of the source are.
@@ -147,7 +147,7 @@ def _start(source: SpatialRun, finer: SpatialModel) -> State:
     return static_equilibrium(model, start) if is_bent else start
 
 
-def _as_in(source: SpatialRun, model: SpatialModel) -> Array:
+def _as_in(source: Outcome, model: SpatialModel) -> Array:
     """Q (n_q,) of `model`, links undeformed, with the joints where `source` has them at its start."""
     q = np.zeros(model.tree.n_q)
     for node, other in zip(model.tree.nodes, source.model.tree.nodes, strict=True):
@@ -155,12 +155,12 @@ def _as_in(source: SpatialRun, model: SpatialModel) -> Array:
     return q
 
 
-def _distance(source: SpatialRun, run: SpatialRun, point: str) -> float:
+def _distance(source: Outcome, run: Outcome, point: str) -> float:
     """The largest, m, between where the two runs have a point."""
     path, found = (_motion(one).point(point).position for one in (source, run))
     rows = min(len(path), len(found))
     return float(np.linalg.norm(path[:rows] - found[:rows], axis=1).max(initial=0.0))
 
 
-def _motion(run: SpatialRun) -> SpatialMotion:
+def _motion(run: Outcome) -> SpatialMotion:
     return SpatialMotion(run.model, run.time, run.q, run.v, run.a, run.multipliers)

@@ -13,8 +13,7 @@ from ..actuation.points import PointForces
 from ..actuation.spatial_points import SpatialPointSet
 from ..fe_models.modal_body import ModalBody
 from ..mbs.analysis.elastic_joints import unresolved_gears
-from ..mbs.analysis.spatial_earlier import EarlierSpatialRun
-from ..mbs.analysis.spatial_run import SpatialRun
+from ..mbs.analysis.outcome import EarlierRun, Outcome
 from ..mbs.model.spatial_model import SpatialModel
 from ..mbs.model.spatial_wrench import Wrench
 from ..mbs.model.truncation import modes_kept
@@ -54,7 +53,7 @@ class SpatialResult:
         closer: the same at the outputs and between, from which all peaks are; None where nothing is between.
     """
 
-    run: SpatialRun
+    run: Outcome
     motion: SpatialMotion
     reactions: Mapping[str, Wrench]
     energies: Energies
@@ -96,7 +95,12 @@ class SpatialResult:
         """Why results may be wrong, or not mean what they seem to, a text each, the most serious first."""
         missed = None if self.actuation is None else self.actuation.unsupplied
         bent = deflection_warning(self.bending)
-        told = (*([bent] if bent else []), *self._doubts, *self.run.warnings, *unresolved_gears(self.motion.gears))
+        told = (
+            *([bent] if bent else []),
+            *self._doubts,
+            *self.run.statistics.warnings,
+            *unresolved_gears(self.motion.gears),
+        )
         told = told if self.sharing is None else (*told, self.sharing.in_words)
         if isinstance(self.run.details, LoopRecord):
             told = (*told, *self.run.details.warnings)
@@ -142,10 +146,10 @@ class SpatialSolution:
     analyses: Mapping[str, SpatialResult]
     seconds: Mapping[str, float]
     failure: Exception | None = None
-    unread: SpatialRun | None = None
+    unread: Outcome | None = None
     path_notes: tuple[str, ...] = ()
     points: Mapping[str, SpatialPointSet] = field(default_factory=dict)
-    earlier: Mapping[str, EarlierSpatialRun] = field(default_factory=dict)
+    earlier: Mapping[str, EarlierRun] = field(default_factory=dict)
     mode_choice: ModeChoice | None = None
     divided: Mapping[str, BodyInPieces] = field(default_factory=dict)
     parts: Mapping[str, LoadedSpatialBody] = field(default_factory=dict)
@@ -153,7 +157,7 @@ class SpatialSolution:
     stiffened: bool = False
 
     @property
-    def outcomes(self) -> dict[str, SpatialRun]:
+    def outcomes(self) -> dict[str, Outcome]:
         """How each analysis went, by its name."""
         runs = [*(result.run for result in self.analyses.values()), *([self.unread] if self.unread else [])]
         return {run.analysis.name: run for run in runs}

@@ -10,7 +10,7 @@ import numpy as np
 from ..actuation.spatial_context import WholeLinksInSpace
 from ..common.arrays import Array
 from ..common.errors import InputError
-from ..mbs.analysis.spatial_run import SpatialRun
+from ..mbs.analysis.outcome import Outcome
 from ..mbs.model.divided_link import DividedLink, SpatialPiece, divided_link_in_space
 from ..mbs.model.spatial_model import SpatialModel
 from ..mbs.model.spatial_tree import Node
@@ -40,7 +40,7 @@ def _divided(solution: SpatialSolution, name: str) -> DividedLink:
     return divided_link_in_space(link.modal, link.spatial, pieces)
 
 
-def _told(solution: SpatialSolution, run: SpatialRun) -> SpatialRun:
+def _told(solution: SpatialSolution, run: Outcome) -> Outcome:
     """A run of the pieces in the coordinates of the robot with whole links: those of joints, and the nearest shapes.
 
     Its multipliers and what drives it stay behind. Raises `InputError` for joints that have no coordinates there.
@@ -59,11 +59,11 @@ def _told(solution: SpatialSolution, run: SpatialRun) -> SpatialRun:
             q[:, node.p_q], v[:, node.p_v] = (values @ to_own for values in now[name])
             behind, ahead = (of[name][1] for of in beside)
             a[:, node.p_v] = (ahead - behind) @ to_own / (2 * step)
-    multipliers = np.zeros((len(run.time), len(whole.rows)))
-    return replace(run, model=whole, q=q, v=v, a=a, multipliers=multipliers, required=None, again=None)
+    motion = replace(run.motion, q=q, v=v, a=a, multipliers=np.zeros((len(run.time), len(whole.rows))))
+    return replace(run, model=whole, motion=motion, forces=replace(run.forces, required=None), again=None)
 
 
-def _modal(solution: SpatialSolution, run: SpatialRun, step: float) -> dict[str, tuple[Array, Array]]:
+def _modal(solution: SpatialSolution, run: Outcome, step: float) -> dict[str, tuple[Array, Array]]:
     """By body, modal coordinates and velocities (T, n) in the modes of its file, `step` (s) later."""
     tree, divided = run.model.tree, divided_links(solution)
     q, v = tree.integrate(run.q, step * run.v), run.v + step * run.a
@@ -72,7 +72,7 @@ def _modal(solution: SpatialSolution, run: SpatialRun, step: float) -> dict[str,
     return {name: (body.modal, body.modal_velocity) for name, body in found.items()}
 
 
-def _take_joint(whole: SpatialModel, node: Node, run: SpatialRun, states: tuple[Array, Array, Array]) -> None:
+def _take_joint(whole: SpatialModel, node: Node, run: Outcome, states: tuple[Array, Array, Array]) -> None:
     """Coordinates, rates and accelerations of the joint of `node`, from the tree of the pieces to that of the links."""
     tree = run.model.tree
     number = tree.carried.get(node.joint.name)

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from ..actuation.control.loop_record import LoopRecord
 from ..mbs.analysis.elastic_joints import unresolved_gears
 from ..mbs.analysis.motors_only import InvertedPath
-from ..mbs.analysis.outcome import Outcome
+from ..mbs.analysis.planar_outcome import PlanarOutcome
 from ..mbs.quantities.path_seen import path_warnings
 from ..mbs.quantities.validity import deflection_warning
 from ..mbs.solve.reach import turned_guesses
@@ -32,7 +32,7 @@ def warnings_of(scene: Scene, result: AnalysisResult) -> Iterator[str]:
         yield from path_warnings(result.outcome.analysis, result.outcome.time, scene.trajectory)
 
 
-def _free_to_swing(outcome: Outcome) -> str:
+def _free_to_swing(outcome: PlanarOutcome) -> str:
     """What to say where trajectories leave degrees of freedom of the robot open; else empty."""
     model, held = outcome.assembly.model, sum(constraint.is_trajectory for constraint in outcome.assembly.constraints)
     if not held or held >= model.degrees_of_freedom:

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 from ..model.model import Model
 from .drive import Progress
-from .outcome import EarlierRun, Outcome
+from .outcome import EarlierRun
+from .planar_outcome import PlanarOutcome
 from .replay import ActuatorSet
 
 
@@ -25,12 +26,12 @@ class Context:
     """
 
     model: Model
-    outcomes: Mapping[str, Outcome]
+    outcomes: Mapping[str, PlanarOutcome]
     make_actuators: Callable[[bool], ActuatorSet]
     progress: Progress
     is_replayed: bool = False
     earlier: EarlierRun | None = None
 
-    def source(self, name: str | None) -> Outcome | None:
+    def source(self, name: str | None) -> PlanarOutcome | None:
         """The outcome of an earlier analysis; None where there is no name."""
         return None if name is None else self.outcomes[name]

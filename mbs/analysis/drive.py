@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any
@@ -25,9 +24,10 @@ from ..solve.initial_state import undeformed_state
 from ..solve.integrators import Choice, beyond_order, choose_integrator, integration_controls, unmet, with_steps_of
 from ..solve.state import State
 from ..solve.statics import static_equilibrium
-from .earlier_check import check_earlier, kept_of
-from .outcome import Continuation, EarlierRun, Forces, Motion, Outcome, Statistics
-from .samples import in_order, new_samples, stops, worth_a_look
+from .earlier_check import Datasets, check_earlier, going_on
+from .outcome import Continuation, EarlierRun, Forces, Motion, Statistics
+from .planar_outcome import PlanarOutcome
+from .samples import new_samples, stops, worth_a_look
 
 Progress = Callable[[float], bool]
 """Called now and then with the time reached; False stops the run."""
@@ -78,7 +78,7 @@ def drive(
     finds_forces: bool = False,
     recording: _core.Recording | None = None,
     earlier: EarlierRun | None = None,
-) -> Outcome:
+) -> PlanarOutcome:
     """The outcome of an integration with outputs at `times`, those of the analysis where not given.
 
     It is in the coordinates of `reported`, the same mechanism with masses as they are, where those of `assembly` are
@@ -92,13 +92,18 @@ def drive(
     motors = len(assembly.motor_measures) if finds_forces else None
     tree = told_in_joints(assembly, analysis.kind, assembly.model.motors.values() if finds_forces else ())
     if earlier is not None:
-        check_earlier(earlier, assembly, times, motors, recorded=recording is not None, tree_size=tree.core.n_v)
+        sizes, datasets = (tree.core.n_v, tree.core.n_v), _datasets(assembly, earlier, motors)
+        check_earlier(earlier, times, sizes, datasets, is_recorded=recording is not None)
     if earlier is not None and earlier.statistics.status == "completed":
-        integrated = None if reported is None else assembly
-        return Outcome(
-            analysis, reported or assembly, earlier.motion, earlier.forces, earlier.statistics,
-            continuation=replace(earlier.continuation, assembly=integrated),
-        )  # fmt: skip
+        return PlanarOutcome(
+            analysis=analysis,
+            assembly=reported or assembly,
+            motion=earlier.motion,
+            forces=earlier.forces,
+            statistics=earlier.statistics,
+            continuation=earlier.continuation,
+            integrated=None if reported is None else assembly,
+        )
     began = time.perf_counter()
     integrator = with_steps_of(
         analysis, float(times[-1]), lambda: choose_integrator(assembly, analysis, start, steering, len(times))
@@ -107,7 +112,7 @@ def drive(
     if earlier is not None:  # with the same candidates, and what they have become since
         known, continuation = earlier.statistics.integrator, earlier.continuation
         integrator = replace(integrator, name=known.name, reason=known.reason)
-    with nullcontext() if earlier is None else kept_of(earlier, times).gone_on_with():
+    with going_on(earlier, times):
         controls = integration_controls(analysis, integrator)
         if any(assembly.is_trajectory):
             controls.stops = as_list(stops(times, assembly.model.scene.trajectory))
@@ -116,7 +121,7 @@ def drive(
     statistics = statistics_of(assembly, run, integrator, seconds)
     if statistics.status == "step underflow" and not statistics.cause:
         statistics = replace(statistics, cause=beyond_order(integrator, analysis) or unmet(integrator, run))
-    outcome = Outcome(
+    outcome = PlanarOutcome(
         analysis=analysis,
         assembly=assembly,
         motion=motion_of(assembly, run, times),
@@ -130,20 +135,35 @@ def drive(
         return found
 
     @cache
-    def look_closer() -> Outcome:
+    def look_closer() -> PlanarOutcome:
         between = _between(tree, samples, outcome, steering, control)
-        return _in_time(found, between if reported is None else between.in_coordinates_of(reported))
+        return found.among(between if reported is None else between.in_coordinates_of(reported))
 
     return replace(found, look_closer=look_closer)
+
+
+def _datasets(assembly: MechanismSystem, earlier: EarlierRun, motors: int | None) -> Datasets:
+    """What `earlier` has to have of `assembly`, with forces of so many motors."""
+    motion, forces, n = earlier.motion, earlier.forces, assembly.system.coordinates
+    modes = sum(body.n_modes for body in assembly.model.bodies)
+    return {
+        "q": (motion.q, n),
+        "v": (motion.v, n),
+        "a": (motion.a, n),
+        "lambda_": (motion.multipliers, len(assembly.constraints)),
+        "residual": (motion.residual, 3),
+        "tau": (forces.tau, motors),
+        "F_p": (forces.F_p, None if motors is None else modes),
+    }
 
 
 def _between(
     tree: PlanarTree,
     samples: _core.Samples,
-    outcome: Outcome,
+    outcome: PlanarOutcome,
     steering: _core.ExternalLoads | None,
     control: SampledControl | None,
-) -> Outcome:
+) -> PlanarOutcome:
     """The outcome at samples of its run."""
     reached = samples.times <= outcome.time[-1]
     times = samples.times[reached]
@@ -163,13 +183,6 @@ def _between(
     run, forces = at(rows), outcome.forces
     forces = forces if forces.tau is None else Forces(run.tau, run.F_p)
     return replace(outcome, motion=motion_of(outcome.assembly, run, times[rows]), forces=forces)
-
-
-def _in_time(outcome: Outcome, between: Outcome) -> Outcome:
-    """An outcome with another at times between its outputs, of the same coordinates."""
-    order = in_order(outcome.time, between.time)
-    motion = outcome.motion.with_rows_of(between.motion, order)
-    return replace(outcome, motion=motion, forces=outcome.forces.with_rows_of(between.forces, order))
 
 
 def _integrated(
@@ -213,7 +226,7 @@ def statistics_of(assembly: MechanismSystem, run: _core.Run, integrator: Choice,
     )  # fmt: skip
 
 
-def _joined(earlier: EarlierRun, later: Outcome) -> Outcome:
+def _joined(earlier: EarlierRun, later: PlanarOutcome) -> PlanarOutcome:
     """`later`, which went on from the checkpoint of `earlier`: its rows before that mean nothing."""
     return replace(
         later,

@@ -1,91 +1,111 @@
-"""Whether a planar run can be gone on with: the core looks at nothing that it is given."""
+"""Whether an earlier run of an analysis can be gone on with: the core looks at nothing that it is given."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 import numpy as np
 
 from ...common.arrays import Array
-from ..model.system import MechanismSystem
-from .kept_check import Kept
-from .outcome import EarlierRun
+from ...common.errors import InputError
+from .. import _core
+from .outcome import METHOD_HISTORY, STEPS, TREE_MEMORY, TREE_VECTORS, EarlierRun
+
+Datasets = Mapping[str, tuple[Array | None, int | None]]
+"""By name: numbers with one row per output, and how many columns are expected; None where they must not be there."""
 
 
 def check_earlier(
-    earlier: EarlierRun,
-    assembly: MechanismSystem,
-    times: Array,
-    motors: int | None,
-    *,
-    recorded: bool,
-    tree_size: int,
+    earlier: EarlierRun, times: Array, sizes: tuple[int, int], datasets: Datasets, *, is_recorded: bool = False
 ) -> None:
-    """Make sure that `earlier` is a run of `assembly` with outputs at `times`.
+    """Make sure that `earlier` is a run with outputs at `times` (s), of a tree with `sizes` n_q and n_v.
 
-    `motors`: as many as the analysis finds forces of; None where it finds none. `recorded`: whether a later analysis
-    replays it. `tree_size`: of q and of v of the tree.
-
-    Raises `InputError` for sizes, times or numbers that are not those of such a run.
+    `is_recorded`: whether a later analysis replays it. Raises `InputError` for sizes, times or numbers that are not
+    those of such a run.
     """
-    _Check(earlier, assembly, times, kept_of(earlier, times), tree_size).everything(motors, recorded=recorded)
+    outputs, is_completed = len(earlier.motion.time), earlier.statistics.status == "completed"
+    kept, point = _Kept(earlier.where, times, outputs), earlier.continuation.checkpoint
+    fits = 0 < outputs <= len(times) and np.array_equal(earlier.motion.time, times[:outputs])
+    kept.expect(fits, "time", "the times of the scene")
+    kept.expect(not is_completed or outputs == len(times), "status", "a run up to its end")
+    for name, (values, columns) in datasets.items():
+        kept.expect((values is None) == (columns is None), name, "forces where motors fit the mechanism")
+        if values is not None and columns is not None:
+            kept.numbers(name, values, (outputs, columns))
+    kept.tree_checkpoint(point, *sizes)
+    kept.expect(is_completed or point.steps.next_step > 0.0, "checkpoint", "a positive step")
+    kept.expect(
+        is_recorded == (earlier.continuation.recording is not None), "recording", "one where the run is replayed"
+    )
+    if earlier.continuation.recording is not None:
+        kept.recording(earlier.continuation.recording, sum(sizes), times[-1] if is_completed else point.time)
 
 
-def kept_of(earlier: EarlierRun, times: Array) -> Kept:
-    """What was kept of it, for a run with outputs at `times`."""
-    return Kept(earlier.where, times, len(earlier.motion.time))
+@contextmanager
+def going_on(earlier: EarlierRun | None, times: Array) -> Iterator[None]:
+    """For the run with outputs at `times` (s) that goes on with `earlier`, if there is one.
+
+    Raises `InputError` where the core finds the memory to be of another mechanism.
+    """
+    try:
+        yield
+    except ValueError:
+        if earlier is None:
+            raise
+        kept = _Kept(earlier.where, times, len(earlier.motion.time))
+        kept.expect(False, "checkpoint", "what a run of this scene remembers")
 
 
 @dataclass(frozen=True)
-class _Check:
-    earlier: EarlierRun
-    assembly: MechanismSystem
-    times: Array
-    kept: Kept
-    tree_size: int
+class _Kept:
+    """What was kept at `where`, as messages call it, of a run with outputs at `times` (s); `outputs` were computed."""
 
-    def everything(self, motors: int | None, *, recorded: bool) -> None:
-        outputs = len(self.earlier.motion.time)
-        fits = 0 < outputs <= len(self.times) and np.array_equal(self.earlier.motion.time, self.times[:outputs])
-        self.kept.expect(fits, "time", "the times of the scene")
-        self.kept.expect(not self._completed or outputs == len(self.times), "status", "a run up to its end")
-        self._rows(outputs, motors)
-        if not self._completed:
-            self._checkpoint()
-        self._recording(recorded)
+    where: str
+    times: Array
+    outputs: int
+
+    def expect(self, holds: bool, name: str, expected: str) -> None:
+        """Raise `InputError` unless it `holds`."""
+        if not holds:
+            raise InputError(f"{self.where}/{name}: expected {expected}, found otherwise: damaged or changed")
+
+    def numbers(self, name: str, values: Array, shape: tuple[int, ...]) -> None:
+        """Raise `InputError` unless they are finite and have that shape."""
+        self.expect(values.shape == shape and bool(np.isfinite(values).all()), name, f"finite numbers {shape}")
+
+    def fields(self, record: object, names: tuple[str, ...]) -> None:
+        """Raise `InputError` for numbers of a record of the checkpoint that are not finite."""
+        self.numbers("checkpoint", np.array([float(getattr(record, name)) for name in names]), (len(names),))
 
     @property
-    def _completed(self) -> bool:
-        return self.earlier.statistics.status == "completed"
+    def slack(self) -> float:
+        """Of times, for rounding, s."""
+        return float(1e-9 * (self.times[-1] - self.times[0]))
 
-    def _rows(self, outputs: int, motors: int | None) -> None:
-        n, modes = self.assembly.system.coordinates, sum(body.n_modes for body in self.assembly.model.bodies)
-        found = vars(self.earlier.motion) | vars(self.earlier.forces)
-        columns = {"q": n, "v": n, "a": n, "lambda_": len(self.assembly.constraints), "residual": 3}
-        for name, count in columns.items():
-            self.kept.numbers(name, found[name], (outputs, count))
-        for name, of_forces in (("tau", motors), ("F_p", None if motors is None else modes)):
-            self.kept.expect(
-                (found[name] is None) == (of_forces is None), name, "forces where motors fit the mechanism"
-            )
-            if of_forces is not None:
-                self.kept.numbers(name, found[name], (outputs, of_forces))
+    def stands_after_outputs(self, point: _core.TreeCheckpoint) -> None:
+        """Raise `InputError` for a checkpoint at a time that does not fit its outputs."""
+        until = self.times[min(self.outputs, len(self.times) - 1)]
+        in_time = self.times[self.outputs - 1] - self.slack <= point.time <= until + self.slack  # False of NaN
+        holds = bool(in_time) and point.outputs == self.outputs
+        self.expect(holds, "checkpoint", f"a time after {self.outputs} outputs")
 
-    def _checkpoint(self) -> None:
-        point = self.earlier.continuation.checkpoint
-        self.kept.tree_checkpoint(point, self.tree_size, self.tree_size)
-        self.kept.expect(point.steps.next_step > 0.0, "checkpoint", "a positive step")
+    def tree_checkpoint(self, point: _core.TreeCheckpoint, n_q: int, n_v: int) -> None:
+        """Raise `InputError` for a checkpoint that is none of a tree with q (n_q,) and v (n_v,)."""
+        self.numbers("checkpoint/state", point.state, (n_q + n_v,))
+        for name in TREE_VECTORS[1:]:
+            self.numbers(f"checkpoint/{name}", getattr(point, name), getattr(point, name).shape)
+        watched = len(point.singular_posture)
+        self.expect(watched in (0, n_q), "checkpoint/singular_posture", "a posture or none")
+        for record, names in ((point.steps, STEPS), (point.methods, METHOD_HISTORY), (point, TREE_MEMORY)):
+            self.fields(record, names)
+        self.stands_after_outputs(point)
 
-    def _recording(self, recorded: bool) -> None:
-        recording = self.earlier.continuation.recording
-        self.kept.expect(recorded == (recording is not None), "recording", "one where the run is replayed")
-        if recording is None:
-            return
-        steps = recording.times
-        self.kept.numbers("recording/times", steps, (len(steps),))
-        self.kept.numbers("recording/states", recording.states, (2 * self.tree_size * len(steps),))
-        last = self.times[-1] if self._completed else self.earlier.continuation.checkpoint.time
+    def recording(self, found: _core.Recording, size: int, last: float) -> None:
+        """Raise `InputError` for one that is none of states (size,) at steps up to time `last`, s."""
+        steps = found.times
+        self.numbers("recording/times", steps, (len(steps),))
+        self.numbers("recording/states", found.states, (size * len(steps),))
         fits = len(steps) > 0 and steps[0] == self.times[0] and bool(np.all(np.diff(steps) > 0.0))
-        self.kept.expect(
-            fits and abs(steps[-1] - last) <= self.kept.slack, "recording/times", f"steps up to t = {last:g} s"
-        )
+        self.expect(fits and abs(steps[-1] - last) <= self.slack, "recording/times", f"steps up to t = {last:g} s")

@@ -25,7 +25,8 @@ from ..model.transmissions import joint_gears, joint_rotors
 from ..scene.bodies import RigidBody
 from ..solve.initial_state import output_angle
 from ..solve.state import State
-from .outcome import GearMotion, Outcome
+from .outcome import GearMotion
+from .planar_outcome import PlanarOutcome
 
 DEGREE = 5
 UNRESOLVED = 0.001  # of a motor's largest moment: what every second output may change of it
@@ -79,7 +80,7 @@ def _rotor(model: Model, gear: ElasticGear) -> PlanarBody:
     return from_rigid_body(gear.rotor, RigidBody(mass=mass, inertia=inertia, center=(0.0, 0.0)))
 
 
-def add_transmission(outcome: Outcome) -> Outcome:
+def add_transmission(outcome: PlanarOutcome) -> PlanarOutcome:
     """An inverse analysis or equilibrium with what motors must do behind gears that give.
 
     With the rigid rotor's angle ψ = N γ + α_a the gear transmits τ_s = τ − J N ψ̈. The twist δ = θ_m − γ follows from
@@ -106,7 +107,7 @@ def add_transmission(outcome: Outcome) -> Outcome:
     return replace(outcome, gears=motions, look_closer=None)  # twists are splines through even outputs
 
 
-def _angles(outcome: Outcome, gear: ElasticGear) -> tuple[Array, Array]:
+def _angles(outcome: PlanarOutcome, gear: ElasticGear) -> tuple[Array, Array]:
     """γ and α_a with their rates and accelerations, each (T, 3)."""
     ground = Measure("", _core.MeasureKind.angle, Marker(None), gear.coordinate.a)
     rows = [gear.coordinate, *([] if gear.coordinate.a.body is None else [ground])]
@@ -167,7 +168,7 @@ def _twist(gear: GearSpring, time: Array, moment: Array) -> Array:
     return np.column_stack([curve(time), curve.derivative(1)(time), curve.derivative(2)(time)])
 
 
-def with_rotors(source: Outcome, model: Model) -> Outcome:
+def with_rotors(source: PlanarOutcome, model: Model) -> PlanarOutcome:
     """The motion of an inverse analysis in the coordinates of `model`, whose gears give. Its own `model` stays behind.
 
     Raises `InputError` where motors do not fit the mechanism, and nothing is known of its rotors.
@@ -192,10 +193,10 @@ def with_rotors(source: Outcome, model: Model) -> Outcome:
     assembly = MechanismSystem(model, [*known_rows, *pins])
     lambda_ = np.zeros((len(q), len(assembly.constraints)))  # nothing pulls at the pins
     lambda_[:, [assembly.constraints.index(row) for row in known_rows]] = source.lambda_
-    return replace(source, assembly=assembly, motion=replace(source.motion, q=q, v=v, a=a, lambda_=lambda_))
+    return replace(source, assembly=assembly, motion=replace(source.motion, q=q, v=v, a=a, multipliers=lambda_))
 
 
-def rotors_like(model: Model, state: State, source: Outcome) -> State:
+def rotors_like(model: Model, state: State, source: PlanarOutcome) -> State:
     """The state of links with rotors wound against them as `source`, a motion with rotors, has them at its start."""
     q, v = source.q[0].copy(), source.v[0].copy()
     n = len(state.q)
@@ -207,7 +208,7 @@ def rotors_like(model: Model, state: State, source: Outcome) -> State:
     return State(q, v)
 
 
-def drive_sizes(source: Outcome, limit: Array) -> list[_core.TimeFunction]:
+def drive_sizes(source: PlanarOutcome, limit: Array) -> list[_core.TimeFunction]:
     """The moments of motors between the outputs of `source`, cut at `limit` (motors,): a function of time for each."""
     tau = source.motor_moments
     assert tau is not None

@@ -32,7 +32,8 @@ from ..solve.reach import check_reach
 from .context import Context
 from .drive import motion_of, motors_fit
 from .elastic_joints import add_transmission
-from .outcome import Details, Forces, Outcome, Statistics
+from .outcome import Details, Forces, Statistics
+from .planar_outcome import PlanarOutcome
 from .samples import path_times
 
 FEWEST_NODES = 201  # of the spline through a static shape; half as many as outputs where that is more
@@ -84,7 +85,7 @@ class Fcid(TimedAnalysis):
             for k, function in enumerate(functions):
                 yield f"modal.{body}[{k}]", function, 2
 
-    def run(self, context: Context) -> Outcome:
+    def run(self, context: Context) -> PlanarOutcome:
         """Motion and forces."""
         return add_transmission(run_fcid(context.model, self))
 
@@ -96,14 +97,14 @@ class PrescribedShape(Details):
     functions: Shape
     shape_force: Array
 
-    def actuation_source(self, outcome: Outcome) -> _core.ActuationSource:
+    def actuation_source(self, outcome: PlanarOutcome) -> _core.ActuationSource:
         """Everything is algebraic: it is solved for again at any time."""
         tree = _tree(outcome.assembly, has_motors=outcome.tau is not None)
         posture = tree.motion(outcome.q[0], outcome.v[0], outcome.a[0])[0]
         return _core.PrescribedActuation(_core.PrescribedMotion(tree.both, posture), self.functions, posture)
 
 
-def run_fcid(model: Model, analysis: Fcid) -> Outcome:
+def run_fcid(model: Model, analysis: Fcid) -> PlanarOutcome:
     """Motion and forces for the trajectories and the shape that the analysis prescribes.
 
     Raises `InputError` where the trajectories do not fix the motion of the mechanism or cannot be followed,
@@ -132,7 +133,7 @@ def run_fcid(model: Model, analysis: Fcid) -> Outcome:
     found = replace(found, statistics=Statistics(wall_seconds=time.perf_counter() - began))
 
     @cache
-    def look_closer() -> Outcome:
+    def look_closer() -> PlanarOutcome:
         times = path_times(analysis.times, assembly.model.scene.trajectory, analysis.end)
         return _at(assembly, analysis, motion, shape, posture, times, has_motors=has_motors)
 
@@ -148,7 +149,7 @@ def _at(
     times: Array,
     *,
     has_motors: bool,
-) -> Outcome:
+) -> PlanarOutcome:
     """The outcome at `times` (T,), s."""
     p, p_dot, p_ddot = sampled(shape, times)
     run = motion.outputs(as_list(times), p, p_dot, p_ddot, posture)
@@ -158,7 +159,7 @@ def _at(
             f'{assembly.model.scene.path}: analysis "{analysis.name}": no position was found at t = {t:g} s: the'
             " prescribed shape takes the trajectory out of reach"
         )
-    return Outcome(
+    return PlanarOutcome(
         analysis=analysis,
         assembly=assembly,
         motion=motion_of(assembly, run, times),

@@ -20,7 +20,8 @@ from ..solve.state import State
 from .context import Context
 from .drive import Progress, drive, initial_state
 from .elastic_joints import drive_sizes, with_compliance, with_rotors
-from .outcome import EarlierRun, Outcome
+from .outcome import EarlierRun
+from .planar_outcome import PlanarOutcome
 from .replay import ActuatorSet, actuation_source, motor_limits, replay_times
 
 
@@ -70,7 +71,7 @@ class Forward(ActuatedAnalysis):
                 f' "{self.apply}"{why}'
             )
 
-    def run(self, context: Context) -> Outcome:
+    def run(self, context: Context) -> PlanarOutcome:
         """Motion alone: nothing is specified."""
         source = context.source(self.actuation)
         actuators = context.make_actuators(has_raised_masses(source))
@@ -80,11 +81,11 @@ class Forward(ActuatedAnalysis):
 def run_forward(
     model: Model,
     analysis: Forward,
-    source: Outcome | None,
+    source: PlanarOutcome | None,
     actuator_set: ActuatorSet,
     progress: Progress,
     earlier: EarlierRun | None = None,
-) -> Outcome:
+) -> PlanarOutcome:
     """Forward dynamics under given loads, and the actuation of the earlier analysis `source` where there is one.
 
     Motors turn elastic gears with the moments at the outputs of `source` and splines between these.
@@ -116,7 +117,7 @@ def run_forward(
     )
 
 
-def has_raised_masses(source: Outcome | None) -> bool:
+def has_raised_masses(source: PlanarOutcome | None) -> bool:
     """Whether a run under the actuation of `source` raises masses: not where that prescribes the shape.
 
     Its forces, known at any time, hold the masses as they are to the shape, and would not hold others.
@@ -134,7 +135,7 @@ def _check_applied(model: Model, analysis: Forward) -> None:
 
 
 def applied_actuators(
-    model: Model, analysis: Forward, source: Outcome, actuator_set: ActuatorSet
+    model: Model, analysis: Forward, source: PlanarOutcome, actuator_set: ActuatorSet
 ) -> tuple[list[Measure], list[_core.Actuator]]:
     """Rows along which forces act, and the actuators that set them, in the order in which the core numbers them.
 
@@ -159,7 +160,7 @@ def applied_actuators(
 
 
 def _point_actuators(
-    model: Model, analysis: Forward, source: Outcome, actuator_set: ActuatorSet
+    model: Model, analysis: Forward, source: PlanarOutcome, actuator_set: ActuatorSet
 ) -> tuple[list[Measure], list[_core.Actuator]]:
     driven = [body.name for body in model.bodies if is_driven(source, body.name)]
     missing = [name for name in driven if name not in actuator_set.points]
@@ -181,7 +182,7 @@ def _point_actuators(
     return rows, actuators
 
 
-def is_driven(source: Outcome, body: str) -> bool:
+def is_driven(source: PlanarOutcome, body: str) -> bool:
     """Whether generalized driving forces Q_a can act on a body: a trajectory or prescribed modes are its own."""
     trajectories = (c.measure for c in source.assembly.constraints if c.is_trajectory)
     prescribed = source.details.shape_force is not None and source.assembly.model.body(body).n_modes > 0

@@ -37,7 +37,8 @@ from .context import Context
 from .drive import Progress, motion_of
 from .elastic_joints import add_transmission
 from .fcid import sampled
-from .outcome import ADVICE, Details, Forces, Outcome, Statistics
+from .outcome import ADVICE, Details, Forces, Statistics
+from .planar_outcome import PlanarOutcome
 from .samples import path_times
 
 DECAY = 23.0  # times the slowest time constant of zeros: what is left is 1e-10
@@ -93,26 +94,32 @@ class MotorsOnly(TimedAnalysis):
         """Something to follow."""
         yield Need("kind", self.kind, "trajectory")
 
-    def run(self, context: Context) -> Outcome:
+    def run(self, context: Context) -> PlanarOutcome:
         """Motion and moments."""
         return add_transmission(run_motors_only(context.model, self, context.progress))
 
 
 @dataclass(frozen=True)
-class InvertedPath(Details):
+class AroundPath(Details):
+    """How long motors act before and after the path, s."""
+
+    pre_actuation: float
+    post_actuation: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class InvertedPath(AroundPath):
     """How the path was inverted; `loads` are held before and after it."""
 
     inversion: Inversion[Servo]
-    pre_actuation: float
-    post_actuation: float
     loads: tuple[tuple[Measure, TimeFunction], ...]
 
-    def actuation_source(self, outcome: Outcome) -> _core.ActuationSource:
+    def actuation_source(self, outcome: PlanarOutcome) -> _core.ActuationSource:
         """The motors' forces at any time, from p(t)."""
         return self.inversion.servo.source(self.inversion.shape)
 
 
-def run_motors_only(model: Model, analysis: MotorsOnly, progress: Progress) -> Outcome:
+def run_motors_only(model: Model, analysis: MotorsOnly, progress: Progress) -> PlanarOutcome:
     """Motion and motor forces for the trajectories, no other force acting.
 
     Raises `InputError` for a path that is not at rest where it has to be, motors that do not fit, a path out of reach,
@@ -125,7 +132,11 @@ def run_motors_only(model: Model, analysis: MotorsOnly, progress: Progress) -> O
     check_rest(servo, analysis, needs_future)
     pre, post = durations(analysis, linear, needs_future)
     inversion = invert(servo, linear, pre, post, analysis.tolerance, progress)
-    return _outcome(analysis, InvertedPath(inversion, pre, post, servo.loads), time.perf_counter() - began)
+    return _outcome(
+        analysis,
+        InvertedPath(pre_actuation=pre, post_actuation=post, inversion=inversion, loads=servo.loads),
+        time.perf_counter() - began,
+    )
 
 
 def where(scene_path: Path, analysis: MotorsOnly) -> str:
@@ -256,19 +267,19 @@ def cause_of(inversion: Inversion[S]) -> str:
     )
 
 
-def _outcome(analysis: MotorsOnly, found: InvertedPath, seconds: float) -> Outcome:
+def _outcome(analysis: MotorsOnly, found: InvertedPath, seconds: float) -> PlanarOutcome:
     times = output_times(analysis.end, analysis.output_step, found.pre_actuation, found.post_actuation)
     outcome = _at(analysis, found, seconds, times)
 
     @cache
-    def look_closer() -> Outcome:
+    def look_closer() -> PlanarOutcome:
         between = path_times(outcome.time, outcome.assembly.model.scene.trajectory, analysis.end)
         return _at(analysis, found, seconds, between)
 
     return replace(outcome, look_closer=look_closer)
 
 
-def _at(analysis: MotorsOnly, found: InvertedPath, seconds: float, times: Array) -> Outcome:
+def _at(analysis: MotorsOnly, found: InvertedPath, seconds: float, times: Array) -> PlanarOutcome:
     """The outcome at `times` (T,), s."""
     inversion, servo = found.inversion, found.inversion.servo
     inside = times <= inversion.curve.x[-1] + 1e-9 * analysis.end  # what an integration reached
@@ -277,7 +288,7 @@ def _at(analysis: MotorsOnly, found: InvertedPath, seconds: float, times: Array)
     reached = len(run.q)
     rows = slice(reached)
     how = "two-point problem" if inversion.linearisation.is_future[0].any() else "integrated forward"
-    outcome = Outcome(
+    outcome = PlanarOutcome(
         analysis=analysis,
         assembly=servo.driven,
         motion=motion_of(servo.driven, run, times).at(rows),

@@ -19,8 +19,8 @@ from ..scene.analysis import Analysis, Surroundings, TimedAnalysis
 from ..solve.initial_state import undeformed_state
 from ..solve.linearisation import held_by_motors
 from .elastic_joints import add_transmission, with_compliance, with_rotors
-from .outcome import Forces, Outcome
-from .spatial_run import SpatialRun
+from .outcome import AnyOutcome, Forces, Outcome
+from .planar_outcome import PlanarOutcome
 from .static import run_static
 
 STATIC = "static"  # instead of an analysis' name: about the static equilibrium
@@ -71,7 +71,7 @@ class InstantAnalysis(Analysis):
                 yield f'times: expected at most {source.last_time!r}, where "{source.name}" ends, found {t!r}'
 
 
-def operating_points(model: Model, analysis: Analysis, source: Outcome | None) -> Outcome:
+def operating_points(model: Model, analysis: Analysis, source: PlanarOutcome | None) -> PlanarOutcome:
     """The motion at the times of `analysis`: rows of the earlier analysis `source`, or the static equilibrium.
 
     At the equilibrium trajectories are held at t = 0, and where there are none motors keep the initial configuration.
@@ -86,10 +86,17 @@ def operating_points(model: Model, analysis: Analysis, source: Outcome | None) -
         return replace(outcome, forces=Forces())
     moved = with_rotors(source, with_compliance(model))
     rows = [row_at(model.scene.path, analysis, source, t) for t in analysis.times]
-    return Outcome(analysis, moved.assembly, moved.motion.at(rows), gears=moved.gears)
+    motion = moved.motion.at(rows)
+    return PlanarOutcome(analysis=analysis, assembly=moved.assembly, motion=motion, gears=moved.gears)
 
 
-def row_at(path: Path, analysis: Analysis, source: Outcome | SpatialRun, t: float) -> int:
+def of_earlier(source: Outcome, analysis: Analysis) -> Outcome:
+    """The motion of `source` as that of `analysis`, which has made no steps of its own."""
+    statistics = replace(source.statistics, steps=0, evaluations=0, warnings=())
+    return replace(source, analysis=analysis, statistics=statistics, again=None)
+
+
+def row_at(path: Path, analysis: Analysis, source: AnyOutcome, t: float) -> int:
     """The output of an earlier analysis at time t. Raises `InputError` where there is none."""
     row = int(np.abs(source.time - t).argmin())
     if abs(source.time[row] - t) > NEAR * source.analysis.last_time:

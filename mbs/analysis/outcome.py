@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Self
+from pathlib import Path
+from typing import Any, Self
 
 import numpy as np
 
@@ -13,11 +14,11 @@ from ...common.errors import SolveError
 from .. import _core
 from .._core import TimeFunction
 from ..joints.measure import Measure
-from ..model.planar_tree import PlanarTree
-from ..model.raised_mass import coordinate_factors, modal_factors
-from ..model.system import MechanismSystem
+from ..model.spatial_drives import PointDrive
+from ..model.spatial_model import SpatialModel
 from ..scene.analysis import Analysis
 from ..solve.integrators import NOT_INTEGRATED, Choice
+from .samples import in_order
 
 ADVICE = {
     "step underflow": "no step is small enough there",
@@ -34,54 +35,80 @@ ADVICE = {
 
 
 class _Rows:
-    """Base of records of arrays with one row per output time; None where there is no such array."""
+    """Base of records of arrays with one row per output time, also by name; anything else is of all times."""
 
     def at(self, rows: slice | Sequence[int]) -> Self:
         """These rows alone."""
-        chosen = {name: None if x is None else x[rows] for name, x in vars(self).items()}
-        return replace(self, **chosen)  # type: ignore[type-var]
+        return self._each(lambda x: x[rows])
 
     def with_rows_of(self, other: Self, order: Indices) -> Self:
         """With the rows of another behind these, all in another order."""
-        return type(self)(
-            **{
-                name: None if x is None else np.concatenate([x, getattr(other, name)])[order]
-                for name, x in vars(self).items()
-            }
-        )
+        return self._each(lambda x, y: np.concatenate([x, y])[order], other)
 
     def followed_by(self, later: Self) -> Self:
         """With the rows that `later` has beyond those that are here."""
-        known = {name: x for name, x in vars(self).items() if x is not None}
-        joined = {name: np.concatenate([x, getattr(later, name)[len(x) :]]) for name, x in known.items()}
-        return replace(self, **joined)  # type: ignore[type-var]
+        return self._each(lambda x, y: np.concatenate([x, y[len(x) :]]), later)
+
+    def _each(self, f: Callable[..., Array], *others: Self) -> Self:
+        def found(values: Sequence[Any]) -> Any:  # noqa: ANN401
+            if isinstance(values[0], Mapping):
+                return {name: f(*(value[name] for value in values)) for name in values[0]}
+            return f(*values) if isinstance(values[0], np.ndarray) else values[0]
+
+        of_all = (self, *others)
+        return replace(self, **{name: found([getattr(x, name) for x in of_all]) for name in vars(self)})  # type: ignore[type-var]
 
 
 @dataclass(frozen=True)
 class Motion(_Rows):
-    """One row per output time; bodies side by side in the columns of q, v, a: (R, θ, p) of each, SI units."""
+    """One row per output time, SI units.
 
-    time: Array  # (T,) s
-    q: Array  # (T, coordinates)
+    Attributes:
+        time: (T,) s.
+        q, v, a: (T, n_q), (T, n_v), (T, n_v) of the model's tree; in the plane (R, θ, p) of all bodies side by side.
+        multipliers: (T, constraint equations).
+        residual: (T, 3) of C, Ċ, C̈, relative to their terms; in the plane alone.
+        is_at_rest: whether targets stand still, as in an equilibrium.
+    """
+
+    time: Array
+    q: Array
     v: Array
     a: Array
-    lambda_: Array  # (T, constraints)
-    residual: Array  # (T, 3) of C, Ċ, C̈, relative to their terms
+    multipliers: Array
+    residual: Array | None = None
+    is_at_rest: bool = False
 
 
 @dataclass(frozen=True)
 class Forces(_Rows):
-    """What actuators have to supply."""
+    """What actuators have to supply, and what acts beside the loads of the scene.
 
-    tau: Array | None = None  # (T, motors) N·m (N for prismatic joints); None where motors do not fit the mechanism
-    F_p: Array | None = None  # (T, modes of all bodies) N/√kg
+    Attributes:
+        tau: in the plane: (T, motors) N·m (N for prismatic joints); None where motors do not fit the mechanism.
+        F_p: in the plane: (T, modes of all bodies) N/√kg.
+        required: in 3D: (T, n_v) generalized forces that a prescribed shape takes; None where those of the paths are
+            all.
+        applied: on points.
+        commanded: (T, k) moments by joint that act along joints, N·m or N: what a controller commands, or a replay
+            applies.
+        driving: the same as accelerations have it, where that is something else: before a command changes.
+    """
+
+    tau: Array | None = None
+    F_p: Array | None = None
+    required: Array | None = None
+    applied: tuple[PointDrive, ...] = ()
+    commanded: Mapping[str, Array] = field(default_factory=dict)
+    driving: Mapping[str, Array] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
 class Statistics:
     """How a run went. `cause` is what was found wrong at `time_reached` (s, the last step's) where it ended early.
 
-    `step_ends` (N,), in s, with which the run can be repeated, if it was asked for them; see `fields.steps`.
+    `warnings` are on what is left open. `step_ends` (N,), in s, with which the run can be repeated, if it was asked for
+    them; see `fields.steps`.
     """
 
     status: str = "completed"
@@ -93,11 +120,14 @@ class Statistics:
     time_reached: float | None = None
     cause: str = ""
     step_ends: Array = field(default_factory=lambda: np.zeros(0), repr=False, compare=False)
+    warnings: tuple[str, ...] = ()
 
     def added_to(self, earlier: Statistics) -> Statistics:
-        """With the work of the run that this one went on from."""
+        """With the work of the run that this one went on from; ends of steps where those of all are known."""
         counts = ("steps", "rejected", "evaluations", "wall_seconds")
-        return replace(self, **{name: getattr(earlier, name) + getattr(self, name) for name in counts})
+        whole = replace(self, **{name: getattr(earlier, name) + getattr(self, name) for name in counts})
+        ends = np.concatenate([earlier.step_ends, self.step_ends])
+        return replace(whole, step_ends=ends if len(ends) == whole.steps else np.zeros(0))
 
 
 STEPS = ("next_step", "usual_step", "reserve", "previous_step", "previous_error", "in_transient", "without_look")
@@ -115,14 +145,10 @@ TREE_VECTORS = ("state", "state_peaks", "force_peaks", "singular_posture", "rang
 
 @dataclass(frozen=True)
 class Continuation:
-    """Where an integration can be gone on with, and its steps where a later analysis replays them.
-
-    Both are of the tree of `assembly`, what was integrated, where that is not the outcome's: see `raised_mass`.
-    """
+    """Where an integration can be gone on with, and its steps where a later analysis replays them."""
 
     checkpoint: _core.TreeCheckpoint
     recording: _core.Recording | None = None
-    assembly: MechanismSystem | None = None
 
 
 @dataclass(frozen=True)
@@ -172,48 +198,34 @@ class Details:
     loads: tuple[tuple[Measure, TimeFunction], ...] | None = None
     shape_force: Array | None = None
 
-    def actuation_source(self, outcome: Outcome) -> _core.ActuationSource | None:
+    def actuation_source(self, outcome: Any) -> _core.ActuationSource | None:  # noqa: ANN401, of its kind
         """What was found at any time of the run, not at its outputs alone; None where that is not known.
 
         Modal forces are in the coordinates of what was integrated.
         """
-        if outcome.continuation is None or outcome.continuation.recording is None:
-            return None
-        assembly = outcome.continuation.assembly or outcome.assembly
-        motors = () if outcome.tau is None else assembly.model.motors.values()
-        return _core.TreeActuation(PlanarTree(assembly, motors).both, outcome.continuation.recording)
+        found: _core.ActuationSource | None = outcome.recorded_actuation()
+        return found
 
 
-@dataclass(frozen=True)
-class Outcome:
-    """What an analysis computed; `gears` by joint, of inverse analyses with elastic gears.
-
-    Where links were divided, it is told of the one link; `in_pieces` is what was computed, and `point_names` say which
-    point of which piece a point of the link is there. `look_closer` finds the same, as computed, with times between.
-    """
+@dataclass(frozen=True, kw_only=True)
+class AnyOutcome:
+    """What an analysis computed, as far as that has the same form in the plane and in 3D."""
 
     analysis: Analysis
-    assembly: MechanismSystem
     motion: Motion
     forces: Forces = Forces()
     statistics: Statistics = Statistics()
     details: Details = field(default=Details(), repr=False)
-    gears: Mapping[str, GearMotion] = field(default_factory=dict)
     continuation: Continuation | None = field(default=None, repr=False)
-    in_pieces: Outcome | None = field(default=None, repr=False)
-    look_closer: Callable[[], Outcome] | None = field(default=None, repr=False)
-    point_names: Mapping[str, str] = field(default_factory=dict, repr=False)
 
     @property
-    def computed(self) -> Outcome:
-        """The outcome as computed: that of the pieces where links were divided, else itself."""
-        return self.in_pieces or self
+    def path(self) -> Path:
+        """Of the scene."""
+        raise NotImplementedError
 
-    @property
-    def closer(self) -> Outcome:
-        """The outcome as computed, at its outputs and between: see `samples`. Itself where nothing is between."""
-        found = self.computed
-        return found if found.look_closer is None else found.look_closer()
+    def recorded_actuation(self) -> _core.ActuationSource | None:
+        """What actuators supplied at any time of the steps that were recorded; None where none were."""
+        return None
 
     @property
     def time(self) -> Array:
@@ -222,83 +234,36 @@ class Outcome:
 
     @property
     def q(self) -> Array:
-        """(T, coordinates) positions."""
+        """(T, n_q) positions."""
         return self.motion.q
 
     @property
     def v(self) -> Array:
-        """(T, coordinates) velocities."""
+        """(T, n_v) velocities."""
         return self.motion.v
 
     @property
     def a(self) -> Array:
-        """(T, coordinates) accelerations."""
+        """(T, n_v) accelerations."""
         return self.motion.a
 
     @property
-    def lambda_(self) -> Array:
-        """(T, constraints) multipliers."""
-        return self.motion.lambda_
-
-    @property
-    def residual(self) -> Array:
-        """(T, 3) of C, Ċ, C̈, relative to their terms."""
-        return self.motion.residual
-
-    @property
-    def tau(self) -> Array | None:
-        """(T, motors) N·m (N for prismatic joints)."""
-        return self.forces.tau
-
-    @property
-    def F_p(self) -> Array | None:
-        """(T, modes of all bodies) N/√kg."""
-        return self.forces.F_p
+    def multipliers(self) -> Array:
+        """(T, constraint equations)."""
+        return self.motion.multipliers
 
     @property
     def status(self) -> str:
         """How the run ended."""
         return self.statistics.status
 
-    def coordinates(self, body: str) -> slice:
-        """Columns of (R, θ, p) of a body in q, v and a."""
-        i = self.assembly.index[body]
-        first = int(self.assembly.first[i])
-        return slice(first, first + 3 + self.assembly.model.bodies[i].n_modes)
-
-    def modal_columns(self, *bodies: str) -> slice:
-        """Columns of a body in `F_p`, or of several that follow each other."""
-        first, last = (self.assembly.index[name] for name in (bodies[0], bodies[-1]))
-        begin, end = (int(self.assembly.first[i]) - 3 * i for i in (first, last))
-        return slice(begin, end + self.assembly.model.bodies[last].n_modes)
-
-    @property
-    def motor_moments(self) -> Array | None:
-        """`tau`, but of elastic gears what their motors must do: (T, motors) N·m."""
-        if self.tau is None or not self.gears:
-            return self.tau
-        motors = enumerate(self.assembly.model.motors)
-        columns = [self.gears[joint].moment if joint in self.gears else self.tau[:, k] for k, joint in motors]
-        return np.column_stack(columns)
-
-    def in_coordinates_of(self, reported: MechanismSystem) -> Outcome:
-        """A motion with raised masses as one of `reported`, the same mechanism without."""
-        if all(a is b for a, b in zip(self.assembly.model.bodies, reported.model.bodies, strict=True)):
-            return self
-        factors, motion, F_p = coordinate_factors(reported.model), self.motion, self.F_p
-        return replace(
-            self,
-            assembly=reported,
-            motion=replace(motion, q=motion.q / factors, v=motion.v / factors, a=motion.a / factors),
-            forces=replace(self.forces, F_p=None if F_p is None else F_p * modal_factors(reported.model)),
-            continuation=self.continuation and replace(self.continuation, assembly=self.assembly),
-        )
-
     @property
     def time_reached(self) -> float:
         """Where the last step ended, s; the last output where that is not known."""
         reached = self.statistics.time_reached
-        return float(self.time[-1]) if reached is None else reached
+        if reached is not None:
+            return reached
+        return float(self.time[-1]) if len(self.time) else 0.0
 
     @property
     def failed(self) -> bool:
@@ -308,8 +273,43 @@ class Outcome:
     def check_completed(self, how_to_go_on: str = "") -> None:
         """Raise `SolveError` with advice where the run failed."""
         if self.failed:
-            run, path = self.statistics, self.assembly.model.scene.path
+            run = self.statistics
             raise SolveError(
-                f'{path}: analysis "{self.analysis.name}" ended at t = {self.time_reached:.9g} s'
+                f'{self.path}: analysis "{self.analysis.name}" ended at t = {self.time_reached:.9g} s'
                 f" ({run.status}): {run.cause or ADVICE[run.status]}{how_to_go_on}"
             )
+
+    def at(self, rows: slice | Sequence[int]) -> Self:
+        """These outputs alone."""
+        return replace(self, motion=self.motion.at(rows), forces=self.forces.at(rows))
+
+    def among(self, between: Self) -> Self:
+        """With the rows of the same run at times between its outputs, all in the order of time."""
+        order, motion, forces = in_order(self.time, between.time), self.motion, self.forces
+        motion, forces = motion.with_rows_of(between.motion, order), forces.with_rows_of(between.forces, order)
+        return replace(self, motion=motion, forces=forces)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Outcome(AnyOutcome):
+    """What an analysis in 3D computed.
+
+    Attributes:
+        model: with the constraint equations of its run.
+        again: the same run with outputs at other times (T,), between its first and its last; None where it has none.
+        look_closer: the same with times between its outputs; None where nothing is between.
+    """
+
+    model: SpatialModel
+    again: Callable[[Array], Outcome] | None = field(default=None, repr=False)
+    look_closer: Callable[[], Outcome] | None = field(default=None, repr=False)
+
+    @property
+    def closer(self) -> Outcome:
+        """The run at its outputs and between: see `samples`. Itself where nothing is between."""
+        return self if self.look_closer is None else self.look_closer()
+
+    @property
+    def path(self) -> Path:
+        """Of the scene."""
+        return self.model.scene.path

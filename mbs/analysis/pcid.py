@@ -16,7 +16,8 @@ from ..solve.reach import check_reach
 from .context import Context
 from .drive import Progress, drive, initial_state, motors_fit
 from .elastic_joints import add_transmission
-from .outcome import EarlierRun, Outcome
+from .outcome import EarlierRun
+from .planar_outcome import PlanarOutcome
 
 
 class Pcid(IntegratedAnalysis):
@@ -37,7 +38,7 @@ class Pcid(IntegratedAnalysis):
         """Something to follow."""
         yield Need("kind", self.kind, "trajectory")
 
-    def run(self, context: Context) -> Outcome:
+    def run(self, context: Context) -> PlanarOutcome:
         """Motion and forces."""
         found = run_pcid(context.model, self, context.is_replayed, context.progress, context.earlier)
         return add_transmission(found)
@@ -49,7 +50,7 @@ def run_pcid(
     keep_recording: bool,
     progress: Progress,
     earlier: EarlierRun | None = None,
-) -> Outcome:
+) -> PlanarOutcome:
     """C_m and C_s hold, p is free. It goes on with an `earlier` run of the same analysis.
 
     Raises `InputError` where the trajectories cannot be followed.

@@ -11,7 +11,7 @@ from ...common.arrays import Array
 from .. import _core
 from ..model.model import Model
 from ..scene.analysis import TimedAnalysis, output_times
-from .outcome import Outcome
+from .planar_outcome import PlanarOutcome
 
 
 @dataclass(frozen=True)
@@ -37,14 +37,14 @@ def motor_limits(model: Model) -> Array:
     return np.array([joints[name].motor_limits.moment for name in model.motors])
 
 
-def actuation_source(source: Outcome) -> _core.ActuationSource:
+def actuation_source(source: PlanarOutcome) -> _core.ActuationSource:
     """The findings of an inverse analysis at any time of it, not at its outputs alone."""
     found = source.details.actuation_source(source)
     assert found is not None  # analyses that are replayed are recorded, or algebraic
     return found
 
 
-def replay_times(source: Outcome, analysis: TimedAnalysis) -> Array:
+def replay_times(source: PlanarOutcome, analysis: TimedAnalysis) -> Array:
     """Output times (T,) of a run under the actuation of `source`, s.
 
     With its pre-actuation and, where the run goes to the end of the path, its post-actuation.

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from functools import cache
 
@@ -23,9 +22,9 @@ from ..solve.spatial_limits import left_ranges, watch_limits
 from ..solve.spatial_posture import NEARLY_SINGULAR, SINGULAR, robot_size, told_posture
 from ..solve.state import State
 from .drive import STATUS, Progress
+from .earlier_check import check_earlier, going_on
+from .outcome import Continuation, EarlierRun, Forces, Motion, Outcome, Statistics
 from .samples import new_samples, stops, worth_a_look
-from .spatial_earlier import ROWS, EarlierSpatialRun
-from .spatial_run import SpatialRun
 
 
 @dataclass(frozen=True)
@@ -58,9 +57,9 @@ def spatial_drive(
     warnings: tuple[str, ...] = (),
     times: Array | None = None,
     control: SpatialControl | None = None,
-    earlier: EarlierSpatialRun | None = None,
+    earlier: EarlierRun | None = None,
     is_looked_into: bool = True,
-) -> SpatialRun:
+) -> Outcome:
     """The run of an integration from `start`, with outputs at `times`, those of the analysis where not given.
 
     Sampled `control` and `drives` act beside the loads of the scene. The rows of `model` hold. It ends early where
@@ -77,7 +76,8 @@ def spatial_drive(
         lambda: choose_integrator_in_space(system, analysis, start, len(times), is_sampled=is_sampled),
     )
     if earlier is not None:  # with the same candidates, and what they have become since
-        integrator = replace(integrator, name=earlier.integrator.name, reason=earlier.integrator.reason)
+        known = earlier.statistics.integrator
+        integrator = replace(integrator, name=known.name, reason=known.reason)
     controls = integration_controls(analysis, integrator)
     if any(row.is_trajectory for row in model.rows):
         controls.stops = as_list(stops(times, model.scene.trajectory))
@@ -85,11 +85,14 @@ def spatial_drive(
         [model.rows[k].is_trajectory for k in system.integrated.rows], robot_size(model)
     )
     watch_limits(system.integrated.scene, model.tree)
-    checkpoint = _core.TreeCheckpoint() if earlier is None else earlier.checkpoint
+    continuation = Continuation(_core.TreeCheckpoint()) if earlier is None else earlier.continuation
     samples = new_samples(times, analysis) if is_looked_into else None
-    with nullcontext() if earlier is None else earlier.checked(model, times):
-        run = _integrated(system, times, start, controls, control, progress, checkpoint, samples)
-    q, v, a, multipliers = _rows(system, run, earlier)
+    if earlier is not None:
+        _check(earlier, model, times)
+    with going_on(earlier, times):
+        run = _integrated(system, times, start, controls, control, progress, continuation.checkpoint, samples)
+    motion = _motion(system, run, times)
+    motion = motion if earlier is None else earlier.motion.followed_by(motion)
     in_posture = _ends_in_posture(run)
     posture = told_posture(model, run.least_ratio, run.singular_at, run.singular_posture, is_end=in_posture)
     cause = f"{posture}: move the path, or start in another posture" if in_posture else ""
@@ -97,28 +100,43 @@ def spatial_drive(
         cause = cause_of_short_steps(system, analysis, integrator, run)
     scatter = beyond_rounding(analysis.tolerance, run.rounding)
     told = (*warnings, *(text for text in (posture, scatter) if text))
-    told = (*told, *left_ranges(model, run.ranges, times[: len(q)], q, v))
+    told = (*told, *left_ranges(model, run.ranges, motion.time, motion.q, motion.v))
 
-    def again(others: Array) -> SpatialRun:
+    def again(others: Array) -> Outcome:
         return spatial_drive(model, analysis, start, progress, drives=drives, times=others, is_looked_into=False)
 
-    found = SpatialRun(
-        analysis, model, times[: len(q)], q, v, a, multipliers, applied=drives.at_points,
-        status="diverged" if in_posture else STATUS[run.status], integrator=integrator.changed_in(run), steps=run.steps,
-        evaluations=run.evaluations, wall_seconds=time.perf_counter() - began, warnings=told, cause=cause,
-        checkpoint=checkpoint if control is None else None, again=again if control is None else None,
-        step_ends=np.array(run.step_ends),
+    statistics = Statistics(
+        "diverged" if in_posture else STATUS[run.status], integrator.changed_in(run), run.steps, run.rejected,
+        run.evaluations, time.perf_counter() - began, continuation.checkpoint.time if control is None else None, cause,
+        np.array(run.step_ends), told,
     )  # fmt: skip
-    found = found if earlier is None else found.added_to(earlier)
+    found = Outcome(
+        analysis=analysis,
+        model=model,
+        motion=motion,
+        forces=Forces(applied=drives.at_points),
+        statistics=statistics if earlier is None else statistics.added_to(earlier.statistics),
+        continuation=continuation if control is None else None,
+        again=again if control is None else None,
+    )
     if samples is None or not len(samples.times):
         return found
     look_closer = cache(lambda: found.among(_between(system, samples, found, control)))
     return replace(found, look_closer=look_closer)
 
 
-def _between(
-    system: SpatialSystem, samples: _core.Samples, found: SpatialRun, control: SpatialControl | None
-) -> SpatialRun:
+def _check(earlier: EarlierRun, model: SpatialModel, times: Array) -> None:
+    motion, n_q, n_v = earlier.motion, model.tree.n_q, model.tree.n_v
+    datasets = {
+        "q": (motion.q, n_q),
+        "v": (motion.v, n_v),
+        "a": (motion.a, n_v),
+        "multipliers": (motion.multipliers, len(model.rows)),
+    }
+    check_earlier(earlier, times, (n_q, n_v), datasets)
+
+
+def _between(system: SpatialSystem, samples: _core.Samples, found: Outcome, control: SpatialControl | None) -> Outcome:
     """The run at samples of it."""
     core, scene, _ = system.integrated
     reached = samples.times <= (found.time[-1] if len(found.time) else -np.inf)
@@ -132,18 +150,13 @@ def _between(
         return _core.tree_outputs_under(core, scene, chosen, of_rows, held, control.held(times[rows]))
 
     rows = worth_a_look(len(times), lambda rows: system.multipliers(at(rows).multipliers))
-    q, v, a, multipliers = _rows(system, at(rows), None)
-    return replace(found, time=times[rows], q=q, v=v, a=a, multipliers=multipliers)
+    return replace(found, motion=_motion(system, at(rows), times[rows]))
 
 
-def _rows(system: SpatialSystem, run: _core.TreeRun, earlier: EarlierSpatialRun | None) -> list[Array]:
-    """What a run has of each output, `ROWS`, after what an earlier one had."""
+def _motion(system: SpatialSystem, run: _core.TreeRun, times: Array) -> Motion:
+    """The motion of a run of the core, as far as it got."""
     q, v = (np.ascontiguousarray(part) for part in np.split(run.states, [system.model.tree.n_q], axis=1))
-    found = [q, v, run.accelerations, system.multipliers(run.multipliers)]
-    if earlier is None:
-        return found
-    known = [getattr(earlier, name) for name in ROWS]
-    return [np.concatenate([before, now[len(before) :]]) for before, now in zip(known, found, strict=True)]
+    return Motion(times[: len(q)], q, v, run.accelerations, system.multipliers(run.multipliers))
 
 
 def _ends_in_posture(run: _core.TreeRun) -> bool:

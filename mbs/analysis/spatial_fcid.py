@@ -19,11 +19,12 @@ from ..solve.spatial_prescribed import prescribed_motion, spatial_quasi_static_s
 from ..solve.spatial_redundancy import resolved
 from ..solve.state import State
 from .fcid import Fcid, Shape, given_shape, sampled, shape_nodes
+from .outcome import Forces, Motion, Outcome, Statistics
 from .samples import path_times
-from .spatial_run import SpatialContext, SpatialRun
+from .spatial_run import SpatialContext
 
 
-def run_spatial_fcid(context: SpatialContext, analysis: Fcid) -> SpatialRun:
+def run_spatial_fcid(context: SpatialContext, analysis: Fcid) -> Outcome:
     """Motion and forces for the trajectories and the shape that the analysis prescribes.
 
     Raises `InputError` where the trajectories do not fix the motion of the mechanism or cannot be followed,
@@ -43,10 +44,10 @@ def run_spatial_fcid(context: SpatialContext, analysis: Fcid) -> SpatialRun:
     fits = sum(len(columns) for columns in model.motors.values()) == found.freedom
     shape = _shape(model, analysis, start, by_motors=fits)
     run = _run(model, analysis, shape, start, analysis.times, warnings)
-    run = replace(run, wall_seconds=time.perf_counter() - began)
+    run = replace(run, statistics=replace(run.statistics, wall_seconds=time.perf_counter() - began))
 
     @cache
-    def look_closer() -> SpatialRun:
+    def look_closer() -> Outcome:
         return _run(model, analysis, shape, start, path_times(run.time, model.scene.trajectory, analysis.end), warnings)
 
     return replace(run, look_closer=look_closer)
@@ -54,16 +55,20 @@ def run_spatial_fcid(context: SpatialContext, analysis: Fcid) -> SpatialRun:
 
 def _run(
     model: SpatialModel, analysis: Fcid, shape: Shape, start: State, times: Array, warnings: tuple[str, ...] = ()
-) -> SpatialRun:
+) -> Outcome:
     found = prescribed_motion(model, sampled(shape, times), times, start)
 
-    def again(others: Array) -> SpatialRun:
+    def again(others: Array) -> Outcome:
         return _run(model, analysis, shape, start, others)
 
-    return SpatialRun(
-        analysis, model, times, found.q, found.v, found.a, found.multipliers, found.required, warnings=warnings,
+    return Outcome(
+        analysis=analysis,
+        model=model,
+        motion=Motion(times, found.q, found.v, found.a, found.multipliers),
+        forces=Forces(required=found.required),
+        statistics=Statistics(warnings=warnings),
         again=again,
-    )  # fmt: skip
+    )
 
 
 def _shape(model: SpatialModel, analysis: Fcid, start: State, *, by_motors: bool) -> Shape:

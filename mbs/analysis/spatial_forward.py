@@ -22,10 +22,11 @@ from ..solve.spatial_statics import hanging_joints, initial_state
 from ..solve.state import State
 from .elastic_joints import DEGREE
 from .forward import Forward
+from .outcome import Outcome
 from .spatial_drive import spatial_drive
 from .spatial_gears import wound_up
 from .spatial_replay import left_paths, motor_forces_of, path_wrenches, replay_times, replayed
-from .spatial_run import SpatialContext, SpatialRun
+from .spatial_run import SpatialContext
 
 Moments = Mapping[str, Sequence[TimeFunction]]
 """By joint, on its second side along each coordinate, N·m or N."""
@@ -43,7 +44,7 @@ class Applied(NamedTuple):
     was_stopped: bool
 
 
-def run_spatial_forward(context: SpatialContext, analysis: Forward) -> SpatialRun:
+def run_spatial_forward(context: SpatialContext, analysis: Forward) -> Outcome:
     """Motion alone: nothing is specified. With an actuation it starts where the earlier analysis did.
 
     Raises `InputError` where what is to be applied does not fit the robot, `SolveError` where there is no equilibrium
@@ -73,16 +74,19 @@ def run_spatial_forward(context: SpatialContext, analysis: Forward) -> SpatialRu
         times=replay_times(source, analysis), earlier=context.earlier,
     )  # fmt: skip
     if analysis.apply == "trajectory":  # others act without what makes up for vibrations
-        run = replace(run, warnings=(*run.warnings, *left_paths(source, run)))
+        statistics = run.statistics
+        warnings = (*statistics.warnings, *left_paths(source, run))
+        run = replace(run, statistics=replace(statistics, warnings=warnings))
     return _commanded(run, applied.moments)
 
 
-def _commanded(run: SpatialRun, moments: Moments) -> SpatialRun:
+def _commanded(run: Outcome, moments: Moments) -> Outcome:
     """With what acts along joints at its outputs, and at times between."""
 
-    def told(of: SpatialRun) -> SpatialRun:
+    def told(of: Outcome) -> Outcome:
         sampled = {joint: [f.sample(of.time)[0] for f in sizes] for joint, sizes in moments.items() if sizes}
-        return replace(of, commanded={joint: np.stack(values, axis=1) for joint, values in sampled.items()})
+        commanded = {joint: np.stack(values, axis=1) for joint, values in sampled.items()}
+        return replace(of, forces=replace(of.forces, commanded=commanded))
 
     return told(run) if run.look_closer is None else replace(told(run), look_closer=cache(lambda: told(run.closer)))
 
@@ -93,7 +97,7 @@ def _by_joint(model: SpatialModel, functions: Iterable[TimeFunction]) -> dict[st
     return {joint: [next(following) for _ in columns] for joint, columns in model.motors.items()}
 
 
-def _behind_gears(source: SpatialRun, model: SpatialModel, analysis: Forward, context: SpatialContext) -> SpatialRun:
+def _behind_gears(source: Outcome, model: SpatialModel, analysis: Forward, context: SpatialContext) -> Outcome:
     """Where gears of `model` give: moments at the outputs of `source` and splines between these, as in the plane."""
     if analysis.apply != "joints":
         raise InputError(
@@ -137,12 +141,12 @@ def _directions(model: SpatialModel) -> list[Array]:
     return [model.sign(joint) * np.eye(model.tree.n_v)[k] for joint, columns in model.motors.items() for k in columns]
 
 
-def _paths(source: SpatialRun, analysis: Forward) -> Applied:
+def _paths(source: Outcome, analysis: Forward) -> Applied:
     """Forces and moments on the points of paths, and along the coordinates of joints that follow one."""
     model = source.model
     rows = [(k, row) for k, row in enumerate(model.rows) if row.is_trajectory and row.kind == "coordinate"]
 
-    def forces(run: SpatialRun) -> Array:
+    def forces(run: Outcome) -> Array:
         along = [-run.multipliers[:, k : k + 1] for k, _ in rows]
         return np.hstack([*along, *path_wrenches(run).values()])
 
@@ -152,34 +156,33 @@ def _paths(source: SpatialRun, analysis: Forward) -> Applied:
     sizes = iter(found.functions[len(rows) :])
     points = [
         PointDrive(point, {component: next(sizes) for component in OF_POINT})
-        for point in path_wrenches(source.rows(slice(0, 1)))
+        for point in path_wrenches(source.at(slice(0, 1)))
     ]
     by_joint = {model.joint_of(row): [size] for (_, row), size in zip(rows, moments, strict=True)}
     return Applied(Drives(tuple(along), tuple(points)), by_joint, found.unresolved, found.was_stopped)
 
 
-def _points(context: SpatialContext, source: SpatialRun, analysis: Forward) -> Applied:
+def _points(context: SpatialContext, source: Outcome, analysis: Forward) -> Applied:
     """Forces at the actuation points, as they were along the motion of the source: in global axes."""
 
-    def forces(run: SpatialRun) -> Array:
+    def forces(run: Outcome) -> Array:
         return np.hstack(list(context.at_points(run).values()))
 
     found = replayed(source, forces, replay_times(source, analysis), analysis.tolerance)
     sizes = iter(found.functions)
     points = tuple(
-        PointDrive(point, {axis: next(sizes) for axis in "xyz"})
-        for point in context.at_points(source.rows(slice(0, 1)))
+        PointDrive(point, {axis: next(sizes) for axis in "xyz"}) for point in context.at_points(source.at(slice(0, 1)))
     )
     return Applied(Drives(at_points=points), {}, found.unresolved, found.was_stopped)
 
 
-def _actuators(context: SpatialContext, source: SpatialRun, analysis: Forward) -> Applied:
+def _actuators(context: SpatialContext, source: Outcome, analysis: Forward) -> Applied:
     """Moments of all motors along their coordinates, and what voltages of patches do on modes."""
     model = source.model
     _check_motors(model, analysis)
     most = largest_moments(model, limits=analysis.limits)
 
-    def forces(run: SpatialRun) -> Array:
+    def forces(run: Outcome) -> Array:
         found = motor_forces_of(run)
         moments = np.clip(np.hstack(list(found.moments.values())), -most, most)
         return np.hstack([moments, *_supplied(context, analysis, found).values()])
@@ -187,7 +190,7 @@ def _actuators(context: SpatialContext, source: SpatialRun, analysis: Forward) -
     found = replayed(source, forces, replay_times(source, analysis), analysis.tolerance)
     sizes = iter(found.functions)
     motors = list(motor_drives(model, sizes))
-    with_patches = _supplied(context, analysis, motor_forces_of(source.rows(slice(0, 1))))
+    with_patches = _supplied(context, analysis, motor_forces_of(source.at(slice(0, 1))))
     modal = tuple(drive for body in with_patches for drive in modal_drives(model, body, sizes))
     along = tuple(drive for drive in motors if isinstance(drive, Drive))
     on_frames = tuple(drive for drive in motors if isinstance(drive, FrameDrive))

@@ -17,9 +17,8 @@ from ..model.spatial_gears import elastic_joints
 from ..model.spatial_model import SpatialModel
 from ..model.spatial_transmission import compliance, rotor, rotors
 from .elastic_joints import GearSpring, gear_motion
-from .outcome import GearMotion
+from .outcome import GearMotion, Outcome
 from .spatial_replay import motor_forces_of
-from .spatial_run import SpatialRun
 
 
 def gears_of_motion(
@@ -67,7 +66,7 @@ class WoundUp(NamedTuple):
     gears: Mapping[str, GearMotion]
 
 
-def wound_up(run: SpatialRun, model: SpatialModel) -> WoundUp:
+def wound_up(run: Outcome, model: SpatialModel) -> WoundUp:
     """The motion of `run` in the coordinates of `model`: where its gears give, motors as far ahead as they have to be.
 
     Raises `InputError` where motors turn frames: what a gear carries then is not along its joint alone.

@@ -17,14 +17,15 @@ from ..solve.integrators import Choice
 from ..solve.internal_dynamics import Stopped
 from ..solve.spatial_servo import SpatialServo, make_spatial_servo
 from ..solve.stable_inversion import Inversion, invert
-from .motors_only import MotorsOnly, cause_of, check_rest, choose_output, durations, where
+from .motors_only import AroundPath, MotorsOnly, cause_of, check_rest, choose_output, durations, where
+from .outcome import Forces, Motion, Outcome, Statistics
 from .samples import path_times
-from .spatial_run import SpatialContext, SpatialRun
+from .spatial_run import SpatialContext
 
 NOTABLE = 1e-9  # m, rad: of a path that is left
 
 
-def run_spatial_motors_only(context: SpatialContext, analysis: MotorsOnly) -> SpatialRun:
+def run_spatial_motors_only(context: SpatialContext, analysis: MotorsOnly) -> Outcome:
     """Motion and motor forces for the trajectories, no other force acting; before and after the path it is held.
 
     Raises `InputError` and `SolveError` as `motors_only.run_motors_only`, and `SolveError` where it is stopped before
@@ -54,33 +55,41 @@ def run_spatial_motors_only(context: SpatialContext, analysis: MotorsOnly) -> Sp
         raise SolveError(f"{servo.where}: no motion was found ({inversion.status}): {cause_of(inversion)}")
     seconds = time.perf_counter() - began
 
+    around = AroundPath(pre, post)
+
     @cache
-    def look_closer() -> SpatialRun:
+    def look_closer() -> Outcome:
         between = path_times(run.time, model.scene.trajectory, analysis.end)
-        return replace(_run(analysis, model, inversion, between), before=pre, after=post)
+        return replace(_run(analysis, model, inversion, between), details=around)
 
-    return replace(
-        run, before=pre, after=post, wall_seconds=seconds, warnings=_told(inversion, run), look_closer=look_closer
-    )
+    statistics = replace(run.statistics, wall_seconds=seconds, warnings=_told(inversion, run))
+    return replace(run, details=around, statistics=statistics, look_closer=look_closer)
 
 
-def _run(analysis: MotorsOnly, model: SpatialModel, inversion: Inversion[SpatialServo], times: Array) -> SpatialRun:
+def _run(analysis: MotorsOnly, model: SpatialModel, inversion: Inversion[SpatialServo], times: Array) -> Outcome:
     curve = inversion.curve
     modes = np.array([curve(times), curve.derivative(1)(times), curve.derivative(2)(times)])
     found, is_met = inversion.servo.motion(times, modes)
     kept = slice(len(times) if is_met.all() else int(is_met.argmin()))
 
-    def again(others: Array) -> SpatialRun:
+    def again(others: Array) -> Outcome:
         return _run(analysis, model, inversion, others)
 
-    return SpatialRun(
-        analysis, without_paths(model), times[kept], found.q[kept], found.v[kept], found.a[kept],
-        -found.split.loops[kept], found.required[kept], status=inversion.status, integrator=Choice("collocation", ""),
-        steps=len(curve.x) - 1, evaluations=inversion.iterations, again=again, cause=cause_of(inversion),
+    statistics = Statistics(
+        inversion.status, Choice("collocation", ""), steps=len(curve.x) - 1, evaluations=inversion.iterations,
+        cause=cause_of(inversion),
     )  # fmt: skip
+    return Outcome(
+        analysis=analysis,
+        model=without_paths(model),
+        motion=Motion(times, found.q, found.v, found.a, -found.split.loops).at(kept),
+        forces=Forces(required=found.required).at(kept),
+        statistics=statistics,
+        again=again,
+    )
 
 
-def _told(inversion: Inversion[SpatialServo], run: SpatialRun) -> tuple[str, ...]:
+def _told(inversion: Inversion[SpatialServo], run: Outcome) -> tuple[str, ...]:
     """How far a redefined output leaves the path itself."""
     told = []
     if not run.failed and inversion.servo.factor < 1:

@@ -19,7 +19,7 @@ from ..model.spatial_motors import MotorForces, motor_forces, path_forces
 from ..model.spatial_wrench import row_wrenches
 from ..scene.analysis import TimedAnalysis, output_times
 from ..solve.spatial_posture import robot_size
-from .spatial_run import SpatialRun
+from .outcome import Outcome
 
 FEWEST_NODES = 401
 MOST_NODES = 200_000
@@ -40,24 +40,24 @@ class Replayed(NamedTuple):
     was_stopped: bool = False
 
 
-def replay_times(source: SpatialRun, analysis: TimedAnalysis) -> Array:
+def replay_times(source: Outcome, analysis: TimedAnalysis) -> Array:
     """Output times (T,) of a run under what `source` found, s.
 
     With what it does before t = 0 and, where the run goes to the end of the path, after that.
     """
-    after = source.after if analysis.end == source.analysis.last_time else 0.0
-    return output_times(analysis.end, analysis.output_step, source.before, after)
+    after = source.details.post_actuation if analysis.end == source.analysis.last_time else 0.0
+    return output_times(analysis.end, analysis.output_step, source.details.pre_actuation, after)
 
 
-def replayed(source: SpatialRun, read: Callable[[SpatialRun], Array], times: Array, tolerance: float) -> Replayed:
+def replayed(source: Outcome, read: Callable[[Outcome], Array], times: Array, tolerance: float) -> Replayed:
     """What `read` (T, columns) finds of a run over `times` (s), to a share of the tolerance where that can be had."""
     assert source.again is not None
-    count = 2 * max(FEWEST_NODES // 2, source.steps) + 1
+    count = 2 * max(FEWEST_NODES // 2, source.statistics.steps) + 1
     while True:
         nodes = as_floats(np.linspace(times[0], times[-1], count))
         made_again = source.again(nodes)
         if made_again.status == "interrupted":
-            at_start = read(source.rows(slice(0, 1)))[0]
+            at_start = read(source.at(slice(0, 1)))[0]
             return Replayed([TimeFunction.constant(float(value)) for value in at_start], 0.0, was_stopped=True)
         made_again.check_completed()
         values = in_parts(made_again, read)
@@ -70,15 +70,16 @@ def replayed(source: SpatialRun, read: Callable[[SpatialRun], Array], times: Arr
         count = 2 * count - 1
 
 
-def motor_forces_of(run: SpatialRun) -> MotorForces:
+def motor_forces_of(run: Outcome) -> MotorForces:
     """τ and F_p of a run (see `mbs.model.spatial_motors`)."""
     frames = run.model.tree.frames(run.q)
     C_v = row_values(run.model, run.q, run.time, frames)[1]
-    wanted = path_forces(run.model, C_v, run.multipliers) if run.required is None else run.required
+    wanted = run.forces.required
+    wanted = path_forces(run.model, C_v, run.multipliers) if wanted is None else wanted
     return motor_forces(run.model, run.q, frames, C_v, wanted)
 
 
-def path_wrenches(run: SpatialRun) -> dict[str, Array]:
+def path_wrenches(run: Outcome) -> dict[str, Array]:
     """What a path does on its point: force and moment (T, 6) about there, by point, of a run's motion."""
     tree, frames = run.model.tree, run.model.tree.frames(run.q)
     found: dict[str, Array] = {}
@@ -95,12 +96,12 @@ def path_wrenches(run: SpatialRun) -> dict[str, Array]:
     return found
 
 
-def in_parts(run: SpatialRun, read: Callable[[SpatialRun], Array]) -> Array:
+def in_parts(run: Outcome, read: Callable[[Outcome], Array]) -> Array:
     """`read` of a long run, part by part: Jacobians of all states at once would not fit into memory."""
-    return np.concatenate([read(run.rows(slice(k, k + CHUNK))) for k in range(0, len(run.time), CHUNK)])
+    return np.concatenate([read(run.at(slice(k, k + CHUNK))) for k in range(0, len(run.time), CHUNK)])
 
 
-def left_paths(source: SpatialRun, run: SpatialRun) -> Iterator[str]:
+def left_paths(source: Outcome, run: Outcome) -> Iterator[str]:
     """Of a replay under the forces on all rows, which would move as `source` did: a warning where it does not."""
     now = (run.time >= 0.0) & (run.time <= source.time[-1])
     model, times, q = source.model, run.time[now], run.q[now]

@@ -11,10 +11,11 @@ from ..scene.analysis import Analysis
 from ..solve.spatial_posture import undeformed_posture
 from ..solve.spatial_redundancy import resolved
 from ..solve.spatial_statics import holding_multipliers, static_equilibrium
-from .spatial_run import SpatialContext, SpatialRun
+from .outcome import Motion, Outcome, Statistics
+from .spatial_run import SpatialContext
 
 
-def run_spatial_static(context: SpatialContext, analysis: Analysis) -> SpatialRun:
+def run_spatial_static(context: SpatialContext, analysis: Analysis) -> Outcome:
     """The equilibrium at the one time t = 0: at rest, however fast the trajectories are there.
 
     Raises `SolveError` where there is none.
@@ -23,7 +24,10 @@ def run_spatial_static(context: SpatialContext, analysis: Analysis) -> SpatialRu
     model = with_held_motors(resolved(context.model, analysis.last_time))
     q = static_equilibrium(model, undeformed_posture(model)).q[None]
     at_rest, times = np.zeros((1, model.tree.n_v)), np.zeros(1)
-    return SpatialRun(
-        analysis, model, times, q, at_rest, at_rest, holding_multipliers(model, q[0])[None],
-        is_at_rest=True, wall_seconds=time.perf_counter() - began,
-    )  # fmt: skip
+    multipliers = holding_multipliers(model, q[0])[None]
+    return Outcome(
+        analysis=analysis,
+        model=model,
+        motion=Motion(times, q, at_rest, at_rest, multipliers, is_at_rest=True),
+        statistics=Statistics(wall_seconds=time.perf_counter() - began),
+    )

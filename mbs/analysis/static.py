@@ -19,7 +19,8 @@ from ..solve.statics import static_equilibrium
 from .context import Context
 from .drive import motion_of, motors_fit, statistics_of
 from .elastic_joints import add_transmission
-from .outcome import Forces, Outcome
+from .outcome import Forces
+from .planar_outcome import PlanarOutcome
 
 
 class Static(Analysis):
@@ -30,12 +31,12 @@ class Static(Analysis):
     is_algebraic = True
     allocates_patches = True
 
-    def run(self, context: Context) -> Outcome:
+    def run(self, context: Context) -> PlanarOutcome:
         """Motion and forces at t = 0."""
         return add_transmission(run_static(context.model, self))
 
 
-def run_static(model: Model, analysis: Analysis) -> Outcome:
+def run_static(model: Model, analysis: Analysis) -> PlanarOutcome:
     """The equilibrium at the one time t = 0, whatever the `kind` that asks for it.
 
     The targets are frozen, so that the multipliers of the state at rest are those of the equilibrium. Raises
@@ -52,7 +53,7 @@ def run_static(model: Model, analysis: Analysis) -> Outcome:
     )
     # no step is made: accelerations and multipliers of one state
     run = _core.run_tree(tree.both, times=[0.0], q=q, v=v, controls=controls, carry_on=lambda _: True)
-    return Outcome(
+    return PlanarOutcome(
         analysis=analysis,
         assembly=assembly,
         motion=motion_of(assembly, run, np.zeros(1)),

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...common.arrays import Array
-from ..analysis.outcome import Outcome
+from ..analysis.planar_outcome import PlanarOutcome
 from ..model.masses import system_mass_matrix
 from ..model.planar_body import PlanarBody
 from ..model.spatial_body import SpatialBody
@@ -78,7 +78,7 @@ def start_jolt(start: Start) -> float:
     return float(np.sqrt((accelerations[elastic] ** 2 / squares[elastic]).sum() / start.largest))
 
 
-def modes_in_motion(outcome: Outcome) -> Iterator[ModesInMotion]:
+def modes_in_motion(outcome: PlanarOutcome) -> Iterator[ModesInMotion]:
     """Of the flexible links of a planar run."""
     for body in outcome.assembly.model.links:
         if body.n_modes:
@@ -93,7 +93,7 @@ def modes_in_3d_motion(motion: SpatialMotion) -> Iterator[ModesInMotion]:
             yield ModesInMotion(node.body, motion.q[:, node.p_q], motion.a[:, node.p_v])
 
 
-def start_of(outcome: Outcome) -> Start:
+def start_of(outcome: PlanarOutcome) -> Start:
     """Of a planar run."""
     assembly, bodies = outcome.assembly, outcome.assembly.model.bodies
     stiffness = np.concatenate([np.append(np.zeros(3), body.stiffness) for body in bodies])

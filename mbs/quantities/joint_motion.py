@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from ...common.arrays import Array
 from .. import _core
-from ..analysis.outcome import Outcome
+from ..analysis.planar_outcome import PlanarOutcome
 from ..model.system import MechanismSystem
 
 
@@ -18,7 +18,7 @@ class JointMotion:
     rate: Array  # (T,) rad/s, or m/s
 
 
-def joint_motions(outcome: Outcome) -> dict[str, JointMotion]:
+def joint_motions(outcome: PlanarOutcome) -> dict[str, JointMotion]:
     """Of all joints that move, by name: between sections or between frames, as `motors` of the scene says.
 
     Of links in pieces, between their sections as they were computed.
@@ -33,7 +33,7 @@ def joint_motions(outcome: Outcome) -> dict[str, JointMotion]:
     return {name: JointMotion(*readings[:, 2 * k : 2 * k + 2].T.copy()) for k, name in enumerate(moving)}
 
 
-def motor_motion(outcome: Outcome, joint: str) -> JointMotion | None:
+def motor_motion(outcome: PlanarOutcome, joint: str) -> JointMotion | None:
     """θ_m of the motor of a joint whose gear gives, behind the gear; None of others, which move as their joint does."""
     if joint in outcome.gears:
         return JointMotion(outcome.gears[joint].angle, outcome.gears[joint].rate)

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from ...common.arrays import Array
-from ..analysis.outcome import Outcome
+from ..analysis.planar_outcome import PlanarOutcome
 from ..model.model import ZERO, Constraint
 from ..model.system import MechanismSystem
 
 
-def motor_rates(outcome: Outcome) -> Array:
+def motor_rates(outcome: PlanarOutcome) -> Array:
     """Rates T_q q̇ of the motor coordinates (T, motors), rad/s, or m/s for prismatic joints.
 
     The motor rows are those that `motors` of the scene defines: between sections or between frames.
@@ -20,7 +20,7 @@ def motor_rates(outcome: Outcome) -> Array:
     return rates
 
 
-def held_joint_motion(outcome: Outcome) -> Array:
+def held_joint_motion(outcome: PlanarOutcome) -> Array:
     """∂q/∂p (T, coordinates, modes of all bodies) with all joints closed and all motors at rest.
 
     The modal columns of the velocity transformation D of Shabana 2022, Eq. 18: C_mq δq = 0 and T_q δq = 0 give δ(R, θ).
@@ -35,7 +35,7 @@ def held_joint_motion(outcome: Outcome) -> Array:
     return motion
 
 
-def motor_joint_motion(outcome: Outcome, rows: slice) -> Array:
+def motor_joint_motion(outcome: PlanarOutcome, rows: slice) -> Array:
     """∂q/∂γ (outputs, coordinates, motors) of the motor coordinates γ with all joints closed and p kept."""
     gradients, frames = _gradients(outcome)[rows], outcome.assembly.frame_coordinates
     closed = len(outcome.assembly.model.joints)
@@ -45,7 +45,7 @@ def motor_joint_motion(outcome: Outcome, rows: slice) -> Array:
     return motion
 
 
-def _gradients(outcome: Outcome) -> Array:
+def _gradients(outcome: PlanarOutcome) -> Array:
     """Gradients (T, rows, coordinates) of the joint constraints and then of the motor coordinates."""
     model = outcome.assembly.model
     motors = [Constraint(row, ZERO, name, "motor", is_trajectory=False) for name, row in model.motors.items()]

@@ -14,7 +14,7 @@ import numpy as np
 
 from ...common.arrays import Array
 from ...common.plane import perpendicular, rotated
-from ..analysis.outcome import Outcome
+from ..analysis.planar_outcome import PlanarOutcome
 from ..fields.field_types import split_point
 from ..joints.measure import FRAME
 from ..model.model import ZERO, Constraint, Model
@@ -37,7 +37,7 @@ class LinkLoads:
     modal_force: Array
 
 
-def link_loads(outcome: Outcome, bodies: Iterable[str]) -> dict[str, LinkLoads]:
+def link_loads(outcome: PlanarOutcome, bodies: Iterable[str]) -> dict[str, LinkLoads]:
     """Of each of `bodies`. Nothing where it is not known what acts: forces at actuation points, links in pieces."""
     if outcome.in_pieces is not None or getattr(outcome.analysis, "apply", None) == FORCES_AT_POINTS:
         return {}
@@ -60,7 +60,7 @@ def link_loads(outcome: Outcome, bodies: Iterable[str]) -> dict[str, LinkLoads]:
 class _Motion:
     """Of one body, in its own axes; gravity counts as an acceleration of the frame the other way."""
 
-    def __init__(self, outcome: Outcome, body: PlanarBody) -> None:
+    def __init__(self, outcome: PlanarOutcome, body: PlanarBody) -> None:
         columns = outcome.coordinates(body.name)
         q, v, a = outcome.q[:, columns], outcome.v[:, columns], outcome.a[:, columns]
         self.body = body
@@ -93,7 +93,7 @@ def _named(point: str, wrench: Array) -> Iterable[tuple[str, Array]]:
     return zip(names, wrench.T, strict=True)
 
 
-def _wrenches(outcome: Outcome) -> tuple[Mapping[str, Mapping[str, Array]], Array]:
+def _wrenches(outcome: PlanarOutcome) -> tuple[Mapping[str, Mapping[str, Array]], Array]:
     """On points of bodies (T, 3), global axes; and the generalized forces (T, coordinates) that these leave."""
     model = replace(outcome.assembly.model, modal_loads=())  # of patches: they are told with what is left
     loads = model.loads if outcome.details.loads is None else outcome.details.loads
@@ -106,7 +106,7 @@ def _wrenches(outcome: Outcome) -> tuple[Mapping[str, Mapping[str, Array]], Arra
     return acting.marker_wrenches(time, q, v, a, lambda_), left
 
 
-def _actuated(outcome: Outcome) -> list[Constraint]:
+def _actuated(outcome: PlanarOutcome) -> list[Constraint]:
     """Rows along which motors act, or forces on the trajectories where these stand for themselves."""
     model = outcome.assembly.model
     if getattr(outcome.analysis, "apply", None) == "trajectory":

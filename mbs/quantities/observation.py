@@ -8,7 +8,7 @@ import numpy as np
 
 from ...common.arrays import Array
 from ...common.plane import rotated
-from ..analysis.outcome import Outcome
+from ..analysis.planar_outcome import PlanarOutcome
 from ..fields.field_types import split_point
 from ..model.geometric_stiffening import second_order_displacement
 from ..model.planar_body import PlanarBody
@@ -44,7 +44,7 @@ class JointForces:
     motor: Array | None  # (T,) N·m, or N for a prismatic joint
 
 
-def body_motion(outcome: Outcome, body: PlanarBody) -> BodyMotion:
+def body_motion(outcome: PlanarOutcome, body: PlanarBody) -> BodyMotion:
     """Motion of `body` in an analysis."""
     columns = outcome.coordinates(body.name)
     q, v = outcome.q[:, columns], outcome.v[:, columns]
@@ -61,7 +61,7 @@ def stored_coordinates(body: PlanarBody) -> Array | None:
     return body.modal_transform if n < n_file else None
 
 
-def modal_force(outcome: Outcome, body: PlanarBody) -> Array | None:
+def modal_force(outcome: PlanarOutcome, body: PlanarBody) -> Array | None:
     """F_p (T, n), what patches would have to supply, in the coordinates of `BodyMotion.modal`; None where not known."""
     if outcome.F_p is None:
         return None
@@ -70,12 +70,12 @@ def modal_force(outcome: Outcome, body: PlanarBody) -> Array | None:
     return np.asarray(F_p @ np.linalg.pinv(T))  # the same work on δp
 
 
-def modes_of_file(outcome: Outcome, body: PlanarBody) -> Array:
+def modes_of_file(outcome: PlanarOutcome, body: PlanarBody) -> Array:
     """P (T, n_file) in the modes of the modal body file."""
     return np.asarray(outcome.q[:, outcome.coordinates(body.name)][:, 3:] @ body.modal_transform.T)
 
 
-def point_motion(outcome: Outcome, reference: str) -> PointMotion:
+def point_motion(outcome: PlanarOutcome, reference: str) -> PointMotion:
     """Motion of "BODY.POINT": r = R + A (x + Φ p), and what geometric stiffening takes off Φp where it is on.
 
     Of a link in pieces the position is that of its pieces, and the deflection how far it is from x in the link's frame.
@@ -92,7 +92,7 @@ def point_motion(outcome: Outcome, reference: str) -> PointMotion:
     return PointMotion(q[:, :2] + rotated(q[:, 2], point.position + deflection), deflection)
 
 
-def trajectory_force(outcome: Outcome, trajectory: str) -> Array:
+def trajectory_force(outcome: PlanarOutcome, trajectory: str) -> Array:
     """−λ_s (T, m): the force on the point in global axes, or the moment on the joint; a column per component."""
     columns = [i for i, c in enumerate(outcome.assembly.constraints) if c.is_trajectory and c.owner == trajectory]
     order = [c.component for c in outcome.assembly.model.trajectories if c.owner == trajectory]
@@ -100,7 +100,7 @@ def trajectory_force(outcome: Outcome, trajectory: str) -> Array:
     return -outcome.lambda_[:, columns]
 
 
-def trajectory_target(outcome: Outcome, trajectory: str) -> Array:
+def trajectory_target(outcome: PlanarOutcome, trajectory: str) -> Array:
     """Specified values (T, m) in the order of `trajectory_force`; held before 0 and after the end of the analysis."""
     targets = [c.target for c in outcome.assembly.model.trajectories if c.owner == trajectory]
     return np.column_stack(
@@ -108,7 +108,7 @@ def trajectory_target(outcome: Outcome, trajectory: str) -> Array:
     )
 
 
-def joint_forces(outcome: Outcome, joint: str) -> JointForces:
+def joint_forces(outcome: PlanarOutcome, joint: str) -> JointForces:
     """Reaction of a joint on its second body, and what its motor does."""
     outcome = outcome.computed
     assembly, reaction, moment = outcome.assembly, np.zeros((len(outcome.time), 2)), None
@@ -126,7 +126,7 @@ def joint_forces(outcome: Outcome, joint: str) -> JointForces:
     return JointForces(reaction, moment, motor)
 
 
-def energies(outcome: Outcome) -> dict[str, Array]:
+def energies(outcome: PlanarOutcome) -> dict[str, Array]:
     """Kinetic, strain and gravitational energy (J) and dissipated power (W), each (T,)."""
     outcome = outcome.computed
     tree = PlanarTree(outcome.assembly)

@@ -8,7 +8,7 @@ import numpy as np
 
 from ...common.arrays import Array
 from ...common.plane import rotated
-from ..analysis.outcome import Outcome
+from ..analysis.planar_outcome import PlanarOutcome
 from ..model.geometric_stiffening import GeometricStiffening
 from ..model.planar_body import PlanarBody
 from .stiffness_change import LoadedPoint, ModalLoads
@@ -16,7 +16,9 @@ from .stiffness_change import LoadedPoint, ModalLoads
 NOTABLE = 0.01  # relative change of a link's stiffness from which on the summary warns, and "auto" switches it on
 
 
-def loads_on_modes(outcome: Outcome, stiffening: Mapping[str, GeometricStiffening | None]) -> dict[str, ModalLoads]:
+def loads_on_modes(
+    outcome: PlanarOutcome, stiffening: Mapping[str, GeometricStiffening | None]
+) -> dict[str, ModalLoads]:
     """By body, of a run, whether geometric stiffening was on or not.
 
     `stiffening` by the names of bodies; those without have no entry. Loads are those of θ̇², of the frame's acceleration
@@ -42,7 +44,7 @@ def loads_on_modes(outcome: Outcome, stiffening: Mapping[str, GeometricStiffenin
     return found
 
 
-def shortenings(outcome: Outcome, stiffening: Mapping[str, GeometricStiffening | None]) -> dict[str, Array]:
+def shortenings(outcome: PlanarOutcome, stiffening: Mapping[str, GeometricStiffening | None]) -> dict[str, Array]:
     """By body, b(t) = ½|pᵀβp| (T,): what bending takes off the length of a link, relative to it.
 
     `stiffening` by the names of bodies, whether it was on in the run or not; bodies without it are left out. The error

@@ -18,7 +18,7 @@ import numpy as np
 
 from ...common.arrays import Array
 from ...fe_models.modal_body import ModalBody
-from ..analysis.outcome import Outcome
+from ..analysis.planar_outcome import PlanarOutcome
 from .observation import modes_of_file
 from .second_order import (
     Missing,
@@ -138,7 +138,7 @@ def enough_pieces(shortening: float, count: int) -> int:
 
 
 def bending(
-    outcome: Outcome,
+    outcome: PlanarOutcome,
     links: Mapping[str, ModalBody],
     loads: Mapping[str, ModalLoads],
     is_stiffened: bool,

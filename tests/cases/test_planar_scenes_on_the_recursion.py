@@ -72,7 +72,7 @@ def solved(request, tmp_path_factory):
 
 
 def motion_of(run):
-    return SpatialMotion(run.model, run.time, run.q, run.v, run.a, run.multipliers, run.required)
+    return SpatialMotion(run.model, run.time, run.q, run.v, run.a, run.multipliers, run.forces.required)
 
 
 def close(found, expected, share=1e-8, least=0.0):

@@ -10,8 +10,8 @@ from mechanisms import assemble, make_model, oracle_of, pcid, relative, revolute
 from ffrobot.common.errors import InputError, SolveError
 from ffrobot.mbs import _core
 from ffrobot.mbs.analysis.fcid import Fcid, run_fcid
-from ffrobot.mbs.analysis.outcome import Outcome
 from ffrobot.mbs.analysis.pcid import run_pcid
+from ffrobot.mbs.analysis.planar_outcome import PlanarOutcome
 from ffrobot.mbs.fields.expressions import parse_expression
 from ffrobot.mbs.fields.waypoints import spline
 from ffrobot.mbs.model.planar_tree import told_in_joints
@@ -224,7 +224,7 @@ def test_pcid_and_fcid_meet_in_stiff_links():
     differences = []
     for EI in (3e3, 3e4):
         model = arm(arm_links(EI=EI), initial={"state": "static", "angles": {"link1": 0.4, "link2": 1.3}})
-        free: Outcome = run_pcid(model, pcid(output_step=0.05), False, lambda _: True)
+        free: PlanarOutcome = run_pcid(model, pcid(output_step=0.05), False, lambda _: True)
         held = run_fcid(model, Fcid(name="f", kind="fcid", shape="zero", end=1.0, output_step=0.05))
         differences.append(relative(held.tau, free.tau))
     assert differences[1] == pytest.approx(differences[0] / np.sqrt(10), rel=0.3)
