@@ -34,18 +34,18 @@ Place = float | Name
 
 
 class ActuationPoints(Record):
-    """Components of force on one body that carry its generalized driving forces (Shabana 2022, sec. 4).
+    """Components of force on one body, equivalent to its generalized driving forces (Shabana 2022, sec. 4).
 
-    `axial` and `transverse` say at which places a component along x or y of the body's frame acts. Without either,
-    as many as the body has coordinates are chosen.
+    `axial` and `transverse` list the points of components along x or y of the body's frame. Without both, ffrobot
+    chooses as many components as the body has coordinates.
     """
 
     body: str
-    """Body that they sit on."""
+    """Body with these forces."""
     axial: tuple[Place, ...] = ()
-    """Places (m from the root, or a point's name) where a force along the body's x axis acts."""
+    """Points (m from the root, or a name) at which a force along the body's x axis acts."""
     transverse: tuple[Place, ...] = ()
-    """Places where a force along the body's y axis acts."""
+    """Points at which a force along the body's y axis acts."""
 
     @property
     def is_automatic(self) -> bool:

@@ -31,20 +31,20 @@ AXES = "xyz"
 
 
 class SpatialActuationPoints(Record):
-    """Components of force on one body that carry its generalized driving forces (Shabana 2022, sec. 4).
+    """Components of force on one body, equivalent to its generalized driving forces (Shabana 2022, sec. 4).
 
-    `x`, `y` and `z` say at which places a component along that axis of the body's frame acts. Without any, as many as
-    are independent of each other are chosen.
+    `x`, `y` and `z` list the points of components along that axis of the body's frame. Without them, ffrobot chooses as
+    many independent components as possible.
     """
 
     body: str
-    """Body that they sit on."""
+    """Body with these forces."""
     x: tuple[Place, ...] = ()
-    """Places (m from the root, or a point's name) where a force along the body's x axis acts."""
+    """Points (m from the root, or a name) at which a force along the body's x axis acts."""
     y: tuple[Place, ...] = ()
-    """Places where a force along the body's y axis acts."""
+    """Points at which a force along the body's y axis acts."""
     z: tuple[Place, ...] = ()
-    """Places where a force along the body's z axis acts."""
+    """Points at which a force along the body's z axis acts."""
 
     @property
     def places(self) -> list[tuple[str, Place]]:

@@ -14,14 +14,14 @@ from ffrobot.scene.spatial_lacks import LACKS
 from ffrobot.schema import schema
 
 INTRODUCTION = {
-    "link": "What stage 1 reads. SI units; the link's axis is x, in-plane bending displaces along y.",
-    "scene": "What stage 2 reads. SI units, angles in rad; files are named relative to the scene's folder. Values that"
-    " the program cannot do yet are refused, with a message that says so."
-    " Axes and signs: [conventions](conventions.md).",
-    "spatial": 'What stage 2 reads where `space = "spatial"`. SI units, angles in rad. Analyses are those of'
-    " planar scenes, with their keys; [what space does not have](#what-space-does-not-have) is refused, with a message"
-    " that says so.",
-    "figures": "What `ffrobot plot` draws: a file `figures.toml` beside the results. Without it, the standard figures.",
+    "link": "A link file is the input of stage 1. SI units; the link's axis is x, in-plane bending displaces along y.",
+    "scene": "A scene file is the input of stage 2. SI units, angles in rad; file names are relative to the scene's"
+    " folder. `ffrobot schema scene` prints these keys for editors. Axes and signs: [conventions](conventions.md).",
+    "spatial": 'A scene file with `space = "spatial"` is the input of stage 2 in 3D. SI units, angles in rad. Analyses have'
+    " the keys of [planar scenes](scene_keys.md). ffrobot rejects [unsupported keys](#unsupported-in-3d) with an error"
+    " message. `ffrobot schema spatial` prints these keys for editors.",
+    "figures": "A file `figures.toml` next to the results lists the figures of `ffrobot plot`. Without it, standard figures"
+    " are drawn.",
 }
 HERE = Path(__file__).parent / "reference"
 
@@ -40,7 +40,7 @@ def key_pages() -> dict[str, str]:
     """The pages by the name of their file."""
     pages = {}
     for kind, introduction in INTRODUCTION.items():
-        what = "scene in space" if kind == "spatial" else f"{kind} file"
+        what = "3D scene file" if kind == "spatial" else f"{kind} file"
         lines = [f"# Keys of a {what}", "", introduction, ""]
         elsewhere = LINK_TABLES if kind in ("scene", "spatial") else ()
         elsewhere += SCENE_TABLES if kind == "spatial" else ()  # a body's link has the keys of a link file
@@ -55,8 +55,8 @@ def key_pages() -> dict[str, str]:
 
 
 def _lacks() -> Iterator[str]:
-    """What scenes in space do not have, and what they have instead."""
-    yield from ("## What space does not have", "", "| what | instead |", "|---|---|")
+    """Unsupported features of 3D scenes, and what to use instead."""
+    yield from ("## Unsupported in 3D", "", "| feature | instead |", "|---|---|")
     yield from (f"| {lack.what} | {lack.instead} |" for lack in LACKS)
 
 
@@ -74,8 +74,15 @@ def _section(name: str, record: dict[str, Any]) -> Iterator[str]:
     required = record.get("required", [])
     for key, entry in record["properties"].items():
         default = "required" if key in required else _code(entry.get("default"))
-        yield f"| `{key}` | {entry['description']} | {_kind(entry)} | {default} |"
+        yield f"| `{key}` | {_meaning(key, entry)} | {_kind(entry)} | {default} |"
     yield ""
+
+
+def _meaning(key: str, entry: dict[str, Any]) -> str:
+    """The description; of a constant, which editors describe by the first line about its table, what the constant is."""
+    if "const" in entry:
+        return "Dimension of the motion." if key == "space" else f"{key.capitalize()} of this table."
+    return str(entry["description"])
 
 
 def _code(default: object) -> str:

@@ -24,15 +24,15 @@ Division = Annotated[int, Field(ge=1, le=MOST_DIVISIONS)]
 
 
 class RectangleSection(Record):
-    """Rectangle; hollow where `wall` is given (solids only)."""
+    """Rectangle; hollow with `wall` (solids only)."""
 
     shape: Literal["rectangle"]
     height: Positive
-    """Along y, m."""
+    """Height along y, m."""
     width: Positive
-    """Along z, m."""
+    """Width along z, m."""
     wall: Positive | None = None
-    """Thickness of the wall of a hollow section, m; full where it is left out (solids only)."""
+    """Wall thickness of a hollow section, m; default: full (solids only)."""
 
 
 class CircleSection(Record):
@@ -57,12 +57,12 @@ SectionRecord = Annotated[RectangleSection | CircleSection | TubeSection, Field(
 
 
 class Segment(Record):
-    """A stretch of constant section."""
+    """A segment of constant section."""
 
     until: Positive
-    """Where it ends, m from the root; it begins where the one before ends."""
+    """End, m from the root; a segment begins at the end of the previous one."""
     section: SectionRecord
-    """Its cross section."""
+    """Cross section."""
 
 
 class BeamGeometry(Record):
@@ -70,11 +70,11 @@ class BeamGeometry(Record):
 
     kind: Literal["beam"]
     length: Positive
-    """From root to tip, m."""
+    """Length from root to tip, m."""
     section: SectionRecord | None = None
-    """Cross section of the whole beam; or give `segment`."""
+    """Cross section of the whole beam; alternative: `segment`."""
     segment: Annotated[tuple[Segment, ...], Field(min_length=1)] | None = None
-    """Stretches of constant section from root to tip, in place of `section`."""
+    """Segments of constant section from root to tip, instead of `section`."""
 
     @property
     def breakpoints(self) -> list[float]:
@@ -97,21 +97,21 @@ class Hole(Record):
     """A round hole along z, through the whole width of a solid."""
 
     position: Positive
-    """Of its centre, m from the root along x."""
+    """Position of the center, m from the root along x."""
     diameter: Positive
     """Diameter, m."""
     offset: float = 0.0
-    """y of its centre, m."""
+    """Offset of the center along y, m."""
 
 
 class SolidGeometry(Record):
-    """A section drawn out along x, or a part from a file (`.step`, or a mesh: `.msh`, `.inp`, `.bdf`, `.vtk` …)."""
+    """An extruded section along x, or a part from a file (`.step`, or a mesh: `.msh`, `.inp`, `.bdf`, `.vtk` …)."""
 
     kind: Literal["solid"]
     length: Positive
-    """From root to tip along x, m."""
+    """Length from root to tip along x, m."""
     section: SectionRecord | None = None
-    """Cross section drawn out along x; or give `file`."""
+    """Cross section, extruded along x; alternative: `file`."""
     tip_section: SectionRecord | None = None
     """Cross section at the tip: from root to tip it changes linearly."""
     hole: tuple[Hole, ...] = ()
@@ -130,18 +130,18 @@ class SolidGeometry(Record):
 
 
 class SolidMeshRecord(Record):
-    """How a solid is meshed; a part that comes as a mesh takes `order` alone.
+    """Mesh of a solid; for a part from a mesh file `order` only.
 
-    `size` is the wanted edge length; `divisions` (along x, y, z) makes a structured mesh, of boxes only. `order` is the
-    polynomial order of the displacements; curved faces get curved elements.
+    `size` is the requested edge length; `divisions` (along x, y, z) makes a structured mesh, of boxes only. `order` is
+    the polynomial order of the displacements; curved faces get curved elements.
     """
 
     cell: Literal["tetrahedron", "hexahedron"] | None = None
-    """Shape of the cells; by default hexahedra where there are `divisions`, else tetrahedra."""
+    """Shape of the cells; by default hexahedra with `divisions`, else tetrahedra."""
     order: Annotated[int, Field(ge=1, le=3)] | None = None
     """Polynomial order of the displacements."""
     size: Positive | None = None
-    """Wanted edge length of cells, m; by default what fits the part."""
+    """Requested edge length of cells, m; by default chosen for the part."""
     divisions: tuple[Division, Division, Division] | None = None
     """Number of cells along x, y, z: a structured mesh, of boxes only."""
 
@@ -156,14 +156,14 @@ class PlaceRecord(Record):
     """
 
     name: Name
-    """What joints and loads call it, as "BODY.NAME"."""
+    """Name of the interface; joints and loads refer to it as "BODY.NAME"."""
     position: NotNegative | Vector3 | None = None
-    """m from the root (on solids the cross section there), or a point (m, link axes) of which the nearest face is
-    taken."""
+    """Position, m from the root (solids: cross section there), or a point (m, link axes) whose nearest face is the
+    interface."""
     normal: Vector3 | None = None
     """Outward direction of the face nearest to `position`, link axes (solids)."""
     group: Title | None = None
-    """Physical surface group of the mesh file that is the face (solids)."""
+    """Physical surface group of the mesh file with the face (solids)."""
 
 
 @dataclass(frozen=True)

@@ -42,15 +42,15 @@ from .signals import Signal, merged, rows_first, sensing, signals
 
 
 class ClosedLoop(SampledAnalysis):
-    """Motion under sampled control; the earlier inverse analysis `actuation` gives reference, feed-forward and start.
+    """Motion under sampled control; reference, feed-forward and start are those of the inverse analysis `actuation`.
 
-    Samples are at 0, sample_time, …; the command of each acts `delay` later and is held. Moments and voltages keep
-    within the limits of the scene unless `unlimited`. The run starts as the inverse analysis does, or as [initial] of
-    the scene says, on the trajectories. `seed` starts the noise. `tip` is the point whose error is reported.
+    Samples are at 0, sample_time, …; a zero-order hold applies the command of each `delay` later. Torques and voltages
+    are limited as in the scene unless `unlimited`. The initial state is that of the inverse analysis, or [initial] of
+    the scene, on the trajectories. `seed` initializes the noise. `tip` is the point of the reported error.
     """
 
     disturbance: tuple[Load, ...] = ()
-    """Loads at points that `actuation` does not know."""
+    """Loads at points, unknown to `actuation`."""
 
     @model_validator(mode="after")
     def _of_time(self) -> Self:

@@ -25,12 +25,12 @@ from .zeros import Zeros, zeros
 class Linear(InstantAnalysis):
     """The robot as x' = A x + B u, y = C x + D u: `about` the static equilibrium, or an earlier analysis at `times`.
 
-    `points` are those whose motion and disturbance the model knows.
+    `points` are outputs and disturbance inputs of the model.
     """
 
     kind: Literal["linear"]
     points: tuple[PointReference, ...] | None = None
-    """Points whose motion and disturbance the model knows; by default those of trajectories, or all tips."""
+    """Points whose motion is an output and at which disturbances act; by default those of trajectories, or all tips."""
 
     needs_actuators = True
 

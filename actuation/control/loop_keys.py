@@ -24,21 +24,21 @@ class SampledAnalysis(ActuatedAnalysis):
     delay: NotNegative = 0.0
     """From a sample to its command, s."""
     start: Literal["actuation", "scene"] = "actuation"
-    """Where the run starts: as `actuation` does, or as [initial] says."""
+    """Initial state: that of `actuation`, or [initial]."""
     feed_forward: Literal["none", "joints", "joints+pzt"] = "joints"
-    """What of `actuation` is added to the commands: moments, with voltages, or nothing."""
+    """Part of `actuation` that is added to the commands: torques, torques and voltages, or nothing."""
     unlimited: bool = False
-    """Moments and voltages beyond the limits of the scene are allowed."""
+    """Permission to exceed the limits of the scene."""
     seed: Annotated[int, Field(ge=0)] = 0
-    """Of the noise of sensors."""
+    """Seed of the sensor noise."""
     tip: PointReference | None = None
-    """Point "BODY.POINT" whose error is reported."""
+    """Point "BODY.POINT" of the reported error."""
     controller: tuple[Controller, ...] = ()
     """Controllers; their commands add up."""
     sensor: tuple[Sensor, ...] = ()
-    """What is measured beside what the controllers need."""
+    """Sensors in addition to those of the controllers."""
     disturbance: tuple[Any, ...] = ()
-    """Loads at points that `actuation` does not know."""
+    """Loads at points, unknown to `actuation`."""
 
     findings = ("diverged", "step underflow")  # what a controller does is what is to be found out
 

@@ -25,11 +25,11 @@ from .records import Placement
 
 
 class PatchPlacement(InstantAnalysis):
-    """A search for the places of patches; see `placement` for what it is `about`."""
+    """Optimal positions of patches; `placement` has the criterion."""
 
     kind: Literal["placement"]
     placement: Placement
-    """Which patches, and what makes a place good."""
+    """Patches and criterion."""
 
     @property
     def is_over_path(self) -> bool:

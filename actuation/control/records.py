@@ -26,33 +26,33 @@ PERMITTIVITY = 1700 * 8.8541878128e-12  # F/m, of PZT-5A along the field, free
 
 
 class Sensor(Record):
-    """What is measured, and how well: of a joint its coordinate, of a point x, y (z), of patches their voltages.
+    """A sensor of a joint coordinate, of the position x, y (z) of a point, or of patch voltages.
 
-    `motor` names a joint with stiffness, of which the motor's angle behind its gear is read, on the first body.
-    `measure` is the value, its rate, or (points) its acceleration. Readings are whole numbers of `resolution`, after
-    Gaussian noise with the standard deviation `noise`, both in the unit of the reading. `modal` names a body whose
-    modal coordinates are read as they are, which no sensor can. Patches read the
-    charge c [φ'(x2) − φ'(x1)] p over `capacitance` (F; that of the patch itself where it is not given).
+    `motor` names a joint with stiffness; the sensor measures the motor angle after its gear. `measure` is the value,
+    its rate, or (points) its acceleration. Readings are multiples of `resolution` after Gaussian noise with standard
+    deviation `noise`, both in the unit of the reading. `modal` names a body whose modal coordinates are read directly,
+    which no real sensor can. Patches read the charge c [φ'(x2) − φ'(x1)] p over `capacitance` (F; default: that of the
+    patch itself).
     """
 
     joint: str | None = None
-    """Joint whose coordinate is read, rad (m where prismatic)."""
+    """Measured joint coordinate, rad (prismatic: m)."""
     motor: str | None = None
-    """Joint with stiffness whose motor's angle behind its gear is read, rad."""
+    """Joint with stiffness: measured motor angle after the gear, rad."""
     point: PointReference | None = None
-    """Point "BODY.POINT" whose x and y (in space z) are read, m, global axes."""
+    """Point "BODY.POINT" with measured x, y (in 3D z), m, global axes."""
     pzt: str | None = None
-    """Body whose patches are read, V; in space the layout, by its name."""
+    """Body with measured patch voltages, V; in 3D the name of the layout."""
     modal: str | None = None
-    """Body whose modal coordinates are read as they are, which no sensor can (m·√kg)."""
+    """Body with directly read modal coordinates (m·√kg); no real sensor can."""
     measure: Literal["value", "rate", "acceleration"] = "value"
-    """The value, its rate, or its acceleration (points)."""
+    """Measured quantity: value, rate, or acceleration (points)."""
     resolution: NotNegative = 0.0
-    """Readings are whole numbers of it, in their unit; 0: any number."""
+    """Resolution: readings are multiples of it, in their unit; 0: continuous."""
     noise: NotNegative = 0.0
     """Standard deviation of Gaussian noise, in the unit of the reading."""
     capacitance: Positive | None = None
-    """Of each patch, F; by default its own."""
+    """Capacitance of each patch, F; by default computed."""
 
     @model_validator(mode="after")
     def _consistent(self) -> Sensor:
@@ -97,15 +97,15 @@ class JointPid(ControllerRecord):
 
     kind: Literal["joint-pid"]
     proportional: dict[Name, NotNegative] = Field(default_factory=dict)
-    """P by joint, N·m/rad (N/m where prismatic)."""
+    """P by joint, N·m/rad (prismatic: N/m)."""
     derivative: dict[Name, NotNegative] = Field(default_factory=dict)
-    """D by joint, N·m·s/rad (N·s/m where prismatic)."""
+    """D by joint, N·m·s/rad (prismatic: N·s/m)."""
     integral: dict[Name, NotNegative] = Field(default_factory=dict)
-    """I by joint, N·m/(rad·s) (N/(m·s) where prismatic)."""
+    """I by joint, N·m/(rad·s) (prismatic: N/(m·s))."""
     rate: Literal["measured", "difference"] = "measured"
-    """Rates are measured, or the difference of two readings over the sample time."""
+    """Source of rates: measured, or the difference of two readings over the sample time."""
     side: Literal["joint", "motor"] = "joint"
-    """Of gears that give, on which the angles are read."""
+    """Side of compliant gears on which angles are measured."""
 
     @property
     def joints(self) -> tuple[str, ...]:
@@ -121,30 +121,31 @@ class JointPid(ControllerRecord):
 
 
 class ComputedTorque(ControllerRecord):
-    """Moments of the mechanism with rigid links for γ̈_ref + 2 ζ ω ė + ω² e, instead of a feed-forward of moments."""
+    """Computed torque of the rigid mechanism for γ̈_ref + 2 ζ ω ė + ω² e, instead of a feed-forward of torques."""
 
     kind: Literal["computed-torque"]
     bandwidth: Positive
-    """ω of the error's dynamics, rad/s."""
+    """Bandwidth ω of the error's dynamics, rad/s."""
     damping_ratio: Positive = 1.0
-    """ζ of the error's dynamics."""
+    """Damping ratio ζ of the error's dynamics."""
 
 
 class ModalVelocity(ControllerRecord):
     """Patches as dampers of the lowest `modes` of their links: modal forces −2 ζ ω ṗ, ζ the `damping_ratio` added.
 
-    p from the voltages of the same patches (least squares over these modes) and ṗ from two samples, or both ideal.
+    p is estimated from the voltages of the same patches (least squares over these modes) and ṗ from two samples, or
+    both are ideal.
     """
 
     kind: Literal["modal-velocity"]
     bodies: Annotated[tuple[str, ...], NotEmpty]
-    """Links whose patches act."""
+    """Links with the driven patches."""
     modes: ModeCount = 1
-    """How many of the lowest modes of each link."""
+    """Number of the lowest modes per link."""
     damping_ratio: Positive
-    """ζ that is added to each of these modes."""
+    """Damping ratio ζ that is added to each of these modes."""
     sensor: Literal["pzt", "ideal"] = "pzt"
-    """Voltages of the same patches, or p and its rate as they are."""
+    """Measured signals: voltages of the same patches, or modal coordinates and velocities directly."""
 
     def references(self) -> Iterator[Reference]:
         """The links."""
@@ -156,18 +157,18 @@ class ModalVelocity(ControllerRecord):
 class Lqr(ControllerRecord):
     """u = −K x for the sampled linear model about the reference at `time`, links with their lowest `modes`.
 
-    Weights are one over the squares of what is acceptable: angles (rad), rates (rad/s), deflections of the links
-    relative to their length, moments (N·m), voltages (V). `inputs`: all, or motors or
-    patches alone, the latter about joints that a "joint-pid" beside holds. States as in `ModalVelocity`.
+    Weights are inverse squares of acceptable errors: angles (rad), rates (rad/s), deflections of the links relative to
+    their length, moments (N·m), voltages (V). `inputs`: all, motors only, or patches only; a "joint-pid" then controls
+    the joints. States as in `ModalVelocity`.
     """
 
     kind: Literal["lqr"]
     inputs: Literal["all", "motors", "patches"] = "all"
-    """What acts: motors and patches, or one of them."""
+    """Inputs: motors and patches, or one of them."""
     modes: ModeCount = 1
-    """How many of the lowest modes of each link the design knows."""
+    """Number of the lowest modes per link in the design model."""
     time: NotNegative = 0.0
-    """Instant of the reference about which it is linear, s."""
+    """Instant of the reference at which the model is linearized, s."""
     angle: Positive = 0.01
     """Acceptable error of joints, rad."""
     rate: Positive = 0.1
@@ -175,11 +176,11 @@ class Lqr(ControllerRecord):
     deflection: Positive = 1e-3
     """Acceptable deflection of links, relative to their length."""
     moment: Positive = 10.0
-    """Acceptable moment of motors, N·m."""
+    """Acceptable motor torque, N·m."""
     voltage: Positive = 100.0
     """Acceptable voltage of patches, V."""
     sensor: Literal["pzt", "ideal"] = "pzt"
-    """Voltages of patches, or p and its rate as they are."""
+    """Measured signals: voltages of patches, or modal coordinates and velocities directly."""
 
 
 def _python_function(value: object, info: ValidationInfo) -> object:
@@ -196,42 +197,44 @@ def _python_function(value: object, info: ValidationInfo) -> object:
 
 
 class PythonController(ControllerRecord):
-    """A function of the user's, "FILE.py:FUNCTION" with the file beside the scene, or itself in scenes made in Python.
+    """A user's function: "FILE.py:FUNCTION" next to the scene, or the function itself in scenes made in Python.
 
     See `actuation.control.python_controller`.
     """
 
     kind: Literal["python"]
     python: Annotated[Any, PlainValidator(_python_function, json_schema_input_type=str)]
-    """Text "FILE.py:FUNCTION" with the file beside the scene; scenes made in Python may have the function itself."""
+    """Function as "FILE.py:FUNCTION" with the file next to the scene, or the function itself in scenes made in Python.
+    """
 
 
 Controller = Annotated[JointPid | ComputedTorque | ModalVelocity | Lqr | PythonController, Field(discriminator="kind")]
 
 
 class Placement(Record):
-    """Where on one link the patches of its [[pzt]] should be, `count` of them.
+    """Optimal positions of the `count` patches of a [[pzt]] on its link.
 
-    `criterion` "controllability": they reach the `modes` lowest modes of the robot with its motors held; "voltage":
-    the largest voltage, relative to its limit, by which they produce the forces of the `modes` lowest modes of the link
-    over the inverse analysis `about`. `measure` says which reach counts: of the worst mode, on average, or the product.
-    Centers are sought every `spacing`, by trying all sets where that is at most `most_sets`, by evolution otherwise.
+    `criterion` "controllability" maximizes the controllability of the `modes` lowest modes of the robot with locked
+    motors. "voltage" minimizes the largest voltage, relative to its limit, that produces the forces of the `modes`
+    lowest modes of the link in the inverse analysis `about`. `measure` selects the controllability of the worst mode,
+    the mean or the product. Centers are tried every `spacing`: all sets if these are at most `most_sets`, otherwise by
+    evolution.
     """
 
     body: str
-    """Link with patches; in space with one layout of them."""
+    """Link with patches; in 3D with one layout of them."""
     count: PatchCount | None = None
     """Number of patches; by default that of its [[pzt]]."""
     criterion: Literal["controllability", "voltage"] = "controllability"
-    """Reach of the robot's lowest modes, or the largest voltage over its limit along the path."""
+    """Controllability of the robot's lowest modes, or the largest voltage over its limit along the path."""
     measure: Literal["worst", "mean", "product"] = "worst"
-    """Which reach counts: that of the worst mode, their mean, or their product."""
+    """Controllability measure: that of the worst mode, their mean, or their product."""
     modes: ModeCount | None = None
-    """How many of the lowest modes count."""
+    """Number of the lowest modes that count."""
     spacing: Positive | None = None
-    """Between the centres that are tried, m; by default half the length of a patch."""
+    """Distance between tried centers, m; by default half the length of a patch."""
     most_sets: Annotated[int, Field(gt=0, le=10_000_000)] = 100_000
-    """So many sets are tried one by one; with more, evolution seeks."""
+    """Largest number of sets for an exhaustive search; beyond it, differential evolution searches."""
 
     def references(self) -> Iterator[Reference]:
         """The link and its patches."""

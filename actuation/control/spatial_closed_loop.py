@@ -40,14 +40,14 @@ from .spatial_signals import SpatialSensing, SpatialSignal, spatial_signals
 
 
 class SpatialClosedLoop(SampledAnalysis):
-    """Motion under sampled control as in the plane; disturbances and readings of points have components x, y, z.
+    """Motion under sampled control; disturbances and measured points have components x, y, z.
 
-    Sensors name patches by their layout. Joints with several coordinates are read and driven coordinate by coordinate,
-    "joint/NAME 1", "joint/NAME 2", with the same gains.
+    Sensors name patches by their layout. Joints with several coordinates have one signal per coordinate, "joint/NAME
+    1", "joint/NAME 2", with the same gains.
     """
 
     disturbance: tuple[SpatialLoad, ...] = ()
-    """Loads at points that `actuation` does not know."""
+    """Loads at points, unknown to `actuation`."""
 
 
 class _Plant(NamedTuple):

@@ -23,9 +23,9 @@ class Lamina(NamedTuple):
 
 
 class Fibres(NamedTuple):
-    """A layer of parallel fibres: E_1, E_2, G_12 in Pa, ν_12, d33 along and d31 across in m/V, angle in rad from x.
+    """A layer of parallel fibers: E_1, E_2, G_12 in Pa, ν_12, d33 along and d31 across in m/V, angle in rad from x.
 
-    `spacing` of the electrodes along the fibres, m: a volt is a field of 1/spacing.
+    `spacing` of the electrodes along the fibers, m: a volt is a field of 1/spacing.
     """
 
     E_1: float

@@ -23,43 +23,44 @@ class PatchKeys(Record):
     """What patches of planar scenes and of scenes in space have in common: see there."""
 
     body: str
-    """Link that they sit on."""
+    """Link with these patches."""
     count: PatchCount | None = None
-    """Number of patches, centres at (k − ½)·length of link / count; or give `centers`."""
+    """Number of patches, with centers at (k − ½)·length of link / count; alternative: `centers`."""
     centers: Annotated[tuple[float, ...], NotEmpty, Field(max_length=MOST_PATCHES)] | None = None
-    """Their centres, m from the root."""
+    """Centers, m from the root."""
     length: Positive
-    """Of each along the link, m."""
+    """Length of a patch along the link, m."""
     width: Positive
-    """Of each across the link, m."""
+    """Width of a patch across the link, m."""
     thickness: Positive
-    """Of one layer, m."""
+    """Thickness of one layer, m."""
     modulus: Positive
     """Young's modulus, Pa."""
     d31: float
     """Piezoelectric strain constant, m/V."""
     density: Positive | None = None
-    """Density, kg/m³; for their mass."""
+    """Density, kg/m³, for the mass of the patches."""
     limit: Positive | Annotated[tuple[Positive, ...], NotEmpty] | None = None
     """Largest voltage, V: of all, or of each."""
     layers: Annotated[int, Field(gt=0, le=MOST_LAYERS)] = 1
-    """Layers on each other."""
+    """Number of stacked layers."""
     face: Literal["+y", "-y", "+z", "-z", "both"] | None = None
-    """Which face they sit on; without it they bend the link and do nothing else."""
+    """Face of the link; without it patches only bend the link."""
     allocation: Literal["exact", "least-squares"] = "exact"
-    """Voltages that produce all modal forces, or come nearest: then fewer patches than modes will do."""
+    """Allocation of voltages: exact, or least squares, which allows fewer patches than modes."""
     mode_weights: Annotated[tuple[NotNegative, ...], NotEmpty] | None = None
-    """What matters of modal forces that are left unmet: a weight of the square for each mode."""
+    """Weights of the squares of unmet modal forces, one per mode."""
     point_weights: dict[Name, NotNegative] | None = None
-    """What matters of the deflections left: a weight of the square by point of the link."""
+    """Weights of the squares of remaining deflections, by point of the link."""
     structural: bool | tuple[Literal["mass", "stiffness"], ...] = ("stiffness",)
-    """What of the patches is added to the link: true for both; false for neither, and the bare link's authority."""
+    """Properties that patches add to the link: true for both; false for neither, with the actuation authority on the
+    bare link."""
     depoling_field: Positive | None = None
-    """Of the material, V/m; for the judgement only."""
+    """Depoling field of the material, V/m; used by the verdict only."""
     strain_limit: Positive | None = None
-    """Of the material; for the judgement only."""
+    """Strain limit of the material; used by the verdict only."""
     coupling: Literal["rotation", "surface"] = "rotation"
-    """On what they work: section rotations at their ends, or faces outlined in the mesh of a solid."""
+    """Coupling to the link: section rotations at patch ends, or faces outlined in the mesh of a solid."""
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
@@ -133,19 +134,18 @@ class PztLayout(PatchKeys):
     """Equal piezoelectric patches along one link. Lengths in m, modulus in Pa, d31 in m/V, density kg/m³, limit in V.
 
     Centers are distances along the link from its root; `count` places them at (k − ½)·(length of link)/count.
-    `thickness` is that of one of `layers`, which lie on each other on one `face` or on both, driven against each other.
-    Without `face` they bend the link and do nothing else, as in the paper. `limit` is one for all or one for each.
-    `allocation = "least-squares"` is content with fewer patches than modes, or modes that no patch reaches.
-    Where voltages cannot produce all modal forces, `mode_weights` (of the squares of what is left) or `point_weights`
-    (of the squares of the deflections that this causes at points of the link) say what matters.
-    `structural`: what the patches add to their link. Without it their stiffness, so that they bend it as the composite
-    section bends; true: mass besides; a list names "mass", "stiffness" or both; false, as in the paper: nothing.
-    Only for the judgement: `depoling_field` (V/m) and `strain_limit` of the material.
-    `coupling`: patches work on the section rotations at their ends, or on the faces of a solid that outlines them.
+    `thickness` is that of one of `layers`, stacked on one `face` or on both, with opposite voltages. Without `face`
+    they only bend the link, as in the paper. `limit` is one for all or one for each. `allocation = "least-squares"`
+    accepts fewer patches than modes, and uncontrollable modes. If voltages cannot produce all modal forces,
+    `mode_weights` weigh the squares of unmet modal forces, `point_weights` the squares of the resulting deflections at
+    points of the link. `structural` lists what the patches add to their link: by default stiffness, so that they bend
+    it like a composite section; true adds mass, too; false adds nothing, as in the paper. `depoling_field` (V/m) and
+    `strain_limit` are limits of the material for the verdict. `coupling`: patches act on the section rotations at their
+    ends, or on the faces of a solid that outlines them.
     """
 
     face: Literal["+y", "-y", "both"] | None = None
-    """Which face they sit on; without it they bend the link and do nothing else."""
+    """Face of the link; without it patches only bend the link."""
 
 
 def _toml(value: bool | tuple[str, ...]) -> str:

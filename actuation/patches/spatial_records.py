@@ -18,35 +18,35 @@ NO_SHEAR = 1e-9  # of the other stress: a layer that shears less does not twist
 
 
 class SpatialPztLayout(PatchKeys):
-    """Equal piezoelectric patches along one link of a scene in space; several layouts on a body have names.
+    """Equal piezoelectric patches along one link of a 3D scene; several layouts on a body have names.
 
     Lengths in m, moduli in Pa, d31 and d33 in m/V, density kg/m³, limit in V. Centers are distances along the link from
-    its root; `count` places them at (k − ½)·(length of link)/count. Without `face` they bend or twist the link and do
-    nothing else. A positive voltage bends towards +y or +z (with d31 > 0), or twists by a positive angle.
+    its root; `count` places them at (k − ½)·(length of link)/count. Without `face` they only bend or twist the link. A
+    positive voltage bends towards +y or +z (with d31 > 0), or twists by a positive angle.
 
     Plain ceramic has one modulus and d31. Macro fibre composites have `fibre_angle`, d33 and `modulus` along the
-    fibres, d31 and `modulus_across` across them, `shear_modulus` and `poissons_ratio`; a volt is a field of
+    fibers, d31 and `modulus_across` across them, `shear_modulus` and `poissons_ratio`; a volt is a field of
     1/`electrode_spacing`. Fibres at an angle wind around the link, that is, lie at the same angle on both faces seen
     from outside.
     """
 
     name: Name | None = None
-    """Of the layout, in results; the body's where it is left out."""
+    """Name of the layout in results; default: the name of the body."""
     bends: Bends = "in-plane"
-    """Along y by patches on faces ±y, along z by patches on faces ±z, or "twist" about x: by fibres at an angle, on ±y
-    unless `face` says otherwise."""
+    """Deformation: along y by patches on faces ±y, along z by patches on faces ±z, or "twist" about x by fibers at an
+    angle, by default on ±y."""
     fibre_angle: Quantity | None = None
-    """Of fibres with the link's axis, rad (or such as "45*deg"): positive ones wind like a right-handed screw."""
+    """Angle of fibers with the link's axis, rad (or such as "45*deg"); positive: like a right-handed screw."""
     d33: float | None = None
-    """Piezoelectric strain constant along fibres, m/V."""
+    """Piezoelectric strain constant along fibers, m/V."""
     modulus_across: Positive | None = None
-    """Young's modulus across fibres, Pa; `modulus` is that along them."""
+    """Young's modulus across fibers, Pa; `modulus` is that along them."""
     shear_modulus: Positive | None = None
-    """Of a layer of fibres in its plane, Pa."""
+    """Shear modulus of a layer of fibers in its plane, Pa."""
     poissons_ratio: float | None = None
-    """Of a layer of fibres: how much narrower it gets, pulled along them."""
+    """Poisson's ratio of a layer of fibers under tension along them."""
     electrode_spacing: Positive | None = None
-    """Of interdigitated electrodes, m: field per volt; by default the thickness of a layer."""
+    """Spacing of interdigitated electrodes, m; the field per volt is its inverse; default: thickness of a layer."""
 
     def check_constants(self) -> None:
         """Raise `ValueError` for patches that do nothing, or not what `bends` says."""

@@ -14,34 +14,34 @@ Coupling = Literal["mean", "rigid"]
 
 
 class InterfaceRecord(PlaceRecord):
-    """A place where joints and loads attach, and what is fixed to it there: a hub, a gripper."""
+    """An interface for joints and loads, with the inertia that is fixed to it: a hub, a gripper."""
 
     coupling: Coupling | None = None
-    """How a solid's face is held to the interface: its mean moves with it, or all of it; by default that of
-    [reference], and the mean for cross sections inside and for a tip that the reference condition leaves free."""
+    """Coupling of a solid's face to the interface: mean motion, or rigid. Default: that of [reference], and "mean" for
+    cross sections inside and for a free tip."""
     mass: NotNegative = 0.0
-    """Mass that sits on the interface, its center there, kg."""
+    """Point mass at the interface, kg."""
     inertia: tuple[NotNegative, NotNegative, NotNegative] = (0.0, 0.0, 0.0)
-    """Its moments of inertia about x, y, z through the interface, kg·m²."""
+    """Moments of inertia of that mass about x, y, z through the interface, kg·m²."""
 
 
 class SurfacePatches(Record):
     """Piezoelectric patches outlined in the mesh of a solid, on the faces at its largest or smallest y.
 
-    Same meaning of the keys as in a scene's `[[pzt]]`: centres at (k − ½)·length of link / count, or `centers`.
+    Same meaning of the keys as in a scene's `[[pzt]]`: centers at (k − ½)·length of link / count, or `centers`.
     """
 
     count: PatchCount | None = None
-    """Number of patches, evenly spread; or give `centers`."""
+    """Number of patches, evenly spaced; alternative: `centers`."""
     # m from the root
     centers: Annotated[tuple[Positive, ...], Field(min_length=1, max_length=MOST_PATCHES)] | None = None
-    """Their centres, m from the root."""
+    """Centers, m from the root."""
     length: Positive
-    """Of each along x, m."""
+    """Length of a patch along x, m."""
     width: Positive
-    """Of each along z, m."""
+    """Width of a patch along z, m."""
     faces: Literal["top", "bottom", "both"] = "both"
-    """On the face at the largest y, the smallest y, or on both."""
+    """Faces with patches: at the largest y, the smallest y, or both."""
 
     def edges(self, length: float) -> list[tuple[float, float]]:
         """Begin and end of each patch on a link of `length`, m from the root."""

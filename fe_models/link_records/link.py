@@ -35,25 +35,25 @@ class Material(Record):
     """Linear elastic, isotropic."""
 
     youngs_modulus: Positive
-    """E, Pa."""
+    """Young's modulus E, Pa."""
     density: Positive
-    """ρ, kg/m³."""
+    """Density ρ, kg/m³."""
     # Beams need it for torsion and shear only, solids always.
     poissons_ratio: Poisson | None = None
-    """ν; beams need it for torsion and shear only, solids always."""
+    """Poisson's ratio ν; beams need it for torsion and shear only, solids always."""
 
 
 class OrthotropicMaterial(Record):
     """Linear elastic, with three planes of symmetry along the axes of the link (solids only)."""
 
     youngs_modulus: tuple[Positive, Positive, Positive]
-    """E_x, E_y, E_z, Pa."""
+    """Young's moduli E_x, E_y, E_z, Pa."""
     poissons_ratio: Vector3
-    """ν_xy, ν_yz, ν_xz: contraction along the second axis under a pull along the first."""
+    """Poisson's ratios ν_xy, ν_yz, ν_xz: contraction along the second axis under tension along the first."""
     shear_modulus: tuple[Positive, Positive, Positive]
-    """G_xy, G_yz, G_xz, Pa."""
+    """Shear moduli G_xy, G_yz, G_xz, Pa."""
     density: Positive
-    """ρ, kg/m³."""
+    """Density ρ, kg/m³."""
 
 
 def _symmetry(material: object) -> str:
@@ -74,16 +74,16 @@ class Region(Record):
     """The part of a solid inside a physical volume `group` of its mesh file, of another material."""
 
     group: Title
-    """Name of the physical volume, element set or property in the mesh file; where two overlap, the smaller counts."""
+    """Name of the physical volume, element set or property in the mesh file; if two overlap, the smaller counts."""
     material: SolidMaterial
-    """What it is made of."""
+    """Material."""
 
 
 class BeamModel(Record):
-    """Which beam theory."""
+    """Beam theory."""
 
     theory: Literal["euler-bernoulli", "timoshenko"] = "euler-bernoulli"
-    """Without shear, or with shear and rotary inertia of the sections."""
+    """Beam theory: without shear, or with shear and rotary inertia of the sections."""
 
 
 HOLDING_ROOT = ("cantilever", "craig-bampton")
@@ -91,18 +91,18 @@ HOLDING_ROOT = ("cantilever", "craig-bampton")
 
 
 class Reference(Record):
-    """How the link's frame is held to it (docs/theory.md, Reference conditions).
+    """Reference conditions of the link's frame (docs/theory.md, Reference conditions).
 
-    `coupling` says how a solid's end faces are held; default: mean for simply-supported, else rigid. A beam's
-    section moves as a plate in any case: both words mean the same there.
+    `coupling` is that of a solid's end faces; default: mean for simply-supported, else rigid. Sections of beams stay
+    plane, so both are the same there.
     """
 
     condition: Literal["cantilever", "simply-supported", "craig-bampton"]
-    """The frame moves with the root's section, or its x axis goes through root and tip; "craig-bampton" is on the root,
-    too, with modes of the link held at all interfaces beside static shapes of unit motions of these."""
+    """Reference condition: "cantilever" fixes the frame to the section at the root, "simply-supported" its x axis to
+    root and tip. "craig-bampton" fixes it to the root, with fixed-interface modes and constraint modes."""
     coupling: Coupling | None = None
-    """How a solid's end faces are held, and the default of [[interface]]; by default mean for simply-supported, else
-    rigid."""
+    """Coupling of a solid's end faces, and default of [[interface]]; by default mean for simply-supported, else rigid.
+    """
 
     @property
     def holds_root(self) -> bool:
@@ -113,19 +113,19 @@ class Reference(Record):
 class Modes(Record):
     """The lowest `count` eigenmodes of one or several families, or those numbered `indices` (1 is the lowest).
 
-    `attachment_modes` adds the static shapes of loads at interfaces, and of torques along a bent link, as far as the
-    eigenmodes do not have them; false: eigenmodes alone. With them `count` may be left out: six of each bending family,
-    one axial, one of torsion.
+    `attachment_modes` adds static shapes of loads at interfaces, and of torques along a bent link, that the eigenmodes
+    do not contain; false: eigenmodes only. The default `count` is then six of each bending family, one axial, one of
+    torsion.
     """
 
     count: ModeCount | None = None
-    """Number of the lowest eigenmodes; or give `indices`."""
+    """Number of the lowest eigenmodes; alternative: `indices`."""
     indices: Annotated[tuple[ModeCount, ...], Field(min_length=1, max_length=MOST_MODES)] | None = None
     """Numbers of the eigenmodes, 1 the lowest."""
     family: Annotated[tuple[Family, ...], Field(min_length=1)] | Family | Literal["all"] = "all"
-    """Family or families that they are taken from."""
+    """Family or families of the eigenmodes."""
     attachment_modes: bool = True
-    """Add static shapes of loads at the interfaces."""
+    """Addition of static shapes of loads at the interfaces."""
 
     @property
     def are_default(self) -> bool:
@@ -136,46 +136,46 @@ class Modes(Record):
 class Damping(Record):
     """Modal damping ratios: one for all modes or one each, or ζ = a/(2ω) + bω/2 of D = aM + bK.
 
-    `of` "robot": one ratio, wanted of the vibrations of the assembled robot at its initial posture, motors free.
+    `of` "robot": one ratio for the vibrations of the assembled robot in its initial posture, motors free.
     """
 
     ratio: NotNegative | tuple[NotNegative, ...] | None = None
     """Damping ratio ζ of all modes, or of each."""
     rayleigh: tuple[NotNegative, NotNegative] | None = None
-    """a (1/s) and b (s) of D = aM + bK, in place of `ratio`."""
+    """Rayleigh coefficients a (1/s) and b (s) of D = aM + bK, instead of `ratio`."""
     of: Literal["link", "robot"] = "link"
-    """Whose vibrations `ratio` is of: the link's under its reference condition, or the assembled robot's."""
+    """Vibrations that `ratio` applies to: of the link under its reference condition, or of the assembled robot."""
 
 
 class StressRecovery(Record):
-    """Where stresses are wanted: at named `points` (m, link frame), and on the whole `surface` of a solid.
+    """Stress output at named `points` (m, link frame), and on the whole `surface` of a solid.
 
     The file keeps those of its modes and the static ones of unit loads (docs/theory.md, Stresses).
     """
 
     points: dict[Name, Vector3] = Field(default_factory=dict)
-    """Places (m, link axes) by name where stresses are kept."""
+    """Points (m, link axes) by name for stress output."""
     surface: bool = False
-    """Keep stresses on the whole surface of a solid."""
+    """Stress output on the whole surface of a solid."""
 
 
 class _Link(Record):
     """What all link files have."""
 
     name: Title
-    """Of the link; in a scene that of its body where it is left out."""
+    """Name of the link; in a scene by default that of its body."""
     reference: Reference
-    """What the link's frame is fixed to."""
+    """Reference condition of the link's frame."""
     modes: Modes = Modes()
-    """Which modes the link may deform in; by default six of each bending family, one axial, one of torsion."""
+    """Modes of the link; by default six of each bending family, one axial, one of torsion."""
     damping: Damping = Damping()
-    """Of the modes."""
+    """Damping of the modes."""
     measured: Measured | None = None
-    """Measured natural frequencies and damping ratios in place of computed ones."""
+    """Measured natural frequencies and damping ratios instead of computed ones."""
     interface: tuple[InterfaceRecord, ...] = ()
-    """Places for joints and loads beside `root` and `tip`, which always are."""
+    """Interfaces for joints and loads in addition to `root` and `tip`."""
     stress: StressRecovery = StressRecovery()
-    """Where stresses are wanted."""
+    """Points and surfaces for stress output."""
 
     @model_validator(mode="after")
     def _has_constraint_modes(self) -> Self:
@@ -197,11 +197,11 @@ class BeamLink(_Link):
     """A whole link file with `geometry.kind = "beam"`."""
 
     material: Material
-    """What it is made of."""
+    """Material."""
     geometry: BeamGeometry
     """Length and cross section."""
     mesh: BeamMesh
-    """Its elements."""
+    """Finite elements."""
     model: BeamModel = BeamModel()
     """Beam theory."""
 
@@ -227,13 +227,13 @@ class SolidLink(_Link):
     """A whole link file with `geometry.kind = "solid"`."""
 
     material: SolidMaterial
-    """What it is made of."""
+    """Material."""
     region: tuple[Region, ...] = ()
     """Parts of another material."""
     geometry: SolidGeometry
-    """Shape, drawn out along x or from a file."""
+    """Shape, extruded along x or from a file."""
     mesh: SolidMeshRecord = SolidMeshRecord()
-    """Its cells; by default what fits the part."""
+    """Mesh; by default chosen for the part."""
     surface_patch: SurfacePatches | None = None
     """Outlines of piezoelectric patches in the mesh."""
 

@@ -17,11 +17,11 @@ COLUMNS = ("mode", "family", "frequency", "damping_ratio", "uncertainty")
 
 
 class Measured(Record):
-    """Natural frequencies and damping ratios that were measured, in place of the computed ones; shapes stay."""
+    """Measured natural frequencies and damping ratios instead of computed ones; shapes stay."""
 
     table: InputFile
-    """CSV table with the columns `mode` and `frequency` (Hz) or `damping_ratio`; `family` beside `mode` where modes are
-    counted by family."""
+    """CSV table with the columns `mode` and `frequency` (Hz) or `damping_ratio`; `family` in addition to `mode` if
+    modes are counted by family."""
 
 
 @dataclass(frozen=True)

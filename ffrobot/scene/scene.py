@@ -14,17 +14,17 @@ from .kinds import Analysis
 
 
 class SceneKeys(MechanismKeys):
-    """Everything a scene file may contain; lists of tables keep the singular name they have in the file.
+    """Keys of a planar scene file. Names of lists of tables are singular, as in the file.
 
-    `geometric_stiffening` "auto": where the loads of a run change the stiffness of a link by more than 1 %.
+    `geometric_stiffening` "auto" includes it if the loads of a run change the stiffness of a link by more than 1 %.
     """
 
     pzt: tuple[PztLayout, ...] = ()
     """Piezoelectric patches."""
     actuation_points: tuple[ActuationPoints, ...] = ()
-    """Places of forces that stand for the driving forces."""
+    """Points of forces that replace the driving forces."""
     analysis: Annotated[tuple[Analysis, ...], NotEmpty]
-    """What is computed, in this order."""
+    """Analyses, in this order."""
 
     def references(self) -> Iterator[Reference]:
         """All that records of the scene refer to, with their full keys."""

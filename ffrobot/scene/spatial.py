@@ -46,14 +46,14 @@ UNAVAILABLE = {
 
 
 class SpatialSceneKeys(SpatialMechanismKeys):
-    """Everything a scene file in space may contain."""
+    """Keys of a 3D scene file."""
 
     pzt: tuple[SpatialPztLayout, ...] = ()
-    """Layouts of piezoelectric patches; several on a body are told apart by their names."""
+    """Layouts of piezoelectric patches; names distinguish several on one body."""
     actuation_points: tuple[SpatialActuationPoints, ...] = ()
-    """Places of forces that stand for the driving forces."""
+    """Points of forces that replace the driving forces."""
     analysis: Annotated[tuple[AnalysisInSpace, ...], NotEmpty]
-    """What is computed, in this order."""
+    """Analyses, in this order."""
 
     def references(self) -> Iterator[Reference]:
         """All that records of the scene refer to, with their full keys."""

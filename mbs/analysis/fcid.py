@@ -45,17 +45,17 @@ Shape = list[list[TimeFunction]]
 class Fcid(TimedAnalysis):
     """Forces that move the robot along its trajectories while the modal coordinates p(t) follow a prescribed shape.
 
-    `shape`: no deflection, that of the static equilibrium at every instant, or the one given in `modal`: expressions
-    for the first modes of a body, as its modal file numbers them; all others are 0. `check` as in `Pcid`.
+    `shape` is zero, the static equilibrium at every instant, or given in `modal`: expressions for the first modes of a
+    body, numbered as in its modal file; all others are 0. `check` as in `Pcid`.
     """
 
     kind: Literal["fcid"]
     shape: Literal["zero", "static", "given"]
-    """No deflection, that of the static equilibrium at every instant, or that in `modal`."""
+    """Prescribed deflection: none, the static equilibrium at every instant, or `modal`."""
     modal: dict[Name, tuple[Expression, ...]] | None = None
-    """By body, expressions in t for its first modal coordinates (m·√kg); the others are 0."""
+    """Expressions in t for the first modal coordinates by body (m·√kg); the others are 0."""
     check: Check = None
-    """Replay the result on links with twice the modes ("finer")."""
+    """Forward simulation under the result with twice the modes ("finer")."""
 
     is_algebraic = True
     allocates_patches = True

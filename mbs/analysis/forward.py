@@ -26,18 +26,18 @@ from .replay import ActuatorSet, actuation_source, motor_limits, replay_times
 
 
 class Forward(ActuatedAnalysis):
-    """Motion under the loads of the scene, and under the `actuation` that an earlier inverse analysis found.
+    """Motion under the loads of the scene and the inputs computed by the inverse analysis `actuation`.
 
-    `apply` says as what it acts: moments of motors, with voltages of patches or without, forces along the
-    trajectories, or forces at the actuation points. `limits` keeps motors and patches within theirs.
+    `apply` selects the inputs: motor torques, motor torques and patch voltages, forces along the trajectories, or
+    forces at the actuation points. `limits` saturates motors and patches at their limits.
     """
 
     kind: Literal["forward"]
     apply: Literal["joints", "joints+pzt", "trajectory", "points"] | None = None
-    """As what the findings of `actuation` act: moments of motors, with voltages of patches, forces along the
-    trajectories, or at the actuation points."""
+    """Inputs taken from `actuation`: motor torques, torques and voltages, forces along the trajectories, or at the
+    actuation points."""
     limits: bool = False
-    """Whether motors and patches keep within their limits."""
+    """Saturation of motors and patches at their limits."""
 
     follows_trajectories = False
     is_resumable = True

@@ -53,25 +53,25 @@ REST = 1e-9  # speed of a path at rest, relative to its mean speed
 
 
 class MotorsOnly(TimedAnalysis):
-    """Moments by which motors alone, without patches, move the robot along its trajectories.
+    """Motor torques that move the robot along its trajectories without patches (stable inversion).
 
-    `output` "tip" has the path's own points follow it, "redefined" where they would be with `factor` times the
-    vibration (nine tenths of the largest that is minimum phase where none is given). `pre_actuation` and
-    `post_actuation` (s) are how long motors act before and after the path, which is held there; where they are not
-    given, as long as the zero dynamics asks for. `check` as in `Pcid`.
+    With `output` "tip" the points of the trajectories follow them; with "redefined" the points with `factor` times the
+    vibration do. The default `factor` is nine tenths of the largest that is minimum phase. `pre_actuation` and
+    `post_actuation` (s) are durations of torques before and after the path, which is constant there; by default the
+    zero dynamics determines them. `check` as in `Pcid`.
     """
 
     kind: Literal["motors-only"]
     output: Literal["tip", "redefined"] = "tip"
-    """The points of the trajectories themselves, or where they would be with `factor` times the vibration."""
+    """Tracked output: points of the trajectories, or their positions with `factor` times the vibration."""
     factor: Annotated[float, Field(ge=0.0, lt=1.0)] | None = None
     """Share of the vibration in the "redefined" output; by default nine tenths of the largest that is minimum phase."""
     pre_actuation: NotNegative | None = None
-    """How long motors act before the path begins, s; by default as long as the zero dynamics asks for."""
+    """Duration of torques before the path begins, s; by default from the zero dynamics."""
     post_actuation: NotNegative | None = None
-    """How long they act after it, s; by default likewise."""
+    """Duration of torques after the path, s; by default from the zero dynamics."""
     check: Check = None
-    """Replay the result on links with twice the modes ("finer")."""
+    """Forward simulation under the result with twice the modes ("finer")."""
 
     is_integrated = True
     applicable = ("joints",)

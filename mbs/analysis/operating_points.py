@@ -33,7 +33,7 @@ class InstantAnalysis(Analysis):
     about: str | None = None
     """Earlier analysis of a motion, or "static" (the default): the equilibrium at t = 0."""
     instants: tuple[NotNegative, ...] | None = Field(default=None, alias="times", min_length=1)
-    """Instants of that motion, s."""
+    """Instants of that analysis, s."""
 
     is_motion = False
 

@@ -21,14 +21,14 @@ from .planar_outcome import PlanarOutcome
 
 
 class Pcid(IntegratedAnalysis):
-    """Forces that move the robot along its trajectories while the links vibrate as they do (Shabana 2022).
+    """Forces that move the robot along its trajectories while the links vibrate freely (Shabana 2022).
 
-    `check` "finer" replays them on links with twice the modes, and tells how far the end effector is off.
+    `check` "finer" applies them to links with twice the modes and reports the deviation of the end effector.
     """
 
     kind: Literal["pcid"]
     check: Check = None
-    """Replay the result on links with twice the modes ("finer")."""
+    """Forward simulation under the result with twice the modes ("finer")."""
 
     is_resumable = True
     allocates_patches = True

@@ -24,7 +24,7 @@ from .planar_outcome import PlanarOutcome
 
 
 class Static(Analysis):
-    """The equilibrium at t = 0, and the moments, forces and voltages that hold it."""
+    """The equilibrium at t = 0 with the torques, forces and voltages that it needs."""
 
     kind: Literal["static"]
 

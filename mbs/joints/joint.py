@@ -24,11 +24,12 @@ class JointKeys(Record, ABC):
     """What joints in the plane and in space have in common: a name, a type, two sides."""
 
     name: Name
-    """Of the joint, unique in the scene."""
+    """Name of the joint, unique in the scene."""
     type: str
     """How it moves."""
     between: tuple[Side, Side]
-    """Its two sides, "BODY.POINT" or "ground"; coordinate, moment and reaction are the second's on the first."""
+    """Sides of the joint, "BODY.POINT" or "ground"; coordinate, torque and reaction are of the second relative to the
+    first."""
 
     locates: ClassVar[bool] = True
     """Whether it fixes the place of one body on the other; the initial guess goes along such joints first."""
@@ -81,7 +82,7 @@ class JointRecord(JointKeys):
     """
 
     at: Vector2 = (0.0, 0.0)
-    """Where it sits on the ground, m, global axes."""
+    """Position on the ground, m, global axes."""
 
     force_unit: ClassVar[str] = "N·m"
     """Unit of the force along its coordinate."""

@@ -17,23 +17,23 @@ class MovingJoint(JointRecord):
     """A joint with a coordinate γ, which a motor may drive."""
 
     motor: bool | None = None
-    """Whether a motor drives it; by default in open chains only."""
+    """Presence of a motor; by default in open chains only."""
     moment_limit: Positive | None = None
-    """Largest moment, N·m (force where prismatic, N), at the joint: behind the gear."""
+    """Largest torque, N·m (prismatic: force, N), at the joint: after the gear."""
     speed_limit: Positive | None = None
-    """Largest rate of the joint, rad/s (m/s where prismatic)."""
+    """Largest rate of the joint, rad/s (prismatic: m/s)."""
     power_limit: Positive | None = None
     """Largest mechanical power, W."""
     gear_ratio: Positive = 1.0
-    """Rotor turns per turn of the joint (rad/m where prismatic)."""
+    """Rotor turns per turn of the joint (prismatic: rad/m)."""
     rotor_inertia: NotNegative = 0.0
     """Moment of inertia of the rotor about its axis, kg·m², before the gear."""
     viscous_friction: NotNegative = 0.0
-    """c, N·m·s/rad (N·s/m where prismatic)."""
+    """Viscous coefficient c, N·m·s/rad (prismatic: N·s/m)."""
     coulomb_friction: NotNegative = 0.0
-    """τ_c, N·m (N where prismatic)."""
+    """Coulomb torque τ_c, N·m (prismatic: N)."""
     friction_speed: Positive = 0.01
-    """Rate at which dry friction has 76 % of its size, tanh 1, rad/s (m/s where prismatic)."""
+    """Rate at which dry friction has 76 % of its size, tanh 1, rad/s (prismatic: m/s)."""
 
     @model_validator(mode="after")
     def _has_friction(self) -> MovingJoint:

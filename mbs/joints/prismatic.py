@@ -17,17 +17,17 @@ from .transmission import Rotor
 class PrismaticJoint(MovingJoint):
     """The second point slides along `axis`, a direction in the frame of the first body, and keeps its angle.
 
-    The angle is that of the initial guess. `at` (m) is where the joint sits on the ground. `motor` left out: driven in
-    open chains. Limits of the motor: N, m/s, W.
+    The angle is that of the initial guess. `at` (m) is the position of the joint on the ground. Without `motor`, joints
+    of open chains are driven. Limits of the motor: N, m/s, W.
 
-    As it is built: `rotor_inertia` J (kg·m²) of a rotor that turns by `gear_ratio` N (rad/m); friction on the way γ
-    along the axis, −(c γ̇ + τ_c tanh(γ̇/γ̇_s)): `viscous_friction` c (N·s/m), `coulomb_friction` τ_c (N),
+    Drivetrain: `rotor_inertia` J (kg·m²) of a rotor that turns by `gear_ratio` N (rad/m); friction on the displacement
+    γ along the axis, −(c γ̇ + τ_c tanh(γ̇/γ̇_s)): `viscous_friction` c (N·s/m), `coulomb_friction` τ_c (N),
     `friction_speed` γ̇_s (m/s).
     """
 
     type: Literal["prismatic"]
     axis: Vector2 | None = None
-    """Direction of motion, axes of the first body (global ones on the ground), of any length."""
+    """Direction of motion in the axes of the first body (ground: global axes), of any length."""
 
     locates: ClassVar[bool] = False  # it leaves the place along its axis open
     force_unit: ClassVar[str] = "N"

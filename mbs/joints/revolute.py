@@ -15,22 +15,21 @@ from .transmission import ElasticGear, Rotor
 
 
 class RevoluteJoint(MovingJoint):
-    """Two points coincide; `at` (m) is where the joint sits on the ground.
+    """Two points coincide; `at` (m) is the position of the joint on the ground.
 
-    `motor` left out: driven in open chains. Limits of the motor: N·m, rad/s, W.
+    Without `motor`, joints of open chains are driven. Limits of the motor: N·m, rad/s, W.
 
-    As it is built: `rotor_inertia` J (kg·m²) of a rotor that sits on the first body and turns `gear_ratio` N times as
-    fast as the second does on the first; friction on the joint's coordinate γ, −(c γ̇ + τ_c tanh(γ̇/γ̇_s)):
+    Drivetrain: `rotor_inertia` J (kg·m²) of a rotor that sits on the first body and turns `gear_ratio` N times as fast
+    as the second does on the first; friction on the joint's coordinate γ, −(c γ̇ + τ_c tanh(γ̇/γ̇_s)):
     `viscous_friction` c (N·m·s), `coulomb_friction` τ_c (N·m), `friction_speed` γ̇_s (rad/s). Between the gear of a
-    motor and the second body a spring `stiffness` (N·m/rad; rigid where it is not given) and a damper `damping`
-    (N·m·s/rad).
+    motor and the second body a spring `stiffness` (N·m/rad; default: rigid) and a damper `damping` (N·m·s/rad).
     """
 
     type: Literal["revolute"]
     stiffness: Positive | None = None
-    """Of a gear that gives, N·m/rad; rigid where it is left out."""
+    """Stiffness of a compliant gear, N·m/rad; default: rigid."""
     damping: NotNegative = 0.0
-    """Of that gear, N·m·s/rad."""
+    """Damping of that gear, N·m·s/rad."""
 
     @model_validator(mode="after")
     def _has_rotor_behind_spring(self) -> RevoluteJoint:

@@ -15,7 +15,7 @@ class WeldJoint(JointRecord):
 
     type: Literal["weld"]
     motor: bool | None = None
-    """`false` alone: a weld cannot be driven."""
+    """Only `false`: a weld cannot be driven."""
 
     @model_validator(mode="after")
     def _has_no_motor(self) -> WeldJoint:

@@ -49,11 +49,11 @@ class Analysis(Record):
     """
 
     name: Name
-    """Of the analysis, and of its group in the results."""
+    """Name of the analysis, and of its group in the results."""
     kind: str
     """What is computed."""
     tolerance: Annotated[float, Field(ge=TIGHTEST_TOLERANCE, lt=1.0)] = 1e-6
-    """Error aimed at in each reported quantity, relative to its peak."""
+    """Requested error of each reported quantity, relative to its peak."""
 
     follows_trajectories: ClassVar[bool] = True  # whether targets have to have values at all its `times`
     is_motion: ClassVar[bool] = True  # whether it finds a motion, at whose instants other analyses may look
@@ -133,7 +133,7 @@ class TimedAnalysis(Analysis):
     """Outputs at 0, output_step, …, end (s)."""
 
     end: Positive
-    """When the run is over, s; it begins at 0."""
+    """End time, s; the run begins at 0."""
     output_step: Positive
     """Time between outputs, s; `end` is a whole number of them."""
 
@@ -163,13 +163,15 @@ class IntegratedAnalysis(TimedAnalysis):
     integrator: Literal["auto", "dopri5", "dop853", "radau", "generalized-alpha"] = "auto"
     """Method of integration; "auto" chooses."""
     spectral_radius: Annotated[float, Field(ge=0.0, le=1.0)] = 0.8
-    """Of generalized-alpha at infinite frequency: what a step leaves of vibrations far above one over its size."""
+    """Spectral radius of generalized-alpha at infinite frequency: the share of fast vibrations that remains after a
+    step."""
     max_steps: Annotated[int, Field(gt=0, le=MOST_STEPS)] = 5_000_000
-    """The run ends after so many steps."""
+    """Largest number of steps."""
     keep_steps: bool = False
-    """Write where steps end to the results, if one explicit integrator makes them all; "auto" then does not change."""
+    """Write the ends of steps to the results, if one explicit integrator makes them all; "auto" then does not switch.
+    """
     repeat_steps: KeptSteps | None = None
-    """Results file of this analysis, with `keep_steps`: its steps are taken again, whatever they err."""
+    """Results file of this analysis with `keep_steps`: the run reuses its time steps, without error control."""
 
     is_integrated = True
 
@@ -210,11 +212,11 @@ class ActuatedAnalysis(IntegratedAnalysis):
     """
 
     end: Positive = 0.0
-    """When the run is over, s; by default that of `actuation`."""
+    """End time, s; by default that of `actuation`."""
     output_step: Positive = 0.0
     """Time between outputs, s; by default that of `actuation`."""
     actuation: str | None = None
-    """Earlier inverse analysis whose findings act."""
+    """Earlier inverse analysis whose results are applied."""
 
     takes_actuation = True
 

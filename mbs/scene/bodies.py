@@ -26,7 +26,7 @@ class RigidBody(Record):
     center: Vector2
     """Center of mass, m, axes of the body."""
     points: dict[Name, Vector2] = Field(default_factory=dict)
-    """Places for joints, loads and trajectories by name: m, axes of the body."""
+    """Points for joints, loads and trajectories by name: m, axes of the body."""
 
     @field_validator("inertia")
     @classmethod
@@ -58,17 +58,17 @@ class BodyKeys(Record):
     """What bodies in the plane and in space have in common; beside it each has the record of a rigid one, `rigid`."""
 
     name: Name
-    """Of the body, unique in the scene."""
+    """Name of the body, unique in the scene."""
     link: LinkInput | None = None
-    """Link file, or a table with its keys; stage 1 runs where needed."""
+    """Link file, or a table with its keys; stage 1 runs if needed."""
     modal: InputFile | None = None
-    """Modal body file, as stage 1 writes it."""
+    """Modal body file, written by stage 1."""
 
     modes: ModeCount | None = None
-    """How many of the lowest modes; "auto": as many as the tolerances need; all where it is left out. In a planar scene
-    those that move in its plane count, in space all, of whatever family."""
+    """Number of the lowest modes; "auto": as many as the tolerances need; default: all. Planar scenes count in-plane
+    modes, 3D scenes those of all families."""
     pieces: Literal["auto"] | Annotated[int, Field(ge=1, le=100)] | None = None
-    """Of a beam link that bends far: how many welded pieces stand for it; "auto": as many as it needs."""
+    """Number of welded segments of a beam link for large deflections; "auto" chooses it."""
 
     @model_validator(mode="after")
     def _is_one_of_three(self) -> Self:
@@ -82,26 +82,26 @@ class BodyKeys(Record):
 
 
 class Body(BodyKeys):
-    """A link file or a table of its keys (stage 1 runs when needed), a modal body file, or a rigid body.
+    """A link file or a table of its keys (stage 1 runs if needed), a modal body file, or a rigid body.
 
-    The `name` in a table of a link's keys is the body's where it is left out.
+    The default `name` in a table of a link's keys is that of the body.
 
-    `modes` of a flexible body: how many of the lowest that move in the plane; the others are represented by their
-    static flexibility. "auto" takes as many as the tolerances of the analyses need; the default is all.
+    `modes` of a flexible body is the number of its lowest in-plane modes; the others are represented by their static
+    flexibility. "auto" takes as many as the tolerances of the analyses need; the default is all.
 
-    `pieces` of a beam link: into how many it is divided for large deflections, "auto": as many as these need. Results
-    are those of the one link, and geometric stiffening is on.
+    `pieces` is the number of segments of a beam link for large deflections; "auto" chooses it. Results are those of the
+    whole link, and geometric stiffening is on.
     """
 
     rigid: RigidBody | None = None
-    """A body that does not deform."""
+    """Data of a rigid body."""
 
 
 class Payload(Record):
     """A mass (kg) on a point, with its moment of inertia about that point (kg·m²)."""
 
     point: PointReference
-    """Where it sits, "BODY.POINT"."""
+    """Point of the mass, "BODY.POINT"."""
     mass: NotNegative
     """Mass, kg."""
     inertia: NotNegative = 0.0

@@ -13,20 +13,20 @@ from ..fields.references import Reference
 
 
 class Initial(Record):
-    """State at t = 0; what is said of bodies and joints are guesses that the constraints correct.
+    """State at t = 0; values of bodies and joints are guesses that the constraints correct.
 
-    With `joints` or `joint_rates`, frames without an angle or rate of their own are turned against the body that
-    carries them by the coordinate of that joint, 0 where it is left out; without them they have 0.
+    With `joints` or `joint_rates`, a frame without an own angle or rate follows the coordinate of its inboard joint
+    (default 0); without them, its angle and rate are 0.
     """
 
     state: Literal["undeformed", "static"] = "undeformed"
-    """Undeformed links, or the static equilibrium under gravity and loads."""
+    """State of the links: undeformed, or static equilibrium under gravity and loads."""
     angles: dict[str, Quantity] = Field(default_factory=dict)
     """Guess of each body frame's absolute angle, against the global x axis, rad (or such as "60*deg")."""
     rates: dict[str, Quantity] = Field(default_factory=dict)
     """Guess of their rates, rad/s."""
     joints: dict[str, Quantity] = Field(default_factory=dict)
-    """Guess of joint coordinates, rad or m (or such as "60*deg"), in place of angles of bodies."""
+    """Guess of joint coordinates, rad or m (or such as "60*deg"), instead of angles of bodies."""
     joint_rates: dict[str, Quantity] = Field(default_factory=dict)
     """Guess of their rates, rad/s or m/s."""
 

@@ -31,17 +31,17 @@ StateForce = Annotated[StateFunction, PlainValidator(_state_force, json_schema_i
 
 
 class Load(Record):
-    """A given load: force (N, global axes) and moment (N·m) at a point, moment of a joint, or voltages (V).
+    """A prescribed load: force (N, global axes) and moment (N·m) at a point, joint torque, or voltages (V).
 
     `force` on a point, in scenes made in Python: a function of its motion, see `state_forces.state_function`.
     """
 
     point: PointReference | None = None
-    """Where it acts, "BODY.POINT"."""
+    """Loaded point, "BODY.POINT"."""
     joint: str | None = None
-    """Joint along whose coordinate it acts."""
+    """Joint that it acts on, along its coordinate."""
     pzt: str | None = None
-    """Body whose patches get voltages."""
+    """Body with the driven patches."""
     x: Expression | None = None
     """Force along the ground's x axis, N; expression in t."""
     y: Expression | None = None
@@ -49,9 +49,9 @@ class Load(Record):
     moment: Expression | None = None
     """Counter-clockwise moment on the point, or on the second body of the joint, N·m; expression in t."""
     force: StateForce | None = None
-    """Scenes made in Python: function of t, position and velocity that gives force (N) and moment (N·m)."""
+    """Function of t, position and velocity that returns force (N) and moment (N·m); in scenes made in Python only."""
     voltage: tuple[Expression, ...] | None = None
-    """One expression in t for each patch, V."""
+    """Voltages, V: one expression in t per patch."""
 
     @model_validator(mode="after")
     def _consistent(self) -> Load:

@@ -23,31 +23,31 @@ from .trajectories import Trajectory
 class MechanismKeys(Record):
     """The keys of a scene file that concern the mechanism; lists of tables keep the singular name they have there.
 
-    `geometric_stiffening` "auto": where the loads of a run change the stiffness of a link by more than 1 %.
+    `geometric_stiffening` "auto" includes it if the loads of a run change the stiffness of a link by more than 1 %.
     """
 
     name: Title
-    """Of the scene."""
+    """Name of the scene."""
     space: Literal["planar", "spatial"] = "planar"
     """Dimension of the motion."""
     gravity: Vector2
     """Acceleration of gravity, m/s², global axes."""
     motors: Literal["section", "frame"] = "section"
-    """What motors and joint coordinates turn: the sections at the joint, or the frames of the bodies."""
+    """Reference of motors and joint coordinates: sections at the joint, or frames of the bodies."""
     geometric_stiffening: bool | Literal["auto"] = False
-    """Loads change the stiffness of links; "auto": where they change that of a link by more than 1 %."""
+    """Stiffness of links depends on their loads; "auto": if these change it by more than 1 %."""
     body: Annotated[tuple[Body, ...], NotEmpty]
     """Links and rigid bodies."""
     joint: tuple[Joint, ...] = ()
-    """What joins them to each other and to the ground."""
+    """Joints between bodies, or to the ground."""
     trajectory: tuple[Trajectory, ...] = ()
-    """Motion that is specified."""
+    """Prescribed motions."""
     load: tuple[Load, ...] = ()
-    """Forces, moments and voltages that are given."""
+    """Prescribed forces, moments and voltages."""
     payload: tuple[Payload, ...] = ()
     """Masses on points."""
     initial: Initial = Initial()
-    """Where the robot starts."""
+    """Initial state."""
 
     @property
     def topology(self) -> Topology:

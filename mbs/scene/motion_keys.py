@@ -27,19 +27,20 @@ OF_LEGS = ("hold", "blend", "duration", *LIMITS, "start", "stretch", "fastest") 
 
 
 class Shaper(Record):
-    """Delayed parts of the motion that cancel each other's vibrations (Singer and Seering 1990).
+    """Input shaping: delayed shares of the motion cancel their vibrations (Singer and Seering 1990).
 
-    Where `frequency` is left out it is that of the robot's lowest vibrations while the path is held, averaged over it.
+    The default `frequency` is that of the robot's lowest vibrations on the constrained path, averaged over it.
     """
 
     kind: Literal["none", "zv", "zvd", "ei"]
-    """"zv" is shortest, "zvd" and "ei" take twice as long and forgive a wrong frequency; "none" does nothing."""
+    """Shaper: "zv" is shortest, "zvd" and "ei" take twice as long and are robust against a wrong frequency; "none" does
+    nothing."""
     frequency: Positive | tuple[Positive, ...] | None = None
-    """Of the vibrations, Hz: one or several; by default those of the robot."""
+    """Frequencies of the vibrations, Hz: one or several; by default those of the robot."""
     damping_ratio: Annotated[float, Field(ge=0.0, lt=1.0)] | None = None
-    """Of these vibrations; by default that of the robot, and 0 beside `frequency`."""
+    """Damping ratio of these vibrations; by default that of the robot, and 0 with `frequency`."""
     modes: Annotated[int, Field(gt=0, le=4)] = 1
-    """How many of the robot's lowest vibrations."""
+    """Number of the robot's lowest vibrations."""
 
     @model_validator(mode="after")
     def _consistent(self) -> Shaper:
@@ -65,9 +66,9 @@ class MotionKeys(Record):
     """What a trajectory has beside what follows it."""
 
     via: Annotated[tuple[Place, ...], OfPlaces] | None = None
-    """Places to go through from rest to rest, the first at t = 0: of points (m), or values of what turns or slides."""
+    """Waypoints from rest to rest, the first at t = 0: of points (m), or values of what turns or slides."""
     profile: Literal["rest-to-rest", "s-curve", "trapezoid", "spline"] | None = None
-    """Law of motion between places: a polynomial (default of `via`), limited jerk, limited acceleration, or a spline
+    """Law of motion between waypoints: a polynomial (default of `via`), limited jerk, limited acceleration, or a spline
     through the rows of `waypoints` (their default)."""
     smoothness: Annotated[int, Field(ge=1, le=6)] | None = None
     """Number of continuous derivatives; by default 4 of rest-to-rest, 2 of s-curve, 1 of trapezoid."""
@@ -78,19 +79,20 @@ class MotionKeys(Record):
     jerk: Positive | None = None
     """Largest jerk along the path, m/s³ or rad/s³."""
     duration: Positive | tuple[Positive, ...] | None = None
-    """Of each leg, s, in place of limits: one for all, or one for each."""
+    """Duration of each path segment, s, instead of limits: one for all, or one each."""
     start: NotNegative = 0.0
-    """When the first leg begins, s."""
+    """Start of the first path segment, s."""
     hold: NotNegative | tuple[NotNegative, ...] = 0.0
-    """Rest at each place between, s: one for all, or one for each."""
+    """Rest at each intermediate waypoint, s: one for all, or one each."""
     blend: Annotated[float, Field(ge=0.0, le=0.5)] = 0.0
-    """Places without a hold are passed beside: legs overlap by this share of the shorter one. 0: a stop at each."""
+    """Overlap of path segments at waypoints without hold, as a share of the shorter one; 0: a stop at each waypoint."""
     stretch: Annotated[float, Field(ge=1e-3, le=1e3)] = 1.0
-    """Factor of the times of all legs."""
+    """Time-scaling factor of all path segments."""
     fastest: bool = False
-    """Seek the smallest `stretch` at which motors and patches keep their limits in the first inverse analysis."""
+    """Search for the smallest `stretch` at which motors and patches satisfy their limits in the first inverse analysis.
+    """
     shaper: Shaper | None = None
-    """Shapes the motion so that it leaves vibrations of certain frequencies at rest."""
+    """Input shaper that does not excite vibrations of certain frequencies."""
 
     @field_validator("waypoints", check_fields=False)
     @classmethod

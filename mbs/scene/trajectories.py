@@ -21,27 +21,27 @@ from .motion_keys import MotionKeys, OfPlaces
 
 
 class Trajectory(MotionKeys):
-    """Motion that is specified (C_s): of a point (m, global axes), a joint coordinate, or an angle (rad).
+    """Prescribed motion (C_s) of a point (m, global axes), a joint coordinate, or an angle (rad).
 
     `angle` is a body (its frame) or BODY.POINT (the section there).
     """
 
     via: Annotated[tuple[Quantity | tuple[Quantity, Quantity], ...], OfPlaces] | None = None
-    """Places to go through from rest to rest, the first at t = 0: [x, y] (m), or values of the joint or angle."""
+    """Waypoints from rest to rest, the first at t = 0: [x, y] (m), or values of the joint or angle."""
     name: Name
-    """Of the trajectory, unique in the scene."""
+    """Name of the trajectory, unique in the scene."""
     point: PointReference | None = None
-    """What moves along it, "BODY.POINT"."""
+    """Point that follows the trajectory, "BODY.POINT"."""
     joint: str | None = None
-    """The joint whose coordinate follows it: relative, of the second side on the first."""
+    """Joint whose coordinate follows the trajectory: second side relative to the first."""
     angle: str | None = None
-    """The body, or the section "BODY.POINT", whose angle follows it: absolute, against the ground's x axis."""
+    """Body, or section "BODY.POINT", whose absolute angle against the ground's x axis follows the trajectory."""
     x: Expression | None = None
-    """Along the ground's x axis, m; expression in t (s)."""
+    """Position along the ground's x axis, m; expression in t (s)."""
     y: Expression | None = None
-    """Along the ground's y axis, m; expression in t (s)."""
+    """Position along the ground's y axis, m; expression in t (s)."""
     value: Expression | None = None
-    """Of the joint's coordinate (rad, or m where prismatic) or the angle (rad); expression in t (s)."""
+    """Joint coordinate (rad; prismatic: m) or angle (rad); expression in t (s)."""
     waypoints: WaypointTable | None = None
     """CSV file with the columns t (s) and x, y (m); of a joint value, or a column of the joint's name (rad, m)."""
 

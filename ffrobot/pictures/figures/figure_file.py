@@ -26,7 +26,7 @@ Range = tuple[float, float]
 
 
 class Curve(Record):
-    """What is drawn: a dataset of the results file, or one column of it.
+    """A curve: a dataset of the results file, or one column of it.
 
     `data` reads, say, `inverse/joints/A/moment` or `forward/points/link2.tip/position[0]`. With `file`, a CSV file
     whose first column is the time, its column `data` is drawn as separate points.
@@ -36,55 +36,55 @@ class Curve(Record):
     """Dataset of the results file, "inverse/joints/A/moment", or one column of it, "…/position[0]"; with `file`, the
     name of its column."""
     label: str
-    """In the legend."""
+    """Label in the legend."""
     x: str | None = None
-    """Dataset of the horizontal axis in place of the time, or one of its columns: "inverse/joints/A/rate"."""
+    """Dataset of the horizontal axis instead of the time, or one of its columns: "inverse/joints/A/rate"."""
     magnitude: bool = False
-    """Length of the vectors of the dataset in place of their components."""
+    """Length of the vectors of the dataset instead of their components."""
     file: InputFile | None = None
     """CSV file whose first column is the time (s), drawn as separate points."""
 
 
 class FigureRecord(Record):
-    """One figure. Axes without a range take that of the data; units stand in the labels of the axes.
+    """One figure. Axes without a range take that of the data; units are in the labels of the axes.
 
-    Kinds: "time" draws its curves over time; "path" draws (x, y) datasets against each other, (x, y, z) ones in space;
-    "configurations" draws the bodies of `analysis` at `times` (s), and its curves as paths (in space, the paths of
-    points with trajectories); "torque-speed" draws its curves over their `x`, and the limits of the motor of `joint`.
-    Of a linear `analysis`, at the first of `times`: "bode" draws the frequency responses of `transfers`
-    [input, output], "modes" the mode shapes of the robot; "placement" the patches that an analysis of that kind found.
+    Kinds: "time" draws its curves over time; "path" draws (x, y) or (x, y, z) datasets as paths; "configurations" draws
+    the bodies of `analysis` at `times` (s), and its curves as paths (in 3D, the paths of points with trajectories);
+    "torque-speed" draws its curves over their `x`, and the limits of the motor of `joint`. Of a linear `analysis`, at
+    the first of `times`: "bode" draws the frequency responses of `transfers` [input, output], "modes" the mode shapes
+    of the robot; "placement" the patches of such an analysis.
     """
 
     name: FileName
-    """Of the files, without suffix."""
+    """Name of the files, without suffix."""
     title: str = ""
-    """Above the axes."""
+    """Title above the axes."""
     kind: Literal["time", "path", "configurations", "torque-speed", "bode", "modes", "placement"] = "time"
-    """What is drawn; see above."""
+    """Kind of figure; see above."""
     transfers: tuple[tuple[str, str], ...] = ()
     """Pairs [input, output] of the linear model for kind = "bode"."""
     curves: tuple[Curve, ...] = ()
-    """What is drawn over time or as paths."""
+    """Curves over time, or paths."""
     analysis: str | None = None
-    """Of which the robot, its modes, responses or patches are drawn."""
+    """Analysis whose robot, modes, responses or patches are drawn."""
     joint: str | None = None
-    """Whose motor has the limits of kind = "torque-speed"."""
+    """Joint whose motor limits kind = "torque-speed" draws."""
     times: tuple[float, ...] = ()
     """Instants of the configurations, s."""
     exaggeration: Positive | None = None
-    """Of deflections in configurations in space; as large as can be seen well if absent."""
+    """Exaggeration of deflections in 3D configurations; default: chosen for visibility."""
     x_label: str = "time (s)"
-    """Of the horizontal axis, with its unit, in kind = "time" and "torque-speed"."""
+    """Label of the horizontal axis, with its unit, in kind = "time" and "torque-speed"."""
     y_label: str = ""
-    """Of the vertical axis, with its unit."""
+    """Label of the vertical axis, with its unit."""
     scale: float = 1.0
-    """What values are multiplied by, in kind = "time" and "torque-speed": 1000 for mm."""
+    """Factor of values, in kind = "time" and "torque-speed": 1000 for mm."""
     x_range: Range | None = None
-    """Of the horizontal axis; by default that of the data."""
+    """Range of the horizontal axis; by default that of the data."""
     y_range: Range | None = None
-    """Of the vertical axis; by default that of the data."""
+    """Range of the vertical axis; by default that of the data."""
     limits: tuple[float, ...] = Field(default=())
-    """Values at which horizontal lines are drawn, such as a voltage limit; in units of the axis."""
+    """Values of horizontal lines, such as a voltage limit; in units of the axis."""
 
     @model_validator(mode="after")
     def _consistent(self) -> FigureRecord:
@@ -108,10 +108,10 @@ class FigureRecord(Record):
 
 
 class FigureFile(Record):
-    """The figures of a case, in order."""
+    """Figures of a case, in order."""
 
     figure: tuple[FigureRecord, ...]
-    """The figures, in this order."""
+    """Figures, in this order."""
 
 
 def load_figures(path: Path) -> FigureFile:

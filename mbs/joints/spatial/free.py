@@ -12,14 +12,14 @@ from .joint import Place, SpatialJoint
 
 
 class SpatialFree(SpatialJoint):
-    """The second side moves as it likes; [initial] gives its place (m) and rotation vector (rad), in axes of the first.
+    """The second side moves freely; [initial] has its position (m) and rotation vector (rad), in axes of the first.
 
     A body without any joint is free, too, from the origin on.
     """
 
     type: Literal["free"]
     motor: bool = False
-    """Whether forces and moments drive it."""
+    """Presence of driving forces and moments."""
 
     guess_units = ("m", "m", "m", "rad", "rad", "rad")
     q_count = 7

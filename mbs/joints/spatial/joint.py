@@ -61,10 +61,10 @@ class SpatialJoint(JointKeys):
     """A joint between two points, or a point and the ground, in space."""
 
     at: Vector3 = (0.0, 0.0, 0.0)
-    """Where it sits on the ground, m, global axes."""
+    """Position on the ground, m, global axes."""
     rpy: Angles = (0.0, 0.0, 0.0)
-    """Orientation of the second side's axes in the first's where the coordinate is zero: roll, pitch, yaw about fixed
-    axes, rad (or such as "90*deg")."""
+    """Orientation of the second side's axes in the first's at coordinate zero: roll, pitch, yaw about fixed axes, rad
+    (or such as "90*deg")."""
 
     units: ClassVar[tuple[str, ...]] = ()  # of its coordinates, "rad" or "m"
     guess_units: ClassVar[tuple[str, ...]] = ()  # of the numbers by which [initial] gives its place, where those differ

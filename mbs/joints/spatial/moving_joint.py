@@ -23,22 +23,22 @@ class MovingSpatialJoint(SpatialJoint):
     """A joint with coordinates, which motors may drive. Joints with several take lists of limits, one for each."""
 
     motor: bool | None = None
-    """Whether motors drive it; by default in open chains only, and spherical and free joints not."""
+    """Presence of motors; by default in open chains only, and not in spherical and free joints."""
     position_limit: Range | tuple[Range, ...] | None = None
-    """Least and largest coordinate, [lo, hi], rad (m where it slides). Nothing acts there; integrated runs tell when
-    it is left, and how far."""
+    """Range of the coordinate, [lo, hi], rad (sliding: m). No contact force acts; integrated runs report when and how
+    far it is exceeded."""
     moment_limit: Limit | None = None
-    """Largest moment, N·m (force where it slides, N), at the joint: behind the gear."""
+    """Largest torque, N·m (sliding: force, N), at the joint: after the gear."""
     speed_limit: Limit | None = None
-    """Largest rate of the joint, rad/s (m/s where it slides)."""
+    """Largest rate of the joint, rad/s (sliding: m/s)."""
     power_limit: Limit | None = None
     """Largest mechanical power, W."""
     viscous_friction: NotNegative = 0.0
-    """c, N·m·s/rad (N·s/m where it slides)."""
+    """Viscous coefficient c, N·m·s/rad (sliding: N·s/m)."""
     coulomb_friction: NotNegative = 0.0
-    """τ_c, N·m (N where it slides)."""
+    """Coulomb torque τ_c, N·m (sliding: N)."""
     friction_speed: Positive = 0.01
-    """Rate at which dry friction has 76 % of its size, tanh 1, rad/s (m/s where it slides)."""
+    """Rate at which dry friction has 76 % of its size, tanh 1, rad/s (sliding: m/s)."""
 
     @model_validator(mode="after")
     def _has_friction(self) -> MovingSpatialJoint:
@@ -103,7 +103,7 @@ class AxialJoint(MovingSpatialJoint):
     """A joint whose motion is along or about an axis, z of its triads."""
 
     axis: Vector3
-    """Of the motion, in the axes of the first of `between` (of the ground: global); of any length."""
+    """Axis of motion in the axes of the first of `between` (ground: global), of any length."""
 
     @model_validator(mode="after")
     def _axis_has_direction(self) -> AxialJoint:

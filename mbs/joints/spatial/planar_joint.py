@@ -15,8 +15,8 @@ from .moving_joint import AxialJoint
 class SpatialPlanar(AxialJoint):
     """The second point moves in the plane across `axis`, the second side turns about it.
 
-    Coordinates: two ways (m) and the angle (rad). The ways are along the axes x and y that come with z along `axis` by
-    the smallest turn.
+    Coordinates: two displacements (m) and the angle (rad). The displacements are along the axes x and y that the
+    smallest rotation of z onto `axis` yields.
     """
 
     type: Literal["planar"]

@@ -13,15 +13,15 @@ from .moving_joint import AxialJoint
 
 
 class SpatialPrismatic(AxialJoint):
-    """The second point slides along `axis` by its coordinate, m; `rpy` is how the second side stands on the first.
+    """The second point slides along `axis` by its coordinate, m; `rpy` is the orientation of the second side.
 
-    As it is built: `rotor_inertia` J (kg·m²) of a rotor that turns by `gear_ratio` N (rad/m) times the coordinate: a
-    mass J N² along it; that the first side turns the rotor is left out.
+    Drivetrain: `rotor_inertia` J (kg·m²) of a rotor that turns by `gear_ratio` N (rad/m) times the coordinate: a mass J
+    N² along it; that the first side turns the rotor is left out.
     """
 
     type: Literal["prismatic"]
     gear_ratio: Positive = 1.0
-    """Turn of the rotor by way of the joint, rad/m."""
+    """Rotor rotation per joint displacement, rad/m."""
     rotor_inertia: NotNegative = 0.0
     """Moment of inertia of the rotor about its axis, kg·m², before the gear."""
 

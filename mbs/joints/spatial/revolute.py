@@ -17,9 +17,9 @@ from .moving_joint import AxialJoint
 class SpatialRevolute(AxialJoint):
     """Two points coincide, the second side turns about `axis` by its coordinate, rad.
 
-    As it is built: `rotor_inertia` J (kg·m²) of a rotor that sits on the first body, its axis that of the joint, and
-    turns `gear_ratio` times as fast as the second side does on the first. Between the gear of a motor and the second
-    body a spring `stiffness` (N·m/rad; rigid where it is not given) and a damper `damping` (N·m·s/rad).
+    Drivetrain: `rotor_inertia` J (kg·m²) of a rotor that sits on the first body, its axis that of the joint, and turns
+    `gear_ratio` times as fast as the second side does on the first. Between the gear of a motor and the second body a
+    spring `stiffness` (N·m/rad; default: rigid) and a damper `damping` (N·m·s/rad).
     """
 
     type: Literal["revolute"]
@@ -28,9 +28,9 @@ class SpatialRevolute(AxialJoint):
     rotor_inertia: NotNegative = 0.0
     """Moment of inertia of the rotor about its axis, kg·m², before the gear."""
     stiffness: Positive | None = None
-    """Of a gear that gives, N·m/rad; rigid where it is left out."""
+    """Stiffness of a compliant gear, N·m/rad; default: rigid."""
     damping: NotNegative = 0.0
-    """Of that gear, N·m·s/rad."""
+    """Damping of that gear, N·m·s/rad."""
 
     @model_validator(mode="after")
     def _has_rotor_behind_spring(self) -> SpatialRevolute:

@@ -18,7 +18,7 @@ class SpatialScrew(AxialJoint):
 
     type: Literal["screw"]
     lead: float
-    """Way along the axis per turn, m: right-handed where it is positive."""
+    """Displacement along the axis per turn, m; positive: right-handed."""
 
     units = ("rad",)
     q_count = 1

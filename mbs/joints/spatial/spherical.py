@@ -12,11 +12,11 @@ from .joint import POINT, Place, SpatialJoint
 
 
 class SpatialSpherical(SpatialJoint):
-    """Two points coincide, the second side turns as it likes; [initial] gives a rotation vector, rad."""
+    """Two points coincide, the second side rotates freely; [initial] has a rotation vector, rad."""
 
     type: Literal["spherical"]
     motor: bool = False
-    """Whether three moments drive it."""
+    """Presence of three driving moments."""
 
     guess_units = ("rad", "rad", "rad")
     q_count = 4

@@ -20,12 +20,12 @@ EXCHANGED = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])  # x 
 class SpatialUniversal(AxialJoint):
     """Two points coincide; the second side turns about `axis` of the first, then about `second_axis` of its own.
 
-    Coordinates: the two angles, rad. The axes are at right angles where both are zero, and stay so.
+    Coordinates: the two angles, rad. The axes are at right angles at zero coordinates, and stay so.
     """
 
     type: Literal["universal"]
     second_axis: Vector3
-    """The other axis, in the axes of the second of `between`; of any length."""
+    """Second axis in the axes of the second of `between`, of any length."""
 
     units = ("rad", "rad")
     q_count = 2

@@ -11,7 +11,7 @@ from .joint import ALIGNED, NOT_TURNED, POINT, Place, SpatialJoint
 
 
 class SpatialWeld(SpatialJoint):
-    """The second side stands on the first as `rpy` says."""
+    """The second side is fixed to the first with orientation `rpy`."""
 
     type: Literal["weld"]
 

@@ -51,11 +51,11 @@ class SpatialRigidBody(Record):
     mass: Positive
     """Mass, kg."""
     inertia: Inertia
-    """About the center of mass, body axes, kg·m²: [xx, yy, zz], or three rows."""
+    """Inertia about the center of mass, body axes, kg·m²: [xx, yy, zz], or three rows."""
     center: Vector3
     """Center of mass, m, axes of the body."""
     points: dict[Name, Vector3] = Field(default_factory=dict)
-    """Places for joints, loads and trajectories by name: m, axes of the body."""
+    """Points for joints, loads and trajectories by name: m, axes of the body."""
 
     @field_validator("inertia")
     @classmethod
@@ -65,34 +65,34 @@ class SpatialRigidBody(Record):
 
 
 class BodyInSpace(BodyKeys):
-    """A link file or a table of its keys (stage 1 runs when needed), a modal body file, or a rigid body.
+    """A link file or a table of its keys (stage 1 runs if needed), a modal body file, or a rigid body.
 
-    The `name` in a table of a link's keys is the body's where it is left out. A link moves in the families of modes
-    that its file has, and is rigid in the others.
+    The default `name` in a table of a link's keys is that of the body. A link moves in the families of modes that its
+    file has, and is rigid in the others.
 
-    `modes` of a flexible body: how many of the lowest, of all families; the others are represented by their static
-    flexibility. Patches serve all modes of the file. "auto" takes as many as the tolerances of the analyses need; the
-    default is all.
+    `modes` of a flexible body is the number of its lowest modes of all families; the others are represented by their
+    static flexibility. Patches serve all modes of the file. "auto" takes as many as the tolerances of the analyses
+    need; the default is all.
 
-    `pieces` of a beam link: into how many it is divided for large deflections, in both planes, and twist, "auto": as
-    many as these need. Results are those of the one link.
+    `pieces` is the number of segments of a beam link for large deflections in both planes, and twist; "auto" chooses
+    it. Results are those of the whole link.
     """
 
     rigid: SpatialRigidBody | None = None
-    """A body that does not deform."""
+    """Data of a rigid body."""
 
 
 class SpatialPayload(Record):
     """A mass (kg) on a section of a body, with its inertia about its own center of mass (kg·m²)."""
 
     point: PointReference
-    """Where it sits, "BODY.POINT"."""
+    """Point of the mass, "BODY.POINT"."""
     mass: NotNegative
     """Mass, kg."""
     center: Vector3 = (0.0, 0.0, 0.0)
-    """Its center of mass, m from the point, axes of the body."""
+    """Center of mass, m from the point, axes of the body."""
     inertia: Inertia = (0.0, 0.0, 0.0)
-    """About that center, axes of the body, kg·m²: [xx, yy, zz], or three rows."""
+    """Inertia about that center, axes of the body, kg·m²: [xx, yy, zz], or three rows."""
 
     @field_validator("inertia")
     @classmethod

@@ -18,10 +18,10 @@ class SpatialInitial(Record):
     """State at t = 0; joint coordinates and rates are guesses that the constraints correct."""
 
     state: Literal["undeformed", "static"] = "undeformed"
-    """Undeformed links, or the static equilibrium under gravity and loads."""
+    """State of the links: undeformed, or static equilibrium under gravity and loads."""
     joints: dict[str, Numbers] = Field(default_factory=dict)
-    """Guess of each joint's coordinates, rad or m (or such as "60*deg"); lists for several; 0 where it is left out.
-    Spherical joints: a rotation vector; free ones: place and rotation vector, in the axes of the first side."""
+    """Guess of each joint's coordinates, rad or m (or such as "60*deg"); lists for several; default 0. Spherical
+    joints: a rotation vector; free ones: position and rotation vector, in the axes of the first side."""
     joint_rates: dict[str, Numbers] = Field(default_factory=dict)
     """Their rates, rad/s or m/s; spherical and free joints: angular velocity in the axes of the second side, after
     the velocity in those of the first."""

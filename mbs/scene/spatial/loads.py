@@ -15,14 +15,14 @@ OF_POINT = ("x", "y", "z", "mx", "my", "mz")
 
 
 class SpatialLoad(Record):
-    """A given load: force (N) and moment (N·m) on a section, in global axes, the moment of a joint, or voltages (V)."""
+    """A prescribed load: force (N) and moment (N·m) on a section in global axes, joint torque, or voltages (V)."""
 
     point: PointReference | None = None
-    """Where it acts, "BODY.POINT"."""
+    """Loaded point, "BODY.POINT"."""
     joint: str | None = None
-    """Joint along whose coordinate it acts."""
+    """Joint that it acts on, along its coordinate."""
     pzt: str | None = None
-    """Layout of patches that get voltages, by its name (the body's where it has none)."""
+    """Name of the layout with the driven patches (default: the name of the body)."""
     x: Expression | None = None
     """Force along the ground's x axis, N; expression in t."""
     y: Expression | None = None
@@ -36,10 +36,10 @@ class SpatialLoad(Record):
     mz: Expression | None = None
     """Moment about the ground's z axis on the section, N·m; expression in t."""
     moment: Expressions | None = None
-    """On the second side of the joint along its coordinate, N·m (N where it slides); expression in t. A list of them
-    for a joint with several coordinates."""
+    """Torque on the second side of the joint along its coordinate, N·m (N along sliding coordinates); expression in t,
+    or a list of them for several coordinates."""
     voltage: tuple[Expression, ...] | None = None
-    """One expression in t for each patch of the layout, V."""
+    """Voltages, V: one expression in t per patch of the layout."""
 
     @model_validator(mode="after")
     def _consistent(self) -> SpatialLoad:

@@ -23,32 +23,32 @@ class SpatialMechanismKeys(Record):
     """The keys of a scene in space that concern the mechanism; lists of tables keep the singular name of the file."""
 
     name: Title
-    """Of the scene."""
+    """Name of the scene."""
     space: Literal["spatial"]
     """Dimension of the motion."""
     gravity: Vector3
     """Acceleration of gravity, m/s², global axes."""
     motors: Literal["section", "frame"] = "section"
-    """What motors turn: the sections at the joint, or the frames of the bodies."""
+    """Reference of motors: sections at the joint, or frames of the bodies."""
     geometric_stiffening: bool | Literal["auto"] | None = None
-    """Loads change the stiffness of links; "auto": where they change that of a link by more than 1 %. Left out: of
-    links in pieces alone, but those with loads between the ends of a piece."""
+    """Stiffness of links depends on their loads; "auto": if these change it by more than 1 %. Default: on for
+    subdivided links only, except links with loads between the ends of a segment."""
     redundancy: Literal["least-torque", "least-motion"] | None = None
-    """What settles the freedom that trajectories leave to joints, found with undeformed links: from the state at t = 0
-    on the least integral of the squares of motor moments over the whole motion, or at every time the least sum of
-    squares of joint rates (ways in sizes of the robot). Left out: it moves by itself."""
+    """Redundancy resolution with undeformed links: "least-torque" minimizes the integral of squared motor torques from
+    the state at t = 0, "least-motion" the sum of squared joint velocities at every time (translations relative to the
+    robot's size). Default: the redundant motion is unactuated."""
     body: Annotated[tuple[BodyInSpace, ...], NotEmpty]
     """Links and rigid bodies."""
     joint: tuple[AnySpatialJoint, ...] = ()
-    """What joins them to each other and to the ground; bodies without any are free."""
+    """Joints between bodies, or to the ground; bodies without a joint are free."""
     trajectory: tuple[SpatialTrajectory, ...] = ()
-    """Motion that is specified."""
+    """Prescribed motions."""
     load: tuple[SpatialLoad, ...] = ()
-    """Forces and moments that are given."""
+    """Prescribed forces and moments."""
     payload: tuple[SpatialPayload, ...] = ()
     """Masses on points."""
     initial: SpatialInitial = SpatialInitial()
-    """Where the robot starts."""
+    """Initial state."""
 
     @property
     def edges(self) -> list[Edge]:

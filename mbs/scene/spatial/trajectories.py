@@ -31,42 +31,42 @@ Triple = tuple[Expression, Expression, Expression]
 
 
 class SpatialTrajectory(MotionKeys):
-    """Motion that is specified: of a point (m, global axes), of the section there, a joint coordinate, or a motor.
+    """Prescribed motion of a point (m, global axes), of the section there, of a joint or of a motor.
 
     The section's orientation is that of its axes in global axes: by a rotation vector, by roll, pitch and yaw about
-    fixed axes, or by one direction of the section, about which it then turns as it likes.
+    fixed axes, or by one direction of the section, about which rotation is then unconstrained.
     """
 
     via: Annotated[tuple[Place, ...], OfPlaces] | None = None
-    """Places to go through from rest to rest, the first at t = 0: [x, y] (z is left open) or [x, y, z] (m), [x, y, z,
-    roll, pitch, yaw] (m, rad), or values of the joint (rad, m)."""
+    """Waypoints from rest to rest, the first at t = 0: [x, y] (z is not prescribed) or [x, y, z] (m), [x, y, z, roll,
+    pitch, yaw] (m, rad), or values of the joint (rad, m)."""
     name: Name
-    """Of the trajectory, unique in the scene."""
+    """Name of the trajectory, unique in the scene."""
     point: PointReference | None = None
-    """What moves along it, "BODY.POINT"."""
+    """Point that follows the trajectory, "BODY.POINT"."""
     joint: str | None = None
-    """The joint whose coordinate follows it: relative, of the second side on the first."""
+    """Joint whose coordinate follows the trajectory: second side relative to the first."""
     motor: str | None = None
-    """The joint whose motor follows it, as its controller holds it; in the joint's coordinate, which differs from that
-    of the motor where the gear gives (`stiffness`)."""
+    """Joint whose motor follows the trajectory; a compliant gear (`stiffness`) lets the joint coordinate differ from
+    that of the motor."""
     x: Expression | None = None
-    """Along the ground's x axis, m; expression in t (s)."""
+    """Position along the ground's x axis, m; expression in t (s)."""
     y: Expression | None = None
-    """Along the ground's y axis, m; expression in t (s)."""
+    """Position along the ground's y axis, m; expression in t (s)."""
     z: Expression | None = None
-    """Along the ground's z axis, m; expression in t (s)."""
+    """Position along the ground's z axis, m; expression in t (s)."""
     rotation_vector: Triple | None = None
     """Orientation of the section: axis times angle, rad, global axes; expressions in t."""
     reference_rotation_vector: Vector3 | None = None
-    """Beside rotation_vector: the orientation that it turns, rad; by default the global axes."""
+    """Orientation that `rotation_vector` rotates, rad; by default the global axes."""
     rpy: Triple | None = None
     """Orientation of the section: roll, pitch, yaw about the ground's x, y, z in this order, rad; expressions in t."""
     tool_axis: Vector3 | None = None
-    """A direction of the section, in its axes, that stays along `direction`."""
+    """Direction of the section, in its axes, that stays along `direction`."""
     direction: Triple | None = None
-    """Where tool_axis points, global axes, of any length; expressions in t."""
+    """Direction of `tool_axis` in global axes, of any length; expressions in t."""
     value: Expression | None = None
-    """Of the joint's coordinate, rad, or m where it slides; expression in t (s)."""
+    """Joint coordinate, rad (sliding: m); expression in t (s)."""
     waypoints: WaypointTable | None = None
     """CSV file with the columns t (s) and x, y, z (m), and qw, qx, qy, qz for the orientation; of a joint value, or a
     column of the joint's name (rad, m)."""
