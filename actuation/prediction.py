@@ -43,11 +43,11 @@ class Unsupplied:
     def in_words(self) -> str:
         """What it means, and what to do."""
         return (
-            f"nothing supplies the modal forces of {', '.join(self.bodies)}, or not all: with"
-            f" {'patches within their limits' if self.with_patches else 'motors alone'} {self.point} is off its path by"
-            f" {_length(self.angles_kept)} where motors keep their angles ({_length(self.at_start)} at the start), by"
-            f" {_length(self.moments_repeated)} and drifting where they repeat these moments;"
-            ' kind = "motors-only" finds moments that follow it'
+            f"no actuator provides all modal forces required on {', '.join(self.bodies)}. With"
+            f" {'patches within their limits' if self.with_patches else 'motors only'}, {self.point} is off its path"
+            f" by {_length(self.angles_kept)} if joints are position-controlled on the computed angles"
+            f" ({_length(self.at_start)} at the start), and by {_length(self.moments_repeated)} and drifting if the"
+            ' computed torques are applied open loop. kind = "motors-only" finds torques that follow the path'
         )
 
 

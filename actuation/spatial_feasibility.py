@@ -69,7 +69,7 @@ class UnsuppliedInSpace:
         ]
         return (
             f"nothing supplies modal forces of {'; '.join(links)}, quasi-static, where {_whoever(self.with_patches)}:"
-            " patches ([[pzt]]) bend links in two planes, fibres at an angle twist them"
+            " patches ([[pzt]]) bend links in two planes, fibers at an angle twist them"
         )
 
 

@@ -110,7 +110,7 @@ def spatial_point_set(
     if rank < len(points):
         raise InputError(
             f"{key}: expected components that differ in what they do to the body, found {len(points)} of which only"
-            f" {rank} are independent: those along x coincide where no mode moves along the link, and it has"
+            f" {rank} are independent. Those along x coincide without axial modes, and the body has"
             f" {len(chosen.scale)} coordinates"
         )
     return chosen
@@ -148,7 +148,7 @@ def forces_at_points(chosen: Mapping[str, SpatialPointSet], run: Outcome) -> dic
         if body not in chosen and np.abs(Q_a).max(initial=0.0) > DEPENDENT * largest:
             raise InputError(
                 f'{run.model.scene.path}: analysis "{run.analysis.name}": expected [[actuation_points]] on every body'
-                f' that trajectories drive or that is held to a shape, found none on "{body}"'
+                f' that trajectories drive or that has a prescribed shape, found none on "{body}"'
             )
     frames = tree.frames(run.q)
     for body, points in chosen.items():

@@ -17,11 +17,11 @@ INTRODUCTION = {
     "link": "A link file is the input of stage 1. SI units; the link's axis is x, in-plane bending displaces along y.",
     "scene": "A scene file is the input of stage 2. SI units, angles in rad; file names are relative to the scene's"
     " folder. `ffrobot schema scene` prints these keys for editors. Axes and signs: [conventions](conventions.md).",
-    "spatial": 'A scene file with `space = "spatial"` is the input of stage 2 in 3D. SI units, angles in rad. Analyses have'
-    " the keys of [planar scenes](scene_keys.md). ffrobot rejects [unsupported keys](#unsupported-in-3d) with an error"
-    " message. `ffrobot schema spatial` prints these keys for editors.",
-    "figures": "A file `figures.toml` next to the results lists the figures of `ffrobot plot`. Without it, standard figures"
-    " are drawn.",
+    "spatial": 'A scene file with `space = "spatial"` is the input of stage 2 in 3D. SI units, angles in rad. Analyses'
+    " have the keys of [planar scenes](scene_keys.md). ffrobot rejects [unsupported keys](#unsupported-in-3d) with an"
+    " error message. `ffrobot schema spatial` prints these keys for editors.",
+    "figures": "A file `figures.toml` next to the results lists the figures of `ffrobot plot`. Without it, standard"
+    " figures are drawn.",
 }
 HERE = Path(__file__).parent / "reference"
 
@@ -79,7 +79,7 @@ def _section(name: str, record: dict[str, Any]) -> Iterator[str]:
 
 
 def _meaning(key: str, entry: dict[str, Any]) -> str:
-    """The description; of a constant, which editors describe by the first line about its table, what the constant is."""
+    """The description; of a constant, for which editors show the first line about its table, what it is."""
     if "const" in entry:
         return "Dimension of the motion." if key == "space" else f"{key.capitalize()} of this table."
     return str(entry["description"])

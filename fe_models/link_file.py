@@ -178,7 +178,7 @@ def _check_measured(link: Link, path: Path) -> None:
         return
     rows = read_measured(link.measured.table, FAMILIES)
     if link.damping.of == "robot" and any(row.damping_ratio is not None for row in rows):
-        _reject(path, "measured", 'no damping_ratio beside damping.of = "robot"', f"some in {link.measured.table}")
+        _reject(path, "measured", 'no damping_ratio with damping.of = "robot"', f"some in {link.measured.table}")
 
 
 def _check_beam_material(link: BeamLink, path: Path) -> None:
@@ -241,7 +241,7 @@ def _check_solid_interfaces(link: SolidLink, path: Path) -> None:
         if interface.group is not None and interface.position is not None:
             _reject(path, key.format("group"), "either group or position", "both")
         if interface.normal is not None and not isinstance(interface.position, tuple):
-            _reject(path, key.format("normal"), "it beside a position of three numbers", interface.position)
+            _reject(path, key.format("normal"), "it only with a position of three numbers", interface.position)
         if isinstance(interface.position, tuple) and interface.normal is None:
             _reject(path, key.format("normal"), "the outward normal of the face at position", "none")
         if isinstance(interface.position, float):

@@ -30,11 +30,11 @@ from .present.logs import LOGGER, log_warning
 @click.group(context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(package_name="ffrobot")
 def cli() -> None:
-    """What motors and piezoelectric patches must do so that a flexible robot follows its path.
+    """Dynamics of robots with flexible links: motor torques, vibrations and patch voltages for a path.
 
     \b
     Stage 1:  ffrobot link  LINK.toml   finite elements → modal body file
-    Stage 2:  ffrobot solve SCENE.toml  modal bodies → moments and voltages
+    Stage 2:  ffrobot solve SCENE.toml  modal bodies → torques and voltages
     Then:     ffrobot info, ffrobot plot, ffrobot view, ffrobot report
     """  # noqa: D301 (click wants the backspace itself)
 
@@ -42,7 +42,7 @@ def cli() -> None:
 @cli.command()
 @click.argument("kind", type=click.Choice(["link", "scene", "spatial", "figures"]))
 def schema(kind: str) -> None:
-    """Print the JSON schema of link, scene or figures files, or of scenes in space, for editors.
+    """Print the JSON schema of link, scene or figures files, or of 3D scenes, for editors.
 
     \b
     ffrobot schema scene > scene.schema.json

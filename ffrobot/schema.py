@@ -25,7 +25,7 @@ def schema(kind: str) -> dict[str, Any]:
             described["$defs"][link]["required"].remove("name")  # that of the body
     if kind == "link":
         described["oneOf"] = described.pop("anyOf")  # geometry.kind tells beam and solid apart
-    title = "scene in space" if kind == "spatial" else f"{kind} file"
+    title = "3D scene" if kind == "spatial" else f"{kind} file"
     return {"$schema": DIALECT, **_for_toml(described), "title": f"ffrobot {title}"}
 
 

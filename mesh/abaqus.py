@@ -214,7 +214,7 @@ class _Assembled:
         others = Counter(kind for one in self.scopes.values() for kind in one.scope.others.values())
         if others:
             listed = ", ".join(f"{count} {kind}" for kind, count in others.items())
-            yield f"elements beside solids are left out, with their stiffness and mass: {listed}"
+            yield f"elements that are not solids are left out, with their stiffness and mass: {listed}"
         for keyword in self.deck.masses:
             value = next((number_of(row[0], place) for row, place in keyword.rows()), 0.0)
             name = keyword.options.get("ELSET", "").upper()

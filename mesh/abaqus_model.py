@@ -119,7 +119,7 @@ class Scope:
             if solid:
                 entry = _KINDS[count], nodes
                 if self.solids.setdefault(number, entry) != entry:
-                    raise InputError(f"{place}: expected elements with numbers of their own, found {number} again")
+                    raise InputError(f"{place}: expected elements with unique numbers, found {number} again")
             else:
                 self.others[number] = kind
                 self.surfaces[number] = nodes[: 3 if count in (3, 6) else 4]
@@ -238,7 +238,7 @@ class Deck:
     def _new_part(self, keyword: Keyword) -> Scope:
         name = keyword.option("NAME").upper()
         if name in self.parts:
-            raise InputError(f"{keyword}: expected parts with names of their own, found {name} again")
+            raise InputError(f"{keyword}: expected parts with unique names, found {name} again")
         return self.parts.setdefault(name, Scope())
 
     def _new_instance(self, keyword: Keyword) -> Scope:
@@ -246,5 +246,5 @@ class Deck:
             raise InputError(f"{keyword}: expected an instance of a part in this deck, found one of results (LIBRARY=)")
         name = keyword.option("NAME").upper()
         if name in self.instances:
-            raise InputError(f"{keyword}: expected instances with names of their own, found {name} again")
+            raise InputError(f"{keyword}: expected instances with unique names, found {name} again")
         return self.instances.setdefault(name, Instance.of(keyword, self.parts)).scope

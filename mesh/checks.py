@@ -156,7 +156,7 @@ def check_boundary(part: PartMesh, where: str) -> None:
     if np.any(inside):
         listed = ", ".join(_show(place) for place in on_facets[inside][:3])
         raise InputError(
-            f"{where}: expected elements beside one another, found {np.sum(inside)} of their free sides inside others,"
+            f"{where}: expected elements side by side, found {np.sum(inside)} of their free sides inside others,"
             f" e.g. at {listed} m: elements overlap, or nodes at one place are not one"
         )
 

@@ -132,7 +132,7 @@ class _Version2:
         order = np.argsort(tags, kind="stable")
         ordered = tags[order]
         if np.any(ordered[1:] == ordered[:-1]):
-            raise InputError("expected nodes with numbers of their own, found two nodes of one number")
+            raise InputError("expected nodes with unique numbers, found two nodes of one number")
 
         def number(wanted: Integers) -> Integers:
             place = np.minimum(np.searchsorted(ordered, wanted), max(len(ordered) - 1, 0))

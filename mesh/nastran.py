@@ -101,7 +101,7 @@ class _Deck:
     def _add_system(self, card: Card, begin: int) -> None:
         number = card.whole(begin)
         if number in self.systems and self.systems[number][0].fields != card.fields:
-            raise InputError(f"{card}: expected coordinate systems with numbers of their own, found {number} again")
+            raise InputError(f"{card}: expected coordinate systems with unique numbers, found {number} again")
         self.systems[number] = card, begin
 
     def mesh(self) -> RawMesh:
@@ -185,7 +185,7 @@ class _Deck:
         if self.others:
             listed = ", ".join(f"{count} {name}" for name, count in self.others.items())
             mass = f" (concentrated masses: {sum(self.masses):g} in all)" if self.masses else ""
-            yield f"elements beside solids are left out, with their stiffness and mass: {listed}{mass}"
+            yield f"elements that are not solids are left out, with their stiffness and mass: {listed}{mass}"
         if unread := [name for name, count in self.not_read.items() if count]:
             yield f"not read: {', '.join(unread)}"
 
@@ -194,7 +194,7 @@ def _add(cards: dict[int, Card], card: Card, number: int) -> None:
     """Add a card by its number; twice the same is once."""
     other = cards.setdefault(number, card)
     if other is not card and (other.name, other.fields) != (card.name, card.fields):
-        raise InputError(f"{card}: expected cards with numbers of their own, found {number} again ({other.place})")
+        raise InputError(f"{card}: expected cards with unique numbers, found {number} again ({other.place})")
 
 
 def _nodes(card: Card) -> tuple[str, list[int]]:

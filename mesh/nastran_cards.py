@@ -72,7 +72,7 @@ def cards(path: Path) -> Iterator[Card]:
         if row.end:
             ends[row.end] = -1 if row.end in ends else k
     if rows and rows[0].follows and rows[0].begin not in ends:
-        raise InputError(f"expected a card (GRID …) first, found a line that goes on with none ({rows[0].place})")
+        raise InputError(f"expected a card (GRID …) first, found a line that continues none ({rows[0].place})")
     after: dict[int, int] = {}
     for k, row in enumerate(rows):
         if not row.follows:
@@ -82,11 +82,11 @@ def cards(path: Path) -> Iterator[Card]:
             by_mark = ends.get(row.begin)
             before = before if by_mark is None and k and not rows[before].end else -1 if by_mark is None else by_mark
         if before < 0 or before in after:
-            raise InputError(f"{row.place}: expected one card that this line goes on with, found none or several")
+            raise InputError(f"{row.place}: expected one card that this line continues, found none or several")
         after[before] = k
     for k, row in enumerate(rows):
         if row.is_half and k not in after:
-            raise InputError(f"{row.place}: expected a line that goes on with this one (*), found none")
+            raise InputError(f"{row.place}: expected a line that continues this one (*), found none")
         if row.follows:
             continue
         fields = list(row.fields)

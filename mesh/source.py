@@ -94,7 +94,7 @@ def source_from(raw: RawMesh, where: str) -> Source:
     number[used] = np.arange(used.size)
     remarks = [*raw.remarks, *_left_out(raw, cells, cell)]
     if doubles := len(once) - len(cells):
-        remarks.append(f"{doubles} of {len(once)} cells stand in the file again, and count once")
+        remarks.append(f"{doubles} of {len(once)} cells are duplicates in the file, and count once")
     part = PartMesh(
         raw.points[used],
         flat.reshape(cells.shape),

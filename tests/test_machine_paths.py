@@ -62,7 +62,7 @@ def test_limits_of_the_path_hold_for_the_fastest_motion():
     ("joint", "end", "says"),
     [
         ({}, 2.0, "expected limits of motors"),
-        ({"moment_limit": 0.05}, 2.0, 'end = 2 s of "inverse", found motor shoulder, which lacks a factor'),
+        ({"moment_limit": 0.05}, 2.0, 'end = 2 s of "inverse", found motor shoulder, with required/available ='),
         ({"moment_limit": 0.05}, 0.4, "expected a path that is over before"),
     ],
 )

@@ -178,8 +178,8 @@ def test_pieces_make_up_the_link():
 @pytest.mark.parametrize(
     ("keys", "says"),
     [
-        ({"actuation_points": [{"body": "link1"}]}, "expected none beside bodies in pieces"),
-        ({"motors": "frame"}, 'motors: expected "section" beside bodies in pieces'),
+        ({"actuation_points": [{"body": "link1"}]}, "expected none with subdivided bodies"),
+        ({"motors": "frame"}, 'motors: expected "section" with subdivided bodies'),
         ({"trajectory": [{"name": "turn", "angle": "link1", "value": "t"}]}, "expected a point or a joint"),
         ({"joint": DRIVEN, "trajectory": [{"name": "turn", "joint": "O", "value": "t"}],
           "analysis": [{"name": "held", "kind": "fcid", "shape": "zero", "end": 1.0, "output_step": 0.1}]},
@@ -199,7 +199,7 @@ def test_what_cannot_be_had_is_refused(keys, says):
         (
             link(geometry={"kind": "solid", "length": 1.0,
                            "section": {"shape": "rectangle", "height": 0.01, "width": 0.02}}, mesh={}),
-            'geometry.kind: expected "beam" of a body in pieces',
+            'geometry.kind: expected "beam" of a subdivided body',
         ),
     ],
 )  # fmt: skip
@@ -211,5 +211,5 @@ def test_links_that_cannot_be_cut_are_refused(of, says):
 def test_pieces_of_a_rigid_body_are_refused():
     rigid = {"mass": 1.0, "inertia": 0.1, "center": [0.5, 0.0], "points": {"root": [0.0, 0.0], "tip": [1.0, 0.0]}}
     bodies = [{"name": name, "rigid": rigid, "pieces": 2} for name in ("link1", "link2")]
-    with pytest.raises(InputError, match='expected "pieces" beside "link" alone, found "rigid"'):
+    with pytest.raises(InputError, match='expected "pieces" with "link" alone, found "rigid"'):
         pendulum(None, body=bodies)

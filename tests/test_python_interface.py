@@ -260,7 +260,7 @@ def test_verdict_says_what_the_file_holds(folder, tmp_path, capsys):
     square = (moment[1:] ** 2 + moment[:-1] ** 2).mean() / 2
     assert motor.rms_moment == pytest.approx(np.sqrt(square), rel=1e-5)
     assert found.feasible is False
-    assert found.answer.startswith("beyond their limits: motor shoulder (factor ")
+    assert found.answer.startswith("limits exceeded: motor shoulder (required/available = ")
     largest = pytest.approx(np.linalg.norm(deflection, axis=1).max(), rel=1e-5)
     assert found.deflection == (largest, "arm.tip", pytest.approx(0.0, abs=5e-4))
     assert any("slower path" in text for text in found.advice)

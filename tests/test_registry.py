@@ -69,7 +69,7 @@ KEYS = {{
 TURN = {{"name": "turn", "kind": "turntable", "end": 1.0, "output_step": 0.25, "rate": 2.0, "body": "rod"}}
 
 
-def refused(**analysis):
+def rejected(**analysis):
     try:
         ffrobot.make_scene(**KEYS, analysis=[TURN | analysis])
     except ffrobot.InputError as error:
@@ -81,9 +81,9 @@ np.testing.assert_allclose(results["turn/bodies/rod/angle"], 2.0 * np.linspace(0
 np.testing.assert_allclose(results["turn/points/rod.tip/position"][-1], [np.cos(2.0), np.sin(2.0)])
 assert dict(results.attributes("turn"))["kind"] == "turntable"
 assert "integration of turn, algebraic" in results.skipped
-assert 'expected one of the bodies "rod", found "rd"' in refused(body="rd")
-assert 'expected the key "shape" only in kind = "fcid", found kind = "turntable"' in refused(shape="zero")
-assert 'expected the key "rate" in kind = "turntable", found none' in refused(rate=None)
+assert 'expected one of the bodies "rod", found "rd"' in rejected(body="rd")
+assert 'expected the key "shape" only in kind = "fcid", found kind = "turntable"' in rejected(shape="zero")
+assert 'expected the key "rate" in kind = "turntable", found none' in rejected(rate=None)
 assert "Turntable" in schema("scene")["$defs"]
 """
 

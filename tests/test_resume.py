@@ -45,7 +45,7 @@ def test_a_resumed_run_is_the_uninterrupted_one(arm, stopped, keys):
         reached = file[stopped]["resume/checkpoint"].attrs["time"]
         outputs = len(file[stopped]["time"])
     assert 0.03 <= reached < END
-    assert message.endswith(f"solve(…, resume=True) goes on from t = {reached:.9g} s")
+    assert message.endswith(f"solve(…, resume=True) resumes from t = {reached:.9g} s")
     watcher = Stops("none", END)
     results = go_on(scene, watcher)
     assert watcher.asked[0] == (f'analysis "{stopped}"', reached)
@@ -87,14 +87,14 @@ def test_implicit_methods_go_on_within_the_tolerance(arm, integrator):
 
 def inverse_alone(scene):
     text = scene.read_text(encoding="utf-8")
-    scene.write_text(text[: text.index("# The same moments and voltages")], encoding="utf-8")
+    scene.write_text(text[: text.index("# The same torques and voltages")], encoding="utf-8")
 
 
 def test_max_steps_may_be_raised_and_count_anew(arm):
     scene = arm(**{"tolerance = 1e-7": 'tolerance = 1e-7\nintegrator = "dop853"\nmax_steps = 800'})
     inverse_alone(scene)
     for _ in range(2):
-        with pytest.raises(ffrobot.SolveError, match=r"raise max_steps.*goes on from t = 0\.0"):
+        with pytest.raises(ffrobot.SolveError, match=r"raise max_steps.*resumes from t = 0\.0"):
             go_on(scene)  # from the start where there is nothing to go on with
     edit(scene, {"max_steps = 800": "max_steps = 100_000"})
     results = go_on(scene)
@@ -135,7 +135,7 @@ def test_on_the_command_line(arm, ffrobot):
     command = ["solve", "scene.toml", "-o", "r.h5", "--resume"]
     messages = [ffrobot(*command, cwd=scene.parent) for _ in range(3)]
     assert [done.returncode for done in messages] == [1, 0, 0]
-    assert "; ffrobot solve scene.toml -o r.h5 --resume goes on from t = 0.0" in messages[0].stderr
+    assert "; ffrobot solve scene.toml -o r.h5 --resume resumes from t = 0.0" in messages[0].stderr
     assert messages[2].stdout == "r.h5: complete, nothing to go on with\n"
 
 

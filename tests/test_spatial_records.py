@@ -180,7 +180,7 @@ MISTAKES = {
     ),
     "value of a point": (
         put("trajectory", value="t"),
-        'expected the keys "x", "y", "z", .* beside "point", found "x", "y", "value"',
+        'expected the keys "x", "y", "z", .* with "point", found "x", "y", "value"',
     ),
     "two orientations": (
         put("trajectory", rpy=["0", "0", "t"], rotation_vector=["0", "0", "t"]),
@@ -188,12 +188,12 @@ MISTAKES = {
     ),
     "direction of nothing": (
         put("trajectory", direction=["1", "0", "0"]),
-        'expected the key "tool_axis" beside direction',
+        'expected the key "tool_axis" with direction',
     ),
-    "tool axis of nothing": (put("trajectory", tool_axis=[1.0, 0.0, 0.0]), 'expected the key "tool_axis" only beside'),
+    "tool axis of nothing": (put("trajectory", tool_axis=[1.0, 0.0, 0.0]), 'expected the key "tool_axis" only with'),
     "reference of nothing": (
         put("trajectory", reference_rotation_vector=[0.0, 0.0, 1.0]),
-        'expected the key "reference_rotation_vector" only beside rotation_vector, found it alone',
+        'expected the key "reference_rotation_vector" only with rotation_vector, found it alone',
     ),
     "direction that vanishes": (
         put("trajectory", tool_axis=[1.0, 0.0, 0.0], direction=["0", "0", "t-0.5"]),
@@ -251,9 +251,9 @@ MISTAKES = {
         put("joint", type="cylindrical", rotor_inertia=1e-3),
         'expected the key "rotor_inertia" only in',
     ),
-    "gear that gives without a rotor": (
+    "compliant gear without a rotor": (
         put("joint", stiffness=100.0),
-        "expected a rotor_inertia above 0 beside stiffness, found none",
+        "expected a rotor_inertia above 0 with stiffness, found none",
     ),
     "load on a joint with two coordinates": (
         add("load", joint="wrist", moment="1.0"),
@@ -274,7 +274,7 @@ def test_mistakes_are_told(name):
 def test_planar_readers_refuse_scenes_in_space(tmp_path):
     path = tmp_path / "scene.toml"
     path.write_text(ARM)
-    with pytest.raises(InputError, match='space: expected "planar", found "spatial": scenes in space run by'):
+    with pytest.raises(InputError, match='space: expected "planar", found "spatial": 3D scenes run by'):
         load_scene(path)
 
 

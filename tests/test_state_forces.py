@@ -130,7 +130,7 @@ def test_what_is_no_function(force, complaint):
 
 
 def test_stands_alone():
-    with pytest.raises(ffrobot.InputError, match='expected "force" alone beside "point", found "x", "force"'):
+    with pytest.raises(ffrobot.InputError, match='expected "force" alone with "point", found "x", "force"'):
         scene(spring, joint=HINGE, analysis=FREE, load=[{"point": "arm.tip", "x": "1", "force": spring}])
 
 

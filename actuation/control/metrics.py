@@ -31,9 +31,9 @@ GROWTH = 4.0  # of the vibration's peak, from the second quarter of a run to its
 AT_REST = 1e-6  # of the way to the last place
 
 DEFINITIONS = (
-    "settled: when the distance of the tip from its place stays below 5 % of its largest; overshoot: beyond the last"
-    " place, on along the way to it; vibration: peak to peak in the last period of the lowest frequency of the robot"
-    " with its joints controlled or locked, less what is slower; at end: distance from its place at the end"
+    "settling time: the tip error stays below 5 % of its largest value; overshoot: beyond the final position along"
+    " the path. Vibration: peak to peak in the last period of the lowest frequency with controlled or locked joints,"
+    " without slower motion; final: tip error at the end"
 )
 
 

@@ -243,8 +243,8 @@ def _candidates(scene_path: Path, wanted: Placement, link: PatchableLink, count:
     gap = ceil(length / spacing * (1 - 1e-9))
     if steps < 0 or steps + 1 <= (count - 1) * gap:
         raise InputError(
-            f'{scene_path}: placement.count: expected patches that fit beside each other on "{link.name}"'
-            f" ({link.length:g} m, centres every {spacing:g} m), found {count} of {length:g} m"
+            f'{scene_path}: placement.count: expected patches that fit side by side on "{link.name}"'
+            f" ({link.length:g} m, centers every {spacing:g} m), found {count} of {length:g} m"
         )
     centers = length / 2 + spacing * np.arange(steps + 1)
     columns = np.zeros((len(link.stiffness), len(centers)))

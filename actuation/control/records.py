@@ -61,9 +61,9 @@ class Sensor(Record):
         allowed["motor"] = allowed["joint"]
         known = allowed.get(subject, ("value", "rate", "acceleration"))
         if self.measure not in known:
-            raise ValueError(f'expected one of {quoted(known)} as measure beside "{subject}", found "{self.measure}"')
+            raise ValueError(f'expected one of {quoted(known)} as measure with "{subject}", found "{self.measure}"')
         if self.capacitance is not None and subject != "pzt":
-            raise ValueError(f'expected the key "capacitance" only beside "pzt", found it beside "{subject}"')
+            raise ValueError(f'expected the key "capacitance" only with "pzt", found it with "{subject}"')
         return self
 
     def references(self) -> Iterator[Reference]:

@@ -47,7 +47,7 @@ def _link(context: ActuatedSpatialContext, name: str) -> PatchableLink:
     spatial = context.model.tree.nodes[context.model.tree.index[name]].body
     if len(of_link.arrays) > 1:
         raise InputError(
-            f'{path}: placement.body: expected a link with one layout of patches in space, found "{name}" with'
+            f'{path}: placement.body: expected a link with one layout of patches in 3D, found "{name}" with'
             f" {len(of_link.arrays)}"
         )
     ((label, array),) = of_link.arrays.items()

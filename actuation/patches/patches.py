@@ -239,6 +239,6 @@ def check_edges(key: str, edges: Array, length: float) -> None:
             first, second = sorted((k + 1, following + 1))
             (a, b), (c, d) = edges[first - 1], edges[second - 1]
             raise InputError(
-                f"{key}: expected patches beside each other, found patch {first} ({a:g} to {b:g} m) and patch {second}"
+                f"{key}: expected patches side by side, found patch {first} ({a:g} to {b:g} m) and patch {second}"
                 f" ({c:g} to {d:g} m) on the same place"
             )

@@ -69,7 +69,7 @@ class PatchKeys(Record):
         if isinstance(self.limit, tuple) and len(self.limit) != self.patch_count:
             raise ValueError(f"expected {self.patch_count} limits, one for each patch, found {len(self.limit)}")
         if self.adds_mass and self.density is None:
-            raise ValueError(f'expected the key "density" beside structural = {_toml(self.structural)}, found none')
+            raise ValueError(f'expected the key "density" with structural = {_toml(self.structural)}, found none')
         if self.mode_weights is not None and self.point_weights is not None:
             raise ValueError('expected one of the keys "mode_weights" and "point_weights", found both')
         for weights in (self.mode_weights, self.point_weights and tuple(self.point_weights.values())):

@@ -86,8 +86,8 @@ def check_sections(key: str, body: ModalBody, normal: Literal["y", "z"], *, twis
     """Raise `InputError` where the modal body does not say what patches on faces with that normal need to know."""
     if np.isnan(link_sections(body).extent(normal)).any():
         raise InputError(
-            f"{key}: expected a modal body file that says how wide the link is (stations/width), found one of an"
-            " earlier version: make it again from its link file with `ffrobot link`"
+            f"{key}: expected a modal body file with the width of the link (stations/width), found one of an earlier"
+            " version: recompute it from its link file with `ffrobot link`"
         )
     if twists and body.stations.outline is None:
         raise InputError(

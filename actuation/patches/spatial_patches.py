@@ -203,7 +203,7 @@ def _together(
     """Of layouts side by side: all modal forces that are left count alike."""
     for layout in layouts:
         if layout.mode_weights is not None or layout.point_weights is not None:
-            beside = f'beside other layouts on "{layout.body}"'
+            beside = f'with other layouts on "{layout.body}"'
             raise InputError(f"{_key(path, layout.label)}: expected no weights {beside}, found them")
     Phi_V = reached.seen(per_volt).T
     return Reach(

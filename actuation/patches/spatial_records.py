@@ -57,25 +57,25 @@ class SpatialPztLayout(PatchKeys):
             self._check_fibres(given)
         if self.coupling == "surface" and (given or self.bends != "in-plane"):
             raise ValueError(
-                'expected bends = "in-plane" and no fibres beside coupling = "surface": link files outline patches of'
+                'expected bends = "in-plane" and no fibers with coupling = "surface": link files outline patches of'
                 f" plain ceramic on faces ±y alone; found {self.bends if not given else given[0]}"
             )
         allowed = FACES.get(self.bends)
         if self.face is not None and allowed is not None and self.face not in allowed:
-            raise ValueError(f'expected face {quoted(allowed)} beside bends = "{self.bends}", found "{self.face}"')
+            raise ValueError(f'expected face {quoted(allowed)} with bends = "{self.bends}", found "{self.face}"')
 
     def _check_plain(self) -> None:
         super().check_constants()
         if self.bends == "twist":
             raise ValueError(
-                f'expected the keys {quoted(OF_FIBRES)} beside bends = "twist", found none: plain piezoceramic strains'
-                " alike in all directions of its plane and twists at no angle; fibres (macro fibre composites) do"
+                f'expected the keys {quoted(OF_FIBRES)} with bends = "twist", found none: plain piezoceramic strains'
+                " alike in all directions of its plane and twists at no angle; fibers (macro fiber composites) do"
             )
 
     def _check_fibres(self, given: list[str]) -> None:
         missing = [key for key in OF_FIBRES if key not in given]
         if missing:
-            raise ValueError(f"expected the keys {quoted(missing)} beside {given[0]}, found none")
+            raise ValueError(f"expected the keys {quoted(missing)} with {given[0]}, found none")
         assert self.modulus_across is not None
         assert self.poissons_ratio is not None
         most = (self.modulus / self.modulus_across) ** 0.5
@@ -89,7 +89,7 @@ class SpatialPztLayout(PatchKeys):
             raise ValueError("expected d33 or d31 other than 0, found neither: such patches do nothing")
         if self.bends == "twist" and shear <= NO_SHEAR * along:
             raise ValueError(
-                f'expected fibres at an angle that shear under a voltage beside bends = "twist", found fibre_angle ='
+                f'expected fibers at an angle that shear under a voltage with bends = "twist", found fibre_angle ='
                 f" {self.fibre_angle:g} with d33 = {self.d33:g}, d31 = {self.d31:g}: along, across or alike in both"
                 " directions they do not; 45*deg does most"
             )

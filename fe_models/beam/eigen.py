@@ -48,7 +48,7 @@ def lowest_modes(K: sp.csr_matrix, M: sp.csr_matrix, strain: sp.csr_matrix, coun
     rounding = np.max(np.abs(np.einsum("ik,ik->k", X, K @ X) / omega2 - 1))
     if not rounding < ROUNDING_LIMIT:
         raise SolveError(
-            f"eigenproblem of size {K.shape[0]}: rounding errors move ω² by {rounding:.1e}, expected less than "
+            f"eigenproblem of size {K.shape[0]}: round-off errors move ω² by {rounding:.1e}, expected less than "
             f"{ROUNDING_LIMIT:g}; use fewer elements, or no very short ones"
         )
     order = np.argsort(omega2, kind="stable")
@@ -87,7 +87,7 @@ def _krylov_schur(K: sp.csr_matrix, M: sp.csr_matrix, count: int) -> Array:
     if converged < count:
         raise SolveError(
             f"eigenproblem of size {K.shape[0]}: {converged} of {count} modes converged to {TOLERANCE:g}; "
-            "ask for fewer modes or use fewer elements"
+            "request fewer modes or use fewer elements"
         )
     X = np.empty((K.shape[0], count))
     vector = solver.getOperators()[0].createVecRight()

@@ -182,7 +182,7 @@ class _Link(Record):
         if self.reference.condition == "craig-bampton" and not self.modes.attachment_modes:
             raise ValueError(
                 'modes.attachment_modes: expected true, or nothing, with condition = "craig-bampton", whose constraint'
-                " modes stand for them, found false"
+                " modes replace them, found false"
             )
         return self
 

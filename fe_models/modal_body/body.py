@@ -210,7 +210,7 @@ def _check_spin(body: ModalBody) -> None:
     if missing:
         if len(missing) < len(parts):
             known = ", ".join(name for name in parts if name not in missing)
-            _fail(body, f"{missing[0]}: expected beside {known}, found none")
+            _fail(body, f"{missing[0]}: expected together with {known}, found none")
         return
     J, h, S = parts.values()
     if not J >= 0:

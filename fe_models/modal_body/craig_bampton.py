@@ -122,7 +122,7 @@ def interface_coordinates(
     rows = np.concatenate(motions)
     if len(rows) != static:
         raise InputError(
-            f"craig-bampton: expected interfaces that can move by themselves ({', '.join(names)}), found only {static}"
+            f"craig-bampton: expected interfaces that can move freely ({', '.join(names)}), found only {static}"
             " independent static shapes: interfaces too near to each other, or to the root"
         )
     omega = np.sqrt(omega2)

@@ -107,7 +107,7 @@ def lowest_modes(flexibility: Inverse, mass: Mass, count: int, known: Array) -> 
     if solver.getConverged() < count:
         raise SolveError(
             f"eigenproblem of size {size}: {solver.getConverged()} of {count} modes converged to {TOLERANCE:g}; "
-            "ask for fewer modes"
+            "request fewer modes"
         )
     found = np.empty((3 * model.owned, count))
     vector = model.vector()

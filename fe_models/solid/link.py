@@ -171,7 +171,7 @@ def _materials(link: SolidLink, solid: SolidMesh, path: Path) -> MaterialMap:
         inside = [other.group for other in ordered[k + 1 :]]
         if set(solid.cells_of(region.group)) <= {tag for group in inside for tag in solid.cells_of(group)}:
             raise InputError(
-                f"{path}: region.group of {region.group}: expected a volume group with cells of its own, found all of"
+                f"{path}: region.group of {region.group}: expected a volume group with own cells, found all of"
                 f" them in {', '.join(inside)} too"
             )
     find = solid.cell_tags.find

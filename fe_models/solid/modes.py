@@ -84,7 +84,7 @@ def wanted_modes(link: SolidLink, flexibility: Inverse, mass: Mass, read: Reader
         if X.shape[1] == most < available:
             raise InputError(
                 f"{where}: modes.{key}: expected {needed} modes of family {quoted(link.families)} among the lowest"
-                f" {X.shape[1]}, found {len(hits)} (short, wide parts hardly bend): ask for fewer"
+                f" {X.shape[1]}, found {len(hits)} (short, wide parts hardly bend): request fewer"
             )
         share = max(len(hits), 1) / X.shape[1]
         batch = int(np.ceil((needed - len(hits)) / share)) + 2

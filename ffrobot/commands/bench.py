@@ -27,28 +27,30 @@ def _numbers(context: click.Context, parameter: click.Parameter, value: str | No
 
 @click.command()
 @click.argument("scene_file", metavar="[SCENE.toml]", required=False, type=FILE)
-@click.option("-o", "--output", metavar="DIR", type=FILE, help="Folder [SCENE.bench beside the scene; ./bench].")
-@click.option("--analysis", metavar="NAME", help="Of the scene [the first that integrates].")
-@click.option("--integrators", metavar="A,B", callback=_texts, help="Which [all, and auto].")
-@click.option("--tolerances", metavar="T,T", callback=_numbers, help="Which [1e-2 … 1e-7].")
-@click.option("--repeat", metavar="N", type=click.IntRange(1), default=5, show_default=True, help="Repetitions.")
+@click.option("-o", "--output", metavar="DIR", type=FILE, help="Folder [SCENE.bench next to the scene; ./bench].")
+@click.option("--analysis", metavar="NAME", help="Analysis of the scene [the first that integrates].")
+@click.option("--integrators", metavar="A,B", callback=_texts, help="Integrators [all, and auto].")
+@click.option("--tolerances", metavar="T,T", callback=_numbers, help="Tolerances [1e-2 … 1e-7].")
+@click.option(
+    "--repeat", metavar="N", type=click.IntRange(1), default=5, show_default=True, help="Number of repetitions."
+)
 @click.option(
     "--budget",
     metavar="S",
     type=click.FloatRange(0.0, min_open=True),
     default=20.0,
     show_default=True,
-    help="Seconds that one run may take; longer ones stay in the tables without errors.",
+    help="Largest duration of a run, s; longer ones stay in the tables without errors.",
 )
 @click.option(
     "--part",
     "parts",
     multiple=True,
     type=click.Choice([*PARTS, PEER]),
-    help="This part only; may be repeated [all but the peer].",
+    help="Single part; repeatable [all but the peer].",
 )
-@click.option("--peer", type=click.Choice(["exudyn"]), help="Measure this program too, as part peer.")
-@click.option("--peer-python", metavar="PYTHON", type=FILE, help="Interpreter that has the peer [this one].")
+@click.option("--peer", type=click.Choice(["exudyn"]), help="Other program that is measured too, as part peer.")
+@click.option("--peer-python", metavar="PYTHON", type=FILE, help="Interpreter with the peer [this one].")
 @click.option("--source", metavar="DIR", type=FILE, default=Path(), help="ffrobot's source tree [.].")
 @python_option
 @logging_options
@@ -70,7 +72,7 @@ def bench(
     With a scene: one of its analyses with every integrator at every tolerance, against a reference that two integrators
     agree on; then the error of its mesh, of its number of modes and of time integration. Without one, in ffrobot's
     source tree: the same for the two cases of the paper, how time grows with modes, links and outputs, and ratios to
-    the two-link case written by hand. Tables as CSV and JSON, figures as PNG and PDF.
+    hand-written code for the two-link case. Tables as CSV and JSON, figures as PNG and PDF.
     """
     from ..bench.campaign import Campaign, Settings
     from ..bench.precision import INTEGRATORS, TOLERANCES

@@ -14,21 +14,21 @@ from .protect import protect
 
 @click.command()
 @click.argument("scene_file", metavar="SCENE.toml", type=FILE)
-@click.option("--of", "goals", metavar="GOAL", multiple=True, required=True, help="A scalar result; repeatable.")
-@click.option("--to", "keys", metavar="KEY,KEY …", multiple=True, required=True, help="Numbers; repeatable.")
+@click.option("--of", "goals", metavar="RESPONSE", multiple=True, required=True, help="Scalar response; repeatable.")
+@click.option("--to", "keys", metavar="KEY,KEY …", multiple=True, required=True, help="Parameters; repeatable.")
 @click.option(
     "--step",
     type=click.FloatRange(1e-6, 0.2),
     default=0.01,
     show_default=True,
-    help="Largest change of a key, of its value.",
+    help="Largest change of a parameter, relative to its value.",
 )
 @click.option(
     "--tolerance",
     type=click.FloatRange(1e-10, 1e-3),
-    help="Of the runs, where the scene has a larger one.  [default: 1e-07 where steps are repeated, 1e-09 elsewhere]",
+    help="Tolerance of the runs, if the scene has a larger one.  [default: 1e-07 with reused time steps, else 1e-09]",
 )
-@click.option("--figures/--no-figures", default=True, show_default=True, help="Whether tornado diagrams are drawn.")
+@click.option("--figures/--no-figures", default=True, show_default=True, help="Tornado diagrams.")
 @runs_options("SCENE.sensitivity")
 @python_option
 @logging_options
@@ -43,7 +43,7 @@ def sensitivity(
     figures: bool,
     output: Path | None,
 ) -> None:
-    """Say what matters: derivatives of scalar results by numbers of a scene and its links.
+    """Sensitivity analysis: derivatives of scalar responses by parameters of a scene and its links.
 
     \b
     --of "peak joints.elbow.moment"             largest absolute value; rms, mean, integral likewise
@@ -53,10 +53,10 @@ def sensitivity(
     --of "frequency 2 arm"  --of "mass arm"     of a link
     --to payload.0.mass,links.arm.geometry.length     keys as in sweeps
 
-    Derivatives are differences of runs that take the same steps in time, where these can be repeated, and extrapolated
-    central ones elsewhere, with an estimate of their error, beside them percent per percent.
-    A peak is followed at its own time; where another one overtakes it, that is told. The same command takes up what
-    was stopped, and computes again what has changed.
+    Derivatives are finite differences of runs with the same time steps if these can be reused, and extrapolated
+    central differences otherwise, with error estimates and in percent per percent. A peak is followed at its own
+    time; a note reports if another peak becomes the largest. The same command resumes a stopped study and recomputes
+    changed runs.
     """  # noqa: D301 (click wants the backspace itself)
     from ..design.record import print_sensitivity, write_sensitivity
     from ..design.sensitivity import sensitivity as find
@@ -85,44 +85,50 @@ METHODS = ("auto", "slsqp", "trust-constr", "differential-evolution", "all")
 
 @click.command()
 @click.argument("scene_file", metavar="SCENE.toml", type=FILE)
-@click.option("--minimise", "--minimize", metavar="GOAL", help="What shall be least, a goal as of sensitivity.")
-@click.option("--maximise", "--maximize", metavar="GOAL", help="Or what shall be largest.")
-@click.option("--against", metavar="GOAL", help="Of which less is wanted too: a curve of both, the least of each.")
-@click.option("--points", type=click.IntRange(3, 1000), default=8, show_default=True, help="Designs on that curve.")
-@click.option("--subject-to", metavar='"GOAL <= NUMBER"', multiple=True, help='A limit, or with ">="; repeatable.')
-@click.option("--vary", metavar="KEY=LOW:HIGH", multiple=True, required=True, help="What may change; repeatable.")
+@click.option("--minimise", "--minimize", metavar="RESPONSE", help="Response to minimize, as in sensitivity.")
+@click.option("--maximise", "--maximize", metavar="RESPONSE", help="Response to maximize.")
+@click.option("--against", metavar="RESPONSE", help="Second response to minimize: Pareto front of both.")
+@click.option(
+    "--points", type=click.IntRange(3, 1000), default=8, show_default=True, help="Number of designs on that front."
+)
+@click.option("--subject-to", metavar='"RESPONSE <= NUMBER"', multiple=True, help='Limit, or with ">="; repeatable.')
+@click.option(
+    "--vary", metavar="KEY=LOW:HIGH", multiple=True, required=True, help="Parameter with its range or set; repeatable."
+)
 @click.option("--method", type=click.Choice(METHODS), default="auto", show_default=True, help="The optimiser.")
 @click.option("--starts", type=click.IntRange(1, 1000), default=1, show_default=True, help="Searches along gradients.")
-@click.option("--seed", type=click.IntRange(0, 2**32 - 1), default=0, show_default=True, help="Of what is drawn.")
-@click.option("--runs", "most", type=click.IntRange(1, 100_000), default=1000, show_default=True, help="At most.")
+@click.option("--seed", type=click.IntRange(0, 2**32 - 1), default=0, show_default=True, help="Seed of random numbers.")
+@click.option(
+    "--runs", "most", type=click.IntRange(1, 100_000), default=1000, show_default=True, help="Largest number of runs."
+)
 @click.option(
     "--tolerance",
     type=click.FloatRange(1e-10, 1e-3),
     default=1e-8,
     show_default=True,
-    help="Of the runs, where the scene has a larger one.",
+    help="Tolerance of the runs, if the scene has a larger one.",
 )
-@click.option("--figures/--no-figures", default=True, show_default=True, help="Whether the designs are drawn.")
+@click.option("--figures/--no-figures", default=True, show_default=True, help="Diagrams of the designs.")
 @runs_options("SCENE.optimum")
 @python_option
 @logging_options
 def optimise(scene_file: Path, output: Path | None, figures: bool, **options: Any) -> None:  # noqa: ANN401 (of `optimise.optimise`)
-    """Find the best design: the numbers and rows of catalogues with which a goal is least, within limits.
+    """Optimisation: parameters and discrete choices that minimize an objective within limits.
 
     \b
-    --minimise mass                                 goals as of "ffrobot sensitivity"
+    --minimise mass                                 responses as in "ffrobot sensitivity"
     --subject-to "peak joints.elbow.moment <= 20"
     --vary links.arm.geometry.section.outer=0.02:0.08
     --vary joint.1.gear_ratio=10:200:log            steps in the logarithm
-    --vary trajectory.tip.duration,analysis.inverse.end=0.5:2     one number for several keys
-    --vary "joint.1.gear_ratio in {50, 80, 100}"    a catalogue
+    --vary trajectory.tip.duration,analysis.inverse.end=0.5:2     one parameter for several keys
+    --vary "joint.1.gear_ratio in {50, 80, 100}"    a discrete set
     --vary "joint.1.gear_ratio,joint.1.rotor_inertia in {50:2e-5, 100:1.2e-5}"     rows of one
     --minimise mass --against "rms tip_error" --points 6     the least mass for six tip errors (Pareto front)
 
-    Numbers are sought along gradients from the scene's own values (and --starts - 1 others), catalogues by trying all
-    rows or by differential evolution. The same command takes up what was stopped. The best design's scene is in
-    DIR/best, all designs with their goals in DIR/designs.csv and, as parallel coordinates, DIR/designs.png. Exit code 1
-    where no design keeps the limits.
+    Gradient searches start from the scene's own values (and --starts - 1 others); discrete sets are enumerated or
+    searched by differential evolution. The same command resumes a stopped study. DIR/best has the optimal scene,
+    DIR/designs.csv all designs with their responses, DIR/designs.png their parallel coordinates. The exit code is 1
+    if no design satisfies the limits.
     """  # noqa: D301 (click wants the backspace itself)
     from ..common.errors import SolveError
     from ..design.optimise import optimise as find
@@ -162,7 +168,7 @@ def _trade_off(scene_file: Path, folder: Path, points: int, options: dict[str, A
 
     method, starts, maximised, _ = (options.pop(key) for key in ("method", "starts", "maximise", "seed"))
     if maximised is not None or options["minimise"] is None:
-        raise InputError("--against: expected --minimise GOAL beside it: of both goals less is wanted")
+        raise InputError("--against: expected --minimise RESPONSE with it: both responses are minimized")
     if method not in ("auto", "slsqp") or starts != 1:
         raise InputError(
             "--against: expected --method slsqp and one start: each search begins at its neighbour's design"

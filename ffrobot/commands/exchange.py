@@ -28,10 +28,10 @@ POSITIVE = click.FloatRange(0.0, min_open=True)
     "--flexible",
     metavar="LINK=FILE.toml",
     multiple=True,
-    help="A link, and the link file that says what it is; repeatable.",
+    help="Flexible link with its link file; repeatable.",
 )
-@click.option("--force", is_flag=True, help="Replace files that are there.")
-@click.option("--fix-inertia", is_flag=True, help="Change inertias that no body has, as little as can be, and say so.")
+@click.option("--force", is_flag=True, help="Replacement of existing files.")
+@click.option("--fix-inertia", is_flag=True, help="Smallest correction of unphysical inertias, with a report.")
 @click.option(
     "--density",
     metavar="KG/M3",
@@ -42,7 +42,7 @@ POSITIVE = click.FloatRange(0.0, min_open=True)
     "--radius",
     metavar="M",
     type=POSITIVE,
-    help="With --density: of cylinders along links whose shapes are missing.",
+    help="Radius of cylinders along links without shapes, with --density.",
 )
 @click.option(
     "--keep-rest",
@@ -63,9 +63,8 @@ def import_(
 ) -> None:
     """Make a scene in space of a robot description (URDF), a modal body or waypoints of those of other programs.
 
-    DIR/scene.toml gets bodies and joints: every link rigid, as its <inertial> says, unless --flexible names a link
-    file for it; links that fixed joints hold together are one body, what the root carries that way stands still.
-    What is to be computed is for you to append.
+    DIR/scene.toml has bodies and joints. Links are rigid with their <inertial> unless --flexible names a link file.
+    Fixed joints merge links to one body, or fix them to the ground. Append trajectories and analyses yourself.
 
     BODY.SID_FEM (standard input data, Wallrapp) and BODY.fem (MBDyn) become modal body files, which scenes take as
     `modal = "BODY.h5"`.
@@ -125,22 +124,22 @@ def _links(pairs: tuple[str, ...]) -> Mapping[str, Path]:
     "file_format",
     metavar="FORMAT",
     required=True,
-    help="Of results csv, joint-trajectory, rosbag2, fmu; of scenes urdf, fmu; of bodies sid, mbdyn, craig-bampton,"
-    " exudyn.",
+    help="Format: of results csv, joint-trajectory, rosbag2, fmu; of scenes urdf, fmu; of bodies sid, mbdyn,"
+    " craig-bampton, exudyn.",
 )
 @click.option(
     "--analysis",
     metavar="NAME",
-    help="Of this analysis; if absent the first with moving joints, of fmu the first linear or forward one.",
+    help="Analysis; default: the first with moving joints, for fmu the first linear or forward one.",
 )
-@click.option("-o", "--output", metavar="FILE", type=FILE, help="Where to write [beside the input, by analysis].")
-@click.option("--force", is_flag=True, help="Replace a file that is there.")
+@click.option("-o", "--output", metavar="FILE", type=FILE, help="Output file [next to the input, by analysis].")
+@click.option("--force", is_flag=True, help="Replacement of an existing file.")
 @logging_options
 def export(file: Path, file_format: str, analysis: str | None, output: Path | None, *, force: bool) -> None:
-    """Write results, a modal body or a scene in a format of other programs.
+    """Export results, a modal body or a scene in a format of other programs.
 
     \b
-    csv               time, and coordinate, rate and moment of every joint, with all digits
+    csv               time, and position, velocity and torque of every joint, with all digits
     joint-trajectory  JSON in the layout of ROS 2's trajectory_msgs/JointTrajectory, with effort
     rosbag2           a folder, the bag of ROS 2 with that message; needs rosbags (extra "ros")
     fmu               FMI 2.0, model exchange and co-simulation, of a linear model; with C sources, compiled where
@@ -149,8 +148,8 @@ def export(file: Path, file_format: str, analysis: str | None, output: Path | No
     mbdyn             .fem of MBDyn's modal joint
     craig-bampton     .npz with M, K, C in interface coordinates and fixed-interface modes
     exudyn            .npz of EXUDYN's ObjectFFRFreducedOrderInterface
-    urdf              of a scene in space, for viewers: links rigid, shapes simple
-    fmu               of a scene: FMI 2.0, co-simulation, of a forward motion under moments and voltages
+    urdf              of a 3D scene, for viewers: links rigid, shapes simple
+    fmu               of a scene: FMI 2.0, co-simulation, of a forward motion under torques and voltages
     """  # noqa: D301 (click wants the backspace itself)
     from ..common.hdf5 import reading
     from ..exchange.export import export_file

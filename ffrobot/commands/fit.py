@@ -13,11 +13,11 @@ from .protect import protect
 
 @click.command()
 @click.argument("file", metavar="LINK.toml|SCENE.toml", type=FILE)
-@click.option("--measured", metavar="MODES.csv", type=FILE, required=True, help="Table: mode, frequency (Hz), …")
+@click.option("--measured", metavar="MODES.csv", type=FILE, required=True, help="Table with mode, frequency (Hz), …")
 @click.option("--vary", metavar="KEY,KEY …", multiple=True, required=True, help="Keys to fit; repeatable.")
-@click.option("--motors", type=click.Choice(["free", "held"]), help="Of a robot, as it was measured [free].")
-@click.option("-o", "--output", metavar="FILE.toml", type=FILE, help="Where to write [FILE.fitted.toml].")
-@click.option("--force", is_flag=True, help="Replace files of an earlier fit.")
+@click.option("--motors", type=click.Choice(["free", "held"]), help="Motors of a robot during the measurement [free].")
+@click.option("-o", "--output", metavar="FILE.toml", type=FILE, help="Output file [FILE.fitted.toml].")
+@click.option("--force", is_flag=True, help="Replacement of files of an earlier fit.")
 @python_option
 @logging_options
 def fit(
@@ -28,14 +28,14 @@ def fit(
     output: Path | None,
     force: bool,
 ) -> None:
-    """Fit keys of a link or a scene to measured natural frequencies; new files have what was found.
+    """Fit keys of a link or a scene to measured natural frequencies, and write new files.
 
     \b
     ffrobot fit arm.toml --measured modes.csv --vary material.youngs_modulus
     ffrobot fit scene.toml --measured robot.csv --vary joint.elbow.stiffness,links.arm.material.youngs_modulus
 
-    A link vibrates under its reference condition, a robot at the start of its scene. KEY=KEY: changed by one factor.
-    Says how sure the values are; keys that the frequencies cannot tell apart are refused.
+    A link vibrates under its reference condition, a robot at the start of its scene. KEY=KEY: common factor.
+    Prints uncertainties of the values, and rejects keys that the frequencies cannot distinguish.
     """  # noqa: D301 (click wants the backspace itself)
     from ..fit.fitting import fit_measured
     from ..fit.table import print_fit

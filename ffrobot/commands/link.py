@@ -13,8 +13,8 @@ from .protect import protect
 
 @click.command()
 @click.argument("link_file", metavar="LINK.toml", type=FILE)
-@click.option("-o", "--output", metavar="BODY.h5", type=FILE, help="Where to write [LINK.h5 beside the input].")
-@click.option("--force", is_flag=True, help="Compute even if the file is up to date.")
+@click.option("-o", "--output", metavar="BODY.h5", type=FILE, help="Output file [LINK.h5 next to the input].")
+@click.option("--force", is_flag=True, help="Computation even if the file is up to date.")
 @logging_options
 def link(link_file: Path, output: Path | None, force: bool) -> None:
     """Compute the modal body file of one link (stage 1).

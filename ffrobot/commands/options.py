@@ -18,15 +18,15 @@ def runs_options(folder: str, of: str = "Folder") -> Callable[[F], F]:
 
     def add(command: F) -> F:
         for option in (
-            click.option("-o", "--output", metavar="DIR", type=FILE, help=f"{of} [{folder} beside the input]."),
-            click.option("--retry", is_flag=True, help="Run again what failed before."),
+            click.option("-o", "--output", metavar="DIR", type=FILE, help=f"{of} [{folder} next to the input]."),
+            click.option("--retry", is_flag=True, help="Repetition of failed runs."),
             click.option(
                 "-j",
                 "--processes",
                 type=click.IntRange(1, 1000),
                 default=processors,
                 show_default="one for each processor",
-                help="Runs side by side.",
+                help="Number of parallel runs.",
             ),
         ):
             command = option(command)

@@ -17,10 +17,10 @@ def movie_options(command: Callable[..., Any]) -> Callable[..., Any]:
     """Which movie, of what, and how."""
     seconds = click.FloatRange(0.1, 600.0)
     for option in (
-        click.option("--movie", metavar="FILE.gif|.mp4", type=FILE, help="Write a movie of the motion, no other file."),
-        click.option("--seconds", metavar="S", type=seconds, default=8.0, help="That the movie plays [8]."),
-        click.option("--analysis", metavar="NAME", help="Movie, or grid, of this analysis only."),
-        click.option("--scale", metavar="S", type=float, help="Of deflections as drawn [as large as can be seen]."),
+        click.option("--movie", metavar="FILE.gif|.mp4", type=FILE, help="Movie of the motion, and no other file."),
+        click.option("--seconds", metavar="S", type=seconds, default=8.0, help="Duration of the movie [8]."),
+        click.option("--analysis", metavar="NAME", help="Analysis of the movie, or of the grid."),
+        click.option("--scale", metavar="S", type=float, help="Scale of deflections [chosen for visibility]."),
     ):
         command = option(command)
     return command
@@ -29,7 +29,7 @@ def movie_options(command: Callable[..., Any]) -> Callable[..., Any]:
 @click.command()
 @click.argument("file", metavar="RESULTS.h5|BODY.h5", type=FILE)
 @click.option("-o", "--output", metavar="DIR", type=FILE, help="Folder for the figures; FILE.figures if absent.")
-@click.option("--format", "formats", metavar="png,pdf,svg", default="png,pdf", help="One or several [png,pdf].")
+@click.option("--format", "formats", metavar="png,pdf,svg", default="png,pdf", help="One or several formats [png,pdf].")
 @click.option("--only", metavar="NAME", multiple=True, help='Figures of this name, or like "moment_*"; repeatable.')
 @movie_options
 def plot(
@@ -42,8 +42,8 @@ def plot(
 ) -> None:
     """Draw the figures of a results file, or mesh and modes of a modal body file.
 
-    Which ones and how, a file figures.toml beside the results says; without one, the standard figures are drawn. With
-    --movie, a movie of the motion instead.
+    A file figures.toml next to the results selects the figures; default: standard figures. With --movie, a movie of
+    the motion instead.
     """
     from ..common.hdf5 import reading
     from ..pictures.figures.movie import write_motion
@@ -61,9 +61,11 @@ def plot(
 @click.command()
 @click.argument("file", metavar="RESULTS.h5|BODY.h5", type=FILE)
 @click.option("-o", "--output", metavar="DIR", type=FILE, help="Folder for the files; FILE.view if absent.")
-@click.option("--frames", metavar="N", type=click.IntRange(1, MOST), default=201, help="Time steps at most [201].")
-@click.option("--time", metavar="SECONDS", type=float, help="Of the picture [where deflections are largest].")
-@click.option("--pictures/--no-pictures", default=None, help="PNG pictures too [where PyVista can draw].")
+@click.option(
+    "--frames", metavar="N", type=click.IntRange(1, MOST), default=201, help="Largest number of time steps [201]."
+)
+@click.option("--time", metavar="SECONDS", type=float, help="Time of the picture [largest deflections].")
+@click.option("--pictures/--no-pictures", default=None, help="PNG pictures [if PyVista can draw].")
 @movie_options
 def view(
     file: Path,
@@ -101,14 +103,13 @@ def _tell(paths: Iterable[Path], notes: Iterable[str] = ()) -> None:
 @click.command()
 @click.argument("results_files", metavar="RESULTS.h5|FOLDER …", nargs=-1, required=True, type=FILE)
 @click.option(
-    "-o", "--output", metavar="FILE.html", type=FILE, help="Where to write [RESULTS.html or FOLDER.html, of the first]."
+    "-o", "--output", metavar="FILE.html", type=FILE, help="Output file [RESULTS.html or FOLDER.html, of the first]."
 )
 def report(results_files: tuple[Path, ...], output: Path | None) -> None:
     """Write one self-contained HTML page: motion, histories, modes, tables.
 
-    Several results files come side by side, for comparison. Folders of sensitivity, optimise and uncertainty, beside
-    results or alone, add what these have found: tornado diagrams, all designs of a search, bands, rankings. The page
-    needs no network and no other file.
+    Several results files are compared side by side. Folders of sensitivity, optimise and uncertainty add their
+    diagrams: tornado diagrams, designs of a search, bands, rankings. The page needs no network and no other file.
     """
     from ..common.hdf5 import reading
     from ..common.outputs import protected

@@ -12,7 +12,7 @@ from ..present.logs import FILE
 @click.command()
 @click.argument("file", metavar="FILE.h5", type=FILE)
 def info(file: Path) -> None:
-    """Say what a modal body file or a results file holds."""
+    """List the contents of a modal body file or a results file."""
     from ..common.hdf5 import reading
     from ..present.info import describe
 
@@ -22,9 +22,9 @@ def info(file: Path) -> None:
 
 @click.command()
 @click.argument("results_file", metavar="RESULTS.h5", type=FILE)
-@click.option("--analysis", metavar="NAME", help="Of this analysis only.")
+@click.option("--analysis", metavar="NAME", help="Single analysis.")
 def feasibility(results_file: Path, analysis: str | None) -> None:
-    """Say whether motors and patches can do what the analyses of a results file ask of them, and what would do."""
+    """Compare required torques and voltages of a results file with the limits, and list remedies."""
     from ..common.hdf5 import reading
     from ..present.feasibility import print_feasibility
     from ..present.summary import summary_console
@@ -35,8 +35,8 @@ def feasibility(results_file: Path, analysis: str | None) -> None:
 
 @click.command()
 @click.argument("results_file", metavar="RESULTS.h5", type=FILE)
-@click.option("--analysis", metavar="NAME", help="Of this analysis; the first linear one if absent.")
-@click.option("-o", "--output", metavar="FILE.npz|FILE.mat", type=FILE, help="Where to write [RESULTS.npz].")
+@click.option("--analysis", metavar="NAME", help="Analysis [the first linear one].")
+@click.option("-o", "--output", metavar="FILE.npz|FILE.mat", type=FILE, help="Output file [RESULTS.npz].")
 def linear(results_file: Path, analysis: str | None, output: Path | None) -> None:
     """Export the linear model of an analysis of kind "linear": matrices A, B, C, D with the names of their columns."""
     from ..common.hdf5 import reading

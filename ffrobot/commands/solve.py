@@ -26,19 +26,19 @@ if TYPE_CHECKING:
     "--output",
     metavar="RESULTS.h5",
     type=FILE,
-    help="Where to write [SCENE.results.h5 beside the input].",
+    help="Output file [SCENE.results.h5 next to the input].",
 )
-@click.option("--resume", is_flag=True, help="Go on with a run that was stopped, from its results file.")
-@click.option("--strict", is_flag=True, help="Exit with 1 where there is a warning; results are written all the same.")
+@click.option("--resume", is_flag=True, help="Resume a stopped run from its results file.")
+@click.option("--strict", is_flag=True, help="Exit code 1 if there is a warning; results are written nevertheless.")
 @python_option
 @logging_options
 def solve(scene_file: Path, output: Path | None, *, resume: bool, strict: bool) -> None:
     """Run the analyses of a scene (stage 2).
 
-    Links given as .toml are taken through stage 1 first where they are not up to date. Prints a summary: time per
-    stage, steps, constraint violation, and the largest voltage against its limit.
+    Stage 1 runs first for link files that are not up to date. Prints a summary: verdict, peaks and limits, steps,
+    constraint violation, errors, wall times.
 
-    Ctrl-C keeps what was computed; --resume goes on from there, and from the start where there are no results yet.
+    Ctrl-C keeps computed results; --resume continues from there, or from the start if there are none.
     """
     from ..common.files import check_output
     from ..results.file import FORMAT

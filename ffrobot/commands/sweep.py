@@ -16,13 +16,13 @@ MOST = 100_000  # runs
 
 @click.command()
 @click.argument("scene_file", metavar="SCENE.toml", type=FILE)
-@click.option("--vary", metavar="KEY=VALUES", multiple=True, required=True, help="What takes which values; repeatable.")
+@click.option("--vary", metavar="KEY=VALUES", multiple=True, required=True, help="Key with its values; repeatable.")
 @click.option(
     "--sample", metavar="N", type=click.IntRange(1, MOST), help="N points of a Latin hypercube, not the full grid."
 )
-@click.option("--seed", type=click.IntRange(0, 2**63 - 1), default=0, show_default=True, help="Of the sample.")
+@click.option("--seed", type=click.IntRange(0, 2**63 - 1), default=0, show_default=True, help="Seed of the sample.")
 @click.option("--collect", metavar="DATASET[:max|rms|first|last]", multiple=True, help="Further columns; repeatable.")
-@click.option("--keep/--no-keep", default=True, show_default=True, help="Whether results files of the runs stay.")
+@click.option("--keep/--no-keep", default=True, show_default=True, help="Retention of the results files of the runs.")
 @runs_options("SCENE.sweep", "Folder of the sweep")
 @python_option
 @logging_options
@@ -37,7 +37,7 @@ def sweep(
     keep: bool,
     output: Path | None,
 ) -> None:
-    """Solve a scene many times with some of its keys varied; one table of all runs, failed ones too.
+    """Parameter sweep: solve a scene for many values of its keys; one table of all runs, failed ones included.
 
     \b
     --vary links.link1.geometry.section.height=0.01:0.03:9   a key of a body's link file, 9 values
@@ -45,8 +45,8 @@ def sweep(
     --vary 'initial.state="static","undeformed"'             a list
     --vary gravity.1=-9.81,0                                 an entry of a list by its number, from 0
 
-    Entries of lists of tables go by their name or body. The same command takes up a sweep that was stopped. Runs go
-    side by side with -j on one machine, and on several under mpirun, where the first process hands them out.
+    Entries of lists of tables are selected by name or body. The same command resumes a stopped sweep. -j runs in
+    parallel on one machine, mpirun on several.
     """  # noqa: D301 (click wants the backspace itself)
     from ..present.progress import Display
     from ..present.summary import summary_console

@@ -14,20 +14,28 @@ from .protect import protect
 
 @click.command()
 @click.argument("scene_file", metavar="SCENE.toml", type=FILE)
-@click.option("--of", metavar="GOAL|HISTORY", multiple=True, required=True, help="What is wanted; repeatable.")
-@click.option("--spread", metavar="KEY=SPREAD", multiple=True, required=True, help="What is not sure; repeatable.")
-@click.option("--samples", metavar="N", type=int, default=200, show_default=True, help="Of a Latin hypercube.")
-@click.option("--seed", type=click.IntRange(0, 2**63 - 1), default=0, show_default=True, help="Of the samples.")
+@click.option("--of", metavar="RESPONSE|HISTORY", multiple=True, required=True, help="Response or history; repeatable.")
+@click.option(
+    "--spread",
+    metavar="KEY=SPREAD",
+    multiple=True,
+    required=True,
+    help="Uncertain parameter with its distribution; repeatable.",
+)
+@click.option(
+    "--samples", metavar="N", type=int, default=200, show_default=True, help="Number of samples of a Latin hypercube."
+)
+@click.option("--seed", type=click.IntRange(0, 2**63 - 1), default=0, show_default=True, help="Seed of the samples.")
 @click.option(
     "--by", type=click.Choice(["samples", "gradients", "screening"]), default="samples", show_default=True,
-    help="Samples, two runs for each key, or elementary effects of many keys (Morris).",
+    help="Method: samples, two runs per parameter, or elementary effects of many parameters (Morris).",
 )  # fmt: skip
-@click.option("--indices", is_flag=True, help="Sobol indices, by N/2 more runs for each key.")
+@click.option("--indices", is_flag=True, help="Sobol indices, with N/2 more runs per parameter.")
 @click.option(
     "--trajectories", metavar="R", type=int, default=10, show_default=True,
-    help="Of --by screening, with a run for each key and one more.",
+    help="Number of trajectories of --by screening, each with one run per parameter and one more.",
 )  # fmt: skip
-@click.option("--figures/--no-figures", default=True, show_default=True, help="Whether bands and rankings are drawn.")
+@click.option("--figures/--no-figures", default=True, show_default=True, help="Diagrams of bands and rankings.")
 @runs_options("SCENE.uncertainty")
 @python_option
 @logging_options
@@ -45,18 +53,18 @@ def uncertainty(
     figures: bool,
     output: Path | None,
 ) -> None:
-    """Say how sure results are where numbers of a scene and its links are not.
+    """Uncertainty quantification: propagate distributions of scene and link parameters to the results.
 
     \b
-    --of "peak joints.elbow.moment"            goals as of `sensitivity`: mean, deviation, quantiles
+    --of "peak joints.elbow.moment"            responses as in `sensitivity`: mean, deviation, quantiles
     --of joints.elbow.moment                   a history: a band
-    --spread payload.0.mass=±5%                anything within 5 %, alike ("+-5%" does, too)
+    --spread payload.0.mass=±5%                uniform within 5 % (also "+-5%")
     --spread joint.elbow.stiffness=±20         … within 20 of the scene's value
     --spread links.arm.material.youngs_modulus=normal:3%     a normal distribution, its deviation
     --spread gravity.1=uniform:-9.83:-9.78     between two values
 
-    --by screening says which of many keys matter at all, in R runs for each and R more: then spread these alone.
-    Every number has its own error. The same command takes up what was stopped; failed runs are told and left out.
+    --by screening finds the influential ones of many parameters with R runs for each and R more. Every number has an
+    error estimate. The same command resumes a stopped study; failed runs are reported and omitted.
     """  # noqa: D301 (click wants the backspace itself)
     from ..common.errors import InputError
     from ..design.screening import Screening, screening
@@ -70,7 +78,7 @@ def uncertainty(
     from ..run.inputs import files_of
 
     if by == "screening" and indices:
-        raise InputError("uncertainty: --indices: expected --by samples beside it, found --by screening")
+        raise InputError("uncertainty: --indices: expected --by samples next to it, found --by screening")
     folder = output or scene_file.with_suffix(".uncertainty")
     protect(files_of(scene_file))
     runs: dict[str, Any] = {"seed": seed, "processes": processes, "retry": retry}

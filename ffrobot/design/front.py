@@ -109,9 +109,9 @@ def trade_off(
     problem, space, watcher = read_problem(minimise, None, subject_to), read_space(path, vary), watcher or Watcher()
     other = parse_goal(against, "--against")
     if other.text == problem.objective.text:
-        raise InputError(f'--against: expected another goal than "{other.text}", which is to be least')
+        raise InputError(f'--against: expected another response than "{other.text}", which is minimized')
     if catalogue := next((v for v in space.variables if v.is_catalogue), None):
-        raise InputError(f"--against: expected numbers between bounds, found the catalogue of {catalogue.name}")
+        raise InputError(f"--against: expected numbers between bounds, found the discrete set of {catalogue.name}")
     check_start(path, space, "slsqp")
     fixed = changes_for(path, (*problem.goals, other), tolerance, keep_steps=may_repeat(space.keys))
     designs = Designs(path, space.keys, space.own, folder, fixed, processes=processes, watcher=watcher, retry=retry)
@@ -142,7 +142,7 @@ class _Searches:
         high, low = (self._read(self.against, one.best).value for one in (first, last))
         if high - low <= SAME * abs(high):
             raise InputError(
-                f'--against: expected goals that ask for different designs: where "{self.problem.objective.text}" is'
+                f'--against: expected responses with different optima: where "{self.problem.objective.text}" is'
                 f' least, "{self.against.text}" is too'
             )
         found = [first]

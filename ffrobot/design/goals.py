@@ -72,7 +72,7 @@ class Frequency(Goal):
         body = self._body(results)
         modes = _modes(body)
         if nominal.mode not in modes:
-            return Followed(float("nan"), f"the link file asks for too few modes to have {nominal.mode}")
+            return Followed(float("nan"), f"the link file has too few modes for {nominal.mode}")
         return Followed(float(body.frequency[modes.index(nominal.mode)]))
 
     def _body(self, results: Results) -> ModalBody:

@@ -13,7 +13,7 @@ from .slopes import Differentiation
 from .steps import AIM, OPTIMISERS, ConflictError, ReachedError, StalledError, Steps, StuckError, rank
 from .variables import Place
 
-KINK = "more peaks take turns here than are told apart: --method differential-evolution goes on from any design"
+KINK = "more peaks switch here than ffrobot separates: --method differential-evolution continues from any design"
 
 
 @dataclass(frozen=True)

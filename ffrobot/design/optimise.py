@@ -68,7 +68,7 @@ def optimise(
         SolveError: no design completed.
     """
     if of_mpi() > 1:
-        raise InputError("optimise: expected one process, found several under mpirun: -j runs designs side by side")
+        raise InputError("optimise: expected one process, found several under mpirun: -j runs designs in parallel")
     problem, space, watcher = read_problem(minimise, maximise, subject_to), read_space(path, vary), watcher or Watcher()
     chosen = _method(space, method, most)
     check_start(path, space, chosen)
@@ -94,12 +94,12 @@ def _method(space: Space, method: Method, most: int) -> Method:
         return "slsqp" if not catalogues else "all" if 0 < combined <= min(EVERY, most) else "differential-evolution"
     if method in ("slsqp", "trust-constr") and catalogues:
         raise InputError(
-            f'optimise: method: expected "differential-evolution" where there are catalogues, found "{method}"'
+            f'optimise: method: expected "differential-evolution" where there are discrete sets, found "{method}"'
         )
     if method == "all" and not combined:
-        raise InputError('optimise: method: expected catalogues alone for "all", found a number between bounds')
+        raise InputError('optimise: method: expected discrete sets alone for "all", found a number between bounds')
     if method == "all" and combined > most:
-        raise InputError(f"optimise: expected at most {most} designs in the catalogues (--runs), found {combined}")
+        raise InputError(f"optimise: expected at most {most} designs in the discrete sets (--runs), found {combined}")
     return method
 
 

@@ -239,7 +239,7 @@ def _trade(found: Optimum, bound: float, room: float, price: float, unit: str) -
     verb = "saves" if found.problem.sense > 0 else "gains"
     of = f" {found.best.readings[0].unit}".rstrip()
     share = f" ({100 * gained / abs(found.value):.3g} %)" if found.value else ""
-    return f"{bound + room:.6g}{f' {unit}' if unit else ''} in place of {bound:g} {verb} {gained:.4g}{of}{share}"
+    return f"{bound + room:.6g}{f' {unit}' if unit else ''} instead of {bound:g} {verb} {gained:.4g}{of}{share}"
 
 
 def _starts(found: Optimum) -> str:
@@ -256,8 +256,8 @@ def _standing(found: Optimum) -> str:
         return "the best of the designs that were tried"
     stands = found.optimality
     return (
-        f"{'converged' if found.converged else 'not converged'}: the gradient, less prices of what is reached, is"
-        f" {stands.residual:.1g} of the goal over the range of a number, known to {stands.gradient_error:.1g}"
+        f"{'converged' if found.converged else 'not converged'}: the gradient of the Lagrangian is"
+        f" {stands.residual:.1g} of the objective over the range of a parameter, known to {stands.gradient_error:.1g}"
     )
 
 

@@ -16,7 +16,9 @@ def optimum_study(found: Optimum) -> Study:
     problem = found.problem
     tables = [table(("key", "start", "best", "bounds"), key_rows(found))]
     if problem.limits:
-        tables.append(table(("limit", "start", "best", "", "price: goal per unit more"), limit_rows(found)))
+        tables.append(
+            table(("limit", "start", "best", "", "shadow price: objective per unit of the limit"), limit_rows(found))
+        )
     states = states_of(problem, found.tried, [found.best])
     goals = [(problem.objective.text, None), *((limit.goal.text, limit) for limit in problem.limits)]
     best = "best" if found.feasible else "nearest"

@@ -101,7 +101,7 @@ def read_problem(minimise: str | None, maximise: str | None, subject_to: Sequenc
     """By what the command line says. Raises `InputError`."""
     if (minimise is None) == (maximise is None):
         found = "both" if minimise is not None else "none"
-        raise InputError(f"optimise: expected one goal, --minimise GOAL or --maximise GOAL, found {found}")
+        raise InputError(f"optimise: expected one objective, --minimise RESPONSE or --maximise RESPONSE, found {found}")
     objective = parse_goal(minimise, "--minimise") if minimise is not None else parse_goal(maximise or "", "--maximise")
     return Problem(objective, 1.0 if minimise is not None else -1.0, tuple(map(parse_limit, subject_to)))
 
@@ -115,7 +115,7 @@ def parse_limit(text: str) -> Limit:
         bound = np.nan
     if match is None or not np.isfinite(bound):
         raise InputError(
-            '--subject-to: expected "GOAL <= NUMBER" or "GOAL >= NUMBER", such as "peak joints.elbow.moment <= 20",'
-            f' found "{shown(text)}"'
+            '--subject-to: expected "RESPONSE <= NUMBER" or "RESPONSE >= NUMBER", such as "peak joints.elbow.moment <='
+            f' 20", found "{shown(text)}"'
         )
     return Limit(parse_goal(match["goal"], "--subject-to"), 1.0 if match["sense"] == "<=" else -1.0, bound)

@@ -24,11 +24,11 @@ COLUMNS = (
 
 
 HOW = {
-    "repeated steps": "repeated steps: differences of runs that take the same steps in time",
+    "repeated steps": "reused time steps: differences of runs with the same steps",
     "differences": "differences: central, extrapolated",
     "exact": "exact: by modes, without runs",
 }
-ERRORS = "errors: by differences of lower order or of all keys at once, noise, and the tolerance of repeated steps"
+ERRORS = "errors: by differences of lower order or of all keys at once, noise, and the tolerance of reused time steps"
 
 
 @dataclass(frozen=True)

@@ -61,19 +61,19 @@ def screening(
 
     Raises:
         InputError: goals, keys or spreads that mean nothing, or that make scenes impossible; histories as a whole.
-        SolveError: the scene with all keys in the middle, or all others, cannot be solved.
+        SolveError: the scene all parameters at nominal values, or all others, cannot be solved.
     """
     if trajectories < FEWEST:
         raise InputError(f"uncertainty: --trajectories: expected at least {FEWEST}, found {trajectories}")
     names = list(dict.fromkeys(of))
     if histories := [text for text in names if is_history(text)]:
         raise InputError(
-            f'--of: expected goals for --by screening, such as "peak {histories[0]}", found the history'
-            f' "{histories[0]}", whose band --by samples and --by gradients tell'
+            f'--of: expected responses for --by screening, such as "peak {histories[0]}", found the history'
+            f' "{histories[0]}", whose band --by samples or --by gradients computes'
         )
     goals, spreads = tuple(map(parse_goal, names)), read_spreads(path, spread)
     if not goals or not spreads:
-        raise InputError("uncertainty: expected at least one goal (--of) and one key (--spread)")
+        raise InputError("uncertainty: expected at least one response (--of) and one key (--spread)")
     designs = SpreadDesigns(path, spreads, goals, Runs(folder, processes, retry, watcher))
     taken = draw_trajectories(len(spreads), trajectories, seed)
     low, high = np.array([one.ends for one in spreads]).T
@@ -82,7 +82,7 @@ def screening(
     values = np.array([designs.read(design) for design in found]).reshape(trajectories, -1, len(goals))
     effects = elementary_effects(taken, as_floats(values))
     if not effects.count.any():
-        raise SolveError(f"{path}: no two runs of a trajectory beside each other completed: {designs.failures[0]}")
+        raise SolveError(f"{path}: no two runs of a trajectory side by side completed: {designs.failures[0]}")
     return Screening(
         path, spreads, tuple(goal.text for goal in goals), designs.readings, effects, as_floats(values),
         tuple(dict.fromkeys(designs.failures)), 1 + len({design.folder for design in found}), designs.table,

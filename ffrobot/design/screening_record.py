@@ -44,9 +44,9 @@ def remarks(found: Screening) -> Iterator[str]:
     if failed := len(found.failures):
         yield f"failed     {failed} of {found.runs} runs, left out: {found.failures[0]}"
     yield (
-        f"how        {found.runs} runs, {len(found.values)} trajectories (Morris); μ*: mean size of the goal's change"
-        " over the whole spread of a key, ± its standard error; σ: its scatter, near 0 where the goal is linear in the"
-        " key, as large as μ* where the key bends it or acts with others; μ: the mean with its sign"
+        f"how        {found.runs} runs, {len(found.values)} trajectories (Morris); μ*: mean absolute change of the"
+        " response over the whole range of a parameter, ± its standard error. σ: standard deviation, near 0 if the"
+        " response is linear in the parameter, as large as μ* with nonlinearity or interaction; μ: signed mean"
     )
 
 

@@ -61,11 +61,11 @@ def sensitivity(
         SolveError: the scene itself cannot be solved.
     """
     if of_mpi() > 1:
-        raise InputError("sensitivity: expected one process, found several under mpirun: -j runs designs side by side")
+        raise InputError("sensitivity: expected one process, found several under mpirun: -j runs designs in parallel")
     goals = tuple(parse_goal(text) for text in dict.fromkeys(of))
     keys = tuple(parse_key(text, "--to") for text in dict.fromkeys(to))
     if not goals or not keys:
-        raise InputError("sensitivity: expected at least one goal (--of) and one key (--to)")
+        raise InputError("sensitivity: expected at least one response (--of) and one key (--to)")
     point = tuple(number_at(path, key, "--to") for key in keys)
     steps = tuple(step * (abs(value) or 1.0) for value in point)
 

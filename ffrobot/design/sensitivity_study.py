@@ -28,7 +28,7 @@ def tornado(found: Sensitivity, g: int) -> Bars:
     return Bars(
         name=f"tornado_{file_name(found.goals[g])}",
         title=f"{found.goals[g]}: {reading.value:.5g} {reading.unit}".rstrip(),
-        x_label="change of the goal (%) with +1 % of the key",
+        x_label="change of the response (%) with +1 % of the parameter",
         labels=tuple(found.keys[k] for k in known),
         series=(Series(values=numbers(found.logarithmic[g, known])),),
         signed=True,

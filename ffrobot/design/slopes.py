@@ -180,7 +180,7 @@ class Differentiation:
     def _kinks(self, samples: Mapping[int, Beside]) -> tuple[str, ...]:
         goals = self.evaluations.split.goals
         found = [
-            f"{goal.text}: beside this design another peak is the largest, {one.elsewhere}"
+            f"{goal.text}: close to this design another peak is the largest, {one.elsewhere}"
             for beside in samples.values()
             for values in beside.values()
             for goal, one in zip(goals, values, strict=True)

@@ -30,7 +30,7 @@ class SpreadDesigns:
 
     Attributes:
         path: of the scene file; `spreads` (k,) of its keys; `goals` (g,).
-        middle: the design with all keys in the middle, which completed; `readings` (g,) of it.
+        middle: the design all parameters at nominal values, which completed; `readings` (g,) of it.
         failures: runs that failed, in words.
     """
 
@@ -48,11 +48,11 @@ class SpreadDesigns:
 
         Raises:
             InputError: goals or spreads that mean nothing, or that make scenes impossible.
-            SolveError: the scene with all keys in the middle cannot be solved.
+            SolveError: the scene all parameters at nominal values cannot be solved.
         """
         if of_mpi() > 1:
             raise InputError(
-                "uncertainty: expected one process, found several under mpirun: -j runs samples side by side"
+                "uncertainty: expected one process, found several under mpirun: -j runs samples in parallel"
             )
         self.path, self.spreads, self.goals = path, tuple(spreads), tuple(goals)
         keys, own = [one.key for one in spreads], tuple(one.own for one in spreads)
@@ -93,7 +93,7 @@ class SpreadDesigns:
         )
 
     def _run_middle(self) -> Design:
-        """The design with all keys in the middle, which has to be there, and to make sense at their ends."""
+        """The design all parameters at nominal values, which has to be there, and to make sense at their ends."""
         centre = tuple(one.mean for one in self.spreads)
         for k, one in enumerate(self.spreads):
             for end in one.ends:

@@ -163,7 +163,7 @@ class Steps:
         for judged in (self._judged, True):
             slopes = self._differentiation.slopes(one, judged=judged)
             if np.isnan(slopes.gradient[:, self._free]).any():
-                raise StuckError("ended where no design beside the last one completes: see the table of runs")
+                raise StuckError("ended where no design next to the last one completes: see the table of runs")
             stands = optimality(self._evaluations, one, slopes)
             if stands.reached(ENOUGH * AIM) or (self._excess and stands.violation <= 0.0):
                 self.best = one

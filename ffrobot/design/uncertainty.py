@@ -115,18 +115,18 @@ def uncertainty(
 
     Raises:
         InputError: goals, keys or spreads that mean nothing, or that make scenes impossible.
-        SolveError: the scene with all keys in the middle, or all others, cannot be solved.
+        SolveError: the scene all parameters at nominal values, or all others, cannot be solved.
     """
     if by == "samples" and samples < FEWEST:
         raise InputError(f"uncertainty: expected at least {FEWEST} samples, found {samples}")
     if by == "gradients" and indices:
-        raise InputError("uncertainty: expected Sobol indices of samples, found them asked for by gradients")
+        raise InputError("uncertainty: expected Sobol indices of samples, found --by gradients")
     names = list(dict.fromkeys(of))
     goals = tuple(parse_goal(text) for text in names if not is_history(text))
     curves = tuple(Curve(text) for text in names if is_history(text))
     spreads = read_spreads(path, spread)
     if not names or not spreads:
-        raise InputError("uncertainty: expected at least one goal or history (--of) and one key (--spread)")
+        raise InputError("uncertainty: expected at least one response or history (--of) and one key (--spread)")
     designs = SpreadDesigns(
         path, spreads, goals, Runs(folder, processes, retry, watcher),
         others=curves, tolerance=TOLERANCE if by == "gradients" else None,

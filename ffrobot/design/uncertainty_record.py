@@ -49,8 +49,8 @@ def print_uncertainty(found: Uncertainty, console: Console) -> None:
 
 
 def goal_line(goal: str, reading: Reading) -> str:
-    """With all keys in the middle."""
-    return f"{goal}: {reading.value:.6g} {reading.unit}".rstrip() + " with all keys in the middle"
+    """With all nominal values."""
+    return f"{goal}: {reading.value:.6g} {reading.unit}".rstrip() + " all parameters at nominal values"
 
 
 def statistics_headings() -> tuple[str, ...]:
@@ -109,7 +109,7 @@ def remarks(found: Uncertainty) -> Iterator[str]:
         if explained < LINEAR and found.indices is None:
             yield (
                 f"note       {goal}: a linear function of the keys makes {100.0 * explained:.0f} % of the variance:"
-                " --indices tells what each does, alone and with others"
+                " --indices computes the effect of each, alone and with others"
             )
     yield from (f"note       {text}" for text in found.notes)
     if failed := len(found.failures):

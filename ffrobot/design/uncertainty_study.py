@@ -30,14 +30,14 @@ def uncertainty_study(found: Uncertainty) -> Study:
             (goal, reading.unit, f"{reading.value:.6g}", *statistics_row(found, g))
             for g, (goal, reading) in enumerate(zip(found.goals, found.readings, strict=True))
         ]
-        tables.append(table(("goal", "unit", "keys in the middle", *statistics_headings()), rows))
+        tables.append(table(("goal", "unit", "nominal values", *statistics_headings()), rows))
     for g in goals:
         (key, *others), rows_of_keys = parts(found, g)
         tables.append(table((f"{found.goals[g]}: {key}", *others), rows_of_keys))
     if found.bands:
         tables.append(table(BAND_HEADINGS, band_rows(found)))
     return make_study(
-        "uncertainty", "How sure it is", found.scene, _headline(found), remarks(found), tables,
+        "uncertainty", "Uncertainty", found.scene, _headline(found), remarks(found), tables,
         [*(_ranking(found, g) for g in goals), *(_band(found, band) for band in found.bands)],
     )  # fmt: skip
 

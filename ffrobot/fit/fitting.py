@@ -94,7 +94,7 @@ def _target(path: Path, motors: Motors | None) -> LinkTarget | RobotTarget:
     if "geometry" not in tables:
         return RobotTarget(path, motors or "free")
     if motors is not None:
-        raise InputError(f"{path}: --motors: expected a scene file beside it, found a link file")
+        raise InputError(f"{path}: --motors: expected a scene file next to it, found a link file")
     return LinkTarget(path)
 
 

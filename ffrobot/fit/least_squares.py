@@ -145,7 +145,7 @@ def check_told_apart(J: Array, keys: Sequence[str]) -> None:
     named = [(key, part) for key, part in zip(keys, vector, strict=True) if abs(part) > SHARE]
     change = ", ".join(f"{key} times c" + ("" if part > 1 - 1e-3 else f"^{part:.3g}") for key, part in named)
     raise InputError(
-        f"fit: expected keys that the measured frequencies tell apart, found that they stay the same with {change}, for"
+        f"fit: expected keys that the measured frequencies distinguish, found no change of these with {change}, for"
         f" any c: vary only {len(named) - 1} of these {len(named)}, or measure with a known mass or spring attached"
     )
 

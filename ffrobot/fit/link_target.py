@@ -41,7 +41,7 @@ class LinkTarget:
         path = output or fitted_name(self._path)
         if path.parent.resolve() != self._path.parent.resolve():
             raise InputError(
-                f"{path}: output: expected a file beside {self._path}, to which its file names are relative"
+                f"{path}: output: expected a file next to {self._path}, to which its file names are relative"
             )
         return {path: with_values(read_text(self._path, "link file"), dict(changes))}
 

@@ -61,7 +61,7 @@ class RobotTarget:
         path = output or fitted_name(self._path)
         if path.parent.resolve() != self._path.parent.resolve():
             raise InputError(
-                f"{path}: output: expected a file beside {self._path}, to which its file names are relative"
+                f"{path}: output: expected a file next to {self._path}, to which its file names are relative"
             )
         of_scene: dict[Key, float | str] = {}
         of_links: dict[str, dict[Key, float | str]] = {}

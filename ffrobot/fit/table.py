@@ -48,7 +48,7 @@ def remarks(fit: Fit) -> Iterator[str]:
     for i, j in zip(*np.triu_indices(len(fit.keys), 1), strict=True):
         if abs(fit.correlation[i, j]) > ALIKE:
             yield (
-                f"{fit.keys[i]} and {fit.keys[j]} are hardly told apart: their errors have a correlation of"
+                f"{fit.keys[i]} and {fit.keys[j]} are hardly distinguishable: their errors have a correlation of"
                 f" {fit.correlation[i, j]:.4f}"
             )
     if fit.misfit > 2.0:

@@ -18,7 +18,7 @@ def error_budget(solution: Solution | SpatialSolution) -> Iterator[str]:
     results = integrated(solution)
     if aims := [result.analysis.tolerance for result in results]:
         asked = " … ".join(f"{aim:.0e}" for aim in sorted({min(aims), max(aims)}))
-        yield f"time integration: {asked} of peaks, asked for"
+        yield f"time integration: {asked} of peaks, requested tolerance"
     yield f"modes: {_modes(solution, results)}"
     yield f"deflection: {deflection_in_words(result.bending for result in solution.analyses.values())}"
     for name, result in solution.analyses.items():
@@ -39,10 +39,13 @@ def _modes(solution: Solution | SpatialSolution, results: Sequence[AnalysisResul
         known = [error for of in solution.mode_choice.errors.values() for error in of.values()]
         return f"{max(known):.0e} of peaks, against all modes of the files" if any(known) else NOT_ESTIMATED
     if any(result.start_jolt >= JOLT for result in results):
-        return f"{NOT_ESTIMATED}: the motion starts with a jolt, in which missing modes take part"
+        return (
+            f"{NOT_ESTIMATED}: the motion starts with a step in acceleration (links not in equilibrium), which excites"
+            " missing modes"
+        )
     errors = [error for result in results if (error := result.mode_error) is not None]
     if not errors or len(errors) < len(results):
         return NOT_ESTIMATED
     if max(errors) > RESOLVED:
-        return "too few: vibrations faster than the highest take part"
+        return "too few: vibrations above the highest mode are excited"
     return f"{max(errors):.0e} of peaks, estimated"

@@ -18,8 +18,8 @@ FREQUENCIES = 5  # that are listed, and damping ratios
 UNDAMPED = 1e-9  # ratios below are rounding
 
 LOOP_COLUMNS = (
-    "closed loop", "verdict", "rms (m)", "max (m)", "settled\n(s)", "overshoot\n(m)", "vibration\n(m)", "at end (m)",
-    "work (J)", "moment\n(N·m)", "voltage\n(V)", "at\nlimits",
+    "closed loop", "verdict", "rms (m)", "max (m)", "settling\ntime (s)", "overshoot\n(m)", "vibration\n(m)",
+    "final (m)", "work (J)", "torque\n(N·m)", "voltage\n(V)", "saturated\nsamples",
 )  # fmt: skip
 
 
@@ -50,7 +50,7 @@ def control_tables(details: Mapping[str, Details]) -> Iterator[Table]:
             yield table
 
 
-LINEAR_COLUMNS = ("linear model", "t (s)", "freedom", "lowest frequencies (Hz)", "growth (1/s)")
+LINEAR_COLUMNS = ("linear model", "t (s)", "DOF", "lowest frequencies (Hz)", "largest Re(pole)\n(1/s)")
 
 
 def _linear(name: str, found: LinearModels) -> Iterator[tuple[str, ...]]:
@@ -61,7 +61,7 @@ def _linear(name: str, found: LinearModels) -> Iterator[tuple[str, ...]]:
         yield name, f"{model.time:g}", f"{model.freedom}", lowest, f"{modes.growth:.3g}" if modes.growth else ""
 
 
-PLACEMENT_COLUMNS = ("placement", "on", "by", "found", "evenly spread", "of sets")
+PLACEMENT_COLUMNS = ("placement", "on", "by", "optimum", "evenly spaced", "sets tried")
 
 
 def _placement(name: str, placed: Placed) -> tuple[str, ...]:
@@ -91,7 +91,7 @@ def control_lines(details: Mapping[str, Details]) -> Iterator[str]:
             yield from _zeros_and_lost(name, found)
     for name, found in details.items():
         if isinstance(found, Placed):
-            yield f"{name}: centres at {', '.join(f'{x:.4g}' for x in found.best.centers)} m"
+            yield f"{name}: centers at {', '.join(f'{x:.4g}' for x in found.best.centers)} m"
 
 
 def _damping(name: str, linear: LinearModels) -> Iterator[str]:
@@ -110,7 +110,7 @@ def _zeros_and_lost(name: str, linear: LinearModels) -> Iterator[str]:
         worst = next((zeros for zeros in found if not zeros.minimum_phase), found[0])
         yield f"{name}: {transfer}: {worst.describe()}"
     for verb, reaches in (
-        ("no motor or patch moves", linear.controllable), ("no joint or point of it sees", linear.observable)
+        ("uncontrollable:", linear.controllable), ("unobservable:", linear.observable)
     ):  # fmt: skip
         for model, reach in zip(linear.models, reaches, strict=True):
             if reach.lost:

@@ -60,10 +60,12 @@ def _tables(name: str, group: h5py.Group) -> Iterator[Table | str]:
 
 def _motors(motors: Mapping[str, MotorFeasibility], units: Mapping[str, str]) -> Table:
     """At the joint, a line for each quantity; the RMS over the run is what heats a motor."""
-    table = _table("motor of", "at the joint", "peak", "limit", "times limit", "RMS", "beyond", "from t (s)", "within?")
+    table = _table(
+        "motor of", "at the joint", "peak", "limit", "peak / limit", "RMS", "share above", "first at (s)", "within?"
+    )
     for name, motor in motors.items():
         unit = units[name]
-        force, speed = ("moment", "rad/s") if unit == "N·m" else ("force", "m/s")
+        force, speed = ("torque", "rad/s") if unit == "N·m" else ("force", "m/s")
         share = f"{_number(100 * motor.share_beyond)} %" if motor.share_beyond else ""
         since, can = _verdict(motor.factor, motor.saturation_time)[1:]
         can = can if motor.has_limits else "no limits"
@@ -117,14 +119,14 @@ def _modes(body: str, judged: h5py.Group) -> Table:
 
 def _remedy_line(judged: h5py.Group) -> str:
     if np.all(judged["factor"][()] <= 1.0):
-        return f"the patches can do it; a limit of {_number(judged['remedies'].attrs['limit'])} V would do"
+        return f"the patches can do it; a limit of {_number(judged['remedies'].attrs['limit'])} V is sufficient"
     remedies = judged["remedies"].attrs
     count = f"{remedies['count']} patches"
     if not remedies["count"]:
         missing = _number(remedies["most_factor"])
-        count = f"no number of patches ({remedies['most_count']} have room, and lack a factor {missing})"
+        count = f"no number of patches ({remedies['most_count']} fit; required/available = {missing})"
     return (
-        f"what alone would do: a limit of {_number(remedies['limit'])} V; {remedies['layers']} layers;"
+        f"sufficient alone: a limit of {_number(remedies['limit'])} V; {remedies['layers']} layers;"
         f" layers of {_number(1e3 * remedies['thickness'])} mm at the same field; {count}"
     )
 

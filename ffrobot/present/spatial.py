@@ -24,7 +24,7 @@ def print_spatial_summary(
     solution: SpatialSolution, verdict: Verdict, path: Path, seconds: Mapping[str, float], console: Console
 ) -> None:
     """Tables of analyses, motors and patches, warnings, whether it can be done, wall time per stage, the file."""
-    table = plain_table("analysis", "kind", "status", "integrator", "steps", "evaluations", "off the constraints")
+    table = plain_table("analysis", "kind", "status", "integrator", "steps", "evaluations", "constraint\nviolation")
     motors = plain_table("analysis", "motor", "largest", "unit")
     units = {joint.name: joint.units for joint in solution.scene.joint}
     for name, result in solution.analyses.items():

@@ -98,7 +98,7 @@ def _notes(solution: Solution, seconds: Mapping[str, float]) -> Iterator[tuple[s
     yield "accuracy", "\n".join(error_budget(solution))
     yield "wall time", ", ".join(f"{stage} {value:.2f} s" for stage, value in seconds.items())
     if solution.omissions:
-        yield "skipped", "; ".join(solution.omissions)
+        yield "omitted", "; ".join(solution.omissions)
 
 
 def _inversion(outcome: PlanarOutcome, found: InvertedPath) -> str:
@@ -118,7 +118,9 @@ def _inversion(outcome: PlanarOutcome, found: InvertedPath) -> str:
 
 
 def _analyses(solution: Solution) -> Table:
-    table = plain_table("analysis", "kind", "integrator", "t (s)", "steps", "tolerance", "constraints", "wall (s)")
+    table = plain_table(
+        "analysis", "kind", "integrator", "end (s)", "steps", "tolerance", "constraint\nviolation", "wall (s)"
+    )
     for name, outcome in solution.outcomes.items():
         analysis, run, reached = outcome.analysis, outcome.statistics, outcome.time[-1]
         integrated = analysis.is_integrated

@@ -14,7 +14,7 @@ from .tables import plain_table
 
 def voltage_table(found: Iterable[tuple[str, str, PatchArray, Voltages]]) -> Table:
     """Of analyses and layouts, by name, with their patches."""
-    table = plain_table("voltages of", "on", "largest (V)", "limit (V)", "times limit", "cond Φ_V")
+    table = plain_table("voltages of", "on", "largest (V)", "limit (V)", "required /\nlimit", "condition\nnumber")
     for analysis, layout, patches, values in found:
         limit = patches.limit.min()
         table.add_row(

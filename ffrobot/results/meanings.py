@@ -47,7 +47,7 @@ joints/*/coordinate | rad, m | of the second body on the first
 joints/*/rate | rad/s, m/s | of the coordinate
 joints/*/moment | N m, N | of the motor, at the joint
 joints/*/motor_moment | N m, N | of the motor, before its gear
-joints/*/motor_angle | rad | of the motor, behind its gear that gives
+joints/*/motor_angle | rad | of the motor, behind its compliant gear
 joints/*/motor_rate | rad/s | likewise
 joints/*/gear_moment | N m | that the gear transmits
 joints/*/reaction | N | on the second body
@@ -72,7 +72,7 @@ stress/*/points/*/von_mises | Pa | von Mises
 stress/*/surface/von_mises_max | Pa | largest on the surface
 stress/*/surface/position_of_max | m | where, in the undeformed link
 stress/*/layers/** | SI | below patches that stiffen the link
-stress/*/modal | m √kg | vibrations beside static deflection
+stress/*/modal | m √kg | vibrations with static deflection
 stress/*/loads | N, N m, m/s², 1/s² | sizes of the unit loads
 energy/kinetic | J | of all bodies
 energy/strain | J | of all links

@@ -22,9 +22,9 @@ def how_to_go_on(solution: Solution | SpatialSolution, command: str) -> str:
     """What a message about a run that was stopped adds; empty where it cannot be gone on with."""
     outcome = stopped(solution)
     if outcome is None:
-        return "".join(f'; {command} goes on with "{name}"' for name in left_out(solution)[:1])
+        return "".join(f'; {command} resumes with "{name}"' for name in left_out(solution)[:1])
     if goes_on(solution, outcome):
-        return f"; {command} goes on from t = {outcome.time_reached:.9g} s"
+        return f"; {command} resumes from t = {outcome.time_reached:.9g} s"
     return f'; {command} runs "{outcome.analysis.name}" again from its start'
 
 

@@ -15,6 +15,7 @@ from .joints import Coordinates, Scene, labelled_coordinates
 from .off_path import off_path_in_words
 from .peaks import POWER, peak_of
 
+FAR_BEYOND = 10.0  # times their limit: no realistic patch supplies that
 AT_REST = 0.3  # of the mean rate of a path: what its first and last steps have at most
 
 Place = tuple[float, str, float]
@@ -174,21 +175,24 @@ def _answer(
     """Whether it can be done, in words and as such; of a run that ended early nothing is known of that."""
     if "control" in group:
         about = group["control"].attrs
-        held = f", {100 * about['saturated']:.2g} % of the samples at a limit" if about["saturated"] else ""
+        held = f", {100 * about['saturated']:.2g} % of the samples saturated" if about["saturated"] else ""
         error = f"tip off by {1e3 * about['tip_error_max']:.4g} mm at most, {1e3 * about['tip_error_rms']:.4g} mm RMS"
         return f"loop {about['verdict']}: {error}{held}", None
     if "feasibility" not in group or _ended_early(group):
         return "", None
     short = dict(_short(motors, patches))
     if short:
-        lacking = [f"{name} (factor {factor:.3g}, from t = {since:g} s)" for name, (factor, since) in short.items()]
-        return f"beyond their limits: {', '.join(lacking)}; details: ffrobot feasibility", False
+        lacking = [
+            f"{name} (required/available = {factor:.3g}, first at t = {since:g} s)"
+            for name, (factor, since) in short.items()
+        ]
+        return f"limits exceeded: {', '.join(lacking)}; details: ffrobot feasibility", False
     has_limits = any(motor.has_limits for motor in motors.values()) or any(
         np.isfinite(e["available_moment"]).any() for e in _of_patches(group)
     )
     within = "within the limits that are given" if has_limits else "no limits are given"
     if (missed := read_unsupplied(group["feasibility"])) is not None:
-        means = "motors and patches" if missed.with_patches else "motors alone"
+        means = "motors and patches" if missed.with_patches else "motor torques"
         return f"{means} cannot do it: see the warning ({within})", False
     return f"motors{' and patches' if patches else ''} can do it, {within}", True
 
@@ -252,14 +256,17 @@ def _advice(
             yield f"motor of {name}: {text}"
     if beyond and asked:
         yield (
-            f"a slower path (fastest = true seeks the least stretch of its times), or another motor or gear for"
+            f"a slower path (fastest = true finds the smallest time-scaling factor), or another motor or gear for"
             f" {', '.join(beyond)}"
         )
     for body, need in patches.items() if asked else ():
         if need.factor > 1.0:
             yield (
-                f"patches of {body}: a limit of {_number(need.limit)} V would do; what layers, thickness or number"
-                " would: ffrobot feasibility"
+                f"patches of {body}: a limit of {_number(need.limit)} V is sufficient; sufficient layers, thickness or"
+                " number: ffrobot feasibility"
+                if need.factor <= FAR_BEYOND
+                else f"patches of {body}: no realistic patch can supply this; prescribe a static shape (fcid) or use"
+                " motors only (motors-only)"
             )
     if asked and read_unsupplied(group["feasibility"]) is not None:
         inversion = 'kind = "motors-only", or ' if _is_from_rest_to_rest(group) else ""
@@ -295,7 +302,7 @@ def _margins(group: h5py.Group) -> str:
         return f"margins (linear model): none, spectral radius of the sampled loop {about['spectral_radius']:.6g}"
     gain, delay = float(about["gain_margin"]), float(about["delay_margin"])
     texts = (
-        f"gains may grow {gain:.3g}-fold" if np.isfinite(gain) else "gains may grow as they like",
+        f"gains may grow {gain:.3g}-fold" if np.isfinite(gain) else "gains may grow freely",
         f"the delay by {1e3 * delay:.3g} ms" if np.isfinite(delay) else "the delay by 50 sample times or more",
     )
     return f"margins (linear model): {', '.join(texts)}"
@@ -308,7 +315,7 @@ def _motor(motor: MotorFeasibility, unit: str, interval: str) -> str:
         f"{_of(motor.speed, motor.speed_limit)} {speed}",
         f"{_of(motor.power, motor.power_limit)} W",
     ]
-    share = f"; beyond a limit for {100 * motor.share_beyond:.3g} % of the time" if motor.share_beyond > 0.0 else ""
+    share = f"; above a limit for {100 * motor.share_beyond:.3g} % of the time" if motor.share_beyond > 0.0 else ""
     return ", ".join(parts) + share
 
 

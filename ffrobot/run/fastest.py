@@ -64,7 +64,7 @@ def fastest(scene: AnyScene, judge: Judge[AnyScene]) -> tuple[AnyScene, str]:
         factor, name = search.tried[most]
         raise InputError(
             f"{scene.path}: trajectory {_names(scene)}: fastest: expected actuators that can follow within"
-            f' end = {search.analysis.end:g} s of "{search.analysis.name}", found {name}, which lacks a factor'
+            f' end = {search.analysis.end:g} s of "{search.analysis.name}", found {name}, with required/available ='
             f" {factor:.3g} at stretch = {most:.4g}: a later end leaves more time, where moments are not those of rest"
         )
     factor, name = search.tried[found]
@@ -105,15 +105,17 @@ def judging(scene: Scene | SpatialScene) -> TimedAnalysis:
     where = f"{scene.path}: trajectory {_names(scene)}: fastest"
     inverse = [one for one in scene.analysis if one.applicable and isinstance(one, TimedAnalysis)]
     if not inverse:
-        raise InputError(f"{where}: expected an inverse analysis (pcid, fcid, motors-only) that can judge, found none")
+        raise InputError(
+            f"{where}: expected an inverse analysis (pcid, fcid, motors-only) with feasibility results, found none"
+        )
     limits = [joint.motor_limits for joint in scene.motor_joints]  # in space one for each coordinate
     limited = any(of != MotorLimits() for each in limits for of in ([each] if isinstance(each, MotorLimits) else each))
     if not limited and not any(layout.limit for layout in scene.pzt):
         raise InputError(f"{where}: expected limits of motors (moment_limit, speed_limit, …) or of patches, found none")
     if any(getattr(body, "modes", None) == "auto" for body in scene.body):
         raise InputError(
-            f'{where}: expected bodies with a number of modes, found modes = "auto": solve once without fastest, whose'
-            " summary says how many are enough, and write these"
+            f'{where}: expected bodies with a number of modes, found modes = "auto": solve once without fastest and'
+            " write the numbers of modes that its summary prints"
         )
     return inverse[0]
 

@@ -41,7 +41,7 @@ def omissions(scene: Scene, bodies: Mapping[str, LoadedBody]) -> Iterator[str]:
     yield "coordinates out of the plane"
     stiff = [name for name, body in bodies.items() if body.modal is not None and _is_rigid_along(body.planar)]
     if stiff:
-        yield f"stretch of {', '.join(stiff)}, rigid along the axis: [modes] family without axial modes"
+        yield f"axial deformation of {', '.join(stiff)}: no axial modes in [modes] family"
     for term, symbol in _TERMS.items():
         of = [name for name, body in bodies.items() if term in vanishing_terms(body.planar)]
         if of:

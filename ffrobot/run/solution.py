@@ -45,7 +45,7 @@ class FinerCheck:
         """On how many modes, and how far off."""
         ended = "" if self.status == "completed" else f", which ended early ({self.status})"
         modes = ", ".join(map(str, dict.fromkeys(self.modes.values())))
-        return f"replayed on {modes} modes{ended}: {self.point} is off by {1e3 * self.error:.2g} mm"
+        return f"forward simulation on {modes} modes{ended}: {self.point} is off by {1e3 * self.error:.2g} mm"
 
 
 @dataclass(frozen=True)

@@ -79,9 +79,9 @@ def _take_joint(whole: SpatialModel, node: Node, run: Outcome, states: tuple[Arr
     same = number is not None and tree.nodes[number].backwards == node.backwards
     if number is None or not (same or len(node.joint.units) == 1):
         raise InputError(
-            f"{whole.scene.path}: {node.joint.label}: expected joints that stand in the tree the same way with links in"
-            " pieces as with whole ones where these are controlled, found it otherwise: list it before the others of"
-            " its loop"
+            f"{whole.scene.path}: {node.joint.label}: expected joints that have the same place in the tree with"
+            " subdivided links as with whole ones if these are controlled, found another. List it before the others"
+            " of its loop"
         )
     sign, other = 1.0 if same else -1.0, tree.nodes[number]
     for to, values, slices in zip(states, (run.q, run.v, run.a), ("q", "v", "v"), strict=True):

@@ -38,7 +38,6 @@ def _free_to_swing(outcome: PlanarOutcome) -> str:
     if not held or held >= model.degrees_of_freedom:
         return ""
     return (
-        f"trajectories hold {held} of {model.degrees_of_freedom} degrees of freedom of the robot, which swings in the"
-        " rest as its weight and inertia want, and motors let it: where that is not meant, a trajectory of a joint, or"
-        " of the angle of a body, holds one more"
+        f"trajectories prescribe {held} of {model.degrees_of_freedom} degrees of freedom; the others are unactuated"
+        " and move freely. Add trajectories of joints, or of angles of bodies, if this is not intended"
     )

@@ -157,7 +157,7 @@ def _stiffening_problems(scene: SceneKeys) -> Iterator[str]:
     if scene.geometric_stiffening is False:
         return
     for points in scene.actuation_points:
-        yield f'geometric_stiffening: expected false beside [[actuation_points]], found those of "{points.body}"'
+        yield f'geometric_stiffening: expected false with [[actuation_points]], found those of "{points.body}"'
     for layout in scene.pzt:
         if layout.adds_mass:
             yield (

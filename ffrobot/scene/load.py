@@ -79,6 +79,6 @@ def _refuse_unavailable(data: dict[str, Any], path: Path) -> None:
     """Say so plainly, before the keys of what is not there yet are called wrong."""
     if data.get("space") == "spatial":
         raise InputError(
-            f'{path}: space: expected "planar", found "spatial": scenes in space run by `ffrobot solve`, `ffrobot'
+            f'{path}: space: expected "planar", found "spatial": 3D scenes run by `ffrobot solve`, `ffrobot'
             " sweep` and `ffrobot.solve` so far"
         )

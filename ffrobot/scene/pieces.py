@@ -124,14 +124,14 @@ def _problems(scene: Scene, divided: Mapping[str, BodyInPieces]) -> Iterator[str
     for analysis in scene.analysis:
         if analysis.kind not in KINDS:
             yield (
-                f'analysis "{analysis.name}": kind: expected one of {", ".join(KINDS)} beside bodies in pieces'
+                f'analysis "{analysis.name}": kind: expected one of {", ".join(KINDS)} with subdivided bodies'
                 f' ("{first}"), found "{analysis.kind}"'
             )
         if analysis.is_checked:
-            yield f'analysis "{analysis.name}": check: expected none beside bodies in pieces ("{first}"), found one'
+            yield f'analysis "{analysis.name}": check: expected none with subdivided bodies ("{first}"), found one'
     for joint in scene.joint:
         if joint.elastic_gear("section") is not None:
-            yield f'joint "{joint.name}": stiffness: expected none beside bodies in pieces ("{first}"), found one'
+            yield f'joint "{joint.name}": stiffness: expected none with subdivided bodies ("{first}"), found one'
     references = MechanismKeys.references(scene)
     yield from unfit_references((each for each in references if not each.key.startswith("initial.")), divided)
 
@@ -142,9 +142,9 @@ def unfit_actuators(pointed: Iterable[str], motors: str, first: str) -> Iterator
     `pointed` are bodies with actuation points.
     """
     for body in pointed:
-        yield f'actuation_points "{body}": expected none beside bodies in pieces ("{first}"), found these'
+        yield f'actuation_points "{body}": expected none with subdivided bodies ("{first}"), found these'
     if motors == "frame":
-        yield f'motors: expected "section" beside bodies in pieces ("{first}"), found "frame"'
+        yield f'motors: expected "section" with subdivided bodies ("{first}"), found "frame"'
 
 
 def unfit_references(references: Iterable[Reference], divided: Container[str]) -> Iterator[str]:
@@ -152,6 +152,6 @@ def unfit_references(references: Iterable[Reference], divided: Container[str]) -
     for reference in references:
         if reference.kind == "body" and reference.name in divided:
             yield (
-                f"{reference.key}: expected a point or a joint where a body is in pieces, whose frame no piece has,"
+                f"{reference.key}: expected a point or a joint where a body is subdivided, whose frame no piece has,"
                 f' found "{reference.name}"'
             )

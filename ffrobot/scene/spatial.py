@@ -138,7 +138,7 @@ def _problems(scene: SpatialSceneKeys) -> Iterator[str]:
                 yield f'{kind} "{name}": expected one {kind} of this name, found {count}'
     for label, count in Counter(layout.label for layout in scene.pzt).items():
         if count > 1:
-            yield f'pzt "{label}": name: expected a name of its own for each layout on a body, found {count} of this'
+            yield f'pzt "{label}": name: expected a separate name for each layout on a body, found {count} of this'
     for name, count in Counter(points.body for points in scene.actuation_points).items():
         if count > 1:
             yield f'actuation_points "{name}": body: expected one table for each body, found {count}'

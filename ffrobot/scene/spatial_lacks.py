@@ -28,22 +28,22 @@ LACKS = (
         "ffrobot.scene.spatial",
     ),
     Lack(
-        '`coupling = "surface"` of patches on ±z, of fibres and of twist: link files outline patches on ±y',
+        '`coupling = "surface"` of patches on ±z, of fibers and of twist: link files outline patches on ±y',
         '`coupling = "rotation"`',
         "ffrobot.actuation.patches.spatial_records",
     ),
     Lack(
-        "bodies in pieces in `fcid`, `motors-only` and `placement`, as in the plane",
+        "subdivided bodies in `fcid`, `motors-only` and `placement`, as in 2D",
         "the link in one, or several links welded to each other",
         "ffrobot.scene.spatial_pieces",
     ),
     Lack(
-        "patches on bodies in pieces",
+        "patches on subdivided bodies",
         "several links welded to each other, each with its patches",
         "ffrobot.scene.spatial_pieces",
     ),
     Lack(
-        'gears that give (`stiffness` of joints) with `motors = "frame"`, where they are driven, controlled or linear',
+        'compliant gears (`stiffness` of joints) with `motors = "frame"`, where they are driven, controlled or linear',
         '`motors = "section"`',
         "ffrobot.mbs.analysis.spatial_gears",
     ),
@@ -53,7 +53,7 @@ LACKS = (
         "ffrobot.actuation.control.spatial_placement",
     ),
     Lack(
-        '`output = "redefined"` of `motors-only` in closed loops',
+        '`output = "redefined"` of `motors-only` in kinematic loops',
         '`output = "tip"`',
         "ffrobot.mbs.solve.spatial_servo",
     ),
@@ -63,9 +63,9 @@ LACKS = (
         "ffrobot.mbs.model.spatial_system",
     ),
     Lack(
-        "closed loops in each of whose joints there is a motor or a rotor, or a trajectory is followed (friction, loads"
+        "kinematic loops with a motor, a rotor or a trajectory in each joint (friction, loads"
         " and limits of positions may be in all)",
-        "one joint of the loop without: the loop is cut there",
+        "one joint of the loop without them: ffrobot cuts the loop there",
         "ffrobot.mbs.model.spatial_model",
     ),
     Lack(

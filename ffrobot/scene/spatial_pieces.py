@@ -67,18 +67,18 @@ def _problems(scene: SpatialScene, divided: Mapping[str, BodyInPieces]) -> Itera
     if not divided:
         return
     first = next(iter(divided))
-    beside = f'beside bodies in pieces ("{first}")'
+    beside = f'with subdivided bodies ("{first}")'
     for layout in scene.pzt:
         if layout.body in divided:
             yield (
-                f'pzt "{layout.label}": body: expected one that is not in pieces, found "{layout.body}": not available'
-                " in space yet"
+                f'pzt "{layout.label}": body: expected one that is not subdivided, found "{layout.body}": not available'
+                " in 3D yet"
             )
     yield from unfit_actuators((points.body for points in scene.actuation_points), scene.motors, first)
     for analysis in scene.analysis:
         if analysis.kind not in KINDS:
             yield (
-                f'analysis "{analysis.name}": kind: expected one of {quoted(KINDS)} {beside} in space, found'
+                f'analysis "{analysis.name}": kind: expected one of {quoted(KINDS)} {beside} in 3D, found'
                 f' "{analysis.kind}"'
             )
         elif analysis.is_checked:

@@ -138,7 +138,7 @@ def _link_of(
 def _body(scene: Table, name: str) -> Table:
     found = next((body for body in _bodies(scene) if body["name"] == name), None)
     if found is None:
-        raise InputError(f'--vary: expected no other name of the body "{shown(name)}" beside {LINKS}.{shown(name)}')
+        raise InputError(f'--vary: expected no other name of the body "{shown(name)}" with {LINKS}.{shown(name)}')
     return found
 
 

@@ -37,7 +37,7 @@ def check_earlier(
     kept.tree_checkpoint(point, *sizes)
     kept.expect(is_completed or point.steps.next_step > 0.0, "checkpoint", "a positive step")
     kept.expect(
-        is_recorded == (earlier.continuation.recording is not None), "recording", "one where the run is replayed"
+        is_recorded == (earlier.continuation.recording is not None), "recording", "one at which its forces are applied"
     )
     if earlier.continuation.recording is not None:
         kept.recording(earlier.continuation.recording, sum(sizes), times[-1] if is_completed else point.time)

@@ -137,8 +137,9 @@ def gear_motion(spring: GearSpring, time: Array, tau: Array, rotor: Array, gamma
     lasts, longest = spring.damping / spring.stiffness, SLOWEST * (time[-1] - time[0])
     if len(time) > 1 and lasts > longest:
         raise InputError(
-            f"{spring.where}: damping: expected a gear that gives way within {longest:.3g} s (damping / stiffness,"
-            f" {SLOWEST:g} times the analysis), found {lasts:.3g} s; without stiffness it does not give at all"
+            f"{spring.where}: damping: expected a compliant gear that relaxes within {longest:.3g} s (damping /"
+            f" stiffness, {SLOWEST:g} times the analysis), found {lasts:.3g} s; without stiffness it does not give at"
+            " all"
         )
     transmitted = tau - rotor
     twist = _twist(spring, time, transmitted)
@@ -178,7 +179,7 @@ def with_rotors(source: PlanarOutcome, model: Model) -> PlanarOutcome:
     if not source.gears:
         raise InputError(
             f'{model.scene.path}: analysis "{source.analysis.name}": expected motors that fit the mechanism'
-            f" ({model.degrees_of_freedom} of them) beside joints with stiffness, found {len(model.motors)}"
+            f" ({model.degrees_of_freedom} of them) for joints with stiffness, found {len(model.motors)}"
         )
     columns: list[list[Array]] = [[source.q], [source.v], [source.a]]
     for gear in model.gears:
@@ -221,6 +222,6 @@ def unresolved_gears(gears: Mapping[str, GearMotion]) -> Iterator[str]:
     for joint, motion in gears.items():
         if motion.unresolved > UNRESOLVED:
             yield (
-                f'joint "{joint}": outputs are too far apart for its motor behind a gear that gives: with every second'
+                f'joint "{joint}": outputs are too far apart for its motor behind a compliant gear: with every second'
                 f" one its moment changes by {100 * motion.unresolved:.2g} %; smooth the path or refine output_step"
             )

@@ -51,7 +51,7 @@ class Forward(ActuatedAnalysis):
             )
         if self.limits and self.apply not in ("joints", "joints+pzt"):
             raise ValueError(
-                f'expected limits = true only beside apply = "joints" or "joints+pzt", found apply = "{self.apply}"'
+                f'expected limits = true only with apply = "joints" or "joints+pzt", found apply = "{self.apply}"'
             )
         return self
 
@@ -129,7 +129,7 @@ def _check_applied(model: Model, analysis: Forward) -> None:
     """Raise `InputError` for an actuation that leaves motors behind gears that give without their moments."""
     if analysis.apply not in ("joints", "joints+pzt"):
         raise InputError(
-            f'{model.scene.path}: analysis "{analysis.name}": apply: expected "joints" or "joints+pzt" beside joints'
+            f'{model.scene.path}: analysis "{analysis.name}": apply: expected "joints" or "joints+pzt" for joints'
             f' with stiffness, found "{analysis.apply}"'
         )
 

@@ -261,9 +261,9 @@ def cause_of(inversion: Inversion[S]) -> str:
         return f"{ADVICE[inversion.status]} (worst at t = {inversion.worst:.4g} s)"
     k = int(changed[0])
     return (
-        f"zeros change sides along the path: {count[0]} of them are in the right half plane at t = 0,"
-        f" {count[k]} at t = {linear.times[k]:.4g} s, and no bounded motion need exist then: leave out axial and high"
-        ' modes (modes.family = "in-plane-bending" and fewer of them in the link files), or use output = "redefined"'
+        f"zeros change sides along the path: {count[0]} of them are in the right half plane at t = 0, {count[k]} at t"
+        f" = {linear.times[k]:.4g} s, so a bounded motion may not exist. Leave out axial and high modes (modes.family"
+        ' = "in-plane-bending" and fewer of them in the link files), or use output = "redefined"'
     )
 
 

@@ -25,9 +25,9 @@ ADVICE = {
     "too many steps": "raise max_steps, loosen the tolerance or leave out high modes",
     "interrupted": "stopped on request",
     "not evaluated": "its outputs could not be made from the states that it found",
-    "mesh too coarse": "motors do not get close enough to the path: vibrations of the zero dynamics that are hardly"
-    " damped take too fine a mesh; add damping, leave out high modes, smooth the path or loosen the tolerance",
-    "inversion not converged": "no motion was found that motors alone carry along the path: slow the path down, add"
+    "mesh too coarse": "motors do not get close enough to the path, as weakly damped vibrations of the zero dynamics"
+    " need too fine a mesh. Add damping, leave out high modes, smooth the path or loosen the tolerance",
+    "inversion not converged": "no motion follows the path with motor torques only: slow the path down, add"
     ' damping, leave out high modes, or use output = "redefined"',
     "diverged": "a link is bent by as much as it is long, which small deformations do not describe: loads beyond"
     " buckling, a spin that needs geometric_stiffening = true, or an arm without motors that falls apart",

@@ -68,7 +68,7 @@ def run_spatial_forward(context: SpatialContext, analysis: Forward) -> Outcome:
     warnings: tuple[str, ...] = ()
     if applied.unresolved > analysis.tolerance:
         off = f"off by {applied.unresolved:.1e} of the largest"
-        warnings = (f'the forces of "{analysis.actuation}" change too fast to be replayed: {off}',)
+        warnings = (f'the forces of "{analysis.actuation}" change too fast for a forward simulation: {off}',)
     run = spatial_drive(
         model, analysis, start, progress, drives=applied.drives, warnings=warnings,
         times=replay_times(source, analysis), earlier=context.earlier,
@@ -101,12 +101,12 @@ def _behind_gears(source: Outcome, model: SpatialModel, analysis: Forward, conte
     """Where gears of `model` give: moments at the outputs of `source` and splines between these, as in the plane."""
     if analysis.apply != "joints":
         raise InputError(
-            f'{model.scene.path}: analysis "{analysis.name}": apply: expected "joints" beside joints with stiffness,'
+            f'{model.scene.path}: analysis "{analysis.name}": apply: expected "joints" for joints with stiffness,'
             f' found "{analysis.apply}"'
         )
     if source.model.tree.gears:
         raise InputError(
-            f'{model.scene.path}: analysis "{analysis.name}": actuation: expected an inverse analysis beside joints'
+            f'{model.scene.path}: analysis "{analysis.name}": actuation: expected an inverse analysis for joints'
             f' with stiffness, found "{source.analysis.name}"'
         )
     wound = wound_up(source, model)

@@ -113,8 +113,8 @@ def left_paths(source: Outcome, run: Outcome) -> Iterator[str]:
         off = share[:, [row.is_trajectory and row.owner == path for row in model.rows]].max(axis=1)
         if off.max() > OFF_PATH:
             yield (
-                f'the forces of "{source.analysis.name}" do not keep trajectory "{path}": from'
-                f" t = {times[int(np.argmax(off > OFF_PATH))]:.4g} s on it is left, by up to {100 * off.max():.3g} % of"
-                " the robot's size, or of 1 rad: forces of time alone are unstable near singular postures; apply ="
+                f'the forces of "{source.analysis.name}" do not follow trajectory "{path}": from t ='
+                f" {times[int(np.argmax(off > OFF_PATH))]:.4g} s on the deviation is up to {100 * off.max():.3g} % of"
+                " the robot's size, or of 1 rad. Open-loop forces are unstable near singular postures; apply ="
                 ' "joints", or a controller, keeps to the path'
             )

@@ -114,7 +114,7 @@ def only(record: Record, subject: str, allowed: tuple[str, ...], optional: tuple
     """Which of the `optional` keys are set. Raises `ValueError` unless all are `allowed` and there is at least one."""
     found = [key for key in optional if getattr(record, key) is not None]
     if not found or not set(found) <= set(allowed):
-        raise ValueError(f'expected the keys {quoted(allowed)} beside "{subject}", found {quoted(found)}')
+        raise ValueError(f'expected the keys {quoted(allowed)} with "{subject}", found {quoted(found)}')
     return found
 
 

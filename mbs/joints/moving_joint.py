@@ -38,7 +38,7 @@ class MovingJoint(JointRecord):
     @model_validator(mode="after")
     def _has_friction(self) -> MovingJoint:
         if "friction_speed" in self.model_fields_set and not self.coulomb_friction:
-            raise ValueError('expected the key "friction_speed" only beside coulomb_friction, found it alone')
+            raise ValueError('expected the key "friction_speed" only with coulomb_friction, found it alone')
         return self
 
     @abstractmethod

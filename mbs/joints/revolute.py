@@ -34,9 +34,9 @@ class RevoluteJoint(MovingJoint):
     @model_validator(mode="after")
     def _has_rotor_behind_spring(self) -> RevoluteJoint:
         if self.stiffness is None and self.damping:
-            raise ValueError('expected the key "damping" only beside stiffness, found it alone')
+            raise ValueError('expected the key "damping" only with stiffness, found it alone')
         if self.stiffness is not None and not self.rotor_inertia:
-            raise ValueError("expected a rotor_inertia above 0 beside stiffness, found none: the rotor turns by itself")
+            raise ValueError("expected a rotor_inertia above 0 with stiffness, found none: the rotor turns freely")
         return self
 
     def constraints(self, angle: float) -> tuple[Measure, ...]:

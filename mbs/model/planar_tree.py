@@ -303,7 +303,8 @@ def told_in_joints(assembly: MechanismSystem, kind: str, motors: Iterable[Measur
         return PlanarTree(assembly, motors)
     except NotInTreeError as why:
         raise InputError(
-            f'{assembly.model.scene.path}: expected for kind = "{kind}" what joint coordinates can tell, found {why}'
+            f'{assembly.model.scene.path}: expected for kind = "{kind}" quantities that joint coordinates define,'
+            f" found {why}"
         ) from None
 
 

@@ -237,7 +237,7 @@ def _spin_inertia(name: str, body: ModalBody) -> tuple[float, Array, Array]:
     if body.kind != "beam":
         return 0.0, np.zeros(body.mode_count), np.zeros((body.mode_count, body.mode_count))
     raise InputError(
-        f'body "{name}": expected a modal body file with the inertia of the beam about its own axis (invariants/J_spin,'
-        ' h_spin, S_spin), which space = "spatial" needs, found one of an earlier version without: make it again from'
-        " its link file with `ffrobot link`"
+        f'body "{name}": expected a modal body file with the inertia of the beam about its own axis'
+        ' (invariants/J_spin, h_spin, S_spin), which space = "spatial" needs, found one of an earlier version without'
+        " it. Recompute it from its link file with `ffrobot link`"
     )

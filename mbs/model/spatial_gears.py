@@ -70,8 +70,8 @@ def with_held_motors(model: SpatialModel) -> SpatialModel:
     for row in found.rows if outputs else ():
         if row.is_trajectory and (row.kind != "coordinate" or row.coordinate in behind):
             raise InputError(
-                f'{model.scene.path}: trajectory: expected motors ("motor") in all of them, or in none, where gears'
-                f' give, found "{row.owner}" beside trajectories of motors'
+                f'{model.scene.path}: trajectory: expected motors ("motor") in all of them, or in none, with compliant'
+                f' gears, found "{row.owner}" with trajectories of motors'
             )
     return found
 
@@ -80,8 +80,8 @@ def refuse_held_motors(model: SpatialModel, analysis: Analysis) -> None:
     """Raise `InputError` where gears that give leave an analysis nothing to do with trajectories of motors."""
     if any(path.motor for path in model.scene.trajectory) and elastic_joints(model):
         raise InputError(
-            f'{model.scene.path}: analysis "{analysis.name}": kind: expected "pcid" or "static" beside trajectories of'
-            f' motors whose gears give, found "{analysis.kind}": the robot behind them is not prescribed'
+            f'{model.scene.path}: analysis "{analysis.name}": kind: expected "pcid" or "static" with trajectories of'
+            f' motors with compliant gears, found "{analysis.kind}": the robot behind them is not prescribed'
         )
 
 

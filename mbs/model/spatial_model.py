@@ -115,8 +115,8 @@ def _check_cut_joints(scene: SpatialMechanismScene, tree: SpatialTree) -> None:
         if found := joint.asks_for_coordinate:
             raise InputError(
                 f"{scene.path}: {joint.label}: expected a loop with a joint that has no motor, no rotor and no"
-                f" trajectory, where it is cut, found {quoted(found)} here and one of them in each of the others: not"
-                " available in space yet"
+                f" trajectory, to be cut, found {quoted(found)} here and one of them in each of the others: not"
+                " available in 3D yet"
             )
 
 

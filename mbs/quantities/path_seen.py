@@ -49,8 +49,8 @@ def _unseen(path: Path, times: Array, analysis: TimedAnalysis) -> Iterator[str]:
         if rate[k] > MISSED * (at_outputs := float(np.abs(target.sample(seen)[1]).max())):
             yield (
                 f'trajectory "{path.name}": moves between outputs, at t = {between[k]:.4g} s with a rate of'
-                f" {rate[k]:.4g}, and no output has more than {at_outputs:.4g} (SI units): peaks and verdicts count it,"
-                f" histories and figures do not show it; an output_step of {_enough(target, between, k):.1g} s does"
+                f" {rate[k]:.4g}, but at outputs at most {at_outputs:.4g} (SI units). Peaks and verdicts include it,"
+                f" histories and figures do not; use an output_step of {_enough(target, between, k):.1g} s does"
             )
             return
 

@@ -40,7 +40,7 @@ def _violated(motion: SpatialMotion, allowed: float) -> Iterator[str]:
         row = motion.model.rows[k]
         yield (
             f'{"trajectory" if row.is_trajectory else "joint"} "{row.owner}" is violated by {C[at, k]:.3g}'
-            f" {'m' if is_way[k] else 'rad'} at t = {motion.time[at]:.6g} s: what was found is no motion of this robot;"
+            f" {'m' if is_way[k] else 'rad'} at t = {motion.time[at]:.6g} s: the result is not a motion of this robot;"
             " choose a smaller tolerance or another integrator"
         )
 

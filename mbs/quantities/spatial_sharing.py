@@ -43,9 +43,9 @@ class Sharing:
         """One sentence."""
         of_joints = "; ".join(f'"{joint}" ({", ".join(of)})' for joint, of in self.components.items())
         return (
-            f"{self.redundant} constraints of closed loops are redundant: nothing determines how these reactions are"
-            f" shared: {of_joints}; written is the split of least squares; give links modes, or loops joints that hold"
-            " less"
+            f"{self.redundant} constraints of kinematic loops are redundant: nothing determines how these reactions"
+            f" are shared: {of_joints}; the results are the least-squares solution. Use flexible links, or joints with"
+            " more degrees of freedom in loops"
         )
 
 

@@ -199,9 +199,7 @@ class IntegratedAnalysis(TimedAnalysis):
                 f' "{self.integrator}"'
             )
         if self.is_checked:
-            raise ValueError(
-                'repeat_steps: expected no "check" beside it, found one: finer links want steps of their own'
-            )
+            raise ValueError('repeat_steps: expected no "check" with it, found one: finer links need their own steps')
         return self
 
 
@@ -250,7 +248,7 @@ class ActuatedAnalysis(IntegratedAnalysis):
             )
         elif isinstance(source, IntegratedAnalysis) and source.integrator == "generalized-alpha":
             yield (
-                f"actuation: expected an analysis whose steps can be made again to replay it (any integrator but"
+                f"actuation: expected an analysis with reproducible steps (any integrator but"
                 f' "generalized-alpha"), found "{source.name}" with that'
             )
         elif self.end > source.last_time:

@@ -77,7 +77,7 @@ class BodyKeys(Record):
             raise ValueError(f'expected the key "modes" only in flexible bodies, found it in a rigid one: {self.modes}')
         if self.pieces is not None and (self.link is None or self.modes is not None):
             beside = "modes" if self.modes is not None else "modal" if self.modal is not None else "rigid"
-            raise ValueError(f'expected "pieces" beside "link" alone, found "{beside}"')
+            raise ValueError(f'expected "pieces" with "link" alone, found "{beside}"')
         return self
 
 

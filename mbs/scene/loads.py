@@ -59,7 +59,7 @@ class Load(Record):
         allowed = {"point": ("x", "y", "moment", "force"), "joint": ("moment",), "pzt": ("voltage",)}[subject]
         found = only(self, subject, allowed, ("x", "y", "moment", "force", "voltage"))
         if self.force is not None and len(found) > 1:
-            raise ValueError(f'expected "force" alone beside "point", found {quoted(found)}')
+            raise ValueError(f'expected "force" alone with "point", found {quoted(found)}')
         return self
 
     def references(self) -> Iterator[Reference]:

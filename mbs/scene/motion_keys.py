@@ -107,7 +107,7 @@ class MotionKeys(Record):
         """
         given = [key for key in (*OF_LEGS, "profile", "smoothness", "shaper") if key in self.model_fields_set]
         if self.via is None and waypoints is None and given:
-            raise ValueError(f'expected {quoted(given)} only beside "via" or "waypoints", found neither')
+            raise ValueError(f'expected {quoted(given)} only with "via" or "waypoints", found neither')
         if waypoints is not None:
             self._check_table(given)
         if self.via is not None:
@@ -116,9 +116,9 @@ class MotionKeys(Record):
     def _check_table(self, given: list[str]) -> None:
         refused = [key for key in given if key in OF_LEGS]
         if refused:
-            raise ValueError(f'expected {quoted(refused)} only beside "via", found them beside "waypoints"')
+            raise ValueError(f'expected {quoted(refused)} only with "via", found them with "waypoints"')
         if self.profile in (None, "spline") and self.smoothness is not None:
-            raise ValueError('expected no key "smoothness" beside profile = "spline", found it there')
+            raise ValueError('expected no key "smoothness" with profile = "spline", found it there')
 
     def _check_via(self, via: tuple[Place, ...], places: Mapping[int, str]) -> None:
         sizes = {int(np.size(place)) for place in via}
@@ -126,7 +126,7 @@ class MotionKeys(Record):
             wanted = " or ".join(places.values()) + (", all alike," if len(places) > 1 else "")
             raise ValueError(f"expected {wanted} in via, found {[list(p) if isinstance(p, tuple) else p for p in via]}")
         if self.profile == "spline":
-            raise ValueError('expected profile = "spline" only beside "waypoints", found it beside "via"')
+            raise ValueError('expected profile = "spline" only with "waypoints", found it with "via"')
         for k, (place, following) in enumerate(pairwise(via), 1):
             if place == following:
                 raise ValueError(f"expected places in via that differ (a rest is a hold), found no. {k} twice")
@@ -142,11 +142,11 @@ class MotionKeys(Record):
         limits = [key for key in LIMITS if getattr(self, key) is not None]
         if bool(limits) == (self.duration is not None):
             found = "both" if limits else "neither"
-            raise ValueError(f'expected either limits ({quoted(LIMITS)}) or a "duration" beside "via", found {found}')
+            raise ValueError(f'expected either limits ({quoted(LIMITS)}) or a "duration" with "via", found {found}')
         if self.profile in ("s-curve", "trapezoid") and limits == ["speed"]:
-            raise ValueError(f'expected "acceleration" or "jerk" beside profile = "{self.profile}", found only "speed"')
+            raise ValueError(f'expected "acceleration" or "jerk" with profile = "{self.profile}", found only "speed"')
         if self.profile == "trapezoid" and self.jerk is not None:
-            raise ValueError('expected no "jerk" beside profile = "trapezoid" (its acceleration jumps), found it')
+            raise ValueError('expected no "jerk" with profile = "trapezoid" (its acceleration jumps), found it')
 
     def motion(self, waypoints: Waypoints | None) -> Piecewise | None:
         """The motion of all components; None where it is given by expressions."""

@@ -70,9 +70,9 @@ def _bent(assembly: MechanismSystem, q: Array) -> str:
     if most < FAR_BENT:
         return ""
     return (
-        f'"{name}" is bent by {100 * most:.0f} % of its length, which small deformations do not describe: a load beyond'
-        " buckling, a spin that needs geometric_stiffening = true, a link too soft, or an arm without motors that falls"
-        " apart"
+        f'"{name}" is bent by {100 * most:.0f} % of its length, which violates small deformations. Possible causes: a'
+        " load beyond buckling, a spin that needs geometric_stiffening = true, a link too soft, or an arm without"
+        " motors that falls apart"
     )
 
 
@@ -91,6 +91,6 @@ def _singular(assembly: MechanismSystem, t: float, q: Array) -> str:
     involved = dict.fromkeys(c.measure.label for c, w in zip(assembly.constraints, weights, strict=True) if w > 0.1)
     return (
         f"the configuration is singular or nearly so (ratio of singular values {ratio:.1g}; {'; '.join(involved)}):"
-        " an arm stretched or folded, or a mechanism at a dead centre, where no finite force on the driven point says"
-        " which way to go on; keep clear of it, or drive a joint instead"
+        " an arm stretched or folded, or a mechanism at a dead centre, where forces on the driven point do not"
+        " determine the direction of motion. Avoid it, or drive a joint instead"
     )

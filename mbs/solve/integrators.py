@@ -37,7 +37,7 @@ NEGLIGIBLE_DOP853, NEGLIGIBLE_RADAU = 0.1, 1.0
 
 MOST_COORDINATES = 600  # beyond them the eigenproblem takes longer than many a run
 MANY_PERIODS = 1e5
-ASKED_FOR = "asked for"
+ASKED_FOR = "requested"
 REPEATED = "steps taken again"
 EXPLICIT = ("dopri5", "dop853")
 
@@ -108,13 +108,13 @@ def choose_integrator(
     if outputs == 1:
         return Choice("dop853", "nothing to integrate")
     if assembly.model.gears:
-        return Choice("dop853", "springs in joints are not among the stiff forces of implicit integrators")
+        return Choice("dop853", "the estimate does not include vibrations of compliant gears")
     highest = max((float(np.sqrt(body.stiffness.max(initial=0.0))) for body in assembly.model.bodies), default=0.0)
     if highest == 0.0:
         return Choice("dop853", "nothing vibrates")
     if len(start.q) > MOST_COORDINATES:
         name = "radau" if highest * analysis.end > MANY_PERIODS else "dop853"
-        return Choice(name, f"links vibrate at up to {highest:.3g} rad/s (more coordinates than are looked at closely)")
+        return Choice(name, f"links vibrate at up to {highest:.3g} rad/s (too many coordinates for a closer estimate)")
     modes = vibrations(assembly, start)
     if not len(modes.frequency):
         return Choice("dop853", "nothing vibrates")
@@ -142,8 +142,8 @@ def faster_of(
     implicit = phase(NEGLIGIBLE_RADAU * analysis.tolerance) / (RESOLVED_RADAU * scale ** (1 / 5))
     explicit, implicit = max(analysis.end * top / STABLE, explicit), max(outputs, implicit) + STEPS_TO_START
     rings = excited > analysis.tolerance
-    felt = f"{frequency[rings].max():.3g} rad/s" if rings.any() else "no frequency"
-    reason = f"vibrations up to {top:.3g} rad/s, ringing above the tolerance up to {felt}"
+    felt = f"{frequency[rings].max():.3g} rad/s" if rings.any() else "none"
+    reason = f"highest natural frequency {top:.3g} rad/s, highest excited frequency {felt}"
     dop853 = Candidate("dop853", 1.0, analysis.end / explicit)
     radau = Candidate("radau", cost, analysis.end / (cost * implicit))
     first, second = (radau, dop853) if radau.pace > dop853.pace else (dop853, radau)
@@ -186,7 +186,7 @@ def beyond_order(choice: Choice, analysis: IntegratedAnalysis) -> str:
         return ""
     return (
         f"a tolerance of {analysis.tolerance:g} is below what generalized-alpha reaches here: at order 2 it takes steps"
-        ' too short to get anywhere, down to rounding; loosen the tolerance, or use integrator = "radau" or "dop853"'
+        ' too short to advance, down to round-off; loosen the tolerance, or use integrator = "radau" or "dop853"'
     )
 
 
@@ -209,7 +209,7 @@ def unmet(choice: Choice, run: _core.Run | _core.TreeRun) -> str:
     else:
         saw = f"the equations of a step of {run.last_step:.2g} s could not be solved"
     return (
-        f"{saw} ({choice.name}), and neither loads nor the configuration there tell why; loosen the tolerance, or use"
+        f"{saw} ({choice.name}), and neither loads nor the configuration explain it; loosen the tolerance, or use"
         " another integrator"
     )
 

@@ -52,8 +52,8 @@ def common_modes(path: Path, found: Sequence[tuple[Array, Array]], modes: int) -
     most = min(len(omega) for omega, _ in found)
     if most < modes:
         raise InputError(
-            f"{path}: trajectory: shaper.modes: expected at most {most}, as many as there are vibrations while the path"
-            f" is held, found {modes}"
+            f"{path}: trajectory: shaper.modes: expected at most {most}, the number of vibrations on the constrained"
+            f" path, found {modes}"
         )
     frequency = np.array([omega[:modes] for omega, _ in found]) / (2 * np.pi)
     return PathFrequencies(as_floats(frequency), np.array([ratio[:modes] for _, ratio in found]))

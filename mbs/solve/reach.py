@@ -87,8 +87,8 @@ def unreachable(assembly: MechanismSystem, t: float, q: Array) -> str:
     how = (
         "cannot reach from the guess in initial.angles (rad)"
         if solve_positions(assembly, t, q) is None
-        else "reach only in a singular configuration (stretched, folded, at a dead centre), from which no force on it"
-        " says which way they go on: keep clear of it, or drive a joint instead"
+        else "reach only in a singular configuration (stretched, folded, at a dead centre), where forces on it do not"
+        " determine the direction of motion. Avoid it, or drive a joint instead"
     )
     scene = assembly.model.scene
     only_joints = MechanismSystem(assembly.model, assembly.model.joints)

@@ -56,11 +56,11 @@ def check_regular(assembly: MechanismSystem, q: Array) -> None:
     if missing and beside is not None and rank_ratio(loop, 0.0, beside) < SINGULAR:
         raise InputError(
             f"{path}: joint: expected joints that each take something away from the motion, found {missing} too many"
-            f" among {owners(loop.constraints)}: in this geometry (parallel cranks?) rigid links move all the same, and"
-            " nothing says how the force is shared; leave a joint out, or give the links modes"
+            f" among {owners(loop.constraints)}: in this geometry (parallel cranks?) rigid links move all the same,"
+            " and the distribution of the force is undetermined. Omit a joint, or use flexible links"
         )
     raise InputError(
         f"{path}: initial: expected a configuration in which the links can follow {names} in every direction, found a"
-        " singular one (an arm stretched or folded, a mechanism at a dead centre?): bend it, or move the start of the"
-        " trajectory"
+        " singular one (an arm stretched or folded, a mechanism at a dead centre?). Bend it, or move the start of"
+        " the trajectory"
     )

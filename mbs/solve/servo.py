@@ -114,8 +114,8 @@ def make_servo(model: Model, end: float, where: str, factor: float) -> Servo:
             )
     if not any(body.n_modes for body in model.bodies):
         raise InputError(
-            f'{where}: expected at least one flexible body for kind = "motors-only", found only rigid ones:'
-            ' kind = "pcid" gives their motors\' forces'
+            f'{where}: expected at least one flexible body for kind = "motors-only", found only rigid ones: use kind'
+            ' = "pcid"'
         )
     rows = list(model.motors.values())
     held = [Constraint(c.measure, c.target.held(0.0, end), c.owner, c.component, True) for c in model.trajectories]

@@ -53,7 +53,7 @@ def choose_integrator_in_space(
     if not any(node.body.n_modes for node in model.tree.nodes):
         return Choice("dop853", "nothing vibrates")
     if model.tree.gears:
-        return Choice("dop853", "springs in joints are not among the stiff forces of implicit integrators")
+        return Choice("dop853", "the estimate does not include vibrations of compliant gears")
     if is_sampled:
         return Choice("dop853", "every sample of the controller begins anew")
     found = vibrations_in_space(model, without_rows(model), 0.0, start.q)

@@ -229,14 +229,14 @@ def check_path(model: SpatialModel, q: Array) -> Iterator[str]:
     if found.followed < rows:
         raise InputError(
             f"{path}: initial: expected a posture in which the links can follow {names} in every direction, found a"
-            " singular one (two axes in line, an arm stretched or folded?): bend it, or move the start of the path"
+            " singular one (two axes in line, an arm stretched or folded?). Bend it, or move the start of the path"
         )
     if found.ratio < NEARLY_SINGULAR:
         yield f"near a singular posture at the start: {names} can hardly be followed (ratio {found.ratio:.1e})"
     if rows and found.followed < found.freedom:
         yield (
-            f"{found.freedom - found.followed} degrees of freedom are not prescribed: {', '.join(found.left)} move by"
-            " themselves, as links and gravity have it; prescribe a joint by a trajectory, or say redundancy ="
+            f"{found.freedom - found.followed} degrees of freedom are not prescribed: {', '.join(found.left)} are"
+            " unactuated and follow gravity and inertia; prescribe a joint by a trajectory, or set redundancy ="
             ' "least-motion" or "least-torque"'
         )
     if rows:
@@ -255,7 +255,7 @@ def _check_motors(model: SpatialModel, found: Mobility) -> Iterator[str]:
         moving = [joint.name for joint in _movable(model) if joint.name not in motors and joint.type != "free"]
         if moving:
             names = ", ".join(moving)
-            yield f"joints without motor: {names}: motors alone cannot hold the path, their moments are none"
+            yield f"joints without motor: {names}: motor torques for the path are undetermined and not computed"
 
 
 def _movable(model: SpatialModel) -> Iterator[SpatialJoint]:

@@ -62,13 +62,13 @@ def _check(model: SpatialModel, criterion: str, found: Mobility) -> None:
     path = model.scene.path
     if found.followed == found.freedom:
         raise InputError(
-            f"{path}: redundancy: expected a mechanism with more freedom than its trajectories prescribe, found"
-            f" {found.freedom} degrees of freedom and as many components: leave the key out"
+            f"{path}: redundancy: expected a mechanism with more degrees of freedom than its trajectories prescribe,"
+            f" found {found.freedom} degrees of freedom and as many components: leave the key out"
         )
     if criterion == "least-torque" and model.loop_rows.any():
         raise InputError(
-            f'{path}: redundancy: expected "least-motion" of a mechanism with closed loops, found "least-torque": it is'
-            " there for open chains"
+            f'{path}: redundancy: expected "least-motion" of a mechanism with kinematic loops, found "least-torque",'
+            " which supports open chains only"
         )
     for node in model.tree.nodes:
         if node.joint.q_count != node.joint.freedoms:

@@ -137,13 +137,13 @@ def make_spatial_servo(
             )
     if not any(node.body.n_modes for node in model.tree.nodes):
         raise InputError(
-            f'{where}: expected at least one flexible body for kind = "motors-only", found only rigid ones: kind ='
-            ' "pcid" gives their motors\' forces'
+            f'{where}: expected at least one flexible body for kind = "motors-only", found only rigid ones: use kind'
+            ' = "pcid"'
         )
     if factor != 1.0 and model.loop_rows.any():
         raise InputError(
-            f'{where}: expected an open chain for output = "redefined" in space = "spatial", found a closed loop: use'
-            ' output = "tip"'
+            f'{where}: expected an open chain for output = "redefined" in space = "spatial", found a kinematic loop:'
+            ' use output = "tip"'
         )
     times = as_floats(np.linspace(0.0, end, POSTURES))
     near = [start]

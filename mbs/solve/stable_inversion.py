@@ -88,7 +88,7 @@ def invert(
     if len(start.rows) + len(finish.rows) != 2 * len(servo.scale):
         raise SolveError(
             f"{servo.where}: stable inversion needs as many zeros in the right half plane at t = 0 s as at t ="
-            f" {end:g} s, found {2 * len(servo.scale) - len(start.rows)} and {len(finish.rows)}: take another number of"
+            f" {end:g} s, found {2 * len(servo.scale) - len(start.rows)} and {len(finish.rows)}. Change the number of"
             ' modes in the link files, end the path in a posture more like the first, or use output = "redefined"'
         )
     problem = Problem(

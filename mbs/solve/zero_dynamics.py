@@ -112,6 +112,6 @@ def _check_numbers(servo: Output, times: Array, *found: Array) -> None:
     lost = np.any([~np.isfinite(x.reshape(len(times), -1)).all(axis=1) for x in found], axis=0)
     if lost.any():
         raise SolveError(
-            f"{servo.where}: motors alone cannot carry the path at t = {times[lost.argmax()]:g} s: the links are too"
-            " soft for their loads there; slow the path down"
+            f"{servo.where}: motor torques alone cannot follow the path at t = {times[lost.argmax()]:g} s: the links"
+            " are too soft for their loads there; slow the path down"
         )

@@ -135,7 +135,7 @@ def test_modes_that_no_patch_reaches_are_named(all_modes):
 
 @pytest.mark.parametrize("centers", [(0.3, 0.3), (0.3, 0.34), (0.5, 0.2, 0.46)])
 def test_overlapping_patches_are_refused(cantilever, centers):
-    with pytest.raises(InputError, match=r'pzt "link": expected patches beside each other, found patch 1 .* and patch'):
+    with pytest.raises(InputError, match=r'pzt "link": expected patches side by side, found patch 1 .* and patch'):
         patches(cantilever(10), centers=centers)
     assert len(patches(cantilever(10), centers=(0.3, 0.35)).edges) == 2  # side by side they may lie
 

@@ -107,7 +107,7 @@ def test_voltages_over_a_path(arm):
 
 
 def test_what_cannot_be_placed_is_refused(arm):
-    with pytest.raises(InputError, match="expected patches that fit beside each other"):
+    with pytest.raises(InputError, match="expected patches that fit side by side"):
         placed(arm, 21)
     with pytest.raises(InputError, match=r"placement.modes: expected at most 6, found 7"):
         placed(arm, 2, modes=7)

@@ -273,10 +273,10 @@ def test_voltages_of_two_planes_do_not_disturb_each_other(link):
     ("keys", "message"),
     [
         ({"bends": "twist"}, "plain piezoceramic strains alike in all directions of its plane and twists at no angle"),
-        ({"bends": "twist", "fibre_angle": 0.0}, "expected fibres at an angle that shear under a voltage"),
-        ({"bends": "twist", "fibre_angle": "90*deg"}, "expected fibres at an angle that shear under a voltage"),
+        ({"bends": "twist", "fibre_angle": 0.0}, "expected fibers at an angle that shear under a voltage"),
+        ({"bends": "twist", "fibre_angle": "90*deg"}, "expected fibers at an angle that shear under a voltage"),
         ({"bends": "out-of-plane", "face": "+y"}, r'expected face "\+z", "-z", "both"'),
-        ({"face": "-z"}, r'expected face "\+y", "-y", "both" beside bends = "in-plane"'),
+        ({"face": "-z"}, r'expected face "\+y", "-y", "both" with bends = "in-plane"'),
         ({"d33": 4e-10}, r'expected the keys "fibre_angle", "modulus_across"'),
         ({"fibre_angle": 0.3, "poissons_ratio": 1.5}, "expected a poissons_ratio between -1.38 and 1.38"),
         ({"bends": "sideways"}, "in-plane"),
@@ -291,7 +291,7 @@ def test_isotropic_layers_twist_at_no_angle():
     """Alike along and across, moduli of an isotropic layer: no shear under a voltage at any angle."""
     alike = {"d33": 110e-12, "d31": 110e-12, "modulus": 60e9, "modulus_across": 60e9, "poissons_ratio": 0.3}
     for angle in np.linspace(0.1, 3.0, 7):
-        with pytest.raises(InputError, match="expected fibres at an angle that shear under a voltage"):
+        with pytest.raises(InputError, match="expected fibers at an angle that shear under a voltage"):
             layout(bends="twist", fibre_angle=float(angle), **alike, shear_modulus=60e9 / 2.6)
 
 
@@ -309,6 +309,6 @@ def test_patches_that_do_not_fit_their_link(link):
     for allocation in ("exact", "least-squares"):
         with pytest.raises(InputError, match=r'bends: expected modes of the link that patches for "in-plane" reach'):
             link_patches(SCENE, [layout(allocation=allocation)], upright, from_modal_body("link", upright))
-    with pytest.raises(InputError, match="expected no weights beside other layouts"):
+    with pytest.raises(InputError, match="expected no weights with other layouts"):
         link_patches(SCENE, [layout(name="a", point_weights={"tip": 1.0}), layout(name="b", bends="out-of-plane")],
                      body, spatial)  # fmt: skip

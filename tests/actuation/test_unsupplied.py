@@ -135,7 +135,9 @@ def test_sag_at_the_start():
 def test_what_is_said(tmp_path):
     trajectory = [{"name": "tip", "point": "link1.tip", "y": quintic(-0.15, 0.3, 1.0)}]
     scene = chain((0.8,), (0.012,), (-0.2,), 0.5, {}, trajectory, [run_for(1.0)])
-    with pytest.warns(library.FfrobotWarning, match=r'nothing supplies the modal forces of link1.*"motors-only"'):
+    with pytest.warns(
+        library.FfrobotWarning, match=r'no actuator provides all modal forces required on link1.*"motors-only"'
+    ):
         results = library.solve(scene, tmp_path / "one.h5")
     about = results.attributes("inverse/feasibility/unsupplied")
     assert list(about["bodies"]) == ["link1"]

@@ -123,7 +123,7 @@ def test_given_voltages_bend_the_link_as_they_do_without_gravity(tmp_path, ffrob
             '["30"]',
             'voltage: expected 2 expressions, one for each patch of "other", found 1',
         ),
-        ('voltage = ["30", "30"]', 'moment = "1"', 'expected the keys "voltage" beside "pzt", found "moment"'),
+        ('voltage = ["30", "30"]', 'moment = "1"', 'expected the keys "voltage" with "pzt", found "moment"'),
     ],
 )
 def test_mistakes_in_given_voltages(old, new, message, tmp_path, ffrobot):

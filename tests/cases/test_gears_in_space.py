@@ -247,8 +247,8 @@ def _rod(mass, length):
 @pytest.mark.parametrize(
     ("keys", "told"),
     [
-        ({"stiffness": 10.0}, "rotor_inertia above 0 beside stiffness"),
-        ({"damping": 1.0}, '"damping" only beside stiffness'),
+        ({"stiffness": 10.0}, "rotor_inertia above 0 with stiffness"),
+        ({"damping": 1.0}, '"damping" only with stiffness'),
         (GIVES | {"motor": False}, "stiffness: expected a joint with a motor, found one without"),
     ],
 )

@@ -120,7 +120,7 @@ def test_computed_torque_knows_the_friction_of_the_joint_that_is_cut(cut):
 @pytest.mark.parametrize("keys", [{"motor": True}, {"rotor_inertia": 1e-3}])
 def test_a_motor_or_a_rotor_in_all_joints_is_refused(keys):
     scene = ffrobot.make_scene(**in_space(dict.fromkeys(SIDES, keys), [INVERSE]))
-    expected = 'joint "D": expected a loop with a joint that has no motor, no rotor and no trajectory, where it is cut'
+    expected = 'joint "D": expected a loop with a joint that has no motor, no rotor and no trajectory, to be cut'
     with pytest.raises(ffrobot.InputError, match=f'{expected}, found "{next(iter(keys))}"'):
         ffrobot.solve(scene)
 

@@ -246,10 +246,10 @@ def test_places_go_with_an_orientation_of_their_own():
             r"expected places \[x, y\] or \[x, y, z\] or .*, all alike, in via",
         ),
         ([[0.0] * 3, [1.0] * 6], {"duration": 1.0}, "all alike, in via"),
-        ([FROM, TO], {"speed": 1.0}, 'expected a "duration" beside poses in via'),
+        ([FROM, TO], {"speed": 1.0}, 'expected a "duration" with poses in via'),
         ([FROM, TO], {"duration": 1.0, "rpy": ["0", "0", "0"]}, 'expected an orientation either in via or by "rpy"'),
         ([FROM[:3], TO[:3]], {"duration": 1.0, "x": "t"}, "expected either waypoints, via or expressions"),
-        ([FROM[:3], TO[:3]], {}, r'expected either limits \(.*\) or a "duration" beside "via", found neither'),
+        ([FROM[:3], TO[:3]], {}, r'expected either limits \(.*\) or a "duration" with "via", found neither'),
         ([[0.0] * 3 + [0, 0, a] for a in (0, 3, 6)], {"duration": 1.0}, "place no. .: expected orientations within"),
     ],
 )
@@ -262,7 +262,7 @@ def test_mistakes_in_places_are_told(via, keys, told):
     ("change", "told"),
     [
         ({"joint": {"motor": False}}, 'motor: expected a joint with a motor, found "shoulder", which has none'),
-        ({"analysis": {"kind": "fcid", "shape": "zero"}}, 'expected "pcid" or "static" beside trajectories of motors'),
+        ({"analysis": {"kind": "fcid", "shape": "zero"}}, 'expected "pcid" or "static" with trajectories of motors'),
         ({"path": {"joint": "shoulder"}}, 'exactly one of the keys "point", "joint", "motor"'),
     ],
 )

@@ -255,14 +255,14 @@ def test_what_no_patch_reaches_is_told_mode_by_mode(tmp_path, ffrobot):
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ('name = "other"', 'name = "one"', 'pzt "one": name: expected a name of its own for each layout on a body'),
+        ('name = "other"', 'name = "one"', 'pzt "one": name: expected a separate name for each layout on a body'),
         ('body = "link"', 'body = "lnk"', 'expected one of the bodies "link", found "lnk"'),
         ('bends = "out-of-plane"', 'bends = "twist"', "plain piezoceramic strains alike in all directions"),
         ("count = 4", "count = 1", "expected as many patches as modes"),
         (
             "limit = 200.0",
             'coupling = "surface"',
-            'expected bends = "in-plane" and no fibres beside coupling = "surface"',
+            'expected bends = "in-plane" and no fibers with coupling = "surface"',
         ),
     ],
 )

@@ -6,7 +6,7 @@ from space import solved, write_scene
 
 MASS, CENTER = 0.3, [0.03, -0.02, 0.05]
 SLIGHT = 1e-12  # kg·m²: rigid bodies have to have some; it is 1e-9 of that of the payload about the point
-MOMENTS = {"point masses beside the section": [0.0, 0.0, 0.0], "rods": [0.0, 2e-4, 2e-4]}
+MOMENTS = {"point masses next to the section": [0.0, 0.0, 0.0], "rods": [0.0, 2e-4, 2e-4]}
 SHORT = ("end = 0.6\noutput_step = 0.02\ntolerance = 1e-08", "end = 0.1\noutput_step = 0.02\ntolerance = 1e-09")
 ANALYSES = """
 [[analysis]]

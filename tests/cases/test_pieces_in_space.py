@@ -259,22 +259,22 @@ def test_auto_takes_as_many_as_the_deflection_needs():
 
 
 MISTAKES = {
-    r'body "beam": expected "pieces" beside "link" alone, found "modes"': {
+    r'body "beam": expected "pieces" with "link" alone, found "modes"': {
         "body": [{"name": "beam", "link": link(), "pieces": 2, "modes": 2}]
     },
-    r'motors: expected "section" beside bodies in pieces \("beam"\), found "frame"': {"motors": "frame"},
-    r'"static", "linear", "closed-loop" beside bodies in pieces \("beam"\) in space, found "fcid"': {
+    r'motors: expected "section" with subdivided bodies \("beam"\), found "frame"': {"motors": "frame"},
+    r'"static", "linear", "closed-loop" with subdivided bodies \("beam"\) in 3D, found "fcid"': {
         "analysis": [{"name": "straight", "kind": "fcid", "shape": "zero", "end": 1.0, "output_step": 0.1}],
         "trajectory": [{"name": "tip", "point": "beam.tip", "x": "t"}],
     },
-    r'body: expected one that is not in pieces, found "beam": not available in space yet': {
+    r'body: expected one that is not subdivided, found "beam": not available in 3D yet': {
         "pzt": [{"body": "beam", "count": 2, "length": 0.05, "width": 0.01, "thickness": 1e-3, "modulus": 6e10,
                  "d31": 1e-10, "allocation": "least-squares"}]
     },
-    r"damping: expected none or rayleigh = \[0.0, b\] of a body in pieces": {
+    r"damping: expected none or rayleigh = \[0.0, b\] of a subdivided body": {
         "body": [{"name": "beam", "link": link(damping={"ratio": 0.01}), "pieces": 2}]
     },
-    r'modes.family: expected "in-plane-bending", "out-of-plane-bending" among those of a body in pieces': {
+    r'modes.family: expected "in-plane-bending", "out-of-plane-bending" among those of a subdivided body': {
         "body": [{"name": "beam", "link": link(modes={"count": 2, "family": ["torsion"]}), "pieces": 2}]
     },
 }  # fmt: skip

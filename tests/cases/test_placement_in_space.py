@@ -90,7 +90,7 @@ def test_patches_out_of_plane_reach_modes_out_of_plane_alone(tmp_path):
     ("layouts", "placement", "expected"),
     [
         ([LAYOUT], {"body": "hub"}, 'found "hub"'),
-        ([LAYOUT], {"body": "arm", "count": 20}, "expected patches that fit beside each other"),
+        ([LAYOUT], {"body": "arm", "count": 20}, "expected patches that fit side by side"),
         ([LAYOUT], {"body": "arm", "modes": 9}, "placement.modes: expected at most"),
         ([LAYOUT, LAYOUT | BESIDE], {"body": "arm"}, "one layout of patches"),
         ([LAYOUT], {"body": "arm", "criterion": "voltage"}, "about: expected an earlier analysis"),

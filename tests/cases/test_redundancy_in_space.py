@@ -157,7 +157,7 @@ def test_flexible_arm_on_a_turntable_follows_its_path_and_comes_back(tmp_path, c
 def test_keys_that_settle_nothing_are_refused(tmp_path):
     tables = arm(RUN, redundancy="least-motion")
     tables["trajectory"].append({"name": "held", "joint": "q3", "value": "0.3"})
-    with pytest.raises(InputError, match="redundancy: expected a mechanism with more freedom"):
+    with pytest.raises(InputError, match="redundancy: expected a mechanism with more degrees of freedom"):
         solve(tables, tmp_path)
     with pytest.raises(InputError, match="redundancy: expected"):
         solve(arm(RUN, redundancy="least"), tmp_path)

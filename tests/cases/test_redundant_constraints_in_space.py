@@ -98,7 +98,7 @@ def test_parallel_axes_of_rigid_links():
     flat, along = (four_bar(bar("coupler", 0.4, 0.7), [0.0, -9.8, g]) for g in (0.0, -3.0))
     assert opened(along) == {name: ["z", "mx", "my"] for name in NAMES}
     (text,) = redundant(along)
-    assert text.startswith("3 constraints of closed loops are redundant")
+    assert text.startswith("3 constraints of kinematic loops are redundant")
     assert '"j4" (z, mx, my)' in text
     of_ground = sum(along[f"inv/joints/{name}/reaction"][:, 2] for name in ("j1", "j4"))
     np.testing.assert_allclose(of_ground, 3.0 * 1.8, rtol=1e-12)

@@ -72,8 +72,8 @@ ARMS = {
     "patches": (
         [("revolute", GEAR | LIMITED), ("revolute", {})], (0,), {"pzt": [{"body": "b0", **PATCHES}]}
     ),
-    "a gear that gives": ([("revolute", SOFT | ROUGH), ("revolute", ROUGH)], (), {}),
-    "a gear that gives and a link that bends": ([("revolute", SOFT)], (0,), {}),
+    "a compliant gear": ([("revolute", SOFT | ROUGH), ("revolute", ROUGH)], (), {}),
+    "a compliant gear and a link that bends": ([("revolute", SOFT)], (0,), {}),
     "motors that turn frames": ([("revolute", {}), ("prismatic", {})], (), {"motors": "frame"}),
 }  # fmt: skip
 

@@ -61,7 +61,7 @@ def test_a_resumed_run_is_the_uninterrupted_one(arm, stopped):
         reached = file[stopped]["resume/checkpoint"].attrs["time"]
         outputs = len(file[stopped]["time"])
     assert 0.02 <= reached < END
-    assert message.endswith(f"solve(…, resume=True) goes on from t = {reached:.9g} s")
+    assert message.endswith(f"solve(…, resume=True) resumes from t = {reached:.9g} s")
     watcher = Stops()
     results = go_on(scene, watcher)
     assert (f'analysis "{stopped}"', reached) in watcher.asked
@@ -96,7 +96,7 @@ def test_a_run_that_is_stopped_before_it_begins_goes_on(arm):
     """While what is to act is made again from the earlier analysis."""
     scene = arm()
     expected = ffrobot.solve(scene)
-    assert stop(scene, "forward", 0.02).endswith("goes on from t = 0 s")
+    assert stop(scene, "forward", 0.02).endswith("resumes from t = 0 s")
     kept = ffrobot.Results(scene.with_suffix(".h5"))
     assert len(kept.time("forward")) == 1
     moment = expected["forward/joints/elbow/reaction"][0]
@@ -120,7 +120,7 @@ def test_a_body_that_tumbles_goes_on(tmp_path):
         analysis=[{"name": "spin", "kind": "forward", "end": 20.0, "output_step": 0.05, "tolerance": 1e-9}],
     )  # fmt: skip
     expected, path = ffrobot.solve(scene), tmp_path / "top.h5"
-    with pytest.raises(ffrobot.SolveError, match=r"resume=True\) goes on from t = "):
+    with pytest.raises(ffrobot.SolveError, match=r"resume=True\) resumes from t = "):
         ffrobot.solve(scene, path, Stops("spin", 4.0))
     results = ffrobot.solve(scene, path, resume=True)
     assert results.attributes("spin")["steps"] == expected.attributes("spin")["steps"]
@@ -146,7 +146,7 @@ def test_implicit_methods_go_on_within_the_tolerance(arm):
     scene = arm(("tolerance = 1e-6", keys))
     text = scene.read_text(encoding="utf-8")
     scene.write_text(text[: text.index('[[analysis]]\nname = "forward"')], encoding="utf-8")
-    with pytest.raises(ffrobot.SolveError, match=r"too many steps.*goes on from t = 0\.0"):
+    with pytest.raises(ffrobot.SolveError, match=r"too many steps.*resumes from t = 0\.0"):
         go_on(scene)  # from the start where there is nothing to go on with
     scene.write_text(scene.read_text(encoding="utf-8").replace("max_steps = 60", "max_steps = 100_000"), "utf-8")
     expected = ffrobot.solve(scene)
@@ -237,7 +237,7 @@ def test_on_the_command_line(arm, ffrobot):
         messages.append(ffrobot(*command, cwd=scene.parent))
         assert len(messages) < 20, messages[-1].stderr
     assert len(messages) > 1
-    assert "; ffrobot solve scene.toml -o r.h5 --resume goes on from t = 0.0" in messages[0].stderr
+    assert "; ffrobot solve scene.toml -o r.h5 --resume resumes from t = 0.0" in messages[0].stderr
     assert ffrobot(*command, cwd=scene.parent).stdout == "r.h5: complete, nothing to go on with\n"
 
 

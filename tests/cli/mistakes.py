@@ -27,7 +27,7 @@ MISTAKES = {
         {"[initial]\n": "[initial]\nangels = 1\n"},
         ["initial.angels", 'did you mean "angles"?'],
     ),
-    "link in place of a scene": (
+    "link instead of a scene": (
         "scene.toml",
         {"[[analysis]]": "[[geometry]]"},
         ["expected a scene file, found a link file", "ffrobot link"],
@@ -150,7 +150,7 @@ MISTAKES = {
     "limits of a run without motors": (
         "scene.toml",
         {'apply = "joints+pzt"': 'apply = "trajectory"\nlimits = true'},
-        ['analysis "forward"', "expected limits = true only beside apply", 'found apply = "trajectory"'],
+        ['analysis "forward"', "expected limits = true only with apply", 'found apply = "trajectory"'],
     ),
     "shape that is not given": (
         "scene.toml",
@@ -165,7 +165,7 @@ MISTAKES = {
     "mass of patches without density": (
         "scene.toml",
         {"density = 7600.0\n": "", "structural = false": 'structural = ["mass"]'},
-        ['pzt "link1"', 'expected the key "density" beside structural = ["mass"], found none'],
+        ['pzt "link1"', 'expected the key "density" with structural = ["mass"], found none'],
     ),
     "weights of modes and of points": (
         "scene.toml",
@@ -200,7 +200,7 @@ MISTAKES = {
         {"output_step = 0.001": "output_step = 0.0007"},
         ['analysis "inverse"', "output_step", "0.0007"],
     ),
-    "tolerance below rounding": (
+    "tolerance below round-off": (
         "scene.toml",
         {"tolerance = 1e-7": "tolerance = 1e-18"},
         ['analysis "inverse": tolerance', "1e-18"],
@@ -256,7 +256,7 @@ MISTAKES = {
         {'link = "link1.toml"': f'link = "{"a" * 5000}.toml"'},
         ['body "link1": link: expected an existing file, found "aaaa', "File name too long"],
     ),
-    "folder in place of a file": ("scene.toml", {'link = "link1.toml"': 'link = "."'}, ["which is a folder"]),
+    "folder instead of a file": ("scene.toml", {'link = "link1.toml"': 'link = "."'}, ["which is a folder"]),
     "actuation that comes later": (
         "scene.toml",
         {'actuation = "inverse"': 'actuation = "joints_only"'},

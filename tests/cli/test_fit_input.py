@@ -27,7 +27,7 @@ WRONG = {
         "output: expected another file than the input"
     ),
     ("fit", "arm.toml", "--measured", "modes.csv", "--vary", "material.density", "-o", "sub/a.toml"): (
-        "output: expected a file beside arm.toml"
+        "output: expected a file next to arm.toml"
     ),
     ("fit", "arm.toml", "--measured", "half.csv", "--vary", "material.density"): (
         "uncertainty: expected it of all frequencies or of none, found 1"

@@ -166,7 +166,7 @@ def test_sample_of_the_campaign(tmp_path):
         capture_output=True, text=True, timeout=300,
     )  # fmt: skip
     assert done.returncode == 0, done.stdout
-    assert "solve: refused" in done.stdout
+    assert "solve: rejected" in done.stdout
 
 
 @pytest.fixture

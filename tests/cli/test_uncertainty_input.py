@@ -36,7 +36,7 @@ GOOD = "payload.0.mass=±2%"
         ("mass", ["body.arm.rigid.mass=normal:60%"], [], "expected spreads with which the scene makes sense"),
         ("mass", [GOOD], ["--samples", "0"], "expected at least 8 samples, found 0"),
         ("mass", [GOOD], ["--by", "gradients", "--indices"], "expected Sobol indices of samples"),
-        ("mass", [GOOD], ["--by", "screening", "--indices"], "--indices: expected --by samples beside it"),
+        ("mass", [GOOD], ["--by", "screening", "--indices"], "--indices: expected --by samples next to it"),
         ("mass", [GOOD], ["--by", "screening", "--trajectories", "1"], "--trajectories: expected at least 2, found 1"),
         ("joints.shoulder.moment", [GOOD], ["--by", "screening"], 'such as "peak joints.shoulder.moment"'),
         ("mass", [GOOD, "payload.0.mass=±1%"], ["--by", "screening"], "every key once, found payload.0.mass 2"),

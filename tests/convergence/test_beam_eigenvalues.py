@@ -167,7 +167,7 @@ def test_frequencies_stay_accurate_on_fine_meshes():
 
 
 def test_too_fine_a_mesh_is_refused():
-    with pytest.raises(SolveError, match=r"rounding errors move ω² by .* use fewer elements"):
+    with pytest.raises(SolveError, match=r"round-off errors move ω² by .* use fewer elements"):
         frequencies(beam("cantilever"), "in-plane-bending", mesh_of("uniform", 10_000))
 
 

@@ -66,5 +66,5 @@ def test_going_on(ffrobot, scene):
 
 
 def test_goals_that_go_together(scene):
-    with pytest.raises(ffrobot.InputError, match="expected goals that ask for different designs"):
+    with pytest.raises(ffrobot.InputError, match="expected responses with different optima"):
         ffrobot.trade_off(scene, [HEIGHT], minimise="mass", against="mass beam", points=3, processes=2)

@@ -78,8 +78,8 @@ def test_lightest_cantilever(write):
     assert np.isnan(found.prices[1])
     assert found.bound_prices[0] == pytest.approx(-2.0 * mass / h, rel=1e-4)
     text = str(found)
-    assert f"peak points.beam.tip.deflection: 0.00101 m in place of 0.001 saves {0.01 * mass:.4g} kg (1 %)" in text
-    assert f"{HEIGHT}: 0.0404 in place of 0.04 saves {0.02 * mass:.4g} kg (2 %)" in text
+    assert f"peak points.beam.tip.deflection: 0.00101 m instead of 0.001 saves {0.01 * mass:.4g} kg (1 %)" in text
+    assert f"{HEIGHT}: 0.0404 instead of 0.04 saves {0.02 * mass:.4g} kg (2 %)" in text
     assert "inverse" not in text
     assert "still: completed" in text
 
@@ -220,7 +220,7 @@ def test_going_on(ffrobot, write):
     assert len(rows) <= 8
     done = ffrobot(*command)
     assert done.returncode == 0, done.stderr
-    assert "price      peak points.beam.tip.deflection: 0.00101 m in place of 0.001 saves" in done.stdout
+    assert "price      peak points.beam.tip.deflection: 0.00101 m instead of 0.001 saves" in done.stdout
     assert {path: path.stat().st_mtime_ns for path in rows} == rows
     with (folder / "designs.csv").open(encoding="utf-8") as file:
         designs = list(csv.DictReader(file))

@@ -62,7 +62,7 @@ def test_the_same_run_again(tmp_path, more):
         ({"end": 0.2}, "expected steps up to 0.2 s, where the run ends, found them up to 0.1 s"),
         ({"name": "other"}, 'expected the steps of an analysis "other", found none'),
         ({"integrator": "radau"}, 'expected integrator = "dop853", which made the steps'),
-        ({"check": "finer"}, 'expected no "check" beside it'),
+        ({"check": "finer"}, 'expected no "check" with it'),
         ({"repeat_steps": "kept.hdf"}, 'did you mean "kept.h5"?'),
     ],
 )

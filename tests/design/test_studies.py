@@ -104,7 +104,7 @@ def test_files_of_a_command(ffrobot, scene, tmp_path):
     study = read_study(file)
     axes = diagrams(study)["designs"].axes
     assert (axes[0].logarithmic, axes[0].low, axes[0].high) == (True, 0.017, 0.03)
-    assert any("frequency 1 arm: 59.4 Hz in place of 60 saves" in fact for fact in study.facts)
+    assert any("frequency 1 arm: 59.4 Hz instead of 60 saves" in fact for fact in study.facts)
     with (folder / "designs.csv").open(encoding="utf-8") as table:
         masses = [float(row["mass"]) for row in csv.DictReader(table)]
     np.testing.assert_allclose(axes[1].values, masses, rtol=1e-12)

@@ -122,7 +122,7 @@ def outcome(path, text):
         told = str(error)
         if not told.startswith(f"{path}: ") or "\n" in told or len(told) > len(str(path)) + 500:
             return f"message: {told}"
-        return "refused"
+        return "rejected"
     except Exception:
         return traceback.format_exc()
     finally:
@@ -139,8 +139,8 @@ def campaign(count, seed, folder):
         condition, suffix = draw.choice(sorted(given))
         text = mutated(given[condition, suffix], draw)
         found = outcome(folder / f"a{suffix}", text)
-        counts[found if found in ("read", "refused") else "bad"] += 1
-        if found not in ("read", "refused"):
+        counts[found if found in ("read", "rejected") else "bad"] += 1
+        if found not in ("read", "rejected"):
             bad.append(f"{seed} {number} {condition} {suffix}: {found}")
     return counts, bad
 

@@ -427,7 +427,7 @@ def test_what_cannot_be_exported(tmp_path, keys, analysis, message):
         ({"motors": "frame"}, 'motors: expected "section"'),
         (
             {"joint": []},
-            'initial: expected bodies without joints to start at angle and rate 0 in space, not so of "upper"',
+            'initial: expected bodies without joints to start at angle and rate 0 in 3D, not so of "upper"',
         ),
     ],
 )

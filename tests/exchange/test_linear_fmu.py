@@ -319,7 +319,7 @@ def test_names_that_are_no_identifiers(tmp_path):
 
 
 IN_SPACE = """
-name = "in space"
+name = "in 3D"
 space = "spatial"
 gravity = [0.0, 0.0, 0.0]
 body = [{ name = "arm", link = "arm.toml" }]

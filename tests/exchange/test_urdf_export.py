@@ -172,7 +172,7 @@ def test_joints_in_steps(backwards, tmp_path, ffrobot):
     for command in (("solve", scene), ("export", scene, "--format", "urdf", "-o", urdf)):
         done = ffrobot(*command)
         assert done.returncode == 0, done.stderr
-    for text in ('"ball": 3 joints in place of a spherical one', "angles about x, y, z", '"tube": 2 joints in place'):
+    for text in ('"ball": 3 joints instead of a spherical one', "angles about x, y, z", '"tube": 2 joints instead'):
         assert text in done.stderr + done.stdout
     results, robot = Results(tmp_path / "scene.results.h5"), yourdfpy.URDF.load(str(urdf))
     types = {joint.get("name"): joint.get("type") for joint in ElementTree.parse(urdf).getroot().findall("joint")}

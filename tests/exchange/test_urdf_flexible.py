@@ -97,7 +97,7 @@ def test_the_link_file_gets_length_and_interfaces(tmp_path, ffrobot):
     assert joints["elbow"]["between"] == ["upper.tip", "fore.origin"]
     assert joints["middle"]["type"] == "weld"
     assert joints["middle"]["between"] == ["upper.middle", "box.origin"]
-    assert 'link "upper" is flexible: upper.toml says what it weighs, not its <inertial>' in done.stdout
+    assert 'link "upper" is flexible: upper.toml determines its inertia, not its <inertial>' in done.stdout
     assert 'length 0.5 m, the distance to joint "elbow"' in done.stdout
 
 

@@ -80,7 +80,7 @@ def test_welds_are_merged_and_their_frames_stay_as_points(imported):
     np.testing.assert_allclose(body["rigid"]["center"], [0, 0, 0.2])
     np.testing.assert_allclose(body["rigid"]["inertia"], [0.04 + 4 * 0.2**2, 0.04 + 4 * 0.2**2, 0.02])
     np.testing.assert_allclose(body["rigid"]["points"]["tip"], [0.1, 0, 0.4])
-    assert '"base" (mass 2 kg) stands still on the ground' in out
+    assert '"base" (mass 2 kg) is fixed to the ground' in out
 
 
 def test_mimic_limits_of_zero_and_masses_of_zero_are_told(imported):
@@ -94,7 +94,7 @@ def test_mimic_limits_of_zero_and_masses_of_zero_are_told(imported):
     )  # fmt: skip
     assert [entry["name"] for entry in keys["joint"]] == ["j", "k"]
     assert 'joint "pan" and link "camera" left out: nothing there has mass' in out
-    assert 'joint "k" follows "j": give it a trajectory of its own, -2 times that one plus 0.1' in out
+    assert 'joint "k" follows "j": give it a separate trajectory, -2 times that one plus 0.1' in out
     assert 'joint "j": effort limit 0 left out' in out
     assert "moment_limit" not in keys["joint"][0]
 
@@ -141,7 +141,7 @@ WRONG = {
         robot(BASE, ARM, joint("j", "base", "arm"), joint("k", "arm", "base")),
         "found none: the joints form a circle",
     ),
-    "circle beside a tree": (
+    "circle with a tree": (
         robot(BASE, link("a"), link("b"), joint("j", "a", "b"), joint("k", "b", "a")),
         'found a circle of "a", "b"',
     ),

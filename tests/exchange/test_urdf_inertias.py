@@ -97,7 +97,7 @@ ODD = {
     "turned in degrees": ([joint("j", "base", "a", origin='rpy="90 0 0"')], "rpy 90 0 0 rad: is it in degrees?"),
     "follows a fixed joint": (
         [link("b"), joint("j", "base", "a", "fixed"), joint("k", "a", "b", more='<mimic joint="j" offset="0.2"/>')],
-        'joint "k" follows "j", which is fixed: it stands still at 0.2',
+        'joint "k" follows "j", which is fixed: its position is 0.2',
     ),
 }
 

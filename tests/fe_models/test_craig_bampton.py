@@ -164,7 +164,7 @@ def test_without_attachment_modes_is_refused(bar):
 
 def test_interfaces_at_one_place_are_refused(bar):
     near = '[[interface]]\nname = "grip"\nposition = 0.39999999\n'
-    with pytest.raises(InputError, match="expected interfaces that can move by themselves"):
+    with pytest.raises(InputError, match="expected interfaces that can move freely"):
         bar(more=near)
 
 

@@ -138,9 +138,9 @@ def test_what_cannot_be_measured_is_refused(measured_link, tmp_path):
     with pytest.raises(InputError, match="expected rows of modes that the link has"):
         make_link(measured_link("mode,family,frequency\n1,torsion,130.0\n"))
     robot = '[damping]\nratio = 0.01\nof = "robot"\n'
-    with pytest.raises(InputError, match=r'measured: expected no damping_ratio beside damping\.of = "robot"'):
+    with pytest.raises(InputError, match=r'measured: expected no damping_ratio with damping\.of = "robot"'):
         read_link(measured_link("mode,frequency,damping_ratio\n1,30.0,0.01\n", more=robot))
-    with pytest.raises(InputError, match="measured: expected none of a body in pieces"):
+    with pytest.raises(InputError, match="measured: expected none of a subdivided body"):
         cut(measured_link("mode,frequency\n1,30.0\n"), 4)
     (tmp_path / "modes.csv").unlink()
     with pytest.raises(InputError, match=r'measured.table: expected an existing file, found "modes.csv"'):

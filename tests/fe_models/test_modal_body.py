@@ -38,7 +38,7 @@ def body(coefficients):
     S_bar_kl = np.zeros((3, 3, 2, 2))
     S_bar_kl[1, 1] = np.eye(2)
     return ModalBody(
-        name="made by hand",
+        name="made manually",
         kind="beam",
         reference_condition="cantilever",
         length=1.4,
@@ -93,7 +93,7 @@ def test_few_stations(body, count):
 
 @pytest.mark.parametrize("x", [-0.01, 1.41, np.nan])
 def test_outside_the_body(body, x):
-    with pytest.raises(InputError, match=r"made by hand: x: expected 0 … 1\.4 m"):
+    with pytest.raises(InputError, match=r"made manually: x: expected 0 … 1\.4 m"):
         body.interpolate(x)
 
 

@@ -213,7 +213,7 @@ def test_equilibrium_knows_neither_rotors_nor_friction():
     [
         ({"rotor_inertia": -1.0}, "a number of at least 0"),
         ({"gear_ratio": 0.0}, "greater than 0"),
-        ({"friction_speed": 0.1}, "only beside coulomb_friction"),
+        ({"friction_speed": 0.1}, "only with coulomb_friction"),
         ({"type": "weld", "viscous_friction": 1.0}, "in a weld joint"),
     ],
 )

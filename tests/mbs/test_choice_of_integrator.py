@@ -81,7 +81,7 @@ def test_ringing_is_what_a_static_start_leaves():
 def test_what_rings_is_resolved_explicitly():
     choice = chosen(arm(), tolerance=1e-6)
     assert choice.name == "dop853"
-    assert "ringing above the tolerance up to" in choice.reason
+    assert "highest excited frequency" in choice.reason
 
 
 def test_stiff_links_that_do_not_ring_are_integrated_implicitly():
@@ -142,7 +142,7 @@ def test_a_choice_that_turns_out_badly_is_changed():
 def test_a_choice_of_the_scene_is_kept():
     for name in ("dopri5", "dop853", "radau", "generalized-alpha"):
         choice = chosen(arm(initial=AT_REST), tolerance=1e-2, integrator=name)
-        assert (choice.name, choice.reason) == (name, "asked for")
+        assert (choice.name, choice.reason) == (name, "requested")
 
 
 @pytest.mark.parametrize("name", ["four-bar", "slider-crank", "tree", "mixed"])

@@ -223,7 +223,7 @@ def test_static_moments_are_those_of_the_gears():
     ("keys", "expected"),
     [
         ({"stiffness": 0.0}, "greater than 0"),
-        ({"damping": 1.0}, "only beside stiffness"),
+        ({"damping": 1.0}, "only with stiffness"),
         ({"stiffness": 1.0}, "rotor_inertia above 0"),
         ({"stiffness": 1.0, "type": "prismatic", "axis": (1.0, 0.0), "rotor_inertia": 1.0}, "only in revolute joints"),
         ({"stiffness": 1.0, "type": "weld"}, "in a weld"),
@@ -239,7 +239,7 @@ def test_what_does_not_go_is_refused():
         with_compliance(pendulum(motor=False))
     model = geared_arm(GEARED)
     source = add_transmission(run_pcid(model, pcid(end=0.1), True, always))
-    with pytest.raises(InputError, match='"joints" or "joints\\+pzt" beside joints'):
+    with pytest.raises(InputError, match='"joints" or "joints\\+pzt" with joints'):
         run_forward(model, forward(actuation="inverse", apply="trajectory", end=0.1), source, ActuatorSet(), always)
     loaded = geared_arm(GEARED, load=[{"joint": "O", "moment": "1"}])
     with pytest.raises(InputError, match=r"expected no \[\[load\]\] on"):

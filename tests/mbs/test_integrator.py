@@ -100,7 +100,7 @@ def test_errors_of_all_reported_quantities_are_within_the_tolerance(tight, integ
     outcome = inverse(arm(), tolerance=tolerance, integrator=integrator)
     ratios = {name: relative(getattr(outcome, name), getattr(tight, name)) / tolerance for name in REPORTED}
     assert max(ratios.values()) <= 1.0, ratios
-    assert ratios["lambda_"] > 0.003, "far more work than the tolerance asks for"
+    assert ratios["lambda_"] > 0.003, "far more work than the tolerance requires"
 
 
 # The factors by which the integrators tighten the tolerance (`error_share`) were found with `arm()`. These arms had no

@@ -174,7 +174,7 @@ def test_what_acts_along_its_coordinate(kind, what, paths):
 def test_what_would_act_along_a_direction_of_the_ground_between_two_bodies_is_refused(what):
     """It would turn with the first of them."""
     model = on_arm(AS_BUILT[what] | {"type": "rail"})
-    expected = r'kind = "forward" what joint coordinates can tell, found .* direction of the ground \(.*joint "S", x\)'
+    expected = r'kind = "forward" quantities that joint coordinates define, .* direction of the ground \(.*"S", x\)'
     with pytest.raises(InputError, match=expected):
         run_forward(model, forward(end=0.3), None, {}, always)
 

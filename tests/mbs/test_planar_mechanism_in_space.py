@@ -78,10 +78,10 @@ def test_inertia_of_a_body_is_that_of_the_plane():
     [
         ({"trajectory": [{"name": "turn", "angle": "tool.a", "value": "t"}]}, 'trajectory "turn": angle: expected'),
         ({"load": [{"point": "tool.a", "force": lambda t, r, v: (0.0, 0.0)}]}, "load no. 1: force: expected functions"),
-        ({"joint": ARM["joint"][2:], "trajectory": []}, 'joints that lead to the ground in space, found "lower"'),
+        ({"joint": ARM["joint"][2:], "trajectory": []}, 'joints that lead to the ground in 3D, found "lower"'),
         (
             {"joint": ARM["joint"][:2], "trajectory": [], "load": []},
-            'angle and rate 0 in space, not so of "upper"(.|\n)*not so of "tool"',
+            'angle and rate 0 in 3D, not so of "upper"(.|\n)*not so of "tool"',
         ),
     ],
 )

@@ -207,7 +207,7 @@ MISTAKES = [
     ("1.5*cos(pi*t/4)", "1/(t - 0.25)", 'trajectory "tip": x: expected a finite value', "found none at t = 0.25 s"),
     ("1.5*cos(pi*t/4)", "sqrt(t)", 'trajectory "tip": x: expected a finite velocity', "found none at t = 0 s"),
     ('point = "link2.tip"', 'point = "link2.tip"\njoint = "O"', 'trajectory "tip": expected exactly one', '"point", "joint"'),
-    ('point = "link2.tip"', 'joint = "O"', 'trajectory "tip": expected the keys "value", "waypoints", "via" beside "joint"', '"x", "y"'),
+    ('point = "link2.tip"', 'joint = "O"', 'trajectory "tip": expected the keys "value", "waypoints", "via" with "joint"', '"x", "y"'),
     ('point = "link2.tip"', 'point = "link3.tip"', 'trajectory "tip": point: expected one of the bodies', '"link3.tip"'),
     (TIP, 'joint = "B"\nvalue = "t"', 'trajectory "tip": joint: expected one of the joints "O", "A"', '"B"'),
     (TIP, 'angle = "B"\nvalue = "t"', 'trajectory "tip": angle: expected one of the bodies', '"B"'),
@@ -224,7 +224,7 @@ MISTAKES = [
     ('["10*t", 5]', '["10*t"]', "load no. 1: voltage: expected 2 expressions", "found 1"),
     ('["10*t", 5]', '["10*t", "v"]', "load no. 1: voltage[1]: expected an expression in t, found 'v'", "unknown name"),
     ('["10*t", 5]', '["log(t)", 5]', "load no. 1: voltage[0]: expected a finite value", "found none at t = 0 s"),
-    ('pzt = "link1"', 'joint = "O"', 'load no. 1: expected the keys "moment" beside "joint", found "voltage"', ""),
+    ('pzt = "link1"', 'joint = "O"', 'load no. 1: expected the keys "moment" with "joint", found "voltage"', ""),
     ("mass = 0.5", "", "payload no. 1: mass: expected a value, since this key is required, found none", ""),
     # analyses
     ("end = 1.0", "end = 1.0005", 'analysis "inverse": expected an output_step that divides end = 1.0005', "found 0.001"),
@@ -283,7 +283,7 @@ def test_pcid_needs_a_trajectory(folder):
         (
             "[[payload]]",
             '[[actuation_points]]\nbody = "link1"\ntransverse = [0.5]\n[[payload]]',
-            r"expected false beside \[\[actuation_points\]\]",
+            r"expected false with \[\[actuation_points\]\]",
         ),
         (
             "count = 2",
@@ -323,20 +323,20 @@ def test_a_path_that_ends_before_the_run_is_held(folder):
 
 VIA = "via = [[1.5, 0.8], [1.2, 0.8], [1.2, 1.0]]"
 MOTION_MISTAKES = [
-    (f"{VIA}", 'expected either limits ("speed", "acceleration", "jerk") or a "duration" beside "via", found neither'),
+    (f"{VIA}", 'expected either limits ("speed", "acceleration", "jerk") or a "duration" with "via", found neither'),
     (f"{VIA}\nspeed = 1.0\nduration = 1.0", "found both"),
     (f"{VIA}\nspeed = 1.0\nhold = [1.0, 1.0]", 'expected 1 numbers in "hold", found 2'),
     (f"{VIA}\nduration = [1.0]", 'expected 2 numbers in "duration", found 1'),
     (f'{VIA}\nspeed = 1.0\nprofile = "s-curve"', 'expected "acceleration" or "jerk"'),
     (f'{VIA}\nacceleration = 1.0\njerk = 9.0\nprofile = "trapezoid"', 'expected no "jerk"'),
-    (f'{VIA}\nduration = 1.0\nprofile = "spline"', 'only beside "waypoints"'),
+    (f'{VIA}\nduration = 1.0\nprofile = "spline"', 'only with "waypoints"'),
     ("via = [1.0, 2.0]\nduration = 1.0", "expected places [x, y] in via, found [1.0, 2.0]"),
     ("via = [[1.0, 2.0], [1.0, 2.0]]\nduration = 1.0", "expected places in via that differ"),
     ("via = [[1.0, 2.0]]\nduration = 1.0", "expected at least 2 entries"),
     ('via = [["t", 2.0], [1.0, 2.0]]\nduration = 1.0', "expression without t"),
     (f'{VIA}\nx = "t"\nduration = 1.0', 'expected either waypoints, via or expressions, found "x", "via"'),
-    ('x = "t"\nspeed = 1.0', 'expected "speed" only beside "via" or "waypoints"'),
-    ('waypoints = "path.csv"\nhold = 1.0', 'expected "hold" only beside "via"'),
+    ('x = "t"\nspeed = 1.0', 'expected "speed" only with "via" or "waypoints"'),
+    ('waypoints = "path.csv"\nhold = 1.0', 'expected "hold" only with "via"'),
     (f'{VIA}\nspeed = 1e-25\nacceleration = 1e25\nprofile = "s-curve"', "that fit each other in size"),
     (f'{VIA}\nspeed = 1.0\nacceleration = 1e30\nprofile = "trapezoid"', "that fit each other in size"),
     (f"{VIA}\nduration = [1e-30, 1e30]", "that fit each other in size"),

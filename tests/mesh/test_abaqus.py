@@ -94,7 +94,7 @@ def test_undefined_surfaces_of_a_tie_are_told(read):
         (TWO.format("") + SURFACES.replace("S5", "S3") + "*Tie, name=g\nDOWN, UP\n", "nodes of DOWN where"),
         (TWO.format("").replace("0.1, 0.", "0.1, 0.01") + SURFACES + "*Tie, name=g\nDOWN, UP\n", "cannot be tied"),
         (TWO.format("").replace("part=HALF\n0.", "part=NONE\n0."), "expected PART= one of HALF, found NONE"),
-        (TWO.format("").replace("H-2", "H-1"), "instances with names of their own, found H-1"),
+        (TWO.format("").replace("H-2", "H-1"), "instances with unique names, found H-1"),
         (TWO.format("").replace("0., 0.1, 0.", "0., 0.1, 0., 0., 0., 0., 90."), r"\*INSTANCE, line \d+: "),
         (PART[: PART.index("{}")], "expected \\*END PART or \\*END INSTANCE, found the end"),
         (TWO.format("") + SURFACES + "*Tie, name=g\nDOWN\n", r"\*TIE, line \d+: expected two surfaces, found 1"),
@@ -104,7 +104,7 @@ def test_undefined_surfaces_of_a_tie_are_told(read):
         (PLAIN + "*INCLUDE, INPUT=part.inp\n", "files that do not include themselves"),
         (PLAIN.replace("1, 0, -0.1", "1, 0, -0.x"), 'line 2: expected a number, found "-0.x"'),
         (PLAIN + "*NODE\n3, 9., 9., 9.\n", "expected one place of each node, found another one of node 3"),
-        (PLAIN + elements(CELLS[:1, ::-1]), "elements with numbers of their own, found 1 again"),
+        (PLAIN + elements(CELLS[:1, ::-1]), "elements with unique numbers, found 1 again"),
         (PLAIN + elements(CELLS[:1] + 100, first=50), "element 50: expected nodes that are there, found node 101"),
         (PLAIN + "*ELEMENT, TYPE=C3D8\n50, 1, 2, 3, 4\n", "line .*: expected 8 nodes of an element, found 4"),
         (PLAIN + "*ELEMENT, TYPE=C3D8\n50, 1, 2, 3, 4, 5, 6, 7, 8, 9\n", "expected 8 nodes of an element, found 9"),
@@ -190,7 +190,7 @@ def test_sides_of_a_surface(read):
         ("*ELEMENT, TYPE=MASS, ELSET=M\n9001, 1\n*MASS, ELSET=M\n5.\n", "1 of 5 each"),
         ("*MPC\nBEAM, 1, 2\n", r"not read: \*MPC"),
         ("*ELEMNT, TYPE=C3D8\n9, 1, 2, 3, 4, 5, 6, 7, 8\n", r"not read: \*ELEMNT"),
-        (elements(CELLS[2:4], elset="AGAIN", first=101), "2 of 8 cells stand in the file again"),
+        (elements(CELLS[2:4], elset="AGAIN", first=101), "2 of 8 cells are in the file again"),
     ],
 )
 def test_what_is_left_out_is_told(read, more, says):

@@ -138,7 +138,7 @@ def test_nodes_on_edges(read, card, cells, edges):
         (PLAIN.replace("GRID,2,,", "GRID,2,5,"), "GRID, line 2: expected a coordinate system .*, found 5"),
         (PLAIN.replace("GRID,2,,", "GRID,2,7,") + CORD2.format("R", 7), "do not refer to themselves, found 7"),
         (PLAIN.replace("GRID,2,,", "GRID,2,7,") + CORD2.format("R", 0).replace("2.,2.,3.", "1.,4.,3."), "span a plane"),
-        (PLAIN + "GRID,2,,9.,9.,9.\n", r"with numbers of their own, found 2 again \(line 2\)"),
+        (PLAIN + "GRID,2,,9.,9.,9.\n", r"with unique numbers, found 2 again \(line 2\)"),
         (PLAIN.replace("GRID,2,,", "GRID,2000,,"), r"CHEXA, line \d+: expected grid points that are there, found 2"),
         (PLAIN + "CTETRA,99,1,1,2,3\n", r'CTETRA, line \d+: expected a whole number, found ""'),
         (PLAIN + "CTETRA,99,1,1,2,3,4,5\n", "expected a grid point in the middle of all edges or none, found 1"),
@@ -151,7 +151,7 @@ def test_nodes_on_edges(read, card, cells, edges):
         (PLAIN + "INCLUDE 'nowhere.bdf'\n", "expected a file to include, found none called nowhere.bdf"),
         ("SOL 103\nCEND\n" + PLAIN, "expected BEGIN BULK after CEND, found none"),
         (HEAD + PLAIN + "BEGIN SUPER=1\n", "expected one BEGIN BULK, found another"),
-        (fixed(POINTS, CELLS, mark="+A").replace("\n+A ", "\n+B ", 1), "expected one card that this line goes on with"),
+        (fixed(POINTS, CELLS, mark="+A").replace("\n+A ", "\n+B ", 1), "expected one card that this line continues"),
         (PLAIN + "CPENTA,99,1,1,2,3,4,5,6\n", "found unsupported elements: 6 hexahedron, 1 wedge"),
     ],
 )  # fmt: skip
@@ -168,7 +168,7 @@ def test_what_cannot_be_is_rejected_by_name(read, text, says):
         ("CQUAD4,99,4,1,2,8,7\n", "1 CQUAD4"),
         ("RBE2,99,1,123456,2,3\n", "1 RBE2"),
         ("CHEAX,99,1,1,2,3,4,5,6\n", "not read: CHEAX"),
-        ("CHEXA,99,1,1,7,9,3,2,8\n,10,4\n", "1 of 7 cells stand in the file again"),
+        ("CHEXA,99,1,1,7,9,3,2,8\n,10,4\n", "1 of 7 cells are in the file again"),
     ],
 )
 def test_what_is_left_out_is_told(read, more, says):

@@ -19,7 +19,7 @@ def history(factor):
 def study(name, *diagrams, good=None):
     return Study(
         ffrobot_version="0", name=name, title="The best design", scene="arm/scene.toml", scene_name="arm <1>",
-        headline="least mass: 2 kg", good=good, facts=("price: 8.08 N m in place of 8 saves 0.1 kg",),
+        headline="least mass: 2 kg", good=good, facts=("price: 8.08 N m instead of 8 saves 0.1 kg",),
         tables=(StudyTable(heading=("key", "best"), rows=(("payload.0.mass", "0.5"),)),), diagrams=diagrams,
     )  # fmt: skip
 
@@ -89,7 +89,7 @@ def test_a_page_of_studies_alone(browser, folder, tmp_path):
     assert browser.value("[...document.querySelectorAll('nav a')].map((a) => a.textContent)") == ["Design", "Origin"]
     assert browser.value("document.title") == "arm <1> – ffrobot"
     text = browser.run("return document.querySelector('#design').innerText")
-    assert "8.08 N m in place of 8 saves 0.1 kg" in text
+    assert "8.08 N m instead of 8 saves 0.1 kg" in text
     assert browser.value("document.querySelectorAll('.verdict.good').length") == 1
 
 
@@ -119,7 +119,7 @@ def test_convergence_and_bands(browser, folder, tmp_path):
         "document.querySelector('[data-chart$=\"_band_moment\"]').data"
         ".filter((t) => t.showlegend !== false).map((t) => t.name)"
     )
-    assert named == ["lowest and highest sample", "5% to 95%", "median", "keys in the middle"]
+    assert named == ["lowest and highest sample", "5% to 95%", "median", "nominal values"]
 
 
 def test_beside_results(browser, page, folder, two_link):

@@ -48,7 +48,7 @@ def inflection(link):
 
 
 def test_overlapping(link, record):
-    with pytest.raises(InputError, match=r"expected patches beside each other, found patch 1 .* on the same place"):
+    with pytest.raises(InputError, match=r"expected patches side by side, found patch 1 .* on the same place"):
         patches(link, centers=(0.1, 0.12, 0.5, 0.7, 0.9))
     record(GROUP, "patches that overlap", "refused", "input error: which, and where")
 

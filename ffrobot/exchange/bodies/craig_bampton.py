@@ -31,7 +31,7 @@ def craig_bampton_file(body: ModalBody) -> tuple[bytes, tuple[str, ...]]:
     if body.reference_condition != CONDITION:
         raise InputError(
             f'modal body {body.name}: expected one with [reference] condition = "{CONDITION}" in its link file,'
-            f' which has modes of the link held at all interfaces, found "{body.reference_condition}"'
+            f' with fixed-interface modes, found "{body.reference_condition}"'
         )
     link = craig_bampton(body)
     names = [ROOT, *(name for name in body.interfaces if name != ROOT)]

@@ -136,9 +136,9 @@ def with_agreed_masses(found: ShapeIntegrals) -> tuple[ShapeIntegrals, tuple[str
     sizes = np.sqrt(np.abs(np.diag(mean)) / np.maximum(np.diag(found.modal_mass), 1e-300))
     if sizes.max(initial=0.0) > 1.0 + ROUNDED:
         raise InputError(
-            f"modal masses: expected at least those that the mean motion of the shapes has, found mode"
+            "modal masses: expected at least those that the mean motion of the shapes has, found mode"
             f" {sizes.argmax() + 1} whose shape moves the center of mass {sizes.max():.3g} times as far as its modal"
-            " mass allows: shapes and modal masses of the file contradict each other"
+            " mass allows. Shapes and modal masses of the file contradict each other"
         )
     off = np.abs(found.modal_mass - found.translational_mass).max(initial=0.0) / np.abs(found.modal_mass).max()
     if off <= EXACT or np.linalg.eigvalsh(about_center(found))[0] > EXACT * np.abs(found.inertia).max():

@@ -22,7 +22,7 @@ ON_AXIS = 1e-9  # of the body's size
 
 NOT_IN_THE_FILE = (
     "not in the file: geometric stiffness, stresses, sections (so no patches on this body), the surface for pictures,"
-    " names of mode families, which are told from the direction of most mass"
+    " names of mode families, which are inferred from the direction of most mass"
 )
 
 

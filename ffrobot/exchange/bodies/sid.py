@@ -126,7 +126,7 @@ def _integrals(modal: Section, layout: Layout) -> ShapeIntegrals:
     if _symmetric_part(slope, Me) is not None and not _is_in_both(modal, slope, layout):
         raise InputError(
             "Cr: expected m1 without a symmetric part, found one: the file has geometric stiffness among its integrals,"
-            " which cannot be told apart from them in Oe; write it without"
+            " which cannot be distinguished from them in Oe; write it without"
         )
     return ShapeIntegrals(
         modal["refmod"].number("mass"), mdCM.m0[:, 0], mdCM.m1[:, :, 0], J0, J1, Cr.m0.T,

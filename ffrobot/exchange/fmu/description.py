@@ -70,7 +70,7 @@ def model_description(unit: Unit, generator: str) -> bytes:
 
 def forward_description(unit: HeldUnit, identifier: str, name: str, analysis: Forward, generator: str) -> bytes:
     """That of a forward motion under held inputs, in UTF-8; outputs follow the state alone, no input."""
-    about = "motion from the initial state under held inputs; gravity and friction act as in the scene"
+    about = "motion from the initial state under piecewise constant inputs; gravity and friction act as in the scene"
     root = _root(name, unit.data.guid, about, generator)
     stepping = {
         "canHandleVariableCommunicationStepSize": "true", "canNotUseMemoryManagementFunctions": "true",

@@ -122,7 +122,7 @@ def _check(path: Path, scene: AnyScene) -> None:
 
 
 def _remarks(unit: HeldUnit, silent: list[str], folder: str) -> list[str]:
-    found = [f"inputs are held over a communication step; binary for {folder} alone, without sources"]
+    found = [f"inputs are constant over a communication step; binary for {folder} alone, without sources"]
     if not unit.inputs:
         found.append("there are no inputs: no joint has a motor, no link patches")
     if silent:

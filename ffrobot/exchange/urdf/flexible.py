@@ -159,7 +159,7 @@ def _position(keys: Mapping[str, Any], x: Array, length: float, label: str) -> d
     off = float(np.linalg.norm(x[1:]))
     if off > ON_AXIS * length or not 0 < x[0] < length:
         raise InputError(
-            f"{label}: expected a joint on the line between the ends of the beam, found it {off:.4g} m beside it, at"
+            f"{label}: expected a joint on the line between the ends of the beam, found it {off:.4g} m off, at"
             f" {x[0]:.4g} m of {length:.4g} m: take a solid, or split the link in the URDF"
         )
     return {"position": float(x[0])}

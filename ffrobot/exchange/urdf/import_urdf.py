@@ -131,7 +131,7 @@ def _compared(
 
 def _remarks_on_links(links: Mapping[str, FlexibleLink]) -> Iterator[str]:
     for link in links.values():
-        yield f'link "{link.name}" is flexible: {link.file_name} says what it weighs, not its <inertial>'
+        yield f'link "{link.name}" is flexible: {link.file_name} determines its inertia, not its <inertial>'
         yield from (f"{link.file_name}: {remark}" for remark in link.remarks)
 
 

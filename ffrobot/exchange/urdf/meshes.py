@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 READ = (".3mf", ".dae", ".glb", ".gltf", ".obj", ".off", ".ply", ".stl")
 """Endings of meshes that are read: formats that trimesh reads itself, all of them without a program of others."""
 
-NOT_LOOKED_AT = "meshes were not looked at, which needs trimesh: pip install 'ffrobot[urdf]'"
+NOT_LOOKED_AT = "meshes were not read, which needs trimesh: pip install 'ffrobot[urdf]'"
 
 
 @dataclass(frozen=True)

@@ -39,9 +39,9 @@ def _of_types(tree: SpatialTree) -> Iterator[str]:
     for node in tree.nodes:
         joint, count = node.joint, len(STEPS[node.joint.type])
         if count > 1:
-            what = f"{joint.label}: {count} joints in place of a {joint.type} one, with links without mass between"
-            angles = "; angles about x, y, z in place of its orientation" if joint.type == "spherical" else ""
-            yield f"{what}: for viewers, `ffrobot import` refuses them{angles}"
+            what = f"{joint.label}: {count} joints instead of a {joint.type} one, with links without mass between"
+            angles = "; angles about x, y, z instead of its orientation" if joint.type == "spherical" else ""
+            yield f"{what}: for viewers, `ffrobot import` rejects them{angles}"
         elif node.backwards and joint.type in ("planar", "free"):
             yield f"{joint.label}: its coordinates there are those of its first side on its second"
 
@@ -53,7 +53,7 @@ def _of_keys(tree: SpatialTree, size: float) -> Iterator[str]:
     if endless := [joint.name for joint in sliding if np.isinf(joint.position_limits[-1]).any()]:
         yield f"{quoted(endless)}: a range of ±{size:.4g} m, the size of the robot: URDF wants one, the scene has none"
     if rotors := [joint.name for joint in joints if getattr(joint, "rotor_inertia", 0.0)]:
-        yield f"{quoted(rotors)}: rotor_inertia and what gears give left out"
+        yield f"{quoted(rotors)}: rotor_inertia and compliance of gears left out"
     if powers := [joint.name for joint in joints if any(np.isfinite(each.power) for each in joint.motor_limits)]:
         yield f"{quoted(powers)}: power_limit left out"
     moving = [joint for joint in joints if isinstance(joint, MovingSpatialJoint)]

@@ -58,7 +58,7 @@ class SceneOfRobot:
         mass = sum(inertial.mass for name in still if (inertial := self.robot.links[name].inertial) is not None)
         if still:
             names = ", ".join(f'"{shown(name)}"' for name in still)
-            said = "stand still on the ground and are" if len(still) > 1 else "stands still on the ground and is"
+            said = "are fixed to the ground and are" if len(still) > 1 else "is fixed to the ground and is"
             self.remarks.append(f"{names} (mass {mass:g} kg) {said} no body of the scene")
 
     # Bodies
@@ -140,16 +140,16 @@ class SceneOfRobot:
         leader, name = self.robot.joints[mimic.joint], f'joint "{shown(joint.name)}"'
         if leader.type == "fixed":
             self.remarks.append(
-                f'{name} follows "{shown(mimic.joint)}", which is fixed: it stands still at {mimic.offset:g}; give it a'
+                f'{name} follows "{shown(mimic.joint)}", which is fixed: its position is {mimic.offset:g}; give it a'
                 " trajectory of that value"
             )
         elif leader not in self.found.joints:
             self.remarks.append(f'{name} follows "{shown(mimic.joint)}", which is left out: give it its own trajectory')
         else:
             self.remarks.append(
-                f'{name} follows "{shown(mimic.joint)}": give it a trajectory of its own,'
+                f'{name} follows "{shown(mimic.joint)}": give it a separate trajectory,'
                 f" {mimic.multiplier:g} times that one plus {mimic.offset:g}; the motor of that one then has to supply"
-                f" {mimic.multiplier:g} times this one's moment beside its own"
+                f" {mimic.multiplier:g} times this one's moment in addition to its own"
             )
 
     def _friction(self, joint: UrdfJoint) -> dict[str, Any]:

@@ -64,7 +64,7 @@ def check_mimics(joints: Mapping[str, UrdfJoint]) -> None:
                                  + did_you_mean(follows.joint, joints))  # fmt: skip
             if follows.joint in chain:
                 raise InputError(
-                    f"{label}: expected a joint that moves by itself at the end of the chain, found a circle:"
+                    f"{label}: expected a joint that moves freely at the end of the chain, found a circle:"
                     f" {' → '.join([*chain, follows.joint])}"
                 )
             chain.append(follows.joint)

@@ -24,10 +24,10 @@ def draw_placement(axes: Axes, figure: FigureRecord, results: Results) -> None:
     centers, frequency = results[f"{group}/candidates"], results[f"{group}/frequency"]
     for reach, f, color in zip(results[f"{group}/candidate_reach"], frequency, shades(len(frequency)), strict=True):
         axes.plot(centers, reach, color=color, label=f"{f:.4g} Hz")
-    for k, (key, label) in enumerate((("best", "found"), ("even", "evenly spread"))):
+    for k, (key, label) in enumerate((("best", "found"), ("even", "evenly spaced"))):
         places = [(x - length / 2, length) for x in results[f"{group}/{key}/centers"]]
         axes.broken_barh(places, (-0.12 * (k + 1), 0.08), color=COLORS[k], label=label)
     axes.set_yticks([0.0, 0.25, 0.5, 0.75, 1.0])
     axes.set_xlabel(f"distance along {body} (m)")
-    axes.set_ylabel("reach of one patch")
+    axes.set_ylabel("controllability by one patch")
     legend(axes)

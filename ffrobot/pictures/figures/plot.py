@@ -140,7 +140,7 @@ def draw(record: FigureRecord, results: Results) -> Figure:
     """Draw one figure."""
     if record.exaggeration is not None and not results.is_spatial:
         raise InputError(
-            f'{results.path}: figure "{record.name}": exaggeration: expected it only of scenes in space, found a planar'
+            f'{results.path}: figure "{record.name}": exaggeration: expected it only of 3D scenes, found a planar'
             " one, whose configurations are to scale"
         )
     whole = DRAW_WHOLE | DRAW_IN_SPACE if results.is_spatial else DRAW_WHOLE

@@ -35,9 +35,7 @@ def tip_error_figures(results: Results) -> Iterator[FigureRecord]:
     """Of all closed loops in one figure."""
     curves = tuple(Curve(data=f"{a}/tip_error", label=a) for a in results.analyses if results.has(f"{a}/tip_error"))
     if curves:
-        yield FigureRecord(
-            name="tip_error", title="tip, distance from its place", curves=curves, y_label="error (mm)", scale=1e3
-        )
+        yield FigureRecord(name="tip_error", title="tip position error", curves=curves, y_label="error (mm)", scale=1e3)
 
 
 def placement_figures(results: Results, analysis: str) -> Iterator[FigureRecord]:
@@ -116,7 +114,7 @@ def voltage_figures(results: Results) -> Iterator[FigureRecord]:
     for analysis in results.analyses:
         for body in results.names(f"{analysis}/pzt"):
             limit = limits.get(body)
-            for dataset, title in (("required_voltage", "voltages required"), ("voltage", "voltages within the limit")):
+            for dataset, title in (("required_voltage", "required voltages"), ("voltage", "voltages within the limit")):
                 yield FigureRecord(
                     name=file_name(dataset, analysis, body),
                     title=f"{title}, patches of {body}, {analysis}",

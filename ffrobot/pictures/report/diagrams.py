@@ -202,7 +202,7 @@ def _band(band: Band) -> Iterator[Trace]:
         yield edge | {"y": encoded(np.array(high)), "fill": "tonexty", "fillcolor": color, "name": plain(label)}
     for values, label, line in (
         (band.median, "median", {"color": COLORS[0]}),
-        (band.nominal, "keys in the middle", {"color": AXIS, "dash": "dot"}),
+        (band.nominal, "nominal values", {"color": AXIS, "dash": "dot"}),
     ):
         yield {
             "type": "scatter", "mode": "lines", "name": label, "x": encoded(time, "f8"),

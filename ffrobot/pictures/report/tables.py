@@ -90,7 +90,14 @@ def _peaks(run: Run) -> Iterator[tuple[str, str, float, float]]:
 
 def voltages_table(runs: Sequence[Run]) -> Table:
     """What the patches of every link should give, and what they can."""
-    heading = ("analysis", "patches on", "largest required (V)", "limit (V)", "times limit", "condition number of Φ_V")
+    heading = (
+        "analysis",
+        "patches on",
+        "largest required (V)",
+        "limit (V)",
+        "required /\nlimit",
+        "condition number of Φ_V",
+    )
     rows = []
     for run in runs:
         for body in run.results.names(f"{run.analysis}/pzt"):

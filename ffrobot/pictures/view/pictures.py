@@ -59,7 +59,7 @@ def draw_pictures(pictures: Sequence[Picture]) -> None:
     """Draw into PNG files. Raises `SolveError` where PyVista is not installed or cannot draw on this machine."""
     if find_spec("pyvista") is None:
         raise SolveError(
-            "pictures need PyVista, which is not installed: pip install pyvista (with 'numpy<2' beside Debian's)"
+            "pictures need PyVista, which is not installed: pip install pyvista (with 'numpy<2' next to Debian's)"
         )
     jobs = json.dumps([asdict(picture) for picture in pictures])
     command = [sys.executable, "-c", f"from {drawing.__name__} import main; main()"]

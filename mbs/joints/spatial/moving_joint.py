@@ -43,7 +43,7 @@ class MovingSpatialJoint(SpatialJoint):
     @model_validator(mode="after")
     def _has_friction(self) -> MovingSpatialJoint:
         if "friction_speed" in self.model_fields_set and not self.coulomb_friction:
-            raise ValueError('expected the key "friction_speed" only beside coulomb_friction, found it alone')
+            raise ValueError('expected the key "friction_speed" only with coulomb_friction, found it alone')
         return self
 
     @model_validator(mode="after")

@@ -15,7 +15,7 @@ def not_carried(scene: MechanismKeys) -> Iterator[str]:
     yield from _trajectories(scene)
     for k, load in enumerate(scene.load, 1):
         if load.force is not None:
-            yield f"load no. {k}: force: expected functions of time in space, found one of the motion of its point"
+            yield f"load no. {k}: force: expected functions of time in 3D, found one of the motion of its point"
     if scene.motors == "frame":
         yield from _coordinates_of_frames(scene)
     yield from _floating(scene)
@@ -26,7 +26,7 @@ def _trajectories(scene: MechanismKeys) -> Iterator[str]:
     for trajectory in scene.trajectory:
         if trajectory.angle is not None:
             yield (
-                f'trajectory "{trajectory.name}": angle: expected points and joints that follow trajectories in space,'
+                f'trajectory "{trajectory.name}": angle: expected points and joints that follow trajectories in 3D,'
                 f' found the angle of "{trajectory.angle}"'
             )
 
@@ -53,7 +53,7 @@ def _along_its_coordinate(joint: JointRecord) -> Iterator[str]:
 
 
 def _of_sections(key: str, found: str) -> str:
-    return f'{key}: expected motors = "section", as joints turn sections in space, found {found} and motors = "frame"'
+    return f'{key}: expected motors = "section", as joints turn sections in 3D, found {found} and motors = "frame"'
 
 
 def _floating(scene: MechanismKeys) -> Iterator[str]:
@@ -63,7 +63,7 @@ def _floating(scene: MechanismKeys) -> Iterator[str]:
     turned = {body for of in (scene.guessed_angles, scene.guessed_rates) for body, value in of.items() if value}
     floating = [body.name for body in scene.body if body.name not in topology.grounded]
     if together := [name for name in floating if name in joined]:
-        yield f"joint: expected joints that lead to the ground in space, found {quoted(together)} without"
+        yield f"joint: expected joints that lead to the ground in 3D, found {quoted(together)} without"
     for name in floating:
         if name in turned and name not in joined:
-            yield f'initial: expected bodies without joints to start at angle and rate 0 in space, not so of "{name}"'
+            yield f'initial: expected bodies without joints to start at angle and rate 0 in 3D, not so of "{name}"'

@@ -78,7 +78,7 @@ class SpatialTrajectory(MotionKeys):
         given = [key for key in (*PLACES, *ORIENTATIONS, "value", "waypoints", "via") if getattr(self, key) is not None]
         if not given or not set(given) <= {*allowed, "waypoints", "via"}:
             raise ValueError(
-                f'expected the keys {quoted((*allowed, "waypoints", "via"))} beside "{subject}", found {quoted(given)}'
+                f'expected the keys {quoted((*allowed, "waypoints", "via"))} with "{subject}", found {quoted(given)}'
             )
         if self.waypoints is not None:
             self._check_columns(given, allowed)
@@ -112,11 +112,9 @@ class SpatialTrajectory(MotionKeys):
             raise ValueError(f"expected one orientation at most ({quoted(ORIENTATIONS)}), found {quoted(found)}")
         for key, beside in (("reference_rotation_vector", "rotation_vector"), ("tool_axis", "direction")):
             if getattr(self, key) is not None and getattr(self, beside) is None:
-                raise ValueError(f'expected the key "{key}" only beside {beside}, found it alone')
+                raise ValueError(f'expected the key "{key}" only with {beside}, found it alone')
         if self.direction is not None and self.tool_axis is None:
-            raise ValueError(
-                'expected the key "tool_axis" beside direction: which direction of the section, found none'
-            )
+            raise ValueError('expected the key "tool_axis" with direction: which direction of the section, found none')
         if self.tool_axis is not None and not any(self.tool_axis):
             raise ValueError(f"expected tool_axis with a direction, found {list(self.tool_axis)}")
 
@@ -129,7 +127,7 @@ class SpatialTrajectory(MotionKeys):
         if self.duration is None:
             limits = [key for key in LIMITS if getattr(self, key) is not None]
             raise ValueError(
-                f'expected a "duration" beside poses in via (limits in m/s say nothing of turning), found'
+                f'expected a "duration" with poses in via (limits in m/s say nothing of turning), found'
                 f" {quoted(limits)}"
             )
         try:
