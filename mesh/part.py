@@ -84,18 +84,18 @@ def part_mesh(
         InputError: the part cannot be read or meshed, its mesh is unsound, or a face is not there.
     """
     where = f"{path}: geometry" if geometry.file is None else f"{path}: geometry.file: {geometry.file.name}"
-    progress("meshing" if geometry.file is None or _is_step(geometry.file) else f"reading {geometry.file.name}")
+    progress("meshing" if geometry.file is None or is_step(geometry.file) else f"reading {geometry.file.name}")
     source = _source(geometry, record, outlines, path, where)
     part = _placed(source.part, geometry) if geometry.file is not None else source.part
     check_shape(part, geometry, where)
     part = oriented(part)
-    if geometry.file is None or _is_step(geometry.file):
+    if geometry.file is None or is_step(geometry.file):
         curved, part = part, straightened(part)
         check_volume(part, curved, where)
     check_quality(part, where)
     check_neighbours(part, where)
     check_connected(part, where)
-    if geometry.file is not None and not _is_step(geometry.file):
+    if geometry.file is not None and not is_step(geometry.file):
         check_boundary(part, where)
     return named_faces(replace(source, part=part), geometry, places, outlines, path)
 
@@ -103,11 +103,12 @@ def part_mesh(
 def _is_meshed(geometry: SolidGeometry, record: SolidMeshRecord) -> bool:
     """Whether gmsh makes the mesh: of a shape drawn here, or a STEP file."""
     if geometry.file is not None:
-        return _is_step(geometry.file)
+        return is_step(geometry.file)
     return record.divisions is None and record.cell != "hexahedron"
 
 
-def _is_step(file: Path) -> bool:
+def is_step(file: Path) -> bool:
+    """Whether the ending says so."""
     return file.suffix.lower() in _STEP
 
 
@@ -121,15 +122,24 @@ def _source(
         from .shapes import mesh_shape
 
         return mesh_shape(geometry, record, outlines, path)
-    if _is_step(file):
+    if not is_step(file):
+        for key in ("cell", "size", "divisions"):
+            if getattr(record, key) is not None:
+                raise InputError(
+                    f"{path}: mesh.{key}: expected none, since {file.name} is a mesh, found {getattr(record, key)}"
+                )
+    return source_of_file(file, record, METRES[geometry.unit], where)
+
+
+def source_of_file(file: Path, record: SolidMeshRecord, metres: float, where: str) -> Source:
+    """The mesh of a part's file, made by gmsh of a STEP file, in the file's own numbers.
+
+    `metres` are those of the file's unit; `where` (file and key) begins the messages. Raises `InputError`.
+    """
+    if is_step(file):
         from .step import mesh_step
 
-        return read_apart(mesh_step, file.stat().st_size, where, file.absolute(), record, METRES[geometry.unit], where)
-    for key in ("cell", "size", "divisions"):
-        if getattr(record, key) is not None:
-            raise InputError(
-                f"{path}: mesh.{key}: expected none, since {file.name} is a mesh, found {getattr(record, key)}"
-            )
+        return read_apart(mesh_step, file.stat().st_size, where, file.absolute(), record, metres, where)
     return source_from(read_mesh(file.absolute(), where), where)
 
 

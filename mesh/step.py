@@ -39,7 +39,7 @@ def mesh_step(file: Path, record: SolidMeshRecord, scale: float, where: str) -> 
     text = file.read_text(encoding="latin-1")
     if "ISO-10303-21" not in text[:4096]:
         raise InputError(f"{where}: expected a STEP file, which begins with ISO-10303-21, found none")
-    declared = _declared_unit(text)
+    declared = declared_unit(text)
     with gmsh_session():
         gmsh.option.setNumber("Geometry.OCCImportLabels", 1)
         try:
@@ -62,7 +62,7 @@ def mesh_step(file: Path, record: SolidMeshRecord, scale: float, where: str) -> 
     return replace(source, part=source.part.moved(as_floats(source.part.points / declared)))
 
 
-def _declared_unit(content: str) -> float:
+def declared_unit(content: str) -> float:
     """The unit of length that the file declares, in mm; millimetres if none."""
     text = re.sub(r"\s+", "", content).upper()
     units = [entity for entity in text.split(";") if "LENGTH_UNIT()" in entity]

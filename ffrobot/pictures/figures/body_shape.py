@@ -10,8 +10,9 @@ from matplotlib.figure import Figure
 
 from ...common.arrays import Array, Integers
 from ...fe_models.modal_body import ModalBody
+from ...mesh.inspection import Inspection
 from ..body_surface import AMPLITUDE, body_surface, drawn_mode
-from ..projection import LINK
+from ..projection import LINK, View
 from .palette import COLORS
 from .parallel import EDGE, directions, lit, normals, projected
 from .style import ORDERED
@@ -49,6 +50,30 @@ def draw_mesh(body: ModalBody) -> Figure:
     return figure
 
 
+def draw_part(part: Inspection, listed: int) -> Figure:
+    """The boundary of a part seen from two sides, its faces in colors; the first `listed` ones have their numbers."""
+    figure = Figure(figsize=(WIDTH, 2 * SOLID_HEIGHT), layout="constrained")
+    palette = np.array([matplotlib.colors.to_rgb(color) for color in COLORS])
+    colors = palette[part.face_of % len(palette)]
+    for k, (view, title) in enumerate(((LINK, "from the side of +z"), (_behind(LINK), "from the other side"))):
+        axes = _view(figure, (2, 1, k + 1), title)
+        _draw_cells(axes, part.points, part.facets, colors, view=view)
+        facing = normals(part.points, part.facets) @ view.viewer > 0
+        for number, face in enumerate(part.faces[:listed]):
+            of_face = part.face_of == number
+            if np.any(facing & of_face):
+                x, y = projected(face.point, view)
+                box = {"boxstyle": "circle", "fc": "w", "lw": 0.3, "pad": 0.1}
+                axes.annotate(str(number + 1), (x, y), fontsize=7, bbox=box)
+        directions(axes, 0.06 * float(np.ptp(part.points, axis=0).max()), view)
+    return figure
+
+
+def _behind(view: View) -> View:
+    """The view from the other side, with the same direction upward."""
+    return View(viewer=-view.viewer, right=-view.right, up=view.up)
+
+
 def draw_modes(body: ModalBody) -> Figure:
     """The lowest modes, each scaled to the same largest displacement, whose size is the colour."""
     mesh = body_surface(body)
@@ -82,19 +107,21 @@ def _view(figure: Figure, place: tuple[int, int, int], title: str) -> Axes:
     return axes
 
 
-def _draw_cells(axes: Axes, points: Array, cells: Integers, colors: Array, edges: Integers | None = None) -> None:
+def _draw_cells(
+    axes: Axes, points: Array, cells: Integers, colors: Array, edges: Integers | None = None, view: View = LINK
+) -> None:
     """Cells of two points as lines, larger ones as polygons; colours (c, 3). Far ones first: near ones hide them."""
     if cells.shape[1] == 2:
-        lines = list(projected(points[cells], LINK))
+        lines = list(projected(points[cells], view))
         axes.add_collection(LineCollection(lines, colors=colors if edges is None else COLORS[0], linewidths=2.0))
         if edges is not None:
-            axes.plot(*projected(points[np.unique(cells)], LINK).T, "|", color=EDGE, markersize=6, markeredgewidth=0.8)
+            axes.plot(*projected(points[np.unique(cells)], view).T, "|", color=EDGE, markersize=6, markeredgewidth=0.8)
     else:
-        faces = lit(points, cells, colors, LINK)
-        polygons, depth = list(projected(points[cells], LINK)), points[cells].mean(axis=1) @ LINK.viewer
+        faces = lit(points, cells, colors, view)
+        polygons, depth = list(projected(points[cells], view)), points[cells].mean(axis=1) @ view.viewer
         if edges is not None:  # lines are polygons of two corners, sorted in just before their cells
             edges, nearest = _edge_depth(cells, depth, edges)
-            polygons, depth = polygons + list(projected(points[edges], LINK)), np.append(depth, nearest)
+            polygons, depth = polygons + list(projected(points[edges], view)), np.append(depth, nearest)
             faces = np.concatenate([faces, np.tile(matplotlib.colors.to_rgb(EDGE), (len(edges), 1))])
         order = np.argsort(depth, kind="stable")
         polygons, faces = [polygons[k] for k in order], faces[order]

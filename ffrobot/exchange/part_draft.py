@@ -1,0 +1,126 @@
+"""`ffrobot link PART.step --inspect`: a draft of a link file for a part, with its faces as interfaces."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..common.arrays import Array, as_list
+from ..common.errors import InputError
+from ..mesh.checks import METRES
+from ..mesh.inspection import Inspection, PartFace
+from .urdf.toml import toml_text
+
+ALUMINIUM = {"youngs_modulus": 70e9, "poissons_ratio": 0.33, "density": 2700.0}
+AT_END = 1e-3  # of the length: how far a plane end is from the end of the bounding box
+ROUND_JOINT = 0.1  # least radius of a bore for a joint, of the part's extent across
+SQUARE = 0.1  # largest cosine between the axis of such a bore and the part
+DIGITS = 9
+
+
+def draft_link(part: Inspection, file: Path, name: str, folder: Path) -> str:
+    """The text of a link file in `folder`, of aluminium: root and tip are the faces that joints most likely take.
+
+    These are two bores across the part, else its plane ends. All other plane faces and bores are there as comments.
+
+    Raises:
+        InputError: the part has no two such faces.
+    """
+    root, tip = _ends(part)
+    way = tip.point - root.point
+    if root.kind == "plane":  # x is square to it
+        way = (way @ root.direction) * root.direction
+    x = way / np.linalg.norm(way)
+    y = _across(part, root, x)
+    axes = np.stack([x, y, np.cross(x, y)])
+    in_file = METRES[part.unit]
+
+    def interface(label: str, face: PartFace) -> dict[str, Any]:
+        place = axes @ (face.point - root.point)
+        return {"name": label, "position": _numbers(place), "normal": _numbers(axes @ face.direction)}
+
+    keys = {
+        "name": name,
+        "material": ALUMINIUM,
+        "geometry": {
+            "kind": "solid",
+            "file": os.path.relpath(file.resolve(), folder.resolve()),
+            "unit": part.unit,
+            "length": round(float(np.linalg.norm(way)), DIGITS),
+            "origin": _numbers(root.point / in_file),
+            "x_axis": _numbers(x),
+            "y_axis": _numbers(y),
+        },
+        "reference": {"condition": "cantilever"},
+        "modes": {"count": 6},
+        "damping": {"ratio": 0.01},
+        "interface": [interface("root", root), interface("tip", tip)],
+    }
+    others = [face for face in part.faces if face.kind in ("plane", "bore") and face is not root and face is not tip]
+    tables = [interface(f"{face.kind}_{k}", face) for k, face in enumerate(others, start=1)]
+    head = f"# Draft by `ffrobot link {file.name} --inspect`. Check material, unit, root and tip.\n\n"
+    return head + toml_text(keys) + "".join(_commented(tables))
+
+
+def _principal(part: Inspection) -> tuple[Array, Array]:
+    """(3, 3) rows: directions in which the part is longest, then wider, then thinnest; and (3,) its extents there."""
+    axes = np.linalg.svd(part.points - part.points.mean(axis=0), full_matrices=False)[2]
+    extent = np.ptp(part.points @ axes.T, axis=0)
+    order = np.argsort(-extent)
+    return axes[order], extent[order]
+
+
+def _ends(part: Inspection) -> tuple[PartFace, PartFace]:
+    """Root and tip: the root is where the part begins along the axis of the file that is nearest to its own."""
+    (along, *_), (length, width, _) = _principal(part)
+    along = along * np.sign(along[np.abs(along).argmax()])
+    bores = [
+        face
+        for face in part.faces
+        if face.kind == "bore" and (face.radius or 0.0) >= ROUND_JOINT * width and abs(face.direction @ along) < SQUARE
+    ]
+    if len(bores) > 1:
+        first, *_, last = sorted(bores, key=lambda face: float(face.center @ along))
+        return first, last
+    ends = [face for face in part.faces if face.kind == "plane" and _is_outermost(part, face, AT_END * length)]
+    pairs = [
+        ((tip.point - root.point) @ tip.direction, root, tip)
+        for root in ends
+        for tip in ends
+        if root.direction @ tip.direction < SQUARE - 1 and tip.direction @ along > 0
+    ]
+    if not pairs:
+        raise InputError(
+            "expected two bores across the part, or plane faces at both of its ends, for root and tip of a draft, found"
+            " neither: write the link file from the faces listed here"
+        )
+    _, root, tip = max(pairs, key=lambda pair: float(pair[0]))
+    return root, tip
+
+
+def _is_outermost(part: Inspection, face: PartFace, slack: float) -> bool:
+    return bool(((part.points - face.point) @ face.direction).max() < slack)
+
+
+def _across(part: Inspection, root: PartFace, x: Array) -> Array:
+    """The link's y axis: square to the axis of the root's bore, else the direction in which the part is thinnest."""
+    z = root.direction if root.kind == "bore" else _principal(part)[0][1]
+    z = z - (z @ x) * x
+    if np.linalg.norm(z) < SQUARE:
+        z = np.eye(3)[np.abs(x).argmin()]
+        z = z - (z @ x) * x
+    y: Array = np.cross(z / np.linalg.norm(z), x)
+    return y
+
+
+def _commented(tables: list[dict[str, Any]]) -> Iterator[str]:
+    for table in tables:
+        yield "\n" + "".join(f"# {line}\n" for line in toml_text({"interface": [table]}).strip().splitlines())
+
+
+def _numbers(vector: Array) -> list[float]:
+    return [value + 0.0 for value in as_list(np.round(vector, DIGITS))]  # no −0.0

@@ -1,0 +1,172 @@
+"""What a part's file holds, before there is a link file: size, likely unit, plane faces, bores and shafts.
+
+The faces are those that interfaces of a link choose from (`faces.Boundary.smooth_faces`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from ..common.arrays import Array, Integers, as_floats
+from ..common.errors import InputError
+from .checks import METRES, check_connected, check_neighbours, check_quality, oriented, straightened
+from .faces import Boundary, SmoothFace
+from .jacobian import volume_of_tetrahedra
+from .part import is_step, source_of_file
+from .records import SolidMeshRecord
+
+Unit = Literal["m", "mm", "in"]
+LONGEST = 5.0  # m of a link: a larger number is in mm
+FLAT = 1e-4  # how far normals of a plane face are from their mean, and points of a bore from its radius, relative
+
+
+@dataclass(frozen=True, eq=False)
+class PartFace:
+    """A smooth face in the axes of the file, m.
+
+    Attributes:
+        kind: plane, bore (hollow) and shaft (solid) for closed cylinders, else curved.
+        center: (3,).
+        point: (3,) by which an interface finds it: the center of a bore or shaft, else a place on it near its center.
+        direction: (3,) outward normal of a plane face, axis of a bore or shaft, mean normal of others; of length one.
+        area: m².
+        radius: of a bore or shaft, m; None of others.
+    """
+
+    kind: Literal["plane", "bore", "shaft", "curved"]
+    center: Array
+    point: Array
+    direction: Array
+    area: float
+    radius: float | None
+
+
+@dataclass(frozen=True, eq=False)
+class Inspection:
+    """A part as its file has it; lengths in m, axes of the file.
+
+    Attributes:
+        unit: of the file's numbers.
+        is_declared: whether the file says so; else it is a guess by the size.
+        low, high: (3,) corners of the bounding box.
+        volume: m³, of the mesh, whose cells may be curved.
+        center: (3,) of the volume within straight facets.
+        faces: largest first.
+        points, facets: (p, 3), (b, 3 or 4) of the boundary; `face_of` (b,) is the number of each facet's face.
+        groups: names of volumes and faces in the file.
+        remarks: on what the file holds besides.
+    """
+
+    unit: Unit
+    is_declared: bool
+    low: Array
+    high: Array
+    volume: float
+    center: Array
+    faces: Sequence[PartFace]
+    points: Array
+    facets: Integers
+    face_of: Integers
+    groups: Sequence[str]
+    remarks: Sequence[str]
+
+
+def inspect_part(file: Path, unit: Unit | None = None) -> Inspection:
+    """Read or mesh the part in `file`; its `unit` where that is known.
+
+    Raises:
+        InputError: the file is not there, cannot be read or meshed, or its mesh is unsound.
+    """
+    if not file.is_file():
+        raise InputError(f"{file}: expected a STEP file or a mesh, found no such file")
+    declared = _declared(file) if is_step(file) else None
+    known = unit or declared
+    source = source_of_file(file, SolidMeshRecord(), METRES[known or "m"], str(file))
+    part = straightened(oriented(source.part))
+    check_quality(part, str(file))
+    check_neighbours(part, str(file))
+    check_connected(part, str(file))
+    if known is None:
+        known = "mm" if np.ptp(part.points, axis=0).max() > LONGEST else "m"
+    part = part.moved(as_floats(METRES[known] * part.points))
+    boundary = Boundary.of(part)
+    faces, face_of = boundary.smooth_faces, np.zeros(len(boundary.facets), dtype=np.int64)
+    for k, face in enumerate(faces):
+        face_of[face.facets] = k
+    volume, center = _volume(boundary)
+    if part.degree == 2 and part.cell == "tetrahedron":
+        volume = volume_of_tetrahedra(part.points[part.cells], part.degree)
+    return Inspection(
+        known, unit is not None or declared is not None,
+        part.points.min(axis=0), part.points.max(axis=0), volume, center,
+        [_part_face(boundary, face) for face in faces], boundary.points, boundary.facets, face_of,
+        [*part.regions, *source.facet_groups, *source.point_groups], part.remarks,
+    )  # fmt: skip
+
+
+def _declared(file: Path) -> Unit | None:
+    from .step import declared_unit
+
+    found: dict[float, Unit] = {1.0: "mm", 25.4: "in", 1000.0: "m"}
+    millimetres = declared_unit(file.read_text(encoding="latin-1"))
+    if millimetres not in found:
+        raise InputError(f"{file}: expected a part drawn in m, mm or in, found a unit of {millimetres:g} mm")
+    return found[millimetres]
+
+
+def _part_face(boundary: Boundary, face: SmoothFace) -> PartFace:
+    normals = boundary.normal[face.facets]
+    if face.axis is not None:
+        fit = _cylinder(boundary.points[np.unique(boundary.facets[face.facets])], face)
+        if fit is not None:
+            center, axis, radius = fit
+            outward = np.einsum("fi,fi->f", boundary.centroid[face.facets] - center, normals)
+            kind: Literal["bore", "shaft"] = "bore" if outward.mean() < 0 else "shaft"
+            return PartFace(kind, center, center, axis, face.area, radius)
+    size = float(np.linalg.norm(face.normal))
+    direction = face.normal / size if size > FLAT else np.zeros(3)
+    is_plane = bool(np.all(np.linalg.norm(normals - direction, axis=1) < FLAT))
+    centroids = boundary.centroid[face.facets]
+    nearest = centroids[np.linalg.norm(centroids - face.center, axis=1).argmin()]
+    is_on_it = is_plane and face.distance(boundary, face.center) < FLAT * np.sqrt(face.area)
+    point = face.center if is_on_it else nearest
+    return PartFace("plane" if is_plane else "curved", face.center, point, direction, face.area, None)
+
+
+def _cylinder(points: Array, face: SmoothFace) -> tuple[Array, Array, float] | None:
+    """Center (3,), axis (3,) and radius of the cylinder nearest to `points` (k, 3); None where they are on none."""
+    assert face.axis is not None
+    across = np.linalg.svd(face.axis[None])[2][1:]  # (2, 3), square to the axis as far as it is known
+    size = float(np.ptp(points, axis=0).max())
+
+    def axis_of(tilt: Array) -> Array:
+        axis = face.axis + tilt @ across
+        return as_floats(axis / np.linalg.norm(axis))
+
+    def distances(x: Array) -> Array:
+        off, axis = points - (face.center + size * x[2:4] @ across), axis_of(x[:2])
+        return as_floats(np.linalg.norm(off - np.outer(off @ axis, axis), axis=1))
+
+    found = least_squares(lambda x: distances(x) / size - x[4], [0.0, 0.0, 0.0, 0.0, 0.5], xtol=1e-15, ftol=1e-15)
+    axis, radius = axis_of(found.x[:2]), float(size * found.x[4])
+    if radius <= 0 or np.abs(distances(found.x) - radius).max() > FLAT * radius:
+        return None
+    on_axis = face.center + size * found.x[2:4] @ across
+    along = (points - on_axis) @ axis
+    return as_floats(on_axis + (along.min() + along.max()) / 2 * axis), axis, radius
+
+
+def _volume(boundary: Boundary) -> tuple[float, Array]:
+    """Volume and center (3,) by the divergence theorem over the boundary's triangles."""
+    corners = boundary.points[boundary.facets]
+    fan = [corners[:, [0, k, k + 1]] for k in range(1, corners.shape[1] - 1)]
+    parts = [(np.linalg.det(triangles) / 6, triangles.sum(axis=1) / 4) for triangles in fan]
+    volume = float(sum(part.sum() for part, _ in parts))
+    moment = sum(part @ center for part, center in parts)
+    return volume, as_floats(moment / volume)

@@ -1,0 +1,108 @@
+"""What is found in a part's file without a link file, and the draft of one: a plate with bores, by closed forms."""
+
+import gmsh
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from ffrobot import InputError
+from ffrobot.exchange.part_draft import draft_link
+from ffrobot.fe_models.link import computed_modal_body
+from ffrobot.mesh.gmsh_session import gmsh_session
+from ffrobot.mesh.inspection import inspect_part
+
+LENGTH, HEIGHT, THICKNESS, RADIUS = 300.0, 40.0, 10.0, 12.0
+BORES = (25.0, 150.0, 275.0)
+VOLUME = THICKNESS * (LENGTH * HEIGHT - 3 * np.pi * RADIUS**2) * 1e-9
+
+
+def plate(path, bores=BORES, *, mesh=False):
+    with gmsh_session():
+        cad = gmsh.model.occ
+        bar = cad.addBox(0, -HEIGHT / 2, -THICKNESS / 2, LENGTH, HEIGHT, THICKNESS)
+        tools = [(3, cad.addCylinder(x, 0, -THICKNESS / 2, 0, 0, THICKNESS, RADIUS)) for x in bores]
+        if tools:
+            cad.cut([(3, bar)], tools)
+        cad.synchronize()
+        if mesh:
+            gmsh.option.setNumber("Mesh.MeshSizeMax", 12.0)
+            gmsh.model.mesh.generate(3)
+        gmsh.write(str(path))
+
+
+def bores_of(part):
+    return sorted((face for face in part.faces if face.kind == "bore"), key=lambda face: face.center[0])
+
+
+def test_a_step_file(tmp_path):
+    plate(tmp_path / "plate.step")
+    part = inspect_part(tmp_path / "plate.step")
+    assert (part.unit, part.is_declared) == ("mm", True)
+    np.testing.assert_allclose(part.high - part.low, [0.3, 0.04, 0.01], atol=1e-9)
+    assert part.volume == pytest.approx(VOLUME, rel=2e-4)
+    found = bores_of(part)
+    for x, bore in zip(BORES, found, strict=True):
+        np.testing.assert_allclose(bore.center, [x / 1000, 0, 0], atol=1e-8)
+        np.testing.assert_allclose(np.abs(bore.direction), [0, 0, 1], atol=1e-6)
+        assert bore.radius == pytest.approx(RADIUS / 1000, rel=1e-6)
+    planes = [face for face in part.faces if face.kind == "plane"]
+    assert len(planes) == 6
+    assert sum(face.area for face in planes[2:4]) == pytest.approx(2 * 0.3 * 0.01, rel=1e-9)
+
+
+def test_shafts_are_not_bores(tmp_path):
+    with gmsh_session():
+        gmsh.model.occ.addCylinder(0, 0, 0, 0, 200, 0, 15)
+        gmsh.model.occ.synchronize()
+        gmsh.write(str(tmp_path / "rod.step"))
+    part = inspect_part(tmp_path / "rod.step")
+    (shaft,) = (face for face in part.faces if face.kind != "plane")
+    assert (shaft.kind, shaft.radius) == ("shaft", pytest.approx(0.015, rel=1e-6))
+    np.testing.assert_allclose(shaft.center, [0, 0.1, 0], atol=1e-8)
+
+
+@pytest.mark.parametrize(("bores", "length"), [(BORES, 0.25), ((), 0.3)])
+def test_a_draft_wherever_the_part_lies(bores, length, tmp_path):
+    """A mesh, and the same turned and moved: links of one mass and one frequency, between bores or plane ends."""
+    import meshio
+
+    plate(tmp_path / "plate.msh", bores, mesh=True)
+    mesh = meshio.read(tmp_path / "plate.msh")
+    turn = Rotation.from_rotvec([0.4, -0.7, 1.1]).as_matrix()
+    cells = [(block.type, block.data) for block in mesh.cells if block.type == "tetra"]
+    bodies = []
+    for name, points in (("here", mesh.points), ("there", mesh.points @ turn.T + [500.0, -20.0, 70.0])):
+        file = tmp_path / f"{name}.vtk"
+        meshio.Mesh(points, cells).write(file)
+        part = inspect_part(file)
+        assert (part.unit, part.is_declared) == ("mm", False)
+        link = tmp_path / f"{name}.toml"
+        link.write_text(draft_link(part, file, name, tmp_path))
+        bodies.append(computed_modal_body(link))
+    here, there = bodies
+    assert here.length == pytest.approx(length, rel=1e-6)
+    assert there.length == pytest.approx(length, rel=1e-6)
+    assert here.mass == pytest.approx(there.mass, rel=1e-9)
+    np.testing.assert_allclose(here.frequency[:3], there.frequency[:3], rtol=1e-6)
+
+
+def test_what_has_no_ends(tmp_path):
+    with gmsh_session():
+        gmsh.model.occ.addSphere(0, 0, 0, 100)
+        gmsh.model.occ.synchronize()
+        gmsh.write(str(tmp_path / "ball.step"))
+    part = inspect_part(tmp_path / "ball.step")
+    with pytest.raises(InputError, match="expected two bores across the part, or plane faces at both of its ends"):
+        draft_link(part, tmp_path / "ball.step", "ball", tmp_path)
+
+
+def test_the_command(tmp_path, ffrobot):
+    plate(tmp_path / "plate.step")
+    done = ffrobot("link", "plate.step", "--inspect", "--density", "2700", "-o", "plate.toml", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert f"mass {2700 * VOLUME:.4f}"[:10] in done.stdout
+    assert "drawn in mm" in done.stdout
+    assert (tmp_path / "plate.faces.png").read_bytes().startswith(b"\x89PNG")
+    assert ffrobot("link", "plate.step", "--inspect", "-o", "plate.toml", cwd=tmp_path).returncode == 2
+    assert "no such file" in ffrobot("link", "gone.step", "--inspect", cwd=tmp_path).stderr
+    assert "--inspect" in ffrobot("link", "plate.toml", "--unit", "mm", cwd=tmp_path).stderr
