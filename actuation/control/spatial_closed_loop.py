@@ -76,7 +76,7 @@ def run_spatial_closed_loop(context: ActuatedSpatialContext, analysis: SpatialCl
         for sensors in (analysis.sensor, needed_sensors(robot, analysis.controller))
     )
     read = merged(given, more)
-    sensing = SpatialSensing(plant.model.tree, read)
+    sensing = SpatialSensing(plant.model, read)
     outputs = replay_times(source, analysis)
     setup = _setup(context, analysis, source, robot, plant, read, outputs, sensing.read(*plant.source[:3]))
     acting = [make_controller(record, setup, analysis.controller) for record in analysis.controller]

@@ -9,8 +9,10 @@ import numpy as np
 
 from ...common.arrays import Array, Indices
 from ...common.errors import InputError
-from ...mbs.model.spatial_accelerations import Accelerated
+from ...mbs.model.spatial_drives import Drives, PointDrive
+from ...mbs.model.spatial_known_motion import KnownStates, motion_forces
 from ...mbs.model.spatial_model import SpatialModel
+from ...mbs.model.spatial_system import SpatialSystem
 from ...mbs.model.spatial_tree import Section, SpatialTree
 from ...mbs.solve.spatial_linearisation import labelled
 from ..context import place_of
@@ -32,18 +34,21 @@ class SpatialSignal(Reading):
 class SpatialSensing:
     """What signals read of states of a tree."""
 
-    def __init__(self, tree: SpatialTree, read: Sequence[SpatialSignal]) -> None:
+    def __init__(self, model: SpatialModel, read: Sequence[SpatialSignal]) -> None:
+        tree = model.tree
         self._tree, self._count = tree, len(read)
         self._linear = np.array([k for k, signal in enumerate(read) if not signal.point], dtype=int)
         self._order = np.array([read[k].order for k in self._linear], dtype=int)
         self._along = np.reshape([read[k].along for k in self._linear], (len(self._linear), tree.n_v))
         self._where = _places_in_q(tree)
         sections = {signal.point: tree.section(signal.point, np.eye(3)) for signal in read if signal.point}
-        self._points: list[tuple[Section, list[tuple[int, int, int]]]] = [
-            (section, [(k, s.order, s.axis) for k, s in enumerate(read) if s.point == point])
+        self._points: list[tuple[str, Section, list[tuple[int, int, int]]]] = [
+            (point, section, [(k, s.order, s.axis) for k, s in enumerate(read) if s.point == point])
             for point, section in sections.items()
         ]
-        self._accelerations = any(signal.point and signal.order == ORDERS["acceleration"] for signal in read)
+        accelerated = any(signal.point and signal.order == ORDERS["acceleration"] for signal in read)
+        drives = Drives(at_points=tuple(PointDrive(point, {}) for point in sections))
+        self._system = SpatialSystem(model, drives) if accelerated else None
 
     def read(self, q: Array, v: Array, a: Array) -> Array:
         """Readings (T, signals) of q (T, n_q), v and a (T, n_v)."""
@@ -52,13 +57,15 @@ class SpatialSensing:
         found[:, self._linear] = np.where(self._order == ORDERS["value"], *values)
         if not self._points:
             return found
-        state = Accelerated(self._tree, q, v, a, self._tree.frames(q))
-        frames = state.of_frames() if self._accelerations else []
-        for section, columns in self._points:
-            at = self._tree.motion(section, q, state.frames)
-            orders = [at.r, state.velocity(at)[0]]
-            if self._accelerations:
-                orders.append(state.of_section(section, frames).r)
+        frames, forces = self._tree.frames(q), None
+        if self._system is not None:
+            none = np.zeros((len(q), len(self._system.model.rows)))
+            forces = motion_forces(self._system, KnownStates(q, v, a), np.zeros(len(q)), none)
+        for point, section, columns in self._points:
+            at = self._tree.motion(section, q, frames)
+            orders = [at.r, np.einsum("tij,tj->ti", at.L[:, :3], v)]
+            if forces is not None:
+                orders.append(forces.of_point(point).a)
             for k, order, axis in columns:
                 found[:, k] = orders[order][:, axis]
         return found

@@ -16,7 +16,7 @@ from ..actuation.spatial_points import forces_at_points, solve_spatial_points, s
 from ..common.errors import FfrobotError, SolveError, of_file
 from ..mbs.analysis.operating_points import InstantAnalysis
 from ..mbs.analysis.outcome import Outcome
-from ..mbs.quantities.spatial_energy import energies, momentum
+from ..mbs.quantities.spatial_energy import totals
 from ..mbs.quantities.spatial_reactions import reactions
 from ..mbs.quantities.spatial_sharing import shared_evenly
 from ..mbs.quantities.stiffening import NOTABLE
@@ -252,6 +252,6 @@ def _evaluated(solution: SpatialSolution, run: Outcome) -> SpatialResult:
     if run.analysis.allocates_patches and any(row.is_trajectory for row in run.model.rows):
         at_points = {name: solve_spatial_points(points, run) for name, points in solution.points.items()}
     return SpatialResult(
-        run, motion, reactions(motion), energies(motion), momentum(motion), actuation, stresses, at_points,
+        run, motion, reactions(motion), *totals(motion), actuation, stresses, at_points,
         bending=bending_of_links(solution, motion), sharing=sharing,
     )  # fmt: skip

@@ -12,17 +12,17 @@ import numpy as np
 
 from ...common.arrays import Array
 from ...common.errors import InputError
-from ..model.spatial_accelerations import Accelerated
 from ..model.spatial_gears import elastic_joints
+from ..model.spatial_known_motion import States, rotor_torques
 from ..model.spatial_model import SpatialModel
-from ..model.spatial_transmission import compliance, rotor, rotors
+from ..model.spatial_transmission import compliance, rotor
 from .elastic_joints import GearSpring, gear_motion
 from .outcome import GearMotion, Outcome
 from .spatial_replay import motor_forces_of
 
 
 def gears_of_motion(
-    model: SpatialModel, state: Accelerated, time: Array, moments: Mapping[str, Array]
+    model: SpatialModel, state: States, time: Array, moments: Mapping[str, Array]
 ) -> dict[str, GearMotion]:
     """By joint with a gear that gives, where `model` takes it for rigid: see `elastic_joints.add_transmission`.
 
@@ -38,17 +38,15 @@ def gears_of_motion(
                 f"{model.scene.path}: expected no [[load]] on joints with stiffness in inverse analyses and"
                 f' equilibria, found one on "{load.joint}"'
             )
-    geared = [node for node in model.tree.nodes if rotor(node)[0]] if elastic else []
-    found = {}
-    for node, turning in zip(geared, rotors(state) if elastic else (), strict=True):
-        if (of_gear := compliance(node)) is None:
-            continue
-        sign, N = -1.0 if node.backwards else 1.0, turning.ratio
+    torques, found = rotor_torques(model, state, time) if elastic else np.zeros((0, 0)), {}
+    for node in elastic:
+        of_gear, (inertia, N) = compliance(node) or (0.0, 0.0), rotor(node)
+        sign, torque = -1.0 if node.backwards else 1.0, torques[:, model.tree.index[node.body.name]]
         of_joint = ((state.q, node.q), (state.v, node.v), (state.a, node.v))
         gamma = sign * np.column_stack([values[:, part.start] for values, part in of_joint])
         where = f'{model.scene.path}: joint "{node.joint.name}"'
-        spring = GearSpring(*of_gear, turning.inertia * N**2, where)
-        found[node.joint.name] = gear_motion(spring, time, moments[node.joint.name][:, 0], N * turning.torque, gamma)
+        spring = GearSpring(*of_gear, inertia * N**2, where)
+        found[node.joint.name] = gear_motion(spring, time, moments[node.joint.name][:, 0], N * torque, gamma)
     return found
 
 
@@ -71,16 +69,14 @@ def wound_up(run: Outcome, model: SpatialModel) -> WoundUp:
 
     Raises `InputError` where motors turn frames: what a gear carries then is not along its joint alone.
     """
-    tree = run.model.tree
-    if not model.tree.gears or tree.gears:
+    if not model.tree.gears or run.model.tree.gears:
         return WoundUp(run.q, run.v, run.a, {})
     if model.scene.motors == "frame":
         raise InputError(
             f'{model.scene.path}: motors: expected "section" where joints with stiffness are driven, controlled or'
             ' linear, found "frame"'
         )
-    state = Accelerated(tree, run.q, run.v, run.a, tree.frames(run.q))
-    gears = gears_of_motion(run.model, state, run.time, motor_forces_of(run).moments)
+    gears = gears_of_motion(run.model, run, run.time, motor_forces_of(run).moments)
     q, v, a = with_motors(model, (run.q, run.v, run.a), gears)
     return WoundUp(q, v, a, gears)
 

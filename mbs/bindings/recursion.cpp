@@ -3,6 +3,7 @@
 #include "core/recursion/independent_rows.h"
 #include "core/recursion/observe.h"
 
+#include <nanobind/stl/array.h>
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/tuple.h>
@@ -167,9 +168,27 @@ template <class Space> auto bind_model(nb::module_ &m, const char *name, const c
            "forces of the scene leave for others.")
       .def("row_accelerations", &row_accelerations<Space>, "scene"_a, "times"_a, "q"_a, "v"_a, "a"_a,
            "Second derivatives of the values of rows (T, rows), less those of their targets.")
-      .def("transmitted_forces", &transmitted_forces<Space>, "scene"_a, "times"_a, "q"_a, "v"_a, "a"_a, "multipliers"_a,
-           "Of the joint of each body (T, bodies 2 dim): force on its outer section and moment about its origin, in "
-           "global axes, then in axes of the joint.")
+      .def(
+          "motion_forces", &motion_forces<Space>, "scene"_a, "times"_a, "q"_a, "v"_a, "a"_a, "multipliers"_a,
+          "What bodies and joints do to each other at states q (T, n_q), v and a (T, n_v), under multipliers (T, rows) "
+          "and the forces of the scene.")
+      .def("multiplier_forces", &multiplier_forces<Space>, "scene"_a, "times"_a, "q"_a, "multipliers"_a,
+           "The same of multipliers (T, rows) by themselves: what they do to joints and constraints.")
+      .def_prop_ro(
+          "sections", [](const Model<Space> &model) { return ForcesOfStates<Space>::sections(model.mechanism); },
+          "Body and marker of each section of MotionForces.")
+      .def(
+          "states_totals",
+          [](const Model<Space> &model, const Scene &scene, const RowMajor &q, const RowMajor &v) {
+            check_scene(model, scene);
+            check_size("states", v.rows(), q.rows());
+            check_size("q", q.cols(), model.mechanism.n_q), check_size("v", v.cols(), model.mechanism.n_v);
+            return totals_of_states(model.mechanism, scene, q, v);
+          },
+          "scene"_a, "q"_a, "v"_a,
+          "(T, 10) of states q (T, n_q), v (T, n_v): kinetic, strain and gravitational energy (J), dissipated power "
+          "(W), "
+          "with what gears and friction of the scene store and dissipate; momentum, angular momentum about the origin.")
       .def("time_evaluations", &time_of<Space>, "q"_a, "v"_a, "target"_a, "repetitions"_a,
            "Seconds of one evaluation.");
 }

@@ -44,10 +44,6 @@ class CutCoordinate(NamedTuple):
         """Friction (T,) at the coordinate's rate, N·m or N."""
         return np.zeros_like(rate) if self.friction is None else self.friction.resistance(rate)
 
-    def given(self, times: Array) -> Array:
-        """The sum of loads (T,) along the coordinate, N·m or N."""
-        return sum((load.sample(times)[0] for load in self.loads), np.zeros(len(times)))
-
 
 def cut_coordinates(scene: SpatialMechanismScene, tree: SpatialTree) -> Iterator[CutCoordinate]:
     """Of all joints at which loops are cut."""
@@ -88,18 +84,6 @@ def cut_resistance(
         for k, one in enumerate(rough):
             G = gradients[:, k]
             found += one.resistance(np.einsum("tj,tj->t", G, v))[:, None] * G
-    return found
-
-
-def cut_loads(
-    tree: SpatialTree, cut: Sequence[CutCoordinate], q: Array, frames: Sequence[Motion], times: Array
-) -> Array:
-    """Generalized forces (T, n_v) of given loads along cut joints at `times` (T,)."""
-    loaded, found = [one for one in cut if one.loads], np.zeros((len(q), tree.n_v))
-    if loaded:
-        _, gradients = measured(tree, loaded, q, frames)
-        for k, one in enumerate(loaded):
-            found += one.given(times)[:, None] * gradients[:, k]
     return found
 
 

@@ -1,4 +1,4 @@
-"""How joints at which loops are cut move, and what acts along them: read off the motion of their two sides."""
+"""How joints at which loops are cut move: read off the motion of their two sides."""
 
 from __future__ import annotations
 
@@ -19,13 +19,11 @@ class CutMotion(NamedTuple):
     Attributes:
         coordinate: (T,), full turns counted.
         rate: (T,).
-        force: (T,) of friction and loads along it, N·m or N.
         is_counted: whether the times are close enough together to count its turns.
     """
 
     coordinate: Array
     rate: Array
-    force: Array
     is_counted: bool
 
 
@@ -38,7 +36,7 @@ def cut_motions(
     for one, value, G, guess in zip(model.cut, values.T, gradients.swapaxes(0, 1), _guesses(model), strict=True):
         rate = np.einsum("tj,tj->t", G, v)
         coordinate, is_counted = _unwound(value, rate, times, guess) if one.row.kind == "turn" else (value, True)
-        found.append(CutMotion(coordinate, rate, one.given(times) - one.resistance(rate), is_counted))
+        found.append(CutMotion(coordinate, rate, is_counted))
     return found
 
 

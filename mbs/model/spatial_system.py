@@ -16,6 +16,7 @@ from .._core import TimeFunction
 from ..fields.orientations import OrientationLaw
 from ..joints.transmission import Friction
 from ..scene.spatial.loads import OF_POINT, SpatialLoad
+from .spatial_cut import CutCoordinate
 from .spatial_drives import NO_DRIVES, Command, Drive, Drives, PointDrive
 from .spatial_frame_motors import held_forces, turn_frames
 from .spatial_model import SpatialModel
@@ -116,6 +117,20 @@ class SpatialSystem:
         """(T, rows) of the model from those of `integrated`: 0 of rows that this has not, as of dependent ones."""
         found = of_core if self.plane is None else of_core @ self.plane.spread.T
         return found * self.row_signs
+
+    @property
+    def loaded_cut(self) -> list[tuple[CutCoordinate, CutPlace]]:
+        """Coordinates of joints at which loops are cut along which something acts, and where."""
+        return list(zip(self._cut, self._parts.cut, strict=True))
+
+    @property
+    def sections(self) -> list[tuple[int, str]]:
+        """Body and name of the point of each of the core's sections."""
+        return [(body, self._markers[body][marker].point) for body, marker in self.core.sections]
+
+    def point_number(self, point: str) -> int:
+        """Of "BODY.POINT", on which a load or a drive acts, among the core's wrenches."""
+        return self._wrenches.index(self._place(self.model.tree.section(point, np.eye(3))))
 
     def held_model(self) -> _core.HeldModel:
         """The model for motions under held inputs, without loads of the scene; rows must follow nothing."""

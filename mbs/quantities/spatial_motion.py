@@ -15,15 +15,16 @@ from ...common.arrays import Array
 from ...common.rotations import quaternions
 from ..analysis.outcome import GearMotion
 from ..analysis.spatial_gears import gears_of_motion, with_motors
-from ..model.spatial_accelerations import Accelerated
 from ..model.spatial_bending import bent_section
 from ..model.spatial_cut import CutCoordinate
 from ..model.spatial_cut_motion import CutMotion, cut_motions
-from ..model.spatial_drives import PointDrive
+from ..model.spatial_drives import Drives, PointDrive
 from ..model.spatial_gears import with_compliance_in_space
+from ..model.spatial_known_motion import MotionForces, motion_forces
 from ..model.spatial_model import SpatialModel, row_values, target_rates
 from ..model.spatial_motors import MotorForces, motor_forces, path_forces
-from ..model.spatial_rows import SpatialRow
+from ..model.spatial_payloads import turns_as_a_body
+from ..model.spatial_system import SpatialSystem
 from ..model.spatial_tree import Motion, Node
 from ..scene.spatial.trajectories import SpatialTrajectory
 
@@ -79,10 +80,18 @@ class SpatialMotion:
         """Of all bodies, in the order of the tree."""
         return self.model.tree.frames(self.q)
 
-    @property
-    def accelerated(self) -> Accelerated:
-        """The same with what accelerations are read off."""
-        return Accelerated(self.model.tree, self.q, self.v, self.a, self.frames)
+    @cached_property
+    def system(self) -> SpatialSystem:
+        """Its equations, with drives on all points where payloads sit."""
+        payloads = (
+            PointDrive(payload.point, {}) for payload in self.model.scene.payload if not turns_as_a_body(payload)
+        )
+        return SpatialSystem(self.model, Drives(at_points=(*self.applied, *payloads)))
+
+    @cached_property
+    def forces(self) -> MotionForces:
+        """What bodies and joints do to each other in it."""
+        return motion_forces(self.system, self, self.time, self.multipliers)
 
     @cached_property
     def rows(self) -> tuple[Array, Array]:
@@ -94,11 +103,6 @@ class SpatialMotion:
         """Coordinates of joints at which loops are cut."""
         motions = cut_motions(self.model, self.q, self.v, self.time, self.frames)
         return list(zip(self.model.cut, motions, strict=True))
-
-    @property
-    def along_cut(self) -> list[tuple[SpatialRow, Array]]:
-        """Rows of these along which something acts, each with its force (T,), N·m or N."""
-        return [(one.row, one.row.sign * motion.force) for one, motion in self.cut if one.is_loaded]
 
     @cached_property
     def violation(self) -> Array:
@@ -204,7 +208,7 @@ class SpatialMotion:
         """By joint, of inverse analyses and equilibria with gears that give."""
         if not self.is_prescribed:
             return {}
-        return gears_of_motion(self.model, self.accelerated, self.time, self._with_rigid_gears.moments)
+        return gears_of_motion(self.model, self, self.time, self._with_rigid_gears.moments)
 
     @cached_property
     def behind_gears(self) -> SpatialMotion:

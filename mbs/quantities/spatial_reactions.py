@@ -1,17 +1,15 @@
-"""Forces in the joints of a tree in space: what each body needs for its motion, summed from the outermost inwards."""
+"""Forces in the joints of a tree in 3D: what the core's Newton–Euler algorithm sums from the outermost body inwards."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import numpy as np
 
 from ...common.arrays import Array
-from .._core import TimeFunction
-from ..model.spatial_inverse import body_forces
-from ..model.spatial_rows import SpatialRow
-from ..model.spatial_transmission import rotors
-from ..model.spatial_wrench import Wrench, along_joint, row_wrenches
+from ..model.spatial_known_motion import MotionForces, multiplier_forces
+from ..model.spatial_tree import Node
+from ..model.spatial_wrench import Wrench, along_joint
 from .spatial_motion import SpatialMotion
 
 
@@ -21,66 +19,44 @@ def reactions(motion: SpatialMotion) -> Mapping[str, Wrench]:
     A joint of the tree carries what its body and all that hangs on it need, less what else acts there and what drives
     the joint; one that closes a loop has its multipliers, and friction and loads along it.
     """
-    rows = zip(motion.model.rows, -motion.multipliers.T, strict=True)
-    along_rows = [(row, size) for row, size in rows if row.kind != "coordinate"]  # that drives its joint
-    # What acts along a joint that closes a loop is part of what it carries, as in the tree.
-    return _carried(motion, _needed(motion), [*along_rows, *motion.along_cut], _driving(motion))
+    found, tree = _carried(motion, motion.forces), motion.model.tree
+    for one, on_a, on_b in motion.forces.along_cut():
+        joint = one.joint.name
+        found[joint] = found[joint].plus(on_b if one.row.sign > 0 else on_a)
+    for joint, along in _driving(motion).items():
+        node = tree.nodes[tree.carried[joint]]
+        drive = along_joint(tree, node, along, motion.q, motion.frames)
+        found[joint] = found[joint].plus(_on_second(motion, node, drive), -1.0)
+    return found
 
 
 def reactions_of_loops(motion: SpatialMotion, forces: Array) -> Mapping[str, Wrench]:
     """What forces (T, rows that close loops) along these rows are in `reactions`."""
-    none = np.zeros((len(motion.time), 3))
-    rows = [row for row in motion.model.rows if not row.is_trajectory]
-    totals = [Wrench(none, none) for _ in motion.model.tree.nodes]
-    return _carried(motion, totals, list(zip(rows, forces.T, strict=True)), {})
+    multipliers = np.zeros_like(motion.multipliers)
+    multipliers[:, motion.model.loop_rows] = -forces
+    return _carried(motion, multiplier_forces(motion.system, motion.q, motion.time, multipliers))
 
 
-def _needed(motion: SpatialMotion) -> list[Wrench]:
-    """By body what it needs for its motion, less loads and what rotors do; moments about the global origin."""
-    tree, state, gravity, totals = motion.model.tree, motion.accelerated, np.array(motion.model.scene.gravity), []
-    for node, of_frame, frame in zip(tree.nodes, state.of_frames(), motion.frames, strict=True):
-        needed = body_forces(node, state, of_frame, gravity)
-        totals.append(Wrench(needed.force, needed.moment).seen_from(frame.r))
-    loads = [(load.point, load.components) for load in motion.model.scene.load if load.point is not None]
-    for point, components in (*loads, *motion.applied):
-        number = tree.index[point.partition(".")[0]]
-        totals[number] = totals[number].plus(load_wrench(motion, point, components), -1.0)
-    for rotor in rotors(state):  # the body that carries it turns its angular momentum
-        if rotor.first.body >= 0:
-            moment = rotor.torque[:, None] * rotor.axis + rotor.gyroscopic
-            totals[rotor.first.body] = totals[rotor.first.body].plus(Wrench(np.zeros_like(moment), moment))
-    return totals
-
-
-def _carried(
-    motion: SpatialMotion,
-    totals: list[Wrench],
-    along_rows: Sequence[tuple[SpatialRow, Array]],
-    driving: Mapping[str, Array],
-) -> dict[str, Wrench]:
-    """By joint what it carries of what bodies need, `totals`, under forces (T,) along rows, less what drives it."""
-    tree, loops = motion.model.tree, dict[str, Wrench]()
-    for row, size in along_rows:
-        on_a, on_b = row_wrenches(tree, row, size, motion.q, motion.time, motion.frames)
-        for section, acting in ((row.a, on_a), (row.b, on_b)):
-            if section.body >= 0:
-                totals[section.body] = totals[section.body].plus(acting, -1.0)
+def _carried(motion: SpatialMotion, forces: MotionForces) -> dict[str, Wrench]:
+    """By joint what it carries, with what drives it."""
+    found, model = dict[str, Wrench](), motion.model
+    for number, row in enumerate(model.rows):
         if not row.is_trajectory:
-            second, on_second = (row.b, on_b) if row.sign > 0 else (row.a, on_a)
-            at_joint = on_second.seen_from(-tree.motion(second, motion.q, motion.frames).r)
-            loops[row.owner] = loops[row.owner].plus(at_joint) if row.owner in loops else at_joint
-    found = dict(loops)
-    for number in reversed(range(len(tree.nodes))):
-        node = tree.nodes[number]
-        if node.inner.body >= 0:
-            totals[node.inner.body] = totals[node.inner.body].plus(totals[number])
-        at = tree.motion(node.inner if node.backwards else node.outer, motion.q, motion.frames).r
-        carried, sign = totals[number], -1.0 if node.backwards else 1.0
-        if node.joint.name in driving:
-            drive = along_joint(tree, node, driving[node.joint.name], motion.q, motion.frames)
-            carried = carried.plus(drive, -1.0)
-        found[node.joint.name] = Wrench(sign * carried.force, sign * carried.moment).seen_from(-at)
+            on_b = forces.of_row(number)[1]
+            found[row.owner] = found[row.owner].plus(on_b) if row.owner in found else on_b
+    for number, node in enumerate(model.tree.nodes):
+        found[node.joint.name] = _on_second(motion, node, forces.of_joint(number))
     return found
+
+
+def _on_second(motion: SpatialMotion, node: Node, on_outer: Wrench) -> Wrench:
+    """Of what acts on the outer side of the joint that carries a body: the same, or what answers it, on the second."""
+    if not node.backwards:
+        return on_outer
+    outer, inner = (
+        motion.model.tree.motion(section, motion.q, motion.frames).r for section in (node.outer, node.inner)
+    )
+    return Wrench(-on_outer.force, -on_outer.moment).seen_from(outer - inner)
 
 
 def _driving(motion: SpatialMotion) -> dict[str, Array]:
@@ -101,11 +77,3 @@ def _driving(motion: SpatialMotion) -> dict[str, Array]:
         along[:, model.columns(joint) - node.v.start] = -moment if node.backwards else moment
         found[joint] = along
     return found
-
-
-def load_wrench(motion: SpatialMotion, point: str, components: Mapping[str, TimeFunction]) -> Wrench:
-    """A given load at a point, moments about the global origin."""
-    values = {name: function.sample(motion.time)[0] for name, function in components.items()}
-    none = np.zeros(len(motion.time))
-    force, moment = (np.stack([values.get(key, none) for key in keys], axis=1) for keys in ("xyz", ("mx", "my", "mz")))
-    return Wrench(force, moment).seen_from(motion.section(point).r)

@@ -14,21 +14,30 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from types import MappingProxyType
+from typing import NamedTuple
 
 import numpy as np
 
 from ...common.arrays import Array, Indices
 from ...common.errors import InputError, SolveError
 from ...common.rotations import skew
-from ..model.spatial_accelerations import Accelerated
 from ..model.spatial_cut import measured
 from ..model.spatial_known_motion import required_forces
 from ..model.spatial_model import SpatialModel, row_values
 from ..model.spatial_motors import FrameShare, frame_share, turning_motors
 from ..model.spatial_system import SpatialSystem
 from ..model.spatial_transmission import gear_matrices
-from ..model.spatial_tree import ElasticGearInSpace, Node
+from ..model.spatial_tree import ElasticGearInSpace, Motion, Node
 from .linearisation import DEPENDENT, LinearMechanism
+
+
+class _State(NamedTuple):
+    """One state q (1, n_q), v and a (1, n_v) with the motion of its frames."""
+
+    q: Array
+    v: Array
+    a: Array
+    frames: Sequence[Motion]
 
 
 class SpatialLinearisation:
@@ -56,7 +65,7 @@ class SpatialLinearisation:
         Raises `SolveError` in a posture in which the independent coordinates do not determine the others.
         """
         tree, s = self.model.tree, self.independent
-        state = Accelerated(tree, q[None], v[None], a[None], tree.frames(q[None]))
+        state = _State(q[None], v[None], a[None], tree.frames(q[None]))
         H, determine = self._followers(state, t)
         force = H.T @ required_forces(self.model, state, np.array([t]))[0]
         along_s = np.zeros(tree.n_v)
@@ -83,7 +92,7 @@ class SpatialLinearisation:
             self._signs * force - on_modes @ H, self.names,
         )  # fmt: skip
 
-    def _followers(self, state: Accelerated, t: float) -> tuple[Array, Array]:
+    def _followers(self, state: _State, t: float) -> tuple[Array, Array]:
         """H (n_v, f), and what gives the coordinates that follow from the rates that rows would get (n_v − f, rows)."""
         n_v, s = self.model.tree.n_v, self.independent
         H = np.zeros((n_v, len(s)))
@@ -103,7 +112,7 @@ class SpatialLinearisation:
         H[others] = -determine @ C_v[:, s]
         return H, determine
 
-    def _inputs(self, state: Accelerated, H: Array, shares: Mapping[str, FrameShare]) -> Mapping[str, Array]:
+    def _inputs(self, state: _State, H: Array, shares: Mapping[str, FrameShare]) -> Mapping[str, Array]:
         """By s: a unit of each motor, and of forces on points along x, y, z."""
         found = {}
         for joint, columns in self.model.motors.items():
@@ -112,7 +121,7 @@ class SpatialLinearisation:
                 found[name] = self.model.sign(joint) * (H[k] + beside)
         return MappingProxyType(found | {f"force/{name}": row for name, row in self._places(state, H).items()})
 
-    def _outputs(self, state: Accelerated, H: Array) -> Mapping[str, Array]:
+    def _outputs(self, state: _State, H: Array) -> Mapping[str, Array]:
         """By s: joint coordinates, those of motors behind gears that give, and places of points."""
         tree, found = self.model.tree, dict[str, Array]()
         for joint in self.model.scene.joint:
@@ -126,7 +135,7 @@ class SpatialLinearisation:
         found |= {_of_motor(gear): H[gear.motor.v.start] for gear in tree.gears}
         return MappingProxyType(found | {f"point/{name}": row for name, row in self._places(state, H).items()})
 
-    def _places(self, state: Accelerated, H: Array) -> dict[str, Array]:
+    def _places(self, state: _State, H: Array) -> dict[str, Array]:
         found: dict[str, Array] = {}
         for point, place in self.points.items():
             L = self.model.tree.motion(self.model.tree.section(place, np.eye(3)), state.q, state.frames).L[0]

@@ -8,8 +8,7 @@ import numpy as np
 
 from ...common.arrays import Array
 from ...common.errors import SolveError
-from ..model.spatial_accelerations import Accelerated
-from ..model.spatial_known_motion import required_forces, row_accelerations
+from ..model.spatial_known_motion import KnownStates, required_forces, row_accelerations
 from ..model.spatial_model import SpatialModel, row_values, target_rates
 from ..model.spatial_motors import split_forces
 from .quasi_static import quasi_static_shape
@@ -41,7 +40,7 @@ def prescribed_motion(
 
     Raises `SolveError` where no posture meets the rows.
     """
-    tree, joints = model.tree, model.tree.joint_columns
+    joints = model.tree.joint_columns
     q = np.tile(start.q, (len(times), 1))
     q[:, modal_places(model)] = modes[0]
     if near is None:
@@ -51,7 +50,7 @@ def prescribed_motion(
         q, is_met = solve_postures(model, times, q)
         _check_met(model, times, is_met)
     q, v, a, C_v = _moved(model, modes, times, q)
-    required = required_forces(model, Accelerated(tree, q, v, a, tree.frames(q)), times)
+    required = required_forces(model, KnownStates(q, v, a), times)
     multipliers = -np.einsum("tji,tj->ti", np.linalg.pinv(C_v[:, :, joints]), required[:, joints])
     return Prescribed(q, v, a, required, multipliers)
 
@@ -78,7 +77,7 @@ def _moved(model: SpatialModel, modes: Array, times: Array, q: Array) -> tuple[A
     by_joints = np.linalg.pinv(C_v[:, :, joints])
     rates = target_rates(model, q, times, frames) - np.einsum("tij,tj->ti", C_v, v)
     v[:, joints] = np.einsum("tij,tj->ti", by_joints, rates)
-    bias = row_accelerations(model, Accelerated(tree, q, v, a, frames), times)
+    bias = row_accelerations(model, KnownStates(q, v, a), times)
     a[:, joints] = -np.einsum("tij,tj->ti", by_joints, bias)
     return q, v, a, C_v
 

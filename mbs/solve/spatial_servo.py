@@ -12,8 +12,7 @@ import numpy as np
 from ...common.arrays import Array, as_floats
 from ...common.errors import InputError
 from .._core import TimeFunction
-from ..model.spatial_accelerations import Accelerated
-from ..model.spatial_known_motion import required_forces
+from ..model.spatial_known_motion import KnownStates, required_forces
 from ..model.spatial_model import SpatialModel, row_values
 from ..model.spatial_motors import SplitForces, split_forces
 from ..model.spatial_rows import SpatialRow
@@ -98,7 +97,7 @@ class SpatialServo:
         modes = np.where(is_met[:, None], modes, 0.0)
         q[:, modal_places(model)], v[:, ~tree.joint_columns], a[:, ~tree.joint_columns] = modes
         frames = tree.frames(q)
-        required = required_forces(model, Accelerated(tree, q, v, a, frames), np.clip(times, 0.0, self.end))
+        required = required_forces(model, KnownStates(q, v, a), np.clip(times, 0.0, self.end))
         split = split_forces(model, q, frames, row_values(model, q, times, frames)[1], required)
         return ServoMotion(q, v, a, required, split), is_met
 

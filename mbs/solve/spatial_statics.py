@@ -9,10 +9,8 @@ import numpy as np
 from ...common.arrays import Array, as_floats
 from ...common.errors import SolveError
 from ...common.validation import quoted
-from ..model.spatial_bending import first_moment
-from ..model.spatial_inverse import given_forces
+from ..model.spatial_known_motion import KnownStates, required_forces
 from ..model.spatial_model import SpatialModel, row_values
-from ..model.spatial_transmission import gear_forces
 from .spatial_posture import robot_size, undeformed_posture, with_rates
 from .state import State
 
@@ -25,18 +23,8 @@ DIFFERENCE = 6e-6  # of natural sizes: central differences of first derivatives
 
 def forces_at_rest(model: SpatialModel, q: Array, t: float = 0.0) -> Array:
     """Generalised forces (T, n_v) at rest, of q (T, n_q): gravity, elasticity, given loads."""
-    tree, gravity = model.tree, np.array(model.scene.gravity)
-    frames, found = tree.frames(q), np.zeros((len(q), tree.n_v))
-    for node, frame in zip(tree.nodes, frames, strict=True):
-        p = q[:, node.p_q]
-        s_body, s_p = first_moment(node.body, p)
-        s = np.einsum("tij,tj->ti", frame.F, s_body)
-        found += frame.L[:, :3].transpose(0, 2, 1) @ (node.body.mass * gravity)
-        found += np.einsum("tij,ti->tj", frame.L[:, 3:], np.cross(s, gravity))
-        pull = np.einsum("tji,j->ti", frame.F, gravity)
-        found[:, node.p_v] += np.einsum("tin,ti->tn", s_p, pull) - node.body.stiffness * p
-    found += gear_forces(tree, q, np.zeros_like(found))
-    return found + given_forces(model, q, frames, np.full(len(q), t))
+    still = np.zeros((len(q), model.tree.n_v))
+    return -required_forces(model, KnownStates(q, still, still), np.full(len(q), t))
 
 
 def initial_state(model: SpatialModel) -> State:

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from space import solved
 
-from ffrobot.mbs.model.spatial_accelerations import Accelerated
-from ffrobot.mbs.model.spatial_known_motion import required_forces
+from ffrobot.mbs.model.spatial_known_motion import KnownStates, required_forces
 from ffrobot.mbs.model.spatial_model import build_spatial_model
 from ffrobot.run.spatial_bodies import load_spatial_bodies
 from ffrobot.scene.spatial import load_spatial_scene
@@ -189,7 +188,7 @@ def whirling(model, Omega):
         q, v, a = np.tile(at_rest, (n, 1)), *np.zeros((2, n, model.tree.n_v))
         v[:, node.v] = [0.0, 0.0, 0.0, Omega, 0.0, 0.0]
         (q[:, node.p_q], v[:, node.p_v], a[:, node.p_v])[k][:] = h * np.eye(n)
-        state = Accelerated(model.tree, q, v, a, model.tree.frames(q))
+        state = KnownStates(q, v, a)
         return required_forces(model, state, np.zeros(n))[:, node.p_v].T
 
     K, D, M = ((forces(k, h) - forces(k, -h)) / (2 * h) for k, h in enumerate((1e-3, 1.0, 1.0)))
@@ -292,7 +291,7 @@ def test_rod_that_spins_is_stretched(tmp_path):
     v[:, node.v] = [0.0, 0.0, 0.0, 0.0, 0.0, Omega]
     q[1:, node.p_q] = step * np.eye(n)
     a[:, node.v] = 0.0
-    state = Accelerated(model.tree, q, v, a, model.tree.frames(q))
+    state = KnownStates(q, v, a)
     forces = required_forces(model, state, np.zeros(n + 1))[:, node.p_v]
     K = (forces[1:] - forces[0]).T / step  # forces on modes are affine in p
     p = np.linalg.solve(K, -forces[0])

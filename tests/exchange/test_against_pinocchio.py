@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 from rigid_robots import ROBOTS, random_urdf
 
-from ffrobot.mbs.model.spatial_accelerations import Accelerated
-from ffrobot.mbs.model.spatial_known_motion import required_forces
+from ffrobot.mbs.model.spatial_known_motion import KnownStates, required_forces
 from ffrobot.mbs.model.spatial_model import build_spatial_model
 from ffrobot.mbs.model.spatial_system import SpatialSystem
 from ffrobot.run.spatial_bodies import load_spatial_bodies
@@ -66,7 +65,7 @@ def test_accelerations_moments_and_mass_matrices(robot, pinocchio_dynamics):
         return system.core.evaluate(q, v, np.zeros(0), force, None)[0]
 
     close([accelerations(q, v, tau) for q, v, _, tau in zip(*motion, strict=True)], expected["aba"])
-    moving = Accelerated(tree, motion.q, motion.v, motion.a, tree.frames(motion.q))
+    moving = KnownStates(motion.q, motion.v, motion.a)
     close(required_forces(system.model, moving, np.zeros(STATES)), expected["rnea"])
     for q, v, M in zip(motion.q, motion.v, expected["crba"], strict=True):
         free = accelerations(q, v, np.zeros(tree.n_v))

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from spatial_scenes import as_scene, coordinates, tree_model
 from spatial_trees import random_tree
+from tree_accelerations import Accelerated
 
 from ffrobot.mbs import _core
-from ffrobot.mbs.model.spatial_accelerations import Accelerated
 from ffrobot.mbs.model.spatial_drives import Drive, Drives, FrameDrive
 from ffrobot.mbs.model.spatial_known_motion import required_forces
 from ffrobot.mbs.model.spatial_system import SpatialSystem

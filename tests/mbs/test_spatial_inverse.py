@@ -2,19 +2,22 @@
 
 import numpy as np
 import pytest
-from body_equations import required_forces
+from body_equations import accelerated, body_forces, energies, momentum, required_forces
 from moving_trees import NOW, SMALL, moving
 from spatial_scenes import as_scene, tree_model
 from spatial_trees import TYPES, random_tree
+from tree_accelerations import Accelerated, row_accelerations
+from tree_reactions import carried
 
 from ffrobot.mbs import _core
-from ffrobot.mbs.model.spatial_accelerations import Accelerated, row_accelerations
 from ffrobot.mbs.model.spatial_drives import Drive, Drives
 from ffrobot.mbs.model.spatial_gears import with_compliance_in_space
 from ffrobot.mbs.model.spatial_motors import path_forces
 from ffrobot.mbs.model.spatial_system import SpatialSystem
 from ffrobot.mbs.model.spatial_transmission import gear_forces
-from ffrobot.mbs.quantities.spatial_energy import energies, momentum
+from ffrobot.mbs.quantities.spatial_energy import totals
+from ffrobot.mbs.quantities.spatial_motion import SpatialMotion
+from ffrobot.mbs.quantities.spatial_reactions import reactions
 from ffrobot.mbs.solve.integrators import METHODS
 
 ONE = _core.TimeFunction.constant(1.0)
@@ -27,7 +30,7 @@ def test_accelerations_take_no_force(joint):
     rng = np.random.default_rng(TYPES.index(joint))
     for _ in range(5):
         motion, _ = moving(rng, [joint] * 3, kinds)
-        left = required_forces(motion.model, motion.accelerated, NOW)
+        left = required_forces(motion.model, accelerated(motion), NOW)
         still = required_forces(
             motion.model, Accelerated(motion.model.tree, motion.q, 0 * motion.v, motion.a, motion.frames), NOW
         )
@@ -94,24 +97,87 @@ def test_the_core_finds_the_same_forces(joint, as_built):
 def test_rows_of_loops_keep_their_accelerations(seed):
     motion, _ = moving(np.random.default_rng(seed), ["revolute"] * 3, ("rigid", "solid", "beam"), loops=1)
     assert motion.model.rows
-    left = row_accelerations(motion.model, motion.accelerated, NOW)
+    left = row_accelerations(motion.model, accelerated(motion), NOW)
     np.testing.assert_allclose(left, 0, atol=1e-8 * np.abs(motion.a).max())
     held = np.einsum("tij,ti->tj", motion.rows[1], motion.multipliers)
-    found = required_forces(motion.model, motion.accelerated, NOW) + held
+    found = required_forces(motion.model, accelerated(motion), NOW) + held
     np.testing.assert_allclose(found, 0, atol=1e-9 * max(np.abs(held).max(), np.abs(motion.a).max()))
     np.testing.assert_array_equal(path_forces(motion.model, motion.rows[1], motion.multipliers), 0)
 
 
-@pytest.mark.parametrize("joint", TYPES)
-def test_energies_and_momentum_are_those_of_the_recursion(joint):
+AS_BUILT = {
+    "revolute": FRICTION | ROTOR | {"stiffness": 9.0, "damping": 0.6},
+    "prismatic": FRICTION | ROTOR,
+    "cylindrical": FRICTION,
+    "screw": FRICTION,
+}
+LOAD = {"x": "3", "y": "t - 2", "mz": "0.7"}  # N, N·m
+
+
+def anything_moving(rng, joint, turned):
+    """A loaded tree of bodies of all kinds with what joints of this type have, at accelerations that nothing makes."""
     kinds = ("rigid", "beam") if joint == "free" else ("rigid", "solid", "beam", "supported beam")
-    motion, system = moving(np.random.default_rng(50 + TYPES.index(joint)), [joint] * 3, kinds)
-    totals = system.core.totals(motion.q[0], motion.v[0])
-    found, moving_on = energies(motion), momentum(motion)
-    for key in ("kinetic", "strain", "gravitational"):
-        np.testing.assert_allclose(getattr(found, key)[0], getattr(totals, key), rtol=1e-11, atol=1e-11)
-    np.testing.assert_allclose(moving_on.linear[0], totals.momentum, atol=1e-10)
-    np.testing.assert_allclose(moving_on.angular[0], totals.angular_momentum, atol=1e-10)
+    plain, tables = as_scene(random_tree(rng, [joint] * 4, kinds, size=SMALL), turned)
+    body = plain.bodies[2]
+    load = {"point": f"{body.name}.{next(iter(body.points))}"} | LOAD
+    tables = [table | AS_BUILT.get(joint, {}) for table in tables]
+    model = with_compliance_in_space(tree_model(plain, tables, load=[load]))
+    tree, times = model.tree, np.array([0.0, 0.4])
+    q = tree.integrate(np.tile(tree.at_rest({}), (2, 1)), SMALL * rng.standard_normal((2, tree.n_v)))
+    return SpatialMotion(model, times, q, *rng.standard_normal((2, 2, tree.n_v)), np.zeros((2, 0)))
+
+
+@pytest.mark.parametrize("turned", [False, True], ids=["outwards", "inwards"])
+@pytest.mark.parametrize("joint", TYPES)
+def test_energies_and_momentum_are_those_of_the_bodies(joint, turned):
+    motion = anything_moving(np.random.default_rng(50 + TYPES.index(joint)), joint, turned)
+    of_core, expected = totals(motion), (energies(motion), momentum(motion))
+    for found, wanted in zip(of_core, expected, strict=True):
+        for key, values in vars(wanted).items():
+            np.testing.assert_allclose(vars(found)[key], values, rtol=0, atol=1e-12 * np.abs(values).max(), err_msg=key)
+
+
+@pytest.mark.parametrize("turned", [False, True], ids=["outwards", "inwards"])
+@pytest.mark.parametrize("joint", TYPES)
+def test_joints_carry_what_bodies_need(joint, turned):
+    check_carried(anything_moving(np.random.default_rng(70 + TYPES.index(joint)), joint, turned))
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_loops_carry_what_bodies_need(seed):
+    motion, _ = moving(np.random.default_rng(seed), ["revolute"] * 3, ("rigid", "solid", "beam"), loops=1)
+    check_carried(motion)
+
+
+def check_carried(motion):
+    found, expected = reactions(motion), carried(motion)
+    assert set(found) == set(expected)
+    for part in ("force", "moment"):
+        size = max(np.abs(getattr(of_joint, part)).max() for of_joint in expected.values())
+        for name, of_joint in expected.items():
+            values = getattr(found[name], part)
+            np.testing.assert_allclose(values, getattr(of_joint, part), rtol=0, atol=1e-12 * size, err_msg=name)
+
+
+@pytest.mark.parametrize("joint", [type_ for type_ in TYPES if type_ != "free"])
+def test_loads_at_points_are_what_bodies_need(joint):
+    """All that acts at the points of a body moves it, and its frame and modes as they do."""
+    motion = anything_moving(np.random.default_rng(90 + TYPES.index(joint)), joint, turned=True)
+    tree, state, gravity = motion.model.tree, accelerated(motion), np.array(motion.model.scene.gravity)
+    for number, (node, of_frame) in enumerate(zip(tree.nodes, state.of_frames(), strict=True)):
+        expected, force, moment = body_forces(node, state, of_frame, gravity), 0.0, 0.0
+        for point, acting in motion.forces.at_points[number].items():
+            place = tree.motion(tree.section(f"{node.body.name}.{point}", np.eye(3)), motion.q, motion.frames)
+            at_frame = acting.seen_from(place.r - motion.frames[number].r)
+            force, moment = force + at_frame.force, moment + at_frame.moment
+        size = np.abs(expected.force).max() + np.abs(expected.moment).max()
+        np.testing.assert_allclose(force, expected.force, rtol=0, atol=1e-11 * size)
+        np.testing.assert_allclose(moment, expected.moment, rtol=0, atol=1e-11 * size)
+        modal = motion.forces.found.modal[:, node.p_v]
+        np.testing.assert_allclose(modal, expected.modal, rtol=0, atol=1e-12 * np.abs(expected.modal).max(initial=1.0))
+        of_body = motion.forces.of_body(number)
+        for found, wanted in ((of_body.a, of_frame.r), (of_body.alpha, of_frame.Omega)):
+            np.testing.assert_allclose(found, wanted, rtol=0, atol=1e-11 * np.abs(wanted).max(initial=1.0))
 
 
 def test_damping_takes_what_its_forces_do():
@@ -119,5 +185,5 @@ def test_damping_takes_what_its_forces_do():
     expected = sum(
         motion.v[0, node.p_v] @ node.body.damping @ motion.v[0, node.p_v] for node in motion.model.tree.nodes
     )
-    np.testing.assert_allclose(energies(motion).dissipated_power, [expected])
+    np.testing.assert_allclose(totals(motion)[0].dissipated_power, [expected])
     assert expected > 0

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from body_equations import accelerated
 from spatial_scenes import as_scene, coordinates, tree_model
 from spatial_trees import TYPES, placed, random_tree
 
@@ -45,9 +46,9 @@ def random_case(rng, turned, types, loops):
     motion = SpatialMotion(model, np.zeros(1), q[None], v[None], p_2dot[None], of_loops[None])
     rates = [mechanism.coordinates.rates(a, node.body.name) for node in model.tree.nodes]
     wanted = np.concatenate([[*x[0], *(frame.F[0] @ x[1])] for x, frame in zip(rates, frames, strict=True)])
-    bias = np.concatenate([[*x.r[0], *x.Omega[0]] for x in motion.accelerated.of_frames()])
+    bias = np.concatenate([[*x.r[0], *x.Omega[0]] for x in accelerated(motion).of_frames()])
     motion.a[0, joints] = np.linalg.lstsq(L[:, joints], wanted - bias, rcond=None)[0]
-    found = np.concatenate([[*x.r[0], *x.Omega[0]] for x in motion.accelerated.of_frames()])
+    found = np.concatenate([[*x.r[0], *x.Omega[0]] for x in accelerated(motion).of_frames()])
     np.testing.assert_allclose(found, wanted, atol=1e-9 * np.abs(wanted).max())
     return motion, mechanism, plain, (Q, V, multipliers)
 

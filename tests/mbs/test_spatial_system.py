@@ -7,12 +7,12 @@ import pytest
 from spatial_rows import UNIT, About, Along, Ground, Section, Spinning
 from spatial_scenes import as_scene, coordinates, tree_model
 from spatial_trees import TYPES, placed, random_beam, random_tree
+from tree_accelerations import Accelerated
 
 from ffrobot.common.errors import InputError
 from ffrobot.mbs import _core
 from ffrobot.mbs.fields.expressions import parse_expression
 from ffrobot.mbs.joints.transmission import Friction
-from ffrobot.mbs.model.spatial_accelerations import Accelerated
 from ffrobot.mbs.model.spatial_known_motion import required_forces
 from ffrobot.mbs.model.spatial_system import SpatialSystem
 

@@ -1,4 +1,5 @@
 // What a mechanism in joint coordinates is made of: mbs/core/recursion/model.h.
+#include "core/recursion/motion_forces.h"
 #include "core/recursion/observe.h"
 
 #include <nanobind/stl/array.h>
@@ -108,6 +109,17 @@ void bind_rows(nb::module_ &m) {
       .def_ro("gravitational", &Totals::gravitational)
       .def_ro("momentum", &Totals::momentum)
       .def_ro("angular_momentum", &Totals::angular_momentum);
+  nb::class_<MotionForces>(m, "MotionForces",
+                           "What bodies and joints do to each other, over states (T, …): forces with their moments "
+                           "about the sections on which they act, global axes; mbs/core/recursion/motion_forces.h.")
+      .def_ro("bodies", &MotionForces::bodies, "(T, 9 bodies) acceleration, angular acceleration, angular velocity.")
+      .def_ro("points", &MotionForces::points, "(T, 9 wrenches) the same of sections on which wrenches may act.")
+      .def_ro("sections", &MotionForces::sections, "(T, dim sections) all that acts on each of the model's sections.")
+      .def_ro("joints", &MotionForces::joints, "(T, dim bodies) what the joint of each does to its outer section.")
+      .def_ro("constraints", &MotionForces::constraints, "(T, 2 dim rows) on section a, then on section b of each.")
+      .def_ro("wrenches", &MotionForces::wrenches, "(T, dim wrenches) given forces, and those along cut joints.")
+      .def_ro("modal", &MotionForces::modal, "(T, n_v) what modes take that forces on sections and actuators supply.")
+      .def_ro("rotors", &MotionForces::rotors, "(T, 3 bodies) rate of angular momentum of the rotor in each joint.");
 }
 
 } // namespace

@@ -1,7 +1,7 @@
 // What motions that are known take: mbs/core/recursion/newton_euler.h, at many states of a mechanism and its scene.
 #pragma once
 
-#include "core/recursion/newton_euler.h"
+#include "core/recursion/motion_forces.h"
 
 #include "bindings/recursion/tree_run.h"
 
@@ -13,7 +13,7 @@ struct KnownStates {
   const RowMajorMatrix &q, &v, &a;
 };
 
-// each(i, what acts, forces, workspace) at state i, after accelerate()
+// each(i, what acts, forces, workspace) at state i, after accelerate(); nothing acts along coordinates of `forces`
 template <class Space, class Each>
 void at_known_states(Model<Space> &model, const Scene &scene, const KnownStates &states, const Each &each) {
   const auto &[times, q, v, a] = states;
@@ -35,7 +35,7 @@ void at_known_states(Model<Space> &model, const Scene &scene, const KnownStates 
     for (const DrivenMarker &driven : scene.driven)
       w.turning[static_cast<std::size_t>(driven.marker)] = driven.law(t);
     const Forces<double> acting = motion.act(t, q.row(i).data(), v.row(i).data());
-    forces.prepare(q.row(i).data(), v.row(i).data(), acting.generalized, w);
+    forces.prepare(q.row(i).data(), v.row(i).data(), nullptr, w);
     forces.accelerate(q.row(i).data(), a.row(i).data(), w);
     each(i, acting, forces, w);
   }
@@ -49,9 +49,8 @@ RowMajorMatrix required_forces(Model<Space> &model, const Scene &scene, const st
   at_known_states(model, scene, {times, q, v, a}, [&](Eigen::Index i, const auto &acting, auto &forces, auto &w) {
     forces.load(nullptr, acting.wrench, w);
     forces.require(q.row(i).data(), a.row(i).data(), w, found.row(i).data());
-    for (const auto &node : model.mechanism.nodes)
-      for (int k = 0; acting.generalized && k < node.shape.v_count; ++k)
-        found(i, node.v + k) -= acting.generalized[node.v + k];
+    if (acting.generalized)
+      found.row(i) -= Eigen::Map<const Eigen::RowVectorXd>(acting.generalized, found.cols());
   });
   return found;
 }
@@ -69,28 +68,35 @@ RowMajorMatrix row_accelerations(Model<Space> &model, const Scene &scene, const 
   return found;
 }
 
-// (T, bodies, 2 dim): what the joint of each body does to its outer section and to nothing else, force and moment about
-// that section's origin, in global axes, then in axes of the joint; with multipliers (T, rows)
+// What bodies and joints do to each other, under multipliers (T, rows) and the forces of the scene
 template <class Space>
-RowMajorMatrix transmitted_forces(Model<Space> &model, const Scene &scene, const std::vector<double> &times,
-                                  const RowMajorMatrix &q, const RowMajorMatrix &v, const RowMajorMatrix &a,
-                                  const RowMajorMatrix &multipliers) {
+MotionForces motion_forces(Model<Space> &model, const Scene &scene, const std::vector<double> &times,
+                           const RowMajorMatrix &q, const RowMajorMatrix &v, const RowMajorMatrix &a,
+                           const RowMajorMatrix &multipliers) {
   check_size("times of multipliers", multipliers.rows(), a.rows());
   check_size("multipliers", multipliers.cols(), model.rows());
-  constexpr int d = Space::dim;
-  const auto nodes = static_cast<Eigen::Index>(model.mechanism.nodes.size());
-  RowMajorMatrix found(a.rows(), 2 * d * nodes);
+  ForcesOfStates<Space> found(model.mechanism, a.rows());
   at_known_states(model, scene, {times, q, v, a}, [&](Eigen::Index i, const auto &acting, auto &forces, auto &w) {
-    forces.load(multipliers.row(i).data(), acting.wrench, w);
-    forces.transmit(w);
-    for (Eigen::Index k = 0; k < nodes; ++k) {
-      const auto at = static_cast<std::size_t>(k);
-      double *to = found.row(i).data() + 2 * d * k;
-      std::copy_n(forces.in_global_axes(at).data(), d, to);
-      std::copy_n(forces.in_joint_axes(at).data(), d, to + d);
-    }
+    const double *lambda = multipliers.row(i).data();
+    forces.load(lambda, acting.wrench, w);
+    found.write(i, q.row(i).data(), v.row(i).data(), a.row(i).data(), lambda, acting.wrench, forces, w);
   });
-  return found;
+  return found.found();
+}
+
+// Joints and constraints alone, under multipliers (T, rows) alone
+template <class Space>
+MotionForces multiplier_forces(Model<Space> &model, const Scene &scene, const std::vector<double> &times,
+                               const RowMajorMatrix &q, const RowMajorMatrix &multipliers) {
+  check_size("times of multipliers", multipliers.rows(), q.rows());
+  check_size("multipliers", multipliers.cols(), model.rows());
+  const RowMajorMatrix still = RowMajorMatrix::Zero(q.rows(), model.mechanism.n_v);
+  ForcesOfStates<Space> found(model.mechanism, q.rows());
+  at_known_states(model, scene, {times, q, still, still}, [&](Eigen::Index i, const auto &, auto &forces, auto &w) {
+    forces.load(multipliers.row(i).data(), nullptr, w);
+    found.write_loads(i, multipliers.row(i).data(), forces, w);
+  });
+  return found.found();
 }
 
 } // namespace ffrobot::recursion

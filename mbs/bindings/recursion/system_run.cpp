@@ -59,13 +59,7 @@ recursion::RowMajorMatrix energies_of(const SystemOnTree &both, const recursion:
   check_size("q columns", q.cols(), both.tree.n_q);
   check_size("v columns", v.cols(), both.tree.n_v);
   check_size("v rows", v.rows(), q.rows());
-  recursion::Workspace<Planar, double> w(both.tree);
-  recursion::RowMajorMatrix found(q.rows(), 4);
-  for (Index i = 0; i < q.rows(); ++i) {
-    const recursion::Totals sum = totals(both.tree, both.scene, q.row(i).data(), v.row(i).data(), w);
-    found.row(i) << sum.kinetic, sum.strain, sum.gravitational, sum.dissipated;
-  }
-  return found;
+  return totals_of_states(both.tree, both.scene, q, v).leftCols(4);
 }
 
 Run reported_at(const SystemOnTree &both, double t, const VectorXd &q, const VectorXd &v,

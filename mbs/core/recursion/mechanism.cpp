@@ -234,6 +234,7 @@ Mechanism<Space>::Mechanism(std::vector<BodyModel<Data>> bodies, std::vector<Mar
     const bool sits = frame_sits_at_joint<Space>(model, node.shape, asked);
     const Marker inboard = model.data.markers[static_cast<std::size_t>(model.inboard_marker)];
     node.outboard = static_cast<int>(used[i].size());
+    node.markers = used[i], node.markers.push_back(model.inboard_marker);
     bool tilts = false; // modes turn the section, and nothing but that
     if constexpr (in_plane) {
       node.is_pin = node.joint == JointKind::revolute && node.rotor_inertia == 0 && node.outboard <= 1 &&

@@ -18,11 +18,12 @@ template <class Space> struct Node {
   double lead = 0, rotor_inertia = 0, gear_ratio = 1;
   double rotor_turns = 1; // of a rotor per turn of the inner section: 0 in prismatic joints
 
-  int index = 0;       // among the nodes
-  int parent = -1;     // node, or -1
-  int parent_port = 0; // of all ports; on the ground: of ground markers
-  int first_port = 0;  // of all ports; outboard ones first
-  int outboard = 0;    // how many
+  int index = 0;            // among the nodes
+  int parent = -1;          // node, or -1
+  int parent_port = 0;      // of all ports; on the ground: of ground markers
+  int first_port = 0;       // of all ports; outboard ones first
+  int outboard = 0;         // how many
+  std::vector<int> markers; // of the body's data: of its outboard ports, then of the section that the joint holds
   int inboard =
       -1; // its port (of the body) where modes move the section that the joint holds; else its frame sits there
   int q = 0, v = 0; // first of the joint; those of the modes follow

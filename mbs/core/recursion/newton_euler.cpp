@@ -45,6 +45,15 @@ std::array<double, Space::dim> acceleration_of_joint(const Node<Space> &node, co
   return along;
 }
 
+// From axes of the section that the joint holds, undeformed
+template <class Space, class State>
+void section_to_global(const Node<Space> &node, const State &s, const double *x, double *y) {
+  if (node.inboard >= 0)
+    port_to_global(node.body, node.inboard, s, x, y);
+  else
+    body_to_global(s, x, y);
+}
+
 // What a unit of its multiplier makes of a row, or a wrench, at the port where it acts: in axes of that
 template <class Space>
 std::array<double, Space::dim> in_port_axes_of(const Mechanism<Space> &m, const typename Mechanism<Space>::Actions &at,
@@ -82,7 +91,7 @@ NewtonEuler<Space>::NewtonEuler(const Mechanism<Space> &mechanism)
     : mechanism_(mechanism), ports_(static_cast<std::size_t>(mechanism.ports)), on_ports_(ports_), with_joints_(ports_),
       terms_(ports_.size()), frames_(mechanism.nodes.size()), inertia_(frames_), rotor_(inertia_.size()),
       on_coordinates_(VectorXd::Zero(mechanism.n_v)), of_joint_(inertia_), in_global_axes_(inertia_),
-      at_section_(inertia_), about_inner_(inertia_) {
+      at_section_(inertia_), about_inner_(inertia_), of_rotor_(inertia_) {
   for (const auto &node : mechanism.nodes)
     bodies_.emplace_back(node.body);
 }
@@ -153,9 +162,7 @@ void NewtonEuler<Space>::load(const double *lambda, const double *wrench, const 
       on_coordinates_[mechanism_.nodes[static_cast<std::size_t>(row.node)].v + row.freedom] -= row.share * lambda[r];
 }
 
-template <class Space> void NewtonEuler<Space>::transmit(const Workspace<Space, double> &w) { inward(true, w); }
-
-template <class Space> void NewtonEuler<Space>::inward(bool with_inertia, const Workspace<Space, double> &w) {
+template <class Space> void NewtonEuler<Space>::transmit(const Workspace<Space, double> &w, bool with_inertia) {
   with_joints_ = on_ports_;
   for (std::size_t i = mechanism_.nodes.size(); i-- > 0;) {
     const Node<Space> &node = mechanism_.nodes[i];
@@ -170,21 +177,25 @@ template <class Space> void NewtonEuler<Space>::inward(bool with_inertia, const 
     if (node.inboard >= 0)
       to_port(node.body, node.inboard, s, f);
     at_section_[i] = of_joint_[i] = f;
-    if (node.inboard >= 0) {
-      port_to_global(node.body, node.inboard, s, f.data(), in_global_axes_[i].data());
+    if (node.inboard >= 0)
       inboard_tilt(node, s).back(f.data(), of_joint_[i].data());
-    } else
-      body_to_global(s, f.data(), in_global_axes_[i].data());
+    section_to_global(node, s, f.data(), in_global_axes_[i].data());
     Vector on_inner = of_joint_[i], turned;
     std::remove_cvref_t<decltype(hinge.turn)>::add_moment(hinge.r, on_inner.data());
     about_inner_[i] = on_inner;
+    if (with_inertia && node.rotor_inertia > 0) {
+      Vector moment{}, at_section;
+      moment[Space::axis] = node.rotor_turns * rotor_[i];
+      if constexpr (Space::dim == 6)
+        moment[3] = hinge.gyro[0], moment[4] = hinge.gyro[1];
+      add(moment, on_inner);
+      at_section = moment;
+      if (node.inboard >= 0)
+        inboard_tilt(node, s).apply(moment.data(), at_section.data());
+      section_to_global(node, s, at_section.data(), of_rotor_[i].data());
+    }
     if (node.parent < 0)
       continue;
-    if (with_inertia && node.rotor_inertia > 0) {
-      on_inner[Space::axis] += node.rotor_turns * rotor_[i];
-      if constexpr (Space::dim == 6)
-        on_inner[3] += hinge.gyro[0], on_inner[4] += hinge.gyro[1];
-    }
     hinge.turn.apply(on_inner.data(), turned.data());
     add(turned, with_joints_[static_cast<std::size_t>(node.parent_port)], -1);
   }
@@ -225,7 +236,7 @@ void NewtonEuler<Space>::on_rows(std::size_t i, const Workspace<Space, double> &
 
 template <class Space>
 void NewtonEuler<Space>::project_on_joints(const double *q, const Workspace<Space, double> &w, double *Q) {
-  inward(false, w);
+  transmit(w, false);
   for (std::size_t i = 0; i < mechanism_.nodes.size(); ++i) {
     const Node<Space> &node = mechanism_.nodes[i];
     const Vector along = along_joint(i, q, w);
@@ -243,7 +254,7 @@ template <class Space> void NewtonEuler<Space>::project(const double *q, const W
 
 template <class Space>
 void NewtonEuler<Space>::require(const double *q, const double *a, Workspace<Space, double> &w, double *f) {
-  inward(true, w);
+  transmit(w);
   for (std::size_t i = 0; i < mechanism_.nodes.size(); ++i) {
     const Node<Space> &node = mechanism_.nodes[i];
     const Vector along = along_joint(i, q, w);
@@ -254,11 +265,29 @@ void NewtonEuler<Space>::require(const double *q, const double *a, Workspace<Spa
     if (node.n() == 0)
       continue;
     VectorXd z = VectorXd::Zero(node.body_width());
-    for (std::size_t k = 0; k < frames_[i].size(); ++k)
-      z[static_cast<Index>(k)] = -frames_[i][k];
     on_rows(i, w, [&](Index row, double force) { z[row] += force; });
-    modal_residual(node.body, bodies_[i], q + node.p_q(), a + node.p_v(), z.data(), w.bodies[i], f + node.p_v());
+    residual_of_modes(i, q, a, z, w, f);
   }
+}
+
+template <class Space>
+void NewtonEuler<Space>::require_of_modes(const double *q, const double *a, Workspace<Space, double> &w, double *f) {
+  std::fill_n(f, mechanism_.n_v, 0.);
+  for (std::size_t i = 0; i < mechanism_.nodes.size(); ++i)
+    if (const Node<Space> &node = mechanism_.nodes[i]; node.n() > 0) {
+      VectorXd z = VectorXd::Zero(node.body_width());
+      residual_of_modes(i, q, a, z, w, f);
+    }
+}
+
+// z: forces on ports by rows of W; the frame's acceleration joins them
+template <class Space>
+void NewtonEuler<Space>::residual_of_modes(std::size_t i, const double *q, const double *a, VectorXd &z,
+                                           Workspace<Space, double> &w, double *f) {
+  const Node<Space> &node = mechanism_.nodes[i];
+  for (std::size_t k = 0; k < frames_[i].size(); ++k)
+    z[static_cast<Index>(k)] -= frames_[i][k];
+  modal_residual(node.body, bodies_[i], q + node.p_q(), a + node.p_v(), z.data(), w.bodies[i], f + node.p_v());
 }
 
 template <class Space>

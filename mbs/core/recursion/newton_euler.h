@@ -41,8 +41,9 @@ public:
   // null). `w` has kinematics, and frames where directions of rows move.
   void load(const double *lambda, const double *wrench, const Workspace<Space, double> &w);
 
-  // Inward: what joints do to their outer sections, so that the loads and what bodies take are balanced.
-  void transmit(const Workspace<Space, double> &w);
+  // Inward: what joints do to their outer sections, so that the loads and what bodies take are balanced; or so that the
+  // loads alone are.
+  void transmit(const Workspace<Space, double> &w, bool with_inertia = true);
 
   // Inward: generalized forces Q (n_v) of the loads; only those along joints, others in Q are left as they are.
   void project(const double *q, const Workspace<Space, double> &w, double *Q);
@@ -51,6 +52,10 @@ public:
   // Inward, after accelerate() and load(): M a - Q (n_v), with Q of gravity, elasticity, damping, the loads, and the
   // generalized forces on modes of prepare(), not those along joints.
   void require(const double *q, const double *a, Workspace<Space, double> &w, double *f);
+
+  // After accelerate(): generalized forces on the modes (n_v; zero elsewhere) by which these move as they do beside
+  // gravity, elasticity and damping, so that forces on sections and actuators have to make up for them.
+  void require_of_modes(const double *q, const double *a, Workspace<Space, double> &w, double *f);
 
   // Second derivative of the value of a row by these accelerations, and the size of the terms that cancel in it.
   struct RowAcceleration {
@@ -63,9 +68,17 @@ public:
   const Vector &in_joint_axes(std::size_t i) const { return of_joint_[i]; }
   const Vector &in_global_axes(std::size_t i) const { return in_global_axes_[i]; }
   const Vector &about_inner(std::size_t i) const { return about_inner_[i]; }
+  // The rate of angular momentum of the rotor in it, a moment in global axes
+  const Vector &of_rotor(std::size_t i) const { return of_rotor_[i]; }
+  // All that acts on a port, with what hangs there: about the origin of its section, axes of the undeformed one
+  const Vector &on_port(std::size_t port) const { return with_joints_[port]; }
+
+  // After accelerate(): acceleration less gravity of the section of a port, in axes of the undeformed one
+  const Vector &of_port(std::size_t port) const { return ports_[port]; }
 
 private:
-  void inward(bool with_inertia, const Workspace<Space, double> &w);
+  void residual_of_modes(std::size_t i, const double *q, const double *a, Eigen::VectorXd &z,
+                         Workspace<Space, double> &w, double *f);
   Vector along_joint(std::size_t i, const double *q, const Workspace<Space, double> &w) const;
   template <class Act> void on_rows(std::size_t i, const Workspace<Space, double> &w, const Act &act) const;
 
@@ -78,7 +91,7 @@ private:
   std::vector<double> rotor_;                          // rate of spin of the rotor on the inner section, times inertia
   Eigen::VectorXd on_coordinates_;                     // (n_v) what rows that are joint coordinates do to these
   std::vector<Vector> of_joint_, in_global_axes_, at_section_; // by nodes; at_section_: in axes of the inboard port
-  std::vector<Vector> about_inner_;
+  std::vector<Vector> about_inner_, of_rotor_;
 };
 
 extern template class NewtonEuler<Planar>;

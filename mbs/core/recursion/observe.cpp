@@ -184,6 +184,18 @@ Totals totals(const Mechanism<Space> &m, const Scene &scene, const double *q, co
   return sum;
 }
 
+template <class Space>
+RowMajor totals_of_states(const Mechanism<Space> &m, const Scene &scene, const RowMajor &q, const RowMajor &v) {
+  Workspace<Space, double> w(m);
+  RowMajor found(q.rows(), 10);
+  for (Eigen::Index i = 0; i < q.rows(); ++i) {
+    const Totals sum = totals(m, scene, q.row(i).data(), v.row(i).data(), w);
+    found.row(i) << sum.kinetic, sum.strain, sum.gravitational, sum.dissipated, sum.momentum.transpose(),
+        sum.angular_momentum.transpose();
+  }
+  return found;
+}
+
 template const std::vector<Pose<double>> &frame_poses(const Mechanism<Planar> &, const double *, const double *,
                                                       Workspace<Planar, double> &);
 template Pose<double> wrench_pose(const Mechanism<Planar> &, std::size_t, const Workspace<Planar, double> &);
@@ -193,7 +205,7 @@ template std::vector<FrameMotion> frame_motions(const Mechanism<Spatial> &, cons
                                                 Workspace<Spatial, double> &);
 template Totals totals(const Mechanism<Planar> &, const double *, const double *, Workspace<Planar, double> &);
 template Totals totals(const Mechanism<Spatial> &, const double *, const double *, Workspace<Spatial, double> &);
-template Totals totals(const Mechanism<Planar> &, const Scene &, const double *, const double *,
-                       Workspace<Planar, double> &);
+template RowMajor totals_of_states(const Mechanism<Planar> &, const Scene &, const RowMajor &, const RowMajor &);
+template RowMajor totals_of_states(const Mechanism<Spatial> &, const Scene &, const RowMajor &, const RowMajor &);
 
 } // namespace ffrobot::recursion

@@ -42,4 +42,10 @@ template <class Space>
 Totals totals(const Mechanism<Space> &m, const Scene &scene, const double *q, const double *v,
               Workspace<Space, double> &w);
 
+// The same of states q (T, n_q), v (T, n_v): (T, 10) kinetic, strain, gravitational, dissipated; momentum, linear and
+// angular
+using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+template <class Space>
+RowMajor totals_of_states(const Mechanism<Space> &m, const Scene &scene, const RowMajor &q, const RowMajor &v);
+
 } // namespace ffrobot::recursion

@@ -1,11 +1,9 @@
-"""Accelerations of a tree in space at given q, v and v̇: of frames, sections, and rows of constraints.
+"""Accelerations of a tree in 3D at given q, v and v̇, of frames, sections and rows: an oracle of the core.
 
-Nothing here asks for forces: it is what turns prescribed motion into prescribed accelerations. Arrays are over states
+Arrays are over states
 (T, …), in global axes, SI units. With ω = A ω̄, u = x + Φp in axes of the body and a section's turning φ = Φ_r p:
 r̈ = R̈ + ω̇ × Au + ω × (ω × Au) + 2ω × AΦṗ + AΦp̈ and Ω̇ = ω̇ + A(J_l φ̈ + J̇_l φ̇) + ω × A J_l φ̇.
 """
-
-from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -13,12 +11,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...common.arrays import Array, as_floats
-from ...common.rotations import left_jacobian, left_jacobian_rate
-from .spatial_bending import bent_section, curvature
-from .spatial_model import SpatialModel, by_section
-from .spatial_rows import SpatialRow
-from .spatial_tree import Motion, Node, Section, SpatialTree
+from ffrobot.common.arrays import Array, as_floats
+from ffrobot.common.rotations import left_jacobian, left_jacobian_rate
+from ffrobot.mbs.model.spatial_bending import bent_section
+from ffrobot.mbs.model.spatial_model import SpatialModel, by_section
+from ffrobot.mbs.model.spatial_rows import SpatialRow
+from ffrobot.mbs.model.spatial_tree import Motion, Node, Section, SpatialTree
 
 
 class Acceleration(NamedTuple):
@@ -26,6 +24,16 @@ class Acceleration(NamedTuple):
 
     r: Array
     Omega: Array
+
+
+class _Bent(NamedTuple):
+    """A u, A Φṗ, A Φp̈, A J_l φ̇, A (J_l φ̈ + J̇_l φ̇): (T, 3) each."""
+
+    arm: Array
+    rate: Array
+    change: Array
+    spin: Array
+    spin_rate: Array
 
 
 @dataclass(frozen=True)
@@ -99,20 +107,19 @@ class Accelerated:
         return _Bent(*(np.einsum("tij,tj->ti", A, x) for x in (at.u, u_dot, u_2dot, spin, spin_rate)))
 
 
+def curvature(body, point: str, p_dot: Array) -> tuple[Array, Array]:
+    """ṗᵀK ṗ (T, 3) along and about the axes, which leave ü and φ̈."""
+    if body.stiffening is None:
+        zero = np.zeros((len(p_dot), 3))
+        return zero, zero
+    found = np.einsum("tm,kmn,tn->tk", p_dot, body.stiffening.at(point), p_dot)
+    return found[:, :3], found[:, 3:]
+
+
 def _times(by_modes: Array, x: Array) -> Array:
     """Rows (3, n) or (T, 3, n) times x (T, n)."""
     found: Array = np.einsum("...in,...n->...i", by_modes, x)
     return found
-
-
-class _Bent(NamedTuple):
-    """A u, A Φṗ, A Φp̈, A J_l φ̇, A (J_l φ̈ + J̇_l φ̇): (T, 3) each."""
-
-    arm: Array
-    rate: Array
-    change: Array
-    spin: Array
-    spin_rate: Array
 
 
 def _swept(omega: Array, bent: _Bent) -> Array:
