@@ -1,6 +1,7 @@
 """The program as a user runs it: the installed command, the cases of the repository, a cache folder of its own."""
 
 import fcntl
+import json
 import os
 import re
 import shutil
@@ -107,12 +108,35 @@ def mpirun():
     return [*as_root, "mpirun", "-n", "2", "--oversubscribe", "--mca", "mpi_yield_when_idle", "1"]
 
 
+def _as_it_is(text):
+    return text
+
+
 @pytest.fixture(scope="session")
 def solved(ffrobot, tmp_path_factory):
-    """Copy a case, edit the text of its scene and of its link files, run it; within `timeout` (s)."""
+    """Copy a case, edit the text of its scene and of its link files, run it; within `timeout` (s).
 
-    def solve(name, edit=lambda text: text, edit_link=lambda text: text, timeout=120):
-        scene = _copy(name, tmp_path_factory.mktemp("solved"))
+    A case as it is runs once for all processes of the test session, in a folder that its tests share.
+    """
+    base = tmp_path_factory.getbasetemp()
+    shared = (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / "solved"
+    shared.mkdir(exist_ok=True)
+
+    def solve(name, edit=_as_it_is, edit_link=_as_it_is, timeout=120):
+        if (edit, edit_link) != (_as_it_is, _as_it_is):
+            return run(name, tmp_path_factory.mktemp("solved"), edit, edit_link, timeout)
+        with (shared / f"{name}.lock").open("w") as lock:
+            fcntl.flock(lock, fcntl.LOCK_EX)
+            told = shared / f"{name}.json"
+            if not told.exists():
+                done = run(name, shared / f"of {name}", edit, edit_link, timeout)
+                done.file.close()
+                told.write_text(json.dumps([str(done.folder), done.stdout, done.stderr]), encoding="utf-8")
+        folder, stdout, stderr = json.loads(told.read_text(encoding="utf-8"))
+        return SolvedCase(Path(folder), stdout, stderr, h5py.File(Path(folder, "scene.results.h5"), "r"))
+
+    def run(name, folder, edit, edit_link, timeout):
+        scene = _copy(name, folder)
         scene.write_text(edit(scene.read_text(encoding="utf-8")), encoding="utf-8")
         for body in tomllib.loads(scene.read_text(encoding="utf-8"))["body"]:
             if "link" in body:

@@ -1,0 +1,254 @@
+"""Scenes whose results are kept: cases by their files, and what they leave out by functions that make short scenes."""
+
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import planar_in_space
+from moved_scenes import tables_of
+from random_robots import random_scene
+from spatial_robots import random_spatial_scene
+
+import ffrobot
+
+FOLDER = Path(__file__).parents[2] / "cases"
+SHORT = {"end": 0.05, "output_step": 0.002}
+TIGHT = SHORT | {"tolerance": 1e-9}
+INVERSE = {"name": "inverse", "kind": "pcid"} | TIGHT
+RELEASED = {"name": "released", "kind": "forward"} | TIGHT
+AGAIN = {"name": "again", "kind": "forward", "actuation": "inverse", "apply": "trajectory", "tolerance": 1e-8}
+STATIC = {"name": "rest", "kind": "static"}
+SAGGING = {"name": "sagging", "kind": "fcid", "shape": "static"} | SHORT
+LINEAR = {"name": "linear", "kind": "linear", "about": "inverse", "times": [0.0, 0.02]}
+BUILT = {"viscous_friction": 0.3, "coulomb_friction": 0.2, "friction_speed": 0.5, "rotor_inertia": 1e-4,
+         "gear_ratio": 30.0}  # fmt: skip
+GIVES = {"gear_ratio": 60.0, "rotor_inertia": 2e-4, "stiffness": 3e3, "damping": 2.0, "motor": True}
+PD = {"kind": "joint-pid", "proportional": {"O": 500.0, "A": 100.0}, "derivative": {"O": 40.0, "A": 8.0}}
+LQR = {"kind": "lqr", "inputs": "patches", "modes": 4, "deflection": 1e-4, "voltage": 200.0}
+ENCODERS = [{"joint": "O", "resolution": 1e-5}, {"joint": "A", "resolution": 1e-5}]
+BLOW = [{"point": "link2.tip", "y": "where(t < 0.02, 30*sin(pi*t/0.02), 0)"}]
+LOOP = {"name": "loop", "kind": "closed-loop", "actuation": "inverse", "sample_time": 0.001, "delay": 0.0005,
+        "disturbance": BLOW, "controller": [PD], "sensor": ENCODERS, "tolerance": 1e-8}  # fmt: skip
+PATCHES = {"length": 0.05, "width": 0.02, "thickness": 5e-4, "modulus": 63e9, "d31": 110e-12, "density": 7600.0}
+LINK = {
+    "material": {"youngs_modulus": 7e10, "poissons_ratio": 0.3, "density": 2700.0},
+    "geometry": {"kind": "beam", "length": 0.5, "section": {"shape": "rectangle", "height": 0.008, "width": 0.02}},
+    "mesh": {"elements": 8},
+    "reference": {"condition": "cantilever"},
+    "damping": {"ratio": 0.01},
+}
+
+
+def bending(count=3, **of_link):
+    modes = {"count": count, "family": "in-plane-bending", "attachment_modes": False}
+    return LINK | {"modes": modes} | of_link
+
+
+def revolute(name, first, second, **own):
+    return {"name": name, "type": "revolute", "between": [first, second]} | own
+
+
+def arm(*analyses, of_joints=(), of_bodies=(), **tables):
+    """Two flexible links in the plane, whose tip follows a path."""
+    found = {
+        "name": "arm", "gravity": [0.0, -9.81],
+        "body": [{"name": f"link{k}", "link": bending()} | dict(of_bodies) for k in (1, 2)],
+        "joint": [revolute("O", "ground", "link1.root") | dict(of_joints),
+                  revolute("A", "link1.tip", "link2.root") | dict(of_joints)],
+        "initial": {"state": "static", "angles": {"link1": -0.4, "link2": 0.8}},
+        "trajectory": [{"name": "tip", "point": "link2.tip", "x": "0.80889 - 8*t**2", "y": "0.16397 + 6*t**2"}],
+        "analysis": list(analyses),
+    }  # fmt: skip
+    return ffrobot.make_scene(**found | tables)
+
+
+def patched(**layout):
+    return [{"body": f"link{k}", "count": 3} | PATCHES | layout for k in (1, 2)]
+
+
+def slider_crank(of_joints):
+    tables = planar_in_space.read(FOLDER / "slider_crank" / "scene.toml") | {"analysis": [INVERSE, RELEASED]}
+    tables["joint"] = [joint | of_joints.get(joint["name"], {}) for joint in tables["joint"]]
+    moments = {"O": 0.2, "guide": 0.1, "B": 0.3}
+    return ffrobot.make_scene(**tables, load=[{"joint": j, "moment": f"{m}*sin(30*t)"} for j, m in moments.items()])
+
+
+def slide(**tables):
+    """A cart, a rod welded to it, a flexible link behind it; a way, an angle and the frame of the link on paths."""
+    points = {"root": [0.0, 0.0], "tip": [0.3, 0.1]}
+    cart = {"mass": 2.0, "inertia": 0.02, "center": [0.1, 0.05], "points": points}
+    found = {
+        "name": "slide", "gravity": [0.0, -9.81],
+        "body": [{"name": "cart", "rigid": cart}, {"name": "rod", "rigid": cart | {"mass": 0.5}},
+                 {"name": "arm", "link": bending()}],
+        "joint": [
+            {"name": "way", "type": "prismatic", "between": ["ground", "cart.root"], "at": [0.1, 0.0],
+             "axis": [2.0, 1.0]},
+            {"name": "weld", "type": "weld", "between": ["cart.tip", "rod.root"]},
+            revolute("turn", "arm.root", "rod.tip"),
+        ],
+        "initial": {"state": "undeformed", "angles": {"arm": 0.5}},
+        "analysis": [INVERSE, AGAIN],
+    }  # fmt: skip
+    return ffrobot.make_scene(**found | tables)
+
+
+def spring(t, position, velocity):
+    return -40.0 * (position - np.array([0.8, 0.2])) - 0.8 * velocity
+
+
+LOADS = [{"point": "link2.mid", "x": "3*t", "moment": "0.5"}, {"joint": "A", "moment": "2*sin(30*t)"}]
+UNDEFORMED = {"state": "undeformed", "angles": {"link1": -0.4, "link2": 0.8}}
+LET_GO = {"initial": UNDEFORMED, "trajectory": []}
+IN_PIECES = {"pieces": 2, "link": bending(damping={"rayleigh": [0.0, 1e-5]})}
+GRIPPER = [{"point": "link2.tip", "mass": 0.3, "inertia": 2e-3}]
+PLANAR = {
+    "arm": partial(arm, INVERSE, AGAIN, STATIC, SAGGING),
+    "arm_with_attachment_modes": partial(arm, INVERSE, AGAIN, of_bodies={"link": bending(modes={"count": 3})}),
+    "arm_released": partial(arm, RELEASED, load=LOADS, **LET_GO),
+    "arm_as_built": partial(
+        arm, INVERSE, AGAIN | {"apply": "joints"}, SAGGING, of_joints=BUILT, load=LOADS, payload=GRIPPER
+    ),
+    "arm_with_gears": partial(arm, INVERSE, AGAIN | {"apply": "joints"}, LINEAR, of_joints=GIVES),
+    "arm_with_frame_motors": partial(arm, INVERSE, SAGGING, motors="frame", pzt=patched()),
+    "arm_with_patches": partial(
+        arm, INVERSE, AGAIN | {"apply": "joints+pzt"}, SAGGING, pzt=patched(structural=True, limit=100.0)
+    ),
+    "arm_under_control": partial(
+        arm, INVERSE, LOOP, LOOP | {"name": "patches", "controller": [PD, LQR]}, LINEAR, pzt=patched()
+    ),
+    "arm_by_motors_only": partial(
+        arm, {"name": "exact", "kind": "motors-only", "end": 0.4, "output_step": 0.004},
+        trajectory=[{"name": "tip", "point": "link2.tip", "via": [[0.80889, 0.16397], [0.83, 0.2]], "duration": 0.4}],
+    ),
+    "arm_stiffened": partial(
+        arm, INVERSE, RELEASED, initial=UNDEFORMED, geometric_stiffening=True, payload=GRIPPER
+    ),
+    "arm_in_pieces": partial(
+        arm, INVERSE, RELEASED, of_bodies=IN_PIECES, initial=UNDEFORMED, pzt=patched(structural=False)
+    ),
+    "arm_with_modes_as_needed": partial(
+        arm, INVERSE | {"tolerance": 1e-5}, of_bodies={"modes": "auto", "link": bending(8)}
+    ),
+    "arm_checked": partial(arm, INVERSE | {"check": "finer"}),
+    "arm_on_a_spring": partial(arm, RELEASED, load=[{"point": "link2.tip", "force": spring}], **LET_GO),
+    "slide": partial(slide, trajectory=[{"name": "way", "joint": "way", "value": "0.1 + t**2"},
+                                        {"name": "turn", "joint": "turn", "value": "-0.5 + 3*t**2"}]),
+    "slide_by_angles": partial(slide, trajectory=[{"name": "turn", "angle": "arm.tip", "value": "0.5 + 3*t**2"},
+                                                  {"name": "way", "joint": "way", "value": "0.1 + t**2"}]),
+    "loop_with_friction": partial(slider_crank, dict.fromkeys("OAB", BUILT) | {"guide": BUILT}),
+    **{f"random_{k}": lambda k=k: random_scene(3717, k)[1] for k in (*range(4), *range(6, 12))},
+}  # fmt: skip
+
+
+FREE = {"mass": 1.2, "center": [0.15, 0.02, -0.01], "inertia": [4e-3, 9e-3, 8e-3],
+        "points": {"root": [0.0, 0.0, 0.0], "tip": [0.3, 0.05, -0.04]}}  # fmt: skip
+
+
+def in_space(name, bodies, joints, *analyses, **tables):
+    return ffrobot.make_scene(
+        name=name, space="spatial", gravity=[0.3, -0.5, -9.8], body=bodies, joint=joints, analysis=list(analyses),
+        **tables,
+    )  # fmt: skip
+
+
+def joints_of_all_types():
+    """Rigid bodies behind a flexible one, each joined in another way, let go under loads."""
+    types = {
+        "revolute": {"axis": [0.1, 0.9, 0.2]}, "prismatic": {"axis": [1.0, 0.3, 0.2]},
+        "cylindrical": {"axis": [0.2, 1.0, 0.1]}, "screw": {"axis": [0.0, 0.6, 0.8], "lead": 0.05},
+        "universal": {"axis": [0.0, 1.0, 0.0], "second_axis": [0.0, 0.0, 1.0]}, "spherical": {},
+        "planar": {"axis": [0.1, 0.2, 1.0]}, "weld": {"rpy": [0.1, 0.4, -0.2]},
+    }  # fmt: skip
+    bodies = [{"name": "base", "link": LINK | {"modes": {"count": 6, "family": "all"}}}]
+    joints = [revolute("foot", "ground", "base.root", axis=[0.0, 0.6, 0.8], at=[0.1, 0.0, 0.2])]
+    for name, own in types.items():
+        bodies.append({"name": name, "rigid": FREE})
+        joints.append({"name": f"to_{name}", "type": name, "between": ["base.tip", f"{name}.root"]} | own)
+    bodies.append({"name": "free", "rigid": FREE})
+    moments = [
+        {"joint": f"to_{name}", "moment": f"0.05*cos({9 + k}*t)"} for k, name in enumerate(("revolute", "screw"))
+    ]
+    return in_space(
+        "joints", bodies, [joint | ({} if joint["type"] == "weld" else {"motor": False}) for joint in joints], RELEASED,
+        load=[*moments, {"point": "spherical.tip", "x": "2*t", "mz": "0.1"}, {"point": "free.tip", "y": "t"}],
+    )  # fmt: skip
+
+
+def arm_in_space(*analyses, checkpoint="arm3_line_static", of_joints=(), of_bodies=(), **tables):
+    """The arm of a checkpoint with other analyses."""
+    found = tables_of(checkpoint, 1e-8)
+    found["joint"] = [joint | dict(of_joints) for joint in found["joint"]]
+    found["body"] = [body | (dict(of_bodies) if "link" in body else {}) for body in found["body"]]
+    return ffrobot.make_scene(**found | {"analysis": list(analyses)} | tables)
+
+
+def patched_in_space(**layout):
+    return [{"body": name, "count": 3, "axis": "y"} | PATCHES | layout for name in ("upper", "fore")]
+
+
+def planar_case_in_space(case, *analyses, **tables):
+    """A planar case with its patches put into space."""
+    planar = planar_in_space.read(FOLDER / case / "scene.toml")
+    found = planar_in_space.in_space(planar) | {"pzt": planar.get("pzt", [])}
+    joints = planar_in_space.CRANK if case == "slider_crank" else planar_in_space.TWO_LINK
+    return ffrobot.make_scene(**found | {"initial": {"joints": joints}, "analysis": list(analyses)} | tables)
+
+
+def in_pieces():
+    """A pendulum on a universal joint, of a link in two pieces."""
+    of_link = LINK | {"modes": {"count": 6, "family": "all"}, "damping": {"rayleigh": [0.0, 1e-5]}}
+    joint = {"name": "O", "type": "universal", "between": ["ground", "link.root"], "axis": [0.0, 1.0, 0.0],
+             "second_axis": [0.0, 0.0, 1.0], "motor": False}  # fmt: skip
+    return in_space("pieces", [{"name": "link", "link": of_link, "pieces": 2}], [joint], RELEASED)
+
+
+def seven_joints(redundancy):
+    """A rigid arm with a joint more than its path asks for."""
+    axes = [[0, 0, 1], [0, 1, 0], [1, 0, 0], [0, 1, 0]]
+    bodies = [{"name": f"l{k}", "rigid": FREE} for k in range(4)]
+    ends = ["ground", *(f"l{k}.tip" for k in range(3))]
+    joints = [revolute(f"q{k}", ends[k], f"l{k}.root", axis=axis) for k, axis in enumerate(axes)]
+    guess = {"q0": 0.2, "q1": -0.6, "q2": 0.3, "q3": 1.1}
+    path = {"name": "tip", "point": "l3.tip", "x": "0.75 + 0.5*t**2", "y": "0.35 - 0.4*t**2", "z": "0.0 + t**2"}
+    return in_space("redundant", bodies, joints, INVERSE | {"end": 0.2, "output_step": 0.01}, trajectory=[path],
+                    initial={"joints": guess}, redundancy=redundancy)  # fmt: skip
+
+
+SPATIAL = {
+    "arm_in_space": partial(arm_in_space, INVERSE, AGAIN, STATIC, SAGGING, LINEAR),
+    "arm_in_space_as_built": partial(
+        arm_in_space, INVERSE, AGAIN | {"apply": "joints"}, SAGGING, of_joints=BUILT,
+        payload=[{"point": "fore.tip", "mass": 0.2, "inertia": [1e-3, 2e-3, 1.5e-3]}],
+        load=[{"point": "upper.tip", "x": "3*t", "my": "0.5"}, {"joint": "q2", "moment": "sin(30*t)"}],
+    ),
+    "arm_in_space_with_gears": partial(arm_in_space, INVERSE, AGAIN | {"apply": "joints"}, of_joints=GIVES),
+    "arm_in_space_with_frame_motors": partial(arm_in_space, INVERSE, SAGGING, motors="frame"),
+    "arm_in_space_stiffened": partial(arm_in_space, INVERSE, AGAIN, SAGGING, geometric_stiffening=True),
+    "pieces_in_space": in_pieces,
+    "tool_axis": partial(arm_in_space, INVERSE, AGAIN, checkpoint="arm5_tool_axis"),
+    "pose": partial(arm_in_space, INVERSE, SAGGING, checkpoint="arm6_static"),
+    "stanford": partial(arm_in_space, INVERSE, AGAIN | {"apply": "joints"}, STATIC, checkpoint="stanford"),
+    "joints_of_all_types": joints_of_all_types,
+    "redundant_by_torque": partial(seven_joints, "least-torque"),
+    "redundant_by_motion": partial(seven_joints, "least-motion"),
+    "patches_in_space": partial(
+        planar_case_in_space, "two_link_patched", INVERSE, AGAIN | {"apply": "joints+pzt"}, SAGGING
+    ),
+    "control_in_space": partial(
+        planar_case_in_space, "two_link_closed_loop", INVERSE, LOOP, LOOP | {"name": "patches", "controller": [PD, LQR]}
+    ),
+    "loop_in_space": partial(
+        planar_case_in_space, "slider_crank", INVERSE, RELEASED,
+    ),
+    **{f"random_in_space_{k}": lambda k=k: random_spatial_scene(3717, k, [("a", 1e-7, "dop853")], 60_000)[1]
+       for k in range(8)},
+}  # fmt: skip
+MADE = PLANAR | SPATIAL
+"""By name, functions without arguments that make a scene."""
+CASES = {
+    path.parent.name if path.stem == "scene" else f"{path.parent.name}_{path.stem}": path
+    for path in sorted(FOLDER.glob("*/*.toml"))
+    if "[[analysis]]" in path.read_text(encoding="utf-8")
+}
+"""Scene files of the cases."""
