@@ -16,6 +16,7 @@ EXTRAS: Mapping[str, str] = {
     "pandas": "pandas",
     "control": "control",
     "rosbags": "ros",
+    "trimesh": "urdf",
 }
 """The extra of this package that installs a library."""
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,11 +13,11 @@ from ...common.files import check_folder, write_atomically
 from ...common.tables import beyond_limits
 from .bodies import mechanism
 from .flexible import FlexibleLink, flexible_link
-from .meshes import MeshMass, mesh_masses
+from .meshes import MeshMass, mesh_masses, mesh_path
 from .names import Names
 from .read import read_urdf
 from .replaced import compared
-from .robot import Robot
+from .robot import MeshFile, Robot
 from .scale import remarks_on_scale
 from .scene import SceneOfRobot
 from .shape_masses import Filling, with_masses, without_mass
@@ -93,7 +94,7 @@ def import_urdf(
         remarks += without_mass(robot)
         stems = Names([Path(SCENE).stem])
         links = {name: flexible_link(robot, name, source, folder, stems[name]) for name, source in flexible.items()}
-        scene = _scene(urdf, robot, links, fix_inertia=fix_inertia)
+        scene = _scene(urdf, robot, links, folder, fix_inertia=fix_inertia)
         masses, about_meshes = mesh_masses(robot, urdf)
         remarks += [*scene.remarks, *_remarks_on_links(links)]
         payloads, about_rest = _compared(robot, links, folder, scene, keep_rest=keep_rest)
@@ -105,15 +106,27 @@ def import_urdf(
         return Imported(robot, keys, tuple(links.values()), tuple(remarks), tuple(masses), written)
 
 
-def _scene(urdf: Path, robot: Robot, links: Mapping[str, FlexibleLink], *, fix_inertia: bool) -> SceneOfRobot:
+def _scene(
+    urdf: Path, robot: Robot, links: Mapping[str, FlexibleLink], folder: Path, *, fix_inertia: bool
+) -> SceneOfRobot:
     try:
         places = {name: link.place for name, link in links.items()}
-        scene = SceneOfRobot(robot, mechanism(robot, places, fix_inertia=fix_inertia), links)
+        scene = SceneOfRobot(
+            robot, mechanism(robot, places, fix_inertia=fix_inertia), links, _meshes(robot, urdf, folder)
+        )
     except InputError as error:
         raise InputError("\n".join(f"{urdf}: {line}" for line in str(error).splitlines())) from None
-    if found := list(beyond_limits(dict(scene.keys))):
-        raise InputError("\n".join(f"{urdf}: {line}" for line in found))
+    if beyond := list(beyond_limits(dict(scene.keys))):
+        raise InputError("\n".join(f"{urdf}: {line}" for line in beyond))
     return scene
+
+
+def _meshes(robot: Robot, urdf: Path, folder: Path) -> dict[str, str]:
+    """Files of meshes to be seen that are there, from `folder` on, by the names that the URDF has for them."""
+    shapes = (shape for link in robot.links.values() for shape in link.visual)
+    names = dict.fromkeys(shape.filename for shape in shapes if isinstance(shape, MeshFile))
+    found = ((name, mesh_path(name, urdf)) for name in names)
+    return {name: os.path.relpath(path, folder.resolve()) for name, path in found if path is not None}
 
 
 def _compared(

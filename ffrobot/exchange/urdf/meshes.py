@@ -13,13 +13,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...common.tables import shown
+from ...mesh.skins import loaded_skin
 from .robot import Inertial, MeshFile, Robot
 
 if TYPE_CHECKING:
     import trimesh
-
-READ = (".3mf", ".dae", ".glb", ".gltf", ".obj", ".off", ".ply", ".stl")
-"""Endings of meshes that are read: formats that trimesh reads itself, all of them without a program of others."""
 
 NOT_LOOKED_AT = "meshes were not read, which needs trimesh: pip install 'ffrobot[urdf]'"
 
@@ -87,17 +85,8 @@ def mesh_path(filename: str, urdf: Path) -> Path | None:
 
 def loaded_mesh(mesh: MeshFile, path: Path) -> trimesh.Trimesh:
     """The mesh in the axes of its link, m. Raises `ModuleNotFoundError` without trimesh, else what a reader raises."""
-    import trimesh
-
-    if path.suffix.lower() not in READ:
-        raise ValueError(f"expected one of {', '.join(READ)}, found {path.name}")
-    loaded = trimesh.load(path, force="mesh")
-    loaded.merge_vertices(merge_tex=True, merge_norm=True)  # of faces that meet with several normals
     place = mesh.origin.place
-    transform = np.eye(4)
-    transform[:3, :3], transform[:3, 3] = place.C @ np.diag(mesh.scale), place.d
-    loaded.apply_transform(transform)
-    return loaded
+    return loaded_skin(path, mesh.scale, place.d, place.C)
 
 
 def _mass_of(name: str, mesh: trimesh.Trimesh, inertial: Inertial) -> MeshMass:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -14,7 +14,7 @@ from ...mbs.fields.field_types import GROUND
 from .bodies import Body, Mechanism
 from .flexible import FlexibleLink
 from .names import Names
-from .robot import HERE, Place, Robot, UrdfJoint
+from .robot import HERE, MeshFile, Place, Robot, UrdfJoint
 
 GRAVITY = [0.0, 0.0, -9.81]
 SCENE_TYPE = {
@@ -33,8 +33,11 @@ ORIGIN = "origin"  # point of a rigid body where the joint that carries it is
 class SceneOfRobot:
     """A scene made from a robot: `keys` of the file, and `remarks` on what it does not keep of the URDF."""
 
-    def __init__(self, robot: Robot, found: Mechanism, flexible: Mapping[str, FlexibleLink]) -> None:
-        self.robot, self.found, self.flexible = robot, found, flexible
+    def __init__(
+        self, robot: Robot, found: Mechanism, flexible: Mapping[str, FlexibleLink], meshes: Mapping[str, str]
+    ) -> None:
+        """`meshes` are files from the folder of the scene on, by the names that the URDF has for them."""
+        self.robot, self.found, self.flexible, self.meshes = robot, found, flexible, meshes
         self.remarks = [*robot.turned, *found.remarks]
         self.bodies, self.joints = Names((GROUND,)), Names()
         self.points = {body.top: Names((ORIGIN,)) for body in found.bodies}
@@ -82,7 +85,30 @@ class SceneOfRobot:
             "inertia": _tensor(inertial.inertia),
             "points": points,
         }
+        if visuals := list(self._visuals(body)):
+            rigid["visual"] = visuals
         return {"name": name, "rigid": rigid}
+
+    def _visuals(self, body: Body) -> Iterator[dict[str, Any]]:
+        """Shapes of all its links, in the body's axes; meshes as far as their files are there."""
+        for link, place in body.members.items():
+            for shape in self.robot.links[link].visual:
+                at = place @ shape.origin.place
+                if isinstance(shape, MeshFile):
+                    if shape.filename not in self.meshes:
+                        continue
+                    keys: dict[str, Any] = {"mesh": self.meshes[shape.filename]}
+                    if shape.scale != (1.0, 1.0, 1.0):
+                        keys["scale"] = list(shape.scale)
+                elif all(size > 0 for size in shape.size):
+                    keys = {shape.shape: shape.size[0] if shape.shape == "sphere" else list(shape.size)}
+                else:
+                    continue
+                if np.any(at.d):
+                    keys["at"] = _numbers(at.d)
+                if any(rpy := rpy_of(at.C)):
+                    keys["rpy"] = rpy
+                yield keys
 
     # Joints
 

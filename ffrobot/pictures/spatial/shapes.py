@@ -13,6 +13,7 @@ from ...fe_models.modal_body import ModalBody
 from ...results.file import Results
 from ..body_surface import body_surface
 from .motion import SpatialBodyMotion, placed, turned
+from .visuals import visual_surface
 
 SIDES = 8  # of bars that stand for lines
 OCTAHEDRON = np.array([[0, 1, 2], [1, 3, 2], [3, 4, 2], [4, 0, 2], [1, 0, 5], [3, 1, 5], [4, 3, 5], [0, 4, 5]])
@@ -46,7 +47,13 @@ class Shape:
 
 
 def surface_shape(results: Results, body: SpatialBodyMotion, notes: list[str]) -> Shape:
-    """The surface of a flexible body; lines of a rigid one, or where its file is not found, as `notes` then say."""
+    """The surface of a flexible body, the visual shapes of a rigid one; else lines between points.
+
+    `notes` say which files are not found.
+    """
+    if body.modal is None and (visual := visual_surface(results, body.name, notes)) is not None:
+        points, triangles = visual
+        return Shape(points, np.zeros((*points.shape, 0)), np.zeros((len(body.position), 0)), triangles)
     found = _modal_body(results, body, notes)
     if found is None:
         return point_shape(body)

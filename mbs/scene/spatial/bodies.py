@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from pydantic import Field, field_validator
+from pydantic import Field, field_validator, model_validator
 
 from ....common.arrays import Array
+from ....common.names import Title
 from ....common.numbers import SMALLEST
 from ....common.validation import Record
-from ...fields.field_types import Name, NotNegative, PointReference, Positive, Vector3
+from ...fields.field_types import Name, NotNegative, PointReference, Positive, Vector3, one_of
 from ...fields.references import Reference
 from ..bodies import BodyKeys
 
@@ -45,6 +46,33 @@ def check_inertia(inertia: Inertia, least: float) -> None:
         )
 
 
+PRIMITIVES = ("box", "cylinder", "sphere")
+
+
+class Visual(Record):
+    """A shape that pictures show of a rigid body, without effect on the motion: mesh, box, cylinder or sphere."""
+
+    mesh: Title | None = None
+    """File of a surface (.stl, .obj, .dae …), from the folder of the scene on; coordinates in m."""
+    scale: Vector3 = (1.0, 1.0, 1.0)
+    """Factors of the coordinates of `mesh` along its axes."""
+    box: tuple[Positive, Positive, Positive] | None = None
+    """Lengths along x, y and z, m."""
+    cylinder: tuple[Positive, Positive] | None = None
+    """Radius and length along z, m."""
+    sphere: Positive | None = None
+    """Radius, m."""
+    at: Vector3 = (0.0, 0.0, 0.0)
+    """Origin of the shape, m, axes of the body: the center of a box, cylinder or sphere."""
+    rpy: Vector3 = (0.0, 0.0, 0.0)
+    """Roll, pitch and yaw of the shape about the fixed axes x, y, z of the body, rad."""
+
+    @model_validator(mode="after")
+    def _is_one_shape(self) -> Visual:
+        one_of(self, ("mesh", *PRIMITIVES))
+        return self
+
+
 class SpatialRigidBody(Record):
     """Mass (kg), inertia about the center (kg·m²), center and named points (m), in the axes of the body."""
 
@@ -56,6 +84,8 @@ class SpatialRigidBody(Record):
     """Center of mass, m, axes of the body."""
     points: dict[Name, Vector3] = Field(default_factory=dict)
     """Points for joints, loads and trajectories by name: m, axes of the body."""
+    visual: tuple[Visual, ...] = ()
+    """Shapes that pictures show."""
 
     @field_validator("inertia")
     @classmethod

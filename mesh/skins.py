@@ -1,0 +1,51 @@
+"""Meshes that only say what a body looks like (STL, OBJ, DAE …), by trimesh (extra "urdf")."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..common.arrays import Array
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import trimesh
+
+READ = (".3mf", ".dae", ".glb", ".gltf", ".obj", ".off", ".ply", ".stl")
+"""Endings of files that are read: formats that trimesh reads itself, all of them without a program of others."""
+
+
+def loaded_skin(path: Path, scale: Sequence[float], d: Array, C: Array) -> trimesh.Trimesh:
+    """The mesh in `path`, m, its coordinates times `scale` (3,), then turned by C (3, 3) and moved by d (3,).
+
+    Raises `ModuleNotFoundError` without trimesh, else what a reader of damaged or unknown files raises.
+    """
+    import trimesh
+
+    if path.suffix.lower() not in READ:
+        raise ValueError(f"expected one of {', '.join(READ)}, found {path.name}")
+    loaded = trimesh.load(path, force="mesh")
+    loaded.merge_vertices(merge_tex=True, merge_norm=True)  # of faces that meet with several normals
+    return _moved(loaded, C @ np.diag(scale), d)
+
+
+def primitive_skin(shape: str, size: Sequence[float], d: Array, C: Array) -> trimesh.Trimesh:
+    """A box of size x, y, z, a cylinder along z (radius, length) or a sphere (radius,), turned by C, moved by d; m."""
+    from trimesh import creation
+
+    made = {
+        "box": lambda: creation.box(size),
+        "cylinder": lambda: creation.cylinder(*size),
+        "sphere": lambda: creation.icosphere(2, *size),
+    }[shape]()
+    return _moved(made, C, d)
+
+
+def _moved(skin: trimesh.Trimesh, C: Array, d: Array) -> trimesh.Trimesh:
+    transform = np.eye(4)
+    transform[:3, :3], transform[:3, 3] = C, d
+    skin.apply_transform(transform)
+    return skin
