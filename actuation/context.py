@@ -7,15 +7,19 @@ from dataclasses import dataclass, field
 from typing import Protocol, TypeVar
 
 from ..fe_models.modal_body import ModalBody
-from ..mbs.analysis.context import Context
+from ..mbs.analysis.context import Context, PlanarContext
+from ..mbs.analysis.outcome import Outcome
 from ..mbs.analysis.planar_outcome import PlanarOutcome
 from ..mbs.model.divided_link import DividedLink
 from ..mbs.model.model import Model
+from ..mbs.model.spatial_body import SpatialBody
+from ..mbs.model.spatial_model import SpatialModel
 from .patches.patches import PatchArray
+from .patches.spatial_patches import LinkPatches
 
 
 @dataclass(frozen=True)
-class WholeLinks:
+class PlanarWholeLinks:
     """Of a model in which links are in pieces: the robot with the whole links, as scenes and controllers name it.
 
     Attributes:
@@ -32,6 +36,23 @@ class WholeLinks:
     told: Callable[[PlanarOutcome], PlanarOutcome]
 
 
+@dataclass(frozen=True)
+class WholeLinks:
+    """Of a robot in 3D whose links are in pieces: see `PlanarWholeLinks`.
+
+    Attributes:
+        model: the robot with one body for each link.
+        divided: the links in pieces by name.
+        places: which point of which piece "BODY.POINT" of such a link is.
+        told: an outcome of the pieces, as one of the links; `InputError` where their joints cannot say it.
+    """
+
+    model: SpatialModel
+    divided: Mapping[str, DividedLink]
+    places: Mapping[str, str]
+    told: Callable[[Outcome], Outcome]
+
+
 Point = TypeVar("Point", str, str | None)
 
 
@@ -46,10 +67,23 @@ def place_of(whole: _Places | None, point: Point) -> Point:
     return point if whole is None or point is None else whole.places.get(point, point)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class ActuatedContext(Context):
+    """With the `patches` of links by body, the modal bodies of `links`, bodies `carrying` all their payloads.
+
+    `whole` are the links of a robot in which some are in pieces: `model` has the pieces then.
+    """
+
+    patches: Mapping[str, LinkPatches] = field(default_factory=dict)
+    links: Mapping[str, ModalBody] = field(default_factory=dict)
+    carrying: Mapping[str, SpatialBody] = field(default_factory=dict)
+    whole: WholeLinks | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class PlanarActuatedContext(PlanarContext):
     """With the `patches` on bodies of the model by link, the modal bodies of `links`, and `whole` links if divided."""
 
     patches: Mapping[str, PatchArray] = field(default_factory=dict)
     links: Mapping[str, ModalBody] = field(default_factory=dict)
-    whole: WholeLinks | None = None
+    whole: PlanarWholeLinks | None = None

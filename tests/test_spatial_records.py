@@ -12,12 +12,11 @@ import scene_of
 from spatial_checkpoints import CASES, load
 from spatial_scenes import checkpoint_scene
 
-from ffrobot.actuation.control.spatial_kinds import IN_SPACE
 from ffrobot.common.errors import InputError
 from ffrobot.common.key_descriptions import key_descriptions
 from ffrobot.common.rotations import exponential, quaternions
 from ffrobot.mbs.fields.orientations import OrientationLaw
-from ffrobot.scene.kinds import AnyKindInSpace
+from ffrobot.scene.kinds import KINDS, AnyKindInSpace
 from ffrobot.scene.load import load_scene
 from ffrobot.scene.spatial import SpatialSceneKeys, check_available, spatial_scene
 from ffrobot.scene.spatial_lacks import LACKS
@@ -278,8 +277,9 @@ def test_planar_readers_refuse_scenes_in_space(tmp_path):
         load_scene(path)
 
 
-def test_every_kind_in_space_has_what_runs_it():
-    assert {kind.kind_name() for kind in get_args(AnyKindInSpace)} == set(IN_SPACE)
+def test_every_kind_runs_in_space():
+    assert {kind.kind_name() for kind in get_args(AnyKindInSpace)} == {kind.kind_name() for kind in KINDS}
+    assert all(callable(kind.run) for kind in get_args(AnyKindInSpace))
 
 
 def test_every_key_says_what_it_means():

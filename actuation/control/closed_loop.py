@@ -26,7 +26,7 @@ from ...mbs.quantities.observation import point_motion
 from ...mbs.scene.loads import Load
 from ...mbs.solve.linearisation import Linearisation
 from ...mbs.solve.state import State
-from ..context import ActuatedContext, WholeLinks, place_of
+from ..context import PlanarActuatedContext, PlanarWholeLinks, place_of
 from ..patches.patches import PatchArray, with_factors
 from ..patches.voltages import allocation
 from .choice import make_controller, needed_sensors
@@ -62,7 +62,7 @@ class ClosedLoop(SampledAnalysis):
                 )
         return self
 
-    def run(self, context: ActuatedContext) -> PlanarOutcome:
+    def run(self, context: PlanarActuatedContext) -> PlanarOutcome:
         """Motion and commands."""
         source = context.source(self.actuation)
         assert source is not None
@@ -75,7 +75,7 @@ def run_closed_loop(
     source: PlanarOutcome,
     patches: Mapping[str, PatchArray],
     progress: Progress,
-    whole: WholeLinks | None = None,
+    whole: PlanarWholeLinks | None = None,
 ) -> PlanarOutcome:
     """The closed loop of `analysis` about the motion of the inverse analysis `source`, from its initial state.
 
@@ -134,7 +134,7 @@ def loop_models(model: Model, reference: PlanarOutcome) -> tuple[LinearModel, ..
 
 
 def _read(
-    robot: Robot, built: Model, analysis: ClosedLoop, patches: Mapping[str, PatchArray], whole: WholeLinks | None
+    robot: Robot, built: Model, analysis: ClosedLoop, patches: Mapping[str, PatchArray], whole: PlanarWholeLinks | None
 ) -> tuple[Signal, ...]:
     """The readings that the scene asks for, and those that its controllers need."""
     needed = needed_sensors(robot, analysis.controller)
@@ -151,7 +151,7 @@ def _assembly(
     analysis: ClosedLoop,
     source: PlanarOutcome,
     read: Sequence[Signal],
-    whole: WholeLinks | None,
+    whole: PlanarWholeLinks | None,
 ) -> MechanismSystem:
     """The robot with its motors, loads and disturbances, and the rows along which sensors read."""
     loads = model.loads if source.details.loads is None else source.details.loads

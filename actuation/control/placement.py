@@ -12,16 +12,18 @@ import numpy as np
 from ...common.errors import InputError
 from ...fe_models.modal_body import ModalBody
 from ...mbs.analysis.operating_points import InstantAnalysis, operating_points
+from ...mbs.analysis.outcome import AnyOutcome
 from ...mbs.analysis.planar_outcome import PlanarOutcome
 from ...mbs.fields.references import Reference
 from ...mbs.model.planar_body import PlanarBody
 from ...mbs.scene.analysis import Surroundings
-from ..context import ActuatedContext
+from ..context import ActuatedContext, PlanarActuatedContext
 from ..patches.patches import PatchArray, patch_array
 from ..patches.records import PatchKeys
 from .linear import linear_models
 from .placing import PatchableLink, Placed, elsewhere, place
 from .records import Placement
+from .spatial_placement import run_spatial_placement
 
 
 class PatchPlacement(InstantAnalysis):
@@ -60,15 +62,17 @@ class PatchPlacement(InstantAnalysis):
                 )
         yield from super().problems(among)
 
-    def run(self, context: ActuatedContext) -> PlanarOutcome:
+    def run(self, context: ActuatedContext | PlanarActuatedContext) -> AnyOutcome:
         """The operating point, or those of the path, with what was `Placed`."""
+        if isinstance(context, ActuatedContext):
+            return run_spatial_placement(context, self, self.placement)
         source = context.source(self.source)
         outcome = operating_points(context.model, self, source)
         return replace(outcome, details=_placed(self, context, outcome, source))
 
 
 def _placed(
-    analysis: PatchPlacement, context: ActuatedContext, outcome: PlanarOutcome, source: PlanarOutcome | None
+    analysis: PatchPlacement, context: PlanarActuatedContext, outcome: PlanarOutcome, source: PlanarOutcome | None
 ) -> Placed:
     """The best places for the patches of one body, about `outcome` or over the path of its `source`."""
     robot, wanted, model, F_p = context.model, analysis.placement, None, None

@@ -13,7 +13,7 @@ from ...mbs import _core
 from ...mbs.joints.measure import Marker, Measure
 from ...mbs.model.model import Model
 from ...mbs.model.system import MechanismSystem
-from ..context import WholeLinks, place_of
+from ..context import PlanarWholeLinks, place_of
 from ..patches.patches import PatchArray
 from .records import PERMITTIVITY, Sensor
 
@@ -46,7 +46,7 @@ class Signal(Reading):
 
 
 def signals(
-    model: Model, patches: Mapping[str, PatchArray], sensor: Sensor, whole: WholeLinks | None = None
+    model: Model, patches: Mapping[str, PatchArray], sensor: Sensor, whole: PlanarWholeLinks | None = None
 ) -> Iterator[Signal]:
     """The readings of one sensor of the scene, of whose links some are in pieces where there are `whole` ones."""
     order, ending = ORDERS[sensor.measure], "" if sensor.measure == "value" else f"/{sensor.measure}"
@@ -72,7 +72,7 @@ def signals(
             yield Signal(f"modal/{sensor.modal}/{k}{ending}", order, *quality, bodies=bodies, vector=vector)
 
 
-def _modal_coordinates(model: Model, link: str, whole: WholeLinks | None) -> tuple[tuple[str, ...], Array]:
+def _modal_coordinates(model: Model, link: str, whole: PlanarWholeLinks | None) -> tuple[tuple[str, ...], Array]:
     """The bodies whose modes make up those of a link, and p of the link (n, …) in theirs."""
     if whole is None or link not in whole.divided:
         return (link,), np.eye(model.body(link).n_modes)

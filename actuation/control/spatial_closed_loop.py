@@ -24,8 +24,7 @@ from ...mbs.scene.spatial.loads import SpatialLoad
 from ...mbs.solve.spatial_linearisation import SpatialLinearisation
 from ...mbs.solve.spatial_statics import initial_state
 from ...mbs.solve.state import State
-from ..context import place_of
-from ..spatial_context import ActuatedSpatialContext
+from ..context import ActuatedContext, place_of
 from .choice import make_controller, needed_sensors
 from .controllers import Setup
 from .linear_model import LinearModel, state_space
@@ -49,6 +48,10 @@ class SpatialClosedLoop(SampledAnalysis):
     disturbance: tuple[SpatialLoad, ...] = ()
     """Loads at points, unknown to `actuation`."""
 
+    def run(self, context: ActuatedContext) -> Outcome:
+        """Motion and commands."""
+        return run_spatial_closed_loop(context, self)
+
 
 class _Plant(NamedTuple):
     """The robot as it moves: gears give where the scene says so.
@@ -62,14 +65,14 @@ class _Plant(NamedTuple):
     source: WoundUp
 
 
-def run_spatial_closed_loop(context: ActuatedSpatialContext, analysis: SpatialClosedLoop) -> Outcome:
+def run_spatial_closed_loop(context: ActuatedContext, analysis: SpatialClosedLoop) -> Outcome:
     """The closed loop of `analysis` about the motion of an inverse analysis, from its initial state.
 
     The run's details are a `LoopRecord`. One that diverges ends there and is kept. Raises `InputError` for controllers
     that do not fit the robot, `SolveError` where a user's function fails.
     """
     assert analysis.actuation is not None
-    source = context.runs[analysis.actuation]
+    source = context.outcomes[analysis.actuation]
     plant, robot, whole = _plant(context, source), _robot(context, source), context.whole
     given, more = (
         [s for sensor in sensors for s in spatial_signals(plant.model, context.patches, sensor, whole)]
@@ -108,7 +111,7 @@ def run_spatial_closed_loop(context: ActuatedSpatialContext, analysis: SpatialCl
     return replace(told(run), look_closer=cache(lambda: told(run.closer)))
 
 
-def _robot(context: ActuatedSpatialContext, source: Outcome) -> SpatialRobot:
+def _robot(context: ActuatedContext, source: Outcome) -> SpatialRobot:
     """What controllers know of: whole links also where the plant has their pieces."""
     if context.whole is None:
         return SpatialRobot(without_paths(context.model), context.patches, source)
@@ -124,13 +127,13 @@ def loop_models_in_space(model: SpatialModel, time: Array, reference: WoundUp) -
     return ()
 
 
-def _plant(context: ActuatedSpatialContext, source: Outcome) -> _Plant:
+def _plant(context: ActuatedContext, source: Outcome) -> _Plant:
     model = with_compliance_in_space(without_paths(context.model))
     return _Plant(model, wound_up(source, model))
 
 
 def _setup(
-    context: ActuatedSpatialContext,
+    context: ActuatedContext,
     analysis: SpatialClosedLoop,
     source: Outcome,
     robot: SpatialRobot,
@@ -149,7 +152,7 @@ def _setup(
 
 
 def _feed_forward(
-    context: ActuatedSpatialContext, analysis: SpatialClosedLoop, source: Outcome, plant: _Plant, times: Array
+    context: ActuatedContext, analysis: SpatialClosedLoop, source: Outcome, plant: _Plant, times: Array
 ) -> Array:
     """(K, inputs) moments and voltages of the inverse analysis, in the middle of the time for which each is held."""
     middle = held_until(times, analysis, source.time[-1])
@@ -183,14 +186,14 @@ def _feed_forward(
     return values
 
 
-def _limits(context: ActuatedSpatialContext) -> Array:
+def _limits(context: ActuatedContext) -> Array:
     """(inputs,) largest moments and voltages, infinite where the scene gives none."""
     return np.concatenate(
         [largest_moments(context.model, limits=True), *(of.reach.limit for of in context.patches.values())]
     )
 
 
-def _commands(context: ActuatedSpatialContext, model: SpatialModel) -> tuple[Command, ...]:
+def _commands(context: ActuatedContext, model: SpatialModel) -> tuple[Command, ...]:
     """What a unit of each does: moments of motors, on sections or on frames, and voltages on the modes of links."""
     joints, found = {joint.name: joint for joint in model.scene.joint}, []
     for joint, columns in model.motors.items():
@@ -203,7 +206,7 @@ def _commands(context: ActuatedSpatialContext, model: SpatialModel) -> tuple[Com
     return tuple(found)
 
 
-def _start(context: ActuatedSpatialContext, analysis: SpatialClosedLoop, plant: _Plant) -> State:
+def _start(context: ActuatedContext, analysis: SpatialClosedLoop, plant: _Plant) -> State:
     """As the inverse analysis starts, or as the scene says, gears that give wound as in that."""
     q, v = plant.source.q[0].copy(), plant.source.v[0].copy()
     if analysis.start == "actuation":

@@ -21,14 +21,13 @@ from ...mbs.scene.analysis import Analysis
 from ...mbs.solve.linearisation import LinearMechanism
 from ...mbs.solve.spatial_linearisation import SpatialLinearisation
 from ...mbs.solve.spatial_posture import undeformed_posture
-from ..context import place_of
+from ..context import ActuatedContext, place_of
 from ..patches.spatial_patches import LinkPatches
-from ..spatial_context import ActuatedSpatialContext
-from .linear import Linear, LinearModels, analyse
 from .linear_model import LinearModel, state_space
+from .linear_models import LinearKeys, LinearModels, analyse
 
 
-def run_spatial_linear(context: ActuatedSpatialContext, analysis: Linear) -> Outcome:
+def run_spatial_linear(context: ActuatedContext, analysis: LinearKeys) -> Outcome:
     """The posture or instants that it is about, with `LinearModels`. Raises `SolveError` in singular postures."""
     run, about = operating_points_in_space(context, analysis)
     return replace(run, details=linear_models_in_space(context, analysis, about))
@@ -47,23 +46,21 @@ class OperatingPoints(NamedTuple):
     a: Array
 
 
-def operating_points_in_space(
-    context: ActuatedSpatialContext, analysis: InstantAnalysis
-) -> tuple[Outcome, OperatingPoints]:
+def operating_points_in_space(context: ActuatedContext, analysis: InstantAnalysis) -> tuple[Outcome, OperatingPoints]:
     """The equilibrium, or the instants of a motion, that an analysis is about, as they were found, and their states."""
     model = with_compliance_in_space(without_paths(context.model))
     if analysis.source is None:
         run = _equilibrium(context, analysis)
         source, rows = run, [0]
     else:
-        source = context.runs[analysis.source]
+        source = context.outcomes[analysis.source]
         rows = [row_at(model.scene.path, analysis, source, float(t)) for t in analysis.times]
         run = of_earlier(source, analysis).at(rows)
     q, v, a, _ = wound_up(source, model)
     return run, OperatingPoints(model, run.time, q[rows], v[rows], a[rows])
 
 
-def linear_models_in_space(context: ActuatedSpatialContext, analysis: Linear, about: OperatingPoints) -> LinearModels:
+def linear_models_in_space(context: ActuatedContext, analysis: LinearKeys, about: OperatingPoints) -> LinearModels:
     """About these states. Points have the names of the scene, modes those of the model, also of links in pieces."""
     free, whole = about.model, context.whole
     points = analysis.points or _default_points(free if whole is None else whole.model)
@@ -76,7 +73,7 @@ def linear_models_in_space(context: ActuatedSpatialContext, analysis: Linear, ab
     return analyse(tuple(models))
 
 
-def _equilibrium(context: ActuatedSpatialContext, analysis: Analysis) -> Outcome:
+def _equilibrium(context: ActuatedContext, analysis: Analysis) -> Outcome:
     """Static; where nothing is followed, motors keep the initial posture."""
     model = context.model
     if not any(row.is_trajectory for row in model.rows):

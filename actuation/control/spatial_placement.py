@@ -8,30 +8,30 @@ import numpy as np
 
 from ...common.arrays import as_floats
 from ...common.errors import InputError
-from ...mbs.analysis.operating_points import of_earlier
+from ...mbs.analysis.operating_points import InstantAnalysis, of_earlier
 from ...mbs.analysis.outcome import Outcome
 from ...mbs.analysis.spatial_replay import motor_forces_of
 from ...mbs.solve.spatial_linearisation import SpatialLinearisation
+from ..context import ActuatedContext
 from ..patches.patches import PatchArray
 from ..patches.spatial_patches import link_patches
 from ..patches.spatial_records import SpatialPztLayout
-from ..spatial_context import ActuatedSpatialContext
 from .linear_model import state_space
-from .placement import PatchPlacement
 from .placing import PatchableLink, elsewhere, place
+from .records import Placement
 from .spatial_linear import operating_points_in_space
 
 
-def run_spatial_placement(context: ActuatedSpatialContext, analysis: PatchPlacement) -> Outcome:
+def run_spatial_placement(context: ActuatedContext, analysis: InstantAnalysis, wanted: Placement) -> Outcome:
     """The operating point, or those of the path, with what was `Placed`.
 
     Raises `InputError` for a link with several layouts, or without room for the patches.
     """
-    model, wanted = context.model, analysis.placement
+    model = context.model
     link = _link(context, wanted.body)
-    if analysis.is_over_path:
+    if wanted.criterion == "voltage":
         assert analysis.source is not None
-        source = context.runs[analysis.source]
+        source = context.outcomes[analysis.source]
         run = of_earlier(source, analysis)
         reached = context.patches[wanted.body].modes[link.layout.label]
         F_p = reached.forces(motor_forces_of(source).modal[wanted.body])
@@ -41,7 +41,7 @@ def run_spatial_placement(context: ActuatedSpatialContext, analysis: PatchPlacem
     return replace(run, details=place(model.scene.path, wanted, link, state_space(at, {}), None))
 
 
-def _link(context: ActuatedSpatialContext, name: str) -> PatchableLink:
+def _link(context: ActuatedContext, name: str) -> PatchableLink:
     """By the coordinates that its layout reaches; patches elsewhere reach the same."""
     path, of_link, body = context.model.scene.path, context.patches[name], context.links[name]
     spatial = context.model.tree.nodes[context.model.tree.index[name]].body

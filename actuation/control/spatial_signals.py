@@ -15,9 +15,8 @@ from ...mbs.model.spatial_model import SpatialModel
 from ...mbs.model.spatial_system import SpatialSystem
 from ...mbs.model.spatial_tree import Section, SpatialTree
 from ...mbs.solve.spatial_linearisation import labelled
-from ..context import place_of
+from ..context import WholeLinks, place_of
 from ..patches.spatial_patches import LinkPatches
-from ..spatial_context import WholeLinksInSpace
 from .records import Sensor
 from .signals import ORDERS, Reading, volts_per_modal_coordinate
 
@@ -82,7 +81,7 @@ def _places_in_q(tree: SpatialTree) -> Indices:
 
 
 def spatial_signals(
-    model: SpatialModel, patches: Mapping[str, LinkPatches], sensor: Sensor, whole: WholeLinksInSpace | None = None
+    model: SpatialModel, patches: Mapping[str, LinkPatches], sensor: Sensor, whole: WholeLinks | None = None
 ) -> Iterator[SpatialSignal]:
     """The readings of one sensor of the scene, of whose links some are in pieces where there are `whole` ones.
 
@@ -111,7 +110,7 @@ def spatial_signals(
             yield SpatialSignal(f"modal/{sensor.modal}/{k}{ending}", *quality, along=along)
 
 
-def _modal_coordinates(model: SpatialModel, link: str, whole: WholeLinksInSpace | None) -> Array:
+def _modal_coordinates(model: SpatialModel, link: str, whole: WholeLinks | None) -> Array:
     """(n, n_v) p of a link by v: its own coordinates, or of its pieces."""
     if whole is None or link not in whole.divided:
         return np.eye(model.tree.n_v)[model.tree.nodes[model.tree.index[link]].p_v]

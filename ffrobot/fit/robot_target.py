@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from ..actuation.control.linear import LinearModels
 from ..actuation.control.linear_model import LinearModel
+from ..actuation.control.linear_models import LinearModels
 from ..actuation.control.modes import held_frequencies, robot_modes
 from ..common.arrays import Array, as_floats
 from ..common.errors import InputError

@@ -10,7 +10,8 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from ..mbs.analysis.motors_only import InvertedPath, describe_zeros, is_minimum_phase, path_error
+from ..mbs.analysis.inverted_path import describe_zeros, is_minimum_phase
+from ..mbs.analysis.motors_only import InvertedPath, path_error
 from ..mbs.analysis.outcome import Details
 from ..mbs.analysis.planar_outcome import PlanarOutcome
 from ..mbs.model.raised_mass import raised_in_words

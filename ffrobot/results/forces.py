@@ -5,7 +5,8 @@ from __future__ import annotations
 import h5py
 import numpy as np
 
-from ..mbs.analysis.motors_only import InvertedPath, is_minimum_phase, path_error
+from ..mbs.analysis.inverted_path import is_minimum_phase
+from ..mbs.analysis.motors_only import InvertedPath, path_error
 from ..mbs.analysis.planar_outcome import PlanarOutcome
 from ..mbs.quantities.joint_motion import joint_motions, motor_motion
 from ..mbs.quantities.observation import joint_forces, trajectory_force, trajectory_target

@@ -9,8 +9,8 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from ..actuation.control.linear import LinearModels
 from ..actuation.control.linear_model import LinearModel, save_arrays
+from ..actuation.control.linear_models import LinearModels
 from ..actuation.control.zeros import Zeros
 from ..common.arrays import Array
 from ..mbs.analysis.planar_outcome import PlanarOutcome

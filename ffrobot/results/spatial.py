@@ -9,7 +9,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from ..actuation.control.linear import LinearModels
+from ..actuation.control.linear_models import LinearModels
 from ..actuation.control.loop_record import LoopRecord
 from ..actuation.control.placing import Placed
 from ..common.checksum import sealed

@@ -10,7 +10,7 @@ from typing import Any
 
 import h5py
 
-from ..actuation.control.linear import LinearModels
+from ..actuation.control.linear_models import LinearModels
 from ..actuation.control.loop_record import LoopRecord
 from ..actuation.control.placing import Placed
 from ..common.arrays import Array

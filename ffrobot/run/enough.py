@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, TypeVar
 
+from ..mbs.analysis.drive import Progress
 from ..mbs.analysis.outcome import AnyOutcome
 from ..mbs.model.planar_body import PlanarBody
 from ..mbs.model.spatial_body import SpatialBody
+from ..mbs.scene.analysis import Analysis
 from .mode_search import ModeSearch, Reported
 from .solution import AnalysisResult, Solution
 from .spatial_solution import SpatialResult, SpatialSolution
-from .watcher import Interruption
+from .watcher import Interruption, Watcher
 
 logger = logging.getLogger(__name__)
 
@@ -68,6 +70,23 @@ def goes_on(solution: Solution | SpatialSolution, outcome: AnyOutcome) -> bool:
         "auto" in (getattr(body, "modes", None), getattr(body, "pieces", None)) for body in solution.scene.body
     )
     return not searched and outcome.analysis.is_resumable
+
+
+def completed(solution: S, run_all: Callable[[S], S | None], stiffened: Callable[[S], S]) -> S:
+    """All analyses run, all of them stiffened where `geometric_stiffening = "auto"` asks for that."""
+    found = run_all(solution) or run_all(stiffened(solution))
+    assert found is not None
+    return found
+
+
+def progress_of(analysis: Analysis, watcher: Watcher, interruption: Interruption) -> Progress:
+    """What tells `watcher` how far an analysis is, and stops it on request."""
+    return lambda t: watcher.advance(t, analysis.last_time) and not interruption.requested
+
+
+def is_replayed(analysis: Analysis, among: Sequence[Analysis]) -> bool:
+    """Whether a check, or another analysis of the scene, takes its actuation."""
+    return analysis.is_checked or any(other.takes_actuation and other.source == analysis.name for other in among)
 
 
 def log_outcome(outcome: AnyOutcome) -> None:

@@ -12,7 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..actuation.control.linear import LinearModels
+from ..actuation.control.linear_models import LinearModels
 from ..common.arrays import Array, as_floats
 from ..common.plane import perpendicular, rotated
 from ..fe_models.link_records import HOLDING_ROOT

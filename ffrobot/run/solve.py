@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..actuation.context import ActuatedContext, WholeLinks
+from ..actuation.context import PlanarActuatedContext, PlanarWholeLinks
 from ..actuation.patches.patches import with_factors as patches_with
 from ..actuation.patches.voltages import Voltages, allocation, solve_voltages
 from ..actuation.points import with_factors as points_with
@@ -26,7 +26,7 @@ from ..scene.pieces import bodies_in_pieces, places_on_pieces
 from ..scene.scene import Scene
 from .bent_links import with_advice, worst_of_pieces
 from .divided import as_divided
-from .enough import log_outcome, with_enough_modes, with_enough_pieces
+from .enough import completed, is_replayed, log_outcome, progress_of, with_enough_modes, with_enough_pieces
 from .evaluation import evaluated
 from .finer import check_on, finer_scene
 from .mode_choice import mode_levels, reported
@@ -162,10 +162,7 @@ def _with_enough_pieces(solution: Solution, watcher: Watcher, interruption: Inte
 
 
 def _completed(solution: Solution, watcher: Watcher, interruption: Interruption) -> Solution:
-    """All analyses run, all of them stiffened where `geometric_stiffening = "auto"` asks for that."""
-    found = _run_all(solution, watcher, interruption) or _run_all(stiffened(solution), watcher, interruption)
-    assert found is not None
-    return found
+    return completed(solution, lambda trial: _run_all(trial, watcher, interruption), stiffened)
 
 
 def _run_all(solution: Solution, watcher: Watcher, interruption: Interruption) -> Solution | None:
@@ -182,6 +179,7 @@ def _run_all(solution: Solution, watcher: Watcher, interruption: Interruption) -
         try:
             with of_file(solution.scene.path):
                 outcome = analysis.run(_context(solution, analysis, results, watcher, interruption))
+                assert isinstance(outcome, PlanarOutcome)
         except Exception as error:  # raised once the analyses before it are kept
             if not results:
                 raise
@@ -215,19 +213,13 @@ def _context(
     results: Mapping[str, AnalysisResult],
     watcher: Watcher,
     interruption: Interruption,
-) -> ActuatedContext:
-    end, later = analysis.last_time, solution.scene.analysis
-
-    def progress(t: float) -> bool:
-        return watcher.advance(t, end) and not interruption.requested
-
-    return ActuatedContext(
+) -> PlanarActuatedContext:
+    return PlanarActuatedContext(
         model=solution.model,
         outcomes={name: result.outcome for name, result in results.items()},
         make_actuators=lambda raised: _actuator_set(solution, raised=raised),
-        progress=progress,
-        is_replayed=analysis.is_checked
-        or any(other.takes_actuation and other.source == analysis.name for other in later),
+        progress=progress_of(analysis, watcher, interruption),
+        is_replayed=is_replayed(analysis, solution.scene.analysis),
         earlier=solution.earlier.get(analysis.name),
         patches=solution.acting_patches,
         links=solution.links,
@@ -235,12 +227,12 @@ def _context(
     )
 
 
-def _whole_links(solution: Solution) -> WholeLinks | None:
+def _whole_links(solution: Solution) -> PlanarWholeLinks | None:
     """What analyses have to know of the links beside their pieces; None where no link is in pieces."""
     if solution.whole is None:
         return None
     links = {name: as_divided(solution.bodies[name], body, solution.parts) for name, body in solution.divided.items()}
-    return WholeLinks(
+    return PlanarWholeLinks(
         solution.whole, solution.patches, links, places_on_pieces(solution.divided), partial(_told, solution)
     )
 

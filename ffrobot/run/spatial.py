@@ -9,9 +9,8 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
-from ..actuation.control.spatial_kinds import IN_SPACE
+from ..actuation.context import ActuatedContext
 from ..actuation.feasibility import Feasibility
-from ..actuation.spatial_context import ActuatedSpatialContext
 from ..actuation.spatial_points import forces_at_points, solve_spatial_points, spatial_point_set, with_spatial_points
 from ..common.errors import FfrobotError, SolveError, of_file
 from ..mbs.analysis.operating_points import InstantAnalysis
@@ -22,7 +21,7 @@ from ..mbs.quantities.spatial_sharing import shared_evenly
 from ..mbs.quantities.stiffening import NOTABLE
 from ..mbs.scene.analysis import Analysis
 from ..scene.spatial import SpatialScene, load_spatial_scene
-from .enough import goes_on, log_outcome, with_enough_modes, with_enough_pieces
+from .enough import completed, goes_on, is_replayed, log_outcome, progress_of, with_enough_modes, with_enough_pieces
 from .mode_search import ModeSearch, error_tolerances
 from .paths import with_paths_in_space
 from .spatial_actuation import actuated_in_space, patches_in_space, supplied_by_patches
@@ -140,12 +139,7 @@ def _judged(
 
 
 def _completed(solution: SpatialSolution, watcher: Watcher, interruption: Interruption) -> SpatialSolution:
-    """All analyses run, all of them stiffened where `geometric_stiffening = "auto"` asks for that."""
-    found = _run_all(solution, watcher, interruption)
-    if found is None:
-        found = _run_all(stiffened_in_space(solution), watcher, interruption)
-    assert found is not None
-    return found
+    return completed(solution, lambda trial: _run_all(trial, watcher, interruption), stiffened_in_space)
 
 
 def _run_all(solution: SpatialSolution, watcher: Watcher, interruption: Interruption) -> SpatialSolution | None:
@@ -159,7 +153,8 @@ def _run_all(solution: SpatialSolution, watcher: Watcher, interruption: Interrup
         began = time.perf_counter()
         try:
             with of_file(f'{solution.scene.path}: analysis "{analysis.name}"'):
-                run = IN_SPACE[analysis.kind](_context(solution, analysis, results, watcher, interruption), analysis)
+                run = analysis.run(_context(solution, analysis, results, watcher, interruption))
+                assert isinstance(run, Outcome)
         except Exception as error:  # raised once the analyses before it are kept
             if not results:
                 raise
@@ -204,19 +199,20 @@ def _context(
     results: Mapping[str, SpatialResult],
     watcher: Watcher,
     interruption: Interruption,
-) -> ActuatedSpatialContext:
-    end = analysis.last_time
-
-    def progress(t: float) -> bool:
-        return watcher.advance(t, end) and not interruption.requested
-
-    runs = {name: result.run for name, result in results.items()}
-    supply = partial(supplied_by_patches, solution.patches)
-    return ActuatedSpatialContext(
-        solution.model, runs, progress, supply, partial(forces_at_points, solution.points),
-        solution.earlier.get(analysis.name), solution.patches, solution.links,
-        {name: body.carrying for name, body in solution.bodies.items()}, whole_links_in_space(solution),
-    )  # fmt: skip
+) -> ActuatedContext:
+    return ActuatedContext(
+        model=solution.model,
+        outcomes={name: result.run for name, result in results.items()},
+        progress=progress_of(analysis, watcher, interruption),
+        is_replayed=is_replayed(analysis, solution.scene.analysis),
+        earlier=solution.earlier.get(analysis.name),
+        supply=partial(supplied_by_patches, solution.patches),
+        at_points=partial(forces_at_points, solution.points),
+        patches=solution.patches,
+        links=solution.links,
+        carrying={name: body.carrying for name, body in solution.bodies.items()},
+        whole=whole_links_in_space(solution),
+    )
 
 
 def _with_peaks(solution: SpatialSolution, run: Outcome) -> SpatialResult:

@@ -12,7 +12,7 @@ from ..actuation.patches.spatial_patches import LinkPatches, by_body, link_patch
 from ..actuation.patches.voltages import Voltages
 from ..actuation.spatial_feasibility import UnsuppliedInSpace, judge_in_space, links_in_motion
 from ..common.arrays import Array
-from ..mbs.analysis.spatial_run import ModalForces
+from ..mbs.analysis.context import ModalForces
 from ..mbs.model.spatial_drives import Drive
 from ..mbs.model.spatial_model import SpatialModel, modal_direction
 from ..mbs.quantities.spatial_motion import SpatialMotion

@@ -7,7 +7,7 @@ from functools import partial
 
 import numpy as np
 
-from ..actuation.spatial_context import WholeLinksInSpace
+from ..actuation.context import WholeLinks
 from ..common.arrays import Array
 from ..common.errors import InputError
 from ..mbs.analysis.outcome import Outcome
@@ -21,12 +21,12 @@ from .spatial_solution import SpatialSolution
 STEP = 1e-3  # of the links' longest 1/ω, along a motion: of central differences of modal velocities
 
 
-def whole_links_in_space(solution: SpatialSolution) -> WholeLinksInSpace | None:
+def whole_links_in_space(solution: SpatialSolution) -> WholeLinks | None:
     """The links of a solution in which some are in pieces; None where none is."""
     if solution.whole is None:
         return None
     divided = {name: _divided(solution, name) for name in solution.divided}
-    return WholeLinksInSpace(solution.whole, divided, places_on_pieces(solution.divided), partial(_told, solution))
+    return WholeLinks(solution.whole, divided, places_on_pieces(solution.divided), partial(_told, solution))
 
 
 def _divided(solution: SpatialSolution, name: str) -> DividedLink:

@@ -3,90 +3,46 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cache
-from pathlib import Path
-from typing import Literal, Self
 
 import numpy as np
-from pydantic import model_validator
 
-from ...common.arrays import Array, as_floats, as_list
+from ...common.arrays import Array, as_list
 from ...common.errors import InputError, SolveError
 from .. import _core
 from .._core import TimeFunction
-from ..fields.field_types import Expression, Name
-from ..fields.references import Reference
 from ..fields.waypoints import spline
 from ..model.model import ZERO, Model
 from ..model.planar_body import PlanarBody
 from ..model.planar_tree import PlanarTree, told_in_joints
-from ..model.spatial_body import SpatialBody
 from ..model.system import MechanismSystem
-from ..scene.analysis import Check, Need, TimedAnalysis
 from ..solve.initial_state import undeformed_state
 from ..solve.path_checks import check_smooth
 from ..solve.quasi_static import quasi_static_shape
 from ..solve.reach import check_reach
-from .context import Context
+from .context import AnyContext, Context
 from .drive import motion_of, motors_fit
 from .elastic_joints import add_transmission
-from .outcome import Details, Forces, Statistics
+from .outcome import AnyOutcome, Details, Forces, Statistics
 from .planar_outcome import PlanarOutcome
 from .samples import path_times
-
-FEWEST_NODES = 201  # of the spline through a static shape; half as many as outputs where that is more
-
-Shape = list[list[TimeFunction]]
-"""p_k(t) of each body, in the coordinates of its `PlanarBody`."""
+from .shapes import FcidKeys, Shape, given_shape, sampled, shape_nodes
+from .spatial_fcid import run_spatial_fcid
 
 
-class Fcid(TimedAnalysis):
+class Fcid(FcidKeys):
     """Forces that move the robot along its trajectories while the modal coordinates p(t) follow a prescribed shape.
 
     `shape` is zero, the static equilibrium at every instant, or given in `modal`: expressions for the first modes of a
     body, numbered as in its modal file; all others are 0. `check` as in `Pcid`.
     """
 
-    kind: Literal["fcid"]
-    shape: Literal["zero", "static", "given"]
-    """Prescribed deflection: none, the static equilibrium at every instant, or `modal`."""
-    modal: dict[Name, tuple[Expression, ...]] | None = None
-    """Expressions in t for the first modal coordinates by body (m·√kg); the others are 0."""
-    check: Check = None
-    """Forward simulation under the result with twice the modes ("finer")."""
-
-    is_algebraic = True
-    allocates_patches = True
-    applicable = ("joints", "joints+pzt", "points")
-
-    @model_validator(mode="after")
-    def _consistent(self) -> Self:
-        if self.modal is not None and self.shape != "given":
-            raise ValueError(f'expected the key "modal" only in shape = "given", found shape = "{self.shape}"')
-        if self.modal is None and self.shape == "given":
-            raise ValueError('expected the key "modal" in shape = "given", found none')
-        return self
-
-    def needs(self) -> Iterator[Need]:
-        """Something to follow."""
-        yield Need("kind", self.kind, "trajectory")
-
-    def references(self) -> Iterator[Reference]:
-        """The links whose shape is given."""
-        for body in self.modal or ():
-            yield Reference("modal", body)
-            yield Reference("modal", body, "flexible body")
-
-    def prescribed(self) -> Iterator[tuple[str, TimeFunction, int]]:
-        """The given shape."""
-        for body, functions in (self.modal or {}).items():
-            for k, function in enumerate(functions):
-                yield f"modal.{body}[{k}]", function, 2
-
-    def run(self, context: Context) -> PlanarOutcome:
+    def run(self, context: AnyContext) -> AnyOutcome:
         """Motion and forces."""
+        if isinstance(context, Context):
+            return run_spatial_fcid(context, self)
         return add_transmission(run_fcid(context.model, self))
 
 
@@ -192,41 +148,6 @@ def _static(model: Model, analysis: Fcid, motion: _core.PrescribedMotion, postur
             f" t = {nodes[is_found.argmin()]:g} s: the links are too soft for their loads there"
         )
     return _by_body(model.bodies, spline(nodes, p))
-
-
-def shape_nodes(analysis: Fcid) -> Array:
-    """Times (T,), s, between which shapes are splines."""
-    return as_floats(np.linspace(0.0, analysis.end, max(FEWEST_NODES, len(analysis.times) // 2 + 1)))
-
-
-def sampled(shape: Shape, times: Array) -> Array:
-    """p, ṗ and p̈ (3, T, n) of all bodies."""
-    functions = [function for of_body in shape for function in of_body]
-    samples = np.array([function.sample(times) for function in functions]).reshape(len(functions), 3, len(times))
-    return np.ascontiguousarray(np.moveaxis(samples, 0, -1))
-
-
-def given_shape(scene_path: Path, bodies: Sequence[PlanarBody | SpatialBody], analysis: Fcid) -> Shape:
-    """The expressions of the scene; by way of a spline where the modes were made anew (payloads, patches)."""
-    given: Mapping[str, tuple[TimeFunction, ...]] = analysis.modal or {}
-    shape: Shape = []
-    for body in bodies:
-        functions = list(given.get(body.name, ()))
-        in_file = len(body.modal_transform)
-        if len(functions) > in_file:
-            raise InputError(
-                f'{scene_path}: analysis "{analysis.name}": modal.{body.name}: expected at most {in_file}'
-                f" expressions, one for each mode, found {len(functions)}"
-            )
-        functions += [ZERO] * (in_file - len(functions))
-        selected = np.argmax(body.modal_transform, axis=0) if body.n_modes else np.zeros(0, dtype=int)
-        if np.array_equal(body.modal_transform, np.eye(in_file)[:, selected]):
-            shape.append([functions[k] for k in selected])
-        else:
-            nodes = shape_nodes(analysis)
-            p = np.column_stack([function.sample(nodes)[0] for function in functions])
-            shape.append(spline(nodes, np.linalg.lstsq(body.modal_transform, p.T, rcond=None)[0].T))
-    return shape
 
 
 def _tree(assembly: MechanismSystem, *, has_motors: bool) -> PlanarTree:

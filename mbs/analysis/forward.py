@@ -2,77 +2,37 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import Literal, Self
-
 import numpy as np
-from pydantic import model_validator
 
 from ...common.errors import InputError
-from ...common.validation import either, quoted
+from ...common.validation import quoted
 from .. import _core
 from ..joints.measure import Marker, Measure
 from ..model.model import ZERO, Model
 from ..model.raised_mass import coordinate_factors, integrated
 from ..model.system import MechanismSystem
-from ..scene.analysis import ActuatedAnalysis, Analysis, Need
 from ..solve.state import State
-from .context import Context
+from .context import AnyContext, Context
 from .drive import Progress, drive, initial_state
 from .elastic_joints import drive_sizes, with_compliance, with_rotors
-from .outcome import EarlierRun
+from .forward_keys import ForwardKeys
+from .outcome import AnyOutcome, EarlierRun
 from .planar_outcome import PlanarOutcome
 from .replay import ActuatorSet, actuation_source, motor_limits, replay_times
+from .spatial_forward import run_spatial_forward
 
 
-class Forward(ActuatedAnalysis):
+class Forward(ForwardKeys):
     """Motion under the loads of the scene and the inputs computed by the inverse analysis `actuation`.
 
     `apply` selects the inputs: motor torques, motor torques and patch voltages, forces along the trajectories, or
     forces at the actuation points. `limits` saturates motors and patches at their limits.
     """
 
-    kind: Literal["forward"]
-    apply: Literal["joints", "joints+pzt", "trajectory", "points"] | None = None
-    """Inputs taken from `actuation`: motor torques, torques and voltages, forces along the trajectories, or at the
-    actuation points."""
-    limits: bool = False
-    """Saturation of motors and patches at their limits."""
-
-    follows_trajectories = False
-    is_resumable = True
-
-    @model_validator(mode="after")
-    def _consistent(self) -> Self:
-        if (self.actuation is None) != (self.apply is None):
-            raise ValueError(
-                'expected the keys "actuation" and "apply" together, found only '
-                + ('"apply"' if self.actuation is None else '"actuation"')
-            )
-        if self.limits and self.apply not in ("joints", "joints+pzt"):
-            raise ValueError(
-                f'expected limits = true only with apply = "joints" or "joints+pzt", found apply = "{self.apply}"'
-            )
-        return self
-
-    def needs(self) -> Iterator[Need]:
-        """Patches or points for what is applied by them."""
-        table = {"joints+pzt": "pzt", "points": "actuation_points"}.get(self.apply or "")
-        if self.apply is not None and table is not None:
-            yield Need("apply", self.apply, table)
-
-    def replay_problems(self, source: Analysis) -> Iterator[str]:
-        """Whether `source` found what is to be applied."""
-        if source.applicable and self.apply not in source.applicable:
-            more = f': "{source.name}" takes more than the forces on its trajectories'
-            why = more if self.apply == "trajectory" else ""
-            yield (
-                f'apply: expected {either(source.applicable)} with an analysis of kind "{source.kind}", found'
-                f' "{self.apply}"{why}'
-            )
-
-    def run(self, context: Context) -> PlanarOutcome:
+    def run(self, context: AnyContext) -> AnyOutcome:
         """Motion alone: nothing is specified."""
+        if isinstance(context, Context):
+            return run_spatial_forward(context, self)
         source = context.source(self.actuation)
         actuators = context.make_actuators(has_raised_masses(source))
         return run_forward(context.model, self, source, actuators, context.progress, context.earlier)

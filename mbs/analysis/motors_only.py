@@ -7,52 +7,33 @@ the part of the vibration that the output does not see.
 
 from __future__ import annotations
 
-import math
 import time
-from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cache, partial
-from pathlib import Path
-from typing import Annotated, Literal, Self
 
 import numpy as np
-from pydantic import Field, model_validator
 
-from ...common.arrays import Array, as_floats, as_list
-from ...common.errors import InputError
-from ...common.numbers import MOST_OUTPUTS
+from ...common.arrays import Array, as_list
 from .. import _core
 from .._core import TimeFunction
-from ..fields.field_types import NotNegative
-from ..fields.waypoints import spline
 from ..joints.measure import Measure
 from ..model.model import Model
-from ..scene.analysis import Check, Need, TimedAnalysis, output_times
+from ..scene.analysis import output_times
 from ..solve.integrators import Choice
-from ..solve.internal_dynamics import Output, is_unstable
 from ..solve.servo import Servo, make_servo
-from ..solve.stable_inversion import Inversion, S, invert
-from ..solve.zero_dynamics import GROWTH, SAMPLES, Linearisation, linearise, shape_along
-from .context import Context
+from ..solve.stable_inversion import Inversion, invert
+from .context import AnyContext, Context
 from .drive import Progress, motion_of
 from .elastic_joints import add_transmission
-from .fcid import sampled
-from .outcome import ADVICE, Details, Forces, Statistics
+from .inverted_path import AroundPath, MotorsOnlyKeys, cause_of, check_rest, choose_output, durations, where
+from .outcome import AnyOutcome, Forces, Statistics
 from .planar_outcome import PlanarOutcome
 from .samples import path_times
-
-DECAY = 23.0  # times the slowest time constant of zeros: what is left is 1e-10
-FACTOR_STEP = 0.02  # of the search for the largest factor
-MARGIN = 0.9  # of it that is taken: at the limit hardly damped motions are excited most
-SINGULAR = 1e-13  # of M of the internal dynamics, scaled
-INFINITE = (
-    "where a zero of the modes passes through infinity: take another number of modes in the link files, or output ="
-    ' "redefined"'
-)
-REST = 1e-9  # speed of a path at rest, relative to its mean speed
+from .shapes import sampled
+from .spatial_motors_only import run_spatial_motors_only
 
 
-class MotorsOnly(TimedAnalysis):
+class MotorsOnly(MotorsOnlyKeys):
     """Motor torques that move the robot along its trajectories without patches (stable inversion).
 
     With `output` "tip" the points of the trajectories follow them; with "redefined" the points with `factor` times the
@@ -61,50 +42,11 @@ class MotorsOnly(TimedAnalysis):
     zero dynamics determines them. `check` as in `Pcid`.
     """
 
-    kind: Literal["motors-only"]
-    output: Literal["tip", "redefined"] = "tip"
-    """Tracked output: points of the trajectories, or their positions with `factor` times the vibration."""
-    factor: Annotated[float, Field(ge=0.0, lt=1.0)] | None = None
-    """Share of the vibration in the "redefined" output; by default nine tenths of the largest that is minimum phase."""
-    pre_actuation: NotNegative | None = None
-    """Duration of torques before the path begins, s; by default from the zero dynamics."""
-    post_actuation: NotNegative | None = None
-    """Duration of torques after the path, s; by default from the zero dynamics."""
-    check: Check = None
-    """Forward simulation under the result with twice the modes ("finer")."""
-
-    is_integrated = True
-    applicable = ("joints",)
-
-    @model_validator(mode="after")
-    def _consistent(self) -> Self:
-        if self.factor is not None and self.output != "redefined":
-            raise ValueError(f'expected the key "factor" only with output = "redefined", found "{self.output}"')
-        more = (self.pre_actuation or 0.0) + (self.post_actuation or 0.0)
-        if self.output_step and (self.end + more) / self.output_step > MOST_OUTPUTS:
-            raise ValueError(f"expected at most {MOST_OUTPUTS} outputs, found {more:g} s of pre- and post-actuation")
-        return self
-
-    @property
-    def times(self) -> Array:
-        """Output times (T,), s: from 0 to `end`, and the pre- and post-actuation besides where they are given."""
-        return output_times(self.end, self.output_step, self.pre_actuation or 0.0, self.post_actuation or 0.0)
-
-    def needs(self) -> Iterator[Need]:
-        """Something to follow."""
-        yield Need("kind", self.kind, "trajectory")
-
-    def run(self, context: Context) -> PlanarOutcome:
+    def run(self, context: AnyContext) -> AnyOutcome:
         """Motion and moments."""
+        if isinstance(context, Context):
+            return run_spatial_motors_only(context, self)
         return add_transmission(run_motors_only(context.model, self, context.progress))
-
-
-@dataclass(frozen=True)
-class AroundPath(Details):
-    """How long motors act before and after the path, s."""
-
-    pre_actuation: float
-    post_actuation: float
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -139,132 +81,12 @@ def run_motors_only(model: Model, analysis: MotorsOnly, progress: Progress) -> P
     )
 
 
-def where(scene_path: Path, analysis: MotorsOnly) -> str:
-    """Scene and analysis, as messages begin."""
-    return f'{scene_path}: analysis "{analysis.name}"'
-
-
 def path_error(inversion: Inversion[Servo], times: Array, q: Array) -> Array:
     """How far (T, components) the specified points, joints and angles themselves are from their path."""
     path = inversion.servo.path
     rest = np.zeros(q.shape[1])
     rows = [i for i, held in enumerate(path.is_trajectory) if held]
     return np.array([path.system.constraints(t, one, rest)[0][rows] for t, one in zip(times, q, strict=True)])
-
-
-def choose_output(make: Callable[[float], S], analysis: MotorsOnly) -> tuple[S, Linearisation]:
-    """The output the path is for: the point itself, or as near to it as is minimum phase or as the scene says.
-
-    `make` gives the output of a factor.
-    """
-    end = analysis.end
-    if analysis.output == "tip" or analysis.factor is not None:
-        servo = make(1.0 if analysis.output == "tip" else float(analysis.factor or 0.0))
-        linear = linearise(servo, end)
-        _check_relative_degree(servo, linear)
-        if analysis.output == "redefined" and not is_minimum_phase(linear):
-            raise InputError(
-                f"{servo.where}: factor: expected one whose output is minimum phase, since it is integrated forward,"
-                f" found {analysis.factor:g} with zeros in the right half plane: {describe_zeros(linear)}; use a"
-                ' smaller factor, leave it out, or use output = "tip"'
-            )
-        return (servo, linear) if analysis.output == "tip" else _with_expected_deflections(servo, end)
-    joints = make(0.0)
-    for k in range(round(1 / FACTOR_STEP) + 1):
-        servo = joints.with_factor(max(0.0, 1.0 - k * FACTOR_STEP))
-        linear = linearise(servo, end, samples=2)
-        if not is_unstable(linear.zeros).any() and is_minimum_phase(linearise(servo, end)):
-            return _with_expected_deflections(servo.with_factor(MARGIN * servo.factor), end)
-    raise InputError(
-        f'{joints.where}: output: expected a robot whose joint motion is minimum phase for "redefined", found zeros in'
-        f" the right half plane even then: {describe_zeros(linear)}"
-    )
-
-
-def _with_expected_deflections(servo: S, end: float) -> tuple[S, Linearisation]:
-    """The part of the deflections that the output leaves out, replaced by what the path's loads bend without vibration.
-
-    A function of time alone: it changes the output's target, not its zeros.
-    """
-    times, sag = shape_along(servo.with_factor(1.0), end, SAMPLES)
-    offset = [f.held(0.0, end) for f in spline(times, (1 - servo.factor) * sag, at_rest=True)]
-    servo = servo.with_offset(tuple(offset))
-    return servo, linearise(servo, end)
-
-
-def is_minimum_phase(linear: Linearisation) -> bool:
-    """Whether no zero lies in the right half plane at rest, and none long enough along the path to matter."""
-    at_rest = linear.zeros[[0, -1]]
-    grows = linear.zeros.real.max() * linear.times[-1] > GROWTH
-    return not (is_unstable(at_rest).any() or grows)
-
-
-def describe_zeros(linear: Linearisation) -> str:
-    """The slowest zeros in the right half plane, in 1/s."""
-    row = max(linear.zeros, key=lambda s: float(s.real.max()))
-    found = row[is_unstable(row)]
-    shown = ", ".join(f"{s.real:.4g}{f' ± {s.imag:.4g}i' if s.imag > 0 else ''}" for s in found if s.imag >= 0)
-    return shown if len(shown) < 120 else ", ".join(shown.split(", ")[:4]) + f" … ({len(found)} in all)"
-
-
-def _check_relative_degree(servo: Output, linear: Linearisation) -> None:
-    """Raise `InputError` where some time of the path the motors cannot accelerate its output."""
-    values = np.linalg.svd(linear.dynamics.M, compute_uv=False)
-    worst = int((values[:, -1] / values[:, 0]).argmin())
-    if values[worst, -1] < SINGULAR * values[worst, 0]:
-        raise InputError(
-            f"{servo.where}: expected motors that accelerate every component of the path, found at"
-            f" t = {linear.times[worst]:.4g} s a singular coupling, {INFINITE}"
-        )
-
-
-def check_rest(servo: Output, analysis: MotorsOnly, needs_future: bool) -> None:
-    """Raise `InputError` for a path that moves where the robot has to be at rest."""
-    ends = [0.0, analysis.end] if needs_future or analysis.post_actuation else [0.0]
-    for target in servo.targets():
-        values = target.function.sample(as_floats(np.linspace(0.0, analysis.end, 101)))[0]
-        mean = float(np.ptp(values)) / analysis.end
-        for t in ends:
-            rate = target.function(t)[1]
-            if abs(rate) > REST * max(mean, 1.0):
-                raise InputError(
-                    f'{servo.where}: trajectory "{target.owner}": {target.component}: expected'
-                    f' a path at rest at t = {t:g} s, before or after which "{analysis.name}" holds it, found the rate'
-                    f" {rate:.4g}: start and end with zero speed, as 10*s**3 - 15*s**4 + 6*s**5 does"
-                )
-
-
-def durations(analysis: MotorsOnly, linear: Linearisation, needs_future: bool) -> tuple[float, float]:
-    """Pre- and post-actuation (s): as given, or until the zero dynamics has died out; whole output steps."""
-    first, last, light = linear.zeros[0].real, linear.zeros[-1].real, linear.is_light[0]
-    is_ahead = linear.is_future[0] & (first > 0)
-    grow, growing_vibrations, decay = first[is_ahead & ~light], first[is_ahead & light], -last[last < 0]
-    pre = max(DECAY / grow.min(initial=np.inf), min(DECAY / growing_vibrations.min(initial=np.inf), analysis.end))
-    post = min(DECAY / decay.min(initial=np.inf), analysis.end) if needs_future else 0.0
-    given = analysis.pre_actuation, analysis.post_actuation
-    chosen = [automatic if value is None else value for automatic, value in zip((pre, post), given, strict=True)]
-    step = analysis.output_step
-    return tuple(math.ceil(value / step - 1e-9) * step for value in chosen)  # type: ignore[return-value]
-
-
-def cause_of(inversion: Inversion[S]) -> str:
-    """Why no motion was found and when it was worst; where zeros change sides, no bounded one need exist."""
-    linear = inversion.linearisation
-    if inversion.status not in ("inversion not converged", "mesh too coarse"):
-        return ""
-    count = (linear.is_future if linear.is_light.any() else is_unstable(linear.zeros)).sum(axis=1)
-    changed = np.flatnonzero(count != count[0])
-    k = linear.singular_after
-    if inversion.status == "inversion not converged" and k is not None:
-        return f"singular coupling between t = {linear.times[k]:.4g} and {linear.times[k + 1]:.4g} s, {INFINITE}"
-    if inversion.status == "mesh too coarse" or not len(changed):
-        return f"{ADVICE[inversion.status]} (worst at t = {inversion.worst:.4g} s)"
-    k = int(changed[0])
-    return (
-        f"zeros change sides along the path: {count[0]} of them are in the right half plane at t = 0, {count[k]} at t"
-        f" = {linear.times[k]:.4g} s, so a bounded motion may not exist. Leave out axial and high modes (modes.family"
-        ' = "in-plane-bending" and fewer of them in the link files), or use output = "redefined"'
-    )
 
 
 def _outcome(analysis: MotorsOnly, found: InvertedPath, seconds: float) -> PlanarOutcome:

@@ -13,11 +13,12 @@ from ..scene.analysis import Check, IntegratedAnalysis, Need
 from ..solve.initial_state import undeformed_state
 from ..solve.path_checks import check_smooth
 from ..solve.reach import check_reach
-from .context import Context
+from .context import AnyContext, Context
 from .drive import Progress, drive, initial_state, motors_fit
 from .elastic_joints import add_transmission
-from .outcome import EarlierRun
+from .outcome import AnyOutcome, EarlierRun
 from .planar_outcome import PlanarOutcome
+from .spatial_pcid import run_spatial_pcid
 
 
 class Pcid(IntegratedAnalysis):
@@ -38,8 +39,10 @@ class Pcid(IntegratedAnalysis):
         """Something to follow."""
         yield Need("kind", self.kind, "trajectory")
 
-    def run(self, context: Context) -> PlanarOutcome:
+    def run(self, context: AnyContext) -> AnyOutcome:
         """Motion and forces."""
+        if isinstance(context, Context):
+            return run_spatial_pcid(context, self)
         found = run_pcid(context.model, self, context.is_replayed, context.progress, context.earlier)
         return add_transmission(found)
 

@@ -18,13 +18,13 @@ from ..solve.spatial_posture import check_path, mobility, undeformed_posture
 from ..solve.spatial_prescribed import prescribed_motion, spatial_quasi_static_shape
 from ..solve.spatial_redundancy import resolved
 from ..solve.state import State
-from .fcid import Fcid, Shape, given_shape, sampled, shape_nodes
+from .context import Context
 from .outcome import Forces, Motion, Outcome, Statistics
 from .samples import path_times
-from .spatial_run import SpatialContext
+from .shapes import FcidKeys, Shape, given_shape, sampled, shape_nodes
 
 
-def run_spatial_fcid(context: SpatialContext, analysis: Fcid) -> Outcome:
+def run_spatial_fcid(context: Context, analysis: FcidKeys) -> Outcome:
     """Motion and forces for the trajectories and the shape that the analysis prescribes.
 
     Raises `InputError` where the trajectories do not fix the motion of the mechanism or cannot be followed,
@@ -54,7 +54,7 @@ def run_spatial_fcid(context: SpatialContext, analysis: Fcid) -> Outcome:
 
 
 def _run(
-    model: SpatialModel, analysis: Fcid, shape: Shape, start: State, times: Array, warnings: tuple[str, ...] = ()
+    model: SpatialModel, analysis: FcidKeys, shape: Shape, start: State, times: Array, warnings: tuple[str, ...] = ()
 ) -> Outcome:
     found = prescribed_motion(model, sampled(shape, times), times, start)
 
@@ -71,7 +71,7 @@ def _run(
     )
 
 
-def _shape(model: SpatialModel, analysis: Fcid, start: State, *, by_motors: bool) -> Shape:
+def _shape(model: SpatialModel, analysis: FcidKeys, start: State, *, by_motors: bool) -> Shape:
     """p(t) of every body of the tree, with its derivatives: of static ones a spline, as in the plane."""
     bodies = [node.body for node in model.tree.nodes]
     if analysis.shape == "given":

@@ -20,13 +20,13 @@ from ..model.spatial_motors import MotorForces
 from ..scene.spatial.loads import OF_POINT
 from ..solve.spatial_statics import hanging_joints, initial_state
 from ..solve.state import State
+from .context import Context
 from .elastic_joints import DEGREE
-from .forward import Forward
+from .forward_keys import ForwardKeys
 from .outcome import Outcome
 from .spatial_drive import spatial_drive
 from .spatial_gears import wound_up
 from .spatial_replay import left_paths, motor_forces_of, path_wrenches, replay_times, replayed
-from .spatial_run import SpatialContext
 
 Moments = Mapping[str, Sequence[TimeFunction]]
 """By joint, on its second side along each coordinate, N·m or N."""
@@ -44,7 +44,7 @@ class Applied(NamedTuple):
     was_stopped: bool
 
 
-def run_spatial_forward(context: SpatialContext, analysis: Forward) -> Outcome:
+def run_spatial_forward(context: Context, analysis: ForwardKeys) -> Outcome:
     """Motion alone: nothing is specified. With an actuation it starts where the earlier analysis did.
 
     Raises `InputError` where what is to be applied does not fit the robot, `SolveError` where there is no equilibrium
@@ -55,7 +55,7 @@ def run_spatial_forward(context: SpatialContext, analysis: Forward) -> Outcome:
         start = initial_state(model)
         told = tuple(hanging_joints(model, start))
         return spatial_drive(model, analysis, start, progress, warnings=told, earlier=context.earlier)
-    source = context.runs[analysis.actuation]
+    source = context.outcomes[analysis.actuation]
     if model.tree.gears:
         return _behind_gears(source, model, analysis, context)
     if analysis.apply == "points":
@@ -97,7 +97,7 @@ def _by_joint(model: SpatialModel, functions: Iterable[TimeFunction]) -> dict[st
     return {joint: [next(following) for _ in columns] for joint, columns in model.motors.items()}
 
 
-def _behind_gears(source: Outcome, model: SpatialModel, analysis: Forward, context: SpatialContext) -> Outcome:
+def _behind_gears(source: Outcome, model: SpatialModel, analysis: ForwardKeys, context: Context) -> Outcome:
     """Where gears of `model` give: moments at the outputs of `source` and splines between these, as in the plane."""
     if analysis.apply != "joints":
         raise InputError(
@@ -141,7 +141,7 @@ def _directions(model: SpatialModel) -> list[Array]:
     return [model.sign(joint) * np.eye(model.tree.n_v)[k] for joint, columns in model.motors.items() for k in columns]
 
 
-def _paths(source: Outcome, analysis: Forward) -> Applied:
+def _paths(source: Outcome, analysis: ForwardKeys) -> Applied:
     """Forces and moments on the points of paths, and along the coordinates of joints that follow one."""
     model = source.model
     rows = [(k, row) for k, row in enumerate(model.rows) if row.is_trajectory and row.kind == "coordinate"]
@@ -162,7 +162,7 @@ def _paths(source: Outcome, analysis: Forward) -> Applied:
     return Applied(Drives(tuple(along), tuple(points)), by_joint, found.unresolved, found.was_stopped)
 
 
-def _points(context: SpatialContext, source: Outcome, analysis: Forward) -> Applied:
+def _points(context: Context, source: Outcome, analysis: ForwardKeys) -> Applied:
     """Forces at the actuation points, as they were along the motion of the source: in global axes."""
 
     def forces(run: Outcome) -> Array:
@@ -176,7 +176,7 @@ def _points(context: SpatialContext, source: Outcome, analysis: Forward) -> Appl
     return Applied(Drives(at_points=points), {}, found.unresolved, found.was_stopped)
 
 
-def _actuators(context: SpatialContext, source: Outcome, analysis: Forward) -> Applied:
+def _actuators(context: Context, source: Outcome, analysis: ForwardKeys) -> Applied:
     """Moments of all motors along their coordinates, and what voltages of patches do on modes."""
     model = source.model
     _check_motors(model, analysis)
@@ -198,7 +198,7 @@ def _actuators(context: SpatialContext, source: Outcome, analysis: Forward) -> A
     return Applied(Drives(along + modal, on_frames=on_frames), moments, found.unresolved, found.was_stopped)
 
 
-def _supplied(context: SpatialContext, analysis: Forward, found: MotorForces) -> dict[str, Array]:
+def _supplied(context: Context, analysis: ForwardKeys, found: MotorForces) -> dict[str, Array]:
     """Modal forces of patches (T, n) by body, where they are applied."""
     return dict(context.supply(found.modal, analysis.limits)) if analysis.apply == "joints+pzt" else {}
 
@@ -222,7 +222,7 @@ def modal_drives(model: SpatialModel, body: str, sizes: Iterator[TimeFunction]) 
         yield Drive(modal_direction(model, body, unit), next(sizes))
 
 
-def _check_motors(model: SpatialModel, analysis: Forward) -> None:
+def _check_motors(model: SpatialModel, analysis: ForwardKeys) -> None:
     if not model.motors:
         raise InputError(
             f'{model.scene.path}: analysis "{analysis.name}": apply: expected joints with motors for'

@@ -17,15 +17,15 @@ from ..solve.integrators import Choice
 from ..solve.internal_dynamics import Stopped
 from ..solve.spatial_servo import SpatialServo, make_spatial_servo
 from ..solve.stable_inversion import Inversion, invert
-from .motors_only import AroundPath, MotorsOnly, cause_of, check_rest, choose_output, durations, where
+from .context import Context
+from .inverted_path import AroundPath, MotorsOnlyKeys, cause_of, check_rest, choose_output, durations, where
 from .outcome import Forces, Motion, Outcome, Statistics
 from .samples import path_times
-from .spatial_run import SpatialContext
 
 NOTABLE = 1e-9  # m, rad: of a path that is left
 
 
-def run_spatial_motors_only(context: SpatialContext, analysis: MotorsOnly) -> Outcome:
+def run_spatial_motors_only(context: Context, analysis: MotorsOnlyKeys) -> Outcome:
     """Motion and motor forces for the trajectories, no other force acting; before and after the path it is held.
 
     Raises `InputError` and `SolveError` as `motors_only.run_motors_only`, and `SolveError` where it is stopped before
@@ -66,7 +66,7 @@ def run_spatial_motors_only(context: SpatialContext, analysis: MotorsOnly) -> Ou
     return replace(run, details=around, statistics=statistics, look_closer=look_closer)
 
 
-def _run(analysis: MotorsOnly, model: SpatialModel, inversion: Inversion[SpatialServo], times: Array) -> Outcome:
+def _run(analysis: MotorsOnlyKeys, model: SpatialModel, inversion: Inversion[SpatialServo], times: Array) -> Outcome:
     curve = inversion.curve
     modes = np.array([curve(times), curve.derivative(1)(times), curve.derivative(2)(times)])
     found, is_met = inversion.servo.motion(times, modes)

@@ -7,12 +7,12 @@ from ..scene.analysis import IntegratedAnalysis
 from ..solve.spatial_posture import check_path, undeformed_posture
 from ..solve.spatial_redundancy import resolved
 from ..solve.spatial_statics import initial_state
+from .context import Context
 from .outcome import Outcome
 from .spatial_drive import spatial_drive
-from .spatial_run import SpatialContext
 
 
-def run_spatial_pcid(context: SpatialContext, analysis: IntegratedAnalysis) -> Outcome:
+def run_spatial_pcid(context: Context, analysis: IntegratedAnalysis) -> Outcome:
     """C_m and C_s hold, p is free; and gears that give, where motors follow the trajectories.
 
     Raises `InputError` where the trajectories cannot be followed, `SolveError` where there is no equilibrium to start

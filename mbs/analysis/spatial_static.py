@@ -11,11 +11,11 @@ from ..scene.analysis import Analysis
 from ..solve.spatial_posture import undeformed_posture
 from ..solve.spatial_redundancy import resolved
 from ..solve.spatial_statics import holding_multipliers, static_equilibrium
+from .context import Context
 from .outcome import Motion, Outcome, Statistics
-from .spatial_run import SpatialContext
 
 
-def run_spatial_static(context: SpatialContext, analysis: Analysis) -> Outcome:
+def run_spatial_static(context: Context, analysis: Analysis) -> Outcome:
     """The equilibrium at the one time t = 0: at rest, however fast the trajectories are there.
 
     Raises `SolveError` where there is none.

@@ -16,11 +16,12 @@ from ..scene.analysis import Analysis
 from ..solve.initial_state import undeformed_state
 from ..solve.integrators import METHODS, NOT_INTEGRATED
 from ..solve.statics import static_equilibrium
-from .context import Context
+from .context import AnyContext, Context
 from .drive import motion_of, motors_fit, statistics_of
 from .elastic_joints import add_transmission
-from .outcome import Forces
+from .outcome import AnyOutcome, Forces
 from .planar_outcome import PlanarOutcome
+from .spatial_static import run_spatial_static
 
 
 class Static(Analysis):
@@ -31,8 +32,10 @@ class Static(Analysis):
     is_algebraic = True
     allocates_patches = True
 
-    def run(self, context: Context) -> PlanarOutcome:
+    def run(self, context: AnyContext) -> AnyOutcome:
         """Motion and forces at t = 0."""
+        if isinstance(context, Context):
+            return run_spatial_static(context, self)
         return add_transmission(run_static(context.model, self))
 
 

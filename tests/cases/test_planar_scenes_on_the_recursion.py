@@ -5,9 +5,8 @@ import planar_in_space
 import pytest
 from checkpoints import CASES
 
-from ffrobot.mbs.analysis.spatial_kinds import MECHANICAL_IN_SPACE
+from ffrobot.mbs.analysis.context import Context
 from ffrobot.mbs.analysis.spatial_replay import motor_forces_of
-from ffrobot.mbs.analysis.spatial_run import SpatialContext
 from ffrobot.mbs.model.planar_body_in_space import planar_body_in_space
 from ffrobot.mbs.model.spatial_model import build_spatial_model
 from ffrobot.mbs.model.spatial_system import SpatialSystem
@@ -66,8 +65,8 @@ def solved(request, tmp_path_factory):
     mechanism = mechanism_in_space(scene.model_copy(update={"payload": ()}), start_in_space(planar.model))
     model = build_spatial_model(mechanism, [planar_body_in_space(body) for body in planar.model.bodies])
     assert SpatialSystem(model).plane is not None
-    context = SpatialContext(model, {}, lambda t: True)
-    runs = {each.name: MECHANICAL_IN_SPACE[each.kind](context, each) for each in scene.analysis}
+    context = Context(model=model, outcomes={}, progress=lambda t: True)
+    runs = {each.name: each.run(context) for each in scene.analysis}
     return planar.outcomes, runs
 
 

@@ -11,7 +11,8 @@ from ffrobot.common.errors import InputError, SolveError
 from ffrobot.mbs import _core
 from ffrobot.mbs._core import TimeFunction
 from ffrobot.mbs.analysis.forward import run_forward
-from ffrobot.mbs.analysis.motors_only import MotorsOnly, is_minimum_phase, path_error, run_motors_only
+from ffrobot.mbs.analysis.inverted_path import is_minimum_phase
+from ffrobot.mbs.analysis.motors_only import MotorsOnly, path_error, run_motors_only
 from ffrobot.mbs.analysis.replay import ActuatorSet
 from ffrobot.mbs.quantities.observation import point_motion
 from ffrobot.mbs.solve import stable_inversion
