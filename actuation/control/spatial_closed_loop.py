@@ -178,10 +178,10 @@ def _feed_forward(
         made_again.check_completed()
         values = in_parts(made_again, found)[which[1:]]
     column = 0
-    for joint, columns in context.model.motors.items():  # behind gears that give: known at outputs
-        if joint in plant.source.gears and analysis.feed_forward != "none":
-            moment = plant.source.gears[joint].moment[:, None]
-            values[:, column : column + 1] = between(middle, source.time, moment)
+    for joint, columns in context.model.motors.items():  # beside gears that give: known at outputs
+        if plant.source.gears and analysis.feed_forward != "none":
+            moments = plant.source.moments[joint]
+            values[:, column : column + len(columns)] = between(middle, source.time, moments)
         column += len(columns)
     return values
 

@@ -56,7 +56,7 @@ def operating_points_in_space(context: ActuatedContext, analysis: InstantAnalysi
         source = context.outcomes[analysis.source]
         rows = [row_at(model.scene.path, analysis, source, float(t)) for t in analysis.times]
         run = of_earlier(source, analysis).at(rows)
-    q, v, a, _ = wound_up(source, model)
+    q, v, a = wound_up(source, model)[:3]
     return run, OperatingPoints(model, run.time, q[rows], v[rows], a[rows])
 
 

@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from ..actuation.context import ActuatedContext
 from ..actuation.feasibility import Feasibility
@@ -40,6 +41,9 @@ from .spatial_solution import SpatialResult, SpatialSolution
 from .spatial_stresses import stresses_in_space
 from .spatial_whole_links import whole_links_in_space
 from .watcher import Interruption, Watcher
+
+if TYPE_CHECKING:
+    from scipy.interpolate import BSpline
 
 logger = logging.getLogger(__name__)
 
@@ -218,9 +222,11 @@ def _context(
 def _with_peaks(solution: SpatialSolution, run: Outcome) -> SpatialResult:
     """What is read off a run; what is judged by peaks, by those between outputs."""
     found, closer = _evaluated(solution, run), run.closer
-    if closer is run or found.motion.gears:  # their twists are splines through even outputs
+    twists = {joint: gear.curve for joint, gear in found.motion.gears.items()}  # splines through outputs
+    known = {joint: curve for joint, curve in twists.items() if curve is not None}
+    if closer is run or len(known) < len(twists):
         return found
-    between = _evaluated(solution, closer)
+    between = _evaluated(solution, closer, known)
     actuation = found.actuation
     if actuation is not None and between.actuation is not None:
         judged = between.actuation
@@ -228,12 +234,12 @@ def _with_peaks(solution: SpatialSolution, run: Outcome) -> SpatialResult:
     return replace(found, actuation=actuation, bending=between.bending, closer=between)
 
 
-def _evaluated(solution: SpatialSolution, run: Outcome) -> SpatialResult:
-    """What is read off a run."""
+def _evaluated(solution: SpatialSolution, run: Outcome, twists: Mapping[str, BSpline] | None = None) -> SpatialResult:
+    """What is read off a run; `twists` of compliant gears where they are known."""
     forces = run.forces
     found = MotionOfLinks(
         run.model, run.time, run.q, run.v, run.a, run.multipliers, forces.required, run.motion.is_at_rest,
-        forces.applied, forces.commanded, forces.driving, divided_links(solution),
+        forces.applied, forces.commanded, forces.driving, twists or {}, divided_links(solution),
     )  # fmt: skip
     motion, sharing = shared_evenly(found)
     actuation = None

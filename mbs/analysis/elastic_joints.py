@@ -1,4 +1,4 @@
-"""Gears that give: the robot with its rotors as bodies, and what motors must do for a motion found without them.
+"""Compliant gears: the robot with its rotors as bodies, and what motors must do for a motion found without them.
 
 Inverse analyses and equilibria take gears for rigid: their motion is that of the links, and their rotors turn with
 them. What a gear transmits is then known, and where its motor has to be follows (`add_transmission`; Spong 1987).
@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -28,13 +28,16 @@ from ..solve.state import State
 from .outcome import GearMotion
 from .planar_outcome import PlanarOutcome
 
+if TYPE_CHECKING:
+    from scipy.interpolate import BSpline
+
 DEGREE = 5
 UNRESOLVED = 0.001  # of a motor's largest moment: what every second output may change of it
 SLOWEST = 1e4  # s, of a gear to give way, per second of the analysis: beyond, splines do not find its twist
 
 
 def with_compliance(model: Model) -> Model:
-    """The robot with gears that give where the scene says so: rotors are bodies, and motors turn them.
+    """The robot with compliant gears where the scene says so: rotors are bodies, and motors turn them.
 
     A rotor's frame stays where it is, at the origin: its mass is a payload of the first body. Raises `InputError` for
     such a gear in a joint without a motor.
@@ -81,7 +84,7 @@ def _rotor(model: Model, gear: ElasticGear) -> PlanarBody:
 
 
 def add_transmission(outcome: PlanarOutcome) -> PlanarOutcome:
-    """An inverse analysis or equilibrium with what motors must do behind gears that give.
+    """An inverse analysis or equilibrium with what motors must do behind compliant gears.
 
     With the rigid rotor's angle ψ = N γ + α_a the gear transmits τ_s = τ − J N ψ̈. The twist δ = θ_m − γ follows from
     k δ + c δ̇ = τ_s as a quintic spline through the outputs, and the motor's moment is τ_s + J N (ψ̈ + N δ̈). Left out is
@@ -128,10 +131,12 @@ class GearSpring(NamedTuple):
     where: str
 
 
-def gear_motion(spring: GearSpring, time: Array, tau: Array, rotor: Array, gamma: Array) -> GearMotion:
+def gear_motion(
+    spring: GearSpring, time: Array, tau: Array, rotor: Array, gamma: Array, curve: BSpline | None = None
+) -> GearMotion:
     """Of a gear whose motor supplies `tau` (T,) where it is rigid, `rotor` (T,) of which its rotor takes, J N ψ̈.
 
-    `gamma` (T, 3): the joint's coordinate, its rate and acceleration.
+    `gamma` (T, 3): the joint's coordinate, its rate and acceleration. `curve`: δ(t) where it is known.
     Raises `InputError` where damping holds it so long that its moments say nothing of its twist.
     """
     lasts, longest = spring.damping / spring.stiffness, SLOWEST * (time[-1] - time[0])
@@ -141,21 +146,26 @@ def gear_motion(spring: GearSpring, time: Array, tau: Array, rotor: Array, gamma
             f" stiffness, {SLOWEST:g} times the analysis), found {lasts:.3g} s; without stiffness it does not give at"
             " all"
         )
-    transmitted = tau - rotor
-    twist = _twist(spring, time, transmitted)
+    transmitted, unresolved = tau - rotor, 0.0
+    is_known = curve is not None
+    curve = curve if is_known or len(time) <= DEGREE else _twist(spring, time, transmitted)
+    twist = _read(curve, time) if curve else np.pad(transmitted[:, None] / spring.stiffness, ((0, 0), (0, 2)))
     moment = tau + spring.inertia * twist[:, 2]
-    unresolved, largest = 0.0, float(np.abs(moment).max())
-    if len(time) > 2 * DEGREE + 1 and largest:
-        coarse = tau[::2] + spring.inertia * _twist(spring, time[::2], transmitted[::2])[:, 2]
+    largest = float(np.abs(moment).max())
+    if not is_known and len(time) > 2 * DEGREE + 1 and largest:
+        coarse = tau[::2] + spring.inertia * _read(_twist(spring, time[::2], transmitted[::2]), time[::2])[:, 2]
         unresolved = float(np.abs(coarse - moment[::2]).max()) / largest
     angle, rate, acceleration = (gamma + twist).T
-    return GearMotion(transmitted, angle, rate, acceleration, moment, unresolved)
+    return GearMotion(transmitted, angle, rate, acceleration, moment, unresolved, twist, curve)
 
 
-def _twist(gear: GearSpring, time: Array, moment: Array) -> Array:
-    """δ, δ̇, δ̈ (T, 3) with k δ + c δ̇ = `moment` at all outputs, δ a quintic spline without knots next to the ends."""
-    if len(time) <= DEGREE:
-        return np.column_stack([moment / gear.stiffness, *np.zeros((2, len(time)))])
+def _read(curve: BSpline, time: Array) -> Array:
+    """Value, rate and acceleration (T, 3)."""
+    return np.column_stack([curve(time), curve.derivative(1)(time), curve.derivative(2)(time)])
+
+
+def _twist(gear: GearSpring, time: Array, moment: Array) -> BSpline:
+    """δ(t) with k δ + c δ̇ = `moment` at all outputs: a quintic spline without knots next to the ends."""
     from scipy.interpolate import BSpline, make_interp_spline
     from scipy.sparse import diags
     from scipy.sparse.linalg import spsolve
@@ -165,8 +175,7 @@ def _twist(gear: GearSpring, time: Array, moment: Array) -> Array:
     widths = DEGREE / (knots[DEGREE + 1 : DEGREE + n] - knots[1:n])
     differences = diags([-widths, widths], [0, 1], shape=(n - 1, n))
     rates = BSpline.design_matrix(time, knots[1:-1], DEGREE - 1) @ differences
-    curve = BSpline(knots, spsolve((gear.stiffness * values + gear.damping * rates).tocsc(), moment), DEGREE)
-    return np.column_stack([curve(time), curve.derivative(1)(time), curve.derivative(2)(time)])
+    return BSpline(knots, spsolve((gear.stiffness * values + gear.damping * rates).tocsc(), moment), DEGREE)
 
 
 def with_rotors(source: PlanarOutcome, model: Model) -> PlanarOutcome:

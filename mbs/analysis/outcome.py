@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
@@ -19,6 +19,9 @@ from ..model.spatial_model import SpatialModel
 from ..scene.analysis import Analysis
 from ..solve.integrators import NOT_INTEGRATED, Choice
 from .samples import in_order
+
+if TYPE_CHECKING:
+    from scipy.interpolate import BSpline
 
 ADVICE = {
     "step underflow": "no step is small enough there",
@@ -174,6 +177,8 @@ class GearMotion:
         angle, rate, acceleration: (T,) of the motor behind its gear, θ_m, rad.
         moment: (T,) τ_s + J N ψ̈ of the motor, behind its gear.
         unresolved: part of the largest moment by which it changes when only every second output is known.
+        twist: (T, 3) δ = θ_m − γ and its derivatives.
+        curve: δ(t) between outputs; None where there are too few.
     """
 
     gear_moment: Array
@@ -182,6 +187,8 @@ class GearMotion:
     acceleration: Array
     moment: Array
     unresolved: float
+    twist: Array
+    curve: BSpline | None
 
 
 class Details:

@@ -110,10 +110,8 @@ def _behind_gears(source: Outcome, model: SpatialModel, analysis: ForwardKeys, c
             f' with stiffness, found "{source.analysis.name}"'
         )
     wound = wound_up(source, model)
-    behind = {joint: gear.moment[:, None] for joint, gear in wound.gears.items()}
-    supplied = {**motor_forces_of(source).moments, **behind}
     most = largest_moments(source.model, limits=analysis.limits)
-    wanted = np.hstack([supplied[joint] for joint in model.motors])
+    wanted = np.hstack([wound.moments[joint] for joint in model.motors])
     given = np.clip(wanted, -most, most)
     sizes = spline(source.time, given, 1 if np.any(given != wanted) else DEGREE)
     along = [Drive(direction, size) for direction, size in zip(_directions(model), sizes, strict=True)]

@@ -1,4 +1,4 @@
-"""Gears that give in space: what motors must do behind them for a motion found with rigid ones.
+"""Compliant gears in 3D: what motors must do behind them for a motion found with rigid ones.
 
 The equations are those of the plane (`elastic_joints`), with the rotor's acceleration about its axis in space.
 """
@@ -6,48 +6,131 @@ The equations are those of the plane (`elastic_joints`), with the rotor's accele
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from dataclasses import replace
+from itertools import count
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from ...common.arrays import Array
 from ...common.errors import InputError
-from ..model.spatial_gears import elastic_joints
-from ..model.spatial_known_motion import States, rotor_torques
+from ..model.spatial_gears import elastic_joints, with_compliance_in_space
+from ..model.spatial_known_motion import KnownStates, States, required_forces, rotor_torques
 from ..model.spatial_model import SpatialModel
+from ..model.spatial_motors import MotorForces, motor_forces
 from ..model.spatial_transmission import compliance, rotor
+from ..model.spatial_tree import Node
 from .elastic_joints import GearSpring, gear_motion
 from .outcome import GearMotion, Outcome
-from .spatial_replay import motor_forces_of
+from .spatial_replay import supplied_in
+
+if TYPE_CHECKING:
+    from scipy.interpolate import BSpline
+
+REPEATS = 1e-12  # of what bodies feel of twists: a change that no longer counts
+CONTRACTS = 0.5  # of one change the next one at most, where rotors on outer bodies feel their own twist, or it is noise
 
 
-def gears_of_motion(
-    model: SpatialModel, state: States, time: Array, moments: Mapping[str, Array]
-) -> dict[str, GearMotion]:
-    """By joint with a gear that gives, where `model` takes it for rigid: see `elastic_joints.add_transmission`.
+class Supplied(NamedTuple):
+    """What motors and modes supply in a motion of the links: see `supplied_through_gears`.
 
-    `moments` (T, 1) by joint are what motors supply in the motion `state` at `time` (T,).
+    Attributes:
+        forces: τ, of motors in front of compliant gears, and F_p.
+        gears: by joint with such a gear.
+        felt: (T, n_v) along v, what the twists take of bodies that carry rotors.
+    """
+
+    forces: MotorForces
+    gears: Mapping[str, GearMotion]
+    felt: Array
+
+
+def supplied_through_gears(
+    model: SpatialModel,
+    state: States,
+    time: Array,
+    C_v: Array,
+    wanted: Array,
+    twists: Mapping[str, BSpline] | None = None,
+) -> Supplied:
+    """What carries the motion `state` at `time` (T,), for which rigid gears need `wanted` (T, n_v) with C_v of rows.
+
+    Compliant gears let their rotors turn by N δ more. Then the rotor needs J N² δ̈ of its motor (`elastic_joints`), and
+    the body that carries it, which turns with Ω_a, the moment J N (δ̈ z + δ̇ Ω_a × z): the rate of J N δ̇ z. That is
+    shared among motors and modes as all else. Moments in front of one gear contain what others add: all follow again,
+    gear by gear inwards, and until they repeat. `twists`: δ(t) by joint where they are known.
+
     Raises `InputError` for such a joint without a motor, or with a load.
     """
-    if model.tree.gears:
-        return {}
-    elastic = elastic_joints(model)
+    frames, felt = model.tree.frames(state.q), np.zeros_like(wanted)
+    elastic = [] if model.tree.gears else elastic_joints(model)
+    if not elastic:
+        return Supplied(motor_forces(model, state.q, frames, C_v, wanted), {}, felt)
+    _refuse_loads(model, elastic)
+    compliant, torques = with_compliance_in_space(model), rotor_torques(model, state, time)
+    firm = required_forces(compliant, _wound(compliant, state, None), time)
+    change = np.inf
+    for passes in count(1):
+        forces = motor_forces(model, state.q, frames, C_v, wanted + felt)
+        gears = {
+            node.joint.name: _gear(
+                model, state, time, node, torques[:, model.tree.index[node.body.name]], forces, twists
+            )
+            for node in elastic
+        }
+        needed = required_forces(compliant, _wound(compliant, state, gears), time) - firm
+        before, felt = felt, needed[:, : felt.shape[1]]
+        for gear in compliant.tree.gears:  # but for what their springs do along their own joints
+            of = gears[gear.joint.joint.name].twist
+            felt[:, gear.joint.v.start] += gear.sign * (gear.stiffness * of[:, 0] + gear.damping * of[:, 1])
+        change, last = float(np.abs(felt - before).max(initial=0.0)), change
+        if change <= REPEATS * float(np.abs(felt).max(initial=0.0)):
+            break
+        if passes > len(elastic) and change > CONTRACTS * last:
+            break
+    moments = {**forces.moments, **{joint: gear.moment[:, None] for joint, gear in gears.items()}}
+    return Supplied(replace(forces, moments=moments), gears, felt)
+
+
+def _refuse_loads(model: SpatialModel, elastic: Sequence[Node]) -> None:
     for load in model.scene.load:
         if any(load.joint == node.joint.name for node in elastic):
             raise InputError(
                 f"{model.scene.path}: expected no [[load]] on joints with stiffness in inverse analyses and"
                 f' equilibria, found one on "{load.joint}"'
             )
-    torques, found = rotor_torques(model, state, time) if elastic else np.zeros((0, 0)), {}
-    for node in elastic:
-        of_gear, (inertia, N) = compliance(node) or (0.0, 0.0), rotor(node)
-        sign, torque = -1.0 if node.backwards else 1.0, torques[:, model.tree.index[node.body.name]]
-        of_joint = ((state.q, node.q), (state.v, node.v), (state.a, node.v))
-        gamma = sign * np.column_stack([values[:, part.start] for values, part in of_joint])
-        where = f'{model.scene.path}: joint "{node.joint.name}"'
-        spring = GearSpring(*of_gear, inertia * N**2, where)
-        found[node.joint.name] = gear_motion(spring, time, moments[node.joint.name][:, 0], N * torque, gamma)
-    return found
+
+
+def _gear(
+    model: SpatialModel,
+    state: States,
+    time: Array,
+    node: Node,
+    torque: Array,
+    forces: MotorForces,
+    twists: Mapping[str, BSpline] | None,
+) -> GearMotion:
+    """Of the gear in the joint of `node`, whose rotor takes `torque` (T,), J u̇, where it is rigid."""
+    joint, (inertia, N) = node.joint.name, rotor(node)
+    where = f'{model.scene.path}: joint "{joint}"'
+    spring = GearSpring(*(compliance(node) or (0.0, 0.0)), inertia * N**2, where)
+    curve = None if twists is None else twists[joint]
+    return gear_motion(spring, time, forces.moments[joint][:, 0], N * torque, _along(node, state), curve)
+
+
+def _along(node: Node, state: States) -> Array:
+    """γ, its rate and acceleration (T, 3), of the joint as the scene has it."""
+    of_joint = ((state.q, node.q), (state.v, node.v), (state.a, node.v))
+    columns = np.column_stack([values[:, part.start] for values, part in of_joint])
+    return -columns if node.backwards else columns
+
+
+def _wound(compliant: SpatialModel, state: States, gears: Mapping[str, GearMotion] | None) -> KnownStates:
+    """The motion of links with motors as far ahead as `gears` say, or not at all."""
+    if gears is not None:
+        return KnownStates(*with_motors(compliant, (state.q, state.v, state.a), gears))
+    motors = np.array([_along(gear.joint, state) for gear in compliant.tree.gears]).transpose(2, 1, 0)
+    return KnownStates(*(np.hstack(pair) for pair in zip((state.q, state.v, state.a), motors, strict=True)))
 
 
 class WoundUp(NamedTuple):
@@ -56,12 +139,14 @@ class WoundUp(NamedTuple):
     Attributes:
         q, v, a: (T, n_q), (T, n_v), (T, n_v).
         gears: by joint, those that are firm in the motion; none where they give in it, too.
+        moments: (T, k) by joint, of all motors where gears are firm in the motion.
     """
 
     q: Array
     v: Array
     a: Array
     gears: Mapping[str, GearMotion]
+    moments: Mapping[str, Array]
 
 
 def wound_up(run: Outcome, model: SpatialModel) -> WoundUp:
@@ -70,15 +155,15 @@ def wound_up(run: Outcome, model: SpatialModel) -> WoundUp:
     Raises `InputError` where motors turn frames: what a gear carries then is not along its joint alone.
     """
     if not model.tree.gears or run.model.tree.gears:
-        return WoundUp(run.q, run.v, run.a, {})
+        return WoundUp(run.q, run.v, run.a, {}, {})
     if model.scene.motors == "frame":
         raise InputError(
             f'{model.scene.path}: motors: expected "section" where joints with stiffness are driven, controlled or'
             ' linear, found "frame"'
         )
-    gears = gears_of_motion(run.model, run, run.time, motor_forces_of(run).moments)
+    forces, gears, _ = supplied_through_gears(run.model, run, run.time, *supplied_in(run))
     q, v, a = with_motors(model, (run.q, run.v, run.a), gears)
-    return WoundUp(q, v, a, gears)
+    return WoundUp(q, v, a, gears, forces.moments)
 
 
 def with_motors(model: SpatialModel, firm: Sequence[Array], gears: Mapping[str, GearMotion]) -> list[Array]:

@@ -31,7 +31,7 @@ def link_loads_in_space(motion: SpatialMotion, bodies: Iterable[str]) -> dict[st
 
 def loads_in_equations(motion: SpatialMotion, bodies: Iterable[str]) -> dict[str, LinkLoads]:
     """Of each of `bodies`, as its equations of motion have them: forces along trajectories where these act."""
-    return _link_loads(motion, bodies, motion.forces)
+    return _link_loads(motion, bodies, motion.behind_gears.forces)
 
 
 def _link_loads(motion: SpatialMotion, bodies: Iterable[str], forces: MotionForces) -> dict[str, LinkLoads]:
@@ -80,8 +80,9 @@ def _with_motors(motion: SpatialMotion) -> MotionForces:
     model = motion.model
     loops, motors = int(model.loop_rows.sum()), sum(len(columns) for columns in model.motors.values())
     if not motion.is_prescribed or loops + motors != int(model.tree.joint_columns.sum()):
-        return motion.forces
+        return motion.behind_gears.forces
     total = required_forces(model, motion, motion.time)
     multipliers = np.zeros_like(motion.multipliers)
     multipliers[:, model.loop_rows] = -split_forces(model, motion.q, motion.frames, motion.rows[1], total).loops
-    return motion_forces(motion.system, motion, motion.time, multipliers)
+    behind = motion.behind_gears
+    return motion_forces(behind.system, behind, motion.time, multipliers)

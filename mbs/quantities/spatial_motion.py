@@ -6,15 +6,16 @@ All arrays are over the output times (T, …), SI units, global axes unless a na
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ...common.arrays import Array
 from ...common.rotations import quaternions
 from ..analysis.outcome import GearMotion
-from ..analysis.spatial_gears import gears_of_motion, with_motors
+from ..analysis.spatial_gears import Supplied, supplied_through_gears, with_motors
 from ..model.spatial_bending import bent_section
 from ..model.spatial_cut import CutCoordinate
 from ..model.spatial_cut_motion import CutMotion, cut_motions
@@ -22,11 +23,15 @@ from ..model.spatial_drives import Drives, PointDrive
 from ..model.spatial_gears import with_compliance_in_space
 from ..model.spatial_known_motion import MotionForces, motion_forces
 from ..model.spatial_model import SpatialModel, row_values, target_rates
-from ..model.spatial_motors import MotorForces, motor_forces, path_forces
+from ..model.spatial_motors import MotorForces, path_forces
 from ..model.spatial_payloads import turns_as_a_body
+from ..model.spatial_rows import SpatialRow
 from ..model.spatial_system import SpatialSystem
 from ..model.spatial_tree import Motion, Node
 from ..scene.spatial.trajectories import SpatialTrajectory
+
+if TYPE_CHECKING:
+    from scipy.interpolate import BSpline
 
 
 @dataclass(frozen=True)
@@ -60,7 +65,7 @@ class SpatialMotion:
     `required` (T, n_v): generalized forces that prescribed motion takes, of links that are held to a shape as well.
     `is_at_rest`: targets stand still, as in an equilibrium. `applied`: forces on points beside the scene's loads.
     `commanded`: moments (T, k) by joint that act along joints beside the scene's loads, N·m or N; `driving`: the same
-    before they change at an output, as accelerations are.
+    before they change at an output, as accelerations are. `twists`: of compliant gears, by joint, where they are known.
     """
 
     model: SpatialModel
@@ -74,6 +79,7 @@ class SpatialMotion:
     applied: tuple[PointDrive, ...] = ()
     commanded: Mapping[str, Array] = field(default_factory=dict)
     driving: Mapping[str, Array] = field(default_factory=dict)
+    twists: Mapping[str, BSpline] = field(default_factory=dict)
 
     @cached_property
     def frames(self) -> list[Motion]:
@@ -193,22 +199,24 @@ class SpatialMotion:
         return self.commanded if self.motor_forces is None else self.motor_forces.moments
 
     def _found_motor_forces(self) -> MotorForces | None:
+        return None if self._supplied is None else self._supplied.forces
+
+    @cached_property
+    def _supplied(self) -> Supplied | None:
         if not self.is_prescribed:
             return None
-        rigid = self._with_rigid_gears
-        behind = {joint: gear.moment[:, None] for joint, gear in self.gears.items()}
-        return replace(rigid, moments={**rigid.moments, **behind})
+        C_v, twists = self.rows[1], self.twists or None
+        return supplied_through_gears(self.model, self, self.time, C_v, self.supplied, twists)
 
-    @cached_property
-    def _with_rigid_gears(self) -> MotorForces:
-        return motor_forces(self.model, self.q, self.frames, self.rows[1], self.supplied)
+    @property
+    def gears(self) -> Mapping[str, GearMotion]:
+        """By joint, of inverse analyses and equilibria with compliant gears."""
+        return {} if self._supplied is None else self._supplied.gears
 
-    @cached_property
-    def gears(self) -> dict[str, GearMotion]:
-        """By joint, of inverse analyses and equilibria with gears that give."""
-        if not self.is_prescribed:
-            return {}
-        return gears_of_motion(self.model, self, self.time, self._with_rigid_gears.moments)
+    def felt(self, row: SpatialRow) -> Array:
+        """What the twists of compliant gears take of the force along the coordinate of a row (T,), N·m or N."""
+        none = np.zeros(len(self.time))
+        return none if self._supplied is None else row.sign * self._supplied.felt[:, row.coordinate]
 
     @cached_property
     def behind_gears(self) -> SpatialMotion:

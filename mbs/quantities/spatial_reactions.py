@@ -19,8 +19,9 @@ def reactions(motion: SpatialMotion) -> Mapping[str, Wrench]:
     A joint of the tree carries what its body and all that hangs on it need, less what else acts there and what drives
     the joint; one that closes a loop has its multipliers, and friction and loads along it.
     """
-    found, tree = _carried(motion, motion.forces), motion.model.tree
-    for one, on_a, on_b in motion.forces.along_cut():
+    forces, tree = motion.behind_gears.forces, motion.model.tree
+    found = _carried(motion, forces)
+    for one, on_a, on_b in forces.along_cut():
         joint = one.joint.name
         found[joint] = found[joint].plus(on_b if one.row.sign > 0 else on_a)
     for joint, along in _driving(motion).items():
@@ -70,7 +71,8 @@ def _driving(motion: SpatialMotion) -> dict[str, Array]:
     for row, size in zip(model.rows, -motion.multipliers.T, strict=True):
         if row.kind == "coordinate":
             joint = model.joint_of(row)
-            moments[joint] = motion.gears[joint].moment[:, None] if joint in motion.gears else size[:, None]
+            along = size + motion.felt(row)
+            moments[joint] = (motion.gears[joint].moment if joint in motion.gears else along)[:, None]
     for joint, moment in moments.items():
         node = model.tree.nodes[model.tree.carried[joint]]
         along = np.zeros((len(motion.time), node.v.stop - node.v.start))

@@ -1,10 +1,11 @@
-"""Gears that give, in space: two masses on a spring, momentum and energy, the plane's numbers, acting again."""
+"""Compliant gears, in space: two masses on a spring, momentum and energy, the plane's numbers, acting again."""
 
 import numpy as np
 import planar_in_space
 import pytest
 from checkpoints import CASES
 from scipy.integrate import simpson
+from scipy.interpolate import make_interp_spline
 from space import write_scene
 
 import ffrobot
@@ -14,6 +15,8 @@ J, N, K, C = 3e-3, 9.0, 500.0, 0.4
 GIVES = {"gear_ratio": N, "rotor_inertia": J, "stiffness": K}
 GEARED = {"gear_ratio": 60.0, "rotor_inertia": 2e-4, "stiffness": 3e3, "damping": 2.0}
 RUN = {"name": "run", "kind": "forward", "end": 1.0, "output_step": 0.002, "tolerance": 1e-10, "integrator": "dop853"}
+FIRM = {"gear_ratio": 30.0, "rotor_inertia": 1e-4}
+SOFTER = FIRM | {"stiffness": 1e3, "damping": 0.7}
 STRAIGHT, AXIS = [0.0, 0.0, 0.0], np.array([0.48, -0.6, 0.64])  # of length 1
 
 
@@ -100,11 +103,13 @@ def test_dampers_and_motors_make_up_the_energy(tmp_path):
 
 
 def test_planar_arm_with_gears_that_give_in_space(tmp_path):
-    """PCID, equilibrium and the forward run of the two-link arm: numbers of the plane."""
+    """Inverse analysis and equilibrium of the two-link arm: numbers of the plane, where the first link feels nothing.
+
+    The plane leaves out that this link carries the second rotor: the moment J N δ̈ of it is the first gear's, too.
+    """
     analyses = [
-        {"name": "inverse", "kind": "pcid", "end": 0.2, "output_step": 0.002, "tolerance": 1e-9},
+        {"name": "inverse", "kind": "fcid", "shape": "zero", "end": 1.0, "output_step": 0.005},
         {"name": "rest", "kind": "static"},
-        RUN | {"actuation": "inverse", "apply": "joints", "end": 0.2, "tolerance": 1e-9},
     ]
     planar = planar_in_space.read(CASES / "two_link" / "scene.toml")
     planar.pop("pzt", None)
@@ -115,25 +120,25 @@ def test_planar_arm_with_gears_that_give_in_space(tmp_path):
     with solve(planar, tmp_path, "planar") as plane, solve(spatial, tmp_path, "spatial") as space:
         for joint in ("O", "A"):
             for key in ("moment", "gear_moment", "motor_angle", "motor_rate"):
-                for analysis, share in (("inverse", 1e-6 if key in ("moment", "motor_rate") else 1e-8), ("rest", 1e-8)):
+                for analysis in ("inverse", "rest") if joint == "A" else ("rest",):
                     name = f"{analysis}/joints/{joint}/{key}"
                     least = 1e-6 * np.abs(plane[f"inverse/joints/O/{key}"]).max()
                     np.testing.assert_allclose(
-                        space[name], plane[name], atol=share * max(np.abs(plane[name]).max(), least), rtol=0
+                        space[name], plane[name], atol=1e-7 * max(np.abs(plane[name]).max(), least), rtol=0
                     )
-            judged = (one.attributes(f"inverse/feasibility/joints/{joint}")["speed"] for one in (space, plane))
-            np.testing.assert_allclose(*judged, rtol=1e-5)
-            for key in ("coordinate", "motor_angle"):
-                name = f"run/joints/{joint}/{key}"
-                np.testing.assert_allclose(space[name], plane[name], atol=1e-7, rtol=0)
-        name = "run/points/link2.tip/position"
-        np.testing.assert_allclose(space[name][:, :2], plane[name], atol=1e-7)
+        t, of_plane, of_space = (one[f"inverse/{key}"] for one, key in (
+            (plane, "time"), (plane, "joints/O/gear_moment"), (space, "joints/O/gear_moment")
+        ))  # fmt: skip
+        twist = plane["inverse/joints/A/motor_angle"] - plane["inverse/joints/A/coordinate"]
+        felt = 2e-4 * 60.0 * make_interp_spline(t, twist, k=5).derivative(2)(t)
+        assert np.abs(felt).max() > 1e-5
+        np.testing.assert_allclose(of_space - of_plane, felt, atol=1e-3 * np.abs(felt).max())
 
 
 def test_motors_behind_gears_carry_out_an_inverse_analysis(tmp_path):
-    """The 3R arm with rigid links: what the base feels of J N δ̈ besides is left out, 1/N of what the gear does."""
+    """The 3R arm with rigid links, rotors on links that move: their motors keep the tool on its path."""
     tables = planar_in_space.read(write_scene("arm3_line_undeformed", tmp_path))
-    stiff = {"gear_ratio": 100.0, "rotor_inertia": 1e-5, "stiffness": 2e3, "damping": 5.0}
+    stiff = {"gear_ratio": 20.0, "rotor_inertia": 2e-4, "stiffness": 2e3, "damping": 5.0}
     tables["joint"] = [joint | stiff for joint in tables["joint"]]
     tables["body"] = [
         body if "rigid" in body else {"name": body["name"], **_rod(0.3, 0.7 if body["name"] == "upper" else 0.6)}
@@ -148,16 +153,21 @@ def test_motors_behind_gears_carry_out_an_inverse_analysis(tmp_path):
             twist = found[f"inverse/joints/{joint}/motor_angle"] - found[f"inverse/joints/{joint}/coordinate"]
             assert np.abs(twist).max() > 5e-5
             off = found[f"run/joints/{joint}/coordinate"] - found[f"inverse/joints/{joint}/coordinate"][::2]
-            assert np.abs(off).max() < 0.02 * np.abs(twist).max()
+            assert np.abs(off).max() < 1e-9
 
 
+@pytest.mark.parametrize("second", [FIRM, SOFTER], ids=["firm", "soft"])
+@pytest.mark.parametrize("between", [("b.root", "a.tip"), ("a.tip", "b.root")])
 @pytest.mark.parametrize(("kind", "followed"), [("pcid", "joint"), ("pcid", "motor"), ("fcid", "joint")])
-def test_inverse_analyses_account_for_what_gears_store_and_lose(tmp_path, kind, followed):
-    """What motors put in is in kinetic, strain and gravitational energy, or dissipated; springs k δ² / 2, c δ̇²."""
-    soft, firm = GEARED | {"viscous_friction": 0.3}, {"gear_ratio": 30.0, "rotor_inertia": 1e-4}
+def test_inverse_analyses_account_for_what_gears_store_and_lose(tmp_path, kind, followed, between, second):
+    """What motors put in is in kinetic, strain and gravitational energy, or dissipated; springs k δ² / 2, c δ̇².
+
+    The rotor of the second joint sits on either body, both of which move.
+    """
+    soft = GEARED | {"viscous_friction": 0.3}
     joints = [
         revolute("O", "ground", "a.root", AXIS, **soft),
-        revolute("A", "b.root", "a.tip", [0.3, 1.0, -0.2], **firm, viscous_friction=0.1),
+        revolute("A", *between, [0.3, 1.0, -0.2], **second, viscous_friction=0.1),
     ]
     bodies = [rigid(name, [0.02, 0.03, 0.04], 1.5, [0.2, 0.05, -0.1]) for name in "ab"]
     paths = [
@@ -173,16 +183,34 @@ def test_inverse_analyses_account_for_what_gears_store_and_lose(tmp_path, kind, 
             found[f"run/joints/O/motor_{key}"] - found[f"run/joints/O/{of}"]
             for key, of in (("angle", "coordinate"), ("rate", "rate"))
         )
-        np.testing.assert_allclose(found["run/energy/strain"], 1500 * twist**2, rtol=1e-9, atol=1e-15)
+        if second is FIRM:
+            np.testing.assert_allclose(found["run/energy/strain"], 1500 * twist**2, rtol=1e-9, atol=1e-15)
         moment = 3e3 * twist + 2.0 * rate
         np.testing.assert_allclose(found["run/joints/O/gear_moment"], moment, atol=1e-9 * np.abs(moment).max())
         power = found["run/joints/O/moment"] * found["run/joints/O/motor_rate"]
-        power = power + found["run/joints/A/moment"] * found["run/joints/A/rate"]
+        power = (
+            power + found["run/joints/A/moment"] * found[f"run/joints/A/{'rate' if second is FIRM else 'motor_rate'}"]
+        )
         energy = sum(found[f"run/energy/{key}"] for key in ("kinetic", "strain", "gravitational"))
         left = power - found["run/energy/dissipated_power"]
         for last in (250, 500, 800):
             assert simpson(left[: last + 1], x=t[: last + 1]) == pytest.approx(energy[last] - energy[0], abs=1e-8)
         assert np.ptp(energy) > 1.0
+
+
+def test_motors_behind_gears_are_judged_between_outputs(tmp_path):
+    """γ = A sin ωt against inertia I: k δ = I γ̈ and τ = (I + J N²) γ̈ + J N² δ̈, θ̇_m = γ̇ + δ̇; peaks at no output."""
+    A, w, I = 0.3, 7.4, 0.4  # noqa: E741
+    joint = revolute("O", "ground", "b.root", AXIS, **GIVES, moment_limit=100.0, speed_limit=9.0)
+    path = {"name": "o", "joint": "O", "value": f"{A}*sin({w}*t)"}
+    run = {"name": "run", "kind": "fcid", "shape": "zero", "end": 1.0, "output_step": 0.05}
+    tables = scene([rigid("b", np.diag([I, I, I]).tolist())], [joint], run, trajectory=[path])
+    with solve(tables, tmp_path) as found:
+        judged = found.attributes("run/feasibility/joints/O")
+        moment = A * w**2 * abs(I + J * N**2 - J * N**2 * I * w**2 / K)
+        assert np.abs(found["run/joints/O/moment"]).max() < 0.998 * moment
+        assert judged["moment"] == pytest.approx(moment, rel=1e-4)
+        assert judged["speed"] == pytest.approx(A * w * (1 - I * w**2 / K), rel=1e-4)
 
 
 @pytest.mark.parametrize("tolerance", [1e-9, 1e-10])

@@ -74,6 +74,9 @@ ARMS = {
     ),
     "a compliant gear": ([("revolute", SOFT | ROUGH), ("revolute", ROUGH)], (), {}),
     "a compliant gear and a link that bends": ([("revolute", SOFT)], (0,), {}),
+    "compliant gears on links that move": (
+        [("revolute", SOFT), ("revolute", GEAR | ROUGH), ("revolute", SOFT | {"stiffness": 2e3})], (), {}
+    ),
     "motors that turn frames": ([("revolute", {}), ("prismatic", {})], (), {"motors": "frame"}),
 }  # fmt: skip
 
