@@ -61,4 +61,4 @@ _FIGURES = {
 
 if __name__ == "__main__":
     here = Path(__file__).parent
-    write_benchmark_tables(here / "benchmarks", here / "reference" / "measured.md")
+    write_benchmark_tables(here / "benchmarks", here / "developer" / "benchmark_records.md")

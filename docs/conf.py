@@ -39,7 +39,7 @@ def setup(app: Any) -> None:  # noqa: ANN401 (Sphinx)
 def _write_pages(folder: Path) -> None:
     write_key_tables(folder / "reference")
     write_case_pages(folder / "cases")
-    write_benchmark_tables(folder / "benchmarks", folder / "reference" / "measured.md")
+    write_benchmark_tables(folder / "benchmarks", folder / "developer" / "benchmark_records.md")
 
 
 def _read(app: Any, name: str, source: list[str]) -> None:  # noqa: ANN401 (Sphinx)

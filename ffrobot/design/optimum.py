@@ -230,7 +230,7 @@ def _state(found: Optimum, k: int) -> str:
     excess = limit.sense * (value - limit.bound) / limit.scale
     if excess > KEPT:
         return f"exceeded by {100 * excess:.3g} %"
-    return "reached" if found.optimality is not None and np.isfinite(found.optimality.limits[k]) else "kept"
+    return "active" if found.optimality is not None and np.isfinite(found.optimality.limits[k]) else "satisfied"
 
 
 def _trade(found: Optimum, bound: float, room: float, price: float, unit: str) -> str:

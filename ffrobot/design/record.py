@@ -24,7 +24,7 @@ COLUMNS = (
 
 
 HOW = {
-    "repeated steps": "reused time steps: differences of runs with the same steps",
+    "repeated steps": "repeated steps: differences of runs with the same time steps",
     "differences": "differences: central, extrapolated",
     "exact": "exact: by modes, without runs",
 }

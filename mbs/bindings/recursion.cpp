@@ -1,4 +1,4 @@
-// The recursion in joint coordinates (docs/recursion.md), for tests and for what is built upon it.
+// The recursion in joint coordinates (docs/developer/kernel.md), for tests and for what is built upon it.
 #include "core/recursion/derivatives.h"
 #include "core/recursion/independent_rows.h"
 #include "core/recursion/observe.h"

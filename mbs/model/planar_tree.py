@@ -1,4 +1,4 @@
-"""A planar mechanism in joint coordinates, as the core's recursion integrates it (docs/recursion.md).
+"""A planar mechanism in joint coordinates, as the core's recursion integrates it (docs/developer/kernel.md).
 
 It is made of what a `MechanismSystem` is made of: bodies hang on the joints of the spanning forest, the joints that
 close loops and the trajectories are rows, loads act along coordinates of joints or on points.

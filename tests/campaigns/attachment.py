@@ -105,7 +105,7 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--seconds", type=float, default=480.0, help="after which no further arm is begun")
     parser.add_argument("--plain", type=int, default=10, help="eigenmodes of the arm without attachment modes")
-    parser.add_argument("--record", action="store_true", help="keep the counts for docs/stability.md")
+    parser.add_argument("--record", action="store_true", help="keep the counts for docs/developer/stress_tests.md")
     parser.add_argument("--reference", type=int, default=10, help="eigenmodes that the reference keeps")
     asked, began = parser.parse_args(), time.perf_counter()
     rng = np.random.default_rng(asked.seed)
@@ -136,7 +136,8 @@ def main() -> None:
     report(np.array(plain_errors), np.array(starts), f"{asked.plain} eigenmodes alone")
     beyond, count = int((np.array(errors) > AIM).sum()), len(errors)
     found = (
-        f"{count - beyond} within {AIM:g} in every quantity, {beyond} beyond it (with a jolt at the start), which the"
+        f"{count - beyond} within {AIM:g} in every quantity, {beyond} beyond it (with a"
+        " step in acceleration at the start), which the"
         f" estimate said of {told}; {misjudged} errors above {TRUSTED:g} times the estimate; ten modes alone:"
         f" {int((np.array(plain_errors) <= AIM).sum())} within"
     )

@@ -102,7 +102,7 @@ def runs():
     section = {"motors": "section", "initial": REST}
     yield "arm, undeformed, smooth path", lambda: inverse_of(arm()), every
     yield "arm, static, smooth path", lambda: inverse_of(arm(initial=REST)), every
-    yield "arm, static, jolt", lambda: inverse_of(arm(initial=REST, trajectory=[JOLT])), common
+    yield "arm, static, step in acceleration", lambda: inverse_of(arm(initial=REST, trajectory=[JOLT])), common
     yield "arm, damped, undeformed", lambda: inverse_of(arm(damped(0.01))), common
     yield "arm, damped, static, jolt", lambda: inverse_of(arm(damped(0.01), initial=REST, trajectory=[JOLT])), (1e-4,)
     yield "stiff links, static", lambda: inverse_of(arm(arm_links(**STIFF), initial=REST)), every
@@ -115,9 +115,9 @@ def runs():
     yield "slider-crank, stiff, damped", lambda: inverse_of(slider_crank(3000.0, 0.02)), common
     yield "chain of two, soft", lambda: motion_of(chain(2, 10.0, 0.0), 0.3), (1e-4,)
     yield "chain of three, damped", lambda: motion_of(chain(3, 100.0, 0.02), 0.3), common
-    yield "replay, all forces", lambda: replay_of(arm(damped(0.01), initial=REST), "trajectory"), (1e-4,)
-    yield "replay, moments alone", lambda: replay_of(arm(damped(0.01), **section), "joints"), common
-    yield "replay of motors-only moments", lambda: motors_only_replay_of(arm(damped(0.02), **section)), every
+    yield "forward run, all forces", lambda: replay_of(arm(damped(0.01), initial=REST), "trajectory"), (1e-4,)
+    yield "forward run, torques alone", lambda: replay_of(arm(damped(0.01), **section), "joints"), common
+    yield "forward run under motors-only torques", lambda: motors_only_replay_of(arm(damped(0.02), **section)), every
 
 
 def measured(run, tolerance, repeat):
@@ -161,7 +161,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("file", type=Path, help="a JSON record per run; those in it are not run again")
     parser.add_argument("--repeat", type=int, default=3)
-    parser.add_argument("--record", action="store_true", help="write the counts, for docs/stability.md")
+    parser.add_argument("--record", action="store_true", help="write the counts, for docs/developer/stress_tests.md")
     asked = parser.parse_args()
     text = asked.file.read_text() if asked.file.exists() else ""
     records = [json.loads(line) for line in text.splitlines()]

@@ -110,7 +110,7 @@ def outcome(path: Path) -> str:
     _, status = os.waitpid(child, 0)
     if os.WIFSIGNALED(status):
         return "hung" if os.WTERMSIG(status) == signal.SIGALRM else "crashed"
-    return {0: "read as if sound", 2: "refused"}.get(os.WEXITSTATUS(status), "other error")
+    return {0: "read as if sound", 2: "rejected"}.get(os.WEXITSTATUS(status), "other error")
 
 
 def main() -> None:
@@ -119,7 +119,9 @@ def main() -> None:
     parser.add_argument("files", metavar="FILE.h5", type=Path, nargs="+")
     parser.add_argument("--tries", type=int, default=1000)
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--record", action="store_true", help="write what was found, for docs/stability.md")
+    parser.add_argument(
+        "--record", action="store_true", help="write what was found, for docs/developer/stress_tests.md"
+    )
     asked = parser.parse_args()
     chance, found = random.Random(asked.seed), Counter[str]()
     damage = Damage(chance)
@@ -133,9 +135,9 @@ def main() -> None:
             path.write_bytes(content)
             end = outcome(path) if content != whole else "unchanged"
             found[end] += 1
-            if end not in ("refused", "unchanged"):
+            if end not in ("rejected", "unchanged"):
                 print(f"{number}: {way.__name__}: {end}", flush=True)
-    ends = ("refused", "unchanged", "read as if sound", "crashed", "hung", "other error")
+    ends = ("rejected", "unchanged", "read as if sound", "crashed", "hung", "other error")
     counts = ", ".join(f"{found[end]} × {end}" for end in ends)
     print(f"{asked.tries} damaged files: {counts}")
     if asked.record:

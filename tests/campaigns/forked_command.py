@@ -12,7 +12,7 @@ from pathlib import Path
 CPU_TIME = 60  # s for one command
 PATIENCE = 600  # s of wall time: something waits for ever
 MEMORY = 8 << 30  # bytes of address space
-GOOD = ("solved", "refused", "stopped")
+GOOD = ("solved", "rejected", "stopped")
 BAD = ("traceback", "crash", "hang", "no file named", "noise")
 PROGRESS = re.compile(r"ffrobot: .* \(\d+ s\)")  # what commands tell of long work, now and then
 LOADED_ONCE = (
@@ -91,4 +91,4 @@ def outcome(code: int, told: str, files: list[str]) -> str:
         return "no file named"
     if not lines[0].startswith("ffrobot: "):
         return "noise"
-    return "refused" if code == 2 else "stopped"
+    return "rejected" if code == 2 else "stopped"

@@ -184,7 +184,9 @@ def main() -> None:
     parser.add_argument("--count", type=int, default=100)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--kind", action="append", choices=KINDS, help="only this one; repeatable")
-    parser.add_argument("--record", action="store_true", help="write what was found, for docs/stability.md")
+    parser.add_argument(
+        "--record", action="store_true", help="write what was found, for docs/developer/stress_tests.md"
+    )
     options = parser.parse_args()
     load_once()
     kinds = options.kind or KINDS

@@ -31,7 +31,7 @@ from ffrobot.mesh.part import part_mesh
 from ffrobot.mesh.records import SolidGeometry, SolidMeshRecord
 
 SECONDS = 240
-TOLD = ("same part", "refused", "told to differ", "differs")
+TOLD = ("same part", "rejected", "told to differ", "differs")
 BAD = ("traceback", "crash", "hang", "noise", "code ran")
 
 
@@ -167,7 +167,7 @@ def _answer(path: Path) -> tuple[str, str]:
         return (
             "hang"
             if "found no end" in str(error) and "STEP" not in str(error) and path.suffix != ".step"
-            else "refused"
+            else "rejected"
         ), str(error)
     except BaseException:
         return "traceback", traceback.format_exc()[-600:]
@@ -186,7 +186,9 @@ def main() -> None:
     parser.add_argument("--count", type=int, default=100)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--kind", action="append", help="only files of this name or ending; repeatable")
-    parser.add_argument("--record", action="store_true", help="write what was found, for docs/stability.md")
+    parser.add_argument(
+        "--record", action="store_true", help="write what was found, for docs/developer/stress_tests.md"
+    )
     asked = parser.parse_args()
     counts: Counter[str] = Counter()
     with tempfile.TemporaryDirectory() as temporary:

@@ -198,7 +198,9 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--case", action="append", help="only this one; repeatable")
     parser.add_argument("--folder", type=Path, help="where the cases and their links, ready for use, are and stay")
-    parser.add_argument("--record", action="store_true", help="write what was found, for docs/stability.md")
+    parser.add_argument(
+        "--record", action="store_true", help="write what was found, for docs/developer/stress_tests.md"
+    )
     asked = parser.parse_args()
     load_once()
     found = campaign(asked.seed, asked.count, asked.case, asked.folder)
@@ -210,7 +212,7 @@ def main() -> None:
             kinds[key.partition(": ")[2]] += number
         tried = (
             f"{asked.count} single changes of keys and text in scene, link and figure files of all cases, and of"
-            f" {len(IN_SPACE)} scenes in space, cut short;"
+            f" {len(IN_SPACE)} 3D scenes, cut short;"
             f" {found.counts.total()} commands: solve, and those that read results"
         )
         record("mutations", tried=tried, found=", ".join(f"{kinds[kind]} × {kind}" for kind in (*GOOD, *BAD)))

@@ -1,4 +1,4 @@
-"""What a campaign has found, for the page docs/stability.md: one file each in `records/`, written where asked for.
+"""What a campaign found, for docs/developer/stress_tests.md: a file each in `records/`, written where asked for.
 
 A campaign (a script in this folder, run by hand with seeds of its own) takes an option `--record` and ends with
 

@@ -46,7 +46,7 @@ def solved(scene: Scene, stiffening: bool) -> Solution | str:
     try:
         return solve(scene.model_copy(update={"geometric_stiffening": stiffening}), keep=kept.append)
     except InputError:
-        return "refused"
+        return "rejected"
     except FfrobotError as error:
         return kept[-1] if kept else str(error).splitlines()[0]
 
@@ -75,15 +75,15 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--count", type=int, default=36, help="random robots")
     parser.add_argument("--cases", type=Path, help="folder of cases")
-    parser.add_argument("--record", action="store_true", help="keep the counts for docs/stability.md")
+    parser.add_argument("--record", action="store_true", help="keep the counts for docs/developer/stress_tests.md")
     asked = parser.parse_args()
     tried = failed = refused = above = better = 0
     for name, scene in scenes(asked):
         off, on = solved(scene, False), solved(scene, True)
         tried += 1
         if isinstance(on, str) and not isinstance(off, str):
-            refused += on == "refused"
-            failed += on != "refused"
+            refused += on == "rejected"
+            failed += on != "rejected"
             print(f"{name}: {on}", flush=True)
             continue
         before, after = ends(off), ends(on)

@@ -177,7 +177,7 @@ def main():
     parser.add_argument("--count", type=int, default=200, help="robots of each seed")
     parser.add_argument("--seeds", type=int, nargs="+", default=[1])
     parser.add_argument("--integrators", choices=list(RUNS), nargs="+")
-    parser.add_argument("--record", action="store_true", help="write the counts, for docs/stability.md")
+    parser.add_argument("--record", action="store_true", help="write the counts, for docs/developer/stress_tests.md")
     asked = parser.parse_args()
     of_all, exact, attempt = (
         (RUNS_IN_SPACE, EXACT_IN_SPACE, try_spatial_robot) if asked.space else (RUNS, EXACT, try_robot)

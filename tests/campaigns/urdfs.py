@@ -82,19 +82,19 @@ def main():
                 error, count = difference(urdf, Path(folder) / "scene", rng)
             except FfrobotError as refusal:
                 refused.append(urdf)
-                print(f"{urdf.name}: refused: {str(refusal).splitlines()[0].partition(': ')[2]}")
+                print(f"{urdf.name}: rejected: {str(refusal).splitlines()[0].partition(': ')[2]}")
                 continue
             equal += error < EQUAL
             wrong += not error < EQUAL
             worst = max(worst, error)
             print(f"{urdf.name}: {count} joints, {error:.1e}", flush=True)
-    print(f"{equal} equal, {wrong} different, {len(refused)} refused; largest difference {worst:.1e}")
+    print(f"{equal} equal, {wrong} different, {len(refused)} rejected; largest difference {worst:.1e}")
     if arguments.record:
         record(
             "urdfs",
             tried=f"{len(files)} URDFs of example-robot-data 6.0.0 through import and solve, all joints moving at once"
-            f" (or {MOST} of them, drawn), motor moments against Newton and Euler on the XML",
-            found=f"{equal} equal to {worst:.0e} of the largest moment, {wrong} different, {len(refused)} refused, all"
+            f" (or {MOST} of them, drawn), motor torques against Newton and Euler on the XML",
+            found=f"{equal} equal to {worst:.0e} of the largest moment, {wrong} different, {len(refused)} rejected, all"
             " with the reason: no link, nothing with mass that moves, inertias of zero or that no body has, a mimic of"
             " a joint that is not there; 0 × traceback",
         )

@@ -5,7 +5,7 @@ solved by Gauss: nothing is shared with the core but the invariants of the links
 complex number and H_kl = ∫ρ Φ̄_k Φ_l = m_xy + iS̃, ∫ρ z̄ Φ = j + ih, all blocks of the mass matrix and Q_v are sums
 of these (docs/theory.md; Shabana, Dynamics of Multibody Systems, ch. 5).
 
-    python tests/mbs/exact_chain.py     the table of docs/recursion.md, a few minutes
+    python tests/mbs/exact_chain.py     the table of docs/developer/kernel.md, a few minutes
 """
 
 import mpmath

@@ -10,29 +10,29 @@ from pathlib import Path
 
 ROWS = Path(__file__).with_name("table.json")
 RECORDS = Path(__file__).parents[1] / "campaigns" / "records"
-PAGE = Path(__file__).parents[2] / "docs" / "stability.md"
+PAGE = Path(__file__).parents[2] / "docs" / "developer" / "stress_tests.md"
 
 SAME = 0.1  # relative difference within which numbers of another machine count as the same
 ROUNDING = 1e-12
 
-HEAD = """# Stability
+HEAD = """# Stress tests
 
-Where the solver was pushed until it broke: what was tried, what was found, how it ends. `tests/stress` runs every row
-and compares; lengths in m, times in s. The page is written by the tests:
+Each row is an input that pushes the solver to its limit, the limit found, and the end of the run. `tests/stress` runs
+every row and compares; lengths in m, times in s. The tests write this page:
 
     pytest tests/stress                        what every change is tested with
     pytest tests/stress --long                 the rows marked with a star as well, some minutes
-    pytest tests/stress --long --write-table   writes this page from what was found
+    pytest tests/stress --long --write-table   writes this page
 
 Units of length, mass and time are the user's: nothing is compared with a meter, a kilogram or a second. A run that does
-not reach its end keeps its results up to there; the attributes `status` and `cause` of the results file say how and
-why it ended, as does the message.
+not reach its end keeps its results up to there; the attributes `status` and `cause` of the results file, and the
+message, state how and why it ended.
 """
 
 CAMPAIGNS = """
 ## Campaigns
 
-Random inputs, damage and signals, by hand, with other seeds each time; no test repeats them. The last run of each, with
+Random inputs, damage and signals, started manually with new seeds; no test repeats them. The last run of each, with
 its commit:
 
 | tried | found | command | when |

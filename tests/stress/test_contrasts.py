@@ -30,7 +30,7 @@ def test_modes(beams, record):
     # DOP853 is at its limit of stability here: where its steps fall, and what they err by, hangs on rounding.
     record(
         GROUP,
-        "5 and 40 modes a link, static start",
+        "5 and 40 modes per link, static start",
         "forces of 5 modes: integrators differ by at most {integrators}, from 40 modes by {truncation}",
         integrators=at_most(2e-5, relative(one, other)),
         truncation=truncation,
@@ -42,7 +42,7 @@ def test_200_modes(beams, record):
     """Up to 8.8e6 rad/s, and 1.3e-9 of the inertia is left after the modes."""
     difference = relative(forces(beams(modes=100)), forces(beams(modes=200)))
     assert difference < 1e-4
-    record(GROUP, "100 and 200 modes a link, static start", "forces differ by {by}", by=difference)
+    record(GROUP, "100 and 200 modes per link, static start", "forces differ by {by}", by=difference)
 
 
 @pytest.mark.parametrize(

@@ -117,7 +117,7 @@ def test_replayed_actuation(record):
     assert rate == pytest.approx(expected, rel=0.3)
     record(
         GROUP,
-        "PCID round a circle, its moments and voltages replayed at a tolerance of 1e-6",
+        "PCID round a circle, forward simulation under its torques and voltages at a tolerance of 1e-6",
         "departs by at most {second} rad after 1 s, grows at {rate} 1/s, linearised {expected} 1/s, ends at t = {t}",
         'diverged; “"link2" is bent by … of its length …”',
         second=at_most(1e-10, departure[10]),  # rounding, grown for a second

@@ -50,7 +50,7 @@ def inflection(link):
 def test_overlapping(link, record):
     with pytest.raises(InputError, match=r"expected patches side by side, found patch 1 .* on the same place"):
         patches(link, centers=(0.1, 0.12, 0.5, 0.7, 0.9))
-    record(GROUP, "patches that overlap", "refused", "input error: which, and where")
+    record(GROUP, "patches that overlap", "rejected", "input error: which, and where")
 
 
 LEFT = {1e-3: 1e-11, 1e-6: 1e-8, 1e-9: 1e-6}  # the condition number times rounding
@@ -119,6 +119,6 @@ def test_fewer_patches_than_modes(link, record):
     record(
         GROUP,
         "three patches for five modes",
-        "refused, or least squares",
+        "rejected, or least squares",
         "input error with advice; residual in the results",
     )

@@ -132,7 +132,7 @@ def test_they_are_in_the_table(record):
     assert min(worst.values()) > 0.0
     record(
         GROUP,
-        f"{SCENES} random mechanisms of the zoo each: equations of motion, Jacobians, power; 6 arms: PCID → forward",
+        f"{SCENES} random mechanisms each: equations of motion, Jacobians, power; 6 arms: PCID → forward",
         "at most: residuals {residual}, C_q against differences {jacobian}, power {power}, round trip {round_trip}",
         **{what: at_most(BOUNDS[what], value) for what, value in worst.items()},
     )

@@ -40,7 +40,7 @@ def test_jumps_are_refused(x, quantity, kind, record):
     record(
         GROUP,
         "a path with a jump, a kink or a pole, PCID and FCID",
-        "refused before the run",
+        "rejected before the run",
         "input error: component, “expected a continuous value (velocity), found a jump from … to … at t = …”",
     )
 
@@ -80,7 +80,7 @@ def test_load_that_jumps(tolerance, record):
     errors = {name: relative(outcome.lambda_, exact.lambda_) for name, outcome in runs.items()}
     record(
         GROUP,
-        f"a joint moment that jumps by 20 N·m, tolerance {tolerance:g}",
+        f"a joint torque that jumps by 20 N·m, tolerance {tolerance:g}",
         "forces err by at most {dop853} (DOP853), {dopri5} (DOPRI5), {radau} (Radau IIA)",
         **{name: at_most(tolerance, error) for name, error in errors.items()},
     )

@@ -47,7 +47,7 @@ def test_path_leaves_the_workspace(beyond, record):
     record(
         GROUP,
         f"path of the tip leads {beyond:g} m out of reach",
-        "refused before the run",
+        "rejected before the run",
         "input error: trajectory, time, “cannot reach” or “reach only in a singular configuration”",
     )
 
@@ -62,7 +62,7 @@ def test_slider_through_dead_centre(speed, flexible, record):
     record(
         GROUP,
         "slider-crank driven at the slider through a dead centre, rod rigid or flexible",
-        "refused before the run, its time to 3e-6 s",
+        "rejected before the run, its time to 3e-6 s",
         "input error: trajectory, time, “… (stretched, folded, at a dead centre) …”",
     )
 
@@ -90,7 +90,7 @@ def test_starts_at_dead_centre(record):
     record(
         GROUP,
         "slider-crank starts at a dead centre, driven at the slider",
-        "refused",
+        "rejected",
         "input error: initial, trajectory",
     )
 
@@ -102,7 +102,7 @@ def test_parallelogram_turns_flat(record):
     record(
         GROUP,
         "flexible parallelogram driven through its flat position",
-        "refused before the run",
+        "rejected before the run",
         "input error: trajectory, time, “reach only in a singular configuration”",
     )
 
@@ -131,7 +131,7 @@ def test_third_crank_of_rods(record):
     record(
         GROUP,
         "parallelogram with a third crank, rigid links",
-        "refused",
+        "rejected",
         "input error: “1 too many among joint … in this geometry (parallel cranks?) …”",
     )
 
@@ -147,7 +147,7 @@ def test_welded_twice(record):
     welds = [{"name": name, "type": "weld", "between": ("link1.tip", "link2.root")} for name in ("W", "again")]
     model = make_model(arm_links(), joint=[revolute("O", "ground", "link1.root"), *welds])
     refused(lambda: free_run(model), "3 too many among", 'joint "W"', 'joint "again"')
-    record(GROUP, "two links welded twice", "refused", 'input error: “3 too many among joint "W", x; …”')
+    record(GROUP, "two links welded twice", "rejected", 'input error: “3 too many among joint "W", x; …”')
 
 
 def test_welded_at_both_ends(record):
@@ -156,4 +156,4 @@ def test_welded_at_both_ends(record):
         {"name": "tip", "type": "weld", "between": ("ground", "beam.tip"), "at": (1.0, 0.0)},
     ]
     refused(lambda: free_run(make_model([rod("beam", 1.0, 1.0)], joint=joints)), "3 too many among")
-    record(GROUP, "a rod welded to the ground at both ends", "refused", "input error: “3 too many among …”")
+    record(GROUP, "a rod welded to the ground at both ends", "rejected", "input error: “3 too many among …”")

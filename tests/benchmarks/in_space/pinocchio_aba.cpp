@@ -1,5 +1,5 @@
 // Pinocchio's articulated-body algorithm of a rigid chain of 6 revolute joints: `REPETITIONS` prints microseconds of
-// the fastest of 20 rounds, in axes of the world and of the bodies. How it is compiled: docs/recursion.md.
+// the fastest of 20 rounds, in axes of the world and of the bodies. How it is compiled: docs/developer/kernel.md.
 #include <pinocchio/algorithm/aba.hpp>
 #include <pinocchio/multibody.hpp>
 

@@ -6,7 +6,7 @@ from exact_chain import errors
 STATES = 4
 
 
-# λ, then q̈: four times the worst of 20 states (docs/recursion.md)
+# λ, then q̈: four times the worst of 20 states (docs/developer/kernel.md)
 @pytest.mark.parametrize(
     ("count", "condition", "modes", "of_lambda", "of_q"),
     [
