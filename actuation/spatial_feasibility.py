@@ -68,13 +68,13 @@ class UnsuppliedInSpace:
             )
         ]
         return (
-            f"nothing supplies modal forces of {'; '.join(links)}, quasi-static, where {_whoever(self.with_patches)}:"
-            " patches ([[pzt]]) bend links in two planes, fibers at an angle twist them"
+            f"no actuator provides all modal forces required on {'; '.join(links)}, quasi-static, with"
+            f" {_whoever(self.with_patches)}. Patches ([[pzt]]) bend links in two planes, fibers at an angle twist them"
         )
 
 
 def _whoever(with_patches: bool) -> str:
-    return "motors and patches do what they can" if with_patches else "motors act alone"
+    return "motors and patches within their limits" if with_patches else "motors only"
 
 
 def links_in_motion(

@@ -78,9 +78,9 @@ class PatchArray(Reach):
         if not np.isfinite(self.authority).all():
             return f"{self.layout.label}: stiffness ratio ψ not known: the modal body has no rigidities"
         psi, authority = (_span(values) for values in (self.stiffness_ratio, self.authority))
-        felt = "which counts" if self.layout.adds_stiffness else "left out: structural = false"
+        felt = "included in the model" if self.layout.adds_stiffness else "not included (structural = false)"
         what = "twist" if self.layout.acts_in == "twist" else "curvature"
-        left = f"their own stiffness leaves {authority} of the {what}, {felt}"
+        left = f"patch stiffness reduces the induced {what} to {authority} of its value, {felt}"
         return f"{self.layout.label}: stiffness ratio ψ {psi}: {left}"
 
     @property

@@ -61,7 +61,7 @@ def import_(
     fix_inertia: bool,
     keep_rest: bool,
 ) -> None:
-    """Make a scene in space of a robot description (URDF), a modal body or waypoints of those of other programs.
+    """Import a robot description (URDF) as a 3D scene, or flexible bodies or motions of other programs.
 
     DIR/scene.toml has bodies and joints. Links are rigid with their <inertial> unless --flexible names a link file.
     Fixed joints merge links to one body, or fix them to the ground. Append trajectories and analyses yourself.

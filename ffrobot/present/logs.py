@@ -61,7 +61,9 @@ def _allow_python(context: click.Context, parameter: click.Parameter, paths: tup
 def logging_options(command: F) -> F:
     """Give a command the options `--verbose` and `--log-file`."""
     path = click.Path(dir_okay=False, writable=True, path_type=Path)
-    verbose = click.option("-v", "--verbose", is_flag=True, expose_value=False, callback=_verbose, help="Tell more.")
+    verbose = click.option(
+        "-v", "--verbose", is_flag=True, expose_value=False, callback=_verbose, help="Verbose output."
+    )
     log_file = click.option(
         "--log-file", metavar="FILE", type=path, expose_value=False, callback=_log_file, help="Append a log to FILE."
     )

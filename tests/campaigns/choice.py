@@ -104,7 +104,11 @@ def runs():
     yield "arm, static, smooth path", lambda: inverse_of(arm(initial=REST)), every
     yield "arm, static, step in acceleration", lambda: inverse_of(arm(initial=REST, trajectory=[JOLT])), common
     yield "arm, damped, undeformed", lambda: inverse_of(arm(damped(0.01))), common
-    yield "arm, damped, static, jolt", lambda: inverse_of(arm(damped(0.01), initial=REST, trajectory=[JOLT])), (1e-4,)
+    yield (
+        "arm, damped, static, step in acceleration",
+        lambda: inverse_of(arm(damped(0.01), initial=REST, trajectory=[JOLT])),
+        (1e-4,),
+    )
     yield "stiff links, static", lambda: inverse_of(arm(arm_links(**STIFF), initial=REST)), every
     yield "stiff links, damped, undeformed", lambda: inverse_of(arm(damped(0.02, **STIFF))), common
     yield "12 modes, static", lambda: inverse_of(arm(arm_links(**MANY), initial=REST)), common

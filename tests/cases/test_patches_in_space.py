@@ -247,9 +247,9 @@ def test_what_no_patch_reaches_is_told_mode_by_mode(tmp_path, ffrobot):
         np.testing.assert_allclose(left[:, torsion], force[:, torsion], rtol=1e-9)
         np.testing.assert_array_equal(left, results["inverse/pzt/other/residual_force"])
         assert results.verdict["inverse"].feasible is False
-        (told,) = (text for text in results.warnings["inverse"] if "nothing supplies" in text)
-        assert "modal forces of link (torsion), off by" in told
-    assert "nothing supplies modal forces" in " ".join(done.stdout.split())
+        (told,) = (text for text in results.warnings["inverse"] if "no actuator provides" in text)
+        assert "modal forces required on link (torsion), off by" in told
+    assert "no actuator provides all modal forces" in " ".join(done.stdout.split())
 
 
 @pytest.mark.parametrize(

@@ -90,7 +90,9 @@ def test_pages_that_are_generated_are_those_in_the_repository(monkeypatch):
     pages = {**key_pages(), measured.name: benchmark_page(DOCS / "benchmarks", measured)}
     assert (DOCS / "cases.md").read_text(encoding="utf-8") == gallery_page(), "python docs/gallery.py"
     for name, text in pages.items():
-        assert (measured if name == measured.name else DOCS / "reference" / name).read_text(encoding="utf-8") == text, name
+        assert (measured if name == measured.name else DOCS / "reference" / name).read_text(encoding="utf-8") == text, (
+            name
+        )
 
 
 def test_first_page_lists_all_pages_for_readers_of_the_repository():

@@ -83,7 +83,7 @@ def test_cylinders_where_meshes_are_missing(tmp_path):
         link("base"), shaped("arm", '<mesh filename="package://gone/arm.stl"/>'), link("hand"),
         joint("j", "base", "arm"), joint("k", "arm", "hand", origin='xyz="0.3 0 0.4"'),
     )  # fmt: skip
-    with pytest.raises(InputError, match=r"expected its mesh beside the URDF, found no file .*--radius"):
+    with pytest.raises(InputError, match=r"expected its mesh next to the URDF, found no file .*--radius"):
         imported(tmp_path, *parts, filling=Filling(RHO))
     scene = imported(tmp_path, *parts, filling=Filling(RHO, 0.05)).scene
     rigid = scene["body"][0]["rigid"]

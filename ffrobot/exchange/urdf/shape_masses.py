@@ -122,7 +122,7 @@ def _cylinder_along(way: Array, radius: float, density: float) -> Inertial:
 def _of_mesh(shape: MeshFile, urdf: Path, density: float, label: str) -> tuple[Inertial, bool]:
     if (path := mesh_path(shape.filename, urdf)) is None:
         raise InputError(
-            f"{label}: expected its mesh beside the URDF, found no file {shown(shape.filename)}; --radius takes"
+            f"{label}: expected its mesh next to the URDF, found no file {shown(shape.filename)}; --radius takes"
             " cylinders where there are no meshes"
         )
     try:
