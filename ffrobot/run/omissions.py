@@ -38,7 +38,7 @@ def omissions(scene: Scene, bodies: Mapping[str, LoadedBody]) -> Iterator[str]:
     rigid = [name for name in bodies if name not in flexible]
     if rigid:
         yield f"modal coordinates of {', '.join(rigid)}, rigid"
-    yield "coordinates out of the plane"
+    yield "out-of-plane motion"
     stiff = [name for name, body in bodies.items() if body.modal is not None and _is_rigid_along(body.planar)]
     if stiff:
         yield f"axial deformation of {', '.join(stiff)}: no axial modes in [modes] family"
@@ -66,6 +66,6 @@ def _modes(name: str, planar: PlanarBody, modal: ModalBody) -> Iterator[str]:
     if idle.size:
         families = Counter(modal.family[k] for k in idle)
         named = ", ".join(f"{count} {family}" for family, count in families.items())
-        yield f"{name}: {idle.size} of {modal.mode_count} modes, which do not move in the plane ({named})"
+        yield f"{name}: {idle.size} of {modal.mode_count} modes, without in-plane motion ({named})"
     if planar.reduction is not None:
         yield f"{name}: all modes but {modes_kept(planar)}"
