@@ -16,7 +16,7 @@ from ..model.spatial_model import SpatialModel
 from ..model.spatial_system import SpatialSystem
 from ..scene.analysis import IntegratedAnalysis
 from ..solve.integrators import beyond_rounding, integration_controls, with_steps_of
-from ..solve.spatial_diagnosis import cause_of_short_steps
+from ..solve.spatial_diagnosis import find_cause_in_space
 from ..solve.spatial_integrators import choose_integrator_in_space
 from ..solve.spatial_limits import left_ranges, watch_limits
 from ..solve.spatial_posture import NEARLY_SINGULAR, SINGULAR, robot_size, told_posture
@@ -96,8 +96,8 @@ def spatial_drive(
     in_posture = _ends_in_posture(run)
     posture = told_posture(model, run.least_ratio, run.singular_at, run.singular_posture, is_end=in_posture)
     cause = f"{posture}: move the path, or start in another posture" if in_posture else ""
-    if not in_posture and STATUS[run.status] == "step underflow":
-        cause = cause_of_short_steps(system, analysis, integrator, run)
+    if not in_posture and STATUS[run.status] not in ("completed", "interrupted"):
+        cause = find_cause_in_space(system, analysis, integrator, run)
     scatter = beyond_rounding(analysis.tolerance, run.rounding)
     told = (*warnings, *(text for text in (posture, scatter) if text))
     told = (*told, *left_ranges(model, run.ranges, motion.time, motion.q, motion.v))

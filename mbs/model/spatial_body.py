@@ -104,6 +104,11 @@ class SpatialBody:
         return J
 
     @property
+    def largest_moment(self) -> float:
+        """Of inertia about the origin of the frame, kg·m²; with |p|² as large the body is bent by about its length."""
+        return max(float(np.linalg.eigvalsh(self.inertia)[-1]), 0.0)
+
+    @property
     def inertia_slope(self) -> Array:
         """J1 (3, 3, n): J1_ij = 2δ_ij tr Ī − Ī_ij − Ī_ji."""
         slope: Array = 2 * np.einsum("ij,kkn->ijn", np.eye(3), self.I_bar) - self.I_bar - self.I_bar.transpose(1, 0, 2)

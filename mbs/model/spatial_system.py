@@ -237,6 +237,7 @@ class SpatialSystem:
             motor, joint = ((node.q.start, node.v.start) for node in (gear.motor, gear.joint))
             scene.add_gear(motor, joint, gear.sign, gear.stiffness, gear.damping)
         self._act_along_cut(scene, self._parts.cut if plane is None else plane.cut)
+        scene.most_bent = [node.body.largest_moment for node in self.model.tree.nodes]
         for number, law in self._turning:
             scene.turn_marker(number, _turning_law(law))
         return scene

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from .position import frame_gradients
 from .state import State
 
 NEARLY_SINGULAR = 1e-3  # ratio of singular values of C_q; a motion that only comes near it has no trouble there
-FAR_BENT = 0.5  # of a link's length, in the mean
+FAR_BENT = 0.5  # of a link's radius of gyration, in the mean
 
 
 def find_cause(assembly: MechanismSystem, t: float, state: State) -> str:
@@ -25,18 +25,23 @@ def find_cause(assembly: MechanismSystem, t: float, state: State) -> str:
     jumps, constraints that turn singular.
     """
     return (
-        _not_a_number(assembly, t, state)
-        or _bent(assembly, state.q)
+        not_a_number(
+            ((constraint.measure.label, constraint.target) for constraint in assembly.constraints),
+            lambda: PlanarTree(assembly).evaluate(t, state.q, state.v)[0],
+            t,
+        )
+        or too_far_bent(_links(assembly, state.q))
         or load_jump(_loads(assembly), t)
         or _singular(assembly, t, state.q)
     )
 
 
-def _not_a_number(assembly: MechanismSystem, t: float, state: State) -> str:
-    for constraint in assembly.constraints:
-        if not np.isfinite(constraint.target(t)).all():
-            return f"{constraint.measure.label} has no finite value, velocity or acceleration there"
-    if not np.isfinite(PlanarTree(assembly).evaluate(t, state.q, state.v)[0]).all():
+def not_a_number(targets: Iterable[tuple[str, TimeFunction]], accelerations: Callable[[], Array], t: float) -> str:
+    """Which of the targets, each with its label, is no number at t, or whether the accelerations there are none."""
+    for label, target in targets:
+        if not np.isfinite(target(t)).all():
+            return f"{label} has no finite value, velocity or acceleration there"
+    if not np.isfinite(accelerations()).all():
         return "the accelerations there are no finite numbers: a load or a target grows without bound"
     return ""
 
@@ -59,21 +64,26 @@ def load_jump(loads: Iterable[tuple[str, TimeFunction]], t: float) -> str:
     return ""
 
 
-def _bent(assembly: MechanismSystem, q: Array) -> str:
-    """The link that is bent most, by the mean of its deflection against its radius of gyration."""
-    bodies = zip(assembly.first, assembly.model.bodies, strict=True)
-    bent = [
-        (float(np.linalg.norm(q[first + 3 : first + 3 + body.n_modes]) / np.sqrt(body.inertia)), body.name)
-        for first, body in bodies
-    ]
-    most, name = max(bent)
-    if most < FAR_BENT:
+def too_far_bent(links: Iterable[tuple[str, Array, float]]) -> str:
+    """The link that is bent most, by its modal coordinates p and largest moment of inertia about its origin, kg·m².
+
+    |p|/√J is the mean of its deflection against its radius of gyration.
+    """
+    bent = [(float(np.linalg.norm(p) / np.sqrt(inertia)), name) for name, p, inertia in links]
+    most, name = max(bent, default=(0.0, ""))
+    if not most > FAR_BENT:
         return ""
     return (
         f'"{name}" is bent by {100 * most:.0f} % of its length, which violates small deformations. Possible causes: a'
         " load beyond buckling, a spin that needs geometric_stiffening = true, a link too soft, or an arm without"
         " motors that falls apart"
     )
+
+
+def _links(assembly: MechanismSystem, q: Array) -> Iterator[tuple[str, Array, float]]:
+    for first, body in zip(assembly.first, assembly.model.bodies, strict=True):
+        if body.n_modes:
+            yield body.name, q[first + 3 : first + 3 + body.n_modes], body.inertia
 
 
 def _singular(assembly: MechanismSystem, t: float, q: Array) -> str:

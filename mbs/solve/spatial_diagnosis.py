@@ -1,4 +1,4 @@
-"""Why steps of a run in space have become too short: what acts at the last state that it reached."""
+"""Why a 3D run ended before its end: what is wrong with the last state that it reached."""
 
 from __future__ import annotations
 
@@ -6,30 +6,37 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from ...common.arrays import Array
 from .. import _core
 from .._core import TimeFunction
 from ..model.spatial_system import SpatialSystem
 from ..scene.analysis import IntegratedAnalysis
-from .diagnosis import load_jump
+from .diagnosis import load_jump, not_a_number, too_far_bent
 from .integrators import EXPLICIT, Choice, beyond_order, unmet
 from .spatial_integrators import TOO_STIFF, fastest_friction
 from .state import State
 
-FAR_BENT = 0.5  # of a link's radius of gyration, in the mean
 
+def find_cause_in_space(system: SpatialSystem, analysis: IntegratedAnalysis, choice: Choice, run: _core.TreeRun) -> str:
+    """A sentence with advice, the likely causes of a failure, the more certain first; empty where nothing is found.
 
-def cause_of_short_steps(
-    system: SpatialSystem, analysis: IntegratedAnalysis, choice: Choice, run: _core.TreeRun
-) -> str:
-    """A sentence with advice, the more certain causes first: loads, links bent too far, friction, the integrator."""
+    A target that is not a number, a link bent too far, a load that jumps, friction; where steps became too short,
+    the integrator.
+    """
     t, at = run.time_reached, State(*np.split(np.array(run.last), [system.model.tree.n_q]))
-    return (
-        load_jump(_loads(system), t)
-        or _bent(system, at)
+    found = (
+        not_a_number(_targets(system), lambda: _accelerations(system, t, run.last), t)
+        or too_far_bent(_links(system, at))
+        or load_jump(_loads(system), t)
         or _friction(system, analysis, choice, at)
-        or beyond_order(choice, analysis)
-        or unmet(choice, run)
     )
+    if found or run.status != _core.IntegrationStatus.step_underflow:
+        return found
+    return beyond_order(choice, analysis) or unmet(choice, run)
+
+
+def _accelerations(system: SpatialSystem, t: float, state: Array) -> Array:
+    return _core.tree_outputs(system.core, system.scene, [t], np.array(state)[None]).accelerations
 
 
 def _loads(system: SpatialSystem) -> Iterator[tuple[str, TimeFunction]]:
@@ -38,19 +45,16 @@ def _loads(system: SpatialSystem) -> Iterator[tuple[str, TimeFunction]]:
             yield f'load on "{load.point or load.joint or load.pzt}", {name},', size
 
 
-def _bent(system: SpatialSystem, at: State) -> str:
-    nodes = [node for node in system.model.tree.nodes if node.body.n_modes]
-    bent = [
-        (float(np.linalg.norm(at.q[node.p_q]) / np.sqrt(np.linalg.eigvalsh(node.body.inertia)[-1])), node.body.name)
-        for node in nodes
-    ]
-    most, name = max(bent, default=(0.0, ""))
-    if not most > FAR_BENT:
-        return ""
-    return (
-        f'"{name}" is bent by {100 * most:.0f} % of its length, which small deformations do not describe: a load beyond'
-        " buckling, a spin that needs geometric_stiffening = true, a link too soft, or joints that nothing holds"
-    )
+def _targets(system: SpatialSystem) -> Iterator[tuple[str, TimeFunction]]:
+    for row in system.model.rows:
+        functions = row.law.functions if row.law is not None else () if row.target is None else (row.target,)
+        yield from ((f'trajectory "{row.owner}"', function) for function in functions)
+
+
+def _links(system: SpatialSystem, at: State) -> Iterator[tuple[str, Array, float]]:
+    for node in system.model.tree.nodes:
+        if node.body.n_modes:
+            yield node.body.name, at.q[node.p_q], node.body.largest_moment
 
 
 def _friction(system: SpatialSystem, analysis: IntegratedAnalysis, choice: Choice, at: State) -> str:

@@ -98,7 +98,7 @@ def natural_sizes(model: SpatialModel) -> Array:
         units = node.joint.units or node.joint.guess_units
         of_joint = np.array([1.0 if unit == "rad" else length for unit in units])
         sizes[node.v] = node.joint.state(of_joint) if node.joint.units else of_joint
-        sizes[node.p_v] = np.sqrt(np.linalg.eigvalsh(node.body.inertia)[-1])
+        sizes[node.p_v] = np.sqrt(node.body.largest_moment)
     return sizes
 
 
