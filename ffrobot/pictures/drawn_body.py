@@ -13,7 +13,7 @@ from ..common.errors import InputError
 from ..common.plane import rotated
 from ..mbs.fields.field_types import GROUND
 from ..results.file import Results
-from .motion import BodyMotion, body_motion, carried, ordered_bodies
+from .motion import MovingBody, moving_bodies
 from .outline import Outline, body_outline, points_outline
 
 
@@ -21,7 +21,7 @@ from .outline import Outline, body_outline, points_outline
 class DrawnBody:
     """A body over T outputs, its outline, and how it moves along with those it hangs from (`motion.carried`)."""
 
-    motion: BodyMotion
+    motion: MovingBody
     outline: Outline
     shift: Array
 
@@ -35,18 +35,17 @@ class DrawnBody:
         return self._placed(k, scale, (self.motion.points + scale * self.motion.deflection[k])[kept])
 
     def _placed(self, k: int, scale: float, at: Array) -> Array:
-        moved: Array = self.motion.position[k] + (scale - 1.0) * self.shift[k] + rotated(self.motion.angle[k], at)
+        moved: Array = self.motion.position[k] + (scale - 1.0) * self.shift[k] + rotated(self.motion.orientation[k], at)
         return moved
 
 
 def drawn_bodies(results: Results, analysis: str, frames: Indices, notes: list[str]) -> list[DrawnBody]:
     """Those of an analysis at the outputs `frames`; `notes` are told what could not be drawn as it is."""
-    motions = [body_motion(results, analysis, name, frames) for name in ordered_bodies(results.scene)]
-    shift = carried(motions, results.scene)
-    return [DrawnBody(motion, outline(results, motion, notes), shift[motion.name]) for motion in motions]
+    bodies, shift = moving_bodies(results, analysis, frames)
+    return [DrawnBody(body, outline(results, body, notes), of) for body, of in zip(bodies, shift, strict=True)]
 
 
-def outline(results: Results, motion: BodyMotion, notes: list[str]) -> Outline:
+def outline(results: Results, motion: MovingBody, notes: list[str]) -> Outline:
     """From the body's modal body, or from its points where it has none or that is not found."""
     if motion.modal is not None:
         try:
@@ -65,7 +64,7 @@ def ground_points(scenes: Iterable[Mapping[str, Any]]) -> list[tuple[float, floa
 
 def box(bodies: Sequence[DrawnBody], scale: float = 1.0) -> Array:
     """(2, 2) lower left and upper right corner of all that the bodies cover over all outputs, in m."""
-    outputs = range(len(bodies[0].motion.angle))
+    outputs = range(len(bodies[0].motion.orientation))
     corners = [body.corners(k, scale) for body in bodies for k in outputs]
     everything = np.concatenate([part for part in corners if part.size])
     return np.array([np.nanmin(everything, axis=0), np.nanmax(everything, axis=0)])

@@ -8,12 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
 from ..common.arrays import Array, Indices
 from ..common.plane import rotated
+from ..common.rotations import of_quaternion
 from ..mbs.scene.topology import Edge, Topology, spanning_forest
 from ..results.file import Results
 from ..results.joints import joint_type
@@ -22,54 +23,97 @@ VISIBLE_DEFORMATION = 0.05  # of the mechanism's size
 
 
 @dataclass(frozen=True)
-class BodyMotion:
-    """A body over T outputs.
+class MovingBody:
+    """A body over T outputs, in the plane (d = 2) or in 3D (d = 3).
 
     Attributes:
         name: in the scene.
-        position: (T, 2) R, origin of its frame, in m.
-        angle: (T,) θ of its frame, in rad.
+        position: (T, d) R, origin of its frame, in m, global axes.
+        orientation: of its frame: in the plane (T,) θ, rad; in 3D (T, 4) quaternions, scalar first.
         modal: (T, n) its modal coordinates; None of a rigid body.
         point_names: of its k points, as in the results: `link2.tip`; in the order of x.
-        points: (k, 2) where they are in the frame, undeformed, in m.
-        deflection: (T, k, 2) their Φ p, in the frame, in m.
+        points: (k, d) where they are in the frame, undeformed, in m.
+        deflection: (T, k, d) their Φ p, in the frame, in m.
+        sections: (T, k, 4) in 3D: quaternions of the sections there, global axes.
     """
 
     name: str
     position: Array
-    angle: Array
+    orientation: Array
     modal: Array | None
     point_names: tuple[str, ...]
     points: Array
     deflection: Array
+    sections: Array
+
+    @property
+    def axes(self) -> Array:
+        """A (T, d, d), columns the axes of the frame."""
+        return _axes(self.orientation)
+
+    def turned(self, vectors: Array) -> Array:
+        """A times vectors (T, …, d) of the frame: in global axes."""
+        found: Array = np.einsum("tij,t...j->t...i", self.axes, vectors)
+        return found
+
+    def placed(self, places: Array) -> Array:
+        """R + A x of places x (T, k, d) in the frame, m: in global axes."""
+        return self.position[:, None] + self.turned(places)
 
     @property
     def global_points(self) -> Array:
-        """Where the points are in global axes (T, k, 2), m."""
-        return self.position[:, None] + rotated(self.angle[:, None], self.points + self.deflection)
+        """Where the points are in global axes (T, k, d), m."""
+        return self.placed(self.points + self.deflection)
 
     def global_deflection(self, point: str) -> Array:
-        """A Φ p of a point (T, 2), in m: how much a unit of s moves it in global axes."""
-        k = self.point_names.index(point)
-        return rotated(self.angle, self.deflection[:, k])
+        """A Φ p of a point (T, d), in m: how much a unit of s moves it in global axes."""
+        return self.turned(self.deflection[:, self.point_names.index(point)])
 
 
-def body_motion(results: Results, analysis: str, name: str, frames: Indices) -> BodyMotion:
-    """Body `name` of an analysis at the outputs `frames`."""
+def moving_bodies(results: Results, analysis: str, frames: Indices) -> tuple[list[MovingBody], list[Array]]:
+    """All bodies at the outputs `frames`, each after the one it hangs from.
+
+    And how much a unit of s moves each as a whole (T, d), m, so that joints stay shut.
+    """
+    bodies = [_moving_body(results, analysis, name, frames) for name in topology(results.scene).carriers]
+    return bodies, _carried(bodies, results.scene)
+
+
+def _moving_body(results: Results, analysis: str, name: str, frames: Indices) -> MovingBody:
     group, points = f"{analysis}/bodies/{name}", f"{analysis}/points"
-    position, angle = results[f"{group}/position"][frames], results[f"{group}/angle"][frames]
-    labels = [label for label in results.names(points) if label.startswith(f"{name}.")]
-    deflection = _stacked([results[f"{points}/{label}/deflection"][frames] for label in labels], len(frames))
-    reached = _stacked([results[f"{points}/{label}/position"][frames] for label in labels], len(frames))
-    at = (rotated(-angle[:1, None], reached[:1] - position[:1, None]) - deflection[:1])[0]
+    position = results[f"{group}/position"][frames]
+    orientation = results[f"{group}/{'quaternion' if results.is_spatial else 'angle'}"][frames]
+    labels, d = [label for label in results.names(points) if label.startswith(f"{name}.")], position.shape[1]
+
+    def of_all(dataset: str, columns: int) -> Array:
+        found = [results[f"{points}/{label}/{dataset}"][frames] for label in labels]
+        return np.stack(found, axis=1) if found else np.zeros((len(frames), 0, columns))
+
+    deflection, reached = of_all("deflection", d), of_all("position", d)
+    sections = of_all("quaternion", 4) if results.is_spatial else np.zeros((len(frames), len(labels), 0))
+    # x = Aᵀ (r − R) − Φ p, the same at all outputs
+    at = (reached[0] - position[0]) @ _axes(orientation[:1])[0] - deflection[0]
     along = np.argsort(at[:, 0], kind="stable")
     modal = results.modal(analysis, name)[frames] if name in results.modal_files else None
-    return BodyMotion(name, position, angle, modal, tuple(labels[i] for i in along), at[along], deflection[:, along])
+    return MovingBody(
+        name, position, orientation, modal, tuple(labels[i] for i in along), at[along], deflection[:, along],
+        sections[:, along],
+    )  # fmt: skip
 
 
-def ordered_bodies(scene: Mapping[str, Any]) -> list[str]:
-    """Bodies in an order in which each comes after the one it hangs from."""
-    return list(topology(scene).carriers)
+def _axes(orientation: Array) -> Array:
+    """A (T, d, d) of angles (T,) or quaternions (T, 4)."""
+    if orientation.ndim == 2:
+        return of_quaternion(orientation)
+    return np.stack([rotated(orientation, unit) for unit in np.eye(2)], axis=-1)
+
+
+def section_axes(bodies: Sequence[MovingBody], side: str, outputs: int) -> Array:
+    """(T, 3, 3) the axes of the section on a `side` of a joint, "BODY.POINT"; of the ground the global ones."""
+    for body in bodies:
+        if side in body.point_names:
+            return of_quaternion(body.sections[:, body.point_names.index(side)])
+    return np.broadcast_to(np.eye(3), (outputs, 3, 3))
 
 
 def topology(scene: Mapping[str, Any]) -> Topology:
@@ -79,30 +123,8 @@ def topology(scene: Mapping[str, Any]) -> Topology:
     return spanning_forest([body["name"] for body in scene["body"]], edges)
 
 
-class Moving(Protocol):
-    """What `carried` has to know of a body, in the plane (d = 2) or in space (d = 3)."""
-
-    @property
-    def name(self) -> str:
-        """In the scene."""
-
-    @property
-    def position(self) -> Array:
-        """(T, d) of its frame, m."""
-
-    @property
-    def point_names(self) -> tuple[str, ...]:
-        """Of its points, as in the results."""
-
-    def global_deflection(self, point: str) -> Array:
-        """A Φ p of a point (T, d), m."""
-
-
-def carried(bodies: Sequence[Moving], scene: Mapping[str, Any]) -> dict[str, Array]:
-    """For each body (T, d), m: how much a unit of s moves it as a whole, so that joints stay shut.
-
-    `bodies` are all those of the scene, as `ordered_bodies` has them.
-    """
+def _carried(bodies: Sequence[MovingBody], scene: Mapping[str, Any]) -> list[Array]:
+    """For each body (T, d), m: how much a unit of s moves it as a whole, so that joints stay shut."""
     by_name, carriers = {body.name: body for body in bodies}, topology(scene).carriers
     shift: dict[str, Array] = {}
     for body in bodies:
@@ -114,15 +136,10 @@ def carried(bodies: Sequence[Moving], scene: Mapping[str, Any]) -> dict[str, Arr
         parent = by_name.get(carrier.parent)
         if parent is not None and carrier.other in parent.point_names:
             shift[body.name] += shift[parent.name] + parent.global_deflection(carrier.other)
-    return shift
+    return list(shift.values())
 
 
 def visible_exaggeration(size: float, deflection: float) -> float:
     """The largest of 1, 2, 5, 10, … 1000 that keeps `deflection` to a visible part of the mechanism's `size`, in m."""
     steps = [1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0]
     return max((s for s in steps if s * deflection <= VISIBLE_DEFORMATION * size), default=1.0)
-
-
-def _stacked(arrays: Sequence[Array], outputs: int) -> Array:
-    """Arrays (T, 2) side by side: (T, k, 2), also for none."""
-    return np.stack(arrays, axis=1) if arrays else np.zeros((outputs, 0, 2))

@@ -18,7 +18,7 @@ def write_motion(group: h5py.Group, outcome: PlanarOutcome) -> None:
     """Of an analysis: bodies/, points/, energy/, and how far the constraints are violated."""
     group["time"] = outcome.time
     for body in outcome.assembly.model.links:
-        for key, values in vars(body_motion(outcome, body)).items():
+        for key, values in body_motion(outcome, body).datasets.items():
             group[f"bodies/{body.name}/{key}"] = values
         if (F_p := modal_force(outcome, body)) is not None:
             group[f"bodies/{body.name}/modal_force"] = F_p
@@ -31,7 +31,7 @@ def write_motion(group: h5py.Group, outcome: PlanarOutcome) -> None:
         group[f"bodies/{body.name}"].attrs["modes_kept"] = modes_kept(body)
         for label in body.points:
             point = f"{body.name}.{label}"
-            for key, values in vars(point_motion(outcome, point)).items():
+            for key, values in point_motion(outcome, point).datasets.items():
                 group[f"points/{point}/{key}"] = values
     for key, values in energies(outcome).items():
         group[f"energy/{key}"] = values

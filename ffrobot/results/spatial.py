@@ -110,7 +110,7 @@ def _write_run(group: h5py.Group, run: Outcome, warnings: Sequence[str]) -> None
 def _write_bodies(group: h5py.Group, solution: SpatialSolution, result: SpatialResult) -> None:
     motion = result.motion
     for name, points in motion.points.items():
-        for key, values in vars(motion.body(name)).items():
+        for key, values in motion.body(name).datasets.items():
             group[f"bodies/{name}/{key}"] = values
         if motion.motor_forces is not None:
             group[f"bodies/{name}/modal_force"] = motion.motor_forces.modal[name]
@@ -121,7 +121,7 @@ def _write_bodies(group: h5py.Group, solution: SpatialSolution, result: SpatialR
         if name in solution.divided:
             group[f"bodies/{name}"].attrs["pieces"] = len(solution.divided[name].names)
         for label in points:
-            for key, values in vars(motion.point(f"{name}.{label}")).items():
+            for key, values in motion.point(f"{name}.{label}").datasets.items():
                 group[f"points/{name}.{label}/{key}"] = values
 
 

@@ -19,7 +19,8 @@ from ..fe_models.link_records import HOLDING_ROOT
 from ..fe_models.modal_body import ModalBody
 from ..mbs.model.divided_link import spread_in_space
 from ..mbs.model.spatial_motors import MotorForces
-from ..mbs.quantities.spatial_motion import BodyMotion, PointMotion, SpatialMotion, continuous
+from ..mbs.quantities.body_motion import BodyMotion, PointMotion
+from ..mbs.quantities.spatial_motion import SpatialMotion, continuous
 from ..mbs.quantities.spatial_validity import bending_in_space
 from ..mbs.quantities.validity import ENOUGH, IN_SPACE, Bending, enough_pieces, shape_from_chord
 from ..scene.pieces import BodyInPieces
@@ -81,7 +82,7 @@ class MotionOfLinks(SpatialMotion):
         link, frame = self.divided[name], self._links[name]
         found = super().point(link.body.point(label))
         position = link.modal.length / 2 * X if label == "mid" else link.modal.interfaces[label].position
-        in_frame = np.einsum("tji,tj->ti", of_quaternion(frame.quaternion), found.position - frame.position)
+        in_frame = np.einsum("tji,tj->ti", of_quaternion(frame.orientation), found.position - frame.position)
         return replace(found, deflection=in_frame - position)
 
     @cached_property

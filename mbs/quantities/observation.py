@@ -13,26 +13,7 @@ from ..fields.field_types import split_point
 from ..model.geometric_stiffening import second_order_displacement
 from ..model.planar_body import PlanarBody
 from ..model.planar_tree import PlanarTree
-
-
-@dataclass(frozen=True)
-class BodyMotion:
-    """Motion of a body's frame and modes, one row per output; p as `stored_coordinates` says."""
-
-    position: Array  # (T, 2) R, m
-    angle: Array  # (T,) θ, rad
-    modal: Array  # (T, n)
-    modal_velocity: Array  # (T, n)
-    velocity: Array  # (T, 2) m/s
-    angular_velocity: Array  # (T,) rad/s
-
-
-@dataclass(frozen=True)
-class PointMotion:
-    """Motion of a point of a body."""
-
-    position: Array  # (T, 2) global, m
-    deflection: Array  # (T, 2) Φ p in the body frame, m
+from .body_motion import BodyMotion, PointMotion
 
 
 @dataclass(frozen=True)
@@ -49,7 +30,7 @@ def body_motion(outcome: PlanarOutcome, body: PlanarBody) -> BodyMotion:
     columns = outcome.coordinates(body.name)
     q, v = outcome.q[:, columns], outcome.v[:, columns]
     T = body.modal_transform if stored_coordinates(body) is None else np.eye(body.n_modes)
-    return BodyMotion(q[:, :2], q[:, 2], q[:, 3:] @ T.T, v[:, 3:] @ T.T, v[:, :2], v[:, 2])
+    return BodyMotion(q[:, :2], q[:, 2], v[:, :2], v[:, 2], q[:, 3:] @ T.T, v[:, 3:] @ T.T)
 
 
 def stored_coordinates(body: PlanarBody) -> Array | None:

@@ -29,33 +29,10 @@ from ..model.spatial_rows import SpatialRow
 from ..model.spatial_system import SpatialSystem
 from ..model.spatial_tree import Motion, Node
 from ..scene.spatial.trajectories import SpatialTrajectory
+from .body_motion import BodyMotion, PointMotion
 
 if TYPE_CHECKING:
     from scipy.interpolate import BSpline
-
-
-@dataclass(frozen=True)
-class BodyMotion:
-    """Of a body's frame: position (T, 3) m, quaternion (T, 4) of continuous sign, velocity and angular velocity (T, 3).
-
-    `modal` and `modal_velocity` (T, n) are in the modes of the modal body file.
-    """
-
-    position: Array
-    quaternion: Array
-    velocity: Array
-    angular_velocity: Array
-    modal: Array
-    modal_velocity: Array
-
-
-@dataclass(frozen=True)
-class PointMotion:
-    """Of a section: position (T, 3) m, deflection (T, 3) m in body axes, quaternion (T, 4) of continuous sign."""
-
-    position: Array
-    deflection: Array
-    quaternion: Array
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from ffrobot.pictures.figures.figure_file import FigureRecord
 from ffrobot.pictures.figures.plot import draw, plot_results
 from ffrobot.pictures.figures.spatial_configurations import draw_spatial_configurations
 from ffrobot.pictures.figures.standard import standard_figures
-from ffrobot.pictures.spatial.motion import section_axes, spatial_motions
+from ffrobot.pictures.motion import moving_bodies, section_axes
 from ffrobot.pictures.spatial.shapes import line_shape, shortest_tree, surface_shape
 from ffrobot.results.file import Results
 
@@ -63,7 +63,7 @@ def test_every_standard_figure_is_drawn(arm_3r, tmp_path):
 @pytest.mark.parametrize("s", [1.0, 40.0])
 def test_links_are_drawn_where_they_were_solved_and_joined(arm, s):
     """Ends of the lines against the file; at 40 times the deflection, too, each begins where the one before it ends."""
-    bodies, shift = spatial_motions(arm, "inverse", FRAMES)
+    bodies, shift = moving_bodies(arm, "inverse", FRAMES)
     drawn = {}
     for body, carried in zip(bodies, shift, strict=True):
         at = line_shape(arm, body, []).placed(body, carried, s)
@@ -80,7 +80,7 @@ def test_links_are_drawn_where_they_were_solved_and_joined(arm, s):
 
 def test_surface_is_the_section_swept_along_the_line(arm):
     """Every corner of the tube is its outer radius off the deformed axis, to second order of the slopes."""
-    bodies, shift = spatial_motions(arm, "inverse", FRAMES)
+    bodies, shift = moving_bodies(arm, "inverse", FRAMES)
     for body, carried, radius in zip(bodies[1:], shift[1:], (0.0055, 0.004), strict=True):
         line = line_shape(arm, body, []).placed(body, carried, 1.0)
         surface = surface_shape(arm, body, []).placed(body, carried, 1.0)
@@ -91,7 +91,7 @@ def test_surface_is_the_section_swept_along_the_line(arm):
 
 def test_sections_have_the_axes_of_the_file(crank):
     """The universal joint's axes are square at all times: z of the crank's tip, y of the rod's root."""
-    bodies, _ = spatial_motions(crank, "inverse", FRAMES)
+    bodies, _ = moving_bodies(crank, "inverse", FRAMES)
     z = section_axes(bodies, "crank.tip", len(FRAMES))[:, :, 2]
     y = section_axes(bodies, "rod.root", len(FRAMES))[:, :, 1]
     np.testing.assert_allclose(np.sum(z * y, axis=1), 0.0, atol=1e-10)
@@ -128,7 +128,7 @@ def test_configurations_hold_every_link_at_every_time(arm):
     lines = [artist for artist in axes.collections if isinstance(artist, Line3DCollection)]
     assert len(lines) == 3 * 3  # times, bodies
     limits = np.array([axes.get_xlim(), axes.get_ylim(), axes.get_zlim()])
-    bodies, shift = spatial_motions(arm, "inverse", FRAMES[[0, 1, 3]])
+    bodies, shift = moving_bodies(arm, "inverse", FRAMES[[0, 1, 3]])
     for body, carried in zip(bodies, shift, strict=True):
         at = line_shape(arm, body, []).placed(body, carried, 3.0)
         assert np.all(at > limits[:, 0])

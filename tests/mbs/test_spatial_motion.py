@@ -70,7 +70,7 @@ def test_bodies_and_points(case):
         found = motion.body(name)
         close(found.position, [each["position"] for each in of_body], 1.0)
         expected = continuous(np.array([each["quaternion"] for each in of_body]))
-        close(found.quaternion * np.sign(found.quaternion[0] @ expected[0]), expected)
+        close(found.orientation * np.sign(found.orientation[0] @ expected[0]), expected)
         body_axes = np.einsum("tij,ti->tj", motion.frames[motion.model.tree.index[name]].F, found.angular_velocity)
         close(body_axes, [each["angular_velocity_body"] for each in of_body], 1.0)
     for name in data["samples"][0]["points"]:

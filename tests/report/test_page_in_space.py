@@ -9,12 +9,12 @@ from scipy.spatial.transform import Rotation
 from selenium.webdriver import ActionChains
 
 from ffrobot.common.errors import InputError
+from ffrobot.pictures.motion import moving_bodies
 from ffrobot.pictures.report import write_report
 from ffrobot.pictures.report.histories import history_charts
 from ffrobot.pictures.report.runs import runs
 from ffrobot.pictures.report.tables import peaks_table
 from ffrobot.pictures.spatial.joints import joint_markers
-from ffrobot.pictures.spatial.motion import spatial_motions
 from ffrobot.pictures.spatial.shapes import Shape, thickened
 from ffrobot.results.file import Results
 
@@ -171,7 +171,7 @@ def test_verdict_of_a_loop(slider_crank_3d):
 def test_axes_of_joints(slider_crank_3d):
     """Of the universal joint both, at right angles; of the ball none; of the guide x, at the slider."""
     with Results(slider_crank_3d.folder / "scene.results.h5") as results:
-        bodies, shift = spatial_motions(results, "inverse", np.array([0, 60]))
+        bodies, shift = moving_bodies(results, "inverse", np.array([0, 60]))
         markers = {marker.name: marker for marker in joint_markers(results.scene, bodies, shift)}
         slider = results["inverse/points/slider.pin/position"][[0, 60]]
     first, second = markers["universal"].directions.swapaxes(0, 1)

@@ -11,8 +11,7 @@ from mpl_toolkits.mplot3d.art3d import Line3DCollection  # type: ignore[import-u
 from ...common.arrays import Array
 from ...mbs.fields.field_types import GROUND
 from ...results.file import Results
-from ..motion import visible_exaggeration
-from ..spatial.motion import SpatialBodyMotion, spatial_motions
+from ..motion import MovingBody, moving_bodies, visible_exaggeration
 from ..spatial.shapes import Shape, line_shape
 from .figure_file import FigureRecord
 from .palette import COLORS
@@ -31,7 +30,7 @@ def draw_spatial_configurations(figure: FigureRecord, results: Results) -> Figur
     assert figure.analysis is not None
     outputs = results.time(figure.analysis)
     frames = np.array([int(np.argmin(np.abs(outputs - time))) for time in figure.times], dtype=np.intp)
-    bodies, shift = spatial_motions(results, figure.analysis, frames)
+    bodies, shift = moving_bodies(results, figure.analysis, frames)
     shapes = [line_shape(results, body, []) for body in bodies]
     s = figure.exaggeration or _exaggeration(bodies)
     picture = Figure(figsize=SCENE_SIZE, layout="constrained")
@@ -60,18 +59,18 @@ def draw_spatial_path(figure: FigureRecord, results: Results) -> Figure:
     return picture
 
 
-def _exaggeration(bodies: list[SpatialBodyMotion]) -> float:
+def _exaggeration(bodies: list[MovingBody]) -> float:
     points = np.concatenate([body.global_points.reshape(-1, 3) for body in bodies])
     largest = max((float(np.abs(body.deflection).max(initial=0.0)) for body in bodies), default=0.0)
     return visible_exaggeration(float(np.ptp(points, axis=0).max()) if len(points) else 0.0, largest)
 
 
-def _moves(bodies: list[SpatialBodyMotion]) -> bool:
+def _moves(bodies: list[MovingBody]) -> bool:
     return any(body.deflection.any() for body in bodies)
 
 
 def _draw_body(
-    axes: Any, body: SpatialBodyMotion, shape: Shape, carried: Array, s: float, k: int, color: Any  # noqa: ANN401
+    axes: Any, body: MovingBody, shape: Shape, carried: Array, s: float, k: int, color: Any  # noqa: ANN401
 ) -> list[Array]:  # fmt: skip
     """Its lines and the points where joints attach, at the k-th output; returns what was drawn, (n, 3)."""
     at = shape.placed(body, carried, s)[k]

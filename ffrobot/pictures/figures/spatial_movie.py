@@ -15,13 +15,12 @@ from matplotlib.figure import Figure
 from ...common.arrays import Array, Indices, Integers
 from ...results.file import Results
 from ..coarse_surface import coarsened, triangles_of
-from ..motion import visible_exaggeration
+from ..motion import moving_bodies, visible_exaggeration
 from ..movie_file import Frame
 from ..path_targets import Target, targets
 from ..projection import SPACE
 from ..spatial.joints import Marker, ground_places, joint_markers, tool_marker
 from ..spatial.marks import AXIS_LENGTH, TOOL_COLORS, TOOL_LENGTH
-from ..spatial.motion import spatial_motions
 from ..spatial.shapes import surface_shape, thickened
 from .palette import COLORS
 from .parallel import directions, lit, normals, projected
@@ -61,7 +60,7 @@ class Scene:
 
 def moving_scene(results: Results, analysis: str, frames: Indices, scale: float | None, notes: list[str]) -> Scene:
     """The scene at the outputs `frames`; `scale` as large as can be seen if None."""
-    bodies, shift = spatial_motions(results, analysis, frames)
+    bodies, shift = moving_bodies(results, analysis, frames)
     at = np.concatenate([body.global_points.reshape(-1, 3) for body in bodies])
     size = float(np.ptp(at, axis=0).max()) or 1.0
     if scale is None:

@@ -11,7 +11,7 @@ import numpy as np
 from ...common.arrays import Indices
 from ..drawn_body import ground_points, outline
 from ..figures.palette import COLORS
-from ..motion import BodyMotion, body_motion, ordered_bodies, topology, visible_exaggeration
+from ..motion import MovingBody, moving_bodies, topology, visible_exaggeration
 from ..outline import Outline
 from ..path_targets import Target, targets
 from .charts import encoded, plain
@@ -37,7 +37,7 @@ def mechanism(runs: Sequence[Run]) -> Mechanism:
     for k, run in enumerate(runs):
         time = run.results.time(run.analysis)
         frames = np.unique(np.linspace(0, len(time) - 1, min(len(time), MAX_FRAMES)).astype(np.intp))
-        bodies = [body_motion(run.results, run.analysis, name, frames) for name in ordered_bodies(run.results.scene)]
+        bodies, _ = moving_bodies(run.results, run.analysis, frames)
         entries.append(
             {
                 "label": plain(run.label),
@@ -66,11 +66,11 @@ def mechanism(runs: Sequence[Run]) -> Mechanism:
     return Mechanism(data, list(dict.fromkeys(notes)))
 
 
-def _body_data(run: Run, body: BodyMotion, bodies: Sequence[BodyMotion], shape: Outline) -> dict[str, Any]:
+def _body_data(run: Run, body: MovingBody, bodies: Sequence[MovingBody], shape: Outline) -> dict[str, Any]:
     data: dict[str, Any] = {
         "name": body.name,
         "position": encoded(body.position),
-        "angle": encoded(body.angle),
+        "angle": encoded(body.orientation),
         "outline": encoded(shape.at),
         "modes": encoded(shape.modes),
         "p": encoded(shape.p),
@@ -85,7 +85,7 @@ def _body_data(run: Run, body: BodyMotion, bodies: Sequence[BodyMotion], shape: 
     return data
 
 
-def _path_data(target: Target, bodies: Sequence[BodyMotion], frames: Indices) -> dict[str, Any]:
+def _path_data(target: Target, bodies: Sequence[MovingBody], frames: Indices) -> dict[str, Any]:
     """A point to be followed, and the path it should take where both components are specified."""
     data: dict[str, Any] = {"name": plain(target.point), "point": _index(target.point, bodies)}
     if target.columns == (0, 1):
@@ -93,6 +93,6 @@ def _path_data(target: Target, bodies: Sequence[BodyMotion], frames: Indices) ->
     return data
 
 
-def _index(point: str, bodies: Sequence[BodyMotion]) -> list[int] | None:
+def _index(point: str, bodies: Sequence[MovingBody]) -> list[int] | None:
     """Numbers of the body and of its point; None for the ground."""
     return next(([i, b.point_names.index(point)] for i, b in enumerate(bodies) if point in b.point_names), None)

@@ -10,12 +10,11 @@ import numpy as np
 from ...common.arrays import Array, Indices
 from ..coarse_surface import coarsened, triangles_of
 from ..figures.palette import COLORS
-from ..motion import visible_exaggeration
+from ..motion import MovingBody, moving_bodies, visible_exaggeration
 from ..path_targets import Target, targets
 from ..projection import SPACE
 from ..spatial.joints import Marker, ground_places, joint_markers, tool_marker
 from ..spatial.marks import AXIS_LENGTH, TOOL_COLORS, TOOL_LENGTH
-from ..spatial.motion import SpatialBodyMotion, spatial_motions
 from ..spatial.shapes import surface_shape, thickened
 from .charts import encoded, plain
 from .mechanism import PLAYING_SECONDS, SLOWEST, Mechanism
@@ -29,7 +28,7 @@ BAR = 0.008  # of the mechanism's size: radius of bars that stand for rigid bodi
 def spatial_mechanism(runs: Sequence[Run]) -> Mechanism:
     """The moving picture of several runs in space, each in a colour of its own."""
     notes: list[str] = []
-    moved = [spatial_motions(run.results, run.analysis, _frames(run)) for run in runs]
+    moved = [moving_bodies(run.results, run.analysis, _frames(run)) for run in runs]
     shown = [k for k, run in enumerate(runs) if run.analysis == run.results.analyses[0]]
     corners = np.concatenate([body.global_points.reshape(-1, 3) for k in shown for body in moved[k][0]])
     low, high = corners.min(axis=0), corners.max(axis=0)
@@ -68,9 +67,7 @@ def _frames(run: Run) -> Indices:
     return np.unique(np.linspace(0, outputs - 1, min(outputs, MAX_FRAMES)).astype(np.intp))
 
 
-def _run_data(
-    run: Run, bodies: list[SpatialBodyMotion], shift: list[Array], bar: float, notes: list[str]
-) -> dict[str, Any]:
+def _run_data(run: Run, bodies: list[MovingBody], shift: list[Array], bar: float, notes: list[str]) -> dict[str, Any]:
     scene = run.results.scene
     wanted = targets(run.results, run.analysis)
     points = dict.fromkeys(target.point for target in wanted)
@@ -82,14 +79,14 @@ def _run_data(
     }
 
 
-def _body_data(run: Run, body: SpatialBodyMotion, shift: Array, bar: float, notes: list[str]) -> dict[str, Any]:
+def _body_data(run: Run, body: MovingBody, shift: Array, bar: float, notes: list[str]) -> dict[str, Any]:
     """Surface points x (p, 3), their displacements Φ (p, 3, n), and the motion R, e, p of the body with its shift."""
     shape = thickened(surface_shape(run.results, body, notes), bar)
     kept, triangles = coarsened(shape.points, triangles_of(shape.cells), MAX_TRIANGLES)
     return {
         "name": plain(body.name),
         "position": encoded(body.position),
-        "quaternion": encoded(body.quaternion),
+        "quaternion": encoded(body.orientation),
         "shift": encoded(shift),
         "points": encoded(shape.points[kept]),
         "shapes": encoded(shape.shapes[kept].reshape(len(kept), -1)),

@@ -10,7 +10,7 @@ import numpy as np
 
 from ...common.arrays import Array
 from ...mbs.fields.field_types import GROUND
-from .motion import SpatialBodyMotion, section_axes
+from ..motion import MovingBody, section_axes
 
 
 @dataclass(frozen=True)
@@ -35,20 +35,18 @@ class Marker:
         return found
 
 
-def joint_markers(
-    scene: Mapping[str, Any], bodies: Sequence[SpatialBodyMotion], shift: Sequence[Array]
-) -> list[Marker]:
+def joint_markers(scene: Mapping[str, Any], bodies: Sequence[MovingBody], shift: Sequence[Array]) -> list[Marker]:
     """Every joint at its second side, with the axes that it has: one, two of universal joints, none of others."""
     return [_joint(keys, bodies, shift) for keys in scene.get("joint", [])]
 
 
-def tool_marker(point: str, bodies: Sequence[SpatialBodyMotion], shift: Sequence[Array]) -> Marker:
+def tool_marker(point: str, bodies: Sequence[MovingBody], shift: Sequence[Array]) -> Marker:
     """The section "BODY.POINT" with its axes x, y, z."""
     position, exaggeration = _place(point, bodies, shift)
     return Marker(point, position, exaggeration, section_axes(bodies, point, len(position)).swapaxes(1, 2))
 
 
-def _joint(keys: Mapping[str, Any], bodies: Sequence[SpatialBodyMotion], shift: Sequence[Array]) -> Marker:
+def _joint(keys: Mapping[str, Any], bodies: Sequence[MovingBody], shift: Sequence[Array]) -> Marker:
     first, second = keys["between"]
     side = second if second != GROUND else first
     position, exaggeration = _place(side, bodies, shift)
@@ -61,7 +59,7 @@ def _joint(keys: Mapping[str, Any], bodies: Sequence[SpatialBodyMotion], shift: 
     return Marker(keys["name"], position, exaggeration, np.stack(directions, 1) if directions else np.zeros((T, 0, 3)))
 
 
-def _place(side: str, bodies: Sequence[SpatialBodyMotion], shift: Sequence[Array]) -> tuple[Array, Array]:
+def _place(side: str, bodies: Sequence[MovingBody], shift: Sequence[Array]) -> tuple[Array, Array]:
     for body, carried in zip(bodies, shift, strict=True):
         if side in body.point_names:
             k = body.point_names.index(side)

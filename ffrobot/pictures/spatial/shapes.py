@@ -12,7 +12,7 @@ from ...common.rotations import smallest_turn
 from ...fe_models.modal_body import ModalBody
 from ...results.file import Results
 from ..body_surface import body_surface
-from .motion import SpatialBodyMotion, placed, turned
+from ..motion import MovingBody
 from .visuals import visual_surface
 
 SIDES = 8  # of bars that stand for lines
@@ -35,18 +35,18 @@ class Shape:
     coordinates: Array
     cells: Integers
 
-    def deflection(self, body: SpatialBodyMotion) -> Array:
+    def deflection(self, body: MovingBody) -> Array:
         """A Φ p (T, p, 3), m, global axes."""
-        return turned(body, np.einsum("pin,tn->tpi", self.shapes, self.coordinates, optimize=True))
+        return body.turned(np.einsum("pin,tn->tpi", self.shapes, self.coordinates, optimize=True))
 
-    def placed(self, body: SpatialBodyMotion, shift: Array, s: float) -> Array:
+    def placed(self, body: MovingBody, shift: Array, s: float) -> Array:
         """Where its points are (T, p, 3), m, with deflections s times as large; joints stay shut by `shift` (T, 3)."""
-        rest = placed(body, np.broadcast_to(self.points, (len(body.position), *self.points.shape)))
+        rest = body.placed(np.broadcast_to(self.points, (len(body.position), *self.points.shape)))
         found: Array = rest + s * self.deflection(body) + (s - 1.0) * shift[:, None]
         return found
 
 
-def surface_shape(results: Results, body: SpatialBodyMotion, notes: list[str]) -> Shape:
+def surface_shape(results: Results, body: MovingBody, notes: list[str]) -> Shape:
     """The surface of a flexible body, the visual shapes of a rigid one; else lines between points.
 
     `notes` say which files are not found.
@@ -62,7 +62,7 @@ def surface_shape(results: Results, body: SpatialBodyMotion, notes: list[str]) -
     return Shape(mesh.points, mesh.mode_shapes, body.modal, mesh.cells)
 
 
-def line_shape(results: Results, body: SpatialBodyMotion, notes: list[str]) -> Shape:
+def line_shape(results: Results, body: MovingBody, notes: list[str]) -> Shape:
     """The line through the stations of a flexible body; otherwise as `surface_shape`."""
     found = _modal_body(results, body, notes)
     if found is None:
@@ -72,7 +72,7 @@ def line_shape(results: Results, body: SpatialBodyMotion, notes: list[str]) -> S
     return Shape(stations.position, stations.translation, body.modal, np.stack([np.arange(k - 1), np.arange(1, k)], 1))
 
 
-def point_shape(body: SpatialBodyMotion) -> Shape:
+def point_shape(body: MovingBody) -> Shape:
     """Lines between the points of a body, as short as they all connect; a single point is itself."""
     k = len(body.points)
     shapes = np.eye(3 * k).reshape(k, 3, 3 * k)
@@ -126,7 +126,7 @@ def shortest_tree(points: Array) -> Integers:
     return np.array(edges, dtype=np.int64).reshape(-1, 2)
 
 
-def _modal_body(results: Results, body: SpatialBodyMotion, notes: list[str]) -> ModalBody | None:
+def _modal_body(results: Results, body: MovingBody, notes: list[str]) -> ModalBody | None:
     if body.modal is None:
         return None
     try:

@@ -13,7 +13,7 @@ from ...fe_models.modal_body import ModalBody
 from ...mbs.quantities.stress import surface_stress, von_mises
 from ...results.file import Results
 from ..body_surface import body_surface
-from ..motion import BodyMotion, body_motion, carried, ordered_bodies
+from ..motion import MovingBody, moving_bodies
 from ..outline import points_outline
 from .vtkhdf import Grid
 
@@ -27,7 +27,7 @@ class Piece:
         von_mises: (T, p) in Pa where the body's file has stresses of its surface.
     """
 
-    motion: BodyMotion
+    motion: MovingBody
     points: Array
     shapes: Array
     modal: Array
@@ -55,10 +55,9 @@ def results_grid(results: Results, analysis: str, frames: Indices, notes: list[s
     large. `von_mises` where modal stresses are known. Cell data: `body`, its number in the scene. `notes` are told what
     could not be drawn as it is.
     """
-    motions = [body_motion(results, analysis, name, frames) for name in ordered_bodies(results.scene)]
-    shift = carried(motions, results.scene)
+    motions, shift = moving_bodies(results, analysis, frames)
     pieces = [_piece(results, analysis, motion, frames, notes) for motion in motions]
-    points, deflection, exaggeration = zip(*(_placed(piece, shift[piece.motion.name]) for piece in pieces), strict=True)
+    points, deflection, exaggeration = zip(*map(_placed, pieces, shift), strict=True)
     data = {"deflection": deflection, "exaggeration": exaggeration}
     if any(piece.von_mises is not None for piece in pieces):
         data["von_mises"] = tuple(
@@ -78,23 +77,22 @@ def results_grid(results: Results, analysis: str, frames: Indices, notes: list[s
 
 def joint_places(results: Results, analysis: str, frames: Indices) -> tuple[Array, Array]:
     """Where revolute joints are at the outputs `frames` (T, j, 3) in m, and their exaggeration as of grids."""
-    motions = [body_motion(results, analysis, name, frames) for name in ordered_bodies(results.scene)]
-    shift = carried(motions, results.scene)
+    motions, shift = moving_bodies(results, analysis, frames)
     ends = {joint["between"][1] for joint in results.scene.get("joint", []) if joint["type"] == "revolute"}
     at: list[Array] = [np.zeros((len(frames), 0, 3))]
     exaggeration = at.copy()
-    for motion in motions:
+    for motion, carried in zip(motions, shift, strict=True):
         here = [k for k, name in enumerate(motion.point_names) if name in ends]
-        moved = rotated(motion.angle[:, None], motion.deflection[:, here])
+        moved = motion.turned(motion.deflection[:, here])
         at.append(_in_space(motion.global_points[:, here]))
-        exaggeration.append(_in_space(moved + shift[motion.name][:, None]))
+        exaggeration.append(_in_space(moved + carried[:, None]))
     return np.concatenate(at, axis=1), np.concatenate(exaggeration, axis=1)
 
 
 def _placed(piece: Piece, shift: Array) -> tuple[Array, Array, Array]:
     """Where the points of a body are, their deflection and exaggeration (T, p, 3), in m and global axes."""
     moved = np.einsum("pin,tn->tpi", piece.shapes, piece.modal, optimize=True)
-    angle, origin = piece.motion.angle, _in_space(piece.motion.position[:, None])
+    angle, origin = piece.motion.orientation, _in_space(piece.motion.position[:, None])
     deflection = _turned(angle, moved)
     return origin + _turned(angle, piece.points + moved), deflection, deflection + _in_space(shift[:, None])
 
@@ -109,7 +107,7 @@ def _in_space(vectors: Array) -> Array:
     return np.concatenate([vectors, np.zeros_like(vectors[..., :1])], axis=-1)
 
 
-def _piece(results: Results, analysis: str, motion: BodyMotion, frames: Indices, notes: list[str]) -> Piece:
+def _piece(results: Results, analysis: str, motion: MovingBody, frames: Indices, notes: list[str]) -> Piece:
     """A flexible body's surface; lines through the points of a rigid one, or of one whose modal body is not found."""
     if motion.modal is not None:
         try:

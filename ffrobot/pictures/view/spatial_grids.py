@@ -10,9 +10,9 @@ from ...common.arrays import Array, Indices, as_rows
 from ...common.errors import InputError
 from ...mbs.quantities.stress import surface_stress, von_mises
 from ...results.file import Results
+from ..motion import moving_bodies
 from ..path_targets import targets
 from ..spatial.joints import Marker, ground_places, joint_markers, tool_marker
-from ..spatial.motion import spatial_motions
 from ..spatial.shapes import surface_shape
 from .vtkhdf import Grid
 
@@ -24,7 +24,7 @@ def spatial_results_grid(results: Results, analysis: str, frames: Indices, notes
     deformations s times as large while joints stay shut; `von_mises`, Pa, where stresses of a surface are known;
     `body`, its number in the scene.
     """
-    bodies, shift = spatial_motions(results, analysis, frames)
+    bodies, shift = moving_bodies(results, analysis, frames)
     shapes = [surface_shape(results, body, notes) for body in bodies]
     deflections = [shape.deflection(body) for shape, body in zip(shapes, bodies, strict=True)]
     points = [shape.placed(body, carried, 1.0) for shape, body, carried in zip(shapes, bodies, shift, strict=True)]
@@ -64,7 +64,7 @@ def _von_mises(results: Results, analysis: str, body: str, frames: Indices) -> A
 
 def spatial_marks(results: Results, analysis: str, frames: Indices, scale: float) -> dict[str, Any]:
     """What a picture of a scene in space (`pictures.Picture`) shows besides bodies, at the outputs `frames`."""
-    bodies, shift = spatial_motions(results, analysis, frames)
+    bodies, shift = moving_bodies(results, analysis, frames)
     joints = joint_markers(results.scene, bodies, shift)
     points = dict.fromkeys(target.point for target in targets(results, analysis))
     tools = [tool_marker(point, bodies, shift) for point in points]
