@@ -39,8 +39,16 @@ def write_earlier_run(group: h5py.Group, outcome: AnyOutcome, *, is_spatial: boo
 
 
 def earlier_runs(file: Results, analyses: Iterable[Analysis]) -> dict[str, EarlierRun]:
-    """Of those `analyses` of which something was kept, by name."""
-    return {one.name: _earlier_run(file, one) for one in analyses if file.has(f"{one.name}/{GROUP}")}
+    """Of those `analyses` of which something was kept, by name.
+
+    A run that was stopped before its first step begins anew: what acts on it may not have been known yet.
+    """
+    return {one.name: _earlier_run(file, one) for one in analyses if _can_go_on(file, one.name)}
+
+
+def _can_go_on(file: Results, name: str) -> bool:
+    about = file.attributes(name) if file.has(f"{name}/{GROUP}") else {"steps": 0, "status": ""}
+    return bool(about["steps"] > 0 or about["status"] == "completed")
 
 
 def _earlier_run(file: Results, analysis: Analysis) -> EarlierRun:
