@@ -30,6 +30,12 @@ def _in_pieces(piece: Bending, count: int) -> Bending:
     return replace(piece, pieces=count, missing=missing)
 
 
+def shared_in_motion(bending: Mapping[str, Bending]) -> dict[str, Bending]:
+    """How far links bend, none with smaller errors than the worst: what one does wrong moves and loads all others."""
+    worst = max((of.missing.of_deflections for of in bending.values()), default=0.0)
+    return {name: replace(of, missing=of.missing.grown_to(worst)) for name, of in bending.items()}
+
+
 def with_advice(
     bending: Mapping[str, Bending], divided: Callable[[Mapping[str, int]], Mapping[str, BodyInPieces]]
 ) -> dict[str, Bending]:

@@ -25,10 +25,11 @@ from ..mbs.quantities.spatial_validity import bending_in_space
 from ..mbs.quantities.validity import ENOUGH, IN_SPACE, Bending, enough_pieces, shape_from_chord
 from ..scene.pieces import BodyInPieces
 from ..scene.spatial_pieces import bodies_in_pieces_in_space
-from .bent_links import with_advice, worst_of_pieces
+from .bent_links import shared_in_motion, with_advice, worst_of_pieces
 from .spatial_solution import SpatialSolution
 
 MOST = 64
+AT_END = 1e-9  # of the length
 X = np.array([1.0, 0.0, 0.0])
 
 
@@ -132,6 +133,8 @@ def bending_of_links(solution: SpatialSolution, motion: SpatialMotion) -> dict[s
     bodies = solution.parts or solution.bodies
     links = {name: body.modal for name, body in bodies.items() if body.modal is not None}
     worst = worst_of_pieces(bending_in_space(motion, links), solution.divided)
+    if not motion.is_at_rest:
+        worst = shared_in_motion(worst)
     return with_advice(worst, partial(bodies_in_pieces_in_space, solution.scene))
 
 
@@ -167,10 +170,15 @@ def _motion_of_link(motion: SpatialMotion, link: Divided) -> BodyMotion:
 
 
 def _section(motion: SpatialMotion, link: Divided, x: float) -> SectionMotion:
-    """Of the section at x (m from the root of the link)."""
+    """Of the section at x (m from the root of the link); to second order in p at the ends of pieces, where K is."""
     starts, names = link.body.cut.starts, link.body.names
     k = int(np.clip(np.searchsorted(starts, x, side="right") - 1, 0, len(names) - 1))
     at = link.pieces[k].interpolate(min(x - starts[k], link.pieces[k].length))
+    for end, interface in link.pieces[k].interfaces.items():
+        if abs(interface.position[0] - at.position[0]) < AT_END * link.modal.length:
+            found = motion.section(f"{names[k]}.{end}")
+            rates = np.einsum("tij,tj->ti", found.L, motion.v)
+            return SectionMotion(found.r, found.F, rates[:, :3], rates[:, 3:])
     node, frame = motion.node(names[k]), motion.frames[motion.model.tree.index[names[k]]]
     Phi, Phi_r = at.translation @ node.body.modal_transform, at.rotation @ node.body.modal_transform
     p, p_dot = motion.q[:, node.p_q], motion.v[:, node.p_v]

@@ -30,6 +30,12 @@ class Missing(NamedTuple):
     of_length: float
     of_deflections: float
 
+    def grown_to(self, of_deflections: float) -> Missing:
+        """With that error of deflections, of points in proportion."""
+        if not 0.0 < self.of_deflections < of_deflections:
+            return self
+        return Missing(self.of_length / self.of_deflections * of_deflections, of_deflections)
+
 
 class Rotations(NamedTuple):
     """Largest rotations of sections (rad): twist from the root on, about y and z from the chord."""
