@@ -10,7 +10,7 @@ from ..model.spatial_gears import with_held_motors
 from ..scene.analysis import Analysis
 from ..solve.spatial_posture import undeformed_posture
 from ..solve.spatial_redundancy import resolved
-from ..solve.spatial_statics import holding_multipliers, static_equilibrium
+from ..solve.spatial_statics import holding_multipliers, static_equilibrium, unstable_ways
 from .context import Context
 from .outcome import Motion, Outcome, Statistics
 
@@ -24,10 +24,11 @@ def run_spatial_static(context: Context, analysis: Analysis) -> Outcome:
     model = with_held_motors(resolved(context.model, analysis.last_time))
     q = static_equilibrium(model, undeformed_posture(model)).q[None]
     at_rest, times = np.zeros((1, model.tree.n_v)), np.zeros(1)
-    multipliers = holding_multipliers(model, q[0])[None]
+    multipliers = holding_multipliers(model, q[0])
     return Outcome(
         analysis=analysis,
         model=model,
-        motion=Motion(times, q, at_rest, at_rest, multipliers, is_at_rest=True),
+        motion=Motion(times, q, at_rest, at_rest, multipliers[None], is_at_rest=True),
         statistics=Statistics(wall_seconds=time.perf_counter() - began),
+        warnings=tuple(unstable_ways(model, q[0], multipliers)),
     )

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
+from scipy.linalg import null_space
 
 from ...common.arrays import Array, as_floats
 from ...common.errors import SolveError
@@ -19,6 +20,8 @@ TOLERANCE = 1e-12  # residual forces relative to the largest of their terms, pos
 LARGEST_STEP = 0.3  # rad, sizes of the robot, and of p the same in sizes of its own
 AWAY = 0.1  # rad, sizes of the robot: by more than links bend in equilibrium
 DIFFERENCE = 6e-6  # of natural sizes: central differences of first derivatives
+SLACK = 1e-3  # of the largest force over its natural size: less stiffness is none
+UNSTABLE = -1e-5  # of the stiffness of single coordinates: closer to none is rounding of differences
 
 
 def forces_at_rest(model: SpatialModel, q: Array, t: float = 0.0) -> Array:
@@ -89,6 +92,30 @@ def static_equilibrium(model: SpatialModel, start: State, t: float = 0.0) -> Sta
         f"{model.scene.path}: no static equilibrium was found near the initial posture: a robot without motors or"
         " trajectories may have none there; give joint coordinates closer to it"
     )
+
+
+def unstable_ways(model: SpatialModel, q: Array, multipliers: Array) -> Iterator[str]:
+    """A warning where the equilibrium at q (n_q,), t = 0, with λ (rows,) is left at the slightest push.
+
+    There the derivative of the forces that lead back has a negative eigenvalue on what the rows leave free.
+    """
+    tree, n, row_scales = model.tree, model.tree.n_v, _row_scales(model)
+    jacobian = _jacobian(model, q, 0.0, multipliers, natural_sizes(model), row_scales)
+    K, size = -jacobian[:n, :n], _residual(model, q[None], 0.0, multipliers, row_scales)[1]
+    scale = 1 / np.sqrt(np.maximum(np.abs(np.diag(K)), max(SLACK * size, 1e-300)))
+    free = null_space(jacobian[n:, :n] * scale) if len(model.rows) else np.eye(n)
+    found, shapes = np.linalg.eig(free.T @ (K * scale * scale[:, None]) @ free)
+    if not len(found) or found.real.min() > UNSTABLE:
+        return
+    moved = np.abs(free @ shapes[:, found.real.argmin()])
+    node = max(tree.nodes, key=lambda node: float(moved[[*_columns(node.v), *_columns(node.p_v)]].max(initial=0.0)))
+    bends = moved[node.p_v].max(initial=0.0) > moved[node.v].max(initial=0.0)
+    what = f'"{node.body.name}" buckles' if bends else f'joint "{node.joint.name}" leaves it; start near another one'
+    yield f"the equilibrium is unstable: at the slightest push {what}"
+
+
+def _columns(part: slice) -> range:
+    return range(part.start, part.stop)
 
 
 def natural_sizes(model: SpatialModel) -> Array:

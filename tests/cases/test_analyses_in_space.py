@@ -1,5 +1,7 @@
 """Analyses of scenes in space beside pcid, through `ffrobot solve`: an independent code's numbers, and identities."""
 
+import warnings
+
 import numpy as np
 import pytest
 from space import close, solved, write_scene
@@ -210,3 +212,32 @@ def test_equilibrium_whose_forces_are_all_of_the_links(seed, number):
     modal = np.abs(results["rest/bodies/b1/modal"][0]).max()
     assert modal > 0.0
     assert np.abs(results["rest/bodies/b1/modal_velocity"][0]).max() < 1e-9 * modal
+
+
+@pytest.mark.parametrize("kind", ["static", "linear"])
+@pytest.mark.parametrize(
+    ("upper", "lower", "is_stable"), [(1.4, 0.1, True), (-1.4, 3.0, False), (-1.4, 0.1, False), (1.4, 3.0, False)]
+)
+def test_a_double_pendulum_has_one_stable_equilibrium(kind, upper, lower, is_stable):
+    """Both bars down, of four; joints about y carry x to -z."""
+    bar = {"mass": 1.0, "inertia": [0.1] * 3, "center": [0.25, 0, 0], "points": {"root": [0] * 3, "tip": [0.5, 0, 0]}}
+    hinge = {"type": "revolute", "axis": [0.0, 1.0, 0.0], "motor": False}
+    scene = ffrobot.make_scene(
+        name="pendulum",
+        space="spatial",
+        gravity=[0.0, 0.0, -9.81],
+        body=[{"name": "a", "rigid": bar}, {"name": "b", "rigid": bar}],
+        joint=[
+            {"name": "A", "between": ["ground", "a.root"], **hinge},
+            {"name": "B", "between": ["a.tip", "b.root"], **hinge},
+        ],
+        initial={"joints": {"A": upper, "B": lower}},
+        analysis=[{"name": "rest", "kind": kind}],
+    )
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ffrobot.FfrobotWarning)
+        results = ffrobot.solve(scene)
+    told = [text for text in results.warnings.get("rest", ()) if "equilibrium is unstable" in text]
+    assert len(told) == (not is_stable)
+    angles = [results[f"rest/joints/{name}/coordinate"][0] for name in "AB"]
+    np.testing.assert_allclose(angles, [np.copysign(np.pi / 2, upper), np.pi * (lower > 1)], atol=1e-9)

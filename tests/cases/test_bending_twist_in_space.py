@@ -99,14 +99,17 @@ def test_lateral_buckling(keys, below, above):
     for times, buckles in ((below, False), (above, True)):
         with pushed_over(times, **keys) as results:
             growth = np.linalg.eigvals(results["run/linear/A"][0]).real.max()
-            told = any("under which it buckles" in text for text in results.warnings.get("run", ()))
+            texts = " ".join(results.warnings.get("run", ()))
+            told = "under which it buckles" in texts
         assert (growth > 1.0) == buckles
+        assert ("the equilibrium is unstable" in texts) == buckles
         if "pieces" not in keys:  # no piece buckles by itself
             assert told == buckles
 
 
 @pytest.mark.slow
-def test_a_strip_let_go(tmp_path):
+@pytest.mark.parametrize(("newtons", "third_order"), [(4.9, 1e-3), (15.0, 3e-3)])
+def test_a_strip_let_go(tmp_path, newtons, third_order):
     """Straight, with a weight beside its axis: against the same modes without expansion; energy to the tolerance.
 
     What is left is of third order, 2e-3 of the peak. Without stiffening it is a third of it, the whole way aside.
@@ -121,15 +124,15 @@ def test_a_strip_let_go(tmp_path):
     keys = {"analysis": [forward], "initial": {"state": "undeformed"}}
     tips, energy = [], {}
     for stiffened in (True, False):
-        with solved(strip, geometric_stiffening=stiffened, **weight(15.0, inertia=1e-8), **keys) as results:
+        with solved(strip, geometric_stiffening=stiffened, **weight(newtons, inertia=1e-8), **keys) as results:
             tips.append(results["run/points/c.tip/position"][()] - [L, 0.0, 0.0])
             if stiffened:
                 energy = {part: results[f"run/energy/{part}"][()] for part in ("kinetic", "gravitational", "strain")}
                 time = results["run/time"][()]
     arm, gravity = np.array([0.0, 0.06, 0.0]), np.array([0.0, 0.0, -9.81])
-    exact = tip_let_go(body, 2700.0 * 0.004 * 0.02, 15.0 / 9.81, arm, gravity, time)
+    exact = tip_let_go(body, 2700.0 * 0.004 * 0.02, newtons / 9.81, arm, gravity, time)
     complete, plain = (np.linalg.norm(tip - exact, axis=1).max() / np.linalg.norm(exact, axis=1).max() for tip in tips)
-    assert complete < 3e-3
+    assert complete < third_order
     assert plain > 0.1
     total = sum(energy.values())
     assert np.abs(total - total[0]).max() < 1e-7 * energy["kinetic"].max()
