@@ -29,6 +29,7 @@ def run_spatial_static(context: Context, analysis: Analysis) -> Outcome:
         analysis=analysis,
         model=model,
         motion=Motion(times, q, at_rest, at_rest, multipliers[None], is_at_rest=True),
-        statistics=Statistics(wall_seconds=time.perf_counter() - began),
-        warnings=tuple(unstable_ways(model, q[0], multipliers)),
+        statistics=Statistics(
+            wall_seconds=time.perf_counter() - began, warnings=tuple(unstable_ways(model, q[0], multipliers))
+        ),
     )
