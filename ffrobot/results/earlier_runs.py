@@ -47,7 +47,9 @@ def earlier_runs(file: Results, analyses: Iterable[Analysis]) -> dict[str, Earli
 
 
 def _can_go_on(file: Results, name: str) -> bool:
-    about = file.attributes(name) if file.has(f"{name}/{GROUP}") else {"steps": 0, "status": ""}
+    if not file.has(f"{name}/{GROUP}"):
+        return False
+    about = file.attributes(name)
     return bool(about["steps"] > 0 or about["status"] == "completed")
 
 

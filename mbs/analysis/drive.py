@@ -114,8 +114,8 @@ def drive(
         integrator = replace(integrator, name=known.name, reason=known.reason)
     with going_on(earlier, times):
         controls = integration_controls(analysis, integrator)
-        if any(assembly.is_trajectory):
-            controls.stops = as_list(stops(times, assembly.model.scene.trajectory))
+        paths = assembly.model.scene.trajectory if any(assembly.is_trajectory) else ()
+        controls.stops = as_list(stops(times, paths, (size for _, size in assembly.model.loads)))
         run = _integrated(tree, start, times, controls, steering, control, continuation, progress, samples)
     seconds, integrator = time.perf_counter() - began, integrator.changed_in(run)
     statistics = statistics_of(assembly, run, integrator, seconds)

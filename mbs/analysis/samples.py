@@ -71,12 +71,13 @@ def in_order(outputs: Array, samples: Array) -> Indices:
     return found
 
 
-def stops(times: Array, paths: Iterable[Path]) -> Array:
-    """(n,) s within `times`: parts of brief pieces in which a path moves far, at whose ends steps of integrations end.
+def stops(times: Array, paths: Iterable[Path], loads: Iterable[TimeFunction]) -> Array:
+    """(n,) s within `times`, at which steps of integrations end.
 
-    Steps look at a path at their stages alone, and might pass one.
+    Steps look at paths and loads at their stages alone, and might pass a pulse. So they end where conditions of loads
+    change, t < 0.1 at 0.1 s, and along parts of brief pieces in which a path moves far.
     """
-    duration, found = times[-1] - times[0], [np.zeros(0)]
+    duration, found = times[-1] - times[0], [np.array(load.switches()) for load in loads]
     for path in paths:
         if path.path is not None and duration > 0.0:
             breaks = path.path.breaks
@@ -84,7 +85,7 @@ def stops(times: Array, paths: Iterable[Path]) -> Array:
             last = np.diff(breaks)
             brief = (last < BRIEF * duration) & (way * duration > FAR * last * way.max(initial=0.0))
             found.append(np.linspace(breaks[:-1][brief], breaks[1:][brief], PARTS + 1).ravel())
-    every = np.unique(np.concatenate(found))
+    every = np.unique(np.concatenate([np.zeros(0), *found]))
     within: Array = every[(every > times[0]) & (every < times[-1])]
     return within
 

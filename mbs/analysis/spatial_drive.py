@@ -79,8 +79,9 @@ def spatial_drive(
         known = earlier.statistics.integrator
         integrator = replace(integrator, name=known.name, reason=known.reason)
     controls = integration_controls(analysis, integrator)
-    if any(row.is_trajectory for row in model.rows):
-        controls.stops = as_list(stops(times, model.scene.trajectory))
+    paths = model.scene.trajectory if any(row.is_trajectory for row in model.rows) else ()
+    loads = (size for load in model.scene.load for size in load.components.values())
+    controls.stops = as_list(stops(times, paths, loads))
     system.integrated.scene.watch_posture(
         [model.rows[k].is_trajectory for k in system.integrated.rows], robot_size(model)
     )

@@ -55,6 +55,24 @@ Samples sample(const TimeFunction &function, Vector times) {
   return Samples(data, {3, count}, owner);
 }
 
+/// Times at which comparisons of t with a number change, in the order of the expression.
+std::vector<double> switches(const TimeFunction &function) {
+  std::vector<double> found;
+  if (function.expression() == nullptr)
+    return found;
+  const std::vector<Expression::Instruction> &program = function.expression()->program();
+  for (std::size_t k = 2; k < program.size(); ++k) {
+    if (program[k].op < Op::less || program[k].op > Op::greater_equal)
+      continue;
+    const Expression::Instruction &left = program[k - 2], &right = program[k - 1];
+    if (left.op == Op::time && right.op == Op::constant)
+      found.push_back(right.constant);
+    if (left.op == Op::constant && right.op == Op::time)
+      found.push_back(left.constant);
+  }
+  return found;
+}
+
 void bind_operations(nb::module_ &m) {
   nb::enum_<Op>(m, "Op", "Instructions of an expression in postfix order.")
       .value("constant", Op::constant)
@@ -112,5 +130,6 @@ void bind_time_function(nb::module_ &m) {
             return std::tuple(jet.value, jet.rate, jet.acceleration);
           },
           "t"_a, "(value, rate, acceleration) at time t (s).")
+      .def("switches", &switches, "Times (s) at which comparisons of t with a number change.")
       .def("sample", &sample, "t"_a, "Value, rate and acceleration (3, T) at the times t (T,).");
 }

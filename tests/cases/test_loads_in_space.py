@@ -205,3 +205,24 @@ def test_forces_on_the_ground_of_a_link_alone(kind, tmp_path):
     with h5py.File(ffrobot.solve(scene).save(tmp_path / "lone.h5")) as file:
         found, exact = (file[name]["joints/O/reaction"][()] for name in ("found", "exact"))
     assert np.abs(found - exact).max() < 1e-4 * np.abs(exact).max()
+
+
+@pytest.mark.parametrize("integrator", ["auto", "dop853", "dopri5", "radau"])
+@pytest.mark.parametrize("duration", [1e-9, 1e-5, 1e-3, 0.03])
+def test_no_step_skips_a_pulse(duration, integrator):
+    """A rod of inertia J at its hinge turns at impulse/J behind it, and not before."""
+    start, end, impulse = 0.503, 0.503 + duration, 2.0
+    body = {"mass": 1.0, "inertia": [0.1] * 3, "center": [0.25, 0, 0], "points": {"root": [0] * 3, "tip": [0.5, 0, 0]}}
+    moment = f"where(t > {start!r} and {end!r} >= t, {impulse / (end - start)!r}, 0)"
+    scene = ffrobot.make_scene(
+        name="rod",
+        space="spatial",
+        gravity=[0.0, 0.0, 0.0],
+        body=[{"name": "a", "rigid": body}],
+        joint=[{"name": "j", "type": "revolute", "axis": [0.0, 1.0, 0.0], "between": ["ground", "a.root"]}],
+        load=[{"joint": "j", "moment": moment}],
+        analysis=[{"name": "run", "kind": "forward", "end": 1.0, "output_step": 0.25, "integrator": integrator}],
+    )
+    rate = ffrobot.solve(scene)["run/joints/j/rate"]
+    rounded = np.spacing(start) / duration  # of its ends
+    np.testing.assert_allclose(rate, [0.0, 0.0, 0.0, impulse / 0.1625, impulse / 0.1625], rtol=1e-9 + 2 * rounded)
