@@ -39,4 +39,4 @@ def deflection_in_words(bending: Iterable[Mapping[str, Bending]]) -> str:
 
 def integrator_lines(choices: Mapping[str, Choice]) -> Iterator[str]:
     """By analysis: which integrators the program has chosen, and why."""
-    return alike((name, f"{one.name}; {one.reason}") for name, one in choices.items() if one.is_automatic)
+    return alike((name, f"{one.in_words}; {one.reason}") for name, one in choices.items() if one.is_automatic)

@@ -31,7 +31,7 @@ def print_spatial_summary(
         run, how = result.run, result.run.statistics
         off = f"{result.motion.violation.max(initial=0.0):.1e}"
         counts = f"{how.steps}", f"{how.evaluations}"
-        table.add_row(name, run.analysis.kind, run.status, how.integrator.name, *counts, off)
+        table.add_row(name, run.analysis.kind, run.status, how.integrator.in_words, *counts, off)
         motion = (result.closer or result).motion
         found = motion.motor_forces
         for joint, moments in {} if found is None else found.moments.items():

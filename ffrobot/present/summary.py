@@ -128,7 +128,7 @@ def _analyses(solution: Solution) -> Table:
         table.add_row(
             name,
             analysis.kind,
-            run.integrator.name if integrated else "",
+            run.integrator.in_words if integrated else "",
             f"{reached:g}" if run.status == "completed" else f"{reached:g} of {analysis.last_time:g}",
             f"{run.steps}" if integrated else "",
             f"{analysis.tolerance:.0e}" if integrated else "",

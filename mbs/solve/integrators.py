@@ -68,6 +68,12 @@ class Choice:
     candidates: tuple[Candidate, ...] = ()
 
     @property
+    def in_words(self) -> str:
+        """The methods in the order of the last change."""
+        last, _, before = self.name.partition(AFTER)
+        return f"{before}, then {last}" if before else last
+
+    @property
     def is_automatic(self) -> bool:
         """Whether the program made it, not the scene."""
         return self.reason != ASKED_FOR

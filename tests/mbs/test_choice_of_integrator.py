@@ -133,6 +133,7 @@ def test_a_choice_that_turns_out_badly_is_changed():
     alone = run_pcid(model, pcid(tolerance=tolerance, integrator="dop853"), False, always)
     exact = run_pcid(model, pcid(tolerance=1e-8, integrator="dop853"), False, always)
     assert watched.statistics.integrator.name == "radau after dop853"
+    assert watched.statistics.integrator.in_words == "dop853, then radau"
     assert "radau from t = 0.0" in watched.statistics.integrator.reason
     assert watched.statistics.evaluations < 0.8 * alone.statistics.evaluations
     for name in ("q", "lambda_", "tau", "F_p"):
