@@ -33,7 +33,8 @@ def test_summary(two_link):
     out = two_link.stdout
     lines = {line.split()[0]: line.split() for line in out.splitlines() if line.strip()}
     for name, kind in (("forward", "forward"), ("joints_only", "forward")):
-        assert lines[name][1:3] == [kind, "dop853"]
+        assert lines[name][1] == kind
+        assert "dop853" in lines[name][2:5]
     assert "…" not in out
     assert "\x1b" not in out
     for text in ("steps", "tolerance", "violation", "wall (s)", "largest (V)", "required /", "condition"):

@@ -190,7 +190,7 @@ def test_sides_of_a_surface(read):
         ("*ELEMENT, TYPE=MASS, ELSET=M\n9001, 1\n*MASS, ELSET=M\n5.\n", "1 of 5 each"),
         ("*MPC\nBEAM, 1, 2\n", r"not read: \*MPC"),
         ("*ELEMNT, TYPE=C3D8\n9, 1, 2, 3, 4, 5, 6, 7, 8\n", r"not read: \*ELEMNT"),
-        (elements(CELLS[2:4], elset="AGAIN", first=101), "2 of 8 cells are in the file again"),
+        (elements(CELLS[2:4], elset="AGAIN", first=101), "2 of 8 cells are duplicates in the file"),
     ],
 )
 def test_what_is_left_out_is_told(read, more, says):

@@ -66,7 +66,7 @@ def test_elements_that_stand_in_the_file_twice_count_once(read, cells, binary):
     assert len(part.cells) == len(cells)
     assert [len({part.regions[name], *part.overlaps.get(name, ())}) for name in ("all", "insert")] == [2, 1]
     assert np.sum(part.cell_tag == part.regions["insert"]) == half
-    assert f"{half} of {len(cells) + half} cells are in the file again" in part.remarks[-1]
+    assert f"{half} of {len(cells) + half} cells are duplicates in the file" in part.remarks[-1]
 
 
 @pytest.mark.parametrize(

@@ -144,7 +144,7 @@ def test_nodes_on_edges(read, card, cells, edges):
         (PLAIN + "CTETRA,99,1,1,2,3,4,5\n", "expected a grid point in the middle of all edges or none, found 1"),
         (PLAIN + "CTETRA,99,1,1,2,3,4,5,6\n,7,8,9,10,11,12\n", "expected 4 or 10 grid points"),
         (PLAIN.replace("-0.1", "-0.x", 1), 'GRID, line 1: expected a number, found "-0.x"'),
-        (fixed(POINTS, CELLS, wide=True).replace("*       -0.05           \n", "", 1), "line 1: .* with this one"),
+        (fixed(POINTS, CELLS, wide=True).replace("*       -0.05           \n", "", 1), "line 1: .* continues this one"),
         (PLAIN.replace("GRID,2,,0", "GRID,2,,0,0,0,,,,0", 1), "line 2: expected 8 fields in a line at most, found 11"),
         (PLAIN + "GRID,99,,0,0,0,0,0,0\n,1,1,1\n", "expected 8 fields of a grid point at most, found 11"),
         (PLAIN + "=,*(1),=,*(.1)\n", r"line \d+: expected cards one by one, found replicated ones"),
@@ -168,7 +168,7 @@ def test_what_cannot_be_is_rejected_by_name(read, text, says):
         ("CQUAD4,99,4,1,2,8,7\n", "1 CQUAD4"),
         ("RBE2,99,1,123456,2,3\n", "1 RBE2"),
         ("CHEAX,99,1,1,2,3,4,5,6\n", "not read: CHEAX"),
-        ("CHEXA,99,1,1,7,9,3,2,8\n,10,4\n", "1 of 7 cells are in the file again"),
+        ("CHEXA,99,1,1,7,9,3,2,8\n,10,4\n", "1 of 7 cells are duplicates in the file"),
     ],
 )
 def test_what_is_left_out_is_told(read, more, says):
