@@ -25,18 +25,35 @@ def states(rng, tree):
 
 
 def assert_same(system, at):
-    """Accelerations, those of frames, multipliers and energies of both, at states (T, n_q + n_v)."""
+    """Accelerations, multipliers, energies, and all forces of both, at states (T, n_q + n_v)."""
     assert system.plane is not None
     space = _core.tree_outputs(system.core, system.scene, TIMES, at)
     plane = _core.tree_outputs(*system.integrated[:2], TIMES, at)
-    frames = plane.frames.reshape(len(TIMES), -1, 3) @ system.plane.axes
     for found, expected in (
         (plane.accelerations, space.accelerations),
-        (frames.reshape(len(TIMES), -1), space.frames),
         (system.multipliers(plane.multipliers), space.multipliers * system.row_signs),
     ):
         np.testing.assert_allclose(found, expected, rtol=0, atol=CLOSE * np.abs(expected).max(initial=0.0))
-    np.testing.assert_allclose(plane.energy[:, :2], space.energy[:, :2], rtol=CLOSE)
+    assert_same_forces(system, at, plane.multipliers)
+
+
+def assert_same_forces(system, at, multipliers):
+    """At accelerations that nothing makes, less what joints carry across the plane, which the plane does not see."""
+    (q, v), axes = np.hsplit(at, [system.model.tree.n_q]), system.plane.axes
+    known = (TIMES, q, v, np.random.default_rng(0).standard_normal(v.shape))
+    core, scene, _ = system.integrated
+    space = system.core.motion_forces(system.scene, *known, multipliers @ system.plane.spread.T)
+    plane = core.motion_forces(scene, *known, multipliers)
+    count = len(TIMES)
+    in_plane = (space.joints.reshape(count, -1, 2, 3) @ axes.T).reshape(count, -1, 6)[..., [0, 1, 5]]
+    for found, expected in (
+        (plane.bodies.reshape(count, -1, 3) @ axes, space.bodies.reshape(count, -1, 3)),
+        (plane.rotors.reshape(count, -1, 3) @ axes, space.rotors.reshape(count, -1, 3)),
+        (plane.joints.reshape(count, -1, 3), in_plane),
+        (plane.modal, space.modal),
+        (core.states_totals(scene, q, v)[:, [0, 1, 3]], system.core.states_totals(system.scene, q, v)[:, [0, 1, 3]]),
+    ):
+        np.testing.assert_allclose(found, expected, rtol=0, atol=CLOSE * np.abs(expected).max(initial=0.0))
 
 
 @pytest.mark.parametrize("kind", ["rigid", "solid", "beam", "supported"])
