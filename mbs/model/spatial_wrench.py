@@ -28,14 +28,13 @@ class Wrench(NamedTuple):
 
 
 def along_joint(tree: SpatialTree, node: Node, force: Array, q: Array, frames: Sequence[Motion]) -> Wrench:
-    """What `force` (T, freedoms) along the joint that carries a body does on its outer side, about the global origin.
+    """What `force` (T, freedoms) along the joint that carries a body does on its outer side, about where that is.
 
     The opposite acts on its inner side.
     """
-    F, r = tree.motion(node.inner, q, frames).F, tree.motion(node.outer, q, frames).r
+    F = tree.motion(node.inner, q, frames).F
     acting = np.einsum("tij,tj->ti", node.joint.action(q[:, node.q]), force)
-    on_outer = (np.einsum("tij,tj->ti", F, part) for part in (acting[:, :3], acting[:, 3:]))
-    return Wrench(*on_outer).seen_from(r)
+    return Wrench(*(np.einsum("tij,tj->ti", F, part) for part in (acting[:, :3], acting[:, 3:])))
 
 
 def row_wrenches(
@@ -48,7 +47,7 @@ def row_wrenches(
     zero = np.zeros((len(times), 3))
     a, b = (tree.motion(section, q, frames) for section in (row.a, row.b))
     if row.kind == "coordinate":
-        on_b = along_joint(tree, tree.nodes[row.b.body], row.sign * size[:, None], q, frames)
+        on_b = along_joint(tree, tree.nodes[row.b.body], row.sign * size[:, None], q, frames).seen_from(b.r)
     elif row.kind in ("point", "slide"):
         f = np.einsum("tij,j->ti", a.F, row.f) if row.kind == "slide" else np.broadcast_to(row.f, a.r.shape)
         on_b = Wrench(size[:, None] * f, zero).seen_from(b.r)

@@ -30,7 +30,7 @@ MEASURES = {
     "tip_error": "position", "tip_error_max": "position", "tip_error_rms": "position", "overshoot": "position",
     "vibration": "position", "at_start": "position", "moments_repeated": "position",
     "modal_velocity": "velocity", "strain": "kinetic", "modal_force": "reaction", "mode_required": "reaction",
-    "reaction_moment": "reaction",
+    "reaction_moment": "reaction", "linear": "velocity", "angular": "angular_velocity",
 }  # fmt: skip
 """What numbers may be small against, until only rounding errors of them are left."""
 FLOORS = dict.fromkeys(
