@@ -7,26 +7,26 @@ from contextlib import contextmanager
 
 from .errors import SolveError
 
-EXTRAS: Mapping[str, str] = {
-    "matplotlib": "plot",
-    "plotly": "report",
-    "jinja2": "report",
-    "pyvista": "view",
-    "imageio_ffmpeg": "movie",
+PACKAGES: Mapping[str, str] = {
+    "matplotlib": "matplotlib",
+    "plotly": "plotly",
+    "jinja2": "jinja2",
+    "pyvista": "pyvista",
+    "imageio_ffmpeg": "imageio-ffmpeg",
     "pandas": "pandas",
     "control": "control",
-    "rosbags": "ros",
-    "trimesh": "urdf",
+    "rosbags": "rosbags",
+    "trimesh": "trimesh pycollada",
 }
-"""The extra of this package that installs a library."""
+"""What pip installs for each of these libraries."""
 
 
 def missing(error: ModuleNotFoundError) -> str | None:
     """What to install where one of these libraries is not there; None for any other."""
     library = (error.name or "").partition(".")[0]
-    if library not in EXTRAS:
+    if library not in PACKAGES:
         return None
-    return f"this needs {library}, which is not installed: pip install 'ffrobot[{EXTRAS[library]}]'"
+    return f"this needs {library}, which is not installed: pip install {PACKAGES[library]}"
 
 
 @contextmanager

@@ -133,6 +133,6 @@ def ffmpeg() -> str:
         return str(get_ffmpeg_exe())
     except (ModuleNotFoundError, RuntimeError):
         raise SolveError(
-            "a movie in MP4 needs ffmpeg, which is not installed: apt install ffmpeg, or pip install 'ffrobot[movie]';"
+            "a movie in MP4 needs ffmpeg, which is not installed: apt install ffmpeg, or pip install imageio-ffmpeg;"
             " a .gif needs neither"
         ) from None

@@ -131,7 +131,7 @@ def test_what_is_refused(results, two_link, tmp_path, monkeypatch):
             view_movie(body, tmp_path / "m.gif")
     monkeypatch.setenv("PATH", str(tmp_path))
     monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
-    with pytest.raises(SolveError, match=r"needs ffmpeg, which is not installed: .* pip install 'ffrobot\[movie\]'"):
+    with pytest.raises(SolveError, match=r"needs ffmpeg, which is not installed: .* pip install imageio-ffmpeg"):
         write_motion(results, tmp_path / "m.mp4")
     assert not list(tmp_path.iterdir())
 

@@ -86,7 +86,10 @@ def test_a_page_of_studies_alone(browser, folder, tmp_path):
     open_alone(browser, folder, tmp_path)
     assert browser.complaints == []
     assert browser.value("places.length") == 6
-    assert browser.value("[...document.querySelectorAll('nav a')].map((a) => a.textContent)") == ["Design", "Origin"]
+    assert browser.value("[...document.querySelectorAll('nav a')].map((a) => a.textContent)") == [
+        "Design",
+        "Input files and versions",
+    ]
     assert browser.value("document.title") == "arm <1> – ffrobot"
     text = browser.run("return document.querySelector('#design').innerText")
     assert "8.08 N m instead of 8 saves 0.1 kg" in text
@@ -130,4 +133,4 @@ def test_beside_results(browser, page, folder, two_link):
     browser.wait("document.querySelector('[data-chart$=\"_designs\"] .main-svg')")
     assert browser.complaints == []
     found = browser.value("[...document.querySelectorAll('nav a')].map((a) => a.textContent)")
-    assert found == ["Motion", "Summary", "Histories", "Modes", "Design", "Origin"]
+    assert found == ["Motion", "Summary", "Histories", "Modes", "Design", "Input files and versions"]

@@ -19,7 +19,7 @@ from .robot import Inertial, MeshFile, Robot
 if TYPE_CHECKING:
     import trimesh
 
-NOT_LOOKED_AT = "meshes were not read, which needs trimesh: pip install 'ffrobot[urdf]'"
+NOT_LOOKED_AT = "meshes were not read, which needs trimesh: pip install trimesh pycollada"
 
 
 @dataclass(frozen=True)

@@ -132,7 +132,7 @@ def _of_mesh(shape: MeshFile, urdf: Path, density: float, label: str) -> tuple[I
         mass = density * float(solid.volume)
         inertia = density * np.array(solid.moment_inertia)
     except ModuleNotFoundError:
-        raise InputError(f"{label}: masses of meshes need trimesh: pip install 'ffrobot[urdf]'") from None
+        raise InputError(f"{label}: masses of meshes need trimesh: pip install trimesh pycollada") from None
     except Exception as error:  # whatever a reader of damaged or unknown files raises
         raise InputError(f"{label}: mesh not read: {type(error).__name__}: {shown(str(error))}") from None
     sign = np.sign(mass)  # of a mesh whose faces look inward

@@ -24,7 +24,7 @@ def moving_configurations(results: Results) -> Iterator[FigureRecord]:
         snapshots = np.linspace(times[0], times[-1], SNAPSHOTS if len(times) > 1 else 1)
         yield FigureRecord(
             name=file_name("configurations", analysis),
-            title=f"configurations, {analysis}",
+            title=f"robot postures, {analysis}",
             kind="configurations",
             analysis=analysis,
             times=tuple(float(t) for t in snapshots),
@@ -51,7 +51,7 @@ def joint_figures(results: Results) -> Iterator[FigureRecord]:
         for coordinate in joint_coordinates(results.scene, joint):
             yield from _coordinate_figures(results, joint, coordinate)
         if held := curves_of(results, f"joints/{joint}/reaction", magnitude=True):
-            title = f"size of the reaction of joint {joint}"
+            title = f"magnitude of the reaction, joint {joint}"
             yield FigureRecord(name=file_name("reaction", joint), title=title, curves=held, y_label="reaction (N)")
 
 
@@ -60,10 +60,10 @@ def _coordinate_figures(results: Results, joint: str, coordinate: Coordinate) ->
     label, column, unit = joint + coordinate.label, coordinate.column, coordinate.unit
     moved = curves_of(results, f"joints/{joint}/coordinate", column)
     if any(np.ptp(results.data(curve.data)) for curve in moved):
-        title, y_label = f"joint {label}", f"{'angle' if unit == 'rad' else 'way'} ({unit})"
+        title, y_label = f"joint {label}", f"{'angle' if unit == 'rad' else 'displacement'} ({unit})"
         yield FigureRecord(name=file_name("coordinate", label), title=title, curves=moved, y_label=y_label)
     if driven := curves_of(results, f"joints/{joint}/moment", column):
-        force = f"{'moment' if unit == 'rad' else 'force'} ({coordinate.force_unit})"
+        force = f"{'torque' if unit == 'rad' else 'force'} ({coordinate.force_unit})"
         limit = coordinate.limits.moment
         title, lines = f"motor of joint {label}", both_ways(limit) if np.isfinite(limit) else ()
         yield FigureRecord(name=file_name("moment", label), title=title, curves=driven, y_label=force, limits=lines)
@@ -80,7 +80,7 @@ def _torque_speed(results: Results, joint: str, coordinate: Coordinate, y_label:
     if curves:
         yield FigureRecord(
             name=file_name("torque_speed", label),
-            title=f"motor of joint {label} over its speed",
+            title=f"torque–speed curve, joint {label}",
             kind="torque-speed",
             joint=joint,
             curves=tuple(curves),

@@ -59,7 +59,7 @@ def _paths(results: Results) -> Iterator[FigureRecord]:
         if group is None:
             continue
         components = _components(results, group)
-        curves = [Curve(data=f"{group}/target[{k}]", label=f"specified, {c}") for k, c in enumerate(components)]
+        curves = [Curve(data=f"{group}/target[{k}]", label=f"prescribed path, {c}") for k, c in enumerate(components)]
         for analysis in results.analyses:
             curves += _by_axis(f"{analysis}/points/{point}/position", analysis, [AXES.index(c) for c in components])
         if components:
@@ -90,7 +90,7 @@ def _modes(results: Results) -> Iterator[FigureRecord]:
         for body in results.names(f"{analysis}/bodies"):
             for dataset, title, y_label in (
                 ("modal", "modal coordinates", "modal coordinate (m·√kg)"),
-                ("modal_force", "modal forces wanted", "modal force (N/√kg)"),
+                ("modal_force", "required modal forces", "modal force (N/√kg)"),
             ):
                 data = f"{analysis}/bodies/{body}/{dataset}"
                 if results.has(data) and results.data(data).any():
@@ -114,7 +114,7 @@ def _trajectory_forces(results: Results) -> Iterator[FigureRecord]:
                 continue
             components, rows = _components(results, group), results.data(f"{group}/force").shape[1]
             turning = rows - len(components)
-            labels = MOMENTS if turning == 3 else [f"row {k + 1} of the orientation" for k in range(turning)]
+            labels = MOMENTS if turning == 3 else [f"orientation component {k + 1}" for k in range(turning)]
             for k, label in enumerate([*components, *labels]):
                 curve = Curve(data=f"{group}/force[{k}]", label=f"{analysis}, {label}")
                 (forces if k < len(components) else moments).append(curve)

@@ -55,7 +55,7 @@ def _paths(results: Results) -> Iterator[FigureRecord]:
         reached = [f"{a}/points/{point}/position" for a in results.analyses]
         in_plane = results.data(wanted[0]).shape[1] == 2
         component = "" if in_plane else "[1]" if "y" in trajectory else "[0]"
-        curves = [Curve(data=data, label="specified") for data in wanted]
+        curves = [Curve(data=data, label="prescribed path") for data in wanted]
         curves += [Curve(data=data + component, label=data.split("/")[0]) for data in reached]
         yield FigureRecord(
             name=file_name("path", name),

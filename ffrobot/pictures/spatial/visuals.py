@@ -28,7 +28,7 @@ def visual_surface(results: Results, name: str, notes: list[str]) -> tuple[Array
     try:
         skins = [_skin(entry, results.path.parent) for entry in entries]
     except ModuleNotFoundError:
-        notes.append("bodies are drawn without their meshes, which need trimesh: pip install 'ffrobot[urdf]'")
+        notes.append("bodies are drawn without their meshes, which need trimesh: pip install trimesh pycollada")
         return None
     except Exception as error:  # whatever a reader of damaged or missing files raises
         notes.append(f"{name} is drawn without its mesh: {shown(str(error))}")
