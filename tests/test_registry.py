@@ -13,7 +13,8 @@ from typing import Literal
 
 import numpy as np
 
-from ffrobot.mbs.analysis.outcome import Motion
+from ffrobot.mbs.analysis.context import Context
+from ffrobot.mbs.analysis.outcome import Motion, Outcome
 from ffrobot.mbs.analysis.planar_outcome import PlanarOutcome
 from ffrobot.mbs.fields.field_types import Positive
 from ffrobot.mbs.fields.references import Reference
@@ -35,7 +36,15 @@ class Turntable(TimedAnalysis):
         yield Reference("body", self.body)
 
     def run(self, context):
-        system = MechanismSystem(context.model, context.model.joints)
+        return self.in_space(context.model) if isinstance(context, Context) else self.in_plane(context.model)
+
+    def in_space(self, model):
+        q = self.rate * self.times[:, None]
+        v, nothing = np.full_like(q, self.rate), np.zeros((len(q), len(model.rows)))
+        return Outcome(analysis=self, model=model, motion=Motion(self.times, q, v, 0 * v, nothing))
+
+    def in_plane(self, model):
+        system = MechanismSystem(model, model.joints)
         start, t = undeformed_state(system).q, self.times
         q = np.tile(start, (len(t), 1))
         q[:, 2] += self.rate * t
@@ -80,6 +89,14 @@ results = ffrobot.solve(ffrobot.make_scene(**KEYS, analysis=[TURN]))
 np.testing.assert_allclose(results["turn/bodies/rod/angle"], 2.0 * np.linspace(0.0, 1.0, 5))
 np.testing.assert_allclose(results["turn/points/rod.tip/position"][-1], [np.cos(2.0), np.sin(2.0)])
 assert dict(results.attributes("turn"))["kind"] == "turntable"
+
+solid = ROD | {{"inertia": [0.1, 0.5, 0.5], "center": [0.5, 0.0, 0.0]}}
+solid["points"] = {{"root": [0.0, 0.0, 0.0], "tip": [1.0, 0.0, 0.0]}}
+in_space = KEYS | {{"space": "spatial", "gravity": [0.0, 0.0, 0.0], "body": [{{"name": "rod", "rigid": solid}}]}}
+in_space["joint"] = [KEYS["joint"][0] | {{"axis": [0.0, 0.0, 1.0]}}]
+turned = ffrobot.solve(ffrobot.make_scene(**in_space, analysis=[TURN]))
+np.testing.assert_allclose(turned["turn/joints/O/coordinate"], 2.0 * np.linspace(0.0, 1.0, 5))
+np.testing.assert_allclose(turned["turn/points/rod.tip/position"][-1], [np.cos(2.0), np.sin(2.0), 0.0], atol=1e-14)
 assert "integration of turn, algebraic" in results.skipped
 assert 'expected one of the bodies "rod", found "rd"' in rejected(body="rd")
 assert 'expected the key "shape" only in kind = "fcid", found kind = "turntable"' in rejected(shape="zero")
@@ -91,9 +108,9 @@ assert "Turntable" in schema("scene")["$defs"]
 def test_a_kind_is_a_file_and_an_entry(tmp_path):
     """The edit that a developer makes to the list is made here, in a process of its own."""
     source = Path(kinds.__file__).read_text(encoding="utf-8")
-    entry = "AnyKind = "
-    assert source.count(entry) == 1
-    source = source.replace(entry, f"from turntable import Turntable\n\n{entry}Turntable | ")
+    for entry in ("AnyKind = ", "AnyKindInSpace = "):
+        assert source.count(entry) == 1
+        source = source.replace(entry, f"from turntable import Turntable\n\n{entry}Turntable | ")
     (tmp_path / "turntable.py").write_text(TOY, encoding="utf-8")
     (tmp_path / "edited.py").write_text(f"kinds_source = {source!r}\n", encoding="utf-8")
     program = SOLVE.format(name="edited")

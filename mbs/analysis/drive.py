@@ -27,7 +27,7 @@ from ..solve.statics import static_equilibrium
 from .earlier_check import Datasets, check_earlier, going_on
 from .outcome import Continuation, EarlierRun, Forces, Motion, Statistics
 from .planar_outcome import PlanarOutcome
-from .samples import new_samples, stops, worth_a_look
+from .samples import new_samples, reached_samples, stops, worth_a_look
 
 Progress = Callable[[float], bool]
 """Called now and then with the time reached; False stops the run."""
@@ -131,12 +131,12 @@ def drive(
     )
     found = outcome if reported is None else outcome.in_coordinates_of(reported)
     found = found if earlier is None else _joined(earlier, found)
-    if samples is None or not len(samples.times):
+    if (reached := reached_samples(samples, found.time)) is None:
         return found
 
     @cache
     def look_closer() -> PlanarOutcome:
-        between = _between(tree, samples, outcome, steering, control)
+        between = _between(tree, *reached, outcome, steering, control)
         return found.among(between if reported is None else between.in_coordinates_of(reported))
 
     return replace(found, look_closer=look_closer)
@@ -159,15 +159,13 @@ def _datasets(assembly: MechanismSystem, earlier: EarlierRun, motors: int | None
 
 def _between(
     tree: PlanarTree,
-    samples: _core.Samples,
+    times: Array,
+    states: Array,
     outcome: PlanarOutcome,
     steering: _core.ExternalLoads | None,
     control: SampledControl | None,
 ) -> PlanarOutcome:
-    """The outcome at samples of its run."""
-    reached = samples.times <= outcome.time[-1]
-    times = samples.times[reached]
-    states = samples.states.reshape(len(reached), -1)[reached]
+    """The outcome at `times` (k,) of its run, with `states` (k, n)."""
 
     def at(rows: Indices) -> _core.Run:
         found = as_list(times[rows]), np.ascontiguousarray(states[rows])

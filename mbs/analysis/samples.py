@@ -42,6 +42,13 @@ def new_samples(times: Array, analysis: IntegratedAnalysis) -> _core.Samples | N
     return _core.Samples(duration / FEWEST, KEPT) if duration > 0.0 and not analysis.is_repeated else None
 
 
+def reached_samples(samples: _core.Samples | None, time: Array) -> tuple[Array, Array] | None:
+    """Times (k,), s, and states (k, n) of those before the last output, of `time` (T,); None where there are none."""
+    if samples is None or not len(time) or not (reached := samples.times <= time[-1]).any():
+        return None
+    return samples.times[reached], samples.states.reshape(len(reached), -1)[reached]
+
+
 def worth_a_look(count: int, read: Callable[[Indices], Array]) -> Indices:
     """Which of `count` samples to evaluate: some of all, and all about the highest values of the columns of `read`.
 

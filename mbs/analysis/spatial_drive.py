@@ -24,7 +24,7 @@ from ..solve.state import State
 from .drive import STATUS, Progress
 from .earlier_check import check_earlier, going_on
 from .outcome import Continuation, EarlierRun, Forces, Motion, Outcome, Statistics
-from .samples import new_samples, stops, worth_a_look
+from .samples import new_samples, reached_samples, stops, worth_a_look
 
 
 @dataclass(frozen=True)
@@ -120,9 +120,9 @@ def spatial_drive(
         continuation=continuation if control is None else None,
         again=again if control is None else None,
     )
-    if samples is None or not len(samples.times):
+    if (reached := reached_samples(samples, found.time)) is None:
         return found
-    look_closer = cache(lambda: found.among(_between(system, samples, found, control)))
+    look_closer = cache(lambda: found.among(_between(system, *reached, found, control)))
     return replace(found, look_closer=look_closer)
 
 
@@ -137,11 +137,11 @@ def _check(earlier: EarlierRun, model: SpatialModel, times: Array) -> None:
     check_earlier(earlier, times, (n_q, n_v), datasets)
 
 
-def _between(system: SpatialSystem, samples: _core.Samples, found: Outcome, control: SpatialControl | None) -> Outcome:
-    """The run at samples of it."""
+def _between(
+    system: SpatialSystem, times: Array, states: Array, found: Outcome, control: SpatialControl | None
+) -> Outcome:
+    """The run at `times` (k,) of it, with `states` (k, n)."""
     core, scene, _ = system.integrated
-    reached = samples.times <= (found.time[-1] if len(found.time) else -np.inf)
-    times, states = samples.times[reached], samples.states.reshape(len(reached), -1)[reached]
 
     def at(rows: Indices) -> _core.TreeRun:
         chosen, of_rows = as_list(times[rows]), np.ascontiguousarray(states[rows])

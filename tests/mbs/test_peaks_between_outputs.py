@@ -108,6 +108,18 @@ def test_peaks_of_a_ringing_arm_are_those_of_a_hundred_times_as_many_outputs(spa
         assert peak == found.moment > np.abs(results["inverse/joints/O/moment"]).max() * 1.02
 
 
+@pytest.mark.parametrize("space", [False, True], ids=["2D", "3D"])
+def test_a_resumed_run_may_end_before_its_next_output(tmp_path, space):
+    scene, results = flexible(0.5, space), tmp_path / "arm.results.h5"
+    scene["analysis"][0] |= {"max_steps": 30}
+    ends = []
+    for resume in (False, True):
+        with pytest.raises(ffrobot.SolveError, match="too many steps") as caught:
+            ffrobot.solve(ffrobot.make_scene(**scene), results, resume=resume)
+        ends.append(float(str(caught.value).partition("ended at t = ")[2].partition(" s")[0]))
+    assert 0.0 < ends[0] < ends[1] < 0.5
+
+
 def test_looking_between_outputs_leaves_the_outputs_as_they_are():
     """Steps do not end elsewhere: outputs of a coarse run are those of a fine one, to rounding of the interpolation."""
     coarse, fine = (solve(flexible(step, space=False)) for step in (0.25, 0.125))
