@@ -244,7 +244,7 @@ def test_outputs_that_fail_leave_the_integration(arm, monkeypatch):
     scene = arm()
     expected, path = ffrobot.solve(scene), scene.with_suffix(".h5")
     with monkeypatch.context() as fault:
-        fault.setattr("ffrobot.run.spatial.energies", lambda motion: 1 / 0)
+        fault.setattr("ffrobot.run.spatial.totals", lambda motion: 1 / 0)
         with pytest.raises(ffrobot.SolveError, match=r'"inverse": outputs failed .* kept .*ZeroDivisionError'):
             ffrobot.solve(scene, path)
     kept = ffrobot.Results(path)
