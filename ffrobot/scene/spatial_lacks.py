@@ -69,6 +69,11 @@ LACKS = (
         "ffrobot.mbs.model.spatial_model",
     ),
     Lack(
+        "sensors and controllers on spherical and free joints, and on joints at which loops are cut",
+        "sensors of points, or of other joints of the loop",
+        "ffrobot.actuation.control.spatial_signals",
+    ),
+    Lack(
         "forward motions with geometric stiffening as FMUs",
         "`geometric_stiffening = false`",
         "ffrobot.exchange.fmu.forward_model",
