@@ -256,20 +256,20 @@ def _advice(
             yield f"motor of {name}: {text}"
     if beyond and asked:
         yield (
-            f"a slower path (fastest = true finds the smallest time-scaling factor), or another motor or gear for"
+            "a slower path (fastest = true finds the smallest time-scaling factor), or another motor or gear for"
             f" {', '.join(beyond)}"
         )
+    inversion = 'kind = "motors-only", or ' if asked and _is_from_rest_to_rest(group) else ""
     for body, need in patches.items() if asked else ():
-        if need.factor > 1.0:
+        if 1.0 < need.factor <= FAR_BEYOND:
             yield (
                 f"patches of {body}: a limit of {_number(need.limit)} V is sufficient; sufficient layers, thickness or"
                 " number: ffrobot feasibility"
-                if need.factor <= FAR_BEYOND
-                else f"patches of {body}: no realistic patch can supply this; prescribe a static shape (fcid) or use"
-                " motors only (motors-only)"
             )
+    if far := [body for body, need in patches.items() if asked and need.factor > FAR_BEYOND]:
+        other = "a slower path" if group.attrs["kind"] == "fcid" else 'kind = "fcid" with shape = "static"'
+        yield f"{inversion}{other}: no realistic patch can supply the voltages of {', '.join(far)}"
     if asked and read_unsupplied(group["feasibility"]) is not None:
-        inversion = 'kind = "motors-only", or ' if _is_from_rest_to_rest(group) else ""
         yield f"{inversion}patches ([[pzt]]) on the links"
     if "linear" in group and (text := str(group["linear"].attrs.get("advice", ""))):
         yield text

@@ -49,6 +49,9 @@ def test_summary(two_link):
         "damping, which is zero",
     ):
         assert text in " ".join(out.split())  # may go over two lines
+    flat = " ".join(out.split())
+    assert "no realistic patch can supply the voltages of link1, link2" in flat
+    assert "V is sufficient" not in flat  # a limit of 97 kV
     required = two_link.file["inverse/pzt/link1/required_voltage"].attrs["peak"].max()
     assert f"{required:.5g}" in out
     assert f"{required / 200:.3g}" in out
