@@ -185,8 +185,8 @@ def cause_of(inversion: Inversion[S]) -> str:
         return ""
     count = (linear.is_future if linear.is_light.any() else is_unstable(linear.zeros)).sum(axis=1)
     changed = np.flatnonzero(count != count[0])
-    k = linear.singular_after
-    if inversion.status == "inversion not converged" and k is not None:
+    if inversion.status == "inversion not converged" and linear.singular_after:
+        k = linear.singular_after[0]
         return f"singular coupling between t = {linear.times[k]:.4g} and {linear.times[k + 1]:.4g} s, {INFINITE}"
     if inversion.status == "mesh too coarse" or not len(changed):
         return f"{ADVICE[inversion.status]} (worst at t = {inversion.worst:.4g} s)"

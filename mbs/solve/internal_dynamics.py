@@ -62,6 +62,11 @@ class Output(Protocol):
         """By body."""
         ...
 
+    @property
+    def doubt(self) -> str:
+        """What is wrong with postures along the path; "" where nothing is."""
+        ...
+
     def residuals(self, times: Array, p: Array, v: Array, a: Array, /) -> Array:
         """Forces r (N, n) on modes that nobody supplies, at `times` (N,), p, ṗ and p̈ (N, n); NaN out of reach.
 
@@ -141,10 +146,14 @@ def equilibrium(servo: Output, t: float) -> Array:
         p = p - step
         if np.linalg.norm(step) <= TOLERANCE * (np.linalg.norm(p) + 1e-12):
             return np.asarray(p[0])
-    raise SolveError(
-        f"{servo.where}: no equilibrium under the motors was found at t = {t:g} s: the links are too soft for their"
-        " loads there: stiffen them, or take less payload"
-    )
+    soft = "the links are too soft for their loads there: stiffen them, or take less payload"
+    cause = cause_in_posture(servo) or soft
+    raise SolveError(f"{servo.where}: no equilibrium under the motors was found at t = {t:g} s: {cause}")
+
+
+def cause_in_posture(servo: Output) -> str:
+    """Why links that bend leave an output without a posture, and the cure, where postures are it; else ""."""
+    return servo.doubt and f"{servo.doubt}, and cannot where links bend. Move the path, or start in another posture"
 
 
 def first_order(dynamics: LinearDynamics, k: int, scale: Array) -> Array:

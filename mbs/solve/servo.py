@@ -77,6 +77,11 @@ class Servo:
         return omega
 
     @property
+    def doubt(self) -> str:
+        """Of postures: none, as reach is known when the path is read."""
+        return ""
+
+    @property
     def mode_sizes(self) -> Array:
         """√J of the bodies of all modes (n,), m·√kg."""
         return np.concatenate([np.full(body.n_modes, np.sqrt(body.inertia)) for body in self.path.model.bodies])

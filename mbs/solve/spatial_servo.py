@@ -17,10 +17,11 @@ from ..model.spatial_model import SpatialModel, row_values
 from ..model.spatial_motors import SplitForces, split_forces
 from ..model.spatial_rows import SpatialRow
 from .internal_dynamics import Stopped, Target
-from .spatial_posture import BoolArray, mobility, solve_posture, undeformed_posture
+from .spatial_posture import BoolArray, mobility, solve_posture, told_posture, undeformed_posture
 from .spatial_prescribed import modal_places, motion_near
 
 POSTURES = 201  # along the path, from which others are looked for
+EVERY = 10  # of these is looked at for singular ones
 MOST_STATES = 1000  # that are evaluated at once, a fraction of a second
 
 
@@ -68,6 +69,13 @@ class SpatialServo:
     def mode_counts(self) -> list[int]:
         """By body of the tree."""
         return [node.body.n_modes for node in self.model.tree.nodes]
+
+    @cached_property
+    def doubt(self) -> str:
+        """What to say of the worst posture along the path; "" where all are fine."""
+        ratios = [mobility(self.model, q).ratio for q in self.near[::EVERY]]
+        worst = EVERY * int(np.argmin(ratios))
+        return told_posture(self.model, min(ratios), float(self.near_times[worst]), self.near[worst], is_end=False)
 
     def targets(self) -> Iterator[Target]:
         """What the path follows."""

@@ -31,6 +31,7 @@ WINDOW = 32  # intervals integrated forward at once
 SHORTEST = 1e-7  # of all the time, an interval of them
 MOST_INTERVALS = 3000  # solved at once
 MOST_REFINEMENTS = 14
+MOST_PLACES = 200  # along a motion at which derivatives are taken again
 MOST_PARTS = 6  # an interval is cut into at once
 TINY = 1e-300
 PROBES = np.sort(np.concatenate([(GAUSS.c[1:] + GAUSS.c[:-1]) / 2, [0.01, 0.5, 0.99]]))  # where r is looked at
@@ -81,32 +82,27 @@ def invert(
     Raises `SolveError` where there is no equilibrium to start from or to end in, or where zeros change sides.
     """
     end = float(linear.times[-1])
-    start, finish = (
-        _boundary(servo, t, linear.zeros[k], linear.is_future[k] == future)
-        for t, k, future in ((-pre, 0, False), (end + post, -1, True))
-    )
-    if len(start.rows) + len(finish.rows) != 2 * len(servo.scale):
-        raise SolveError(
-            f"{servo.where}: stable inversion needs as many zeros in the right half plane at t = 0 s as at t ="
-            f" {end:g} s, found {2 * len(servo.scale) - len(start.rows)} and {len(finish.rows)}. Change the number of"
-            ' modes in the link files, end the path in a posture more like the first, or use output = "redefined"'
-        )
-    problem = Problem(
-        servo.residuals, linear.dynamics, servo.scale,
-        max(TINY, float(np.abs(servo.scale * linear.shape).max())), start, finish,
-        GAUSS if linear.is_light.any() and linear.singular_after is None else OF_SECOND_ORDER,
-    )  # fmt: skip
+    start, finish = _boundaries(servo, linear, -pre, end + post)
+    size = max(TINY, float(np.abs(servo.scale * linear.shape).max()))
     force = max(TINY, float(np.abs(servo.scale**2 * linear.shape).max()))
-    solver = _Solver(problem, tolerance * force, progress)
-    try:
-        if len(finish.rows):
-            solver.solve(_breaks(pre, end, post), _constant(start.state[: len(servo.scale)]))
-        else:
-            solver.march(np.unique([-pre, 0.0, end, end + post]), partial(_about, servo, linear.dynamics))
-    except Stopped:
-        if solver.curve is None:
-            raise
-        solver.status = "interrupted"
+    schemes = [OF_SECOND_ORDER] if not linear.is_light.any() else [GAUSS]
+    if linear.singular_after:  # either may lose the p̈ that has no factor for a moment
+        schemes = [GAUSS, OF_SECOND_ORDER]
+    for scheme in schemes:
+        problem = Problem(servo.residuals, linear.dynamics, servo.scale, size, start, finish, scheme)
+        solver = _Solver(problem, tolerance * force, progress)
+        try:
+            if len(finish.rows):
+                about = partial(_along, servo)
+                solver.solve(_breaks(pre, end, post), _constant(start.state[: len(servo.scale)]), about)
+            else:
+                solver.march(np.unique([-pre, 0.0, end, end + post]), partial(_about, servo, linear.dynamics))
+        except Stopped:
+            if solver.curve is None:
+                raise
+            solver.status = "interrupted"
+        if solver.status in ("completed", "interrupted"):
+            break
     assert solver.curve is not None
     return Inversion(
         servo, linear, solver.curve, solver.status, solver.iterations, solver.unmet / force, solver.worst,
@@ -123,8 +119,12 @@ class _Solver:
         self.problem, self.most, self.progress = problem, most, progress
         self.status, self.iterations, self.unmet, self.worst = "", 0, 0.0, 0.0
 
-    def solve(self, breaks: Array, guess: States) -> None:
-        """On all breaks at once."""
+    def solve(self, breaks: Array, guess: States, along: Callable[[States, Array], Derivatives]) -> None:
+        """On all breaks at once.
+
+        along(states, breaks) has the derivatives along a motion: taken where those of the last mesh do not lead on.
+        """
+        is_near = True  # derivatives to the guess
         for refinement in range(MOST_REFINEMENTS):
             found = collocate(self.problem, breaks, guess)
             self.iterations += found.iterations
@@ -136,13 +136,17 @@ class _Solver:
             if unmet.max() <= self.most:
                 self.status, self.unmet = "completed", float(unmet.max())
                 return
-            finer = _refined(breaks, as_floats(unmet / self.most)) if found.converged else _halved(breaks)
-            if len(finer) > MOST_INTERVALS + 1:
-                break
             if not self.progress(float(breaks[0] + (breaks[-1] - breaks[0]) * refinement / MOST_REFINEMENTS)):
                 self.status = "interrupted"
                 break
-            breaks, guess = finer, _states(found.curve) if found.converged else guess
+            if found.converged:
+                breaks, guess, is_near = _refined(breaks, as_floats(unmet / self.most)), _states(found.curve), False
+            elif not is_near:
+                self.problem, is_near = replace(self.problem, derivatives=along(guess, breaks)), True
+            else:
+                breaks = _halved(breaks)
+            if len(breaks) > MOST_INTERVALS + 1:
+                break
         self.unmet, self.curve = float(unmet.max()), self.curve or found.curve
 
     def march(self, corners: Array, about: Callable[[float, Array], Derivatives]) -> None:
@@ -189,6 +193,12 @@ class _Solver:
         return largest
 
 
+def _along(servo: Output, states: States, breaks: Array) -> Derivatives:
+    """Those about the motion `states`, at most `MOST_PLACES` breaks."""
+    times = breaks[:: -(-len(breaks) // MOST_PLACES)]
+    return linear_dynamics(servo, times, *states(times))
+
+
 def _about(servo: Output, along: LinearDynamics, t: float, y: Array) -> Derivatives:
     """Those `along` the path, with what the state y (2n,) at time t changes of them."""
     now, (p, v) = np.array([t]), y.reshape(2, 1, -1)
@@ -202,18 +212,64 @@ def _about(servo: Output, along: LinearDynamics, t: float, y: Array) -> Derivati
     return derivatives
 
 
-def _boundary(servo: Output, t: float, s: ComplexArray, is_held: Booleans) -> Boundary:
+def _boundaries(servo: Output, linear: Linearisation, first: float, last: float) -> tuple[Boundary, Boundary]:
+    """What holds at the times `first` and `last`, 2n conditions in all.
+
+    A zero that passes through infinity takes a condition away, or brings one: p̈ of a fast motion loses its factor
+    there, and a motion without it is smooth (what is left of it shows in `unmet`). The fastest motion then has one
+    condition more or less: intervals far longer than it lets it neither grow nor decay.
+    Raises `SolveError` where zeros change sides otherwise.
+    """
+    held = [~linear.is_future[0], linear.is_future[-1].copy()]
+    excess = int(sum(of.sum() for of in held)) - linear.zeros.shape[1]
+    if excess and not linear.singular_after:
+        raise SolveError(
+            f"{servo.where}: stable inversion needs as many zeros in the right half plane at t = 0 s as at t ="
+            f" {linear.times[-1]:g} s, found {np.count_nonzero(~held[0])} and {np.count_nonzero(held[1])}. Change the"
+            " number of modes in the link files, end the path in a posture more like the first, or use output ="
+            ' "redefined"'
+        )
+    zeros = linear.zeros[[0, -1]]
+    speeds = np.where([of if excess > 0 else ~of for of in held], np.abs(zeros), 0.0).max(axis=1)
+    rows = [int(of.sum()) for of in held]
+    rows[int(speeds.argmax())] -= excess
+    found = [_boundary(servo, t, zeros[k], held[k], rows[k]) for k, t in enumerate((first, last))]
+    return found[0], found[1]
+
+
+def _boundary(servo: Output, t: float, s: ComplexArray, is_held: Booleans, count: int) -> Boundary:
     """No part of y − y_rest in the subspace of the zeros s (2n,) that are held, of the equilibrium at time t.
 
-    An orthonormal basis of the left invariant subspace, from the ordered Schur form of 𝒜ᵀ with eigenvalues near s.
+    An orthonormal basis of the left invariant subspace, from the ordered Schur form of 𝒜ᵀ with eigenvalues near s;
+    `count` of them, without some of the fastest that are held, or with some of the fastest others.
     """
-    from scipy.linalg import schur
-
     p, rest = equilibrium(servo, t), np.zeros((1, len(servo.scale)))
     A = first_order(linear_dynamics(servo, np.array([t]), p[None], rest, rest), 0, servo.scale)
-    _, U, count = schur(A.T, sort=lambda re, im: bool(is_held[np.abs(s - complex(re, abs(im))).argmin()]))
-    rows = U[:, :count].T * np.concatenate([servo.scale, np.ones_like(servo.scale)])
+    others = [is_held]  # sets of zeros, each within the next one, up to one with at least `count`
+    while not min(x.sum() for x in others) <= count <= max(x.sum() for x in others):
+        others.append(_with_fastest(s, others[-1], held=bool(is_held.sum() < count)))
+    basis = np.zeros((2 * len(p), 0))
+    for held in sorted(others, key=lambda x: int(x.sum())):
+        more = _invariant(A, s, held)
+        more -= basis @ (basis.T @ more)
+        basis = np.hstack([basis, np.linalg.svd(more, full_matrices=False)[0][:, : held.sum() - basis.shape[1]]])
+    rows = basis[:, :count].T * np.concatenate([servo.scale, np.ones_like(servo.scale)])
     return Boundary(rows, np.concatenate([p, rest[0]]))
+
+
+def _with_fastest(s: ComplexArray, is_held: Booleans, *, held: bool) -> Booleans:
+    """The same but for the fastest zero of those that are not `held`, or are: with it and its conjugate."""
+    fastest = s[np.where(is_held != held, np.abs(s), -1.0).argmax()]
+    chosen = np.abs(s.real + 1j * np.abs(s.imag) - fastest.real - 1j * abs(fastest.imag)) <= 1e-9 * abs(fastest)
+    return np.where(chosen, held, is_held)
+
+
+def _invariant(A: Array, s: ComplexArray, is_held: Booleans) -> Array:
+    from scipy.linalg import schur
+
+    _, U, count = schur(A.T, sort=lambda re, im: bool(is_held[np.abs(s - complex(re, abs(im))).argmin()]))
+    found: Array = U[:, :count]
+    return found
 
 
 def _breaks(pre: float, end: float, post: float) -> Array:

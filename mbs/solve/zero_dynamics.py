@@ -14,11 +14,12 @@ from numpy.typing import NDArray
 
 from ...common.arrays import Array, Booleans, ComplexArray, as_floats
 from ...common.errors import SolveError
-from .internal_dynamics import LinearDynamics, Output, is_unstable, linear_dynamics, stiffness, zeros
+from .internal_dynamics import LinearDynamics, Output, cause_in_posture, is_unstable, linear_dynamics, stiffness, zeros
 
 SAMPLES = 33  # of the linear dynamics along the path
 LIGHT = 0.1  # |Re s| / |s| of a lightly damped vibration
 GROWTH = 1.0  # ln of what it may grow by along a path and count as bounded
+JUMP = 0.5  # of the size of a zero, between two samples: it passed through infinity
 SHAPE_ITERATIONS = 8  # of that shape, each a hundred times closer for links that are not very soft
 TINY = 1e-300
 
@@ -42,29 +43,38 @@ class Linearisation:
 
         Those in the right half plane; but lightly damped vibrations, whose zeros may cross the imaginary axis along the
         path, only where they grow too far over all of it, by exp ∫ Re s dt. Else they start at rest and ring on: a jump
-        in jerk excites them by about 10/(|s| T) of a deflection, of which they may come to a tenth.
+        in jerk excites them by about 10/(|s| T) of a deflection, of which they may come to a tenth. A zero that leaves
+        through infinity and comes back elsewhere counts at each time as it is then.
         """
         from scipy.integrate import trapezoid
 
-        places = self._followed
+        places, jumps = self._followed
         s, T = np.take_along_axis(self.zeros, places, axis=1), float(self.times[-1])
         most = np.maximum(GROWTH, np.log(np.maximum(np.abs(s).mean(axis=0) * T / 100, TINY)))
-        is_light = np.take_along_axis(self.is_light, places, axis=1).any(axis=0)
-        future = np.where(is_light, trapezoid(s.real, self.times, axis=0) > most, is_unstable(s[0]))
+        light = np.take_along_axis(self.is_light, places, axis=1)
+        future = np.where(light.any(axis=0), trapezoid(s.real, self.times, axis=0) > most, is_unstable(s[0]))
+        flags = np.where(jumps, is_unstable(s) & ~light, future)
         found = np.zeros(s.shape, dtype=bool)
-        np.put_along_axis(found, places, np.broadcast_to(future, s.shape), axis=1)
+        np.put_along_axis(found, places, flags, axis=1)
         return found
 
     @property
-    def _followed(self) -> NDArray[np.int_]:
-        """Where the zeros at t = 0 stand (N, 2n) at all times: those that move least in all."""
+    def _followed(self) -> tuple[NDArray[np.int_], Booleans]:
+        """Where the zeros at t = 0 stand (N, 2n) at all times, those that move least, and which of them jump (2n,).
+
+        Ways are shares of sizes, so that those of fast zeros, which pass through infinity, do not outweigh others.
+        """
         from scipy.optimize import linear_sum_assignment
 
         places = np.tile(np.arange(self.zeros.shape[1]), (len(self.zeros), 1))
+        jumps = np.zeros(self.zeros.shape[1], dtype=bool)
         for k in range(1, len(places)):
-            before = self.zeros[k - 1, places[k - 1]]
-            places[k] = linear_sum_assignment(np.abs(before[:, None] - self.zeros[k]))[1]
-        return places
+            before, now = self.zeros[k - 1, places[k - 1]][:, None], self.zeros[k]
+            ways = np.abs(before - now) / np.maximum(np.abs(before) + np.abs(now), TINY)
+            rows, places[k] = linear_sum_assignment(ways)
+            if k - 1 in self.singular_after:
+                jumps |= ways[rows, places[k]] > JUMP
+        return places, jumps
 
     @property
     def is_light(self) -> Booleans:
@@ -73,11 +83,10 @@ class Linearisation:
         return light
 
     @property
-    def singular_after(self) -> int | None:
-        """Which of the times is the last before a zero passes through infinity, where det M changes its sign."""
+    def singular_after(self) -> tuple[int, ...]:
+        """Which of the times are the last before a zero passes through infinity, where det M changes its sign."""
         sides = np.linalg.slogdet(self.dynamics.M)[0]
-        changed = np.flatnonzero(sides[1:] != sides[:-1])
-        return int(changed[0]) if changed.size else None
+        return tuple(int(k) for k in np.flatnonzero(sides[1:] != sides[:-1]))
 
     @property
     def times(self) -> Array:
@@ -111,7 +120,6 @@ def _check_numbers(servo: Output, times: Array, *found: Array) -> None:
     """Raise `SolveError` for the first of the times (N,) at which one of `found` (N, …) is no number."""
     lost = np.any([~np.isfinite(x.reshape(len(times), -1)).all(axis=1) for x in found], axis=0)
     if lost.any():
-        raise SolveError(
-            f"{servo.where}: motor torques alone cannot follow the path at t = {times[lost.argmax()]:g} s: the links"
-            " are too soft for their loads there; slow the path down"
-        )
+        cause = cause_in_posture(servo) or "the links are too soft for their loads there; slow the path down"
+        t = times[lost.argmax()]
+        raise SolveError(f"{servo.where}: motor torques alone cannot follow the path at t = {t:g} s: {cause}")

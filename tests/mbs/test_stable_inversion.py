@@ -326,8 +326,8 @@ def test_zero_that_passes_through_infinity_is_found_with_its_time():
     """The second mode's inertia changes sign at t = 0.55, where the motors lose it."""
     t = np.linspace(0.0, 1.0, 11)
     linear = along(np.column_stack([1 + 0 * t, 0.55 - t]), np.zeros((11, 2)), np.tile([1e4, -1e4], (11, 1)), [1e2, 1e2])
-    assert linear.singular_after == 5
-    assert along(np.ones((11, 2)), np.zeros((11, 2)), np.ones((11, 2)), [1.0, 1.0]).singular_after is None
+    assert linear.singular_after == (5,)
+    assert along(np.ones((11, 2)), np.zeros((11, 2)), np.ones((11, 2)), [1.0, 1.0]).singular_after == ()
 
 
 @pytest.mark.parametrize(("growth", "future"), [(0.5, False), (2.0, False), (4.0, True)])
