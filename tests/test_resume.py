@@ -87,7 +87,7 @@ def test_implicit_methods_go_on_within_the_tolerance(arm, integrator):
 
 def inverse_alone(scene):
     text = scene.read_text(encoding="utf-8")
-    scene.write_text(text[: text.index("# The same torques and voltages")], encoding="utf-8")
+    scene.write_text(text[: text.index("# The same moments and voltages")], encoding="utf-8")
 
 
 def test_max_steps_may_be_raised_and_count_anew(arm):
