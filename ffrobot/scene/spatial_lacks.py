@@ -53,7 +53,7 @@ LACKS = (
         "ffrobot.actuation.control.spatial_placement",
     ),
     Lack(
-        '`output = "redefined"` of `motors-only` in kinematic loops',
+        '`output = "redefined"` of `motors-only` with motors in planar joints and kinematic loops',
         '`output = "tip"`',
         "ffrobot.mbs.solve.spatial_servo",
     ),

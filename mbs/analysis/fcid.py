@@ -3,24 +3,17 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cache
-
-import numpy as np
 
 from ...common.arrays import Array, as_list
 from ...common.errors import InputError, SolveError
 from .. import _core
-from .._core import TimeFunction
-from ..fields.waypoints import spline
-from ..model.model import ZERO, Model
-from ..model.planar_body import PlanarBody
+from ..model.model import Model
 from ..model.planar_tree import PlanarTree, told_in_joints
 from ..model.system import MechanismSystem
 from ..solve.initial_state import undeformed_state
 from ..solve.path_checks import check_smooth
-from ..solve.quasi_static import quasi_static_shape
 from ..solve.reach import check_reach
 from .context import AnyContext, Context
 from .drive import motion_of, motors_fit
@@ -28,7 +21,7 @@ from .elastic_joints import add_transmission
 from .outcome import AnyOutcome, Details, Forces, Statistics
 from .planar_outcome import PlanarOutcome
 from .samples import path_times
-from .shapes import FcidKeys, Shape, given_shape, sampled, shape_nodes
+from .shapes import FcidKeys, Shape, prescribed_shape, sampled
 from .spatial_fcid import run_spatial_fcid
 
 
@@ -57,7 +50,8 @@ class PrescribedShape(Details):
         """Everything is algebraic: it is solved for again at any time."""
         tree = _tree(outcome.assembly, has_motors=outcome.tau is not None)
         posture = tree.motion(outcome.q[0], outcome.v[0], outcome.a[0])[0]
-        return _core.PrescribedActuation(_core.PrescribedMotion(tree.both, posture), self.functions, posture)
+        motion = _core.PlanarPrescribedMotion(tree.both.driven, posture)
+        return _core.PrescribedActuation(tree.both, motion, self.functions, posture)
 
 
 def run_fcid(model: Model, analysis: Fcid) -> PlanarOutcome:
@@ -80,18 +74,18 @@ def run_fcid(model: Model, analysis: Fcid) -> PlanarOutcome:
     has_motors = motors_fit(model)
     tree = _tree(assembly, has_motors=has_motors)
     posture = tree.motion(start.q, start.v, 0 * start.v)[0]
-    motion = _core.PrescribedMotion(tree.both, posture)
+    motion = _core.PlanarPrescribedMotion(tree.both.driven, posture)
     if analysis.shape != "zero":
         import scipy.interpolate  # noqa: F401, loading takes longer than solving
     began = time.perf_counter()
-    shape = prescribed_shape(model, analysis, motion, posture)
-    found = _at(assembly, analysis, motion, shape, posture, analysis.times, has_motors=has_motors)
+    shape = prescribed_shape(model.scene.path, model.bodies, analysis, motion, posture)
+    found = _at(assembly, analysis, tree, motion, shape, posture, analysis.times, has_motors=has_motors)
     found = replace(found, statistics=Statistics(wall_seconds=time.perf_counter() - began))
 
     @cache
     def look_closer() -> PlanarOutcome:
         times = path_times(analysis.times, assembly.model.scene.trajectory, analysis.end)
-        return _at(assembly, analysis, motion, shape, posture, times, has_motors=has_motors)
+        return _at(assembly, analysis, tree, motion, shape, posture, times, has_motors=has_motors)
 
     return replace(found, look_closer=look_closer)
 
@@ -99,7 +93,8 @@ def run_fcid(model: Model, analysis: Fcid) -> PlanarOutcome:
 def _at(
     assembly: MechanismSystem,
     analysis: Fcid,
-    motion: _core.PrescribedMotion,
+    tree: PlanarTree,
+    motion: _core.PlanarPrescribedMotion,
     shape: Shape,
     posture: Array,
     times: Array,
@@ -108,7 +103,7 @@ def _at(
 ) -> PlanarOutcome:
     """The outcome at `times` (T,), s."""
     p, p_dot, p_ddot = sampled(shape, times)
-    run = motion.outputs(as_list(times), p, p_dot, p_ddot, posture)
+    run = _core.prescribed_outputs(tree.both, motion, as_list(times), p, p_dot, p_ddot, posture)
     if len(run.q) < len(times):
         t = times[len(run.q)]
         raise SolveError(
@@ -124,36 +119,5 @@ def _at(
     )
 
 
-def prescribed_shape(model: Model, analysis: Fcid, motion: _core.PrescribedMotion, posture: Array) -> Shape:
-    """p(t) of every body, with its derivatives; `posture` (n_q,) of the tree at the start."""
-    if analysis.shape == "given":
-        return given_shape(model.scene.path, model.bodies, analysis)
-    if analysis.shape == "static":
-        return _static(model, analysis, motion, posture)
-    return [[ZERO] * body.n_modes for body in model.bodies]
-
-
-def _static(model: Model, analysis: Fcid, motion: _core.PrescribedMotion, posture: Array) -> Shape:
-    """A spline through static shapes: p is prescribed, so p, ṗ and p̈ only have to go with each other exactly."""
-
-    def left_on_modes(at: Array, p: Array, near: Array | None) -> tuple[Array, Array]:
-        return motion.left_on_modes(as_list(at), p, 0 * p, 0 * p, posture[None] if near is None else near)
-
-    nodes, stiffness = shape_nodes(analysis), np.concatenate([body.stiffness for body in model.bodies])
-    p = quasi_static_shape(left_on_modes, stiffness, nodes)
-    is_found = np.isfinite(p).all(axis=1)
-    if not is_found.all():
-        raise SolveError(
-            f'{model.scene.path}: analysis "{analysis.name}": no static shape was found at'
-            f" t = {nodes[is_found.argmin()]:g} s: the links are too soft for their loads there"
-        )
-    return _by_body(model.bodies, spline(nodes, p))
-
-
 def _tree(assembly: MechanismSystem, *, has_motors: bool) -> PlanarTree:
     return told_in_joints(assembly, "fcid", assembly.model.motors.values() if has_motors else ())
-
-
-def _by_body(bodies: Sequence[PlanarBody], functions: list[TimeFunction]) -> Shape:
-    remaining = iter(functions)
-    return [[next(remaining) for _ in range(body.n_modes)] for body in bodies]

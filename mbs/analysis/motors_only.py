@@ -106,7 +106,9 @@ def _at(analysis: MotorsOnly, found: InvertedPath, seconds: float, times: Array)
     inversion, servo = found.inversion, found.inversion.servo
     inside = times <= inversion.curve.x[-1] + 1e-9 * analysis.end  # what an integration reached
     p, p_dot, p_ddot = sampled(inversion.shape, times[inside])
-    run = servo.motion.outputs(as_list(times[inside]), p, p_dot, p_ddot, servo.near[0])
+    run = _core.prescribed_outputs(
+        servo.driven_tree.both, servo.motion, as_list(times[inside]), p, p_dot, p_ddot, servo.near[0]
+    )
     reached = len(run.q)
     rows = slice(reached)
     how = "two-point problem" if inversion.linearisation.is_future[0].any() else "integrated forward"

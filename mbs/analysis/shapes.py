@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import model_validator
 
 from ...common.arrays import Array, as_floats
-from ...common.errors import InputError
+from ...common.errors import InputError, SolveError
 from .._core import TimeFunction
 from ..fields.field_types import Expression, Name
 from ..fields.references import Reference
@@ -19,8 +19,11 @@ from ..model.model import ZERO
 from ..model.planar_body import PlanarBody
 from ..model.spatial_body import SpatialBody
 from ..scene.analysis import Check, Need, TimedAnalysis
+from ..solve.quasi_static import PrescribedMotion, quasi_static_shape
 
 FEWEST_NODES = 201  # of the spline through a static shape; half as many as outputs where that is more
+
+Bodies = Sequence[PlanarBody | SpatialBody]
 
 Shape = list[list[TimeFunction]]
 """p_k(t) of each body, in the coordinates of its `PlanarBody`."""
@@ -78,7 +81,7 @@ def sampled(shape: Shape, times: Array) -> Array:
     return np.ascontiguousarray(np.moveaxis(samples, 0, -1))
 
 
-def given_shape(scene_path: Path, bodies: Sequence[PlanarBody | SpatialBody], analysis: FcidKeys) -> Shape:
+def given_shape(scene_path: Path, bodies: Bodies, analysis: FcidKeys) -> Shape:
     """The expressions of the scene; by way of a spline where the modes were made anew (payloads, patches)."""
     given: Mapping[str, tuple[TimeFunction, ...]] = analysis.modal or {}
     shape: Shape = []
@@ -99,3 +102,31 @@ def given_shape(scene_path: Path, bodies: Sequence[PlanarBody | SpatialBody], an
             p = np.column_stack([function.sample(nodes)[0] for function in functions])
             shape.append(spline(nodes, np.linalg.lstsq(body.modal_transform, p.T, rcond=None)[0].T))
     return shape
+
+
+def prescribed_shape(
+    scene_path: Path, bodies: Bodies, analysis: FcidKeys, motion: PrescribedMotion, posture: Array
+) -> Shape:
+    """p(t) of every body, with its derivatives; `posture` (n_q,) of the tree at the start.
+
+    Raises `SolveError` where no posture, or no static shape, is found.
+    """
+    if analysis.shape == "given":
+        return given_shape(scene_path, bodies, analysis)
+    if analysis.shape == "static":
+        return _static(scene_path, bodies, analysis, motion, posture)
+    return [[ZERO] * body.n_modes for body in bodies]
+
+
+def _static(scene_path: Path, bodies: Bodies, analysis: FcidKeys, motion: PrescribedMotion, posture: Array) -> Shape:
+    """A spline through static shapes: p is prescribed, so p, ṗ and p̈ only have to go with each other exactly."""
+    nodes, stiffness = shape_nodes(analysis), np.concatenate([body.stiffness for body in bodies])
+    p = quasi_static_shape(motion, stiffness, nodes, posture)
+    is_found = np.isfinite(p).all(axis=1)
+    if not is_found.all():
+        raise SolveError(
+            f'{scene_path}: analysis "{analysis.name}": no static shape was found at'
+            f" t = {nodes[is_found.argmin()]:g} s: the links are too soft for their loads there"
+        )
+    functions = iter(spline(nodes, p))
+    return [[next(functions) for _ in range(body.n_modes)] for body in bodies]

@@ -8,7 +8,7 @@ from functools import cache, partial
 
 import numpy as np
 
-from ...common.arrays import Array
+from ...common.arrays import Array, as_list
 from ...common.errors import SolveError
 from ..model.spatial_gears import refuse_held_motors
 from ..model.spatial_model import SpatialModel, row_values, without_paths
@@ -67,9 +67,10 @@ def run_spatial_motors_only(context: Context, analysis: MotorsOnlyKeys) -> Outco
 
 
 def _run(analysis: MotorsOnlyKeys, model: SpatialModel, inversion: Inversion[SpatialServo], times: Array) -> Outcome:
-    curve = inversion.curve
-    modes = np.array([curve(times), curve.derivative(1)(times), curve.derivative(2)(times)])
-    found, is_met = inversion.servo.motion(times, modes)
+    curve, servo = inversion.curve, inversion.servo
+    modes = curve(times), curve.derivative(1)(times), curve.derivative(2)(times)
+    found = servo.motion.motion(as_list(times), *modes, servo.postures(times))
+    is_met = np.isfinite(found.q).all(axis=1)
     kept = slice(len(times) if is_met.all() else int(is_met.argmin()))
 
     def again(others: Array) -> Outcome:
@@ -82,7 +83,7 @@ def _run(analysis: MotorsOnlyKeys, model: SpatialModel, inversion: Inversion[Spa
     return Outcome(
         analysis=analysis,
         model=without_paths(model),
-        motion=Motion(times, found.q, found.v, found.a, -found.split.loops).at(kept),
+        motion=Motion(times, found.q, found.v, found.a, found.loops).at(kept),
         forces=Forces(required=found.required).at(kept),
         statistics=statistics,
         again=again,

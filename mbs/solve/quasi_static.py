@@ -2,33 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 
-from ...common.arrays import Array
+from ...common.arrays import Array, as_list
+from .. import _core
 
 MOST_ITERATIONS = 100
 SETTLED = 1e-14  # of a shape's size: what the next step would change
 TINY = 1e-300
 
-LeftOnModes = Callable[[Array, Array, Array | None], tuple[Array, Array]]
-"""Postures q (T, n_q), and forces (T, n) on modes that nothing supplies, at times (T,) with p (T, n) and ṗ = p̈ = 0.
 
-From postures near (T, n_q); without any they are found one after the other. NaN where there is none.
-"""
+PrescribedMotion = _core.PlanarPrescribedMotion | _core.SpatialPrescribedMotion
 
 
-def quasi_static_shape(left_on_modes: LeftOnModes, stiffness: Array, times: Array) -> Array:
-    """Shapes p (T, n) of all bodies at `times` (T,) with which nothing is left, by p ← p − F_p/K; `stiffness` K (n,).
+def quasi_static_shape(motion: PrescribedMotion, stiffness: Array, times: Array, posture: Array) -> Array:
+    """Shapes p (T, n) of all bodies at `times` (T,) with which nothing is left on modes, by p ← p − F_p/K.
 
-    NaN where that does not converge: links too soft for their loads.
+    With `stiffness` K (n,), from a posture (n_q,) near the first. NaN where that does not converge: links too soft for
+    their loads.
     """
     shape = np.zeros((len(times), len(stiffness)))
-    going, near, rate = np.arange(len(times)), None, np.ones(len(times))  # by which a step shrinks, as seen last
+    going, near, rate = np.arange(len(times)), posture[None], np.ones(len(times))  # by which a step shrinks
     previous = np.zeros(len(times))
     for _ in range(MOST_ITERATIONS):
-        near, left = left_on_modes(times[going], shape[going], near)
+        p = shape[going]
+        near, left = motion.left_on_modes(as_list(times[going]), p, 0 * p, 0 * p, near)
         step = left / stiffness
         shape[going] -= step
         size = np.linalg.norm(step, axis=1) / (np.linalg.norm(shape[going], axis=1) + TINY)

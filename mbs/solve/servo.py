@@ -49,16 +49,17 @@ class Servo:
     offset: tuple[TimeFunction, ...] = ()
 
     @cached_property
-    def motion(self) -> _core.PrescribedMotion:
+    def motion(self) -> _core.PlanarPrescribedMotion:
         """Of the driven robot, with p(t) given."""
-        trees = self.driven_tree.both, self.path_tree.both
-        return _core.RedefinedMotion(*trees, self.near[0], self.factor, list(self.offset))
+        trees = self.driven_tree.both.driven, self.path_tree.both.driven
+        return _core.PlanarRedefinedMotion(*trees, self.near[0], self.factor, list(self.offset))
 
     @cached_property
-    def _output(self) -> _core.PrescribedMotion:
+    def _output(self) -> _core.PlanarPrescribedMotion:
         """What leaves r on the modes: that of the path where it is the output itself, at half the work."""
-        is_itself = self.factor == 1.0 and not self.offset
-        return _core.PrescribedMotion(self.path_tree.both, self.near[0]) if is_itself else self.motion
+        if self.factor != 1.0 or self.offset:
+            return self.motion
+        return _core.PlanarPrescribedMotion(self.path_tree.both.driven, self.near[0])
 
     def residuals(self, times: Array, p: Array, v: Array, a: Array) -> Array:
         """Modal forces r (N, n) that motors do not supply; NaN where no posture is found."""
@@ -68,7 +69,7 @@ class Servo:
 
     def source(self, shape: list[list[TimeFunction]]) -> _core.ActuationSource:
         """The motors' forces for p(t), at any time."""
-        return _core.PrescribedActuation(self.motion, shape, self.near[0])
+        return _core.PrescribedActuation(self.driven_tree.both, self.motion, shape, self.near[0])
 
     @property
     def scale(self) -> Array:

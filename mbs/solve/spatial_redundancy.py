@@ -15,13 +15,13 @@ import numpy as np
 
 from ...common.arrays import Array, as_floats
 from ...common.errors import InputError, SolveError
+from .. import _core
 from ..fields.waypoints import spline
 from ..model.spatial_model import SpatialModel, row_values, target_rates
 from ..model.spatial_rows import SpatialRow
 from ..model.spatial_tree import Node
 from .spatial_posture import Mobility, joint_scales, mobility, undeformed_posture
-from .spatial_prescribed import joint_places, prescribed_motion
-from .state import State
+from .spatial_prescribed import driven_mechanism, joint_places, prescribed_motion
 
 OWNER = "redundancy"  # of the rows that this adds
 NODES = 401  # of the splines that joints follow
@@ -143,7 +143,8 @@ def _least_torque(model: SpatialModel, nodes: Sequence[Node], times: Array, q: A
     def moments(c: Array) -> Array:
         held = _held(model, nodes, times, moved(c, 0))
         try:
-            motion = prescribed_motion(held, still, times[::STRIDE], State(start[0], 0 * scales), near=moved(c, 1))
+            mechanism = _core.SpatialPrescribedMotion(driven_mechanism(held, has_motors=False), start[0])
+            motion = prescribed_motion(held, mechanism, still, times[::STRIDE], moved(c, 1))
         except SolveError:  # out of reach: worse than anything within it
             return np.full(weights.size, OUT_OF_REACH)
         found: Array = (weights * motion.required).ravel() / size

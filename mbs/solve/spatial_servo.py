@@ -5,34 +5,22 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 
-from ...common.arrays import Array, as_floats
+from ...common.arrays import Array, as_floats, as_list
 from ...common.errors import InputError
+from .. import _core
 from .._core import TimeFunction
-from ..model.spatial_known_motion import KnownStates, required_forces
-from ..model.spatial_model import SpatialModel, row_values
-from ..model.spatial_motors import SplitForces, split_forces
+from ..model.spatial_model import SpatialModel
 from ..model.spatial_rows import SpatialRow
 from .internal_dynamics import Stopped, Target
-from .spatial_posture import BoolArray, mobility, solve_posture, told_posture, undeformed_posture
-from .spatial_prescribed import modal_places, motion_near
+from .spatial_posture import mobility, solve_posture, told_posture, undeformed_posture
+from .spatial_prescribed import driven_mechanism, following_motors
 
 POSTURES = 201  # along the path, from which others are looked for
 EVERY = 10  # of these is looked at for singular ones
-MOST_STATES = 1000  # that are evaluated at once, a fraction of a second
-
-
-class ServoMotion(NamedTuple):
-    """States q (T, n_q), v and a (T, n_v) with p(t) given, and M v̇ − Q split into motors, modes and loops."""
-
-    q: Array
-    v: Array
-    a: Array
-    required: Array
-    split: SplitForces
+MOST_STATES = 10_000  # that are evaluated at once, a fraction of a second
 
 
 @dataclass(frozen=True)
@@ -94,34 +82,32 @@ class SpatialServo:
         """The same with what is expected of the deflections that the output leaves out."""
         return replace(self, offset=offset)
 
-    def motion(self, times: Array, modes: Array) -> tuple[ServoMotion, BoolArray]:
-        """With `modes` (3, T, n), p, ṗ and p̈, at `times` (T,); and where a posture was found (T,)."""
-        model, tree = self.model, self.model.tree
-        guess = self.near[np.abs(times[:, None] - self.near_times).argmin(axis=1)]
-        seen = self.factor * modes
-        if self.offset:
-            seen = seen + np.array([f.sample(times) for f in self.offset]).transpose(1, 2, 0)
-        q, v, a, is_met = motion_near(model, seen, times, guess)
-        modes = np.where(is_met[:, None], modes, 0.0)
-        q[:, modal_places(model)], v[:, ~tree.joint_columns], a[:, ~tree.joint_columns] = modes
-        frames = tree.frames(q)
-        required = required_forces(model, KnownStates(q, v, a), np.clip(times, 0.0, self.end))
-        split = split_forces(model, q, frames, row_values(model, q, times, frames)[1], required)
-        return ServoMotion(q, v, a, required, split), is_met
+    @cached_property
+    def motion(self) -> _core.SpatialPrescribedMotion:
+        """With p(t) given, the motors' coordinates as on the path with the deflections `factor` p + `offset`."""
+        path = driven_mechanism(self.model, has_motors=True)
+        motion = _core.SpatialPrescribedMotion(path, self.near[0])
+        if self.factor != 1.0 or self.offset:
+            has_loops = self.model.loop_rows.any()
+            driven = driven_mechanism(following_motors(self.model), has_motors=True) if has_loops else path
+            motion = _core.SpatialRedefinedMotion(driven, path, self.near[0], self.factor, list(self.offset))
+        motion.hold_loads(0.0, self.end)
+        return motion
+
+    def postures(self, times: Array) -> Array:
+        """Those along the path without deflections, (T, n_q), nearest to `times` (T,)."""
+        found: Array = self.near[np.abs(times[:, None] - self.near_times).argmin(axis=1)]
+        return found
 
     def residuals(self, times: Array, p: Array, v: Array, a: Array) -> Array:
         """Modal forces r (N, n) that motors do not supply; NaN where no posture is found. Raises `Stopped`."""
-        modes = np.array([p, v, a])
-        parts = range(0, len(times), MOST_STATES)
-        return np.concatenate([self._left(times[k : k + MOST_STATES], modes[:, k : k + MOST_STATES]) for k in parts])
-
-    def _left(self, times: Array, modes: Array) -> Array:
-        if not self.goes_on():
-            raise Stopped
-        with np.errstate(over="ignore", invalid="ignore"):  # of an iteration that leaves the numbers r is none
-            found, is_met = self.motion(times, modes)
-        left: Array = np.where(is_met[:, None], found.split.left[:, ~self.model.tree.joint_columns], np.nan)
-        return left
+        r, near = np.zeros_like(p), self.postures(times)
+        for k in range(0, len(times), MOST_STATES):
+            if not self.goes_on():
+                raise Stopped
+            part = slice(k, k + MOST_STATES)
+            r[part] = self.motion.left_on_modes(as_list(times[part]), p[part], v[part], a[part], near[part])[1]
+        return r
 
 
 def make_spatial_servo(
@@ -144,13 +130,13 @@ def make_spatial_servo(
             )
     if not any(node.body.n_modes for node in model.tree.nodes):
         raise InputError(
-            f'{where}: expected at least one flexible body for kind = "motors-only", found only rigid ones: use kind'
-            ' = "pcid"'
+            f'{where}: expected at least one flexible body for kind = "motors-only", found only rigid ones: kind ='
+            ' "pcid" gives their motors\' forces'
         )
-    if factor != 1.0 and model.loop_rows.any():
+    if factor != 1.0 and model.loop_rows.any() and any(joint.type == "planar" for joint in model.scene.motor_joints):
         raise InputError(
-            f'{where}: expected an open chain for output = "redefined" in space = "spatial", found a kinematic loop:'
-            ' use output = "tip"'
+            f'{where}: expected no motor in a planar joint of a mechanism with closed loops for output = "redefined",'
+            ' found one: use output = "tip"'
         )
     times = as_floats(np.linspace(0.0, end, POSTURES))
     near = [start]

@@ -103,11 +103,12 @@ def test_the_shape_of_a_free_vibration_takes_no_force(name):
         q[modal], v[modal] = 0.02 * rng.standard_normal((2, body.n_modes))
     tree = told_in_joints(assembly, "fcid")
     posture = tree.motion(start.q, start.v, 0 * start.v)[0]
-    motion = _core.PrescribedMotion(tree.both, posture)
+    motion = _core.PlanarPrescribedMotion(tree.both.driven, posture)
     modes = np.setdiff1d(np.arange(len(q)), assembly.frame_coordinates)
-    probe = motion.outputs([0.0], q[None, modes], v[None, modes], 0 * q[None, modes], posture)
+    at_rest = q[None, modes], v[None, modes], 0 * q[None, modes]
+    probe = _core.prescribed_outputs(tree.both, motion, [0.0], *at_rest, posture)
     a, lambda_ = oracle_of(assembly).solve(0.0, probe.q[0], probe.v[0])
-    run = motion.outputs([0.0], q[None, modes], v[None, modes], a[None, modes], posture)
+    run = _core.prescribed_outputs(tree.both, motion, [0.0], *at_rest[:2], a[None, modes], posture)
     assert relative(run.multipliers[0], lambda_) < 1e-10
     assert relative(run.a[0], a) < 1e-11
     assert np.abs(run.shape_force).max() < 1e-10 * np.abs(lambda_).max()

@@ -79,7 +79,7 @@ def test_internal_dynamics_are_those_of_the_constrained_and_driven_rows():
     model = arm()
     servo, dynamics = at_rest(model)
     p = equilibrium(servo, 0.0)[None]
-    q = servo.motion.outputs([0.0], p, 0 * p, 0 * p, servo.near[0]).q[0]
+    q = _core.prescribed_outputs(servo.driven_tree.both, servo.motion, [0.0], p, 0 * p, 0 * p, servo.near[0]).q[0]
     modes = np.setdiff1d(np.arange(len(q)), servo.path.frame_coordinates)
 
     def keeps(assembly):
@@ -206,9 +206,11 @@ def test_motors_of_a_redefined_output_are_those_of_less_deflection(name, motors)
     servo = servo.with_offset(tuple(TimeFunction.constant(float(p)) for p in 0.01 * rng.standard_normal(n)))
     offset = np.array([function(0.0)[0] for function in servo.offset])
     p, v, a = (size * rng.standard_normal((2, n)) for size in (0.01, 0.1, 1.0))
-    run = servo.motion.outputs(times.tolist(), p, v, a, servo.near[0])
-    path = _core.PrescribedMotion(servo.path_tree.both, servo.near[0])
-    seen = path.outputs(times.tolist(), factor * p + offset, factor * v, factor * a, servo.near[0])
+    both, at = servo.driven_tree.both, times.tolist()
+    run = _core.prescribed_outputs(both, servo.motion, at, p, v, a, servo.near[0])
+    path = _core.PlanarPrescribedMotion(servo.path_tree.both.driven, servo.near[0])
+    lesser = factor * p + offset, factor * v, factor * a
+    seen = _core.prescribed_outputs(servo.path_tree.both, path, at, *lesser, servo.near[0])
     driven, on_path = oracle_of(servo.driven), oracle_of(servo.path)
     measures = servo.path.model.motors.values()
     held = np.zeros(driven.size)

@@ -1,115 +1,242 @@
-// Motions of planar systems that are wholly prescribed: mbs/core/analysis/prescribed_motion.h.
+// Motions that are wholly prescribed, and what motors do in place of what holds them: mbs/core/recursion/
+// prescribed_motion.h and motors.h.
 #include "core/analysis/tree_outputs.h"
 #include "core/analysis/tree_replay.h"
 
 #include <nanobind/stl/pair.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
 
 #include <limits>
+#include <string>
 #include <utility>
 
-#include "bindings/recursion/recursion.h"
+#include "bindings/recursion/known_motion.h"
 
 namespace nb = nanobind;
 using namespace nb::literals;
 using namespace ffrobot;
+using namespace ffrobot::recursion;
 using Eigen::Index;
 using Eigen::VectorXd;
+using ffrobot::recursion::RowMajorMatrix;
 
 namespace {
 
 // p, p_dot and p_ddot (T, n) at times (T)
 struct Modes {
+  const std::vector<double> &times;
   const RowMajorMatrix &p, &p_dot, &p_ddot;
 
   ModalMotion operator[](std::size_t i) const {
     const auto row = static_cast<Index>(i);
     return {p.row(row), p_dot.row(row), p_ddot.row(row)};
   }
+  void check(Index n) const {
+    for (const RowMajorMatrix *of : {&p, &p_dot, &p_ddot}) {
+      check_size("times of modes", of->rows(), static_cast<Index>(times.size()));
+      check_size("modes", of->cols(), n);
+    }
+  }
 };
 
-Modes checked(const PrescribedMotion &motion, const std::vector<double> &times, const RowMajorMatrix &p,
-              const RowMajorMatrix &p_dot, const RowMajorMatrix &p_ddot) {
-  for (const RowMajorMatrix *of : {&p, &p_dot, &p_ddot}) {
-    check_size("times of modes", of->rows(), static_cast<Index>(times.size()));
-    check_size("modes", of->cols(), motion.both().system.n_modes());
-  }
-  return {p, p_dot, p_ddot};
-}
+// At states q, v, a: forces `required` M a - Q, multipliers, and what motors do in place of both
+struct Prescribed {
+  RowMajorMatrix q, v, a, required, multipliers, tau, left, loops;
+};
 
-// (q (T, n_q), forces that are left on modes (T, n)); NaN where no position is found
-std::pair<RowMajorMatrix, RowMajorMatrix> left_on_modes(PrescribedMotion &motion, const std::vector<double> &times,
-                                                        const RowMajorMatrix &p, const RowMajorMatrix &p_dot,
-                                                        const RowMajorMatrix &p_ddot, const RowMajorMatrix &near) {
-  const Modes modes = checked(motion, times, p, p_dot, p_ddot);
-  const Index n_q = motion.both().tree.n_q;
+// each(i) after balance() at every time with a position: from postures near (T, n_q), or each from the last, the first
+// near (1, n_q), up to the first time without one.
+template <class Space, class Each>
+void at_positions(PrescribedMotion<Space> &motion, const Modes &modes, const RowMajorMatrix &near, const Each &each) {
+  const Index n_q = motion.driven().mechanism.n_q;
+  modes.check(motion.modes());
   check_size("near", near.cols(), n_q);
   const bool follows = near.rows() == 1;
   if (!follows)
-    check_size("near", near.rows(), p.rows());
-  constexpr double NaN = std::numeric_limits<double>::quiet_NaN();
-  RowMajorMatrix q = RowMajorMatrix::Constant(p.rows(), n_q, NaN);
-  RowMajorMatrix left = RowMajorMatrix::Constant(p.rows(), p.cols(), NaN);
+    check_size("near", near.rows(), modes.p.rows());
+  if (modes.times.empty())
+    return;
   VectorXd last = near.row(0);
-  double found_at = NaN;
+  double found_at = std::numeric_limits<double>::quiet_NaN();
   motion.start_at(last);
-  const auto move = [&](std::size_t i) {
-    if (follows)
-      return motion.move(times[i], modes[i]);
-    if (times[i] != found_at) {
+  for (std::size_t i = 0; i < modes.times.size(); ++i) {
+    const double t = modes.times[i];
+    if (!follows && t != found_at)
       motion.start_at(near.row(static_cast<Index>(i)));
-      if (motion.move(times[i], modes[i]))
-        return true;
+    else if (!follows)
+      motion.start_at(last);
+    bool is_found = motion.move(t, modes[i]);
+    if (!is_found && (follows || t != found_at)) { // links that are bent far are nearer to the last posture
+      motion.start_at(last);
+      is_found = motion.move(t, modes[i]);
     }
-    motion.start_at(last); // links that are bent far are nearer to that
-    return motion.move(times[i], modes[i]);
-  };
-  for (std::size_t i = 0; i < times.size(); ++i) {
-    if (move(i)) {
-      const auto row = static_cast<Index>(i);
+    if (is_found) {
       motion.balance();
       last = motion.state().head(n_q);
-      found_at = times[i];
-      q.row(row) = last.transpose();
-      left.row(row) = motion.left().transpose();
+      found_at = t;
+      each(static_cast<Index>(i));
     } else if (follows)
-      break;
+      return;
   }
+}
+
+RowMajorMatrix nothing(Index rows, Index columns) {
+  return RowMajorMatrix::Constant(rows, columns, std::numeric_limits<double>::quiet_NaN());
+}
+
+template <class Space>
+std::pair<RowMajorMatrix, RowMajorMatrix>
+left_on_modes(PrescribedMotion<Space> &motion, const std::vector<double> &times, const RowMajorMatrix &p,
+              const RowMajorMatrix &p_dot, const RowMajorMatrix &p_ddot, const RowMajorMatrix &near) {
+  const Index T = p.rows(), n_q = motion.driven().mechanism.n_q;
+  RowMajorMatrix q = nothing(T, n_q), left = nothing(T, p.cols());
+  at_positions(motion, {times, p, p_dot, p_ddot}, near, [&](Index i) {
+    q.row(i) = motion.state().head(n_q).transpose();
+    left.row(i) = motion.left().transpose();
+  });
   return {q, left};
 }
 
-Run prescribed_outputs(PrescribedMotion &motion, const std::vector<double> &times, const RowMajorMatrix &p,
-                       const RowMajorMatrix &p_dot, const RowMajorMatrix &p_ddot, const VectorXd &q) {
-  const Modes modes = checked(motion, times, p, p_dot, p_ddot);
-  check_size("q", q.size(), motion.both().tree.n_q);
-  motion.start_at(q);
-  TreeOutputs outputs(motion.both(), times.size(), times.front(), motion.state().data(), nullptr);
+template <class Space>
+Prescribed states_of(PrescribedMotion<Space> &motion, const std::vector<double> &times, const RowMajorMatrix &p,
+                     const RowMajorMatrix &p_dot, const RowMajorMatrix &p_ddot, const RowMajorMatrix &near) {
+  const auto &driven = motion.driven();
+  const Index T = p.rows(), n_q = driven.mechanism.n_q, n_v = driven.mechanism.n_v;
+  const Index tau = static_cast<Index>(driven.motors.size()), equations = motion.lambda().size();
+  const auto loops = static_cast<Index>(std::ranges::count(driven.is_path, 0));
+  Prescribed to{nothing(T, n_q),       nothing(T, n_v), nothing(T, n_v), nothing(T, n_v),
+                nothing(T, equations), nothing(T, tau), nothing(T, n_v), nothing(T, loops)};
+  at_positions(motion, {times, p, p_dot, p_ddot}, near, [&](Index i) {
+    to.q.row(i) = motion.state().head(n_q).transpose(), to.v.row(i) = motion.state().tail(n_v).transpose();
+    to.a.row(i) = motion.a().transpose(), to.required.row(i) = motion.required().transpose();
+    to.multipliers.row(i) = motion.lambda().transpose();
+    if (const Motors<Space> *motors = motion.motors()) {
+      to.tau.row(i) = motors->tau().transpose(), to.left.row(i) = motors->left().transpose();
+      to.loops.row(i) = motors->loops().transpose();
+    }
+  });
+  return to;
+}
+
+Run planar_outputs(const SystemOnTree &both, PrescribedMotion<Planar> &motion, const std::vector<double> &times,
+                   const RowMajorMatrix &p, const RowMajorMatrix &p_dot, const RowMajorMatrix &p_ddot,
+                   const VectorXd &q) {
+  TreeOutputs outputs(both, times.size(), times.front(), motion.state().data(), nullptr);
   std::size_t reached = 0;
-  for (; reached < times.size() && motion.move(times[reached], modes[reached]); ++reached) {
-    motion.balance();
-    outputs(reached, motion);
-  }
+  at_positions(motion, {times, p, p_dot, p_ddot}, q.transpose(),
+               [&](Index i) { outputs(static_cast<std::size_t>(i), motion), ++reached; });
   return {{}, outputs.take(reached), {}};
+}
+
+// each(i, motors, workspace) at postures q (T, n_q)
+template <class Space, class Each>
+void at_postures(const DrivenMechanism<Space> &driven, const std::vector<double> &times, const RowMajorMatrix &q,
+                 const Each &each) {
+  check_size("postures", q.rows(), static_cast<Index>(times.size()));
+  check_size("coordinates", q.cols(), driven.mechanism.n_q);
+  recursion::Workspace<Space, double> w(driven.mechanism);
+  Motors<Space> motors(driven);
+  const VectorXd v = VectorXd::Zero(driven.mechanism.n_v);
+  for (Index i = 0; i < q.rows(); ++i) {
+    for (const DrivenMarker &marker : driven.scene.driven)
+      w.turning[static_cast<std::size_t>(marker.marker)] = marker.law(times[static_cast<std::size_t>(i)]);
+    place_all(driven.mechanism, q.row(i).data(), v.data(), Forces<double>(), w);
+    each(i, motors, w);
+  }
+}
+
+template <class Space>
+RowMajorMatrix path_forces(const DrivenMechanism<Space> &driven, const std::vector<double> &times,
+                           const RowMajorMatrix &q, const RowMajorMatrix &multipliers) {
+  check_size("times of multipliers", multipliers.rows(), q.rows());
+  check_size("multipliers", multipliers.cols(), static_cast<Index>(driven.mechanism.rows.size()));
+  RowMajorMatrix found(q.rows(), driven.mechanism.n_v);
+  at_postures(driven, times, q, [&](Index i, Motors<Space> &motors, const auto &w) {
+    found.row(i) = motors.path_forces(q.row(i).data(), multipliers.row(i).data(), w).transpose();
+  });
+  return found;
+}
+
+template <class Space>
+std::tuple<RowMajorMatrix, RowMajorMatrix, RowMajorMatrix>
+split(const DrivenMechanism<Space> &driven, const std::vector<double> &times, const RowMajorMatrix &q,
+      const RowMajorMatrix &wanted) {
+  check_size("times of forces", wanted.rows(), q.rows());
+  check_size("forces", wanted.cols(), driven.mechanism.n_v);
+  RowMajorMatrix tau(q.rows(), static_cast<Index>(driven.motors.size())), left(q.rows(), wanted.cols());
+  RowMajorMatrix loops(q.rows(), static_cast<Index>(std::ranges::count(driven.is_path, 0)));
+  at_postures(driven, times, q, [&](Index i, Motors<Space> &motors, const auto &w) {
+    motors.split(q.row(i).data(), wanted.row(i), w);
+    tau.row(i) = motors.tau().transpose(), left.row(i) = motors.left().transpose();
+    loops.row(i) = motors.loops().transpose();
+  });
+  return {tau, left, loops};
+}
+
+template <class Space>
+void make_driven(DrivenMechanism<Space> *made, const Model<Space> &model, const Scene &scene,
+                 const std::vector<bool> &is_path) {
+  check_scene(model, scene);
+  new (made) DrivenMechanism<Space>(model.mechanism, scene, {}, {is_path.begin(), is_path.end()});
+  made->check();
+}
+
+template <class Space> void bind(nb::module_ &m, const std::string &space) {
+  using Motion = PrescribedMotion<Space>;
+  using Driven = DrivenMechanism<Space>;
+  nb::class_<Driven>(m, (space + "Driven").c_str(), "A mechanism under its scene with motors, and what its path is.")
+      .def("__init__", &make_driven<Space>, "model"_a, "scene"_a, "is_path"_a, nb::keep_alive<1, 2>(),
+           nb::keep_alive<1, 3>(), "is_path: of each constraint equation; others close loops.")
+      .def(
+          "add_motor",
+          [](Driven &d, int coordinate, double sign, bool turns_frames) {
+            d.motors.push_back({coordinate, sign, turns_frames});
+            d.check();
+          },
+          "coordinate"_a, "sign"_a, "turns_frames"_a,
+          "A motor along `sign` v[coordinate], or between the frames of the bodies there.")
+      .def("path_forces", &path_forces<Space>, "times"_a, "q"_a, "multipliers"_a,
+           "-C_s^T lambda_s (T, n_v) of the path at postures q (T, n_q), with multipliers (T, constraint equations).")
+      .def("split", &split<Space>, "times"_a, "q"_a, "wanted"_a,
+           "(tau (T, motors), left (T, n_v), loops (T, constraint equations of loops)): what motors do of generalized "
+           "forces\n(T, n_v), what they and loops leave, and multipliers of the loops.");
+  nb::class_<Motion>(m, (space + "PrescribedMotion").c_str(),
+                     "Modes by functions of time, joints by constraint equations.")
+      .def(nb::init<Driven, VectorXd>(), "driven"_a, "q"_a, nb::keep_alive<1, 2>(), "q (n_q): a posture to start from.")
+      .def("hold_loads", &Motion::hold_loads, "start"_a, "end"_a,
+           "Loads are before and after these times (s) what they are there.")
+      .def("left_on_modes", &left_on_modes<Space>, "times"_a, "p"_a, "p_dot"_a, "p_ddot"_a, "near"_a,
+           "(q (T, n_q), forces on modes (T, n)) that neither motors, or constraint equations without any, nor loads "
+           "supply,\nwith modes of all bodies (T, n), from postures near (T, n_q), or each from the last, the first "
+           "near "
+           "(1, n_q);\nNaN where none is found.")
+      .def("motion", &states_of<Space>, "times"_a, "p"_a, "p_dot"_a, "p_ddot"_a, "near"_a,
+           "States and forces for the same arguments; NaN where no posture is found.");
+  nb::class_<RedefinedMotion<Space>, Motion>(m, (space + "RedefinedMotion").c_str(),
+                                             "With the motors of the motion that follows a path.")
+      .def(nb::init<Driven, Driven, VectorXd, double, std::vector<TimeFunction>>(), "driven"_a, "path"_a, "q"_a,
+           "factor"_a, "offset"_a, nb::keep_alive<1, 2>(), nb::keep_alive<1, 3>());
 }
 
 } // namespace
 
 void bind_prescribed(nb::module_ &m) {
-  nb::class_<PrescribedMotion>(m, "PrescribedMotion", "Modes as they are told, joints as rows have it.")
-      .def(nb::init<const SystemOnTree &, VectorXd>(), "both"_a, "q"_a, nb::keep_alive<1, 2>(),
-           "q (n_q) of the tree: a posture to start from.")
-      .def(
-          "left_on_modes", &left_on_modes, "times"_a, "p"_a, "p_dot"_a, "p_ddot"_a, "near"_a,
-          "(q (T, n_q), forces on modes (T, n)) that neither motors, or rows without any, nor loads supply, with modes "
-          "of all\nbodies (T, n), from postures near (T, n_q), or each from the last, the first near (1, n_q); NaN "
-          "where none is found.")
-      .def("outputs", &prescribed_outputs, "times"_a, "p"_a, "p_dot"_a, "p_ddot"_a, "q"_a,
-           "What a run reports, as far as positions were found, the first from q (n_q).");
+  bind<Planar>(m, "Planar");
+  bind<Spatial>(m, "Spatial");
+  nb::class_<Prescribed>(m, "Prescribed", "A prescribed motion and its forces at times (T,).")
+      .def_ro("q", &Prescribed::q, "(T, n_q)")
+      .def_ro("v", &Prescribed::v, "(T, n_v)")
+      .def_ro("a", &Prescribed::a, "(T, n_v)")
+      .def_ro("required", &Prescribed::required, "(T, n_v) M a - Q.")
+      .def_ro("multipliers", &Prescribed::multipliers, "(T, constraint equations) with joints that move freely.")
+      .def_ro("tau", &Prescribed::tau, "(T, motors) in place of these.")
+      .def_ro("left", &Prescribed::left, "(T, n_v) what motors and loops leave of `required`.")
+      .def_ro("loops", &Prescribed::loops, "(T, constraint equations of loops) their multipliers under the motors.");
   nb::class_<PrescribedActuation, ActuationSource>(m, "PrescribedActuation", "Solved anew at every time.")
-      .def(nb::init<PrescribedMotion &, std::vector<ModalShape>, VectorXd>(), "motion"_a, "shape"_a, "q"_a,
-           nb::keep_alive<1, 2>());
-  nb::class_<RedefinedMotion, PrescribedMotion>(m, "RedefinedMotion",
-                                                "With the motors of the motion that follows a path.")
-      .def(nb::init<const SystemOnTree &, const SystemOnTree &, VectorXd, double, std::vector<TimeFunction>>(),
-           "driven"_a, "path"_a, "q"_a, "factor"_a, "offset"_a, nb::keep_alive<1, 2>(), nb::keep_alive<1, 3>());
+      .def(nb::init<const SystemOnTree &, PrescribedMotion<Planar> &, std::vector<ModalShape>, VectorXd>(), "both"_a,
+           "motion"_a, "shape"_a, "q"_a, nb::keep_alive<1, 2>(), nb::keep_alive<1, 3>());
+  m.def("prescribed_outputs", &planar_outputs, "both"_a, "motion"_a, "times"_a, "p"_a, "p_dot"_a, "p_ddot"_a, "q"_a,
+        "What a run reports of a system in the plane, as far as positions were found, the first from q (n_q).");
 }

@@ -109,9 +109,9 @@ Run run_tree(const SystemOnTree &both, const std::vector<double> &times, const V
   if (external_loads)
     steering.emplace(both, *external_loads);
   TreeMotion motion(both.tree, both.scene, times.front(), q.data(), v.data(), nullptr, steering ? &*steering : nullptr);
-  std::optional<MotorsOnTree> motors;
+  std::optional<recursion::Motors<Planar>> motors;
   if (!both.reactions.motors.empty())
-    motion.judge(motors.emplace(both));
+    motion.judge(motors.emplace(both.driven()));
   if (checkpoint && checkpoint->integration.has_begun()) {
     check_size("state of the checkpoint", checkpoint->integration.state.size(), state.size());
     motion.go_on(checkpoint->history);
@@ -230,6 +230,7 @@ void bind_system_run(nb::module_ &m) {
            "What a run reports of states (T, n_q + n_v) of the tree near its rows, at times (T,).")
       .def("outputs_under", &reported_under, "times"_a, "states"_a, "motors"_a, "patches"_a, "commands"_a,
            "As `outputs`, under commands (T, inputs) of motors and patches.")
+      .def_prop_ro("driven", &SystemOnTree::driven, nb::keep_alive<0, 1>(), "The tree with motors and path.")
       .def("acceleration_violation", &violation_of, "t"_a, "q"_a, "v"_a, "a"_a,
            "Largest violation of C_ddot = 0 by accelerations a (n_v) of the tree, relative to the terms that cancel.");
   bind_prescribed(m);

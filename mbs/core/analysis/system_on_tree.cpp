@@ -33,11 +33,19 @@ void SystemOnTree::check() const {
     check_index("constraint", constraint, constraints);
   for (const auto &[drive, joint] : drives.along_cuts)
     check_index("drive", drive, system.drives.size()), check_index("cut joint", joint, scene.cut_joints.size());
-  for (const auto &motor : reactions.motors)
-    if (motor.cut >= 0)
-      check_index("cut joint of a motor", motor.cut, scene.cut_joints.size());
-    else
-      check_index("coordinate of a motor", motor.coordinate, tree.n_v);
+  driven().check();
+}
+
+recursion::DrivenMechanism<recursion::Planar> SystemOnTree::driven() const {
+  std::vector<char> is_path(tree.rows.size(), false);
+  for (const auto &row : reactions.rows)
+    is_path[static_cast<std::size_t>(row.row)] = row.is_trajectory;
+  recursion::DrivenMechanism<recursion::Planar> found(tree, scene, reactions.motors, std::move(is_path));
+  found.of_modes.clear();
+  for (std::size_t b = 0; b < system.bodies.size(); ++b)
+    for (int k = 0; k < static_cast<int>(system.bodies[b].modes()); ++k)
+      found.of_modes.push_back(drives.modes[b] + k);
+  return found;
 }
 
 namespace {

@@ -3,7 +3,7 @@
 #pragma once
 
 #include "core/actuation/external_loads.h"
-#include "core/recursion/motion.h"
+#include "core/recursion/motors.h"
 #include "core/recursion/observe.h"
 #include "core/system/system.h"
 
@@ -51,16 +51,10 @@ struct ReactionsOnTree {
     int constraint;
     double value; // N
   };
-  struct Motor {
-    int coordinate; // in v; -1 of one along a cut joint
-    double sign;
-    bool turns_frames; // in place of the sections, which modes turn against these
-    int cut = -1;      // of the scene's cut joints
-  };
   std::vector<OfRow> rows;
   std::vector<OfJoint> joints;
   std::vector<Weight> weights; // of rotors before gears that give, whose frames stay where they are
-  std::vector<Motor> motors;
+  std::vector<recursion::Motor> motors;
 };
 
 struct SystemOnTree {
@@ -72,6 +66,7 @@ struct SystemOnTree {
   ReactionsOnTree reactions;
 
   Eigen::Index state_size() const { return tree.n_q + tree.n_v; }
+  recursion::DrivenMechanism<recursion::Planar> driven() const; // modes in the order of the system
   void check() const; // throws std::invalid_argument where one names what the other does not have
 };
 

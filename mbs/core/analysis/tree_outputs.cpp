@@ -1,7 +1,5 @@
 #include "core/analysis/tree_outputs.h"
 
-#include "core/actuation/side_by_side.h"
-
 #include <algorithm>
 #include <cmath>
 
@@ -37,7 +35,8 @@ TreeOutputs::TreeOutputs(const SystemOnTree &both, std::size_t count, double t, 
   outputs_.residual = RowMajorMatrix::Zero(T, 3);
   if (both.reactions.motors.empty())
     return;
-  motors_.emplace(both);
+  of_modes_ = both.driven().of_modes;
+  motors_.emplace(both.driven());
   outputs_.tau.resize(T, motors_->tau().size());
   outputs_.F_p.resize(T, system.n_modes());
 }
@@ -81,7 +80,7 @@ void TreeOutputs::at(std::size_t output, double t, const double *state) {
   write(static_cast<Index>(output), targets_at(both_.scene, t), motion_.workspace(), motion_.wrenches());
 }
 
-void TreeOutputs::operator()(std::size_t output, PrescribedMotion &motion) {
+void TreeOutputs::operator()(std::size_t output, recursion::PrescribedMotion<recursion::Planar> &motion) {
   const auto i = static_cast<Index>(output);
   state_ = motion.state();
   a_ = motion.a();
@@ -112,7 +111,7 @@ void TreeOutputs::write(Index i, const std::vector<Jet> &targets, const TreeWork
     return;
   motors_->resolve(state_.data(), w.lambda.data(), w);
   outputs_.tau.row(i) = motors_->tau().transpose();
-  outputs_.F_p.row(i) = joined(motors_->modal_force(), outputs_.F_p.cols()).transpose();
+  outputs_.F_p.row(i) = motors_->left()(of_modes_).transpose();
 }
 
 // Those of joints are, with their signs, components of what these transmit.

@@ -1,9 +1,9 @@
 // What is reported of a planar system, which is integrated in joint coordinates: from the recursion.
 #pragma once
 
-#include "core/analysis/motors_on_tree.h"
-#include "core/analysis/prescribed_motion.h"
 #include "core/analysis/run.h"
+#include "core/analysis/system_on_tree.h"
+#include "core/recursion/prescribed_motion.h"
 
 #include <optional>
 
@@ -22,7 +22,7 @@ public:
               ExternalLoads *external_loads);
 
   void operator()(std::size_t i, double t, const double *state); // (q, v) of the tree
-  void operator()(std::size_t i, PrescribedMotion &motion);
+  void operator()(std::size_t i, recursion::PrescribedMotion<recursion::Planar> &motion);
   void at(std::size_t i, double t, const double *state); // as it is: not moved onto its rows
   Outputs take(std::size_t reached);
 
@@ -46,7 +46,8 @@ private:
   TreeMotion motion_;
   AbsoluteState absolute_;
   recursion::NewtonEuler<recursion::Planar> forces_;
-  std::optional<MotorsOnTree> motors_;
+  std::optional<recursion::Motors<recursion::Planar>> motors_;
+  std::vector<int> of_modes_; // in v
   Eigen::VectorXd state_, a_, system_a_, value_, rate_;
   Outputs outputs_;
 };

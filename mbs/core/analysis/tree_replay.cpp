@@ -14,7 +14,7 @@ TreeSource::TreeSource(const SystemOnTree &both)
   const auto &rows = both.reactions.rows;
   trajectory_force_ = VectorXd::Zero(std::ranges::count_if(rows, [](const auto &row) { return row.is_trajectory; }));
   if (!both.reactions.motors.empty())
-    motors_.emplace(both);
+    motors_.emplace(both.driven());
 }
 
 void TreeSource::take(const double *state, const TreeWorkspace &w, const VectorXd &shape_force) {
@@ -38,7 +38,7 @@ void TreeSource::find_motors() {
   motors_->resolve(state_, found_->lambda.data(), *found_);
   tau_ = motors_->tau();
   for (std::size_t b = 0; b < modal_force_.size(); ++b)
-    modal_force_[b] = motors_->modal_force()[b] + shape_force_[b];
+    modal_force_[b] = motors_->left().segment(both_.drives.modes[b], modal_force_[b].size()) + shape_force_[b];
 }
 
 const VectorXd &TreeSource::tau() {
@@ -83,14 +83,16 @@ bool TreeActuation::find(double t) {
   return !recorded_.is_at_stage();
 }
 
-PrescribedActuation::PrescribedActuation(PrescribedMotion &motion, std::vector<ModalShape> shape, const VectorXd &q)
-    : TreeSource(motion.both()), motion_(motion), shape_(std::move(shape)) {
+PrescribedActuation::PrescribedActuation(const SystemOnTree &both,
+                                         recursion::PrescribedMotion<recursion::Planar> &motion,
+                                         std::vector<recursion::ModalShape> shape, const VectorXd &q)
+    : TreeSource(both), motion_(motion), shape_(std::move(shape)) {
   motion_.start_at(q);
 }
 
 bool PrescribedActuation::find(double t) {
   // was found at all output times before; a failure in between shows as a step that is refused
-  if (motion_.move(t, modes_at(shape_, t)))
+  if (motion_.move(t, recursion::modes_at(shape_, t)))
     motion_.balance();
   take(motion_.q(), motion_.workspace(), motion_.shape_force());
   return true;

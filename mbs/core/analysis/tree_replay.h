@@ -2,8 +2,9 @@
 #pragma once
 
 #include "core/actuation/source.h"
-#include "core/analysis/prescribed_motion.h"
+#include "core/analysis/system_on_tree.h"
 #include "core/integrate/recorded_motion.h"
+#include "core/recursion/prescribed_motion.h"
 
 #include <optional>
 
@@ -31,7 +32,7 @@ protected:
 private:
   void find_motors(); // unless they are known
 
-  std::optional<MotorsOnTree> motors_;
+  std::optional<recursion::Motors<recursion::Planar>> motors_;
   bool motors_are_known_ = true;
   AbsoluteState absolute_;
   Workspace workspace_;
@@ -59,13 +60,14 @@ private:
 // (n_q).
 class PrescribedActuation final : public TreeSource {
 public:
-  PrescribedActuation(PrescribedMotion &motion, std::vector<ModalShape> shape, const Eigen::VectorXd &q);
+  PrescribedActuation(const SystemOnTree &both, recursion::PrescribedMotion<recursion::Planar> &motion,
+                      std::vector<recursion::ModalShape> shape, const Eigen::VectorXd &q);
 
 private:
   bool find(double t) override;
 
-  PrescribedMotion &motion_;
-  std::vector<ModalShape> shape_;
+  recursion::PrescribedMotion<recursion::Planar> &motion_;
+  std::vector<recursion::ModalShape> shape_;
 };
 
 } // namespace ffrobot

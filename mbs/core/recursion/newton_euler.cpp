@@ -291,6 +291,36 @@ void NewtonEuler<Space>::residual_of_modes(std::size_t i, const double *q, const
 }
 
 template <class Space>
+void NewtonEuler<Space>::add_joint_moment_on_modes(std::size_t i, double moment, const Workspace<Space, double> &w,
+                                                   double *Q) const {
+  const auto add_to = [&](std::size_t at, const auto &put) {
+    const Node<Space> &node = mechanism_.nodes[at];
+    if (node.n() == 0)
+      return;
+    VectorXd modal(node.n());
+    put_on_modes(node.body, bodies_[at], w.bodies[at], put, modal.data());
+    Eigen::Map<VectorXd>(Q + node.p_v(), node.n()) += modal;
+  };
+  const Node<Space> &node = mechanism_.nodes[i];
+  Vector about_z{}, at_port{};
+  about_z[Space::axis] = moment;
+  add_to(i, [&](const auto &act) {
+    if (node.inboard < 0)
+      return on_tilt(node.body, about_z, act);
+    inboard_tilt(node, w.bodies[i]).apply(about_z.data(), at_port.data());
+    put_on_rows(node.body, node.inboard, w.bodies[i], at_port, act);
+  });
+  if (node.parent < 0)
+    return;
+  const auto inner = static_cast<std::size_t>(node.parent);
+  about_z[Space::axis] = -moment;
+  w.hinges[i].turn.apply(about_z.data(), at_port.data());
+  const int port = node.parent_port - mechanism_.nodes[inner].first_port;
+  add_to(inner,
+         [&](const auto &act) { put_on_rows(mechanism_.nodes[inner].body, port, w.bodies[inner], at_port, act); });
+}
+
+template <class Space>
 typename NewtonEuler<Space>::RowAcceleration NewtonEuler<Space>::of_row(std::size_t r, const double *a,
                                                                         const Workspace<Space, double> &w) const {
   const Row &row = mechanism_.rows[r];

@@ -57,6 +57,10 @@ public:
   // gravity, elasticity and damping, so that forces on sections and actuators have to make up for them.
   void require_of_modes(const double *q, const double *a, Workspace<Space, double> &w, double *f);
 
+  // Adds to Q (n_v) what a moment about z of the joint that carries node i, on its outer section and the opposite on
+  // the inner one, does on the modes of both bodies.
+  void add_joint_moment_on_modes(std::size_t i, double moment, const Workspace<Space, double> &w, double *Q) const;
+
   // Second derivative of the value of a row by these accelerations, and the size of the terms that cancel in it.
   struct RowAcceleration {
     double value, size;

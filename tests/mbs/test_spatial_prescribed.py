@@ -1,0 +1,205 @@
+"""Prescribed motion and the forces of motors in 3D: the core against NumPy on random trees and loops."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from moving_trees import SMALL, moving
+from prescribed_oracle import Motor, prescribed_motion, split
+from scipy.linalg import qr
+from spatial_trees import TYPES
+
+from ffrobot.mbs import _core
+from ffrobot.mbs.model.spatial_drives import Drive
+from ffrobot.mbs.model.spatial_model import row_values
+from ffrobot.mbs.model.spatial_rows import SpatialRow
+from ffrobot.mbs.model.spatial_system import SpatialSystem
+from ffrobot.mbs.model.spatial_tree import Section
+
+TIMES = np.array([0.0, 0.01, 0.01, 0.05])
+GROUND = Section(-1, "", np.eye(3), np.zeros(3))
+FAMILIES = ("rigid", "solid", "beam", "supported beam")
+
+
+def polynomial(value, rate, acceleration):
+    """A function of time with these at t = 0, from t = −1 on."""
+    second, first = acceleration / 2, rate - acceleration
+    return _core.TimeFunction.polynomial(np.array([-1.0, 1.0]), np.array([[second, first, value - first - second]]))
+
+
+def candidates(rng, model, q):
+    """Rows of all kinds that may follow a path, which measure 0 at q (n_q,): several for each body."""
+    tree = model.tree
+    frames = tree.frames(q[None])
+    for number, node in enumerate(tree.nodes):
+        for label in ("tip", "side"):
+            section = Section(number, label, np.eye(3), np.zeros(3))
+            yield from (SpatialRow("path", "point", GROUND, section, f, f) for f in rng.standard_normal((3, 3)))
+            for f in rng.standard_normal((3, 3)):
+                g = tree.motion(section, q[None], frames).F[0].T @ np.cross(f, rng.standard_normal(3))
+                yield SpatialRow("path", "dot", GROUND, section, f, g)
+        if number:
+            a, f = Section(number - 1, "side", np.eye(3), np.zeros(3)), rng.standard_normal(3)
+            yield SpatialRow("path", "slide", a, section, f, f)
+        yield from coordinate_rows(node, range(node.v.start, node.v.stop))
+
+
+def coordinate_rows(node, coordinates):
+    """Of a joint whose coordinates are numbers; the core has none of planar joints."""
+    zero = np.zeros(3)
+    for k in coordinates if node.joint.q_count == node.joint.freedoms and node.joint.type != "planar" else ():
+        place = node.q.start + k - node.v.start
+        yield SpatialRow("path", "coordinate", node.inner, node.outer, zero, zero, coordinate=k, q_index=place)
+
+
+def following(rng, model, q, count_more=0):
+    """The model with as many path rows as it has freedom, targets that move, and rows that only say the same again."""
+    pool = tuple(candidates(rng, model, q))
+    at, joints = np.zeros(1), model.tree.joint_columns
+    free = freedom(model, q)
+    values, gradients = (found[0] for found in row_values(replace(model, rows=pool), q[None], at))
+    chosen = qr((gradients[:, joints] @ free).T, pivoting=True)[2][: free.shape[1]]
+    path = [
+        pool[k] if pool[k].kind == "dot" else replace(pool[k], target=polynomial(values[k], *rng.standard_normal(2)))
+        for k in chosen
+    ]
+    return replace(model, rows=(*model.rows, *path, *path[:count_more]))
+
+
+def freedom(model, q):
+    """Orthonormal columns (joint coordinates, k) of what loops leave of the joints at q (n_q,)."""
+    joints = model.tree.joint_columns
+    if not model.rows:
+        return np.eye(np.count_nonzero(joints))
+    _, values, V = np.linalg.svd(row_values(model, q[None], np.zeros(1))[1][0][:, joints])
+    return V[np.count_nonzero(values > 1e-9 * values[0]) :].T
+
+
+def motors_of(rng, model, q):
+    """As many motors as the loops leave freedom; those along single angles may turn frames."""
+    coordinates = np.flatnonzero(model.tree.joint_columns)
+    free = freedom(model, q)
+    chosen = coordinates[qr(free.T, pivoting=True)[2][: free.shape[1]]]
+    angles = {node.v.start for node in model.tree.nodes if node.joint.type == "revolute"}
+    return [Motor(int(k), rng.choice([-1.0, 1.0]), k in angles and bool(rng.integers(2))) for k in chosen]
+
+
+def in_core(model, motors):
+    """The model in the core with motors."""
+    system = SpatialSystem(model)
+    driven = _core.SpatialDriven(system.core, system.scene, (~model.loop_rows).tolist())
+    for motor in motors:
+        driven.add_motor(*motor)
+    return driven
+
+
+def drawn(seed, types, loops=0, count_more=0):
+    """A random robot on its path, its motors, modes (3, T, n), and postures near (T, n_q)."""
+    rng = np.random.default_rng(seed)
+    families = tuple(kind for kind in FAMILIES if "free" not in types or kind in ("rigid", "beam"))
+    motion, _ = moving(rng, types, families, loops=loops)
+    q, motors = motion.q[0], motors_of(rng, motion.model, motion.q[0])
+    model = following(rng, motion.model, q, count_more)
+    modal = np.concatenate([np.r_[node.p_q] for node in model.tree.nodes]).astype(int)
+    sizes = np.array([0.03 * SMALL, 1.0, 1.0])[:, None, None]
+    modes = sizes * rng.standard_normal((3, len(TIMES), len(modal)))
+    modes[0] += q[modal]
+    return model, motors, modes, np.tile(q, (len(TIMES), 1))
+
+
+def check(found, expected, model, motors):
+    """Agreement of all that the core finds, relative to the largest; rounding grows with the condition of C_J."""
+    C_J = expected.C_v[:, :, model.tree.joint_columns]
+    values = np.linalg.svd(C_J, compute_uv=False)
+    grows = max(1.0, 0.1 * (values[:, :1] / np.where(values > 1e-9 * values[:, :1], values, values[:, :1])).max())
+    tau, loops, left = split(model, expected, motors)
+    pairs = {name: (getattr(found, name), getattr(expected, name)) for name in ("q", "v", "a", "required")}
+    pairs |= {"multipliers": (found.multipliers, expected.multipliers), "loops": (found.loops, loops)}
+    pairs |= {"tau": (found.tau, tau), "left": (found.left, left)}
+    for name, (x, y) in pairs.items():
+        np.testing.assert_allclose(x, y, rtol=0, atol=1e-12 * grows * max(1.0, np.abs(y).max(initial=0.0)), err_msg=name)
+
+
+CASES = [([joint] * 3, 0, 0) for joint in TYPES if joint != "weld"]
+CASES += [(["revolute", "weld", "spherical", "universal"], 0, 0), (["planar", "prismatic", "screw"], 0, 2)]
+CASES += [(["revolute"] * 6, 1, 0), (["revolute", "prismatic", "spherical", "revolute"], 1, 1)]
+
+
+@pytest.mark.parametrize(("types", "loops", "count_more"), CASES, ids=str)
+@pytest.mark.parametrize("seed", range(3))
+def test_the_core_finds_the_motion_and_forces_of_numpy(seed, types, loops, count_more):
+    model, motors, modes, near = drawn(seed, types, loops, count_more)
+    driven = in_core(model, motors)
+    found = _core.SpatialPrescribedMotion(driven, near[0]).motion(TIMES.tolist(), *modes, near)
+    check(found, prescribed_motion(model, modes, TIMES, near), model, motors)
+
+
+def motor_rows(model, motors, targets):
+    """The model with the motors' coordinates, which follow `targets`, in place of its path."""
+    rows = [row for row in model.rows if not row.is_trajectory]
+    for motor, target in zip(motors, targets, strict=True):
+        node = next(node for node in model.tree.nodes if node.v.start <= motor.coordinate < node.v.stop)
+        (row,) = coordinate_rows(node, [motor.coordinate])
+        rows.append(replace(row, target=target))
+    return replace(model, rows=tuple(rows))
+
+
+@pytest.mark.parametrize(
+    ("types", "loops"), [(["revolute"] * 3, 0), (["universal", "screw"], 0), (["revolute"] * 6, 1)]
+)
+def test_motors_of_a_redefined_output_are_those_of_less_deflection(types, loops):
+    """The motors' coordinates, rates and accelerations are those on the path with the deflections a p + p_e."""
+    model, motors, modes, near = drawn(3, types, loops)
+    factor, shift = 0.6, 0.3 * modes[0, 0]
+    offset = [_core.TimeFunction.constant(float(p)) for p in shift]
+    still = [_core.TimeFunction.constant(0.0)] * len(motors)
+    path = in_core(model, motors)
+    driven = in_core(motor_rows(model, motors, still), motors) if loops else path
+    motion = _core.SpatialRedefinedMotion(driven, path, near[0], factor, offset)
+    found = motion.motion(TIMES.tolist(), *modes, near)
+    seen = factor * modes
+    seen[0] += shift
+    on_path = prescribed_motion(model, seen, TIMES, near)
+    for k in range(len(TIMES)):
+        targets = []
+        for motor in motors:
+            node = next(node for node in model.tree.nodes if node.v.start <= motor.coordinate < node.v.stop)
+            place = node.q.start + motor.coordinate - node.v.start
+            targets.append(
+                polynomial(on_path.q[k, place], on_path.v[k, motor.coordinate], on_path.a[k, motor.coordinate])
+            )
+        one = motor_rows(model, motors, targets)
+        expected = prescribed_motion(one, modes[:, k : k + 1], np.zeros(1), on_path.q[k : k + 1])
+        tau, lambdas, left = split(one, expected, motors)
+        for x, y in (
+            (found.q[k], expected.q[0]), (found.v[k], expected.v[0]), (found.a[k], expected.a[0]),
+            (found.tau[k], tau[0]), (found.loops[k], lambdas[0]), (found.left[k], left[0]),
+        ):  # fmt: skip
+            np.testing.assert_allclose(x, y, rtol=0, atol=1e-11 * max(1.0, np.abs(y).max(initial=0.0)))
+
+
+def test_loads_are_held_before_and_after_the_path():
+    """Loads of time stay outside of an interval what they are at its ends."""
+    model, motors, modes, near = drawn(0, ["revolute"] * 3)
+    direction = np.ones(model.tree.n_v)
+    model = replace(model, modal_loads=(Drive(direction, polynomial(1.0, 20.0, 5.0)),))
+    motion = _core.SpatialPrescribedMotion(in_core(model, motors), near[0])
+    free = motion.motion(TIMES.tolist(), *modes, near).required
+    motion.hold_loads(0.005, 0.02)
+    held = motion.motion(TIMES.tolist(), *modes, near).required
+    change = [20.0 * (t - h) + 2.5 * (t**2 - h**2) for t, h in zip(TIMES, np.clip(TIMES, 0.005, 0.02), strict=True)]
+    np.testing.assert_allclose(held - free, np.outer(change, direction), atol=1e-10)
+
+
+def test_motion_ends_where_a_path_leaves_the_reach():
+    """From one posture to the next up to the first time without any; with postures near, all others are found."""
+    model, motors, modes, near = drawn(1, ["revolute"] * 3)
+    k = next(k for k, row in enumerate(model.rows) if row.kind in ("point", "coordinate"))
+    rows, away = list(model.rows), polynomial(model.rows[k].target(0.0)[0], 1e4, 0.0)
+    rows[k] = replace(rows[k], target=away)
+    motion = _core.SpatialPrescribedMotion(in_core(replace(model, rows=tuple(rows)), motors), near[0])
+    times, modes = [0.0, 0.04, 0.0], np.repeat(modes[:, :1], 3, axis=1)
+    one_by_one, apart = (motion.motion(times, *modes, start).q for start in (near[:1], near[:3]))
+    np.testing.assert_array_equal(np.isfinite(one_by_one).all(axis=1), [True, False, False])
+    np.testing.assert_array_equal(np.isfinite(apart).all(axis=1), [True, False, True])
+    np.testing.assert_allclose(apart[2], one_by_one[0], atol=1e-13)
