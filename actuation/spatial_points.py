@@ -21,7 +21,7 @@ from ..fe_models.modal_body import ModalBody
 from ..mbs.analysis.outcome import Outcome
 from ..mbs.fields.references import Reference
 from ..mbs.model.spatial_body import SpatialBody, SpatialPoint
-from ..mbs.model.spatial_model import SpatialModel, row_values
+from ..mbs.model.spatial_model import SpatialModel
 from ..mbs.model.spatial_motors import path_forces, spin_of_modes
 from ..mbs.model.spatial_tree import Motion, Section
 from ..mbs.model.spatial_wrench import Wrench, row_wrenches
@@ -173,8 +173,7 @@ def driving_forces_in_space(run: Outcome) -> dict[str, Array]:
                     body = model.tree.nodes[section.body].body
                     found[body.name] += _on_body(model, run.q, frames, section, wrench)
     if run.forces.required is not None:  # a shape is held besides, by forces on the modes alone
-        C_v = row_values(model, run.q, run.time, frames)[1]
-        held = run.forces.required - path_forces(model, C_v, run.multipliers)
+        held = run.forces.required - path_forces(model, run.time, run.q, run.multipliers)
         for node in model.tree.nodes:
             found[node.body.name][:, 6:] += held[:, node.p_v]
     return found

@@ -12,8 +12,9 @@ from ...common.arrays import Array
 from ...common.errors import InputError
 from .. import _core
 from ..model.spatial_gears import refuse_held_motors
+from ..model.spatial_motors import driven_mechanism
 from ..solve.spatial_posture import check_path, mobility, undeformed_posture
-from ..solve.spatial_prescribed import driven_mechanism, prescribed_motion
+from ..solve.spatial_prescribed import prescribed_motion
 from ..solve.spatial_redundancy import resolved
 from .context import Context
 from .outcome import Forces, Motion, Outcome, Statistics
@@ -43,9 +44,10 @@ def run_spatial_fcid(context: Context, analysis: FcidKeys) -> Outcome:
     shape = prescribed_shape(model.scene.path, [node.body for node in model.tree.nodes], analysis, motion, q)
 
     def at(times: Array) -> Outcome:
-        *states, required = prescribed_motion(model, motion, sampled(shape, times), times, q[None])
+        found = prescribed_motion(model, motion, sampled(shape, times), times, q[None])
         return Outcome(
-            analysis=analysis, model=model, motion=Motion(times, *states), forces=Forces(required=required),
+            analysis=analysis, model=model, forces=Forces(required=found.required),
+            motion=Motion(times, found.q, found.v, found.a, found.multipliers),
             statistics=Statistics(warnings=warnings), again=at,
         )  # fmt: skip
 

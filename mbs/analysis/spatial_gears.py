@@ -49,11 +49,10 @@ def supplied_through_gears(
     model: SpatialModel,
     state: States,
     time: Array,
-    C_v: Array,
     wanted: Array,
     twists: Mapping[str, BSpline] | None = None,
 ) -> Supplied:
-    """What carries the motion `state` at `time` (T,), for which rigid gears need `wanted` (T, n_v) with C_v of rows.
+    """What carries the motion `state` at `time` (T,), for which rigid gears need `wanted` (T, n_v).
 
     Compliant gears let their rotors turn by N δ more. Then the rotor needs J N² δ̈ of its motor (`elastic_joints`), and
     the body that carries it, which turns with Ω_a, the moment J N (δ̈ z + δ̇ Ω_a × z): the rate of J N δ̇ z. That is
@@ -62,16 +61,16 @@ def supplied_through_gears(
 
     Raises `InputError` for such a joint without a motor, or with a load.
     """
-    frames, felt = model.tree.frames(state.q), np.zeros_like(wanted)
+    felt = np.zeros_like(wanted)
     elastic = [] if model.tree.gears else elastic_joints(model)
     if not elastic:
-        return Supplied(motor_forces(model, state.q, frames, C_v, wanted), {}, felt)
+        return Supplied(motor_forces(model, state.q, wanted), {}, felt)
     _refuse_loads(model, elastic)
     compliant, torques = with_compliance_in_space(model), rotor_torques(model, state, time)
     firm = required_forces(compliant, _wound(compliant, state, None), time)
     change = np.inf
     for passes in count(1):
-        forces = motor_forces(model, state.q, frames, C_v, wanted + felt)
+        forces = motor_forces(model, state.q, wanted + felt)
         gears = {
             node.joint.name: _gear(
                 model, state, time, node, torques[:, model.tree.index[node.body.name]], forces, twists
@@ -161,7 +160,7 @@ def wound_up(run: Outcome, model: SpatialModel) -> WoundUp:
             f'{model.scene.path}: motors: expected "section" where joints with stiffness are driven, controlled or'
             ' linear, found "frame"'
         )
-    forces, gears, _ = supplied_through_gears(run.model, run, run.time, *supplied_in(run))
+    forces, gears, _ = supplied_through_gears(run.model, run, run.time, supplied_in(run))
     q, v, a = with_motors(model, (run.q, run.v, run.a), gears)
     return WoundUp(q, v, a, gears, forces.moments)
 

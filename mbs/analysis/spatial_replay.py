@@ -72,14 +72,14 @@ def replayed(source: Outcome, read: Callable[[Outcome], Array], times: Array, to
 
 def motor_forces_of(run: Outcome) -> MotorForces:
     """τ and F_p of a run, its gears rigid (see `mbs.model.spatial_motors`)."""
-    return motor_forces(run.model, run.q, run.model.tree.frames(run.q), *supplied_in(run))
+    return motor_forces(run.model, run.q, supplied_in(run))
 
 
-def supplied_in(run: Outcome) -> tuple[Array, Array]:
-    """C_v (T, rows, n_v) of a run, and what paths or a prescribed shape take along v (T, n_v)."""
-    C_v = row_values(run.model, run.q, run.time, run.model.tree.frames(run.q))[1]
-    wanted = run.forces.required
-    return C_v, path_forces(run.model, C_v, run.multipliers) if wanted is None else wanted
+def supplied_in(run: Outcome) -> Array:
+    """What the paths of a run, or a prescribed shape, take along v (T, n_v)."""
+    if run.forces.required is not None:
+        return run.forces.required
+    return path_forces(run.model, run.time, run.q, run.multipliers)
 
 
 def path_wrenches(run: Outcome) -> dict[str, Array]:

@@ -8,9 +8,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...common.arrays import Array
+from ...common.arrays import Array, as_list
 from ...common.rotations import left_jacobian, left_jacobian_slope
+from .. import _core
 from .spatial_model import SpatialModel
+from .spatial_system import SpatialSystem
 from .spatial_tree import Motion, Section
 
 
@@ -25,62 +27,46 @@ class MotorForces:
     modal: Mapping[str, Array]
 
 
-def path_forces(model: SpatialModel, C_v: Array, multipliers: Array) -> Array:
-    """−C_sᵀλ_s (T, n_v): what the forces on the paths do along v, with C_v (T, rows, n_v) and λ (T, rows)."""
-    path = ~model.loop_rows
-    found: Array = -np.einsum("tij,ti->tj", C_v[:, path], multipliers[:, path])
-    return found
+def driven_mechanism(model: SpatialModel, *, has_motors: bool = True) -> _core.SpatialDriven:
+    """The model in the core, under the loads of its scene, with its motors where asked for."""
+    system = SpatialSystem(model)
+    driven = _core.SpatialDriven(system.core, system.scene, (~model.loop_rows).tolist())
+    turning = turning_motors(model) if model.scene.motors == "frame" else []
+    for joint, coordinates in model.motors.items() if has_motors else ():
+        for coordinate in coordinates.tolist():
+            driven.add_motor(coordinate, model.sign(joint), joint in turning)
+    return driven
+
+
+def path_forces(model: SpatialModel, times: Array, q: Array, multipliers: Array) -> Array:
+    """−C_sᵀλ_s (T, n_v): what the forces on the paths do along v at q (T, n_q) and `times` (T,), with λ (T, rows)."""
+    signs = np.array([row.sign for row in model.rows])
+    return driven_mechanism(model).path_forces(as_list(times), q, multipliers * signs)
 
 
 class SplitForces(NamedTuple):
-    """τ (T, k) by joint, EᵀF_p (T, n_v) and ν (T, loop rows)."""
+    """τ (T, k) by joint, EᵀF_p (T, n_v) and multipliers λ_c (T, constraint equations of loops)."""
 
     moments: dict[str, Array]
     left: Array
     loops: Array
 
 
-def split_forces(model: SpatialModel, q: Array, frames: Sequence[Motion], C_v: Array, wanted: Array) -> SplitForces:
-    """Gᵀτ + EᵀF_p + C_mᵀν = `wanted` (T, n_v), with C_v (T, rows, n_v) at q (T, n_q).
-
-    In joint coordinates without loops τ are the components of the right side along the motors' coordinates and F_p
-    those along the modes; loops share them out with ν.
-    """
-    joints, loops = model.tree.joint_columns, C_v[:, model.loop_rows]
-    motors = np.concatenate([*model.motors.values(), np.zeros(0, dtype=int)]).astype(int)
-    G = np.broadcast_to(np.eye(model.tree.n_v)[motors], (len(q), len(motors), model.tree.n_v))
-    rows = np.concatenate([loops, G], axis=1)
-    found = np.einsum("tji,tj->ti", np.linalg.pinv(rows[:, :, joints]), wanted[:, joints])
-    left = wanted - np.einsum("tij,ti->tj", rows, found)
-    moments, first = {}, loops.shape[1]
-    for name, numbers in model.motors.items():
-        moments[name] = model.sign(name) * found[:, first : first + len(numbers)]
-        first += len(numbers)
-    if model.scene.motors == "frame":
-        _move_to_frames(model, q, frames, moments, left)
-    return SplitForces(moments, left, found[:, : loops.shape[1]])
+def split_forces(model: SpatialModel, q: Array, wanted: Array) -> SplitForces:
+    """Gᵀτ + EᵀF_p − C_cᵀλ_c = `wanted` (T, n_v) at q (T, n_q), by the core (core/recursion/motors.h)."""
+    tau, left, multipliers = driven_mechanism(model).split(q, wanted)
+    moments, first = {}, 0
+    for joint, coordinates in model.motors.items():
+        moments[joint] = tau[:, first : first + len(coordinates)]
+        first += len(coordinates)
+    return SplitForces(moments, left, multipliers)
 
 
-def motor_forces(model: SpatialModel, q: Array, frames: Sequence[Motion], C_v: Array, wanted: Array) -> MotorForces:
+def motor_forces(model: SpatialModel, q: Array, wanted: Array) -> MotorForces:
     """The same, modal forces by body and in the modes of the modal body files."""
-    moments, left, _ = split_forces(model, q, frames, C_v, wanted)
+    moments, left, _ = split_forces(model, q, wanted)
     stored = {node.body.name: left[:, node.p_v] @ node.body.on_file for node in model.tree.nodes}
     return MotorForces(moments, stored)
-
-
-def _move_to_frames(
-    model: SpatialModel, q: Array, frames: Sequence[Motion], moments: Mapping[str, Array], left: Array
-) -> None:
-    """Motors that turn frames, not sections: what they do less on the modes, modal forces do more."""
-    tree = model.tree
-    for joint in turning_motors(model):
-        node = tree.nodes[tree.carried[joint]]
-        axis = tree.motion(node.inner, q, frames).F[:, :, 2]
-        along = model.sign(joint) * moments[joint]
-        for section, sign in ((node.outer, 1.0), (node.inner, -1.0)):
-            if section.body >= 0:
-                turn = np.einsum("ti,tij->tj", axis, spin_of_modes(model, q, frames, section))
-                left[:, tree.nodes[section.body].p_v] += sign * along * turn
 
 
 def turning_motors(model: SpatialModel) -> list[str]:

@@ -83,6 +83,6 @@ def _with_motors(motion: SpatialMotion) -> MotionForces:
         return motion.behind_gears.forces
     total = required_forces(model, motion, motion.time)
     multipliers = np.zeros_like(motion.multipliers)
-    multipliers[:, model.loop_rows] = -split_forces(model, motion.q, motion.frames, motion.rows[1], total).loops
+    multipliers[:, model.loop_rows] = split_forces(model, motion.q, total).loops
     behind = motion.behind_gears
     return motion_forces(behind.system, behind, motion.time, multipliers)

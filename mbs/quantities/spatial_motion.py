@@ -149,7 +149,9 @@ class SpatialMotion:
     @cached_property
     def supplied(self) -> Array:
         """(T, n_v) what actuators supply along v: see `mbs.model.spatial_motors.path_forces`."""
-        return path_forces(self.model, self.rows[1], self.multipliers) if self.required is None else self.required
+        return (
+            self.required if self.required is not None else path_forces(self.model, self.time, self.q, self.multipliers)
+        )
 
     @property
     def followed(self) -> list[SpatialTrajectory]:
@@ -182,8 +184,7 @@ class SpatialMotion:
     def _supplied(self) -> Supplied | None:
         if not self.is_prescribed:
             return None
-        C_v, twists = self.rows[1], self.twists or None
-        return supplied_through_gears(self.model, self, self.time, C_v, self.supplied, twists)
+        return supplied_through_gears(self.model, self, self.time, self.supplied, self.twists or None)
 
     @property
     def gears(self) -> Mapping[str, GearMotion]:

@@ -11,9 +11,7 @@ from ...common.arrays import Array, as_list
 from ...common.errors import SolveError
 from .. import _core
 from ..model.spatial_model import SpatialModel
-from ..model.spatial_motors import turning_motors
 from ..model.spatial_rows import SpatialRow
-from ..model.spatial_system import SpatialSystem
 
 
 class Prescribed(NamedTuple):
@@ -24,17 +22,6 @@ class Prescribed(NamedTuple):
     a: Array
     multipliers: Array
     required: Array
-
-
-def driven_mechanism(model: SpatialModel, *, has_motors: bool) -> _core.SpatialDriven:
-    """The model in the core, under the loads of its scene, with its motors where asked for."""
-    system = SpatialSystem(model)
-    driven = _core.SpatialDriven(system.core, system.scene, (~model.loop_rows).tolist())
-    turning = turning_motors(model) if model.scene.motors == "frame" else []
-    for joint, coordinates in model.motors.items() if has_motors else ():
-        for coordinate in coordinates:
-            driven.add_motor(int(coordinate), model.sign(joint), joint in turning)
-    return driven
 
 
 def following_motors(model: SpatialModel) -> SpatialModel:
@@ -58,7 +45,7 @@ def prescribed_motion(
 
     Raises `SolveError` where no posture meets the rows.
     """
-    found = motion.motion(as_list(times), *modes, near)
+    found = motion.motion(as_list(times), modes[0], modes[1], modes[2], near)
     is_met = np.isfinite(found.q).all(axis=1)
     if not is_met.all():
         raise SolveError(

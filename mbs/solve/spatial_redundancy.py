@@ -18,10 +18,11 @@ from ...common.errors import InputError, SolveError
 from .. import _core
 from ..fields.waypoints import spline
 from ..model.spatial_model import SpatialModel, row_values, target_rates
+from ..model.spatial_motors import driven_mechanism
 from ..model.spatial_rows import SpatialRow
 from ..model.spatial_tree import Node
 from .spatial_posture import Mobility, joint_scales, mobility, undeformed_posture
-from .spatial_prescribed import driven_mechanism, joint_places, prescribed_motion
+from .spatial_prescribed import joint_places, prescribed_motion
 
 OWNER = "redundancy"  # of the rows that this adds
 NODES = 401  # of the splines that joints follow

@@ -13,10 +13,11 @@ from ...common.errors import InputError
 from .. import _core
 from .._core import TimeFunction
 from ..model.spatial_model import SpatialModel
+from ..model.spatial_motors import driven_mechanism
 from ..model.spatial_rows import SpatialRow
 from .internal_dynamics import Stopped, Target
 from .spatial_posture import mobility, solve_posture, told_posture, undeformed_posture
-from .spatial_prescribed import driven_mechanism, following_motors
+from .spatial_prescribed import following_motors
 
 POSTURES = 201  # along the path, from which others are looked for
 EVERY = 10  # of these is looked at for singular ones
@@ -85,11 +86,11 @@ class SpatialServo:
     @cached_property
     def motion(self) -> _core.SpatialPrescribedMotion:
         """With p(t) given, the motors' coordinates as on the path with the deflections `factor` p + `offset`."""
-        path = driven_mechanism(self.model, has_motors=True)
+        path = driven_mechanism(self.model)
         motion = _core.SpatialPrescribedMotion(path, self.near[0])
         if self.factor != 1.0 or self.offset:
             has_loops = self.model.loop_rows.any()
-            driven = driven_mechanism(following_motors(self.model), has_motors=True) if has_loops else path
+            driven = driven_mechanism(following_motors(self.model)) if has_loops else path
             motion = _core.SpatialRedefinedMotion(driven, path, self.near[0], self.factor, list(self.offset))
         motion.hold_loads(0.0, self.end)
         return motion
@@ -130,12 +131,12 @@ def make_spatial_servo(
             )
     if not any(node.body.n_modes for node in model.tree.nodes):
         raise InputError(
-            f'{where}: expected at least one flexible body for kind = "motors-only", found only rigid ones: kind ='
-            ' "pcid" gives their motors\' forces'
+            f'{where}: expected at least one flexible body for kind = "motors-only", found only rigid ones: use kind'
+            ' = "pcid"'
         )
     if factor != 1.0 and model.loop_rows.any() and any(joint.type == "planar" for joint in model.scene.motor_joints):
         raise InputError(
-            f'{where}: expected no motor in a planar joint of a mechanism with closed loops for output = "redefined",'
+            f'{where}: expected no motor in a planar joint of a mechanism with kinematic loops for output = "redefined",'
             ' found one: use output = "tip"'
         )
     times = as_floats(np.linspace(0.0, end, POSTURES))

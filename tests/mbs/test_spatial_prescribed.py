@@ -53,7 +53,7 @@ def coordinate_rows(node, coordinates):
 
 
 def following(rng, model, q, count_more=0):
-    """The model with as many path rows as it has freedom, targets that move, and rows that only say the same again."""
+    """The model with as many path rows as it has freedom, targets that move, and equations that only repeat others."""
     pool = tuple(candidates(rng, model, q))
     at, joints = np.zeros(1), model.tree.joint_columns
     free = freedom(model, q)
@@ -63,7 +63,7 @@ def following(rng, model, q, count_more=0):
         pool[k] if pool[k].kind == "dot" else replace(pool[k], target=polynomial(values[k], *rng.standard_normal(2)))
         for k in chosen
     ]
-    return replace(model, rows=(*model.rows, *path, *path[:count_more]))
+    return replace(model, rows=(*model.rows, *model.rows[:count_more], *path, *path[:count_more]))
 
 
 def freedom(model, q):
@@ -97,8 +97,12 @@ def drawn(seed, types, loops=0, count_more=0):
     """A random robot on its path, its motors, modes (3, T, n), and postures near (T, n_q)."""
     rng = np.random.default_rng(seed)
     families = tuple(kind for kind in FAMILIES if "free" not in types or kind in ("rigid", "beam"))
-    motion, _ = moving(rng, types, families, loops=loops)
-    q, motors = motion.q[0], motors_of(rng, motion.model, motion.q[0])
+    while True:
+        motion, _ = moving(rng, types, families, loops=loops)
+        q = motion.q[0]
+        if freedom(motion.model, q).shape[1] + len(motion.model.rows) == sum(motion.model.tree.joint_columns):
+            break  # loops that rigid links can close, too
+    motors = motors_of(rng, motion.model, q)
     model = following(rng, motion.model, q, count_more)
     modal = np.concatenate([np.r_[node.p_q] for node in model.tree.nodes]).astype(int)
     sizes = np.array([0.03 * SMALL, 1.0, 1.0])[:, None, None]
@@ -117,7 +121,8 @@ def check(found, expected, model, motors):
     pairs |= {"multipliers": (found.multipliers, expected.multipliers), "loops": (found.loops, loops)}
     pairs |= {"tau": (found.tau, tau), "left": (found.left, left)}
     for name, (x, y) in pairs.items():
-        np.testing.assert_allclose(x, y, rtol=0, atol=1e-12 * grows * max(1.0, np.abs(y).max(initial=0.0)), err_msg=name)
+        tolerance = 1e-12 * grows * max(1.0, np.abs(y).max(initial=0.0))
+        np.testing.assert_allclose(x, y, rtol=0, atol=tolerance, err_msg=name)
 
 
 CASES = [([joint] * 3, 0, 0) for joint in TYPES if joint != "weld"]
@@ -193,8 +198,8 @@ def test_loads_are_held_before_and_after_the_path():
 
 def test_motion_ends_where_a_path_leaves_the_reach():
     """From one posture to the next up to the first time without any; with postures near, all others are found."""
-    model, motors, modes, near = drawn(1, ["revolute"] * 3)
-    k = next(k for k, row in enumerate(model.rows) if row.kind in ("point", "coordinate"))
+    model, motors, modes, near = drawn(0, ["revolute"] * 3)
+    k = next(k for k, row in enumerate(model.rows) if row.target is not None)
     rows, away = list(model.rows), polynomial(model.rows[k].target(0.0)[0], 1e4, 0.0)
     rows[k] = replace(rows[k], target=away)
     motion = _core.SpatialPrescribedMotion(in_core(replace(model, rows=tuple(rows)), motors), near[0])
@@ -203,3 +208,18 @@ def test_motion_ends_where_a_path_leaves_the_reach():
     np.testing.assert_array_equal(np.isfinite(one_by_one).all(axis=1), [True, False, False])
     np.testing.assert_array_equal(np.isfinite(apart).all(axis=1), [True, False, True])
     np.testing.assert_allclose(apart[2], one_by_one[0], atol=1e-13)
+
+
+@pytest.mark.parametrize(("types", "loops"), [(["revolute"] * 3, 0), (["revolute"] * 6, 1), (["spherical"] * 2, 0)])
+def test_forces_of_paths_are_split_as_in_numpy(types, loops):
+    """−C_sᵀλ_s of any multipliers, and of any generalized forces what motors and loops leave."""
+    model, motors, modes, near = drawn(5, types, loops, count_more=1)
+    driven, expected = in_core(model, motors), prescribed_motion(model, modes, TIMES, near)
+    rng = np.random.default_rng(0)
+    multipliers, wanted = (rng.standard_normal((len(TIMES), k)) for k in (len(model.rows), model.tree.n_v))
+    of_paths = -np.einsum("tij,ti->tj", expected.C_v[:, ~model.loop_rows], multipliers[:, ~model.loop_rows])
+    found = driven.path_forces(TIMES.tolist(), expected.q, multipliers)
+    np.testing.assert_allclose(found, of_paths, rtol=0, atol=1e-12 * np.abs(of_paths).max())
+    tau, loads, left = split(model, expected._replace(required=wanted), motors)
+    for x, y in zip(driven.split(expected.q, wanted), (tau, left, loads), strict=True):
+        np.testing.assert_allclose(x, y, rtol=0, atol=1e-11 * max(1.0, np.abs(y).max(initial=0.0)))

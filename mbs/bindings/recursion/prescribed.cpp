@@ -130,18 +130,19 @@ Run planar_outputs(const SystemOnTree &both, PrescribedMotion<Planar> &motion, c
   return {{}, outputs.take(reached), {}};
 }
 
-// each(i, motors, workspace) at postures q (T, n_q)
+// each(i, motors, workspace) at postures q (T, n_q); markers that constraint equations follow are where they are at
+// `times` (T), if there are any.
 template <class Space, class Each>
 void at_postures(const DrivenMechanism<Space> &driven, const std::vector<double> &times, const RowMajorMatrix &q,
                  const Each &each) {
-  check_size("postures", q.rows(), static_cast<Index>(times.size()));
   check_size("coordinates", q.cols(), driven.mechanism.n_q);
   recursion::Workspace<Space, double> w(driven.mechanism);
   Motors<Space> motors(driven);
   const VectorXd v = VectorXd::Zero(driven.mechanism.n_v);
   for (Index i = 0; i < q.rows(); ++i) {
-    for (const DrivenMarker &marker : driven.scene.driven)
-      w.turning[static_cast<std::size_t>(marker.marker)] = marker.law(times[static_cast<std::size_t>(i)]);
+    if (!times.empty())
+      for (const DrivenMarker &marker : driven.scene.driven)
+        w.turning[static_cast<std::size_t>(marker.marker)] = marker.law(times[static_cast<std::size_t>(i)]);
     place_all(driven.mechanism, q.row(i).data(), v.data(), Forces<double>(), w);
     each(i, motors, w);
   }
@@ -150,6 +151,7 @@ void at_postures(const DrivenMechanism<Space> &driven, const std::vector<double>
 template <class Space>
 RowMajorMatrix path_forces(const DrivenMechanism<Space> &driven, const std::vector<double> &times,
                            const RowMajorMatrix &q, const RowMajorMatrix &multipliers) {
+  check_size("times", static_cast<Index>(times.size()), q.rows());
   check_size("times of multipliers", multipliers.rows(), q.rows());
   check_size("multipliers", multipliers.cols(), static_cast<Index>(driven.mechanism.rows.size()));
   RowMajorMatrix found(q.rows(), driven.mechanism.n_v);
@@ -161,13 +163,12 @@ RowMajorMatrix path_forces(const DrivenMechanism<Space> &driven, const std::vect
 
 template <class Space>
 std::tuple<RowMajorMatrix, RowMajorMatrix, RowMajorMatrix>
-split(const DrivenMechanism<Space> &driven, const std::vector<double> &times, const RowMajorMatrix &q,
-      const RowMajorMatrix &wanted) {
-  check_size("times of forces", wanted.rows(), q.rows());
+split(const DrivenMechanism<Space> &driven, const RowMajorMatrix &q, const RowMajorMatrix &wanted) {
+  check_size("postures of forces", wanted.rows(), q.rows());
   check_size("forces", wanted.cols(), driven.mechanism.n_v);
   RowMajorMatrix tau(q.rows(), static_cast<Index>(driven.motors.size())), left(q.rows(), wanted.cols());
   RowMajorMatrix loops(q.rows(), static_cast<Index>(std::ranges::count(driven.is_path, 0)));
-  at_postures(driven, times, q, [&](Index i, Motors<Space> &motors, const auto &w) {
+  at_postures(driven, {}, q, [&](Index i, Motors<Space> &motors, const auto &w) {
     motors.split(q.row(i).data(), wanted.row(i), w);
     tau.row(i) = motors.tau().transpose(), left.row(i) = motors.left().transpose();
     loops.row(i) = motors.loops().transpose();
@@ -199,7 +200,7 @@ template <class Space> void bind(nb::module_ &m, const std::string &space) {
           "A motor along `sign` v[coordinate], or between the frames of the bodies there.")
       .def("path_forces", &path_forces<Space>, "times"_a, "q"_a, "multipliers"_a,
            "-C_s^T lambda_s (T, n_v) of the path at postures q (T, n_q), with multipliers (T, constraint equations).")
-      .def("split", &split<Space>, "times"_a, "q"_a, "wanted"_a,
+      .def("split", &split<Space>, "q"_a, "wanted"_a,
            "(tau (T, motors), left (T, n_v), loops (T, constraint equations of loops)): what motors do of generalized "
            "forces\n(T, n_v), what they and loops leave, and multipliers of the loops.");
   nb::class_<Motion>(m, (space + "PrescribedMotion").c_str(),

@@ -163,9 +163,8 @@ template <class Space> void PrescribedMotion<Space>::act(double t) {
 }
 
 template <class Space>
-bool PrescribedMotion<Space>::take_joints(double t, const ModalMotion &modes, std::vector<Jet> targets,
-                                          const PrescribedMotion &other) {
-  targets_ = std::move(targets);
+void PrescribedMotion<Space>::take_joints(double t, const ModalMotion &modes, const PrescribedMotion &other) {
+  targets_ = other.targets_;
   state_ = other.state_, a_ = other.a_;
   set_modes(modes);
   turn_markers(t);
@@ -173,7 +172,6 @@ bool PrescribedMotion<Space>::take_joints(double t, const ModalMotion &modes, st
   measure();
   factorise();
   act(t);
-  return true;
 }
 
 template <class Space> std::vector<Jet> PrescribedMotion<Space>::measured_in(const PrescribedMotion &other) {
@@ -236,12 +234,14 @@ template <class Space> bool RedefinedMotion<Space>::move(double t, const ModalMo
   if (!path_.move(t, seen))
     return false;
   const auto &driven = this->driven();
+  if (&driven.mechanism == &path_.driven().mechanism) {
+    this->take_joints(t, modes, path_);
+    return true;
+  }
   std::vector<Jet> targets = targets_at(driven.scene, t), motors = this->measured_in(path_);
   for (std::size_t r = 0; r < targets.size(); ++r)
     if (driven.is_path[r])
       targets[r] = motors[r];
-  if (std::ranges::count(driven.is_path, 0) == 0)
-    return this->take_joints(t, modes, std::move(targets), path_);
   PrescribedMotion<Space>::start_at(path_.state().head(driven.mechanism.n_q));
   return this->follow(t, modes, std::move(targets));
 }

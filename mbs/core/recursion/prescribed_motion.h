@@ -63,8 +63,8 @@ public:
 
 protected:
   bool follow(double t, const ModalMotion &modes, std::vector<Jet> targets); // of constraint equations
-  // With the joints' motion of another one, which meets the targets
-  bool take_joints(double t, const ModalMotion &modes, std::vector<Jet> targets, const PrescribedMotion &other);
+  // With the joints' motion of another one
+  void take_joints(double t, const ModalMotion &modes, const PrescribedMotion &other);
   // What constraint equations of this mechanism measure in another motion of the same bodies.
   std::vector<Jet> measured_in(const PrescribedMotion &other);
 
@@ -95,8 +95,8 @@ private:
 };
 
 // The motion with the motors' coordinates that another one has, whose path is that of the scene, with deflections
-// factor p + offset(t). Its own mechanism has the motors' coordinates in place of the path; without loops, where motors
-// move all joints, it may be the other one's.
+// factor p + offset(t). Its own mechanism has the motors' coordinates in place of the path. It is the other one's where
+// these are the coordinates of all joints.
 template <class Space> class RedefinedMotion final : public PrescribedMotion<Space> {
 public:
   // offset: one function for each mode of all bodies, or none.
