@@ -11,6 +11,7 @@ import numpy as np
 from ...common.arrays import Array, as_list
 from ...common.rotations import left_jacobian, left_jacobian_slope
 from .. import _core
+from .spatial_drives import Command
 from .spatial_model import SpatialModel
 from .spatial_system import SpatialSystem
 from .spatial_tree import Motion, Section
@@ -29,7 +30,8 @@ class MotorForces:
 
 def driven_mechanism(model: SpatialModel, *, has_motors: bool = True) -> _core.SpatialDriven:
     """The model in the core, under the loads of its scene, with its motors where asked for."""
-    system = SpatialSystem(model)
+    moved = [Command(direction) for joint in model.motors for direction in model.along(joint)]
+    system = SpatialSystem(model, commands=moved)
     driven = _core.SpatialDriven(system.core, system.scene, (~model.loop_rows).tolist())
     turning = turning_motors(model) if model.scene.motors == "frame" else []
     for joint, coordinates in model.motors.items() if has_motors else ():

@@ -74,6 +74,10 @@ class Output(Protocol):
         """
         ...
 
+    def derivatives(self, times: Array, p: Array, v: Array, a: Array, /) -> tuple[Array, Array, Array]:
+        """M, D and K, (N, n, n) each: derivatives of these by p̈, ṗ and p; exact, or `by_differences`."""
+        ...
+
     def targets(self) -> Iterator[Target]:
         """What the path follows."""
         ...
@@ -107,15 +111,17 @@ class LinearDynamics:
 
 
 def linear_dynamics(servo: Output, times: Array, p: Array, v: Array, a: Array) -> LinearDynamics:
-    """Derivatives of r at N nodes: times (N,), p, ṗ, p̈ (N, n).
+    """Derivatives of r at N nodes: times (N,), p, ṗ, p̈ (N, n)."""
+    return LinearDynamics(times, *servo.derivatives(times, p, v, a))
 
-    By central differences; r is quadratic in ṗ and linear in p̈, so that these are exact there.
-    """
+
+def by_differences(servo: Output, times: Array, p: Array, v: Array, a: Array) -> tuple[Array, Array, Array]:
+    """M, D and K by central differences; r is quadratic in ṗ and linear in p̈, so that these are exact there."""
     modes, one = np.array([p, v, a]), np.ones(p.shape[1])
     K, D, M = (
         _derivative(servo, times, modes, k, step) for k, step in enumerate((DIFFERENCE * servo.mode_sizes, one, one))
     )
-    return LinearDynamics(times, M, D, K)
+    return M, D, K
 
 
 def stiffness(servo: Output, times: Array, p: Array) -> Array:

@@ -17,7 +17,7 @@ from ..model.model import ZERO, Constraint, Model
 from ..model.planar_tree import PlanarTree, told_in_joints
 from ..model.system import MechanismSystem
 from .initial_state import undeformed_state
-from .internal_dynamics import Target
+from .internal_dynamics import Target, by_differences
 from .reach import REACH_CHECKS, check_reach
 
 
@@ -66,6 +66,10 @@ class Servo:
         near = self.near[np.abs(times[:, None] - self.near_times).argmin(axis=1)]
         found: Array = self._output.left_on_modes(as_list(times), p, v, a, near)[1]
         return found
+
+    def derivatives(self, times: Array, p: Array, v: Array, a: Array) -> tuple[Array, Array, Array]:
+        """M, D and K (N, n, n) of these by p̈, ṗ and p."""
+        return by_differences(self, times, p, v, a)
 
     def source(self, shape: list[list[TimeFunction]]) -> _core.ActuationSource:
         """The motors' forces for p(t), at any time."""

@@ -15,7 +15,7 @@ from .._core import TimeFunction
 from ..model.spatial_model import SpatialModel
 from ..model.spatial_motors import driven_mechanism
 from ..model.spatial_rows import SpatialRow
-from .internal_dynamics import Stopped, Target
+from .internal_dynamics import Stopped, Target, by_differences
 from .spatial_posture import mobility, solve_posture, told_posture, undeformed_posture
 from .spatial_prescribed import following_motors
 
@@ -88,12 +88,16 @@ class SpatialServo:
         """With p(t) given, the motors' coordinates as on the path with the deflections `factor` p + `offset`."""
         path = driven_mechanism(self.model)
         motion = _core.SpatialPrescribedMotion(path, self.near[0])
-        if self.factor != 1.0 or self.offset:
+        if self._is_redefined:
             has_loops = self.model.loop_rows.any()
             driven = driven_mechanism(following_motors(self.model)) if has_loops else path
             motion = _core.SpatialRedefinedMotion(driven, path, self.near[0], self.factor, list(self.offset))
         motion.hold_loads(0.0, self.end)
         return motion
+
+    @property
+    def _is_redefined(self) -> bool:
+        return self.factor != 1.0 or bool(self.offset)
 
     def postures(self, times: Array) -> Array:
         """Those along the path without deflections, (T, n_q), nearest to `times` (T,)."""
@@ -109,6 +113,14 @@ class SpatialServo:
             part = slice(k, k + MOST_STATES)
             r[part] = self.motion.left_on_modes(as_list(times[part]), p[part], v[part], a[part], near[part])[1]
         return r
+
+    def derivatives(self, times: Array, p: Array, v: Array, a: Array) -> tuple[Array, Array, Array]:
+        """M, D and K (N, n, n) of these by p̈, ṗ and p: exact, unless motors turn frames or follow a redefined loop."""
+        if self.model.scene.motors == "frame" or (self._is_redefined and self.model.loop_rows.any()):
+            return by_differences(self, times, p, v, a)
+        n = p.shape[1]
+        M, D, K = self.motion.derivatives(as_list(times), p, v, a, self.postures(times))
+        return M.reshape(-1, n, n), D.reshape(-1, n, n), K.reshape(-1, n, n)
 
 
 def make_spatial_servo(
@@ -136,8 +148,8 @@ def make_spatial_servo(
         )
     if factor != 1.0 and model.loop_rows.any() and any(joint.type == "planar" for joint in model.scene.motor_joints):
         raise InputError(
-            f'{where}: expected no motor in a planar joint of a mechanism with kinematic loops for output = "redefined",'
-            ' found one: use output = "tip"'
+            f'{where}: expected motors in joints other than planar ones, with kinematic loops and output = "redefined",'
+            ' found one in a planar joint: use output = "tip"'
         )
     times = as_floats(np.linspace(0.0, end, POSTURES))
     near = [start]

@@ -4,10 +4,10 @@ from typing import NamedTuple
 
 import numpy as np
 from body_equations import required_forces
+from tree_accelerations import Accelerated, row_accelerations
 
 from ffrobot.common.arrays import Array
 from ffrobot.common.rotations import left_jacobian
-from ffrobot.mbs.model.spatial_accelerations import Accelerated, row_accelerations
 from ffrobot.mbs.model.spatial_model import row_values, target_rates
 from ffrobot.mbs.solve.spatial_posture import solve_postures
 

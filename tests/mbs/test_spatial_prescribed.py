@@ -1,5 +1,6 @@
 """Prescribed motion and the forces of motors in 3D: the core against NumPy on random trees and loops."""
 
+import copy
 from dataclasses import replace
 
 import numpy as np
@@ -10,7 +11,7 @@ from scipy.linalg import qr
 from spatial_trees import TYPES
 
 from ffrobot.mbs import _core
-from ffrobot.mbs.model.spatial_drives import Drive
+from ffrobot.mbs.model.spatial_drives import Command, Drive
 from ffrobot.mbs.model.spatial_model import row_values
 from ffrobot.mbs.model.spatial_rows import SpatialRow
 from ffrobot.mbs.model.spatial_system import SpatialSystem
@@ -86,7 +87,8 @@ def motors_of(rng, model, q):
 
 def in_core(model, motors):
     """The model in the core with motors."""
-    system = SpatialSystem(model)
+    moved = np.isin(np.arange(model.tree.n_v), [motor.coordinate for motor in motors])
+    system = SpatialSystem(model, commands=[Command(moved.astype(float))])
     driven = _core.SpatialDriven(system.core, system.scene, (~model.loop_rows).tolist())
     for motor in motors:
         driven.add_motor(*motor)
@@ -223,3 +225,44 @@ def test_forces_of_paths_are_split_as_in_numpy(types, loops):
     tau, loads, left = split(model, expected._replace(required=wanted), motors)
     for x, y in zip(driven.split(expected.q, wanted), (tau, left, loads), strict=True):
         np.testing.assert_allclose(x, y, rtol=0, atol=1e-11 * max(1.0, np.abs(y).max(initial=0.0)))
+
+
+def with_friction(model):
+    """In all joints that have one coordinate."""
+    friction, tree = {"viscous_friction": 0.3, "coulomb_friction": 0.2, "friction_speed": 0.5}, copy.copy(model.tree)
+    tree.nodes = tuple(
+        replace(node, joint=node.joint.model_copy(update=friction)) if len(node.joint.units) == 1 else node
+        for node in tree.nodes
+    )
+    return replace(model, tree=tree)
+
+
+@pytest.mark.parametrize(
+    ("types", "loops", "factor"),
+    [
+        (["revolute"] * 3, 0, 1.0),
+        (["revolute"] * 3, 0, 0.6),
+        (["spherical", "universal"], 0, 1.0),
+        (["planar", "cylindrical"], 0, 1.0),
+        (["revolute"] * 6, 1, 1.0),
+    ],
+    ids=str,
+)
+def test_derivatives_of_what_motors_leave_are_those_of_differences(types, loops, factor):
+    """By p, ṗ and p̈, with friction along single coordinates; differences of fourth order."""
+    model, motors, modes, near = drawn(2, types, loops, count_more=1 if loops else 0)
+    model = with_friction(model)
+    motors = [motor._replace(turns_frames=False) for motor in motors]
+    driven = in_core(model, motors)
+    motion = _core.SpatialPrescribedMotion(driven, near[0])
+    if factor != 1.0:
+        motion = _core.SpatialRedefinedMotion(driven, driven, near[0], factor, [])
+    times, modes, n = TIMES[:1], modes[:, :1], modes.shape[2]
+    found = [x.reshape(n, n) for x in motion.derivatives(times.tolist(), *modes, near[:1])]
+    for order, (exact, size) in enumerate(zip(found[::-1], (1e-4, 0.1, 0.1), strict=True)):
+        steps = size * np.array([-2.0, -1.0, 1.0, 2.0])
+        moved = np.repeat(modes, 4 * n, axis=1)
+        moved[order] += np.kron(np.eye(n), steps[:, None])
+        r = motion.left_on_modes([0.0] * (4 * n), *moved, np.repeat(near[:1], 4 * n, axis=0))[1].reshape(n, 4, n)
+        by_differences = np.einsum("k,jki->ij", np.array([1.0, -8.0, 8.0, -1.0]) / (12 * size), r)
+        np.testing.assert_allclose(exact, by_differences, rtol=0, atol=1e-8 * np.abs(by_differences).max())

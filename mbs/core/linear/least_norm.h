@@ -16,8 +16,10 @@ public:
     else
       qr_.setThreshold(dependent).compute(A);
   }
-  Eigen::VectorXd solve(const Eigen::VectorXd &b) const {
-    return is_square_ ? lu_.solve(b).eval() : qr_.solve(b).eval();
+  template <class Columns> Columns solve(const Columns &b) const {
+    if (is_square_)
+      return lu_.solve(b);
+    return qr_.solve(b);
   }
   Eigen::VectorXd solve_transposed(const Eigen::VectorXd &c) const {
     return is_square_ ? lu_.transpose().solve(c).eval() : qr_.transpose().solve(c).eval();

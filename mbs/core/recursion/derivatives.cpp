@@ -82,7 +82,8 @@ Derivatives derivatives(const Mechanism<Space> &m, const Workspace<Space, double
     }
     accelerations(m, at_q.data(), at_v.data(), acting, held.data(), w, a.data());
   };
-  Derivatives found{MatrixXd(n, n), MatrixXd(n, n), MatrixXd(n, n), MatrixXd(rows, n), MatrixXd(rows, n)};
+  Derivatives found{MatrixXd(n, n),    MatrixXd(n, n),    MatrixXd(n, n),   MatrixXd(rows, n),
+                    MatrixXd(rows, n), MatrixXd(rows, n), MatrixXd(rows, n)};
   for (Index first = 0; first < n; first += directions) {
     const Index count = std::min(directions, n - first);
     Duals q1 = q0, v1 = v0, force1 = force0;
@@ -90,8 +91,8 @@ Derivatives derivatives(const Mechanism<Space> &m, const Workspace<Space, double
       const auto i = static_cast<std::size_t>(first + k);
       seed_increment(space, q, first + k, k, q1), seed(v1[i], k), seed(force1[i], k);
     }
-    answer(q1, v0, force0), take(a, first, count, found.a_q);
-    answer(q0, v1, force0), take(a, first, count, found.a_v);
+    answer(q1, v0, force0), take(a, first, count, found.a_q), take(w.lambda, first, count, found.lambda_q);
+    answer(q0, v1, force0), take(a, first, count, found.a_v), take(w.lambda, first, count, found.lambda_v);
     answer(q0, v0, force1), take(a, first, count, found.a_f);
     measure(m, q1.data(), v0.data(), w, value.data(), rate.data());
     take(value, first, count, found.value_q), take(rate, first, count, found.rate_q);

@@ -10,9 +10,10 @@ namespace ffrobot::recursion {
 
 // By increments of q (n_v; rotation vectors in body axes for quaternions), by v and by generalized forces; rows hold.
 struct Derivatives {
-  Eigen::MatrixXd a_q, a_v, a_f; // (n_v, n_v) of accelerations
-  Eigen::MatrixXd value_q;       // (rows, n_v) of values of rows, C_q: by v of their rates, too
-  Eigen::MatrixXd rate_q;        // (rows, n_v) of their rates
+  Eigen::MatrixXd a_q, a_v, a_f;      // (n_v, n_v) of accelerations
+  Eigen::MatrixXd lambda_q, lambda_v; // (rows, n_v) of multipliers, 0 of rows that are not kept
+  Eigen::MatrixXd value_q;            // (rows, n_v) of values of rows, C_q: by v of their rates, too
+  Eigen::MatrixXd rate_q;             // (rows, n_v) of their rates
 };
 
 // Joints at which loops are cut, with the loads that are given along them: N m, N, as many.

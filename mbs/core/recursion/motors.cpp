@@ -88,17 +88,23 @@ template <class Space> void Motors<Space>::split(const double *q, const VectorXd
 }
 
 template <class Space> void Motors<Space>::split(const double *q, const TreeWorkspace &w) {
-  const bool has_equations = !cuts_.empty() || !is_along_coordinates_;
-  if (has_equations)
+  if (has_equations())
     close_loops(q, w);
   for (std::size_t k = 0; k < driven_.motors.size(); ++k) {
     const Motor &motor = driven_.motors[k];
     double &tau = tau_[static_cast<Index>(k)];
-    if (!has_equations)
+    if (!has_equations())
       tau = motor.sign * Q_[motor.coordinate], Q_[motor.coordinate] = 0;
     if (motor.turns_frames)
       turn_frames(motor.coordinate, motor.sign * tau, w);
   }
+}
+
+template <class Space> Eigen::MatrixXd Motors<Space>::left_of(const Eigen::MatrixXd &dQ) const {
+  Eigen::MatrixXd left = dQ(driven_.of_modes, Eigen::all);
+  if (has_equations())
+    left -= columns_(driven_.of_modes, Eigen::all) * factors_.solve(dQ(driven_.of_joints, Eigen::all).eval());
+  return left;
 }
 
 // Of a moment between the frames of bodies in place of their sections: what it does less on modes, F_p does more.
@@ -119,7 +125,7 @@ template <class Space> void Motors<Space>::close_loops(const double *q, const Tr
   for (Index k = 0; k < tau_.size(); ++k)
     add_motor(k, q, w);
   factors_.compute(columns_(driven_.of_joints, Eigen::all));
-  const VectorXd found = factors_.solve(Q_(driven_.of_joints));
+  const VectorXd found = factors_.solve(VectorXd(Q_(driven_.of_joints)));
   lambda_c_ = found.head(cuts), tau_ = found.tail(tau_.size());
   Q_ -= columns_ * found;
 }

@@ -45,6 +45,8 @@ public:
   // kinematics of a state at q, and its frames where constraint equations or cut joints ask for these.
   void resolve(const double *q, const double *lambda, const TreeWorkspace &w);
   void split(const double *q, const Eigen::VectorXd &Q, const TreeWorkspace &w);
+  // After split(): (modes, …) of other forces dQ (n_v, …) what motors and loops leave, as they are then
+  Eigen::MatrixXd left_of(const Eigen::MatrixXd &dQ) const;
   // -C_s^T lambda_s (n_v) of the path
   const Eigen::VectorXd &path_forces(const double *q, const double *lambda, const TreeWorkspace &w);
 
@@ -56,6 +58,7 @@ public:
   const Eigen::VectorXd &loops() const { return lambda_c_; } // (constraint equations of loops)
 
 private:
+  bool has_equations() const { return !cuts_.empty() || !is_along_coordinates_; }
   void project(const double *q, const TreeWorkspace &w, Eigen::Ref<Eigen::VectorXd> Q); // of lambda_
   void split(const double *q, const TreeWorkspace &w);                                  // Q_
   void close_loops(const double *q, const TreeWorkspace &w);

@@ -8,6 +8,7 @@
 // go with them: lambda is the smallest then.
 #pragma once
 
+#include "core/recursion/derivatives.h"
 #include "core/recursion/motors.h"
 
 #include <memory>
@@ -22,6 +23,16 @@ struct ModalMotion {
 
 using ModalShape = std::vector<TimeFunction>; // p_k(t) of one body
 ModalMotion modes_at(const std::vector<ModalShape> &shape, double t);
+
+// How the motion of all coordinates answers to small changes of p, p_dot and p_ddot, (n_v, modes) each. By p_dot v, and
+// by p_ddot a, change as q by p does.
+struct JointSlopes {
+  Eigen::MatrixXd q, v, a_p, a_v; // of q, v and a by p, of a by p_dot
+};
+
+struct LeftSlopes {
+  Eigen::MatrixXd M, D, K; // (modes, modes) of what is left, by p_ddot, p_dot, p
+};
 
 template <class Space> class PrescribedMotion {
 public:
@@ -52,7 +63,9 @@ public:
   Eigen::VectorXd shape_force() const;                          // (modes)
   const Motors<Space> *motors(); // in place of all that is required along joints; null where there are none
   Eigen::VectorXd left();        // (modes) that motors, or without any the constraint equations, leave
-  const Eigen::VectorXd &values() const { return value_; } // C and its rate, which should be zero
+  JointSlopes joint_slopes();    // after balance(), as the next ones; then comes the next move()
+  virtual LeftSlopes slopes() { return left_slopes(joint_slopes()); } // of left(), with motors; exact
+  const Eigen::VectorXd &values() const { return value_; }            // C and its rate, which should be zero
   const Eigen::VectorXd &rates() const { return rate_; }
   const std::vector<Jet> &targets() const { return targets_; }
   const DrivenMechanism<Space> &driven() const { return driven_; }
@@ -64,11 +77,13 @@ public:
 protected:
   bool follow(double t, const ModalMotion &modes, std::vector<Jet> targets); // of constraint equations
   // With the joints' motion of another one
+  LeftSlopes left_slopes(const JointSlopes &joints);
   void take_joints(double t, const ModalMotion &modes, const PrescribedMotion &other);
   // What constraint equations of this mechanism measure in another motion of the same bodies.
   std::vector<Jet> measured_in(const PrescribedMotion &other);
 
 private:
+  Derivatives derivatives_under(const Eigen::VectorXd &forces, const std::vector<int> &active);
   void set_modes(const ModalMotion &modes);
   void act(double t); // at the state that was measured
   void turn_markers(double t);
@@ -104,6 +119,7 @@ public:
                   std::vector<TimeFunction> offset);
 
   void start_at(const Eigen::VectorXd &q) override { path_.start_at(q); }
+  LeftSlopes slopes() override;
   bool move(double t, const ModalMotion &modes) override;
 
 private:
