@@ -267,7 +267,7 @@ def test_verdict_says_what_the_file_holds(folder, tmp_path, capsys):
     printed = " ".join(capsys.readouterr().out.split())
     for line in str(results.verdict).splitlines():
         assert " ".join(line.split()) in printed
-    assert "beyond their limits" in results._repr_html_()
+    assert "limits exceeded" in results._repr_html_()
     with pytest.raises(KeyError):
         results.verdict["invers"]
 
