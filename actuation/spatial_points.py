@@ -82,6 +82,11 @@ class SpatialPointSet:
         """(3, c) unit vectors in body axes."""
         return np.eye(3)[:, [AXES.index(axis) for axis in self.axes]]
 
+    def of_core(self) -> tuple[Array, Array, Array, Array]:
+        """What the core takes of them: mbs/core/analysis/found_forces.h."""
+        position = np.transpose([point.position for point in self.points])
+        return self.direction, position, np.vstack([point.translation for point in self.points]), self.scale
+
     def L_a(self, p: Array) -> Array:
         """(T, 6 + n, c) at modal coordinates p (T, n) of the equations."""
         e, columns = self.direction, []

@@ -10,16 +10,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...common.arrays import Array
+from ...common.arrays import Array, as_list
 from ...common.errors import InputError, SolveError
 from ...mbs.analysis.outcome import Outcome
 from ...mbs.analysis.spatial_drive import SpatialControl, spatial_drive
-from ...mbs.analysis.spatial_forward import largest_moments
+from ...mbs.analysis.spatial_forward import actuator_commands, largest_moments
 from ...mbs.analysis.spatial_gears import WoundUp, wound_up
-from ...mbs.analysis.spatial_replay import in_parts, motor_forces_of, replay_times
-from ...mbs.model.spatial_drives import Command, Drives, PointDrive
+from ...mbs.analysis.spatial_replay import replay_times, supplied
+from ...mbs.model.spatial_drives import Drives, PointDrive
 from ...mbs.model.spatial_gears import with_compliance_in_space
-from ...mbs.model.spatial_model import SpatialModel, modal_direction, without_paths
+from ...mbs.model.spatial_model import SpatialModel, without_paths
 from ...mbs.scene.spatial.loads import SpatialLoad
 from ...mbs.solve.spatial_linearisation import SpatialLinearisation
 from ...mbs.solve.spatial_statics import initial_state
@@ -91,7 +91,7 @@ def run_spatial_closed_loop(context: ActuatedContext, analysis: SpatialClosedLoo
         return loop(k, t, sensing.read(*(part[None] for part in np.split(state, splits)))[0])
 
     held = partial(held_commands, setup=setup, loop=loop)
-    before, inputs = partial(held, after=-1e-9), _commands(context, plant.model)
+    before, inputs = partial(held, after=-1e-9), actuator_commands(plant.model, context.patches)
     control = SpatialControl(inputs, loop.first, setup.times, analysis.delay, at_sample, before)
     disturbing = ((place_of(whole, str(load.point)), load.components) for load in analysis.disturbance)
     drives = Drives(at_points=tuple(PointDrive(*load) for load in disturbing))
@@ -157,26 +157,12 @@ def _feed_forward(
     """(K, inputs) moments and voltages of the inverse analysis, in the middle of the time for which each is held."""
     middle = held_until(times, analysis, source.time[-1])
 
-    def found(run: Outcome) -> Array:
-        forces = motor_forces_of(run)
-        moments = np.hstack([*forces.moments.values(), np.zeros((len(run.time), 0))])
-        if analysis.feed_forward == "none":
-            moments[:] = 0.0
-        voltages: list[Array] = [np.zeros((len(run.time), of.Phi_V.shape[1])) for of in context.patches.values()]
-        if analysis.feed_forward == "joints+pzt":
-            voltages = [
-                np.hstack([one.required if analysis.unlimited else one.within_limit for one in volts.values()])
-                for volts in (of.voltages(forces.modal[body]) for body, of in context.patches.items())
-            ]
-        return np.hstack([moments, *voltages])
-
-    if source.again is None:
-        values = between(middle, source.time, in_parts(source, found))
-    else:
-        nodes, which = np.unique(np.append(source.time[0], middle), return_inverse=True)
-        made_again = source.again(nodes)
-        made_again.check_completed()
-        values = in_parts(made_again, found)[which[1:]]
+    most = largest_moments(context.model, limits=False)
+    values = supplied(source, most, context.patches, limited=not analysis.unlimited).sample(as_list(middle))
+    if analysis.feed_forward == "none":
+        values[:, : len(most)] = 0.0
+    if analysis.feed_forward != "joints+pzt":
+        values[:, len(most) :] = 0.0
     column = 0
     for joint, columns in context.model.motors.items():  # beside gears that give: known at outputs
         if plant.source.gears and analysis.feed_forward != "none":
@@ -191,19 +177,6 @@ def _limits(context: ActuatedContext) -> Array:
     return np.concatenate(
         [largest_moments(context.model, limits=True), *(of.reach.limit for of in context.patches.values())]
     )
-
-
-def _commands(context: ActuatedContext, model: SpatialModel) -> tuple[Command, ...]:
-    """What a unit of each does: moments of motors, on sections or on frames, and voltages on the modes of links."""
-    joints, found = {joint.name: joint for joint in model.scene.joint}, []
-    for joint, columns in model.motors.items():
-        sign = model.sign(joint)
-        on_frames = model.scene.motors == "frame" and joints[joint].units == ("rad",)
-        frame = (model.tree.carried[joint], sign) if on_frames else None
-        found += [Command(sign * np.eye(model.tree.n_v)[k], frame) for k in columns]
-    for body, of_link in context.patches.items():
-        found += [Command(modal_direction(model, body, column)) for column in of_link.Phi_V.T]
-    return tuple(found)
 
 
 def _start(context: ActuatedContext, analysis: SpatialClosedLoop, plant: _Plant) -> State:

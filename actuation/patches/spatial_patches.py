@@ -16,6 +16,7 @@ import numpy as np
 from ...common.arrays import Array, Indices, as_floats
 from ...common.errors import InputError
 from ...fe_models.modal_body import ModalBody
+from ...mbs import _core
 from ...mbs.model.spatial_body import SpatialBody
 from ...mbs.model.spatial_masses import uncoupling
 from .composite import Placed
@@ -24,7 +25,7 @@ from .patches import PatchArray, assembled, check_edges, patch_edges
 from .reach import Reach, check_all_served, served_first, weights
 from .sections import check_sections
 from .spatial_records import SpatialPztLayout
-from .voltages import Voltages, solve_voltages
+from .voltages import Voltages, allocation, solve_voltages
 
 OUT_OF_REACH = 1e-9  # of the largest modal force per volt: less is rounding
 
@@ -87,6 +88,15 @@ class LinkPatches:
             name: Voltages(one, other, self.modes[name].forces(unmet), self.modes[name].served)
             for name, one, other in zip(self.arrays, required, within, strict=True)
         }
+
+    @property
+    def to_reached(self) -> Array:
+        """(m, n) modal forces on `reached` by those on the modes of the modal body."""
+        return self.reached.forces(np.eye(len(self.Phi_V))).T
+
+    def allocation(self, *, limited: bool) -> _core.Allocation:
+        """From modal forces on `reached` to voltages (k,), with the limits of the patches or without."""
+        return allocation(self.reach, limited=limited)
 
     def of_layout(self, name: str) -> Array:
         """(n, k) modal forces per volt of the patches of one layout."""

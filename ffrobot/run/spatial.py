@@ -25,7 +25,7 @@ from ..scene.spatial import SpatialScene, load_spatial_scene
 from .enough import completed, goes_on, is_replayed, log_outcome, progress_of, with_enough_modes, with_enough_pieces
 from .mode_search import ModeSearch, error_tolerances
 from .paths import with_paths_in_space
-from .spatial_actuation import actuated_in_space, patches_in_space, supplied_by_patches
+from .spatial_actuation import actuated_in_space, patches_in_space
 from .spatial_bodies import load_spatial_bodies
 from .spatial_finer import checked_in_space
 from .spatial_mode_choice import mode_levels_in_space, reported_in_space
@@ -210,7 +210,7 @@ def _context(
         progress=progress_of(analysis, watcher, interruption),
         is_replayed=is_replayed(analysis, solution.scene.analysis),
         earlier=solution.earlier.get(analysis.name),
-        supply=partial(supplied_by_patches, solution.patches),
+        points=solution.points,
         at_points=partial(forces_at_points, solution.points),
         patches=solution.patches,
         links=solution.links,

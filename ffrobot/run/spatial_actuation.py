@@ -12,7 +12,6 @@ from ..actuation.patches.spatial_patches import LinkPatches, by_body, link_patch
 from ..actuation.patches.voltages import Voltages
 from ..actuation.spatial_feasibility import UnsuppliedInSpace, judge_in_space, links_in_motion
 from ..common.arrays import Array
-from ..mbs.analysis.context import ModalForces
 from ..mbs.model.spatial_drives import Drive
 from ..mbs.model.spatial_model import SpatialModel, modal_direction
 from ..mbs.quantities.spatial_motion import SpatialMotion
@@ -62,16 +61,6 @@ def given_voltages(model: SpatialModel, patches: Mapping[str, LinkPatches]) -> I
             per_volt = patches[bodies[load.pzt]].of_layout(load.pzt)
             for column, voltage in zip(per_volt.T, load.voltage or (), strict=True):
                 yield Drive(modal_direction(model, bodies[load.pzt], column), voltage)
-
-
-def supplied_by_patches(patches: Mapping[str, LinkPatches], wanted: ModalForces, limited: bool) -> ModalForces:
-    """What voltages do of modal forces, as much of them as they can: with limits or without."""
-    found = {}
-    for body, of_link in patches.items():
-        voltages = of_link.voltages(wanted[body]).values()
-        chosen = [each.within_limit if limited else each.required for each in voltages]
-        found[body] = np.concatenate(chosen, axis=1) @ of_link.Phi_V.T
-    return found
 
 
 def actuated_in_space(

@@ -2,22 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 
 from ..actuation.control.spatial_linear import held_by_motors
-from ..common.arrays import Array, as_floats
+from ..common.arrays import Array
 from ..common.errors import InputError
 from ..mbs.analysis.forward import Forward
 from ..mbs.analysis.outcome import Outcome
 from ..mbs.analysis.spatial_drive import spatial_drive
-from ..mbs.analysis.spatial_forward import motor_drives
-from ..mbs.analysis.spatial_replay import in_parts, motor_forces_of, replay_times
-from ..mbs.fields.waypoints import spline
-from ..mbs.model.spatial_drives import Drive, Drives, FrameDrive
-from ..mbs.model.spatial_model import SpatialModel, modal_direction, without_paths
+from ..mbs.analysis.spatial_forward import actuator_commands, largest_moments
+from ..mbs.analysis.spatial_replay import replay_times, supplied
+from ..mbs.model.spatial_drives import Drives, Replayed
+from ..mbs.model.spatial_model import SpatialModel, without_paths
 from ..mbs.quantities.spatial_motion import SpatialMotion
 from ..mbs.scene.analysis import TimedAnalysis
 from ..mbs.solve.spatial_posture import undeformed_posture
@@ -25,7 +24,7 @@ from ..mbs.solve.spatial_redundancy import resolved
 from ..mbs.solve.spatial_statics import static_equilibrium
 from ..mbs.solve.state import State
 from ..scene.spatial import SpatialScene
-from .finer import MOST_SAMPLES, SAMPLES_PER_RADIAN, TIGHTEST, with_twice_the_modes
+from .finer import TIGHTEST, with_twice_the_modes
 from .solution import FinerCheck
 from .spatial_solution import SpatialSolution
 from .watcher import Watcher
@@ -81,37 +80,11 @@ def _check(solution: SpatialSolution, source: Outcome, finer: SpatialSolution, w
 
 
 def _drives(solution: SpatialSolution, source: Outcome, finer: SpatialSolution) -> Drives:
-    """Splines through what the source found, as dense as its fastest vibration asks for, on the finer links."""
-    assert source.again is not None
-    fastest = max(float(np.sqrt(node.body.stiffness.max(initial=0.0))) for node in source.model.tree.nodes)
-    begin, end = float(source.time[0]), float(source.time[-1])
-    count = int(np.clip(SAMPLES_PER_RADIAN * fastest * (end - begin), len(source.time), MOST_SAMPLES))
-    times = as_floats(np.linspace(begin, end, max(count, 6)))
-    made_again = source.again(times)
-    made_again.check_completed()
-    layouts = list(_layouts(solution)) if "joints+pzt" in source.analysis.applicable else []
-
-    def found(run: Outcome) -> Array:
-        forces = motor_forces_of(run)
-        voltages = {b: solution.patches[b].voltages(forces.modal[b]) for b in dict.fromkeys(b for b, _ in layouts)}
-        return np.hstack([*forces.moments.values(), *(voltages[b][layout].required for b, layout in layouts)])
-
-    sizes = iter(spline(times, in_parts(made_again, found), 3))
-    motors = list(motor_drives(finer.model, sizes))
-    modal = [
-        Drive(modal_direction(finer.model, body, column), next(sizes))
-        for body, layout in layouts
-        for column in finer.patches[body].of_layout(layout).T
-    ]
-    along = [drive for drive in motors if isinstance(drive, Drive)]
-    return Drives((*along, *modal), on_frames=tuple(drive for drive in motors if isinstance(drive, FrameDrive)))
-
-
-def _layouts(solution: SpatialSolution) -> Iterator[tuple[str, str]]:
-    """Bodies and their layouts of patches."""
-    for body, of_link in solution.patches.items():
-        for layout in of_link.arrays:
-            yield body, layout
+    """What the source found of moments and voltages, on the finer links."""
+    bends = "joints+pzt" in source.analysis.applicable
+    patches, on_finer = (of.patches if bends else {} for of in (solution, finer))
+    found = supplied(source, largest_moments(source.model, limits=False), patches, limited=False)
+    return Drives(replayed=Replayed(found, actuator_commands(finer.model, on_finer)))
 
 
 def _replayed(source: Outcome, finer: SpatialModel, drives: Drives, watcher: Watcher) -> Outcome:

@@ -60,7 +60,7 @@ def _told(solution: SpatialSolution, run: Outcome) -> Outcome:
             behind, ahead = (of[name][1] for of in beside)
             a[:, node.p_v] = (ahead - behind) @ to_own / (2 * step)
     motion = replace(run.motion, q=q, v=v, a=a, multipliers=np.zeros((len(run.time), len(whole.rows))))
-    return replace(run, model=whole, motion=motion, forces=replace(run.forces, required=None), again=None)
+    return replace(run, model=whole, motion=motion, forces=replace(run.forces, required=None), prescribed=None)
 
 
 def _modal(solution: SpatialSolution, run: Outcome, step: float) -> dict[str, tuple[Array, Array]]:

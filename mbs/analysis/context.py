@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Protocol
 
 from ...common.arrays import Array
+from .. import _core
 from ..model.model import Model
 from ..model.spatial_model import SpatialModel
 from .drive import Progress
@@ -13,16 +15,27 @@ from .outcome import EarlierRun, Outcome
 from .planar_outcome import PlanarOutcome
 from .replay import ActuatorSet
 
-ModalForces = Mapping[str, Array]
-"""By body, (T, n) on the modes of its file."""
 
-Supply = Callable[[ModalForces, bool], ModalForces]
-"""What patches do of modal forces, within their limits or not; bodies without patches are left out."""
+class PatchedLink(Protocol):
+    """All k patches of one link, on the n modes of its file."""
+
+    @property
+    def Phi_V(self) -> Array:
+        """(n, k) modal forces per volt."""
+
+    @property
+    def to_reached(self) -> Array:
+        """(m, n) modal forces as `allocation` takes them, by those on the modes of the file."""
+
+    def allocation(self, *, limited: bool) -> _core.Allocation:
+        """From modal forces to voltages, with the limits of the patches or without."""
 
 
-def no_patches(wanted: ModalForces, limited: bool) -> ModalForces:
-    """Nothing."""
-    return {}
+class ActuationPoints(Protocol):
+    """Points of one body for components of force."""
+
+    def of_core(self) -> tuple[Array, Array, Array, Array]:
+        """What `_core.point_reader` takes of their body: directions and positions (3, c), Φ (3 c, n), scale (6 + n)."""
 
 
 ForcesAtPoints = Callable[[Outcome], Mapping[str, Array]]
@@ -56,13 +69,15 @@ class Context(_Start):
     Attributes:
         model: the robot, with the constraint equations of all joints that close loops and of all trajectories.
         outcomes: of the analyses before, by name.
-        supply: what patches do.
-        at_points: what driving forces are at the actuation points.
+        patches: of links by body.
+        points: actuation points by body.
+        at_points: what driving forces are there.
     """
 
     model: SpatialModel
     outcomes: Mapping[str, Outcome]
-    supply: Supply = no_patches
+    patches: Mapping[str, PatchedLink] = field(default_factory=dict)
+    points: Mapping[str, ActuationPoints] = field(default_factory=dict)
     at_points: ForcesAtPoints = no_points
 
 

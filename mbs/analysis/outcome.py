@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
 import numpy as np
 
@@ -297,19 +297,38 @@ class AnyOutcome:
         return replace(self, motion=motion, forces=forces)
 
 
+class Prescription(NamedTuple):
+    """A motion of which the modes are functions of time.
+
+    Attributes:
+        motion: makes its equations, each time new ones.
+        shape: p(t) of each body.
+        near: (n_q,) a posture near the first.
+    """
+
+    motion: Callable[[], _core.SpatialPrescribedMotion]
+    shape: Sequence[Sequence[TimeFunction]]
+    near: Array
+
+
 @dataclass(frozen=True, kw_only=True)
 class Outcome(AnyOutcome):
     """What an analysis in 3D computed.
 
     Attributes:
         model: with the constraint equations of its run.
-        again: the same run with outputs at other times (T,), between its first and its last; None where it has none.
+        prescribed: what moves it, where that is known without steps.
         look_closer: the same with times between its outputs; None where nothing is between.
     """
 
     model: SpatialModel
-    again: Callable[[Array], Outcome] | None = field(default=None, repr=False)
+    prescribed: Prescription | None = field(default=None, repr=False)
     look_closer: Callable[[], Outcome] | None = field(default=None, repr=False)
+
+    @property
+    def recording(self) -> _core.Recording | None:
+        """Its steps, where a later analysis replays them."""
+        return self.continuation.recording if self.continuation else None
 
     @property
     def closer(self) -> Outcome:

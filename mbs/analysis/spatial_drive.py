@@ -11,7 +11,9 @@ import numpy as np
 
 from ...common.arrays import Array, Indices, as_list
 from .. import _core
-from ..model.spatial_drives import NO_DRIVES, Command, Drives
+from .._core import TimeFunction
+from ..fields.waypoints import spline
+from ..model.spatial_drives import NO_DRIVES, Command, Drives, PointDrive, Replayed
 from ..model.spatial_model import SpatialModel
 from ..model.spatial_system import SpatialSystem
 from ..scene.analysis import IntegratedAnalysis
@@ -24,7 +26,7 @@ from ..solve.state import State
 from .drive import STATUS, Progress
 from .earlier_check import check_earlier, going_on
 from .outcome import Continuation, EarlierRun, Forces, Motion, Outcome, Statistics
-from .samples import new_samples, reached_samples, stops, worth_a_look
+from .samples import in_order, new_samples, reached_samples, stops, worth_a_look
 
 
 @dataclass(frozen=True)
@@ -58,13 +60,13 @@ def spatial_drive(
     times: Array | None = None,
     control: SpatialControl | None = None,
     earlier: EarlierRun | None = None,
-    is_looked_into: bool = True,
+    is_recorded: bool = False,
 ) -> Outcome:
     """The run of an integration from `start`, with outputs at `times`, those of the analysis where not given.
 
     Sampled `control` and `drives` act beside the loads of the scene. The rows of `model` hold. It ends early where
     `progress` says so, and in a posture in which the joints cannot follow the path, with a warning. It goes on with an
-    `earlier` run of the same analysis. `is_looked_into`: between its outputs, too.
+    `earlier` run of the same analysis. `is_recorded`: with its steps, for a replay.
     """
     times = analysis.times if times is None else times
     commands = control.commands if control is not None else ()
@@ -86,12 +88,12 @@ def spatial_drive(
         [model.rows[k].is_trajectory for k in system.integrated.rows], robot_size(model)
     )
     watch_limits(system.integrated.scene, model.tree)
-    continuation = Continuation(_core.TreeCheckpoint()) if earlier is None else earlier.continuation
-    samples = new_samples(times, analysis) if is_looked_into else None
+    new = Continuation(_core.TreeCheckpoint(), _core.Recording() if is_recorded else None)
+    continuation, samples = new if earlier is None else earlier.continuation, new_samples(times, analysis)
     if earlier is not None:
-        _check(earlier, model, times)
+        _check(earlier, model, times, is_recorded=is_recorded)
     with going_on(earlier, times):
-        run = _integrated(system, times, start, controls, control, progress, continuation.checkpoint, samples)
+        run = _integrated(system, times, start, controls, control, progress, continuation, samples)
     motion = _motion(system, run, times)
     motion = motion if earlier is None else earlier.motion.followed_by(motion)
     in_posture = _ends_in_posture(run)
@@ -102,9 +104,6 @@ def spatial_drive(
     scatter = beyond_rounding(analysis.tolerance, run.rounding)
     told = (*warnings, *(text for text in (posture, scatter) if text))
     told = (*told, *left_ranges(model, run.ranges, motion.time, motion.q, motion.v))
-
-    def again(others: Array) -> Outcome:
-        return spatial_drive(model, analysis, start, progress, drives=drives, times=others, is_looked_into=False)
 
     statistics = Statistics(
         "diverged" if in_posture else STATUS[run.status], integrator.changed_in(run), run.steps, run.rejected,
@@ -118,15 +117,45 @@ def spatial_drive(
         forces=Forces(applied=drives.at_points),
         statistics=statistics if earlier is None else statistics.added_to(earlier.statistics),
         continuation=continuation if control is None else None,
-        again=again if control is None else None,
     )
+    numbers = _numbers(drives.replayed, run, found, 0 if earlier is None else len(earlier.motion.time))
+    acting = _under(drives, found, numbers)
     if (reached := reached_samples(samples, found.time)) is None:
-        return found
-    look_closer = cache(lambda: found.among(_between(system, *reached, found, control)))
-    return replace(found, look_closer=look_closer)
+        return acting
+
+    @cache
+    def look_closer() -> Outcome:
+        between, more = _between(system, *reached, found, control)
+        order = in_order(found.time, between.time)
+        return _under(drives, found.among(between), np.concatenate([numbers, more])[order])
+
+    return replace(acting, look_closer=look_closer)
 
 
-def _check(earlier: EarlierRun, model: SpatialModel, times: Array) -> None:
+def _numbers(replayed: Replayed | None, run: _core.TreeRun, found: Outcome, known: int) -> Array:
+    """What a replay does (T, numbers) at outputs of `run`, of which those that were `known` say nothing."""
+    if replayed is None:
+        return np.zeros((len(found.time), 0))
+    before = replayed.source.sample(as_list(found.time[:known]))
+    return np.concatenate([before, run.replayed[known:]]) if known else run.replayed
+
+
+def _under(drives: Drives, run: Outcome, numbers: Array) -> Outcome:
+    """The run with what a replay does on joints and points at its times."""
+    if drives.replayed is None or not len(run.time):
+        return run
+    constant = len(run.time) == 1
+    acting = [TimeFunction.constant(x) for x in numbers[0]] if constant else spline(run.time, numbers, 1)
+    applied = (
+        PointDrive(point, {component: acting[number] for component, number in of_point.items()})
+        for point, of_point in drives.replayed.at_points.items()
+    )
+    commanded = {joint: numbers[:, list(columns)] for joint, columns in drives.replayed.moments.items()}
+    forces = replace(run.forces, commanded=commanded, applied=(*drives.at_points, *applied))
+    return replace(run, forces=forces)
+
+
+def _check(earlier: EarlierRun, model: SpatialModel, times: Array, *, is_recorded: bool) -> None:
     motion, n_q, n_v = earlier.motion, model.tree.n_q, model.tree.n_v
     datasets = {
         "q": (motion.q, n_q),
@@ -134,24 +163,25 @@ def _check(earlier: EarlierRun, model: SpatialModel, times: Array) -> None:
         "a": (motion.a, n_v),
         "multipliers": (motion.multipliers, len(model.rows)),
     }
-    check_earlier(earlier, times, (n_q, n_v), datasets)
+    check_earlier(earlier, times, (n_q, n_v), datasets, is_recorded=is_recorded)
 
 
 def _between(
     system: SpatialSystem, times: Array, states: Array, found: Outcome, control: SpatialControl | None
-) -> Outcome:
-    """The run at `times` (k,) of it, with `states` (k, n)."""
+) -> tuple[Outcome, Array]:
+    """The run at `times` (k,) of it, with `states` (k, n), and what a replay does there (T, numbers)."""
     core, scene, _ = system.integrated
 
     def at(rows: Indices) -> _core.TreeRun:
         chosen, of_rows = as_list(times[rows]), np.ascontiguousarray(states[rows])
         if control is None:
-            return _core.tree_outputs(core, scene, chosen, of_rows)
+            return _core.tree_outputs(core, scene, chosen, of_rows, system.replay)
         held = system.held_forces(control.commands)
         return _core.tree_outputs_under(core, scene, chosen, of_rows, held, control.held(times[rows]))
 
     rows = worth_a_look(len(times), lambda rows: system.multipliers(at(rows).multipliers))
-    return replace(found, motion=_motion(system, at(rows), times[rows]))
+    run = at(rows)
+    return replace(found, motion=_motion(system, run, times[rows])), run.replayed
 
 
 def _motion(system: SpatialSystem, run: _core.TreeRun, times: Array) -> Motion:
@@ -174,12 +204,15 @@ def _integrated(
     controls: _core.IntegrationControls,
     control: SpatialControl | None,
     progress: Progress,
-    checkpoint: _core.TreeCheckpoint,
+    continuation: Continuation,
     samples: _core.Samples | None,
 ) -> _core.TreeRun:
     core, scene, _ = system.integrated
     if control is None:
-        return _core.tree_motion(core, scene, as_list(times), start.q, start.v, controls, progress, checkpoint, samples)
+        return _core.tree_motion(
+            core, scene, as_list(times), start.q, start.v, controls, progress, continuation.checkpoint, samples,
+            continuation.recording, system.replay,
+        )  # fmt: skip
     return _core.tree_sampled(
         model=core, scene=scene, times=as_list(times), q=start.q, v=start.v, controls=controls,
         carry_on=progress, held=system.held_forces(control.commands), first_command=control.first,

@@ -17,7 +17,7 @@ from ..solve.spatial_posture import check_path, mobility, undeformed_posture
 from ..solve.spatial_prescribed import prescribed_motion
 from ..solve.spatial_redundancy import resolved
 from .context import Context
-from .outcome import Forces, Motion, Outcome, Statistics
+from .outcome import Forces, Motion, Outcome, Prescription, Statistics
 from .samples import path_times
 from .shapes import FcidKeys, prescribed_shape, sampled
 
@@ -39,8 +39,11 @@ def run_spatial_fcid(context: Context, analysis: FcidKeys) -> Outcome:
             f'{model.scene.path}: analysis "{analysis.name}": kind: expected as many trajectory components as the'
             f' mechanism has degrees of freedom ({freedom}) for "fcid", found {rows}'
         )
-    has_motors = sum(len(columns) for columns in model.motors.values()) == freedom
-    motion = _core.SpatialPrescribedMotion(driven_mechanism(model, has_motors=has_motors), q)
+
+    def equations(*, has_motors: bool = True) -> _core.SpatialPrescribedMotion:
+        return _core.SpatialPrescribedMotion(driven_mechanism(model, has_motors=has_motors), q)
+
+    motion = equations(has_motors=sum(len(columns) for columns in model.motors.values()) == freedom)
     shape = prescribed_shape(model.scene.path, [node.body for node in model.tree.nodes], analysis, motion, q)
 
     def at(times: Array) -> Outcome:
@@ -48,7 +51,7 @@ def run_spatial_fcid(context: Context, analysis: FcidKeys) -> Outcome:
         return Outcome(
             analysis=analysis, model=model, forces=Forces(required=found.required),
             motion=Motion(times, found.q, found.v, found.a, found.multipliers),
-            statistics=Statistics(warnings=warnings), again=at,
+            statistics=Statistics(warnings=warnings), prescribed=Prescription(equations, shape, q),
         )  # fmt: skip
 
     run = at(analysis.times)

@@ -10,6 +10,7 @@ import numpy as np
 
 from ...common.arrays import Array, as_list
 from ...common.errors import SolveError
+from .. import _core
 from ..model.spatial_gears import refuse_held_motors
 from ..model.spatial_model import SpatialModel, row_values, without_paths
 from ..scene.analysis import output_times
@@ -19,7 +20,7 @@ from ..solve.spatial_servo import SpatialServo, make_spatial_servo
 from ..solve.stable_inversion import Inversion, invert
 from .context import Context
 from .inverted_path import AroundPath, MotorsOnlyKeys, cause_of, check_rest, choose_output, durations, where
-from .outcome import Forces, Motion, Outcome, Statistics
+from .outcome import Forces, Motion, Outcome, Prescription, Statistics
 from .samples import path_times
 
 NOTABLE = 1e-9  # m, rad: of a path that is left
@@ -73,8 +74,8 @@ def _run(analysis: MotorsOnlyKeys, model: SpatialModel, inversion: Inversion[Spa
     is_met = np.isfinite(found.q).all(axis=1)
     kept = slice(len(times) if is_met.all() else int(is_met.argmin()))
 
-    def again(others: Array) -> Outcome:
-        return _run(analysis, model, inversion, others)
+    def equations() -> _core.SpatialPrescribedMotion:
+        return replace(servo).motion
 
     statistics = Statistics(
         inversion.status, Choice("collocation", ""), steps=len(curve.x) - 1, evaluations=inversion.iterations,
@@ -86,7 +87,7 @@ def _run(analysis: MotorsOnlyKeys, model: SpatialModel, inversion: Inversion[Spa
         motion=Motion(times, found.q, found.v, found.a, found.loops).at(kept),
         forces=Forces(required=found.required).at(kept),
         statistics=statistics,
-        again=again,
+        prescribed=Prescription(equations, inversion.shape, servo.near[0]),
     )
 
 

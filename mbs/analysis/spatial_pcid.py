@@ -22,5 +22,6 @@ def run_spatial_pcid(context: Context, analysis: IntegratedAnalysis) -> Outcome:
     warnings = tuple(check_path(firm, undeformed_posture(firm).q))
     model = with_held_motors(firm)
     return spatial_drive(
-        model, analysis, initial_state(model), context.progress, warnings=warnings, earlier=context.earlier
-    )
+        model, analysis, initial_state(model), context.progress, warnings=warnings, earlier=context.earlier,
+        is_recorded=context.is_replayed,
+    )  # fmt: skip

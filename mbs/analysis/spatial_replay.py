@@ -1,43 +1,37 @@
-"""What an inverse analysis in space found, as functions of time that act again.
+"""What an inverse analysis in space found, at any time of it, to act again in other runs.
 
-Forces are sampled on finer and finer grids until splines through every second value meet the others: samples at the
-outputs alone would alias fast modes.
+Steps that were recorded are made again, stage by stage where another run has the same ones; prescribed motions are
+solved anew.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from typing import NamedTuple
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...common.arrays import Array, as_floats
-from .._core import TimeFunction
-from ..fields.waypoints import spline
+from ...common.arrays import Array
+from .. import _core
 from ..model.spatial_model import row_values
-from ..model.spatial_motors import MotorForces, motor_forces, path_forces
-from ..model.spatial_wrench import row_wrenches
+from ..model.spatial_motors import (
+    MotorForces,
+    driven_mechanism,
+    driven_system,
+    integrated_mechanism,
+    motor_forces,
+    path_forces,
+)
 from ..scene.analysis import TimedAnalysis, output_times
+from ..scene.spatial.loads import OF_POINT
 from ..solve.spatial_posture import robot_size
+from .context import ActuationPoints, PatchedLink
 from .outcome import Outcome
 
-FEWEST_NODES = 401
-MOST_NODES = 200_000
-CHUNK = 2000  # states that are looked at at once
-SHARE = 0.3  # of the tolerance that the splines may take
 OFF_PATH = 0.01  # sizes of the robot, rad: a replay that is off by more has left its path
-GAIN = 32.0  # at least: by how much half the step makes a quintic spline better (64 where it is smooth)
 
-
-class Replayed(NamedTuple):
-    """Functions of time of each column, and how far they are off (share of the largest value, mean over time).
-
-    Where it `was_stopped`, on request, they are what they are at the start.
-    """
-
-    functions: list[TimeFunction]
-    unresolved: float
-    was_stopped: bool = False
+Reader = Callable[[Any], Any]
+"""Makes what reads forces of the states of a `_core.PlanarDriven`, or of a `_core.SpatialDriven`."""
 
 
 def replay_times(source: Outcome, analysis: TimedAnalysis) -> Array:
@@ -49,25 +43,65 @@ def replay_times(source: Outcome, analysis: TimedAnalysis) -> Array:
     return output_times(analysis.end, analysis.output_step, source.details.pre_actuation, after)
 
 
-def replayed(source: Outcome, read: Callable[[Outcome], Array], times: Array, tolerance: float) -> Replayed:
-    """What `read` (T, columns) finds of a run over `times` (s), to a share of the tolerance where that can be had."""
-    assert source.again is not None
-    count = 2 * max(FEWEST_NODES // 2, source.statistics.steps) + 1
-    while True:
-        nodes = as_floats(np.linspace(times[0], times[-1], count))
-        made_again = source.again(nodes)
-        if made_again.status == "interrupted":
-            at_start = read(source.at(slice(0, 1)))[0]
-            return Replayed([TimeFunction.constant(float(value)) for value in at_start], 0.0, was_stopped=True)
-        made_again.check_completed()
-        values = in_parts(made_again, read)
-        peak = float(np.abs(values).max(initial=0.0))
-        rough = np.array([f.sample(nodes[1::2])[0] for f in spline(nodes[::2], values[::2])]).T
-        off = float(np.abs(rough - values[1::2]).mean(axis=0).max(initial=0.0)) if values.size else 0.0
-        unresolved = off / GAIN / peak if peak > 0 else 0.0
-        if unresolved <= SHARE * tolerance or 2 * count - 1 > MOST_NODES:
-            return Replayed(spline(nodes, values), unresolved)
-        count = 2 * count - 1
+def supplied(run: Outcome, most: Array, patches: Mapping[str, PatchedLink], *, limited: bool) -> _core.ForceSource:
+    """Forces of all motors, `most` (motors,) at most, and voltages of the patches of links by body, within limits.
+
+    In the order of `SpatialModel.motors`, N·m or N on second sides, then of `patches`, V.
+    """
+    links = []
+    for name, of_link in patches.items():
+        node = run.model.tree.nodes[run.model.tree.index[name]]
+        reached = of_link.to_reached @ node.body.on_file.T
+        links.append((node.p_v.start, reached, of_link.allocation(limited=limited)))
+    return _found(run, lambda driven: _core.actuator_reader(driven, most, links))
+
+
+class OfPaths(NamedTuple):
+    """Forces that hold paths: by number along the coordinates of joints, and at points from a number on (6 each)."""
+
+    source: _core.ForceSource
+    joints: Mapping[str, list[int]]
+    points: Mapping[str, int]
+
+
+def path_numbers(run: Outcome) -> OfPaths:
+    """Forces on the points of paths, about there, and along the coordinates of joints that follow one."""
+    model = run.model
+    paths = {path.name: path.point for path in model.scene.trajectory if path.point is not None}
+    rows = [(k, row) for k, row in enumerate(model.rows) if row.is_trajectory]
+    along = [(k, row) for k, row in rows if row.kind == "coordinate"]
+    on_points = [(k, row, paths[row.owner]) for k, row in rows if row.owner in paths]
+    joints = {model.joint_of(row): [number] for number, (_, row) in enumerate(along)}
+    firsts = range(len(along), len(along) + len(OF_POINT) * len(on_points), len(OF_POINT))
+    points = dict(zip(dict.fromkeys(point for *_, point in on_points), firsts, strict=False))
+    parts = [(k, number, float(row.sign)) for number, (k, row) in enumerate(along)]
+    parts += [(k, points[point], 1.0 if row.a.body < 0 else -1.0) for k, row, point in on_points]
+    count = len(along) + len(OF_POINT) * len(points)
+    source = _found(run, lambda driven: _core.path_reader(driven, np.eye(3), parts, count), is_in_plane=False)
+    return OfPaths(source, joints, points)
+
+
+def point_numbers(run: Outcome, chosen: Mapping[str, ActuationPoints]) -> _core.ForceSource:
+    """Driving forces at the actuation points, global axes: three numbers of each component."""
+    tree, core = run.model.tree, driven_system(run.model).core
+    in_core, frames = core.frames(run.q[0], run.v[0]), tree.frames(run.q[:1])
+    bodies = []
+    for name, of_body in chosen.items():  # the core's frames are elsewhere on bodies, as it is best for joints
+        number = tree.index[name]
+        R, data = in_core[number].R, frames[number]
+        bodies.append((number, R.T @ data.F[0], R.T @ (data.r[0] - in_core[number].r), *of_body.of_core()))
+    return _found(run, lambda driven: _core.point_reader(driven, bodies), is_in_plane=False)
+
+
+def _found(run: Outcome, reader: Reader, *, is_in_plane: bool = True) -> _core.ForceSource:
+    """Read of the recorded steps of a run, or of its prescribed motion; in 3D also where all moves in a plane."""
+    if run.recording is not None:
+        of_run = integrated_mechanism(run.model) if is_in_plane else driven_mechanism(run.model, has_motors=False)
+        return _core.recorded_forces(of_run, run.recording, reader(of_run))
+    assert run.prescribed is not None
+    equations, shape, near = run.prescribed
+    motion = equations()
+    return _core.prescribed_forces(motion, shape, near, reader(motion.driven))
 
 
 def motor_forces_of(run: Outcome) -> MotorForces:
@@ -80,28 +114,6 @@ def supplied_in(run: Outcome) -> Array:
     if run.forces.required is not None:
         return run.forces.required
     return path_forces(run.model, run.time, run.q, run.multipliers)
-
-
-def path_wrenches(run: Outcome) -> dict[str, Array]:
-    """What a path does on its point: force and moment (T, 6) about there, by point, of a run's motion."""
-    tree, frames = run.model.tree, run.model.tree.frames(run.q)
-    found: dict[str, Array] = {}
-    paths = {path.name: path for path in run.model.scene.trajectory if path.point is not None}
-    for k, row in enumerate(run.model.rows):
-        if not row.is_trajectory or row.owner not in paths:
-            continue
-        point = paths[row.owner].point
-        assert point is not None
-        of_a, of_b = row_wrenches(tree, row, -run.multipliers[:, k], run.q, run.time, frames)
-        arm = tree.motion(tree.section(point, np.eye(3)), run.q, frames).r
-        acting = (of_b if row.a.body < 0 else of_a).seen_from(-arm)
-        found[point] = found.get(point, 0.0) + np.hstack([acting.force, acting.moment])
-    return found
-
-
-def in_parts(run: Outcome, read: Callable[[Outcome], Array]) -> Array:
-    """`read` of a long run, part by part: Jacobians of all states at once would not fit into memory."""
-    return np.concatenate([read(run.at(slice(k, k + CHUNK))) for k in range(0, len(run.time), CHUNK)])
 
 
 def left_paths(source: Outcome, run: Outcome) -> Iterator[str]:

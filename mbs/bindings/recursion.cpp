@@ -205,6 +205,7 @@ void bind_recursion(nb::module_ &m) {
       .def_ro("rate_q", &Derivatives::rate_q);
   bind_model<Planar>(m, "PlanarModel", "PlanarBody", "A mechanism in the plane, in joint coordinates.");
   bind_model<Spatial>(m, "SpatialModel", "SpatialBody", "A mechanism in space, in joint coordinates.");
+  bind_replay(m);
   bind_tree_motion(m);
   bind_tree_sampled(m);
   bind_held_motion(m);

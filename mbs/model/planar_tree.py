@@ -78,7 +78,7 @@ class PlanarTree:
         self._add_loads()
         self._add_what_joints_have()
         reactions = self._reactions(motors)
-        self.scene.is_strict, self.scene.has_loops = True, bool(cut)
+        self.scene.keeps_all_rows, self.scene.has_loops = True, bool(cut)
         self.scene.most_bent = [node.body.inertia for node in self._layout.nodes]
         wrenches = [self._layout.place(marker) for marker in self._wrenches]
         for at, marker in zip(wrenches, self._wrenches, strict=True):

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 from typing import NamedTuple
 
 from ...common.arrays import Array
-from .._core import TimeFunction
+from .._core import ForceSource, TimeFunction
 
 
 class Drive(NamedTuple):
@@ -23,22 +24,30 @@ class PointDrive(NamedTuple):
     components: Mapping[str, TimeFunction]
 
 
-class FrameDrive(NamedTuple):
-    """`sign` times the moment of a motor along the joint that carries body no. `body`: on frames, not on sections."""
-
-    body: int
-    sign: float
-    size: TimeFunction
-
-
 class Command(NamedTuple):
-    """What a unit of a held command does: generalized forces `direction` (n_v,).
+    """What a unit of a command does: generalized forces `direction` (n_v,).
 
-    Of motors on frames `frame` is as in `FrameDrive`: the number of the body that the joint carries, and the sign.
+    Of motors on frames, not on sections, `frame` has the number of the body that the joint carries, and the sign.
     """
 
     direction: Array
     frame: tuple[int, float] | None = None
+
+
+class Replayed(NamedTuple):
+    """Numbers that an earlier analysis found, and what they do in another run.
+
+    Attributes:
+        source: of the numbers, at any time.
+        commands: what a unit of each does; of those at points nothing.
+        at_points: by "BODY.POINT" the number of each component ("x" … "mz"), global axes.
+        moments: by joint those that act along its coordinates, N·m or N on its second side.
+    """
+
+    source: ForceSource
+    commands: tuple[Command, ...]
+    at_points: Mapping[str, Mapping[str, int]] = MappingProxyType({})
+    moments: Mapping[str, Sequence[int]] = MappingProxyType({})
 
 
 class Drives(NamedTuple):
@@ -46,7 +55,7 @@ class Drives(NamedTuple):
 
     along: tuple[Drive, ...] = ()
     at_points: tuple[PointDrive, ...] = ()
-    on_frames: tuple[FrameDrive, ...] = ()
+    replayed: Replayed | None = None
 
 
 NO_DRIVES = Drives()

@@ -8,18 +8,22 @@ import numpy as np
 
 from ...common.arrays import Array
 from .. import _core
-from .spatial_drives import Command, FrameDrive
+from .spatial_drives import Command
 from .spatial_model import SpatialModel
 from .spatial_parts import rows_of
 
 
-def turn_frames(scene: _core.TreeScene, model: SpatialModel, drive: FrameDrive) -> None:
-    """A moment along the joint, less what the sections at it would do on the modes of its two bodies."""
-    node, direction = model.tree.nodes[drive.body], np.zeros(model.tree.n_v)
-    direction[node.v] = drive.sign
-    scene.add_load(direction, drive.size)
-    for share in _shares(model, drive.body, drive.sign):
-        scene.add_frame_motor(*share, drive.size)
+def turning_motors(model: SpatialModel) -> list[str]:
+    """Joints whose motors can turn frames in place of sections: those with one angle."""
+    return [joint.name for joint in model.scene.motor_joints if joint.units == ("rad",)]
+
+
+def motor_commands(model: SpatialModel) -> Iterator[Command]:
+    """What a unit of each motor does, in the order of `SpatialModel.motors`, on the second side of its joint."""
+    turning = turning_motors(model) if model.scene.motors == "frame" else []
+    for joint, columns in model.motors.items():
+        frame = (model.tree.carried[joint], model.sign(joint)) if joint in turning else None
+        yield from (Command(direction, frame) for direction in model.sign(joint) * np.eye(model.tree.n_v)[columns])
 
 
 def held_forces(model: SpatialModel, commands: Sequence[Command]) -> _core.HeldForces:

@@ -12,6 +12,7 @@ from ...common.arrays import Array, as_list
 from ...common.rotations import left_jacobian, left_jacobian_slope
 from .. import _core
 from .spatial_drives import Command
+from .spatial_frame_motors import turning_motors
 from .spatial_model import SpatialModel
 from .spatial_system import SpatialSystem
 from .spatial_tree import Motion, Section
@@ -28,16 +29,38 @@ class MotorForces:
     modal: Mapping[str, Array]
 
 
+def driven_system(model: SpatialModel) -> SpatialSystem:
+    """The model in the core, with forces along the coordinates of its motors."""
+    return SpatialSystem(model, commands=[Command(along) for joint in model.motors for along in model.along(joint)])
+
+
 def driven_mechanism(model: SpatialModel, *, has_motors: bool = True) -> _core.SpatialDriven:
     """The model in the core, under the loads of its scene, with its motors where asked for."""
-    moved = [Command(direction) for joint in model.motors for direction in model.along(joint)]
-    system = SpatialSystem(model, commands=moved)
+    system = driven_system(model)
     driven = _core.SpatialDriven(system.core, system.scene, (~model.loop_rows).tolist())
+    if has_motors:
+        _add_motors(driven, model)
+    return driven
+
+
+def integrated_mechanism(model: SpatialModel) -> _core.PlanarDriven | _core.SpatialDriven:
+    """The same with motors, as it is integrated: in the plane where all moves in one."""
+    core, scene, rows = SpatialSystem(model).integrated
+    is_path = [row.is_trajectory for row in (model.rows[k] for k in rows)]
+    if isinstance(core, _core.PlanarModel):
+        in_plane = _core.PlanarDriven(core, scene, is_path)
+        _add_motors(in_plane, model)
+        return in_plane
+    driven = _core.SpatialDriven(core, scene, is_path)
+    _add_motors(driven, model)
+    return driven
+
+
+def _add_motors(driven: _core.PlanarDriven | _core.SpatialDriven, model: SpatialModel) -> None:
     turning = turning_motors(model) if model.scene.motors == "frame" else []
-    for joint, coordinates in model.motors.items() if has_motors else ():
+    for joint, coordinates in model.motors.items():
         for coordinate in coordinates.tolist():
             driven.add_motor(coordinate, model.sign(joint), joint in turning)
-    return driven
 
 
 def path_forces(model: SpatialModel, times: Array, q: Array, multipliers: Array) -> Array:
@@ -69,11 +92,6 @@ def motor_forces(model: SpatialModel, q: Array, wanted: Array) -> MotorForces:
     moments, left, _ = split_forces(model, q, wanted)
     stored = {node.body.name: left[:, node.p_v] @ node.body.on_file for node in model.tree.nodes}
     return MotorForces(moments, stored)
-
-
-def turning_motors(model: SpatialModel) -> list[str]:
-    """Joints whose motors can turn frames in place of sections: those with one angle."""
-    return [joint.name for joint in model.scene.motor_joints if joint.units == ("rad",)]
 
 
 class FrameShare(NamedTuple):

@@ -18,7 +18,7 @@ from ..joints.transmission import Friction
 from ..scene.spatial.loads import OF_POINT, SpatialLoad
 from .spatial_cut import CutCoordinate
 from .spatial_drives import NO_DRIVES, Command, Drive, Drives, PointDrive
-from .spatial_frame_motors import held_forces, turn_frames
+from .spatial_frame_motors import held_forces
 from .spatial_model import SpatialModel
 from .spatial_parts import CutPlace, Placed, SpatialParts, carried_body, moves, standing_marker
 from .spatial_plane import Plane, in_plane
@@ -66,7 +66,7 @@ class SpatialSystem:
 
     def __init__(self, model: SpatialModel, drives: Drives = NO_DRIVES, commands: Sequence[Command] = ()) -> None:
         """`drives` act beside the loads of the scene, and `commands` will, held."""
-        self.model, tree = model, model.tree
+        self.model, tree, self._replayed = model, model.tree, drives.replayed
         self._markers: list[list[Section]] = [[] for _ in tree.nodes]
         self._ground: list[Section] = []
         self._turning: list[tuple[int, OrientationLaw]] = []
@@ -75,13 +75,14 @@ class SpatialSystem:
         self._wrenches: list[Placed] = []
         loads = [PointDrive(load.point, load.components) for load in model.scene.load if load.point is not None]
         self._at_points = [self._point_drive(drive) for drive in (*loads, *drives.at_points)]
+        at_points = drives.replayed.at_points if drives.replayed else {}
+        self._numbers_at = [(self._wrench(tree.section(at, np.eye(3))), of) for at, of in at_points.items()]
         self._cut = [one for one in model.cut if one.is_loaded]
         cut = tuple(self._cut_place(one.row) for one in self._cut)
         self._check()
         moments = [drive for load in model.scene.load if load.joint in tree.carried for drive in self._drives(load)]
         self._along = [*moments, *model.modal_loads, *drives.along]
-        self._on_frames = drives.on_frames
-        driven = self._driven(commands)
+        driven = self._driven((*commands, *(drives.replayed.commands if drives.replayed else ())))
         bodies = [
             carried_body(node, *of_node, self._markers[number], bool(driven[node.v].any()))
             for number, (node, of_node) in enumerate(zip(tree.nodes, sides, strict=True))
@@ -112,6 +113,20 @@ class SpatialSystem:
         if self.plane is None:
             return Integrated(self.core, self.scene, np.arange(len(self.model.rows)))
         return Integrated(self.plane.model, self._follow(self.plane), self.plane.followed)
+
+    @cached_property
+    def replay(self) -> _core.Replay | None:
+        """What integrators take of the numbers that are replayed; None where there are none."""
+        if self._replayed is None:
+            return None
+        size = len(OF_POINT) if self.plane is None else 3
+        at_points = [
+            (number, size * wrench + along, share)
+            for wrench, numbers in self._numbers_at
+            for name, number in numbers.items()
+            for along, share in _shares(OF_POINT.index(name), self.plane)
+        ]
+        return _core.Replay(self._replayed.source, self.held_forces(self._replayed.commands), at_points)
 
     def multipliers(self, of_core: Array) -> Array:
         """(T, rows) of the model from those of `integrated`: 0 of rows that this has not, as of dependent ones."""
@@ -146,7 +161,7 @@ class SpatialSystem:
         resisting = [node for node in tree.nodes if node.joint.frictions]
         for node in (*resisting, *(side for gear in tree.gears for side in (gear.motor, gear.joint))):
             found[node.v] = True
-        for body in (*(drive.body for drive in self._on_frames), *(c.frame[0] for c in commands if c.frame)):
+        for body in (c.frame[0] for c in commands if c.frame):
             found[tree.nodes[body].v] = True
         return found
 
@@ -224,11 +239,8 @@ class SpatialSystem:
             scene.add_load(direction, magnitude)
         for wrench, components in self._at_points:
             for name, magnitude in components.items():
-                component = OF_POINT.index(name)
-                for along, share in [(component, 1.0)] if plane is None else plane.shares(component):
+                for along, share in _shares(OF_POINT.index(name), plane):
                     scene.add_point_load(wrench, along, magnitude, share)
-        for drive in self._on_frames:
-            turn_frames(scene, self.model, drive)
         for node in self.model.tree.nodes:
             for number, friction in enumerate(node.joint.frictions):  # the same along all of a joint's coordinates
                 at = node.q.start + number, node.v.start + number
@@ -304,6 +316,11 @@ class SpatialSystem:
         found.a, found.b = _core.MarkerAt(*a), _core.MarkerAt(*b)
         found.f, found.g = np.array(row.f), np.array(row.g)
         return found
+
+
+def _shares(component: int, plane: Plane | None) -> list[tuple[int, float]]:
+    """Of a component of a wrench: those of the core, with shares; see `Plane.shares`."""
+    return [(component, 1.0)] if plane is None else plane.shares(component)
 
 
 def _turning_law(law: OrientationLaw) -> _core.TurningLaw:

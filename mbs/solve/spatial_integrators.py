@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from ...common.arrays import Array
@@ -60,7 +62,9 @@ def choose_integrator_in_space(
     if not len(found.frequency):
         return Choice("dop853", "nothing vibrates")
     excited = _excitation(system, start, found)
-    return faster_of(found.frequency, found.damping_ratio, excited, analysis, outputs, COST_OF_RADAU)
+    choice = faster_of(found.frequency, found.damping_ratio, excited, analysis, outputs, COST_OF_RADAU)
+    # Under a replay the length of steps says less of what they cost: no integrator takes over.
+    return choice if system.replay is None else replace(choice, candidates=())
 
 
 def fastest_friction(system: SpatialSystem, at: State) -> tuple[float, str]:
@@ -96,7 +100,8 @@ def _excitation(system: SpatialSystem, start: State, found: SpatialVibrations) -
     dt = 1e-3 / float(omega.max())
     q, v, a = start.q, start.v, _acceleration(system, 0.0, start)
     later = State(model.tree.integrate(q, dt * v), v + dt * a)
-    jerk = (_acceleration(system, dt, later) - a) / dt
+    at = dt if system.replay is None else 0.0  # round-off of what is replayed, over so short a time, is no jerk
+    jerk = (_acceleration(system, at, later) - a) / dt
     project = (K @ found.shape).T / omega[:, None] ** 2
     amplitude = np.abs(project @ v) / omega + np.abs(project @ a) / omega**2 + np.abs(project @ jerk) / omega**3
     forces = K @ found.shape * amplitude
@@ -112,5 +117,5 @@ def _acceleration(system: SpatialSystem, t: float, state: State) -> Array:
     """(n_v,) at time t."""
     states = np.concatenate([state.q, state.v])[None]
     core, scene, _ = system.integrated
-    found: Array = _core.tree_outputs(core, scene, [t], states).accelerations[0]
+    found: Array = _core.tree_outputs(core, scene, [t], states, system.replay).accelerations[0]
     return found

@@ -22,9 +22,10 @@ from ...common.arrays import Array, Indices
 from ...common.errors import InputError, SolveError
 from ...common.rotations import skew
 from ..model.spatial_cut import measured
+from ..model.spatial_frame_motors import turning_motors
 from ..model.spatial_known_motion import required_forces
 from ..model.spatial_model import SpatialModel, row_values
-from ..model.spatial_motors import FrameShare, frame_share, turning_motors
+from ..model.spatial_motors import FrameShare, frame_share
 from ..model.spatial_system import SpatialSystem
 from ..model.spatial_transmission import gear_matrices
 from ..model.spatial_tree import ElasticGearInSpace, Motion, Node

@@ -10,6 +10,8 @@ from rotations import logarithm
 from spatial_checkpoints import load
 from spatial_trees import Tree
 
+from ffrobot.mbs import _core
+from ffrobot.mbs.model.spatial_drives import Command, Drives, Replayed
 from ffrobot.mbs.model.spatial_model import build_spatial_model
 from ffrobot.mbs.scene.spatial.mechanism import SpatialMechanismScene
 from ffrobot.scene.spatial import spatial_scene
@@ -114,3 +116,10 @@ def coordinates(model, tree, turned):
             numbers = np.concatenate([turn @ numbers[:2], numbers[2:]])
         found[joint.name] = record.turned_around(numbers) if turned else numbers
     return found
+
+
+def motor_on_frames(model, body, size):
+    """`Drives` with a moment `size`(t) on the frames at the joint that carries a body."""
+    direction = np.zeros(model.tree.n_v)
+    direction[model.tree.nodes[body].v] = 1.0
+    return Drives(replayed=Replayed(_core.ForcesOfTime([size]), (Command(direction, (body, 1.0)),)))

@@ -4,12 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from spatial_scenes import as_scene, coordinates, tree_model
+from spatial_scenes import as_scene, coordinates, motor_on_frames, tree_model
 from spatial_trees import random_tree
 from tree_accelerations import Accelerated
 
 from ffrobot.mbs import _core
-from ffrobot.mbs.model.spatial_drives import Drive, Drives, FrameDrive
+from ffrobot.mbs.model.spatial_drives import Drive, Drives
 from ffrobot.mbs.model.spatial_known_motion import required_forces
 from ffrobot.mbs.model.spatial_system import SpatialSystem
 from ffrobot.mbs.solve.spatial_linearisation import SpatialLinearisation
@@ -28,7 +28,8 @@ def state_of(turned, drives):
     for node in model.tree.nodes:
         q[node.p_q] = 0.03 * rng.standard_normal(node.body.n_modes)
     v = rng.standard_normal(model.tree.n_v)
-    a = _core.tree_outputs(system.core, system.scene, [0.1], np.concatenate([q, v])[None]).accelerations
+    state = np.concatenate([q, v])[None]
+    a = _core.tree_outputs(system.core, system.scene, [0.1], state, system.replay).accelerations
     return model, Accelerated(model.tree, q[None], v[None], a, model.tree.frames(q[None]))
 
 
@@ -36,7 +37,7 @@ def state_of(turned, drives):
 def test_generalized_forces_are_the_virtual_work_of_the_frames(turned):
     """M v̇ − Q of what the core finds is τ z·(∂ω_b − ∂ω_a), z of the joint, ω of the two frames."""
     size = _core.TimeFunction.constant(MOMENT)
-    model, state = state_of(turned, lambda model: Drives(on_frames=(FrameDrive(1, 1.0, size),)))
+    model, state = state_of(turned, lambda model: motor_on_frames(model, 1, size))
     node = model.tree.nodes[1]
     axis = model.tree.motion(node.inner, state.q, state.frames).F[0, :, 2]
     expected = MOMENT * axis @ (state.frames[1].L[0, 3:] - state.frames[node.inner.body].L[0, 3:])
@@ -68,7 +69,7 @@ def test_linear_models_are_those_of_motions_beside_it(turned):
     Its jerk is found by differences of accelerations along it. Of what drives it, the moment alone is left.
     """
     size = _core.TimeFunction.constant(MOMENT)
-    model, state = state_of(turned, lambda model: Drives(on_frames=(FrameDrive(1, 1.0, size),)))
+    model, state = state_of(turned, lambda model: motor_on_frames(model, 1, size))
     on_frames = replace(model, scene=model.scene.model_copy(update={"motors": "frame"}))
     q, v, a = state.q[0], state.v[0], state.a[0]
     linearisation = SpatialLinearisation(on_frames, q)
@@ -78,11 +79,11 @@ def test_linear_models_are_those_of_motions_beside_it(turned):
     expected[found.names.index(f"joint/{joint}")] = model.sign(joint) * MOMENT
     np.testing.assert_allclose(found.force, expected, atol=1e-8)
 
-    system = SpatialSystem(model, Drives(on_frames=(FrameDrive(1, 1.0, size),)))
+    system = SpatialSystem(model, motor_on_frames(model, 1, size))
 
     def acceleration(dt):
         beside = np.concatenate([tree.integrate(q, dt * v), v + dt * a])
-        return _core.tree_outputs(system.core, system.scene, [0.0], beside[None]).accelerations[0]
+        return _core.tree_outputs(system.core, system.scene, [0.0], beside[None], system.replay).accelerations[0]
 
     h = 1e-4  # of a straight line through the state, along which the motion begins
     s, signs = linearisation.independent, found.transformation[linearisation.independent].diagonal()

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 from planar_trees import TYPES, flat_beam, planar_model
-from spatial_scenes import tree_model
+from spatial_scenes import motor_on_frames, tree_model
 from spatial_trees import random_beam, random_solid, stiffened
 
 from ffrobot.mbs import _core
 from ffrobot.mbs.fields.expressions import parse_expression
-from ffrobot.mbs.model.spatial_drives import Drive, Drives, FrameDrive
+from ffrobot.mbs.model.spatial_drives import Drive
 from ffrobot.mbs.model.spatial_gears import with_compliance_in_space
 from ffrobot.mbs.model.spatial_system import SpatialSystem
 
@@ -27,8 +27,8 @@ def states(rng, tree):
 def assert_same(system, at):
     """Accelerations, multipliers, energies, and all forces of both, at states (T, n_q + n_v)."""
     assert system.plane is not None
-    space = _core.tree_outputs(system.core, system.scene, TIMES, at)
-    plane = _core.tree_outputs(*system.integrated[:2], TIMES, at)
+    space = _core.tree_outputs(system.core, system.scene, TIMES, at, system.replay)
+    plane = _core.tree_outputs(*system.integrated[:2], TIMES, at, system.replay)
     for found, expected in (
         (plane.accelerations, space.accelerations),
         (system.multipliers(plane.multipliers), space.multipliers * system.row_signs),
@@ -84,7 +84,7 @@ def test_trees_under_all_that_acts(seed, rotor):
         trajectory=followed,
     )  # fmt: skip
     push = Drive(rng.standard_normal(model.tree.n_v), WAVE)
-    system = SpatialSystem(model, Drives(along=(push,), on_frames=(FrameDrive(0, 1.0, WAVE),)))
+    system = SpatialSystem(model, motor_on_frames(model, 0, WAVE)._replace(along=(push,)))
     assert list(system.integrated.rows) == [0, 1]
     assert_same(system, states(rng, model.tree))
 

@@ -25,33 +25,39 @@ namespace {
 template <class Space>
 TreeRun motion_of(const Model<Space> &model, const Scene &scene, const std::vector<double> &times, const VectorXd &q,
                   const VectorXd &v, const IntegrationControls &controls, const std::function<bool(double)> &carry_on,
-                  TreeCheckpoint *checkpoint, Samples *samples) {
+                  TreeCheckpoint *checkpoint, Samples *samples, Recording *recording, Replay *replay) {
   model.check_state(q, v);
   check_scene(model, scene);
+  if (replay)
+    check_replay(model, *replay);
   const nb::gil_scoped_release unlocked;
-  RecursiveMotion<Space> motion(model.mechanism, scene, times.front(), q.data(), v.data());
-  RecursiveMotion<Space> reader(model.mechanism, scene, times.front(), q.data(), v.data());
+  RecursiveMotion<Space> motion(model.mechanism, scene, times.front(), q.data(), v.data(), nullptr, replay);
+  RecursiveMotion<Space> reader(model.mechanism, scene, times.front(), q.data(), v.data(), nullptr, replay);
   if (checkpoint && checkpoint->integration.has_begun()) {
     check_size("state of the checkpoint", checkpoint->integration.state.size(), q.size() + v.size());
     motion.go_on(checkpoint->history);
   }
-  return integrated(model, scene, motion, reader, times, q, v, controls, carry_on, nullptr, checkpoint, samples);
+  return integrated(model, scene, motion, reader, times, q, v, controls, carry_on, recording, nullptr, checkpoint,
+                    samples, replay);
 }
 
 // The same of states (T, n_q + n_v) that are known
 template <class Space>
 TreeRun outputs_of(const Model<Space> &model, const Scene &scene, const std::vector<double> &times,
-                   const RowMajorMatrix &states) {
+                   const RowMajorMatrix &states, Replay *replay) {
   check_scene(model, scene);
+  if (replay)
+    check_replay(model, *replay);
   check_size("states", states.cols(), model.mechanism.n_q + model.mechanism.n_v);
   check_size("times", static_cast<Index>(times.size()), states.rows());
   TreeRun run(model, times.size());
   if (times.empty())
     return run;
   const double *first = states.row(0).data();
-  RecursiveMotion<Space> reader(model.mechanism, scene, times.front(), first, first + model.mechanism.n_q);
+  RecursiveMotion<Space> reader(model.mechanism, scene, times.front(), first, first + model.mechanism.n_q, nullptr,
+                                replay);
   for (std::size_t i = 0; i < times.size(); ++i)
-    run.evaluate(i, times[i], states.row(static_cast<Index>(i)).data(), reader, model.mechanism);
+    run.evaluate(i, times[i], states.row(static_cast<Index>(i)).data(), reader, model.mechanism, replay);
   return run;
 }
 
@@ -104,13 +110,13 @@ template <class Space> void bind_motion(nb::module_ &m) {
   bind_newton_step(&newton_step<Space, double>);
   bind_newton_step(&newton_step<Space, std::complex<double>>);
   m.def("tree_motion", &motion_of<Space>, "model"_a, "scene"_a, "times"_a, "q"_a, "v"_a, "controls"_a, "carry_on"_a,
-        "checkpoint"_a = nb::none(), "samples"_a = nb::none(),
+        "checkpoint"_a = nb::none(), "samples"_a = nb::none(), "recording"_a = nb::none(), "replay"_a = nb::none(),
         "Integrates the motion from (q, v) at the first of `times`, or on from a checkpoint, which it moves, and "
         "reports\n"
         "it at all of them; rows of outputs that were delivered before mean nothing. carry_on(t), which is called now "
         "and\n"
-        "then, ends it where it gives False.");
-  m.def("tree_outputs", &outputs_of<Space>, "model"_a, "scene"_a, "times"_a, "states"_a,
+        "then, ends it where it gives False. A recording keeps its steps; a replay acts beside the scene.");
+  m.def("tree_outputs", &outputs_of<Space>, "model"_a, "scene"_a, "times"_a, "states"_a, "replay"_a = nb::none(),
         "What a run reports of states (T, n_q + n_v) that are known.");
   m.def("tree_projected", &projected<Space>, "model"_a, "scene"_a, "t"_a, "q"_a, "v"_a,
         "(q, v, largest residual left) on the rows at time t, by Newton steps in the mass metric.");
@@ -215,6 +221,7 @@ void bind_run_and_laws(nb::module_ &m) {
       .def_ro("accelerations", &TreeRun::accelerations, "(T, n_v)")
       .def_ro("multipliers", &TreeRun::lambda, "(T, rows); 0 of rows that depend on others.")
       .def_ro("frames", &TreeRun::frames, "(T, 6 bodies): of each body R_ddot of its origin and alpha, global axes.")
+      .def_ro("replayed", &TreeRun::replayed, "(T, numbers) of the source of a replay.")
       .def_ro("energy", &TreeRun::energy, "(T, 3) kinetic, strain, gravitational, J.");
   nb::enum_<OrientationKind>(m, "OrientationKind")
       .value("rotation_vector", OrientationKind::rotation_vector)
@@ -273,15 +280,6 @@ void bind_tree_motion(nb::module_ &m) {
           "q"_a, "v"_a, "stiffness"_a, "rest"_a, "viscous"_a, "coulomb"_a, "speed"_a,
           "Spring and friction along the coordinate with these indices in q and v.")
       .def(
-          "add_frame_motor",
-          [](Scene &s, int q, int v, const Eigen::MatrixXd &rotation, const Eigen::Vector3d &axis,
-             const TimeFunction &magnitude) {
-            check_size("rotation", rotation.rows(), 3);
-            s.frame_motors.push_back({{q, v, rotation, axis}, magnitude});
-          },
-          "q"_a, "v"_a, "rotation"_a, "axis"_a, "magnitude"_a,
-          "What a motor that turns the frame of a body takes back on its modes: see core/recursion/frame_motor.h.")
-      .def(
           "add_gear",
           [](Scene &s, std::pair<int, int> a, std::pair<int, int> b, double ratio, double stiffness, double damping) {
             s.gears.push_back({{a.first, a.second}, {b.first, b.second}, ratio, stiffness, damping});
@@ -324,7 +322,7 @@ void bind_tree_motion(nb::module_ &m) {
           "lowest"_a, "highest"_a,
           "Watch whether the coordinate with this index in v, a number, stays in a range; the run does not end there.")
       .def_rw("has_loops", &Scene::has_loops, "Whether rows close loops: the run ends where these are singular.")
-      .def_rw("is_strict", &Scene::is_strict, "Whether steps are limited and errors judged as in planar scenes.")
+      .def_rw("keeps_all_rows", &Scene::keeps_all_rows, "Whether no rows depend on others.")
       .def_rw("most_bent", &Scene::most_bent, "(bodies) kg m^2: largest p^T p of each that makes sense; empty: any.")
       .def(
           "turn_marker", [](Scene &s, int marker, const OrientationLaw &law) { s.driven.push_back({marker, law}); },

@@ -223,6 +223,9 @@ template <class Space> void bind(nb::module_ &m, const std::string &space) {
   nb::class_<Motion>(m, (space + "PrescribedMotion").c_str(),
                      "Modes by functions of time, joints by constraint equations.")
       .def(nb::init<Driven, VectorXd>(), "driven"_a, "q"_a, nb::keep_alive<1, 2>(), "q (n_q): a posture to start from.")
+      .def_prop_ro(
+          "driven", [](const Motion &motion) -> const Driven & { return motion.driven(); },
+          nb::rv_policy::reference_internal)
       .def("hold_loads", &Motion::hold_loads, "start"_a, "end"_a,
            "Loads are before and after these times (s) what they are there.")
       .def("left_on_modes", &left_on_modes<Space>, "times"_a, "p"_a, "p_dot"_a, "p_ddot"_a, "near"_a,

@@ -13,6 +13,7 @@ void bind_system_run(nanobind::module_ &m); // of systems in the plane
 void bind_prescribed(nanobind::module_ &m);
 void bind_tree_sampled(nanobind::module_ &m);
 void bind_held_motion(nanobind::module_ &m);
+void bind_replay(nanobind::module_ &m);
 
 namespace ffrobot::recursion {
 

@@ -41,14 +41,6 @@ private:
   VectorXd read_;
 };
 
-template <class Space> void check_held(const Model<Space> &model, const HeldForces &held) {
-  check_size("rows of held forces", held.direction().rows(), model.mechanism.n_v);
-  for (const auto &[input, share] : held.frame_motors()) {
-    check_index("input of a motor on frames", input, held.direction().cols());
-    check_share(share, model.mechanism.n_q, model.mechanism.n_v);
-  }
-}
-
 template <class Space>
 TreeRun sampled_motion_of(const Model<Space> &model, const Scene &scene, const std::vector<double> &times,
                           const VectorXd &q, const VectorXd &v, const IntegrationControls &controls,
@@ -66,7 +58,8 @@ TreeRun sampled_motion_of(const Model<Space> &model, const Scene &scene, const s
   Plant<Space> plant(model.mechanism, reader, held);
   const Sampling sampling{samples, delay, locked(controller)};
   const SampledLoop loop(plant, sampling, times.back());
-  return integrated(model, scene, motion, reader, times, q, v, controls, carry_on, &loop.breaks(), nullptr, between);
+  return integrated(model, scene, motion, reader, times, q, v, controls, carry_on, nullptr, &loop.breaks(), nullptr,
+                    between);
 }
 
 template <class Space>

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "bindings/recursion/recursion.h"
+#include "core/analysis/replay.h"
 #include "core/check_index.h"
 #include "core/integrate/integrate.h"
 #include "core/recursion/observe.h"
@@ -39,8 +40,6 @@ template <class Space> void check_scene(const Model<Space> &model, const Scene &
     check_index("wrench of a force", force.wrench, model.mechanism.wrenches.size());
   for (const JointForce &force : scene.joint_forces)
     check_index("q of a joint's force", force.q, n_q), check_index("v of a joint's force", force.v, n_v);
-  for (const FrameMotor &motor : scene.frame_motors)
-    check_share(motor.share, model.mechanism.n_q, model.mechanism.n_v);
   for (const GearSpring &gear : scene.gears)
     for (const GearSpring::Side &side : {gear.a, gear.b})
       check_index("q of a gear", side.q, n_q), check_index("v of a gear", side.v, n_v);
@@ -69,6 +68,20 @@ template <class Space> void check_scene(const Model<Space> &model, const Scene &
     check_index("marker of the ground", driven.marker, model.mechanism.ground.size());
 }
 
+template <class Space> void check_held(const Model<Space> &model, const HeldForces &held) {
+  check_size("rows of held forces", held.direction().rows(), model.mechanism.n_v);
+  for (const auto &[input, share] : held.frame_motors()) {
+    check_index("input of a motor on frames", input, held.direction().cols());
+    check_share(share, model.mechanism.n_q, model.mechanism.n_v);
+  }
+}
+
+template <class Space> void check_replay(const Model<Space> &model, const Replay &replay) {
+  check_held(model, replay.along());
+  for (const auto &[number, entry, share] : replay.at_points())
+    check_index("entry of wrenches", entry, Space::dim * model.mechanism.wrenches.size());
+}
+
 // Where a run has stopped, and all that its next step depends on.
 struct TreeCheckpoint {
   IntegrationCheckpoint integration;
@@ -83,6 +96,7 @@ struct TreeRun {
   RowMajorMatrix states, accelerations, lambda; // (T, n_q + n_v), (T, n_v), (T, rows)
   RowMajorMatrix frames;                        // (T, 6 bodies) of each body: R_ddot of its origin, alpha
   RowMajorMatrix energy;                        // (T, 3) kinetic, strain, gravitational
+  RowMajorMatrix replayed;                      // (T, numbers of its source) what a replay does
   double least_ratio = 1, singular_at = 0;      // of the scene's watch
   Eigen::VectorXd singular_posture;
   std::vector<RangeSeen> ranges; // of the scene's limits
@@ -92,12 +106,13 @@ struct TreeRun {
     const Eigen::Index n = model.mechanism.n_q + model.mechanism.n_v;
     last.resize(n), states.resize(T, n), accelerations.resize(T, model.mechanism.n_v), lambda.resize(T, model.rows());
     frames.resize(T, 6 * static_cast<Eigen::Index>(model.mechanism.nodes.size())), energy.resize(T, 3);
+    replayed.resize(T, 0);
   }
 
-  // All that is read off a state (q, v), into row i; `reader` evaluates it
+  // All that is read off a state (q, v), into row i; `reader` evaluates it, under `replay` if that is not null
   template <class Space>
   void evaluate(std::size_t output, double t, const double *state, RecursiveMotion<Space> &reader,
-                const Mechanism<Space> &mechanism) {
+                const Mechanism<Space> &mechanism, const Replay *replay = nullptr) {
     const auto i = static_cast<Eigen::Index>(output);
     states.row(i) = Eigen::Map<const Eigen::RowVectorXd>(state, states.cols());
     const double *q = states.row(i).data(), *v = q + mechanism.n_q;
@@ -109,6 +124,12 @@ struct TreeRun {
       frames.row(i).segment<3>(column + 3) = frame.alpha.transpose();
       column += 6;
     }
+    if (replay) {
+      const Eigen::VectorXd &values = replay->source().values();
+      if (replayed.cols() != values.size())
+        replayed.resize(replayed.rows(), values.size());
+      replayed.row(i) = values.transpose();
+    }
     const Totals sum = totals(mechanism, q, v, reader.workspace());
     energy.row(i) << sum.kinetic, sum.strain, sum.gravitational;
   }
@@ -118,19 +139,19 @@ struct TreeRun {
     motion.watch_posture(report.time, last.data());
     least_ratio = motion.least_ratio(), singular_at = motion.singular_at();
     singular_posture = motion.singular_posture();
-    for (auto *x : {&states, &accelerations, &lambda, &frames, &energy})
+    for (auto *x : {&states, &accelerations, &lambda, &frames, &energy, &replayed})
       x->conservativeResize(static_cast<Eigen::Index>(report.outputs), Eigen::NoChange);
   }
 };
 
 // The motion from (q, v) at the first of `times`, or on from a checkpoint, with outputs at all of them, which `reader`
-// evaluates. `breaks`, `checkpoint` and `samples` may be null.
+// evaluates. Pointers may be null.
 template <class Space>
 TreeRun integrated(const Model<Space> &model, const Scene &scene, RecursiveMotion<Space> &motion,
                    RecursiveMotion<Space> &reader, const std::vector<double> &times, const Eigen::VectorXd &q,
                    const Eigen::VectorXd &v, const IntegrationControls &controls,
-                   const std::function<bool(double)> &carry_on, const Breaks *breaks, TreeCheckpoint *checkpoint,
-                   Samples *samples = nullptr) {
+                   const std::function<bool(double)> &carry_on, Recording *recording, const Breaks *breaks,
+                   TreeCheckpoint *checkpoint, Samples *samples, const Replay *replay = nullptr) {
   TreeRun run(model, times.size());
   run.last << q, v;
   motion.plan(times.back() - times.front());
@@ -145,8 +166,8 @@ TreeRun integrated(const Model<Space> &model, const Scene &scene, RecursiveMotio
   }
   run.report = integrate(
       motion, times, run.last, controls,
-      [&](std::size_t i, double t, const double *state) { run.evaluate(i, t, state, reader, model.mechanism); },
-      locked(carry_on), nullptr, breaks, checkpoint ? &checkpoint->integration : nullptr, limits ? &*limits : nullptr,
+      [&](std::size_t i, double t, const double *state) { run.evaluate(i, t, state, reader, model.mechanism, replay); },
+      locked(carry_on), recording, breaks, checkpoint ? &checkpoint->integration : nullptr, limits ? &*limits : nullptr,
       samples);
   if (limits)
     run.ranges = limits->seen();

@@ -109,7 +109,7 @@ SteeredTree::SteeredTree(const SystemOnTree &both, ExternalLoads &loads) : loads
     forces_.modal.emplace_back(VectorXd::Zero(body.modes()));
 }
 
-void SteeredTree::add(double t, double *force, double *wrench) {
+void SteeredTree::add(double t, const double *, double *force, double *wrench) {
   loads_.apply(t, forces_);
   for (const auto &[drive, coordinate, share] : drives_.along)
     force[coordinate] += share * forces_.drive[drive];

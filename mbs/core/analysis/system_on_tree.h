@@ -97,7 +97,7 @@ public:
   // All must outlive this.
   SteeredTree(const SystemOnTree &both, ExternalLoads &loads);
 
-  void add(double t, double *force, double *wrench) override;
+  void add(double t, const double *q, double *force, double *wrench) override;
   void add_along_cuts(double *along) override;
   void foresee(const double *times, int count) override { loads_.foresee(times, count); }
   double end_of_step(double t, double h) override { return loads_.end_of_step(t, h); }

@@ -1,8 +1,6 @@
 // What a motor that turns frames does on modes, beside its moment along the joint.
 #pragma once
 
-#include "core/time_function/time_function.h"
-
 #include <Eigen/Dense>
 
 #include <cmath>
@@ -34,11 +32,6 @@ private:
     const Eigen::Vector3d across = phi.cross(axis);
     return axis + a * across + b * phi.cross(across);
   }
-};
-
-struct FrameMotor {
-  FrameShare share;
-  TimeFunction magnitude; // N m
 };
 
 } // namespace ffrobot::recursion

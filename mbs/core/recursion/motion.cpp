@@ -59,16 +59,14 @@ RecursiveMotion<Space>::RecursiveMotion(const Mechanism<Space> &mechanism, const
       value_(VectorXd::Zero(static_cast<Index>(mechanism.rows.size()))), rate_(value_), correction_(force_),
       state_(VectorXd::Zero(mechanism.n_q + mechanism.n_v)), laws_(laws_of(scene, mechanism.rows.size())),
       sign_(signs_of(scene, mechanism.rows.size())), target_time_(std::numeric_limits<double>::quiet_NaN()),
-      norm_(mechanism, scene.is_strict), shifted_(VectorXd::Zero(2 * mechanism.n_v)),
-      unused_(VectorXd::Zero(mechanism.n_v)), evaluated_(VectorXd::Zero(mechanism.n_q)), rates_(force_),
-      posture_(mechanism) {
-  has_given_ = held_ || steering_ || !scene_.loads.empty() || !scene_.joint_forces.empty() ||
-               !scene_.frame_motors.empty() || !scene_.gears.empty() ||
+      norm_(mechanism), shifted_(VectorXd::Zero(2 * mechanism.n_v)), unused_(VectorXd::Zero(mechanism.n_v)),
+      evaluated_(VectorXd::Zero(mechanism.n_q)), rates_(force_), posture_(mechanism) {
+  has_given_ = held_ || steering_ || !scene_.loads.empty() || !scene_.joint_forces.empty() || !scene_.gears.empty() ||
                std::ranges::any_of(scene_.cut_joints, [](const CutJoint &cut) { return cut.coordinate >= 0; });
   has_wrenches_ =
       steering_ || !scene_.point_loads.empty() || !scene_.point_forces.empty() || !scene_.cut_joints.empty();
   update_targets(t);
-  if (!scene.is_strict)
+  if (!scene.keeps_all_rows)
     keep_independent_rows(mechanism, q, v, workspace_);
   else if (!mechanism.rows.empty())
     evaluate(t, q, v, correction_.data()); // projections need its factors
@@ -127,8 +125,6 @@ template <class Space> Forces<double> RecursiveMotion<Space>::act(double t, cons
     }
     for (const JointForce &joint : scene_.joint_forces)
       force_[joint.v] -= joint.stiffness * (q[joint.q] - joint.rest) + joint.friction.resistance(v[joint.v]);
-    for (const FrameMotor &motor : scene_.frame_motors)
-      motor.share.add(motor.magnitude(t).value, q, force_.data());
     for (const auto &[a, b, ratio, stiffness, damping] : scene_.gears) {
       const double moment = stiffness * (q[a.q] - ratio * q[b.q]) + damping * (v[a.v] - ratio * v[b.v]);
       force_[a.v] -= moment, force_[b.v] += ratio * moment;
@@ -142,7 +138,7 @@ template <class Space> Forces<double> RecursiveMotion<Space>::act(double t, cons
     for (const PointLoad &load : scene_.point_loads)
       wrench_[Space::dim * load.wrench + load.component] += load.share * load.magnitude(t).value;
     if (steering_)
-      steering_->add(t, force_.data(), wrench_.data());
+      steering_->add(t, q, force_.data(), wrench_.data());
     if (!scene_.point_forces.empty() || !scene_.cut_joints.empty()) {
       place_all(mechanism_, q, v, forces, workspace_), forces.is_placed = true;
       act_at_points(t), act_along_cuts(t, q, v);
@@ -328,7 +324,7 @@ template <class Space> void RecursiveMotion<Space>::accepted(double t, const dou
     norm_.observe(workspace_, motors_at(local().state(z)));
   if (loops_ && loops_->is_far())
     loops_->begin_at(local().state(z), workspace_, newton_);
-  norm_.take(z, z_dot, scene_.is_strict && has_given_ ? force_.data() : nullptr, workspace_);
+  norm_.take(z, z_dot, has_given_ ? force_.data() : nullptr, workspace_);
   if (accepted_ % steps_between_postures_ == 0)
     watch_posture(t, local().state(z));
   ++accepted_;
@@ -354,7 +350,7 @@ template <class Space> void RecursiveMotion<Space>::watch_posture(double t, cons
 template <class Space> Index RecursiveMotion<Space>::prescribed() const {
   const std::size_t count =
       scene_.targets.size() + scene_.loads.size() + scene_.point_loads.size() + scene_.cut_loads.size();
-  return scene_.is_strict ? static_cast<Index>(count) : 0;
+  return static_cast<Index>(count);
 }
 
 template <class Space> void RecursiveMotion<Space>::prescribe(double t, double *f) {

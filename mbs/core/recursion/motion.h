@@ -9,7 +9,6 @@
 #include "core/integrate/limit_watch.h"
 #include "core/integrate/ode.h"
 #include "core/recursion/cut.h"
-#include "core/recursion/frame_motor.h"
 #include "core/recursion/held_forces.h"
 #include "core/recursion/loop_watch.h"
 #include "core/recursion/motion_norm.h"
@@ -94,8 +93,9 @@ struct Target {
 class Steering {
 public:
   virtual ~Steering() = default;
-  // Adds those at time t along v (n_v), and on the wrenches of the mechanism (wrenches, dim).
-  virtual void add(double t, double *force, double *wrench) = 0;
+  // Adds those at time t along v (n_v), and on the wrenches of the mechanism (wrenches, dim); q (n_q) says where
+  // directions are that modes turn.
+  virtual void add(double t, const double *q, double *force, double *wrench) = 0;
   virtual void add_along_cuts(double *) {}     // the same (cut joints) of the scene, at the time of the last add()
   virtual void foresee(const double *, int) {} // as OdeSystem has it
   virtual double end_of_step(double t, double h) { return t + h; }
@@ -116,7 +116,6 @@ struct Scene {
   std::vector<PointLoad> point_loads;
   std::vector<PointForce> point_forces;
   std::vector<JointForce> joint_forces;
-  std::vector<FrameMotor> frame_motors;
   std::vector<GearSpring> gears;
   std::vector<CutJoint> cut_joints;
   std::vector<CutLoad> cut_loads;
@@ -124,10 +123,7 @@ struct Scene {
   std::optional<PostureWatch> watch;
   std::vector<LimitedCoordinate> limits; // of joints; told, nothing acts there
   bool has_loops = false; // closed by rows: steps do not lead across postures in which all rows depend on each other
-  // As scenes in the plane have it: steps are limited where functions of time bend (OdeSystem::prescribe), errors of
-  // forces between bodies count twice, and those of links that given forces hold straight are compared with what these
-  // would bend them. No rows depend on others: who makes the scene has refused those that do.
-  bool is_strict = false;
+  bool keeps_all_rows = false;   // who makes the scene has refused rows that depend on others
   std::vector<double> most_bent; // of each node, kg m^2: p^T p beyond it makes no sense; empty: none is too large
 };
 
@@ -146,7 +142,7 @@ template <class Space> class RecursiveMotion final : public ImplicitSystem {
 public:
   // The mechanism and the scene must outlive this. Rows that depend on others
   // at time t and (q, v) are left out of the equations from there on; they are
-  // to be consistent. Strict scenes have none. What acts beside the scene's loads may be null, and must outlive this:
+  // to be consistent. What acts beside the scene's loads may be null, and must outlive this:
   // `held`, which may change between steps, and `steering`.
   RecursiveMotion(const Mechanism<Space> &mechanism, const Scene &scene, double t, const double *q, const double *v,
                   const HeldForces *held = nullptr, Steering *steering = nullptr);
@@ -163,7 +159,7 @@ public:
   double change_size(const double *z, const double *change, double rate) const override;
   void accepted(double t, const double *z, const double *z_dot) override;
   bool is_sensible(const double *z) const override;
-  Eigen::Index prescribed() const override; // of the scene's loads and targets, where these limit steps
+  Eigen::Index prescribed() const override; // of the scene's loads and targets, which limit steps
   void prescribe(double t, double *f) override;
   double initial_step() const override { return 0.1 / std::max(fastest_, norm_.sizes().pace()); }
   unsigned long evaluations() const override { return workspace_.evaluations; }

@@ -20,10 +20,9 @@ constexpr double leverage = 2;       // of multipliers: motors' moments follow f
                                      // and where nothing else tells of the forces of fast modes
 constexpr double small_motor = 0.1;  // of the largest: what motors do is judged below
 constexpr double small_arm = 1e-2;   // of a body's length: moments count like the largest force at it
-constexpr double slow = 3e-4;        // of the natural pace: rates of joints below, times the peak of what they are of,
-constexpr double slow_if_strict = 0.01; // likewise
-constexpr double small_bend = 1e-3;     // of what a body's acceleration would do to its softest mode
-constexpr double small_twist = 1e-5;    // rad, of a spring: rounding of angles is less than a part of 1e-10 of it
+constexpr double slow = 0.01;        // of the natural pace: rates of joints below, times the peak of what they are of
+constexpr double small_bend = 1e-3;  // of what a body's acceleration would do to its softest mode
+constexpr double small_twist = 1e-5; // rad, of a spring: rounding of angles is less than a part of 1e-10 of it
 constexpr double nothing = std::numeric_limits<double>::min(); // of groups without members
 
 double square(double x) { return x * x; }
@@ -32,6 +31,9 @@ void grow(double &peak, double squared) {
   if (squared > peak * peak)
     peak = std::sqrt(squared);
 }
+
+double size_of_turn(double omega) { return std::abs(omega); }
+double size_of_turn(const double (&omega)[3]) { return std::hypot(omega[0], omega[1], omega[2]); }
 
 // Of accelerations, of these times the radians of modes, and times their squares
 struct SquaresOfModes {
@@ -53,8 +55,8 @@ double larger(double x, double y) { return x >= y || std::isnan(x) ? x : y; }
 } // namespace
 
 template <class Space>
-MotionNorm<Space>::MotionNorm(const Mechanism<Space> &mechanism, bool is_strict)
-    : mechanism_(mechanism), is_strict_(is_strict), sizes_(mechanism), pace_{0, 0} {
+MotionNorm<Space>::MotionNorm(const Mechanism<Space> &mechanism)
+    : mechanism_(mechanism), sizes_(mechanism), pace_{0, 0} {
   const auto n = static_cast<std::size_t>(mechanism.n_v);
   group_.assign(2 * n, 0), radian_.assign(n, 0);
   for (const Node<Space> &node : mechanism.nodes) {
@@ -90,19 +92,19 @@ MotionNorm<Space>::MotionNorm(const Mechanism<Space> &mechanism, bool is_strict)
     force_group_.push_back(at->second);
   }
   leverage_.assign(is_moment_.size(), leverage);
-  const auto add_joint = [&](std::vector<std::size_t> &to, std::size_t at, double counts) {
+  const auto add_joint = [&](std::vector<std::size_t> &to, std::size_t at) {
     const int force = static_cast<int>(is_moment_.size());
     to.push_back(at);
-    is_moment_.insert(is_moment_.end(), {false, true}), leverage_.insert(leverage_.end(), 2, counts);
+    is_moment_.insert(is_moment_.end(), {false, true}), leverage_.insert(leverage_.end(), 2, leverage);
     for (int i = 0; i < Space::dim; ++i)
       force_group_.push_back(i < Space::linear ? force : force + 1);
   };
   for (std::size_t port = 0; port < mechanism.children.size(); ++port)
     if (mechanism.children[port] >= 0)
-      add_joint(carriers_, port, is_strict ? leverage : 1);
+      add_joint(carriers_, port); // forces between bodies stand for those on the ground, too
   for (std::size_t i = 0; i < mechanism.nodes.size(); ++i)
     if (mechanism.nodes[i].is_alone)
-      add_joint(alone_, i, leverage);
+      add_joint(alone_, i);
   find_pace();
   add_motors({});
 }
@@ -123,9 +125,8 @@ template <class Space> void MotionNorm<Space>::plan(double duration) {
 }
 
 template <class Space> void MotionNorm<Space>::find_pace() {
-  const double part = is_strict_ ? slow_if_strict : slow;
-  pace_[0] = part * sizes_.pace(), pace_[1] = std::max(pace_[0], pace_of_springs_);
-  slow_acceleration_ = part * sizes_.acceleration();
+  pace_[0] = slow * sizes_.pace(), pace_[1] = std::max(pace_[0], pace_of_springs_);
+  slow_acceleration_ = slow * sizes_.acceleration();
 }
 
 template <class Space> void MotionNorm<Space>::add_spring(double stiffness, double inertia) {
@@ -284,12 +285,10 @@ template <class Space> void MotionNorm<Space>::take_accelerations(const Workspac
       const double force = std::sqrt(mass) * std::max(acceleration, least);
       peak_[g] = std::max(peak_[g], small_bend * force / (pace_[g] * pace_[g]));
       peak_[size_.size() + g] = std::max(peak_[size_.size() + g], force);
-      if constexpr (Space::dim == 3) // rates of modes as parts of the velocity of a link that turns
-        if (is_strict_) {
-          const double turns = std::max(std::abs(w.bodies[i].omega), pace_[0]);
-          double &of_modes = peak_[pace_.size() + g];
-          of_modes = std::max(of_modes, std::sqrt(mass) * sizes_.reach()[i] * turns);
-        }
+      // rates of modes as parts of the velocity of a link that turns
+      const double turns = std::max(size_of_turn(w.bodies[i].omega), pace_[0]);
+      double &of_modes = peak_[pace_.size() + g];
+      of_modes = std::max(of_modes, std::sqrt(mass) * sizes_.reach()[i] * turns);
     }
   }
   of_angles = std::max(of_angles, of_ways / sizes_.length());

@@ -17,9 +17,7 @@ struct NormPeaks {
 // Errors e and states z are local coordinates (space/local_coordinates.h).
 template <class Space> class MotionNorm {
 public:
-  // `is_strict`: forces between bodies stand for those on the ground, too, which are not observed; rates of modes are
-  // judged as parts of a body's velocity.
-  explicit MotionNorm(const Mechanism<Space> &mechanism, bool is_strict = false);
+  explicit MotionNorm(const Mechanism<Space> &mechanism);
 
   // The run will last `duration` s. Rates are slow, and accelerations small, beside the natural pace.
   void plan(double duration);
@@ -64,7 +62,6 @@ private:
   Largest largest() const; // so far
 
   const Mechanism<Space> &mechanism_;
-  bool is_strict_;
   NaturalSizes<Space> sizes_;
   double pace_of_springs_ = 0;   // 1/s, what a small twist makes
   double slow_acceleration_ = 0; // m/s^2: smaller ones count like this one

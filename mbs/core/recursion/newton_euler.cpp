@@ -320,6 +320,53 @@ void NewtonEuler<Space>::add_joint_moment_on_modes(std::size_t i, double moment,
          [&](const auto &act) { put_on_rows(mechanism_.nodes[inner].body, port, w.bodies[inner], at_port, act); });
 }
 
+template <class Space> typename NewtonEuler<Space>::Vector NewtonEuler<Space>::loads_along_joint(std::size_t i) const {
+  const Node<Space> &node = mechanism_.nodes[i];
+  Vector found{};
+  for (int k = 0; k < node.shape.freedoms.count; ++k)
+    found[static_cast<std::size_t>(node.shape.freedoms.component[k])] += on_coordinates_[node.v + k];
+  return found;
+}
+
+template <class Space> VectorXd NewtonEuler<Space>::on_body(std::size_t i, const Workspace<Space, double> &w) const {
+  const Node<Space> &node = mechanism_.nodes[i];
+  const auto &s = w.bodies[i];
+  std::vector<Vector> at_ports(on_ports_.begin() + node.first_port,
+                               on_ports_.begin() + node.first_port + node.outboard);
+  for (std::size_t k = 0; k < mechanism_.nodes.size(); ++k)
+    if (const Node<Space> &outer = mechanism_.nodes[k]; outer.parent == static_cast<int>(i)) {
+      Vector on_inner = loads_along_joint(k), turned;
+      std::remove_cvref_t<decltype(w.hinges[k].turn)>::add_moment(w.hinges[k].r, on_inner.data());
+      w.hinges[k].turn.apply(on_inner.data(), turned.data());
+      add(turned, at_ports[static_cast<std::size_t>(outer.parent_port - node.first_port)], -1);
+    }
+  const Vector by_joint = loads_along_joint(i);
+  Vector on_frame = by_joint, at_inboard{};
+  if (node.inboard >= 0) {
+    inboard_tilt(node, s).apply(by_joint.data(), at_inboard.data());
+    on_frame = at_inboard;
+    to_frame(node.body, node.inboard, s, on_frame);
+  }
+  for (int k = 0; k < node.outboard; ++k) {
+    Vector at_port = at_ports[static_cast<std::size_t>(k)];
+    to_frame(node.body, k, s, at_port);
+    add(at_port, on_frame);
+  }
+  VectorXd Q(Space::dim + node.n());
+  std::copy(on_frame.begin(), on_frame.end(), Q.data());
+  const auto on_rows_of_body = [&](const auto &act) {
+    for (int k = 0; k < node.outboard; ++k)
+      put_on_rows(node.body, k, s, at_ports[static_cast<std::size_t>(k)], act);
+    if (node.inboard >= 0)
+      put_on_rows(node.body, node.inboard, s, at_inboard, act);
+    else
+      on_tilt(node.body, by_joint, act);
+  };
+  if (node.n() > 0)
+    put_on_modes(node.body, bodies_[i], s, on_rows_of_body, Q.data() + Space::dim);
+  return Q;
+}
+
 template <class Space>
 typename NewtonEuler<Space>::RowAcceleration NewtonEuler<Space>::of_row(std::size_t r, const double *a,
                                                                         const Workspace<Space, double> &w) const {

@@ -61,6 +61,10 @@ public:
   // the inner one, does on the modes of both bodies.
   void add_joint_moment_on_modes(std::size_t i, double moment, const Workspace<Space, double> &w, double *Q) const;
 
+  // After load(): what the loads do on node i alone, (dim + n): force and moment about the origin of its frame, in axes
+  // of the body, then generalized forces on its modes.
+  Eigen::VectorXd on_body(std::size_t i, const Workspace<Space, double> &w) const;
+
   // Second derivative of the value of a row by these accelerations, and the size of the terms that cancel in it.
   struct RowAcceleration {
     double value, size;
@@ -84,6 +88,8 @@ private:
   void residual_of_modes(std::size_t i, const double *q, const double *a, Eigen::VectorXd &z,
                          Workspace<Space, double> &w, double *f);
   Vector along_joint(std::size_t i, const double *q, const Workspace<Space, double> &w) const;
+  // What loads along the coordinates of joint i do to its outer section, in axes of the joint
+  Vector loads_along_joint(std::size_t i) const;
   template <class Act> void on_rows(std::size_t i, const Workspace<Space, double> &w, const Act &act) const;
 
   const Mechanism<Space> &mechanism_;

@@ -1,0 +1,66 @@
+// What an earlier analysis found, at any time of it.
+#pragma once
+
+#include "core/time_function/time_function.h"
+
+#include <Eigen/Core>
+
+#include <limits>
+#include <vector>
+
+namespace ffrobot {
+
+class TimedSource {
+public:
+  virtual ~TimedSource() = default;
+
+  // What the source has found is that of time t afterwards. Costs nothing where it is already: stages of a step and
+  // outputs meet.
+  void evaluate(double t) {
+    if (t != time_)
+      time_ = find(t) ? t : nowhere;
+  }
+
+  // As OdeSystem has them: the next times will be the stages of a step, and where one had best end.
+  void foresee(const double *times, int count) {
+    time_ = nowhere;
+    prepare(times, count);
+  }
+  virtual double end_of_step(double t, double h) { return t + h; }
+
+protected:
+  // False where it is of a stage of a step, not of time t at any other moment.
+  virtual bool find(double t) = 0;
+  virtual void prepare(const double *, int) {}
+
+private:
+  static constexpr double nowhere = std::numeric_limits<double>::quiet_NaN();
+  double time_ = nowhere;
+};
+
+// Forces and voltages, number by number.
+class ForceSource : public TimedSource {
+public:
+  explicit ForceSource(Eigen::Index count) : values_(Eigen::VectorXd::Zero(count)) {}
+  const Eigen::VectorXd &values() const { return values_; } // (count) of the last evaluate()
+
+protected:
+  Eigen::VectorXd values_; // filled by find()
+};
+
+class ForcesOfTime final : public ForceSource {
+public:
+  explicit ForcesOfTime(std::vector<TimeFunction> functions)
+      : ForceSource(static_cast<Eigen::Index>(functions.size())), functions_(std::move(functions)) {}
+
+private:
+  bool find(double t) override {
+    for (std::size_t i = 0; i < functions_.size(); ++i)
+      values_[static_cast<Eigen::Index>(i)] = functions_[i](t).value;
+    return true;
+  }
+
+  std::vector<TimeFunction> functions_;
+};
+
+} // namespace ffrobot

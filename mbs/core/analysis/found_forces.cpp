@@ -1,0 +1,144 @@
+#include "core/analysis/found_forces.h"
+
+#include "core/recursion/rows.h"
+
+#include <algorithm>
+
+namespace ffrobot::recursion {
+
+using Eigen::Index;
+using Eigen::VectorXd;
+
+template <class Space>
+RecordedForces<Space>::RecordedForces(const Mechanism<Space> &mechanism, const Scene &scene, const Recording &recording,
+                                      std::shared_ptr<ForceReader<Space>> reader)
+    : ForceSource(reader->count()), motion_(mechanism, scene, recording.times.front(), recording.states.data(),
+                                            recording.states.data() + mechanism.n_q),
+      recorded_(motion_, recording), reader_(std::move(reader)) {
+  motion_.plan(recording.times.back() - recording.times.front());
+}
+
+template <class Space> bool RecordedForces<Space>::find(double t) {
+  const double *q = recorded_.state(t);
+  reader_->read(q, motion_.workspace(), nullptr, values_.data());
+  return !recorded_.is_at_stage();
+}
+
+template <class Space>
+PrescribedForces<Space>::PrescribedForces(PrescribedMotion<Space> &motion, std::vector<ModalShape> shape,
+                                          const VectorXd &q, std::shared_ptr<ForceReader<Space>> reader)
+    : ForceSource(reader->count()), motion_(motion), shape_(std::move(shape)),
+      holding_(VectorXd::Zero(motion.driven().mechanism.n_v)), reader_(std::move(reader)) {
+  motion_.start_at(q);
+}
+
+template <class Space> bool PrescribedForces<Space>::find(double t) {
+  // was found at all output times before; a failure in between shows as a step that is refused
+  if (motion_.move(t, modes_at(shape_, t)))
+    motion_.balance();
+  holding_(motion_.driven().of_modes) = motion_.shape_force();
+  reader_->read(motion_.q(), motion_.workspace(), &holding_, values_.data());
+  return true;
+}
+
+template <class Space>
+ActuatorReader<Space>::ActuatorReader(DrivenMechanism<Space> driven, VectorXd limit, std::vector<LinkPatches> patches)
+    : driven_(std::move(driven)), motors_(driven_), limit_(std::move(limit)), patches_(std::move(patches)) {}
+
+template <class Space> Index ActuatorReader<Space>::count() const {
+  Index found = limit_.size();
+  for (const LinkPatches &of_link : patches_)
+    found += of_link.allocation.Phi().cols();
+  return found;
+}
+
+template <class Space>
+void ActuatorReader<Space>::read(const double *q, const Workspace<Space, double> &w, const VectorXd *shape,
+                                 double *to) {
+  motors_.resolve(q, w.lambda.data(), w);
+  for (Index k = 0; k < limit_.size(); ++k)
+    *to++ = std::clamp(motors_.tau()[k], -limit_[k], limit_[k]);
+  for (auto &[first, reached, allocation] : patches_) {
+    VectorXd modal = motors_.left().segment(first, reached.cols());
+    if (shape)
+      modal += shape->segment(first, reached.cols());
+    const VectorXd &V = allocation.solve(reached * modal);
+    to = std::copy_n(V.data(), V.size(), to);
+  }
+}
+
+template <class Space>
+void PathReader<Space>::read(const double *, const Workspace<Space, double> &w, const VectorXd *, double *to) {
+  std::fill_n(to, count_, 0.0);
+  for (const auto &[row, column, sign] : parts_) {
+    const Row &of = mechanism_.rows[static_cast<std::size_t>(row)];
+    const double size = -sign * w.lambda[static_cast<std::size_t>(row)];
+    if (of.model.kind == RowKind::coordinate) {
+      to[column] += size;
+      continue;
+    }
+    RowMotion<double> motion;
+    row_motion(mechanism_, of, w, of.moves, motion);
+    Eigen::Map<Eigen::Vector3d> force(to + column), moment(to + column + 3);
+    force += size * axes_ * Eigen::Map<const Eigen::Vector3d>(motion.force);
+    moment += size * axes_ * Eigen::Map<const Eigen::Vector3d>(sign > 0 ? motion.moment_b : motion.moment_a);
+  }
+}
+
+Index PointReader::count() const {
+  Index found = 0;
+  for (const PointComponents &of_body : bodies_)
+    found += 3 * of_body.direction.cols();
+  return found;
+}
+
+namespace {
+
+Eigen::MatrixXd L_a(const PointComponents &of, const Eigen::Ref<const VectorXd> &p) {
+  Eigen::MatrixXd found(6 + p.size(), of.direction.cols());
+  for (Index k = 0; k < found.cols(); ++k) {
+    const Eigen::Vector3d e = of.direction.col(k), u = of.position.col(k) + of.Phi.middleRows<3>(3 * k) * p;
+    found.col(k) << e, u.cross(e), of.Phi.middleRows<3>(3 * k).transpose() * e;
+  }
+  return found;
+}
+
+} // namespace
+
+void PointReader::read(const double *q, const Workspace<Spatial, double> &w, const VectorXd *shape, double *to) {
+  VectorXd lambda = Eigen::Map<const VectorXd>(w.lambda.data(), static_cast<Index>(is_path_.size()));
+  for (std::size_t r = 0; r < is_path_.size(); ++r)
+    if (!is_path_[r])
+      lambda[static_cast<Index>(r)] = 0;
+  forces_.load(lambda.data(), nullptr, w);
+  for (const PointComponents &of : bodies_) {
+    const auto i = static_cast<std::size_t>(of.node);
+    const auto &node = mechanism_.nodes[i];
+    const Eigen::Map<const VectorXd> p(q + node.p_q(), node.n());
+    LeastNorm solver;
+    solver.compute(of.scale.asDiagonal() * L_a(of, p));
+    VectorXd Q_a = forces_.on_body(i, w);
+    const Eigen::Vector3d on_frame = Q_a.head<3>(), about_frame = Q_a.segment<3>(3);
+    Q_a.head<3>() = of.axes.transpose() * on_frame;
+    Q_a.segment<3>(3) = of.axes.transpose() * (about_frame - of.origin.cross(on_frame));
+    if (shape)
+      Q_a.tail(node.n()) += shape->segment(node.p_v(), node.n());
+    Q_a.array() *= of.scale.array();
+    const VectorXd force = solver.solve(Q_a);
+    for (Index k = 0; k < force.size(); ++k, to += 3) {
+      const Eigen::Vector3d local = of.axes * (force[k] * of.direction.col(k));
+      turn(w.bodies[i].absolute, local.data(), to);
+    }
+  }
+}
+
+template class RecordedForces<Planar>;
+template class RecordedForces<Spatial>;
+template class PrescribedForces<Planar>;
+template class PrescribedForces<Spatial>;
+template class ActuatorReader<Planar>;
+template class ActuatorReader<Spatial>;
+template class PathReader<Planar>;
+template class PathReader<Spatial>;
+
+} // namespace ffrobot::recursion

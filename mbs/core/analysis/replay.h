@@ -1,0 +1,43 @@
+// Forces of a source in another run: along its coordinates, and at points of its bodies.
+#pragma once
+
+#include "core/actuation/force_source.h"
+#include "core/recursion/held_forces.h"
+#include "core/recursion/motion.h"
+
+#include <memory>
+
+namespace ffrobot::recursion {
+
+class Replay final : public Steering {
+public:
+  struct AtPoint {
+    Eigen::Index number; // of the source's
+    Eigen::Index entry;  // in wrenches
+    double share;
+  };
+  // `along`: what units of all numbers of the source do along v.
+  Replay(std::shared_ptr<ForceSource> source, HeldForces along, std::vector<AtPoint> at_points)
+      : source_(std::move(source)), along_(std::move(along)), at_points_(std::move(at_points)) {}
+
+  void add(double t, const double *q, double *force, double *wrench) override {
+    source_->evaluate(t);
+    along_.hold(source_->values());
+    along_.add(q, force);
+    for (const auto &[number, entry, share] : at_points_)
+      wrench[entry] += share * source_->values()[number];
+  }
+  void foresee(const double *times, int count) override { source_->foresee(times, count); }
+  double end_of_step(double t, double h) override { return source_->end_of_step(t, h); }
+
+  const ForceSource &source() const { return *source_; }
+  const HeldForces &along() const { return along_; }
+  const std::vector<AtPoint> &at_points() const { return at_points_; }
+
+private:
+  std::shared_ptr<ForceSource> source_;
+  HeldForces along_;
+  std::vector<AtPoint> at_points_;
+};
+
+} // namespace ffrobot::recursion
