@@ -36,13 +36,13 @@ FORCES_AT_POINTS = ("trajectory", "points")  # values of `apply` that need no mo
 ROUNDING = 1e-6  # of the largest modal force: less is what ill-conditioned patches leave
 
 
-def evaluated(solution: Solution, result: AnalysisResult) -> AnalysisResult:
-    """The result with all that follows from its outcome."""
+def evaluated(solution: Solution, result: AnalysisResult, *, is_judged: bool = True) -> AnalysisResult:
+    """The result with all that follows from its outcome; what motors and patches can do only where it `is_judged`."""
     began, outcome = time.perf_counter(), result.outcome
     shift, unsupplied = _unmet(solution, result)
     # modes know nothing of those that are not there
     is_resolved = outcome.analysis.is_integrated and not any(body.rigid_in for body in solution.bodies.values())
-    feasibility = _feasibility(solution, result)
+    feasibility = _feasibility(solution, result) if is_judged else None
     result = replace(
         result,
         point_forces=_point_forces(solution, outcome),

@@ -90,8 +90,10 @@ def _evaluated(solution: Solution) -> Solution:
 
 def _with_peaks(solution: Solution, result: AnalysisResult) -> AnalysisResult:
     """The result with all that follows from its outcome; what is judged by peaks, by those between outputs."""
-    found, closer = evaluated(solution, told_of_links(solution, result)), result.outcome.closer
-    if closer is result.outcome:
+    closer = result.outcome.closer
+    is_all = closer is result.outcome
+    found = evaluated(solution, told_of_links(solution, result), is_judged=is_all)
+    if is_all:
         return found
     voltages = _voltages(solution, closer)
     between = evaluated(solution, told_of_links(solution, replace(result, outcome=closer, voltages=voltages)))
