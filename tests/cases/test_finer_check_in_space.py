@@ -86,7 +86,7 @@ def test_it_is_told_and_kept(tmp_path, ffrobot):
     path.write_text(library.make_scene(**in_space(planar(MODES))).text, encoding="utf-8")
     done = ffrobot("solve", path)
     assert done.returncode == 0, done.stderr
-    assert "inverse, replayed on 4 modes: link.tip is off by" in " ".join(done.stdout.split())
+    assert "inverse, forward simulation on 4 modes: link.tip is off by" in " ".join(done.stdout.split())
     with library.Results(path.with_suffix(".results.h5")) as results:
         assert json.loads(results.attributes("inverse")["check_modes"]) == {"link": 4}
 
