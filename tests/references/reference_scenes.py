@@ -22,9 +22,12 @@ SAGGING = {"name": "sagging", "kind": "fcid", "shape": "static"} | SHORT
 LINEAR = {"name": "linear", "kind": "linear", "about": "inverse", "times": [0.0, 0.02]}
 BUILT = {"viscous_friction": 0.3, "coulomb_friction": 0.2, "friction_speed": 0.5, "rotor_inertia": 1e-4,
          "gear_ratio": 30.0}  # fmt: skip
+FRICTION = {"viscous_friction": 0.02, "coulomb_friction": 0.05, "friction_speed": 0.5}
 GIVES = {"gear_ratio": 60.0, "rotor_inertia": 2e-4, "stiffness": 3e3, "damping": 2.0, "motor": True}
 PD = {"kind": "joint-pid", "proportional": {"O": 500.0, "A": 100.0}, "derivative": {"O": 40.0, "A": 8.0}}
+SOFT = {"kind": "joint-pid", "proportional": {"O": 20.0, "A": 5.0}, "derivative": {"O": 0.5, "A": 0.1}}
 LQR = {"kind": "lqr", "inputs": "patches", "modes": 4, "deflection": 1e-4, "voltage": 200.0}
+DAMPER = {"kind": "modal-velocity", "bodies": ["link1", "link2"], "modes": 2, "damping_ratio": 0.05, "sensor": "ideal"}
 ENCODERS = [{"joint": "O", "resolution": 1e-5}, {"joint": "A", "resolution": 1e-5}]
 BLOW = [{"point": "link2.tip", "y": "where(t < 0.02, 30*sin(pi*t/0.02), 0)"}]
 LOOP = {"name": "loop", "kind": "closed-loop", "actuation": "inverse", "sample_time": 0.001, "delay": 0.0005,
@@ -115,7 +118,8 @@ PLANAR = {
         arm, INVERSE, AGAIN | {"apply": "joints+pzt"}, SAGGING, pzt=patched(structural=True, limit=100.0)
     ),
     "arm_under_control": partial(
-        arm, INVERSE, LOOP, LOOP | {"name": "patches", "controller": [PD, LQR]}, LINEAR, pzt=patched()
+        arm, INVERSE, LOOP | {"controller": [SOFT]}, LOOP | {"name": "patches", "controller": [SOFT, DAMPER]}, LINEAR,
+        pzt=patched(),
     ),
     "arm_by_motors_only": partial(
         arm, {"name": "exact", "kind": "motors-only", "end": 0.4, "output_step": 0.004},
@@ -136,7 +140,9 @@ PLANAR = {
                                         {"name": "turn", "joint": "turn", "value": "-0.5 + 3*t**2"}]),
     "slide_by_angles": partial(slide, trajectory=[{"name": "turn", "angle": "arm.tip", "value": "0.5 + 3*t**2"},
                                                   {"name": "way", "joint": "way", "value": "0.1 + t**2"}]),
-    "loop_with_friction": partial(slider_crank, dict.fromkeys("OAB", BUILT) | {"guide": BUILT}),
+    "loop_with_friction": partial(slider_crank, dict.fromkeys(("O", "A", "B", "guide"), FRICTION)),
+    "loop_as_built": partial(slider_crank, {"O": FRICTION, "A": BUILT, "B": FRICTION, "guide": BUILT}),
+    "loop_with_rotors": partial(slider_crank, dict.fromkeys(("O", "A", "B", "guide"), BUILT)),
     **{f"random_{k}": lambda k=k: random_scene(3717, k)[1] for k in (*range(4), *range(6, 12))},
 }  # fmt: skip
 
