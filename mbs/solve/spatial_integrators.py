@@ -17,10 +17,10 @@ from .integrators import ASKED_FOR, Choice, faster_of
 from .spatial_frequencies import SpatialVibrations, vibrations_in_space, without_rows
 from .state import State
 
-# Time of a step of Radau IIA in steps of DOP853 is 1.4 to 3 in cases/arm_3r and cases/slider_crank_3d. Half as much
-# again here: once at work, it is given time to damp vibrations away (core/integrate/faster_method.cpp), which has to be
-# worth it.
-COST_OF_RADAU = 4.2
+# Steps of DOP853 in the time of one of Radau IIA: 0.7 to 1.5 in cases/arm_3r, cases/slider_crank_3d and a stiff arm of
+# three links. Twice as much here: once at work, Radau is given time to damp vibrations away
+# (core/integrate/faster_method.cpp), which has to be worth it.
+COST_OF_RADAU = 3.0
 
 TOO_STIFF = 1e6  # rates of friction in a run above which explicit steps, a few of its times long, are too many
 
