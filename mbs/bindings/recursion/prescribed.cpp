@@ -156,11 +156,17 @@ void at_postures(const DrivenMechanism<Space> &driven, const std::vector<double>
   recursion::Workspace<Space, double> w(driven.mechanism);
   Motors<Space> motors(driven);
   const VectorXd v = VectorXd::Zero(driven.mechanism.n_v);
+  const VectorXd target = VectorXd::Zero(static_cast<Index>(driven.mechanism.rows.size()));
+  VectorXd a(driven.mechanism.n_v);
+  w.keep({});
   for (Index i = 0; i < q.rows(); ++i) {
     if (!times.empty())
       for (const DrivenMarker &marker : driven.scene.driven)
         w.turning[static_cast<std::size_t>(marker.marker)] = marker.law(times[static_cast<std::size_t>(i)]);
-    place_all(driven.mechanism, q.row(i).data(), v.data(), Forces<double>(), w);
+    Forces<double> none;
+    place_all(driven.mechanism, q.row(i).data(), v.data(), none, w), none.is_placed = true;
+    // for the mass matrix of the modes of stiffened bodies, and their rows
+    accelerations(driven.mechanism, q.row(i).data(), v.data(), none, target.data(), w, a.data());
     each(i, motors, w);
   }
 }
