@@ -80,6 +80,19 @@ def test_frequencies_of_a_rotating_cantilever(spin, tmp_path):
         assert np.abs(zeros / lag - 1).min() < 1e-4
 
 
+def test_modal_forces_of_small_loads_are_those_without_stiffening(tmp_path):
+    """What forces along a link change goes to zero with them."""
+    path = [{"name": "tip", "point": "blade.tip", "y": "1e-3*t**2"}]
+    analysis = [{"name": "turning", "kind": "pcid", "end": 0.02, "output_step": 0.005}]
+    found = []
+    for stiffened in (True, False):
+        tables = blade(tmp_path, trajectory=path, analysis=analysis, geometric_stiffening=stiffened)
+        with ffrobot.solve(ffrobot.make_scene(**tables)) as results:
+            found.append(results["turning/bodies/blade/modal_force"])
+    assert np.abs(found[1]).max() > 0
+    np.testing.assert_allclose(found[0], found[1], rtol=0, atol=1e-5 * np.abs(found[1]).max())
+
+
 def test_links_that_bend_far_across_the_plane(tmp_path):
     """Two cantilevers of eight shapes each fall about y: a chain of rigid rods, and their energy, which stays."""
     E = 7e9
