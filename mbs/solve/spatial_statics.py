@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from scipy.linalg import null_space
 
 from ...common.arrays import Array, as_floats
 from ...common.errors import SolveError
@@ -99,6 +98,8 @@ def unstable_ways(model: SpatialModel, q: Array, multipliers: Array) -> Iterator
 
     There the derivative of the forces that lead back has a negative eigenvalue on what the rows leave free.
     """
+    from scipy.linalg import null_space  # loaded here: others do not pay for it
+
     tree, n, row_scales = model.tree, model.tree.n_v, _row_scales(model)
     jacobian = _jacobian(model, q, 0.0, multipliers, natural_sizes(model), row_scales)
     K, size = -jacobian[:n, :n], _residual(model, q[None], 0.0, multipliers, row_scales)[1]

@@ -88,7 +88,8 @@ def test_gears_that_give(tmp_path):
     """About an equilibrium, an inverse analysis, for which motors are found, and a forward run that has them.
 
     The gear on the ground alone is compliant: what the rotor of another does to the link that carries it is left out
-    in 2D (docs/theory.md). At rest gravity bears 12 N·m/rad, which are what is left of springs of 3000: rounding counts the more.
+    in 2D (docs/theory.md). At rest gravity bears 12 N·m/rad, which are what is left of springs of 3000: rounding counts
+    the more.
     """
     inverse = INVERSE | {"output_step": 0.0005, "tolerance": 1e-9}
     forward = inverse | {"name": "forward", "kind": "forward", "actuation": "inverse", "apply": "joints"}
