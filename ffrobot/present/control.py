@@ -18,8 +18,8 @@ FREQUENCIES = 5  # that are listed, and damping ratios
 UNDAMPED = 1e-9  # ratios below are rounding
 
 LOOP_COLUMNS = (
-    "closed loop", "verdict", "rms (m)", "max (m)", "settling\ntime (s)", "overshoot\n(m)", "vibration\n(m)",
-    "final (m)", "work (J)", "torque\n(N·m)", "voltage\n(V)", "saturated\nsamples",
+    "closed loop", "verdict", "rms (m)", "max (m)", "settling\n(s)", "overshoot\n(m)", "vibration\n(m)",
+    "final (m)", "work (J)", "torque\n(N·m)", "voltage\n(V)", "at\nlimits",
 )  # fmt: skip
 
 

@@ -287,7 +287,7 @@ def _is_from_rest_to_rest(group: h5py.Group) -> bool:
     """Whether the paths begin and end at rest, as inversion with motors alone needs: next to their mean rates."""
     for entry in group.get("trajectories", {}).values():
         target = entry["target"][()] if "target" in entry else np.zeros((0, 1))
-        steps = np.abs(np.diff(target.reshape(len(target), -1), axis=0))
+        steps = np.abs(np.diff(target.reshape(len(target), target[:1].size), axis=0))
         if len(steps) and (steps[[0, -1]].max(axis=0) > AT_REST * steps.mean(axis=0)).any():
             return False
     return True

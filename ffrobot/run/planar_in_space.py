@@ -57,11 +57,11 @@ def _lacks(scene: Scene, planar: Solution) -> list[str]:
     """What bodies of the plane leave open of scenes in space."""
     found = [f'actuation_points "{of.body}": components are those of the plane' for of in scene.actuation_points]
     found += [f'body "{body.name}": modes: "auto" needs modes in space' for body in scene.body if body.modes == "auto"]
-    found += [f'body "{body.name}": pieces need links in space' for body in scene.body if body.pieces is not None]
+    found += [f'body "{body.name}": pieces need 3D links' for body in scene.body if body.pieces is not None]
     if planar.stiffened or scene.geometric_stiffening == "auto":
         found.append("geometric_stiffening: that of planar bodies is not carried into space")
     if any(analysis.is_checked for analysis in scene.analysis):
-        found.append('check: "finer" needs links in space')
+        found.append('check: "finer" needs 3D links')
     return found
 
 

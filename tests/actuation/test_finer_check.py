@@ -93,7 +93,7 @@ def test_it_is_told_and_kept(tmp_path, ffrobot):
     path.write_text(arm(2).text, encoding="utf-8")
     done = ffrobot("solve", path)
     assert done.returncode == 0, done.stderr
-    assert "inverse, replayed on 4 modes: link2.tip is off by" in " ".join(done.stdout.split())
+    assert "inverse, forward simulation on 4 modes: link2.tip is off by" in " ".join(done.stdout.split())
     with library.Results(path.with_suffix(".results.h5")) as results:
         about = results.attributes("inverse")
     assert json.loads(about["check_modes"]) == {"link1": 4, "link2": 4}

@@ -303,7 +303,7 @@ def test_patches_that_do_not_fit_their_link(link):
     with pytest.raises(InputError, match=r"expected as many patches as modes \(\d+\) or more, found 1"):
         link_patches(SCENE, [layout(allocation="exact")], body, spatial)
     old = replace(body, stations=replace(body.stations, width=None, outline=None))
-    with pytest.raises(InputError, match="make it again from its link file"):
+    with pytest.raises(InputError, match="recompute it from its link file"):
         link_patches(SCENE, [layout(bends="out-of-plane")], old, spatial)
     upright = link(rectangle(0.006, 0.014), 4, "out-of-plane-bending")
     for allocation in ("exact", "least-squares"):

@@ -136,7 +136,10 @@ def test_numbers_of_the_readme(arm, held):
     }
     check_table("arm_6r", "motor", moments_of)
     rows = {}
-    for name, group in (("joints held", held._file["held"]), ("moments of the rigid arm", arm.file["rigid_moments"])):
+    for name, group in (
+        ("joints locked on q_r(t)", held._file["held"]),
+        ("moments of the rigid arm", arm.file["rigid_moments"]),
+    ):
         way, turn = deviation(group)
         rows[name] = [way[0], way.max(), way[-1], turn.max()]
     check_table("arm_6r", "run", rows, smallest=1e-6)
@@ -182,7 +185,7 @@ def test_the_shaper_is_for_the_frequency_with_which_the_tool_swings(behind_gears
 
 def test_numbers_behind_gears(behind_gears):
     way, turn = deviation(behind_gears["gears"])
-    check_table("arm_6r", "gears", {"motors held": [way[0], way.max(), way[-1], turn.max()]})
+    check_table("arm_6r", "gears", {"motors on q_r(t)": [way[0], way.max(), way[-1], turn.max()]})
     rows = {
         f"{name}.toml": [
             group["trajectories/waist"].attrs["end"], pdist(after_path(group)[1]).max(),

@@ -22,7 +22,7 @@ def test_numbers_of_the_readme(slewing_appendage):
     group = slewing_appendage.file["slew"]
     deflection, after = 1e3 * np.abs(group["points/boom.tip/deflection"]), group["time"][()] >= 4.0
     measured = {
-        "moment of the motor (N·m)": peak(group["joints/drive/moment"]),
+        "motor torque (N·m)": peak(group["joints/drive/moment"]),
         "angular velocity of the hub (rad/s)": np.linalg.norm(group["bodies/hub/angular_velocity"], axis=1).max(),
         "turn of the hub after the slew (degrees)": turn_of(group)[after].max(),
         "deflection of the tip, y (mm)": deflection[:, 1].max(),

@@ -145,7 +145,7 @@ def test_files_of_earlier_versions_have_no_spin_inertia(outcome):
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"h_spin": None}, "h_spin: expected with J_spin, S_spin, found none"),
+        ({"h_spin": None}, "h_spin: expected together with J_spin, S_spin, found none"),
         ({"J_spin": -1.0}, "J_spin: expected a number not below 0, found -1"),
         ({"J_spin": 0.0}, "S_spin, less h_spin.* expected no negative eigenvalue"),
         ({"h_spin": np.ones(12)}, "S_spin, less h_spin.* expected no negative eigenvalue"),

@@ -86,8 +86,8 @@ def test_as_many_frequencies_as_parameters_leave_the_uncertainty_open():
 def test_parameters_that_cannot_be_told_apart_are_refused_with_what_they_have_in_common():
     """k1 = a b², k2 = c: a b² alone shows."""
     keys = ("a", "b", "c")
-    with pytest.raises(InputError, match=r"the same with a times c\^-2, b times c, for any c: vary only 1 of these 2|"
-                                         r"the same with a times c, b times c\^-0.5, for any c"):  # fmt: skip
+    with pytest.raises(InputError, match=r"with a times c\^-2, b times c, for any c: vary only 1 of these 2|"
+                                         r"with a times c, b times c\^-0.5, for any c"):  # fmt: skip
         fit_frequencies(lambda x: chain([x[0] * x[1] ** 2, x[2], 2.0]), keys, np.ones(3), LABELS, chain(TRUE))
 
 

@@ -239,7 +239,7 @@ def test_what_does_not_go_is_refused():
         with_compliance(pendulum(motor=False))
     model = geared_arm(GEARED)
     source = add_transmission(run_pcid(model, pcid(end=0.1), True, always))
-    with pytest.raises(InputError, match='"joints" or "joints\\+pzt" with joints'):
+    with pytest.raises(InputError, match='"joints" or "joints\\+pzt" for joints'):
         run_forward(model, forward(actuation="inverse", apply="trajectory", end=0.1), source, ActuatorSet(), always)
     loaded = geared_arm(GEARED, load=[{"joint": "O", "moment": "1"}])
     with pytest.raises(InputError, match=r"expected no \[\[load\]\] on"):

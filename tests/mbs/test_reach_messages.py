@@ -86,4 +86,4 @@ def test_degrees_of_freedom_that_no_trajectory_holds_are_warned_of(path, held):
     texts = solve(arm(path, BENT)).analyses["inverse"].warnings
     said = [text for text in texts if "degrees of freedom" in text]
     assert len(said) == 2 - held
-    assert all(text.startswith("trajectories hold 1 of 2 degrees of freedom") for text in said)
+    assert all(text.startswith("trajectories prescribe 1 of 2 degrees of freedom") for text in said)

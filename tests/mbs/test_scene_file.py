@@ -235,7 +235,7 @@ MISTAKES = [
     ("end = 1.0", 'end = 1.0\nintegrator = "dop"', 'analysis "inverse": integrator: expected "auto", "dopri5", "dop853",', '"dop"'),
     ("end = 1.0", "end = 1.0\nspectral_radius = 0.5", 'analysis "inverse": expected the key "spectral_radius" only with', ""),
     ("end = 1.0", "end = 1.0\nspectral_radius = 2", 'analysis "inverse": spectral_radius: expected a number of at most 1', ""),
-    ("end = 1.0", 'end = 1.0\nintegrator = "generalized-alpha"', 'analysis "forward": actuation: expected an analysis', "again"),
+    ("end = 1.0", 'end = 1.0\nintegrator = "generalized-alpha"', 'analysis "forward": actuation: expected an analysis', "reproducible steps"),
     ("end = 1.0", 'end = 1.0\nshape = "zero"', 'analysis "inverse": expected the key "shape" only in kind = "fcid"', "found"),
     ('kind = "pcid"', 'kind = "fcid"', 'analysis "inverse": expected the key "shape" in kind = "fcid"', "found none"),
     ('kind = "pcid"', 'kind = "pcd"', 'analysis "inverse": kind: expected "pcid", "fcid", "forward", ', '"pcid"?'),
