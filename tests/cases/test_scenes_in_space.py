@@ -38,7 +38,7 @@ def test_times_and_status(solved):
     data, file = solved
     np.testing.assert_allclose(file["inverse/time"], [sample["t"] for sample in data["samples"]], atol=1e-15)
     assert file["inverse"].attrs["status"] == "completed"
-    assert file["inverse"].attrs["integrator"].startswith("dop853")  # perhaps after a trial of another
+    assert "dop853" in file["inverse"].attrs["integrator"]  # perhaps with another after or before it
     assert np.max(file["inverse/constraint_violation"]) < 1e-9
     assert file.attrs["space"] == "spatial"
 
