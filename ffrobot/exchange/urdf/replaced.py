@@ -58,10 +58,8 @@ class Replaced:
             )
         if mass <= SAME * after.mass:
             return None, []
-        center = as_floats((before.mass * before.center - after.mass * after.center) / mass)
-        inertia = as_floats(
-            before.inertia + _at(before.mass, before.center) - after.inertia - _at(after.mass, after.center)
-        ) - _at(mass, center)
+        rest = before + Inertial(-after.mass, after.center, -after.inertia)
+        center, inertia = rest.center, rest.inertia
         points = {name: point.position for name, point in self.body.points.items() if name != "mid"}
         nearest = min(points, key=lambda name: float(np.linalg.norm(points[name] - center)))
         keys: dict[str, Any] = {"point": nearest, "mass": mass, "center": (center - points[nearest]).tolist()}

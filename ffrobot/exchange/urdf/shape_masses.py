@@ -14,6 +14,7 @@ from ...common.errors import InputError
 from ...common.tables import shown
 from .meshes import loaded_mesh, mesh_path
 from .robot import Inertial, MeshFile, Primitive, Robot, UrdfLink
+from .visuals import bars
 
 
 @dataclass(frozen=True)
@@ -71,8 +72,9 @@ def _filled(robot: Robot, link: UrdfLink, urdf: Path, filling: Filling) -> tuple
     beyond = max(robot.joints_of(link.name), key=lambda joint: float(np.linalg.norm(joint.origin.xyz)), default=None)
     if filling.radius is None or beyond is None or not any(beyond.origin.xyz):
         return None, ""
-    rod = _cylinder_along(np.array(beyond.origin.xyz), filling.radius, filling.density)
-    return rod, f'a cylinder of radius {filling.radius:g} m to joint "{shown(beyond.name)}" {with_density}'
+    (rod,) = bars([np.array(beyond.origin.xyz)], filling.radius)
+    what = f'a cylinder of radius {filling.radius:g} m to joint "{shown(beyond.name)}" {with_density}'
+    return _of_primitive(rod, filling.density), what
 
 
 def _missing(shapes: tuple[MeshFile | Primitive, ...], urdf: Path) -> bool:
@@ -108,15 +110,6 @@ def _of_primitive(shape: Primitive, density: float) -> Inertial:
         (radius,) = shape.size
         mass, moments = density * 4 / 3 * np.pi * radius**3, np.full(3, 0.4 * radius**2)
     return Inertial(mass, np.zeros(3), mass * np.diag(moments)).seen_from(shape.origin.place)
-
-
-def _cylinder_along(way: Array, radius: float, density: float) -> Inertial:
-    """A solid cylinder from the link's frame along `way` (3,), m."""
-    length = float(np.linalg.norm(way))
-    mass, unit = density * np.pi * radius**2 * length, way / length
-    across = (3 * radius**2 + length**2) / 12
-    along = radius**2 / 2
-    return Inertial(mass, way / 2, mass * (across * np.eye(3) + (along - across) * np.outer(unit, unit)))
 
 
 def _of_mesh(shape: MeshFile, urdf: Path, density: float, label: str) -> tuple[Inertial, bool]:
