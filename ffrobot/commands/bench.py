@@ -9,6 +9,7 @@ import click
 
 from ..bench import OF_A_SCENE, PARTS, PEER
 from ..present.logs import FILE, logging_options, python_option
+from .options import POSITIVE
 from .protect import protect
 
 
@@ -37,7 +38,7 @@ def _numbers(context: click.Context, parameter: click.Parameter, value: str | No
 @click.option(
     "--budget",
     metavar="S",
-    type=click.FloatRange(0.0, min_open=True),
+    type=POSITIVE,
     default=20.0,
     show_default=True,
     help="Largest duration of a run, s; longer ones stay in the tables without errors.",

@@ -9,9 +9,8 @@ import click
 
 from ..common.errors import InputError
 from ..present.logs import FILE, logging_options
+from .options import POSITIVE
 from .protect import protect
-
-POSITIVE = click.FloatRange(0.0, min_open=True)
 
 
 @click.command(name="import")

@@ -11,6 +11,7 @@ from ..common.errors import InputError
 from ..common.files import check_new_file, write_atomically
 from ..common.parallel import is_first
 from ..present.logs import FILE, logging_options
+from .options import POSITIVE
 from .protect import protect
 
 if TYPE_CHECKING:
@@ -32,7 +33,7 @@ if TYPE_CHECKING:
 @click.option(
     "--density",
     metavar="KG/M3",
-    type=click.FloatRange(0.0, min_open=True),
+    type=POSITIVE,
     help="Density for the mass of the part, with --inspect.",
 )
 @logging_options

@@ -1,4 +1,4 @@
-"""Options that commands which make many runs share."""
+"""Types of options, and options that commands which make many runs share."""
 
 from __future__ import annotations
 
@@ -11,6 +11,8 @@ from ..common.parallel import processors
 from ..present.logs import FILE
 
 F = TypeVar("F", bound=Callable[..., object])
+
+POSITIVE = click.FloatRange(0.0, min_open=True)
 
 
 def runs_options(folder: str, of: str = "Folder") -> Callable[[F], F]:
