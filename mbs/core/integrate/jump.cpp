@@ -1,6 +1,8 @@
 #include "core/integrate/jump.h"
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
 
 namespace ffrobot {
@@ -27,8 +29,10 @@ std::optional<Jump> find_jump(OdeSystem &system, const double *z, double start, 
   const double whole = size(left, right);
   if (!(whole > least) || !std::isfinite(whole))
     return std::nullopt;
+  // numbers next to 0 are much closer together than times can be told apart
+  const double resolution = 0.5 * std::numeric_limits<double>::epsilon() * std::max(std::abs(start), std::abs(end));
   double t = std::midpoint(start, end);
-  for (; start < t && t < end; t = std::midpoint(start, end)) {
+  for (; start < t && t < end && end - start > resolution; t = std::midpoint(start, end)) {
     system.slope(t, z, middle.data());
     if (size(left, middle) > size(middle, right)) {
       end = t;

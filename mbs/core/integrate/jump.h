@@ -8,7 +8,7 @@
 namespace ffrobot {
 
 struct Jump {
-  double before, after; // s, neighbours among numbers
+  double before, after; // s, as close together as rounding of the times tells apart
 };
 
 // Where slopes at the state z jump between `start` and `end`, which are short compared with what else changes them;

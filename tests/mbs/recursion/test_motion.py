@@ -277,3 +277,20 @@ def test_steps_of_radau_are_not_bound_by_what_is_stiff():
     )
     assert implicit.steps < 0.1 * explicit.steps
     assert relative(implicit.states[-1, : model.n_q], explicit.states[-1, : model.n_q]) < 1e-5
+
+
+def test_a_force_that_begins_at_zero_in_a_run_from_before():
+    """Closed form x = t² F / 2 m; numbers next to 0 are 5e-324 apart, times of steps and samples are not."""
+    body = random_body(np.random.default_rng(4), 0, J.prismatic)
+    model = Mechanism([body], ground(np.random.default_rng(5)), np.zeros(3)).model()
+    q, _, v, _ = model.first[0]
+    along = np.eye(model.n_v)[v]
+    acceleration = model.evaluate(np.zeros(model.n_q), np.zeros(model.n_v), np.zeros(0), along, None)[0][v]
+    scene = _core.TreeScene()
+    scene.add_load(along, parse_expression("where(t < 0, 0, 1)"))
+    samples, times = _core.Samples(1e-3, 10_000), np.linspace(-0.3, 1.0, 14)
+    start = np.zeros(model.n_q), np.zeros(model.n_v)
+    run = _core.tree_motion(model, scene, list(times), *start, controls(), on, None, samples)
+    assert np.abs(run.states[:, q] - np.maximum(times, 0) ** 2 * acceleration / 2).max() < 1e-12 * acceleration
+    assert np.diff(samples.times).min() > 1e-20
+    assert run.evaluations < 2000
