@@ -20,7 +20,7 @@ from ...mbs.model.spatial_rows import SpatialRow
 from ...mbs.scene.analysis import Analysis
 from ...mbs.solve.linearisation import LinearMechanism
 from ...mbs.solve.spatial_linearisation import SpatialLinearisation
-from ...mbs.solve.spatial_posture import undeformed_posture
+from ...mbs.solve.spatial_start import undeformed_posture
 from ..context import ActuatedContext, place_of
 from ..patches.spatial_patches import LinkPatches
 from .linear_model import LinearModel, state_space

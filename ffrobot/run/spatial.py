@@ -21,6 +21,7 @@ from ..mbs.quantities.spatial_reactions import reactions
 from ..mbs.quantities.spatial_sharing import shared_evenly
 from ..mbs.quantities.stiffening import NOTABLE
 from ..mbs.scene.analysis import Analysis
+from ..mbs.solve.spatial_reach import turned_guesses
 from ..scene.spatial import SpatialScene, load_spatial_scene
 from .enough import completed, goes_on, is_replayed, log_outcome, progress_of, with_enough_modes, with_enough_pieces
 from .mode_search import ModeSearch, error_tolerances
@@ -159,6 +160,9 @@ def _run_all(solution: SpatialSolution, watcher: Watcher, interruption: Interrup
             with of_file(f'{solution.scene.path}: analysis "{analysis.name}"'):
                 run = analysis.run(_context(solution, analysis, results, watcher, interruption))
                 assert isinstance(run, Outcome)
+            if not results:
+                told = (*run.statistics.warnings, *turned_guesses(solution.scene))
+                run = replace(run, statistics=replace(run.statistics, warnings=told))
         except Exception as error:  # raised once the analyses before it are kept
             if not results:
                 raise

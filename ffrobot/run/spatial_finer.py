@@ -19,8 +19,8 @@ from ..mbs.model.spatial_drives import Drives, Replayed
 from ..mbs.model.spatial_model import SpatialModel, without_paths
 from ..mbs.quantities.spatial_motion import SpatialMotion
 from ..mbs.scene.analysis import TimedAnalysis
-from ..mbs.solve.spatial_posture import undeformed_posture
 from ..mbs.solve.spatial_redundancy import resolved
+from ..mbs.solve.spatial_start import undeformed_posture
 from ..mbs.solve.spatial_statics import static_equilibrium
 from ..mbs.solve.state import State
 from ..scene.spatial import SpatialScene

@@ -22,6 +22,7 @@ from ..solve.spatial_diagnosis import find_cause_in_space
 from ..solve.spatial_integrators import choose_integrator_in_space
 from ..solve.spatial_limits import left_ranges, watch_limits
 from ..solve.spatial_posture import NEARLY_SINGULAR, SINGULAR, robot_size, told_posture
+from ..solve.spatial_reach import out_of_reach
 from ..solve.state import State
 from .drive import STATUS, Progress
 from .earlier_check import check_earlier, going_on
@@ -98,7 +99,7 @@ def spatial_drive(
     motion = motion if earlier is None else earlier.motion.followed_by(motion)
     in_posture = _ends_in_posture(run)
     posture = told_posture(model, run.least_ratio, run.singular_at, run.singular_posture, is_end=in_posture)
-    cause = f"{posture}: move the path, or start in another posture" if in_posture else ""
+    cause = f"{posture}: {_advice(model, times)}" if in_posture else ""
     if not in_posture and STATUS[run.status] not in ("completed", "interrupted"):
         cause = find_cause_in_space(system, analysis, integrator, run)
     scatter = beyond_rounding(analysis.tolerance, run.rounding)
@@ -130,6 +131,12 @@ def spatial_drive(
         return _under(drives, found.among(between), np.concatenate([numbers, more])[order])
 
     return replace(acting, look_closer=look_closer)
+
+
+def _advice(model: SpatialModel, times: Array) -> str:
+    """How to come past a posture in which a run at `times` (T,) ended."""
+    far = out_of_reach(model, times)
+    return far if far else "move the path, or start in another posture"
 
 
 def _numbers(replayed: Replayed | None, run: _core.TreeRun, found: Outcome, known: int) -> Array:

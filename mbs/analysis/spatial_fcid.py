@@ -13,9 +13,10 @@ from ...common.errors import InputError
 from .. import _core
 from ..model.spatial_gears import refuse_held_motors
 from ..model.spatial_motors import driven_mechanism
-from ..solve.spatial_posture import check_path, mobility, undeformed_posture
+from ..solve.spatial_posture import check_path, mobility
 from ..solve.spatial_prescribed import prescribed_motion
 from ..solve.spatial_redundancy import resolved
+from ..solve.spatial_start import undeformed_posture
 from .context import Context
 from .outcome import Forces, Motion, Outcome, Prescription, Statistics
 from .samples import path_times

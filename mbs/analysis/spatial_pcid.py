@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from ..model.spatial_gears import with_held_motors
 from ..scene.analysis import IntegratedAnalysis
-from ..solve.spatial_posture import check_path, undeformed_posture
+from ..solve.spatial_posture import check_path
 from ..solve.spatial_redundancy import resolved
+from ..solve.spatial_start import undeformed_posture
 from ..solve.spatial_statics import initial_state
 from .context import Context
 from .outcome import Outcome

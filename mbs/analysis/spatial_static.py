@@ -8,8 +8,8 @@ import numpy as np
 
 from ..model.spatial_gears import with_held_motors
 from ..scene.analysis import Analysis
-from ..solve.spatial_posture import undeformed_posture
 from ..solve.spatial_redundancy import resolved
+from ..solve.spatial_start import undeformed_posture
 from ..solve.spatial_statics import holding_multipliers, static_equilibrium, unstable_ways
 from .context import Context
 from .outcome import Motion, Outcome, Statistics

@@ -17,7 +17,7 @@ from ..model.spatial_model import SpatialModel, without_paths
 from ..model.system import MechanismSystem
 from .initial_state import undeformed_state
 from .spatial_frequencies import vibrations_in_space, without_rows
-from .spatial_posture import undeformed_posture
+from .spatial_start import undeformed_posture
 from .vibration import vibrations
 
 B = TypeVar("B", PlanarBody, SpatialBody)

@@ -16,8 +16,9 @@ from ..model.spatial_model import SpatialModel, row_values
 from ..model.spatial_system import SpatialSystem
 from ..model.spatial_transmission import gear_matrices
 from .path_frequencies import INSTANTS, PathFrequencies, common_modes
-from .spatial_posture import relaxed_gears, solve_posture, undeformed_posture
+from .spatial_posture import solve_posture
 from .spatial_redundancy import resolved
+from .spatial_start import relaxed_gears, undeformed_posture
 from .state import State
 from .vibration import strained
 

@@ -1,8 +1,8 @@
-"""The posture that a robot in space starts from: the guess of joint coordinates, then Newton on the rows."""
+"""Postures of a robot in space: Newton on the rows, how it can move there, and what to say of singular ones."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -35,37 +35,6 @@ def robot_size(model: SpatialModel) -> float:
         for other in node.body.points.values()
     ]
     return max(sizes, default=0.0) or 1.0
-
-
-def undeformed_posture(model: SpatialModel) -> State:
-    """The state with p = ṗ = 0 that meets all rows at t = 0, next to the guessed coordinates and rates.
-
-    Raises `InputError` where no posture near the guess does.
-    """
-    tree = model.tree
-    q = solve_posture(model, 0.0, tree.at_rest(_numbers(model, model.scene.initial.joints, "joints")))
-    if q is None:
-        owners = quoted(dict.fromkeys(row.owner for row in model.rows))
-        raise InputError(
-            f"{model.scene.path}: initial.joints: expected a guess near a posture with undeformed links that meets"
-            f" {owners} at t = 0, found none within {MOST_ITERATIONS} steps (out of reach, or on another branch?)"
-        )
-    return relaxed_gears(model, with_rates(model, q, _guessed_rates(model)))
-
-
-def relaxed_gears(model: SpatialModel, state: State) -> State:
-    """The state with motors where their gears are not strained; joints where motors follow a trajectory."""
-    q, v = state.q.copy(), state.v.copy()
-    held = {row.coordinate for row in model.rows if row.kind == "coordinate"}
-    for gear in model.tree.gears:
-        way, rate = gear.twist(q, v)
-        if gear.motor.v.start in held:
-            q[gear.joint.q.start] += gear.sign * way
-            v[gear.joint.v.start] += gear.sign * rate
-        else:
-            q[gear.motor.q.start] -= way
-            v[gear.motor.v.start] -= rate
-    return State(q, v)
 
 
 def solve_posture(model: SpatialModel, t: float, q: Array) -> Array | None:
@@ -117,37 +86,6 @@ def joint_scales(model: SpatialModel) -> Array:
         sizes = np.array([1.0 if unit == "rad" else robot_size(model) for unit in units])
         scales[node.v] = node.joint.state(sizes) if node.joint.units else sizes
     return scales
-
-
-def _numbers(model: SpatialModel, table: Mapping[str, object], key: str) -> dict[str, Array]:
-    """The lists of numbers of a table by joint. Raises `InputError` for a wrong number of them."""
-    found = {}
-    for name, value in table.items():
-        joint = next(each for each in model.scene.joint if each.name == name)
-        wanted, numbers = len(joint.guess_units or joint.units), np.atleast_1d(np.array(value, dtype=float))
-        if len(numbers) != wanted:
-            raise InputError(
-                f"{model.scene.path}: initial.{key}.{name}: expected {wanted} numbers of a {joint.type} joint, found"
-                f" {len(numbers)}"
-            )
-        found[name] = numbers
-    return found
-
-
-def _guessed_rates(model: SpatialModel) -> Array:
-    v = np.zeros(model.tree.n_v)
-    for name, rates in _numbers(model, model.scene.initial.joint_rates, "joint_rates").items():
-        number = model.tree.carried.get(name)
-        if number is None:
-            continue  # where a loop is cut the other joints' rates say all
-        node = model.tree.nodes[number]
-        if node.backwards and len(node.joint.units) != 1:
-            raise InputError(
-                f"{model.scene.path}: initial.joint_rates.{name}: expected the side nearer to the ground first in"
-                f" between of a {node.joint.type} joint with rates, found it second"
-            )
-        v[node.v] = -rates if node.backwards else (node.joint.state(rates) if node.joint.units else rates)
-    return v
 
 
 @dataclass(frozen=True)

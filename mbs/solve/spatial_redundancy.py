@@ -21,8 +21,9 @@ from ..model.spatial_model import SpatialModel, row_values, target_rates
 from ..model.spatial_motors import driven_mechanism
 from ..model.spatial_rows import SpatialRow
 from ..model.spatial_tree import Node
-from .spatial_posture import Mobility, joint_scales, mobility, undeformed_posture
+from .spatial_posture import Mobility, joint_scales, mobility
 from .spatial_prescribed import joint_places, prescribed_motion
+from .spatial_start import undeformed_posture
 
 OWNER = "redundancy"  # of the rows that this adds
 NODES = 401  # of the splines that joints follow

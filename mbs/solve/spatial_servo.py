@@ -16,8 +16,10 @@ from ..model.spatial_model import SpatialModel
 from ..model.spatial_motors import driven_mechanism
 from ..model.spatial_rows import SpatialRow
 from .internal_dynamics import Stopped, Target, by_differences
-from .spatial_posture import mobility, solve_posture, told_posture, undeformed_posture
+from .spatial_posture import mobility, solve_posture, told_posture
 from .spatial_prescribed import following_motors
+from .spatial_reach import out_of_reach
+from .spatial_start import undeformed_posture
 
 POSTURES = 201  # along the path, from which others are looked for
 EVERY = 10  # of these is looked at for singular ones
@@ -158,7 +160,11 @@ def make_spatial_servo(
             raise Stopped
         q = solve_posture(held, float(t), near[-1])
         if q is None:
-            raise InputError(f"{where}: trajectory: expected a path within reach, found no posture at t = {t:.6g} s")
+            far = out_of_reach(held, times)
+            raise InputError(
+                f"{where}: trajectory: expected a path within reach, found no posture at t = {t:.6g} s"
+                + (f": {far}" if far else "")
+            )
         near.append(q)
     return SpatialServo(held, end, factor, times, np.array(near), where, goes_on)
 

@@ -11,7 +11,8 @@ from ...common.errors import SolveError
 from ...common.validation import quoted
 from ..model.spatial_known_motion import KnownStates, required_forces
 from ..model.spatial_model import SpatialModel, row_values
-from .spatial_posture import robot_size, undeformed_posture, with_rates
+from .spatial_posture import robot_size, with_rates
+from .spatial_start import undeformed_posture
 from .state import State
 
 MOST_ITERATIONS = 60

@@ -9,7 +9,7 @@ import ffrobot
 from ffrobot.actuation.control.spatial_rigid_arm import SpatialRigidArm
 from ffrobot.mbs.model import spatial_system
 from ffrobot.mbs.model.spatial_model import build_spatial_model
-from ffrobot.mbs.solve.spatial_posture import undeformed_posture
+from ffrobot.mbs.solve.spatial_start import undeformed_posture
 from ffrobot.run.spatial_bodies import load_spatial_bodies
 
 ROUGH = {"viscous_friction": 0.3, "coulomb_friction": 0.2, "friction_speed": 0.05}

@@ -11,7 +11,8 @@ from spatial_trees import Tree
 
 from ffrobot.mbs.model.spatial_body import rigid_body
 from ffrobot.mbs.model.spatial_model import build_spatial_model, row_values, target_rates
-from ffrobot.mbs.solve.spatial_posture import check_path, mobility, solve_posture, undeformed_posture
+from ffrobot.mbs.solve.spatial_posture import check_path, mobility, solve_posture
+from ffrobot.mbs.solve.spatial_start import undeformed_posture
 from ffrobot.mbs.solve.spatial_statics import static_equilibrium
 from ffrobot.run.spatial_bodies import load_spatial_bodies
 

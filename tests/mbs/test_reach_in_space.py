@@ -1,0 +1,91 @@
+"""What a path out of reach and guesses that do not work are told in 3D."""
+
+import tomllib
+
+import numpy as np
+import pytest
+
+import ffrobot
+from ffrobot.common.errors import InputError
+
+ROD = {"mass": 2.0, "inertia": [0.01, 0.2, 0.2], "center": [0.35, 0.0, 0.0],
+       "points": {"root": [0.0, 0.0, 0.0], "tip": [0.7, 0.0, 0.0]}}  # fmt: skip
+HUB = {"mass": 1.0, "inertia": [0.01, 0.01, 0.01], "center": [0.0, 0.0, 0.0], "points": {"in": [0.0, 0.0, 0.0]}}
+JOINTS = [
+    {"name": "yaw", "type": "revolute", "between": ["ground", "hub.in"], "axis": [0.0, 0.0, 1.0],
+     "at": [0.1, 0.2, 0.3]},
+    {"name": "lift", "type": "revolute", "between": ["hub.in", "a.root"], "axis": [0.0, 1.0, 0.0]},
+    {"name": "elbow", "type": "revolute", "between": ["a.tip", "b.root"], "axis": [0.0, 1.0, 0.0]},
+]  # fmt: skip
+BENT = {"yaw": 0.3, "lift": -0.4, "elbow": 1.2}
+
+
+def arm(path, guess, joints=JOINTS):
+    """Two rods of 0.7 m on a turning hub at (0.1, 0.2, 0.3) whose tip follows `path`."""
+    analysis = [{"name": name, "kind": "pcid", "end": 0.1, "output_step": 0.01} for name in ("inverse", "again")]
+    bodies = [{"name": "hub", "rigid": HUB}, *({"name": name, "rigid": ROD} for name in "ab")]
+    return ffrobot.make_scene(
+        name="rods", space="spatial", gravity=[0.0, 0.0, 0.0], body=bodies, joint=joints,
+        trajectory=[{"name": "tip", "point": "b.tip"} | path], initial={"joints": guess}, analysis=analysis,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("path", "distance", "unit"),
+    [
+        ({"x": "750", "y": "250", "z": "30"}, np.sqrt(749.9**2 + 249.8**2 + 29.7**2), True),
+        ({"x": "1.4", "y": "1.2", "z": "0"}, np.sqrt(1.3**2 + 1.0**2 + 0.3**2), False),
+    ],
+)
+def test_a_target_out_of_reach_is_told_with_distance_and_reach(path, distance, unit):
+    with pytest.raises(InputError) as caught:
+        ffrobot.solve(arm(path, BENT))
+    text = str(caught.value)
+    said = f'trajectory "tip" is {distance:.4g} m from joint "yaw" on the ground at t = 0 s, from which the links reach'
+    assert f"{said} 1.4 m" in text
+    assert ("are these m?" in text) == unit
+
+
+def test_a_component_out_of_reach_is_told():
+    with pytest.raises(InputError, match=r'is 1\.7 m along x from joint "yaw" on the ground'):
+        ffrobot.solve(arm({"x": "-1.6"}, BENT))
+
+
+def test_a_reach_that_a_slide_leaves_open_is_not_told():
+    slide = {"name": "yaw", "type": "prismatic", "between": ["ground", "hub.in"], "axis": [0.0, 0.0, 1.0]}
+    with pytest.raises(InputError, match="out of reach, or on another branch") as caught:
+        ffrobot.solve(arm({"x": "3", "y": "0", "z": "0"}, BENT, [slide, *JOINTS[1:]]))
+    assert "links reach" not in str(caught.value)
+
+
+def test_a_path_that_leaves_the_reach_says_where():
+    """1.3 + 2 t from the hub along x passes 1.4 m at t = 0.05 s, where the arm is stretched."""
+    path = {"x": "1.4 + 2*t", "y": "0.2", "z": "0.3"}
+    guess = {"lift": -np.arccos(1.3 / 1.4), "elbow": 2 * np.arccos(1.3 / 1.4)}
+    with pytest.raises(
+        ffrobot.SolveError, match=r'a singular posture: .* trajectory "tip" is 1\.42 m from joint'
+    ) as end:
+        ffrobot.solve(arm(path, guess))
+    assert "at t = 0.06 s, from which the links reach 1.4 m" in str(end.value)
+
+
+def test_guesses_that_work_are_named():
+    """A straight arm in line with its target is at a dead center; from what the message says it is reached."""
+    path = {"x": "0.7", "y": "0.2", "z": "0.3"}
+    with pytest.raises(InputError, match=r"from \[initial\] joints = \{ yaw = .* \}, for one, it goes") as caught:
+        ffrobot.solve(arm(path, {}))
+    text = str(caught.value)
+    guess = tomllib.loads(text[text.index("joints = {") : text.index("}") + 1])["joints"]
+    with ffrobot.solve(arm(path, guess)) as results:
+        np.testing.assert_allclose(results["inverse/points/b.tip/position"][0], [0.7, 0.2, 0.3], atol=1e-9)
+
+
+def test_guesses_beyond_a_turn_are_warned_of_once():
+    path = {"x": "0.9 + 0.1*t", "y": "0.5", "z": "0.4"}
+    with ffrobot.solve(arm(path, BENT)) as results:
+        assert not any("initial.joints" in text for text in results.warnings.get("inverse", []))
+    turns = BENT | {"yaw": 0.3 + 4 * np.pi}
+    with ffrobot.solve(arm(path, turns)) as results:
+        told = [text for text in results.warnings.get("inverse", []) if "initial.joints" in text]
+        assert told == ['initial.joints: yaw = 12.8664 rad is more than a turn (degrees are written "12.8664*deg")']
+        assert not any("initial.joints" in text for text in results.warnings.get("again", []))
