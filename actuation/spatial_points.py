@@ -11,6 +11,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from types import MappingProxyType
+from typing import Annotated
 
 import numpy as np
 
@@ -20,6 +21,7 @@ from ..common.validation import Record
 from ..fe_models.modal_body import ModalBody
 from ..mbs.analysis.outcome import Outcome
 from ..mbs.fields.references import Reference
+from ..mbs.fields.spelling import IN_PLANE, IN_SPACE
 from ..mbs.model.spatial_body import SpatialBody, SpatialPoint
 from ..mbs.model.spatial_model import SpatialModel
 from ..mbs.model.spatial_motors import path_forces, spin_of_modes
@@ -39,17 +41,22 @@ class SpatialActuationPoints(Record):
 
     body: str
     """Body with these forces."""
-    x: tuple[Place, ...] = ()
+    x: Annotated[tuple[Place, ...], IN_SPACE] = ()
     """Points (m from the root, or a name) at which a force along the body's x axis acts."""
-    y: tuple[Place, ...] = ()
+    y: Annotated[tuple[Place, ...], IN_SPACE] = ()
     """Points at which a force along the body's y axis acts."""
-    z: tuple[Place, ...] = ()
+    z: Annotated[tuple[Place, ...], IN_SPACE] = ()
     """Points at which a force along the body's z axis acts."""
+    axial: Annotated[tuple[Place, ...], IN_PLANE] = ()
+    """Points (m from the root, or a name) at which a force along the body's x axis acts."""
+    transverse: Annotated[tuple[Place, ...], IN_PLANE] = ()
+    """Points at which a force along the body's y axis acts."""
 
     @property
     def places(self) -> list[tuple[str, Place]]:
         """Axis and place of each component."""
-        return [(axis, place) for axis in AXES for place in getattr(self, axis)]
+        of_axes = {"x": self.x or self.axial, "y": self.y or self.transverse, "z": self.z}
+        return [(axis, place) for axis, places in of_axes.items() for place in places]
 
     def references(self) -> Iterator[Reference]:
         """The body, and the places on it that are named."""

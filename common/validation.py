@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from difflib import get_close_matches
 from os import PathLike
 from pathlib import Path
-from typing import Annotated, Any, NamedTuple, TypeVar, get_args
+from typing import Annotated, Any, ClassVar, NamedTuple, TypeVar, get_args
 
 import numpy as np
-from pydantic import AfterValidator, BaseModel, ConfigDict, ValidationError, ValidationInfo
-from pydantic_core import ErrorDetails
+from pydantic import AfterValidator, BaseModel, ConfigDict, GetCoreSchemaHandler, ValidationError, ValidationInfo
+from pydantic.fields import FieldInfo
+from pydantic_core import CoreSchema, ErrorDetails, PydanticKnownError, core_schema
 
 from .errors import InputError
 from .function_content import digest_of_function
@@ -27,6 +29,9 @@ class Record(BaseModel):
 
     model_config = ConfigDict(defer_build=True, extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
 
+    only_in: ClassVar[str | None] = None
+    """The `space` whose scenes alone have such tables; None: all have."""
+
     @classmethod
     def refuse_key(cls, key: str, others: Sequence[type[Record]]) -> str:
         """What to say of a key that only `others` of the records have that may stand in the place of this one.
@@ -39,6 +44,34 @@ class Record(BaseModel):
     def demand_key(cls, key: str) -> str:
         """What to say where `key` is missing; nothing where the general words do."""
         return ""
+
+
+def space_of(info: ValidationInfo) -> str | None:
+    """The `space` of the scene that is being read, "planar" or "spatial"; None of records made in Python."""
+    found: str | None = (info.context or {}).get("space")
+    return found
+
+
+def as_tuples(value: Any) -> Any:  # noqa: ANN401 (any part of a JSON document)
+    """`value` with tuples for lists: what pydantic takes from validators that stand before those of a type."""
+    if isinstance(value, dict):
+        return {key: as_tuples(item) for key, item in value.items()}
+    return tuple(as_tuples(item) for item in value) if isinstance(value, list | tuple) else value
+
+
+@dataclass(frozen=True)
+class OnlyIn:
+    """Marks a key that only scenes of one `space` have: in others it is an unknown key."""
+
+    space: str
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:  # noqa: ANN401
+        return core_schema.with_info_before_validator_function(self._check, handler(source))
+
+    def _check(self, value: object, info: ValidationInfo) -> object:
+        if space_of(info) not in (None, self.space):
+            raise PydanticKnownError("extra_forbidden")
+        return as_tuples(value)
 
 
 R = TypeVar("R", bound=Record)
@@ -67,20 +100,26 @@ InputFile = Annotated[Path, AfterValidator(existing_file)]
 """A file named by an input file, relative to it; it exists."""
 
 
-def validate(record: type[R], data: dict[str, Any], path: Path, objects: Mapping[str, object] | None = None) -> R:
+def validate(
+    record: type[R],
+    data: dict[str, Any],
+    path: Path,
+    objects: Mapping[str, object] | None = None,
+    space: str | None = None,
+) -> R:
     """Build `record` from `data`, read from `path`; an `InputError` lists every wrong key.
 
-    `objects` are what TOML cannot hold, by the text that stands for them in `data`; validators find them in their
-    context.
+    `objects` are what TOML cannot hold, by the text that stands for them in `data`, `space` that of a scene; validators
+    find them in their context.
     """
     check_limits(data, path)
     USED.add(record)
-    context = {"path": path, "folder": path.parent, "objects": objects or {}}
+    context = {"path": path, "folder": path.parent, "objects": objects or {}, "space": space}
     try:
         # By way of JSON, whose strict mode reads lists as tuples and text as paths; TOML has no types for these either.
         return record.model_validate_json(json.dumps(data, default=str), context=context)
     except ValidationError as error:
-        problems = [_describe(item, record, data) for item in error.errors(include_url=False)]
+        problems = [_describe(item, record, data, space) for item in error.errors(include_url=False)]
         raise InputError("\n".join(f"{path}: {line}" for line in _merge(problems))) from None
 
 
@@ -164,16 +203,16 @@ _EXPECTED = {
 }
 
 
-def _describe(item: ErrorDetails, record: type[BaseModel], data: dict[str, Any]) -> _Problem:
+def _describe(item: ErrorDetails, record: type[BaseModel], data: dict[str, Any], space: str | None) -> _Problem:
     """Where pydantic's `item` is in the user's file, and what is wrong there, in the user's terms."""
     kind, loc, context = item["type"], item["loc"], item.get("ctx", {})
     key = key_path(loc, data, kind)
     if kind == "value_error":
         return _Problem(key, str(context["error"]), "")
     if kind == "extra_forbidden":
-        if refusal := _refusal(record, loc):
+        if refusal := _refusal(record, loc, space):
             return _Problem(key_path(loc[:-1], data, kind=""), refusal, "")
-        known = _known_keys(_alternatives(record, loc[:-1])[0])
+        known = _known_keys(_alternatives(record, loc[:-1])[0], space)
         return _Problem(
             key,
             f"expected one of the keys {', '.join(known)}",
@@ -236,15 +275,22 @@ def _tagged(records: Sequence[type[BaseModel]], tag: str) -> list[type[BaseModel
     return only or [record for record, choices in values.items() if any(tag in choice for choice in choices)]
 
 
-def _known_keys(records: Iterable[type[BaseModel]]) -> list[str]:
-    """The keys of tables."""
-    return list(dict.fromkeys(field.alias or name for c in records for name, field in c.model_fields.items()))
+def _known_keys(records: Iterable[type[BaseModel]], space: str | None) -> list[str]:
+    """The keys of tables in scenes of a `space`."""
+    fields = [entry for record in records for entry in record.model_fields.items()]
+    return list(dict.fromkeys(field.alias or name for name, field in fields if is_key(field, space)))
 
 
-def _refusal(record: type[BaseModel], loc: Sequence[int | str]) -> str:
+def is_key(field: FieldInfo, space: str | None) -> bool:
+    """Whether tables of scenes of a `space` have it; of all with None."""
+    return all(space in (None, mark.space) for mark in field.metadata if isinstance(mark, OnlyIn))
+
+
+def _refusal(record: type[BaseModel], loc: Sequence[int | str], space: str | None) -> str:
     """What a record itself says of the key at `loc`, which others in its place have."""
     (taken, *more), allowed = _alternatives(record, loc[:-1])
-    others = [other for other in allowed if issubclass(other, Record) and str(loc[-1]) in _known_keys([other])]
+    here = [other for other in allowed if issubclass(other, Record) and other.only_in in (None, space)]
+    others = [other for other in here if str(loc[-1]) in _known_keys([other], space)]
     return taken.refuse_key(str(loc[-1]), others) if others and not more and issubclass(taken, Record) else ""
 
 

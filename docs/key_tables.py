@@ -86,6 +86,8 @@ def _meaning(key: str, entry: dict[str, Any]) -> str:
 
 
 def _code(default: object) -> str:
+    if isinstance(default, dict):
+        default = {key: value for key, value in default.items() if value}
     return "" if default in (None, [], {}) else f"`{json.dumps(default, ensure_ascii=False)}`"
 
 

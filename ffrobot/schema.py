@@ -13,16 +13,22 @@ from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
 from pydantic_core import core_schema
 
 from .common.key_descriptions import key_descriptions
+from .common.validation import is_key
+from .mbs.fields.spelling import NormalInPlane
 
 DIALECT = GenerateJsonSchema.schema_dialect
 
 
 def schema(kind: str) -> dict[str, Any]:
     """The JSON schema of a "link", "scene" or "figures" file, or of a scene in space ("spatial"), as a dictionary."""
-    described = TypeAdapter(_record(kind)).json_schema(schema_generator=_Described)
+    generator = _Spatial if kind == "spatial" else _Described
+    described = TypeAdapter(_record(kind)).json_schema(schema_generator=generator)
     if kind in ("scene", "spatial"):
         for link in ("BeamLink", "SolidLink"):
             described["$defs"][link]["required"].remove("name")  # that of the body
+    if kind == "spatial":
+        described["properties"]["space"] = {"const": "spatial", "description": "Dimension of the motion."}
+        described["required"].append("space")
     if kind == "link":
         described["oneOf"] = described.pop("anyOf")  # geometry.kind tells beam and solid apart
     title = "3D scene" if kind == "spatial" else f"{kind} file"
@@ -48,13 +54,26 @@ def _record(kind: str) -> Any:  # noqa: ANN401 (a record or a union of them)
 
 
 class _Described(GenerateJsonSchema):
-    """The schema with the meaning of each key."""
+    """The schema with the meaning of each key, of those that scenes of a `space` have."""
+
+    space: str | None = None
 
     def model_schema(self, schema: core_schema.ModelSchema) -> JsonSchemaValue:
         described = super().model_schema(schema)
-        for key, text in key_descriptions(schema["cls"]).items():
-            described["properties"][key]["description"] = text
+        record, properties = schema["cls"], described["properties"]
+        for key, text in key_descriptions(record).items():
+            properties[key]["description"] = text
+        for name, field in record.model_fields.items():
+            key = field.alias or name
+            if not is_key(field, self.space):
+                del properties[key]
+            elif any(isinstance(mark, NormalInPlane) for mark in field.metadata):
+                described["required"].append(key)
         return described
+
+
+class _Spatial(_Described):
+    space = "spatial"
 
 
 def _for_toml(node: Any) -> Any:  # noqa: ANN401 (any part of a JSON document)

@@ -16,6 +16,7 @@ from .lamina import Lamina, plain_lamina
 
 MOST_LAYERS = 1000
 
+Face = Literal["+y", "-y", "+z", "-z", "both"]
 Bends = Literal["in-plane", "out-of-plane", "twist"]
 
 
@@ -44,7 +45,7 @@ class PatchKeys(Record):
     """Largest voltage, V: of all, or of each."""
     layers: Annotated[int, Field(gt=0, le=MOST_LAYERS)] = 1
     """Number of stacked layers."""
-    face: Literal["+y", "-y", "+z", "-z", "both"] | None = None
+    face: Face | None = None
     """Face of the link; without it patches only bend the link."""
     allocation: Literal["exact", "least-squares"] = "exact"
     """Allocation of voltages: exact, or least squares, which allows fewer patches than modes."""

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
 
 from ...common.numbers import SMALLEST
 from ...common.validation import quoted
 from ...mbs.fields.field_types import Name, Positive, Quantity
+from ...mbs.fields.spelling import IN_SPACE, Spelled, as_written
 from .lamina import Fibres, Lamina, fibre_lamina
-from .records import Bends, PatchKeys
+from .records import Bends, Face, PatchKeys
 
 FACES = {"in-plane": ("+y", "-y", "both"), "out-of-plane": ("+z", "-z", "both")}
 OF_FIBRES = ("fibre_angle", "d33", "modulus_across", "shear_modulus", "poissons_ratio")
@@ -30,22 +31,24 @@ class SpatialPztLayout(PatchKeys):
     from outside.
     """
 
-    name: Name | None = None
+    face: Annotated[Face | None, Spelled(Literal["+y", "-y", "both"], as_written)] = None
+    """Face of the link; without it patches only bend or twist the link."""
+    name: Annotated[Name | None, IN_SPACE] = None
     """Name of the layout in results; default: the name of the body."""
-    bends: Bends = "in-plane"
+    bends: Annotated[Bends, IN_SPACE] = "in-plane"
     """Deformation: along y by patches on faces ±y, along z by patches on faces ±z, or "twist" about x by fibers at an
     angle, by default on ±y."""
-    fibre_angle: Quantity | None = None
+    fibre_angle: Annotated[Quantity | None, IN_SPACE] = None
     """Angle of fibers with the link's axis, rad (or such as "45*deg"); positive: like a right-handed screw."""
-    d33: float | None = None
+    d33: Annotated[float | None, IN_SPACE] = None
     """Piezoelectric strain constant along fibers, m/V."""
-    modulus_across: Positive | None = None
+    modulus_across: Annotated[Positive | None, IN_SPACE] = None
     """Young's modulus across fibers, Pa; `modulus` is that along them."""
-    shear_modulus: Positive | None = None
+    shear_modulus: Annotated[Positive | None, IN_SPACE] = None
     """Shear modulus of a layer of fibers in its plane, Pa."""
-    poissons_ratio: float | None = None
+    poissons_ratio: Annotated[float | None, IN_SPACE] = None
     """Poisson's ratio of a layer of fibers under tension along them."""
-    electrode_spacing: Positive | None = None
+    electrode_spacing: Annotated[Positive | None, IN_SPACE] = None
     """Spacing of interdigitated electrodes, m; the field per volt is its inverse; default: thickness of a layer."""
 
     def check_constants(self) -> None:

@@ -20,8 +20,10 @@ from ..mbs.fields.derivatives import check_derivatives
 from ..mbs.fields.field_types import GROUND, NotEmpty
 from ..mbs.fields.functions import check_domain
 from ..mbs.fields.references import Reference, under
+from ..mbs.fields.spelling import PLANAR, SPATIAL
 from ..mbs.scene.analysis import Surroundings
 from ..mbs.scene.spatial.mechanism import SpatialMechanismKeys, SpatialMechanismScene
+from ..mbs.scene.spatial.planar_spelling import in_3d
 from ..mbs.scene.spatial.trajectories import SpatialTrajectory
 from .actuation_times import with_times_of_actuation
 from .kinds import KINDS, AnalysisInSpace
@@ -106,10 +108,11 @@ def spatial_scene(
     data: dict[str, Any], path: Path, text: str, functions: Mapping[str, object] | None = None
 ) -> SpatialScene:
     """The validated scene of `data`, which was read from `path` as `text`; `functions` of Python by their names."""
-    refused = [f"{path}: {problem}" for problem in _unavailable_keys(data)]
+    space = SPATIAL if data.get("space") == SPATIAL else PLANAR
+    refused = [f"{path}: {problem}" for problem in _unavailable_keys(data)] if space == SPATIAL else []
     if refused:
         raise InputError("\n".join(refused))
-    keys = validate(SpatialSceneKeys, with_times_of_actuation(data), path, functions)
+    keys = validate(SpatialSceneKeys, with_times_of_actuation(data), path, functions, space)
     found = [f"{path}: {problem}" for problem in _problems(keys)]
     if found:
         raise InputError("\n".join(found))
@@ -117,7 +120,7 @@ def spatial_scene(
         if isinstance(link, LinkTable):
             read_link(link)
     _check_functions(keys, path)
-    return SpatialScene.model_construct(**dict(keys), path=path.absolute(), text=text)  # the keys are validated
+    return SpatialScene.model_construct(**dict(in_3d(keys)), path=path.absolute(), text=text)  # the keys are validated
 
 
 def _unavailable_keys(data: dict[str, object]) -> Iterator[str]:

@@ -8,6 +8,7 @@ import numpy as np
 
 from ....common.arrays import Array
 from ....common.rotations import about
+from ...fields.spelling import SPATIAL
 from .joint import GUIDED, Along, Place
 from .moving_joint import AxialJoint
 
@@ -16,6 +17,7 @@ class SpatialCylindrical(AxialJoint):
     """The second side turns about `axis` and slides along it. Coordinates: angle (rad), way (m)."""
 
     type: Literal["cylindrical"]
+    only_in = SPATIAL
 
     units = ("rad", "m")
     q_count = 2

@@ -8,6 +8,7 @@ import numpy as np
 
 from ....common.arrays import Array
 from ....common.rotations import exponential, of_quaternion, quaternions
+from ...fields.spelling import SPATIAL
 from .joint import Place, SpatialJoint
 
 
@@ -18,6 +19,7 @@ class SpatialFree(SpatialJoint):
     """
 
     type: Literal["free"]
+    only_in = SPATIAL
     motor: bool = False
     """Presence of driving forces and moments."""
 

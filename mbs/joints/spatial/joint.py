@@ -8,13 +8,14 @@ single coordinates these themselves, of free orientations a quaternion, and the 
 from __future__ import annotations
 
 from abc import abstractmethod
-from typing import ClassVar, Literal, NamedTuple
+from typing import Annotated, ClassVar, Literal, NamedTuple
 
 import numpy as np
 
 from ....common.arrays import Array
 from ....common.rotations import of_rpy, smallest_turn
 from ...fields.field_types import Quantity, Vector3
+from ...fields.spelling import IN_SPACE, Vector
 from ..joint import JointKeys
 from ..transmission import Friction, MotorLimits
 
@@ -60,9 +61,9 @@ NOT_TURNED = Held("dot", 0, 1)  # beside ALIGNED
 class SpatialJoint(JointKeys):
     """A joint between two points, or a point and the ground, in space."""
 
-    at: Vector3 = (0.0, 0.0, 0.0)
+    at: Vector = (0.0, 0.0, 0.0)
     """Position on the ground, m, global axes."""
-    rpy: Angles = (0.0, 0.0, 0.0)
+    rpy: Annotated[Angles, IN_SPACE] = (0.0, 0.0, 0.0)
     """Orientation of the second side's axes in the first's at coordinate zero: roll, pitch, yaw about fixed axes, rad
     (or such as "90*deg")."""
 

@@ -6,6 +6,7 @@ from typing import Annotated, get_args
 
 from pydantic import Field
 
+from ...fields.spelling import TaggedInPlane
 from .cylindrical import SpatialCylindrical
 from .free import SpatialFree
 from .joint import SpatialJoint
@@ -28,6 +29,7 @@ AnySpatialJoint = Annotated[
     | SpatialWeld
     | SpatialFree,
     Field(discriminator="type"),
+    TaggedInPlane(),
 ]
 """The list of all types, told apart by the key `type`: a new one is a file beside this one and an entry here."""
 

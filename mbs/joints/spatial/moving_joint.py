@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TypeVar
+from typing import Annotated, TypeVar
 
 import numpy as np
-from pydantic import model_validator
+from pydantic import Field, model_validator
 
 from ....common.arrays import Array
 from ...fields.field_types import NotNegative, Positive, Quantity, Vector3
+from ...fields.spelling import IN_SPACE, SPATIAL, NormalInPlane, Spelled, as_written
 from ..transmission import Friction, MotorLimits
 from .joint import SpatialJoint, with_axis
 
-Limit = Positive | tuple[Positive, ...]
+Limit = Annotated[Positive | tuple[Positive, ...], Spelled(Positive, as_written)]
 Range = tuple[Quantity, Quantity]
 
 T = TypeVar("T")
@@ -24,7 +25,7 @@ class MovingSpatialJoint(SpatialJoint):
 
     motor: bool | None = None
     """Presence of motors; by default in open chains only, and not in spherical and free joints."""
-    position_limit: Range | tuple[Range, ...] | None = None
+    position_limit: Annotated[Range | tuple[Range, ...] | None, IN_SPACE] = None
     """Range of the coordinate, [lo, hi], rad (sliding: m). No contact force acts; integrated runs report when and how
     far it is exceeded."""
     moment_limit: Limit | None = None
@@ -102,7 +103,7 @@ class MovingSpatialJoint(SpatialJoint):
 class AxialJoint(MovingSpatialJoint):
     """A joint whose motion is along or about an axis, z of its triads."""
 
-    axis: Vector3
+    axis: Annotated[Vector3, NormalInPlane(SPATIAL)] = Field(default=None, validate_default=True)
     """Axis of motion in the axes of the first of `between` (ground: global), of any length."""
 
     @model_validator(mode="after")

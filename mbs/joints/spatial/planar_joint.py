@@ -8,6 +8,7 @@ import numpy as np
 
 from ....common.arrays import Array
 from ....common.rotations import about
+from ...fields.spelling import SPATIAL
 from .joint import ALIGNED, Along, Held, Place
 from .moving_joint import AxialJoint
 
@@ -20,6 +21,7 @@ class SpatialPlanar(AxialJoint):
     """
 
     type: Literal["planar"]
+    only_in = SPATIAL
 
     units = ("m", "m", "rad")
     q_count = 3

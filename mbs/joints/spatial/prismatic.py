@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
 
 from ....common.arrays import Array
-from ...fields.field_types import NotNegative, Positive
+from ...fields.field_types import NotNegative, Positive, Vector2, Vector3
+from ...fields.spelling import Spelled, place
 from .joint import GUIDED, NOT_TURNED, Along, Place
 from .moving_joint import AxialJoint
+
+
+def _direction(axis: Vector2) -> Vector3:
+    if not any(axis):
+        raise ValueError(f"expected an axis that is not zero in a prismatic joint, found {list(axis)}")
+    return place(axis)
 
 
 class SpatialPrismatic(AxialJoint):
@@ -20,6 +27,8 @@ class SpatialPrismatic(AxialJoint):
     """
 
     type: Literal["prismatic"]
+    axis: Annotated[Vector3, Spelled(Vector2, _direction)]
+    """Axis of motion in the axes of the first of `between` (ground: global), of any length."""
     gear_ratio: Positive = 1.0
     """Rotor rotation per joint displacement, rad/m."""
     rotor_inertia: NotNegative = 0.0

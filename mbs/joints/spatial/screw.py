@@ -9,6 +9,7 @@ from pydantic import model_validator
 
 from ....common.arrays import Array
 from ....common.rotations import about
+from ...fields.spelling import SPATIAL
 from .joint import Place
 from .moving_joint import AxialJoint
 
@@ -17,6 +18,7 @@ class SpatialScrew(AxialJoint):
     """The second side turns about `axis` by its coordinate, rad, and slides along it by `lead` per turn."""
 
     type: Literal["screw"]
+    only_in = SPATIAL
     lead: float
     """Displacement along the axis per turn, m; positive: right-handed."""
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from ....common.arrays import Array
 from ....common.rotations import exponential, of_quaternion, quaternions
+from ...fields.spelling import SPATIAL
 from .joint import POINT, Place, SpatialJoint
 
 
@@ -15,6 +16,7 @@ class SpatialSpherical(SpatialJoint):
     """Two points coincide, the second side rotates freely; [initial] has a rotation vector, rad."""
 
     type: Literal["spherical"]
+    only_in = SPATIAL
     motor: bool = False
     """Presence of three driving moments."""
 

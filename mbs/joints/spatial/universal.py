@@ -10,6 +10,7 @@ from pydantic import model_validator
 from ....common.arrays import Array
 from ....common.rotations import about, unit
 from ...fields.field_types import Vector3
+from ...fields.spelling import SPATIAL
 from .joint import NOT_TURNED, POINT, Along, Place
 from .moving_joint import AxialJoint, check_direction
 
@@ -24,6 +25,7 @@ class SpatialUniversal(AxialJoint):
     """
 
     type: Literal["universal"]
+    only_in = SPATIAL
     second_axis: Vector3
     """Second axis in the axes of the second of `between`, of any length."""
 

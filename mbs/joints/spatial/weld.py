@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
+from pydantic import model_validator
 
 from ....common.arrays import Array
+from ...fields.spelling import IN_PLANE
 from .joint import ALIGNED, NOT_TURNED, POINT, Place, SpatialJoint
 
 
@@ -14,6 +16,14 @@ class SpatialWeld(SpatialJoint):
     """The second side is fixed to the first with orientation `rpy`."""
 
     type: Literal["weld"]
+    motor: Annotated[bool | None, IN_PLANE] = None
+    """Only `false`: a weld cannot be driven."""
+
+    @model_validator(mode="after")
+    def _has_no_motor(self) -> SpatialWeld:
+        if self.motor:
+            raise ValueError("expected no motor in a weld, which cannot move, found motor = true")
+        return self
 
     held = (POINT, *ALIGNED, NOT_TURNED)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Annotated
 
 import numpy as np
 from pydantic import Field, field_validator, model_validator
@@ -13,6 +14,7 @@ from ....common.numbers import SMALLEST
 from ....common.validation import Record
 from ...fields.field_types import Name, NotNegative, PointReference, Positive, Vector3, one_of
 from ...fields.references import Reference
+from ...fields.spelling import IN_SPACE, Spelled, Vector, inertia_about_z
 from ..bodies import BodyKeys
 
 Inertia = Vector3 | tuple[Vector3, Vector3, Vector3]
@@ -44,6 +46,16 @@ def check_inertia(inertia: Inertia, least: float) -> None:
             f"expected no principal moment of inertia larger than the sum of the others, found"
             f" {', '.join(f'{moment:g}' for moment in moments)}"
         )
+
+
+def _about_center(J: float) -> Vector3:
+    """Of a rigid body of a planar scene, by its moment of inertia about z."""
+    if not J >= SMALLEST:
+        raise ValueError(
+            f"expected a moment of inertia greater than 0, found {J:g}: without it the body's rotation has no"
+            " equation of motion (a point mass is a [[payload]])"
+        )
+    return inertia_about_z(J)
 
 
 PRIMITIVES = ("box", "cylinder", "sphere")
@@ -78,13 +90,13 @@ class SpatialRigidBody(Record):
 
     mass: Positive
     """Mass, kg."""
-    inertia: Inertia
+    inertia: Annotated[Inertia, Spelled(float, _about_center)]
     """Inertia about the center of mass, body axes, kg·m²: [xx, yy, zz], or three rows."""
-    center: Vector3
+    center: Vector
     """Center of mass, m, axes of the body."""
-    points: dict[Name, Vector3] = Field(default_factory=dict)
+    points: dict[Name, Vector] = Field(default_factory=dict)
     """Points for joints, loads and trajectories by name: m, axes of the body."""
-    visual: tuple[Visual, ...] = ()
+    visual: Annotated[tuple[Visual, ...], IN_SPACE] = ()
     """Shapes that pictures show."""
 
     @field_validator("inertia")
@@ -119,9 +131,9 @@ class SpatialPayload(Record):
     """Point of the mass, "BODY.POINT"."""
     mass: NotNegative
     """Mass, kg."""
-    center: Vector3 = (0.0, 0.0, 0.0)
+    center: Annotated[Vector3, IN_SPACE] = (0.0, 0.0, 0.0)
     """Center of mass, m from the point, axes of the body."""
-    inertia: Inertia = (0.0, 0.0, 0.0)
+    inertia: Annotated[Inertia, Spelled(NotNegative, inertia_about_z)] = (0.0, 0.0, 0.0)
     """Inertia about that center, axes of the body, kg·m²: [xx, yy, zz], or three rows."""
 
     @field_validator("inertia")

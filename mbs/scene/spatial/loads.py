@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Annotated
 
-from pydantic import model_validator
+from pydantic import ValidationInfo, model_validator
 
 from ....common.validation import Record
 from ..._core import TimeFunction
 from ...fields.field_types import Expression, Expressions, PointReference, one_of, only, present
 from ...fields.references import Reference, marker_reference
+from ...fields.spelling import IN_SPACE, Spelled, as_written, is_planar, keys_here
 
 OF_POINT = ("x", "y", "z", "mx", "my", "mz")
 
@@ -27,25 +29,26 @@ class SpatialLoad(Record):
     """Force along the ground's x axis, N; expression in t."""
     y: Expression | None = None
     """Force along the ground's y axis, N; expression in t."""
-    z: Expression | None = None
+    z: Annotated[Expression | None, IN_SPACE] = None
     """Force along the ground's z axis, N; expression in t."""
-    mx: Expression | None = None
+    mx: Annotated[Expression | None, IN_SPACE] = None
     """Moment about the ground's x axis on the section, N·m; expression in t."""
-    my: Expression | None = None
+    my: Annotated[Expression | None, IN_SPACE] = None
     """Moment about the ground's y axis on the section, N·m; expression in t."""
-    mz: Expression | None = None
+    mz: Annotated[Expression | None, IN_SPACE] = None
     """Moment about the ground's z axis on the section, N·m; expression in t."""
-    moment: Expressions | None = None
+    moment: Annotated[Expressions | None, Spelled(Expression, as_written)] = None
     """Torque on the second side of the joint along its coordinate, N·m (N along sliding coordinates); expression in t,
-    or a list of them for several coordinates."""
+    or a list of them for several coordinates. In planar scenes also the counter-clockwise moment on a point."""
     voltage: tuple[Expression, ...] | None = None
     """Voltages, V: one expression in t per patch of the layout."""
 
     @model_validator(mode="after")
-    def _consistent(self) -> SpatialLoad:
+    def _consistent(self, info: ValidationInfo) -> SpatialLoad:
         subject = one_of(self, ("point", "joint", "pzt"))
-        allowed = {"point": OF_POINT, "joint": ("moment",), "pzt": ("voltage",)}[subject]
-        only(self, subject, allowed, (*OF_POINT, "moment", "voltage"))
+        of_point = keys_here(self, OF_POINT, info) + (("moment",) if is_planar(info) else ())
+        allowed = {"point": of_point, "joint": ("moment",), "pzt": ("voltage",)}[subject]
+        only(self, subject, allowed, (*keys_here(self, OF_POINT, info), "moment", "voltage"))
         return self
 
     def references(self) -> Iterator[Reference]:
@@ -59,6 +62,8 @@ class SpatialLoad(Record):
     @property
     def components(self) -> dict[str, TimeFunction]:
         """The given functions of time by component; of joints "moment[k]", of voltages "voltage[k]"."""
+        if self.point is not None and self.moments:  # in the plane: about its normal
+            return present(x=self.x, y=self.y, mz=self.moments[0])
         of_point = present(x=self.x, y=self.y, z=self.z, mx=self.mx, my=self.my, mz=self.mz)
         voltages = {f"voltage[{k}]": function for k, function in enumerate(self.voltage or ())}
         moments = {f"moment[{k}]": function for k, function in enumerate(self.moments)}

@@ -9,8 +9,9 @@ from typing import Annotated, Literal
 
 from ....common.names import Title
 from ....common.validation import Record
-from ...fields.field_types import NotEmpty, Vector3
+from ...fields.field_types import NotEmpty
 from ...fields.references import Reference, under
+from ...fields.spelling import IN_SPACE, Vector
 from ...joints.spatial.joints import AnySpatialJoint
 from ..topology import Edge, Topology, spanning_forest
 from .bodies import BodyInSpace, SpatialPayload
@@ -24,16 +25,16 @@ class SpatialMechanismKeys(Record):
 
     name: Title
     """Name of the scene."""
-    space: Literal["spatial"]
+    space: Literal["planar", "spatial"] = "planar"
     """Dimension of the motion."""
-    gravity: Vector3
+    gravity: Vector
     """Acceleration of gravity, m/s², global axes."""
     motors: Literal["section", "frame"] = "section"
     """Reference of motors: sections at the joint, or frames of the bodies."""
     geometric_stiffening: bool | Literal["auto"] | None = None
     """Stiffness of links depends on their loads; "auto": if these change it by more than 1 %. Default: on for
     subdivided links only, except links with loads between the ends of a segment."""
-    redundancy: Literal["least-torque", "least-motion"] | None = None
+    redundancy: Annotated[Literal["least-torque", "least-motion"] | None, IN_SPACE] = None
     """Redundancy resolution with undeformed links: "least-torque" minimizes the integral of squared motor torques from
     the state at t = 0, "least-motion" the sum of squared joint velocities at every time (translations relative to the
     robot's size). Default: the redundant motion is unactuated."""

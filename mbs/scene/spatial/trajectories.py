@@ -7,26 +7,29 @@ from functools import cached_property
 from typing import Annotated
 
 import numpy as np
-from pydantic import model_validator
+from pydantic import ValidationInfo, model_validator
 
 from ....common.arrays import Array, as_rows
 from ....common.errors import InputError
 from ....common.rotations import of_rpy, smallest_turn
 from ....common.validation import quoted
 from ..._core import TimeFunction
-from ...fields.field_types import Expression, Name, PointReference, Vector3, WaypointTable, one_of, present
+from ...fields.field_types import Expression, Name, PointReference, Quantity, Vector3, WaypointTable, one_of, present
 from ...fields.orientations import QUATERNION, OrientationLaw, Reference, about_their_middle, orientation_of
 from ...fields.piecewise import Piecewise
 from ...fields.references import Reference as RecordReference
 from ...fields.references import marker_reference
+from ...fields.spelling import IN_SPACE, Spelled, as_written, is_planar, keys_here
 from ...fields.waypoints import Waypoints
 from ..motion_keys import LIMITS, MotionKeys, OfPlaces, Place
 
 PLACES = ("x", "y", "z")
+SUBJECTS = ("point", "joint", "motor")
 ORIENTATIONS = ("rotation_vector", "rpy", "direction")
 POSE = 6
 OF_POINT = {2: "places [x, y]", 3: "[x, y, z]", POSE: "[x, y, z, roll, pitch, yaw]"}
 """How `via` of a point is written, by the number of components."""
+OfPlane = Annotated[Place, Spelled(Quantity | tuple[Quantity, Quantity], as_written)]
 Triple = tuple[Expression, Expression, Expression]
 
 
@@ -37,7 +40,7 @@ class SpatialTrajectory(MotionKeys):
     fixed axes, or by one direction of the section, about which rotation is then unconstrained.
     """
 
-    via: Annotated[tuple[Place, ...], OfPlaces] | None = None
+    via: Annotated[tuple[OfPlane, ...], OfPlaces] | None = None
     """Waypoints from rest to rest, the first at t = 0: [x, y] (z is not prescribed) or [x, y, z] (m), [x, y, z, roll,
     pitch, yaw] (m, rad), or values of the joint (rad, m)."""
     name: Name
@@ -46,24 +49,24 @@ class SpatialTrajectory(MotionKeys):
     """Point that follows the trajectory, "BODY.POINT"."""
     joint: str | None = None
     """Joint whose coordinate follows the trajectory: second side relative to the first."""
-    motor: str | None = None
+    motor: Annotated[str | None, IN_SPACE] = None
     """Joint whose motor follows the trajectory; a compliant gear (`stiffness`) lets the joint coordinate differ from
     that of the motor."""
     x: Expression | None = None
     """Position along the ground's x axis, m; expression in t (s)."""
     y: Expression | None = None
     """Position along the ground's y axis, m; expression in t (s)."""
-    z: Expression | None = None
+    z: Annotated[Expression | None, IN_SPACE] = None
     """Position along the ground's z axis, m; expression in t (s)."""
-    rotation_vector: Triple | None = None
+    rotation_vector: Annotated[Triple | None, IN_SPACE] = None
     """Orientation of the section: axis times angle, rad, global axes; expressions in t."""
-    reference_rotation_vector: Vector3 | None = None
+    reference_rotation_vector: Annotated[Vector3 | None, IN_SPACE] = None
     """Orientation that `rotation_vector` rotates, rad; by default the global axes."""
-    rpy: Triple | None = None
+    rpy: Annotated[Triple | None, IN_SPACE] = None
     """Orientation of the section: roll, pitch, yaw about the ground's x, y, z in this order, rad; expressions in t."""
-    tool_axis: Vector3 | None = None
+    tool_axis: Annotated[Vector3 | None, IN_SPACE] = None
     """Direction of the section, in its axes, that stays along `direction`."""
-    direction: Triple | None = None
+    direction: Annotated[Triple | None, IN_SPACE] = None
     """Direction of `tool_axis` in global axes, of any length; expressions in t."""
     value: Expression | None = None
     """Joint coordinate, rad (sliding: m); expression in t (s)."""
@@ -72,9 +75,9 @@ class SpatialTrajectory(MotionKeys):
     column of the joint's name (rad, m)."""
 
     @model_validator(mode="after")
-    def _consistent(self) -> SpatialTrajectory:
-        subject = one_of(self, ("point", "joint", "motor"))
-        allowed = (*PLACES, *ORIENTATIONS) if subject == "point" else ("value",)
+    def _consistent(self, info: ValidationInfo) -> SpatialTrajectory:
+        subject = one_of(self, keys_here(self, SUBJECTS, info))
+        allowed = keys_here(self, (*PLACES, *ORIENTATIONS), info) if subject == "point" else ("value",)
         given = [key for key in (*PLACES, *ORIENTATIONS, "value", "waypoints", "via") if getattr(self, key) is not None]
         if not given or not set(given) <= {*allowed, "waypoints", "via"}:
             raise ValueError(
@@ -84,7 +87,8 @@ class SpatialTrajectory(MotionKeys):
             self._check_columns(given, allowed)
         if self.via is not None and set(given) & {*PLACES, "value"}:
             raise ValueError(f"expected either waypoints, via or expressions, found {quoted(given)}")
-        self.check_motion(OF_POINT if subject == "point" else {1: "numbers"}, self.waypoints)
+        of_point = {2: OF_POINT[2]} if is_planar(info) else OF_POINT
+        self.check_motion(of_point if subject == "point" else {1: "numbers"}, self.waypoints)
         self._check_orientation()
         self._check_poses()
         self._check_size()
@@ -95,10 +99,12 @@ class SpatialTrajectory(MotionKeys):
         if given != ["waypoints"]:
             raise ValueError(f"expected either waypoints, via or expressions, found {quoted(given)}")
         columns = self.waypoints.columns
-        wanted = ("value",) if allowed == ("value",) else (*PLACES, *QUATERNION)
+        places = tuple(key for key in allowed if key not in ORIENTATIONS)
+        wanted = (*places, *QUATERNION) if "z" in allowed else places
         turned = set(columns) & set(QUATERNION)
         if not set(columns) <= set(wanted) or (turned and turned != set(QUATERNION)):
-            header = "t,value or t,JOINT" if allowed == ("value",) else "t,x,y,z or t,x,y,z,qw,qx,qy,qz"
+            header = ",".join(("t", *places))
+            header += " or t,JOINT" if allowed == ("value",) else " or t,x,y,z,qw,qx,qy,qz" if "z" in allowed else ""
             raise ValueError(f'expected waypoints with the header {header}, found "{",".join(("t", *columns))}"')
         if turned:
             try:

@@ -1,0 +1,62 @@
+"""Planar scenes read by the records of 3D: components, axes, angles; keys of the other space are unknown."""
+
+import pytest
+from test_planar_mechanism_in_space import ARM
+
+from ffrobot.common.errors import InputError
+from ffrobot.scene.load import made_in_python
+from ffrobot.scene.spatial import available_scene
+
+
+def read(**changes):
+    made = made_in_python(".", ARM | changes)
+    return available_scene(made.data, made.path, made.text, made.functions)
+
+
+def test_bodies_and_loads_get_components_of_3d():
+    found = read()
+    rigid = found.body[0].rigid
+    assert (found.space, found.gravity) == ("planar", (1.0, -9.81, 0.0))
+    assert (rigid.center, rigid.points["b"]) == ((0.1, 0.2, 0.0), (0.4, 0.1, 0.0))
+    assert (rigid.inertia[2], found.payload[0].inertia[2]) == (0.1, 0.01)
+    assert {key: of(2.0)[0] for key, of in found.load[0].components.items()} == {"x": 2.0, "mz": 4.0}
+    assert found.load[1].moments[0](2.0)[0] == 6.0
+    assert sorted(found.trajectory[0].components) == ["x", "y"]
+
+
+def test_joints_turn_about_z_and_start_by_relative_angles():
+    found = read()
+    joints = {joint.name: joint for joint in found.joint}
+    assert joints["elbow"].axis == (0.0, 0.0, 1.0)
+    assert (joints["way"].axis, joints["way"].at) == ((1.0, 2.0, 0.0), (0.5, 0.0, 0.0))
+    assert joints["way"].rpy == pytest.approx((0.0, 0.0, 0.3))  # as lower stands on the ground
+    assert joints["hold"].rpy == pytest.approx((0.0, 0.0, -0.9))
+    assert found.initial.joints == pytest.approx({"root": 0.3, "elbow": -0.4})
+    assert found.initial.joint_rates == pytest.approx({"root": 2.0, "elbow": -3.0})
+
+
+def test_bodies_without_angles_follow_guesses_of_joints():
+    found = read(initial={"angles": {"upper": 0.7}, "joints": {"root": 0.3, "way": 0.1}})
+    joints = {joint.name: joint for joint in found.joint}
+    assert found.initial.joints == pytest.approx({"root": 0.3, "way": 0.1, "elbow": 0.3 - 0.7})
+    assert joints["hold"].rpy == pytest.approx((0.0, 0.0, 0.0))  # the tool follows what it is welded to
+
+
+@pytest.mark.parametrize(
+    ("changes", "line"),
+    [
+        ({"gravity": [0.0, 0.0, -9.81]}, "gravity: expected at most 2 entries, found [0.0, 0.0, -9.81]"),
+        ({"load": [{"point": "tool.a", "mz": "t"}]},
+         "load no. 1: mz: expected one of the keys point, joint, pzt, x, y, moment, "),
+        ({"joint": [{"name": "j", "type": "screw", "between": ["ground", "lower.a"]}]},
+         'joint "j": type: expected "revolute", "prismatic" or "weld", found "screw"'),
+        ({"joint": [{"name": "j", "type": "revolute", "between": ["ground", "lower.a"], "axis": [0.0, 0.0, 1.0]}]},
+         'joint "j": expected the key "axis" only in prismatic joints, found it in a revolute joint'),
+        ({"payload": [{"point": "upper.b", "mass": 0.5, "inertia": [1.0, 1.0, 1.0]}]},
+         "payload no. 1: inertia: expected a number, found [1.0, 1.0, 1.0]"),
+    ],
+)  # fmt: skip
+def test_what_only_3d_has_is_no_key_of_the_plane(changes, line):
+    with pytest.raises(InputError) as caught:
+        read(**changes)
+    assert line in str(caught.value)
