@@ -41,7 +41,7 @@ def _record(kind: str) -> Any:  # noqa: ANN401 (a record or a union of them)
 
         return SceneKeys
     if kind == "spatial":
-        from .scene.spatial import SpatialSceneKeys
+        from .scene.spatial_keys import SpatialSceneKeys
 
         return SpatialSceneKeys
     if kind == "link":

@@ -18,7 +18,8 @@ from ffrobot.common.rotations import exponential, quaternions
 from ffrobot.mbs.fields.orientations import OrientationLaw
 from ffrobot.scene.kinds import KINDS, AnyKindInSpace
 from ffrobot.scene.load import load_scene
-from ffrobot.scene.spatial import SpatialSceneKeys, check_available, spatial_scene
+from ffrobot.scene.spatial import check_available, spatial_scene
+from ffrobot.scene.spatial_keys import SpatialSceneKeys
 from ffrobot.scene.spatial_lacks import LACKS
 from ffrobot.schema import DIALECT
 
@@ -200,7 +201,7 @@ MISTAKES = {
     ),
     "point that is none": (
         put("trajectory", point="hands.tip"),
-        'expected one of the bodies .* found "hands" .did you',
+        'expected one of the bodies .* found "hands.tip" .did you',
     ),
     "joint that is none": (
         lambda data: data["initial"]["joints"].update(elbow=1.0),

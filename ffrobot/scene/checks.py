@@ -3,35 +3,44 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from ..common.arrays import Array
+from ..common.errors import InputError
 from ..common.validation import did_you_mean, quoted
 from ..mbs._core import TimeFunction
 from ..mbs.fields.derivatives import check_derivatives
 from ..mbs.fields.field_types import GROUND
 from ..mbs.fields.functions import check_domain
+from ..mbs.fields.orientations import OrientationLaw
+from ..mbs.fields.spelling import SPATIAL
+from ..mbs.joints.joint import JointRecord
+from ..mbs.joints.spatial.joint import SpatialJoint
 from ..mbs.scene.analysis import Surroundings
-from .kinds import KINDS, AnyKind
+from ..mbs.scene.loads import Load
+from ..mbs.scene.spatial.loads import SpatialLoad
+from ..mbs.scene.spatial.trajectories import SpatialTrajectory
+from ..mbs.scene.trajectories import Trajectory
+from .kinds import KINDS, AnyKind, AnyKindInSpace
 from .scene import SceneKeys
+from .spatial_keys import SpatialSceneKeys
 
-PATCHED = ("patches", "patched body")  # in the plane a body has one layout, which has its name
+AnyKeys = SceneKeys | SpatialSceneKeys
+AnyJoint = JointRecord | SpatialJoint
 
 
-def problems(scene: SceneKeys) -> Iterator[str]:
+def problems(scene: AnyKeys) -> Iterator[str]:
     """Everything in the scene that refers to something that does not exist or does not fit, a line each."""
-    for kind in ("body", "joint", "trajectory", "analysis"):
-        yield from _duplicates(kind, (record.name for record in getattr(scene, kind)))
-    for kind in ("pzt", "actuation_points"):
-        yield from _duplicates(kind, (layout.body for layout in getattr(scene, kind)))
+    yield from _all_duplicates(scene)
     yield from _body_problems(scene)
     yield from _joint_problems(scene)
     yield from _guess_problems(scene)
     yield from _flexible_body_problems(scene)
     yield from _patch_problems(scene)
+    yield from _load_problems(scene)
     yield from _stiffening_problems(scene)
     for k, analysis in enumerate(scene.analysis):
         among = Surroundings(scene.analysis[:k], scene.analysis[k:], KINDS)
@@ -39,16 +48,15 @@ def problems(scene: SceneKeys) -> Iterator[str]:
             yield f'analysis "{analysis.name}": {problem}'
 
 
-def check_functions(scene: SceneKeys, path: Path) -> None:
+def check_functions(scene: AnyKeys, path: Path) -> None:
     """Raise `InputError` for a function of time without a value at an output time at which it is needed."""
     following = [analysis for analysis in scene.analysis if analysis.follows_trajectories]
     for trajectory in scene.trajectory:
-        for component, function in trajectory.components.items():
-            key = component if trajectory.path is None else "via" if trajectory.waypoints is None else "waypoints"
-            for analysis in following:
-                times = np.clip(analysis.times, 0.0, analysis.last_time)
-                _check_path(function, times, f'{path}: trajectory "{trajectory.name}": {key}')
-    for k, load in enumerate(scene.load, 1):
+        for analysis in following:
+            times = np.clip(analysis.times, 0.0, analysis.last_time)
+            _check_trajectory(trajectory, times, f'{path}: trajectory "{trajectory.name}"')
+    loads: Sequence[Load | SpatialLoad] = scene.load
+    for k, load in enumerate(loads, 1):
         for component, function in load.components.items():
             for analysis in scene.analysis:
                 times = np.clip(analysis.times, 0.0, analysis.last_time)
@@ -62,11 +70,43 @@ def check_functions(scene: SceneKeys, path: Path) -> None:
                 check_domain(function, analysis.times, label, derivatives)
 
 
+def _check_trajectory(trajectory: Trajectory | SpatialTrajectory, times: Array, label: str) -> None:
+    """Of places or coordinates, and of an orientation, at `times` (T,)."""
+    places = None if trajectory.path is None else "via" if trajectory.waypoints is None else "waypoints"
+    for component, function in trajectory.components.items():
+        _check_path(function, times, f"{label}: {places or component}")
+    law = getattr(trajectory, "orientation", None)
+    if law is not None:
+        _check_orientation(law, times, f"{label}: {law.kind}")
+
+
+def _check_orientation(law: OrientationLaw, times: Array, label: str) -> None:
+    for function in law.functions:
+        _check_path(function, times, label)
+    if law.kind == "direction":
+        sizes = np.linalg.norm([function.sample(times)[0] for function in law.functions], axis=0)
+        if sizes.min() <= 1e-9 * sizes.max():
+            at = times[sizes.argmin()]
+            raise InputError(f"{label}: expected a direction at all times, found none at t = {at:.9g} s")
+
+
 def _check_path(function: TimeFunction, times: Array, label: str) -> None:
     """Raise `InputError` for a function of time that no motion can follow, or whose derivatives are others."""
     check_domain(function, times, label, 2)
     if len(times) > 1:
         check_derivatives(function, float(times[-1]), label)
+
+
+def _all_duplicates(scene: AnyKeys) -> Iterator[str]:
+    for kind in ("body", "joint", "trajectory", "analysis"):
+        yield from _duplicates(kind, (record.name for record in getattr(scene, kind)))
+    for label, count in Counter(layout.label for layout in scene.pzt).items():
+        if count > 1:
+            apart = "name: expected a separate name for each layout on a body" if scene.space == SPATIAL else ""
+            yield f'pzt "{label}": {apart or "expected one pzt of this name"}, found {count}'
+    for name, count in Counter(points.body for points in scene.actuation_points).items():
+        if count > 1:
+            yield f'actuation_points "{name}": body: expected one table for each body, found {count}'
 
 
 def _duplicates(kind: str, names: Iterable[str]) -> Iterator[str]:
@@ -75,7 +115,7 @@ def _duplicates(kind: str, names: Iterable[str]) -> Iterator[str]:
             yield f'{kind} "{name}": expected one {kind} of this name, found {count}'
 
 
-def _body_problems(scene: SceneKeys) -> Iterator[str]:
+def _body_problems(scene: AnyKeys) -> Iterator[str]:
     bodies = {body.name: body for body in scene.body}
     if GROUND in bodies:
         yield f'body "{GROUND}": name: expected any other name, found "{GROUND}", which is the fixed frame'
@@ -96,10 +136,10 @@ def _body_problems(scene: SceneKeys) -> Iterator[str]:
             )
 
 
-def _joint_problems(scene: SceneKeys) -> Iterator[str]:
-    joints = {joint.name: joint for joint in scene.joint}
-    elastic = [name for name, joint in joints.items() if joint.elastic_gear("section")]
-    moving = [name for name, joint in joints.items() if joint.coordinate("section") is not None]
+def _joint_problems(scene: AnyKeys) -> Iterator[str]:
+    joints: dict[str, AnyJoint] = {joint.name: joint for joint in scene.joint}
+    elastic = [name for name, joint in joints.items() if getattr(joint, "stiffness", None) is not None]
+    moving = [name for name, joint in joints.items() if _moves(joint)]
     for reference in scene.references():
         key, name = reference.key, reference.name
         if reference.kind == "elastic joint" and name not in elastic:
@@ -111,7 +151,14 @@ def _joint_problems(scene: SceneKeys) -> Iterator[str]:
             yield f"{key}: expected a joint that moves ({quoted(moving)}), found {found}"
 
 
-def _guess_problems(scene: SceneKeys) -> Iterator[str]:
+def _moves(joint: AnyJoint) -> bool:
+    """Whether it has coordinates, or a place that [initial] can guess."""
+    if isinstance(joint, SpatialJoint):
+        return bool(joint.units or joint.guess_units)
+    return joint.coordinate("section") is not None
+
+
+def _guess_problems(scene: AnyKeys) -> Iterator[str]:
     """Guesses of joints between bodies whose own guesses say the same."""
     initial = scene.initial
     for key, of_joints, bodies, of_bodies in (
@@ -128,45 +175,65 @@ def _guess_problems(scene: SceneKeys) -> Iterator[str]:
                 )
 
 
-def _flexible_body_problems(scene: SceneKeys) -> Iterator[str]:
+def _flexible_body_problems(scene: AnyKeys) -> Iterator[str]:
     rigid = [body.name for body in scene.body if body.rigid is not None]
     for reference in scene.references():
         if reference.kind == "flexible body" and reference.name in rigid:
             yield f'{reference.key}: expected a flexible body, found "{reference.name}", which is rigid'
 
 
-def _patch_problems(scene: SceneKeys) -> Iterator[str]:
-    layouts = {layout.body: layout for layout in scene.pzt}
-    uses = [(reference.key, reference.name) for reference in scene.references() if reference.kind in PATCHED]
-    uses += [(f"load no. {k}: pzt", load.pzt) for k, load in enumerate(scene.load, 1) if load.pzt is not None]
-    for key, body in uses:
-        if body not in layouts:
-            hint = did_you_mean(body, layouts)
-            yield f'{key}: expected a body with patches, {quoted(layouts)}, found "{body}"{hint}'
-    for k, load in enumerate(scene.load, 1):
-        count = layouts[load.pzt].patch_count if load.pzt in layouts else 0
-        if count and load.voltage is not None and len(load.voltage) != count:
+def _patch_problems(scene: AnyKeys) -> Iterator[str]:
+    """References to bodies with patches, and to layouts: in the plane a body has one, which has its name."""
+    bodies = list(dict.fromkeys(layout.body for layout in scene.pzt))
+    layouts = [layout.label for layout in scene.pzt]
+    for reference in scene.references():
+        known = {"patched body": bodies, "patches": layouts}.get(reference.kind)
+        if known is not None and reference.name not in known:
+            what = f"a body with patches, {quoted(known)}"
+            if reference.kind == "patches" and scene.space == SPATIAL:
+                what = f"one of the layouts {quoted(known)}" if known else "a layout of patches ([[pzt]])"
+            hint = did_you_mean(reference.name, known)
+            yield f'{reference.key}: expected {what}, found "{reference.name}"{hint}'
+
+
+def _load_problems(scene: AnyKeys) -> Iterator[str]:
+    """Numbers of voltages, and of moments of joints with several coordinates."""
+    counts = {layout.label: layout.patch_count for layout in scene.pzt}
+    joints: dict[str, AnyJoint] = {joint.name: joint for joint in scene.joint}
+    loads: Sequence[Load | SpatialLoad] = scene.load
+    for k, load in enumerate(loads, 1):
+        count, found = counts.get(load.pzt or "", 0), len(load.voltage or ())
+        if count and found != count:
+            of = f'one for each patch of "{load.pzt}"'
+            yield f"load no. {k}: voltage: expected {count} expressions, {of}, found {found}"
+        joint = joints.get(load.joint or "")
+        if not isinstance(joint, SpatialJoint) or not _moves(joint):
+            continue
+        if not joint.units:
             yield (
-                f"load no. {k}: voltage: expected {count} expressions, one for each patch of"
-                f' "{load.pzt}", found {len(load.voltage)}'
+                f'load no. {k}: joint: expected one with coordinates, found "{joint.name}", a {joint.type} joint:'
+                " forces and moments on what it joins are loads on points (x, y, z, mx, my, mz)"
             )
+        elif (found := int(np.size(load.moment))) != len(joint.units):
+            of = f'one for each coordinate of "{joint.name}" ({", ".join(joint.units)})'
+            yield f"load no. {k}: moment: expected {len(joint.units)} expressions, {of}, found {found}"
 
 
-def _stiffening_problems(scene: SceneKeys) -> Iterator[str]:
+def _stiffening_problems(scene: AnyKeys) -> Iterator[str]:
     """What acts between the interfaces of a link: modal body files hold no geometric stiffness of such loads."""
-    if scene.geometric_stiffening is False:
+    if not scene.geometric_stiffening:
         return
-    for points in scene.actuation_points:
+    for points in scene.actuation_points if scene.space != SPATIAL else ():
         yield f'geometric_stiffening: expected false with [[actuation_points]], found those of "{points.body}"'
     for layout in scene.pzt:
         if layout.adds_mass:
             yield (
                 'geometric_stiffening: expected no patches with structural = ["mass"], whose inertia loads the link'
-                f' between its interfaces, found those of "{layout.body}"'
+                f' between its interfaces, found those of "{layout.label}"'
             )
 
 
-def _unmet_needs(scene: SceneKeys, analysis: AnyKind) -> Iterator[str]:
+def _unmet_needs(scene: AnyKeys, analysis: AnyKind | AnyKindInSpace) -> Iterator[str]:
     for need in analysis.needs():
         if not getattr(scene, need.table):
             yield f'{need.key}: expected at least one [[{need.table}]] for "{need.value}", found none'

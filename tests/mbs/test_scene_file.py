@@ -10,6 +10,7 @@ import pytest
 from ffrobot.common.errors import InputError
 from ffrobot.mbs.fields.field_types import split_point
 from ffrobot.scene.load import load_scene
+from ffrobot.scene.spatial import load_spatial_scene
 
 SCENE = """
 name = "two_link"
@@ -95,9 +96,24 @@ def folder(tmp_path):
 
 
 def load(folder, text):
+    """The scene in planar records; those of 3D refuse what these do, in the same words."""
     path = folder / "scene.toml"
     path.write_text(text)
+    if "angle = " not in text:
+        assert refusal(load_spatial_scene, path) == refusal(load_scene, path)
     return load_scene(path)
+
+
+def refusal(reader, path):
+    """Lines of the message, with the keys that they list in alphabetical order."""
+    try:
+        reader(path)
+    except InputError as error:
+        listed = re.compile("(?<=expected one of the keys ).*(?=, found)")
+        return {
+            listed.sub(lambda keys: ", ".join(sorted(keys[0].split(", "))), line) for line in str(error).splitlines()
+        }
+    return set()
 
 
 def test_scene_is_read_key_by_key(folder):

@@ -34,6 +34,11 @@ class SpatialPrismatic(AxialJoint):
     rotor_inertia: NotNegative = 0.0
     """Moment of inertia of the rotor about its axis, kg·m², before the gear."""
 
+    @classmethod
+    def demand_key(cls, key: str) -> str:
+        """Of the axis: the others have defaults, or are those of all joints."""
+        return "expected an axis that is not zero in a prismatic joint, found none" if key == "axis" else ""
+
     units = ("m",)
     q_count = 1
     freedoms = 1
