@@ -207,14 +207,14 @@ def _load_problems(scene: AnyKeys) -> Iterator[str]:
             of = f'one for each patch of "{load.pzt}"'
             yield f"load no. {k}: voltage: expected {count} expressions, {of}, found {found}"
         joint = joints.get(load.joint or "")
-        if not isinstance(joint, SpatialJoint) or not _moves(joint):
+        if not isinstance(joint, SpatialJoint) or not isinstance(load, SpatialLoad) or not _moves(joint):
             continue
         if not joint.units:
             yield (
                 f'load no. {k}: joint: expected one with coordinates, found "{joint.name}", a {joint.type} joint:'
                 " forces and moments on what it joins are loads on points (x, y, z, mx, my, mz)"
             )
-        elif (found := int(np.size(load.moment))) != len(joint.units):
+        elif (found := len(load.moments)) != len(joint.units):
             of = f'one for each coordinate of "{joint.name}" ({", ".join(joint.units)})'
             yield f"load no. {k}: moment: expected {len(joint.units)} expressions, {of}, found {found}"
 
