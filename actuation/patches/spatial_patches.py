@@ -169,8 +169,9 @@ def _reached(per_volt: Array, body: ModalBody, spatial: SpatialBody) -> ReachedM
     """By modal forces per volt (k, n) on the modes of the modal body: the families in which any is not 0."""
     size = np.abs(per_volt).max(axis=0)
     families = {body.family[k] for k in np.flatnonzero(size > OUT_OF_REACH * size.max())}
-    rows = np.flatnonzero([family in families for family in body.family])
-    T_inverse, square = np.linalg.inv(spatial.modal_transform), np.ix_(rows, rows)
+    moving = spatial.modal_transform.any(axis=1)
+    rows = np.flatnonzero([moves and family in families for moves, family in zip(moving, body.family, strict=True)])
+    T_inverse, square = spatial.on_file, np.ix_(rows, rows)
     T, stiffness = uncoupling((T_inverse.T @ T_inverse)[square], (T_inverse.T * spatial.stiffness @ T_inverse)[square])
     modes_first = np.argsort(body.residual[rows], kind="stable")
     served = int(np.count_nonzero(body.residual[rows] == 0))
@@ -190,7 +191,7 @@ def _check_reached(path: Path, layout: SpatialPztLayout, modes: ReachedModes, bo
 def _array(
     path: Path, placed: Placed, body: ModalBody, spatial: SpatialBody, of: Effects, modes: ReachedModes
 ) -> PatchArray:
-    T_inverse = np.linalg.inv(spatial.modal_transform)
+    T_inverse = spatial.on_file
     points = {name: modes.seen(at.translation @ T_inverse) for name, at in spatial.points.items()}
     W_sqrt = weights(_key(path, placed.layout.label), placed.layout, modes.served, modes.stiffness, points)
     to_modes = np.zeros((body.mode_count, len(modes.rows)))

@@ -13,6 +13,7 @@ from ..actuation.patches.spatial_structure import structure_effect_in_space, wit
 from ..actuation.patches.structure import StructureEffect
 from ..common.errors import of_file
 from ..fe_models.modal_body_file import read_modal_body
+from ..mbs.model.projection import projected
 from ..mbs.model.spatial_body import SpatialBody, from_modal_body, rigid_body
 from ..mbs.model.spatial_masses import with_payload
 from ..mbs.model.spatial_payloads import turns_as_a_body
@@ -44,30 +45,35 @@ def load_spatial_bodies(scene: SpatialScene, stage: Callable[[str], None]) -> li
     patches = dict(by_body(scene.pzt))
     with of_file(scene.path):
         wanted = bool(scene.geometric_stiffening)
-        loaded = [_loaded(body, wanted or body.pieces is not None, stage) for body in scene.body]
+        loaded = [_loaded(scene, body, wanted or body.pieces is not None, stage) for body in scene.body]
     bodies = [(body.spatial.name, _with_payloads(scene, body)) for body in loaded]
-    return [_patched(scene, loaded, patches[name]) if name in patches else loaded for name, loaded in bodies]
+    complete = [_patched(scene, loaded, patches[name]) if name in patches else loaded for name, loaded in bodies]
+    return [_projected(body) for body in complete] if scene.is_planar else complete
 
 
-def _loaded(body: BodyInSpace, stiffened: bool, stage: Callable[[str], None]) -> LoadedSpatialBody:
+def _projected(body: LoadedSpatialBody) -> LoadedSpatialBody:
+    return replace(body, spatial=projected(body.spatial), carrying=projected(body.carrying))
+
+
+def _loaded(scene: SpatialScene, body: BodyInSpace, stiffened: bool, stage: Callable[[str], None]) -> LoadedSpatialBody:
+    """Without payloads and patches, which in a planar scene are on modes that move in the plane."""
+    path, computed, reused, modal = None, False, "", None
     if body.rigid is not None:
         rigid = body.rigid
         points = {name: np.array(position) for name, position in rigid.points.items()}
         made = rigid_body(body.name, rigid.mass, np.array(rigid.center), tensor(rigid.inertia), points)
-        return LoadedSpatialBody(spatial=made, carrying=made)
-    if body.modal is not None:
-        modal = read_modal_body(body.modal)
-        made = from_modal_body(body.name, modal, stiffened)
-        return LoadedSpatialBody(spatial=made, carrying=made, modal=modal, path=body.modal)
-    from ..fe_models.link import cached_modal_body
+    elif body.modal is not None:
+        modal, path = read_modal_body(body.modal), body.modal
+    else:
+        from ..fe_models.link import cached_modal_body
 
-    assert body.link is not None
-    outcome = cached_modal_body(body.link, stage)
-    made = from_modal_body(body.name, outcome.body, stiffened)
-    return LoadedSpatialBody(
-        spatial=made, carrying=made, modal=outcome.body,
-        path=outcome.path, computed=outcome.computed, reused=outcome.reused,
-    )  # fmt: skip
+        assert body.link is not None
+        outcome = cached_modal_body(body.link, stage)
+        modal, path, computed, reused = outcome.body, outcome.path, outcome.computed, outcome.reused
+    if modal is not None:
+        made = from_modal_body(body.name, modal, stiffened, is_planar=scene.is_planar)
+    made = projected(made) if scene.is_planar else made
+    return LoadedSpatialBody(spatial=made, carrying=made, modal=modal, path=path, computed=computed, reused=reused)
 
 
 def _with_payloads(scene: SpatialScene, body: LoadedSpatialBody) -> LoadedSpatialBody:
@@ -75,7 +81,7 @@ def _with_payloads(scene: SpatialScene, body: LoadedSpatialBody) -> LoadedSpatia
     for point, payload in payloads_on(scene.payload, spatial.name, spatial.points, scene.path):
         about = point, payload.mass, np.array(payload.center), tensor(payload.inertia)
         carrying = with_payload(carrying, *about)
-        if body.modal is None or not turns_as_a_body(payload):
+        if body.modal is None or not turns_as_a_body(scene, payload):
             spatial = with_payload(spatial, *about)
     return replace(body, spatial=spatial, carrying=carrying)
 

@@ -45,7 +45,8 @@ def reported_in_space(result: SpatialResult) -> Reported:
 def mode_levels_in_space(scene: SpatialScene, bodies: Mapping[str, LoadedSpatialBody]) -> list[dict[str, SpatialBody]]:
     """See `truncation_levels`; `bodies` may have fewer modes already.
 
-    Counted is the family with most modes: with those of the plane alone, both planes of bending come at once.
+    Counted is the family with most modes: with those of one plane alone, both planes of bending come at once. In a
+    planar scene all modes count.
     """
     whole = {name: body.spatial.whole for name, body in bodies.items()}
 
@@ -54,7 +55,8 @@ def mode_levels_in_space(scene: SpatialScene, bodies: Mapping[str, LoadedSpatial
         for name in names:
             modal, of_body = bodies[name].modal, whole[name].stiffness[: whole[name].n_eigenmodes]
             assert modal is not None
-            for family, square in zip(modal.family, of_body, strict=False):  # attachment modes come after them
+            families = [""] * len(of_body) if scene.is_planar else modal.family
+            for family, square in zip(families, of_body, strict=False):  # attachment modes come after them
                 squares.setdefault(family, []).append(square)
         return np.array(max(squares.values(), key=len, default=[]))
 

@@ -82,10 +82,11 @@ def _unsolved(solution: SpatialSolution) -> SpatialSolution:
 
 
 def _all_stiffened(scene: SpatialScene, is_needed: bool) -> bool:
-    """Whether all links are stiffened; with "auto", where that `is_needed`, and beside links in pieces."""
+    """Whether all links are stiffened; with "auto" where that `is_needed`; in the plane beside links in pieces, too."""
+    in_pieces = any(body.pieces is not None for body in scene.body)
     if scene.geometric_stiffening == "auto":
-        return is_needed or any(body.pieces is not None for body in scene.body)
-    return scene.geometric_stiffening is True
+        return is_needed or in_pieces
+    return scene.geometric_stiffening is True or (scene.is_planar and in_pieces)
 
 
 def _model(

@@ -85,7 +85,7 @@ class SpatialPiece(NamedTuple):
 def divided_link_in_space(link: ModalBody, spatial: SpatialBody, pieces: Sequence[SpatialPiece]) -> DividedLink:
     """Of a link and its pieces, each with its equations, in the coordinates of these."""
     of_file = [_shape_in_piece_in_space(link, piece.start, piece.modal) for piece in pieces]
-    own = [np.linalg.solve(piece.spatial.modal_transform, p) for piece, p in zip(pieces, of_file, strict=True)]
+    own = [np.linalg.pinv(piece.spatial.modal_transform) @ p for piece, p in zip(pieces, of_file, strict=True)]
     spread = np.vstack(own) @ spatial.modal_transform
     root = np.sqrt(np.concatenate([piece.spatial.stiffness for piece in pieces]))
     names = tuple(piece.spatial.name for piece in pieces)

@@ -156,7 +156,7 @@ def diagonalised(body: PlanarBody, K_ff: Array, m_ff: Array) -> PlanarBody:
     if np.array_equal(m_ff, np.eye(len(m_ff))) and np.abs(off_diagonal).max(initial=0.0) <= 1e-9 * np.abs(K_ff).max(
         initial=0.0
     ):
-        return body
+        return replace(body, stiffness=np.diag(K_ff).copy())
     L_inverse = np.linalg.inv(np.linalg.cholesky(m_ff))
     stiffness, vectors = np.linalg.eigh(L_inverse @ K_ff @ L_inverse.T)
     return transformed(body, L_inverse.T @ vectors, stiffness)

@@ -168,21 +168,21 @@ def transformed(body: SpatialBody, T: Array, stiffness: Array) -> SpatialBody:
     )
 
 
-def from_modal_body(name: str, body: ModalBody, stiffened: bool = False) -> SpatialBody:
-    """All modes of a modal body; `stiffened`: with geometric stiffening.
+def from_modal_body(name: str, body: ModalBody, stiffened: bool = False, *, is_planar: bool = False) -> SpatialBody:
+    """All modes of a modal body; `stiffened`: with geometric stiffening; `is_planar`: for motion in z = 0 alone.
 
     Raises:
         InputError: the file of a beam does not say what inertia it has about its own axis; it has to be stiffened, and
             the file does not say how.
     """
-    stiffening = spatial_stiffening.from_modal_body(body) if stiffened else None
+    stiffening = spatial_stiffening.from_modal_body(body, is_planar=is_planar) if stiffened else None
     if stiffened and stiffening is None:
         raise InputError(
             "geometric_stiffening: expected modal bodies with the geometric stiffness of all accelerations"
             f' (geometric_stiffness/t_x to omega_yz), found none in that of "{name}": make it again from its link file'
             " with `ffrobot link`"
         )
-    J_spin, h_spin, S_spin = _spin_inertia(name, body)
+    J_spin, h_spin, S_spin = _spin_inertia(name, body, is_planar=is_planar)
     S_bar_kl = body.S_bar_kl.copy()
     S_bar_kl[2, 2] -= S_spin
     omega = 2 * np.pi * body.frequency
@@ -235,11 +235,11 @@ def rigid_body(name: str, mass: float, center: Array, inertia: Array, points: Ma
     )
 
 
-def _spin_inertia(name: str, body: ModalBody) -> tuple[float, Array, Array]:
-    """J_s, h_s, S_s; files of earlier versions lack them, which matters for beams alone."""
+def _spin_inertia(name: str, body: ModalBody, *, is_planar: bool) -> tuple[float, Array, Array]:
+    """J_s, h_s, S_s; files of earlier versions lack them, which matters for beams alone, and not in the plane."""
     if body.J_spin is not None and body.h_spin is not None and body.S_spin is not None:
         return body.J_spin, body.h_spin, body.S_spin
-    if body.kind != "beam":
+    if is_planar or body.kind != "beam":
         return 0.0, np.zeros(body.mode_count), np.zeros((body.mode_count, body.mode_count))
     raise InputError(
         f'body "{name}": expected a modal body file with the inertia of the beam about its own axis'

@@ -26,6 +26,8 @@ def with_payload(body: SpatialBody, point: str, mass: float, center: Array, iner
     Phi = at.translation - skew(center) @ phi
     E = 0.5 * np.trace(inertia) * np.eye(3) - inertia
     added = attached_integrals(mass, x, E, Phi, phi)
+    # J about the center counts as it is, however far the section turns: see `SpatialStiffening.S_turned`
+    added["S_bar_kl"] = mass * np.einsum("km,ln->klmn", Phi, Phi)
     loaded = _with_integrals(body, added)
     if body.stiffening is not None:
         stiffening = body.stiffening.with_payload(point, at.position, phi, mass, center, E)

@@ -105,6 +105,8 @@ def _data(body: SpatialBody, markers: list[Section]) -> _core.SpatialData:
         data.S_bar, data.I_bar = np.array(body.S_bar), np.array(body.I_bar.reshape(9, -1))
         booked = body.S_bar_kl.copy()
         booked[2, 2] += body.S_spin
+        if body.stiffening is not None:
+            booked += body.stiffening.S_turned
         data.S_bar_kl = [np.array(booked[k, l]) for k in range(3) for l in range(3)]  # noqa: E741
         data.h_spin, data.S_spin = np.array(body.h_spin), np.array(body.S_spin)
     if body.stiffening is not None:

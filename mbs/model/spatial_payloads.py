@@ -17,16 +17,17 @@ from ..scene.spatial.mechanism import SpatialMechanismKeys
 from .spatial_body import SpatialBody, rigid_body
 
 
-def turns_as_a_body(payload: SpatialPayload) -> bool:
-    """Whether turning its section moves it: all but a point mass there."""
-    return bool(np.any(payload.inertia) or (payload.mass and np.any(payload.center)))
+def turns_as_a_body(scene: SpatialMechanismKeys, payload: SpatialPayload) -> bool:
+    """Whether turning its section moves it: all but a point mass there, in the plane with its moment of inertia."""
+    is_beside = payload.mass and np.any(payload.center)
+    return bool(is_beside or (np.any(payload.inertia) and not scene.is_planar))
 
 
 def welded_payloads(scene: SpatialMechanismKeys) -> Iterator[tuple[SpatialBody, SpatialWeld]]:
     """The payloads on links that turn as bodies, each with what holds it; names that no body of a scene can have."""
     rigid = {body.name for body in scene.body if body.rigid is not None}
     for k, payload in enumerate(scene.payload, 1):
-        if turns_as_a_body(payload) and payload.point.partition(".")[0] not in rigid:
+        if turns_as_a_body(scene, payload) and payload.point.partition(".")[0] not in rigid:
             name = f"payload, number {k}"
             body = rigid_body(name, payload.mass, np.array(payload.center), tensor(payload.inertia), {})
             yield body, SpatialWeld.model_construct(name=name, type="weld", between=(payload.point, name))

@@ -47,17 +47,22 @@ def planar_marker(marker: _core.SpatialMarker, axes: Array) -> _core.PlanarMarke
     x = axes @ marker.triad @ axes_of_triad(marker.triad.T @ axes[2])[0]
     found.position, found.angle = np.ascontiguousarray((axes @ marker.position)[:2]), float(np.arctan2(x[1], x[0]))
     found.Phi = np.vstack([Phi[:2], Phi_r[2:]])
+    if len(marker.K):
+        K = np.einsum("skl,slmn->skmn", np.array([axes, axes]), np.reshape(marker.K, (2, 3, *marker.K[0].shape)))
+        if not (_is_small(K[0, 2], K[0]) and _is_small(K[1, :2], K[1])):
+            raise AcrossError
+        found.K = [K[0, 0], K[0, 1], K[1, 2]]
     return found
 
 
 def planar_data(data: _core.SpatialData, axes: Array) -> _core.PlanarData:
-    """The constants of a body in the plane. Raises `AcrossError` where it bends otherwise, twists, or is stiffened."""
+    """The constants of a body in the plane. Raises `AcrossError` where it bends otherwise, or twists."""
     found, normal = _core.PlanarData(), axes[2]
     along = float(normal @ data.spin_axis)
     found.mass, found.first_moment = data.mass, np.ascontiguousarray(axes[:2] @ data.first_moment)
     found.inertia = float(np.trace(data.J2) - normal @ data.J2 @ normal + data.J_spin * along**2)
     if len(data.stiffness):
-        if data.K_s or np.any(data.h_spin) or np.any(data.S_spin):
+        if np.any(data.h_spin) or np.any(data.S_spin):
             raise AcrossError
         n = len(data.stiffness)
         S = _turned(np.array(data.S_bar_kl).reshape(3, 3, n, n), axes)
@@ -69,8 +74,33 @@ def planar_data(data: _core.SpatialData, axes: Array) -> _core.PlanarData:
         found.S_bar = np.ascontiguousarray(axes[:2] @ data.S_bar)
         found.h, found.j = I_bar[0, 1] - I_bar[1, 0], I_bar[0, 0] + I_bar[1, 1]
         found.S_tilde, found.m_xy = S[0, 1] - S[1, 0], S[0, 0] + S[1, 1]
+        if data.K_s:
+            K_s = as_floats(np.einsum("kl,lmn->kmn", axes, np.array(data.K_s)))
+            K_x = _turned(np.array(data.K_x).reshape(3, 3, n, n), axes)
+            if not (_is_small(K_s[2], K_s) and _is_small(K_x[:, 2], K_x)):
+                raise AcrossError
+            found.K = [K_s[0], K_s[1], K_x[0, 0] + K_x[1, 1], K_x[0, 1] - K_x[1, 0]]
+            S, J2 = axes[:2] @ data.first_moment, axes[:2] @ data.J2 @ axes[:2].T
+            N = np.block([[np.array([[data.mass]]), S[None]], [S[:, None], J2]])
+            for moved, by_place in ((found.S_bar, I_bar[:2, :2]), (K_s[:2], K_x[:2, :2])):
+                _check_shapes(N, np.concatenate([moved[None], by_place]).reshape(3, 2, -1))
     found.markers = [planar_marker(marker, axes) for marker in data.markers]
     return found
+
+
+def _check_shapes(N: Array, F: Array) -> None:
+    """Raise `AcrossError` unless fields of displacement keep shapes: the core has no others of them in the plane.
+
+    N (3, 3) and F (3, 2, fields): integrals of 1, x, y times 1, x, y, and times displacements along x and y.
+    """
+    (m, x, y), J = N[0], N[1, 1] + N[2, 2]
+    by_shape = np.array([[m, 0, x, -y], [0, m, y, x], [x, y, J, 0], [-y, x, 0, J]])
+    along_x, along_y, stretch, turn = np.linalg.solve(
+        by_shape, np.array([F[0, 0], F[0, 1], F[1, 0] + F[2, 1], F[1, 1] - F[2, 0]])
+    )
+    fields = np.array([[along_x, along_y], [stretch, turn], [-turn, stretch]])
+    if not _is_small(F - np.einsum("ij,jkn->ikn", N, fields), F):
+        raise AcrossError
 
 
 def _turned(tensor: Array, axes: Array) -> Array:

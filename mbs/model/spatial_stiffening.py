@@ -14,7 +14,11 @@ import numpy as np
 
 from ...common.arrays import Array
 from ...fe_models.modal_body import ModalBody
+from ...fe_models.modal_body.lumped_masses import attached_integrals
 from ...fe_models.modal_body.tensors import LEVI_CIVITA
+
+IN_PLANE = ("t_x", "t_y", "r_z", "omega_zz")
+"""Inertial loads of motion in the plane z = 0."""
 
 
 @dataclass(frozen=True)
@@ -25,11 +29,14 @@ class SpatialStiffening:
         K_s: (3, n, n) ∫ρ G_l dV.
         K_x: (3, 3, n, n) ∫ρ x_k G_l dV at [k, l].
         K_points: (6, n, n) of forces along and moments about x, y, z at each interface.
+        S_turned: (3, 3, n, n) of the extent of payloads, which turn with their points: what S̄_kl has of it where K_x
+            has it to second order, too.
     """
 
     K_s: Array
     K_x: Array
     K_points: Mapping[str, Array]
+    S_turned: Array
 
     def at(self, point: str) -> Array:
         """(6, n, n) of a point; zero where it is not known."""
@@ -39,7 +46,9 @@ class SpatialStiffening:
     def transformed(self, T: Array) -> SpatialStiffening:
         """In coordinates p' with p = T p'."""
         points = {name: T.T @ K @ T for name, K in self.K_points.items()}
-        return SpatialStiffening(T.T @ self.K_s @ T, T.T @ self.K_x @ T, MappingProxyType(points))
+        return SpatialStiffening(
+            T.T @ self.K_s @ T, T.T @ self.K_x @ T, MappingProxyType(points), T.T @ self.S_turned @ T
+        )
 
     def with_payload(
         self, point: str, position: Array, phi: Array, mass: float, arm: Array, E: Array
@@ -56,19 +65,26 @@ class SpatialStiffening:
         by_arm = by_arm + np.einsum("lb,aamn->lbmn", np.eye(3), turning) - turning
         G_center = K[:3] + np.einsum("lbmn,b->lmn", by_arm, arm)
         K_x = self.K_x + mass * np.einsum("k,lmn->klmn", position + arm, G_center)
-        return replace(self, K_s=self.K_s + mass * G_center, K_x=K_x + np.einsum("kb,lbmn->klmn", E, by_arm))
+        turned = attached_integrals(0.0, position, E, np.zeros_like(phi), phi)["S_bar_kl"]
+        return replace(
+            self,
+            K_s=self.K_s + mass * G_center,
+            K_x=K_x + np.einsum("kb,lbmn->klmn", E, by_arm),
+            S_turned=self.S_turned + turned,
+        )
 
 
-def from_modal_body(body: ModalBody) -> SpatialStiffening | None:
-    """What the file of a modal body holds; None where it holds nothing of the kind, or not for motion in space.
+def from_modal_body(body: ModalBody, *, is_planar: bool = False) -> SpatialStiffening | None:
+    """What the file of a modal body holds; None where it lacks what motion in space asks, or in the plane z = 0.
 
     With K of its d'Alembert loads: K_s,i = −K(t_i), K_r,i = −K(r_i), K_ω,ii = K(omega_ii), K_ω,ij = ½ K(omega_ij).
     """
-    K = body.geometric_stiffness
     pairs = {"xx": (0, 0), "yy": (1, 1), "zz": (2, 2), "xy": (0, 1), "xz": (0, 2), "yz": (1, 2)}
     inertial = [f"t_{axis}" for axis in "xyz"] + [f"r_{axis}" for axis in "xyz"] + [f"omega_{pair}" for pair in pairs]
-    if any(load not in K for load in inertial):
+    if any(load not in body.geometric_stiffness for load in (IN_PLANE if is_planar else inertial)):
         return None
+    zero = np.zeros((body.mode_count, body.mode_count))
+    K = dict.fromkeys(inertial, zero) | dict(body.geometric_stiffness)
     K_omega = np.zeros((3, 3, body.mode_count, body.mode_count))
     for pair, (i, j) in pairs.items():
         K_omega[i, j] = K_omega[j, i] = K[f"omega_{pair}"] * (1.0 if i == j else 0.5)
@@ -81,8 +97,9 @@ def from_modal_body(body: ModalBody) -> SpatialStiffening | None:
     )
     loads = [f"{kind}/{{}}/{axis}" for kind in ("force", "moment") for axis in "xyz"]
     points = {
-        name: np.array([K[load.format(name)] for load in loads])
+        name: np.array([K.get(load.format(name), zero) for load in loads])
         for name in body.interfaces
-        if all(load.format(name) in K for load in loads)
+        if all(load.format(name) in K for load in ([loads[k] for k in (0, 1, 5)] if is_planar else loads))
     }
-    return SpatialStiffening(-np.array([K[f"t_{axis}"] for axis in "xyz"]), K_x, MappingProxyType(points))
+    K_s = -np.array([K[f"t_{axis}"] for axis in "xyz"])
+    return SpatialStiffening(K_s, K_x, MappingProxyType(points), np.zeros_like(K_x))

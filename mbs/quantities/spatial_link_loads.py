@@ -17,7 +17,7 @@ from ..fields.field_types import split_point
 from ..model.spatial_known_motion import MotionForces, motion_forces, required_forces
 from ..model.spatial_motors import split_forces
 from ..model.spatial_payloads import turns_as_a_body
-from ..scene.spatial.bodies import SpatialPayload
+from ..scene.spatial.bodies import SpatialPayload, tensor
 from .link_loads import LinkLoads
 from .spatial_motion import SpatialMotion
 
@@ -46,7 +46,7 @@ def _link_loads(motion: SpatialMotion, bodies: Iterable[str], forces: MotionForc
             left -= wrench @ np.vstack([at.translation, at.rotation])
         for payload in motion.model.scene.payload:
             body, point = split_point(payload.point)
-            if body == name and not turns_as_a_body(payload):  # others are bodies of their own
+            if body == name and not turns_as_a_body(motion.model.scene, payload):  # others are bodies of their own
                 at_points[point] = at_points.get(point, 0.0) + _of_mass(motion, payload)
         a, alpha, omega = forces.of_body(number)
         sizes = _of_frame(*np.hsplit(_in_axes_of(F, (a - gravity, alpha, omega)), 3))
@@ -69,10 +69,11 @@ def _of_frame(a: Array, alpha: Array, omega: Array) -> dict[str, Array]:
 
 
 def _of_mass(motion: SpatialMotion, payload: SpatialPayload) -> Array:
-    """Force and moment (T, 6) of a point mass's inertia and weight on its point, axes of the body."""
-    force = -payload.mass * (motion.forces.of_point(payload.point).a - np.array(motion.model.scene.gravity))
+    """Force and moment (T, 6) of a mass's inertia and weight on its point, axes of the body. It turns about z alone."""
+    of_point = motion.forces.of_point(payload.point)
+    force = -payload.mass * (of_point.a - np.array(motion.model.scene.gravity))
     F = motion.frames[motion.model.tree.index[split_point(payload.point)[0]]].F
-    return _in_axes_of(F, (force, np.zeros_like(force)))
+    return _in_axes_of(F, (force, -of_point.alpha @ tensor(payload.inertia)))
 
 
 def _with_motors(motion: SpatialMotion) -> MotionForces:

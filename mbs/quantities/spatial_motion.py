@@ -66,9 +66,8 @@ class SpatialMotion:
     @cached_property
     def system(self) -> SpatialSystem:
         """Its equations, with drives on all points where payloads sit."""
-        payloads = (
-            PointDrive(payload.point, {}) for payload in self.model.scene.payload if not turns_as_a_body(payload)
-        )
+        scene = self.model.scene
+        payloads = (PointDrive(load.point, {}) for load in scene.payload if not turns_as_a_body(scene, load))
         return SpatialSystem(self.model, Drives(at_points=(*self.applied, *payloads)))
 
     @cached_property

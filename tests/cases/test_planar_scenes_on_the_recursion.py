@@ -25,10 +25,7 @@ ALLOWED = 0.1  # times the tolerance of references: 1e-7 of the size of most dat
 OF_SMALL_DIFFERENCES = 5.0, "/(modal_force|voltage|required_voltage)$"  # of large forces, where links sag
 END = 0.05  # s, of analyses of cases that say how long they are
 REFUSED = {
-    "arm_stiffened": (InputError, "geometric_stiffening"),
-    "arm_in_pieces": (InputError, "pieces"),
-    "arm_with_modes_as_needed": (InputError, "modes"),
-    "arm_checked": (InputError, "check"),
+    "arm_in_pieces": (InputError, "pzt"),
     "arm_on_a_spring": (InputError, "force"),
     "slide_by_angles": (InputError, "angle"),
     "random_1": (InputError, "angle"),
@@ -43,7 +40,7 @@ OTHERWISE = {
     "/constraint_violation$": ("arm", "without that of accelerations"),
     "/predicted_shift$": ("arm", "not written"),
     "/motor_moment$": ("geared_arm", "not written of gears that do not give"),
-    "/patch_structure/": ("arm_with_patches", "not written of bodies that are planar"),
+    "/patch_structure/": ("arm_with_patches", "not written"),
     "/residual_force$": (
         "two_link_patched",
         "of modes with the stiffness of patches in the plane, of bare ones in space",

@@ -7,8 +7,9 @@ import numpy as np
 from material_points import random_cloud
 from rotations import random_rotation, rotation_about
 from spatial_scenes import rpy, tree_model
-from spatial_trees import random_beam, random_rigid
+from spatial_trees import random_beam, random_rigid, random_solid, stiffened
 
+from ffrobot.mbs.model.projection import projected
 from ffrobot.mbs.model.spatial_body import SpatialBody, SpatialPoint, from_modal_body
 
 TYPES = ("revolute", "prismatic", "planar", "weld")
@@ -28,11 +29,17 @@ def flat_beam(rng, name, condition="cantilever"):
     return random_beam(rng, name, (3, 0, 1, 0), condition)
 
 
+def flat_and_stiffened(rng, name):
+    """A solid of which the motion across z, to first and second order, is left out."""
+    return projected(stiffened(rng, random_solid(rng, name)))
+
+
 KINDS = {
     "rigid": random_rigid,
     "solid": flat_solid,
     "beam": flat_beam,
     "supported": lambda rng, name: flat_beam(rng, name, "simply-supported"),
+    "stiffened": flat_and_stiffened,
 }
 
 

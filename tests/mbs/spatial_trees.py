@@ -94,7 +94,7 @@ def stiffened(rng, body):
     K = np.einsum("ef,flmn->elmn", N, 0.3 * symmetric(rng, 4, 3, n)) if n else np.zeros((4, 3, 0, 0))
     moved = {label: np.any(at.translation) or np.any(at.rotation) for label, at in body.points.items()}
     points = {label: 0.3 * symmetric(rng, 6, n) * moves if n else np.zeros((6, 0, 0)) for label, moves in moved.items()}
-    return replace(body, stiffening=SpatialStiffening(K[0], K[1:], MappingProxyType(points)))
+    return replace(body, stiffening=SpatialStiffening(K[0], K[1:], MappingProxyType(points), np.zeros_like(K[1:])))
 
 
 class _shapes:  # noqa: N801 (reads as a function of x/length)

@@ -77,7 +77,9 @@ def test_stiffened_equations_are_newtons_of_every_point(rng):
     fields = np.hstack([np.ones((len(cloud.x), 1)), cloud.x])
     G_points = np.einsum("if,flmn->ilmn", fields, G_fields)
     K = np.einsum("i,if,ilmn->flmn", cloud.mass, fields, G_points)
-    body = replace(from_modal_body("b", cloud.modal_body()), stiffening=SpatialStiffening(K[0], K[1:], {}))
+    body = replace(
+        from_modal_body("b", cloud.modal_body()), stiffening=SpatialStiffening(K[0], K[1:], {}, np.zeros_like(K[1:]))
+    )
     A, p, omega, p_dot = random_rotation(rng), *(rng.standard_normal(k) for k in (n, 3, n))
     a = rng.standard_normal(6 + n)
     alpha, p_2dot = a[3:6], a[6:]
@@ -101,7 +103,9 @@ def test_stiffened_equations_are_newtons_of_every_point(rng):
 def test_stiffened_equations_with_nothing_of_second_order_are_the_plain_ones(rng, make):
     plain = make(rng, "b")
     n = plain.n_modes
-    zero = replace(plain, stiffening=SpatialStiffening(np.zeros((3, n, n)), np.zeros((3, 3, n, n)), {}))
+    zero = replace(
+        plain, stiffening=SpatialStiffening(np.zeros((3, n, n)), np.zeros((3, 3, n, n)), {}, np.zeros((3, 3, n, n)))
+    )
     A, p, omega, p_dot = random_rotation(rng), *(rng.standard_normal(k) for k in (n, 3, n))
     assert relative(body_mass_matrix(zero, A, p), body_mass_matrix(plain, A, p)) < 1e-13
     assert relative(body_forces(zero, A, p, omega, p_dot, G), body_forces(plain, A, p, omega, p_dot, G)) < 1e-13

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from planar_trees import TYPES, flat_beam, planar_model
+from planar_trees import TYPES, flat_and_stiffened, flat_beam, planar_model
 from spatial_scenes import motor_on_frames, tree_model
 from spatial_trees import random_beam, random_solid, stiffened
 
@@ -56,12 +56,12 @@ def assert_same_forces(system, at, multipliers):
         np.testing.assert_allclose(found, expected, rtol=0, atol=CLOSE * np.abs(expected).max(initial=0.0))
 
 
-@pytest.mark.parametrize("kind", ["rigid", "solid", "beam", "supported"])
+@pytest.mark.parametrize("kind", ["rigid", "solid", "beam", "supported", "stiffened"])
 @pytest.mark.parametrize("joint", TYPES)
 def test_trees_of_one_joint_and_kind(joint, kind):
     """In planes that stand anyhow."""
     rng = np.random.default_rng(TYPES.index(joint))
-    if joint == "planar" and kind in ("solid", "supported"):
+    if joint == "planar" and kind in ("solid", "supported", "stiffened"):
         kind = "beam"  # see test_what_does_not_move_in_a_plane
     types = ["revolute", joint, joint]
     for _ in range(3):
@@ -147,6 +147,7 @@ PATH = {"name": "path", "point": "b2.tip", "x": ZERO, "y": TIME}
         ({"body": lambda rng: random_beam(rng, "b2", (2, 0, 0, 1))}, False),
         ({"body": lambda rng: random_solid(rng, "b2")}, False),
         ({"body": lambda rng: stiffened(rng, flat_beam(rng, "b2"))}, False),
+        ({"body": lambda rng: flat_and_stiffened(rng, "b2")}, True),
     ],
 )  # fmt: skip
 def test_what_does_not_move_in_a_plane(changes, is_planar):

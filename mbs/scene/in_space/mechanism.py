@@ -45,7 +45,7 @@ def mechanism_keys(scene: MechanismKeys, start: Start | None = None) -> Keys:
     kept = ("name", "motors", "geometric_stiffening")
     found = {key: value for key, value in given_keys(scene).items() if key in kept}
     return found | {
-        "space": "spatial",
+        "space": "planar",
         "gravity": place(scene.gravity),
         "body": tuple(_body(body) for body in scene.body),
         "joint": tuple(_joint(scene, scene.joint[number]) for number in _tree_first(scene)),

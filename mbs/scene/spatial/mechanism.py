@@ -52,6 +52,11 @@ class SpatialMechanismKeys(Record):
     """Initial state."""
 
     @property
+    def is_planar(self) -> bool:
+        """Whether the mechanism is projected on the plane z = 0, by declaration."""
+        return self.space == "planar"
+
+    @property
     def edges(self) -> list[Edge]:
         """The joints for a spanning forest.
 

@@ -1,0 +1,63 @@
+"""Bodies of planar scenes: of their motion what is in the plane z = 0 of their frames, by declaration.
+
+What a mode moves across the plane keeps its share of m_ff = 1. Of masses the plane sees affine fields of displacement
+that keep shapes alone: translations along x and y, a stretch (x, y) and a turn (−y, x). A body gets the integrals of a
+mass that is as wide along x as along y about its center, in which these are all there are: then geometric stiffening,
+which is by affine fields, is the same in 3D.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import MappingProxyType
+
+import numpy as np
+
+from ...common.arrays import Array, as_floats
+from .spatial_body import SpatialBody, SpatialPoint, transformed
+
+IMMOBILE = 1e-12  # of m_ff = 1: a mode that moves less of it in the plane does so by round-off
+ALONG = np.array([1.0, 1.0, 0.0])
+PLANE, TURN = np.diag(ALONG), np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
+
+
+def projected(body: SpatialBody) -> SpatialBody:
+    """A body without its motion across the plane z = 0 of its frame, and without modes that have no other."""
+    moving = np.flatnonzero(np.einsum("kknn->n", body.S_bar_kl[:2, :2]) > IMMOBILE)
+    kept = transformed(body, np.eye(body.n_modes)[:, moving], body.stiffness[moving])
+    center = kept.first_moment * ALONG / kept.mass
+    S_bar, S_bar_kl = ALONG[:, None] * kept.S_bar, _keeping_shapes(kept.S_bar_kl)
+    about_center = np.trace(kept.second_moment[:2, :2]) - kept.mass * center @ center
+    points = {
+        label: SpatialPoint(at.position * ALONG, ALONG[:, None] * at.translation, (1.0 - ALONG)[:, None] * at.rotation)
+        for label, at in kept.points.items()
+    }
+    found = replace(
+        kept, first_moment=kept.mass * center, S_bar=S_bar, S_bar_kl=S_bar_kl, points=MappingProxyType(points),
+        second_moment=kept.mass * np.outer(center, center) + 0.5 * about_center * np.eye(3),
+        I_bar=_about(center, S_bar, kept.I_bar), J_spin=0.0, h_spin=0.0 * kept.h_spin, S_spin=0.0 * kept.S_spin,
+        attachment_modes=int(np.sum(moving >= body.n_eigenmodes)),
+    )  # fmt: skip
+    if kept.stiffening is None:
+        return found
+    K_s = ALONG[:, None, None] * kept.stiffening.K_s
+    K_points = {
+        point: np.concatenate([ALONG, 1.0 - ALONG])[:, None, None] * K for point, K in kept.stiffening.K_points.items()
+    }
+    stiffening = replace(
+        kept.stiffening, K_s=K_s, K_x=_about(center, K_s, kept.stiffening.K_x), K_points=MappingProxyType(K_points),
+        S_turned=_keeping_shapes(kept.stiffening.S_turned),
+    )  # fmt: skip
+    return replace(found, stiffening=stiffening)
+
+
+def _about(center: Array, S: Array, I: Array) -> Array:  # noqa: E741
+    """∫ρ x_k u_l dV (3, 3, …) that keep shapes about the center, of S = ∫ρ u_l dV (3, …) and those of all fields."""
+    moved = np.multiply.outer(center, S)
+    return as_floats(moved + _keeping_shapes(I - moved))
+
+
+def _keeping_shapes(I: Array) -> Array:  # noqa: E741
+    """Of tensors (3, 3, …) the part in the plane that stretch and turn have."""
+    stretch, turn = 0.5 * (I[0, 0] + I[1, 1]), 0.5 * (I[0, 1] - I[1, 0])
+    return as_floats(np.multiply.outer(PLANE, stretch) + np.multiply.outer(TURN, turn))
