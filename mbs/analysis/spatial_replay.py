@@ -22,6 +22,7 @@ from ..model.spatial_motors import (
     motor_forces,
     path_forces,
 )
+from ..model.spatial_system import SpatialSystem
 from ..scene.analysis import TimedAnalysis, output_times
 from ..scene.spatial.loads import OF_POINT
 from ..solve.spatial_posture import robot_size
@@ -53,7 +54,7 @@ def supplied(run: Outcome, most: Array, patches: Mapping[str, PatchedLink], *, l
         node = run.model.tree.nodes[run.model.tree.index[name]]
         reached = of_link.to_reached @ node.body.on_file.T
         links.append((node.p_v.start, reached, of_link.allocation(limited=limited)))
-    return _found(run, lambda driven: _core.actuator_reader(driven, most, links))
+    return _found(run, lambda driven: _core.actuator_reader(driven, most, links), SpatialSystem(run.model))
 
 
 class OfPaths(NamedTuple):
@@ -77,7 +78,18 @@ def path_numbers(run: Outcome) -> OfPaths:
     parts = [(k, number, float(row.sign)) for number, (k, row) in enumerate(along)]
     parts += [(k, points[point], 1.0 if row.a.body < 0 else -1.0) for k, row, point in on_points]
     count = len(along) + len(OF_POINT) * len(points)
-    source = _found(run, lambda driven: _core.path_reader(driven, np.eye(3), parts, count), is_in_plane=False)
+    system = SpatialSystem(model)
+
+    def reader(driven: _core.PlanarDriven | _core.SpatialDriven) -> _core.PlanarForceReader | _core.SpatialForceReader:
+        if isinstance(driven, _core.SpatialDriven):
+            return _core.path_reader(driven, np.eye(3), parts, count)
+        assert system.plane is not None
+        at = {int(k): number for number, k in enumerate(system.plane.followed)}
+        in_plane = [(at[k], number, sign) for k, number, sign in parts]
+        return _core.path_reader(driven, system.plane.axes.T, in_plane, count)
+
+    are_in_plane = system.lie_in_plane([row.f for _, row, _ in on_points])  # else joints carry what is across it
+    source = _found(run, reader, system if are_in_plane else None)
     return OfPaths(source, joints, points)
 
 
@@ -90,13 +102,13 @@ def point_numbers(run: Outcome, chosen: Mapping[str, ActuationPoints]) -> _core.
         number = tree.index[name]
         R, data = in_core[number].R, frames[number]
         bodies.append((number, R.T @ data.F[0], R.T @ (data.r[0] - in_core[number].r), *of_body.of_core()))
-    return _found(run, lambda driven: _core.point_reader(driven, bodies), is_in_plane=False)
+    return _found(run, lambda driven: _core.point_reader(driven, bodies))
 
 
-def _found(run: Outcome, reader: Reader, *, is_in_plane: bool = True) -> _core.ForceSource:
-    """Read of the recorded steps of a run, or of its prescribed motion; in 3D also where all moves in a plane."""
+def _found(run: Outcome, reader: Reader, system: SpatialSystem | None = None) -> _core.ForceSource:
+    """Read of the recorded steps of a run, as `system` was integrated (None: in 3D), or of its prescribed motion."""
     if run.recording is not None:
-        of_run = integrated_mechanism(run.model) if is_in_plane else driven_mechanism(run.model, has_motors=False)
+        of_run = driven_mechanism(run.model, has_motors=False) if system is None else integrated_mechanism(system)
         return _core.recorded_forces(of_run, run.recording, reader(of_run))
     assert run.prescribed is not None
     equations, shape, near = run.prescribed

@@ -43,10 +43,10 @@ def driven_mechanism(model: SpatialModel, *, has_motors: bool = True) -> _core.S
     return driven
 
 
-def integrated_mechanism(model: SpatialModel) -> _core.PlanarDriven | _core.SpatialDriven:
+def integrated_mechanism(system: SpatialSystem) -> _core.PlanarDriven | _core.SpatialDriven:
     """The same with motors, as it is integrated: in the plane where all moves in one."""
-    core, scene, rows = SpatialSystem(model).integrated
-    is_path = [row.is_trajectory for row in (model.rows[k] for k in rows)]
+    (core, scene, rows), model = system.integrated, system.model
+    is_path = [model.rows[k].is_trajectory for k in rows]
     if isinstance(core, _core.PlanarModel):
         in_plane = _core.PlanarDriven(core, scene, is_path)
         _add_motors(in_plane, model)

@@ -22,6 +22,7 @@ from .spatial_frame_motors import held_forces
 from .spatial_model import SpatialModel
 from .spatial_parts import CutPlace, Placed, SpatialParts, carried_body, moves, standing_marker
 from .spatial_plane import Plane, in_plane
+from .spatial_plane_bodies import EXACT
 from .spatial_rows import SpatialRow
 from .spatial_transmission import gear_forces, tree_resistance, tree_resistance_slope
 from .spatial_tree import Section
@@ -62,11 +63,12 @@ class SpatialSystem:
 
     Attributes:
         model: what it was made from.
+        replayed: what an earlier analysis found, to act again.
     """
 
     def __init__(self, model: SpatialModel, drives: Drives = NO_DRIVES, commands: Sequence[Command] = ()) -> None:
         """`drives` act beside the loads of the scene, and `commands` will, held."""
-        self.model, tree, self._replayed = model, model.tree, drives.replayed
+        self.model, tree, self.replayed = model, model.tree, drives.replayed
         self._markers: list[list[Section]] = [[] for _ in tree.nodes]
         self._ground: list[Section] = []
         self._turning: list[tuple[int, OrientationLaw]] = []
@@ -107,6 +109,11 @@ class SpatialSystem:
         """In the plane in which all moves, with the same q and v; None where there is none."""
         return in_plane(self._parts, ~self.model.loop_rows)
 
+    def lie_in_plane(self, directions: Sequence[Array]) -> bool:
+        """Whether all moves in a plane, and these (3,), global axes, lie in it."""
+        plane = self.plane
+        return plane is not None and all(abs(plane.axes[2] @ direction) <= EXACT for direction in directions)
+
     @cached_property
     def integrated(self) -> Integrated:
         """What integrators take: in the plane where all moves in one."""
@@ -117,7 +124,7 @@ class SpatialSystem:
     @cached_property
     def replay(self) -> _core.Replay | None:
         """What integrators take of the numbers that are replayed; None where there are none."""
-        if self._replayed is None:
+        if self.replayed is None:
             return None
         size = len(OF_POINT) if self.plane is None else 3
         at_points = [
@@ -126,7 +133,7 @@ class SpatialSystem:
             for name, number in numbers.items()
             for along, share in _shares(OF_POINT.index(name), self.plane)
         ]
-        return _core.Replay(self._replayed.source, self.held_forces(self._replayed.commands), at_points)
+        return _core.Replay(self.replayed.source, self.held_forces(self.replayed.commands), at_points)
 
     def multipliers(self, of_core: Array) -> Array:
         """(T, rows) of the model from those of `integrated`: 0 of rows that this has not, as of dependent ones."""

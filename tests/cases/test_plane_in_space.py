@@ -74,8 +74,9 @@ def assert_same(plane, space, close=CLOSE):
             np.testing.assert_allclose(plane[name], expected, rtol=0, atol=close * peaks[kind], err_msg=name)
 
 
-def test_two_links_along_a_path_and_again_by_their_moments(tmp_path, monkeypatch):
-    tables = tables_of("two_link", TWO_LINK, [INVERSE, REPLAY])
+def test_two_links_along_a_path_and_again_by_their_moments_and_by_its_forces(tmp_path, monkeypatch):
+    along_path = REPLAY | {"name": "along path", "apply": "trajectory"}
+    tables = tables_of("two_link", TWO_LINK, [INVERSE, REPLAY, along_path])
     assert_same(*in_both(tables, tmp_path, monkeypatch))
 
 
