@@ -42,10 +42,12 @@ def run_spatial_forward(context: Context, analysis: ForwardKeys) -> Outcome:
     source = context.outcomes[analysis.actuation]
     if model.tree.gears:
         return _behind_gears(source, model, analysis, context)
+    replayed = _replayed(context, source, analysis)
+    if source.recording is not None:
+        replayed = replayed._replace(integrator=source.statistics.integrator.at_end)
     run = spatial_drive(
         model, analysis, State(source.q[0], source.v[0]), progress,
-        drives=Drives(replayed=_replayed(context, source, analysis)), times=replay_times(source, analysis),
-        earlier=context.earlier,
+        drives=Drives(replayed=replayed), times=replay_times(source, analysis), earlier=context.earlier,
     )  # fmt: skip
     if analysis.apply == "trajectory":  # others act without what makes up for vibrations
         statistics = run.statistics

@@ -68,6 +68,11 @@ class Choice:
     candidates: tuple[Candidate, ...] = ()
 
     @property
+    def at_end(self) -> str:
+        """The method at the end of the run."""
+        return self.name.partition(AFTER)[0]
+
+    @property
     def in_words(self) -> str:
         """The methods in the order of the last change."""
         last, _, before = self.name.partition(AFTER)

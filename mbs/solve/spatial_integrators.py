@@ -13,7 +13,7 @@ from ..model.spatial_model import SpatialModel
 from ..model.spatial_system import SpatialSystem
 from ..model.spatial_transmission import tree_resistance_slope
 from ..scene.analysis import IntegratedAnalysis
-from .integrators import ASKED_FOR, Choice, faster_of
+from .integrators import ASKED_FOR, EXPLICIT, Choice, faster_of
 from .spatial_frequencies import SpatialVibrations, vibrations_in_space, without_rows
 from .state import State
 
@@ -58,13 +58,16 @@ def choose_integrator_in_space(
         return Choice("dop853", "the estimate does not include vibrations of compliant gears")
     if is_sampled:
         return Choice("dop853", "every sample of the controller begins anew")
+    replayed = system.replayed
+    if replayed is not None and replayed.integrator in (*EXPLICIT, "radau"):
+        return Choice(replayed.integrator, "the run that is replayed ended with it")
     found = vibrations_in_space(model, without_rows(model), 0.0, start.q)
     if not len(found.frequency):
         return Choice("dop853", "nothing vibrates")
     excited = _excitation(system, start, found)
     choice = faster_of(found.frequency, found.damping_ratio, excited, analysis, outputs, COST_OF_RADAU)
     # Under a replay the length of steps says less of what they cost: no integrator takes over.
-    return choice if system.replay is None else replace(choice, candidates=())
+    return choice if replayed is None else replace(choice, candidates=())
 
 
 def fastest_friction(system: SpatialSystem, at: State) -> tuple[float, str]:
@@ -100,7 +103,7 @@ def _excitation(system: SpatialSystem, start: State, found: SpatialVibrations) -
     dt = 1e-3 / float(omega.max())
     q, v, a = start.q, start.v, _acceleration(system, 0.0, start)
     later = State(model.tree.integrate(q, dt * v), v + dt * a)
-    at = dt if system.replay is None else 0.0  # round-off of what is replayed, over so short a time, is no jerk
+    at = dt if system.replayed is None else 0.0  # round-off of what is replayed, over so short a time, is no jerk
     jerk = (_acceleration(system, at, later) - a) / dt
     project = (K @ found.shape).T / omega[:, None] ** 2
     amplitude = np.abs(project @ v) / omega + np.abs(project @ a) / omega**2 + np.abs(project @ jerk) / omega**3
