@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
-from functools import cache, partial
+from functools import partial
 from typing import Self
 
 import numpy as np
@@ -34,7 +34,8 @@ from .controllers import Setup
 from .linear_model import LinearModel, linear_model
 from .loop import Loop
 from .loop_keys import SampledAnalysis
-from .loop_record import between, held_commands, held_until, loop_record, sample_times
+from .loop_record import between, held_commands, held_until, loop_record, sample_times, times_of_run
+from .margins import lowest_frequency
 from .metrics import Followed, place_of_tip
 from .planar_robot import PlanarRobot
 from .robot import Robot, input_names
@@ -92,6 +93,10 @@ def run_closed_loop(
     read = _read(robot, built, analysis, patches, whole)
     assembly = _assembly(model, built, analysis, source, read, whole)
     sensor, outputs = sensing(assembly, read), replay_times(source, analysis)
+    tip = place_of(whole, analysis.tip) or _default_tip(assembly)
+    place_at, models = _place_of_tip(analysis, assembly, source, tip), loop_models(built, moved)
+    lowest = lowest_frequency(models, analysis.controller, analysis.sample_time, analysis.delay)
+    times, rows = times_of_run(outputs, place_at, lowest)
     setup = _setup(robot, model, analysis, source, patches, read, outputs, sensor.read(*_states(moved)))
     acting = [make_controller(record, setup, analysis.controller) for record in analysis.controller]
     limit = np.concatenate([motor_limits(model), *(array.limit for array in patches.values())])
@@ -109,17 +114,15 @@ def run_closed_loop(
     held = partial(held_commands, setup=setup, loop=loop)
     before = partial(held, after=-1e-9)  # of accelerations
     control = SampledControl(len(model.motors), voltages, loop.first, sensor, setup.times, analysis.delay, loop, before)
-    outcome = drive(driven, analysis, start, progress, reported=assembly, times=outputs, control=control)
-    known = source.closer if source.in_pieces is None else source
-    runs = [_followed(of, known, held(of.time), place_of(whole, analysis.tip)) for of in (outcome, outcome.closer)]
-    record = loop_record(
-        analysis, setup, loop, acting, (runs[0], runs[1]), loop_models(built, moved), gears=bool(built.gears)
-    )
+    outcome = drive(driven, analysis, start, progress, reported=assembly, times=times, control=control)
+    closer, outcome = outcome.closer, outcome.at([k for k in rows if k < len(outcome.time)])
+    runs = _followed(outcome, place_at, held, tip), _followed(closer, place_at, held, tip)
+    record = loop_record(analysis, setup, loop, acting, runs, models, lowest, gears=bool(built.gears))
 
     def told(of: PlanarOutcome) -> PlanarOutcome:
         return replace(of, forces=Forces(tau=held(of.time)[:, : len(model.motors)]), details=record)
 
-    return replace(told(outcome), look_closer=cache(lambda: told(outcome.closer)))
+    return replace(told(outcome), look_closer=lambda: told(closer))
 
 
 def loop_models(model: Model, reference: PlanarOutcome) -> tuple[LinearModel, ...]:
@@ -192,26 +195,31 @@ def _start(assembly: MechanismSystem, analysis: ClosedLoop, source: PlanarOutcom
     return rotors_like(assembly.model, start, source)
 
 
-def _followed(outcome: PlanarOutcome, source: PlanarOutcome, held: Array, tip: str | None) -> Followed:
-    """Where the tip went against where it should be; `tip` is the point that the scene names, if any."""
-    tip = tip or default_tip(outcome)
-    paths = [path.components for path in outcome.assembly.model.scene.trajectory if path.point == tip]
-    known = source.time, point_motion(source, tip).position
+def _followed(
+    outcome: PlanarOutcome, place_at: Callable[[Array], Array], held: Callable[[Array], Array], tip: str
+) -> Followed:
+    """Where the tip went against where it should be."""
     assert isinstance(outcome.analysis, ClosedLoop)
-    place = place_of_tip(outcome.time, outcome.analysis.last_time, known, paths)
-    error = point_motion(outcome, tip).position - place
-    is_disturbed = bool(outcome.analysis.disturbance)
-    completed = outcome.status == "completed"
-    return Followed(outcome.time, error, place, motor_rates(outcome), held, completed, is_disturbed)
+    error = point_motion(outcome, tip).position - place_at(outcome.time)
+    completed, is_disturbed = outcome.status == "completed", bool(outcome.analysis.disturbance)
+    return Followed(outcome.time, error, place_at, motor_rates(outcome), held(outcome.time), completed, is_disturbed)
 
 
-def default_tip(outcome: PlanarOutcome) -> str:
-    """The point whose error is reported: that of the first trajectory of a point, or the last tip."""
-    scene = outcome.assembly.model.scene
-    driven = [trajectory.point for trajectory in scene.trajectory if trajectory.point is not None]
+def _place_of_tip(
+    analysis: ClosedLoop, assembly: MechanismSystem, source: PlanarOutcome, tip: str
+) -> Callable[[Array], Array]:
+    paths = [path.components for path in assembly.model.scene.trajectory if path.point == tip]
+    run = source.closer if source.in_pieces is None else source
+    known = run.time, point_motion(run, tip).position
+    return partial(place_of_tip, end=analysis.last_time, known=known, paths=paths)
+
+
+def _default_tip(assembly: MechanismSystem) -> str:
+    """The point whose error is measured: that of the first trajectory of a point, or the last tip."""
+    driven = [trajectory.point for trajectory in assembly.model.scene.trajectory if trajectory.point is not None]
     if driven:
         return driven[0]
-    body = outcome.assembly.model.links[-1]
+    body = assembly.model.links[-1]
     return f"{body.name}.{'tip' if 'tip' in body.points else next(iter(body.points))}"
 
 

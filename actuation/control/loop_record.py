@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ...common.arrays import Array
 from ...mbs.analysis.outcome import Details
+from ...mbs.analysis.samples import in_order
 from .controllers import Controller, Setup
 from .linear_model import LinearModel
 from .loop import Loop
 from .loop_keys import SampledAnalysis
-from .margins import Margins, joint_gains, lowest_frequency, margins
-from .metrics import Followed, Metrics, measure
+from .margins import Margins, joint_gains, margins
+from .metrics import Followed, Metrics, measure, resting, ringing, watched
 from .records import ComputedTorque, JointPid, Lqr
 from .suggestion import advice
 
@@ -79,6 +80,17 @@ def held_commands(times: Array, setup: Setup, loop: Loop, after: float = 1e-9) -
     return np.vstack([loop.first, loop.commands[taken]])[which]
 
 
+def times_of_run(outputs: Array, place_at: Callable[[Array], Array], lowest: float) -> tuple[Array, list[int]]:
+    """Times (T,), s, of a run: its outputs, and those at which vibration about `lowest` (Hz) is measured.
+
+    Beside them the rows of the outputs. `place_at` as in `Followed`.
+    """
+    frequency, window = ringing(*resting(place_at, outputs), lowest)
+    more = watched(float(outputs[-1]), window, frequency)
+    times = np.concatenate([outputs, more])[in_order(outputs, more)]
+    return times, [int(k) for k in np.searchsorted(times, outputs)]
+
+
 def loop_record(
     analysis: SampledAnalysis,
     setup: Setup,
@@ -86,15 +98,15 @@ def loop_record(
     acting: Sequence[Controller],
     runs: tuple[Followed, Followed],
     models: Sequence[LinearModel],
+    lowest: float,
     *,
     gears: bool,
 ) -> LoopRecord:
     """Of a run at its outputs, and at these and between; `models` on the reference, none where it is singular.
 
-    `gears`: some give.
+    `lowest`: as in `measure`. `gears`: some give.
     """
     taken, (at_outputs, run) = slice(loop.taken), runs
-    lowest = lowest_frequency(models, analysis.controller, analysis.sample_time, analysis.delay)
     tip_error, metrics = np.linalg.norm(at_outputs.error, axis=1), measure(run, setup, loop, lowest)
     warnings = tuple(_warnings(analysis, acting, metrics, gears))
     record = LoopRecord(

@@ -1,20 +1,23 @@
 """How well a closed loop did: error of the tip, settling, overshoot, vibration, effort: see `DEFINITIONS`.
 
 Vibration is measured in the last period of the lowest frequency that the robot has with its joints controlled or
-locked. What is slower, a drift or an error that dies out, is the cubic of the least-squares fit of a cubic and one
+locked. What is slower, a drift or an error that dies out, is the cubic of a least-squares fit of a cubic and one
 vibration to the last `PERIODS`: the cubic alone would take a part of the vibration for drift.
+
+These numbers are continuous in the motion: which steps an integrator takes, which round-off decides, must not show. So
+they are read at times that do not depend on the steps (`watched`), and no fit is chosen: all count, by what they leave.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from ...common.arrays import Array
-from ...common.peaks import largest, root_mean_square
+from ...common.peaks import largest, root_mean_square, shares
 from .controllers import Setup
 from .loop import Loop
 
@@ -25,7 +28,9 @@ RESTING = 0.1  # of a run, for which it rests at least
 CUBIC = 3
 NEARBY = np.geomspace(0.6, 1.6, 41)  # times the frequency of the linear model: that of the loop is sought there
 EXPLAINED = 0.25  # of what the cubic leaves: what is left beside a vibration, if there is one
-MOST_ROWS = 2000  # that are fitted
+PICKY = 8  # power of what fits leave, by which they count
+WATCHED = 400  # times of the last period, and of what is before it
+FINE = 4000  # intervals of a run, at which its place is read
 WINDOW = 0.1  # s at least, over which motion that a cubic follows is no vibration, for the verdict
 GROWTH = 4.0  # of the vibration's peak, from the second quarter of a run to its last
 AT_REST = 1e-6  # of the way to the last place
@@ -79,7 +84,7 @@ class Followed:
     Attributes:
         time: (T,) s.
         error: (T, d) m, of the tip from its place.
-        place: (T, d) m, where the tip should be.
+        place_at: (T, d) m at times (T,), where the tip should be.
         rates: (T, motors) rad/s, m/s.
         held: (T, inputs) commands.
         completed: whether it came to its end.
@@ -88,7 +93,7 @@ class Followed:
 
     time: Array
     error: Array
-    place: Array
+    place_at: Callable[[Array], Array]
     rates: Array
     held: Array
     completed: bool
@@ -103,7 +108,7 @@ def measure(run: Followed, setup: Setup, loop: Loop, lowest: float) -> Metrics:
     moments, volts = loop.commands[taken, :motors], loop.commands[taken, motors:]
     work = np.abs(run.held[:, :motors] * run.rates).sum(axis=1)
     cut = (loop.commands[taken] != loop.wanted[taken]).any(axis=1)
-    lowest, window = ringing(t, run.place, lowest)
+    lowest, window = ringing(*resting(run.place_at, t), lowest)
     return Metrics(
         _verdict(run, lowest),
         root_mean_square(t, distance),
@@ -116,7 +121,7 @@ def measure(run: Followed, setup: Setup, loop: Loop, lowest: float) -> Metrics:
         float(np.abs(moments).max(initial=0.0)),
         float(np.abs(volts).max(initial=0.0)),
         float(cut.mean()),
-        overshoot(run.place, run.error),
+        overshoot(t, run.place_at(t), run.error),
         lowest,
         window,
     )
@@ -130,8 +135,7 @@ def ringing(time: Array, place: Array, lowest: float) -> tuple[float, float]:
     """
     whole = float(time[-1] - time[0])
     way = np.linalg.norm(place - place[-1], axis=1)
-    moving = np.flatnonzero(way > AT_REST * way.max(initial=0.0))
-    rest = float(time[-1] - time[moving[-1] + 1]) if moving.size else whole
+    rest = float(time[-1]) - _last_crossing(time, way, AT_REST * float(way.max(initial=0.0)))
     room, periods = (rest, LEAST_PERIODS) if rest >= RESTING * whole else (0.5 * whole, PERIODS)
     if not lowest > 0.0 or not room > 0.0:
         return lowest, whole
@@ -139,39 +143,65 @@ def ringing(time: Array, place: Array, lowest: float) -> tuple[float, float]:
     return frequency, min(room, PERIODS / frequency)
 
 
+def resting(place_at: Callable[[Array], Array], time: Array) -> tuple[Array, Array]:
+    """Times (T,) over those of a run, and the place of its tip there (T, d): for `ringing`."""
+    even = np.linspace(time[0], time[-1], FINE + 1)
+    return even, place_at(even)
+
+
+def watched(end: float, window: float, lowest: float) -> Array:
+    """(2 `WATCHED` + 1,) s: times over the `window` (s) before `end`, the last half of them in a period of `lowest`."""
+    begin = end - _period(window, lowest)
+    before = np.linspace(end - window, begin, WATCHED, endpoint=False)
+    found: Array = np.concatenate([before, np.linspace(begin, end, WATCHED + 1)])
+    return found
+
+
 def vibration(time: Array, error: Array, window: float, lowest: float) -> float:
     """Peak to peak (m) of `error` (T, d) in the last period of `lowest` (Hz), where it is largest, less what is slower.
 
-    That is found over the last `window` (s) of `time` (T,).
+    That is found over the last `window` (s) of `time` (T,), which should have the times `watched`.
     """
-    late = np.flatnonzero(time >= time[-1] - window)
-    late = late[:: -(-len(late) // MOST_ROWS)]
-    if len(late) < 2 * CUBIC:
+    if not window > 0.0:
         return 0.0
-    t, left = time[late], error[late] - error[late].mean(axis=0)
-    x = 2.0 * (t - t[0]) / (t[-1] - t[0]) - 1.0
-    slow = np.vander(x, CUBIC + 1)
-    found = left - slow @ np.linalg.lstsq(slow, left, rcond=None)[0]
-    fits = []
-    for omega in 2.0 * np.pi * lowest * NEARBY if lowest > 0.0 else ():
-        both = np.column_stack([slow, np.cos(omega * t), np.sin(omega * t)])
-        parts = np.linalg.lstsq(both, left, rcond=None)[0]
-        fits.append((float(((left - both @ parts) ** 2).sum()), parts))
-    if fits:
-        least, parts = min(fits, key=lambda fit: fit[0])
-        if least < EXPLAINED * float((found**2).sum()):
-            found = left - slow @ parts[: CUBIC + 1]
-    last = found[t >= t[-1] - min(window, 1.0 / lowest)] if lowest > 0.0 else found
-    direction = np.linalg.svd(last, full_matrices=False)[2][0]
-    return float(np.ptp(last @ direction))
+    t = watched(float(time[-1]), window, lowest)
+    values = _interpolated(t, time, error)
+    left = values - _slower(t, values, lowest)
+    last = left[t >= t[-WATCHED - 1]]
+    return float(np.sqrt(max(((last - one) ** 2).sum(axis=1).max() for one in last)))
 
 
-def overshoot(place: Array, error: Array) -> float:
+def _period(window: float, lowest: float) -> float:
+    return min(window, 1.0 / lowest) if lowest > 0.0 else window
+
+
+def _slower(t: Array, values: Array, lowest: float) -> Array:
+    """The cubic of (T, d) beside a vibration near `lowest` (Hz), (T, d).
+
+    The mean of the least-squares fits with one vibration each and of the cubic alone, weighted by a power of what each
+    leaves, so that the best decides: frequencies as in G. L. Bretthorst, Bayesian Spectrum Analysis, 1988, ch. 2.
+    """
+    weights = np.sqrt(shares(t))[:, None]
+    slow = np.vander(2.0 * (t - t[0]) / (t[-1] - t[0]) - 1.0, CUBIC + 1)
+    phases = 2.0 * np.pi * lowest * NEARBY[:, None] * t if lowest > 0.0 else ()
+    cubics, lefts = [], []
+    for shape in (slow, *(np.column_stack([slow, np.cos(phase), np.sin(phase)]) for phase in phases)):
+        parts = np.linalg.lstsq(weights * shape, weights * values, rcond=None)[0]
+        cubics.append(slow @ parts[: CUBIC + 1])
+        lefts.append(float(((weights * (values - shape @ parts)) ** 2).sum()))
+    least = np.array([EXPLAINED * lefts[0], *lefts[1:]]) + np.finfo(float).eps * float(((weights * values) ** 2).sum())
+    if not least.any():
+        return np.zeros_like(values)
+    found: Array = np.average(cubics, axis=0, weights=(least.min() / least) ** PICKY)
+    return found
+
+
+def overshoot(time: Array, place: Array, error: Array) -> float:
     """How far (m) the tip, at `place` + `error` (T, d), gets beyond its last place along the line to it."""
     way = place[-1] - place[0]
     length = float(np.linalg.norm(way))
-    beyond = (place + error - place[-1]) @ way
-    return float(max(0.0, beyond.max())) / length if length > 0.0 else 0.0
+    beyond = np.maximum((place + error - place[-1]) @ way, 0.0)
+    return largest(time, beyond)[0] / length if length > 0.0 else 0.0
 
 
 def place_of_tip(time: Array, end: float, known: tuple[Array, Array], paths: Sequence[Mapping[str, Any]]) -> Array:
@@ -179,7 +209,9 @@ def place_of_tip(time: Array, end: float, known: tuple[Array, Array], paths: Seq
 
     Else where it is in the inverse analysis, `known` as its times (K,) and positions (K, d).
     """
-    place = _interpolated(time, *known)
+    from scipy.interpolate import CubicSpline
+
+    place: Array = CubicSpline(*known)(time)
     on_path = np.clip(time, 0.0, end)
     for components in paths:
         for component, target in components.items():
@@ -203,10 +235,27 @@ def _slow(t: Array, values: Array, window: float) -> Array:
 
 
 def _settling(t: Array, distance: Array) -> float:
-    outside = np.flatnonzero(distance > SETTLED * distance.max())
-    if not outside.size:
-        return 0.0
-    return float(t[outside[-1] + 1]) if outside[-1] + 1 < len(t) else float("nan")
+    largest_error = float(distance.max())
+    return _last_crossing(t, distance, SETTLED * largest_error) if largest_error > 0.0 else 0.0
+
+
+def _last_crossing(t: Array, values: Array, level: float) -> float:
+    """When (s) `values` (T,) last come down to `level`, on the cubic through four of them; NaN where they end above it.
+
+    The first of the times (T,) where they are never above it.
+    """
+    above = np.flatnonzero(values > level)
+    if not above.size:
+        return float(t[0])
+    k = int(above[-1])
+    if k + 1 == len(t):
+        return float("nan")
+    near, step = slice(max(k - 1, 0), k + 3), t[k + 1] - t[k]
+    x, y = (t[near] - t[k]) / step, values[near] - level
+    roots = np.roots(np.polyfit(x, y, len(x) - 1))
+    inside = roots.real[(roots.imag == 0.0) & (roots.real >= 0.0) & (roots.real <= 1.0)]
+    share = inside.max(initial=0.0) or (values[k] - level) / (values[k] - values[k + 1])
+    return float(t[k] + share * step)
 
 
 def _verdict(run: Followed, lowest: float) -> str:
@@ -214,7 +263,7 @@ def _verdict(run: Followed, lowest: float) -> str:
     if not run.completed:
         return "diverges"
     even = np.linspace(run.time[0], run.time[-1], len(run.time))
-    error = np.column_stack([np.interp(even, run.time, column) for column in run.error.T])
+    error = _interpolated(even, run.time, run.error)
     window = WINDOW if not lowest > 0.0 else max(WINDOW, min(PERIODS / lowest, np.ptp(even) / 4))
     shaking = np.linalg.norm(error - _slow(even, error, window), axis=1)
     quarters = [part.max(initial=0.0) for part in np.array_split(shaking, 4)]

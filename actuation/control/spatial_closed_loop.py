@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import replace
-from functools import cache, partial
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -30,7 +30,8 @@ from .controllers import Setup
 from .linear_model import LinearModel, state_space
 from .loop import Loop
 from .loop_keys import SampledAnalysis
-from .loop_record import between, held_commands, held_until, loop_record, sample_times
+from .loop_record import between, held_commands, held_until, loop_record, sample_times, times_of_run
+from .margins import lowest_frequency
 from .metrics import Followed, place_of_tip
 from .robot import input_names
 from .signals import merged
@@ -80,7 +81,11 @@ def run_spatial_closed_loop(context: ActuatedContext, analysis: SpatialClosedLoo
     )
     read = merged(given, more)
     sensing = SpatialSensing(plant.model, read)
-    outputs = replay_times(source, analysis)
+    outputs, tip = replay_times(source, analysis), place_of(whole, analysis.tip) or _default_tip(plant.model)
+    models = loop_models_in_space(plant.model, source.time, plant.source)
+    place_at = _place_of_tip(analysis, plant.model, source, tip)
+    lowest = lowest_frequency(models, analysis.controller, analysis.sample_time, analysis.delay)
+    times, rows = times_of_run(outputs, place_at, lowest)
     setup = _setup(context, analysis, source, robot, plant, read, outputs, sensing.read(*plant.source[:3]))
     acting = [make_controller(record, setup, analysis.controller) for record in analysis.controller]
     limit = np.full(len(setup.inputs), np.inf) if analysis.unlimited else _limits(context)
@@ -96,19 +101,18 @@ def run_spatial_closed_loop(context: ActuatedContext, analysis: SpatialClosedLoo
     disturbing = ((place_of(whole, str(load.point)), load.components) for load in analysis.disturbance)
     drives = Drives(at_points=tuple(PointDrive(*load) for load in disturbing))
     run = spatial_drive(
-        plant.model, analysis, _start(context, analysis, plant), context.progress, drives=drives, times=outputs,
+        plant.model, analysis, _start(context, analysis, plant), context.progress, drives=drives, times=times,
         control=control,
     )  # fmt: skip
-    models = loop_models_in_space(plant.model, source.time, plant.source)
-    runs = [_followed(of, source.closer, held(of.time), place_of(whole, analysis.tip)) for of in (run, run.closer)]
-    gears = bool(plant.model.tree.gears)
-    record = loop_record(analysis, setup, loop, acting, (runs[0], runs[1]), models, gears=gears)
+    closer, run = run.closer, run.at([k for k in rows if k < len(run.time)])
+    runs, gears = (_followed(run, place_at, held, tip), _followed(closer, place_at, held, tip)), plant.model.tree.gears
+    record = loop_record(analysis, setup, loop, acting, runs, models, lowest, gears=bool(gears))
 
     def told(of: Outcome) -> Outcome:
         commanded, driving = (_by_joint(context.model, commands(of.time)) for commands in (held, before))
         return replace(of, forces=replace(of.forces, commanded=commanded, driving=driving), details=record)
 
-    return replace(told(run), look_closer=cache(lambda: told(run.closer)))
+    return replace(told(run), look_closer=lambda: told(closer))
 
 
 def _robot(context: ActuatedContext, source: Outcome) -> SpatialRobot:
@@ -193,26 +197,22 @@ def _start(context: ActuatedContext, analysis: SpatialClosedLoop, plant: _Plant)
     return State(q, v)
 
 
-def _followed(run: Outcome, source: Outcome, held: Array, tip: str | None) -> Followed:
-    """Where the tip went against where it should be; `tip` is the point that the scene names, if any."""
-    analysis, model = run.analysis, run.model
-    assert isinstance(analysis, SpatialClosedLoop)
-    tip = tip or _default_tip(model)
-    paths = [path.components for path in model.scene.trajectory if path.point == tip]
-    known = source.time, _position(source, tip)
-    place = place_of_tip(run.time, analysis.last_time, known, paths)
+def _followed(run: Outcome, place_at: Callable[[Array], Array], held: Callable[[Array], Array], tip: str) -> Followed:
+    """Where the tip went against where it should be."""
+    assert isinstance(run.analysis, SpatialClosedLoop)
+    model = run.model
     columns = np.concatenate([*model.motors.values(), np.zeros(0, dtype=int)]).astype(int)
-    signs = np.array([model.sign(joint) for joint, of in model.motors.items() for _ in of])
-    completed = run.status == "completed"
-    return Followed(
-        run.time,
-        _position(run, tip) - place,
-        place,
-        signs * run.v[:, columns],
-        held,
-        completed,
-        bool(analysis.disturbance),
-    )
+    rates = np.array([model.sign(joint) for joint, of in model.motors.items() for _ in of]) * run.v[:, columns]
+    completed, is_disturbed = run.status == "completed", bool(run.analysis.disturbance)
+    error = _position(run, tip) - place_at(run.time)
+    return Followed(run.time, error, place_at, rates, held(run.time), completed, is_disturbed)
+
+
+def _place_of_tip(
+    analysis: SpatialClosedLoop, model: SpatialModel, source: Outcome, tip: str
+) -> Callable[[Array], Array]:
+    paths, run = [path.components for path in model.scene.trajectory if path.point == tip], source.closer
+    return partial(place_of_tip, end=analysis.last_time, known=(run.time, _position(run, tip)), paths=paths)
 
 
 def _position(run: Outcome, point: str) -> Array:

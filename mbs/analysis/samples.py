@@ -26,6 +26,7 @@ MOST = 20_000  # times of a prescribed motion
 RESOLVED = 1e-6  # of the largest value or rate of a path: what the trapezoidal rule may miss between two times
 ROUNDS = 30  # of halving
 SHORTEST = 1e-9  # of a run, between two times
+SAME = 1e-13  # of the latest time, by which equal ones differ at most
 BRIEF, FAR = 0.01, 20.0  # of a run; times the longest way of a piece in the time of the run: see `stops`
 PARTS = 16  # of such a piece
 
@@ -73,8 +74,15 @@ def _highest(values: Array) -> list[int]:
 
 
 def in_order(outputs: Array, samples: Array) -> Indices:
-    """Rows of outputs with samples behind them, in the order of time; of equal times the output alone."""
-    found: Indices = np.unique(np.concatenate([outputs, samples]), return_index=True)[1]
+    """Rows of outputs (T,) with samples (k,) behind them, both in s and ascending, in the order of time.
+
+    Of times that are equal to round-off the output alone: steps that end at samples of a controller meet outputs so.
+    """
+    times, after = np.concatenate([outputs, samples]), np.searchsorted(outputs, samples)
+    padded = np.concatenate([[-np.inf], outputs, [np.inf]])
+    apart = np.minimum(samples - padded[after], padded[after + 1] - samples) > SAME * np.abs(times).max(initial=0.0)
+    rows = np.concatenate([np.arange(len(outputs)), len(outputs) + np.flatnonzero(apart)])
+    found: Indices = rows[np.unique(times[rows], return_index=True)[1]]
     return found
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import ffrobot
-from ffrobot.actuation.control.metrics import overshoot, ringing, vibration
+from ffrobot.actuation.control.metrics import _settling, overshoot, ringing, vibration, watched
 
 TIME = np.linspace(0.0, 2.0, 2001)
 TRAVEL = np.column_stack([np.clip(TIME / 0.3, 0.0, 1.0), 0.0 * TIME])
@@ -14,10 +14,9 @@ TRAVEL = np.column_stack([np.clip(TIME / 0.3, 0.0, 1.0), 0.0 * TIME])
 
 def measured(error, lowest):
     """Along a direction across both axes."""
-    both = np.outer(error, [0.6, 0.8])
     frequency, window = ringing(TIME, TRAVEL, lowest)
     assert frequency == lowest
-    return vibration(TIME, both, window, lowest)
+    return vibration(TIME, np.outer(error, [0.6, 0.8]), window, lowest)
 
 
 @pytest.mark.parametrize("lowest", [2.8, 6.5, 20.0])
@@ -48,8 +47,48 @@ def test_a_run_too_short_for_the_lowest_frequency_is_measured_about_one_that_fit
 def test_overshoot_is_beyond_the_last_place_along_the_way():
     error = np.column_stack([0.1 * np.exp(-5 * TIME) * np.sin(9 * TIME), 0.3 * np.sin(7 * TIME)])
     beyond = (TRAVEL + error)[:, 0].max() - 1.0
-    assert overshoot(TRAVEL, error) == pytest.approx(beyond, rel=1e-12)
-    assert overshoot(np.ones((5, 2)), np.ones((5, 2))) == 0.0
+    assert overshoot(TIME, TRAVEL, error) == pytest.approx(beyond, rel=1e-12)
+    assert overshoot(TIME[:5], np.ones((5, 2)), np.ones((5, 2))) == 0.0
+
+
+def two_tones(time, *, share):
+    """Two vibrations near 6.5 Hz, of which either may be taken for the vibration, on an ellipse, and a drift."""
+    tones = np.column_stack([(1.0 - share) * np.cos(33.0 * time), share * np.sin(52.0 * time + 0.3)])
+    return 1e-3 * (tones + tones[:, ::-1] * [1.0, -1.0]) + np.outer(np.exp(-time), [2e-3, 1e-3])
+
+
+@pytest.mark.parametrize("share", [0.0, 0.45, 0.5, 0.55, 1.0])
+def test_vibration_does_not_depend_on_the_steps_of_the_run(share):
+    """Steps of other numbers and lengths, and values that are off by 1e-12: round-off decides on no more than that."""
+    rng, found = np.random.default_rng(4), []
+    for count in (900, 1000, 1700):
+        steps = np.unique(np.concatenate([[0.0, 2.0], rng.uniform(0.0, 2.0, count), watched(2.0, 3 / 6.5, 6.5)]))
+        error = two_tones(steps, share=share)
+        found.append(
+            vibration(steps, error + 1e-12 * np.abs(error).max() * rng.uniform(-1, 1, error.shape), 3 / 6.5, 6.5)
+        )
+    assert found == pytest.approx([found[0]] * 3, rel=1e-9)
+
+
+@pytest.mark.parametrize("share", np.linspace(0.3, 0.7, 9))
+def test_vibration_is_continuous_where_one_fit_becomes_better_than_another(share):
+    beside = [vibration(TIME, two_tones(TIME, share=share + off), 3 / 6.5, 6.5) for off in (0.0, 1e-6, 1e-3)]
+    assert beside[1] == pytest.approx(beside[0], rel=1e-4)
+    assert beside[2] == pytest.approx(beside[0], rel=1e-1)
+
+
+def test_on_a_circle_vibration_is_the_diameter():
+    """To 1 %: frequencies that are tried are 2.5 % apart."""
+    turning = 0.02 * np.column_stack([np.cos(41 * TIME), np.sin(41 * TIME), 0.0 * TIME])
+    assert vibration(TIME, turning, 6 * np.pi / 41, 41 / (2 * np.pi)) == pytest.approx(0.04, rel=0.01)
+
+
+def test_settling_is_where_the_error_comes_down_to_its_share():
+    """e^{−5 t} comes to 5 % at ln 20/5, between the times at which it is known, whatever these are."""
+    for times in (np.linspace(0.0, 2.0, 101), np.linspace(0.0, 1.9, 73) ** 1.1):
+        assert _settling(times, np.exp(-5.0 * times)) == pytest.approx(np.log(20.0) / 5.0, rel=1e-5)
+    assert np.isnan(_settling(TIME, 1.0 + TIME))
+    assert _settling(TIME, 0.0 * TIME) == 0.0
 
 
 def arm(*, space, thickness, step):
@@ -99,3 +138,20 @@ def test_an_arm_that_rings_below_ten_hertz_is_said_to(space, thickness, hertz):
     assert found[0] == pytest.approx(found[1], rel=5e-3)  # feed-forward is that of the outputs' spline
     if not space:
         assert found[0][0] == pytest.approx(0.051, rel=0.02)
+
+
+CONTINUOUS = ("vibration", "vibration_window", "lowest_frequency", "settling_time", "overshoot", "tip_error_rms")
+
+
+@pytest.mark.parametrize(("space", "thickness"), [(False, 0.004), (True, 0.007)])
+def test_metrics_change_as_little_as_their_input(space, thickness):
+    """A payload heavier by 1e-12 changes the number of steps, no more."""
+    found = []
+    for mass in (0.3, 0.3 * (1 + 1e-12), 0.3 * (1 - 3e-12)):
+        scene = arm(space=space, thickness=thickness, step=0.002)
+        scene["payload"][0]["mass"] = mass
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", ffrobot.FfrobotWarning)
+            about = ffrobot.solve(ffrobot.make_scene(**scene)).attributes("held/control")
+        found.append([about[key] for key in CONTINUOUS])
+    assert np.array(found[1:]) == pytest.approx(np.array(found[:1] * 2), rel=1e-6, nan_ok=True)

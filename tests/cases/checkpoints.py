@@ -46,7 +46,7 @@ TABLES = {
     ("geared_arm", "joint"): 0.02,
     ("compliant_arm", "gears"): 1e-3,
     ("compliant_arm", "joint"): 0.02,
-    ("compliant_arm", "run"): 0.3,  # limit cycles of encoders: round-off moves what is left of vibration
+    ("compliant_arm", "run"): 0.02,
     ("two_link_closed_loop", "run"): 0.02,
     ("two_link_rest_to_rest", "run"): 0.02,
     ("two_link_rest_to_rest", "times less"): 0.03,  # quotients of the above
