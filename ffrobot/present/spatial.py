@@ -13,7 +13,7 @@ from ..results.verdict import Verdict
 from ..run.spatial_solution import SpatialSolution
 from .accuracy import error_budget
 from .control import control_lines, control_tables
-from .lines import integrator_lines, warning_lines
+from .lines import alike, integrator_lines, warning_lines
 from .modes import chosen_modes, pieces_in_words
 from .stresses import stress_table
 from .tables import plain_table
@@ -23,7 +23,7 @@ from .voltages import voltage_table
 def print_spatial_summary(
     solution: SpatialSolution, verdict: Verdict, path: Path, seconds: Mapping[str, float], console: Console
 ) -> None:
-    """Tables of analyses, motors and patches, warnings, whether it can be done, wall time per stage, the file."""
+    """Tables of analyses, motors and patches, warnings and notes, whether it can be done, wall times, the file."""
     table = plain_table("analysis", "kind", "status", "integrator", "steps", "evaluations", "constraint\nviolation")
     motors = plain_table("analysis", "motor", "largest", "unit")
     units = {joint.name: joint.units for joint in solution.scene.joint}
@@ -61,6 +61,8 @@ def print_spatial_summary(
     bending = {name: result.bending for name, result in solution.analyses.items()}
     for line in warning_lines(bending, {name: result.warnings for name, result in solution.analyses.items()}):
         console.print(f"warning    {line}")
+    for line in alike((name, text) for name, result in solution.analyses.items() for text in result.notes):
+        console.print(f"note       {line}")
     notes = Table.grid(padding=(0, 2))
     for one in verdict.analyses:
         if one.answer:

@@ -265,7 +265,15 @@ class Results:
     @property
     def warnings(self) -> dict[str, list[str]]:
         """Why results of an analysis may be wrong, or not mean what they seem to; by analysis, where there is any."""
-        told = {name: self.attributes(name).get("warnings", ()) for name in self.analyses}
+        return self._texts("warnings")
+
+    @property
+    def notes(self) -> dict[str, list[str]]:
+        """What is worth knowing of right results of an analysis; by analysis, where there is any."""
+        return self._texts("notes")
+
+    def _texts(self, kind: str) -> dict[str, list[str]]:
+        told = {name: self.attributes(name).get(kind, ()) for name in self.analyses}
         return {name: [str(text) for text in texts] for name, texts in told.items() if len(texts)}
 
     @property

@@ -27,7 +27,7 @@ from .linear import write_spatial_linear
 from .peaks import write_peaks
 from .spatial_actuation import write_actuation
 from .spatial_resume import write_state_in_space
-from .write import write_check, write_head, write_judgement, write_mode_errors, write_steps
+from .write import write_check, write_head, write_judgement, write_mode_errors, write_steps, write_texts
 
 
 def write_spatial_results(solution: SpatialSolution, path: Path) -> None:
@@ -51,7 +51,7 @@ def spatial_image(solution: SpatialSolution) -> bytes:
             if isinstance(result.run.details, LinearModels):
                 write_spatial_linear(file[name], result.motion, result.run.details)
         if (run := solution.unread) is not None:
-            _write_run(file.create_group(run.analysis.name), run, run.statistics.warnings)
+            _write_run(file.create_group(run.analysis.name), run, run.statistics.warnings, ())
         write_state_in_space(file, solution)
         file.flush()
         image: bytes = file.id.get_file_image()
@@ -60,7 +60,7 @@ def spatial_image(solution: SpatialSolution) -> bytes:
 
 def _write_analysis(group: h5py.Group, solution: SpatialSolution, result: SpatialResult) -> None:
     run, motion = result.run, result.motion
-    _write_run(group, run, result.warnings)
+    _write_run(group, run, result.warnings, result.notes)
     group.attrs["stiffening_effect"] = result.stiffening_effect
     write_judgement(group, result)
     if joints := resolving_joints(motion.model):
@@ -93,7 +93,7 @@ def _write_analysis(group: h5py.Group, solution: SpatialSolution, result: Spatia
     violation.attrs["columns"] = ["position", "velocity"]
 
 
-def _write_run(group: h5py.Group, run: Outcome, warnings: Sequence[str]) -> None:
+def _write_run(group: h5py.Group, run: Outcome, warnings: Sequence[str], notes: Sequence[str]) -> None:
     """What is known of a run whether it has outputs or not."""
     analysis, how = run.analysis, run.statistics
     group.attrs.update({"kind": analysis.kind, "tolerance": analysis.tolerance})
@@ -102,7 +102,7 @@ def _write_run(group: h5py.Group, run: Outcome, warnings: Sequence[str]) -> None
     group.attrs.update({"integrator": how.integrator.name, "integrator_reason": how.integrator.reason})
     for key in ("steps", "evaluations", "wall_seconds", "status"):
         group.attrs[key] = getattr(how, key)
-    group.attrs.create("warnings", list(warnings), dtype=h5py.string_dtype())
+    write_texts(group, warnings, notes)
     group["time"] = run.time
     write_steps(group, how.step_ends, how.integrator.name)
 

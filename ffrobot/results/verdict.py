@@ -47,6 +47,7 @@ class AnalysisVerdict:
         stress: largest von Mises, Pa, the body, and when; None where none was asked for.
         margins: of a closed loop by its linear model, in words; empty where not known.
         warnings: why results may be wrong, or not mean what they seem to.
+        notes: what is worth knowing of results that are right.
         advice: what to try next, a text each.
     """
 
@@ -63,6 +64,7 @@ class AnalysisVerdict:
     stress: Place | None
     margins: str
     warnings: tuple[str, ...]
+    notes: tuple[str, ...]
     advice: tuple[str, ...]
 
     def lines(self) -> Iterator[str]:
@@ -137,6 +139,7 @@ def _judge(name: str, group: h5py.Group, scene: Scene, coordinates: Coordinates)
         stress=None if _ended_early(group) else _stress(group),
         margins=_margins(group),
         warnings=tuple(map(str, about.get("warnings", ()))),
+        notes=tuple(map(str, about.get("notes", ()))),
         advice=tuple(_advice(group, motors, units, patches)),
     )
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -89,7 +89,7 @@ def _write_analysis(group: h5py.Group, solution: Solution, result: AnalysisResul
     _write_attributes(group, outcome)
     group.attrs["stiffening_effect"] = result.stiffening_effect
     write_judgement(group, result)
-    group.attrs.create("warnings", list(result.warnings), dtype=h5py.string_dtype())
+    write_texts(group, result.warnings, result.notes)
     if solution.mode_choice is not None:
         write_mode_errors(group, name, solution.mode_choice)
     write_check(group, result.check)
@@ -105,6 +105,12 @@ def _write_analysis(group: h5py.Group, solution: Solution, result: AnalysisResul
     for found, write in DETAILS.items():
         if isinstance(outcome.details, found):
             write(group, outcome, outcome.details)
+
+
+def write_texts(group: h5py.Group, warnings: Sequence[str], notes: Sequence[str]) -> None:
+    """Of an analysis: why its results may be wrong, and what is worth knowing of right ones."""
+    for name, texts in (("warnings", warnings), ("notes", notes)):
+        group.attrs.create(name, list(texts), dtype=h5py.string_dtype())
 
 
 def write_judgement(group: h5py.Group, result: AnalysisResult | SpatialResult) -> None:

@@ -66,6 +66,7 @@ class AnalysisResult:
         start_jolt: see `attachment_error`.
         check: what a replay on finer links found, where that is asked for.
         warnings: why results may be wrong, or not mean what they seem to, a text each.
+        notes: what is worth knowing of results that are right, likewise.
     """
 
     outcome: PlanarOutcome
@@ -80,6 +81,7 @@ class AnalysisResult:
     start_jolt: float = 0.0
     check: FinerCheck | None = None
     warnings: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
     closer: AnalysisResult | None = field(default=None, repr=False)
 
     @property

@@ -101,12 +101,16 @@ class SpatialResult:
             *self.run.statistics.warnings,
             *unresolved_gears(self.motion.gears),
         )
-        told = told if self.sharing is None else (*told, self.sharing.in_words)
         if isinstance(self.run.details, LoopRecord):
             told = (*told, *self.run.details.warnings)
         elif self.motion.is_prescribed:
             told = (*told, *path_warnings(self.run.analysis, self.run.time, self.motion.model.scene.trajectory))
         return told if missed is None else (*told, missed.in_words)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What is worth knowing of results that are right, a text each."""
+        return () if self.sharing is None else (self.sharing.in_words,)
 
     @cached_property
     def _doubts(self) -> tuple[str, ...]:

@@ -44,9 +44,14 @@ def analyses_table(runs: Sequence[Run]) -> Table:
 
 
 def warnings_table(runs: Sequence[Run]) -> Table:
-    """Why results may be wrong, a text in each row."""
-    rows = [(run.label, text) for run in runs for text in run.results.warnings.get(run.analysis, ())]
-    return Table(("analysis", "warning"), rows)
+    """Why results may be wrong, and what is worth knowing of right ones, a text in each row."""
+    rows = [
+        (run.label, kind, text)
+        for kind, attribute in (("warning", "warnings"), ("note", "notes"))
+        for run in runs
+        for text in getattr(run.results, attribute).get(run.analysis, ())
+    ]
+    return Table(("analysis", "", "text"), rows)
 
 
 def bending_table(runs: Sequence[Run]) -> Table:
