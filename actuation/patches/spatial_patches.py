@@ -130,7 +130,7 @@ def link_patches(path: Path, layouts: Sequence[SpatialPztLayout], body: ModalBod
         for one, of in zip(placed, found, strict=True)
     }
     Phi_V = np.concatenate([of.Phi_V for of in found])
-    reached = _reached(Phi_V, body, spatial)
+    reached = modes[layouts[0].label] if len(layouts) == 1 else _reached(Phi_V, body, spatial)
     reach = _alone(arrays[layouts[0].label]) if len(layouts) == 1 else _together(path, layouts, arrays, reached, Phi_V)
     if all(layout.allocation == "exact" for layout in layouts):
         check_all_served(key, reach)

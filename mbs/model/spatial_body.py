@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from types import MappingProxyType
 
 import numpy as np
@@ -86,7 +87,7 @@ class SpatialBody:
         """With all modes of its file."""
         return self if self.reduction is None else self.reduction.whole
 
-    @property
+    @cached_property
     def on_file(self) -> Array:
         """(n, n_file): forces (…, n) on p times this are those on the modes of the file that do the same work on them.
 

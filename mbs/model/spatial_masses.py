@@ -82,12 +82,11 @@ def uncoupling(M: Array, K: Array) -> tuple[Array, Array]:
 
 def coupled_blocks(*matrices: Array) -> list[Indices]:
     """Numbers of the modes that feel each other in any of the matrices (n, n), set by set."""
-    # Loaded here: only links with patches of mass pay for it.
-    from scipy.sparse.csgraph import connected_components
-
-    coupled = np.zeros_like(matrices[0], dtype=bool)
+    coupled = np.eye(len(matrices[0]), dtype=bool)
     for matrix in matrices:
         scale = np.sqrt(np.diag(matrix))
         coupled |= np.abs(matrix) > UNCOUPLED * np.outer(scale, scale)
-    count, label = connected_components(coupled)
-    return [np.flatnonzero(label == k) for k in range(count)]
+    coupled |= coupled.T
+    while np.any((further := coupled @ coupled) != coupled):
+        coupled = further
+    return [np.flatnonzero(coupled[k]) for k in np.unique(coupled.argmax(axis=1))]

@@ -11,7 +11,9 @@ import numpy as np
 from ...common.arrays import Array, Booleans
 from ...common.errors import InputError
 from ...common.validation import did_you_mean, quoted
+from ..joints.spatial.free import SpatialFree
 from ..joints.spatial.joint import SpatialJoint
+from ..joints.spatial.planar_joint import SpatialPlanar
 from ..scene.spatial.mechanism import SpatialMechanismScene
 from ..scene.spatial.trajectories import SpatialTrajectory
 from ..scene.topology import Edge, spanning_forest
@@ -102,7 +104,8 @@ def build_spatial_model(scene: SpatialMechanismScene, bodies: Sequence[SpatialBo
     joints = (*scene.joint, *(weld for _, weld in carried))
     names = [*(body.name for body in scene.body), *(body.name for body, _ in carried)]
     topology = spanning_forest(names, [*scene.edges, *(Edge(weld.between) for _, weld in carried)])
-    tree = SpatialTree([*(body for body, _ in carried), *bodies], joints, topology)
+    floating = SpatialPlanar if scene.is_planar else SpatialFree
+    tree = SpatialTree([*(body for body, _ in carried), *bodies], joints, topology, floating)
     _check_cut_joints(scene, tree)
     rows = [row for joint in tree.loops for row in _loop_rows(scene, tree, joint)]
     rows += [row for trajectory in scene.trajectory for row in _path_rows(scene, tree, trajectory)]

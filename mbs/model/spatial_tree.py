@@ -18,6 +18,7 @@ from ...common.rotations import exponential, left_jacobian, of_quaternion, quate
 from ..fields.field_types import GROUND
 from ..joints.spatial.free import SpatialFree
 from ..joints.spatial.joint import SpatialJoint
+from ..joints.spatial.planar_joint import SpatialPlanar
 from ..scene.topology import Topology
 from .spatial_bending import bent_section
 from .spatial_body import SpatialBody
@@ -46,7 +47,7 @@ class Node:
 
     Attributes:
         body: its constants.
-        joint: that carries it; a free one at the origin where the scene has none.
+        joint: that carries it; where the scene has none a free one at the origin, in planar scenes a planar one.
         backwards: whether the joint's first side is on this body.
         inner: the joint's triad on what carries it.
         outer: its triad on this body.
@@ -91,13 +92,20 @@ class SpatialTree:
 
     gears: tuple[ElasticGearInSpace, ...] = ()
 
-    def __init__(self, bodies: Sequence[SpatialBody], joints: Sequence[SpatialJoint], topology: Topology) -> None:
+    def __init__(
+        self,
+        bodies: Sequence[SpatialBody],
+        joints: Sequence[SpatialJoint],
+        topology: Topology,
+        floating: type[SpatialFree | SpatialPlanar] = SpatialFree,
+    ) -> None:
+        """`floating`: the type of joint, at the origin, of bodies that no joint carries."""
         by_name = {body.name: body for body in bodies}
         self.index = {name: number for number, name in enumerate(topology.carriers)}
         nodes, q, v = [], 0, 0
         for number, (name, carrier) in enumerate(topology.carriers.items()):
             body = by_name[name]
-            joint = _free(name) if carrier is None else joints[carrier.joint]
+            joint = _at_origin(name, floating) if carrier is None else joints[carrier.joint]
             backwards = carrier is not None and joint.between[0] == carrier.own
             at_rest = Section(-1, "", np.eye(3), np.zeros(3))
             inner, outer = at_rest, Section(number, "", np.eye(3), np.zeros(3))
@@ -210,5 +218,6 @@ def _bent(body: SpatialBody, section: Section, p: Array) -> tuple[Array, Array, 
     return at.u, exponential(at.phi), at.u_p, left_jacobian(at.phi) @ at.phi_p
 
 
-def _free(body: str) -> SpatialFree:
-    return SpatialFree(name=body, type="free", between=(GROUND, f"{body}.frame"))
+def _at_origin(body: str, floating: type[SpatialFree | SpatialPlanar]) -> SpatialJoint:
+    kind = "free" if floating is SpatialFree else "planar"
+    return floating.model_construct(name=body, type=kind, between=(GROUND, f"{body}.frame"))

@@ -132,7 +132,7 @@ def turned_guesses(scene: SpatialMechanismKeys) -> list[str]:
     return [
         f'initial.joints: {name} = {angle:g} rad is more than a turn (degrees are written "{angle:g}*deg")'
         for name, values in guesses
-        for angle in _turns(values.tolist(), units[name])
+        for angle in _turns(values.tolist(), units.get(name, ()))
     ]
 
 

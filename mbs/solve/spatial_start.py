@@ -59,9 +59,10 @@ def _advice(model: SpatialModel, guess: Array) -> Iterator[str]:
 
 def _numbers(model: SpatialModel, table: Mapping[str, object], key: str) -> dict[str, Array]:
     """The lists of numbers of a table by joint. Raises `InputError` for a wrong number of them."""
+    joints = {joint.name: joint for joint in (*(node.joint for node in model.tree.nodes), *model.scene.joint)}
     found = {}
     for name, value in table.items():
-        joint = next(each for each in model.scene.joint if each.name == name)
+        joint = joints[name]
         wanted, numbers = len(joint.guess_units or joint.units), np.atleast_1d(np.array(value, dtype=float))
         if len(numbers) != wanted:
             raise InputError(

@@ -21,7 +21,7 @@ def in_3d(scene: S) -> S:
     """The scene with guesses of joints for those of bodies; the scene itself where it is spatial.
 
     The guess of a revolute joint is the angle of its second body on the first, in rad; welds and prismatic joints keep
-    that angle. Likewise for rates.
+    that angle. Likewise for rates. Bodies that no joint carries are in the plane on one of their own name.
     """
     if scene.space != "planar":
         return scene
@@ -29,9 +29,16 @@ def in_3d(scene: S) -> S:
     angles = _of_bodies(scene, initial.angles, initial.joints)
     rates = _of_bodies(scene, initial.rates, initial.joint_rates)
     turning = [joint for joint in scene.joint if _turns(joint)]
+    floating = [body for body, carrier in scene.topology.carriers.items() if carrier is None]
+
+    def guesses(of_bodies: Values) -> dict[str, Any]:
+        return {joint.name: _turn(of_bodies, joint) for joint in turning} | {
+            body: (0.0, 0.0, of_bodies.get(body, 0.0)) for body in floating
+        }
+
     start = {
-        "joints": initial.joints | {joint.name: _turn(angles, joint) for joint in turning},
-        "joint_rates": initial.joint_rates | {joint.name: _turn(rates, joint) for joint in turning},
+        "joints": initial.joints | guesses(angles),
+        "joint_rates": initial.joint_rates | guesses(rates),
     }
     joints = tuple(
         joint if _turns(joint) else joint.model_copy(update={"rpy": (0.0, 0.0, _turn(angles, joint))})
