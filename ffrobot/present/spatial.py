@@ -84,6 +84,8 @@ def print_spatial_summary(
         notes.add_row("pieces", pieces_in_words(solution.divided))
     for note in solution.notes:
         notes.add_row("links", note)
+    if solution.omissions:
+        notes.add_row("omitted", "; ".join(solution.omissions))
     notes.add_row("time", ", ".join(f"{stage} {value:.2f} s" for stage, value in seconds.items()))
     console.print()
     console.print(notes)

@@ -41,7 +41,7 @@ def spatial_image(solution: SpatialSolution) -> bytes:
         write_head(file, solution.scene.name, solution.scene.text, solution.bodies)
         file.attrs["space"] = "spatial"
         file.attrs["geometric_stiffening"] = solution.is_stiffened
-        file.attrs.create("skipped", list(solution.notes), dtype=h5py.string_dtype())
+        file.attrs.create("skipped", [*solution.omissions, *solution.notes], dtype=h5py.string_dtype())
         for name, result in solution.analyses.items():
             group, closer = file.create_group(name), result.closer
             _write_analysis(group, solution, result)

@@ -7,20 +7,20 @@ from dataclasses import dataclass, replace
 
 from ..actuation.patches.patches import patch_array
 from ..actuation.patches.structure import StructureEffect, structure_effect, with_patches
+from ..fe_models.link_records import Family
 from ..fe_models.modal_body_file import read_modal_body
 from ..mbs.model.masses import with_payload
 from ..mbs.model.planar_body import PlanarBody, from_modal_body, from_rigid_body
 from ..scene.scene import Scene
-from .loaded_body import Loaded, payloads_on
+from .loaded_body import IN_PLANE, Loaded, payloads_on
 
 
 @dataclass(frozen=True, kw_only=True)
 class LoadedBody(Loaded):
     """A body of the scene with its planar equations."""
 
-    MOTIONS = ("in-plane-bending",)  # stretch: see `omissions`
-
     planar: PlanarBody
+    motions: tuple[Family, ...] = IN_PLANE
 
 
 def load_bodies(scene: Scene, stage: Callable[[str], None]) -> list[LoadedBody]:

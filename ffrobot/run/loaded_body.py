@@ -6,7 +6,7 @@ import hashlib
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import ClassVar, Protocol, TypeVar
+from typing import Protocol, TypeVar
 
 from ..common.errors import InputError
 from ..common.validation import did_you_mean, quoted
@@ -17,15 +17,16 @@ from ..mbs.fields.field_types import split_point
 
 @dataclass(frozen=True, kw_only=True)
 class Loaded:
-    """The modal body and its file (None where the body is rigid), and whether stage 1 ran for it."""
+    """The modal body and its file (None where the body is rigid), and whether stage 1 ran for it.
 
-    MOTIONS: ClassVar[tuple[Family, ...]] = FAMILIES
-    """Families of motion that the scene can ask of a link."""
+    `motions` are the families of motion that the scene can ask of a link.
+    """
 
     modal: ModalBody | None = None
     path: Path | None = None
     computed: bool = False
     reused: str = ""
+    motions: tuple[Family, ...] = FAMILIES
 
     @property
     def file_hash(self) -> str:
@@ -35,7 +36,11 @@ class Loaded:
     @property
     def rigid_in(self) -> tuple[Family, ...]:
         """Motions that a link cannot follow, since its file has no modes of them; none of a rigid body."""
-        return () if self.modal is None else tuple(one for one in self.MOTIONS if one not in self.modal.family)
+        return () if self.modal is None else tuple(one for one in self.motions if one not in self.modal.family)
+
+
+IN_PLANE: tuple[Family, ...] = ("in-plane-bending",)
+"""Of planar scenes; stretch: see `omissions`."""
 
 
 def robot_damping_ratios(bodies: Mapping[str, Loaded]) -> dict[str, float]:

@@ -12,6 +12,7 @@ from ..actuation.patches.spatial_records import SpatialPztLayout
 from ..actuation.patches.spatial_structure import structure_effect_in_space, with_patches_in_space
 from ..actuation.patches.structure import StructureEffect
 from ..common.errors import of_file
+from ..fe_models.link_records import FAMILIES
 from ..fe_models.modal_body_file import read_modal_body
 from ..mbs.model.projection import projected
 from ..mbs.model.spatial_body import SpatialBody, from_modal_body, rigid_body
@@ -19,7 +20,7 @@ from ..mbs.model.spatial_masses import with_payload
 from ..mbs.model.spatial_payloads import turns_as_a_body
 from ..mbs.scene.spatial.bodies import BodyInSpace, tensor
 from ..scene.spatial import SpatialScene
-from .loaded_body import Loaded, payloads_on
+from .loaded_body import IN_PLANE, Loaded, payloads_on
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -73,7 +74,10 @@ def _loaded(scene: SpatialScene, body: BodyInSpace, stiffened: bool, stage: Call
     if modal is not None:
         made = from_modal_body(body.name, modal, stiffened, is_planar=scene.is_planar)
     made = projected(made) if scene.is_planar else made
-    return LoadedSpatialBody(spatial=made, carrying=made, modal=modal, path=path, computed=computed, reused=reused)
+    return LoadedSpatialBody(
+        spatial=made, carrying=made, modal=modal, path=path, computed=computed, reused=reused,
+        motions=IN_PLANE if scene.is_planar else FAMILIES,
+    )  # fmt: skip
 
 
 def _with_payloads(scene: SpatialScene, body: LoadedSpatialBody) -> LoadedSpatialBody:

@@ -30,6 +30,7 @@ from ..scene.pieces import BodyInPieces
 from ..scene.spatial import SpatialScene
 from .loaded_body import remarks_on_parts, rigid_in_words
 from .mode_search import ModeChoice
+from .omissions import omissions
 from .solution import FinerCheck
 from .spatial_actuation import SpatialActuation
 from .spatial_bodies import LoadedSpatialBody
@@ -182,10 +183,15 @@ class SpatialSolution:
         return tuple(array for of in self.patches.values() for array in of.arrays.values())
 
     @property
+    def omissions(self) -> tuple[str, ...]:
+        """What a planar scene does not need, one line each."""
+        return tuple(omissions(self.scene, self.bodies)) if self.scene.is_planar else ()
+
+    @property
     def notes(self) -> tuple[str, ...]:
         """What links cannot do, and modes left out, one line each."""
         found = [*rigid_in_words(self.bodies)]
         for name, body in self.bodies.items():
-            if body.spatial.reduction is not None:
+            if body.spatial.reduction is not None and not self.scene.is_planar:
                 found.append(f"{name}: all modes but {modes_kept(body.spatial)}")
         return (*found, *remarks_on_parts(self.bodies))

@@ -51,6 +51,22 @@ def projected(body: SpatialBody) -> SpatialBody:
     return replace(found, stiffening=stiffening)
 
 
+def vanishing_in_plane(body: SpatialBody) -> tuple[str, ...]:
+    """Which terms of the equations in the plane are nothing but round-off for the modes of a body; none of a rigid one.
+
+    They are called as `planar_body.vanishing_terms` does.
+    """
+    if not body.n_modes:
+        return ()
+    size = np.sqrt(body.mass) * max((float(np.linalg.norm(at.position)) for at in body.points.values()), default=0.0)
+    terms = {
+        "D_ff": (body.damping, 0.0),
+        "j": (body.I_bar[0, 0] + body.I_bar[1, 1], IMMOBILE * size),
+        "S_tilde": (body.spin_slope[2], IMMOBILE),
+    }
+    return tuple(name for name, (array, limit) in terms.items() if np.abs(array).max(initial=0.0) <= limit)
+
+
 def _about(center: Array, S: Array, I: Array) -> Array:  # noqa: E741
     """∫ρ x_k u_l dV (3, 3, …) that keep shapes about the center, of S = ∫ρ u_l dV (3, …) and those of all fields."""
     moved = np.multiply.outer(center, S)

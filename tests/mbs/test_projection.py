@@ -17,7 +17,6 @@ from ffrobot.run.watcher import Watcher
 from ffrobot.scene.load import made_in_python
 from ffrobot.scene.spatial import available_scene
 
-
 AT = [0.0, 0.0]
 
 
