@@ -148,6 +148,18 @@ SCENES = PLANAR | {
         ],
         "initial": {"joints": {"drive": -1.2, "knee": 0.9, "out": -1.9}},
     },
+    # soft links that bend far, with geometric stiffening: points move to second order
+    "soft": {
+        "geometric_stiffening": True,
+        "body": [{"name": "upper", "link": link("upper", 2)}, {"name": "fore", "link": link("fore", 2)},
+                 {"name": "tool", "rigid": box(root=ROOT, tip=TIP)}],
+        "joint": [
+            pin("shoulder", "ground", "upper.root", (0.1, 1.0, 0.2)),
+            pin("elbow", "fore.root", "upper.tip", (0.0, 0.6, 0.8)),
+            {"name": "grip", "type": "weld", "between": ["fore.tip", "tool.root"]},
+        ],
+        "initial": {"joints": {"shoulder": -0.4, "elbow": 0.7}},
+    },
     # dry friction: implicit steps
     "radau": {
         "body": [{"name": "upper", "link": link("upper", 1)}],
@@ -159,6 +171,7 @@ INPUTS = {
             "pzt/upper/2": (150.0, -200.0, 0.0)},
     "gears": {"joint/shoulder/moment": (4.0, -5.0, 1.0), "joint/elbow/moment": (-1.0, 2.0, 0.0)},
     "loop": {"joint/drive/moment": (0.3, -1.0, 1.5)},
+    "soft": {"joint/shoulder/moment": (-3.0, -1.0, 2.0), "joint/elbow/moment": (0.5, -1.5, 1.0)},
     "radau": {"joint/shoulder/moment": (-1.2, -0.2, 0.6)},
     "flat arm": {"joint/shoulder/moment": (1.0, -3.0, 2.0), "joint/elbow/moment": (0.5, -1.5, 1.0),
                  "joint/way/moment": (4.0, 6.0, 3.0), "pzt/upper/2": (150.0, -200.0, 0.0)},
@@ -411,6 +424,7 @@ AGAIN = {"name": "again", "kind": "forward", "end": 0.3, "output_step": 0.01, "a
         ),
         ({"load": [{"joint": "shoulder", "moment": "1"}]}, None, "load: expected none of a scene for an FMU"),
         ({"motors": "frame"}, "swing", 'motors: expected "section"'),
+        ({"geometric_stiffening": "auto"}, "swing", "geometric_stiffening: expected true or false of a scene for an"),
     ],
 )
 def test_what_cannot_be_exported(tmp_path, keys, analysis, message):

@@ -117,6 +117,11 @@ def _check(path: Path, scene: AnyScene) -> None:
         if body.pieces is not None:
             key = f'{path}: body "{body.name}": pieces'
             raise InputError(f"{key}: expected none of a scene for an FMU, found {body.pieces}")
+    if scene.geometric_stiffening == "auto":
+        raise InputError(
+            f'{path}: geometric_stiffening: expected true or false of a scene for an FMU, found "auto", by which the'
+            " motion of an analysis decides"
+        )
     if scene.motors == "frame":
         raise InputError(f'{path}: motors: expected "section" of a scene for an FMU, found "frame"')
 

@@ -9,8 +9,6 @@ import numpy as np
 
 from ...actuation.patches.spatial_patches import LinkPatches
 from ...common.arrays import Array
-from ...common.errors import InputError
-from ...common.validation import quoted
 from ...fe_models.modal_body import ModalBody
 from ...mbs import _core
 from ...mbs.analysis.forward import Forward
@@ -57,11 +55,6 @@ def held_unit(
 
     Raises `InputError` and `SolveError` as the analysis itself does.
     """
-    if stiffened := [node.body.name for node in model.tree.nodes if node.body.stiffening is not None]:
-        raise InputError(
-            f"{model.scene.path}: geometric_stiffening: expected false of a scene exported as an FMU, whose points move"
-            f" by the modes alone, found true, with {quoted(stiffened)}: not available yet"
-        )
     data, start = SpatialSystem(model).held_model(), initial_state(model)
     data.q, data.v = start.q, start.v
     data.method = METHODS[integrator_of(model, analysis.integrator)]
@@ -163,4 +156,5 @@ def _places(model: SpatialModel) -> Iterator[tuple[str, _core.PlaceOutput]]:
     """By "BODY.POINT"."""
     for number, node in enumerate(model.tree.nodes):
         for label, at in node.body.points.items():
-            yield f"{node.body.name}.{label}", _core.PlaceOutput(number, at.position, at.translation)
+            K = [] if node.body.stiffening is None else list(node.body.stiffening.at(label)[:3])
+            yield f"{node.body.name}.{label}", _core.PlaceOutput(number, at.position, at.translation, K)

@@ -23,10 +23,9 @@ void bind_held_motion(nb::module_ &m) {
   nb::class_<PlaceOutput>(m, "PlaceOutput", "Three outputs: where a section of a body is, m, global axes.")
       .def(
           "__init__",
-          [](PlaceOutput *o, int body, const Eigen::Vector3d &position, const Eigen::MatrixXd &Phi) {
-            new (o) PlaceOutput{body, position, Phi};
-          },
-          "body"_a, "position"_a, "Phi"_a);
+          [](PlaceOutput *o, int body, const Eigen::Vector3d &position, const Eigen::MatrixXd &Phi,
+             const std::vector<Eigen::MatrixXd> &K) { new (o) PlaceOutput{body, position, Phi, K}; },
+          "body"_a, "position"_a, "Phi"_a, "K"_a);
   nb::class_<HeldModel>(m, "HeldModel",
                         "All that a motion under held inputs needs; see mbs/core/forward/held_motion.h.")
       .def(

@@ -38,7 +38,7 @@ template <class Archive> void fields(Archive &a, CutJoint &x) {
 } // namespace recursion
 
 template <class Archive> void fields(Archive &a, LinearOutput &x) { archived_all(a, x.entries, x.weights); }
-template <class Archive> void fields(Archive &a, PlaceOutput &x) { archived_all(a, x.body, x.position, x.Phi); }
+template <class Archive> void fields(Archive &a, PlaceOutput &x) { archived_all(a, x.body, x.position, x.Phi, x.K); }
 template <class Archive> void fields(Archive &a, HeldModel &x) {
   archived_all(a, x.guid, x.bodies, x.ground, x.rows, x.gravity, x.joint_forces, x.gears, x.wrenches, x.cut_joints,
                x.inputs, x.linear, x.places, x.q, x.v, x.method, x.spectral_radius, x.tolerance, x.duration);
@@ -50,7 +50,7 @@ using namespace recursion;
 using Eigen::Index;
 using Eigen::VectorXd;
 
-const std::string head = "ffrobot held motion 4\n"; // another number wherever fields() change
+const std::string head = "ffrobot held motion 5\n"; // another number wherever fields() change
 
 VectorXd joined(const VectorXd &q, const VectorXd &v) {
   VectorXd y(q.size() + v.size());
@@ -113,8 +113,10 @@ Scene HeldMotion::scene_of(const HeldModel &model) {
     for (const int entry : output.entries)
       check(entry >= 0 && entry < n_q + n_v, "outputs of the state");
   }
-  for (const PlaceOutput &output : model.places)
+  for (const PlaceOutput &output : model.places) {
     check(output.body >= 0 && output.body < static_cast<int>(model.bodies.size()), "places on bodies");
+    check(output.K.empty() || output.K.size() == 3, "geometric stiffness along three axes");
+  }
   scene.joint_forces = model.joint_forces;
   scene.gears = model.gears;
   scene.cut_joints = model.cut_joints;
@@ -179,8 +181,12 @@ Eigen::Vector3d HeldMotion::place(const PlaceOutput &at, const std::vector<Frame
   const auto &body = model_.bodies[number].data;
   const auto inboard = static_cast<std::size_t>(model_.bodies[number].inboard_marker);
   Eigen::Vector3d x = at.position;
-  if (node.n())
-    x += at.Phi * y_.segment(node.p_q(), node.n());
+  if (node.n()) {
+    const auto p = y_.segment(node.p_q(), node.n());
+    x += at.Phi * p;
+    for (std::size_t l = 0; l < at.K.size(); ++l)
+      x[static_cast<Index>(l)] -= 0.5 * p.dot(at.K[l] * p);
+  }
   if (node.inboard < 0) // the frame sits at the joint, with the axes of its triad
     x = node.origin + body.markers[inboard].triad.transpose() * x;
   return frames[number].r + frames[number].R * x;

@@ -17,11 +17,12 @@ struct LinearOutput {
   std::vector<double> weights;
 };
 
-// Three outputs, the place of a section in global axes (m): r + A (position + Phi p).
+// Three outputs, the place of a section in global axes (m): r + A (position + Phi p - 1/2 p^T K p).
 struct PlaceOutput {
   int body = 0;
   Eigen::Vector3d position = Eigen::Vector3d::Zero(); // m, body axes
   Eigen::MatrixXd Phi;                                // (3, n)
+  std::vector<Eigen::MatrixXd> K;                     // three (n, n) of geometric stiffening; empty without
 };
 
 // Everything that such a motion needs; rows close loops.
