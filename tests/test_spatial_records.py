@@ -235,9 +235,9 @@ MISTAKES = {
         ),
         r'analysis "inverse": modal.hand\[0\]: expected a finite value during the whole run, found none at t = 0.1',
     ),
-    "key that is not there yet": (
+    "function in a file": (
         lambda data: data.update(load=[{"point": "hand.tip", "force": "f"}]),
-        'load: force: expected no such key in space = "spatial", found it: forces that depend on the motion',
+        "load no. 1: force: expected a function of t, position and velocity, in scenes made in Python, found 'f'",
     ),
     "angles of bodies": (
         lambda data: data.update(initial={"angles": {"upper": 0.1}}),

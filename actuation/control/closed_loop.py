@@ -6,10 +6,8 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial
-from typing import Self
 
 import numpy as np
-from pydantic import model_validator
 
 from ...common.arrays import Array, as_list
 from ...common.errors import SolveError
@@ -52,16 +50,6 @@ class ClosedLoop(SampledAnalysis):
 
     disturbance: tuple[Load, ...] = ()
     """Loads at points, unknown to `actuation`."""
-
-    @model_validator(mode="after")
-    def _of_time(self) -> Self:
-        for k, load in enumerate(self.disturbance, 1):
-            if load.force is not None:
-                raise ValueError(
-                    f"disturbance no. {k}: force: expected expressions in t, found a function, which only a [[load]]"
-                    " may have"
-                )
-        return self
 
     def run(self, context: PlanarActuatedContext) -> PlanarOutcome:
         """Motion and commands."""

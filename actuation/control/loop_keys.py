@@ -48,6 +48,12 @@ class SampledAnalysis(ActuatedAnalysis):
             raise ValueError(f'expected the key "actuation" in kind = "{self.kind}", found none')
         if any(load.point is None for load in self.disturbance):
             raise ValueError("expected disturbances at points, found one elsewhere")
+        for k, load in enumerate(self.disturbance, 1):
+            if load.force is not None:
+                raise ValueError(
+                    f"disturbance no. {k}: force: expected expressions in t, found a function, which only a [[load]]"
+                    " may have"
+                )
         end = self.end
         if end and self.delay >= end:
             raise ValueError(f"expected a delay shorter than the run ({end:g} s), found {self.delay:g} s")

@@ -20,10 +20,6 @@ from .spatial_keys import SpatialSceneKeys
 # Keys of planar scenes that scenes in space do not have, by the table in which they stand, and what there is instead.
 _AXES = "forces at points are along x, y and z, axes of the body"
 UNAVAILABLE = {
-    "load": {
-        "force": "forces that depend on the motion (functions of Python) are those of planar scenes; what depends on"
-        " time alone is x, y, z, mx, my, mz"
-    },
     "trajectory": {
         "angle": "the orientation of a point is rotation_vector, rpy or tool_axis with direction, that of a joint its"
         " value"

@@ -18,11 +18,6 @@ class Lack(NamedTuple):
 
 LACKS = (
     Lack(
-        "`[[load]] force`, a function of Python of the motion of its point",
-        "forces and moments over time: `x`, `y`, `z`, `mx`, `my`, `mz`",
-        "ffrobot.scene.spatial",
-    ),
-    Lack(
         "`motor = true` of spherical and free joints, which have no coordinates",
         "revolute and prismatic joints in series; loads on points",
         "ffrobot.scene.spatial",
@@ -72,10 +67,5 @@ LACKS = (
         "sensors and controllers on spherical and free joints, and on joints at which loops are cut",
         "sensors of points, or of other joints of the loop",
         "ffrobot.actuation.control.spatial_signals",
-    ),
-    Lack(
-        "forward motions with geometric stiffening as FMUs",
-        "`geometric_stiffening = false`",
-        "ffrobot.exchange.fmu.forward_model",
     ),
 )

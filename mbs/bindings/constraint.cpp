@@ -4,11 +4,12 @@
 #include <nanobind/eigen/dense.h>
 #include <nanobind/nanobind.h>
 #include <nanobind/stl/function.h>
-#include <nanobind/stl/tuple.h>
+#include <nanobind/stl/vector.h>
 
+#include <algorithm>
 #include <cstdint>
 #include <functional>
-#include <tuple>
+#include <vector>
 
 #include "bindings/bindings.h"
 
@@ -19,14 +20,31 @@ using Eigen::Vector2d;
 
 namespace {
 
-StateFunction python_force(
-    const std::function<std::tuple<double, double, double>(double, double, double, double, double)> &function) {
-  return {[function](double t, const double *position, const double *rate, double *force) {
-    std::tie(force[0], force[1], force[2]) = function(t, position[0], position[1], rate[0], rate[1]);
-  }};
+using Numbers = std::vector<double>;
+using PythonForce = std::function<Numbers(double, const Numbers &, const Numbers &)>;
+
+// `python` takes position and velocity (2 or 3 numbers), and returns force and moment (3 or 6).
+StateFunction python_force(const PythonForce &python, bool is_planar) {
+  const int n = is_planar ? 2 : 3;
+  return {[python, n](double t, const double *position, const double *rate, double *force) {
+            const Numbers found = python(t, {position, position + n}, {rate, rate + n});
+            check_size("force and moment", static_cast<Eigen::Index>(found.size()), 3 * n - 3);
+            std::copy(found.begin(), found.end(), force);
+          },
+          is_planar};
 }
 
-StateFunction compiled_force(std::uintptr_t address) { return {reinterpret_cast<StateFunction::Compiled>(address)}; }
+StateFunction compiled_force(std::uintptr_t address, bool is_planar) {
+  return {reinterpret_cast<StateFunction::Compiled>(address), is_planar};
+}
+
+Numbers called(const StateFunction &function, double t, const Numbers &position, const Numbers &rate) {
+  check_size("position", static_cast<Eigen::Index>(position.size()), function.is_planar ? 3 : 12);
+  check_size("rates", static_cast<Eigen::Index>(rate.size()), function.is_planar ? 3 : 6);
+  Numbers force(rate.size());
+  function.call(t, position.data(), rate.data(), force.data());
+  return force;
+}
 
 } // namespace
 
@@ -47,19 +65,12 @@ void bind_constraint(nb::module_ &m) {
       .def_ro("kind", &Measure::kind)
       .def_ro("a", &Measure::a)
       .def_ro("b", &Measure::b);
-  nb::class_<StateFunction>(m, "StateFunction", "A force of the user's, of time, position and velocity.")
-      .def(
-          "__call__",
-          [](const StateFunction &function, double t, double x, double y, double angle, double v_x, double v_y,
-             double angular_velocity) {
-            const double position[] = {x, y, angle}, rate[] = {v_x, v_y, angular_velocity};
-            double force[3] = {};
-            function.call(t, position, rate, force);
-            return std::make_tuple(force[0], force[1], force[2]);
-          },
-          "t"_a, "x"_a, "y"_a, "angle"_a, "v_x"_a, "v_y"_a, "angular_velocity"_a, "(x, y, moment): N, N m.")
-      .def_static("python", &python_force, "function"_a, "A callable of t, x, y, v_x, v_y that returns (x, y, moment).")
+  nb::class_<StateFunction>(m, "StateFunction", "A force of the user's; see mbs/core/recursion/point_force.h.")
+      .def("__call__", &called, "t"_a, "position"_a, "rate"_a, "Force and moment: N, N m.")
+      .def_ro("is_planar", &StateFunction::is_planar)
+      .def_static("python", &python_force, "function"_a, "is_planar"_a,
+                  "A callable of t, position and velocity that returns force and moment.")
       .def_static(
-          "compiled", &compiled_force, "address"_a,
-          "Address of a C function void(double t, const double *x_y_angle, const double *rates, double *x_y_moment).");
+          "compiled", &compiled_force, "address"_a, "is_planar"_a,
+          "Address of a C function void(double t, const double *position, const double *rates, double *force).");
 }

@@ -72,8 +72,9 @@ Derivatives derivatives_at(Model<Space> &model, const VectorXd &q, const VectorX
   VectorXd along_cuts = VectorXd::Zero(static_cast<Index>(scene.cut_joints.size()));
   for (const CutLoad &load : scene.cut_loads)
     along_cuts[load.joint] += load.share * load.magnitude(t).value;
-  const LoadedCuts cuts{scene.cut_joints, along_cuts.data()};
-  return derivatives(model.mechanism, model.w, q.data(), v.data(), forces, cuts, target.data());
+  const AtSections at{scene.cut_joints, along_cuts.data(), scene.point_forces, t,
+                      NaturalSizes<Space>(model.mechanism).length()};
+  return derivatives(model.mechanism, model.w, q.data(), v.data(), forces, at, target.data());
 }
 
 template <class Space> VectorXd answer_of(Model<Space> &model, const VectorXd &q, const VectorXd &residual) {

@@ -2,39 +2,60 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from typing import Annotated
 
 import numpy as np
+from pydantic import PlainValidator, ValidationInfo
 
 from ...common.errors import InputError
+from ...common.validation import space_of
 from .._core import StateFunction
 from .functions import called, name_of
+from .spelling import SPATIAL
 
 
-def state_function(function: object) -> StateFunction:
-    """A force (N, global axes) and moment (N·m) on a point: f(t, position (2,), velocity (2,)) → (x, y[, moment]).
+def state_function(function: object, *, is_planar: bool = True) -> StateFunction:
+    """A force (N, global axes) and moment (N·m) on a point: f(t, position, velocity) → force, or force and moment.
 
-    One that has been compiled (`numba.cfunc` and its like, with an `address`) is
-    `void(double t, const double *x_y_angle, const double *rates, double *x_y_moment)`, and runs at the speed of the
-    core. Raises `ValueError` for anything else.
+    Position and velocity have the shape (2,) in the plane, where f returns (x, y) or (x, y, moment); in space (3,), and
+    f returns (x, y, z) or (x, y, z, mx, my, mz). One that has been compiled (`numba.cfunc` and its like, with an
+    `address`) is `void(double t, const double *position, const double *rates, double *force)`, and runs at the speed of
+    the core; mbs/core/recursion/point_force.h says which numbers. Raises `ValueError` for anything else.
     """
     address = getattr(function, "address", None)
     if isinstance(address, int):
-        return StateFunction.compiled(address)
+        return StateFunction.compiled(address, is_planar)
     if not callable(function):
         raise ValueError(f"expected a function of t, position and velocity, found {function!r}")
-    return StateFunction.python(_checked(function))
+    return StateFunction.python(_checked(function, is_planar=is_planar), is_planar)
 
 
-def _checked(function: Callable[..., object]) -> Callable[..., tuple[float, float, float]]:
-    def force(t: float, x: float, y: float, v_x: float, v_y: float) -> tuple[float, float, float]:
-        values = called(function, t, t, np.array([x, y]), np.array([v_x, v_y]))
-        if values.shape not in ((2,), (3,)):
+def _checked(
+    function: Callable[..., object], *, is_planar: bool
+) -> Callable[[float, Sequence[float], Sequence[float]], Sequence[float]]:
+    components = ("x", "y", "moment") if is_planar else ("x", "y", "z", "mx", "my", "mz")
+    linear, all_of_them = (2, 3) if is_planar else (3, 6)
+
+    def force(t: float, position: Sequence[float], velocity: Sequence[float]) -> list[float]:
+        values = called(function, t, t, np.array(position), np.array(velocity))
+        if values.shape not in ((linear,), (all_of_them,)):
             raise InputError(
-                f"{name_of(function)}: expected a force (x, y), or (x, y, moment), found an array of shape"
-                f" {values.shape} at t = {t:g} s"
+                f"{name_of(function)}: expected a force ({', '.join(components[:linear])}), or"
+                f" ({', '.join(components)}), found an array of shape {values.shape} at t = {t:g} s"
             )
-        moment = float(values[2]) if len(values) == 3 else 0.0
-        return float(values[0]), float(values[1]), moment
+        return [*map(float, values), *[0.0] * (all_of_them - len(values))]
 
     return force
+
+
+def _named(value: object, info: ValidationInfo) -> StateFunction:
+    if isinstance(value, StateFunction):
+        return value
+    objects = (info.context or {}).get("objects", {})
+    if not isinstance(value, str) or value not in objects:
+        raise ValueError(f"expected a function of t, position and velocity, in scenes made in Python, found {value!r}")
+    return state_function(objects[value], is_planar=space_of(info) != SPATIAL)
+
+
+StateForce = Annotated[StateFunction, PlainValidator(_named, json_schema_input_type=str)]

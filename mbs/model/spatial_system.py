@@ -75,10 +75,13 @@ class SpatialSystem:
         sides = [(self._place(node.inner), self._place(node.outer)) for node in tree.nodes]
         rows = [self._row(row) for row in model.rows]
         self._wrenches: list[Placed] = []
-        loads = [PointDrive(load.point, load.components) for load in model.scene.load if load.point is not None]
-        self._at_points = [self._point_drive(drive) for drive in (*loads, *drives.at_points)]
-        at_points = drives.replayed.at_points if drives.replayed else {}
-        self._numbers_at = [(self._wrench(tree.section(at, np.eye(3))), of) for at, of in at_points.items()]
+        loads = [load for load in model.scene.load if load.point is not None]
+        at_points = [*(PointDrive(str(load.point), load.components) for load in loads), *drives.at_points]
+        self._at_points = [self._point_drive(drive) for drive in at_points]
+        at_loads = zip(self._at_points, loads, strict=False)
+        self._of_motion = [(wrench, load.force) for (wrench, _), load in at_loads if load.force is not None]
+        replayed = drives.replayed.at_points if drives.replayed else {}
+        self._numbers_at = [(self._wrench(tree.section(at, np.eye(3))), of) for at, of in replayed.items()]
         self._cut = [one for one in model.cut if one.is_loaded]
         cut = tuple(self._cut_place(one.row) for one in self._cut)
         self._check()
@@ -106,7 +109,12 @@ class SpatialSystem:
 
     @cached_property
     def plane(self) -> Plane | None:
-        """In the plane in which all moves, with the same q and v; None where there is none."""
+        """In the plane in which all moves, with the same q and v; None where there is none.
+
+        Forces of the motion of points may lead out of it, but for those of scenes in the plane.
+        """
+        if not all(function.is_planar for _, function in self._of_motion):
+            return None
         return in_plane(self._parts, ~self.model.loop_rows)
 
     def lie_in_plane(self, directions: Sequence[Array]) -> bool:
@@ -248,6 +256,8 @@ class SpatialSystem:
             for name, magnitude in components.items():
                 for along, share in _shares(OF_POINT.index(name), plane):
                     scene.add_point_load(wrench, along, magnitude, share)
+        for wrench, function in self._of_motion:
+            scene.add_point_force(wrench, function)
         for node in self.model.tree.nodes:
             for number, friction in enumerate(node.joint.frictions):  # the same along all of a joint's coordinates
                 at = node.q.start + number, node.v.start + number

@@ -3,31 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from typing import Annotated
 
-from pydantic import PlainValidator, ValidationInfo, model_validator
+from pydantic import model_validator
 
 from ...common.validation import Record, quoted
 from .. import _core
-from .._core import StateFunction, TimeFunction
+from .._core import TimeFunction
 from ..fields.field_types import Expression, PointReference, one_of, only, present
 from ..fields.references import Reference, marker_reference
-from ..fields.state_forces import state_function
+from ..fields.state_forces import StateForce
 from ..joints.measure import GROUND_FRAME, Measure, marker_at
 
 _ALONG = {"x": _core.MeasureKind.x, "y": _core.MeasureKind.y, "moment": _core.MeasureKind.angle}
-
-
-def _state_force(value: object, info: ValidationInfo) -> StateFunction:
-    if isinstance(value, StateFunction):
-        return value
-    objects = (info.context or {}).get("objects", {})
-    if not isinstance(value, str) or value not in objects:
-        raise ValueError(f"expected a function of t, position and velocity, in scenes made in Python, found {value!r}")
-    return state_function(objects[value])
-
-
-StateForce = Annotated[StateFunction, PlainValidator(_state_force, json_schema_input_type=str)]
 
 
 class Load(Record):

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...common.arrays import Array
+from ...common.arrays import Array, as_list
 from .. import _core
 from .._core import StateFunction
 from ..joints.measure import GROUND_FRAME, Marker, Measure
@@ -97,7 +97,7 @@ def _given(function: StateFunction, sizes: Array) -> Law:
 
     def law(t: float, value: Array, rate: Array) -> Answer:
         def force(dx: Array, dv: Array) -> Array:
-            return np.array(function(t, *(value + dx), *(rate + dv)))
+            return np.array(function(t, as_list(value + dx), as_list(rate + dv)))
 
         none, steps = np.zeros(3), DIFFERENCE * np.diag(sizes)
         by_value = [(force(h, none) - force(-h, none)) / (2 * h.max()) for h in steps]

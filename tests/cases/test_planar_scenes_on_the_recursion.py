@@ -26,7 +26,6 @@ OF_SMALL_DIFFERENCES = 5.0, "/(modal_force|voltage|required_voltage)$"  # of lar
 END = 0.05  # s, of analyses of cases that say how long they are
 REFUSED = {
     "arm_in_pieces": (InputError, "pzt"),
-    "arm_on_a_spring": (InputError, "force"),
     "slide_by_angles": (InputError, "angle"),
     "random_1": (InputError, "angle"),
     "random_7": (InputError, "angle"),

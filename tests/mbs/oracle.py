@@ -184,7 +184,7 @@ class Mechanism:
             Q -= (a.gradient - b.gradient) * (stiffness * (a.value - b.value) + damping * (a.rate - b.rate))
         for end, function in self.state_forces:
             marker = self.marker(end, q, v)
-            Q += marker.L.T @ function(t, *marker.position, *marker.velocity)
+            Q += marker.L.T @ np.array(function(t, list(marker.position), list(marker.velocity)))
         for name, vector, size in self.modal_loads:
             Q[self.columns[name]][3:] += vector * size(t)[0]
         return Q

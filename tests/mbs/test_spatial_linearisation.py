@@ -1,5 +1,8 @@
 """Linear equations in space against differences of the nonlinear ones: all joints, loops, in motion."""
 
+import ctypes
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from moving_trees import moving
@@ -8,7 +11,10 @@ from spatial_trees import TYPES
 
 from ffrobot.common.rotations import of_quaternion
 from ffrobot.mbs import _core
+from ffrobot.mbs._core import StateFunction
 from ffrobot.mbs.model.spatial_model import row_values
+from ffrobot.mbs.model.spatial_system import SpatialSystem
+from ffrobot.mbs.scene.spatial.loads import SpatialLoad
 from ffrobot.mbs.solve.spatial_linearisation import SpatialLinearisation
 
 KINDS = ("rigid", "solid", "beam", "supported beam")
@@ -52,6 +58,43 @@ def test_derivatives_are_those_of_evaluations(joint, loops):
         np.testing.assert_allclose(found.value_q, row_values(motion.model, q[None], np.zeros(1))[1][0], atol=1e-12)
         expected = differences(lambda x: system.core.measure(tree.integrate(q, x), v)[1], tree.n_v)
         np.testing.assert_allclose(found.rate_q, expected, atol=1e-8 * np.abs(expected).max())
+
+
+def pull(t, position, rate, force):
+    """On a section: a cubic spring, a damper that turns with it, moments of its orientation, and of its spin."""
+    r, R, v, omega = np.array(position[:3]), np.array(position[3:12]).reshape(3, 3), rate[:3], rate[3:6]
+    force[:3] = -3.0 * (r - 0.2) * (1 + r @ r) - R @ np.diag([1.0, 2.0, 0.5]) @ R.T @ v
+    force[3:6] = 2.0 * R[:, 0] + t * R[:, 1] - np.square(omega) * np.sign(omega)
+
+
+@pytest.mark.parametrize("joint", ["revolute", "spherical", "free"])
+def test_derivatives_with_a_force_of_the_motion(joint):
+    """Its own derivatives are central differences, which leave about 1e-9."""
+    numbers = ctypes.POINTER(ctypes.c_double)
+
+    @ctypes.CFUNCTYPE(None, ctypes.c_double, numbers, numbers, numbers)
+    def compiled(t, position, rate, force):
+        position, rate, force = (np.ctypeslib.as_array(x, (n,)) for x, n in ((position, 12), (rate, 6), (force, 6)))
+        pull(t, position, rate, force)
+
+    motion, _ = moving(np.random.default_rng(TYPES.index(joint)), [joint] * 3, kinds_of(joint))
+    model, q, v, t = motion.model, motion.q[0], motion.v[0], 0.7
+    body = model.tree.nodes[-1].body
+    function = StateFunction.compiled(ctypes.cast(compiled, ctypes.c_void_p).value, is_planar=False)
+    load = SpatialLoad(point=f"{body.name}.{list(body.points)[-1]}", force=function)
+    system = SpatialSystem(replace(model, scene=model.scene.model_copy(update={"load": (load,)})))
+    found, n = system.derivatives(t, q, v, np.zeros(model.tree.n_v)), model.tree.n_v
+
+    def a(dq=0.0, dv=0.0):
+        states = np.concatenate([model.tree.integrate(q, np.zeros(n) + dq), v + dv])[None]
+        return _core.tree_outputs(system.core, system.scene, [t], states, None).accelerations[0]
+
+    without = SpatialSystem(model).derivatives(t, q, v, np.zeros(n))
+    for key, by in (("a_q", "dq"), ("a_v", "dv")):
+        expected = differences(lambda x, by=by: a(**{by: x}), n, 1e-4)
+        difference = getattr(found, key) - expected
+        np.testing.assert_allclose(difference, 0, atol=2e-7 * max(1, np.abs(expected).max()))
+        assert np.abs(getattr(without, key) - expected).max() > 1e3 * np.abs(difference).max()
 
 
 @pytest.mark.parametrize("loops", [0, 1])

@@ -271,7 +271,7 @@ void bind_tree_motion(nb::module_ &m) {
       .def(
           "add_point_force",
           [](Scene &s, int wrench, const StateFunction &function) { s.point_forces.push_back({wrench, function}); },
-          "wrench"_a, "function"_a, "In the plane: of the motion of the section on which a wrench of the model acts.")
+          "wrench"_a, "function"_a, "Of the motion of the section on which a wrench of the model acts.")
       .def(
           "add_joint_force",
           [](Scene &s, int q, int v, double stiffness, double rest, double viscous, double coulomb, double speed) {

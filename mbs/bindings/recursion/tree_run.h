@@ -34,10 +34,11 @@ template <class Space> void check_scene(const Model<Space> &model, const Scene &
     check_index("wrench of a load", load.wrench, model.mechanism.wrenches.size());
     check_index("component of a load", load.component, Space::dim);
   }
-  if (Space::dim != 3 && !scene.point_forces.empty())
-    throw std::invalid_argument("forces of the motion of points: expected none in space");
-  for (const PointForce &force : scene.point_forces)
+  for (const PointForce &force : scene.point_forces) {
     check_index("wrench of a force", force.wrench, model.mechanism.wrenches.size());
+    if (Space::dim == 3 && !force.function.is_planar)
+      throw std::invalid_argument("forces of the motion of points: expected planar functions in the plane");
+  }
   for (const JointForce &force : scene.joint_forces)
     check_index("q of a joint's force", force.q, n_q), check_index("v of a joint's force", force.v, n_v);
   for (const GearSpring &gear : scene.gears)

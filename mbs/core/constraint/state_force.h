@@ -2,18 +2,9 @@
 #pragma once
 
 #include "core/constraint/measure.h"
-
-#include <functional>
+#include "core/recursion/point_force.h"
 
 namespace ffrobot {
-
-// Writes force and moment (x, y, moment; N, N m) at time t (s) for position and rates (x, y, angle), all in global
-// axes.
-struct StateFunction {
-  using Compiled = void (*)(double, const double *, const double *, double *);
-
-  std::function<void(double t, const double *position, const double *rate, double *force)> call;
-};
 
 struct StateForce {
   MarkerReference marker;

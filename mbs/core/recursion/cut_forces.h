@@ -1,10 +1,19 @@
-// What acts along joints at which loops are cut, for one space and scalar: included by the .cpp of each.
+// Sections on which wrenches act, and what acts along joints at which loops are cut, for one space and scalar:
+// included by the .cpp of each.
 #pragma once
 
 #include "core/recursion/cut.h"
+#include "core/recursion/point_force.h"
 #include "core/recursion/rows.h"
 
 namespace ffrobot::recursion {
+
+template <class Space, class T>
+Pose<T> wrench_pose(const Mechanism<Space> &m, int wrench, const Workspace<Space, T> &w) {
+  Pose<T> at;
+  attachment_pose(m, m.wrenches[static_cast<std::size_t>(wrench)], w, at);
+  return at;
+}
 
 // The axis (global axes) and the sections of a coordinate, after locate().
 template <class T> struct CutPose {
@@ -14,8 +23,7 @@ template <class T> struct CutPose {
 
 template <class Space, class T>
 void cut_pose(const Mechanism<Space> &m, const CutJoint &cut, const Workspace<Space, T> &w, CutPose<T> &to) {
-  attachment_pose(m, m.wrenches[static_cast<std::size_t>(cut.a)], w, to.a);
-  attachment_pose(m, m.wrenches[static_cast<std::size_t>(cut.b)], w, to.b);
+  to.a = wrench_pose(m, cut.a, w), to.b = wrench_pose(m, cut.b, w);
   const T axis[3] = {T(cut.axis[0]), T(cut.axis[1]), T(cut.axis[2])};
   turn(to.a.R, axis, to.axis);
   for (int i = 0; i < 3; ++i)

@@ -57,7 +57,7 @@ template <class Values> void take(const Values &x, Index first, Index count, Mat
 
 template <class Space>
 Derivatives derivatives(const Mechanism<Space> &m, const Workspace<Space, double> &kept, const double *q,
-                        const double *v, const Forces<double> &forces, const LoadedCuts &cuts, const double *target) {
+                        const double *v, const Forces<double> &forces, const AtSections &at, const double *target) {
   const ConfigurationSpace space(m.n_v, m.rotations);
   const Index n = m.n_v, rows = static_cast<Index>(m.rows.size());
   const auto n_v = static_cast<std::size_t>(n), n_rows = m.rows.size();
@@ -66,19 +66,20 @@ Derivatives derivatives(const Mechanism<Space> &m, const Workspace<Space, double
   const Duals q0 = constants(q, static_cast<std::size_t>(m.n_q)), v0 = constants(v, n_v);
   const Duals force0 = constants(forces.generalized, n_v), held = constants(target, n_rows);
   const Duals wrench = constants(forces.wrench, Space::dim * m.wrenches.size());
-  Duals a(n_v), value(n_rows), rate(n_rows), along(cuts.joints.size()), acting_wrench;
+  Duals a(n_v), value(n_rows), rate(n_rows), along(at.joints.size()), acting_wrench;
   const auto answer = [&](const Duals &at_q, const Duals &at_v, const Duals &force) {
     Forces<Dual> acting;
     acting.generalized = force.data();
     acting.wrench = forces.wrench ? wrench.data() : nullptr;
-    if (!cuts.joints.empty()) {
+    if (!at.joints.empty() || !at.points.empty()) {
       acting_wrench = wrench;
       acting.wrench = acting_wrench.data();
       place_all(m, at_q.data(), at_v.data(), acting, w), acting.is_placed = true;
-      cut_rates(m, cuts.joints, w, along.data());
+      add_at_points(m, at.points, at.t, at.length, w, acting_wrench.data());
+      cut_rates(m, at.joints, w, along.data());
       for (std::size_t k = 0; k < along.size(); ++k)
-        along[k] = Dual(cuts.loads[k]) - resistance(cuts.joints[k].friction, along[k]);
-      add_along_cuts(m, cuts.joints, along.data(), w, acting_wrench.data());
+        along[k] = Dual(at.loads[k]) - resistance(at.joints[k].friction, along[k]);
+      add_along_cuts(m, at.joints, along.data(), w, acting_wrench.data());
     }
     accelerations(m, at_q.data(), at_v.data(), acting, held.data(), w, a.data());
   };
@@ -101,8 +102,8 @@ Derivatives derivatives(const Mechanism<Space> &m, const Workspace<Space, double
 }
 
 template Derivatives derivatives(const Mechanism<Planar> &, const Workspace<Planar, double> &, const double *,
-                                 const double *, const Forces<double> &, const LoadedCuts &, const double *);
+                                 const double *, const Forces<double> &, const AtSections &, const double *);
 template Derivatives derivatives(const Mechanism<Spatial> &, const Workspace<Spatial, double> &, const double *,
-                                 const double *, const Forces<double> &, const LoadedCuts &, const double *);
+                                 const double *, const Forces<double> &, const AtSections &, const double *);
 
 } // namespace ffrobot::recursion

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "core/recursion/cut.h"
+#include "core/recursion/point_force.h"
 
 #include <Eigen/Core>
 
@@ -16,16 +17,19 @@ struct Derivatives {
   Eigen::MatrixXd rate_q;             // (rows, n_v) of their rates
 };
 
-// Joints at which loops are cut, with the loads that are given along them: N m, N, as many.
-struct LoadedCuts {
+// What changes with q and v where sections move: joints at which loops are cut, with the loads that are given along
+// them (N m, N, as many), and forces at points at time t. `length` (m): see add_at_points().
+struct AtSections {
   const std::vector<CutJoint> &joints;
   const double *loads;
+  const std::vector<PointForce> &points;
+  double t, length;
 };
 
-// At q, v under `forces`, those along `cuts` and second derivatives `target` (rows) of the rows that `kept` keeps;
-// markers of the ground stand and turn as there. Friction in cut joints changes with q and v.
+// At q, v under `forces`, those `at` sections and second derivatives `target` (rows) of the rows that `kept` keeps;
+// markers of the ground stand and turn as there.
 template <class Space>
 Derivatives derivatives(const Mechanism<Space> &m, const Workspace<Space, double> &kept, const double *q,
-                        const double *v, const Forces<double> &forces, const LoadedCuts &cuts, const double *target);
+                        const double *v, const Forces<double> &forces, const AtSections &at, const double *target);
 
 } // namespace ffrobot::recursion

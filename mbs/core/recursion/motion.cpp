@@ -141,7 +141,8 @@ template <class Space> Forces<double> RecursiveMotion<Space>::act(double t, cons
       steering_->add(t, q, force_.data(), wrench_.data());
     if (!scene_.point_forces.empty() || !scene_.cut_joints.empty()) {
       place_all(mechanism_, q, v, forces, workspace_), forces.is_placed = true;
-      act_at_points(t), act_along_cuts(t, q, v);
+      add_at_points(mechanism_, scene_.point_forces, t, norm_.sizes().length(), workspace_, wrench_.data());
+      act_along_cuts(t, q, v);
     }
     forces.wrench = wrench_.data();
   }
@@ -163,17 +164,6 @@ template <class Space>
 
 template <class Space> void RecursiveMotion<Space>::evaluate(double t, const double *q, const double *v, double *a) {
   evaluate_here(t, q, v, a);
-}
-
-template <class Space> void RecursiveMotion<Space>::act_at_points(double t) {
-  if constexpr (Space::dim == 3)
-    for (const PointForce &force : scene_.point_forces) {
-      const Pose<double> at = wrench_pose(mechanism_, static_cast<std::size_t>(force.wrench), workspace_);
-      const double position[] = {at.r[0], at.r[1], at.angle}, rate[] = {at.v[0], at.v[1], at.omega[2]};
-      Eigen::Vector3d wrench = Eigen::Vector3d::Zero();
-      force.function.call(t, position, rate, wrench.data());
-      wrench_.template segment<3>(3 * force.wrench) += wrench;
-    }
 }
 
 namespace {

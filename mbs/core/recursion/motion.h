@@ -5,7 +5,6 @@
 #pragma once
 
 #include "core/constraint/constraint.h"
-#include "core/constraint/state_force.h"
 #include "core/integrate/limit_watch.h"
 #include "core/integrate/ode.h"
 #include "core/recursion/cut.h"
@@ -13,6 +12,7 @@
 #include "core/recursion/loop_watch.h"
 #include "core/recursion/motion_norm.h"
 #include "core/recursion/newton.h"
+#include "core/recursion/point_force.h"
 #include "core/recursion/posture.h"
 #include "core/recursion/workspace.h"
 #include "core/space/configuration_space.h"
@@ -39,12 +39,6 @@ struct PointLoad {
   int wrench = 0, component = 0;
   TimeFunction magnitude;
   double share = 1;
-};
-
-// A force and a moment, global axes, of the motion of the section on which a wrench of a mechanism in the plane acts.
-struct PointForce {
-  int wrench = 0;
-  StateFunction function;
 };
 
 // How a marker of the ground turns.
@@ -220,7 +214,6 @@ private:
   void find_laws(const double *times, int count);
   void residuals(double t, const double *q, const double *v, Workspace<Space, double> &w);
   double project(double t, double *q, double *v, Workspace<Space, double> &w); // w: where residuals are measured
-  void act_at_points(double t);                                                // after place_all(); adds to wrench_
   void act_along_cuts(double t, const double *q, const double *v);             // the same; and to force_
   const Eigen::VectorXd *motors_at(const double *q); // of the last evaluation; null where they are not judged
   void find_stiff_terms();

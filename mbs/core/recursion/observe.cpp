@@ -99,13 +99,6 @@ const std::vector<Pose<double>> &frame_poses(const Mechanism<Space> &m, const do
 }
 
 template <class Space>
-Pose<double> wrench_pose(const Mechanism<Space> &m, std::size_t wrench, const Workspace<Space, double> &w) {
-  Pose<double> at;
-  attachment_pose(m, m.wrenches[wrench], w, at);
-  return at;
-}
-
-template <class Space>
 std::vector<FrameMotion> frame_motions(const Mechanism<Space> &m, const double *q, const double *v,
                                        Workspace<Space, double> &w) {
   frame_poses(m, q, v, w);
@@ -198,7 +191,6 @@ RowMajor totals_of_states(const Mechanism<Space> &m, const Scene &scene, const R
 
 template const std::vector<Pose<double>> &frame_poses(const Mechanism<Planar> &, const double *, const double *,
                                                       Workspace<Planar, double> &);
-template Pose<double> wrench_pose(const Mechanism<Planar> &, std::size_t, const Workspace<Planar, double> &);
 template std::vector<FrameMotion> frame_motions(const Mechanism<Planar> &, const double *, const double *,
                                                 Workspace<Planar, double> &);
 template std::vector<FrameMotion> frame_motions(const Mechanism<Spatial> &, const double *, const double *,

@@ -20,10 +20,6 @@ template <class Space>
 const std::vector<Pose<double>> &frame_poses(const Mechanism<Space> &m, const double *q, const double *v,
                                              Workspace<Space, double> &w);
 
-// Where the section on which a wrench acts is, and how it moves, after frame_poses().
-template <class Space>
-Pose<double> wrench_pose(const Mechanism<Space> &m, std::size_t wrench, const Workspace<Space, double> &w);
-
 template <class Space>
 std::vector<FrameMotion> frame_motions(const Mechanism<Space> &m, const double *q, const double *v,
                                        Workspace<Space, double> &w);

@@ -12,6 +12,7 @@ template struct Workspace<Planar, Dual>;
 template void accelerations(const M &, const Dual *, const Dual *, const Forces<Dual> &, const Dual *, W &, Dual *);
 template void measure(const M &, const Dual *, const Dual *, W &, Dual *, Dual *);
 template void place_all(const M &, const Dual *, const Dual *, const Forces<Dual> &, W &);
+template Pose<Dual> wrench_pose(const M &, int, const W &);
 template void cut_rates(const M &, const std::vector<CutJoint> &, const W &, Dual *);
 template void add_along_cuts(const M &, const std::vector<CutJoint> &, const Dual *, const W &, Dual *);
 

@@ -44,7 +44,8 @@ Derivatives PrescribedMotion<Space>::derivatives_under(const VectorXd &forces, c
     target[static_cast<Index>(r)] = forces_.of_row(r, a_.data(), w_).value;
   w_.keep(active);
   return derivatives(m, w_, q(), v(), Forces<double>{forces.data(), wrench.data()},
-                     {scene.cut_joints, along_cuts.data()}, target.data());
+                     {scene.cut_joints, along_cuts.data(), scene.point_forces, t, NaturalSizes<Space>(m).length()},
+                     target.data());
 }
 
 // With all constraint equations C_ddot stays what it is: its derivatives at given a are -C_v a_q and -C_v a_v.
@@ -69,8 +70,8 @@ template <class Space> JointSlopes PrescribedMotion<Space>::joint_slopes() {
 // M a - Q + C_c^T lambda_c = f with the loops' multipliers leads to f_q = -(M a_q + C_c^T lambda_q) at given a.
 template <class Space> LeftSlopes PrescribedMotion<Space>::left_slopes(const JointSlopes &joints) {
   const auto turns_frames = [](const Motor &motor) { return motor.turns_frames || motor.cut >= 0; };
-  if (!motors_ || std::ranges::any_of(driven_.motors, turns_frames) || !driven_.scene.point_forces.empty())
-    throw std::invalid_argument("derivatives: expected motors along joint coordinates, and loads of time");
+  if (!motors_ || std::ranges::any_of(driven_.motors, turns_frames))
+    throw std::invalid_argument("derivatives: expected motors along joint coordinates");
   motors_->split(q(), required_, w_);
   VectorXd forces = VectorXd::Zero(a_.size()), unit = forces, f = forces;
   if (acting_.generalized)

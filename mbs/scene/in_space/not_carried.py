@@ -13,9 +13,6 @@ from ..mechanism import MechanismKeys
 def not_carried(scene: MechanismKeys) -> Iterator[str]:
     """What the embedding in space leaves no way to say, a line each with its key."""
     yield from _trajectories(scene)
-    for k, load in enumerate(scene.load, 1):
-        if load.force is not None:
-            yield f"load no. {k}: force: expected functions of time in 3D, found one of the motion of its point"
     if scene.motors == "frame":
         yield from _coordinates_of_frames(scene)
     yield from _floating(scene)

@@ -7,17 +7,21 @@ from typing import Annotated
 
 from pydantic import ValidationInfo, model_validator
 
-from ....common.validation import Record
+from ....common.validation import Record, quoted
 from ..._core import TimeFunction
 from ...fields.field_types import Expression, Expressions, PointReference, one_of, only, present
 from ...fields.references import Reference, marker_reference
 from ...fields.spelling import IN_SPACE, Spelled, as_written, is_planar, keys_here
+from ...fields.state_forces import StateForce
 
 OF_POINT = ("x", "y", "z", "mx", "my", "mz")
 
 
 class SpatialLoad(Record):
-    """A prescribed load: force (N) and moment (N·m) on a section in global axes, joint torque, or voltages (V)."""
+    """A prescribed load: force (N) and moment (N·m) on a section in global axes, joint torque, or voltages (V).
+
+    `force` on a point, in scenes made in Python: a function of its motion, see `state_forces.state_function`.
+    """
 
     point: PointReference | None = None
     """Loaded point, "BODY.POINT"."""
@@ -40,15 +44,20 @@ class SpatialLoad(Record):
     moment: Annotated[Expressions | None, Spelled(Expression, as_written)] = None
     """Torque on the second side of the joint along its coordinate, N·m (N along sliding coordinates); expression in t,
     or a list of them for several coordinates. In planar scenes also the counter-clockwise moment on a point."""
+    force: StateForce | None = None
+    """Function of t, position and velocity that returns force (N) and moment (N·m); in scenes made in Python only."""
     voltage: tuple[Expression, ...] | None = None
     """Voltages, V: one expression in t per patch of the layout."""
 
     @model_validator(mode="after")
     def _consistent(self, info: ValidationInfo) -> SpatialLoad:
         subject = one_of(self, ("point", "joint", "pzt"))
-        of_point = keys_here(self, OF_POINT, info) + (("moment",) if is_planar(info) else ())
-        allowed = {"point": of_point, "joint": ("moment",), "pzt": ("voltage",)}[subject]
-        only(self, subject, allowed, (*keys_here(self, OF_POINT, info), "moment", "voltage"))
+        of_point = keys_here(self, (*OF_POINT, "force"), info)
+        moment = ("moment",) if is_planar(info) else ()
+        allowed = {"point": (*of_point, *moment), "joint": ("moment",), "pzt": ("voltage",)}[subject]
+        found = only(self, subject, allowed, (*of_point, "moment", "voltage"))
+        if self.force is not None and len(found) > 1:
+            raise ValueError(f'expected "force" alone with "point", found {quoted(found)}')
         return self
 
     def references(self) -> Iterator[Reference]:
