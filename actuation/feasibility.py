@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from dataclasses import field as described
+from functools import cached_property, partial
 from typing import NamedTuple
 
 import numpy as np
@@ -49,7 +51,7 @@ class PatchFeasibility:
         limited_field: (k,) V/m at the voltage within the limit.
         strain: (k,) of the outer surface, from the bending of the link, its mean along the patch.
         mode_required, mode_available: (n,) N/√kg, modal forces: wanted, and with every patch at its limit.
-        remedies: what would do.
+        find_remedies: finds `remedies`.
     """
 
     required_moment: Array
@@ -60,7 +62,12 @@ class PatchFeasibility:
     strain: Array
     mode_required: Array
     mode_available: Array
-    remedies: Remedies
+    find_remedies: Callable[[], Remedies] = described(repr=False)
+
+    @cached_property
+    def remedies(self) -> Remedies:
+        """What would do; found when it is asked for, as it takes longer than all else."""
+        return self.find_remedies()
 
     @property
     def factor(self) -> Array:
@@ -155,7 +162,7 @@ def judge_patches(
         strain=patches.lever * patches.surface_distance * curvature,
         mode_required=np.abs(F_p[:, : patches.served]).max(axis=0),
         mode_available=np.abs(patches.Phi_V[: patches.served]) @ patches.limit,
-        remedies=_remedies(patches, required, F_p, with_count),
+        find_remedies=partial(_remedies, patches, required, F_p, with_count),
     )
 
 

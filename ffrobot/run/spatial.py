@@ -229,13 +229,13 @@ def _with_peaks(solution: SpatialSolution, run: Outcome) -> SpatialResult:
     twists = {joint: gear.curve for joint, gear in found.motion.gears.items()}  # splines through outputs
     known = {joint: curve for joint, curve in twists.items() if curve is not None}
     if closer is run or len(known) < len(twists):
-        return found
+        return replace(found, bending=bending_of_links(solution, found.motion))
     between = _evaluated(solution, closer, known)
     actuation = found.actuation
     if actuation is not None and between.actuation is not None:
         judged = between.actuation
         actuation = replace(actuation, feasibility=judged.feasibility, unsupplied=judged.unsupplied)
-    return replace(found, actuation=actuation, bending=between.bending, closer=between)
+    return replace(found, actuation=actuation, bending=bending_of_links(solution, between.motion), closer=between)
 
 
 def _evaluated(solution: SpatialSolution, run: Outcome, twists: Mapping[str, BSpline] | None = None) -> SpatialResult:
@@ -259,5 +259,5 @@ def _evaluated(solution: SpatialSolution, run: Outcome, twists: Mapping[str, BSp
         at_points = {name: solve_spatial_points(points, run) for name, points in solution.points.items()}
     return SpatialResult(
         run, motion, reactions(motion), *totals(motion), actuation, stresses, at_points,
-        bending=bending_of_links(solution, motion), sharing=sharing,
+        sharing=sharing,
     )  # fmt: skip

@@ -89,4 +89,4 @@ def coupled_blocks(*matrices: Array) -> list[Indices]:
     coupled |= coupled.T
     while np.any((further := coupled @ coupled) != coupled):
         coupled = further
-    return [np.flatnonzero(coupled[k]) for k in np.unique(coupled.argmax(axis=1))]
+    return [np.array(block) for block in dict.fromkeys(tuple(np.flatnonzero(row)) for row in coupled)]
