@@ -8,7 +8,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from ...common.arrays import Array, as_floats
+from ...common.arrays import Array
 from ...mbs import _core
 from ...mbs.joints.measure import Marker, Measure
 from ...mbs.model.model import Model
@@ -80,7 +80,12 @@ def _modal_coordinates(model: Model, link: str, whole: PlanarWholeLinks | None) 
 
 
 def volts_per_modal_coordinate(patches: PatchArray, capacitance: float | None = None) -> Array:
-    """Voltage (k, n) of each patch per modal coordinate: its charge c [φ'(x2) − φ'(x1)] over its capacitance.
+    """Voltage (k, n) of each patch per modal coordinate: by how much that turns its ends against each other."""
+    return volts_per_turn(patches, capacitance)[:, None] * patches.turn.T
+
+
+def volts_per_turn(patches: PatchArray, capacitance: float | None = None) -> Array:
+    """Voltage (k,) of each patch per turn: its charge c [φ'(x2) − φ'(x1)] over its capacitance.
 
     By reciprocity the charge of a rotation is the moment of a voltage, c (Lee and Moon, J. Appl. Mech. 57, 1990). The
     capacitance of a patch is ε w l/t_p of each layer; one that also drives the link is read through a bridge, which
@@ -89,7 +94,7 @@ def volts_per_modal_coordinate(patches: PatchArray, capacitance: float | None = 
     layout = patches.layout
     faces = 2 if layout.face == "both" else 1
     own = faces * layout.layers * PERMITTIVITY * layout.width * layout.length / layout.thickness
-    return as_floats((patches.moment_per_volt * patches.turn).T / (own if capacitance is None else capacitance))
+    return patches.moment_per_volt / (own if capacitance is None else capacitance)
 
 
 def merged(given: Iterable[AnyReading], needed: Iterable[AnyReading]) -> tuple[AnyReading, ...]:

@@ -15,7 +15,7 @@ from ...mbs.analysis.outcome import Outcome
 from ...mbs.analysis.spatial_gears import wound_up
 from ...mbs.analysis.spatial_static import run_spatial_static
 from ...mbs.model.spatial_gears import with_compliance_in_space
-from ...mbs.model.spatial_model import SpatialModel, without_paths
+from ...mbs.model.spatial_model import SpatialModel, modal_directions, without_paths
 from ...mbs.model.spatial_rows import SpatialRow
 from ...mbs.scene.analysis import Analysis
 from ...mbs.solve.linearisation import LinearMechanism
@@ -103,15 +103,12 @@ def held_by_motors(model: SpatialModel, q: Array) -> list[SpatialRow]:
 def patch_voltages_in_space(
     model: SpatialModel, mechanism: LinearMechanism, patches: Mapping[str, LinkPatches]
 ) -> dict[str, Array]:
-    """By "pzt/LAYOUT/k", what a volt does along s: on the modes of its link."""
+    """By "pzt/LAYOUT/k", what a volt does along s: on the modes of its link, or of the pieces of that."""
     found: dict[str, Array] = {}
-    for name, of_link in patches.items():
-        body = model.tree.nodes[model.tree.index[name]].body
-        per_volt = np.zeros((of_link.Phi_V.shape[1], len(mechanism.M)))
-        per_volt[:, mechanism.modal(name)] = (body.modal_transform.T @ of_link.Phi_V).T
-        ends = np.cumsum([len(array.edges) for array in of_link.arrays.values()])
-        for layout, rows in zip(of_link.arrays, np.split(per_volt, ends[:-1]), strict=True):
-            found |= {f"pzt/{layout}/{k}": row for k, row in enumerate(rows, 1)}
+    for of_link in patches.values():
+        along_s = modal_directions(model, of_link.per_volt) @ mechanism.transformation
+        for layout in of_link.arrays:
+            found |= {f"pzt/{layout}/{k}": row for k, row in enumerate(along_s[of_link.columns(layout)], 1)}
     return found
 
 

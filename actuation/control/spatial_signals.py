@@ -11,14 +11,14 @@ from ...common.arrays import Array, Indices
 from ...common.errors import InputError
 from ...mbs.model.spatial_drives import Drives, PointDrive
 from ...mbs.model.spatial_known_motion import KnownStates, motion_forces
-from ...mbs.model.spatial_model import SpatialModel
+from ...mbs.model.spatial_model import SpatialModel, modal_directions
 from ...mbs.model.spatial_system import SpatialSystem
 from ...mbs.model.spatial_tree import Section, SpatialTree
 from ...mbs.solve.spatial_linearisation import labelled
 from ..context import WholeLinks, place_of
 from ..patches.spatial_patches import LinkPatches
 from .records import Sensor
-from .signals import ORDERS, Reading, volts_per_modal_coordinate
+from .signals import ORDERS, Reading, volts_per_turn
 
 
 @dataclass(frozen=True)
@@ -103,8 +103,9 @@ def spatial_signals(
             yield SpatialSignal(f"point/{sensor.point}/{name}{ending}", *quality, point=place, axis=axis)
     elif sensor.pzt is not None:
         body = next(body for body, of_link in patches.items() if sensor.pzt in of_link.arrays)
-        for k, volts in enumerate(volts_of_layout(model, patches, body, sensor.pzt, sensor.capacitance), 1):
-            yield SpatialSignal(f"pzt/{sensor.pzt}/{k}", *quality, along=_on_modes(model, body, volts))
+        volts = volts_on_file(patches[body], sensor.pzt, sensor.capacitance)
+        for k, along in enumerate(modal_directions(model, {name: of.T for name, of in volts.items()}), 1):
+            yield SpatialSignal(f"pzt/{sensor.pzt}/{k}", *quality, along=along)
     elif sensor.modal is not None:
         for k, along in enumerate(_modal_coordinates(model, sensor.modal, whole), 1):
             yield SpatialSignal(f"modal/{sensor.modal}/{k}{ending}", *quality, along=along)
@@ -122,22 +123,10 @@ def _modal_coordinates(model: SpatialModel, link: str, whole: WholeLinks | None)
     return found
 
 
-def volts_of_layout(
-    model: SpatialModel, patches: Mapping[str, LinkPatches], body: str, layout: str, capacitance: float | None = None
-) -> Array:
-    """(k, n) that the patches of a layout read per unit of the link's modal coordinates in the tree."""
-    array, reached = patches[body].arrays[layout], patches[body].modes[layout]
-    to_file = model.tree.nodes[model.tree.index[body]].body.modal_transform
-    found: Array = volts_per_modal_coordinate(array, capacitance) @ np.linalg.solve(reached.T, to_file[reached.rows])
-    return found
-
-
-def volts_on_file(of_link: LinkPatches, layout: str) -> Array:
-    """(k, n_file) that the patches of a layout read per unit of the coordinates of the modes of the link's file."""
-    array, reached = of_link.arrays[layout], of_link.modes[layout]
-    found = np.zeros((len(array.edges), len(of_link.Phi_V)))
-    found[:, reached.rows] = np.linalg.solve(reached.T.T, volts_per_modal_coordinate(array).T).T
-    return found
+def volts_on_file(of_link: LinkPatches, layout: str, capacitance: float | None = None) -> dict[str, Array]:
+    """By body that may carry a layout: (k, n) that its patches read per unit of the modes of the body's file."""
+    volts, columns = volts_per_turn(of_link.arrays[layout], capacitance), of_link.columns(layout)
+    return {name: volts[:, None] * of.turn[:, columns].T for name, of in of_link.bodies.items()}
 
 
 def check_joint(model: SpatialModel, joint: str) -> None:
@@ -155,9 +144,3 @@ def check_joint(model: SpatialModel, joint: str) -> None:
             f"{scene.path}: {record.label}: between: expected the side nearer to the ground first where sensors read a"
             " planar joint, found it second"
         )
-
-
-def _on_modes(model: SpatialModel, body: str, vector: Array) -> Array:
-    along = np.zeros(model.tree.n_v)
-    along[model.tree.nodes[model.tree.index[body]].p_v] = vector
-    return along

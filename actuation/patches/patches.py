@@ -138,7 +138,7 @@ def on_pieces(scene_path: Path, whole: PatchArray, link: DividedLink, pieces: Se
     first = 0
     for piece in pieces:
         rows = slice(first, first + piece.planar.n_modes)
-        which, edges = edges_on_piece(whole.layout, whole.edges, piece)
+        which, edges = edges_on_piece(whole.layout, whole.edges, piece.start, piece.modal.length)
         if which.size:
             (found,), T = effects(key, [Placed(whole.layout, edges)], piece.modal), piece.planar.modal_transform
             turn[rows, which], Phi_V[rows, which] = (found.turn @ T).T, (found.Phi_V @ T).T
@@ -153,9 +153,12 @@ def on_pieces(scene_path: Path, whole: PatchArray, link: DividedLink, pieces: Se
     )
 
 
-def edges_on_piece(layout: PatchKeys, edges: Array, piece: Piece) -> tuple[Indices, Array]:
-    """Numbers (from 0) of the patches between `edges` (k, 2) that are on a piece, and where on it they are, m."""
-    clipped = (edges - piece.start).clip(0.0, piece.modal.length)
+def edges_on_piece(layout: PatchKeys, edges: Array, start: float, length: float) -> tuple[Indices, Array]:
+    """Numbers (from 0) of the patches between `edges` (k, 2) that are on a piece, and where on it they are, m.
+
+    The piece is `length` (m) long and begins at `start` (m) from the root of the link.
+    """
+    clipped = (edges - start).clip(0.0, length)
     which = np.flatnonzero(np.diff(clipped, axis=1)[:, 0] > SLIVER * layout.length)
     return which, clipped[which]
 

@@ -8,7 +8,7 @@ by one named face. Modal forces on the other families are left as they are, and 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -17,11 +17,12 @@ from ...common.arrays import Array, Indices, as_floats
 from ...common.errors import InputError
 from ...fe_models.modal_body import ModalBody
 from ...mbs import _core
+from ...mbs.model.divided_link import spread_in_space
 from ...mbs.model.spatial_body import SpatialBody
 from ...mbs.model.spatial_masses import uncoupling
 from .composite import Placed
 from .effects import Effects, effects
-from .patches import PatchArray, assembled, check_edges, patch_edges
+from .patches import PatchArray, assembled, check_edges, edges_on_piece, patch_edges
 from .reach import Reach, check_all_served, served_first, weights
 from .sections import check_sections
 from .spatial_records import SpatialPztLayout
@@ -61,22 +62,49 @@ class ReachedModes:
 
 
 @dataclass(frozen=True)
+class OnBody:
+    """What all k patches of a link do to one body that may carry them, on the n modes of the body's file.
+
+    Attributes:
+        Phi_V: (n, k) modal forces per volt.
+        turn: (n, k) by how much each mode turns the ends of each patch against each other, rad.
+        to_link: modal forces on the modes of the link's file by those on these, (modes of the link, n).
+    """
+
+    Phi_V: Array
+    turn: Array
+    to_link: Array
+
+
+@dataclass(frozen=True)
 class LinkPatches:
     """All patches of one link in space, k in all, on the n modes of its modal body.
+
+    Voltages serve the modes of the link. They act on whichever of the `bodies` a model has: the link, or its pieces.
 
     Attributes:
         arrays: by layout, each on the modes that it reaches, `modes`.
         modes: by layout.
         reach: of all patches side by side on the modes that they reach together, `reached`.
         reached: likewise.
-        Phi_V: (n, k) modal forces per volt on the modes of the modal body.
+        bodies: by name, the link and, where it is divided, its pieces.
     """
 
     arrays: Mapping[str, PatchArray]
     modes: Mapping[str, ReachedModes]
     reach: Reach
     reached: ReachedModes
-    Phi_V: Array
+    bodies: Mapping[str, OnBody]
+
+    @property
+    def body(self) -> str:
+        """Name of the link."""
+        return next(iter(self.arrays.values())).body
+
+    @property
+    def Phi_V(self) -> Array:
+        """(n, k) modal forces per volt on the modes of the link's file."""
+        return self.bodies[self.body].Phi_V
 
     def voltages(self, F_p: Array) -> dict[str, Voltages]:
         """By layout, of modal forces F_p (T, n); `unmet` is what all layouts leave of those that this one reaches."""
@@ -90,26 +118,45 @@ class LinkPatches:
         }
 
     @property
-    def to_reached(self) -> Array:
-        """(m, n) modal forces on `reached` by those on the modes of the modal body."""
-        return self.reached.forces(np.eye(len(self.Phi_V))).T
+    def per_volt(self) -> dict[str, Array]:
+        """By body, (n, k) modal forces per volt on the modes of its file."""
+        return {name: of.Phi_V for name, of in self.bodies.items()}
+
+    @property
+    def to_reached(self) -> dict[str, Array]:
+        """By body, (m, n) modal forces on `reached` by those on the modes of its file."""
+        return {name: self.reached.forces(of.to_link.T).T for name, of in self.bodies.items()}
 
     def allocation(self, *, limited: bool) -> _core.Allocation:
         """From modal forces on `reached` to voltages (k,), with the limits of the patches or without."""
         return allocation(self.reach, limited=limited)
 
-    def of_layout(self, name: str) -> Array:
-        """(n, k) modal forces per volt of the patches of one layout."""
-        first = 0
+    def placed_on(self, start: float, length: float) -> list[tuple[Indices, Placed]]:
+        """By layout with patches on a piece of the link: which of the k these are, and where they are on the piece.
+
+        The piece is `length` (m) long and begins at `start` (m) from the root.
+        """
+        found = []
         for label, array in self.arrays.items():
-            if label == name:
-                return self.Phi_V[:, first : first + len(array.edges)]
-            first += len(array.edges)
-        raise KeyError(name)
+            which, edges = edges_on_piece(array.layout, array.edges, start, length)
+            if which.size:
+                found.append((self.columns(label).start + which, Placed(array.layout, edges)))
+        return found
+
+    def columns(self, layout: str) -> slice:
+        """Which of the k patches are those of one layout."""
+        ends = np.cumsum([len(array.edges) for array in self.arrays.values()])
+        end = int(ends[list(self.arrays).index(layout)])
+        return slice(end - len(self.arrays[layout].edges), end)
 
     def unmet(self, F_p: Array, voltages: Array) -> Array:
         """(T, n) of modal forces F_p, at voltages (T, k) of all patches."""
         return F_p - voltages @ self.Phi_V.T
+
+
+def placed_patches(path: Path, layouts: Sequence[SpatialPztLayout], body: ModalBody) -> list[Placed]:
+    """Where the patches of layouts are on their link. Raises `InputError` for patches that do not fit it."""
+    return [_placed(path, layout, body) for layout in layouts]
 
 
 def link_patches(path: Path, layouts: Sequence[SpatialPztLayout], body: ModalBody, spatial: SpatialBody) -> LinkPatches:
@@ -120,8 +167,9 @@ def link_patches(path: Path, layouts: Sequence[SpatialPztLayout], body: ModalBod
     """
     spatial = spatial.whole
     key = _key(path, layouts[0].label if len(layouts) == 1 else layouts[0].body)
-    placed = [_placed(path, layout, body) for layout in layouts]
+    placed = placed_patches(path, layouts, body)
     found = effects(key, placed, body)
+    Phi_V, turn = (np.concatenate(of).T for of in ([of.Phi_V for of in found], [of.turn for of in found]))
     modes = {one.layout.label: _reached(of.Phi_V, body, spatial) for one, of in zip(placed, found, strict=True)}
     for layout in layouts:
         _check_reached(path, layout, modes[layout.label], body)
@@ -129,12 +177,35 @@ def link_patches(path: Path, layouts: Sequence[SpatialPztLayout], body: ModalBod
         one.layout.label: _array(path, one, body, spatial, of, modes[one.layout.label])
         for one, of in zip(placed, found, strict=True)
     }
-    Phi_V = np.concatenate([of.Phi_V for of in found])
-    reached = modes[layouts[0].label] if len(layouts) == 1 else _reached(Phi_V, body, spatial)
-    reach = _alone(arrays[layouts[0].label]) if len(layouts) == 1 else _together(path, layouts, arrays, reached, Phi_V)
+    if len(layouts) == 1:
+        reached, reach = modes[layouts[0].label], _alone(arrays[layouts[0].label])
+    else:
+        reached = _reached(Phi_V.T, body, spatial)
+        reach = _together(path, layouts, arrays, reached, Phi_V.T)
     if all(layout.allocation == "exact" for layout in layouts):
         check_all_served(key, reach)
-    return LinkPatches(arrays, modes, reach, reached, Phi_V.T)
+    own = {layouts[0].body: OnBody(Phi_V, turn, np.eye(body.mode_count))}
+    return LinkPatches(arrays, modes, reach, reached, own)
+
+
+def on_pieces(
+    path: Path, whole: LinkPatches, link: ModalBody, pieces: Mapping[str, tuple[float, ModalBody]]
+) -> LinkPatches:
+    """The patches of a link, on its pieces as well: a patch across a cut acts on both sides of it.
+
+    `pieces` by name from the root to the tip: where each begins, m from the root, and its modal body.
+    """
+    body, bodies = whole.body, {whole.body: whole.bodies[whole.body]}
+    spread = spread_in_space(link, list(pieces.values()))
+    ends = np.cumsum([modal.mode_count for _, modal in pieces.values()])
+    for (name, (start, modal)), to_piece in zip(pieces.items(), np.split(spread, ends[:-1]), strict=True):
+        Phi_V, turn = np.zeros((2, modal.mode_count, whole.Phi_V.shape[1]))
+        on_piece = whole.placed_on(start, modal.length)
+        found = effects(_key(path, body), [placed for _, placed in on_piece], modal) if on_piece else []
+        for (which, _), of in zip(on_piece, found, strict=True):
+            Phi_V[:, which], turn[:, which] = of.Phi_V.T, of.turn.T
+        bodies[name] = OnBody(Phi_V, turn, to_piece.T)
+    return replace(whole, bodies=bodies)
 
 
 def by_body(layouts: Sequence[SpatialPztLayout]) -> Iterator[tuple[str, list[SpatialPztLayout]]]:

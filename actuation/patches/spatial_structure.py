@@ -11,30 +11,28 @@ from ...mbs.model.spatial_body import SpatialBody, SpatialPoint
 from ...mbs.model.spatial_masses import with_line_masses
 from .composite import Placed, composite, gauss_points
 from .layers import layer_section
-from .patches import patch_edges
 from .sections import link_sections
-from .spatial_records import SpatialPztLayout
 from .structure import StructureEffect
 
 
-def with_patches_in_space(spatial: SpatialBody, body: ModalBody, layouts: Sequence[SpatialPztLayout]) -> SpatialBody:
-    """The link with mass and stiffness of its patches, as far as the layouts say so; it keeps its number of modes.
+def with_patches_in_space(spatial: SpatialBody, body: ModalBody, placed: Sequence[Placed]) -> SpatialBody:
+    """The link, or a piece of it, with mass and stiffness of patches, as far as layouts say so; it keeps all modes.
 
     Mass lies on the axis, like that of a beam, with its moment of inertia about the axis, ∫ρ (η² + ζ²) dA. The
     stiffness is that of the `composite` section.
     """
     T, sections = spatial.modal_transform, link_sections(body)
     points, masses, spins = [], [], []
-    for layout in layouts:
+    for layout, edges in placed:
         extent = sections.extent(layout.normal)
-        for place in gauss_points(body, patch_edges(layout, body.length)) if layout.adds_mass else ():
+        for place in gauss_points(body, edges) if layout.adds_mass else ():
             at = body.interpolate(place.x)
             points.append(SpatialPoint(at.position, at.translation @ T, at.rotation @ T))
             A, _, I = layer_section(layout, extent[place.station])  # noqa: E741
             line_density = place.weight * (layout.density or 0.0)
             masses.append(line_density * A)
             spins.append(line_density * (I + A * layout.width**2 / 12))
-    stiff = [Placed(layout, patch_edges(layout, body.length)) for layout in layouts if layout.adds_stiffness]
+    stiff = [one for one in placed if one.layout.adds_stiffness]
     added = T.T @ composite(stiff, body).stiffness @ T if stiff else np.zeros((spatial.n_modes, spatial.n_modes))
     return with_line_masses(spatial, points, np.array(masses), np.array(spins), added)
 

@@ -43,7 +43,7 @@ def patched_pieces(layout: PztLayout, length: float, body: BodyInPieces, parts: 
         return {}
     found = {}
     for name, piece in zip(body.names, pieces_of(body, parts), strict=True):
-        which, edges = edges_on_piece(layout, patch_edges(layout, length), piece)
+        which, edges = edges_on_piece(layout, patch_edges(layout, length), piece.start, piece.modal.length)
         if which.size:
             found[name] = replace(parts[name], planar=with_patches(piece.planar, piece.modal, layout, edges))
     return found

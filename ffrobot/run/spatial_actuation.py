@@ -13,7 +13,7 @@ from ..actuation.patches.voltages import Voltages
 from ..actuation.spatial_feasibility import UnsuppliedInSpace, judge_in_space, links_in_motion
 from ..common.arrays import Array
 from ..mbs.model.spatial_drives import Drive
-from ..mbs.model.spatial_model import SpatialModel, modal_direction
+from ..mbs.model.spatial_model import SpatialModel, modal_directions
 from ..mbs.quantities.spatial_motion import SpatialMotion
 from ..scene.spatial import SpatialScene
 from .spatial_bodies import LoadedSpatialBody
@@ -58,9 +58,9 @@ def given_voltages(model: SpatialModel, patches: Mapping[str, LinkPatches]) -> I
     bodies = {label: body for body, of_link in patches.items() for label in of_link.arrays}
     for load in model.scene.load:
         if load.pzt is not None:
-            per_volt = patches[bodies[load.pzt]].of_layout(load.pzt)
-            for column, voltage in zip(per_volt.T, load.voltage or (), strict=True):
-                yield Drive(modal_direction(model, bodies[load.pzt], column), voltage)
+            of_link = patches[bodies[load.pzt]]
+            directions = modal_directions(model, of_link.per_volt)[of_link.columns(load.pzt)]
+            yield from map(Drive, directions, load.voltage or ())
 
 
 def actuated_in_space(

@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..actuation.patches.spatial_patches import by_body, link_patches
+from ..actuation.patches.composite import Placed
+from ..actuation.patches.spatial_patches import by_body, link_patches, placed_patches
 from ..actuation.patches.spatial_records import SpatialPztLayout
 from ..actuation.patches.spatial_structure import structure_effect_in_space, with_patches_in_space
 from ..actuation.patches.structure import StructureEffect
@@ -94,8 +95,13 @@ def _patched(scene: SpatialScene, body: LoadedSpatialBody, layouts: Sequence[Spa
     """With the mass and stiffness of its patches, as far as the scene asks for it."""
     assert body.modal is not None
     link_patches(scene.path, layouts, body.modal, body.carrying)  # refuses patches that do not fit
-    if not any(layout.adds_mass or layout.adds_stiffness for layout in layouts):
+    return with_structure(body, placed_patches(scene.path, layouts, body.modal))
+
+
+def with_structure(body: LoadedSpatialBody, placed: Sequence[Placed]) -> LoadedSpatialBody:
+    """A link, or a piece of one, with the mass and stiffness of patches, as far as layouts say so."""
+    if body.modal is None or not any(one.layout.adds_mass or one.layout.adds_stiffness for one in placed):
         return body
-    spatial, carrying = (with_patches_in_space(of, body.modal, layouts) for of in (body.spatial, body.carrying))
+    spatial, carrying = (with_patches_in_space(of, body.modal, placed) for of in (body.spatial, body.carrying))
     effect = structure_effect_in_space(body.carrying, carrying)
     return replace(body, spatial=spatial, carrying=carrying, structure=effect)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
-from ..actuation.patches.spatial_patches import LinkPatches
+from ..actuation.patches.spatial_patches import LinkPatches, on_pieces
 from ..actuation.spatial_points import SpatialPointSet
 from ..mbs.model.spatial_body import SpatialBody
 from ..mbs.model.spatial_model import SpatialModel, build_spatial_model
@@ -15,7 +15,7 @@ from ..scene.spatial import SpatialScene
 from ..scene.spatial_pieces import bodies_in_pieces_in_space, scene_of_pieces_in_space
 from .loaded_body import robot_damping_ratios
 from .spatial_actuation import given_voltages
-from .spatial_bodies import LoadedSpatialBody, load_spatial_bodies
+from .spatial_bodies import LoadedSpatialBody, load_spatial_bodies, with_structure
 from .spatial_solution import SpatialSolution
 from .watcher import Watcher
 
@@ -55,6 +55,7 @@ def with_pieces_in_space(solution: SpatialSolution, counts: Mapping[str, int], w
     if not divided and not solution.divided:
         return solution
     parts: dict[str, LoadedSpatialBody] = {}
+    patches = dict(solution.patches)
     if divided:
         scene = scene_of_pieces_in_space(solution.scene, divided)
         own = {name: body for name, body in solution.bodies.items() if name not in divided}
@@ -64,7 +65,24 @@ def with_pieces_in_space(solution: SpatialSolution, counts: Mapping[str, int], w
         loaded = load_spatial_bodies(new, watcher.stage)
         parts = own | {body.name: part for body, part in zip(new.body, loaded, strict=True)}
         parts = {body.name: parts[body.name] for body in scene.body}
-    return _unsolved(replace(solution, divided=divided, parts=parts))
+    for name in divided.keys() & patches.keys():
+        patches[name] = _on_pieces(solution, divided[name], patches[name], parts)
+        for piece, start in zip(divided[name].names, divided[name].cut.starts, strict=True):
+            length = parts[piece].spatial.length or 0.0
+            placed = [one for _, one in patches[name].placed_on(start, length)]
+            parts[piece] = with_structure(parts[piece], placed)
+    return _unsolved(replace(solution, divided=divided, parts=parts, patches=patches))
+
+
+def _on_pieces(solution: SpatialSolution, body: BodyInPieces, patches: LinkPatches, parts: Bodies) -> LinkPatches:
+    link, pieces = solution.bodies[patches.body].modal, [parts[name].modal for name in body.names]
+    assert link is not None
+    starts = {
+        name: (start, piece)
+        for name, start, piece in zip(body.names, body.cut.starts, pieces, strict=True)
+        if piece is not None
+    }
+    return on_pieces(solution.scene.path, patches, link, starts)
 
 
 def stiffened_in_space(solution: SpatialSolution) -> SpatialSolution:
@@ -98,7 +116,12 @@ def _model(
     stiffened: bool,
 ) -> SpatialModel:
     """The equations, of pieces in place of their links, with the voltages that the scene gives to patches."""
-    links = [divided[body.name].names if body.name in divided else (body.name,) for body in scene.body if body.pieces]
+    heavy = {layout.body for layout in scene.pzt if layout.adds_mass}  # between the ends of pieces
+    links = [
+        divided[body.name].names if body.name in divided else (body.name,)
+        for body in scene.body
+        if body.pieces and body.name not in heavy
+    ]
     if divided:
         scene, bodies = scene_of_pieces_in_space(scene, divided), parts
     spatial = {name: body.spatial for name, body in bodies.items()}

@@ -33,11 +33,6 @@ LACKS = (
         "ffrobot.scene.spatial_pieces",
     ),
     Lack(
-        "patches on subdivided bodies",
-        "several links welded to each other, each with its patches",
-        "ffrobot.scene.spatial_pieces",
-    ),
-    Lack(
         'compliant gears (`stiffness` of joints) with `motors = "frame"`, where they are driven, controlled or linear',
         '`motors = "section"`',
         "ffrobot.mbs.analysis.spatial_gears",

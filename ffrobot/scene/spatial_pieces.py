@@ -68,12 +68,6 @@ def _problems(scene: SpatialScene, divided: Mapping[str, BodyInPieces]) -> Itera
         return
     first = next(iter(divided))
     beside = f'with subdivided bodies ("{first}")'
-    for layout in scene.pzt:
-        if layout.body in divided:
-            yield (
-                f'pzt "{layout.label}": body: expected one that is not subdivided, found "{layout.body}": not available'
-                " in 3D yet"
-            )
     yield from unfit_actuators((points.body for points in scene.actuation_points), scene.motors, first)
     for analysis in scene.analysis:
         if analysis.kind not in KINDS:

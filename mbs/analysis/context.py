@@ -17,14 +17,14 @@ from .replay import ActuatorSet
 
 
 class PatchedLink(Protocol):
-    """All k patches of one link, on the n modes of its file."""
+    """All k patches of one link, by the bodies that may carry them, of n modes: the link itself, or its pieces."""
 
     @property
-    def Phi_V(self) -> Array:
+    def per_volt(self) -> Mapping[str, Array]:
         """(n, k) modal forces per volt."""
 
     @property
-    def to_reached(self) -> Array:
+    def to_reached(self) -> Mapping[str, Array]:
         """(m, n) modal forces as `allocation` takes them, by those on the modes of the file."""
 
     def allocation(self, *, limited: bool) -> _core.Allocation:

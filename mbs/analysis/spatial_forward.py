@@ -15,7 +15,7 @@ from ..fields.waypoints import spline
 from ..model.spatial_drives import Command, Drives, Replayed
 from ..model.spatial_frame_motors import motor_commands
 from ..model.spatial_gears import with_compliance_in_space
-from ..model.spatial_model import SpatialModel, modal_direction, without_paths
+from ..model.spatial_model import SpatialModel, modal_directions, without_paths
 from ..scene.spatial.loads import OF_POINT
 from ..solve.spatial_statics import hanging_joints, initial_state
 from ..solve.state import State
@@ -80,8 +80,8 @@ def _replayed(context: Context, source: Outcome, analysis: ForwardKeys) -> Repla
 
 def actuator_commands(model: SpatialModel, patches: Mapping[str, PatchedLink]) -> tuple[Command, ...]:
     """What a unit of each does: moments of motors, on sections or on frames, and voltages on the modes of links."""
-    per_volt = ((body, column) for body, of_link in patches.items() for column in of_link.Phi_V.T)
-    return (*motor_commands(model), *(Command(modal_direction(model, body, column)) for body, column in per_volt))
+    of_volts = (row for of_link in patches.values() for row in modal_directions(model, of_link.per_volt))
+    return (*motor_commands(model), *map(Command, of_volts))
 
 
 def numbers_of_motors(model: SpatialModel) -> dict[str, list[int]]:

@@ -13,7 +13,7 @@ import numpy as np
 
 from ...common.arrays import Array
 from .. import _core
-from ..model.spatial_model import row_values
+from ..model.spatial_model import SpatialModel, row_values
 from ..model.spatial_motors import (
     MotorForces,
     driven_mechanism,
@@ -49,12 +49,18 @@ def supplied(run: Outcome, most: Array, patches: Mapping[str, PatchedLink], *, l
 
     In the order of `SpatialModel.motors`, N·m or N on second sides, then of `patches`, V.
     """
-    links = []
-    for name, of_link in patches.items():
-        node = run.model.tree.nodes[run.model.tree.index[name]]
-        reached = of_link.to_reached @ node.body.on_file.T
-        links.append((node.p_v.start, reached, of_link.allocation(limited=limited)))
+    links = [(*_reached(run.model, of.to_reached), of.allocation(limited=limited)) for of in patches.values()]
     return _found(run, lambda driven: _core.actuator_reader(driven, most, links), SpatialSystem(run.model))
+
+
+def _reached(model: SpatialModel, to_reached: Mapping[str, Array]) -> tuple[int, Array]:
+    """Where the modes of the bodies that carry patches begin in v, and (m, …) what makes `reached` of v from there."""
+    nodes = [node for node in model.tree.nodes if node.body.name in to_reached]
+    first, end = nodes[0].p_v.start, nodes[-1].p_v.stop
+    found = np.zeros((len(to_reached[nodes[0].body.name]), end - first))
+    for node in nodes:
+        found[:, node.p_v.start - first : node.p_v.stop - first] = to_reached[node.body.name] @ node.body.on_file.T
+    return first, found
 
 
 class OfPaths(NamedTuple):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TypeVar
 
@@ -85,11 +85,17 @@ def without_paths(model: SpatialModel) -> SpatialModel:
     return replace(model, rows=tuple(row for row in model.rows if not row.is_trajectory))
 
 
-def modal_direction(model: SpatialModel, body: str, on_modes: Array) -> Array:
-    """Along v of the tree (n_v,): forces (n,) on the modes of the file of a body."""
-    node, direction = model.tree.nodes[model.tree.index[body]], np.zeros(model.tree.n_v)
-    direction[node.p_v] = on_modes @ node.body.modal_transform
-    return direction
+def modal_directions(model: SpatialModel, on_modes: Mapping[str, Array]) -> Array:
+    """Along v of the tree (k, n_v): k forces (n, k) on the modes of the files of bodies, as far as these are in it.
+
+    Gradients of what depends on modal coordinates are alike.
+    """
+    (count,) = {forces.shape[1] for forces in on_modes.values()}
+    directions = np.zeros((count, model.tree.n_v))
+    for node in model.tree.nodes:
+        if node.body.name in on_modes:
+            directions[:, node.p_v] = on_modes[node.body.name].T @ node.body.modal_transform
+    return directions
 
 
 def _in_order(node: Node) -> Array:

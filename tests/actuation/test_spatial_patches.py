@@ -9,7 +9,7 @@ import pytest
 from ffrobot.actuation.patches.lamina import Fibres, fibre_lamina
 from ffrobot.actuation.patches.patches import patch_array
 from ffrobot.actuation.patches.records import PztLayout
-from ffrobot.actuation.patches.spatial_patches import link_patches
+from ffrobot.actuation.patches.spatial_patches import link_patches, placed_patches
 from ffrobot.actuation.patches.spatial_records import SpatialPztLayout
 from ffrobot.actuation.patches.spatial_structure import with_patches_in_space
 from ffrobot.actuation.patches.structure import with_patches
@@ -79,7 +79,7 @@ def layout(**keys):
 
 def tip(body, layouts, volts=None):
     """Φp (3,) and Φ_r p (3,) of the tip under a voltage on all patches, statically, with what the patches stiffen."""
-    spatial = with_patches_in_space(from_modal_body("link", body), body, layouts)
+    spatial = with_patches_in_space(from_modal_body("link", body), body, placed_patches(SCENE, layouts, body))
     found = link_patches(SCENE, layouts, body, spatial)
     V = np.full(found.Phi_V.shape[1], VOLT) if volts is None else np.asarray(volts, dtype=float)
     p = spatial.modal_transform.T @ (found.Phi_V @ V) / spatial.stiffness
@@ -218,7 +218,9 @@ def test_overlap_of_layouts_is_shared(link):
 def test_round_links_do_not_mix_their_planes(link):
     """Frequencies in the two planes are equal; patches in one leave the other's modes alone, payload or not."""
     body = link(TUBE)
-    spatial = with_patches_in_space(from_modal_body("link", body), body, [layout(structural=True, density=7600.0)])
+    spatial = with_patches_in_space(
+        from_modal_body("link", body), body, placed_patches(SCENE, [layout(structural=True, density=7600.0)], body)
+    )
     families = np.array(body.family)
     assert not spatial.modal_transform[families[:, None] != families].any()
 
@@ -227,7 +229,7 @@ def test_mass_and_stiffness_as_in_the_plane(link):
     """Frequencies in the plane are those of the planar body with the same patches, which is other code."""
     body = link(rectangle(0.006, 0.014))
     keys = {"count": 5, "length": 0.05, "structural": True, "density": 7600.0, "face": "both"}
-    spatial = with_patches_in_space(from_modal_body("link", body), body, [layout(**keys)])
+    spatial = with_patches_in_space(from_modal_body("link", body), body, placed_patches(SCENE, [layout(**keys)], body))
     planar = with_patches(planar_body("link", body), body, PztLayout(body="link", width=0.01, **PLAIN | keys))
     in_plane = np.isin(body.family, ("in-plane-bending", "axial"))
     np.testing.assert_allclose(np.sort(spatial.stiffness[in_plane]), np.sort(planar.stiffness), rtol=1e-9)

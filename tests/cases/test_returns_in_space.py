@@ -19,7 +19,7 @@ from ffrobot.mbs.analysis.spatial_pcid import run_spatial_pcid
 from ffrobot.mbs.analysis.spatial_replay import motor_forces_of
 from ffrobot.mbs.fields.steps import Steps
 from ffrobot.mbs.model.spatial_frame_motors import motor_commands
-from ffrobot.mbs.model.spatial_model import modal_direction, without_paths
+from ffrobot.mbs.model.spatial_model import modal_directions, without_paths
 from ffrobot.mbs.model.spatial_system import SpatialSystem
 from ffrobot.run.spatial import prepare_spatial
 from ffrobot.run.watcher import Watcher
@@ -29,11 +29,12 @@ SIZES = (0.08, 0.12, 0.06)  # m, of the way of the tip along x, y, z
 
 
 class Patches:
-    """Modal forces `per_volt` (n, k) on the modes of a file, all of which are served; least squares within `limit`."""
+    """Modal forces Φ_V (n, k) on the modes of a body's file, all of which are served; least squares within `limit`."""
 
-    def __init__(self, per_volt, limit=np.inf):
-        self.Phi_V, self.to_reached = per_volt, np.eye(len(per_volt))
-        self._limit = np.broadcast_to(limit, per_volt.shape[1]).astype(float)
+    def __init__(self, body, Phi_V, limit=np.inf):
+        self.Phi_V = Phi_V
+        self.per_volt, self.to_reached = {body: Phi_V}, {body: np.eye(len(Phi_V))}
+        self._limit = np.broadcast_to(limit, Phi_V.shape[1]).astype(float)
 
     def allocation(self, *, limited):
         n, k = self.Phi_V.shape
@@ -68,7 +69,7 @@ def scene(load=(), limits=({}, {}), **more):
 def full(model):
     """Patches that supply all modal forces."""
     bodies = {node.body.name: node.body for node in model.tree.nodes}
-    return {name: Patches(np.eye(body.on_file.shape[1])) for name, body in bodies.items()}
+    return {name: Patches(name, np.eye(body.on_file.shape[1])) for name, body in bodies.items()}
 
 
 def always(t):
@@ -165,7 +166,7 @@ def test_saturated_actuators_do_what_their_limits_leave(integrator):
     model, rng = prepare_spatial(limited, Watcher()).model, np.random.default_rng(3)
     bodies = {node.body.name: node.body for node in model.tree.nodes}
     patches = {
-        name: Patches(rng.standard_normal((body.on_file.shape[1], 3)), [0.02, 0.05, 0.5])
+        name: Patches(name, rng.standard_normal((body.on_file.shape[1], 3)), [0.02, 0.05, 0.5])
         for name, body in bodies.items()
     }
     inverse = inverse_of(model, 1e-8)
@@ -181,7 +182,7 @@ def test_saturated_actuators_do_what_their_limits_leave(integrator):
             limit = np.array([0.02, 0.05, 0.5])
             V = lsq_linear(of_link.Phi_V, wanted, (-limit, limit), method="bvls", tol=1e-14).x
             saturated += np.count_nonzero(np.abs(V) >= limit)
-            acting[k] += modal_direction(model, name, of_link.Phi_V @ V)
+            acting[k] += modal_directions(model, {name: of_link.Phi_V @ V[:, None]})[0]
     assert saturated > 10
     system = SpatialSystem(without_paths(model))
     required = system.core.required_forces(system.scene, list(back.time), back.q, back.v, back.a)

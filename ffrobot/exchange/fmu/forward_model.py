@@ -12,7 +12,7 @@ from ...common.arrays import Array
 from ...fe_models.modal_body import ModalBody
 from ...mbs import _core
 from ...mbs.analysis.forward import Forward
-from ...mbs.model.spatial_model import SpatialModel, modal_direction
+from ...mbs.model.spatial_model import SpatialModel, modal_directions
 from ...mbs.model.spatial_system import SpatialSystem
 from ...mbs.model.spatial_tree import Node
 from ...mbs.solve.integrators import METHODS
@@ -92,11 +92,10 @@ def _motors(model: SpatialModel) -> Iterator[Input]:
 
 def voltages_in_space(model: SpatialModel, patches: Mapping[str, LinkPatches]) -> Iterator[Input]:
     """Of all layouts, by the body that carries them."""
-    for body, of_link in patches.items():
-        columns = iter(of_link.Phi_V.T)
-        for layout, array in of_link.arrays.items():
-            for k in range(1, len(array.edges) + 1):
-                yield voltage(layout, k), modal_direction(model, body, next(columns))
+    for of_link in patches.values():
+        directions = modal_directions(model, of_link.per_volt)
+        for layout in of_link.arrays:
+            yield from ((voltage(layout, k), row) for k, row in enumerate(directions[of_link.columns(layout)], 1))
 
 
 def voltage(layout: str, number: int) -> Variable:
