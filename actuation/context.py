@@ -8,12 +8,10 @@ from typing import Protocol, TypeVar
 
 from ..fe_models.modal_body import ModalBody
 from ..mbs.analysis.context import Context, PlanarContext
-from ..mbs.analysis.outcome import Outcome
 from ..mbs.analysis.planar_outcome import PlanarOutcome
 from ..mbs.model.divided_link import DividedLink
 from ..mbs.model.model import Model
 from ..mbs.model.spatial_body import SpatialBody
-from ..mbs.model.spatial_model import SpatialModel
 from .patches.patches import PatchArray
 from .patches.spatial_patches import LinkPatches
 
@@ -36,23 +34,6 @@ class PlanarWholeLinks:
     told: Callable[[PlanarOutcome], PlanarOutcome]
 
 
-@dataclass(frozen=True)
-class WholeLinks:
-    """Of a robot in 3D whose links are in pieces: see `PlanarWholeLinks`.
-
-    Attributes:
-        model: the robot with one body for each link.
-        divided: the links in pieces by name.
-        places: which point of which piece "BODY.POINT" of such a link is.
-        told: an outcome of the pieces, as one of the links; `InputError` where their joints cannot say it.
-    """
-
-    model: SpatialModel
-    divided: Mapping[str, DividedLink]
-    places: Mapping[str, str]
-    told: Callable[[Outcome], Outcome]
-
-
 Point = TypeVar("Point", str, str | None)
 
 
@@ -69,15 +50,11 @@ def place_of(whole: _Places | None, point: Point) -> Point:
 
 @dataclass(frozen=True, kw_only=True)
 class ActuatedContext(Context):
-    """With the `patches` of links by body, the modal bodies of `links`, bodies `carrying` all their payloads.
-
-    `whole` are the links of a robot in which some are in pieces: `model` has the pieces then.
-    """
+    """With the `patches` of links by body, the modal bodies of `links`, bodies `carrying` all their payloads."""
 
     patches: Mapping[str, LinkPatches] = field(default_factory=dict)
     links: Mapping[str, ModalBody] = field(default_factory=dict)
     carrying: Mapping[str, SpatialBody] = field(default_factory=dict)
-    whole: WholeLinks | None = None
 
 
 @dataclass(frozen=True, kw_only=True)

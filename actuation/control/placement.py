@@ -96,5 +96,5 @@ def patchable_link(path: Path, layout: PatchKeys, body: ModalBody, planar: Plana
     def patches(**changes: object) -> PatchArray:
         return patch_array(path, layout.model_copy(update=elsewhere(layout, changes)), body, planar)
 
-    unit = np.eye(planar.n_modes)
-    return PatchableLink(planar.name, body.length, layout, planar.stiffness, planar.n_eigenmodes, unit, patches)
+    served, unit = planar.n_eigenmodes, np.eye(planar.n_modes)
+    return PatchableLink(planar.name, body.length, (planar.name,), layout, planar.stiffness, served, unit, patches)

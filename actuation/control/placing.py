@@ -41,14 +41,16 @@ class PatchableLink:
 
     Attributes:
         name, length: of the link, m.
+        bodies: whose modal coordinates are those of the link in linear models: itself, or its pieces.
         layout: of the patches.
         stiffness: (m,) of p, and `served` how many of p, the first ones, patches are to serve.
-        own: (m, n) p from the modal coordinates of the link as linear models have them.
+        own: (m, n) p from the modal coordinates of the `bodies`, side by side, as linear models have them.
         patches: elsewhere, by the keys "count" or "centers".
     """
 
     name: str
     length: float
+    bodies: tuple[str, ...]
     layout: PatchKeys
     stiffness: Array
     served: int
@@ -118,7 +120,7 @@ def held_modes(model: LinearModel, link: PatchableLink, count: int) -> ModalReac
 
     f = model.freedom
     modal = [i for i, name in enumerate(model.state_names[:f]) if name.startswith("modal/")]
-    own = [k for k, i in enumerate(modal) if model.state_names[i].startswith(f"modal/{link.name}/")]
+    own = [k for body in link.bodies for k, i in enumerate(modal) if model.state_names[i].startswith(f"modal/{body}/")]
     block = np.ix_(modal, modal)
     K = -(model.mass @ model.A[f:, :f])[block]
     squares, shape = eigh((K + K.T) / 2, model.mass[block])

@@ -34,7 +34,7 @@ def run_spatial_placement(context: ActuatedContext, analysis: InstantAnalysis, w
         source = context.outcomes[analysis.source]
         run = of_earlier(source, analysis)
         reached = context.patches[wanted.body].modes[link.layout.label]
-        F_p = reached.forces(motor_forces_of(source).modal[wanted.body])
+        F_p = reached.forces(context.patches[wanted.body].on_link(motor_forces_of(source).modal))
         return replace(run, details=place(model.scene.path, wanted, link, None, F_p))
     run, about = operating_points_in_space(context, analysis)
     at = SpatialLinearisation(about.model, about.q[0]).at(float(about.time[0]), about.q[0], about.v[0], about.a[0])
@@ -44,7 +44,12 @@ def run_spatial_placement(context: ActuatedContext, analysis: InstantAnalysis, w
 def _link(context: ActuatedContext, name: str) -> PatchableLink:
     """By the coordinates that its layout reaches; patches elsewhere reach the same."""
     path, of_link, body = context.model.scene.path, context.patches[name], context.links[name]
-    spatial = context.model.tree.nodes[context.model.tree.index[name]].body
+    whole = context.whole
+    bodies: tuple[str, ...] = (name,)
+    tree = (context.model if whole is None else whole.model).tree
+    to_file = tree.nodes[tree.index[name]].body.modal_transform
+    if whole is not None and name in whole.divided:
+        bodies, to_file = whole.divided[name].bodies, to_file @ whole.divided[name].gathered
     if len(of_link.arrays) > 1:
         raise InputError(
             f'{path}: placement.body: expected a link with one layout of patches in 3D, found "{name}" with'
@@ -61,5 +66,5 @@ def _link(context: ActuatedContext, name: str) -> PatchableLink:
             raise InputError(f'{path}: placement.body: expected patches that reach the modes of "{label}"')
         return found.arrays[label]
 
-    own = as_floats(np.linalg.solve(reached.T, spatial.modal_transform[reached.rows]))
-    return PatchableLink(name, body.length, layout, reached.stiffness, reached.served, own, patches)
+    own = as_floats(np.linalg.solve(reached.T, to_file[reached.rows]))
+    return PatchableLink(name, body.length, bodies, layout, reached.stiffness, reached.served, own, patches)

@@ -9,13 +9,14 @@ import numpy as np
 
 from ...common.arrays import Array, Indices
 from ...common.errors import InputError
+from ...mbs.analysis.context import WholeLinks
 from ...mbs.model.spatial_drives import Drives, PointDrive
 from ...mbs.model.spatial_known_motion import KnownStates, motion_forces
 from ...mbs.model.spatial_model import SpatialModel, modal_directions
 from ...mbs.model.spatial_system import SpatialSystem
 from ...mbs.model.spatial_tree import Section, SpatialTree
 from ...mbs.solve.spatial_linearisation import labelled
-from ..context import WholeLinks, place_of
+from ..context import place_of
 from ..patches.spatial_patches import LinkPatches
 from .records import Sensor
 from .signals import ORDERS, Reading, volts_per_turn

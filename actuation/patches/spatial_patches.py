@@ -127,6 +127,11 @@ class LinkPatches:
         """By body, (m, n) modal forces on `reached` by those on the modes of its file."""
         return {name: self.reached.forces(of.to_link.T).T for name, of in self.bodies.items()}
 
+    def on_link(self, modal: Mapping[str, Array]) -> Array:
+        """Modal forces (T, …) on the modes of the link's file, by those of bodies that carry it on theirs."""
+        found = [modal[name] @ of.to_link.T for name, of in self.bodies.items() if name in modal]
+        return as_floats(np.sum(found, axis=0))
+
     def allocation(self, *, limited: bool) -> _core.Allocation:
         """From modal forces on `reached` to voltages (k,), with the limits of the patches or without."""
         return allocation(self.reach, limited=limited)

@@ -7,9 +7,9 @@ from functools import partial
 
 import numpy as np
 
-from ..actuation.context import WholeLinks
 from ..common.arrays import Array
 from ..common.errors import InputError
+from ..mbs.analysis.context import WholeLinks
 from ..mbs.analysis.outcome import Outcome
 from ..mbs.model.divided_link import DividedLink, SpatialPiece, divided_link_in_space
 from ..mbs.model.spatial_model import SpatialModel

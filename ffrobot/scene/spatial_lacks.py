@@ -28,11 +28,6 @@ LACKS = (
         "ffrobot.actuation.patches.spatial_records",
     ),
     Lack(
-        "subdivided bodies in `fcid`, `motors-only` and `placement`, as in 2D",
-        "the link in one, or several links welded to each other",
-        "ffrobot.scene.spatial_pieces",
-    ),
-    Lack(
         'compliant gears (`stiffness` of joints) with `motors = "frame"`, where they are driven, controlled or linear',
         '`motors = "section"`',
         "ffrobot.mbs.analysis.spatial_gears",

@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 
 from ..common.errors import InputError
-from ..common.validation import quoted
 from ..fe_models.link_records import FAMILIES
 from ..fe_models.pieces import cut
 from ..mbs.joints.spatial.weld import SpatialWeld
@@ -17,9 +16,6 @@ from ..mbs.scene.spatial.bodies import BodyInSpace
 from ..mbs.scene.spatial.mechanism import SpatialMechanismKeys
 from .pieces import BodyInPieces, places_on_pieces, renamed, unfit_actuators, unfit_references, welds_between
 from .spatial import SpatialScene
-
-KINDS = ("pcid", "forward", "static", "linear", "closed-loop")
-"""Kinds of analysis that links in pieces can take part in."""
 
 
 def bodies_in_pieces_in_space(scene: SpatialScene, counts: Mapping[str, int]) -> dict[str, BodyInPieces]:
@@ -70,12 +66,7 @@ def _problems(scene: SpatialScene, divided: Mapping[str, BodyInPieces]) -> Itera
     beside = f'with subdivided bodies ("{first}")'
     yield from unfit_actuators((points.body for points in scene.actuation_points), scene.motors, first)
     for analysis in scene.analysis:
-        if analysis.kind not in KINDS:
-            yield (
-                f'analysis "{analysis.name}": kind: expected one of {quoted(KINDS)} {beside} in 3D, found'
-                f' "{analysis.kind}"'
-            )
-        elif analysis.is_checked:
+        if analysis.is_checked:
             yield f'analysis "{analysis.name}": check: expected none {beside}, found one'
     for joint in scene.joint:
         if getattr(joint, "stiffness", None) is not None:

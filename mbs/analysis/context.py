@@ -8,6 +8,7 @@ from typing import Protocol
 
 from ...common.arrays import Array
 from .. import _core
+from ..model.divided_link import DividedLink
 from ..model.model import Model
 from ..model.spatial_model import SpatialModel
 from .drive import Progress
@@ -47,6 +48,23 @@ def no_points(run: Outcome) -> Mapping[str, Array]:
     return {}
 
 
+@dataclass(frozen=True)
+class WholeLinks:
+    """Of a model in which links are in pieces: the robot with the whole links, as scenes and controllers name it.
+
+    Attributes:
+        model: the robot with one body for each link.
+        divided: the links in pieces by name.
+        places: which point of which piece "BODY.POINT" of such a link is.
+        told: an outcome of the pieces, as one of the links; `InputError` where their joints cannot say it.
+    """
+
+    model: SpatialModel
+    divided: Mapping[str, DividedLink]
+    places: Mapping[str, str]
+    told: Callable[[Outcome], Outcome]
+
+
 @dataclass(frozen=True, kw_only=True)
 class _Start:
     """What the run of an analysis starts from, in the plane and in 3D.
@@ -72,6 +90,7 @@ class Context(_Start):
         patches: of links by body.
         points: actuation points by body.
         at_points: what driving forces are there.
+        whole: the links, where `model` has pieces of some.
     """
 
     model: SpatialModel
@@ -79,6 +98,7 @@ class Context(_Start):
     patches: Mapping[str, PatchedLink] = field(default_factory=dict)
     points: Mapping[str, ActuationPoints] = field(default_factory=dict)
     at_points: ForcesAtPoints = no_points
+    whole: WholeLinks | None = None
 
 
 @dataclass(frozen=True, kw_only=True)

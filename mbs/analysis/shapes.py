@@ -15,6 +15,7 @@ from .._core import TimeFunction
 from ..fields.field_types import Expression, Name
 from ..fields.references import Reference
 from ..fields.waypoints import spline
+from ..model.divided_link import DividedLink
 from ..model.model import ZERO
 from ..model.planar_body import PlanarBody
 from ..model.spatial_body import SpatialBody
@@ -102,6 +103,19 @@ def given_shape(scene_path: Path, bodies: Bodies, analysis: FcidKeys) -> Shape:
             p = np.column_stack([function.sample(nodes)[0] for function in functions])
             shape.append(spline(nodes, np.linalg.lstsq(body.modal_transform, p.T, rcond=None)[0].T))
     return shape
+
+
+def given_shape_of_pieces(
+    scene_path: Path, bodies: Bodies, analysis: FcidKeys, links: Bodies, divided: Mapping[str, DividedLink]
+) -> Shape:
+    """`given_shape` of the whole `links`, in the coordinates of `bodies`, which have pieces of the divided ones."""
+    nodes, counts = shape_nodes(analysis), {body.name: body.n_modes for body in bodies}
+    shape = dict(zip((link.name for link in links), given_shape(scene_path, links, analysis), strict=True))
+    for name, link in divided.items():
+        p = np.column_stack([function.sample(nodes)[0] for function in shape[name]])
+        of_pieces = iter(spline(nodes, p @ link.spread.T))
+        shape |= {piece: [next(of_pieces) for _ in range(counts[piece])] for piece in link.bodies}
+    return [shape[body.name] for body in bodies]
 
 
 def prescribed_shape(

@@ -20,7 +20,7 @@ from ..solve.spatial_start import undeformed_posture
 from .context import Context
 from .outcome import Forces, Motion, Outcome, Prescription, Statistics
 from .samples import path_times
-from .shapes import FcidKeys, prescribed_shape, sampled
+from .shapes import FcidKeys, Shape, given_shape_of_pieces, prescribed_shape, sampled
 
 
 def run_spatial_fcid(context: Context, analysis: FcidKeys) -> Outcome:
@@ -45,7 +45,7 @@ def run_spatial_fcid(context: Context, analysis: FcidKeys) -> Outcome:
         return _core.SpatialPrescribedMotion(driven_mechanism(model, has_motors=has_motors), q)
 
     motion = equations(has_motors=sum(len(columns) for columns in model.motors.values()) == freedom)
-    shape = prescribed_shape(model.scene.path, [node.body for node in model.tree.nodes], analysis, motion, q)
+    shape = _shape(context, analysis, motion, q)
 
     def at(times: Array) -> Outcome:
         found = prescribed_motion(model, motion, sampled(shape, times), times, q[None])
@@ -63,3 +63,13 @@ def run_spatial_fcid(context: Context, analysis: FcidKeys) -> Outcome:
         return at(path_times(run.time, model.scene.trajectory, analysis.end))
 
     return replace(run, look_closer=look_closer)
+
+
+def _shape(context: Context, analysis: FcidKeys, motion: _core.SpatialPrescribedMotion, q: Array) -> Shape:
+    """P(t) of all bodies; expressions are those of whole links."""
+    path, whole = context.model.scene.path, context.whole
+    bodies = [node.body for node in context.model.tree.nodes]
+    if analysis.shape == "given" and whole is not None:
+        links = [node.body for node in whole.model.tree.nodes]
+        return given_shape_of_pieces(path, bodies, analysis, links, whole.divided)
+    return prescribed_shape(path, bodies, analysis, motion, q)

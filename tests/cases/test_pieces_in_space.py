@@ -307,10 +307,6 @@ MISTAKES = {
         "body": [{"name": "beam", "link": link(), "pieces": 2, "modes": 2}]
     },
     r'motors: expected "section" with subdivided bodies \("beam"\), found "frame"': {"motors": "frame"},
-    r'"static", "linear", "closed-loop" with subdivided bodies \("beam"\) in 3D, found "fcid"': {
-        "analysis": [{"name": "straight", "kind": "fcid", "shape": "zero", "end": 1.0, "output_step": 0.1}],
-        "trajectory": [{"name": "tip", "point": "beam.tip", "x": "t"}],
-    },
     r"damping: expected none or rayleigh = \[0.0, b\] of a subdivided body": {
         "body": [{"name": "beam", "link": link(damping={"ratio": 0.01}), "pieces": 2}]
     },
