@@ -153,6 +153,8 @@ def place(
     modes = wanted.modes or min(count, link.served)
     if link.layout.coupling == "surface":
         raise InputError(f'{key}: expected patches with coupling = "rotation", found "surface", outlined in the mesh')
+    if wanted.pzt not in (None, link.layout.label):
+        raise InputError(f'{key}.pzt: expected "{link.layout.label}", found "{wanted.pzt}"')
     if modes > link.served or (F_p is not None and modes > count):
         most = link.served if F_p is None else min(count, link.served)
         raise InputError(f"{key}.modes: expected at most {most}, found {modes}")

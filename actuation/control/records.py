@@ -222,7 +222,9 @@ class Placement(Record):
     """
 
     body: str
-    """Link with patches; in 3D with one layout of them."""
+    """Link with patches."""
+    pzt: Name | None = None
+    """Layout whose patches are placed, by itself; required where a link of a 3D scene has several."""
     count: PatchCount | None = None
     """Number of patches; by default that of its [[pzt]]."""
     criterion: Literal["controllability", "voltage"] = "controllability"
@@ -240,3 +242,5 @@ class Placement(Record):
         """The link and its patches."""
         yield Reference("placement.body", self.body)
         yield Reference("placement.body", self.body, "patched body")
+        if self.pzt is not None:
+            yield Reference("placement.pzt", self.pzt, "patches")

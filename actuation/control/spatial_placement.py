@@ -8,6 +8,7 @@ import numpy as np
 
 from ...common.arrays import as_floats
 from ...common.errors import InputError
+from ...common.validation import quoted
 from ...mbs.analysis.operating_points import InstantAnalysis, of_earlier
 from ...mbs.analysis.outcome import Outcome
 from ...mbs.analysis.spatial_replay import motor_forces_of
@@ -25,10 +26,11 @@ from .spatial_linear import operating_points_in_space
 def run_spatial_placement(context: ActuatedContext, analysis: InstantAnalysis, wanted: Placement) -> Outcome:
     """The operating point, or those of the path, with what was `Placed`.
 
-    Raises `InputError` for a link with several layouts, or without room for the patches.
+    Of several layouts of a link the others stay where they are. Raises `InputError` where it does not say which one is
+    placed, and for a link without room for the patches.
     """
     model = context.model
-    link = _link(context, wanted.body)
+    link = _link(context, wanted)
     if wanted.criterion == "voltage":
         assert analysis.source is not None
         source = context.outcomes[analysis.source]
@@ -41,8 +43,9 @@ def run_spatial_placement(context: ActuatedContext, analysis: InstantAnalysis, w
     return replace(run, details=place(model.scene.path, wanted, link, state_space(at, {}), None))
 
 
-def _link(context: ActuatedContext, name: str) -> PatchableLink:
-    """By the coordinates that its layout reaches; patches elsewhere reach the same."""
+def _link(context: ActuatedContext, wanted: Placement) -> PatchableLink:
+    """By the coordinates that the layout reaches; patches elsewhere reach the same."""
+    name = wanted.body
     path, of_link, body = context.model.scene.path, context.patches[name], context.links[name]
     whole = context.whole
     bodies: tuple[str, ...] = (name,)
@@ -50,13 +53,13 @@ def _link(context: ActuatedContext, name: str) -> PatchableLink:
     to_file = tree.nodes[tree.index[name]].body.modal_transform
     if whole is not None and name in whole.divided:
         bodies, to_file = whole.divided[name].bodies, to_file @ whole.divided[name].gathered
-    if len(of_link.arrays) > 1:
+    label = wanted.pzt or ("" if len(of_link.arrays) > 1 else next(iter(of_link.arrays)))
+    if label not in of_link.arrays:
+        found = f'"{label}"' if label else "none"
         raise InputError(
-            f'{path}: placement.body: expected a link with one layout of patches in 3D, found "{name}" with'
-            f" {len(of_link.arrays)}"
+            f'{path}: placement.pzt: expected one of the layouts {quoted(of_link.arrays)} of "{name}", found {found}'
         )
-    ((label, array),) = of_link.arrays.items()
-    reached, layout = of_link.modes[label], array.layout
+    reached, layout = of_link.modes[label], of_link.arrays[label].layout
     assert isinstance(layout, SpatialPztLayout)
 
     def patches(**changes: object) -> PatchArray:

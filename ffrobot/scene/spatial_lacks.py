@@ -33,11 +33,6 @@ LACKS = (
         "ffrobot.mbs.analysis.spatial_gears",
     ),
     Lack(
-        "`placement` of patches on a link with several layouts",
-        "one layout on that link",
-        "ffrobot.actuation.control.spatial_placement",
-    ),
-    Lack(
         '`output = "redefined"` of `motors-only` with motors in planar joints and kinematic loops',
         '`output = "tip"`',
         "ffrobot.mbs.solve.spatial_servo",

@@ -113,9 +113,9 @@ def test_patches_are_placed_as_on_the_whole_link():
         "placement": {"body": "fore", "count": 2, "spacing": 0.1, "criterion": "voltage"}
     }
     shown = "best/centers", "best/reach", "frequency", "share", "largest_voltage"
-    with solved(in_pieces([ZERO, reach, volts], None, pzt=[PATCHES])) as whole:
-        with solved(in_pieces([ZERO, reach, volts], 2, pzt=[PATCHES])) as pieces:
-            for name in ("reach", "volts"):
-                for key in shown:
-                    found, expected = (of[f"{name}/placement/{key}"] for of in (pieces, whole))
-                    np.testing.assert_allclose(found, expected, rtol=2e-2, err_msg=key)
+    whole, pieces = (solved(in_pieces([ZERO, reach, volts], count, pzt=[PATCHES])) for count in (None, 2))
+    with whole, pieces:
+        for name in ("reach", "volts"):
+            for key in shown:
+                found, expected = (of[f"{name}/placement/{key}"] for of in (pieces, whole))
+                np.testing.assert_allclose(found, expected, rtol=2e-2, err_msg=key)

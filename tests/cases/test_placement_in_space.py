@@ -72,9 +72,16 @@ def strip(folder, layouts, placement):
     }  # fmt: skip
 
 
-def test_patches_out_of_plane_reach_modes_out_of_plane_alone(tmp_path):
-    """A cantilever that its motor holds: one patch for its first mode sits at the root, where the curvature is most."""
-    with solve(strip(tmp_path, [LAYOUT], {"body": "arm"}), tmp_path) as found:
+@pytest.mark.parametrize(
+    ("layouts", "placement"),
+    [([LAYOUT], {"body": "arm"}), ([LAYOUT | {"name": "up"}, LAYOUT | BESIDE], {"body": "arm", "pzt": "up"})],
+)
+def test_patches_out_of_plane_reach_modes_out_of_plane_alone(tmp_path, layouts, placement):
+    """A cantilever that its motor holds: one patch for its first mode sits at the root, where the curvature is most.
+
+    Whatever other layouts the link has.
+    """
+    with solve(strip(tmp_path, layouts, placement), tmp_path) as found:
         assert found["where/placement/best/centers"] == pytest.approx([0.03])
         reach = found["where/placement/candidate_reach"][0]
         assert (np.diff(reach) < 0).all()
@@ -92,7 +99,8 @@ def test_patches_out_of_plane_reach_modes_out_of_plane_alone(tmp_path):
         ([LAYOUT], {"body": "hub"}, 'found "hub"'),
         ([LAYOUT], {"body": "arm", "count": 20}, "expected patches that fit side by side"),
         ([LAYOUT], {"body": "arm", "modes": 9}, "placement.modes: expected at most"),
-        ([LAYOUT, LAYOUT | BESIDE], {"body": "arm"}, "one layout of patches"),
+        ([LAYOUT, LAYOUT | BESIDE], {"body": "arm"}, 'pzt: expected one of the layouts "arm", "b" of "arm"'),
+        ([LAYOUT, LAYOUT | BESIDE], {"body": "arm", "pzt": "c"}, "placement.pzt: expected one of the layouts"),
         ([LAYOUT], {"body": "arm", "criterion": "voltage"}, "about: expected an earlier analysis"),
     ],
 )  # fmt: skip
