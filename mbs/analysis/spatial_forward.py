@@ -43,7 +43,7 @@ def run_spatial_forward(context: Context, analysis: ForwardKeys) -> Outcome:
     if model.tree.gears:
         return _behind_gears(source, model, analysis, context)
     replayed = _replayed(context, source, analysis)
-    if source.recording is not None:
+    if analysis.apply == "trajectory" and source.recording is not None:  # others may ring where `source` did not
         replayed = replayed._replace(integrator=source.statistics.integrator.at_end)
     run = spatial_drive(
         model, analysis, State(source.q[0], source.v[0]), progress,

@@ -42,7 +42,7 @@ class Replayed(NamedTuple):
         commands: what a unit of each does; of those at points nothing.
         at_points: by "BODY.POINT" the number of each component ("x" … "mz"), global axes.
         moments: by joint those that act along its coordinates, N·m or N on its second side.
-        integrator: with which the earlier analysis ended; empty: it was not integrated.
+        integrator: with which the earlier analysis ended, where this run repeats its motion; else empty.
     """
 
     source: ForceSource

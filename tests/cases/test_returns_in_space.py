@@ -124,7 +124,7 @@ def test_with_other_steps_the_tolerance_is_left(solution, apply, tolerance, inte
 def test_auto_goes_on_with_the_integrator_of_the_inverse_run(solution, integrator):
     """Its steps are known there, so that far less than the tolerance is left."""
     inverse = inverse_of(solution.model, 1e-5, integrator=integrator)
-    back = replay_of(solution.model, inverse, "joints+pzt", 1e-5, integrator="auto")
+    back = replay_of(solution.model, inverse, "trajectory", 1e-5, integrator="auto")
     assert back.statistics.integrator.name == integrator
     assert departure(inverse, back) < 1e-9
 
