@@ -69,7 +69,8 @@ def run_fcid(model: Model, analysis: Fcid) -> PlanarOutcome:
             f'"fcid", found {len(assembly.constraints) - len(model.joints)}'
         )
     start = undeformed_state(assembly)
-    check_smooth(assembly, analysis.end)
+    paths = [(held.measure.label, held.target) for held in assembly.constraints if held.is_trajectory]
+    check_smooth(model.scene.path, paths, analysis.end)
     check_reach(assembly, start, analysis.times)
     has_motors = motors_fit(model)
     tree = _tree(assembly, has_motors=has_motors)

@@ -62,7 +62,8 @@ def run_pcid(
     assembly = _system(raised)
     start = initial_state(assembly)
     if not analysis.is_repeated:
-        check_smooth(assembly, analysis.end)
+        paths = [(held.measure.label, held.target) for held in assembly.constraints if held.is_trajectory]
+        check_smooth(model.scene.path, paths, analysis.end)
         check_reach(assembly, undeformed_state(assembly), analysis.times)
     recording = _core.Recording() if keep_recording else None
     return drive(

@@ -33,7 +33,7 @@ def run_spatial_fcid(context: Context, analysis: FcidKeys) -> Outcome:
     refuse_held_motors(context.model, analysis)
     model = resolved(context.model, analysis.last_time)
     q = undeformed_posture(model).q
-    warnings = tuple(check_path(model, q))
+    warnings = tuple(check_path(model, q, analysis.last_time))
     freedom, rows = mobility(model, q).freedom, int(np.count_nonzero(~model.loop_rows))
     if rows != freedom:
         raise InputError(

@@ -20,7 +20,7 @@ def run_spatial_pcid(context: Context, analysis: IntegratedAnalysis) -> Outcome:
     from.
     """
     firm = resolved(context.model, analysis.last_time)
-    warnings = tuple(check_path(firm, undeformed_posture(firm).q))
+    warnings = tuple(check_path(firm, undeformed_posture(firm).q, analysis.last_time))
     model = with_held_motors(firm)
     return spatial_drive(
         model, analysis, initial_state(model), context.progress, warnings=warnings, earlier=context.earlier,

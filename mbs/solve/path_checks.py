@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from pathlib import Path
+
 import numpy as np
 
 from ...common.arrays import Array, as_floats
 from ...common.errors import InputError
 from .._core import TimeFunction
-from ..model.system import MechanismSystem
 
 SAMPLES = 2001
 LOOKED_INTO = 5  # intervals between samples, the roughest ones
@@ -17,23 +19,21 @@ SMOOTH = 0.1  # of that: what misses less in one of those intervals has no jump
 RESTING = 1e-6  # of the largest value, within the run: a path that moves less stands still, and what jumps is rounding
 
 
-def check_smooth(assembly: MechanismSystem, end: float) -> None:
-    """Raise `InputError` for a trajectory that jumps, in value or velocity, between t = 0 and `end` (s).
+def check_smooth(path: Path, targets: Iterable[tuple[str, TimeFunction]], end: float) -> None:
+    """Raise `InputError` for a target, with its label, that jumps in value or velocity between t = 0 and `end` (s).
 
-    Accelerations may jump. What is looked into are the intervals that the trapezoidal rule on the exact derivatives
-    describes worst; a jump is what stays however far they are halved.
+    `path` is that of the scene. Accelerations may jump. What is looked into are the intervals that the trapezoidal rule
+    on the exact derivatives describes worst; a jump is what stays however far they are halved.
     """
-    for constraint in assembly.constraints:
-        if not constraint.is_trajectory:
-            continue
+    for label, target in targets:
         for order, quantity in enumerate(("value", "velocity")):
-            found = _jump(constraint.target, end, order)
+            found = _jump(target, end, order)
             if found is not None:
                 t, before, after = found
                 raise InputError(
-                    f"{assembly.model.scene.path}: {constraint.measure.label}: expected a continuous {quantity}, found"
-                    f" a jump from {before:.6g} to {after:.6g} at t = {t:.9g} s: no finite force can make the robot"
-                    " follow; round it off (waypoints make a smooth curve)"
+                    f"{path}: {label}: expected a continuous {quantity}, found a jump from {before:.6g} to {after:.6g}"
+                    f" at t = {t:.9g} s: no finite force can make the robot follow; round it off (waypoints make a"
+                    " smooth curve)"
                 )
 
 

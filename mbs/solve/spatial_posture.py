@@ -13,6 +13,7 @@ from ...common.errors import InputError
 from ...common.validation import quoted
 from ..joints.spatial.joint import SpatialJoint
 from ..model.spatial_model import SpatialModel, row_values, target_rates
+from .path_checks import check_smooth
 from .state import State
 
 BoolArray = NDArray[np.bool_]
@@ -151,12 +152,15 @@ def _null_space(J: Array) -> tuple[Array, int]:
     return V[rank:].T, rank
 
 
-def check_path(model: SpatialModel, q: Array) -> Iterator[str]:
+def check_path(model: SpatialModel, q: Array, end: float) -> Iterator[str]:
     """Warnings on what paths and motors leave open at q.
 
-    Raises `InputError` for more rows than the mechanism can follow, motors that do not fit, and a singular posture.
+    Raises `InputError` for more rows than the mechanism can follow, motors that do not fit, a singular posture, and a
+    path that jumps before `end` (s).
     """
     path, found = model.scene.path, mobility(model, q)
+    for each in model.scene.trajectory if end > 0 else ():
+        check_smooth(path, ((f'trajectory "{each.name}": {name}', target) for name, target in each.targets), end)
     rows = int(np.count_nonzero(~model.loop_rows))
     names = quoted(trajectory.name for trajectory in model.scene.trajectory)
     if rows > found.freedom:

@@ -126,12 +126,17 @@ def _written(nodes: Sequence[Node], q: Array) -> Iterator[str]:
 
 
 def turned_guesses(scene: SpatialMechanismKeys) -> list[str]:
-    """Guesses of angles beyond a whole turn, which are degrees as a rule; a text each."""
+    """Guesses of angles beyond a whole turn, which are degrees as a rule; a text each.
+
+    A trajectory of the joint's own coordinate says in which turn it begins.
+    """
+    followed = {path.coordinate_of for path in scene.trajectory}
     units = {joint.name: joint.guess_units or joint.units for joint in scene.joint}
     guesses = ((name, np.atleast_1d(np.array(value, dtype=float))) for name, value in scene.initial.joints.items())
     return [
         f'initial.joints: {name} = {angle:g} rad is more than a turn (degrees are written "{angle:g}*deg")'
         for name, values in guesses
+        if name not in followed
         for angle in _turns(values.tolist(), units.get(name, ()))
     ]
 

@@ -71,11 +71,8 @@ class SpatialServo:
     def targets(self) -> Iterator[Target]:
         """What the path follows."""
         for path in self.model.scene.trajectory:
-            for component, function in path.components.items():
+            for component, function in path.targets:
                 yield Target(path.name, component, function)
-            if path.orientation is not None:
-                for function in path.orientation.functions:
-                    yield Target(path.name, path.orientation.kind, function)
 
     def with_factor(self, factor: float) -> SpatialServo:
         """The same with another factor."""

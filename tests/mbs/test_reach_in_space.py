@@ -80,6 +80,18 @@ def test_guesses_that_work_are_named():
         np.testing.assert_allclose(results["inverse/points/b.tip/position"][0], [0.7, 0.2, 0.3], atol=1e-9)
 
 
+@pytest.mark.parametrize(
+    ("y", "jump"),
+    [
+        ("where(t < 0.04, 0.5, 0.52)", "a continuous value, found a jump from 0.5 to 0.52 at t = 0.04 s"),
+        ("0.5 + where(t < 0.04, 0, t - 0.04)", "a continuous velocity, found a jump from 0 to 1 at t = 0.04 s"),
+    ],
+)
+def test_a_path_that_jumps_is_rejected(y, jump):
+    with pytest.raises(InputError, match=f'trajectory "tip": y: expected {jump}'):
+        ffrobot.solve(arm({"x": "0.9 + 0.1*t", "y": y, "z": "0.4"}, BENT))
+
+
 def test_guesses_beyond_a_turn_are_warned_of_once():
     path = {"x": "0.9 + 0.1*t", "y": "0.5", "z": "0.4"}
     with ffrobot.solve(arm(path, BENT)) as results:

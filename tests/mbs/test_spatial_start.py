@@ -63,7 +63,7 @@ def test_paths_take_all_freedom(name, freedom):
     found = mobility(model, undeformed_posture(model).q)
     assert (found.freedom, found.followed, found.left) == (freedom, freedom, ())
     assert found.ratio > 0.01
-    assert list(check_path(model, undeformed_posture(model).q)) == []
+    assert list(check_path(model, undeformed_posture(model).q, 1.0)) == []
 
 
 def test_loops_are_cut_at_the_spherical_joint():

@@ -192,6 +192,13 @@ class SpatialTrajectory(MotionKeys):
             names = ("value",) if self.point is None else PLACES[: self._places.shape[1]]
         return dict(zip(names, self.path.functions(), strict=True)) if names else {}
 
+    @property
+    def targets(self) -> list[tuple[str, TimeFunction]]:
+        """All functions of time that it follows, by component; those of an orientation by its kind."""
+        law = self.orientation
+        turning = [] if law is None else [(law.kind, function) for function in law.functions]
+        return [*self.components.items(), *turning]
+
     @cached_property
     def orientation(self) -> OrientationLaw | None:
         """How the section turns; None where that is left open."""
