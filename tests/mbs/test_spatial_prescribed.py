@@ -11,11 +11,13 @@ from scipy.linalg import qr
 from spatial_trees import TYPES
 
 from ffrobot.mbs import _core
+from ffrobot.mbs.fields.state_forces import state_function
 from ffrobot.mbs.model.spatial_drives import Command, Drive
 from ffrobot.mbs.model.spatial_model import row_values
 from ffrobot.mbs.model.spatial_rows import SpatialRow
 from ffrobot.mbs.model.spatial_system import SpatialSystem
 from ffrobot.mbs.model.spatial_tree import Section
+from ffrobot.mbs.scene.spatial.loads import SpatialLoad
 
 TIMES = np.array([0.0, 0.01, 0.01, 0.05])
 GROUND = Section(-1, "", np.eye(3), np.zeros(3))
@@ -237,6 +239,17 @@ def with_friction(model):
     return replace(model, tree=tree)
 
 
+def pulled(model):
+    """By a cubic spring and a damper at a point of the last body."""
+
+    def pull(t, position, velocity):
+        return -30.0 * (position - 0.2) * (1 + position @ position) - (2 + position[1] ** 2) * velocity
+
+    body = model.tree.nodes[-1].body
+    load = SpatialLoad(point=f"{body.name}.{list(body.points)[-1]}", force=state_function(pull, is_planar=False))
+    return replace(model, scene=model.scene.model_copy(update={"load": (load,)}))
+
+
 @pytest.mark.parametrize(
     ("types", "loops", "factor"),
     [
@@ -249,9 +262,9 @@ def with_friction(model):
     ids=str,
 )
 def test_derivatives_of_what_motors_leave_are_those_of_differences(types, loops, factor):
-    """By p, ṗ and p̈, with friction along single coordinates; differences of fourth order."""
+    """By p, ṗ and p̈, with friction along single coordinates and a force of the motion; of fourth order."""
     model, motors, modes, near = drawn(2, types, loops, count_more=1 if loops else 0)
-    model = with_friction(model)
+    model = pulled(with_friction(model))
     motors = [motor._replace(turns_frames=False) for motor in motors]
     driven = in_core(model, motors)
     motion = _core.SpatialPrescribedMotion(driven, near[0])
