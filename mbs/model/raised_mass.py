@@ -16,17 +16,24 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import TypeVar
 
 import numpy as np
 
 from ...common.arrays import Array
 from .model import Model
 from .planar_body import PlanarBody, transformed
+from .projection import PLANE
+from .spatial_body import SpatialBody
+from .spatial_body import transformed as transformed_in_space
 
 LIMIT = 2.0  # times the frequency of the highest eigenmode: above it masses are raised
 
 
-def mass_factors(body: PlanarBody) -> Array:
+B = TypeVar("B", PlanarBody, SpatialBody)
+
+
+def mass_factors(body: PlanarBody | SpatialBody) -> Array:
     """(n,) μ ≥ 1 of each modal coordinate; 1 where a body has no attachment modes."""
     mu = np.ones(body.n_modes)
     if body.attachment_modes and body.n_eigenmodes:
@@ -35,13 +42,17 @@ def mass_factors(body: PlanarBody) -> Array:
     return mu
 
 
-def with_raised_mass(body: PlanarBody) -> PlanarBody:
-    """The body in p' = √μ p; the same object where no mass is raised."""
+def with_raised_mass(body: B) -> B:
+    """The body, in 3D one of a planar scene, in p' = √μ p; the same object where no mass is raised."""
     mu = mass_factors(body)
     if np.all(mu == 1.0):
         return body
-    raised = transformed(body, np.diag(1.0 / np.sqrt(mu)), body.stiffness / mu)
-    return replace(raised, m_xy=raised.m_xy + np.diag(1.0 - 1.0 / mu))
+    T, stiffness, added = np.diag(1.0 / np.sqrt(mu)), body.stiffness / mu, np.diag(1.0 - 1.0 / mu)
+    if isinstance(body, SpatialBody):
+        raised = transformed_in_space(body, T, stiffness)
+        return replace(raised, S_bar_kl=raised.S_bar_kl + np.multiply.outer(0.5 * PLANE, added))
+    planar = transformed(body, T, stiffness)
+    return replace(planar, m_xy=planar.m_xy + added)
 
 
 def integrated(model: Model) -> Model:

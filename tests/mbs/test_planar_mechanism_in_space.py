@@ -8,9 +8,9 @@ import pytest
 
 import ffrobot
 from ffrobot.common.errors import InputError
-from ffrobot.mbs.model.planar_body import from_rigid_body
-from ffrobot.mbs.model.planar_body_in_space import planar_body_in_space
 from ffrobot.mbs.scene.in_space.mechanism import mechanism_in_space
+from ffrobot.run.spatial_bodies import load_spatial_bodies
+from ffrobot.scene.spatial import SpatialScene
 
 
 def body(name, **points):
@@ -66,18 +66,15 @@ def test_joints_turn_about_z_and_start_by_relative_angles():
 
 
 def test_inertia_of_a_body_is_that_of_the_plane():
-    rigid = ffrobot.make_scene(**ARM).body[0].rigid
-    planar = from_rigid_body("lower", rigid)
-    J = planar_body_in_space(planar).inertia
-    assert J[2, 2] == pytest.approx(rigid.inertia + rigid.mass * (0.1**2 + 0.2**2))
-    assert np.array_equal(J, np.diag(np.diag(J)))  # nothing turns it out of the plane
+    J = load_spatial_bodies(SpatialScene.model_construct(**dict(mechanism(payload=[]))), str)[0].spatial.inertia
+    assert J[2, 2] == pytest.approx(0.1 + 2.0 * (0.1**2 + 0.2**2))
+    assert np.abs(J[:2, 2]).max() < 1e-15  # nothing turns it out of the plane
 
 
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
         ({"trajectory": [{"name": "turn", "angle": "tool.a", "value": "t"}]}, 'trajectory "turn": angle: expected'),
-        ({"load": [{"point": "tool.a", "force": lambda t, r, v: (0.0, 0.0)}]}, "load no. 1: force: expected functions"),
         ({"joint": ARM["joint"][2:], "trajectory": []}, 'joints that lead to the ground in 3D, found "lower"'),
         (
             {"joint": ARM["joint"][:2], "trajectory": [], "load": []},

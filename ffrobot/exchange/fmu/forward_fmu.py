@@ -13,20 +13,23 @@ from ...common.errors import InputError
 from ...common.validation import quoted
 from ...mbs import _core
 from ...mbs.analysis.forward import Forward
+from ...mbs.model.raised_mass import with_raised_mass
 from ...mbs.model.spatial_gears import with_compliance_in_space
 from ...mbs.model.spatial_model import SpatialModel, build_spatial_model, without_paths
 from ...mbs.solve.robot_damping import with_robot_damping_in_space
 from ...run.loaded_body import robot_damping_ratios
+from ...run.planar_in_space import scene_in_space
+from ...run.prepare import prepare
 from ...run.spatial_actuation import patches_in_space
 from ...run.spatial_bodies import load_spatial_bodies
 from ...run.spatial_mode_choice import mode_levels_in_space
 from ...run.watcher import Watcher
 from ...scene.any_space import AnyScene, load_any_scene
+from ...scene.scene import Scene
 from ...scene.spatial import SpatialScene
 from .archive import PLATFORMS, identifier_of, zipped
 from .description import forward_description
-from .forward_model import HeldUnit, has_own_coordinates, held_unit, voltages_in_space
-from .planar_forward import unit_in_plane
+from .forward_model import AXES, HeldUnit, has_own_coordinates, held_unit, voltages_in_space
 
 logger = logging.getLogger(__name__)
 
@@ -47,8 +50,7 @@ def forward_fmu(path: Path, analysis: str | None) -> tuple[bytes, str, str, tupl
     place = PLATFORMS.get((sys.platform, platform.machine()))
     if place is None:
         raise InputError(f"{path}: --format fmu: FMI 2.0 has no name for {sys.platform} on {platform.machine()}")
-    held = _unit_in_space(scene, chosen) if isinstance(scene, SpatialScene) else unit_in_plane(scene, chosen, _Logged())
-    model, unit = held
+    model, unit = _unit(scene if isinstance(scene, SpatialScene) else _in_3d(scene), chosen)
     names = "\n".join(each.name for each in (*unit.inputs, *unit.outputs))
     unit.data.guid = f"{{{uuid5(NAMESPACE_URL, unit.data.to_bytes().hex() + names)}}}"
     identifier, (folder, suffix) = identifier_of(scene.name, chosen.name), place
@@ -72,16 +74,23 @@ class _Logged(Watcher):
         logger.info("%s", title)
 
 
-def _unit_in_space(scene: SpatialScene, analysis: Forward) -> tuple[SpatialModel, HeldUnit]:
+def _in_3d(scene: Scene) -> SpatialScene:
+    """A planar scene with records of 3D, which need not say what nothing follows."""
+    return scene_in_space(prepare(scene.model_copy(update={"trajectory": ()}), _Logged()))
+
+
+def _unit(scene: SpatialScene, analysis: Forward) -> tuple[SpatialModel, HeldUnit]:
+    """The motion of `analysis`; in the plane with raised masses of attachment modes, as the analysis has them."""
     bodies = load_spatial_bodies(scene, _Logged().stage)
     loaded = {body.name: part for body, part in zip(scene.body, bodies, strict=True)}
     fewer = mode_levels_in_space(scene, loaded)[-1]  # "auto": all of them
     spatial = [fewer.get(name, part.spatial) for name, part in loaded.items()]
+    spatial = [with_raised_mass(body) for body in spatial] if scene.is_planar else spatial
     damped = with_robot_damping_in_space(build_spatial_model(scene, spatial), robot_damping_ratios(loaded))
     model = with_compliance_in_space(without_paths(damped))
     links = {name: part.modal for name, part in loaded.items() if part.modal is not None}
     voltages = voltages_in_space(model, patches_in_space(scene, loaded))
-    return model, held_unit(model, voltages, links, analysis)
+    return model, held_unit(model, voltages, links, analysis, AXES[:2] if scene.is_planar else AXES)
 
 
 def _silent(model: SpatialModel) -> list[str]:
