@@ -8,7 +8,13 @@ import ffrobot as library
 
 E, NU, LENGTH = 70e9, 0.3, 0.5
 LEAST = 4e-8  # of the length: stretch of the links, which exact rods have not
-VARIANTS = {"off": ({}, {}), "on": ({}, {"geometric_stiffening": True}), "pieces": ({"pieces": 4}, {})}
+VARIANTS = {
+    "off": ({}, {}),
+    "on": ({}, {"geometric_stiffening": True}),
+    "two pieces": ({"pieces": 2}, {}),
+    "pieces": ({"pieces": 4}, {}),
+}
+FACTOR = {"two pieces": 3}  # by which true errors may be larger than stated ones, where stretch does not count; else 5
 
 
 def drawn(seed):
@@ -48,7 +54,7 @@ def solved(height, width, force, moment, body, keys):
 @pytest.mark.parametrize("variant", list(VARIANTS))
 @pytest.mark.parametrize("seed", range(6))
 @pytest.mark.filterwarnings("ignore::ffrobot.FfrobotWarning")
-def test_stated_errors_are_true_within_a_factor_of_five(variant, seed):
+def test_stated_errors_are_true_within_a_factor(variant, seed):
     height, width, force, moment = drawn(seed)
     exact = tip_of(rigidities(height, width, E, NU), LENGTH, force, moment)[0]
     tip, about = solved(height, width, force, moment, *VARIANTS[variant])
@@ -58,5 +64,5 @@ def test_stated_errors_are_true_within_a_factor_of_five(variant, seed):
         (error / np.linalg.norm(exact), about["relative_error"]),
     ):
         least = LEAST if stated == about["position_error"] else LEAST * LENGTH / np.linalg.norm(exact)
-        assert true < 5 * stated + least
+        assert true < FACTOR.get(variant, 5) * stated + least
         assert stated < 5 * true + least

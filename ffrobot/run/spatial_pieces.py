@@ -20,6 +20,8 @@ from ..fe_models.modal_body import ModalBody
 from ..mbs.model.divided_link import spread_in_space
 from ..mbs.model.spatial_motors import MotorForces
 from ..mbs.quantities.body_motion import BodyMotion, PointMotion
+from ..mbs.quantities.pieces_error import PieceInMotion, missed_by_pieces
+from ..mbs.quantities.second_order import IN_MOTION, Missing, largest_displacement
 from ..mbs.quantities.spatial_motion import SpatialMotion, continuous
 from ..mbs.quantities.spatial_validity import bending_in_space
 from ..mbs.quantities.validity import ENOUGH, IN_SPACE, Bending, enough_pieces, shape_from_chord
@@ -133,9 +135,27 @@ def bending_of_links(solution: SpatialSolution, motion: SpatialMotion) -> dict[s
     bodies = solution.parts or solution.bodies
     links = {name: body.modal for name, body in bodies.items() if body.modal is not None}
     worst = worst_of_pieces(bending_in_space(motion, links), solution.divided)
+    for name in solution.divided:
+        if worst[name].is_stiffened:
+            worst[name] = replace(worst[name], missing=_missing(solution, motion, name))
     if not motion.is_at_rest:
         worst = shared_in_motion(worst)
     return with_advice(worst, partial(bodies_in_pieces_in_space, solution.scene))
+
+
+def _missing(solution: SpatialSolution, motion: SpatialMotion, name: str) -> Missing:
+    """What the pieces of a link miss, which have geometric stiffening; in motion it makes the link vibrate besides."""
+    link, pieces = solution.bodies[name].modal, []
+    assert link is not None
+    for piece in solution.divided[name].names:
+        modal, node = solution.parts[piece].modal, motion.node(piece)
+        assert modal is not None
+        ends = (motion.section(f"{piece}.{end}") for end in ("root", "tip"))
+        pieces.append(PieceInMotion(modal, node.body, motion.q[:, node.p_q], *ends))
+    of_length = float(np.linalg.norm(missed_by_pieces(pieces), axis=1).max(initial=0.0)) / link.length
+    of_length *= 1.0 if motion.is_at_rest else IN_MOTION
+    whole = largest_displacement(link, motion.body(name).modal)
+    return Missing(of_length, min(1.0, of_length / whole) if whole else 0.0)
 
 
 def _shortening(solution: SpatialSolution, name: str) -> float:

@@ -18,10 +18,8 @@ from ...fe_models.modal_body import ModalBody
 from .stiffness_change import ModalLoads
 
 OUTPUTS = 64  # at which Δp is found: those with the largest ‖S‖ ‖p‖, and as many with the largest ‖p‖
-IN_MOTION = 2.0  # times the static Δp: loads that come at once
-# Of a link in N pieces, from rotations in the worst one, of its length: θ³/N of bending in one plane, N φ² θ with a
-# twist φ, N θ² ϑ with bending ϑ in the other plane.
-IN_ONE_PLANE, WITH_TWIST, IN_TWO_PLANES = 0.015, 0.05, 0.4
+IN_MOTION = 2.0  # times what is missed at rest: loads that come at once
+IN_ONE_PLANE = 0.015  # times θ³/N of a link in N pieces, of its length, with the rotation θ of bending in the worst
 
 
 class Missing(NamedTuple):
@@ -78,9 +76,12 @@ def missing_to_second_order(
 
 
 def missing_in_pieces(rotations: Rotations, count: int) -> Missing:
-    """What a link misses in `count` pieces with geometric stiffening, by the rotations in its worst piece."""
-    phi, less, most = rotations.twist, *sorted((rotations.bending_y, rotations.bending_z))
-    of_length = IN_ONE_PLANE * most**3 / count + count * (WITH_TWIST * phi**2 + IN_TWO_PLANES * most * less) * most
+    """What a planar link misses in `count` pieces with geometric stiffening, by the rotation in its worst piece.
+
+    In 3D `pieces_error` knows better.
+    """
+    most = rotations.bending_z
+    of_length = IN_ONE_PLANE * most**3 / count
     whole = 2 / 3 * count * most  # of a cantilever under a force, whose slope is N θ at its tip
     return Missing(of_length, min(1.0, of_length / whole) if whole else 0.0)
 
