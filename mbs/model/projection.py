@@ -1,9 +1,9 @@
 """Bodies of planar scenes: of their motion what is in the plane z = 0 of their frames, by declaration.
 
 What a mode moves across the plane keeps its share of m_ff = 1. Of masses the plane sees affine fields of displacement
-that keep shapes alone: translations along x and y, an expansion (x, y) and a rotation (−y, x). A body gets the integrals of a
-mass that is as wide along x as along y about its center, in which these are all there are: then geometric stiffening,
-which is by affine fields, is the same in 3D.
+that keep shapes alone: translations along x and y, an expansion (x, y) and a rotation (−y, x). A body gets the
+integrals of a mass that is as wide along x as along y about its center, in which these are all there are: then
+geometric stiffening, which is by affine fields, is the same in 3D.
 """
 
 from __future__ import annotations
