@@ -224,7 +224,7 @@ class Placement(Record):
     body: str
     """Link with patches."""
     pzt: Name | None = None
-    """Layout whose patches are placed, by itself; required where a link of a 3D scene has several."""
+    """Layout of the patches; required if a link of a 3D scene has several layouts."""
     count: PatchCount | None = None
     """Number of patches; by default that of its [[pzt]]."""
     criterion: Literal["controllability", "voltage"] = "controllability"
