@@ -106,15 +106,15 @@ class SpatialPointSet:
 
 
 def spatial_point_set(
-    scene_path: Path, layout: SpatialActuationPoints, body: ModalBody | None, spatial: SpatialBody
+    scene_path: Path, layout: SpatialActuationPoints, body: ModalBody | None, spatial: SpatialBody, axes: str = AXES
 ) -> SpatialPointSet:
-    """The components that the scene asks for, or as many well-conditioned ones as are independent.
+    """The components that the scene asks for, or as many well-conditioned ones along `axes` as are independent.
 
     Raises `InputError` for places that the body has not, and for components that do the same to the body.
     """
     key = f'{scene_path}: actuation_points "{layout.body}"'
     if not layout.places:
-        return _automatic(key, layout.body, body, spatial)
+        return _automatic(key, layout.body, body, spatial, axes)
     points = [_point(f"{key}: {axis}", place, body, spatial) for axis, place in layout.places]
     chosen = _named(layout.body, tuple(axis for axis, _ in layout.places), points, spatial)
     sizes = np.linalg.svd(_scaled(chosen, np.zeros((1, spatial.n_modes)))[0], compute_uv=False)
@@ -201,12 +201,12 @@ def _on_body(model: SpatialModel, q: Array, frames: Sequence[Motion], section: S
     return np.hstack([*on_frame, on_modes])
 
 
-def _automatic(key: str, name: str, body: ModalBody | None, spatial: SpatialBody) -> SpatialPointSet:
+def _automatic(key: str, name: str, body: ModalBody | None, spatial: SpatialBody, axes: str) -> SpatialPointSet:
     """Out of all components at every station, those that QR with column pivoting takes first: far from dependent."""
     from scipy.linalg import qr
 
     points = [_point(key, place, body, spatial) for place in candidate_places(key, body, spatial.points)]
-    candidates = _named(name, tuple(axis for axis in AXES for _ in points), points * 3, spatial)
+    candidates = _named(name, tuple(axis for axis in axes for _ in points), points * len(axes), spatial)
     _, R, order = qr(_scaled(candidates, np.zeros((1, spatial.n_modes)))[0], mode="economic", pivoting=True)
     sizes = np.abs(np.diag(R))
     kept = sorted(order[: int(np.count_nonzero(sizes > DEPENDENT * sizes[0]))])

@@ -75,7 +75,13 @@ def prepare_spatial(scene: SpatialScene | Path, watcher: Watcher) -> SpatialSolu
     bodies = {body.name: part for body, part in zip(scene.body, loaded, strict=True)}
     patches = patches_in_space(scene, bodies)
     points = {
-        layout.body: spatial_point_set(scene.path, layout, bodies[layout.body].modal, bodies[layout.body].spatial)
+        layout.body: spatial_point_set(
+            scene.path,
+            layout,
+            bodies[layout.body].modal,
+            bodies[layout.body].spatial,
+            "xy" if scene.is_planar else "xyz",
+        )
         for layout in scene.actuation_points
     }
     for name, chosen in points.items():

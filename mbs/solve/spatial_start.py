@@ -9,7 +9,7 @@ import numpy as np
 from ...common.arrays import Array
 from ...common.errors import InputError
 from ...common.validation import quoted
-from ..model.spatial_model import SpatialModel
+from ..model.spatial_model import SpatialModel, row_values
 from .spatial_posture import MOST_ITERATIONS, solve_posture, with_rates
 from .spatial_reach import out_of_reach, turned_guesses, working_guess
 from .state import State
@@ -21,7 +21,7 @@ def undeformed_posture(model: SpatialModel) -> State:
     Raises `InputError` where no posture near the guess does.
     """
     tree = model.tree
-    guess = tree.at_rest(_numbers(model, model.scene.initial.joints, "joints"))
+    guess = _with_slides(model, tree.at_rest(_numbers(model, model.scene.initial.joints, "joints")))
     q = solve_posture(model, 0.0, guess)
     if q is None:
         owners, advice = quoted(dict.fromkeys(row.owner for row in model.rows)), "; ".join(_advice(model, guess))
@@ -31,6 +31,21 @@ def undeformed_posture(model: SpatialModel) -> State:
             f" ({advice or 'out of reach, or on another branch?'})"
         )
     return relaxed_gears(model, with_rates(model, q, _guessed_rates(model)))
+
+
+def _with_slides(model: SpatialModel, q: Array) -> Array:
+    """The guess q (n_q,), in planar scenes with slides that these do not guess where the guessed angles close loops.
+
+    They enter the rows of loops linearly.
+    """
+    guesses, is_loop = model.scene.initial.joints, model.loop_rows
+    slides = [node for node in model.tree.nodes if node.joint.type == "prismatic" and node.joint.name not in guesses]
+    if not (slides and model.scene.is_planar and is_loop.any()):
+        return q
+    values, gradients = row_values(model, q[None], np.zeros(1))
+    dv, along = np.zeros(model.tree.n_v), [node.v.start for node in slides]
+    dv[along] = np.linalg.lstsq(gradients[0, is_loop][:, along], -values[0, is_loop], rcond=1e-10)[0]
+    return model.tree.integrate(q, dv)
 
 
 def relaxed_gears(model: SpatialModel, state: State) -> State:

@@ -7,12 +7,11 @@ import numpy as np
 from .. import _core
 from ..model.model import Model
 from ..model.system import MechanismSystem
-from ..scene.in_space.mechanism import Start
 from .initial_state import undeformed_state
 
 
-def start_in_space(model: Model) -> Start:
-    """Coordinates and rates of all joints that move, of undeformed links, trajectories left aside.
+def start_in_space(model: Model) -> dict[str, dict[str, float]]:
+    """`joints` and `joint_rates` of [initial] for all joints that move, with undeformed links and without trajectories.
 
     Loops are closed here: from joints that do, space finds the same posture, whichever way it would close them itself.
 
@@ -26,4 +25,4 @@ def start_in_space(model: Model) -> Start:
     q, v = state.q[None], state.v[None]
     readings = _core.Sensing(assembly.system, along, []).read(q, v, np.zeros_like(v))[0].tolist()
     places, rates = readings[: len(moving)], readings[len(moving) :]
-    return Start(dict(zip(moving, places, strict=True)), dict(zip(moving, rates, strict=True)))
+    return {key: dict(zip(moving, of, strict=True)) for key, of in (("joints", places), ("joint_rates", rates))}

@@ -1,8 +1,9 @@
 """A four-bar linkage of rigid bars in the plane, as a planar scene and as one in space, with any keys of its joints."""
 
 import numpy as np
+from planar_in_space import joint_keys, rigid_keys
 
-from ffrobot.mbs.scene.in_space import keys
+from ffrobot.mbs.fields.spelling import place
 
 LENGTHS = {"crank": 0.2, "coupler": 0.5, "rocker": 0.4}
 BASE = 0.5  # m, between the two joints on the ground
@@ -53,8 +54,8 @@ def in_space(of_joints, analyses, **tables):
     found = planar(of_joints, analyses, **tables)
     return found | {
         "space": "spatial",
-        "gravity": keys.place(found["gravity"]),
-        "body": [body | {"rigid": keys.rigid_keys(body["rigid"])} for body in found["body"]],
-        "joint": [keys.joint_keys(joint) for joint in found["joint"]],
+        "gravity": place(found["gravity"]),
+        "body": [body | {"rigid": rigid_keys(body["rigid"])} for body in found["body"]],
+        "joint": [joint_keys(joint) for joint in found["joint"]],
         "initial": {"joints": closed(1.0)},
     }

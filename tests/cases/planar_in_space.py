@@ -5,7 +5,7 @@ import tomllib
 import numpy as np
 import tomli_w
 
-from ffrobot.mbs.scene.in_space import keys
+from ffrobot.mbs.fields.spelling import NORMAL, inertia_about_z, place
 
 # Where the joints of these cases start: [initial] of scenes in space
 TWO_LINK = {"O": 0.0, "A": 1.0471975511965976}
@@ -24,15 +24,28 @@ REST = {"name": "rest", "kind": "static"}
 def in_space(tables):
     """The tables of a planar scene, without patches and analyses, as those of one in space."""
     found = {key: tables[key] for key in ("name", "motors") if key in tables}
-    found |= {"space": "spatial", "gravity": keys.place(tables["gravity"])}
+    found |= {"space": "spatial", "gravity": place(tables["gravity"])}
     found["body"] = [_body(body) for body in tables["body"]]
-    found["joint"] = [keys.joint_keys(joint) for joint in tables["joint"]]
+    found["joint"] = [joint_keys(joint) for joint in tables["joint"]]
     found["trajectory"] = [dict(trajectory) for trajectory in tables["trajectory"]]
     return found
 
 
 def _body(body):
-    return body | {"rigid": keys.rigid_keys(body["rigid"])} if "rigid" in body else dict(body)
+    return body | {"rigid": rigid_keys(body["rigid"])} if "rigid" in body else dict(body)
+
+
+def rigid_keys(rigid):
+    """The table of a rigid body in 3D."""
+    points = {name: place(at) for name, at in rigid.get("points", {}).items()}
+    return rigid | {"center": place(rigid["center"]), "inertia": inertia_about_z(rigid["inertia"]), "points": points}
+
+
+def joint_keys(joint):
+    """The table of a joint in 3D, whose sides have the same axes where it is welded or slides."""
+    axes = {"revolute": lambda: {"axis": NORMAL}, "prismatic": lambda: {"axis": place(joint["axis"])}, "weld": dict}
+    at = {"at": place(joint["at"])} if "at" in joint else {}
+    return joint | at | axes[joint["type"]]()
 
 
 def read(path):

@@ -5,10 +5,11 @@ In motion the plane raises the mass of attachment modes, space does not: the lin
 
 import numpy as np
 import pytest
+from planar_in_space import joint_keys
 
 import ffrobot
+from ffrobot.mbs.fields.spelling import place
 from ffrobot.mbs.quantities.spatial_motion import SpatialMotion
-from ffrobot.mbs.scene.in_space import keys
 from ffrobot.run.pieces import as_one_link
 from ffrobot.run.solve import solve
 from ffrobot.run.spatial import solve_spatial
@@ -79,8 +80,8 @@ def arm(pieces, analyses, family="in-plane-bending", count=4, **changes):
 def in_space(tables, **changes):
     return tables | {
         "space": "spatial",
-        "gravity": keys.place(tables["gravity"]),
-        "joint": [keys.joint_keys(joint) for joint in tables["joint"]],
+        "gravity": place(tables["gravity"]),
+        "joint": [joint_keys(joint) for joint in tables["joint"]],
         "initial": {"state": "static", "joints": {"O": 0.1, "A": 0.5}},
     } | changes  # fmt: skip
 

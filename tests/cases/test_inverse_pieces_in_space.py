@@ -6,11 +6,12 @@ The plane is asked with links cut by hand and welded, which no code for links in
 from pathlib import Path
 
 import numpy as np
+from planar_in_space import joint_keys
 
 import ffrobot
 from ffrobot.fe_models.link_file import LinkTable
 from ffrobot.fe_models.pieces import cut
-from ffrobot.mbs.scene.in_space import keys
+from ffrobot.mbs.fields.spelling import place
 
 S = "(10*(t/0.8)**3-15*(t/0.8)**4+6*(t/0.8)**5)"
 NAMES = "upper", "fore"
@@ -60,8 +61,8 @@ def in_pieces(analyses, count=2, link=LINK, **changes):
     tables = planar(bodies, [], [(f"{name}.root", f"{name}.tip") for name in NAMES], analyses)
     return tables | {
         "space": "spatial",
-        "gravity": keys.place(tables["gravity"]),
-        "joint": [keys.joint_keys(joint) for joint in tables["joint"]],
+        "gravity": place(tables["gravity"]),
+        "joint": [joint_keys(joint) for joint in tables["joint"]],
         "initial": {"joints": {"O": 0.1, "A": 0.5}},
     } | changes  # fmt: skip
 

@@ -1,11 +1,12 @@
-"""Planar scenes sent through records and analyses in space, to the core in the plane: the planar results.
+"""Planar scenes sent through records and analyses of 3D, to the core in the plane: the planar results.
 
-The switch is `run.planar_in_space`. What cannot take that road yet is in `REFUSED`, what it writes otherwise in
+What cannot take that road yet is in `REFUSED`, what it writes otherwise in
 `OTHERWISE`: a test fails where an entry is no longer needed.
 """
 
 import io
 import re
+from unittest import mock
 
 import h5py
 import planar_in_space
@@ -17,19 +18,20 @@ import ffrobot
 from ffrobot.common.errors import InputError
 from ffrobot.results.spatial import spatial_image
 from ffrobot.results.write import results_image
-from ffrobot.run.planar_in_space import solve_planar_in_space
 from ffrobot.run.solve import solve
+from ffrobot.run.spatial import solve_spatial
+from ffrobot.run.watcher import Watcher
+from ffrobot.scene.load import made_in_python
+from ffrobot.scene.spatial import available_scene
 
 ALLOWED = 0.1  # times the tolerance of references: 1e-7 of the size of most datasets
 OF_SMALL_DIFFERENCES = 5.0, "/(modal_force|voltage|required_voltage)$"  # of large forces, where links sag
 END = 0.05  # s, of analyses of cases that say how long they are
 REFUSED = {
-    "arm_in_pieces": (InputError, "pzt"),
     "slide_by_angles": (InputError, "angle"),
     "random_1": (InputError, "angle"),
     "random_7": (InputError, "angle"),
     "loop_with_rotors": (InputError, "rotor_inertia"),
-    "two_link_points": (InputError, "actuation_points"),
 }
 """By scene: how the road ends, and the key that cannot be said or solved in space yet."""
 OTHERWISE = {
@@ -52,6 +54,7 @@ OTHERWISE = {
 """Datasets that the road writes otherwise, a scene that shows it, and why."""
 OTHERWISE_IN = {
     "arm_with_attachment_modes": (".", "masses of attachment modes are raised in the plane alone"),
+    "arm_in_pieces": (".", "likewise"),
     "compliant_arm": (".", "likewise"),
     "lightest_arm": (".", "likewise"),
     "arm_with_gears": (".", "bodies that carry rotors feel the twist of compliant gears in space alone"),
@@ -74,14 +77,14 @@ OTHERWISE_IN = {
 
 
 def shortened(path):
-    """The scene of a case with four analyses, inverse ones of `END` unless times are chosen."""
+    """The tables of a case with four analyses, inverse ones of `END` unless times are chosen."""
     tables = planar_in_space.read(path)
     tables["analysis"] = tables["analysis"][:4]
     is_cut = not any("times" in analysis for analysis in tables["analysis"])
     for analysis in tables["analysis"]:
         if is_cut and "end" in analysis and analysis["kind"] != "motors-only":
             analysis["end"] = END
-    return ffrobot.make_scene(**tables)
+    return tables
 
 
 CASES_IN_PLANE = {
@@ -91,14 +94,21 @@ CASES_IN_PLANE = {
 }
 
 
-def scene_of(name):
-    """The scene with tolerances of 1e-9 where it is integrated."""
-    scene = PLANAR[name]() if name in PLANAR else shortened(CASES_IN_PLANE[name])
+def tables_of(name):
+    """Of the scene, with tolerances of 1e-9 where it is integrated."""
+    with mock.patch.object(ffrobot, "make_scene", lambda **tables: tables):  # which those functions end with
+        tables = PLANAR[name]() if name in PLANAR else shortened(CASES_IN_PLANE[name])
     closer = [
-        analysis.model_copy(update={"tolerance": 1e-9}) if analysis.kind in ("pcid", "forward") else analysis
-        for analysis in scene.analysis
+        analysis | ({"tolerance": 1e-9} if analysis["kind"] in ("pcid", "forward") else {})
+        for analysis in tables["analysis"]
     ]
-    return scene.model_copy(update={"analysis": tuple(closer)})
+    return tables | {"analysis": closer}
+
+
+def solved_in_3d(tables):
+    """By the records and the analyses of 3D scenes."""
+    made = made_in_python(".", tables)
+    return solve_spatial(available_scene(made.data, made.path, made.text, made.functions), Watcher())
 
 
 def entries(image, like=None):
@@ -124,9 +134,9 @@ def in_plane(values, shape):
 
 def differences(name):
     """Of the datasets that both roads write of a scene, those that are not allowed by name."""
-    scene = scene_of(name)
-    expected = entries(results_image(solve(scene)))
-    found = entries(spatial_image(solve_planar_in_space(scene)), expected)
+    tables = tables_of(name)
+    expected = entries(results_image(solve(ffrobot.make_scene(**tables))))
+    found = entries(spatial_image(solved_in_3d(tables)), expected)
     common = {dataset: of for dataset, of in found.items() if dataset in expected}
     assert len(common) > 20
     compared = reference_numbers.differences(common, expected, reference_numbers.SENSITIVE.get(name, ()))
@@ -160,4 +170,4 @@ def test_results_of_the_plane(name):
 def test_what_cannot_take_the_road_yet(name):
     error, key = REFUSED[name]
     with pytest.raises(error, match=key):
-        solve_planar_in_space(scene_of(name))
+        solved_in_3d(tables_of(name))

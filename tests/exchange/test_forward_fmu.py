@@ -91,6 +91,12 @@ PLANAR = {
             flat_pin("elbow", "upper.tip", "fore.root", stiffness=30.0, rotor_inertia=1e-5, gear_ratio=40.0),
         ],
     },
+    # a body without joints, which starts turned and turns
+    "flat flyer": PLANE | {
+        "body": [{"name": "upper", "link": flat_link("upper", 1)}, {"name": "flyer", "rigid": flat_box()}],
+        "joint": [flat_pin("shoulder", "ground", "upper.root")],
+        "initial": {"angles": {"upper": -0.4, "flyer": 0.6}, "rates": {"flyer": 2.0}},
+    },
     # two links welded at an angle hang from a pin, from static equilibrium; implicit steps
     "flat rest": PLANE | {
         "body": [{"name": "upper", "link": flat_link("upper", 1)}, {"name": "fore", "link": flat_link("fore", 1)}],
@@ -184,6 +190,7 @@ INPUTS = {
                  "joint/way/moment": (4.0, 6.0, 3.0), "pzt/upper/2": (150.0, -200.0, 0.0)},
     "flat soft": {"joint/shoulder/moment": (-3.0, -1.0, 2.0), "joint/elbow/moment": (0.5, -1.5, 1.0)},
     "flat gears": {"joint/shoulder/moment": (4.0, -5.0, 1.0), "joint/elbow/moment": (-1.0, 2.0, 0.0)},
+    "flat flyer": {"joint/shoulder/moment": (1.0, -3.0, 2.0)},
     "flat rest": {"joint/pin/moment": (0.0, 0.5, -0.3)},
     "flat loop": {"joint/drive/moment": (0.3, -1.0, 1.5)},
 }  # fmt: skip
@@ -446,14 +453,11 @@ def test_what_cannot_be_exported(tmp_path, keys, analysis, message):
     ("keys", "message"),
     [
         ({"motors": "frame"}, 'motors: expected "section"'),
-        (
-            {"joint": []},
-            'initial: expected bodies without joints to start at angle and rate 0 in 3D, not so of "upper"',
-        ),
+        ({"load": [{"joint": "elbow", "moment": "1"}]}, "load: expected none of a scene for an FMU"),
     ],
 )
 def test_what_cannot_be_exported_of_planar_scenes(tmp_path, keys, message):
-    scene, turned = tmp_path / "scene.toml", {"initial": {"angles": {"upper": 0.1}}}
-    scene.write_text(tomli_w.dumps(tomllib.loads(scene_text("flat gears")) | turned | keys))
+    scene = tmp_path / "scene.toml"
+    scene.write_text(tomli_w.dumps(tomllib.loads(scene_text("flat gears")) | keys))
     with pytest.raises(InputError, match=message):
         export_file(scene, "fmu", "swing", None)

@@ -1,7 +1,9 @@
 """Arms whose links have the damping ratio RATIO, of their own modes or of the robot's vibrations."""
 
+from planar_in_space import joint_keys
+
 import ffrobot
-from ffrobot.mbs.scene.in_space import keys
+from ffrobot.mbs.fields.spelling import place
 
 RATIO = 0.01
 
@@ -44,8 +46,8 @@ def in_space(arm, joints):
     """The same in space, its joints at the coordinates `joints`."""
     return arm | {
         "space": "spatial",
-        "gravity": keys.place(arm["gravity"]),
-        "joint": [keys.joint_keys(joint) for joint in arm["joint"]],
+        "gravity": place(arm["gravity"]),
+        "joint": [joint_keys(joint) for joint in arm["joint"]],
         "initial": {"joints": joints},
     }
 

@@ -1,11 +1,32 @@
 """Planar scenes read by the records of 3D: components, axes, angles; keys of the other space are unknown."""
 
 import pytest
-from test_planar_mechanism_in_space import ARM
 
 from ffrobot.common.errors import InputError
 from ffrobot.scene.load import made_in_python
 from ffrobot.scene.spatial import available_scene
+
+
+def body(name, **points):
+    return {"name": name, "rigid": {"mass": 2.0, "inertia": 0.1, "center": [0.1, 0.2], "points": points}}
+
+
+ARM = {
+    "name": "arm", "space": "planar", "gravity": [1.0, -9.81],
+    "body": [body("lower", a=[0.0, 0.0], b=[0.4, 0.1]), body("upper", a=[0.0, 0.0], b=[0.3, 0.0]),
+             body("tool", a=[0.0, 0.0])],
+    "joint": [
+        {"name": "way", "type": "prismatic", "between": ["ground", "lower.b"], "axis": [1.0, 2.0], "at": [0.5, 0.0]},
+        {"name": "root", "type": "revolute", "between": ["ground", "lower.a"], "at": [0.1, 0.2]},
+        {"name": "elbow", "type": "revolute", "between": ["upper.a", "lower.b"], "gear_ratio": 9.0},
+        {"name": "hold", "type": "weld", "between": ["upper.b", "tool.a"]},
+    ],
+    "payload": [{"point": "upper.b", "mass": 0.5, "inertia": 0.01}],
+    "load": [{"point": "tool.a", "x": "t", "moment": "2*t"}, {"joint": "elbow", "moment": "3*t"}],
+    "trajectory": [{"name": "path", "point": "upper.b", "via": [[0.1, 0.2], [0.3, 0.4]], "duration": 1.0}],
+    "initial": {"angles": {"lower": 0.3, "upper": 0.7, "tool": -0.2}, "rates": {"lower": 2.0, "upper": 5.0}},
+    "analysis": [{"name": "rest", "kind": "static"}],
+}  # fmt: skip
 
 
 def read(**changes):

@@ -18,18 +18,16 @@ from ...mbs.model.spatial_gears import with_compliance_in_space
 from ...mbs.model.spatial_model import SpatialModel, build_spatial_model, without_paths
 from ...mbs.solve.robot_damping import with_robot_damping_in_space
 from ...run.loaded_body import robot_damping_ratios
-from ...run.planar_in_space import scene_in_space
-from ...run.prepare import prepare
 from ...run.spatial_actuation import patches_in_space
 from ...run.spatial_bodies import load_spatial_bodies
 from ...run.spatial_mode_choice import mode_levels_in_space
 from ...run.watcher import Watcher
 from ...scene.any_space import AnyScene, load_any_scene
-from ...scene.scene import Scene
 from ...scene.spatial import SpatialScene
 from .archive import PLATFORMS, identifier_of, zipped
 from .description import forward_description
 from .forward_model import AXES, HeldUnit, has_own_coordinates, held_unit, voltages_in_space
+from .planar_forward import forward_scene
 
 logger = logging.getLogger(__name__)
 
@@ -50,7 +48,9 @@ def forward_fmu(path: Path, analysis: str | None) -> tuple[bytes, str, str, tupl
     place = PLATFORMS.get((sys.platform, platform.machine()))
     if place is None:
         raise InputError(f"{path}: --format fmu: FMI 2.0 has no name for {sys.platform} on {platform.machine()}")
-    model, unit = _unit(scene if isinstance(scene, SpatialScene) else _in_3d(scene), chosen)
+    if not isinstance(scene, SpatialScene):
+        scene = forward_scene(path, scene, chosen, _Logged())
+    model, unit = _unit(scene, chosen)
     names = "\n".join(each.name for each in (*unit.inputs, *unit.outputs))
     unit.data.guid = f"{{{uuid5(NAMESPACE_URL, unit.data.to_bytes().hex() + names)}}}"
     identifier, (folder, suffix) = identifier_of(scene.name, chosen.name), place
@@ -72,11 +72,6 @@ class _Logged(Watcher):
     def stage(self, title: str) -> None:
         """Of a link that is computed."""
         logger.info("%s", title)
-
-
-def _in_3d(scene: Scene) -> SpatialScene:
-    """A planar scene with records of 3D, which need not say what nothing follows."""
-    return scene_in_space(prepare(scene.model_copy(update={"trajectory": ()}), _Logged()))
 
 
 def _unit(scene: SpatialScene, analysis: Forward) -> tuple[SpatialModel, HeldUnit]:

@@ -39,6 +39,8 @@ def in_3d(scene: S) -> S:
     start = {
         "joints": initial.joints | guesses(angles),
         "joint_rates": initial.joint_rates | guesses(rates),
+        "angles": {},
+        "rates": {},
     }
     joints = tuple(
         joint if _turns(joint) else joint.model_copy(update={"rpy": (0.0, 0.0, _turn(angles, joint))})
