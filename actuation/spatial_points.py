@@ -7,7 +7,7 @@ it, and those that hold a shape.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from types import MappingProxyType
@@ -23,10 +23,7 @@ from ..mbs.analysis.outcome import Outcome
 from ..mbs.fields.references import Reference
 from ..mbs.fields.spelling import IN_PLANE, IN_SPACE
 from ..mbs.model.spatial_body import SpatialBody, SpatialPoint
-from ..mbs.model.spatial_model import SpatialModel
-from ..mbs.model.spatial_motors import path_forces, spin_of_modes
-from ..mbs.model.spatial_tree import Motion, Section
-from ..mbs.model.spatial_wrench import Wrench, row_wrenches
+from ..mbs.model.spatial_motors import path_forces, path_forces_on_bodies
 from .points import DEPENDENT, Place, PointForces, candidate_places, length_of, point_at, point_names
 
 AXES = "xyz"
@@ -173,32 +170,13 @@ def forces_at_points(chosen: Mapping[str, SpatialPointSet], run: Outcome) -> dic
 
 def driving_forces_in_space(run: Outcome) -> dict[str, Array]:
     """Q_a by body, (T, 6 + n): force and moment on its frame, both in its axes, and on its modes."""
-    model, frames = run.model, run.model.tree.frames(run.q)
-    found: dict[str, Array] = {
-        node.body.name: np.zeros((len(run.time), 6 + node.body.n_modes)) for node in model.tree.nodes
-    }
-    for k, row in enumerate(model.rows):
-        if row.is_trajectory:
-            wrenches = row_wrenches(model.tree, row, -run.multipliers[:, k], run.q, run.time, frames)
-            for section, wrench in zip((row.a, row.b), wrenches, strict=True):
-                if section.body >= 0:
-                    body = model.tree.nodes[section.body].body
-                    found[body.name] += _on_body(model, run.q, frames, section, wrench)
+    model = run.model
+    found = path_forces_on_bodies(model, run.time, run.q, run.multipliers)
     if run.forces.required is not None:  # a shape is held besides, by forces on the modes alone
         held = run.forces.required - path_forces(model, run.time, run.q, run.multipliers)
         for node in model.tree.nodes:
             found[node.body.name][:, 6:] += held[:, node.p_v]
     return found
-
-
-def _on_body(model: SpatialModel, q: Array, frames: Sequence[Motion], section: Section, wrench: Wrench) -> Array:
-    """(T, 6 + n) of a wrench on a section, moments about the global origin: on frame and modes of its body."""
-    node, frame, at = model.tree.nodes[section.body], frames[section.body], model.tree.motion(section, q, frames)
-    on_frame = [np.einsum("tji,tj->ti", frame.F, x) for x in wrench.seen_from(-frame.r)]
-    on_modes = np.einsum("ti,tij->tj", wrench.seen_from(-at.r).moment, spin_of_modes(model, q, frames, section))
-    if section.point:
-        on_modes += on_frame[0] @ node.body.points[section.point].translation
-    return np.hstack([*on_frame, on_modes])
 
 
 def _automatic(key: str, name: str, body: ModalBody | None, spatial: SpatialBody, axes: str) -> SpatialPointSet:

@@ -18,6 +18,7 @@ from ..model.spatial_motors import (
     MotorForces,
     driven_mechanism,
     driven_system,
+    frames_in_core,
     integrated_mechanism,
     motor_forces,
     path_forces,
@@ -101,13 +102,8 @@ def path_numbers(run: Outcome) -> OfPaths:
 
 def point_numbers(run: Outcome, chosen: Mapping[str, ActuationPoints]) -> _core.ForceSource:
     """Driving forces at the actuation points, global axes: three numbers of each component."""
-    tree, core = run.model.tree, driven_system(run.model).core
-    in_core, frames = core.frames(run.q[0], run.v[0]), tree.frames(run.q[:1])
-    bodies = []
-    for name, of_body in chosen.items():  # the core's frames are elsewhere on bodies, as it is best for joints
-        number = tree.index[name]
-        R, data = in_core[number].R, frames[number]
-        bodies.append((number, R.T @ data.F[0], R.T @ (data.r[0] - in_core[number].r), *of_body.of_core()))
+    tree, in_core = run.model.tree, frames_in_core(run.model, driven_system(run.model).core, run.q[0])
+    bodies = [(tree.index[name], *in_core[tree.index[name]], *of_body.of_core()) for name, of_body in chosen.items()]
     return _found(run, lambda driven: _core.point_reader(driven, bodies))
 
 

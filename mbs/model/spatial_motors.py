@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -15,7 +15,6 @@ from .spatial_drives import Command
 from .spatial_frame_motors import turning_motors
 from .spatial_model import SpatialModel
 from .spatial_system import SpatialSystem
-from .spatial_tree import Motion, Section
 
 
 @dataclass(frozen=True)
@@ -69,6 +68,37 @@ def path_forces(model: SpatialModel, times: Array, q: Array, multipliers: Array)
     return driven_mechanism(model).path_forces(as_list(times), q, multipliers * signs)
 
 
+class InCore(NamedTuple):
+    """A body's axes and origin in the frame that the core has of it, which is elsewhere: where it suits joints."""
+
+    axes: Array
+    origin: Array
+
+
+def frames_in_core(model: SpatialModel, core: _core.SpatialModel, q: Array) -> list[InCore]:
+    """Of all bodies, found at q (n_q,)."""
+    of_core, frames = core.frames(q, np.zeros(model.tree.n_v)), model.tree.frames(q[None])
+    return [
+        InCore(frame.R.T @ own.F[0], frame.R.T @ (own.r[0] - frame.r))
+        for frame, own in zip(of_core, frames, strict=True)
+    ]
+
+
+def path_forces_on_bodies(model: SpatialModel, times: Array, q: Array, multipliers: Array) -> dict[str, Array]:
+    """By body what the forces on the paths do on it alone (T, 6 + n): on its frame, in its axes, and on its modes."""
+    system = driven_system(model)
+    driven = driven_mechanism(model, has_motors=False)
+    on_bodies = driven.path_forces_on_bodies(as_list(times), q, multipliers * system.row_signs)
+    found = {}
+    for node, (axes, origin), forces in zip(
+        model.tree.nodes, frames_in_core(model, system.core, q[0]), on_bodies, strict=True
+    ):
+        force, moment = forces[:, :3], forces[:, 3:6]
+        on_frame = [force @ axes, (moment - np.cross(origin, force)) @ axes]
+        found[node.body.name] = np.hstack([*on_frame, forces[:, 6:]])
+    return found
+
+
 class SplitForces(NamedTuple):
     """τ (T, k) by joint, EᵀF_p (T, n_v) and multipliers λ_c (T, constraint equations of loops)."""
 
@@ -120,12 +150,3 @@ def frame_share(model: SpatialModel, joint: str, q: Array) -> FrameShare:
             direction[of.p_v] -= Phi_r.T @ left_jacobian(phi) @ axis
             slope[of.p_v, of.p_v] -= Phi_r.T @ left_jacobian_slope(phi, axis) @ Phi_r
     return FrameShare(direction, slope)
-
-
-def spin_of_modes(model: SpatialModel, q: Array, frames: Sequence[Motion], section: Section) -> Array:
-    """A J_l Φ_r (T, 3, n): the section's angular velocity by ṗ."""
-    node = model.tree.nodes[section.body]
-    Phi_r = node.body.points[section.point].rotation if section.point else np.zeros((3, node.body.n_modes))
-    phi = q[:, node.p_q] @ Phi_r.T
-    found: Array = frames[section.body].F @ left_jacobian(phi) @ Phi_r
-    return found

@@ -60,7 +60,7 @@ def choose_integrator_in_space(
         return Choice("dop853", "every sample of the controller begins anew")
     replayed = system.replayed
     if replayed is not None and replayed.integrator in (*EXPLICIT, "radau"):
-        return Choice(replayed.integrator, "the run that is replayed ended with it")
+        return Choice(replayed.integrator, "integrator of the run whose forces act")
     found = vibrations_in_space(model, without_rows(model), 0.0, start.q)
     if not len(found.frequency):
         return Choice("dop853", "nothing vibrates")

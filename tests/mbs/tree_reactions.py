@@ -2,8 +2,9 @@
 
 import numpy as np
 from body_equations import accelerated, along_cut, body_forces, rotors
+from row_wrenches import row_wrenches
 
-from ffrobot.mbs.model.spatial_wrench import Wrench, row_wrenches
+from ffrobot.mbs.model.spatial_wrench import Wrench
 
 
 def carried(motion):

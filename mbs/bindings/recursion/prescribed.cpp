@@ -185,6 +185,24 @@ RowMajorMatrix path_forces(const DrivenMechanism<Space> &driven, const std::vect
 }
 
 template <class Space>
+std::vector<RowMajorMatrix> path_forces_on_bodies(const DrivenMechanism<Space> &driven,
+                                                  const std::vector<double> &times, const RowMajorMatrix &q,
+                                                  const RowMajorMatrix &multipliers) {
+  check_size("times", static_cast<Index>(times.size()), q.rows());
+  check_size("times of multipliers", multipliers.rows(), q.rows());
+  check_size("multipliers", multipliers.cols(), static_cast<Index>(driven.mechanism.rows.size()));
+  std::vector<RowMajorMatrix> found;
+  for (const auto &node : driven.mechanism.nodes)
+    found.emplace_back(q.rows(), Space::dim + node.n());
+  at_postures(driven, times, q, [&](Index i, Motors<Space> &motors, const auto &w) {
+    const auto on_bodies = motors.path_forces_on_bodies(multipliers.row(i).data(), w);
+    for (std::size_t k = 0; k < found.size(); ++k)
+      found[k].row(i) = on_bodies[k].transpose();
+  });
+  return found;
+}
+
+template <class Space>
 std::tuple<RowMajorMatrix, RowMajorMatrix, RowMajorMatrix>
 split(const DrivenMechanism<Space> &driven, const RowMajorMatrix &q, const RowMajorMatrix &wanted) {
   check_size("postures of forces", wanted.rows(), q.rows());
@@ -223,6 +241,8 @@ template <class Space> void bind(nb::module_ &m, const std::string &space) {
           "A motor along `sign` v[coordinate], or between the frames of the bodies there.")
       .def("path_forces", &path_forces<Space>, "times"_a, "q"_a, "multipliers"_a,
            "-C_s^T lambda_s (T, n_v) of the path at postures q (T, n_q), with multipliers (T, constraint equations).")
+      .def("path_forces_on_bodies", &path_forces_on_bodies<Space>, "times"_a, "q"_a, "multipliers"_a,
+           "The same on each body alone, (T, 6 + n) in 3D: on its frame, in axes of that, and on its modes.")
       .def("split", &split<Space>, "q"_a, "wanted"_a,
            "(tau (T, motors), left (T, n_v), loops (T, constraint equations of loops)): what motors do of generalized "
            "forces\n(T, n_v), what they and loops leave, and multipliers of the loops.");

@@ -64,7 +64,7 @@ Reader<Spatial> points_of(const DrivenMechanism<Spatial> &driven, const std::vec
     check_size("scale", scale.size(), 6 + n);
     found.push_back({node, axes, origin, direction, position, Phi, scale});
   }
-  return std::make_shared<PointReader>(driven.mechanism, driven.is_path, std::move(found));
+  return std::make_shared<PointReader>(driven, std::move(found));
 }
 
 template <class Space>

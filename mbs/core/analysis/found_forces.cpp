@@ -106,18 +106,14 @@ Eigen::MatrixXd L_a(const PointComponents &of, const Eigen::Ref<const VectorXd> 
 } // namespace
 
 void PointReader::read(const double *q, const Workspace<Spatial, double> &w, const VectorXd *shape, double *to) {
-  VectorXd lambda = Eigen::Map<const VectorXd>(w.lambda.data(), static_cast<Index>(is_path_.size()));
-  for (std::size_t r = 0; r < is_path_.size(); ++r)
-    if (!is_path_[r])
-      lambda[static_cast<Index>(r)] = 0;
-  forces_.load(lambda.data(), nullptr, w);
+  const std::vector<VectorXd> on_bodies = path_.path_forces_on_bodies(w.lambda.data(), w);
   for (const PointComponents &of : bodies_) {
     const auto i = static_cast<std::size_t>(of.node);
     const auto &node = mechanism_.nodes[i];
     const Eigen::Map<const VectorXd> p(q + node.p_q(), node.n());
     LeastNorm solver;
     solver.compute(of.scale.asDiagonal() * L_a(of, p));
-    VectorXd Q_a = forces_.on_body(i, w);
+    VectorXd Q_a = on_bodies[i];
     const Eigen::Vector3d on_frame = Q_a.head<3>(), about_frame = Q_a.segment<3>(3);
     Q_a.head<3>() = of.axes.transpose() * on_frame;
     Q_a.segment<3>(3) = of.axes.transpose() * (about_frame - of.origin.cross(on_frame));

@@ -113,16 +113,15 @@ struct PointComponents {
 // Forces of a path as forces at points, global axes: (3) of each component.
 class PointReader final : public ForceReader<Spatial> {
 public:
-  PointReader(const Mechanism<Spatial> &mechanism, std::vector<char> is_path, std::vector<PointComponents> bodies)
-      : mechanism_(mechanism), forces_(mechanism), is_path_(std::move(is_path)), bodies_(std::move(bodies)) {}
+  PointReader(const DrivenMechanism<Spatial> &driven, std::vector<PointComponents> bodies)
+      : mechanism_(driven.mechanism), path_(driven), bodies_(std::move(bodies)) {}
 
   Eigen::Index count() const override;
   void read(const double *q, const Workspace<Spatial, double> &w, const Eigen::VectorXd *shape, double *to) override;
 
 private:
   const Mechanism<Spatial> &mechanism_;
-  NewtonEuler<Spatial> forces_;
-  std::vector<char> is_path_; // of all constraint equations
+  Motors<Spatial> path_;
   std::vector<PointComponents> bodies_;
 };
 

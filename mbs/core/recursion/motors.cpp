@@ -68,13 +68,27 @@ template <class Space> void Motors<Space>::project(const double *q, const TreeWo
   forces_.project(q, w, Q.data());
 }
 
-template <class Space>
-const VectorXd &Motors<Space>::path_forces(const double *q, const double *lambda, const TreeWorkspace &w) {
+template <class Space> void Motors<Space>::take_path(const double *lambda) {
   lambda_ = Eigen::Map<const VectorXd>(lambda, lambda_.size());
   for (const int row : cuts_)
     lambda_[row] = 0;
+}
+
+template <class Space>
+const VectorXd &Motors<Space>::path_forces(const double *q, const double *lambda, const TreeWorkspace &w) {
+  take_path(lambda);
   project(q, w, Q_);
   return Q_;
+}
+
+template <class Space>
+std::vector<VectorXd> Motors<Space>::path_forces_on_bodies(const double *lambda, const TreeWorkspace &w) {
+  take_path(lambda);
+  forces_.load(lambda_.data(), nullptr, w);
+  std::vector<VectorXd> found;
+  for (std::size_t i = 0; i < driven_.mechanism.nodes.size(); ++i)
+    found.push_back(forces_.on_body(i, w));
+  return found;
 }
 
 template <class Space> void Motors<Space>::resolve(const double *q, const double *lambda, const TreeWorkspace &w) {

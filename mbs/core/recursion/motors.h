@@ -49,6 +49,8 @@ public:
   Eigen::MatrixXd left_of(const Eigen::MatrixXd &dQ) const;
   // -C_s^T lambda_s (n_v) of the path
   const Eigen::VectorXd &path_forces(const double *q, const double *lambda, const TreeWorkspace &w);
+  // What the path does on each body alone (dim + n): see NewtonEuler::on_body
+  std::vector<Eigen::VectorXd> path_forces_on_bodies(const double *lambda, const TreeWorkspace &w);
 
   std::vector<bool> are_moments() const override;
   const Eigen::VectorXd &find(const double *q, const TreeWorkspace &w) override; // tau()
@@ -59,6 +61,7 @@ public:
 
 private:
   bool has_equations() const { return !cuts_.empty() || !is_along_coordinates_; }
+  void take_path(const double *lambda);                                                 // into lambda_
   void project(const double *q, const TreeWorkspace &w, Eigen::Ref<Eigen::VectorXd> Q); // of lambda_
   void split(const double *q, const TreeWorkspace &w);                                  // Q_
   void close_loops(const double *q, const TreeWorkspace &w);

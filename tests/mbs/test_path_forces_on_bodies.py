@@ -1,0 +1,71 @@
+"""What forces on paths do on each body alone, in the core, against the wrenches of constraint equations in NumPy."""
+
+import numpy as np
+import pytest
+from row_wrenches import on_body, row_wrenches
+
+import ffrobot
+from ffrobot.mbs.model.spatial_motors import path_forces_on_bodies
+from ffrobot.run.spatial import prepare_spatial
+from ffrobot.run.watcher import Watcher
+
+MODES = {"count": 4, "family": "all", "attachment_modes": False}
+
+
+def beam(name, condition):
+    return {
+        "name": name,
+        "link": {
+            "name": name, "material": {"youngs_modulus": 7e10, "density": 2700.0, "poissons_ratio": 0.33},
+            "geometry": {
+                "kind": "beam", "length": 0.35, "section": {"shape": "rectangle", "height": 0.009, "width": 0.014}
+            },
+            "mesh": {"elements": 8}, "reference": {"condition": condition}, "modes": MODES,
+        },
+    }  # fmt: skip
+
+
+def arm(trajectories):
+    """Links on a revolute, a universal and a prismatic joint; every second joint is named from the outside in."""
+    joints = [
+        {"name": "base", "type": "revolute", "between": ["ground", "b0.root"], "axis": [0.0, 0.6, 0.8]},
+        {"name": "elbow", "type": "universal", "between": ["b1.root", "b0.tip"], "axis": [0.0, 0.0, 1.0],
+         "second_axis": [0.0, 1.0, 0.0]},
+        {"name": "slide", "type": "prismatic", "between": ["b1.tip", "b2.root"], "axis": [0.0, 1.0, 0.0]},
+    ]  # fmt: skip
+    bodies = [beam("b0", "cantilever"), beam("b1", "simply-supported"), beam("b2", "cantilever")]
+    scene = ffrobot.make_scene(
+        name="arm", space="spatial", gravity=[0.0, 0.0, -9.81], body=bodies, joint=joints, trajectory=trajectories,
+        initial={"joints": {"base": 0.1, "elbow": [0.2, 0.4], "slide": 0.05}},
+        analysis=[{"name": "inverse", "kind": "pcid", "end": 0.1, "output_step": 0.01}],
+    )  # fmt: skip
+    return prepare_spatial(scene, Watcher()).model
+
+
+PATHS = {
+    "points and turns": [
+        {"name": "tip", "point": "b2.tip", "x": "t", "y": "1", "z": "0", "rotation_vector": ["t", "0.1", "0"]}
+    ],
+    "tools": [{"name": "tip", "point": "b2.tip", "x": "t", "tool_axis": [1.0, 0.0, 0.0], "direction": ["1", "t", "0"]}],
+    "joints": [{"name": "j", "joint": "base", "value": "t"}, {"name": "s", "joint": "slide", "value": "t"}],
+}
+
+
+@pytest.mark.parametrize("paths", PATHS)
+def test_forces_are_those_of_the_wrenches(paths):
+    model, rng = arm(PATHS[paths]), np.random.default_rng(37)
+    tree, times = model.tree, np.array([0.0, 0.03, 0.1])
+    rest = tree.at_rest({})
+    q = np.array([tree.integrate(rest, 0.3 * rng.standard_normal(tree.n_v)) for _ in times])
+    multipliers, frames = rng.standard_normal((len(times), len(model.rows))), tree.frames(q)
+    expected = {node.body.name: np.zeros((len(times), 6 + node.body.n_modes)) for node in tree.nodes}
+    for row, size in zip(model.rows, -multipliers.T, strict=True):
+        sides = row_wrenches(tree, row, size, q, times, frames)
+        for section, wrench in zip((row.a, row.b), sides, strict=True):
+            if section.body >= 0:
+                expected[tree.nodes[section.body].body.name] += on_body(model, q, frames, section, wrench)
+    found = path_forces_on_bodies(model, times, q, multipliers)
+    for body, forces in expected.items():
+        np.testing.assert_allclose(found[body], forces, rtol=0, atol=1e-12 * max(np.abs(forces).max(), 1.0))
+    touched = {body for body, forces in expected.items() if np.abs(forces).max() > 0.1}
+    assert touched == ({"b0", "b1", "b2"} if paths == "joints" else {"b2"})
