@@ -109,12 +109,24 @@ class LinkPatches:
     def voltages(self, F_p: Array) -> dict[str, Voltages]:
         """By layout, of modal forces F_p (T, n); `unmet` is what all layouts leave of those that this one reaches."""
         found = solve_voltages(self.reach, self.reached.forces(F_p))
-        unmet = self.unmet(F_p, found.within_limit)
+        return self._by_layout(found.required, found.within_limit, self.unmet(F_p, found.within_limit))
+
+    @property
+    def limit(self) -> Array:
+        """(k,) largest voltages, V; infinite where the scene gives none."""
+        return self.reach.limit
+
+    def at_voltages(self, V: Array, F_p: Array) -> dict[str, Voltages]:
+        """By layout, of known V (T, k) where modal forces F_p (T, n) are wanted."""
+        within = np.clip(V, -self.limit, self.limit)
+        return self._by_layout(V, within, self.unmet(F_p, within))
+
+    def _by_layout(self, required: Array, within: Array, unmet: Array) -> dict[str, Voltages]:
         ends = np.cumsum([len(array.edges) for array in self.arrays.values()])
-        required, within = (np.split(x, ends[:-1], axis=1) for x in (found.required, found.within_limit))
+        pairs = (np.split(x, ends[:-1], axis=1) for x in (required, within))
         return {
             name: Voltages(one, other, self.modes[name].forces(unmet), self.modes[name].served)
-            for name, one, other in zip(self.arrays, required, within, strict=True)
+            for name, one, other in zip(self.arrays, *pairs, strict=True)
         }
 
     @property

@@ -15,6 +15,7 @@ from ..actuation.control.placing import Placed
 from ..common.checksum import sealed
 from ..common.files import write_atomically
 from ..mbs.analysis.outcome import Outcome
+from ..mbs.analysis.tracking import TrackedPath
 from ..mbs.model.truncation import modes_kept
 from ..mbs.quantities.spatial_motion import SpatialMotion
 from ..mbs.solve.spatial_redundancy import resolving_joints
@@ -25,7 +26,7 @@ from .control import write_loop
 from .forces import write_path
 from .linear import write_spatial_linear
 from .peaks import write_peaks
-from .spatial_actuation import write_actuation
+from .spatial_actuation import write_actuation, write_tracking
 from .spatial_resume import write_state_in_space
 from .write import write_check, write_head, write_judgement, write_mode_errors, write_steps, write_texts
 
@@ -75,6 +76,8 @@ def _write_analysis(group: h5py.Group, solution: SpatialSolution, result: Spatia
         write_stress(group.create_group(f"stress/{body}"), stress)
     if isinstance(run.details, LoopRecord):
         write_loop(group, run.details)
+    if isinstance(run.details, TrackedPath):
+        write_tracking(group, motion, run.details)
     if isinstance(run.details, Placed):
         write_placement(group, run.details)
     for trajectory in motion.followed:

@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 import h5py
+import numpy as np
 
+from ..common.arrays import Array
+from ..mbs.analysis.tracking import TrackedPath
+from ..mbs.quantities.spatial_motion import SpatialMotion
 from ..run.spatial_actuation import SpatialActuation
 from ..run.spatial_solution import SpatialSolution
 from .actuators import write_judgement, write_voltages
@@ -37,3 +41,27 @@ def write_actuation(group: h5py.Group, solution: SpatialSolution, actuation: Spa
         for k, unit in enumerate(joint.units):
             name = joint.name if len(joint.units) == 1 else f"{joint.name} {k + 1}"
             entry[f"joints/{name}"].attrs["unit"] = "N·m" if unit == "rad" else "N"
+
+
+def write_tracking(group: h5py.Group, motion: SpatialMotion, found: TrackedPath) -> None:
+    """tracking/ of an analysis: what it made small, and work (J) and largest power (W) of motors and of patches."""
+    about = group.create_group("tracking").attrs
+    for key in ("objective", "least_voltage", "least_share", "cost", "pre_actuation", "post_actuation"):
+        about[key] = getattr(found, key)
+    for name, power in zip(("motor", "patch"), _powers(motion), strict=True):
+        about[f"{name}_work"] = float(np.diff(motion.time) @ (power[1:] + power[:-1]) / 2)
+        about[f"{name}_power"] = float(np.abs(power).max(initial=0.0))
+
+
+def _powers(motion: SpatialMotion) -> tuple[Array, Array]:
+    """(T,) W of all motors, and of the modal forces of all patches."""
+    forces, motors, patches = motion.motor_forces, np.zeros_like(motion.time), np.zeros_like(motion.time)
+    assert forces is not None
+    for joint, moments in forces.moments.items():
+        of_joint = motion.joint(joint)
+        assert of_joint is not None
+        motors = motors + (moments * of_joint[1]).sum(axis=1)
+    for body, F_p in forces.modal.items():
+        if F_p.shape[1]:
+            patches = patches + (F_p * motion.body(body).datasets["modal_velocity"]).sum(axis=1)
+    return motors, patches

@@ -197,7 +197,8 @@ def _answer(
     if (missed := read_unsupplied(group["feasibility"])) is not None:
         means = "motors and patches" if missed.with_patches else "motor torques"
         return f"{means} cannot do it: see the warning ({within})", False
-    return f"motors{' and patches' if patches else ''} can do it, {within}", True
+    least = f"; least voltage {group['tracking'].attrs['least_voltage']:.3g} V" if "tracking" in group else ""
+    return f"motors{' and patches' if patches else ''} can do it, {within}{least}", True
 
 
 def _ended_early(group: h5py.Group) -> bool:

@@ -255,7 +255,9 @@ def _evaluated(solution: SpatialSolution, run: Outcome, twists: Mapping[str, BSp
     actuation = None
     is_judged = motion.motor_forces is not None and not isinstance(run.analysis, InstantAnalysis)
     if is_judged:  # else nothing is asked of motors and patches
-        actuation = actuated_in_space(solution.scene, motion, run.analysis.last_time, solution.bodies, solution.patches)
+        actuation = actuated_in_space(
+            solution.scene, motion, run.analysis.last_time, solution.bodies, solution.patches, forces.voltages
+        )
         if actuation.unsupplied is not None and set(actuation.unsupplied.bodies) <= solution.points.keys():
             actuation = replace(actuation, unsupplied=None)  # forces at actuation points supply it
     whole = {name: body for name, body in solution.bodies.items() if name not in solution.divided}

@@ -64,18 +64,24 @@ def given_voltages(model: SpatialModel, patches: Mapping[str, LinkPatches]) -> I
 
 
 def actuated_in_space(
-    scene: SpatialScene, motion: SpatialMotion, end: float, bodies: Bodies, patches: Mapping[str, LinkPatches]
+    scene: SpatialScene,
+    motion: SpatialMotion,
+    end: float,
+    bodies: Bodies,
+    patches: Mapping[str, LinkPatches],
+    known: Mapping[str, Array],
 ) -> SpatialActuation:
     """Voltages that produce the modal forces of a motion, or as much of them as they can, and what is asked by it.
 
-    `end` (s) of the path: see `actuation.motors.judge_motion`.
+    `end` (s) of the path: see `actuation.motors.judge_motion`. `known`: voltages (T, k) by body, V.
     """
     flexible = {name: (body.modal, body.carrying) for name, body in bodies.items() if body.modal is not None}
     links = links_in_motion(motion, flexible)
     voltages: dict[str, Voltages] = {}
     unmet = {}
     for name, of_link in patches.items():
-        found = of_link.voltages(links[name].F_p)
+        F_p = links[name].F_p
+        found = of_link.at_voltages(known[name], F_p) if name in known else of_link.voltages(F_p)
         within = np.concatenate([of_layout.within_limit for of_layout in found.values()], axis=1)
         unmet[name] = of_link.unmet(links[name].F_p, within)
         voltages |= found

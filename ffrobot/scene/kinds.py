@@ -15,13 +15,14 @@ from ..mbs.analysis.forward import Forward
 from ..mbs.analysis.motors_only import MotorsOnly
 from ..mbs.analysis.pcid import Pcid
 from ..mbs.analysis.static import Static
+from ..mbs.analysis.tracking import Tracking
 
 AnyKind = Pcid | Fcid | Forward | Static | Linear | PatchPlacement | MotorsOnly | ClosedLoop
 
 Analysis = Annotated[AnyKind, Field(discriminator="kind")]
 """One table [[analysis]] of a scene, of the kind that it says."""
 
-AnyKindInSpace = Pcid | Fcid | Forward | Static | Linear | PatchPlacement | MotorsOnly | SpatialClosedLoop
+AnyKindInSpace = Pcid | Fcid | Forward | Static | Linear | PatchPlacement | MotorsOnly | Tracking | SpatialClosedLoop
 
 AnalysisInSpace = Annotated[AnyKindInSpace, Field(discriminator="kind")]
 """The same of scenes in space: disturbances have components there that the plane has not."""

@@ -25,6 +25,10 @@ class PatchedLink(Protocol):
         """(n, k) modal forces per volt."""
 
     @property
+    def limit(self) -> Array:
+        """(k,) largest voltages, V; infinite where there are none."""
+
+    @property
     def to_reached(self) -> Mapping[str, Array]:
         """(m, n) modal forces as `allocation` takes them, by those on the modes of the file."""
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal, Self
@@ -16,7 +16,7 @@ from ...common.errors import InputError
 from ...common.numbers import MOST_OUTPUTS
 from ..fields.field_types import NotNegative
 from ..fields.waypoints import spline
-from ..scene.analysis import Check, Need, TimedAnalysis, output_times
+from ..scene.analysis import Analysis, Check, Need, TimedAnalysis, output_times
 from ..solve.internal_dynamics import Output, is_unstable
 from ..solve.stable_inversion import Inversion, S
 from ..solve.zero_dynamics import GROWTH, SAMPLES, Linearisation, linearise, shape_along
@@ -78,7 +78,7 @@ class AroundPath(Details):
     post_actuation: float
 
 
-def where(scene_path: Path, analysis: MotorsOnlyKeys) -> str:
+def where(scene_path: Path, analysis: Analysis) -> str:
     """Scene and analysis, as messages begin."""
     return f'{scene_path}: analysis "{analysis.name}"'
 
@@ -149,9 +149,13 @@ def _check_relative_degree(servo: Output, linear: Linearisation) -> None:
         )
 
 
-def check_rest(servo: Output, analysis: MotorsOnlyKeys, needs_future: bool) -> None:
-    """Raise `InputError` for a path that moves where the robot has to be at rest."""
-    ends = [0.0, analysis.end] if needs_future or analysis.post_actuation else [0.0]
+def rests(analysis: MotorsOnlyKeys, needs_future: bool) -> list[float]:
+    """Times (s) at which motors alone need the robot at rest."""
+    return [0.0, analysis.end] if needs_future or analysis.post_actuation else [0.0]
+
+
+def check_rest(servo: Output, analysis: TimedAnalysis, ends: Sequence[float]) -> None:
+    """Raise `InputError` for a path that moves at one of the `ends` (s), where the robot has to be at rest."""
     for target in servo.targets():
         values = target.function.sample(as_floats(np.linspace(0.0, analysis.end, 101)))[0]
         mean = float(np.ptp(values)) / analysis.end
@@ -167,15 +171,30 @@ def check_rest(servo: Output, analysis: MotorsOnlyKeys, needs_future: bool) -> N
 
 def durations(analysis: MotorsOnlyKeys, linear: Linearisation, needs_future: bool) -> tuple[float, float]:
     """Pre- and post-actuation (s): as given, or until the zero dynamics has died out; whole output steps."""
+    chosen = [
+        automatic if value is None else value
+        for automatic, value in zip(
+            decay_times(linear, analysis.end, needs_future=needs_future),
+            (analysis.pre_actuation, analysis.post_actuation),
+            strict=True,
+        )
+    ]
+    return whole_steps(chosen, analysis.output_step)
+
+
+def decay_times(linear: Linearisation, end: float, *, needs_future: bool) -> tuple[float, float]:
+    """Times (s) in which the zero dynamics dies out before and after the path, which ends at `end`."""
     first, last, light = linear.zeros[0].real, linear.zeros[-1].real, linear.is_light[0]
     is_ahead = linear.is_future[0] & (first > 0)
     grow, growing_vibrations, decay = first[is_ahead & ~light], first[is_ahead & light], -last[last < 0]
-    pre = max(DECAY / grow.min(initial=np.inf), min(DECAY / growing_vibrations.min(initial=np.inf), analysis.end))
-    post = min(DECAY / decay.min(initial=np.inf), analysis.end) if needs_future else 0.0
-    given = analysis.pre_actuation, analysis.post_actuation
-    chosen = [automatic if value is None else value for automatic, value in zip((pre, post), given, strict=True)]
-    step = analysis.output_step
-    return tuple(math.ceil(value / step - 1e-9) * step for value in chosen)  # type: ignore[return-value]
+    pre = max(DECAY / grow.min(initial=np.inf), min(DECAY / growing_vibrations.min(initial=np.inf), end))
+    return pre, min(DECAY / decay.min(initial=np.inf), end) if needs_future else 0.0
+
+
+def whole_steps(times: Sequence[float], step: float) -> tuple[float, float]:
+    """As many output steps as these times (s) take."""
+    before, after = (math.ceil(time / step - 1e-9) * step for time in times)
+    return before, after
 
 
 def cause_of(inversion: Inversion[S]) -> str:

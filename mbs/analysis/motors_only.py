@@ -25,7 +25,7 @@ from ..solve.stable_inversion import Inversion, invert
 from .context import AnyContext, Context
 from .drive import Progress, motion_of
 from .elastic_joints import add_transmission
-from .inverted_path import AroundPath, MotorsOnlyKeys, cause_of, check_rest, choose_output, durations, where
+from .inverted_path import AroundPath, MotorsOnlyKeys, cause_of, check_rest, choose_output, durations, rests, where
 from .outcome import AnyOutcome, Forces, Statistics
 from .planar_outcome import PlanarOutcome
 from .samples import path_times
@@ -71,7 +71,7 @@ def run_motors_only(model: Model, analysis: MotorsOnly, progress: Progress) -> P
     began = time.perf_counter()
     servo, linear = choose_output(partial(make_servo, model, analysis.end, where(model.scene.path, analysis)), analysis)
     needs_future = bool(linear.is_future[0].any())
-    check_rest(servo, analysis, needs_future)
+    check_rest(servo, analysis, rests(analysis, needs_future))
     pre, post = durations(analysis, linear, needs_future)
     inversion = invert(servo, linear, pre, post, analysis.tolerance, progress)
     return _outcome(

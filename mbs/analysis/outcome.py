@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
 import numpy as np
@@ -96,6 +97,7 @@ class Forces(_Rows):
         commanded: (T, k) moments by joint that act along joints, N·m or N: what a controller commands, or a replay
             applies.
         driving: the same as accelerations have it, where that is something else: before a command changes.
+        voltages: (T, k) V by body, of patches where the analysis itself finds them.
     """
 
     tau: Array | None = None
@@ -104,6 +106,7 @@ class Forces(_Rows):
     applied: tuple[PointDrive, ...] = ()
     commanded: Mapping[str, Array] = field(default_factory=dict)
     driving: Mapping[str, Array] = field(default_factory=dict)
+    voltages: Mapping[str, Array] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -304,11 +307,13 @@ class Prescription(NamedTuple):
         motion: makes its equations, each time new ones.
         shape: p(t) of each body.
         near: (n_q,) a posture near the first.
+        voltages: by body times (B,), s, and V (B, k), linear between, of patches where the analysis itself finds them.
     """
 
     motion: Callable[[], _core.SpatialPrescribedMotion]
     shape: Sequence[Sequence[TimeFunction]]
     near: Array
+    voltages: Mapping[str, tuple[Array, Array]] = MappingProxyType({})
 
 
 @dataclass(frozen=True, kw_only=True)

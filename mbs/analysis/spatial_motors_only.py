@@ -19,7 +19,7 @@ from ..solve.internal_dynamics import Stopped
 from ..solve.spatial_servo import SpatialServo, make_spatial_servo
 from ..solve.stable_inversion import Inversion, invert
 from .context import Context
-from .inverted_path import AroundPath, MotorsOnlyKeys, cause_of, check_rest, choose_output, durations, where
+from .inverted_path import AroundPath, MotorsOnlyKeys, cause_of, check_rest, choose_output, durations, rests, where
 from .outcome import Forces, Motion, Outcome, Prescription, Statistics
 from .samples import path_times
 
@@ -44,7 +44,7 @@ def run_spatial_motors_only(context: Context, analysis: MotorsOnlyKeys) -> Outco
     try:
         servo, linear = choose_output(partial(make_spatial_servo, model, analysis.end, place, progress), analysis)
         needs_future = bool(linear.is_future[0].any())
-        check_rest(servo, analysis, needs_future)
+        check_rest(servo, analysis, rests(analysis, needs_future))
         pre, post = durations(analysis, linear, needs_future)
         inversion = invert(servo, linear, pre, post, analysis.tolerance, progress)
     except Stopped:

@@ -13,6 +13,8 @@ import numpy as np
 
 from ...common.arrays import Array
 from .. import _core
+from .._core import TimeFunction
+from ..fields.waypoints import spline
 from ..model.spatial_model import SpatialModel, row_values
 from ..model.spatial_motors import (
     MotorForces,
@@ -50,6 +52,8 @@ def supplied(run: Outcome, most: Array, patches: Mapping[str, PatchedLink], *, l
 
     In the order of `SpatialModel.motors`, N·m or N on second sides, then of `patches`, V.
     """
+    if run.prescribed is not None and run.prescribed.voltages:
+        return _with_known_voltages(run, most, patches, limited=limited)
     links = [(*_reached(run.model, of.to_reached), of.allocation(limited=limited)) for of in patches.values()]
     return _found(run, lambda driven: _core.actuator_reader(driven, most, links), SpatialSystem(run.model))
 
@@ -62,6 +66,19 @@ def _reached(model: SpatialModel, to_reached: Mapping[str, Array]) -> tuple[int,
     for node in nodes:
         found[:, node.p_v.start - first : node.p_v.stop - first] = to_reached[node.body.name] @ node.body.on_file.T
     return first, found
+
+
+def _with_known_voltages(
+    run: Outcome, most: Array, patches: Mapping[str, PatchedLink], *, limited: bool
+) -> _core.ForceSource:
+    torques = _found(run, lambda driven: _core.actuator_reader(driven, most, []))
+    assert run.prescribed is not None
+    voltages: list[TimeFunction] = []
+    for name, of_link in patches.items():
+        breaks, V = run.prescribed.voltages[name]
+        within = np.clip(V, -of_link.limit, of_link.limit) if limited else V
+        voltages += [function.held(breaks[0], breaks[-1]) for function in spline(breaks, within, 1)]
+    return _core.ForcesOfBoth(torques, _core.ForcesOfTime(voltages)) if voltages else torques
 
 
 class OfPaths(NamedTuple):
@@ -113,7 +130,7 @@ def _found(run: Outcome, reader: Reader, system: SpatialSystem | None = None) ->
         of_run = driven_mechanism(run.model, has_motors=False) if system is None else integrated_mechanism(system)
         return _core.recorded_forces(of_run, run.recording, reader(of_run))
     assert run.prescribed is not None
-    equations, shape, near = run.prescribed
+    equations, shape, near, _ = run.prescribed
     motion = equations()
     return _core.prescribed_forces(motion, shape, near, reader(motion.driven))
 

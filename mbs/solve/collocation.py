@@ -10,7 +10,7 @@ p̈ for a moment, as where a zero passes through infinity.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -106,7 +106,7 @@ def collocate(problem: Problem, breaks: Array, guess: Callable[[Array], tuple[Ar
     previous, converged, iteration, worst = np.inf, False, 0, float(breaks[0])
     while not converged and iteration < MOST_ITERATIONS:
         iteration += 1
-        stages = _stages(problem.scheme, h, p, v, K)
+        stages = stage_states(problem.scheme, h, p, v, K)
         r = problem.residual(times.ravel(), *(x.reshape(-1, n) for x in (*stages, K))).reshape(K.shape)
         if not np.all(np.isfinite(r)):
             worst = float(times[~np.isfinite(r).all(axis=2)][0])
@@ -120,10 +120,10 @@ def collocate(problem: Problem, breaks: Array, guess: Callable[[Array], tuple[Ar
         if not np.isfinite(size):
             break
         previous = size
-    return Found(_curve(problem.scheme, breaks, p, v, K), bool(converged), iteration, worst)
+    return Found(piecewise(problem.scheme, breaks, p, v, K), bool(converged), iteration, worst)
 
 
-def _stages(scheme: Scheme, h: Array, p: Array, v: Array, K: Array) -> tuple[Array, Array]:
+def stage_states(scheme: Scheme, h: Array, p: Array, v: Array, K: Array) -> tuple[Array, Array]:
     """States p and ṗ (N, s, n) at the Gauss points, from their values at the breaks and K (N, s, n)."""
     step = h[:, None, None]
     once, twice = (np.einsum("ij,Njn->Nin", a, K) for a in (scheme.stage_once, scheme.stage_twice))
@@ -131,7 +131,7 @@ def _stages(scheme: Scheme, h: Array, p: Array, v: Array, K: Array) -> tuple[Arr
     return p_stages, v[:-1, None] + step * once
 
 
-def _curve(scheme: Scheme, breaks: Array, p: Array, v: Array, K: Array) -> PPoly:
+def piecewise(scheme: Scheme, breaks: Array, p: Array, v: Array, K: Array) -> PPoly:
     """Coefficients in powers of t − left break, highest first."""
     from scipy.interpolate import PPoly
 
@@ -141,16 +141,18 @@ def _curve(scheme: Scheme, breaks: Array, p: Array, v: Array, K: Array) -> PPoly
     return PPoly(np.array([*integrated[::-1], v[:-1], p[:-1]]), breaks)
 
 
-class _LinearSystem:
-    """Newton's equations: stages eliminated interval by interval, then a banded system for the values at breaks."""
+class Elimination:
+    """Newton's equations of the stages, solved interval by interval: by values (p, ṗ) at their starts, and others.
 
-    def __init__(self, problem: Problem, breaks: Array, derivatives: list[Array]) -> None:
-        from scipy.linalg.lapack import dgbtrf
+    With right sides b (N, s n, …) of E K + G (p, ṗ) = b: `E_inverse` (N, s n, s n), `G` (N, s n, 2n), and the
+    `response` (N, s, n, 2n) of K.
+    """
 
+    def __init__(self, scheme: Scheme, h: Array, derivatives: Sequence[Array]) -> None:
         M, D, K = derivatives
-        self.problem, self.h, scheme = problem, np.diff(breaks), problem.scheme
+        self.scheme, self.h = scheme, h
         N, s, n = M.shape[:3]
-        h = self.h[:, None, None, None, None]
+        h = h[:, None, None, None, None]
         E = h * scheme.stage_once[:, None, :, None] * D[:, :, :, None] + h**2 * (
             scheme.stage_twice[:, None, :, None] * K[:, :, :, None]
         )  # (N, s, n, s, n)
@@ -158,9 +160,31 @@ class _LinearSystem:
             E[:, i, :, i] += M[:, i]
         self.G = np.concatenate([K, D + scheme.c[:, None, None] * h[..., 0] * K], axis=3).reshape(N, s * n, 2 * n)
         self.E_inverse = np.linalg.inv(E.reshape(N, s * n, s * n))
+        self.response = -(self.E_inverse @ self.G).reshape(N, s, n, 2 * n)
+
+    def at_end(self, p: Array, v: Array, K: Array) -> tuple[Array, Array]:
+        """States p and ṗ (N, n, …) at the ends of intervals for p, ṗ at their starts and K (N, s, n, …)."""
+        h = self.h.reshape(-1, *(1 for _ in K.shape[2:]))
+        once, twice = (np.einsum("i,Ni...->N...", b, K) for b in (self.scheme.end_once, self.scheme.end_twice))
+        return p + h * v + h**2 * twice, v + h * once
+
+    def continuity(self) -> Array:
+        """Y (N, 2n, 2n): (p, ṗ) at the ends of intervals by those at their starts."""
+        unit = np.eye(self.G.shape[2])
+        p, v = np.split(unit, 2)
+        return np.concatenate(self.at_end(p, v, self.response), axis=1)
+
+
+class _LinearSystem:
+    """Newton's equations: stages eliminated interval by interval, then a banded system for the values at breaks."""
+
+    def __init__(self, problem: Problem, breaks: Array, derivatives: list[Array]) -> None:
+        from scipy.linalg.lapack import dgbtrf
+
+        self.problem, n = problem, len(problem.scale)
+        self.stages = Elimination(problem.scheme, np.diff(breaks), derivatives)
         self.S = np.concatenate([problem.scale, np.ones(n)])
-        response = -(self.E_inverse @ self.G).reshape(N, s, n, 2 * n)
-        Y = np.concatenate(self._at_end(np.eye(2 * n)[:n], np.eye(2 * n)[n:], response), axis=1)
+        Y = self.stages.continuity()
         blocks = np.concatenate([Y, -np.broadcast_to(np.eye(2 * n), Y.shape)], axis=2)
         blocks = self.S[:, None] * blocks / np.tile(self.S, 2)
         self.boundary = [problem.start.rows / self.S, problem.end.rows / self.S]
@@ -168,13 +192,6 @@ class _LinearSystem:
         self.lower, self.upper = self.n_start + 2 * n - 1, 4 * n - 1 - self.n_start
         self.lu, self.pivots, info = dgbtrf(self._banded(blocks), self.lower, self.upper)
         self.singular = info != 0
-
-    def _at_end(self, p: Array, v: Array, K: Array) -> tuple[Array, Array]:
-        """States p and ṗ (N, n, …) at the ends of intervals for p, ṗ at their starts and K (N, s, n, …)."""
-        h = self.h.reshape(-1, *(1 for _ in K.shape[2:]))
-        scheme = self.problem.scheme
-        once, twice = (np.einsum("i,Ni...->N...", b, K) for b in (scheme.end_once, scheme.end_twice))
-        return p + h * v + h**2 * twice, v + h * once
 
     def _banded(self, blocks: Array) -> Array:
         """Rows: conditions at the start, continuity at the end of each interval, conditions at the end (LAPACK gb)."""
@@ -192,9 +209,9 @@ class _LinearSystem:
         """Steps of p, ṗ at the breaks and of K at the stages."""
         from scipy.linalg.lapack import dgbtrs
 
-        N, s, n = r.shape
-        K_step = -(self.E_inverse @ r.reshape(N, s * n, 1)).reshape(N, s, n)
-        ends = self._at_end(p[:-1], v[:-1], K + K_step)
+        (N, s, n), stages = r.shape, self.stages
+        K_step = -(stages.E_inverse @ r.reshape(N, s * n, 1)).reshape(N, s, n)
+        ends = stages.at_end(p[:-1], v[:-1], K + K_step)
         gap = self.S * np.concatenate([p[1:] - ends[0], v[1:] - ends[1]], axis=1)
         start, end = (
             -b.rows @ (np.concatenate([p[k], v[k]]) - b.state)
@@ -202,5 +219,5 @@ class _LinearSystem:
         )
         x, _ = dgbtrs(self.lu, self.lower, self.upper, np.concatenate([start, gap.ravel(), end]), self.pivots)
         y = x.reshape(N + 1, 2 * n) / self.S
-        K_step -= (self.E_inverse @ (self.G @ y[:-1, :, None])).reshape(N, s, n)
+        K_step -= (stages.E_inverse @ (stages.G @ y[:-1, :, None])).reshape(N, s, n)
         return y[:, :n], y[:, n:], K_step

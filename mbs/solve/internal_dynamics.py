@@ -6,7 +6,7 @@ vanish: the zero dynamics about a path that is held (Blajer and Kolodziejczyk 20
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import NamedTuple, Protocol, Self
 
@@ -117,24 +117,32 @@ def linear_dynamics(servo: Output, times: Array, p: Array, v: Array, a: Array) -
 
 def by_differences(servo: Output, times: Array, p: Array, v: Array, a: Array) -> tuple[Array, Array, Array]:
     """M, D and K by central differences; r is quadratic in ṗ and linear in p̈, so that these are exact there."""
+    return slopes_by_differences(servo.residuals, servo.mode_sizes, times, p, v, a)
+
+
+def slopes_by_differences(
+    forces: Callable[[Array, Array, Array, Array], Array], sizes: Array, times: Array, p: Array, v: Array, a: Array
+) -> tuple[Array, Array, Array]:
+    """Derivatives (N, …, n) of `forces` (N, …) by p̈, ṗ and p; `sizes` (n,) of modes as in `Output.mode_sizes`."""
     modes, one = np.array([p, v, a]), np.ones(p.shape[1])
-    K, D, M = (
-        _derivative(servo, times, modes, k, step) for k, step in enumerate((DIFFERENCE * servo.mode_sizes, one, one))
-    )
+    K, D, M = (_derivative(forces, times, modes, k, step) for k, step in enumerate((DIFFERENCE * sizes, one, one)))
     return M, D, K
 
 
 def stiffness(servo: Output, times: Array, p: Array) -> Array:
     """K (N, n, n) alone, at times (N,) and p (N, n) at rest."""
-    return _derivative(servo, times, np.array([p, 0 * p, 0 * p]), 0, DIFFERENCE * servo.mode_sizes)
+    rest = np.array([p, 0 * p, 0 * p])
+    return _derivative(servo.residuals, times, rest, 0, DIFFERENCE * servo.mode_sizes)
 
 
-def _derivative(servo: Output, times: Array, modes: Array, k: int, step: Array) -> Array:
-    """Of r by modes[k] (N, n, n), about `modes` (3, N, n)."""
+def _derivative(
+    forces: Callable[[Array, Array, Array, Array], Array], times: Array, modes: Array, k: int, step: Array
+) -> Array:
+    """Of `forces` by modes[k] (N, …, n), about `modes` (3, N, n)."""
     n = len(step)
     moved = np.repeat(modes[:, :, None], 2 * n, axis=2)
     moved[k] += np.concatenate([np.diag(step), -np.diag(step)])
-    r = servo.residuals(np.repeat(times, 2 * n), *moved.reshape(3, -1, n)).reshape(-1, 2, n, n)
+    r = forces(np.repeat(times, 2 * n), *moved.reshape(3, -1, n)).reshape(len(times), 2, n, -1)
     found: Array = ((r[:, 0] - r[:, 1]) / (2 * step[:, None])).transpose(0, 2, 1)
     return found
 

@@ -8,14 +8,14 @@ from functools import cached_property
 
 import numpy as np
 
-from ...common.arrays import Array, as_floats, as_list
+from ...common.arrays import Array, Indices, as_floats, as_list
 from ...common.errors import InputError
 from .. import _core
 from .._core import TimeFunction
 from ..model.spatial_model import SpatialModel
 from ..model.spatial_motors import driven_mechanism
 from ..model.spatial_rows import SpatialRow
-from .internal_dynamics import Stopped, Target, by_differences
+from .internal_dynamics import Stopped, Target, by_differences, slopes_by_differences
 from .spatial_posture import mobility, solve_posture, told_posture
 from .spatial_prescribed import following_motors
 from .spatial_reach import out_of_reach
@@ -115,15 +115,39 @@ class SpatialServo:
 
     def derivatives(self, times: Array, p: Array, v: Array, a: Array) -> tuple[Array, Array, Array]:
         """M, D and K (N, n, n) of these by p̈, ṗ and p: exact, unless motors turn frames or follow a redefined loop."""
-        if self.model.scene.motors == "frame" or (self._is_redefined and self.model.loop_rows.any()):
+        if not self._has_exact_slopes:
             return by_differences(self, times, p, v, a)
         n = p.shape[1]
-        M, D, K = self.motion.derivatives(as_list(times), p, v, a, self.postures(times))
-        return M.reshape(-1, n, n), D.reshape(-1, n, n), K.reshape(-1, n, n)
+        M, D, K = self.slopes(times, p, v, a)
+        return M[:, :n], D[:, :n], K[:, :n]
+
+    @property
+    def _has_exact_slopes(self) -> bool:
+        return self.model.scene.motors != "frame" and not (self._is_redefined and self.model.loop_rows.any())
+
+    def forces(self, times: Array, p: Array, v: Array, a: Array) -> tuple[Array, Array]:
+        """The same r (N, n), and what the motors do, τ (N, motors), N·m or N."""
+        found = self.motion.motion(as_list(times), p, v, a, self.postures(times))
+        return found.left[:, self.of_modes], found.tau
+
+    @cached_property
+    def of_modes(self) -> Indices:
+        """Places (n,) of all modes along v."""
+        return np.concatenate([np.arange(node.p_v.start, node.p_v.stop) for node in self.model.tree.nodes])
+
+    def slopes(self, times: Array, p: Array, v: Array, a: Array) -> tuple[Array, Array, Array]:
+        """Derivatives (N, n + motors, n) of (r, τ) by p̈, ṗ and p."""
+        if not self._has_exact_slopes:
+            return slopes_by_differences(
+                lambda *at: np.concatenate(self.forces(*at), axis=1), self.mode_sizes, times, p, v, a
+            )
+        found = self.motion.derivatives(as_list(times), p, v, a, self.postures(times))
+        M, D, K = (x.reshape(len(times), -1, p.shape[1]) for x in found)
+        return M, D, K
 
 
 def make_spatial_servo(
-    model: SpatialModel, end: float, where: str, goes_on: Callable[[], bool], factor: float
+    model: SpatialModel, end: float, where: str, goes_on: Callable[[], bool], factor: float, kind: str = "motors-only"
 ) -> SpatialServo:
     """The equations for a path that is held before 0 and after `end`.
 
@@ -137,12 +161,12 @@ def make_spatial_servo(
     for found, what in ((motors, "motors"), (np.count_nonzero(~model.loop_rows), "trajectory components")):
         if found != freedom:
             raise InputError(
-                f'{where}: expected for kind = "motors-only" as many {what} as the mechanism has degrees of freedom'
+                f'{where}: expected for kind = "{kind}" as many {what} as the mechanism has degrees of freedom'
                 f" ({freedom}), found {found}"
             )
     if not any(node.body.n_modes for node in model.tree.nodes):
         raise InputError(
-            f'{where}: expected at least one flexible body for kind = "motors-only", found only rigid ones: use kind'
+            f'{where}: expected at least one flexible body for kind = "{kind}", found only rigid ones: use kind'
             ' = "pcid"'
         )
     if factor != 1.0 and model.loop_rows.any() and any(joint.type == "planar" for joint in model.scene.motor_joints):

@@ -140,7 +140,7 @@ class _Solver:
                 self.status = "interrupted"
                 break
             if found.converged:
-                breaks, guess, is_near = _refined(breaks, as_floats(unmet / self.most)), _states(found.curve), False
+                breaks, guess, is_near = cut(breaks, as_floats(unmet / self.most)), _states(found.curve), False
             elif not is_near:
                 self.problem, is_near = replace(self.problem, derivatives=along(guess, breaks)), True
             else:
@@ -280,7 +280,7 @@ def _breaks(pre: float, end: float, post: float) -> Array:
     return breaks
 
 
-def _refined(breaks: Array, excess: Array) -> Array:
+def cut(breaks: Array, excess: Array) -> Array:
     """Breaks that cut interval k into as many parts as its `excess` over the tolerance asks for: r falls as h⁴."""
     parts = np.where(excess > 1, np.clip(np.ceil(1.1 * np.minimum(excess, 1e9) ** 0.25), 2, MOST_PARTS), 1).astype(int)
     pieces = [np.linspace(a, b, k, endpoint=False) for a, b, k in zip(breaks[:-1], breaks[1:], parts, strict=True)]

@@ -99,17 +99,17 @@ left_on_modes(PrescribedMotion<Space> &motion, const std::vector<double> &times,
   return {q, left};
 }
 
-// M, D, K (T, n n) of what is left by p_ddot, p_dot and p
+// M, D, K (T, (n + motors) n) of what is left, and of torques, by p_ddot, p_dot and p
 template <class Space>
 std::tuple<RowMajorMatrix, RowMajorMatrix, RowMajorMatrix>
 derivatives_of(PrescribedMotion<Space> &motion, const std::vector<double> &times, const RowMajorMatrix &p,
                const RowMajorMatrix &p_dot, const RowMajorMatrix &p_ddot, const RowMajorMatrix &near) {
-  const Index n = p.cols();
-  RowMajorMatrix M = nothing(p.rows(), n * n), D = M, K = M;
+  const Index n = p.cols(), rows = n + static_cast<Index>(motion.driven().motors.size());
+  RowMajorMatrix M = nothing(p.rows(), rows * n), D = M, K = M;
   at_positions(motion, {times, p, p_dot, p_ddot}, near, [&](Index i) {
     const LeftSlopes found = motion.slopes();
     const auto write = [&](const Eigen::MatrixXd &of, RowMajorMatrix &to) {
-      Eigen::Map<RowMajorMatrix>(to.row(i).data(), n, n) = of;
+      Eigen::Map<RowMajorMatrix>(to.row(i).data(), rows, n) = of;
     };
     write(found.M, M), write(found.D, D), write(found.K, K);
   });
@@ -261,8 +261,8 @@ template <class Space> void bind(nb::module_ &m, const std::string &space) {
            "(1, n_q);\nNaN where none is found.")
       .def(
           "derivatives", &derivatives_of<Space>, "times"_a, "p"_a, "p_dot"_a, "p_ddot"_a, "near"_a,
-          "(M, D, K), (T, n n) each: exact derivatives of these forces by p_ddot, p_dot and p, with motors along joint "
-          "coordinates.")
+          "(M, D, K), (T, (n + motors) n) each: exact derivatives of these forces, and of torques, by p_ddot, p_dot\n"
+          "and p, with motors along joint coordinates.")
       .def("motion", &states_of<Space>, "times"_a, "p"_a, "p_dot"_a, "p_ddot"_a, "near"_a,
            "States and forces for the same arguments; NaN where no posture is found.");
   nb::class_<RedefinedMotion<Space>, Motion>(m, (space + "RedefinedMotion").c_str(),

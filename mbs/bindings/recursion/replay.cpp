@@ -127,6 +127,8 @@ void bind_replay(nb::module_ &m) {
       .def("sample", &sampled, "times"_a, "(T, numbers) at times (T,).");
   nb::class_<ForcesOfTime, ForceSource>(m, "ForcesOfTime", "Of functions of time.")
       .def(nb::init<std::vector<TimeFunction>>(), "functions"_a);
+  nb::class_<ForcesOfBoth, ForceSource>(m, "ForcesOfBoth", "The numbers of one source, then those of another.")
+      .def(nb::init<Source, Source>(), "first"_a, "second"_a);
   nb::class_<Replay>(m, "Replay", "What acts in a run: the numbers of a source.")
       .def("__init__", &make_replay, "source"_a, "along"_a, "at_points"_a,
            "along: what units of them do along v; at_points: (number, entry in wrenches, share).");

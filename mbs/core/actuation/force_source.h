@@ -6,6 +6,8 @@
 #include <Eigen/Core>
 
 #include <limits>
+#include <memory>
+#include <utility>
 #include <vector>
 
 namespace ffrobot {
@@ -61,6 +63,26 @@ private:
   }
 
   std::vector<TimeFunction> functions_;
+};
+
+// The numbers of one source, then those of another, which says nothing about steps.
+class ForcesOfBoth final : public ForceSource {
+public:
+  ForcesOfBoth(std::shared_ptr<ForceSource> first, std::shared_ptr<ForceSource> second)
+      : ForceSource(first->values().size() + second->values().size()), first_(std::move(first)),
+        second_(std::move(second)) {}
+
+  double end_of_step(double t, double h) override { return first_->end_of_step(t, h); }
+
+private:
+  bool find(double t) override {
+    first_->evaluate(t), second_->evaluate(t);
+    values_ << first_->values(), second_->values();
+    return false; // they know themselves where they are
+  }
+  void prepare(const double *times, int count) override { first_->foresee(times, count); }
+
+  std::shared_ptr<ForceSource> first_, second_;
 };
 
 } // namespace ffrobot

@@ -114,11 +114,20 @@ template <class Space> void Motors<Space>::split(const double *q, const TreeWork
   }
 }
 
-template <class Space> Eigen::MatrixXd Motors<Space>::left_of(const Eigen::MatrixXd &dQ) const {
-  Eigen::MatrixXd left = dQ(driven_.of_modes, Eigen::all);
-  if (has_equations())
-    left -= columns_(driven_.of_modes, Eigen::all) * factors_.solve(dQ(driven_.of_joints, Eigen::all).eval());
-  return left;
+template <class Space> Eigen::MatrixXd Motors<Space>::shares_of(const Eigen::MatrixXd &dQ) const {
+  const auto modes = static_cast<Index>(driven_.of_modes.size());
+  Eigen::MatrixXd found(modes + tau_.size(), dQ.cols());
+  found.topRows(modes) = dQ(driven_.of_modes, Eigen::all);
+  if (has_equations()) {
+    const Eigen::MatrixXd solved = factors_.solve(dQ(driven_.of_joints, Eigen::all).eval());
+    found.topRows(modes) -= columns_(driven_.of_modes, Eigen::all) * solved;
+    found.bottomRows(tau_.size()) = solved.bottomRows(tau_.size());
+  } else
+    for (Index k = 0; k < tau_.size(); ++k) {
+      const Motor &motor = driven_.motors[static_cast<std::size_t>(k)];
+      found.row(modes + k) = motor.sign * dQ.row(motor.coordinate);
+    }
+  return found;
 }
 
 // Of a moment between the frames of bodies in place of their sections: what it does less on modes, F_p does more.

@@ -31,7 +31,7 @@ struct JointSlopes {
 };
 
 struct LeftSlopes {
-  Eigen::MatrixXd M, D, K; // (modes, modes) of what is left, by p_ddot, p_dot, p
+  Eigen::MatrixXd M, D, K; // (modes + motors, modes) of what is left and of torques, by p_ddot, p_dot, p
 };
 
 template <class Space> class PrescribedMotion {
@@ -64,7 +64,7 @@ public:
   const Motors<Space> *motors(); // in place of all that is required along joints; null where there are none
   Eigen::VectorXd left();        // (modes) that motors, or without any the constraint equations, leave
   JointSlopes joint_slopes();    // after balance(), as the next ones; then comes the next move()
-  virtual LeftSlopes slopes() { return left_slopes(joint_slopes()); } // of left(), with motors; exact
+  virtual LeftSlopes slopes() { return left_slopes(joint_slopes()); } // of left() and of motors; exact
   const Eigen::VectorXd &values() const { return value_; }            // C and its rate, which should be zero
   const Eigen::VectorXd &rates() const { return rate_; }
   const std::vector<Jet> &targets() const { return targets_; }

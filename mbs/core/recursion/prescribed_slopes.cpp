@@ -96,8 +96,8 @@ template <class Space> LeftSlopes PrescribedMotion<Space>::left_slopes(const Joi
   MatrixXd by_q = -(M * found.a_q + found.value_q.transpose() * found.lambda_q);
   MatrixXd by_v = -(M * found.a_v + found.value_q.transpose() * found.lambda_v);
   add_slopes(driven_.scene, v(), by_q, by_v);
-  return {motors_->left_of(M * joints.q), motors_->left_of(by_v * joints.q + M * joints.a_v),
-          motors_->left_of(by_q * joints.q + by_v * joints.v + M * joints.a_p)};
+  return {motors_->shares_of(M * joints.q), motors_->shares_of(by_v * joints.q + M * joints.a_v),
+          motors_->shares_of(by_q * joints.q + by_v * joints.v + M * joints.a_p)};
 }
 
 template <class Space> LeftSlopes RedefinedMotion<Space>::slopes() {

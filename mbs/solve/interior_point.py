@@ -1,0 +1,209 @@
+"""Convex quadratic programs along a time axis, by a primal-dual interior point method.
+
+    min  Σ_k ½ z_kᵀ H_k z_k + g_kᵀ z_k        z_k = (x_k, x_{k+1}),  k = 0 … N−1
+    with F_k x_k + G_k x_{k+1} = c_k,   R_0 x_0 = e_0,   R_N x_N = e_N,   C_k z_k ≤ d_k
+
+Predictor and corrector are Mehrotra's (Nocedal and Wright, *Numerical Optimization*, ch. 16.6). Newton's equations in
+the order (R_0, x_0, λ_0, x_1, λ_1 …) are banded, and factorized with pivoting: growing and decaying solutions side by
+side need it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from ...common.arrays import Array, as_floats
+
+MOST_ITERATIONS = 60
+FEASIBLE = 1e-10  # of equations and inequalities, relative to their data
+GAP = 1e-11  # of the objective
+STATIONARY = 1e-8  # of the Lagrangian's gradient, relative to its terms
+BACK = 0.995  # of the way to the nearest bound
+
+
+@dataclass(frozen=True)
+class Program:
+    """See above: H (N, 2s, 2s), g (N, 2s), F, G (N, e, s), c (N, e), C (N, i, 2s), d (N, i).
+
+    `start`, `end`: R (r, s) and e (r,).
+    """
+
+    H: Array
+    g: Array
+    F: Array
+    G: Array
+    c: Array
+    start: tuple[Array, Array]
+    end: tuple[Array, Array]
+    C: Array
+    d: Array
+
+
+class Minimum(NamedTuple):
+    """x (N+1, s), multipliers z (N, i) of the inequalities; whether the method converged, and its iterations."""
+
+    x: Array
+    z: Array
+    converged: bool
+    iterations: int
+
+
+class _Layout:
+    """Where unknowns stand: R_0's multipliers, then x_k and λ_k by turns, R_N's multipliers."""
+
+    def __init__(self, program: Program) -> None:
+        self.N, self.e, self.s = program.F.shape
+        self.first, self.last = len(program.start[0]), len(program.end[0])
+        self.period = self.s + self.e
+        self.size = self.first + self.N * self.period + self.s + self.last
+        self.x = self.first + self.period * np.arange(self.N + 1)[:, None] + np.arange(self.s)
+        self.equations = self.first + self.s + self.period * np.arange(self.N)[:, None] + np.arange(self.e)
+        self.z = np.hstack([self.x[:-1], self.x[1:]])
+        self.of_start, self.of_end = np.arange(self.first), self.size - self.last + np.arange(self.last)
+        self.band = max(2 * self.s + self.e, self.first + self.s, self.s + self.last) - 1
+
+
+class _Newton:
+    """Factors of [H + CᵀWC, Aᵀ; A, 0]."""
+
+    def __init__(self, program: Program, layout: _Layout, W: Array) -> None:
+        from scipy.linalg.lapack import dgbtrf
+
+        self.layout, b = layout, layout.band
+        self.ab = np.zeros((3 * b + 1, layout.size))
+        weighted = program.C * W[:, :, None]
+        blocks = program.H + np.einsum("kia,kib->kab", weighted, program.C)
+        for half in (0, 1):  # neighbours share x: not at once
+            self._add(layout.z[half::2], layout.z[half::2], blocks[half::2])
+        for rows, columns, of in (
+            (layout.equations, layout.x[:-1], program.F),
+            (layout.equations, layout.x[1:], program.G),
+            (layout.of_start[None], layout.x[:1], program.start[0][None]),
+            (layout.of_end[None], layout.x[-1:], program.end[0][None]),
+        ):
+            self._add(rows, columns, of)
+            self._add(columns, rows, of.transpose(0, 2, 1))
+        self.lu, self.pivots, info = dgbtrf(self.ab, b, b)
+        self.is_singular = info != 0
+
+    def _add(self, rows: Array, columns: Array, blocks: Array) -> None:
+        i, j = np.broadcast_arrays(rows[:, :, None], columns[:, None, :])
+        self.ab[2 * self.layout.band + i - j, j] += blocks
+
+    def solve(self, right: Array) -> Array:
+        """The unknowns, with one step of refinement: close to the end weights span many powers of ten."""
+        from scipy.linalg.blas import dgbmv
+        from scipy.linalg.lapack import dgbtrs
+
+        b, size = self.layout.band, self.layout.size
+        found: Array = dgbtrs(self.lu, b, b, right, self.pivots)[0]
+        left = right - dgbmv(size, size, b, b, 1.0, self.ab[b:], found)
+        return found + as_floats(dgbtrs(self.lu, b, b, left, self.pivots)[0])
+
+
+def minimize(program: Program, x: Array) -> Minimum:
+    """The minimum, from about x (N+1, s), which need not be feasible."""
+    way = _CentralPath(program, x)
+    iteration = 0
+    while not way.is_at_end() and iteration < MOST_ITERATIONS:
+        iteration += 1
+        if not way.advance():
+            break
+    return Minimum(way.unknown[way.layout.x], way.z, way.is_at_end(), iteration)
+
+
+class _CentralPath:
+    """Unknowns, slack and multipliers z (N, i) of the inequalities on their way to the minimum."""
+
+    def __init__(self, program: Program, x: Array) -> None:
+        self.program, self.layout = program, _Layout(program)
+        self.reach = np.abs(program.d).max(initial=1.0)
+        self.force = 1 + float(np.abs(program.g).sum())
+        self.unknown = np.zeros(self.layout.size)
+        self.unknown[self.layout.x] = x
+        # of min ½ zᵀ H z + gᵀ z + ½ |slack|², with slack made positive
+        slack = self._slack()
+        to = _residuals(program, self.layout, self.unknown, -slack)
+        self.unknown += _Newton(program, self.layout, np.ones_like(slack)).solve(to)
+        slack = self._slack()
+        least = 1e-1 * float(np.abs(slack).max(initial=self.reach))
+        self.slack = slack + max(0.0, least - float(slack.min(initial=np.inf)))
+        self.count = max(1, slack.size)
+        self.z = self.force * float(self.slack.mean()) / (self.count * self.slack)  # on the central path
+        self._look()
+
+    def _slack(self) -> Array:
+        return self.program.d - np.einsum("kia,ka->ki", self.program.C, self.unknown[self.layout.z])
+
+    def _look(self) -> None:
+        """Take what equations and inequalities leave here, and the mean of slack × z."""
+        self.right = _residuals(self.program, self.layout, self.unknown, self.z)
+        self.of_slack = self._slack() - self.slack
+        self.gap = float((self.slack * self.z).sum()) / self.count
+
+    def is_at_end(self) -> bool:
+        program, layout, right = self.program, self.layout, self.right
+        off = np.abs(right[layout.equations]).max(initial=0.0) / (1 + np.abs(program.c).max(initial=0.0))
+        if max(off, np.abs(self.of_slack).max(initial=0.0) / self.reach) > FEASIBLE:
+            return False
+        if self.gap * self.count > GAP * (1 + abs(_objective(program, self.unknown[layout.z]))):
+            return False
+        multipliers = np.abs(self.unknown[layout.equations])
+        terms = np.einsum("kea,ke->ka", np.abs(program.F), multipliers).max(initial=self.force)
+        return bool(np.abs(right[layout.x]).max() <= STATIONARY * terms)
+
+    def advance(self) -> bool:
+        """One step of predictor and corrector; False where there is none."""
+        slack, z = self.slack, self.z
+        newton = _Newton(self.program, self.layout, z / slack)
+        if newton.is_singular or not np.isfinite(self.gap):
+            return False
+        _, d_slack, dz = self._toward(newton, slack * z)
+        ways = min(1.0, _way(slack, d_slack)), min(1.0, _way(z, dz))
+        after = float(((slack + ways[0] * d_slack) * (z + ways[1] * dz)).sum()) / self.count
+        target = self.gap * (after / self.gap) ** 3 if self.gap else 0.0
+        dx, d_slack, dz = self._toward(newton, slack * z + d_slack * dz - target)
+        step = min(1.0, BACK * min(_way(slack, d_slack), _way(z, dz)))
+        self.unknown, self.slack, self.z = self.unknown + step * dx, slack + step * d_slack, z + step * dz
+        self._look()
+        return True
+
+    def _toward(self, newton: _Newton, products: Array) -> tuple[Array, Array, Array]:
+        """Steps of unknowns, slack and z by which slack × z loses `products`."""
+        pull = (products + self.z * self.of_slack) / self.slack
+        to = self.right.copy()
+        np.add.at(to, self.layout.z, np.einsum("kia,ki->ka", self.program.C, pull))
+        dx = newton.solve(to)
+        d_slack = self.of_slack - np.einsum("kia,ka->ki", self.program.C, dx[self.layout.z])
+        return dx, d_slack, -(products + self.z * d_slack) / self.slack
+
+
+def _residuals(program: Program, layout: _Layout, unknown: Array, z: Array) -> Array:
+    """Minus the gradient of the Lagrangian by all unknowns."""
+    left = np.zeros(layout.size)
+    x, of_z = unknown[layout.x], unknown[layout.z]
+    gradient = program.g + np.einsum("kab,kb->ka", program.H, of_z) + np.einsum("kia,ki->ka", program.C, z)
+    np.add.at(left, layout.z, gradient)
+    multiplier = unknown[layout.equations]
+    np.add.at(left, layout.x[:-1], np.einsum("kea,ke->ka", program.F, multiplier))
+    np.add.at(left, layout.x[1:], np.einsum("kea,ke->ka", program.G, multiplier))
+    for (rows, values), at, k in ((program.start, layout.of_start, 0), (program.end, layout.of_end, -1)):
+        left[layout.x[k]] += rows.T @ unknown[at]
+        left[at] = rows @ x[k] - values
+    left[layout.equations] = (
+        np.einsum("kea,ka->ke", program.F, x[:-1]) + np.einsum("kea,ka->ke", program.G, x[1:]) - program.c
+    )
+    return -left
+
+
+def _objective(program: Program, z: Array) -> float:
+    return float(0.5 * np.einsum("ka,kab,kb->", z, program.H, z) + (program.g * z).sum())
+
+
+def _way(values: Array, step: Array) -> float:
+    """The longest share of a step that leaves positive values positive, at most 1 / BACK."""
+    shrinking = step < 0
+    return float(np.min(-values[shrinking] / step[shrinking], initial=1 / BACK))

@@ -1,0 +1,358 @@
+"""Motors and patches together on a path, within limits: an optimal control problem on the internal dynamics.
+
+With patches r(t, p, ṗ, p̈) = Φ_V V (`internal_dynamics`). p̈ is a polynomial on each interval through the four Gauss
+points of `collocation`, V is linear between breaks: limits at breaks are limits everywhere. Each Newton step solves
+
+    min  1/(t₁−t₀) ∫ ½ |τ − τ_qs|²/τ_ref² + ½ |V|²/V_ref² + ½ T_r² |V̇|²/V_ref² dt,    |V| ≤ V_max, |τ| ≤ τ_max
+
+or the least share of the limits of voltages, or of torques, of the linearized equations; τ_qs carries the links as they
+sag. Links rest at both ends. Output transition with free internal states: Perez and Devasia, Automatica 39 (2003).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal, Protocol
+
+import numpy as np
+
+from ...common.arrays import Array, as_floats
+from .. import _core
+from .collocation import GAUSS, Elimination, piecewise, stage_states
+from .interior_point import Minimum, Program, minimize
+from .stable_inversion import PROBES, cut
+
+if TYPE_CHECKING:
+    from scipy.interpolate import PPoly
+
+Objective = Literal["effort", "least-voltage", "least-torque"]
+
+GRADING = 2.5  # of breaks to both ends: tanh
+MOST_ITERATIONS = 25
+TOLERANCE = 1e-8  # of the last Newton step, relative to the peak of its quantity
+SHAPE_ITERATIONS = 20
+MOST_INTERVALS = 1500
+
+
+class Driven(Protocol):
+    """A path that motors and patches carry."""
+
+    @property
+    def scale(self) -> Array:
+        """Frequencies ω of all modes (n,), rad/s."""
+        ...
+
+    def forces(self, times: Array, p: Array, v: Array, a: Array, /) -> tuple[Array, Array]:
+        """r (N, n), forces on modes that motors leave, and their torques τ (N, motors), at `times` (N,)."""
+        ...
+
+    def slopes(self, times: Array, p: Array, v: Array, a: Array, /) -> tuple[Array, Array, Array]:
+        """Derivatives (N, n + motors, n) of (r, τ) by p̈, ṗ and p."""
+        ...
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Of patches (m,) V, and of motors (motors,) N·m or N; infinite where there are none."""
+
+    voltage: Array
+    torque: Array
+
+
+@dataclass(frozen=True)
+class Weights:
+    """τ_ref (N·m), V_ref (V) and T_r (s)."""
+
+    torque: float
+    voltage: float
+    rate: float
+
+
+@dataclass(frozen=True)
+class Transition:
+    """What is asked for: `rest` are p at both ends, `is_free` whether V may begin and end at any value."""
+
+    driven: Driven
+    Phi_V: Array  # (n, m)
+    limits: Limits
+    weights: Weights
+    rest: tuple[Array, Array]
+    objective: Objective = "effort"
+    is_free: bool = False
+
+
+@dataclass(frozen=True)
+class Tracked:
+    """p(t) and V(t) as piecewise polynomials, and how they were found.
+
+    Attributes:
+        share: σ, the least share of limits (`objective` "least-…"), or of V_ref or τ_ref where there are none.
+        cost: J.
+    """
+
+    curve: PPoly
+    voltage: PPoly
+    converged: bool
+    iterations: int
+    share: float
+    cost: float
+
+    def shape(self, counts: Sequence[int]) -> list[list[_core.TimeFunction]]:
+        """p_k(t) of each body, for the core; `counts` of modes by body."""
+        columns = iter(self.curve.c.transpose(2, 1, 0))
+        return [
+            [_core.TimeFunction.polynomial(self.curve.x, np.ascontiguousarray(next(columns))) for _ in range(count)]
+            for count in counts
+        ]
+
+
+def graded(start: float, end: float, intervals: int, grading: float = GRADING) -> Array:
+    """Breaks (intervals + 1,), closer together at both ends."""
+    u = np.tanh(grading * np.linspace(-1.0, 1.0, intervals + 1)) / np.tanh(grading)
+    return as_floats(start + 0.5 * (end - start) * (1.0 + u))
+
+
+def start_breaks(start: float, path_end: float, end: float, intervals: int) -> Array:
+    """Graded breaks from `start` to `end`, with those next to 0 and to the end of the path moved there (s)."""
+    breaks = graded(start, end, intervals)
+    for t in (0.0, path_end):
+        breaks[np.abs(breaks - t).argmin()] = t
+    return breaks
+
+
+def refined(asked: Transition, breaks: Array, tolerance: float, goes_on: Callable[[], bool]) -> Tracked:
+    """The same on intervals that are cut until no force above `tolerance` of the largest elastic one is left over."""
+    driven = asked.driven
+    found = None
+    while True:
+        found = track(asked, breaks, found)
+        times = (breaks[:-1, None] + np.diff(breaks)[:, None] * PROBES).ravel()
+        motion = [found.curve(times, k) for k in range(3)]
+        r = driven.forces(times, *motion)[0] - found.voltage(times) @ asked.Phi_V.T
+        largest = float(np.abs(driven.scale**2 * motion[0]).max())
+        unmet = np.abs(r).max(axis=1).reshape(len(breaks) - 1, -1).max(axis=1)
+        finer = cut(breaks, unmet / (tolerance * largest))
+        if not found.converged or not len(breaks) < len(finer) <= MOST_INTERVALS or not goes_on():
+            return found
+        breaks = finer
+
+
+def sagging(driven: Driven, times: Array) -> Array:
+    """p_s (N, n) with r(t, p_s, 0, 0) = 0, and so τ_qs."""
+    p = np.zeros((len(times), len(driven.scale)))
+    n = p.shape[1]
+    for _ in range(SHAPE_ITERATIONS):
+        r = driven.forces(times, p, 0 * p, 0 * p)[0]
+        K = driven.slopes(times, p, 0 * p, 0 * p)[2][:, :n]
+        step = np.linalg.solve(K, r[..., None])[..., 0]
+        p = p - step
+        if np.abs(driven.scale * step).max() <= TOLERANCE * np.abs(driven.scale * p).max(initial=1e-300):
+            break
+    return p
+
+
+def track(asked: Transition, breaks: Array, near: Tracked | None = None) -> Tracked:
+    """Solve on `breaks` (N + 1,), from a motion `near`, or from links as they sag and no voltages."""
+    driven, h = asked.driven, np.diff(breaks)
+    times = breaks[:-1, None] + h[:, None] * GAUSS.c
+    N, s, n, m = *times.shape, *asked.Phi_V.shape
+    flat = times.ravel()
+    p_s = sagging(driven, np.concatenate([breaks, flat]))
+    p, v, u = p_s[: N + 1].copy(), np.zeros((N + 1, n)), np.zeros((N + 1, m))
+    K, sag_at = np.zeros((N, s, n)), p_s[N + 1 :]
+    tau_qs = driven.forces(flat, sag_at, 0 * sag_at, 0 * sag_at)[1].reshape(N, s, -1)
+    size = max(float(np.abs(driven.scale * p_s).max()), 1e-300)
+    if near is not None:
+        p, v, u = near.curve(breaks), near.curve(breaks, 1), near.voltage(breaks)
+        K = near.curve(flat, 2).reshape(K.shape)
+    steps = _Steps(asked, breaks, tau_qs, size)
+    converged, iteration, previous, previous_share = False, 0, np.inf, np.inf
+    found: Minimum | None = None
+    while not converged and iteration < MOST_ITERATIONS:
+        iteration += 1
+        state = p, v, K
+        p, v, K, u_new, found = steps.take(state, u)
+        moved = max(float(np.abs(driven.scale * (p - state[0])).max()), float(np.abs(v - state[1]).max())) / max(
+            float(np.abs(driven.scale * p).max()), float(np.abs(v).max()), size
+        )
+        u, share = u_new, steps.share(found)
+        if not (np.isfinite(moved) and found.converged):
+            break
+        if steps.has_share:  # V(t) of linear programs is not unique
+            moved = abs(share - previous_share) / abs(share)
+            previous_share = share
+        converged = moved <= TOLERANCE or (moved <= 1e-7 and moved > 0.3 * previous)
+        previous = moved
+    assert found is not None
+    from scipy.interpolate import PPoly
+
+    slope = np.diff(u, axis=0) / h[:, None]
+    return Tracked(
+        piecewise(GAUSS, breaks, p, v, K), PPoly(np.array([slope, u[:-1]]), breaks), bool(converged), iteration,
+        steps.share(found), steps.cost(found),
+    )  # fmt: skip
+
+
+class _Steps:
+    """Newton's steps, each the minimum of the linearized problem in x = (p, ṗ, V, σ) at breaks.
+
+    σ, the share of limits, is a constant, and there where it is the objective.
+    """
+
+    program: Program
+    constant = 0.0  # of J, which the program leaves out
+
+    def __init__(self, asked: Transition, breaks: Array, tau_qs: Array, size: float) -> None:
+        self.asked, self.breaks, self.h, self.tau_qs = asked, breaks, np.diff(breaks), tau_qs
+        self.n, self.m = asked.Phi_V.shape
+        self.has_share = asked.objective != "effort"
+        self.y, self.V = slice(0, 2 * self.n), slice(2 * self.n, 2 * self.n + self.m)
+        self.width = 2 * self.n + self.m + self.has_share
+        self.y_unit = np.concatenate([size / asked.driven.scale, np.full(self.n, size)])
+        volts = np.full(self.m, asked.weights.voltage)
+        self.unit = np.concatenate([self.y_unit, volts, np.ones(int(self.has_share))])
+        self.sigma = 1.0
+
+    def take(self, state: tuple[Array, Array, Array], u: Array) -> tuple[Array, Array, Array, Array, Minimum]:
+        """The next p, ṗ at breaks, K at stages and V at breaks, and the minimum they come from."""
+        (p, v, K), n, h, width = state, self.n, self.h, self.width
+        N, s, _ = K.shape
+        times = (self.breaks[:-1, None] + h[:, None] * GAUSS.c).ravel()
+        at = [*(x.reshape(-1, n) for x in stage_states(GAUSS, h, p, v, K)), K.reshape(-1, n)]
+        r, tau = self.asked.driven.forces(times, *at)
+        slopes = [x.reshape(N, s, -1, n) for x in self.asked.driven.slopes(times, *at)]
+        stages = Elimination(GAUSS, h, [x[:, :, :n] for x in slopes])
+        y = np.concatenate([p, v], axis=1)
+        right = r.reshape(N, s * n, 1) - stages.G @ y[:-1, :, None]
+        known = K - (stages.E_inverse @ right).reshape(N, s, n)  # K for (p, ṗ) = 0 and V = 0
+        K_z = self._stages_by_z(stages)
+        # stages and ends for z = (x_k, x_{k+1})
+        starts = np.zeros((2, n, 2 * width))
+        starts[0, :, :n], starts[1, :, n : 2 * n] = np.eye(n), np.eye(n)
+        ends = np.concatenate(stages.at_end(starts[0], starts[1], K_z), axis=1)
+        offset = np.concatenate(stages.at_end(np.zeros(n), np.zeros(n), known), axis=1)
+        forward = np.zeros((2 * n, 2 * width))
+        forward[:, width : width + 2 * n] = np.eye(2 * n)
+        continuity = forward - ends
+        tau_z = self._torques(tau.reshape(N, s, -1), [x[:, :, n:] for x in slopes], at, known, (starts, K_z))
+        self.program = self._program(continuity, offset, *tau_z)
+        scaled = np.concatenate([y, u, np.full((N + 1, int(self.has_share)), self.sigma)], axis=1) / self.unit
+        found = minimize(self.program, scaled)
+        x = found.x * self.unit
+        K_new = known + np.einsum("Nsnz,Nz->Nsn", K_z, np.hstack([x[:-1], x[1:]]))
+        self.sigma = self.share(found)
+        return x[:, :n], x[:, n : 2 * n], K_new, x[:, self.V], found
+
+    def _stages_by_z(self, stages: Elimination) -> Array:
+        """Derivatives (N, s, n, 2 width) of K by z."""
+        N, s, n, _ = stages.response.shape
+        shares = np.stack([1 - GAUSS.c, GAUSS.c])  # of V at both ends
+        by_V = np.einsum("es,nm->snem", shares, self.asked.Phi_V).reshape(s * n, 2 * self.m)
+        K_by_V = (stages.E_inverse @ by_V).reshape(N, s, n, 2, self.m)
+        found = np.zeros((N, s, n, 2 * self.width))
+        found[..., self.y] = stages.response
+        for end in (0, 1):
+            first = end * self.width
+            found[..., first + self.V.start : first + self.V.stop] = K_by_V[..., end, :]
+        return found
+
+    def _torques(
+        self, tau: Array, slopes: list[Array], at: list[Array], known: Array, by_z: tuple[Array, Array]
+    ) -> tuple[Array, Array]:
+        """τ (N, s, motors) at stages for z = 0, and its derivatives (N, s, motors, 2 width) by z."""
+        starts, K_z = by_z
+        h = self.h[:, None, None, None]
+        once, twice = (np.einsum("ij,Nj...->Ni...", a, K_z) for a in (GAUSS.stage_once, GAUSS.stage_twice))
+        p_z = starts[0] + GAUSS.c[:, None, None] * h * starts[1] + h**2 * twice
+        v_z = starts[1] + h * once
+        h = h[..., 0]
+        once, twice = (np.einsum("ij,Nj...->Ni...", a, known) for a in (GAUSS.stage_once, GAUSS.stage_twice))
+        for_nothing = h**2 * twice, h * once, known
+        found, moved = np.zeros((*tau.shape, 2 * self.width)), tau
+        for by, of_z, of_nothing, now in zip(slopes[::-1], (p_z, v_z, K_z), for_nothing, at, strict=True):
+            found = found + by @ of_z
+            moved = moved + np.einsum("Nstn,Nsn->Nst", by, of_nothing - now.reshape(of_nothing.shape))
+        return moved, found
+
+    def _program(self, continuity: Array, offset: Array, tau_0: Array, tau_z: Array) -> Program:
+        n, width, N = self.n, self.width, len(offset)
+        tau_z = tau_z * np.tile(self.unit, 2)
+        scaled = continuity * np.tile(self.unit, 2) / self.y_unit[:, None]
+        F, G = scaled[..., :width], scaled[..., width:]
+        c = offset / self.y_unit
+        H, g = self._effort(tau_0, tau_z) if not self.has_share else self._of_share(N)
+        if self.has_share:
+            keep = np.zeros((N, 1, width))
+            keep[..., -1] = 1.0
+            F, G, c = np.hstack([F, -keep]), np.hstack([G, keep]), np.hstack([c, np.zeros((N, 1))])
+        C, d = self._inequalities(tau_0, tau_z)
+        rows = np.eye(width)[: 2 * n if self.asked.is_free else 2 * n + self.m]
+        rests = [np.concatenate([p / self.y_unit[:n], np.zeros(len(rows) - n)]) for p in self.asked.rest]
+        return Program(H, g, F, G, c, (rows, rests[0]), (rows, rests[1]), C, d)
+
+    def _of_share(self, N: int) -> tuple[Array, Array]:
+        g = np.zeros((N, 2 * self.width))
+        g[0, self.width - 1] = 1.0
+        return np.zeros((N, 2 * self.width, 2 * self.width)), g
+
+    def _effort(self, tau_0: Array, tau_z: Array) -> tuple[Array, Array]:
+        """H and g of J."""
+        weights = self.asked.weights
+        whole = self.breaks[-1] - self.breaks[0]
+        b = self.h[:, None] * GAUSS.end_once / (whole * weights.torque**2)  # (N, s)
+        off = tau_0 - self.tau_qs
+        H = np.einsum("Ns,Nsta,Nstb->Nab", b, tau_z, tau_z, optimize=True)
+        g = np.einsum("Ns,Nsta,Nst->Na", b, tau_z, off, optimize=True)
+        self.constant = 0.5 * float(np.einsum("Ns,Nst->", b, off**2))
+        first = np.arange(self.V.start, self.V.stop)
+        second = first + self.width
+        rate = weights.rate**2 / self.h
+        same, other = (self.h / 3 + rate) / whole, (self.h / 6 - rate) / whole  # V in units of V_ref
+        for i, j, size in (
+            (first, first, same),
+            (second, second, same),
+            (first, second, other),
+            (second, first, other),
+        ):
+            H[:, i, j] += size[:, None]
+        return H, g
+
+    def _inequalities(self, tau_0: Array, tau_z: Array) -> tuple[Array, Array]:
+        """C and d: limits of voltages at breaks, each in the interval that it begins, and of torques at stages."""
+        asked, N, width = self.asked, len(tau_z), self.width
+        V_max, tau_max = asked.limits.voltage, asked.limits.torque
+        rows, most = [], []
+        is_shared = asked.objective == "least-voltage"
+        bounded = np.arange(self.m) if is_shared else np.flatnonzero(np.isfinite(V_max))
+        limit = np.where(np.isfinite(V_max), V_max, asked.weights.voltage)[bounded] / asked.weights.voltage
+        at = np.arange(len(bounded))
+        for sign in (1.0, -1.0):
+            for of_intervals, first in ((slice(None), 0), (slice(-1, None), width)):  # nothing begins at the last break
+                of = np.zeros((N, len(bounded), 2 * width))
+                of[of_intervals, at, first + self.V.start + bounded] = sign / limit
+                if is_shared:
+                    of[of_intervals, :, width - 1] = -1.0
+                rows.append(of)
+                most.append(np.where(of.any(axis=2) & is_shared, 0.0, 1.0))
+        is_shared = asked.objective == "least-torque"
+        motors = np.arange(len(tau_max)) if is_shared else np.flatnonzero(np.isfinite(tau_max))
+        limit = np.where(np.isfinite(tau_max), tau_max, asked.weights.torque)[motors]
+        for sign in (1.0, -1.0):
+            of = sign * tau_z[:, :, motors] / limit[:, None]
+            if is_shared:
+                of[..., width - 1] = -1.0
+            rows.append(of.reshape(N, -1, 2 * width))
+            most.append(((0.0 if is_shared else 1.0) - sign * tau_0[:, :, motors] / limit).reshape(N, -1))
+        return np.concatenate(rows, axis=1), np.concatenate(most, axis=1)
+
+    def share(self, found: Minimum) -> float:
+        """σ; 1 where it is not the objective."""
+        return float(found.x[0, -1]) if self.has_share else 1.0
+
+    def cost(self, found: Minimum) -> float:
+        """J; 0 where it is not the objective."""
+        if self.has_share:
+            return 0.0
+        z, program = np.hstack([found.x[:-1], found.x[1:]]), self.program
+        return float(0.5 * np.einsum("ka,kab,kb->", z, program.H, z) + (program.g * z).sum()) + self.constant

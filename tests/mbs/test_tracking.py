@@ -1,0 +1,152 @@
+"""Motors and patches on a path: against an independent planar prototype (its own equations, collocation and solver).
+
+The numbers are those of ../shared/tracking_notes.md, section 7: a soft strip of 1 m with pairs of patches that turns by
+45°, septic timing, and the arm of the paper.
+"""
+
+import numpy as np
+import pytest
+
+from ffrobot.common.arrays import as_list
+from ffrobot.mbs.model.spatial_model import modal_directions
+from ffrobot.mbs.solve.internal_dynamics import equilibrium
+from ffrobot.mbs.solve.spatial_servo import make_spatial_servo
+from ffrobot.mbs.solve.stable_inversion import invert
+from ffrobot.mbs.solve.tracking import Limits, Transition, Weights, graded, track
+from ffrobot.mbs.solve.zero_dynamics import linearise
+from ffrobot.run.spatial import prepare_spatial
+from ffrobot.run.watcher import Watcher
+
+LINK = """
+name = "strip"
+material = {{ youngs_modulus = 70e9, poissons_ratio = 0.33, density = 2700.0 }}
+geometry = {{ kind = "beam", length = 1.0, section = {{ shape = "rectangle", height = 0.004, width = 0.02 }} }}
+mesh = {{ elements = 24 }}
+reference = {{ condition = "cantilever" }}
+modes = {{ family = "in-plane-bending", count = {modes}, attachment_modes = false }}
+damping = {{ ratio = 0.005 }}
+"""
+
+SCENE = """
+name = "strip"
+space = "spatial"
+gravity = [0.0, 0.0, 0.0]
+[[body]]
+name = "arm"
+link = "link.toml"
+[[joint]]
+name = "O"
+type = "revolute"
+axis = [0, 0, 1]
+between = ["ground", "arm.root"]
+motor = true
+[initial]
+joints = {{ O = -0.39269908169872414 }}
+[[trajectory]]
+name = "tip"
+point = "arm.tip"
+y = "sin(pi/4*(35*(t/{T})**4 - 84*(t/{T})**5 + 70*(t/{T})**6 - 20*(t/{T})**7) - pi/8)"
+[[pzt]]
+body = "arm"
+centers = [0.125, 0.375, 0.625, 0.875]
+face = "both"
+length = 0.08
+width = 0.02
+thickness = 0.25e-3
+modulus = 63e9
+d31 = 110e-12
+structural = false
+limit = 200.0
+[[analysis]]
+name = "carried"
+kind = "tracking"
+end = {T}
+output_step = {T}
+"""
+
+
+@pytest.fixture
+def strip(tmp_path):
+    def make(modes, T):
+        (tmp_path / "link.toml").write_text(LINK.format(modes=modes), encoding="utf-8")
+        (tmp_path / "scene.toml").write_text(SCENE.format(T=T), encoding="utf-8")
+        solution = prepare_spatial(tmp_path / "scene.toml", Watcher())
+        servo = make_spatial_servo(solution.model, T, "strip", lambda: True, 1.0)
+        directions = modal_directions(servo.model, solution.patches["arm"].per_volt)
+        return servo, directions[:, servo.of_modes].T
+
+    return make
+
+
+def asked(servo, Phi_V, span, objective, limit, *, is_free=False):
+    limits = Limits(np.full(Phi_V.shape[1], limit), np.full(1, np.inf))
+    rest = tuple(equilibrium(servo, t) for t in span)
+    return Transition(servo, Phi_V, limits, Weights(0.4, 200.0, 0.005), rest, objective, is_free)
+
+
+@pytest.mark.parametrize(("intervals", "expected"), [(100, 53.7562), (200, 53.6953)])
+def test_least_voltage(strip, intervals, expected):
+    """Checkpoint 2."""
+    servo, Phi_V = strip(2, 0.8)
+    found = track(asked(servo, Phi_V, (0.0, 0.8), "least-voltage", 200.0, is_free=True), graded(0.0, 0.8, intervals))
+    assert found.converged
+    assert 200.0 * found.share == pytest.approx(expected, abs=1e-4)
+
+
+def test_least_voltage_falls_with_time(strip):
+    """Section 3: by the fourth power or so of the path time; 20.51 and 139.7 V with four modes."""
+    for T, expected in ((1.0, 20.51), (0.6, 139.7)):
+        servo, Phi_V = strip(4, T)
+        found = track(asked(servo, Phi_V, (0.0, T), "least-voltage", 200.0, is_free=True), graded(0.0, T, 64))
+        assert 200.0 * found.share == pytest.approx(expected, rel=5e-4)
+
+
+def test_least_effort(strip):
+    """Checkpoint 3, at 140 intervals."""
+    servo, Phi_V = strip(4, 0.7)
+    found = track(asked(servo, Phi_V, (0.0, 0.7), "effort", 120.0), graded(0.0, 0.7, 140))
+    assert found.converged
+    assert found.cost == pytest.approx(0.0454892, abs=1e-7)
+    breaks, V = found.voltage.x, found.voltage(found.voltage.x)
+    squares = ((V[:-1] ** 2 + V[:-1] * V[1:] + V[1:] ** 2).sum(axis=1) * np.diff(breaks) / 3).sum()
+    assert np.sqrt(squares / 0.7 / 4) == pytest.approx(25.56276, abs=1e-4)
+    assert np.abs(V).max() <= 120.0 * (1 + 1e-9)
+    times = np.array([0.03, 0.10, 0.20, 0.35, 0.60])
+    motion = [found.curve(times, k) for k in range(3)]
+    tau = servo.forces(times, *motion)[1][:, 0]
+    assert np.abs(tau - [0.1240302, 0.5080775, 0.8311328, -0.0001646, -0.5071881]).max() < 2e-6
+    expected = [[25.7578, 60.4196, 94.4616, 38.1730], [0.332613, 0.727236, 1.187379, 0.473746]]
+    assert np.abs(found.voltage(times[:2]) - expected).max() < 2e-3
+    state = servo.motion.motion(as_list(times), *motion, servo.postures(times))
+    assert np.isfinite(state.q).all()
+
+
+def test_without_voltage_motors_alone_carry(strip):
+    """Section 4: with time before and after, V → 0, and torques are those of stable inversion."""
+    servo, Phi_V = strip(4, 0.7)
+    inverted = invert(servo, linearise(servo, 0.7), 0.34, 0.34, 1e-8, lambda _: True)
+    assert inverted.status == "completed"
+    breaks = inverted.curve.x
+    found = track(asked(servo, Phi_V, (breaks[0], breaks[-1]), "effort", 1e-3), breaks)
+    times = np.linspace(0.0, 0.7, 71)
+    torques = [servo.forces(times, *(curve(times, k) for k in range(3)))[1] for curve in (found.curve, inverted.curve)]
+    assert np.abs(torques[0] - torques[1]).max() < 1e-8
+    assert np.abs(found.voltage(breaks)).max() < 1e-3
+
+
+def test_slopes_of_torques(strip):
+    """Dual numbers against differences, in which r is linear in p̈ and quadratic in ṗ."""
+    servo, _ = strip(3, 0.8)
+    rng = np.random.default_rng(0)
+    times = np.array([0.1, 0.4, 0.7])
+    p, v, a = (size * rng.standard_normal((3, 3)) for size in (1e-3, 1e-2, 1.0))
+    h = 1e-6
+    for k, slope in zip((2, 1, 0), servo.slopes(times, p, v, a), strict=True):
+        for mode in range(3):
+            moved = []
+            for sign in (1, -1):
+                state = [p.copy(), v.copy(), a.copy()]
+                state[k][:, mode] += sign * h
+                moved.append(np.concatenate(servo.forces(times, *state), axis=1))
+            expected = (moved[0] - moved[1]) / (2 * h)
+            assert np.abs(slope[:, :, mode] - expected).max() < 1e-6 * max(1.0, np.abs(slope).max())
