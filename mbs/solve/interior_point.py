@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...common.arrays import Array, as_floats
+from ...common.arrays import Array, Indices, as_floats
 
 MOST_ITERATIONS = 60
 FEASIBLE = 1e-10  # of equations and inequalities, relative to their data
@@ -89,7 +89,7 @@ class _Newton:
         self.lu, self.pivots, info = dgbtrf(self.ab, b, b)
         self.is_singular = info != 0
 
-    def _add(self, rows: Array, columns: Array, blocks: Array) -> None:
+    def _add(self, rows: Indices, columns: Indices, blocks: Array) -> None:
         i, j = np.broadcast_arrays(rows[:, :, None], columns[:, None, :])
         self.ab[2 * self.layout.band + i - j, j] += blocks
 
@@ -136,7 +136,8 @@ class _CentralPath:
         self._look()
 
     def _slack(self) -> Array:
-        return self.program.d - np.einsum("kia,ka->ki", self.program.C, self.unknown[self.layout.z])
+        left: Array = self.program.d - np.einsum("kia,ka->ki", self.program.C, self.unknown[self.layout.z])
+        return left
 
     def _look(self) -> None:
         """Take what equations and inequalities leave here, and the mean of slack × z."""

@@ -44,7 +44,7 @@ class Driven(Protocol):
         ...
 
     def forces(self, times: Array, p: Array, v: Array, a: Array, /) -> tuple[Array, Array]:
-        """r (N, n), forces on modes that motors leave, and their torques τ (N, motors), at `times` (N,)."""
+        """Forces r (N, n) on modes that motors leave, and their torques τ (N, motors), at `times` (N,)."""
         ...
 
     def slopes(self, times: Array, p: Array, v: Array, a: Array, /) -> tuple[Array, Array, Array]:

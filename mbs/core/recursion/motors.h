@@ -45,7 +45,8 @@ public:
   // kinematics of a state at q, and its frames where constraint equations or cut joints ask for these.
   void resolve(const double *q, const double *lambda, const TreeWorkspace &w);
   void split(const double *q, const Eigen::VectorXd &Q, const TreeWorkspace &w);
-  // After split(): (modes + motors, …) of other forces dQ (n_v, …) what motors and loops leave, as they are then, and tau
+  // After split(): (modes + motors, …) of other forces dQ (n_v, …) what motors and loops leave, as they are then, and
+  // tau
   Eigen::MatrixXd shares_of(const Eigen::MatrixXd &dQ) const;
   // -C_s^T lambda_s (n_v) of the path
   const Eigen::VectorXd &path_forces(const double *q, const double *lambda, const TreeWorkspace &w);
