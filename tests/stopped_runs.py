@@ -57,3 +57,27 @@ def differences(results, expected):
         for name, values in wanted.items():
             assert found[name].shape == values.shape
             yield name, np.abs(found[name] - values).max() / (np.abs(values).max() or 1.0)
+
+
+def attributes(results):
+    """All of the analyses, their groups and datasets, by place, peaks among them; but what a run took.
+
+    To go on an integrator evaluates once more where it has stopped.
+    """
+    found, work = {}, ("wall_seconds", "evaluations")
+
+    def add(name, item):
+        found.update({(name, key): value for key, value in item.attrs.items() if key not in work})
+
+    for analysis in results.analyses:
+        add(analysis, results._file[analysis])
+        results._file[analysis].visititems(lambda name, item, analysis=analysis: add(f"{analysis}/{name}", item))
+    return found
+
+
+def check_attributes(results, expected):
+    """That all are the same, to the last bit."""
+    found, wanted = attributes(results), attributes(expected)
+    assert found.keys() == wanted.keys()
+    for place, value in wanted.items():
+        np.testing.assert_array_equal(found[place], value, err_msg=str(place))

@@ -1,11 +1,14 @@
 """Runs that were stopped go on from their results file as if they had never been."""
 
+from types import SimpleNamespace
+
 import h5py
 import pytest
-from stopped_runs import Stops, differences, edit, go_on, stop
+from stopped_runs import Stops, check_attributes, differences, edit, go_on, stop
 
 import ffrobot
 from ffrobot.common.checksum import seal
+from ffrobot.mbs.solve.integrators import METHODS, Choice
 
 END = 0.12
 SHORT = {"end = 1.0": f"end = {END}"}
@@ -51,9 +54,7 @@ def test_a_resumed_run_is_the_uninterrupted_one(arm, stopped, keys):
     assert watcher.asked[0] == (f'analysis "{stopped}"', reached)
     for name, difference in differences(results, expected):
         assert difference == 0.0, name
-    for analysis in ("inverse", "forward"):
-        for key in ("steps", "rejected", "status"):
-            assert results.attributes(analysis)[key] == expected.attributes(analysis)[key]
+    check_attributes(results, expected)
     assert 1 < outputs < len(expected.time(stopped))
     assert not results.has(f"{stopped}/resume")
 
@@ -156,6 +157,19 @@ def test_runs_in_absolute_coordinates_are_refused(arm):
     seal(scene.with_suffix(".h5"))
     with pytest.raises(ffrobot.InputError, match=r"found one in absolute coordinates, which an earlier version"):
         go_on(scene)
+
+
+@pytest.mark.parametrize("first", range(6))
+def test_changes_of_integrators_are_those_of_a_run_in_one_go(first):
+    """However many of five changes were made before the run was stopped."""
+    radau, dop853 = METHODS["radau"], METHODS["dop853"]
+    changes = [(0.1 * k, *((radau, dop853) if k % 2 else (dop853, radau)), 1e-3) for k in range(5)]
+    choice, parts = Choice("dop853", "highest natural frequency 3 rad/s"), (changes[:first], changes[first:])
+    whole = choice.changed_in(SimpleNamespace(changes=changes))
+    for part in parts:
+        choice = choice.changed_in(SimpleNamespace(changes=part))
+    assert choice == whole
+    assert whole.reason.endswith("; changed 5 times in all")
 
 
 def test_needs_a_file():

@@ -8,10 +8,10 @@ from collections.abc import Iterable
 import h5py
 import numpy as np
 
-from ..common.arrays import Array
+from ..common.arrays import Array, as_list
 from ..common.errors import InputError
 from ..mbs import _core
-from ..mbs.analysis.outcome import AnyOutcome, Continuation, EarlierRun, Forces, Motion, Statistics
+from ..mbs.analysis.outcome import SAMPLED, AnyOutcome, Continuation, EarlierRun, Forces, Motion, Statistics
 from ..mbs.scene.analysis import Analysis, IntegratedAnalysis
 from ..mbs.solve.integrators import METHODS, Choice
 from .file import Results
@@ -31,6 +31,10 @@ def write_earlier_run(group: h5py.Group, outcome: AnyOutcome, *, is_spatial: boo
         if values is not None:
             group[name] = values
     write_tree_checkpoint(group, outcome.continuation.checkpoint)
+    if (samples := outcome.continuation.samples) is not None:
+        group["samples/times"] = samples.times
+        group["samples/states"] = samples.states
+        group["samples"].attrs.update({key: getattr(samples, key) for key in SAMPLED})
     if (recording := outcome.continuation.recording) is not None:
         group["recording/times"] = recording.times
         group["recording/states"] = recording.states
@@ -94,14 +98,27 @@ def _continuation(file: Results, analysis: Analysis) -> Continuation:
         raise InputError(
             f"{file.path}: {group}: expected as many outputs as times, {expected}, found {checkpoint.outputs}"
         )
+    samples = _samples(file, f"{group}/samples")
     if not file.has(f"{group}/recording"):
-        return Continuation(checkpoint)
+        return Continuation(checkpoint, samples=samples)
     assert isinstance(analysis, IntegratedAnalysis)
     times, states = (row_of_numbers(file, f"{group}/recording/{key}") for key in ("times", "states"))
     methods = _methods(file, f"{group}/recording")
-    return Continuation(
-        checkpoint, _core.Recording(times, states, methods, analysis.spectral_radius, analysis.tolerance)
-    )
+    recording = _core.Recording(times, states, methods, analysis.spectral_radius, analysis.tolerance)
+    return Continuation(checkpoint, recording, samples)
+
+
+def _samples(file: Results, group: str) -> _core.Samples | None:
+    """States between outputs; None in files of earlier versions."""
+    if not file.has(group):
+        return None
+    about = file.attributes(group)
+    times, states = (row_of_numbers(file, f"{group}/{key}") for key in ("times", "states"))
+    try:
+        numbers = {key: about[key].item() for key in SAMPLED}
+        return _core.Samples(times=as_list(times), states=as_list(states), **numbers)
+    except (TypeError, ValueError, AttributeError) as error:
+        raise InputError(f"{file.path}: {group}: expected states between outputs, found {error}") from None
 
 
 def _methods(file: Results, group: str) -> list[tuple[int, _core.MethodKind]]:

@@ -95,7 +95,7 @@ def drive(
         sizes, datasets = (tree.core.n_v, tree.core.n_v), _datasets(assembly, earlier, motors)
         check_earlier(earlier, times, sizes, datasets, is_recorded=recording is not None)
     if earlier is not None and earlier.statistics.status == "completed":
-        return PlanarOutcome(
+        found = PlanarOutcome(
             analysis=analysis,
             assembly=reported or assembly,
             motion=earlier.motion,
@@ -104,11 +104,12 @@ def drive(
             continuation=earlier.continuation,
             integrated=None if reported is None else assembly,
         )
+        return _with_samples(found, replace(found, assembly=assembly), tree, earlier.continuation, steering, control)
     began = time.perf_counter()
     integrator = with_steps_of(
         analysis, float(times[-1]), lambda: choose_integrator(assembly, analysis, start, steering, len(times))
     )
-    continuation, samples = Continuation(_core.TreeCheckpoint(), recording), new_samples(times, analysis)
+    continuation = Continuation(_core.TreeCheckpoint(), recording, new_samples(times, analysis))
     if earlier is not None:  # with the same candidates, and what they have become since
         known, continuation = earlier.statistics.integrator, earlier.continuation
         integrator = replace(integrator, name=known.name, reason=known.reason)
@@ -116,7 +117,7 @@ def drive(
         controls = integration_controls(analysis, integrator)
         paths = assembly.model.scene.trajectory if any(assembly.is_trajectory) else ()
         controls.stops = as_list(stops(times, paths, (size for _, size in assembly.model.loads)))
-        run = _integrated(tree, start, times, controls, steering, control, continuation, progress, samples)
+        run = _integrated(tree, start, times, controls, steering, control, continuation, progress)
     seconds, integrator = time.perf_counter() - began, integrator.changed_in(run)
     statistics = statistics_of(assembly, run, integrator, seconds)
     if statistics.status == "step underflow" and not statistics.cause:
@@ -131,13 +132,24 @@ def drive(
     )
     found = outcome if reported is None else outcome.in_coordinates_of(reported)
     found = found if earlier is None else _joined(earlier, found)
-    if (reached := reached_samples(samples, found.time)) is None:
+    return _with_samples(found, outcome, tree, continuation, steering, control)
+
+
+def _with_samples(
+    found: PlanarOutcome,
+    integrated: PlanarOutcome,
+    tree: PlanarTree,
+    continuation: Continuation,
+    steering: _core.ExternalLoads | None,
+    control: SampledControl | None,
+) -> PlanarOutcome:
+    """`found`, which was `integrated` in its own coordinates, with what it does at samples between outputs."""
+    if (reached := reached_samples(continuation.samples, found.time)) is None:
         return found
 
     @cache
     def look_closer() -> PlanarOutcome:
-        between = _between(tree, *reached, outcome, steering, control)
-        return found.among(between if reported is None else between.in_coordinates_of(reported))
+        return found.among(_between(tree, *reached, integrated, steering, control).in_coordinates_of(found.assembly))
 
     return replace(found, look_closer=look_closer)
 
@@ -192,19 +204,18 @@ def _integrated(
     control: SampledControl | None,
     continuation: Continuation,
     progress: Progress,
-    samples: _core.Samples | None,
 ) -> _core.Run:
     q, v = tree.state(start.q, start.v)
     common: dict[str, Any] = {"times": as_list(times), "q": q, "v": v, "controls": controls, "carry_on": progress}
     if control is None:
         return _core.run_tree(
             tree.both, **common, external_loads=steering, recording=continuation.recording,
-            checkpoint=continuation.checkpoint, samples=samples,
+            checkpoint=continuation.checkpoint, samples=continuation.samples,
         )  # fmt: skip
     return _core.run_tree_sampled(
         tree.both, **common, motors=control.motors, patches=control.voltages, first_command=control.first,
         sensing=control.sensing, samples=as_list(control.times), delay=control.delay, controller=control.controller,
-        between=samples,
+        between=continuation.samples,
     )  # fmt: skip
 
 

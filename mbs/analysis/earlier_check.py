@@ -41,6 +41,8 @@ def check_earlier(
     )
     if earlier.continuation.recording is not None:
         kept.recording(earlier.continuation.recording, sum(sizes), times[-1] if is_completed else point.time)
+    if earlier.continuation.samples is not None:
+        kept.samples(earlier.continuation.samples, sum(sizes))
 
 
 @contextmanager
@@ -101,6 +103,13 @@ class _Kept:
         for record, names in ((point.steps, STEPS), (point.methods, METHOD_HISTORY), (point, TREE_MEMORY)):
             self.fields(record, names)
         self.stands_after_outputs(point)
+
+    def samples(self, found: _core.Samples, size: int) -> None:
+        """Raise `InputError` for some that are none of states (size,) within the run."""
+        self.numbers("samples/times", found.times, (len(found.times),))
+        self.numbers("samples/states", found.states, (size * len(found.times),))
+        fits = bool(np.all(np.diff(found.times) >= 0.0)) and len(found.times) <= found.most
+        self.expect(fits, "samples/times", "ascending times")
 
     def recording(self, found: _core.Recording, size: int, last: float) -> None:
         """Raise `InputError` for one that is none of states (size,) at steps up to time `last`, s."""

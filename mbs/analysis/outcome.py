@@ -149,12 +149,17 @@ TREE_VECTORS = ("state", "state_peaks", "force_peaks", "singular_posture", "rang
 """Arrays of the core's `TreeCheckpoint`."""
 
 
+SAMPLED = ("longest", "most", "steps", "every")
+"""Numbers of the core's `Samples` beside its times and states."""
+
+
 @dataclass(frozen=True)
 class Continuation:
-    """Where an integration can be gone on with, and its steps where a later analysis replays them."""
+    """Where an integration resumes, its steps where a later analysis replays them, and states between outputs."""
 
     checkpoint: _core.TreeCheckpoint
     recording: _core.Recording | None = None
+    samples: _core.Samples | None = None
 
 
 @dataclass(frozen=True)

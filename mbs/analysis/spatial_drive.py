@@ -89,12 +89,13 @@ def spatial_drive(
         [model.rows[k].is_trajectory for k in system.integrated.rows], robot_size(model)
     )
     watch_limits(system.integrated.scene, model.tree)
-    new = Continuation(_core.TreeCheckpoint(), _core.Recording() if is_recorded else None)
-    continuation, samples = new if earlier is None else earlier.continuation, new_samples(times, analysis)
+    recording = _core.Recording() if is_recorded else None
+    continuation = Continuation(_core.TreeCheckpoint(), recording, new_samples(times, analysis))
+    continuation = continuation if earlier is None else earlier.continuation
     if earlier is not None:
         _check(earlier, model, times, is_recorded=is_recorded)
     with going_on(earlier, times):
-        run = _integrated(system, times, start, controls, control, progress, continuation, samples)
+        run = _integrated(system, times, start, controls, control, progress, continuation)
     motion = _motion(system, run, times)
     motion = motion if earlier is None else earlier.motion.followed_by(motion)
     in_posture = _ends_in_posture(run)
@@ -121,7 +122,7 @@ def spatial_drive(
     )
     numbers = _numbers(drives.replayed, run, found, 0 if earlier is None else len(earlier.motion.time))
     acting = _under(drives, found, numbers)
-    if (reached := reached_samples(samples, found.time)) is None:
+    if (reached := reached_samples(continuation.samples, found.time)) is None:
         return acting
 
     @cache
@@ -212,16 +213,16 @@ def _integrated(
     control: SpatialControl | None,
     progress: Progress,
     continuation: Continuation,
-    samples: _core.Samples | None,
 ) -> _core.TreeRun:
     core, scene, _ = system.integrated
     if control is None:
         return _core.tree_motion(
-            core, scene, as_list(times), start.q, start.v, controls, progress, continuation.checkpoint, samples,
-            continuation.recording, system.replay,
+            core, scene, as_list(times), start.q, start.v, controls, progress, continuation.checkpoint,
+            continuation.samples, continuation.recording, system.replay,
         )  # fmt: skip
     return _core.tree_sampled(
         model=core, scene=scene, times=as_list(times), q=start.q, v=start.v, controls=controls,
         carry_on=progress, held=system.held_forces(control.commands), first_command=control.first,
-        samples=as_list(control.times), delay=control.delay, controller=control.controller, between=samples,
+        samples=as_list(control.times), delay=control.delay, controller=control.controller,
+        between=continuation.samples,
     )  # fmt: skip

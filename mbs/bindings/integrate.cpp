@@ -115,12 +115,20 @@ void bind_integrate(nb::module_ &m) {
   nb::class_<Samples>(m, "Samples", "States within a run, closer than its outputs: mbs/core/integrate/integrate.h.")
       .def(
           "__init__",
-          [](Samples *s, double longest, std::size_t most) {
-            if (!(longest > 0) || most < 2)
+          [](Samples *s, double longest, std::size_t most, std::vector<double> times, std::vector<double> states,
+             unsigned long steps, unsigned long every) {
+            if (!(longest > 0) || most < 2 || every < 1)
               throw std::invalid_argument("samples: expected a positive time between them, and at least two");
-            new (s) Samples{longest, most};
+            new (s) Samples{longest, most, std::move(times), std::move(states), steps, every};
           },
-          "longest"_a, "most"_a, "longest: s between two of them, where steps are longer; most: of them.")
+          "longest"_a, "most"_a, "times"_a = std::vector<double>{}, "states"_a = std::vector<double>{}, "steps"_a = 0,
+          "every"_a = 1,
+          "longest: s between two of them, where steps are longer; most: of them. The others are those of an earlier "
+          "run that goes on.")
+      .def_ro("longest", &Samples::longest)
+      .def_ro("most", &Samples::most)
+      .def_ro("steps", &Samples::steps)
+      .def_ro("every", &Samples::every)
       .def_prop_ro("times", [](const Samples &s) { return as_vector(s.times); })
       .def_prop_ro(
           "states", [](const Samples &s) { return as_vector(s.states); }, "(q, v) of each, one after the other.");

@@ -44,6 +44,7 @@ EXPLICIT = ("dopri5", "dop853")
 
 AFTER = " after "  # in names of integrators that were changed during a run
 MOST_TOLD = 3  # changes
+CHANGED, IN_ALL = " from t = ", "; changed "  # in reasons
 
 
 @dataclass(frozen=True)
@@ -90,13 +91,15 @@ class Choice:
         names = {kind: name for name, kind in METHODS.items()}
         last = names[run.changes[-1][2]]
         before = {*self.name.split(AFTER), *(names[before] for _, before, _, _ in run.changes)} - {last}
+        earlier, _, times = self.reason.partition(IN_ALL)  # of a run that was stopped
+        known = int(times.split()[0]) if times else earlier.count(CHANGED)
         told = [
-            f"{names[to]} from t = {t:.4g} s, where steps of {names[before]} were {step:.2g} s"
-            for t, before, to, step in run.changes[:MOST_TOLD]
+            f"{names[to]}{CHANGED}{t:.4g} s, where steps of {names[before]} were {step:.2g} s"
+            for t, before, to, step in run.changes[: max(0, MOST_TOLD - known)]
         ]
-        if len(run.changes) > MOST_TOLD:
-            told.append(f"changed {len(run.changes)} times in all")
-        return replace(self, name=f"{last}{AFTER}{' and '.join(before)}", reason="; ".join([self.reason, *told]))
+        count = known + len(run.changes)
+        reason = "; ".join([earlier, *told]) + (f"{IN_ALL}{count} times in all" if count > MOST_TOLD else "")
+        return replace(self, name=f"{last}{AFTER}{' and '.join(before)}", reason=reason)
 
 
 NOT_INTEGRATED = Choice("none", "nothing to integrate")

@@ -5,7 +5,7 @@ import re
 import h5py
 import numpy as np
 import pytest
-from stopped_runs import Stops, differences, edit, go_on, stop
+from stopped_runs import Stops, check_attributes, differences, edit, go_on, stop
 
 import ffrobot
 
@@ -68,9 +68,7 @@ def test_a_resumed_run_is_the_uninterrupted_one(arm, stopped):
     assert (f'analysis "{stopped}"', reached) in watcher.asked
     for name, difference in differences(results, expected):
         assert difference == 0.0, name
-    for analysis in ("inverse", "forward"):
-        for key in ("steps", "status"):
-            assert results.attributes(analysis)[key] == expected.attributes(analysis)[key]
+    check_attributes(results, expected)
     assert 1 < outputs < len(expected.time(stopped))
     assert not results.has(f"{stopped}/resume")
 
@@ -196,6 +194,8 @@ def _attribute(name, value):
         (_shorten("checkpoint/force_peaks"), "resume/checkpoint: expected what a run of this scene remembers"),
         (_shorten("checkpoint/singular_posture"), "resume/checkpoint/singular_posture: expected a posture or none"),
         (_attribute("time", 99.0), "resume/checkpoint: expected a time after"),
+        (_shorten("samples/times"), "resume/samples/states: expected finite numbers"),
+        (lambda group: group["samples"].attrs.__setitem__("every", 0), "resume/samples: expected states between"),
         (_attribute("next_step", np.nan), "resume/checkpoint: expected finite numbers"),
         (_attribute("outputs", 2), "expected as many outputs as times"),
         (lambda group: group.__delitem__("a"), "resume/a: expected a dataset, found none"),

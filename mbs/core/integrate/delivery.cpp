@@ -39,14 +39,14 @@ void Delivery::sample_step(Method &method, double t, const double *z, double h, 
     if (method.needs_slopes_between()) // the system is where it was
       system_.slope(end, method.end(), method.last_slope());
   }
-  if (++steps_ % every_ == 0)
+  if (++samples_->steps % samples_->every == 0)
     sample(end, method.end());
 }
 
 void Delivery::sample(double t, const double *z) {
   if (!samples_)
     return;
-  auto &[longest, most, times, states] = *samples_;
+  auto &[longest, most, times, states, steps, every] = *samples_;
   const std::size_t n = static_cast<std::size_t>(system_.local().state_size());
   if (times.size() >= most) {
     std::size_t kept = 0;
@@ -56,7 +56,7 @@ void Delivery::sample(double t, const double *z) {
                   states.begin() + static_cast<std::ptrdiff_t>(kept * n));
     }
     times.resize(kept), states.resize(kept * n);
-    every_ *= 2;
+    every *= 2;
   }
   const double *y = state(z);
   times.push_back(t);

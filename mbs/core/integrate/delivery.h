@@ -43,7 +43,6 @@ private:
   Recording *recording_;
   Samples *samples_;
   std::size_t outputs_ = 0;
-  unsigned long steps_ = 0, every_ = 1; // of steps, the ends that are sampled
   Eigen::VectorXd z_output_;
 };
 

@@ -25,12 +25,13 @@ struct Recording {
 
 // States within a run, closer than its outputs: ends of steps, and times between them where steps are longer than
 // `longest`. With more than `most` of them every other one is dropped, and of later steps every second end taken, then
-// every fourth.
+// every fourth. A run that goes on with an earlier one goes on with its samples.
 struct Samples {
-  double longest;               // s
-  std::size_t most;             // at least 2
-  std::vector<double> times{};  // s
-  std::vector<double> states{}; // (q, v) of each, one after the other
+  double longest;                     // s
+  std::size_t most;                   // at least 2
+  std::vector<double> times{};        // s
+  std::vector<double> states{};       // (q, v) of each, one after the other
+  unsigned long steps = 0, every = 1; // made so far; of them, the ends that are taken
 };
 
 // Where an integration has stopped, and all that its next step depends on: the same candidates given, it goes on with
