@@ -109,8 +109,8 @@ def run_spatial_closed_loop(context: ActuatedContext, analysis: SpatialClosedLoo
     record = loop_record(analysis, setup, loop, acting, runs, models, lowest, gears=bool(gears))
 
     def told(of: Outcome) -> Outcome:
-        commanded, driving = (_by_joint(context.model, commands(of.time)) for commands in (held, before))
-        return replace(of, forces=replace(of.forces, commanded=commanded, driving=driving), details=record)
+        commanded = _by_joint(context.model, held(of.time))
+        return replace(of, forces=replace(of.forces, commanded=commanded), details=record)
 
     return replace(told(run), look_closer=lambda: told(closer))
 

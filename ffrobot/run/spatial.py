@@ -249,7 +249,7 @@ def _evaluated(solution: SpatialSolution, run: Outcome, twists: Mapping[str, BSp
     forces = run.forces
     found = MotionOfLinks(
         run.model, run.time, run.q, run.v, run.a, run.multipliers, forces.required, run.motion.is_at_rest,
-        forces.applied, forces.commanded, forces.driving, twists or {}, divided_links(solution),
+        forces.applied, forces.commanded, twists or {}, divided_links(solution),
     )  # fmt: skip
     motion, sharing = shared_evenly(found)
     actuation = None

@@ -96,7 +96,6 @@ class Forces(_Rows):
         applied: on points.
         commanded: (T, k) moments by joint that act along joints, N·m or N: what a controller commands, or a replay
             applies.
-        driving: the same as accelerations have it, where that is something else: before a command changes.
         voltages: (T, k) V by body, of patches where the analysis itself finds them.
     """
 
@@ -105,7 +104,6 @@ class Forces(_Rows):
     required: Array | None = None
     applied: tuple[PointDrive, ...] = ()
     commanded: Mapping[str, Array] = field(default_factory=dict)
-    driving: Mapping[str, Array] = field(default_factory=dict)
     voltages: Mapping[str, Array] = field(default_factory=dict)
 
 

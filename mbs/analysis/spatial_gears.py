@@ -37,12 +37,10 @@ class Supplied(NamedTuple):
     Attributes:
         forces: τ, of motors in front of compliant gears, and F_p.
         gears: by joint with such a gear.
-        felt: (T, n_v) along v, what the twists take of bodies that carry rotors.
     """
 
     forces: MotorForces
     gears: Mapping[str, GearMotion]
-    felt: Array
 
 
 def supplied_through_gears(
@@ -64,7 +62,7 @@ def supplied_through_gears(
     felt = np.zeros_like(wanted)
     elastic = [] if model.tree.gears else elastic_joints(model)
     if not elastic:
-        return Supplied(motor_forces(model, state.q, wanted), {}, felt)
+        return Supplied(motor_forces(model, state.q, wanted), {})
     _refuse_loads(model, elastic)
     compliant, torques = with_compliance_in_space(model), rotor_torques(model, state, time)
     firm = required_forces(compliant, _wound(compliant, state, None), time)
@@ -88,7 +86,7 @@ def supplied_through_gears(
         if passes > len(elastic) and change > CONTRACTS * last:
             break
     moments = {**forces.moments, **{joint: gear.moment[:, None] for joint, gear in gears.items()}}
-    return Supplied(replace(forces, moments=moments), gears, felt)
+    return Supplied(replace(forces, moments=moments), gears)
 
 
 def _refuse_loads(model: SpatialModel, elastic: Sequence[Node]) -> None:
@@ -160,7 +158,7 @@ def wound_up(run: Outcome, model: SpatialModel) -> WoundUp:
             f'{model.scene.path}: motors: expected "section" where joints with stiffness are driven, controlled or'
             ' linear, found "frame"'
         )
-    forces, gears, _ = supplied_through_gears(run.model, run, run.time, supplied_in(run))
+    forces, gears = supplied_through_gears(run.model, run, run.time, supplied_in(run))
     q, v, a = with_motors(model, (run.q, run.v, run.a), gears)
     return WoundUp(q, v, a, gears, forces.moments)
 

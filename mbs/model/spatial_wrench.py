@@ -34,3 +34,14 @@ def along_joint(tree: SpatialTree, node: Node, force: Array, q: Array, frames: S
     F = tree.motion(node.inner, q, frames).F
     acting = np.einsum("tij,tj->ti", node.joint.action(q[:, node.q]), force)
     return Wrench(*(np.einsum("tij,tj->ti", F, part) for part in (acting[:, :3], acting[:, 3:])))
+
+
+def without_work(tree: SpatialTree, node: Node, on_outer: Wrench, q: Array, frames: Sequence[Motion]) -> Wrench:
+    """What a joint does to its outer side, about where that is, less what of it does work along the joint.
+
+    That is what drives, loads and brakes it along its coordinates: Sᵀ (force, moment) is 0 of the rest, S = `motion`.
+    """
+    F = tree.motion(node.inner, q, frames).F
+    in_axes = np.hstack([np.einsum("tji,tj->ti", F, part) for part in on_outer])
+    along = np.einsum("tik,ti->tk", node.joint.motion(q[:, node.q]), in_axes)
+    return on_outer.plus(along_joint(tree, node, along, q, frames), -1.0)

@@ -25,7 +25,6 @@ from ..model.spatial_known_motion import MotionForces, motion_forces
 from ..model.spatial_model import SpatialModel, row_values, target_rates
 from ..model.spatial_motors import MotorForces, path_forces
 from ..model.spatial_payloads import turns_as_a_body
-from ..model.spatial_rows import SpatialRow
 from ..model.spatial_system import SpatialSystem
 from ..model.spatial_tree import Motion, Node
 from ..scene.spatial.trajectories import SpatialTrajectory
@@ -41,8 +40,8 @@ class SpatialMotion:
 
     `required` (T, n_v): generalized forces that prescribed motion takes, of links that are held to a shape as well.
     `is_at_rest`: targets stand still, as in an equilibrium. `applied`: forces on points beside the scene's loads.
-    `commanded`: moments (T, k) by joint that act along joints beside the scene's loads, N·m or N; `driving`: the same
-    before they change at an output, as accelerations are. `twists`: of compliant gears, by joint, where they are known.
+    `commanded`: moments (T, k) by joint that act along joints beside the scene's loads, N·m or N. `twists`: of
+    compliant gears, by joint, where they are known.
     """
 
     model: SpatialModel
@@ -55,7 +54,6 @@ class SpatialMotion:
     is_at_rest: bool = False
     applied: tuple[PointDrive, ...] = ()
     commanded: Mapping[str, Array] = field(default_factory=dict)
-    driving: Mapping[str, Array] = field(default_factory=dict)
     twists: Mapping[str, BSpline] = field(default_factory=dict)
 
     @cached_property
@@ -189,11 +187,6 @@ class SpatialMotion:
     def gears(self) -> Mapping[str, GearMotion]:
         """By joint, of inverse analyses and equilibria with compliant gears."""
         return {} if self._supplied is None else self._supplied.gears
-
-    def felt(self, row: SpatialRow) -> Array:
-        """What the twists of compliant gears take of the force along the coordinate of a row (T,), N·m or N."""
-        none = np.zeros(len(self.time))
-        return none if self._supplied is None else row.sign * self._supplied.felt[:, row.coordinate]
 
     @cached_property
     def behind_gears(self) -> SpatialMotion:

@@ -63,8 +63,6 @@ OTHERWISE_IN = {
         "/stress/|^motors_alone|/modal_velocity$|/dissipated_power$",
         "loads of stresses have no z in the plane; replays are splines in space",
     ),
-    "loop_with_friction": ("guide/reaction$", "friction along a slide is part of its reaction in space alone"),
-    "loop_as_built": ("guide/reaction$", "likewise"),
     "two_link_motors_only": ("^(exact_forward|redefined)/", "replays are splines in space; an unstable inversion"),
     "flexible_arm_inversion": (
         "^(exact_forward|moment_instead|force_at_tip)/",

@@ -159,3 +159,47 @@ def test_motors_only_keeps_motors_out_of_reactions():
         assert np.abs(results[f"{name}/joints/hub/moment"]).max() > 0.1
         assert np.abs(results[f"{name}/joints/hub/reaction_moment"][:, 2]).max() < 1e-6
         assert np.abs(results[f"{name}/joints/hub/reaction"][:, 2]).min() > 1.0
+
+
+ROUGH = {"viscous_friction": 3.0, "coulomb_friction": 2.0, "friction_speed": 0.05}
+
+
+@pytest.mark.parametrize("turned", [False, True], ids=["outwards", "inwards"])
+def test_friction_loads_and_rotors_along_joints_are_no_reactions(turned):
+    """They do work along the joints as motors do, and no reaction does."""
+    scene = chain(["prismatic", "screw", "revolute", "cylindrical"], turned)
+    for joint in scene["joint"]:
+        joint |= ROUGH | ({"rotor_inertia": 0.02} if joint["type"] in ("revolute", "prismatic") else {})
+    scene["load"] = [{"joint": "j0", "moment": "7*cos(9*t)"}, {"joint": "j2", "moment": "3*cos(9*t)"}]
+    fall = {"name": "fall", "kind": "forward", "end": END, "output_step": STEP, "tolerance": 1e-9}
+    results = ffrobot.solve(ffrobot.make_scene(**scene, analysis=[fall]))
+    for joint in scene["joint"]:
+        assert np.abs(results[f"fall/joints/{joint['name']}/rate"]).max() > 1e-2
+        assert np.abs(along_joint(results, "fall", joint)).max() < 1e-7, joint["name"]
+
+
+@pytest.mark.parametrize("closes", [False, True], ids=["in the tree", "closes a loop"])
+def test_a_block_that_slides_with_friction_in_closed_form(closes):
+    """A block on rails across gravity: they bear m g across and nothing along, whatever friction takes of the motion.
+
+    A second slide beside the first closes a loop; friction acts in the one that is asked about.
+    """
+    m, d, v0 = 2.0, 6.0, 1.5
+    block = body("block", [0.0, 0.0, 0.0])
+    block["rigid"] |= {"mass": m, "center": [0.0, 0.0, 0.0]}
+    rail = {"type": "prismatic", "between": ["ground", "block.root"], "axis": [1.0, 0.0, 0.0], "motor": False}
+    rough = rail | {"name": "rough", "viscous_friction": d}
+    joints = [rail | {"name": "smooth"}, rough] if closes else [rough]
+    fall = {"name": "fall", "kind": "forward", "end": 0.5, "output_step": 0.05, "tolerance": 1e-9}
+    scene = ffrobot.make_scene(
+        name="block", space="spatial", gravity=[0.0, 0.0, -10.0], body=[block], joint=joints, analysis=[fall],
+        initial={"joint_rates": {joint["name"]: v0 for joint in joints}},
+    )  # fmt: skip
+    results = ffrobot.solve(scene)
+    time, shares = results.time("fall"), 2 if closes else 1
+    np.testing.assert_allclose(
+        results["fall/bodies/block/position"][:, 0], v0 * m / d * (1 - np.exp(-d * time / m)), atol=1e-7
+    )
+    expected = np.tile([0.0, 0.0, 10.0 * m / shares], (len(time), 1))
+    for joint in joints:
+        np.testing.assert_allclose(results[f"fall/joints/{joint['name']}/reaction"], expected, atol=1e-8)

@@ -8,22 +8,22 @@ from ffrobot.mbs.model.spatial_wrench import Wrench
 
 
 def carried(motion):
-    """By joint force and moment (T, 3) on its second side, about where that is, with all that acts along it."""
+    """By joint force and moment (T, 3) on its second side, about where that is, less what acts along the joint."""
     tree, totals, found = motion.model.tree, needed(motion), {}
-    along = [(row, size) for row, size in zip(motion.model.rows, -motion.multipliers.T, strict=True)]
+    along = [(row, size, True) for row, size in zip(motion.model.rows, -motion.multipliers.T, strict=True)]
     along += [
-        (one.row, one.row.sign * (along_cut(one, motion.time) - one.resistance(of.rate)))
+        (one.row, one.row.sign * (along_cut(one, motion.time) - one.resistance(of.rate)), False)
         for one, of in motion.cut
         if one.is_loaded
     ]
-    for row, size in along:
+    for row, size, is_constraint in along:
         if row.kind == "coordinate":  # within a joint
             continue
         sides = row_wrenches(tree, row, size, motion.q, motion.time, motion.frames)
         for section, acting in zip((row.a, row.b), sides, strict=True):
             if section.body >= 0:
                 totals[section.body] = totals[section.body].plus(acting, -1.0)
-        if not row.is_trajectory:
+        if is_constraint and not row.is_trajectory:
             second, acting = (row.b, sides[1]) if row.sign > 0 else (row.a, sides[0])
             of_row = acting.seen_from(-tree.motion(second, motion.q, motion.frames).r)
             found[row.owner] = found[row.owner].plus(of_row) if row.owner in found else of_row
@@ -31,10 +31,22 @@ def carried(motion):
         node, total = tree.nodes[number], totals[number]
         if node.inner.body >= 0:
             totals[node.inner.body] = totals[node.inner.body].plus(total)
-        at = tree.motion(node.inner if node.backwards else node.outer, motion.q, motion.frames).r
-        sign = -1.0 if node.backwards else 1.0
-        found[node.joint.name] = Wrench(sign * total.force, sign * total.moment).seen_from(-at)
+        inner, outer = (tree.motion(section, motion.q, motion.frames) for section in (node.inner, node.outer))
+        rest = _workless(node, total.seen_from(-outer.r), inner, outer, motion.q)
+        sign, at = (-1.0, outer.r - inner.r) if node.backwards else (1.0, 0.0 * inner.r)
+        found[node.joint.name] = Wrench(sign * rest.force, sign * rest.moment).seen_from(at)
     return found
+
+
+def _workless(node, total, inner, outer, q):
+    """Less the motors' directions times the work by v, which follows from velocities of both sections."""
+    J = outer.L - inner.L  # at the place of the outer section:
+    J[:, :3] -= np.cross(inner.L[:, 3:], (outer.r - inner.r)[:, :, None], axis=1)
+    acting = np.hstack([total.force, total.moment])
+    work = np.einsum("tik,ti->tk", J[:, :, node.v], acting)
+    along = np.einsum("tik,tk->ti", node.joint.action(q[:, node.q]), work)
+    force, moment = (np.einsum("tij,tj->ti", inner.F, part) for part in np.split(along, 2, axis=1))
+    return Wrench(total.force - force, total.moment - moment)
 
 
 def needed(motion):
