@@ -243,9 +243,13 @@ MISTAKES = {
         lambda data: data.update(initial={"angles": {"upper": 0.1}}),
         'initial: angles: expected no such key in space = "spatial", found it: the guess is of joint coordinates',
     ),
-    "angle of a point": (
-        put("trajectory", angle="hand.tip"),
-        'trajectory: angle: expected no such key in space = "spatial", found it: the orientation of a point is',
+    "axis of no angle": (
+        put("trajectory", axis=[0.0, 0.0, 1.0]),
+        'trajectory.*expected the key "axis" only with angle',
+    ),
+    "axis of an angle without direction": (
+        put("trajectory", point=None, x=None, y=None, angle="hand.tip", axis=[0.0, 0.0, 0.0], value="t"),
+        'trajectory.*expected the key "axis" only with angle, a direction',
     ),
     "rotor of a joint that slides and turns": (
         put("joint", type="cylindrical", rotor_inertia=1e-3),

@@ -20,10 +20,6 @@ from .spatial_keys import SpatialSceneKeys
 # Keys of planar scenes that scenes in space do not have, by the table in which they stand, and what there is instead.
 _AXES = "forces at points are along x, y and z, axes of the body"
 UNAVAILABLE = {
-    "trajectory": {
-        "angle": "the orientation of a point is rotation_vector, rpy or tool_axis with direction, that of a joint its"
-        " value"
-    },
     "initial": {
         "angles": "the guess is of joint coordinates, joints = { … }",
         "rates": "the guess is of joint coordinates, joint_rates = { … }",

@@ -92,7 +92,8 @@ class OfPaths(NamedTuple):
 def path_numbers(run: Outcome) -> OfPaths:
     """Forces on the points of paths, about there, and along the coordinates of joints that follow one."""
     model = run.model
-    paths = {path.name: path.point for path in model.scene.trajectory if path.point is not None}
+    sections = ((path.name, path.point or path.angle) for path in model.scene.trajectory)
+    paths = {name: section for name, section in sections if section is not None}
     rows = [(k, row) for k, row in enumerate(model.rows) if row.is_trajectory]
     along = [(k, row) for k, row in rows if row.kind == "coordinate"]
     on_points = [(k, row, paths[row.owner]) for k, row in rows if row.owner in paths]

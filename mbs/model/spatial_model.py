@@ -10,6 +10,7 @@ import numpy as np
 
 from ...common.arrays import Array, Booleans
 from ...common.errors import InputError
+from ...common.rotations import smallest_turn
 from ...common.validation import did_you_mean, quoted
 from ..joints.spatial.free import SpatialFree
 from ..joints.spatial.joint import SpatialJoint
@@ -149,6 +150,11 @@ def _path_rows(scene: SpatialMechanismScene, tree: SpatialTree, path: SpatialTra
     unit, ground = np.eye(3), Section(-1, "", np.eye(3), np.zeros(3))
     if path.coordinate_of is not None:
         yield _coordinate_row(scene, tree, path, path.coordinate_of)
+        return
+    if path.angle is not None:
+        section, triad = tree.section(path.angle, np.eye(3)), smallest_turn(np.array(path.turning_axis))
+        target = path.components["value"]
+        yield SpatialRow(path.name, "turn", ground, section, triad[:, 2], triad[:, 0], target=target)
         return
     assert path.point is not None
     section = tree.section(path.point, np.eye(3))

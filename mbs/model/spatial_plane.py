@@ -212,6 +212,8 @@ class _Reduction:
         found = _like(row, row.f)
         if row.kind == _core.RowKind.coordinate:
             return found
+        if row.kind == _core.RowKind.turn:
+            return self._turn(found, row)
         f = self._direction(row)
         g = self._of_marker(row.b) @ row.g if row.kind == _core.RowKind.dot else row.g
         if np.linalg.norm(f[:2]) <= EXACT or (row.kind == _core.RowKind.dot and np.linalg.norm(g[:2]) <= EXACT):
@@ -223,6 +225,31 @@ class _Reduction:
         found.f, found.g = f, g
         return found
 
+    def _turn(self, found: _core.RowModel, row: _core.RowModel) -> _core.RowModel:
+        """The difference of angles of planar markers, in which directions are those of their x: see `axes_of_triad`."""
+        a, b = self._of_marker(row.a), self._of_marker(row.b)
+        f = a @ row.f
+        if np.linalg.norm(f[:2]) > EXACT:
+            raise AcrossError
+        (x_a, y_a, _), (x_b, y_b, _) = a @ row.g, b @ row.g
+        turned = float(np.arctan2(x_a * y_b - y_a * x_b, x_a * x_b + y_a * y_b))
+        found.kind, found.f = _core.RowKind.rotation, np.array([0.0, 0.0, np.sign(f[2])])
+        if abs(turned) > EXACT:
+            found.a = self._turned(row.a, -turned)
+        return found
+
+    def _turned(self, at: _core.MarkerAt, angle: float) -> _core.MarkerAt:
+        """A marker of the ground in the place of another one, its axes turned by `angle`."""
+        if at.body >= 0:
+            raise AcrossError
+        marker = planar_marker(self._parts.ground[at.marker], self._ground)
+        marker.angle += angle
+        return self._added(marker)
+
+    def _added(self, marker: _core.PlanarMarker) -> _core.MarkerAt:
+        self._shifted.append(marker)
+        return _core.MarkerAt(-1, len(self._parts.ground) + len(self._shifted) - 1)
+
     def _shifted_for(self, row: _core.RowModel, f: Array) -> _core.MarkerAt:
         """A point of the ground from which f in the plane measures what it does in space: d_n is a constant."""
         if row.kind != _core.RowKind.point or row.a.body >= 0:
@@ -231,8 +258,7 @@ class _Reduction:
         marker = _core.PlanarMarker()
         marker.position = a[:2] - f[:2] * (f[2] * (self._height(row.b) - a[2]) / (f[:2] @ f[:2]))
         marker.Phi = np.zeros((3, 0))
-        self._shifted.append(marker)
-        return _core.MarkerAt(-1, len(self._parts.ground) + len(self._shifted) - 1)
+        return self._added(marker)
 
     def _height(self, at: _core.MarkerAt) -> float:
         """Of a marker over the plane through the origin, m: it keeps it."""

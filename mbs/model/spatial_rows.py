@@ -24,9 +24,9 @@ class SpatialRow:
         owner: the joint or trajectory.
         kind: "point", f·(r_b − r_a) with f in global axes; "slide", the same with f in axes of a; "dot", f·g with f in
             axes of a and g in axes of b; "rotation", the turn of b against a about f, global axes; "turn", the angle of
-            b against a about f in axes of a, of g in axes of both; "coordinate", the joint coordinate v[coordinate],
-            `sign` times.
-        target: of points and coordinates.
+            g of b about f of a, unit vectors across each other in axes of both; "coordinate", the joint coordinate
+            v[coordinate], `sign` times.
+        target: of points, angles and coordinates.
         law: an orientation in time: of "rotation" rows that of a, whose triad is then A(t); of "dot" rows that of b.
     """
 
@@ -46,7 +46,7 @@ class SpatialRow:
     @property
     def carries_moment(self) -> bool:
         """Whether its multiplier is a moment."""
-        return self.kind in ("dot", "rotation")
+        return self.kind in ("dot", "rotation", "turn")
 
 
 def value_and_gradient(row: SpatialRow, a: Motion, b: Motion, q: Array, times: Array) -> tuple[Array, Array]:
@@ -61,10 +61,10 @@ def value_and_gradient(row: SpatialRow, a: Motion, b: Motion, q: Array, times: A
         residual = logarithm(b.F @ np.swapaxes(row.law.sample(times), -1, -2))
         return residual @ row.f, np.einsum("i,tij->tj", row.f, b.L[:, 3:])
     if row.kind == "turn":
-        axis, zero = np.einsum("tij,j->ti", a.F, row.f), np.einsum("tij,j->ti", a.F, row.g)
-        turned = b.F @ row.g
-        angle = np.arctan2(np.sum(np.cross(axis, zero) * turned, axis=-1), np.sum(zero * turned, axis=-1))
-        return angle, np.einsum("ti,tij->tj", axis, b.L[:, 3:] - a.L[:, 3:])
+        angle = turned_by(row, a, b) - target
+        return angle - 2 * np.pi * np.round(angle / (2 * np.pi)), np.einsum(
+            "ti,tij->tj", turning_axis(row, a, b), b.L[:, 3:] - a.L[:, 3:]
+        )
     if row.kind == "dot":
         f = np.einsum("tij,j->ti", a.F, row.f)
         g = b.F @ row.g if row.law is None else row.law.sample(times)[:, :, 2]
@@ -76,3 +76,18 @@ def value_and_gradient(row: SpatialRow, a: Motion, b: Motion, q: Array, times: A
     if row.kind == "slide":
         gradient = gradient + np.einsum("ti,tij->tj", np.cross(f, d), a.L[:, 3:])
     return np.sum(f * d, axis=-1) - target, gradient
+
+
+def turned_by(row: SpatialRow, a: Motion, b: Motion) -> Array:
+    """The angle (T,) of a "turn" row, within ±π: that of b's g about a's f, from a's g on."""
+    axis, zero, turned = a.F @ row.f, a.F @ row.g, b.F @ row.g
+    found: Array = np.arctan2(np.sum(np.cross(axis, zero) * turned, axis=-1), np.sum(zero * turned, axis=-1))
+    return found
+
+
+def turning_axis(row: SpatialRow, a: Motion, b: Motion) -> Array:
+    """Its rate (T, 3) by the angular velocity of b against a; core/recursion/rows.h."""
+    axis, turned = a.F @ row.f, b.F @ row.g
+    along = np.sum(axis * turned, axis=-1, keepdims=True)
+    found: Array = axis - along / (1.0 - along**2) * (turned - along * axis)
+    return found

@@ -47,6 +47,14 @@ def candidates(rng, model, q):
         yield from coordinate_rows(node, range(node.v.start, node.v.stop))
 
 
+def angles(rng, model):
+    """Rows of the angles of all bodies against the one before, about any axes."""
+    for number in range(len(model.tree.nodes)):
+        a = Section(number - 1, "side", np.eye(3), np.zeros(3)) if number else GROUND
+        f, g, _ = random_rotation(rng)
+        yield SpatialRow("path", "turn", a, Section(number, "tip", np.eye(3), np.zeros(3)), f, g)
+
+
 def coordinate_rows(node, coordinates):
     """Of a joint whose coordinates are numbers; the core has none of planar joints."""
     zero = np.zeros(3)
@@ -55,9 +63,9 @@ def coordinate_rows(node, coordinates):
         yield SpatialRow("path", "coordinate", node.inner, node.outer, zero, zero, coordinate=k, q_index=place)
 
 
-def following(rng, model, q, count_more=0):
+def following(rng, model, q, count_more=0, pool=()):
     """The model with as many path rows as it has freedom, targets that move, and equations that only repeat others."""
-    pool = tuple(candidates(rng, model, q))
+    pool = tuple(pool or candidates(rng, model, q))
     at, joints = np.zeros(1), model.tree.joint_columns
     free = freedom(model, q)
     values, gradients = (found[0] for found in row_values(replace(model, rows=pool), q[None], at))
@@ -97,7 +105,7 @@ def in_core(model, motors):
     return driven
 
 
-def drawn(seed, types, loops=0, count_more=0):
+def drawn(seed, types, loops=0, count_more=0, pool=lambda *_: ()):
     """A random robot on its path, its motors, modes (3, T, n), and postures near (T, n_q)."""
     rng = np.random.default_rng(seed)
     families = tuple(kind for kind in FAMILIES if "free" not in types or kind in ("rigid", "beam"))
@@ -107,7 +115,7 @@ def drawn(seed, types, loops=0, count_more=0):
         if freedom(motion.model, q).shape[1] + len(motion.model.rows) == sum(motion.model.tree.joint_columns):
             break  # loops that rigid links can close, too
     motors = motors_of(rng, motion.model, q)
-    model = following(rng, motion.model, q, count_more)
+    model = following(rng, motion.model, q, count_more, tuple(pool(rng, motion.model)))
     modal = np.concatenate([np.r_[node.p_q] for node in model.tree.nodes]).astype(int)
     sizes = np.array([0.03 * SMALL, 1.0, 1.0])[:, None, None]
     modes = sizes * rng.standard_normal((3, len(TIMES), len(modal)))
@@ -127,6 +135,15 @@ def check(found, expected, model, motors):
     for name, (x, y) in pairs.items():
         tolerance = 1e-12 * grows * max(1.0, np.abs(y).max(initial=0.0))
         np.testing.assert_allclose(x, y, rtol=0, atol=tolerance, err_msg=name)
+
+
+@pytest.mark.parametrize("types", [["revolute"] * 3, ["revolute", "screw", "revolute"]])
+def test_angles_between_sections_follow_targets(types):
+    """Of one direction about one axis each, however the sections turn otherwise."""
+    model, motors, modes, near = drawn(11, types, pool=angles)
+    assert [row.kind for row in model.rows] == ["turn"] * 3
+    motion = _core.SpatialPrescribedMotion(in_core(model, motors), near[0])
+    check(motion.motion(TIMES.tolist(), *modes, near), prescribed_motion(model, modes, TIMES, near), model, motors)
 
 
 CASES = [([joint] * 3, 0, 0) for joint in TYPES if joint != "weld"]

@@ -157,6 +157,11 @@ def _row(
         found = (of_b.r - of_a.r) @ row.f - target
         return found
     f = np.einsum("tij,j->ti", a.F, row.f)
+    if row.kind == "turn":
+        return (
+            _angle_rate(a.F @ row.g, np.cross(f, a.F @ row.g), b.F @ row.g, (w_a, of_a.Omega), (w_b, of_b.Omega))
+            - target
+        )
     if row.kind == "slide":
         return _product_rate(f, w_a, of_a.Omega, b.r - a.r, v_b - v_a, of_b.r - of_a.r) - target
     if row.law is None:
@@ -174,3 +179,20 @@ def _product_rate(f: Array, omega: Array, alpha: Array, d: Array, d_dot: Array, 
     f_2dot = np.cross(alpha, f) + np.cross(omega, f_dot)
     found: Array = np.sum(f_2dot * d + 2 * f_dot * d_dot + f * d_2dot, axis=-1)
     return found
+
+
+def _angle_rate(x: Array, y: Array, g: Array, of_a: tuple[Array, Array], of_b: tuple[Array, Array]) -> Array:
+    """d²/dt² of atan2(y·g, x·g) (T,), where x and y turn with a and g with b, each by ω and ω̇."""
+    (w_a, alpha_a), (w_b, alpha_b) = of_a, of_b
+    g_dot = np.cross(w_b, g)
+    g_2dot = np.cross(alpha_b, g) + np.cross(w_b, g_dot)
+    (c, c_dot, c_2dot), (s, s_dot, s_2dot) = (
+        (
+            np.sum(e * g, axis=-1),
+            np.sum(np.cross(w_a, e) * g + e * g_dot, axis=-1),
+            _product_rate(e, w_a, alpha_a, g, g_dot, g_2dot),
+        )
+        for e in (x, y)
+    )
+    found: Array = (c * s_2dot - s * c_2dot) / (c**2 + s**2)
+    return found - 2 * (c * c_dot + s * s_dot) * (c * s_dot - s * c_dot) / (c**2 + s**2) ** 2

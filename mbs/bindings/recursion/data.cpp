@@ -78,6 +78,7 @@ void bind_rows(nb::module_ &m) {
       .value("slide", RowKind::slide)
       .value("dot", RowKind::dot)
       .value("rotation", RowKind::rotation)
+      .value("turn", RowKind::turn)
       .value("coordinate", RowKind::coordinate);
   nb::class_<MarkerAt>(m, "MarkerAt", "A marker of a body, or of the ground: body -1.")
       .def(

@@ -48,6 +48,11 @@ FFROBOT_INLINE Dual sqrt(const Dual &x) {
   return root > 0 ? Dual(root, (0.5 / root) * x.rate) : Dual(0.);
 }
 
+FFROBOT_INLINE Dual angle_of(const Dual &sine, const Dual &cosine) {
+  const double s = sine.value, c = cosine.value;
+  return {std::atan2(s, c), (1 / (s * s + c * c)) * (c * sine.rate - s * cosine.rate)};
+}
+
 FFROBOT_INLINE Dual angle_by_sine(const Dual &sine, const Dual &cosine) {
   if (!(sine.value > 1e-9))
     return Dual(1.);

@@ -178,9 +178,8 @@ Mechanism<Space>::Mechanism(std::vector<BodyModel<Data>> bodies, std::vector<Mar
     }
   }
   for (const RowModel &model : row_models) {
-    if (model.coordinate >= 0 && model.kind != RowKind::coordinate && model.kind != RowKind::rotation &&
-        model.kind != RowKind::slide)
-      refuse("row " + model.name + ": coordinate: expected one of a rotation or slide, got one of another kind of row");
+    if (model.coordinate >= 0 && (model.kind == RowKind::point || model.kind == RowKind::dot))
+      refuse("row " + model.name + ": coordinate: expected one of an angle or slide, got one of another kind of row");
     Row row{model, {}, {}, -1, 0};
     if (model.kind != RowKind::coordinate)
       row.a = attach(model.a, used), row.b = attach(model.b, used);
@@ -293,10 +292,10 @@ Mechanism<Space>::Mechanism(std::vector<BodyModel<Data>> bodies, std::vector<Mar
   };
   for (Row &row : rows)
     if (row.model.kind != RowKind::coordinate) {
-      row.moves = row.model.kind == RowKind::slide || row.model.kind == RowKind::dot;
+      row.moves = row.model.kind != RowKind::point && row.model.kind != RowKind::rotation;
       if (row.model.kind == RowKind::point)
         row.lift = gravity.dot(row.model.f.head(Space::linear)) * ((row.a.node < 0) - (row.b.node < 0));
-      needs_positions = needs_positions || row.model.kind == RowKind::slide || row.model.kind == RowKind::dot;
+      needs_positions = needs_positions || row.moves;
       has_moving_rows = has_moving_rows || row.moves || row.follows;
       finish(row.a), finish(row.b);
     }

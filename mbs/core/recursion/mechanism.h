@@ -7,6 +7,8 @@
 
 #include <Eigen/Core>
 
+#include <cmath>
+
 namespace ffrobot::recursion {
 
 // A body with the joint that it hangs on.
@@ -83,6 +85,12 @@ struct Row {
   bool moves = false;         // its direction does
   bool follows = false;       // a side is a marker of the ground that turns
   double lift = 0;            // what it measures of gravity, one end being on the ground
+
+  // What it measures, less its target: full turns do not count.
+  double apart(double value, double target) const {
+    const bool is_angle = model.kind == RowKind::rotation || model.kind == RowKind::turn;
+    return is_angle ? std::remainder(value - target, 2 * M_PI) : value - target;
+  }
 };
 
 template <class Space> struct Mechanism {

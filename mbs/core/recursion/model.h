@@ -90,6 +90,7 @@ enum class RowKind {
   slide,      // n . (r_b - r_a), n in axes of section a
   dot,        // f . g, f in axes of section a, g in axes of section b (space)
   rotation,   // rotation of b against a about n, global axes; as a rate n . (Omega_b - Omega_a)
+  turn,       // angle of g of b about f of a (space), f and g unit vectors across each other in axes of both
   coordinate, // joint coordinate v[coordinate]
 };
 struct RowModel {
@@ -97,7 +98,7 @@ struct RowModel {
   RowKind kind = RowKind::point;
   MarkerAt a, b;
   Eigen::Vector3d f = Eigen::Vector3d::UnitX(), g = Eigen::Vector3d::UnitX(); // n is f
-  int coordinate = -1; // in v; of a rotation or slide it is taken off, where there is one
+  int coordinate = -1; // in v; of a rotation, turn or slide it is taken off, where there is one
 };
 
 } // namespace ffrobot::recursion

@@ -221,7 +221,8 @@ void RecursiveMotion<Space>::residuals(double t, const double *q, const double *
   is_placed_ = &w == &workspace_;
   for (Index r = 0; r < value_.size(); ++r) {
     const Jet law = laws_.jet(now_, static_cast<std::size_t>(r));
-    value_[r] -= sign_[r] * law.value, rate_[r] -= sign_[r] * law.rate;
+    value_[r] = mechanism_.rows[static_cast<std::size_t>(r)].apart(value_[r], sign_[r] * law.value);
+    rate_[r] -= sign_[r] * law.rate;
   }
 }
 

@@ -31,7 +31,7 @@ template <class Numbers> double largest(const Numbers &x, const VectorXd &invers
 
 template <class Space> bool is_moment(const Mechanism<Space> &m, const Row &row) {
   if (row.model.kind != RowKind::coordinate)
-    return row.model.kind == RowKind::rotation || row.model.kind == RowKind::dot;
+    return row.model.kind != RowKind::point && row.model.kind != RowKind::slide;
   return m.nodes[static_cast<std::size_t>(row.node)].shape.freedoms.component[row.freedom] >= Space::linear;
 }
 

@@ -86,7 +86,8 @@ template <class Space> void PrescribedMotion<Space>::turn_markers(double t) {
 template <class Space> void PrescribedMotion<Space>::measure() {
   recursion::measure(driven_.mechanism, q(), v(), w_, value_.data(), rate_.data());
   for (std::size_t r = 0; r < targets_.size(); ++r) {
-    value_[static_cast<Index>(r)] -= targets_[r].value;
+    double &value = value_[static_cast<Index>(r)];
+    value = driven_.mechanism.rows[r].apart(value, targets_[r].value);
     rate_[static_cast<Index>(r)] -= targets_[r].rate;
   }
 }

@@ -229,6 +229,26 @@ template <class T> struct RowMotion {
   T force[3], moment_a[3], moment_b[3];
 };
 
+// The angle of s = B g about n = A f, from A g on: that of its projection on the plane across n. With w = Omega_b -
+// Omega_a and z = n . s, s = z n + u, its rate is w . h with h = n - z u / u^2; in the frame of a, s_dot is w x s.
+template <class T>
+inline void turn_motion(const T *f, const T *g, const Pose<T> &a, const Pose<T> &b, RowMotion<T> &to) {
+  T n[3], e[3], s[3], across[3], w[3], s_dot[3], h[3], h_dot[3], turned[3];
+  turn(a.R, f, n), turn(a.R, g, e), turn(b.R, g, s), cross(n, e, across);
+  for (int i = 0; i < 3; ++i)
+    w[i] = b.omega[i] - a.omega[i];
+  cross(w, s, s_dot);
+  const T z = dot(n, s), z_dot = dot(n, s_dot), share = 1. / (1. - z * z); // of u^2
+  for (int i = 0; i < 3; ++i) {
+    const T u = s[i] - z * n[i], u_dot = s_dot[i] - z_dot * n[i];
+    h[i] = n[i] - z * share * u;
+    h_dot[i] = -share * (z_dot * u + z * u_dot + 2. * (z * z * z_dot * share) * u);
+    to.moment_a[i] = to.moment_b[i] = h[i];
+  }
+  cross(a.omega, h, turned);
+  to.value = angle_of(dot(across, s), dot(e, s)), to.rate = dot(w, h), to.bias = dot(w, h_dot) + dot(w, turned);
+}
+
 // With positions; `n` alone matters where directions do not move and neither value nor rate is asked for.
 template <class Space, class T>
 FFROBOT_APART void row_motion(const Mechanism<Space> &m, const Row &row, const Workspace<Space, T> &w, bool located,
@@ -287,6 +307,11 @@ FFROBOT_APART void row_motion(const Mechanism<Space> &m, const Row &row, const W
       relative[i] = a.omega[i] - b.omega[i], to.moment_a[i] = to.moment_b[i] = -k[i];
     to.value = dot(f, g), to.rate = dot(relative, k);
     to.bias = dot(wwf, g) + dot(f, wwg) + 2. * dot(wf, wg);
+    break;
+  }
+  case RowKind::turn: {
+    const T g[3] = {T(row.model.g[0]), T(row.model.g[1]), T(row.model.g[2])};
+    turn_motion(n, g, a, b, to);
     break;
   }
   case RowKind::coordinate:

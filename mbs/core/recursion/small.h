@@ -11,6 +11,8 @@ FFROBOT_INLINE double value_of(double x) { return x; }
 
 FFROBOT_INLINE void sine_and_cosine(double x, double &s, double &c) { s = std::sin(x), c = std::cos(x); }
 
+FFROBOT_INLINE double angle_of(double sine, double cosine) { return std::atan2(sine, cosine); }
+
 // angle/sine of an angle from 0 to pi
 FFROBOT_INLINE double angle_by_sine(double sine, double cosine) {
   return sine > 1e-9 ? std::atan2(sine, cosine) / sine : 1.;

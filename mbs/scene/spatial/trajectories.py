@@ -24,7 +24,7 @@ from ...fields.waypoints import Waypoints
 from ..motion_keys import LIMITS, MotionKeys, OfPlaces, Place
 
 PLACES = ("x", "y", "z")
-SUBJECTS = ("point", "joint", "motor")
+SUBJECTS = ("point", "joint", "angle", "motor")
 ORIENTATIONS = ("rotation_vector", "rpy", "direction")
 POSE = 6
 OF_POINT = {2: "places [x, y]", 3: "[x, y, z]", POSE: "[x, y, z, roll, pitch, yaw]"}
@@ -34,7 +34,7 @@ Triple = tuple[Expression, Expression, Expression]
 
 
 class SpatialTrajectory(MotionKeys):
-    """Prescribed motion of a point (m, global axes), of the section there, of a joint or of a motor.
+    """Prescribed motion of a point (m, global axes), of the section there, of an absolute angle, a joint or a motor.
 
     The section's orientation is that of its axes in global axes: by a rotation vector, by roll, pitch and yaw about
     fixed axes, or by one direction of the section, about which rotation is then unconstrained.
@@ -49,6 +49,12 @@ class SpatialTrajectory(MotionKeys):
     """Point that follows the trajectory, "BODY.POINT"."""
     joint: str | None = None
     """Joint whose coordinate follows the trajectory: second side relative to the first."""
+    angle: str | None = None
+    """Body, or section "BODY.POINT", whose absolute angle about `axis` follows the trajectory: one component of its
+    orientation, the others are free. Of the section's direction that is across `axis` where its axes are global ones,
+    the projection on the plane across `axis` has this angle."""
+    axis: Annotated[Vector3 | None, IN_SPACE] = None
+    """Axis of `angle`, global axes; by default z."""
     motor: Annotated[str | None, IN_SPACE] = None
     """Joint whose motor follows the trajectory; a compliant gear (`stiffness`) lets the joint coordinate differ from
     that of the motor."""
@@ -77,6 +83,8 @@ class SpatialTrajectory(MotionKeys):
     @model_validator(mode="after")
     def _consistent(self, info: ValidationInfo) -> SpatialTrajectory:
         subject = one_of(self, keys_here(self, SUBJECTS, info))
+        if self.axis is not None and (self.angle is None or not any(self.axis)):
+            raise ValueError(f'expected the key "axis" only with angle, a direction, found {list(self.axis)}')
         allowed = keys_here(self, (*PLACES, *ORIENTATIONS), info) if subject == "point" else ("value",)
         given = [key for key in (*PLACES, *ORIENTATIONS, "value", "waypoints", "via") if getattr(self, key) is not None]
         if not given or not set(given) <= {*allowed, "waypoints", "via"}:
@@ -150,6 +158,7 @@ class SpatialTrajectory(MotionKeys):
     def references(self) -> Iterator[RecordReference]:
         """What follows it."""
         yield from marker_reference("point", self.point, loaded=True)
+        yield from marker_reference("angle", self.angle, loaded=True)
         for key in ("joint", "motor"):
             if (name := getattr(self, key)) is not None:
                 yield RecordReference(key, name, "joint")
@@ -162,6 +171,11 @@ class SpatialTrajectory(MotionKeys):
     def coordinate_of(self) -> str | None:
         """The joint whose coordinate, or whose motor's, follows it."""
         return self.joint if self.motor is None else self.motor
+
+    @property
+    def turning_axis(self) -> Vector3:
+        """Of an absolute angle."""
+        return self.axis or (0.0, 0.0, 1.0)
 
     @property
     def force_components(self) -> tuple[str, ...]:
