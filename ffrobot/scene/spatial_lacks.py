@@ -43,9 +43,9 @@ LACKS = (
         "ffrobot.mbs.model.spatial_system",
     ),
     Lack(
-        "kinematic loops with a motor, a rotor or a trajectory in each joint (friction, loads"
-        " and limits of positions may be in all)",
-        "one joint of the loop without them: ffrobot cuts the loop there",
+        "kinematic loops with a motor without `rotor_inertia`, or a compliant gear, in each joint (rotors,"
+        " trajectories, friction, loads and limits of positions may be in all)",
+        "a rotor in front of a rigid gear in one of them, or no motor there: ffrobot cuts the loop there",
         "ffrobot.mbs.model.spatial_model",
     ),
     Lack(

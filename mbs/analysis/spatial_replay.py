@@ -25,6 +25,7 @@ from ..model.spatial_motors import (
     motor_forces,
     path_forces,
 )
+from ..model.spatial_rows import SpatialRow
 from ..model.spatial_system import SpatialSystem
 from ..scene.analysis import TimedAnalysis, output_times
 from ..scene.spatial.loads import OF_POINT
@@ -92,16 +93,14 @@ class OfPaths(NamedTuple):
 def path_numbers(run: Outcome) -> OfPaths:
     """Forces on the points of paths, about there, and along the coordinates of joints that follow one."""
     model = run.model
-    sections = ((path.name, path.point or path.angle) for path in model.scene.trajectory)
-    paths = {name: section for name, section in sections if section is not None}
     rows = [(k, row) for k, row in enumerate(model.rows) if row.is_trajectory]
     along = [(k, row) for k, row in rows if row.kind == "coordinate"]
-    on_points = [(k, row, paths[row.owner]) for k, row in rows if row.owner in paths]
+    on_points = [(k, row, *side) for k, row in rows if row.kind != "coordinate" for side in _sides(model, row)]
     joints = {model.joint_of(row): [number] for number, (_, row) in enumerate(along)}
     firsts = range(len(along), len(along) + len(OF_POINT) * len(on_points), len(OF_POINT))
-    points = dict(zip(dict.fromkeys(point for *_, point in on_points), firsts, strict=False))
+    points = dict(zip(dict.fromkeys(point for *_, point, _ in on_points), firsts, strict=False))
     parts = [(k, number, float(row.sign)) for number, (k, row) in enumerate(along)]
-    parts += [(k, points[point], 1.0 if row.a.body < 0 else -1.0) for k, row, point in on_points]
+    parts += [(k, points[point], sign) for k, _, point, sign in on_points]
     count = len(along) + len(OF_POINT) * len(points)
     system = SpatialSystem(model)
 
@@ -113,9 +112,17 @@ def path_numbers(run: Outcome) -> OfPaths:
         in_plane = [(at[k], number, sign) for k, number, sign in parts]
         return _core.path_reader(driven, system.plane.axes.T, in_plane, count)
 
-    are_in_plane = system.lie_in_plane([row.f for _, row, _ in on_points])  # else joints carry what is across it
+    ways = [row.f for _, row, *_ in on_points if row.kind == "point"]
+    are_in_plane = system.lie_in_plane(ways)  # else joints carry what is across it
     source = _found(run, reader, system if are_in_plane else None)
     return OfPaths(source, joints, points)
+
+
+def _sides(model: SpatialModel, row: SpatialRow) -> Iterator[tuple[str, float]]:
+    """Sections of bodies on which the force along a row acts, and its sign there: "BODY.POINT", or "BODY"."""
+    for section, sign in ((row.b, 1.0), (row.a, -1.0)):
+        if section.body >= 0:
+            yield ".".join(filter(None, (model.tree.nodes[section.body].body.name, section.point))), sign
 
 
 def point_numbers(run: Outcome, chosen: Mapping[str, ActuationPoints]) -> _core.ForceSource:

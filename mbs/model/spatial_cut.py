@@ -1,19 +1,21 @@
 """Joints at which loops are cut: the tree has no coordinate of theirs, but what acts along it acts on its two sides.
 
-With γ the joint's coordinate, γ̇ = G v: a force f along it is Gᵀf. Friction and loads act so; rotors, whose forces are
-those of accelerations, do not. States (T, …), SI units.
+With γ the joint's coordinate, γ̇ = G v: a force f along it is Gᵀf. Friction and loads act so. The output of a rotor is a
+body of the tree without inertia beside the loop: its coordinate is γ by a constraint equation, and all that acts along
+the joint acts there. States (T, …), SI units.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
 from ...common.arrays import Array
 from .._core import TimeFunction
-from ..joints.spatial.joint import Along, SpatialJoint
+from ..joints.spatial.joint import SpatialJoint
 from ..joints.transmission import Friction
 from ..scene.spatial.mechanism import SpatialMechanismScene
 from .spatial_rows import SpatialRow, value_and_gradient
@@ -45,16 +47,32 @@ class CutCoordinate(NamedTuple):
         return np.zeros_like(rate) if self.friction is None else self.friction.resistance(rate)
 
 
+def with_rotors_beside(tree: SpatialTree) -> tuple[SpatialTree, list[SpatialRow]]:
+    """The tree with the outputs of rotors in joints at which loops are cut, and the rows by which they turn with these.
+
+    They are on the first sides of their joints, whose coordinates theirs are.
+    """
+    cut = [joint for joint in tree.loops if getattr(joint, "rotor_inertia", 0.0)]
+    rows = [cut_row(tree, joint) for joint in cut]
+    found = tree.with_outputs([(joint, f"{joint.name}/rotor", row.a) for joint, row in zip(cut, rows, strict=True)])
+    nodes = found.nodes[len(tree.nodes) :]
+    return found, [
+        replace(row, coordinate=node.v.start, q_index=node.q.start) for row, node in zip(rows, nodes, strict=True)
+    ]
+
+
 def cut_coordinates(scene: SpatialMechanismScene, tree: SpatialTree) -> Iterator[CutCoordinate]:
-    """Of all joints at which loops are cut."""
-    for joint in tree.loops:
+    """Of all joints at which loops are cut and whose coordinates the tree has not."""
+    for joint in tree.cut_joints:
         frictions = joint.frictions or (None,) * len(joint.along)
-        for number, (along, friction) in enumerate(zip(joint.along, frictions, strict=True)):
+        for number, friction in enumerate(frictions):
             loads = tuple(load.moments[number] for load in scene.load if load.joint == joint.name)
-            yield CutCoordinate(joint, _row(tree, joint, along), friction, loads)
+            yield CutCoordinate(joint, cut_row(tree, joint, number), friction, loads)
 
 
-def _row(tree: SpatialTree, joint: SpatialJoint, along: Along) -> SpatialRow:
+def cut_row(tree: SpatialTree, joint: SpatialJoint, number: int = 0) -> SpatialRow:
+    """What measures a coordinate of a joint at which a loop is cut, `sign` times: of the second side on the first."""
+    along = joint.along[number]
     sides = [tree.section(side, triad, joint.at) for side, triad in zip(joint.between, joint.triads(), strict=True)]
     a, b = sides[::-1] if along.of_outer else sides
     f, g = np.eye(3)[[along.f, along.g]]

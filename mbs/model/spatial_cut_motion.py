@@ -43,7 +43,7 @@ def cut_motions(
 def _guesses(model: SpatialModel) -> Iterator[float]:
     """The coordinates as [initial] has them, else 0; a spherical joint has none, whose guess is a rotation vector."""
     given = model.scene.initial.joints
-    for joint in model.tree.loops:
+    for joint in model.tree.cut_joints:
         if joint.along:
             of_joint = np.atleast_1d(np.array(given.get(joint.name, np.zeros(len(joint.along))), dtype=float))
             yield from (float(value) for value in of_joint)

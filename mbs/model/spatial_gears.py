@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
 
 from ...common.errors import InputError
+from ..joints.spatial.joint import SpatialJoint
 from ..scene.analysis import Analysis
-from .spatial_body import rigid_body
 from .spatial_drives import Drive
 from .spatial_model import SpatialModel
 from .spatial_rows import SpatialRow
@@ -41,13 +40,10 @@ def with_compliance_in_space(model: SpatialModel) -> SpatialModel:
     elastic = elastic_joints(model)
     if not elastic or model.tree.gears:
         return model
-    tree = copy.copy(model.tree)
-    outputs = [_output(tree, node, number) for number, node in enumerate(elastic)]
+    tree = model.tree.with_outputs([_output(node) for node in elastic])
+    outputs = tree.nodes[-len(elastic) :]
     firm = {node.body.name: _without_rotor(node) for node in elastic}
-    tree.nodes = (*(firm.get(node.body.name, node) for node in tree.nodes), *outputs)
-    tree.n_q, tree.n_v = tree.n_q + len(outputs), tree.n_v + len(outputs)
-    tree.index = {node.body.name: number for number, node in enumerate(tree.nodes)}
-    tree.carried = {node.joint.name: number for number, node in enumerate(tree.nodes)}
+    tree.nodes = tuple(firm.get(node.body.name, node) for node in tree.nodes)
     tree.gears = tuple(
         ElasticGearInSpace(output, firm[node.body.name], -1.0 if node.backwards else 1.0, *(compliance(node) or (0, 0)))
         for output, node in zip(outputs, elastic, strict=True)
@@ -99,20 +95,15 @@ def _rows_at_motors(model: SpatialModel, tree: SpatialTree) -> Iterator[SpatialR
             )
 
 
-def _output(tree: SpatialTree, node: Node, number: int) -> Node:
-    """The output of the gear in the joint of `node`, the tree's last body but for the `number` before it."""
+def _output(node: Node) -> tuple[SpatialJoint, str, Section]:
+    """The joint, name and place of the output of the gear in the joint of `node`."""
     label = f"{node.joint.name}/rotor"
     joint = node.joint.model_copy(
         update={
             "name": label, "stiffness": None, "position_limit": None, "viscous_friction": 0.0, "coulomb_friction": 0.0
         }
     )  # fmt: skip
-    body = rigid_body(label, 0.0, np.zeros(3), np.zeros((3, 3)), {})
-    q, v = tree.n_q + number, tree.n_v + number
-    inner = node.outer if node.backwards else node.inner
-    outer = Section(len(tree.nodes) + number, "", np.eye(3), np.zeros(3))
-    none_q, none_v = slice(q + 1, q + 1), slice(v + 1, v + 1)
-    return Node(body, joint, False, inner, outer, slice(q, q + 1), none_q, slice(v, v + 1), none_v)
+    return joint, label, node.outer if node.backwards else node.inner
 
 
 def _without_rotor(node: Node) -> Node:

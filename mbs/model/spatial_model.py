@@ -19,7 +19,7 @@ from ..scene.spatial.mechanism import SpatialMechanismScene
 from ..scene.spatial.trajectories import SpatialTrajectory
 from ..scene.topology import Edge, spanning_forest
 from .spatial_body import SpatialBody
-from .spatial_cut import CutCoordinate, cut_coordinates
+from .spatial_cut import CutCoordinate, cut_coordinates, cut_row, with_rotors_beside
 from .spatial_drives import Drive
 from .spatial_payloads import welded_payloads
 from .spatial_rows import SpatialRow, value_and_gradient
@@ -114,19 +114,20 @@ def build_spatial_model(scene: SpatialMechanismScene, bodies: Sequence[SpatialBo
     floating = SpatialPlanar if scene.is_planar else SpatialFree
     tree = SpatialTree([*(body for body, _ in carried), *bodies], joints, topology, floating)
     _check_cut_joints(scene, tree)
-    rows = [row for joint in tree.loops for row in _loop_rows(scene, tree, joint)]
+    tree, rows = with_rotors_beside(tree)
+    rows = [*(row for joint in tree.loops for row in _loop_rows(scene, tree, joint)), *rows]
     rows += [row for trajectory in scene.trajectory for row in _path_rows(scene, tree, trajectory)]
     return SpatialModel(scene, tree, tuple(rows), tuple(cut_coordinates(scene, tree)))
 
 
 def _check_cut_joints(scene: SpatialMechanismScene, tree: SpatialTree) -> None:
-    """Raise `InputError` for a motor or rotor in the joint at which a loop is cut."""
+    """Raise `InputError` for a motor without a rotor, or a compliant gear, in the joint at which a loop is cut."""
     for joint in tree.loops:
         if found := joint.asks_for_coordinate:
             raise InputError(
-                f"{scene.path}: {joint.label}: expected a loop with a joint that has no motor, no rotor and no"
-                f" trajectory, to be cut, found {quoted(found)} here and one of them in each of the others: not"
-                " available in 3D yet"
+                f"{scene.path}: {joint.label}: expected a loop with a joint that has neither a motor without"
+                f" rotor_inertia nor a compliant gear, to be cut, found {quoted(found)} here and one of them in each of"
+                " the others: not available in 3D yet"
             )
 
 
@@ -174,11 +175,14 @@ def _path_rows(scene: SpatialMechanismScene, tree: SpatialTree, path: SpatialTra
 def _coordinate_row(scene: SpatialMechanismScene, tree: SpatialTree, path: SpatialTrajectory, name: str) -> SpatialRow:
     joint = next(each for each in scene.joint if each.name == name)
     label = f'{scene.path}: trajectory "{path.name}": {"joint" if path.motor is None else "motor"}'
-    if len(joint.units) != 1 or joint.name not in tree.carried:
-        why = f"{len(joint.units)} coordinates" if joint.name in tree.carried else "the joint at which a loop is cut"
-        raise InputError(f'{label}: expected a joint with one coordinate, found "{joint.name}", {why}')
+    if len(joint.units) != 1:
+        raise InputError(
+            f'{label}: expected a joint with one coordinate, found "{joint.name}", {len(joint.units)} coordinates'
+        )
     if path.motor is not None and joint not in scene.motor_joints:
         raise InputError(f'{label}: expected a joint with a motor, found "{joint.name}", which has none')
+    if joint.name not in tree.carried:  # a loop is cut there
+        return replace(cut_row(tree, joint), owner=path.name, is_trajectory=True, target=path.components["value"])
     node = tree.nodes[tree.carried[joint.name]]
     return SpatialRow(
         path.name, "coordinate", node.inner, node.outer, np.zeros(3), np.zeros(3), coordinate=node.v.start,

@@ -154,7 +154,8 @@ class _Reduction:
         """Rows of a loop that hold one way in several directions, k among them, where the plane is askew to these."""
         rows, ends = self._parts.rows, _ends(self._parts.rows[k])
         ways = (_core.RowKind.point, _core.RowKind.slide)
-        same = [i for i, row in enumerate(rows) if row.kind in ways and row.kind == rows[k].kind and _ends(row) == ends]
+        held = [i for i, row in enumerate(rows) if row.kind in ways and row.coordinate < 0]  # none that rotors follow
+        same = [i for i in held if rows[i].kind == rows[k].kind and _ends(rows[i]) == ends]
         return same if k in same and any(_is_mixed(self._direction(rows[i])) for i in same) else []
 
     def _together(self, group: Sequence[int]) -> Iterator[tuple[_core.RowModel, Array]]:

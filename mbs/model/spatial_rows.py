@@ -26,6 +26,7 @@ class SpatialRow:
             axes of a and g in axes of b; "rotation", the turn of b against a about f, global axes; "turn", the angle of
             g of b about f of a, unit vectors across each other in axes of both; "coordinate", the joint coordinate
             v[coordinate], `sign` times.
+        coordinate, q_index: in v and q; of "turn" and "slide" rows it is taken off, where there is one.
         target: of points, angles and coordinates.
         law: an orientation in time: of "rotation" rows that of a, whose triad is then A(t); of "dot" rows that of b.
     """
@@ -51,31 +52,38 @@ class SpatialRow:
 
 def value_and_gradient(row: SpatialRow, a: Motion, b: Motion, q: Array, times: Array) -> tuple[Array, Array]:
     """C (T,) at q (T, n_q) and `times` (T,), and its derivative C_v (T, n_v), from the motions of its sections."""
-    target = 0.0 if row.target is None else row.target.sample(times)[0]
+    value, gradient = _measured(row, a, b, q, times)
+    if row.target is not None:
+        value = value - row.target.sample(times)[0]
+    if row.kind in ("turn", "slide") and row.coordinate >= 0:
+        value = value - q[:, row.q_index]
+        gradient[:, row.coordinate] -= 1.0
+    return value - 2 * np.pi * np.round(value / (2 * np.pi)) if row.kind == "turn" else value, gradient
+
+
+def _measured(row: SpatialRow, a: Motion, b: Motion, q: Array, times: Array) -> tuple[Array, Array]:
+    """Without its target, and the coordinate that is taken off."""
     if row.kind == "coordinate":
         gradient = np.zeros((len(q), a.L.shape[-1]))
         gradient[:, row.coordinate] = row.sign
-        return row.sign * q[:, row.q_index] - target, gradient
+        return row.sign * q[:, row.q_index], gradient
+    turning = b.L[:, 3:] - a.L[:, 3:]
     if row.kind == "rotation":
         assert row.law is not None
         residual = logarithm(b.F @ np.swapaxes(row.law.sample(times), -1, -2))
         return residual @ row.f, np.einsum("i,tij->tj", row.f, b.L[:, 3:])
     if row.kind == "turn":
-        angle = turned_by(row, a, b) - target
-        return angle - 2 * np.pi * np.round(angle / (2 * np.pi)), np.einsum(
-            "ti,tij->tj", turning_axis(row, a, b), b.L[:, 3:] - a.L[:, 3:]
-        )
+        return turned_by(row, a, b), np.einsum("ti,tij->tj", turning_axis(row, a, b), turning)
     if row.kind == "dot":
         f = np.einsum("tij,j->ti", a.F, row.f)
         g = b.F @ row.g if row.law is None else row.law.sample(times)[:, :, 2]
-        across = np.cross(f, g)
-        return np.sum(f * g, axis=-1), np.einsum("ti,tij->tj", across, a.L[:, 3:] - b.L[:, 3:])
+        return np.sum(f * g, axis=-1), -np.einsum("ti,tij->tj", np.cross(f, g), turning)
     f = np.einsum("tij,j->ti", a.F, row.f) if row.kind == "slide" else np.broadcast_to(row.f, a.r.shape)
     d = b.r - a.r
     gradient = np.einsum("ti,tij->tj", f, b.L[:, :3] - a.L[:, :3])
     if row.kind == "slide":
         gradient = gradient + np.einsum("ti,tij->tj", np.cross(f, d), a.L[:, 3:])
-    return np.sum(f * d, axis=-1) - target, gradient
+    return np.sum(f * d, axis=-1), gradient
 
 
 def turned_by(row: SpatialRow, a: Motion, b: Motion) -> Array:

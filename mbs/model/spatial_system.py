@@ -331,7 +331,7 @@ class SpatialSystem:
             turning = (-1, self._turning_marker(row.law))
             a, b = (a, turning) if row.kind == "dot" else (turning, b)
         found.a, found.b = _core.MarkerAt(*a), _core.MarkerAt(*b)
-        found.f, found.g = np.array(row.f), np.array(row.g)
+        found.f, found.g, found.coordinate = np.array(row.f), np.array(row.g), row.coordinate
         return found
 
 

@@ -21,7 +21,7 @@ from ..joints.spatial.joint import SpatialJoint
 from ..joints.spatial.planar_joint import SpatialPlanar
 from ..scene.topology import Topology
 from .spatial_bending import bent_section
-from .spatial_body import SpatialBody
+from .spatial_body import SpatialBody, rigid_body
 
 
 class Section(NamedTuple):
@@ -131,11 +131,35 @@ class SpatialTree:
         body, _, point = side.partition(".")
         return Section(self.index[body], point, triad, np.zeros(3))
 
+    def with_outputs(self, outputs: Sequence[tuple[SpatialJoint, str, Section]]) -> SpatialTree:
+        """The tree with a body without inertia, of a label, on each joint with a rotor and one coordinate.
+
+        They turn or slide on the sections `inner` as the outputs of the rotors' gears do, and stand after all others.
+        """
+        found, nodes = copy.copy(self), list(self.nodes)
+        for joint, label, inner in outputs:
+            q, v, outer = found.n_q, found.n_v, Section(len(nodes), "", np.eye(3), np.zeros(3))
+            body = rigid_body(label, 0.0, np.zeros(3), np.zeros((3, 3)), {})
+            found.n_q, found.n_v = q + 1, v + 1
+            no_modes = slice(found.n_q, found.n_q), slice(found.n_v, found.n_v)
+            nodes.append(
+                Node(body, joint, False, inner, outer, slice(q, q + 1), no_modes[0], slice(v, v + 1), no_modes[1])
+            )
+        found.nodes = tuple(nodes)
+        found.index = {node.body.name: number for number, node in enumerate(nodes)}
+        found.carried = {node.joint.name: number for number, node in enumerate(nodes)}
+        return found
+
     def with_bodies(self, bodies: Sequence[SpatialBody]) -> SpatialTree:
         """The tree with other bodies of the same names, modes and points, in its order."""
         found = copy.copy(self)
         found.nodes = tuple(replace(node, body=body) for node, body in zip(self.nodes, bodies, strict=True))
         return found
+
+    @property
+    def cut_joints(self) -> tuple[SpatialJoint, ...]:
+        """The joints at which loops are cut that have no coordinates here."""
+        return tuple(joint for joint in self.loops if joint.name not in self.carried)
 
     @property
     def joint_columns(self) -> Booleans:

@@ -33,12 +33,14 @@ def _carried(motion: SpatialMotion, forces: MotionForces) -> dict[str, Wrench]:
     """By joint what it carries but does no work along it."""
     found, model = dict[str, Wrench](), motion.model
     for number, row in enumerate(model.rows):
-        if not row.is_trajectory:
+        if not row.is_trajectory and row.coordinate < 0:  # else it turns a rotor, along the joint
             on_b = forces.of_row(number)[1]
             found[row.owner] = found[row.owner].plus(on_b) if row.owner in found else on_b
+    loops = {joint.name for joint in model.tree.loops}
     for number, node in enumerate(model.tree.nodes):
-        carried = without_work(model.tree, node, forces.of_joint(number), motion.q, motion.frames)
-        found[node.joint.name] = _on_second(motion, node, carried)
+        if node.joint.name not in loops:
+            carried = without_work(model.tree, node, forces.of_joint(number), motion.q, motion.frames)
+            found[node.joint.name] = _on_second(motion, node, carried)
     return found
 
 

@@ -107,7 +107,7 @@ def _sampled_in_tree(model: SpatialModel, q: Array) -> Iterator[tuple[SpatialJoi
 
 def _at_cuts(model: SpatialModel, times: Array, q: Array, v: Array) -> Iterator[tuple[SpatialJoint, Array]]:
     """Joints at which loops are cut, where they have limits."""
-    limited = {joint.name: joint for joint in model.tree.loops if _is_limited(joint)}
+    limited = {joint.name: joint for joint in model.tree.cut_joints if _is_limited(joint)}
     if limited:
         motions = cut_motions(model, q, v, times)
         for name, joint in limited.items():

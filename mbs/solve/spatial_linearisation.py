@@ -130,7 +130,7 @@ class SpatialLinearisation:
                 sign = -1.0 if tree.nodes[tree.carried[joint.name]].backwards else 1.0
                 found |= {name: sign * H[k] for name, k in labelled(self.model, joint.name)}
         gradients = measured(tree, self.model.cut, state.q, state.frames)[1][0]
-        for cut in tree.loops:
+        for cut in tree.cut_joints:
             own = [G @ H for one, G in zip(self.model.cut, gradients, strict=True) if one.joint is cut]
             found |= dict(zip(_names(cut.name, len(own)), own, strict=True))
         found |= {_of_motor(gear): H[gear.motor.v.start] for gear in tree.gears}

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from four_bar import SIDES, in_space, planar
+from four_bar import SIDES, closed, in_space, planar
 from scipy.interpolate import CubicSpline
 
 import ffrobot
@@ -117,12 +117,39 @@ def test_computed_torque_knows_the_friction_of_the_joint_that_is_cut(cut):
     np.testing.assert_allclose(found, moment, rtol=1e-8)
 
 
-@pytest.mark.parametrize("keys", [{"motor": True}, {"rotor_inertia": 1e-3}])
-def test_a_motor_or_a_rotor_in_all_joints_is_refused(keys):
+@pytest.mark.parametrize(
+    ("keys", "named"),
+    [({"motor": True}, "motor"), ({"motor": True, "rotor_inertia": 1e-3, "stiffness": 100.0}, "stiffness")],
+)
+def test_motors_without_a_rotor_and_compliant_gears_in_all_joints_are_refused(keys, named):
     scene = ffrobot.make_scene(**in_space(dict.fromkeys(SIDES, keys), [INVERSE]))
-    expected = 'joint "D": expected a loop with a joint that has no motor, no rotor and no trajectory, to be cut'
-    with pytest.raises(ffrobot.InputError, match=f'{expected}, found "{next(iter(keys))}"'):
+    expected = 'joint "D": expected a loop with a joint that has neither a motor without rotor_inertia'
+    with pytest.raises(ffrobot.InputError, match=f'{expected}.*found "{named}"'):
         ffrobot.solve(scene)
+
+
+BUILT = ROUGH | {"rotor_inertia": 0.05, "gear_ratio": 3.0}
+
+
+@pytest.mark.parametrize(("followed", "bare"), [("A", ""), ("C", ""), ("C", "C"), ("D", "D")])
+def test_rotors_and_trajectories_in_all_joints(followed, bare):
+    """The numbers of the plane, wherever the loop is cut: at a joint with a rotor, a trajectory or both."""
+    start = closed(1.0)[followed]
+    path = [{"name": "turn", "joint": followed, "value": f"{start!r} + 0.2*(1 - cos(3*t))"}]
+    along = {"name": "along", "kind": "forward", "actuation": "inverse", "apply": "trajectory"} | TIMES
+
+    def solved(tables, order):
+        built = {name: ROUGH if name == bare else BUILT for name in order}
+        return ffrobot.solve(ffrobot.make_scene(**tables(built, [*ANALYSES, along], load=LOADS, trajectory=path)))
+
+    expected = solved(planar, "ABDC")
+    for order in ORDERS:
+        found = solved(in_space, order)
+        close(found["inverse/trajectories/turn/force"].ravel(), expected["inverse/trajectories/turn/force"].ravel())
+        for analysis in ("inverse", "replay", "along", "released", "implicit", "rest"):
+            test_motion_and_forces((expected, found), analysis)
+        for analysis in ("about rest", "in motion"):
+            test_linear_models((expected, found), analysis)
 
 
 @pytest.mark.parametrize(("limits", "is_told"), [([0.0, 1.0], True), ([0.0, 1.5], False)])

@@ -28,7 +28,6 @@ ALLOWED = 0.1  # times the tolerance of references: 1e-7 of the size of most dat
 OF_SMALL_DIFFERENCES = 5.0, "/(modal_force|voltage|required_voltage)$"  # of large forces, where links sag
 END = 0.05  # s, of analyses of cases that say how long they are
 REFUSED = {
-    "loop_with_rotors": (InputError, "rotor_inertia"),
 }
 """By scene: how the road ends, and the key that cannot be said or solved in space yet."""
 OTHERWISE = {

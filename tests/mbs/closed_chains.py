@@ -12,6 +12,7 @@ from ffrobot.mbs.quantities.spatial_motion import SpatialMotion
 from ffrobot.mbs.scene.spatial.loads import SpatialLoad
 
 FRICTION = {"viscous_friction": 0.4, "coulomb_friction": 0.7, "friction_speed": 0.3}
+ROTOR = {"rotor_inertia": 3e-3, "gear_ratio": 4.0}
 COUNT = {"revolute": 1, "prismatic": 1, "cylindrical": 2, "universal": 2, "planar": 3}
 NOW = 0.3
 
@@ -45,12 +46,15 @@ class ClosedChain:
         """The state's q for a model of it."""
         q = model.tree.at_rest(self.joints)
         for node in model.tree.nodes:
-            q[node.p_q] = self.p[node.body.name]
+            q[node.p_q] = self.p.get(node.body.name, ())  # none of outputs of rotors
         return q
 
 
-def closed_chain(rng, types, kinds, size=0.01):
-    """Bodies b1, b2, … on joints j1, j2, … of `types`, the last of which stands on the ground at coordinate 0."""
+def closed_chain(rng, types, kinds, size=0.01, rotors=False):
+    """Bodies b1, b2, … on joints j1, j2, … of `types`, the last of which stands on the ground at coordinate 0.
+
+    With `rotors` all joints have one.
+    """
     tree = random_tree(rng, types[:-1], kinds, chain=True, size=size)
     plain, tables = as_scene(tree, False)
     model, mechanism = tree_model(plain, tables), plain.mechanism()
@@ -67,7 +71,7 @@ def closed_chain(rng, types, kinds, size=0.01):
     last["axis"] = axis.tolist()
     if type_ == "universal":
         last["second_axis"] = (R.T @ np.cross(axis, rng.standard_normal(3))).tolist()
-    found = {table["name"]: table | FRICTION for table in (*tables, last)}
+    found = {table["name"]: table | FRICTION | (ROTOR if rotors else {}) for table in (*tables, last)}
     return ClosedChain(plain, found, {**joints, name: np.zeros(COUNT[type_])}, p)
 
 

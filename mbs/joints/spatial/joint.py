@@ -152,8 +152,9 @@ class SpatialJoint(JointKeys):
 
     @property
     def asks_for_coordinate(self) -> tuple[str, ...]:
-        """Keys that ask for its coordinate in the tree, as the joint at which a loop is cut has none."""
-        return tuple(key for key in ("motor", "rotor_inertia") if getattr(self, key, None))
+        """Keys that ask for its coordinate in the tree; where a loop is cut there is only that of a rotor."""
+        keys = ("stiffness",) if getattr(self, "rotor_inertia", 0.0) else ("motor",)
+        return tuple(key for key in keys if getattr(self, key, None))
 
 
 def with_axis(axis: Vector3, orientation: Array) -> tuple[Array, Array]:

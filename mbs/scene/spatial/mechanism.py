@@ -60,18 +60,20 @@ class SpatialMechanismKeys(Record):
     def edges(self) -> list[Edge]:
         """The joints for a spanning forest.
 
-        Loops are cut at spherical joints, then where nothing acts along the joint, then where friction or loads do. The
-        tree needs the coordinates of motors, rotors and trajectories.
+        Loops are cut at spherical joints, then where nothing acts along the joint, then where friction or loads do,
+        then where there is a rotor or a trajectory. The tree needs the coordinates of motors without rotors.
         """
         return [Edge(joint.between, self._rank(joint)) for joint in self.joint]
 
     def _rank(self, joint: AnySpatialJoint) -> int:
         followed = any(trajectory.coordinate_of == joint.name for trajectory in self.trajectory)
         if not joint.locates:
-            return 3
-        if joint.held is None or joint.asks_for_coordinate or followed:
+            return 4
+        if joint.held is None or joint.asks_for_coordinate:
             return 0
-        return 1 if joint.frictions or any(load.joint == joint.name for load in self.load) else 2
+        if followed or getattr(joint, "rotor_inertia", 0.0):
+            return 1
+        return 2 if joint.frictions or any(load.joint == joint.name for load in self.load) else 3
 
     @property
     def topology(self) -> Topology:
