@@ -38,11 +38,6 @@ LACKS = (
         "ffrobot.mbs.solve.spatial_servo",
     ),
     Lack(
-        "free joints at points of links that modes move",
-        "no joint at all: a body without one is free",
-        "ffrobot.mbs.model.spatial_system",
-    ),
-    Lack(
         "kinematic loops with a motor without `rotor_inertia`, or a compliant gear, in each joint (rotors,"
         " trajectories, friction, loads and limits of positions may be in all)",
         "a rotor in front of a rigid gear in one of them, or no motor there: ffrobot cuts the loop there",

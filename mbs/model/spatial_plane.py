@@ -179,10 +179,7 @@ class _Reduction:
     def _body(self, number: int) -> _core.PlanarBody:
         body, axes = self._parts.bodies[number], self._axes[number]
         data = body.data
-        inboard = data.markers[body.inboard_marker]
         self._check_joint(body.joint, self._normal @ self._frames[number].carrier)
-        if body.joint == _core.JointKind.planar and np.any(inboard.Phi):
-            raise AcrossError  # the core takes coordinates of free bodies for those of their frames
         found = _core.PlanarBody()
         for key in (
             "name",

@@ -20,7 +20,7 @@ from .spatial_cut import CutCoordinate
 from .spatial_drives import NO_DRIVES, Command, Drive, Drives, PointDrive
 from .spatial_frame_motors import held_forces
 from .spatial_model import SpatialModel
-from .spatial_parts import CutPlace, Placed, SpatialParts, carried_body, moves, standing_marker
+from .spatial_parts import CutPlace, Placed, SpatialParts, carried_body, standing_marker
 from .spatial_plane import Plane, in_plane
 from .spatial_plane_bodies import EXACT
 from .spatial_rows import SpatialRow
@@ -194,12 +194,6 @@ class SpatialSystem:
                 raise InputError(
                     f"{path}: {node.joint.label}: between: expected the side nearer to the ground first where a load"
                     " acts along a planar joint, found it second"
-                )
-            if node.joint.type == "free" and moves(node):
-                raise InputError(
-                    f"{path}: {node.joint.label}: expected a point that modes do not move, found"
-                    f' "{node.outer.point}" of "{node.body.name}": leave the joint out (a body without one is free from'
-                    " the origin on)"
                 )
 
     def turn_markers(self, t: float) -> None:

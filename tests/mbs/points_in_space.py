@@ -194,7 +194,7 @@ class Mechanism:
             at = at + (R @ way if way is not None else 0.0)
             R = R @ turn
             p = stacked([z[p_v + k] + q[p_q + k] for k in range(body.n)]) if body.n else None
-            # Coordinates of a free body are those of its frame, wherever the section is.
+            # Coordinates of a free body are those of its frame where nothing asks for those of the section.
             position, local = body.marker(body.inboard_marker, p, still=body.joint == J.free)
             frame = R @ local.T
             origin = at - frame @ position

@@ -111,9 +111,8 @@ def in_core(model, motors):
 def drawn(seed, types, loops=0, count_more=0, pool=lambda *_: ()):
     """A random robot on its path, its motors, modes (3, T, n), and postures near (T, n_q)."""
     rng = np.random.default_rng(seed)
-    families = tuple(kind for kind in FAMILIES if "free" not in types or kind in ("rigid", "beam"))
     while True:
-        motion, _ = moving(rng, types, families, loops=loops)
+        motion, _ = moving(rng, types, FAMILIES, loops=loops)
         q = motion.q[0]
         if freedom(motion.model, q).shape[1] + len(motion.model.rows) == sum(motion.model.tree.joint_columns):
             break  # loops that rigid links can close, too

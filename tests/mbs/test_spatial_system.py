@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 from spatial_rows import UNIT, About, Along, Ground, Section, Spinning
 from spatial_scenes import as_scene, coordinates, tree_model
-from spatial_trees import TYPES, placed, random_beam, random_tree
+from spatial_trees import TYPES, placed, random_tree
 from tree_accelerations import Accelerated
 
-from ffrobot.common.errors import InputError
 from ffrobot.mbs import _core
 from ffrobot.mbs.fields.expressions import parse_expression
 from ffrobot.mbs.joints.transmission import Friction
@@ -161,11 +160,9 @@ def test_geared_rotors(turned):
         assert found.energy[0, 0] == pytest.approx(mechanism.energies(q, v)[0], rel=1e-12)
 
 
-def test_free_joint_at_a_section_that_modes_turn_is_refused():
-    """Its coordinates would be those of the section, and the core takes those of the frame."""
-    rng = np.random.default_rng(0)
-    tree = random_tree(rng, ["free"], ("rigid",))
-    tree.bodies = [random_beam(rng, "b1", (2, 0, 0, 0), "simply-supported")]
-    tree.q = placed(tree, [np.zeros(2)])
-    with pytest.raises(InputError, match=r"expected a point that modes do not move, found \"root\" of \"b1\""):
-        systems(tree)
+@pytest.mark.parametrize("kind", ["beam", "solid", "supported beam"])
+def test_free_joint_at_a_section_that_modes_turn(kind):
+    """Its coordinates are those of the section."""
+    tree = random_tree(np.random.default_rng(0), ["free", "revolute"], (kind,), chain=True, size=SMALL)
+    found, nodes, _ = systems(tree)
+    assert_same(found, nodes)

@@ -57,7 +57,7 @@ double turn_of(const SpatialMarker &) { return 0; }
 // ways that the joint leaves free, and nothing asks for the joint's coordinate.
 template <class Space>
 bool frame_sits_at_joint(const BodyModel<typename Space::Data> &body, const JointShape &shape, bool asked) {
-  if (body.data.modes() == 0 || body.joint == JointKind::free) // coordinates of a free body are those of its frame
+  if (body.data.modes() == 0)
     return true;
   const auto &marker = body.data.markers[static_cast<std::size_t>(body.inboard_marker)];
   const Eigen::MatrixXd rows = section_rows(marker);
