@@ -33,11 +33,6 @@ LACKS = (
         "ffrobot.mbs.analysis.spatial_gears",
     ),
     Lack(
-        '`output = "redefined"` of `motors-only` with motors in planar joints and kinematic loops',
-        '`output = "tip"`',
-        "ffrobot.mbs.solve.spatial_servo",
-    ),
-    Lack(
         "kinematic loops with a motor without `rotor_inertia`, or a compliant gear, in each joint (rotors,"
         " trajectories, friction, loads and limits of positions may be in all)",
         "a rotor in front of a rigid gear in one of them, or no motor there: ffrobot cuts the loop there",

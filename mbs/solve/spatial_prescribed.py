@@ -25,10 +25,15 @@ class Prescribed(NamedTuple):
 
 
 def following_motors(model: SpatialModel) -> SpatialModel:
-    """The robot with the coordinates of its motors in place of its paths."""
+    """The robot with the coordinates of its motors in place of its paths; of planar joints between its sections."""
     rows, zero = [row for row in model.rows if not row.is_trajectory], np.zeros(3)
     for joint, coordinates in model.motors.items():
         node = model.driven(joint)
+        if node.joint.type == "planar":  # the core prescribes no coordinates whose axes turn
+            x, y, z = np.eye(3)
+            rows += [SpatialRow(joint, "slide", node.inner, node.outer, f, f) for f in (x, y)]
+            rows.append(SpatialRow(joint, "turn", node.inner, node.outer, z, x))
+            continue
         for k in coordinates.tolist():
             at = {"coordinate": k, "q_index": node.q.start + k - node.v.start}
             rows.append(SpatialRow(joint, "coordinate", node.inner, node.outer, zero, zero, **at))

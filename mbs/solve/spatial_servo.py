@@ -169,11 +169,6 @@ def make_spatial_servo(
             f'{where}: expected at least one flexible body for kind = "{kind}", found only rigid ones: use kind'
             ' = "pcid"'
         )
-    if factor != 1.0 and model.loop_rows.any() and any(joint.type == "planar" for joint in model.scene.motor_joints):
-        raise InputError(
-            f'{where}: expected motors in joints other than planar ones, with kinematic loops and output = "redefined",'
-            ' found one in a planar joint: use output = "tip"'
-        )
     times = as_floats(np.linspace(0.0, end, POSTURES))
     near = [start]
     for t in times[1:]:

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from closed_chains import closed_chain
 from moving_trees import SMALL, moving
 from prescribed_oracle import Motor, prescribed_motion, split
 from rotations import random_rotation
@@ -19,6 +20,7 @@ from ffrobot.mbs.model.spatial_rows import SpatialRow
 from ffrobot.mbs.model.spatial_system import SpatialSystem
 from ffrobot.mbs.model.spatial_tree import Section
 from ffrobot.mbs.scene.spatial.loads import SpatialLoad
+from ffrobot.mbs.solve.spatial_servo import SpatialServo
 
 TIMES = np.array([0.0, 0.01, 0.01, 0.05])
 GROUND = Section(-1, "", np.eye(3), np.zeros(3))
@@ -298,3 +300,30 @@ def test_derivatives_of_what_motors_leave_are_those_of_differences(types, loops,
         r = motion.left_on_modes([0.0] * (4 * n), *moved, np.repeat(near[:1], 4 * n, axis=0))[1].reshape(n, 4, n)
         by_differences = np.einsum("k,jki->ij", np.array([1.0, -8.0, 8.0, -1.0]) / (12 * size), r)
         np.testing.assert_allclose(exact, by_differences, rtol=0, atol=1e-8 * np.abs(by_differences).max())
+
+
+@pytest.mark.parametrize("cut", ["j2", "j4"])
+def test_motors_of_planar_joints_in_loops_go_with_the_redefined_output(cut):
+    """Their coordinates are those on the path with a share of the deflections; loops stay closed."""
+    rng, factor = np.random.default_rng(4), 0.6
+    chain = closed_chain(rng, ("planar", "universal", "cylindrical", "universal"), ("beam",), size=SMALL)
+    chain.tables["j1"]["motor"] = True
+    model = chain.model(cut)
+    q = chain.position(model)
+    model = following(rng, model, q)
+    near, tree = np.tile(q, (len(TIMES), 1)), model.tree
+    modal = np.concatenate([np.r_[node.p_q] for node in tree.nodes]).astype(int)
+    modes = np.array([0.03 * SMALL, 1.0, 1.0])[:, None, None] * rng.standard_normal((3, len(TIMES), len(modal)))
+    modes[0] += q[modal]
+    servo = SpatialServo(model, 1.0, factor, TIMES, near, "", lambda: True)
+    found, on_path = servo.motion.motion(TIMES, *modes, near), prescribed_motion(model, factor * modes, TIMES, near)
+    node = tree.nodes[tree.carried["j1"]]
+    assert len(model.motors["j1"]) == 3
+    for name, columns in (("q", node.q), ("v", node.v), ("a", node.v)):
+        expected = getattr(on_path, name)[:, columns]
+        np.testing.assert_allclose(getattr(found, name)[:, columns], expected, atol=1e-10 * np.abs(expected).max())
+    np.testing.assert_allclose(found.q[:, modal], modes[0], atol=1e-14)
+    C, C_v = row_values(model, found.q, TIMES)
+    assert np.abs(C[:, model.loop_rows]).max() < 1e-10
+    assert np.abs(np.einsum("tij,tj->ti", C_v, found.v)[:, model.loop_rows]).max() < 1e-9
+    assert np.abs(found.q - on_path.q).max() > 1e-3
