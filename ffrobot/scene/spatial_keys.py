@@ -23,6 +23,12 @@ class SpatialSceneKeys(SpatialMechanismKeys):
     analysis: Annotated[tuple[AnalysisInSpace, ...], NotEmpty]
     """Analyses, in this order."""
 
+    @property
+    def read_joints(self) -> frozenset[str]:
+        """Names of joints with sensors or controllers."""
+        named = (reference for analysis in self.analysis for reference in analysis.references())
+        return frozenset(reference.name for reference in named if reference.kind == "joint")
+
     def references(self) -> Iterator[Reference]:
         """All that records of the scene refer to, with their full keys."""
         yield from super().references()

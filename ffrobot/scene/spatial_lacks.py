@@ -39,7 +39,8 @@ LACKS = (
         "ffrobot.mbs.model.spatial_model",
     ),
     Lack(
-        "sensors and controllers on spherical and free joints, and on joints at which loops are cut",
+        "sensors and controllers on spherical and free joints, which have no coordinates, and on all joints of a"
+        " kinematic loop where none has a `rotor_inertia`",
         "sensors of points, or of other joints of the loop",
         "ffrobot.actuation.control.spatial_signals",
     ),

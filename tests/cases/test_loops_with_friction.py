@@ -162,3 +162,34 @@ def test_limits_of_the_joint_that_is_cut(limits, is_told):
     told = [text for text in results.warnings.get("inverse", ()) if 'joint "C": leaves its position_limit' in text]
     assert len(told) == is_told
     assert all(f"to {peak:.6g} rad" in text for text in told)
+
+
+ENCODERS = [{"joint": name, "measure": measure} for name in ("C", "A") for measure in ("value", "rate")]
+HELD = {
+    "name": "held", "kind": "closed-loop", "actuation": "inverse", "sample_time": 0.005, "delay": 0.001,
+    "disturbance": [{"point": "coupler.tip", "y": "4.0"}], "sensor": ENCODERS, "tip": "coupler.tip",
+    "controller": [{"kind": "joint-pid", "proportional": {"A": 20.0}, "derivative": {"A": 1.0}}],
+} | TIMES  # fmt: skip
+
+
+@pytest.mark.parametrize("built", [{}, dict.fromkeys("ABCD", BUILT)], ids=["one rotor", "rotors in all joints"])
+def test_sensors_on_any_joint_of_a_loop(built):
+    """Also on the one that is listed last, at which it would be cut; with rotors in all, where it is cut."""
+    own = of_joints("ABDC") | built
+    expected, found = (
+        ffrobot.solve(ffrobot.make_scene(**tables(own, [INVERSE, HELD]))) for tables in (planar, in_space)
+    )
+    outputs, known = (list(results.attributes("held/control")["outputs"]) for results in (found, expected))
+    assert {"joint/C", "joint/C/rate", "joint/A"} <= set(outputs)
+    for number, output in enumerate(known):
+        readings = expected["held/control/readings"][:, number]
+        close(found["held/control/readings"][:, outputs.index(output)], readings, 1e-8)
+    close(found["held/control/commands"], expected["held/control/commands"], 1e-8)
+    assert np.ptp(found["held/control/readings"][:, outputs.index("joint/C")]) > 0.1
+
+
+def test_sensors_on_all_joints_of_a_loop_without_a_rotor_are_refused():
+    own = {name: ROUGH for name in SIDES}
+    sensed = HELD | {"sensor": [{"joint": name} for name in SIDES]}
+    with pytest.raises(ffrobot.InputError, match=r'expected one with coordinates, found "D".* at which a loop is cut'):
+        ffrobot.solve(ffrobot.make_scene(**in_space(own, [INVERSE, sensed])))

@@ -61,7 +61,8 @@ class SpatialMechanismKeys(Record):
         """The joints for a spanning forest.
 
         Loops are cut at spherical joints, then where nothing acts along the joint, then where friction or loads do,
-        then where there is a rotor or a trajectory. The tree needs the coordinates of motors without rotors.
+        then where there is a rotor or a trajectory. The tree needs the coordinates of motors without rotors, and those
+        that analyses read.
         """
         return [Edge(joint.between, self._rank(joint)) for joint in self.joint]
 
@@ -71,9 +72,18 @@ class SpatialMechanismKeys(Record):
             return 4
         if joint.held is None or joint.asks_for_coordinate:
             return 0
-        if followed or getattr(joint, "rotor_inertia", 0.0):
+        if getattr(joint, "rotor_inertia", 0.0):
+            return 1
+        if joint.name in self.read_joints:
+            return 0
+        if followed:
             return 1
         return 2 if joint.frictions or any(load.joint == joint.name for load in self.load) else 3
+
+    @property
+    def read_joints(self) -> frozenset[str]:
+        """Names of joints whose coordinates analyses read."""
+        return frozenset()
 
     @property
     def topology(self) -> Topology:
