@@ -28,7 +28,8 @@ LACKS = (
         "ffrobot.actuation.patches.spatial_records",
     ),
     Lack(
-        'compliant gears (`stiffness` of joints) with `motors = "frame"`, where they are driven, controlled or linear',
+        'compliant gears (`stiffness` of joints) with `motors = "frame"` in joints whose axis modes tilt, where they'
+        " are driven, controlled or linear: no angle goes with a moment between frames there",
         '`motors = "section"`',
         "ffrobot.mbs.analysis.spatial_gears",
     ),

@@ -14,6 +14,8 @@ import numpy as np
 
 from ...common.arrays import Array
 from ...common.errors import InputError
+from ...common.validation import quoted
+from ..model.spatial_frame_motors import turning_motors
 from ..model.spatial_gears import elastic_joints, with_compliance_in_space
 from ..model.spatial_known_motion import KnownStates, States, required_forces, rotor_torques
 from ..model.spatial_model import SpatialModel
@@ -149,14 +151,16 @@ class WoundUp(NamedTuple):
 def wound_up(run: Outcome, model: SpatialModel) -> WoundUp:
     """The motion of `run` in the coordinates of `model`: where its gears give, motors as far ahead as they have to be.
 
-    Raises `InputError` where motors turn frames: what a gear carries then is not along its joint alone.
+    Raises `InputError` where motors turn frames and modes tilt the joint's axis: no angle goes with their moments.
     """
     if not model.tree.gears or run.model.tree.gears:
         return WoundUp(run.q, run.v, run.a, {}, {})
-    if model.scene.motors == "frame":
+    turning = set(turning_motors(run.model)).intersection(gear.joint.joint.name for gear in model.tree.gears)
+    if turning:
         raise InputError(
             f'{model.scene.path}: motors: expected "section" where joints with stiffness are driven, controlled or'
-            ' linear, found "frame"'
+            f" linear and modes tilt the joint's axis ({quoted(sorted(turning))}),"
+            ' found "frame"'
         )
     forces, gears = supplied_through_gears(run.model, run, run.time, supplied_in(run))
     q, v, a = with_motors(model, (run.q, run.v, run.a), gears)

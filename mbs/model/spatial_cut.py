@@ -74,6 +74,8 @@ def cut_row(tree: SpatialTree, joint: SpatialJoint, number: int = 0) -> SpatialR
     """What measures a coordinate of a joint at which a loop is cut, `sign` times: of the second side on the first."""
     along = joint.along[number]
     sides = [tree.section(side, triad, joint.at) for side, triad in zip(joint.between, joint.triads(), strict=True)]
+    if joint.name in tree.on_frames:
+        sides = [section._replace(still=True) for section in sides]
     a, b = sides[::-1] if along.of_outer else sides
     f, g = np.eye(3)[[along.f, along.g]]
     sign = -1.0 if along.of_outer else 1.0  # of the first side on the second

@@ -14,13 +14,20 @@ from .spatial_parts import rows_of
 
 
 def turning_motors(model: SpatialModel) -> list[str]:
-    """Joints whose motors can turn frames in place of sections: those with one angle."""
-    return [joint.name for joint in model.scene.motor_joints if joint.units == ("rad",)]
+    """Joints with one angle, that of sections, whose motors turn frames in place of these."""
+    if model.scene.motors != "frame":
+        return []
+    tree = model.tree
+    return [
+        joint.name
+        for joint in model.scene.motor_joints
+        if joint.units == ("rad",) and not tree.nodes[tree.carried[joint.name]].inner.still
+    ]
 
 
 def motor_commands(model: SpatialModel) -> Iterator[Command]:
     """What a unit of each motor does, in the order of `SpatialModel.motors`, on the second side of its joint."""
-    turning = turning_motors(model) if model.scene.motors == "frame" else []
+    turning = turning_motors(model)
     for joint, columns in model.motors.items():
         frame = (model.tree.carried[joint], model.sign(joint)) if joint in turning else None
         yield from (Command(direction, frame) for direction in model.sign(joint) * np.eye(model.tree.n_v)[columns])

@@ -13,6 +13,7 @@ from .. import _core
 from .spatial_cut import CutCoordinate
 from .spatial_model import SpatialModel
 from .spatial_system import SpatialSystem
+from .spatial_tree import Section
 from .spatial_wrench import Wrench
 
 
@@ -79,12 +80,11 @@ class MotionForces:
         return [(one, _wrench(wrenches, at.a), _wrench(wrenches, at.b)) for one, at in self.system.loaded_cut]
 
     @cached_property
-    def at_points(self) -> list[dict[str, Wrench]]:
-        """By body of the tree all that acts on it at its points; "" is its frame."""
-        found: list[dict[str, Wrench]] = [{} for _ in self.system.model.tree.nodes]
-        for number, (body, point) in enumerate(self.system.sections):
-            acting = _wrench(self.found.sections, number)
-            found[body][point] = found[body][point].plus(acting) if point in found[body] else acting
+    def at_points(self) -> list[list[tuple[Section, Wrench]]]:
+        """By body of the tree all that acts on it at its points and its frame, section by section."""
+        found: list[list[tuple[Section, Wrench]]] = [[] for _ in self.system.model.tree.nodes]
+        for number, section in enumerate(self.system.sections):
+            found[section.body].append((section, _wrench(self.found.sections, number)))
         return found
 
     def of_body(self, number: int) -> SectionMotion:

@@ -21,6 +21,7 @@ from ..scene.topology import Edge, spanning_forest
 from .spatial_body import SpatialBody
 from .spatial_cut import CutCoordinate, cut_coordinates, cut_row, with_rotors_beside
 from .spatial_drives import Drive
+from .spatial_frames import with_coordinates_of_frames
 from .spatial_payloads import welded_payloads
 from .spatial_rows import SpatialRow, value_and_gradient
 from .spatial_tree import Motion, Node, Section, SpatialTree
@@ -114,6 +115,7 @@ def build_spatial_model(scene: SpatialMechanismScene, bodies: Sequence[SpatialBo
     floating = SpatialPlanar if scene.is_planar else SpatialFree
     tree = SpatialTree([*(body for body, _ in carried), *bodies], joints, topology, floating)
     _check_cut_joints(scene, tree)
+    tree = with_coordinates_of_frames(tree) if scene.motors == "frame" else tree
     tree, rows = with_rotors_beside(tree)
     rows = [*(row for joint in tree.loops for row in _loop_rows(scene, tree, joint)), *rows]
     rows += [row for trajectory in scene.trajectory for row in _path_rows(scene, tree, trajectory)]

@@ -56,7 +56,7 @@ def integrated_mechanism(system: SpatialSystem) -> _core.PlanarDriven | _core.Sp
 
 
 def _add_motors(driven: _core.PlanarDriven | _core.SpatialDriven, model: SpatialModel) -> None:
-    turning = turning_motors(model) if model.scene.motors == "frame" else []
+    turning = turning_motors(model)
     for joint, coordinates in model.motors.items():
         for coordinate in coordinates.tolist():
             driven.add_motor(coordinate, model.sign(joint), joint in turning)

@@ -81,7 +81,10 @@ def rows_of(body: SpatialBody, section: Section) -> tuple[Array, Array, list[Arr
         return np.zeros((6, body.n_modes)), np.zeros(3), []
     at = body.points[section.point]
     K = [] if body.stiffening is None else list(body.stiffening.K_points.get(section.point, []))
-    return np.vstack([at.translation, at.rotation]), at.position, K
+    if K and section.still:
+        n = body.n_modes
+        K[3:] = section.turned(np.reshape(K[3:], (3, n * n))).reshape(3, n, n)
+    return np.vstack([at.translation, section.turned(at.rotation)]), at.position, K
 
 
 def _rotor(node: Node) -> tuple[float, float]:

@@ -154,9 +154,9 @@ class SpatialSystem:
         return list(zip(self._cut, self._parts.cut, strict=True))
 
     @property
-    def sections(self) -> list[tuple[int, str]]:
-        """Body and name of the point of each of the core's sections."""
-        return [(body, self._markers[body][marker].point) for body, marker in self.core.sections]
+    def sections(self) -> list[Section]:
+        """Of the core's sections."""
+        return [self._markers[body][marker] for body, marker in self.core.sections]
 
     def point_number(self, point: str) -> int:
         """Of "BODY.POINT", on which a load or a drive acts, among the core's wrenches."""
@@ -308,8 +308,8 @@ class SpatialSystem:
         """Body (−1: the ground) and number of the marker of a section there; made where it is new."""
         known = self._ground if section.body < 0 else self._markers[section.body]
         for number, other in enumerate(known):
-            same = other.point == section.point and np.array_equal(other.triad, section.triad)
-            if same and np.array_equal(other.position, section.position):
+            same = other.point == section.point and other.still == section.still
+            if same and np.array_equal(other.triad, section.triad) and np.array_equal(other.position, section.position):
                 return section.body, number
         known.append(section)
         return section.body, len(known) - 1

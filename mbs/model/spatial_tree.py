@@ -25,12 +25,24 @@ from .spatial_body import SpatialBody, rigid_body
 
 
 class Section(NamedTuple):
-    """A triad (3, 3), columns, on a section of body number `body`, or standing at `position` (m) on the ground (−1)."""
+    """A triad (3, 3), columns, on a section of body number `body`, or standing at `position` (m) on the ground (−1).
+
+    `still`: about its z it turns with the frame of the body, not with the section.
+    """
 
     body: int
     point: str
     triad: Array
     position: Array
+    still: bool = False
+
+    def turned(self, rotation: Array) -> Array:
+        """What modes turn it by, of rotations (…, 3, n) of the section, or (…, 3) with a last axis of length one."""
+        if not self.still:
+            return rotation
+        z = self.triad[:, 2]
+        found: Array = rotation - z[:, None] * np.einsum("i,...ij->...j", z, rotation)[..., None, :]
+        return found
 
 
 class Motion(NamedTuple):
@@ -88,9 +100,11 @@ class SpatialTree:
     """Bodies on the joints of a spanning forest; `loops` are the joints beside it, in the scene's order.
 
     `gears` are between its joints: none where they are taken for rigid (see `spatial_gears.with_compliance_in_space`).
+    `on_frames` names joints whose angles are those of frames (see `spatial_frames`).
     """
 
     gears: tuple[ElasticGearInSpace, ...] = ()
+    on_frames: frozenset[str] = frozenset()
 
     def __init__(
         self,
@@ -239,7 +253,8 @@ def _bent(body: SpatialBody, section: Section, p: Array) -> tuple[Array, Array, 
         zero, none = np.zeros((*p.shape[:-1], 3)), np.zeros((3, body.n_modes))
         return zero, np.broadcast_to(np.eye(3), (*p.shape[:-1], 3, 3)), none, none
     at = bent_section(body, section.point, p)
-    return at.u, exponential(at.phi), at.u_p, left_jacobian(at.phi) @ at.phi_p
+    phi = section.turned(at.phi[..., None])[..., 0]
+    return at.u, exponential(phi), at.u_p, left_jacobian(phi) @ section.turned(at.phi_p)
 
 
 def _at_origin(body: str, floating: type[SpatialFree | SpatialPlanar]) -> SpatialJoint:

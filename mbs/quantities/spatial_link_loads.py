@@ -17,6 +17,8 @@ from ..fields.field_types import split_point
 from ..model.spatial_known_motion import MotionForces, motion_forces, required_forces
 from ..model.spatial_motors import split_forces
 from ..model.spatial_payloads import turns_as_a_body
+from ..model.spatial_tree import Section
+from ..model.spatial_wrench import Wrench
 from ..scene.spatial.bodies import SpatialPayload, tensor
 from .link_loads import LinkLoads
 from .spatial_motion import SpatialMotion
@@ -39,7 +41,7 @@ def _link_loads(motion: SpatialMotion, bodies: Iterable[str], forces: MotionForc
     for name in bodies:
         number = tree.index[name]
         node, F = tree.nodes[number], motion.frames[number].F
-        at_points = {point: _in_axes_of(F, acting) for point, acting in forces.at_points[number].items() if point}
+        at_points = _at_points(F, forces.at_points[number])
         left = forces.found.modal[:, node.p_v].copy()
         for point, wrench in at_points.items():
             at = node.body.points[point]
@@ -53,6 +55,17 @@ def _link_loads(motion: SpatialMotion, bodies: Iterable[str], forces: MotionForc
         for point, wrench in at_points.items():
             sizes |= dict(zip(interface_load_names([point]), wrench.T, strict=True))
         found[name] = LinkLoads(sizes, left)
+    return found
+
+
+def _at_points(F: Array, acting: Iterable[tuple[Section, Wrench]]) -> dict[str, Array]:
+    """(T, 6) by point, in axes of the body F (T, 3, 3); without what turns its frame and not the section."""
+    found = dict[str, Array]()
+    for section, wrench in acting:
+        if section.point:
+            force, moment = np.hsplit(_in_axes_of(F, wrench), 2)
+            own = np.hstack([force, section.turned(moment[..., None])[..., 0]])
+            found[section.point] = found.get(section.point, 0.0) + own
     return found
 
 

@@ -54,7 +54,7 @@ class SpatialLinearisation:
         _check(model)
         self.points = dict(points) if isinstance(points, Mapping) else {point: point for point in points}
         self.model, self.system = model, SpatialSystem(model)
-        self._on_frames = turning_motors(model) if model.scene.motors == "frame" else []
+        self._on_frames = turning_motors(model)
         self.independent = _independent(model, q)
         names, signs = _coordinates(model)
         self.names = tuple(names[k] for k in self.independent)

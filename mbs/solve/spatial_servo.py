@@ -12,6 +12,7 @@ from ...common.arrays import Array, Indices, as_floats, as_list
 from ...common.errors import InputError
 from .. import _core
 from .._core import TimeFunction
+from ..model.spatial_frame_motors import turning_motors
 from ..model.spatial_model import SpatialModel
 from ..model.spatial_motors import driven_mechanism
 from ..model.spatial_rows import SpatialRow
@@ -123,7 +124,7 @@ class SpatialServo:
 
     @property
     def _has_exact_slopes(self) -> bool:
-        return self.model.scene.motors != "frame" and not (self._is_redefined and self.model.loop_rows.any())
+        return not turning_motors(self.model) and not (self._is_redefined and self.model.loop_rows.any())
 
     def forces(self, times: Array, p: Array, v: Array, a: Array) -> tuple[Array, Array]:
         """The same r (N, n), and what the motors do, τ (N, motors), N·m or N."""

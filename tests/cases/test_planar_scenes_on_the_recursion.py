@@ -54,7 +54,6 @@ OTHERWISE_IN = {
     "compliant_arm": (".", "likewise"),
     "lightest_arm": (".", "likewise"),
     "arm_with_gears": (".", "bodies that carry rotors feel the twist of compliant gears in space alone"),
-    "arm_with_frame_motors": ("/(coordinate|rate)$", "of sections in space"),
     "lightened_arm": (
         "/stress/|^motors_alone|/modal_velocity$|/dissipated_power$",
         "loads of stresses have no z in the plane; replays are splines in space",

@@ -8,6 +8,7 @@ from spatial_scenes import as_scene, coordinates, motor_on_frames, tree_model
 from spatial_trees import random_tree
 from tree_accelerations import Accelerated
 
+import ffrobot
 from ffrobot.mbs import _core
 from ffrobot.mbs.model.spatial_drives import Drive, Drives
 from ffrobot.mbs.model.spatial_known_motion import required_forces
@@ -92,3 +93,24 @@ def test_linear_models_are_those_of_motions_beside_it(turned):
     np.testing.assert_allclose(sum(terms), 0, atol=1e-6 * max(np.abs(term).max() for term in terms))
     held = SpatialLinearisation(model, q).at(0.0, q, v, a)  # with sections driven K is another
     assert np.abs(held.K - found.K).max() > 1e-4 * MOMENT
+
+
+LINK = {
+    "material": {"youngs_modulus": 70e9, "poissons_ratio": 0.3, "density": 2700.0},
+    "geometry": {"kind": "beam", "length": 0.4, "section": {"shape": "rectangle", "height": 0.01, "width": 0.02}},
+    "mesh": {"elements": 8}, "reference": {"condition": "cantilever"},
+}  # fmt: skip
+
+
+def test_gears_do_not_give_between_frames_where_modes_tilt_their_axis():
+    """No angle goes with a moment between frames there, of which a spring could be a function."""
+    joint, gear = {"type": "revolute", "axis": [0.0, 0.0, 1.0]}, {"rotor_inertia": 1e-3, "stiffness": 2e3}
+    scene = ffrobot.make_scene(
+        name="arm", space="spatial", motors="frame", gravity=[0.0, 0.0, -9.8],
+        body=[{"name": name, "link": LINK | {"modes": {"count": 2, "family": "all"}}} for name in ("upper", "fore")],
+        joint=[joint | {"name": "shoulder", "between": ["ground", "upper.root"]},
+               joint | gear | {"name": "elbow", "between": ["upper.tip", "fore.root"]}],
+        analysis=[{"name": "rest", "kind": "linear"}],
+    )  # fmt: skip
+    with pytest.raises(ffrobot.InputError, match=r"modes tilt the joint's axis .\"elbow\"."):
+        ffrobot.solve(scene)
