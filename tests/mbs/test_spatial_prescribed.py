@@ -47,8 +47,6 @@ def candidates(rng, model, q):
         if number:
             a, f = Section(number - 1, "side", np.eye(3), np.zeros(3)), rng.standard_normal(3)
             yield SpatialRow("path", "slide", a, section, f, f)
-            f, g, _ = random_rotation(rng)
-            yield SpatialRow("path", "turn", a, section, f, g)
         yield from coordinate_rows(node, range(node.v.start, node.v.stop))
 
 
