@@ -15,7 +15,6 @@ import reference_numbers
 from reference_scenes import CASES, PLANAR
 
 import ffrobot
-from ffrobot.common.errors import InputError
 from ffrobot.results.spatial import spatial_image
 from ffrobot.results.write import results_image
 from ffrobot.run.solve import solve
@@ -27,8 +26,7 @@ from ffrobot.scene.spatial import available_scene
 ALLOWED = 0.1  # times the tolerance of references: 1e-7 of the size of most datasets
 OF_SMALL_DIFFERENCES = 5.0, "/(modal_force|voltage|required_voltage)$"  # of large forces, where links sag
 END = 0.05  # s, of analyses of cases that say how long they are
-REFUSED = {
-}
+REFUSED = {}
 """By scene: how the road ends, and the key that cannot be said or solved in space yet."""
 OTHERWISE = {
     "/angle$": ("arm", "bodies have quaternions"),
