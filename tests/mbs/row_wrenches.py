@@ -3,6 +3,7 @@
 import numpy as np
 
 from ffrobot.common.rotations import left_jacobian
+from ffrobot.mbs.model.spatial_rows import turning_axis
 from ffrobot.mbs.model.spatial_wrench import Wrench, along_joint
 
 
@@ -19,7 +20,7 @@ def row_wrenches(tree, row, size, q, times, frames):
         f = np.einsum("tij,j->ti", a.F, row.f) if row.kind == "slide" else np.broadcast_to(row.f, a.r.shape)
         on_b = Wrench(size[:, None] * f, zero).seen_from(b.r)
     elif row.kind == "turn":
-        on_b = Wrench(zero, size[:, None] * np.einsum("tij,j->ti", a.F, row.f))
+        on_b = Wrench(zero, size[:, None] * turning_axis(row, a, b))
     elif row.kind == "rotation":
         on_b = Wrench(zero, size[:, None] * row.f)
     else:
