@@ -14,7 +14,7 @@ from ..common.arrays import Array
 from .motors import MotorFeasibility, first_time
 from .patches.patches import PatchArray
 from .patches.voltages import Voltages, voltage_gain
-from .prediction import Unsupplied
+from .unsupplied import Unsupplied
 
 MOST_PATCHES = 200  # that are tried on one link
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -13,42 +12,7 @@ from ..mbs.analysis.planar_outcome import PlanarOutcome
 from ..mbs.model.masses import system_mass_matrix
 from ..mbs.quantities.joint_space import held_joint_motion, motor_joint_motion
 from .patches.voltages import Voltages
-
-ROWS = 50  # of a run, at most, at which mass matrices are made
-RINGING = 2.0  # times the static shift, of a force that is missing all at once
-
-
-@dataclass(frozen=True)
-class Unsupplied:
-    """What motors, with the patches that there are, miss of a path whose modal forces nothing supplies.
-
-    Attributes:
-        bodies: links without patches or points, or with too few, for the modal forces that were found.
-        with_patches: whether any link has patches.
-        point: of a trajectory (of any body where trajectories are of angles), the one that misses most.
-        angles_kept: m, largest distance from the path where the motors keep the angles that were found, quasi-static.
-        at_start: m, likewise at the first output: what the links sag by.
-        moments_repeated: m, likewise where they repeat the moments that were found: the first vibration. The robot
-            drifts away from there, which no quasi-static estimate knows.
-    """
-
-    bodies: tuple[str, ...]
-    with_patches: bool
-    point: str
-    angles_kept: float
-    at_start: float
-    moments_repeated: float
-
-    @property
-    def in_words(self) -> str:
-        """What it means, and what to do."""
-        return (
-            f"no actuator provides all modal forces required on {', '.join(self.bodies)}. With"
-            f" {'patches within their limits' if self.with_patches else 'motors only'}, {self.point} is off its path"
-            f" by {_length(self.angles_kept)} if joints are position-controlled on the computed angles"
-            f" ({_length(self.at_start)} at the start), and by {_length(self.moments_repeated)} and drifting if the"
-            ' computed torques are applied open loop. kind = "motors-only" finds torques that follow the path'
-        )
+from .unsupplied import RINGING, ROWS, Unsupplied
 
 
 def unmet_modal_forces(outcome: PlanarOutcome, voltages: Mapping[str, Voltages]) -> Array:
@@ -113,7 +77,3 @@ def _shift_of_points(outcome: PlanarOutcome, delta_q: Array, rows: slice) -> dic
             in_body = delta[:, 3:] @ point.translation.T + delta[:, 2:3] * np.column_stack([-u[:, 1], u[:, 0]])
             shifts[f"{body.name}.{name}"] = delta[:, :2] + rotated(q[:, 2], in_body)
     return shifts
-
-
-def _length(value: float) -> str:
-    return f"{1e3 * value:.2g} mm"

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Container, Mapping
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
@@ -18,6 +18,7 @@ from .motors import MotorFeasibility, judge_motion
 from .patches.spatial_patches import LinkPatches, with_count
 from .patches.spatial_records import SpatialPztLayout
 from .patches.voltages import Voltages
+from .unsupplied import Unsupplied, seen_at_points
 
 ROUNDING = 1e-6  # of the largest modal force: less is what ill-conditioned patches leave
 NEGLIGIBLE = 1e-6  # of the length of a link, of a deflection; rad
@@ -40,43 +41,6 @@ class LinkInMotion:
     F_p: Array
 
 
-@dataclass(frozen=True)
-class UnsuppliedInSpace:
-    """Modal forces that no patch supplies, whatever its limit: of links, families and the deflection that they leave.
-
-    Attributes:
-        bodies: links, the worst first.
-        families: of each, those of the modes concerned, in words.
-        with_patches: whether any link has patches.
-        deflection: m, of each, the largest of a point by Φ K⁻¹ r, quasi-static, the link held as its modes are.
-        rotation: rad, likewise, of a section.
-    """
-
-    bodies: tuple[str, ...]
-    families: tuple[str, ...]
-    with_patches: bool
-    deflection: tuple[float, ...]
-    rotation: tuple[float, ...]
-
-    @property
-    def in_words(self) -> str:
-        """What it means, and what to do."""
-        links = [
-            f"{body} ({families}), off by {1e3 * deflection:.2g} mm and {np.degrees(turn):.2g}°"
-            for body, families, deflection, turn in zip(
-                self.bodies, self.families, self.deflection, self.rotation, strict=True
-            )
-        ]
-        return (
-            f"no actuator provides all modal forces required on {'; '.join(links)}, quasi-static, with"
-            f" {_whoever(self.with_patches)}. Patches ([[pzt]]) bend links in two planes, fibers at an angle twist them"
-        )
-
-
-def _whoever(with_patches: bool) -> str:
-    return "motors and patches within their limits" if with_patches else "motors only"
-
-
 def links_in_motion(
     motion: SpatialMotion, bodies: Mapping[str, tuple[ModalBody, SpatialBody]]
 ) -> dict[str, LinkInMotion]:
@@ -95,8 +59,12 @@ def judge_in_space(
     patches: Mapping[str, LinkPatches],
     voltages: Mapping[str, Voltages],
     end: float,
-) -> tuple[Feasibility, UnsuppliedInSpace | None]:
-    """Required against available of motors by joint ("JOINT 2" of a second coordinate) and of patches by layout."""
+    others: Container[str],
+) -> Feasibility:
+    """Required against available of motors by joint ("JOINT 2" of a second coordinate) and of patches by layout.
+
+    `others`: links on which something else than patches supplies modal forces.
+    """
     judged: dict[str, PatchFeasibility] = {}
     for body, of_link in patches.items():
         link = links[body]
@@ -106,7 +74,8 @@ def judge_in_space(
             trial = partial(with_count, path, array.layout, link.modal, link.spatial)
             modal = ModalMotion(motion.time, modes.coordinates(link.p), modes.forces(link.F_p))
             judged[name] = judge_patches(array, voltages[name], modal, trial)
-    return Feasibility(judge_motors_in_space(motion, end), judged), unsupplied_in_space(links, patches, voltages)
+    missing = unsupplied_in_space(motion, links, patches, voltages, others)
+    return Feasibility(judge_motors_in_space(motion, end), judged, missing)
 
 
 def judge_motors_in_space(motion: SpatialMotion, end: float) -> dict[str, MotorFeasibility]:
@@ -125,35 +94,49 @@ def judge_motors_in_space(motion: SpatialMotion, end: float) -> dict[str, MotorF
 
 
 def unmet_in_space(
-    links: Mapping[str, LinkInMotion], patches: Mapping[str, LinkPatches], voltages: Mapping[str, Voltages]
+    links: Mapping[str, LinkInMotion],
+    patches: Mapping[str, LinkPatches],
+    voltages: Mapping[str, Voltages],
+    *,
+    limited: bool,
 ) -> dict[str, Array]:
-    """By link: F_p less what its patches do at the voltages that are required, without limits (T, n)."""
+    """By link: F_p less what its patches do (T, n) at the voltages that are required, or at those within limits."""
     found = {}
     for name, link in links.items():
         found[name] = link.F_p
         if (of_link := patches.get(name)) is not None:
-            required = np.concatenate([voltages[layout].required for layout in of_link.arrays], axis=1)
-            found[name] = of_link.unmet(link.F_p, required)
+            of = [voltages[layout] for layout in of_link.arrays]
+            applied = np.concatenate([one.within_limit if limited else one.required for one in of], axis=1)
+            found[name] = of_link.unmet(link.F_p, applied)
     return found
 
 
 def unsupplied_in_space(
-    links: Mapping[str, LinkInMotion], patches: Mapping[str, LinkPatches], voltages: Mapping[str, Voltages]
-) -> UnsuppliedInSpace | None:
-    """What no voltages supply; None where that bends no link."""
+    motion: SpatialMotion,
+    links: Mapping[str, LinkInMotion],
+    patches: Mapping[str, LinkPatches],
+    voltages: Mapping[str, Voltages],
+    others: Container[str],
+) -> Unsupplied | None:
+    """What no voltages supply, but of links with `others` for that; None where that bends no link."""
     largest = max((float(np.abs(link.F_p).max(initial=0.0)) for link in links.values()), default=0.0)
     found: list[tuple[float, float, str, str]] = []
-    for name, left in unmet_in_space(links, patches, voltages).items():
+    for name, left in unmet_in_space(links, patches, voltages, limited=False).items():
         modal, counts = links[name].modal, np.abs(left).max(axis=0) > ROUNDING * largest
         deflection, rotation = _largest_shift(links[name], left)
-        if max(deflection / modal.length, rotation) > NEGLIGIBLE and counts.any():
+        if name not in others and counts.any() and max(deflection / modal.length, rotation) > NEGLIGIBLE:
             of_modes = dict.fromkeys(family for family, one in zip(modal.family, counts, strict=True) if one)
             found.append((deflection, rotation, name, ", ".join(of_modes)))
     if not found:
         return None
     found.sort(reverse=True)
     deflections, rotations, bodies, families = zip(*found, strict=True)
-    return UnsuppliedInSpace(bodies, families, bool(patches), deflections, rotations)
+    about = Unsupplied(bodies, bool(patches))
+    if not motion.space.is_plane:
+        about = replace(about, families=families, deflection=deflections, rotation=rotations)
+    followed = [path.point for path in motion.model.scene.trajectory if path.point is not None]
+    points = followed or [f"{body}.{label}" for body, labels in motion.points.items() for label in labels]
+    return seen_at_points(about, motion, unmet_in_space(links, patches, voltages, limited=True), points)
 
 
 def _largest_shift(link: LinkInMotion, left: Array) -> tuple[float, float]:

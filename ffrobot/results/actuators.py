@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import MISSING, fields
+from typing import Any
 
 import h5py
 import numpy as np
@@ -13,11 +14,11 @@ from ..actuation.feasibility import Feasibility
 from ..actuation.motors import MotorFeasibility
 from ..actuation.patches.patches import PatchArray
 from ..actuation.patches.records import PatchKeys
+from ..actuation.patches.structure import StructureEffect
 from ..actuation.patches.voltages import Voltages
 from ..actuation.points import PointForces, PointSet
-from ..actuation.prediction import Unsupplied
-from ..actuation.spatial_feasibility import UnsuppliedInSpace
 from ..actuation.spatial_points import SpatialPointSet
+from ..actuation.unsupplied import Unsupplied
 from ..common.arrays import Array
 from ..run.solution import AnalysisResult, Solution
 
@@ -28,13 +29,18 @@ def write_actuators(group: h5py.Group, solution: Solution, result: AnalysisResul
         write_voltages(group.create_group(f"pzt/{body}"), solution.patches[body], voltages, voltages.unmet)
     for body, forces in result.point_forces.items():
         write_point_forces(group.create_group(f"actuation_points/{body}"), solution.points[body], forces)
-    for body, effect in solution.structure.items():
-        for key, pair in vars(effect).items():
-            group[f"patch_structure/{body}/{key}"] = pair
+    write_structure(group, solution.structure)
     for point, shift in result.predicted_shift.items():
         group[f"points/{point}/predicted_shift"] = shift
     if result.feasibility is not None:
         _write_feasibility(group.create_group("feasibility"), solution, result.feasibility)
+
+
+def write_structure(group: h5py.Group, effects: Mapping[str, StructureEffect]) -> None:
+    """Of an analysis: patch_structure/, by body."""
+    for body, effect in effects.items():
+        for key, pair in vars(effect).items():
+            group[f"patch_structure/{body}/{key}"] = pair
 
 
 def write_voltages(group: h5py.Group, patches: PatchArray, voltages: Voltages, unmet: Array) -> None:
@@ -52,10 +58,16 @@ def write_voltages(group: h5py.Group, patches: PatchArray, voltages: Voltages, u
 
 
 def _write_feasibility(group: h5py.Group, solution: Solution, judged: Feasibility) -> None:
+    write_verdict(group, judged)
+    write_judgement(group, judged, {name: array.layout for name, array in solution.patches.items()})
+
+
+def write_verdict(group: h5py.Group, judged: Feasibility) -> None:
+    """Whether it can be done, and what nothing supplies."""
     group.attrs["feasible"] = judged.is_feasible
     if judged.unsupplied is not None:
-        group.create_group("unsupplied").attrs.update(vars(judged.unsupplied))
-    write_judgement(group, judged, {name: array.layout for name, array in solution.patches.items()})
+        about = {key: value for key, value in vars(judged.unsupplied).items() if value != () and value != ""}
+        group.create_group("unsupplied").attrs.update(about)
 
 
 def write_judgement(group: h5py.Group, judged: Feasibility, layouts: Mapping[str, PatchKeys]) -> None:
@@ -88,15 +100,13 @@ def read_motors(group: h5py.Group, joints: Sequence[str]) -> dict[str, MotorFeas
     }
 
 
-def read_unsupplied(group: h5py.Group) -> Unsupplied | UnsuppliedInSpace | None:
+def read_unsupplied(group: h5py.Group) -> Unsupplied | None:
     """Of the feasibility of an analysis: what nothing supplies; None where there is nothing of the kind."""
     if "unsupplied" not in group:
         return None
-    about = dict(group["unsupplied"].attrs)
-    if "families" in about:
-        lists = {key: tuple(about[key]) for key in ("bodies", "families", "deflection", "rotation")}
-        return UnsuppliedInSpace(**lists, with_patches=bool(about["with_patches"]))
-    return Unsupplied(**(about | {"bodies": tuple(about["bodies"])}))
+    attributes = group["unsupplied"].attrs.items()
+    about: dict[str, Any] = {key: tuple(value) if np.ndim(value) else value for key, value in attributes}
+    return Unsupplied(**about)
 
 
 def write_point_forces(group: h5py.Group, points: PointSet | SpatialPointSet, forces: PointForces) -> None:

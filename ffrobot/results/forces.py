@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import h5py
 import numpy as np
 
@@ -12,6 +14,7 @@ from ..mbs.quantities.joint_motion import joint_motions, motor_motion
 from ..mbs.quantities.observation import joint_forces, trajectory_force, trajectory_target
 from ..mbs.scene.spatial.trajectories import SpatialTrajectory
 from ..mbs.scene.trajectories import Trajectory
+from ..mbs.solve.stable_inversion import Inversion
 
 
 def write_forces(group: h5py.Group, outcome: PlanarOutcome) -> None:
@@ -56,6 +59,11 @@ def write_inversion(group: h5py.Group, outcome: PlanarOutcome, found: InvertedPa
         entry.attrs["components"] = list(trajectory.components)
         write_path(entry, trajectory)
         column += count
+    write_zero_dynamics(group, inversion)
+
+
+def write_zero_dynamics(group: h5py.Group, inversion: Inversion[Any]) -> None:
+    """Of motors-only inverse dynamics: zero_dynamics/."""
     entry = group.create_group("zero_dynamics")
     entry["time"] = inversion.linearisation.times
     entry["zeros"] = np.stack([inversion.linearisation.zeros.real, inversion.linearisation.zeros.imag], axis=2)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -14,16 +15,18 @@ from ..actuation.control.loop_record import LoopRecord
 from ..actuation.control.placing import Placed
 from ..common.checksum import sealed
 from ..common.files import write_atomically
+from ..mbs.analysis.inverted_path import AroundPath
 from ..mbs.analysis.outcome import Outcome
+from ..mbs.analysis.spatial_motors_only import path_errors
 from ..mbs.analysis.tracking import TrackedPath
 from ..mbs.model.truncation import modes_kept
 from ..mbs.quantities.spatial_motion import SpatialMotion
 from ..mbs.solve.spatial_redundancy import resolving_joints
 from ..run.spatial_solution import SpatialResult, SpatialSolution
-from .actuators import write_placement, write_point_forces
+from .actuators import write_placement, write_point_forces, write_structure
 from .bodies import write_bending, write_stress
 from .control import write_loop
-from .forces import write_path
+from .forces import write_path, write_zero_dynamics
 from .linear import write_spatial_linear
 from .peaks import write_peaks
 from .spatial_actuation import write_actuation, write_tracking
@@ -40,7 +43,7 @@ def spatial_image(solution: SpatialSolution) -> bytes:
     """The content of the results file of a solution."""
     with h5py.File("results", "w", driver="core", backing_store=False) as file:
         write_head(file, solution.scene.name, solution.scene.text, solution.bodies)
-        file.attrs["space"] = "spatial"
+        file.attrs["space"] = solution.scene.space
         file.attrs["geometric_stiffening"] = solution.is_stiffened
         file.attrs.create("skipped", [*solution.omissions, *solution.notes], dtype=h5py.string_dtype())
         for name, result in solution.analyses.items():
@@ -70,6 +73,9 @@ def _write_analysis(group: h5py.Group, solution: SpatialSolution, result: Spatia
     _write_bodies(group, solution, result)
     write_bending(group, result.bending)
     _write_joints(group, solution, result)
+    write_structure(group, {name: body.structure for name, body in solution.bodies.items() if body.structure})
+    for point, shift in result.predicted_shift.items():
+        group[f"points/{point}/predicted_shift"] = motion.space.along(shift)
     for body, forces in result.point_forces.items():
         write_point_forces(group.create_group(f"actuation_points/{body}"), solution.points[body], forces)
     for body, stress in result.stresses.items():
@@ -80,20 +86,34 @@ def _write_analysis(group: h5py.Group, solution: SpatialSolution, result: Spatia
         write_tracking(group, motion, run.details)
     if isinstance(run.details, Placed):
         write_placement(group, run.details)
-    for trajectory in motion.followed:
-        entry = group.create_group(f"trajectories/{trajectory.name}")
-        entry["force"] = motion.path_force(trajectory.name)
-        entry.attrs["components"] = list(trajectory.force_components)
-        if functions := list(trajectory.components.values()):
-            entry["target"] = np.stack([function.sample(run.time)[0] for function in functions], axis=1)
-        write_path(entry, trajectory)
-    for part in ("energies", "momentum"):
-        for key, values in vars(getattr(result, part)).items():
-            group[f"{'energy' if part == 'energies' else part}/{key}"] = values
+    _write_paths(group, result)
+    for key, values in vars(result.energies).items():
+        group[f"energy/{key}"] = values
+    group["momentum/linear"] = motion.space.along(result.momentum.linear)
+    group["momentum/angular"] = motion.space.about(result.momentum.angular)
     if result.actuation is not None:
         write_actuation(group, solution, result.actuation)
     violation = group.create_dataset("constraint_violation", data=motion.violation)
-    violation.attrs["columns"] = ["position", "velocity"]
+    violation.attrs["columns"] = ["position", "velocity", "acceleration"]
+
+
+def _write_paths(group: h5py.Group, result: SpatialResult) -> None:
+    """Trajectories/ that hold in an analysis, or that motors alone follow; paths stand still before and after."""
+    run, motion, details = result.run, result.motion, result.run.details
+    inside, errors = np.clip(run.time, 0.0, run.analysis.last_time), {}
+    if isinstance(details, AroundPath) and details.inversion is not None:
+        errors = path_errors(details.inversion, run.time, run.q)
+        write_zero_dynamics(group, details.inversion)
+    for trajectory in motion.model.scene.trajectory if errors else motion.followed:
+        entry = group.create_group(f"trajectories/{trajectory.name}")
+        if errors:
+            entry["error"] = errors[trajectory.name]
+        else:
+            entry["force"] = motion.path_force(trajectory.name)
+        entry.attrs["components"] = list(trajectory.force_components)
+        if functions := list(trajectory.components.values()):
+            entry["target"] = np.stack([function.sample(inside)[0] for function in functions], axis=1)
+        write_path(entry, trajectory)
 
 
 def _write_run(group: h5py.Group, run: Outcome, warnings: Sequence[str], notes: Sequence[str]) -> None:
@@ -103,7 +123,7 @@ def _write_run(group: h5py.Group, run: Outcome, warnings: Sequence[str], notes: 
     group.attrs["actuation"] = (analysis.source or "") if analysis.takes_actuation else ""
     group.attrs["apply"] = getattr(analysis, "apply", None) or ""  # of every kind, for those who read the file
     group.attrs.update({"integrator": how.integrator.name, "integrator_reason": how.integrator.reason})
-    for key in ("steps", "evaluations", "wall_seconds", "status"):
+    for key in ("steps", "rejected", "evaluations", "wall_seconds", "status", "cause"):
         group.attrs[key] = getattr(how, key)
     write_texts(group, warnings, notes)
     group["time"] = run.time
@@ -113,18 +133,25 @@ def _write_run(group: h5py.Group, run: Outcome, warnings: Sequence[str], notes: 
 def _write_bodies(group: h5py.Group, solution: SpatialSolution, result: SpatialResult) -> None:
     motion = result.motion
     for name, points in motion.points.items():
-        for key, values in motion.body(name).datasets.items():
+        body, moved = solution.bodies[name].spatial, motion.body(name)
+        F_p, T = None if motion.motor_forces is None else motion.motor_forces.modal[name], body.modal_transform
+        about = "modes of the modal body file"
+        if motion.space.is_plane and T.shape[1] < T.shape[0]:  # of those that move in the plane
+            group[f"bodies/{name}/modal_transform"] = T
+            about = "modes of the modal body file are modal_transform times these"
+            p, p_dot = (np.linalg.lstsq(T, values.T, rcond=None)[0].T for values in (moved.modal, moved.modal_velocity))
+            F_p, moved = None if F_p is None else F_p @ T, replace(moved, modal=p, modal_velocity=p_dot)
+        angle = motion.angle(name) if motion.space.is_plane else moved.orientation
+        for key, values in moved.within(motion.space, angle).datasets.items():
             group[f"bodies/{name}/{key}"] = values
-        if motion.motor_forces is not None:
-            group[f"bodies/{name}/modal_force"] = motion.motor_forces.modal[name]
-        if name in solution.links:
-            kept = modes_kept(solution.bodies[name].spatial)
-            about = {"modal_coordinates": "modes of the modal body file", "modes_kept": kept}
-            group[f"bodies/{name}"].attrs.update(about)
+        if F_p is not None:
+            group[f"bodies/{name}/modal_force"] = F_p
+        if motion.space.is_plane or name in solution.links:
+            group[f"bodies/{name}"].attrs.update({"modal_coordinates": about, "modes_kept": modes_kept(body)})
         if name in solution.divided:
             group[f"bodies/{name}"].attrs["pieces"] = len(solution.divided[name].names)
         for label in points:
-            for key, values in motion.point(f"{name}.{label}").datasets.items():
+            for key, values in motion.point(f"{name}.{label}").within(motion.space).datasets.items():
                 group[f"points/{name}.{label}/{key}"] = values
 
 
@@ -134,7 +161,9 @@ def _write_joints(group: h5py.Group, solution: SpatialSolution, result: SpatialR
         entry = group.create_group(f"joints/{joint.name}")
         entry.attrs["type"] = joint.type
         acting = result.reactions[joint.name]
-        entry["reaction"], entry["reaction_moment"] = acting.force, acting.moment
+        entry["reaction"] = motion.space.along(acting.force)
+        if not (motion.space.is_plane and joint.type == "revolute"):  # it carries no moment about its axis
+            entry["reaction_moment"] = motion.space.about(acting.moment)
         if result.sharing is not None and joint.name in result.sharing.components:
             entry.attrs["indeterminate"] = list(result.sharing.components[joint.name])
         if (found := motion.joint(joint.name)) is not None:
@@ -144,6 +173,8 @@ def _write_joints(group: h5py.Group, solution: SpatialSolution, result: SpatialR
         moment = motion.motor_moments.get(joint.name)
         if moment is not None and joint in motors:
             entry["moment"] = np.squeeze(moment, 1) if len(joint.units) == 1 else moment
+            if joint.given_gear_ratio is not None:
+                entry["motor_moment"] = entry["moment"][()] / joint.given_gear_ratio
         _write_gear(entry, motion, joint.name)
 
 

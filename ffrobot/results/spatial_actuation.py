@@ -8,34 +8,33 @@ import numpy as np
 from ..common.arrays import Array
 from ..mbs.analysis.tracking import TrackedPath
 from ..mbs.quantities.spatial_motion import SpatialMotion
+from ..mbs.scene.space import SPACES
 from ..run.spatial_actuation import SpatialActuation
 from ..run.spatial_solution import SpatialSolution
-from .actuators import write_judgement, write_voltages
+from .actuators import write_judgement, write_verdict, write_voltages
 
 
 def write_actuation(group: h5py.Group, solution: SpatialSolution, actuation: SpatialActuation) -> None:
-    """Of an analysis: pzt/, by layout, patch_structure/, by body, and feasibility/.
+    """Of an analysis: pzt/, by layout, and feasibility/.
 
     `pzt/LAYOUT/residual_force` (T, n) is what all patches of the link leave, on the modes of its file.
     """
-    layouts = {}
+    layouts, space = {}, SPACES[solution.scene.space]
     for body, of_link in solution.patches.items():
         families = [str(name) for name in solution.links[body].family]
         for name, array in of_link.arrays.items():
             entry = group.create_group(f"pzt/{name}")
-            write_voltages(entry, array, actuation.voltages[name], actuation.unmet[body])
-            entry["residual_force"].attrs.create("columns", families, dtype=h5py.string_dtype())
+            voltages = actuation.voltages[name]
+            unmet = actuation.unmet[body]
+            if space.is_plane:  # modes of the equations
+                unmet = unmet @ solution.bodies[body].spatial.modal_transform
+            write_voltages(entry, array, voltages, unmet)
+            if not space.is_plane:
+                entry["residual_force"].attrs.create("columns", families, dtype=h5py.string_dtype())
             entry.attrs.update({"body": body, "bends": array.layout.acts_in})
             layouts[name] = array.layout
-    for body, loaded in solution.bodies.items():
-        for key, pair in vars(loaded.structure).items() if loaded.structure is not None else ():
-            group[f"patch_structure/{body}/{key}"] = pair
     entry = group.create_group("feasibility")
-    entry.attrs["feasible"] = actuation.is_feasible
-    if actuation.unsupplied is not None:
-        about = entry.create_group("unsupplied").attrs
-        for key, value in vars(actuation.unsupplied).items():
-            about[key] = list(value) if isinstance(value, tuple) else value
+    write_verdict(entry, actuation.feasibility)
     write_judgement(entry, actuation.feasibility, layouts)
     for joint in solution.scene.motor_joints:
         for k, unit in enumerate(joint.units):

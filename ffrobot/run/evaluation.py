@@ -15,7 +15,8 @@ from ..actuation.patches.composite import Placed, section_loads
 from ..actuation.patches.patches import with_patch_count
 from ..actuation.patches.voltages import voltage_gain
 from ..actuation.points import PointForces, solve_point_forces
-from ..actuation.prediction import Unsupplied, predicted_shift, unmet_modal_forces, unsupplied
+from ..actuation.prediction import predicted_shift, unmet_modal_forces, unsupplied
+from ..actuation.unsupplied import Unsupplied
 from ..common.arrays import Array
 from ..mbs.analysis.planar_outcome import PlanarOutcome
 from ..mbs.quantities.attachment_error import mode_error, modes_in_motion, start_jolt, start_of
@@ -30,9 +31,9 @@ from ..mbs.quantities.stress import (
     mode_displacement,
 )
 from .solution import AnalysisResult, Solution
+from .spatial_actuation import FORCES_AT_POINTS
 from .warnings import warnings_of
 
-FORCES_AT_POINTS = ("trajectory", "points")  # values of `apply` that need no modal forces
 ROUNDING = 1e-6  # of the largest modal force: less is what ill-conditioned patches leave
 
 

@@ -26,7 +26,7 @@ from ..scene.spatial import SpatialScene, load_spatial_scene
 from .enough import completed, goes_on, is_replayed, log_outcome, progress_of, with_enough_modes, with_enough_pieces
 from .mode_search import ModeSearch, error_tolerances
 from .paths import with_paths_in_space
-from .spatial_actuation import actuated_in_space, patches_in_space
+from .spatial_actuation import actuated_in_space, patches_in_space, predicted_shift
 from .spatial_bodies import load_spatial_bodies
 from .spatial_finer import checked_in_space
 from .spatial_mode_choice import mode_levels_in_space, reported_in_space
@@ -232,6 +232,8 @@ def _context(
 def _with_peaks(solution: SpatialSolution, run: Outcome) -> SpatialResult:
     """What is read off a run; what is judged by peaks, by those between outputs."""
     found, closer = _evaluated(solution, run), run.closer
+    if found.actuation is not None and not solution.divided:
+        found = replace(found, predicted_shift=predicted_shift(found.motion, found.actuation))
     twists = {joint: gear.curve for joint, gear in found.motion.gears.items()}  # splines through outputs
     known = {joint: curve for joint, curve in twists.items() if curve is not None}
     if closer is run or len(known) < len(twists):
@@ -239,8 +241,7 @@ def _with_peaks(solution: SpatialSolution, run: Outcome) -> SpatialResult:
     between = _evaluated(solution, closer, known)
     actuation = found.actuation
     if actuation is not None and between.actuation is not None:
-        judged = between.actuation
-        actuation = replace(actuation, feasibility=judged.feasibility, unsupplied=judged.unsupplied)
+        actuation = replace(actuation, feasibility=between.actuation.feasibility)
     return replace(found, actuation=actuation, bending=bending_of_links(solution, between.motion), closer=between)
 
 
@@ -256,10 +257,8 @@ def _evaluated(solution: SpatialSolution, run: Outcome, twists: Mapping[str, BSp
     is_judged = motion.motor_forces is not None and not isinstance(run.analysis, InstantAnalysis)
     if is_judged:  # else nothing is asked of motors and patches
         actuation = actuated_in_space(
-            solution.scene, motion, run.analysis.last_time, solution.bodies, solution.patches, forces.voltages
+            solution.scene, motion, run.analysis, solution.bodies, solution.patches, forces.voltages
         )
-        if actuation.unsupplied is not None and set(actuation.unsupplied.bodies) <= solution.points.keys():
-            actuation = replace(actuation, unsupplied=None)  # forces at actuation points supply it
     whole = {name: body for name, body in solution.bodies.items() if name not in solution.divided}
     stresses = stresses_in_space(motion, whole, solution.patches)
     at_points = {}

@@ -10,15 +10,18 @@ import numpy as np
 from ..actuation.feasibility import Feasibility
 from ..actuation.patches.spatial_patches import LinkPatches, by_body, link_patches
 from ..actuation.patches.voltages import Voltages
-from ..actuation.spatial_feasibility import UnsuppliedInSpace, judge_in_space, links_in_motion
+from ..actuation.spatial_feasibility import judge_in_space, links_in_motion
+from ..actuation.unsupplied import held_shift
 from ..common.arrays import Array
 from ..mbs.model.spatial_drives import Drive
 from ..mbs.model.spatial_model import SpatialModel, modal_directions
 from ..mbs.quantities.spatial_motion import SpatialMotion
+from ..mbs.scene.analysis import Analysis
 from ..scene.spatial import SpatialScene
 from .spatial_bodies import LoadedSpatialBody
 
 Bodies = Mapping[str, LoadedSpatialBody]
+FORCES_AT_POINTS = ("trajectory", "points")  # values of `apply` that need no modal forces
 
 
 @dataclass(frozen=True)
@@ -29,18 +32,11 @@ class SpatialActuation:
         voltages: by layout.
         unmet: by body with patches, (T, n) modal forces that voltages within their limits leave, modes of its file.
         feasibility: whether motors and patches can do it, within their limits.
-        unsupplied: what no patch supplies; None where that bends no link.
     """
 
     voltages: Mapping[str, Voltages]
     unmet: Mapping[str, Array]
     feasibility: Feasibility
-    unsupplied: UnsuppliedInSpace | None
-
-    @property
-    def is_feasible(self) -> bool:
-        """Whether there are actuators for all that is needed, within their limits."""
-        return self.unsupplied is None and self.feasibility.is_feasible
 
 
 def patches_in_space(scene: SpatialScene, bodies: Bodies) -> dict[str, LinkPatches]:
@@ -66,14 +62,15 @@ def given_voltages(model: SpatialModel, patches: Mapping[str, LinkPatches]) -> I
 def actuated_in_space(
     scene: SpatialScene,
     motion: SpatialMotion,
-    end: float,
+    analysis: Analysis,
     bodies: Bodies,
     patches: Mapping[str, LinkPatches],
     known: Mapping[str, Array],
 ) -> SpatialActuation:
     """Voltages that produce the modal forces of a motion, or as much of them as they can, and what is asked by it.
 
-    `end` (s) of the path: see `actuation.motors.judge_motion`. `known`: voltages (T, k) by body, V.
+    Links with actuation points need no patches, and none does where a later analysis has the forces on the paths.
+    `known`: voltages (T, k) by body, V.
     """
     flexible = {name: (body.modal, body.carrying) for name, body in bodies.items() if body.modal is not None}
     links = links_in_motion(motion, flexible)
@@ -85,4 +82,20 @@ def actuated_in_space(
         within = np.concatenate([of_layout.within_limit for of_layout in found.values()], axis=1)
         unmet[name] = of_link.unmet(links[name].F_p, within)
         voltages |= found
-    return SpatialActuation(voltages, unmet, *judge_in_space(scene.path, motion, links, patches, voltages, end))
+    others = {of.body for of in scene.actuation_points}
+    if any(getattr(one, "apply", None) in FORCES_AT_POINTS for one in scene.analysis if one.source == analysis.name):
+        others |= links.keys()
+    judged = judge_in_space(scene.path, motion, links, patches, voltages, analysis.last_time, others)
+    return SpatialActuation(voltages, unmet, judged)
+
+
+def predicted_shift(motion: SpatialMotion, actuation: SpatialActuation) -> dict[str, Array]:
+    """Shift (T, 3), m, of all points of bodies by modal forces that nothing supplies, `unmet` ones of patches.
+
+    None where no link has patches and nothing is missing.
+    """
+    forces = motion.motor_forces
+    if forces is None or not (actuation.unmet or actuation.feasibility.unsupplied):
+        return {}
+    points = [f"{body}.{label}" for body, labels in motion.points.items() for label in labels]
+    return held_shift(motion, {**forces.modal, **actuation.unmet}, points)

@@ -88,6 +88,10 @@ class MotionOfLinks(SpatialMotion):
         in_frame = np.einsum("tji,tj->ti", of_quaternion(frame.orientation), found.position - frame.position)
         return replace(found, deflection=in_frame - position)
 
+    def _turned(self, body: str) -> Array:
+        """Of a link that of its first piece."""
+        return super()._turned(self.divided[body].body.names[0] if body in self.divided else body)
+
     @cached_property
     def _links(self) -> dict[str, BodyMotion]:
         return {name: _motion_of_link(self, link) for name, link in self.divided.items()}

@@ -11,6 +11,7 @@ from ..actuation.patches.patches import PatchArray
 from ..actuation.patches.spatial_patches import LinkPatches
 from ..actuation.points import PointForces
 from ..actuation.spatial_points import SpatialPointSet
+from ..common.arrays import Array
 from ..fe_models.modal_body import ModalBody
 from ..mbs.analysis.elastic_joints import unresolved_gears
 from ..mbs.analysis.outcome import EarlierRun, Outcome
@@ -51,6 +52,7 @@ class SpatialResult:
         check: what a replay on finer links found, where that is asked for.
         bending: how far flexible bodies leave small deformations, and what loads do to their stiffness.
         sharing: reactions that redundant constraints leave open; None where there are none.
+        predicted_shift: by point, (T, 3) m: what voltages within their limits leave undone.
         closer: the same at the outputs and between, from which all peaks are; None where nothing is between.
     """
 
@@ -65,6 +67,7 @@ class SpatialResult:
     check: FinerCheck | None = None
     bending: Mapping[str, Bending] = field(default_factory=dict)
     sharing: Sharing | None = None
+    predicted_shift: Mapping[str, Array] = field(default_factory=dict)
     closer: SpatialResult | None = field(default=None, repr=False)
 
     @property
@@ -94,7 +97,7 @@ class SpatialResult:
     @property
     def warnings(self) -> tuple[str, ...]:
         """Why results may be wrong, or not mean what they seem to, a text each, the most serious first."""
-        missed = None if self.actuation is None else self.actuation.unsupplied
+        missed = None if self.actuation is None else self.actuation.feasibility.unsupplied
         bent = deflection_warning(self.bending)
         told = (
             *([bent] if bent else []),

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -70,12 +70,13 @@ class MotorsOnlyKeys(TimedAnalysis):
         yield Need("kind", self.kind, "trajectory")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class AroundPath(Details):
-    """How long motors act before and after the path, s."""
+    """How long motors act before and after the path, s, and how the path was inverted for motors alone."""
 
     pre_actuation: float
     post_actuation: float
+    inversion: Inversion[Any] | None = field(default=None, repr=False)
 
 
 def where(scene_path: Path, analysis: Analysis) -> str:

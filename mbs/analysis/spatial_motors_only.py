@@ -56,7 +56,7 @@ def run_spatial_motors_only(context: Context, analysis: MotorsOnlyKeys) -> Outco
         raise SolveError(f"{servo.where}: no motion was found ({inversion.status}): {cause_of(inversion)}")
     seconds = time.perf_counter() - began
 
-    around = AroundPath(pre, post)
+    around = AroundPath(pre_actuation=pre, post_actuation=post, inversion=inversion)
 
     @cache
     def look_closer() -> Outcome:
@@ -91,13 +91,19 @@ def _run(analysis: MotorsOnlyKeys, model: SpatialModel, inversion: Inversion[Spa
     )
 
 
+def path_errors(inversion: Inversion[SpatialServo], times: Array, q: Array) -> dict[str, Array]:
+    """By trajectory how far (T, m) what follows it is off at `times` (T,) and q (T, n_q), in m or rad."""
+    held = inversion.servo.model
+    C, owners = row_values(held, q, times)[0], [row.owner if row.is_trajectory else "" for row in held.rows]
+    return {path.name: C[:, [owner == path.name for owner in owners]] for path in held.scene.trajectory}
+
+
 def _told(inversion: Inversion[SpatialServo], run: Outcome) -> tuple[str, ...]:
     """How far a redefined output leaves the path itself."""
     told = []
     if not run.failed and inversion.servo.factor < 1:
-        held = inversion.servo.model
-        C = row_values(held, run.q, run.time)[0][:, ~held.loop_rows]
-        if (off := float(np.abs(C).max(initial=0.0))) > NOTABLE:
+        off = max(float(np.abs(of).max(initial=0.0)) for of in path_errors(inversion, run.time, run.q).values())
+        if off > NOTABLE:
             told.append(
                 f"a point with {inversion.servo.factor:.2g} of the vibration follows the path: that of the trajectory"
                 f" is off by up to {off:.3g} (m or rad)"

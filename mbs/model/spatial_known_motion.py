@@ -141,10 +141,10 @@ def row_accelerations(model: SpatialModel, state: States, times: Array) -> Array
     return system.core.row_accelerations(system.scene, times.tolist(), state.q, state.v, state.a) * system.row_signs
 
 
-def mass_matrix(model: SpatialModel, q: Array, t: float) -> Array:
-    """M (n_v, n_v) at q (n_q,): what unit accelerations take more than none."""
-    count = model.tree.n_v
-    system, a = SpatialSystem(model), np.vstack([np.zeros(count), np.eye(count)])
-    states = np.tile(q, (count + 1, 1)), np.zeros((count + 1, count)), a
-    found = system.core.required_forces(system.scene, [t] * (count + 1), *states)
-    return as_floats((found[1:] - found[0]).T)
+def mass_matrices(model: SpatialModel, q: Array, t: float = 0.0) -> Array:
+    """M (T, n_v, n_v) at q (T, n_q): what unit accelerations take more than none."""
+    T, n = len(q), model.tree.n_v
+    system, a = SpatialSystem(model), np.tile(np.vstack([np.zeros(n), np.eye(n)]), (T, 1))
+    states = np.repeat(q, n + 1, axis=0), np.zeros((T * (n + 1), n)), a
+    found = system.core.required_forces(system.scene, [t] * len(a), *states).reshape(T, n + 1, n)
+    return as_floats(np.swapaxes(found[:, 1:] - found[:, :1], 1, 2))

@@ -12,7 +12,7 @@ from ..analysis.planar_outcome import PlanarOutcome
 from ..model.masses import system_mass_matrix
 from ..model.planar_body import PlanarBody
 from ..model.spatial_body import SpatialBody
-from ..model.spatial_known_motion import mass_matrix
+from ..model.spatial_known_motion import mass_matrices
 from .spatial_motion import SpatialMotion
 
 JOLT = 0.01  # of the largest deformation: where more begins to ring at once, modes that are not there would ring, too
@@ -109,5 +109,5 @@ def start_of_3d_motion(motion: SpatialMotion) -> Start:
     for node in tree.nodes:
         stiffness[node.p_v] = node.body.stiffness
         energy += motion.q[:, node.p_q] ** 2 @ node.body.stiffness
-    M = mass_matrix(motion.model, motion.q[0], float(motion.time[0]))
+    (M,) = mass_matrices(motion.model, motion.q[:1], float(motion.time[0]))
     return Start(M, motion.rows[1][0], motion.a[0], stiffness, float(energy.max(initial=0.0)))

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from ...common.arrays import Array
+from ..scene.space import Space
 
 
 @dataclass(frozen=True)
@@ -32,6 +33,16 @@ class BodyMotion:
         """By their names in results files."""
         return _named(vars(self))
 
+    def within(self, space: Space, angle: Array) -> BodyMotion:
+        """Of a motion in 3D what `space` has of it; in the plane `angle` (T,) stands for the quaternions."""
+        return replace(
+            self,
+            position=space.along(self.position),
+            orientation=angle if space.is_plane else self.orientation,
+            velocity=space.along(self.velocity),
+            angular_velocity=space.about(self.angular_velocity),
+        )
+
 
 @dataclass(frozen=True)
 class PointMotion:
@@ -48,6 +59,11 @@ class PointMotion:
     def datasets(self) -> dict[str, Array]:
         """By their names in results files."""
         return _named({key: values for key, values in vars(self).items() if values is not None})
+
+    def within(self, space: Space) -> PointMotion:
+        """Of a motion in 3D what `space` has of it."""
+        turned = None if space.is_plane else self.orientation
+        return PointMotion(space.along(self.position), space.along(self.deflection), turned)
 
 
 def _named(found: dict[str, Array]) -> dict[str, Array]:

@@ -16,18 +16,21 @@ from ...common.arrays import Array
 from ...common.rotations import quaternions
 from ..analysis.outcome import GearMotion
 from ..analysis.spatial_gears import Supplied, supplied_through_gears, with_motors
+from ..fields.field_types import GROUND
 from ..model.spatial_bending import bent_section
 from ..model.spatial_cut import CutCoordinate
 from ..model.spatial_cut_motion import CutMotion, cut_motions
 from ..model.spatial_drives import Drives, PointDrive
 from ..model.spatial_gears import with_compliance_in_space
-from ..model.spatial_known_motion import MotionForces, motion_forces
+from ..model.spatial_known_motion import MotionForces, motion_forces, row_accelerations
 from ..model.spatial_model import SpatialModel, row_values, target_rates
 from ..model.spatial_motors import MotorForces, path_forces
 from ..model.spatial_payloads import turns_as_a_body
 from ..model.spatial_system import SpatialSystem
-from ..model.spatial_tree import Motion, Node
+from ..model.spatial_tree import Motion, Node, Section
+from ..scene.space import SPACES, Space
 from ..scene.spatial.trajectories import SpatialTrajectory
+from ..solve.spatial_posture import mobility
 from .body_motion import BodyMotion, PointMotion
 
 if TYPE_CHECKING:
@@ -86,14 +89,21 @@ class SpatialMotion:
 
     @cached_property
     def violation(self) -> Array:
-        """(T, 2) largest of |C| (m, rad) and |Ċ| of all rows; of the one state of a static analysis, C alone."""
+        """(T, 3) of C, Ċ, C̈: the largest of all rows over 1 + that of q, v, a; of an equilibrium, C alone."""
         C, C_v = self.rows
-        off = np.zeros((len(self.time), 2))
-        off[:, 0] = np.abs(C).max(axis=1, initial=0.0)
+        levels = [(C, self.q)]
         if not self.is_at_rest:
-            rate = np.einsum("tij,tj->ti", C_v, self.v) - target_rates(self.model, self.q, self.time)
-            off[:, 1] = np.abs(rate).max(axis=1, initial=0.0)
+            C_dot = np.einsum("tij,tj->ti", C_v, self.v) - target_rates(self.model, self.q, self.time)
+            levels += [(C_dot, self.v), (row_accelerations(self.model, self, self.time), self.a)]
+        off = np.zeros((len(self.time), 3))
+        for k, (values, size) in enumerate(levels):
+            off[:, k] = np.abs(values).max(axis=1, initial=0.0) / (1 + np.abs(size).max(axis=1, initial=0.0))
         return off
+
+    @property
+    def space(self) -> Space:
+        """That of the scene."""
+        return SPACES[self.model.scene.space]
 
     @property
     def points(self) -> dict[str, tuple[str, ...]]:
@@ -114,6 +124,34 @@ class SpatialMotion:
             self.q[:, node.p_q] @ stored, self.v[:, node.p_v] @ stored,
         )  # fmt: skip
 
+    def angle(self, body: str) -> Array:
+        """θ (T,) of the frame of a body that moves in the plane, rad; turns of the joints before it count."""
+        e = self.body(body).orientation
+        angle = 2 * np.arctan2(e[:, 3], e[:, 0])
+        found: Array = angle + 2 * np.pi * np.round((self._turned(body) - angle) / (2 * np.pi))
+        return found
+
+    def _turned(self, body: str) -> Array:
+        """θ (T,) of the frame of a body of the tree that moves in the plane, rad: turns of joints and bent links."""
+        node = self.node(body)
+        coordinate = self._between_sections(node.joint.name)
+        if node.joint.freedoms and coordinate is None:
+            A = self.frames[self.model.tree.index[body]].F
+            return np.unwrap(np.arctan2(A[:, 1, 0], A[:, 0, 0]))
+        turn = node.joint.rpy[2] + np.zeros(len(self.time))
+        if coordinate is not None and node.joint.units == ("rad",):
+            turn += coordinate[0][:, 0]
+        turn = (-turn if node.backwards else turn) + self._bent(node.inner) - self._bent(node.outer)
+        return turn + (self._turned(self.model.tree.nodes[node.inner.body].body.name) if node.inner.body >= 0 else 0.0)
+
+    def _bent(self, section: Section) -> Array | float:
+        """By how much (T,) a section turns about z on its body, rad."""
+        if section.body < 0 or not section.point:
+            return 0.0
+        node = self.model.tree.nodes[section.body]
+        found: Array = bent_section(node.body, section.point, self.q[:, node.p_q]).phi[:, 2]
+        return found
+
     def section(self, point: str) -> Motion:
         """Of the section "BODY.POINT"."""
         return self.model.tree.motion(self.model.tree.section(point, np.eye(3)), self.q, self.frames)
@@ -126,7 +164,20 @@ class SpatialMotion:
         return PointMotion(found.r, deflection, continuous(quaternions(found.F)))
 
     def joint(self, name: str) -> tuple[Array, Array] | None:
-        """Coordinates, unwrapped, and rates (T, k) of a joint; None where it has none."""
+        """Coordinates, unwrapped, and rates (T, k) of a joint; None where it has none.
+
+        They are between sections; in the plane between frames where motors turn these, as work counts then.
+        """
+        joint = next((joint for joint in self.model.scene.joint if joint.name == name), None)
+        if joint is None or joint.units != ("rad",) or not (self.space.is_plane and self.model.scene.motors == "frame"):
+            return self._between_sections(name)
+        ends = [side.partition(".")[0] for side in joint.between]
+        none = np.zeros(len(self.time))
+        first, second = (none if body == GROUND else self.angle(body) for body in ends)
+        before, after = (none if body == GROUND else self.body(body).angular_velocity[:, 2] for body in ends)
+        return (second - first - joint.rpy[2])[:, None], (after - before)[:, None]
+
+    def _between_sections(self, name: str) -> tuple[Array, Array] | None:
         if of_cut := [motion for one, motion in self.cut if one.joint.name == name]:
             return np.array([one.coordinate for one in of_cut]).T, np.array([one.rate for one in of_cut]).T
         number = self.model.tree.carried.get(name)
@@ -179,9 +230,16 @@ class SpatialMotion:
 
     @cached_property
     def _supplied(self) -> Supplied | None:
-        if not self.is_prescribed:
+        if not self.is_prescribed or (self.space.is_plane and not self._motors_fit):
             return None
         return supplied_through_gears(self.model, self, self.time, self.supplied, self.twists or None)
+
+    @cached_property
+    def _motors_fit(self) -> bool:
+        """Whether there are as many as the mechanism has degrees of freedom with rigid links."""
+        if not len(self.time):
+            return False
+        return sum(map(len, self.model.motors.values())) == mobility(self.model, self.q[0]).freedom
 
     @property
     def gears(self) -> Mapping[str, GearMotion]:

@@ -70,7 +70,8 @@ def shared_evenly(motion: M) -> tuple[M, Sharing | None]:
     even = -np.einsum("tkc,tc->tk", np.linalg.pinv(basis), _side_by_side(motion, reactions(motion)))
     multipliers = motion.multipliers.copy()
     multipliers[:, is_loop] -= np.einsum("trk,tk->tr", null, even)
-    return replace(motion, multipliers=multipliers), Sharing(redundant, _open(motion, basis))
+    components = _open(motion, basis)
+    return replace(motion, multipliers=multipliers), Sharing(redundant, components) if components else None
 
 
 def _side_by_side(motion: SpatialMotion, found: Mapping[str, Wrench]) -> Array:
@@ -81,9 +82,11 @@ def _side_by_side(motion: SpatialMotion, found: Mapping[str, Wrench]) -> Array:
 
 
 def _open(motion: SpatialMotion, basis: Array) -> dict[str, tuple[str, ...]]:
-    """Components of joints that any combination of changes (T, 6 joints, redundant) moves at any time."""
+    """Components that the space has of joints which any combination of changes (T, 6 joints, redundant) moves."""
     directions = np.linalg.svd(basis, full_matrices=False)[0]
     joints = [joint.name for joint in motion.model.scene.joint]
     moved = np.linalg.norm(directions, axis=2).max(axis=0).reshape(len(joints), len(OF_POINT)) > OPEN
+    space = motion.space
+    moved[:, [axis not in (*space.translations, *(3 + k for k in space.rotations)) for axis in range(6)]] = False
     found = {name: tuple(np.array(OF_POINT)[of].tolist()) for name, of in zip(joints, moved, strict=True)}
     return {name: components for name, components in found.items() if components}

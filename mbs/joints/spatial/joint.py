@@ -141,6 +141,11 @@ class SpatialJoint(JointKeys):
         return ()
 
     @property
+    def given_gear_ratio(self) -> float | None:
+        """The ratio of its gear where the scene gives one."""
+        return getattr(self, "gear_ratio", None) if "gear_ratio" in self.model_fields_set else None
+
+    @property
     def position_limits(self) -> tuple[tuple[float, float], ...]:
         """Least and largest value of each coordinate; infinite where the scene gives none."""
         return ((-np.inf, np.inf),) * len(self.units)

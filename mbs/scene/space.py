@@ -1,0 +1,45 @@
+"""The axes of the plane and of 3D: which components the vectors of a motion have in each.
+
+Motions are computed in 3D; those of a scene with `space = "planar"` stay in the plane z = 0 and turn about z.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+from ...common.arrays import Array
+
+
+@dataclass(frozen=True)
+class Space:
+    """A space by its axes among x, y, z (0, 1, 2).
+
+    Attributes:
+        translations: along which points move and forces act.
+        rotations: about which bodies turn and moments act.
+    """
+
+    translations: tuple[int, ...]
+    rotations: tuple[int, ...]
+
+    @property
+    def is_plane(self) -> bool:
+        """Whether one angle says how a body stands."""
+        return len(self.rotations) == 1
+
+    def along(self, vectors: Array) -> Array:
+        """Of places, velocities or forces (…, 3) the components along its axes (…, d)."""
+        found: Array = vectors[..., list(self.translations)]
+        return found
+
+    def about(self, vectors: Array) -> Array:
+        """Of angular velocities or moments (…, 3) the components about its axes (…, 3), in the plane one (…)."""
+        found: Array = vectors[..., self.rotations[0]] if self.is_plane else vectors[..., list(self.rotations)]
+        return found
+
+
+PLANE = Space((0, 1), (2,))
+SPACES: Mapping[str, Space] = MappingProxyType({"planar": PLANE, "spatial": Space((0, 1, 2), (0, 1, 2))})
+"""By what the key `space` of a scene says."""
