@@ -134,6 +134,8 @@ def unsupplied_in_space(
     about = Unsupplied(bodies, bool(patches))
     if not motion.space.is_plane:
         about = replace(about, families=families, deflection=deflections, rotation=rotations)
+    if not (motion.motors_fit and links.keys() <= motion.model.tree.index.keys()):
+        return about  # motors do not say where points are, or links are in pieces
     followed = [path.point for path in motion.model.scene.trajectory if path.point is not None]
     points = followed or [f"{body}.{label}" for body, labels in motion.points.items() for label in labels]
     return seen_at_points(about, motion, unmet_in_space(links, patches, voltages, limited=True), points)

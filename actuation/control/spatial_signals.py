@@ -15,6 +15,7 @@ from ...mbs.model.spatial_known_motion import KnownStates, motion_forces
 from ...mbs.model.spatial_model import SpatialModel, modal_directions
 from ...mbs.model.spatial_system import SpatialSystem
 from ...mbs.model.spatial_tree import Section, SpatialTree
+from ...mbs.scene.space import SPACES
 from ...mbs.solve.spatial_linearisation import labelled
 from ..context import place_of
 from ..patches.spatial_patches import LinkPatches
@@ -100,8 +101,8 @@ def spatial_signals(
         yield SpatialSignal(f"motor/{sensor.motor}{ending}", *quality, along=np.eye(model.tree.n_v)[k])
     elif sensor.point is not None:
         place = place_of(whole, sensor.point)
-        for axis, name in enumerate("xyz"):
-            yield SpatialSignal(f"point/{sensor.point}/{name}{ending}", *quality, point=place, axis=axis)
+        for axis in SPACES[model.scene.space].translations:
+            yield SpatialSignal(f"point/{sensor.point}/{'xyz'[axis]}{ending}", *quality, point=place, axis=axis)
     elif sensor.pzt is not None:
         body = next(body for body, of_link in patches.items() if sensor.pzt in of_link.arrays)
         volts = volts_on_file(patches[body], sensor.pzt, sensor.capacitance)

@@ -39,11 +39,26 @@ def write_spatial_linear(group: h5py.Group, motion: SpatialMotion, linear: Linea
     along_v, shapes = _motion(linear)[:, :, : motion.model.tree.n_v], {}  # motors behind gears come last
     T, f, n_v = along_v.shape
     moving = replace(motion, time=np.repeat(motion.time, f), q=np.repeat(motion.q, f, 0), v=along_v.reshape(-1, n_v))
+    space, turning = motion.space, "angle" if motion.space.is_plane else "rotation"
     for name in motion.points:  # what bodies do in a mode is what they do at these rates
         body = moving.body(name)
-        rates = {"position": body.velocity, "rotation": body.angular_velocity, "modal": body.modal_velocity}
-        shapes[name] = {key: values.reshape(T, f, -1) for key, values in rates.items()}
+        rates = {"position": space.along(body.velocity), turning: space.about(body.angular_velocity)}
+        rates["modal"] = body.modal_velocity
+        shapes[name] = {key: values.reshape(T, f, *values.shape[1:]) for key, values in rates.items()}
+    if space.is_plane:
+        models = (replace(model, transformation=_of_frames(motion, k) @ model.transformation[:n_v])
+                  for k, model in enumerate(linear.models))  # fmt: skip
+        linear = replace(linear, models=tuple(models))
     write_models(group, linear, shapes)
+
+
+def _of_frames(motion: SpatialMotion, row: int) -> Array:
+    """(coordinates, n_v) rates of place, angle and modes of each body that moves in the plane, by v."""
+    found, all_rates = [], np.eye(motion.model.tree.n_v)
+    for name in motion.points:
+        L = motion.frames[motion.model.tree.index[name]].L[row]
+        found += [motion.space.along(L[:3].T).T, motion.space.about(L[3:].T)[None], all_rates[motion.node(name).p_v]]
+    return np.concatenate(found)
 
 
 def _motion(linear: LinearModels) -> Array:

@@ -31,7 +31,15 @@ from .linear import write_spatial_linear
 from .peaks import write_peaks
 from .spatial_actuation import write_actuation, write_tracking
 from .spatial_resume import write_state_in_space
-from .write import write_check, write_head, write_judgement, write_mode_errors, write_steps, write_texts
+from .write import (
+    write_attributes,
+    write_check,
+    write_head,
+    write_judgement,
+    write_mode_errors,
+    write_steps,
+    write_texts,
+)
 
 
 def write_spatial_results(solution: SpatialSolution, path: Path) -> None:
@@ -118,16 +126,10 @@ def _write_paths(group: h5py.Group, result: SpatialResult) -> None:
 
 def _write_run(group: h5py.Group, run: Outcome, warnings: Sequence[str], notes: Sequence[str]) -> None:
     """What is known of a run whether it has outputs or not."""
-    analysis, how = run.analysis, run.statistics
-    group.attrs.update({"kind": analysis.kind, "tolerance": analysis.tolerance})
-    group.attrs["actuation"] = (analysis.source or "") if analysis.takes_actuation else ""
-    group.attrs["apply"] = getattr(analysis, "apply", None) or ""  # of every kind, for those who read the file
-    group.attrs.update({"integrator": how.integrator.name, "integrator_reason": how.integrator.reason})
-    for key in ("steps", "rejected", "evaluations", "wall_seconds", "status", "cause"):
-        group.attrs[key] = getattr(how, key)
+    write_attributes(group, run)
     write_texts(group, warnings, notes)
     group["time"] = run.time
-    write_steps(group, how.step_ends, how.integrator.name)
+    write_steps(group, run.statistics.step_ends, run.statistics.integrator.name)
 
 
 def _write_bodies(group: h5py.Group, solution: SpatialSolution, result: SpatialResult) -> None:

@@ -19,7 +19,7 @@ from ..common.checksum import METHOD as CHECKSUM
 from ..common.files import write_atomically
 from ..common.version import program_version
 from ..mbs.analysis.motors_only import InvertedPath
-from ..mbs.analysis.outcome import Details
+from ..mbs.analysis.outcome import AnyOutcome, Details
 from ..mbs.analysis.planar_outcome import PlanarOutcome
 from ..mbs.fields.steps import DATASET, METHOD
 from ..run.loaded_body import Loaded
@@ -86,7 +86,7 @@ def write_head(file: h5py.File, name: str, text: str, bodies: Mapping[str, Loade
 
 def _write_analysis(group: h5py.Group, solution: Solution, result: AnalysisResult) -> None:
     outcome, name = result.outcome, result.outcome.analysis.name
-    _write_attributes(group, outcome)
+    write_attributes(group, outcome)
     group.attrs["stiffening_effect"] = result.stiffening_effect
     write_judgement(group, result)
     write_texts(group, result.warnings, result.notes)
@@ -141,7 +141,8 @@ def write_mode_errors(group: h5py.Group, analysis: str, choice: ModeChoice) -> N
         group.attrs[f"mode_error_{kind}"] = error
 
 
-def _write_attributes(group: h5py.Group, outcome: PlanarOutcome) -> None:
+def write_attributes(group: h5py.Group, outcome: AnyOutcome) -> None:
+    """What is known of a run by its analysis and statistics."""
     analysis, run = outcome.analysis, outcome.statistics
     group.attrs["kind"] = analysis.kind
     group.attrs["integrator"] = run.integrator.name if analysis.is_integrated else "none"

@@ -95,7 +95,7 @@ def predicted_shift(motion: SpatialMotion, actuation: SpatialActuation) -> dict[
     None where no link has patches and nothing is missing.
     """
     forces = motion.motor_forces
-    if forces is None or not (actuation.unmet or actuation.feasibility.unsupplied):
+    if forces is None or not motion.motors_fit or not (actuation.unmet or actuation.feasibility.unsupplied):
         return {}
     points = [f"{body}.{label}" for body, labels in motion.points.items() for label in labels]
     return held_shift(motion, {**forces.modal, **actuation.unmet}, points)

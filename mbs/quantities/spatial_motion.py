@@ -230,16 +230,15 @@ class SpatialMotion:
 
     @cached_property
     def _supplied(self) -> Supplied | None:
-        if not self.is_prescribed or (self.space.is_plane and not self._motors_fit):
+        if not self.is_prescribed or (self.space.is_plane and not self.motors_fit):
             return None
         return supplied_through_gears(self.model, self, self.time, self.supplied, self.twists or None)
 
     @cached_property
-    def _motors_fit(self) -> bool:
+    def motors_fit(self) -> bool:
         """Whether there are as many as the mechanism has degrees of freedom with rigid links."""
-        if not len(self.time):
-            return False
-        return sum(map(len, self.model.motors.values())) == mobility(self.model, self.q[0]).freedom
+        count = sum(map(len, self.model.motors.values()))
+        return len(self.time) > 0 and count == mobility(self.model, self.q[0]).freedom
 
     @property
     def gears(self) -> Mapping[str, GearMotion]:

@@ -29,6 +29,7 @@ from ..model.spatial_motors import FrameShare, frame_share
 from ..model.spatial_system import SpatialSystem
 from ..model.spatial_transmission import gear_matrices
 from ..model.spatial_tree import ElasticGearInSpace, Motion, Node
+from ..scene.space import SPACES
 from .linearisation import DEPENDENT, LinearMechanism
 
 
@@ -140,7 +141,8 @@ class SpatialLinearisation:
         found: dict[str, Array] = {}
         for point, place in self.points.items():
             L = self.model.tree.motion(self.model.tree.section(place, np.eye(3)), state.q, state.frames).L[0]
-            found |= {f"{point}/{axis}": L[k] @ H for k, axis in enumerate("xyz")}
+            axes = SPACES[self.model.scene.space].translations
+            found |= {f"{point}/{'xyz'[k]}": L[k] @ H for k in axes}
         return found
 
 

@@ -38,10 +38,6 @@ OTHERWISE = {
         "by loads of links in 3D",
     ),
     "@start_jolt$": ("slider_crank", "accelerations that a loop forces are those of joints"),
-    "/linear/(B|C|D|transformation|modes)|/linear@|/linear/zeros": (
-        "arm_under_control",
-        "inputs and outputs have a z, coordinates are joints",
-    ),
 }
 """Datasets that the road writes otherwise, a scene that shows it, and why."""
 OTHERWISE_IN = {
