@@ -37,6 +37,7 @@ OTHERWISE = {
         "arm",
         "by loads of links in 3D",
     ),
+    "/residual_force$": ("two_link_patched", "of modes of loaded links, whose signs are free"),
     "@start_jolt$": ("slider_crank", "accelerations that a loop forces are those of joints"),
 }
 """Datasets that the road writes otherwise, a scene that shows it, and why."""
@@ -47,6 +48,9 @@ OTHERWISE_IN = {
     "lightest_arm": (".", "likewise"),
     "arm_with_gears": (".", "bodies that carry rotors feel the twist of compliant gears in space alone"),
     "arm_under_control": ("^linear/.*@", "peaks are those of the run that is linearized in the plane"),
+    "arm_in_pieces": (".", "motions of pieces differ, and shifts of their points are not predicted in 3D"),
+    "arm_stiffened": ("/predicted_shift$", "points of stiffened links move to first order there in the plane"),
+    "arm_with_modes_as_needed": ("@moments_repeated$", "of some times between outputs"),
     "lightened_arm": (
         "/stress/|^motors_alone|/modal_velocity$|/dissipated_power$",
         "loads of stresses have no z in the plane; replays are splines in space",
@@ -55,7 +59,10 @@ OTHERWISE_IN = {
         "^(exact_forward|moment_instead|force_at_tip)[/@]",
         "replays are splines in space, rounding errors grow",
     ),
-    "two_link_rest_to_rest": ("/modal|/pzt/", "patches serve all modes of files in space, those kept in the plane"),
+    "two_link_rest_to_rest": (
+        "/modal|/pzt/|/predicted_shift$",
+        "patches serve all modes of files in space, those kept in the plane",
+    ),
     "two_link_placement": ("^path_link", "places on a path are judged at one time in the plane"),
 }
 """The same by scene."""

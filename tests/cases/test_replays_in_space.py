@@ -9,7 +9,7 @@ import ffrobot
 TOLERANCE = 1e-9
 CLOSE = 1e-7  # of the peak of each kind of dataset: forces amplify errors of the motion
 # What inverse analyses have beside, and what runs differ in by nature
-ALONE = ("predicted_shift", "trajectories/", "pzt/", "patch_structure/", "feasibility", "modal_force")
+ALONE = ("predicted_shift", "trajectories/", "pzt/", "feasibility", "modal_force")
 NOT_COMPARED = (
     "kind", "apply", "actuation", "steps", "rejected", "evaluations", "wall_seconds", "integrator", "integrator_reason",
     "unresolved",
