@@ -48,7 +48,6 @@ OTHERWISE_IN = {
     "lightest_arm": (".", "likewise"),
     "arm_with_gears": (".", "bodies that carry rotors feel the twist of compliant gears in space alone"),
     "arm_under_control": ("^linear/.*@", "peaks are those of the run that is linearized in the plane"),
-    "arm_in_pieces": (".", "motions of pieces differ, and shifts of their points are not predicted in 3D"),
     "arm_stiffened": ("/predicted_shift$", "points of stiffened links move to first order there in the plane"),
     "arm_with_modes_as_needed": ("@moments_repeated$", "of some times between outputs"),
     "lightened_arm": (
