@@ -16,7 +16,6 @@ from ...common.arrays import Array
 from ...common.rotations import quaternions
 from ..analysis.outcome import GearMotion
 from ..analysis.spatial_gears import Supplied, supplied_through_gears, with_motors
-from ..fields.field_types import GROUND
 from ..model.spatial_bending import bent_section
 from ..model.spatial_cut import CutCoordinate
 from ..model.spatial_cut_motion import CutMotion, cut_motions
@@ -134,7 +133,7 @@ class SpatialMotion:
     def _turned(self, body: str) -> Array:
         """θ (T,) of the frame of a body of the tree that moves in the plane, rad: turns of joints and bent links."""
         node = self.node(body)
-        coordinate = self._between_sections(node.joint.name)
+        coordinate = self.joint(node.joint.name)
         if node.joint.freedoms and coordinate is None:
             A = self.frames[self.model.tree.index[body]].F
             return np.unwrap(np.arctan2(A[:, 1, 0], A[:, 0, 0]))
@@ -149,7 +148,8 @@ class SpatialMotion:
         if section.body < 0 or not section.point:
             return 0.0
         node = self.model.tree.nodes[section.body]
-        found: Array = bent_section(node.body, section.point, self.q[:, node.p_q]).phi[:, 2]
+        phi = bent_section(node.body, section.point, self.q[:, node.p_q]).phi
+        found: Array = section.turned(phi[..., None])[:, 2, 0]
         return found
 
     def section(self, point: str) -> Motion:
@@ -164,20 +164,7 @@ class SpatialMotion:
         return PointMotion(found.r, deflection, continuous(quaternions(found.F)))
 
     def joint(self, name: str) -> tuple[Array, Array] | None:
-        """Coordinates, unwrapped, and rates (T, k) of a joint; None where it has none.
-
-        They are between sections; in the plane between frames where motors turn these, as work counts then.
-        """
-        joint = next((joint for joint in self.model.scene.joint if joint.name == name), None)
-        if joint is None or joint.units != ("rad",) or not (self.space.is_plane and self.model.scene.motors == "frame"):
-            return self._between_sections(name)
-        ends = [side.partition(".")[0] for side in joint.between]
-        none = np.zeros(len(self.time))
-        first, second = (none if body == GROUND else self.angle(body) for body in ends)
-        before, after = (none if body == GROUND else self.body(body).angular_velocity[:, 2] for body in ends)
-        return (second - first - joint.rpy[2])[:, None], (after - before)[:, None]
-
-    def _between_sections(self, name: str) -> tuple[Array, Array] | None:
+        """Coordinates, unwrapped, and rates (T, k) of a joint; None where it has none."""
         if of_cut := [motion for one, motion in self.cut if one.joint.name == name]:
             return np.array([one.coordinate for one in of_cut]).T, np.array([one.rate for one in of_cut]).T
         number = self.model.tree.carried.get(name)

@@ -38,6 +38,11 @@ OTHERWISE = {
         "by loads of links in 3D",
     ),
     "/residual_force$": ("two_link_patched", "of modes of loaded links, whose signs are free"),
+    "@moments_repeated$": ("arm_with_modes_as_needed", "of some times between outputs, which differ"),
+    "/constraint_violation$": (
+        "loop_with_friction",
+        "of accelerations relative to those of coordinates, not to all terms of a constraint",
+    ),
     "@start_jolt$": ("slider_crank", "accelerations that a loop forces are those of joints"),
 }
 """Datasets that the road writes otherwise, a scene that shows it, and why."""
@@ -49,7 +54,6 @@ OTHERWISE_IN = {
     "arm_with_gears": (".", "bodies that carry rotors feel the twist of compliant gears in space alone"),
     "arm_under_control": ("^linear/.*@", "peaks are those of the run that is linearized in the plane"),
     "arm_stiffened": ("/predicted_shift$", "points of stiffened links move to first order there in the plane"),
-    "arm_with_modes_as_needed": ("@moments_repeated$", "of some times between outputs"),
     "lightened_arm": (
         "/stress/|^motors_alone|/modal_velocity$|/dissipated_power$",
         "loads of stresses have no z in the plane; replays are splines in space",
