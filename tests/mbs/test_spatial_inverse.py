@@ -166,8 +166,8 @@ def test_loads_at_points_are_what_bodies_need(joint):
     tree, state, gravity = motion.model.tree, accelerated(motion), np.array(motion.model.scene.gravity)
     for number, (node, of_frame) in enumerate(zip(tree.nodes, state.of_frames(), strict=True)):
         expected, force, moment = body_forces(node, state, of_frame, gravity), 0.0, 0.0
-        for point, acting in motion.forces.at_points[number].items():
-            place = tree.motion(tree.section(f"{node.body.name}.{point}", np.eye(3)), motion.q, motion.frames)
+        for section, acting in motion.forces.at_points[number]:
+            place = tree.motion(section, motion.q, motion.frames)
             at_frame = acting.seen_from(place.r - motion.frames[number].r)
             force, moment = force + at_frame.force, moment + at_frame.moment
         size = np.abs(expected.force).max() + np.abs(expected.moment).max()
