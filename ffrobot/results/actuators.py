@@ -20,6 +20,7 @@ from ..actuation.points import PointForces, PointSet
 from ..actuation.spatial_points import SpatialPointSet
 from ..actuation.unsupplied import Unsupplied
 from ..common.arrays import Array
+from ..mbs.scene.space import Space
 from ..run.solution import AnalysisResult, Solution
 
 
@@ -109,14 +110,18 @@ def read_unsupplied(group: h5py.Group) -> Unsupplied | None:
     return Unsupplied(**about)
 
 
-def write_point_forces(group: h5py.Group, points: PointSet | SpatialPointSet, forces: PointForces) -> None:
-    """Of the actuation points of one body."""
+def write_point_forces(
+    group: h5py.Group, points: PointSet | SpatialPointSet, forces: PointForces, space: Space | None = None
+) -> None:
+    """Of the actuation points of one body; of 3D sets what the `space` of the scene has."""
     group["force"] = forces.force
     group["residual"] = forces.residual
     group["residual_force"] = forces.unmet
-    group["position"] = np.array([point.position for point in points.points])
-    group["direction"] = points.direction.T
-    group.attrs["components"] = list(points.axes)
+    position, direction = np.array([point.position for point in points.points]), points.direction.T
+    group["position"] = position if space is None else space.along(position)
+    group["direction"] = direction if space is None else space.along(direction)
+    of_plane = {"x": "axial", "y": "transverse"} if space is not None and space.is_plane else {}
+    group.attrs["components"] = [of_plane.get(axis, axis) for axis in points.axes]
     group.attrs["rank"] = forces.rank
     group.attrs["condition_number"] = forces.condition_number
 

@@ -85,7 +85,7 @@ def _write_analysis(group: h5py.Group, solution: SpatialSolution, result: Spatia
     for point, shift in result.predicted_shift.items():
         group[f"points/{point}/predicted_shift"] = motion.space.along(shift)
     for body, forces in result.point_forces.items():
-        write_point_forces(group.create_group(f"actuation_points/{body}"), solution.points[body], forces)
+        write_point_forces(group.create_group(f"actuation_points/{body}"), solution.points[body], forces, motion.space)
     for body, stress in result.stresses.items():
         write_stress(group.create_group(f"stress/{body}"), stress)
     if isinstance(run.details, LoopRecord):
