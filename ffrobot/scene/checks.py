@@ -237,7 +237,8 @@ def _unmet_needs(scene: AnyKeys, analysis: AnyKind | AnyKindInSpace) -> Iterator
     for need in analysis.needs():
         if not getattr(scene, need.table):
             yield f'{need.key}: expected at least one [[{need.table}]] for "{need.value}", found none'
-    if analysis.needs_actuators and not scene.motor_joints and not scene.pzt:
+    is_planar = isinstance(scene, SceneKeys) or scene.is_planar  # linear models of 3D scenes may have no inputs
+    if is_planar and analysis.needs_actuators and not scene.motor_joints and not scene.pzt:
         yield (
             f'kind: expected motors or [[pzt]] for "{analysis.kind}", found neither: nothing to control the robot with'
         )

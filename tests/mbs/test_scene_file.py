@@ -95,8 +95,8 @@ def folder(tmp_path):
     return tmp_path
 
 
-NOT_SHARED = ("spatial", "angle = ", 'joint = "O"')
-"""What `load_scene` says otherwise: 3D scenes are none of the plane, 3D trajectories know no `angle`."""
+NOT_SHARED = ("spatial", "angle = ", 'joint = "O"', '"pcd"')
+"""What `load_scene` says otherwise: 3D scenes are none of the plane, 3D trajectories know no `angle`, "tracking" is 3D."""
 
 
 def load(folder, text):
