@@ -19,7 +19,7 @@ from .stopped import GROUP, STOPPED, row_of_numbers
 from .tree_checkpoint import read_tree_checkpoint, write_tree_checkpoint
 
 ROWS = ("q", "v", "a")
-COUNTS = ("steps", "evaluations", "wall_seconds")
+COUNTS = ("steps", "rejected", "evaluations", "wall_seconds")
 
 
 def write_earlier_run(group: h5py.Group, outcome: AnyOutcome, *, is_spatial: bool) -> None:
@@ -69,7 +69,7 @@ def _earlier_run(file: Results, analysis: Analysis) -> EarlierRun:
     q, v, a, multipliers = (dataset(row) for row in (*ROWS, _multipliers(file.is_spatial)))
     residual = None if file.is_spatial else file[f"{name}/constraint_violation"]
     tau, F_p = (dataset(row) if file.has(f"{group}/{row}") else None for row in ("tau", "F_p"))
-    counts = {count: about[count].item() for count in (*COUNTS, *(() if file.is_spatial else ("rejected",)))}
+    counts = {count: about[count].item() for count in COUNTS if count != "rejected" or count in about}
     ends = row_of_numbers(file, f"{name}/step_ends") if file.has(f"{name}/step_ends") else np.zeros(0)
     return EarlierRun(
         Motion(file.time(name), q, v, a, multipliers, residual),

@@ -263,7 +263,7 @@ def test_mistakes_in_places_are_told(via, keys, told):
     [
         ({"joint": {"motor": False}}, 'motor: expected a joint with a motor, found "shoulder", which has none'),
         ({"analysis": {"kind": "fcid", "shape": "zero"}}, 'expected "pcid" or "static" with trajectories of motors'),
-        ({"path": {"joint": "shoulder"}}, 'exactly one of the keys "point", "joint", "motor"'),
+        ({"path": {"joint": "shoulder"}}, 'exactly one of the keys "point", "joint", "angle", "motor"'),
     ],
 )
 def test_mistakes_with_motors_are_told(change, told):

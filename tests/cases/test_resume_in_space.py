@@ -5,7 +5,7 @@ import re
 import h5py
 import numpy as np
 import pytest
-from stopped_runs import Stops, check_attributes, differences, edit, go_on, stop
+from stopped_runs import SAME, Stops, check_attributes, differences, edit, go_on, stop
 
 import ffrobot
 
@@ -67,7 +67,7 @@ def test_a_resumed_run_is_the_uninterrupted_one(arm, stopped):
     results = go_on(scene, watcher)
     assert (f'analysis "{stopped}"', reached) in watcher.asked
     for name, difference in differences(results, expected):
-        assert difference == 0.0, name
+        assert difference < SAME, name
     check_attributes(results, expected)
     assert 1 < outputs < len(expected.time(stopped))
     assert not results.has(f"{stopped}/resume")
@@ -242,5 +242,5 @@ def test_outputs_that_fail_leave_the_integration(arm, monkeypatch):
     results = go_on(scene)
     found = dict(differences(results, expected))
     del found["joints/waist/reaction_moment[2]"]  # along the axis of the motor: round-off of zero
-    assert max(found.values()) == 0.0
+    assert max(found.values()) < SAME
     assert results.attributes("inverse")["evaluations"] < expected.attributes("inverse")["evaluations"] + 5
