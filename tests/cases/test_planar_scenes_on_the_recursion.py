@@ -1,7 +1,6 @@
 """Planar scenes sent through records and analyses of 3D, to the core in the plane: the planar results.
 
-What cannot take that road yet is in `REFUSED`, what it writes otherwise in
-`OTHERWISE`: a test fails where an entry is no longer needed.
+What it writes otherwise is in `OTHERWISE`: a test fails where an entry is no longer needed.
 """
 
 import io
@@ -29,8 +28,6 @@ OF_PEAKS = 1.0  # 2e-2: they are read off at times of steps, and steps differ
 MORE = "/momentum/|/modal_force$|/joints/[^/]*(/(motor_)?moment(@|$)|@peak_power)"
 """What the one writer adds: momentum, modal forces of linear analyses, moments of motors in replays."""
 END = 0.05  # s, of analyses of cases that say how long they are
-REFUSED = {}
-"""By scene: how the road ends, and the key that cannot be said or solved in space yet."""
 OTHERWISE = {
     "@integrator$": ("slider_crank", "chosen by what its own evaluations cost"),
     "@(stiffness_change|stiffening_effect|foreshortening_moment|(position|relative)_error)$": (
@@ -134,7 +131,7 @@ def is_nothing(difference, expected):
     return not (difference.words or expected[difference.name].size) and difference.apart < 1e-6
 
 
-@pytest.mark.parametrize("name", [name for name in (*PLANAR, *CASES_IN_PLANE) if name not in REFUSED])
+@pytest.mark.parametrize("name", [*PLANAR, *CASES_IN_PLANE])
 def test_results_of_the_plane(name):
     beyond = differences(name)
     listed = [pattern for pattern, (shown_by, _) in OTHERWISE.items() if shown_by == name]
@@ -145,10 +142,3 @@ def test_results_of_the_plane(name):
     known = "|".join([*OTHERWISE, *listed])
     unknown = [str(each) for dataset, each in beyond.items() if not re.search(known, dataset)]
     assert not unknown, "\n".join(unknown[:12])
-
-
-@pytest.mark.parametrize("name", REFUSED)
-def test_what_cannot_take_the_road_yet(name):
-    error, key = REFUSED[name]
-    with pytest.raises(error, match=key):
-        solved_in_3d(tables_of(name))
