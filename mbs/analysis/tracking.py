@@ -26,6 +26,7 @@ from ..scene.analysis import Need, TimedAnalysis, output_times
 from ..solve.integrators import Choice
 from ..solve.internal_dynamics import Stopped, equilibrium
 from ..solve.spatial_servo import SpatialServo, make_spatial_servo
+from ..solve.stable_inversion import shape_of
 from ..solve.tracking import Limits, Objective, Tracked, Transition, Weights, refined, start_breaks, track
 from ..solve.zero_dynamics import linearise
 from .context import AnyContext, Context
@@ -250,7 +251,7 @@ def _outcome(
             "completed", Choice("collocation", ""), steps=len(curve.x) - 1, evaluations=tracked.iterations
         ),
         prescribed=Prescription(
-            equations, tracked.shape(servo.mode_counts), servo.near[0],
+            equations, shape_of(curve, servo.mode_counts), servo.near[0],
             {body: (breaks, V) for body, V in _by_body(context, voltage(breaks)).items()},
         ),
     )  # fmt: skip

@@ -43,12 +43,10 @@ class Program:
 
 
 class Minimum(NamedTuple):
-    """x (N+1, s), multipliers z (N, i) of the inequalities; whether the method converged, and its iterations."""
+    """x (N+1, s), and whether the method converged."""
 
     x: Array
-    z: Array
     converged: bool
-    iterations: int
 
 
 class _Layout:
@@ -107,12 +105,10 @@ class _Newton:
 def minimize(program: Program, x: Array) -> Minimum:
     """The minimum, from about x (N+1, s), which need not be feasible."""
     way = _CentralPath(program, x)
-    iteration = 0
-    while not way.is_at_end() and iteration < MOST_ITERATIONS:
-        iteration += 1
-        if not way.advance():
+    for _ in range(MOST_ITERATIONS):
+        if way.is_at_end() or not way.advance():
             break
-    return Minimum(way.unknown[way.layout.x], way.z, way.is_at_end(), iteration)
+    return Minimum(way.unknown[way.layout.x], way.is_at_end())
 
 
 class _CentralPath:

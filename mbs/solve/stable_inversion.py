@@ -9,7 +9,7 @@ initial value problem, solved window by window, each with intervals as short as 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Generic, TypeVar
@@ -67,11 +67,16 @@ class Inversion(Generic[S]):
     @property
     def shape(self) -> list[list[_core.TimeFunction]]:
         """p_k(t) of each body, for the core."""
-        columns = iter(self.curve.c.transpose(2, 1, 0))
-        return [
-            [_core.TimeFunction.polynomial(self.curve.x, np.ascontiguousarray(next(columns))) for _ in range(count)]
-            for count in self.servo.mode_counts
-        ]
+        return shape_of(self.curve, self.servo.mode_counts)
+
+
+def shape_of(curve: PPoly, counts: Sequence[int]) -> list[list[_core.TimeFunction]]:
+    """Functions p_k(t) of each body, for the core; `counts` of modes by body."""
+    columns = iter(curve.c.transpose(2, 1, 0))
+    return [
+        [_core.TimeFunction.polynomial(curve.x, np.ascontiguousarray(next(columns))) for _ in range(count)]
+        for count in counts
+    ]
 
 
 def invert(

@@ -11,14 +11,13 @@ sag. Links rest at both ends. Output transition with free internal states: Perez
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal, Protocol
 
 import numpy as np
 
 from ...common.arrays import Array, as_floats
-from .. import _core
 from .collocation import GAUSS, Elimination, piecewise, stage_states
 from .interior_point import Minimum, Program, minimize
 from .stable_inversion import PROBES, cut
@@ -97,14 +96,6 @@ class Tracked:
     iterations: int
     share: float
     cost: float
-
-    def shape(self, counts: Sequence[int]) -> list[list[_core.TimeFunction]]:
-        """p_k(t) of each body, for the core; `counts` of modes by body."""
-        columns = iter(self.curve.c.transpose(2, 1, 0))
-        return [
-            [_core.TimeFunction.polynomial(self.curve.x, np.ascontiguousarray(next(columns))) for _ in range(count)]
-            for count in counts
-        ]
 
 
 def graded(start: float, end: float, intervals: int, grading: float = GRADING) -> Array:
