@@ -41,8 +41,7 @@ if TYPE_CHECKING:
     from .results.file import Results
     from .run.watcher import Watcher
     from .scene.any_space import make_scene
-    from .scene.scene import Scene
-    from .scene.spatial import SpatialScene
+    from .scene.spatial import SpatialScene as Scene
 
     __version__: str
 
@@ -68,8 +67,7 @@ _HOME = {
     "SolveError": ".common.errors",
     "ModalBody": ".fe_models.modal_body",
     "make_scene": ".scene.any_space",
-    "Scene": ".scene.scene",
-    "SpatialScene": ".scene.spatial",
+    "Scene": ".scene.spatial:SpatialScene",
     "Results": ".results.file",
     "Watcher": ".run.watcher",
 }
@@ -82,7 +80,6 @@ __all__ = [
     "Results",
     "Scene",
     "SolveError",
-    "SpatialScene",
     "Watcher",
     "fit_measured",
     "load_scene",
@@ -109,7 +106,8 @@ def __getattr__(name: str) -> object:
 
         value: object = program_version()
     elif name in _HOME:
-        value = getattr(import_module(_HOME[name], __name__), name)
+        home, _, known = _HOME[name].partition(":")
+        value = getattr(import_module(home, __name__), known or name)
     else:
         raise AttributeError(f"module 'ffrobot' has no attribute {name!r}")
     globals()[name] = value

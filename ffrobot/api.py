@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from .fe_models.modal_body import ModalBody
     from .fit import Fit
     from .results.file import Results
-    from .run.solution import Solution
     from .run.spatial_solution import SpatialSolution
     from .run.watcher import Watcher
     from .scene.any_space import AnyScene
@@ -48,16 +47,11 @@ def solve(
     was computed until then is in `output` all the same. Warns (`FfrobotWarning`) where results may be wrong, or do not
     mean what they seem to; `Results.warnings` has the same texts.
     """
-    from .common.errors import FfrobotWarning, InputError
+    from .common.errors import InputError
     from .common.files import check_output
     from .common.outputs import protected
-    from .results.file import FORMAT, Results
-    from .results.resume import resume as run_on
-    from .results.stopped import how_to_go_on
-    from .results.write import results_image, write_results
+    from .results.file import FORMAT
     from .run.inputs import files_of, files_of_tables
-    from .run.solve import solve as run
-    from .scene.scene import Scene
 
     path = None if output is None else Path(output)
     inputs = files_of(Path(scene)) if isinstance(scene, str | PathLike) else files_of_tables(scene.path, scene.text)
@@ -68,30 +62,7 @@ def solve(
         raise InputError("solve: resume: expected the output of the run that was stopped, found none")
     if isinstance(scene, str | PathLike):
         scene = load_scene(scene, allow_python=allow_python)
-    if scene.space == "spatial":
-        from .scene.spatial import SpatialScene
-
-        assert isinstance(scene, SpatialScene)
-        return _solve_spatial(scene, path, watcher, inputs, resume=resume)
-    assert isinstance(scene, Scene)
-
-    def keep(solution: Solution) -> None:
-        if path is not None:
-            with protected(inputs):
-                write_results(solution, path)
-
-    solution = run_on(scene, path, watcher, keep) if path is not None and resume else run(scene, watcher, keep)
-    if solution is None:
-        assert path is not None
-        return Results(path)
-    for name, result in solution.analyses.items():
-        for text in result.warnings:
-            warnings.warn(f'{solution.scene.path}: analysis "{name}": {text}', FfrobotWarning, stacklevel=2)
-    for outcome in solution.outcomes.values():
-        outcome.check_completed(how_to_go_on(solution, "solve(…, resume=True)") if path is not None else "")
-    if path is not None:
-        return Results(path)
-    return Results.from_image(results_image(solution), solution.scene.path)
+    return _solve_spatial(scene, path, watcher, inputs, resume=resume)
 
 
 def _solve_spatial(

@@ -43,15 +43,12 @@ def solve(scene_file: Path, output: Path | None, *, resume: bool, strict: bool) 
     from ..common.files import check_output
     from ..results.file import FORMAT
     from ..run.inputs import files_of
-    from ..scene.spatial import is_spatial
 
     path = output or scene_file.with_suffix(".results.h5")
     protect(files_of(scene_file))
     check_output(path, FORMAT)
     again = f"ffrobot solve {scene_file}{f' -o {output}' if output else ''} --resume"
-    _solve(
-        _in_space() if is_spatial(scene_file) else _in_plane(), scene_file, path, again, resume=resume, strict=strict
-    )
+    _solve(_in_space(), scene_file, path, again, resume=resume, strict=strict)
 
 
 @dataclass(frozen=True)
@@ -62,15 +59,6 @@ class _Stage2:
     resume: Callable[..., Any]
     write: Callable[[Any, Path], None]
     print_summary: Callable[..., None]
-
-
-def _in_plane() -> _Stage2:
-    from ..present.summary import print_summary
-    from ..results.resume import resume
-    from ..results.write import write_results
-    from ..run.solve import solve
-
-    return _Stage2(solve, resume, write_results, print_summary)
 
 
 def _in_space() -> _Stage2:

@@ -12,8 +12,9 @@ from ..actuation.control.modes import held_frequencies, robot_modes
 from ..common.arrays import Array, as_floats
 from ..common.errors import InputError
 from ..common.toml_files import load_toml, read_text
-from ..run.solve import solve
-from ..scene.load import load_scene, make_scene
+from ..run.spatial import solve_spatial
+from ..run.watcher import Watcher
+from ..scene.any_space import load_any_scene, make_scene
 from ..sweep.files import LINKS, run_files, value_of
 from .link_target import fitted_name
 from .toml_edit import Key, with_values
@@ -29,7 +30,7 @@ class RobotTarget:
     def __init__(self, path: Path, motors: str) -> None:
         self._path, self._motors = path, motors
         self._scene = load_toml(path, "scene file")
-        load_scene(path)
+        load_any_scene(path)
         bodies = {body["name"]: body.get("link") for body in self._scene["body"]}
         self._links = {name: path.parent / link for name, link in bodies.items() if isinstance(link, str)}
         self._tables: dict[str, Any] = {name: load_toml(link, "link file") for name, link in self._links.items()}
@@ -50,7 +51,7 @@ class RobotTarget:
             body["link"] = tables.get(body.get("link"), body.get("link")) if "link" in body else None
             if body.get("modes") == "auto":  # the linear model needs no choice: all of them
                 del body["modes"]
-        solution = solve(make_scene(folder=self._path.parent, **scene))
+        solution = solve_spatial(make_scene(folder=self._path.parent, **scene), Watcher())
         details = solution.outcomes["fit"].details
         assert isinstance(details, LinearModels)
         frequency = held_frequencies(details.models[0]) if self._motors == "held" else _free(details.models[0])
