@@ -4,7 +4,6 @@ import copy
 import tomllib
 from importlib.util import find_spec
 from pathlib import Path
-from typing import get_args
 
 import numpy as np
 import pytest
@@ -16,7 +15,6 @@ from ffrobot.common.errors import InputError
 from ffrobot.common.key_descriptions import key_descriptions
 from ffrobot.common.rotations import exponential, quaternions
 from ffrobot.mbs.fields.orientations import OrientationLaw
-from ffrobot.scene.kinds import KINDS, AnyKindInSpace
 from ffrobot.scene.load import load_scene
 from ffrobot.scene.spatial import check_available, spatial_scene
 from ffrobot.scene.spatial_keys import SpatialSceneKeys
@@ -280,12 +278,6 @@ def test_planar_readers_refuse_scenes_in_space(tmp_path):
     path.write_text(ARM)
     with pytest.raises(InputError, match='space: expected "planar", found "spatial": 3D scenes run by'):
         load_scene(path)
-
-
-def test_every_kind_runs_in_space():
-    in_space = {kind.kind_name() for kind in get_args(AnyKindInSpace)}
-    assert in_space == {kind.kind_name() for kind in KINDS} | {"tracking"}
-    assert all(callable(kind.run) for kind in get_args(AnyKindInSpace))
 
 
 def test_every_key_says_what_it_means():

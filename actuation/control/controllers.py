@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 
 from ...common.arrays import Array, Indices
 from ...common.errors import InputError
 from ...common.validation import quoted
+from ...mbs.analysis.outcome import Outcome
+from ...mbs.model.spatial_model import SpatialModel
+from ..patches.spatial_patches import LinkPatches
 from .records import JointPid, ModalVelocity
 from .robot import Robot, estimate
 
@@ -41,8 +44,8 @@ class Setup:
     """
 
     robot: Robot
-    model: Any
-    patches: Mapping[str, Any]
+    model: SpatialModel
+    patches: Mapping[str, LinkPatches]
     inputs: tuple[str, ...]
     outputs: tuple[str, ...]
     times: Array
@@ -50,7 +53,7 @@ class Setup:
     delay: float
     reference: Array
     feed_forward: Array
-    source: Any
+    source: Outcome
 
     def robot_coordinates(self, joints: Iterable[str]) -> Iterator[tuple[str, str]]:
         """Joints with the names of their coordinates, one after the other."""

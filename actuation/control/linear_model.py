@@ -15,7 +15,6 @@ from ...common.extras import extras
 from ...common.files import write_atomically
 from ...common.validation import did_you_mean, quoted
 from ...mbs.solve.linearisation import LinearMechanism
-from ..patches.patches import PatchArray
 
 if TYPE_CHECKING:
     import control
@@ -115,23 +114,8 @@ class LinearModel:
         return control.ss(self.A, self.B[:, columns], self.C[rows], self.D[np.ix_(rows, columns)], **allowed)
 
 
-def linear_model(mechanism: LinearMechanism, patches: Mapping[str, PatchArray]) -> LinearModel:
-    """The state space of a linear mechanism, with the voltages of patches among its inputs."""
-    return state_space(mechanism, patch_voltages(mechanism, patches))
-
-
-def patch_voltages(mechanism: LinearMechanism, patches: Mapping[str, PatchArray]) -> dict[str, Array]:
-    """By "pzt/BODY/k", what a volt does along s (f,)."""
-    f = len(mechanism.M)
-    return {
-        f"pzt/{body}/{k}": _spread(f, [i for carrier in array.carriers for i in mechanism.modal(carrier)], column)
-        for body, array in patches.items()
-        for k, column in enumerate(array.Phi_V.T, 1)
-    }
-
-
 def state_space(mechanism: LinearMechanism, voltages: Mapping[str, Array]) -> LinearModel:
-    """The same, with what a unit of each voltage does along s (f,)."""
+    """The state space of a linear mechanism; `voltages`: what a unit of each does along s (f,), by name."""
     f = len(mechanism.M)
     motors = {name: column for name, column in mechanism.inputs.items() if name.startswith("joint/")}
     forces = {name: column for name, column in mechanism.inputs.items() if name not in motors}
@@ -166,12 +150,6 @@ def save_arrays(arrays: Mapping[str, Any], path: Path) -> None:
     else:
         raise InputError(f'{path}: expected a file name that ends in .npz or .mat, found "{path.name}"')
     write_atomically(path, content.getvalue(), "linear model")
-
-
-def _spread(size: int, places: list[int], values: Array) -> Array:
-    spread = np.zeros(size)
-    spread[places] = values
-    return spread
 
 
 def _some(names: tuple[str, ...]) -> str:

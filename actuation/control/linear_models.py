@@ -1,35 +1,16 @@
-"""Keys of linear models, and what is worth telling of them; in 2D and 3D."""
+"""What is worth telling of linear models: modes, reach, zeros and gains for their motors."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
-from typing import Literal
 
-from ...mbs.analysis.operating_points import InstantAnalysis
 from ...mbs.analysis.outcome import Details
-from ...mbs.fields.field_types import PointReference
-from ...mbs.fields.references import Reference
 from .linear_model import LinearModel
 from .modes import Reach, RobotModes, controllability, observability, robot_modes
 from .suggestion import Suggestion, unhurried_gains
 from .zeros import Zeros, zeros
-
-
-class LinearKeys(InstantAnalysis):
-    """Of `Linear`."""
-
-    kind: Literal["linear"]
-    points: tuple[PointReference, ...] | None = None
-    """Points whose motion is an output and at which disturbances act; by default those of trajectories, or all tips."""
-
-    needs_actuators = True
-
-    def references(self) -> Iterator[Reference]:
-        """The points."""
-        for point in self.points or ():
-            yield Reference("points", point, needs_marker=True)
 
 
 @dataclass(frozen=True)

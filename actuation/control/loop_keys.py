@@ -1,9 +1,9 @@
-"""Keys of closed loops, in the plane and in space."""
+"""Keys of closed loops."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -12,11 +12,12 @@ from ...mbs._core import TimeFunction
 from ...mbs.fields.field_types import NotNegative, PointReference, Positive
 from ...mbs.fields.references import Reference, under
 from ...mbs.scene.analysis import ActuatedAnalysis, Analysis, Need
+from ...mbs.scene.spatial.loads import SpatialLoad
 from .records import Controller, Sensor
 
 
 class SampledAnalysis(ActuatedAnalysis):
-    """Keys of closed loops in the plane and in space: see `closed_loop.ClosedLoop`."""
+    """Keys of closed loops: see `SpatialClosedLoop`."""
 
     kind: Literal["closed-loop"]
     sample_time: Positive
@@ -37,7 +38,7 @@ class SampledAnalysis(ActuatedAnalysis):
     """Controllers; their commands add up."""
     sensor: tuple[Sensor, ...] = ()
     """Sensors in addition to those of the controllers."""
-    disturbance: tuple[Any, ...] = ()
+    disturbance: tuple[SpatialLoad, ...] = ()
     """Loads at points, unknown to `actuation`."""
 
     findings = ("diverged", "step underflow")  # what a controller does is what is to be found out

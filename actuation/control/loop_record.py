@@ -1,4 +1,4 @@
-"""What a closed loop leaves, and the parts of its run that are the same in the plane and in space."""
+"""What a closed loop leaves: samples, metrics, margins, advice."""
 
 from __future__ import annotations
 

@@ -1,29 +1,30 @@
-"""Where patches on a link in the plane do most: the analysis `kind = "placement"`."""
+"""Where patches on a link do most: the analysis `kind = "placement"`."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
 from typing import Literal
 
 import numpy as np
 
+from ...common.arrays import as_floats
 from ...common.errors import InputError
-from ...fe_models.modal_body import ModalBody
-from ...mbs.analysis.operating_points import InstantAnalysis, operating_points
-from ...mbs.analysis.outcome import AnyOutcome
-from ...mbs.analysis.planar_outcome import PlanarOutcome
+from ...common.validation import quoted
+from ...mbs.analysis.operating_points import InstantAnalysis, of_earlier
+from ...mbs.analysis.outcome import Outcome
+from ...mbs.analysis.spatial_replay import motor_forces_of
 from ...mbs.fields.references import Reference
-from ...mbs.model.planar_body import PlanarBody
 from ...mbs.scene.analysis import Surroundings
-from ..context import ActuatedContext, PlanarActuatedContext
-from ..patches.patches import PatchArray, patch_array
-from ..patches.records import PatchKeys
-from .linear import linear_models
-from .placing import PatchableLink, Placed, elsewhere, place
+from ...mbs.solve.spatial_linearisation import SpatialLinearisation
+from ..context import ActuatedContext
+from ..patches.patches import PatchArray
+from ..patches.spatial_patches import link_patches
+from ..patches.spatial_records import SpatialPztLayout
+from .linear import operating_points_in_space
+from .linear_model import state_space
+from .placing import PatchableLink, elsewhere, place
 from .records import Placement
-from .spatial_placement import run_spatial_placement
 
 
 class PatchPlacement(InstantAnalysis):
@@ -62,39 +63,51 @@ class PatchPlacement(InstantAnalysis):
                 )
         yield from super().problems(among)
 
-    def run(self, context: ActuatedContext | PlanarActuatedContext) -> AnyOutcome:
-        """The operating point, or those of the path, with what was `Placed`."""
-        if isinstance(context, ActuatedContext):
-            return run_spatial_placement(context, self, self.placement)
-        source = context.source(self.source)
-        outcome = operating_points(context.model, self, source)
-        return replace(outcome, details=_placed(self, context, outcome, source))
+    def run(self, context: ActuatedContext) -> Outcome:
+        """The operating point, or those of the path, with what was `Placed`.
+
+        Of several layouts of a link the others stay where they are. Raises `InputError` where it does not say which one
+        is placed, and for a link without room for the patches.
+        """
+        model, wanted = context.model, self.placement
+        link = _link(context, wanted)
+        if self.is_over_path:
+            assert self.source is not None
+            source = context.outcomes[self.source]
+            run = of_earlier(source, self)
+            reached = context.patches[wanted.body].modes[link.layout.label]
+            F_p = reached.forces(context.patches[wanted.body].on_link(motor_forces_of(source).modal))
+            return replace(run, details=place(model.scene.path, wanted, link, None, F_p))
+        run, about = operating_points_in_space(context, self)
+        at = SpatialLinearisation(about.model, about.q[0]).at(float(about.time[0]), about.q[0], about.v[0], about.a[0])
+        return replace(run, details=place(model.scene.path, wanted, link, state_space(at, {}), None))
 
 
-def _placed(
-    analysis: PatchPlacement, context: PlanarActuatedContext, outcome: PlanarOutcome, source: PlanarOutcome | None
-) -> Placed:
-    """The best places for the patches of one body, about `outcome` or over the path of its `source`."""
-    robot, wanted, model, F_p = context.model, analysis.placement, None, None
-    if analysis.is_over_path:
-        assert source is not None
-        if source.F_p is None:
-            raise InputError(
-                f'{robot.scene.path}: analysis "{analysis.name}": placement.criterion: expected motors that fit the'
-                f' mechanism for "voltage", found {len(robot.motors)} for {robot.degrees_of_freedom}'
-            )
-        F_p = source.F_p[:, source.modal_columns(wanted.body)]
-    else:
-        (model,) = linear_models(outcome, {})
-    path, layout, body = robot.scene.path, context.patches[wanted.body].layout, context.links[wanted.body]
-    return place(path, wanted, patchable_link(path, layout, body, robot.body(wanted.body)), model, F_p)
-
-
-def patchable_link(path: Path, layout: PatchKeys, body: ModalBody, planar: PlanarBody) -> PatchableLink:
-    """Of the scene at `path`, by the modes of the link in the model."""
+def _link(context: ActuatedContext, wanted: Placement) -> PatchableLink:
+    """By the coordinates that the layout reaches; patches elsewhere reach the same."""
+    name = wanted.body
+    path, of_link, body = context.model.scene.path, context.patches[name], context.links[name]
+    whole = context.whole
+    bodies: tuple[str, ...] = (name,)
+    tree = (context.model if whole is None else whole.model).tree
+    to_file = tree.nodes[tree.index[name]].body.modal_transform
+    if whole is not None and name in whole.divided:
+        bodies, to_file = whole.divided[name].bodies, to_file @ whole.divided[name].gathered
+    label = wanted.pzt or ("" if len(of_link.arrays) > 1 else next(iter(of_link.arrays)))
+    if label not in of_link.arrays:
+        found = f'"{label}"' if label else "none"
+        raise InputError(
+            f'{path}: placement.pzt: expected one of the layouts {quoted(of_link.arrays)} of "{name}", found {found}'
+        )
+    reached, layout = of_link.modes[label], of_link.arrays[label].layout
+    assert isinstance(layout, SpatialPztLayout)
 
     def patches(**changes: object) -> PatchArray:
-        return patch_array(path, layout.model_copy(update=elsewhere(layout, changes)), body, planar)
+        keys = {"allocation": "least-squares", "mode_weights": None, "point_weights": None} | changes
+        found = link_patches(path, [layout.model_copy(update=elsewhere(layout, keys))], body, context.carrying[name])
+        if not np.array_equal(found.modes[label].rows, reached.rows):
+            raise InputError(f'{path}: placement.body: expected patches that reach the modes of "{label}"')
+        return found.arrays[label]
 
-    served, unit = planar.n_eigenmodes, np.eye(planar.n_modes)
-    return PatchableLink(planar.name, body.length, (planar.name,), layout, planar.stiffness, served, unit, patches)
+    own = as_floats(np.linalg.solve(reached.T, to_file[reached.rows]))
+    return PatchableLink(name, body.length, bodies, layout, reached.stiffness, reached.served, own, patches)

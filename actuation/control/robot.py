@@ -1,16 +1,24 @@
-"""What controllers ask of a robot, in the plane or in space: names, links, patches, linear and rigid models."""
+"""What controllers ask of a robot: names, links, patches, linear and rigid models."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
-from typing import Protocol
 
 import numpy as np
 
 from ...common.arrays import Array, as_floats
+from ...mbs.analysis.outcome import Outcome
+from ...mbs.model.spatial_model import SpatialModel
 from ...mbs.solve.linearisation import LinearMechanism
+from ...mbs.solve.spatial_linearisation import SpatialLinearisation, labelled
+from ..patches.spatial_patches import LinkPatches
+from ..patches.voltages import voltage_gain
+from .linear import patch_voltages_in_space
+from .signals import check_joint, volts_on_file
+from .spatial_rigid_arm import SpatialRigidArm, rigid_freedom
 
 
 @dataclass(frozen=True)
@@ -43,63 +51,76 @@ class PatchedLink:
     own: Array
 
 
-class RigidMotion(Protocol):
-    """The mechanism with rigid links, rotors and friction too: what motors do for accelerations of their joints."""
-
-    def angles(self) -> Array:
-        """(motors,) at the start of the reference."""
-
-    def terms(self, gamma: Array, gamma_dot: Array) -> tuple[Array, Array]:
-        """M (motors, motors) and h (motors,) of τ = M γ̈ + h."""
-
-    def moments(self, gamma: Array, gamma_dot: Array, gamma_ddot: Array) -> Array:
-        """τ (motors,) N·m."""
-
-
-class Robot(Protocol):
+@dataclass(frozen=True)
+class Robot:
     """A robot about the motion of an inverse analysis.
 
     Attributes:
-        path: of the scene.
-        motor_joints: names of the joints with motors.
-        motors: of the motors' coordinates, "NAME", or "NAME 1", "NAME 2" of joints with several.
-        links: flexible ones by name.
-        patches: by link.
-        motors_fit: whether there are as many motors as the mechanism with rigid links has freedom.
+        model: its constraint equations are those of loops alone, its gears do not give.
+        of_links: patches by link.
+        source: the inverse analysis.
     """
+
+    model: SpatialModel
+    of_links: Mapping[str, LinkPatches]
+    source: Outcome
 
     @property
     def path(self) -> Path:
-        """See above."""
+        """Of the scene."""
+        return self.model.scene.path
 
     @property
     def motor_joints(self) -> tuple[str, ...]:
-        """See above."""
+        """Names of joints with motors, in the order of commands."""
+        return tuple(self.model.motors)
 
     @property
     def motors(self) -> tuple[str, ...]:
-        """See above."""
+        """Names of the coordinates of motors: "NAME", or "NAME 1", "NAME 2" of joints with several."""
+        return tuple(name for joint in self.model.motors for name in self.coordinates(joint))
 
-    @property
-    def links(self) -> Mapping[str, LinkModes]:
-        """See above."""
-
-    @property
-    def patches(self) -> Mapping[str, PatchedLink]:
-        """See above."""
+    def coordinates(self, joint: str) -> tuple[str, ...]:
+        """Of a joint: its name, or "NAME 1", "NAME 2" where there are several."""
+        check_joint(self.model, joint)
+        return tuple(name.removeprefix("joint/") for name, _ in labelled(self.model, joint))
 
     @property
     def motors_fit(self) -> bool:
-        """See above."""
+        """Whether there are as many motors as the mechanism with rigid links has freedom."""
+        return len(self.motors) == rigid_freedom(self.model, self.source.q[0])
 
-    def coordinates(self, joint: str) -> tuple[str, ...]:
-        """Names of the coordinates of a joint."""
+    @cached_property
+    def links(self) -> Mapping[str, LinkModes]:
+        """Flexible ones by name."""
+        bodies = [node.body for node in self.model.tree.nodes if node.body.n_modes]
+        return {body.name: LinkModes(body.mass, body.length or 1.0, body.stiffness) for body in bodies}
+
+    @cached_property
+    def patches(self) -> Mapping[str, PatchedLink]:
+        """By link, with the modes that its layouts reach together."""
+        return {name: self._patched(name, of_link) for name, of_link in self.of_links.items()}
+
+    def _patched(self, name: str, of_link: LinkPatches) -> PatchedLink:
+        reached, to_file = of_link.reached, self.model.tree.nodes[self.model.tree.index[name]].body.modal_transform
+        inputs = [f"pzt/{layout}/{k}" for layout, of in of_link.arrays.items() for k in range(1, len(of.edges) + 1)]
+        volts = np.vstack([volts_on_file(of_link, layout)[name] for layout in of_link.arrays])
+        own = as_floats(np.linalg.solve(reached.T, to_file[reached.rows]))
+        return PatchedLink(
+            tuple(inputs), tuple(of_link.arrays), np.sqrt(reached.stiffness[: reached.served]),
+            voltage_gain(of_link.reach), reached.seen(volts), own,
+        )  # fmt: skip
 
     def linear(self, row: int) -> tuple[LinearMechanism, Mapping[str, Array]]:
         """About output `row` of the motion, and what a unit of each voltage does along its s."""
+        source = self.source
+        linearisation = SpatialLinearisation(self.model, source.q[row])
+        found = linearisation.at(float(source.time[row]), source.q[row], source.v[row], source.a[row])
+        return found, patch_voltages_in_space(self.model, found, self.of_links)
 
-    def rigid(self) -> RigidMotion:
+    def rigid(self) -> SpatialRigidArm:
         """With rigid links. Raises `InputError` where the motors do not fit the mechanism."""
+        return SpatialRigidArm(self.model, self.source.q[0])
 
 
 def input_names(robot: Robot) -> tuple[str, ...]:

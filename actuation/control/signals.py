@@ -1,31 +1,35 @@
-"""Readings of sensors and commands of actuators by name, as linear models name them."""
+"""Readings of sensors by name, as linear models name them: joints, motors, points, patches, modes."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TypeVar
 
 import numpy as np
 
-from ...common.arrays import Array
-from ...mbs import _core
-from ...mbs.joints.measure import Marker, Measure
-from ...mbs.model.model import Model
-from ...mbs.model.system import MechanismSystem
-from ..context import PlanarWholeLinks, place_of
+from ...common.arrays import Array, Indices
+from ...common.errors import InputError
+from ...mbs.analysis.context import WholeLinks
+from ...mbs.model.spatial_drives import Drives, PointDrive
+from ...mbs.model.spatial_known_motion import KnownStates, motion_forces
+from ...mbs.model.spatial_model import SpatialModel, modal_directions
+from ...mbs.model.spatial_system import SpatialSystem
+from ...mbs.model.spatial_tree import Section, SpatialTree
+from ...mbs.scene.space import SPACES
+from ...mbs.solve.spatial_linearisation import labelled
+from ..context import place_of
 from ..patches.patches import PatchArray
+from ..patches.spatial_patches import LinkPatches
 from .records import PERMITTIVITY, Sensor
 
-AnyReading = TypeVar("AnyReading", bound="Reading")
 ORDERS = {"value": 0, "rate": 1, "acceleration": 2}
 
 
 @dataclass(frozen=True)
-class Reading:
-    """One reading.
+class SpatialSignal:
+    """One reading: the coordinate `axis` (0, 1, 2) of a `point`, or `along` (n_v,) times joint and modal coordinates.
 
-    `name`: "joint/NAME", "motor/NAME", "point/BODY.POINT/x" or y, "pzt/BODY/k", "modal/BODY/k" (k from 1), with
+    `name`: "joint/NAME", "motor/NAME", "point/BODY.POINT/x" or y or z, "pzt/LAYOUT/k", "modal/BODY/k" (k from 1), with
     "/rate" or "/acceleration" behind it where that is read. `order` counts derivatives, `resolution` and `noise` are
     those of `Sensor`.
     """
@@ -34,54 +38,108 @@ class Reading:
     order: int
     resolution: float
     noise: float
+    along: Array = field(default_factory=lambda: np.zeros(0))
+    point: str = ""
+    axis: int = 0
 
 
-@dataclass(frozen=True)
-class Signal(Reading):
-    """In the plane: either `row` is read, or `vector` . p of the `bodies`, p of one beside that of the next."""
+class SpatialSensing:
+    """What signals read of states of a tree."""
 
-    row: Measure | None = None
-    bodies: tuple[str, ...] = ()
-    vector: Array = field(default_factory=lambda: np.zeros(0))
+    def __init__(self, model: SpatialModel, read: Sequence[SpatialSignal]) -> None:
+        tree = model.tree
+        self._tree, self._count = tree, len(read)
+        self._linear = np.array([k for k, signal in enumerate(read) if not signal.point], dtype=int)
+        self._order = np.array([read[k].order for k in self._linear], dtype=int)
+        self._along = np.reshape([read[k].along for k in self._linear], (len(self._linear), tree.n_v))
+        self._where = _places_in_q(tree)
+        sections = {signal.point: tree.section(signal.point, np.eye(3)) for signal in read if signal.point}
+        self._points: list[tuple[str, Section, list[tuple[int, int, int]]]] = [
+            (point, section, [(k, s.order, s.axis) for k, s in enumerate(read) if s.point == point])
+            for point, section in sections.items()
+        ]
+        accelerated = any(signal.point and signal.order == ORDERS["acceleration"] for signal in read)
+        drives = Drives(at_points=tuple(PointDrive(point, {}) for point in sections))
+        self._system = SpatialSystem(model, drives) if accelerated else None
+
+    def read(self, q: Array, v: Array, a: Array) -> Array:
+        """Readings (T, signals) of q (T, n_q), v and a (T, n_v)."""
+        found = np.zeros((len(q), self._count))
+        values = np.stack([q[:, self._where] @ self._along.T, v @ self._along.T])
+        found[:, self._linear] = np.where(self._order == ORDERS["value"], *values)
+        if not self._points:
+            return found
+        frames, forces = self._tree.frames(q), None
+        if self._system is not None:
+            none = np.zeros((len(q), len(self._system.model.rows)))
+            forces = motion_forces(self._system, KnownStates(q, v, a), np.zeros(len(q)), none)
+        for point, section, columns in self._points:
+            at = self._tree.motion(section, q, frames)
+            orders = [at.r, np.einsum("tij,tj->ti", at.L[:, :3], v)]
+            if forces is not None:
+                orders.append(forces.of_point(point).a)
+            for k, order, axis in columns:
+                found[:, k] = orders[order][:, axis]
+        return found
 
 
-def signals(
-    model: Model, patches: Mapping[str, PatchArray], sensor: Sensor, whole: PlanarWholeLinks | None = None
-) -> Iterator[Signal]:
-    """The readings of one sensor of the scene, of whose links some are in pieces where there are `whole` ones."""
+def _places_in_q(tree: SpatialTree) -> Indices:
+    """(n_v,) where in q the coordinate of each rate is; of orientations, which nothing reads so, some other place."""
+    places = np.zeros(tree.n_v, dtype=np.intp)
+    for node in tree.nodes:
+        if node.joint.q_count == node.joint.freedoms:
+            places[node.v] = np.arange(node.q.start, node.q.stop)
+        places[node.p_v] = np.arange(node.p_q.start, node.p_q.stop)
+    return places
+
+
+def spatial_signals(
+    model: SpatialModel, patches: Mapping[str, LinkPatches], sensor: Sensor, whole: WholeLinks | None = None
+) -> Iterator[SpatialSignal]:
+    """The readings of one sensor of the scene, of whose links some are in pieces where there are `whole` ones.
+
+    Raises `InputError` for a joint without coordinates in the tree.
+    """
     order, ending = ORDERS[sensor.measure], "" if sensor.measure == "value" else f"/{sensor.measure}"
-    quality = sensor.resolution, sensor.noise
+    quality = order, sensor.resolution, sensor.noise
     if sensor.joint is not None:
-        yield Signal(f"joint/{sensor.joint}{ending}", order, *quality, model.scene.coordinate(sensor.joint))
+        check_joint(model, sensor.joint)
+        sign = -1.0 if model.tree.nodes[model.tree.carried[sensor.joint]].backwards else 1.0
+        for name, k in labelled(model, sensor.joint):
+            yield SpatialSignal(f"{name}{ending}", *quality, along=sign * np.eye(model.tree.n_v)[k])
     elif sensor.motor is not None:
-        yield Signal(f"motor/{sensor.motor}{ending}", order, *quality, model.motors[sensor.motor])
+        k = model.driven(sensor.motor).v.start
+        yield SpatialSignal(f"motor/{sensor.motor}{ending}", *quality, along=np.eye(model.tree.n_v)[k])
     elif sensor.point is not None:
-        body, _, point = place_of(whole, sensor.point).partition(".")
-        for axis in ("x", "y"):
-            row = Measure(
-                f'sensor on "{sensor.point}"', getattr(_core.MeasureKind, axis), Marker(None), Marker(body, point)
-            )
-            yield Signal(f"point/{sensor.point}/{axis}{ending}", order, *quality, row)
+        place = place_of(whole, sensor.point)
+        for axis in SPACES[model.scene.space].translations:
+            yield SpatialSignal(f"point/{sensor.point}/{'xyz'[axis]}{ending}", *quality, point=place, axis=axis)
     elif sensor.pzt is not None:
-        for k, vector in enumerate(volts_per_modal_coordinate(patches[sensor.pzt], sensor.capacitance), 1):
-            carriers = patches[sensor.pzt].carriers
-            yield Signal(f"pzt/{sensor.pzt}/{k}", order, *quality, bodies=carriers, vector=vector)
+        body = next(body for body, of_link in patches.items() if sensor.pzt in of_link.arrays)
+        volts = volts_on_file(patches[body], sensor.pzt, sensor.capacitance)
+        for k, along in enumerate(modal_directions(model, {name: of.T for name, of in volts.items()}), 1):
+            yield SpatialSignal(f"pzt/{sensor.pzt}/{k}", *quality, along=along)
     elif sensor.modal is not None:
-        bodies, rows = _modal_coordinates(model, sensor.modal, whole)
-        for k, vector in enumerate(rows, 1):
-            yield Signal(f"modal/{sensor.modal}/{k}{ending}", order, *quality, bodies=bodies, vector=vector)
+        for k, along in enumerate(_modal_coordinates(model, sensor.modal, whole), 1):
+            yield SpatialSignal(f"modal/{sensor.modal}/{k}{ending}", *quality, along=along)
 
 
-def _modal_coordinates(model: Model, link: str, whole: PlanarWholeLinks | None) -> tuple[tuple[str, ...], Array]:
-    """The bodies whose modes make up those of a link, and p of the link (n, …) in theirs."""
+def merged(given: Iterable[SpatialSignal], needed: Iterable[SpatialSignal]) -> tuple[SpatialSignal, ...]:
+    """The sensors of the scene, and ideal ones for what controllers need besides."""
+    by_name = {signal.name: signal for signal in needed} | {signal.name: signal for signal in given}
+    return tuple(by_name.values())
+
+
+def _modal_coordinates(model: SpatialModel, link: str, whole: WholeLinks | None) -> Array:
+    """(n, n_v) p of a link by v: its own coordinates, or of its pieces."""
     if whole is None or link not in whole.divided:
-        return (link,), np.eye(model.body(link).n_modes)
-    return whole.divided[link].bodies, whole.divided[link].gathered
-
-
-def volts_per_modal_coordinate(patches: PatchArray, capacitance: float | None = None) -> Array:
-    """Voltage (k, n) of each patch per modal coordinate: by how much that turns its ends against each other."""
-    return volts_per_turn(patches, capacitance)[:, None] * patches.turn.T
+        return np.eye(model.tree.n_v)[model.tree.nodes[model.tree.index[link]].p_v]
+    bodies, rows = whole.divided[link].bodies, whole.divided[link].gathered
+    places = [model.tree.nodes[model.tree.index[body]].p_v for body in bodies]
+    columns = np.concatenate([np.arange(of_piece.start, of_piece.stop) for of_piece in places])
+    found = np.zeros((len(rows), model.tree.n_v))
+    found[:, columns] = rows
+    return found
 
 
 def volts_per_turn(patches: PatchArray, capacitance: float | None = None) -> Array:
@@ -97,20 +155,24 @@ def volts_per_turn(patches: PatchArray, capacitance: float | None = None) -> Arr
     return patches.moment_per_volt / (own if capacitance is None else capacitance)
 
 
-def merged(given: Iterable[AnyReading], needed: Iterable[AnyReading]) -> tuple[AnyReading, ...]:
-    """The sensors of the scene, and ideal ones for what controllers need besides."""
-    by_name = {signal.name: signal for signal in needed} | {signal.name: signal for signal in given}
-    return tuple(by_name.values())
+def volts_on_file(of_link: LinkPatches, layout: str, capacitance: float | None = None) -> dict[str, Array]:
+    """By body that may carry a layout: (k, n) that its patches read per unit of the modes of the body's file."""
+    volts, columns = volts_per_turn(of_link.arrays[layout], capacitance), of_link.columns(layout)
+    return {name: volts[:, None] * of.turn[:, columns].T for name, of in of_link.bodies.items()}
 
 
-def rows_first(read: Iterable[Signal]) -> tuple[Signal, ...]:
-    """As the core has them."""
-    return tuple(sorted(read, key=lambda signal: signal.row is None))
-
-
-def sensing(assembly: MechanismSystem, read: Sequence[Signal]) -> _core.Sensing:
-    """What reads these signals in the core; the motor rows of `assembly` are those of the signals along rows."""
-    orders = [signal.order for signal in read if signal.row is not None]
-    along = list(zip(assembly.motor_measures, orders, strict=True))
-    modal = [(assembly.index[s.bodies[0]], s.vector, s.order) for s in read if s.row is None]
-    return _core.Sensing(assembly.system, along, modal)
+def check_joint(model: SpatialModel, joint: str) -> None:
+    """Raise `InputError` unless controllers can read and name the coordinates of a joint."""
+    scene = model.scene
+    record = next(each for each in scene.joint if each.name == joint)
+    if not record.units or joint not in model.tree.carried:
+        why = "at which a loop is cut" if record.units else "whose orientation is no list of coordinates"
+        raise InputError(
+            f"{scene.path}: sensor or controller: joint: expected one with coordinates, found"
+            f' "{joint}", a {record.type} joint {why}'
+        )
+    if record.type == "planar" and model.tree.nodes[model.tree.carried[joint]].backwards:
+        raise InputError(
+            f"{scene.path}: {record.label}: between: expected the side nearer to the ground first where sensors read a"
+            " planar joint, found it second"
+        )

@@ -1,4 +1,4 @@
-"""Forward dynamics in space under a sampled controller: sensors, delay, saturation, feed-forward, disturbances."""
+"""Forward dynamics under a sampled controller: sensors, delay, saturation, feed-forward, disturbances."""
 
 from __future__ import annotations
 
@@ -20,7 +20,6 @@ from ...mbs.analysis.spatial_replay import replay_times, supplied
 from ...mbs.model.spatial_drives import Drives, PointDrive
 from ...mbs.model.spatial_gears import with_compliance_in_space
 from ...mbs.model.spatial_model import SpatialModel, without_paths
-from ...mbs.scene.spatial.loads import SpatialLoad
 from ...mbs.solve.spatial_linearisation import SpatialLinearisation
 from ...mbs.solve.spatial_statics import initial_state
 from ...mbs.solve.state import State
@@ -33,21 +32,20 @@ from .loop_keys import SampledAnalysis
 from .loop_record import between, held_commands, held_until, loop_record, sample_times, times_of_run
 from .margins import lowest_frequency
 from .metrics import Followed, place_of_tip
-from .robot import input_names
-from .signals import merged
-from .spatial_robot import SpatialRobot
-from .spatial_signals import SpatialSensing, SpatialSignal, spatial_signals
+from .robot import Robot, input_names
+from .signals import SpatialSensing, SpatialSignal, merged, spatial_signals
 
 
 class SpatialClosedLoop(SampledAnalysis):
-    """Motion under sampled control; disturbances and measured points have components x, y, z.
+    """Motion under sampled control; reference, feed-forward and start are those of the inverse analysis `actuation`.
+
+    Samples are at 0, sample_time, …; a zero-order hold applies the command of each `delay` later. Torques and voltages
+    are limited as in the scene unless `unlimited`. The initial state is that of the inverse analysis, or [initial] of
+    the scene, on the trajectories. `seed` initializes the noise. `tip` is the point of the reported error.
 
     Sensors name patches by their layout. Joints with several coordinates have one signal per coordinate, "joint/NAME
     1", "joint/NAME 2", with the same gains.
     """
-
-    disturbance: tuple[SpatialLoad, ...] = ()
-    """Loads at points, unknown to `actuation`."""
 
     def run(self, context: ActuatedContext) -> Outcome:
         """Motion and commands."""
@@ -115,11 +113,11 @@ def run_spatial_closed_loop(context: ActuatedContext, analysis: SpatialClosedLoo
     return replace(told(run), look_closer=lambda: told(closer))
 
 
-def _robot(context: ActuatedContext, source: Outcome) -> SpatialRobot:
+def _robot(context: ActuatedContext, source: Outcome) -> Robot:
     """What controllers know of: whole links also where the plant has their pieces."""
     if context.whole is None:
-        return SpatialRobot(without_paths(context.model), context.patches, source)
-    return SpatialRobot(without_paths(context.whole.model), context.patches, context.whole.told(source))
+        return Robot(without_paths(context.model), context.patches, source)
+    return Robot(without_paths(context.whole.model), context.patches, context.whole.told(source))
 
 
 def loop_models_in_space(model: SpatialModel, time: Array, reference: WoundUp) -> tuple[LinearModel, ...]:
@@ -140,7 +138,7 @@ def _setup(
     context: ActuatedContext,
     analysis: SpatialClosedLoop,
     source: Outcome,
-    robot: SpatialRobot,
+    robot: Robot,
     plant: _Plant,
     read: Sequence[SpatialSignal],
     outputs: Array,

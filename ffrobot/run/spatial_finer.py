@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..actuation.control.spatial_linear import held_by_motors
+from ..actuation.control.linear import held_by_motors
 from ..common.arrays import Array
 from ..common.errors import InputError
 from ..mbs.analysis.forward import Forward

@@ -24,7 +24,7 @@ from ..mbs.scene.loads import Load
 from ..mbs.scene.spatial.loads import SpatialLoad
 from ..mbs.scene.spatial.trajectories import SpatialTrajectory
 from ..mbs.scene.trajectories import Trajectory
-from .kinds import KINDS, AnyKind, AnyKindInSpace
+from .kinds import KINDS, AnyKind
 from .scene import SceneKeys
 from .spatial_keys import SpatialSceneKeys
 
@@ -233,7 +233,7 @@ def _stiffening_problems(scene: AnyKeys) -> Iterator[str]:
             )
 
 
-def _unmet_needs(scene: AnyKeys, analysis: AnyKind | AnyKindInSpace) -> Iterator[str]:
+def _unmet_needs(scene: AnyKeys, analysis: AnyKind) -> Iterator[str]:
     for need in analysis.needs():
         if not getattr(scene, need.table):
             yield f'{need.key}: expected at least one [[{need.table}]] for "{need.value}", found none'

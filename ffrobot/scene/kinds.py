@@ -6,7 +6,6 @@ from typing import Annotated, get_args
 
 from pydantic import Field
 
-from ..actuation.control.closed_loop import ClosedLoop
 from ..actuation.control.linear import Linear
 from ..actuation.control.placement import PatchPlacement
 from ..actuation.control.spatial_closed_loop import SpatialClosedLoop
@@ -17,14 +16,9 @@ from ..mbs.analysis.pcid import Pcid
 from ..mbs.analysis.static import Static
 from ..mbs.analysis.tracking import Tracking
 
-AnyKind = Pcid | Fcid | Forward | Static | Linear | PatchPlacement | MotorsOnly | ClosedLoop
+AnyKind = Pcid | Fcid | Forward | Static | Linear | PatchPlacement | MotorsOnly | Tracking | SpatialClosedLoop
 
 Analysis = Annotated[AnyKind, Field(discriminator="kind")]
 """One table [[analysis]] of a scene, of the kind that it says."""
-
-AnyKindInSpace = Pcid | Fcid | Forward | Static | Linear | PatchPlacement | MotorsOnly | Tracking | SpatialClosedLoop
-
-AnalysisInSpace = Annotated[AnyKindInSpace, Field(discriminator="kind")]
-"""The same of scenes in space: disturbances have components there that the plane has not."""
 
 KINDS: tuple[type[AnyKind], ...] = get_args(AnyKind)

@@ -10,7 +10,7 @@ from ..actuation.spatial_points import SpatialActuationPoints
 from ..mbs.fields.field_types import NotEmpty
 from ..mbs.fields.references import Reference, under
 from ..mbs.scene.spatial.mechanism import SpatialMechanismKeys
-from .kinds import AnalysisInSpace
+from .kinds import Analysis
 
 
 class SpatialSceneKeys(SpatialMechanismKeys):
@@ -20,7 +20,7 @@ class SpatialSceneKeys(SpatialMechanismKeys):
     """Layouts of piezoelectric patches; names distinguish several on one body."""
     actuation_points: tuple[SpatialActuationPoints, ...] = ()
     """Points of forces that replace the driving forces."""
-    analysis: Annotated[tuple[AnalysisInSpace, ...], NotEmpty]
+    analysis: Annotated[tuple[Analysis, ...], NotEmpty]
     """Analyses, in this order."""
 
     @property

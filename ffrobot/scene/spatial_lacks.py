@@ -43,6 +43,6 @@ LACKS = (
         "sensors and controllers on spherical and free joints, which have no coordinates, and on all joints of a"
         " kinematic loop where none has a `rotor_inertia`",
         "sensors of points, or of other joints of the loop",
-        "ffrobot.actuation.control.spatial_signals",
+        "ffrobot.actuation.control.signals",
     ),
 )
