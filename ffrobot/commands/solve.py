@@ -15,7 +15,6 @@ from .protect import protect
 
 if TYPE_CHECKING:
     from ..present.progress import Display
-    from ..run.solution import Solution
     from ..run.spatial_solution import SpatialSolution
 
 
@@ -84,7 +83,7 @@ def _solve(program: _Stage2, scene_file: Path, path: Path, again: str, *, resume
         click.echo(f"note       {remark}")
     writing, kept = 0.0, []
 
-    def keep(solution: Solution | SpatialSolution) -> None:
+    def keep(solution: SpatialSolution) -> None:
         nonlocal writing
         began = time.perf_counter()
         program.write(solution, path)
@@ -115,7 +114,7 @@ def _solve(program: _Stage2, scene_file: Path, path: Path, again: str, *, resume
         _check_without_warnings(solution, scene_file)
 
 
-def _check_ended(solution: Solution | SpatialSolution, display: Display, scene_file: Path, again: str) -> None:
+def _check_ended(solution: SpatialSolution, display: Display, scene_file: Path, again: str) -> None:
     """Raise `SolveError` where an analysis ended early, `StoppedError` where a signal has asked for an end."""
     from ..common.errors import SolveError, StoppedError
     from ..results.stopped import how_to_go_on, left_out
@@ -131,7 +130,7 @@ def _check_ended(solution: Solution | SpatialSolution, display: Display, scene_f
         raise StoppedError(f"{scene_file}: stopped on request {done}{go_on}", display.signal)
 
 
-def _check_without_warnings(solution: Solution | SpatialSolution, scene_file: Path) -> None:
+def _check_without_warnings(solution: SpatialSolution, scene_file: Path) -> None:
     """Raise `SolveError` for the first warning."""
     from ..common.errors import SolveError
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from ..mbs.quantities.attachment_error import JOLT
-from ..run.solution import AnalysisResult, Solution
 from ..run.spatial_solution import SpatialResult, SpatialSolution
 from .lines import deflection_in_words
 
@@ -13,7 +12,7 @@ NOT_ESTIMATED = "not estimated"
 RESOLVED = 0.3  # an estimated error of modes beyond is none: they do not resolve the motion
 
 
-def error_budget(solution: Solution | SpatialSolution) -> Iterator[str]:
+def error_budget(solution: SpatialSolution) -> Iterator[str]:
     """A line each: time integration, modes, deflection, patches."""
     results = integrated(solution)
     if aims := [result.analysis.tolerance for result in results]:
@@ -27,12 +26,12 @@ def error_budget(solution: Solution | SpatialSolution) -> Iterator[str]:
     yield from (f"patches of {patches.stiffness_in_words}" for patches in solution.patch_arrays)
 
 
-def integrated(solution: Solution | SpatialSolution) -> list[AnalysisResult | SpatialResult]:
+def integrated(solution: SpatialSolution) -> list[SpatialResult]:
     """The analyses that went through time."""
     return [result for result in solution.analyses.values() if result.analysis.is_integrated]
 
 
-def _modes(solution: Solution | SpatialSolution, results: Sequence[AnalysisResult | SpatialResult]) -> str:
+def _modes(solution: SpatialSolution, results: Sequence[SpatialResult]) -> str:
     if rigid := [f"{name} in {', '.join(body.rigid_in)}" for name, body in solution.bodies.items() if body.rigid_in]:
         return f"{NOT_ESTIMATED}: rigid for want of modes: {'; '.join(rigid)}"
     if solution.mode_choice is not None:

@@ -21,20 +21,6 @@ from ..actuation.spatial_points import SpatialPointSet
 from ..actuation.unsupplied import Unsupplied
 from ..common.arrays import Array
 from ..mbs.scene.space import Space
-from ..run.solution import AnalysisResult, Solution
-
-
-def write_actuators(group: h5py.Group, solution: Solution, result: AnalysisResult) -> None:
-    """Of an analysis: pzt/, actuation_points/, patch_structure/, feasibility/, and what is left undone at points/."""
-    for body, voltages in result.voltages.items():
-        write_voltages(group.create_group(f"pzt/{body}"), solution.patches[body], voltages, voltages.unmet)
-    for body, forces in result.point_forces.items():
-        write_point_forces(group.create_group(f"actuation_points/{body}"), solution.points[body], forces)
-    write_structure(group, solution.structure)
-    for point, shift in result.predicted_shift.items():
-        group[f"points/{point}/predicted_shift"] = shift
-    if result.feasibility is not None:
-        _write_feasibility(group.create_group("feasibility"), solution, result.feasibility)
 
 
 def write_structure(group: h5py.Group, effects: Mapping[str, StructureEffect]) -> None:
@@ -56,11 +42,6 @@ def write_voltages(group: h5py.Group, patches: PatchArray, voltages: Voltages, u
     group.attrs["condition_number"] = patches.condition_number
     group["residual_force"] = unmet
     group.attrs["limit"] = patches.limit if np.unique(patches.limit).size > 1 else patches.limit[0]
-
-
-def _write_feasibility(group: h5py.Group, solution: Solution, judged: Feasibility) -> None:
-    write_verdict(group, judged)
-    write_judgement(group, judged, {name: array.layout for name, array in solution.patches.items()})
 
 
 def write_verdict(group: h5py.Group, judged: Feasibility) -> None:

@@ -1,24 +1,19 @@
-"""What of a run that was stopped can be gone on with, in the plane and in space, and what messages say of it."""
+"""What of a run that was stopped can be gone on with, and what messages say of it."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from ..common.arrays import Array
 from ..common.errors import InputError
-from ..mbs.analysis.outcome import AnyOutcome
+from ..mbs.analysis.outcome import Outcome
 from ..run.enough import goes_on
-from ..run.solution import Solution
+from ..run.spatial_solution import SpatialSolution
 from .file import Results
-
-if TYPE_CHECKING:  # else every solve in the plane would load what is of space
-    from ..run.spatial_solution import SpatialSolution
 
 GROUP = "resume"  # in the group of an analysis
 STOPPED = ("interrupted", "too many steps", "not evaluated")
 
 
-def how_to_go_on(solution: Solution | SpatialSolution, command: str) -> str:
+def how_to_go_on(solution: SpatialSolution, command: str) -> str:
     """What a message about a run that was stopped adds; empty where it cannot be gone on with."""
     outcome = stopped(solution)
     if outcome is None:
@@ -28,24 +23,24 @@ def how_to_go_on(solution: Solution | SpatialSolution, command: str) -> str:
     return f'; {command} runs "{outcome.analysis.name}" again from its start'
 
 
-def left_out(solution: Solution | SpatialSolution) -> list[str]:
+def left_out(solution: SpatialSolution) -> list[str]:
     """Analyses that were not begun when the run was stopped, or ended by an error."""
     if any(outcome.failed and outcome.status not in STOPPED for outcome in solution.outcomes.values()):
         return []
     return [name for name in analyses(solution) if name not in solution.outcomes]
 
 
-def is_kept(solution: Solution | SpatialSolution) -> bool:
+def is_kept(solution: SpatialSolution) -> bool:
     """Whether there is something to go on with."""
     return stopped(solution) is not None or bool(left_out(solution))
 
 
-def stopped(solution: Solution | SpatialSolution) -> AnyOutcome | None:
+def stopped(solution: SpatialSolution) -> Outcome | None:
     """The analysis that was stopped."""
     return next((outcome for outcome in solution.outcomes.values() if outcome.status in STOPPED), None)
 
 
-def analyses(solution: Solution | SpatialSolution) -> list[str]:
+def analyses(solution: SpatialSolution) -> list[str]:
     """Names of all that the scene asks for."""
     return [analysis.name for analysis in solution.scene.analysis]
 

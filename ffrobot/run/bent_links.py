@@ -1,4 +1,4 @@
-"""How far links bend, told of links in pieces, and whether they can be divided: in the plane and in space."""
+"""How far links bend, those in pieces as one link each, and whether they can be divided."""
 
 from __future__ import annotations
 

@@ -1,36 +1,29 @@
-"""Scenes solved again and again, with more modes or in more pieces, until there are enough; plane and space."""
+"""Scenes solved again and again, with more modes or in more pieces, until there are enough."""
 
 from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import Any, TypeVar
 
 from ..mbs.analysis.drive import Progress
-from ..mbs.analysis.outcome import AnyOutcome
-from ..mbs.model.planar_body import PlanarBody
+from ..mbs.analysis.outcome import Outcome
 from ..mbs.model.spatial_body import SpatialBody
 from ..mbs.scene.analysis import Analysis
 from .mode_search import ModeSearch, Reported
-from .solution import AnalysisResult, Solution
 from .spatial_solution import SpatialResult, SpatialSolution
 from .watcher import Interruption, Watcher
 
 logger = logging.getLogger(__name__)
 
-B = TypeVar("B", PlanarBody, SpatialBody)
-R = TypeVar("R", AnalysisResult, SpatialResult)
-S = TypeVar("S", Solution, SpatialSolution)
-
 
 def with_enough_modes(
-    solution: S,
-    search: ModeSearch[B],
-    solved: Callable[[S, Mapping[str, B]], S],
-    reported: Callable[[R], Reported],
+    solution: SpatialSolution,
+    search: ModeSearch,
+    solved: Callable[[SpatialSolution, Mapping[str, SpatialBody]], SpatialSolution],
+    reported: Callable[[SpatialResult], Reported],
     interruption: Interruption,
-) -> S:
+) -> SpatialSolution:
     """The scene `solved` with the bodies that `search` asks for, until that has enough."""
     while True:
         solution = solved(solution, search.bodies)
@@ -41,7 +34,7 @@ def with_enough_modes(
             return replace(solution, mode_choice=search.choice())
 
 
-def _reported(solution: Solution | SpatialSolution, reported: Callable[[Any], Reported]) -> dict[str, Reported] | None:
+def _reported(solution: SpatialSolution, reported: Callable[[SpatialResult], Reported]) -> dict[str, Reported] | None:
     """What counts, by analysis; None where not all of them completed."""
     results = solution.analyses
     if len(results) < len(solution.scene.analysis) or any(of.status != "completed" for of in results.values()):
@@ -50,12 +43,12 @@ def _reported(solution: Solution | SpatialSolution, reported: Callable[[Any], Re
 
 
 def with_enough_pieces(
-    solution: S,
-    solved: Callable[[S], S],
-    divided: Callable[[S, Mapping[str, int]], S],
-    wanted: Callable[[S], Mapping[str, int]],
+    solution: SpatialSolution,
+    solved: Callable[[SpatialSolution], SpatialSolution],
+    divided: Callable[[SpatialSolution, Mapping[str, int]], SpatialSolution],
+    wanted: Callable[[SpatialSolution], Mapping[str, int]],
     interruption: Interruption,
-) -> S:
+) -> SpatialSolution:
     """The scene `solved` with links `divided` in as many pieces as they bend far, which is what solutions want more."""
     solution = solved(solution)
     given = {body.name: body.pieces for body in solution.scene.body if isinstance(body.pieces, int)}
@@ -64,15 +57,17 @@ def with_enough_pieces(
     return solution
 
 
-def goes_on(solution: Solution | SpatialSolution, outcome: AnyOutcome) -> bool:
+def goes_on(solution: SpatialSolution, outcome: Outcome) -> bool:
     """Whether `outcome` is of use to `resume`; a search for modes or pieces has its own bodies and starts again."""
-    searched = any(
-        "auto" in (getattr(body, "modes", None), getattr(body, "pieces", None)) for body in solution.scene.body
-    )
+    searched = any("auto" in (body.modes, body.pieces) for body in solution.scene.body)
     return not searched and outcome.analysis.is_resumable
 
 
-def completed(solution: S, run_all: Callable[[S], S | None], stiffened: Callable[[S], S]) -> S:
+def completed(
+    solution: SpatialSolution,
+    run_all: Callable[[SpatialSolution], SpatialSolution | None],
+    stiffened: Callable[[SpatialSolution], SpatialSolution],
+) -> SpatialSolution:
     """All analyses run, all of them stiffened where `geometric_stiffening = "auto"` asks for that."""
     found = run_all(solution) or run_all(stiffened(solution))
     assert found is not None
@@ -89,7 +84,7 @@ def is_replayed(analysis: Analysis, among: Sequence[Analysis]) -> bool:
     return analysis.is_checked or any(other.takes_actuation and other.source == analysis.name for other in among)
 
 
-def log_outcome(outcome: AnyOutcome) -> None:
+def log_outcome(outcome: Outcome) -> None:
     """One line on how an analysis went."""
     run = outcome.statistics
     logger.info(

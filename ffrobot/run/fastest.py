@@ -10,18 +10,15 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from math import inf, sqrt
-from typing import Generic, TypeVar
 
 from ..actuation.feasibility import Feasibility
 from ..common.errors import InputError
 from ..common.validation import quoted
 from ..mbs.joints.transmission import MotorLimits
 from ..mbs.scene.analysis import TimedAnalysis
-from ..scene.scene import Scene
 from ..scene.spatial import SpatialScene
 
-AnyScene = TypeVar("AnyScene", Scene, SpatialScene)
-Judge = Callable[[AnyScene], Feasibility | None]
+Judge = Callable[[SpatialScene], Feasibility | None]
 """Solves a scene with the one analysis that it has; None where there is no motion along the path."""
 
 GROWTH = 1.5  # of the stretch, until one is found that is too fast and one that is not
@@ -31,12 +28,12 @@ KEPT = 1.0 + 1e-9  # times a limit
 
 
 @dataclass
-class Search(Generic[AnyScene]):
+class Search:
     """Motions that were tried, by their stretch: the largest ratio of what is required to a limit, and of what."""
 
-    scene: AnyScene
+    scene: SpatialScene
     analysis: TimedAnalysis
-    judge: Judge[AnyScene]
+    judge: Judge
     tried: dict[float, tuple[float, str]] = field(default_factory=dict)
 
     def keeps_limits(self, stretch: float) -> bool:
@@ -52,7 +49,7 @@ class Search(Generic[AnyScene]):
         return max((factor, name) for name, factor in found.factors.items())
 
 
-def fastest(scene: AnyScene, judge: Judge[AnyScene]) -> tuple[AnyScene, str]:
+def fastest(scene: SpatialScene, judge: Judge) -> tuple[SpatialScene, str]:
     """The scene with its paths stretched by the least factor that keeps all limits, to 0.5 %, and what was found.
 
     Raises `InputError` where nothing has a limit, no analysis can judge, or the run is too short for any such motion.
@@ -94,13 +91,13 @@ def least_stretch(keeps_limits: Callable[[float], bool], least: float, most: flo
     return good
 
 
-def stretched(scene: AnyScene, stretch: float) -> AnyScene:
+def stretched(scene: SpatialScene, stretch: float) -> SpatialScene:
     """The scene with the paths that are to be fastest slowed down by a factor."""
     paths = [one.changed(stretch=stretch, fastest=False) if one.fastest else one for one in scene.trajectory]
     return scene.model_copy(update={"trajectory": tuple(paths)})
 
 
-def judging(scene: Scene | SpatialScene) -> TimedAnalysis:
+def judging(scene: SpatialScene) -> TimedAnalysis:
     """The first inverse analysis. Raises `InputError` where there is none, or nothing to judge by."""
     where = f"{scene.path}: trajectory {_names(scene)}: fastest"
     inverse = [one for one in scene.analysis if one.applicable and isinstance(one, TimedAnalysis)]
@@ -112,7 +109,7 @@ def judging(scene: Scene | SpatialScene) -> TimedAnalysis:
     limited = any(of != MotorLimits() for each in limits for of in ([each] if isinstance(each, MotorLimits) else each))
     if not limited and not any(layout.limit for layout in scene.pzt):
         raise InputError(f"{where}: expected limits of motors (moment_limit, speed_limit, …) or of patches, found none")
-    if any(getattr(body, "modes", None) == "auto" for body in scene.body):
+    if any(body.modes == "auto" for body in scene.body):
         raise InputError(
             f'{where}: expected bodies with a number of modes, found modes = "auto": solve once without fastest and'
             " write the numbers of modes that its summary prints"
@@ -120,7 +117,7 @@ def judging(scene: Scene | SpatialScene) -> TimedAnalysis:
     return inverse[0]
 
 
-def _bounds(scene: Scene | SpatialScene, analysis: TimedAnalysis) -> tuple[float, float]:
+def _bounds(scene: SpatialScene, analysis: TimedAnalysis) -> tuple[float, float]:
     """Stretches at which the path keeps its own limits, and is over before the run is."""
     one, two = (_end(scene, stretch) for stretch in (1.0, 2.0))
     least = 1.0 if any(path.fastest and path.duration is None for path in scene.trajectory) else 1.0 / MOST
@@ -133,11 +130,11 @@ def _bounds(scene: Scene | SpatialScene, analysis: TimedAnalysis) -> tuple[float
     return least, most
 
 
-def _end(scene: Scene | SpatialScene, stretch: float) -> float:
+def _end(scene: SpatialScene, stretch: float) -> float:
     """When the last of the paths that are to be fastest is over, s."""
     slower = (one.changed(stretch=stretch, fastest=False).path for one in scene.trajectory if one.fastest)
     return max(path.end for path in slower if path is not None)
 
 
-def _names(scene: Scene | SpatialScene) -> str:
+def _names(scene: SpatialScene) -> str:
     return quoted(one.name for one in scene.trajectory if one.fastest)

@@ -1,4 +1,4 @@
-"""What is loaded of a body of a scene, in the plane and in space: its modal body, and the payloads on it."""
+"""What is loaded of a body of a scene: its modal body, and the payloads on it."""
 
 from __future__ import annotations
 

@@ -5,18 +5,18 @@ from __future__ import annotations
 from dataclasses import replace
 from math import ceil
 
-from ..mbs.model.truncation import loaded_points, with_fewer_modes
-from .mode_choice import reported
+from ..mbs.model.truncation import loaded_points, with_fewer_modes_in_space
 from .mode_search import Errors, difference
-from .prepare import with_bodies
-from .solution import Solution
-from .solve import run_analyses
+from .spatial import run_spatial
+from .spatial_mode_choice import reported_in_space
+from .spatial_prepare import with_bodies_in_space
+from .spatial_solution import SpatialSolution
 from .watcher import Watcher
 
 PART = 2 / 3  # of the eigenmodes of each link in the solve that is compared with
 
 
-def modal_errors(solution: Solution, watcher: Watcher | None = None) -> Errors | None:
+def modal_errors(solution: SpatialSolution, watcher: Watcher | None = None) -> Errors | None:
     """Estimated error of the largest quantity of each kind, relative to its peak, by analysis; None where unknown.
 
     The difference to a solve with two thirds of the eigenmodes of each link. With attachment modes the error falls with
@@ -27,19 +27,19 @@ def modal_errors(solution: Solution, watcher: Watcher | None = None) -> Errors |
 
     Costs a solve with fewer modes. Raises what a solve raises.
     """
-    bodies = {name: body.planar for name, body in solution.bodies.items() if body.planar.n_modes}
+    bodies = {name: body.spatial for name, body in solution.bodies.items() if body.spatial.n_modes}
     whole = {name: body for name, body in bodies.items() if body.attachment_modes and body.reduction is None}
     if not bodies or whole.keys() != bodies.keys() or any(body.n_eigenmodes < 2 for body in whole.values()):
         return None
     scene = solution.scene
     fewer = {
-        name: with_fewer_modes(body, ceil(PART * body.n_eigenmodes), loaded_points(scene, name))
+        name: with_fewer_modes_in_space(body, ceil(PART * body.n_eigenmodes), loaded_points(scene, name))
         for name, body in whole.items()
     }
-    unsolved = replace(with_bodies(solution, fewer), analyses={}, failure=None, earlier={})
-    coarse = run_analyses(unsolved, watcher or Watcher())
+    unsolved = replace(with_bodies_in_space(solution, fewer), failure=None, earlier={})
+    coarse = run_spatial(unsolved, watcher or Watcher())
     return {
-        name: difference(reported(scene, result), reported(scene, coarse.analyses[name]))
+        name: difference(reported_in_space(result), reported_in_space(coarse.analyses[name]))
         for name, result in solution.analyses.items()
-        if name in coarse.analyses and result.outcome.status == coarse.analyses[name].outcome.status == "completed"
+        if name in coarse.analyses and result.status == coarse.analyses[name].status == "completed"
     }

@@ -1,4 +1,4 @@
-"""How many modes of the links a scene needs for its tolerance, in the plane and in space: more and more are tried.
+"""How many modes of the links a scene needs for its tolerance: more and more are tried.
 
 The first solves are cheap: few modes leave out the high frequencies, which hold the steps down.
 """
@@ -8,17 +8,16 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Generic, TypeVar
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..common.arrays import Array
-from ..mbs.model.planar_body import PlanarBody
 from ..mbs.model.spatial_body import SpatialBody
 from ..mbs.model.truncation import loaded_points
 
 if TYPE_CHECKING:
-    from ..scene.any_space import AnyScene
+    from ..scene.spatial import SpatialScene
 
 Errors = Mapping[str, Mapping[str, float]]
 """By analysis and kind of quantity, relative to peaks."""
@@ -117,24 +116,21 @@ def difference(now: Reported, before: Reported) -> dict[str, float]:
     return found
 
 
-B = TypeVar("B", PlanarBody, SpatialBody)
-
-
-class ModeSearch(Generic[B]):
+class ModeSearch:
     """How many modes to solve a scene with next, and when there are enough.
 
     `tolerances` by analysis; `levels`: bodies with more and more modes, the last with all (`truncation_levels`).
     """
 
-    def __init__(self, tolerances: Mapping[str, float], levels: Sequence[Mapping[str, B]]) -> None:
+    def __init__(self, tolerances: Mapping[str, float], levels: Sequence[Mapping[str, SpatialBody]]) -> None:
         self._tolerances = tolerances
-        self._levels: Sequence[Mapping[str, B]] = levels
+        self._levels: Sequence[Mapping[str, SpatialBody]] = levels
         self._estimate, self._tried = ErrorEstimate(), list[int]()
         self._level, self._is_over, self._completed = 0, False, False
         self._began = self._last = time.perf_counter()
 
     @property
-    def bodies(self) -> Mapping[str, B]:
+    def bodies(self) -> Mapping[str, SpatialBody]:
         """The bodies to solve with next; those of the solve to keep once it is over."""
         return self._levels[self._level]
 
@@ -177,7 +173,7 @@ class ModeSearch(Generic[B]):
         return ModeChoice(errors, self._estimate.differences, tuple(self._tried), seconds, (kept, every))
 
 
-def error_tolerances(scene: AnyScene) -> dict[str, float]:
+def error_tolerances(scene: SpatialScene) -> dict[str, float]:
     """What the error of each analysis may be; algebraic ones that do not say follow the tightest that is integrated."""
     tightest = min((analysis.tolerance for analysis in scene.analysis if analysis.is_resumable), default=None)
     return {
@@ -189,11 +185,11 @@ def error_tolerances(scene: AnyScene) -> dict[str, float]:
 
 
 def truncation_levels(
-    scene: AnyScene,
-    bodies: Mapping[str, B],
-    fewer: Callable[[B, int, Sequence[str]], B],
+    scene: SpatialScene,
+    bodies: Mapping[str, SpatialBody],
+    fewer: Callable[[SpatialBody, int, Sequence[str]], SpatialBody],
     counted: Callable[[Sequence[str]], Array],
-) -> list[dict[str, B]]:
+) -> list[dict[str, SpatialBody]]:
     """The flexible bodies with `modes` given, with more and more modes where that is "auto"; the last have all.
 
     A level has the modes up to one frequency, of all bodies: 1, 2, 3, 5, 8 … of each on average, of those that are
@@ -205,7 +201,7 @@ def truncation_levels(
     auto = {name: bodies[name] for name, modes in wanted.items() if modes == "auto"}
     if not auto:
         return [fixed]
-    found: list[dict[str, B]] = []
+    found: list[dict[str, SpatialBody]] = []
     squares = np.sort(counted(list(auto)))
     each = 1
     while each * len(auto) < len(squares):

@@ -8,13 +8,10 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from ..fe_models.modal_body import ModalBody
-from ..mbs.model.planar_body import PlanarBody, vanishing_terms
 from ..mbs.model.projection import vanishing_in_plane
 from ..mbs.model.spatial_body import SpatialBody
 from ..mbs.model.truncation import modes_kept
-from ..scene.scene import Scene
 from ..scene.spatial import SpatialScene
-from .bodies import LoadedBody
 from .spatial_bodies import LoadedSpatialBody
 
 _STAGE_1 = {"modes": "stage 1 but for damping, stresses and name", "mesh": "the mesh, which is that of an earlier run"}
@@ -28,11 +25,9 @@ _TERMS = {
 }
 
 
-def omissions(
-    scene: Scene | SpatialScene, bodies: Mapping[str, LoadedBody] | Mapping[str, LoadedSpatialBody]
-) -> Iterator[str]:
+def omissions(scene: SpatialScene, bodies: Mapping[str, LoadedSpatialBody]) -> Iterator[str]:
     """One line for each thing that a planar scene leaves out."""
-    of = {name: body.planar if isinstance(body, LoadedBody) else body.spatial for name, body in bodies.items()}
+    of = {name: body.spatial for name, body in bodies.items()}
     for name, body in bodies.items():
         if body.modal is None:
             continue
@@ -50,7 +45,7 @@ def omissions(
     if stiff:
         yield f"axial deformation of {', '.join(stiff)}: no axial modes in [modes] family"
     for term, symbol in _TERMS.items():
-        zero = [name for name, body in of.items() if term in _vanishing(body)]
+        zero = [name for name, body in of.items() if term in vanishing_in_plane(body)]
         if zero:
             whose = "" if zero == flexible else f" of {', '.join(zero)}"
             yield f"{symbol}{whose}, which is zero"
@@ -59,18 +54,14 @@ def omissions(
         yield f"integration of {', '.join(algebraic)}, algebraic"
 
 
-def _vanishing(body: PlanarBody | SpatialBody) -> tuple[str, ...]:
-    return vanishing_terms(body) if isinstance(body, PlanarBody) else vanishing_in_plane(body)
-
-
-def _is_rigid_along(body: PlanarBody | SpatialBody) -> bool:
+def _is_rigid_along(body: SpatialBody) -> bool:
     """Whether no force at a point moves any point of the link along its axis, where joints and weight load it."""
     along = [point.translation[0] for point in body.points.values()]
     across = [point.translation[1] for point in body.points.values()]
     return bool(np.abs(along).max(initial=0.0) <= RIGID * np.abs(across).max(initial=0.0))
 
 
-def _modes(name: str, body: PlanarBody | SpatialBody, modal: ModalBody) -> Iterator[str]:
+def _modes(name: str, body: SpatialBody, modal: ModalBody) -> Iterator[str]:
     """Modes that do not move in the plane, and those left out by choice."""
     whole = body if body.reduction is None else body.reduction.whole
     idle = np.flatnonzero(~whole.modal_transform.any(axis=1))

@@ -3,45 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 from functools import partial
 
-from ..actuation.feasibility import Feasibility
-from ..common.errors import SolveError
 from ..mbs.model.spatial_model import SpatialModel
 from ..mbs.scene.motion_keys import Shaper
-from ..mbs.solve.path_frequencies import PathFrequencies, path_frequencies
+from ..mbs.solve.path_frequencies import PathFrequencies
 from ..mbs.solve.spatial_frequencies import spatial_path_frequencies
-from ..scene.scene import Scene
 from ..scene.spatial import SpatialScene
-from .fastest import AnyScene, Judge, fastest
-from .prepare import with_scene
-from .solution import Solution
+from .fastest import Judge, fastest
 
-Solve = Callable[[Solution], Solution]
-"""Runs the analyses of a scene, with all that follows from them."""
 Frequencies = Callable[[float, float, int], PathFrequencies]
 """Of so many of the lowest vibrations from one time to another, s."""
 Notes = tuple[str, ...]
 
 
-def with_paths(solution: Solution, solve: Solve, stage: Callable[[str], None]) -> tuple[Solution, Notes]:
+def with_paths_in_space(
+    scene: SpatialScene, model: SpatialModel, judge: Judge, stage: Callable[[str], None]
+) -> tuple[SpatialScene, Notes]:
     """The scene with shapers for the robot's own frequencies, stretched as far as `fastest` asks for; what was found.
 
-    `solve` runs analyses. Raises `InputError` where there are no such frequencies, or no motion keeps the limits.
+    `model` is what vibrates. Raises `InputError` where there are no such frequencies, or no motion keeps the limits.
     """
-    scene, notes = _shaped(solution.scene, partial(path_frequencies, solution.model))
-    if any(trajectory.fastest for trajectory in scene.trajectory):
-        stage("fastest motion")
-        scene, note = fastest(scene, partial(_judged, solution, solve))
-        notes = (*notes, note)
-    return (_with_scene(solution, scene) if notes else solution), notes
-
-
-def with_paths_in_space(
-    scene: SpatialScene, model: SpatialModel, judge: Judge[SpatialScene], stage: Callable[[str], None]
-) -> tuple[SpatialScene, Notes]:
-    """The same of a scene in space, whose `model` is what vibrates."""
     scene, notes = _shaped(scene, partial(spatial_path_frequencies, model))
     if any(trajectory.fastest for trajectory in scene.trajectory):
         stage("fastest motion")
@@ -50,7 +32,7 @@ def with_paths_in_space(
     return scene, notes
 
 
-def _shaped(scene: AnyScene, frequencies: Frequencies) -> tuple[AnyScene, Notes]:
+def _shaped(scene: SpatialScene, frequencies: Frequencies) -> tuple[SpatialScene, Notes]:
     """The scene with shapers for frequencies of the robot where they ask for these; notes on them and on tables."""
     asking = {one.name: one.shaper for one in scene.trajectory if one.shaper and one.shaper.asks_robot}
     tables = (one.waypoints for one in scene.trajectory if one.waypoints is not None)
@@ -78,22 +60,9 @@ def _in_words(shaper: Shaper, found: PathFrequencies) -> str:
     return f"{shaper.kind} shaper for {', '.join(list(ranges)[: shaper.modes])}"
 
 
-def _span(scene: Scene | SpatialScene) -> tuple[float, float]:
+def _span(scene: SpatialScene) -> tuple[float, float]:
     """When the first path begins and the last one is over, s."""
     paths = [one.path for one in scene.trajectory]
     ends = [path.end for path in paths if path is not None]
     begins = [path.begin for path in paths if path is not None]
     return min(begins), max(ends)
-
-
-def _with_scene(solution: Solution, scene: Scene) -> Solution:
-    return replace(with_scene(solution, scene), earlier=solution.earlier)
-
-
-def _judged(solution: Solution, solve: Solve, trial: Scene) -> Feasibility | None:
-    """What its one analysis asks of motors and patches; None where it fails."""
-    try:
-        (result,) = solve(with_scene(solution, trial)).analyses.values()
-    except SolveError:
-        return None
-    return None if result.outcome.failed else result.feasibility

@@ -52,7 +52,9 @@ logger = logging.getLogger(__name__)
 Keep = Callable[[SpatialSolution], None]
 
 
-def solve_spatial(scene: SpatialScene | Path, watcher: Watcher, keep: Keep | None = None) -> SpatialSolution:
+def solve_spatial(
+    scene: SpatialScene | Path, watcher: Watcher | None = None, keep: Keep | None = None
+) -> SpatialSolution:
     """Run every analysis of a scene, or of a scene file, in space; stage 1 runs first for links that are out of date.
 
     Shapers for the robot's frequencies and the fastest motion are found first (see `paths`).
@@ -62,11 +64,13 @@ def solve_spatial(scene: SpatialScene | Path, watcher: Watcher, keep: Keep | Non
     So does Ctrl-C during an analysis. `keep` is given what there is before an error is raised.
     Raises `InputError` for anything wrong with the scene or the files it names, `SolveError` where no state is found.
     """
+    watcher = watcher or Watcher()
     return run_spatial(prepare_spatial(scene, watcher), watcher, keep)
 
 
-def prepare_spatial(scene: SpatialScene | Path, watcher: Watcher) -> SpatialSolution:
+def prepare_spatial(scene: SpatialScene | Path, watcher: Watcher | None = None) -> SpatialSolution:
     """All that analyses start from, nothing solved yet. Raises `InputError` as `solve_spatial`."""
+    watcher = watcher or Watcher()
     if isinstance(scene, Path):
         scene = load_spatial_scene(scene)
     began = time.perf_counter()

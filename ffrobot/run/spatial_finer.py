@@ -1,15 +1,19 @@
-"""`check = "finer"` in space: an inverse analysis replayed on links with twice the modes, as `finer` in the plane."""
+"""`check = "finer"`: an inverse analysis replayed on links with twice the modes, which holds the error of too few."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from ..actuation.control.linear import held_by_motors
 from ..common.arrays import Array
 from ..common.errors import InputError
+from ..fe_models.link_file import LinkTable, link_keys, link_path
+from ..fe_models.modal_body import ModalBody
 from ..mbs.analysis.forward import Forward
 from ..mbs.analysis.outcome import Outcome
 from ..mbs.analysis.spatial_drive import spatial_drive
@@ -19,18 +23,19 @@ from ..mbs.model.spatial_drives import Drives, Replayed
 from ..mbs.model.spatial_model import SpatialModel, without_paths
 from ..mbs.quantities.spatial_motion import SpatialMotion
 from ..mbs.scene.analysis import TimedAnalysis
+from ..mbs.scene.spatial.bodies import BodyInSpace
 from ..mbs.solve.spatial_redundancy import resolved
 from ..mbs.solve.spatial_start import undeformed_posture
 from ..mbs.solve.spatial_statics import static_equilibrium
 from ..mbs.solve.state import State
 from ..scene.spatial import SpatialScene
-from .finer import TIGHTEST, with_twice_the_modes
-from .solution import FinerCheck
-from .spatial_solution import SpatialSolution
+from .spatial_solution import FinerCheck, SpatialSolution
 from .watcher import Watcher
 
 Prepare = Callable[[SpatialScene, Watcher], SpatialSolution]
 """All that analyses of a scene start from."""
+
+TIGHTEST = 1e-5  # tolerance: what is looked for is larger
 
 
 def checked_in_space(solution: SpatialSolution, prepare: Prepare, watcher: Watcher) -> SpatialSolution:
@@ -52,13 +57,44 @@ def checked_in_space(solution: SpatialSolution, prepare: Prepare, watcher: Watch
 def _finer_scene(solution: SpatialSolution) -> SpatialScene:
     """The scene with twice the eigenmodes of each link, of whose patches only the modal forces per volt are asked."""
     scene = solution.scene
-    bodies = with_twice_the_modes(scene.path, scene.body, solution.links)
+    bodies = _with_twice_the_modes(scene.path, scene.body, solution.links)
     forward = Forward(name="replay", kind="forward", end=1.0, output_step=1.0)  # asks nothing of patches
     served = {"allocation": "least-squares", "mode_weights": None, "point_weights": None}
     pzt = tuple(layout.model_copy(update=served) for layout in scene.pzt)
     stiffening = solution.stiffened if scene.geometric_stiffening == "auto" else scene.geometric_stiffening
     changed = {"body": bodies, "pzt": pzt, "analysis": (forward,), "geometric_stiffening": stiffening}
     return scene.model_copy(update=changed)
+
+
+def _with_twice_the_modes(
+    path: Path, bodies: Sequence[BodyInSpace], links: Mapping[str, ModalBody]
+) -> tuple[BodyInSpace, ...]:
+    """The bodies of the scene at `path` with twice the eigenmodes of each link and nothing left out.
+
+    `links`: their modal bodies. Raises `InputError` for a body whose link is not known, only its modal body file.
+    """
+    finer = []
+    for body in bodies:
+        modal = links.get(body.name)
+        if modal is not None:
+            if body.link is None:
+                raise InputError(
+                    f'{path}: analysis: check: expected "link" in body "{body.name}" for "finer", which computes'
+                    f" it with twice the modes, found only the modal body file {body.modal}"
+                )
+            table = LinkTable(_twice_as_many(link_keys(body.link), modal), link_path(body.link))
+            body = body.model_copy(update={"link": table, "modes": None})
+        finer.append(body)
+    return tuple(finer)
+
+
+def _twice_as_many(keys: dict[str, Any], modal: ModalBody) -> dict[str, Any]:
+    """The keys of a link, for twice the eigenmodes that `modal` has."""
+    modes = {key: value for key, value in keys.get("modes", {}).items() if key != "indices"}
+    damping = dict(keys.get("damping", {}))
+    if isinstance(damping.get("ratio"), list | tuple):  # one for each mode: the last is that of all above
+        damping["ratio"] = [*damping["ratio"], *[damping["ratio"][-1]] * modal.eigenmode_count]
+    return keys | {"modes": modes | {"count": 2 * modal.eigenmode_count}, "damping": damping}
 
 
 def _check(solution: SpatialSolution, source: Outcome, finer: SpatialSolution, watcher: Watcher) -> FinerCheck:

@@ -25,8 +25,7 @@ from ..mbs.quantities.second_order import IN_MOTION, Missing, largest_displaceme
 from ..mbs.quantities.spatial_motion import SpatialMotion, continuous
 from ..mbs.quantities.spatial_validity import bending_in_space
 from ..mbs.quantities.validity import ENOUGH, IN_SPACE, Bending, enough_pieces, shape_from_chord
-from ..scene.pieces import BodyInPieces
-from ..scene.spatial_pieces import bodies_in_pieces_in_space
+from ..scene.pieces import BodyInPieces, bodies_in_pieces_in_space
 from .bent_links import shared_in_motion, with_advice, worst_of_pieces
 from .spatial_solution import SpatialSolution
 
@@ -122,7 +121,8 @@ def divided_links(solution: SpatialSolution) -> dict[str, Divided]:
 def wanted_pieces_in_space(solution: SpatialSolution) -> dict[str, int]:
     """How many pieces bodies with `pieces = "auto"` want after a solve; empty where they have them.
 
-    What a piece loses of its length goes down with the square of their number. See `pieces.wanted_pieces`.
+    What a piece loses of its length goes down with the square of their number. A run that failed has bent links
+    farther than they are.
     """
     wanted, now = {}, {}
     for body in solution.scene.body:

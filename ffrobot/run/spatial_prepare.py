@@ -10,9 +10,8 @@ from ..actuation.spatial_points import SpatialPointSet
 from ..mbs.model.spatial_body import SpatialBody
 from ..mbs.model.spatial_model import SpatialModel, build_spatial_model
 from ..mbs.solve.robot_damping import with_robot_damping_in_space
-from ..scene.pieces import BodyInPieces
+from ..scene.pieces import BodyInPieces, bodies_in_pieces_in_space, scene_of_pieces_in_space
 from ..scene.spatial import SpatialScene
-from ..scene.spatial_pieces import bodies_in_pieces_in_space, scene_of_pieces_in_space
 from .loaded_body import robot_damping_ratios
 from .spatial_actuation import given_voltages
 from .spatial_bodies import LoadedSpatialBody, load_spatial_bodies, with_structure

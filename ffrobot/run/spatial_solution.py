@@ -32,9 +32,32 @@ from ..scene.spatial import SpatialScene
 from .loaded_body import remarks_on_parts, rigid_in_words
 from .mode_search import ModeChoice
 from .omissions import omissions
-from .solution import FinerCheck
 from .spatial_actuation import SpatialActuation
 from .spatial_bodies import LoadedSpatialBody
+
+
+@dataclass(frozen=True)
+class FinerCheck:
+    """What a replay on twice the modes found.
+
+    Attributes:
+        modes: eigenmodes of each flexible body in it.
+        point: that is farthest from where the inverse analysis has it, of those on trajectories where there are any.
+        error: by how much, m, at worst.
+        status: how the replay ended.
+    """
+
+    modes: Mapping[str, int]
+    point: str
+    error: float
+    status: str
+
+    @property
+    def in_words(self) -> str:
+        """On how many modes, and how far off."""
+        ended = "" if self.status == "completed" else f", which ended early ({self.status})"
+        modes = ", ".join(map(str, dict.fromkeys(self.modes.values())))
+        return f"forward simulation on {modes} modes{ended}: {self.point} is off by {1e3 * self.error:.2g} mm"
 
 
 @dataclass(frozen=True)

@@ -27,7 +27,6 @@ from ...scene.spatial import SpatialScene
 from .archive import PLATFORMS, identifier_of, zipped
 from .description import forward_description
 from .forward_model import AXES, HeldUnit, has_own_coordinates, held_unit, voltages_in_space
-from .planar_forward import forward_scene
 
 logger = logging.getLogger(__name__)
 
@@ -48,8 +47,6 @@ def forward_fmu(path: Path, analysis: str | None) -> tuple[bytes, str, str, tupl
     place = PLATFORMS.get((sys.platform, platform.machine()))
     if place is None:
         raise InputError(f"{path}: --format fmu: FMI 2.0 has no name for {sys.platform} on {platform.machine()}")
-    if not isinstance(scene, SpatialScene):
-        scene = forward_scene(path, scene, chosen, _Logged())
     model, unit = _unit(scene, chosen)
     names = "\n".join(each.name for each in (*unit.inputs, *unit.outputs))
     unit.data.guid = f"{{{uuid5(NAMESPACE_URL, unit.data.to_bytes().hex() + names)}}}"
