@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     from .fe_models.modal_body import ModalBody
     from .results.file import Results
     from .run.watcher import Watcher
-    from .scene.any_space import make_scene
+    from .scene.load import make_scene
     from .scene.spatial import SpatialScene as Scene
 
     __version__: str
@@ -66,7 +66,7 @@ _HOME = {
     "InputError": ".common.errors",
     "SolveError": ".common.errors",
     "ModalBody": ".fe_models.modal_body",
-    "make_scene": ".scene.any_space",
+    "make_scene": ".scene.load",
     "Scene": ".scene.spatial:SpatialScene",
     "Results": ".results.file",
     "Watcher": ".run.watcher",

@@ -24,14 +24,13 @@ if TYPE_CHECKING:
     from .results.file import Results
     from .run.spatial_solution import SpatialSolution
     from .run.watcher import Watcher
-    from .scene.any_space import AnyScene
     from .scene.spatial import SpatialScene
 
 AnyPath = str | PathLike[str]
 
 
 def solve(
-    scene: AnyScene | AnyPath,
+    scene: SpatialScene | AnyPath,
     output: AnyPath | None = None,
     watcher: Watcher | None = None,
     *,
@@ -98,13 +97,13 @@ def _solve_spatial(
     return Results(path) if path is not None else Results.from_image(spatial_image(solution), scene.path)
 
 
-def load_scene(path: AnyPath, *, allow_python: Sequence[AnyPath] = ()) -> AnyScene:
+def load_scene(path: AnyPath, *, allow_python: Sequence[AnyPath] = ()) -> SpatialScene:
     """Read and validate a scene file, `allow_python` as in `solve`. Raises `InputError`, a line for each wrong key."""
     from .common.python_files import python_allowed
-    from .scene.any_space import load_any_scene
+    from .scene.load import load_scene as load
 
     with python_allowed(Path(place) for place in allow_python):
-        return load_any_scene(Path(path))
+        return load(Path(path))
 
 
 def make_link(link: AnyPath | Mapping[str, Any], output: AnyPath | None = None, *, force: bool = False) -> LinkOutcome:

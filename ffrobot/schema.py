@@ -37,11 +37,11 @@ def schema(kind: str) -> dict[str, Any]:
 
 def _record(kind: str) -> Any:  # noqa: ANN401 (a record or a union of them)
     if kind == "scene":
-        from .scene.scene import SceneKeys
+        from .scene.spatial import SpatialSceneKeys as SceneKeys
 
         return SceneKeys
     if kind == "spatial":
-        from .scene.spatial_keys import SpatialSceneKeys
+        from .scene.spatial import SpatialSceneKeys
 
         return SpatialSceneKeys
     if kind == "link":

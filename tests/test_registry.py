@@ -13,14 +13,10 @@ from typing import Literal
 
 import numpy as np
 
-from ffrobot.mbs.analysis.context import Context
 from ffrobot.mbs.analysis.outcome import Motion, Outcome
-from ffrobot.mbs.analysis.planar_outcome import PlanarOutcome
 from ffrobot.mbs.fields.field_types import Positive
 from ffrobot.mbs.fields.references import Reference
-from ffrobot.mbs.model.system import MechanismSystem
 from ffrobot.mbs.scene.analysis import TimedAnalysis
-from ffrobot.mbs.solve.initial_state import undeformed_state
 
 
 class Turntable(TimedAnalysis):
@@ -36,23 +32,10 @@ class Turntable(TimedAnalysis):
         yield Reference("body", self.body)
 
     def run(self, context):
-        return self.in_space(context.model) if isinstance(context, Context) else self.in_plane(context.model)
-
-    def in_space(self, model):
+        model = context.model
         q = self.rate * self.times[:, None]
         v, nothing = np.full_like(q, self.rate), np.zeros((len(q), len(model.rows)))
         return Outcome(analysis=self, model=model, motion=Motion(self.times, q, v, 0 * v, nothing))
-
-    def in_plane(self, model):
-        system = MechanismSystem(model, model.joints)
-        start, t = undeformed_state(system).q, self.times
-        q = np.tile(start, (len(t), 1))
-        q[:, 2] += self.rate * t
-        v = np.zeros_like(q)
-        v[:, 2] = self.rate
-        held = len(system.constraints)
-        motion = Motion(t, q, v, np.zeros_like(q), np.zeros((len(t), held)), np.zeros((len(t), 3)))
-        return PlanarOutcome(analysis=self, assembly=system, motion=motion)
 '''
 
 SOLVE = """

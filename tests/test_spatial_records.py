@@ -15,9 +15,8 @@ from ffrobot.common.errors import InputError
 from ffrobot.common.key_descriptions import key_descriptions
 from ffrobot.common.rotations import exponential, quaternions
 from ffrobot.mbs.fields.orientations import OrientationLaw
-from ffrobot.scene.load import load_scene
-from ffrobot.scene.spatial import check_available, spatial_scene
-from ffrobot.scene.spatial_keys import SpatialSceneKeys
+from ffrobot.scene.load import validated_scene
+from ffrobot.scene.spatial import SpatialSceneKeys
 from ffrobot.scene.spatial_lacks import LACKS
 from ffrobot.schema import DIALECT
 
@@ -98,13 +97,7 @@ output_step = 0.1
 def scene(change=lambda tables: None):
     data = tomllib.loads(ARM)
     change(data)
-    return spatial_scene(data, FOLDER / "scene.toml", ARM)
-
-
-def available_scene(change):
-    found = scene(change)
-    check_available(found)
-    return found
+    return validated_scene(data, FOLDER / "scene.toml", ARM)
 
 
 def test_keys_and_their_meaning():
@@ -269,15 +262,8 @@ MISTAKES = {
 def test_mistakes_are_told(name):
     change, message = MISTAKES[name]
     with pytest.raises(InputError, match=message.replace(r"\\[", r"\[").replace(r"\\]", r"\]")) as caught:
-        available_scene(change)
+        scene(change)
     assert str(FOLDER / "scene.toml") in str(caught.value)
-
-
-def test_planar_readers_refuse_scenes_in_space(tmp_path):
-    path = tmp_path / "scene.toml"
-    path.write_text(ARM)
-    with pytest.raises(InputError, match='space: expected "planar", found "spatial": 3D scenes run by'):
-        load_scene(path)
 
 
 def test_every_key_says_what_it_means():
@@ -315,7 +301,7 @@ def test_waypoints_with_quaternions(tmp_path, turn):
     np.savetxt(tmp_path / "pose.csv", table, delimiter=",", header="t,x,y,z,qw,qx,qy,qz", comments="")
     data = copy.deepcopy(tomllib.loads(ARM))
     data["trajectory"] = [{"name": "tool", "point": "hand.tip", "waypoints": "pose.csv"}]
-    found = spatial_scene(data, tmp_path / "scene.toml", ARM).trajectory[0]
+    found = validated_scene(data, tmp_path / "scene.toml", ARM).trajectory[0]
     assert set(found.components) == {"x", "y", "z"}
     assert found.row_count == 6
     np.testing.assert_allclose(found.orientation.sample(times), A, atol=1e-12)
@@ -327,7 +313,7 @@ def test_waypoints_that_are_no_rotation(tmp_path):
     data = copy.deepcopy(tomllib.loads(ARM))
     data["trajectory"] = [{"name": "tool", "point": "hand.tip", "waypoints": "pose.csv"}]
     with pytest.raises(InputError, match=r"waypoints: row 2: expected qw, qx, qy, qz of length 1, found 1\.41421"):
-        spatial_scene(data, tmp_path / "scene.toml", ARM)
+        validated_scene(data, tmp_path / "scene.toml", ARM)
 
 
 @pytest.mark.parametrize(

@@ -23,8 +23,7 @@ from ..mbs.solve.initial_state import undeformed_state
 from ..run.prepare import prepare
 from ..run.spatial_bodies import load_spatial_bodies
 from ..run.watcher import Watcher
-from ..scene.any_space import make_scene
-from ..scene.load import load_scene
+from ..scene.load import load_scene, make_scene
 from ..scene.spatial import SpatialScene
 from .evaluation import State, tree_evaluation_seconds
 from .growth import LINKS, chain

@@ -13,7 +13,8 @@ from ..fe_models.link_records import Link
 from ..mbs.fields.steps import DATASET
 from ..mbs.scene.analysis import TimedAnalysis
 from ..results.file import Results
-from ..scene.any_space import AnyScene, load_any_scene
+from ..scene.load import load_scene
+from ..scene.spatial import SpatialScene
 from ..sweep.files import run_files
 from ..sweep.sweep import Key
 from .readings import Goal
@@ -31,7 +32,7 @@ def changes_for(
     Replays of inverse analyses on finer links, which change no result, are left out too. There are `OUTPUTS` at least.
     `keep_steps`: of integrations.
     """
-    scene = load_any_scene(path)
+    scene = load_scene(path)
     needed = _needed(scene, goals)
     whole = run_files(path, {}, path.parent).scene["analysis"]
     tables = deepcopy([table for table in whole if table["name"] in needed])
@@ -77,7 +78,7 @@ def link_with(path: Path, body: str, changes: Mapping[Key, float]) -> Link | Non
     return read_link(Path(source) if changed is None else LinkTable(changed, Path(source)))
 
 
-def _needed(scene: AnyScene, goals: Sequence[Goal]) -> set[str]:
+def _needed(scene: SpatialScene, goals: Sequence[Goal]) -> set[str]:
     """Names of the analyses that goals name, by default the first, and of those that they rest on."""
     names = [one.name for one in scene.analysis]
     found = {goal.analysis if goal.analysis in names else names[0] for goal in goals} or {names[0]}

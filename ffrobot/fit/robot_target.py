@@ -14,7 +14,7 @@ from ..common.errors import InputError
 from ..common.toml_files import load_toml, read_text
 from ..run.spatial import solve_spatial
 from ..run.watcher import Watcher
-from ..scene.any_space import load_any_scene, make_scene
+from ..scene.load import load_scene, make_scene
 from ..sweep.files import LINKS, run_files, value_of
 from .link_target import fitted_name
 from .toml_edit import Key, with_values
@@ -30,7 +30,7 @@ class RobotTarget:
     def __init__(self, path: Path, motors: str) -> None:
         self._path, self._motors = path, motors
         self._scene = load_toml(path, "scene file")
-        load_any_scene(path)
+        load_scene(path)
         bodies = {body["name"]: body.get("link") for body in self._scene["body"]}
         self._links = {name: path.parent / link for name, link in bodies.items() if isinstance(link, str)}
         self._tables: dict[str, Any] = {name: load_toml(link, "link file") for name, link in self._links.items()}

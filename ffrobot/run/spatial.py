@@ -22,7 +22,8 @@ from ..mbs.quantities.spatial_sharing import shared_evenly
 from ..mbs.quantities.stiffening import NOTABLE
 from ..mbs.scene.analysis import Analysis
 from ..mbs.solve.spatial_reach import turned_guesses
-from ..scene.spatial import SpatialScene, load_spatial_scene
+from ..scene.load import load_scene
+from ..scene.spatial import SpatialScene
 from .enough import completed, goes_on, is_replayed, log_outcome, progress_of, with_enough_modes, with_enough_pieces
 from .mode_search import ModeSearch, error_tolerances
 from .paths import with_paths_in_space
@@ -72,7 +73,7 @@ def prepare_spatial(scene: SpatialScene | Path, watcher: Watcher | None = None) 
     """All that analyses start from, nothing solved yet. Raises `InputError` as `solve_spatial`."""
     watcher = watcher or Watcher()
     if isinstance(scene, Path):
-        scene = load_spatial_scene(scene)
+        scene = load_scene(scene)
     began = time.perf_counter()
     loaded = load_spatial_bodies(scene, watcher.stage)
     seconds = {"bodies": time.perf_counter() - began}

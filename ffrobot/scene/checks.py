@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -16,23 +16,14 @@ from ..mbs.fields.derivatives import check_derivatives
 from ..mbs.fields.field_types import GROUND
 from ..mbs.fields.functions import check_domain
 from ..mbs.fields.orientations import OrientationLaw
-from ..mbs.fields.spelling import SPATIAL
-from ..mbs.joints.joint import JointRecord
 from ..mbs.joints.spatial.joint import SpatialJoint
 from ..mbs.scene.analysis import Surroundings
-from ..mbs.scene.loads import Load
-from ..mbs.scene.spatial.loads import SpatialLoad
 from ..mbs.scene.spatial.trajectories import SpatialTrajectory
-from ..mbs.scene.trajectories import Trajectory
 from .kinds import KINDS, AnyKind
-from .scene import SceneKeys
-from .spatial_keys import SpatialSceneKeys
-
-AnyKeys = SceneKeys | SpatialSceneKeys
-AnyJoint = JointRecord | SpatialJoint
+from .spatial import SpatialSceneKeys
 
 
-def problems(scene: AnyKeys) -> Iterator[str]:
+def problems(scene: SpatialSceneKeys) -> Iterator[str]:
     """Everything in the scene that refers to something that does not exist or does not fit, a line each."""
     yield from _all_duplicates(scene)
     yield from _body_problems(scene)
@@ -48,15 +39,14 @@ def problems(scene: AnyKeys) -> Iterator[str]:
             yield f'analysis "{analysis.name}": {problem}'
 
 
-def check_functions(scene: AnyKeys, path: Path) -> None:
+def check_functions(scene: SpatialSceneKeys, path: Path) -> None:
     """Raise `InputError` for a function of time without a value at an output time at which it is needed."""
     following = [analysis for analysis in scene.analysis if analysis.follows_trajectories]
     for trajectory in scene.trajectory:
         for analysis in following:
             times = np.clip(analysis.times, 0.0, analysis.last_time)
             _check_trajectory(trajectory, times, f'{path}: trajectory "{trajectory.name}"')
-    loads: Sequence[Load | SpatialLoad] = scene.load
-    for k, load in enumerate(loads, 1):
+    for k, load in enumerate(scene.load, 1):
         for component, function in load.components.items():
             for analysis in scene.analysis:
                 times = np.clip(analysis.times, 0.0, analysis.last_time)
@@ -70,13 +60,12 @@ def check_functions(scene: AnyKeys, path: Path) -> None:
                 check_domain(function, analysis.times, label, derivatives)
 
 
-def _check_trajectory(trajectory: Trajectory | SpatialTrajectory, times: Array, label: str) -> None:
+def _check_trajectory(trajectory: SpatialTrajectory, times: Array, label: str) -> None:
     """Of places or coordinates, and of an orientation, at `times` (T,)."""
     places = None if trajectory.path is None else "via" if trajectory.waypoints is None else "waypoints"
     for component, function in trajectory.components.items():
         _check_path(function, times, f"{label}: {places or component}")
-    law = getattr(trajectory, "orientation", None)
-    if law is not None:
+    if (law := trajectory.orientation) is not None:
         _check_orientation(law, times, f"{label}: {law.kind}")
 
 
@@ -97,12 +86,12 @@ def _check_path(function: TimeFunction, times: Array, label: str) -> None:
         check_derivatives(function, float(times[-1]), label)
 
 
-def _all_duplicates(scene: AnyKeys) -> Iterator[str]:
+def _all_duplicates(scene: SpatialSceneKeys) -> Iterator[str]:
     for kind in ("body", "joint", "trajectory", "analysis"):
         yield from _duplicates(kind, (record.name for record in getattr(scene, kind)))
     for label, count in Counter(layout.label for layout in scene.pzt).items():
         if count > 1:
-            apart = "name: expected a separate name for each layout on a body" if scene.space == SPATIAL else ""
+            apart = "name: expected a separate name for each layout on a body" if not scene.is_planar else ""
             yield f'pzt "{label}": {apart or "expected one pzt of this name"}, found {count}'
     for name, count in Counter(points.body for points in scene.actuation_points).items():
         if count > 1:
@@ -115,7 +104,7 @@ def _duplicates(kind: str, names: Iterable[str]) -> Iterator[str]:
             yield f'{kind} "{name}": expected one {kind} of this name, found {count}'
 
 
-def _body_problems(scene: AnyKeys) -> Iterator[str]:
+def _body_problems(scene: SpatialSceneKeys) -> Iterator[str]:
     bodies = {body.name: body for body in scene.body}
     if GROUND in bodies:
         yield f'body "{GROUND}": name: expected any other name, found "{GROUND}", which is the fixed frame'
@@ -136,8 +125,8 @@ def _body_problems(scene: AnyKeys) -> Iterator[str]:
             )
 
 
-def _joint_problems(scene: AnyKeys) -> Iterator[str]:
-    joints: dict[str, AnyJoint] = {joint.name: joint for joint in scene.joint}
+def _joint_problems(scene: SpatialSceneKeys) -> Iterator[str]:
+    joints: dict[str, SpatialJoint] = {joint.name: joint for joint in scene.joint}
     elastic = [name for name, joint in joints.items() if getattr(joint, "stiffness", None) is not None]
     moving = [name for name, joint in joints.items() if _moves(joint)]
     for reference in scene.references():
@@ -151,14 +140,12 @@ def _joint_problems(scene: AnyKeys) -> Iterator[str]:
             yield f"{key}: expected a joint that moves ({quoted(moving)}), found {found}"
 
 
-def _moves(joint: AnyJoint) -> bool:
+def _moves(joint: SpatialJoint) -> bool:
     """Whether it has coordinates, or a place that [initial] can guess."""
-    if isinstance(joint, SpatialJoint):
-        return bool(joint.units or joint.guess_units)
-    return joint.coordinate("section") is not None
+    return bool(joint.units or joint.guess_units)
 
 
-def _guess_problems(scene: AnyKeys) -> Iterator[str]:
+def _guess_problems(scene: SpatialSceneKeys) -> Iterator[str]:
     """Guesses of joints between bodies whose own guesses say the same."""
     initial = scene.initial
     for key, of_joints, bodies, of_bodies in (
@@ -175,14 +162,14 @@ def _guess_problems(scene: AnyKeys) -> Iterator[str]:
                 )
 
 
-def _flexible_body_problems(scene: AnyKeys) -> Iterator[str]:
+def _flexible_body_problems(scene: SpatialSceneKeys) -> Iterator[str]:
     rigid = [body.name for body in scene.body if body.rigid is not None]
     for reference in scene.references():
         if reference.kind == "flexible body" and reference.name in rigid:
             yield f'{reference.key}: expected a flexible body, found "{reference.name}", which is rigid'
 
 
-def _patch_problems(scene: AnyKeys) -> Iterator[str]:
+def _patch_problems(scene: SpatialSceneKeys) -> Iterator[str]:
     """References to bodies with patches, and to layouts: in the plane a body has one, which has its name."""
     bodies = list(dict.fromkeys(layout.body for layout in scene.pzt))
     layouts = [layout.label for layout in scene.pzt]
@@ -190,24 +177,23 @@ def _patch_problems(scene: AnyKeys) -> Iterator[str]:
         known = {"patched body": bodies, "patches": layouts}.get(reference.kind)
         if known is not None and reference.name not in known:
             what = f"a body with patches, {quoted(known)}"
-            if reference.kind == "patches" and scene.space == SPATIAL:
+            if reference.kind == "patches" and not scene.is_planar:
                 what = f"one of the layouts {quoted(known)}" if known else "a layout of patches ([[pzt]])"
             hint = did_you_mean(reference.name, known)
             yield f'{reference.key}: expected {what}, found "{reference.name}"{hint}'
 
 
-def _load_problems(scene: AnyKeys) -> Iterator[str]:
+def _load_problems(scene: SpatialSceneKeys) -> Iterator[str]:
     """Numbers of voltages, and of moments of joints with several coordinates."""
     counts = {layout.label: layout.patch_count for layout in scene.pzt}
-    joints: dict[str, AnyJoint] = {joint.name: joint for joint in scene.joint}
-    loads: Sequence[Load | SpatialLoad] = scene.load
-    for k, load in enumerate(loads, 1):
+    joints: dict[str, SpatialJoint] = {joint.name: joint for joint in scene.joint}
+    for k, load in enumerate(scene.load, 1):
         count, found = counts.get(load.pzt or "", 0), len(load.voltage or ())
         if count and found != count:
             of = f'one for each patch of "{load.pzt}"'
             yield f"load no. {k}: voltage: expected {count} expressions, {of}, found {found}"
         joint = joints.get(load.joint or "")
-        if not isinstance(joint, SpatialJoint) or not isinstance(load, SpatialLoad) or not _moves(joint):
+        if joint is None or not _moves(joint):
             continue
         if not joint.units:
             yield (
@@ -219,11 +205,11 @@ def _load_problems(scene: AnyKeys) -> Iterator[str]:
             yield f"load no. {k}: moment: expected {len(joint.units)} expressions, {of}, found {found}"
 
 
-def _stiffening_problems(scene: AnyKeys) -> Iterator[str]:
+def _stiffening_problems(scene: SpatialSceneKeys) -> Iterator[str]:
     """What acts between the interfaces of a link: modal body files hold no geometric stiffness of such loads."""
     if not scene.geometric_stiffening:
         return
-    for points in scene.actuation_points if scene.space != SPATIAL else ():
+    for points in scene.actuation_points if scene.is_planar else ():
         yield f'geometric_stiffening: expected false with [[actuation_points]], found those of "{points.body}"'
     for layout in scene.pzt:
         if layout.adds_mass:
@@ -233,12 +219,12 @@ def _stiffening_problems(scene: AnyKeys) -> Iterator[str]:
             )
 
 
-def _unmet_needs(scene: AnyKeys, analysis: AnyKind) -> Iterator[str]:
+def _unmet_needs(scene: SpatialSceneKeys, analysis: AnyKind) -> Iterator[str]:
     for need in analysis.needs():
         if not getattr(scene, need.table):
             yield f'{need.key}: expected at least one [[{need.table}]] for "{need.value}", found none'
-    is_planar = isinstance(scene, SceneKeys) or scene.is_planar  # linear models of 3D scenes may have no inputs
-    if is_planar and analysis.needs_actuators and not scene.motor_joints and not scene.pzt:
+    # Linear models of 3D scenes may have no inputs.
+    if scene.is_planar and analysis.needs_actuators and not scene.motor_joints and not scene.pzt:
         yield (
             f'kind: expected motors or [[pzt]] for "{analysis.kind}", found neither: nothing to control the robot with'
         )

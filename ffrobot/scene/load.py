@@ -1,9 +1,8 @@
-"""Loading a scene file: syntax, keys, and that everything it refers to exists."""
+"""Loading a scene from a file or from Python: syntax, keys, and that everything it refers to exists."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -12,34 +11,41 @@ from ..common.errors import InputError
 from ..common.toml_files import load_toml, parse_toml, read_text
 from ..common.validation import plain, validate
 from ..fe_models.link_file import LinkTable, read_link
+from ..mbs.fields.spelling import PLANAR, SPATIAL
+from ..mbs.scene.spatial.planar_spelling import in_3d
 from .actuation_times import with_times_of_actuation
 from .checks import check_functions, problems
-from .scene import Scene, SceneKeys
+from .spatial import SpatialScene, SpatialSceneKeys
 
 MADE_IN_PYTHON = "<scene made in Python>"
 
+# Keys of planar scenes that 3D scenes do not have, by the table in which they stand, and what there is instead.
+_AXES = "forces at points are along x, y and z, axes of the body"
+UNAVAILABLE = {
+    "initial": {
+        "angles": "the guess is of joint coordinates, joints = { … }",
+        "rates": "the guess is of joint coordinates, joint_rates = { … }",
+    },
+    "actuation_points": {"transverse": _AXES, "axial": _AXES},
+}
 
-def load_scene(path: Path) -> Scene:
+
+def load_scene(path: Path) -> SpatialScene:
     """Read and validate the scene file at `path`; paths in it come out relative to its folder.
 
     Raises `InputError` with one line for each wrong key: file, key, expected, found. What depends on modal bodies
     (their points, the length of a link) is checked when these are known.
     """
-    return _scene(load_toml(path, "scene file"), path, read_text(path, "scene file"))
+    return validated_scene(load_toml(path, "scene file"), path, read_text(path, "scene file"))
 
 
-@dataclass(frozen=True)
-class MadeInPython:
-    """Tables from Python as those of a file: `functions` by the text that stands for them."""
+def make_scene(*, folder: PathLike[str] | str = ".", **keys: Any) -> SpatialScene:  # noqa: ANN401 (whatever TOML may hold)
+    """A scene from Python, with the keys of a scene file: tables are dictionaries, arrays of tables lists of them.
 
-    data: dict[str, Any]
-    path: Path
-    text: str
-    functions: Mapping[str, object]
-
-
-def made_in_python(folder: PathLike[str] | str, keys: Mapping[str, Any]) -> MadeInPython:
-    """The keys of a scene as a file in `folder` would have them. Raises `InputError` for what no file can hold."""
+    Files it names are looked for in `folder`. NumPy numbers and arrays, tuples and paths may stand for numbers, lists
+    and text; keys that are None are left out. Functions may stand for expressions: see `time_functions.user_function`.
+    Raises `InputError` as `load_scene` does.
+    """
     import tomli_w
 
     path = Path(folder) / MADE_IN_PYTHON
@@ -48,37 +54,38 @@ def made_in_python(folder: PathLike[str] | str, keys: Mapping[str, Any]) -> Made
         text = tomli_w.dumps(plain(keys, functions))
     except (TypeError, RecursionError) as error:
         raise InputError(f"{path}: expected numbers, text, lists and tables, found something else: {error}") from None
-    return MadeInPython(parse_toml(text, path, "scene"), path, text, functions)
+    return validated_scene(parse_toml(text, path, "scene"), path, text, functions)
 
 
-def made_scene(made: MadeInPython) -> Scene:
-    """The validated planar scene. Raises `InputError` as `load_scene` does."""
-    return _scene(made.data, made.path, made.text, made.functions)
+def validated_scene(
+    data: dict[str, Any], path: Path, text: str, functions: Mapping[str, object] | None = None
+) -> SpatialScene:
+    """The validated scene of `data`, which was read from `path` as `text`; `functions` of Python by their names.
 
-
-def make_scene(*, folder: PathLike[str] | str = ".", **keys: Any) -> Scene:  # noqa: ANN401 (whatever TOML may hold)
-    """A planar scene from Python: see `any_space.make_scene`."""
-    return made_scene(made_in_python(folder, keys))
-
-
-def _scene(data: dict[str, Any], path: Path, text: str, objects: Mapping[str, object] | None = None) -> Scene:
-    """The validated scene of `data`, which was read from `path` as `text`."""
-    _refuse_unavailable(data, path)
-    keys = validate(SceneKeys, with_times_of_actuation(data), path, objects)
-    found = [f"{path}: {problem}" for problem in problems(keys)]
-    if found:
-        raise InputError("\n".join(found))
+    Raises `InputError` as `load_scene` does.
+    """
+    space = SPATIAL if data.get("space") == SPATIAL else PLANAR
+    _raise(_unavailable_keys(data) if space == SPATIAL else (), path)
+    keys = validate(SpatialSceneKeys, with_times_of_actuation(data), path, functions, space)
+    _raise(problems(keys), path)
     for link in (body.link for body in keys.body):
         if isinstance(link, LinkTable):
             read_link(link)
     check_functions(keys, path)
-    return Scene.model_construct(**dict(keys), path=path.absolute(), text=text)  # the keys are validated
+    return SpatialScene.model_construct(**dict(in_3d(keys)), path=path.absolute(), text=text)  # the keys are validated
 
 
-def _refuse_unavailable(data: dict[str, Any], path: Path) -> None:
-    """Say so plainly, before the keys of what is not there yet are called wrong."""
-    if data.get("space") == "spatial":
-        raise InputError(
-            f'{path}: space: expected "planar", found "spatial": 3D scenes run by `ffrobot solve`, `ffrobot'
-            " sweep` and `ffrobot.solve` so far"
-        )
+def _raise(found: Iterable[str], path: Path) -> None:
+    lines = [f"{path}: {problem}" for problem in found]
+    if lines:
+        raise InputError("\n".join(lines))
+
+
+def _unavailable_keys(data: dict[str, object]) -> Iterator[str]:
+    """Keys that only planar scenes have, before they are called unknown."""
+    for table, keys in UNAVAILABLE.items():
+        found = data.get(table, [])
+        for entry in found if isinstance(found, list) else [found]:
+            for key, instead in keys.items():
+                if isinstance(entry, dict) and key in entry:
+                    yield f'{table}: {key}: expected no such key in space = "spatial", found it: {instead}'

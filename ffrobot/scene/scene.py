@@ -1,53 +1,6 @@
-"""A scene file as a whole; its tables are records of their own."""
+"""The scene of what still stands of the planar wing; it goes with that."""
 
-from __future__ import annotations
+from .spatial import SpatialScene as Scene
+from .spatial import SpatialSceneKeys as SceneKeys
 
-from collections.abc import Iterator
-from typing import Annotated
-
-from ..actuation.patches.records import PztLayout
-from ..actuation.points import ActuationPoints
-from ..mbs.fields.field_types import NotEmpty
-from ..mbs.fields.references import Reference, under
-from ..mbs.scene.mechanism import MechanismKeys, MechanismScene
-from .kinds import Analysis
-
-
-class SceneKeys(MechanismKeys):
-    """Keys of a planar scene file. Names of lists of tables are singular, as in the file.
-
-    `geometric_stiffening` "auto" includes it if the loads of a run change the stiffness of a link by more than 1 %.
-    """
-
-    pzt: tuple[PztLayout, ...] = ()
-    """Piezoelectric patches."""
-    actuation_points: tuple[ActuationPoints, ...] = ()
-    """Points of forces that replace the driving forces."""
-    analysis: Annotated[tuple[Analysis, ...], NotEmpty]
-    """Analyses, in this order."""
-
-    def references(self) -> Iterator[Reference]:
-        """All that records of the scene refer to, with their full keys."""
-        yield from super().references()
-        for layout in self.pzt:
-            yield from under(f'pzt "{layout.body}"', layout.references())
-        for points in self.actuation_points:
-            yield from under(f'actuation_points "{points.body}"', points.references())
-        for analysis in self.analysis:
-            yield from under(f'analysis "{analysis.name}"', analysis.references())
-
-
-class Scene(SceneKeys, MechanismScene):
-    """A validated scene, with the absolute `path` of its file and the raw `text` that results files carry."""
-
-    def __repr__(self) -> str:
-        names = {
-            "bodies": [body.name for body in self.body],
-            "joints": [joint.name for joint in self.joint],
-            "trajectories": [trajectory.name for trajectory in self.trajectory],
-            "analyses": [analysis.name for analysis in self.analysis],
-        }
-        parts = [f"{kind} {', '.join(members)}" for kind, members in names.items() if members]
-        return f"Scene({self.name!r}): {'; '.join(parts)}"
-
-    __str__ = __repr__
+__all__ = ["Scene", "SceneKeys"]

@@ -20,7 +20,7 @@ LACKS = (
     Lack(
         "`motor = true` of spherical and free joints, which have no coordinates",
         "revolute and prismatic joints in series; loads on points",
-        "ffrobot.scene.spatial",
+        "ffrobot.mbs.joints.spatial.joint",
     ),
     Lack(
         '`coupling = "surface"` of patches on ±z, of fibers and of twist: link files outline patches on ±y',

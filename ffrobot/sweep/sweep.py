@@ -213,13 +213,13 @@ def check_point(sweep: Sweep, values: tuple[Value, ...]) -> None:
     from tempfile import TemporaryDirectory
 
     from ..fe_models.link_file import read_link
-    from ..scene.any_space import load_any_scene
+    from ..scene.load import load_scene
 
     with TemporaryDirectory() as folder:
         run = Run(0, values, Path(folder))
         try:
             with python_allowed(sweep.allow_python):
-                scene = load_any_scene(_files(sweep, run).write(run.folder))
+                scene = load_scene(_files(sweep, run).write(run.folder))
             for body in scene.body:
                 if body.link is not None:
                     read_link(body.link)

@@ -13,7 +13,7 @@ from ffrobot.mbs.quantities.spatial_energy import totals
 from ffrobot.mbs.quantities.spatial_motion import SpatialMotion
 from ffrobot.mbs.solve.state import State
 from ffrobot.run.spatial_bodies import load_spatial_bodies
-from ffrobot.scene.spatial import spatial_scene
+from ffrobot.scene.load import validated_scene
 
 RIGID = """
 name = "top"
@@ -61,7 +61,7 @@ def spinner():
         "body": ({"name": "spinner", "link": "links/spinner.toml"},),
         "analysis": ({"name": "spin", "kind": "forward", "end": 1.0, "output_step": 1.0},),
     }  # fmt: skip
-    scene = spatial_scene(tables, FOLDER / "scene.toml", "")
+    scene = validated_scene(tables, FOLDER / "scene.toml", "")
     model = build_spatial_model(scene, [body.spatial for body in load_spatial_bodies(scene, lambda _: None)])
     sample, (node,) = load("top_flexible")["samples"][0], model.tree.nodes
     q, v = np.zeros(model.tree.n_q), np.zeros(model.tree.n_v)

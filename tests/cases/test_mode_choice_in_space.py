@@ -17,7 +17,7 @@ from ffrobot.run.spatial import solve_spatial
 from ffrobot.run.spatial_bodies import load_spatial_bodies
 from ffrobot.run.spatial_mode_choice import reported_in_space
 from ffrobot.run.watcher import Watcher
-from ffrobot.scene.spatial import load_spatial_scene
+from ffrobot.scene.load import load_scene
 
 S = "(10*t**3-15*t**4+6*t**5)"  # from rest to rest with zero acceleration at both ends
 QUINTIC = {"x": f"1.5-0.5*{S}", "y": f"sqrt(3)/2+0.3*{S}"}
@@ -157,7 +157,7 @@ def link(request, arm):
     folder, tables, _ = arm
     load = [{"point": request.param, "mass": 0.2, "center": [0.01, 0.02, 0.03]}] if request.param else []
     path = planar_in_space.write(tables | {"payload": load}, folder / "loaded.toml")
-    scene = load_spatial_scene(path)
+    scene = load_scene(path)
     (loaded,) = (body for body in load_spatial_bodies(scene, lambda _: None) if body.spatial.name == "fore")
     return loaded.spatial
 
@@ -193,7 +193,7 @@ def test_coordinates_with_fewer_modes_are_orthonormal_and_their_forces_known(lin
 def test_wrong_numbers_of_modes_in_space(modes, tmp_path):
     tables = two_links(modes)[1]
     with pytest.raises(InputError, match=r'body "link1": modes: expected "auto" or a .*number'):
-        load_spatial_scene(planar_in_space.write(tables, tmp_path / "wrong.toml"))
+        load_scene(planar_in_space.write(tables, tmp_path / "wrong.toml"))
 
 
 def test_rigid_bodies_have_no_modes_in_space(arm, tmp_path):
@@ -201,4 +201,4 @@ def test_rigid_bodies_have_no_modes_in_space(arm, tmp_path):
     column = tables["body"][0] | {"modes": 2}
     path = planar_in_space.write(tables | {"body": [column]}, tmp_path / "rigid.toml")
     with pytest.raises(InputError, match=r'expected the key "modes" only in flexible bodies, found it in a rigid one'):
-        load_spatial_scene(path)
+        load_scene(path)

@@ -19,8 +19,7 @@ from ffrobot.results.write import results_image
 from ffrobot.run.solve import solve
 from ffrobot.run.spatial import solve_spatial
 from ffrobot.run.watcher import Watcher
-from ffrobot.scene.load import made_in_python
-from ffrobot.scene.spatial import available_scene
+from ffrobot.scene.load import make_scene
 
 ALLOWED = 0.1  # times the tolerance of references: 1e-7 of the size of most datasets
 OF_SMALL_DIFFERENCES = 5.0, "/(modal_force|voltage|required_voltage)$"  # of large forces, where links sag
@@ -99,8 +98,7 @@ def tables_of(name):
 
 def solved_in_3d(tables):
     """By the records and the analyses of 3D scenes."""
-    made = made_in_python(".", tables)
-    return solve_spatial(available_scene(made.data, made.path, made.text, made.functions), Watcher())
+    return solve_spatial(make_scene(**tables), Watcher())
 
 
 def entries(image):

@@ -7,7 +7,7 @@ from space import solved
 from ffrobot.mbs.model.spatial_known_motion import KnownStates, required_forces
 from ffrobot.mbs.model.spatial_model import build_spatial_model
 from ffrobot.run.spatial_bodies import load_spatial_bodies
-from ffrobot.scene.spatial import load_spatial_scene
+from ffrobot.scene.load import load_scene
 
 LINK = """
 name = "{name}"
@@ -214,7 +214,7 @@ def test_spinning_shaft_whirls_forward_and_backward(stiffening, tmp_path):
     text = text.replace("[mesh]", '[model]\ntheory = "timoshenko"\n[mesh]').replace("elements = 20", "elements = 40")
     (tmp_path / "shaft.toml").write_text(text)
     (tmp_path / "scene.toml").write_text(f"geometric_stiffening = {str(stiffening).lower()}\n{SHAFT}")
-    scene = load_spatial_scene(tmp_path / "scene.toml")
+    scene = load_scene(tmp_path / "scene.toml")
     model = build_spatial_model(scene, [body.spatial for body in load_spatial_bodies(scene, lambda _: None)])
     omega_0 = whirling(model, 0.0).mean()
     r_k = diameter / 4 * np.pi / length
@@ -283,7 +283,7 @@ def test_rod_that_spins_is_stretched(tmp_path):
     )  # fmt: skip
     (tmp_path / "shaft.toml").write_text(text.replace("elements = 20", "elements = 80"))
     (tmp_path / "scene.toml").write_text(SHAFT)
-    scene = load_spatial_scene(tmp_path / "scene.toml")
+    scene = load_scene(tmp_path / "scene.toml")
     model = build_spatial_model(scene, [body.spatial for body in load_spatial_bodies(scene, lambda _: None)])
     (node,) = model.tree.nodes
     n, step = node.body.n_modes, 1e-3

@@ -11,7 +11,7 @@ from ffrobot.mbs.model.spatial_known_motion import KnownStates, required_forces
 from ffrobot.mbs.model.spatial_model import build_spatial_model
 from ffrobot.mbs.model.spatial_system import SpatialSystem
 from ffrobot.run.spatial_bodies import load_spatial_bodies
-from ffrobot.scene.spatial import load_spatial_scene
+from ffrobot.scene.load import load_scene
 
 STATES = 5
 CLOSE = 1e-12  # of the largest
@@ -41,7 +41,7 @@ def robot(request, tmp_path_factory, ffrobot):
     path.write_text(
         text + '[[analysis]]\nname = "falls"\nkind = "forward"\nend = 1.0\noutput_step = 1.0\ntolerance = 1e-6\n'
     )
-    scene = load_spatial_scene(path)
+    scene = load_scene(path)
     model = build_spatial_model(scene, [body.spatial for body in load_spatial_bodies(scene, lambda _: None)])
     motion = Motion(*rng.uniform(-1, 1, (4, STATES, model.tree.n_v)))
     return urdf, SpatialSystem(model), motion

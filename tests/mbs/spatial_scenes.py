@@ -14,7 +14,7 @@ from ffrobot.mbs import _core
 from ffrobot.mbs.model.spatial_drives import Command, Drives, Replayed
 from ffrobot.mbs.model.spatial_model import build_spatial_model
 from ffrobot.mbs.scene.spatial.mechanism import SpatialMechanismScene
-from ffrobot.scene.spatial import spatial_scene
+from ffrobot.scene.load import validated_scene
 
 UNDIRECTED = ("spherical", "weld", "free")
 PLACEHOLDER = {"mass": 1.0, "inertia": [1.0, 1.0, 1.0], "center": [0.0, 0.0, 0.0]}  # bodies are passed beside the scene
@@ -24,7 +24,7 @@ def checkpoint_scene(name, tolerance=1e-8):
     """The scene of a checkpoint; its links are found in the folder of the checkpoints."""
     text, _ = scene_of.scene(load(name), tolerance)
     text = text.replace('link = "', 'link = "links/')
-    return spatial_scene(tomllib.loads(text), Path(scene_of.__file__).with_name("scene.toml"), text)
+    return validated_scene(tomllib.loads(text), Path(scene_of.__file__).with_name("scene.toml"), text)
 
 
 def rpy(C):

@@ -3,8 +3,7 @@
 import pytest
 
 from ffrobot.common.errors import InputError
-from ffrobot.scene.load import made_in_python
-from ffrobot.scene.spatial import available_scene
+from ffrobot.scene.load import make_scene
 
 
 def body(name, **points):
@@ -30,8 +29,7 @@ ARM = {
 
 
 def read(**changes):
-    made = made_in_python(".", ARM | changes)
-    return available_scene(made.data, made.path, made.text, made.functions)
+    return make_scene(**ARM | changes)
 
 
 def test_bodies_and_loads_get_components_of_3d():

@@ -14,8 +14,7 @@ from ffrobot.mbs.model.spatial_model import build_spatial_model
 from ffrobot.mbs.model.spatial_system import SpatialSystem
 from ffrobot.run.spatial import solve_spatial
 from ffrobot.run.watcher import Watcher
-from ffrobot.scene.load import made_in_python
-from ffrobot.scene.spatial import available_scene
+from ffrobot.scene.load import make_scene
 
 AT = [0.0, 0.0]
 
@@ -67,10 +66,7 @@ def test_body_without_joints_moves_in_the_plane():
         "load": [{"point": "puck.c", "x": str(F), "moment": str(M)}],
         "analysis": [{"name": "pushed", "kind": "forward", "end": end, "output_step": end}],
     }  # fmt: skip
-    made = made_in_python(".", tables)
-    (result,) = solve_spatial(
-        available_scene(made.data, made.path, made.text, made.functions), Watcher()
-    ).analyses.values()
+    (result,) = solve_spatial(make_scene(**tables), Watcher()).analyses.values()
     assert SpatialSystem(result.run.model).plane is not None
     x, y, angle = result.run.q[-1]
     assert (x, y, angle) == pytest.approx((F * end**2 / (2 * m), 0.0, 0.4 + 2.0 * end + M * end**2 / (2 * J)), abs=1e-6)

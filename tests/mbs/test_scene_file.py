@@ -10,7 +10,6 @@ import pytest
 from ffrobot.common.errors import InputError
 from ffrobot.mbs.fields.field_types import split_point
 from ffrobot.scene.load import load_scene
-from ffrobot.scene.spatial import load_spatial_scene
 
 SCENE = """
 name = "two_link"
@@ -95,46 +94,28 @@ def folder(tmp_path):
     return tmp_path
 
 
-NOT_SHARED = ("spatial", "angle = ", 'joint = "O"', '"pcd"')
-"""What `load_scene` says otherwise: 3D scenes are none of the plane, 3D trajectories know no `angle`, "tracking" is 3D."""
-
-
 def load(folder, text):
-    """The scene in planar records; those of 3D refuse what these do, in the same words."""
     path = folder / "scene.toml"
     path.write_text(text)
-    if not any(words in text for words in NOT_SHARED):
-        assert refusal(load_spatial_scene, path) == refusal(load_scene, path)
     return load_scene(path)
-
-
-def refusal(reader, path):
-    """Lines of the message, with the keys that they list in alphabetical order."""
-    try:
-        reader(path)
-    except InputError as error:
-        listed = re.compile("(?<=expected one of the keys ).*(?=, found)")
-        return {
-            listed.sub(lambda keys: ", ".join(sorted(keys[0].split(", "))), line) for line in str(error).splitlines()
-        }
-    return set()
 
 
 def test_scene_is_read_key_by_key(folder):
     scene = load(folder, SCENE)
-    assert scene.gravity == (0.0, -9.81)
+    assert scene.gravity == (0.0, -9.81, 0.0)
     assert scene.motors == "section"
     assert [body.name for body in scene.body] == ["link1", "link2", "hand"]
     assert scene.body[0].link == folder / "link1.toml"
     assert scene.body[1].modal == folder / "link2.h5"
-    assert scene.body[2].rigid.points["grip"] == (0.2, 0.0)
+    assert scene.body[2].rigid.points["grip"] == (0.2, 0.0, 0.0)
     assert scene.joint[0].between == ("ground", "link1.root")
-    assert scene.joint[0].at == (0.5, 0.0)
+    assert scene.joint[0].at == (0.5, 0.0, 0.0)
     assert scene.joint[0].motor is None
     assert scene.initial.state == "undeformed"
-    assert scene.initial.angles["link2"] == 1.0471975511965976
+    assert scene.initial.joints == {"O": 0.0, "A": 1.0471975511965976}
+    assert scene.joint[2].rpy == (0.0, 0.0, -1.0471975511965976)
     assert scene.pzt[0].patch_count == 2
-    assert scene.payload[0].inertia == 0.0
+    assert scene.payload[0].inertia == (0.0, 0.0, 0.0)
     assert [function(2.0)[:2] for function in scene.load[0].components.values()] == [(20.0, 10.0), (5.0, 0.0)]
     assert scene.trajectory[0].components["x"](0.0)[0] == 1.5
     assert scene.path == folder / "scene.toml"
@@ -188,7 +169,6 @@ MISTAKES = [
     ("gravity", "gravty", "gravty: expected one of the keys name, space, gravity, ", '(did you mean "gravity"?)'),
     ("[0.0, -9.81]", '"down"', 'gravity: expected a list, found "down"', ""),
     ("[0.0, -9.81]", "[0.0, nan]", "gravity[1]: expected a finite number, found ", ""),
-    ('"planar"', '"spatial"', 'space: expected "planar", found "spatial"', "`ffrobot solve`"),
     ('"planar"', '"plane"', 'space: expected "planar" or "spatial", found "plane"', '"planar"?'),
     ("[[payload]]", "[[paylod]]", "paylod: expected one of the keys", '(did you mean "payload"?)'),
     ("[initial]", "[[initial]]", "initial: expected a table, found [", ""),
@@ -321,7 +301,8 @@ def test_stiffening_knows_no_loads_between_interfaces(folder, value, old, new, s
 
 def test_actuation_comes_from_pcid(folder):
     with pytest.raises(
-        InputError, match='actuation: expected an analysis of kind "pcid", "fcid" or "motors-only", found "inv'
+        InputError,
+        match='actuation: expected an analysis of kind "pcid", "fcid", "motors-only" or "tracking", found "inv',
     ):
         load(folder, SCENE.replace('kind = "pcid"', 'kind = "forward"', 1))
 

@@ -22,7 +22,7 @@ from ...run.spatial_actuation import patches_in_space
 from ...run.spatial_bodies import load_spatial_bodies
 from ...run.spatial_mode_choice import mode_levels_in_space
 from ...run.watcher import Watcher
-from ...scene.any_space import AnyScene, load_any_scene
+from ...scene.load import load_scene
 from ...scene.spatial import SpatialScene
 from .archive import PLATFORMS, identifier_of, zipped
 from .description import forward_description
@@ -41,7 +41,7 @@ def forward_fmu(path: Path, analysis: str | None) -> tuple[bytes, str, str, tupl
         InputError: there is no such analysis, or something acts that the FMU does not have.
         SolveError: the scene has no state to start from.
     """
-    scene = load_any_scene(path)
+    scene = load_scene(path)
     chosen = _chosen(path, scene, analysis)
     _check(path, scene)
     place = PLATFORMS.get((sys.platform, platform.machine()))
@@ -92,7 +92,7 @@ def _silent(model: SpatialModel) -> list[str]:
     return [joint.name for joint in (*nodes, *model.tree.loops) if joint.units and joint.name not in own]
 
 
-def _chosen(path: Path, scene: AnyScene, name: str | None) -> Forward:
+def _chosen(path: Path, scene: SpatialScene, name: str | None) -> Forward:
     """The analysis of this name, or the first that fits."""
     found = {each.name: each for each in scene.analysis}
     if name is not None and name not in found:
@@ -111,7 +111,7 @@ def _chosen(path: Path, scene: AnyScene, name: str | None) -> Forward:
     raise InputError(f'{path}: --analysis: expected {wanted}, found "{name}" of {what}')
 
 
-def _check(path: Path, scene: AnyScene) -> None:
+def _check(path: Path, scene: SpatialScene) -> None:
     if scene.load:
         raise InputError(f"{path}: load: expected none of a scene for an FMU, whose loads are its inputs, found some")
     for body in scene.body:

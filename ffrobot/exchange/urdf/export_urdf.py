@@ -17,7 +17,7 @@ from ...mbs.model.spatial_model import build_spatial_model
 from ...mbs.model.spatial_tree import Node
 from ...mbs.solve.spatial_posture import robot_size
 from ...run.spatial_bodies import LoadedSpatialBody, load_spatial_bodies
-from ...scene.any_space import load_any_scene
+from ...scene.load import load_scene
 from ...scene.spatial import SpatialScene
 from .names import Names
 from .not_carried import not_carried
@@ -38,7 +38,7 @@ def scene_as_urdf(path: Path) -> tuple[str, str, tuple[str, ...]]:
     Raises:
         InputError: the scene is wrong, or planar.
     """
-    scene = load_any_scene(path)
+    scene = load_scene(path)
     if not isinstance(scene, SpatialScene):
         raise InputError(
             f'{path}: --format urdf: expected a scene with space = "spatial", found a planar one, which has no'

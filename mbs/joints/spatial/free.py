@@ -21,7 +21,7 @@ class SpatialFree(SpatialJoint):
     type: Literal["free"]
     only_in = SPATIAL
     motor: bool = False
-    """Presence of driving forces and moments."""
+    """Only `false`: motors need coordinates, which free joints do not have."""
 
     guess_units = ("m", "m", "m", "rad", "rad", "rad")
     q_count = 7

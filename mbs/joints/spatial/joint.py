@@ -11,6 +11,7 @@ from abc import abstractmethod
 from typing import Annotated, ClassVar, Literal, NamedTuple
 
 import numpy as np
+from pydantic import field_validator
 
 from ....common.arrays import Array
 from ....common.rotations import of_rpy, smallest_turn
@@ -73,6 +74,16 @@ class SpatialJoint(JointKeys):
     freedoms: ClassVar[int] = 0
     held: ClassVar[tuple[Held, ...] | None] = None  # None where it cannot close a loop
     along: ClassVar[tuple[Along, ...]] = ()  # its coordinates where it does, in the scene's order
+
+    @field_validator("motor", check_fields=False)
+    @classmethod
+    def _motor_has_coordinates(cls, motor: bool | None) -> bool | None:
+        if motor and cls.guess_units:
+            raise ValueError(
+                f"expected false of a {cls.type_name()} joint, which has no coordinates for motors, found true:"
+                " revolute and prismatic joints in series have them"
+            )
+        return motor
 
     @property
     def orientation(self) -> Array:

@@ -18,7 +18,7 @@ class SpatialSpherical(SpatialJoint):
     type: Literal["spherical"]
     only_in = SPATIAL
     motor: bool = False
-    """Presence of three driving moments."""
+    """Only `false`: motors need coordinates, which spherical joints do not have."""
 
     guess_units = ("rad", "rad", "rad")
     q_count = 4
