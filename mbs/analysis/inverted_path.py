@@ -118,7 +118,8 @@ def _with_expected_deflections(servo: S, end: float) -> tuple[S, Linearisation]:
 
     A function of time alone: it changes the output's target, not its zeros.
     """
-    times, sag = shape_along(servo.with_factor(1.0), end, SAMPLES)
+    times = as_floats(np.linspace(0.0, end, SAMPLES))
+    sag = shape_along(servo.with_factor(1.0), times)
     offset = [f.held(0.0, end) for f in spline(times, (1 - servo.factor) * sag, at_rest=True)]
     servo = servo.with_offset(tuple(offset))
     return servo, linearise(servo, end)

@@ -89,8 +89,7 @@ class Tracking(TimedAnalysis):
 
     def run(self, context: AnyContext) -> AnyOutcome:
         """Motion, torques and voltages."""
-        if not isinstance(context, Context):
-            raise InputError(f'analysis "{self.name}": kind: expected space = "spatial" for "tracking" so far')
+        assert isinstance(context, Context)
         return run_tracking(context, self)
 
 
@@ -200,7 +199,7 @@ def _solve(
         )
         objective = "least-voltage"
     asked = replace(asked, objective=objective)
-    found = refined(asked, breaks, analysis.tolerance, servo.goes_on)
+    found = refined(asked, breaks, analysis.tolerance, servo.goes_on, least)
     if not found.converged:
         raise SolveError(f"{place}: the motion of least {analysis.objective} was not found: loosen limits or tolerance")
     return found, least.share, asked, told

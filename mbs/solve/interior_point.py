@@ -72,8 +72,7 @@ class _Newton:
 
         self.layout, b = layout, layout.band
         self.ab = np.zeros((3 * b + 1, layout.size))
-        weighted = program.C * W[:, :, None]
-        blocks = program.H + np.einsum("kia,kib->kab", weighted, program.C)
+        blocks = program.H + (program.C * W[:, :, None]).transpose(0, 2, 1) @ program.C
         for half in (0, 1):  # neighbours share x: not at once
             self._add(layout.z[half::2], layout.z[half::2], blocks[half::2])
         for rows, columns, of in (

@@ -20,7 +20,9 @@ import numpy as np
 from ...common.arrays import Array, as_floats
 from .collocation import GAUSS, Elimination, piecewise, stage_states
 from .interior_point import Minimum, Program, minimize
+from .internal_dynamics import Output
 from .stable_inversion import PROBES, cut
+from .zero_dynamics import shape_along
 
 if TYPE_CHECKING:
     from scipy.interpolate import PPoly
@@ -30,17 +32,11 @@ Objective = Literal["effort", "least-voltage", "least-torque"]
 GRADING = 2.5  # of breaks to both ends: tanh
 MOST_ITERATIONS = 25
 TOLERANCE = 1e-8  # of the last Newton step, relative to the peak of its quantity
-SHAPE_ITERATIONS = 20
 MOST_INTERVALS = 1500
 
 
-class Driven(Protocol):
+class Driven(Output, Protocol):
     """A path that motors and patches carry."""
-
-    @property
-    def scale(self) -> Array:
-        """Frequencies ω of all modes (n,), rad/s."""
-        ...
 
     def forces(self, times: Array, p: Array, v: Array, a: Array, /) -> tuple[Array, Array]:
         """Forces r (N, n) on modes that motors leave, and their torques τ (N, motors), at `times` (N,)."""
@@ -112,10 +108,9 @@ def start_breaks(start: float, path_end: float, end: float, intervals: int) -> A
     return breaks
 
 
-def refined(asked: Transition, breaks: Array, tolerance: float, goes_on: Callable[[], bool]) -> Tracked:
+def refined(asked: Transition, breaks: Array, tolerance: float, goes_on: Callable[[], bool], near: Tracked) -> Tracked:
     """The same on intervals that are cut until no force above `tolerance` of the largest elastic one is left over."""
-    driven = asked.driven
-    found = None
+    driven, found = asked.driven, near
     while True:
         found = track(asked, breaks, found)
         times = (breaks[:-1, None] + np.diff(breaks)[:, None] * PROBES).ravel()
@@ -129,27 +124,13 @@ def refined(asked: Transition, breaks: Array, tolerance: float, goes_on: Callabl
         breaks = finer
 
 
-def sagging(driven: Driven, times: Array) -> Array:
-    """p_s (N, n) with r(t, p_s, 0, 0) = 0, and so τ_qs."""
-    p = np.zeros((len(times), len(driven.scale)))
-    n = p.shape[1]
-    for _ in range(SHAPE_ITERATIONS):
-        r = driven.forces(times, p, 0 * p, 0 * p)[0]
-        K = driven.slopes(times, p, 0 * p, 0 * p)[2][:, :n]
-        step = np.linalg.solve(K, r[..., None])[..., 0]
-        p = p - step
-        if np.abs(driven.scale * step).max() <= TOLERANCE * np.abs(driven.scale * p).max(initial=1e-300):
-            break
-    return p
-
-
 def track(asked: Transition, breaks: Array, near: Tracked | None = None) -> Tracked:
     """Solve on `breaks` (N + 1,), from a motion `near`, or from links as they sag and no voltages."""
     driven, h = asked.driven, np.diff(breaks)
     times = breaks[:-1, None] + h[:, None] * GAUSS.c
     N, s, n, m = *times.shape, *asked.Phi_V.shape
     flat = times.ravel()
-    p_s = sagging(driven, np.concatenate([breaks, flat]))
+    p_s = shape_along(driven, np.concatenate([breaks, flat]))
     p, v, u = p_s[: N + 1].copy(), np.zeros((N + 1, n)), np.zeros((N + 1, m))
     K, sag_at = np.zeros((N, s, n)), p_s[N + 1 :]
     tau_qs = driven.forces(flat, sag_at, 0 * sag_at, 0 * sag_at)[1].reshape(N, s, -1)

@@ -94,23 +94,23 @@ class Linearisation:
         return self.dynamics.times
 
 
-def shape_along(servo: Output, end: float, samples: int) -> tuple[Array, Array]:
-    """Times (N,) from 0 to `end`, and p (N, n) of links that follow their loads as springs would: r(t, p, 0, 0) = 0.
+def shape_along(servo: Output, times: Array) -> Array:
+    """P (N, n) of links that follow their loads at `times` (N,) as springs would: r(t, p, 0, 0) = 0.
 
     Raises `SolveError` where they are too soft for that.
     """
-    times = as_floats(np.linspace(0.0, end, samples))
-    rest: Array = np.zeros((samples, len(servo.scale)))
+    rest: Array = np.zeros((len(times), len(servo.scale)))
     p, K = rest, stiffness(servo, times, rest)
     for _ in range(SHAPE_ITERATIONS):
         _check_numbers(servo, times, K, p)
         p = p - np.linalg.solve(K, servo.residuals(times, p, rest, rest)[:, :, None])[:, :, 0]
-    return times, p
+    return p
 
 
 def linearise(servo: Output, end: float, samples: int = SAMPLES) -> Linearisation:
     """About `shape_along`. Raises `SolveError` as it does."""
-    times, p = shape_along(servo, end, samples)
+    times = as_floats(np.linspace(0.0, end, samples))
+    p = shape_along(servo, times)
     dynamics = linear_dynamics(servo, times, p, 0 * p, 0 * p)
     _check_numbers(servo, times, dynamics.M, dynamics.D, dynamics.K)
     return Linearisation(dynamics, p, servo.scale)

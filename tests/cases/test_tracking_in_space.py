@@ -99,7 +99,6 @@ def off_path_of_first(results):
     [
         ([("35*(t/0.6)**4 - 84*(t/0.6)**5 + 70*(t/0.6)**6 - 20*(t/0.6)**7", "t/0.6")], "a path at rest"),
         ([("motor = true\nmoment_limit = 2.0         # N·m\n", "motor = false\n")], "as many motors"),
-        ([('space = "spatial"\n', "")], "tracking"),
         ([("tolerance = 1e-4", 'objective = "speed"')], "objective"),
     ],
 )
@@ -113,3 +112,18 @@ def test_no_patches(scene):
     layout = text[text.index("[[pzt]]\nbody") : text.index('[[analysis]]\nname = "carried"')]
     with pytest.raises(InputError, match="pzt"):
         ffrobot.solve(scene((layout, ""), ("joints+pzt", "joints")))
+
+
+def test_planar_spelling(scene):
+    """A planar scene is the same arm, projected: its voltages are those of 3D."""
+    planar = (
+        ('space = "spatial"\n', ""),
+        ("gravity = [0.0, 0.0, 0.0]", "gravity = [0.0, 0.0]"),
+        ("axis = [0, 0, 1]\n", ""),
+        ("joints = { hub =", "angles = { arm ="),
+    )
+    voltages = []
+    for changes in ((), planar):
+        with ffrobot.solve(scene(*changes)) as results:
+            voltages.append(results["carried/pzt/arm/voltage"])
+    assert np.abs(voltages[0] - voltages[1]).max() < 1e-6 * np.abs(voltages[0]).max()

@@ -78,10 +78,10 @@ def strip(tmp_path):
     return make
 
 
-def asked(servo, Phi_V, span, objective, limit, *, is_free=False):
+def asked(servo, Phi_V, span, objective, limit, *, is_free=False, V_ref=200.0):
     limits = Limits(np.full(Phi_V.shape[1], limit), np.full(1, np.inf))
     rest = tuple(equilibrium(servo, t) for t in span)
-    return Transition(servo, Phi_V, limits, Weights(0.4, 200.0, 0.005), rest, objective, is_free)
+    return Transition(servo, Phi_V, limits, Weights(0.4, V_ref, 0.005), rest, objective, is_free)
 
 
 @pytest.mark.parametrize(("intervals", "expected"), [(100, 53.7562), (200, 53.6953)])
@@ -127,7 +127,7 @@ def test_without_voltage_motors_alone_carry(strip):
     inverted = invert(servo, linearise(servo, 0.7), 0.34, 0.34, 1e-8, lambda _: True)
     assert inverted.status == "completed"
     breaks = inverted.curve.x
-    found = track(asked(servo, Phi_V, (breaks[0], breaks[-1]), "effort", 1e-3), breaks)
+    found = track(asked(servo, Phi_V, (breaks[0], breaks[-1]), "effort", 1e-3, V_ref=1e-3), breaks)
     times = np.linspace(0.0, 0.7, 71)
     torques = [servo.forces(times, *(curve(times, k) for k in range(3)))[1] for curve in (found.curve, inverted.curve)]
     assert np.abs(torques[0] - torques[1]).max() < 1e-8
