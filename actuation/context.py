@@ -2,37 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Protocol, TypeVar
 
 from ..fe_models.modal_body import ModalBody
-from ..mbs.analysis.context import Context, PlanarContext
-from ..mbs.analysis.planar_outcome import PlanarOutcome
-from ..mbs.model.divided_link import DividedLink
-from ..mbs.model.model import Model
+from ..mbs.analysis.context import Context
 from ..mbs.model.spatial_body import SpatialBody
-from .patches.patches import PatchArray
 from .patches.spatial_patches import LinkPatches
-
-
-@dataclass(frozen=True)
-class PlanarWholeLinks:
-    """Of a model in which links are in pieces: the robot with the whole links, as scenes and controllers name it.
-
-    Attributes:
-        model: with one body for each link; `patches` of these.
-        divided: the links in pieces by name.
-        places: which point of which piece "BODY.POINT" of such a link is.
-        told: an outcome of the pieces, as one of the links.
-    """
-
-    model: Model
-    patches: Mapping[str, PatchArray]
-    divided: Mapping[str, DividedLink]
-    places: Mapping[str, str]
-    told: Callable[[PlanarOutcome], PlanarOutcome]
-
 
 Point = TypeVar("Point", str, str | None)
 
@@ -55,12 +32,3 @@ class ActuatedContext(Context):
     patches: Mapping[str, LinkPatches] = field(default_factory=dict)
     links: Mapping[str, ModalBody] = field(default_factory=dict)
     carrying: Mapping[str, SpatialBody] = field(default_factory=dict)
-
-
-@dataclass(frozen=True, kw_only=True)
-class PlanarActuatedContext(PlanarContext):
-    """With the `patches` on bodies of the model by link, the modal bodies of `links`, and `whole` links if divided."""
-
-    patches: Mapping[str, PatchArray] = field(default_factory=dict)
-    links: Mapping[str, ModalBody] = field(default_factory=dict)
-    whole: PlanarWholeLinks | None = None

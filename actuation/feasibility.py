@@ -187,8 +187,7 @@ def _count(patches: PatchArray, F_p: Array, with_count: Callable[[int], PatchArr
     """The smallest number of patches that do, the largest that has room, and what factor is missing then."""
     most, missing = len(patches.edges), np.inf
     limit = float(patches.limit.min())
-    served = patches if patches.of_all_modes is None else patches.of_all_modes[0]
-    for count in range(served.served, MOST_PATCHES):
+    for count in range(patches.served, MOST_PATCHES):
         array = with_count(count)
         if array is None:
             break

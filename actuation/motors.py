@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,11 +10,10 @@ import numpy as np
 from ..common.arrays import Array, Booleans, as_floats
 from ..common.peaks import largest, root_mean_square, shares
 from ..mbs._core import TimeFunction
-from ..mbs.analysis.motors_only import InvertedPath
-from ..mbs.analysis.planar_outcome import PlanarOutcome
-from ..mbs.joints.joint import JointRecord
+from ..mbs.analysis.inverted_path import MotorsOnlyKeys
 from ..mbs.joints.transmission import MotorLimits
-from ..mbs.quantities.joint_motion import joint_motions, motor_motion
+from ..mbs.quantities.spatial_motion import SpatialMotion
+from ..mbs.scene.analysis import Analysis
 
 SHORT = 0.01  # of the time: a peak that lasts less is one of its own
 APART = 1.1  # times the moment of the other 99 % of the time: likewise
@@ -78,20 +77,24 @@ class MotorFeasibility:
         )
 
 
-def judge_motors(outcome: PlanarOutcome, joints: Mapping[str, JointRecord]) -> dict[str, MotorFeasibility]:
-    """What every motor has to do against its limits; behind a gear that gives it turns otherwise than its joint."""
-    moments = outcome.motor_moments
-    assert moments is not None
-    motions = joint_motions(outcome)
-    return {
-        name: _judge(outcome, joints[name], moments[:, k], (motor_motion(outcome, name) or motions[name]).rate)
-        for k, name in enumerate(outcome.assembly.model.motors)
-    }
+def judge_motors(motion: SpatialMotion, analysis: Analysis) -> dict[str, MotorFeasibility]:
+    """What every motor has to do up to the end of the path; a number behind the joint tells coordinates apart.
 
-
-def _judge(outcome: PlanarOutcome, joint: JointRecord, moment: Array, rate: Array) -> MotorFeasibility:
-    judged = judge_motion(outcome.time, moment, rate, joint.motor_limits, outcome.analysis.last_time)
-    return replace(judged, jump=path_jump(outcome, judged.moment_time)) if judged.has_spike else judged
+    Behind a gear that gives the motor turns otherwise than its joint.
+    """
+    forces, found = motion.motor_forces, {}
+    assert forces is not None
+    for joint in motion.model.scene.motor_joints:
+        of_joint = motion.joint(joint.name)
+        assert of_joint is not None
+        motor = motion.motor_motion(joint.name)
+        moments, rates = forces.moments[joint.name], of_joint[1] if motor is None else motor[1][:, None]
+        for k, limits in enumerate(joint.motor_limits):
+            name = joint.name if len(joint.units) == 1 else f"{joint.name} {k + 1}"
+            judged = judge_motion(motion.time, moments[:, k], rates[:, k], limits, analysis.last_time)
+            jump = path_jump(motion, analysis, judged.moment_time) if judged.has_spike else ""
+            found[name] = replace(judged, jump=jump)
+    return found
 
 
 def judge_motion(time: Array, moment: Array, rate: Array, limits: MotorLimits, end: float) -> MotorFeasibility:
@@ -118,17 +121,17 @@ def first_time(time: Array, beyond: Booleans) -> Array:
     return np.where(beyond.any(axis=0), time[beyond.argmax(axis=0)], np.nan)
 
 
-def path_jump(outcome: PlanarOutcome, at: float) -> str:
+def path_jump(motion: SpatialMotion, analysis: Analysis, at: float) -> str:
     """Which derivative of a trajectory jumps near the time `at` (s), if moments follow from it.
 
     "acceleration", in motors-only analyses "jerk" too, else "": a path is held before t = 0 and after its end.
     """
-    end = outcome.analysis.last_time
-    if end <= 0.0 or len(outcome.time) < 2:
+    end = analysis.last_time
+    if end <= 0.0 or len(motion.time) < 2:
         return ""
     h = INSTANT * end
     near = NEARBY * end * (round(at / end / NEARBY) + np.arange(-1.0, 2.0))
-    for target in (constraint.target for constraint in outcome.assembly.model.trajectories):
+    for target in _targets(motion):
 
         def acceleration(t: Array, target: TimeFunction = target) -> Array:
             return np.where(
@@ -142,9 +145,16 @@ def path_jump(outcome: PlanarOutcome, at: float) -> str:
             return "acceleration"
         jerks = (before[0] - before[1]) / h, (after[1] - after[0]) / h
         largest = np.abs(np.diff(all_over)).max() / (end / 1000)
-        if isinstance(outcome.details, InvertedPath) and np.any(np.abs(jerks[1] - jerks[0]) > JUMP * largest):
+        if isinstance(analysis, MotorsOnlyKeys) and np.any(np.abs(jerks[1] - jerks[0]) > JUMP * largest):
             return "jerk"
     return ""
+
+
+def _targets(motion: SpatialMotion) -> Iterator[TimeFunction]:
+    """The functions of time that trajectories follow."""
+    for path in motion.model.scene.trajectory:
+        yield from path.components.values()
+        yield from () if path.orientation is None else path.orientation.functions
 
 
 def _not_exceeded(time: Array, values: Array, share: float) -> float:

@@ -1,4 +1,4 @@
-"""What motors and patches of a robot in space have to do against what they can, and what nothing does."""
+"""What motors and patches of a robot have to do against what they can, and what nothing does."""
 
 from __future__ import annotations
 
@@ -13,8 +13,9 @@ from ..common.arrays import Array
 from ..fe_models.modal_body import ModalBody
 from ..mbs.model.spatial_body import SpatialBody
 from ..mbs.quantities.spatial_motion import SpatialMotion
+from ..mbs.scene.analysis import Analysis
 from .feasibility import Feasibility, ModalMotion, PatchFeasibility, judge_patches
-from .motors import MotorFeasibility, judge_motion
+from .motors import judge_motors
 from .patches.spatial_patches import LinkPatches, with_count
 from .patches.spatial_records import SpatialPztLayout
 from .patches.voltages import Voltages
@@ -58,7 +59,7 @@ def judge_in_space(
     links: Mapping[str, LinkInMotion],
     patches: Mapping[str, LinkPatches],
     voltages: Mapping[str, Voltages],
-    end: float,
+    analysis: Analysis,
     others: Container[str],
 ) -> Feasibility:
     """Required against available of motors by joint ("JOINT 2" of a second coordinate) and of patches by layout.
@@ -71,26 +72,11 @@ def judge_in_space(
         for name, array in of_link.arrays.items():
             assert isinstance(array.layout, SpatialPztLayout)
             modes = of_link.modes[name]
-            trial = partial(with_count, path, array.layout, link.modal, link.spatial)
+            trial = None if analysis.is_repeated else partial(with_count, path, array.layout, link.modal, link.spatial)
             modal = ModalMotion(motion.time, modes.coordinates(link.p), modes.forces(link.F_p))
             judged[name] = judge_patches(array, voltages[name], modal, trial)
     missing = unsupplied_in_space(motion, links, patches, voltages, others)
-    return Feasibility(judge_motors_in_space(motion, end), judged, missing)
-
-
-def judge_motors_in_space(motion: SpatialMotion, end: float) -> dict[str, MotorFeasibility]:
-    """What the motors have to do up to the `end` (s) of the path; a number behind the joint tells coordinates apart."""
-    forces, found = motion.motor_forces, {}
-    assert forces is not None
-    for joint in motion.model.scene.motor_joints:
-        of_joint = motion.joint(joint.name)
-        assert of_joint is not None
-        motor = motion.motor_motion(joint.name)  # behind a gear that gives
-        moments, rates = forces.moments[joint.name], of_joint[1] if motor is None else motor[1][:, None]
-        for k, limits in enumerate(joint.motor_limits):
-            name = joint.name if len(joint.units) == 1 else f"{joint.name} {k + 1}"
-            found[name] = judge_motion(motion.time, moments[:, k], rates[:, k], limits, end)
-    return found
+    return Feasibility(judge_motors(motion, analysis), judged, missing)
 
 
 def unmet_in_space(

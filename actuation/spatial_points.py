@@ -1,4 +1,4 @@
-"""Actuation points in space (Shabana 2022, Eqs. 5–10): generalized driving forces of a body as forces along x, y, z.
+"""Actuation points (Shabana 2022, Eqs. 5–10): generalized driving forces of a body as forces along x, y, z.
 
 Forces F_a at points of a body do L_a F_a on it, with a column [e; u × e; Φᵀe] for a unit force along e at u = x + Φp:
 on R and on the rotation, both in axes of the body, and on its modes. Q_a are the forces that the trajectories have on
@@ -7,7 +7,7 @@ it, and those that hold a shape.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from types import MappingProxyType
@@ -17,16 +17,20 @@ import numpy as np
 
 from ..common.arrays import Array
 from ..common.errors import InputError
-from ..common.validation import Record
-from ..fe_models.modal_body import ModalBody
+from ..common.validation import Record, did_you_mean, quoted
+from ..fe_models.modal_body import Interface, ModalBody
 from ..mbs.analysis.outcome import Outcome
+from ..mbs.fields.field_types import Name
 from ..mbs.fields.references import Reference
 from ..mbs.fields.spelling import IN_PLANE, IN_SPACE
 from ..mbs.model.spatial_body import SpatialBody, SpatialPoint
 from ..mbs.model.spatial_motors import path_forces, path_forces_on_bodies
-from .points import DEPENDENT, Place, PointForces, candidate_places, length_of, point_at, point_names
 
+DEPENDENT = 1e-10  # ratio of singular values of L_a below which components count as saying the same
 AXES = "xyz"
+
+Place = float | Name
+"""Where on a link: the distance from its root (m), or the name of one of its points."""
 
 
 class SpatialActuationPoints(Record):
@@ -100,6 +104,25 @@ class SpatialPointSet:
             on_modes = np.broadcast_to(point.translation.T @ e[:, k], p.shape)
             columns.append(np.hstack([on_frame, on_modes]))
         return np.stack(columns, axis=2)
+
+
+@dataclass(frozen=True)
+class PointForces:
+    """Forces at the actuation points of one body over time.
+
+    Attributes:
+        force: (T, c) N along each component, body axes.
+        unmet: (T, 6 + n) Q_a − L_a F_a on R and on the rotation, both in axes of the body, and on p: N, N·m, N/√kg.
+        residual: (T,) its norm with the scale of the set, N.
+        rank: least rank of the scaled L_a.
+        condition_number: largest of the scaled L_a.
+    """
+
+    force: Array
+    unmet: Array
+    residual: Array
+    rank: int
+    condition_number: float
 
 
 def spatial_point_set(
@@ -208,3 +231,50 @@ def _scaled(chosen: SpatialPointSet, p: Array) -> Array:
     """The scaled L_a (T, 6 + n, c) at p (T, n)."""
     found: Array = chosen.scale[:, None] * chosen.L_a(p)
     return found
+
+
+def point_names(count: int) -> tuple[str, ...]:
+    """What the points of so many components are called in results."""
+    return tuple(f"actuation{k}" for k in range(1, count + 1))
+
+
+def length_of(body: SpatialBody) -> float:
+    """By which moments on a body are measured against forces, m."""
+    return body.length or max(float(np.linalg.norm(point.position)) for point in body.points.values()) or 1.0
+
+
+def candidate_places(key: str, body: ModalBody | None, points: Mapping[str, SpatialPoint]) -> list[Place]:
+    """Where components may be put: the stations of a link, the points of a rigid body.
+
+    Raises `InputError` where there are none.
+    """
+    if body is not None:
+        return [float(x) for x in np.unique(body.stations.position[:, 0])]
+    if not points:
+        raise InputError(f"{key}: expected a rigid body with points, found none")
+    return list(points)
+
+
+def point_at(
+    key: str,
+    place: Place,
+    body: ModalBody | None,
+    points: Mapping[str, SpatialPoint],
+    made: Callable[[Interface], SpatialPoint],
+) -> SpatialPoint:
+    """One of the `points` of a body by its name, or the one `made` of the section at a distance from its link's root.
+
+    Raises `InputError` for a place that the body has not.
+    """
+    if isinstance(place, str):
+        if place not in points:
+            raise InputError(
+                f'{key}: expected a point of the body ({quoted(points)}), found "{place}"' + did_you_mean(place, points)
+            )
+        return points[place]
+    if body is None:
+        raise InputError(f"{key}: expected points of the rigid body by name ({quoted(points)}), found {place:g}")
+    slack = 1e-9 * body.length
+    if not -slack <= place <= body.length + slack:
+        raise InputError(f"{key}: expected places within the link, 0 … {body.length:g} m, found {place:g} m")
+    return made(body.interpolate(place))

@@ -28,8 +28,6 @@ class Reach:
         W_sqrt: (rows, n) what of the modal forces left unmet counts: |W_sqrt r|² is made small.
         frequency: (n,) of the modes, Hz.
         served: number of modes, the first ones, that the patches are to serve: attachment modes are not among them.
-        of_all_modes: where these are not all modes, but the patches reach all: the same patches on all modes, and
-            (n_all, n) the modal forces on these from those on the n.
     """
 
     Phi_V: Array
@@ -37,7 +35,6 @@ class Reach:
     W_sqrt: Array
     frequency: Array
     served: int
-    of_all_modes: tuple[Reach, Array] | None = None
 
     @property
     def condition_number(self) -> float:

@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from ...common.arrays import Array
 from ...fe_models.modal_body import ModalBody
-from ...mbs.model.masses import with_masses
-from ...mbs.model.planar_body import PlanarBody, PlanarPoint
+from ...mbs.model.spatial_body import SpatialBody, SpatialPoint
+from ...mbs.model.spatial_masses import with_line_masses
 from .composite import Placed, composite, gauss_points
 from .layers import layer_section
-from .patches import patch_edges
-from .records import PztLayout
 from .sections import link_sections
 
 
@@ -23,7 +22,7 @@ class StructureEffect:
 
     Attributes:
         mass: (2,) kg.
-        inertia: (2,) about the frame's origin, kg·m².
+        inertia: (2,) about the body's z axis, kg·m².
         frequency: (2, n) Hz.
     """
 
@@ -32,32 +31,33 @@ class StructureEffect:
     frequency: Array
 
 
-def with_patches(planar: PlanarBody, body: ModalBody, layout: PztLayout, edges: Array | None = None) -> PlanarBody:
-    """The link with mass and stiffness of its patches, as far as the layout says so; it keeps its number of modes.
+def with_patches_in_space(spatial: SpatialBody, body: ModalBody, placed: Sequence[Placed]) -> SpatialBody:
+    """The link, or a piece of it, with mass and stiffness of patches, as far as layouts say so; it keeps all modes.
 
-    Mass lies on the axis, like that of a beam. The stiffness is that of the `composite` section. `edges` (k, 2), m, say
-    where patches are if not where the layout has them: on a piece of a link.
+    Mass lies on the axis, like that of a beam, with its moment of inertia about the axis, ∫ρ (η² + ζ²) dA. The
+    stiffness is that of the `composite` section.
     """
-    edges = patch_edges(layout, body.length) if edges is None else edges
-    T = planar.modal_transform
-    points: list[PlanarPoint] = []
-    masses: list[float] = []
-    sections = link_sections(body)
-    for place in gauss_points(body, edges) if layout.adds_mass else ():
-        at = body.interpolate(place.x)
-        points.append(PlanarPoint(at.position[:2], at.translation[:2] @ T, at.rotation[2] @ T))
-        masses.append(place.weight * layer_section(layout, sections.height[place.station]).A * (layout.density or 0.0))
-    stiffness = T.T @ composite([Placed(layout, edges)], body).stiffness @ T if layout.adds_stiffness else None
-    if not points:
-        points, masses = [PlanarPoint(np.zeros(2), np.zeros((2, planar.n_modes)), np.zeros(planar.n_modes))], [0.0]
-    return with_masses(planar, points, np.array(masses), np.zeros(len(masses)), stiffness)
+    T, sections = spatial.modal_transform, link_sections(body)
+    points, masses, spins = [], [], []
+    for layout, edges in placed:
+        extent = sections.extent(layout.normal)
+        for place in gauss_points(body, edges) if layout.adds_mass else ():
+            at = body.interpolate(place.x)
+            points.append(SpatialPoint(at.position, at.translation @ T, at.rotation @ T))
+            A, _, I = layer_section(layout, extent[place.station])  # noqa: E741
+            line_density = place.weight * (layout.density or 0.0)
+            masses.append(line_density * A)
+            spins.append(line_density * (I + A * layout.width**2 / 12))
+    stiff = [one for one in placed if one.layout.adds_stiffness]
+    added = T.T @ composite(stiff, body).stiffness @ T if stiff else np.zeros((spatial.n_modes, spatial.n_modes))
+    return with_line_masses(spatial, points, np.array(masses), np.array(spins), added)
 
 
-def structure_effect(bare: PlanarBody, patched: PlanarBody) -> StructureEffect:
+def structure_effect_in_space(bare: SpatialBody, patched: SpatialBody) -> StructureEffect:
     """What the patches change."""
     pair = (bare, patched)
     return StructureEffect(
         np.array([body.mass for body in pair]),
-        np.array([body.inertia for body in pair]),
+        np.array([body.inertia[2, 2] for body in pair]),
         np.array([np.sqrt(body.stiffness) / (2 * np.pi) for body in pair]),
     )

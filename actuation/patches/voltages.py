@@ -48,11 +48,8 @@ def voltage_scale(patches: Reach) -> Array:
 def voltage_gain(patches: Reach) -> Array:
     """Voltages (k, n) per modal force without limits: Φ_V⁻¹, or those of least weighted residual.
 
-    Of many that do, the smallest relative to `voltage_scale`; where modes are left out, those that serve them too.
+    Of many that do, the smallest relative to `voltage_scale`.
     """
-    if patches.of_all_modes is not None:
-        on_all, lift = patches.of_all_modes
-        return np.asarray(voltage_gain(on_all) @ lift)
     (n, k), served = patches.Phi_V.shape, patches.served
     if k == served and not patches.unreached_modes.size:
         return as_floats(np.linalg.inv(patches.Phi_V[:served]) @ np.eye(served, n))

@@ -85,7 +85,7 @@ def actuated_in_space(
     others = {of.body for of in scene.actuation_points}
     if any(getattr(one, "apply", None) in FORCES_AT_POINTS for one in scene.analysis if one.source == analysis.name):
         others |= links.keys()
-    judged = judge_in_space(scene.path, motion, links, patches, voltages, analysis.last_time, others)
+    judged = judge_in_space(scene.path, motion, links, patches, voltages, analysis, others)
     return SpatialActuation(voltages, unmet, judged)
 
 
