@@ -263,18 +263,21 @@ def _advice(
             "a slower path (fastest = true finds the smallest time-scaling factor), or another motor or gear for"
             f" {', '.join(beyond)}"
         )
-    inversion = 'kind = "motors-only", or ' if asked and _is_from_rest_to_rest(group) else ""
+    at_rest = asked and _is_from_rest_to_rest(group)
     for body, need in patches.items() if asked else ():
         if 1.0 < need.factor <= FAR_BEYOND:
             yield (
                 f"patches of {body}: a limit of {_number(need.limit)} V is sufficient; sufficient layers, thickness or"
                 " number: ffrobot feasibility"
             )
-    if far := [body for body, need in patches.items() if asked and need.factor > FAR_BEYOND]:
+    far = [body for body, need in patches.items() if asked and need.factor > FAR_BEYOND]
+    if far and group.attrs["kind"] != "tracking":
+        carried = 'kind = "tracking"' if at_rest else 'kind = "tracking" on a path from rest to rest'
         other = "a slower path" if group.attrs["kind"] == "fcid" else 'kind = "fcid" with shape = "static"'
-        yield f"{inversion}{other}: no realistic patch can supply the voltages of {', '.join(far)}"
+        yield f"{carried}, or {other}: no realistic patch can supply the voltages of {', '.join(far)}"
     if asked and read_unsupplied(group["feasibility"]) is not None:
-        yield f"{inversion}patches ([[pzt]]) on the links"
+        inversion = 'kind = "motors-only", or ' if at_rest else ""
+        yield f'{inversion}patches ([[pzt]]) on the links with kind = "tracking"'
     if "linear" in group and (text := str(group["linear"].attrs.get("advice", ""))):
         yield text
     if "control" in group:
