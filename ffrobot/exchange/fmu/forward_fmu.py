@@ -13,7 +13,6 @@ from ...common.errors import InputError
 from ...common.validation import quoted
 from ...mbs import _core
 from ...mbs.analysis.forward import Forward
-from ...mbs.model.raised_mass import with_raised_mass
 from ...mbs.model.spatial_gears import with_compliance_in_space
 from ...mbs.model.spatial_model import SpatialModel, build_spatial_model, without_paths
 from ...mbs.solve.robot_damping import with_robot_damping_in_space
@@ -72,12 +71,11 @@ class _Logged(Watcher):
 
 
 def _unit(scene: SpatialScene, analysis: Forward) -> tuple[SpatialModel, HeldUnit]:
-    """The motion of `analysis`; in the plane with raised masses of attachment modes, as the analysis has them."""
+    """The motion of `analysis`."""
     bodies = load_spatial_bodies(scene, _Logged().stage)
     loaded = {body.name: part for body, part in zip(scene.body, bodies, strict=True)}
     fewer = mode_levels_in_space(scene, loaded)[-1]  # "auto": all of them
     spatial = [fewer.get(name, part.spatial) for name, part in loaded.items()]
-    spatial = [with_raised_mass(body) for body in spatial] if scene.is_planar else spatial
     damped = with_robot_damping_in_space(build_spatial_model(scene, spatial), robot_damping_ratios(loaded))
     model = with_compliance_in_space(without_paths(damped))
     links = {name: part.modal for name, part in loaded.items() if part.modal is not None}
