@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from os import PathLike
@@ -46,11 +46,16 @@ def solve(
     was computed until then is in `output` all the same. Warns (`FfrobotWarning`) where results may be wrong, or do not
     mean what they seem to; `Results.warnings` has the same texts.
     """
-    from .common.errors import InputError
+    from .common.errors import FfrobotWarning, InputError
     from .common.files import check_output
     from .common.outputs import protected
-    from .results.file import FORMAT
+    from .results.file import FORMAT, Results
+    from .results.spatial import spatial_image, write_spatial_results
+    from .results.spatial_resume import resume_spatial
+    from .results.stopped import how_to_go_on
     from .run.inputs import files_of, files_of_tables
+    from .run.spatial import solve_spatial
+    from .run.watcher import Watcher
 
     path = None if output is None else Path(output)
     inputs = files_of(Path(scene)) if isinstance(scene, str | PathLike) else files_of_tables(scene.path, scene.text)
@@ -59,29 +64,14 @@ def solve(
             check_output(path, FORMAT)
     elif resume:
         raise InputError("solve: resume: expected the output of the run that was stopped, found none")
-    if isinstance(scene, str | PathLike):
-        scene = load_scene(scene, allow_python=allow_python)
-    return _solve_spatial(scene, path, watcher, inputs, resume=resume)
-
-
-def _solve_spatial(
-    scene: SpatialScene, path: Path | None, watcher: Watcher | None, inputs: Iterable[Path], *, resume: bool
-) -> Results:
-    """The same of a scene in space."""
-    from .common.errors import FfrobotWarning
-    from .common.outputs import protected
-    from .results.file import Results
-    from .results.spatial import spatial_image, write_spatial_results
-    from .results.spatial_resume import resume_spatial
-    from .results.stopped import how_to_go_on
-    from .run.spatial import solve_spatial
-    from .run.watcher import Watcher
 
     def keep(solution: SpatialSolution) -> None:
         if path is not None:
             with protected(inputs):
                 write_spatial_results(solution, path)
 
+    if isinstance(scene, str | PathLike):
+        scene = load_scene(scene, allow_python=allow_python)
     watcher = watcher or Watcher()
     if path is not None and resume:
         solution = resume_spatial(scene, path, watcher, keep)
@@ -91,7 +81,7 @@ def _solve_spatial(
         solution = solve_spatial(scene, watcher, keep)
     for name, result in solution.analyses.items():
         for text in result.warnings:
-            warnings.warn(f'{scene.path}: analysis "{name}": {text}', FfrobotWarning, stacklevel=3)
+            warnings.warn(f'{scene.path}: analysis "{name}": {text}', FfrobotWarning, stacklevel=2)
     for run in solution.outcomes.values():
         run.check_completed(how_to_go_on(solution, "solve(…, resume=True)") if path is not None else "")
     return Results(path) if path is not None else Results.from_image(spatial_image(solution), scene.path)

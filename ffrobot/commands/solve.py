@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
@@ -47,36 +45,20 @@ def solve(scene_file: Path, output: Path | None, *, resume: bool, strict: bool) 
     protect(files_of(scene_file))
     check_output(path, FORMAT)
     again = f"ffrobot solve {scene_file}{f' -o {output}' if output else ''} --resume"
-    _solve(_in_space(), scene_file, path, again, resume=resume, strict=strict)
+    _solve(scene_file, path, again, resume=resume, strict=strict)
 
 
-@dataclass(frozen=True)
-class _Stage2:
-    """What solves scenes of one dimension: functions that get the same, and return the solutions of that dimension."""
-
-    solve: Callable[..., Any]
-    resume: Callable[..., Any]
-    write: Callable[[Any, Path], None]
-    print_summary: Callable[..., None]
-
-
-def _in_space() -> _Stage2:
-    from ..present.spatial import print_spatial_summary
-    from ..results.spatial import write_spatial_results
-    from ..results.spatial_resume import resume_spatial
-    from ..run.spatial import solve_spatial
-
-    return _Stage2(solve_spatial, resume_spatial, write_spatial_results, print_spatial_summary)
-
-
-def _solve(program: _Stage2, scene_file: Path, path: Path, again: str, *, resume: bool, strict: bool) -> None:
+def _solve(scene_file: Path, path: Path, again: str, *, resume: bool, strict: bool) -> None:
     """Solve, write and tell; `again` is the command that goes on with it."""
     from ..common.errors import SolveError, StoppedError
     from ..present.progress import Display
     from ..present.start_posture import chosen_posture
-    from ..present.summary import summary_console
+    from ..present.summary import print_summary, summary_console
     from ..results.file import Results
+    from ..results.spatial import write_spatial_results
+    from ..results.spatial_resume import resume_spatial
     from ..results.stopped import how_to_go_on
+    from ..run.spatial import solve_spatial
     from ..scene.plausibility import remarks_on_file
 
     for remark in remarks_on_file(scene_file):  # first: they may be why the run fails
@@ -86,16 +68,15 @@ def _solve(program: _Stage2, scene_file: Path, path: Path, again: str, *, resume
     def keep(solution: SpatialSolution) -> None:
         nonlocal writing
         began = time.perf_counter()
-        program.write(solution, path)
+        write_spatial_results(solution, path)
         writing = time.perf_counter() - began
         kept.append(solution)
 
     with Display() as display:
         try:
-            if resume:
-                solution = program.resume(scene_file, path, display, keep)
-            else:
-                solution = program.solve(scene_file, display, keep)
+            solution = (
+                resume_spatial(scene_file, path, display, keep) if resume else solve_spatial(scene_file, display, keep)
+            )
         except SolveError as error:  # what a signal has cut short may fail for that
             if not display.signal:
                 raise
@@ -106,7 +87,7 @@ def _solve(program: _Stage2, scene_file: Path, path: Path, again: str, *, resume
         return
     with Results(path) as results:
         verdict, posture = results.verdict, chosen_posture(results)
-    program.print_summary(solution, verdict, path, {**solution.seconds, "writing": writing}, summary_console())
+    print_summary(solution, verdict, path, {**solution.seconds, "writing": writing}, summary_console())
     if posture:
         click.echo(f"note       {posture}")
     _check_ended(solution, display, scene_file, again)

@@ -1,4 +1,4 @@
-"""Lines of summaries, of plane and space."""
+"""Lines of summaries."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The table of largest stresses, of scenes in the plane and in space."""
+"""The table of largest stresses in the summary of a solve."""
 
 from __future__ import annotations
 

@@ -16,11 +16,43 @@ from ..actuation.patches.patches import PatchArray
 from ..actuation.patches.records import PatchKeys
 from ..actuation.patches.structure import StructureEffect
 from ..actuation.patches.voltages import Voltages
-from ..actuation.points import PointForces, PointSet
+from ..actuation.points import PointForces
 from ..actuation.spatial_points import SpatialPointSet
 from ..actuation.unsupplied import Unsupplied
 from ..common.arrays import Array
-from ..mbs.scene.space import Space
+from ..mbs.analysis.tracking import TrackedPath
+from ..mbs.quantities.spatial_motion import SpatialMotion
+from ..mbs.scene.space import SPACES, Space
+from ..run.spatial_actuation import SpatialActuation
+from ..run.spatial_solution import SpatialSolution
+
+
+def write_actuation(group: h5py.Group, solution: SpatialSolution, actuation: SpatialActuation) -> None:
+    """Of an analysis: pzt/, by layout, and feasibility/.
+
+    `pzt/LAYOUT/residual_force` (T, n) is what all patches of the link leave, on the modes of its file.
+    """
+    layouts, space = {}, SPACES[solution.scene.space]
+    for body, of_link in solution.patches.items():
+        families = [str(name) for name in solution.links[body].family]
+        for name, array in of_link.arrays.items():
+            entry = group.create_group(f"pzt/{name}")
+            voltages = actuation.voltages[name]
+            unmet = actuation.unmet[body]
+            if space.is_plane:  # modes of the equations
+                unmet = unmet @ solution.bodies[body].spatial.modal_transform
+            _write_voltages(entry, array, voltages, unmet)
+            if not space.is_plane:
+                entry["residual_force"].attrs.create("columns", families, dtype=h5py.string_dtype())
+            entry.attrs.update({"body": body, "bends": array.layout.acts_in})
+            layouts[name] = array.layout
+    entry = group.create_group("feasibility")
+    _write_verdict(entry, actuation.feasibility)
+    _write_judgement(entry, actuation.feasibility, layouts)
+    for joint in solution.scene.motor_joints:
+        for k, unit in enumerate(joint.units):
+            name = joint.name if len(joint.units) == 1 else f"{joint.name} {k + 1}"
+            entry[f"joints/{name}"].attrs["unit"] = "N·m" if unit == "rad" else "N"
 
 
 def write_structure(group: h5py.Group, effects: Mapping[str, StructureEffect]) -> None:
@@ -30,7 +62,7 @@ def write_structure(group: h5py.Group, effects: Mapping[str, StructureEffect]) -
             group[f"patch_structure/{body}/{key}"] = pair
 
 
-def write_voltages(group: h5py.Group, patches: PatchArray, voltages: Voltages, unmet: Array) -> None:
+def _write_voltages(group: h5py.Group, patches: PatchArray, voltages: Voltages, unmet: Array) -> None:
     """Of one layout, and the modal forces `unmet` (T, n) that it leaves."""
     group["voltage"] = voltages.within_limit
     group["required_voltage"] = voltages.required
@@ -44,7 +76,7 @@ def write_voltages(group: h5py.Group, patches: PatchArray, voltages: Voltages, u
     group.attrs["limit"] = patches.limit if np.unique(patches.limit).size > 1 else patches.limit[0]
 
 
-def write_verdict(group: h5py.Group, judged: Feasibility) -> None:
+def _write_verdict(group: h5py.Group, judged: Feasibility) -> None:
     """Whether it can be done, and what nothing supplies."""
     group.attrs["feasible"] = judged.is_feasible
     if judged.unsupplied is not None:
@@ -52,7 +84,7 @@ def write_verdict(group: h5py.Group, judged: Feasibility) -> None:
         group.create_group("unsupplied").attrs.update(about)
 
 
-def write_judgement(group: h5py.Group, judged: Feasibility, layouts: Mapping[str, PatchKeys]) -> None:
+def _write_judgement(group: h5py.Group, judged: Feasibility, layouts: Mapping[str, PatchKeys]) -> None:
     """What is required of each motor and each of the layouts, against what they can."""
     for joint, motor in judged.motors.items():
         group.create_group(f"joints/{joint}").attrs.update(vars(motor) | {"factor": motor.factor})
@@ -91,17 +123,14 @@ def read_unsupplied(group: h5py.Group) -> Unsupplied | None:
     return Unsupplied(**about)
 
 
-def write_point_forces(
-    group: h5py.Group, points: PointSet | SpatialPointSet, forces: PointForces, space: Space | None = None
-) -> None:
-    """Of the actuation points of one body; of 3D sets what the `space` of the scene has."""
+def write_point_forces(group: h5py.Group, points: SpatialPointSet, forces: PointForces, space: Space) -> None:
+    """Of the actuation points of one body, what the `space` of the scene has."""
     group["force"] = forces.force
     group["residual"] = forces.residual
     group["residual_force"] = forces.unmet
-    position, direction = np.array([point.position for point in points.points]), points.direction.T
-    group["position"] = position if space is None else space.along(position)
-    group["direction"] = direction if space is None else space.along(direction)
-    of_plane = {"x": "axial", "y": "transverse"} if space is not None and space.is_plane else {}
+    group["position"] = space.along(np.array([point.position for point in points.points]))
+    group["direction"] = space.along(points.direction.T)
+    of_plane = {"x": "axial", "y": "transverse"} if space.is_plane else {}
     group.attrs["components"] = [of_plane.get(axis, axis) for axis in points.axes]
     group.attrs["rank"] = forces.rank
     group.attrs["condition_number"] = forces.condition_number
@@ -120,3 +149,27 @@ def write_placement(group: h5py.Group, placed: Placed) -> None:
             group[f"{key}/{name}"] = values
     for key in ("frequency", "share", "largest_voltage", "candidates", "candidate_reach"):
         group[key] = getattr(placed, key)
+
+
+def write_tracking(group: h5py.Group, motion: SpatialMotion, found: TrackedPath) -> None:
+    """tracking/ of an analysis: what it made small, and work (J) and largest power (W) of motors and of patches."""
+    about = group.create_group("tracking").attrs
+    for key in ("objective", "least_voltage", "least_share", "cost", "pre_actuation", "post_actuation"):
+        about[key] = getattr(found, key)
+    for name, power in zip(("motor", "patch"), _powers(motion), strict=True):
+        about[f"{name}_work"] = float(np.diff(motion.time) @ (power[1:] + power[:-1]) / 2)
+        about[f"{name}_power"] = float(np.abs(power).max(initial=0.0))
+
+
+def _powers(motion: SpatialMotion) -> tuple[Array, Array]:
+    """(T,) W of all motors, and of the modal forces of all patches."""
+    forces, motors, patches = motion.motor_forces, np.zeros_like(motion.time), np.zeros_like(motion.time)
+    assert forces is not None
+    for joint, moments in forces.moments.items():
+        of_joint = motion.joint(joint)
+        assert of_joint is not None
+        motors = motors + (moments * of_joint[1]).sum(axis=1)
+    for body, F_p in forces.modal.items():
+        if F_p.shape[1]:
+            patches = patches + (F_p * motion.body(body).datasets["modal_velocity"]).sum(axis=1)
+    return motors, patches

@@ -1,42 +1,44 @@
-"""Motion of bodies and points in results files, energies, and stresses in the bodies."""
+"""Motion of bodies and points in results files, and stresses in the bodies."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import h5py
+import numpy as np
 
 from ..common.arrays import Array
-from ..mbs.analysis.planar_outcome import PlanarOutcome
 from ..mbs.model.truncation import modes_kept
-from ..mbs.quantities.observation import body_motion, energies, modal_force, point_motion, stored_coordinates
 from ..mbs.quantities.stress import BodyStress, Recovery, SectionLoads, mode_displacement
 from ..mbs.quantities.validity import Bending
+from ..run.spatial_solution import SpatialResult, SpatialSolution
 
 
-def write_motion(group: h5py.Group, outcome: PlanarOutcome) -> None:
-    """Of an analysis: bodies/, points/, energy/, and how far the constraints are violated."""
-    group["time"] = outcome.time
-    for body in outcome.assembly.model.links:
-        for key, values in body_motion(outcome, body).datasets.items():
-            group[f"bodies/{body.name}/{key}"] = values
-        if (F_p := modal_force(outcome, body)) is not None:
-            group[f"bodies/{body.name}/modal_force"] = F_p
-        transform = stored_coordinates(body)
+def write_bodies(group: h5py.Group, solution: SpatialSolution, result: SpatialResult) -> None:
+    """Of an analysis: bodies/ and points/; modes of planar scenes are those that move in the plane."""
+    motion = result.motion
+    for name, points in motion.points.items():
+        body, moved = solution.bodies[name].spatial, motion.body(name)
+        F_p, T = None if motion.motor_forces is None else motion.motor_forces.modal[name], body.modal_transform
         about = "modes of the modal body file"
-        if transform is not None:
-            group[f"bodies/{body.name}/modal_transform"] = transform
+        if motion.space.is_plane and T.shape[1] < T.shape[0]:  # of those that move in the plane
+            group[f"bodies/{name}/modal_transform"] = T
             about = "modes of the modal body file are modal_transform times these"
-        group[f"bodies/{body.name}"].attrs["modal_coordinates"] = about
-        group[f"bodies/{body.name}"].attrs["modes_kept"] = modes_kept(body)
-        for label in body.points:
-            point = f"{body.name}.{label}"
-            for key, values in point_motion(outcome, point).datasets.items():
-                group[f"points/{point}/{key}"] = values
-    for key, values in energies(outcome).items():
-        group[f"energy/{key}"] = values
-    violation = group.create_dataset("constraint_violation", data=outcome.residual)
-    violation.attrs["columns"] = ["position", "velocity", "acceleration"]
+            p, p_dot = (np.linalg.lstsq(T, values.T, rcond=None)[0].T for values in (moved.modal, moved.modal_velocity))
+            F_p, moved = None if F_p is None else F_p @ T, replace(moved, modal=p, modal_velocity=p_dot)
+        angle = motion.angle(name) if motion.space.is_plane else moved.orientation
+        for key, values in moved.within(motion.space, angle).datasets.items():
+            group[f"bodies/{name}/{key}"] = values
+        if F_p is not None:
+            group[f"bodies/{name}/modal_force"] = F_p
+        if motion.space.is_plane or name in solution.links:
+            group[f"bodies/{name}"].attrs.update({"modal_coordinates": about, "modes_kept": modes_kept(body)})
+        if name in solution.divided:
+            group[f"bodies/{name}"].attrs["pieces"] = len(solution.divided[name].names)
+        for label in points:
+            for key, values in motion.point(f"{name}.{label}").within(motion.space).datasets.items():
+                group[f"points/{name}.{label}/{key}"] = values
 
 
 def write_bending(group: h5py.Group, links: Mapping[str, Bending]) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable
+from typing import Any
 
 import h5py
 import numpy as np
@@ -11,26 +12,36 @@ import numpy as np
 from ..common.arrays import Array, as_list
 from ..common.errors import InputError
 from ..mbs import _core
-from ..mbs.analysis.outcome import SAMPLED, AnyOutcome, Continuation, EarlierRun, Forces, Motion, Statistics
+from ..mbs.analysis.outcome import (
+    METHOD_HISTORY,
+    SAMPLED,
+    STEPS,
+    TREE_MEMORY,
+    TREE_VECTORS,
+    Continuation,
+    EarlierRun,
+    Forces,
+    Motion,
+    Outcome,
+    Statistics,
+)
 from ..mbs.scene.analysis import Analysis, IntegratedAnalysis
 from ..mbs.solve.integrators import METHODS, Choice
 from .file import Results
 from .stopped import GROUP, STOPPED, row_of_numbers
-from .tree_checkpoint import read_tree_checkpoint, write_tree_checkpoint
 
-ROWS = ("q", "v", "a")
+ROWS = ("q", "v", "a", "multipliers")
 COUNTS = ("steps", "rejected", "evaluations", "wall_seconds")
+OF_PLANE = ("lambda_", "checkpoint/peaks")
+"""What earlier versions kept of runs of planar scenes, in coordinates of the plane, 0.1 in absolute ones."""
 
 
-def write_earlier_run(group: h5py.Group, outcome: AnyOutcome, *, is_spatial: bool) -> None:
+def write_earlier_run(group: h5py.Group, outcome: Outcome) -> None:
     """What the next step of a run depends on, and its numbers that results files do not hold anyway."""
     assert outcome.continuation is not None
-    datasets = {name: getattr(outcome, name) for name in ROWS} | {_multipliers(is_spatial): outcome.multipliers}
-    datasets |= {"tau": outcome.forces.tau, "F_p": outcome.forces.F_p}
-    for name, values in datasets.items():
-        if values is not None:
-            group[name] = values
-    write_tree_checkpoint(group, outcome.continuation.checkpoint)
+    for name in ROWS:
+        group[name] = getattr(outcome, name)
+    _write_checkpoint(group, outcome.continuation.checkpoint)
     if (samples := outcome.continuation.samples) is not None:
         group["samples/times"] = samples.times
         group["samples/states"] = samples.states
@@ -40,6 +51,16 @@ def write_earlier_run(group: h5py.Group, outcome: AnyOutcome, *, is_spatial: boo
         group["recording/states"] = recording.states
         names = {kind: name for name, kind in METHODS.items()}
         group["recording"].attrs["methods"] = json.dumps([(first, names[kind]) for first, kind in recording.methods])
+
+
+def _write_checkpoint(group: h5py.Group, checkpoint: _core.TreeCheckpoint) -> None:
+    """Add "checkpoint" to what is kept of an analysis."""
+    for name in TREE_VECTORS:
+        group[f"checkpoint/{name}"] = getattr(checkpoint, name)
+    about = {name: getattr(checkpoint, name) for name in ("time", "outputs", *TREE_MEMORY)}
+    about |= {name: getattr(checkpoint.steps, name) for name in STEPS}
+    about |= {name: getattr(checkpoint.methods, name) for name in METHOD_HISTORY}
+    group["checkpoint"].attrs.update(about)
 
 
 def earlier_runs(file: Results, analyses: Iterable[Analysis]) -> dict[str, EarlierRun]:
@@ -61,39 +82,33 @@ def _earlier_run(file: Results, analysis: Analysis) -> EarlierRun:
     """The run of `analysis` as far as it got. Raises `InputError` where something is missing or damaged."""
     name, about, group = analysis.name, file.attributes(analysis.name), f"{analysis.name}/{GROUP}"
 
+    if any(file.has(f"{group}/{kept}") for kept in OF_PLANE):
+        raise InputError(
+            f"{file.path}: {group}: expected a run in the coordinates of this version, found one that an earlier"
+            " version of ffrobot has stopped: solve again without --resume"
+        )
+
     def dataset(row: str) -> Array:
         if not file.has(f"{group}/{row}"):
             raise InputError(f"{file.path}: {group}/{row}: expected a dataset, found none")
         return file[f"{group}/{row}"]
 
-    q, v, a, multipliers = (dataset(row) for row in (*ROWS, _multipliers(file.is_spatial)))
-    residual = None if file.is_spatial else file[f"{name}/constraint_violation"]
-    tau, F_p = (dataset(row) if file.has(f"{group}/{row}") else None for row in ("tau", "F_p"))
+    q, v, a, multipliers = (dataset(row) for row in ROWS)
     counts = {count: about[count].item() for count in COUNTS if count != "rejected" or count in about}
     ends = row_of_numbers(file, f"{name}/step_ends") if file.has(f"{name}/step_ends") else np.zeros(0)
     return EarlierRun(
-        Motion(file.time(name), q, v, a, multipliers, residual),
-        Forces(tau, F_p),
+        Motion(file.time(name), q, v, a, multipliers),
+        Forces(),
         Statistics(about["status"], Choice(about["integrator"], about["integrator_reason"]), **counts, step_ends=ends),
         _continuation(file, analysis),
         f"{file.path}: {group}",
     )
 
 
-def _multipliers(is_spatial: bool) -> str:
-    """The name of their dataset."""
-    return "multipliers" if is_spatial else "lambda_"
-
-
 def _continuation(file: Results, analysis: Analysis) -> Continuation:
     about, group = file.attributes(analysis.name), f"{analysis.name}/{GROUP}"
-    where, expected = f"{group}/checkpoint", len(file.time(analysis.name))
-    if file.has(f"{where}/peaks"):
-        raise InputError(
-            f"{file.path}: {group}: expected a run in joint coordinates, found one in absolute coordinates, which an"
-            " earlier version of ffrobot has stopped: solve again without --resume"
-        )
-    checkpoint = read_tree_checkpoint(file, where)
+    expected = len(file.time(analysis.name))
+    checkpoint = _read_checkpoint(file, f"{group}/checkpoint")
     if checkpoint.outputs != expected or about["status"] not in (*STOPPED, "completed"):
         raise InputError(
             f"{file.path}: {group}: expected as many outputs as times, {expected}, found {checkpoint.outputs}"
@@ -106,6 +121,24 @@ def _continuation(file: Results, analysis: Analysis) -> Continuation:
     methods = _methods(file, f"{group}/recording")
     recording = _core.Recording(times, states, methods, analysis.spectral_radius, analysis.tolerance)
     return Continuation(checkpoint, recording, samples)
+
+
+def _read_checkpoint(file: Results, group: str) -> _core.TreeCheckpoint:
+    """That of a group. Raises `InputError` where it lacks something."""
+    about = file.attributes(group)
+    try:
+        memory: dict[str, Any] = {name: about[name].item() for name in TREE_MEMORY}
+        memory |= {name: row_of_numbers(file, f"{group}/{name}") for name in TREE_VECTORS}
+        found: _core.TreeCheckpoint = _core.TreeCheckpoint(
+            time=float(about["time"]),
+            outputs=int(about["outputs"]),
+            steps=_core.StepHistory(**{name: about[name].item() for name in STEPS if name in about}),
+            methods=_core.MethodHistory(**{name: about[name].item() for name in METHOD_HISTORY}),
+            **memory,
+        )
+        return found
+    except (TypeError, ValueError, KeyError, AttributeError) as error:
+        raise InputError(f"{file.path}: {group}: expected where the run has stopped, found {error}") from None
 
 
 def _samples(file: Results, group: str) -> _core.Samples | None:

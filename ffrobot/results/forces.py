@@ -7,62 +7,34 @@ from typing import Any
 import h5py
 import numpy as np
 
-from ..mbs.analysis.inverted_path import is_minimum_phase
-from ..mbs.analysis.motors_only import InvertedPath, path_error
-from ..mbs.analysis.planar_outcome import PlanarOutcome
-from ..mbs.quantities.joint_motion import joint_motions, motor_motion
-from ..mbs.quantities.observation import joint_forces, trajectory_force, trajectory_target
+from ..mbs.analysis.inverted_path import AroundPath, is_minimum_phase
+from ..mbs.analysis.spatial_motors_only import path_errors
+from ..mbs.quantities.spatial_motion import SpatialMotion
 from ..mbs.scene.spatial.trajectories import SpatialTrajectory
-from ..mbs.scene.trajectories import Trajectory
 from ..mbs.solve.stable_inversion import Inversion
+from ..run.spatial_solution import SpatialResult, SpatialSolution
 
 
-def write_forces(group: h5py.Group, outcome: PlanarOutcome) -> None:
-    """Of an analysis: trajectories/ that hold in it, and joints/."""
-    held = {c.owner for c in outcome.assembly.constraints if c.is_trajectory}
-    for trajectory in outcome.assembly.model.scene.trajectory:
-        if trajectory.name in held:
-            entry = group.create_group(f"trajectories/{trajectory.name}")
-            entry["force"] = trajectory_force(outcome, trajectory.name)
-            entry["target"] = trajectory_target(outcome, trajectory.name)
-            entry.attrs["components"] = list(trajectory.components)
-            write_path(entry, trajectory)
-    motions = joint_motions(outcome)
-    for joint in outcome.assembly.model.scene.joint:
-        forces = joint_forces(outcome, joint.name)
-        entry = group.create_group(f"joints/{joint.name}")
-        entry.attrs["type"] = joint.type
-        if joint.name in motions:
-            entry["coordinate"], entry["rate"] = motions[joint.name].coordinate, motions[joint.name].rate
-        entry["reaction"] = forces.reaction
-        if forces.reaction_moment is not None:
-            entry["reaction_moment"] = forces.reaction_moment
-        if forces.motor is not None:
-            entry["moment"] = forces.motor
-            if joint.given_gear_ratio is not None:
-                entry["motor_moment"] = forces.motor / joint.given_gear_ratio
-        if (motor := motor_motion(outcome, joint.name)) is not None:
-            entry["motor_angle"], entry["motor_rate"] = motor.coordinate, motor.rate
-        if (gear := outcome.gears.get(joint.name)) is not None:
-            entry["gear_moment"] = gear.gear_moment
-            entry.attrs["unresolved"] = gear.unresolved
+def write_paths(group: h5py.Group, result: SpatialResult) -> None:
+    """Of an analysis: trajectories/ that hold in it, or that motors alone follow; at rest before and after."""
+    run, motion, details = result.run, result.motion, result.run.details
+    inside, errors = np.clip(run.time, 0.0, run.analysis.last_time), {}
+    if isinstance(details, AroundPath) and details.inversion is not None:
+        errors = path_errors(details.inversion, run.time, run.q)
+        _write_zero_dynamics(group, details.inversion)
+    for trajectory in motion.model.scene.trajectory if errors else motion.followed:
+        entry = group.create_group(f"trajectories/{trajectory.name}")
+        if errors:
+            entry["error"] = errors[trajectory.name]
+        else:
+            entry["force"] = motion.path_force(trajectory.name)
+        entry.attrs["components"] = list(trajectory.force_components)
+        if functions := list(trajectory.components.values()):
+            entry["target"] = np.stack([function.sample(inside)[0] for function in functions], axis=1)
+        _write_path(entry, trajectory)
 
 
-def write_inversion(group: h5py.Group, outcome: PlanarOutcome, found: InvertedPath) -> None:
-    """Of motors-only inverse dynamics: no force acts on the path's points, which may be off it."""
-    inversion = found.inversion
-    error, column = path_error(inversion, outcome.time, outcome.q), 0
-    for trajectory in outcome.assembly.model.scene.trajectory:
-        entry, count = group.create_group(f"trajectories/{trajectory.name}"), len(trajectory.components)
-        entry["target"] = trajectory_target(outcome, trajectory.name)
-        entry["error"] = error[:, column : column + count]
-        entry.attrs["components"] = list(trajectory.components)
-        write_path(entry, trajectory)
-        column += count
-    write_zero_dynamics(group, inversion)
-
-
-def write_zero_dynamics(group: h5py.Group, inversion: Inversion[Any]) -> None:
+def _write_zero_dynamics(group: h5py.Group, inversion: Inversion[Any]) -> None:
     """Of motors-only inverse dynamics: zero_dynamics/."""
     entry = group.create_group("zero_dynamics")
     entry["time"] = inversion.linearisation.times
@@ -74,7 +46,7 @@ def write_zero_dynamics(group: h5py.Group, inversion: Inversion[Any]) -> None:
     entry.attrs["off_rest"] = inversion.off_rest
 
 
-def write_path(entry: h5py.Group, trajectory: Trajectory | SpatialTrajectory) -> None:
+def _write_path(entry: h5py.Group, trajectory: SpatialTrajectory) -> None:
     """When a path made of legs begins and is over, and what was found for it."""
     if trajectory.path is None:
         return
@@ -82,3 +54,37 @@ def write_path(entry: h5py.Group, trajectory: Trajectory | SpatialTrajectory) ->
     entry.attrs["stretch"] = trajectory.stretch
     if trajectory.shaper is not None and trajectory.shaper.frequency is not None:
         entry.attrs["shaper_frequency"] = np.atleast_1d(trajectory.shaper.frequency)
+
+
+def write_joints(group: h5py.Group, solution: SpatialSolution, result: SpatialResult) -> None:
+    """Of an analysis: joints/."""
+    motion, motors = result.motion, solution.scene.motor_joints
+    for joint in solution.scene.joint:
+        entry = group.create_group(f"joints/{joint.name}")
+        entry.attrs["type"] = joint.type
+        acting = result.reactions[joint.name]
+        entry["reaction"] = motion.space.along(acting.force)
+        if not (motion.space.is_plane and joint.type == "revolute"):  # it carries no moment about its axis
+            entry["reaction_moment"] = motion.space.about(acting.moment)
+        if result.sharing is not None and joint.name in result.sharing.components:
+            entry.attrs["indeterminate"] = list(result.sharing.components[joint.name])
+        if (found := motion.joint(joint.name)) is not None:
+            entry["coordinate"], entry["rate"] = (
+                np.squeeze(values, 1) if len(joint.units) == 1 else values for values in found
+            )
+        moment = motion.motor_moments.get(joint.name)
+        if moment is not None and joint in motors:
+            entry["moment"] = np.squeeze(moment, 1) if len(joint.units) == 1 else moment
+            if joint.given_gear_ratio is not None:
+                entry["motor_moment"] = entry["moment"][()] / joint.given_gear_ratio
+        _write_gear(entry, motion, joint.name)
+
+
+def _write_gear(entry: h5py.Group, motion: SpatialMotion, joint: str) -> None:
+    """What a gear that gives adds to a joint."""
+    if (motor := motion.motor_motion(joint)) is not None:
+        entry["motor_angle"], entry["motor_rate"] = motor
+    if (moment := motion.gear_moment(joint)) is not None:
+        entry["gear_moment"] = moment
+    if (gear := motion.gears.get(joint)) is not None:
+        entry.attrs["unresolved"] = gear.unresolved

@@ -13,7 +13,6 @@ from ..actuation.control.linear_model import LinearModel, save_arrays
 from ..actuation.control.linear_models import LinearModels
 from ..actuation.control.zeros import Zeros
 from ..common.arrays import Array
-from ..mbs.analysis.planar_outcome import PlanarOutcome
 from ..mbs.quantities.spatial_motion import SpatialMotion
 
 MATRICES = ("A", "B", "C", "D", "mass", "transformation")
@@ -24,18 +23,8 @@ Shapes = Mapping[str, Mapping[str, Array]]
 """By body, what the robot's modes (T, f) do to it: displacement, turn, modal coordinates."""
 
 
-def write_linear(group: h5py.Group, outcome: PlanarOutcome, linear: LinearModels) -> None:
-    """Of an analysis in the plane: linear/."""
-    motion, shapes = _motion(linear), {}
-    for body in outcome.assembly.model.links:
-        columns = motion[:, :, outcome.coordinates(body.name)]
-        modal = columns[:, :, 3:] @ body.modal_transform.T
-        shapes[body.name] = {"position": columns[:, :, :2], "angle": columns[:, :, 2], "modal": modal}
-    write_models(group, linear, shapes)
-
-
 def write_spatial_linear(group: h5py.Group, motion: SpatialMotion, linear: LinearModels) -> None:
-    """Of an analysis in space: linear/; `motion` is what it is about."""
+    """Of an analysis: linear/; `motion` is what it is about."""
     along_v, shapes = _motion(linear)[:, :, : motion.model.tree.n_v], {}  # motors behind gears come last
     T, f, n_v = along_v.shape
     moving = replace(motion, time=np.repeat(motion.time, f), q=np.repeat(motion.q, f, 0), v=along_v.reshape(-1, n_v))
@@ -49,7 +38,7 @@ def write_spatial_linear(group: h5py.Group, motion: SpatialMotion, linear: Linea
         models = (replace(model, transformation=_of_frames(motion, k) @ model.transformation[:n_v])
                   for k, model in enumerate(linear.models))  # fmt: skip
         linear = replace(linear, models=tuple(models))
-    write_models(group, linear, shapes)
+    _write_models(group, linear, shapes)
 
 
 def _of_frames(motion: SpatialMotion, row: int) -> Array:
@@ -66,7 +55,7 @@ def _motion(linear: LinearModels) -> Array:
     return np.array([modes.motion.real for modes in linear.modes])
 
 
-def write_models(group: h5py.Group, linear: LinearModels, shapes: Shapes) -> None:
+def _write_models(group: h5py.Group, linear: LinearModels, shapes: Shapes) -> None:
     """linear/, with models (T, …), poles, frequencies, shapes of all bodies, reach and zeros."""
     group = group.create_group("linear")
     for key in MATRICES:

@@ -1,4 +1,8 @@
-"""Going on with a run in space that was stopped, from its results file: as `resume` in the plane."""
+"""Going on with a run that was stopped, from its results file.
+
+On Ctrl-C and where `max_steps` is used up, the results file keeps what the next step depends on. Analyses for which
+that can be done (`is_resumable`) go on from there, or are taken over where they are complete; all others are run again.
+"""
 
 from __future__ import annotations
 
@@ -47,4 +51,4 @@ def write_state_in_space(file: h5py.File, solution: SpatialSolution) -> None:
     write_input_files(file, solution.scene)
     for name, run in solution.outcomes.items() if is_kept(solution) else ():
         if goes_on(solution, run) and run.continuation is not None:
-            write_earlier_run(file[name].create_group(GROUP), run, is_spatial=True)
+            write_earlier_run(file[name].create_group(GROUP), run)

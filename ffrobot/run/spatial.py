@@ -76,7 +76,7 @@ def prepare_spatial(scene: SpatialScene | Path, watcher: Watcher | None = None) 
         scene = load_scene(scene)
     began = time.perf_counter()
     loaded = load_spatial_bodies(scene, watcher.stage)
-    seconds = {"bodies": time.perf_counter() - began}
+    seconds = {"links and files": time.perf_counter() - began}
     bodies = {body.name: part for body, part in zip(scene.body, loaded, strict=True)}
     patches = patches_in_space(scene, bodies)
     points = {

@@ -94,7 +94,7 @@ def _unsolved(solution: SpatialSolution) -> SpatialSolution:
     scene, bodies, patches = solution.scene, solution.bodies, solution.patches
     model, divided = _model(scene, bodies, patches, solution.divided, solution.parts, stiffened), solution.divided
     whole = _model(scene, bodies, patches, {}, {}, stiffened) if divided else None
-    seconds = {"bodies": solution.seconds["bodies"]}
+    seconds = {"links and files": solution.seconds["links and files"]}
     return replace(solution, model=model, whole=whole, analyses={}, seconds=seconds, stiffened=stiffened)
 
 
