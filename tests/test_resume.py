@@ -148,14 +148,15 @@ def test_other_kinds_and_searches_for_modes_start_again(arm):
     assert results.attributes("inverse")["status"] == "completed"
 
 
-def test_runs_in_absolute_coordinates_are_refused(arm):
-    """As versions before 0.2 have stopped them: with peaks of bodies beside the state."""
+@pytest.mark.parametrize(("old", "new"), [("multipliers", "lambda_"), ("q", "checkpoint/peaks/velocity")])
+def test_runs_in_coordinates_of_earlier_versions_are_refused(arm, old, new):
+    """Of planar scenes 0.2 has kept λ of its own equations in the plane, versions before it peaks of bodies."""
     scene = arm()
     stop(scene, "inverse", 0.03)
     with h5py.File(scene.with_suffix(".h5"), "a") as file:
-        file["inverse/resume/checkpoint/peaks/velocity"] = [1.0, 2.0]
+        file[f"inverse/resume/{new}"] = file[f"inverse/resume/{old}"]
     seal(scene.with_suffix(".h5"))
-    with pytest.raises(ffrobot.InputError, match=r"found one in absolute coordinates, which an earlier version"):
+    with pytest.raises(ffrobot.InputError, match=r"found one that an earlier version of ffrobot has stopped: solve"):
         go_on(scene)
 
 

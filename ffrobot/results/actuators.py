@@ -136,7 +136,7 @@ def write_point_forces(group: h5py.Group, points: SpatialPointSet, forces: Point
     group.attrs["condition_number"] = forces.condition_number
 
 
-def write_placement(group: h5py.Group, placed: Placed) -> None:
+def write_placement(group: h5py.Group, _motion: SpatialMotion, placed: Placed) -> None:
     """Of an analysis: placement/, with the patches found and those spread evenly.
 
     What each reaches, and what one patch would reach anywhere.

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import h5py
 
@@ -16,9 +17,10 @@ from ..common.checksum import MARK, sealed
 from ..common.checksum import METHOD as CHECKSUM
 from ..common.files import write_atomically
 from ..common.version import program_version
-from ..mbs.analysis.outcome import Outcome
+from ..mbs.analysis.outcome import Details, Outcome
 from ..mbs.analysis.tracking import TrackedPath
 from ..mbs.fields.steps import DATASET, METHOD
+from ..mbs.quantities.spatial_motion import SpatialMotion
 from ..mbs.solve.spatial_redundancy import resolving_joints
 from ..run.spatial_solution import SpatialResult, SpatialSolution
 from .actuators import write_actuation, write_placement, write_point_forces, write_structure, write_tracking
@@ -31,6 +33,14 @@ from .peaks import write_peaks
 from .spatial_resume import write_state_in_space
 
 FORMAT_VERSION = 1
+
+DETAILS: dict[type[Details], Callable[[h5py.Group, SpatialMotion, Any], None]] = {
+    LinearModels: write_spatial_linear,
+    LoopRecord: write_loop,
+    Placed: write_placement,
+    TrackedPath: write_tracking,
+}
+"""What writes to the group of an analysis that which only its kind finds."""
 
 
 def write_spatial_results(solution: SpatialSolution, path: Path) -> None:
@@ -46,8 +56,6 @@ def spatial_image(solution: SpatialSolution) -> bytes:
             group, closer = file.create_group(name), result.closer
             _write_analysis(group, solution, result)
             write_peaks(group, None if closer is None else partial(_write_analysis, solution=solution, result=closer))
-            if isinstance(result.run.details, LinearModels):
-                write_spatial_linear(group, result.motion, result.run.details)
         if (run := solution.unread) is not None:
             _write_run(file.create_group(run.analysis.name), run, run.statistics.warnings, ())
         write_state_in_space(file, solution)
@@ -91,12 +99,6 @@ def _write_analysis(group: h5py.Group, solution: SpatialSolution, result: Spatia
         write_point_forces(group.create_group(f"actuation_points/{body}"), solution.points[body], forces, motion.space)
     for body, stress in result.stresses.items():
         write_stress(group.create_group(f"stress/{body}"), stress)
-    if isinstance(run.details, LoopRecord):
-        write_loop(group, run.details)
-    if isinstance(run.details, TrackedPath):
-        write_tracking(group, motion, run.details)
-    if isinstance(run.details, Placed):
-        write_placement(group, run.details)
     write_paths(group, result)
     for key, values in vars(result.energies).items():
         group[f"energy/{key}"] = values
@@ -106,6 +108,9 @@ def _write_analysis(group: h5py.Group, solution: SpatialSolution, result: Spatia
         write_actuation(group, solution, result.actuation)
     violation = group.create_dataset("constraint_violation", data=motion.violation)
     violation.attrs["columns"] = ["position", "velocity", "acceleration"]
+    for found, write in DETAILS.items():
+        if isinstance(run.details, found):
+            write(group, motion, run.details)
 
 
 def _write_run(group: h5py.Group, outcome: Outcome, warnings: Sequence[str], notes: Sequence[str]) -> None:
