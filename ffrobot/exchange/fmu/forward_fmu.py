@@ -14,12 +14,10 @@ from ...common.validation import quoted
 from ...mbs import _core
 from ...mbs.analysis.forward import Forward
 from ...mbs.model.spatial_gears import with_compliance_in_space
-from ...mbs.model.spatial_model import SpatialModel, build_spatial_model, without_paths
-from ...mbs.solve.robot_damping import with_robot_damping_in_space
-from ...run.loaded_body import robot_damping_ratios
-from ...run.spatial_actuation import patches_in_space
-from ...run.spatial_bodies import load_spatial_bodies
+from ...mbs.model.spatial_model import SpatialModel, without_paths
+from ...run.spatial import prepare_spatial
 from ...run.spatial_mode_choice import mode_levels_in_space
+from ...run.spatial_prepare import with_bodies_in_space
 from ...run.watcher import Watcher
 from ...scene.load import load_scene
 from ...scene.spatial import SpatialScene
@@ -72,15 +70,11 @@ class _Logged(Watcher):
 
 def _unit(scene: SpatialScene, analysis: Forward) -> tuple[SpatialModel, HeldUnit]:
     """The motion of `analysis`."""
-    bodies = load_spatial_bodies(scene, _Logged().stage)
-    loaded = {body.name: part for body, part in zip(scene.body, bodies, strict=True)}
-    fewer = mode_levels_in_space(scene, loaded)[-1]  # "auto": all of them
-    spatial = [fewer.get(name, part.spatial) for name, part in loaded.items()]
-    damped = with_robot_damping_in_space(build_spatial_model(scene, spatial), robot_damping_ratios(loaded))
-    model = with_compliance_in_space(without_paths(damped))
-    links = {name: part.modal for name, part in loaded.items() if part.modal is not None}
-    voltages = voltages_in_space(model, patches_in_space(scene, loaded))
-    return model, held_unit(model, voltages, links, analysis, AXES[:2] if scene.is_planar else AXES)
+    prepared = prepare_spatial(scene, _Logged())
+    bodies = mode_levels_in_space(scene, prepared.bodies)[-1]  # "auto": all of them
+    model = with_compliance_in_space(without_paths(with_bodies_in_space(prepared, bodies).model))
+    voltages = voltages_in_space(model, prepared.patches)
+    return model, held_unit(model, voltages, prepared.links, analysis, AXES[:2] if scene.is_planar else AXES)
 
 
 def _silent(model: SpatialModel) -> list[str]:

@@ -39,7 +39,7 @@ def scene_as_urdf(path: Path) -> tuple[str, str, tuple[str, ...]]:
         InputError: the scene is wrong, or planar.
     """
     scene = load_scene(path)
-    if not isinstance(scene, SpatialScene):
+    if scene.is_planar:
         raise InputError(
             f'{path}: --format urdf: expected a scene with space = "spatial", found a planar one, which has no'
             " moments of inertia about x and y"
