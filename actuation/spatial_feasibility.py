@@ -17,7 +17,6 @@ from ..mbs.scene.analysis import Analysis
 from .feasibility import Feasibility, ModalMotion, PatchFeasibility, judge_patches
 from .motors import judge_motors
 from .patches.spatial_patches import LinkPatches, with_count
-from .patches.spatial_records import SpatialPztLayout
 from .patches.voltages import Voltages
 from .unsupplied import Unsupplied, seen_at_points
 
@@ -70,7 +69,6 @@ def judge_in_space(
     for body, of_link in patches.items():
         link = links[body]
         for name, array in of_link.arrays.items():
-            assert isinstance(array.layout, SpatialPztLayout)
             modes = of_link.modes[name]
             trial = None if analysis.is_repeated else partial(with_count, path, array.layout, link.modal, link.spatial)
             modal = ModalMotion(motion.time, modes.coordinates(link.p), modes.forces(link.F_p))

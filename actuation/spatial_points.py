@@ -7,8 +7,9 @@ it, and those that hold a shape.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import combinations
 from pathlib import Path
 from types import MappingProxyType
 from typing import Annotated
@@ -25,9 +26,12 @@ from ..mbs.fields.references import Reference
 from ..mbs.fields.spelling import IN_PLANE, IN_SPACE
 from ..mbs.model.spatial_body import SpatialBody, SpatialPoint
 from ..mbs.model.spatial_motors import path_forces, path_forces_on_bodies
+from ..mbs.scene.space import SPACES, Space
 
 DEPENDENT = 1e-10  # ratio of singular values of L_a below which components count as saying the same
 AXES = "xyz"
+ALONG = {"x": "x", "axial": "x", "y": "y", "transverse": "y", "z": "z"}
+"""The axis along which forces act at the places of a key."""
 
 Place = float | Name
 """Where on a link: the distance from its root (m), or the name of one of its points."""
@@ -55,16 +59,15 @@ class SpatialActuationPoints(Record):
 
     @property
     def places(self) -> list[tuple[str, Place]]:
-        """Axis and place of each component."""
-        of_axes = {"x": self.x or self.axial, "y": self.y or self.transverse, "z": self.z}
-        return [(axis, place) for axis, places in of_axes.items() for place in places]
+        """Key and place of each component."""
+        return [(key, place) for key in ALONG for place in getattr(self, key)]
 
     def references(self) -> Iterator[Reference]:
         """The body, and the places on it that are named."""
         yield Reference("body", self.body)
-        for axis, place in self.places:
+        for key, place in self.places:
             if isinstance(place, str):
-                yield Reference(axis, f"{self.body}.{place}")
+                yield Reference(key, f"{self.body}.{place}")
 
 
 @dataclass(frozen=True)
@@ -112,7 +115,8 @@ class PointForces:
 
     Attributes:
         force: (T, c) N along each component, body axes.
-        unmet: (T, 6 + n) Q_a − L_a F_a on R and on the rotation, both in axes of the body, and on p: N, N·m, N/√kg.
+        unmet: (T, 6 + n) Q_a − L_a F_a on R and on the rotation, both in axes of the body, and on p: N, N·m, N/√kg; in
+            the plane (T, 3 + n) on (R, θ, p), R in global axes.
         residual: (T,) its norm with the scale of the set, N.
         rank: least rank of the scaled L_a.
         condition_number: largest of the scaled L_a.
@@ -126,26 +130,51 @@ class PointForces:
 
 
 def spatial_point_set(
-    scene_path: Path, layout: SpatialActuationPoints, body: ModalBody | None, spatial: SpatialBody, axes: str = AXES
+    scene_path: Path, layout: SpatialActuationPoints, body: ModalBody | None, spatial: SpatialBody, space: Space
 ) -> SpatialPointSet:
-    """The components that the scene asks for, or as many well-conditioned ones along `axes` as are independent.
+    """The components that the scene asks for, or as many well-conditioned ones in `space` as are independent.
 
-    Raises `InputError` for places that the body has not, and for components that do the same to the body.
+    Raises `InputError` for places that the body has not, for more components than coordinates, and for components that
+    do the same to the body; in the plane for a body whose points cannot carry all its generalized forces.
     """
     key = f'{scene_path}: actuation_points "{layout.body}"'
+    coordinates = len(space.translations) + len(space.rotations) + spatial.n_modes
     if not layout.places:
-        return _automatic(key, layout.body, body, spatial, axes)
-    points = [_point(f"{key}: {axis}", place, body, spatial) for axis, place in layout.places]
-    chosen = _named(layout.body, tuple(axis for axis, _ in layout.places), points, spatial)
+        chosen = _automatic(key, layout.body, body, spatial, "".join(AXES[k] for k in space.translations))
+        if space.is_plane and len(chosen.names) < coordinates:  # in 3D forces on an axis do not turn about it
+            raise InputError(
+                f"{key}: expected points that carry all {coordinates} generalized forces of the body, found"
+                f" {len(chosen.names)} independent components among all its stations"
+            )
+        return chosen
+    if len(layout.places) > coordinates:
+        raise InputError(
+            f"{key}: expected at most as many components as the body has coordinates ({coordinates}), found"
+            f" {len(layout.places)}"
+        )
+    points = [_point(key, place, body, spatial) for _, place in layout.places]
+    _check_apart(key, layout.places, points, 1e-9 * (spatial.length or 0.0))
+    chosen = _named(layout.body, tuple(ALONG[along] for along, _ in layout.places), points, spatial)
     sizes = np.linalg.svd(_scaled(chosen, np.zeros((1, spatial.n_modes)))[0], compute_uv=False)
     rank = int(np.count_nonzero(sizes > DEPENDENT * sizes[0]))
     if rank < len(points):
+        along_x = "axial ones" if space.is_plane else "those along x"
         raise InputError(
             f"{key}: expected components that differ in what they do to the body, found {len(points)} of which only"
-            f" {rank} are independent. Those along x coincide without axial modes, and the body has"
-            f" {len(chosen.scale)} coordinates"
+            f" {rank} are independent: {along_x} coincide where no mode moves along the link, and it has {coordinates}"
+            " coordinates"
         )
     return chosen
+
+
+def _check_apart(key: str, places: Sequence[tuple[str, Place]], points: Sequence[SpatialPoint], near: float) -> None:
+    """Raise `InputError` for components along one axis at points less than `near` (m) apart."""
+    for (i, (along, first)), (k, (other, second)) in combinations(enumerate(places), 2):
+        if along == other and np.allclose(points[i].position, points[k].position, rtol=0, atol=near):
+            raise InputError(
+                f"{key}: {along}: expected points apart from each other, found two at {first} and {second} that"
+                " coincide"
+            )
 
 
 def with_spatial_points(spatial: SpatialBody, chosen: SpatialPointSet) -> SpatialBody:
@@ -155,17 +184,22 @@ def with_spatial_points(spatial: SpatialBody, chosen: SpatialPointSet) -> Spatia
 
 
 def solve_spatial_points(chosen: SpatialPointSet, run: Outcome) -> PointForces:
-    """L_a F_a = Q_a at every output time; `unmet` (T, 6 + n) with force and moment on the frame in axes of the body."""
+    """L_a F_a = Q_a at every output time."""
     node = run.model.tree.nodes[run.model.tree.index[chosen.body]]
     Q_a = driving_forces_in_space(run)[chosen.body]
     p = run.q[:, node.p_q]
     scaled = _scaled(chosen, p)
     force = np.einsum("tck,tk->tc", np.linalg.pinv(scaled, rcond=DEPENDENT), chosen.scale * Q_a)
     unmet = Q_a - np.einsum("tkc,tc->tk", chosen.L_a(p), force)
+    residual = np.linalg.norm(unmet * chosen.scale, axis=1)
     sizes = np.linalg.svd(scaled, compute_uv=False)
     rank = int(np.count_nonzero(sizes > DEPENDENT * sizes[:, :1], axis=1).min())
     condition = float((sizes[:, 0] / sizes[:, -1]).max())
-    return PointForces(force, unmet, np.linalg.norm(unmet * chosen.scale, axis=1), rank, condition)
+    if (space := SPACES[run.model.scene.space]).is_plane:
+        F = run.model.tree.frames(run.q)[run.model.tree.index[chosen.body]].F
+        on_frame = np.einsum("tij,tj->ti", F, unmet[:, :3]), unmet[:, 3:6]
+        unmet = np.column_stack([space.along(on_frame[0]), space.about(on_frame[1]), unmet[:, 6:]])
+    return PointForces(force, unmet, residual, rank, condition)
 
 
 def forces_at_points(chosen: Mapping[str, SpatialPointSet], run: Outcome) -> dict[str, Array]:

@@ -20,7 +20,6 @@ from ...mbs.solve.spatial_linearisation import SpatialLinearisation
 from ..context import ActuatedContext
 from ..patches.patches import PatchArray
 from ..patches.spatial_patches import link_patches
-from ..patches.spatial_records import SpatialPztLayout
 from .linear import operating_points_in_space
 from .linear_model import state_space
 from .placing import PatchableLink, elsewhere, place
@@ -100,7 +99,6 @@ def _link(context: ActuatedContext, wanted: Placement) -> PatchableLink:
             f'{path}: placement.pzt: expected one of the layouts {quoted(of_link.arrays)} of "{name}", found {found}'
         )
     reached, layout = of_link.modes[label], of_link.arrays[label].layout
-    assert isinstance(layout, SpatialPztLayout)
 
     def patches(**changes: object) -> PatchArray:
         keys = {"allocation": "least-squares", "mode_weights": None, "point_weights": None} | changes

@@ -1,4 +1,4 @@
-"""Patches of a scene file, key by key. SI units."""
+"""Patches of a scene file, key by key: which way they bend their link, and fibers at an angle. SI units."""
 
 from __future__ import annotations
 
@@ -6,22 +6,44 @@ import json
 from collections.abc import Iterator
 from typing import Annotated, Literal, Self
 
+import numpy as np
 from pydantic import Field, model_validator
 
 from ...common.numbers import MOST_PATCHES, SMALLEST
-from ...common.validation import Record
-from ...mbs.fields.field_types import Name, NotEmpty, NotNegative, PatchCount, Positive, one_of
+from ...common.validation import Record, quoted
+from ...mbs.fields.field_types import Name, NotEmpty, NotNegative, PatchCount, Positive, Quantity, one_of
 from ...mbs.fields.references import Reference
-from .lamina import Lamina, plain_lamina
+from ...mbs.fields.spelling import IN_SPACE, Spelled, as_written
+from .lamina import Fibres, Lamina, fibre_lamina, plain_lamina
 
 MOST_LAYERS = 1000
 
 Face = Literal["+y", "-y", "+z", "-z", "both"]
 Bends = Literal["in-plane", "out-of-plane", "twist"]
 
+FACES = {"in-plane": ("+y", "-y", "both"), "out-of-plane": ("+z", "-z", "both")}
+OF_FIBRES = ("fibre_angle", "d33", "modulus_across", "shear_modulus", "poissons_ratio")
+NO_SHEAR = 1e-9  # of the other stress: a layer that shears less does not twist
 
-class PatchKeys(Record):
-    """What patches of planar scenes and of scenes in space have in common: see there."""
+
+class SpatialPztLayout(Record):
+    """Equal piezoelectric patches along one link; in 3D several layouts on a body have names.
+
+    Lengths in m, moduli in Pa, d31 and d33 in m/V, density kg/m³, limit in V. Centers are distances along the link from
+    its root; `count` places them at (k − ½)·(length of link)/count. `thickness` is that of one of `layers`, stacked on
+    one `face` or on both, with opposite voltages. Without `face` they only bend or twist the link, as in the paper. A
+    positive voltage bends towards +y or +z (with d31 > 0), or twists by a positive angle.
+
+    `allocation = "least-squares"` accepts fewer patches than modes, and uncontrollable modes. If voltages cannot
+    produce all modal forces, `mode_weights` weigh the squares of unmet modal forces, `point_weights` the squares of the
+    resulting deflections at points of the link. `structural` lists what the patches add to their link: by default
+    stiffness, so that they bend it like a composite section; true adds mass, too; false adds nothing, as in the paper.
+
+    Plain ceramic has one modulus and d31. Macro fibre composites have `fibre_angle`, d33 and `modulus` along the
+    fibers, d31 and `modulus_across` across them, `shear_modulus` and `poissons_ratio`; a volt is a field of
+    1/`electrode_spacing`. Fibres at an angle wind around the link, that is, lie at the same angle on both faces seen
+    from outside.
+    """
 
     body: str
     """Link with these patches."""
@@ -45,8 +67,8 @@ class PatchKeys(Record):
     """Largest voltage, V: of all, or of each."""
     layers: Annotated[int, Field(gt=0, le=MOST_LAYERS)] = 1
     """Number of stacked layers."""
-    face: Face | None = None
-    """Face of the link; without it patches only bend the link."""
+    face: Annotated[Face | None, Spelled(Literal["+y", "-y", "both"], as_written)] = None
+    """Face of the link; without it patches only bend or twist the link."""
     allocation: Literal["exact", "least-squares"] = "exact"
     """Allocation of voltages: exact, or least squares, which allows fewer patches than modes."""
     mode_weights: Annotated[tuple[NotNegative, ...], NotEmpty] | None = None
@@ -62,11 +84,28 @@ class PatchKeys(Record):
     """Strain limit of the material; used by the verdict only."""
     coupling: Literal["rotation", "surface"] = "rotation"
     """Coupling to the link: section rotations at patch ends, or faces outlined in the mesh of a solid."""
+    name: Annotated[Name | None, IN_SPACE] = None
+    """Name of the layout in results; default: the name of the body."""
+    bends: Annotated[Bends, IN_SPACE] = "in-plane"
+    """Deformation: along y by patches on faces ±y, along z by patches on faces ±z, or "twist" about x by fibers at an
+    angle, by default on ±y."""
+    fibre_angle: Annotated[Quantity | None, IN_SPACE] = None
+    """Angle of fibers with the link's axis, rad (or such as "45*deg"); positive: like a right-handed screw."""
+    d33: Annotated[float | None, IN_SPACE] = None
+    """Piezoelectric strain constant along fibers, m/V."""
+    modulus_across: Annotated[Positive | None, IN_SPACE] = None
+    """Young's modulus across fibers, Pa; `modulus` is that along them."""
+    shear_modulus: Annotated[Positive | None, IN_SPACE] = None
+    """Shear modulus of a layer of fibers in its plane, Pa."""
+    poissons_ratio: Annotated[float | None, IN_SPACE] = None
+    """Poisson's ratio of a layer of fibers under tension along them."""
+    electrode_spacing: Annotated[Positive | None, IN_SPACE] = None
+    """Spacing of interdigitated electrodes, m; the field per volt is its inverse; default: thickness of a layer."""
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
         one_of(self, ("count", "centers"))
-        self.check_constants()
+        self._check_constants()
         if isinstance(self.limit, tuple) and len(self.limit) != self.patch_count:
             raise ValueError(f"expected {self.patch_count} limits, one for each patch, found {len(self.limit)}")
         if self.adds_mass and self.density is None:
@@ -78,35 +117,77 @@ class PatchKeys(Record):
                 raise ValueError("expected weights that are not all 0, found only zeros")
         return self
 
-    def check_constants(self) -> None:
-        """Raise `ValueError` for patches that do nothing."""
+    def _check_constants(self) -> None:
+        """Raise `ValueError` for patches that do nothing, or not what `bends` says."""
+        given = [key for key in (*OF_FIBRES, "electrode_spacing") if getattr(self, key) is not None]
+        if not given:
+            self._check_plain()
+        else:
+            self._check_fibres(given)
+        if self.coupling == "surface" and (given or self.bends != "in-plane"):
+            raise ValueError(
+                'expected bends = "in-plane" and no fibers with coupling = "surface": link files outline patches of'
+                f" plain ceramic on faces ±y alone; found {self.bends if not given else given[0]}"
+            )
+        allowed = FACES.get(self.bends)
+        if self.face is not None and allowed is not None and self.face not in allowed:
+            raise ValueError(f'expected face {quoted(allowed)} with bends = "{self.bends}", found "{self.face}"')
+
+    def _check_plain(self) -> None:
         if abs(self.d31) < SMALLEST:
             raise ValueError(f"expected a d31 other than 0, found {self.d31:g}: such patches do nothing")
+        if self.bends == "twist":
+            raise ValueError(
+                f'expected the keys {quoted(OF_FIBRES)} with bends = "twist", found none: plain piezoceramic strains'
+                " alike in all directions of its plane and twists at no angle; fibers (macro fiber composites) do"
+            )
+
+    def _check_fibres(self, given: list[str]) -> None:
+        missing = [key for key in OF_FIBRES if key not in given]
+        if missing:
+            raise ValueError(f"expected the keys {quoted(missing)} with {given[0]}, found none")
+        assert self.modulus_across is not None
+        assert self.poissons_ratio is not None
+        most = (self.modulus / self.modulus_across) ** 0.5
+        if not abs(self.poissons_ratio) < most:
+            raise ValueError(
+                f"expected a poissons_ratio between -{most:.4g} and {most:.4g}, which leaves the energy of such moduli"
+                f" positive, found {self.poissons_ratio:g}"
+            )
+        along, shear = np.abs(self.lamina.per_volt)
+        if max(along, shear) * self.thickness < SMALLEST:
+            raise ValueError("expected d33 or d31 other than 0, found neither: such patches do nothing")
+        if self.bends == "twist" and shear <= NO_SHEAR * along:
+            raise ValueError(
+                f'expected fibers at an angle that shear under a voltage with bends = "twist", found fibre_angle ='
+                f" {self.fibre_angle:g} with d33 = {self.d33:g}, d31 = {self.d31:g}: along, across or alike in both"
+                " directions they do not; 45*deg does most"
+            )
 
     @property
     def label(self) -> str:
         """What results and messages call the layout."""
-        return self.body
+        return self.body if self.name is None else self.name
 
     @property
     def acts_in(self) -> Bends:
         """What the patches do to their link."""
-        return "in-plane"
-
-    @property
-    def served_in_words(self) -> str:
-        """Which modes the patches are to serve."""
-        return "moves in the plane"
+        return self.bends
 
     @property
     def normal(self) -> Literal["y", "z"]:
         """Of the faces that they sit on: an axis of the link."""
-        return "y"
+        return "z" if self.bends == "out-of-plane" or self.face in ("+z", "-z") else "y"
 
     @property
     def lamina(self) -> Lamina:
         """One layer by itself."""
-        return plain_lamina(self.modulus, self.d31, self.thickness)
+        if self.fibre_angle is None:
+            return plain_lamina(self.modulus, self.d31, self.thickness)
+        values = (self.modulus_across, self.shear_modulus, self.poissons_ratio, self.d33)
+        across, shear, ratio, d33 = (0.0 if value is None else value for value in values)
+        spacing = self.electrode_spacing or self.thickness
+        return fibre_lamina(Fibres(self.modulus, across, shear, ratio, d33, self.d31, self.fibre_angle, spacing))
 
     @property
     def adds_mass(self) -> bool:
@@ -129,24 +210,6 @@ class PatchKeys(Record):
         yield Reference("body", self.body, "flexible body")
         for point in self.point_weights or ():
             yield Reference("point_weights", f"{self.body}.{point}")
-
-
-class PztLayout(PatchKeys):
-    """Equal piezoelectric patches along one link. Lengths in m, modulus in Pa, d31 in m/V, density kg/m³, limit in V.
-
-    Centers are distances along the link from its root; `count` places them at (k − ½)·(length of link)/count.
-    `thickness` is that of one of `layers`, stacked on one `face` or on both, with opposite voltages. Without `face`
-    they only bend the link, as in the paper. `limit` is one for all or one for each. `allocation = "least-squares"`
-    accepts fewer patches than modes, and uncontrollable modes. If voltages cannot produce all modal forces,
-    `mode_weights` weigh the squares of unmet modal forces, `point_weights` the squares of the resulting deflections at
-    points of the link. `structural` lists what the patches add to their link: by default stiffness, so that they bend
-    it like a composite section; true adds mass, too; false adds nothing, as in the paper. `depoling_field` (V/m) and
-    `strain_limit` are limits of the material for the verdict. `coupling`: patches act on the section rotations at their
-    ends, or on the faces of a solid that outlines them.
-    """
-
-    face: Literal["+y", "-y", "both"] | None = None
-    """Face of the link; without it patches only bend the link."""
 
 
 def _toml(value: bool | tuple[str, ...]) -> str:

@@ -24,8 +24,8 @@ from .composite import Placed
 from .effects import Effects, effects
 from .patches import PatchArray, assembled, check_edges, edges_on_piece, patch_edges
 from .reach import Reach, check_all_served, served_first, weights
+from .records import SpatialPztLayout
 from .sections import check_sections
-from .spatial_records import SpatialPztLayout
 from .voltages import Voltages, allocation, solve_voltages
 
 OUT_OF_REACH = 1e-9  # of the largest modal force per volt: less is rounding

@@ -13,11 +13,10 @@ from ..actuation.control.placing import Placed
 from ..actuation.feasibility import Feasibility
 from ..actuation.motors import MotorFeasibility
 from ..actuation.patches.patches import PatchArray
-from ..actuation.patches.records import PatchKeys
+from ..actuation.patches.records import SpatialPztLayout
 from ..actuation.patches.structure import StructureEffect
 from ..actuation.patches.voltages import Voltages
-from ..actuation.points import PointForces
-from ..actuation.spatial_points import SpatialPointSet
+from ..actuation.spatial_points import PointForces, SpatialPointSet
 from ..actuation.unsupplied import Unsupplied
 from ..common.arrays import Array
 from ..mbs.analysis.tracking import TrackedPath
@@ -84,7 +83,7 @@ def _write_verdict(group: h5py.Group, judged: Feasibility) -> None:
         group.create_group("unsupplied").attrs.update(about)
 
 
-def _write_judgement(group: h5py.Group, judged: Feasibility, layouts: Mapping[str, PatchKeys]) -> None:
+def write_judgement(group: h5py.Group, judged: Feasibility, layouts: Mapping[str, SpatialPztLayout]) -> None:
     """What is required of each motor and each of the layouts, against what they can."""
     for joint, motor in judged.motors.items():
         group.create_group(f"joints/{joint}").attrs.update(vars(motor) | {"factor": motor.factor})
@@ -123,8 +122,10 @@ def read_unsupplied(group: h5py.Group) -> Unsupplied | None:
     return Unsupplied(**about)
 
 
-def write_point_forces(group: h5py.Group, points: SpatialPointSet, forces: PointForces, space: Space) -> None:
-    """Of the actuation points of one body, what the `space` of the scene has."""
+def write_point_forces(
+    group: h5py.Group, points: SpatialPointSet, forces: PointForces, space: Space | None = None
+) -> None:
+    """Of the actuation points of one body; of 3D sets what the `space` of the scene has."""
     group["force"] = forces.force
     group["residual"] = forces.residual
     group["residual_force"] = forces.unmet

@@ -21,6 +21,7 @@ from ..mbs.quantities.spatial_reactions import reactions
 from ..mbs.quantities.spatial_sharing import shared_evenly
 from ..mbs.quantities.stiffening import NOTABLE
 from ..mbs.scene.analysis import Analysis
+from ..mbs.scene.space import SPACES
 from ..mbs.solve.spatial_reach import turned_guesses
 from ..scene.load import load_scene
 from ..scene.spatial import SpatialScene
@@ -85,7 +86,7 @@ def prepare_spatial(scene: SpatialScene | Path, watcher: Watcher | None = None) 
             layout,
             bodies[layout.body].modal,
             bodies[layout.body].spatial,
-            "xy" if scene.is_planar else "xyz",
+            SPACES[scene.space],
         )
         for layout in scene.actuation_points
     }

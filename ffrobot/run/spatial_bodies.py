@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..actuation.patches.composite import Placed
+from ..actuation.patches.records import SpatialPztLayout
 from ..actuation.patches.spatial_patches import by_body, link_patches, placed_patches
-from ..actuation.patches.spatial_records import SpatialPztLayout
 from ..actuation.patches.structure import StructureEffect, structure_effect_in_space, with_patches_in_space
 from ..common.errors import of_file
 from ..fe_models.link_records import FAMILIES

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Annotated
 
-from ..actuation.patches.spatial_records import SpatialPztLayout
+from ..actuation.patches.records import SpatialPztLayout
 from ..actuation.spatial_points import SpatialActuationPoints
 from ..mbs.fields.field_types import NotEmpty
 from ..mbs.fields.references import Reference, under

@@ -25,7 +25,7 @@ LACKS = (
     Lack(
         '`coupling = "surface"` of patches on ±z, of fibers and of twist: link files outline patches on ±y',
         '`coupling = "rotation"`',
-        "ffrobot.actuation.patches.spatial_records",
+        "ffrobot.actuation.patches.records",
     ),
     Lack(
         'compliant gears (`stiffness` of joints) with `motors = "frame"` in joints whose axis modes tilt, where they'

@@ -101,7 +101,10 @@ MISTAKES = {
     "axis of the plane": ('body = "fore"\naxial = ["tip"]', "axial: expected no such key .* along x, y and z"),
     "point that is none": ('body = "fore"\nx = ["top"]', r'expected a point of the body \(.*tip.*\), found "top"'),
     "beyond the link": ('body = "fore"\ny = [3.0]', "expected places within the link, 0 … "),
-    "two alike": ('body = "fore"\ny = ["tip", "tip"]', "expected components that differ in what they do to the body"),
+    "two alike": (
+        'body = "fore"\ny = ["tip", "tip"]',
+        "y: expected points apart from each other, found two at tip and tip",
+    ),
     "places on a rigid body": ('body = "column"\nx = [0.1]', "expected points of the rigid body by name"),
     "body that is none": ('body = "hand"', 'expected one of the bodies "column", "upper", "fore", found "hand"'),
     "twice": ('body = "fore"\n[[actuation_points]]\nbody = "fore"', "expected one table for each body, found 2"),
