@@ -83,7 +83,7 @@ def _write_verdict(group: h5py.Group, judged: Feasibility) -> None:
         group.create_group("unsupplied").attrs.update(about)
 
 
-def write_judgement(group: h5py.Group, judged: Feasibility, layouts: Mapping[str, SpatialPztLayout]) -> None:
+def _write_judgement(group: h5py.Group, judged: Feasibility, layouts: Mapping[str, SpatialPztLayout]) -> None:
     """What is required of each motor and each of the layouts, against what they can."""
     for joint, motor in judged.motors.items():
         group.create_group(f"joints/{joint}").attrs.update(vars(motor) | {"factor": motor.factor})
@@ -122,10 +122,8 @@ def read_unsupplied(group: h5py.Group) -> Unsupplied | None:
     return Unsupplied(**about)
 
 
-def write_point_forces(
-    group: h5py.Group, points: SpatialPointSet, forces: PointForces, space: Space | None = None
-) -> None:
-    """Of the actuation points of one body; of 3D sets what the `space` of the scene has."""
+def write_point_forces(group: h5py.Group, points: SpatialPointSet, forces: PointForces, space: Space) -> None:
+    """Of the actuation points of one body, what the `space` of the scene has."""
     group["force"] = forces.force
     group["residual"] = forces.residual
     group["residual_force"] = forces.unmet
