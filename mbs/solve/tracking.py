@@ -139,6 +139,7 @@ def track(asked: Transition, breaks: Array, near: Tracked | None = None) -> Trac
         p, v, u = near.curve(breaks), near.curve(breaks, 1), near.voltage(breaks)
         K = near.curve(flat, 2).reshape(K.shape)
     steps = _Steps(asked, breaks, tau_qs, size)
+    steps.sigma = near.share if near is not None and steps.has_share else 1.0
     converged, iteration, previous, previous_share = False, 0, np.inf, np.inf
     found: Minimum | None = None
     while not converged and iteration < MOST_ITERATIONS:
@@ -148,7 +149,7 @@ def track(asked: Transition, breaks: Array, near: Tracked | None = None) -> Trac
         moved = max(float(np.abs(driven.scale * (p - state[0])).max()), float(np.abs(v - state[1]).max())) / max(
             float(np.abs(driven.scale * p).max()), float(np.abs(v).max()), size
         )
-        u, share = u_new, steps.share(found)
+        u, share = u_new, steps.sigma
         if not (np.isfinite(moved) and found.converged):
             break
         if steps.has_share:  # V(t) of linear programs is not unique
@@ -162,7 +163,7 @@ def track(asked: Transition, breaks: Array, near: Tracked | None = None) -> Trac
     slope = np.diff(u, axis=0) / h[:, None]
     return Tracked(
         piecewise(GAUSS, breaks, p, v, K), PPoly(np.array([slope, u[:-1]]), breaks), bool(converged), iteration,
-        steps.share(found), steps.cost(found),
+        steps.sigma, steps.cost(found),
     )  # fmt: skip
 
 
@@ -196,24 +197,25 @@ class _Steps:
         slopes = [x.reshape(N, s, -1, n) for x in self.asked.driven.slopes(times, *at)]
         stages = Elimination(GAUSS, h, [x[:, :, :n] for x in slopes])
         y = np.concatenate([p, v], axis=1)
-        right = r.reshape(N, s * n, 1) - stages.G @ y[:-1, :, None]
-        known = K - (stages.E_inverse @ right).reshape(N, s, n)  # K for (p, ṗ) = 0 and V = 0
+        x = np.concatenate([y, u, np.full((N + 1, int(self.has_share)), self.sigma)], axis=1)
+        V = u[:-1, None] + GAUSS.c[:, None] * np.diff(u, axis=0)[:, None]
+        left = (r.reshape(N, s, n) - V @ self.asked.Phi_V.T).reshape(N, s * n, 1)
+        moved = -(stages.E_inverse @ left).reshape(N, s, n)  # of K, with p, ṗ and V at breaks as they are
         K_z = self._stages_by_z(stages)
-        # stages and ends for z = (x_k, x_{k+1})
+        # stages and ends for changes of z = (x_k, x_{k+1})
         starts = np.zeros((2, n, 2 * width))
         starts[0, :, :n], starts[1, :, n : 2 * n] = np.eye(n), np.eye(n)
         ends = np.concatenate(stages.at_end(starts[0], starts[1], K_z), axis=1)
-        offset = np.concatenate(stages.at_end(np.zeros(n), np.zeros(n), known), axis=1)
+        offset = np.concatenate(stages.at_end(p[:-1], v[:-1], K + moved), axis=1) - y[1:]
         forward = np.zeros((2 * n, 2 * width))
         forward[:, width : width + 2 * n] = np.eye(2 * n)
-        continuity = forward - ends
-        tau_z = self._torques(tau.reshape(N, s, -1), [x[:, :, n:] for x in slopes], at, known, (starts, K_z))
-        self.program = self._program(continuity, offset, *tau_z)
-        scaled = np.concatenate([y, u, np.full((N + 1, int(self.has_share)), self.sigma)], axis=1) / self.unit
-        found = minimize(self.program, scaled)
-        x = found.x * self.unit
-        K_new = known + np.einsum("Nsnz,Nz->Nsn", K_z, np.hstack([x[:-1], x[1:]]))
-        self.sigma = self.share(found)
+        tau_z = self._torques(tau.reshape(N, s, -1), [of[:, :, n:] for of in slopes], moved, (starts, K_z))
+        self.program = self._program(forward - ends, offset, *tau_z, x)
+        found = minimize(self.program, np.zeros_like(x))
+        change = found.x * self.unit
+        K_new = K + moved + np.einsum("Nsnz,Nz->Nsn", K_z, np.hstack([change[:-1], change[1:]]))
+        x = x + change
+        self.sigma = float(x[0, -1]) if self.has_share else 1.0
         return x[:, :n], x[:, n : 2 * n], K_new, x[:, self.V], found
 
     def _stages_by_z(self, stages: Elimination) -> Array:
@@ -229,54 +231,56 @@ class _Steps:
             found[..., first + self.V.start : first + self.V.stop] = K_by_V[..., end, :]
         return found
 
-    def _torques(
-        self, tau: Array, slopes: list[Array], at: list[Array], known: Array, by_z: tuple[Array, Array]
-    ) -> tuple[Array, Array]:
-        """τ (N, s, motors) at stages for z = 0, and its derivatives (N, s, motors, 2 width) by z."""
+    def _torques(self, tau: Array, slopes: list[Array], moved: Array, by_z: tuple[Array, Array]) -> tuple[Array, Array]:
+        """τ (N, s, motors) at stages once K has `moved`, and its derivatives (N, s, motors, 2 width) by z."""
         starts, K_z = by_z
         h = self.h[:, None, None, None]
         once, twice = (np.einsum("ij,Nj...->Ni...", a, K_z) for a in (GAUSS.stage_once, GAUSS.stage_twice))
         p_z = starts[0] + GAUSS.c[:, None, None] * h * starts[1] + h**2 * twice
         v_z = starts[1] + h * once
         h = h[..., 0]
-        once, twice = (np.einsum("ij,Nj...->Ni...", a, known) for a in (GAUSS.stage_once, GAUSS.stage_twice))
-        for_nothing = h**2 * twice, h * once, known
-        found, moved = np.zeros((*tau.shape, 2 * self.width)), tau
-        for by, of_z, of_nothing, now in zip(slopes[::-1], (p_z, v_z, K_z), for_nothing, at, strict=True):
+        once, twice = (np.einsum("ij,Nj...->Ni...", a, moved) for a in (GAUSS.stage_once, GAUSS.stage_twice))
+        found = np.zeros((*tau.shape, 2 * self.width))
+        for by, of_z, of_moved in zip(slopes[::-1], (p_z, v_z, K_z), (h**2 * twice, h * once, moved), strict=True):
             found = found + by @ of_z
-            moved = moved + np.einsum("Nstn,Nsn->Nst", by, of_nothing - now.reshape(of_nothing.shape))
-        return moved, found
+            tau = tau + np.einsum("Nstn,Nsn->Nst", by, of_moved)
+        return tau, found
 
-    def _program(self, continuity: Array, offset: Array, tau_0: Array, tau_z: Array) -> Program:
+    def _program(self, continuity: Array, offset: Array, tau_0: Array, tau_z: Array, x: Array) -> Program:
+        """For changes of `x` (N+1, width) in `unit`: what is left stays small against what cancels."""
         n, width, N = self.n, self.width, len(offset)
         tau_z = tau_z * np.tile(self.unit, 2)
         scaled = continuity * np.tile(self.unit, 2) / self.y_unit[:, None]
         F, G = scaled[..., :width], scaled[..., width:]
         c = offset / self.y_unit
-        H, g = self._effort(tau_0, tau_z) if not self.has_share else self._of_share(N)
+        now = x / self.unit
+        H, g = self._effort(tau_0, tau_z, now) if not self.has_share else self._of_share(N)
         if self.has_share:
             keep = np.zeros((N, 1, width))
             keep[..., -1] = 1.0
             F, G, c = np.hstack([F, -keep]), np.hstack([G, keep]), np.hstack([c, np.zeros((N, 1))])
-        C, d = self._inequalities(tau_0, tau_z)
+        C, d = self._inequalities(tau_0, tau_z, now)
         rows = np.eye(width)[: 2 * n if self.asked.is_free else 2 * n + self.m]
-        rests = [np.concatenate([p / self.y_unit[:n], np.zeros(len(rows) - n)]) for p in self.asked.rest]
-        return Program(H, g, F, G, c, (rows, rests[0]), (rows, rests[1]), C, d)
+        ends = zip(self.asked.rest, (now[0], now[-1]), strict=True)
+        start, end = (
+            np.concatenate([p / self.y_unit[:n], np.zeros(len(rows) - n)]) - at[: len(rows)] for p, at in ends
+        )
+        return Program(H, g, F, G, c, (rows, start), (rows, end), C, d)
 
     def _of_share(self, N: int) -> tuple[Array, Array]:
         g = np.zeros((N, 2 * self.width))
         g[0, self.width - 1] = 1.0
         return np.zeros((N, 2 * self.width, 2 * self.width)), g
 
-    def _effort(self, tau_0: Array, tau_z: Array) -> tuple[Array, Array]:
-        """H and g of J."""
+    def _effort(self, tau_0: Array, tau_z: Array, now: Array) -> tuple[Array, Array]:
+        """H and g of J, whose value without a change is `constant`."""
         weights = self.asked.weights
         whole = self.breaks[-1] - self.breaks[0]
         b = self.h[:, None] * GAUSS.end_once / (whole * weights.torque**2)  # (N, s)
         off = tau_0 - self.tau_qs
         H = np.einsum("Ns,Nsta,Nstb->Nab", b, tau_z, tau_z, optimize=True)
         g = np.einsum("Ns,Nsta,Nst->Na", b, tau_z, off, optimize=True)
-        self.constant = 0.5 * float(np.einsum("Ns,Nst->", b, off**2))
+        of_voltages = np.zeros_like(H)
         first = np.arange(self.V.start, self.V.stop)
         second = first + self.width
         rate = weights.rate**2 / self.h
@@ -287,10 +291,13 @@ class _Steps:
             (first, second, other),
             (second, first, other),
         ):
-            H[:, i, j] += size[:, None]
-        return H, g
+            of_voltages[:, i, j] += size[:, None]
+        z = np.hstack([now[:-1], now[1:]])[..., None]
+        pull = (of_voltages @ z)[..., 0]
+        self.constant = 0.5 * float(np.einsum("Ns,Nst->", b, off**2) + (pull * z[..., 0]).sum())
+        return H + of_voltages, g + pull
 
-    def _inequalities(self, tau_0: Array, tau_z: Array) -> tuple[Array, Array]:
+    def _inequalities(self, tau_0: Array, tau_z: Array, now: Array) -> tuple[Array, Array]:
         """C and d: limits of voltages at breaks, each in the interval that it begins, and of torques at stages."""
         asked, N, width = self.asked, len(tau_z), self.width
         V_max, tau_max = asked.limits.voltage, asked.limits.torque
@@ -299,14 +306,18 @@ class _Steps:
         bounded = np.arange(self.m) if is_shared else np.flatnonzero(np.isfinite(V_max))
         limit = np.where(np.isfinite(V_max), V_max, asked.weights.voltage)[bounded] / asked.weights.voltage
         at = np.arange(len(bounded))
+        places = [(slice(None), 0)]
+        if asked.is_free:  # else V ends at zero
+            places.append((slice(-1, None), width))  # no interval begins at the last break
         for sign in (1.0, -1.0):
-            for of_intervals, first in ((slice(None), 0), (slice(-1, None), width)):  # nothing begins at the last break
+            for of_intervals, first in places:
                 of = np.zeros((N, len(bounded), 2 * width))
                 of[of_intervals, at, first + self.V.start + bounded] = sign / limit
                 if is_shared:
                     of[of_intervals, :, width - 1] = -1.0
                 rows.append(of)
-                most.append(np.where(of.any(axis=2) & is_shared, 0.0, 1.0))
+                reached = (of @ np.hstack([now[:-1], now[1:]])[..., None])[..., 0]
+                most.append(np.where(of.any(axis=2) & is_shared, 0.0, 1.0) - reached)
         is_shared = asked.objective == "least-torque"
         motors = np.arange(len(tau_max)) if is_shared else np.flatnonzero(np.isfinite(tau_max))
         limit = np.where(np.isfinite(tau_max), tau_max, asked.weights.torque)[motors]
@@ -315,12 +326,9 @@ class _Steps:
             if is_shared:
                 of[..., width - 1] = -1.0
             rows.append(of.reshape(N, -1, 2 * width))
-            most.append(((0.0 if is_shared else 1.0) - sign * tau_0[:, :, motors] / limit).reshape(N, -1))
+            share = self.sigma if is_shared else 1.0
+            most.append((share - sign * tau_0[:, :, motors] / limit).reshape(N, -1))
         return np.concatenate(rows, axis=1), np.concatenate(most, axis=1)
-
-    def share(self, found: Minimum) -> float:
-        """σ; 1 where it is not the objective."""
-        return float(found.x[0, -1]) if self.has_share else 1.0
 
     def cost(self, found: Minimum) -> float:
         """J; 0 where it is not the objective."""
