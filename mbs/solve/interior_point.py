@@ -64,31 +64,47 @@ class _Layout:
         self.band = max(2 * self.s + self.e, self.first + self.s, self.s + self.last) - 1
 
 
-class _Newton:
-    """Factors of [H + CᵀWC, Aᵀ; A, 0]."""
+class _Band:
+    """[H, Aᵀ; A, 0] as LAPACK stores bands, with room for pivots."""
 
-    def __init__(self, program: Program, layout: _Layout, W: Array) -> None:
-        from scipy.linalg.lapack import dgbtrf
-
-        self.layout, b = layout, layout.band
-        self.ab = np.zeros((3 * b + 1, layout.size))
-        blocks = program.H + (program.C * W[:, :, None]).transpose(0, 2, 1) @ program.C
-        for half in (0, 1):  # neighbours share x: not at once
-            self._add(layout.z[half::2], layout.z[half::2], blocks[half::2])
+    def __init__(self, program: Program, layout: _Layout) -> None:
+        self.layout, self.C = layout, program.C
+        self.ab = np.zeros((3 * layout.band + 1, layout.size))
+        self._add_costs(self.ab, program.H)
         for rows, columns, of in (
             (layout.equations, layout.x[:-1], program.F),
             (layout.equations, layout.x[1:], program.G),
             (layout.of_start[None], layout.x[:1], program.start[0][None]),
             (layout.of_end[None], layout.x[-1:], program.end[0][None]),
         ):
-            self._add(rows, columns, of)
-            self._add(columns, rows, of.transpose(0, 2, 1))
-        self.lu, self.pivots, info = dgbtrf(self.ab, b, b)
-        self.is_singular = info != 0
+            self._add(self.ab, rows, columns, of)
+            self._add(self.ab, columns, rows, of.transpose(0, 2, 1))
 
-    def _add(self, rows: Indices, columns: Indices, blocks: Array) -> None:
+    def newton(self, W: Array) -> _Newton:
+        """Factors of [H + CᵀWC, Aᵀ; A, 0]."""
+        ab = self.ab.copy()
+        self._add_costs(ab, (self.C * W[:, :, None]).transpose(0, 2, 1) @ self.C)
+        return _Newton(ab, self.layout)
+
+    def _add_costs(self, ab: Array, blocks: Array) -> None:
+        z = self.layout.z
+        for half in (0, 1):  # neighbours share x: not at once
+            self._add(ab, z[half::2], z[half::2], blocks[half::2])
+
+    def _add(self, ab: Array, rows: Indices, columns: Indices, blocks: Array) -> None:
         i, j = np.broadcast_arrays(rows[:, :, None], columns[:, None, :])
-        self.ab[2 * self.layout.band + i - j, j] += blocks
+        ab[2 * self.layout.band + i - j, j] += blocks
+
+
+class _Newton:
+    """Factors of a band matrix."""
+
+    def __init__(self, ab: Array, layout: _Layout) -> None:
+        from scipy.linalg.lapack import dgbtrf
+
+        self.ab, self.layout = ab, layout
+        self.lu, self.pivots, info = dgbtrf(ab, layout.band, layout.band)
+        self.is_singular = info != 0
 
     def solve(self, right: Array) -> Array:
         """The unknowns, with one step of refinement: close to the end weights span many powers of ten."""
@@ -115,6 +131,7 @@ class _CentralPath:
 
     def __init__(self, program: Program, x: Array) -> None:
         self.program, self.layout = program, _Layout(program)
+        self.band = _Band(program, self.layout)
         self.reach = np.abs(program.d).max(initial=1.0)
         self.force = 1 + float(np.abs(program.g).sum())
         self.unknown = np.zeros(self.layout.size)
@@ -122,7 +139,7 @@ class _CentralPath:
         # of min ½ zᵀ H z + gᵀ z + ½ |slack|², with slack made positive
         slack = self._slack()
         to = _residuals(program, self.layout, self.unknown, -slack)
-        self.unknown += _Newton(program, self.layout, np.ones_like(slack)).solve(to)
+        self.unknown += self.band.newton(np.ones_like(slack)).solve(to)
         slack = self._slack()
         least = 1e-1 * float(np.abs(slack).max(initial=self.reach))
         self.slack = slack + max(0.0, least - float(slack.min(initial=np.inf)))
@@ -154,7 +171,7 @@ class _CentralPath:
     def advance(self) -> bool:
         """One step of predictor and corrector; False where there is none."""
         slack, z = self.slack, self.z
-        newton = _Newton(self.program, self.layout, z / slack)
+        newton = self.band.newton(z / slack)
         if newton.is_singular or not np.isfinite(self.gap):
             return False
         _, d_slack, dz = self._toward(newton, slack * z)
