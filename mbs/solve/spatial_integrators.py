@@ -100,25 +100,28 @@ def _excitation(system: SpatialSystem, start: State, found: SpatialVibrations) -
     As `modal_excitation` in the plane: velocities, accelerations and jerk of modes are vibrations v/ω, a/ω², j/ω³.
     """
     model, omega, K = system.model, found.frequency, found.springs
-    dt = 1e-3 / float(omega.max())
-    q, v, a = start.q, start.v, _acceleration(system, 0.0, start)
+    dt = (1e-3 if system.replay is None else 0.1) / float(omega.max())  # round-off of what is replayed is no jerk
+    q, v, a = start.q, start.v, _acceleration(system, 0.0, start, system.replay)
     later = State(model.tree.integrate(q, dt * v), v + dt * a)
-    at = dt if system.replayed is None else 0.0  # round-off of what is replayed, over so short a time, is no jerk
-    jerk = (_acceleration(system, at, later) - a) / dt
+    jerk = (_acceleration(system, dt, later, system.replay) - a) / dt
     project = (K @ found.shape).T / omega[:, None] ** 2
     amplitude = np.abs(project @ v) / omega + np.abs(project @ a) / omega**2 + np.abs(project @ jerk) / omega**3
     forces = K @ found.shape * amplitude
     bodies = [node for node in model.tree.nodes if node.body.n_modes]
     of_each = np.array([np.linalg.norm(forces[node.p_v], axis=0) for node in bodies])
-    sizes = np.array([np.linalg.norm(node.body.stiffness * q[node.p_q]) for node in bodies]) + of_each.sum(axis=1)
+    carried = [node.body.stiffness * q[node.p_q] for node in bodies]
+    if system.replay is not None:  # which may carry what would bend links
+        alone = _acceleration(system, 0.0, start, None)
+        carried = [np.append(of, alone[node.p_v]) for of, node in zip(carried, bodies, strict=True)]
+    sizes = np.array([np.linalg.norm(of) for of in carried]) + of_each.sum(axis=1)
     sizes = np.maximum(sizes, max(1e-3 * float(sizes.max()), 1e-300))
     largest: Array = (of_each / sizes[:, None]).max(axis=0)
     return largest
 
 
-def _acceleration(system: SpatialSystem, t: float, state: State) -> Array:
+def _acceleration(system: SpatialSystem, t: float, state: State, replay: _core.Replay | None) -> Array:
     """(n_v,) at time t."""
     states = np.concatenate([state.q, state.v])[None]
     core, scene, _ = system.integrated
-    found: Array = _core.tree_outputs(core, scene, [t], states, system.replay).accelerations[0]
+    found: Array = _core.tree_outputs(core, scene, [t], states, replay).accelerations[0]
     return found
