@@ -11,7 +11,7 @@ import numpy as np
 from ...common.arrays import as_floats
 from ...common.errors import InputError
 from ...common.validation import quoted
-from ...mbs.analysis.operating_points import InstantAnalysis, of_earlier
+from ...mbs.analysis.operating_points import InstantAnalysis, of_earlier, row_at
 from ...mbs.analysis.outcome import Outcome
 from ...mbs.analysis.spatial_replay import motor_forces_of
 from ...mbs.fields.references import Reference
@@ -73,7 +73,7 @@ class PatchPlacement(InstantAnalysis):
         if self.is_over_path:
             assert self.source is not None
             source = context.outcomes[self.source]
-            run = of_earlier(source, self)
+            run = of_earlier(source, self).at([row_at(model.scene.path, self, source, t) for t in self.times])
             reached = context.patches[wanted.body].modes[link.layout.label]
             F_p = reached.forces(context.patches[wanted.body].on_link(motor_forces_of(source).modal))
             return replace(run, details=place(model.scene.path, wanted, link, None, F_p))

@@ -93,7 +93,7 @@ def operating_points(model: Model, analysis: Analysis, source: PlanarOutcome | N
 def of_earlier(source: Outcome, analysis: Analysis) -> Outcome:
     """The motion of `source` as that of `analysis`, which has made no steps of its own."""
     statistics = replace(source.statistics, steps=0, evaluations=0, warnings=())
-    return replace(source, analysis=analysis, statistics=statistics, prescribed=None)
+    return replace(source, analysis=analysis, statistics=statistics, prescribed=None, look_closer=None)
 
 
 def row_at(path: Path, analysis: Analysis, source: AnyOutcome, t: float) -> int:
