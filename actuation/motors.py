@@ -10,7 +10,7 @@ import numpy as np
 from ..common.arrays import Array, Booleans, as_floats
 from ..common.peaks import largest, root_mean_square, shares
 from ..mbs._core import TimeFunction
-from ..mbs.analysis.inverted_path import MotorsOnlyKeys
+from ..mbs.analysis.motors_only import MotorsOnly
 from ..mbs.joints.transmission import MotorLimits
 from ..mbs.quantities.spatial_motion import SpatialMotion
 from ..mbs.scene.analysis import Analysis
@@ -145,7 +145,7 @@ def path_jump(motion: SpatialMotion, analysis: Analysis, at: float) -> str:
             return "acceleration"
         jerks = (before[0] - before[1]) / h, (after[1] - after[0]) / h
         largest = np.abs(np.diff(all_over)).max() / (end / 1000)
-        if isinstance(analysis, MotorsOnlyKeys) and np.any(np.abs(jerks[1] - jerks[0]) > JUMP * largest):
+        if isinstance(analysis, MotorsOnly) and np.any(np.abs(jerks[1] - jerks[0]) > JUMP * largest):
             return "jerk"
     return ""
 

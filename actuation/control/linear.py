@@ -13,15 +13,14 @@ from ...mbs._core import TimeFunction
 from ...mbs.analysis.operating_points import InstantAnalysis, of_earlier, row_at
 from ...mbs.analysis.outcome import Outcome
 from ...mbs.analysis.spatial_gears import wound_up
-from ...mbs.analysis.spatial_static import run_spatial_static
+from ...mbs.analysis.static import run_spatial_static
 from ...mbs.fields.field_types import PointReference
 from ...mbs.fields.references import Reference
 from ...mbs.model.spatial_gears import with_compliance_in_space
 from ...mbs.model.spatial_model import SpatialModel, modal_directions, without_paths
 from ...mbs.model.spatial_rows import SpatialRow
 from ...mbs.scene.analysis import Analysis
-from ...mbs.solve.linearisation import LinearMechanism
-from ...mbs.solve.spatial_linearisation import SpatialLinearisation
+from ...mbs.solve.linearisation import LinearMechanism, SpatialLinearisation
 from ...mbs.solve.spatial_start import undeformed_posture
 from ..context import ActuatedContext, place_of
 from ..patches.spatial_patches import LinkPatches

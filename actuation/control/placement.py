@@ -16,7 +16,7 @@ from ...mbs.analysis.outcome import Outcome
 from ...mbs.analysis.spatial_replay import motor_forces_of
 from ...mbs.fields.references import Reference
 from ...mbs.scene.analysis import Surroundings
-from ...mbs.solve.spatial_linearisation import SpatialLinearisation
+from ...mbs.solve.linearisation import SpatialLinearisation
 from ..context import ActuatedContext
 from ..patches.patches import PatchArray
 from ..patches.spatial_patches import link_patches

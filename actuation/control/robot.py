@@ -12,8 +12,7 @@ import numpy as np
 from ...common.arrays import Array, as_floats
 from ...mbs.analysis.outcome import Outcome
 from ...mbs.model.spatial_model import SpatialModel
-from ...mbs.solve.linearisation import LinearMechanism
-from ...mbs.solve.spatial_linearisation import SpatialLinearisation, labelled
+from ...mbs.solve.linearisation import LinearMechanism, SpatialLinearisation, labelled
 from ..patches.spatial_patches import LinkPatches
 from ..patches.voltages import voltage_gain
 from .linear import patch_voltages_in_space

@@ -16,7 +16,7 @@ from ...mbs.model.spatial_model import SpatialModel, modal_directions
 from ...mbs.model.spatial_system import SpatialSystem
 from ...mbs.model.spatial_tree import Section, SpatialTree
 from ...mbs.scene.space import SPACES
-from ...mbs.solve.spatial_linearisation import labelled
+from ...mbs.solve.linearisation import labelled
 from ..context import place_of
 from ..patches.patches import PatchArray
 from ..patches.spatial_patches import LinkPatches

@@ -12,15 +12,15 @@ import numpy as np
 
 from ...common.arrays import Array, as_list
 from ...common.errors import InputError, SolveError
+from ...mbs.analysis.forward import actuator_commands, largest_moments
 from ...mbs.analysis.outcome import Outcome
 from ...mbs.analysis.spatial_drive import SpatialControl, spatial_drive
-from ...mbs.analysis.spatial_forward import actuator_commands, largest_moments
 from ...mbs.analysis.spatial_gears import WoundUp, wound_up
 from ...mbs.analysis.spatial_replay import replay_times, supplied
 from ...mbs.model.spatial_drives import Drives, PointDrive
 from ...mbs.model.spatial_gears import with_compliance_in_space
 from ...mbs.model.spatial_model import SpatialModel, without_paths
-from ...mbs.solve.spatial_linearisation import SpatialLinearisation
+from ...mbs.solve.linearisation import SpatialLinearisation
 from ...mbs.solve.spatial_statics import initial_state
 from ...mbs.solve.state import State
 from ..context import ActuatedContext, place_of

@@ -11,8 +11,8 @@ from rich.console import Console
 from rich.table import Table
 
 from ..mbs.analysis.inverted_path import AroundPath, describe_zeros, is_minimum_phase
+from ..mbs.analysis.motors_only import path_errors
 from ..mbs.analysis.outcome import Details, Outcome
-from ..mbs.analysis.spatial_motors_only import path_errors
 from ..results.verdict import Verdict
 from ..run.spatial_solution import SpatialResult, SpatialSolution
 from .accuracy import error_budget, integrated

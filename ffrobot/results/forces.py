@@ -8,7 +8,7 @@ import h5py
 import numpy as np
 
 from ..mbs.analysis.inverted_path import AroundPath, is_minimum_phase
-from ..mbs.analysis.spatial_motors_only import path_errors
+from ..mbs.analysis.motors_only import path_errors
 from ..mbs.quantities.spatial_motion import SpatialMotion
 from ..mbs.scene.spatial.trajectories import SpatialTrajectory
 from ..mbs.solve.stable_inversion import Inversion

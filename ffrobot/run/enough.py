@@ -6,8 +6,8 @@ import logging
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
-from ..mbs.analysis.drive import Progress
 from ..mbs.analysis.outcome import Outcome
+from ..mbs.analysis.spatial_drive import Progress
 from ..mbs.model.spatial_body import SpatialBody
 from ..mbs.scene.analysis import Analysis
 from .mode_search import ModeSearch, Reported

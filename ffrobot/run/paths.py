@@ -7,8 +7,7 @@ from functools import partial
 
 from ..mbs.model.spatial_model import SpatialModel
 from ..mbs.scene.motion_keys import Shaper
-from ..mbs.solve.path_frequencies import PathFrequencies
-from ..mbs.solve.spatial_frequencies import spatial_path_frequencies
+from ..mbs.solve.path_frequencies import PathFrequencies, spatial_path_frequencies
 from ..scene.spatial import SpatialScene
 from .fastest import Judge, fastest
 

@@ -19,7 +19,7 @@ from ..mbs.analysis.outcome import Outcome
 from ..mbs.quantities.spatial_energy import totals
 from ..mbs.quantities.spatial_reactions import reactions
 from ..mbs.quantities.spatial_sharing import shared_evenly
-from ..mbs.quantities.stiffening import NOTABLE
+from ..mbs.quantities.validity import NOTABLE
 from ..mbs.scene.analysis import Analysis
 from ..mbs.scene.space import SPACES
 from ..mbs.solve.spatial_reach import turned_guesses

@@ -14,10 +14,9 @@ from ..common.arrays import Array
 from ..common.errors import InputError
 from ..fe_models.link_file import LinkTable, link_keys, link_path
 from ..fe_models.modal_body import ModalBody
-from ..mbs.analysis.forward import Forward
+from ..mbs.analysis.forward import Forward, actuator_commands, largest_moments
 from ..mbs.analysis.outcome import Outcome
 from ..mbs.analysis.spatial_drive import spatial_drive
-from ..mbs.analysis.spatial_forward import actuator_commands, largest_moments
 from ..mbs.analysis.spatial_replay import replay_times, supplied
 from ..mbs.model.spatial_drives import Drives, Replayed
 from ..mbs.model.spatial_model import SpatialModel, without_paths

@@ -23,8 +23,7 @@ from ..mbs.quantities.body_motion import BodyMotion, PointMotion
 from ..mbs.quantities.pieces_error import PieceInMotion, missed_by_pieces
 from ..mbs.quantities.second_order import IN_MOTION, Missing, largest_displacement
 from ..mbs.quantities.spatial_motion import SpatialMotion, continuous
-from ..mbs.quantities.spatial_validity import bending_in_space
-from ..mbs.quantities.validity import ENOUGH, IN_SPACE, Bending, enough_pieces, shape_from_chord
+from ..mbs.quantities.validity import ENOUGH, Bending, bending_in_space, enough_pieces, shape_from_chord
 from ..scene.pieces import BodyInPieces, bodies_in_pieces_in_space
 from .bent_links import shared_in_motion, with_advice, worst_of_pieces
 from .spatial_solution import SpatialSolution
@@ -167,7 +166,7 @@ def _shortening(solution: SpatialSolution, name: str) -> float:
     modal = (solution.parts or solution.bodies)[name].modal
     assert modal is not None
     found = [
-        shape_from_chord(modal, SpatialMotion.body(result.motion, name).modal, IN_SPACE)[2].max(initial=0.0)
+        shape_from_chord(modal, SpatialMotion.body(result.motion, name).modal)[2].max(initial=0.0)
         for result in solution.analyses.values()
     ]
     return float(max(found, default=0.0)) / modal.length

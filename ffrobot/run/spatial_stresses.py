@@ -9,7 +9,7 @@ import numpy as np
 from ..actuation.patches.spatial_patches import LinkPatches
 from ..common.arrays import Array
 from ..fe_models.modal_body import ModalBody
-from ..mbs.quantities.spatial_link_loads import link_loads_in_space
+from ..mbs.quantities.link_loads import link_loads_in_space
 from ..mbs.quantities.spatial_motion import SpatialMotion
 from ..mbs.quantities.stress import BodyStress, body_stress, has_stresses, mode_acceleration, mode_displacement
 from .spatial_bodies import LoadedSpatialBody

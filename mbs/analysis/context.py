@@ -9,12 +9,9 @@ from typing import Protocol
 from ...common.arrays import Array
 from .. import _core
 from ..model.divided_link import DividedLink
-from ..model.model import Model
 from ..model.spatial_model import SpatialModel
-from .drive import Progress
 from .outcome import EarlierRun, Outcome
-from .planar_outcome import PlanarOutcome
-from .replay import ActuatorSet
+from .spatial_drive import Progress
 
 
 class PatchedLink(Protocol):
@@ -70,25 +67,13 @@ class WholeLinks:
 
 
 @dataclass(frozen=True, kw_only=True)
-class _Start:
-    """What the run of an analysis starts from, in the plane and in 3D.
+class Context:
+    """What the run of an analysis starts from.
 
     Attributes:
-        progress: see `drive.Progress`.
+        progress: see `spatial_drive.Progress`.
         is_replayed: whether a later analysis takes its actuation.
         earlier: an earlier run of the same analysis, to go on with; None from the start.
-    """
-
-    progress: Progress
-    is_replayed: bool = False
-    earlier: EarlierRun | None = None
-
-
-@dataclass(frozen=True, kw_only=True)
-class Context(_Start):
-    """What the run of an analysis in 3D starts from.
-
-    Attributes:
         model: the robot, with the constraint equations of all joints that close loops and of all trajectories.
         outcomes: of the analyses before, by name.
         patches: of links by body.
@@ -97,31 +82,12 @@ class Context(_Start):
         whole: the links, where `model` has pieces of some.
     """
 
+    progress: Progress
     model: SpatialModel
     outcomes: Mapping[str, Outcome]
+    is_replayed: bool = False
+    earlier: EarlierRun | None = None
     patches: Mapping[str, PatchedLink] = field(default_factory=dict)
     points: Mapping[str, ActuationPoints] = field(default_factory=dict)
     at_points: ForcesAtPoints = no_points
     whole: WholeLinks | None = None
-
-
-@dataclass(frozen=True, kw_only=True)
-class PlanarContext(_Start):
-    """What the run of an analysis in the plane starts from.
-
-    Attributes:
-        model: the robot.
-        outcomes: of the analyses before, by name.
-        make_actuators: the actuators of the scene, fresh for one run, which has raised masses or not (`raised_mass`).
-    """
-
-    model: Model
-    outcomes: Mapping[str, PlanarOutcome]
-    make_actuators: Callable[[bool], ActuatorSet]
-
-    def source(self, name: str | None) -> PlanarOutcome | None:
-        """The outcome of an earlier analysis; None where there is no name."""
-        return None if name is None else self.outcomes[name]
-
-
-AnyContext = Context | PlanarContext

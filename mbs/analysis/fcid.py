@@ -3,122 +3,218 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import cache
+from pathlib import Path
+from typing import Literal, Self
 
-from ...common.arrays import Array, as_list
+import numpy as np
+from pydantic import model_validator
+
+from ...common.arrays import Array, as_floats
 from ...common.errors import InputError, SolveError
 from .. import _core
-from ..model.model import Model
-from ..model.planar_tree import PlanarTree, told_in_joints
-from ..model.system import MechanismSystem
-from ..solve.initial_state import undeformed_state
-from ..solve.path_checks import check_smooth
-from ..solve.reach import check_reach
-from .context import AnyContext, Context
-from .drive import motion_of, motors_fit
-from .elastic_joints import add_transmission
-from .outcome import AnyOutcome, Details, Forces, Statistics
-from .planar_outcome import PlanarOutcome
+from .._core import TimeFunction
+from ..fields.field_types import Expression, Name
+from ..fields.references import Reference
+from ..fields.waypoints import spline
+from ..model.divided_link import DividedLink
+from ..model.spatial_body import SpatialBody
+from ..model.spatial_gears import refuse_held_motors
+from ..model.spatial_motors import driven_mechanism
+from ..scene.analysis import Check, Need, TimedAnalysis
+from ..solve.quasi_static import quasi_static_shape
+from ..solve.spatial_posture import check_path, mobility
+from ..solve.spatial_prescribed import prescribed_motion
+from ..solve.spatial_redundancy import resolved
+from ..solve.spatial_start import undeformed_posture
+from .context import Context
+from .outcome import Forces, Motion, Outcome, Prescription, Statistics
 from .samples import path_times
-from .shapes import FcidKeys, Shape, prescribed_shape, sampled
-from .spatial_fcid import run_spatial_fcid
+
+ZERO = TimeFunction.constant(0.0)
+FEWEST_NODES = 201  # of the spline through a static shape; half as many as outputs where that is more
+
+Bodies = Sequence[SpatialBody]
+
+Shape = list[list[TimeFunction]]
+"""p_k(t) of each body, in the coordinates of its `SpatialBody`."""
 
 
-class Fcid(FcidKeys):
+class Fcid(TimedAnalysis):
     """Forces that move the robot along its trajectories while the modal coordinates p(t) follow a prescribed shape.
 
     `shape` is zero, the static equilibrium at every instant, or given in `modal`: expressions for the first modes of a
     body, numbered as in its modal file; all others are 0. `check` as in `Pcid`.
     """
 
-    def run(self, context: AnyContext) -> AnyOutcome:
+    kind: Literal["fcid"]
+    shape: Literal["zero", "static", "given"]
+    """Prescribed deflection: none, the static equilibrium at every instant, or `modal`."""
+    modal: dict[Name, tuple[Expression, ...]] | None = None
+    """Expressions in t for the first modal coordinates by body (m·√kg); the others are 0."""
+    check: Check = None
+    """Forward simulation under the result with twice the modes ("finer")."""
+
+    is_algebraic = True
+    allocates_patches = True
+    applicable = ("joints", "joints+pzt", "points")
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        if self.modal is not None and self.shape != "given":
+            raise ValueError(f'expected the key "modal" only in shape = "given", found shape = "{self.shape}"')
+        if self.modal is None and self.shape == "given":
+            raise ValueError('expected the key "modal" in shape = "given", found none')
+        return self
+
+    def needs(self) -> Iterator[Need]:
+        """Something to follow."""
+        yield Need("kind", self.kind, "trajectory")
+
+    def references(self) -> Iterator[Reference]:
+        """The links whose shape is given."""
+        for body in self.modal or ():
+            yield Reference("modal", body)
+            yield Reference("modal", body, "flexible body")
+
+    def prescribed(self) -> Iterator[tuple[str, TimeFunction, int]]:
+        """The given shape."""
+        for body, functions in (self.modal or {}).items():
+            for k, function in enumerate(functions):
+                yield f"modal.{body}[{k}]", function, 2
+
+    def run(self, context: Context) -> Outcome:
         """Motion and forces."""
-        if isinstance(context, Context):
-            return run_spatial_fcid(context, self)
-        return add_transmission(run_fcid(context.model, self))
+        return run_spatial_fcid(context, self)
 
 
-@dataclass(frozen=True)
-class PrescribedShape(Details):
-    """`functions`: p_k(t) of each body; `shape_force` holds it."""
-
-    functions: Shape
-    shape_force: Array
-
-    def actuation_source(self, outcome: PlanarOutcome) -> _core.ActuationSource:
-        """Everything is algebraic: it is solved for again at any time."""
-        tree = _tree(outcome.assembly, has_motors=outcome.tau is not None)
-        posture = tree.motion(outcome.q[0], outcome.v[0], outcome.a[0])[0]
-        motion = _core.PlanarPrescribedMotion(tree.both.driven, posture)
-        return _core.PrescribedActuation(tree.both, motion, self.functions, posture)
-
-
-def run_fcid(model: Model, analysis: Fcid) -> PlanarOutcome:
+def run_spatial_fcid(context: Context, analysis: Fcid) -> Outcome:
     """Motion and forces for the trajectories and the shape that the analysis prescribes.
 
     Raises `InputError` where the trajectories do not fix the motion of the mechanism or cannot be followed,
-    `SolveError` where no static shape is found.
+    `SolveError` where no posture, or no static shape, is found.
     """
-    assembly = MechanismSystem(model, [*model.joints, *model.trajectories], model.loads, list(model.motors.values()))
-    frames = len(assembly.frame_coordinates)
-    if len(assembly.constraints) != frames:
+    began = time.perf_counter()
+    refuse_held_motors(context.model, analysis)
+    model = resolved(context.model, analysis.last_time)
+    q = undeformed_posture(model).q
+    warnings = tuple(check_path(model, q, analysis.last_time))
+    freedom, rows = mobility(model, q).freedom, int(np.count_nonzero(~model.loop_rows))
+    if rows != freedom:
         raise InputError(
             f'{model.scene.path}: analysis "{analysis.name}": kind: expected as many trajectory components as the'
-            f" mechanism has degrees of freedom ({model.degrees_of_freedom}) for "
-            f'"fcid", found {len(assembly.constraints) - len(model.joints)}'
+            f' mechanism has degrees of freedom ({freedom}) for "fcid", found {rows}'
         )
-    start = undeformed_state(assembly)
-    paths = [(held.measure.label, held.target) for held in assembly.constraints if held.is_trajectory]
-    check_smooth(model.scene.path, paths, analysis.end)
-    check_reach(assembly, start, analysis.times)
-    has_motors = motors_fit(model)
-    tree = _tree(assembly, has_motors=has_motors)
-    posture = tree.motion(start.q, start.v, 0 * start.v)[0]
-    motion = _core.PlanarPrescribedMotion(tree.both.driven, posture)
-    if analysis.shape != "zero":
-        import scipy.interpolate  # noqa: F401, loading takes longer than solving
-    began = time.perf_counter()
-    shape = prescribed_shape(model.scene.path, model.bodies, analysis, motion, posture)
-    found = _at(assembly, analysis, tree, motion, shape, posture, analysis.times, has_motors=has_motors)
-    found = replace(found, statistics=Statistics(wall_seconds=time.perf_counter() - began))
+
+    def equations(*, has_motors: bool = True) -> _core.SpatialPrescribedMotion:
+        return _core.SpatialPrescribedMotion(driven_mechanism(model, has_motors=has_motors), q)
+
+    motion = equations(has_motors=sum(len(columns) for columns in model.motors.values()) == freedom)
+    shape = _shape(context, analysis, motion, q)
+
+    def at(times: Array) -> Outcome:
+        found = prescribed_motion(model, motion, sampled(shape, times), times, q[None])
+        return Outcome(
+            analysis=analysis, model=model, forces=Forces(required=found.required),
+            motion=Motion(times, found.q, found.v, found.a, found.multipliers),
+            statistics=Statistics(warnings=warnings), prescribed=Prescription(equations, shape, q),
+        )  # fmt: skip
+
+    run = at(analysis.times)
+    run = replace(run, statistics=replace(run.statistics, wall_seconds=time.perf_counter() - began))
 
     @cache
-    def look_closer() -> PlanarOutcome:
-        times = path_times(analysis.times, assembly.model.scene.trajectory, analysis.end)
-        return _at(assembly, analysis, tree, motion, shape, posture, times, has_motors=has_motors)
+    def look_closer() -> Outcome:
+        return at(path_times(run.time, model.scene.trajectory, analysis.end))
 
-    return replace(found, look_closer=look_closer)
+    return replace(run, look_closer=look_closer)
 
 
-def _at(
-    assembly: MechanismSystem,
-    analysis: Fcid,
-    tree: PlanarTree,
-    motion: _core.PlanarPrescribedMotion,
-    shape: Shape,
-    posture: Array,
-    times: Array,
-    *,
-    has_motors: bool,
-) -> PlanarOutcome:
-    """The outcome at `times` (T,), s."""
-    p, p_dot, p_ddot = sampled(shape, times)
-    run = _core.prescribed_outputs(tree.both, motion, as_list(times), p, p_dot, p_ddot, posture)
-    if len(run.q) < len(times):
-        t = times[len(run.q)]
+def _shape(context: Context, analysis: Fcid, motion: _core.SpatialPrescribedMotion, q: Array) -> Shape:
+    """P(t) of all bodies; expressions are those of whole links."""
+    path, whole = context.model.scene.path, context.whole
+    bodies = [node.body for node in context.model.tree.nodes]
+    if analysis.shape == "given" and whole is not None:
+        links = [node.body for node in whole.model.tree.nodes]
+        return given_shape_of_pieces(path, bodies, analysis, links, whole.divided)
+    return prescribed_shape(path, bodies, analysis, motion, q)
+
+
+def shape_nodes(analysis: Fcid) -> Array:
+    """Times (T,), s, between which shapes are splines."""
+    return as_floats(np.linspace(0.0, analysis.end, max(FEWEST_NODES, len(analysis.times) // 2 + 1)))
+
+
+def sampled(shape: Shape, times: Array) -> Array:
+    """p, ṗ and p̈ (3, T, n) of all bodies."""
+    functions = [function for of_body in shape for function in of_body]
+    samples = np.array([function.sample(times) for function in functions]).reshape(len(functions), 3, len(times))
+    return np.ascontiguousarray(np.moveaxis(samples, 0, -1))
+
+
+def given_shape(scene_path: Path, bodies: Bodies, analysis: Fcid) -> Shape:
+    """The expressions of the scene; by way of a spline where the modes were made anew (payloads, patches)."""
+    given: Mapping[str, tuple[TimeFunction, ...]] = analysis.modal or {}
+    shape: Shape = []
+    for body in bodies:
+        functions = list(given.get(body.name, ()))
+        in_file = len(body.modal_transform)
+        if len(functions) > in_file:
+            raise InputError(
+                f'{scene_path}: analysis "{analysis.name}": modal.{body.name}: expected at most {in_file}'
+                f" expressions, one for each mode, found {len(functions)}"
+            )
+        functions += [ZERO] * (in_file - len(functions))
+        selected = np.argmax(body.modal_transform, axis=0) if body.n_modes else np.zeros(0, dtype=int)
+        if np.array_equal(body.modal_transform, np.eye(in_file)[:, selected]):
+            shape.append([functions[k] for k in selected])
+        else:
+            nodes = shape_nodes(analysis)
+            p = np.column_stack([function.sample(nodes)[0] for function in functions])
+            shape.append(spline(nodes, np.linalg.lstsq(body.modal_transform, p.T, rcond=None)[0].T))
+    return shape
+
+
+def given_shape_of_pieces(
+    scene_path: Path, bodies: Bodies, analysis: Fcid, links: Bodies, divided: Mapping[str, DividedLink]
+) -> Shape:
+    """`given_shape` of the whole `links`, in the coordinates of `bodies`, which have pieces of the divided ones."""
+    nodes, counts = shape_nodes(analysis), {body.name: body.n_modes for body in bodies}
+    shape = dict(zip((link.name for link in links), given_shape(scene_path, links, analysis), strict=True))
+    for name, link in divided.items():
+        p = np.column_stack([function.sample(nodes)[0] for function in shape[name]])
+        of_pieces = iter(spline(nodes, p @ link.spread.T))
+        shape |= {piece: [next(of_pieces) for _ in range(counts[piece])] for piece in link.bodies}
+    return [shape[body.name] for body in bodies]
+
+
+def prescribed_shape(
+    scene_path: Path, bodies: Bodies, analysis: Fcid, motion: _core.SpatialPrescribedMotion, posture: Array
+) -> Shape:
+    """p(t) of every body, with its derivatives; `posture` (n_q,) of the tree at the start.
+
+    Raises `SolveError` where no posture, or no static shape, is found.
+    """
+    if analysis.shape == "given":
+        return given_shape(scene_path, bodies, analysis)
+    if analysis.shape == "static":
+        return _static(scene_path, bodies, analysis, motion, posture)
+    return [[ZERO] * body.n_modes for body in bodies]
+
+
+def _static(
+    scene_path: Path, bodies: Bodies, analysis: Fcid, motion: _core.SpatialPrescribedMotion, posture: Array
+) -> Shape:
+    """A spline through static shapes: p is prescribed, so p, ṗ and p̈ only have to go with each other exactly."""
+    nodes, stiffness = shape_nodes(analysis), np.concatenate([body.stiffness for body in bodies])
+    p = quasi_static_shape(motion, stiffness, nodes, posture)
+    is_found = np.isfinite(p).all(axis=1)
+    if not is_found.all():
         raise SolveError(
-            f'{assembly.model.scene.path}: analysis "{analysis.name}": no position was found at t = {t:g} s: the'
-            " prescribed shape takes the trajectory out of reach"
+            f'{scene_path}: analysis "{analysis.name}": no static shape was found at'
+            f" t = {nodes[is_found.argmin()]:g} s: the links are too soft for their loads there"
         )
-    return PlanarOutcome(
-        analysis=analysis,
-        assembly=assembly,
-        motion=motion_of(assembly, run, times),
-        forces=Forces(run.tau, run.F_p) if has_motors else Forces(),
-        details=PrescribedShape(shape, run.shape_force),
-    )
-
-
-def _tree(assembly: MechanismSystem, *, has_motors: bool) -> PlanarTree:
-    return told_in_joints(assembly, "fcid", assembly.model.motors.values() if has_motors else ())
+    functions = iter(spline(nodes, p))
+    return [[next(functions) for _ in range(body.n_modes)] for body in bodies]

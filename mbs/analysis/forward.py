@@ -2,148 +2,182 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from itertools import count
+from typing import Literal, Self
+
 import numpy as np
+from pydantic import model_validator
 
+from ...common.arrays import Array
 from ...common.errors import InputError
-from ...common.validation import quoted
+from ...common.validation import either
 from .. import _core
-from ..joints.measure import Marker, Measure
-from ..model.model import ZERO, Model
-from ..model.raised_mass import coordinate_factors, integrated
-from ..model.system import MechanismSystem
+from ..fields.waypoints import spline
+from ..model.spatial_drives import Command, Drives, Replayed
+from ..model.spatial_frame_motors import motor_commands
+from ..model.spatial_gears import with_compliance_in_space
+from ..model.spatial_model import SpatialModel, modal_directions, without_paths
+from ..scene.analysis import ActuatedAnalysis, Analysis, Need
+from ..scene.spatial.loads import OF_POINT
+from ..solve.spatial_statics import hanging_joints, initial_state
 from ..solve.state import State
-from .context import AnyContext, Context
-from .drive import Progress, drive, initial_state
-from .elastic_joints import drive_sizes, with_compliance, with_rotors
-from .forward_keys import ForwardKeys
-from .outcome import AnyOutcome, EarlierRun
-from .planar_outcome import PlanarOutcome
-from .replay import ActuatorSet, actuation_source, motor_limits, replay_times
-from .spatial_forward import run_spatial_forward
+from .context import Context, PatchedLink
+from .elastic_joints import DEGREE
+from .outcome import Outcome
+from .spatial_drive import spatial_drive
+from .spatial_gears import wound_up
+from .spatial_replay import left_paths, path_numbers, point_numbers, replay_times, supplied
 
 
-class Forward(ForwardKeys):
+class Forward(ActuatedAnalysis):
     """Motion under the loads of the scene and the inputs computed by the inverse analysis `actuation`.
 
     `apply` selects the inputs: motor torques, motor torques and patch voltages, forces along the trajectories, or
     forces at the actuation points. `limits` saturates motors and patches at their limits.
     """
 
-    def run(self, context: AnyContext) -> AnyOutcome:
+    kind: Literal["forward"]
+    apply: Literal["joints", "joints+pzt", "trajectory", "points"] | None = None
+    """Inputs taken from `actuation`: motor torques, torques and voltages, forces along the trajectories, or at the
+    actuation points."""
+    limits: bool = False
+    """Saturation of motors and patches at their limits."""
+
+    follows_trajectories = False
+    is_resumable = True
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        if (self.actuation is None) != (self.apply is None):
+            raise ValueError(
+                'expected the keys "actuation" and "apply" together, found only '
+                + ('"apply"' if self.actuation is None else '"actuation"')
+            )
+        if self.limits and self.apply not in ("joints", "joints+pzt"):
+            raise ValueError(
+                f'expected limits = true only with apply = "joints" or "joints+pzt", found apply = "{self.apply}"'
+            )
+        return self
+
+    def run(self, context: Context) -> Outcome:
         """Motion alone: nothing is specified."""
-        if isinstance(context, Context):
-            return run_spatial_forward(context, self)
-        source = context.source(self.actuation)
-        actuators = context.make_actuators(has_raised_masses(source))
-        return run_forward(context.model, self, source, actuators, context.progress, context.earlier)
+        return run_spatial_forward(context, self)
+
+    def needs(self) -> Iterator[Need]:
+        """Patches or points for what is applied by them."""
+        table = {"joints+pzt": "pzt", "points": "actuation_points"}.get(self.apply or "")
+        if self.apply is not None and table is not None:
+            yield Need("apply", self.apply, table)
+
+    def replay_problems(self, source: Analysis) -> Iterator[str]:
+        """Whether `source` found what is to be applied."""
+        if source.applicable and self.apply not in source.applicable:
+            more = f': "{source.name}" takes more than the forces on its trajectories'
+            why = more if self.apply == "trajectory" else ""
+            yield (
+                f'apply: expected {either(source.applicable)} with an analysis of kind "{source.kind}", found'
+                f' "{self.apply}"{why}'
+            )
 
 
-def run_forward(
-    model: Model,
-    analysis: Forward,
-    source: PlanarOutcome | None,
-    actuator_set: ActuatorSet,
-    progress: Progress,
-    earlier: EarlierRun | None = None,
-) -> PlanarOutcome:
-    """Forward dynamics under given loads, and the actuation of the earlier analysis `source` where there is one.
+def run_spatial_forward(context: Context, analysis: Forward) -> Outcome:
+    """Motion alone: nothing is specified. With an actuation it starts where the earlier analysis did.
 
-    Motors turn elastic gears with the moments at the outputs of `source` and splines between these.
-    It goes on with an `earlier` run of the same analysis.
+    Raises `InputError` where what is to be applied does not fit the robot, `SolveError` where there is no equilibrium
+    to start from.
     """
-    exact = with_compliance(model)
-    model = integrated(exact) if has_raised_masses(source) else exact
-    if source is None:
-        assembly = MechanismSystem(model, model.joints, model.loads)
-        reported = None if model is exact else MechanismSystem(exact, exact.joints, exact.loads)
-        return drive(assembly, analysis, initial_state(assembly), progress, reported=reported, earlier=earlier)
-    loads = model.loads if source.details.loads is None else source.details.loads
-    rows, actuators = applied_actuators(model, analysis, source, actuator_set)
-    sizes, moved = [ZERO] * len(rows), with_rotors(source, exact)
-    if model.gears:
-        _check_applied(model, analysis)
-        limits = motor_limits(model)
-        sizes = drive_sizes(source, limits if analysis.limits else np.full_like(limits, np.inf))
-        actuators = actuators[1:]  # without the motors
-    drives = [*zip(rows, sizes, strict=True), *loads]
-    assembly = MechanismSystem(model, model.joints, drives)
-    reported = None if model is exact else MechanismSystem(exact, exact.joints, drives)
-    steering = _core.Actuation(actuation_source(source), actuators) if actuators else None
-    factors = 1.0 if model is exact else coordinate_factors(exact)
-    start = State(moved.q[0] * factors, moved.v[0] * factors)  # bodies and their order are the same
-    times = replay_times(source, analysis)
-    return drive(
-        assembly, analysis, start, progress, reported=reported, times=times, steering=steering, earlier=earlier
-    )
+    model, progress = with_compliance_in_space(without_paths(context.model)), context.progress
+    if analysis.actuation is None:
+        start = initial_state(model)
+        told = tuple(hanging_joints(model, start))
+        return spatial_drive(model, analysis, start, progress, warnings=told, earlier=context.earlier)
+    source = context.outcomes[analysis.actuation]
+    if model.tree.gears:
+        return _behind_gears(source, model, analysis, context)
+    replayed = _replayed(context, source, analysis)
+    if analysis.apply == "trajectory" and source.recording is not None:  # others may ring where `source` did not
+        replayed = replayed._replace(integrator=source.statistics.integrator.at_end)
+    run = spatial_drive(
+        model, analysis, State(source.q[0], source.v[0]), progress,
+        drives=Drives(replayed=replayed), times=replay_times(source, analysis), earlier=context.earlier,
+    )  # fmt: skip
+    if analysis.apply == "trajectory":  # others act without what makes up for vibrations
+        statistics = run.statistics
+        warnings = (*statistics.warnings, *left_paths(source, run))
+        run = replace(run, statistics=replace(statistics, warnings=warnings))
+    return run
 
 
-def has_raised_masses(source: PlanarOutcome | None) -> bool:
-    """Whether a run under the actuation of `source` raises masses: not where that prescribes the shape.
-
-    Its forces, known at any time, hold the masses as they are to the shape, and would not hold others.
-    """
-    return source is None or source.details.shape_force is None
-
-
-def _check_applied(model: Model, analysis: Forward) -> None:
-    """Raise `InputError` for an actuation that leaves motors behind gears that give without their moments."""
-    if analysis.apply not in ("joints", "joints+pzt"):
-        raise InputError(
-            f'{model.scene.path}: analysis "{analysis.name}": apply: expected "joints" or "joints+pzt" for joints'
-            f' with stiffness, found "{analysis.apply}"'
-        )
-
-
-def applied_actuators(
-    model: Model, analysis: Forward, source: PlanarOutcome, actuator_set: ActuatorSet
-) -> tuple[list[Measure], list[_core.Actuator]]:
-    """Rows along which forces act, and the actuators that set them, in the order in which the core numbers them.
-
-    Raises `InputError` where the motors do not fit the mechanism, or a body has no actuation points.
-    """
+def _replayed(context: Context, source: Outcome, analysis: Forward) -> Replayed:
+    """What acts."""
+    model = source.model
+    nothing = Command(np.zeros(model.tree.n_v))
     if analysis.apply == "trajectory":
-        return [c.measure for c in source.assembly.constraints if c.is_trajectory], [_core.TrajectoryForces(0)]
+        found, joints, points = path_numbers(source)
+        rows = [row for row in model.rows if row.is_trajectory and row.kind == "coordinate"]
+        along = [Command(row.sign * np.eye(model.tree.n_v)[row.coordinate]) for row in rows]
+        at_points = {
+            point: {name: first + number for number, name in enumerate(OF_POINT)} for point, first in points.items()
+        }
+        return Replayed(found, (*along, *[nothing] * (len(OF_POINT) * len(points))), at_points, joints)
     if analysis.apply == "points":
-        return _point_actuators(model, analysis, source, actuator_set)
-    if source.tau is None:
+        chosen = list(context.at_points(source))
+        at_points = {point: dict(zip("xyz", range(3 * k, 3 * k + 3), strict=True)) for k, point in enumerate(chosen)}
+        return Replayed(point_numbers(source, context.points), (nothing,) * (3 * len(chosen)), at_points)
+    _check_motors(model, analysis)
+    patches = context.patches if analysis.apply == "joints+pzt" else {}
+    found = supplied(source, largest_moments(model, limits=analysis.limits), patches, limited=analysis.limits)
+    return Replayed(found, actuator_commands(model, patches), moments=numbers_of_motors(model))
+
+
+def actuator_commands(model: SpatialModel, patches: Mapping[str, PatchedLink]) -> tuple[Command, ...]:
+    """What a unit of each does: moments of motors, on sections or on frames, and voltages on the modes of links."""
+    of_volts = (row for of_link in patches.values() for row in modal_directions(model, of_link.per_volt))
+    return (*motor_commands(model), *map(Command, of_volts))
+
+
+def numbers_of_motors(model: SpatialModel) -> dict[str, list[int]]:
+    """By joint with motors the numbers of its coordinates, one joint after the other."""
+    numbers = count()
+    return {joint: [next(numbers) for _ in columns] for joint, columns in model.motors.items()}
+
+
+def _behind_gears(source: Outcome, model: SpatialModel, analysis: Forward, context: Context) -> Outcome:
+    """Where gears of `model` give: moments at the outputs of `source` and splines between these, as in the plane."""
+    if analysis.apply != "joints":
         raise InputError(
-            f'{model.scene.path}: analysis "{analysis.name}": apply: expected motors that fit the mechanism'
-            f" ({model.degrees_of_freedom} of them) for {analysis.apply!r}, found {len(model.motors)}; name them with"
-            ' motor = true, or use apply = "trajectory"'
+            f'{model.scene.path}: analysis "{analysis.name}": apply: expected "joints" for joints with stiffness,'
+            f' found "{analysis.apply}"'
         )
-    limits = motor_limits(model)
-    motors = _core.Motors(0, limits if analysis.limits else np.full_like(limits, np.inf))
-    patches = actuator_set.limited_patches if analysis.limits else actuator_set.patches
-    index = {body.name: i for i, body in enumerate(model.bodies)}
-    bent = [_core.Patches(index[name], allocation) for name, allocation in patches.items()]
-    return list(model.motors.values()), [motors, *(bent if analysis.apply == "joints+pzt" else [])]
-
-
-def _point_actuators(
-    model: Model, analysis: Forward, source: PlanarOutcome, actuator_set: ActuatorSet
-) -> tuple[list[Measure], list[_core.Actuator]]:
-    driven = [body.name for body in model.bodies if is_driven(source, body.name)]
-    missing = [name for name in driven if name not in actuator_set.points]
-    if missing:
+    if source.model.tree.gears:
         raise InputError(
-            f'{model.scene.path}: analysis "{analysis.name}": apply: expected [[actuation_points]] on every body that'
-            f' "{source.analysis.name}" drives ({quoted(driven)}), found none on {quoted(missing)}'
+            f'{model.scene.path}: analysis "{analysis.name}": actuation: expected an inverse analysis for joints'
+            f' with stiffness, found "{source.analysis.name}"'
         )
-    rows: list[Measure] = []
-    actuators: list[_core.Actuator] = []
-    for i, body in enumerate(model.bodies):
-        if body.name not in actuator_set.points:
-            continue
-        points = actuator_set.points[body.name]
-        actuators.append(_core.PointForces(len(rows), i, points.equations))
-        for name in points.points:
-            for kind in (_core.MeasureKind.x, _core.MeasureKind.y):
-                rows.append(Measure(f'actuation point on "{body.name}"', kind, Marker(None), Marker(body.name, name)))
-    return rows, actuators
+    wound = wound_up(source, model)
+    most = largest_moments(source.model, limits=analysis.limits)
+    wanted = np.hstack([wound.moments[joint] for joint in model.motors])
+    given = np.clip(wanted, -most, most)
+    sizes = spline(source.time, given, 1 if np.any(given != wanted) else DEGREE)
+    replayed = Replayed(_core.ForcesOfTime(sizes), tuple(motor_commands(model)), moments=numbers_of_motors(model))
+    return spatial_drive(
+        model, analysis, State(wound.q[0], wound.v[0]), context.progress, drives=Drives(replayed=replayed),
+        times=replay_times(source, analysis), earlier=context.earlier,
+    )  # fmt: skip
 
 
-def is_driven(source: PlanarOutcome, body: str) -> bool:
-    """Whether generalized driving forces Q_a can act on a body: a trajectory or prescribed modes are its own."""
-    trajectories = (c.measure for c in source.assembly.constraints if c.is_trajectory)
-    prescribed = source.details.shape_force is not None and source.assembly.model.body(body).n_modes > 0
-    return prescribed or any(body in (row.a.body, row.b.body) for row in trajectories)
+def largest_moments(model: SpatialModel, *, limits: bool) -> Array:
+    """(motors,) N·m or N, infinite where limits do not count."""
+    joints = {joint.name: joint for joint in model.scene.joint}
+    most = np.array([of.moment for name in model.motors for of in joints[name].motor_limits])
+    return most if limits else np.full_like(most, np.inf)
+
+
+def _check_motors(model: SpatialModel, analysis: Forward) -> None:
+    if not model.motors:
+        raise InputError(
+            f'{model.scene.path}: analysis "{analysis.name}": apply: expected joints with motors for'
+            f' "{analysis.apply}", found none: name them with motor = true'
+        )

@@ -1,73 +1,29 @@
-"""Inverting a path for motors alone: keys, the choice of the output, and for how long motors act; in 2D and 3D."""
+"""A path that motors carry from rest to rest: what has to rest, for how long they act, and why none was found."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Any
 
 import numpy as np
-from pydantic import Field, model_validator
 
-from ...common.arrays import Array, as_floats
+from ...common.arrays import as_floats
 from ...common.errors import InputError
-from ...common.numbers import MOST_OUTPUTS
-from ..fields.field_types import NotNegative
-from ..fields.waypoints import spline
-from ..scene.analysis import Analysis, Check, Need, TimedAnalysis, output_times
+from ..scene.analysis import Analysis, TimedAnalysis
 from ..solve.internal_dynamics import Output, is_unstable
 from ..solve.stable_inversion import Inversion, S
-from ..solve.zero_dynamics import GROWTH, SAMPLES, Linearisation, linearise, shape_along
+from ..solve.zero_dynamics import GROWTH, Linearisation
 from .outcome import ADVICE, Details
 
 DECAY = 23.0  # times the slowest time constant of zeros: what is left is 1e-10
-FACTOR_STEP = 0.02  # of the search for the largest factor
-MARGIN = 0.9  # of it that is taken: at the limit hardly damped motions are excited most
-SINGULAR = 1e-13  # of M of the internal dynamics, scaled
 INFINITE = (
     "where a zero of the modes passes through infinity: take another number of modes in the link files, or output ="
     ' "redefined"'
 )
 REST = 1e-9  # speed of a path at rest, relative to its mean speed
-
-
-class MotorsOnlyKeys(TimedAnalysis):
-    """Of `MotorsOnly`."""
-
-    kind: Literal["motors-only"]
-    output: Literal["tip", "redefined"] = "tip"
-    """Tracked output: points of the trajectories, or their positions with `factor` times the vibration."""
-    factor: Annotated[float, Field(ge=0.0, lt=1.0)] | None = None
-    """Share of the vibration in the "redefined" output; by default nine tenths of the largest that is minimum phase."""
-    pre_actuation: NotNegative | None = None
-    """Duration of torques before the path begins, s; by default from the zero dynamics."""
-    post_actuation: NotNegative | None = None
-    """Duration of torques after the path, s; by default from the zero dynamics."""
-    check: Check = None
-    """Forward simulation under the result with twice the modes ("finer")."""
-
-    is_integrated = True
-    applicable = ("joints",)
-
-    @model_validator(mode="after")
-    def _consistent(self) -> Self:
-        if self.factor is not None and self.output != "redefined":
-            raise ValueError(f'expected the key "factor" only with output = "redefined", found "{self.output}"')
-        more = (self.pre_actuation or 0.0) + (self.post_actuation or 0.0)
-        if self.output_step and (self.end + more) / self.output_step > MOST_OUTPUTS:
-            raise ValueError(f"expected at most {MOST_OUTPUTS} outputs, found {more:g} s of pre- and post-actuation")
-        return self
-
-    @property
-    def times(self) -> Array:
-        """Output times (T,), s: from 0 to `end`, and the pre- and post-actuation besides where they are given."""
-        return output_times(self.end, self.output_step, self.pre_actuation or 0.0, self.post_actuation or 0.0)
-
-    def needs(self) -> Iterator[Need]:
-        """Something to follow."""
-        yield Need("kind", self.kind, "trajectory")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -82,47 +38,6 @@ class AroundPath(Details):
 def where(scene_path: Path, analysis: Analysis) -> str:
     """Scene and analysis, as messages begin."""
     return f'{scene_path}: analysis "{analysis.name}"'
-
-
-def choose_output(make: Callable[[float], S], analysis: MotorsOnlyKeys) -> tuple[S, Linearisation]:
-    """The output the path is for: the point itself, or as near to it as is minimum phase or as the scene says.
-
-    `make` gives the output of a factor.
-    """
-    end = analysis.end
-    if analysis.output == "tip" or analysis.factor is not None:
-        servo = make(1.0 if analysis.output == "tip" else float(analysis.factor or 0.0))
-        linear = linearise(servo, end)
-        _check_relative_degree(servo, linear)
-        if analysis.output == "redefined" and not is_minimum_phase(linear):
-            raise InputError(
-                f"{servo.where}: factor: expected one whose output is minimum phase, since it is integrated forward,"
-                f" found {analysis.factor:g} with zeros in the right half plane: {describe_zeros(linear)}; use a"
-                ' smaller factor, leave it out, or use output = "tip"'
-            )
-        return (servo, linear) if analysis.output == "tip" else _with_expected_deflections(servo, end)
-    joints = make(0.0)
-    for k in range(round(1 / FACTOR_STEP) + 1):
-        servo = joints.with_factor(max(0.0, 1.0 - k * FACTOR_STEP))
-        linear = linearise(servo, end, samples=2)
-        if not is_unstable(linear.zeros).any() and is_minimum_phase(linearise(servo, end)):
-            return _with_expected_deflections(servo.with_factor(MARGIN * servo.factor), end)
-    raise InputError(
-        f'{joints.where}: output: expected a robot whose joint motion is minimum phase for "redefined", found zeros in'
-        f" the right half plane even then: {describe_zeros(linear)}"
-    )
-
-
-def _with_expected_deflections(servo: S, end: float) -> tuple[S, Linearisation]:
-    """The part of the deflections that the output leaves out, replaced by what the path's loads bend without vibration.
-
-    A function of time alone: it changes the output's target, not its zeros.
-    """
-    times = as_floats(np.linspace(0.0, end, SAMPLES))
-    sag = shape_along(servo.with_factor(1.0), times)
-    offset = [f.held(0.0, end) for f in spline(times, (1 - servo.factor) * sag, at_rest=True)]
-    servo = servo.with_offset(tuple(offset))
-    return servo, linearise(servo, end)
 
 
 def is_minimum_phase(linear: Linearisation) -> bool:
@@ -140,22 +55,6 @@ def describe_zeros(linear: Linearisation) -> str:
     return shown if len(shown) < 120 else ", ".join(shown.split(", ")[:4]) + f" … ({len(found)} in all)"
 
 
-def _check_relative_degree(servo: Output, linear: Linearisation) -> None:
-    """Raise `InputError` where some time of the path the motors cannot accelerate its output."""
-    values = np.linalg.svd(linear.dynamics.M, compute_uv=False)
-    worst = int((values[:, -1] / values[:, 0]).argmin())
-    if values[worst, -1] < SINGULAR * values[worst, 0]:
-        raise InputError(
-            f"{servo.where}: expected motors that accelerate every component of the path, found at"
-            f" t = {linear.times[worst]:.4g} s a singular coupling, {INFINITE}"
-        )
-
-
-def rests(analysis: MotorsOnlyKeys, needs_future: bool) -> list[float]:
-    """Times (s) at which motors alone need the robot at rest."""
-    return [0.0, analysis.end] if needs_future or analysis.post_actuation else [0.0]
-
-
 def check_rest(servo: Output, analysis: TimedAnalysis, ends: Sequence[float]) -> None:
     """Raise `InputError` for a path that moves at one of the `ends` (s), where the robot has to be at rest."""
     for target in servo.targets():
@@ -169,19 +68,6 @@ def check_rest(servo: Output, analysis: TimedAnalysis, ends: Sequence[float]) ->
                     f' a path at rest at t = {t:g} s, before or after which "{analysis.name}" holds it, found the rate'
                     f" {rate:.4g}: start and end with zero speed, as 10*s**3 - 15*s**4 + 6*s**5 does"
                 )
-
-
-def durations(analysis: MotorsOnlyKeys, linear: Linearisation, needs_future: bool) -> tuple[float, float]:
-    """Pre- and post-actuation (s): as given, or until the zero dynamics has died out; whole output steps."""
-    chosen = [
-        automatic if value is None else value
-        for automatic, value in zip(
-            decay_times(linear, analysis.end, needs_future=needs_future),
-            (analysis.pre_actuation, analysis.post_actuation),
-            strict=True,
-        )
-    ]
-    return whole_steps(chosen, analysis.output_step)
 
 
 def decay_times(linear: Linearisation, end: float, *, needs_future: bool) -> tuple[float, float]:

@@ -8,32 +8,50 @@ the part of the vibration that the output does not see.
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator
+from dataclasses import replace
 from functools import cache, partial
+from typing import Annotated, Literal, Self
 
 import numpy as np
+from pydantic import Field, model_validator
 
-from ...common.arrays import Array, as_list
+from ...common.arrays import Array, as_floats, as_list
+from ...common.errors import InputError, SolveError
+from ...common.numbers import MOST_OUTPUTS
 from .. import _core
-from .._core import TimeFunction
-from ..joints.measure import Measure
-from ..model.model import Model
-from ..scene.analysis import output_times
+from ..fields.field_types import NotNegative
+from ..fields.waypoints import spline
+from ..model.spatial_gears import refuse_held_motors
+from ..model.spatial_model import SpatialModel, row_values, without_paths
+from ..scene.analysis import Check, Need, TimedAnalysis, output_times
 from ..solve.integrators import Choice
-from ..solve.servo import Servo, make_servo
-from ..solve.stable_inversion import Inversion, invert
-from .context import AnyContext, Context
-from .drive import Progress, motion_of
-from .elastic_joints import add_transmission
-from .inverted_path import AroundPath, MotorsOnlyKeys, cause_of, check_rest, choose_output, durations, rests, where
-from .outcome import AnyOutcome, Forces, Statistics
-from .planar_outcome import PlanarOutcome
+from ..solve.internal_dynamics import Output, Stopped, is_unstable
+from ..solve.spatial_servo import SpatialServo, make_spatial_servo
+from ..solve.stable_inversion import Inversion, S, invert
+from ..solve.zero_dynamics import SAMPLES, Linearisation, linearise, shape_along
+from .context import Context
+from .inverted_path import (
+    INFINITE,
+    AroundPath,
+    cause_of,
+    check_rest,
+    decay_times,
+    describe_zeros,
+    is_minimum_phase,
+    where,
+    whole_steps,
+)
+from .outcome import Forces, Motion, Outcome, Prescription, Statistics
 from .samples import path_times
-from .shapes import sampled
-from .spatial_motors_only import run_spatial_motors_only
+
+FACTOR_STEP = 0.02  # of the search for the largest factor
+MARGIN = 0.9  # of it that is taken: at the limit hardly damped motions are excited most
+SINGULAR = 1e-13  # of M of the internal dynamics, scaled
+NOTABLE = 1e-9  # m, rad: of a path that is left
 
 
-class MotorsOnly(MotorsOnlyKeys):
+class MotorsOnly(TimedAnalysis):
     """Motor torques that move the robot along its trajectories without patches (stable inversion).
 
     With `output` "tip" the points of the trajectories follow them; with "redefined" the points with `factor` times the
@@ -42,92 +60,194 @@ class MotorsOnly(MotorsOnlyKeys):
     zero dynamics determines them. `check` as in `Pcid`.
     """
 
-    def run(self, context: AnyContext) -> AnyOutcome:
+    kind: Literal["motors-only"]
+    output: Literal["tip", "redefined"] = "tip"
+    """Tracked output: points of the trajectories, or their positions with `factor` times the vibration."""
+    factor: Annotated[float, Field(ge=0.0, lt=1.0)] | None = None
+    """Share of the vibration in the "redefined" output; by default nine tenths of the largest that is minimum phase."""
+    pre_actuation: NotNegative | None = None
+    """Duration of torques before the path begins, s; by default from the zero dynamics."""
+    post_actuation: NotNegative | None = None
+    """Duration of torques after the path, s; by default from the zero dynamics."""
+    check: Check = None
+    """Forward simulation under the result with twice the modes ("finer")."""
+
+    is_integrated = True
+    applicable = ("joints",)
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        if self.factor is not None and self.output != "redefined":
+            raise ValueError(f'expected the key "factor" only with output = "redefined", found "{self.output}"')
+        more = (self.pre_actuation or 0.0) + (self.post_actuation or 0.0)
+        if self.output_step and (self.end + more) / self.output_step > MOST_OUTPUTS:
+            raise ValueError(f"expected at most {MOST_OUTPUTS} outputs, found {more:g} s of pre- and post-actuation")
+        return self
+
+    @property
+    def times(self) -> Array:
+        """Output times (T,), s: from 0 to `end`, and the pre- and post-actuation besides where they are given."""
+        return output_times(self.end, self.output_step, self.pre_actuation or 0.0, self.post_actuation or 0.0)
+
+    def needs(self) -> Iterator[Need]:
+        """Something to follow."""
+        yield Need("kind", self.kind, "trajectory")
+
+    def run(self, context: Context) -> Outcome:
         """Motion and moments."""
-        if isinstance(context, Context):
-            return run_spatial_motors_only(context, self)
-        return add_transmission(run_motors_only(context.model, self, context.progress))
+        return run_spatial_motors_only(context, self)
 
 
-@dataclass(frozen=True, kw_only=True)
-class InvertedPath(AroundPath):
-    """How the path was inverted; `loads` are held before and after it."""
-
-    inversion: Inversion[Servo]
-    loads: tuple[tuple[Measure, TimeFunction], ...]
-
-    def actuation_source(self, outcome: PlanarOutcome) -> _core.ActuationSource:
-        """The motors' forces at any time, from p(t)."""
-        return self.inversion.servo.source(self.inversion.shape)
-
-
-def run_motors_only(model: Model, analysis: MotorsOnly, progress: Progress) -> PlanarOutcome:
-    """Motion and motor forces for the trajectories, no other force acting.
+def run_spatial_motors_only(context: Context, analysis: MotorsOnly) -> Outcome:
+    """Motion and motor forces for the trajectories, no other force acting; before and after the path it is held.
 
     Raises `InputError` for a path that is not at rest where it has to be, motors that do not fit, a path out of reach,
-    and a given factor whose output is not minimum phase; `SolveError` where no equilibrium or no motion is
-    found.
+    and a given factor whose output is not minimum phase; `SolveError` where no equilibrium or no motion is found.
     """
-    began = time.perf_counter()
-    servo, linear = choose_output(partial(make_servo, model, analysis.end, where(model.scene.path, analysis)), analysis)
-    needs_future = bool(linear.is_future[0].any())
-    check_rest(servo, analysis, rests(analysis, needs_future))
-    pre, post = durations(analysis, linear, needs_future)
-    inversion = invert(servo, linear, pre, post, analysis.tolerance, progress)
-    return _outcome(
-        analysis,
-        InvertedPath(pre_actuation=pre, post_actuation=post, inversion=inversion, loads=servo.loads),
-        time.perf_counter() - began,
-    )
+    model, began, reached = context.model, time.perf_counter(), 0.0
+    place = where(model.scene.path, analysis)
 
+    def progress(t: float | None = None) -> bool:
+        nonlocal reached
+        reached = reached if t is None else t
+        return context.progress(reached)
 
-def path_error(inversion: Inversion[Servo], times: Array, q: Array) -> Array:
-    """How far (T, components) the specified points, joints and angles themselves are from their path."""
-    path = inversion.servo.path
-    rest = np.zeros(q.shape[1])
-    rows = [i for i, held in enumerate(path.is_trajectory) if held]
-    return np.array([path.system.constraints(t, one, rest)[0][rows] for t, one in zip(times, q, strict=True)])
+    refuse_held_motors(model, analysis)
+    try:
+        servo, linear = choose_output(partial(make_spatial_servo, model, analysis.end, place, progress), analysis)
+        needs_future = bool(linear.is_future[0].any())
+        check_rest(servo, analysis, rests(analysis, needs_future))
+        pre, post = durations(analysis, linear, needs_future)
+        inversion = invert(servo, linear, pre, post, analysis.tolerance, progress)
+    except Stopped:
+        raise SolveError(f"{place}: stopped on request before any of its motion was found") from None
+    times = output_times(analysis.end, analysis.output_step, pre, post)
+    times = times[times <= inversion.curve.x[-1] + 1e-9 * analysis.end]  # what an integration reached
+    run = _run(analysis, model, inversion, times)
+    if not len(run.time):
+        raise SolveError(f"{servo.where}: no motion was found ({inversion.status}): {cause_of(inversion)}")
+    seconds = time.perf_counter() - began
 
-
-def _outcome(analysis: MotorsOnly, found: InvertedPath, seconds: float) -> PlanarOutcome:
-    times = output_times(analysis.end, analysis.output_step, found.pre_actuation, found.post_actuation)
-    outcome = _at(analysis, found, seconds, times)
+    around = AroundPath(pre_actuation=pre, post_actuation=post, inversion=inversion)
 
     @cache
-    def look_closer() -> PlanarOutcome:
-        between = path_times(outcome.time, outcome.assembly.model.scene.trajectory, analysis.end)
-        return _at(analysis, found, seconds, between)
+    def look_closer() -> Outcome:
+        between = path_times(run.time, model.scene.trajectory, analysis.end)
+        return replace(_run(analysis, model, inversion, between), details=around)
 
-    return replace(outcome, look_closer=look_closer)
+    statistics = replace(run.statistics, wall_seconds=seconds, warnings=_told(inversion, run))
+    return replace(run, details=around, statistics=statistics, look_closer=look_closer)
 
 
-def _at(analysis: MotorsOnly, found: InvertedPath, seconds: float, times: Array) -> PlanarOutcome:
-    """The outcome at `times` (T,), s."""
-    inversion, servo = found.inversion, found.inversion.servo
-    inside = times <= inversion.curve.x[-1] + 1e-9 * analysis.end  # what an integration reached
-    p, p_dot, p_ddot = sampled(inversion.shape, times[inside])
-    run = _core.prescribed_outputs(
-        servo.driven_tree.both, servo.motion, as_list(times[inside]), p, p_dot, p_ddot, servo.near[0]
-    )
-    reached = len(run.q)
-    rows = slice(reached)
-    how = "two-point problem" if inversion.linearisation.is_future[0].any() else "integrated forward"
-    outcome = PlanarOutcome(
+def _run(analysis: MotorsOnly, model: SpatialModel, inversion: Inversion[SpatialServo], times: Array) -> Outcome:
+    curve, servo = inversion.curve, inversion.servo
+    modes = curve(times), curve.derivative(1)(times), curve.derivative(2)(times)
+    found = servo.motion.motion(as_list(times), *modes, servo.postures(times))
+    is_met = np.isfinite(found.q).all(axis=1)
+    kept = slice(len(times) if is_met.all() else int(is_met.argmin()))
+
+    def equations() -> _core.SpatialPrescribedMotion:
+        return replace(servo).motion
+
+    statistics = Statistics(
+        inversion.status, Choice("collocation", ""), steps=len(curve.x) - 1, evaluations=inversion.iterations,
+        cause=cause_of(inversion),
+    )  # fmt: skip
+    return Outcome(
         analysis=analysis,
-        assembly=servo.driven,
-        motion=motion_of(servo.driven, run, times).at(rows),
-        forces=Forces(tau=run.tau).at(rows),
-        statistics=Statistics(
-            status=inversion.status,
-            integrator=Choice("collocation", how),
-            steps=len(inversion.curve.x) - 1,
-            evaluations=inversion.iterations,
-            wall_seconds=seconds,
-            time_reached=None if reached else float(inversion.curve.x[0]),
-            cause=cause_of(inversion),
-        ),
-        details=found,
+        model=without_paths(model),
+        motion=Motion(times, found.q, found.v, found.a, found.loops).at(kept),
+        forces=Forces(required=found.required).at(kept),
+        statistics=statistics,
+        prescribed=Prescription(equations, inversion.shape, servo.near[0]),
     )
-    if not reached:  # an iteration that left the numbers: no motion to keep
-        outcome.check_completed()
-    return outcome
+
+
+def path_errors(inversion: Inversion[SpatialServo], times: Array, q: Array) -> dict[str, Array]:
+    """By trajectory how far (T, m) what follows it is off at `times` (T,) and q (T, n_q), in m or rad."""
+    held = inversion.servo.model
+    C, owners = row_values(held, q, times)[0], [row.owner if row.is_trajectory else "" for row in held.rows]
+    return {path.name: C[:, [owner == path.name for owner in owners]] for path in held.scene.trajectory}
+
+
+def _told(inversion: Inversion[SpatialServo], run: Outcome) -> tuple[str, ...]:
+    """How far a redefined output leaves the path itself."""
+    told = []
+    if not run.failed and inversion.servo.factor < 1:
+        off = max(float(np.abs(of).max(initial=0.0)) for of in path_errors(inversion, run.time, run.q).values())
+        if off > NOTABLE:
+            told.append(
+                f"a point with {inversion.servo.factor:.2g} of the vibration follows the path: that of the trajectory"
+                f" is off by up to {off:.3g} (m or rad)"
+            )
+    return tuple(told)
+
+
+def choose_output(make: Callable[[float], S], analysis: MotorsOnly) -> tuple[S, Linearisation]:
+    """The output the path is for: the point itself, or as near to it as is minimum phase or as the scene says.
+
+    `make` gives the output of a factor.
+    """
+    end = analysis.end
+    if analysis.output == "tip" or analysis.factor is not None:
+        servo = make(1.0 if analysis.output == "tip" else float(analysis.factor or 0.0))
+        linear = linearise(servo, end)
+        _check_relative_degree(servo, linear)
+        if analysis.output == "redefined" and not is_minimum_phase(linear):
+            raise InputError(
+                f"{servo.where}: factor: expected one whose output is minimum phase, since it is integrated forward,"
+                f" found {analysis.factor:g} with zeros in the right half plane: {describe_zeros(linear)}; use a"
+                ' smaller factor, leave it out, or use output = "tip"'
+            )
+        return (servo, linear) if analysis.output == "tip" else _with_expected_deflections(servo, end)
+    joints = make(0.0)
+    for k in range(round(1 / FACTOR_STEP) + 1):
+        servo = joints.with_factor(max(0.0, 1.0 - k * FACTOR_STEP))
+        linear = linearise(servo, end, samples=2)
+        if not is_unstable(linear.zeros).any() and is_minimum_phase(linearise(servo, end)):
+            return _with_expected_deflections(servo.with_factor(MARGIN * servo.factor), end)
+    raise InputError(
+        f'{joints.where}: output: expected a robot whose joint motion is minimum phase for "redefined", found zeros in'
+        f" the right half plane even then: {describe_zeros(linear)}"
+    )
+
+
+def _with_expected_deflections(servo: S, end: float) -> tuple[S, Linearisation]:
+    """The part of the deflections that the output leaves out, replaced by what the path's loads bend without vibration.
+
+    A function of time alone: it changes the output's target, not its zeros.
+    """
+    times = as_floats(np.linspace(0.0, end, SAMPLES))
+    sag = shape_along(servo.with_factor(1.0), times)
+    offset = [f.held(0.0, end) for f in spline(times, (1 - servo.factor) * sag, at_rest=True)]
+    servo = servo.with_offset(tuple(offset))
+    return servo, linearise(servo, end)
+
+
+def _check_relative_degree(servo: Output, linear: Linearisation) -> None:
+    """Raise `InputError` where some time of the path the motors cannot accelerate its output."""
+    values = np.linalg.svd(linear.dynamics.M, compute_uv=False)
+    worst = int((values[:, -1] / values[:, 0]).argmin())
+    if values[worst, -1] < SINGULAR * values[worst, 0]:
+        raise InputError(
+            f"{servo.where}: expected motors that accelerate every component of the path, found at"
+            f" t = {linear.times[worst]:.4g} s a singular coupling, {INFINITE}"
+        )
+
+
+def rests(analysis: MotorsOnly, needs_future: bool) -> list[float]:
+    """Times (s) at which motors alone need the robot at rest."""
+    return [0.0, analysis.end] if needs_future or analysis.post_actuation else [0.0]
+
+
+def durations(analysis: MotorsOnly, linear: Linearisation, needs_future: bool) -> tuple[float, float]:
+    """Pre- and post-actuation (s): as given, or until the zero dynamics has died out; whole output steps."""
+    chosen = [
+        automatic if value is None else value
+        for automatic, value in zip(
+            decay_times(linear, analysis.end, needs_future=needs_future),
+            (analysis.pre_actuation, analysis.post_actuation),
+            strict=True,
+        )
+    ]
+    return whole_steps(chosen, analysis.output_step)

@@ -13,15 +13,8 @@ from ...common.arrays import Array
 from ...common.errors import InputError
 from ...common.validation import did_you_mean, quoted
 from ..fields.field_types import NotNegative
-from ..model.model import Model
-from ..model.system import MechanismSystem
 from ..scene.analysis import Analysis, Surroundings, TimedAnalysis
-from ..solve.initial_state import undeformed_state
-from ..solve.linearisation import held_by_motors
-from .elastic_joints import add_transmission, with_compliance, with_rotors
-from .outcome import AnyOutcome, Forces, Outcome
-from .planar_outcome import PlanarOutcome
-from .static import run_static
+from .outcome import Outcome
 
 STATIC = "static"  # instead of an analysis' name: about the static equilibrium
 NEAR = 1e-9  # of the end of an analysis: how far from an output a time may be for rounding
@@ -71,32 +64,13 @@ class InstantAnalysis(Analysis):
                 yield f'times: expected at most {source.last_time!r}, where "{source.name}" ends, found {t!r}'
 
 
-def operating_points(model: Model, analysis: Analysis, source: PlanarOutcome | None) -> PlanarOutcome:
-    """The motion at the times of `analysis`: rows of the earlier analysis `source`, or the static equilibrium.
-
-    At the equilibrium trajectories are held at t = 0, and where there are none motors keep the initial configuration.
-    Raises `InputError` for times that are no outputs of the source, `SolveError` where there is no equilibrium.
-    """
-    if source is None:
-        held = model
-        if not model.trajectories and model.motors:
-            start = undeformed_state(MechanismSystem(model, model.joints))
-            held = replace(model, trajectories=tuple(held_by_motors(model, start.q)))
-        outcome = with_rotors(add_transmission(run_static(held, analysis)), with_compliance(model))
-        return replace(outcome, forces=Forces())
-    moved = with_rotors(source, with_compliance(model))
-    rows = [row_at(model.scene.path, analysis, source, t) for t in analysis.times]
-    motion = moved.motion.at(rows)
-    return PlanarOutcome(analysis=analysis, assembly=moved.assembly, motion=motion, gears=moved.gears)
-
-
 def of_earlier(source: Outcome, analysis: Analysis) -> Outcome:
     """The motion of `source` as that of `analysis`, which has made no steps of its own."""
     statistics = replace(source.statistics, steps=0, evaluations=0, warnings=())
     return replace(source, analysis=analysis, statistics=statistics, prescribed=None, look_closer=None)
 
 
-def row_at(path: Path, analysis: Analysis, source: AnyOutcome, t: float) -> int:
+def row_at(path: Path, analysis: Analysis, source: Outcome, t: float) -> int:
     """The output of an earlier analysis at time t. Raises `InputError` where there is none."""
     row = int(np.abs(source.time - t).argmin())
     if abs(source.time[row] - t) > NEAR * source.analysis.last_time:

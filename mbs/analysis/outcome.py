@@ -14,7 +14,6 @@ from ...common.arrays import Array, Indices
 from ...common.errors import SolveError
 from .. import _core
 from .._core import TimeFunction
-from ..joints.measure import Measure
 from ..model.spatial_drives import PointDrive
 from ..model.spatial_model import SpatialModel
 from ..scene.analysis import Analysis
@@ -69,9 +68,8 @@ class Motion(_Rows):
 
     Attributes:
         time: (T,) s.
-        q, v, a: (T, n_q), (T, n_v), (T, n_v) of the model's tree; in the plane (R, θ, p) of all bodies side by side.
+        q, v, a: (T, n_q), (T, n_v), (T, n_v) of the model's tree.
         multipliers: (T, constraint equations).
-        residual: (T, 3) of C, Ċ, C̈, relative to their terms; in the plane alone.
         is_at_rest: whether targets stand still, as in an equilibrium.
     """
 
@@ -80,7 +78,6 @@ class Motion(_Rows):
     v: Array
     a: Array
     multipliers: Array
-    residual: Array | None = None
     is_at_rest: bool = False
 
 
@@ -89,9 +86,7 @@ class Forces(_Rows):
     """What actuators have to supply, and what acts beside the loads of the scene.
 
     Attributes:
-        tau: in the plane: (T, motors) N·m (N for prismatic joints); None where motors do not fit the mechanism.
-        F_p: in the plane: (T, modes of all bodies) N/√kg.
-        required: in 3D: (T, n_v) generalized forces that a prescribed shape takes; None where those of the paths are
+        required: (T, n_v) generalized forces that a prescribed shape takes; None where those of the paths are
             all.
         applied: on points.
         commanded: (T, k) moments by joint that act along joints, N·m or N: what a controller commands, or a replay
@@ -99,8 +94,6 @@ class Forces(_Rows):
         voltages: (T, k) V by body, of patches where the analysis itself finds them.
     """
 
-    tau: Array | None = None
-    F_p: Array | None = None
     required: Array | None = None
     applied: tuple[PointDrive, ...] = ()
     commanded: Mapping[str, Array] = field(default_factory=dict)
@@ -202,43 +195,62 @@ class Details:
 
     Attributes:
         pre_actuation, post_actuation: s for which motors act before and after the path.
-        loads: of the scene as this analysis had them; None where they were as the model has them.
-        shape_force: (T, modes of all bodies) −λ_p, N/√kg: forces that hold a prescribed shape.
     """
 
     pre_actuation: float = 0.0
     post_actuation: float = 0.0
-    loads: tuple[tuple[Measure, TimeFunction], ...] | None = None
-    shape_force: Array | None = None
 
-    def actuation_source(self, outcome: Any) -> _core.ActuationSource | None:  # noqa: ANN401, of its kind
-        """What was found at any time of the run, not at its outputs alone; None where that is not known.
 
-        Modal forces are in the coordinates of what was integrated.
-        """
-        found: _core.ActuationSource | None = outcome.recorded_actuation()
-        return found
+class Prescription(NamedTuple):
+    """A motion of which the modes are functions of time.
+
+    Attributes:
+        motion: makes its equations, each time new ones.
+        shape: p(t) of each body.
+        near: (n_q,) a posture near the first.
+        voltages: by body times (B,), s, and V (B, k), linear between, of patches where the analysis itself finds them.
+    """
+
+    motion: Callable[[], _core.SpatialPrescribedMotion]
+    shape: Sequence[Sequence[TimeFunction]]
+    near: Array
+    voltages: Mapping[str, tuple[Array, Array]] = MappingProxyType({})
 
 
 @dataclass(frozen=True, kw_only=True)
-class AnyOutcome:
-    """What an analysis computed, as far as that has the same form in the plane and in 3D."""
+class Outcome:
+    """What an analysis computed.
+
+    Attributes:
+        model: with the constraint equations of its run.
+        prescribed: what moves it, where that is known without steps.
+        look_closer: the same with times between its outputs; None where nothing is between.
+    """
 
     analysis: Analysis
+    model: SpatialModel
     motion: Motion
     forces: Forces = Forces()
     statistics: Statistics = Statistics()
     details: Details = field(default=Details(), repr=False)
     continuation: Continuation | None = field(default=None, repr=False)
+    prescribed: Prescription | None = field(default=None, repr=False)
+    look_closer: Callable[[], Outcome] | None = field(default=None, repr=False)
 
     @property
     def path(self) -> Path:
         """Of the scene."""
-        raise NotImplementedError
+        return self.model.scene.path
 
-    def recorded_actuation(self) -> _core.ActuationSource | None:
-        """What actuators supplied at any time of the steps that were recorded; None where none were."""
-        return None
+    @property
+    def recording(self) -> _core.Recording | None:
+        """Its steps, where a later analysis replays them."""
+        return self.continuation.recording if self.continuation else None
+
+    @property
+    def closer(self) -> Outcome:
+        """The run at its outputs and between: see `samples`. Itself where nothing is between."""
+        return self if self.look_closer is None else self.look_closer()
 
     @property
     def time(self) -> Array:
@@ -301,49 +313,3 @@ class AnyOutcome:
         order, motion, forces = in_order(self.time, between.time), self.motion, self.forces
         motion, forces = motion.with_rows_of(between.motion, order), forces.with_rows_of(between.forces, order)
         return replace(self, motion=motion, forces=forces)
-
-
-class Prescription(NamedTuple):
-    """A motion of which the modes are functions of time.
-
-    Attributes:
-        motion: makes its equations, each time new ones.
-        shape: p(t) of each body.
-        near: (n_q,) a posture near the first.
-        voltages: by body times (B,), s, and V (B, k), linear between, of patches where the analysis itself finds them.
-    """
-
-    motion: Callable[[], _core.SpatialPrescribedMotion]
-    shape: Sequence[Sequence[TimeFunction]]
-    near: Array
-    voltages: Mapping[str, tuple[Array, Array]] = MappingProxyType({})
-
-
-@dataclass(frozen=True, kw_only=True)
-class Outcome(AnyOutcome):
-    """What an analysis in 3D computed.
-
-    Attributes:
-        model: with the constraint equations of its run.
-        prescribed: what moves it, where that is known without steps.
-        look_closer: the same with times between its outputs; None where nothing is between.
-    """
-
-    model: SpatialModel
-    prescribed: Prescription | None = field(default=None, repr=False)
-    look_closer: Callable[[], Outcome] | None = field(default=None, repr=False)
-
-    @property
-    def recording(self) -> _core.Recording | None:
-        """Its steps, where a later analysis replays them."""
-        return self.continuation.recording if self.continuation else None
-
-    @property
-    def closer(self) -> Outcome:
-        """The run at its outputs and between: see `samples`. Itself where nothing is between."""
-        return self if self.look_closer is None else self.look_closer()
-
-    @property
-    def path(self) -> Path:
-        """Of the scene."""
-        return self.model.scene.path

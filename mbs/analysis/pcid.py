@@ -1,24 +1,19 @@
-"""Partially constrained inverse dynamics (Shabana 2022, sec. 5): joints and trajectories hold, p is free."""
+"""Partially constrained inverse dynamics: joints and trajectories hold, p is free (Shabana 2022, sec. 5)."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from typing import Literal
 
-from .. import _core
-from ..model.model import Model
-from ..model.raised_mass import integrated
-from ..model.system import MechanismSystem
+from ..model.spatial_gears import with_held_motors
 from ..scene.analysis import Check, IntegratedAnalysis, Need
-from ..solve.initial_state import undeformed_state
-from ..solve.path_checks import check_smooth
-from ..solve.reach import check_reach
-from .context import AnyContext, Context
-from .drive import Progress, drive, initial_state, motors_fit
-from .elastic_joints import add_transmission
-from .outcome import AnyOutcome, EarlierRun
-from .planar_outcome import PlanarOutcome
-from .spatial_pcid import run_spatial_pcid
+from ..solve.spatial_posture import check_path
+from ..solve.spatial_redundancy import resolved
+from ..solve.spatial_start import undeformed_posture
+from ..solve.spatial_statics import initial_state
+from .context import Context
+from .outcome import Outcome
+from .spatial_drive import spatial_drive
 
 
 class Pcid(IntegratedAnalysis):
@@ -39,44 +34,21 @@ class Pcid(IntegratedAnalysis):
         """Something to follow."""
         yield Need("kind", self.kind, "trajectory")
 
-    def run(self, context: AnyContext) -> AnyOutcome:
+    def run(self, context: Context) -> Outcome:
         """Motion and forces."""
-        if isinstance(context, Context):
-            return run_spatial_pcid(context, self)
-        found = run_pcid(context.model, self, context.is_replayed, context.progress, context.earlier)
-        return add_transmission(found)
+        return run_spatial_pcid(context, self)
 
 
-def run_pcid(
-    model: Model,
-    analysis: IntegratedAnalysis,
-    keep_recording: bool,
-    progress: Progress,
-    earlier: EarlierRun | None = None,
-) -> PlanarOutcome:
-    """C_m and C_s hold, p is free. It goes on with an `earlier` run of the same analysis.
+def run_spatial_pcid(context: Context, analysis: IntegratedAnalysis) -> Outcome:
+    """C_m and C_s hold, p is free; and gears that give, where motors follow the trajectories.
 
-    Raises `InputError` where the trajectories cannot be followed.
+    Raises `InputError` where the trajectories cannot be followed, `SolveError` where there is no equilibrium to start
+    from.
     """
-    raised = integrated(model)
-    assembly = _system(raised)
-    start = initial_state(assembly)
-    if not analysis.is_repeated:
-        paths = [(held.measure.label, held.target) for held in assembly.constraints if held.is_trajectory]
-        check_smooth(model.scene.path, paths, analysis.end)
-        check_reach(assembly, undeformed_state(assembly), analysis.times)
-    recording = _core.Recording() if keep_recording else None
-    return drive(
-        assembly,
-        analysis,
-        start,
-        progress,
-        reported=None if raised is model else _system(model),
-        finds_forces=motors_fit(model),
-        recording=recording,
-        earlier=earlier,
-    )
-
-
-def _system(model: Model) -> MechanismSystem:
-    return MechanismSystem(model, [*model.joints, *model.trajectories], model.loads, list(model.motors.values()))
+    firm = resolved(context.model, analysis.last_time)
+    warnings = tuple(check_path(firm, undeformed_posture(firm).q, analysis.last_time))
+    model = with_held_motors(firm)
+    return spatial_drive(
+        model, analysis, initial_state(model), context.progress, warnings=warnings, earlier=context.earlier,
+        is_recorded=context.is_replayed,
+    )  # fmt: skip

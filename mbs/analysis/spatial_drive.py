@@ -1,4 +1,4 @@
-"""Running the integrators of the core from an initial state in space to a run: all kinds that integrate do it here."""
+"""Running the integrators of the core from an initial state to an outcome: all kinds that integrate do it here."""
 
 from __future__ import annotations
 
@@ -17,17 +17,27 @@ from ..model.spatial_drives import NO_DRIVES, Command, Drives, PointDrive, Repla
 from ..model.spatial_model import SpatialModel
 from ..model.spatial_system import SpatialSystem
 from ..scene.analysis import IntegratedAnalysis
+from ..solve.diagnosis import find_cause_in_space
 from ..solve.integrators import beyond_rounding, integration_controls, with_steps_of
-from ..solve.spatial_diagnosis import find_cause_in_space
 from ..solve.spatial_integrators import choose_integrator_in_space
 from ..solve.spatial_limits import left_ranges, watch_limits
 from ..solve.spatial_posture import NEARLY_SINGULAR, SINGULAR, robot_size, told_posture
 from ..solve.spatial_reach import out_of_reach
 from ..solve.state import State
-from .drive import STATUS, Progress
 from .earlier_check import check_earlier, going_on
 from .outcome import Continuation, EarlierRun, Forces, Motion, Outcome, Statistics
 from .samples import in_order, new_samples, reached_samples, stops, worth_a_look
+
+Progress = Callable[[float], bool]
+"""Called now and then with the time reached; False stops the run."""
+
+STATUS = {
+    _core.IntegrationStatus.completed: "completed",
+    _core.IntegrationStatus.step_underflow: "step underflow",
+    _core.IntegrationStatus.too_many_steps: "too many steps",
+    _core.IntegrationStatus.interrupted: "interrupted",
+    _core.IntegrationStatus.diverged: "diverged",
+}
 
 
 @dataclass(frozen=True)

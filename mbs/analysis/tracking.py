@@ -29,9 +29,9 @@ from ..solve.spatial_servo import SpatialServo, make_spatial_servo
 from ..solve.stable_inversion import shape_of
 from ..solve.tracking import Limits, Objective, Tracked, Transition, Weights, refined, start_breaks, track
 from ..solve.zero_dynamics import linearise
-from .context import AnyContext, Context
+from .context import Context
 from .inverted_path import AroundPath, check_rest, decay_times, where, whole_steps
-from .outcome import AnyOutcome, Forces, Motion, Outcome, Prescription, Statistics
+from .outcome import Forces, Motion, Outcome, Prescription, Statistics
 from .samples import path_times
 
 RATE = 0.005  # s, T_r where the scene does not say
@@ -89,9 +89,8 @@ class Tracking(TimedAnalysis):
         yield Need("kind", self.kind, "trajectory")
         yield Need("kind", self.kind, "pzt")
 
-    def run(self, context: AnyContext) -> AnyOutcome:
+    def run(self, context: Context) -> Outcome:
         """Motion, torques and voltages."""
-        assert isinstance(context, Context)
         return run_tracking(context, self)
 
 
@@ -229,7 +228,7 @@ def _more_time(asked: Transition, analysis: Tracking, around: tuple[float, float
         if not (least.converged and servo.goes_on()):
             break
         if NEAR**2 <= least.share <= 1.0:
-            return more
+            return float(more)
         tried.append((more, np.log(least.share)))
         (t_0, log_0), (t_1, log_1) = tried[-2:]
         rate = max((log_0 - log_1) / (t_1 - t_0), 0.1 * rate)

@@ -16,19 +16,9 @@ import numpy as np
 
 from ...common.arrays import Array, as_floats
 from ...fe_models.modal_body import ModalBody
-from .planar_body import PlanarBody
 from .spatial_body import SpatialBody
 
 INTERVALS = 32  # of a piece, over which strains are taken as constant
-
-
-@dataclass(frozen=True)
-class Piece:
-    """A piece, a body of its own: where it begins, m from the root of the link, and its modal body."""
-
-    start: float
-    modal: ModalBody
-    planar: PlanarBody
 
 
 @dataclass(frozen=True)
@@ -46,32 +36,6 @@ class DividedLink:
     bodies: tuple[str, ...]
     spread: Array
     gathered: Array
-
-
-def divided_link(link: ModalBody, planar: PlanarBody, pieces: Sequence[Piece]) -> DividedLink:
-    """Of a link and its pieces, each with its equations."""
-    spread = np.vstack([_shape_in_piece(link, planar, piece) for piece in pieces])
-    root = np.sqrt(np.concatenate([piece.planar.stiffness for piece in pieces]))
-    names = tuple(piece.planar.name for piece in pieces)
-    return DividedLink(names, spread, np.linalg.pinv(root[:, None] * spread) * root)
-
-
-def _shape_in_piece(link: ModalBody, planar: PlanarBody, piece: Piece) -> Array:
-    """P (m, n) of a piece, m its modes, for the modes of the link: least strain energy of the difference."""
-    x = as_floats(np.linspace(0.0, piece.modal.length, INTERVALS + 1))
-    of_link = _strains(link, planar, np.minimum(piece.start + x, link.length))
-    of_piece = _strains(piece.modal, piece.planar, x)
-    rigidity = piece.modal.stations.rigidity
-    EA, EI = (1.0, 1.0) if rigidity is None else rigidity.mean(axis=0)
-    weight = np.sqrt(np.repeat([EI, EA], INTERVALS))[:, None]
-    return np.asarray(np.linalg.lstsq(weight * of_piece, weight * of_link, rcond=None)[0])
-
-
-def _strains(modal: ModalBody, planar: PlanarBody, x: Array) -> Array:
-    """(2 · intervals, n) changes of section rotation, then of the displacement along the axis, between places x (m)."""
-    places = [modal.interpolate(at) for at in x]
-    rows = np.array([[at.rotation[2] for at in places], [at.translation[0] for at in places]])
-    return np.asarray(np.diff(rows, axis=1).reshape(2 * INTERVALS, -1) @ planar.modal_transform)
 
 
 class SpatialPiece(NamedTuple):

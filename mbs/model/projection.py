@@ -52,10 +52,7 @@ def projected(body: SpatialBody) -> SpatialBody:
 
 
 def vanishing_in_plane(body: SpatialBody) -> tuple[str, ...]:
-    """Which terms of the equations in the plane are nothing but round-off for the modes of a body; none of a rigid one.
-
-    They are called as `planar_body.vanishing_terms` does.
-    """
+    """Which terms of the equations in the plane are round-off for the modes of a body; none of a rigid one."""
     if not body.n_modes:
         return ()
     size = np.sqrt(body.mass) * max((float(np.linalg.norm(at.position)) for at in body.points.values()), default=0.0)

@@ -14,43 +14,23 @@ import numpy as np
 
 from ...common.arrays import Array
 from . import spatial_body
-from .planar_body import PlanarBody, Reduction, transformed
 from .spatial_body import SpatialBody
 from .spatial_masses import coupled_blocks
 
 if TYPE_CHECKING:
-    from ..scene.mechanism import MechanismKeys
     from ..scene.spatial.mechanism import SpatialMechanismKeys
 
 IMMOBILE = 1e-9  # of the ordinary size of modes, 1/√m: less is rounding
 DEPENDENT = 1e-8  # static shapes below this fraction of the first one, in energy, say nothing new
 
 
-def with_fewer_modes(body: PlanarBody, lowest: int, loaded: Sequence[str]) -> PlanarBody:
+def with_fewer_modes_in_space(body: SpatialBody, lowest: int, loaded: Sequence[str]) -> SpatialBody:
     """The body with its `lowest` modes and, for each load at a point of `loaded`, the static response of the others.
 
     A unit load (modal forces Bᵀ) bends the discarded modes d by Ω_d⁻² B_dᵀ. These shapes, made orthonormal in mass and
     uncoupled, are further modes: the flexibility B K⁻¹ Bᵀ stays exact. The body comes back where nothing is saved.
-    Attachment modes of the file are no modes to be kept: what the loads need of them is in the static shapes.
-    """
-    lowest = min(lowest, body.n_eigenmodes)
-    if lowest >= body.n_modes:
-        return body
-    B_T = interface_loads(body, loaded)
-    static, squares = _static_modes(body.stiffness[lowest:], B_T[lowest:])
-    if lowest + len(squares) >= body.n_modes:
-        return body
-    T = np.eye(body.n_modes, lowest + len(squares))
-    T[lowest:, lowest:] = static
-    reduced = transformed(body, T, np.concatenate([body.stiffness[:lowest], squares]))
-    static_shapes = len(squares) if body.attachment_modes else 0
-    return replace(reduced, reduction=Reduction(body, lowest, T, _lift(T, B_T)), attachment_modes=static_shapes)
-
-
-def with_fewer_modes_in_space(body: SpatialBody, lowest: int, loaded: Sequence[str]) -> SpatialBody:
-    """The same in space, where the modes of a file are ordered by frequency within their families alone.
-
-    Static shapes are found apart for modes that no load couples: they keep to the plane of bending, or to torsion.
+    Attachment modes of the file are no modes to be kept: what the loads need of them is in the static shapes. These are
+    found apart for modes that no load couples: they keep to the plane of bending, or to torsion.
     """
     lowest = min(lowest, body.n_eigenmodes)
     if lowest >= body.n_modes:
@@ -83,7 +63,7 @@ def _lift(T: Array, B_T: Array) -> Array:
     return lift
 
 
-def modes_kept(body: PlanarBody | SpatialBody) -> str:
+def modes_kept(body: SpatialBody) -> str:
     """How many of its modes (in the plane: of those that move there) a body has, in words."""
     if body.reduction is None:
         attachment = f" and {body.attachment_modes} attachment modes" if body.attachment_modes else ""
@@ -93,13 +73,13 @@ def modes_kept(body: PlanarBody | SpatialBody) -> str:
     return f"{lowest} of {body.reduction.whole.n_eigenmodes} modes{shapes}"
 
 
-def loaded_points(scene: MechanismKeys | SpatialMechanismKeys, body: str) -> list[str]:
+def loaded_points(scene: SpatialMechanismKeys, body: str) -> list[str]:
     """Points of a body at which joints, trajectories and loads of the scene act."""
     found = [reference.body_and_point for reference in scene.references() if reference.loaded]
     return list(dict.fromkeys(part[1] for part in found if part is not None and part[0] == body))
 
 
-def interface_loads(body: PlanarBody | SpatialBody, loaded: Sequence[str]) -> Array:
+def interface_loads(body: SpatialBody, loaded: Sequence[str]) -> Array:
     """Bᵀ (n, loads): modal forces of forces and moments along all axes at each point, scaled to size 1.
 
     Left out are loads under which nothing moves: forces on a support, along a link without axial modes.

@@ -8,9 +8,6 @@ from typing import NamedTuple
 import numpy as np
 
 from ...common.arrays import Array
-from ..analysis.planar_outcome import PlanarOutcome
-from ..model.masses import system_mass_matrix
-from ..model.planar_body import PlanarBody
 from ..model.spatial_body import SpatialBody
 from ..model.spatial_known_motion import mass_matrices
 from .spatial_motion import SpatialMotion
@@ -22,7 +19,7 @@ DEPENDENT, RIGID = 1e-10, 1e-9  # of the largest singular value of C_q, and of t
 class ModesInMotion(NamedTuple):
     """Of one flexible body: p and p̈ (T, n)."""
 
-    body: PlanarBody | SpatialBody
+    body: SpatialBody
     p: Array
     p_ddot: Array
 
@@ -80,32 +77,15 @@ def start_jolt(start: Start) -> float:
     return float(np.sqrt((accelerations[elastic] ** 2 / squares[elastic]).sum() / start.largest))
 
 
-def modes_in_motion(outcome: PlanarOutcome) -> Iterator[ModesInMotion]:
-    """Of the flexible links of a planar run."""
-    for body in outcome.assembly.model.links:
-        if body.n_modes:
-            columns = outcome.coordinates(body.name)
-            yield ModesInMotion(body, outcome.q[:, columns][:, 3:], outcome.a[:, columns][:, 3:])
-
-
 def modes_in_3d_motion(motion: SpatialMotion) -> Iterator[ModesInMotion]:
-    """Of the flexible bodies of a 3D run."""
+    """Of the flexible bodies of a run."""
     for node in motion.model.tree.nodes:
         if node.body.n_modes:
             yield ModesInMotion(node.body, motion.q[:, node.p_q], motion.a[:, node.p_v])
 
 
-def start_of(outcome: PlanarOutcome) -> Start:
-    """Of a planar run."""
-    assembly, bodies = outcome.assembly, outcome.assembly.model.bodies
-    stiffness = np.concatenate([np.append(np.zeros(3), body.stiffness) for body in bodies])
-    C_q = assembly.system.constraint_jacobians(outcome.q[:1])[0]
-    largest = float((outcome.q**2 @ stiffness).max(initial=0.0))
-    return Start(system_mass_matrix(assembly, outcome.q[0]), C_q, outcome.a[0], stiffness, largest)
-
-
 def start_of_3d_motion(motion: SpatialMotion) -> Start:
-    """Of a 3D run."""
+    """Of a run."""
     tree, stiffness = motion.model.tree, np.zeros(motion.model.tree.n_v)
     energy: Array = np.zeros(len(motion.time))
     for node in tree.nodes:

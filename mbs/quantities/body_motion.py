@@ -17,8 +17,8 @@ class BodyMotion:
         orientation: in the plane (T,) θ, rad; in 3D (T, 4) quaternions of continuous sign.
         velocity: (T, d) m/s.
         angular_velocity: in the plane (T,), in 3D (T, 3), rad/s.
-        modal, modal_velocity: (T, n), in the modes of the modal body file; of planar bodies with fewer modes as
-            `observation.stored_coordinates` says.
+        modal, modal_velocity: (T, n), in the modes of the modal body file; of planar bodies with fewer modes in the
+            coordinates of the equations.
     """
 
     position: Array

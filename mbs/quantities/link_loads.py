@@ -1,27 +1,27 @@
-"""All loads on a link over a motion, as multiples of unit loads: forces at interfaces, and those of its inertia.
+"""All loads on a link over a motion as multiples of unit loads: forces at interfaces, and of its inertia.
 
-What joints transmit follows from the motion: with f = M a − Q of all bodies (Newton and Euler), less what is known
-(given loads, friction, gears, rotors), the forces in joints and of motors solve C_qᵀ λ = −f in the rows of the frames.
-So forces that an inverse analysis has along its trajectories count as the moments of motors that stand for them.
+What a joint hands to the body that it carries is what that body and all that hangs on it need for their motion, less
+what else acts there (Newton and Euler, in the core). Where motors carry the motion they do so in place of the forces
+along its trajectories: loops then transmit their share of M v̇ − Q (`split_forces`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from ...common.arrays import Array
-from ...common.plane import perpendicular, rotated
-from ..analysis.planar_outcome import PlanarOutcome
+from ...fe_models.modal_body.unit_loads import PAIRS, interface_load_names
 from ..fields.field_types import split_point
-from ..joints.measure import FRAME
-from ..model.model import ZERO, Constraint, Model
-from ..model.planar_body import PlanarBody
-from ..model.system import MechanismSystem
-
-FORCES_AT_POINTS = "points"  # value of `apply` whose forces act elsewhere than in joints
+from ..model.spatial_known_motion import MotionForces, motion_forces, required_forces
+from ..model.spatial_motors import split_forces
+from ..model.spatial_payloads import turns_as_a_body
+from ..model.spatial_tree import Section
+from ..model.spatial_wrench import Wrench
+from ..scene.spatial.bodies import SpatialPayload, tensor
+from .spatial_motion import SpatialMotion
 
 
 @dataclass(frozen=True)
@@ -37,96 +37,79 @@ class LinkLoads:
     modal_force: Array
 
 
-def link_loads(outcome: PlanarOutcome, bodies: Iterable[str]) -> dict[str, LinkLoads]:
-    """Of each of `bodies`. Nothing where it is not known what acts: forces at actuation points, links in pieces."""
-    if outcome.in_pieces is not None or getattr(outcome.analysis, "apply", None) == FORCES_AT_POINTS:
+def link_loads_in_space(motion: SpatialMotion, bodies: Iterable[str]) -> dict[str, LinkLoads]:
+    """Of each of `bodies`. Nothing where motors turn frames: what they do to a link acts at no interface."""
+    if motion.model.scene.motors == "frame":
         return {}
-    model = outcome.assembly.model
-    wrenches, left = _wrenches(outcome)
-    found = {}
+    return _link_loads(motion, bodies, _with_motors(motion))
+
+
+def loads_in_equations(motion: SpatialMotion, bodies: Iterable[str]) -> dict[str, LinkLoads]:
+    """Of each of `bodies`, as its equations of motion have them: forces along trajectories where these act."""
+    return _link_loads(motion, bodies, motion.behind_gears.forces)
+
+
+def _link_loads(motion: SpatialMotion, bodies: Iterable[str], forces: MotionForces) -> dict[str, LinkLoads]:
+    tree, gravity, found = motion.model.tree, np.array(motion.model.scene.gravity), {}
     for name in bodies:
-        motion = _Motion(outcome, model.body(name))
-        at_points = {point: motion.in_body_axes(w) for point, w in wrenches[name].items() if point != FRAME}
-        for payload in model.scene.payload:
+        number = tree.index[name]
+        node, F = tree.nodes[number], motion.frames[number].F
+        at_points = _at_points(F, forces.at_points[number])
+        left = forces.found.modal[:, node.p_v].copy()
+        for point, wrench in at_points.items():
+            at = node.body.points[point]
+            left -= wrench @ np.vstack([at.translation, at.rotation])
+        for payload in motion.model.scene.payload:
             body, point = split_point(payload.point)
-            if body == name:
-                inertia = motion.of_mass(point, payload.mass, payload.inertia)
-                at_points[point] = at_points.get(point, 0.0) + inertia
-        named = {load: column for point, wrench in at_points.items() for load, column in _named(point, wrench)}
-        found[name] = LinkLoads(motion.of_frame() | named, left[:, outcome.coordinates(name)][:, 3:])
+            if body == name and not turns_as_a_body(motion.model.scene, payload):  # others are bodies of their own
+                at_points[point] = at_points.get(point, 0.0) + _of_mass(motion, payload)
+        a, alpha, omega = forces.of_body(number)
+        sizes = _of_frame(*np.hsplit(_in_axes_of(F, (a - gravity, alpha, omega)), 3))
+        for point, wrench in at_points.items():
+            sizes |= dict(zip(interface_load_names([point]), wrench.T, strict=True))
+        found[name] = LinkLoads(sizes, left)
     return found
 
 
-class _Motion:
-    """Of one body, in its own axes; gravity counts as an acceleration of the frame the other way."""
-
-    def __init__(self, outcome: PlanarOutcome, body: PlanarBody) -> None:
-        columns = outcome.coordinates(body.name)
-        q, v, a = outcome.q[:, columns], outcome.v[:, columns], outcome.a[:, columns]
-        self.body = body
-        self.angle = q[:, 2]
-        self.p, self.p_dot, self.p_ddot = q[:, 3:], v[:, 3:], a[:, 3:]
-        self.omega, self.alpha = v[:, 2], a[:, 2]
-        self.acceleration = rotated(-self.angle, a[:, :2] - np.array(outcome.assembly.model.scene.gravity))
-
-    def in_body_axes(self, wrench: Array) -> Array:
-        """Force and moment (T, 3) from global axes."""
-        return np.column_stack([rotated(-self.angle, wrench[:, :2]), wrench[:, 2]])
-
-    def of_frame(self) -> dict[str, Array]:
-        """Sizes of the d'Alembert forces of the frame's motion."""
-        a_x, a_y = self.acceleration.T
-        return {"t_x": a_x, "t_y": a_y, "r_z": self.alpha, "omega_zz": self.omega**2}
-
-    def of_mass(self, point: str, mass: float, inertia: float) -> Array:
-        """Force and moment (T, 3) of the inertia of a payload: −m a of its point, −I times its angular acceleration."""
-        at = self.body.points[point]
-        x = at.position + self.p @ at.translation.T
-        alpha, omega = self.alpha[:, None], self.omega[:, None]
-        a = self.acceleration + alpha * perpendicular(x) - omega**2 * x
-        a += 2.0 * omega * perpendicular(self.p_dot @ at.translation.T) + self.p_ddot @ at.translation.T
-        return np.column_stack([-mass * a, -inertia * (self.alpha + self.p_ddot @ at.rotation)])
+def _at_points(F: Array, acting: Iterable[tuple[Section, Wrench]]) -> dict[str, Array]:
+    """(T, 6) by point, in axes of the body F (T, 3, 3); without what turns its frame and not the section."""
+    found = dict[str, Array]()
+    for section, wrench in acting:
+        if section.point:
+            force, moment = np.hsplit(_in_axes_of(F, wrench), 2)
+            own = np.hstack([force, section.turned(moment[..., None])[..., 0]])
+            found[section.point] = found.get(section.point, 0.0) + own
+    return found
 
 
-def _named(point: str, wrench: Array) -> Iterable[tuple[str, Array]]:
-    names = (f"force/{point}/x", f"force/{point}/y", f"moment/{point}/z")
-    return zip(names, wrench.T, strict=True)
+def _in_axes_of(F: Array, vectors: Iterable[Array]) -> Array:
+    """Vectors (T, 3) side by side, from global axes to those of a triad F (T, 3, 3)."""
+    return np.hstack([np.einsum("tji,tj->ti", F, x) for x in vectors])
 
 
-def _wrenches(outcome: PlanarOutcome) -> tuple[Mapping[str, Mapping[str, Array]], Array]:
-    """On points of bodies (T, 3), global axes; and the generalized forces (T, coordinates) that these leave."""
-    model = replace(outcome.assembly.model, modal_loads=())  # of patches: they are told with what is left
-    loads = model.loads if outcome.details.loads is None else outcome.details.loads
-    acting = MechanismSystem(model, [*model.joints, *_actuated(outcome)], loads)
-    time, (q, v, a) = outcome.time, (np.ascontiguousarray(x) for x in (outcome.q, outcome.v, outcome.a))
-    frames = acting.frame_coordinates
-    f, C_q = acting.system.required_forces(time, q, v, a), acting.system.constraint_jacobians(q)
-    lambda_ = _solved(C_q[:, :, frames], -f[:, frames])
-    left: Array = f + np.einsum("tri,tr->ti", C_q, lambda_)
-    return acting.marker_wrenches(time, q, v, a, lambda_), left
+def _of_frame(a: Array, alpha: Array, omega: Array) -> dict[str, Array]:
+    """Sizes of the d'Alembert forces of the frame's motion, (T, 3) each in its axes; gravity is taken off a."""
+    found = {f"t_{axis}": column for axis, column in zip("xyz", a.T, strict=True)}
+    found |= {f"r_{axis}": column for axis, column in zip("xyz", alpha.T, strict=True)}
+    return found | {f"omega_{name}": omega[:, i] * omega[:, j] for name, (i, j) in PAIRS.items()}
 
 
-def _actuated(outcome: PlanarOutcome) -> list[Constraint]:
-    """Rows along which motors act, or forces on the trajectories where these stand for themselves."""
-    model = outcome.assembly.model
-    if getattr(outcome.analysis, "apply", None) == "trajectory":
-        return list(model.trajectories)
-    held = [row for row in outcome.assembly.constraints if row.is_trajectory]
-    if held and len(model.motors) != model.degrees_of_freedom:
-        return held
-    return [_along(name, model) for name in model.motors]
+def _of_mass(motion: SpatialMotion, payload: SpatialPayload) -> Array:
+    """Force and moment (T, 6) of a mass's inertia and weight on its point, axes of the body. It turns about z alone."""
+    of_point = motion.forces.of_point(payload.point)
+    force = -payload.mass * (of_point.a - np.array(motion.model.scene.gravity))
+    F = motion.frames[motion.model.tree.index[split_point(payload.point)[0]]].F
+    return _in_axes_of(F, (force, -of_point.alpha @ tensor(payload.inertia)))
 
 
-def _along(motor: str, model: Model) -> Constraint:
-    return Constraint(model.motors[motor], ZERO, motor, "motor", is_trajectory=False)
-
-
-def _solved(C_q: Array, right: Array) -> Array:
-    """λ (T, rows) of C_qᵀ λ = right for C_q (T, rows, frames): there is one, of as many rows or fewer."""
-    transposed = C_q.transpose(0, 2, 1)
-    if C_q.shape[1] == C_q.shape[2]:
-        try:
-            return np.asarray(np.linalg.solve(transposed, right[..., None])[..., 0])
-        except np.linalg.LinAlgError:  # a singular posture: the smallest forces
-            pass
-    return np.asarray((np.linalg.pinv(transposed) @ right[..., None])[..., 0])
+def _with_motors(motion: SpatialMotion) -> MotionForces:
+    """Where motors carry the motion, without forces on its paths: these stay where the motors do not fit."""
+    model = motion.model
+    loops, motors = int(model.loop_rows.sum()), sum(len(columns) for columns in model.motors.values())
+    if not motion.is_prescribed or loops + motors != int(model.tree.joint_columns.sum()):
+        return motion.behind_gears.forces
+    total = required_forces(model, motion, motion.time)
+    multipliers = np.zeros_like(motion.multipliers)
+    multipliers[:, model.loop_rows] = split_forces(model, motion.q, total).loops
+    behind = motion.behind_gears
+    return motion_forces(behind.system, behind, motion.time, multipliers)

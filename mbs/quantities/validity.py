@@ -9,7 +9,7 @@ than a link on simple supports.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from math import ceil, sqrt
 from typing import NamedTuple
@@ -18,8 +18,8 @@ import numpy as np
 
 from ...common.arrays import Array
 from ...fe_models.modal_body import ModalBody
-from ..analysis.planar_outcome import PlanarOutcome
-from .observation import modes_of_file
+from ..model.spatial_body import SpatialBody
+from .link_loads import loads_in_equations
 from .second_order import (
     Missing,
     Rotations,
@@ -28,11 +28,10 @@ from .second_order import (
     missing_to_first_order,
     missing_to_second_order,
 )
-from .stiffening import NOTABLE
-from .stiffness_change import ModalLoads, StiffnessChange, stiffness_change
+from .spatial_motion import SpatialMotion
+from .stiffness_change import LoadedPoint, ModalLoads, stiffness_change
 
-IN_PLANE, IN_SPACE = (1,), (1, 2)  # axes across a link along which it bends
-
+NOTABLE = 0.01  # relative change of a link's stiffness from which on "auto" switches geometric stiffening on
 DEFLECTION_LIMIT = {False: 0.02, True: 0.05}  # of the length, from the chord; without and with geometric stiffening
 SHORTENING_LIMIT = {False: 1e-3, True: 1e-2}  # of the length: a half wave at 2 %; where the second order ends
 USELESS = 0.1  # of the length, in the position of points
@@ -137,45 +136,67 @@ def enough_pieces(shortening: float, count: int) -> int:
     return max(2, ceil(count * sqrt(shortening / ENOUGH)))
 
 
-def bending(
-    outcome: PlanarOutcome,
-    links: Mapping[str, ModalBody],
-    loads: Mapping[str, ModalLoads],
-    is_stiffened: bool,
-) -> dict[str, Bending]:
-    """Of the flexible `links` of a run, by name. They are modal bodies as their files have them."""
-    wrenches = outcome.assembly.constraint_wrenches(outcome.q, outcome.lambda_)
+def bending_in_space(motion: SpatialMotion, links: Mapping[str, ModalBody]) -> dict[str, Bending]:
+    """Of the flexible bodies of the equations by name; `links` are their modal bodies as their files have them."""
+    loads = loads_in_equations(motion, links) if len(motion.time) else {}
     found = {}
     for name, link in links.items():
-        body, is_at_rest = outcome.assembly.model.body(name), not outcome.analysis.is_integrated
-        run = LinkInRun(modes_of_file(outcome, body), body.modal_transform, loads.get(name), is_stiffened, is_at_rest)
-        forces = [np.linalg.norm(w[:, :2], axis=1) for w in wrenches.get(name, {}).values()]
-        force = np.max(forces, axis=0) if forces else np.zeros(len(run.p))
-        found[name] = bending_of_link(link, run, force, IN_PLANE)
+        body, sizes = motion.node(name).body, loads[name].sizes if name in loads else {}
+        p = motion.q[:, motion.node(name).p_q] @ body.modal_transform.T
+        run = LinkInRun(
+            p, body.modal_transform, _on_modes(link, body, sizes), body.stiffening is not None, motion.is_at_rest
+        )
+        found[name] = bending_of_link(link, run, _largest_force(body, sizes, len(p)))
     return found
 
 
+def _on_modes(link: ModalBody, body: SpatialBody, sizes: Mapping[str, Array]) -> ModalLoads:
+    """Loads of `sizes` (T,) on a body, whether their geometric stiffness is in the equations or not.
+
+    Loads by the names of `fe_models.modal_body.unit_loads`; those alone of which the file has a geometric stiffness.
+    """
+    T, n = body.modal_transform, len(body.stiffness)
+    K = {load: T.T @ of_load @ T for load, of_load in link.geometric_stiffness.items()}
+    known = [load for load in sizes if load in K]
+    f = np.stack([sizes[load] for load in known], axis=1) if known else np.zeros((0, 0))
+    along = {point: [f"force/{point}/{axis}" for axis in "xyz"] for point in link.interfaces}
+    points = tuple(
+        LoadedPoint(link.interfaces[point].translation @ T, np.stack([K[load] for load in of]))
+        for point, of in along.items()
+        if all(load in K for load in of)
+    )
+    return ModalLoads(f, np.array([K[load] for load in known]).reshape(-1, n, n), body.stiffness, points)
+
+
+def _largest_force(body: SpatialBody, sizes: Mapping[str, Array], count: int) -> Array:
+    """(T,) N, of the forces at the interfaces of a body."""
+    largest = np.zeros(count)
+    for point in body.points:
+        parts = [sizes[load] for axis in "xyz" if (load := f"force/{point}/{axis}") in sizes]
+        if parts:
+            largest = np.maximum(largest, np.linalg.norm(parts, axis=0))
+    return largest
+
+
 class LinkInRun(NamedTuple):
-    """A link in a run: p (T, n_file) of its file, which is T times that of the equations, and its loads if known."""
+    """A link in a run: p (T, n_file) of its file, which is T times that of the equations, and its loads."""
 
     p: Array
     T: Array
-    loads: ModalLoads | None
+    loads: ModalLoads
     is_stiffened: bool
     is_at_rest: bool
 
 
-def bending_of_link(link: ModalBody, run: LinkInRun, force: Array, axes: Sequence[int]) -> Bending:
-    """Of one link, across along `axes`; see `Bending`. `force` (T,) N: the largest at an interface."""
-    deflection, rotation, shortening = shape_from_chord(link, run.p, axes)
+def bending_of_link(link: ModalBody, run: LinkInRun, force: Array) -> Bending:
+    """Of one link; see `Bending`. `force` (T,) N: the largest at an interface."""
+    deflection, rotation, shortening = shape_from_chord(link, run.p)
     peaks = (deflection / link.length, rotation, shortening, force * shortening)
     w, phi, s, moment = (float(x.max(initial=0.0)) for x in peaks)
-    change = StiffnessChange() if run.loads is None else stiffness_change(run.loads)
+    change = stiffness_change(run.loads)
     rotations = largest_rotations(link, run.p)
     if run.is_stiffened:
         missing = missing_to_second_order(largest_displacement(link, run.p), s / link.length, rotations, change.largest)
-    elif run.loads is None:
-        missing = Missing(s / link.length, min(1.0, s / link.length))
     else:
         p, stations = run.p @ np.linalg.pinv(run.T).T, link.stations.translation @ run.T
         missing = missing_to_first_order(run.loads, p, stations, link.length, is_at_rest=run.is_at_rest)
@@ -184,14 +205,14 @@ def bending_of_link(link: ModalBody, run: LinkInRun, force: Array, axes: Sequenc
     )
 
 
-def shape_from_chord(link: ModalBody, p: Array, axes: Sequence[int]) -> tuple[Array, Array, Array]:
+def shape_from_chord(link: ModalBody, p: Array) -> tuple[Array, Array, Array]:
     """Largest deflection (m) and section rotation (rad) from the chord, and foreshortening (m), each (T,).
 
-    Across along `axes`, 1 for y and 2 for z: v' = φ_z, w' = −φ_y.
+    Across along y and z: v' = φ_z, w' = −φ_y.
     """
     stations, x = link.stations, link.stations.position[:, 0]
     off, turned, squares = (np.zeros((len(p), len(x))) for _ in range(3))
-    for axis in axes:
+    for axis in (1, 2):
         w, slope = p @ stations.translation[:, axis].T, p @ stations.rotation[:, 3 - axis].T
         slope = slope if axis == 1 else -slope
         chord = (w[:, -1:] - w[:, :1]) / (x[-1] - x[0])

@@ -7,33 +7,44 @@ from collections.abc import Callable, Iterable, Iterator
 import numpy as np
 
 from ...common.arrays import Array
+from .. import _core
 from .._core import TimeFunction
-from ..model.planar_tree import PlanarTree
-from ..model.system import MechanismSystem
+from ..model.spatial_system import SpatialSystem
+from ..scene.analysis import IntegratedAnalysis
+from .integrators import EXPLICIT, Choice, beyond_order, unmet
 from .path_checks import JUMP
-from .position import frame_gradients
+from .spatial_integrators import TOO_STIFF, fastest_friction
 from .state import State
 
-NEARLY_SINGULAR = 1e-3  # ratio of singular values of C_q; a motion that only comes near it has no trouble there
 FAR_BENT = 0.5  # of a link's radius of gyration, in the mean
 
 
-def find_cause(assembly: MechanismSystem, t: float, state: State) -> str:
-    """A sentence with numbers and advice; empty where nothing is found.
+def find_cause_in_space(system: SpatialSystem, analysis: IntegratedAnalysis, choice: Choice, run: _core.TreeRun) -> str:
+    """A sentence with advice, the likely causes of a failure, the more certain first; empty where nothing is found.
 
-    The likely causes, the more certain first: a state or target that is not a number, a link bent too far, a load that
-    jumps, constraints that turn singular.
+    A target that is not a number, a link bent too far, a load that jumps, friction; where steps became too short,
+    the integrator.
     """
-    return (
-        not_a_number(
-            ((constraint.measure.label, constraint.target) for constraint in assembly.constraints),
-            lambda: PlanarTree(assembly).evaluate(t, state.q, state.v)[0],
-            t,
-        )
-        or too_far_bent(_links(assembly, state.q))
-        or load_jump(_loads(assembly), t)
-        or _singular(assembly, t, state.q)
+    t, at = run.time_reached, State(*np.split(np.array(run.last), [system.model.tree.n_q]))
+    found = (
+        not_a_number(_targets(system), lambda: _accelerations(system, t, run.last), t)
+        or too_far_bent(_links(system, at))
+        or load_jump(_loads(system), t)
+        or _friction(system, analysis, choice, at)
     )
+    if found or run.status != _core.IntegrationStatus.step_underflow:
+        return found
+    return beyond_order(choice, analysis) or unmet(choice, run)
+
+
+def _targets(system: SpatialSystem) -> Iterator[tuple[str, TimeFunction]]:
+    for row in system.model.rows:
+        functions = row.law.functions if row.law is not None else () if row.target is None else (row.target,)
+        yield from ((f'trajectory "{row.owner}"', function) for function in functions)
+
+
+def _accelerations(system: SpatialSystem, t: float, state: Array) -> Array:
+    return _core.tree_outputs(system.core, system.scene, [t], np.array(state)[None]).accelerations
 
 
 def not_a_number(targets: Iterable[tuple[str, TimeFunction]], accelerations: Callable[[], Array], t: float) -> str:
@@ -46,22 +57,10 @@ def not_a_number(targets: Iterable[tuple[str, TimeFunction]], accelerations: Cal
     return ""
 
 
-def _loads(assembly: MechanismSystem) -> Iterator[tuple[str, TimeFunction]]:
-    yield from ((row.label, size) for row, size in assembly.model.loads)
-    yield from ((f'load of the patches of "{load.body}"', load.magnitude) for load in assembly.model.modal_loads)
-
-
-def load_jump(loads: Iterable[tuple[str, TimeFunction]], t: float) -> str:
-    """Which of the loads, each with its label, jumps at t: its size just after t does not follow from that before."""
-    dt = 1e-9 * max(t, 1e-9)
-    for label, size in loads:
-        before, after = (size(s) for s in (t - dt, t + dt))
-        if not np.isfinite(after).all():
-            return f"{label} has no finite value, slope or curvature after that time"
-        change = after[0] - before[0] - dt * (before[1] + after[1])
-        if abs(change) > JUMP * max(abs(before[0]), abs(after[0])):
-            return f"{label} jumps from {before[0]:.6g} to {after[0]:.6g} there: round it off, or loosen the tolerance"
-    return ""
+def _links(system: SpatialSystem, at: State) -> Iterator[tuple[str, Array, float]]:
+    for node in system.model.tree.nodes:
+        if node.body.n_modes:
+            yield node.body.name, at.q[node.p_q], node.body.largest_moment
 
 
 def too_far_bent(links: Iterable[tuple[str, Array, float]]) -> str:
@@ -80,27 +79,31 @@ def too_far_bent(links: Iterable[tuple[str, Array, float]]) -> str:
     )
 
 
-def _links(assembly: MechanismSystem, q: Array) -> Iterator[tuple[str, Array, float]]:
-    for first, body in zip(assembly.first, assembly.model.bodies, strict=True):
-        if body.n_modes:
-            yield body.name, q[first + 3 : first + 3 + body.n_modes], body.inertia
+def _loads(system: SpatialSystem) -> Iterator[tuple[str, TimeFunction]]:
+    for load in system.model.scene.load:
+        for name, size in load.components.items():
+            yield f'load on "{load.point or load.joint or load.pzt}", {name},', size
 
 
-def _singular(assembly: MechanismSystem, t: float, q: Array) -> str:
-    """Whether the constraints can hardly be told apart there."""
-    if not assembly.constraints:
+def load_jump(loads: Iterable[tuple[str, TimeFunction]], t: float) -> str:
+    """Which of the loads, each with its label, jumps at t: its size just after t does not follow from that before."""
+    dt = 1e-9 * max(t, 1e-9)
+    for label, size in loads:
+        before, after = (size(s) for s in (t - dt, t + dt))
+        if not np.isfinite(after).all():
+            return f"{label} has no finite value, slope or curvature after that time"
+        change = after[0] - before[0] - dt * (before[1] + after[1])
+        if abs(change) > JUMP * max(abs(before[0]), abs(after[0])):
+            return f"{label} jumps from {before[0]:.6g} to {after[0]:.6g} there: round it off, or loosen the tolerance"
+    return ""
+
+
+def _friction(system: SpatialSystem, analysis: IntegratedAnalysis, choice: Choice, at: State) -> str:
+    rate, joint = fastest_friction(system, at)
+    if rate * analysis.end <= TOO_STIFF:
         return ""
-    J = frame_gradients(assembly, t, q)
-    if len(J) > J.shape[1]:
-        return ""
-    left, values, _ = np.linalg.svd(J)
-    ratio = float(values[-1] / values[0])
-    if ratio > NEARLY_SINGULAR:
-        return ""
-    weights = np.abs(left[:, -1])
-    involved = dict.fromkeys(c.measure.label for c, w in zip(assembly.constraints, weights, strict=True) if w > 0.1)
+    implicit = 'integrator = "radau", ' if choice.name in EXPLICIT else ""
     return (
-        f"the configuration is singular or nearly so (ratio of singular values {ratio:.1g}; {'; '.join(involved)}):"
-        " an arm stretched or folded, or a mechanism at a dead centre, where forces on the driven point do not"
-        " determine the direction of motion. Avoid it, or drive a joint instead"
+        f"friction of {joint} brings it to rest within {1 / rate:.1e} s, which steps of {choice.name} cannot follow:"
+        f" use {implicit}less friction or a larger friction_speed"
     )

@@ -11,10 +11,7 @@ import numpy as np
 from ...common.arrays import Array, as_list
 from ...common.errors import InputError
 from .. import _core
-from ..model.system import MechanismSystem
 from ..scene.analysis import IntegratedAnalysis
-from .state import State
-from .vibration import modal_excitation, vibrations
 
 METHODS = {
     "dopri5": _core.MethodKind.dopri5,
@@ -24,19 +21,15 @@ METHODS = {
 }
 
 # What the rule is made of, measured on the two-link case (26 coordinates; tests/benchmarks): step size times frequency
-# at which DOP853 is stable, and at which both resolve a vibration to a tolerance of 1e-4; time of a step of Radau IIA
-# in steps of DOP853, alone (2.6 with three modes a link, 1.9 with ten) and where a replay of actuation is most of an
-# evaluation; parts of the tolerance below which both need not resolve a vibration, Radau since it damps it away; steps
-# that Radau takes before they have found their size. DOPRI5 never wins by more than clocks scatter: undamped, its steps
+# at which DOP853 is stable, and at which both resolve a vibration to a tolerance of 1e-4; parts of the tolerance below
+# which both need not resolve a vibration, Radau since it damps it away; steps that Radau takes before they have found
+# their size. DOPRI5 never wins by more than clocks scatter: undamped, its steps
 # have to be five times as short as those of DOP853 (it is stable up to 1.0), damped nearly three.
 STABLE = 4.8
 RESOLVED_DOP853, RESOLVED_RADAU = 1.25, 0.30
 STEPS_TO_START = 100
-COST_OF_RADAU, COST_OF_RADAU_STEERED = 2.4, 0.75
 NEGLIGIBLE_DOP853, NEGLIGIBLE_RADAU = 0.1, 1.0
 
-MOST_COORDINATES = 600  # beyond them the eigenproblem takes longer than many a run
-MANY_PERIODS = 1e5
 ASKED_FOR = "requested"
 REPEATED = "steps taken again"
 EXPLICIT = ("dopri5", "dop853")
@@ -84,7 +77,7 @@ class Choice:
         """Whether the program made it, not the scene."""
         return self.reason != ASKED_FOR
 
-    def changed_in(self, run: _core.Run | _core.TreeRun) -> Choice:
+    def changed_in(self, run: _core.TreeRun) -> Choice:
         """What it has become during `run`, which says when and why."""
         if not run.changes:
             return self
@@ -103,38 +96,6 @@ class Choice:
 
 
 NOT_INTEGRATED = Choice("none", "nothing to integrate")
-
-
-def choose_integrator(
-    assembly: MechanismSystem,
-    analysis: IntegratedAnalysis,
-    start: State,
-    steering: _core.ExternalLoads | None,
-    outputs: int,
-) -> Choice:
-    """The integrator for an analysis from `start`, under the actuation `steering` that it replays, if any.
-
-    Explicit steps are held by the highest frequency whether it is excited or not, implicit ones by the highest that
-    rings above the tolerance. The rule estimates the number of steps of both; a wrong one is found out in the run.
-    """
-    if analysis.integrator != "auto":
-        return Choice(analysis.integrator, ASKED_FOR)
-    if outputs == 1:
-        return Choice("dop853", "nothing to integrate")
-    if assembly.model.gears:
-        return Choice("dop853", "the estimate does not include vibrations of compliant gears")
-    highest = max((float(np.sqrt(body.stiffness.max(initial=0.0))) for body in assembly.model.bodies), default=0.0)
-    if highest == 0.0:
-        return Choice("dop853", "nothing vibrates")
-    if len(start.q) > MOST_COORDINATES:
-        name = "radau" if highest * analysis.end > MANY_PERIODS else "dop853"
-        return Choice(name, f"links vibrate at up to {highest:.3g} rad/s (too many coordinates for a closer estimate)")
-    modes = vibrations(assembly, start)
-    if not len(modes.frequency):
-        return Choice("dop853", "nothing vibrates")
-    excited = modal_excitation(assembly, start, modes, steering)
-    cost = COST_OF_RADAU if steering is None else COST_OF_RADAU_STEERED
-    return faster_of(modes.frequency, modes.damping_ratio, excited, analysis, outputs, cost)
 
 
 def faster_of(
@@ -216,7 +177,7 @@ def beyond_rounding(tolerance: float, rounding: float) -> str:
     )
 
 
-def unmet(choice: Choice, run: _core.Run | _core.TreeRun) -> str:
+def unmet(choice: Choice, run: _core.TreeRun) -> str:
     """What the integrator saw where steps have become too short and no cause is found in loads or positions."""
     if np.isfinite(run.last_error):
         saw = f"a step of {run.last_step:.2g} s still errs by {run.last_error:.2g} times what it may"

@@ -1,30 +1,36 @@
-"""The equations of motion, linear about a configuration or a motion, in independent coordinates.
+"""The equations of motion, linear about a posture or a motion, in independent coordinates.
 
-M δs̈ + D δṡ + K δs = Σ inputs · δu, where
-s = (motor coordinates, p of all bodies). About a motion the matrices belong to it: centrifugal and Coriolis terms, the
-forces that drive it, and how H = ∂q/∂s turns along it are in D and K.
+The core differentiates them exactly (core/recursion/derivatives.h). For increments δ of the coordinates of the tree,
+rotation vectors in body axes for orientations, δ̇ = δv + B δ with B = −ω~ at orientations, else 0. Loops leave
+δ = H δs and δv = H δv_s + N δs, where v_s are the rates of the independent coordinates s. So
+
+    δv = H δṡ + Ḣ δs,  Ḣ = N − H B_s H;    δs̈ = a_v,s (H δṡ + Ḣ δs) + a_q,s H δs + d/dt (B_s δ).
+
+Held are the forces along s that drive the motion; moments of motors that turn frames are held in their place, and what
+these do on modes turns with the sections at them.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from types import MappingProxyType
+from typing import NamedTuple
 
 import numpy as np
 
-from ...common.arrays import Array
-from ...common.errors import SolveError
-from .. import _core
-from ..joints.measure import FRAME, GROUND_FRAME, Marker, Measure, marker_at
-from ..model.masses import system_mass_matrix
-from ..model.model import ZERO, Constraint, Model
-from ..model.system import MechanismSystem
-from ..model.tree_layout import NotInTreeError
-from .absolute_linearisation import AbsoluteLinearisation
-from .gradients import gradient_rates, gradients
-from .tree_linearisation import TreeLinearisation
+from ...common.arrays import Array, Indices
+from ...common.errors import InputError, SolveError
+from ...common.rotations import skew
+from ..model.spatial_cut import measured
+from ..model.spatial_frame_motors import turning_motors
+from ..model.spatial_known_motion import required_forces
+from ..model.spatial_model import SpatialModel, row_values
+from ..model.spatial_motors import FrameShare, frame_share
+from ..model.spatial_system import SpatialSystem
+from ..model.spatial_transmission import gear_matrices
+from ..model.spatial_tree import ElasticGearInSpace, Motion, Node
+from ..scene.space import SPACES
 
 DEPENDENT = 1e-8  # of a row's gradient, what others must leave of it to count as independent
 
@@ -63,149 +69,189 @@ class LinearMechanism:
         return [i for i, name in enumerate(self.names) if name.startswith(f"modal/{body}/")]
 
 
-class Linearisation:
-    """What `linearise` needs of a model at every configuration: joints only, drives are loads of the scene.
+class _State(NamedTuple):
+    """One state q (1, n_q), v and a (1, n_v) with the motion of its frames."""
 
-    `independent` rows are the motors' where these fit the mechanism. Where they do not, as many of them as are
-    independent, then other joint coordinates, then angles and places of frames make up the number, those first that
-    the constraints determine worst at `q` (QR with pivoting). `points` ("BODY.POINT") are in- and outputs; a mapping
-    says where each is in the model, where that is another body's point (of a link in pieces).
+    q: Array
+    v: Array
+    a: Array
+    frames: Sequence[Motion]
+
+
+class SpatialLinearisation:
+    """What is the same at every posture: joints alone hold; given forces along s act, and loads.
+
+    `model` has no rows of trajectories; its gears give where its tree has them. Independent are the motors' coordinates
+    where loops leave them so, then other joint coordinates, and modes, those first that the loops determine worst at
+    `q` (QR with pivoting). `points` ("BODY.POINT") are in- and outputs; a mapping says where each is in the model,
+    where that is another body's point (of a link in pieces).
     """
 
-    def __init__(self, model: Model, q: Array, points: Sequence[str] | Mapping[str, str] = ()) -> None:
-        joints = {f"joint/{name}": measure for name, measure in _joint_coordinates(model).items()}
-        elastic = {gear.joint for gear in model.gears}
-        motors = {
-            f"{'motor' if name in elastic else 'joint'}/{name}": measure for name, measure in model.motors.items()
-        }
-        candidates = [motors, {name: joint for name, joint in joints.items() if name not in motors}, _frames(model)]
-        where = points if isinstance(points, Mapping) else {point: point for point in points}
-        places = {f"{point}/{axis}": _place(place, axis) for point, place in where.items() for axis in "xy"}
-        measures = [measure for group in (*candidates, joints, places) for measure in group.values()]
-        self.model = model
-        self.assembly = MechanismSystem(model, model.joints, model.loads, measures)
-        core = iter(self.assembly.motor_measures)
-        known = [{name: next(core) for name in group} for group in (*candidates, joints, places)]
-        self._motors = {f"joint/{name}": row for name, row in zip(model.motors, known[0].values(), strict=True)}
-        self._joints = {name: row for name, row in known[0].items() if name not in known[3]} | known[3]
-        self._places = known[4]
-        independent = _choose(self.assembly, q, known[:3])
-        self.independent = list(independent.values())
-        by_name = {name: measure for group in candidates for name, measure in group.items()}
-        self._rows = [by_name[name] for name in independent]
-        self.tree = _on_tree(model, self._rows)
-        modal = [f"modal/{body.name}/{k}" for body in model.bodies for k in range(1, body.n_modes + 1)]
-        self.names = (*independent, *modal)
+    def __init__(self, model: SpatialModel, q: Array, points: Sequence[str] | Mapping[str, str] = ()) -> None:
+        _check(model)
+        self.points = dict(points) if isinstance(points, Mapping) else {point: point for point in points}
+        self.model, self.system = model, SpatialSystem(model)
+        self._on_frames = turning_motors(model)
+        self.independent = _independent(model, q)
+        names, signs = _coordinates(model)
+        self.names = tuple(names[k] for k in self.independent)
+        self._signs = signs[self.independent]
 
     def at(self, t: float, q: Array, v: Array, a: Array) -> LinearMechanism:
-        """The linear equations about a motion whose q, v and a meet the joint constraints.
+        """The linear equations about a motion whose q (n_q,), v and a (n_v,) keep the loops closed.
 
-        Raises `SolveError` in a configuration in which the independent coordinates do not determine the others.
+        Raises `SolveError` in a posture in which the independent coordinates do not determine the others.
         """
-        rows = [*self.assembly.constraint_measures, *self.independent]
-        G, frames = gradients(self.assembly, rows, q), self.assembly.frame_coordinates
-        if not 1.0 / np.linalg.cond(G[:, frames], 1) > DEPENDENT**2:
-            independent = ", ".join(self.names[: len(self.independent)])
-            raise SolveError(
-                f"{self.model.scene.path}: linear model at t = {t:g} s: {independent} do not determine the"
-                " configuration there (a singular one)"
-            )
-        H = self._followers(G)
-        H_dot = np.zeros_like(H)
-        H_dot[frames] = -np.linalg.solve(G[:, frames], gradient_rates(self.assembly, rows, q, v) @ H)
-        force = H.T @ self.assembly.system.required_forces(np.array([t]), q[None], v[None], a[None])[0]
-        M = H.T @ system_mass_matrix(self.assembly, q) @ H
-        if self.tree is not None:
-            resistance = self.tree.at(t, q, v, a, force, M)
-        else:
-            resistance = self.absolute.at(t, q, v, a, H, H_dot)
-        inputs = self._motors | {f"force/{place}": row for place, row in self._places.items()}
-        outputs = self._joints | {f"point/{place}": row for place, row in self._places.items()}
+        tree, s = self.model.tree, self.independent
+        state = _State(q[None], v[None], a[None], tree.frames(q[None]))
+        H, determine = self._followers(state, t)
+        force = H.T @ required_forces(self.model, state, np.array([t]))[0]
+        along_s = np.zeros(tree.n_v)
+        along_s[s] = force
+        core, N = self.system.derivatives(t, q, v, along_s), np.zeros_like(H)
+        N[np.setdiff1d(np.arange(tree.n_v), s)] = -determine @ core.rate_q @ H
+        B, B_dot = _bracket(tree.nodes, v), _bracket(tree.nodes, a)[s]
+        H_dot = N - H @ B[s] @ H
+        by_rate = core.a_v[s] @ H + B[s] @ H
+        by_s = core.a_q[s] @ H + core.a_v[s] @ H_dot + B_dot @ H + B[s] @ (H_dot + B @ H)
+        M = np.linalg.inv(core.a_f[np.ix_(s, s)])
+        sides: Array = self._signs[:, None] * self._signs
+        H, H_dot = H * self._signs, H_dot * self._signs
+        shares = {joint: frame_share(self.model, joint, q) for joint in self._on_frames}
+        moments = {joint: along_s[self.model.motors[joint][0]] for joint in shares}
+        on_modes = sum((moments[joint] * shares[joint].direction for joint in shares), np.zeros(tree.n_v))
+        # Not by way of M⁻¹, whose rounding is that of the stiffest modes
+        K_more, D_more = gear_matrices(tree)
+        K_more -= sum((moments[joint] * shares[joint].slope for joint in shares), np.zeros_like(K_more))
         return LinearMechanism(
-            t, q, v, a, M, resistance.D, resistance.K,
-            self._gradients(inputs, H, q), self._gradients(outputs, H, q), H, H_dot, force, self.names,
+            t, q, v, a, sides * (M + M.T) / 2, H.T @ D_more @ H - sides * (M @ by_rate),
+            H.T @ (K_more @ H + D_more @ H_dot) - sides * (M @ by_s),
+            self._inputs(state, H, shares), self._outputs(state, H), H, H_dot,
+            self._signs * force - on_modes @ H, self.names,
         )  # fmt: skip
 
-    @cached_property
-    def absolute(self) -> AbsoluteLinearisation:
-        """In absolute coordinates, where nothing is missing; made where it is asked for."""
-        return AbsoluteLinearisation(self.model, self._rows)
+    def _followers(self, state: _State, t: float) -> tuple[Array, Array]:
+        """H (n_v, f), and what gives the coordinates that follow from the rates that rows would get (n_v − f, rows)."""
+        n_v, s = self.model.tree.n_v, self.independent
+        H = np.zeros((n_v, len(s)))
+        H[s, np.arange(len(s))] = 1.0
+        others = np.setdiff1d(np.arange(n_v), s)
+        C_v = row_values(self.model, state.q, np.array([t]), state.frames)[1][0]
+        if not len(others):
+            return H, np.zeros((0, len(C_v)))
+        sizes = np.linalg.svd(C_v[:, others], compute_uv=False)
+        if not sizes[-1] > DEPENDENT * sizes[0]:
+            joints = ", ".join(name for name in self.names if not name.startswith("modal/"))
+            raise SolveError(
+                f"{self.model.scene.path}: linear model at t = {t:g} s: {joints} do not determine the posture there (a"
+                " singular one)"
+            )
+        determine = np.linalg.pinv(C_v[:, others])
+        H[others] = -determine @ C_v[:, s]
+        return H, determine
 
-    def _followers(self, G: Array) -> Array:
-        """H (coordinates, f) by the gradients of joints and of what is independent: frames follow this, and p."""
-        frames, independent = self.assembly.frame_coordinates, len(self.independent)
-        modes = np.setdiff1d(np.arange(G.shape[1]), frames)
-        H = np.zeros((G.shape[1], len(self.names)))
-        H[modes, independent:] = np.eye(len(modes))
-        of_s = np.eye(len(G))[:, len(G) - independent :]
-        H[frames] = np.linalg.solve(G[:, frames], np.hstack([of_s, -G[:, modes]]))
-        return H
+    def _inputs(self, state: _State, H: Array, shares: Mapping[str, FrameShare]) -> Mapping[str, Array]:
+        """By s: a unit of each motor, and of forces on points along x, y, z."""
+        found = {}
+        for joint, columns in self.model.motors.items():
+            beside = shares[joint].direction @ H if joint in shares else 0.0
+            for name, k in _labelled(joint, columns):
+                found[name] = self.model.sign(joint) * (H[k] + beside)
+        return MappingProxyType(found | {f"force/{name}": row for name, row in self._places(state, H).items()})
 
-    def _gradients(self, rows: dict[str, _core.Measure], H: Array, q: Array) -> Mapping[str, Array]:
-        found = gradients(self.assembly, list(rows.values()), q) @ H
-        return MappingProxyType(dict(zip(rows, found, strict=True)))
+    def _outputs(self, state: _State, H: Array) -> Mapping[str, Array]:
+        """By s: joint coordinates, those of motors behind gears that give, and places of points."""
+        tree, found = self.model.tree, dict[str, Array]()
+        for joint in self.model.scene.joint:
+            if joint.name in tree.carried:
+                sign = -1.0 if tree.nodes[tree.carried[joint.name]].backwards else 1.0
+                found |= {name: sign * H[k] for name, k in labelled(self.model, joint.name)}
+        gradients = measured(tree, self.model.cut, state.q, state.frames)[1][0]
+        for cut in tree.cut_joints:
+            own = [G @ H for one, G in zip(self.model.cut, gradients, strict=True) if one.joint is cut]
+            found |= dict(zip(_names(cut.name, len(own)), own, strict=True))
+        found |= {_of_motor(gear): H[gear.motor.v.start] for gear in tree.gears}
+        return MappingProxyType(found | {f"point/{name}": row for name, row in self._places(state, H).items()})
 
-
-def _on_tree(model: Model, independent: Sequence[Measure]) -> TreeLinearisation | None:
-    """None of what the recursion does not have, which is told in absolute coordinates."""
-    try:
-        return TreeLinearisation(model, independent)
-    except NotInTreeError:
-        return None
-
-
-def linearise(model: Model, t: float, q: Array, v: Array, a: Array, points: Sequence[str] = ()) -> LinearMechanism:
-    """The linear equations about one configuration or instant of a motion; see `Linearisation` for many."""
-    return Linearisation(model, q, points).at(t, q, v, a)
-
-
-def held_by_motors(model: Model, q: Array) -> list[Constraint]:
-    """Constraints that keep the motor coordinates where they are at q."""
-    free = [Constraint(row, ZERO, name, "motor", is_trajectory=True) for name, row in model.motors.items()]
-    assembly = MechanismSystem(model, free)
-    values = assembly.system.constraints(0.0, q, np.zeros_like(q))[0]
-    targets = [_core.TimeFunction.constant(float(value)) for value in values]
-    return [replace(c, target=target) for c, target in zip(assembly.constraints, targets, strict=True)]
-
-
-def _joint_coordinates(model: Model) -> dict[str, Measure]:
-    """Coordinates of the joints that move, by name; a motor's is the measure that it drives."""
-    own = {joint.name: joint.coordinate(model.scene.motors) for joint in model.scene.joint}
-    driven = model.motors | {gear.joint: gear.coordinate for gear in model.gears}
-    return {name: driven.get(name, measure) for name, measure in own.items() if measure is not None}
-
-
-def _frames(model: Model) -> dict[str, Measure]:
-    """Angles and places of the frames."""
-    return {
-        f"frame/{body.name}/{kind.name}": Measure(f"frame of {body.name}", kind, GROUND_FRAME, Marker(body.name, FRAME))
-        for kind in (_core.MeasureKind.angle, _core.MeasureKind.x, _core.MeasureKind.y)
-        for body in model.bodies
-    }
+    def _places(self, state: _State, H: Array) -> dict[str, Array]:
+        found: dict[str, Array] = {}
+        for point, place in self.points.items():
+            L = self.model.tree.motion(self.model.tree.section(place, np.eye(3)), state.q, state.frames).L[0]
+            axes = SPACES[self.model.scene.space].translations
+            found |= {f"{point}/{'xyz'[k]}": L[k] @ H for k in axes}
+        return found
 
 
-def _place(point: str, axis: str) -> Measure:
-    return Measure(f"{point}/{axis}", getattr(_core.MeasureKind, axis), GROUND_FRAME, marker_at(point))
+def _check(model: SpatialModel) -> None:
+    for node in model.tree.nodes:
+        if node.backwards and node.joint.type == "planar":  # its coordinates are not linear in the tree's
+            raise InputError(
+                f"{model.scene.path}: {node.joint.label}: between: expected the side nearer to the ground first for"
+                " linear models, found it second"
+            )
 
 
-def _choose(
-    assembly: MechanismSystem, q: Array, groups: Sequence[Mapping[str, _core.Measure]]
-) -> dict[str, _core.Measure]:
-    """The rows that, with the joints, determine the frames: earlier groups first, those of a group as QR pivots."""
+def labelled(model: SpatialModel, joint: str) -> Iterator[tuple[str, int]]:
+    """Coordinates of a joint, "joint/NAME", or "joint/NAME 1", "joint/NAME 2" of several, and where each is in v."""
+    return _labelled(joint, model.columns(joint))
+
+
+def _labelled(joint: str, columns: Array) -> Iterator[tuple[str, int]]:
+    yield from zip(_names(joint, len(columns)), map(int, columns), strict=True)
+
+
+def _names(joint: str, count: int) -> list[str]:
+    return [f"joint/{joint}" + (f" {number}" if count > 1 else "") for number in range(1, count + 1)]
+
+
+def _of_motor(gear: ElasticGearInSpace) -> str:
+    """Of the coordinate of a motor behind a gear that gives."""
+    return f"motor/{gear.joint.joint.name}"
+
+
+def _coordinates(model: SpatialModel) -> tuple[list[str], Array]:
+    """Names of the entries of v, and the sign with which a joint of the scene counts each."""
+    names, signs = [""] * model.tree.n_v, np.ones(model.tree.n_v)
+    joints = {joint.name for joint in model.scene.joint}
+    for node in model.tree.nodes:
+        for number, k in enumerate(range(node.v.start, node.v.stop), 1):
+            kind = "joint" if node.joint.name in joints else "frame"
+            names[k] = f"{kind}/{node.joint.name} {number}"  # of orientations: about axes of the body
+        for number, k in enumerate(range(node.p_v.start, node.p_v.stop), 1):
+            names[k] = f"modal/{node.body.name}/{number}"
+        if node.joint.name in joints:
+            for name, k in labelled(model, node.joint.name):
+                names[k], signs[k] = name, -1.0 if node.backwards else 1.0
+    for gear in model.tree.gears:
+        names[gear.motor.v.start] = _of_motor(gear)
+    return names, signs
+
+
+def _independent(model: SpatialModel, q: Array) -> Indices:
+    """Where s is in v: motors first, then other joints, then modes."""
     from scipy.linalg import qr
 
-    frames = assembly.frame_coordinates
-    basis = np.linalg.qr(gradients(assembly, assembly.constraint_measures, q)[:, frames].T)[0]
-    chosen: dict[str, _core.Measure] = {}
-    for group in groups:
-        missing = len(frames) - basis.shape[1]
-        if not missing or not group:
-            continue
-        rows = gradients(assembly, list(group.values()), q)[:, frames]
-        Q, R, order = qr((rows - (rows @ basis) @ basis.T).T, mode="economic", pivoting=True)
-        independent = np.abs(np.diag(R)) > DEPENDENT * np.linalg.norm(rows, axis=1).max()
-        count = min(missing, int(np.count_nonzero(independent)))
-        names = list(group)
-        chosen |= {names[i]: group[names[i]] for i in sorted(order[:count])}
-        basis = np.hstack([basis, Q[:, :count]])
+    modes = np.flatnonzero(~model.tree.joint_columns)
+    motors = np.concatenate([*model.motors.values(), np.zeros(0, dtype=int)]).astype(np.intp)
+    others = np.setdiff1d(np.flatnonzero(model.tree.joint_columns), motors)
+    left = row_values(model, q[None], np.zeros(1))[1][0]
+    size, free = np.abs(left).max(initial=0.0), []
+    for group in (others, motors, modes):  # what loops determine best is dependent, motors and modes last
+        rank, order = 0, np.arange(len(group))
+        if len(left) and len(group):
+            Q, R, order = qr(left[:, group], pivoting=True)
+            rank = int(np.count_nonzero(np.abs(np.diag(R)) > DEPENDENT * size))
+            left = Q[:, rank:].T @ left
+        free.append(np.sort(group[order[rank:]]))
+    chosen: Indices = np.concatenate([free[1], free[0], free[2]]).astype(np.intp)
     return chosen
+
+
+def _bracket(nodes: Sequence[Node], v: Array) -> Array:
+    """B (n_v, n_v) of velocities (or accelerations) v: −ω~ where three of v turn an orientation."""
+    found = np.zeros((len(v), len(v)))
+    for node in nodes:
+        if node.joint.q_count > node.joint.freedoms:
+            turning = slice(node.v.stop - 3, node.v.stop)
+            found[turning, turning] = -skew(v[turning])
+    return found

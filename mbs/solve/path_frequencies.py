@@ -10,13 +10,14 @@ import numpy as np
 
 from ...common.arrays import Array, as_floats
 from ...common.errors import InputError
-from ..model.model import Model
-from ..model.system import MechanismSystem
-from .initial_state import undeformed_state
-from .position import solve_positions
-from .reach import unreachable
+from ...common.validation import quoted
+from ..model.spatial_gears import with_held_motors
+from ..model.spatial_model import SpatialModel
+from .spatial_posture import solve_posture
+from .spatial_redundancy import resolved
+from .spatial_start import relaxed_gears, undeformed_posture
 from .state import State
-from .vibration import vibrations
+from .vibration import vibrations_in_space, without_rows
 
 INSTANTS = 9
 
@@ -29,21 +30,24 @@ class PathFrequencies:
     damping_ratio: Array
 
 
-def path_frequencies(model: Model, begin: float, end: float, modes: int) -> PathFrequencies:
-    """Of the `modes` lowest vibrations with the trajectories held, at instants from `begin` to `end`, s.
+def spatial_path_frequencies(model: SpatialModel, begin: float, end: float, modes: int) -> PathFrequencies:
+    """Of the `modes` lowest vibrations of the undeformed robot with its trajectories held, from `begin` to `end`, s.
 
+    Where motors follow them, gears that give are among its springs. Joints that the paths leave free are free.
     Raises `InputError` where the path is out of reach, or there are fewer vibrations.
     """
-    assembly = MechanismSystem(model, [*model.joints, *model.trajectories])
-    state, found = undeformed_state(assembly), []
-    q = state.q
+    model = with_held_motors(resolved(model, end))
+    unheld = without_rows(model)
+    state, found = undeformed_posture(model), []
     for t in np.linspace(begin, end, INSTANTS):
-        following = solve_positions(assembly, float(t), q)
-        if following is None:
-            raise InputError(unreachable(assembly, float(t), q))
-        q = following
-        each = vibrations(assembly, State(q, np.zeros_like(state.v)))
-        found.append((each.frequency, each.damping_ratio))
+        q = solve_posture(model, float(t), state.q)
+        if q is None:
+            raise InputError(
+                f"{model.scene.path}: trajectory: expected paths within reach, found no posture of the undeformed robot"
+                f" at t = {t:.6g} s that meets {quoted(dict.fromkeys(row.owner for row in model.rows))}"
+            )
+        state = relaxed_gears(model, State(q, np.zeros_like(state.v)))
+        found.append(vibrations_in_space(model, unheld, float(t), state.q)[:2])
     return common_modes(model.scene.path, found, modes)
 
 

@@ -1,4 +1,4 @@
-"""Shapes with which links at rest against their frames need no modal forces, in the plane and in space."""
+"""Shapes with which links at rest against their frames need no modal forces."""
 
 from __future__ import annotations
 
@@ -12,10 +12,7 @@ SETTLED = 1e-14  # of a shape's size: what the next step would change
 TINY = 1e-300
 
 
-PrescribedMotion = _core.PlanarPrescribedMotion | _core.SpatialPrescribedMotion
-
-
-def quasi_static_shape(motion: PrescribedMotion, stiffness: Array, times: Array, posture: Array) -> Array:
+def quasi_static_shape(motion: _core.SpatialPrescribedMotion, stiffness: Array, times: Array, posture: Array) -> Array:
     """Shapes p (T, n) of all bodies at `times` (T,) with which nothing is left on modes, by p ← p − F_p/K.
 
     With `stiffness` K (n,), from a posture (n_q,) near the first. NaN where that does not converge: links too soft for

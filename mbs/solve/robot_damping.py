@@ -5,40 +5,21 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
-from typing import TypeVar
 
 import numpy as np
 
 from ...common.arrays import Array, as_floats
-from ..model.model import Model
-from ..model.planar_body import PlanarBody
 from ..model.spatial_body import SpatialBody
 from ..model.spatial_model import SpatialModel, without_paths
-from ..model.system import MechanismSystem
-from .initial_state import undeformed_state
-from .spatial_frequencies import vibrations_in_space, without_rows
 from .spatial_start import undeformed_posture
-from .vibration import vibrations
-
-B = TypeVar("B", PlanarBody, SpatialBody)
-
-
-def with_robot_damping(model: Model, ratios: Mapping[str, float]) -> Model:
-    """The robot with links so damped that its vibrations have the damping ratios ζ, given by body, where all agree.
-
-    At the initial posture, motors free. Bodies not named keep the damping that they have.
-    """
-    if not ratios:
-        return model
-    start = undeformed_state(MechanismSystem(model, [*model.joints, *model.trajectories]))
-    assembly = MechanismSystem(model, model.joints)
-    modes = vibrations(assembly, start)
-    wanted = unit_damping(modes.frequency, np.delete(modes.shape, assembly.frame_coordinates, axis=0))
-    return replace(model, bodies=_damped(model.bodies, wanted, ratios))
+from .vibration import vibrations_in_space, without_rows
 
 
 def with_robot_damping_in_space(model: SpatialModel, ratios: Mapping[str, float]) -> SpatialModel:
-    """The same of a robot in space, whose gears are firm here as they are there."""
+    """The robot with links so damped that its vibrations have the damping ratios ζ, given by body, where all agree.
+
+    At the initial posture, motors free, gears rigid. Bodies not named keep the damping that they have.
+    """
     if not ratios:
         return model
     start, tree = undeformed_posture(model), model.tree
@@ -61,7 +42,7 @@ def unit_damping(frequency: Array, shape: Array) -> Array:
     return as_floats(inverse.T @ (2 * frequency[:, None] * inverse))
 
 
-def _damped(bodies: Sequence[B], wanted: Array, ratios: Mapping[str, float]) -> tuple[B, ...]:
+def _damped(bodies: Sequence[SpatialBody], wanted: Array, ratios: Mapping[str, float]) -> tuple[SpatialBody, ...]:
     """With their blocks on the diagonal of `wanted` (modes of all bodies)², ζ times; bodies not named as they are."""
     ends = np.cumsum([0, *(body.n_modes for body in bodies)])
     return tuple(

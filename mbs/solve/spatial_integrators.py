@@ -1,4 +1,8 @@
-"""Which integrator a scene in space asks for: the rule of the plane, on the vibrations of the robot in space."""
+"""Which integrator a scene asks for, by the vibrations of the robot.
+
+Explicit steps are held by the highest frequency whether it is excited or not, implicit ones by the highest that rings
+above the tolerance. The rule estimates the number of steps of both; a wrong one is found out in the run.
+"""
 
 from __future__ import annotations
 
@@ -14,8 +18,8 @@ from ..model.spatial_system import SpatialSystem
 from ..model.spatial_transmission import tree_resistance_slope
 from ..scene.analysis import IntegratedAnalysis
 from .integrators import ASKED_FOR, EXPLICIT, Choice, faster_of
-from .spatial_frequencies import SpatialVibrations, vibrations_in_space, without_rows
 from .state import State
+from .vibration import SpatialVibrations, vibrations_in_space, without_rows
 
 # Steps of DOP853 in the time of one of Radau IIA: 0.7 to 1.5 in cases/arm_3r, cases/slider_crank_3d and a stiff arm of
 # three links. Twice as much here: once at work, Radau is given time to damp vibrations away
@@ -39,7 +43,7 @@ def integrator_of(model: SpatialModel, name: str) -> str:
 def choose_integrator_in_space(
     system: SpatialSystem, analysis: IntegratedAnalysis, start: State, outputs: int, *, is_sampled: bool
 ) -> Choice:
-    """The integrator for an analysis from `start` with that many outputs, as `choose_integrator` in the plane.
+    """The integrator for an analysis from `start` with that many outputs.
 
     Where a controller `is_sampled`, every sample starts anew and nothing takes over.
     """
@@ -97,7 +101,9 @@ def _sticks(model: SpatialModel) -> bool:
 def _excitation(system: SpatialSystem, start: State, found: SpatialVibrations) -> Array:
     """Size (n,) with which each vibration rings from `start` on, in the elastic forces of a link, relative to these.
 
-    As `modal_excitation` in the plane: velocities, accelerations and jerk of modes are vibrations v/ω, a/ω², j/ω³.
+    A mode at rest follows its load and the links' static deflection; the velocity v, the acceleration a or the jerk j
+    about that with which it starts is the vibration v/ω, a/ω², j/ω³. What the robot does beside following statically
+    is what changes its elastic forces: φᵀ K q̇ = ω² v, and so on.
     """
     model, omega, K = system.model, found.frequency, found.springs
     dt = (1e-3 if system.replay is None else 0.1) / float(omega.max())  # round-off of what is replayed is no jerk

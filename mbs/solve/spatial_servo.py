@@ -29,10 +29,16 @@ MOST_STATES = 10_000  # that are evaluated at once, a fraction of a second
 
 @dataclass(frozen=True)
 class SpatialServo:
-    """The robot under its path, held before 0 and after `end`; `factor` and `offset` as in `servo.Servo`.
+    """The robot under its path, held before 0 and after `end`; `factor` 1 takes the path's own points as output.
 
-    `near` (N, n_q): postures along the path without deflections, at `near_times`. `where` are scene and analysis, for
-    messages; `goes_on` is asked again and again whether to go on.
+    A smaller factor takes where they would be with the same motor coordinates and the deflections `factor` p +
+    `offset`, which is what is expected of the rest (Wang and Vidyasagar 1991; De Luca and Siciliano 1993).
+
+    Attributes:
+        near_times, near: along the path, (N,) s, postures without deflections (N, n_q).
+        where: scene and analysis, for messages.
+        goes_on: is asked again and again whether to go on.
+        offset: one for each mode of all bodies, or none.
     """
 
     model: SpatialModel

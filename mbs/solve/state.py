@@ -9,7 +9,7 @@ from ...common.arrays import Array
 
 @dataclass(frozen=True)
 class State:
-    """Coordinates q = (R, θ, p of each body), (coordinates,), and their rates v: m, rad, √kg·m and these per s."""
+    """Positions q (n_q,) and velocities v (n_v,) of the tree: m, rad, √kg·m and these per s."""
 
     q: Array
     v: Array

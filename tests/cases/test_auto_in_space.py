@@ -11,8 +11,8 @@ from spatial_scenes import checkpoint_scene
 from ffrobot.mbs import _core
 from ffrobot.mbs.model.spatial_model import build_spatial_model
 from ffrobot.mbs.model.spatial_system import SpatialSystem
-from ffrobot.mbs.solve.spatial_frequencies import vibrations_in_space, without_rows
 from ffrobot.mbs.solve.spatial_start import undeformed_posture
+from ffrobot.mbs.solve.vibration import vibrations_in_space, without_rows
 from ffrobot.run.spatial_bodies import load_spatial_bodies
 
 COARSE = ("tolerance = 1e-08", "tolerance = 1e-3")

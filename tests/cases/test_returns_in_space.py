@@ -10,12 +10,9 @@ from test_replays_in_space import beam
 import ffrobot
 from ffrobot.mbs import _core
 from ffrobot.mbs.analysis.context import Context
-from ffrobot.mbs.analysis.fcid import Fcid
-from ffrobot.mbs.analysis.forward import Forward
-from ffrobot.mbs.analysis.pcid import Pcid
-from ffrobot.mbs.analysis.spatial_fcid import run_spatial_fcid
-from ffrobot.mbs.analysis.spatial_forward import run_spatial_forward
-from ffrobot.mbs.analysis.spatial_pcid import run_spatial_pcid
+from ffrobot.mbs.analysis.fcid import Fcid, run_spatial_fcid
+from ffrobot.mbs.analysis.forward import Forward, run_spatial_forward
+from ffrobot.mbs.analysis.pcid import Pcid, run_spatial_pcid
 from ffrobot.mbs.analysis.spatial_replay import motor_forces_of
 from ffrobot.mbs.fields.steps import Steps
 from ffrobot.mbs.model.spatial_frame_motors import motor_commands

@@ -6,9 +6,7 @@ import mpmath
 import numpy as np
 from mechanisms import make_model, revolute
 from numpy.polynomial import Legendre, Polynomial
-
-from ffrobot.mbs.model.geometric_stiffening import GeometricStiffening
-from ffrobot.mbs.model.planar_body import PlanarBody, PlanarPoint
+from planar_bodies import GeometricStiffening, PlanarBody, PlanarPoint
 
 CLAMPED = Polynomial([0, 0, 1])  # ξ²: deflection and slope vanish at the root
 SUPPORTED = Polynomial([0, 1, -1])  # ξ (1 − ξ): deflection vanishes at both ends

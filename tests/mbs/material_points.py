@@ -3,9 +3,9 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
+from planar_bodies import from_modal_body
 
 from ffrobot.fe_models.modal_body import Interface, ModalBody, PictureMesh, Stations
-from ffrobot.mbs.model.planar_body import from_modal_body
 
 NAMED = ("root", "tip", "side")
 

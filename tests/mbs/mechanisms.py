@@ -1,37 +1,149 @@
-"""Scenes written in Python, with bodies that are given as `PlanarBody`."""
+"""Planar robots written in Python, of bodies given by their invariants: as the oracle has them, and as models in 3D."""
 
-from pathlib import Path
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from oracle import Mechanism
+from planar_bodies import in_3d
+from planar_rows import Kind, Marker, Measure, coordinate, friction, joint_constraints, marker_at, path_measures, rotor
 
 from ffrobot.mbs import _core
+from ffrobot.mbs._core import TimeFunction
 from ffrobot.mbs.analysis.forward import Forward
 from ffrobot.mbs.analysis.pcid import Pcid
-from ffrobot.mbs.model.model import build_model
-from ffrobot.mbs.model.planar_tree import PlanarTree
-from ffrobot.mbs.model.system import MechanismSystem
+from ffrobot.mbs.model.spatial_drives import Drive
+from ffrobot.mbs.model.spatial_model import SpatialModel, build_spatial_model
 from ffrobot.scene.load import make_scene
-from ffrobot.scene.scene import Scene
 
 PLACEHOLDER = {"mass": 1.0, "inertia": 1.0, "center": (0.0, 0.0)}  # the bodies themselves are passed beside the scene
+ZERO = _core.TimeFunction.constant(0.0)
+
+
+@dataclass(frozen=True)
+class Constraint:
+    """A measure that is held at `target`(t): `component` of the joint or trajectory `owner`."""
+
+    measure: Measure
+    target: TimeFunction
+    owner: str
+    component: str
+    is_trajectory: bool
+
+
+@dataclass(frozen=True)
+class ModalLoad:
+    """Modal forces `vector` (n,), N/√kg, times `magnitude`(t) on one body."""
+
+    body: str
+    vector: np.ndarray
+    magnitude: TimeFunction
+
+
+@dataclass(frozen=True)
+class Robot:
+    """A scene with `PlanarBody`s: rows by `planar_rows`, and the model in 3D, projected on the plane."""
+
+    scene: object
+    bodies: tuple
+    modal_loads: tuple = ()
+    tables: object = None  # keys of the scene
+
+    def body(self, name):
+        return next(body for body in self.bodies if body.name == name)
+
+    @cached_property
+    def model(self) -> SpatialModel:
+        model = build_spatial_model(self.scene, [in_3d(body) for body in self.bodies])
+        return replace(model, modal_loads=tuple(_drive(model, load) for load in self.modal_loads))
+
+    @property
+    def joints(self):
+        return [
+            Constraint(row, ZERO, joint.name, row.kind.name, is_trajectory=False)
+            for joint in self.scene.joint
+            for row in joint_constraints(joint)
+        ]
+
+    @property
+    def trajectories(self):
+        joints = {joint.name: joint for joint in self.scene.joint}
+        return [
+            Constraint(row, path.components[component], path.name, component, is_trajectory=True)
+            for path in self.scene.trajectory
+            for component, row in path_measures(path, self.scene.motors, joints).items()
+        ]
+
+    @property
+    def motors(self):
+        return {joint.name: coordinate(joint, self.scene.motors) for joint in self.scene.motor_joints}
+
+    @property
+    def rotors(self):
+        return [rotor(joint, self.scene.motors) for joint in self.scene.joint if getattr(joint, "rotor_inertia", 0.0)]
+
+    @property
+    def frictions(self):
+        return [
+            (coordinate(joint, self.scene.motors), found)
+            for joint in self.scene.joint
+            if (found := friction(joint)) is not None
+        ]
+
+    @property
+    def loads(self):
+        joints = {joint.name: joint for joint in self.scene.joint}
+        found = []
+        for load in self.scene.load:
+            if load.joint is not None:
+                found += [(coordinate(joints[load.joint], self.scene.motors), size) for size in load.moments]
+            else:
+                at = path_like(load.point)
+                found += [(at[component], size) for component, size in load.components.items()]
+        return found
+
+    @property
+    def state_forces(self):
+        return [(marker_at(load.point), load.force) for load in self.scene.load if load.force is not None]
+
+
+def path_like(point):
+    """What forces and moments on a point act along, by component."""
+    kinds, at = {"x": Kind.x, "y": Kind.y, "mz": Kind.angle}, marker_at(point)
+    return {name: Measure(f"{point}, {name}", kind, Marker(None), at) for name, kind in kinds.items()}
+
+
+def _drive(model, load):
+    direction = np.zeros(model.tree.n_v)
+    node = model.tree.nodes[model.tree.index[load.body]]
+    direction[node.p_v] = load.vector
+    return Drive(direction, load.magnitude)
+
+
+class Assembly:
+    """A robot under some constraints, in absolute coordinates (R, θ, p) of one body after the other."""
+
+    def __init__(self, robot, constraints):
+        self.model, self.constraints = robot, list(constraints)
+        sizes = [3 + body.n_modes for body in robot.bodies]
+        self.first = np.concatenate([[0], np.cumsum(sizes)[:-1]]).astype(int)
+        self.index = {body.name: k for k, body in enumerate(robot.bodies)}
+        self.size = sum(sizes)
+        self.is_trajectory = [constraint.is_trajectory for constraint in self.constraints]
+
+    @property
+    def frame_coordinates(self):
+        return np.concatenate([np.arange(first, first + 3) for first in self.first])
 
 
 def make_model(bodies, modal_loads=(), **keys):
-    """A model of `bodies`; `keys` are those of a scene file."""
-    tables = {"gravity": (0.0, -9.81)} | keys
-    if "analysis" not in tables:
-        tables["analysis"] = (pcid(),)
-    for name in ("joint", "trajectory", "load"):
-        tables[name] = tuple(tables.get(name, ()))
-    scene = Scene(
-        name="test",
-        body=tuple({"name": body.name, "rigid": PLACEHOLDER} for body in bodies),
-        path=Path("scene.toml"),
-        text="",
-        **tables,
-    )
-    return build_model(scene, bodies, modal_loads)
+    """A robot of `bodies`; `keys` are those of a scene file."""
+    tables = {"name": "test", "gravity": (0.0, -9.81), "analysis": [{"name": "rest", "kind": "static"}]} | keys
+    tables["body"] = [
+        {"name": body.name, "rigid": PLACEHOLDER | {"points": {name: (0.0, 0.0) for name in body.points}}}
+        for body in bodies
+    ]
+    return Robot(make_scene(**tables), tuple(bodies), tuple(modal_loads), tables)
 
 
 def checked_scene(joints, bodies=("a",)):
@@ -58,9 +170,9 @@ def revolute(name, first, second, **keys):
     return {"name": name, "type": "revolute", "between": (first, second), **keys}
 
 
-def assemble(model):
-    """All joints, trajectories, loads and motors of the model in one system."""
-    return MechanismSystem(model, [*model.joints, *model.trajectories], model.loads, list(model.motors.values()))
+def assemble(robot):
+    """All joints and trajectories of the robot."""
+    return Assembly(robot, [*robot.joints, *robot.trajectories])
 
 
 def random_state(rng, size, modal=0.1):
@@ -73,34 +185,6 @@ def always(_):
     return True
 
 
-def core_run(assembly, q, v, times, tolerance=1e-6, max_steps=0, motors=(), **keys):
-    """A run of the core itself from (q, v) of the system, with DOP853; forces of `motors` (measures) are found."""
-    controls = _core.IntegrationControls(
-        tolerance=tolerance, max_steps=max_steps, methods=[(_core.MethodKind.dop853, 1.0, 0.0)], spectral_radius=0.8
-    )
-    tree = PlanarTree(assembly, motors)
-    q, v = tree.state(q, v)
-    return _core.run_tree(tree.both, times=times, q=q, v=v, controls=controls, carry_on=always, **keys)
-
-
-def evaluate(assembly, t, q, v):
-    """Accelerations and multipliers by the core, of a state that the joints of the tree allow."""
-    return PlanarTree(assembly).evaluate(t, q, v)
-
-
-def energies(assembly, q, v):
-    """Kinetic, strain, gravitational energy and dissipated power by the core, of such a state."""
-    tree = PlanarTree(assembly)
-    return tree.both.energies(*(x[None] for x in tree.state(q, v)))[0]
-
-
-def joint_state(rng, assembly, modal=0.1):
-    """Any q and v that the joints of the tree allow; what is held by rows may be violated."""
-    tree = PlanarTree(assembly)
-    found = tree.both.at(0.0, *random_state(rng, tree.core.n_v, modal))
-    return found.q[0], found.v[0]
-
-
 def relative(got, expected, scale=None):
     """Largest difference relative to the largest expected value."""
     return np.abs(got - expected).max() / (np.abs(expected).max() if scale is None else scale)
@@ -108,17 +192,17 @@ def relative(got, expected, scale=None):
 
 def oracle_of(assembly):
     """The oracle's mechanism with the same bodies and rows, in the same order."""
-    model = assembly.model
+    robot = assembly.model
     return Mechanism(
-        model.bodies,
-        model.scene.gravity,
+        robot.bodies,
+        robot.scene.gravity[:2],
         [(constraint.measure, constraint.target) for constraint in assembly.constraints],
-        assembly.drives,
-        [(load.body, load.vector, load.magnitude) for load in model.modal_loads],
-        model.rotors,
-        model.frictions,
-        [(gear.motor, gear.coordinate, gear.stiffness, gear.damping) for gear in model.gears],
-        model.state_forces,
+        robot.loads,
+        [(load.body, load.vector, load.magnitude) for load in robot.modal_loads],
+        robot.rotors,
+        robot.frictions,
+        (),
+        robot.state_forces,
     )
 
 

@@ -1,19 +1,40 @@
 """Patches on the two links of `links.arm`, three modes each."""
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from ffrobot.mbs import _core
-from ffrobot.mbs.analysis.replay import ActuatorSet
 
 N = 3  # modes of a link
 UNLIMITED = np.full(N, np.inf)
 
 
+@dataclass(frozen=True)
+class Patches:
+    """As analyses have them, of one body: modal forces per volt Φ_V (n, k), limits (k,)."""
+
+    body: str
+    Phi: np.ndarray
+    limit: np.ndarray
+
+    @property
+    def per_volt(self):
+        return {self.body: self.Phi}
+
+    @property
+    def to_reached(self):
+        return {self.body: np.eye(len(self.Phi))}
+
+    def allocation(self, *, limited):
+        n, k = self.Phi.shape
+        limit = self.limit if limited else np.full(k, np.inf)
+        return _core.Allocation(self.Phi, np.eye(n), np.linalg.pinv(self.Phi), limit, np.ones(n))
+
+
 def patches(Phi, limit=UNLIMITED):
     """The same patches on both links."""
-    return {
-        name: _core.Allocation(Phi, np.eye(N), np.linalg.pinv(Phi), limit, np.ones(N)) for name in ("link1", "link2")
-    }
+    return {name: Patches(name, Phi, limit) for name in ("link1", "link2")}
 
 
-FULL = ActuatorSet(patches(np.eye(N)))  # patches that reach every mode
+FULL = patches(np.eye(N))  # patches that reach every mode

@@ -4,11 +4,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from mechanisms import random_state
+from planar_rows import Kind
 
 from ffrobot.mbs import _core
 
 r = _core
-KINDS = _core.MeasureKind
 
 
 def planar_data(body):
@@ -64,8 +64,8 @@ class Tree:
 
     def from_tree(self, q, v, a=None):
         """q, v and, after an evaluation, accelerations of the assembly for those of the tree."""
-        core, first = self.assembly.system, self.assembly.first
-        Q, V, A = (np.zeros(core.coordinates) for _ in range(3))
+        first = self.assembly.first
+        Q, V, A = (np.zeros(self.assembly.size) for _ in range(3))
         frames = self.model.frames(q, v)
         for k, (i, frame) in enumerate(zip(self.bodies, frames, strict=True)):
             n = self.assembly.model.bodies[i].n_modes
@@ -96,11 +96,11 @@ def groups(assembly):
 def joint_of(assembly, indices):
     """Kind, axis angle and angle offset of a joint by its constraint rows."""
     measures = {assembly.constraints[i].measure.kind: assembly.constraints[i].measure for i in indices}
-    offset = measures[KINDS.angle].offset if KINDS.angle in measures else 0.0
-    if KINDS.slide in measures:
-        x, y = measures[KINDS.slide].direction  # across the axis
+    offset = measures[Kind.angle].offset if Kind.angle in measures else 0.0
+    if Kind.slide in measures:
+        x, y = measures[Kind.slide].direction  # across the axis
         return r.JointKind.prismatic, float(np.arctan2(-x, y)), offset
-    return (r.JointKind.weld if KINDS.angle in measures else r.JointKind.revolute), 0.0, offset
+    return (r.JointKind.weld if Kind.angle in measures else r.JointKind.revolute), 0.0, offset
 
 
 def row_of(measure, markers, number):
@@ -110,10 +110,10 @@ def row_of(measure, markers, number):
     (body_a, a), (body_b, b) = side(measure.a, markers), side(measure.b, markers)
     row.a, row.b = r.MarkerAt(number[body_a], a), r.MarkerAt(number[body_b], b)
     row.kind, row.f = {
-        KINDS.x: lambda: (r.RowKind.point, np.array([1.0, 0, 0])),
-        KINDS.y: lambda: (r.RowKind.point, np.array([0, 1.0, 0])),
-        KINDS.angle: lambda: (r.RowKind.rotation, np.array([0, 0, 1.0])),
-        KINDS.slide: lambda: (r.RowKind.slide, np.array([*measure.direction, 0.0])),
+        Kind.x: lambda: (r.RowKind.point, np.array([1.0, 0, 0])),
+        Kind.y: lambda: (r.RowKind.point, np.array([0, 1.0, 0])),
+        Kind.angle: lambda: (r.RowKind.rotation, np.array([0, 0, 1.0])),
+        Kind.slide: lambda: (r.RowKind.slide, np.array([*measure.direction, 0.0])),
     }[measure.kind]()
     return row
 
@@ -168,5 +168,5 @@ def tree_of(assembly, free=False, wrenches=(), driven=False):
         data.markers = markers[name].list
         body.data = data
         bodies.append(body)
-    built = r.PlanarModel(bodies, markers[None].list, rows, loaded, np.array(model.scene.gravity))
+    built = r.PlanarModel(bodies, markers[None].list, rows, loaded, np.array(model.scene.gravity[:2]))
     return Tree(built, [assembly.index[name] for name, *_ in order], kept, assembly)

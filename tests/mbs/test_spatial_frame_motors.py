@@ -13,7 +13,7 @@ from ffrobot.mbs import _core
 from ffrobot.mbs.model.spatial_drives import Drive, Drives
 from ffrobot.mbs.model.spatial_known_motion import required_forces
 from ffrobot.mbs.model.spatial_system import SpatialSystem
-from ffrobot.mbs.solve.spatial_linearisation import SpatialLinearisation
+from ffrobot.mbs.solve.linearisation import SpatialLinearisation
 
 MOMENT = 0.7  # N·m
 

@@ -15,7 +15,7 @@ from ffrobot.mbs._core import StateFunction
 from ffrobot.mbs.model.spatial_model import row_values
 from ffrobot.mbs.model.spatial_system import SpatialSystem
 from ffrobot.mbs.scene.spatial.loads import SpatialLoad
-from ffrobot.mbs.solve.spatial_linearisation import SpatialLinearisation
+from ffrobot.mbs.solve.linearisation import SpatialLinearisation
 
 KINDS = ("rigid", "solid", "beam", "supported beam")
 

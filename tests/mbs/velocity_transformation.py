@@ -2,6 +2,8 @@
 
 import numpy as np
 from oracle import rotation
+from planar_rows import coordinate as coordinate_of
+from planar_rows import joint_constraints
 
 
 def open_chain(mechanism, scene, q):
@@ -13,7 +15,7 @@ def open_chain(mechanism, scene, q):
         D[i, k] = 1.0
     placed, rest = {None}, np.zeros(mechanism.size)
     for joint in scene.joint:
-        coordinate, place = joint.coordinate(scene.motors), scene.constraints(joint)[0]
+        place = joint_constraints(joint)[0]
         outwards = place.a.body in placed  # the joint's second side is the new body
         known, new = (place.a, place.b) if outwards else (place.b, place.a)
         base, tip = mechanism.marker(known, q, rest), mechanism.marker(new, q, rest)
@@ -23,6 +25,7 @@ def open_chain(mechanism, scene, q):
         if joint.name in driven:
             rate[driven.index(joint.name)] = 1.0 if outwards else -1.0
         angular, section = v_base[2].copy(), True
+        coordinate = None if joint.type == "weld" else coordinate_of(joint, scene.motors)
         if joint.type == "revolute":
             angular = mechanism.marker(coordinate.a if outwards else coordinate.b, q, rest).L[2] @ D + rate
             section = coordinate.a.point != "" or coordinate.b.point != ""

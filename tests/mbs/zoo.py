@@ -4,12 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 from material_points import random_cloud
-from mechanisms import make_model, revolute
+from mechanisms import ModalLoad, make_model, revolute
+from planar_bodies import GeometricStiffening, with_payload
 
 from ffrobot.mbs.fields.expressions import parse_expression
-from ffrobot.mbs.model.geometric_stiffening import GeometricStiffening
-from ffrobot.mbs.model.masses import with_payload
-from ffrobot.mbs.model.model import ModalLoad
 
 LOADS = (
     {"point": "b1.side", "x": "3*sin(t)+1", "y": "-2*cos(t)", "moment": "0.7"},
@@ -157,8 +155,7 @@ def as_built(mechanism):
 
     def build(rng, **keys):
         bare = mechanism(np.random.default_rng(0))
-        joints = [joint.model_dump(exclude_unset=True) for joint in bare.scene.joint]
-        return mechanism(rng, **({"joint": built(joints)} | keys))
+        return mechanism(rng, **({"joint": built(bare.tables["joint"])} | keys))
 
     return build
 
@@ -170,7 +167,7 @@ def geared(name, motor=None, **keys):
     """A mechanism of `ALL` whose revolute joints have motors behind gears that give; rotors come with the analysis."""
     gear = {"gear_ratio": 7.0, "rotor_inertia": 0.02, "stiffness": 90.0, "damping": 0.3, "viscous_friction": 0.2}
     gear |= {} if motor is None else {"motor": motor}
-    joints = [joint.model_dump(exclude_unset=True) for joint in build(name).scene.joint]
+    joints = build(name).tables["joint"]
     return build(name, joint=[joint | gear if joint["type"] == "revolute" else joint for joint in joints], **keys)
 
 

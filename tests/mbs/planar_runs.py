@@ -1,0 +1,170 @@
+"""Analyses of planar robots, and what they found in absolute coordinates (R, θ, p), as the oracle has them."""
+
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from mechanisms import always, assemble, random_state
+
+from ffrobot.mbs import _core
+from ffrobot.mbs.analysis.context import Context
+from ffrobot.mbs.analysis.outcome import Motion, Outcome
+from ffrobot.mbs.analysis.static import Static
+from ffrobot.mbs.model.spatial_model import row_values, target_rates
+from ffrobot.mbs.model.spatial_system import SpatialSystem
+from ffrobot.mbs.quantities.spatial_energy import totals
+from ffrobot.mbs.quantities.spatial_motion import SpatialMotion
+from ffrobot.mbs.quantities.spatial_reactions import reactions
+from ffrobot.mbs.scene.analysis import IntegratedAnalysis
+from ffrobot.mbs.solve.spatial_start import undeformed_posture
+
+
+class JointForces(NamedTuple):
+    """On the second side: force (T, 2), moment (T,), and what the motor does (T,), None without one."""
+
+    reaction: np.ndarray
+    reaction_moment: np.ndarray
+    motor: np.ndarray | None
+
+
+class Seen:
+    """An outcome in the plane: (R, θ, p) of all bodies side by side; what else is asked of it, the outcome has."""
+
+    def __init__(self, robot, outcome):
+        self.robot, self.outcome = robot, outcome
+
+    def __getattr__(self, name):
+        return getattr(self.outcome, name)
+
+    @cached_property
+    def assembly(self):
+        return assemble(self.robot)
+
+    @cached_property
+    def motion(self):
+        run = self.outcome
+        return SpatialMotion(
+            run.model, run.time, run.q, run.v, run.a, run.multipliers, run.forces.required, run.motion.is_at_rest,
+            run.forces.applied, run.forces.commanded,
+        )  # fmt: skip
+
+    def _of_bodies(self, frame, modes, p):
+        found = []
+        for body in self.robot.bodies:
+            node = self.motion.node(body.name)
+            found += [frame(body.name), modes[:, getattr(node, p)]]
+        return np.hstack(found)
+
+    @cached_property
+    def q(self):
+        def frame(name):
+            return np.column_stack([self.motion.body(name).position[:, :2], self.motion.angle(name)])
+
+        return self._of_bodies(frame, self.outcome.q, "p_q")
+
+    @cached_property
+    def v(self):
+        def frame(name):
+            moving = self.motion.body(name)
+            return np.column_stack([moving.velocity[:, :2], moving.angular_velocity[:, 2]])
+
+        return self._of_bodies(frame, self.outcome.v, "p_v")
+
+    @cached_property
+    def a(self):
+        def frame(name):
+            a, alpha, _ = self.motion.forces.of_body(self.outcome.model.tree.index[name])
+            return np.column_stack([a[:, :2], alpha[:, 2]])
+
+        return self._of_bodies(frame, self.outcome.a, "p_v")
+
+    def coordinates(self, body):
+        first = self.assembly.first[self.assembly.index[body]]
+        return slice(first, first + 3 + self.robot.body(body).n_modes)
+
+    def modal_columns(self, body):
+        """Of `F_p`."""
+        here = self.coordinates(body)
+        before = 3 * self.assembly.index[body]
+        return slice(here.start - before, here.stop - before - 3)
+
+    @property
+    def tau(self):
+        """(T, motors)."""
+        return np.column_stack([self.motion.motor_moments[joint][:, 0] for joint in self.robot.motors])
+
+    @property
+    def F_p(self):
+        """(T, modes of all bodies), what patches would have to supply."""
+        modal = self.motion.motor_forces.modal
+        return np.hstack([modal[body.name] @ body.modal_transform for body in self.robot.bodies])
+
+    @property
+    def lambda_(self):
+        """(T, components) multipliers of the trajectories: minus the forces that follow them."""
+        return -np.hstack([self.motion.path_force(path.name) for path in self.robot.scene.trajectory])
+
+
+def run(robot, analysis, source=None, patches=None, progress=always, earlier=None):
+    """What `analysis` finds, after that of `source`; integrations are recorded."""
+    outcomes = {} if source is None else {source.analysis.name: source.outcome}
+    context = Context(
+        model=robot.model, outcomes=outcomes, progress=progress, earlier=earlier, patches=patches or {},
+        is_replayed=isinstance(analysis, IntegratedAnalysis) and analysis.kind != "forward",
+    )  # fmt: skip
+    return Seen(robot, analysis.run(context))
+
+
+def point_motion(seen, point):
+    """Position and deflection (T, 2) of "BODY.POINT"."""
+    return seen.motion.point(point).within(seen.motion.space)
+
+
+def trajectory_force(seen, trajectory):
+    """(T, components)."""
+    return seen.motion.path_force(trajectory)
+
+
+def joint_forces(seen, joint):
+    wrench = reactions(seen.motion)[joint]
+    moments = seen.motion.motor_moments
+    return JointForces(wrench[0][:, :2], wrench[1][:, 2], moments[joint][:, 0] if joint in moments else None)
+
+
+def energies(seen):
+    """Kinetic, strain and gravitational energy, dissipated power (T,)."""
+    return vars(totals(seen.motion)[0])
+
+
+def evaluated(robot, t, q, v):
+    """The accelerations and multipliers that the core finds in the plane, in a state of the tree, seen as a run."""
+    system = SpatialSystem(robot.model)
+    core, scene, _ = system.integrated
+    found = _core.tree_outputs(core, scene, [t], np.concatenate([q, v])[None])
+    motion = Motion(np.array([t]), q[None], v[None], found.accelerations, system.multipliers(found.multipliers))
+    return Seen(robot, Outcome(analysis=Static(name="state", kind="static"), model=robot.model, motion=motion))
+
+
+def random_tree_state(rng, robot, modal=0.1):
+    """Any q and v of the tree; rows may be violated."""
+    return random_state(rng, robot.model.tree.n_v, modal)
+
+
+def posture_of(robot, rng, modal=0.05):
+    """A state of the tree that meets all rows at t = 0, bent at random and moving."""
+    model = robot.model
+    q = undeformed_posture(model).q
+    for node in model.tree.nodes:
+        q[node.p_q] = modal * rng.standard_normal(node.body.n_modes)
+    return on_rows(robot, q, rng.standard_normal(model.tree.n_v))
+
+
+def on_rows(robot, q, v):
+    """A state of the tree moved onto all rows at t = 0 by least steps."""
+    model, at = robot.model, np.zeros(1)
+    for _ in range(30):
+        C, C_v = (x[0] for x in row_values(model, q[None], at))
+        q = model.tree.integrate(q, -np.linalg.lstsq(C_v, C, rcond=None)[0])
+    C_v = row_values(model, q[None], at)[1][0]
+    rates = target_rates(model, q[None], at)[0]
+    return q, v - np.linalg.lstsq(C_v, C_v @ v - rates, rcond=None)[0]
