@@ -11,15 +11,14 @@ from pathlib import Path
 from typing import Any
 
 from ffrobot.scene.spatial_lacks import LACKS
-from ffrobot.schema import schema
+from ffrobot.schema import scene_in, schema
 
 INTRODUCTION = {
     "link": "A link file is the input of stage 1. SI units; the link's axis is x, in-plane bending displaces along y.",
     "scene": "A scene file is the input of stage 2. SI units, angles in rad; file names are relative to the scene's"
-    " folder. `ffrobot schema scene` prints these keys for editors. Axes and signs: [conventions](conventions.md).",
-    "spatial": 'A scene file with `space = "spatial"` is the input of stage 2 in 3D. SI units, angles in rad. Analyses'
-    " have the keys of [planar scenes](scene_keys.md). ffrobot rejects [unsupported keys](#unsupported-in-3d) with an"
-    " error message. `ffrobot schema spatial` prints these keys for editors.",
+    " folder. `ffrobot schema scene` prints these keys for editors. Axes and signs: [conventions](conventions.md)."
+    ' Scenes are planar, or 3D with `space = "spatial"`. The tables mark keys and values of one of the two. ffrobot'
+    " rejects [unsupported features](#unsupported) with an error message.",
     "figures": "A file `figures.toml` next to the results lists the figures of `ffrobot plot`. Without it, standard"
     " figures are drawn.",
 }
@@ -27,11 +26,11 @@ HERE = Path(__file__).parent / "reference"
 
 
 LINK_TABLES = tuple(schema("link")["$defs"])
-SCENE_TABLES = tuple(schema("scene")["$defs"])
+Schema = dict[str, Any]
 
 
 def write_key_tables(folder: Path) -> None:
-    """Write `link_keys.md`, `scene_keys.md`, `spatial_keys.md` and `figures_keys.md` into `folder`."""
+    """Write `link_keys.md`, `scene_keys.md` and `figures_keys.md` into `folder`."""
     for name, text in key_pages().items():
         (folder / name).write_text(text, encoding="utf-8")
 
@@ -40,42 +39,64 @@ def key_pages() -> dict[str, str]:
     """The pages by the name of their file."""
     pages = {}
     for kind, introduction in INTRODUCTION.items():
-        what = "3D scene file" if kind == "spatial" else f"{kind} file"
-        lines = [f"# Keys of a {what}", "", introduction, ""]
-        elsewhere = LINK_TABLES if kind in ("scene", "spatial") else ()
-        elsewhere += SCENE_TABLES if kind == "spatial" else ()  # a body's link has the keys of a link file
-        records = [(name, record) for name, record in _records(schema(kind)) if name not in elsewhere]
-        lines += [line for name, record in records for line in _section(name, record)]
-        lines += _lacks() if kind == "spatial" else ()
-        text = "\n".join(lines).rstrip("\n") + "\n"
-        for name in SCENE_TABLES if kind == "spatial" else ():  # analyses are those of planar scenes
-            text = text.replace(f"](#{name.lower()})", f"](scene_keys.md#{name.lower()})")
-        pages[f"{kind}_keys.md"] = text
+        lines = [f"# Keys of a {kind} file", "", introduction, ""]
+        lines += [line for section in _sections(kind) for line in section]
+        lines += _lacks() if kind == "scene" else ()
+        pages[f"{kind}_keys.md"] = "\n".join(lines).rstrip("\n") + "\n"
     return pages
 
 
 def _lacks() -> Iterator[str]:
-    """Unsupported features of 3D scenes, and what to use instead."""
-    yield from ("## Unsupported in 3D", "", "| feature | instead |", "|---|---|")
+    """Unsupported features, and what to use instead."""
+    yield from ("## Unsupported", "", "| feature | instead |", "|---|---|")
     yield from (f"| {lack.what} | {lack.instead} |" for lack in LACKS)
 
 
-def _records(described: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:
-    """The whole file first, then every table in it."""
-    if "properties" in described:
-        yield "the file", described
-    yield from ((name, record) for name, record in described["$defs"].items() if "properties" in record)
+def _sections(kind: str) -> Iterator[Iterator[str]]:
+    """Of the whole file first, then of every table in it; a body's link has the keys of a link file."""
+    if kind != "scene":
+        yield from (_section(name, record, {"": record}) for name, record in _records(schema(kind)).items())
+        return
+    everything, *parts = (_records(scene_in(space)) for space in (None, "planar", "spatial"))
+    for name, record in everything.items():
+        if name not in LINK_TABLES:
+            of_spaces = zip(("planar", "3D"), parts, strict=True)
+            yield _section(name, record, {space: part[name] for space, part in of_spaces if name in part})
 
 
-def _section(name: str, record: dict[str, Any]) -> Iterator[str]:
+def _records(described: Schema) -> dict[str, Schema]:
+    """By name; the whole file first."""
+    whole = {"the file": described} if "properties" in described else {}
+    return whole | {name: record for name, record in described["$defs"].items() if "properties" in record}
+
+
+def _section(name: str, record: Schema, parts: dict[str, Schema]) -> Iterator[str]:
+    """Of a table with all its keys, and what it is in each space."""
     about = record.get("description", "").splitlines()  # stars are products here, not emphasis
     yield from (f"## {name}", "", *(line.replace("*", "\\*") for line in about), "")
+    if len(parts) < 2 and "" not in parts:
+        yield from (f"In {next(iter(parts))} scenes only.", "")
     yield from ("| key | what | value | default |", "|---|---|---|---|")
-    required = record.get("required", [])
     for key, entry in record["properties"].items():
-        default = "required" if key in required else _code(entry.get("default"))
-        yield f"| `{key}` | {_meaning(key, entry)} | {_kind(entry)} | {default} |"
+        having = {space: part for space, part in parts.items() if key in part["properties"]}
+        only = f" ({next(iter(having))} only)" if len(having) < len(parts) else ""
+        value = _kind(entry)  # tables say by themselves which scenes have them
+        if "](" not in value:
+            value = _each({space: _kind(part["properties"][key]) for space, part in having.items()})
+        default = _each({space: _default(key, part) for space, part in having.items()})
+        yield f"| `{key}`{only} | {_meaning(key, entry)} | {value} | {default} |"
     yield ""
+
+
+def _each(texts: dict[str, str]) -> str:
+    """The one text, or that of each space."""
+    if len(set(texts.values())) == 1:
+        return next(iter(texts.values()))
+    return "; ".join(f"{space}: {text or 'none'}" for space, text in texts.items())
+
+
+def _default(key: str, record: Schema) -> str:
+    return "required" if key in record.get("required", []) else _code(record["properties"][key].get("default"))
 
 
 def _meaning(key: str, entry: dict[str, Any]) -> str:

@@ -42,7 +42,7 @@ def cli() -> None:
 @cli.command()
 @click.argument("kind", type=click.Choice(["link", "scene", "spatial", "figures"]))
 def schema(kind: str) -> None:
-    """Print the JSON schema of link, scene or figures files, or of 3D scenes, for editors.
+    """Print the JSON schema of link, scene or figures files, or of 3D scenes alone, for editors.
 
     \b
     ffrobot schema scene > scene.schema.json

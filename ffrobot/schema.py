@@ -6,6 +6,8 @@ joint has no axis) is beyond a schema: the records and the readers of the files 
 
 from __future__ import annotations
 
+import json
+import re
 from typing import Any
 
 from pydantic import TypeAdapter
@@ -14,43 +16,65 @@ from pydantic_core import core_schema
 
 from .common.key_descriptions import key_descriptions
 from .common.validation import is_key
-from .mbs.fields.spelling import NormalInPlane
+from .mbs.fields.spelling import PLANAR, SPATIAL, NormalInPlane, Spelled
 
 DIALECT = GenerateJsonSchema.schema_dialect
+REF = "#/$defs/"
+REFERENCE = re.compile(r'"#/\$defs/(\w+)"')
+SCENE, IN_PLANE = "Scene", "InPlane"  # names of definitions, and what they end in where planar scenes differ
 
 
 def schema(kind: str) -> dict[str, Any]:
-    """The JSON schema of a "link", "scene" or "figures" file, or of a scene in space ("spatial"), as a dictionary."""
-    generator = _Spatial if kind == "spatial" else _Described
-    described = TypeAdapter(_record(kind)).json_schema(schema_generator=generator)
-    if kind in ("scene", "spatial"):
-        for link in ("BeamLink", "SolidLink"):
-            described["$defs"][link]["required"].remove("name")  # that of the body
-    if kind == "spatial":
-        described["properties"]["space"] = {"const": "spatial", "description": "Dimension of the motion."}
+    """The JSON schema of a "link", "scene" or "figures" file, or of 3D scenes alone ("spatial"), as a dictionary."""
+    described = scene_in(SPATIAL) if kind == SPATIAL else _scene() if kind == "scene" else _file(kind)
+    if kind == SPATIAL:
+        described["properties"]["space"] = {"const": SPATIAL, "description": "Dimension of the motion."}
         described["required"].append("space")
-    if kind == "link":
-        described["oneOf"] = described.pop("anyOf")  # geometry.kind tells beam and solid apart
-    title = "3D scene" if kind == "spatial" else f"{kind} file"
-    return {"$schema": DIALECT, **_for_toml(described), "title": f"ffrobot {title}"}
+    title = "3D scene" if kind == SPATIAL else f"{kind} file"
+    return {"$schema": DIALECT, **described, "title": f"ffrobot {title}"}
 
 
-def _record(kind: str) -> Any:  # noqa: ANN401 (a record or a union of them)
-    if kind == "scene":
-        from .scene.spatial import SpatialSceneKeys as SceneKeys
+def scene_in(space: str | None) -> dict[str, Any]:
+    """The schema of scenes of a `space`, with its definitions; None: with all keys, those of 3D as they are there."""
+    from .scene.spatial import SpatialSceneKeys
 
-        return SceneKeys
-    if kind == "spatial":
-        from .scene.spatial import SpatialSceneKeys
+    generator = {PLANAR: _Planar, SPATIAL: _Spatial, None: _Described}[space]
+    described: dict[str, Any] = TypeAdapter(SpatialSceneKeys).json_schema(schema_generator=generator)
+    for link in ("BeamLink", "SolidLink"):
+        described["$defs"][link]["required"].remove("name")  # that of the body
+    return _for_toml(described)  # type: ignore[no-any-return]
 
-        return SpatialSceneKeys
+
+def _scene() -> dict[str, Any]:
+    """Of scenes of both spaces: `space` says which holds, so that editors name the key that is wrong."""
+    parts = {space: scene_in(space) for space in (PLANAR, SPATIAL)}
+    tables = {space: part.pop("$defs") | {SCENE: part} for space, part in parts.items()}
+    planar, spatial = tables[PLANAR], tables[SPATIAL]
+    differ = {name for name in planar if planar[name] != spatial[name]}
+    refers = {name: set(REFERENCE.findall(json.dumps(table))) for name, table in planar.items()}
+    while more := {name for name in planar if name not in differ and refers[name] & differ}:
+        differ |= more
+    text = json.dumps({f"{name}{IN_PLANE}": planar[name] for name in planar if name in differ})
+    text = REFERENCE.sub(lambda found: f'"{REF}{found[1]}{IN_PLANE * (found[1] in differ)}"', text)
+    is_spatial = {"properties": {"space": {"const": SPATIAL}}, "required": ["space"]}
+    either: list[Any] = [{"$ref": REF + SCENE}, {"$ref": REF + SCENE + IN_PLANE}]
+    conditions = {"if": is_spatial, "then": either[0], "else": either[1]}
+    # Editors that follow no "if" (Taplo) complete keys by "anyOf", which accepts everything.
+    return {"type": "object", **conditions, "anyOf": [*either, True], "$defs": spatial | json.loads(text)}
+
+
+def _file(kind: str) -> dict[str, Any]:
+    """Of link files and of figure files."""
     if kind == "link":
         from .fe_models.link_records import Link
 
-        return Link
-    from .pictures.figures.figure_file import FigureFile
+        described = TypeAdapter(Link).json_schema(schema_generator=_Described)
+        described["oneOf"] = described.pop("anyOf")  # geometry.kind tells beam and solid apart
+    else:
+        from .pictures.figures.figure_file import FigureFile
 
-    return FigureFile
+        described = TypeAdapter(FigureFile).json_schema(schema_generator=_Described)
+    return _for_toml(described)  # type: ignore[no-any-return]
 
 
 class _Described(GenerateJsonSchema):
@@ -73,7 +97,35 @@ class _Described(GenerateJsonSchema):
 
 
 class _Spatial(_Described):
-    space = "spatial"
+    space = SPATIAL
+
+
+class _Planar(_Described):
+    """Of planar scenes, with their spelling."""
+
+    space = PLANAR
+
+    def function_wrap_schema(self, schema: core_schema.WrapValidatorFunctionSchema) -> JsonSchemaValue:
+        inner: Any = schema["schema"]
+        if mark := _spelled(schema):
+            return self.generate_inner(TypeAdapter(mark.spelling).core_schema)
+        if tags := schema.get("metadata", {}).get("tags_in_plane"):
+            return self.generate_inner(inner | {"choices": {tag: inner["choices"][tag] for tag in tags}})
+        return super().function_wrap_schema(schema)
+
+    def default_schema(self, schema: core_schema.WithDefaultSchema) -> JsonSchemaValue:
+        """With as many components as the plane has: such defaults are zeros."""
+        described = super().default_schema(schema)
+        default = described.get("default")
+        if isinstance(default, list) and _spelled(schema["schema"]):
+            described["default"] = default[: described["maxItems"]] if "maxItems" in described else default[-1]
+        return described
+
+
+def _spelled(schema: Any) -> Spelled | None:  # noqa: ANN401 (any core schema)
+    """The mark of a field that planar scenes write otherwise."""
+    mark = getattr(schema.get("function", {}).get("function"), "__self__", None)
+    return mark if isinstance(mark, Spelled) else None
 
 
 def _for_toml(node: Any) -> Any:  # noqa: ANN401 (any part of a JSON document)

@@ -14,7 +14,6 @@ from spatial_checkpoints import load as checkpoint
 from ffrobot.common.errors import InputError
 from ffrobot.fe_models.link_file import read_link
 from ffrobot.scene.load import load_scene, make_scene
-from ffrobot.scene.spatial import is_spatial, load_spatial_scene
 from ffrobot.schema import schema
 
 CASES = Path(__file__).parents[1] / "cases"
@@ -45,14 +44,16 @@ def parsed(path):
 
 @pytest.mark.parametrize("path", SCENES, ids=lambda path: f"{path.parent.name}/{path.stem}")
 def test_scenes_of_the_cases_pass(validator, path):
-    in_space = is_spatial(path)
-    (load_spatial_scene if in_space else load_scene)(path)
-    validator["spatial" if in_space else "scene"].validate(parsed(path))
+    scene = load_scene(path)
+    validator["scene"].validate(parsed(path))
+    assert validator["spatial"].is_valid(parsed(path)) is not scene.is_planar
 
 
 @pytest.mark.parametrize("name", CHECKPOINTS)
 def test_scenes_in_space_pass(validator, name):
-    validator["spatial"].validate(tomllib.loads(scene_of.scene(checkpoint(name), 1e-8)[0]))
+    scene = tomllib.loads(scene_of.scene(checkpoint(name), 1e-8)[0])
+    validator["spatial"].validate(scene)
+    validator["scene"].validate(scene)
 
 
 @pytest.mark.parametrize("path", LINKS, ids=lambda path: f"{path.parent.name}/{path.stem}")
@@ -117,6 +118,26 @@ SCENE_MISTAKES = {
     "list for an expression": (("trajectory", 0, "x"), ["t"]),
     "table for a list": (("body",), {"name": "link1"}),
     "missing key in a table": (("pzt", 0, "d31"), None),
+    "unknown space": (("space",), "plane"),
+    "planar scene called a 3D one": (("space",), "spatial"),
+    "axis of a revolute joint": (("joint", 0, "axis"), [0.0, 0.0, 1.0]),
+    "joint of 3D": (("joint", 0, "type"), "spherical"),
+    "position in 3D": (("joint", 0, "at"), [0.0, 0.0, 0.0]),
+    "force of 3D": (("load",), [{"point": "link2.tip", "z": "t"}]),
+    "orientation of 3D": (("trajectory", 0, "rpy"), ["0", "0", "t"]),
+    "inertia of 3D": (("payload",), [{"point": "link2.tip", "mass": 1.0, "inertia": [0.1, 0.1, 0.1]}]),
+    "patches of 3D": (("pzt", 0, "bends"), "twist"),
+    "components of 3D": (("actuation_points",), [{"body": "link1", "x": [0.5]}]),
+}
+MISTAKES_IN_3D = {
+    "gravity in the plane": (("gravity",), [0.0, -9.81]),
+    "planar scene": (("space",), "planar"),
+    "no space": (("space",), None),
+    "joint without its axis": (("joint", 0, "axis"), None),
+    "position in the plane": (("joint", 0, "at"), [0.0, 0.0]),
+    "angles of bodies": (("initial",), {"angles": {"upper": 0.1}}),
+    "inertia of the plane": (("payload",), [{"point": "fore.tip", "mass": 1.0, "inertia": 0.1}]),
+    "components of the plane": (("actuation_points",), [{"body": "fore", "transverse": [0.5]}]),
 }
 LINK_MISTAKES = {
     "unknown key": (("material", "densty"), 1.0),
@@ -132,6 +153,15 @@ LINK_MISTAKES = {
 @pytest.mark.parametrize(("keys", "value"), SCENE_MISTAKES.values(), ids=SCENE_MISTAKES)
 def test_mistakes_in_a_scene_are_refused_by_both(validator, keys, value):
     folder = CASES / "two_link"
+    data = edited(parsed(folder / "scene.toml"), keys, value)
+    with pytest.raises(InputError):
+        make_scene(folder=folder, **data)
+    assert not validator["scene"].is_valid(data)
+
+
+@pytest.mark.parametrize(("keys", "value"), MISTAKES_IN_3D.values(), ids=MISTAKES_IN_3D)
+def test_mistakes_in_a_3d_scene_are_refused_by_both(validator, keys, value):
+    folder = CASES / "arm_3r"
     data = edited(parsed(folder / "scene.toml"), keys, value)
     with pytest.raises(InputError):
         make_scene(folder=folder, **data)

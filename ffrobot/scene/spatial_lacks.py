@@ -1,4 +1,4 @@
-"""What scenes in space do not have of what their keys, or planar scenes, can say: THE list, which pages print.
+"""What the keys of scenes can say and ffrobot does not support: THE list, which pages print.
 
 Each of these is refused by name where it is found, with what to write in its place; `where` is the module that does so.
 """

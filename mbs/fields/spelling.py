@@ -85,7 +85,8 @@ class TaggedInPlane:
                 )
             return inner(as_tuples(value))
 
-        return core_schema.with_info_wrap_validator_function(read, handler(source))
+        marks = {"tags_in_plane": tags}
+        return core_schema.with_info_wrap_validator_function(read, handler(source), metadata=marks)
 
 
 def as_written(value: Any) -> Any:  # noqa: ANN401

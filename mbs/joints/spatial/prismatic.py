@@ -22,6 +22,8 @@ def _direction(axis: Vector2) -> Vector3:
 class SpatialPrismatic(AxialJoint):
     """The second point slides along `axis` by its coordinate, m; `rpy` is the orientation of the second side.
 
+    In planar scenes the second side keeps the angle of the initial guess.
+
     Drivetrain: `rotor_inertia` J (kg·m²) of a rotor that turns by `gear_ratio` N (rad/m) times the coordinate: a mass J
     N² along it; that the first side turns the rotor is left out.
     """

@@ -15,7 +15,7 @@ from .moving_joint import AxialJoint
 
 
 class SpatialRevolute(AxialJoint):
-    """Two points coincide, the second side turns about `axis` by its coordinate, rad.
+    """Two points coincide, the second side turns about `axis` by its coordinate, rad; in planar scenes about z.
 
     Drivetrain: `rotor_inertia` J (kg·m²) of a rotor that sits on the first body, its axis that of the joint, and turns
     `gear_ratio` times as fast as the second side does on the first. Between the gear of a motor and the second body a

@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Literal
 
 import numpy as np
 from pydantic import model_validator
 
 from ....common.arrays import Array
-from ...fields.spelling import IN_PLANE
 from .joint import ALIGNED, NOT_TURNED, POINT, Place, SpatialJoint
 
 
 class SpatialWeld(SpatialJoint):
-    """The second side is fixed to the first with orientation `rpy`."""
+    """The second side is fixed to the first with orientation `rpy`; in planar scenes with the angle of the guess."""
 
     type: Literal["weld"]
-    motor: Annotated[bool | None, IN_PLANE] = None
+    motor: bool | None = None
     """Only `false`: a weld cannot be driven."""
 
     @model_validator(mode="after")

@@ -91,7 +91,7 @@ class SpatialRigidBody(Record):
     mass: Positive
     """Mass, kg."""
     inertia: Annotated[Inertia, Spelled(float, _about_center)]
-    """Inertia about the center of mass, body axes, kg·m²: [xx, yy, zz], or three rows."""
+    """Inertia about the center of mass, body axes, kg·m²: [xx, yy, zz], or three rows; in planar scenes about z."""
     center: Vector
     """Center of mass, m, axes of the body."""
     points: dict[Name, Vector] = Field(default_factory=dict)
@@ -112,12 +112,12 @@ class BodyInSpace(BodyKeys):
     The default `name` in a table of a link's keys is that of the body. A link moves in the families of modes that its
     file has, and is rigid in the others.
 
-    `modes` of a flexible body is the number of its lowest modes of all families; the others are represented by their
-    static flexibility. Patches serve all modes of the file. "auto" takes as many as the tolerances of the analyses
-    need; the default is all.
+    `modes` of a flexible body is the number of its lowest modes, in planar scenes of those in the plane; the others are
+    represented by their static flexibility. Patches serve all modes of the file. "auto" takes as many as the tolerances
+    of the analyses need; the default is all.
 
-    `pieces` is the number of segments of a beam link for large deflections in both planes, and twist; "auto" chooses
-    it. Results are those of the whole link.
+    `pieces` is the number of segments of a beam link for large deflections, in 3D scenes in both planes, and twist;
+    "auto" chooses it. Results are those of the whole link, and geometric stiffening is on by default.
     """
 
     rigid: SpatialRigidBody | None = None
@@ -134,7 +134,8 @@ class SpatialPayload(Record):
     center: Annotated[Vector3, IN_SPACE] = (0.0, 0.0, 0.0)
     """Center of mass, m from the point, axes of the body."""
     inertia: Annotated[Inertia, Spelled(NotNegative, inertia_about_z)] = (0.0, 0.0, 0.0)
-    """Inertia about that center, axes of the body, kg·m²: [xx, yy, zz], or three rows."""
+    """Inertia about that center, axes of the body, kg·m²: [xx, yy, zz], or three rows; in planar scenes about z, and
+    the center is the point."""
 
     @field_validator("inertia")
     @classmethod

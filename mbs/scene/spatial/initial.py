@@ -16,7 +16,11 @@ Numbers = Annotated[Quantity | tuple[Quantity, ...], Spelled(Quantity, as_writte
 
 
 class SpatialInitial(Record):
-    """State at t = 0; joint coordinates and rates are guesses that the constraints correct."""
+    """State at t = 0; values of bodies and joints are guesses that the constraints correct.
+
+    In planar scenes with `joints` or `joint_rates`, a frame without an own angle or rate follows the coordinate of its
+    inboard joint (default 0); without them, its angle and rate are 0.
+    """
 
     state: Literal["undeformed", "static"] = "undeformed"
     """State of the links: undeformed, or static equilibrium under gravity and loads."""
@@ -25,8 +29,9 @@ class SpatialInitial(Record):
     rates: Annotated[dict[str, Quantity], IN_PLANE] = Field(default_factory=dict)
     """Guess of their rates, rad/s."""
     joints: dict[str, Numbers] = Field(default_factory=dict)
-    """Guess of each joint's coordinates, rad or m (or such as "60*deg"); lists for several; default 0. Spherical
-    joints: a rotation vector; free ones: position and rotation vector, in the axes of the first side."""
+    """Guess of each joint's coordinates, rad or m (or such as "60*deg"); lists for several; default 0; in planar
+    scenes instead of angles of bodies. Spherical joints: a rotation vector; free ones: position and rotation vector, in
+    the axes of the first side."""
     joint_rates: dict[str, Numbers] = Field(default_factory=dict)
     """Their rates, rad/s or m/s; spherical and free joints: angular velocity in the axes of the second side, after
     the velocity in those of the first."""

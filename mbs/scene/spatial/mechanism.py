@@ -30,7 +30,7 @@ class SpatialMechanismKeys(Record):
     gravity: Vector
     """Acceleration of gravity, m/s², global axes."""
     motors: Literal["section", "frame"] = "section"
-    """Reference of motors: sections at the joint, or frames of the bodies."""
+    """Reference of motors and, in planar scenes, joint coordinates: sections at the joint, or frames of the bodies."""
     geometric_stiffening: bool | Literal["auto"] | None = None
     """Stiffness of links depends on their loads; "auto": if these change it by more than 1 %. Default: on for
     subdivided links only, except links with loads between the ends of a segment."""
@@ -45,7 +45,7 @@ class SpatialMechanismKeys(Record):
     trajectory: tuple[SpatialTrajectory, ...] = ()
     """Prescribed motions."""
     load: tuple[SpatialLoad, ...] = ()
-    """Prescribed forces and moments."""
+    """Prescribed forces, torques and voltages."""
     payload: tuple[SpatialPayload, ...] = ()
     """Masses on points."""
     initial: SpatialInitial = SpatialInitial()

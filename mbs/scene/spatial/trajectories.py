@@ -41,8 +41,8 @@ class SpatialTrajectory(MotionKeys):
     """
 
     via: Annotated[tuple[OfPlane, ...], OfPlaces] | None = None
-    """Waypoints from rest to rest, the first at t = 0: [x, y] (z is not prescribed) or [x, y, z] (m), [x, y, z, roll,
-    pitch, yaw] (m, rad), or values of the joint (rad, m)."""
+    """Waypoints from rest to rest, the first at t = 0: [x, y] (m), or values of the joint or angle (rad, m). In 3D
+    scenes also [x, y, z], and [x, y, z, roll, pitch, yaw] (m, rad); [x, y] does not prescribe z."""
     name: Name
     """Name of the trajectory, unique in the scene."""
     point: PointReference | None = None
@@ -51,8 +51,8 @@ class SpatialTrajectory(MotionKeys):
     """Joint whose coordinate follows the trajectory: second side relative to the first."""
     angle: str | None = None
     """Body, or section "BODY.POINT", whose absolute angle about `axis` follows the trajectory: one component of its
-    orientation, the others are free. Of the section's direction that is across `axis` where its axes are global ones,
-    the projection on the plane across `axis` has this angle."""
+    orientation, the others are free; in planar scenes about z. Of the section's direction that is across `axis` where
+    its axes are global ones, the projection on the plane across `axis` has this angle."""
     axis: Annotated[Vector3 | None, IN_SPACE] = None
     """Axis of `angle`, global axes; by default z."""
     motor: Annotated[str | None, IN_SPACE] = None
@@ -75,10 +75,10 @@ class SpatialTrajectory(MotionKeys):
     direction: Annotated[Triple | None, IN_SPACE] = None
     """Direction of `tool_axis` in global axes, of any length; expressions in t."""
     value: Expression | None = None
-    """Joint coordinate, rad (sliding: m); expression in t (s)."""
+    """Joint coordinate (rad; sliding: m) or angle (rad); expression in t (s)."""
     waypoints: WaypointTable | None = None
-    """CSV file with the columns t (s) and x, y, z (m), and qw, qx, qy, qz for the orientation; of a joint value, or a
-    column of the joint's name (rad, m)."""
+    """CSV file with the columns t (s) and x, y (m), in 3D scenes also z, and qw, qx, qy, qz for the orientation. Of a
+    joint: with the column value, or one of the joint's name (rad, m)."""
 
     @model_validator(mode="after")
     def _consistent(self, info: ValidationInfo) -> SpatialTrajectory:
