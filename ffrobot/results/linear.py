@@ -43,10 +43,14 @@ def write_spatial_linear(group: h5py.Group, motion: SpatialMotion, linear: Linea
 
 def _of_frames(motion: SpatialMotion, row: int) -> Array:
     """(coordinates, n_v) rates of place, angle and modes of each body that moves in the plane, by v."""
-    found, all_rates = [], np.eye(motion.model.tree.n_v)
+    n_v, space = motion.model.tree.n_v, motion.space
+    moving = replace(motion, time=np.repeat(motion.time[row], n_v), q=np.repeat(motion.q[row : row + 1], n_v, 0),
+                     v=np.eye(n_v))  # fmt: skip
+    found = []
     for name in motion.points:
-        L = motion.frames[motion.model.tree.index[name]].L[row]
-        found += [motion.space.along(L[:3].T).T, motion.space.about(L[3:].T)[None], all_rates[motion.node(name).p_v]]
+        body = moving.body(name)
+        turn = space.about(body.angular_velocity)
+        found += [space.along(body.velocity).T, turn[None], moving.modal_velocity(name).T]
     return np.concatenate(found)
 
 

@@ -13,10 +13,13 @@ from typing import TYPE_CHECKING
 from ..actuation.context import ActuatedContext
 from ..actuation.feasibility import Feasibility
 from ..actuation.spatial_points import forces_at_points, solve_spatial_points, spatial_point_set, with_spatial_points
-from ..common.errors import FfrobotError, SolveError, of_file
+from ..actuation.unsupplied import held_shift
+from ..common.arrays import Array
+from ..common.errors import FfrobotError, InputError, SolveError, of_file
 from ..mbs.analysis.operating_points import InstantAnalysis
 from ..mbs.analysis.outcome import Outcome
 from ..mbs.quantities.spatial_energy import totals
+from ..mbs.quantities.spatial_motion import SpatialMotion
 from ..mbs.quantities.spatial_reactions import reactions
 from ..mbs.quantities.spatial_sharing import shared_evenly
 from ..mbs.quantities.validity import NOTABLE
@@ -28,7 +31,7 @@ from ..scene.spatial import SpatialScene
 from .enough import completed, goes_on, is_replayed, log_outcome, progress_of, with_enough_modes, with_enough_pieces
 from .mode_search import ModeSearch, error_tolerances
 from .paths import with_paths_in_space
-from .spatial_actuation import actuated_in_space, patches_in_space, predicted_shift
+from .spatial_actuation import actuated_in_space, missing_forces, patches_in_space
 from .spatial_bodies import load_spatial_bodies
 from .spatial_finer import checked_in_space
 from .spatial_mode_choice import mode_levels_in_space, reported_in_space
@@ -238,8 +241,7 @@ def _context(
 def _with_peaks(solution: SpatialSolution, run: Outcome) -> SpatialResult:
     """What is read off a run; what is judged by peaks, by those between outputs."""
     found, closer = _evaluated(solution, run), run.closer
-    if found.actuation is not None and not solution.divided:
-        found = replace(found, predicted_shift=predicted_shift(found.motion, found.actuation))
+    found = replace(found, predicted_shift=_predicted_shift(solution, found))
     twists = {joint: gear.curve for joint, gear in found.motion.gears.items()}  # splines through outputs
     known = {joint: curve for joint, curve in twists.items() if curve is not None}
     if closer is run or len(known) < len(twists):
@@ -249,6 +251,25 @@ def _with_peaks(solution: SpatialSolution, run: Outcome) -> SpatialResult:
     if actuation is not None and between.actuation is not None:
         actuation = replace(actuation, feasibility=between.actuation.feasibility)
     return replace(found, actuation=actuation, bending=bending_of_links(solution, between.motion), closer=between)
+
+
+def _predicted_shift(solution: SpatialSolution, found: SpatialResult) -> dict[str, Array]:
+    """Shift (T, 3), m, of all points by modal forces that nothing supplies; of links in pieces as of the whole links.
+
+    None where the joints of whole links cannot say how the pieces move.
+    """
+    motion = found.motion
+    forces = {} if found.actuation is None else missing_forces(motion, found.actuation)
+    if not forces:
+        return {}
+    points = [f"{body}.{label}" for body, labels in motion.points.items() for label in labels]
+    if (whole := whole_links_in_space(solution)) is not None:
+        try:
+            told = whole.told(found.run)
+        except InputError:
+            return {}
+        motion = SpatialMotion(told.model, told.time, told.q, told.v, told.a, told.multipliers)
+    return held_shift(motion, forces, points)
 
 
 def _evaluated(solution: SpatialSolution, run: Outcome, twists: Mapping[str, BSpline] | None = None) -> SpatialResult:

@@ -11,7 +11,6 @@ from ..actuation.feasibility import Feasibility
 from ..actuation.patches.spatial_patches import LinkPatches, by_body, link_patches
 from ..actuation.patches.voltages import Voltages
 from ..actuation.spatial_feasibility import judge_in_space, links_in_motion
-from ..actuation.unsupplied import held_shift
 from ..common.arrays import Array
 from ..mbs.model.spatial_drives import Drive
 from ..mbs.model.spatial_model import SpatialModel, modal_directions
@@ -89,13 +88,9 @@ def actuated_in_space(
     return SpatialActuation(voltages, unmet, judged)
 
 
-def predicted_shift(motion: SpatialMotion, actuation: SpatialActuation) -> dict[str, Array]:
-    """Shift (T, 3), m, of all points of bodies by modal forces that nothing supplies, `unmet` ones of patches.
-
-    None where no link has patches and nothing is missing.
-    """
+def missing_forces(motion: SpatialMotion, actuation: SpatialActuation) -> dict[str, Array]:
+    """By body, modal forces (T, n), modes of its file, that nothing supplies; none where nothing is missing."""
     forces = motion.motor_forces
     if forces is None or not motion.motors_fit or not (actuation.unmet or actuation.feasibility.unsupplied):
         return {}
-    points = [f"{body}.{label}" for body, labels in motion.points.items() for label in labels]
-    return held_shift(motion, {**forces.modal, **actuation.unmet}, points)
+    return {**forces.modal, **actuation.unmet}

@@ -35,11 +35,15 @@ X = np.array([1.0, 0.0, 0.0])
 
 @dataclass(frozen=True)
 class Divided:
-    """A link in pieces: its modal body, how it is cut, and the modal bodies of its pieces from the root to the tip."""
+    """A link in pieces: its modal body, how it is cut, and the modal bodies of its pieces from the root to the tip.
+
+    `to_own` (n_file, n): modal coordinates of the whole link in the equations, by those of its file.
+    """
 
     modal: ModalBody
     body: BodyInPieces
     pieces: tuple[ModalBody, ...]
+    to_own: Array
 
 
 @dataclass(frozen=True)
@@ -74,6 +78,12 @@ class MotionOfLinks(SpatialMotion):
     def body(self, name: str) -> BodyMotion:
         """Of a body's frame and modes, or of a link's."""
         return self._links[name] if name in self.divided else super().body(name)
+
+    def modal_velocity(self, body: str) -> Array:
+        """Rates (T, n) of the modes that a body, or the whole link, has in the equations."""
+        if body not in self.divided:
+            return super().modal_velocity(body)
+        return as_floats(self._links[body].modal_velocity @ self.divided[body].to_own)
 
     def point(self, point: str) -> PointMotion:
         """Of the section "BODY.POINT": where the piece has it, and how far that is from its place in the link."""
@@ -112,8 +122,9 @@ def divided_links(solution: SpatialSolution) -> dict[str, Divided]:
     for name, body in solution.divided.items():
         modal = solution.bodies[name].modal
         pieces = [solution.parts[piece].modal for piece in body.names]
+        to_own = np.linalg.pinv(solution.bodies[name].spatial.modal_transform).T
         assert modal is not None
-        found[name] = Divided(modal, body, tuple(piece for piece in pieces if piece is not None))
+        found[name] = Divided(modal, body, tuple(piece for piece in pieces if piece is not None), as_floats(to_own))
     return found
 
 

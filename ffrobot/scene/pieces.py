@@ -12,7 +12,7 @@ from typing import Any, TypeVar
 from ..common.errors import InputError
 from ..common.validation import Record
 from ..fe_models.link_records import FAMILIES
-from ..fe_models.pieces import CutLink, cut
+from ..fe_models.pieces import IN_PLANE, CutLink, cut
 from ..mbs.joints.spatial.weld import SpatialWeld
 from ..mbs.scene.spatial.bodies import BodyInSpace
 from ..mbs.scene.spatial.mechanism import SpatialMechanismKeys
@@ -37,11 +37,11 @@ def bodies_in_pieces_in_space(scene: SpatialScene, counts: Mapping[str, int]) ->
 
     Raises `InputError` where a link or the scene allows no pieces.
     """
-    found = {}
+    found, families = {}, IN_PLANE if scene.is_planar else FAMILIES
     for body in scene.body:
         if body.link is not None and body.name in counts:
             names = tuple(f"{body.name}, piece {k}" for k in range(1, counts[body.name] + 1))
-            found[body.name] = BodyInPieces(cut(body.link, counts[body.name], FAMILIES), names)
+            found[body.name] = BodyInPieces(cut(body.link, counts[body.name], families), names)
     problems = [f"{scene.path}: {problem}" for problem in _problems(scene, found)]
     if problems:
         raise InputError("\n".join(problems))

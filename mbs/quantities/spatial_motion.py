@@ -123,6 +123,10 @@ class SpatialMotion:
             self.q[:, node.p_q] @ stored, self.v[:, node.p_v] @ stored,
         )  # fmt: skip
 
+    def modal_velocity(self, body: str) -> Array:
+        """Rates (T, n) of the modes that a body has in the equations."""
+        return self.v[:, self.node(body).p_v]
+
     def angle(self, body: str) -> Array:
         """θ (T,) of the frame of a body that moves in the plane, rad; turns of the joints before it count."""
         e = self.body(body).orientation
