@@ -164,7 +164,7 @@ def stopped(stopped_once, tmp_path):
 
 
 PEAKS = [f"checkpoint/{name}_peaks" for name in ("state", "force")]
-RESUMED = ["checkpoint/state", *PEAKS, "q", "v", "a", "lambda_", "tau", "F_p"]
+RESUMED = ["checkpoint/state", *PEAKS, "q", "v", "a", "multipliers"]
 CHANGES = {
     "empty": lambda values: values[:0],
     "short": lambda values: values[:-1],

@@ -10,8 +10,7 @@ import pytest
 from ffrobot import make_scene
 from ffrobot.common import checksum
 from ffrobot.common.errors import InputError
-from ffrobot.present.spatial import print_spatial_summary
-from ffrobot.present.summary import summary_console
+from ffrobot.present.summary import print_summary, summary_console
 from ffrobot.results.file import Results
 from ffrobot.results.spatial import spatial_image
 from ffrobot.run.mode_search import ErrorEstimate, difference
@@ -132,7 +131,7 @@ def test_results_say_what_their_modal_coordinates_are(reduced, tmp_path):
 
 def test_the_summary_tells_the_number_the_estimate_and_what_is_saved(reduced, tmp_path, capsys):
     verdict = Results.from_image(spatial_image(reduced), tmp_path / "x.h5").verdict
-    print_spatial_summary(reduced, verdict, tmp_path / "x.h5", reduced.seconds, summary_console())
+    print_summary(reduced, verdict, tmp_path / "x.h5", reduced.seconds, summary_console())
     printed = " ".join(capsys.readouterr().out.split())
     assert "link1: 3 of 10 modes and 2 static shapes for the others; link2: 3 of 10 modes" in printed
     assert "inverse: error of leaving out the others, estimated: deflections" in printed
