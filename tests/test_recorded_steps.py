@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 
-from ffrobot.run.solve import solve
-from ffrobot.scene.load import make_scene
+from ffrobot import make_scene
+from ffrobot.mbs.analysis.spatial_replay import supplied
+from ffrobot.run.spatial import solve_spatial
 
 TUBES = {"upper": (0.5, 0.06, 0.052), "fore": (0.4, 0.05, 0.044), "hand": (0.2, 0.03, 0.026)}
 
@@ -54,14 +55,15 @@ def arm():
              "output_step": 0.002},
         ],
     )  # fmt: skip
-    return solve(scene)
+    return solve_spatial(scene)
 
 
 def test_moments_between_outputs_are_those_of_a_spline_through_them(arm):
     """The path is smooth and the links do not ring, so that 1e-6 of the peak is what both leave."""
-    source = arm.outcomes["inverse"]
+    source, motion = arm.outcomes["inverse"], arm.analyses["inverse"].motion
+    moments = np.hstack([motion.motor_moments[joint] for joint in ("shoulder", "elbow", "wrist")])
     times = np.arange(0.0, 3.0, 0.00025)
-    tau, _ = source.details.actuation_source(source).sample(times.tolist())
-    off = np.abs(tau - CubicSpline(source.time, source.tau)(times)).max(axis=0)
+    tau = supplied(source, np.full(3, np.inf), {}, limited=False).sample(times.tolist())
+    off = np.abs(tau - CubicSpline(source.time, moments)(times)).max(axis=0)
     assert source.statistics.integrator.name == "radau"
-    assert np.all(off < 2e-6 * np.abs(source.tau).max(axis=0))
+    assert np.all(off < 2e-6 * np.abs(moments).max(axis=0))

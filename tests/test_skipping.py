@@ -8,15 +8,12 @@ import h5py
 import numpy as np
 import pytest
 
+from ffrobot import make_scene
 from ffrobot.fe_models.link import make_link
 from ffrobot.mbs import _core
-from ffrobot.mbs.analysis import fcid
-from ffrobot.mbs.model.planar_body import core_arguments, vanishing_terms
-from ffrobot.mbs.model.system import MechanismSystem
-from ffrobot.results.write import results_image
-from ffrobot.run.prepare import prepare
-from ffrobot.run.solve import solve
-from ffrobot.scene.load import make_scene
+from ffrobot.mbs.model.spatial_system import SpatialSystem
+from ffrobot.results.spatial import spatial_image
+from ffrobot.run.spatial import prepare_spatial, solve_spatial
 
 LINK = """
 name = "{name}"
@@ -76,71 +73,64 @@ def arm(folder, link, **keys):
 
 
 def test_planar_scenes_have_no_coordinates_out_of_their_plane(folder):
-    """Two bodies in (R, θ) and the modes that move in the plane; the others are named."""
-    solution = solve(arm(folder, "all"))
+    """Two joints and the modes that move in the plane; the others are named."""
+    solution = solve_spatial(arm(folder, "all"))
     families = solution.bodies["arm"].modal.family
     in_plane = sum(family in ("in-plane-bending", "axial") for family in families)
     assert families.count("in-plane-bending") < in_plane < len(families) == 14
-    assert solution.outcomes["run"].q.shape[1] == 3 + 3 + in_plane
+    assert solution.outcomes["run"].q.shape[1] == 2 + in_plane
     line = next(line for line in solution.omissions if "without in-plane motion" in line)
     assert line.startswith(f"arm: {14 - in_plane} of 14 modes")
     assert f"{families.count('out-of-plane-bending')} out-of-plane-bending" in line
     assert "out-of-plane motion" in solution.omissions
     assert not any("axial deformation" in line for line in solution.omissions)  # it has axial modes
-    with h5py.File(BytesIO(results_image(solution))) as file:
+    with h5py.File(BytesIO(spatial_image(solution))) as file:
         assert file["run/bodies/arm/modal"].shape == (11, in_plane)
         assert file["run/bodies/arm/modal_transform"].shape == (14, in_plane)
 
 
-def test_rigid_bodies_have_no_modal_blocks(folder):
-    solution = prepare(arm(folder, "bending"))
-    stick, flexible = solution.model.bodies
-    assert core_arguments(stick, [], [])["W"].shape == (3, 0)
-    assert MechanismSystem(solution.model, solution.model.joints).system.coordinates == 3 + 3 + flexible.n_modes
+def test_rigid_bodies_have_no_modal_coordinates(folder):
+    solution = prepare_spatial(arm(folder, "bending"))
+    stick, flexible = (node.body for node in solution.model.tree.nodes)
+    assert stick.n_modes == 0
+    assert SpatialSystem(solution.model).plane.model.n_v == 1 + 1 + flexible.n_modes
     assert "modal coordinates of stick, rigid" in solution.omissions
     assert any(line.startswith("axial deformation of arm") for line in solution.omissions)
 
 
-def test_terms_that_vanish_are_not_multiplied(folder):
-    """Bending alone has S̃ = 0 and j = 0, axial modes beside it have not: the core gets no matrix for the former."""
-    bending, both = (prepare(arm(folder, link)) for link in ("bending", "all"))
-    n = both.model.bodies[1].n_modes
-    of_bending, of_both = (core_arguments(solution.model.bodies[1], [], []) for solution in (bending, both))
-    for term, symbol, shape in (
-        ("S_tilde", "inertia between rotation and pairs of modes", (n, n)),
-        ("j", "change of inertia to first order in deflections", (n,)),
-    ):
-        assert of_bending[term].size == 0
-        assert of_both[term].shape == shape
-        assert f"{symbol}, which is zero" in bending.omissions
-        assert f"{symbol}, which is zero" not in both.omissions
-    assert of_bending["damping"].size == of_bending["m_xy"].size == 0
-    assert vanishing_terms(bending.model.bodies[0]) == ()
+def test_terms_that_vanish_are_named(folder):
+    """Bending alone has S̃ = 0 and j = 0, axial modes beside it have not."""
+    bending, both = (prepare_spatial(arm(folder, link)).omissions for link in ("bending", "all"))
+    for symbol in ("inertia between rotation and pairs of modes", "change of inertia to first order in deflections"):
+        assert f"{symbol}, which is zero" in bending
+        assert f"{symbol}, which is zero" not in both
+    assert "damping, which is zero" in bending
 
 
 def test_algebraic_analyses_integrate_nothing(folder, monkeypatch):
     def refuse(*_):
         raise AssertionError
 
-    monkeypatch.setattr(_core, "run_tree", refuse)
-    assert fcid._core is _core
+    monkeypatch.setattr(_core, "tree_motion", refuse)
     analysis = {"name": "stiff", "kind": "fcid", "shape": "static", "end": 0.1, "output_step": 0.01}
-    solution = solve(arm(folder, "bending", analysis=[analysis]))
+    solution = solve_spatial(arm(folder, "bending", analysis=[analysis]))
     outcome = solution.outcomes["stiff"]
     assert outcome.statistics.steps == outcome.statistics.evaluations == 0
     assert outcome.q.shape[0] == 11
-    assert np.abs(outcome.lambda_).max() > 1.0
+    assert np.abs(solution.analyses["stiff"].motion.path_force("path")).max() > 1.0
     assert "integration of stiff, algebraic" in solution.omissions
 
 
 def test_only_runs_that_are_replayed_are_recorded(folder):
     run = {"kind": "pcid", "end": 0.02, "output_step": 0.01, "tolerance": 1e-4}
     forward = {"name": "back", "kind": "forward", "actuation": "first", "apply": "joints"}
-    solution = solve(arm(folder, "bending", analysis=[run | {"name": "first"}, run | {"name": "second"}, forward]))
+    solution = solve_spatial(
+        arm(folder, "bending", analysis=[run | {"name": "first"}, run | {"name": "second"}, forward])
+    )
     assert solution.outcomes["first"].continuation.recording is not None
     assert solution.outcomes["second"].continuation.recording is None
     assert not solution.analyses["first"].stresses  # the modal body file has no modal stresses
-    assert not solution.analyses["first"].voltages  # no patches
+    assert not solution.analyses["first"].actuation.voltages  # no patches
 
 
 def test_no_analysis_loads_finite_elements_or_plotting(folder):
@@ -170,7 +160,7 @@ def test_another_layout_of_patches_needs_nothing_of_stage_1(folder):
     patches = {"body": "arm", "length": 0.02, "width": 0.01, "thickness": 1e-3, "modulus": 63e9, "d31": 1.1e-10}
     before = (folder / "bending.h5").stat().st_mtime_ns
     for count in (9, 12):
-        solution = prepare(arm(folder, "bending", pzt=[patches | {"count": count}]))
+        solution = prepare_spatial(arm(folder, "bending", pzt=[patches | {"count": count}]))
         assert not solution.bodies["arm"].computed
         assert solution.bodies["arm"].path == folder / "bending.h5"
     assert (folder / "bending.h5").stat().st_mtime_ns == before
