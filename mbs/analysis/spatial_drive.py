@@ -15,6 +15,7 @@ from .._core import TimeFunction
 from ..fields.waypoints import spline
 from ..model.spatial_drives import NO_DRIVES, Command, Drives, PointDrive, Replayed
 from ..model.spatial_model import SpatialModel
+from ..model.spatial_motors import integrated_mechanism
 from ..model.spatial_system import SpatialSystem
 from ..scene.analysis import IntegratedAnalysis
 from ..solve.diagnosis import find_cause_in_space
@@ -202,6 +203,12 @@ def _between(
     return replace(found, motion=_motion(system, run, times[rows])), run.replayed
 
 
+def _judged(system: SpatialSystem) -> _core.PlanarDriven | _core.SpatialDriven | None:
+    """The mechanism with its motors, where these take the place of forces on a path: their errors count, too."""
+    is_followed = any(row.is_trajectory for row in system.model.rows)
+    return integrated_mechanism(system) if is_followed and system.model.motors else None
+
+
 def _motion(system: SpatialSystem, run: _core.TreeRun, times: Array) -> Motion:
     """The motion of a run of the core, as far as it got."""
     q, v = (np.ascontiguousarray(part) for part in np.split(run.states, [system.model.tree.n_q], axis=1))
@@ -226,9 +233,10 @@ def _integrated(
 ) -> _core.TreeRun:
     core, scene, _ = system.integrated
     if control is None:
-        return _core.tree_motion(
+        motion: Callable[..., _core.TreeRun] = _core.tree_motion  # core and motors are of one space
+        return motion(
             core, scene, as_list(times), start.q, start.v, controls, progress, continuation.checkpoint,
-            continuation.samples, continuation.recording, system.replay,
+            continuation.samples, continuation.recording, system.replay, _judged(system),
         )  # fmt: skip
     return _core.tree_sampled(
         model=core, scene=scene, times=as_list(times), q=start.q, v=start.v, controls=controls,

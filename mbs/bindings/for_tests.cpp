@@ -10,7 +10,7 @@
 #include <algorithm>
 #include <stdexcept>
 
-#include "bindings/bindings.h"
+#include "bindings/recursion/recursion.h"
 
 namespace nb = nanobind;
 using namespace nb::literals;
@@ -106,6 +106,22 @@ VectorXd joined(const VectorXd &q, const VectorXd &v) {
   return y;
 }
 
+template <class Space>
+RowMajorMatrix tree_fixed_steps(const recursion::Model<Space> &model, const recursion::Scene &scene, double end,
+                                int steps, const VectorXd &q, const VectorXd &v, MethodKind kind,
+                                double spectral_radius) {
+  model.check_state(q, v);
+  recursion::RecursiveMotion<Space> motion(model.mechanism, scene, 0, q.data(), v.data());
+  motion.plan(end);
+  return equal_steps(motion, joined(q, v), end, steps, {kind, spectral_radius});
+}
+
+template <class Space> void bind_fixed_steps(nb::module_ &m) {
+  m.def("tree_fixed_steps", &tree_fixed_steps<Space>, "model"_a, "scene"_a, "end"_a, "steps"_a, "q"_a, "v"_a,
+        "method"_a, "spectral_radius"_a,
+        "States after equal steps and in their middle (2 steps + 1, n_q + n_v), for convergence studies.");
+}
+
 RowMajorMatrix fixed_steps(const SystemOnTree &both, double end, int steps, const VectorXd &q, const VectorXd &v,
                            MethodKind kind, double spectral_radius) {
   check_size("q", q.size(), both.tree.n_q);
@@ -142,6 +158,8 @@ RowMajorMatrix top_motion(const Vector3d &inertia, const Vector3d &r, const Vect
 } // namespace
 
 void bind_for_tests(nb::module_ &m) {
+  bind_fixed_steps<recursion::Planar>(m);
+  bind_fixed_steps<recursion::Spatial>(m);
   m.def("fixed_steps", &fixed_steps, "both"_a, "end"_a, "steps"_a, "q"_a, "v"_a, "method"_a, "spectral_radius"_a,
         "States of the tree after equal steps and in their middle (2 steps + 1, n_q + n_v), for convergence studies.");
   m.def("top_fixed_steps", &top_fixed_steps, "inertia"_a, "r"_a, "f"_a, "end"_a, "steps"_a, "q"_a, "v"_a, "method"_a,

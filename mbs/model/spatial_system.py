@@ -261,6 +261,7 @@ class SpatialSystem:
             scene.add_gear(motor, joint, gear.sign, gear.stiffness, gear.damping)
         self._act_along_cut(scene, self._parts.cut if plane is None else plane.cut)
         scene.most_bent = [node.body.largest_moment for node in self.model.tree.nodes]
+        scene.has_loops = bool(self.model.loop_rows.any())
         for number, law in self._turning:
             scene.turn_marker(number, _turning_law(law))
         return scene

@@ -14,6 +14,7 @@ from ..scene.analysis import IntegratedAnalysis
 from .integrators import EXPLICIT, Choice, beyond_order, unmet
 from .path_checks import JUMP
 from .spatial_integrators import TOO_STIFF, fastest_friction
+from .spatial_posture import told_loops
 from .state import State
 
 FAR_BENT = 0.5  # of a link's radius of gyration, in the mean
@@ -22,8 +23,8 @@ FAR_BENT = 0.5  # of a link's radius of gyration, in the mean
 def find_cause_in_space(system: SpatialSystem, analysis: IntegratedAnalysis, choice: Choice, run: _core.TreeRun) -> str:
     """A sentence with advice, the likely causes of a failure, the more certain first; empty where nothing is found.
 
-    A target that is not a number, a link bent too far, a load that jumps, friction; where steps became too short,
-    the integrator.
+    A target that is not a number, a link bent too far, a load that jumps, friction, a singular posture of loops; where
+    steps became too short, the integrator.
     """
     t, at = run.time_reached, State(*np.split(np.array(run.last), [system.model.tree.n_q]))
     found = (
@@ -31,6 +32,7 @@ def find_cause_in_space(system: SpatialSystem, analysis: IntegratedAnalysis, cho
         or too_far_bent(_links(system, at))
         or load_jump(_loads(system), t)
         or _friction(system, analysis, choice, at)
+        or told_loops(system.model, at.q, at.v)
     )
     if found or run.status != _core.IntegrationStatus.step_underflow:
         return found

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ...common.arrays import Array
+from ...common.arrays import Array, as_floats
 from ...common.errors import InputError
 from ...common.validation import quoted
 from ..joints.spatial.joint import SpatialJoint
-from ..model.spatial_model import SpatialModel, row_values, target_rates
+from ..model.spatial_model import SpatialModel, row_values, target_rates, without_paths
 from .path_checks import check_smooth
 from .state import State
 
@@ -23,6 +23,7 @@ SINGULAR = 1e-6  # ratio of singular values below which a posture counts as sing
 NEARLY_SINGULAR = 1e-3  # ratio of singular values that is worth a warning
 MOVING = 0.05  # share of a joint in the motion that a singular posture leaves, of the largest
 MOVES = 1e-6  # share of a joint in a motion that is left free
+BESIDE = 0.05  # rad (and sizes of the robot) before a singular posture, where rows of loops are told apart
 MOST_ITERATIONS = 60
 LARGEST_TURN = 0.5  # rad (and sizes of the robot) that a Newton step may move: keeps to the branch of the guess
 
@@ -110,10 +111,7 @@ class Mobility:
 
 def mobility(model: SpatialModel, q: Array) -> Mobility:
     """Of the mechanism with rigid links at q (n_q,)."""
-    joints, length, is_loop = model.tree.joint_columns, robot_size(model), model.loop_rows
-    scales = joint_scales(model)[joints]
-    row_scales = np.array([1.0 if row.carries_moment else length for row in model.rows]).reshape(-1, 1)
-    J = row_values(model, q[None], np.zeros(1))[1][0][:, joints] * scales / row_scales
+    J, is_loop = _scaled_rows(model, q), model.loop_rows
     free, loop_rank = _null_space(J[is_loop])
     path = J[~is_loop] @ free
     values = np.linalg.svd(path, compute_uv=False)
@@ -131,16 +129,37 @@ def told_posture(model: SpatialModel, ratio: float, t: float, q: Array, *, is_en
     """
     if not ratio < NEARLY_SINGULAR:
         return ""
-    joints, is_loop = model.tree.joint_columns, model.loop_rows
-    scales, length = joint_scales(model)[joints], robot_size(model)
-    row_scales = np.array([1.0 if row.carries_moment else length for row in model.rows]).reshape(-1, 1)
-    J = row_values(model, q[None], np.array([t]))[1][0][:, joints] * scales / row_scales
+    J, is_loop = _scaled_rows(model, q, t), model.loop_rows
     free, _ = _null_space(J[is_loop])
     least = np.abs(free @ np.linalg.svd(J[~is_loop] @ free)[2][-1])
     names = np.array([node.joint.name for node in model.tree.nodes for _ in range(node.joint.freedoms)])
     moving = quoted(dict.fromkeys(names[least > MOVING * least.max()].tolist()))
     how = "a singular posture" if is_end else f"nearly a singular posture (ratio {ratio:.1e})"
     return f"at t = {t:.6g} s {how}: motions of {moving} against each other hardly move what follows the path"
+
+
+def told_loops(model: SpatialModel, q: Array, v: Array) -> str:
+    """Of loops at q (n_q,) that move at v (n_v,): whether their rows hardly differ here, and did before; "" if not."""
+    loops = without_paths(model)
+    before = solve_posture(loops, 0.0, model.tree.integrate(q, -BESIDE / max(float(np.abs(v).max()), 1e-300) * v))
+    if not loops.rows or before is None:
+        return ""
+    values, rank = np.linalg.svd(_scaled_rows(loops, q), compute_uv=False), mobility(loops, before).loop_rank
+    ratio = float(values[rank - 1] / values[0])
+    if not ratio < NEARLY_SINGULAR:
+        return ""
+    return (
+        f"the loops that {quoted(dict.fromkeys(row.owner for row in loops.rows))} close are singular or nearly so there"
+        f" (ratio of singular values {ratio:.1g}): a mechanism at a dead center, or cranks and coupler in a line, where"
+        " no finite force says which way to go on. Keep clear of it, or drive a joint instead"
+    )
+
+
+def _scaled_rows(model: SpatialModel, q: Array, t: float = 0.0) -> Array:
+    """C_v (rows, joint coordinates) at q (n_q,) and time t, in radians and sizes of the robot."""
+    row_scales = np.array([1.0 if row.carries_moment else robot_size(model) for row in model.rows]).reshape(-1, 1)
+    C_v = row_values(model, q[None], np.array([t]))[1][0]
+    return as_floats((C_v * joint_scales(model) / row_scales)[:, model.tree.joint_columns])
 
 
 def _null_space(J: Array) -> tuple[Array, int]:

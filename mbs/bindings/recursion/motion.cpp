@@ -1,6 +1,7 @@
 // Motions of mechanisms in joint coordinates: mbs/core/recursion/motion.h.
 #include "core/recursion/motion.h"
 #include "core/integrate/integrate.h"
+#include "core/recursion/motors.h"
 #include "core/recursion/observe.h"
 
 #include <nanobind/stl/complex.h>
@@ -25,7 +26,8 @@ namespace {
 template <class Space>
 TreeRun motion_of(const Model<Space> &model, const Scene &scene, const std::vector<double> &times, const VectorXd &q,
                   const VectorXd &v, const IntegrationControls &controls, const std::function<bool(double)> &carry_on,
-                  TreeCheckpoint *checkpoint, Samples *samples, Recording *recording, Replay *replay) {
+                  TreeCheckpoint *checkpoint, Samples *samples, Recording *recording, Replay *replay,
+                  const DrivenMechanism<Space> *judged) {
   model.check_state(q, v);
   check_scene(model, scene);
   if (replay)
@@ -33,6 +35,9 @@ TreeRun motion_of(const Model<Space> &model, const Scene &scene, const std::vect
   const nb::gil_scoped_release unlocked;
   RecursiveMotion<Space> motion(model.mechanism, scene, times.front(), q.data(), v.data(), nullptr, replay);
   RecursiveMotion<Space> reader(model.mechanism, scene, times.front(), q.data(), v.data(), nullptr, replay);
+  std::optional<Motors<Space>> motors;
+  if (judged && !judged->motors.empty())
+    motion.judge(motors.emplace(*judged));
   if (checkpoint && checkpoint->integration.has_begun()) {
     check_size("state of the checkpoint", checkpoint->integration.state.size(), q.size() + v.size());
     motion.go_on(checkpoint->history);
@@ -109,13 +114,16 @@ template <class Space> void bind_motion(nb::module_ &m) {
   };
   bind_newton_step(&newton_step<Space, double>);
   bind_newton_step(&newton_step<Space, std::complex<double>>);
-  m.def("tree_motion", &motion_of<Space>, "model"_a, "scene"_a, "times"_a, "q"_a, "v"_a, "controls"_a, "carry_on"_a,
-        "checkpoint"_a = nb::none(), "samples"_a = nb::none(), "recording"_a = nb::none(), "replay"_a = nb::none(),
-        "Integrates the motion from (q, v) at the first of `times`, or on from a checkpoint, which it moves, and "
-        "reports\n"
-        "it at all of them; rows of outputs that were delivered before mean nothing. carry_on(t), which is called now "
-        "and\n"
-        "then, ends it where it gives False. A recording keeps its steps; a replay acts beside the scene.");
+  m.def(
+      "tree_motion", &motion_of<Space>, "model"_a, "scene"_a, "times"_a, "q"_a, "v"_a, "controls"_a, "carry_on"_a,
+      "checkpoint"_a = nb::none(), "samples"_a = nb::none(), "recording"_a = nb::none(), "replay"_a = nb::none(),
+      "judged"_a = nb::none(),
+      "Integrates the motion from (q, v) at the first of `times`, or on from a checkpoint, which it moves, and "
+      "reports\n"
+      "it at all of them; rows of outputs that were delivered before mean nothing. carry_on(t), which is called now "
+      "and\n"
+      "then, ends it where it gives False. A recording keeps its steps; a replay acts beside the scene. Errors of the\n"
+      "motors of `judged`, the same mechanism, are bounded, too.");
   m.def("tree_outputs", &outputs_of<Space>, "model"_a, "scene"_a, "times"_a, "states"_a, "replay"_a = nb::none(),
         "What a run reports of states (T, n_q + n_v) that are known.");
   m.def("tree_projected", &projected<Space>, "model"_a, "scene"_a, "t"_a, "q"_a, "v"_a,

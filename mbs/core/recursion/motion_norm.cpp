@@ -296,10 +296,10 @@ template <class Space> void MotionNorm<Space>::take_accelerations(const Workspac
 }
 
 template <class Space> void MotionNorm<Space>::set_peaks(const NormPeaks &peaks) {
-  // both as before 0.2.0: without accelerations, without forces on the ground
+  // both as before 0.2.0: without accelerations, without forces on the ground; and in 3D without motors
   const bool is_state = peaks.state.size() == peak_.size() || peaks.state.size() == size_.size();
-  const std::size_t on_ground = 2 * alone_.size(), forces = force_peak_.size();
-  if (!is_state || (peaks.force.size() != forces && peaks.force.size() + on_ground != forces))
+  const std::size_t on_ground = 2 * alone_.size(), missing = force_peak_.size() - peaks.force.size();
+  if (!is_state || (missing != 0 && missing != on_ground && missing != motors_))
     throw std::invalid_argument("peaks: expected those of the same mechanism, found those of another one");
   std::copy(peaks.state.begin(), peaks.state.end(), peak_.begin());
   std::copy(peaks.force.begin(), peaks.force.end(), force_peak_.begin());

@@ -1,0 +1,47 @@
+"""Errors of small motor torques are judged by their own size while an arm follows a path."""
+
+import numpy as np
+import pytest
+
+from ffrobot.mbs.model.spatial_motors import motor_forces, path_forces
+from ffrobot.run.spatial import solve_spatial
+from ffrobot.run.watcher import Watcher
+from ffrobot.scene.load import make_scene
+
+
+def link(name, mass, length):
+    points = {"root": [0.0, 0.0], "tip": [length, 0.0]}
+    rigid = {"mass": mass, "inertia": mass * length**2 / 12, "center": [length / 2, 0.0], "points": points}
+    return {"name": name, "rigid": rigid}
+
+
+def arm():
+    """Two links, and a hand of a gram which keeps its angle."""
+    bodies = [link("upper", 2.0, 0.5), link("lower", 1.0, 0.4), link("hand", 1e-3, 0.02)]
+    sides = ["ground", "upper.tip", "lower.tip"]
+    joints = [
+        {"name": f"j{k}", "type": "revolute", "between": [side, f"{body['name']}.root"]}
+        for k, (side, body) in enumerate(zip(sides, bodies, strict=True))
+    ]
+    path = {"name": "tip", "point": "lower.tip", "x": "0.6+0.1*sin(2*t)", "y": "0.2-0.1*t**2"}
+    turn = {"name": "turn", "angle": "hand", "value": "0.3*t**2"}
+    return make_scene(
+        name="arm",
+        gravity=[0.0, -9.81],
+        body=bodies,
+        joint=joints,
+        trajectory=[path, turn],
+        initial={"angles": {"upper": 0.9, "lower": -0.6, "hand": 0.0}},
+        analysis=[{"name": "follow", "kind": "pcid", "end": 1.0, "output_step": 0.001, "tolerance": 1e-6}],
+    )
+
+
+def test_peaks_of_small_motors_are_among_those_that_errors_are_compared_with():
+    """The last ones, by motor: that of the hand is what its motor did, as far as steps show it."""
+    run = solve_spatial(arm(), Watcher()).outcomes["follow"]
+    q = run.motion.q
+    torques = motor_forces(run.model, q, path_forces(run.model, run.time, q, run.motion.multipliers)).moments
+    peaks = run.continuation.checkpoint.force_peaks[-3:]
+    largest = np.array([np.abs(torques[f"j{k}"]).max() for k in range(3)])
+    assert largest[2] < 1e-3 * largest[0]
+    assert peaks[2] == pytest.approx(largest[2], rel=0.02)

@@ -1,0 +1,63 @@
+"""Loops whose equations turn dependent on the way, in the plane and in space: runs end there and say why."""
+
+import numpy as np
+import pytest
+
+from ffrobot.run.spatial import solve_spatial
+from ffrobot.run.watcher import Watcher
+from ffrobot.scene.load import make_scene
+
+CRANK, FOOT = 0.3, 1.0  # m
+
+
+def rod(space, mass, length):
+    number = mass * length**2 / 12
+    inertia = number if space == "planar" else [number / 10, number, number]
+    points = {"root": point(space, 0.0), "tip": point(space, length)}
+    return {"mass": mass, "inertia": inertia, "center": point(space, length / 2), "points": points}
+
+
+def point(space, x):
+    return [x, 0.0] if space == "planar" else [x, 0.0, 0.0]
+
+
+def parallelogram(space, tolerance):
+    """Cranks under a coupler that fall from 1 rad above the flat posture."""
+    cranks = ("crank0", "crank1")
+    bodies = [{"name": name, "rigid": rod(space, 0.5, CRANK)} for name in cranks]
+    axis = {} if space == "planar" else {"axis": [0.0, 0.0, 1.0]}
+    joints = [
+        {"name": f"foot{k}", "type": "revolute", "between": ["ground", f"{name}.root"], "at": point(space, k * FOOT)}
+        for k, name in enumerate(cranks)
+    ]
+    joints += [
+        {"name": f"head{k}", "type": "revolute", "between": [f"{name}.tip", f"coupler.{end}"]}
+        for k, (name, end) in enumerate(zip(cranks, ("root", "tip"), strict=True))
+    ]
+    return make_scene(
+        name="parallelogram",
+        space=space,
+        gravity=[0.0, -9.81] if space == "planar" else [0.0, -9.81, 0.05],
+        body=[*bodies, {"name": "coupler", "rigid": rod(space, 0.8, FOOT)}],
+        joint=[joint | axis for joint in joints],
+        initial={"joints": {"foot0": 1.0, "foot1": 1.0, "head0": -1.0}},
+        analysis=[{"name": "fall", "kind": "forward", "end": 1.0, "output_step": 0.01, "tolerance": tolerance}],
+    )
+
+
+@pytest.mark.parametrize("tolerance", [1e-4, 1e-8])
+@pytest.mark.parametrize("space", ["planar", "spatial"])
+def test_a_parallelogram_that_falls_flat_stops_and_says_why(space, tolerance):
+    """Branches meet there; steps that would jump over the posture do not."""
+    run = solve_spatial(parallelogram(space, tolerance), Watcher()).outcomes["fall"]
+    assert run.status == "step underflow"
+    assert 'the loops that "head1" close are singular' in run.statistics.cause
+    angle = run.motion.q[-1, run.model.columns("foot0")[0]]
+    assert 0.0 < angle < 0.3
+    # of a pendulum: (J_cranks + m l²) ω²/2 = (m_cranks/2 + m) g l (sin 1 − sin θ)
+    inertia, weight = 2 * 0.5 * CRANK**2 / 3 + 0.8 * CRANK**2, (0.5 + 0.8) * 9.81 * CRANK
+    theta = np.linspace(0.0, 1.0, 200_001)[:-1]
+    rate = np.sqrt(2 * weight / inertia * (np.sin(1.0) - np.sin(theta)))
+    substituted = np.sqrt(np.sin(1.0) - np.sin(theta))  # ∫dθ/ω, the end of which is integrable
+    assert np.isfinite(substituted).all()
+    assert run.statistics.time_reached == pytest.approx(float(np.sum(1 / rate) * (theta[1] - theta[0])), rel=5e-3)
