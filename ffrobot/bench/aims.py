@@ -8,12 +8,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from statistics import median
 
-from ..run.prepare import prepare
+from ..run.spatial import prepare_spatial
 from ..run.watcher import Watcher
 from ..scene.load import make_scene
-from ..scene.scene import Scene
+from ..scene.spatial import SpatialScene
 from .errors import KINDS
-from .evaluation import State, tree_evaluation_seconds
+from .evaluation import State, evaluation_seconds
 from .hand_written import TIME, HandWritten, general_state
 from .precision import Point, Row, fastest, find_reference, measure_points, repeat_point
 from .ratio import ratios
@@ -48,13 +48,13 @@ AIMS = (
 
 
 def measure_aims(
-    scene: Scene, repository: Path, folder: Path, repeat: int, budget: float, display: Watcher
+    scene: SpatialScene, repository: Path, folder: Path, repeat: int, budget: float, display: Watcher
 ) -> list[Row]:
     """Rows of the right-hand side and of each aim; `scene` is cases/two_link, `repository` the source tree.
 
     Raises `InputError` or `SolveError` where the hand-written program is not to be had.
     """
-    model = prepare(scene).model
+    model = prepare_spatial(scene, display).model
     display.stage("compiling the hand-written version")
     hand_written = HandWritten(repository, model, folder)
     rows = [_right_hand_side(hand_written, general_state(model), display)]
@@ -66,13 +66,13 @@ def measure_aims(
 def _right_hand_side(hand_written: HandWritten, state: State, display: Watcher) -> Row:
     display.stage("right-hand side")
     pairs = [
-        (tree_evaluation_seconds(state, TIME, EVALUATIONS), hand_written.evaluation_seconds(EVALUATIONS))
+        (evaluation_seconds(state, TIME, EVALUATIONS), hand_written.evaluation_seconds(EVALUATIONS))
         for _ in range(ROUNDS)
     ]
     return {"what": "right-hand side", "within": "", "run": "joint coordinates", **_ratio(pairs, 1.6)}
 
 
-def _scene(scene: Scene, aim: Aim) -> Scene:
+def _scene(scene: SpatialScene, aim: Aim) -> SpatialScene:
     keys = tomllib.loads(scene.text)
     keys.pop("pzt", None)
     keys["initial"]["state"] = aim.state
@@ -81,7 +81,9 @@ def _scene(scene: Scene, aim: Aim) -> Scene:
     return make_scene(folder=scene.path.parent, **keys)
 
 
-def _rows(aim: Aim, scene: Scene, hand_written: HandWritten, repeat: int, budget: float, display: Watcher) -> list[Row]:
+def _rows(
+    aim: Aim, scene: SpatialScene, hand_written: HandWritten, repeat: int, budget: float, display: Watcher
+) -> list[Row]:
     """The run that a user gets who asks for 1e-4, and the fastest of all whose measured error is that small."""
     reference = find_reference(scene, NAME, REFERENCE_TOLERANCE, budget, display)
     points = measure_points(scene, NAME, reference, INTEGRATORS, TOLERANCES, 2, budget, display)

@@ -15,17 +15,13 @@ from typing import Any
 
 import numpy as np
 
-from ..mbs.model.model import Model
 from ..mbs.model.spatial_model import build_spatial_model
 from ..mbs.model.spatial_system import SpatialSystem
-from ..mbs.model.system import MechanismSystem
-from ..mbs.solve.initial_state import undeformed_state
-from ..run.prepare import prepare
+from ..run.spatial import prepare_spatial
 from ..run.spatial_bodies import load_spatial_bodies
 from ..run.watcher import Watcher
 from ..scene.load import load_scene, make_scene
-from ..scene.spatial import SpatialScene
-from .evaluation import State, tree_evaluation_seconds
+from .evaluation import evaluation_seconds, start_at_rest
 from .growth import LINKS, chain
 from .hand_written import TIME, HandWritten, general_state
 from .precision import Row
@@ -67,21 +63,23 @@ class Timed:
 def measure_evaluations(repository: Path, folder: Path, display: Watcher) -> list[Row]:
     """A row for each mechanism; those of the two-link case and the one written by hand come first."""
     display.stage("bodies, and compiling the hand-written version")
-    two_link = prepare(load_scene(repository / "cases" / "two_link" / "scene.toml")).model
+    two_link, slider_crank = (
+        prepare_spatial(load_scene(repository / "cases" / name / "scene.toml"), display).model
+        for name in ("two_link", "slider_crank")
+    )
     hand_written = HandWritten(repository, two_link, folder)
-    slider_crank = prepare(load_scene(repository / "cases" / "slider_crank" / "scene.toml")).model
     timed = [
         Timed("two links × 10 modes, by hand", hand_written.evaluation_seconds),
-        Timed("two links × 10 modes, 2 rows", partial(tree_evaluation_seconds, general_state(two_link), TIME)),
+        Timed("two links × 10 modes, 2 rows", partial(evaluation_seconds, general_state(two_link), TIME)),
         *(
             Timed(
                 f"chain of {n} links × {MODES} modes, 2 rows",
-                partial(tree_evaluation_seconds, chain(n, MODES, False), 0.0),
+                partial(evaluation_seconds, start_at_rest(chain(n, MODES)), 0.0),
                 55e-9 * n,
             )
             for n in LINKS
         ),
-        Timed("slider-crank, 3 rows", partial(tree_evaluation_seconds, _start(slider_crank), 0.0), 0.15e-6),
+        Timed("slider-crank, 3 rows", partial(evaluation_seconds, start_at_rest(slider_crank), 0.0), 0.15e-6),
         Timed(f"arm of 3 links × {MODES} modes in space, 3 rows", _arm_in_space(3, TUBE), 1.4e-6),
         Timed(f"arm of 6 links × {MODES} modes in space, 6 rows", _arm_in_space(6, TUBE), 3e-6),
         Timed("arm of 6 rigid links in space, 6 rows", _arm_in_space(6, RIGID)),
@@ -95,13 +93,6 @@ def measure_evaluations(repository: Path, folder: Path, display: Watcher) -> lis
             seconds.append(one.seconds(count))
     by_hand = measured[0]
     return [_row(one, seconds, by_hand) for one, seconds in zip(timed, measured, strict=True)]
-
-
-def _start(model: Model) -> State:
-    """A planar mechanism on its path where it starts, undeformed and at rest: equations, q and v."""
-    assembly = MechanismSystem(model, [*model.joints, *model.trajectories])
-    start = undeformed_state(assembly)
-    return assembly, start.q, np.zeros_like(start.v)
 
 
 def _arm_in_space(links: int, link: Mapping[str, Any], rows: int | None = None) -> Callable[[int], float]:
@@ -122,7 +113,6 @@ def _arm_in_space(links: int, link: Mapping[str, Any], rows: int | None = None) 
         trajectory=_path(f"{names[-1]}.tip", rows),
         analysis=[{"name": "moves", "kind": "pcid" if rows else "forward", "end": 1.0, "output_step": 1.0}],
     )
-    assert isinstance(scene, SpatialScene)
     model = build_spatial_model(scene, [body.spatial for body in load_spatial_bodies(scene, lambda _: None)])
     core, rng = SpatialSystem(model).core, np.random.default_rng(1)
     q, v = rng.uniform(-1.0, 1.0, (2, core.n_v))

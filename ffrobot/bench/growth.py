@@ -5,21 +5,23 @@ Links are simply supported beams with sine modes, in closed form, so that any nu
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping
 from functools import partial
-from pathlib import Path
 from statistics import median
 from types import MappingProxyType
 
 import numpy as np
 
-from ..mbs.analysis.pcid import Pcid, run_pcid
-from ..mbs.model.model import build_model
-from ..mbs.model.planar_body import PlanarBody, PlanarPoint
-from ..mbs.model.system import MechanismSystem
+from ..mbs.analysis.context import Context
+from ..mbs.analysis.pcid import run_spatial_pcid
+from ..mbs.model.projection import projected
+from ..mbs.model.spatial_body import SpatialBody, SpatialPoint
+from ..mbs.model.spatial_model import SpatialModel, build_spatial_model
+from ..mbs.scene.analysis import IntegratedAnalysis
 from ..run.watcher import Watcher
-from ..scene.scene import Scene
-from .evaluation import State, tree_evaluation_seconds
+from ..scene.load import make_scene
+from ..scene.spatial import SpatialScene
+from .evaluation import State, evaluation_seconds, start_at_rest
 from .precision import Row
 
 MASS, LENGTH, STIFFNESS = 1.0, 1.0, 100.0  # kg, m, EI in N·m²
@@ -28,94 +30,97 @@ MODES_IN_CHAINS, RUN_LENGTH = 5, 0.1  # s
 EVALUATIONS, ROUNDS = 50_000, 25  # over the number of coordinates, in one timing; a millisecond is often undisturbed
 
 
-def sine_link(name: str, modes: int) -> PlanarBody:
-    """A simply supported beam: φ_k = √(2/m) sin(kπx/L)."""
+def sine_link(name: str, modes: int) -> SpatialBody:
+    """A simply supported beam: φ_k = √(2/m) sin(kπx/L) along y."""
     k = np.arange(1, modes + 1)
     amplitude, sign = np.sqrt(2 / MASS), (-1.0) ** k
-    rows = np.zeros((2, modes))
     slope = amplitude * k * np.pi / LENGTH
-    none = np.zeros((modes, modes))
-    return PlanarBody(
+    none, y = np.zeros((3, modes)), np.array([0.0, 1.0, 0.0])
+    x_y = np.outer([1.0, 0.0, 0.0], y)
+    along, across = np.multiply.outer(y, np.ones(modes)), np.multiply.outer(np.outer(y, y), np.eye(modes))
+    turned = np.multiply.outer([0.0, 0.0, 1.0], slope)
+    whole = SpatialBody(
         name=name,
         mass=MASS,
-        inertia=MASS * LENGTH**2 / 3,
-        first_moment=np.array([MASS * LENGTH / 2, 0.0]),
+        first_moment=np.array([MASS * LENGTH / 2, 0.0, 0.0]),
+        second_moment=np.diag([MASS * LENGTH**2 / 3, 0.0, 0.0]),
+        S_bar=along * (MASS * amplitude * (1 - sign) / (k * np.pi)),
+        I_bar=np.multiply.outer(x_y, -MASS * amplitude * LENGTH * sign / (k * np.pi)),
+        S_bar_kl=across,
+        J_spin=0.0,
+        h_spin=np.zeros(modes),
+        S_spin=np.zeros((modes, modes)),
         stiffness=STIFFNESS * LENGTH / MASS * (k * np.pi / LENGTH) ** 4,
-        damping=none,
-        S_bar=np.array([np.zeros(modes), MASS * amplitude * (1 - sign) / (k * np.pi)]),
-        h=-MASS * amplitude * LENGTH * sign / (k * np.pi),
-        j=np.zeros(modes),
-        S_tilde=none,
-        m_xy=np.eye(modes),
+        damping=np.zeros((modes, modes)),
         points=MappingProxyType(
             {
-                "root": PlanarPoint(np.zeros(2), rows, slope),
-                "tip": PlanarPoint(np.array([LENGTH, 0.0]), rows, slope * sign),
+                "root": SpatialPoint(np.zeros(3), none, turned),
+                "tip": SpatialPoint(np.array([LENGTH, 0.0, 0.0]), none, turned * sign),
             }
         ),
         modal_transform=np.eye(modes),
         length=LENGTH,
     )
+    return projected(whole)
 
 
-def chain(links: int, modes: int, closed: bool) -> State:
-    """A half circle of links, straight and at rest: equations, q and v.
+def chain(links: int, modes: int, *, closed: bool = False, outputs: int = 1) -> SpatialModel:
+    """A half circle of links, straight and at rest, with a short inverse analysis of so many outputs.
 
     Its last tip is on a path, or, where closed, pinned to the ground while the first link is driven.
     """
-    bodies = [sine_link(f"b{i}", modes) for i in range(links)]
-    angles = {body.name: np.pi * (i + 0.5) / links for i, body in enumerate(bodies)}
-    model = build_model(_scene(bodies, angles, closed), bodies)
-    assembly = MechanismSystem(model, [*model.joints, *model.trajectories], (), list(model.motors.values()))
-    q, at = np.zeros(assembly.system.coordinates), np.zeros(2)
-    for first, angle in zip(assembly.first, angles.values(), strict=True):
-        q[first : first + 3] = *at, angle
-        at += LENGTH * np.array([np.cos(angle), np.sin(angle)])
-    return assembly, q, np.zeros_like(q)
+    names = [f"b{i}" for i in range(links)]
+    angles = {name: np.pi * (i + 0.5) / links for i, name in enumerate(names)}
+    return build_spatial_model(_scene(angles, closed, outputs), [sine_link(name, modes) for name in names])
 
 
-def _scene(bodies: Sequence[PlanarBody], angles: dict[str, float], closed: bool) -> Scene:
+def _scene(angles: Mapping[str, float], closed: bool, outputs: int) -> SpatialScene:
     a = np.array(list(angles.values()))
-    tip = LENGTH * float(np.cos(a).sum()), LENGTH * float(np.sin(a).sum())
-    last = f"{bodies[-1].name}.tip"
-    before = ["ground", *(f"{body.name}.tip" for body in bodies[:-1])]
+    tip = [LENGTH * float(np.cos(a).sum()), LENGTH * float(np.sin(a).sum())]
+    names = list(angles)
+    last, before = f"{names[-1]}.tip", ["ground", *(f"{name}.tip" for name in names[:-1])]
     joints: list[dict[str, object]] = [
-        {"name": f"j{i}", "type": "revolute", "between": (side, f"{body.name}.root")}
-        for i, (side, body) in enumerate(zip(before, bodies, strict=True))
+        {"name": f"j{i}", "type": "revolute", "between": [side, f"{name}.root"]}
+        for i, (side, name) in enumerate(zip(before, names, strict=True))
     ]
     if closed:
-        joints.append({"name": "end", "type": "revolute", "between": ("ground", last), "at": tip})
-        first = bodies[0].name
-        path = {"name": "crank", "angle": first, "value": f"{angles[first]!r}+0.1*t"}
+        joints.append({"name": "end", "type": "revolute", "between": ["ground", last], "at": tip})
+        path = {"name": "crank", "angle": names[0], "value": f"{angles[names[0]]!r}+0.1*t"}
     else:
         path = {"name": "tip", "point": last, "x": f"{tip[0]!r}+0.1*t", "y": f"{tip[1]!r}"}
-    rigid = {"mass": 1.0, "inertia": 1.0, "center": (0.0, 0.0)}  # build_model takes `bodies` in its place
-    return Scene.model_validate(
-        {
-            "name": "growth",
-            "gravity": (0.0, -9.81),
-            "body": tuple({"name": body.name, "rigid": rigid} for body in bodies),
-            "joint": tuple(joints),
-            "trajectory": (path,),
-            "initial": {"angles": angles},
-            "analysis": ({"name": "inverse", "kind": "pcid", "end": RUN_LENGTH, "output_step": RUN_LENGTH},),
-            "path": Path("scene.toml"),
-            "text": "",
-        }
+    points = {"root": [0.0, 0.0], "tip": [LENGTH, 0.0]}
+    rigid = {"mass": 1.0, "inertia": 1.0, "center": [0.0, 0.0], "points": points}  # sine links come in its place
+    return make_scene(
+        name="growth",
+        gravity=[0.0, -9.81],
+        body=[{"name": name, "rigid": rigid} for name in names],
+        joint=joints,
+        trajectory=[path],
+        initial={"angles": angles},
+        analysis=[
+            {"name": "inverse", "kind": "pcid", "end": RUN_LENGTH, "output_step": RUN_LENGTH / outputs}
+            | {"tolerance": 1e-6, "integrator": "dop853"}
+        ],
     )
+
+
+def _timer(model: SpatialModel) -> Callable[[], float]:
+    return evaluation_timer(start_at_rest(model))
 
 
 def evaluation_timer(state: State, evaluations: int = EVALUATIONS) -> Callable[[], float]:
     """Measures the seconds of one of so many `evaluations` (over the number of coordinates, at least one)."""
-    return partial(tree_evaluation_seconds, state, 0.0, max(1, evaluations // len(state[1])))
+    return partial(evaluation_seconds, state, 0.0, max(1, evaluations // len(state[1])))
 
 
 def output_timer(outputs: int) -> Callable[[], float]:
     """Measures the seconds of a short run with so many outputs; the integration in it is always the same."""
-    model = chain(2, MODES_IN_CHAINS, False)[0].model
-    keys = {"name": "inverse", "kind": "pcid", "end": RUN_LENGTH, "output_step": RUN_LENGTH / outputs}
-    analysis = Pcid.model_validate({**keys, "tolerance": 1e-6, "integrator": "dop853"})
-    return lambda: run_pcid(model, analysis, False, lambda t: True).statistics.wall_seconds
+    model = chain(2, MODES_IN_CHAINS, outputs=outputs)
+    assert isinstance(model.scene, SpatialScene)
+    analysis = model.scene.analysis[0]
+    assert isinstance(analysis, IntegratedAnalysis)
+    context = Context(model=model, outcomes={}, progress=lambda t: True)
+    return lambda: run_spatial_pcid(context, analysis).statistics.wall_seconds
 
 
 def measure_growth(repeat: int, display: Watcher) -> list[Row]:
@@ -125,9 +130,9 @@ def measure_growth(repeat: int, display: Watcher) -> list[Row]:
     logarithms: 1 is linear growth.
     """
     kinds: dict[str, dict[int, Callable[[], float]]] = {
-        "modes per link": {n: evaluation_timer(chain(2, n, False)) for n in MODES},
-        "links, open": {n: evaluation_timer(chain(n, MODES_IN_CHAINS, False)) for n in LINKS},
-        "links, closed": {n: evaluation_timer(chain(n, MODES_IN_CHAINS, True)) for n in LINKS},
+        "modes per link": {n: _timer(chain(2, n)) for n in MODES},
+        "links, open": {n: _timer(chain(n, MODES_IN_CHAINS)) for n in LINKS},
+        "links, closed": {n: _timer(chain(n, MODES_IN_CHAINS, closed=True)) for n in LINKS},
         "outputs": {n: output_timer(n) for n in OUTPUTS},
     }
     rows: list[Row] = []

@@ -10,10 +10,11 @@ from pathlib import Path
 import numpy as np
 
 from ..common.errors import InputError, SolveError
-from ..mbs.model.model import Model
-from ..mbs.model.planar_body import PlanarBody
-from ..mbs.model.system import MechanismSystem
-from ..mbs.solve.initial_state import undeformed_state
+from ..mbs.model.spatial_body import SpatialBody
+from ..mbs.model.spatial_model import SpatialModel
+from ..mbs.model.spatial_system import SpatialSystem
+from ..mbs.solve.spatial_posture import solve_posture, with_rates
+from ..mbs.solve.spatial_start import undeformed_posture
 from .evaluation import State
 
 SOURCE = Path("tests/benchmarks/hand_written/two_link.cpp")
@@ -33,7 +34,7 @@ class HandWritten:
     Raises `InputError` where the source is not there, `SolveError` where it cannot be compiled.
     """
 
-    def __init__(self, repository: Path, model: Model, folder: Path, flags: Sequence[str] = FLAGS) -> None:
+    def __init__(self, repository: Path, model: SpatialModel, folder: Path, flags: Sequence[str] = FLAGS) -> None:
         source = repository / SOURCE
         if not source.is_file():
             raise InputError(f"{repository}: source: expected ffrobot's source tree, found no {SOURCE} in it")
@@ -44,7 +45,7 @@ class HandWritten:
         compiled = subprocess.run(command, capture_output=True, text=True, check=False)
         if compiled.returncode:
             raise SolveError(f"{source}: does not compile:\n{compiled.stderr}")
-        self._links.write_text("\n".join(link_numbers(body) for body in model.bodies), encoding="utf-8")
+        self._links.write_text("\n".join(link_numbers(node.body) for node in model.tree.nodes), encoding="utf-8")
 
     def command(self, evaluations: int, steps: int) -> list[str]:
         """What runs it; its main function says what it does."""
@@ -64,24 +65,21 @@ class HandWritten:
         return self(1, STEPS)[2][0]
 
 
-def link_numbers(body: PlanarBody) -> str:
-    """Mass, inertia, first moment, length, and the rows K, S̄_y, h, Φ_y of the tip."""
-    rows = [body.stiffness, body.S_bar[1], body.h, body.points["tip"].translation[1]]
-    numbers = [body.mass, body.inertia, body.first_moment[0], body.length, *np.concatenate(rows)]
+def link_numbers(body: SpatialBody) -> str:
+    """Mass, inertia about z, first moment, length, and the rows K, S̄_y, h = Ī_xy − Ī_yx, Φ_y of the tip."""
+    h = body.I_bar[0, 1] - body.I_bar[1, 0]
+    rows = [body.stiffness, body.S_bar[1], h, body.points["tip"].translation[1]]
+    numbers = [body.mass, body.inertia[2, 2], body.first_moment[0], body.length, *np.concatenate(rows)]
     return " ".join(repr(float(number)) for number in numbers if number is not None)
 
 
-def general_state(model: Model) -> State:
-    """The state at which the program times itself, on the constraints: equations, q, v."""
-    assembly = MechanismSystem(model, [*model.joints, *model.trajectories])
-    start = undeformed_state(assembly)
-    q, v = start.q.copy(), np.zeros_like(start.v)
-    bend = iter(1e-4 / (1 + np.arange(sum(body.n_modes for body in model.bodies))))
-    for first, body in zip(assembly.first, model.bodies, strict=True):
-        q[first + 3 : first + 3 + body.n_modes] = [next(bend) for _ in range(body.n_modes)]
-    frames = assembly.frame_coordinates
-    for _ in range(20):
-        C, C_dot, C_q = assembly.system.constraints(TIME, q, v)
-        q[frames] -= np.linalg.solve(C_q[:, frames], C)
-        v[frames] -= np.linalg.solve(C_q[:, frames], C_dot)
-    return assembly, q, v
+def general_state(model: SpatialModel) -> State:
+    """The state at which the program times itself, on the constraints."""
+    q, v = undeformed_posture(model).q, np.zeros(model.tree.n_v)
+    bend = iter(1e-4 / (1 + np.arange(model.tree.n_v)))
+    for node in model.tree.nodes:
+        q[node.p_q] = [next(bend) for _ in range(node.body.n_modes)]
+    found = solve_posture(model, TIME, q)
+    assert found is not None
+    start = with_rates(model, found, v, TIME)
+    return SpatialSystem(model), start.q, start.v

@@ -14,12 +14,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ffrobot.bench.evaluation import tree_evaluation_seconds
+from ffrobot.bench.evaluation import evaluation_seconds
 from ffrobot.bench.hand_written import STEPS, TIME, HandWritten, general_state
 from ffrobot.common.errors import InputError
-from ffrobot.mbs.analysis.pcid import Pcid, run_pcid
-from ffrobot.mbs.model.planar_tree import PlanarTree
-from ffrobot.run.prepare import prepare
+from ffrobot.mbs.analysis.context import Context
+from ffrobot.mbs.analysis.pcid import Pcid, run_spatial_pcid
+from ffrobot.run.spatial import prepare_spatial
+from ffrobot.run.watcher import Watcher
 
 pytestmark = pytest.mark.alone
 
@@ -29,7 +30,7 @@ ALARM = {"evaluation": 4.6, "pcid": 8.2}
 
 @pytest.fixture(scope="module")
 def two_link(case_folder):
-    return prepare(case_folder / "scene.toml").model
+    return prepare_spatial(case_folder / "scene.toml", Watcher()).model
 
 
 @pytest.fixture(scope="module")
@@ -47,17 +48,16 @@ def program(tmp_path_factory, two_link):
     return HandWritten(ROOT, two_link, tmp_path_factory.mktemp("program"))
 
 
-def tip_force(assembly, lambda_):
-    return -lambda_[..., assembly.is_trajectory]
-
-
 def test_both_compute_the_same(two_link, program):
-    assembly, q, v = general_state(two_link)
-    a, lambda_ = PlanarTree(assembly).evaluate(TIME, q, v)
+    system, q, v = general_state(two_link)
+    core, _, rows = system.integrated
+    a, multipliers = core.evaluate(q, v, system.target(TIME)[rows], None, None)
     _, (force_x, force_y, alpha, _) = program(1, 0)
     # the program takes displacements of 1e-12 m at supports for zero; forces amplify that
-    np.testing.assert_allclose(tip_force(assembly, lambda_), [force_x, force_y], rtol=1e-8)
-    assert alpha == pytest.approx(a[assembly.first[0] + 2], abs=1e-8 * np.abs(a).max())
+    np.testing.assert_allclose(-multipliers, [force_x, force_y], rtol=1e-8)
+    first = two_link.tree.nodes[0]  # its frame turns by the joint's angle less what modes turn the section by
+    of_frame = a[first.v.start] - first.body.points["root"].rotation[2] @ a[first.p_v]
+    assert alpha == pytest.approx(of_frame, abs=1e-8 * np.abs(a).max())
 
 
 def test_without_the_source_tree_it_says_what_is_missing(two_link, tmp_path):
@@ -70,7 +70,7 @@ def test_right_hand_side_ratio(benchmark, two_link, program):
     count = 20_000 if benchmark.enabled else 4_000
 
     def both():
-        return tree_evaluation_seconds(state, TIME, count), program.evaluation_seconds(count)
+        return evaluation_seconds(state, TIME, count), program.evaluation_seconds(count)
 
     rounds = 15 if benchmark.enabled else 9
     times = np.array([both() for _ in range(rounds)]).min(axis=0)
@@ -80,11 +80,12 @@ def test_right_hand_side_ratio(benchmark, two_link, program):
 
 def test_pcid_ratio(benchmark, two_link, program):
     analysis = Pcid(name="inverse", kind="pcid", end=1.0, output_step=0.1, tolerance=1e-4)
+    context = Context(model=two_link, outcomes={}, progress=lambda t: True)
     rounds, outcomes, hand_written = (5 if benchmark.enabled else 3), [], []
     for _ in range(rounds):
-        outcomes.append(run_pcid(two_link, analysis, False, lambda t: True))
+        outcomes.append(run_spatial_pcid(context, analysis))
         hand_written.append(program(1, STEPS)[2:])
-    force = tip_force(outcomes[0].assembly, outcomes[0].lambda_[-1])
+    force = -outcomes[0].motion.multipliers[-1]
     peak = 67.0  # N, of the tip force (cases/two_link)
     np.testing.assert_allclose(force, hand_written[0][1][:2], atol=2e-4 * peak)
     benchmark.pedantic(lambda: None, rounds=1)

@@ -8,8 +8,8 @@ Run and compare on a quiet machine:
 In the ordinary test run (--benchmark-disable, see pyproject.toml) each runs once, and the ratios are checked: bounds
 are two to three times what was measured, so that a slip in an algorithm is found and a busy machine is not.
 
-* right-hand side: accelerations and multipliers of the two-link model, 26 coordinates and 6 constraints; the time is
-  that of 1000 evaluations (milliseconds there are microseconds each). Aim: 1 µs each.
+* right-hand side: accelerations and multipliers of the two-link model, 22 coordinates and 2 constraint equations; the
+  time is that of 1000 evaluations (milliseconds there are microseconds each). Aim: 1 µs each.
 * pcid: one second of the two-link model at tolerance 1e-6. Aim: under 0.5 s. An evaluation in the run, with what the
   integrator does to it, takes 2.3 times a bare one.
 * process: `ffrobot solve` with the inverse analysis only and modal files up to date, from start to exit; extra_info has
@@ -31,14 +31,14 @@ import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
 
-from ffrobot.bench.evaluation import tree_evaluation_seconds
+from ffrobot.bench.evaluation import evaluation_seconds, start_at_rest
 from ffrobot.bench.hand_written import TIME, general_state
 from ffrobot.mbs import _core
-from ffrobot.mbs.analysis.drive import initial_state
-from ffrobot.mbs.analysis.fcid import Fcid, run_fcid
-from ffrobot.mbs.analysis.pcid import run_pcid
-from ffrobot.mbs.model.system import MechanismSystem
-from ffrobot.run.prepare import prepare
+from ffrobot.mbs.analysis.context import Context
+from ffrobot.mbs.analysis.fcid import Fcid, run_spatial_fcid
+from ffrobot.mbs.analysis.pcid import run_spatial_pcid
+from ffrobot.run.spatial import prepare_spatial
+from ffrobot.run.watcher import Watcher
 
 pytestmark = pytest.mark.alone
 
@@ -51,7 +51,13 @@ OF_STAGE_1 = "import dolfinx.fem.petsc, slepc4py.SLEPc, gmsh"
 def evaluation(model):
     """Seconds of one evaluation of the model's equations."""
     state = general_state(model)
-    return min(tree_evaluation_seconds(state, TIME, EVALUATIONS) for _ in range(9))
+    return min(evaluation_seconds(state, TIME, EVALUATIONS) for _ in range(9))
+
+
+def context_of(scene):
+    """What analyses of the scene start from."""
+    model = prepare_spatial(scene, Watcher()).model
+    return Context(model=model, outcomes={}, progress=lambda t: True)
 
 
 def seconds(work):
@@ -81,30 +87,28 @@ def scene(case_copy, ffrobot, monkeypatch):
 
 
 def test_right_hand_side(benchmark, scene):
-    model = prepare(scene).model
-    assembly = MechanismSystem(model, [*model.joints, *model.trajectories])
-    start = initial_state(assembly)
-    assert (assembly.system.coordinates, len(assembly.constraints)) == (26, 6)
-    benchmark(tree_evaluation_seconds, (assembly, start.q, start.v), 0.0, EVALUATIONS)
+    model = context_of(scene).model
+    assert (model.tree.n_v, len(model.rows)) == (22, 2)
+    benchmark(evaluation_seconds, start_at_rest(model), 0.0, EVALUATIONS)
 
 
 def test_pcid_of_one_second(benchmark, scene):
-    model = prepare(scene).model
-    outcome = benchmark(run_pcid, model, model.scene.analysis[0], False, lambda t: True)
+    context = context_of(scene)
+    outcome = benchmark(run_spatial_pcid, context, context.model.scene.analysis[0])
     benchmark.extra_info |= {"steps": outcome.statistics.steps, "evaluations": outcome.statistics.evaluations}
     assert outcome.status == "completed"
-    assert outcome.statistics.wall_seconds < 5 * outcome.statistics.evaluations * evaluation(model)
+    assert outcome.statistics.wall_seconds < 5 * outcome.statistics.evaluations * evaluation(context.model)
 
 
 @pytest.mark.parametrize(("shape", "evaluations"), [("zero", 40), ("static", 120)])
 def test_fcid_of_1000_outputs(benchmark, scene, shape, evaluations):
-    model = prepare(scene).model
+    context = context_of(scene)
     analysis = Fcid(name="fcid", kind="fcid", shape=shape, end=1.0, output_step=0.001)
-    outcome = benchmark(run_fcid, model, analysis)
+    outcome = benchmark(run_spatial_fcid, context, analysis)
     benchmark.extra_info |= {"solver": outcome.statistics.wall_seconds}
     assert len(outcome.time) == 1001
-    again = min(run_fcid(model, analysis).statistics.wall_seconds for _ in range(3))
-    assert again < evaluations * 1001 * evaluation(model)
+    again = min(run_spatial_fcid(context, analysis).statistics.wall_seconds for _ in range(3))
+    assert again < evaluations * 1001 * evaluation(context.model)
 
 
 def test_allocation_of_20_patches_at_1000_times(benchmark):
