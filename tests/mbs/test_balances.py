@@ -5,24 +5,16 @@ import pytest
 import zoo
 from balances import OUTPUT_STEP, energy_and_losses
 from links import arm, arm_links
-from mechanisms import always, forward, make_model, oracle_of, pcid, revolute
+from mechanisms import forward, make_model, oracle_of, pcid, revolute
+from planar_runs import energies, run
 from scipy.integrate import simpson
-
-from ffrobot.mbs.analysis.forward import run_forward
-from ffrobot.mbs.analysis.pcid import run_pcid
-from ffrobot.mbs.quantities.observation import energies
 
 
 @pytest.mark.parametrize("tolerance", [1e-4, 1e-6, 1e-8])
 def test_work_of_the_trajectory_forces_is_energy_gained_and_dissipated(tolerance):
-    outcome = run_pcid(
-        arm(arm_links(damping_ratio=0.02)), pcid(output_step=OUTPUT_STEP, tolerance=tolerance), False, always
-    )
-    power = sum(
-        -outcome.lambda_[:, i] * constraint.target.sample(outcome.time)[1]
-        for i, constraint in enumerate(outcome.assembly.constraints)
-        if constraint.is_trajectory
-    )
+    outcome = run(arm(arm_links(damping_ratio=0.02)), pcid(output_step=OUTPUT_STEP, tolerance=tolerance))
+    rates = np.column_stack([held.target.sample(outcome.time)[1] for held in outcome.robot.trajectories])
+    power = np.sum(-outcome.lambda_ * rates, axis=1)
     work, (total, losses) = simpson(power, x=outcome.time), energy_and_losses(outcome)
     assert losses > 1e-3
     assert abs(work - losses - (total[-1] - total[0])) < tolerance * np.abs(power).max()
@@ -36,7 +28,7 @@ def test_work_of_given_loads_is_energy_gained_and_dissipated():
         {"point": "link2.tip", "x": "3*cos(4*t)", "y": "2", "moment": "0.3*t"},
     ]
     model = arm(arm_links(damping_ratio=0.02), trajectory=[], load=loads)
-    outcome = run_forward(model, forward(output_step=OUTPUT_STEP, tolerance=tolerance), None, {}, always)
+    outcome = run(model, forward(output_step=OUTPUT_STEP, tolerance=tolerance))
     mechanism = oracle_of(outcome.assembly)
     power = [
         sum(mechanism.row(row, q, v).rate * size(t)[0] for row, size in model.loads)
@@ -50,7 +42,7 @@ def test_work_of_given_loads_is_energy_gained_and_dissipated():
 def test_energy_of_an_undamped_pendulum_stays():
     tolerance = 1e-8
     model = arm(trajectory=[], initial={"angles": {"link1": 0.3, "link2": 1.0}, "rates": {"link1": 2.0}})
-    outcome = run_forward(model, forward(end=2.0, tolerance=tolerance), None, {}, always)
+    outcome = run(model, forward(end=2.0, tolerance=tolerance))
     total, losses = energy_and_losses(outcome)
     assert losses == 0
     assert np.ptp(energies(outcome)["kinetic"]) > 1
@@ -70,7 +62,7 @@ def test_momentum_of_a_free_chain_stays(kind):
         load=[{"joint": "A", "moment": "3*sin(8*t)"}],  # from within: no momentum
         initial={"angles": {first: 0.3, second: 1.0}, "rates": {first: 3.0, second: -1.0}},
     )
-    outcome = run_forward(model, forward(end=2.0, tolerance=tolerance), None, {}, always)
+    outcome = run(model, forward(end=2.0, tolerance=tolerance))
     assert outcome.status == "completed"
     mechanism = oracle_of(outcome.assembly)
     momentum = np.array([mechanism.momentum(q, v) for q, v in zip(outcome.q, outcome.v, strict=True)])
@@ -85,7 +77,7 @@ def test_center_of_mass_of_a_free_chain_falls_as_a_stone():
         joint=[revolute("A", "link1.tip", "link2.root")],
         initial={"angles": {"link1": 0.3, "link2": 1.0}, "rates": {"link1": 3.0}},
     )
-    outcome = run_forward(model, forward(tolerance=1e-9), None, {}, always)
+    outcome = run(model, forward(tolerance=1e-9))
     mechanism = oracle_of(outcome.assembly)
     momentum = np.array([mechanism.momentum(q, v)[:2] for q, v in zip(outcome.q, outcome.v, strict=True)])
     fall = momentum[0] + np.outer(outcome.time, 2.0 * np.array([0.0, -9.81]))

@@ -5,7 +5,6 @@ import pytest
 from balances import OUTPUT_STEP, energy_and_losses
 from links import ANGLES, arm, arm_links
 from mechanisms import (
-    always,
     checked_scene,
     core_run,
     evaluate,
@@ -17,23 +16,19 @@ from mechanisms import (
     relative,
     revolute,
 )
+from planar_runs import joint_forces, run
 from rods import rod
 
 from ffrobot.common.errors import InputError
 from ffrobot.mbs import _core
-from ffrobot.mbs.analysis.fcid import Fcid, run_fcid
-from ffrobot.mbs.analysis.forward import run_forward
-from ffrobot.mbs.analysis.motors_only import MotorsOnly, run_motors_only
-from ffrobot.mbs.analysis.pcid import run_pcid
-from ffrobot.mbs.analysis.replay import ActuatorSet, actuation_source
-from ffrobot.mbs.analysis.static import Static, run_static
+from ffrobot.mbs.analysis.fcid import Fcid
+from ffrobot.mbs.analysis.motors_only import MotorsOnly
+from ffrobot.mbs.analysis.static import Static
 from ffrobot.mbs.model.masses import mass_matrix
 from ffrobot.mbs.model.model import ZERO
 from ffrobot.mbs.model.planar_body import from_rigid_body
 from ffrobot.mbs.model.system import MechanismSystem
-from ffrobot.mbs.quantities.observation import joint_forces
 from ffrobot.mbs.scene.bodies import RigidBody
-from ffrobot.mbs.solve.initial_state import undeformed_state
 
 G = 9.81
 AT_REST = {"state": "static", "angles": ANGLES}
@@ -58,7 +53,7 @@ def test_swing_of_a_pendulum_with_a_geared_rotor():
         initial={"angles": {"a": -np.pi / 2 + angle}},
     )
     omega = np.sqrt(m * G * L / 2 / (m * L**2 / 3 + N**2 * J))
-    outcome = run_forward(model, forward(end=2.0, tolerance=1e-9), None, {}, always)
+    outcome = run(model, forward(end=2.0, tolerance=1e-9))
     swing = outcome.q[:, 2] + np.pi / 2
     assert np.abs(swing - angle * np.cos(omega * outcome.time)).max() < 1e-7 * angle
 
@@ -123,8 +118,8 @@ def test_geared_two_link_arm_needs_the_moments_of_spong():
             initial={"angles": {"a": 0.4, "b": 0.0}},
         )
         if kind == "fcid":
-            return run_fcid(model, Fcid(name="i", kind="fcid", shape="zero", end=1.0, output_step=0.01))
-        return run_pcid(model, pcid(tolerance=1e-9), False, always)
+            return run(model, Fcid(name="i", kind="fcid", shape="zero", end=1.0, output_step=0.01))
+        return run(model, pcid(tolerance=1e-9))
 
     for kind in ("pcid", "fcid"):
         bare = inverse({}, {}, kind)
@@ -141,9 +136,9 @@ def test_motors_alone_carry_rotors_and_friction_along():
     """Inverse dynamics with motors only, applied to the flexible arm, brings its tip along the path."""
     model = geared_arm(arm_links(modes=2), GEARED | FRICTION, GEARED | FRICTION, initial=AT_REST)
     servo = MotorsOnly(name="servo", kind="motors-only", end=1.0, output_step=0.01)
-    source = run_motors_only(model, servo, always)
+    source = run(model, servo)
     replay = forward(actuation="servo", apply="joints", tolerance=1e-7)
-    outcome = run_forward(model, replay, source, ActuatorSet(), always)
+    outcome = run(model, replay, source)
     assert source.q.shape == outcome.q.shape
     assert relative(outcome.q, source.q) < 1e-5
 
@@ -154,7 +149,7 @@ def test_friction_takes_the_energy_that_is_missing():
         arm_links(), GEARED | FRICTION, GEARED | FRICTION, trajectory=[],
         initial={"angles": {"link1": 0.3, "link2": 1.0}, "rates": {"link1": 2.0}},
     )  # fmt: skip
-    outcome = run_forward(model, forward(output_step=OUTPUT_STEP, tolerance=tolerance), None, {}, always)
+    outcome = run(model, forward(output_step=OUTPUT_STEP, tolerance=tolerance))
     total, losses = energy_and_losses(outcome)
     assert losses > 0.1
     assert abs(losses + total[-1] - total[0]) < 10 * tolerance * np.ptp(total)
@@ -164,8 +159,8 @@ def test_friction_takes_the_energy_that_is_missing():
 def test_implicit_integrators_agree_with_explicit_ones(integrator):
     keys = {"trajectory": [], "initial": {"angles": {"link1": 0.3, "link2": 1.0}}}
     model = geared_arm(arm_links(), GEARED | FRICTION, GEARED | FRICTION, **keys)
-    reference = run_forward(model, forward(end=0.3, tolerance=1e-8, integrator="dop853"), None, {}, always)
-    outcome = run_forward(model, forward(end=0.3, tolerance=1e-5, integrator=integrator), None, {}, always)
+    reference = run(model, forward(end=0.3, tolerance=1e-8, integrator="dop853"))
+    outcome = run(model, forward(end=0.3, tolerance=1e-5, integrator=integrator))
     assert outcome.status == "completed"
     assert relative(outcome.q, reference.q) < 1e-4
 
@@ -173,7 +168,7 @@ def test_implicit_integrators_agree_with_explicit_ones(integrator):
 def test_inverse_moments_carry_out_the_motion_with_rotors_and_friction():
     """Motor moments and modal forces of the partially constrained run bring the tip along its path, forwards again."""
     model = geared_arm(arm_links(modes=2), GEARED | FRICTION, GEARED | FRICTION)
-    source = run_pcid(model, pcid(tolerance=1e-8, end=0.4), True, always)
+    source = run(model, pcid(tolerance=1e-8, end=0.4))
     assert np.abs(joint_forces(source, "O").motor).max() > 1.0
     assembly = MechanismSystem(model, model.joints, [(row, ZERO) for row in model.motors.values()])
     actuators = [_core.Motors(0, np.full(2, np.inf))]
@@ -196,14 +191,14 @@ def test_a_prismatic_joint_moves_the_reflected_mass():
     model = make_model(
         [slider], joint=[rail | {"gear_ratio": N, "rotor_inertia": J}], load=[{"point": "s.pin", "x": "3.0"}]
     )
-    outcome = run_forward(model, forward(), None, {}, always)
+    outcome = run(model, forward())
     np.testing.assert_allclose(outcome.a[:, 0], 3.0 / (0.4 + J * N**2), rtol=1e-12)
 
 
 def test_equilibrium_knows_neither_rotors_nor_friction():
     keys = {"analysis": (Static(name="static", kind="static"),), "motors": "section"}
-    with_them = run_static(geared_arm(None, GEARED | FRICTION, GEARED | FRICTION, **keys), keys["analysis"][0])
-    without = run_static(geared_arm(None, {}, {}, **keys), keys["analysis"][0])
+    with_them = run(geared_arm(None, GEARED | FRICTION, GEARED | FRICTION, **keys), keys["analysis"][0])
+    without = run(geared_arm(None, {}, {}, **keys), keys["analysis"][0])
     np.testing.assert_allclose(with_them.q, without.q, atol=1e-12)
     np.testing.assert_allclose(with_them.tau, without.tau, rtol=1e-9)
 

@@ -6,13 +6,10 @@ import numpy as np
 import pytest
 import zoo
 from links import ANGLES, TIP, arm, arm_links
-from mechanisms import always, assemble, forward, oracle_of, pcid, relative
+from mechanisms import assemble, forward, oracle_of, pcid, relative
+from planar_runs import run
 
-from ffrobot.mbs.analysis.forward import run_forward
-from ffrobot.mbs.analysis.pcid import run_pcid
-from ffrobot.mbs.analysis.replay import ActuatorSet
 from ffrobot.mbs.model.masses import mass_matrix
-from ffrobot.mbs.solve.initial_state import undeformed_state
 from ffrobot.mbs.solve.state import State
 from ffrobot.mbs.solve.vibration import modal_excitation, vibrations
 
@@ -21,7 +18,7 @@ AT_REST = {"angles": ANGLES, "state": "static"}
 
 def chosen(model, **keys):
     """What a run begins with; it may change."""
-    choice = run_pcid(model, pcid(**keys), False, always).statistics.integrator
+    choice = run(model, pcid(**keys)).statistics.integrator
     return replace(choice, name=choice.candidates[0].name) if choice.candidates else choice
 
 
@@ -67,7 +64,7 @@ def test_ringing_is_what_a_static_start_leaves():
     """
     path = {"name": "tip", "point": "link2.tip", "x": f"{TIP[0]!r}-t**2", "y": f"{TIP[1]!r}"}
     model = arm(arm_links(EI=3000.0, modes=1), initial=AT_REST, trajectory=[path])
-    outcome = run_pcid(model, pcid(end=0.02, output_step=1e-4, tolerance=1e-8), False, always)
+    outcome = run(model, pcid(end=0.02, output_step=1e-4, tolerance=1e-8))
     assembly, start, t = outcome.assembly, State(outcome.q[0], outcome.v[0]), outcome.time
     modes = vibrations(assembly, start)
     waves = [wave(omega * t) for omega in modes.frequency for wave in (np.cos, np.sin)]
@@ -103,13 +100,13 @@ def test_damping_lets_steps_grow():
 def at_rest():
     """Stiff links from rest, and a PCID of them that takes long steps."""
     model = arm(arm_links(EI=300.0, modes=12, extra=2), initial=AT_REST, motors="section")
-    return model, run_pcid(model, pcid(tolerance=1e-4, integrator="radau"), True, always)
+    return model, run(model, pcid(tolerance=1e-4, integrator="radau"))
 
 
 def test_a_replay_that_does_not_ring_is_integrated_implicitly(at_rest):
     model, inverse = at_rest
     analysis = forward(tolerance=1e-3, actuation="inverse", apply="trajectory")
-    outcome = run_forward(model, analysis, inverse, ActuatorSet(), always)
+    outcome = run(model, analysis, inverse)
     assert outcome.statistics.integrator.candidates[0].name == "radau"
     assert np.abs(outcome.q - inverse.q).max() < 1e-4
 
@@ -118,7 +115,7 @@ def test_motors_without_the_modal_forces_that_went_with_them_let_links_ring(at_r
     """From the same rest, under the same moments: judged by how the replay itself rings, not by its source."""
     model, inverse = at_rest
     analysis = forward(tolerance=1e-3, actuation="inverse", apply="joints", max_steps=100)
-    outcome = run_forward(model, analysis, inverse, ActuatorSet(), always)
+    outcome = run(model, analysis, inverse)
     assert inverse.statistics.integrator.name == "radau"
     assert outcome.statistics.integrator.candidates[0].name == "dop853"
 
@@ -129,9 +126,9 @@ def test_a_choice_that_turns_out_badly_is_changed():
     The state is carried over: outputs are those of one integrator within the tolerance, and the summary says when.
     """
     model, tolerance = arm(arm_links(EI=3000.0, modes=8, extra=2, damping_ratio=0.02)), 1e-4
-    watched = run_pcid(model, pcid(tolerance=tolerance), False, always)
-    alone = run_pcid(model, pcid(tolerance=tolerance, integrator="dop853"), False, always)
-    exact = run_pcid(model, pcid(tolerance=1e-8, integrator="dop853"), False, always)
+    watched = run(model, pcid(tolerance=tolerance))
+    alone = run(model, pcid(tolerance=tolerance, integrator="dop853"))
+    exact = run(model, pcid(tolerance=1e-8, integrator="dop853"))
     assert watched.statistics.integrator.name == "radau after dop853"
     assert watched.statistics.integrator.in_words == "dop853, then radau"
     assert "radau from t = 0.0" in watched.statistics.integrator.reason
@@ -151,8 +148,8 @@ def test_a_choice_of_the_scene_is_kept():
 def test_implicit_integrators_agree_with_dop853_on_every_kind_of_joint(name, integrator):
     model = zoo.build(name, analysis=(pcid(),))
     keys = {"end": 0.05, "output_step": 0.01}
-    exact = run_pcid(model, pcid(tolerance=1e-9, integrator="dop853", **keys), False, always)
-    outcome = run_pcid(model, pcid(tolerance=1e-3, integrator=integrator, **keys), False, always)
+    exact = run(model, pcid(tolerance=1e-9, integrator="dop853", **keys))
+    outcome = run(model, pcid(tolerance=1e-3, integrator=integrator, **keys))
     assert outcome.status == "completed"
     peak = np.abs(exact.lambda_).max()
     assert np.abs(outcome.lambda_ - exact.lambda_).max() < 1e-3 * peak

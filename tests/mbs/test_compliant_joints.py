@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from balances import OUTPUT_STEP, energy_and_losses
 from links import ANGLES, TIP, arm, arm_links, quintic
-from mechanisms import always, checked_scene, forward, make_model, pcid, relative, revolute
+from mechanisms import checked_scene, forward, make_model, pcid, relative, revolute
+from planar_runs import joint_forces, point_motion, run
 from rods import rod
 from scipy.integrate import simpson
 
@@ -13,15 +14,10 @@ from ffrobot.actuation.control.linear_model import linear_model
 from ffrobot.actuation.control.modes import robot_modes
 from ffrobot.actuation.motors import judge_motors
 from ffrobot.common.errors import InputError
-from ffrobot.mbs.analysis.elastic_joints import add_transmission, unresolved_gears, with_compliance
-from ffrobot.mbs.analysis.forward import run_forward
-from ffrobot.mbs.analysis.motors_only import MotorsOnly, run_motors_only
+from ffrobot.mbs.analysis.elastic_joints import unresolved_gears
+from ffrobot.mbs.analysis.motors_only import MotorsOnly
 from ffrobot.mbs.analysis.operating_points import operating_points
-from ffrobot.mbs.analysis.pcid import run_pcid
-from ffrobot.mbs.analysis.replay import ActuatorSet
-from ffrobot.mbs.analysis.static import Static, run_static
-from ffrobot.mbs.quantities.joint_motion import motor_motion
-from ffrobot.mbs.quantities.observation import joint_forces, point_motion
+from ffrobot.mbs.analysis.static import Static
 from ffrobot.mbs.solve.linearisation import linearise
 
 L, M, J, N, K, C = 0.7, 2.0, 3e-3, 9.0, 500.0, 0.4
@@ -53,7 +49,7 @@ def test_two_masses_turn_and_swing():
     ω² = k (1/I_m + 1/I) with I_m = J N² and I = m L²/3; the twist's mean is τ I/(I_m + I)/k.
     """
     tau, t = 2.0, np.linspace(0.0, 1.0, 101)
-    outcome = run_forward(pendulum(str(tau)), forward(tolerance=1e-9), None, {}, always)
+    outcome = run(pendulum(str(tau)), forward(tolerance=1e-9))
     omega, total = np.sqrt(K * (1 / MOTOR + 1 / LINK)), MOTOR + LINK
     twist = tau * LINK / total / K * (1 - np.cos(omega * t))
     turned = tau * t**2 / 2 / total
@@ -91,9 +87,7 @@ def test_dampers_take_the_energy_that_is_missing():
     soft = GEARED | {"stiffness": 200.0, "damping": 1.0}
     keys = {"trajectory": [], "initial": {"angles": {"link1": 0.3, "link2": 1.0}, "rates": {"link1": 2.0}}}
     load = [{"joint": "O", "moment": "20*sin(10*t)"}]
-    outcome = run_forward(
-        geared_arm(soft, load=load, **keys), forward(output_step=OUTPUT_STEP, tolerance=1e-9), None, {}, always
-    )
+    outcome = run(geared_arm(soft, load=load, **keys), forward(output_step=OUTPUT_STEP, tolerance=1e-9))
     total, losses = energy_and_losses(outcome)
     motor_rate = np.gradient(motor_motion(outcome, "O").coordinate, OUTPUT_STEP, edge_order=2)
     work = simpson(20 * np.sin(10 * outcome.time) * motor_rate, x=outcome.time)
@@ -106,10 +100,10 @@ def test_stiff_gears_approach_rigid_ones_as_one_over_their_stiffness():
     load = [{"joint": "O", "moment": "4*sin(2*t)**4"}, {"joint": "A", "moment": "sin(2*t)**4"}]
     keys = {"trajectory": [], "load": load, "gravity": (0.0, 0.0)}
     run = forward(tolerance=1e-9)
-    rigid, errors = run_forward(rigid_arm(RIGID, RIGID, **keys), run, None, {}, always).q, []
+    rigid, errors = run(rigid_arm(RIGID, RIGID, **keys), run).q, []
     for k in (1e4, 2e4, 4e4):
         give = RIGID | {"stiffness": k}
-        q = run_forward(rigid_arm(give, give, **keys), run, None, {}, always).q
+        q = run(rigid_arm(give, give, **keys), run).q
         errors.append(relative(q[:, : rigid.shape[1]], rigid))
     order = -np.diff(np.log(errors)) / np.log(2)
     assert errors[-1] < 1e-3
@@ -120,7 +114,7 @@ def test_motors_behind_soft_gears_are_judged_by_their_own_speed():
     """θ_m = γ + I γ̈/k: under γ = (1 − cos πt)/2 the rate is that of the joint times 1 − I π²/k, the power likewise."""
     path = {"name": "swing", "joint": "O", "value": "0.5*(1 - cos(pi*t))"}
     model = pendulum(stiffness=10.0, trajectory=[path])
-    outcome = add_transmission(run_pcid(model, pcid(tolerance=1e-9, output_step=0.005), True, always))
+    outcome = run(model, pcid(tolerance=1e-9, output_step=0.005))
     judged = judge_motors(outcome, {joint.name: joint for joint in model.scene.joint})["O"]
     slower = 1 - LINK * np.pi**2 / 10.0
     np.testing.assert_allclose(judged.speed, 0.5 * np.pi * slower, rtol=1e-5)
@@ -131,17 +125,17 @@ def test_motors_behind_soft_gears_are_judged_by_their_own_speed():
 @pytest.mark.parametrize("integrator", ["radau", "generalized-alpha"])
 def test_implicit_integrators_agree_with_explicit_ones(integrator):
     model = geared_arm(GEARED, trajectory=[], initial={"angles": {"link1": 0.3, "link2": 1.0}})
-    reference = run_forward(model, forward(end=0.2, tolerance=1e-8, integrator="dop853"), None, {}, always)
-    outcome = run_forward(model, forward(end=0.2, tolerance=1e-5, integrator=integrator), None, {}, always)
+    reference = run(model, forward(end=0.2, tolerance=1e-8, integrator="dop853"))
+    outcome = run(model, forward(end=0.2, tolerance=1e-5, integrator=integrator))
     assert outcome.status == "completed"
     assert relative(outcome.q, reference.q) < 1e-4
 
 
 def carried_out(model, end=1.0):
     """Distance (T,) of the tip from its path when the motors do what the inverse analysis says; and that analysis."""
-    source = add_transmission(run_pcid(model, pcid(tolerance=1e-9, end=end, output_step=0.0025), True, always))
+    source = run(model, pcid(tolerance=1e-9, end=end, output_step=0.0025))
     replay = forward(actuation="inverse", apply="joints", tolerance=1e-9, end=end, output_step=0.0025)
-    outcome = run_forward(model, replay, source, ActuatorSet(), always)
+    outcome = run(model, replay, source)
     assert outcome.status == "completed"
     tip = f"{model.links[-1].name}.tip"
     error = point_motion(outcome, tip).position - point_motion(source, tip).position
@@ -178,16 +172,16 @@ def test_motors_alone_carry_flexible_links_behind_gears_that_give(second, left):
     path = {"name": "tip", "point": "link2.tip", "x": nonic(TIP[0], 0.4), "y": nonic(TIP[1], 1.5)}
     model = geared_arm(GEARED, second, initial={"state": "static", "angles": ANGLES}, trajectory=[path])
     servo = MotorsOnly(name="servo", kind="motors-only", end=1.0, output_step=0.005)
-    source = add_transmission(run_motors_only(model, servo, always))
+    source = run(model, servo)
     replay = forward(actuation="servo", apply="joints", tolerance=1e-8, output_step=0.005)
-    outcome = run_forward(model, replay, source, ActuatorSet(), always)
+    outcome = run(model, replay, source)
     error = point_motion(outcome, "link2.tip").position - point_motion(source, "link2.tip").position
     assert np.linalg.norm(error, axis=1).max() < left
 
 
 def test_coarse_outputs_are_told_of():
     model = rigid_arm(GEARED | {"stiffness": 30.0}, RIGID)
-    source = add_transmission(run_pcid(model, pcid(tolerance=1e-6, output_step=0.05), True, always))
+    source = run(model, pcid(tolerance=1e-6, output_step=0.05))
     (line,) = unresolved_gears(source.gears)
     assert "refine output_step" in line
 
@@ -196,7 +190,7 @@ def test_dampers_that_hold_a_gear_for_good_are_refused():
     """Moments say nothing of a twist that takes 15 000 analyses to come; splines would have no solution to rounding."""
     model = rigid_arm(GEARED | {"damping": 4.5e7}, RIGID)
     with pytest.raises(InputError, match=r'joint "O": damping: expected .* within 1e\+04 s .*, found 1.5e\+04'):
-        add_transmission(run_pcid(model, pcid(tolerance=1e-6), True, always))
+        run(model, pcid(tolerance=1e-6))
 
 
 def test_equilibrium_winds_the_gears():
@@ -214,7 +208,7 @@ def test_equilibrium_winds_the_gears():
 
 def test_static_moments_are_those_of_the_gears():
     analysis = Static(name="static", kind="static")
-    static = add_transmission(run_static(geared_arm(GEARED, analysis=(analysis,)), analysis))
+    static = run(geared_arm(GEARED, analysis=(analysis,)), analysis)
     for joint in "OA":
         np.testing.assert_allclose(static.gears[joint].gear_moment, joint_forces(static, joint).motor)
 
@@ -238,9 +232,9 @@ def test_what_does_not_go_is_refused():
     with pytest.raises(InputError, match="a joint with a motor"):
         with_compliance(pendulum(motor=False))
     model = geared_arm(GEARED)
-    source = add_transmission(run_pcid(model, pcid(end=0.1), True, always))
+    source = run(model, pcid(end=0.1))
     with pytest.raises(InputError, match='"joints" or "joints\\+pzt" for joints'):
-        run_forward(model, forward(actuation="inverse", apply="trajectory", end=0.1), source, ActuatorSet(), always)
+        run(model, forward(actuation="inverse", apply="trajectory", end=0.1), source)
     loaded = geared_arm(GEARED, load=[{"joint": "O", "moment": "1"}])
     with pytest.raises(InputError, match=r"expected no \[\[load\]\] on"):
-        add_transmission(run_pcid(loaded, pcid(end=0.1), False, always))
+        run(loaded, pcid(end=0.1))

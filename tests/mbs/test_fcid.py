@@ -6,16 +6,15 @@ import velocity_transformation
 import zoo
 from links import arm, arm_links, quintic, ritz_link
 from mechanisms import assemble, make_model, oracle_of, pcid, relative, revolute
+from planar_runs import run
 
 from ffrobot.common.errors import InputError, SolveError
 from ffrobot.mbs import _core
-from ffrobot.mbs.analysis.fcid import Fcid, run_fcid
-from ffrobot.mbs.analysis.pcid import run_pcid
+from ffrobot.mbs.analysis.fcid import Fcid
 from ffrobot.mbs.analysis.planar_outcome import PlanarOutcome
 from ffrobot.mbs.fields.expressions import parse_expression
 from ffrobot.mbs.fields.waypoints import spline
 from ffrobot.mbs.model.planar_tree import told_in_joints
-from ffrobot.mbs.solve.initial_state import undeformed_state
 
 OPEN = ["chain of 2", "backwards", "mixed", "mixed backwards", "tree", "loaded", "stiffened, driven"]
 WITH_PAYLOAD = ("loaded", "stiffened, driven")
@@ -38,7 +37,7 @@ def given_shapes(model):
 def solved(name, shape="given", **keys):
     model = zoo.build(name, **keys)
     analysis = fcid(shape, modal=given_shapes(model)) if shape == "given" else fcid(shape)
-    return model, run_fcid(model, analysis)
+    return model, run(model, analysis)
 
 
 @pytest.mark.parametrize("name", OPEN + CLOSED)
@@ -122,7 +121,7 @@ def rigid(body):
 def test_zero_shape_is_the_rigid_arm_in_closed_form():
     """Two uniform links: τ of the double pendulum (Spong and Vidyasagar 1989, ch. 6); F_p of rods that move rigidly."""
     model = arm()
-    outcome = run_fcid(model, Fcid(name="fcid", kind="fcid", shape="zero", end=1.0, output_step=0.05))
+    outcome = run(model, Fcid(name="fcid", kind="fcid", shape="zero", end=1.0, output_step=0.05))
     theta, w, alpha = (
         np.array([x[:, outcome.coordinates(name)][:, 2] for name in ("link1", "link2")])
         for x in (outcome.q, outcome.v, outcome.a)
@@ -166,7 +165,7 @@ def test_static_shape_sags_as_in_closed_form():
         joint=[revolute("O", "ground", "link1.root")],
         trajectory=[{"name": "hold", "joint": "O", "value": "0"}],
     )
-    outcome = run_fcid(model, fcid("static"))
+    outcome = run(model, fcid("static"))
     sag = outcome.q[:, 3:] @ link.points["tip"].translation[1]
     np.testing.assert_allclose(sag, -mass * 9.81 / (8 * EI), rtol=1e-9)
     np.testing.assert_allclose(outcome.tau, mass * 9.81 / 2, rtol=1e-9)
@@ -177,8 +176,7 @@ def test_static_shape_needs_only_what_its_own_motion_takes():
     """Inertia of p̈ is all that is left where loads vary slowly: orders of magnitude below links held straight."""
     model = arm(arm_links(EI=3e4))
     static, zero = (
-        run_fcid(model, Fcid(name="f", kind="fcid", shape=shape, end=1.0, output_step=0.01))
-        for shape in ("static", "zero")
+        run(model, Fcid(name="f", kind="fcid", shape=shape, end=1.0, output_step=0.01)) for shape in ("static", "zero")
     )
     assert np.abs(static.F_p).max() < 1e-3 * np.abs(zero.F_p).max()
 
@@ -196,20 +194,20 @@ def test_static_shape_of_links_that_are_too_soft():
     with pytest.raises(
         SolveError, match=r'analysis "fcid": no static shape was found at t = 0 s: the links are too soft'
     ):
-        run_fcid(arm(arm_links(EI=0.2)), fcid("static"))
+        run(arm(arm_links(EI=0.2)), fcid("static"))
 
 
 def test_too_few_trajectories_are_refused():
     model = arm(trajectory=[{"name": "lift", "point": "link2.tip", "y": quintic(1.3, 1.5)}])
     with pytest.raises(InputError, match=r"as many trajectory components as .* degrees of freedom \(2\) .* found 1"):
-        run_fcid(model, fcid("zero"))
+        run(model, fcid("zero"))
 
 
 def test_more_expressions_than_modes_are_refused():
     model = arm()
     expressions = tuple(parse_expression("0") for _ in range(4))
     with pytest.raises(InputError, match=r"modal.link2: expected at most 3 expressions, one for each mode, found 4"):
-        run_fcid(model, fcid("given", modal={"link2": expressions}))
+        run(model, fcid("given", modal={"link2": expressions}))
 
 
 def test_a_shape_out_of_reach_is_an_error():
@@ -217,7 +215,7 @@ def test_a_shape_out_of_reach_is_an_error():
     model = arm()
     modal = {"link2": (parse_expression("-50*t"),)}
     with pytest.raises(SolveError, match=r"no position was found at t = .*: the prescribed shape takes the trajectory"):
-        run_fcid(model, fcid("given", modal=modal))
+        run(model, fcid("given", modal=modal))
 
 
 def test_pcid_and_fcid_meet_in_stiff_links():
@@ -225,8 +223,8 @@ def test_pcid_and_fcid_meet_in_stiff_links():
     differences = []
     for EI in (3e3, 3e4):
         model = arm(arm_links(EI=EI), initial={"state": "static", "angles": {"link1": 0.4, "link2": 1.3}})
-        free: PlanarOutcome = run_pcid(model, pcid(output_step=0.05), False, lambda _: True)
-        held = run_fcid(model, Fcid(name="f", kind="fcid", shape="zero", end=1.0, output_step=0.05))
+        free: PlanarOutcome = run(model, pcid(output_step=0.05))
+        held = run(model, Fcid(name="f", kind="fcid", shape="zero", end=1.0, output_step=0.05))
         differences.append(relative(held.tau, free.tau))
     assert differences[1] == pytest.approx(differences[0] / np.sqrt(10), rel=0.3)
     assert differences[1] < 1e-3

@@ -2,16 +2,14 @@
 
 import numpy as np
 import pytest
+import velocity_transformation
 from links import arm
-from mechanisms import always, forward, oracle_of, pcid, relative, revolute
+from mechanisms import forward, oracle_of, pcid, relative, revolute
 from patch_sets import FULL, N, patches
+from planar_runs import point_motion, run
 from scipy.optimize import lsq_linear
 
-from ffrobot.mbs.analysis.fcid import Fcid, run_fcid
-from ffrobot.mbs.analysis.forward import run_forward
-from ffrobot.mbs.analysis.pcid import run_pcid
-from ffrobot.mbs.analysis.replay import ActuatorSet
-from ffrobot.mbs.quantities.observation import point_motion
+from ffrobot.mbs.analysis.fcid import Fcid
 
 
 @pytest.fixture(scope="module")
@@ -20,9 +18,9 @@ def model():
 
 
 def pair(model, apply, tolerance, actuator_set=FULL, **of_forward):
-    inverse = run_pcid(model, pcid(tolerance=tolerance), True, always)
+    inverse = run(model, pcid(tolerance=tolerance))
     analysis = forward(tolerance=tolerance, actuation="inverse", apply=apply, **of_forward)
-    outcome = run_forward(model, analysis, inverse, actuator_set, always)
+    outcome = run(model, analysis, inverse, actuator_set)
     assert outcome.status == "completed"
     return inverse, outcome
 
@@ -68,7 +66,7 @@ def test_joint_moments_alone_leave_the_path(model):
 
 
 def test_joint_moments_alone_are_the_full_actuation_with_patches_that_do_nothing(model):
-    nothing = ActuatorSet(patches(np.zeros((N, N))))
+    nothing = patches(np.zeros((N, N)))
     _, idle = pair(model, "joints+pzt", 1e-6, nothing)
     _, joints = pair(model, "joints", 1e-6)
     assert relative(idle.q, joints.q) < 1e-6
@@ -83,18 +81,18 @@ def test_motors_at_frames_work_as_well(model):
 
 def test_outputs_between_those_of_the_inverse_run_are_as_good(model):
     """The actuation comes from the dense output, not from samples at output times."""
-    inverse = run_pcid(model, pcid(tolerance=1e-7, output_step=0.5), True, always)
+    inverse = run(model, pcid(tolerance=1e-7, output_step=0.5))
     analysis = forward(tolerance=1e-7, output_step=0.01, actuation="inverse", apply="joints+pzt")
-    outcome = run_forward(model, analysis, inverse, FULL, always)
-    reference = run_pcid(model, pcid(tolerance=1e-7), False, always)
+    outcome = run(model, analysis, inverse, FULL)
+    reference = run(model, pcid(tolerance=1e-7))
     assert departure(reference, outcome).max() < 1e-7
 
 
 @pytest.mark.parametrize("integrator", ["dopri5", "radau"])
 def test_recordings_of_other_integrators_are_replayed(model, integrator):
-    inverse = run_pcid(model, pcid(tolerance=1e-5, integrator=integrator), True, always)
+    inverse = run(model, pcid(tolerance=1e-5, integrator=integrator))
     analysis = forward(tolerance=1e-5, actuation="inverse", apply="joints+pzt")
-    outcome = run_forward(model, analysis, inverse, FULL, always)
+    outcome = run(model, analysis, inverse, FULL)
     assert outcome.status == "completed"
     assert departure(inverse, outcome).max() < 1e-5
 
@@ -103,9 +101,9 @@ def test_recordings_of_other_integrators_are_replayed(model, integrator):
 def test_forward_run_under_fcid_keeps_path_and_shape(model, shape):
     """Links that ring in PCID keep a shape that is prescribed: straight, or sagging."""
     analysis = Fcid(name="fcid", kind="fcid", shape=shape, end=1.0, output_step=0.01)
-    inverse = run_fcid(model, analysis)
+    inverse = run(model, analysis)
     following = forward(tolerance=1e-6, actuation="fcid", apply="joints+pzt")
-    outcome = run_forward(model, following, inverse, FULL, always)
+    outcome = run(model, following, inverse, FULL)
     assert departure(inverse, outcome).max() < 1e-6
     modal = np.r_[inverse.coordinates("link1")][3:], np.r_[inverse.coordinates("link2")][3:]
     for own in modal:
@@ -123,44 +121,41 @@ def limited_arm():
 
 @pytest.mark.parametrize("kind", ["pcid", "fcid"])
 def test_saturated_actuators_give_what_their_limits_leave(kind):
-    """M q̈ + C_mqᵀ λ = Q + T_qᵀ clip(τ) + Φ_V V at every output, V by SciPy's bounded least squares."""
+    """Dᵀ (M q̈ − Q) = (clip(τ), Φ_V V) at every output, V by SciPy's bounded least squares."""
     model = limited_arm()
     Phi = np.random.default_rng(2).standard_normal((N, N))
     limit = np.array([3.0, 1.0, 0.5])
     inverse = (
-        run_pcid(model, pcid(tolerance=1e-7), True, always)
+        run(model, pcid(tolerance=1e-7))
         if kind == "pcid"
-        else run_fcid(model, Fcid(name="inverse", kind="fcid", shape="zero", end=1.0, output_step=0.01))
+        else run(model, Fcid(name="inverse", kind="fcid", shape="zero", end=1.0, output_step=0.01))
     )
     analysis = forward(tolerance=1e-7, actuation="inverse", apply="joints+pzt", limits=True)
-    actuator_set = ActuatorSet(limited_patches=patches(Phi, limit))
-    outcome = run_forward(model, analysis, inverse, actuator_set, always)
+    actuator_set = patches(Phi, limit)
+    outcome = run(model, analysis, inverse, actuator_set)
     tau = np.clip(inverse.tau, [-12.0, -4.0], [12.0, 4.0])
     assert np.any(tau != inverse.tau)
     mechanism, saturated = oracle_of(outcome.assembly), 0
     for k in range(0, 101, 10):
         q, v = outcome.q[k], outcome.v[k]
-        load = mechanism.forces(outcome.time[k], q, v)
-        for row, moment in zip(model.motors.values(), tau[k], strict=True):
-            load += moment * mechanism.row(row, q, v).gradient
+        C_mq = np.array([row.gradient for row in mechanism.rows(q, v)])[~np.array(outcome.assembly.is_trajectory)]
+        T_q = np.array([mechanism.row(row, q, v).gradient for row in model.motors.values()])
+        D, supplied = velocity_transformation.by_definition(mechanism, C_mq, T_q), [tau[k]]
         for name in ("link1", "link2"):
             wanted = inverse.F_p[k, inverse.modal_columns(name)]
             V = lsq_linear(Phi, wanted, (-limit, limit), method="bvls", tol=1e-14).x
             saturated += np.count_nonzero(np.abs(V) >= limit)
-            load[mechanism.columns[name]][3:] += Phi @ V
-        C_q = np.array([row.gradient for row in mechanism.rows(q, v)])
-        inertia = mechanism.mass_matrix(q) @ outcome.a[k] + C_q.T @ outcome.lambda_[k]
-        assert relative(inertia, load) < 1e-6  # the inverse run between its outputs, to its tolerance
+            supplied.append(Phi @ V)
+        needed = D.T @ (mechanism.mass_matrix(q) @ outcome.a[k] - mechanism.forces(outcome.time[k], q, v))
+        assert relative(needed, np.concatenate(supplied)) < 1e-6  # the inverse run between its outputs, to its tolerance
     assert saturated > 10
 
 
 def test_limits_that_are_never_reached_change_nothing(model):
-    inverse = run_pcid(model, pcid(tolerance=1e-6), True, always)
-    wide = ActuatorSet(limited_patches=patches(np.eye(N), np.full(N, 1e6)))
+    inverse = run(model, pcid(tolerance=1e-6))
+    wide = patches(np.eye(N), np.full(N, 1e6))
     runs = [
-        run_forward(
-            model, forward(tolerance=1e-6, actuation="inverse", apply="joints+pzt", limits=limits), inverse, e, always
-        )
+        run(model, forward(tolerance=1e-6, actuation="inverse", apply="joints+pzt", limits=limits), inverse, e)
         for limits, e in ((True, wide), (False, FULL))
     ]
     np.testing.assert_array_equal(runs[0].q, runs[1].q)

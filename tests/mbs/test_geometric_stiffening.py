@@ -5,13 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from links import arm, arm_links, ritz_link
-from mechanisms import always, forward, make_model, oracle_of, pcid, revolute
+from mechanisms import forward, make_model, oracle_of, pcid, revolute
+from planar_runs import energies, point_motion, run
 from scipy.linalg import eigh
 
 from ffrobot.common.errors import SolveError
-from ffrobot.mbs.analysis.forward import run_forward
-from ffrobot.mbs.analysis.pcid import run_pcid
-from ffrobot.mbs.quantities.observation import energies, point_motion
 from ffrobot.mbs.quantities.stiffening import loads_on_modes
 from ffrobot.mbs.quantities.stiffness_change import stiffness_change
 
@@ -53,7 +51,7 @@ def test_frequency_of_a_spinning_cantilever():
 
 def test_spin_up_lags_as_it_should_and_settles():
     """The tip lags by at most 0.535 m, at 6.77 s (Wu and Haug 1988)."""
-    outcome = run_pcid(spinning(True), pcid(end=30.0, output_step=0.01), False, always)
+    outcome = run(spinning(True), pcid(end=30.0, output_step=0.01))
     assert outcome.status == "completed"
     lag = -point_motion(outcome, "beam.tip").deflection[:, 1]
     assert lag.max() == pytest.approx(0.535, rel=0.01)
@@ -63,7 +61,7 @@ def test_spin_up_lags_as_it_should_and_settles():
 
 def test_spin_up_without_it_diverges_and_says_so():
     """The first bending frequency, 2.91 rad/s, is below the speed of 4 rad/s."""
-    outcome = run_pcid(spinning(False), pcid(end=30.0, output_step=0.01), False, always)
+    outcome = run(spinning(False), pcid(end=30.0, output_step=0.01))
     assert outcome.status == "diverged"
     assert 7 < outcome.time[-1] < 15
     assert len(outcome.q) == len(outcome.time) > 700  # what there is up to then
@@ -74,9 +72,7 @@ def test_spin_up_without_it_diverges_and_says_so():
 @pytest.mark.parametrize("integrator", ["radau", "generalized-alpha"])
 def test_implicit_integrators_stiffen_as_well(integrator):
     keys = {"end": 3.0, "output_step": 0.01, "tolerance": 1e-3}
-    exact, outcome = (
-        run_pcid(spinning(True), pcid(integrator=name, **keys), False, always) for name in ("dop853", integrator)
-    )
+    exact, outcome = (run(spinning(True), pcid(integrator=name, **keys)) for name in ("dop853", integrator))
     tips = [point_motion(o, "beam.tip").deflection for o in (exact, outcome)]
     assert np.abs(tips[1] - tips[0]).max() < 2e-3 * np.abs(tips[0]).max()
 
@@ -85,7 +81,7 @@ def test_energy_of_an_undamped_pendulum_stays():
     tolerance = 1e-8
     initial = {"angles": {"link1": 0.3, "link2": 1.0}, "rates": {"link1": 2.0}}
     model = arm(arm_links(stiffening=True), trajectory=[], initial=initial)
-    outcome = run_forward(model, forward(end=2.0, tolerance=tolerance), None, {}, always)
+    outcome = run(model, forward(end=2.0, tolerance=tolerance))
     parts = energies(outcome)
     total = parts["kinetic"] + parts["strain"] + parts["gravitational"]
     assert np.ptp(parts["kinetic"]) > 1
@@ -101,7 +97,7 @@ def test_momentum_of_a_free_chain_stays():
         load=[{"joint": "A", "moment": "3*sin(8*t)"}],
         initial={"angles": {"link1": 0.3, "link2": 1.0}, "rates": {"link1": 3.0, "link2": -1.0}},
     )
-    outcome = run_forward(model, forward(end=2.0, tolerance=tolerance), None, {}, always)
+    outcome = run(model, forward(end=2.0, tolerance=tolerance))
     assert outcome.status == "completed"
     mechanism = oracle_of(outcome.assembly)
     momentum = np.array([mechanism.momentum(q, v) for q, v in zip(outcome.q, outcome.v, strict=True)])
@@ -111,7 +107,7 @@ def test_momentum_of_a_free_chain_stays():
 def test_tip_is_on_its_path_with_what_bending_takes_off():
     """Position as reported: foreshortening included."""
     model = arm(arm_links(stiffening=True))
-    outcome = run_pcid(model, pcid(tolerance=1e-6), False, always)
+    outcome = run(model, pcid(tolerance=1e-6))
     tip = point_motion(outcome, "link2.tip")
     targets = np.column_stack([c.target.sample(outcome.time)[0] for c in model.trajectories])
     assert np.abs(tip.deflection[:, 0]).max() > 1e-5
@@ -123,8 +119,8 @@ def test_stiffness_changes_are_those_of_the_loads():
     stiffened = spinning(True)
     known = {"beam": stiffened.bodies[0].stiffening}
     keys = {"end": 3.0, "output_step": 0.1}
-    on = stiffness_change(loads_on_modes(run_pcid(stiffened, pcid(**keys), False, always), known)["beam"]).largest
-    outcome = run_pcid(spinning(False), pcid(**keys), False, always)
+    on = stiffness_change(loads_on_modes(run(stiffened, pcid(**keys)), known)["beam"]).largest
+    outcome = run(spinning(False), pcid(**keys))
     speed = np.abs(outcome.v[:, 2]).max()
     expected = eigh(known["beam"].K_omega, np.diag(stiffened.bodies[0].stiffness))[0].max() * speed**2
     off = stiffness_change(loads_on_modes(outcome, known)["beam"])
@@ -136,5 +132,5 @@ def test_stiffness_changes_are_those_of_the_loads():
 def test_it_is_left_out_where_the_body_has_none():
     """Bodies without it are those of an arm that never heard of it, to the last bit."""
     with_none = arm([replace(link, stiffening=None) for link in arm_links(stiffening=True)])
-    one, other = (run_pcid(model, pcid(end=0.1), False, always) for model in (arm(), with_none))
+    one, other = (run(model, pcid(end=0.1)) for model in (arm(), with_none))
     assert np.array_equal(one.q, other.q)

@@ -3,16 +3,13 @@
 import numpy as np
 import pytest
 from links import ANGLES, TIP, arm, arm_links, ritz_link
-from mechanisms import always, assemble, make_model, pcid, revolute
+from mechanisms import assemble, make_model, pcid, revolute
+from planar_runs import point_motion, run
 from rods import rod, slider_crank
 
 from ffrobot.common.errors import InputError, SolveError
-from ffrobot.mbs.analysis.drive import initial_state
-from ffrobot.mbs.analysis.pcid import run_pcid
-from ffrobot.mbs.analysis.static import Static, run_static
+from ffrobot.mbs.analysis.static import Static
 from ffrobot.mbs.model.model import build_model
-from ffrobot.mbs.quantities.observation import point_motion
-from ffrobot.mbs.solve.initial_state import undeformed_state
 from ffrobot.mbs.solve.reach import turned_guesses
 
 HOLD = {"name": "tip", "point": "link2.tip", "x": repr(TIP[0]), "y": repr(TIP[1])}
@@ -20,7 +17,7 @@ HOLD = {"name": "tip", "point": "link2.tip", "x": repr(TIP[0]), "y": repr(TIP[1]
 
 def refused(model, match):
     with pytest.raises(InputError, match=match):
-        run_pcid(model, pcid(), False, always)
+        run(model, pcid())
 
 
 def to(x, y, name="tip"):
@@ -75,7 +72,7 @@ def test_target_that_moves_out_of_reach_is_named_with_its_time():
     """1.5 + t leaves the circle of radius 2 at t = 0.5 s."""
     model = arm(trajectory=[to("1.5+t", "0", "hand")], initial={"angles": {"link1": -0.7, "link2": 0.7}})
     with pytest.raises(InputError, match=r'trajectory "hand": expected a target within reach') as raised:
-        run_pcid(model, pcid(), False, always)
+        run(model, pcid())
     time = float(str(raised.value).split("t = ")[1].split(" s")[0])
     assert time == pytest.approx(0.5, abs=0.02)
 
@@ -116,7 +113,7 @@ def test_redundant_joints_are_named():
 def test_static_start_is_at_rest():
     """A robot held still under gravity: no accelerations, no ringing later on."""
     model = arm(trajectory=[HOLD], initial={"angles": ANGLES, "state": "static"})
-    outcome = run_pcid(model, pcid(tolerance=1e-8), False, always)
+    outcome = run(model, pcid(tolerance=1e-8))
     assert np.abs(outcome.q[0][3:6]).max() > 1e-4  # it sags
     assert np.abs(outcome.a[0]).max() < 1e-8
     assert np.abs(outcome.q - outcome.q[0]).max() < 1e-10
@@ -125,7 +122,7 @@ def test_static_start_is_at_rest():
 
 def test_undeformed_start_rings():
     """What the static start avoids."""
-    outcome = run_pcid(arm(trajectory=[HOLD]), pcid(), False, always)
+    outcome = run(arm(trajectory=[HOLD]), pcid())
     assert np.abs(outcome.lambda_ - outcome.lambda_[0]).max() > np.abs(outcome.lambda_[0]).max()
 
 
@@ -143,7 +140,7 @@ def test_static_shape_of_a_horizontal_cantilever():
     static = Static(name="rest", kind="static")
     beam = ritz_link("beam", "cantilever", mass=2.0, EI=50.0)
     load = [{"point": "beam.tip", "y": "-3"}]
-    outcome = run_static(make_model([beam], joint=[weld], load=load, analysis=(static,)), static)
+    outcome = run(make_model([beam], joint=[weld], load=load, analysis=(static,)), static)
     expected = -(2.0 * 9.81 / 8 + 3.0 / 3) / 50.0
     assert point_motion(outcome, "beam.tip").deflection[0, 1] == pytest.approx(expected, rel=1e-3)  # three modes
 

@@ -3,21 +3,20 @@
 import numpy as np
 import pytest
 from links import ANGLES, TIP, arm, arm_links, quintic, ritz_link
-from mechanisms import always, assemble, pcid, relative
+from mechanisms import assemble, pcid, relative
+from planar_runs import run
 
 from ffrobot.common.errors import SolveError
 from ffrobot.mbs import _core
-from ffrobot.mbs.analysis.pcid import run_pcid
 from ffrobot.mbs.model.planar_tree import PlanarTree
 from ffrobot.mbs.scene.analysis import TIGHTEST_TOLERANCE
-from ffrobot.mbs.solve.initial_state import undeformed_state
 from ffrobot.mbs.solve.statics import static_equilibrium
 
 REPORTED = ("q", "v", "lambda_", "tau", "F_p")
 
 
 def inverse(model, **keys):
-    outcome = run_pcid(model, pcid(**keys), False, always)
+    outcome = run(model, pcid(**keys))
     assert outcome.status == "completed"
     return outcome
 
@@ -206,7 +205,7 @@ def test_constraints_hold_at_every_output(integrator):
 
 
 def test_a_run_ends_at_max_steps_and_says_so():
-    outcome = run_pcid(arm(), pcid(max_steps=100), False, always)
+    outcome = run(arm(), pcid(max_steps=100))
     assert outcome.status == "too many steps"
     assert outcome.statistics.steps + outcome.statistics.rejected == 100
     assert 0 < outcome.time[-1] < 1
@@ -218,14 +217,14 @@ def test_generalized_alpha_says_that_a_tolerance_is_beyond_it():
     model = arm(gravity=(0.0, 0.0), trajectory=[path])
     analysis = pcid(end=0.2, tolerance=1e-8, integrator="generalized-alpha")
     with pytest.raises(SolveError, match=r"1e-08 is below what generalized-alpha reaches here.*loosen the tolerance"):
-        run_pcid(model, analysis, False, always).check_completed()
+        run(model, analysis).check_completed()
 
 
 def test_where_steps_collapse_does_not_depend_on_max_steps():
     path = {"name": "tip", "point": "link2.tip", "x": f"{TIP[0]!r}-0.12*sin(100*t)", "y": f"{TIP[1]!r}"}
     model = arm(gravity=(0.0, 0.0), trajectory=[path])
     keys = {"end": 0.2, "tolerance": 1e-8, "integrator": "generalized-alpha"}
-    runs = [run_pcid(model, pcid(max_steps=most, **keys), False, always) for most in (50_000, 1_000_000)]
+    runs = [run(model, pcid(max_steps=most, **keys)) for most in (50_000, 1_000_000)]
     assert [run.status for run in runs] == ["step underflow"] * 2
     assert runs[0].statistics.steps == runs[1].statistics.steps
     assert runs[0].statistics.time_reached == runs[1].statistics.time_reached
@@ -233,7 +232,7 @@ def test_where_steps_collapse_does_not_depend_on_max_steps():
 
 def test_a_run_stops_when_asked_to():
     asked = []
-    outcome = run_pcid(arm(), pcid(tolerance=1e-10), False, lambda t: asked.append(t) or t < 0.2)
+    outcome = run(arm(), pcid(tolerance=1e-10), progress=lambda t: asked.append(t) or t < 0.2)
     assert outcome.status == "interrupted"
     assert 0.2 <= asked[-1] < 1
     assert outcome.time[-1] <= asked[-1]
@@ -244,6 +243,6 @@ def test_a_start_at_rest_costs_no_more_steps_than_the_motion(tolerance):
     """Vibration starts from nothing there: its rounding once drove the step below any size."""
     initial = {"angles": ANGLES, "state": "static"}
     keys = {"tolerance": tolerance, "integrator": "dop853"}
-    at_rest = run_pcid(arm(initial=initial), pcid(max_steps=20_000, **keys), False, always)
+    at_rest = run(arm(initial=initial), pcid(max_steps=20_000, **keys))
     assert at_rest.status == "completed"
     assert at_rest.statistics.steps < 1.2 * inverse(arm(), **keys).statistics.steps

@@ -2,11 +2,10 @@
 
 import numpy as np
 from links import ANGLES, arm
-from mechanisms import always, make_model, pcid, revolute
+from mechanisms import make_model, pcid, revolute
+from planar_runs import run
 from rods import rod, slider_crank
 
-from ffrobot.mbs.analysis.pcid import run_pcid
-from ffrobot.mbs.quantities.joint_motion import joint_motions
 from ffrobot.mbs.quantities.joint_space import motor_rates
 
 
@@ -21,7 +20,7 @@ def test_turns_are_counted():
         ],
         initial={"angles": {"a": 0.4, "b": -0.7}},
     )
-    outcome = run_pcid(model, pcid(tolerance=1e-9), False, always)
+    outcome = run(model, pcid(tolerance=1e-9))
     motions, t = joint_motions(outcome), outcome.time
     np.testing.assert_allclose(motions["O"].coordinate, 0.4 + 0.9 * np.sin(2 * t), atol=1e-10)
     np.testing.assert_allclose(motions["A"].coordinate, -1.1 + 22 * t, atol=1e-10)
@@ -31,9 +30,7 @@ def test_turns_are_counted():
 def test_way_of_a_slider():
     """x = r cos φ + √(l² − r² sin² φ) along the guide, φ of the crank."""
     r, length = 0.2, 0.5
-    outcome = run_pcid(
-        slider_crank({"name": "crank", "joint": "O", "value": "0.9+8*t"}), pcid(tolerance=1e-9), False, always
-    )
+    outcome = run(slider_crank({"name": "crank", "joint": "O", "value": "0.9+8*t"}), pcid(tolerance=1e-9))
     motions = joint_motions(outcome)
     phi = 0.9 + 8 * outcome.time
     (guide,) = (motion for name, motion in motions.items() if name not in ("O", "A", "B"))
@@ -47,7 +44,7 @@ def test_flexible_links_turn_with_their_sections_or_frames():
     found = {}
     for motors in ("section", "frame"):
         model = arm(motors=motors, initial={"state": "static", "angles": ANGLES})
-        outcome = run_pcid(model, pcid(tolerance=1e-6, end=0.1), False, always)
+        outcome = run(model, pcid(tolerance=1e-6, end=0.1))
         motions, rates = joint_motions(outcome), motor_rates(outcome)
         for k, name in enumerate(model.motors):
             np.testing.assert_allclose(motions[name].rate, rates[:, k], atol=1e-12)

@@ -8,7 +8,6 @@ import pytest
 import velocity_transformation
 from material_points import random_cloud
 from mechanisms import (
-    always,
     assemble,
     checked_scene,
     core_run,
@@ -19,15 +18,13 @@ from mechanisms import (
     relative,
     revolute,
 )
+from planar_runs import run, trajectory_force
 from pydantic import Field
 
 from ffrobot.common.errors import InputError
 from ffrobot.common.validation import validate
 from ffrobot.mbs import _core
-from ffrobot.mbs.analysis.fcid import Fcid, run_fcid
-from ffrobot.mbs.analysis.forward import run_forward
-from ffrobot.mbs.analysis.pcid import run_pcid
-from ffrobot.mbs.analysis.replay import ActuatorSet, actuation_source
+from ffrobot.mbs.analysis.fcid import Fcid
 from ffrobot.mbs.fields.field_types import Vector2
 from ffrobot.mbs.joints.joints import JOINT_TYPES, Joint
 from ffrobot.mbs.joints.measure import Measure, relative_angle, slide
@@ -37,8 +34,6 @@ from ffrobot.mbs.model.model import ZERO, build_model
 from ffrobot.mbs.model.planar_body import from_rigid_body
 from ffrobot.mbs.model.planar_tree import PlanarTree
 from ffrobot.mbs.model.system import MechanismSystem
-from ffrobot.mbs.quantities.observation import trajectory_force
-from ffrobot.mbs.solve.initial_state import undeformed_state
 from ffrobot.scene.scene import Scene
 
 
@@ -115,7 +110,7 @@ def test_a_pin_slides_in_an_inclined_slot_and_turns():
     scene = scene_with({"name": "S", "type": "slot", "between": ["ground", "a.pin"], "way": [3.0**0.5, -1.0]})
     model = build_model(scene, [from_rigid_body("a", scene.body[0].rigid)])
     assert list(model.motors) == ["S"]
-    outcome = run_forward(model, forward(tolerance=1e-9), None, {}, always)
+    outcome = run(model, forward(tolerance=1e-9))
     distance = 0.25 * 9.81 * outcome.time**2
     expected = np.column_stack([distance * 3.0**0.5 / 2, -distance / 2, 3.0 * outcome.time])
     assert relative(outcome.q, expected) < 1e-8
@@ -176,17 +171,17 @@ def test_what_would_act_along_a_direction_of_the_ground_between_two_bodies_is_re
     model = on_arm(AS_BUILT[what] | {"type": "rail"})
     expected = r'kind = "forward" quantities that joint coordinates define, .* direction of the ground \(.*"S", x\)'
     with pytest.raises(InputError, match=expected):
-        run_forward(model, forward(end=0.3), None, {}, always)
+        run(model, forward(end=0.3))
 
 
 def test_forces_of_paths_carry_the_motion_out_again():
     arm = {"name": "arm", "joint": "O", "value": "0.4+0.3*t**2"}
     model = on_arm(AS_BUILT["both"], trajectory=[arm, PATHS[1]])
-    source = run_pcid(model, pcid(end=0.3, tolerance=1e-10), True, always)
+    source = run(model, pcid(end=0.3, tolerance=1e-10))
     assert source.status == "completed"
     assert source.tau is None  # as many motors as freedom: the way along the slot has none
     replay = forward(end=0.3, tolerance=1e-10, actuation="inverse", apply="trajectory")
-    again = run_forward(model, replay, source, ActuatorSet(), always)
+    again = run(model, replay, source)
     assert relative(again.q, source.q) < 1e-8
 
 
@@ -211,7 +206,7 @@ def trammel(kind, slot, *trajectory):
 def test_a_motor_along_its_coordinate(kind, what):
     """What it does in place of a path's forces, by definition; its moment carries the motion out again."""
     model = trammel(kind, AS_BUILT.get(what, {}), {"name": "turn", "angle": "a", "value": "t**2"})
-    source = run_pcid(model, pcid(end=0.1, tolerance=1e-10), True, always)
+    source = run(model, pcid(end=0.1, tolerance=1e-10))
     assert source.status == "completed"
     oracle, is_trajectory = oracle_of(source.assembly), np.array(source.assembly.is_trajectory)
     for k in (0, 5, 10):
@@ -235,8 +230,8 @@ def test_a_motor_along_its_coordinate(kind, what):
 @pytest.mark.parametrize("integrator", ["radau", "generalized-alpha"])
 def test_implicit_integrators(integrator):
     model = on_arm(AS_BUILT["friction"])
-    exact = run_forward(model, forward(end=0.3, tolerance=1e-9, integrator="dop853"), None, {}, always)
-    found = run_forward(model, forward(end=0.3, tolerance=1e-5, integrator=integrator), None, {}, always)
+    exact = run(model, forward(end=0.3, tolerance=1e-9, integrator="dop853"))
+    found = run(model, forward(end=0.3, tolerance=1e-5, integrator=integrator))
     assert relative(found.q, exact.q) < 1e-4
 
 
@@ -245,7 +240,7 @@ def test_prescribed_motion():
     paths = [{"name": "turn", "angle": "a", "value": "t**2"}, {"name": "slide", "point": "a.pin", "x": "t**2"}]
     scene = scene_with({"name": "S", "type": "slot", "between": ["ground", "a.pin"], "way": [1.0, 0.0]}, paths)
     model = build_model(scene, [from_rigid_body("a", scene.body[0].rigid)])
-    outcome = run_fcid(model, Fcid(name="held", kind="fcid", shape="zero", end=1.0, output_step=0.1))
+    outcome = run(model, Fcid(name="held", kind="fcid", shape="zero", end=1.0, output_step=0.1))
     np.testing.assert_allclose(outcome.a, [[2.0, 0.0, 2.0]] * 11, atol=1e-13)
     expected = {"turn": 0.5 * 2.0, "slide": 2.0 * 2.0}
     for name, force in expected.items():

@@ -6,14 +6,13 @@ import numpy as np
 import pytest
 import zoo
 from links import arm, arm_links, ritz_link
-from mechanisms import always, make_model, oracle_of, pcid, relative, revolute
+from mechanisms import make_model, oracle_of, pcid, relative, revolute
+from planar_runs import run
 
 from ffrobot.common.errors import SolveError
 from ffrobot.mbs import _core
-from ffrobot.mbs.analysis.pcid import run_pcid
 from ffrobot.mbs.model.model import ModalLoad
 from ffrobot.mbs.model.system import MechanismSystem
-from ffrobot.mbs.solve.initial_state import undeformed_state
 from ffrobot.mbs.solve.linearisation import Linearisation, held_by_motors, linearise
 
 constant = _core.TimeFunction.constant
@@ -23,7 +22,7 @@ constant = _core.TimeFunction.constant
 def motion(request):
     """One instant of the arm's inverse dynamics, where everything moves."""
     model = arm(arm_links(damping_ratio=0.02, stiffening=request.param), analysis=(pcid(end=0.4, output_step=0.1),))
-    outcome = run_pcid(model, model.scene.analysis[0], False, always)
+    outcome = run(model, model.scene.analysis[0])
     return model, outcome
 
 

@@ -6,14 +6,12 @@ import numpy as np
 import pytest
 import zoo
 from links import arm, arm_links
-from mechanisms import always, forward, pcid
+from mechanisms import forward, pcid
 from oracle import elastic_forces, gravity_forces, mass_matrix, quadratic_velocity_forces
+from planar_runs import joint_forces, run
 
 from ffrobot.common.plane import rotated
-from ffrobot.mbs.analysis.forward import run_forward
-from ffrobot.mbs.analysis.pcid import run_pcid
 from ffrobot.mbs.quantities.link_loads import link_loads
-from ffrobot.mbs.quantities.observation import joint_forces
 
 MECHANISMS = (
     *("chain of 3", "backwards", "mixed", "four-bar", "slider-crank", "tree"),
@@ -56,7 +54,7 @@ def missing(outcome, name):
 def test_loads_at_points_move_the_bodies(name):
     """Every joint type, closed loops, rotors, friction, given loads; frames and modes alike."""
     model = zoo.build(name, trajectory=[], load=zoo.LOADS)
-    outcome = run_forward(model, forward(end=0.05, output_step=0.01), None, {}, always)
+    outcome = run(model, forward(end=0.05, output_step=0.01))
     for body in model.links:
         left, largest = missing(outcome, body.name)
         assert np.abs(left).max() < 1e-9 * largest
@@ -64,7 +62,7 @@ def test_loads_at_points_move_the_bodies(name):
 
 def test_inverse_dynamics_counts_what_motors_and_patches_do():
     """Not the force on the trajectory that stands for them: what is left to the modes is F_p."""
-    outcome = run_pcid(arm(arm_links(damping_ratio=0.02), load=LOADS[:1]), pcid(output_step=0.05), False, always)
+    outcome = run(arm(arm_links(damping_ratio=0.02), load=LOADS[:1]), pcid(output_step=0.05))
     for body in outcome.assembly.model.links:
         left, largest = missing(outcome, body.name)
         np.testing.assert_allclose(left[:, :3], 0.0, atol=1e-9 * largest)
@@ -77,7 +75,7 @@ def test_inverse_dynamics_counts_what_motors_and_patches_do():
 
 def test_forces_in_joints_are_those_of_the_multipliers():
     """Of a forward run, whose multipliers are the reactions themselves; moments of the motors come with the loads."""
-    outcome = run_forward(arm(trajectory=[], load=LOADS), forward(output_step=0.1), None, {}, always)
+    outcome = run(arm(trajectory=[], load=LOADS), forward(output_step=0.1))
     loads, columns = link_loads(outcome, ["link2"])["link2"].sizes, outcome.coordinates("link2")
     reaction = rotated(-outcome.q[:, columns][:, 2], joint_forces(outcome, "A").reaction)
     found = at_point(loads, "root")
@@ -86,7 +84,7 @@ def test_forces_in_joints_are_those_of_the_multipliers():
 
 
 def test_forces_at_actuation_points_are_not_taken_for_those_of_joints():
-    outcome = run_forward(arm(trajectory=[]), forward(end=0.1, output_step=0.1), None, {}, always)
+    outcome = run(arm(trajectory=[]), forward(end=0.1, output_step=0.1))
     points = SimpleNamespace(analysis=SimpleNamespace(apply="points"), in_pieces=None)
     assert link_loads(outcome, ["link2"])
     assert link_loads(points, ["link2"]) == {}

@@ -6,11 +6,10 @@ from types import MappingProxyType
 import numpy as np
 import zoo
 from links import arm, arm_links
-from mechanisms import always, assemble, evaluate, joint_state, pcid, relative
+from mechanisms import assemble, evaluate, joint_state, pcid, relative
+from planar_runs import energies, joint_forces, point_motion, run, trajectory_force
 
-from ffrobot.mbs.analysis.pcid import run_pcid
 from ffrobot.mbs.model.planar_body import PlanarPoint
-from ffrobot.mbs.quantities.observation import energies, joint_forces, point_motion, trajectory_force
 
 
 def with_signs(body, signs):
@@ -35,7 +34,7 @@ def with_signs(body, signs):
 def test_a_whole_run_does_not_depend_on_the_signs():
     links = arm_links(damping_ratio=0.01)
     flipped = [with_signs(body, signs) for body, signs in zip(links, ([-1, 1, -1], [1, -1, -1]), strict=True)]
-    one, other = (run_pcid(arm(bodies), pcid(tolerance=1e-8), False, always) for bodies in (links, flipped))
+    one, other = (run(arm(bodies), pcid(tolerance=1e-8)) for bodies in (links, flipped))
     quantities = {
         "tip": lambda o: point_motion(o, "link2.tip").position,
         "deflection of link 1": lambda o: point_motion(o, "link1.mid").deflection,

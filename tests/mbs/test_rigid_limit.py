@@ -3,19 +3,15 @@
 import numpy as np
 import pytest
 from links import ANGLES, TIP, arm, arm_links, quintic
-from mechanisms import always, make_model, pcid, relative, revolute
+from mechanisms import make_model, pcid, relative, revolute
+from planar_runs import joint_forces, run, trajectory_force
 from rods import rod, slider_crank
-
-from ffrobot.mbs.analysis.pcid import run_pcid
-from ffrobot.mbs.quantities.observation import joint_forces, trajectory_force
 
 G = 9.81
 
 
 def inverse(model, **keys):
-    outcome = run_pcid(
-        model, pcid(**({"tolerance": 1e-9, "output_step": 0.002, "max_steps": 200_000} | keys)), False, always
-    )
+    outcome = run(model, pcid(**({"tolerance": 1e-9, "output_step": 0.002, "max_steps": 200_000} | keys)))
     assert outcome.status == "completed"
     return outcome
 

@@ -4,17 +4,15 @@ import numpy as np
 import pytest
 import zoo
 from links import TIP, arm, arm_links, quintic, ritz_link
-from mechanisms import always, forward, make_model, oracle_of, relative, revolute
+from mechanisms import forward, make_model, oracle_of, relative, revolute
 from numpy.polynomial import Polynomial
+from planar_runs import point_motion, run
 
 from ffrobot.common.errors import InputError, SolveError
 from ffrobot.mbs import _core
 from ffrobot.mbs._core import TimeFunction
-from ffrobot.mbs.analysis.forward import run_forward
 from ffrobot.mbs.analysis.inverted_path import is_minimum_phase
-from ffrobot.mbs.analysis.motors_only import MotorsOnly, path_error, run_motors_only
-from ffrobot.mbs.analysis.replay import ActuatorSet
-from ffrobot.mbs.quantities.observation import point_motion
+from ffrobot.mbs.analysis.motors_only import MotorsOnly
 from ffrobot.mbs.solve import stable_inversion
 from ffrobot.mbs.solve.internal_dynamics import LinearDynamics, equilibrium, is_unstable, linear_dynamics, zeros
 from ffrobot.mbs.solve.servo import make_servo
@@ -48,7 +46,7 @@ def at_rest(model, factor=1.0):
 def exact_forward(model, outcome, **keys):
     """The motors' moments without the path."""
     analysis = forward(actuation="inverse", apply="joints", **keys)
-    replayed = run_forward(model, analysis, outcome, ActuatorSet(), always)
+    replayed = run(model, analysis, outcome)
     assert replayed.status == "completed"
     return replayed
 
@@ -120,7 +118,7 @@ def test_moment_of_a_single_link_is_the_linear_inverse_in_the_frequency_domain()
     f, size = smooth_step(), 1e-4
     path = f"{size}*(" + "+".join(f"({float(c)!r})*t**{k}" for k, c in enumerate(f.coef) if c) + ")"
     model = single_link(path, damping_ratio=0.01)
-    outcome = run_motors_only(model, motors_only(tolerance=1e-8, output_step=1 / 128), always)
+    outcome = run(model, motors_only(tolerance=1e-8, output_step=1 / 128))
     assert outcome.status == "completed"
 
     t = np.arange(-4 * 2048, 4 * 2048) / 2048
@@ -140,7 +138,7 @@ def two_links():
 
 @pytest.fixture(scope="module")
 def carried(two_links):
-    return run_motors_only(two_links, motors_only(), always)
+    return run(two_links, motors_only())
 
 
 def test_tip_follows_its_path_with_the_motors_alone(two_links, carried):
@@ -183,14 +181,14 @@ def test_path_that_ends_far_from_where_it_began():
     model = arm(
         arm_links(EI=300.0), trajectory=[path], gravity=(0.0, 0.0), initial={"angles": {"link1": 0.4, "link2": -0.8}}
     )
-    outcome = run_motors_only(model, motors_only(end=2.0), always)
+    outcome = run(model, motors_only(end=2.0))
     assert outcome.status == "completed"
     replayed = exact_forward(model, outcome)
     assert np.abs(path_error(outcome.details.inversion, replayed.time, replayed.q)).max() < 1e-7
 
 
 def test_shorter_pre_actuation_starts_off_rest_as_told(two_links, carried):
-    short = run_motors_only(two_links, motors_only(pre_actuation=0.05), always)
+    short = run(two_links, motors_only(pre_actuation=0.05))
     assert short.status == "completed"
     assert 1e-4 < short.details.inversion.off_rest < 1.0
     assert np.abs(path_error(short.details.inversion, short.time, short.q)).max() < 1e-12
@@ -232,7 +230,7 @@ def test_motors_of_a_redefined_output_are_those_of_less_deflection(name, motors)
 def test_redefined_output_is_minimum_phase_and_tells_what_is_left(two_links):
     """The motors alone bring the tip as near as reported, and the largest factor is taken that is minimum phase."""
     model = arm(arm_links(damping_ratio=0.01, modes=2))
-    outcome = run_motors_only(model, motors_only(output="redefined"), always)
+    outcome = run(model, motors_only(output="redefined"))
     assert outcome.status == "completed"
     assert is_minimum_phase(outcome.details.inversion.linearisation)
     factor = outcome.details.inversion.servo.factor
@@ -244,14 +242,14 @@ def test_redefined_output_is_minimum_phase_and_tells_what_is_left(two_links):
     same = np.abs(path_error(outcome.details.inversion, replayed.time, replayed.q))
     np.testing.assert_allclose(same, left, atol=1e-6)
     with pytest.raises(InputError, match=r"minimum phase.*right half plane"):
-        run_motors_only(model, motors_only(output="redefined", factor=min(0.99, factor + 0.1)), always)
+        run(model, motors_only(output="redefined", factor=min(0.99, factor + 0.1)))
 
 
 def test_joint_trajectories_need_no_future():
     """A specified joint angle is collocated with its motor: integrated forward from rest, without pre-actuation."""
     path = [{"name": "swing", "joint": "O", "value": quintic(0, 1)}]
     model = single_link("0*t", damping_ratio=0.02, trajectory=path)
-    outcome = run_motors_only(model, motors_only(), always)
+    outcome = run(model, motors_only())
     assert outcome.status == "completed"
     assert outcome.time[0] == 0.0
     assert is_minimum_phase(outcome.details.inversion.linearisation)
@@ -261,29 +259,29 @@ def test_joint_trajectories_need_no_future():
 
 def test_path_that_does_not_start_at_rest_is_refused():
     with pytest.raises(InputError, match=r'trajectory "tip": y: .* at rest at t = 0 s.*found the rate 0.3'):
-        run_motors_only(single_link("0.3*t*(1-t)**2"), motors_only(), always)
+        run(single_link("0.3*t*(1-t)**2"), motors_only())
 
 
 def test_path_that_does_not_end_at_rest_is_refused():
     with pytest.raises(InputError, match=r"at rest at t = 1 s.*found the rate 0.6"):
-        run_motors_only(single_link("0.3*t**2"), motors_only(), always)
+        run(single_link("0.3*t**2"), motors_only())
 
 
 def test_too_few_motors_are_refused():
     joints = [revolute("O", "ground", "link.root", motor=False)]
     with pytest.raises(InputError, match=r"as many motors as .* \(1\), found 0"):
-        run_motors_only(single_link(quintic(0, 0.1), joint=joints), motors_only(), always)
+        run(single_link(quintic(0, 0.1), joint=joints), motors_only())
 
 
 def test_too_few_trajectory_components_are_refused():
     model = arm(trajectory=[{"name": "tip", "point": "link2.tip", "y": "0.5+0*t"}])
     with pytest.raises(InputError, match=r"trajectory components .* \(2\), found 1"):
-        run_motors_only(model, motors_only(), always)
+        run(model, motors_only())
 
 
 def test_rigid_arms_are_sent_to_pcid():
     with pytest.raises(InputError, match=r'at least one flexible body.*kind = "pcid"'):
-        run_motors_only(single_link(quintic(0, 0.1), modes=0), motors_only(), always)
+        run(single_link(quintic(0, 0.1), modes=0), motors_only())
 
 
 def in_a_hurry(EI):
@@ -294,7 +292,7 @@ def in_a_hurry(EI):
 
 def test_path_that_bends_the_links_too_much_ends_with_advice(monkeypatch):
     monkeypatch.setattr(stable_inversion, "MOST_INTERVALS", 200)
-    outcome = run_motors_only(in_a_hurry(EI=6.0), motors_only(end=0.3), always)
+    outcome = run(in_a_hurry(EI=6.0), motors_only(end=0.3))
     assert outcome.status == "inversion not converged"
     assert len(outcome.time) > 30  # what the last iteration had
     with pytest.raises(SolveError, match="slow the path down"):
@@ -303,13 +301,13 @@ def test_path_that_bends_the_links_too_much_ends_with_advice(monkeypatch):
 
 def test_links_too_soft_for_their_path_are_named():
     with pytest.raises(SolveError, match=r"motor torques alone cannot follow the path at t = 0\.\d+ s.*too soft"):
-        run_motors_only(in_a_hurry(EI=3.0), motors_only(end=0.3), always)
+        run(in_a_hurry(EI=3.0), motors_only(end=0.3))
 
 
 def test_failed_inversion_keeps_what_it_found(monkeypatch):
     """A mesh that may not get fine enough: status, advice, and the motion as far as it was found."""
     monkeypatch.setattr(stable_inversion, "MOST_INTERVALS", 80)
-    outcome = run_motors_only(arm(), motors_only(tolerance=1e-9), always)
+    outcome = run(arm(), motors_only(tolerance=1e-9))
     assert outcome.status == "mesh too coarse"
     assert len(outcome.time) > 100
     assert np.all(np.isfinite(outcome.tau))

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
+from planar_runs import point_motion
 
-from ffrobot.mbs.quantities.observation import point_motion
 from ffrobot.run.solve import solve
 
 LINK = """
