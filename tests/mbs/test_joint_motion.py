@@ -2,11 +2,10 @@
 
 import numpy as np
 from links import ANGLES, arm
-from mechanisms import make_model, pcid, revolute
+from mechanisms import make_model, oracle_of, pcid, revolute
 from planar_runs import run
 from rods import rod, slider_crank
 
-from ffrobot.mbs.quantities.joint_space import motor_rates
 
 
 def test_turns_are_counted():
@@ -21,22 +20,21 @@ def test_turns_are_counted():
         initial={"angles": {"a": 0.4, "b": -0.7}},
     )
     outcome = run(model, pcid(tolerance=1e-9))
-    motions, t = joint_motions(outcome), outcome.time
-    np.testing.assert_allclose(motions["O"].coordinate, 0.4 + 0.9 * np.sin(2 * t), atol=1e-10)
-    np.testing.assert_allclose(motions["A"].coordinate, -1.1 + 22 * t, atol=1e-10)
-    np.testing.assert_allclose(motions["A"].rate, 22.0, rtol=1e-9)
+    t, (O, A) = outcome.time, (outcome.motion.joint(joint) for joint in "OA")
+    np.testing.assert_allclose(O[0][:, 0], 0.4 + 0.9 * np.sin(2 * t), atol=1e-10)
+    np.testing.assert_allclose(A[0][:, 0], -1.1 + 22 * t, atol=1e-10)
+    np.testing.assert_allclose(A[1][:, 0], 22.0, rtol=1e-9)
 
 
 def test_way_of_a_slider():
     """x = r cos φ + √(l² − r² sin² φ) along the guide, φ of the crank."""
     r, length = 0.2, 0.5
     outcome = run(slider_crank({"name": "crank", "joint": "O", "value": "0.9+8*t"}), pcid(tolerance=1e-9))
-    motions = joint_motions(outcome)
     phi = 0.9 + 8 * outcome.time
-    (guide,) = (motion for name, motion in motions.items() if name not in ("O", "A", "B"))
+    guide = outcome.motion.joint("rail")[0][:, 0]
     way = r * np.cos(phi) + np.sqrt(length**2 - (r * np.sin(phi)) ** 2)
-    np.testing.assert_allclose(guide.coordinate - guide.coordinate[0], way - way[0], atol=1e-9)
-    np.testing.assert_allclose(motions["O"].rate, 8.0, rtol=1e-9)
+    np.testing.assert_allclose(guide - guide[0], way - way[0], atol=1e-9)
+    np.testing.assert_allclose(outcome.motion.joint("O")[1], 8.0, rtol=1e-9)
 
 
 def test_flexible_links_turn_with_their_sections_or_frames():
@@ -45,8 +43,9 @@ def test_flexible_links_turn_with_their_sections_or_frames():
     for motors in ("section", "frame"):
         model = arm(motors=motors, initial={"state": "static", "angles": ANGLES})
         outcome = run(model, pcid(tolerance=1e-6, end=0.1))
-        motions, rates = joint_motions(outcome), motor_rates(outcome)
-        for k, name in enumerate(model.motors):
-            np.testing.assert_allclose(motions[name].rate, rates[:, k], atol=1e-12)
-        found[motors] = motions["A"].coordinate
+        mechanism = oracle_of(outcome.assembly)
+        for name, row in model.motors.items():
+            rates = [mechanism.row(row, q, v).rate for q, v in zip(outcome.q, outcome.v, strict=True)]
+            np.testing.assert_allclose(outcome.motion.joint(name)[1][:, 0], rates, atol=1e-12)
+        found[motors] = outcome.motion.joint("A")[0]
     assert np.abs(found["section"] - found["frame"]).max() > 1e-4

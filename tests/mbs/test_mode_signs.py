@@ -6,10 +6,10 @@ from types import MappingProxyType
 import numpy as np
 import zoo
 from links import arm, arm_links
-from mechanisms import assemble, evaluate, joint_state, pcid, relative
-from planar_runs import energies, joint_forces, point_motion, run, trajectory_force
+from mechanisms import pcid, relative
+from planar_bodies import PlanarPoint
+from planar_runs import energies, evaluated, joint_forces, point_motion, random_tree_state, run, trajectory_force
 
-from ffrobot.mbs.model.planar_body import PlanarPoint
 
 
 def with_signs(body, signs):
@@ -59,14 +59,12 @@ def test_general_modes_do_not_depend_on_the_signs():
     bodies = zoo.clouds(rng, 2)
     signs = [np.array([1, -1, -1, 1]), np.array([-1, -1, 1, 1])]
     tables = {"joint": zoo.serial_joints(2), "trajectory": [zoo.tip_path("b2")]}
-    assemblies = [
-        assemble(zoo.make_model(b, **tables))
-        for b in (bodies, [with_signs(body, s) for body, s in zip(bodies, signs, strict=True)])
-    ]
-    q, v = joint_state(rng, assemblies[0])
-    flip = np.concatenate([np.ones(3), signs[0], np.ones(3), signs[1]])
-    (a, lambda_), (a_flipped, lambda_flipped) = (
-        evaluate(assembly, 0.0, signs * q, signs * v) for assembly, signs in zip(assemblies, (1.0, flip), strict=True)
-    )
-    assert relative(flip * a_flipped, a) < 1e-12
-    assert relative(lambda_flipped, lambda_) < 1e-12
+    flipped = [with_signs(body, own) for body, own in zip(bodies, signs, strict=True)]
+    robots = [zoo.make_model(each, **tables) for each in (bodies, flipped)]
+    tree, flip = robots[0].model.tree, np.ones(robots[0].model.tree.n_v)
+    for node, own in zip(tree.nodes, signs, strict=True):
+        flip[node.p_v] = own
+    q, v = random_tree_state(rng, robots[0])
+    one, other = (evaluated(robot, 0.0, k * q, k * v) for robot, k in zip(robots, (1.0, flip), strict=True))
+    assert relative(flip * other.outcome.a, one.outcome.a) < 1e-12
+    assert relative(other.lambda_, one.lambda_) < 1e-12
