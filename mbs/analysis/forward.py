@@ -145,11 +145,11 @@ def numbers_of_motors(model: SpatialModel) -> dict[str, list[int]]:
 
 
 def _behind_gears(source: Outcome, model: SpatialModel, analysis: Forward, context: Context) -> Outcome:
-    """Where gears of `model` give: moments at the outputs of `source` and splines between these, as in the plane."""
-    if analysis.apply != "joints":
+    """Where gears of `model` give: moments at the outputs of `source` and splines between these, and its voltages."""
+    if analysis.apply not in ("joints", "joints+pzt"):
         raise InputError(
-            f'{model.scene.path}: analysis "{analysis.name}": apply: expected "joints" for joints with stiffness,'
-            f' found "{analysis.apply}"'
+            f'{model.scene.path}: analysis "{analysis.name}": apply: expected "joints" or "joints+pzt" for joints with'
+            f' stiffness, found "{analysis.apply}"'
         )
     if source.model.tree.gears:
         raise InputError(
@@ -161,7 +161,13 @@ def _behind_gears(source: Outcome, model: SpatialModel, analysis: Forward, conte
     wanted = np.hstack([wound.moments[joint] for joint in model.motors])
     given = np.clip(wanted, -most, most)
     sizes = spline(source.time, given, 1 if np.any(given != wanted) else DEGREE)
-    replayed = Replayed(_core.ForcesOfTime(sizes), tuple(motor_commands(model)), moments=numbers_of_motors(model))
+    found: _core.ForceSource = _core.ForcesOfTime(sizes)
+    commands = actuator_commands(model, context.patches)
+    motors, patches = commands[: len(most)], commands[len(most) :]
+    if analysis.apply == "joints+pzt":  # moments of firm gears come with the voltages, and do nothing
+        found = _core.ForcesOfBoth(found, supplied(source, most, context.patches, limited=analysis.limits))
+        motors = (*motors, *[Command(np.zeros(model.tree.n_v))] * len(most), *patches)
+    replayed = Replayed(found, motors, moments=numbers_of_motors(model))
     return spatial_drive(
         model, analysis, State(wound.q[0], wound.v[0]), context.progress, drives=Drives(replayed=replayed),
         times=replay_times(source, analysis), earlier=context.earlier,

@@ -4,31 +4,17 @@ import numpy as np
 import pytest
 from balances import OUTPUT_STEP, energy_and_losses
 from links import ANGLES, arm, arm_links
-from mechanisms import (
-    checked_scene,
-    core_run,
-    evaluate,
-    forward,
-    make_model,
-    on_constraints,
-    oracle_of,
-    pcid,
-    relative,
-    revolute,
-)
-from planar_runs import joint_forces, run
+from mechanisms import Assembly, checked_scene, forward, make_model, oracle_of, pcid, relative, revolute
+from oracle import mass_matrix
+from patch_sets import Patches
+from planar_bodies import rigid_body
+from planar_runs import evaluated, joint_forces, posture_of, run
 from rods import rod
 
 from ffrobot.common.errors import InputError
-from ffrobot.mbs import _core
 from ffrobot.mbs.analysis.fcid import Fcid
 from ffrobot.mbs.analysis.motors_only import MotorsOnly
 from ffrobot.mbs.analysis.static import Static
-from ffrobot.mbs.model.masses import mass_matrix
-from ffrobot.mbs.model.model import ZERO
-from ffrobot.mbs.model.planar_body import from_rigid_body
-from ffrobot.mbs.model.system import MechanismSystem
-from ffrobot.mbs.scene.bodies import RigidBody
 
 G = 9.81
 AT_REST = {"state": "static", "angles": ANGLES}
@@ -61,24 +47,17 @@ def test_swing_of_a_pendulum_with_a_geared_rotor():
 @pytest.mark.parametrize("motors", ["section", "frame"])
 def test_accelerations_are_those_of_the_whole_mass_matrix(motors):
     """M + Σ J d dᵀ with d from the rates of the rotors, inverted as it stands."""
-    rng = np.random.default_rng(3)
     model = geared_arm(trajectory=[], motors=motors)
-    bare = geared_arm(first={}, second={}, trajectory=[], motors=motors)
-    assembly, without = MechanismSystem(model, model.joints), MechanismSystem(bare, bare.joints)
-    n = assembly.system.coordinates
-    state = undeformed_state(assembly)
-    modes = np.setdiff1d(np.arange(n), assembly.frame_coordinates)
-    q = state.q.copy()
-    q[modes] += 0.01 * rng.standard_normal(len(modes))
-    q, v = on_constraints(assembly, 0.0, q, rng.standard_normal(n))
+    found = evaluated(model, 0.0, *posture_of(model, np.random.default_rng(3), modal=0.01))
+    assembly, q, v, n = found.assembly, found.q[0], found.v[0], found.assembly.size
     M = np.zeros((n, n))
-    for body, first in zip(model.bodies, assembly.first, strict=True):
-        block = slice(first, first + 3 + body.n_modes)
+    for body in model.bodies:
+        block = found.coordinates(body.name)
         M[block, block] = mass_matrix(body, q[block])
     d = np.array([oracle_of(assembly).row(row, q, v).gradient for row, _ in model.rotors])
     J = np.array([inertia for _, inertia in model.rotors])
     turning = d @ v  # rates of the rotors: the second's are those of sections (or frames) of both links
-    link1, link2 = (slice(f, f + 3 + b.n_modes) for b, f in zip(model.bodies, assembly.first, strict=True))
+    link1, link2 = (found.coordinates(body.name) for body in model.bodies)
     rate1, rate2 = v[link1][2], v[link2][2]
     if motors == "section":
         rate1_root = rate1 + model.bodies[0].points["root"].rotation @ v[link1][3:]
@@ -88,16 +67,16 @@ def test_accelerations_are_those_of_the_whole_mass_matrix(motors):
         rate1_root = rate1
     np.testing.assert_allclose(turning, [60 * rate1_root, 60 * rate2 - 59 * rate1], rtol=1e-12)
 
-    _, _, C_q = assembly.system.constraints(0.0, q, v)
+    without = Assembly(geared_arm(first={}, second={}, trajectory=[], motors=motors), assembly.constraints)
+    C_q = np.array([row.gradient for row in oracle_of(without).rows(q, v)])
     a_bare, lambda_bare = oracle_of(without).solve(0.0, q, v)
     Q = M @ a_bare + C_q.T @ lambda_bare
     m = len(C_q)
-    gamma = C_q @ a_bare
     whole = np.block([[M + d.T @ (J[:, None] * d), C_q.T], [C_q, np.zeros((m, m))]])
-    expected = np.linalg.solve(whole, np.concatenate([Q, gamma]))
-    a, lambda_ = evaluate(assembly, 0.0, q, v)
-    assert relative(a, expected[:n]) < 1e-10
-    assert relative(lambda_, expected[n:]) < 1e-10
+    expected = np.linalg.solve(whole, np.concatenate([Q, C_q @ a_bare]))
+    assert relative(found.a[0], expected[:n]) < 1e-10
+    for joint, at in zip("OA", (n, n + 2), strict=True):
+        assert relative(joint_forces(found, joint).reaction[0], -expected[at : at + 2]) < 1e-9
 
 
 def test_geared_two_link_arm_needs_the_moments_of_spong():
@@ -170,23 +149,15 @@ def test_inverse_moments_carry_out_the_motion_with_rotors_and_friction():
     model = geared_arm(arm_links(modes=2), GEARED | FRICTION, GEARED | FRICTION)
     source = run(model, pcid(tolerance=1e-8, end=0.4))
     assert np.abs(joint_forces(source, "O").motor).max() > 1.0
-    assembly = MechanismSystem(model, model.joints, [(row, ZERO) for row in model.motors.values()])
-    actuators = [_core.Motors(0, np.full(2, np.inf))]
-    actuators += [
-        _core.Patches(i, _core.Allocation(np.eye(2), np.eye(2), np.eye(2), np.full(2, np.inf), np.ones(2)))
-        for i in range(2)
-    ]
-    run = core_run(
-        assembly, source.q[0], source.v[0], source.time.tolist(), tolerance=1e-8,
-        external_loads=_core.Actuation(actuation_source(source), actuators),
-    )  # fmt: skip
-    assert relative(run.q, source.q) < 1e-5
+    patches = {body.name: Patches(body.name, np.eye(2), np.full(2, np.inf)) for body in model.bodies}
+    outcome = run(model, forward(end=0.4, tolerance=1e-8, actuation="inverse", apply="joints+pzt"), source, patches)
+    assert relative(outcome.q, source.q) < 1e-5
 
 
 def test_a_prismatic_joint_moves_the_reflected_mass():
     """A slider of mass m on rails, pulled by F: ẍ = F/(m + J N²)."""
     J, N = 2e-3, 30.0
-    slider = from_rigid_body("s", RigidBody(mass=0.4, inertia=0.01, center=(0.0, 0.0), points={"pin": (0.0, 0.0)}))
+    slider = rigid_body("s", 0.4, 0.01, (0.0, 0.0), {"pin": (0.0, 0.0)})
     rail = {"name": "rail", "type": "prismatic", "between": ("ground", "s.pin"), "axis": (1.0, 0.0)}
     model = make_model(
         [slider], joint=[rail | {"gear_ratio": N, "rotor_inertia": J}], load=[{"point": "s.pin", "x": "3.0"}]
@@ -196,9 +167,9 @@ def test_a_prismatic_joint_moves_the_reflected_mass():
 
 
 def test_equilibrium_knows_neither_rotors_nor_friction():
-    keys = {"analysis": (Static(name="static", kind="static"),), "motors": "section"}
-    with_them = run(geared_arm(None, GEARED | FRICTION, GEARED | FRICTION, **keys), keys["analysis"][0])
-    without = run(geared_arm(None, {}, {}, **keys), keys["analysis"][0])
+    static, keys = Static(name="static", kind="static"), {"motors": "section"}
+    with_them = run(geared_arm(None, GEARED | FRICTION, GEARED | FRICTION, **keys), static)
+    without = run(geared_arm(None, {}, {}, **keys), static)
     np.testing.assert_allclose(with_them.q, without.q, atol=1e-12)
     np.testing.assert_allclose(with_them.tau, without.tau, rtol=1e-9)
 
