@@ -62,9 +62,9 @@ def start_jolt(start: Start) -> float:
     """How much of a motion's deformation begins to ring at its start all at once, of the largest there is in it.
 
     The vibrations φ_i, ω_i of the robot under the constraints of the run, about its first configuration, have of the
-    first accelerations z̈_i = φ_iᵀ M q̈, and stand z̈_i/ω_i² from equilibrium: √(Σ (z̈_i/ω_i)²) is compared with the
-    largest √(Σ pᵀ K p) of all links. It is 0 on smooth paths from equilibrium, 0.1 to 1 where links start undeformed
-    under gravity, or a path with a jump of its acceleration.
+    first accelerations those that bend links, z̈_i = φ_iᵀ K q̈/ω_i², and stand z̈_i/ω_i² from where they vibrate about:
+    √(Σ (z̈_i/ω_i)²) is compared with the largest √(Σ pᵀ K p) of all links. It is 0 on smooth paths from equilibrium, 0.1
+    to 1 where links start undeformed under gravity, or a path with a jump of its acceleration.
     """
     if not start.largest:
         return 0.0
@@ -72,9 +72,10 @@ def start_jolt(start: Start) -> float:
     free = directions[np.count_nonzero(sizes > DEPENDENT * sizes.max(initial=0.0)) :].T
     inverse = np.linalg.inv(np.linalg.cholesky(free.T @ start.M @ free))
     squares, shapes = np.linalg.eigh(inverse @ (free.T * start.stiffness) @ free @ inverse.T)
-    accelerations = shapes.T @ inverse @ free.T @ start.M @ start.a
     elastic = squares > RIGID * squares.max(initial=0.0)
-    return float(np.sqrt((accelerations[elastic] ** 2 / squares[elastic]).sum() / start.largest))
+    squares, shapes = squares[elastic], free @ inverse.T @ shapes[:, elastic]
+    accelerations = shapes.T @ (start.stiffness * start.a) / squares
+    return float(np.sqrt((accelerations**2 / squares).sum() / start.largest))
 
 
 def modes_in_3d_motion(motion: SpatialMotion) -> Iterator[ModesInMotion]:

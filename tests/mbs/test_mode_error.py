@@ -86,3 +86,27 @@ def test_modes_that_ring_count_by_what_they_do():
     ringing = ModesInMotion(body, p, -body.stiffness * p)
     share = 1e-3 * np.sqrt(body.stiffness[-1] / body.stiffness[0])
     assert mode_error([ringing]) == pytest.approx(share / np.sqrt(1 + share**2), rel=1e-3)
+
+
+def swung(angle):
+    """A cantilever of one mode without damping whose root follows `angle`, without gravity."""
+    link = {
+        "material": {"youngs_modulus": 2.1e11, "density": 7850.0},
+        "geometry": {
+            "kind": "beam", "length": 0.8, "section": {"shape": "rectangle", "height": 0.012, "width": 0.03},
+        },
+        "mesh": {"elements": 40}, "reference": {"condition": "cantilever"}, "damping": {"ratio": 0.0},
+        "modes": {"count": 1, "family": "in-plane-bending", "attachment_modes": False},
+    }  # fmt: skip
+    return library.make_scene(
+        name="swung", space="planar", gravity=[0.0, 0.0], body=[{"name": "link", "link": link}],
+        joint=[{"name": "O", "type": "revolute", "between": ["ground", "link.root"]}],
+        initial={"state": "undeformed"}, trajectory=[{"name": "swing", "joint": "O", "value": angle}],
+        analysis=[{"name": "inverse", "kind": "pcid", "end": 0.2, "output_step": 2e-4, "tolerance": 1e-9}],
+    )  # fmt: skip
+
+
+def test_half_of_what_bends_a_link_rings_where_its_acceleration_jumps():
+    """A step bends it by p = p_s (1 − cos ω t) at first, 2 p_s at most, p_s from where it stands at the start."""
+    assert solved(swung("0.5*t**2")).start_jolt == pytest.approx(0.5, rel=1e-3)
+    assert solved(swung("40*t**5")).start_jolt < 1e-6
