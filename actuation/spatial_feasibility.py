@@ -70,9 +70,9 @@ def judge_in_space(
         link = links[body]
         for name, array in of_link.arrays.items():
             modes = of_link.modes[name]
-            trial = None if analysis.is_repeated else partial(with_count, path, array.layout, link.modal, link.spatial)
+            trial = partial(with_count, path, array.layout, link.modal, link.spatial, of_link.kept)
             modal = ModalMotion(motion.time, modes.coordinates(link.p), modes.forces(link.F_p))
-            judged[name] = judge_patches(array, voltages[name], modal, trial)
+            judged[name] = judge_patches(array, voltages[name], modal, None if analysis.is_repeated else trial)
     missing = unsupplied_in_space(motion, links, patches, voltages, others)
     return Feasibility(judge_motors(motion, analysis), judged, missing)
 

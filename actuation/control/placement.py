@@ -102,7 +102,8 @@ def _link(context: ActuatedContext, wanted: Placement) -> PatchableLink:
 
     def patches(**changes: object) -> PatchArray:
         keys = {"allocation": "least-squares", "mode_weights": None, "point_weights": None} | changes
-        found = link_patches(path, [layout.model_copy(update=elsewhere(layout, keys))], body, context.carrying[name])
+        moved = layout.model_copy(update=elsewhere(layout, keys))
+        found = link_patches(path, [moved], body, context.carrying[name], of_link.kept)
         if not np.array_equal(found.modes[label].rows, reached.rows):
             raise InputError(f'{path}: placement.body: expected patches that reach the modes of "{label}"')
         return found.arrays[label]

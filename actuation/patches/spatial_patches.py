@@ -23,7 +23,7 @@ from ...mbs.model.spatial_masses import uncoupling
 from .composite import Placed
 from .effects import Effects, effects
 from .patches import PatchArray, assembled, check_edges, edges_on_piece, patch_edges
-from .reach import Reach, check_all_served, served_first, weights
+from .reach import SINGULAR, Reach, check_all_served, served_first, weights
 from .records import SpatialPztLayout
 from .sections import check_sections
 from .voltages import Voltages, allocation, solve_voltages
@@ -88,6 +88,7 @@ class LinkPatches:
         reach: of all patches side by side on the modes that they reach together, `reached`.
         reached: likewise.
         bodies: by name, the link and, where it is divided, its pieces.
+        kept: how many modes the scene keeps of the link; None for all.
     """
 
     arrays: Mapping[str, PatchArray]
@@ -95,6 +96,7 @@ class LinkPatches:
     reach: Reach
     reached: ReachedModes
     bodies: Mapping[str, OnBody]
+    kept: int | None = None
 
     @property
     def body(self) -> str:
@@ -176,18 +178,20 @@ def placed_patches(path: Path, layouts: Sequence[SpatialPztLayout], body: ModalB
     return [_placed(path, layout, body) for layout in layouts]
 
 
-def link_patches(path: Path, layouts: Sequence[SpatialPztLayout], body: ModalBody, spatial: SpatialBody) -> LinkPatches:
-    """Place the layouts of one link: they serve all modes of its file, also where the equations have fewer.
+def link_patches(
+    path: Path, layouts: Sequence[SpatialPztLayout], body: ModalBody, spatial: SpatialBody, kept: int | None = None
+) -> LinkPatches:
+    """Place the layouts of one link, of which the equations may have the `kept` lowest modes alone.
 
-    Modal forces on those left out follow from the loads on the link. Raises `InputError` for patches that do not fit
-    it, or weights that do not.
+    Patches that can serve all modes of its file: modal forces on those left out follow from the loads on the link.
+    Others serve the modes kept, and may bend the rest. Raises `InputError` for patches that do not fit the link, or
+    weights that do not.
     """
     spatial = spatial.whole
-    key = _key(path, layouts[0].label if len(layouts) == 1 else layouts[0].body)
     placed = placed_patches(path, layouts, body)
-    found = effects(key, placed, body)
+    found = effects(_key(path, layouts[0].label if len(layouts) == 1 else layouts[0].body), placed, body)
     Phi_V, turn = (np.concatenate(of).T for of in ([of.Phi_V for of in found], [of.turn for of in found]))
-    modes = {one.layout.label: _reached(of.Phi_V, body, spatial) for one, of in zip(placed, found, strict=True)}
+    modes = {one.layout.label: _reached(of.Phi_V, body, spatial, kept) for one, of in zip(placed, found, strict=True)}
     for layout in layouts:
         _check_reached(path, layout, modes[layout.label], body)
     arrays = {
@@ -197,12 +201,17 @@ def link_patches(path: Path, layouts: Sequence[SpatialPztLayout], body: ModalBod
     if len(layouts) == 1:
         reached, reach = modes[layouts[0].label], _alone(arrays[layouts[0].label])
     else:
-        reached = _reached(Phi_V.T, body, spatial)
+        reached = _reached(Phi_V.T, body, spatial, kept)
         reach = _together(path, layouts, arrays, reached, Phi_V.T)
-    if all(layout.allocation == "exact" for layout in layouts):
-        check_all_served(key, reach)
     own = {layouts[0].body: OnBody(Phi_V, turn, np.eye(body.mode_count))}
-    return LinkPatches(arrays, modes, reach, reached, own)
+    return LinkPatches(arrays, modes, reach, reached, own, kept)
+
+
+def check_allocation(path: Path, patches: LinkPatches) -> None:
+    """Raise `InputError` unless the patches of a link serve all modes that they are to, or layouts ask for less."""
+    layouts = [array.layout for array in patches.arrays.values()]
+    if all(layout.allocation == "exact" for layout in layouts):
+        check_all_served(_key(path, layouts[0].label if len(layouts) == 1 else patches.body), patches.reach)
 
 
 def on_pieces(
@@ -232,7 +241,7 @@ def by_body(layouts: Sequence[SpatialPztLayout]) -> Iterator[tuple[str, list[Spa
 
 
 def with_count(
-    path: Path, layout: SpatialPztLayout, body: ModalBody, spatial: SpatialBody, count: int
+    path: Path, layout: SpatialPztLayout, body: ModalBody, spatial: SpatialBody, kept: int | None, count: int
 ) -> PatchArray | None:
     """As many of the same patches, evenly spread over the link, alone, with one limit; None where they have no room."""
     if count * layout.length > body.length * (1 + 1e-9):
@@ -240,7 +249,7 @@ def with_count(
     limit = min(layout.limit) if isinstance(layout.limit, tuple) else layout.limit
     changed = {"count": count, "centers": None, "limit": limit, "allocation": "least-squares"}
     try:
-        found = link_patches(path, [layout.model_copy(update=changed)], body, spatial)
+        found = link_patches(path, [layout.model_copy(update=changed)], body, spatial, kept)
     except InputError:  # across a step of the section, or weights for another number
         return None
     return found.arrays[layout.label]
@@ -253,7 +262,7 @@ def _placed(path: Path, layout: SpatialPztLayout, body: ModalBody) -> Placed:
     return Placed(layout, edges)
 
 
-def _reached(per_volt: Array, body: ModalBody, spatial: SpatialBody) -> ReachedModes:
+def _reached(per_volt: Array, body: ModalBody, spatial: SpatialBody, kept: int | None) -> ReachedModes:
     """By modal forces per volt (k, n) on the modes of the modal body: the families in which any is not 0."""
     size = np.abs(per_volt).max(axis=0)
     families = {body.family[k] for k in np.flatnonzero(size > OUT_OF_REACH * size.max())}
@@ -261,9 +270,20 @@ def _reached(per_volt: Array, body: ModalBody, spatial: SpatialBody) -> ReachedM
     rows = np.flatnonzero([moves and family in families for moves, family in zip(moving, body.family, strict=True)])
     T_inverse, square = spatial.on_file, np.ix_(rows, rows)
     T, stiffness = uncoupling((T_inverse.T @ T_inverse)[square], (T_inverse.T * spatial.stiffness @ T_inverse)[square])
-    modes_first = np.argsort(body.residual[rows], kind="stable")
-    served = int(np.count_nonzero(body.residual[rows] == 0))
-    return ReachedModes(rows, T[:, modes_first], stiffness[modes_first], served)
+    is_left = body.residual[rows] != 0
+    if kept is not None and not _reaches_all((per_volt[:, rows] @ T)[:, ~is_left]):
+        of_link = np.flatnonzero(moving & (body.residual == 0))
+        lowest = of_link[np.argsort(body.frequency[of_link], kind="stable")][:kept]
+        others = np.flatnonzero(~is_left)
+        is_left[others[np.argsort(stiffness[others], kind="stable")][np.isin(lowest, rows).sum() :]] = True
+    modes_first = np.argsort(is_left, kind="stable")
+    return ReachedModes(rows, T[:, modes_first], stiffness[modes_first], int(np.count_nonzero(~is_left)))
+
+
+def _reaches_all(per_volt: Array) -> bool:
+    """Whether k patches can serve n modes, by modal forces per volt (k, n)."""
+    k, n = per_volt.shape
+    return k >= n and bool(np.linalg.cond(per_volt) < SINGULAR) if n else True
 
 
 def _check_reached(path: Path, layout: SpatialPztLayout, modes: ReachedModes, body: ModalBody) -> None:

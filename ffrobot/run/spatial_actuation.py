@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..actuation.feasibility import Feasibility
-from ..actuation.patches.spatial_patches import LinkPatches, by_body, link_patches
+from ..actuation.patches.spatial_patches import LinkPatches, by_body, check_allocation, link_patches
 from ..actuation.patches.voltages import Voltages
 from ..actuation.spatial_feasibility import judge_in_space, links_in_motion
 from ..common.arrays import Array
@@ -40,11 +40,14 @@ class SpatialActuation:
 
 def patches_in_space(scene: SpatialScene, bodies: Bodies) -> dict[str, LinkPatches]:
     """By body. Raises `InputError` for layouts that do not fit their link or do not serve what they are to."""
-    found = {}
+    found, kept = {}, {body.name: body.modes_kept for body in scene.body}
+    is_allocated = bool(scene.trajectory) and any(analysis.allocates_patches for analysis in scene.analysis)
     for name, layouts in by_body(scene.pzt):
         body = bodies[name]
         assert body.modal is not None
-        found[name] = link_patches(scene.path, layouts, body.modal, body.carrying)
+        found[name] = link_patches(scene.path, layouts, body.modal, body.carrying, kept[name])
+        if is_allocated:
+            check_allocation(scene.path, found[name])
     return found
 
 

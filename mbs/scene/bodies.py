@@ -70,6 +70,11 @@ class BodyKeys(Record):
     pieces: Literal["auto"] | Annotated[int, Field(ge=1, le=100)] | None = None
     """Number of welded segments of a beam link for large deflections; "auto" chooses it."""
 
+    @property
+    def modes_kept(self) -> int | None:
+        """How many modes the scene asks for; None where it does not say."""
+        return self.modes if isinstance(self.modes, int) else None
+
     @model_validator(mode="after")
     def _is_one_of_three(self) -> Self:
         one_of(self, ("link", "modal", "rigid"))

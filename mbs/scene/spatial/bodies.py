@@ -113,8 +113,8 @@ class BodyInSpace(BodyKeys):
     file has, and is rigid in the others.
 
     `modes` of a flexible body is the number of its lowest modes, in planar scenes of those in the plane; the others are
-    represented by their static flexibility. Patches serve all modes of the file. "auto" takes as many as the tolerances
-    of the analyses need; the default is all.
+    represented by their static flexibility. Patches that are enough for all modes of the file serve these, others the
+    lowest. "auto" takes as many as the tolerances of the analyses need; the default is all.
 
     `pieces` is the number of segments of a beam link for large deflections, in 3D scenes in both planes, and twist;
     "auto" chooses it. Results are those of the whole link, and geometric stiffening is on by default.
