@@ -27,6 +27,7 @@ from ..scene.analysis import Check, Need, TimedAnalysis
 from ..solve.quasi_static import quasi_static_shape
 from ..solve.spatial_posture import check_path, mobility
 from ..solve.spatial_prescribed import prescribed_motion
+from ..solve.spatial_reach import check_reach
 from ..solve.spatial_redundancy import resolved
 from ..solve.spatial_start import undeformed_posture
 from .context import Context
@@ -99,6 +100,7 @@ def run_spatial_fcid(context: Context, analysis: Fcid) -> Outcome:
     began = time.perf_counter()
     refuse_held_motors(context.model, analysis)
     model = resolved(context.model, analysis.last_time)
+    check_reach(model, analysis.last_time)
     q = undeformed_posture(model).q
     warnings = tuple(check_path(model, q, analysis.last_time))
     freedom, rows = mobility(model, q).freedom, int(np.count_nonzero(~model.loop_rows))

@@ -8,6 +8,7 @@ from typing import Literal
 from ..model.spatial_gears import with_held_motors
 from ..scene.analysis import Check, IntegratedAnalysis, Need
 from ..solve.spatial_posture import check_path
+from ..solve.spatial_reach import check_reach
 from ..solve.spatial_redundancy import resolved
 from ..solve.spatial_start import undeformed_posture
 from ..solve.spatial_statics import initial_state
@@ -46,6 +47,7 @@ def run_spatial_pcid(context: Context, analysis: IntegratedAnalysis) -> Outcome:
     from.
     """
     firm = resolved(context.model, analysis.last_time)
+    check_reach(firm, analysis.last_time)
     warnings = tuple(check_path(firm, undeformed_posture(firm).q, analysis.last_time))
     model = with_held_motors(firm)
     return spatial_drive(

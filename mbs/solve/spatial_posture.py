@@ -189,8 +189,9 @@ def check_path(model: SpatialModel, q: Array, end: float) -> Iterator[str]:
         )
     if found.followed < rows:
         raise InputError(
-            f"{path}: initial: expected a posture in which the links can follow {names} in every direction, found a"
-            " singular one (two axes in line, an arm stretched or folded?). Bend it, or move the start of the path"
+            f"{path}: initial: expected a posture in which the links can follow trajectory {names} in every direction,"
+            " found a singular one (two axes in line, an arm stretched or folded?). Bend it, or move the start of the"
+            " path"
         )
     if found.ratio < NEARLY_SINGULAR:
         yield f"near a singular posture at the start: {names} can hardly be followed (ratio {found.ratio:.1e})"
@@ -207,7 +208,7 @@ def check_path(model: SpatialModel, q: Array, end: float) -> Iterator[str]:
 def _check_motors(model: SpatialModel, found: Mobility) -> Iterator[str]:
     motors = {name: len(columns) for name, columns in model.motors.items()}
     count, named = sum(motors.values()), any(joint.asks_for_motor for joint in model.scene.joint)
-    if count > found.freedom:
+    if count > found.freedom or (count < found.freedom and named and model.scene.is_planar):
         raise InputError(
             f"{model.scene.path}: joint: expected as many motors as the mechanism has degrees of freedom"
             f" ({found.freedom}), found {count} ({quoted(motors)})"

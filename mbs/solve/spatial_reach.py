@@ -7,7 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...common.arrays import Array
+from ...common.arrays import Array, as_floats
+from ...common.errors import InputError
 from ..fields.field_types import split_point
 from ..model.spatial_model import SpatialModel, row_values
 from ..model.spatial_tree import Node
@@ -17,6 +18,7 @@ from .spatial_posture import joint_scales, robot_size, solve_postures
 
 TURNING = ("revolute", "universal", "spherical", "weld")
 TRIES = 60
+REACH_CHECKS = 1001
 REGULAR = 1e-3  # ratio of singular values of the rows: less is next to a singular posture
 BEYOND = 1e-6  # of the reach: less is rounding
 
@@ -35,6 +37,15 @@ def out_of_reach(model: SpatialModel, times: Array) -> str:
         if text := _beyond(model, path, times):
             return text
     return ""
+
+
+def check_reach(model: SpatialModel, end: float) -> None:
+    """Raise `InputError` for a path that leads beyond the reach of the undeformed links before `end` (s).
+
+    Flexible links would stretch beyond all sense instead of failing.
+    """
+    if text := out_of_reach(model, as_floats(np.linspace(0.0, end, REACH_CHECKS))):
+        raise InputError(f"{model.scene.path}: expected paths within reach of the links, found that {text}")
 
 
 def _beyond(model: SpatialModel, path: SpatialTrajectory, times: Array) -> str:

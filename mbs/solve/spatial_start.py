@@ -11,7 +11,7 @@ from ...common.errors import InputError
 from ...common.validation import quoted
 from ..model.spatial_model import SpatialModel, row_values
 from .spatial_posture import MOST_ITERATIONS, solve_posture, with_rates
-from .spatial_reach import out_of_reach, turned_guesses, working_guess
+from .spatial_reach import check_reach, turned_guesses, working_guess
 from .state import State
 
 
@@ -24,6 +24,7 @@ def undeformed_posture(model: SpatialModel) -> State:
     guess = _with_slides(model, tree.at_rest(_numbers(model, model.scene.initial.joints, "joints")))
     q = solve_posture(model, 0.0, guess)
     if q is None:
+        check_reach(model, 0.0)
         owners, advice = quoted(dict.fromkeys(row.owner for row in model.rows)), "; ".join(_advice(model, guess))
         raise InputError(
             f"{model.scene.path}: initial.joints: expected a guess near a posture with undeformed links that meets"
@@ -64,11 +65,9 @@ def relaxed_gears(model: SpatialModel, state: State) -> State:
 
 
 def _advice(model: SpatialModel, guess: Array) -> Iterator[str]:
-    """What keeps a guess (n_q,) from meeting the rows at t = 0: reach, degrees, or another branch."""
-    if far := out_of_reach(model, np.zeros(1)):
-        yield far
+    """What keeps a guess (n_q,) from meeting the rows at t = 0: degrees, or another branch."""
     yield from turned_guesses(model.scene)
-    if not far and (works := working_guess(model, guess)):
+    if works := working_guess(model, guess):
         yield f"from [initial] {works}, for one, it goes"
 
 
