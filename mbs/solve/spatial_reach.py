@@ -12,6 +12,7 @@ from ...common.errors import InputError
 from ..fields.field_types import split_point
 from ..model.spatial_model import SpatialModel, row_values
 from ..model.spatial_tree import Node
+from ..scene.space import SPACES
 from ..scene.spatial.mechanism import SpatialMechanismKeys
 from ..scene.spatial.trajectories import SpatialTrajectory
 from .spatial_posture import joint_scales, robot_size, solve_postures
@@ -58,7 +59,8 @@ def _beyond(model: SpatialModel, path: SpatialTrajectory, times: Array) -> str:
     beyond = np.flatnonzero(distance > (1 + BEYOND) * chain.reach)
     if not beyond.size:
         return ""
-    first, along = distance[beyond[0]], "" if len(places) == 3 else f" along {' and '.join(places)}"
+    axes = SPACES[model.scene.space].translations
+    first, along = distance[beyond[0]], "" if len(places) == len(axes) else f" along {' and '.join(places)}"
     unit = ': are these m? (mm are written "750*mm")' if first > 10 * chain.reach else ""
     return (
         f'trajectory "{path.name}" is {first:.4g} m{along} from joint "{chain.joint}" on the ground at t ='

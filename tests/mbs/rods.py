@@ -9,7 +9,7 @@ def rod(name, length, mass):
     return rigid_body(name, mass, mass * length**2 / 12, (length / 2, 0.0), points)
 
 
-def slider_crank(path, **keys):
+def slider_crank(path, angles=None, **keys):
     joints = [
         revolute("O", "ground", "crank.root", motor=True),
         revolute("A", "crank.tip", "rod.root"),
@@ -18,5 +18,5 @@ def slider_crank(path, **keys):
     ]
     slider = rigid_body("slider", 0.4, 0.01, (0.0, 0.0), {"pin": (0.0, 0.0)})
     bodies = [rod("crank", 0.2, 1.0), rod("rod", 0.5, 1.5), slider]
-    initial = {"angles": {"crank": 0.9, "rod": -0.3}}
+    initial = {"angles": angles or {"crank": 0.9, "rod": -0.3}}
     return make_model(bodies, joint=joints, trajectory=[path], initial=initial, **keys)

@@ -5,16 +5,15 @@ import pytest
 import velocity_transformation
 import zoo
 from links import arm, arm_links, quintic, ritz_link
-from mechanisms import assemble, make_model, oracle_of, pcid, relative, revolute
+from mechanisms import make_model, oracle_of, pcid, relative, revolute
+from patch_sets import Patches
 from planar_runs import run
 
 from ffrobot.common.errors import InputError, SolveError
-from ffrobot.mbs import _core
 from ffrobot.mbs.analysis.fcid import Fcid
-from ffrobot.mbs.analysis.planar_outcome import PlanarOutcome
+from ffrobot.mbs.analysis.spatial_replay import supplied
 from ffrobot.mbs.fields.expressions import parse_expression
 from ffrobot.mbs.fields.waypoints import spline
-from ffrobot.mbs.model.planar_tree import told_in_joints
 
 OPEN = ["chain of 2", "backwards", "mixed", "mixed backwards", "tree", "loaded", "stiffened, driven"]
 WITH_PAYLOAD = ("loaded", "stiffened, driven")
@@ -41,18 +40,13 @@ def solved(name, shape="given", **keys):
 
 
 @pytest.mark.parametrize("name", OPEN + CLOSED)
-def test_equations_of_motion_hold_with_the_forces_reported(name):
-    """M q̈ + C_qᵀ λ + (0, 0, λ_p) = Q and C = Ċ = C̈ = 0, each computed by the oracle alone."""
+def test_constraints_and_shapes_hold(name):
+    """C = Ċ = C̈ = 0, computed by the oracle alone, and p(t) as it was given."""
     model, outcome = solved(name)
     mechanism = oracle_of(outcome.assembly)
-    modal = [i for body in model.bodies for i in range(*mechanism.columns[body.name].indices(mechanism.size))[3:]]
     for k, t in enumerate(TIMES):
         q, v, a = outcome.q[k], outcome.v[k], outcome.a[k]
         C, C_dot, C_q = mechanism.constraint_values(t, q, v)
-        held = np.zeros(mechanism.size)
-        held[modal] = outcome.details.shape_force[k]
-        inertia, Q = mechanism.mass_matrix(q) @ a, mechanism.forces(t, q, v)
-        assert relative(inertia + C_q.T @ outcome.lambda_[k], Q + held, np.abs(Q).max()) < 1e-11
         bias = [row.bias for row in mechanism.rows(q, v)]
         gamma = np.array([target(t)[2] for _, target in mechanism.constraints]) - bias
         assert max(np.abs(C).max(), np.abs(C_dot).max()) < 1e-12
@@ -80,42 +74,37 @@ def test_motor_and_modal_forces_are_those_of_the_velocity_transformation(name, m
         assert relative(np.concatenate([outcome.tau[k], outcome.F_p[k]]), force) < 1e-11
 
 
-@pytest.mark.parametrize("name", ["mixed backwards", "four-bar", "stiffened, driven"])
+@pytest.mark.parametrize("name", ["mixed backwards", "four-bar", "chain of 2"])
 def test_forces_at_any_time_are_those_at_outputs(name):
-    """Replays ask for them at times that go to and fro."""
-    _, outcome = solved(name)
-    tau, F_p = outcome.details.actuation_source(outcome).sample(TIMES[[3, 0, 4, 1]].tolist())
-    assert relative(tau, outcome.tau[[3, 0, 4, 1]]) < 1e-11
-    assert relative(F_p, outcome.F_p[[3, 0, 4, 1]]) < 1e-11
+    """Replays ask for them at times that go to and fro; patches of all bodies serve all modes."""
+    model, outcome = solved(name)
+    patches = {
+        body.name: Patches(body.name, np.eye(body.n_modes), np.full(body.n_modes, np.inf)) for body in model.bodies
+    }
+    motors = outcome.tau.shape[1]
+    source = supplied(outcome.outcome, np.full(motors, np.inf), patches, limited=False)
+    found = source.sample(TIMES[[3, 0, 4, 1]].tolist())
+    assert relative(found[:, :motors], outcome.tau[[3, 0, 4, 1]]) < 1e-11
+    assert relative(found[:, motors:], outcome.F_p[[3, 0, 4, 1]]) < 1e-11
 
 
-@pytest.mark.parametrize("name", ["chain of 2", "mixed", "slider-crank", "loaded", "stiffened, driven"])
-def test_the_shape_of_a_free_vibration_takes_no_force(name):
-    """p(t) as PCID finds it: FCID then gives the same λ, and nothing is needed to hold the shape."""
-    model = zoo.build(name)
-    assembly = assemble(model)
-    start = undeformed_state(assembly)
-    rng = np.random.default_rng(3)
-    q, v = start.q.copy(), start.v.copy()
-    for body, first in zip(model.bodies, assembly.first, strict=True):
-        modal = slice(first + 3, first + 3 + body.n_modes)
-        q[modal], v[modal] = 0.02 * rng.standard_normal((2, body.n_modes))
-    tree = told_in_joints(assembly, "fcid")
-    posture = tree.motion(start.q, start.v, 0 * start.v)[0]
-    motion = _core.PlanarPrescribedMotion(tree.both.driven, posture)
-    modes = np.setdiff1d(np.arange(len(q)), assembly.frame_coordinates)
-    at_rest = q[None, modes], v[None, modes], 0 * q[None, modes]
-    probe = _core.prescribed_outputs(tree.both, motion, [0.0], *at_rest, posture)
-    a, lambda_ = oracle_of(assembly).solve(0.0, probe.q[0], probe.v[0])
-    run = _core.prescribed_outputs(tree.both, motion, [0.0], *at_rest[:2], a[None, modes], posture)
-    assert relative(run.multipliers[0], lambda_) < 1e-10
-    assert relative(run.a[0], a) < 1e-11
-    assert np.abs(run.shape_force).max() < 1e-10 * np.abs(lambda_).max()
+@pytest.mark.parametrize("name", ["chain of 2", "mixed", "slider-crank"])
+def test_the_shape_of_a_free_vibration_is_its_motion(name):
+    """With p̈ as the oracle finds it for the robot on its path, FCID finds the oracle's accelerations of all frames."""
+    model, rng = zoo.build(name), np.random.default_rng(3)
+    p, p_dot = (size * rng.standard_normal((len(model.bodies), 4)) for size in (0.02, 0.02))
 
+    def moved(p_ddot):
+        modal = {
+            body.name: tuple(parse_expression(f"{x!r}+({v!r})*t+({a!r})*t**2/2") for x, v, a in zip(*each, strict=True))
+            for body, *each in zip(model.bodies, p.tolist(), p_dot.tolist(), p_ddot.tolist(), strict=True)
+        }
+        return run(model, fcid("given", modal=modal))
 
-def rigid(body):
-    """The same body without its modes."""
-    return ritz_link(body.name, "cantilever", mass=body.mass, EI=1e9, modes=1)
+    probe = moved(0.0 * p)
+    a, _ = oracle_of(probe.assembly).solve(0.0, probe.q[0], probe.v[0])
+    found = moved(np.array([a[probe.coordinates(body.name)][3:] for body in model.bodies]))
+    assert relative(found.a[0], a) < 1e-11
 
 
 def test_zero_shape_is_the_rigid_arm_in_closed_form():
@@ -214,7 +203,7 @@ def test_a_shape_out_of_reach_is_an_error():
     """A second link bent by metres: its tip is farther from the elbow than the first link can make up for."""
     model = arm()
     modal = {"link2": (parse_expression("-50*t"),)}
-    with pytest.raises(SolveError, match=r"no position was found at t = .*: the prescribed shape takes the trajectory"):
+    with pytest.raises(SolveError, match=r"no posture was found at t = .*: the prescribed shape takes the trajectories"):
         run(model, fcid("given", modal=modal))
 
 
@@ -223,7 +212,7 @@ def test_pcid_and_fcid_meet_in_stiff_links():
     differences = []
     for EI in (3e3, 3e4):
         model = arm(arm_links(EI=EI), initial={"state": "static", "angles": {"link1": 0.4, "link2": 1.3}})
-        free: PlanarOutcome = run(model, pcid(output_step=0.05))
+        free = run(model, pcid(output_step=0.05))
         held = run(model, Fcid(name="f", kind="fcid", shape="zero", end=1.0, output_step=0.05))
         differences.append(relative(held.tau, free.tau))
     assert differences[1] == pytest.approx(differences[0] / np.sqrt(10), rel=0.3)

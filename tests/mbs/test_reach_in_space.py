@@ -46,6 +46,22 @@ def test_a_target_out_of_reach_is_told_with_distance_and_reach(path, distance, u
     assert ("are these m?" in text) == unit
 
 
+def test_a_target_of_a_planar_arm_out_of_reach_is_told():
+    rod = {"mass": 2.0, "inertia": 0.2, "center": [0.35, 0.0], "points": {"root": [0.0, 0.0], "tip": [0.7, 0.0]}}
+    joints = [
+        {"name": "O", "type": "revolute", "between": ["ground", "a.root"], "at": [0.1, 0.2]},
+        {"name": "A", "type": "revolute", "between": ["a.tip", "b.root"]},
+    ]
+    scene = ffrobot.make_scene(
+        name="rods", gravity=[0.0, 0.0], body=[{"name": name, "rigid": rod} for name in "ab"], joint=joints,
+        trajectory=[{"name": "tip", "point": "b.tip", "x": "750", "y": "250"}], initial={"angles": {"a": 0.3, "b": 1.2}},
+        analysis=[{"name": "inverse", "kind": "pcid", "end": 0.1, "output_step": 0.01}],
+    )  # fmt: skip
+    said = rf'"tip" is {np.hypot(749.9, 249.8):.4g} m from joint "O" on the ground at t = 0 s, .* 1.4 m: are these m'
+    with pytest.raises(InputError, match=said):
+        ffrobot.solve(scene)
+
+
 def test_a_component_out_of_reach_is_told():
     with pytest.raises(InputError, match=r'is 1\.7 m along x from joint "yaw" on the ground'):
         ffrobot.solve(arm({"x": "-1.6"}, BENT))
