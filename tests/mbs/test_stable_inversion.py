@@ -2,20 +2,18 @@
 
 import numpy as np
 import pytest
-import zoo
+import velocity_transformation
 from links import TIP, arm, arm_links, quintic, ritz_link
-from mechanisms import forward, make_model, oracle_of, relative, revolute
+from mechanisms import ZERO, Assembly, Constraint, assemble, forward, make_model, oracle_of, relative, revolute
 from numpy.polynomial import Polynomial
-from planar_runs import point_motion, run
+from planar_runs import evaluated, point_motion, run
 
 from ffrobot.common.errors import InputError, SolveError
-from ffrobot.mbs import _core
-from ffrobot.mbs._core import TimeFunction
 from ffrobot.mbs.analysis.inverted_path import is_minimum_phase
 from ffrobot.mbs.analysis.motors_only import MotorsOnly
 from ffrobot.mbs.solve import stable_inversion
 from ffrobot.mbs.solve.internal_dynamics import LinearDynamics, equilibrium, is_unstable, linear_dynamics, zeros
-from ffrobot.mbs.solve.servo import make_servo
+from ffrobot.mbs.solve.spatial_servo import make_spatial_servo
 from ffrobot.mbs.solve.zero_dynamics import Linearisation
 
 C = np.sqrt(30.0)  # √(EI/ρA)/L² of `ritz_link`, 1/s
@@ -38,9 +36,18 @@ def single_link(path, modes=4, damping_ratio=0.0, **keys):
 
 def at_rest(model, factor=1.0):
     """The equations of motors only with the robot at rest at t = 0: output, M, D and K."""
-    servo = make_servo(model, 1.0, "scene", factor)
+    servo = make_spatial_servo(model.model, 1.0, "scene", lambda: True, factor)
     p, rest = equilibrium(servo, 0.0), np.zeros((1, len(servo.scale)))
     return servo, linear_dynamics(servo, np.zeros(1), p[None], rest, rest)
+
+
+def off_path(outcome):
+    """How far (T, components) points, joints and angles themselves are from their path, by the oracle."""
+    mechanism, is_path, rest = oracle_of(outcome.assembly), outcome.assembly.is_trajectory, 0 * outcome.q[0]
+    times = np.clip(outcome.time, 0.0, outcome.analysis.end)
+    return np.array(
+        [mechanism.constraint_values(t, q, rest)[0][np.array(is_path)] for t, q in zip(times, outcome.q, strict=True)]
+    )
 
 
 def exact_forward(model, outcome, **keys):
@@ -77,19 +84,20 @@ def test_internal_dynamics_are_those_of_the_constrained_and_driven_rows():
     model = arm()
     servo, dynamics = at_rest(model)
     p = equilibrium(servo, 0.0)[None]
-    q = _core.prescribed_outputs(servo.driven_tree.both, servo.motion, [0.0], p, 0 * p, 0 * p, servo.near[0]).q[0]
-    modes = np.setdiff1d(np.arange(len(q)), servo.path.frame_coordinates)
+    found = servo.motion.motion([0.0], p, 0 * p, 0 * p, servo.near[:1])
+    q = evaluated(model, 0.0, found.q[0], 0 * found.v[0]).q[0]
 
     def keeps(assembly):
-        mechanism = oracle_of(assembly)
+        mechanism, frames = oracle_of(assembly), assembly.frame_coordinates
+        modes = np.setdiff1d(np.arange(len(q)), frames)
         rows = np.array([row.gradient for row in mechanism.rows(q, np.zeros_like(q))])
         basis = np.zeros((len(q), len(modes)))
         basis[modes] = np.eye(len(modes))
-        frames = assembly.frame_coordinates
         basis[frames] = -np.linalg.solve(rows[:, frames], rows[:, modes])
         return basis, mechanism.mass_matrix(q)
 
-    (Z, M), (L, _) = keeps(servo.path), keeps(servo.driven)
+    motors = [Constraint(row, ZERO, name, "motor", is_trajectory=False) for name, row in model.motors.items()]
+    (Z, M), (L, _) = keeps(assemble(model)), keeps(Assembly(model, [*model.joints, *motors]))
     np.testing.assert_allclose(dynamics.M[0], L.T @ M @ Z, atol=1e-9)
 
 
@@ -147,20 +155,22 @@ def test_tip_follows_its_path_with_the_motors_alone(two_links, carried):
     replayed = exact_forward(two_links, carried)
     np.testing.assert_array_equal(replayed.time, carried.time)
     way = np.ptp(point_motion(carried, "link2.tip").position, axis=0).max()
-    assert np.abs(path_error(carried.details.inversion, replayed.time, replayed.q)).max() < 1e-7 * way
+    assert np.abs(off_path(replayed)).max() < 1e-7 * way
 
 
 def test_equations_of_motion_hold_with_the_motors_moments(carried):
-    """M q̈ + C_mᵀ ν − T_qᵀ τ = Q, by the oracle alone, and the path by kinematics."""
+    """Dᵀ (M q̈ − Q) = (τ, 0), by the oracle alone, and the path by kinematics."""
     mechanism = oracle_of(carried.assembly)
-    motor = np.array(carried.assembly.is_trajectory)
+    is_path = np.array(carried.assembly.is_trajectory)
     for k in range(0, len(carried.time), 17):
         q, v, a = carried.q[k], carried.v[k], carried.a[k]
-        _, _, C_q = mechanism.constraint_values(0.0, q, v)
+        C_mq = np.array([row.gradient for row in mechanism.rows(q, v)])[~is_path]
+        T_q = np.array([mechanism.row(row, q, v).gradient for row in carried.robot.motors.values()])
+        D = velocity_transformation.by_definition(mechanism, C_mq, T_q)
         Q = mechanism.forces(float(np.clip(carried.time[k], 0, 1)), q, v)
-        reaction = C_q[~motor].T @ carried.lambda_[k][~motor] - C_q[motor].T @ carried.tau[k]
-        assert relative(mechanism.mass_matrix(q) @ a + reaction, Q, np.abs(Q).max()) < 1e-6
-    assert np.abs(path_error(carried.details.inversion, carried.time, carried.q)).max() < 1e-12
+        supplied = np.concatenate([carried.tau[k], np.zeros(6)])
+        assert relative(D.T @ (mechanism.mass_matrix(q) @ a - Q), supplied, np.abs(Q).max()) < 1e-6
+    assert np.abs(off_path(carried)).max() < 1e-12
 
 
 def test_actuation_begins_before_the_path_and_ends_after_it(carried):
@@ -184,47 +194,14 @@ def test_path_that_ends_far_from_where_it_began():
     outcome = run(model, motors_only(end=2.0))
     assert outcome.status == "completed"
     replayed = exact_forward(model, outcome)
-    assert np.abs(path_error(outcome.details.inversion, replayed.time, replayed.q)).max() < 1e-7
+    assert np.abs(off_path(replayed)).max() < 1e-7
 
 
 def test_shorter_pre_actuation_starts_off_rest_as_told(two_links, carried):
     short = run(two_links, motors_only(pre_actuation=0.05))
     assert short.status == "completed"
     assert 1e-4 < short.details.inversion.off_rest < 1.0
-    assert np.abs(path_error(short.details.inversion, short.time, short.q)).max() < 1e-12
-
-
-@pytest.mark.parametrize("motors", ["section", "frame"])
-@pytest.mark.parametrize("name", ["mixed backwards", "loaded", "four-bar", "slider-crank"])
-def test_motors_of_a_redefined_output_are_those_of_less_deflection(name, motors):
-    """The motors' coordinates are those on the path with a p + p_e; r is what the oracle finds unbalanced on modes."""
-    factor, rng = 0.6, np.random.default_rng(4)
-    servo = make_servo(zoo.build(name, motors=motors), 0.2, "scene", factor)
-    n, times = len(servo.scale), np.array([0.0, 0.1])
-    servo = servo.with_offset(tuple(TimeFunction.constant(float(p)) for p in 0.01 * rng.standard_normal(n)))
-    offset = np.array([function(0.0)[0] for function in servo.offset])
-    p, v, a = (size * rng.standard_normal((2, n)) for size in (0.01, 0.1, 1.0))
-    both, at = servo.driven_tree.both, times.tolist()
-    run = _core.prescribed_outputs(both, servo.motion, at, p, v, a, servo.near[0])
-    path = _core.PlanarPrescribedMotion(servo.path_tree.both.driven, servo.near[0])
-    lesser = factor * p + offset, factor * v, factor * a
-    seen = _core.prescribed_outputs(servo.path_tree.both, path, at, *lesser, servo.near[0])
-    driven, on_path = oracle_of(servo.driven), oracle_of(servo.path)
-    measures = servo.path.model.motors.values()
-    held = np.zeros(driven.size)
-    modes = np.setdiff1d(np.arange(driven.size), servo.driven.frame_coordinates)
-    r = servo.residuals(times, p, v, a)
-    for k, t in enumerate(times):
-        of_motors, expected = (
-            [mechanism.row(measure, q, q_dot).value for measure in measures]
-            for mechanism, q, q_dot in ((driven, run.q[k], run.v[k]), (on_path, seen.q[k], seen.v[k]))
-        )
-        np.testing.assert_allclose(of_motors, expected, atol=1e-12)
-        C_q = np.array([row.gradient for row in driven.rows(run.q[k], run.v[k])])
-        Q = driven.forces(t, run.q[k], run.v[k])
-        held[modes] = r[k]
-        needed = driven.mass_matrix(run.q[k]) @ run.a[k] + C_q.T @ run.multipliers[k]
-        assert relative(needed, Q + held, np.abs(Q).max()) < 1e-11
+    assert np.abs(off_path(short)).max() < 1e-12
 
 
 def test_redefined_output_is_minimum_phase_and_tells_what_is_left(two_links):
@@ -235,11 +212,11 @@ def test_redefined_output_is_minimum_phase_and_tells_what_is_left(two_links):
     assert is_minimum_phase(outcome.details.inversion.linearisation)
     factor = outcome.details.inversion.servo.factor
     assert 0.5 < factor < 1.0
-    left = np.abs(path_error(outcome.details.inversion, outcome.time, outcome.q))
+    left = np.abs(off_path(outcome))
     assert 1e-4 < left.max() < 0.05  # m, of a path of 1 m
     assert left[0].max() < 1e-6  # at rest nothing is left
     replayed = exact_forward(model, outcome)
-    same = np.abs(path_error(outcome.details.inversion, replayed.time, replayed.q))
+    same = np.abs(off_path(replayed))
     np.testing.assert_allclose(same, left, atol=1e-6)
     with pytest.raises(InputError, match=r"minimum phase.*right half plane"):
         run(model, motors_only(output="redefined", factor=min(0.99, factor + 0.1)))
@@ -254,7 +231,7 @@ def test_joint_trajectories_need_no_future():
     assert outcome.time[0] == 0.0
     assert is_minimum_phase(outcome.details.inversion.linearisation)
     replayed = exact_forward(model, outcome)
-    assert np.abs(path_error(outcome.details.inversion, replayed.time, replayed.q)).max() < 1e-6
+    assert np.abs(off_path(replayed)).max() < 1e-6
 
 
 def test_path_that_does_not_start_at_rest_is_refused():
