@@ -119,7 +119,7 @@ def section_axes(bodies: Sequence[MovingBody], side: str, outputs: int) -> Array
 def topology(scene: Mapping[str, Any]) -> Topology:
     """Which joint carries which body, of a scene as a results file has it."""
     joints = scene.get("joint", [])
-    edges = [Edge(tuple(joint["between"]), int(not joint_type(scene, joint).locates)) for joint in joints]
+    edges = [Edge(tuple(joint["between"]), int(not joint_type(joint).locates)) for joint in joints]
     return spanning_forest([body["name"] for body in scene["body"]], edges)
 
 

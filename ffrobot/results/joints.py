@@ -8,8 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..common.arrays import Array
-from ..mbs.joints.joint import JointKeys
-from ..mbs.joints.joints import JOINT_TYPES
+from ..mbs.joints.spatial.joint import SpatialJoint
 from ..mbs.joints.spatial.joints import SPATIAL_JOINT_TYPES
 from ..mbs.joints.transmission import MotorLimits
 
@@ -47,10 +46,9 @@ class Coordinate(NamedTuple):
         return "N·m" if self.unit == "rad" else "N"
 
 
-def joint_type(scene: Scene, keys: Mapping[str, Any]) -> type[JointKeys]:
-    """The record of a joint of the scene with these keys."""
-    types: Mapping[str, type[JointKeys]] = SPATIAL_JOINT_TYPES if is_spatial(scene) else JOINT_TYPES
-    return types[str(keys["type"])]
+def joint_type(keys: Mapping[str, Any]) -> type[SpatialJoint]:
+    """The record of a joint with these keys."""
+    return SPATIAL_JOINT_TYPES[str(keys["type"])]
 
 
 def joint_keys(scene: Scene, name: str) -> Mapping[str, Any]:
@@ -61,7 +59,7 @@ def joint_keys(scene: Scene, name: str) -> Mapping[str, Any]:
 def joint_coordinates(scene: Scene, name: str) -> tuple[Coordinate, ...]:
     """The coordinates of a joint in the order of its datasets; none of one that does not move, or is not there."""
     keys = joint_keys(scene, name)
-    units = _units(scene, keys) if keys else ()
+    units = joint_type(keys).units if keys else ()
     limits = [np.broadcast_to(keys.get(f"{what}_limit") or np.inf, len(units)) for what in ("moment", "speed", "power")]
     several = len(units) > 1
     return tuple(
@@ -78,9 +76,3 @@ def labelled_coordinates(scene: Scene) -> Coordinates:
     """Those of all joints, in the order of the scene."""
     names = [str(joint["name"]) for joint in scene.get("joint", [])]
     return {f"{name}{one.label}": (name, one) for name in names for one in joint_coordinates(scene, name)}
-
-
-def _units(scene: Scene, keys: Mapping[str, Any]) -> tuple[str, ...]:
-    if is_spatial(scene):
-        return SPATIAL_JOINT_TYPES[str(keys["type"])].units
-    return ("rad" if JOINT_TYPES[str(keys["type"])].force_unit == "N·m" else "m",)

@@ -15,7 +15,6 @@ from .. import _core
 from .._core import TimeFunction
 from ..scene.analysis import IntegratedAnalysis
 from ..scene.spatial.trajectories import SpatialTrajectory
-from ..scene.trajectories import Trajectory
 from ..solve.path_checks import misfits
 
 FEWEST = 2000  # intervals of a run
@@ -29,9 +28,6 @@ SHORTEST = 1e-9  # of a run, between two times
 SAME = 1e-13  # of the latest time, by which equal ones differ at most
 BRIEF, FAR = 0.01, 20.0  # of a run; times the longest way of a piece in the time of the run: see `stops`
 PARTS = 16  # of such a piece
-
-
-Path = Trajectory | SpatialTrajectory
 
 
 def new_samples(times: Array, analysis: IntegratedAnalysis) -> _core.Samples | None:
@@ -86,7 +82,7 @@ def in_order(outputs: Array, samples: Array) -> Indices:
     return found
 
 
-def stops(times: Array, paths: Iterable[Path], loads: Iterable[TimeFunction]) -> Array:
+def stops(times: Array, paths: Iterable[SpatialTrajectory], loads: Iterable[TimeFunction]) -> Array:
     """(n,) s within `times`, at which steps of integrations end.
 
     Steps look at paths and loads at their stages alone, and might pass a pulse. So they end where conditions of loads
@@ -105,7 +101,7 @@ def stops(times: Array, paths: Iterable[Path], loads: Iterable[TimeFunction]) ->
     return within
 
 
-def path_times(times: Array, paths: Iterable[Path], end: float) -> Array:
+def path_times(times: Array, paths: Iterable[SpatialTrajectory], end: float) -> Array:
     """(T,) s: the outputs `times`, and as many between them as the motion along `paths` from 0 to `end` (s) needs."""
     paths = list(paths)
     found = np.unique(np.concatenate([times, np.linspace(times[0], times[-1], FEWEST + 1)]))
@@ -121,9 +117,9 @@ def path_times(times: Array, paths: Iterable[Path], end: float) -> Array:
     return np.union1d(found[~moving], inside)
 
 
-def targets_of(path: Path) -> tuple[TimeFunction, ...]:
+def targets_of(path: SpatialTrajectory) -> tuple[TimeFunction, ...]:
     """What a path prescribes: places, a coordinate, an orientation."""
-    law = path.orientation if isinstance(path, SpatialTrajectory) else None
+    law = path.orientation
     return (*path.components.values(), *(() if law is None else law.functions))
 
 

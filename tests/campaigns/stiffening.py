@@ -23,12 +23,12 @@ from ffrobot.run.mode_search import difference
 from ffrobot.run.solution import Solution
 from ffrobot.run.solve import solve
 from ffrobot.scene.load import load_scene
-from ffrobot.scene.scene import Scene
+from ffrobot.scene.spatial import SpatialScene
 
 NOTABLE = 0.01  # change of a mode's stiffness from which on "auto" switches it on
 
 
-def scenes(asked: argparse.Namespace) -> Iterator[tuple[str, Scene]]:
+def scenes(asked: argparse.Namespace) -> Iterator[tuple[str, SpatialScene]]:
     """Random robots, then the cases."""
     for number in range(asked.count):
         kind, scene = random_scene(asked.seed, number)
@@ -40,7 +40,7 @@ def scenes(asked: argparse.Namespace) -> Iterator[tuple[str, Scene]]:
                 yield path.parent.name, load_scene(path)
 
 
-def solved(scene: Scene, stiffening: bool) -> Solution | str:
+def solved(scene: SpatialScene, stiffening: bool) -> Solution | str:
     """The solution as far as it came, or why there is none."""
     kept: list[Solution] = []
     try:

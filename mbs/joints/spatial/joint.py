@@ -7,19 +7,22 @@ single coordinates these themselves, of free orientations a quaternion, and the 
 
 from __future__ import annotations
 
-from abc import abstractmethod
-from typing import Annotated, ClassVar, Literal, NamedTuple
+from abc import ABC, abstractmethod
+from collections.abc import Iterator, Sequence
+from typing import Annotated, ClassVar, Literal, NamedTuple, Self, get_args
 
 import numpy as np
-from pydantic import field_validator
+from pydantic import field_validator, model_validator
 
 from ....common.arrays import Array
 from ....common.rotations import of_rpy, smallest_turn
-from ...fields.field_types import Quantity, Vector3
+from ....common.validation import Record
+from ...fields.field_types import GROUND, Name, Quantity, Side, Vector3, split_point
+from ...fields.references import Reference, body_of, marker_reference
 from ...fields.spelling import IN_SPACE, Vector
-from ..joint import JointKeys
 from ..transmission import Friction, MotorLimits
 
+RecordType = type[Record]  # `type` is a key below
 Angles = tuple[Quantity, Quantity, Quantity]
 
 
@@ -59,9 +62,16 @@ GUIDED = (Held("slide", 0), Held("slide", 1), *ALIGNED)
 NOT_TURNED = Held("dot", 0, 1)  # beside ALIGNED
 
 
-class SpatialJoint(JointKeys):
-    """A joint between two points, or a point and the ground, in space."""
+class SpatialJoint(Record, ABC):
+    """A joint between two points, or a point and the ground: two sides, and how it moves."""
 
+    name: Name
+    """Name of the joint, unique in the scene."""
+    type: str
+    """How it moves."""
+    between: tuple[Side, Side]
+    """Sides of the joint, "BODY.POINT" or "ground"; coordinate, torque and reaction are of the second relative to the
+    first."""
     at: Vector = (0.0, 0.0, 0.0)
     """Position on the ground, m, global axes."""
     rpy: Annotated[Angles, IN_SPACE] = (0.0, 0.0, 0.0)
@@ -74,6 +84,47 @@ class SpatialJoint(JointKeys):
     freedoms: ClassVar[int] = 0
     held: ClassVar[tuple[Held, ...] | None] = None  # None where it cannot close a loop
     along: ClassVar[tuple[Along, ...]] = ()  # its coordinates where it does, in the scene's order
+    locates: ClassVar[bool] = True
+    """Whether it fixes the place of one body on the other; the initial guess goes along such joints first."""
+
+    @model_validator(mode="after")
+    def _fits_two_bodies(self) -> Self:
+        points = [side for side in self.between if side != GROUND]
+        if not points:
+            raise ValueError('expected at most one "ground" in between, found two')
+        bodies = [split_point(point)[0] for point in points]
+        if len(points) == 2 and bodies[0] == bodies[1]:
+            raise ValueError(f'expected two bodies in between, found "{bodies[0]}" twice')
+        if len(points) == 2 and "at" in self.model_fields_set:
+            raise ValueError('expected the key "at" only in joints to "ground", found it between two bodies')
+        return self
+
+    @classmethod
+    def type_name(cls) -> str:
+        """What the key `type` says."""
+        return str(get_args(cls.model_fields["type"].annotation)[0])
+
+    @classmethod
+    def refuse_key(cls, key: str, others: Sequence[RecordType]) -> str:
+        """What to say of a key that only joints of other types have."""
+        having = " or ".join(other.type_name() for other in others if issubclass(other, SpatialJoint))
+        return f'expected the key "{key}" only in {having} joints, found it in a {cls.type_name()} joint'
+
+    @property
+    def label(self) -> str:
+        """What messages call it."""
+        return f'joint "{self.name}"'
+
+    @property
+    def bodies(self) -> tuple[str, str]:
+        """The two bodies it joins; one may be the ground."""
+        first, second = self.between
+        return body_of(first), body_of(second)
+
+    def references(self) -> Iterator[Reference]:
+        """The points it joins."""
+        for k, side in enumerate(self.between):
+            yield from marker_reference(f"between[{k}]", side, loaded=True)
 
     @field_validator("motor", check_fields=False)
     @classmethod

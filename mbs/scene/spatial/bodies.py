@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Annotated
+from pathlib import Path
+from typing import Annotated, Literal, Self
 
 import numpy as np
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, PlainValidator, ValidationInfo, field_validator, model_validator
 
 from ....common.arrays import Array
 from ....common.names import Title
-from ....common.numbers import SMALLEST
-from ....common.validation import Record
+from ....common.numbers import MOST_MODES, SMALLEST
+from ....common.validation import InputFile, Record, existing_file
+from ....fe_models.link_file import LinkSource, LinkTable
+from ....fe_models.link_records import BeamLink, SolidLink
 from ...fields.field_types import Name, NotNegative, PointReference, Positive, Vector3, one_of
 from ...fields.references import Reference
 from ...fields.spelling import IN_SPACE, Spelled, Vector, inertia_about_z
-from ..bodies import BodyKeys
 
 Inertia = Vector3 | tuple[Vector3, Vector3, Vector3]
 ROUNDING = 1e-9  # of the largest entry of an inertia tensor
@@ -106,7 +108,22 @@ class SpatialRigidBody(Record):
         return inertia
 
 
-class BodyInSpace(BodyKeys):
+def _link(value: object, info: ValidationInfo) -> LinkSource:
+    if isinstance(value, str):
+        return existing_file(Path(value), info)
+    if not isinstance(value, dict):
+        raise ValueError(f"expected the name of a link file in quotes or a table of its keys, found {value!r}")
+    name, path = info.data.get("name", "?"), info.context["path"] if info.context else Path("scene")
+    return LinkTable({"name": name, **value}, path.with_name(f'{path.name}: body "{name}": link'))
+
+
+LinkInput = Annotated[LinkSource, PlainValidator(_link, json_schema_input_type=str | BeamLink | SolidLink)]
+
+
+ModeCount = Literal["auto"] | Annotated[int, Field(ge=0, le=MOST_MODES)]
+
+
+class BodyInSpace(Record):
     """A link file or a table of its keys (stage 1 runs if needed), a modal body file, or a rigid body.
 
     The default `name` in a table of a link's keys is that of the body. A link moves in the families of modes that its
@@ -120,8 +137,35 @@ class BodyInSpace(BodyKeys):
     "auto" chooses it. Results are those of the whole link, and geometric stiffening is on by default.
     """
 
+    name: Name
+    """Name of the body, unique in the scene."""
+    link: LinkInput | None = None
+    """Link file, or a table with its keys; stage 1 runs if needed."""
+    modal: InputFile | None = None
+    """Modal body file, written by stage 1."""
+
+    modes: ModeCount | None = None
+    """Number of the lowest modes; "auto": as many as the tolerances need; default: all. Planar scenes count in-plane
+    modes, 3D scenes those of all families."""
+    pieces: Literal["auto"] | Annotated[int, Field(ge=1, le=100)] | None = None
+    """Number of welded segments of a beam link for large deflections; "auto" chooses it."""
     rigid: SpatialRigidBody | None = None
     """Data of a rigid body."""
+
+    @property
+    def modes_kept(self) -> int | None:
+        """How many modes the scene asks for; None where it does not say."""
+        return self.modes if isinstance(self.modes, int) else None
+
+    @model_validator(mode="after")
+    def _is_one_of_three(self) -> Self:
+        one_of(self, ("link", "modal", "rigid"))
+        if self.modes is not None and self.link is None and self.modal is None:
+            raise ValueError(f'expected the key "modes" only in flexible bodies, found it in a rigid one: {self.modes}')
+        if self.pieces is not None and (self.link is None or self.modes is not None):
+            beside = "modes" if self.modes is not None else "modal" if self.modal is not None else "rigid"
+            raise ValueError(f'expected "pieces" with "link" alone, found "{beside}"')
+        return self
 
 
 class SpatialPayload(Record):
