@@ -13,7 +13,7 @@ import numpy as np
 from ..common.arrays import Array
 from .motors import MotorFeasibility, first_time
 from .patches.patches import PatchArray
-from .patches.voltages import Voltages, voltage_gain
+from .patches.voltages import Voltages
 from .unsupplied import Unsupplied
 
 MOST_PATCHES = 200  # that are tried on one link
@@ -143,12 +143,12 @@ def judge_patches(
     patches: PatchArray,
     voltages: Voltages,
     motion: ModalMotion,
-    with_count: Callable[[int], PatchArray | None] | None,
+    with_count: Callable[[int], float | None] | None,
 ) -> PatchFeasibility:
     """Required against available of the patches of one layout.
 
-    `with_count(k)` makes an array of k such patches, evenly spread; None where they have no room. Without it no other
-    numbers of patches are tried.
+    `with_count(k)` is the largest voltage (V) of k such patches, evenly spread; None where they have no room. Without
+    it no other numbers of patches are tried.
     """
     time, p, F_p = motion
     required = np.abs(voltages.required).max(axis=0)
@@ -162,13 +162,11 @@ def judge_patches(
         strain=patches.lever * patches.surface_distance * curvature,
         mode_required=np.abs(F_p[:, : patches.served]).max(axis=0),
         mode_available=np.abs(patches.Phi_V[: patches.served]) @ patches.limit,
-        find_remedies=partial(_remedies, patches, required, F_p, with_count),
+        find_remedies=partial(_remedies, patches, required, with_count),
     )
 
 
-def _remedies(
-    patches: PatchArray, required: Array, F_p: Array, with_count: Callable[[int], PatchArray | None] | None
-) -> Remedies:
+def _remedies(patches: PatchArray, required: Array, with_count: Callable[[int], float | None] | None) -> Remedies:
     """What limit, layers, thickness or count alone would do, by c ∝ N (t_b + N t_p) for the patch that lacks most."""
     worst = int(np.argmax(required / patches.limit))
     factor = float(required[worst] / patches.limit[worst])
@@ -177,21 +175,19 @@ def _remedies(
     layers = max(N, int(np.ceil((-t_b + np.sqrt(t_b**2 + 4 * t_p * lever)) / (2 * t_p) - 1e-9)))
     lever = max(factor, 1.0) * t_p * (t_b + N * t_p)  # of t (t_b + N t), the thickness that would do
     thickness = (-t_b + np.sqrt(t_b**2 + 4 * N * lever)) / (2 * N)
-    count, most, most_factor = (
-        (0, len(patches.edges), factor) if with_count is None else _count(patches, F_p, with_count)
-    )
+    count, most, most_factor = (0, len(patches.edges), factor) if with_count is None else _count(patches, with_count)
     return Remedies(float(required[worst]), layers, float(thickness), count, most, most_factor)
 
 
-def _count(patches: PatchArray, F_p: Array, with_count: Callable[[int], PatchArray | None]) -> tuple[int, int, float]:
+def _count(patches: PatchArray, with_count: Callable[[int], float | None]) -> tuple[int, int, float]:
     """The smallest number of patches that do, the largest that has room, and what factor is missing then."""
     most, missing = len(patches.edges), np.inf
     limit = float(patches.limit.min())
     for count in range(patches.served, MOST_PATCHES):
-        array = with_count(count)
-        if array is None:
+        largest = with_count(count)
+        if largest is None:
             break
-        most, missing = count, float(np.abs(F_p @ voltage_gain(array).T).max() / limit)
+        most, missing = count, largest / limit
         if missing <= 1.0:
             return count, most, missing
     return 0, most, missing

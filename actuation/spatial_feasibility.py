@@ -16,8 +16,10 @@ from ..mbs.quantities.spatial_motion import SpatialMotion
 from ..mbs.scene.analysis import Analysis
 from .feasibility import Feasibility, ModalMotion, PatchFeasibility, judge_patches
 from .motors import judge_motors
+from .patches.kept_modes import on_kept_modes
+from .patches.records import SpatialPztLayout
 from .patches.spatial_patches import LinkPatches, with_count
-from .patches.voltages import Voltages
+from .patches.voltages import Voltages, voltage_gain
 from .unsupplied import Unsupplied, seen_at_points
 
 ROUNDING = 1e-6  # of the largest modal force: less is what ill-conditioned patches leave
@@ -70,11 +72,23 @@ def judge_in_space(
         link = links[body]
         for name, array in of_link.arrays.items():
             modes = of_link.modes[name]
-            trial = partial(with_count, path, array.layout, link.modal, link.spatial, of_link.kept)
+            trial = None if analysis.is_repeated else partial(_largest_voltage, path, motion, link, array.layout)
             modal = ModalMotion(motion.time, modes.coordinates(link.p), modes.forces(link.F_p))
-            judged[name] = judge_patches(array, voltages[name], modal, None if analysis.is_repeated else trial)
+            judged[name] = judge_patches(array, voltages[name], modal, trial)
     missing = unsupplied_in_space(motion, links, patches, voltages, others)
     return Feasibility(judge_motors(motion, analysis), judged, missing)
+
+
+def _largest_voltage(
+    path: Path, motion: SpatialMotion, link: LinkInMotion, layout: SpatialPztLayout, count: int
+) -> float | None:
+    """V, that so many patches of a layout would need alone, evenly spread; None where they have no room."""
+    found = with_count(path, layout, link.modal, link.spatial, count)
+    if found is None:
+        return None
+    if link.spatial.name in motion.model.tree.index:  # else in pieces, with all modes
+        found = on_kept_modes(found, motion.node(link.spatial.name).body)
+    return float(np.abs(found.reached.forces(link.F_p) @ voltage_gain(found.reach).T).max())
 
 
 def unmet_in_space(

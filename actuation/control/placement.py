@@ -8,7 +8,6 @@ from typing import Literal
 
 import numpy as np
 
-from ...common.arrays import as_floats
 from ...common.errors import InputError
 from ...common.validation import quoted
 from ...mbs.analysis.operating_points import InstantAnalysis, of_earlier, row_at
@@ -19,7 +18,7 @@ from ...mbs.scene.analysis import Surroundings
 from ...mbs.solve.linearisation import SpatialLinearisation
 from ..context import ActuatedContext
 from ..patches.patches import PatchArray
-from ..patches.spatial_patches import link_patches
+from ..patches.spatial_patches import LinkPatches, link_patches
 from .linear import operating_points_in_space
 from .linear_model import state_space
 from .placing import PatchableLink, elsewhere, place
@@ -74,8 +73,8 @@ class PatchPlacement(InstantAnalysis):
             assert self.source is not None
             source = context.outcomes[self.source]
             run = of_earlier(source, self).at([row_at(model.scene.path, self, source, t) for t in self.times])
-            reached = context.patches[wanted.body].modes[link.layout.label]
-            F_p = reached.forces(context.patches[wanted.body].on_link(motor_forces_of(source).modal))
+            of_link = _patches(context, wanted.body)
+            F_p = of_link.modes[link.layout.label].forces(of_link.on_link(motor_forces_of(source).modal))
             return replace(run, details=place(model.scene.path, wanted, link, None, F_p))
         run, about = operating_points_in_space(context, self)
         at = SpatialLinearisation(about.model, about.q[0]).at(float(about.time[0]), about.q[0], about.v[0], about.a[0])
@@ -85,7 +84,7 @@ class PatchPlacement(InstantAnalysis):
 def _link(context: ActuatedContext, wanted: Placement) -> PatchableLink:
     """By the coordinates that the layout reaches; patches elsewhere reach the same."""
     name = wanted.body
-    path, of_link, body = context.model.scene.path, context.patches[name], context.links[name]
+    path, of_link, body = context.model.scene.path, _patches(context, name), context.links[name]
     whole = context.whole
     bodies: tuple[str, ...] = (name,)
     tree = (context.model if whole is None else whole.model).tree
@@ -102,11 +101,18 @@ def _link(context: ActuatedContext, wanted: Placement) -> PatchableLink:
 
     def patches(**changes: object) -> PatchArray:
         keys = {"allocation": "least-squares", "mode_weights": None, "point_weights": None} | changes
-        moved = layout.model_copy(update=elsewhere(layout, keys))
-        found = link_patches(path, [moved], body, context.carrying[name], of_link.kept)
+        found = link_patches(path, [layout.model_copy(update=elsewhere(layout, keys))], body, context.carrying[name])
         if not np.array_equal(found.modes[label].rows, reached.rows):
             raise InputError(f'{path}: placement.body: expected patches that reach the modes of "{label}"')
         return found.arrays[label]
 
-    own = as_floats(np.linalg.solve(reached.T, to_file[reached.rows]))
+    own = reached.coordinates(to_file.T).T
     return PatchableLink(name, body.length, bodies, layout, reached.stiffness, reached.served, own, patches)
+
+
+def _patches(context: ActuatedContext, link: str) -> LinkPatches:
+    """Those of a link, also where its pieces carry them, on all modes of its file."""
+    of_link = context.patches[link]
+    layouts = [array.layout for array in of_link.arrays.values()]
+    placed = link_patches(context.model.scene.path, layouts, context.links[link], context.carrying[link])
+    return replace(placed, bodies=of_link.bodies)

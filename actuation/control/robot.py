@@ -104,7 +104,7 @@ class Robot:
         reached, to_file = of_link.reached, self.model.tree.nodes[self.model.tree.index[name]].body.modal_transform
         inputs = [f"pzt/{layout}/{k}" for layout, of in of_link.arrays.items() for k in range(1, len(of.edges) + 1)]
         volts = np.vstack([volts_on_file(of_link, layout)[name] for layout in of_link.arrays])
-        own = as_floats(np.linalg.solve(reached.T, to_file[reached.rows]))
+        own = reached.coordinates(to_file.T).T
         return PatchedLink(
             tuple(inputs), tuple(of_link.arrays), np.sqrt(reached.stiffness[: reached.served]),
             voltage_gain(of_link.reach), reached.seen(volts), own,

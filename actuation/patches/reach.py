@@ -49,6 +49,11 @@ class Reach:
         return np.flatnonzero(np.abs(left[:, rank:]).max(axis=1, initial=0.0) > 0.1)
 
     @property
+    def serves_all(self) -> bool:
+        """Whether some voltages produce any forces on the modes to be served."""
+        return self.Phi_V.shape[1] >= self.served and not self.unreached_modes.size
+
+    @property
     def in_order(self) -> Array:
         """(rows, n) roots of weights: modes first, and attachment modes with what more patches than modes are left."""
         n, k = self.Phi_V.shape

@@ -23,7 +23,7 @@ from ...mbs.model.spatial_masses import uncoupling
 from .composite import Placed
 from .effects import Effects, effects
 from .patches import PatchArray, assembled, check_edges, edges_on_piece, patch_edges
-from .reach import SINGULAR, Reach, check_all_served, served_first, weights
+from .reach import Reach, check_all_served, served_first, weights
 from .records import SpatialPztLayout
 from .sections import check_sections
 from .voltages import Voltages, allocation, solve_voltages
@@ -37,7 +37,8 @@ class ReachedModes:
 
     Attributes:
         rows: (m,) numbers (from 0) of the modes of the modal body in these families.
-        T: (m, m) p of these rows from the coordinates p' in which m_ff is the identity and K_ff diagonal.
+        T: (m, m) p of these rows from the coordinates p' in which m_ff is the identity and K_ff diagonal; (m, fewer) of
+            the coordinates that equations keep, see `kept_modes`.
         stiffness: (m,) of the p'.
         served: number of them, the first ones: the others are attachment modes.
     """
@@ -54,7 +55,7 @@ class ReachedModes:
 
     def coordinates(self, p: Array) -> Array:
         """(T, m) p' from those of the modal body (T, n)."""
-        return as_floats(np.linalg.solve(self.T, p[:, self.rows].T).T)
+        return as_floats(np.linalg.lstsq(self.T, p[:, self.rows].T, rcond=None)[0].T)
 
     def seen(self, rows: Array) -> Array:
         """(k, m) what is linear in the modes of the modal body, (k, n), over p'."""
@@ -88,7 +89,7 @@ class LinkPatches:
         reach: of all patches side by side on the modes that they reach together, `reached`.
         reached: likewise.
         bodies: by name, the link and, where it is divided, its pieces.
-        kept: how many modes the scene keeps of the link; None for all.
+        on_kept: (n, n) of modal forces the part that the equations keep, where the patches serve that alone.
     """
 
     arrays: Mapping[str, PatchArray]
@@ -96,7 +97,7 @@ class LinkPatches:
     reach: Reach
     reached: ReachedModes
     bodies: Mapping[str, OnBody]
-    kept: int | None = None
+    on_kept: Array | None = None
 
     @property
     def body(self) -> str:
@@ -170,7 +171,8 @@ class LinkPatches:
 
     def unmet(self, F_p: Array, voltages: Array) -> Array:
         """(T, n) of modal forces F_p, at voltages (T, k) of all patches."""
-        return F_p - voltages @ self.Phi_V.T
+        left: Array = F_p - voltages @ self.Phi_V.T
+        return left if self.on_kept is None else left @ self.on_kept
 
 
 def placed_patches(path: Path, layouts: Sequence[SpatialPztLayout], body: ModalBody) -> list[Placed]:
@@ -178,20 +180,17 @@ def placed_patches(path: Path, layouts: Sequence[SpatialPztLayout], body: ModalB
     return [_placed(path, layout, body) for layout in layouts]
 
 
-def link_patches(
-    path: Path, layouts: Sequence[SpatialPztLayout], body: ModalBody, spatial: SpatialBody, kept: int | None = None
-) -> LinkPatches:
-    """Place the layouts of one link, of which the equations may have the `kept` lowest modes alone.
+def link_patches(path: Path, layouts: Sequence[SpatialPztLayout], body: ModalBody, spatial: SpatialBody) -> LinkPatches:
+    """Place the layouts of one link: they serve all modes of its file that they reach; see `kept_modes`, too.
 
-    Patches that can serve all modes of its file: modal forces on those left out follow from the loads on the link.
-    Others serve the modes kept, and may bend the rest. Raises `InputError` for patches that do not fit the link, or
-    weights that do not.
+    Raises `InputError` for patches that do not fit the link, or weights that do not.
     """
     spatial = spatial.whole
+    key = _key(path, layouts[0].label if len(layouts) == 1 else layouts[0].body)
     placed = placed_patches(path, layouts, body)
-    found = effects(_key(path, layouts[0].label if len(layouts) == 1 else layouts[0].body), placed, body)
+    found = effects(key, placed, body)
     Phi_V, turn = (np.concatenate(of).T for of in ([of.Phi_V for of in found], [of.turn for of in found]))
-    modes = {one.layout.label: _reached(of.Phi_V, body, spatial, kept) for one, of in zip(placed, found, strict=True)}
+    modes = {one.layout.label: _reached(of.Phi_V, body, spatial) for one, of in zip(placed, found, strict=True)}
     for layout in layouts:
         _check_reached(path, layout, modes[layout.label], body)
     arrays = {
@@ -201,17 +200,17 @@ def link_patches(
     if len(layouts) == 1:
         reached, reach = modes[layouts[0].label], _alone(arrays[layouts[0].label])
     else:
-        reached = _reached(Phi_V.T, body, spatial, kept)
+        reached = _reached(Phi_V.T, body, spatial)
         reach = _together(path, layouts, arrays, reached, Phi_V.T)
     own = {layouts[0].body: OnBody(Phi_V, turn, np.eye(body.mode_count))}
-    return LinkPatches(arrays, modes, reach, reached, own, kept)
+    return LinkPatches(arrays, modes, reach, reached, own)
 
 
-def check_allocation(path: Path, patches: LinkPatches) -> None:
-    """Raise `InputError` unless the patches of a link serve all modes that they are to, or layouts ask for less."""
-    layouts = [array.layout for array in patches.arrays.values()]
+def check_reach(path: Path, of_link: LinkPatches) -> None:
+    """Raise `InputError` unless patches reach all modes that they are to serve, or the scene is content with less."""
+    layouts = [array.layout for array in of_link.arrays.values()]
     if all(layout.allocation == "exact" for layout in layouts):
-        check_all_served(_key(path, layouts[0].label if len(layouts) == 1 else patches.body), patches.reach)
+        check_all_served(_key(path, layouts[0].label if len(layouts) == 1 else of_link.body), of_link.reach)
 
 
 def on_pieces(
@@ -241,18 +240,17 @@ def by_body(layouts: Sequence[SpatialPztLayout]) -> Iterator[tuple[str, list[Spa
 
 
 def with_count(
-    path: Path, layout: SpatialPztLayout, body: ModalBody, spatial: SpatialBody, kept: int | None, count: int
-) -> PatchArray | None:
+    path: Path, layout: SpatialPztLayout, body: ModalBody, spatial: SpatialBody, count: int
+) -> LinkPatches | None:
     """As many of the same patches, evenly spread over the link, alone, with one limit; None where they have no room."""
     if count * layout.length > body.length * (1 + 1e-9):
         return None
     limit = min(layout.limit) if isinstance(layout.limit, tuple) else layout.limit
     changed = {"count": count, "centers": None, "limit": limit, "allocation": "least-squares"}
     try:
-        found = link_patches(path, [layout.model_copy(update=changed)], body, spatial, kept)
+        return link_patches(path, [layout.model_copy(update=changed)], body, spatial)
     except InputError:  # across a step of the section, or weights for another number
         return None
-    return found.arrays[layout.label]
 
 
 def _placed(path: Path, layout: SpatialPztLayout, body: ModalBody) -> Placed:
@@ -262,7 +260,7 @@ def _placed(path: Path, layout: SpatialPztLayout, body: ModalBody) -> Placed:
     return Placed(layout, edges)
 
 
-def _reached(per_volt: Array, body: ModalBody, spatial: SpatialBody, kept: int | None) -> ReachedModes:
+def _reached(per_volt: Array, body: ModalBody, spatial: SpatialBody) -> ReachedModes:
     """By modal forces per volt (k, n) on the modes of the modal body: the families in which any is not 0."""
     size = np.abs(per_volt).max(axis=0)
     families = {body.family[k] for k in np.flatnonzero(size > OUT_OF_REACH * size.max())}
@@ -270,20 +268,9 @@ def _reached(per_volt: Array, body: ModalBody, spatial: SpatialBody, kept: int |
     rows = np.flatnonzero([moves and family in families for moves, family in zip(moving, body.family, strict=True)])
     T_inverse, square = spatial.on_file, np.ix_(rows, rows)
     T, stiffness = uncoupling((T_inverse.T @ T_inverse)[square], (T_inverse.T * spatial.stiffness @ T_inverse)[square])
-    is_left = body.residual[rows] != 0
-    if kept is not None and not _reaches_all((per_volt[:, rows] @ T)[:, ~is_left]):
-        of_link = np.flatnonzero(moving & (body.residual == 0))
-        lowest = of_link[np.argsort(body.frequency[of_link], kind="stable")][:kept]
-        others = np.flatnonzero(~is_left)
-        is_left[others[np.argsort(stiffness[others], kind="stable")][np.isin(lowest, rows).sum() :]] = True
-    modes_first = np.argsort(is_left, kind="stable")
-    return ReachedModes(rows, T[:, modes_first], stiffness[modes_first], int(np.count_nonzero(~is_left)))
-
-
-def _reaches_all(per_volt: Array) -> bool:
-    """Whether k patches can serve n modes, by modal forces per volt (k, n)."""
-    k, n = per_volt.shape
-    return k >= n and bool(np.linalg.cond(per_volt) < SINGULAR) if n else True
+    modes_first = np.argsort(body.residual[rows], kind="stable")
+    served = int(np.count_nonzero(body.residual[rows] == 0))
+    return ReachedModes(rows, T[:, modes_first], stiffness[modes_first], served)
 
 
 def _check_reached(path: Path, layout: SpatialPztLayout, modes: ReachedModes, body: ModalBody) -> None:

@@ -51,9 +51,9 @@ def voltage_gain(patches: Reach) -> Array:
     Of many that do, the smallest relative to `voltage_scale`.
     """
     (n, k), served = patches.Phi_V.shape, patches.served
-    if k == served and not patches.unreached_modes.size:
+    if k == served and patches.serves_all:
         return as_floats(np.linalg.inv(patches.Phi_V[:served]) @ np.eye(served, n))
-    W_sqrt = patches.W_sqrt if k < served or patches.unreached_modes.size else patches.in_order
+    W_sqrt = patches.in_order if patches.serves_all else patches.W_sqrt
     scale = voltage_scale(patches)
     gain: Array = scale[:, None] * np.linalg.pinv(W_sqrt @ patches.Phi_V * scale) @ W_sqrt
     return gain

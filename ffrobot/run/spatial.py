@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from ..actuation.context import ActuatedContext
 from ..actuation.feasibility import Feasibility
-from ..actuation.spatial_points import forces_at_points, solve_spatial_points, spatial_point_set, with_spatial_points
+from ..actuation.spatial_points import forces_at_points, solve_spatial_points
 from ..actuation.unsupplied import held_shift
 from ..common.arrays import Array
 from ..common.errors import FfrobotError, InputError, SolveError, of_file
@@ -24,14 +24,13 @@ from ..mbs.quantities.spatial_reactions import reactions
 from ..mbs.quantities.spatial_sharing import shared_evenly
 from ..mbs.quantities.validity import NOTABLE
 from ..mbs.scene.analysis import Analysis
-from ..mbs.scene.space import SPACES
 from ..mbs.solve.spatial_reach import turned_guesses
 from ..scene.load import load_scene
 from ..scene.spatial import SpatialScene
 from .enough import completed, goes_on, is_replayed, log_outcome, progress_of, with_enough_modes, with_enough_pieces
 from .mode_search import ModeSearch, error_tolerances
 from .paths import with_paths_in_space
-from .spatial_actuation import actuated_in_space, missing_forces, patches_in_space
+from .spatial_actuation import actuated_in_space, missing_forces
 from .spatial_bodies import load_spatial_bodies
 from .spatial_finer import checked_in_space
 from .spatial_mode_choice import mode_levels_in_space, reported_in_space
@@ -82,23 +81,8 @@ def prepare_spatial(scene: SpatialScene | Path, watcher: Watcher | None = None) 
     loaded = load_spatial_bodies(scene, watcher.stage)
     seconds = {"links and files": time.perf_counter() - began}
     bodies = {body.name: part for body, part in zip(scene.body, loaded, strict=True)}
-    patches = patches_in_space(scene, bodies)
-    points = {
-        layout.body: spatial_point_set(
-            scene.path,
-            layout,
-            bodies[layout.body].modal,
-            bodies[layout.body].spatial,
-            SPACES[scene.space],
-        )
-        for layout in scene.actuation_points
-    }
-    for name, chosen in points.items():
-        bodies[name] = replace(bodies[name], spatial=with_spatial_points(bodies[name].spatial, chosen))
     counts = {body.name: 1 if body.pieces == "auto" else body.pieces for body in scene.body if body.pieces is not None}
-    solution = made_solution(scene, bodies, patches, seconds, points)
-    solution = with_bodies_in_space(solution, mode_levels_in_space(scene, bodies)[0])
-    return with_pieces_in_space(solution, counts, watcher)
+    return with_pieces_in_space(made_solution(scene, bodies, seconds), counts, watcher)
 
 
 def run_spatial(solution: SpatialSolution, watcher: Watcher, keep: Keep | None = None) -> SpatialSolution:

@@ -8,14 +8,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..actuation.feasibility import Feasibility
-from ..actuation.patches.spatial_patches import LinkPatches, by_body, check_allocation, link_patches
+from ..actuation.patches.kept_modes import on_kept_modes
+from ..actuation.patches.spatial_patches import LinkPatches, by_body, check_reach, link_patches
 from ..actuation.patches.voltages import Voltages
 from ..actuation.spatial_feasibility import judge_in_space, links_in_motion
+from ..actuation.spatial_points import SpatialPointSet, spatial_point_set
 from ..common.arrays import Array
 from ..mbs.model.spatial_drives import Drive
 from ..mbs.model.spatial_model import SpatialModel, modal_directions
 from ..mbs.quantities.spatial_motion import SpatialMotion
 from ..mbs.scene.analysis import Analysis
+from ..mbs.scene.space import SPACES
 from ..scene.spatial import SpatialScene
 from .spatial_bodies import LoadedSpatialBody
 
@@ -39,16 +42,27 @@ class SpatialActuation:
 
 
 def patches_in_space(scene: SpatialScene, bodies: Bodies) -> dict[str, LinkPatches]:
-    """By body. Raises `InputError` for layouts that do not fit their link or do not serve what they are to."""
-    found, kept = {}, {body.name: body.modes_kept for body in scene.body}
-    is_allocated = bool(scene.trajectory) and any(analysis.allocates_patches for analysis in scene.analysis)
+    """By body. Raises `InputError` for layouts that do not fit their link, or do not serve what an analysis asks."""
+    found = {}
     for name, layouts in by_body(scene.pzt):
         body = bodies[name]
         assert body.modal is not None
-        found[name] = link_patches(scene.path, layouts, body.modal, body.carrying, kept[name])
-        if is_allocated:
-            check_allocation(scene.path, found[name])
+        of_link = link_patches(scene.path, layouts, body.modal, body.carrying)
+        found[name] = on_kept_modes(of_link, body.spatial)
+    if scene.trajectory and any(analysis.allocates_patches for analysis in scene.analysis):
+        for of_link in found.values():
+            check_reach(scene.path, of_link)
     return found
+
+
+def points_in_space(scene: SpatialScene, bodies: Bodies) -> dict[str, SpatialPointSet]:
+    """Actuation points by body. Raises `InputError` for those that do not fit it."""
+    return {
+        layout.body: spatial_point_set(
+            scene.path, layout, bodies[layout.body].modal, bodies[layout.body].spatial, SPACES[scene.space]
+        )
+        for layout in scene.actuation_points
+    }
 
 
 def given_voltages(model: SpatialModel, patches: Mapping[str, LinkPatches]) -> Iterator[Drive]:

@@ -93,8 +93,7 @@ def _with_payloads(scene: SpatialScene, body: LoadedSpatialBody) -> LoadedSpatia
 def _patched(scene: SpatialScene, body: LoadedSpatialBody, layouts: Sequence[SpatialPztLayout]) -> LoadedSpatialBody:
     """With the mass and stiffness of its patches, as far as the scene asks for it."""
     assert body.modal is not None
-    (kept,) = (of.modes_kept for of in scene.body if of.name == layouts[0].body)
-    link_patches(scene.path, layouts, body.modal, body.carrying, kept)  # refuses patches that do not fit
+    link_patches(scene.path, layouts, body.modal, body.carrying)  # refuses patches that do not fit
     return with_structure(body, placed_patches(scene.path, layouts, body.modal))
 
 

@@ -6,41 +6,58 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
 from ..actuation.patches.spatial_patches import LinkPatches, on_pieces
-from ..actuation.spatial_points import SpatialPointSet
+from ..actuation.spatial_points import SpatialPointSet, with_spatial_points
 from ..mbs.model.spatial_body import SpatialBody
 from ..mbs.model.spatial_model import SpatialModel, build_spatial_model
 from ..mbs.solve.robot_damping import with_robot_damping_in_space
 from ..scene.pieces import BodyInPieces, bodies_in_pieces_in_space, scene_of_pieces_in_space
 from ..scene.spatial import SpatialScene
 from .loaded_body import robot_damping_ratios
-from .spatial_actuation import given_voltages
+from .spatial_actuation import given_voltages, patches_in_space, points_in_space
 from .spatial_bodies import LoadedSpatialBody, load_spatial_bodies, with_structure
+from .spatial_mode_choice import mode_levels_in_space
 from .spatial_solution import SpatialSolution
 from .watcher import Watcher
 
 Bodies = Mapping[str, LoadedSpatialBody]
 
 
-def made_solution(
-    scene: SpatialScene,
-    bodies: Bodies,
-    patches: Mapping[str, LinkPatches],
-    seconds: Mapping[str, float],
-    points: Mapping[str, SpatialPointSet],
-) -> SpatialSolution:
-    """A solution without analyses."""
-    stiffened = _all_stiffened(scene, False)
+def made_solution(scene: SpatialScene, bodies: Bodies, seconds: Mapping[str, float]) -> SpatialSolution:
+    """A solution without analyses, of links with as few modes as the scene begins with.
+
+    Raises `InputError` for patches and actuation points that do not fit.
+    """
+    bodies = _with_equations(bodies, mode_levels_in_space(scene, bodies)[0])
+    patches, points, stiffened = (
+        patches_in_space(scene, bodies),
+        points_in_space(scene, bodies),
+        _all_stiffened(scene, False),
+    )
+    bodies, stiffened = _with_points(bodies, points), _all_stiffened(scene, False)
     model = _model(scene, bodies, patches, {}, {}, stiffened)
     return SpatialSolution(scene, model, bodies, patches, {}, seconds, points=points, stiffened=stiffened)
 
 
 def with_bodies_in_space(solution: SpatialSolution, spatial: Mapping[str, SpatialBody]) -> SpatialSolution:
-    """The scene with some of its bodies replaced, nothing solved yet; patches serve all modes of their links."""
+    """The scene with some of its bodies replaced, nothing solved yet. Raises `InputError` as `made_solution`."""
+    scene, divided = solution.scene, solution.divided
+    bodies, parts = (_with_equations(of, spatial) for of in (solution.bodies, solution.parts))
+    found, points = patches_in_space(scene, bodies), points_in_space(scene, bodies)
+    patches = {name: solution.patches[name] if name in divided else of_link for name, of_link in found.items()}
+    bodies, parts = (_with_points(of, points) for of in (bodies, parts))
+    return _unsolved(replace(solution, bodies=bodies, parts=parts, patches=patches, points=points))
 
-    def replaced(bodies: Bodies) -> dict[str, LoadedSpatialBody]:
-        return {name: replace(body, spatial=spatial.get(name, body.spatial)) for name, body in bodies.items()}
 
-    return _unsolved(replace(solution, bodies=replaced(solution.bodies), parts=replaced(solution.parts)))
+def _with_equations(bodies: Bodies, spatial: Mapping[str, SpatialBody]) -> Bodies:
+    return {name: replace(body, spatial=spatial.get(name, body.spatial)) for name, body in bodies.items()}
+
+
+def _with_points(bodies: Bodies, points: Mapping[str, SpatialPointSet]) -> Bodies:
+    """With actuation points among their points."""
+    return {
+        name: replace(body, spatial=with_spatial_points(body.spatial, points[name])) if name in points else body
+        for name, body in bodies.items()
+    }
 
 
 def with_scene_in_space(solution: SpatialSolution, scene: SpatialScene) -> SpatialSolution:

@@ -9,7 +9,7 @@ import pytest
 from ffrobot.actuation.patches.lamina import Fibres, fibre_lamina
 from ffrobot.actuation.patches.patches import patch_array
 from ffrobot.actuation.patches.records import PztLayout
-from ffrobot.actuation.patches.spatial_patches import check_allocation, link_patches, placed_patches
+from ffrobot.actuation.patches.spatial_patches import check_reach, link_patches, placed_patches
 from ffrobot.actuation.patches.spatial_records import SpatialPztLayout
 from ffrobot.actuation.patches.spatial_structure import with_patches_in_space
 from ffrobot.actuation.patches.structure import with_patches
@@ -303,7 +303,7 @@ def test_patches_that_do_not_fit_their_link(link):
     with pytest.raises(InputError, match=r'pzt "up": expected patches within the link'):
         link_patches(SCENE, [layout(name="up", centers=[0.39], length=0.06)], body, spatial)
     with pytest.raises(InputError, match=r"expected as many patches as modes \(\d+\) or more, found 1"):
-        check_allocation(SCENE, link_patches(SCENE, [layout(allocation="exact")], body, spatial))
+        check_reach(SCENE, link_patches(SCENE, [layout(allocation="exact")], body, spatial))
     old = replace(body, stations=replace(body.stations, width=None, outline=None))
     with pytest.raises(InputError, match="recompute it from its link file"):
         link_patches(SCENE, [layout(bends="out-of-plane")], old, spatial)

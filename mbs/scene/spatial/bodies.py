@@ -130,8 +130,8 @@ class BodyInSpace(Record):
     file has, and is rigid in the others.
 
     `modes` of a flexible body is the number of its lowest modes, in planar scenes of those in the plane; the others are
-    represented by their static flexibility. Patches that are enough for all modes of the file serve these, others the
-    lowest. "auto" takes as many as the tolerances of the analyses need; the default is all.
+    represented by their static flexibility. Patches that are enough for all modes of the file serve these, others those
+    kept. "auto" takes as many as the tolerances of the analyses need; the default is all.
 
     `pieces` is the number of segments of a beam link for large deflections, in 3D scenes in both planes, and twist;
     "auto" chooses it. Results are those of the whole link, and geometric stiffening is on by default.
@@ -151,11 +151,6 @@ class BodyInSpace(Record):
     """Number of welded segments of a beam link for large deflections; "auto" chooses it."""
     rigid: SpatialRigidBody | None = None
     """Data of a rigid body."""
-
-    @property
-    def modes_kept(self) -> int | None:
-        """How many modes the scene asks for; None where it does not say."""
-        return self.modes if isinstance(self.modes, int) else None
 
     @model_validator(mode="after")
     def _is_one_of_three(self) -> Self:
