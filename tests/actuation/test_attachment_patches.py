@@ -1,25 +1,15 @@
 """Attachment modes do not count as modes for patches: ten patches on ten modes stay an exact square problem."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
+from planar_patches import SCENE, on_link, planar_body
 
-from ffrobot.actuation.patches.patches import check_reach, patch_array, with_factors
-from ffrobot.actuation.patches.records import PztLayout
-from ffrobot.actuation.patches.voltages import solve_voltages, voltage_gain
+from ffrobot.actuation.patches.kept_modes import on_kept_modes
+from ffrobot.actuation.patches.spatial_patches import check_reach
+from ffrobot.actuation.patches.voltages import voltage_gain
 from ffrobot.common.errors import InputError
 from ffrobot.fe_models.link import cached_modal_body
-from ffrobot.mbs.model.planar_body import from_modal_body
-from ffrobot.mbs.model.raised_mass import mass_factors
-from ffrobot.mbs.model.truncation import with_fewer_modes
-
-PATH = Path("scene.toml")
-
-
-def layout(count=10, **keys):
-    given = {"body": "b", "length": 0.05, "width": 0.025, "thickness": 0.75e-3, "modulus": 63e9, "d31": 110e-12}
-    return PztLayout(count=count, **given, **({"structural": False} | keys))
+from ffrobot.mbs.model.truncation import with_fewer_modes_in_space
 
 
 @pytest.fixture
@@ -32,56 +22,75 @@ def bodies(link_file):
 
 
 def test_ten_patches_on_ten_modes_are_exact(bodies):
-    found = [patch_array(PATH, layout(), body, from_modal_body("b", body)) for body in bodies]
-    attached, plain = found
-    check_reach(PATH, attached)
+    attached, plain = (on_link(body) for body in bodies)
+    check_reach(SCENE, attached)
     assert attached.Phi_V.shape == (12, 10)
     assert np.array_equal(attached.Phi_V[:10], plain.Phi_V)
-    assert attached.condition_number == plain.condition_number
+    assert attached.reach.condition_number == pytest.approx(plain.reach.condition_number, rel=1e-9)
     F_p = np.random.default_rng(1).standard_normal((5, 12))
-    voltages = solve_voltages(attached, F_p)
-    assert np.allclose(voltages.required, solve_voltages(plain, F_p[:, :10]).required, rtol=1e-12)
+    voltages = attached.voltages(F_p)["link"]
+    assert np.allclose(voltages.required, plain.voltages(F_p[:, :10])["link"].required, rtol=1e-12)
     assert voltages.residual.max() < 1e-10
     # What is left is on the attachment modes, and is said.
     assert np.allclose(voltages.unmet[:, 10:], F_p[:, 10:] - voltages.within_limit @ attached.Phi_V[10:].T)
 
 
 def test_nine_patches_are_too_few(bodies):
-    array = patch_array(PATH, layout(9), bodies[0], from_modal_body("b", bodies[0]))
     with pytest.raises(InputError, match=r"as many patches as modes \(10\) or more, found 9"):
-        check_reach(PATH, array)
+        check_reach(SCENE, on_link(bodies[0], count=9))
 
 
 def test_weights_are_for_eigenmodes(bodies):
-    planar = from_modal_body("b", bodies[0])
-    array = patch_array(PATH, layout(4, mode_weights=(1.0,) * 10, allocation="least-squares"), bodies[0], planar)
-    plain = from_modal_body("b", bodies[1])
-    other = patch_array(PATH, layout(4, mode_weights=(1.0,) * 10, allocation="least-squares"), bodies[1], plain)
-    assert np.allclose(voltage_gain(array)[:, :10], voltage_gain(other), rtol=1e-9, atol=1e-12)
-    assert np.allclose(voltage_gain(array)[:, 10:], 0.0)
-    with pytest.raises(InputError, match="expected 10 weights"):
-        patch_array(PATH, layout(4, mode_weights=(1.0,) * 12), bodies[0], planar)
+    keys = {"count": 4, "allocation": "least-squares"}
+    found, other = (on_link(body, **keys, mode_weights=(1.0,) * 10) for body in bodies)
+    assert np.allclose(voltage_gain(found.reach)[:, :10], voltage_gain(other.reach), rtol=1e-9, atol=1e-12)
+    assert np.allclose(voltage_gain(found.reach)[:, 10:], 0.0)
+    with pytest.raises(InputError, match="expected 10 weights, one for each mode that the patches serve, found 12"):
+        on_link(bodies[0], **keys, mode_weights=(1.0,) * 12)
 
 
-@pytest.mark.parametrize("keys", [{}, {"point_weights": {"tip": 1.0}, "allocation": "least-squares"}])
-@pytest.mark.parametrize("count", [6, 10, 12])
-def test_voltages_do_not_depend_on_coordinates(bodies, keys, count):
-    """p' = √μ p, F' = F / √μ: the same voltages."""
-    planar = from_modal_body("b", bodies[0])
-    array = patch_array(PATH, layout(count, **keys), bodies[0], planar)
-    factors = np.sqrt(mass_factors(planar))
-    assert np.any(factors > 1.0)
-    F_p = np.random.default_rng(2).standard_normal((3, 12))
-    scaled = with_factors(array, factors)
-    expected = solve_voltages(array, F_p)
-    found = solve_voltages(scaled, F_p / factors)
-    assert np.allclose(found.required, expected.required, rtol=1e-8, atol=1e-9 * np.abs(expected.required).max())
+LOADED = {"root": ["root"], "both": ["root", "tip"]}
 
 
-def test_fewer_modes_are_served_through_all(bodies):
+@pytest.fixture(params=LOADED)
+def fewer(bodies, request):
+    """The link with four of its ten eigenmodes, and static shapes of loads."""
+    return with_fewer_modes_in_space(planar_body(bodies[0]), 4, LOADED[request.param])
+
+
+def test_fewer_modes_are_served_through_all(bodies, fewer):
     """`modes = 4`: ten patches reach all ten eigenmodes still."""
-    planar = with_fewer_modes(from_modal_body("b", bodies[0]), 4, ["root", "tip"])
-    array = patch_array(PATH, layout(), bodies[0], planar)
-    assert planar.n_eigenmodes == array.served == 4
-    assert array.of_all_modes is not None
-    check_reach(PATH, array)
+    assert fewer.n_eigenmodes == 4
+    of_link = on_link(bodies[0])
+    assert on_kept_modes(of_link, fewer) is of_link
+
+
+@pytest.mark.parametrize("count", [3, 4, 7])
+def test_too_few_patches_serve_the_modes_kept(bodies, fewer, count):
+    """Four coordinates of modes are met where there are four patches, whatever happens to the others."""
+    of_link = on_kept_modes(on_link(bodies[0], count=count), fewer)
+    F_kept = np.random.default_rng(3).standard_normal((6, fewer.n_modes))
+    F_p = F_kept @ fewer.on_file
+    V = of_link.voltages(F_p)["link"].required
+    left = F_kept - (V @ of_link.Phi_V.T) @ fewer.modal_transform
+    np.testing.assert_allclose(of_link.unmet(F_p, V) @ fewer.modal_transform, left, atol=1e-12 * np.abs(F_kept).max())
+    if count >= 4:
+        check_reach(SCENE, of_link)
+        assert np.abs(left[:, :4]).max() < 1e-8
+    else:
+        with pytest.raises(InputError, match=r"as many patches as modes \(4\) or more, found 3"):
+            check_reach(SCENE, of_link)
+
+
+@pytest.mark.parametrize("weights", [{}, {"mode_weights": (1.0,) * 10}, {"point_weights": {"tip": 1.0}}])
+def test_weights_of_all_modes_hold_for_those_kept(bodies, fewer, weights):
+    """What too few patches leave is weighed as what loads make of all modes of the file."""
+    keys = {"count": 2, "allocation": "least-squares"} | weights
+    whole = on_link(bodies[0], **keys)
+    kept = on_kept_modes(whole, fewer)
+    F_kept = np.random.default_rng(3).standard_normal((6, fewer.n_modes))
+    V = kept.voltages(F_kept @ fewer.on_file)["link"].required
+    Phi = fewer.modal_transform.T @ whole.Phi_V  # what is seen of the patches
+    rows = whole.reach.W_sqrt @ whole.reached.forces(fewer.on_file).T
+    expected = np.array([np.linalg.lstsq(rows @ Phi, rows @ F, rcond=None)[0] for F in F_kept])
+    np.testing.assert_allclose(V, expected, rtol=1e-7, atol=1e-9 * np.abs(expected).max())

@@ -2,34 +2,20 @@
 
 from dataclasses import replace
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 import pytest
+from planar_patches import SCENE, bent, layout, modes_in_the_plane, on_link, patches, planar_body, tip_deflection
 
-from ffrobot.actuation.patches.patches import check_reach, patch_array
-from ffrobot.actuation.patches.records import PztLayout
+from ffrobot.actuation.patches.spatial_patches import check_reach, link_patches
 from ffrobot.actuation.patches.voltages import solve_voltages
 from ffrobot.common.errors import InputError
+from ffrobot.fe_models.link import cached_modal_body
 from ffrobot.fe_models.modal_body import OutlinedPatches
-from ffrobot.mbs.model.masses import with_payload
-from ffrobot.mbs.model.planar_body import from_modal_body
+from ffrobot.mbs.model.spatial_masses import with_payload
 
 EI = 2.068427e11 * 0.025 * 0.015**3 / 12
 C = 63e9 * 110e-12 * 0.025 * (0.75e-3 + 0.015) / 2  # Shabana 2022, Eq. 14
-
-
-def patches(body, planar=None, **keys):
-    tables = {"length": 0.05, "width": 0.025, "thickness": 0.75e-3, "modulus": 63e9, "d31": 110e-12} | keys
-    if "centers" not in tables and "count" not in tables:
-        tables["count"] = 10
-    layout = PztLayout(body="link", **({"structural": False} | tables))
-    return patch_array(Path("scene.toml"), layout, body, planar or from_modal_body("link", body))
-
-
-def tip_deflection(planar, array, voltage):
-    p = array.Phi_V @ voltage / planar.stiffness
-    return planar.points["tip"].translation[1] @ p
 
 
 def test_moment_per_volt(cantilever):
@@ -41,8 +27,8 @@ def test_moment_per_volt(cantilever):
 def test_cantilever_bends_as_in_closed_form(cantilever, start):
     """w(L) = cV (x2 − x1) [L − (x1 + x2)/2]/EI; with all 40 modes of 20 elements that is exact at their nodes."""
     body = cantilever(40)
-    planar = from_modal_body("link", body)
-    array = patches(body, centers=(start + 0.025,))
+    planar = planar_body(body)
+    array = on_link(body, centers=(start + 0.025,))
     expected = C * 100.0 * 0.05 * (1.0 - start - 0.025) / EI
     assert tip_deflection(planar, array, np.array([100.0])) == pytest.approx(expected, rel=1e-7)
     if start == 0.0:
@@ -54,7 +40,7 @@ def test_deflection_converges_with_the_number_of_modes(cantilever):
     errors = []
     for count in (3, 6, 12, 24):
         body = cantilever(count)
-        deflection = tip_deflection(from_modal_body("link", body), patches(body, centers=(0.025,)), np.array([100.0]))
+        deflection = tip_deflection(planar_body(body), on_link(body, centers=(0.025,)), np.array([100.0]))
         errors.append(abs(deflection / exact - 1))
     assert errors[0] > errors[1] > errors[2] > errors[3]
     assert errors[3] < 1e-3
@@ -75,17 +61,17 @@ def test_signs_of_modes_do_not_matter_to_voltages(cantilever):
         geometric_stiffness={},
     )  # fmt: skip
     F_p = np.random.default_rng(0).standard_normal((3, 10))
-    one, other = solve_voltages(patches(body), F_p), solve_voltages(patches(flipped), F_p * signs)
+    one, other = on_link(body).voltages(F_p)["link"], on_link(flipped).voltages(F_p * signs)["link"]
     np.testing.assert_allclose(other.required, one.required, rtol=1e-9, atol=1e-9 * one.largest)
 
 
 def test_a_payload_changes_the_modes_and_not_the_deflection(cantilever):
     """Modes are made anew with the payload; the same volts still bend the link as far."""
     body = cantilever(40)
-    planar = from_modal_body("link", body)
-    loaded = with_payload(planar, "tip", 3.0, 0.1)
-    bare = tip_deflection(planar, patches(body), np.linspace(10, 100, 10))
-    assert tip_deflection(loaded, patches(body, loaded), np.linspace(10, 100, 10)) == pytest.approx(bare, rel=1e-9)
+    planar = planar_body(body)
+    loaded = with_payload(planar, "tip", 3.0, np.zeros(3), np.diag([0.1, 0.1, 0.1]))
+    bare = tip_deflection(planar, on_link(body), np.linspace(10, 100, 10))
+    assert tip_deflection(loaded, on_link(body, loaded), np.linspace(10, 100, 10)) == pytest.approx(bare, rel=1e-9)
 
 
 def test_square_voltages_reproduce_the_modal_forces(cantilever):
@@ -114,23 +100,39 @@ def test_fewer_or_more_patches_than_modes_are_least_squares(cantilever, count):
 def test_more_modes_than_patches_need_least_squares(cantilever):
     body = cantilever(10)
     with pytest.raises(InputError, match=r'pzt "link": expected as many patches as modes \(10\) or more, found 4: add'):
-        check_reach(Path("scene.toml"), patches(body, count=4))
-    check_reach(Path("scene.toml"), patches(body, count=4, allocation="least-squares"))
-    check_reach(Path("scene.toml"), patches(body, count=14))
+        check_reach(SCENE, on_link(body, count=4))
+    check_reach(SCENE, on_link(body, count=4, allocation="least-squares"))
+    check_reach(SCENE, on_link(body, count=14))
 
 
-def test_modes_that_no_patch_reaches_are_named(all_modes):
-    """Patches without a named face bend and do not stretch: they leave the axial mode, √(E/ρ)/4L = 1283 Hz, alone."""
-    planar = from_modal_body("link", all_modes)
-    array = patches(all_modes, planar, count=planar.n_modes)
-    axial = [k for k, size in enumerate(np.abs(planar.points["tip"].translation[0])) if size > 1e-6]
-    assert list(array.unreached_modes) == axial
-    assert len(axial) == 1
-    message = rf"singular Φ_V \(condition number .*\): no voltages serve mode {axial[0] + 1} \(1283 Hz\)"
-    with pytest.raises(InputError, match=message):
-        check_reach(Path("scene.toml"), array)
-    check_reach(Path("scene.toml"), patches(all_modes, planar, count=planar.n_modes, allocation="least-squares"))
-    check_reach(Path("scene.toml"), patches(all_modes, planar, count=planar.n_modes, face="+y"))
+def test_modes_that_no_patch_reaches_are_named(link_file):
+    """Mode 4 of a supported beam has nodes of curvature at its quarters, where all four patches are."""
+    body = cached_modal_body(link_file("supported4", "simply-supported", 4)).body
+    layouts = [layout(name="three", centers=(0.25, 0.5, 0.75)), layout(name="one", centers=(0.25,))]
+    of_link = link_patches(SCENE, layouts, body, planar_body(body))
+    assert list(of_link.reach.unreached_modes) == [3]
+    frequency = (4 * np.pi) ** 2 / (2 * np.pi) * np.sqrt(EI / (7850.0 * 0.025 * 0.015))
+    message = r"singular Φ_V \(condition number .*\): no voltages serve mode 4 \(.* Hz\); move patches"
+    with pytest.raises(InputError, match=message) as caught:
+        check_reach(SCENE, of_link)
+    assert float(str(caught.value).split("mode 4 (")[1].split(" Hz")[0]) == pytest.approx(frequency, rel=2e-4)
+    one = [each.model_copy(update={"allocation": "least-squares"}) for each in layouts]
+    check_reach(SCENE, link_patches(SCENE, one, body, planar_body(body)))
+
+
+def test_patches_that_only_bend_leave_axial_modes_as_they_are(all_modes):
+    """Patches without a named face do not stretch the link; those on one face do, and serve its axial mode."""
+    moving = modes_in_the_plane(all_modes)
+    bending = [k for k in moving if all_modes.family[k] == "in-plane-bending"]
+    assert len(bending) == len(moving) - 1
+    F_p = np.random.default_rng(4).standard_normal((2, len(all_modes.family)))
+    for face, rows in ((None, bending), ("+y", moving)):
+        of_link = on_link(all_modes, count=len(moving), face=face)
+        assert list(of_link.reached.rows) == list(rows)
+        check_reach(SCENE, of_link)
+        left = of_link.unmet(F_p, of_link.voltages(F_p)["link"].required)
+        np.testing.assert_allclose(left[:, rows], 0.0, atol=1e-8)
+        np.testing.assert_array_equal(np.delete(left, rows, axis=1), np.delete(F_p, rows, axis=1))
 
 
 @pytest.mark.parametrize("centers", [(0.3, 0.3), (0.3, 0.34), (0.5, 0.2, 0.46)])
@@ -144,20 +146,19 @@ def test_overlapping_patches_are_refused(cantilever, centers):
 def test_both_faces_bend_twice_as_much_and_layers_add_up(cantilever, layers):
     """Bimorph: w(L) = 2 N E d31 w_p (t_b + N t_p)/2 V (x2 − x1)[L − (x1 + x2)/2]/EI."""
     body = cantilever(40)
-    planar = from_modal_body("link", body)
-    array = patches(body, centers=(0.225,), face="both", layers=layers)
+    planar = planar_body(body)
+    of_link = on_link(body, centers=(0.225,), face="both", layers=layers)
     c = 2 * layers * 63e9 * 110e-12 * 0.025 * (0.015 + layers * 0.75e-3) / 2
-    assert array.moment_per_volt[0] == pytest.approx(c, rel=1e-12)
+    assert of_link.arrays["link"].moment_per_volt[0] == pytest.approx(c, rel=1e-12)
     expected = c * 100.0 * 0.05 * (1.0 - 0.225) / EI
-    assert tip_deflection(planar, array, np.array([100.0])) == pytest.approx(expected, rel=1e-7)
+    assert tip_deflection(planar, of_link, np.array([100.0])) == pytest.approx(expected, rel=1e-7)
 
 
 @pytest.mark.parametrize(("face", "sign"), [("+y", -1.0), ("-y", 1.0), ("both", 0.0)])
 def test_one_face_also_stretches_the_link(all_modes, face, sign):
     """u(L) = ∓E_p d31 w_p V x2/EA of a bar: of it one axial mode gives 8/π² sin(πx2/2L) L/x2."""
-    planar = from_modal_body("link", all_modes)
-    array = patches(all_modes, planar, centers=(0.025,), face=face)
-    p = array.Phi_V[:, 0] * 100.0 / planar.stiffness
+    planar = planar_body(all_modes)
+    p = bent(planar, on_link(all_modes, centers=(0.025,), face=face), np.array([100.0]))
     stretch = planar.points["tip"].translation[0] @ p
     EA = 2.068427e11 * 0.025 * 0.015
     pull = sign * 63e9 * 110e-12 * 0.025 * 100.0
@@ -176,11 +177,11 @@ def test_individual_limits(cantilever):
 def test_weights_of_points_keep_the_tip_where_it_is_wanted(cantilever):
     """Two patches, ten modes, a uniform load: with all weight on the tip hardly anything of its deflection is left."""
     body = cantilever(10)
-    planar = from_modal_body("link", body)
-    F_p = planar.S_bar[1:] * 1e-3
+    planar = planar_body(body)
+    F_p = planar.S_bar[1:2] * 1e-3
     tip = planar.points["tip"].translation[1] / planar.stiffness
     equal, weighted = (
-        solve_voltages(patches(body, centers=(0.1, 0.5), allocation="least-squares", **keys), F_p)
+        on_link(body, centers=(0.1, 0.5), allocation="least-squares", **keys).voltages(F_p)["link"]
         for keys in ({}, {"point_weights": {"tip": 1.0}})
     )
     left = [abs(tip @ voltages.unmet[0]) / abs(tip @ F_p[0]) for voltages in (equal, weighted)]

@@ -1,17 +1,10 @@
 """The two couplings of patches to a solid, section rotations and surface strain, against each other and a beam."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
+from planar_patches import on_link
 
-from ffrobot.actuation.patches.patches import patch_array
-from ffrobot.actuation.patches.records import PztLayout
-from ffrobot.actuation.patches.spatial_patches import link_patches
-from ffrobot.actuation.patches.spatial_records import SpatialPztLayout
 from ffrobot.fe_models.link import cached_modal_body
-from ffrobot.mbs.model.planar_body import from_modal_body
-from ffrobot.mbs.model.spatial_body import from_modal_body as spatial_body
 
 LINK = """
 name = "link"
@@ -42,7 +35,7 @@ def arrays(tmp_path_factory):
     folder = tmp_path_factory.mktemp("solid")
     bodies = {}
 
-    def compute(faces=None, coupling="rotation", in_space=False):
+    def compute(faces=None, coupling="rotation"):
         if faces not in bodies:
             path = folder / f"{faces}.toml"
             path.write_text(LINK.replace("KIND", BEAM if faces is None else SOLID.replace("FACES", faces)))
@@ -50,20 +43,7 @@ def arrays(tmp_path_factory):
                 patch.setenv("XDG_CACHE_HOME", str(folder / "cache"))
                 bodies[faces] = cached_modal_body(path).body
         body = bodies[faces]
-        keys = {
-            "length": 0.05,
-            "width": 0.025,
-            "thickness": 0.75e-3,
-            "modulus": 63e9,
-            "d31": 110e-12,
-            "count": 10,
-            "structural": False,
-        }
-        if in_space:
-            layout = SpatialPztLayout(body="link", coupling=coupling, **keys)
-            return link_patches(Path("scene.toml"), [layout], body, spatial_body("link", body)).Phi_V
-        layout = PztLayout(body="link", coupling=coupling, **keys)
-        return patch_array(Path("scene.toml"), layout, body, from_modal_body("link", body)).Phi_V
+        return on_link(body, coupling=coupling).Phi_V
 
     return compute
 
@@ -90,8 +70,3 @@ def test_one_face_or_two_bend_alike(arrays):
     np.testing.assert_allclose(
         arrays("top", "surface"), arrays("both", "surface"), atol=1e-3 * np.abs(arrays("both", "surface")).max()
     )
-
-
-@pytest.mark.parametrize("coupling", ["surface", "rotation"])
-def test_in_space_they_do_the_same(arrays, coupling):
-    np.testing.assert_array_equal(arrays("both", coupling, in_space=True), arrays("both", coupling))

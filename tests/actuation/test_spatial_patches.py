@@ -7,17 +7,13 @@ import numpy as np
 import pytest
 
 from ffrobot.actuation.patches.lamina import Fibres, fibre_lamina
-from ffrobot.actuation.patches.patches import patch_array
-from ffrobot.actuation.patches.records import PztLayout
+from ffrobot.actuation.patches.records import SpatialPztLayout
 from ffrobot.actuation.patches.spatial_patches import check_reach, link_patches, placed_patches
-from ffrobot.actuation.patches.spatial_records import SpatialPztLayout
-from ffrobot.actuation.patches.spatial_structure import with_patches_in_space
-from ffrobot.actuation.patches.structure import with_patches
+from ffrobot.actuation.patches.structure import with_patches_in_space
 from ffrobot.common.errors import InputError
 from ffrobot.common.validation import validate
 from ffrobot.fe_models.beam.section_stress import surface_shear
 from ffrobot.fe_models.link import cached_modal_body
-from ffrobot.mbs.model.planar_body import from_modal_body as planar_body
 from ffrobot.mbs.model.spatial_body import from_modal_body
 
 SCENE = Path("scene.toml")
@@ -225,30 +221,17 @@ def test_round_links_do_not_mix_their_planes(link):
     assert not spatial.modal_transform[families[:, None] != families].any()
 
 
-def test_mass_and_stiffness_as_in_the_plane(link):
-    """Frequencies in the plane are those of the planar body with the same patches, which is other code."""
+def test_mass_of_layers(link):
+    """∫ρ(y² + z²) over the layers; modes stay orthonormal."""
     body = link(rectangle(0.006, 0.014))
     keys = {"count": 5, "length": 0.05, "structural": True, "density": 7600.0, "face": "both"}
     spatial = with_patches_in_space(from_modal_body("link", body), body, placed_patches(SCENE, [layout(**keys)], body))
-    planar = with_patches(planar_body("link", body), body, PztLayout(body="link", width=0.01, **PLAIN | keys))
-    in_plane = np.isin(body.family, ("in-plane-bending", "axial"))
-    np.testing.assert_allclose(np.sort(spatial.stiffness[in_plane]), np.sort(planar.stiffness), rtol=1e-9)
-    assert spatial.mass == pytest.approx(planar.mass)
-    layers = 2 * 5 * 0.05 * 7600.0 * 0.01 * (((0.0035) ** 3 - 0.003**3) / 3 + 0.0005 * 0.01**2 / 12)
-    assert spatial.J_spin - body.J_spin == pytest.approx(layers, rel=1e-9)  # ∫ρ(y² + z²) over the layers
+    A, I = 2 * 0.01 * 0.5e-3, 2 * 0.01 * (0.0035**3 - 0.003**3) / 3  # noqa: E741
+    assert spatial.mass - body.mass == pytest.approx(5 * 0.05 * 7600.0 * A, rel=1e-9)
+    layers = 5 * 0.05 * 7600.0 * (I + A * 0.01**2 / 12)
+    assert spatial.J_spin - body.J_spin == pytest.approx(layers, rel=1e-9)
     np.testing.assert_allclose(spatial.S_bar_kl.trace(axis1=0, axis2=1) + spatial.S_spin, np.eye(len(body.family)),
                                atol=1e-9)  # fmt: skip
-
-
-def test_modal_forces_per_volt_as_in_the_plane(link):
-    body = link(rectangle(0.006, 0.014))
-    keys = {"count": 5, "length": 0.05, "face": "+y"}
-    planar = patch_array(SCENE, PztLayout(body="link", width=0.01, **PLAIN | keys), body, planar_body("link", body))
-    of_link = link_patches(SCENE, [layout(**keys)], body, from_modal_body("link", body))
-    found, in_plane = of_link.arrays["link"], np.isin(body.family, ("in-plane-bending", "axial"))
-    np.testing.assert_allclose(of_link.Phi_V[in_plane], planar.Phi_V, rtol=1e-10, atol=1e-12)
-    np.testing.assert_allclose(found.moment_per_volt, planar.moment_per_volt, rtol=1e-14)
-    np.testing.assert_allclose(found.authority, planar.authority, rtol=1e-12)
 
 
 def test_voltages_of_two_planes_do_not_disturb_each_other(link):

@@ -1,0 +1,48 @@
+"""Patches on links of planar scenes: the bodies, layouts and arrays that a solve makes of them."""
+
+from pathlib import Path
+
+import numpy as np
+
+from ffrobot.actuation.patches.records import SpatialPztLayout
+from ffrobot.actuation.patches.spatial_patches import link_patches
+from ffrobot.mbs.model.projection import projected
+from ffrobot.mbs.model.spatial_body import from_modal_body
+
+SCENE = Path("scene.toml")
+CERAMIC = {"length": 0.05, "width": 0.025, "thickness": 0.75e-3, "modulus": 63e9, "d31": 110e-12}
+
+
+def planar_body(body, name="link"):
+    """The modes of a link that move in the plane."""
+    return projected(from_modal_body(name, body, is_planar=True))
+
+
+def layout(body="link", **keys):
+    places = {} if keys.keys() & {"count", "centers"} else {"count": 10}
+    return SpatialPztLayout(body=body, **({"structural": False} | CERAMIC | places | keys))
+
+
+def on_link(body, planar=None, **keys):
+    """All patches of one layout on the link, `planar` with payloads or with fewer modes."""
+    return link_patches(SCENE, [layout(**keys)], body, planar_body(body) if planar is None else planar)
+
+
+def patches(body, planar=None, **keys):
+    """The same, on the modes that they reach."""
+    return on_link(body, planar, **keys).arrays["link"]
+
+
+def bent(planar, of_link, voltage):
+    """Modal coordinates under voltages (k,), statically."""
+    return planar.modal_transform.T @ of_link.Phi_V @ voltage / planar.stiffness
+
+
+def tip_deflection(planar, of_link, voltage):
+    """Along y, m, of the tip."""
+    return planar.points["tip"].translation[1] @ bent(planar, of_link, voltage)
+
+
+def modes_in_the_plane(body):
+    """Numbers of the modes of a modal body that move in the plane."""
+    return np.flatnonzero(planar_body(body).modal_transform.any(axis=1))
