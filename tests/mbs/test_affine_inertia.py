@@ -9,11 +9,10 @@ import pytest
 import zoo
 from links import ritz_link
 from material_points import PointCloud, random_cloud
-from mechanisms import assemble, energies, evaluate, make_model, oracle_of, random_state, relative
-
-from ffrobot.mbs.model.geometric_stiffening import GeometricStiffening
-from ffrobot.mbs.model.masses import mass_matrix, with_payload
-from ffrobot.mbs.quantities.stiffening import shortening
+from mechanisms import assemble, make_model, oracle_of, random_state, relative
+from oracle import mass_matrix
+from planar_bodies import GeometricStiffening, with_payload
+from planar_runs import energies, evaluated, freely
 
 STEP = 1e-30  # complex step: exact to rounding
 GRAVITY = np.array([1.3, -9.81])
@@ -87,7 +86,6 @@ def test_mass_matrix_is_that_of_the_points(case):
     bent, q, _ = case
     M = np.array([momentum(bent, q, e) for e in np.eye(len(q))])
     assert relative(mass_matrix(bent.body(), q), M) < 1e-13
-    assert relative(oracle.mass_matrix(bent.body(), q), M) < 1e-13
 
 
 def test_quadratic_velocity_forces_satisfy_lagranges_equations(case):
@@ -101,14 +99,14 @@ def test_quadratic_velocity_forces_satisfy_lagranges_equations(case):
 def test_free_body_of_the_core_moves_as_its_points(case):
     """C++ against the points, with nothing in between."""
     bent, q, v = case
-    assembly = assemble(make_model([bent.body()], gravity=tuple(GRAVITY)))
+    robot = make_model([bent.body()], gravity=tuple(GRAVITY))
     M = np.array([momentum(bent, q, e) for e in np.eye(len(q))])
     Q = gradient(lambda x: bent.kinetic_energy(x, v) + bent.work_of_gravity(x), q)
     Q -= np.imag(momentum(bent, q + 1j * STEP * v, v)) / STEP
     Q[3:] -= bent.cloud.stiffness * q[3:] + bent.cloud.damping @ v[3:]
-    a, _ = evaluate(assembly, 0.0, q, v)
-    assert relative(a, np.linalg.solve(M, Q)) < 1e-12
-    assert relative(energies(assembly, q, v)[0], bent.kinetic_energy(q, v)) < 1e-13
+    found = evaluated(robot, 0.0, *freely(robot, q, v))
+    assert relative(found.a[0], np.linalg.solve(M, Q)) < 1e-12
+    assert relative(energies(found)["kinetic"], bent.kinetic_energy(q, v)) < 1e-13
 
 
 @pytest.mark.parametrize("name", ["stiffened", "stiffened, driven"])
@@ -116,7 +114,7 @@ def test_mass_matrix_is_positive_definite_however_far_the_bodies_are_bent(name):
     assembly = assemble(zoo.build(name))
     mechanism, rng = oracle_of(assembly), np.random.default_rng(3)
     for size in 10.0 ** rng.uniform(-2, 1, 200):
-        q, _ = random_state(rng, assembly.system.coordinates)
+        q, _ = random_state(rng, assembly.size)
         for first, body in zip(assembly.first, assembly.model.bodies, strict=True):
             p = rng.standard_normal(body.n_modes)
             q[first + 3 : first + 3 + body.n_modes] = size * p / np.linalg.norm(p)
@@ -145,15 +143,3 @@ def test_a_long_payload_is_a_pair_of_masses():
     shorter = np.abs(p @ point.rotation) ** 2
     assert np.abs(M - M_alone - added).max() < 2 * shorter * np.abs(added).max()
     assert np.abs(M - M_alone).max() > 0.5 * np.abs(added).max()
-
-
-def test_shortening_of_a_cantilever_is_what_bending_takes_off_its_length():
-    """½∫w′² dx is that at the tip; b, its affine part along the beam, is of that size."""
-    link = ritz_link("link", "cantilever", length=2.0, modes=1, stiffening=True)
-    for deflection in (0.01, 0.05):
-        p = np.array([[deflection * 2.0 / link.points["tip"].translation[1, 0]]])
-        at_tip = 0.5 * float(p[0] @ link.stiffening.K_points["tip"][0] @ p[0]) / 2.0
-        b = shortening(link, link.stiffening, p)
-        assert b.shape == (1,)
-        assert 0.5 * at_tip < b[0] < 1.5 * at_tip
-        assert at_tip == pytest.approx(0.58 * deflection**2, rel=0.01)

@@ -203,7 +203,9 @@ def test_a_shape_out_of_reach_is_an_error():
     """A second link bent by metres: its tip is farther from the elbow than the first link can make up for."""
     model = arm()
     modal = {"link2": (parse_expression("-50*t"),)}
-    with pytest.raises(SolveError, match=r"no posture was found at t = .*: the prescribed shape takes the trajectories"):
+    with pytest.raises(
+        SolveError, match=r"no posture was found at t = .*: the prescribed shape takes the trajectories"
+    ):
         run(model, fcid("given", modal=modal))
 
 

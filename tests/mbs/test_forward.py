@@ -147,7 +147,9 @@ def test_saturated_actuators_give_what_their_limits_leave(kind):
             saturated += np.count_nonzero(np.abs(V) >= limit)
             supplied.append(Phi @ V)
         needed = D.T @ (mechanism.mass_matrix(q) @ outcome.a[k] - mechanism.forces(outcome.time[k], q, v))
-        assert relative(needed, np.concatenate(supplied)) < 1e-6  # the inverse run between its outputs, to its tolerance
+        assert (
+            relative(needed, np.concatenate(supplied)) < 1e-6
+        )  # the inverse run between its outputs, to its tolerance
     assert saturated > 10
 
 

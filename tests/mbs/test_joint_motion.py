@@ -7,7 +7,6 @@ from planar_runs import run
 from rods import rod, slider_crank
 
 
-
 def test_turns_are_counted():
     """Two rods on given joint angles, the second for three turns and a half."""
     model = make_model(

@@ -11,7 +11,6 @@ from planar_bodies import PlanarPoint
 from planar_runs import energies, evaluated, joint_forces, point_motion, random_tree_state, run, trajectory_force
 
 
-
 def with_signs(body, signs):
     """The same body in modal coordinates signs · p."""
     S = np.diag(signs)
