@@ -8,10 +8,15 @@ import pytest
 from ffrobot.fe_models.link import cached_modal_body
 from ffrobot.fe_models.link_file import LinkTable
 from ffrobot.fe_models.pieces import cut
-from ffrobot.mbs.model.divided_link import Piece, divided_link
-from ffrobot.mbs.model.planar_body import from_modal_body
+from ffrobot.mbs.model.divided_link import SpatialPiece, divided_link_in_space
+from ffrobot.mbs.model.projection import projected
+from ffrobot.mbs.model.spatial_body import from_modal_body
 
 MODES = 4
+
+
+def planar(name, modal):
+    return projected(from_modal_body(name, modal, is_planar=True))
 
 
 def divided(condition, count, modes=MODES):
@@ -28,34 +33,34 @@ def divided(condition, count, modes=MODES):
     source = LinkTable(keys, Path("link.toml"))
     link, parts = cached_modal_body(source).body, cut(source, count)
     pieces = [
-        Piece(start, modal, from_modal_body(f"piece {k}", modal))
+        SpatialPiece(start, modal, planar(f"piece {k}", modal))
         for k, (start, modal) in enumerate(
             (start, cached_modal_body(table).body) for start, table in zip(parts.starts, parts.tables, strict=True)
         )
     ]
-    planar = from_modal_body("link", link)
-    return link, planar, pieces, divided_link(link, planar, pieces)
+    whole = planar("link", link)
+    return link, whole, pieces, divided_link_in_space(link, whole, pieces)
 
 
 @pytest.mark.parametrize("condition", ["cantilever", "simply-supported"])
 @pytest.mark.parametrize("count", [2, 4, 8])
 def test_sections_turn_from_cut_to_cut_as_those_of_the_link(condition, count):
-    link, planar, pieces, found = divided(condition, count)
-    rows = np.cumsum([0, *(piece.planar.n_modes for piece in pieces)])
-    largest = np.abs(link.stations.rotation[:, 2] @ planar.modal_transform).max(axis=0)
+    link, whole, pieces, found = divided(condition, count)
+    rows = np.cumsum([0, *(piece.spatial.n_modes for piece in pieces)])
+    largest = np.abs(link.stations.rotation[:, 2] @ whole.modal_transform).max(axis=0)
     for piece, first, last in zip(pieces, rows[:-1], rows[1:], strict=True):
         ends = piece.start, piece.start + piece.modal.length
-        a, b = (link.interpolate(min(x, link.length)).rotation[2] @ planar.modal_transform for x in ends)
-        start, end = (piece.planar.points[name].rotation for name in ("root", "tip"))
+        a, b = (link.interpolate(min(x, link.length)).rotation[2] @ whole.modal_transform for x in ends)
+        start, end = (piece.spatial.points[name].rotation[2] for name in ("root", "tip"))
         np.testing.assert_allclose((end - start) @ found.spread[first:last], b - a, atol=2e-4 * largest.max())
 
 
 @pytest.mark.parametrize("count", [4, 8])
 def test_strain_energy_converges_from_below(count):
     """What the shapes of the pieces do not have of the link's modes is left out: the more pieces, the less."""
-    _, planar, pieces, found = divided("cantilever", count)
-    stiffness = np.concatenate([piece.planar.stiffness for piece in pieces])
-    part = np.einsum("kn,k,kn->n", found.spread, stiffness, found.spread) / planar.stiffness
+    _, whole, pieces, found = divided("cantilever", count)
+    stiffness = np.concatenate([piece.spatial.stiffness for piece in pieces])
+    part = np.einsum("kn,k,kn->n", found.spread, stiffness, found.spread) / whole.stiffness
     assert (part < 1 + 1e-4).all()  # strains are taken as constant over a 32nd of a piece
     assert (part > 1 - {4: 0.06, 8: 0.004}[count]).all()
     assert part[0] == pytest.approx(1.0, abs=1e-4)
@@ -68,7 +73,7 @@ def test_what_is_spread_is_gathered():
 
 def test_a_link_may_have_more_modes_than_its_pieces():
     """Ten modes in two pieces of three: what the pieces can do is gathered, and found again."""
-    _, planar, pieces, found = divided("cantilever", 2, modes=10)
-    total = sum(piece.planar.n_modes for piece in pieces)
-    assert total < planar.n_modes
+    _, whole, pieces, found = divided("cantilever", 2, modes=10)
+    total = sum(piece.spatial.n_modes for piece in pieces)
+    assert total < whole.n_modes
     np.testing.assert_allclose(found.spread @ found.gathered, np.eye(total), atol=1e-8)

@@ -3,16 +3,19 @@
 import numpy as np
 import pytest
 from links import arm, ritz_link
+from planar_bodies import in_3d
+from spatial_oracle import body_mass_matrix
 
-from ffrobot.mbs.model.masses import mass_matrix
-from ffrobot.mbs.model.truncation import interface_loads, loaded_points, with_fewer_modes
+from ffrobot.common.rotations import exponential
+from ffrobot.mbs.model.truncation import interface_loads, loaded_points
+from ffrobot.mbs.model.truncation import with_fewer_modes_in_space as with_fewer_modes
 
 POINTS = ["root", "tip"]
 
 
 @pytest.fixture(params=["cantilever", "simply-supported"])
 def whole(request):
-    return ritz_link("link", request.param, modes=8, extra=1, damping_ratio=0.01, stiffening=True)
+    return in_3d(ritz_link("link", request.param, modes=8, extra=1, damping_ratio=0.01, stiffening=True))
 
 
 @pytest.mark.parametrize("lowest", [0, 1, 3])
@@ -40,13 +43,13 @@ def test_the_coordinates_are_orthonormal_and_uncoupled(whole):
 def test_equations_are_those_of_the_body_restricted_to_fewer_shapes(whole):
     body = with_fewer_modes(whole, 3, POINTS)
     p = 1e-3 * np.random.default_rng(1).normal(size=body.n_modes)
-    T = np.zeros((3 + whole.n_modes, 3 + body.n_modes))
-    T[:3, :3], T[3:, 3:] = np.eye(3), body.reduction.T
-    q = np.concatenate([[0.3, -0.2, 0.7], p])
-    np.testing.assert_allclose(mass_matrix(body, q), T.T @ mass_matrix(whole, T @ q) @ T, atol=1e-12)
+    T, A = np.zeros((6 + whole.n_modes, 6 + body.n_modes)), exponential(np.array([0.0, 0.0, 0.7]))
+    T[:6, :6], T[6:, 6:] = np.eye(6), body.reduction.T
+    M, M_whole = body_mass_matrix(body, A, p), body_mass_matrix(whole, A, body.reduction.T @ p)
+    np.testing.assert_allclose(M, T.T @ M_whole @ T, atol=1e-12)
     np.testing.assert_allclose(body.damping, body.reduction.T.T @ whole.damping @ body.reduction.T, atol=1e-12)
     K_tip, K_of_all = (of.stiffening.K_points["tip"][0] for of in (body, whole))
-    np.testing.assert_allclose(p @ K_tip @ p, (T @ q)[3:] @ K_of_all @ (T @ q)[3:], rtol=1e-12)
+    np.testing.assert_allclose(p @ K_tip @ p, (T[6:, 6:] @ p) @ K_of_all @ (T[6:, 6:] @ p), rtol=1e-12)
 
 
 def test_modal_forces_of_loads_are_known_on_the_modes_left_out(whole):
