@@ -107,7 +107,8 @@ def _inversion(run: Outcome, around: AroundPath) -> str:
     inversion = around.inversion
     assert inversion is not None
     linear, factor = inversion.linearisation, inversion.servo.factor
-    error = max(float(np.abs(off).max(initial=0.0)) for off in path_errors(inversion, run.time, run.q).values())
+    held = inversion.servo.model
+    error = max(float(np.abs(off).max(initial=0.0)) for off in path_errors(held, run.time, run.q).values())
     left = f"largest error of the path {error:.2g}"
     if is_minimum_phase(linear):
         output = "the path's own points" if factor == 1 else f"the output with {factor:.2g} times the vibration"

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..mbs.analysis.inverted_path import AroundPath, is_minimum_phase
 from ..mbs.analysis.motors_only import path_errors
+from ..mbs.analysis.tracking import TrackedPath
 from ..mbs.quantities.spatial_motion import SpatialMotion
 from ..mbs.scene.spatial.trajectories import SpatialTrajectory
 from ..mbs.solve.stable_inversion import Inversion
@@ -19,8 +20,10 @@ def write_paths(group: h5py.Group, result: SpatialResult) -> None:
     """Of an analysis: trajectories/ that hold in it, or that motors alone follow; at rest before and after."""
     run, motion, details = result.run, result.motion, result.run.details
     inside, errors = np.clip(run.time, 0.0, run.analysis.last_time), {}
-    if isinstance(details, AroundPath) and details.inversion is not None:
-        errors = path_errors(details.inversion, run.time, run.q)
+    if isinstance(details, TrackedPath):
+        errors = path_errors(details.held, run.time, run.q)
+    elif isinstance(details, AroundPath) and details.inversion is not None:
+        errors = path_errors(details.inversion.servo.model, run.time, run.q)
         _write_zero_dynamics(group, details.inversion)
     for trajectory in motion.model.scene.trajectory if errors else motion.followed:
         entry = group.create_group(f"trajectories/{trajectory.name}")

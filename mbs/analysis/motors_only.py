@@ -163,9 +163,8 @@ def _run(analysis: MotorsOnly, model: SpatialModel, inversion: Inversion[Spatial
     )
 
 
-def path_errors(inversion: Inversion[SpatialServo], times: Array, q: Array) -> dict[str, Array]:
-    """By trajectory how far (T, m) what follows it is off at `times` (T,) and q (T, n_q), in m or rad."""
-    held = inversion.servo.model
+def path_errors(held: SpatialModel, times: Array, q: Array) -> dict[str, Array]:
+    """By trajectory of `held` how far (T, m) what follows it is off at `times` (T,) and q (T, n_q), in m or rad."""
     C, owners = row_values(held, q, times)[0], [row.owner if row.is_trajectory else "" for row in held.rows]
     return {path.name: C[:, [owner == path.name for owner in owners]] for path in held.scene.trajectory}
 
@@ -174,7 +173,9 @@ def _told(inversion: Inversion[SpatialServo], run: Outcome) -> tuple[str, ...]:
     """How far a redefined output leaves the path itself."""
     told = []
     if not run.failed and inversion.servo.factor < 1:
-        off = max(float(np.abs(of).max(initial=0.0)) for of in path_errors(inversion, run.time, run.q).values())
+        off = max(
+            float(np.abs(of).max(initial=0.0)) for of in path_errors(inversion.servo.model, run.time, run.q).values()
+        )
         if off > NOTABLE:
             told.append(
                 f"a point with {inversion.servo.factor:.2g} of the vibration follows the path: that of the trajectory"

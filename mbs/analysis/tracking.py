@@ -103,12 +103,14 @@ class TrackedPath(AroundPath):
         least_share: the same as a share of the limits; NaN where no patch has any.
         objective: what was made small, `effort` unless limits do not allow it.
         cost: the effort, without unit.
+        held: the robot whose constraint equations hold it on its path.
     """
 
     least_voltage: float
     least_share: float
     objective: Objective
     cost: float
+    held: SpatialModel
 
 
 def run_tracking(context: Context, analysis: Tracking) -> Outcome:
@@ -136,7 +138,7 @@ def run_tracking(context: Context, analysis: Tracking) -> Outcome:
     around = TrackedPath(
         pre_actuation=pre, post_actuation=post, least_voltage=least * float(units.max()),
         least_share=least if np.isfinite(asked.limits.voltage).any() else float("nan"), objective=asked.objective,
-        cost=found.cost,
+        cost=found.cost, held=servo.model,
     )  # fmt: skip
     times = output_times(analysis.end, analysis.output_step, pre, post)
 

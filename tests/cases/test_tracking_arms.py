@@ -44,6 +44,8 @@ def test_replay_follows_the_path(scene):
     with ffrobot.solve(path) as results:
         way = float(np.ptp(results["carried/points/arm.tip/position"]))
         assert off_path(results, "replay") < 1e-8 * way
+        assert np.abs(results["carried/trajectories/tip/error"]).max() < 1e-12
+        assert "off its path" in results.verdict["replay"].answer
         assert off_path(results, "without_patches") > 1e-4
         y = np.sin(np.pi / 4 * np.array([0.0, 1.0]) - np.pi / 8)
         assert np.abs(results["carried/points/arm.tip/position"][[0, -1], 1] - y).max() < 1e-12

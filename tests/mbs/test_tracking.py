@@ -4,6 +4,8 @@ The numbers are those of ../shared/tracking_notes.md, section 7: a soft strip of
 45°, septic timing, and the arm of the paper.
 """
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -82,6 +84,63 @@ def asked(servo, Phi_V, span, objective, limit, *, is_free=False, V_ref=200.0):
     limits = Limits(np.full(Phi_V.shape[1], limit), np.full(1, np.inf))
     rest = tuple(equilibrium(servo, t) for t in span)
     return Transition(servo, Phi_V, limits, Weights(0.4, V_ref, 0.005), rest, objective, is_free)
+
+
+class OneMode:
+    """m p̈ + d ṗ + k p = f ÿ + b V for y = 1e-5 σ(t/0.1), σ of seventh degree."""
+
+    m, d, k, f, b = -0.13765154622696, 0.20672227218342, 427.34097816676604, 0.26436631797, -0.0012390036504
+    scale, mode_sizes = np.array([np.sqrt(k / -m)]), np.ones(1)
+    where = doubt = ""
+
+    def residuals(self, times, p, v, a):
+        s = np.asarray(times)[:, None] / 0.1
+        acceleration = 1e-5 / 0.1**2 * (420 * s**2 - 1680 * s**3 + 2100 * s**4 - 840 * s**5)
+        return self.m * a + self.d * v + self.k * p - self.f * acceleration
+
+    def forces(self, times, p, v, a):
+        return self.residuals(times, p, v, a), 0 * p
+
+    def slopes(self, times, p, v, a):
+        return tuple(np.broadcast_to([[[x], [0.0]]], (len(times), 2, 1)) for x in (self.m, self.d, self.k))
+
+
+def test_closed_form_of_one_mode():
+    """Checkpoint 1: least ∫V², V free at both ends, from the matrix exponential of its Hamiltonian; order 2."""
+    times = np.array([0.0, 0.01, 0.02, 0.05, 0.08, 0.1])
+    expected = np.array([1.288481, 0.726347, 0.402254, -0.005867, -0.416134, -1.287267])
+    limits, rest = Limits(np.full(1, np.inf), np.full(1, np.inf)), (np.zeros(1), np.zeros(1))
+    asked = Transition(OneMode(), np.array([[OneMode.b]]), limits, Weights(1.0, 1.0, 0.0), rest, is_free=True)
+    found = [track(asked, np.linspace(0.0, 0.1, N + 1)) for N in (40, 80)]
+    assert all(one.converged for one in found)
+    off = [np.abs(one.voltage(times)[:, 0] - expected).max() for one in found]
+    assert off[1] < 4.5e-4 * 1.288481  # the notes: 6.4e-4 at N = 64, 1.6e-4 at 128
+    finest = (4 * found[1].voltage(times) - found[0].voltage(times))[:, 0] / 3
+    assert np.abs(finest - expected).max() < 2e-5
+    breaks, V = found[1].voltage.x, found[1].voltage(found[1].voltage.x)[:, 0]
+    mean_square = ((V[:-1] ** 2 + V[:-1] * V[1:] + V[1:] ** 2) * np.diff(breaks) / 3).sum() / 0.1
+    assert np.sqrt(mean_square) == pytest.approx(0.535967, abs=2e-4)
+
+
+@pytest.mark.parametrize(("T", "expected"), [(0.5, 129.4), (0.7, 35.3)])
+def test_least_voltage_of_the_paper(tmp_path, T, expected):
+    """Section 4: the paper's arm with four modes and ten patches a link, of which that table has no mesh: within 1 %."""
+    case = Path(__file__).parents[2] / "cases" / "two_link_tracking"
+    text = (case / "scene.toml").read_text(encoding="utf-8").replace("../two_link", str(case.parent / "two_link"))
+    timing, s = "(560*t**4 - 2688*t**5 + 4480*t**6 - 2560*t**7)", f"(t/{T})"
+    assert timing in text
+    text = text.replace(timing, f"(35*{s}**4 - 84*{s}**5 + 70*{s}**6 - 20*{s}**7)").replace("end = 0.5", f"end = {T}")
+    (tmp_path / "scene.toml").write_text(text[: text.index("# The same torques and voltages")], encoding="utf-8")
+    solution = prepare_spatial(tmp_path / "scene.toml", Watcher())
+    servo = make_spatial_servo(solution.model, T, "arm", lambda: True, 1.0)
+    per_volt = [modal_directions(servo.model, of_link.per_volt) for of_link in solution.patches.values()]
+    Phi_V = np.concatenate(per_volt)[:, servo.of_modes].T
+    asked = Transition(
+        servo, Phi_V, Limits(np.full(20, 200.0), np.full(2, np.inf)), Weights(50.0, 200.0, 0.005),
+        tuple(equilibrium(servo, t) for t in (0.0, T)), "least-voltage", is_free=True,
+    )  # fmt: skip
+    found = track(asked, graded(0.0, T, 64, grading=2.0))
+    assert 200.0 * found.share == pytest.approx(expected, rel=1e-2)
 
 
 @pytest.mark.parametrize(("intervals", "expected"), [(100, 53.7562), (200, 53.6953)])
