@@ -1,9 +1,10 @@
-"""A new kind of analysis is one file with its record, and one entry in the list of kinds."""
+"""A new kind of analysis, or type of joint, is one file with its record, and one entry in the list of them."""
 
 import subprocess
 import sys
 from pathlib import Path
 
+import ffrobot.mbs.joints.spatial.joints as joints
 import ffrobot.scene.kinds as kinds
 
 TOY = '''
@@ -38,27 +39,29 @@ class Turntable(TimedAnalysis):
         return Outcome(analysis=self, model=model, motion=Motion(self.times, q, v, 0 * v, nothing))
 '''
 
-SOLVE = """
+EDITED = """
 import sys
 import types
 
 import numpy as np
 
-from {name} import kinds_source
-module = types.ModuleType("ffrobot.scene.kinds")
-module.__package__ = "ffrobot.scene"
-sys.modules["ffrobot.scene.kinds"] = module
-exec(kinds_source, module.__dict__)
+from edited import source
+module = types.ModuleType("{module}")
+module.__package__ = "{package}"
+sys.modules["{module}"] = module
+exec(source, module.__dict__)
 
 import ffrobot
 from ffrobot.schema import schema
+"""
 
-ROD = {{"mass": 2.0, "inertia": 0.5, "center": [0.5, 0.0], "points": {{"root": [0.0, 0.0], "tip": [1.0, 0.0]}}}}
-KEYS = {{
-    "name": "toy", "gravity": [0.0, 0.0], "body": [{{"name": "rod", "rigid": ROD}}],
-    "joint": [{{"name": "O", "type": "revolute", "between": ["ground", "rod.root"]}}],
-}}
-TURN = {{"name": "turn", "kind": "turntable", "end": 1.0, "output_step": 0.25, "rate": 2.0, "body": "rod"}}
+SOLVE = """
+ROD = {"mass": 2.0, "inertia": 0.5, "center": [0.5, 0.0], "points": {"root": [0.0, 0.0], "tip": [1.0, 0.0]}}
+KEYS = {
+    "name": "toy", "gravity": [0.0, 0.0], "body": [{"name": "rod", "rigid": ROD}],
+    "joint": [{"name": "O", "type": "revolute", "between": ["ground", "rod.root"]}],
+}
+TURN = {"name": "turn", "kind": "turntable", "end": 1.0, "output_step": 0.25, "rate": 2.0, "body": "rod"}
 
 
 def rejected(**analysis):
@@ -73,10 +76,10 @@ np.testing.assert_allclose(results["turn/bodies/rod/angle"], 2.0 * np.linspace(0
 np.testing.assert_allclose(results["turn/points/rod.tip/position"][-1], [np.cos(2.0), np.sin(2.0)])
 assert dict(results.attributes("turn"))["kind"] == "turntable"
 
-solid = ROD | {{"inertia": [0.1, 0.5, 0.5], "center": [0.5, 0.0, 0.0]}}
-solid["points"] = {{"root": [0.0, 0.0, 0.0], "tip": [1.0, 0.0, 0.0]}}
-in_space = KEYS | {{"space": "spatial", "gravity": [0.0, 0.0, 0.0], "body": [{{"name": "rod", "rigid": solid}}]}}
-in_space["joint"] = [KEYS["joint"][0] | {{"axis": [0.0, 0.0, 1.0]}}]
+solid = ROD | {"inertia": [0.1, 0.5, 0.5], "center": [0.5, 0.0, 0.0]}
+solid["points"] = {"root": [0.0, 0.0, 0.0], "tip": [1.0, 0.0, 0.0]}
+in_space = KEYS | {"space": "spatial", "gravity": [0.0, 0.0, 0.0], "body": [{"name": "rod", "rigid": solid}]}
+in_space["joint"] = [KEYS["joint"][0] | {"axis": [0.0, 0.0, 1.0]}]
 turned = ffrobot.solve(ffrobot.make_scene(**in_space, analysis=[TURN]))
 np.testing.assert_allclose(turned["turn/joints/O/coordinate"], 2.0 * np.linspace(0.0, 1.0, 5))
 np.testing.assert_allclose(turned["turn/points/rod.tip/position"][-1], [np.cos(2.0), np.sin(2.0), 0.0], atol=1e-14)
@@ -88,17 +91,119 @@ assert "Turntable" in schema("scene")["$defs"]
 """
 
 
-def test_a_kind_is_a_file_and_an_entry(tmp_path):
-    """The edit that a developer makes to the list is made here, in a process of its own."""
-    source = Path(kinds.__file__).read_text(encoding="utf-8")
-    entry = "AnyKind = "
-    assert source.count(entry) == 1
-    source = source.replace(entry, f"from turntable import Turntable\n\n{entry}Turntable | ")
-    (tmp_path / "turntable.py").write_text(TOY, encoding="utf-8")
-    (tmp_path / "edited.py").write_text(f"kinds_source = {source!r}\n", encoding="utf-8")
-    program = SOLVE.format(name="edited")
-    done = subprocess.run([sys.executable, "-c", program], cwd=tmp_path, capture_output=True, text=True, check=False)
+SLOT = '''
+"""A pin in a slot of another body."""
+
+from typing import Annotated, ClassVar, Literal
+
+import numpy as np
+
+from ffrobot.common.rotations import exponential, of_quaternion, quaternions
+from ffrobot.mbs.fields.field_types import Vector2, Vector3
+from ffrobot.mbs.fields.spelling import Spelled, place
+from ffrobot.mbs.joints.spatial.joint import Along, Held, Place
+from ffrobot.mbs.joints.spatial.moving_joint import AxialJoint
+
+
+class SlotJoint(AxialJoint):
+    """The second point slides along `axis` of the first side, m, and turns freely there."""
+
+    type: Literal["slot"]
+    axis: Annotated[Vector3, Spelled(Vector2, place)]
+    """Direction of the slot in the axes of the first of `between`, of any length."""
+
+    units = ("m",)
+    q_count = 5
+    freedoms = 4
+    held = (Held("slide", 0), Held("slide", 1))
+    along = (Along("slide", 2),)
+    locates: ClassVar[bool] = False  # it leaves a place open: loops are cut here
+
+    def place(self, q):
+        return Place(q[..., :1] * np.eye(3)[2], of_quaternion(q[..., 1:]))
+
+    def motion(self, q):
+        turning = np.concatenate([np.zeros((*q.shape[:-1], 3, 3)), of_quaternion(q[..., 1:])], axis=-2)
+        return np.concatenate([np.broadcast_to(np.eye(6)[:, 2:3], (*q.shape[:-1], 6, 1)), turning], axis=-1)
+
+    def state(self, coordinates):
+        return np.concatenate([coordinates, quaternions(exponential(np.zeros(3)))])
+'''
+
+QUICK_RETURN = """
+r, d, w = 0.3, 0.5, 2.0  # crank, way between the pins on the ground, rate of the crank
+
+
+def rod(n, length):
+    inertia = {2: 0.1, 3: [0.01, 0.1, 0.1]}[n]
+    points = {"root": [0.0] * n, "tip": [length] + [0.0] * (n - 1)}
+    return {"mass": 2.0, "inertia": inertia, "center": [length / 2] + [0.0] * (n - 1), "points": points}
+
+
+def mechanism(n, **changed):
+    axis = {"axis": [0.0, 0.0, 1.0]} if n == 3 else {}
+    along = [1.0] + [0.0] * (n - 1)
+    slot = {"name": "S", "type": "slot", "between": ["arm.root", "crank.tip"], "axis": along} | changed
+    return ffrobot.make_scene(
+        name="quick return", space={2: "planar", 3: "spatial"}[n], gravity=[0.0] * n,
+        body=[{"name": "crank", "rigid": rod(n, r)}, {"name": "arm", "rigid": rod(n, 1.0)}],
+        joint=[
+            {"name": "O", "type": "revolute", "between": ["ground", "crank.root"], "motor": True} | axis,
+            {"name": "A", "type": "revolute", "between": ["ground", "arm.root"], "at": [0.0, -d, 0.0][:n]} | axis,
+            slot,
+        ],
+        initial={"joints": {"O": 0.2, "A": 1.0}},
+        trajectory=[{"name": "turn", "joint": "O", "value": f"0.2+{w}*t"}],
+        analysis=[{"name": "inverse", "kind": "pcid", "end": 2.0, "output_step": 0.1, "tolerance": 1e-9}],
+    )
+
+
+for n in (2, 3):
+    results = ffrobot.solve(mechanism(n))
+    crank = 0.2 + w * results["inverse/time"]
+    x, y = r * np.cos(crank), r * np.sin(crank) + d
+    np.testing.assert_allclose(results["inverse/joints/A/coordinate"], np.arctan2(y, x), atol=1e-8)
+    np.testing.assert_allclose(results["inverse/joints/S/coordinate"], np.hypot(x, y), atol=1e-8)
+    # Power of the crank's motor is that of the arm, J φ' φ'': nothing else speeds up.
+    N, D = r * w * (x * np.cos(crank) + y * np.sin(crank)), x**2 + y**2
+    rate = N / D
+    acceleration = (w**2 * d * x - rate * 2 * r * w * (y * np.cos(crank) - x * np.sin(crank))) / D
+    power = (0.1 + 2.0 * 0.5**2) * rate * acceleration
+    np.testing.assert_allclose(results["inverse/joints/O/moment"] * w, power, atol=1e-7 * np.abs(power).max())
+
+for n, line in ((2, "axis: expected at most 2 entries, found [1.0, 0.0, 0.0]"), (3, "axis: expected a list with more")):
+    try:
+        mechanism(n, axis=[1.0, 0.0, 0.0][: 5 - n])
+    except ffrobot.InputError as error:
+        assert f'joint "S": {line}' in str(error), error
+    else:
+        raise AssertionError(n)
+assert {"SlotJoint", "SlotJointInPlane"} <= set(schema("scene")["$defs"])
+"""
+
+
+def solved_with(entry, module, own, program, folder):
+    """In a process of its own, with the edit that a developer makes to the list in `module`."""
+    source = Path(module.__file__).read_text(encoding="utf-8")
+    before, after = entry
+    assert source.count(before) == 1
+    source = source.replace(before, after)
+    name, content = own
+    (folder / f"{name}.py").write_text(content, encoding="utf-8")
+    (folder / "edited.py").write_text(f"source = {source!r}\n", encoding="utf-8")
+    text = EDITED.format(module=module.__name__, package=module.__package__) + program
+    done = subprocess.run([sys.executable, "-c", text], cwd=folder, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
+
+
+def test_a_kind_is_a_file_and_an_entry(tmp_path):
+    entry = "AnyKind = ", "from turntable import Turntable\n\nAnyKind = Turntable | "
+    solved_with(entry, kinds, ("turntable", TOY), SOLVE, tmp_path)
+
+
+def test_a_type_of_joint_is_a_file_and_an_entry(tmp_path):
+    entry = "    SpatialRevolute\n", "    SpatialRevolute\n    | __import__('slot').SlotJoint\n"
+    solved_with(entry, joints, ("slot", SLOT), QUICK_RETURN, tmp_path)
 
 
 def test_every_kind_says_what_it_is():

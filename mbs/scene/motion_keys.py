@@ -148,12 +148,6 @@ class MotionKeys(Record):
         if self.profile == "trapezoid" and self.jerk is not None:
             raise ValueError('expected no "jerk" with profile = "trapezoid" (its acceleration jumps), found it')
 
-    def motion(self, waypoints: Waypoints | None) -> Piecewise | None:
-        """The motion of all components; None where it is given by expressions."""
-        if waypoints is not None:
-            return self.along_table(waypoints)
-        return None if self.via is None else self.through(np.array(self.via, dtype=float).reshape(len(self.via), -1))
-
     def along_table(self, waypoints: Waypoints) -> Piecewise:
         """The motion of all columns of a table."""
         if self.profile in (None, "spline"):

@@ -49,15 +49,6 @@ class Topology:
         """Whether the joints form trees."""
         return not self.loop_joints
 
-    @property
-    def grounded(self) -> dict[str, Carrier]:
-        """The carriers of bodies that hang from the ground, nearest first."""
-        found: dict[str, Carrier] = {}
-        for body, carrier in self.carriers.items():
-            if carrier is not None and (carrier.parent == GROUND or carrier.parent in found):
-                found[body] = carrier
-        return found
-
 
 def spanning_forest(bodies: Sequence[str], joints: Sequence[Edge]) -> Topology:
     """The topology of `joints` between `bodies`: trees grow from the ground, then from each body left, in their order.

@@ -1,1 +1,1 @@
-"""Joints in space, one file for each type: its keys, its triads, where it puts one section on the other."""
+"""Joints, one file for each type: its keys, its triads, where it puts one section on the other."""

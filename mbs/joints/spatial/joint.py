@@ -1,4 +1,4 @@
-"""What all types of joints in space have in common: two triads, and how the outer one stands on the inner one.
+"""What all types of joints have in common: two triads, and how the outer one stands on the inner one.
 
 Triads coincide where the coordinates are zero. Motion is along and about z, of universal joints about x of the inner
 triad and y of the outer one. `q` (…, q_count) and `v` (…, freedoms) are the core's (mbs/core/recursion/joint): of

@@ -1,4 +1,4 @@
-"""The types of joints that a scene in space may have."""
+"""The types of joints that a scene may have."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Joints in space that move along an axis: keys of the axis, of limits, motors and friction."""
+"""Joints that move along an axis: keys of the axis, of limits, motors and friction."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""The records of a scene in space, beside those of the plane."""
+"""The records of a scene; planar scenes are read by the same."""

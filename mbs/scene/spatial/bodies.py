@@ -1,4 +1,4 @@
-"""Bodies and payloads of a scene in space, key by key. SI units."""
+"""Bodies and payloads of a scene, key by key. SI units."""
 
 from __future__ import annotations
 

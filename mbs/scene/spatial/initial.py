@@ -1,4 +1,4 @@
-"""The initial state in a scene in space, key by key."""
+"""The initial state of a scene, key by key."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Given loads of a scene in space, key by key. SI units."""
+"""Given loads of a scene, key by key. SI units."""
 
 from __future__ import annotations
 

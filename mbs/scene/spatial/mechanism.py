@@ -1,4 +1,4 @@
-"""What a scene in space says of a mechanism: bodies, joints, trajectories, loads, and the state it starts from."""
+"""What a scene says of a mechanism: bodies, joints, trajectories, loads, and the state it starts from."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from .trajectories import SpatialTrajectory
 
 
 class SpatialMechanismKeys(Record):
-    """The keys of a scene in space that concern the mechanism; lists of tables keep the singular name of the file."""
+    """The keys of a scene that concern the mechanism; lists of tables keep the singular name of the file."""
 
     name: Title
     """Name of the scene."""

@@ -1,4 +1,4 @@
-"""Trajectories of a scene in space, key by key: motion that is specified. SI units; angles in rad."""
+"""Trajectories of a scene, key by key: motion that is specified. SI units; angles in rad."""
 
 from __future__ import annotations
 
