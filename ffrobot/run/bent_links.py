@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 from ..common.errors import InputError
-from ..mbs.quantities.second_order import missing_in_pieces
+from ..mbs.quantities.second_order import Missing, missing_in_pieces
 from ..mbs.quantities.validity import Bending
 from ..scene.pieces import BodyInPieces
 
@@ -32,7 +32,8 @@ def _in_pieces(piece: Bending, count: int) -> Bending:
 
 def shared_in_motion(bending: Mapping[str, Bending]) -> dict[str, Bending]:
     """How far links bend, none with smaller errors than the worst: what one does wrong moves and loads all others."""
-    worst = max((of.missing.of_deflections for of in bending.values()), default=0.0)
+    missing = [of.missing for of in bending.values()] or [Missing(0.0, 0.0)]
+    worst = Missing(*(max(errors) for errors in zip(*missing, strict=True)))
     return {name: replace(of, missing=of.missing.grown_to(worst)) for name, of in bending.items()}
 
 

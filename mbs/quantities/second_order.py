@@ -28,11 +28,12 @@ class Missing(NamedTuple):
     of_length: float
     of_deflections: float
 
-    def grown_to(self, of_deflections: float) -> Missing:
-        """With that error of deflections, of points in proportion."""
-        if not 0.0 < self.of_deflections < of_deflections:
+    def grown_to(self, worst: Missing) -> Missing:
+        """With the error of deflections of the `worst` link; of points in proportion, at most its error of points."""
+        if not 0.0 < self.of_deflections < worst.of_deflections:
             return self
-        return Missing(self.of_length / self.of_deflections * of_deflections, of_deflections)
+        in_proportion = self.of_length / self.of_deflections * worst.of_deflections
+        return Missing(max(self.of_length, min(in_proportion, worst.of_length)), worst.of_deflections)
 
 
 class Rotations(NamedTuple):

@@ -29,7 +29,7 @@ from .second_order import (
     missing_to_second_order,
 )
 from .spatial_motion import SpatialMotion
-from .stiffness_change import LoadedPoint, ModalLoads, stiffness_change
+from .stiffness_change import LoadedPoint, ModalLoads, StiffnessChange, stiffness_change
 
 NOTABLE = 0.01  # relative change of a link's stiffness from which on "auto" switches geometric stiffening on
 DEFLECTION_LIMIT = {False: 0.02, True: 0.05}  # of the length, from the chord; without and with geometric stiffening
@@ -143,9 +143,8 @@ def bending_in_space(motion: SpatialMotion, links: Mapping[str, ModalBody]) -> d
     for name, link in links.items():
         body, sizes = motion.node(name).body, loads[name].sizes if name in loads else {}
         p = motion.q[:, motion.node(name).p_q] @ body.modal_transform.T
-        run = LinkInRun(
-            p, body.modal_transform, _on_modes(link, body, sizes), body.stiffening is not None, motion.is_at_rest
-        )
+        on_modes = _on_modes(link, body, sizes) if body.n_modes else None
+        run = LinkInRun(p, body.modal_transform, on_modes, body.stiffening is not None, motion.is_at_rest)
         found[name] = bending_of_link(link, run, _largest_force(body, sizes, len(p)))
     return found
 
@@ -179,11 +178,11 @@ def _largest_force(body: SpatialBody, sizes: Mapping[str, Array], count: int) ->
 
 
 class LinkInRun(NamedTuple):
-    """A link in a run: p (T, n_file) of its file, which is T times that of the equations, and its loads."""
+    """A link in a run: p (T, n_file) of its file, which is T times that of the equations; its loads if it has modes."""
 
     p: Array
     T: Array
-    loads: ModalLoads
+    loads: ModalLoads | None
     is_stiffened: bool
     is_at_rest: bool
 
@@ -193,9 +192,11 @@ def bending_of_link(link: ModalBody, run: LinkInRun, force: Array) -> Bending:
     deflection, rotation, shortening = shape_from_chord(link, run.p)
     peaks = (deflection / link.length, rotation, shortening, force * shortening)
     w, phi, s, moment = (float(x.max(initial=0.0)) for x in peaks)
-    change = stiffness_change(run.loads)
+    change = StiffnessChange() if run.loads is None else stiffness_change(run.loads)
     rotations = largest_rotations(link, run.p)
-    if run.is_stiffened:
+    if run.loads is None:
+        missing = Missing(0.0, 0.0)
+    elif run.is_stiffened:
         missing = missing_to_second_order(largest_displacement(link, run.p), s / link.length, rotations, change.largest)
     else:
         p, stations = run.p @ np.linalg.pinv(run.T).T, link.stations.translation @ run.T
