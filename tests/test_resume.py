@@ -30,8 +30,8 @@ def arm(case_copy, ffrobot, monkeypatch):
 @pytest.mark.parametrize(
     ("stopped", "keys"),
     [
-        ("inverse", "tolerance = 1e-4"),
-        ("forward", "tolerance = 1e-4"),
+        ("inverse", "tolerance = 1e-3"),
+        ("forward", "tolerance = 1e-3"),
         ("inverse", 'tolerance = 1e-4\nintegrator = "dopri5"'),
     ],
 )
@@ -40,16 +40,16 @@ def test_a_resumed_run_is_the_uninterrupted_one(arm, stopped, keys):
 
     "auto" has tried Radau before: what it found, and steps by two methods to be replayed, go on as well.
     """
-    scene = arm(**{"tolerance = 1e-7": keys})
+    scene, after, end = arm(**{"tolerance = 1e-7": keys, "end = 1.0": "end = 0.2"}), 0.15, 0.2
     expected = ffrobot.solve(scene)
     assert (expected.attributes("inverse")["integrator"] == "dop853 after radau") == ("integrator" not in keys)
-    message = stop(scene, stopped, 0.03)
+    message = stop(scene, stopped, after)
     with h5py.File(scene.with_suffix(".h5")) as file:
         reached = file[stopped]["resume/checkpoint"].attrs["time"]
         outputs = len(file[stopped]["time"])
-    assert 0.03 <= reached < END
+    assert after <= reached < end
     assert message.endswith(f"solve(…, resume=True) resumes from t = {reached:.9g} s")
-    watcher = Stops("none", END)
+    watcher = Stops("none", end)
     results = go_on(scene, watcher)
     assert watcher.asked[0] == (f'analysis "{stopped}"', reached)
     for name, difference in differences(results, expected):

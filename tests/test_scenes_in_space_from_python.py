@@ -38,7 +38,7 @@ def moment(t):
 
 def test_results_in_memory():
     scene = ffrobot.make_scene(**PENDULUM)
-    assert isinstance(scene, ffrobot.SpatialScene)
+    assert isinstance(scene, ffrobot.Scene)
     with ffrobot.solve(scene) as results:
         t = results["inverse/time"]
         np.testing.assert_allclose(results["inverse/joints/pin/moment"], moment(t), rtol=1e-7)
@@ -59,7 +59,7 @@ def test_files_and_warnings(tmp_path):
 
     scene = tmp_path / "scene.toml"
     scene.write_text(tomli_w.dumps(PENDULUM | {"joint": [PENDULUM["joint"][0] | {"motor": False}]}))
-    assert isinstance(ffrobot.load_scene(scene), ffrobot.SpatialScene)
+    assert isinstance(ffrobot.load_scene(scene), ffrobot.Scene)
     with pytest.warns(ffrobot.FfrobotWarning, match="joints without motor: pin"):
         ffrobot.solve(scene, tmp_path / "out.h5").close()
     with ffrobot.Results(tmp_path / "out.h5") as results:
