@@ -20,7 +20,6 @@ from ..mbs.analysis.outcome import (
     TREE_VECTORS,
     Continuation,
     EarlierRun,
-    Forces,
     Motion,
     Outcome,
     Statistics,
@@ -98,7 +97,6 @@ def _earlier_run(file: Results, analysis: Analysis) -> EarlierRun:
     ends = row_of_numbers(file, f"{name}/step_ends") if file.has(f"{name}/step_ends") else np.zeros(0)
     return EarlierRun(
         Motion(file.time(name), q, v, a, multipliers),
-        Forces(),
         Statistics(about["status"], Choice(about["integrator"], about["integrator_reason"]), **counts, step_ends=ends),
         _continuation(file, analysis),
         f"{file.path}: {group}",

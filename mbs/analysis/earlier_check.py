@@ -13,8 +13,8 @@ from ...common.errors import InputError
 from .. import _core
 from .outcome import METHOD_HISTORY, STEPS, TREE_MEMORY, TREE_VECTORS, EarlierRun
 
-Datasets = Mapping[str, tuple[Array | None, int | None]]
-"""By name: numbers with one row per output, and how many columns are expected; None where they must not be there."""
+Datasets = Mapping[str, tuple[Array, int]]
+"""By name: numbers with one row per output, and how many columns are expected."""
 
 
 def check_earlier(
@@ -31,9 +31,7 @@ def check_earlier(
     kept.expect(fits, "time", "the times of the scene")
     kept.expect(not is_completed or outputs == len(times), "status", "a run up to its end")
     for name, (values, columns) in datasets.items():
-        kept.expect((values is None) == (columns is None), name, "forces where motors fit the mechanism")
-        if values is not None and columns is not None:
-            kept.numbers(name, values, (outputs, columns))
+        kept.numbers(name, values, (outputs, columns))
     kept.tree_checkpoint(point, *sizes)
     kept.expect(is_completed or point.steps.next_step > 0.0, "checkpoint", "a positive step")
     kept.expect(

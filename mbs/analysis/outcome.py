@@ -161,7 +161,6 @@ class EarlierRun:
     """
 
     motion: Motion
-    forces: Forces
     statistics: Statistics
     continuation: Continuation
     where: str

@@ -1,6 +1,6 @@
 """Compliant gears in 3D: what motors must do behind them for a motion found with rigid ones.
 
-The equations are those of the plane (`elastic_joints`), with the rotor's acceleration about its axis in space.
+The equations are those of `elastic_joints`, with the rotor's acceleration about its axis in space.
 """
 
 from __future__ import annotations

@@ -10,7 +10,6 @@ import numpy as np
 
 from ...common.arrays import Array, as_floats
 from .. import _core
-from .spatial_cut import CutCoordinate
 from .spatial_model import SpatialModel
 from .spatial_system import SpatialSystem
 from .spatial_tree import Section
@@ -73,11 +72,6 @@ class MotionForces:
     def of_row(self, number: int) -> tuple[Wrench, Wrench]:
         """What row no. `number` does to its sections a and b; nothing where it is a joint coordinate of the tree."""
         return _wrench(self.found.constraints, 2 * number), _wrench(self.found.constraints, 2 * number + 1)
-
-    def along_cut(self) -> list[tuple[CutCoordinate, Wrench, Wrench]]:
-        """What friction and loads along joints that close loops do to their sections a and b."""
-        wrenches = self.found.wrenches
-        return [(one, _wrench(wrenches, at.a), _wrench(wrenches, at.b)) for one, at in self.system.loaded_cut]
 
     @cached_property
     def at_points(self) -> list[list[tuple[Section, Wrench]]]:

@@ -16,7 +16,6 @@ from .._core import TimeFunction
 from ..fields.orientations import OrientationLaw
 from ..joints.transmission import Friction
 from ..scene.spatial.loads import OF_POINT, SpatialLoad
-from .spatial_cut import CutCoordinate
 from .spatial_drives import NO_DRIVES, Command, Drive, Drives, PointDrive
 from .spatial_frame_motors import held_forces
 from .spatial_model import SpatialModel
@@ -147,11 +146,6 @@ class SpatialSystem:
         """(T, rows) of the model from those of `integrated`: 0 of rows that this has not, as of dependent ones."""
         found = of_core if self.plane is None else of_core @ self.plane.spread.T
         return found * self.row_signs
-
-    @property
-    def loaded_cut(self) -> list[tuple[CutCoordinate, CutPlace]]:
-        """Coordinates of joints at which loops are cut along which something acts, and where."""
-        return list(zip(self._cut, self._parts.cut, strict=True))
 
     @property
     def sections(self) -> list[Section]:

@@ -19,10 +19,10 @@ def test_turns_are_counted():
         initial={"angles": {"a": 0.4, "b": -0.7}},
     )
     outcome = run(model, pcid(tolerance=1e-9))
-    t, (O, A) = outcome.time, (outcome.motion.joint(joint) for joint in "OA")
-    np.testing.assert_allclose(O[0][:, 0], 0.4 + 0.9 * np.sin(2 * t), atol=1e-10)
-    np.testing.assert_allclose(A[0][:, 0], -1.1 + 22 * t, atol=1e-10)
-    np.testing.assert_allclose(A[1][:, 0], 22.0, rtol=1e-9)
+    t, (first, second) = outcome.time, (outcome.motion.joint(joint) for joint in "OA")
+    np.testing.assert_allclose(first[0][:, 0], 0.4 + 0.9 * np.sin(2 * t), atol=1e-10)
+    np.testing.assert_allclose(second[0][:, 0], -1.1 + 22 * t, atol=1e-10)
+    np.testing.assert_allclose(second[1][:, 0], 22.0, rtol=1e-9)
 
 
 def test_way_of_a_slider():

@@ -54,7 +54,8 @@ def test_a_target_of_a_planar_arm_out_of_reach_is_told():
     ]
     scene = ffrobot.make_scene(
         name="rods", gravity=[0.0, 0.0], body=[{"name": name, "rigid": rod} for name in "ab"], joint=joints,
-        trajectory=[{"name": "tip", "point": "b.tip", "x": "750", "y": "250"}], initial={"angles": {"a": 0.3, "b": 1.2}},
+        trajectory=[{"name": "tip", "point": "b.tip", "x": "750", "y": "250"}],
+        initial={"angles": {"a": 0.3, "b": 1.2}},
         analysis=[{"name": "inverse", "kind": "pcid", "end": 0.1, "output_step": 0.01}],
     )  # fmt: skip
     said = rf'"tip" is {np.hypot(749.9, 249.8):.4g} m from joint "O" on the ground at t = 0 s, .* 1.4 m: are these m'

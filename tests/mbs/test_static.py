@@ -5,7 +5,6 @@ import pytest
 
 import ffrobot
 
-
 LINK = """
 name = "arm"
 [material]
