@@ -5,11 +5,9 @@ import pytest
 
 import ffrobot
 from ffrobot.actuation.feasibility import PatchFeasibility, Remedies
-from ffrobot.actuation.motors import judge_motors, path_jump
-from ffrobot.actuation.patches.patches import patch_array, with_patch_count
-from ffrobot.actuation.patches.voltages import solve_voltages
-from ffrobot.actuation.prediction import predicted_shift, unmet_modal_forces
-from ffrobot.run.solve import solve
+from ffrobot.actuation.motors import path_jump
+from ffrobot.actuation.patches.spatial_patches import link_patches, with_count
+from ffrobot.run.spatial import solve_spatial
 
 LIMIT = 200.0
 SCENE = """
@@ -25,9 +23,7 @@ link = "{link}"
 name = "O"
 type = "revolute"
 between = ["ground", "link.root"]
-moment_limit = 10.0
-speed_limit = 0.2
-power_limit = 1e3
+{motor}
 
 [[trajectory]]
 name = "turn"
@@ -52,6 +48,7 @@ kind = "{kind}"
 {times}
 """
 RUN = "end = 0.5\noutput_step = 0.01"
+MOTOR = "moment_limit = 10.0\nspeed_limit = 0.2\npower_limit = 1e3"
 TURN = 'joint = "O"\nvalue = "0.1*sin(2*t)"'
 
 
@@ -59,20 +56,26 @@ TURN = 'joint = "O"\nvalue = "0.1*sin(2*t)"'
 def arm(link_file, tmp_path_factory):
     """One horizontal link of the paper, its motor moved as `trajectory` says."""
 
-    def run(kind="fcid", times=f'shape = "zero"\n{RUN}', trajectory=TURN, limit=LIMIT, own="", load=""):
+    def run(kind="fcid", times=f'shape = "zero"\n{RUN}', trajectory=TURN, limit=LIMIT, own="", load="", motor=MOTOR):
         scene = tmp_path_factory.mktemp("scene") / "scene.toml"
         link = link_file("arm", "cantilever")
         scene.write_text(
-            SCENE.format(link=link, kind=kind, times=times, trajectory=trajectory, limit=limit, own=own, load=load)
+            SCENE.format(
+                link=link, kind=kind, times=times, trajectory=trajectory, limit=limit, own=own, load=load, motor=motor
+            )
         )
-        return solve(scene)
+        return solve_spatial(scene)
 
     return run
 
 
+def judged_of(solution):
+    return solution.analyses["motion"].actuation.feasibility
+
+
 def test_patches_peak_by_peak(arm):
     solution = arm(limit=3000.0)
-    judged = solution.analyses["motion"].feasibility.patches["link"]
+    judged = judged_of(solution).patches["link"]
     outcome = solution.outcomes["motion"]
     body = solution.bodies["link"].modal
     # What holds it straight: with a = θ̈ x + g cos θ, the modal forces S̄ g cos θ + h θ̈ against the weight and inertia.
@@ -108,24 +111,26 @@ def test_strain_under_a_static_load_is_that_of_the_beam(arm):
     x = np.linspace(0.025, 0.075, 201)  # the first patch
     M = 7850.0 * 0.025 * 0.015 * 9.81 * (1 - x) ** 2 / 2
     expected = (0.0075 + 0.75e-3) * M.mean() / (2.068427e11 * 0.025 * 0.015**3 / 12)
-    assert solution.analyses["motion"].feasibility.patches["link"].strain[0] == pytest.approx(
-        expected, rel=0.05
-    )  # of ten modes
+    assert judged_of(solution).patches["link"].strain[0] == pytest.approx(expected, rel=0.05)  # of ten modes
+
+
+def modal_forces(solution):
+    """(T, n) that patches have to supply."""
+    return solution.analyses["motion"].motion.motor_forces.modal["link"]
 
 
 @pytest.mark.parametrize("word", ["limit", "layers", "thickness"])
 def test_remedies_do(arm, word):
     """With the limit, layers or thickness named, and nothing else changed, the worst patch just suffices."""
     solution = arm()
-    array, outcome = solution.patches["link"], solution.outcomes["motion"]
-    remedies = solution.analyses["motion"].feasibility.patches["link"].remedies
-    assert solution.analyses["motion"].feasibility.patches["link"].factor.max() > 2.0
+    layout, F_p = solution.patches["link"].arrays["link"].layout, modal_forces(solution)
+    remedies = judged_of(solution).patches["link"].remedies
+    assert judged_of(solution).patches["link"].factor.max() > 2.0
 
     def factor(**keys):
-        layout = array.layout.model_copy(update=keys)
-        body, planar = solution.bodies["link"].modal, solution.bodies["link"].planar
-        other = patch_array(solution.scene.path, layout, body, planar)
-        return np.abs(solve_voltages(other, outcome.F_p).required / other.limit).max()
+        changed, body = layout.model_copy(update=keys), solution.bodies["link"]
+        other = link_patches(solution.scene.path, [changed], body.modal, body.carrying)
+        return np.abs(other.voltages(F_p)["link"].required / other.limit).max()
 
     match word:
         case "limit":
@@ -140,27 +145,26 @@ def test_remedies_do(arm, word):
 def test_number_of_patches_that_would_do(arm):
     """Found by trying; a limit between the needs of 10 and of 20 patches has an answer, a lower one has none."""
     solution = arm()
-    array, outcome = solution.patches["link"], solution.outcomes["motion"]
-    body, planar = solution.bodies["link"].modal, solution.bodies["link"].planar
+    layout, body = solution.patches["link"].arrays["link"].layout, solution.bodies["link"]
 
     def needs(count):
-        other = with_patch_count(solution.scene.path, array.layout, body, planar, count)
-        return other and np.abs(solve_voltages(other, outcome.F_p).required).max()
+        other = with_count(solution.scene.path, layout, body.modal, body.carrying, count)
+        return other and np.abs(other.voltages(modal_forces(solution))["link"].required).max()
 
     assert needs(21) is None  # 21 × 0.05 m on 1 m
     least = min(needs(count) for count in range(10, 21))
     assert least < needs(10)
-    between = arm(limit=0.5 * (least + needs(10))).analyses["motion"].feasibility.patches["link"].remedies
+    between = judged_of(arm(limit=0.5 * (least + needs(10)))).patches["link"].remedies
     assert 10 < between.count <= 20
     assert needs(between.count) <= 0.5 * (least + needs(10)) < needs(between.count - 1)
-    without = arm(limit=0.9 * least).analyses["motion"].feasibility.patches["link"].remedies
+    without = judged_of(arm(limit=0.9 * least)).patches["link"].remedies
     assert (without.count, without.most_count) == (0, 20)
     assert without.most_factor == pytest.approx(needs(20) / (0.9 * least), rel=1e-9)
 
 
 def test_motors_peak_by_peak(arm):
     """τ = J θ̈ + m g L/2 cos θ of a link held straight, θ̇ = 0.2 cos 2t, and their product."""
-    motor = arm().analyses["motion"].feasibility.motors["O"]
+    motor = judged_of(arm()).motors["O"]
     t = np.arange(51) * 0.01
     m = 7850.0 * 0.025 * 0.015
     theta, rate, acceleration = 0.1 * np.sin(2 * t), 0.2 * np.cos(2 * t), -0.4 * np.sin(2 * t)
@@ -174,11 +178,7 @@ def test_motors_peak_by_peak(arm):
 
 
 def test_motors_without_limits_are_never_short(arm):
-    solution = arm()
-    joints = {
-        "O": solution.scene.joint[0].model_copy(update=dict.fromkeys(("moment_limit", "speed_limit", "power_limit")))
-    }
-    motor = judge_motors(solution.outcomes["motion"], joints)["O"]
+    motor = judged_of(arm(motor="")).motors["O"]
     assert motor.factor == 0.0
     assert np.isnan(motor.saturation_time)
 
@@ -186,32 +186,27 @@ def test_motors_without_limits_are_never_short(arm):
 def test_predicted_shift_of_the_tip_is_what_happens(arm):
     """Held by its motor under its weight: patches at their limits against patches without, each solved statically."""
     straight = arm(times=f'shape = "zero"\n{RUN}', trajectory='joint = "O"\nvalue = "0"')
-    voltages = straight.analyses["motion"].voltages["link"]
+    voltages = straight.analyses["motion"].actuation.voltages["link"]
     tips = []
     for volts in (voltages.required[0], voltages.within_limit[0]):
         load = '\n[[load]]\npzt = "link"\nvoltage = [' + ", ".join(f'"{v!r}"' for v in volts.tolist()) + "]\n"
         held = arm(kind="static", times="", trajectory='joint = "O"\nvalue = "0"', load=load)
-        outcome = held.outcomes["motion"]
-        tips.append(outcome.q[0, 3:] @ outcome.assembly.model.body("link").points["tip"].translation[1])
+        tips.append(held.analyses["motion"].motion.point("link.tip").deflection[0, 1])
     assert abs(tips[0]) < 1e-12  # straight
     np.testing.assert_allclose(
-        straight.analyses["motion"].predicted_shift["link.tip"][0], [0.0, tips[1]], rtol=1e-9, atol=1e-15
+        straight.analyses["motion"].predicted_shift["link.tip"][0], [0.0, tips[1], 0.0], rtol=1e-9, atol=1e-15
     )
 
 
 def test_predicted_shift_of_an_inclined_tip(arm):
     """The shift across the link is the deflection that unmet modal forces leave."""
     solution = arm(trajectory='point = "link.tip"\ny = "0.1*sin(2*t)"')
-    outcome = solution.outcomes["motion"]
-    unmet = unmet_modal_forces(outcome, solution.analyses["motion"].voltages)
-    np.testing.assert_array_equal(unmet, solution.analyses["motion"].voltages["link"].unmet)
-    body = outcome.assembly.model.body("link")
-    deflection = -(unmet / body.stiffness) @ body.points["tip"].translation[1]
-    theta = outcome.q[:, 2]
-    expected = deflection[:, None] * np.column_stack([-np.sin(theta), np.cos(theta)])
-    shift = predicted_shift(outcome, unmet)["link.tip"]
-    np.testing.assert_allclose(shift, expected, atol=1e-9 * np.abs(expected).max())
-    np.testing.assert_array_equal(shift, solution.analyses["motion"].predicted_shift["link.tip"])
+    result, body = solution.analyses["motion"], solution.bodies["link"].carrying
+    unmet = result.actuation.unmet["link"]
+    deflection = -(unmet @ body.modal_transform / body.stiffness) @ body.points["tip"].translation[1]
+    theta = result.motion.angle("link")
+    expected = deflection[:, None] * np.column_stack([-np.sin(theta), np.cos(theta), 0 * theta])
+    np.testing.assert_allclose(result.predicted_shift["link.tip"], expected, atol=1e-9 * np.abs(expected).max())
 
 
 def test_rms_and_shares_of_time_by_hand(arm):
@@ -219,9 +214,9 @@ def test_rms_and_shares_of_time_by_hand(arm):
     solution = arm(
         times='shape = "zero"\nend = 3.141592653589793\noutput_step = 0.0015707963267948967',
         trajectory='joint = "O"\nvalue = "1e-3*sin(2*t)"',
+        motor="speed_limit = 1e-3",
     )
-    joint = solution.scene.joint[0].model_copy(update={"moment_limit": None, "power_limit": None, "speed_limit": 1e-3})
-    motor = judge_motors(solution.outcomes["motion"], {"O": joint})["O"]
+    motor = judged_of(solution).motors["O"]
     m = 7850.0 * 0.025 * 0.015
     swing = m / 3 * 4e-3  # amplitude of J θ̈; the weight's moment changes by θ²/2 only
     assert motor.rms_moment == pytest.approx(np.hypot(m * 9.81 / 2, swing / np.sqrt(2)), rel=1e-6)
@@ -237,8 +232,9 @@ def test_rms_and_shares_of_time_by_hand(arm):
     ],
 )
 def test_jump_of_a_path_is_seen(arm, value, jump):
-    outcome = arm(times='shape = "zero"\nend = 0.5\noutput_step = 0.01', trajectory=f'joint = "O"\nvalue = "{value}"')
-    assert path_jump(outcome.outcomes["motion"], 0) == jump
+    found = arm(times='shape = "zero"\nend = 0.5\noutput_step = 0.01', trajectory=f'joint = "O"\nvalue = "{value}"')
+    result = found.analyses["motion"]
+    assert path_jump(result.motion, result.analysis, 0) == jump
 
 
 def test_short_peaks_of_motors_only_are_laid_to_the_jerk():

@@ -1,53 +1,52 @@
 """Placement of patches: against gramians, closed forms of beams, and exhaustive search."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
-from mechanisms import make_model, revolute
+from planar_patches import SCENE, layout, patches, planar_body
 from scipy.linalg import solve_continuous_lyapunov
 
-from ffrobot.actuation.control.linear_model import linear_model
-from ffrobot.actuation.control.placement import patchable_link
-from ffrobot.actuation.control.placing import held_modes, place
+from ffrobot.actuation.control.linear_model import state_space
+from ffrobot.actuation.control.placing import PatchableLink, held_modes, place
 from ffrobot.actuation.control.records import Placement
-from ffrobot.actuation.patches.patches import patch_array
-from ffrobot.actuation.patches.records import PztLayout
 from ffrobot.common.errors import InputError
-from ffrobot.mbs.model.planar_body import from_modal_body
-from ffrobot.mbs.model.system import MechanismSystem
-from ffrobot.mbs.solve.initial_state import undeformed_state
-from ffrobot.mbs.solve.linearisation import linearise
-
-SCENE = Path("scene.toml")
+from ffrobot.mbs.model.spatial_model import build_spatial_model
+from ffrobot.mbs.solve.linearisation import SpatialLinearisation
+from ffrobot.scene.load import make_scene
 
 
 @pytest.fixture(scope="module")
 def arm(cantilever):
-    """One link on a motor: (modal body, planar body, linear model)."""
+    """One link on a motor: (modal body, planar body, linear model); modes are those of the file."""
     modal = cantilever(6)
-    planar = from_modal_body("arm", modal)
-    model = make_model([planar], gravity=(0.0, 0.0), joint=[revolute("hub", "ground", "arm.root")])
-    q = undeformed_state(MechanismSystem(model, model.joints)).q
-    return modal, planar, linear_model(linearise(model, 0.0, q, 0 * q, 0 * q), {})
+    planar = planar_body(modal, "arm")
+    rigid = {"mass": 1.0, "inertia": 1.0, "center": [0.0, 0.0], "points": {"root": [0.0, 0.0]}}
+    scene = make_scene(
+        name="arm", gravity=[0.0, 0.0], body=[{"name": "arm", "rigid": rigid}],
+        joint=[{"name": "hub", "type": "revolute", "between": ["ground", "arm.root"]}],
+        analysis=[{"name": "linear", "kind": "linear"}],
+    )  # fmt: skip
+    model = build_spatial_model(scene, [planar])
+    rest = np.zeros(model.tree.n_v)
+    return modal, planar, state_space(SpatialLinearisation(model, rest).at(0.0, rest, rest, rest), {})
 
 
-def layout(**keys):
-    return PztLayout(
-        body="arm", length=0.05, width=0.025, thickness=7.5e-4, modulus=63e9, d31=1.1e-10, structural=False, **keys
-    )
+def link_of(modal, planar, count):
+    def elsewhere(**changes):
+        return patches(modal, planar, allocation="least-squares", **({"count": count} | changes))
+
+    own, wanted = np.eye(planar.n_modes), layout("arm", count=count)
+    return PatchableLink("arm", modal.length, ("arm",), wanted, planar.stiffness, planar.n_modes, own, elsewhere)
 
 
 def placed(arm, count, F_p=None, **keys):
     modal, planar, model = arm
     wanted = Placement(body="arm", count=count, **keys)
-    link = patchable_link(SCENE, layout(count=count), modal, planar)
-    return place(SCENE, wanted, link, None if F_p is not None else model, F_p)
+    return place(SCENE, wanted, link_of(modal, planar, count), None if F_p is not None else model, F_p)
 
 
 def test_held_modes_are_those_of_the_clamped_link(arm):
     modal, planar, model = arm
-    reach = held_modes(model, patchable_link(SCENE, layout(count=1), modal, planar), 3)
+    reach = held_modes(model, link_of(modal, planar, 1), 3)
     np.testing.assert_allclose(reach.frequency, np.sqrt(planar.stiffness[:3]) / (2 * np.pi), rtol=1e-9)
     np.testing.assert_allclose(reach.share, 1.0, rtol=1e-9)
 
@@ -68,7 +67,7 @@ def test_reach_is_what_the_gramian_grows_with(arm):
     found = placed(arm, 2, modes=3)
     ratios = []
     for centers in (found.best.centers, found.even.centers):
-        B = patch_array(SCENE, layout(centers=tuple(centers), allocation="least-squares"), modal, planar).Phi_V
+        B = patches(modal, planar, centers=tuple(centers), allocation="least-squares").Phi_V
         omega, n = np.sqrt(planar.stiffness), planar.n_modes
         A = np.block([[np.zeros((n, n)), np.diag(omega)], [-np.diag(omega), -np.diag(2e-4 * omega)]])
         gramian = solve_continuous_lyapunov(A, -np.vstack([0 * B, B]) @ np.vstack([0 * B, B]).T)
