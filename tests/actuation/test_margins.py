@@ -200,10 +200,10 @@ def test_a_loop_that_diverges_says_why_and_what_to_start_with():
     }  # fmt: skip
     rest = {"name": "rest", "kind": "pcid", "end": 1.0, "output_step": 0.01}
     path = [{"name": "still", "joint": "J0", "value": "0.3"}]
-    start = {"name": "start", "kind": "linear", "about": "rest", "times": [0.0]}
+    linear = {"name": "linear", "kind": "linear", "about": "rest", "times": [0.0]}
 
     def arm(loop):
-        return solve_spatial(links(np.random.default_rng(3), 1, 0.2, [0.0], [rest, start, loop], trajectory=path))
+        return solve_spatial(links(np.random.default_rng(3), 1, 0.2, [0.0], [rest, linear, loop], trajectory=path))
 
     solution = arm(loop)
     record = solution.outcomes["loop"].details
@@ -211,7 +211,7 @@ def test_a_loop_that_diverges_says_why_and_what_to_start_with():
     assert record.margins.radius > 1.0 > record.margins.gain
     advice = Results.from_image(spatial_image(solution), solution.scene.path).verdict["loop"].advice
     assert any("J0: no rotor_inertia to speak of" in text for text in advice)
-    assert light_roots(solution.outcomes["start"].details.models) == ["J0"]
+    assert light_roots(solution.outcomes["linear"].details.models) == ["J0"]
     (start,) = [text for text in advice if text.startswith("start with ")]
     P, D = (float(start.split(f"{what} = {{ J0 = ")[1].split(" }")[0]) for what in ("proportional", "derivative"))
     calm = {"kind": "joint-pid", "proportional": {"J0": P}, "derivative": {"J0": D}}
