@@ -20,7 +20,6 @@ from ..model.spatial_frame_motors import motor_commands
 from ..model.spatial_gears import with_compliance_in_space
 from ..model.spatial_model import SpatialModel, modal_directions, without_paths
 from ..scene.analysis import ActuatedAnalysis, Analysis, Need
-from ..scene.spatial.loads import OF_POINT
 from ..solve.spatial_statics import hanging_joints, initial_state
 from ..solve.state import State
 from .context import Context, PatchedLink
@@ -115,13 +114,10 @@ def _replayed(context: Context, source: Outcome, analysis: Forward) -> Replayed:
     model = source.model
     nothing = Command(np.zeros(model.tree.n_v))
     if analysis.apply == "trajectory":
-        found, joints, points = path_numbers(source)
+        found, joints, at_points, count = path_numbers(source)
         rows = [row for row in model.rows if row.is_trajectory and row.kind == "coordinate"]
         along = [Command(row.sign * np.eye(model.tree.n_v)[row.coordinate]) for row in rows]
-        at_points = {
-            point: {name: first + number for number, name in enumerate(OF_POINT)} for point, first in points.items()
-        }
-        return Replayed(found, (*along, *[nothing] * (len(OF_POINT) * len(points))), at_points, joints)
+        return Replayed(found, (*along, *[nothing] * (count - len(along))), at_points, joints)
     if analysis.apply == "points":
         chosen = list(context.at_points(source))
         at_points = {point: dict(zip("xyz", range(3 * k, 3 * k + 3), strict=True)) for k, point in enumerate(chosen)}

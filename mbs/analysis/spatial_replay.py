@@ -83,11 +83,15 @@ def _with_known_voltages(
 
 
 class OfPaths(NamedTuple):
-    """Forces that hold paths: by number along the coordinates of joints, and at points from a number on (6 each)."""
+    """Forces that hold paths: numbers along the coordinates of joints, and at points by component.
+
+    There are `count` numbers; those at points that no component has are zero.
+    """
 
     source: _core.ForceSource
     joints: Mapping[str, list[int]]
-    points: Mapping[str, int]
+    points: Mapping[str, Mapping[str, int]]
+    count: int
 
 
 def path_numbers(run: Outcome) -> OfPaths:
@@ -115,7 +119,12 @@ def path_numbers(run: Outcome) -> OfPaths:
     ways = [row.f for _, row, *_ in on_points if row.kind == "point"]
     are_in_plane = system.lie_in_plane(ways)  # else joints carry what is across it
     source = _found(run, reader, system if are_in_plane else None)
-    return OfPaths(source, joints, points)
+    turned = {point for _, row, point, _ in on_points if row.kind != "point"}
+    components = {
+        point: {name: first + k for k, name in enumerate(OF_POINT if point in turned else OF_POINT[:3])}
+        for point, first in points.items()
+    }
+    return OfPaths(source, joints, components, count)
 
 
 def _sides(model: SpatialModel, row: SpatialRow) -> Iterator[tuple[str, float]]:

@@ -94,6 +94,8 @@ class SpatialSystem:
         turning = [number for number, _ in self._turning]
         ground = [standing_marker(section, number in turning) for number, section in enumerate(self._ground)]
         wrenches = [_core.MarkerAt(*at) for at in self._wrenches]
+        for number, at in enumerate(wrenches):
+            at.only_forces = number not in self._with_moments(cut)
         self._parts = SpatialParts(bodies, ground, rows, wrenches, np.array(model.scene.gravity), cut)
 
     @cached_property
@@ -160,6 +162,12 @@ class SpatialSystem:
         """The model for motions under held inputs, without loads of the scene; rows must follow nothing."""
         parts = self._parts
         return _core.HeldModel(parts.bodies, parts.ground, parts.rows, parts.wrenches, parts.gravity, self.scene)
+
+    def _with_moments(self, cut: Sequence[CutPlace]) -> set[int]:
+        """Numbers of wrenches that may have a moment; where there is none, pins in the plane pass none on."""
+        at_points = (number for number, of in (*self._at_points, *self._numbers_at) if not set("xyz").issuperset(of))
+        of_motion = (number for number, _ in self._of_motion)
+        return {*at_points, *of_motion, *(number for place in cut for number in (place.a, place.b))}
 
     def _driven(self, commands: Sequence[Command]) -> Booleans:
         """(n_v,) along which coordinates given forces act, of which inverse analyses have none."""
@@ -256,6 +264,7 @@ class SpatialSystem:
         self._act_along_cut(scene, self._parts.cut if plane is None else plane.cut)
         scene.most_bent = [node.body.largest_moment for node in self.model.tree.nodes]
         scene.has_loops = bool(self.model.loop_rows.any())
+        scene.keeps_all_rows = not scene.has_loops  # `check_path` refuses paths whose rows depend on each other
         for number, law in self._turning:
             scene.turn_marker(number, _turning_law(law))
         return scene

@@ -159,3 +159,14 @@ def test_rigid_slides_in_two_directions_have_a_plane():
     system = SpatialSystem(model)
     np.testing.assert_array_equal(np.abs(system.plane.axes[2]), [0.0, 1.0, 0.0])
     assert_same(system, states(np.random.default_rng(3), model.tree))
+
+
+@pytest.mark.parametrize("kinds", [("beam",), ("supported",), ("beam", "rigid")])
+def test_forces_without_moments_on_pins(kinds):
+    """At points of chains whose joints then pass no moments on; with one at the last point they do."""
+    rng = np.random.default_rng(7)
+    force = {"x": parse_expression("1 + t"), "y": parse_expression("2 - t")}
+    for moment in ({}, {"mz": parse_expression("3*t")}):
+        load = ({"point": "b1.tip"} | force, {"point": "b3.side"} | force | moment)
+        system = SpatialSystem(planar_model(rng, ["revolute"] * 3, kinds, np.eye(3)[2], load=load))
+        assert_same(system, states(rng, system.model.tree))
