@@ -9,11 +9,8 @@
 // One function per folder of the core, in a file of that name; module.cpp calls them. Default arguments live in Python,
 // never here: only what may be absent is None.
 void bind_time_function(nanobind::module_ &m);
-void bind_constraint(nanobind::module_ &m);
-void bind_system(nanobind::module_ &m);
 void bind_integrate(nanobind::module_ &m);
-void bind_actuation(nanobind::module_ &m);
-void bind_analysis(nanobind::module_ &m);
+void bind_allocation(nanobind::module_ &m);
 void bind_recursion(nanobind::module_ &m);
 void bind_for_tests(nanobind::module_ &m); // of no use to the program
 

@@ -1,5 +1,4 @@
 // What tests alone look at: single pieces of the integrators, and a system with an orientation.
-#include "core/analysis/system_on_tree.h"
 #include "core/integrate/integrate.h"
 #include "core/space/rotation.h"
 
@@ -122,15 +121,6 @@ template <class Space> void bind_fixed_steps(nb::module_ &m) {
         "States after equal steps and in their middle (2 steps + 1, n_q + n_v), for convergence studies.");
 }
 
-RowMajorMatrix fixed_steps(const SystemOnTree &both, double end, int steps, const VectorXd &q, const VectorXd &v,
-                           MethodKind kind, double spectral_radius) {
-  check_size("q", q.size(), both.tree.n_q);
-  check_size("v", v.size(), both.tree.n_v);
-  TreeMotion motion(both.tree, both.scene, 0, q.data(), v.data());
-  motion.plan(end);
-  return equal_steps(motion, joined(q, v), end, steps, {kind, spectral_radius});
-}
-
 RowMajorMatrix top_fixed_steps(const Vector3d &inertia, const Vector3d &r, const Vector3d &f, double end, int steps,
                                const Eigen::Vector4d &q, const Vector3d &v, MethodKind kind, double spectral_radius) {
   Top top(inertia, r, f);
@@ -160,10 +150,8 @@ RowMajorMatrix top_motion(const Vector3d &inertia, const Vector3d &r, const Vect
 void bind_for_tests(nb::module_ &m) {
   bind_fixed_steps<recursion::Planar>(m);
   bind_fixed_steps<recursion::Spatial>(m);
-  m.def("fixed_steps", &fixed_steps, "both"_a, "end"_a, "steps"_a, "q"_a, "v"_a, "method"_a, "spectral_radius"_a,
-        "States of the tree after equal steps and in their middle (2 steps + 1, n_q + n_v), for convergence studies.");
   m.def("top_fixed_steps", &top_fixed_steps, "inertia"_a, "r"_a, "f"_a, "end"_a, "steps"_a, "q"_a, "v"_a, "method"_a,
-        "spectral_radius"_a, "As fixed_steps, of a heavy top: q = (w, x, y, z), v = omega in body axes.");
+        "spectral_radius"_a, "As tree_fixed_steps, of a heavy top: q = (w, x, y, z), v = omega in body axes.");
   m.def("top_motion", &top_motion, "inertia"_a, "r"_a, "f"_a, "times"_a, "q"_a, "v"_a, "controls"_a,
         "States (T, 7) of a heavy top.");
 }

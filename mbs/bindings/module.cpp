@@ -6,14 +6,11 @@ NB_MODULE(_core, m) {
   // pydantic and typing keep the types of their fields until after the interpreter has ended, which nanobind would
   // report as a leak.
   nanobind::set_leak_warnings(false);
-  m.doc() = "Compiled core of ffrobot: planar floating-frame dynamics.";
+  m.doc() = "Compiled core of ffrobot: floating-frame dynamics in joint coordinates, in the plane and in space.";
   m.attr("build") = FFROBOT_BUILD; // compiler and flags
   bind_time_function(m);
-  bind_constraint(m);
-  bind_system(m);
   bind_integrate(m);
-  bind_actuation(m);
-  bind_analysis(m);
+  bind_allocation(m);
   bind_recursion(m);
   bind_for_tests(m);
 }

@@ -198,6 +198,7 @@ template <class Space> auto bind_model(nb::module_ &m, const char *name, const c
 
 void bind_recursion(nb::module_ &m) {
   bind_tree_data(m);
+  bind_state_function(m);
   nb::class_<Derivatives>(m, "Derivatives", "Of accelerations a and rows, by increments of q, by v and by forces f.")
       .def_ro("a_q", &Derivatives::a_q)
       .def_ro("a_v", &Derivatives::a_v)
@@ -210,5 +211,5 @@ void bind_recursion(nb::module_ &m) {
   bind_tree_motion(m);
   bind_tree_sampled(m);
   bind_held_motion(m);
-  bind_system_run(m);
+  bind_prescribed(m);
 }

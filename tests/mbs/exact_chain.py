@@ -146,7 +146,7 @@ def errors(count, condition, modes, seed):
     a, lambda_ = tree.model.evaluate(q, v, target, None, None)
     A = tree.from_tree(q, v, a)[2]
     exact_a, exact_lambda = accelerations(
-        model.bodies, model.scene.gravity, q[first[:, 0]], v[first[:, 2]], p, p_rate, target[x_y]
+        model.bodies, model.scene.gravity[:2], q[first[:, 0]], v[first[:, 2]], p, p_rate, target[x_y]
     )
     return float(relative(lambda_[x_y], exact_lambda)), float(relative(A, exact_a))
 

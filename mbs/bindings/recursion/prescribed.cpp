@@ -1,7 +1,6 @@
 // Motions that are wholly prescribed, and what motors do in place of what holds them: mbs/core/recursion/
 // prescribed_motion.h and motors.h.
-#include "core/analysis/tree_outputs.h"
-#include "core/analysis/tree_replay.h"
+#include "core/recursion/prescribed_motion.h"
 
 #include <nanobind/stl/pair.h>
 #include <nanobind/stl/string.h>
@@ -135,16 +134,6 @@ Prescribed states_of(PrescribedMotion<Space> &motion, const std::vector<double> 
     }
   });
   return to;
-}
-
-Run planar_outputs(const SystemOnTree &both, PrescribedMotion<Planar> &motion, const std::vector<double> &times,
-                   const RowMajorMatrix &p, const RowMajorMatrix &p_dot, const RowMajorMatrix &p_ddot,
-                   const VectorXd &q) {
-  TreeOutputs outputs(both, times.size(), times.front(), motion.state().data(), nullptr);
-  std::size_t reached = 0;
-  at_positions(motion, {times, p, p_dot, p_ddot}, q.transpose(),
-               [&](Index i) { outputs(static_cast<std::size_t>(i), motion), ++reached; });
-  return {{}, outputs.take(reached), {}};
 }
 
 // each(i, motors, workspace) at postures q (T, n_q); markers that constraint equations follow are where they are at
@@ -284,9 +273,4 @@ void bind_prescribed(nb::module_ &m) {
       .def_ro("tau", &Prescribed::tau, "(T, motors) in place of these.")
       .def_ro("left", &Prescribed::left, "(T, n_v) what motors and loops leave of `required`.")
       .def_ro("loops", &Prescribed::loops, "(T, constraint equations of loops) their multipliers under the motors.");
-  nb::class_<PrescribedActuation, ActuationSource>(m, "PrescribedActuation", "Solved anew at every time.")
-      .def(nb::init<const SystemOnTree &, PrescribedMotion<Planar> &, std::vector<ModalShape>, VectorXd>(), "both"_a,
-           "motion"_a, "shape"_a, "q"_a, nb::keep_alive<1, 2>(), nb::keep_alive<1, 3>());
-  m.def("prescribed_outputs", &planar_outputs, "both"_a, "motion"_a, "times"_a, "p"_a, "p_dot"_a, "p_ddot"_a, "q"_a,
-        "What a run reports of a system in the plane, as far as positions were found, the first from q (n_q).");
 }

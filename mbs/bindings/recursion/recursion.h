@@ -9,7 +9,7 @@
 
 void bind_tree_data(nanobind::module_ &m);
 void bind_tree_motion(nanobind::module_ &m);
-void bind_system_run(nanobind::module_ &m); // of systems in the plane
+void bind_state_function(nanobind::module_ &m);
 void bind_prescribed(nanobind::module_ &m);
 void bind_tree_sampled(nanobind::module_ &m);
 void bind_held_motion(nanobind::module_ &m);

@@ -2,8 +2,8 @@
 // same steps, of a prescribed motion solved anew.
 #pragma once
 
-#include "core/actuation/allocation.h"
-#include "core/actuation/force_source.h"
+#include "core/analysis/allocation.h"
+#include "core/analysis/force_source.h"
 #include "core/integrate/recorded_motion.h"
 #include "core/recursion/prescribed_motion.h"
 

@@ -1,7 +1,7 @@
 // Forces of a source in another run: along its coordinates, and at points of its bodies.
 #pragma once
 
-#include "core/actuation/force_source.h"
+#include "core/analysis/force_source.h"
 #include "core/recursion/held_forces.h"
 #include "core/recursion/motion.h"
 

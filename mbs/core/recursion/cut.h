@@ -2,7 +2,7 @@
 // as a moment or force on the second one and its opposite on the first.
 #pragma once
 
-#include "core/constraint/constraint.h"
+#include "core/recursion/friction.h"
 #include "core/recursion/workspace.h"
 
 #include <vector>

@@ -4,10 +4,10 @@
 // columns of the recursion.
 #pragma once
 
-#include "core/constraint/constraint.h"
 #include "core/integrate/limit_watch.h"
 #include "core/integrate/ode.h"
 #include "core/recursion/cut.h"
+#include "core/recursion/friction.h"
 #include "core/recursion/held_forces.h"
 #include "core/recursion/loop_watch.h"
 #include "core/recursion/motion_norm.h"

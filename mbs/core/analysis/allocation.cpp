@@ -1,6 +1,6 @@
-#include "core/actuation/allocation.h"
+#include "core/analysis/allocation.h"
 
-#include "core/actuation/small_product.h"
+#include "core/linear/small_product.h"
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>

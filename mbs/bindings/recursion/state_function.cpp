@@ -1,8 +1,6 @@
-#include "core/constraint/measure.h"
-#include "core/constraint/state_force.h"
+// Forces of the user's, of how points move: mbs/core/recursion/point_force.h.
+#include "core/recursion/point_force.h"
 
-#include <nanobind/eigen/dense.h>
-#include <nanobind/nanobind.h>
 #include <nanobind/stl/function.h>
 #include <nanobind/stl/vector.h>
 
@@ -11,12 +9,11 @@
 #include <functional>
 #include <vector>
 
-#include "bindings/bindings.h"
+#include "bindings/recursion/recursion.h"
 
 namespace nb = nanobind;
 using namespace nb::literals;
 using namespace ffrobot;
-using Eigen::Vector2d;
 
 namespace {
 
@@ -48,23 +45,7 @@ Numbers called(const StateFunction &function, double t, const Numbers &position,
 
 } // namespace
 
-void bind_constraint(nb::module_ &m) {
-  nb::class_<MarkerReference>(m, "Marker", "A marker of a body (body index, marker index), or a point of the ground.")
-      .def(nb::init<int, int, Vector2d>(), "body"_a, "marker"_a, "ground"_a)
-      .def_ro("body", &MarkerReference::body)
-      .def_ro("marker", &MarkerReference::marker);
-  nb::enum_<MeasureKind>(m, "MeasureKind", "What is measured between two markers.")
-      .value("x", MeasureKind::x)
-      .value("y", MeasureKind::y)
-      .value("angle", MeasureKind::angle)
-      .value("slide", MeasureKind::slide)
-      .value("gear", MeasureKind::gear);
-  nb::class_<Measure>(m, "Measure", "A scalar function of the motion of two markers: that of b relative to a.")
-      .def(nb::init<MeasureKind, MarkerReference, MarkerReference, Vector2d, Vector2d, double>(), "kind"_a, "a"_a,
-           "b"_a, "direction"_a, "gear_ratios"_a, "offset"_a)
-      .def_ro("kind", &Measure::kind)
-      .def_ro("a", &Measure::a)
-      .def_ro("b", &Measure::b);
+void bind_state_function(nb::module_ &m) {
   nb::class_<StateFunction>(m, "StateFunction", "A force of the user's; see mbs/core/recursion/point_force.h.")
       .def("__call__", &called, "t"_a, "position"_a, "rate"_a, "Force and moment: N, N m.")
       .def_ro("is_planar", &StateFunction::is_planar)

@@ -1,0 +1,34 @@
+#include "core/analysis/allocation.h"
+
+#include <nanobind/eigen/dense.h>
+#include <nanobind/nanobind.h>
+
+#include "bindings/bindings.h"
+
+namespace nb = nanobind;
+using namespace nb::literals;
+using namespace ffrobot;
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+using RowMajorMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
+namespace {
+
+// Voltages (T, k) for modal forces (T, n), one after the other
+RowMajorMatrix allocate(Allocation &allocation, const RowMajorMatrix &F_p) {
+  RowMajorMatrix V(F_p.rows(), allocation.Phi().cols());
+  for (Index i = 0; i < F_p.rows(); ++i)
+    V.row(i) = allocation.solve(F_p.row(i).transpose()).transpose();
+  return V;
+}
+
+} // namespace
+
+void bind_allocation(nb::module_ &m) {
+  nb::class_<Allocation>(m, "Allocation", "Voltages within limits by bounded weighted least squares.")
+      .def(nb::init<MatrixXd, const MatrixXd &, MatrixXd, VectorXd, VectorXd>(), "Phi"_a, "W_sqrt"_a, "gain"_a,
+           "limit"_a, "scale"_a)
+      .def("solve", &allocate, "F_p"_a, "Voltages (T, k) for modal forces (T, n); each solve starts at the one before.")
+      .def_prop_ro("iterations", &Allocation::iterations);
+}
