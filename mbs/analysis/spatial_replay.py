@@ -85,13 +85,13 @@ def _with_known_voltages(
 class OfPaths(NamedTuple):
     """Forces that hold paths: numbers along the coordinates of joints, and at points by component.
 
-    There are `count` numbers; those at points that no component has are zero.
+    There are `total` numbers; those at points that no component has are zero.
     """
 
     source: _core.ForceSource
     joints: Mapping[str, list[int]]
     points: Mapping[str, Mapping[str, int]]
-    count: int
+    total: int
 
 
 def path_numbers(run: Outcome) -> OfPaths:

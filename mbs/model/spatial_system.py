@@ -263,8 +263,9 @@ class SpatialSystem:
             scene.add_gear(motor, joint, gear.sign, gear.stiffness, gear.damping)
         self._act_along_cut(scene, self._parts.cut if plane is None else plane.cut)
         scene.most_bent = [node.body.largest_moment for node in self.model.tree.nodes]
-        scene.has_loops = bool(self.model.loop_rows.any())
-        scene.keeps_all_rows = not scene.has_loops  # `check_path` refuses paths whose rows depend on each other
+        has_loops = bool(self.model.loop_rows.any())
+        scene.has_loops = has_loops and plane is not None  # in space round-off moves rows that hold by themselves
+        scene.keeps_all_rows = not has_loops  # `check_path` refuses paths whose rows depend on each other
         for number, law in self._turning:
             scene.turn_marker(number, _turning_law(law))
         return scene

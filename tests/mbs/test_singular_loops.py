@@ -1,4 +1,4 @@
-"""Loops whose equations turn dependent on the way, in the plane and in space: runs end there and say why."""
+"""Loops in a plane, declared or found, whose equations turn dependent on the way: runs end there and say why."""
 
 import numpy as np
 import pytest
