@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import ffrobot as library
-from ffrobot.run.solve import solve
+from ffrobot.run.spatial import solve_spatial
 
 GEARED = {"gear_ratio": 80.0, "rotor_inertia": 2e-5}
 
@@ -71,24 +71,22 @@ def three(payload, *later):
         {"name": "tip", "point": "link3.tip", **tip},
         {"name": "hand", "angle": "link3", "value": quintic(START[2], END[2], 1.2)},
     ]
-    return solve(chain(LENGTHS, HEIGHTS, START, payload, GEARED, trajectory, [run_for(1.2), *later]))
+    return solve_spatial(chain(LENGTHS, HEIGHTS, START, payload, GEARED, trajectory, [run_for(1.2), *later]))
 
 
 def one(*later):
     trajectory = [{"name": "tip", "point": "link1.tip", "y": quintic(-0.8 * np.sin(0.2), 0.8 * np.sin(0.5), 1.0)}]
-    return solve(chain((0.8,), (0.012,), (-0.2,), 0.5, {}, trajectory, [run_for(1.0), *later]))
+    return solve_spatial(chain((0.8,), (0.012,), (-0.2,), 0.5, {}, trajectory, [run_for(1.0), *later]))
 
 
 def miss(solution, name, point):
     """Distance (T,) m of the point in a run from where it is in "inverse"."""
-    from ffrobot.mbs.quantities.observation import point_motion
-
-    run, path = (point_motion(solution.outcomes[analysis], point).position for analysis in (name, "inverse"))
+    run, path = (solution.analyses[analysis].motion.point(point).position for analysis in (name, "inverse"))
     return np.linalg.norm(run - path[: len(run)], axis=1)
 
 
 def found(solution):
-    return solution.analyses["inverse"].feasibility.unsupplied
+    return solution.analyses["inverse"].actuation.feasibility.unsupplied
 
 
 @pytest.mark.parametrize(
@@ -122,13 +120,10 @@ def test_angles_kept(payload):
 def test_sag_at_the_start():
     """The equilibrium with the joint angles of t = 0 held, solved for by itself."""
     solution = one()
-    outcome = solution.outcomes["inverse"]
-    angle = float(outcome.q[0, 2])
+    angle = float(solution.analyses["inverse"].motion.angle("link1")[0])
     held = [{"name": "still", "joint": "J1", "value": f"{angle!r}"}]
-    static = solve(chain((0.8,), (0.012,), (-0.2,), 0.5, {}, held, [{"name": "inverse", "kind": "static"}]))
-    from ffrobot.mbs.quantities.observation import point_motion
-
-    tips = [point_motion(s.outcomes["inverse"], "link1.tip").position[0] for s in (solution, static)]
+    static = solve_spatial(chain((0.8,), (0.012,), (-0.2,), 0.5, {}, held, [{"name": "inverse", "kind": "static"}]))
+    tips = [s.analyses["inverse"].motion.point("link1.tip").position[0] for s in (solution, static)]
     assert np.linalg.norm(tips[1] - tips[0]) == pytest.approx(found(solution).at_start, rel=0.01)
 
 
@@ -149,7 +144,7 @@ def test_what_is_said(tmp_path):
 
 def test_a_joint_path_needs_nothing_besides_motors():
     trajectory = [{"name": "turn", "joint": "J1", "value": "0.3*(1-cos(3*t))"}]
-    result = solve(chain((0.8,), (0.012,), (0.0,), 0.5, {}, trajectory, [run_for(0.5)])).analyses["inverse"]
-    assert result.feasibility.unsupplied is None
-    assert result.feasibility.is_feasible
+    result = solve_spatial(chain((0.8,), (0.012,), (0.0,), 0.5, {}, trajectory, [run_for(0.5)])).analyses["inverse"]
+    assert result.actuation.feasibility.unsupplied is None
+    assert result.actuation.feasibility.is_feasible
     assert not result.predicted_shift

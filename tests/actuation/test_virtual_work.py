@@ -3,10 +3,8 @@
 import numpy as np
 import pytest
 
-from ffrobot.actuation.points import driving_forces
-from ffrobot.mbs.quantities.joint_space import motor_rates
-from ffrobot.mbs.quantities.observation import trajectory_force
-from ffrobot.run.solve import solve
+from ffrobot.actuation.spatial_points import driving_forces_in_space
+from ffrobot.run.spatial import solve_spatial
 
 SCENE = """
 name = "two_link"
@@ -96,7 +94,7 @@ def solved_with(link_file, tmp_path_factory):
         patches = "".join(PATCHES.format(body=body, own=pzt) for body in links)
         text = SCENE.format(motors=motors, patches=patches, points=POINTS.format(own=points), **links)
         scene.write_text(text)
-        return solve(scene)
+        return solve_spatial(scene)
 
     return run
 
@@ -115,38 +113,55 @@ def limited(solved_with):
 ANALYSES = ["inverse", "straight", "sagging"]
 
 
-def velocity(outcome, body):
-    return outcome.v[:, outcome.coordinates(body)]
+BODIES = ("link1", "link2")
 
 
-def driving_power(outcome):
-    """Q_a · q̇ of every body: (T, terms)."""
-    return np.column_stack(
-        [(driving_forces(outcome, body) * velocity(outcome, body)).sum(axis=1) for body in ("link1", "link2")]
-    )
+def velocity(result, body):
+    """(T, 6 + n): of the frame and its turn, in axes of the body, and p."""
+    moving, node = result.motion.body(body), result.motion.node(body)
+    F = result.motion.frames[result.motion.model.tree.index[body]].F
+    frame = [np.einsum("tji,tj->ti", F, of) for of in (moving.velocity, moving.angular_velocity)]
+    return np.column_stack([*frame, result.motion.v[:, node.p_v]])
 
 
-def motor_power(solution, outcome):
+def in_plane(result, body):
+    """(T, 3 + n): of (R, θ, p), R in global axes."""
+    moving, node = result.motion.body(body), result.motion.node(body)
+    frame = moving.velocity[:, :2], moving.angular_velocity[:, 2]
+    return np.column_stack([*frame, result.motion.v[:, node.p_v]])
+
+
+def Q_a_power(result, body):
+    return (driving_forces_in_space(result.run)[body] * velocity(result, body)).sum(axis=1)
+
+
+def driving_power(result):
+    """Q_a · q̇ of every body: (T, 2)."""
+    return np.column_stack([Q_a_power(result, body) for body in BODIES])
+
+
+def motor_power(solution, result):
     """Angles turn with the section or with the frame, as the scene says."""
     section = solution.scene.motors == "section"
 
     def turn(body, point):
-        v = velocity(outcome, body)
-        return v[:, 2] + (v[:, 3:] @ outcome.assembly.model.body(body).points[point].rotation if section else 0.0)
+        moving = in_plane(result, body)
+        of_section = result.motion.node(body).body.points[point].rotation[2]
+        return moving[:, 2] + (moving[:, 3:] @ of_section if section else 0.0)
 
     rates = np.column_stack([turn("link1", "root"), turn("link2", "root") - turn("link1", "tip")])
-    np.testing.assert_allclose(motor_rates(outcome), rates, atol=1e-12)
-    return outcome.tau * rates
+    found = np.column_stack([result.motion.joint(joint)[1] for joint in "OA"])
+    np.testing.assert_allclose(found, rates, atol=1e-12)
+    return np.column_stack([result.motion.motor_moments[joint] for joint in "OA"]) * rates
 
 
-def patch_power(solution, outcome, which):
+def patch_power(solution, result, which):
     """Of the patches of each link, and of the modal forces they leave unmet."""
     patches, unmet = [], []
-    for body, array in solution.patches.items():
-        voltages = solution.analyses[outcome.analysis.name].voltages[body]
-        p_dot = velocity(outcome, body)[:, 3:]
-        patches.append(((getattr(voltages, which) @ array.Phi_V.T) * p_dot).sum(axis=1))
-        unmet.append((voltages.unmet * p_dot).sum(axis=1))
+    for body, of_link in solution.patches.items():
+        voltages, p_dot = result.actuation.voltages[body], result.motion.body(body).modal_velocity
+        patches.append(((getattr(voltages, which) @ of_link.Phi_V.T) * p_dot).sum(axis=1))
+        unmet.append((result.actuation.unmet[body] * p_dot).sum(axis=1))
     return np.column_stack(patches), np.column_stack(unmet)
 
 
@@ -158,82 +173,79 @@ def check_sum_is_zero(*terms):
 
 
 def test_power_of_the_force_on_the_tip_is_that_of_Q_a(solution):
-    outcome = solution.outcomes["inverse"]
-    rate = -np.pi / 4 * np.sin(np.pi * outcome.time / 4)
+    result = solution.analyses["inverse"]
+    rate = -np.pi / 4 * np.sin(np.pi * result.run.time / 4)
     tip_velocity = np.outer(rate, [1.5, np.sqrt(3) / 2])
-    check_sum_is_zero((trajectory_force(outcome, "tip") * tip_velocity).sum(axis=1), -driving_power(outcome))
+    check_sum_is_zero((result.motion.path_force("tip") * tip_velocity).sum(axis=1), -driving_power(result))
 
 
 @pytest.mark.parametrize("analysis", ANALYSES)
 def test_power_of_motors_and_patches_is_that_of_Q_a(solution, analysis):
     """Joint forces do none."""
-    outcome = solution.outcomes[analysis]
-    patches, _ = patch_power(solution, outcome, "required")
-    check_sum_is_zero(motor_power(solution, outcome), patches, -driving_power(outcome))
+    result = solution.analyses[analysis]
+    patches, _ = patch_power(solution, result, "required")
+    check_sum_is_zero(motor_power(solution, result), patches, -driving_power(result))
 
 
 @pytest.mark.parametrize("analysis", ANALYSES)
 def test_power_at_the_actuation_points_is_that_of_Q_a(solution, analysis):
     """Thirteen components on each link, chosen by the program, carry all of Q_a."""
-    outcome = solution.outcomes[analysis]
-    for body in ("link1", "link2"):
-        chosen, forces = solution.points[body], solution.analyses[analysis].point_forces[body]
+    result = solution.analyses[analysis]
+    for body in BODIES:
+        chosen, forces = solution.points[body], result.point_forces[body]
         assert forces.rank == 13
         assert forces.condition_number < 1e4
         assert np.all(forces.residual <= 1e-11 * np.abs(forces.force).max())
-        terms = point_power(outcome, chosen, forces.force)
-        Q_a = (driving_forces(outcome, body) * velocity(outcome, body)).sum(axis=1)
+        terms, Q_a = point_power(result, chosen, forces.force), Q_a_power(result, body)
         if (body, analysis) == ("link1", "inverse"):  # no trajectory drives it
             assert not np.any(forces.force)
         else:  # the power of a link held straight is zero, that of its components is not
             check_sum_is_zero(terms, -Q_a)
 
 
-def point_power(outcome, chosen, force):
+def point_power(result, chosen, force):
     """F_a · ṙ of every component, with the velocity of its point from R + A (x + Φ p)."""
-    q, v = (x[:, outcome.coordinates(chosen.body)] for x in (outcome.q, outcome.v))
-    c, s, w = np.cos(q[:, 2]), np.sin(q[:, 2]), v[:, 2]
-    powers = []
+    node, moving, powers = result.motion.node(chosen.body), velocity(result, chosen.body), []
+    p = result.run.q[:, node.p_q]
     for point, direction, f in zip(chosen.points, chosen.direction.T, force.T, strict=True):
-        u = point.position + q[:, 3:] @ point.translation.T
-        u_dot = v[:, 3:] @ point.translation.T + w[:, None] * np.column_stack([-u[:, 1], u[:, 0]])
-        in_body = np.column_stack([c * v[:, 0] + s * v[:, 1], -s * v[:, 0] + c * v[:, 1]]) + u_dot
+        u = point.position + p @ point.translation.T
+        in_body = moving[:, :3] + np.cross(moving[:, 3:6], u) + moving[:, 6:] @ point.translation.T
         powers.append(f * (in_body @ direction))
     return np.column_stack(powers)
 
 
 @pytest.mark.parametrize("analysis", ["inverse", "straight"])
 def test_power_that_limits_leave_unmet_is_residual_times_velocity(limited, analysis):
-    outcome = limited.outcomes[analysis]
-    patches, unmet = patch_power(limited, outcome, "within_limit")
+    result = limited.analyses[analysis]
+    patches, unmet = patch_power(limited, result, "within_limit")
     assert np.abs(unmet).max() > 10 * np.abs(patches).max() or analysis == "straight"
-    assert np.abs(limited.analyses[analysis].voltages["link1"].within_limit).max() == 200.0
-    check_sum_is_zero(motor_power(limited, outcome), patches, unmet, -driving_power(outcome))
+    assert np.abs(result.actuation.voltages["link1"].within_limit).max() == 200.0
+    check_sum_is_zero(motor_power(limited, result), patches, unmet, -driving_power(result))
 
 
 @pytest.mark.parametrize("analysis", ANALYSES)
 def test_power_that_motors_alone_leave_unmet_is_that_of_the_modal_forces(solution, analysis):
-    outcome = solution.outcomes[analysis]
-    p_dot = np.hstack([velocity(outcome, body)[:, 3:] for body in ("link1", "link2")])
-    check_sum_is_zero(motor_power(solution, outcome), outcome.F_p * p_dot, -driving_power(outcome))
+    result = solution.analyses[analysis]
+    modal = result.motion.motor_forces.modal
+    left = np.hstack([modal[body] * result.motion.body(body).modal_velocity for body in BODIES])
+    check_sum_is_zero(motor_power(solution, result), left, -driving_power(result))
 
 
 @pytest.mark.parametrize("analysis", ANALYSES)
 def test_power_that_too_few_points_leave_unmet_is_residual_times_velocity(limited, analysis):
-    outcome = limited.outcomes[analysis]
-    for body in ("link1", "link2"):
-        forces = limited.analyses[analysis].point_forces[body]
+    result = limited.analyses[analysis]
+    for body in BODIES:
+        forces, Q_a = result.point_forces[body], Q_a_power(result, body)
         assert forces.force.shape == (6, 3)
-        Q_a = (driving_forces(outcome, body) * velocity(outcome, body)).sum(axis=1)
         if np.any(Q_a):
             assert forces.residual.max() > 1e-3
-            unmet = (forces.unmet * velocity(outcome, body)).sum(axis=1)
-            check_sum_is_zero(point_power(outcome, limited.points[body], forces.force), unmet, -Q_a)
+            unmet = (forces.unmet * in_plane(result, body)).sum(axis=1)
+            check_sum_is_zero(point_power(result, limited.points[body], forces.force), unmet, -Q_a)
 
 
 def test_checkpoint_of_voltages(solution):
     """At t = 0.1 s: kilovolts, of which link 1 needs none with motors at the frames."""
-    voltages = solution.analyses["inverse"].voltages
+    voltages = solution.analyses["inverse"].actuation.voltages
     expected = {"section": [91903.83, 76997.78, 22644.86], "frame": [0.0, 0.0, 0.0]}[solution.scene.motors]
     np.testing.assert_allclose(voltages["link1"].required[-1, [0, 3, 9]], expected, atol=1e-5 * 92000)
     np.testing.assert_allclose(
