@@ -124,7 +124,7 @@ def test_closed_form_of_one_mode():
 
 @pytest.mark.parametrize(("T", "expected"), [(0.5, 129.4), (0.7, 35.3)])
 def test_least_voltage_of_the_paper(tmp_path, T, expected):
-    """Section 4: the paper's arm with four modes and ten patches a link, of which that table has no mesh: within 1 %."""
+    """Section 4: the paper's arm with four modes and ten patches a link, to 1 % (it names no mesh)."""
     case = Path(__file__).parents[2] / "cases" / "two_link_tracking"
     text = (case / "scene.toml").read_text(encoding="utf-8").replace("../two_link", str(case.parent / "two_link"))
     timing, s = "(560*t**4 - 2688*t**5 + 4480*t**6 - 2560*t**7)", f"(t/{T})"
