@@ -20,15 +20,15 @@ MEASURED = """
 import json, sys, time
 sys.path[:0] = sys.argv[1:]
 from links import ANGLES, arm, arm_links
-from mechanisms import always, pcid
+from mechanisms import pcid
+from planar_runs import run
 from ffrobot.mbs import _core
-from ffrobot.mbs.analysis.pcid import run_pcid
 for line in sys.stdin:
     modes, integrator = json.loads(line)
     model = arm(arm_links(modes=modes, extra=2), initial={"angles": ANGLES})
     analysis = pcid(end=0.2, tolerance=1e-5, integrator=integrator)
     before = time.process_time()
-    statistics = run_pcid(model, analysis, False, always).statistics
+    statistics = run(model, analysis).statistics
     seconds = time.process_time() - before
     print(json.dumps([seconds, statistics.evaluations, _core.build]), flush=True)
 """

@@ -15,8 +15,6 @@ import argparse
 import numpy as np
 
 import ffrobot
-from ffrobot.mbs.quantities.observation import point_motion
-from ffrobot.run.solve import solve
 
 SWING = "(10*t**3 - 15*t**4 + 6*t**5)"
 PLAIN = {"attachment_modes": False}
@@ -68,10 +66,11 @@ def arm(modes, kept, payload, tolerance=1e-6):
 
 
 def quantities(scene):
-    """Tip (T, 2) m, moments (T, 2) N·m, statistics, and how far the tip is bent, m."""
-    outcome = solve(scene).analyses["swing"].outcome
-    tip = point_motion(outcome, "link2.tip")
-    return tip.position, outcome.tau, outcome.statistics, np.linalg.norm(tip.deflection, axis=1).max()
+    """Tip (T, 2) m, moments (T, 2) N·m, steps and solver time by name, and how far the tip is bent, m."""
+    with ffrobot.solve(scene) as results:
+        bent = np.linalg.norm(results["swing/points/link2.tip/deflection"], axis=1).max()
+        moments = np.column_stack([results[f"swing/joints/{joint}/moment"] for joint in "OA"])
+        return results["swing/points/link2.tip/position"], moments, results.attributes("swing"), bent
 
 
 def main():
@@ -87,13 +86,13 @@ def main():
     for _ in range(asked.repeat):
         for name, (modes, kept) in ROWS.items():
             found[name] = quantities(arm(modes, kept, asked.payload))
-            seconds[name] = min(seconds[name], found[name][2].wall_seconds)
+            seconds[name] = min(seconds[name], found[name][2]["wall_seconds"])
     reference = seconds[BEFORE]
     print(f"{'modes':22s} {'tip (mm)':>9s} {'O':>9s} {'A':>9s} {'steps':>7s} {'time':>6s}")
     for name, (tip, moments, statistics, _) in found.items():
         off = 1e3 * np.linalg.norm(tip - true_tip, axis=1).max()
         O, A = np.abs(moments - true_moments).max(axis=0) / peaks  # noqa: E741
-        print(f"{name:22s} {off:9.2e} {O:9.1e} {A:9.1e} {statistics.steps:7d} {seconds[name] / reference:6.2f}")
+        print(f"{name:22s} {off:9.2e} {O:9.1e} {A:9.1e} {statistics['steps']:7d} {seconds[name] / reference:6.2f}")
 
 
 if __name__ == "__main__":

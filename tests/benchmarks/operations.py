@@ -32,6 +32,13 @@ def build_core(folder):
     return next(folder.glob("_core_v3*.so"))
 
 
+def two_link():
+    from ffrobot.run.spatial import prepare_spatial
+    from ffrobot.run.watcher import Watcher
+
+    return prepare_spatial(SCENE, Watcher()).model
+
+
 def evaluate(core, count):
     """What the counted process does: the model, then `count` evaluations by the module at `core`."""
     import ffrobot.mbs
@@ -40,11 +47,10 @@ def evaluate(core, count):
     module = importlib.util.module_from_spec(spec)
     sys.modules[spec.name] = ffrobot.mbs._core = module
     spec.loader.exec_module(module)
-    from ffrobot.bench.evaluation import tree_evaluation_seconds
+    from ffrobot.bench.evaluation import evaluation_seconds
     from ffrobot.bench.hand_written import TIME, general_state
-    from ffrobot.run.prepare import prepare
 
-    tree_evaluation_seconds(general_state(prepare(SCENE).model), TIME, count)
+    evaluation_seconds(general_state(two_link()), TIME, count)
 
 
 def counted(*command):
@@ -83,13 +89,12 @@ def per_evaluation(command):
 
 def main():
     from ffrobot.bench.hand_written import FLAGS, HandWritten
-    from ffrobot.run.prepare import prepare
 
     with TemporaryDirectory() as name:
         folder = Path(name)
         core = build_core(folder / "core")
         flags = [TARGET if flag == "-march=native" else flag for flag in FLAGS]
-        program = HandWritten(ROOT, prepare(SCENE).model, folder, flags)
+        program = HandWritten(ROOT, two_link(), folder, flags)
         general = per_evaluation(lambda count: (sys.executable, __file__, core, count))
         by_hand = per_evaluation(lambda count: program.command(count, 0))
     print(f"{'of one evaluation':20} {'general':>10} {'by hand':>10} {'ratio':>6}")
