@@ -22,11 +22,11 @@ from ..fields.waypoints import spline
 from ..model.divided_link import DividedLink
 from ..model.spatial_body import SpatialBody
 from ..model.spatial_gears import refuse_held_motors
-from ..model.spatial_motors import driven_mechanism
+from ..model.spatial_motors import driven_mechanism, fastest_mechanism
 from ..scene.analysis import Check, Need, TimedAnalysis
 from ..solve.quasi_static import quasi_static_shape
 from ..solve.spatial_posture import check_path, mobility
-from ..solve.spatial_prescribed import prescribed_motion
+from ..solve.spatial_prescribed import PrescribedMotion, prescribed_by, prescribed_motion
 from ..solve.spatial_reach import check_reach
 from ..solve.spatial_redundancy import resolved
 from ..solve.spatial_start import undeformed_posture
@@ -110,10 +110,11 @@ def run_spatial_fcid(context: Context, analysis: Fcid) -> Outcome:
             f' mechanism has degrees of freedom ({freedom}) for "fcid", found {rows}'
         )
 
-    def equations(*, has_motors: bool = True) -> _core.SpatialPrescribedMotion:
-        return _core.SpatialPrescribedMotion(driven_mechanism(model, has_motors=has_motors), q)
+    def equations() -> _core.SpatialPrescribedMotion:
+        return _core.SpatialPrescribedMotion(driven_mechanism(model), q)
 
-    motion = equations(has_motors=sum(len(columns) for columns in model.motors.values()) == freedom)
+    has_motors = sum(len(columns) for columns in model.motors.values()) == freedom
+    motion = prescribed_by(fastest_mechanism(model, has_motors=has_motors), q)
     shape = _shape(context, analysis, motion, q)
 
     def at(times: Array) -> Outcome:
@@ -134,7 +135,7 @@ def run_spatial_fcid(context: Context, analysis: Fcid) -> Outcome:
     return replace(run, look_closer=look_closer)
 
 
-def _shape(context: Context, analysis: Fcid, motion: _core.SpatialPrescribedMotion, q: Array) -> Shape:
+def _shape(context: Context, analysis: Fcid, motion: PrescribedMotion, q: Array) -> Shape:
     """P(t) of all bodies; expressions are those of whole links."""
     path, whole = context.model.scene.path, context.whole
     bodies = [node.body for node in context.model.tree.nodes]
@@ -193,7 +194,7 @@ def given_shape_of_pieces(
 
 
 def prescribed_shape(
-    scene_path: Path, bodies: Bodies, analysis: Fcid, motion: _core.SpatialPrescribedMotion, posture: Array
+    scene_path: Path, bodies: Bodies, analysis: Fcid, motion: PrescribedMotion, posture: Array
 ) -> Shape:
     """p(t) of every body, with its derivatives; `posture` (n_q,) of the tree at the start.
 
@@ -206,9 +207,7 @@ def prescribed_shape(
     return [[ZERO] * body.n_modes for body in bodies]
 
 
-def _static(
-    scene_path: Path, bodies: Bodies, analysis: Fcid, motion: _core.SpatialPrescribedMotion, posture: Array
-) -> Shape:
+def _static(scene_path: Path, bodies: Bodies, analysis: Fcid, motion: PrescribedMotion, posture: Array) -> Shape:
     """A spline through static shapes: p is prescribed, so p, ṗ and p̈ only have to go with each other exactly."""
     nodes, stiffness = shape_nodes(analysis), np.concatenate([body.stiffness for body in bodies])
     p = quasi_static_shape(motion, stiffness, nodes, posture)

@@ -19,7 +19,6 @@ from pydantic import Field, model_validator
 from ...common.arrays import Array, as_floats, as_list
 from ...common.errors import InputError, SolveError
 from ...common.numbers import MOST_OUTPUTS
-from .. import _core
 from ..fields.field_types import NotNegative
 from ..fields.waypoints import spline
 from ..model.spatial_gears import refuse_held_motors
@@ -146,9 +145,6 @@ def _run(analysis: MotorsOnly, model: SpatialModel, inversion: Inversion[Spatial
     is_met = np.isfinite(found.q).all(axis=1)
     kept = slice(len(times) if is_met.all() else int(is_met.argmin()))
 
-    def equations() -> _core.SpatialPrescribedMotion:
-        return replace(servo).motion
-
     statistics = Statistics(
         inversion.status, Choice("collocation", ""), steps=len(curve.x) - 1, evaluations=inversion.iterations,
         cause=cause_of(inversion),
@@ -159,7 +155,7 @@ def _run(analysis: MotorsOnly, model: SpatialModel, inversion: Inversion[Spatial
         motion=Motion(times, found.q, found.v, found.a, found.loops).at(kept),
         forces=Forces(required=found.required).at(kept),
         statistics=statistics,
-        prescribed=Prescription(equations, inversion.shape, servo.near[0]),
+        prescribed=Prescription(servo.equations, inversion.shape, servo.near[0]),
     )
 
 

@@ -18,7 +18,6 @@ from pydantic import Field
 from ...common.arrays import Array, as_floats, as_list
 from ...common.errors import InputError, SolveError
 from ...common.validation import Record
-from .. import _core
 from ..fields.field_types import NotNegative, Positive
 from ..model.spatial_gears import refuse_held_motors
 from ..model.spatial_model import SpatialModel, modal_directions, without_paths
@@ -269,9 +268,6 @@ def _outcome(
     modes = curve(times), curve.derivative(1)(times), curve.derivative(2)(times)
     found = servo.motion.motion(as_list(times), *modes, servo.postures(times))
 
-    def equations() -> _core.SpatialPrescribedMotion:
-        return replace(servo).motion
-
     breaks = voltage.x
     return Outcome(
         analysis=analysis,
@@ -282,7 +278,7 @@ def _outcome(
             "completed", Choice("collocation", ""), steps=len(curve.x) - 1, evaluations=tracked.iterations
         ),
         prescribed=Prescription(
-            equations, shape_of(curve, servo.mode_counts), servo.near[0],
+            servo.equations, shape_of(curve, servo.mode_counts), servo.near[0],
             {body: (breaks, V) for body, V in _by_body(context, voltage(breaks)).items()},
         ),
     )  # fmt: skip

@@ -42,16 +42,25 @@ def driven_mechanism(model: SpatialModel, *, has_motors: bool = True) -> _core.S
     return driven
 
 
-def integrated_mechanism(system: SpatialSystem) -> _core.PlanarDriven | _core.SpatialDriven:
-    """The same with motors, as it is integrated: in the plane where all moves in one."""
+def fastest_mechanism(model: SpatialModel, *, has_motors: bool = True) -> _core.PlanarDriven | _core.SpatialDriven:
+    """The same; of open chains that move in a plane in it, where their constraint equations are the same."""
+    system = driven_system(model)
+    if model.loop_rows.any() or system.plane is None:
+        return driven_mechanism(model, has_motors=has_motors)
+    return integrated_mechanism(system, has_motors=has_motors)
+
+
+def integrated_mechanism(system: SpatialSystem, *, has_motors: bool = True) -> _core.PlanarDriven | _core.SpatialDriven:
+    """The same as it is integrated: in the plane where all moves in one."""
     (core, scene, rows), model = system.integrated, system.model
     is_path = [model.rows[k].is_trajectory for k in rows]
+    driven: _core.PlanarDriven | _core.SpatialDriven
     if isinstance(core, _core.PlanarModel):
-        in_plane = _core.PlanarDriven(core, scene, is_path)
-        _add_motors(in_plane, model)
-        return in_plane
-    driven = _core.SpatialDriven(core, scene, is_path)
-    _add_motors(driven, model)
+        driven = _core.PlanarDriven(core, scene, is_path)
+    else:
+        driven = _core.SpatialDriven(core, scene, is_path)
+    if has_motors:
+        _add_motors(driven, model)
     return driven
 
 

@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from ...common.arrays import Array, as_list
-from .. import _core
+from .spatial_prescribed import PrescribedMotion
 
 MOST_ITERATIONS = 100
 SETTLED = 1e-14  # of a shape's size: what the next step would change
 TINY = 1e-300
 
 
-def quasi_static_shape(motion: _core.SpatialPrescribedMotion, stiffness: Array, times: Array, posture: Array) -> Array:
+def quasi_static_shape(motion: PrescribedMotion, stiffness: Array, times: Array, posture: Array) -> Array:
     """Shapes p (T, n) of all bodies at `times` (T,) with which nothing is left on modes, by p ← p − F_p/K.
 
     With `stiffness` K (n,), from a posture (n_q,) near the first. NaN where that does not converge: links too soft for

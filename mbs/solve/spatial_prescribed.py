@@ -40,8 +40,18 @@ def following_motors(model: SpatialModel) -> SpatialModel:
     return replace(model, rows=tuple(rows))
 
 
+PrescribedMotion = _core.PlanarPrescribedMotion | _core.SpatialPrescribedMotion
+
+
+def prescribed_by(mechanism: _core.PlanarDriven | _core.SpatialDriven, q: Array) -> PrescribedMotion:
+    """What prescribes the modes of a mechanism, and finds its postures from q (n_q,) on."""
+    if isinstance(mechanism, _core.PlanarDriven):
+        return _core.PlanarPrescribedMotion(mechanism, q)
+    return _core.SpatialPrescribedMotion(mechanism, q)
+
+
 def prescribed_motion(
-    model: SpatialModel, motion: _core.SpatialPrescribedMotion, modes: Array, times: Array, near: Array
+    model: SpatialModel, motion: PrescribedMotion, modes: Array, times: Array, near: Array
 ) -> Prescribed:
     """At `times` (T,), with `modes` (3, T, n): p, ṗ and p̈ of all bodies, from postures near (T, n_q).
 

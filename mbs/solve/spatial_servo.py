@@ -14,11 +14,11 @@ from .. import _core
 from .._core import TimeFunction
 from ..model.spatial_frame_motors import turning_motors
 from ..model.spatial_model import SpatialModel
-from ..model.spatial_motors import driven_mechanism
+from ..model.spatial_motors import driven_mechanism, fastest_mechanism
 from ..model.spatial_rows import SpatialRow
 from .internal_dynamics import Stopped, Target, by_differences, slopes_by_differences
 from .spatial_posture import mobility, solve_posture, told_posture
-from .spatial_prescribed import following_motors
+from .spatial_prescribed import PrescribedMotion, following_motors
 from .spatial_reach import out_of_reach
 from .spatial_start import undeformed_posture
 
@@ -90,8 +90,19 @@ class SpatialServo:
         return replace(self, offset=offset)
 
     @cached_property
-    def motion(self) -> _core.SpatialPrescribedMotion:
+    def motion(self) -> PrescribedMotion:
         """With p(t) given, the motors' coordinates as on the path with the deflections `factor` p + `offset`."""
+        path = fastest_mechanism(self.model)
+        if isinstance(path, _core.SpatialDriven):
+            return self.equations()
+        motion = _core.PlanarPrescribedMotion(path, self.near[0])
+        if self._is_redefined:
+            motion = _core.PlanarRedefinedMotion(path, path, self.near[0], self.factor, list(self.offset))
+        motion.hold_loads(0.0, self.end)
+        return motion
+
+    def equations(self) -> _core.SpatialPrescribedMotion:
+        """The same anew, in 3D."""
         path = driven_mechanism(self.model)
         motion = _core.SpatialPrescribedMotion(path, self.near[0])
         if self._is_redefined:
