@@ -42,7 +42,7 @@ class Sensor(Record):
     point: PointReference | None = None
     """Point "BODY.POINT" with measured x, y (in 3D z), m, global axes."""
     pzt: str | None = None
-    """Body with measured patch voltages, V; in 3D the name of the layout."""
+    """Layout of patches with measured voltages, V: its name, or that of its body."""
     modal: str | None = None
     """Body with directly read modal coordinates (m·√kg); no real sensor can."""
     measure: Literal["value", "rate", "acceleration"] = "value"
@@ -224,7 +224,7 @@ class Placement(Record):
     body: str
     """Link with patches."""
     pzt: Name | None = None
-    """Layout of the patches; required if a link of a 3D scene has several layouts."""
+    """Layout of the patches; required if a link has several layouts."""
     count: PatchCount | None = None
     """Number of patches; by default that of its [[pzt]]."""
     criterion: Literal["controllability", "voltage"] = "controllability"

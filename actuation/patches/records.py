@@ -27,7 +27,7 @@ NO_SHEAR = 1e-9  # of the other stress: a layer that shears less does not twist
 
 
 class SpatialPztLayout(Record):
-    """Equal piezoelectric patches along one link; in 3D several layouts on a body have names.
+    """Equal piezoelectric patches along one link; several layouts on a body have names.
 
     Lengths in m, moduli in Pa, d31 and d33 in m/V, density kg/m³, limit in V. Centers are distances along the link from
     its root; `count` places them at (k − ½)·(length of link)/count. `thickness` is that of one of `layers`, stacked on
@@ -84,7 +84,7 @@ class SpatialPztLayout(Record):
     """Strain limit of the material; used by the verdict only."""
     coupling: Literal["rotation", "surface"] = "rotation"
     """Coupling to the link: section rotations at patch ends, or faces outlined in the mesh of a solid."""
-    name: Annotated[Name | None, IN_SPACE] = None
+    name: Name | None = None
     """Name of the layout in results; default: the name of the body."""
     bends: Annotated[Bends, IN_SPACE] = "in-plane"
     """Deformation: along y by patches on faces ±y, along z by patches on faces ±z, or "twist" about x by fibers at an

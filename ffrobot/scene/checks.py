@@ -91,8 +91,7 @@ def _all_duplicates(scene: SpatialSceneKeys) -> Iterator[str]:
         yield from _duplicates(kind, (record.name for record in getattr(scene, kind)))
     for label, count in Counter(layout.label for layout in scene.pzt).items():
         if count > 1:
-            apart = "name: expected a separate name for each layout on a body" if not scene.is_planar else ""
-            yield f'pzt "{label}": {apart or "expected one pzt of this name"}, found {count}'
+            yield f'pzt "{label}": name: expected a separate name for each layout on a body, found {count}'
     for name, count in Counter(points.body for points in scene.actuation_points).items():
         if count > 1:
             yield f'actuation_points "{name}": body: expected one table for each body, found {count}'
@@ -170,14 +169,14 @@ def _flexible_body_problems(scene: SpatialSceneKeys) -> Iterator[str]:
 
 
 def _patch_problems(scene: SpatialSceneKeys) -> Iterator[str]:
-    """References to bodies with patches, and to layouts: in the plane a body has one, which has its name."""
+    """References to bodies with patches, and to layouts of these."""
     bodies = list(dict.fromkeys(layout.body for layout in scene.pzt))
     layouts = [layout.label for layout in scene.pzt]
     for reference in scene.references():
         known = {"patched body": bodies, "patches": layouts}.get(reference.kind)
         if known is not None and reference.name not in known:
             what = f"a body with patches, {quoted(known)}"
-            if reference.kind == "patches" and not scene.is_planar:
+            if reference.kind == "patches":
                 what = f"one of the layouts {quoted(known)}" if known else "a layout of patches ([[pzt]])"
             hint = did_you_mean(reference.name, known)
             yield f'{reference.key}: expected {what}, found "{reference.name}"{hint}'

@@ -20,7 +20,7 @@ class SpatialSceneKeys(SpatialMechanismKeys):
     """
 
     pzt: tuple[SpatialPztLayout, ...] = ()
-    """Layouts of piezoelectric patches; in 3D scenes names distinguish several on one body."""
+    """Layouts of piezoelectric patches; names distinguish several on one body."""
     actuation_points: tuple[SpatialActuationPoints, ...] = ()
     """Points of forces that replace the driving forces."""
     analysis: Annotated[tuple[Analysis, ...], NotEmpty]

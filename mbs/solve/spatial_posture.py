@@ -151,7 +151,7 @@ def told_loops(model: SpatialModel, q: Array, v: Array) -> str:
     return (
         f"the loops that {quoted(dict.fromkeys(row.owner for row in loops.rows))} close are singular or nearly so there"
         f" (ratio of singular values {ratio:.1g}): a mechanism at a dead center, or cranks and coupler in a line, where"
-        " no finite force says which way to go on. Keep clear of it, or drive a joint instead"
+        " no finite force determines which way to go on. Keep clear of it, or drive a joint instead"
     )
 
 

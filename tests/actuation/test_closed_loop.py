@@ -268,7 +268,7 @@ def test_slow_sampling_is_warned_of():
         ({"sample_time": 0.7}, "expected a sample_time of at most the run"),
         ({"sensor": [{"point": "w.rimm"}]}, 'found "w.rimm".*did you mean'),
         ({"sensor": [{"joint": "P"}]}, 'expected one of the joints "O", found "P"'),
-        ({"sensor": [{"pzt": "w"}]}, "expected a body with patches"),
+        ({"sensor": [{"pzt": "w"}]}, "expected a layout of patches"),
         ({"sensor": [{"joint": "O", "measure": "acceleration"}]}, "measure"),
         ({"controller": [{"kind": "joint-pid", "proportional": {"B": 1.0}}]}, 'found "B"'),
         ({"controller": [{"kind": "pid"}]}, "joint-pid"),

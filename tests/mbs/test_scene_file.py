@@ -220,7 +220,7 @@ MISTAKES = [
     ("count = 2", "count = 2\ncenters = [0.1]", 'pzt "link1": expected exactly one of the keys "count", "centers"', "found"),
     ("d31 = 110e-12", "d31 = 0", 'pzt "link1": expected a d31 other than 0, found 0', ""),
     ('body = "link1"', 'body = "hand"', 'pzt "hand": body: expected a flexible body, found "hand"', "rigid"),
-    ('pzt = "link1"', 'pzt = "link2"', 'load no. 1: pzt: expected a body with patches, "link1", found "link2"', ""),
+    ('pzt = "link1"', 'pzt = "link2"', 'load no. 1: pzt: expected one of the layouts "link1", found "link2"', ""),
     ('["10*t", 5]', '["10*t"]', "load no. 1: voltage: expected 2 expressions", "found 1"),
     ('["10*t", 5]', '["10*t", "v"]', "load no. 1: voltage[1]: expected an expression in t, found 'v'", "unknown name"),
     ('["10*t", 5]', '["log(t)", 5]', "load no. 1: voltage[0]: expected a finite value", "found none at t = 0 s"),

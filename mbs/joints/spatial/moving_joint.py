@@ -10,7 +10,7 @@ from pydantic import Field, model_validator
 
 from ....common.arrays import Array
 from ...fields.field_types import NotNegative, Positive, Quantity, Vector3
-from ...fields.spelling import IN_SPACE, SPATIAL, NormalInPlane, Spelled, as_written
+from ...fields.spelling import SPATIAL, NormalInPlane, Spelled, as_written
 from ..transmission import Friction, MotorLimits
 from .joint import SpatialJoint, with_axis
 
@@ -25,7 +25,7 @@ class MovingSpatialJoint(SpatialJoint):
 
     motor: bool | None = None
     """Presence of motors; by default in open chains only, and not in spherical and free joints."""
-    position_limit: Annotated[Range | tuple[Range, ...] | None, IN_SPACE] = None
+    position_limit: Annotated[Range | tuple[Range, ...] | None, Spelled(Range, as_written)] = None
     """Range of the coordinate, [lo, hi], rad (sliding: m). No contact force acts; integrated runs report when and how
     far it is exceeded."""
     moment_limit: Limit | None = None

@@ -170,11 +170,10 @@ class SpatialPayload(Record):
     """Point of the mass, "BODY.POINT"."""
     mass: NotNegative
     """Mass, kg."""
-    center: Annotated[Vector3, IN_SPACE] = (0.0, 0.0, 0.0)
+    center: Vector = (0.0, 0.0, 0.0)
     """Center of mass, m from the point, axes of the body."""
     inertia: Annotated[Inertia, Spelled(NotNegative, inertia_about_z)] = (0.0, 0.0, 0.0)
-    """Inertia about that center, axes of the body, kg·m²: [xx, yy, zz], or three rows; in planar scenes about z, and
-    the center is the point."""
+    """Inertia about that center, axes of the body, kg·m²: [xx, yy, zz], or three rows; in planar scenes about z."""
 
     @field_validator("inertia")
     @classmethod

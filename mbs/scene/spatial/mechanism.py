@@ -11,7 +11,7 @@ from ....common.names import Title
 from ....common.validation import Record
 from ...fields.field_types import NotEmpty
 from ...fields.references import Reference, under
-from ...fields.spelling import IN_SPACE, Vector
+from ...fields.spelling import Vector
 from ...joints.spatial.joints import AnySpatialJoint
 from ..topology import Edge, Topology, spanning_forest
 from .bodies import BodyInSpace, SpatialPayload
@@ -34,7 +34,7 @@ class SpatialMechanismKeys(Record):
     geometric_stiffening: bool | Literal["auto"] | None = None
     """Stiffness of links depends on their loads; "auto": if these change it by more than 1 %. Default: on for
     subdivided links only, except links with loads between the ends of a segment."""
-    redundancy: Annotated[Literal["least-torque", "least-motion"] | None, IN_SPACE] = None
+    redundancy: Literal["least-torque", "least-motion"] | None = None
     """Redundancy resolution with undeformed links: "least-torque" minimizes the integral of squared motor torques from
     the state at t = 0, "least-motion" the sum of squared joint velocities at every time (translations relative to the
     robot's size). Default: the redundant motion is unactuated."""

@@ -55,7 +55,7 @@ class SpatialTrajectory(MotionKeys):
     its axes are global ones, the projection on the plane across `axis` has this angle."""
     axis: Annotated[Vector3 | None, IN_SPACE] = None
     """Axis of `angle`, global axes; by default z."""
-    motor: Annotated[str | None, IN_SPACE] = None
+    motor: str | None = None
     """Joint whose motor follows the trajectory; a compliant gear (`stiffness`) lets the joint coordinate differ from
     that of the motor."""
     x: Expression | None = None
