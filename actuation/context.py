@@ -4,23 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Protocol, TypeVar
+from typing import TypeVar
 
 from ..fe_models.modal_body import ModalBody
-from ..mbs.analysis.context import Context
+from ..mbs.analysis.context import Context, WholeLinks
 from ..mbs.model.spatial_body import SpatialBody
 from .patches.spatial_patches import LinkPatches
 
 Point = TypeVar("Point", str, str | None)
 
 
-class _Places(Protocol):
-    @property
-    def places(self) -> Mapping[str, str]:
-        """Of points of links in pieces."""
-
-
-def place_of(whole: _Places | None, point: Point) -> Point:
+def place_of(whole: WholeLinks | None, point: Point) -> Point:
     """Where a point of the scene is in the model, of whose links some are in pieces where there are `whole` ones."""
     return point if whole is None or point is None else whole.places.get(point, point)
 

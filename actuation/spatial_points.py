@@ -20,13 +20,11 @@ from ..common.arrays import Array
 from ..common.errors import InputError
 from ..common.validation import Record, did_you_mean, quoted
 from ..fe_models.modal_body import Interface, ModalBody
-from ..mbs.analysis.outcome import Outcome
 from ..mbs.fields.field_types import Name
 from ..mbs.fields.references import Reference
 from ..mbs.fields.spelling import IN_PLANE, IN_SPACE
 from ..mbs.model.spatial_body import SpatialBody, SpatialPoint
-from ..mbs.model.spatial_motors import path_forces, path_forces_on_bodies
-from ..mbs.scene.space import SPACES, Space
+from ..mbs.scene.space import Space
 
 DEPENDENT = 1e-10  # ratio of singular values of L_a below which components count as saying the same
 AXES = "xyz"
@@ -108,25 +106,10 @@ class SpatialPointSet:
             columns.append(np.hstack([on_frame, on_modes]))
         return np.stack(columns, axis=2)
 
-
-@dataclass(frozen=True)
-class PointForces:
-    """Forces at the actuation points of one body over time.
-
-    Attributes:
-        force: (T, c) N along each component, body axes.
-        unmet: (T, 6 + n) Q_a − L_a F_a on R and on the rotation, both in axes of the body, and on p: N, N·m, N/√kg; in
-            the plane (T, 3 + n) on (R, θ, p), R in global axes.
-        residual: (T,) its norm with the scale of the set, N.
-        rank: least rank of the scaled L_a.
-        condition_number: largest of the scaled L_a.
-    """
-
-    force: Array
-    unmet: Array
-    residual: Array
-    rank: int
-    condition_number: float
+    def scaled(self, p: Array) -> Array:
+        """L_a (T, 6 + n, c) at p (T, n), its rows as forces in N."""
+        found: Array = self.scale[:, None] * self.L_a(p)
+        return found
 
 
 def spatial_point_set(
@@ -155,7 +138,7 @@ def spatial_point_set(
     points = [_point(key, place, body, spatial) for _, place in layout.places]
     _check_apart(key, layout.places, points, 1e-9 * (spatial.length or 0.0))
     chosen = _named(layout.body, tuple(ALONG[along] for along, _ in layout.places), points, spatial)
-    sizes = np.linalg.svd(_scaled(chosen, np.zeros((1, spatial.n_modes)))[0], compute_uv=False)
+    sizes = np.linalg.svd(chosen.scaled(np.zeros((1, spatial.n_modes)))[0], compute_uv=False)
     rank = int(np.count_nonzero(sizes > DEPENDENT * sizes[0]))
     if rank < len(points):
         along_x = "axial ones" if space.is_plane else "those along x"
@@ -183,66 +166,13 @@ def with_spatial_points(spatial: SpatialBody, chosen: SpatialPointSet) -> Spatia
     return replace(spatial, points=MappingProxyType({**spatial.points, **own}))
 
 
-def solve_spatial_points(chosen: SpatialPointSet, run: Outcome) -> PointForces:
-    """L_a F_a = Q_a at every output time."""
-    node = run.model.tree.nodes[run.model.tree.index[chosen.body]]
-    Q_a = driving_forces_in_space(run)[chosen.body]
-    p = run.q[:, node.p_q]
-    scaled = _scaled(chosen, p)
-    force = np.einsum("tck,tk->tc", np.linalg.pinv(scaled, rcond=DEPENDENT), chosen.scale * Q_a)
-    unmet = Q_a - np.einsum("tkc,tc->tk", chosen.L_a(p), force)
-    residual = np.linalg.norm(unmet * chosen.scale, axis=1)
-    sizes = np.linalg.svd(scaled, compute_uv=False)
-    rank = int(np.count_nonzero(sizes > DEPENDENT * sizes[:, :1], axis=1).min())
-    condition = float((sizes[:, 0] / sizes[:, -1]).max())
-    if (space := SPACES[run.model.scene.space]).is_plane:
-        F = run.model.tree.frames(run.q)[run.model.tree.index[chosen.body]].F
-        on_frame = np.einsum("tij,tj->ti", F, unmet[:, :3]), unmet[:, 3:6]
-        unmet = np.column_stack([space.along(on_frame[0]), space.about(on_frame[1]), unmet[:, 6:]])
-    return PointForces(force, unmet, residual, rank, condition)
-
-
-def forces_at_points(chosen: Mapping[str, SpatialPointSet], run: Outcome) -> dict[str, Array]:
-    """By "BODY.POINT" the force (T, 3) there, N, global axes, along the motion of a run.
-
-    Raises `InputError` where a body without points has driving forces.
-    """
-    tree, found = run.model.tree, {}
-    driven = driving_forces_in_space(run)
-    largest = max(float(np.abs(Q_a).max(initial=0.0)) for Q_a in driven.values())
-    for body, Q_a in driven.items():
-        if body not in chosen and np.abs(Q_a).max(initial=0.0) > DEPENDENT * largest:
-            raise InputError(
-                f'{run.model.scene.path}: analysis "{run.analysis.name}": expected [[actuation_points]] on every body'
-                f' that trajectories drive or that has a prescribed shape, found none on "{body}"'
-            )
-    frames = tree.frames(run.q)
-    for body, points in chosen.items():
-        F = frames[tree.index[body]].F
-        force = solve_spatial_points(points, run).force
-        for k, name in enumerate(points.names):
-            found[f"{body}.{name}"] = force[:, k : k + 1] * (F @ points.direction[:, k])
-    return found
-
-
-def driving_forces_in_space(run: Outcome) -> dict[str, Array]:
-    """Q_a by body, (T, 6 + n): force and moment on its frame, both in its axes, and on its modes."""
-    model = run.model
-    found = path_forces_on_bodies(model, run.time, run.q, run.multipliers)
-    if run.forces.required is not None:  # a shape is held besides, by forces on the modes alone
-        held = run.forces.required - path_forces(model, run.time, run.q, run.multipliers)
-        for node in model.tree.nodes:
-            found[node.body.name][:, 6:] += held[:, node.p_v]
-    return found
-
-
 def _automatic(key: str, name: str, body: ModalBody | None, spatial: SpatialBody, axes: str) -> SpatialPointSet:
     """Out of all components at every station, those that QR with column pivoting takes first: far from dependent."""
     from scipy.linalg import qr
 
     points = [_point(key, place, body, spatial) for place in candidate_places(key, body, spatial.points)]
     candidates = _named(name, tuple(axis for axis in axes for _ in points), points * len(axes), spatial)
-    _, R, order = qr(_scaled(candidates, np.zeros((1, spatial.n_modes)))[0], mode="economic", pivoting=True)
+    _, R, order = qr(candidates.scaled(np.zeros((1, spatial.n_modes)))[0], mode="economic", pivoting=True)
     sizes = np.abs(np.diag(R))
     kept = sorted(order[: int(np.count_nonzero(sizes > DEPENDENT * sizes[0]))])
     return _named(name, tuple(candidates.axes[k] for k in kept), [candidates.points[k] for k in kept], spatial)
@@ -259,12 +189,6 @@ def _point(key: str, place: Place, body: ModalBody | None, spatial: SpatialBody)
     return point_at(
         key, place, body, spatial.points, lambda at: SpatialPoint(at.position, at.translation @ T, at.rotation @ T)
     )
-
-
-def _scaled(chosen: SpatialPointSet, p: Array) -> Array:
-    """The scaled L_a (T, 6 + n, c) at p (T, n)."""
-    found: Array = chosen.scale[:, None] * chosen.L_a(p)
-    return found
 
 
 def point_names(count: int) -> tuple[str, ...]:

@@ -37,7 +37,7 @@ class Patches(Protocol):
 
 @dataclass(frozen=True)
 class PatchableLink:
-    """A link that is to get patches, in the plane or in space, by the m coordinates p that these reach.
+    """A link that is to get patches, by the m coordinates p that these reach.
 
     Attributes:
         name, length: of the link, m.

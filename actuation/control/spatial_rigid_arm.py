@@ -1,4 +1,4 @@
-"""The mechanism in space with rigid links: what joint accelerations take, as computed torque needs it."""
+"""The mechanism with rigid links: what joint accelerations take, as computed torque needs it."""
 
 from __future__ import annotations
 

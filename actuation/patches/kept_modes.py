@@ -9,7 +9,8 @@ import numpy as np
 from ...common.arrays import Array, Indices, as_floats
 from ...mbs.model.spatial_body import SpatialBody
 from .patches import PatchArray
-from .spatial_patches import LinkPatches, ReachedModes
+from .reached_modes import ReachedModes
+from .spatial_patches import LinkPatches
 
 
 def on_kept_modes(of_link: LinkPatches, equations: SpatialBody) -> LinkPatches:

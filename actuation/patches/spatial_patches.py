@@ -1,4 +1,4 @@
-"""Patches of a link in space: several layouts side by side, their reach, and voltages that they find together.
+"""Patches of a link: several layouts side by side, their reach, and voltages that they find together.
 
 The modes to be served are those of the link that moves in the families which some patch reaches, and in no other:
 in-plane bending by patches on ±y, out-of-plane bending by those on ±z, torsion by fibres at an angle, the axial family
@@ -19,47 +19,14 @@ from ...fe_models.modal_body import ModalBody
 from ...mbs import _core
 from ...mbs.model.divided_link import spread_in_space
 from ...mbs.model.spatial_body import SpatialBody
-from ...mbs.model.spatial_masses import uncoupling
 from .composite import Placed
 from .effects import Effects, effects
 from .patches import PatchArray, assembled, check_edges, edges_on_piece, patch_edges
 from .reach import Reach, check_all_served, served_first, weights
+from .reached_modes import ReachedModes, reached_modes
 from .records import SpatialPztLayout
 from .sections import check_sections
 from .voltages import Voltages, allocation, solve_voltages
-
-OUT_OF_REACH = 1e-9  # of the largest modal force per volt: less is rounding
-
-
-@dataclass(frozen=True)
-class ReachedModes:
-    """The modes of a link that moves in some of its families alone, with what it carries.
-
-    Attributes:
-        rows: (m,) numbers (from 0) of the modes of the modal body in these families.
-        T: (m, m) p of these rows from the coordinates p' in which m_ff is the identity and K_ff diagonal; (m, fewer) of
-            the coordinates that equations keep, see `kept_modes`.
-        stiffness: (m,) of the p'.
-        served: number of them, the first ones: the others are attachment modes.
-    """
-
-    rows: Indices
-    T: Array
-    stiffness: Array
-    served: int
-
-    def forces(self, F_p: Array) -> Array:
-        """(T, m) on the p' from those on the modes of the modal body (T, n)."""
-        on_modes: Array = F_p[:, self.rows] @ self.T
-        return on_modes
-
-    def coordinates(self, p: Array) -> Array:
-        """(T, m) p' from those of the modal body (T, n)."""
-        return as_floats(np.linalg.lstsq(self.T, p[:, self.rows].T, rcond=None)[0].T)
-
-    def seen(self, rows: Array) -> Array:
-        """(k, m) what is linear in the modes of the modal body, (k, n), over p'."""
-        return self.forces(rows)
 
 
 @dataclass(frozen=True)
@@ -79,7 +46,7 @@ class OnBody:
 
 @dataclass(frozen=True)
 class LinkPatches:
-    """All patches of one link in space, k in all, on the n modes of its modal body.
+    """All patches of one link, k in all, on the n modes of its modal body.
 
     Voltages serve the modes of the link. They act on whichever of the `bodies` a model has: the link, or its pieces.
 
@@ -190,7 +157,7 @@ def link_patches(path: Path, layouts: Sequence[SpatialPztLayout], body: ModalBod
     placed = placed_patches(path, layouts, body)
     found = effects(key, placed, body)
     Phi_V, turn = (np.concatenate(of).T for of in ([of.Phi_V for of in found], [of.turn for of in found]))
-    modes = {one.layout.label: _reached(of.Phi_V, body, spatial) for one, of in zip(placed, found, strict=True)}
+    modes = {one.layout.label: reached_modes(of.Phi_V, body, spatial) for one, of in zip(placed, found, strict=True)}
     for layout in layouts:
         _check_reached(path, layout, modes[layout.label], body)
     arrays = {
@@ -200,7 +167,7 @@ def link_patches(path: Path, layouts: Sequence[SpatialPztLayout], body: ModalBod
     if len(layouts) == 1:
         reached, reach = modes[layouts[0].label], _alone(arrays[layouts[0].label])
     else:
-        reached = _reached(Phi_V.T, body, spatial)
+        reached = reached_modes(Phi_V.T, body, spatial)
         reach = _together(path, layouts, arrays, reached, Phi_V.T)
     own = {layouts[0].body: OnBody(Phi_V, turn, np.eye(body.mode_count))}
     return LinkPatches(arrays, modes, reach, reached, own)
@@ -258,19 +225,6 @@ def _placed(path: Path, layout: SpatialPztLayout, body: ModalBody) -> Placed:
     check_sections(key, body, layout.normal, twists=layout.fibre_angle is not None)
     check_edges(key, edges, body.length)
     return Placed(layout, edges)
-
-
-def _reached(per_volt: Array, body: ModalBody, spatial: SpatialBody) -> ReachedModes:
-    """By modal forces per volt (k, n) on the modes of the modal body: the families in which any is not 0."""
-    size = np.abs(per_volt).max(axis=0)
-    families = {body.family[k] for k in np.flatnonzero(size > OUT_OF_REACH * size.max())}
-    moving = spatial.modal_transform.any(axis=1)
-    rows = np.flatnonzero([moves and family in families for moves, family in zip(moving, body.family, strict=True)])
-    T_inverse, square = spatial.on_file, np.ix_(rows, rows)
-    T, stiffness = uncoupling((T_inverse.T @ T_inverse)[square], (T_inverse.T * spatial.stiffness @ T_inverse)[square])
-    modes_first = np.argsort(body.residual[rows], kind="stable")
-    served = int(np.count_nonzero(body.residual[rows] == 0))
-    return ReachedModes(rows, T[:, modes_first], stiffness[modes_first], served)
 
 
 def _check_reached(path: Path, layout: SpatialPztLayout, modes: ReachedModes, body: ModalBody) -> None:

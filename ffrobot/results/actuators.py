@@ -16,7 +16,8 @@ from ..actuation.patches.patches import PatchArray
 from ..actuation.patches.records import SpatialPztLayout
 from ..actuation.patches.structure import StructureEffect
 from ..actuation.patches.voltages import Voltages
-from ..actuation.spatial_points import PointForces, SpatialPointSet
+from ..actuation.point_forces import PointForces
+from ..actuation.spatial_points import SpatialPointSet
 from ..actuation.unsupplied import Unsupplied
 from ..common.arrays import Array
 from ..mbs.analysis.tracking import TrackedPath

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from ..actuation.context import ActuatedContext
 from ..actuation.feasibility import Feasibility
-from ..actuation.spatial_points import forces_at_points, solve_spatial_points
+from ..actuation.point_forces import forces_at_points, solve_spatial_points
 from ..actuation.unsupplied import held_shift
 from ..common.arrays import Array
 from ..common.errors import FfrobotError, InputError, SolveError, of_file

@@ -9,7 +9,8 @@ from functools import cached_property
 from ..actuation.control.loop_record import LoopRecord
 from ..actuation.patches.patches import PatchArray
 from ..actuation.patches.spatial_patches import LinkPatches
-from ..actuation.spatial_points import PointForces, SpatialPointSet
+from ..actuation.point_forces import PointForces
+from ..actuation.spatial_points import SpatialPointSet
 from ..common.arrays import Array
 from ..fe_models.modal_body import ModalBody
 from ..mbs.analysis.elastic_joints import unresolved_gears

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from ffrobot.actuation.spatial_points import driving_forces_in_space
+from ffrobot.actuation.point_forces import driving_forces_in_space
 from ffrobot.run.spatial import solve_spatial
 
 SCENE = """

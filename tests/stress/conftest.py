@@ -5,10 +5,10 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from planar_bodies import from_modal_body
 from table import PAGE, ROWS, Table, render
 
 from ffrobot.fe_models.link import cached_modal_body
-from ffrobot.mbs.model.planar_body import from_modal_body
 
 LINK = Path(__file__).parents[2] / "cases" / "two_link" / "link2.toml"
 

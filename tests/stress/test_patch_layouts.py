@@ -1,15 +1,18 @@
 """PZT layouts that are ill-conditioned: overlapping, where modes have no curvature, too many, too few."""
 
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
 from table import at_most
 
-from ffrobot.actuation.patches.patches import check_reach, patch_array
-from ffrobot.actuation.patches.records import PztLayout
+from ffrobot.actuation.patches.records import SpatialPztLayout
+from ffrobot.actuation.patches.spatial_patches import check_reach, link_patches
 from ffrobot.actuation.patches.voltages import solve_voltages
 from ffrobot.common.errors import InputError
+from ffrobot.mbs.model.projection import projected
+from ffrobot.mbs.model.spatial_body import from_modal_body
 
 GROUP = "PZT layouts"
 PATCH = {
@@ -25,14 +28,15 @@ PATCH = {
 
 @pytest.fixture(scope="module")
 def link(beam):
-    """The body and its planar equations, five modes."""
-    return beam("link2", "cantilever", modes=5, modal=True)
+    """Its modal body, five modes."""
+    return beam("link2", "cantilever", modes=5, modal=True)[0]
 
 
 def patches(link, **keys):
-    array = patch_array("scene.toml", PztLayout(**(PATCH | keys)), *link)
-    check_reach("scene.toml", array)
-    return array
+    path, spatial = Path("scene.toml"), projected(from_modal_body("link2", link, is_planar=True))
+    of_link = link_patches(path, [SpatialPztLayout(**(PATCH | keys))], link, spatial)
+    check_reach(path, of_link)
+    return of_link.reach
 
 
 def wanted(link):
@@ -43,7 +47,7 @@ def wanted(link):
 def inflection(link):
     """Where the second mode of a cantilever has no curvature, from its stations."""
     x = np.linspace(0.1, 0.9, 801)
-    curvature = np.gradient([link[0].interpolate(s).rotation[2][1] for s in x], x)
+    curvature = np.gradient([link.interpolate(s).rotation[2][1] for s in x], x)
     return float(x[np.flatnonzero(np.diff(np.sign(curvature)))[0]])
 
 
