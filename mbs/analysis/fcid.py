@@ -97,7 +97,6 @@ def run_spatial_fcid(context: Context, analysis: Fcid) -> Outcome:
     Raises `InputError` where the trajectories do not fix the motion of the mechanism or cannot be followed,
     `SolveError` where no posture, or no static shape, is found.
     """
-    began = time.perf_counter()
     refuse_held_motors(context.model, analysis)
     model = resolved(context.model, analysis.last_time)
     check_reach(model, analysis.last_time)
@@ -113,6 +112,7 @@ def run_spatial_fcid(context: Context, analysis: Fcid) -> Outcome:
     def equations() -> _core.SpatialPrescribedMotion:
         return _core.SpatialPrescribedMotion(driven_mechanism(model), q)
 
+    began = time.perf_counter()
     has_motors = sum(len(columns) for columns in model.motors.values()) == freedom
     motion = prescribed_by(fastest_mechanism(model, has_motors=has_motors), q)
     shape = _shape(context, analysis, motion, q)
