@@ -72,8 +72,10 @@ RecursiveMotion<Space>::RecursiveMotion(const Mechanism<Space> &mechanism, const
     evaluate(t, q, v, correction_.data()); // projections need its factors
   newton_.keep(workspace_.active);
   find_stiff_terms();
-  if (scene.has_loops && !workspace_.active.empty())
+  if (scene.has_loops && !workspace_.active.empty()) {
+    evaluate(t, q, v, correction_.data()); // with the factors of the rows that are kept
     loops_.emplace(mechanism, workspace_);
+  }
   for (const GearSpring &gear : scene_.gears)
     for (const Node<Space> &node : mechanism.nodes)
       if (node.v == gear.a.v)
