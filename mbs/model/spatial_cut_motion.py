@@ -52,15 +52,15 @@ def _guesses(model: SpatialModel) -> Iterator[float]:
 def _unwound(angle: Array, rate: Array, times: Array, guess: float) -> tuple[Array, bool]:
     """The angle (T,) with full turns: each the nearest to where the rates lead from the one before.
 
-    Rates lead there by a cubic spline. Turns are counted where it is near the trapezoidal rule and the angle found.
+    Rates lead there by cubics with the slopes of their differences. Turns are counted where these are near the
+    trapezoidal rule and the angle found.
     """
     if len(times) < 2:
         return angle + 2 * np.pi * np.round((guess - angle) / (2 * np.pi)), True
-    from scipy.interpolate import CubicSpline
-
-    way = np.diff(CubicSpline(times, rate).antiderivative()(times))
+    h, slope = np.diff(times), np.gradient(rate, times, edge_order=min(2, len(times) - 1))
+    rough = h * (rate[1:] + rate[:-1]) / 2
+    way = rough - h**2 * np.diff(slope) / 12
     turns = np.round((np.append(guess, way) - np.append(angle[0], np.diff(angle))) / (2 * np.pi))
     found: Array = angle + 2 * np.pi * np.cumsum(turns)
-    rough = np.diff(times) * (rate[1:] + rate[:-1]) / 2
     off = np.abs(way - np.array([rough, np.diff(found)])).max()
     return found, bool(off < np.pi / 2)
