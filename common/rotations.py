@@ -19,10 +19,11 @@ _SERIES = {m: np.array([(-1) ** k / factorial(2 * k + m) for k in reversed(range
 
 def skew(vectors: Array) -> Array:
     """The matrices (…, 3, 3) of the cross product with `vectors` (…, 3)."""
-    x, y, z = np.moveaxis(np.asarray(vectors, dtype=float), -1, 0)
-    zero = np.zeros_like(x)
-    rows = [[zero, -z, y], [z, zero, -x], [-y, x, zero]]
-    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+    vectors = np.asarray(vectors, dtype=float)
+    found = np.zeros((*vectors.shape, 3))
+    found[..., (2, 0, 1), (1, 2, 0)] = vectors
+    found[..., (1, 2, 0), (2, 0, 1)] = -vectors
+    return found
 
 
 def exponential(vectors: Array) -> Array:
@@ -62,20 +63,31 @@ def series(m: int, x: Array) -> tuple[Array, Array]:
     c_1 = sin φ/φ, c_2 = (1 − cos φ)/φ², c_3 = (φ − sin φ)/φ³; c_m' = (c_{m−1} − m c_m)/(2x), with c_0 = cos φ.
     """
     near, far = np.minimum(x, NEAR), np.maximum(x, NEAR)
-    phi = np.sqrt(far)
-    sine, cosine = np.sin(phi), np.cos(phi)
-    closed = (cosine, sine / phi, (1 - cosine) / far, (phi - sine) / (far * phi))
-    slope = (closed[m - 1] - m * closed[m]) / (2 * far)
-    coefficients, is_near = _SERIES[m], np.asarray(x) <= NEAR
-    value: Array = np.where(is_near, np.polyval(coefficients, near), closed[m])
-    near_slope = np.polyval(coefficients[:-1] * np.arange(TERMS - 1, 0, -1), near)
-    return value, np.where(is_near, near_slope, slope)
+    slope = (_closed(m - 1, far) - m * _closed(m, far)) / (2 * far)
+    near_slope = np.polyval(_SERIES[m][:-1] * np.arange(TERMS - 1, 0, -1), near)
+    return _value(m, x), np.where(np.asarray(x) <= NEAR, near_slope, slope)
+
+
+def _value(m: int, x: Array) -> Array:
+    """c_m of any x = φ² ≥ 0."""
+    near = np.polyval(_SERIES[m], np.minimum(x, NEAR))
+    if np.max(x, initial=0.0) <= NEAR:
+        return near
+    return np.where(np.asarray(x) <= NEAR, near, _closed(m, np.maximum(x, NEAR)))
+
+
+def _closed(m: int, x: Array) -> Array:
+    """c_m of x = φ² away from 0."""
+    phi = np.sqrt(x)
+    of_m = (np.cos, lambda phi: np.sin(phi) / phi, lambda phi: (1 - np.cos(phi)) / x,
+            lambda phi: (phi - np.sin(phi)) / (x * phi))  # fmt: skip
+    return as_floats(of_m[m](phi))
 
 
 def _of_skew(vectors: Array, first: int, second: int) -> Array:
     """The sum c_first φ~ + c_second φ~²."""
     S, x = skew(vectors), np.sum(np.square(vectors), axis=-1)[..., None, None]
-    found: Array = series(first, x)[0] * S + series(second, x)[0] * (S @ S)
+    found: Array = _value(first, x) * S + _value(second, x) * (S @ S)
     return found
 
 

@@ -249,9 +249,10 @@ class SpatialTree:
 
 def _bent(body: SpatialBody, section: Section, p: Array) -> tuple[Array, Array, Array, Array]:
     """In body axes: u (…, 3), E (…, 3, 3) = exp φ~, Φ (…, 3, n), and J_l Φ_r (…, 3, n), which gives the spin by ṗ."""
-    if not section.point:
-        zero, none = np.zeros((*p.shape[:-1], 3)), np.zeros((3, body.n_modes))
-        return zero, np.broadcast_to(np.eye(3), (*p.shape[:-1], 3, 3)), none, none
+    if not section.point or not body.n_modes:
+        u, none = body.points[section.point].position if section.point else np.zeros(3), np.zeros((3, body.n_modes))
+        shape = (*p.shape[:-1], 3)
+        return np.broadcast_to(u, shape), np.broadcast_to(np.eye(3), (*shape, 3)), none, none
     at = bent_section(body, section.point, p)
     phi = section.turned(at.phi[..., None])[..., 0]
     return at.u, exponential(phi), at.u_p, left_jacobian(phi) @ section.turned(at.phi_p)

@@ -12,7 +12,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from ...common.arrays import Array
+from ...common.arrays import Array, Integers
 from ..model.spatial_wrench import Wrench
 from ..scene.spatial.loads import OF_POINT
 from ..solve.spatial_posture import SINGULAR, robot_size
@@ -57,14 +57,15 @@ def shared_evenly(motion: M) -> tuple[M, Sharing | None]:
     is_loop, length = motion.model.loop_rows, robot_size(motion.model)
     if not is_loop.any() or not len(motion.time):
         return motion, None
-    row_scales = np.array([1.0 if row.carries_moment else length for row in motion.model.rows])[is_loop]
-    J = motion.rows[1][:, is_loop] * natural_sizes(motion.model) / row_scales[:, None]
+    B, measured = _multipliers_of_loops(motion)
+    row_scales = np.array([1.0 if motion.model.rows[k].carries_moment else length for k in measured])
+    J = np.einsum("rm,tri->tmi", B, motion.rows[1][:, is_loop]) * natural_sizes(motion.model) / row_scales[:, None]
     some = np.unique(np.linspace(0, len(J) - 1, SAMPLES).astype(int))
     values = np.linalg.svd(J[some], compute_uv=False)
     redundant = J.shape[1] - int(np.max(np.sum(values > SINGULAR * np.maximum(values[:, :1], 1.0), axis=1)))
     if redundant == 0:
         return motion, None
-    null = np.linalg.eigh(J @ J.swapaxes(1, 2))[1][:, :, :redundant] / row_scales[:, None]  # ascending
+    null = B @ (np.linalg.eigh(J @ J.swapaxes(1, 2))[1][:, :, :redundant] / row_scales[:, None])  # ascending
     changes = [_side_by_side(motion, reactions_of_loops(motion, column)) for column in null.transpose(2, 0, 1)]
     basis = np.stack(changes, axis=-1)  # (T, components, redundant)
     even = -np.einsum("tkc,tc->tk", np.linalg.pinv(basis), _side_by_side(motion, reactions(motion)))
@@ -72,6 +73,20 @@ def shared_evenly(motion: M) -> tuple[M, Sharing | None]:
     multipliers[:, is_loop] -= np.einsum("trk,tk->tr", null, even)
     components = _open(motion, basis)
     return replace(motion, multipliers=multipliers), Sharing(redundant, components) if components else None
+
+
+def _multipliers_of_loops(motion: SpatialMotion) -> tuple[Array, Integers]:
+    """B (rows that close loops, m): multipliers of these rows by those that do something; m rows with their measures.
+
+    In planar scenes only those in the plane do.
+    """
+    is_loop = motion.model.loop_rows
+    plane = motion.system.plane if motion.space.is_plane else None
+    if plane is None:
+        return np.eye(int(is_loop.sum())), np.flatnonzero(is_loop)
+    of_loops = is_loop[plane.followed]
+    B = motion.system.row_signs[:, None] * plane.spread
+    return B[np.ix_(is_loop, of_loops)], plane.followed[of_loops]
 
 
 def _side_by_side(motion: SpatialMotion, found: Mapping[str, Wrench]) -> Array:
