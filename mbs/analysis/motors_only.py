@@ -145,8 +145,9 @@ def _run(analysis: MotorsOnly, model: SpatialModel, inversion: Inversion[Spatial
     is_met = np.isfinite(found.q).all(axis=1)
     kept = slice(len(times) if is_met.all() else int(is_met.argmin()))
 
+    how = "two-point problem" if inversion.linearisation.is_future[0].any() else "integrated forward"
     statistics = Statistics(
-        inversion.status, Choice("collocation", ""), steps=len(curve.x) - 1, evaluations=inversion.iterations,
+        inversion.status, Choice("collocation", how), steps=len(curve.x) - 1, evaluations=inversion.iterations,
         cause=cause_of(inversion),
     )  # fmt: skip
     return Outcome(

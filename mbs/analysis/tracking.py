@@ -275,7 +275,10 @@ def _outcome(
         motion=Motion(times, found.q, found.v, found.a, found.loops),
         forces=Forces(required=found.required, voltages=_by_body(context, voltage(times))),
         statistics=Statistics(
-            "completed", Choice("collocation", ""), steps=len(curve.x) - 1, evaluations=tracked.iterations
+            "completed",
+            Choice("collocation", "interior-point method"),
+            steps=len(curve.x) - 1,
+            evaluations=tracked.iterations,
         ),
         prescribed=Prescription(
             servo.equations, shape_of(curve, servo.mode_counts), servo.near[0],
