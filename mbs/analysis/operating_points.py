@@ -66,7 +66,7 @@ class InstantAnalysis(Analysis):
 
 def of_earlier(source: Outcome, analysis: Analysis) -> Outcome:
     """The motion of `source` as that of `analysis`, which has made no steps of its own."""
-    statistics = replace(source.statistics, steps=0, evaluations=0, warnings=())
+    statistics = replace(source.statistics, steps=0, evaluations=0, wall_seconds=0.0, warnings=())
     return replace(source, analysis=analysis, statistics=statistics, prescribed=None, look_closer=None)
 
 

@@ -43,6 +43,9 @@ def test_planar_robot_put_into_space_gets_the_same_patches(tmp_path):
         expected, found = (results["path/placement/largest_voltage"] for results in (plane, space))
         np.testing.assert_allclose(found, expected, rtol=1e-6)
         assert len(expected) == 2
+        for results in (plane, space):
+            assert results.attributes("path")["wall_seconds"] == 0.0  # the integration was that of "inverse"
+            assert results.attributes("path")["steps"] == 0 < results.attributes("inverse")["steps"]
 
 
 STRIP = {
