@@ -149,9 +149,9 @@ def told_loops(model: SpatialModel, q: Array, v: Array) -> str:
     if not ratio < NEARLY_SINGULAR:
         return ""
     return (
-        f"the loops that {quoted(dict.fromkeys(row.owner for row in loops.rows))} close are singular or nearly so there"
-        f" (ratio of singular values {ratio:.1g}): a mechanism at a dead center, or cranks and coupler in a line, where"
-        " no finite force determines which way to go on. Keep clear of it, or drive a joint instead"
+        f"the configuration is singular or nearly so (ratio of singular values {ratio:.1g}; loops that"
+        f" {quoted(dict.fromkeys(row.owner for row in loops.rows))} close): a mechanism at a dead center, or cranks and"
+        " coupler in a line, where no finite force says which way to go on. Keep clear of it, or drive a joint instead"
     )
 
 
