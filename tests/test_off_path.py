@@ -26,3 +26,31 @@ def test_linear_and_static_analyses_are_not(solved):
     for name in results.analyses:
         if results.attributes(name)["kind"] != "forward":
             assert "off its path" not in results.verdict[name].answer
+
+
+@pytest.mark.parametrize(
+    ("motor", "message"),
+    [(None, r"motors that fit the mechanism \(2 of them\) for \"joints\", found 1"), (False, "none")],
+)
+def test_moments_that_were_not_computed_are_not_replayed(motor, message):
+    """Of planar scenes with other motors than the mechanism needs; the rest of the file is right."""
+    points = {"root": [0.0, 0.0], "tip": [1.0, 0.0]}
+    bar = {"mass": 1.0, "inertia": 0.1, "center": [0.5, 0.0], "points": points}
+    scene = ffrobot.make_scene(
+        name="arm",
+        gravity=[0.0, -9.81],
+        body=[{"name": name, "rigid": bar} for name in ("upper", "fore")],
+        joint=[
+            {"name": "O", "type": "revolute", "between": ["ground", "upper.root"], "motor": False},
+            {"name": "A", "type": "revolute", "between": ["upper.tip", "fore.root"], "motor": motor},
+        ],
+        initial={"angles": {"upper": 0.0, "fore": 1.0}},
+        trajectory=[{"name": "tip", "point": "fore.tip", "x": "1 + cos(1)", "y": "sin(1) + 0.1*t**2"}],
+        analysis=[
+            {"name": "inverse", "kind": "pcid", "end": 0.1, "output_step": 0.01},
+            {"name": "again", "kind": "forward", "end": 0.1, "output_step": 0.01}
+            | {"actuation": "inverse", "apply": "joints"},
+        ],
+    )
+    with pytest.raises(ffrobot.InputError, match=message):
+        ffrobot.solve(scene)

@@ -20,6 +20,7 @@ from ..model.spatial_frame_motors import motor_commands
 from ..model.spatial_gears import with_compliance_in_space
 from ..model.spatial_model import SpatialModel, modal_directions, without_paths
 from ..scene.analysis import ActuatedAnalysis, Analysis, Need
+from ..solve.spatial_posture import mobility
 from ..solve.spatial_statics import hanging_joints, initial_state
 from ..solve.state import State
 from .context import Context, PatchedLink
@@ -122,7 +123,7 @@ def _replayed(context: Context, source: Outcome, analysis: Forward) -> Replayed:
         chosen = list(context.at_points(source))
         at_points = {point: dict(zip("xyz", range(3 * k, 3 * k + 3), strict=True)) for k, point in enumerate(chosen)}
         return Replayed(point_numbers(source, context.points), (nothing,) * (3 * len(chosen)), at_points)
-    _check_motors(model, analysis)
+    _check_motors(model, analysis, source.q[0])
     patches = context.patches if analysis.apply == "joints+pzt" else {}
     found = supplied(source, largest_moments(model, limits=analysis.limits), patches, limited=analysis.limits)
     return Replayed(found, actuator_commands(model, patches), moments=numbers_of_motors(model))
@@ -152,6 +153,7 @@ def _behind_gears(source: Outcome, model: SpatialModel, analysis: Forward, conte
             f'{model.scene.path}: analysis "{analysis.name}": actuation: expected an inverse analysis for joints'
             f' with stiffness, found "{source.analysis.name}"'
         )
+    _check_motors(source.model, analysis, source.q[0])
     wound = wound_up(source, model)
     most = largest_moments(source.model, limits=analysis.limits)
     wanted = np.hstack([wound.moments[joint] for joint in model.motors])
@@ -177,9 +179,16 @@ def largest_moments(model: SpatialModel, *, limits: bool) -> Array:
     return most if limits else np.full_like(most, np.inf)
 
 
-def _check_motors(model: SpatialModel, analysis: Forward) -> None:
+def _check_motors(model: SpatialModel, analysis: Forward, q: Array) -> None:
+    """Raise `InputError` without motors, and in the plane where their moments were not computed at q (n_q,)."""
+    key = f'{model.scene.path}: analysis "{analysis.name}": apply'
     if not model.motors:
         raise InputError(
-            f'{model.scene.path}: analysis "{analysis.name}": apply: expected joints with motors for'
-            f' "{analysis.apply}", found none: name them with motor = true'
+            f'{key}: expected joints with motors for "{analysis.apply}", found none: name them with motor = true'
+        )
+    found, freedom = sum(map(len, model.motors.values())), mobility(model, q).freedom
+    if model.scene.is_planar and found != freedom:
+        raise InputError(
+            f'{key}: expected motors that fit the mechanism ({freedom} of them) for "{analysis.apply}", found {found};'
+            ' name them with motor = true, or use apply = "trajectory"'
         )

@@ -219,7 +219,6 @@ def by_section(compute: Callable[[Section], T]) -> Callable[[Section], T]:
 
 def target_rates(model: SpatialModel, q: Array, times: Array, frames: Sequence[Motion] | None = None) -> Array:
     """What C_v v has to be (T, rows), for Ċ = 0; `frames` of q where known."""
-    frames = model.tree.frames(q) if frames is None else frames
     found = np.zeros((len(q), len(model.rows)))
     for k, row in enumerate(model.rows):
         if row.target is not None:
@@ -229,6 +228,7 @@ def target_rates(model: SpatialModel, q: Array, times: Array, frames: Sequence[M
             if row.kind == "rotation":
                 found[:, k] = omega @ row.f
             else:  # f·g with g turning by ω
+                frames = model.tree.frames(q) if frames is None else frames
                 f = np.einsum("tij,j->ti", model.tree.motion(row.a, q, frames).F, row.f)
                 found[:, k] = -np.sum(f * np.cross(omega, row.law.sample(times)[:, :, 2]), axis=-1)
     return found

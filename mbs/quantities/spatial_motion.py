@@ -92,7 +92,7 @@ class SpatialMotion:
         C, C_v = self.rows
         levels = [(C, self.q)]
         if not self.is_at_rest:
-            C_dot = np.einsum("tij,tj->ti", C_v, self.v) - target_rates(self.model, self.q, self.time)
+            C_dot = np.einsum("tij,tj->ti", C_v, self.v) - target_rates(self.model, self.q, self.time, self.frames)
             levels += [(C_dot, self.v), (row_accelerations(self.model, self, self.time), self.a)]
         off = np.zeros((len(self.time), 3))
         for k, (values, size) in enumerate(levels):

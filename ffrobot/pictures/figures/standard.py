@@ -23,6 +23,8 @@ from .shared import (
 )
 from .spatial_standard import spatial_figures
 
+ROUND_OFF = 1e-9  # rad: bodies that turn no further do not turn
+
 
 def standard_figures(results: Results) -> tuple[FigureRecord, ...]:
     """Configurations, paths, angles, deflections, forces, moments and voltages; analyses are laid over each other."""
@@ -69,7 +71,7 @@ def _paths(results: Results) -> Iterator[FigureRecord]:
 def _angles(results: Results) -> Iterator[FigureRecord]:
     for body in members(results, "bodies"):
         datasets = [f"{a}/bodies/{body}/angle" for a in results.analyses if results.has(f"{a}/bodies/{body}/angle")]
-        if any(np.ptp(results.data(name)) for name in datasets):
+        if any(np.ptp(results.data(name)) > ROUND_OFF for name in datasets):
             curves = tuple(Curve(data=name, label=name.split("/")[0]) for name in datasets)
             yield FigureRecord(
                 name=file_name("angle", body), title=f"angle of {body}", curves=curves, y_label="angle (rad)"
