@@ -138,7 +138,7 @@ def mode_acceleration(
         loads: sizes (outputs,) of unit loads by name.
         sections: what layers on the link do to its sections.
     """
-    known = [name for name in loads if name in body.stress_loads]
+    known = [name for name in body.stress_loads if name in loads]
     if not known:
         return mode_displacement(p)
     names = tuple(name for name in known if np.any(loads[name]))
