@@ -1,7 +1,4 @@
-"""Links in pieces in space in linear models and closed loops: as in the plane, and as the one link where it is stiff.
-
-In motion the plane raises the mass of attachment modes, space does not: the links' fast vibrations differ.
-"""
+"""Links in pieces in 3D in linear models and closed loops: as in the plane, and as the one link where it is stiff."""
 
 import numpy as np
 import pytest
@@ -10,8 +7,6 @@ from planar_in_space import joint_keys
 import ffrobot
 from ffrobot.mbs.fields.spelling import place
 from ffrobot.mbs.quantities.spatial_motion import SpatialMotion
-from ffrobot.run.pieces import as_one_link
-from ffrobot.run.solve import solve
 from ffrobot.run.spatial import solve_spatial
 from ffrobot.run.spatial_whole_links import whole_links_in_space
 from ffrobot.run.watcher import Watcher
@@ -93,7 +88,7 @@ def both():
         3, [INVERSE, REST, MOVING, LOOP | {"sensor": [*LOOP["sensor"], {"pzt": "link2"}]}, DESIGN], pzt=PATCHED
     )
     plane, space = (ffrobot.make_scene(**of) for of in (tables, in_space(tables)))
-    return solve(plane), solve_spatial(space, Watcher())
+    return solve_spatial(plane, Watcher()), solve_spatial(space, Watcher())
 
 
 def test_linear_models_are_those_of_the_plane(both):
@@ -117,19 +112,17 @@ def test_linear_models_are_those_of_the_plane(both):
 
 def test_controllers_know_the_whole_links(both):
     """Modal coordinates of these, their rates and accelerations along the motion, as the plane tells them."""
-    plane, space = both
-    inverse = plane.outcomes["inverse"]
-    told = as_one_link(inverse.in_pieces, plane.whole, plane.bodies, plane.divided, plane.parts)
-    found = whole_links_in_space(space).told(space.outcomes["inverse"])
-    for node in found.model.tree.nodes:
-        columns = told.coordinates(node.body.name)
-        in_plane, to_file = plane.bodies[node.body.name].planar.modal_transform.T, node.body.modal_transform.T
-        for values, expected in ((found.q[:, node.p_q], told.q), (found.v[:, node.p_v], told.v)):
-            of_link = expected[:, columns][:, 3:] @ in_plane
-            np.testing.assert_allclose(values @ to_file, of_link, atol=1e-4 * np.abs(expected).max())
-        second = told.a[:, columns][:, 3:] @ in_plane
-        np.testing.assert_allclose(found.a[:, node.p_v] @ to_file, second, atol=5e-3 * np.abs(second).max())
-    t = inverse.time
+    told, found = (whole_links_in_space(of).told(of.outcomes["inverse"]) for of in both)
+    for node, of_plane in zip(found.model.tree.nodes, told.model.tree.nodes, strict=True):
+        to_file, in_plane = node.body.modal_transform.T, of_plane.body.modal_transform.T
+        for share, values, expected in (
+            (1e-4, found.q[:, node.p_q], told.q[:, of_plane.p_q]),
+            (1e-4, found.v[:, node.p_v], told.v[:, of_plane.p_v]),
+            (5e-3, found.a[:, node.p_v], told.a[:, of_plane.p_v]),
+        ):
+            of_link = expected @ in_plane
+            np.testing.assert_allclose(values @ to_file, of_link, atol=share * np.abs(of_link).max())
+    t = found.time
     s = 10 * t**3 - 15 * t**4 + 6 * t**5
     for node, path in zip(found.model.tree.nodes, (0.1 + 0.4 * s, 0.5 - 0.6 * s), strict=True):
         np.testing.assert_allclose(found.q[:, node.q][:, 0], path, atol=1e-9)
@@ -158,10 +151,10 @@ def test_patches_across_cuts_are_those_of_the_plane():
     """
     path = [{"name": "tip", "point": "link2.tip", "x": f"1.82-0.2*{S}", "y": f"0.66+0.2*{S}"}]
     tables = arm(3, [INVERSE, REPLAY], pzt=PATCHED, trajectory=path)
-    plane = solve(ffrobot.make_scene(**tables))
+    plane = solve_spatial(ffrobot.make_scene(**tables), Watcher())
     space = solve_spatial(ffrobot.make_scene(**in_space(tables)), Watcher())
     for link in CONDITIONS:
-        expected, found = plane.analyses["inverse"].voltages[link], space.analyses["inverse"].actuation.voltages[link]
+        expected, found = (of.analyses["inverse"].actuation.voltages[link] for of in (plane, space))
         assert np.abs(expected.required).max() > 10.0
         a, b = expected.required, found.required
         np.testing.assert_allclose(b[0], a[0], rtol=0, atol=1e-8 * np.abs(a[0]).max())

@@ -7,6 +7,7 @@ import numpy as np
 import planar_in_space
 import pytest
 from checkpoints import CASES
+from planar_bodies import from_modal_body as planar_body
 from planar_in_space import CRANK, REST, STRAIGHT, TIGHT, TWO_LINK, close, compare_two_links
 from rod_chain import falling_tip
 from scipy.linalg import eigh
@@ -14,7 +15,6 @@ from scipy.linalg import eigh
 import ffrobot
 from ffrobot.fe_models.link import computed_modal_body
 from ffrobot.fe_models.modal_body_file import write_modal_body
-from ffrobot.mbs.model.planar_body import from_modal_body as planar_body
 from ffrobot.mbs.model.spatial_body import from_modal_body as spatial_body
 
 LINK = """
