@@ -109,7 +109,8 @@ def test_point_forces_reproduce_the_motion(solved):
             assert group.attrs["rank"] == 13
             assert group["force"].shape == (301, 13)
             assert group["residual"].shape == (301,)
-            assert peak(group["residual"]) < 1e-11
+            rounding = 1e-15 * group.attrs["condition_number"]
+            assert peak(group["residual"]) <= rounding * peak(group["force"])
             for name in ("angle", "modal"):
                 of_both = [file[f"{analysis}/bodies/{body}/{name}"][()] for analysis in (source, forward)]
                 assert np.abs(of_both[1] - of_both[0]).max() < 1e-9
