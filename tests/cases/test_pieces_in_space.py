@@ -242,8 +242,7 @@ def test_rates_of_the_one_link_are_derivatives(condition):
 def test_pieces_are_those_of_the_plane():
     """A double pendulum in pieces in space, and in the plane of links cut by hand and welded, with stiffening.
 
-    At rest the same but for rounding. Where it falls the plane raises the mass of attachment modes, space does not: the
-    links' fast vibrations differ.
+    At rest the same but for rounding, where it falls to the tolerance of its steps.
     """
     soft = link(5e9, modes={"count": 8, "family": "in-plane-bending"})
     runs = [
@@ -276,7 +275,7 @@ def test_pieces_are_those_of_the_plane():
     keys = {"load": load, "initial": {"joints": {"O": -1.2}}, "analysis": runs}
     spatial = solved(bodies, gravity=[0.0, -9.81, 0.0], joint=in_space, **keys)
     with spatial, ffrobot.solve(planar) as plane:
-        for analysis, share in (("rest", 1e-8), ("fall", 5e-4)):
+        for analysis, share in (("rest", 1e-8), ("fall", 1e-5)):
             for point, by in (
                 ("first.tip", "first1.tip"),
                 ("second.tip", "second1.tip"),
