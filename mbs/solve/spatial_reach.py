@@ -34,10 +34,13 @@ class _Chain(NamedTuple):
 
 def out_of_reach(model: SpatialModel, times: Array) -> str:
     """How far the first path that leads beyond the reach of the links does, at the first of `times` (T,); else ""."""
-    for path in model.scene.trajectory:
-        if text := _beyond(model, path, times):
-            return text
-    return ""
+    return next((f'trajectory "{name}" {how}' for name, how in _all_beyond(model, times)), "")
+
+
+def _all_beyond(model: SpatialModel, times: Array) -> Iterator[tuple[str, str]]:
+    """Each path that leads beyond the reach of the links at some of `times` (T,): its name, and how far."""
+    found = ((path.name, _beyond(model, path, times)) for path in model.scene.trajectory)
+    yield from ((name, how) for name, how in found if how)
 
 
 def check_reach(model: SpatialModel, end: float) -> None:
@@ -45,8 +48,10 @@ def check_reach(model: SpatialModel, end: float) -> None:
 
     Flexible links would stretch beyond all sense instead of failing.
     """
-    if text := out_of_reach(model, as_floats(np.linspace(0.0, end, REACH_CHECKS))):
-        raise InputError(f"{model.scene.path}: expected paths within reach of the links, found that {text}")
+    for name, how in _all_beyond(model, as_floats(np.linspace(0.0, end, REACH_CHECKS))):
+        raise InputError(
+            f'{model.scene.path}: trajectory "{name}": expected a target within reach, found one that {how}'
+        )
 
 
 def _beyond(model: SpatialModel, path: SpatialTrajectory, times: Array) -> str:
@@ -63,7 +68,7 @@ def _beyond(model: SpatialModel, path: SpatialTrajectory, times: Array) -> str:
     first, along = distance[beyond[0]], "" if len(places) == len(axes) else f" along {' and '.join(places)}"
     unit = ': are these m? (mm are written "750*mm")' if first > 10 * chain.reach else ""
     return (
-        f'trajectory "{path.name}" is {first:.4g} m{along} from joint "{chain.joint}" on the ground at t ='
+        f'is {first:.4g} m{along} from joint "{chain.joint}" on the ground at t ='
         f" {times[beyond[0]]:.6g} s, from which the links reach {chain.reach:.4g} m{unit}"
     )
 
