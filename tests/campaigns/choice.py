@@ -18,13 +18,11 @@ import numpy as np
 sys.path.append(str(Path(__file__).parents[1] / "mbs"))
 
 from links import ANGLES, TIP, arm, arm_links, quintic, ritz_link
-from mechanisms import always, forward, make_model, pcid, revolute
+from mechanisms import forward, make_model, pcid, revolute
+from planar_runs import run
 from record import record
 
-from ffrobot.mbs.analysis.forward import run_forward
-from ffrobot.mbs.analysis.motors_only import MotorsOnly, run_motors_only
-from ffrobot.mbs.analysis.pcid import run_pcid
-from ffrobot.mbs.analysis.replay import ActuatorSet
+from ffrobot.mbs.analysis.motors_only import MotorsOnly
 
 SINGLE = ("dop853", "radau", "dopri5")
 EVALUATIONS = 7  # of a step, of an integrator that takes few
@@ -76,24 +74,23 @@ def slider_crank(EI, damping):
 
 
 def inverse_of(model):
-    return lambda **keys: run_pcid(model, pcid(**keys), False, always)
+    return lambda **keys: run(model, pcid(**keys))
 
 
 def motion_of(model, end):
-    return lambda **keys: run_forward(model, forward(end=end, **keys), None, ActuatorSet(), always)
+    return lambda **keys: run(model, forward(end=end, **keys))
 
 
 def replay_of(model, apply):
-    source = run_pcid(model, pcid(tolerance=1e-6, integrator="dop853"), True, always)
+    source = run(model, pcid(tolerance=1e-6, integrator="dop853"))
     keys_of = {"actuation": "inverse", "apply": apply}
-    return lambda **keys: run_forward(model, forward(**keys_of, **keys), source, ActuatorSet(), always)
+    return lambda **keys: run(model, forward(**keys_of, **keys), source)
 
 
 def motors_only_replay_of(model):
-    analysis = MotorsOnly(name="exact", kind="motors-only", end=1.0, output_step=0.01)
-    source = run_motors_only(model, analysis, always)
-    keys_of = {"actuation": "exact", "apply": "joints"}
-    return lambda **keys: run_forward(model, forward(**keys_of, **keys), source, ActuatorSet(), always)
+    source = run(model, MotorsOnly(name="inverse", kind="motors-only", end=1.0, output_step=0.01))
+    keys_of = {"actuation": "inverse", "apply": "joints"}
+    return lambda **keys: run(model, forward(**keys_of, **keys), source)
 
 
 def runs():
@@ -124,13 +121,13 @@ def runs():
     yield "forward run under motors-only torques", lambda: motors_only_replay_of(arm(damped(0.02), **section)), every
 
 
-def measured(run, tolerance, repeat):
+def measured(solved, tolerance, repeat):
     """By integrator: seconds, evaluations, what ran; None where it did not complete. All of them in turn."""
     found, names, limits = {}, ["auto", *SINGLE], {"max_steps": 400_000}
     for _ in range(repeat):
         for integrator in tuple(names):
             before = time.process_time()
-            outcome = run(tolerance=tolerance, integrator=integrator, **limits)
+            outcome = solved(tolerance=tolerance, integrator=integrator, **limits)
             seconds, counts = time.process_time() - before, outcome.statistics
             if outcome.status != "completed":
                 names.remove(integrator)
@@ -173,17 +170,17 @@ def main():
     with asked.file.open("a") as file:
         for name, make, tolerances in runs():
             wanted = [tolerance for tolerance in tolerances if (name, tolerance) not in known]
-            run = make() if wanted else None
+            solved = make() if wanted else None
             for tolerance in wanted:
-                records.append({"run": name, "tolerance": tolerance} | measured(run, tolerance, asked.repeat))
+                records.append({"run": name, "tolerance": tolerance} | measured(solved, tolerance, asked.repeat))
                 file.write(json.dumps(records[-1]) + "\n")
                 file.flush()
     print("\n".join(table(records)))
     times = sorted((against_best(one)[1], one["run"], one["tolerance"]) for one in records)
-    median, (worst, run, tolerance) = times[len(times) // 2][0], times[-1]
+    median, (worst, of, tolerance) = times[len(times) // 2][0], times[-1]
     slow = sum(over > AIM for over, *_ in times)
     found = (
-        f"{slow} above {AIM} times the best single one; median {median:.2f}, worst {worst:.2f} ({run}, {tolerance:g})"
+        f"{slow} above {AIM} times the best single one; median {median:.2f}, worst {worst:.2f} ({of}, {tolerance:g})"
     )
     print(found)
     if asked.record:

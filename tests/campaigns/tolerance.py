@@ -3,154 +3,122 @@
     python tests/campaigns/tolerance.py found.jsonl [--space] [--count 200] [--seeds 1 2] [--record]
 
 Robots that are in the file already are not run again. Each is run by every integrator at random tolerances. Errors are
-differences to a run at 3e-11, in parts of the history's peak and in tolerances. Histories smaller than a thousandth of
+differences to a run at 1e-10, in parts of the history's peak and in tolerances. Histories smaller than a thousandth of
 the largest of their kind count in parts of that. Modal velocities count relative to √m times the velocity of their
 body where that is larger than their own peak, rates of joints to 0.01 rad in the time of the run.
 """
 
 import argparse
 import json
+import tempfile
 from collections import defaultdict
-from dataclasses import replace
 from pathlib import Path
 
+import h5py
 import numpy as np
-from judging import (
-    largest,
-    largest_errors,
-    nothing_of_rounding,
-    peaks,
-    record_of_run,
-    with_body_velocity,
-    with_slow_rates,
-)
+from judging import largest_errors, nothing_of_rounding, peaks, record_of_run, with_body_velocity, with_slow_rates
 from random_robots import random_scene
 from record import record
-from spatial_tolerance import EXACT as EXACT_IN_SPACE
-from spatial_tolerance import RUNS as RUNS_IN_SPACE
-from spatial_tolerance import try_spatial_robot
+from spatial_robots import random_spatial_scene
 
-from ffrobot.actuation.patches.voltages import solve_voltages
+import ffrobot
 from ffrobot.common.errors import FfrobotError
-from ffrobot.mbs.analysis.forward import run_forward
-from ffrobot.mbs.analysis.pcid import run_pcid
-from ffrobot.mbs.analysis.replay import ActuatorSet
-from ffrobot.mbs.model.system import MechanismSystem
-from ffrobot.mbs.quantities.observation import joint_forces, point_motion, trajectory_force
-from ffrobot.mbs.solve.initial_state import undeformed_state
-from ffrobot.mbs.solve.vibration import vibrations
-from ffrobot.run.prepare import prepare
+from ffrobot.mbs.solve.spatial_start import undeformed_posture
+from ffrobot.mbs.solve.vibration import vibrations_in_space, without_rows
+from ffrobot.run.spatial import prepare_spatial
 from ffrobot.run.watcher import Watcher
 
-EXACT = 3e-11
-RUNS = {  # powers of ten between which tolerances are drawn, those that an integrator's order is made for; how many;
-    # steps that a run may take: those of low order are many and cheap
-    "dop853": (-8, -3, 3, 15_000),
-    "dopri5": (-7, -3, 2, 15_000),
-    "radau": (-7, -2, 2, 15_000),
-    "generalized-alpha": (-3.5, -2, 1, 100_000),
-    "auto": (-7, -2, 2, 15_000),
+EXACT = 1e-10  # the least that a scene may ask for
+RUNS_IN_SPACE = {  # powers of ten between which tolerances are drawn, those that an integrator's order is made for; how
+    "dop853": (-7, -3, 3),  # many
+    "dopri5": (-7, -3, 2),
+    "radau": (-7, -2, 2),
+    "auto": (-7, -2, 2),
 }
-MOST_RADIANS = 1_500.0  # of the highest vibration in a run: keeps it short
-MOST_STEPS_EXACT = 60_000
+RUNS = {
+    "dop853": (-8, -3, 3),
+    "dopri5": (-7, -3, 2),
+    "radau": (-7, -2, 2),
+    "generalized-alpha": (-3.5, -2, 1),
+    "auto": (-7, -2, 2),
+}
+MOST_RADIANS = 1_500.0  # of the highest vibration in a planar run: keeps it short
+MOST_STEPS = 100_000
+KINDS = {
+    "bodies": ("position", "angle", "modal", "modal_velocity", "modal_force"),
+    "points": ("position", "deflection"),
+    "joints": ("coordinate", "rate", "moment", "reaction", "reaction_moment"),
+    "trajectories": ("force", "moment"),
+    "pzt": ("required_voltage",),
+}
 
 
-def solved(prepared, **keys):
-    """The outcome of the scene's one analysis with other keys."""
-    analysis = prepared.scene.analysis[0].model_copy(update=keys)
-    if analysis.kind == "pcid":
-        return run_pcid(prepared.model, analysis, False, lambda _: True)
-    return run_forward(prepared.model, analysis, None, ActuatorSet(), lambda _: True)
-
-
-def prepared_robot(seed, number):
-    """Its kind and what is to be solved, with an end before the highest vibration has gone through `MOST_RADIANS`."""
+def planar_scene(seed, number, analyses):
+    """Its kind and scene, with an end before the highest vibration has gone through `MOST_RADIANS`."""
     kind, scene = random_scene(seed, number)
-    prepared = prepare(scene, Watcher())
-    analysis, model = scene.analysis[0], prepared.model
-    system = MechanismSystem(model, [*model.joints, *model.trajectories])
-    top = float(vibrations(system, undeformed_state(system)).frequency[-1])
+    model, (analysis,) = prepare_spatial(scene, Watcher()).model, scene.analysis
+    top = float(vibrations_in_space(model, without_rows(model), 0.0, undeformed_posture(model).q).frequency[-1])
     shorter = min(1.0, MOST_RADIANS / (top * analysis.end))
-    times = {"end": shorter * analysis.end, "output_step": shorter * analysis.output_step}
-    shortened = prepared.scene.model_copy(update={"analysis": (analysis.model_copy(update=times),)})
-    return kind, replace(prepared, scene=shortened)
+    times = {"end": shorter * analysis.end, "output_step": shorter * analysis.output_step, "max_steps": MOST_STEPS}
+    copies = [times | {"name": name, "tolerance": at, "integrator": by} for name, at, by in analyses]
+    return kind, scene.model_copy(update={"analysis": tuple(analysis.model_copy(update=keys) for keys in copies)})
 
 
-def histories(prepared, outcome):
-    """What is reported, by kind and name: (T,) or (T, columns)."""
+def spatial_scene(seed, number, analyses):
+    """Its kind and scene."""
+    return random_spatial_scene(seed, number, analyses, MOST_STEPS)
+
+
+def histories(file, name):
+    """What one analysis reports, by kind and owner: (T,) or (T, columns)."""
     found = defaultdict(dict)
-    sections = {None: (np.zeros(len(outcome.time)),) * 2}  # angle and rate at each point, of the ground
-    for body in outcome.assembly.model.bodies:
-        columns = outcome.coordinates(body.name)
-        q, v = outcome.q[:, columns], outcome.v[:, columns]
-        found["position"][body.name], found["angle"][body.name] = q[:, :2], q[:, 2]
-        for label, point in body.points.items():
-            name = f"{body.name}.{label}"
-            motion = point_motion(outcome, name)
-            found["position"][name] = motion.position
-            sections[name] = q[:, 2] + q[:, 3:] @ point.rotation, v[:, 2] + v[:, 3:] @ point.rotation
-            if body.n_modes:
-                found["deflection"][name] = motion.deflection
-        if body.n_modes:
-            found["modal"][body.name], found["modal velocity"][body.name] = q[:, 3:], v[:, 3:]
-            if outcome.F_p is not None:
-                F_p = outcome.F_p[:, outcome.modal_columns(body.name)]
-                found["modal force"][body.name] = F_p
-                if body.name in prepared.patches:
-                    found["voltage"][body.name] = solve_voltages(prepared.patches[body.name], F_p).required
-    for joint in prepared.scene.joint:
-        forces = joint_forces(outcome, joint.name)
-        found["reaction"][joint.name] = forces.reaction
-        if joint.type == "revolute":
-            first, second = (sections[None if end == "ground" else end] for end in joint.between)
-            found["joint coordinate"][joint.name] = second[0] - first[0]
-            found["joint rate"][joint.name] = second[1] - first[1]
-        if forces.motor is not None:
-            found["moment"][joint.name] = forces.motor
-    held = {c.owner for c in outcome.assembly.constraints if c.is_trajectory}
-    for trajectory in prepared.scene.trajectory:
-        if trajectory.name in held:
-            kind = "force" if trajectory.point else "moment"
-            found[kind][f"of {trajectory.name}"] = trajectory_force(outcome, trajectory.name)
+    for group, kinds in KINDS.items():
+        for owner, part in file[name].get(group, {}).items():
+            for kind in kinds:
+                if kind in part and part[kind].size:
+                    found[f"{group}/{kind}"][owner] = part[kind][()]
     return found
 
 
-def scales(outcome, exact):
-    """What the error of each history counts relative to, by kind and name; zero where it is but rounding."""
+def scales(file, exact, duration):
+    """What the error of each history counts relative to, by kind and owner; zero where it is but rounding."""
     found = peaks(exact)
-    for body in outcome.assembly.model.bodies:
-        v = outcome.v[:, outcome.coordinates(body.name)]
-        fastest = max(largest(np.hypot(v[:, 0], v[:, 1])), largest(v[:, 2]) * (body.length or 0.0))
-        if body.n_modes:
-            own = found["modal velocity"][body.name]
-            found["modal velocity"][body.name] = with_body_velocity(own, body.mass, fastest)
-    found["joint rate"] = with_slow_rates(found.get("joint rate", {}), float(outcome.time[-1] - outcome.time[0]))
-    nothing_of_rounding(found, ("modal force", "voltage"), max(found["reaction"].values()))
+    files = json.loads(file.attrs["modal_bodies"])
+    for owner, own in found.get("bodies/modal_velocity", {}).items():
+        if owner not in files:  # rigid
+            continue
+        with h5py.File(files[owner]["path"]) as body:
+            mass, length = float(body["mass"][()]), float(body["length"][()])
+        moving = file["exact/bodies"][owner]
+        velocity, turning = (np.abs(moving[key][()]).max() for key in ("velocity", "angular_velocity"))
+        found["bodies/modal_velocity"][owner] = with_body_velocity(own, mass, max(velocity, turning * length))
+    nothing_of_rounding(found, ("bodies/modal_force", "pzt/required_voltage"), max(found["joints/reaction"].values()))
+    found["joints/rate"] = with_slow_rates(found.get("joints/rate", {}), duration)
     return found
 
 
-def try_robot(seed, number, integrators=tuple(RUNS)):
+def try_robot(seed, number, integrators=None, *, space=False):
     """Record of one robot: by integrator and tolerance, steps, evaluations and the largest error of each kind."""
-    rng = np.random.default_rng([seed, number, 1])
-    found = {"seed": seed, "number": number, "runs": []}
+    rng, of_all = np.random.default_rng([seed, number, 1]), RUNS_IN_SPACE if space else RUNS
+    drawn = [(by, 10**power) for by, (low, high, n) in of_all.items() for power in rng.uniform(low, high, n)]
+    runs = [(f"{by}{k}", float(f"{at:.2g}"), by) for k, (by, at) in enumerate(drawn) if by in (integrators or of_all)]
+    found = {"seed": seed, "number": number, "space": space, "runs": []}
     try:
-        found["kind"], prepared = prepared_robot(seed, number)
-        reference = solved(prepared, tolerance=EXACT, integrator="dop853", max_steps=MOST_STEPS_EXACT)
+        make = spatial_scene if space else planar_scene
+        found["kind"], scene = make(seed, number, [("exact", EXACT, "dop853"), *runs])
+        results = ffrobot.solve(scene)
     except FfrobotError as error:
         return found | {"left out": str(error)}
-    if reference.status != "completed":
-        return found | {"left out": reference.status}
-    exact = histories(prepared, reference)
-    scale = scales(reference, exact)
-    for integrator, (low, high, count, most_steps) in RUNS.items():
-        powers = rng.uniform(low, high, count)  # drawn for all, so that they do not hang on which are asked for
-        for power in powers if integrator in integrators else ():
-            tolerance = float(f"{10**power:.2g}")
-            outcome = solved(prepared, tolerance=tolerance, integrator=integrator, max_steps=most_steps)
+    with tempfile.TemporaryDirectory() as folder, h5py.File(results.save(Path(folder) / "robot.h5")) as file:
+        if file["exact"].attrs["status"] != "completed":
+            return found | {"left out": str(file["exact"].attrs["status"])}
+        exact = histories(file, "exact")
+        scale = scales(file, exact, scene.analysis[0].end)
+        for name, tolerance, by in runs:
+            done = file[name].attrs
             run = record_of_run(
-                integrator, outcome.statistics.integrator.name, tolerance, outcome.status,
-                outcome.statistics.evaluations,
-                lambda outcome=outcome: largest_errors(histories(prepared, outcome), exact, scale),
+                by, done["integrator"], tolerance, done["status"], done["evaluations"],
+                lambda name=name: largest_errors(histories(file, name), exact, scale),
             )  # fmt: skip
             found["runs"].append(run)
     return found
@@ -179,9 +147,7 @@ def main():
     parser.add_argument("--integrators", choices=list(RUNS), nargs="+")
     parser.add_argument("--record", action="store_true", help="write the counts, for docs/developer/stress_tests.md")
     asked = parser.parse_args()
-    of_all, exact, attempt = (
-        (RUNS_IN_SPACE, EXACT_IN_SPACE, try_spatial_robot) if asked.space else (RUNS, EXACT, try_robot)
-    )
+    of_all = RUNS_IN_SPACE if asked.space else RUNS
     text = asked.file.read_text() if asked.file.exists() else ""
     wanted = [(seed, number) for seed in asked.seeds for number in range(asked.count)]
     records = {(one["seed"], one["number"]): one for one in map(json.loads, text.splitlines())}
@@ -189,18 +155,18 @@ def main():
     with asked.file.open("a") as file:
         for key in wanted:
             if key not in records:
-                records[key] = attempt(*key, asked.integrators or tuple(of_all))
+                records[key] = try_robot(*key, asked.integrators, space=asked.space)
                 file.write(json.dumps(records[key]) + "\n")
                 file.flush()
     for integrator, robots, done, too_long, outside, worst, kind in counts(records.values()):
         found = f"{outside} outside, {100 * (1 - outside / done):.1f} % kept, worst {worst:.2f} times ({kind})"
         print(f"{integrator}: {done} runs of {robots} robots, {too_long} too long; {found}")
         if asked.record:
-            low, high, *_ = of_all[integrator]
+            low, high, _ = of_all[integrator]
             where = " in space" if asked.space else ""
             tried = (
                 f'`integrator = "{integrator}"`: {done} runs of {robots} random arms, chains and loops{where},'
-                f" tolerances 1e{low:g} … 1e{high:g}, every output of every history against {exact:g}"
+                f" tolerances 1e{low:g} … 1e{high:g}, every output of every history against {EXACT:g}"
             )
             record(f"tolerance{'-space' if asked.space else ''}-{integrator}", tried=tried, found=found)
 

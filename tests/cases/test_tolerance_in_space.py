@@ -7,7 +7,7 @@ import h5py
 import pytest
 from judging import largest_errors
 from space import write_scene
-from spatial_tolerance import histories, scales
+from tolerance import histories, scales
 
 # Reactions that were outside before they were judged, by that many tolerances
 OUTSIDE = {"stanford, radau": ("stanford", 1e-6, "radau"),  # 3.4
