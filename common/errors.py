@@ -55,7 +55,8 @@ def of_file(name: object) -> Iterator[None]:
     except StoppedError:
         raise
     except (InputError, SolveError) as error:
-        if str(error).startswith(str(name)) or Path(str(error).partition(":")[0]).suffix:  # of another file
+        first = str(error).partition(":")[0]  # this file, or another one
+        if str(error).startswith(str(name)) or str(name).startswith(f"{first}:") or Path(first).suffix:
             raise
         raise type(error)(f"{name}: {error}") from None
     except (LinAlgError, FloatingPointError) as error:

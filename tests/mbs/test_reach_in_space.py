@@ -60,8 +60,9 @@ def test_a_target_of_a_planar_arm_out_of_reach_is_told():
         analysis=[{"name": "inverse", "kind": "pcid", "end": 0.1, "output_step": 0.01}],
     )  # fmt: skip
     said = rf'one that is {np.hypot(749.9, 249.8):.4g} m from joint "O" on the ground at t = 0 s, .* 1.4 m: are these m'
-    with pytest.raises(InputError, match=said):
+    with pytest.raises(InputError, match=said) as caught:
         ffrobot.solve(scene)
+    assert str(caught.value).count(str(scene.path)) == 1
 
 
 def test_a_component_out_of_reach_is_told():
