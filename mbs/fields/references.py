@@ -13,8 +13,7 @@ from .field_types import GROUND, split_point
 class Reference:
     """One reference: `key` of the record where it stands, `name` "BODY", "BODY.POINT" or the joint's.
 
-    "patches" are a layout of them (in the plane the body with it), a "patched body" has some, an "elastic joint" has
-    stiffness.
+    "patches" are a layout of them, a "patched body" has some, an "elastic joint" has stiffness.
 
     The equations of motion have a marker at a point that `needs_marker`; forces of the mechanism act there where it
     is `loaded`.
