@@ -57,7 +57,7 @@ def _unwound(angle: Array, rate: Array, times: Array, guess: float) -> tuple[Arr
     """
     if len(times) < 2:
         return angle + 2 * np.pi * np.round((guess - angle) / (2 * np.pi)), True
-    h, slope = np.diff(times), np.gradient(rate, times, edge_order=min(2, len(times) - 1))
+    h, slope = np.diff(times), np.gradient(rate, times, edge_order=2 if len(times) > 2 else 1)
     rough = h * (rate[1:] + rate[:-1]) / 2
     way = rough - h**2 * np.diff(slope) / 12
     turns = np.round((np.append(guess, way) - np.append(angle[0], np.diff(angle))) / (2 * np.pi))

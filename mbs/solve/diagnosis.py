@@ -32,7 +32,7 @@ def find_cause_in_space(system: SpatialSystem, analysis: IntegratedAnalysis, cho
         or too_far_bent(_links(system, at))
         or load_jump(_loads(system), t)
         or _friction(system, analysis, choice, at)
-        or told_loops(system.model, at.q, at.v)
+        or told_loops(system.model, t, at.q, at.v)
     )
     if found or run.status != _core.IntegrationStatus.step_underflow:
         return found
@@ -84,7 +84,8 @@ def too_far_bent(links: Iterable[tuple[str, Array, float]]) -> str:
 def _loads(system: SpatialSystem) -> Iterator[tuple[str, TimeFunction]]:
     for load in system.model.scene.load:
         for name, size in load.components.items():
-            yield f'load on "{load.point or load.joint or load.pzt}", {name},', size
+            component = name.removesuffix("[0]") if len(load.moments) == 1 else name
+            yield f'load on "{load.point or load.joint or load.pzt}", {component},', size
 
 
 def load_jump(loads: Iterable[tuple[str, TimeFunction]], t: float) -> str:

@@ -138,21 +138,39 @@ def told_posture(model: SpatialModel, ratio: float, t: float, q: Array, *, is_en
     return f"at t = {t:.6g} s {how}: motions of {moving} against each other hardly move what follows the path"
 
 
-def told_loops(model: SpatialModel, q: Array, v: Array) -> str:
-    """Of loops at q (n_q,) that move at v (n_v,): whether their rows hardly differ here, and did before; "" if not."""
+def told_loops(model: SpatialModel, t: float, q: Array, v: Array) -> str:
+    """Of loops, and of paths through them, at q (n_q,), v (n_v,) and time t: whether their rows hardly differ here.
+
+    "" where they do, or did not before.
+    """
     loops = without_paths(model)
     before = solve_posture(loops, 0.0, model.tree.integrate(q, -BESIDE / max(float(np.abs(v).max()), 1e-300) * v))
     if not loops.rows or before is None:
         return ""
-    values, rank = np.linalg.svd(_scaled_rows(loops, q), compute_uv=False), mobility(loops, before).loop_rank
-    ratio = float(values[rank - 1] / values[0])
-    if not ratio < NEARLY_SINGULAR:
-        return ""
-    return (
-        f"the configuration is singular or nearly so (ratio of singular values {ratio:.1g}; loops that"
-        f" {quoted(dict.fromkeys(row.owner for row in loops.rows))} close): a mechanism at a dead center, or cranks and"
-        " coupler in a line, where no finite force says which way to go on. Keep clear of it, or drive a joint instead"
-    )
+    found = mobility(model, before)
+    ratio = _ratio(_scaled_rows(loops, q), found.loop_rank)
+    if ratio < NEARLY_SINGULAR:
+        return (
+            f"the configuration is singular or nearly so (ratio of singular values {ratio:.1g}; loops that"
+            f" {quoted(dict.fromkeys(row.owner for row in loops.rows))} close): a mechanism at a dead center, or cranks"
+            " and coupler in a line, where no finite force says which way to go on. Keep clear of it, or drive a joint"
+            " instead"
+        )
+    ratio = _ratio(_scaled_rows(model, q, t), found.loop_rank + found.followed)
+    if ratio < NEARLY_SINGULAR:
+        paths = quoted(dict.fromkeys(row.owner for row in model.rows if row.is_trajectory))
+        return (
+            f"the configuration is singular or nearly so (ratio of singular values {ratio:.1g}; trajectory {paths}): a"
+            " mechanism at a dead center, where forces on the driven point do not determine the direction of motion."
+            " Keep clear of it, or drive a joint instead"
+        )
+    return ""
+
+
+def _ratio(J: Array, rank: int) -> float:
+    """Of the singular values that are not zero by its `rank`, the least over the largest."""
+    values = np.linalg.svd(J, compute_uv=False)
+    return float(values[rank - 1] / values[0]) if rank else 1.0
 
 
 def _scaled_rows(model: SpatialModel, q: Array, t: float = 0.0) -> Array:

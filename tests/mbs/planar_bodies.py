@@ -178,6 +178,8 @@ def rigid_body(name, mass, inertia, center, points) -> PlanarBody:
     """A body without modes, `inertia` about its center; it is moved to the origin of the frame (Steiner)."""
     none, center = np.zeros(0), np.array(center)
     places = {label: np.array(position) for label, position in points.items()}
+    if {"root", "tip"} <= places.keys():
+        places.setdefault("mid", (places["root"] + places["tip"]) / 2)
     return PlanarBody(
         name=name, mass=mass, inertia=inertia + mass * float(center @ center), first_moment=mass * center,
         stiffness=none, damping=np.zeros((0, 0)), S_bar=np.zeros((2, 0)), h=none, j=none, S_tilde=np.zeros((0, 0)),

@@ -101,7 +101,9 @@ class Seen:
 
     @property
     def lambda_(self):
-        """(T, components) multipliers of the trajectories: minus the forces that follow them."""
+        """(T, components) multipliers of the trajectories; where there are none, minus the reactions of joints."""
+        if not self.robot.scene.trajectory:
+            return -np.hstack([wrench[0][:, :2] for wrench in reactions(self.motion).values()])
         return -np.hstack([self.motion.path_force(path.name) for path in self.robot.scene.trajectory])
 
 

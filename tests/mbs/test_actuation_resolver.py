@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 import velocity_transformation
 import zoo
-from mechanisms import oracle_of, relative
-from planar_runs import evaluated, posture_of
+from mechanisms import oracle_of, pcid, relative
+from planar_runs import evaluated, posture_of, run
 
 from ffrobot.common.errors import InputError
 
@@ -70,7 +70,14 @@ def test_actuation_does_the_work_of_the_trajectory_forces(name):
 
 def test_motors_at_frames_and_sections_share_moments_and_differ_in_modal_forces():
     """With p held, sections and frames turn alike, so τ is the same; the reactions bend the links only at sections."""
-    section, frame = (resolved("chain of 2", motors=motors)[0] for motors in ("section", "frame"))
+    section, robot = resolved("chain of 2")[0], zoo.build("chain of 2", motors="frame")
+    in_tree = []
+    for of_bodies, in_section in ((section.q[0], section.outcome.q[0]), (section.v[0], section.outcome.v[0])):
+        turns = [of_bodies[section.coordinates(name)][2] for name in ("b1", "b2")]
+        moved = in_section.copy()  # frames turn against each other by the coordinates of these motors
+        moved[[robot.model.columns(joint)[0] for joint in ("j1", "j2")]] = turns[0], turns[1] - turns[0]
+        in_tree.append(moved)
+    frame = evaluated(robot, 0.0, *in_tree)
     assert relative(frame.q, section.q) < 1e-12
     assert relative(frame.tau[0], section.tau[0]) < 1e-12
     assert relative(frame.F_p[0], section.F_p[0]) > 1e-2
@@ -80,4 +87,4 @@ def test_too_few_named_motors_are_refused():
     joints = zoo.serial_joints(2)
     joints[0]["motor"], joints[1]["motor"] = True, False
     with pytest.raises(InputError, match=r"as many motors as the mechanism has degrees of freedom \(2\), found 1"):
-        zoo.build("chain of 2", joint=joints).model  # noqa: B018
+        run(zoo.build("chain of 2", joint=joints), pcid())

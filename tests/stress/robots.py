@@ -2,24 +2,20 @@
 
 import numpy as np
 from links import arm, ritz_link
-from mechanisms import always, forward, make_model, oracle_of, pcid, revolute
+from mechanisms import forward, make_model, oracle_of, pcid, revolute
+from planar_bodies import rigid_body
+from planar_runs import energies, run
 from rods import rod
-
-from ffrobot.mbs.analysis.forward import run_forward
-from ffrobot.mbs.analysis.pcid import run_pcid
-from ffrobot.mbs.model.planar_body import from_rigid_body
-from ffrobot.mbs.quantities.observation import energies
-from ffrobot.mbs.scene.bodies import RigidBody
 
 CRANK, ROD = 0.2, 0.5
 
 
 def inverse(model, **keys):
-    return run_pcid(model, pcid(**keys), False, always)
+    return run(model, pcid(**keys))
 
 
 def free_run(model, **keys):
-    return run_forward(model, forward(**keys), None, {}, always)
+    return run(model, forward(**keys))
 
 
 def pendulum(links=None, **keys):
@@ -41,7 +37,7 @@ def slider_crank(trajectory=None, *, flexible=True, angle=0.9, **initial):
         revolute("B", "rod.tip", "slider.pin"),
         {"name": "rail", "type": "prismatic", "between": ("ground", "slider.pin"), "axis": (1.0, 0.0)},
     ]
-    slider = from_rigid_body("slider", RigidBody(mass=0.4, inertia=0.01, center=(0, 0), points={"pin": (0, 0)}))
+    slider = rigid_body("slider", 0.4, 0.01, (0.0, 0.0), {"pin": (0.0, 0.0)})
     flexible_rod = ritz_link("rod", "simply-supported", ROD, 1.5, damping_ratio=0.01)
     bodies = [rod("crank", CRANK, 1.0), flexible_rod if flexible else rod("rod", ROD, 1.5), slider]
     angles = {"crank": angle, "rod": -np.arcsin(CRANK * np.sin(angle) / ROD)}

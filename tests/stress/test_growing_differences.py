@@ -1,42 +1,43 @@
 """Open loop, small differences grow: as fast as the linearised equations say, and no faster."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from links import arm
-from mechanisms import always, evaluate, forward, make_model, pcid, revolute
+from mechanisms import ModalLoad, forward, make_model, oracle_of, pcid, revolute
 from patch_sets import FULL
+from planar_runs import evaluated, run
 from robots import free_run
 from rods import rod
 from table import at_most
 
 from ffrobot.mbs._core import TimeFunction
-from ffrobot.mbs.analysis.forward import run_forward
-from ffrobot.mbs.analysis.pcid import run_pcid
-from ffrobot.mbs.model.model import ModalLoad
-from ffrobot.mbs.model.system import MechanismSystem
 
 GROUP = "Growth of differences, open loop"
 
 
-def fastest_growth(assembly, q):
-    """The largest real part of the eigenvalues (1/s) of the linearised motion about rest at q, by central differences.
+def fastest_growth(robot, q):
+    """The largest real part of the eigenvalues (1/s) of the oracle's motion about rest at q (n_q,) of the tree.
 
-    On independent coordinates: the constraints' null space, with what their curvature adds to the stiffness.
+    By central differences on the coordinates of an open chain: angles of its joints, and modes.
     """
-    system, rest, h = assembly.system, np.zeros_like(q), 1e-5
-    _, _, C_q = system.constraints(0.0, q, rest)
-    free = np.linalg.svd(C_q)[2][len(C_q) :].T
+    h, n = 1e-5, len(q)
+    tree = robot.model.tree
+    seen = evaluated(robot, 0.0, q, 0 * q)
+    oracle, modes = oracle_of(seen.assembly), np.setdiff1d(np.arange(len(seen.q[0])), seen.assembly.frame_coordinates)
+    joints = [(tree.nodes[tree.carried[name]].v.start, row) for name, row in robot.motors.items()]
+    of_modes = np.concatenate([np.arange(node.p_v.start, node.p_v.stop) for node in tree.nodes])
 
-    def acceleration(direction, size):
-        state = q + size * direction
-        for _ in range(3):
-            C, _, J = system.constraints(0.0, state, rest)
-            state = state - np.linalg.lstsq(J, C, rcond=None)[0]
-        return evaluate(assembly, 0.0, state, rest)[0]
+    def acceleration(q):
+        state = evaluated(robot, 0.0, q, 0 * q)
+        a = oracle.solve(0.0, state.q[0], state.v[0])[0]
+        found = np.zeros(n)
+        found[of_modes] = a[modes]
+        for at, row in joints:
+            way = oracle.row(row, state.q[0], state.v[0])
+            found[at] = way.gradient @ a + way.bias
+        return found
 
-    A = np.array([free.T @ (acceleration(d, h) - acceleration(d, -h)) / (2 * h) for d in free.T]).T
+    A = np.array([(acceleration(q + h * e) - acceleration(q - h * e)) / (2 * h) for e in np.eye(n)]).T
     return np.sqrt(np.linalg.eigvals(A).astype(complex)).real.max()
 
 
@@ -47,11 +48,10 @@ def upright(rates):
 def test_arm_that_stands_on_its_head(record):
     """From 1e-9 rad/s on, e-folds are those of the linearised arm until the arm has fallen."""
     outcome = free_run(upright({"link1": 1e-9}), end=4.0, tolerance=1e-10)
-    assembly = outcome.assembly
     turn = np.abs(outcome.q[:, 2] - np.pi / 2)
     early = (outcome.time > 1.5) & (turn < 1e-3)
     rate = np.polyfit(outcome.time[early], np.log(turn[early]), 1)[0]
-    expected = fastest_growth(assembly, outcome.q[0])
+    expected = fastest_growth(outcome.robot, outcome.outcome.q[0])
     assert rate == pytest.approx(expected, rel=2e-3)
     record(
         GROUP,
@@ -93,27 +93,31 @@ def test_chaos_is_that_of_the_equations(record):
 
 def steered(inverse, k):
     """The arm under the moments and modal forces that were found for output k, and held."""
-    model, constant = inverse.assembly.model, TimeFunction.constant
-    modal = tuple(
-        ModalLoad(body.name, inverse.F_p[k, inverse.modal_columns(body.name)], constant(1.0)) for body in model.bodies
-    )
-    moments = [(row, constant(tau)) for row, tau in zip(model.motors.values(), inverse.tau[k], strict=True)]
-    return MechanismSystem(replace(model, modal_loads=modal), model.joints, moments)
+    robot = inverse.robot
+    modal = [
+        ModalLoad(body.name, inverse.F_p[k, inverse.modal_columns(body.name)], TimeFunction.constant(1.0))
+        for body in robot.bodies
+    ]
+    loads = [
+        {"joint": joint, "moment": repr(float(tau))} for joint, tau in zip(robot.motors, inverse.tau[k], strict=True)
+    ]
+    tables = {key: value for key, value in robot.tables.items() if key != "body"}
+    return make_model(robot.bodies, modal, **(tables | {"trajectory": [], "load": loads}))
 
 
 def test_replayed_actuation(record):
     """Nothing holds an arm on its way but moments found before: it falls off it as an arm does that nothing steers."""
     path = {"name": "tip", "point": "link2.tip", "x": "1.2+0.2*cos(t)", "y": "0.9+0.2*sin(t)"}
     model = arm(trajectory=[path], initial={"angles": {"link1": -0.2, "link2": 1.4}})
-    inverse = run_pcid(model, pcid(end=20.0, output_step=0.1, tolerance=1e-6), True, always)
+    inverse = run(model, pcid(end=20.0, output_step=0.1, tolerance=1e-6))
     analysis = forward(end=20.0, output_step=0.1, tolerance=1e-6, actuation="inverse", apply="joints+pzt")
-    replay = run_forward(model, analysis, inverse, FULL, always)
+    replay = run(model, analysis, inverse, FULL)
     assert replay.status == "diverged"
     assert "is bent by" in replay.statistics.cause
     time, departure = replay.time, np.abs(replay.q - inverse.q[: len(replay.q)])[:, 2]
     early = (time > 1.0) & (departure > 1e-10) & (departure < 1e-2)
     rate = np.polyfit(time[early], np.log(departure[early]), 1)[0]
-    expected = np.mean([fastest_growth(steered(inverse, k), inverse.q[k]) for k in np.flatnonzero(early)])
+    expected = np.mean([fastest_growth(steered(inverse, k), inverse.outcome.q[k]) for k in np.flatnonzero(early)])
     assert rate == pytest.approx(expected, rel=0.3)
     record(
         GROUP,

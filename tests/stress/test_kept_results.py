@@ -35,7 +35,7 @@ def test_ends_with_time_cause_and_results(ffrobot, tmp_path, record):
     (message,) = done.stderr.splitlines()
     assert 'analysis "fall" ended at t = 0.500' in message
     assert "(step underflow)" in message
-    assert 'joint "O", angle jumps from' in message
+    assert 'load on "O", moment, jumps from' in message
     with h5py.File(tmp_path / "scene.results.h5") as file:
         fall = file["fall"]
         assert fall.attrs["status"] == "step underflow"
@@ -46,5 +46,5 @@ def test_ends_with_time_cause_and_results(ffrobot, tmp_path, record):
         "Rough inputs",
         "`ffrobot solve` of a scene whose load has a pole",
         "exit code 1, results up to the pole, their attributes `status` and `cause`",
-        'step underflow; “joint "O", angle jumps from … to … there …”',
+        'step underflow; “load on "O", moment, jumps from … to … there …”',
     )

@@ -10,12 +10,13 @@ import pytest
 import tomli_w
 from links import ANGLES, TIP, arm, quintic
 from mechanisms import relative
+from planar_runs import run
 from robots import inverse
 from table import at_most
 from units import SI, SYSTEMS, Units
 
 import ffrobot
-from ffrobot.mbs.analysis.static import Static, run_static
+from ffrobot.mbs.analysis.static import Static
 
 OTHERS = [name for name in SYSTEMS if name != "SI"]
 STATIC = Static(name="rest", kind="static")
@@ -61,7 +62,7 @@ def test_robots_of_any_size(size, record):
 @pytest.mark.parametrize("name", OTHERS)
 def test_statics(name):
     units = SYSTEMS[name]
-    found, expected = (run_static(u.arm(analysis=(STATIC,)), STATIC) for u in (units, SI))
+    found, expected = (run(u.arm(), STATIC) for u in (units, SI))
     assert relative(found.lambda_ / units.force, expected.lambda_) < 1e-10
 
 

@@ -5,8 +5,7 @@ from types import MappingProxyType
 
 from links import ANGLES, TIP, arm_links, quintic
 from mechanisms import make_model, revolute
-
-from ffrobot.mbs.model.planar_body import PlanarPoint
+from planar_bodies import PlanarPoint
 
 
 @dataclass(frozen=True)
