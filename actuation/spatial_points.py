@@ -7,7 +7,7 @@ it, and those that hold a shape.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 from pathlib import Path
@@ -19,7 +19,7 @@ import numpy as np
 from ..common.arrays import Array
 from ..common.errors import InputError
 from ..common.validation import Record, did_you_mean, quoted
-from ..fe_models.modal_body import Interface, ModalBody
+from ..fe_models.modal_body import ModalBody
 from ..mbs.fields.field_types import Name
 from ..mbs.fields.references import Reference
 from ..mbs.fields.spelling import IN_PLANE, IN_SPACE
@@ -170,7 +170,7 @@ def _automatic(key: str, name: str, body: ModalBody | None, spatial: SpatialBody
     """Out of all components at every station, those that QR with column pivoting takes first: far from dependent."""
     from scipy.linalg import qr
 
-    points = [_point(key, place, body, spatial) for place in candidate_places(key, body, spatial.points)]
+    points = [_point(key, place, body, spatial) for place in _candidate_places(key, body, spatial.points)]
     candidates = _named(name, tuple(axis for axis in axes for _ in points), points * len(axes), spatial)
     _, R, order = qr(candidates.scaled(np.zeros((1, spatial.n_modes)))[0], mode="economic", pivoting=True)
     sizes = np.abs(np.diag(R))
@@ -179,29 +179,22 @@ def _automatic(key: str, name: str, body: ModalBody | None, spatial: SpatialBody
 
 
 def _named(name: str, axes: tuple[str, ...], points: list[SpatialPoint], spatial: SpatialBody) -> SpatialPointSet:
-    per_length, per_mass = np.full(3, 1.0 / length_of(spatial)), np.full(spatial.n_modes, np.sqrt(spatial.mass))
+    per_length, per_mass = np.full(3, 1.0 / _length_of(spatial)), np.full(spatial.n_modes, np.sqrt(spatial.mass))
     scale = np.concatenate([np.ones(3), per_length, per_mass])
-    return SpatialPointSet(name, point_names(len(points)), axes, tuple(points), scale)
+    return SpatialPointSet(name, _point_names(len(points)), axes, tuple(points), scale)
 
 
-def _point(key: str, place: Place, body: ModalBody | None, spatial: SpatialBody) -> SpatialPoint:
-    T = spatial.modal_transform
-    return point_at(
-        key, place, body, spatial.points, lambda at: SpatialPoint(at.position, at.translation @ T, at.rotation @ T)
-    )
-
-
-def point_names(count: int) -> tuple[str, ...]:
+def _point_names(count: int) -> tuple[str, ...]:
     """What the points of so many components are called in results."""
     return tuple(f"actuation{k}" for k in range(1, count + 1))
 
 
-def length_of(body: SpatialBody) -> float:
+def _length_of(body: SpatialBody) -> float:
     """By which moments on a body are measured against forces, m."""
     return body.length or max(float(np.linalg.norm(point.position)) for point in body.points.values()) or 1.0
 
 
-def candidate_places(key: str, body: ModalBody | None, points: Mapping[str, SpatialPoint]) -> list[Place]:
+def _candidate_places(key: str, body: ModalBody | None, points: Mapping[str, SpatialPoint]) -> list[Place]:
     """Where components may be put: the stations of a link, the points of a rigid body.
 
     Raises `InputError` where there are none.
@@ -213,17 +206,12 @@ def candidate_places(key: str, body: ModalBody | None, points: Mapping[str, Spat
     return list(points)
 
 
-def point_at(
-    key: str,
-    place: Place,
-    body: ModalBody | None,
-    points: Mapping[str, SpatialPoint],
-    made: Callable[[Interface], SpatialPoint],
-) -> SpatialPoint:
-    """One of the `points` of a body by its name, or the one `made` of the section at a distance from its link's root.
+def _point(key: str, place: Place, body: ModalBody | None, spatial: SpatialBody) -> SpatialPoint:
+    """One of the points of a body by its name, or the section at a distance from its link's root.
 
     Raises `InputError` for a place that the body has not.
     """
+    points = spatial.points
     if isinstance(place, str):
         if place not in points:
             raise InputError(
@@ -235,4 +223,5 @@ def point_at(
     slack = 1e-9 * body.length
     if not -slack <= place <= body.length + slack:
         raise InputError(f"{key}: expected places within the link, 0 … {body.length:g} m, found {place:g} m")
-    return made(body.interpolate(place))
+    at, T = body.interpolate(place), spatial.modal_transform
+    return SpatialPoint(at.position, at.translation @ T, at.rotation @ T)
