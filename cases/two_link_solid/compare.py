@@ -12,9 +12,8 @@ from pathlib import Path
 import matplotlib as mpl
 import numpy as np
 
-from ffrobot.mbs.quantities.observation import joint_forces, trajectory_force
-from ffrobot.run.solution import Solution
-from ffrobot.run.solve import solve
+import ffrobot
+from ffrobot.results.file import Results
 
 mpl.use("Agg")
 from matplotlib import pyplot as plt
@@ -24,7 +23,7 @@ BEAMS = HERE.parent / "two_link"
 THEORY = '\n[model]\ntheory = "{}"\n'
 
 
-def solved(links: str) -> Solution:
+def solved(links: str) -> Results:
     """PCID from the static start with links "solid", "timoshenko" or "euler-bernoulli"."""
     scene = (HERE / "scene.toml").read_text()
     head, inverse = scene.split("[[analysis]]")[:2]
@@ -35,23 +34,22 @@ def solved(links: str) -> Solution:
         for name in ("link1.toml", "link2.toml"):
             text = (HERE / name if links == "solid" else BEAMS / name).read_text()
             (Path(folder) / name).write_text(text if links == "solid" else text + THEORY.format(links))
-        return solve(path)
+        return ffrobot.solve(path)
 
 
-def histories(solution: Solution) -> dict[str, np.ndarray]:
+def histories(results: Results) -> dict[str, np.ndarray]:
     """Tip force and joint moments over time."""
-    outcome = solution.outcomes["inverse"]
-    force = trajectory_force(outcome, "tip")
-    moments = {f"moment {joint} (N·m)": joint_forces(outcome, joint).motor for joint in ("O", "A")}
+    force = results["inverse/trajectories/tip/force"]
+    moments = {f"moment {joint} (N·m)": results[f"inverse/joints/{joint}/moment"] for joint in ("O", "A")}
     return {"tip force x (N)": force[:, 0], "tip force y (N)": force[:, 1], **moments}
 
 
-def print_frequencies(solutions: dict[str, Solution]) -> None:
+def print_frequencies(solutions: dict[str, Results]) -> None:
     """Differences of ω from the Timoshenko beam's, in percent."""
     for link in ("link1", "link2"):
         print(f"\n{link}: bending frequency of the Timoshenko beam (Hz), and in % of it what others differ")
-        base = solutions["timoshenko"].bodies[link].modal.frequency
-        others = {name: s.bodies[link].modal.frequency / base - 1 for name, s in solutions.items()}
+        base = solutions["timoshenko"].modal_body(link).frequency
+        others = {name: s.modal_body(link).frequency / base - 1 for name, s in solutions.items()}
         for k in range(5):
             print(
                 f"  {base[k]:10.4f}"
@@ -95,7 +93,7 @@ def main() -> None:
             )
         )
     (HERE / "figures").mkdir(exist_ok=True)
-    draw(curves, solutions["solid"].outcomes["inverse"].time)
+    draw(curves, solutions["solid"].time("inverse"))
 
 
 if __name__ == "__main__":
