@@ -141,9 +141,10 @@ def test_results_that_stopped_early_have_a_page(two_link, tmp_path):
     with h5py.File(path, "r+") as file:
         del file["joints_only"]
         for name, dataset in list(_datasets(file["forward"])):
-            values = dataset[:300]
+            values, about = dataset[:300], dict(dataset.attrs)
             del file["forward"][name]
             file["forward"][name] = values
+            file["forward"][name].attrs.update(about)
         file["forward"].attrs["status"] = "interrupted"
     seal(path)
     write_report([path], tmp_path / "r.html")
