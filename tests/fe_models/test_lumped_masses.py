@@ -8,8 +8,8 @@ from ffrobot.fe_models.link import make_link
 from ffrobot.fe_models.modal_body import Interface
 from ffrobot.fe_models.modal_body.invariants import Invariants
 from ffrobot.fe_models.modal_body.lumped_masses import Lump, with_lumped_loads, with_lumped_masses
-from ffrobot.mbs.model.masses import with_payload
-from ffrobot.mbs.model.planar_body import from_modal_body
+from ffrobot.mbs.model.spatial_body import from_modal_body
+from ffrobot.mbs.model.spatial_masses import with_payload
 
 EI, RHO_A, L = 2.068427e11 * 0.025 * 0.015**3 / 12, 7850.0 * 0.015 * 0.025, 1.0
 
@@ -134,23 +134,19 @@ def test_same_as_a_payload_of_stage_2(body, name, position, inertia):
     """With all 40 modes of 20 elements both span the same motions; the modes differ in sign at most."""
     bare = body(count=40, more=attached("grip", position=0.4))
     loaded = from_modal_body("link", body(count=40, more=attached(name, 0.8, inertia, position)))
-    payload = with_payload(from_modal_body("link", bare), name, 0.8, inertia)
+    payload = with_payload(from_modal_body("link", bare), name, 0.8, np.zeros(3), np.diag([0.0, 0.0, inertia]))
     low = slice(0, 10)
     np.testing.assert_allclose(loaded.stiffness[low], payload.stiffness[low], rtol=1e-8)
-    for scalar in ("mass", "inertia"):
-        assert getattr(loaded, scalar) == pytest.approx(getattr(payload, scalar), rel=1e-12)
+    assert loaded.mass == pytest.approx(payload.mass, rel=1e-12)
+    turning = [np.trace(each.second_moment[:2, :2]) for each in (loaded, payload)]
+    assert turning[0] == pytest.approx(turning[1], rel=1e-12)
     np.testing.assert_allclose(loaded.first_moment, payload.first_moment, rtol=1e-12)
-    tips = loaded.points["tip"].rotation[low], payload.points["tip"].rotation[low]
+    tips = loaded.points["tip"].rotation[2, low], payload.points["tip"].rotation[2, low]
     sign = np.sign(tips[0] * tips[1])
-    for array in ("S_bar", "h", "j"):
-        left, right = getattr(loaded, array)[..., low], getattr(payload, array)[..., low]
-        np.testing.assert_allclose(left, right * sign, rtol=1e-6, atol=1e-8)
-    m_xy = payload.m_xy
-    if inertia:  # the file's m_xy holds all rotary inertia, as in solids: m_ff is its sum with S̄_33
-        rotation = payload.points[name].rotation
-        m_xy = m_xy + inertia * np.outer(rotation, rotation)
-    expected = m_xy[low, low] * np.outer(sign, sign)
-    np.testing.assert_allclose(loaded.m_xy[low, low], expected, atol=1e-7)
+    np.testing.assert_allclose(loaded.S_bar[:, low], payload.S_bar[:, low] * sign, rtol=1e-6, atol=1e-8)
+    h, j = ([each.I_bar[0, 1] - each.I_bar[1, 0], each.I_bar[0, 0] + each.I_bar[1, 1]] for each in (loaded, payload))
+    for left, right in zip(h, j, strict=True):
+        np.testing.assert_allclose(left[low], right[low] * sign, rtol=1e-6, atol=1e-8)
 
 
 def test_hub_on_the_root_of_a_cantilever_only_adds_mass(body):
