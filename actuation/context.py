@@ -8,8 +8,8 @@ from typing import TypeVar
 
 from ..fe_models.modal_body import ModalBody
 from ..mbs.analysis.context import Context, WholeLinks
-from ..mbs.model.spatial_body import SpatialBody
-from .patches.spatial_patches import LinkPatches
+from ..mbs.model.body import Body
+from .patches.link_patches import LinkPatches
 
 Point = TypeVar("Point", str, str | None)
 
@@ -25,4 +25,4 @@ class ActuatedContext(Context):
 
     patches: Mapping[str, LinkPatches] = field(default_factory=dict)
     links: Mapping[str, ModalBody] = field(default_factory=dict)
-    carrying: Mapping[str, SpatialBody] = field(default_factory=dict)
+    carrying: Mapping[str, Body] = field(default_factory=dict)

@@ -12,7 +12,7 @@ from ..common.peaks import largest, root_mean_square, shares
 from ..mbs._core import TimeFunction
 from ..mbs.analysis.motors_only import MotorsOnly
 from ..mbs.joints.transmission import MotorLimits
-from ..mbs.quantities.spatial_motion import SpatialMotion
+from ..mbs.quantities.motion import RobotMotion
 from ..mbs.scene.analysis import Analysis
 
 SHORT = 0.01  # of the time: a peak that lasts less is one of its own
@@ -77,7 +77,7 @@ class MotorFeasibility:
         )
 
 
-def judge_motors(motion: SpatialMotion, analysis: Analysis) -> dict[str, MotorFeasibility]:
+def judge_motors(motion: RobotMotion, analysis: Analysis) -> dict[str, MotorFeasibility]:
     """What every motor has to do up to the end of the path; a number behind the joint tells coordinates apart.
 
     Behind a gear that gives the motor turns otherwise than its joint.
@@ -121,7 +121,7 @@ def first_time(time: Array, beyond: Booleans) -> Array:
     return np.where(beyond.any(axis=0), time[beyond.argmax(axis=0)], np.nan)
 
 
-def path_jump(motion: SpatialMotion, analysis: Analysis, at: float) -> str:
+def path_jump(motion: RobotMotion, analysis: Analysis, at: float) -> str:
     """Which derivative of a trajectory jumps near the time `at` (s), if moments follow from it.
 
     "acceleration", in motors-only analyses "jerk" too, else "": a path is held before t = 0 and after its end.
@@ -150,7 +150,7 @@ def path_jump(motion: SpatialMotion, analysis: Analysis, at: float) -> str:
     return ""
 
 
-def _targets(motion: SpatialMotion) -> Iterator[TimeFunction]:
+def _targets(motion: RobotMotion) -> Iterator[TimeFunction]:
     """The functions of time that trajectories follow."""
     for path in motion.model.scene.trajectory:
         yield from path.components.values()

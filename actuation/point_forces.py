@@ -10,9 +10,9 @@ import numpy as np
 from ..common.arrays import Array
 from ..common.errors import InputError
 from ..mbs.analysis.outcome import Outcome
-from ..mbs.model.spatial_motors import path_forces, path_forces_on_bodies
+from ..mbs.model.motors import path_forces, path_forces_on_bodies
 from ..mbs.scene.space import SPACES
-from .spatial_points import DEPENDENT, SpatialPointSet
+from .points import DEPENDENT, PointSet
 
 
 @dataclass(frozen=True)
@@ -35,10 +35,10 @@ class PointForces:
     condition_number: float
 
 
-def solve_spatial_points(chosen: SpatialPointSet, run: Outcome) -> PointForces:
+def solve_points(chosen: PointSet, run: Outcome) -> PointForces:
     """L_a F_a = Q_a at every output time."""
     node = run.model.tree.nodes[run.model.tree.index[chosen.body]]
-    Q_a = driving_forces_in_space(run)[chosen.body]
+    Q_a = find_driving_forces(run)[chosen.body]
     p = run.q[:, node.p_q]
     scaled = chosen.scaled(p)
     force = np.einsum("tck,tk->tc", np.linalg.pinv(scaled, rcond=DEPENDENT), chosen.scale * Q_a)
@@ -54,13 +54,13 @@ def solve_spatial_points(chosen: SpatialPointSet, run: Outcome) -> PointForces:
     return PointForces(force, unmet, residual, rank, condition)
 
 
-def forces_at_points(chosen: Mapping[str, SpatialPointSet], run: Outcome) -> dict[str, Array]:
+def forces_at_points(chosen: Mapping[str, PointSet], run: Outcome) -> dict[str, Array]:
     """By "BODY.POINT" the force (T, 3) there, N, global axes, along the motion of a run.
 
     Raises `InputError` where a body without points has driving forces.
     """
     tree, found = run.model.tree, {}
-    driven = driving_forces_in_space(run)
+    driven = find_driving_forces(run)
     largest = max(float(np.abs(Q_a).max(initial=0.0)) for Q_a in driven.values())
     for body, Q_a in driven.items():
         if body not in chosen and np.abs(Q_a).max(initial=0.0) > DEPENDENT * largest:
@@ -71,13 +71,13 @@ def forces_at_points(chosen: Mapping[str, SpatialPointSet], run: Outcome) -> dic
     frames = tree.frames(run.q)
     for body, points in chosen.items():
         F = frames[tree.index[body]].F
-        force = solve_spatial_points(points, run).force
+        force = solve_points(points, run).force
         for k, name in enumerate(points.names):
             found[f"{body}.{name}"] = force[:, k : k + 1] * (F @ points.direction[:, k])
     return found
 
 
-def driving_forces_in_space(run: Outcome) -> dict[str, Array]:
+def find_driving_forces(run: Outcome) -> dict[str, Array]:
     """Q_a by body, (T, 6 + n): force and moment on its frame, both in its axes, and on its modes."""
     model = run.model
     found = path_forces_on_bodies(model, run.time, run.q, run.multipliers)

@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..common.arrays import Array
-from ..mbs.model.spatial_known_motion import mass_matrices
-from ..mbs.model.spatial_motors import split_forces
-from ..mbs.quantities.spatial_motion import SpatialMotion
+from ..mbs.model.known_motion import mass_matrices
+from ..mbs.model.motors import split_forces
+from ..mbs.quantities.motion import RobotMotion
 
 ROWS = 50  # of a run, at most, at which mass matrices are made
 RINGING = 2.0  # times the static shift, of a force that is missing all at once
@@ -62,7 +62,7 @@ class Unsupplied:
         return f"no actuator provides all modal forces required on {of_links}.{of_point if self.point else ''}"
 
 
-def held_shift(motion: SpatialMotion, modal: Mapping[str, Array], points: Iterable[str]) -> dict[str, Array]:
+def held_shift(motion: RobotMotion, modal: Mapping[str, Array], points: Iterable[str]) -> dict[str, Array]:
     """Shift (T, 3), m, global axes, of points by modal forces r (T, n) of modal body files, where motors stand still.
 
     To first order, and slowly: δp = −K⁻¹ r and δr = (∂r/∂p) δp. Vibration that a sudden lack of force starts can be
@@ -77,7 +77,7 @@ def held_shift(motion: SpatialMotion, modal: Mapping[str, Array], points: Iterab
     return found
 
 
-def freed_shift(motion: SpatialMotion, modal: Mapping[str, Array], point: str, rows: slice) -> Array:
+def freed_shift(motion: RobotMotion, modal: Mapping[str, Array], point: str, rows: slice) -> Array:
     """The same of one point at these rows, where motors keep their moments: the robot recoils by γ.
 
     δq = δq_held + R γ with Rᵀ M δq = 0, R = ∂q/∂γ: unmet modal forces do no work while p stands still, and no momentum
@@ -95,7 +95,7 @@ def freed_shift(motion: SpatialMotion, modal: Mapping[str, Array], point: str, r
 
 
 def seen_at_points(
-    about: Unsupplied, motion: SpatialMotion, modal: Mapping[str, Array], points: Iterable[str]
+    about: Unsupplied, motion: RobotMotion, modal: Mapping[str, Array], points: Iterable[str]
 ) -> Unsupplied:
     """With what modal forces r (T, n) that are left do to these points: `point` is the one that is farthest off."""
     shift = {name: np.linalg.norm(found, axis=1) for name, found in held_shift(motion, modal, points).items()}
@@ -111,7 +111,7 @@ def seen_at_points(
     )
 
 
-def _bent(motion: SpatialMotion, modal: Mapping[str, Array]) -> Array:
+def _bent(motion: RobotMotion, modal: Mapping[str, Array]) -> Array:
     """(T, n_v) −K⁻¹ r of the modes of these bodies, else 0."""
     found = np.zeros((len(motion.time), motion.model.tree.n_v))
     for name, r in modal.items():

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from ffrobot.scene.spatial_lacks import LACKS
+from ffrobot.scene.unsupported import UNSUPPORTED
 from ffrobot.schema import scene_in, schema
 
 INTRODUCTION = {
@@ -49,7 +49,7 @@ def key_pages() -> dict[str, str]:
 def _lacks() -> Iterator[str]:
     """Unsupported features, and what to use instead."""
     yield from ("## Unsupported", "", "| feature | instead |", "|---|---|")
-    yield from (f"| {lack.what} | {lack.instead} |" for lack in LACKS)
+    yield from (f"| {lack.what} | {lack.instead} |" for lack in UNSUPPORTED)
 
 
 def _sections(kind: str) -> Iterator[Iterator[str]]:

@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     from .results.file import Results
     from .run.watcher import Watcher
     from .scene.load import make_scene
-    from .scene.spatial import SpatialScene as Scene
+    from .scene.scene import Scene as Scene
 
     __version__: str
 
@@ -67,7 +67,7 @@ _HOME = {
     "SolveError": ".common.errors",
     "ModalBody": ".fe_models.modal_body",
     "make_scene": ".scene.load",
-    "Scene": ".scene.spatial:SpatialScene",
+    "Scene": ".scene.scene:Scene",
     "Results": ".results.file",
     "Watcher": ".run.watcher",
 }

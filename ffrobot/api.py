@@ -22,15 +22,15 @@ if TYPE_CHECKING:
     from .fe_models.modal_body import ModalBody
     from .fit import Fit
     from .results.file import Results
-    from .run.spatial_solution import SpatialSolution
+    from .run.solution import Solution
     from .run.watcher import Watcher
-    from .scene.spatial import SpatialScene
+    from .scene.scene import Scene
 
 AnyPath = str | PathLike[str]
 
 
 def solve(
-    scene: SpatialScene | AnyPath,
+    scene: Scene | AnyPath,
     output: AnyPath | None = None,
     watcher: Watcher | None = None,
     *,
@@ -50,11 +50,11 @@ def solve(
     from .common.files import check_output
     from .common.outputs import protected
     from .results.file import FORMAT, Results
-    from .results.spatial import spatial_image, write_spatial_results
-    from .results.spatial_resume import resume_spatial
+    from .results.resume import resume_scene
     from .results.stopped import how_to_go_on
+    from .results.write import results_image, write_results
     from .run.inputs import files_of, files_of_tables
-    from .run.spatial import solve_spatial
+    from .run.solve import solve_scene
     from .run.watcher import Watcher
 
     path = None if output is None else Path(output)
@@ -65,29 +65,29 @@ def solve(
     elif resume:
         raise InputError("solve: resume: expected the output of the run that was stopped, found none")
 
-    def keep(solution: SpatialSolution) -> None:
+    def keep(solution: Solution) -> None:
         if path is not None:
             with protected(inputs):
-                write_spatial_results(solution, path)
+                write_results(solution, path)
 
     if isinstance(scene, str | PathLike):
         scene = load_scene(scene, allow_python=allow_python)
     watcher = watcher or Watcher()
     if path is not None and resume:
-        solution = resume_spatial(scene, path, watcher, keep)
+        solution = resume_scene(scene, path, watcher, keep)
         if solution is None:
             return Results(path)
     else:
-        solution = solve_spatial(scene, watcher, keep)
+        solution = solve_scene(scene, watcher, keep)
     for name, result in solution.analyses.items():
         for text in result.warnings:
             warnings.warn(f'{scene.path}: analysis "{name}": {text}', FfrobotWarning, stacklevel=2)
     for run in solution.outcomes.values():
         run.check_completed(how_to_go_on(solution, "solve(…, resume=True)") if path is not None else "")
-    return Results(path) if path is not None else Results.from_image(spatial_image(solution), scene.path)
+    return Results(path) if path is not None else Results.from_image(results_image(solution), scene.path)
 
 
-def load_scene(path: AnyPath, *, allow_python: Sequence[AnyPath] = ()) -> SpatialScene:
+def load_scene(path: AnyPath, *, allow_python: Sequence[AnyPath] = ()) -> Scene:
     """Read and validate a scene file, `allow_python` as in `solve`. Raises `InputError`, a line for each wrong key."""
     from .common.python_files import python_allowed
     from .scene.load import load_scene as load

@@ -36,10 +36,10 @@ def schema(kind: str) -> dict[str, Any]:
 
 def scene_in(space: str | None) -> dict[str, Any]:
     """The schema of scenes of a `space`, with its definitions; None: with all keys, those of 3D as they are there."""
-    from .scene.spatial import SpatialSceneKeys
+    from .scene.scene import SceneKeys
 
     generator = {PLANAR: _Planar, SPATIAL: _Spatial, None: _Described}[space]
-    described: dict[str, Any] = TypeAdapter(SpatialSceneKeys).json_schema(schema_generator=generator)
+    described: dict[str, Any] = TypeAdapter(SceneKeys).json_schema(schema_generator=generator)
     for link in ("BeamLink", "SolidLink"):
         described["$defs"][link]["required"].remove("name")  # that of the body
     return _for_toml(described)  # type: ignore[no-any-return]

@@ -29,8 +29,8 @@ from .common.python_files import imported_files
 from .common.validation import USED
 
 LOADED = (  # by every run; what else a run has loaded, the next one finds
-    "ffrobot.cli", "ffrobot.run.spatial", "ffrobot.run.inputs", "ffrobot.results.spatial",
-    "ffrobot.results.spatial_resume", "ffrobot.results.stopped", "ffrobot.present.progress",
+    "ffrobot.cli", "ffrobot.run.solve", "ffrobot.run.inputs", "ffrobot.results.write",
+    "ffrobot.results.resume", "ffrobot.results.stopped", "ffrobot.present.progress",
     "ffrobot.present.start_posture", "ffrobot.present.summary", "ffrobot.fe_models.link",
 )  # fmt: skip
 KEPT = ("ffrobot.", "scipy.")  # packages of which the next run finds what one has loaded

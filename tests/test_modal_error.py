@@ -4,9 +4,9 @@ import pytest
 
 import ffrobot
 from ffrobot.run.modal_error import modal_errors
+from ffrobot.run.mode_choice import reported_modes
 from ffrobot.run.mode_search import difference
-from ffrobot.run.spatial import solve_spatial
-from ffrobot.run.spatial_mode_choice import reported_in_space
+from ffrobot.run.solve import solve_scene
 
 
 def arm(modes, start):
@@ -37,13 +37,13 @@ def arm(modes, start):
         ],
         analysis=[{"name": "swing", "kind": "pcid", "end": 0.5, "output_step": 0.002, "tolerance": 1e-7}],
     )
-    return solve_spatial(scene)
+    return solve_scene(scene)
 
 
 @pytest.mark.parametrize("start", ["static", "undeformed"])
 def test_no_error_is_above_twice_the_estimate(start):
     found, converged = arm({}, start), arm({"count": 16}, start)
-    quantities = [reported_in_space(one.analyses["swing"]) for one in (found, converged)]
+    quantities = [reported_modes(one.analyses["swing"]) for one in (found, converged)]
     errors, estimate = difference(*quantities), modal_errors(found)["swing"]
     assert errors.keys() == estimate.keys() == {"deflections", "forces", "motors"}
     for kind, error in errors.items():

@@ -12,10 +12,10 @@ from ffrobot.common import checksum
 from ffrobot.common.errors import InputError
 from ffrobot.present.summary import print_summary, summary_console
 from ffrobot.results.file import Results
-from ffrobot.results.spatial import spatial_image
+from ffrobot.results.write import results_image
+from ffrobot.run.mode_choice import reported_modes
 from ffrobot.run.mode_search import ErrorEstimate, difference
-from ffrobot.run.spatial import solve_spatial
-from ffrobot.run.spatial_mode_choice import reported_in_space
+from ffrobot.run.solve import solve_scene
 
 CASE = Path(__file__).parents[1] / "cases" / "two_link"
 S = "(10*t**3-15*t**4+6*t**5)"  # from rest to rest with zero acceleration at both ends
@@ -33,14 +33,14 @@ def scene(state="static", path=QUINTIC, modes=None, forward=(), **analysis):
 
 
 def reported_of(solution, name):
-    return reported_in_space(solution.analyses[name])
+    return reported_modes(solution.analyses[name])
 
 
 @pytest.fixture(scope="module", params=["static", "undeformed"])
 def truth(request):
     """The state at the start, what is specified from there on, and the solution with all modes."""
     path = QUINTIC if request.param == "static" else None
-    return request.param, path, reported_of(solve_spatial(scene(request.param, path, tolerance=1e-5)), "inverse")
+    return request.param, path, reported_of(solve_scene(scene(request.param, path, tolerance=1e-5)), "inverse")
 
 
 def test_the_estimate_is_honest_and_meets_the_tolerance(truth):
@@ -49,7 +49,7 @@ def test_the_estimate_is_honest_and_meets_the_tolerance(truth):
     tolerances = {"static": (3e-2, 3e-3, 1e-3), "undeformed": (0.9, 0.3)}[state]
     kept = []
     for tolerance in tolerances:
-        solution = solve_spatial(scene(state, path, "auto", tolerance=tolerance))
+        solution = solve_scene(scene(state, path, "auto", tolerance=tolerance))
         choice = solution.mode_choice
         errors = difference(reported_of(solution, "inverse"), with_all)
         assert set(errors) == {"deflections", "forces", "motors", "voltages"}
@@ -68,8 +68,8 @@ def test_the_estimate_is_honest_on_paths_it_was_not_made_with(seed):
     """Other ways of the tip, drawn by seed: as the paper's arm on its own."""
     x, y = np.random.default_rng(seed).uniform([-1.0, -0.5], [0.0, 0.5]).tolist()
     path = {"x": f"1.5+{x!r}*{S}", "y": f"sqrt(3)/2+{y!r}*{S}"}
-    exact = reported_of(solve_spatial(scene("static", path, tolerance=1e-5)), "inverse")
-    solution = solve_spatial(scene("static", path, "auto", tolerance=1e-2))
+    exact = reported_of(solve_scene(scene("static", path, tolerance=1e-5)), "inverse")
+    solution = solve_scene(scene("static", path, "auto", tolerance=1e-2))
     worst = max(difference(reported_of(solution, "inverse"), exact).values())
     estimated = max(solution.mode_choice.errors["inverse"].values())
     assert worst <= 1e-2
@@ -77,7 +77,7 @@ def test_the_estimate_is_honest_on_paths_it_was_not_made_with(seed):
 
 
 def test_all_modes_are_taken_where_fewer_do_not_do():
-    solution = solve_spatial(scene("undeformed", None, "auto", tolerance=1e-3, end=0.1))
+    solution = solve_scene(scene("undeformed", None, "auto", tolerance=1e-3, end=0.1))
     assert solution.mode_choice.tried[-1] == 20
     assert len(solution.mode_choice.tried) <= 4  # it sees from the pace that there is no hope
     assert set(solution.mode_choice.errors["inverse"].values()) == {0.0}
@@ -100,7 +100,7 @@ def test_errors_that_shrink_by_a_constant_ratio_are_found_exactly():
 def test_what_forces_and_voltages_do_forwards_with_fewer_modes():
     """The arm that carries out its own inverse dynamics moves as that said; voltages serve modes left out too."""
     run = {"name": "forward", "kind": "forward", "actuation": "inverse", "apply": "joints+pzt"}
-    solution = solve_spatial(scene(modes=3, forward=[run], end=0.2, tolerance=1e-7))
+    solution = solve_scene(scene(modes=3, forward=[run], end=0.2, tolerance=1e-7))
     inverse, back = (reported_of(solution, name)["deflections"] for name in ("inverse", "forward"))
     for point, deflection in inverse.items():
         np.testing.assert_allclose(back[point], deflection, rtol=0, atol=1e-8)
@@ -108,12 +108,12 @@ def test_what_forces_and_voltages_do_forwards_with_fewer_modes():
 
 @pytest.fixture(scope="module")
 def reduced():
-    return solve_spatial(scene(modes="auto", tolerance=3e-3))
+    return solve_scene(scene(modes="auto", tolerance=3e-3))
 
 
 def test_results_say_what_their_modal_coordinates_are(reduced, tmp_path):
     path = tmp_path / "reduced.h5"
-    path.write_bytes(spatial_image(reduced))
+    path.write_bytes(results_image(reduced))
     checksum.seal(path)
     with h5py.File(path) as file:
         body = file["inverse/bodies/link2"]
@@ -130,7 +130,7 @@ def test_results_say_what_their_modal_coordinates_are(reduced, tmp_path):
 
 
 def test_the_summary_tells_the_number_the_estimate_and_what_is_saved(reduced, tmp_path, capsys):
-    verdict = Results.from_image(spatial_image(reduced), tmp_path / "x.h5").verdict
+    verdict = Results.from_image(results_image(reduced), tmp_path / "x.h5").verdict
     print_summary(reduced, verdict, tmp_path / "x.h5", reduced.seconds, summary_console())
     printed = " ".join(capsys.readouterr().out.split())
     assert "link1: 3 of 10 modes and 2 static shapes for the others; link2: 3 of 10 modes" in printed

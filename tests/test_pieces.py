@@ -10,8 +10,8 @@ import pytest
 from ffrobot import make_scene
 from ffrobot.common.errors import InputError
 from ffrobot.fe_models.pieces import cut
-from ffrobot.results.spatial import spatial_image
-from ffrobot.run.spatial import solve_spatial
+from ffrobot.results.write import results_image
+from ffrobot.run.solve import solve_scene
 
 sys.path.insert(0, str(Path(__file__).parent / "mbs"))
 from rod_chains import extrapolated
@@ -54,7 +54,7 @@ def pendulum(pieces, of=None, analysis=None, **keys):
 
 def solved(scene, tmp_path):
     path = tmp_path / f"{scene.body[0].pieces}.h5"
-    path.write_bytes(spatial_image(solve_spatial(scene)))
+    path.write_bytes(results_image(solve_scene(scene)))
     return h5py.File(path)
 
 
@@ -185,7 +185,7 @@ def test_pieces_make_up_the_link():
 )
 def test_what_cannot_be_had_is_refused(keys, says):
     with pytest.raises(InputError, match=says):
-        solve_spatial(pendulum(2, **keys))
+        solve_scene(pendulum(2, **keys))
 
 
 @pytest.mark.parametrize(
@@ -202,7 +202,7 @@ def test_what_cannot_be_had_is_refused(keys, says):
 )  # fmt: skip
 def test_links_that_cannot_be_cut_are_refused(of, says):
     with pytest.raises(InputError, match=says):
-        solve_spatial(pendulum(2, of))
+        solve_scene(pendulum(2, of))
 
 
 def test_pieces_of_a_rigid_body_are_refused():

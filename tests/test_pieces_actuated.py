@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from ffrobot import make_scene
-from ffrobot.results.spatial import spatial_image
-from ffrobot.run.spatial import solve_spatial
+from ffrobot.results.write import results_image
+from ffrobot.run.solve import solve_scene
 
 S = "(10*t**3-15*t**4+6*t**5)"
 PATCHES = {"count": 4, "length": 0.12, "width": 0.02, "thickness": 5e-4, "modulus": 63e9, "d31": 1.1e-10}
@@ -49,8 +49,8 @@ def solved(pieces, analyses, **keys):
         "pzt": [{"body": name, **PATCHES, "allocation": "least-squares"} for name in conditions],
         "analysis": analyses,
     }
-    solution = solve_spatial(make_scene(name="arm", **(tables | keys)))
-    return h5py.File(io.BytesIO(spatial_image(solution)))
+    solution = solve_scene(make_scene(name="arm", **(tables | keys)))
+    return h5py.File(io.BytesIO(results_image(solution)))
 
 
 @pytest.fixture(scope="module")

@@ -5,8 +5,8 @@ import pytest
 from scipy.interpolate import CubicSpline
 
 from ffrobot import make_scene
-from ffrobot.mbs.analysis.spatial_replay import supplied
-from ffrobot.run.spatial import solve_spatial
+from ffrobot.mbs.analysis.replay import supplied
+from ffrobot.run.solve import solve_scene
 
 TUBES = {"upper": (0.5, 0.06, 0.052), "fore": (0.4, 0.05, 0.044), "hand": (0.2, 0.03, 0.026)}
 
@@ -55,7 +55,7 @@ def arm():
              "output_step": 0.002},
         ],
     )  # fmt: skip
-    return solve_spatial(scene)
+    return solve_scene(scene)
 
 
 def test_moments_between_outputs_are_those_of_a_spline_through_them(arm):

@@ -4,7 +4,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-import ffrobot.mbs.joints.spatial.joints as joints
+import ffrobot.mbs.joints.joints as joints
 import ffrobot.scene.kinds as kinds
 
 TOY = '''
@@ -101,8 +101,8 @@ import numpy as np
 from ffrobot.common.rotations import exponential, of_quaternion, quaternions
 from ffrobot.mbs.fields.field_types import Vector2, Vector3
 from ffrobot.mbs.fields.spelling import Spelled, place
-from ffrobot.mbs.joints.spatial.joint import Along, Held, Place
-from ffrobot.mbs.joints.spatial.moving_joint import AxialJoint
+from ffrobot.mbs.joints.joint import Along, Held, Place
+from ffrobot.mbs.joints.moving_joint import AxialJoint
 
 
 class SlotJoint(AxialJoint):
@@ -202,7 +202,7 @@ def test_a_kind_is_a_file_and_an_entry(tmp_path):
 
 
 def test_a_type_of_joint_is_a_file_and_an_entry(tmp_path):
-    entry = "    SpatialRevolute\n", "    SpatialRevolute\n    | __import__('slot').SlotJoint\n"
+    entry = "    RevoluteJoint\n", "    RevoluteJoint\n    | __import__('slot').SlotJoint\n"
     solved_with(entry, joints, ("slot", SLOT), QUICK_RETURN, tmp_path)
 
 

@@ -11,9 +11,9 @@ import pytest
 from ffrobot import make_scene
 from ffrobot.fe_models.link import make_link
 from ffrobot.mbs import _core
-from ffrobot.mbs.model.spatial_system import SpatialSystem
-from ffrobot.results.spatial import spatial_image
-from ffrobot.run.spatial import prepare_spatial, solve_spatial
+from ffrobot.mbs.model.system import MultibodySystem
+from ffrobot.results.write import results_image
+from ffrobot.run.solve import prepare_scene, solve_scene
 
 LINK = """
 name = "{name}"
@@ -74,7 +74,7 @@ def arm(folder, link, **keys):
 
 def test_planar_scenes_have_no_coordinates_out_of_their_plane(folder):
     """Two joints and the modes that move in the plane; the others are named."""
-    solution = solve_spatial(arm(folder, "all"))
+    solution = solve_scene(arm(folder, "all"))
     families = solution.bodies["arm"].modal.family
     in_plane = sum(family in ("in-plane-bending", "axial") for family in families)
     assert families.count("in-plane-bending") < in_plane < len(families) == 14
@@ -84,23 +84,23 @@ def test_planar_scenes_have_no_coordinates_out_of_their_plane(folder):
     assert f"{families.count('out-of-plane-bending')} out-of-plane-bending" in line
     assert "out-of-plane motion" in solution.omissions
     assert not any("axial deformation" in line for line in solution.omissions)  # it has axial modes
-    with h5py.File(BytesIO(spatial_image(solution))) as file:
+    with h5py.File(BytesIO(results_image(solution))) as file:
         assert file["run/bodies/arm/modal"].shape == (11, in_plane)
         assert file["run/bodies/arm/modal_transform"].shape == (14, in_plane)
 
 
 def test_rigid_bodies_have_no_modal_coordinates(folder):
-    solution = prepare_spatial(arm(folder, "bending"))
+    solution = prepare_scene(arm(folder, "bending"))
     stick, flexible = (node.body for node in solution.model.tree.nodes)
     assert stick.n_modes == 0
-    assert SpatialSystem(solution.model).plane.model.n_v == 1 + 1 + flexible.n_modes
+    assert MultibodySystem(solution.model).plane.model.n_v == 1 + 1 + flexible.n_modes
     assert "modal coordinates of stick, rigid" in solution.omissions
     assert any(line.startswith("axial deformation of arm") for line in solution.omissions)
 
 
 def test_terms_that_vanish_are_named(folder):
     """Bending alone has S̃ = 0 and j = 0, axial modes beside it have not."""
-    bending, both = (prepare_spatial(arm(folder, link)).omissions for link in ("bending", "all"))
+    bending, both = (prepare_scene(arm(folder, link)).omissions for link in ("bending", "all"))
     for symbol in ("inertia between rotation and pairs of modes", "change of inertia to first order in deflections"):
         assert f"{symbol}, which is zero" in bending
         assert f"{symbol}, which is zero" not in both
@@ -113,7 +113,7 @@ def test_algebraic_analyses_integrate_nothing(folder, monkeypatch):
 
     monkeypatch.setattr(_core, "tree_motion", refuse)
     analysis = {"name": "stiff", "kind": "fcid", "shape": "static", "end": 0.1, "output_step": 0.01}
-    solution = solve_spatial(arm(folder, "bending", analysis=[analysis]))
+    solution = solve_scene(arm(folder, "bending", analysis=[analysis]))
     outcome = solution.outcomes["stiff"]
     assert outcome.statistics.steps == outcome.statistics.evaluations == 0
     assert outcome.q.shape[0] == 11
@@ -124,7 +124,7 @@ def test_algebraic_analyses_integrate_nothing(folder, monkeypatch):
 def test_only_runs_that_are_replayed_are_recorded(folder):
     run = {"kind": "pcid", "end": 0.02, "output_step": 0.01, "tolerance": 1e-4}
     forward = {"name": "back", "kind": "forward", "actuation": "first", "apply": "joints"}
-    solution = solve_spatial(
+    solution = solve_scene(
         arm(folder, "bending", analysis=[run | {"name": "first"}, run | {"name": "second"}, forward])
     )
     assert solution.outcomes["first"].continuation.recording is not None
@@ -160,7 +160,7 @@ def test_another_layout_of_patches_needs_nothing_of_stage_1(folder):
     patches = {"body": "arm", "length": 0.02, "width": 0.01, "thickness": 1e-3, "modulus": 63e9, "d31": 1.1e-10}
     before = (folder / "bending.h5").stat().st_mtime_ns
     for count in (9, 12):
-        solution = prepare_spatial(arm(folder, "bending", pzt=[patches | {"count": count}]))
+        solution = prepare_scene(arm(folder, "bending", pzt=[patches | {"count": count}]))
         assert not solution.bodies["arm"].computed
         assert solution.bodies["arm"].path == folder / "bending.h5"
     assert (folder / "bending.h5").stat().st_mtime_ns == before

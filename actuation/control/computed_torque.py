@@ -7,7 +7,7 @@ import numpy as np
 from ...common.arrays import Array
 from .controllers import Setup
 from .records import ComputedTorque
-from .spatial_rigid_arm import SpatialRigidArm
+from .rigid_arm import RigidArm
 
 
 class ComputedTorqueControl:
@@ -16,7 +16,7 @@ class ComputedTorqueControl:
     They replace the moments of the feed-forward, which are taken off.
     """
 
-    def __init__(self, record: ComputedTorque, setup: Setup, arm: SpatialRigidArm) -> None:
+    def __init__(self, record: ComputedTorque, setup: Setup, arm: RigidArm) -> None:
         motors = setup.robot.motors
         self.arm, self.bandwidth = arm, record.bandwidth
         self.gains = record.bandwidth**2, 2 * record.damping_ratio * record.bandwidth

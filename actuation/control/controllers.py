@@ -12,8 +12,8 @@ from ...common.arrays import Array, Indices
 from ...common.errors import InputError
 from ...common.validation import quoted
 from ...mbs.analysis.outcome import Outcome
-from ...mbs.model.spatial_model import SpatialModel
-from ..patches.spatial_patches import LinkPatches
+from ...mbs.model.model import Model
+from ..patches.link_patches import LinkPatches
 from .records import JointPid, ModalVelocity
 from .robot import Robot, estimate
 
@@ -44,7 +44,7 @@ class Setup:
     """
 
     robot: Robot
-    model: SpatialModel
+    model: Model
     patches: Mapping[str, LinkPatches]
     inputs: tuple[str, ...]
     outputs: tuple[str, ...]

@@ -10,20 +10,20 @@ import numpy as np
 
 from ...common.arrays import Array
 from ...mbs._core import TimeFunction
+from ...mbs.analysis.gears import wound_up
 from ...mbs.analysis.operating_points import InstantAnalysis, of_earlier, row_at
 from ...mbs.analysis.outcome import Outcome
-from ...mbs.analysis.spatial_gears import wound_up
-from ...mbs.analysis.static import run_spatial_static
+from ...mbs.analysis.static import run_static
 from ...mbs.fields.field_types import PointReference
 from ...mbs.fields.references import Reference
-from ...mbs.model.spatial_gears import with_compliance_in_space
-from ...mbs.model.spatial_model import SpatialModel, modal_directions, without_paths
-from ...mbs.model.spatial_rows import SpatialRow
+from ...mbs.model.gears import with_compliance
+from ...mbs.model.model import Model, modal_directions, without_paths
+from ...mbs.model.rows import ConstraintRow
 from ...mbs.scene.analysis import Analysis
-from ...mbs.solve.linearisation import LinearMechanism, SpatialLinearisation
-from ...mbs.solve.spatial_start import undeformed_posture
+from ...mbs.solve.linearisation import LinearEquations, LinearMechanism
+from ...mbs.solve.start import undeformed_posture
 from ..context import ActuatedContext, place_of
-from ..patches.spatial_patches import LinkPatches
+from ..patches.link_patches import LinkPatches
 from .linear_model import LinearModel, state_space
 from .linear_models import LinearModels, analyse
 
@@ -47,8 +47,8 @@ class Linear(InstantAnalysis):
 
     def run(self, context: ActuatedContext) -> Outcome:
         """The operating points, with `LinearModels` about them. Raises `SolveError` in singular postures."""
-        run, about = operating_points_in_space(context, self)
-        return replace(run, details=linear_models_in_space(context, self, about))
+        run, about = find_operating_points(context, self)
+        return replace(run, details=make_linear_models(context, self, about))
 
 
 class OperatingPoints(NamedTuple):
@@ -57,16 +57,16 @@ class OperatingPoints(NamedTuple):
     time (T,) s; q (T, n_q), v and a (T, n_v).
     """
 
-    model: SpatialModel
+    model: Model
     time: Array
     q: Array
     v: Array
     a: Array
 
 
-def operating_points_in_space(context: ActuatedContext, analysis: InstantAnalysis) -> tuple[Outcome, OperatingPoints]:
+def find_operating_points(context: ActuatedContext, analysis: InstantAnalysis) -> tuple[Outcome, OperatingPoints]:
     """The equilibrium, or the instants of a motion, that an analysis is about, as they were found, and their states."""
-    model = with_compliance_in_space(without_paths(context.model))
+    model = with_compliance(without_paths(context.model))
     if analysis.source is None:
         run = _equilibrium(context, analysis)
         source, rows = run, [0]
@@ -78,16 +78,16 @@ def operating_points_in_space(context: ActuatedContext, analysis: InstantAnalysi
     return run, OperatingPoints(model, run.time, q[rows], v[rows], a[rows])
 
 
-def linear_models_in_space(context: ActuatedContext, analysis: Linear, about: OperatingPoints) -> LinearModels:
+def make_linear_models(context: ActuatedContext, analysis: Linear, about: OperatingPoints) -> LinearModels:
     """About these states. Points have the names of the scene, modes those of the model, also of links in pieces."""
     free, whole = about.model, context.whole
     points = analysis.points or _default_points(free if whole is None else whole.model)
     places = {point: place_of(whole, point) for point in points}
-    linearisation = SpatialLinearisation(free, about.q[0], places)
+    linearisation = LinearEquations(free, about.q[0], places)
     models: list[LinearModel] = []
     for t, q, v, a in zip(about.time, about.q, about.v, about.a, strict=True):
         mechanism = linearisation.at(float(t), q, v, a)
-        models.append(state_space(mechanism, patch_voltages_in_space(free, mechanism, context.patches)))
+        models.append(state_space(mechanism, voltages_at(free, mechanism, context.patches)))
     return analyse(tuple(models))
 
 
@@ -98,10 +98,10 @@ def _equilibrium(context: ActuatedContext, analysis: Analysis) -> Outcome:
         context = replace(
             context, model=replace(model, rows=(*model.rows, *held_by_motors(model, undeformed_posture(model).q)))
         )
-    return run_spatial_static(context, analysis)
+    return run_static(context, analysis)
 
 
-def held_by_motors(model: SpatialModel, q: Array) -> list[SpatialRow]:
+def held_by_motors(model: Model, q: Array) -> list[ConstraintRow]:
     """Rows that keep the coordinates of motors where they are at q (n_q,)."""
     rows = []
     for joint, columns in model.motors.items():
@@ -110,7 +110,7 @@ def held_by_motors(model: SpatialModel, q: Array) -> list[SpatialRow]:
             q_index = node.q.start + int(k) - node.v.start
             target, nothing = TimeFunction.constant(float(q[q_index])), np.zeros(3)
             rows.append(
-                SpatialRow(
+                ConstraintRow(
                     joint, "coordinate", node.inner, node.outer, nothing, nothing, coordinate=int(k), q_index=q_index,
                     target=target,
                 )
@@ -118,9 +118,7 @@ def held_by_motors(model: SpatialModel, q: Array) -> list[SpatialRow]:
     return rows
 
 
-def patch_voltages_in_space(
-    model: SpatialModel, mechanism: LinearMechanism, patches: Mapping[str, LinkPatches]
-) -> dict[str, Array]:
+def voltages_at(model: Model, mechanism: LinearMechanism, patches: Mapping[str, LinkPatches]) -> dict[str, Array]:
     """By "pzt/LAYOUT/k", what a volt does along s: on the modes of its link, or of the pieces of that."""
     found: dict[str, Array] = {}
     for of_link in patches.values():
@@ -130,7 +128,7 @@ def patch_voltages_in_space(
     return found
 
 
-def _default_points(model: SpatialModel) -> tuple[str, ...]:
+def _default_points(model: Model) -> tuple[str, ...]:
     """The points of trajectories; where there are none, the tips of all bodies that have one."""
     points = [trajectory.point for trajectory in model.scene.trajectory if trajectory.point is not None]
     tips = [f"{node.body.name}.tip" for node in model.tree.nodes if "tip" in node.body.points]

@@ -8,14 +8,14 @@ import numpy as np
 
 from ...common.arrays import Array
 from .controllers import Controller, Setup
-from .signals import SpatialSignal
+from .signals import Signal
 
 
 class Loop:
     """What the core asks at every sample: noise and resolution, controllers, limits."""
 
     def __init__(
-        self, setup: Setup, read: Sequence[SpatialSignal], controllers: Sequence[Controller], limit: Array, seed: int
+        self, setup: Setup, read: Sequence[Signal], controllers: Sequence[Controller], limit: Array, seed: int
     ) -> None:
         samples = (len(setup.times), len(read))
         noise = np.array([signal.noise for signal in read])

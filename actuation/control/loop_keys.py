@@ -12,12 +12,12 @@ from ...mbs._core import TimeFunction
 from ...mbs.fields.field_types import NotNegative, PointReference, Positive
 from ...mbs.fields.references import Reference, under
 from ...mbs.scene.analysis import ActuatedAnalysis, Analysis, Need
-from ...mbs.scene.spatial.loads import SpatialLoad
+from ...mbs.scene.loads import Load
 from .records import Controller, Sensor
 
 
 class SampledAnalysis(ActuatedAnalysis):
-    """Keys of closed loops: see `SpatialClosedLoop`."""
+    """Keys of closed loops: see `ClosedLoop`."""
 
     kind: Literal["closed-loop"]
     sample_time: Positive
@@ -38,7 +38,7 @@ class SampledAnalysis(ActuatedAnalysis):
     """Controllers; their commands add up."""
     sensor: tuple[Sensor, ...] = ()
     """Sensors in addition to those of the controllers."""
-    disturbance: tuple[SpatialLoad, ...] = ()
+    disturbance: tuple[Load, ...] = ()
     """Loads at points, unknown to `actuation`."""
 
     findings = ("diverged", "step underflow")  # what a controller does is what is to be found out

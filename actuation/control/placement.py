@@ -12,14 +12,14 @@ from ...common.errors import InputError
 from ...common.validation import quoted
 from ...mbs.analysis.operating_points import InstantAnalysis, of_earlier, row_at
 from ...mbs.analysis.outcome import Outcome
-from ...mbs.analysis.spatial_replay import motor_forces_of
+from ...mbs.analysis.replay import motor_forces_of
 from ...mbs.fields.references import Reference
 from ...mbs.scene.analysis import Surroundings
-from ...mbs.solve.linearisation import SpatialLinearisation
+from ...mbs.solve.linearisation import LinearEquations
 from ..context import ActuatedContext
+from ..patches.link_patches import LinkPatches, link_patches
 from ..patches.patches import PatchArray
-from ..patches.spatial_patches import LinkPatches, link_patches
-from .linear import operating_points_in_space
+from .linear import find_operating_points
 from .linear_model import state_space
 from .placing import PatchableLink, elsewhere, place
 from .records import Placement
@@ -76,8 +76,8 @@ class PatchPlacement(InstantAnalysis):
             of_link = _patches(context, wanted.body)
             F_p = of_link.modes[link.layout.label].forces(of_link.on_link(motor_forces_of(source).modal))
             return replace(run, details=place(model.scene.path, wanted, link, None, F_p))
-        run, about = operating_points_in_space(context, self)
-        at = SpatialLinearisation(about.model, about.q[0]).at(float(about.time[0]), about.q[0], about.v[0], about.a[0])
+        run, about = find_operating_points(context, self)
+        at = LinearEquations(about.model, about.q[0]).at(float(about.time[0]), about.q[0], about.v[0], about.a[0])
         return replace(run, details=place(model.scene.path, wanted, link, state_space(at, {}), None))
 
 

@@ -18,7 +18,7 @@ from ...common.arrays import Array, Indices
 from ...common.errors import InputError
 from ...mbs.analysis.outcome import Details
 from ..patches.patches import PatchArray
-from ..patches.records import SpatialPztLayout
+from ..patches.records import PztLayout
 from .linear_model import LinearModel
 from .records import Placement
 
@@ -51,7 +51,7 @@ class PatchableLink:
     name: str
     length: float
     bodies: tuple[str, ...]
-    layout: SpatialPztLayout
+    layout: PztLayout
     stiffness: Array
     served: int
     own: Array
@@ -260,7 +260,7 @@ def _candidates(scene_path: Path, wanted: Placement, link: PatchableLink, count:
     return Candidates(centers, gap, columns)
 
 
-def elsewhere(layout: SpatialPztLayout, changes: dict[str, object]) -> dict[str, object]:
+def elsewhere(layout: PztLayout, changes: dict[str, object]) -> dict[str, object]:
     """The keys of a layout that change with the number or places of its patches: one limit holds for all."""
     limit = min(layout.limit) if isinstance(layout.limit, tuple) else layout.limit
     return {**changes, "limit": limit}

@@ -11,13 +11,13 @@ import numpy as np
 
 from ...common.arrays import Array, as_floats
 from ...mbs.analysis.outcome import Outcome
-from ...mbs.model.spatial_model import SpatialModel
-from ...mbs.solve.linearisation import LinearMechanism, SpatialLinearisation, labelled
-from ..patches.spatial_patches import LinkPatches
+from ...mbs.model.model import Model
+from ...mbs.solve.linearisation import LinearEquations, LinearMechanism, labelled
+from ..patches.link_patches import LinkPatches
 from ..patches.voltages import voltage_gain
-from .linear import patch_voltages_in_space
+from .linear import voltages_at
+from .rigid_arm import RigidArm, rigid_freedom
 from .signals import check_joint, volts_on_file
-from .spatial_rigid_arm import SpatialRigidArm, rigid_freedom
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,7 @@ class Robot:
         source: the inverse analysis.
     """
 
-    model: SpatialModel
+    model: Model
     of_links: Mapping[str, LinkPatches]
     source: Outcome
 
@@ -113,13 +113,13 @@ class Robot:
     def linear(self, row: int) -> tuple[LinearMechanism, Mapping[str, Array]]:
         """About output `row` of the motion, and what a unit of each voltage does along its s."""
         source = self.source
-        linearisation = SpatialLinearisation(self.model, source.q[row])
+        linearisation = LinearEquations(self.model, source.q[row])
         found = linearisation.at(float(source.time[row]), source.q[row], source.v[row], source.a[row])
-        return found, patch_voltages_in_space(self.model, found, self.of_links)
+        return found, voltages_at(self.model, found, self.of_links)
 
-    def rigid(self) -> SpatialRigidArm:
+    def rigid(self) -> RigidArm:
         """With rigid links. Raises `InputError` where the motors do not fit the mechanism."""
-        return SpatialRigidArm(self.model, self.source.q[0])
+        return RigidArm(self.model, self.source.q[0])
 
 
 def input_names(robot: Robot) -> tuple[str, ...]:

@@ -10,23 +10,23 @@ import numpy as np
 from ...common.arrays import Array, Indices
 from ...common.errors import InputError
 from ...mbs.analysis.context import WholeLinks
-from ...mbs.model.spatial_drives import Drives, PointDrive
-from ...mbs.model.spatial_known_motion import KnownStates, motion_forces
-from ...mbs.model.spatial_model import SpatialModel, modal_directions
-from ...mbs.model.spatial_system import SpatialSystem
-from ...mbs.model.spatial_tree import Section, SpatialTree
+from ...mbs.model.drives import Drives, PointDrive
+from ...mbs.model.known_motion import KnownStates, motion_forces
+from ...mbs.model.model import Model, modal_directions
+from ...mbs.model.system import MultibodySystem
+from ...mbs.model.tree import KinematicTree, Section
 from ...mbs.scene.space import SPACES
 from ...mbs.solve.linearisation import labelled
 from ..context import place_of
+from ..patches.link_patches import LinkPatches
 from ..patches.patches import PatchArray
-from ..patches.spatial_patches import LinkPatches
 from .records import PERMITTIVITY, Sensor
 
 ORDERS = {"value": 0, "rate": 1, "acceleration": 2}
 
 
 @dataclass(frozen=True)
-class SpatialSignal:
+class Signal:
     """One reading: the coordinate `axis` (0, 1, 2) of a `point`, or `along` (n_v,) times joint and modal coordinates.
 
     `name`: "joint/NAME", "motor/NAME", "point/BODY.POINT/x" or y or z, "pzt/LAYOUT/k", "modal/BODY/k" (k from 1), with
@@ -43,10 +43,10 @@ class SpatialSignal:
     axis: int = 0
 
 
-class SpatialSensing:
+class Sensing:
     """What signals read of states of a tree."""
 
-    def __init__(self, model: SpatialModel, read: Sequence[SpatialSignal]) -> None:
+    def __init__(self, model: Model, read: Sequence[Signal]) -> None:
         tree = model.tree
         self._tree, self._count = tree, len(read)
         self._linear = np.array([k for k, signal in enumerate(read) if not signal.point], dtype=int)
@@ -60,7 +60,7 @@ class SpatialSensing:
         ]
         accelerated = any(signal.point and signal.order == ORDERS["acceleration"] for signal in read)
         drives = Drives(at_points=tuple(PointDrive(point, {}) for point in sections))
-        self._system = SpatialSystem(model, drives) if accelerated else None
+        self._system = MultibodySystem(model, drives) if accelerated else None
 
     def read(self, q: Array, v: Array, a: Array) -> Array:
         """Readings (T, signals) of q (T, n_q), v and a (T, n_v)."""
@@ -83,7 +83,7 @@ class SpatialSensing:
         return found
 
 
-def _places_in_q(tree: SpatialTree) -> Indices:
+def _places_in_q(tree: KinematicTree) -> Indices:
     """(n_v,) where in q the coordinate of each rate is; of orientations, which nothing reads so, some other place."""
     places = np.zeros(tree.n_v, dtype=np.intp)
     for node in tree.nodes:
@@ -93,9 +93,9 @@ def _places_in_q(tree: SpatialTree) -> Indices:
     return places
 
 
-def spatial_signals(
-    model: SpatialModel, patches: Mapping[str, LinkPatches], sensor: Sensor, whole: WholeLinks | None = None
-) -> Iterator[SpatialSignal]:
+def make_signals(
+    model: Model, patches: Mapping[str, LinkPatches], sensor: Sensor, whole: WholeLinks | None = None
+) -> Iterator[Signal]:
     """The readings of one sensor of the scene, of whose links some are in pieces where there are `whole` ones.
 
     Raises `InputError` for a joint without coordinates in the tree.
@@ -106,31 +106,31 @@ def spatial_signals(
         check_joint(model, sensor.joint)
         sign = -1.0 if model.tree.nodes[model.tree.carried[sensor.joint]].backwards else 1.0
         for name, k in labelled(model, sensor.joint):
-            yield SpatialSignal(f"{name}{ending}", *quality, along=sign * np.eye(model.tree.n_v)[k])
+            yield Signal(f"{name}{ending}", *quality, along=sign * np.eye(model.tree.n_v)[k])
     elif sensor.motor is not None:
         k = model.driven(sensor.motor).v.start
-        yield SpatialSignal(f"motor/{sensor.motor}{ending}", *quality, along=np.eye(model.tree.n_v)[k])
+        yield Signal(f"motor/{sensor.motor}{ending}", *quality, along=np.eye(model.tree.n_v)[k])
     elif sensor.point is not None:
         place = place_of(whole, sensor.point)
         for axis in SPACES[model.scene.space].translations:
-            yield SpatialSignal(f"point/{sensor.point}/{'xyz'[axis]}{ending}", *quality, point=place, axis=axis)
+            yield Signal(f"point/{sensor.point}/{'xyz'[axis]}{ending}", *quality, point=place, axis=axis)
     elif sensor.pzt is not None:
         body = next(body for body, of_link in patches.items() if sensor.pzt in of_link.arrays)
         volts = volts_on_file(patches[body], sensor.pzt, sensor.capacitance)
         for k, along in enumerate(modal_directions(model, {name: of.T for name, of in volts.items()}), 1):
-            yield SpatialSignal(f"pzt/{sensor.pzt}/{k}", *quality, along=along)
+            yield Signal(f"pzt/{sensor.pzt}/{k}", *quality, along=along)
     elif sensor.modal is not None:
         for k, along in enumerate(_modal_coordinates(model, sensor.modal, whole), 1):
-            yield SpatialSignal(f"modal/{sensor.modal}/{k}{ending}", *quality, along=along)
+            yield Signal(f"modal/{sensor.modal}/{k}{ending}", *quality, along=along)
 
 
-def merged(given: Iterable[SpatialSignal], needed: Iterable[SpatialSignal]) -> tuple[SpatialSignal, ...]:
+def merged(given: Iterable[Signal], needed: Iterable[Signal]) -> tuple[Signal, ...]:
     """The sensors of the scene, and ideal ones for what controllers need besides."""
     by_name = {signal.name: signal for signal in needed} | {signal.name: signal for signal in given}
     return tuple(by_name.values())
 
 
-def _modal_coordinates(model: SpatialModel, link: str, whole: WholeLinks | None) -> Array:
+def _modal_coordinates(model: Model, link: str, whole: WholeLinks | None) -> Array:
     """(n, n_v) p of a link by v: its own coordinates, or of its pieces."""
     if whole is None or link not in whole.divided:
         return np.eye(model.tree.n_v)[model.tree.nodes[model.tree.index[link]].p_v]
@@ -161,7 +161,7 @@ def volts_on_file(of_link: LinkPatches, layout: str, capacitance: float | None =
     return {name: volts[:, None] * of.turn[:, columns].T for name, of in of_link.bodies.items()}
 
 
-def check_joint(model: SpatialModel, joint: str) -> None:
+def check_joint(model: Model, joint: str) -> None:
     """Raise `InputError` unless controllers can read and name the coordinates of a joint."""
     scene = model.scene
     record = next(each for each in scene.joint if each.name == joint)

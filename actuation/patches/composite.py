@@ -31,7 +31,7 @@ from ...common.arrays import Array, as_floats
 from ...fe_models.modal_body import ModalBody
 from ...mbs.quantities.stress import SectionLoads
 from .layers import LayerLoads, bending_row, felt_rows, layer_loads, own_row, straight_loads
-from .records import SpatialPztLayout
+from .records import PztLayout
 from .sections import STRETCH, TWIST, LinkSections, link_sections, potentials
 
 SLIVER = 1e-6  # of a patch: what a station cuts off less of stays whole
@@ -41,7 +41,7 @@ GAUSS_POINTS = 4  # products of the cubics of an element are of degree 6
 class Placed(NamedTuple):
     """A layout with its patches between `edges` (k, 2), m."""
 
-    layout: SpatialPztLayout
+    layout: PztLayout
     edges: Array
 
 
@@ -168,14 +168,14 @@ def gauss_points(body: ModalBody, intervals: Array) -> Iterator[GaussPoint]:
                 yield GaussPoint(number, (a + b) / 2 + node * (b - a) / 2, weight * (b - a) / 2, station)
 
 
-def place_of(layout: SpatialPztLayout, sections: LinkSections, station: int) -> tuple[float, float]:
+def place_of(layout: PztLayout, sections: LinkSections, station: int) -> tuple[float, float]:
     """Extent along the patches' normal (m) and β at a station."""
     shears = layout.lamina.C[0, 1] or layout.lamina.per_volt[1] or layout.lamina.C[1, 1]
     lever = sections.shear_lever(station, layout.normal, layout.width) if shears else 0.0
     return float(sections.extent(layout.normal)[station]), lever
 
 
-def felt_loads(layout: SpatialPztLayout, sections: LinkSections, station: int) -> LayerLoads:
+def felt_loads(layout: PztLayout, sections: LinkSections, station: int) -> LayerLoads:
     """C (4, 4) and f (4,) of the layers, 0 but in the rows that feel them, the section free in those that do not.
 
     Free means that link and layers together carry nothing there: e_d = (C_l + C)_dd⁻¹ (f_d V − C_df e_f), eliminated.
@@ -193,7 +193,7 @@ def felt_loads(layout: SpatialPztLayout, sections: LinkSections, station: int) -
     return LayerLoads(C, f)
 
 
-def _intervals(placed: Sequence[Placed]) -> tuple[Array, list[list[tuple[SpatialPztLayout, int]]]]:
+def _intervals(placed: Sequence[Placed]) -> tuple[Array, list[list[tuple[PztLayout, int]]]]:
     """Stretches (m, 2) of the link with the same patches on each, and which: layouts with numbers of their patches.
 
     Patches are numbered through the layouts. Those of one layout lie beside each other and are the stretches.

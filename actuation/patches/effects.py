@@ -12,7 +12,7 @@ from ...common.errors import InputError
 from ...fe_models.modal_body import ModalBody
 from .composite import Placed, composite, place_of
 from .layers import load_per_volt, own_row, straight_loads
-from .records import SpatialPztLayout
+from .records import PztLayout
 from .sections import LinkSections, link_sections, potentials
 
 STEP = 0.1  # of the extent, from one station to the next; less is a taper
@@ -72,7 +72,7 @@ def _straight(key: str, placed: Placed, body: ModalBody) -> Effects:
 
 
 def _stretches(
-    key: str, layout: SpatialPztLayout, body: ModalBody, sections: LinkSections, number: int, start: float, end: float
+    key: str, layout: PztLayout, body: ModalBody, sections: LinkSections, number: int, start: float, end: float
 ) -> tuple[Array, Array]:
     """The ends (m + 1,) of stretches into which a change of the link's extent cuts a patch, and their stations (m,)."""
     x = body.stations.position[:, 0]
@@ -94,7 +94,7 @@ def _stretches(
     return ends, covered[np.append(changes, len(extents) - 1)]
 
 
-def _outlined(key: str, layout: SpatialPztLayout, body: ModalBody, edges: Array) -> Array:
+def _outlined(key: str, layout: PztLayout, body: ModalBody, edges: Array) -> Array:
     """(k, n) modal forces of unit membrane force (N/m): pressing the upper face, pulling the lower, halved on both."""
     patches = body.surface_patches
     if patches is None:

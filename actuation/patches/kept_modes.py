@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 
 from ...common.arrays import Array, Indices, as_floats
-from ...mbs.model.spatial_body import SpatialBody
+from ...mbs.model.body import Body
+from .link_patches import LinkPatches
 from .patches import PatchArray
 from .reached_modes import ReachedModes
-from .spatial_patches import LinkPatches
 
 
-def on_kept_modes(of_link: LinkPatches, equations: SpatialBody) -> LinkPatches:
+def on_kept_modes(of_link: LinkPatches, equations: Body) -> LinkPatches:
     """The patches of a link whose `equations` may have fewer modes than its file; the same where they reach all modes.
 
     Modal forces on modes left out follow from the loads on the link. Patches that cannot produce all of these produce
@@ -33,25 +33,25 @@ def on_kept_modes(of_link: LinkPatches, equations: SpatialBody) -> LinkPatches:
     return replace(of_link, arrays=arrays, modes=modes, reach=reach, reached=reached, on_kept=on_kept)
 
 
-def _columns(reached: ReachedModes, equations: SpatialBody) -> Indices:
+def _columns(reached: ReachedModes, equations: Body) -> Indices:
     """Numbers of the coordinates kept that move the link in these modes above all."""
     squares = equations.modal_transform**2
     return np.flatnonzero(squares[reached.rows].sum(axis=0) > 0.5 * squares.sum(axis=0))
 
 
-def _kept(reached: ReachedModes, equations: SpatialBody) -> ReachedModes:
+def _kept(reached: ReachedModes, equations: Body) -> ReachedModes:
     columns = _columns(reached, equations)
     T = equations.modal_transform[np.ix_(reached.rows, columns)]
     served = int(np.count_nonzero(columns < equations.n_eigenmodes))
     return ReachedModes(reached.rows, T, equations.stiffness[columns], served)
 
 
-def _lift(reached: ReachedModes, equations: SpatialBody) -> Array:
+def _lift(reached: ReachedModes, equations: Body) -> Array:
     """(m, m') forces on all modes that patches reach from those on the coordinates kept."""
     return reached.forces(equations.on_file[_columns(reached, equations)]).T
 
 
-def _array(of_link: LinkPatches, layout: str, kept: ReachedModes, equations: SpatialBody) -> PatchArray:
+def _array(of_link: LinkPatches, layout: str, kept: ReachedModes, equations: Body) -> PatchArray:
     array, columns, on_link = of_link.arrays[layout], of_link.columns(layout), of_link.bodies[of_link.body]
     return replace(
         array, turn=kept.seen(on_link.turn[:, columns].T).T, Phi_V=kept.seen(on_link.Phi_V[:, columns].T).T,

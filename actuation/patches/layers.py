@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...common.arrays import Array, Indices
-from .records import SpatialPztLayout
+from .records import PztLayout
 from .sections import BEND_Y, BEND_Z, STRETCH, TWIST
 
 
@@ -35,22 +35,22 @@ class LayerLoads(NamedTuple):
     f: Array
 
 
-def side(layout: SpatialPztLayout) -> float:
+def side(layout: PztLayout) -> float:
     """1.0 of patches on the face at largest y (or z), -1.0 at smallest, 0.0 of those on both or on no named face."""
     return {"+": 1.0, "-": -1.0}.get((layout.face or " ")[0], 0.0)
 
 
-def bending_row(layout: SpatialPztLayout) -> int:
+def bending_row(layout: PztLayout) -> int:
     """Which of the strains e is the curvature towards the patches' normal."""
     return BEND_Y if layout.normal == "y" else BEND_Z
 
 
-def own_row(layout: SpatialPztLayout) -> int:
+def own_row(layout: PztLayout) -> int:
     """Which of the strains e the layout is there for."""
     return TWIST if layout.acts_in == "twist" else bending_row(layout)
 
 
-def felt_rows(layout: SpatialPztLayout) -> Indices:
+def felt_rows(layout: PztLayout) -> Indices:
     """Which of the strains e feel the patches: see `composite`."""
     found = {own_row(layout)}
     if side(layout):
@@ -61,7 +61,7 @@ def felt_rows(layout: SpatialPztLayout) -> Indices:
     return np.array(sorted(found))
 
 
-def layer_section(layout: SpatialPztLayout, extent: float) -> LayerSection:
+def layer_section(layout: PztLayout, extent: float) -> LayerSection:
     """On a link of that extent t_b (m) along their normal; those without a named face lie on one."""
     w, t = layout.width, layout.layers * layout.thickness
     inner, outer = extent / 2, extent / 2 + t
@@ -70,7 +70,7 @@ def layer_section(layout: SpatialPztLayout, extent: float) -> LayerSection:
     return LayerSection(faces * w * t, sign * w * (outer**2 - inner**2) / 2, faces * w * (outer**3 - inner**3) / 3)
 
 
-def layer_loads(layout: SpatialPztLayout, extent: float, lever: float) -> LayerLoads:
+def layer_loads(layout: PztLayout, extent: float, lever: float) -> LayerLoads:
     """Of all layers at a place of that extent (m) along their normal, on its strains; `lever`: β, 0 without fibres."""
     A, S, I = layer_section(layout, extent)  # noqa: E741
     sign = np.sign(S)
@@ -87,14 +87,14 @@ def layer_loads(layout: SpatialPztLayout, extent: float, lever: float) -> LayerL
     return LayerLoads(C + C.T - np.diag(np.diag(C)), f)
 
 
-def straight_loads(layout: SpatialPztLayout, extent: float, lever: float) -> Array:
+def straight_loads(layout: PztLayout, extent: float, lever: float) -> Array:
     """(4,) of a volt on a link held straight, of the rows that feel it: N·m, N."""
     found, rows = np.zeros(4), felt_rows(layout)
     found[rows] = layer_loads(layout, extent, lever).f[rows]
     return found
 
 
-def load_per_volt(layout: SpatialPztLayout, extent: Array, lever: Array) -> Array:
+def load_per_volt(layout: PztLayout, extent: Array, lever: Array) -> Array:
     """Moment (k,) c per volt, N·m/V, of a link held straight; the layers' own stiffness takes of it: see `composite`.
 
     Of bending, E_p d31 w_p N (t_b + N t_p)/2 of N layers on one face, twice that on both: the layers' arms,

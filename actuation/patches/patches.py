@@ -14,7 +14,7 @@ from ...fe_models.modal_body import ModalBody
 from .composite import SLIVER, Placed, stiffness_ratios
 from .effects import Effects
 from .reach import Reach
-from .records import SpatialPztLayout
+from .records import PztLayout
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,7 @@ class PatchArray(Reach):
         lever: (k,) strain of the surface by unit turn per length and distance: 1 of bending.
     """
 
-    layout: SpatialPztLayout
+    layout: PztLayout
     edges: Array
     height: Array
     moment_per_volt: Array
@@ -92,7 +92,7 @@ def assembled(
     )  # fmt: skip
 
 
-def edges_on_piece(layout: SpatialPztLayout, edges: Array, start: float, length: float) -> tuple[Indices, Array]:
+def edges_on_piece(layout: PztLayout, edges: Array, start: float, length: float) -> tuple[Indices, Array]:
     """Numbers (from 0) of the patches between `edges` (k, 2) that are on a piece, and where on it they are, m.
 
     The piece is `length` (m) long and begins at `start` (m) from the root of the link.
@@ -102,7 +102,7 @@ def edges_on_piece(layout: SpatialPztLayout, edges: Array, start: float, length:
     return which, clipped[which]
 
 
-def patch_edges(layout: SpatialPztLayout, length: float) -> Array:
+def patch_edges(layout: PztLayout, length: float) -> Array:
     """(k, 2) where the patches of `layout` begin and end on a link of that length, m."""
     if layout.centers is not None:
         centers = np.array(layout.centers)

@@ -9,7 +9,7 @@ import numpy as np
 
 from ...common.arrays import Array, Indices
 from ...common.errors import InputError
-from .records import SpatialPztLayout
+from .records import PztLayout
 
 SINGULAR = 1e12  # condition number of Φ_V beyond which voltages are rounding
 MOST_CONDITION = 1e16  # what more is found of a condition number is rounding itself
@@ -66,7 +66,7 @@ def served_first(served: int, n: int, patches: int) -> Array:
     return np.diag(np.where(np.arange(n) < served, 1.0, OF_STATIC_SHAPES))[:rows]
 
 
-def weights(key: str, layout: SpatialPztLayout, served: int, stiffness: Array, points: Mapping[str, Array]) -> Array:
+def weights(key: str, layout: PztLayout, served: int, stiffness: Array, points: Mapping[str, Array]) -> Array:
     """W_sqrt (rows, n): of modes, or of the deflections Φ(x) K⁻¹ r that modal forces r cause at points.
 
     `stiffness` (n,) of the modes, `points` their Φ (components, n) by name. Raises `InputError` for weights that do not

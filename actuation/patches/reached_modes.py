@@ -8,8 +8,8 @@ import numpy as np
 
 from ...common.arrays import Array, Indices, as_floats
 from ...fe_models.modal_body import ModalBody
-from ...mbs.model.spatial_body import SpatialBody
-from ...mbs.model.spatial_masses import uncoupling
+from ...mbs.model.body import Body
+from ...mbs.model.masses import uncoupling
 
 OUT_OF_REACH = 1e-9  # of the largest modal force per volt: less is rounding
 
@@ -45,7 +45,7 @@ class ReachedModes:
         return self.forces(rows)
 
 
-def reached_modes(per_volt: Array, body: ModalBody, spatial: SpatialBody) -> ReachedModes:
+def reached_modes(per_volt: Array, body: ModalBody, spatial: Body) -> ReachedModes:
     """By modal forces per volt (k, n) on the modes of the modal body: the families in which any is not 0."""
     size = np.abs(per_volt).max(axis=0)
     families = {body.family[k] for k in np.flatnonzero(size > OUT_OF_REACH * size.max())}

@@ -26,7 +26,7 @@ OF_FIBRES = ("fibre_angle", "d33", "modulus_across", "shear_modulus", "poissons_
 NO_SHEAR = 1e-9  # of the other stress: a layer that shears less does not twist
 
 
-class SpatialPztLayout(Record):
+class PztLayout(Record):
     """Equal piezoelectric patches along one link; several layouts on a body have names.
 
     Lengths in m, moduli in Pa, d31 and d33 in m/V, density kg/m³, limit in V. Centers are distances along the link from

@@ -9,8 +9,8 @@ import numpy as np
 
 from ...common.arrays import Array
 from ...fe_models.modal_body import ModalBody
-from ...mbs.model.spatial_body import SpatialBody, SpatialPoint
-from ...mbs.model.spatial_masses import with_line_masses
+from ...mbs.model.body import Body, BodyPoint
+from ...mbs.model.masses import with_line_masses
 from .composite import Placed, composite, gauss_points
 from .layers import layer_section
 from .sections import link_sections
@@ -31,7 +31,7 @@ class StructureEffect:
     frequency: Array
 
 
-def with_patches_in_space(spatial: SpatialBody, body: ModalBody, placed: Sequence[Placed]) -> SpatialBody:
+def patched_body(spatial: Body, body: ModalBody, placed: Sequence[Placed]) -> Body:
     """The link, or a piece of it, with mass and stiffness of patches, as far as layouts say so; it keeps all modes.
 
     Mass lies on the axis, like that of a beam, with its moment of inertia about the axis, ∫ρ (η² + ζ²) dA. The
@@ -43,7 +43,7 @@ def with_patches_in_space(spatial: SpatialBody, body: ModalBody, placed: Sequenc
         extent = sections.extent(layout.normal)
         for place in gauss_points(body, edges) if layout.adds_mass else ():
             at = body.interpolate(place.x)
-            points.append(SpatialPoint(at.position, at.translation @ T, at.rotation @ T))
+            points.append(BodyPoint(at.position, at.translation @ T, at.rotation @ T))
             A, _, I = layer_section(layout, extent[place.station])  # noqa: E741
             line_density = place.weight * (layout.density or 0.0)
             masses.append(line_density * A)
@@ -53,7 +53,7 @@ def with_patches_in_space(spatial: SpatialBody, body: ModalBody, placed: Sequenc
     return with_line_masses(spatial, points, np.array(masses), np.array(spins), added)
 
 
-def structure_effect_in_space(bare: SpatialBody, patched: SpatialBody) -> StructureEffect:
+def structure_effect_of(bare: Body, patched: Body) -> StructureEffect:
     """What the patches change."""
     pair = (bare, patched)
     return StructureEffect(

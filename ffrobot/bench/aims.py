@@ -8,10 +8,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from statistics import median
 
-from ..run.spatial import prepare_spatial
+from ..run.solve import prepare_scene
 from ..run.watcher import Watcher
 from ..scene.load import make_scene
-from ..scene.spatial import SpatialScene
+from ..scene.scene import Scene
 from .errors import KINDS
 from .evaluation import State, evaluation_seconds
 from .hand_written import TIME, HandWritten, general_state
@@ -48,13 +48,13 @@ AIMS = (
 
 
 def measure_aims(
-    scene: SpatialScene, repository: Path, folder: Path, repeat: int, budget: float, display: Watcher
+    scene: Scene, repository: Path, folder: Path, repeat: int, budget: float, display: Watcher
 ) -> list[Row]:
     """Rows of the right-hand side and of each aim; `scene` is cases/two_link, `repository` the source tree.
 
     Raises `InputError` or `SolveError` where the hand-written program is not to be had.
     """
-    model = prepare_spatial(scene, display).model
+    model = prepare_scene(scene, display).model
     display.stage("compiling the hand-written version")
     hand_written = HandWritten(repository, model, folder)
     rows = [_right_hand_side(hand_written, general_state(model), display)]
@@ -72,7 +72,7 @@ def _right_hand_side(hand_written: HandWritten, state: State, display: Watcher) 
     return {"what": "right-hand side", "within": "", "run": "joint coordinates", **_ratio(pairs, 1.6)}
 
 
-def _scene(scene: SpatialScene, aim: Aim) -> SpatialScene:
+def _scene(scene: Scene, aim: Aim) -> Scene:
     keys = tomllib.loads(scene.text)
     keys.pop("pzt", None)
     keys["initial"]["state"] = aim.state
@@ -81,9 +81,7 @@ def _scene(scene: SpatialScene, aim: Aim) -> SpatialScene:
     return make_scene(folder=scene.path.parent, **keys)
 
 
-def _rows(
-    aim: Aim, scene: SpatialScene, hand_written: HandWritten, repeat: int, budget: float, display: Watcher
-) -> list[Row]:
+def _rows(aim: Aim, scene: Scene, hand_written: HandWritten, repeat: int, budget: float, display: Watcher) -> list[Row]:
     """The run that a user gets who asks for 1e-4, and the fastest of all whose measured error is that small."""
     reference = find_reference(scene, NAME, REFERENCE_TOLERANCE, budget, display)
     points = measure_points(scene, NAME, reference, INTEGRATORS, TOLERANCES, 2, budget, display)

@@ -8,7 +8,7 @@ from pathlib import Path
 from ..common.errors import FfrobotError
 from ..mbs.scene.analysis import TIGHTEST_TOLERANCE, IntegratedAnalysis
 from ..run.watcher import Watcher
-from ..scene.spatial import SpatialScene
+from ..scene.scene import Scene
 from .errors import KINDS, errors
 from .links import elements_of, modes_of, refined
 from .measuring import Run, run, with_analysis
@@ -19,7 +19,7 @@ ELEMENTS, MODES = (0.5, 1.0, 2.0, 4.0), (0.5, 1.0, 1.5, 2.0)
 TIGHTER = 0.1  # than the scene's tolerance, where time integration must not be seen
 
 
-def measure_axes(scene: SpatialScene, analysis: IntegratedAnalysis, budget: float, display: Watcher) -> list[Row]:
+def measure_axes(scene: Scene, analysis: IntegratedAnalysis, budget: float, display: Watcher) -> list[Row]:
     """Rows of errors along each axis; runs that fail, or take longer than `budget` (s), stay as rows without errors.
 
     "mesh" compares with four times the elements, "modes" with twice the modes, on that mesh, "time" with a tenth of the
@@ -47,7 +47,7 @@ class _Trials:
     """Runs of one analysis with links refined; each combination once."""
 
     def __init__(
-        self, scene: SpatialScene, analysis: IntegratedAnalysis, budget: float, display: Watcher, folder: Path
+        self, scene: Scene, analysis: IntegratedAnalysis, budget: float, display: Watcher, folder: Path
     ) -> None:
         self.scene, self.analysis, self.budget, self.display, self.folder = scene, analysis, budget, display, folder
         self.done: dict[tuple[float, float, float], Run | str] = {}
@@ -85,12 +85,12 @@ class _Trials:
             **{f"error_{kind}": error.get(kind) for kind in KINDS},
         }
 
-    def _scene(self, elements: float, modes: float) -> SpatialScene | None:
+    def _scene(self, elements: float, modes: float) -> Scene | None:
         if elements == modes == 1.0:
             return self.scene
         return refined(self.scene, elements, modes, self.folder)
 
-    def _run(self, scene: SpatialScene, tolerance: float) -> Run | str:
+    def _run(self, scene: Scene, tolerance: float) -> Run | str:
         name = self.analysis.name
         try:
             return run(with_analysis(scene, name, tolerance=tolerance), name, self.budget, self.display)

@@ -14,10 +14,10 @@ from ..common.errors import InputError
 from ..common.files import check_folder
 from ..common.validation import did_you_mean, quoted
 from ..mbs.scene.analysis import TIGHTEST_TOLERANCE
-from ..run.spatial import prepare_spatial
+from ..run.solve import prepare_scene
 from ..run.watcher import Watcher
 from ..scene.load import load_scene
-from ..scene.spatial import SpatialScene
+from ..scene.scene import Scene
 from . import OF_A_SCENE, PEER
 from .aims import measure_aims
 from .axes import measure_axes
@@ -103,7 +103,7 @@ class Campaign:
         if exudyn is not None:
             self._peer(exudyn, load_scene(paths["two_link"]), swept.get("two_link"))
 
-    def _work_precision(self, scene: SpatialScene, name: str, folder: Path) -> Swept:
+    def _work_precision(self, scene: Scene, name: str, folder: Path) -> Swept:
         """The sweep of one analysis, with its records and figures."""
         settings = self.settings
         tolerance = TIGHTER * min(settings.tolerances)
@@ -118,14 +118,14 @@ class Campaign:
         self._drawn(draw_work_precision(rows, (), scene.name, folder))
         return reference, points
 
-    def _aims(self, scene: SpatialScene, repository: Path) -> None:
+    def _aims(self, scene: Scene, repository: Path) -> None:
         with tempfile.TemporaryDirectory(prefix="ffrobot-bench-") as folder:
             rows = measure_aims(
                 scene, repository, Path(folder), self.settings.repeat, self.settings.budget, self.display
             )
         self._keep("aims", rows, {"inputs": _inputs(scene, {})}, self.folder, "ratios to the hand-written version")
 
-    def _replays(self, scene: SpatialScene) -> None:
+    def _replays(self, scene: Scene) -> None:
         rows = measure_replays(scene, self.settings.repeat, self.display)
         self._keep("replays", rows, {"inputs": _inputs(scene, {})}, self.folder, "forward runs that replay PCID")
 
@@ -135,11 +135,11 @@ class Campaign:
         self._keep("evaluations", rows, {}, self.folder, "one evaluation of accelerations and multipliers")
 
     def _exudyn(self, scene_path: Path, repository: Path, python: Path) -> Exudyn:
-        bodies = prepare_spatial(load_scene(scene_path), self.display).bodies
+        bodies = prepare_scene(load_scene(scene_path), self.display).bodies
         links = [body.path for body in bodies.values() if body.path is not None]
         return Exudyn(repository, python, links, self.settings.budget)
 
-    def _peer(self, exudyn: Exudyn, scene: SpatialScene, swept: Swept | None) -> None:
+    def _peer(self, exudyn: Exudyn, scene: Scene, swept: Swept | None) -> None:
         """The peer beside our sweep, on whose figures it comes."""
         name, folder = find_analysis(scene, None).name, self.folder / scene.name
         reference, points = swept or self._work_precision(scene, name, folder)
@@ -171,7 +171,7 @@ class Campaign:
             self.console.print(str(path), soft_wrap=True)
 
 
-def _inputs(scene: SpatialScene, bodies: Mapping[str, str]) -> dict[str, object]:
+def _inputs(scene: Scene, bodies: Mapping[str, str]) -> dict[str, object]:
     return {"name": scene.name, "scene": content_hash(scene.text), "bodies": dict(bodies)}
 
 

@@ -5,17 +5,17 @@ from __future__ import annotations
 import numpy as np
 
 from ..common.arrays import Array
-from ..mbs.model.spatial_model import SpatialModel
-from ..mbs.model.spatial_system import SpatialSystem
-from ..mbs.solve.spatial_start import undeformed_posture
+from ..mbs.model.model import Model
+from ..mbs.model.system import MultibodySystem
+from ..mbs.solve.start import undeformed_posture
 
-State = tuple[SpatialSystem, Array, Array]
+State = tuple[MultibodySystem, Array, Array]
 """Equations, q (n_q,) and v (n_v,)."""
 
 
-def start_at_rest(model: SpatialModel) -> State:
+def start_at_rest(model: Model) -> State:
     """Where a mechanism starts: on its path with undeformed links, at rest."""
-    return SpatialSystem(model), undeformed_posture(model).q, np.zeros(model.tree.n_v)
+    return MultibodySystem(model), undeformed_posture(model).q, np.zeros(model.tree.n_v)
 
 
 def evaluation_seconds(state: State, t: float, evaluations: int) -> float:

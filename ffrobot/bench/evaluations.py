@@ -15,10 +15,10 @@ from typing import Any
 
 import numpy as np
 
-from ..mbs.model.spatial_model import build_spatial_model
-from ..mbs.model.spatial_system import SpatialSystem
-from ..run.spatial import prepare_spatial
-from ..run.spatial_bodies import load_spatial_bodies
+from ..mbs.model.model import build_model
+from ..mbs.model.system import MultibodySystem
+from ..run.bodies import load_bodies
+from ..run.solve import prepare_scene
 from ..run.watcher import Watcher
 from ..scene.load import load_scene, make_scene
 from .evaluation import evaluation_seconds, start_at_rest
@@ -64,7 +64,7 @@ def measure_evaluations(repository: Path, folder: Path, display: Watcher) -> lis
     """A row for each mechanism; those of the two-link case and the one written by hand come first."""
     display.stage("bodies, and compiling the hand-written version")
     two_link, slider_crank = (
-        prepare_spatial(load_scene(repository / "cases" / name / "scene.toml"), display).model
+        prepare_scene(load_scene(repository / "cases" / name / "scene.toml"), display).model
         for name in ("two_link", "slider_crank")
     )
     hand_written = HandWritten(repository, two_link, folder)
@@ -80,10 +80,10 @@ def measure_evaluations(repository: Path, folder: Path, display: Watcher) -> lis
             for n in LINKS
         ),
         Timed("slider-crank, 3 rows", partial(evaluation_seconds, start_at_rest(slider_crank), 0.0), 0.15e-6),
-        Timed(f"arm of 3 links × {MODES} modes in space, 3 rows", _arm_in_space(3, TUBE), 1.4e-6),
-        Timed(f"arm of 6 links × {MODES} modes in space, 6 rows", _arm_in_space(6, TUBE), 3e-6),
-        Timed("arm of 6 rigid links in space, 6 rows", _arm_in_space(6, RIGID)),
-        Timed("arm of 6 rigid links in space, free", _arm_in_space(6, RIGID, rows=0)),
+        Timed(f"arm of 3 links × {MODES} modes in space, 3 rows", _arm_3d(3, TUBE), 1.4e-6),
+        Timed(f"arm of 6 links × {MODES} modes in space, 6 rows", _arm_3d(6, TUBE), 3e-6),
+        Timed("arm of 6 rigid links in space, 6 rows", _arm_3d(6, RIGID)),
+        Timed("arm of 6 rigid links in space, free", _arm_3d(6, RIGID, rows=0)),
     ]
     counts = [max(1, int(SECONDS / one.seconds(100))) for one in timed]
     measured: list[list[float]] = [[] for _ in timed]
@@ -95,7 +95,7 @@ def measure_evaluations(repository: Path, folder: Path, display: Watcher) -> lis
     return [_row(one, seconds, by_hand) for one, seconds in zip(timed, measured, strict=True)]
 
 
-def _arm_in_space(links: int, link: Mapping[str, Any], rows: int | None = None) -> Callable[[int], float]:
+def _arm_3d(links: int, link: Mapping[str, Any], rows: int | None = None) -> Callable[[int], float]:
     """Measures an evaluation of an arm whose tip follows a path, by default with all its joints; bent, in motion."""
     rows = links if rows is None else rows
     names = [f"link{k}" for k in range(links)]
@@ -113,8 +113,8 @@ def _arm_in_space(links: int, link: Mapping[str, Any], rows: int | None = None) 
         trajectory=_path(f"{names[-1]}.tip", rows),
         analysis=[{"name": "moves", "kind": "pcid" if rows else "forward", "end": 1.0, "output_step": 1.0}],
     )
-    model = build_spatial_model(scene, [body.spatial for body in load_spatial_bodies(scene, lambda _: None)])
-    core, rng = SpatialSystem(model).core, np.random.default_rng(1)
+    model = build_model(scene, [body.spatial for body in load_bodies(scene, lambda _: None)])
+    core, rng = MultibodySystem(model).core, np.random.default_rng(1)
     q, v = rng.uniform(-1.0, 1.0, (2, core.n_v))
     for node in model.tree.nodes:
         q[node.p_q] *= 1e-3

@@ -13,14 +13,14 @@ from types import MappingProxyType
 import numpy as np
 
 from ..mbs.analysis.context import Context
-from ..mbs.analysis.pcid import run_spatial_pcid
+from ..mbs.analysis.pcid import run_pcid
+from ..mbs.model.body import Body, BodyPoint
+from ..mbs.model.model import Model, build_model
 from ..mbs.model.projection import projected
-from ..mbs.model.spatial_body import SpatialBody, SpatialPoint
-from ..mbs.model.spatial_model import SpatialModel, build_spatial_model
 from ..mbs.scene.analysis import IntegratedAnalysis
 from ..run.watcher import Watcher
 from ..scene.load import make_scene
-from ..scene.spatial import SpatialScene
+from ..scene.scene import Scene
 from .evaluation import State, evaluation_seconds, start_at_rest
 from .precision import Row
 
@@ -30,7 +30,7 @@ MODES_IN_CHAINS, RUN_LENGTH = 5, 0.1  # s
 EVALUATIONS, ROUNDS = 50_000, 25  # over the number of coordinates, in one timing; a millisecond is often undisturbed
 
 
-def sine_link(name: str, modes: int) -> SpatialBody:
+def sine_link(name: str, modes: int) -> Body:
     """A simply supported beam: φ_k = √(2/m) sin(kπx/L) along y."""
     k = np.arange(1, modes + 1)
     amplitude, sign = np.sqrt(2 / MASS), (-1.0) ** k
@@ -39,7 +39,7 @@ def sine_link(name: str, modes: int) -> SpatialBody:
     x_y = np.outer([1.0, 0.0, 0.0], y)
     along, across = np.multiply.outer(y, np.ones(modes)), np.multiply.outer(np.outer(y, y), np.eye(modes))
     turned = np.multiply.outer([0.0, 0.0, 1.0], slope)
-    whole = SpatialBody(
+    whole = Body(
         name=name,
         mass=MASS,
         first_moment=np.array([MASS * LENGTH / 2, 0.0, 0.0]),
@@ -54,8 +54,8 @@ def sine_link(name: str, modes: int) -> SpatialBody:
         damping=np.zeros((modes, modes)),
         points=MappingProxyType(
             {
-                "root": SpatialPoint(np.zeros(3), none, turned),
-                "tip": SpatialPoint(np.array([LENGTH, 0.0, 0.0]), none, turned * sign),
+                "root": BodyPoint(np.zeros(3), none, turned),
+                "tip": BodyPoint(np.array([LENGTH, 0.0, 0.0]), none, turned * sign),
             }
         ),
         modal_transform=np.eye(modes),
@@ -64,17 +64,17 @@ def sine_link(name: str, modes: int) -> SpatialBody:
     return projected(whole)
 
 
-def chain(links: int, modes: int, *, closed: bool = False, outputs: int = 1) -> SpatialModel:
+def chain(links: int, modes: int, *, closed: bool = False, outputs: int = 1) -> Model:
     """A half circle of links, straight and at rest, with a short inverse analysis of so many outputs.
 
     Its last tip is on a path, or, where closed, pinned to the ground while the first link is driven.
     """
     names = [f"b{i}" for i in range(links)]
     angles = {name: np.pi * (i + 0.5) / links for i, name in enumerate(names)}
-    return build_spatial_model(_scene(angles, closed, outputs), [sine_link(name, modes) for name in names])
+    return build_model(_scene(angles, closed, outputs), [sine_link(name, modes) for name in names])
 
 
-def _scene(angles: Mapping[str, float], closed: bool, outputs: int) -> SpatialScene:
+def _scene(angles: Mapping[str, float], closed: bool, outputs: int) -> Scene:
     a = np.array(list(angles.values()))
     tip = [LENGTH * float(np.cos(a).sum()), LENGTH * float(np.sin(a).sum())]
     names = list(angles)
@@ -104,7 +104,7 @@ def _scene(angles: Mapping[str, float], closed: bool, outputs: int) -> SpatialSc
     )
 
 
-def _timer(model: SpatialModel) -> Callable[[], float]:
+def _timer(model: Model) -> Callable[[], float]:
     return evaluation_timer(start_at_rest(model))
 
 
@@ -116,11 +116,11 @@ def evaluation_timer(state: State, evaluations: int = EVALUATIONS) -> Callable[[
 def output_timer(outputs: int) -> Callable[[], float]:
     """Measures the seconds of a short run with so many outputs; the integration in it is always the same."""
     model = chain(2, MODES_IN_CHAINS, outputs=outputs)
-    assert isinstance(model.scene, SpatialScene)
+    assert isinstance(model.scene, Scene)
     analysis = model.scene.analysis[0]
     assert isinstance(analysis, IntegratedAnalysis)
     context = Context(model=model, outcomes={}, progress=lambda t: True)
-    return lambda: run_spatial_pcid(context, analysis).statistics.wall_seconds
+    return lambda: run_pcid(context, analysis).statistics.wall_seconds
 
 
 def measure_growth(repeat: int, display: Watcher) -> list[Row]:

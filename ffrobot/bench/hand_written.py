@@ -10,11 +10,11 @@ from pathlib import Path
 import numpy as np
 
 from ..common.errors import InputError, SolveError
-from ..mbs.model.spatial_body import SpatialBody
-from ..mbs.model.spatial_model import SpatialModel
-from ..mbs.model.spatial_system import SpatialSystem
-from ..mbs.solve.spatial_posture import solve_posture, with_rates
-from ..mbs.solve.spatial_start import undeformed_posture
+from ..mbs.model.body import Body
+from ..mbs.model.model import Model
+from ..mbs.model.system import MultibodySystem
+from ..mbs.solve.posture import solve_posture, with_rates
+from ..mbs.solve.start import undeformed_posture
 from .evaluation import State
 
 SOURCE = Path("tests/benchmarks/hand_written/two_link.cpp")
@@ -34,7 +34,7 @@ class HandWritten:
     Raises `InputError` where the source is not there, `SolveError` where it cannot be compiled.
     """
 
-    def __init__(self, repository: Path, model: SpatialModel, folder: Path, flags: Sequence[str] = FLAGS) -> None:
+    def __init__(self, repository: Path, model: Model, folder: Path, flags: Sequence[str] = FLAGS) -> None:
         source = repository / SOURCE
         if not source.is_file():
             raise InputError(f"{repository}: source: expected ffrobot's source tree, found no {SOURCE} in it")
@@ -65,7 +65,7 @@ class HandWritten:
         return self(1, STEPS)[2][0]
 
 
-def link_numbers(body: SpatialBody) -> str:
+def link_numbers(body: Body) -> str:
     """Mass, inertia about z, first moment, length, and the rows K, S̄_y, h = Ī_xy − Ī_yx, Φ_y of the tip."""
     h = body.I_bar[0, 1] - body.I_bar[1, 0]
     rows = [body.stiffness, body.S_bar[1], h, body.points["tip"].translation[1]]
@@ -73,7 +73,7 @@ def link_numbers(body: SpatialBody) -> str:
     return " ".join(repr(float(number)) for number in numbers if number is not None)
 
 
-def general_state(model: SpatialModel) -> State:
+def general_state(model: Model) -> State:
     """The state at which the program times itself, on the constraints."""
     q, v = undeformed_posture(model).q, np.zeros(model.tree.n_v)
     bend = iter(1e-4 / (1 + np.arange(model.tree.n_v)))
@@ -82,4 +82,4 @@ def general_state(model: SpatialModel) -> State:
     found = solve_posture(model, TIME, q)
     assert found is not None
     start = with_rates(model, found, v, TIME)
-    return SpatialSystem(model), start.q, start.v
+    return MultibodySystem(model), start.q, start.v

@@ -10,7 +10,7 @@ from typing import Any
 import tomli_w
 
 from ..fe_models.link_file import link_keys, link_path
-from ..scene.spatial import SpatialScene
+from ..scene.scene import Scene
 
 Keys = dict[str, Any]
 
@@ -18,7 +18,7 @@ Keys = dict[str, Any]
 _ANY_NUMBER_OF_MODES = {"allocation": "least-squares", "mode_weights": None}
 
 
-def refined(scene: SpatialScene, elements: float, modes: float, folder: Path) -> SpatialScene | None:
+def refined(scene: Scene, elements: float, modes: float, folder: Path) -> Scene | None:
     """The scene with `elements` and `modes` times as many of them in every link that is given by its link file.
 
     Written to `folder`, one file a link. None where neither changes anything: no link files, or none with such keys.
@@ -42,17 +42,17 @@ def refined(scene: SpatialScene, elements: float, modes: float, folder: Path) ->
     return scene.model_copy(update=update) if changed else None
 
 
-def elements_of(scene: SpatialScene) -> str:
+def elements_of(scene: Scene) -> str:
     """What the mesh tables of the link files say, for the record: "20" or "20, 40"."""
     return _listed(scene, lambda keys: keys.get("mesh", {}))
 
 
-def modes_of(scene: SpatialScene) -> str:
+def modes_of(scene: Scene) -> str:
     """Likewise for the numbers of modes."""
     return _listed(scene, lambda keys: {"count": keys.get("modes", {}).get("count", "")})
 
 
-def _listed(scene: SpatialScene, table: Callable[[Keys], Keys]) -> str:
+def _listed(scene: Scene, table: Callable[[Keys], Keys]) -> str:
     links = [link_keys(body.link) for body in scene.body if body.link is not None]
     values = [str(value) for keys in links for key, value in table(keys).items() if key not in ("cell", "order")]
     return ", ".join(dict.fromkeys(values))

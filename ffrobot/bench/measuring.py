@@ -11,11 +11,11 @@ from ..common.errors import InputError
 from ..common.validation import did_you_mean, quoted
 from ..mbs.scene.analysis import IntegratedAnalysis
 from ..results.file import Results
-from ..results.spatial import spatial_image
-from ..run.spatial import solve_spatial
+from ..results.write import results_image
+from ..run.solve import solve_scene
 from ..run.watcher import Watcher
 from ..scene.kinds import AnyKind
-from ..scene.spatial import SpatialScene
+from ..scene.scene import Scene
 from .errors import histories
 
 UNLIMITED = 10**12  # steps: the budget ends a run
@@ -66,7 +66,7 @@ class Deadline(Watcher):
         return self.display.advance(t, end) and not self.passed
 
 
-def find_analysis(scene: SpatialScene, name: str | None) -> IntegratedAnalysis:
+def find_analysis(scene: Scene, name: str | None) -> IntegratedAnalysis:
     """The analysis of that name, or the first that integrates. Raises `InputError` where there is none."""
     integrated = [a for a in scene.analysis if isinstance(a, IntegratedAnalysis) and a.is_resumable]
     if not integrated:
@@ -91,7 +91,7 @@ def find_analysis(scene: SpatialScene, name: str | None) -> IntegratedAnalysis:
     )
 
 
-def with_analysis(scene: SpatialScene, name: str, **changes: object) -> SpatialScene:
+def with_analysis(scene: Scene, name: str, **changes: object) -> Scene:
     """The scene with one analysis only, and the one whose actuation it takes; `changes` of keys concern both."""
     kept: list[AnyKind] = []
     for analysis in reversed(scene.analysis):
@@ -101,14 +101,14 @@ def with_analysis(scene: SpatialScene, name: str, **changes: object) -> SpatialS
     return scene.model_copy(update={"analysis": tuple(reversed(kept))})
 
 
-def run(scene: SpatialScene, name: str, budget: float, display: Watcher, *, keep: bool = True) -> Run:
+def run(scene: Scene, name: str, budget: float, display: Watcher, *, keep: bool = True) -> Run:
     """Solve `scene`, which has the analysis `name` last, within `budget` (s). Histories only where `keep`.
 
     Raises `InputError` for anything wrong with the scene, `SolveError` where no state is found, `KeyboardInterrupt`
     after Ctrl-C.
     """
     deadline = Deadline(budget, display)
-    solution = solve_spatial(scene, deadline)
+    solution = solve_scene(scene, deadline)
     outcomes = list(solution.outcomes.values())
     last = outcomes[-1]
     status, runs = last.status, [outcome.statistics for outcome in outcomes]
@@ -118,7 +118,7 @@ def run(scene: SpatialScene, name: str, budget: float, display: Watcher, *, keep
         status = "over budget"
     found: dict[str, dict[str, Array]] = {}
     if keep and status == "completed":
-        with Results.from_image(spatial_image(solution), scene.path) as results:
+        with Results.from_image(results_image(solution), scene.path) as results:
             found = histories(results, name)
     return Run(
         last.statistics.integrator.name,

@@ -14,7 +14,7 @@ import numpy as np
 
 from ..common.errors import InputError, SolveError
 from ..run.watcher import Watcher
-from ..scene.spatial import SpatialScene
+from ..scene.scene import Scene
 from .errors import relative
 from .precision import PATIENCE, Point, Reference, Row, fastest, repeat_point
 
@@ -86,7 +86,7 @@ def _errors(path: Path, reference: Reference) -> dict[str, float]:
 
 def measure_peer(
     exudyn: Exudyn,
-    scene: SpatialScene,
+    scene: Scene,
     name: str,
     reference: Reference,
     points: Sequence[Point],

@@ -12,7 +12,7 @@ from ..common.arrays import Array
 from ..common.errors import SolveError
 from ..mbs.scene.analysis import TIGHTEST_TOLERANCE
 from ..run.watcher import Watcher
-from ..scene.spatial import SpatialScene
+from ..scene.scene import Scene
 from .errors import KINDS, errors
 from .measuring import Run, run, with_analysis
 
@@ -79,7 +79,7 @@ class Point:
         }
 
 
-def find_reference(scene: SpatialScene, name: str, tolerance: float, budget: float, display: Watcher) -> Reference:
+def find_reference(scene: Scene, name: str, tolerance: float, budget: float, display: Watcher) -> Reference:
     """Solve at `tolerance` with one integrator, and near it with another.
 
     Raises `SolveError` where fewer than two of them complete.
@@ -105,7 +105,7 @@ def find_reference(scene: SpatialScene, name: str, tolerance: float, budget: flo
 
 
 def measure_points(
-    scene: SpatialScene,
+    scene: Scene,
     name: str,
     reference: Reference,
     integrators: Sequence[str],
@@ -151,14 +151,14 @@ def _rivals(other: Point, point: Point) -> bool:
     return other.integrator != point.integrator and other.tolerance == point.tolerance and other.first.completed
 
 
-def repeat_point(scene: SpatialScene, name: str, point: Point, budget: float, display: Watcher) -> float:
+def repeat_point(scene: Scene, name: str, point: Point, budget: float, display: Watcher) -> float:
     """Run a point once more, however long it takes this time; returns its seconds."""
     again = run(at(scene, name, point.integrator, point.tolerance), name, 10 * budget, display, keep=False)
     point.seconds.append(again.seconds)
     return again.seconds
 
 
-def at(scene: SpatialScene, name: str, integrator: str, tolerance: float) -> SpatialScene:
+def at(scene: Scene, name: str, integrator: str, tolerance: float) -> Scene:
     """The scene with the analysis `name` alone, integrated so."""
     return with_analysis(scene, name, integrator=integrator, tolerance=tolerance)
 

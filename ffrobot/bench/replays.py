@@ -5,10 +5,10 @@ from __future__ import annotations
 import tomllib
 from statistics import median
 
-from ..run.spatial import solve_spatial
+from ..run.solve import solve_scene
 from ..run.watcher import Watcher
 from ..scene.load import make_scene
-from ..scene.spatial import SpatialScene
+from ..scene.scene import Scene
 from .precision import Row
 from .ratio import ratios
 
@@ -18,7 +18,7 @@ TOLERANCE, END, OUTPUT_STEP = 1e-4, 1.0, 0.001
 AIM = 2.0  # times the seconds of PCID
 
 
-def measure_replays(scene: SpatialScene, repeat: int, display: Watcher) -> list[Row]:
+def measure_replays(scene: Scene, repeat: int, display: Watcher) -> list[Row]:
     """Rows by integrator and by what is applied; `scene` is cases/two_link. Raises `SolveError` where one fails."""
     return [
         _row(_scene(scene, apply, integrator), apply, integrator, repeat, display)
@@ -27,11 +27,11 @@ def measure_replays(scene: SpatialScene, repeat: int, display: Watcher) -> list[
     ]
 
 
-def _row(both: SpatialScene, apply: str, integrator: str, repeat: int, display: Watcher) -> Row:
+def _row(both: Scene, apply: str, integrator: str, repeat: int, display: Watcher) -> Row:
     seconds, of_pcid = [], []
     for repetition in range(repeat):
         display.stage(f"{apply}, {integrator}: repetition {repetition + 1} of {repeat}")
-        outcomes = solve_spatial(both, display).outcomes.values()
+        outcomes = solve_scene(both, display).outcomes.values()
         for outcome in outcomes:
             outcome.check_completed()
         pcid, forward = (outcome.statistics for outcome in outcomes)
@@ -51,7 +51,7 @@ def _row(both: SpatialScene, apply: str, integrator: str, repeat: int, display: 
     }
 
 
-def _scene(scene: SpatialScene, apply: str, integrator: str) -> SpatialScene:
+def _scene(scene: Scene, apply: str, integrator: str) -> Scene:
     keys = tomllib.loads(scene.text)
     common = {"end": END, "output_step": OUTPUT_STEP, "tolerance": TOLERANCE, "integrator": integrator}
     keys["analysis"] = [

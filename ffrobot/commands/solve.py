@@ -13,7 +13,7 @@ from .protect import protect
 
 if TYPE_CHECKING:
     from ..present.progress import Display
-    from ..run.spatial_solution import SpatialSolution
+    from ..run.solution import Solution
 
 
 @click.command()
@@ -55,27 +55,27 @@ def _solve(scene_file: Path, path: Path, again: str, *, resume: bool, strict: bo
     from ..present.start_posture import chosen_posture
     from ..present.summary import print_summary, summary_console
     from ..results.file import Results
-    from ..results.spatial import write_spatial_results
-    from ..results.spatial_resume import resume_spatial
+    from ..results.resume import resume_scene
     from ..results.stopped import how_to_go_on
-    from ..run.spatial import solve_spatial
+    from ..results.write import write_results
+    from ..run.solve import solve_scene
     from ..scene.plausibility import remarks_on_file
 
     for remark in remarks_on_file(scene_file):  # first: they may be why the run fails
         click.echo(f"note       {remark}")
     writing, kept = 0.0, []
 
-    def keep(solution: SpatialSolution) -> None:
+    def keep(solution: Solution) -> None:
         nonlocal writing
         began = time.perf_counter()
-        write_spatial_results(solution, path)
+        write_results(solution, path)
         writing = time.perf_counter() - began
         kept.append(solution)
 
     with Display() as display:
         try:
             solution = (
-                resume_spatial(scene_file, path, display, keep) if resume else solve_spatial(scene_file, display, keep)
+                resume_scene(scene_file, path, display, keep) if resume else solve_scene(scene_file, display, keep)
             )
         except SolveError as error:  # what a signal has cut short may fail for that
             if not display.signal:
@@ -95,7 +95,7 @@ def _solve(scene_file: Path, path: Path, again: str, *, resume: bool, strict: bo
         _check_without_warnings(solution, scene_file)
 
 
-def _check_ended(solution: SpatialSolution, display: Display, scene_file: Path, again: str) -> None:
+def _check_ended(solution: Solution, display: Display, scene_file: Path, again: str) -> None:
     """Raise `SolveError` where an analysis ended early, `StoppedError` where a signal has asked for an end."""
     from ..common.errors import SolveError, StoppedError
     from ..results.stopped import how_to_go_on, left_out
@@ -111,7 +111,7 @@ def _check_ended(solution: SpatialSolution, display: Display, scene_file: Path, 
         raise StoppedError(f"{scene_file}: stopped on request {done}{go_on}", display.signal)
 
 
-def _check_without_warnings(solution: SpatialSolution, scene_file: Path) -> None:
+def _check_without_warnings(solution: Solution, scene_file: Path) -> None:
     """Raise `SolveError` for the first warning."""
     from ..common.errors import SolveError
 

@@ -10,7 +10,7 @@ import numpy as np
 from ..common.arrays import Array, as_floats
 from ..common.errors import InputError
 from ..common.validation import did_you_mean
-from ..mbs.joints.spatial.joints import SPATIAL_JOINT_TYPES
+from ..mbs.joints.joints import JOINT_TYPES
 from ..results.file import COLUMN, Results
 from ..results.meanings import RESULTS, meaning
 from ..sweep.runs import is_vector
@@ -114,7 +114,7 @@ def _unit(results: Results, name: str) -> str:
     kinds = {str(joint["name"]): str(joint["type"]) for joint in results.scene["joint"]} if match else {}
     if match is None or match["joint"] not in kinds:
         return ""
-    units = set(SPATIAL_JOINT_TYPES[kinds[match["joint"]]].units)  # types that the plane has too have the same there
+    units = set(JOINT_TYPES[kinds[match["joint"]]].units)  # types that the plane has too have the same there
     turning, sliding = known.unit.split(", ")
     return {"rad": turning, "m": sliding}[units.pop()] if len(units) == 1 else ""
 

@@ -14,7 +14,7 @@ from ..mbs.fields.steps import DATASET
 from ..mbs.scene.analysis import TimedAnalysis
 from ..results.file import Results
 from ..scene.load import load_scene
-from ..scene.spatial import SpatialScene
+from ..scene.scene import Scene
 from ..sweep.files import run_files
 from ..sweep.sweep import Key
 from .readings import Goal
@@ -78,7 +78,7 @@ def link_with(path: Path, body: str, changes: Mapping[Key, float]) -> Link | Non
     return read_link(Path(source) if changed is None else LinkTable(changed, Path(source)))
 
 
-def _needed(scene: SpatialScene, goals: Sequence[Goal]) -> set[str]:
+def _needed(scene: Scene, goals: Sequence[Goal]) -> set[str]:
     """Names of the analyses that goals name, by default the first, and of those that they rest on."""
     names = [one.name for one in scene.analysis]
     found = {goal.analysis if goal.analysis in names else names[0] for goal in goals} or {names[0]}

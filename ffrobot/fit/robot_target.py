@@ -12,7 +12,7 @@ from ..actuation.control.modes import held_frequencies, robot_modes
 from ..common.arrays import Array, as_floats
 from ..common.errors import InputError
 from ..common.toml_files import load_toml, read_text
-from ..run.spatial import solve_spatial
+from ..run.solve import solve_scene
 from ..run.watcher import Watcher
 from ..scene.load import load_scene, make_scene
 from ..sweep.files import LINKS, run_files, value_of
@@ -51,7 +51,7 @@ class RobotTarget:
             body["link"] = tables.get(body.get("link"), body.get("link")) if "link" in body else None
             if body.get("modes") == "auto":  # the linear model needs no choice: all of them
                 del body["modes"]
-        solution = solve_spatial(make_scene(folder=self._path.parent, **scene), Watcher())
+        solution = solve_scene(make_scene(folder=self._path.parent, **scene), Watcher())
         details = solution.outcomes["fit"].details
         assert isinstance(details, LinearModels)
         frequency = held_frequencies(details.models[0]) if self._motors == "held" else _free(details.models[0])

@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from ..mbs.quantities.attachment_error import JOLT
-from ..run.spatial_solution import SpatialResult, SpatialSolution
+from ..run.solution import AnalysisResult, Solution
 from .lines import deflection_in_words
 
 NOT_ESTIMATED = "not estimated"
 RESOLVED = 0.3  # an estimated error of modes beyond is none: they do not resolve the motion
 
 
-def error_budget(solution: SpatialSolution) -> Iterator[str]:
+def error_budget(solution: Solution) -> Iterator[str]:
     """A line each: time integration, modes, deflection, patches."""
     results = integrated(solution)
     if aims := [result.analysis.tolerance for result in results]:
@@ -26,12 +26,12 @@ def error_budget(solution: SpatialSolution) -> Iterator[str]:
     yield from (f"patches of {patches.stiffness_in_words}" for patches in solution.patch_arrays)
 
 
-def integrated(solution: SpatialSolution) -> list[SpatialResult]:
+def integrated(solution: Solution) -> list[AnalysisResult]:
     """The analyses that went through time."""
     return [result for result in solution.analyses.values() if result.analysis.is_integrated]
 
 
-def _modes(solution: SpatialSolution, results: Sequence[SpatialResult]) -> str:
+def _modes(solution: Solution, results: Sequence[AnalysisResult]) -> str:
     if rigid := [f"{name} in {', '.join(body.rigid_in)}" for name, body in solution.bodies.items() if body.rigid_in]:
         return f"{NOT_ESTIMATED}: rigid for want of modes: {'; '.join(rigid)}"
     if solution.mode_choice is not None:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from ..mbs.model.spatial_body import SpatialBody
+from ..mbs.model.body import Body
 from ..mbs.model.truncation import modes_kept
 from ..run.mode_search import ModeChoice
 from ..scene.pieces import BodyInPieces
 
 
-def chosen_modes(bodies: Sequence[SpatialBody], choice: ModeChoice) -> str:
+def chosen_modes(bodies: Sequence[Body], choice: ModeChoice) -> str:
     """How many modes were enough, and what leaving out the others costs and saves."""
     kept = [f"{body.name}: {modes_kept(body)}" for body in bodies if body.n_modes]
     lines = ["; ".join(kept)]

@@ -14,7 +14,7 @@ from ..mbs.analysis.inverted_path import AroundPath, describe_zeros, is_minimum_
 from ..mbs.analysis.motors_only import path_errors
 from ..mbs.analysis.outcome import Details, Outcome
 from ..results.verdict import Verdict
-from ..run.spatial_solution import SpatialResult, SpatialSolution
+from ..run.solution import AnalysisResult, Solution
 from .accuracy import error_budget, integrated
 from .control import control_lines, control_tables
 from .lines import alike, integrator_lines, warning_lines
@@ -33,7 +33,7 @@ def summary_console() -> Console:
 
 
 def print_summary(
-    solution: SpatialSolution, verdict: Verdict, path: Path, seconds: Mapping[str, float], console: Console
+    solution: Solution, verdict: Verdict, path: Path, seconds: Mapping[str, float], console: Console
 ) -> None:
     """Tables of the analyses and what they found, wall time per stage, what was skipped, where the results are."""
     console.print(_analyses(solution))
@@ -59,17 +59,17 @@ def print_summary(
     console.print(f"results    {path}", soft_wrap=True)
 
 
-def _closest(solution: SpatialSolution) -> Iterator[tuple[str, SpatialResult]]:
+def _closest(solution: Solution) -> Iterator[tuple[str, AnalysisResult]]:
     """The analyses by name, at outputs and between."""
     yield from ((name, one.closer or one) for name, one in solution.analyses.items())
 
 
-def _details(solution: SpatialSolution) -> dict[str, Details]:
+def _details(solution: Solution) -> dict[str, Details]:
     """What only kinds of analyses find, by analysis."""
     return {name: result.run.details for name, result in solution.analyses.items()}
 
 
-def _tables(solution: SpatialSolution) -> Iterator[Table]:
+def _tables(solution: Solution) -> Iterator[Table]:
     """What was found of each kind, where there is any."""
     voltages = voltage_table(
         (name, layout, array, result.actuation.voltages[layout])
@@ -83,7 +83,7 @@ def _tables(solution: SpatialSolution) -> Iterator[Table]:
     yield from control_tables(_details(solution))
 
 
-def _notes(solution: SpatialSolution, seconds: Mapping[str, float]) -> Iterator[tuple[str, str]]:
+def _notes(solution: Solution, seconds: Mapping[str, float]) -> Iterator[tuple[str, str]]:
     runs = {result.analysis.name: result.run for result in integrated(solution)}
     yield from (("path", note) for note in solution.path_notes)
     chosen = {name: run.statistics.integrator for name, run in runs.items()}
@@ -120,7 +120,7 @@ def _inversion(run: Outcome, around: AroundPath) -> str:
     )
 
 
-def _analyses(solution: SpatialSolution) -> Table:
+def _analyses(solution: Solution) -> Table:
     table = plain_table(
         "analysis", "kind", "integrator", "end (s)", "steps", "tolerance", "constraint\nviolation", "wall (s)"
     )
@@ -139,7 +139,7 @@ def _analyses(solution: SpatialSolution) -> Table:
     return table
 
 
-def _end(result: SpatialResult) -> str:
+def _end(result: AnalysisResult) -> str:
     """The last output, s, or how far a run came that ended early."""
     run = result.run
     ended_early = run.status != "completed"

@@ -13,21 +13,21 @@ from ..actuation.control.placing import Placed
 from ..actuation.feasibility import Feasibility
 from ..actuation.motors import MotorFeasibility
 from ..actuation.patches.patches import PatchArray
-from ..actuation.patches.records import SpatialPztLayout
+from ..actuation.patches.records import PztLayout
 from ..actuation.patches.structure import StructureEffect
 from ..actuation.patches.voltages import Voltages
 from ..actuation.point_forces import PointForces
-from ..actuation.spatial_points import SpatialPointSet
+from ..actuation.points import PointSet
 from ..actuation.unsupplied import Unsupplied
 from ..common.arrays import Array
 from ..mbs.analysis.tracking import TrackedPath
-from ..mbs.quantities.spatial_motion import SpatialMotion
+from ..mbs.quantities.motion import RobotMotion
 from ..mbs.scene.space import SPACES, Space
-from ..run.spatial_actuation import SpatialActuation
-from ..run.spatial_solution import SpatialSolution
+from ..run.actuation import Actuation
+from ..run.solution import Solution
 
 
-def write_actuation(group: h5py.Group, solution: SpatialSolution, actuation: SpatialActuation) -> None:
+def write_actuation(group: h5py.Group, solution: Solution, actuation: Actuation) -> None:
     """Of an analysis: pzt/, by layout, and feasibility/.
 
     `pzt/LAYOUT/residual_force` (T, n) is what all patches of the link leave, on the modes of its file.
@@ -84,7 +84,7 @@ def _write_verdict(group: h5py.Group, judged: Feasibility) -> None:
         group.create_group("unsupplied").attrs.update(about)
 
 
-def _write_judgement(group: h5py.Group, judged: Feasibility, layouts: Mapping[str, SpatialPztLayout]) -> None:
+def _write_judgement(group: h5py.Group, judged: Feasibility, layouts: Mapping[str, PztLayout]) -> None:
     """What is required of each motor and each of the layouts, against what they can."""
     for joint, motor in judged.motors.items():
         group.create_group(f"joints/{joint}").attrs.update(vars(motor) | {"factor": motor.factor})
@@ -123,7 +123,7 @@ def read_unsupplied(group: h5py.Group) -> Unsupplied | None:
     return Unsupplied(**about)
 
 
-def write_point_forces(group: h5py.Group, points: SpatialPointSet, forces: PointForces, space: Space) -> None:
+def write_point_forces(group: h5py.Group, points: PointSet, forces: PointForces, space: Space) -> None:
     """Of the actuation points of one body, what the `space` of the scene has."""
     group["force"] = forces.force
     group["residual"] = forces.residual
@@ -136,7 +136,7 @@ def write_point_forces(group: h5py.Group, points: SpatialPointSet, forces: Point
     group.attrs["condition_number"] = forces.condition_number
 
 
-def write_placement(group: h5py.Group, _motion: SpatialMotion, placed: Placed) -> None:
+def write_placement(group: h5py.Group, _motion: RobotMotion, placed: Placed) -> None:
     """Of an analysis: placement/, with the patches found and those spread evenly.
 
     What each reaches, and what one patch would reach anywhere.
@@ -151,7 +151,7 @@ def write_placement(group: h5py.Group, _motion: SpatialMotion, placed: Placed) -
         group[key] = getattr(placed, key)
 
 
-def write_tracking(group: h5py.Group, motion: SpatialMotion, found: TrackedPath) -> None:
+def write_tracking(group: h5py.Group, motion: RobotMotion, found: TrackedPath) -> None:
     """tracking/ of an analysis: what it made small, and work (J) and largest power (W) of motors and of patches."""
     about = group.create_group("tracking").attrs
     for key in ("objective", "least_voltage", "least_share", "cost", "pre_actuation", "post_actuation"):
@@ -161,7 +161,7 @@ def write_tracking(group: h5py.Group, motion: SpatialMotion, found: TrackedPath)
         about[f"{name}_power"] = float(np.abs(power).max(initial=0.0))
 
 
-def _powers(motion: SpatialMotion) -> tuple[Array, Array]:
+def _powers(motion: RobotMotion) -> tuple[Array, Array]:
     """(T,) W of all motors, and of the modal forces of all patches."""
     forces, motors, patches = motion.motor_forces, np.zeros_like(motion.time), np.zeros_like(motion.time)
     assert forces is not None

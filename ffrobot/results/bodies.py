@@ -12,10 +12,10 @@ from ..common.arrays import Array
 from ..mbs.model.truncation import modes_kept
 from ..mbs.quantities.stress import BodyStress, Recovery, SectionLoads, mode_displacement
 from ..mbs.quantities.validity import Bending
-from ..run.spatial_solution import SpatialResult, SpatialSolution
+from ..run.solution import AnalysisResult, Solution
 
 
-def write_bodies(group: h5py.Group, solution: SpatialSolution, result: SpatialResult) -> None:
+def write_bodies(group: h5py.Group, solution: Solution, result: AnalysisResult) -> None:
     """Of an analysis: bodies/ and points/; modes of planar scenes are those that move in the plane."""
     motion = result.motion
     for name, points in motion.points.items():

@@ -9,10 +9,10 @@ import h5py
 
 from ..actuation.control.loop_record import LoopRecord
 from ..actuation.control.metrics import Metrics
-from ..mbs.quantities.spatial_motion import SpatialMotion
+from ..mbs.quantities.motion import RobotMotion
 
 
-def write_loop(group: h5py.Group, _motion: SpatialMotion, record: LoopRecord) -> None:
+def write_loop(group: h5py.Group, _motion: RobotMotion, record: LoopRecord) -> None:
     """Of an analysis: tip_error at its outputs; in control/, samples, with metrics and names as attributes."""
     group["tip_error"] = record.tip_error
     group = group.create_group("control")

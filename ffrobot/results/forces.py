@@ -10,13 +10,13 @@ import numpy as np
 from ..mbs.analysis.inverted_path import AroundPath, is_minimum_phase
 from ..mbs.analysis.motors_only import path_errors
 from ..mbs.analysis.tracking import TrackedPath
-from ..mbs.quantities.spatial_motion import SpatialMotion
-from ..mbs.scene.spatial.trajectories import SpatialTrajectory
+from ..mbs.quantities.motion import RobotMotion
+from ..mbs.scene.trajectories import Trajectory
 from ..mbs.solve.stable_inversion import Inversion
-from ..run.spatial_solution import SpatialResult, SpatialSolution
+from ..run.solution import AnalysisResult, Solution
 
 
-def write_paths(group: h5py.Group, result: SpatialResult) -> None:
+def write_paths(group: h5py.Group, result: AnalysisResult) -> None:
     """Of an analysis: trajectories/ that hold in it, or that motors alone follow; at rest before and after."""
     run, motion, details = result.run, result.motion, result.run.details
     inside, errors = np.clip(run.time, 0.0, run.analysis.last_time), {}
@@ -49,7 +49,7 @@ def _write_zero_dynamics(group: h5py.Group, inversion: Inversion[Any]) -> None:
     entry.attrs["off_rest"] = inversion.off_rest
 
 
-def _write_path(entry: h5py.Group, trajectory: SpatialTrajectory) -> None:
+def _write_path(entry: h5py.Group, trajectory: Trajectory) -> None:
     """When a path made of legs begins and is over, and what was found for it."""
     if trajectory.path is None:
         return
@@ -59,7 +59,7 @@ def _write_path(entry: h5py.Group, trajectory: SpatialTrajectory) -> None:
         entry.attrs["shaper_frequency"] = np.atleast_1d(trajectory.shaper.frequency)
 
 
-def write_joints(group: h5py.Group, solution: SpatialSolution, result: SpatialResult) -> None:
+def write_joints(group: h5py.Group, solution: Solution, result: AnalysisResult) -> None:
     """Of an analysis: joints/."""
     motion, motors = result.motion, solution.scene.motor_joints
     for joint in solution.scene.joint:
@@ -83,7 +83,7 @@ def write_joints(group: h5py.Group, solution: SpatialSolution, result: SpatialRe
         _write_gear(entry, motion, joint.name)
 
 
-def _write_gear(entry: h5py.Group, motion: SpatialMotion, joint: str) -> None:
+def _write_gear(entry: h5py.Group, motion: RobotMotion, joint: str) -> None:
     """What a gear that gives adds to a joint."""
     if (motor := motion.motor_motion(joint)) is not None:
         entry["motor_angle"], entry["motor_rate"] = motor

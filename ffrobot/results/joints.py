@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..common.arrays import Array
-from ..mbs.joints.spatial.joint import SpatialJoint
-from ..mbs.joints.spatial.joints import SPATIAL_JOINT_TYPES
+from ..mbs.joints.joint import JointRecord
+from ..mbs.joints.joints import JOINT_TYPES
 from ..mbs.joints.transmission import MotorLimits
 
 Scene = Mapping[str, Any]
@@ -46,9 +46,9 @@ class Coordinate(NamedTuple):
         return "N·m" if self.unit == "rad" else "N"
 
 
-def joint_type(keys: Mapping[str, Any]) -> type[SpatialJoint]:
+def joint_type(keys: Mapping[str, Any]) -> type[JointRecord]:
     """The record of a joint with these keys."""
-    return SPATIAL_JOINT_TYPES[str(keys["type"])]
+    return JOINT_TYPES[str(keys["type"])]
 
 
 def joint_keys(scene: Scene, name: str) -> Mapping[str, Any]:

@@ -13,7 +13,7 @@ from ..actuation.control.linear_model import LinearModel, save_arrays
 from ..actuation.control.linear_models import LinearModels
 from ..actuation.control.zeros import Zeros
 from ..common.arrays import Array
-from ..mbs.quantities.spatial_motion import SpatialMotion
+from ..mbs.quantities.motion import RobotMotion
 
 MATRICES = ("A", "B", "C", "D", "mass", "transformation")
 NAMES = ("state_names", "input_names", "output_names")
@@ -23,7 +23,7 @@ Shapes = Mapping[str, Mapping[str, Array]]
 """By body, what the robot's modes (T, f) do to it: displacement, turn, modal coordinates."""
 
 
-def write_spatial_linear(group: h5py.Group, motion: SpatialMotion, linear: LinearModels) -> None:
+def write_linear(group: h5py.Group, motion: RobotMotion, linear: LinearModels) -> None:
     """Of an analysis: linear/; `motion` is what it is about."""
     along_v, shapes = _motion(linear)[:, :, : motion.model.tree.n_v], {}  # motors behind gears come last
     T, f, n_v = along_v.shape
@@ -41,7 +41,7 @@ def write_spatial_linear(group: h5py.Group, motion: SpatialMotion, linear: Linea
     _write_models(group, linear, shapes)
 
 
-def _of_frames(motion: SpatialMotion, row: int) -> Array:
+def _of_frames(motion: RobotMotion, row: int) -> Array:
     """(coordinates, n_v) rates of place, angle and modes of each body that moves in the plane, by v."""
     n_v, space = motion.model.tree.n_v, motion.space
     moving = replace(motion, time=np.repeat(motion.time[row], n_v), q=np.repeat(motion.q[row : row + 1], n_v, 0),

@@ -16,13 +16,13 @@ from ..common.tables import key_path
 from ..common.version import program_version
 from ..run.inputs import digest_of_file, named_files, python_files
 from ..run.loaded_body import Loaded
-from ..scene.spatial import SpatialScene
+from ..scene.scene import Scene
 from .file import Results
 
 MAY_CHANGE = "max_steps"  # counts from where a run goes on
 
 
-def check_same_input(scene: SpatialScene, bodies: Mapping[str, Loaded], file: Results) -> None:
+def check_same_input(scene: Scene, bodies: Mapping[str, Loaded], file: Results) -> None:
     """Raise `InputError` naming the first thing that is not as it was."""
     found = next(_changes(scene, bodies, file), None)
     if found is not None:
@@ -32,7 +32,7 @@ def check_same_input(scene: SpatialScene, bodies: Mapping[str, Loaded], file: Re
         )
 
 
-def _changes(scene: SpatialScene, bodies: Mapping[str, Loaded], file: Results) -> Iterator[str]:
+def _changes(scene: Scene, bodies: Mapping[str, Loaded], file: Results) -> Iterator[str]:
     """What of the input is not that of the results file."""
     if file.ffrobot_version != program_version():
         yield f"ffrobot {file.ffrobot_version}, now {program_version()},"
@@ -71,7 +71,7 @@ def _first_difference(then: object, now: object, loc: tuple[int | str, ...] = ()
     return next((place for place in found if place is not None), loc)
 
 
-def write_input_files(file: h5py.File, scene: SpatialScene) -> None:
+def write_input_files(file: h5py.File, scene: Scene) -> None:
     """Attributes `input_files`, and `imported_files` where the scene runs Python files: names from its folder on."""
     file.attrs["input_files"] = json.dumps(input_files(scene))
     folder = scene.path.parent
@@ -81,7 +81,7 @@ def write_input_files(file: h5py.File, scene: SpatialScene) -> None:
         file.attrs["imported_files"] = json.dumps(names)
 
 
-def input_files(scene: SpatialScene) -> dict[str, str]:
+def input_files(scene: Scene) -> dict[str, str]:
     """SHA-256 of the files that a scene names besides links and modal bodies, by what messages call them."""
     tables, folder = tomllib.loads(scene.text), scene.path.parent
     waypoints = {entry["waypoints"] for entry in tables.get("trajectory", []) if "waypoints" in entry}

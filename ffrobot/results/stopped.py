@@ -6,14 +6,14 @@ from ..common.arrays import Array
 from ..common.errors import InputError
 from ..mbs.analysis.outcome import Outcome
 from ..run.enough import goes_on
-from ..run.spatial_solution import SpatialSolution
+from ..run.solution import Solution
 from .file import Results
 
 GROUP = "resume"  # in the group of an analysis
 STOPPED = ("interrupted", "too many steps", "not evaluated")
 
 
-def how_to_go_on(solution: SpatialSolution, command: str) -> str:
+def how_to_go_on(solution: Solution, command: str) -> str:
     """What a message about a run that was stopped adds; empty where it cannot be gone on with."""
     outcome = stopped(solution)
     if outcome is None:
@@ -23,24 +23,24 @@ def how_to_go_on(solution: SpatialSolution, command: str) -> str:
     return f'; {command} runs "{outcome.analysis.name}" again from its start'
 
 
-def left_out(solution: SpatialSolution) -> list[str]:
+def left_out(solution: Solution) -> list[str]:
     """Analyses that were not begun when the run was stopped, or ended by an error."""
     if any(outcome.failed and outcome.status not in STOPPED for outcome in solution.outcomes.values()):
         return []
     return [name for name in analyses(solution) if name not in solution.outcomes]
 
 
-def is_kept(solution: SpatialSolution) -> bool:
+def is_kept(solution: Solution) -> bool:
     """Whether there is something to go on with."""
     return stopped(solution) is not None or bool(left_out(solution))
 
 
-def stopped(solution: SpatialSolution) -> Outcome | None:
+def stopped(solution: Solution) -> Outcome | None:
     """The analysis that was stopped."""
     return next((outcome for outcome in solution.outcomes.values() if outcome.status in STOPPED), None)
 
 
-def analyses(solution: SpatialSolution) -> list[str]:
+def analyses(solution: Solution) -> list[str]:
     """Names of all that the scene asks for."""
     return [analysis.name for analysis in solution.scene.analysis]
 

@@ -6,24 +6,24 @@ import logging
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
+from ..mbs.analysis.drive import Progress
 from ..mbs.analysis.outcome import Outcome
-from ..mbs.analysis.spatial_drive import Progress
-from ..mbs.model.spatial_body import SpatialBody
+from ..mbs.model.body import Body
 from ..mbs.scene.analysis import Analysis
 from .mode_search import ModeSearch, Reported
-from .spatial_solution import SpatialResult, SpatialSolution
+from .solution import AnalysisResult, Solution
 from .watcher import Interruption, Watcher
 
 logger = logging.getLogger(__name__)
 
 
 def with_enough_modes(
-    solution: SpatialSolution,
+    solution: Solution,
     search: ModeSearch,
-    solved: Callable[[SpatialSolution, Mapping[str, SpatialBody]], SpatialSolution],
-    reported: Callable[[SpatialResult], Reported],
+    solved: Callable[[Solution, Mapping[str, Body]], Solution],
+    reported: Callable[[AnalysisResult], Reported],
     interruption: Interruption,
-) -> SpatialSolution:
+) -> Solution:
     """The scene `solved` with the bodies that `search` asks for, until that has enough."""
     while True:
         solution = solved(solution, search.bodies)
@@ -34,7 +34,7 @@ def with_enough_modes(
             return replace(solution, mode_choice=search.choice())
 
 
-def _reported(solution: SpatialSolution, reported: Callable[[SpatialResult], Reported]) -> dict[str, Reported] | None:
+def _reported(solution: Solution, reported: Callable[[AnalysisResult], Reported]) -> dict[str, Reported] | None:
     """What counts, by analysis; None where not all of them completed."""
     results = solution.analyses
     if len(results) < len(solution.scene.analysis) or any(of.status != "completed" for of in results.values()):
@@ -43,12 +43,12 @@ def _reported(solution: SpatialSolution, reported: Callable[[SpatialResult], Rep
 
 
 def with_enough_pieces(
-    solution: SpatialSolution,
-    solved: Callable[[SpatialSolution], SpatialSolution],
-    divided: Callable[[SpatialSolution, Mapping[str, int]], SpatialSolution],
-    wanted: Callable[[SpatialSolution], Mapping[str, int]],
+    solution: Solution,
+    solved: Callable[[Solution], Solution],
+    divided: Callable[[Solution, Mapping[str, int]], Solution],
+    wanted: Callable[[Solution], Mapping[str, int]],
     interruption: Interruption,
-) -> SpatialSolution:
+) -> Solution:
     """The scene `solved` with links `divided` in as many pieces as they bend far, which is what solutions want more."""
     solution = solved(solution)
     given = {body.name: body.pieces for body in solution.scene.body if isinstance(body.pieces, int)}
@@ -57,17 +57,17 @@ def with_enough_pieces(
     return solution
 
 
-def goes_on(solution: SpatialSolution, outcome: Outcome) -> bool:
+def goes_on(solution: Solution, outcome: Outcome) -> bool:
     """Whether `outcome` is of use to `resume`; a search for modes or pieces has its own bodies and starts again."""
     searched = any("auto" in (body.modes, body.pieces) for body in solution.scene.body)
     return not searched and outcome.analysis.is_resumable
 
 
 def completed(
-    solution: SpatialSolution,
-    run_all: Callable[[SpatialSolution], SpatialSolution | None],
-    stiffened: Callable[[SpatialSolution], SpatialSolution],
-) -> SpatialSolution:
+    solution: Solution,
+    run_all: Callable[[Solution], Solution | None],
+    stiffened: Callable[[Solution], Solution],
+) -> Solution:
     """All analyses run, all of them stiffened where `geometric_stiffening = "auto"` asks for that."""
     found = run_all(solution) or run_all(stiffened(solution))
     assert found is not None

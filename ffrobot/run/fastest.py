@@ -16,9 +16,9 @@ from ..common.errors import InputError
 from ..common.validation import quoted
 from ..mbs.joints.transmission import MotorLimits
 from ..mbs.scene.analysis import TimedAnalysis
-from ..scene.spatial import SpatialScene
+from ..scene.scene import Scene
 
-Judge = Callable[[SpatialScene], Feasibility | None]
+Judge = Callable[[Scene], Feasibility | None]
 """Solves a scene with the one analysis that it has; None where there is no motion along the path."""
 
 GROWTH = 1.5  # of the stretch, until one is found that is too fast and one that is not
@@ -31,7 +31,7 @@ KEPT = 1.0 + 1e-9  # times a limit
 class Search:
     """Motions that were tried, by their stretch: the largest ratio of what is required to a limit, and of what."""
 
-    scene: SpatialScene
+    scene: Scene
     analysis: TimedAnalysis
     judge: Judge
     tried: dict[float, tuple[float, str]] = field(default_factory=dict)
@@ -49,7 +49,7 @@ class Search:
         return max((factor, name) for name, factor in found.factors.items())
 
 
-def fastest(scene: SpatialScene, judge: Judge) -> tuple[SpatialScene, str]:
+def fastest(scene: Scene, judge: Judge) -> tuple[Scene, str]:
     """The scene with its paths stretched by the least factor that keeps all limits, to 0.5 %, and what was found.
 
     Raises `InputError` where nothing has a limit, no analysis can judge, or the run is too short for any such motion.
@@ -91,13 +91,13 @@ def least_stretch(keeps_limits: Callable[[float], bool], least: float, most: flo
     return good
 
 
-def stretched(scene: SpatialScene, stretch: float) -> SpatialScene:
+def stretched(scene: Scene, stretch: float) -> Scene:
     """The scene with the paths that are to be fastest slowed down by a factor."""
     paths = [one.changed(stretch=stretch, fastest=False) if one.fastest else one for one in scene.trajectory]
     return scene.model_copy(update={"trajectory": tuple(paths)})
 
 
-def judging(scene: SpatialScene) -> TimedAnalysis:
+def judging(scene: Scene) -> TimedAnalysis:
     """The first inverse analysis. Raises `InputError` where there is none, or nothing to judge by."""
     where = f"{scene.path}: trajectory {_names(scene)}: fastest"
     inverse = [one for one in scene.analysis if one.applicable and isinstance(one, TimedAnalysis)]
@@ -117,7 +117,7 @@ def judging(scene: SpatialScene) -> TimedAnalysis:
     return inverse[0]
 
 
-def _bounds(scene: SpatialScene, analysis: TimedAnalysis) -> tuple[float, float]:
+def _bounds(scene: Scene, analysis: TimedAnalysis) -> tuple[float, float]:
     """Stretches at which the path keeps its own limits, and is over before the run is."""
     one, two = (_end(scene, stretch) for stretch in (1.0, 2.0))
     least = 1.0 if any(path.fastest and path.duration is None for path in scene.trajectory) else 1.0 / MOST
@@ -130,11 +130,11 @@ def _bounds(scene: SpatialScene, analysis: TimedAnalysis) -> tuple[float, float]
     return least, most
 
 
-def _end(scene: SpatialScene, stretch: float) -> float:
+def _end(scene: Scene, stretch: float) -> float:
     """When the last of the paths that are to be fastest is over, s."""
     slower = (one.changed(stretch=stretch, fastest=False).path for one in scene.trajectory if one.fastest)
     return max(path.end for path in slower if path is not None)
 
 
-def _names(scene: SpatialScene) -> str:
+def _names(scene: Scene) -> str:
     return quoted(one.name for one in scene.trajectory if one.fastest)

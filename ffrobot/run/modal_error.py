@@ -5,18 +5,18 @@ from __future__ import annotations
 from dataclasses import replace
 from math import ceil
 
-from ..mbs.model.truncation import loaded_points, with_fewer_modes_in_space
+from ..mbs.model.truncation import loaded_points, with_fewer_modes
+from .mode_choice import reported_modes
 from .mode_search import Errors, difference
-from .spatial import run_spatial
-from .spatial_mode_choice import reported_in_space
-from .spatial_prepare import with_bodies_in_space
-from .spatial_solution import SpatialSolution
+from .prepare import with_bodies
+from .solution import Solution
+from .solve import run_analyses
 from .watcher import Watcher
 
 PART = 2 / 3  # of the eigenmodes of each link in the solve that is compared with
 
 
-def modal_errors(solution: SpatialSolution, watcher: Watcher | None = None) -> Errors | None:
+def modal_errors(solution: Solution, watcher: Watcher | None = None) -> Errors | None:
     """Estimated error of the largest quantity of each kind, relative to its peak, by analysis; None where unknown.
 
     The difference to a solve with two thirds of the eigenmodes of each link. With attachment modes the error falls with
@@ -33,13 +33,13 @@ def modal_errors(solution: SpatialSolution, watcher: Watcher | None = None) -> E
         return None
     scene = solution.scene
     fewer = {
-        name: with_fewer_modes_in_space(body, ceil(PART * body.n_eigenmodes), loaded_points(scene, name))
+        name: with_fewer_modes(body, ceil(PART * body.n_eigenmodes), loaded_points(scene, name))
         for name, body in whole.items()
     }
-    unsolved = replace(with_bodies_in_space(solution, fewer), failure=None, earlier={})
-    coarse = run_spatial(unsolved, watcher or Watcher())
+    unsolved = replace(with_bodies(solution, fewer), failure=None, earlier={})
+    coarse = run_analyses(unsolved, watcher or Watcher())
     return {
-        name: difference(reported_in_space(result), reported_in_space(coarse.analyses[name]))
+        name: difference(reported_modes(result), reported_modes(coarse.analyses[name]))
         for name, result in solution.analyses.items()
         if name in coarse.analyses and result.status == coarse.analyses[name].status == "completed"
     }

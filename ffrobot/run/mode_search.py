@@ -13,11 +13,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..common.arrays import Array
-from ..mbs.model.spatial_body import SpatialBody
+from ..mbs.model.body import Body
 from ..mbs.model.truncation import loaded_points
 
 if TYPE_CHECKING:
-    from ..scene.spatial import SpatialScene
+    from ..scene.scene import Scene
 
 Errors = Mapping[str, Mapping[str, float]]
 """By analysis and kind of quantity, relative to peaks."""
@@ -122,15 +122,15 @@ class ModeSearch:
     `tolerances` by analysis; `levels`: bodies with more and more modes, the last with all (`truncation_levels`).
     """
 
-    def __init__(self, tolerances: Mapping[str, float], levels: Sequence[Mapping[str, SpatialBody]]) -> None:
+    def __init__(self, tolerances: Mapping[str, float], levels: Sequence[Mapping[str, Body]]) -> None:
         self._tolerances = tolerances
-        self._levels: Sequence[Mapping[str, SpatialBody]] = levels
+        self._levels: Sequence[Mapping[str, Body]] = levels
         self._estimate, self._tried = ErrorEstimate(), list[int]()
         self._level, self._is_over, self._completed = 0, False, False
         self._began = self._last = time.perf_counter()
 
     @property
-    def bodies(self) -> Mapping[str, SpatialBody]:
+    def bodies(self) -> Mapping[str, Body]:
         """The bodies to solve with next; those of the solve to keep once it is over."""
         return self._levels[self._level]
 
@@ -173,7 +173,7 @@ class ModeSearch:
         return ModeChoice(errors, self._estimate.differences, tuple(self._tried), seconds, (kept, every))
 
 
-def error_tolerances(scene: SpatialScene) -> dict[str, float]:
+def error_tolerances(scene: Scene) -> dict[str, float]:
     """What the error of each analysis may be; algebraic ones that do not say follow the tightest that is integrated."""
     tightest = min((analysis.tolerance for analysis in scene.analysis if analysis.is_resumable), default=None)
     return {
@@ -185,11 +185,11 @@ def error_tolerances(scene: SpatialScene) -> dict[str, float]:
 
 
 def truncation_levels(
-    scene: SpatialScene,
-    bodies: Mapping[str, SpatialBody],
-    fewer: Callable[[SpatialBody, int, Sequence[str]], SpatialBody],
+    scene: Scene,
+    bodies: Mapping[str, Body],
+    fewer: Callable[[Body, int, Sequence[str]], Body],
     counted: Callable[[Sequence[str]], Array],
-) -> list[dict[str, SpatialBody]]:
+) -> list[dict[str, Body]]:
     """The flexible bodies with `modes` given, with more and more modes where that is "auto"; the last have all.
 
     A level has the modes up to one frequency, of all bodies: 1, 2, 3, 5, 8 … of each on average, of those that are
@@ -201,7 +201,7 @@ def truncation_levels(
     auto = {name: bodies[name] for name, modes in wanted.items() if modes == "auto"}
     if not auto:
         return [fixed]
-    found: list[dict[str, SpatialBody]] = []
+    found: list[dict[str, Body]] = []
     squares = np.sort(counted(list(auto)))
     each = 1
     while each * len(auto) < len(squares):

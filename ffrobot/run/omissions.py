@@ -8,11 +8,11 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from ..fe_models.modal_body import ModalBody
+from ..mbs.model.body import Body
 from ..mbs.model.projection import vanishing_in_plane
-from ..mbs.model.spatial_body import SpatialBody
 from ..mbs.model.truncation import modes_kept
-from ..scene.spatial import SpatialScene
-from .spatial_bodies import LoadedSpatialBody
+from ..scene.scene import Scene
+from .bodies import LoadedBody
 
 _STAGE_1 = {"modes": "stage 1 but for damping, stresses and name", "mesh": "the mesh, which is that of an earlier run"}
 
@@ -25,7 +25,7 @@ _TERMS = {
 }
 
 
-def omissions(scene: SpatialScene, bodies: Mapping[str, LoadedSpatialBody]) -> Iterator[str]:
+def omissions(scene: Scene, bodies: Mapping[str, LoadedBody]) -> Iterator[str]:
     """One line for each thing that a planar scene leaves out."""
     of = {name: body.spatial for name, body in bodies.items()}
     for name, body in bodies.items():
@@ -54,14 +54,14 @@ def omissions(scene: SpatialScene, bodies: Mapping[str, LoadedSpatialBody]) -> I
         yield f"integration of {', '.join(algebraic)}, algebraic"
 
 
-def _is_rigid_along(body: SpatialBody) -> bool:
+def _is_rigid_along(body: Body) -> bool:
     """Whether no force at a point moves any point of the link along its axis, where joints and weight load it."""
     along = [point.translation[0] for point in body.points.values()]
     across = [point.translation[1] for point in body.points.values()]
     return bool(np.abs(along).max(initial=0.0) <= RIGID * np.abs(across).max(initial=0.0))
 
 
-def _modes(name: str, body: SpatialBody, modal: ModalBody) -> Iterator[str]:
+def _modes(name: str, body: Body, modal: ModalBody) -> Iterator[str]:
     """Modes that do not move in the plane, and those left out by choice."""
     whole = body if body.reduction is None else body.reduction.whole
     idle = np.flatnonzero(~whole.modal_transform.any(axis=1))

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from functools import partial
 
-from ..mbs.model.spatial_model import SpatialModel
+from ..mbs.model.model import Model
 from ..mbs.scene.motion_keys import Shaper
-from ..mbs.solve.path_frequencies import PathFrequencies, spatial_path_frequencies
-from ..scene.spatial import SpatialScene
+from ..mbs.solve.path_frequencies import PathFrequencies, frequencies_along
+from ..scene.scene import Scene
 from .fastest import Judge, fastest
 
 Frequencies = Callable[[float, float, int], PathFrequencies]
@@ -16,14 +16,12 @@ Frequencies = Callable[[float, float, int], PathFrequencies]
 Notes = tuple[str, ...]
 
 
-def with_paths_in_space(
-    scene: SpatialScene, model: SpatialModel, judge: Judge, stage: Callable[[str], None]
-) -> tuple[SpatialScene, Notes]:
+def with_paths(scene: Scene, model: Model, judge: Judge, stage: Callable[[str], None]) -> tuple[Scene, Notes]:
     """The scene with shapers for the robot's own frequencies, stretched as far as `fastest` asks for; what was found.
 
     `model` is what vibrates. Raises `InputError` where there are no such frequencies, or no motion keeps the limits.
     """
-    scene, notes = _shaped(scene, partial(spatial_path_frequencies, model))
+    scene, notes = _shaped(scene, partial(frequencies_along, model))
     if any(trajectory.fastest for trajectory in scene.trajectory):
         stage("fastest motion")
         scene, note = fastest(scene, judge)
@@ -31,7 +29,7 @@ def with_paths_in_space(
     return scene, notes
 
 
-def _shaped(scene: SpatialScene, frequencies: Frequencies) -> tuple[SpatialScene, Notes]:
+def _shaped(scene: Scene, frequencies: Frequencies) -> tuple[Scene, Notes]:
     """The scene with shapers for frequencies of the robot where they ask for these; notes on them and on tables."""
     asking = {one.name: one.shaper for one in scene.trajectory if one.shaper and one.shaper.asks_robot}
     tables = (one.waypoints for one in scene.trajectory if one.waypoints is not None)
@@ -59,7 +57,7 @@ def _in_words(shaper: Shaper, found: PathFrequencies) -> str:
     return f"{shaper.kind} shaper for {', '.join(list(ranges)[: shaper.modes])}"
 
 
-def _span(scene: SpatialScene) -> tuple[float, float]:
+def _span(scene: Scene) -> tuple[float, float]:
     """When the first path begins and the last one is over, s."""
     paths = [one.path for one in scene.trajectory]
     ends = [path.end for path in paths if path is not None]

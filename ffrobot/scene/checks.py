@@ -16,14 +16,14 @@ from ..mbs.fields.derivatives import check_derivatives
 from ..mbs.fields.field_types import GROUND
 from ..mbs.fields.functions import check_domain
 from ..mbs.fields.orientations import OrientationLaw
-from ..mbs.joints.spatial.joint import SpatialJoint
+from ..mbs.joints.joint import JointRecord
 from ..mbs.scene.analysis import Surroundings
-from ..mbs.scene.spatial.trajectories import SpatialTrajectory
+from ..mbs.scene.trajectories import Trajectory
 from .kinds import KINDS, AnyKind
-from .spatial import SpatialSceneKeys
+from .scene import SceneKeys
 
 
-def problems(scene: SpatialSceneKeys) -> Iterator[str]:
+def problems(scene: SceneKeys) -> Iterator[str]:
     """Everything in the scene that refers to something that does not exist or does not fit, a line each."""
     yield from _all_duplicates(scene)
     yield from _body_problems(scene)
@@ -39,7 +39,7 @@ def problems(scene: SpatialSceneKeys) -> Iterator[str]:
             yield f'analysis "{analysis.name}": {problem}'
 
 
-def check_functions(scene: SpatialSceneKeys, path: Path) -> None:
+def check_functions(scene: SceneKeys, path: Path) -> None:
     """Raise `InputError` for a function of time without a value at an output time at which it is needed."""
     following = [analysis for analysis in scene.analysis if analysis.follows_trajectories]
     for trajectory in scene.trajectory:
@@ -60,7 +60,7 @@ def check_functions(scene: SpatialSceneKeys, path: Path) -> None:
                 check_domain(function, analysis.times, label, derivatives)
 
 
-def _check_trajectory(trajectory: SpatialTrajectory, times: Array, label: str) -> None:
+def _check_trajectory(trajectory: Trajectory, times: Array, label: str) -> None:
     """Of places or coordinates, and of an orientation, at `times` (T,)."""
     places = None if trajectory.path is None else "via" if trajectory.waypoints is None else "waypoints"
     for component, function in trajectory.components.items():
@@ -86,7 +86,7 @@ def _check_path(function: TimeFunction, times: Array, label: str) -> None:
         check_derivatives(function, float(times[-1]), label)
 
 
-def _all_duplicates(scene: SpatialSceneKeys) -> Iterator[str]:
+def _all_duplicates(scene: SceneKeys) -> Iterator[str]:
     for kind in ("body", "joint", "trajectory", "analysis"):
         yield from _duplicates(kind, (record.name for record in getattr(scene, kind)))
     for label, count in Counter(layout.label for layout in scene.pzt).items():
@@ -103,7 +103,7 @@ def _duplicates(kind: str, names: Iterable[str]) -> Iterator[str]:
             yield f'{kind} "{name}": expected one {kind} of this name, found {count}'
 
 
-def _body_problems(scene: SpatialSceneKeys) -> Iterator[str]:
+def _body_problems(scene: SceneKeys) -> Iterator[str]:
     bodies = {body.name: body for body in scene.body}
     if GROUND in bodies:
         yield f'body "{GROUND}": name: expected any other name, found "{GROUND}", which is the fixed frame'
@@ -124,8 +124,8 @@ def _body_problems(scene: SpatialSceneKeys) -> Iterator[str]:
             )
 
 
-def _joint_problems(scene: SpatialSceneKeys) -> Iterator[str]:
-    joints: dict[str, SpatialJoint] = {joint.name: joint for joint in scene.joint}
+def _joint_problems(scene: SceneKeys) -> Iterator[str]:
+    joints: dict[str, JointRecord] = {joint.name: joint for joint in scene.joint}
     elastic = [name for name, joint in joints.items() if getattr(joint, "stiffness", None) is not None]
     moving = [name for name, joint in joints.items() if _moves(joint)]
     for reference in scene.references():
@@ -139,12 +139,12 @@ def _joint_problems(scene: SpatialSceneKeys) -> Iterator[str]:
             yield f"{key}: expected a joint that moves ({quoted(moving)}), found {found}"
 
 
-def _moves(joint: SpatialJoint) -> bool:
+def _moves(joint: JointRecord) -> bool:
     """Whether it has coordinates, or a place that [initial] can guess."""
     return bool(joint.units or joint.guess_units)
 
 
-def _guess_problems(scene: SpatialSceneKeys) -> Iterator[str]:
+def _guess_problems(scene: SceneKeys) -> Iterator[str]:
     """Guesses of joints between bodies whose own guesses say the same."""
     initial = scene.initial
     for key, of_joints, bodies, of_bodies in (
@@ -161,14 +161,14 @@ def _guess_problems(scene: SpatialSceneKeys) -> Iterator[str]:
                 )
 
 
-def _flexible_body_problems(scene: SpatialSceneKeys) -> Iterator[str]:
+def _flexible_body_problems(scene: SceneKeys) -> Iterator[str]:
     rigid = [body.name for body in scene.body if body.rigid is not None]
     for reference in scene.references():
         if reference.kind == "flexible body" and reference.name in rigid:
             yield f'{reference.key}: expected a flexible body, found "{reference.name}", which is rigid'
 
 
-def _patch_problems(scene: SpatialSceneKeys) -> Iterator[str]:
+def _patch_problems(scene: SceneKeys) -> Iterator[str]:
     """References to bodies with patches, and to layouts of these."""
     bodies = list(dict.fromkeys(layout.body for layout in scene.pzt))
     layouts = [layout.label for layout in scene.pzt]
@@ -182,10 +182,10 @@ def _patch_problems(scene: SpatialSceneKeys) -> Iterator[str]:
             yield f'{reference.key}: expected {what}, found "{reference.name}"{hint}'
 
 
-def _load_problems(scene: SpatialSceneKeys) -> Iterator[str]:
+def _load_problems(scene: SceneKeys) -> Iterator[str]:
     """Numbers of voltages, and of moments of joints with several coordinates."""
     counts = {layout.label: layout.patch_count for layout in scene.pzt}
-    joints: dict[str, SpatialJoint] = {joint.name: joint for joint in scene.joint}
+    joints: dict[str, JointRecord] = {joint.name: joint for joint in scene.joint}
     for k, load in enumerate(scene.load, 1):
         count, found = counts.get(load.pzt or "", 0), len(load.voltage or ())
         if count and found != count:
@@ -204,7 +204,7 @@ def _load_problems(scene: SpatialSceneKeys) -> Iterator[str]:
             yield f"load no. {k}: moment: expected {len(joint.units)} expressions, {of}, found {found}"
 
 
-def _stiffening_problems(scene: SpatialSceneKeys) -> Iterator[str]:
+def _stiffening_problems(scene: SceneKeys) -> Iterator[str]:
     """What acts between the interfaces of a link: modal body files hold no geometric stiffness of such loads."""
     if not scene.geometric_stiffening:
         return
@@ -218,7 +218,7 @@ def _stiffening_problems(scene: SpatialSceneKeys) -> Iterator[str]:
             )
 
 
-def _unmet_needs(scene: SpatialSceneKeys, analysis: AnyKind) -> Iterator[str]:
+def _unmet_needs(scene: SceneKeys, analysis: AnyKind) -> Iterator[str]:
     for need in analysis.needs():
         if not getattr(scene, need.table):
             yield f'{need.key}: expected at least one [[{need.table}]] for "{need.value}", found none'

@@ -6,9 +6,9 @@ from typing import Annotated, get_args
 
 from pydantic import Field
 
+from ..actuation.control.closed_loop import ClosedLoop
 from ..actuation.control.linear import Linear
 from ..actuation.control.placement import PatchPlacement
-from ..actuation.control.spatial_closed_loop import SpatialClosedLoop
 from ..mbs.analysis.fcid import Fcid
 from ..mbs.analysis.forward import Forward
 from ..mbs.analysis.motors_only import MotorsOnly
@@ -16,7 +16,7 @@ from ..mbs.analysis.pcid import Pcid
 from ..mbs.analysis.static import Static
 from ..mbs.analysis.tracking import Tracking
 
-AnyKind = Pcid | Fcid | Forward | Static | Linear | PatchPlacement | MotorsOnly | Tracking | SpatialClosedLoop
+AnyKind = Pcid | Fcid | Forward | Static | Linear | PatchPlacement | MotorsOnly | Tracking | ClosedLoop
 
 Analysis = Annotated[AnyKind, Field(discriminator="kind")]
 """One table [[analysis]] of a scene, of the kind that it says."""

@@ -12,10 +12,10 @@ from ..common.toml_files import load_toml, parse_toml, read_text
 from ..common.validation import plain, validate
 from ..fe_models.link_file import LinkTable, read_link
 from ..mbs.fields.spelling import PLANAR, SPATIAL
-from ..mbs.scene.spatial.planar_spelling import in_3d
+from ..mbs.scene.planar_spelling import in_3d
 from .actuation_times import with_times_of_actuation
 from .checks import check_functions, problems
-from .spatial import SpatialScene, SpatialSceneKeys
+from .scene import Scene, SceneKeys
 
 MADE_IN_PYTHON = "<scene made in Python>"
 
@@ -30,7 +30,7 @@ UNAVAILABLE = {
 }
 
 
-def load_scene(path: Path) -> SpatialScene:
+def load_scene(path: Path) -> Scene:
     """Read and validate the scene file at `path`; paths in it come out relative to its folder.
 
     Raises `InputError` with one line for each wrong key: file, key, expected, found. What depends on modal bodies
@@ -39,7 +39,7 @@ def load_scene(path: Path) -> SpatialScene:
     return validated_scene(load_toml(path, "scene file"), path, read_text(path, "scene file"))
 
 
-def make_scene(*, folder: PathLike[str] | str = ".", **keys: Any) -> SpatialScene:  # noqa: ANN401 (whatever TOML may hold)
+def make_scene(*, folder: PathLike[str] | str = ".", **keys: Any) -> Scene:  # noqa: ANN401 (whatever TOML may hold)
     """A scene from Python, with the keys of a scene file: tables are dictionaries, arrays of tables lists of them.
 
     Files it names are looked for in `folder`. NumPy numbers and arrays, tuples and paths may stand for numbers, lists
@@ -59,20 +59,20 @@ def make_scene(*, folder: PathLike[str] | str = ".", **keys: Any) -> SpatialScen
 
 def validated_scene(
     data: dict[str, Any], path: Path, text: str, functions: Mapping[str, object] | None = None
-) -> SpatialScene:
+) -> Scene:
     """The validated scene of `data`, which was read from `path` as `text`; `functions` of Python by their names.
 
     Raises `InputError` as `load_scene` does.
     """
     space = SPATIAL if data.get("space") == SPATIAL else PLANAR
     _raise(_unavailable_keys(data) if space == SPATIAL else (), path)
-    keys = validate(SpatialSceneKeys, with_times_of_actuation(data), path, functions, space)
+    keys = validate(SceneKeys, with_times_of_actuation(data), path, functions, space)
     _raise(problems(keys), path)
     for link in (body.link for body in keys.body):
         if isinstance(link, LinkTable):
             read_link(link)
     check_functions(keys, path)
-    return SpatialScene.model_construct(**dict(in_3d(keys)), path=path.absolute(), text=text)  # the keys are validated
+    return Scene.model_construct(**dict(in_3d(keys)), path=path.absolute(), text=text)  # the keys are validated
 
 
 def _raise(found: Iterable[str], path: Path) -> None:

@@ -1,6 +1,6 @@
 """Scenes with links in pieces: the same scene with a body for each piece, welded to the next.
 
-What computes motions gets the scene of pieces; what is said of them is of the one link (`ffrobot.run.spatial_pieces`).
+What computes motions gets the scene of pieces; what is said of them is of the one link (`ffrobot.run.pieces`).
 """
 
 from __future__ import annotations
@@ -13,10 +13,10 @@ from ..common.errors import InputError
 from ..common.validation import Record
 from ..fe_models.link_records import FAMILIES
 from ..fe_models.pieces import IN_PLANE, CutLink, cut
-from ..mbs.joints.spatial.weld import SpatialWeld
-from ..mbs.scene.spatial.bodies import BodyInSpace
-from ..mbs.scene.spatial.mechanism import SpatialMechanismKeys
-from .spatial import SpatialScene
+from ..mbs.joints.weld import WeldJoint
+from ..mbs.scene.bodies import BodyKeys
+from ..mbs.scene.mechanism import MechanismKeys
+from .scene import Scene
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,7 @@ class BodyInPieces:
         return f"{self.names[piece]}.{name}"
 
 
-def bodies_in_pieces_in_space(scene: SpatialScene, counts: Mapping[str, int]) -> dict[str, BodyInPieces]:
+def bodies_in_pieces(scene: Scene, counts: Mapping[str, int]) -> dict[str, BodyInPieces]:
     """The bodies of a scene with the key `pieces` that are cut in more than one, by name; `counts` of all of them.
 
     Raises `InputError` where a link or the scene allows no pieces.
@@ -48,7 +48,7 @@ def bodies_in_pieces_in_space(scene: SpatialScene, counts: Mapping[str, int]) ->
     return {name: body for name, body in found.items() if len(body.names) > 1}
 
 
-def scene_of_pieces_in_space(scene: SpatialScene, divided: Mapping[str, BodyInPieces]) -> SpatialScene:
+def scene_of_pieces(scene: Scene, divided: Mapping[str, BodyInPieces]) -> Scene:
     """The scene in which each piece is a body; points that scene and analyses name are those of the pieces."""
     places = places_on_pieces(divided)
     keys = {
@@ -56,7 +56,7 @@ def scene_of_pieces_in_space(scene: SpatialScene, divided: Mapping[str, BodyInPi
     }
     bodies = tuple(piece for body in scene.body for piece in _pieces(body, divided))
     welds = (
-        SpatialWeld(name=weld, type="weld", between=between)
+        WeldJoint(name=weld, type="weld", between=between)
         for name, body in divided.items()
         for weld, between in _welds(name, body)
     )
@@ -68,7 +68,7 @@ def places_on_pieces(divided: Mapping[str, BodyInPieces]) -> dict[str, str]:
     return {f"{name}.{label}": body.point(label) for name, body in divided.items() for label in body.cut.places}
 
 
-def _pieces(body: BodyInSpace, divided: Mapping[str, BodyInPieces]) -> Iterator[BodyInSpace]:
+def _pieces(body: BodyKeys, divided: Mapping[str, BodyInPieces]) -> Iterator[BodyKeys]:
     if body.name not in divided:
         yield body
         return
@@ -98,7 +98,7 @@ def _renamed(value: T, places: Mapping[str, str]) -> T:
     return new  # type: ignore[no-any-return]
 
 
-def _problems(scene: SpatialScene, divided: Mapping[str, BodyInPieces]) -> Iterator[str]:
+def _problems(scene: Scene, divided: Mapping[str, BodyInPieces]) -> Iterator[str]:
     """What cannot be had together with links in pieces."""
     if not divided:
         return
@@ -113,7 +113,7 @@ def _problems(scene: SpatialScene, divided: Mapping[str, BodyInPieces]) -> Itera
     for joint in scene.joint:
         if getattr(joint, "stiffness", None) is not None:
             yield f'joint "{joint.name}": stiffness: expected none {beside}, found one'
-    for reference in SpatialMechanismKeys.references(scene):
+    for reference in MechanismKeys.references(scene):
         if reference.kind == "body" and reference.name in divided:
             yield (
                 f"{reference.key}: expected a point or a joint where a body is subdivided, whose frame no piece has,"

@@ -11,7 +11,7 @@ import numpy as np
 from ..common.errors import InputError
 from ..fe_models.link_file import read_link
 from ..fe_models.link_records import Link
-from .spatial import SpatialScene
+from .scene import Scene
 
 TURNS = 4 * np.pi  # rad: joints of robots that come to rest do so within two turns
 SPINNING = 0.1  # rate at the end over the largest: what still turns then is a wheel
@@ -23,7 +23,7 @@ SAMPLES = 201
 OUTPUT = 5e3  # bytes for each body and output, while results are evaluated: a link of four modes in space takes 5.5e3
 
 
-def remarks(scene: SpatialScene) -> Iterator[str]:
+def remarks(scene: Scene) -> Iterator[str]:
     """Of a scene that is valid, one line each: units of links and bodies, angles, times of paths."""
     for body in scene.body:
         if body.link is not None:
@@ -77,7 +77,7 @@ def _long(length: float, label: str) -> Iterator[str]:
         yield f"{label} is {length:g} m long: units are SI; is this in mm?"
 
 
-def _angles(scene: SpatialScene) -> Iterator[str]:
+def _angles(scene: Scene) -> Iterator[str]:
     """Paths of angles that come to rest many turns away."""
     turning = {joint.name for joint in scene.joint if joint.type == "revolute"}
     for one in scene.trajectory:
@@ -98,7 +98,7 @@ def _angles(scene: SpatialScene) -> Iterator[str]:
                 )
 
 
-def _times(scene: SpatialScene) -> Iterator[str]:
+def _times(scene: Scene) -> Iterator[str]:
     """Paths with times of their own that do not fit those of the analyses that follow them."""
     for analysis in scene.analysis:
         if not analysis.follows_trajectories:

@@ -9,9 +9,9 @@ from typing import Protocol
 from ...common.arrays import Array
 from .. import _core
 from ..model.divided_link import DividedLink
-from ..model.spatial_model import SpatialModel
+from ..model.model import Model
+from .drive import Progress
 from .outcome import EarlierRun, Outcome
-from .spatial_drive import Progress
 
 
 class PatchedLink(Protocol):
@@ -60,7 +60,7 @@ class WholeLinks:
         told: an outcome of the pieces, as one of the links; `InputError` where their joints cannot say it.
     """
 
-    model: SpatialModel
+    model: Model
     divided: Mapping[str, DividedLink]
     places: Mapping[str, str]
     told: Callable[[Outcome], Outcome]
@@ -71,7 +71,7 @@ class Context:
     """What the run of an analysis starts from.
 
     Attributes:
-        progress: see `spatial_drive.Progress`.
+        progress: see `drive_robot.Progress`.
         is_replayed: whether a later analysis takes its actuation.
         earlier: an earlier run of the same analysis, to go on with; None from the start.
         model: the robot, with the constraint equations of all joints that close loops and of all trajectories.
@@ -83,7 +83,7 @@ class Context:
     """
 
     progress: Progress
-    model: SpatialModel
+    model: Model
     outcomes: Mapping[str, Outcome]
     is_replayed: bool = False
     earlier: EarlierRun | None = None

@@ -19,17 +19,17 @@ from .._core import TimeFunction
 from ..fields.field_types import Expression, Name
 from ..fields.references import Reference
 from ..fields.waypoints import spline
+from ..model.body import Body
 from ..model.divided_link import DividedLink
-from ..model.spatial_body import SpatialBody
-from ..model.spatial_gears import refuse_held_motors
-from ..model.spatial_motors import driven_mechanism, fastest_mechanism
+from ..model.gears import refuse_held_motors
+from ..model.motors import driven_mechanism, fastest_mechanism
 from ..scene.analysis import Check, Need, TimedAnalysis
+from ..solve.posture import check_path, mobility
+from ..solve.prescribed import PrescribedMotion, prescribed_by, prescribed_motion
 from ..solve.quasi_static import quasi_static_shape
-from ..solve.spatial_posture import check_path, mobility
-from ..solve.spatial_prescribed import PrescribedMotion, prescribed_by, prescribed_motion
-from ..solve.spatial_reach import check_reach
-from ..solve.spatial_redundancy import resolved
-from ..solve.spatial_start import undeformed_posture
+from ..solve.reach import check_reach
+from ..solve.redundancy import resolved
+from ..solve.start import undeformed_posture
 from .context import Context
 from .outcome import Forces, Motion, Outcome, Prescription, Statistics
 from .samples import path_times
@@ -37,10 +37,10 @@ from .samples import path_times
 ZERO = TimeFunction.constant(0.0)
 FEWEST_NODES = 201  # of the spline through a static shape; half as many as outputs where that is more
 
-Bodies = Sequence[SpatialBody]
+Bodies = Sequence[Body]
 
 Shape = list[list[TimeFunction]]
-"""p_k(t) of each body, in the coordinates of its `SpatialBody`."""
+"""p_k(t) of each body, in the coordinates of its `Body`."""
 
 
 class Fcid(TimedAnalysis):
@@ -88,10 +88,10 @@ class Fcid(TimedAnalysis):
 
     def run(self, context: Context) -> Outcome:
         """Motion and forces."""
-        return run_spatial_fcid(context, self)
+        return run_fcid(context, self)
 
 
-def run_spatial_fcid(context: Context, analysis: Fcid) -> Outcome:
+def run_fcid(context: Context, analysis: Fcid) -> Outcome:
     """Motion and forces for the trajectories and the shape that the analysis prescribes.
 
     Raises `InputError` where the trajectories do not fix the motion of the mechanism or cannot be followed,

@@ -15,20 +15,20 @@ from ...common.errors import InputError
 from ...common.validation import either
 from .. import _core
 from ..fields.waypoints import spline
-from ..model.spatial_drives import Command, Drives, Replayed
-from ..model.spatial_frame_motors import motor_commands
-from ..model.spatial_gears import with_compliance_in_space
-from ..model.spatial_model import SpatialModel, modal_directions, without_paths
+from ..model.drives import Command, Drives, Replayed
+from ..model.frame_motors import motor_commands
+from ..model.gears import with_compliance
+from ..model.model import Model, modal_directions, without_paths
 from ..scene.analysis import ActuatedAnalysis, Analysis, Need
-from ..solve.spatial_posture import mobility
-from ..solve.spatial_statics import hanging_joints, initial_state
+from ..solve.posture import mobility
 from ..solve.state import State
+from ..solve.statics import hanging_joints, initial_state
 from .context import Context, PatchedLink
+from .drive import drive_robot
 from .elastic_joints import DEGREE
+from .gears import wound_up
 from .outcome import Outcome
-from .spatial_drive import spatial_drive
-from .spatial_gears import wound_up
-from .spatial_replay import left_paths, path_numbers, point_numbers, replay_times, supplied
+from .replay import left_paths, path_numbers, point_numbers, replay_times, supplied
 
 
 class Forward(ActuatedAnalysis):
@@ -63,7 +63,7 @@ class Forward(ActuatedAnalysis):
 
     def run(self, context: Context) -> Outcome:
         """Motion alone: nothing is specified."""
-        return run_spatial_forward(context, self)
+        return run_forward(context, self)
 
     def needs(self) -> Iterator[Need]:
         """Patches or points for what is applied by them."""
@@ -82,24 +82,24 @@ class Forward(ActuatedAnalysis):
             )
 
 
-def run_spatial_forward(context: Context, analysis: Forward) -> Outcome:
+def run_forward(context: Context, analysis: Forward) -> Outcome:
     """Motion alone: nothing is specified. With an actuation it starts where the earlier analysis did.
 
     Raises `InputError` where what is to be applied does not fit the robot, `SolveError` where there is no equilibrium
     to start from.
     """
-    model, progress = with_compliance_in_space(without_paths(context.model)), context.progress
+    model, progress = with_compliance(without_paths(context.model)), context.progress
     if analysis.actuation is None:
         start = initial_state(model)
         told = tuple(hanging_joints(model, start))
-        return spatial_drive(model, analysis, start, progress, warnings=told, earlier=context.earlier)
+        return drive_robot(model, analysis, start, progress, warnings=told, earlier=context.earlier)
     source = context.outcomes[analysis.actuation]
     if model.tree.gears:
         return _behind_gears(source, model, analysis, context)
     replayed = _replayed(context, source, analysis)
     if analysis.apply == "trajectory" and source.recording is not None:  # others may ring where `source` did not
         replayed = replayed._replace(integrator=source.statistics.integrator.at_end)
-    run = spatial_drive(
+    run = drive_robot(
         model, analysis, State(source.q[0], source.v[0]), progress,
         drives=Drives(replayed=replayed), times=replay_times(source, analysis), earlier=context.earlier,
     )  # fmt: skip
@@ -129,19 +129,19 @@ def _replayed(context: Context, source: Outcome, analysis: Forward) -> Replayed:
     return Replayed(found, actuator_commands(model, patches), moments=numbers_of_motors(model))
 
 
-def actuator_commands(model: SpatialModel, patches: Mapping[str, PatchedLink]) -> tuple[Command, ...]:
+def actuator_commands(model: Model, patches: Mapping[str, PatchedLink]) -> tuple[Command, ...]:
     """What a unit of each does: moments of motors, on sections or on frames, and voltages on the modes of links."""
     of_volts = (row for of_link in patches.values() for row in modal_directions(model, of_link.per_volt))
     return (*motor_commands(model), *map(Command, of_volts))
 
 
-def numbers_of_motors(model: SpatialModel) -> dict[str, list[int]]:
+def numbers_of_motors(model: Model) -> dict[str, list[int]]:
     """By joint with motors the numbers of its coordinates, one joint after the other."""
     numbers = count()
     return {joint: [next(numbers) for _ in columns] for joint, columns in model.motors.items()}
 
 
-def _behind_gears(source: Outcome, model: SpatialModel, analysis: Forward, context: Context) -> Outcome:
+def _behind_gears(source: Outcome, model: Model, analysis: Forward, context: Context) -> Outcome:
     """Where gears of `model` give: moments at the outputs of `source` and splines between these, and its voltages."""
     if analysis.apply not in ("joints", "joints+pzt"):
         raise InputError(
@@ -166,20 +166,20 @@ def _behind_gears(source: Outcome, model: SpatialModel, analysis: Forward, conte
         found = _core.ForcesOfBoth(found, supplied(source, most, context.patches, limited=analysis.limits))
         motors = (*motors, *[Command(np.zeros(model.tree.n_v))] * len(most), *patches)
     replayed = Replayed(found, motors, moments=numbers_of_motors(model))
-    return spatial_drive(
+    return drive_robot(
         model, analysis, State(wound.q[0], wound.v[0]), context.progress, drives=Drives(replayed=replayed),
         times=replay_times(source, analysis), earlier=context.earlier,
     )  # fmt: skip
 
 
-def largest_moments(model: SpatialModel, *, limits: bool) -> Array:
+def largest_moments(model: Model, *, limits: bool) -> Array:
     """(motors,) N·m or N, infinite where limits do not count."""
     joints = {joint.name: joint for joint in model.scene.joint}
     most = np.array([of.moment for name in model.motors for of in joints[name].motor_limits])
     return most if limits else np.full_like(most, np.inf)
 
 
-def _check_motors(model: SpatialModel, analysis: Forward, q: Array) -> None:
+def _check_motors(model: Model, analysis: Forward, q: Array) -> None:
     """Raise `InputError` without motors, and in the plane where their moments were not computed at q (n_q,)."""
     key = f'{model.scene.path}: analysis "{analysis.name}": apply'
     if not model.motors:

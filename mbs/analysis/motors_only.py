@@ -21,12 +21,12 @@ from ...common.errors import InputError, SolveError
 from ...common.numbers import MOST_OUTPUTS
 from ..fields.field_types import NotNegative
 from ..fields.waypoints import spline
-from ..model.spatial_gears import refuse_held_motors
-from ..model.spatial_model import SpatialModel, row_values, without_paths
+from ..model.gears import refuse_held_motors
+from ..model.model import Model, row_values, without_paths
 from ..scene.analysis import Check, Need, TimedAnalysis, output_times
 from ..solve.integrators import Choice
 from ..solve.internal_dynamics import Output, Stopped, is_unstable
-from ..solve.spatial_servo import SpatialServo, make_spatial_servo
+from ..solve.servo import Servo, make_servo
 from ..solve.stable_inversion import Inversion, S, invert
 from ..solve.zero_dynamics import SAMPLES, Linearisation, linearise, shape_along
 from .context import Context
@@ -94,10 +94,10 @@ class MotorsOnly(TimedAnalysis):
 
     def run(self, context: Context) -> Outcome:
         """Motion and moments."""
-        return run_spatial_motors_only(context, self)
+        return run_motors_only(context, self)
 
 
-def run_spatial_motors_only(context: Context, analysis: MotorsOnly) -> Outcome:
+def run_motors_only(context: Context, analysis: MotorsOnly) -> Outcome:
     """Motion and motor forces for the trajectories, no other force acting; before and after the path it is held.
 
     Raises `InputError` for a path that is not at rest where it has to be, motors that do not fit, a path out of reach,
@@ -113,7 +113,7 @@ def run_spatial_motors_only(context: Context, analysis: MotorsOnly) -> Outcome:
 
     refuse_held_motors(model, analysis)
     try:
-        servo, linear = choose_output(partial(make_spatial_servo, model, analysis.end, place, progress), analysis)
+        servo, linear = choose_output(partial(make_servo, model, analysis.end, place, progress), analysis)
         needs_future = bool(linear.is_future[0].any())
         check_rest(servo, analysis, rests(analysis, needs_future))
         pre, post = durations(analysis, linear, needs_future)
@@ -138,7 +138,7 @@ def run_spatial_motors_only(context: Context, analysis: MotorsOnly) -> Outcome:
     return replace(run, details=around, statistics=statistics, look_closer=look_closer)
 
 
-def _run(analysis: MotorsOnly, model: SpatialModel, inversion: Inversion[SpatialServo], times: Array) -> Outcome:
+def _run(analysis: MotorsOnly, model: Model, inversion: Inversion[Servo], times: Array) -> Outcome:
     curve, servo = inversion.curve, inversion.servo
     modes = curve(times), curve.derivative(1)(times), curve.derivative(2)(times)
     found = servo.motion.motion(as_list(times), *modes, servo.postures(times))
@@ -160,13 +160,13 @@ def _run(analysis: MotorsOnly, model: SpatialModel, inversion: Inversion[Spatial
     )
 
 
-def path_errors(held: SpatialModel, times: Array, q: Array) -> dict[str, Array]:
+def path_errors(held: Model, times: Array, q: Array) -> dict[str, Array]:
     """By trajectory of `held` how far (T, m) what follows it is off at `times` (T,) and q (T, n_q), in m or rad."""
     C, owners = row_values(held, q, times)[0], [row.owner if row.is_trajectory else "" for row in held.rows]
     return {path.name: C[:, [owner == path.name for owner in owners]] for path in held.scene.trajectory}
 
 
-def _told(inversion: Inversion[SpatialServo], run: Outcome) -> tuple[str, ...]:
+def _told(inversion: Inversion[Servo], run: Outcome) -> tuple[str, ...]:
     """How far a redefined output leaves the path itself."""
     told = []
     if not run.failed and inversion.servo.factor < 1:

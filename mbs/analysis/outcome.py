@@ -14,8 +14,8 @@ from ...common.arrays import Array, Indices
 from ...common.errors import SolveError
 from .. import _core
 from .._core import TimeFunction
-from ..model.spatial_drives import PointDrive
-from ..model.spatial_model import SpatialModel
+from ..model.drives import PointDrive
+from ..model.model import Model
 from ..scene.analysis import Analysis
 from ..solve.integrators import NOT_INTEGRATED, Choice
 from .samples import in_order
@@ -227,7 +227,7 @@ class Outcome:
     """
 
     analysis: Analysis
-    model: SpatialModel
+    model: Model
     motion: Motion
     forces: Forces = Forces()
     statistics: Statistics = Statistics()

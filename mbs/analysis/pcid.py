@@ -5,16 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Literal
 
-from ..model.spatial_gears import with_held_motors
+from ..model.gears import with_held_motors
 from ..scene.analysis import Check, IntegratedAnalysis, Need
-from ..solve.spatial_posture import check_path
-from ..solve.spatial_reach import check_reach
-from ..solve.spatial_redundancy import resolved
-from ..solve.spatial_start import undeformed_posture
-from ..solve.spatial_statics import initial_state
+from ..solve.posture import check_path
+from ..solve.reach import check_reach
+from ..solve.redundancy import resolved
+from ..solve.start import undeformed_posture
+from ..solve.statics import initial_state
 from .context import Context
+from .drive import drive_robot
 from .outcome import Outcome
-from .spatial_drive import spatial_drive
 
 
 class Pcid(IntegratedAnalysis):
@@ -37,10 +37,10 @@ class Pcid(IntegratedAnalysis):
 
     def run(self, context: Context) -> Outcome:
         """Motion and forces."""
-        return run_spatial_pcid(context, self)
+        return run_pcid(context, self)
 
 
-def run_spatial_pcid(context: Context, analysis: IntegratedAnalysis) -> Outcome:
+def run_pcid(context: Context, analysis: IntegratedAnalysis) -> Outcome:
     """C_m and C_s hold, p is free; and gears that give, where motors follow the trajectories.
 
     Raises `InputError` where the trajectories cannot be followed, `SolveError` where there is no equilibrium to start
@@ -50,7 +50,7 @@ def run_spatial_pcid(context: Context, analysis: IntegratedAnalysis) -> Outcome:
     check_reach(firm, analysis.last_time)
     warnings = tuple(check_path(firm, undeformed_posture(firm).q, analysis.last_time))
     model = with_held_motors(firm)
-    return spatial_drive(
+    return drive_robot(
         model, analysis, initial_state(model), context.progress, warnings=warnings, earlier=context.earlier,
         is_recorded=context.is_replayed,
     )  # fmt: skip

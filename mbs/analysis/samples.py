@@ -14,7 +14,7 @@ from ...common.arrays import Array, Indices, as_floats
 from .. import _core
 from .._core import TimeFunction
 from ..scene.analysis import IntegratedAnalysis
-from ..scene.spatial.trajectories import SpatialTrajectory
+from ..scene.trajectories import Trajectory
 from ..solve.path_checks import misfits
 
 FEWEST = 2000  # intervals of a run
@@ -82,7 +82,7 @@ def in_order(outputs: Array, samples: Array) -> Indices:
     return found
 
 
-def stops(times: Array, paths: Iterable[SpatialTrajectory], loads: Iterable[TimeFunction]) -> Array:
+def stops(times: Array, paths: Iterable[Trajectory], loads: Iterable[TimeFunction]) -> Array:
     """(n,) s within `times`, at which steps of integrations end.
 
     Steps look at paths and loads at their stages alone, and might pass a pulse. So they end where conditions of loads
@@ -101,7 +101,7 @@ def stops(times: Array, paths: Iterable[SpatialTrajectory], loads: Iterable[Time
     return within
 
 
-def path_times(times: Array, paths: Iterable[SpatialTrajectory], end: float) -> Array:
+def path_times(times: Array, paths: Iterable[Trajectory], end: float) -> Array:
     """(T,) s: the outputs `times`, and as many between them as the motion along `paths` from 0 to `end` (s) needs."""
     paths = list(paths)
     found = np.unique(np.concatenate([times, np.linspace(times[0], times[-1], FEWEST + 1)]))
@@ -117,7 +117,7 @@ def path_times(times: Array, paths: Iterable[SpatialTrajectory], end: float) -> 
     return np.union1d(found[~moving], inside)
 
 
-def targets_of(path: SpatialTrajectory) -> tuple[TimeFunction, ...]:
+def targets_of(path: Trajectory) -> tuple[TimeFunction, ...]:
     """What a path prescribes: places, a coordinate, an orientation."""
     law = path.orientation
     return (*path.components.values(), *(() if law is None else law.functions))

@@ -7,11 +7,11 @@ from typing import Literal
 
 import numpy as np
 
-from ..model.spatial_gears import with_held_motors
+from ..model.gears import with_held_motors
 from ..scene.analysis import Analysis
-from ..solve.spatial_redundancy import resolved
-from ..solve.spatial_start import undeformed_posture
-from ..solve.spatial_statics import holding_multipliers, static_equilibrium, unstable_ways
+from ..solve.redundancy import resolved
+from ..solve.start import undeformed_posture
+from ..solve.statics import holding_multipliers, static_equilibrium, unstable_ways
 from .context import Context
 from .outcome import Motion, Outcome, Statistics
 
@@ -26,10 +26,10 @@ class Static(Analysis):
 
     def run(self, context: Context) -> Outcome:
         """Motion and forces at t = 0."""
-        return run_spatial_static(context, self)
+        return run_static(context, self)
 
 
-def run_spatial_static(context: Context, analysis: Analysis) -> Outcome:
+def run_static(context: Context, analysis: Analysis) -> Outcome:
     """The equilibrium at the one time t = 0: at rest, however fast the trajectories are there.
 
     Raises `SolveError` where there is none.

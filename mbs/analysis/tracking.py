@@ -19,12 +19,12 @@ from ...common.arrays import Array, as_floats, as_list
 from ...common.errors import InputError, SolveError
 from ...common.validation import Record
 from ..fields.field_types import NotNegative, Positive
-from ..model.spatial_gears import refuse_held_motors
-from ..model.spatial_model import SpatialModel, modal_directions, without_paths
+from ..model.gears import refuse_held_motors
+from ..model.model import Model, modal_directions, without_paths
 from ..scene.analysis import Need, TimedAnalysis, output_times
 from ..solve.integrators import Choice
 from ..solve.internal_dynamics import Stopped, equilibrium
-from ..solve.spatial_servo import SpatialServo, make_spatial_servo
+from ..solve.servo import Servo, make_servo
 from ..solve.stable_inversion import shape_of
 from ..solve.tracking import Limits, Objective, Tracked, Transition, Weights, refined, start_breaks, track
 from ..solve.zero_dynamics import linearise
@@ -109,7 +109,7 @@ class TrackedPath(AroundPath):
     least_share: float
     objective: Objective
     cost: float
-    held: SpatialModel
+    held: Model
 
 
 def run_tracking(context: Context, analysis: Tracking) -> Outcome:
@@ -126,7 +126,7 @@ def run_tracking(context: Context, analysis: Tracking) -> Outcome:
 
     refuse_held_motors(model, analysis)
     try:
-        servo = make_spatial_servo(model, analysis.end, place, progress, 1.0, analysis.kind)
+        servo = make_servo(model, analysis.end, place, progress, 1.0, analysis.kind)
         check_rest(servo, analysis, (0.0, analysis.end))
         pre, post = _durations(servo, analysis)
         solved = _solve(context, servo, analysis, (pre, post))
@@ -156,7 +156,7 @@ def run_tracking(context: Context, analysis: Tracking) -> Outcome:
     return replace(run, look_closer=look_closer)
 
 
-def _durations(servo: SpatialServo, analysis: Tracking) -> tuple[float, float]:
+def _durations(servo: Servo, analysis: Tracking) -> tuple[float, float]:
     given = analysis.pre_actuation, analysis.post_actuation
     automatic = (0.0, 0.0)
     if "auto" in given:
@@ -167,7 +167,7 @@ def _durations(servo: SpatialServo, analysis: Tracking) -> tuple[float, float]:
 
 
 def _solve(
-    context: Context, servo: SpatialServo, analysis: Tracking, around: tuple[float, float]
+    context: Context, servo: Servo, analysis: Tracking, around: tuple[float, float]
 ) -> tuple[Tracked, float, Transition, list[str]]:
     """What carries the path, the least share of limits, what was asked for last, and warnings."""
     place = servo.where
@@ -216,7 +216,7 @@ def _more_time(asked: Transition, analysis: Tracking, around: tuple[float, float
     logarithm, from there.
     """
     servo = asked.driven
-    assert isinstance(servo, SpatialServo)
+    assert isinstance(servo, Servo)
     zeros = linearise(servo, analysis.end).zeros.real
     growing = zeros[zeros > 1.0 / analysis.end]
     if not growing.size:
@@ -236,7 +236,7 @@ def _more_time(asked: Transition, analysis: Tracking, around: tuple[float, float
     return float("nan")
 
 
-def _patches(context: Context, servo: SpatialServo) -> Array:
+def _patches(context: Context, servo: Servo) -> Array:
     """Φ_V (n, k) on all modes, of all patches of all links."""
     rows = [modal_directions(servo.model, of_link.per_volt) for of_link in context.patches.values()]
     return np.concatenate(rows)[:, servo.of_modes].T
@@ -249,7 +249,7 @@ def _limits(context: Context) -> Limits:
     return Limits(voltage, torque)
 
 
-def _weights(servo: SpatialServo, analysis: Tracking, limits: Limits) -> Weights:
+def _weights(servo: Servo, analysis: Tracking, limits: Limits) -> Weights:
     given, torque = analysis.weights, analysis.weights.moment
     if torque is None:
         times = as_floats(np.linspace(0.0, analysis.end, len(servo.near_times)))
@@ -262,7 +262,7 @@ def _weights(servo: SpatialServo, analysis: Tracking, limits: Limits) -> Weights
 
 
 def _outcome(
-    analysis: Tracking, model: SpatialModel, servo: SpatialServo, tracked: Tracked, context: Context, times: Array
+    analysis: Tracking, model: Model, servo: Servo, tracked: Tracked, context: Context, times: Array
 ) -> Outcome:
     curve, voltage = tracked.curve, tracked.voltage
     modes = curve(times), curve.derivative(1)(times), curve.derivative(2)(times)

@@ -16,7 +16,7 @@ import numpy as np
 
 from ...common.arrays import Array, as_floats
 from ...fe_models.modal_body import ModalBody
-from .spatial_body import SpatialBody
+from .body import Body
 
 INTERVALS = 32  # of a piece, over which strains are taken as constant
 
@@ -38,17 +38,17 @@ class DividedLink:
     gathered: Array
 
 
-class SpatialPiece(NamedTuple):
+class PieceOfLink(NamedTuple):
     """A piece of a link in space: where it begins, m from the root of the link, its modal body, and its equations."""
 
     start: float
     modal: ModalBody
-    spatial: SpatialBody
+    spatial: Body
 
 
-def divided_link_in_space(link: ModalBody, spatial: SpatialBody, pieces: Sequence[SpatialPiece]) -> DividedLink:
+def divided_link_of(link: ModalBody, spatial: Body, pieces: Sequence[PieceOfLink]) -> DividedLink:
     """Of a link and its pieces, each with its equations, in the coordinates of these."""
-    of_file = [_shape_in_piece_in_space(link, piece.start, piece.modal) for piece in pieces]
+    of_file = [_shape_in_piece(link, piece.start, piece.modal) for piece in pieces]
     own = [np.linalg.pinv(piece.spatial.modal_transform) @ p for piece, p in zip(pieces, of_file, strict=True)]
     spread = np.vstack(own) @ spatial.modal_transform
     root = np.sqrt(np.concatenate([piece.spatial.stiffness for piece in pieces]))
@@ -56,16 +56,16 @@ def divided_link_in_space(link: ModalBody, spatial: SpatialBody, pieces: Sequenc
     return DividedLink(names, spread, np.linalg.pinv(root[:, None] * spread) * root)
 
 
-def spread_in_space(link: ModalBody, pieces: Sequence[tuple[float, ModalBody]]) -> Array:
+def spread_of(link: ModalBody, pieces: Sequence[tuple[float, ModalBody]]) -> Array:
     """(N, n) p of the pieces where a link in space bends, twists and stretches in its modes, both of the files' modes.
 
     Pieces are given by where they begin, m from the root, from the root to the tip. Planes of bending, twist and
     stretch do not couple, so that their rigidities are of no account.
     """
-    return np.vstack([_shape_in_piece_in_space(link, start, piece) for start, piece in pieces])
+    return np.vstack([_shape_in_piece(link, start, piece) for start, piece in pieces])
 
 
-def _shape_in_piece_in_space(link: ModalBody, start: float, piece: ModalBody) -> Array:
+def _shape_in_piece(link: ModalBody, start: float, piece: ModalBody) -> Array:
     x = as_floats(np.linspace(0.0, piece.length, INTERVALS + 1))
     of_link = _changes(link, np.minimum(start + x, link.length))
     return np.asarray(np.linalg.lstsq(_changes(piece, x), of_link, rcond=None)[0])

@@ -14,14 +14,14 @@ from types import MappingProxyType
 import numpy as np
 
 from ...common.arrays import Array, as_floats
-from .spatial_body import SpatialBody, SpatialPoint, transformed
+from .body import Body, BodyPoint, transformed
 
 IMMOBILE = 1e-12  # of m_ff = 1: a mode that moves less of it in the plane does so by round-off
 ALONG = np.array([1.0, 1.0, 0.0])
 PLANE, TURN = np.diag(ALONG), np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
 
 
-def projected(body: SpatialBody) -> SpatialBody:
+def projected(body: Body) -> Body:
     """A body without its motion across the plane z = 0 of its frame, and without modes that have no other."""
     moving = np.flatnonzero(np.einsum("kknn->n", body.S_bar_kl[:2, :2]) > IMMOBILE)
     kept = transformed(body, np.eye(body.n_modes)[:, moving], body.stiffness[moving])
@@ -29,7 +29,7 @@ def projected(body: SpatialBody) -> SpatialBody:
     S_bar, S_bar_kl = ALONG[:, None] * kept.S_bar, _keeping_shapes(kept.S_bar_kl)
     about_center = np.trace(kept.second_moment[:2, :2]) - kept.mass * center @ center
     points = {
-        label: SpatialPoint(at.position * ALONG, ALONG[:, None] * at.translation, (1.0 - ALONG)[:, None] * at.rotation)
+        label: BodyPoint(at.position * ALONG, ALONG[:, None] * at.translation, (1.0 - ALONG)[:, None] * at.rotation)
         for label, at in kept.points.items()
     }
     found = replace(
@@ -51,7 +51,7 @@ def projected(body: SpatialBody) -> SpatialBody:
     return replace(found, stiffening=stiffening)
 
 
-def vanishing_in_plane(body: SpatialBody) -> tuple[str, ...]:
+def vanishing_in_plane(body: Body) -> tuple[str, ...]:
     """Which terms of the equations in the plane are round-off for the modes of a body; none of a rigid one."""
     if not body.n_modes:
         return ()

@@ -13,18 +13,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...common.arrays import Array
-from . import spatial_body
-from .spatial_body import SpatialBody
-from .spatial_masses import coupled_blocks
+from . import body as bodies
+from .body import Body
+from .masses import coupled_blocks
 
 if TYPE_CHECKING:
-    from ..scene.spatial.mechanism import SpatialMechanismKeys
+    from ..scene.mechanism import MechanismKeys
 
 IMMOBILE = 1e-9  # of the ordinary size of modes, 1/√m: less is rounding
 DEPENDENT = 1e-8  # static shapes below this fraction of the first one, in energy, say nothing new
 
 
-def with_fewer_modes_in_space(body: SpatialBody, lowest: int, loaded: Sequence[str]) -> SpatialBody:
+def with_fewer_modes(body: Body, lowest: int, loaded: Sequence[str]) -> Body:
     """The body with its `lowest` modes and, for each load at a point of `loaded`, the static response of the others.
 
     A unit load (modal forces Bᵀ) bends the discarded modes d by Ω_d⁻² B_dᵀ. These shapes, made orthonormal in mass and
@@ -51,9 +51,9 @@ def with_fewer_modes_in_space(body: SpatialBody, lowest: int, loaded: Sequence[s
     if len(stiffness) >= body.n_modes:
         return body
     T = np.hstack([np.eye(body.n_modes)[:, kept], *shapes])
-    reduced = spatial_body.transformed(body, T, stiffness)
+    reduced = bodies.transformed(body, T, stiffness)
     static_shapes = len(stiffness) - lowest if body.attachment_modes else 0
-    reduction = spatial_body.Reduction(body, lowest, T, _lift(T, B_T))
+    reduction = bodies.Reduction(body, lowest, T, _lift(T, B_T))
     return replace(reduced, reduction=reduction, attachment_modes=static_shapes)
 
 
@@ -63,7 +63,7 @@ def _lift(T: Array, B_T: Array) -> Array:
     return lift
 
 
-def modes_kept(body: SpatialBody) -> str:
+def modes_kept(body: Body) -> str:
     """How many of its modes (in the plane: of those that move there) a body has, in words."""
     if body.reduction is None:
         attachment = f" and {body.attachment_modes} attachment modes" if body.attachment_modes else ""
@@ -73,13 +73,13 @@ def modes_kept(body: SpatialBody) -> str:
     return f"{lowest} of {body.reduction.whole.n_eigenmodes} modes{shapes}"
 
 
-def loaded_points(scene: SpatialMechanismKeys, body: str) -> list[str]:
+def loaded_points(scene: MechanismKeys, body: str) -> list[str]:
     """Points of a body at which joints, trajectories and loads of the scene act."""
     found = [reference.body_and_point for reference in scene.references() if reference.loaded]
     return list(dict.fromkeys(part[1] for part in found if part is not None and part[0] == body))
 
 
-def interface_loads(body: SpatialBody, loaded: Sequence[str]) -> Array:
+def interface_loads(body: Body, loaded: Sequence[str]) -> Array:
     """Bᵀ (n, loads): modal forces of forces and moments along all axes at each point, scaled to size 1.
 
     Left out are loads under which nothing moves: forces on a support, along a link without axial modes.

@@ -8,9 +8,9 @@ from typing import NamedTuple
 import numpy as np
 
 from ...common.arrays import Array
-from ..model.spatial_body import SpatialBody
-from ..model.spatial_known_motion import mass_matrices
-from .spatial_motion import SpatialMotion
+from ..model.body import Body
+from ..model.known_motion import mass_matrices
+from .motion import RobotMotion
 
 JOLT = 0.01  # of the largest deformation: where more begins to ring at once, modes that are not there would ring, too
 DEPENDENT, RIGID = 1e-10, 1e-9  # of the largest singular value of C_q, and of the largest ω²
@@ -19,7 +19,7 @@ DEPENDENT, RIGID = 1e-10, 1e-9  # of the largest singular value of C_q, and of t
 class ModesInMotion(NamedTuple):
     """Of one flexible body: p and p̈ (T, n)."""
 
-    body: SpatialBody
+    body: Body
     p: Array
     p_ddot: Array
 
@@ -78,14 +78,14 @@ def start_jolt(start: Start) -> float:
     return float(np.sqrt((accelerations**2 / squares).sum() / start.largest))
 
 
-def modes_in_3d_motion(motion: SpatialMotion) -> Iterator[ModesInMotion]:
+def modes_in_motion(motion: RobotMotion) -> Iterator[ModesInMotion]:
     """Of the flexible bodies of a run."""
     for node in motion.model.tree.nodes:
         if node.body.n_modes:
             yield ModesInMotion(node.body, motion.q[:, node.p_q], motion.a[:, node.p_v])
 
 
-def start_of_3d_motion(motion: SpatialMotion) -> Start:
+def start_of_motion(motion: RobotMotion) -> Start:
     """Of a run."""
     tree, stiffness = motion.model.tree, np.zeros(motion.model.tree.n_v)
     energy: Array = np.zeros(len(motion.time))

@@ -15,13 +15,13 @@ import numpy as np
 from ...common.arrays import Array
 from ...fe_models.modal_body.unit_loads import PAIRS, interface_load_names
 from ..fields.field_types import split_point
-from ..model.spatial_known_motion import MotionForces, motion_forces, required_forces
-from ..model.spatial_motors import split_forces
-from ..model.spatial_payloads import turns_as_a_body
-from ..model.spatial_tree import Section
-from ..model.spatial_wrench import Wrench
-from ..scene.spatial.bodies import SpatialPayload, tensor
-from .spatial_motion import SpatialMotion
+from ..model.known_motion import MotionForces, motion_forces, required_forces
+from ..model.motors import split_forces
+from ..model.payloads import turns_as_a_body
+from ..model.tree import Section
+from ..model.wrench import Wrench
+from ..scene.bodies import Payload, tensor
+from .motion import RobotMotion
 
 
 @dataclass(frozen=True)
@@ -37,19 +37,19 @@ class LinkLoads:
     modal_force: Array
 
 
-def link_loads_in_space(motion: SpatialMotion, bodies: Iterable[str]) -> dict[str, LinkLoads]:
+def loads_on_links(motion: RobotMotion, bodies: Iterable[str]) -> dict[str, LinkLoads]:
     """Of each of `bodies`. Nothing where motors turn frames: what they do to a link acts at no interface."""
     if motion.model.scene.motors == "frame":
         return {}
     return _link_loads(motion, bodies, _with_motors(motion))
 
 
-def loads_in_equations(motion: SpatialMotion, bodies: Iterable[str]) -> dict[str, LinkLoads]:
+def loads_in_equations(motion: RobotMotion, bodies: Iterable[str]) -> dict[str, LinkLoads]:
     """Of each of `bodies`, as its equations of motion have them: forces along trajectories where these act."""
     return _link_loads(motion, bodies, motion.behind_gears.forces)
 
 
-def _link_loads(motion: SpatialMotion, bodies: Iterable[str], forces: MotionForces) -> dict[str, LinkLoads]:
+def _link_loads(motion: RobotMotion, bodies: Iterable[str], forces: MotionForces) -> dict[str, LinkLoads]:
     tree, gravity, found = motion.model.tree, np.array(motion.model.scene.gravity), {}
     for name in bodies:
         number = tree.index[name]
@@ -94,7 +94,7 @@ def _of_frame(a: Array, alpha: Array, omega: Array) -> dict[str, Array]:
     return found | {f"omega_{name}": omega[:, i] * omega[:, j] for name, (i, j) in PAIRS.items()}
 
 
-def _of_mass(motion: SpatialMotion, payload: SpatialPayload) -> Array:
+def _of_mass(motion: RobotMotion, payload: Payload) -> Array:
     """Force and moment (T, 6) of a mass's inertia and weight on its point, axes of the body. It turns about z alone."""
     of_point = motion.forces.of_point(payload.point)
     force = -payload.mass * (of_point.a - np.array(motion.model.scene.gravity))
@@ -102,7 +102,7 @@ def _of_mass(motion: SpatialMotion, payload: SpatialPayload) -> Array:
     return _in_axes_of(F, (force, -of_point.alpha @ tensor(payload.inertia)))
 
 
-def _with_motors(motion: SpatialMotion) -> MotionForces:
+def _with_motors(motion: RobotMotion) -> MotionForces:
     """Where motors carry the motion, without forces on its paths: these stay where the motors do not fit."""
     model = motion.model
     loops, motors = int(model.loop_rows.sum()), sum(len(columns) for columns in model.motors.values())

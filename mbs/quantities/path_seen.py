@@ -10,13 +10,13 @@ from ...common.arrays import Array
 from .._core import TimeFunction
 from ..analysis.samples import path_times, targets_of
 from ..scene.analysis import TimedAnalysis
-from ..scene.spatial.trajectories import SpatialTrajectory
+from ..scene.trajectories import Trajectory
 
 MISSED = 1.5  # times the largest rate at outputs: faster motion between them
 STILL = 0.5  # of a run, in which way points are over: the other part is rest
 
 
-def path_warnings(analysis: object, times: Array, paths: Iterable[SpatialTrajectory]) -> Iterator[str]:
+def path_warnings(analysis: object, times: Array, paths: Iterable[Trajectory]) -> Iterator[str]:
     """Of an `analysis` with outputs at `times` (T,), s, that follows `paths`: what these hide, a text each."""
     if not isinstance(analysis, TimedAnalysis) or np.count_nonzero((times >= 0.0) & (times <= analysis.end)) < 2:
         return  # it ended before the path began
@@ -25,7 +25,7 @@ def path_warnings(analysis: object, times: Array, paths: Iterable[SpatialTraject
         yield from _unseen(path, times, analysis)
 
 
-def _outside(path: SpatialTrajectory, analysis: TimedAnalysis) -> Iterator[str]:
+def _outside(path: Trajectory, analysis: TimedAnalysis) -> Iterator[str]:
     """Way points that the run does not come to, and a table that is over early."""
     if path.path is None:
         return
@@ -40,7 +40,7 @@ def _outside(path: SpatialTrajectory, analysis: TimedAnalysis) -> Iterator[str]:
         yield f'{where}: its way points are over at t = {over:g} s, and "{analysis.name}" rests until {end:g} s'
 
 
-def _unseen(path: SpatialTrajectory, times: Array, analysis: TimedAnalysis) -> Iterator[str]:
+def _unseen(path: Trajectory, times: Array, analysis: TimedAnalysis) -> Iterator[str]:
     """The fastest of its components that moves faster between outputs than at any of them."""
     every = path_times(times, [path], analysis.end)
     between, seen = (some[(some >= 0.0) & (some <= analysis.end)] for some in (every, times))

@@ -17,9 +17,9 @@ import numpy as np
 from ...common.arrays import Array, as_floats
 from ...common.rotations import exponential, left_jacobian, logarithm
 from ...fe_models.modal_body import ModalBody
-from ..model.spatial_bending import bent_section
-from ..model.spatial_body import SpatialBody
-from ..model.spatial_tree import Motion
+from ..model.bending import bent_section
+from ..model.body import Body
+from ..model.tree import Motion
 
 INTERVALS = 16  # of a piece, over each of which curvature is constant but for its share in the direction
 X = np.array([1.0, 0.0, 0.0])
@@ -29,7 +29,7 @@ class PieceInMotion(NamedTuple):
     """A piece: its modal body, its equations, its p (T, n) in these, and its sections at root and tip over time."""
 
     modal: ModalBody
-    body: SpatialBody
+    body: Body
     p: Array
     root: Motion
     tip: Motion
@@ -54,7 +54,7 @@ def missed_by_pieces(pieces: Sequence[PieceInMotion]) -> Array:
     return missed
 
 
-def ends_in_equations(body: SpatialBody, p: Array) -> Ends:
+def ends_in_equations(body: Body, p: Array) -> Ends:
     """As the equations of a piece have them at p (T, n)."""
     root, tip = (bent_section(body, end, p) for end in ("root", "tip"))
     back = np.swapaxes(exponential(root.phi), -1, -2)

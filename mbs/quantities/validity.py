@@ -18,8 +18,9 @@ import numpy as np
 
 from ...common.arrays import Array
 from ...fe_models.modal_body import ModalBody
-from ..model.spatial_body import SpatialBody
+from ..model.body import Body
 from .link_loads import loads_in_equations
+from .motion import RobotMotion
 from .second_order import (
     Missing,
     Rotations,
@@ -28,7 +29,6 @@ from .second_order import (
     missing_to_first_order,
     missing_to_second_order,
 )
-from .spatial_motion import SpatialMotion
 from .stiffness_change import LoadedPoint, ModalLoads, StiffnessChange, stiffness_change
 
 NOTABLE = 0.01  # relative change of a link's stiffness from which on "auto" switches geometric stiffening on
@@ -136,7 +136,7 @@ def enough_pieces(shortening: float, count: int) -> int:
     return max(2, ceil(count * sqrt(shortening / ENOUGH)))
 
 
-def bending_in_space(motion: SpatialMotion, links: Mapping[str, ModalBody]) -> dict[str, Bending]:
+def link_bending(motion: RobotMotion, links: Mapping[str, ModalBody]) -> dict[str, Bending]:
     """Of the flexible bodies of the equations by name; `links` are their modal bodies as their files have them."""
     loads = loads_in_equations(motion, links) if len(motion.time) else {}
     found = {}
@@ -149,7 +149,7 @@ def bending_in_space(motion: SpatialMotion, links: Mapping[str, ModalBody]) -> d
     return found
 
 
-def _on_modes(link: ModalBody, body: SpatialBody, sizes: Mapping[str, Array]) -> ModalLoads:
+def _on_modes(link: ModalBody, body: Body, sizes: Mapping[str, Array]) -> ModalLoads:
     """Loads of `sizes` (T,) on a body, whether their geometric stiffness is in the equations or not.
 
     Loads by the names of `fe_models.modal_body.unit_loads`; those alone of which the file has a geometric stiffness.
@@ -167,7 +167,7 @@ def _on_modes(link: ModalBody, body: SpatialBody, sizes: Mapping[str, Array]) ->
     return ModalLoads(f, np.array([K[load] for load in known]).reshape(-1, n, n), body.stiffness, points)
 
 
-def _largest_force(body: SpatialBody, sizes: Mapping[str, Array], count: int) -> Array:
+def _largest_force(body: Body, sizes: Mapping[str, Array], count: int) -> Array:
     """(T,) N, of the forces at the interfaces of a body."""
     largest = np.zeros(count)
     for point in body.points:

@@ -9,18 +9,18 @@ import numpy as np
 from ...common.arrays import Array
 from .. import _core
 from .._core import TimeFunction
-from ..model.spatial_system import SpatialSystem
+from ..model.system import MultibodySystem
 from ..scene.analysis import IntegratedAnalysis
+from .integrator_choice import TOO_STIFF, fastest_friction
 from .integrators import EXPLICIT, Choice, beyond_order, unmet
 from .path_checks import JUMP
-from .spatial_integrators import TOO_STIFF, fastest_friction
-from .spatial_posture import told_loops
+from .posture import told_loops
 from .state import State
 
 FAR_BENT = 0.5  # of a link's radius of gyration, in the mean
 
 
-def find_cause_in_space(system: SpatialSystem, analysis: IntegratedAnalysis, choice: Choice, run: _core.TreeRun) -> str:
+def find_cause(system: MultibodySystem, analysis: IntegratedAnalysis, choice: Choice, run: _core.TreeRun) -> str:
     """A sentence with advice, the likely causes of a failure, the more certain first; empty where nothing is found.
 
     A target that is not a number, a link bent too far, a load that jumps, friction, a singular posture of loops; where
@@ -39,13 +39,13 @@ def find_cause_in_space(system: SpatialSystem, analysis: IntegratedAnalysis, cho
     return beyond_order(choice, analysis) or unmet(choice, run)
 
 
-def _targets(system: SpatialSystem) -> Iterator[tuple[str, TimeFunction]]:
+def _targets(system: MultibodySystem) -> Iterator[tuple[str, TimeFunction]]:
     for row in system.model.rows:
         functions = row.law.functions if row.law is not None else () if row.target is None else (row.target,)
         yield from ((f'trajectory "{row.owner}"', function) for function in functions)
 
 
-def _accelerations(system: SpatialSystem, t: float, state: Array) -> Array:
+def _accelerations(system: MultibodySystem, t: float, state: Array) -> Array:
     return _core.tree_outputs(system.core, system.scene, [t], np.array(state)[None]).accelerations
 
 
@@ -59,7 +59,7 @@ def not_a_number(targets: Iterable[tuple[str, TimeFunction]], accelerations: Cal
     return ""
 
 
-def _links(system: SpatialSystem, at: State) -> Iterator[tuple[str, Array, float]]:
+def _links(system: MultibodySystem, at: State) -> Iterator[tuple[str, Array, float]]:
     for node in system.model.tree.nodes:
         if node.body.n_modes:
             yield node.body.name, at.q[node.p_q], node.body.largest_moment
@@ -81,7 +81,7 @@ def too_far_bent(links: Iterable[tuple[str, Array, float]]) -> str:
     )
 
 
-def _loads(system: SpatialSystem) -> Iterator[tuple[str, TimeFunction]]:
+def _loads(system: MultibodySystem) -> Iterator[tuple[str, TimeFunction]]:
     for load in system.model.scene.load:
         for name, size in load.components.items():
             component = name.removesuffix("[0]") if len(load.moments) == 1 else name
@@ -101,7 +101,7 @@ def load_jump(loads: Iterable[tuple[str, TimeFunction]], t: float) -> str:
     return ""
 
 
-def _friction(system: SpatialSystem, analysis: IntegratedAnalysis, choice: Choice, at: State) -> str:
+def _friction(system: MultibodySystem, analysis: IntegratedAnalysis, choice: Choice, at: State) -> str:
     rate, joint = fastest_friction(system, at)
     if rate * analysis.end <= TOO_STIFF:
         return ""

@@ -35,7 +35,7 @@ class Target(NamedTuple):
 
 
 class Output(Protocol):
-    """A path that motors alone are to carry; `factor` and `offset` as in `spatial_servo.SpatialServo`."""
+    """A path that motors alone are to carry; `factor` and `offset` as in `spatial_servo.Servo`."""
 
     @property
     def factor(self) -> float:

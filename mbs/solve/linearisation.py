@@ -22,14 +22,14 @@ import numpy as np
 from ...common.arrays import Array, Indices
 from ...common.errors import InputError, SolveError
 from ...common.rotations import skew
-from ..model.spatial_cut import measured
-from ..model.spatial_frame_motors import turning_motors
-from ..model.spatial_known_motion import required_forces
-from ..model.spatial_model import SpatialModel, row_values
-from ..model.spatial_motors import FrameShare, frame_share
-from ..model.spatial_system import SpatialSystem
-from ..model.spatial_transmission import gear_matrices
-from ..model.spatial_tree import ElasticGearInSpace, Motion, Node
+from ..model.cut import measured
+from ..model.frame_motors import turning_motors
+from ..model.known_motion import required_forces
+from ..model.model import Model, row_values
+from ..model.motors import FrameShare, frame_share
+from ..model.system import MultibodySystem
+from ..model.transmission import gear_matrices
+from ..model.tree import ElasticGearInSpace, Motion, Node
 from ..scene.space import SPACES
 
 DEPENDENT = 1e-8  # of a row's gradient, what others must leave of it to count as independent
@@ -78,7 +78,7 @@ class _State(NamedTuple):
     frames: Sequence[Motion]
 
 
-class SpatialLinearisation:
+class LinearEquations:
     """What is the same at every posture: joints alone hold; given forces along s act, and loads.
 
     `model` has no rows of trajectories; its gears give where its tree has them. Independent are the motors' coordinates
@@ -87,10 +87,10 @@ class SpatialLinearisation:
     where that is another body's point (of a link in pieces).
     """
 
-    def __init__(self, model: SpatialModel, q: Array, points: Sequence[str] | Mapping[str, str] = ()) -> None:
+    def __init__(self, model: Model, q: Array, points: Sequence[str] | Mapping[str, str] = ()) -> None:
         _check(model)
         self.points = dict(points) if isinstance(points, Mapping) else {point: point for point in points}
-        self.model, self.system = model, SpatialSystem(model)
+        self.model, self.system = model, MultibodySystem(model)
         self._on_frames = turning_motors(model)
         self.independent = _independent(model, q)
         names, signs = _coordinates(model)
@@ -182,7 +182,7 @@ class SpatialLinearisation:
         return found
 
 
-def _check(model: SpatialModel) -> None:
+def _check(model: Model) -> None:
     for node in model.tree.nodes:
         if node.backwards and node.joint.type == "planar":  # its coordinates are not linear in the tree's
             raise InputError(
@@ -191,7 +191,7 @@ def _check(model: SpatialModel) -> None:
             )
 
 
-def labelled(model: SpatialModel, joint: str) -> Iterator[tuple[str, int]]:
+def labelled(model: Model, joint: str) -> Iterator[tuple[str, int]]:
     """Coordinates of a joint, "joint/NAME", or "joint/NAME 1", "joint/NAME 2" of several, and where each is in v."""
     return _labelled(joint, model.columns(joint))
 
@@ -209,7 +209,7 @@ def _of_motor(gear: ElasticGearInSpace) -> str:
     return f"motor/{gear.joint.joint.name}"
 
 
-def _coordinates(model: SpatialModel) -> tuple[list[str], Array]:
+def _coordinates(model: Model) -> tuple[list[str], Array]:
     """Names of the entries of v, and the sign with which a joint of the scene counts each."""
     names, signs = [""] * model.tree.n_v, np.ones(model.tree.n_v)
     joints = {joint.name for joint in model.scene.joint}
@@ -227,7 +227,7 @@ def _coordinates(model: SpatialModel) -> tuple[list[str], Array]:
     return names, signs
 
 
-def _independent(model: SpatialModel, q: Array) -> Indices:
+def _independent(model: Model, q: Array) -> Indices:
     """Where s is in v: motors first, then other joints, then modes."""
     from scipy.linalg import qr
 

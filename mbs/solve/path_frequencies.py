@@ -11,13 +11,13 @@ import numpy as np
 from ...common.arrays import Array, as_floats
 from ...common.errors import InputError
 from ...common.validation import quoted
-from ..model.spatial_gears import with_held_motors
-from ..model.spatial_model import SpatialModel
-from .spatial_posture import solve_posture
-from .spatial_redundancy import resolved
-from .spatial_start import relaxed_gears, undeformed_posture
+from ..model.gears import with_held_motors
+from ..model.model import Model
+from .posture import solve_posture
+from .redundancy import resolved
+from .start import relaxed_gears, undeformed_posture
 from .state import State
-from .vibration import vibrations_in_space, without_rows
+from .vibration import vibrations_of, without_rows
 
 INSTANTS = 9
 
@@ -30,7 +30,7 @@ class PathFrequencies:
     damping_ratio: Array
 
 
-def spatial_path_frequencies(model: SpatialModel, begin: float, end: float, modes: int) -> PathFrequencies:
+def frequencies_along(model: Model, begin: float, end: float, modes: int) -> PathFrequencies:
     """Of the `modes` lowest vibrations of the undeformed robot with its trajectories held, from `begin` to `end`, s.
 
     Where motors follow them, gears that give are among its springs. Joints that the paths leave free are free.
@@ -47,7 +47,7 @@ def spatial_path_frequencies(model: SpatialModel, begin: float, end: float, mode
                 f" at t = {t:.6g} s that meets {quoted(dict.fromkeys(row.owner for row in model.rows))}"
             )
         state = relaxed_gears(model, State(q, np.zeros_like(state.v)))
-        found.append(vibrations_in_space(model, unheld, float(t), state.q)[:2])
+        found.append(vibrations_of(model, unheld, float(t), state.q)[:2])
     return common_modes(model.scene.path, found, modes)
 
 

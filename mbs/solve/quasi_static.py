@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...common.arrays import Array, as_list
-from .spatial_prescribed import PrescribedMotion
+from .prescribed import PrescribedMotion
 
 MOST_ITERATIONS = 100
 SETTLED = 1e-14  # of a shape's size: what the next step would change

@@ -9,13 +9,13 @@ from itertools import pairwise
 import numpy as np
 
 from ...common.arrays import Array, as_floats
-from ..model.spatial_body import SpatialBody
-from ..model.spatial_model import SpatialModel, without_paths
-from .spatial_start import undeformed_posture
-from .vibration import vibrations_in_space, without_rows
+from ..model.body import Body
+from ..model.model import Model, without_paths
+from .start import undeformed_posture
+from .vibration import vibrations_of, without_rows
 
 
-def with_robot_damping_in_space(model: SpatialModel, ratios: Mapping[str, float]) -> SpatialModel:
+def with_robot_damping(model: Model, ratios: Mapping[str, float]) -> Model:
     """The robot with links so damped that its vibrations have the damping ratios ζ, given by body, where all agree.
 
     At the initial posture, motors free, gears rigid. Bodies not named keep the damping that they have.
@@ -23,7 +23,7 @@ def with_robot_damping_in_space(model: SpatialModel, ratios: Mapping[str, float]
     if not ratios:
         return model
     start, tree = undeformed_posture(model), model.tree
-    modes = vibrations_in_space(without_paths(model), without_rows(model), 0.0, start.q)
+    modes = vibrations_of(without_paths(model), without_rows(model), 0.0, start.q)
     wanted = unit_damping(modes.frequency, modes.shape[~tree.joint_columns])
     bodies = _damped([node.body for node in tree.nodes], wanted, ratios)
     return replace(model, tree=tree.with_bodies(bodies))
@@ -42,7 +42,7 @@ def unit_damping(frequency: Array, shape: Array) -> Array:
     return as_floats(inverse.T @ (2 * frequency[:, None] * inverse))
 
 
-def _damped(bodies: Sequence[SpatialBody], wanted: Array, ratios: Mapping[str, float]) -> tuple[SpatialBody, ...]:
+def _damped(bodies: Sequence[Body], wanted: Array, ratios: Mapping[str, float]) -> tuple[Body, ...]:
     """With their blocks on the diagonal of `wanted` (modes of all bodies)², ζ times; bodies not named as they are."""
     ends = np.cumsum([0, *(body.n_modes for body in bodies)])
     return tuple(

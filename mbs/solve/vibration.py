@@ -8,16 +8,16 @@ from typing import NamedTuple
 import numpy as np
 
 from ...common.arrays import Array, as_floats
-from ..model.spatial_cut import cut_damping
-from ..model.spatial_model import SpatialModel, row_values
-from ..model.spatial_system import SpatialSystem
-from ..model.spatial_transmission import gear_matrices
+from ..model.cut import cut_damping
+from ..model.model import Model, row_values
+from ..model.system import MultibodySystem
+from ..model.transmission import gear_matrices
 
 DEPENDENT = 1e-9  # of the largest singular value: below it a row repeats others
 RIGID = 1e-9  # of the largest strain of a unit motion, each in units of its spring: below it there is none
 
 
-class SpatialVibrations(NamedTuple):
+class Vibrations(NamedTuple):
     """Of M q̈ + D q̇ + K q = −C_vᵀλ, C_v q̇ = 0 about rest; rigid motion is left out.
 
     frequency ω (n,) rad/s ascending; damping_ratio (n,); shape (n_v, n), M-orthonormal; springs K (n_v, n_v).
@@ -29,12 +29,12 @@ class SpatialVibrations(NamedTuple):
     springs: Array
 
 
-def without_rows(model: SpatialModel) -> SpatialSystem:
+def without_rows(model: Model) -> MultibodySystem:
     """The mechanism that follows nothing and whose loops are open."""
-    return SpatialSystem(replace(model, rows=()))
+    return MultibodySystem(replace(model, rows=()))
 
 
-def vibrations_in_space(model: SpatialModel, unheld: SpatialSystem, t: float, q: Array) -> SpatialVibrations:
+def vibrations_of(model: Model, unheld: MultibodySystem, t: float, q: Array) -> Vibrations:
     """Those about q (n_q,), with the rows of `model` held.
 
     M⁻¹ is what the core says that forces do to accelerations where `unheld`. K are the stiffnesses of links and gears,
@@ -50,10 +50,10 @@ def vibrations_in_space(model: SpatialModel, unheld: SpatialSystem, t: float, q:
     stiff = slice(len(squares) - strained(K, free), None)
     omega, shape = np.sqrt(squares[stiff]), free @ L_inverse.T @ vectors[:, stiff]
     ratio = np.einsum("in,ij,jn->n", shape, D, shape) / (2 * omega)
-    return SpatialVibrations(as_floats(omega), as_floats(ratio), shape, K)
+    return Vibrations(as_floats(omega), as_floats(ratio), shape, K)
 
 
-def _springs(model: SpatialModel, q: Array) -> tuple[Array, Array]:
+def _springs(model: Model, q: Array) -> tuple[Array, Array]:
     """K and D (n_v, n_v) of modes, gears and viscous friction at q (n_q,)."""
     K, D = gear_matrices(model.tree)
     D += cut_damping(model.tree, model.cut, q)

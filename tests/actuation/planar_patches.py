@@ -4,10 +4,10 @@ from pathlib import Path
 
 import numpy as np
 
-from ffrobot.actuation.patches.records import SpatialPztLayout
-from ffrobot.actuation.patches.spatial_patches import link_patches
+from ffrobot.actuation.patches.link_patches import link_patches
+from ffrobot.actuation.patches.records import PztLayout
+from ffrobot.mbs.model.body import from_modal_body
 from ffrobot.mbs.model.projection import projected
-from ffrobot.mbs.model.spatial_body import from_modal_body
 
 SCENE = Path("scene.toml")
 CERAMIC = {"length": 0.05, "width": 0.025, "thickness": 0.75e-3, "modulus": 63e9, "d31": 110e-12}
@@ -20,7 +20,7 @@ def planar_body(body, name="link"):
 
 def layout(body="link", **keys):
     places = {} if keys.keys() & {"count", "centers"} else {"count": 10}
-    return SpatialPztLayout(body=body, **({"structural": False} | CERAMIC | places | keys))
+    return PztLayout(body=body, **({"structural": False} | CERAMIC | places | keys))
 
 
 def on_link(body, planar=None, **keys):

@@ -5,11 +5,11 @@ import pytest
 from planar_patches import SCENE, on_link, planar_body
 
 from ffrobot.actuation.patches.kept_modes import on_kept_modes
-from ffrobot.actuation.patches.spatial_patches import check_reach
+from ffrobot.actuation.patches.link_patches import check_reach
 from ffrobot.actuation.patches.voltages import voltage_gain
 from ffrobot.common.errors import InputError
 from ffrobot.fe_models.link import cached_modal_body
-from ffrobot.mbs.model.truncation import with_fewer_modes_in_space
+from ffrobot.mbs.model.truncation import with_fewer_modes
 
 
 @pytest.fixture
@@ -55,7 +55,7 @@ LOADED = {"root": ["root"], "both": ["root", "tip"]}
 @pytest.fixture(params=LOADED)
 def fewer(bodies, request):
     """The link with four of its ten eigenmodes, and static shapes of loads."""
-    return with_fewer_modes_in_space(planar_body(bodies[0]), 4, LOADED[request.param])
+    return with_fewer_modes(planar_body(bodies[0]), 4, LOADED[request.param])
 
 
 def test_fewer_modes_are_served_through_all(bodies, fewer):

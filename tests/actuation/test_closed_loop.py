@@ -9,16 +9,16 @@ from scipy.linalg import expm, solve_discrete_are
 
 from ffrobot.actuation.context import ActuatedContext
 from ffrobot.actuation.control.lqr import gains
+from ffrobot.actuation.control.rigid_arm import RigidArm
 from ffrobot.actuation.control.sampling import sampled
 from ffrobot.actuation.control.signals import volts_on_file
-from ffrobot.actuation.control.spatial_rigid_arm import SpatialRigidArm
 from ffrobot.common.errors import InputError, SolveError
 from ffrobot.common.python_files import python_allowed
-from ffrobot.mbs.model.spatial_model import without_paths
+from ffrobot.mbs.model.model import without_paths
 from ffrobot.pictures.figures.standard import standard_figures
 from ffrobot.results.file import Results
-from ffrobot.results.spatial import spatial_image
-from ffrobot.run.spatial import prepare_spatial, solve_spatial
+from ffrobot.results.write import results_image
+from ffrobot.run.solve import prepare_scene, solve_scene
 from ffrobot.scene.load import make_scene
 
 INERTIA, T = 0.5, 0.01
@@ -61,9 +61,7 @@ def two_rods(*analyses, **keys):
 
 def moving_at(rates, scene):
     """The closed loop of a wheel's scene about an inverse analysis that is to have found these rates (T,)."""
-    context = ActuatedContext(
-        model=prepare_spatial(scene).model, outcomes={}, progress=lambda _: True, is_replayed=True
-    )
+    context = ActuatedContext(model=prepare_scene(scene).model, outcomes={}, progress=lambda _: True, is_replayed=True)
     inverse, analysis = scene.analysis
     source = inverse.run(context)
     source = replace(source, motion=replace(source.motion, v=rates(source.v)))
@@ -106,7 +104,7 @@ def test_units_of_commands_do_not_decide_on_the_discrete_model():
 
 
 def test_commands_stop_at_the_limits_of_the_motors():
-    outcomes = solve_spatial(wheel(loop(controller=[PID], disturbance=blow()), joint={"moment_limit": 0.5}))
+    outcomes = solve_scene(wheel(loop(controller=[PID], disturbance=blow()), joint={"moment_limit": 0.5}))
     record = outcomes.outcomes["loop"].details
     assert np.abs(record.commands).max() == 0.5 == record.metrics.peak_moment
     assert np.abs(record.wanted).max() > 0.6
@@ -118,7 +116,7 @@ def test_noise_is_that_of_the_seed():
     def readings(seed):
         sensor = [{"joint": "O", "measure": "rate", "noise": 0.02}, {"joint": "O"}]
         scene = wheel(loop(sensor=sensor, seed=seed))
-        record = solve_spatial(scene).outcomes["loop"].details
+        record = solve_scene(scene).outcomes["loop"].details
         return record.readings[:, record.outputs.index("joint/O/rate")]
 
     first, again, other = readings(1), readings(1), readings(2)
@@ -130,7 +128,7 @@ def test_noise_is_that_of_the_seed():
 def test_the_points_accelerometer_feels_the_blow():
     """F = 5 N at the rim, 0.3 m from O: a_y = r (F r)/I as long as the wheel has hardly turned."""
     sensor = [{"point": "w.rim", "measure": "acceleration"}]
-    record = solve_spatial(wheel(loop(sensor=sensor, disturbance=blow()))).outcomes["loop"].details
+    record = solve_scene(wheel(loop(sensor=sensor, disturbance=blow()))).outcomes["loop"].details
     column = record.outputs.index("point/w.rim/y/acceleration")
     assert record.readings[1, column] == pytest.approx(0.3 * 5.0 * 0.3 / INERTIA, rel=1e-3)
     assert record.readings[20, column] == pytest.approx(0.0, abs=0.2)
@@ -138,13 +136,13 @@ def test_the_points_accelerometer_feels_the_blow():
 
 def test_rigid_arm_knows_the_moments_of_the_inverse_analysis():
     built = {"gear_ratio": 30.0, "rotor_inertia": 1e-3, "viscous_friction": 0.2, "coulomb_friction": 0.5}
-    solution = solve_spatial(two_rods(first=built, second=built))
+    solution = solve_scene(two_rods(first=built, second=built))
     inverse = solution.outcomes["inverse"]
     t = inverse.time
     gamma = np.column_stack([0.4 + 0.9 * np.sin(2 * t), -1.1 + 0.7 * np.cos(3 * t)])
     rate = np.column_stack([1.8 * np.cos(2 * t), -2.1 * np.sin(3 * t)])
     acceleration = np.column_stack([-3.6 * np.sin(2 * t), -6.3 * np.cos(3 * t)])
-    arm = SpatialRigidArm(without_paths(solution.model), inverse.q[0])
+    arm = RigidArm(without_paths(solution.model), inverse.q[0])
     moments = np.array([arm.moments(*state) for state in zip(gamma, rate, acceleration, strict=True)])
     found = solution.analyses["inverse"].motion.motor_moments
     tau = np.column_stack([found[joint] for joint in "OA"])
@@ -155,7 +153,7 @@ def test_computed_torque_follows_without_any_feed_forward_better_the_faster_it_s
     def error(sample_time):
         control = [{"kind": "computed-torque", "bandwidth": 20.0}]
         scene = two_rods(loop(controller=control, sample_time=sample_time, feed_forward="none", tip="b.tip"))
-        return solve_spatial(scene).outcomes["loop"].details.metrics.tip_error_max
+        return solve_scene(scene).outcomes["loop"].details.metrics.tip_error_max
 
     coarse, fine = error(0.01), error(0.0025)
     assert coarse < 0.05
@@ -174,7 +172,7 @@ def test_lqr_gains_are_those_of_scipy():
 def test_lqr_damps_the_wheel_as_its_own_model_says():
     control = [{"kind": "lqr", "angle": 0.01, "rate": 0.1, "moment": 1.0}]
     scene = wheel(loop(controller=control, delay=0.015, disturbance=blow(until=0.1)))
-    record = solve_spatial(scene).outcomes["loop"].details
+    record = solve_scene(scene).outcomes["loop"].details
     assert record.metrics.verdict == "stable"
     assert np.abs(record.readings[-1, 0]) < 0.05 * np.abs(record.readings[:, 0]).max()
     assert not [line for line in record.warnings if "LQR" in line]
@@ -202,7 +200,7 @@ def test_a_function_of_the_user_acts_like_the_same_controller_of_the_scene(tmp_p
         loop("mine", controller=[mine], sensor=sensor, disturbance=blow()),
     ]
     with python_allowed([tmp_path]):
-        solution = solve_spatial(wheel(*loops))
+        solution = solve_scene(wheel(*loops))
     theirs, own = solution.outcomes["theirs"].details, solution.outcomes["mine"].details
     np.testing.assert_allclose(own.commands, theirs.commands, atol=1e-12)
     np.testing.assert_array_equal(solution.outcomes["itself"].details.commands, own.commands)
@@ -221,20 +219,20 @@ def test_what_a_users_function_does_wrong_is_said(tmp_path, body, error, expecte
     file = tmp_path / "mine.py"
     file.write_text(f"import numpy as np\ndef controller(setup):\n    def act(k, y):\n        {body}\n    return act\n")
     with python_allowed([tmp_path]), pytest.raises(error, match=expected):
-        solve_spatial(wheel(loop(controller=[{"kind": "python", "python": f"{file}:controller"}])))
+        solve_scene(wheel(loop(controller=[{"kind": "python", "python": f"{file}:controller"}])))
 
 
 def test_unstable_gains_are_reported_and_the_results_kept():
     """Derivative gain beyond 2 I/T: every sample overshoots. The run after it is made all the same."""
     wild = {"kind": "joint-pid", "proportional": {"O": 1.0}, "derivative": {"O": 3 * INERTIA / T}}
     scene = wheel(loop("wild", controller=[wild], disturbance=blow(until=0.02)), loop("calm", controller=[PID]))
-    solution = solve_spatial(scene)
+    solution = solve_scene(scene)
     wild, calm = solution.outcomes["wild"].details, solution.outcomes["calm"].details
     rate = wild.readings[:, wild.outputs.index("joint/O/rate")]
     # ω(k+1) = ω(k) (1 − 3) once the blow is over; the proportional part, T²/I of the rate, adds 2e-4.
     np.testing.assert_allclose(rate[4:] / rate[3:-1], -2.0, rtol=1e-3)
     assert calm.metrics.verdict == "stable"
-    results = Results.from_image(spatial_image(solution), scene.path)
+    results = Results.from_image(results_image(solution), scene.path)
     assert results.has("wild/control/commands")
     assert results.attributes("calm/control")["verdict"] == "stable"
     assert len(results.time("calm/control/commands")) == len(results["calm/control/readings"]) == 50
@@ -256,9 +254,9 @@ def test_verdict_is_that_of_the_sampled_rate(factor, verdict):
 
 def test_slow_sampling_is_warned_of():
     stiff = {"kind": "joint-pid", "proportional": {"O": 5000.0}}
-    record = solve_spatial(wheel(loop(controller=[stiff]))).outcomes["loop"].details
+    record = solve_scene(wheel(loop(controller=[stiff]))).outcomes["loop"].details
     assert any("sampling at 100 Hz is slow" in line for line in record.warnings)
-    assert not solve_spatial(wheel(loop(controller=[PID]))).outcomes["loop"].details.warnings
+    assert not solve_scene(wheel(loop(controller=[PID]))).outcomes["loop"].details.warnings
 
 
 @pytest.mark.parametrize(
@@ -282,7 +280,7 @@ def test_slow_sampling_is_warned_of():
 )
 def test_bad_keys_are_refused(keys, expected):
     with pytest.raises(InputError, match=expected):
-        prepare_spatial(wheel(loop(**keys)))
+        prepare_scene(wheel(loop(**keys)))
 
 
 def test_keys_of_a_closed_loop_are_refused_elsewhere():
@@ -327,7 +325,7 @@ def test_patches_add_the_damping_that_is_asked_for(link_file, sensor):
     control = {"kind": "modal-velocity", "bodies": ["link"], "modes": 1, "damping_ratio": 0.05, "sensor": sensor}
     link = link_file("cantilever3", count=3)
     scene = held_link(link, loop(sample_time=1e-4, controller=[control]), loop("free", sample_time=1e-4))
-    solution = solve_spatial(scene)
+    solution = solve_scene(scene)
     assert abs(decay(solution, "free")) < 1e-4
     assert decay(solution, "loop") == pytest.approx(0.05, rel=0.05)
 
@@ -337,7 +335,7 @@ def test_all_integrators_go_from_sample_to_sample_alike(link_file):
     control = {"kind": "modal-velocity", "bodies": ["link"], "damping_ratio": 0.05, "sensor": "ideal"}
     names = ["dop853", "dopri5", "radau", "generalized-alpha"]
     loops = [loop(name, integrator=name, sample_time=2e-3, controller=[control]) for name in names]
-    solution = solve_spatial(held_link(link_file("cantilever3", count=3), *loops))
+    solution = solve_scene(held_link(link_file("cantilever3", count=3), *loops))
     first = solution.outcomes["dop853"].q
     sag = solution.outcomes["inverse"].q
     for name in names[1:]:
@@ -355,14 +353,14 @@ def test_lqr_names_the_modes_out_of_reach():
                  "viscous_friction": 0.1}],
     )  # fmt: skip
     frequency = np.sqrt(9.81 * 0.1 / 0.31) / (2 * np.pi)
-    lines = solve_spatial(scene).outcomes["loop"].details.warnings
+    lines = solve_scene(scene).outcomes["loop"].details.warnings
     for word in ("uncontrollable", "unobservable"):
         assert any(word in line and f"({frequency:.4g} Hz)" in line for line in lines), lines
 
 
 def test_a_patch_reads_the_charge_of_its_bending(link_file):
     """A force at the tip of a cantilever turns its sections by F (L x − x²/2)/(E I)."""
-    solution = prepare_spatial(held_link(link_file("cantilever10"), loop()))
+    solution = prepare_scene(held_link(link_file("cantilever10"), loop()))
     of_link, link = solution.patches["link"], solution.bodies["link"].carrying
     EI = 2.068427e11 * 0.025 * 0.015**3 / 12
     p = link.modal_transform @ (link.points["tip"].translation[1] / link.stiffness)
@@ -385,7 +383,7 @@ def test_gears_that_give_are_wound_at_the_start():
         loop(controller=[ON_MOTORS]), loop("from_scene", controller=[ON_MOTORS], start="scene"),
         first=GIVES, second=GIVES, paths=still,
     )  # fmt: skip
-    solution = solve_spatial(scene)
+    solution = solve_scene(scene)
     for name in ("loop", "from_scene"):
         record = solution.outcomes[name].details
         assert record.tip_error.max() < 1e-9
@@ -399,7 +397,7 @@ def test_a_motor_behind_a_spring_is_its_two_masses():
     scene = wheel(
         loop(controller=[ON_MOTORS], sample_time=T_fine, disturbance=blow(), feed_forward="none"), joint=GIVES
     )
-    solution = solve_spatial(scene)
+    solution = solve_scene(scene)
     outcome, (angle, _) = solution.outcomes["loop"], solution.analyses["loop"].motion.joint("O")
     # x = (θ_m, γ, rates); the blow is a moment of 5 N times 0.3 m on the wheel for 0.1 s, which turns by little
     M, K = np.diag([I_m, INERTIA]), np.array([[k + P, -k], [-k, k]])

@@ -6,8 +6,8 @@ import pytest
 import ffrobot
 from ffrobot.actuation.feasibility import PatchFeasibility, Remedies
 from ffrobot.actuation.motors import path_jump
-from ffrobot.actuation.patches.spatial_patches import link_patches, with_count
-from ffrobot.run.spatial import solve_spatial
+from ffrobot.actuation.patches.link_patches import link_patches, with_count
+from ffrobot.run.solve import solve_scene
 
 LIMIT = 200.0
 SCENE = """
@@ -64,7 +64,7 @@ def arm(link_file, tmp_path_factory):
                 link=link, kind=kind, times=times, trajectory=trajectory, limit=limit, own=own, load=load, motor=motor
             )
         )
-        return solve_spatial(scene)
+        return solve_scene(scene)
 
     return run
 

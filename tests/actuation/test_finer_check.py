@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import ffrobot as library
-from ffrobot.run.spatial import solve_spatial
+from ffrobot.run.solve import solve_scene
 
 LENGTHS, START, END = (0.7, 0.5), (0.4, 1.3), (0.7, 1.1)
 
@@ -69,7 +69,7 @@ def test_error_is_that_of_the_modes_left_out(gravity):
     """It falls with every mode, where the replay on the same modes has none to speak of."""
     errors = []
     for modes in (2, 4):
-        solution = solve_spatial(arm(modes, gravity=gravity))
+        solution = solve_scene(arm(modes, gravity=gravity))
         check = solution.analyses["inverse"].check
         same, path = (solution.analyses[name].motion.point("link2.tip").position for name in ("same", "inverse"))
         assert np.abs(same - path).max() < 1e-3 * check.error
@@ -82,7 +82,7 @@ def test_error_is_that_of_the_modes_left_out(gravity):
 
 def test_links_with_all_that_matters_leave_nothing():
     """Motors alone in a horizontal plane, eight modes: what sixteen add is below the tolerance of the replay."""
-    check = solve_spatial(arm(8, kind="motors-only", patches=False)).analyses["inverse"].check
+    check = solve_scene(arm(8, kind="motors-only", patches=False)).analyses["inverse"].check
     assert check.point == "link2.tip"
     assert check.error < 1e-5 * 0.4  # of the path
 
@@ -117,4 +117,4 @@ modes = { count = 2, family = "in-plane-bending", attachment_modes = false }
         {"name": "link2", "link": link("link2", 0.5, "cantilever", 2)},
     ]
     with pytest.raises(library.InputError, match=r'check: expected "link" in body "link1" for "finer"'):
-        solve_spatial(arm(2, bodies=bodies))
+        solve_scene(arm(2, bodies=bodies))

@@ -13,9 +13,9 @@ from ffrobot.actuation.control.linear_model import state_space
 from ffrobot.actuation.control.modes import controllability, observability, robot_modes
 from ffrobot.actuation.control.zeros import zeros
 from ffrobot.common.errors import InputError
-from ffrobot.mbs.model.spatial_model import without_paths
-from ffrobot.mbs.solve.linearisation import SpatialLinearisation
-from ffrobot.mbs.solve.spatial_start import undeformed_posture
+from ffrobot.mbs.model.model import without_paths
+from ffrobot.mbs.solve.linearisation import LinearEquations
+from ffrobot.mbs.solve.start import undeformed_posture
 
 EI, MASS, LENGTH = 30.0, 1.5, 0.8
 RATE = np.sqrt(EI / (MASS * LENGTH**3))  # ω = λ² times this
@@ -26,7 +26,7 @@ def at_rest(robot, points=("link2.tip",)):
     model = without_paths(robot.model)
     state = undeformed_posture(model)
     rest = np.zeros(len(state.v))
-    return state_space(SpatialLinearisation(model, state.q, points).at(0.0, state.q, rest, rest), {})
+    return state_space(LinearEquations(model, state.q, points).at(0.0, state.q, rest, rest), {})
 
 
 def hub_and_beam(ratio, modes=8, damping_ratio=0.0):

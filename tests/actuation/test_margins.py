@@ -14,8 +14,8 @@ from ffrobot.actuation.control.suggestion import (
     suggested_gains,
 )
 from ffrobot.results.file import Results
-from ffrobot.results.spatial import spatial_image
-from ffrobot.run.spatial import solve_spatial
+from ffrobot.results.write import results_image
+from ffrobot.run.solve import solve_scene
 from ffrobot.scene.load import make_scene
 
 INERTIA, T = 0.5, 0.01
@@ -37,7 +37,7 @@ def cache(tmp_path_factory):
 
 def models(scene):
     """The linear models of the scene's only analysis."""
-    return solve_spatial(scene).outcomes["linear"].details.models
+    return solve_scene(scene).outcomes["linear"].details.models
 
 
 def wheel():
@@ -121,7 +121,7 @@ def simulated(rng_seed, gains, sample_time, delay, kick=1e-4):
         np.random.default_rng(rng_seed), 1, 0.2, [0.01], [rest, loop],
         trajectory=[{"name": "still", "joint": "J0", "value": "0.3"}],
     )  # fmt: skip
-    return solve_spatial(arm)
+    return solve_scene(arm)
 
 
 def shaking(record):
@@ -177,14 +177,14 @@ def test_suggested_gains_hold_the_simulated_arm():
     """Those of the linear analysis, at the sample time that it names; its bandwidth is the third that it says."""
     rng = np.random.default_rng(5)
     (plant,) = models(links(rng, 1, 0.2, [0.05], [{"name": "linear", "kind": "linear"}]))
-    solution = solve_spatial(links(np.random.default_rng(5), 1, 0.2, [0.05], [{"name": "linear", "kind": "linear"}]))
+    solution = solve_scene(links(np.random.default_rng(5), 1, 0.2, [0.05], [{"name": "linear", "kind": "linear"}]))
     details = solution.outcomes["linear"].details
     suggestion, sample_time = details.suggested
     J = joint_inertia(plant)[0, 0]
     omega = 2 * np.pi * suggestion.bandwidth
     assert suggestion.proportional["J0"] == pytest.approx(J * omega**2, rel=0.05)  # two digits
     assert suggestion.derivative["J0"] == pytest.approx(2 * J * omega, rel=0.05)
-    text = Results.from_image(spatial_image(solution), solution.scene.path).verdict["linear"].advice[0]
+    text = Results.from_image(results_image(solution), solution.scene.path).verdict["linear"].advice[0]
     assert f"sampled every {1e3 * sample_time:g} ms or faster" in text
     assert f"proportional = {{ J0 = {suggestion.proportional['J0']:.2g} }}" in text
     (lowest, *_) = held_frequencies(plant)
@@ -203,13 +203,13 @@ def test_a_loop_that_diverges_says_why_and_what_to_start_with():
     linear = {"name": "linear", "kind": "linear", "about": "rest", "times": [0.0]}
 
     def arm(loop):
-        return solve_spatial(links(np.random.default_rng(3), 1, 0.2, [0.0], [rest, linear, loop], trajectory=path))
+        return solve_scene(links(np.random.default_rng(3), 1, 0.2, [0.0], [rest, linear, loop], trajectory=path))
 
     solution = arm(loop)
     record = solution.outcomes["loop"].details
     assert record.metrics.verdict == "diverges"
     assert record.margins.radius > 1.0 > record.margins.gain
-    advice = Results.from_image(spatial_image(solution), solution.scene.path).verdict["loop"].advice
+    advice = Results.from_image(results_image(solution), solution.scene.path).verdict["loop"].advice
     assert any("J0: no rotor_inertia to speak of" in text for text in advice)
     assert light_roots(solution.outcomes["linear"].details.models) == ["J0"]
     (start,) = [text for text in advice if text.startswith("start with ")]

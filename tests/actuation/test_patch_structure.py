@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from planar_patches import SCENE, planar_body
 
-from ffrobot.actuation.patches.records import SpatialPztLayout
-from ffrobot.actuation.patches.spatial_patches import placed_patches
-from ffrobot.actuation.patches.structure import structure_effect_in_space, with_patches_in_space
+from ffrobot.actuation.patches.link_patches import placed_patches
+from ffrobot.actuation.patches.records import PztLayout
+from ffrobot.actuation.patches.structure import patched_body, structure_effect_of
 from ffrobot.fe_models.link import cached_modal_body
 
 E, RHO, H, B = 2.068427e11, 7850.0, 0.015, 0.025
@@ -39,11 +39,11 @@ section = {{ shape = "rectangle", height = {height!r}, width = {width!r} }}
 
 def layout(**keys):
     tables = {"count": 10, "length": 0.05, "width": B, "thickness": T_P, "modulus": E_P, "d31": 110e-12}
-    return SpatialPztLayout(body="link", density=RHO_P, **(tables | keys))
+    return PztLayout(body="link", density=RHO_P, **(tables | keys))
 
 
 def with_patches(bare, body, one):
-    return with_patches_in_space(bare, body, placed_patches(SCENE, [one], body))
+    return patched_body(bare, body, placed_patches(SCENE, [one], body))
 
 
 def composite_link(tmp_path, faces, mass, stiffness):
@@ -81,7 +81,7 @@ def test_frequencies_are_those_of_the_composite_link(cantilever, tmp_path, monke
     bare = planar_body(body)
     patched = with_patches(bare, body, layout(face=face, structural=structural))
     reference = composite_link(tmp_path, 2 if face else 1, "mass" in structural, "stiffness" in structural)
-    effect = structure_effect_in_space(bare, patched)
+    effect = structure_effect_of(bare, patched)
     ritz, exact = effect.frequency[1, :5], reference.frequency[:5]
     assert np.all(ritz > exact * (1 - 1e-9))  # Rayleigh's principle
     np.testing.assert_allclose(ritz, exact, rtol=1e-3)

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 from planar_patches import SCENE, bent, layout, modes_in_the_plane, on_link, patches, planar_body, tip_deflection
 
-from ffrobot.actuation.patches.spatial_patches import check_reach, link_patches
+from ffrobot.actuation.patches.link_patches import check_reach, link_patches
 from ffrobot.actuation.patches.voltages import solve_voltages
 from ffrobot.common.errors import InputError
 from ffrobot.fe_models.link import cached_modal_body
 from ffrobot.fe_models.modal_body import OutlinedPatches
-from ffrobot.mbs.model.spatial_masses import with_payload
+from ffrobot.mbs.model.masses import with_payload
 
 EI = 2.068427e11 * 0.025 * 0.015**3 / 12
 C = 63e9 * 110e-12 * 0.025 * (0.75e-3 + 0.015) / 2  # Shabana 2022, Eq. 14

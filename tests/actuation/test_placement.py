@@ -9,8 +9,8 @@ from ffrobot.actuation.control.linear_model import state_space
 from ffrobot.actuation.control.placing import PatchableLink, held_modes, place
 from ffrobot.actuation.control.records import Placement
 from ffrobot.common.errors import InputError
-from ffrobot.mbs.model.spatial_model import build_spatial_model
-from ffrobot.mbs.solve.linearisation import SpatialLinearisation
+from ffrobot.mbs.model.model import build_model
+from ffrobot.mbs.solve.linearisation import LinearEquations
 from ffrobot.scene.load import make_scene
 
 
@@ -25,9 +25,9 @@ def arm(cantilever):
         joint=[{"name": "hub", "type": "revolute", "between": ["ground", "arm.root"]}],
         analysis=[{"name": "linear", "kind": "linear"}],
     )  # fmt: skip
-    model = build_spatial_model(scene, [planar])
+    model = build_model(scene, [planar])
     rest = np.zeros(model.tree.n_v)
-    return modal, planar, state_space(SpatialLinearisation(model, rest).at(0.0, rest, rest, rest), {})
+    return modal, planar, state_space(LinearEquations(model, rest).at(0.0, rest, rest, rest), {})
 
 
 def link_of(modal, planar, count):

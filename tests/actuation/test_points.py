@@ -6,17 +6,17 @@ import numpy as np
 import pytest
 from planar_patches import SCENE, planar_body
 
-from ffrobot.actuation.spatial_points import SpatialActuationPoints, spatial_point_set, with_spatial_points
+from ffrobot.actuation.points import ActuationPoints, make_point_set, with_points
 from ffrobot.common.errors import InputError
-from ffrobot.mbs.model.spatial_body import rigid_body
-from ffrobot.mbs.model.spatial_masses import with_payload
+from ffrobot.mbs.model.body import rigid_body
+from ffrobot.mbs.model.masses import with_payload
 from ffrobot.mbs.scene.space import PLANE
 
 IN_PLANE = [0, 1, 5]  # of force and moment on the frame
 
 
 def point_set(body, planar, **keys):
-    return spatial_point_set(SCENE, SpatialActuationPoints(body="link", **keys), body, planar, PLANE)
+    return make_point_set(SCENE, ActuationPoints(body="link", **keys), body, planar, PLANE)
 
 
 def chosen(body, planar=None, **keys):
@@ -84,7 +84,7 @@ def test_points_of_a_rigid_body_go_by_name():
     rod = rigid_body("link", 1.0, np.array([0.5, 0.0, 0.0]), np.diag([0.06, 0.06, 0.1]), places)
     points = point_set(None, rod)
     assert sorted(points.axes) == ["x", "y", "y"]
-    assert set(with_spatial_points(rod, points).points) >= {"actuation1", "actuation2", "actuation3"}
+    assert set(with_points(rod, points).points) >= {"actuation1", "actuation2", "actuation3"}
     with pytest.raises(InputError, match="expected points of the rigid body by name"):
         point_set(None, rod, axial=(0.5,))
     with pytest.raises(InputError, match="expected points that carry all 3 generalized forces of the body, found 2"):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import ffrobot as library
-from ffrobot.run.spatial import solve_spatial
+from ffrobot.run.solve import solve_scene
 
 GEARED = {"gear_ratio": 80.0, "rotor_inertia": 2e-5}
 
@@ -71,12 +71,12 @@ def three(payload, *later):
         {"name": "tip", "point": "link3.tip", **tip},
         {"name": "hand", "angle": "link3", "value": quintic(START[2], END[2], 1.2)},
     ]
-    return solve_spatial(chain(LENGTHS, HEIGHTS, START, payload, GEARED, trajectory, [run_for(1.2), *later]))
+    return solve_scene(chain(LENGTHS, HEIGHTS, START, payload, GEARED, trajectory, [run_for(1.2), *later]))
 
 
 def one(*later):
     trajectory = [{"name": "tip", "point": "link1.tip", "y": quintic(-0.8 * np.sin(0.2), 0.8 * np.sin(0.5), 1.0)}]
-    return solve_spatial(chain((0.8,), (0.012,), (-0.2,), 0.5, {}, trajectory, [run_for(1.0), *later]))
+    return solve_scene(chain((0.8,), (0.012,), (-0.2,), 0.5, {}, trajectory, [run_for(1.0), *later]))
 
 
 def miss(solution, name, point):
@@ -122,7 +122,7 @@ def test_sag_at_the_start():
     solution = one()
     angle = float(solution.analyses["inverse"].motion.angle("link1")[0])
     held = [{"name": "still", "joint": "J1", "value": f"{angle!r}"}]
-    static = solve_spatial(chain((0.8,), (0.012,), (-0.2,), 0.5, {}, held, [{"name": "inverse", "kind": "static"}]))
+    static = solve_scene(chain((0.8,), (0.012,), (-0.2,), 0.5, {}, held, [{"name": "inverse", "kind": "static"}]))
     tips = [s.analyses["inverse"].motion.point("link1.tip").position[0] for s in (solution, static)]
     assert np.linalg.norm(tips[1] - tips[0]) == pytest.approx(found(solution).at_start, rel=0.01)
 
@@ -144,7 +144,7 @@ def test_what_is_said(tmp_path):
 
 def test_a_joint_path_needs_nothing_besides_motors():
     trajectory = [{"name": "turn", "joint": "J1", "value": "0.3*(1-cos(3*t))"}]
-    result = solve_spatial(chain((0.8,), (0.012,), (0.0,), 0.5, {}, trajectory, [run_for(0.5)])).analyses["inverse"]
+    result = solve_scene(chain((0.8,), (0.012,), (0.0,), 0.5, {}, trajectory, [run_for(0.5)])).analyses["inverse"]
     assert result.actuation.feasibility.unsupplied is None
     assert result.actuation.feasibility.is_feasible
     assert not result.predicted_shift

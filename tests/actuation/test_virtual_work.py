@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from ffrobot.actuation.point_forces import driving_forces_in_space
-from ffrobot.run.spatial import solve_spatial
+from ffrobot.actuation.point_forces import find_driving_forces
+from ffrobot.run.solve import solve_scene
 
 SCENE = """
 name = "two_link"
@@ -94,7 +94,7 @@ def solved_with(link_file, tmp_path_factory):
         patches = "".join(PATCHES.format(body=body, own=pzt) for body in links)
         text = SCENE.format(motors=motors, patches=patches, points=POINTS.format(own=points), **links)
         scene.write_text(text)
-        return solve_spatial(scene)
+        return solve_scene(scene)
 
     return run
 
@@ -132,7 +132,7 @@ def in_plane(result, body):
 
 
 def Q_a_power(result, body):
-    return (driving_forces_in_space(result.run)[body] * velocity(result, body)).sum(axis=1)
+    return (find_driving_forces(result.run)[body] * velocity(result, body)).sum(axis=1)
 
 
 def driving_power(result):

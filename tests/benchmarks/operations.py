@@ -33,10 +33,10 @@ def build_core(folder):
 
 
 def two_link():
-    from ffrobot.run.spatial import prepare_spatial
+    from ffrobot.run.solve import prepare_scene
     from ffrobot.run.watcher import Watcher
 
-    return prepare_spatial(SCENE, Watcher()).model
+    return prepare_scene(SCENE, Watcher()).model
 
 
 def evaluate(core, count):

@@ -12,7 +12,7 @@ import pytest
 
 from ffrobot.bench.evaluation import start_at_rest
 from ffrobot.bench.growth import LINKS, MODES, MODES_IN_CHAINS, chain, evaluation_timer
-from ffrobot.mbs.model.spatial_model import row_values
+from ffrobot.mbs.model.model import row_values
 
 pytestmark = pytest.mark.alone
 

@@ -18,8 +18,8 @@ from ffrobot.bench.evaluation import evaluation_seconds
 from ffrobot.bench.hand_written import STEPS, TIME, HandWritten, general_state
 from ffrobot.common.errors import InputError
 from ffrobot.mbs.analysis.context import Context
-from ffrobot.mbs.analysis.pcid import Pcid, run_spatial_pcid
-from ffrobot.run.spatial import prepare_spatial
+from ffrobot.mbs.analysis.pcid import Pcid, run_pcid
+from ffrobot.run.solve import prepare_scene
 from ffrobot.run.watcher import Watcher
 
 pytestmark = pytest.mark.alone
@@ -30,7 +30,7 @@ ALARM = {"evaluation": 4.6, "pcid": 8.2}
 
 @pytest.fixture(scope="module")
 def two_link(case_folder):
-    return prepare_spatial(case_folder / "scene.toml", Watcher()).model
+    return prepare_scene(case_folder / "scene.toml", Watcher()).model
 
 
 @pytest.fixture(scope="module")
@@ -83,7 +83,7 @@ def test_pcid_ratio(benchmark, two_link, program):
     context = Context(model=two_link, outcomes={}, progress=lambda t: True)
     rounds, outcomes, hand_written = (5 if benchmark.enabled else 3), [], []
     for _ in range(rounds):
-        outcomes.append(run_spatial_pcid(context, analysis))
+        outcomes.append(run_pcid(context, analysis))
         hand_written.append(program(1, STEPS)[2:])
     force = -outcomes[0].motion.multipliers[-1]
     peak = 67.0  # N, of the tip force (cases/two_link)

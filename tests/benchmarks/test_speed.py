@@ -35,9 +35,9 @@ from ffrobot.bench.evaluation import evaluation_seconds, start_at_rest
 from ffrobot.bench.hand_written import TIME, general_state
 from ffrobot.mbs import _core
 from ffrobot.mbs.analysis.context import Context
-from ffrobot.mbs.analysis.fcid import Fcid, run_spatial_fcid
-from ffrobot.mbs.analysis.pcid import run_spatial_pcid
-from ffrobot.run.spatial import prepare_spatial
+from ffrobot.mbs.analysis.fcid import Fcid, run_fcid
+from ffrobot.mbs.analysis.pcid import run_pcid
+from ffrobot.run.solve import prepare_scene
 from ffrobot.run.watcher import Watcher
 
 pytestmark = pytest.mark.alone
@@ -56,7 +56,7 @@ def evaluation(model):
 
 def context_of(scene):
     """What analyses of the scene start from."""
-    model = prepare_spatial(scene, Watcher()).model
+    model = prepare_scene(scene, Watcher()).model
     return Context(model=model, outcomes={}, progress=lambda t: True)
 
 
@@ -94,7 +94,7 @@ def test_right_hand_side(benchmark, scene):
 
 def test_pcid_of_one_second(benchmark, scene):
     context = context_of(scene)
-    outcome = benchmark(run_spatial_pcid, context, context.model.scene.analysis[0])
+    outcome = benchmark(run_pcid, context, context.model.scene.analysis[0])
     benchmark.extra_info |= {"steps": outcome.statistics.steps, "evaluations": outcome.statistics.evaluations}
     assert outcome.status == "completed"
     assert outcome.statistics.wall_seconds < 5 * outcome.statistics.evaluations * evaluation(context.model)
@@ -104,10 +104,10 @@ def test_pcid_of_one_second(benchmark, scene):
 def test_fcid_of_1000_outputs(benchmark, scene, shape, evaluations):
     context = context_of(scene)
     analysis = Fcid(name="fcid", kind="fcid", shape=shape, end=1.0, output_step=0.001)
-    outcome = benchmark(run_spatial_fcid, context, analysis)
+    outcome = benchmark(run_fcid, context, analysis)
     benchmark.extra_info |= {"solver": outcome.statistics.wall_seconds}
     assert len(outcome.time) == 1001
-    again = min(run_spatial_fcid(context, analysis).statistics.wall_seconds for _ in range(3))
+    again = min(run_fcid(context, analysis).statistics.wall_seconds for _ in range(3))
     assert again < evaluations * 1001 * evaluation(context.model)
 
 

@@ -23,10 +23,10 @@ from record import record
 import ffrobot
 from ffrobot.common.arrays import Array
 from ffrobot.run.modal_error import modal_errors
+from ffrobot.run.mode_choice import reported_modes
 from ffrobot.run.mode_search import difference
-from ffrobot.run.spatial import solve_spatial
-from ffrobot.run.spatial_mode_choice import reported_in_space
-from ffrobot.run.spatial_solution import SpatialSolution
+from ffrobot.run.solution import Solution
+from ffrobot.run.solve import solve_scene
 from ffrobot.run.watcher import Watcher
 
 AIM = 2e-3  # of each quantity's peak
@@ -80,20 +80,20 @@ def _mass(link: dict[str, Any]) -> float:
     return float(link["material"]["density"] * geometry["length"] * section["height"] * section["width"])
 
 
-def solved(arm: dict[str, Any], modes: dict[str, Any], kept: int | None = None) -> SpatialSolution:
+def solved(arm: dict[str, Any], modes: dict[str, Any], kept: int | None = None) -> Solution:
     """The arm with `[modes]` of all links, of which bodies keep `kept`."""
     table = {"family": "in-plane-bending", **modes}
     keep = {"modes": kept} if kept else {}
     bodies = [body | {"link": body["link"] | {"modes": table}} | keep for body in arm["body"]]
-    return solve_spatial(ffrobot.make_scene(**(arm | {"body": bodies})), Watcher())
+    return solve_scene(ffrobot.make_scene(**(arm | {"body": bodies})), Watcher())
 
 
-def quantities(solution: SpatialSolution) -> Any:
+def quantities(solution: Solution) -> Any:
     """Everything of the run whose error counts."""
-    return reported_in_space(solution.analyses["s"])
+    return reported_modes(solution.analyses["s"])
 
 
-def largest_deflection(solution: SpatialSolution, found: Any) -> float:
+def largest_deflection(solution: Solution, found: Any) -> float:
     """Of any link, over its length."""
     lengths = {name: body.modal.length for name, body in solution.bodies.items()}
     return max(float(np.abs(u).max()) / lengths[name.split(".")[0]] for name, u in found["deflections"].items())

@@ -18,18 +18,18 @@ from random_robots import random_scene
 from record import record
 
 from ffrobot.common.errors import FfrobotError, InputError
+from ffrobot.run.mode_choice import reported_modes
 from ffrobot.run.mode_search import difference
-from ffrobot.run.spatial import solve_spatial
-from ffrobot.run.spatial_mode_choice import reported_in_space
-from ffrobot.run.spatial_solution import SpatialSolution
+from ffrobot.run.solution import Solution
+from ffrobot.run.solve import solve_scene
 from ffrobot.run.watcher import Watcher
 from ffrobot.scene.load import load_scene
-from ffrobot.scene.spatial import SpatialScene
+from ffrobot.scene.scene import Scene
 
 NOTABLE = 0.01  # change of a mode's stiffness from which on "auto" switches it on
 
 
-def scenes(asked: argparse.Namespace) -> Iterator[tuple[str, SpatialScene]]:
+def scenes(asked: argparse.Namespace) -> Iterator[tuple[str, Scene]]:
     """Random robots, then the cases."""
     for number in range(asked.count):
         kind, scene = random_scene(asked.seed, number)
@@ -41,31 +41,31 @@ def scenes(asked: argparse.Namespace) -> Iterator[tuple[str, SpatialScene]]:
                 yield path.parent.name, load_scene(path)
 
 
-def solved(scene: SpatialScene, stiffening: bool) -> SpatialSolution | str:
+def solved(scene: Scene, stiffening: bool) -> Solution | str:
     """The solution as far as it came, or why there is none."""
-    kept: list[SpatialSolution] = []
+    kept: list[Solution] = []
     try:
-        return solve_spatial(scene.model_copy(update={"geometric_stiffening": stiffening}), Watcher(), kept.append)
+        return solve_scene(scene.model_copy(update={"geometric_stiffening": stiffening}), Watcher(), kept.append)
     except InputError:
         return "rejected"
     except FfrobotError as error:
         return kept[-1] if kept else str(error).splitlines()[0]
 
 
-def ends(solution: SpatialSolution | str) -> dict[str, str]:
+def ends(solution: Solution | str) -> dict[str, str]:
     """How each analysis ended."""
     if isinstance(solution, str):
         return {}
     return {name: result.status for name, result in solution.analyses.items()}
 
 
-def changes(on: SpatialSolution, off: SpatialSolution) -> dict[str, float]:
+def changes(on: Solution, off: Solution) -> dict[str, float]:
     """By kind, the largest difference over all analyses that ended at the same time."""
     found: dict[str, float] = {}
     for name in on.analyses.keys() & off.analyses.keys():
         one, other = on.analyses[name], off.analyses[name]
         if np.array_equal(one.run.time, other.run.time):
-            for kind, value in difference(reported_in_space(one), reported_in_space(other)).items():
+            for kind, value in difference(reported_modes(one), reported_modes(other)).items():
                 found[kind] = max(found.get(kind, 0.0), value)
     return found
 

@@ -19,13 +19,13 @@ import numpy as np
 from judging import largest_errors, nothing_of_rounding, peaks, record_of_run, with_body_velocity, with_slow_rates
 from random_robots import random_scene
 from record import record
-from spatial_robots import random_spatial_scene
+from robots_3d import random_spatial_scene
 
 import ffrobot
 from ffrobot.common.errors import FfrobotError
-from ffrobot.mbs.solve.spatial_start import undeformed_posture
-from ffrobot.mbs.solve.vibration import vibrations_in_space, without_rows
-from ffrobot.run.spatial import prepare_spatial
+from ffrobot.mbs.solve.start import undeformed_posture
+from ffrobot.mbs.solve.vibration import vibrations_of, without_rows
+from ffrobot.run.solve import prepare_scene
 from ffrobot.run.watcher import Watcher
 
 EXACT = 1e-10  # the least that a scene may ask for
@@ -56,15 +56,15 @@ KINDS = {
 def planar_scene(seed, number, analyses):
     """Its kind and scene, with an end before the highest vibration has gone through `MOST_RADIANS`."""
     kind, scene = random_scene(seed, number)
-    model, (analysis,) = prepare_spatial(scene, Watcher()).model, scene.analysis
-    top = float(vibrations_in_space(model, without_rows(model), 0.0, undeformed_posture(model).q).frequency[-1])
+    model, (analysis,) = prepare_scene(scene, Watcher()).model, scene.analysis
+    top = float(vibrations_of(model, without_rows(model), 0.0, undeformed_posture(model).q).frequency[-1])
     shorter = min(1.0, MOST_RADIANS / (top * analysis.end))
     times = {"end": shorter * analysis.end, "output_step": shorter * analysis.output_step, "max_steps": MOST_STEPS}
     copies = [times | {"name": name, "tolerance": at, "integrator": by} for name, at, by in analyses]
     return kind, scene.model_copy(update={"analysis": tuple(analysis.model_copy(update=keys) for keys in copies)})
 
 
-def spatial_scene(seed, number, analyses):
+def validated_scene(seed, number, analyses):
     """Its kind and scene."""
     return random_spatial_scene(seed, number, analyses, MOST_STEPS)
 
@@ -104,7 +104,7 @@ def try_robot(seed, number, integrators=None, *, space=False):
     runs = [(f"{by}{k}", float(f"{at:.2g}"), by) for k, (by, at) in enumerate(drawn) if by in (integrators or of_all)]
     found = {"seed": seed, "number": number, "space": space, "runs": []}
     try:
-        make = spatial_scene if space else planar_scene
+        make = validated_scene if space else planar_scene
         found["kind"], scene = make(seed, number, [("exact", EXACT, "dop853"), *runs])
         results = ffrobot.solve(scene)
     except FfrobotError as error:

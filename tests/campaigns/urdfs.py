@@ -25,8 +25,8 @@ from ffrobot.exchange.urdf.import_urdf import import_urdf
 from ffrobot.exchange.urdf.names import FORBIDDEN
 from ffrobot.exchange.urdf.toml import toml_text
 from ffrobot.present.progress import Display
-from ffrobot.results.spatial import write_spatial_results
-from ffrobot.run.spatial import solve_spatial
+from ffrobot.results.write import write_results
+from ffrobot.run.solve import solve_scene
 
 EQUAL = 1e-10  # of the largest moment
 MOST = 15  # joints that move at once
@@ -48,7 +48,7 @@ def difference(urdf, folder, rng):
     scene.write_text(with_motion(text, *({called[name]: part[name] for name in moving} for part in motion)))
     results = folder / "results.h5"
     with Display() as display:
-        write_spatial_results(solve_spatial(scene, display), results)
+        write_results(solve_scene(scene, display), results)
     expected = moments(urdf.read_bytes(), *({**part, **dict.fromkeys(still, 0.0)} for part in motion))
     with h5py.File(results) as file:
         found = np.array([file[f"inverse/joints/{called[name]}/moment"][0] for name in moving])

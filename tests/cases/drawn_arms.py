@@ -4,7 +4,7 @@ import numpy as np
 import tomli_w
 from scipy.spatial.transform import Rotation
 
-from ffrobot.run.spatial import prepare_spatial
+from ffrobot.run.solve import prepare_scene
 from ffrobot.run.watcher import Watcher
 
 FAMILIES = ["in-plane-bending", "out-of-plane-bending", "torsion", "axial"]
@@ -114,7 +114,7 @@ def posed(scene, postures, tool, end, path, tolerance=1e-6):
     """
     scene |= {"initial": {"state": "static", "joints": postures[0]}, "analysis": [{"name": "s", "kind": "static"}]}
     path.write_text(tomli_w.dumps(scene), encoding="utf-8")
-    tree = prepare_spatial(path, Watcher()).model.tree
+    tree = prepare_scene(path, Watcher()).model.tree
     places = []
     for posture in postures:
         q = tree.at_rest({name: [value] for name, value in posture.items()})[None]

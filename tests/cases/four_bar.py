@@ -1,7 +1,7 @@
 """A four-bar linkage of rigid bars in the plane, as a planar scene and as one in space, with any keys of its joints."""
 
 import numpy as np
-from planar_in_space import joint_keys, rigid_keys
+from planar_tables import joint_keys, rigid_keys
 
 from ffrobot.mbs.fields.spelling import place
 

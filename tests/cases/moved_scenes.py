@@ -8,9 +8,9 @@ import tomllib
 
 import numpy as np
 import scene_of
+from checkpoint_scenes import rpy
 from rotations import exponential, logarithm
 from spatial_checkpoints import load
-from spatial_scenes import rpy
 
 MIRROR = np.diag([1.0, -1.0, 1.0])
 

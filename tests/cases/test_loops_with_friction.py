@@ -6,11 +6,11 @@ from four_bar import SIDES, closed, in_space, planar
 from scipy.interpolate import CubicSpline
 
 import ffrobot
-from ffrobot.actuation.control.spatial_rigid_arm import SpatialRigidArm
-from ffrobot.mbs.model import spatial_system
-from ffrobot.mbs.model.spatial_model import build_spatial_model
-from ffrobot.mbs.solve.spatial_start import undeformed_posture
-from ffrobot.run.spatial_bodies import load_spatial_bodies
+from ffrobot.actuation.control.rigid_arm import RigidArm
+from ffrobot.mbs.model import system
+from ffrobot.mbs.model.model import build_model
+from ffrobot.mbs.solve.start import undeformed_posture
+from ffrobot.run.bodies import load_bodies
 
 ROUGH = {"viscous_friction": 0.3, "coulomb_friction": 0.2, "friction_speed": 0.05}
 LOADS = [{"joint": "C", "moment": "0.7*sin(5*t)"}, {"joint": "B", "moment": "0.4 + t"}]
@@ -77,7 +77,7 @@ def test_the_plane_is_that_of_space(monkeypatch):
     """The same cut solved by the core in the plane and by that in space."""
     scene = ffrobot.make_scene(**in_space(of_joints("ABDC"), ANALYSES[:3], load=LOADS))
     plane = ffrobot.solve(scene)
-    monkeypatch.setattr(spatial_system, "in_plane", lambda *_: None)
+    monkeypatch.setattr(system, "in_plane", lambda *_: None)
     space = ffrobot.solve(scene)
     for name in ("inverse/joints/A/moment", "released/joints/C/rate", "released/joints/C/reaction"):
         close(plane[name], space[name])
@@ -110,9 +110,9 @@ def test_computed_torque_knows_the_friction_of_the_joint_that_is_cut(cut):
     scene = ffrobot.make_scene(**in_space(own, [INVERSE]))
     results = ffrobot.solve(scene)
     t, moment, rate = (results[f"inverse/{key}"][30] for key in ("time", "joints/A/moment", "joints/A/rate"))
-    model = build_spatial_model(scene, [body.spatial for body in load_spatial_bodies(scene, lambda _: None)])
+    model = build_model(scene, [body.spatial for body in load_bodies(scene, lambda _: None)])
     assert [joint.name for joint in model.tree.loops] == [cut]
-    arm = SpatialRigidArm(model, undeformed_posture(model).q)
+    arm = RigidArm(model, undeformed_posture(model).q)
     found = arm.moments(*(np.array([x]) for x in (1 + 0.3 * (1 - np.cos(3 * t)), rate, 2.7 * np.cos(3 * t))))
     np.testing.assert_allclose(found, moment, rtol=1e-8)
 

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from ffrobot.fe_models.modal_body_file import read_modal_body
-from ffrobot.mbs.model.spatial_body import from_modal_body
+from ffrobot.mbs.model.body import from_modal_body
 
 # E A = 5.03e6 N, E I = 566.6 N·m², ρ A = 0.2019 kg/m
 LINK = """

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from rigid_robots import ROBOTS, random_urdf
 
-from ffrobot.mbs.model.spatial_known_motion import KnownStates, required_forces
-from ffrobot.mbs.model.spatial_model import build_spatial_model
-from ffrobot.mbs.model.spatial_system import SpatialSystem
-from ffrobot.run.spatial_bodies import load_spatial_bodies
+from ffrobot.mbs.model.known_motion import KnownStates, required_forces
+from ffrobot.mbs.model.model import build_model
+from ffrobot.mbs.model.system import MultibodySystem
+from ffrobot.run.bodies import load_bodies
 from ffrobot.scene.load import load_scene
 
 STATES = 5
@@ -42,9 +42,9 @@ def robot(request, tmp_path_factory, ffrobot):
         text + '[[analysis]]\nname = "falls"\nkind = "forward"\nend = 1.0\noutput_step = 1.0\ntolerance = 1e-6\n'
     )
     scene = load_scene(path)
-    model = build_spatial_model(scene, [body.spatial for body in load_spatial_bodies(scene, lambda _: None)])
+    model = build_model(scene, [body.spatial for body in load_bodies(scene, lambda _: None)])
     motion = Motion(*rng.uniform(-1, 1, (4, STATES, model.tree.n_v)))
-    return urdf, SpatialSystem(model), motion
+    return urdf, MultibodySystem(model), motion
 
 
 def close(found, expected):

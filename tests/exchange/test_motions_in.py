@@ -9,7 +9,7 @@ from ffrobot import InputError
 from ffrobot.common.validation import validate
 from ffrobot.exchange.motion.read_motion import read_motion
 from ffrobot.mbs.fields.waypoints import load_waypoints
-from ffrobot.mbs.scene.spatial.trajectories import SpatialTrajectory
+from ffrobot.mbs.scene.trajectories import Trajectory
 
 ROWS = [(0.0, 0.1, -0.4), (0.5, 0.3, -0.2), (1.25, 0.2, 0.6)]
 EPOCH = 1_700_000_000
@@ -56,7 +56,7 @@ def test_what_is_no_column_of_times(header, tmp_path):
 def test_the_column_of_a_joint(names, column, tmp_path):
     write(tmp_path / "path.csv", f"t,{names}", ROWS)
     keys = {"name": "bend", "joint": "knee", "waypoints": "path.csv"}
-    trajectory = validate(SpatialTrajectory, keys, tmp_path / "scene.toml")
+    trajectory = validate(Trajectory, keys, tmp_path / "scene.toml")
     sampled = trajectory.components["value"].sample(np.array([0.0, 0.5, 1.25]))[0]
     np.testing.assert_allclose(sampled, [row[1 + column] for row in ROWS], rtol=0, atol=1e-14)
 
@@ -64,7 +64,7 @@ def test_the_column_of_a_joint(names, column, tmp_path):
 def test_a_table_without_the_joint(tmp_path):
     write(tmp_path / "path.csv", "t,hip,knee", ROWS)
     with pytest.raises(InputError, match=r'header t,value or t,JOINT, found "t,hip,knee"'):
-        validate(SpatialTrajectory, {"name": "n", "joint": "toe", "waypoints": "path.csv"}, tmp_path / "scene.toml")
+        validate(Trajectory, {"name": "n", "joint": "toe", "waypoints": "path.csv"}, tmp_path / "scene.toml")
 
 
 def test_rows_twice_and_gaps(tmp_path):

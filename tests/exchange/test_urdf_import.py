@@ -13,7 +13,7 @@ from ffrobot.common.validation import validate
 from ffrobot.exchange.urdf.import_urdf import import_urdf
 from ffrobot.exchange.urdf.names import Names
 from ffrobot.exchange.urdf.scene import rpy_of
-from ffrobot.mbs.scene.spatial.mechanism import SpatialMechanismKeys
+from ffrobot.mbs.scene.mechanism import MechanismKeys
 
 INERTIAL = '<inertial><mass value="2"/><inertia ixx="0.02" ixy="0" ixz="0" iyy="0.02" iyz="0" izz="0.01"/></inertial>'
 
@@ -45,7 +45,7 @@ def imported(tmp_path, ffrobot):
         assert done.returncode == 0, done.stderr
         scene = tmp_path / "scene" / "scene.toml"
         keys = tomllib.loads(scene.read_text())
-        validate(SpatialMechanismKeys, keys, scene)
+        validate(MechanismKeys, keys, scene)
         return keys, done.stdout
 
     return run

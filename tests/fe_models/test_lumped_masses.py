@@ -8,8 +8,8 @@ from ffrobot.fe_models.link import make_link
 from ffrobot.fe_models.modal_body import Interface
 from ffrobot.fe_models.modal_body.invariants import Invariants
 from ffrobot.fe_models.modal_body.lumped_masses import Lump, with_lumped_loads, with_lumped_masses
-from ffrobot.mbs.model.spatial_body import from_modal_body
-from ffrobot.mbs.model.spatial_masses import with_payload
+from ffrobot.mbs.model.body import from_modal_body
+from ffrobot.mbs.model.masses import with_payload
 
 EI, RHO_A, L = 2.068427e11 * 0.025 * 0.015**3 / 12, 7850.0 * 0.015 * 0.025, 1.0
 

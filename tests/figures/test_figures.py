@@ -115,7 +115,7 @@ def test_wrong_results_are_refused(tmp_path):
 
 
 def test_matplotlib_is_loaded_for_plotting_only():
-    program = "import sys, ffrobot.cli, ffrobot.run.spatial_solution; print('matplotlib' in sys.modules)"
+    program = "import sys, ffrobot.cli, ffrobot.run.solution; print('matplotlib' in sys.modules)"
     run = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
     assert run.stdout.strip() == "False"
 

@@ -11,10 +11,10 @@ from affine_fields import affine_motions, first_moment
 from tree_accelerations import Accelerated
 
 from ffrobot.common.arrays import Array
-from ffrobot.mbs.model.spatial_cut import measured
-from ffrobot.mbs.model.spatial_transmission import gear_forces, resistance, rotor
-from ffrobot.mbs.model.spatial_tree import Section
-from ffrobot.mbs.quantities.spatial_energy import Energies, Momentum
+from ffrobot.mbs.model.cut import measured
+from ffrobot.mbs.model.transmission import gear_forces, resistance, rotor
+from ffrobot.mbs.model.tree import Section
+from ffrobot.mbs.quantities.energy import Energies, Momentum
 
 
 def accelerated(motion) -> Accelerated:

@@ -3,13 +3,13 @@
 from dataclasses import dataclass
 
 import numpy as np
-from spatial_scenes import as_scene, coordinates, rpy, tree_model
+from checkpoint_scenes import as_scene, coordinates, rpy, tree_model
 from spatial_trees import Tree, random_tree
 
 from ffrobot.mbs import _core
-from ffrobot.mbs.model.spatial_system import SpatialSystem
-from ffrobot.mbs.quantities.spatial_motion import SpatialMotion
-from ffrobot.mbs.scene.spatial.loads import SpatialLoad
+from ffrobot.mbs.model.system import MultibodySystem
+from ffrobot.mbs.quantities.motion import RobotMotion
+from ffrobot.mbs.scene.loads import Load
 
 FRICTION = {"viscous_friction": 0.4, "coulomb_friction": 0.7, "friction_speed": 0.3}
 ROTOR = {"rotor_inertia": 3e-3, "gear_ratio": 4.0}
@@ -36,7 +36,7 @@ class ClosedChain:
     def model(self, cut):
         """Cut at a joint, by name."""
         order = [*(name for name in self.tables if name != cut), cut]
-        loads = [SpatialLoad(joint=name, moment=_moments(table["type"])) for name, table in self.tables.items()]
+        loads = [Load(joint=name, moment=_moments(table["type"])) for name, table in self.tables.items()]
         initial = {"joints": {name: values.tolist() for name, values in self.joints.items()}}
         model = tree_model(self.tree, [self.tables[name] for name in order], initial, load=loads)
         assert [joint.name for joint in model.tree.loops] == [cut]
@@ -82,7 +82,7 @@ def _moments(type_):
 
 def evaluated(model, q, v):
     """The motion of one instant at q, v, as the core finds it under friction and loads."""
-    system = SpatialSystem(model)
+    system = MultibodySystem(model)
     run = _core.tree_outputs(system.core, system.scene, [NOW], np.concatenate([q, v])[None])
     multipliers = run.multipliers * system.row_signs
-    return SpatialMotion(model, np.array([NOW]), q[None], v[None], run.accelerations, multipliers)
+    return RobotMotion(model, np.array([NOW]), q[None], v[None], run.accelerations, multipliers)

@@ -1,6 +1,6 @@
 """Arms whose links have the damping ratio RATIO, of their own modes or of the robot's vibrations."""
 
-from planar_in_space import joint_keys
+from planar_tables import joint_keys
 
 import ffrobot
 from ffrobot.mbs.fields.spelling import place

@@ -12,8 +12,8 @@ from ffrobot.mbs import _core
 from ffrobot.mbs._core import TimeFunction
 from ffrobot.mbs.analysis.forward import Forward
 from ffrobot.mbs.analysis.pcid import Pcid
-from ffrobot.mbs.model.spatial_drives import Drive
-from ffrobot.mbs.model.spatial_model import SpatialModel, build_spatial_model
+from ffrobot.mbs.model.drives import Drive
+from ffrobot.mbs.model.model import Model, build_model
 from ffrobot.scene.load import make_scene
 
 PLACEHOLDER = {"mass": 1.0, "inertia": 1.0, "center": (0.0, 0.0)}  # the bodies themselves are passed beside the scene
@@ -53,8 +53,8 @@ class Robot:
         return next(body for body in self.bodies if body.name == name)
 
     @cached_property
-    def model(self) -> SpatialModel:
-        model = build_spatial_model(self.scene, [in_3d(body) for body in self.bodies])
+    def model(self) -> Model:
+        model = build_model(self.scene, [in_3d(body) for body in self.bodies])
         return replace(model, modal_loads=tuple(_drive(model, load) for load in self.modal_loads))
 
     @property

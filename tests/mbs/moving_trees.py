@@ -1,12 +1,12 @@
 """Random trees in space that move: one instant of their motion by the recursion."""
 
 import numpy as np
-from spatial_scenes import as_scene, coordinates, tree_model
+from checkpoint_scenes import as_scene, coordinates, tree_model
 from spatial_trees import random_tree
 
-from ffrobot.mbs.model.spatial_model import row_values
-from ffrobot.mbs.model.spatial_system import SpatialSystem
-from ffrobot.mbs.quantities.spatial_motion import SpatialMotion
+from ffrobot.mbs.model.model import row_values
+from ffrobot.mbs.model.system import MultibodySystem
+from ffrobot.mbs.quantities.motion import RobotMotion
 
 SMALL = 0.01  # modal coordinates: sections turn by about 0.1 rad
 NOW = np.zeros(1)
@@ -17,7 +17,7 @@ def moving(rng, types, kinds, loops=0):
     tree = random_tree(rng, types, kinds, chain=True, size=SMALL, loops=loops)
     plain, tables = as_scene(tree, False)
     model, mechanism = tree_model(plain, tables), plain.mechanism()
-    system = SpatialSystem(model)
+    system = MultibodySystem(model)
     q = model.tree.at_rest(coordinates(model, plain, False))
     for node in model.tree.nodes:
         q[node.p_q] = mechanism.coordinates.parts(tree.q, node.body.name)[2]
@@ -27,4 +27,4 @@ def moving(rng, types, kinds, loops=0):
     if len(model.rows):
         system.core.keep_independent_rows(q, v)
     a, multipliers = system.core.evaluate(q, v, np.zeros(len(model.rows)), None, None)
-    return SpatialMotion(model, NOW, q[None], v[None], a[None], multipliers[None]), system
+    return RobotMotion(model, NOW, q[None], v[None], a[None], multipliers[None]), system

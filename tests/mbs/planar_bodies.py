@@ -13,9 +13,9 @@ import numpy as np
 
 from ffrobot.common.arrays import Array
 from ffrobot.fe_models.modal_body import ModalBody
+from ffrobot.mbs.model.body import Body, BodyPoint
 from ffrobot.mbs.model.projection import projected
-from ffrobot.mbs.model.spatial_body import SpatialBody, SpatialPoint
-from ffrobot.mbs.model.spatial_stiffening import SpatialStiffening
+from ffrobot.mbs.model.stiffening import Stiffening
 
 NEGLIGIBLE = 1e-12
 
@@ -248,7 +248,7 @@ def transformed(body: PlanarBody, T: Array, stiffness: Array) -> PlanarBody:
     )
 
 
-def in_3d(body: PlanarBody) -> SpatialBody:
+def in_3d(body: PlanarBody) -> Body:
     """The body whose motion in z = 0 is that of `body`; what it is across the plane, nothing in it sees."""
     none, about_z = np.zeros((3, body.n_modes)), np.array([0.0, 0.0, 1.0])[:, None]
     stretch, turn = np.diag([0.5, 0.5, 0.0]), np.array([[0.0, 0.5, 0.0], [-0.5, 0.0, 0.0], [0.0, 0.0, 0.0]])
@@ -260,17 +260,17 @@ def in_3d(body: PlanarBody) -> SpatialBody:
         return np.concatenate([x_y, np.zeros_like(x_y[:1])])
 
     points = {
-        label: SpatialPoint(vectors(at.position), vectors(at.translation), about_z * at.rotation)
+        label: BodyPoint(vectors(at.position), vectors(at.translation), about_z * at.rotation)
         for label, at in body.points.items()
     }
     stiffening, n = body.stiffening, body.n_modes
     if stiffening is not None:
         known = {label: np.array([K[0], K[1], *np.zeros((3, n, n)), K[2]]) for label, K in stiffening.K_points.items()}
-        stiffening = SpatialStiffening(
+        stiffening = Stiffening(
             vectors(stiffening.K_s), fields(stiffening.by_affine_fields[2], stiffening.K_h), MappingProxyType(known),
             fields(stiffening.rotary, 0.0 * stiffening.rotary),
         )  # fmt: skip
-    found = SpatialBody(
+    found = Body(
         name=body.name, mass=body.mass, first_moment=vectors(body.first_moment),
         second_moment=fields(np.array(body.inertia), np.array(0.0)), S_bar=vectors(body.S_bar),
         I_bar=fields(body.j, body.h), S_bar_kl=fields(body.m_xy, body.S_tilde), J_spin=0.0, h_spin=none[0],

@@ -10,13 +10,13 @@ from ffrobot.mbs import _core
 from ffrobot.mbs.analysis.context import Context
 from ffrobot.mbs.analysis.outcome import Motion, Outcome
 from ffrobot.mbs.analysis.static import Static
-from ffrobot.mbs.model.spatial_model import row_values, target_rates
-from ffrobot.mbs.model.spatial_system import SpatialSystem
-from ffrobot.mbs.quantities.spatial_energy import totals
-from ffrobot.mbs.quantities.spatial_motion import SpatialMotion
-from ffrobot.mbs.quantities.spatial_reactions import reactions
+from ffrobot.mbs.model.model import row_values, target_rates
+from ffrobot.mbs.model.system import MultibodySystem
+from ffrobot.mbs.quantities.energy import totals
+from ffrobot.mbs.quantities.motion import RobotMotion
+from ffrobot.mbs.quantities.reactions import reactions
 from ffrobot.mbs.scene.analysis import IntegratedAnalysis
-from ffrobot.mbs.solve.spatial_start import undeformed_posture
+from ffrobot.mbs.solve.start import undeformed_posture
 
 
 class JointForces(NamedTuple):
@@ -43,7 +43,7 @@ class Seen:
     @cached_property
     def motion(self):
         run = self.outcome
-        return SpatialMotion(
+        return RobotMotion(
             run.model, run.time, run.q, run.v, run.a, run.multipliers, run.forces.required, run.motion.is_at_rest,
             run.forces.applied, run.forces.commanded,
         )  # fmt: skip
@@ -140,7 +140,7 @@ def energies(seen):
 
 def evaluated(robot, t, q, v):
     """The accelerations and multipliers that the core finds in the plane, in a state of the tree, seen as a run."""
-    system = SpatialSystem(robot.model)
+    system = MultibodySystem(robot.model)
     core, scene, _ = system.integrated
     found = _core.tree_outputs(core, scene, [t], np.concatenate([q, v])[None])
     motion = Motion(np.array([t]), q[None], v[None], found.accelerations, system.multipliers(found.multipliers))

@@ -4,13 +4,13 @@ from dataclasses import replace
 from types import MappingProxyType, SimpleNamespace
 
 import numpy as np
+from checkpoint_scenes import rpy, tree_model
 from material_points import random_cloud
 from rotations import random_rotation, rotation_about
-from spatial_scenes import rpy, tree_model
 from spatial_trees import random_beam, random_rigid, random_solid, stiffened
 
+from ffrobot.mbs.model.body import Body, BodyPoint, from_modal_body
 from ffrobot.mbs.model.projection import projected
-from ffrobot.mbs.model.spatial_body import SpatialBody, SpatialPoint, from_modal_body
 
 TYPES = ("revolute", "prismatic", "planar", "weld")
 
@@ -48,7 +48,7 @@ def in_other_axes(body, R):
     T = R.T
     tensor = "ai,bj,ij...->ab..."
     points = {
-        label: SpatialPoint(T @ at.position, T @ at.translation, T @ at.rotation) for label, at in body.points.items()
+        label: BodyPoint(T @ at.position, T @ at.translation, T @ at.rotation) for label, at in body.points.items()
     }
     return replace(
         body, first_moment=T @ body.first_moment, second_moment=T @ body.second_moment @ T.T, S_bar=T @ body.S_bar,
@@ -66,7 +66,7 @@ def planar_model(rng, types, kinds=tuple(KINDS), normal=None, joint_keys=None, *
     bodies, tables, normals = [], [], {"ground": n}
     for k, type_ in enumerate(types, 1):
         kind = kinds[rng.integers(len(kinds))]
-        body: SpatialBody = KINDS[kind](rng, f"b{k}")
+        body: Body = KINDS[kind](rng, f"b{k}")
         own = np.array([0.0, 0.0, 1.0])
         if kind in ("rigid", "solid"):
             R = random_rotation(rng)

@@ -8,8 +8,8 @@ from tree_accelerations import Accelerated, row_accelerations
 
 from ffrobot.common.arrays import Array
 from ffrobot.common.rotations import left_jacobian
-from ffrobot.mbs.model.spatial_model import row_values, target_rates
-from ffrobot.mbs.solve.spatial_posture import solve_postures
+from ffrobot.mbs.model.model import row_values, target_rates
+from ffrobot.mbs.solve.posture import solve_postures
 
 RANK = 1e-10  # of the largest singular value
 

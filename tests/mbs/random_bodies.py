@@ -1,7 +1,7 @@
 """Random spatial bodies of material points, their joints, states and rows."""
 
 import numpy as np
-from points_in_space import Body, J, r
+from points_3d import Body, J, r
 
 JOINTS = [J.revolute, J.prismatic, J.screw, J.cylindrical, J.universal, J.spherical, J.planar, J.weld, J.free]
 GRAVITY = np.array([0.3, 1.0, -9.81])

@@ -3,8 +3,8 @@
 import numpy as np
 
 from ffrobot.common.rotations import left_jacobian
-from ffrobot.mbs.model.spatial_rows import turning_axis
-from ffrobot.mbs.model.spatial_wrench import Wrench, along_joint
+from ffrobot.mbs.model.rows import turning_axis
+from ffrobot.mbs.model.wrench import Wrench, along_joint
 
 
 def row_wrenches(tree, row, size, q, times, frames):

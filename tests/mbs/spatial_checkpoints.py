@@ -13,7 +13,7 @@ from spatial_rows import UNIT, About, Along, Dot, Driven, Ground, Joint, Section
 
 from ffrobot.fe_models.link import cached_modal_body
 from ffrobot.mbs.fields.expressions import parse_expression
-from ffrobot.mbs.model.spatial_body import from_modal_body, rigid_body
+from ffrobot.mbs.model.body import from_modal_body, rigid_body
 
 FOLDER = Path(scene_of.__file__).parent
 

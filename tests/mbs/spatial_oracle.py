@@ -1,6 +1,6 @@
 """The equations in space: absolute coordinates, dense matrices, written to be read, not to be fast.
 
-Shares nothing with the compiled core but `SpatialBody`. Of one body after the other q = (R, e, p) with the quaternion e
+Shares nothing with the compiled core but `Body`. Of one body after the other q = (R, e, p) with the quaternion e
 (scalar first) and v = (Ṙ, ω̄, ṗ) with ω̄ in body axes. Symbols: Shabana, Dynamics of Multibody Systems, ch. 5; turning
 sections and joints: docs/theory.md.
 """

@@ -13,8 +13,8 @@ from rotations import quaternion, random_rotation, rotation, rotation_about
 from spatial_oracle import Mechanism
 from spatial_rows import Ground, Joint, Section
 
-from ffrobot.mbs.model.spatial_body import SpatialBody, SpatialPoint, from_modal_body, rigid_body
-from ffrobot.mbs.model.spatial_stiffening import SpatialStiffening
+from ffrobot.mbs.model.body import Body, BodyPoint, from_modal_body, rigid_body
+from ffrobot.mbs.model.stiffening import Stiffening
 
 TYPES = ("revolute", "prismatic", "screw", "cylindrical", "universal", "spherical", "planar", "weld", "free")
 G = np.array([0.4, -1.1, -9.5])
@@ -52,14 +52,14 @@ def random_beam(rng, name, modes=(2, 2, 1, 1), condition="cantilever"):
         Phi, Phi_r = np.zeros((3, n)), np.zeros((3, n))
         Phi[0, u], Phi[1, v], Phi[2, w], Phi_r[0, twist] = a(xi), i(xi), o(xi), t(xi)
         Phi_r[2, v], Phi_r[1, w] = i.slope(xi) / length, -o.slope(xi) / length
-        return SpatialPoint(np.array([xi * length, 0.0, 0.0]), Phi, Phi_r)
+        return BodyPoint(np.array([xi * length, 0.0, 0.0]), Phi, Phi_r)
 
     nodes, weights = np.polynomial.legendre.leggauss(20)
     sections = [(section((node + 1) / 2), 0.5 * weight * mass) for node, weight in zip(nodes, weights, strict=True)]
     x = np.array([at.position for at, _ in sections])
     m, Phi = np.array([m for _, m in sections]), np.array([at.translation for at, _ in sections])
     phi = np.array([at.rotation[0] for at, _ in sections])
-    return SpatialBody(
+    return Body(
         name=name,
         mass=mass,
         first_moment=m @ x,
@@ -94,7 +94,7 @@ def stiffened(rng, body):
     K = np.einsum("ef,flmn->elmn", N, 0.3 * symmetric(rng, 4, 3, n)) if n else np.zeros((4, 3, 0, 0))
     moved = {label: np.any(at.translation) or np.any(at.rotation) for label, at in body.points.items()}
     points = {label: 0.3 * symmetric(rng, 6, n) * moves if n else np.zeros((6, 0, 0)) for label, moves in moved.items()}
-    return replace(body, stiffening=SpatialStiffening(K[0], K[1:], MappingProxyType(points), np.zeros_like(K[1:])))
+    return replace(body, stiffening=Stiffening(K[0], K[1:], MappingProxyType(points), np.zeros_like(K[1:])))
 
 
 class _shapes:  # noqa: N801 (reads as a function of x/length)
@@ -231,7 +231,7 @@ def _close_loop(rng, tree, name):
     R, e, p = mechanism.coordinates.parts(tree.q, last.name)
     Phi, Phi_r = 0.3 * rng.standard_normal((3, n)), 0.3 * rng.standard_normal((3, n))
     u = rotation(e).T @ (at.r + at.F @ pose.d - R)
-    points = dict(last.points) | {name: SpatialPoint(u - Phi @ p, Phi, Phi_r)}
+    points = dict(last.points) | {name: BodyPoint(u - Phi @ p, Phi, Phi_r)}
     tree.bodies[-1] = replace(last, points=MappingProxyType(points))
     section = Mechanism(tree.bodies, G).marker(Section(last.name, name), tree.q, np.zeros(mechanism.size))
     b = Section(last.name, name, section.F.T @ at.F @ pose.C)

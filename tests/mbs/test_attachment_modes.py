@@ -8,9 +8,9 @@ import pytest
 import ffrobot
 from ffrobot.fe_models.link import cached_modal_body
 from ffrobot.fe_models.link_file import LinkTable
+from ffrobot.mbs.model.body import from_modal_body
 from ffrobot.mbs.model.projection import projected
-from ffrobot.mbs.model.spatial_body import from_modal_body
-from ffrobot.mbs.model.truncation import with_fewer_modes_in_space
+from ffrobot.mbs.model.truncation import with_fewer_modes
 
 E, RHO, HEIGHT, WIDTH = 2.068427e11, 7850.0, 0.015, 0.025
 EI, LINE = E * WIDTH * HEIGHT**3 / 12, RHO * HEIGHT * WIDTH
@@ -142,7 +142,7 @@ def test_sag_of_two_links():
 def test_fewer_modes_of_a_body_without_attachment_modes_have_none():
     table = LinkTable(link("cantilever", 4, False), path=Path("link.toml"))
     body = projected(from_modal_body("b", cached_modal_body(table).body, is_planar=True))
-    assert with_fewer_modes_in_space(body, 2, ["root", "tip"]).attachment_modes == 0
+    assert with_fewer_modes(body, 2, ["root", "tip"]).attachment_modes == 0
 
 
 def test_results_are_in_the_modes_of_the_file():

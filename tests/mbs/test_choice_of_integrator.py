@@ -10,8 +10,8 @@ from mechanisms import forward, oracle_of, pcid, relative
 from planar_runs import evaluated, run
 from scipy.linalg import eigh, null_space
 
-from ffrobot.mbs.solve.spatial_start import undeformed_posture
-from ffrobot.mbs.solve.vibration import vibrations_in_space, without_rows
+from ffrobot.mbs.solve.start import undeformed_posture
+from ffrobot.mbs.solve.vibration import vibrations_of, without_rows
 
 AT_REST = {"angles": ANGLES, "state": "static"}
 
@@ -26,7 +26,7 @@ def test_vibrations_solve_the_linearised_equations():
     """Of the oracle: frequencies and shapes in its coordinates, by what the constraints leave free."""
     robot = arm()
     q = undeformed_posture(robot.model).q
-    modes = vibrations_in_space(robot.model, without_rows(robot.model), 0.0, q)
+    modes = vibrations_of(robot.model, without_rows(robot.model), 0.0, q)
     found = evaluated(robot, 0.0, q, 0 * q)
     oracle, rest = oracle_of(found.assembly), 0 * found.q[0]
     M, (_, _, C_q) = oracle.mass_matrix(found.q[0]), oracle.constraint_values(0.0, found.q[0], rest)
@@ -42,7 +42,7 @@ def test_vibrations_show_in_the_motion():
     path = {"name": "tip", "point": "link2.tip", "x": "1.2", "y": "1.4"}
     robot = arm(gravity=(0.0, 0.0), trajectory=[path])
     rest = undeformed_posture(robot.model)
-    modes = vibrations_in_space(robot.model, without_rows(robot.model), 0.0, rest.q)
+    modes = vibrations_of(robot.model, without_rows(robot.model), 0.0, rest.q)
     found = evaluated(robot, 0.0, rest.q + 1e-7 * modes.shape[:, 0], rest.v)
     a, _ = oracle_of(found.assembly).solve(0.0, found.q[0], found.v[0])
     away = found.q[0] - evaluated(robot, 0.0, rest.q, rest.v).q[0]

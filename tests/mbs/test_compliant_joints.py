@@ -15,12 +15,12 @@ from ffrobot.actuation.control.modes import robot_modes
 from ffrobot.actuation.motors import judge_motors
 from ffrobot.common.errors import InputError
 from ffrobot.mbs.analysis.elastic_joints import unresolved_gears
+from ffrobot.mbs.analysis.gears import wound_up
 from ffrobot.mbs.analysis.motors_only import MotorsOnly
-from ffrobot.mbs.analysis.spatial_gears import wound_up
 from ffrobot.mbs.analysis.static import Static
-from ffrobot.mbs.model.spatial_gears import with_compliance_in_space
-from ffrobot.mbs.model.spatial_model import without_paths
-from ffrobot.mbs.solve.linearisation import SpatialLinearisation
+from ffrobot.mbs.model.gears import with_compliance
+from ffrobot.mbs.model.model import without_paths
+from ffrobot.mbs.solve.linearisation import LinearEquations
 
 L, M, J, N, K, C = 0.7, 2.0, 3e-3, 9.0, 500.0, 0.4
 MOTOR, LINK = J * N**2, M * L**2 / 3
@@ -62,7 +62,7 @@ def test_two_masses_turn_and_swing():
 
 def linearised(robot, q, v, a):
     """With gears that give."""
-    return SpatialLinearisation(with_compliance_in_space(without_paths(robot.model)), q).at(0.0, q, v, a)
+    return LinearEquations(with_compliance(without_paths(robot.model)), q).at(0.0, q, v, a)
 
 
 def test_linear_model_has_the_closed_form_resonance_and_response():
@@ -219,7 +219,7 @@ def test_equilibrium_winds_the_gears():
     held = [{"name": name, "joint": name, "value": value} for name, value in (("O", "0.4"), ("A", "0.9"))]
     model = geared_arm(GEARED, trajectory=held)
     about = run(model, Static(name="static", kind="static"))
-    q = wound_up(about.outcome, with_compliance_in_space(without_paths(model.model))).q[0]
+    q = wound_up(about.outcome, with_compliance(without_paths(model.model))).q[0]
     mechanism = linearised(model, q, *np.zeros((2, len(q))))
     along = [mechanism.names.index(f"motor/{joint}") for joint in "OA"]
     assert mechanism.force[along].min() > 1.0

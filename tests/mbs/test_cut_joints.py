@@ -6,10 +6,10 @@ from body_equations import accelerated, required_forces
 from closed_chains import NOW, closed_chain, evaluated
 
 from ffrobot.mbs import _core
-from ffrobot.mbs.model.spatial_model import row_values
-from ffrobot.mbs.model.spatial_system import SpatialSystem
-from ffrobot.mbs.quantities.spatial_energy import totals
-from ffrobot.mbs.quantities.spatial_reactions import reactions
+from ffrobot.mbs.model.model import row_values
+from ffrobot.mbs.model.system import MultibodySystem
+from ffrobot.mbs.quantities.energy import totals
+from ffrobot.mbs.quantities.reactions import reactions
 
 CHAINS = [
     (("revolute", "universal", "cylindrical", "universal"), ("rigid",)),
@@ -102,7 +102,7 @@ def test_derivatives(number):
     chain = case(number)
     for cut in list(chain.tables)[1::2]:
         model = chain.model(cut)
-        tree, system, q = model.tree, SpatialSystem(model), chain.position(model)
+        tree, system, q = model.tree, MultibodySystem(model), chain.position(model)
         v = free_velocity(np.random.default_rng(1), model, q)
         force = np.random.default_rng(2).standard_normal(tree.n_v)
         scene = system.scene
@@ -144,7 +144,7 @@ def test_a_joint_that_sticks_where_the_loop_is_cut():
         table.update(STICKS)
     for cut in chain.tables:
         model = chain.model(cut)
-        system, q = SpatialSystem(model), chain.position(model)
+        system, q = MultibodySystem(model), chain.position(model)
         implicit, explicit = (swung(system, q, method) for method in (_core.MethodKind.radau, _core.MethodKind.dop853))
         assert implicit.status == _core.IntegrationStatus.completed != explicit.status
         ends.append(implicit.energy[-1])

@@ -8,9 +8,9 @@ import pytest
 from ffrobot.fe_models.link import cached_modal_body
 from ffrobot.fe_models.link_file import LinkTable
 from ffrobot.fe_models.pieces import cut
-from ffrobot.mbs.model.divided_link import SpatialPiece, divided_link_in_space
+from ffrobot.mbs.model.body import from_modal_body
+from ffrobot.mbs.model.divided_link import PieceOfLink, divided_link_of
 from ffrobot.mbs.model.projection import projected
-from ffrobot.mbs.model.spatial_body import from_modal_body
 
 MODES = 4
 
@@ -33,13 +33,13 @@ def divided(condition, count, modes=MODES):
     source = LinkTable(keys, Path("link.toml"))
     link, parts = cached_modal_body(source).body, cut(source, count)
     pieces = [
-        SpatialPiece(start, modal, planar(f"piece {k}", modal))
+        PieceOfLink(start, modal, planar(f"piece {k}", modal))
         for k, (start, modal) in enumerate(
             (start, cached_modal_body(table).body) for start, table in zip(parts.starts, parts.tables, strict=True)
         )
     ]
     whole = planar("link", link)
-    return link, whole, pieces, divided_link_in_space(link, whole, pieces)
+    return link, whole, pieces, divided_link_of(link, whole, pieces)
 
 
 @pytest.mark.parametrize("condition", ["cantilever", "simply-supported"])

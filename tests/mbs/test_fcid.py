@@ -11,7 +11,7 @@ from planar_runs import run
 
 from ffrobot.common.errors import InputError, SolveError
 from ffrobot.mbs.analysis.fcid import Fcid
-from ffrobot.mbs.analysis.spatial_replay import supplied
+from ffrobot.mbs.analysis.replay import supplied
 from ffrobot.mbs.fields.expressions import parse_expression
 from ffrobot.mbs.fields.waypoints import spline
 

@@ -8,7 +8,7 @@ from spatial_oracle import body_mass_matrix
 
 from ffrobot.common.rotations import exponential
 from ffrobot.mbs.model.truncation import interface_loads, loaded_points
-from ffrobot.mbs.model.truncation import with_fewer_modes_in_space as with_fewer_modes
+from ffrobot.mbs.model.truncation import with_fewer_modes as with_fewer_modes
 
 POINTS = ["root", "tip"]
 

@@ -9,8 +9,8 @@ from rods import rod, slider_crank
 
 from ffrobot.common.errors import InputError, SolveError
 from ffrobot.mbs.analysis.static import Static
-from ffrobot.mbs.solve.spatial_start import undeformed_posture
-from ffrobot.mbs.solve.spatial_statics import initial_state
+from ffrobot.mbs.solve.start import undeformed_posture
+from ffrobot.mbs.solve.statics import initial_state
 
 HOLD = {"name": "tip", "point": "link2.tip", "x": repr(TIP[0]), "y": repr(TIP[1])}
 

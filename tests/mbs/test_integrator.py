@@ -8,10 +8,10 @@ from planar_runs import run
 
 from ffrobot.common.errors import SolveError
 from ffrobot.mbs import _core
-from ffrobot.mbs.model.spatial_system import SpatialSystem
+from ffrobot.mbs.model.system import MultibodySystem
 from ffrobot.mbs.scene.analysis import TIGHTEST_TOLERANCE
-from ffrobot.mbs.solve.spatial_start import undeformed_posture
-from ffrobot.mbs.solve.spatial_statics import static_equilibrium
+from ffrobot.mbs.solve.start import undeformed_posture
+from ffrobot.mbs.solve.statics import static_equilibrium
 
 REPORTED = ("q", "v", "lambda_", "tau", "F_p")
 
@@ -45,7 +45,7 @@ def soft():
 
 def fixed(model, start, method, steps, spectral_radius=0.8):
     """States of the tree after equal steps up to 0.5 s, and in their middle."""
-    core, scene, _ = SpatialSystem(model).integrated
+    core, scene, _ = MultibodySystem(model).integrated
     return _core.tree_fixed_steps(core, scene, 0.5, steps, start.q, start.v, method, spectral_radius)
 
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from ffrobot.mbs.model.spatial_motors import motor_forces, path_forces
-from ffrobot.run.spatial import solve_spatial
+from ffrobot.mbs.model.motors import motor_forces, path_forces
+from ffrobot.run.solve import solve_scene
 from ffrobot.run.watcher import Watcher
 from ffrobot.scene.load import make_scene
 
@@ -38,7 +38,7 @@ def arm():
 
 def test_peaks_of_small_motors_are_among_those_that_errors_are_compared_with():
     """The last ones, by motor: that of the hand is what its motor did, as far as steps show it."""
-    run = solve_spatial(arm(), Watcher()).outcomes["follow"]
+    run = solve_scene(arm(), Watcher()).outcomes["follow"]
     q = run.motion.q
     torques = motor_forces(run.model, q, path_forces(run.model, run.time, q, run.motion.multipliers)).moments
     peaks = run.continuation.checkpoint.force_peaks[-3:]

@@ -9,9 +9,9 @@ from planar_runs import evaluated, run
 
 from ffrobot.common.errors import SolveError
 from ffrobot.mbs import _core
-from ffrobot.mbs.model.spatial_model import without_paths
-from ffrobot.mbs.solve.linearisation import SpatialLinearisation
-from ffrobot.mbs.solve.spatial_start import undeformed_posture
+from ffrobot.mbs.model.model import without_paths
+from ffrobot.mbs.solve.linearisation import LinearEquations
+from ffrobot.mbs.solve.start import undeformed_posture
 
 constant = _core.TimeFunction.constant
 ROW = 2  # of the outputs: an instant at which everything moves
@@ -29,7 +29,7 @@ def motion(request):
 
 def linearised(outcome, points=()):
     run, model = outcome.outcome, without_paths(outcome.robot.model)
-    return SpatialLinearisation(model, run.q[ROW], points).at(run.time[ROW], run.q[ROW], run.v[ROW], run.a[ROW])
+    return LinearEquations(model, run.q[ROW], points).at(run.time[ROW], run.q[ROW], run.v[ROW], run.a[ROW])
 
 
 def test_forces_of_the_motion_are_those_of_the_inverse_analysis(motion):
@@ -104,7 +104,7 @@ def test_independent_coordinates(name, driven, expected):
     """Motors first, then the other joints, then modes."""
     joints = [joint | {"motor": joint["name"] in driven} for joint in zoo.build(name).tables["joint"]]
     model = zoo.build(name, trajectory=[], joint=joints).model
-    names = SpatialLinearisation(model, undeformed_posture(model).q).names
+    names = LinearEquations(model, undeformed_posture(model).q).names
     assert [one for one in names if not one.startswith("modal/")] == expected
     assert len(names) == len(expected) + sum(node.body.n_modes for node in model.tree.nodes)
 
@@ -121,7 +121,7 @@ def test_singular_configuration_is_refused():
         for angle in (0.7, 0.0)
     )
     q, rest = undeformed_posture(bent).q, np.zeros(bent.tree.n_v)
-    linearisation = SpatialLinearisation(bent, q)
+    linearisation = LinearEquations(bent, q)
     assert linearisation.names[0] == "joint/rail"
     linearisation.at(0.0, q, rest, rest)
     with pytest.raises(SolveError, match="joint/rail do not determine the posture"):

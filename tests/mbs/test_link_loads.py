@@ -9,7 +9,7 @@ from oracle import elastic_forces, gravity_forces, mass_matrix, quadratic_veloci
 from planar_runs import joint_forces, run
 
 from ffrobot.common.plane import rotated
-from ffrobot.mbs.quantities.link_loads import link_loads_in_space
+from ffrobot.mbs.quantities.link_loads import loads_on_links
 
 MECHANISMS = (
     *("chain of 3", "backwards", "mixed", "four-bar", "slider-crank", "tree"),
@@ -22,7 +22,7 @@ LOADS = (
 
 
 def link_loads(outcome, bodies):
-    return link_loads_in_space(outcome.motion, bodies)
+    return loads_on_links(outcome.motion, bodies)
 
 
 def at_point(loads, point):

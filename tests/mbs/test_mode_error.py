@@ -5,7 +5,7 @@ import pytest
 
 import ffrobot as library
 from ffrobot.mbs.quantities.attachment_error import ModesInMotion, mode_error
-from ffrobot.run.spatial import solve_spatial
+from ffrobot.run.solve import solve_scene
 from ffrobot.run.watcher import Watcher
 
 
@@ -49,7 +49,7 @@ def arm(modes, payload, attachment_modes=True, rise=1.0, state="static"):
 
 
 def solved(scene):
-    return solve_spatial(scene, Watcher()).analyses["inverse"]
+    return solve_scene(scene, Watcher()).analyses["inverse"]
 
 
 @pytest.mark.parametrize(

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from ffrobot.run.spatial import solve_spatial
+from ffrobot.run.solve import solve_scene
 from ffrobot.run.watcher import Watcher
 from ffrobot.scene.load import make_scene
 
@@ -34,6 +34,6 @@ def test_all_equations_of_a_path_are_followed(off):
         initial={"angles": {"link1": off - 0.5, "link2": off + 0.5}},
         analysis=[{"name": "follow", "kind": "pcid", "end": 0.05, "output_step": 0.005, "tolerance": 1e-6}],
     )
-    run = solve_spatial(scene, Watcher()).outcomes["follow"]
+    run = solve_scene(scene, Watcher()).outcomes["follow"]
     assert run.status == "completed"
     np.testing.assert_allclose(run.motion.q[:, 0], off + run.time**2 - 0.5, rtol=0, atol=1e-9)

@@ -5,8 +5,8 @@ import pytest
 from row_wrenches import on_body, row_wrenches
 
 import ffrobot
-from ffrobot.mbs.model.spatial_motors import path_forces_on_bodies
-from ffrobot.run.spatial import prepare_spatial
+from ffrobot.mbs.model.motors import path_forces_on_bodies
+from ffrobot.run.solve import prepare_scene
 from ffrobot.run.watcher import Watcher
 
 MODES = {"count": 4, "family": "all", "attachment_modes": False}
@@ -39,7 +39,7 @@ def arm(trajectories):
         initial={"joints": {"base": 0.1, "elbow": [0.2, 0.4], "slide": 0.05}},
         analysis=[{"name": "inverse", "kind": "pcid", "end": 0.1, "output_step": 0.01}],
     )  # fmt: skip
-    return prepare_spatial(scene, Watcher()).model
+    return prepare_scene(scene, Watcher()).model
 
 
 PATHS = {

@@ -11,7 +11,7 @@ from planar_bodies import PlanarBody, PlanarPoint, in_3d, rigid_body
 from planar_rows import Kind, Marker, Measure
 
 from ffrobot.mbs.fields.expressions import parse_expression
-from ffrobot.mbs.model.spatial_masses import with_payload
+from ffrobot.mbs.model.masses import with_payload
 
 MASS = 0.7
 

@@ -4,15 +4,15 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from checkpoint_scenes import tree_model
 from material_points import random_cloud
-from spatial_scenes import tree_model
 from spatial_trees import random_solid, stiffened
 
+from ffrobot.mbs.model.body import from_modal_body
+from ffrobot.mbs.model.model import build_model
 from ffrobot.mbs.model.projection import projected
-from ffrobot.mbs.model.spatial_body import from_modal_body
-from ffrobot.mbs.model.spatial_model import build_spatial_model
-from ffrobot.mbs.model.spatial_system import SpatialSystem
-from ffrobot.run.spatial import solve_spatial
+from ffrobot.mbs.model.system import MultibodySystem
+from ffrobot.run.solve import solve_scene
 from ffrobot.run.watcher import Watcher
 from ffrobot.scene.load import make_scene
 
@@ -42,7 +42,7 @@ def test_kinetic_energy_is_that_of_every_point(rng):
     cloud = random_cloud(rng, "b")
     body = projected(from_modal_body("b", cloud.modal_body()))
     scene = tree_model(SimpleNamespace(bodies=[body]), []).scene.model_copy(update={"space": "planar"})
-    system = SpatialSystem(build_spatial_model(scene, [body]))
+    system = MultibodySystem(build_model(scene, [body]))
     core, scene, _ = system.integrated
     q, v = 0.3 * rng.standard_normal((2, 5, 3 + body.n_modes))
     expected = [cloud.kinetic_energy(*state) for state in zip(q, v, strict=True)]
@@ -66,7 +66,7 @@ def test_body_without_joints_moves_in_the_plane():
         "load": [{"point": "puck.c", "x": str(F), "moment": str(M)}],
         "analysis": [{"name": "pushed", "kind": "forward", "end": end, "output_step": end}],
     }  # fmt: skip
-    (result,) = solve_spatial(make_scene(**tables), Watcher()).analyses.values()
-    assert SpatialSystem(result.run.model).plane is not None
+    (result,) = solve_scene(make_scene(**tables), Watcher()).analyses.values()
+    assert MultibodySystem(result.run.model).plane is not None
     x, y, angle = result.run.q[-1]
     assert (x, y, angle) == pytest.approx((F * end**2 / (2 * m), 0.0, 0.4 + 2.0 * end + M * end**2 / (2 * J)), abs=1e-6)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from ffrobot.run.spatial import solve_spatial
+from ffrobot.run.solve import solve_scene
 from ffrobot.run.watcher import Watcher
 from ffrobot.scene.load import make_scene
 
@@ -49,7 +49,7 @@ def parallelogram(space, tolerance):
 @pytest.mark.parametrize("space", ["planar", "spatial"])
 def test_a_parallelogram_that_falls_flat_stops_and_says_why(space, tolerance):
     """Branches meet there; steps that would jump over the posture do not."""
-    run = solve_spatial(parallelogram(space, tolerance), Watcher()).outcomes["fall"]
+    run = solve_scene(parallelogram(space, tolerance), Watcher()).outcomes["fall"]
     assert run.status == "step underflow"
     assert run.statistics.cause.startswith("the configuration is singular or nearly so (ratio of singular values")
     assert 'loops that "head1" close' in run.statistics.cause

@@ -13,7 +13,7 @@ from ffrobot.mbs.analysis.inverted_path import is_minimum_phase
 from ffrobot.mbs.analysis.motors_only import MotorsOnly
 from ffrobot.mbs.solve import stable_inversion
 from ffrobot.mbs.solve.internal_dynamics import LinearDynamics, equilibrium, is_unstable, linear_dynamics, zeros
-from ffrobot.mbs.solve.spatial_servo import make_spatial_servo
+from ffrobot.mbs.solve.servo import make_servo
 from ffrobot.mbs.solve.zero_dynamics import Linearisation
 
 C = np.sqrt(30.0)  # √(EI/ρA)/L² of `ritz_link`, 1/s
@@ -36,7 +36,7 @@ def single_link(path, modes=4, damping_ratio=0.0, **keys):
 
 def at_rest(model, factor=1.0):
     """The equations of motors only with the robot at rest at t = 0: output, M, D and K."""
-    servo = make_spatial_servo(model.model, 1.0, "scene", lambda: True, factor)
+    servo = make_servo(model.model, 1.0, "scene", lambda: True, factor)
     p, rest = equilibrium(servo, 0.0), np.zeros((1, len(servo.scale)))
     return servo, linear_dynamics(servo, np.zeros(1), p[None], rest, rest)
 

@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 
 from ffrobot.common.arrays import as_list
-from ffrobot.mbs.model.spatial_model import modal_directions
+from ffrobot.mbs.model.model import modal_directions
 from ffrobot.mbs.solve.internal_dynamics import equilibrium
-from ffrobot.mbs.solve.spatial_servo import make_spatial_servo
+from ffrobot.mbs.solve.servo import make_servo
 from ffrobot.mbs.solve.stable_inversion import invert
 from ffrobot.mbs.solve.tracking import Limits, Transition, Weights, graded, track
 from ffrobot.mbs.solve.zero_dynamics import linearise
-from ffrobot.run.spatial import prepare_spatial
+from ffrobot.run.solve import prepare_scene
 from ffrobot.run.watcher import Watcher
 
 LINK = """
@@ -72,8 +72,8 @@ def strip(tmp_path):
     def make(modes, T):
         (tmp_path / "link.toml").write_text(LINK.format(modes=modes), encoding="utf-8")
         (tmp_path / "scene.toml").write_text(SCENE.format(T=T), encoding="utf-8")
-        solution = prepare_spatial(tmp_path / "scene.toml", Watcher())
-        servo = make_spatial_servo(solution.model, T, "strip", lambda: True, 1.0)
+        solution = prepare_scene(tmp_path / "scene.toml", Watcher())
+        servo = make_servo(solution.model, T, "strip", lambda: True, 1.0)
         directions = modal_directions(servo.model, solution.patches["arm"].per_volt)
         return servo, directions[:, servo.of_modes].T
 
@@ -131,8 +131,8 @@ def test_least_voltage_of_the_paper(tmp_path, T, expected):
     assert timing in text
     text = text.replace(timing, f"(35*{s}**4 - 84*{s}**5 + 70*{s}**6 - 20*{s}**7)").replace("end = 0.5", f"end = {T}")
     (tmp_path / "scene.toml").write_text(text[: text.index("# The same torques and voltages")], encoding="utf-8")
-    solution = prepare_spatial(tmp_path / "scene.toml", Watcher())
-    servo = make_spatial_servo(solution.model, T, "arm", lambda: True, 1.0)
+    solution = prepare_scene(tmp_path / "scene.toml", Watcher())
+    servo = make_servo(solution.model, T, "arm", lambda: True, 1.0)
     per_volt = [modal_directions(servo.model, of_link.per_volt) for of_link in solution.patches.values()]
     Phi_V = np.concatenate(per_volt)[:, servo.of_modes].T
     asked = Transition(

@@ -13,10 +13,10 @@ import numpy as np
 
 from ffrobot.common.arrays import Array, as_floats
 from ffrobot.common.rotations import left_jacobian, left_jacobian_rate
-from ffrobot.mbs.model.spatial_bending import bent_section
-from ffrobot.mbs.model.spatial_model import SpatialModel, by_section
-from ffrobot.mbs.model.spatial_rows import SpatialRow
-from ffrobot.mbs.model.spatial_tree import Motion, Node, Section, SpatialTree
+from ffrobot.mbs.model.bending import bent_section
+from ffrobot.mbs.model.model import Model, by_section
+from ffrobot.mbs.model.rows import ConstraintRow
+from ffrobot.mbs.model.tree import KinematicTree, Motion, Node, Section
 
 
 class Acceleration(NamedTuple):
@@ -40,7 +40,7 @@ class _Bent(NamedTuple):
 class Accelerated:
     """States q (T, n_q), v and a (T, n_v) of a tree, with the motion of its frames."""
 
-    tree: SpatialTree
+    tree: KinematicTree
     q: Array
     v: Array
     a: Array
@@ -128,7 +128,7 @@ def _swept(omega: Array, bent: _Bent) -> Array:
     return found
 
 
-def row_accelerations(model: SpatialModel, state: Accelerated, times: Array) -> Array:
+def row_accelerations(model: Model, state: Accelerated, times: Array) -> Array:
     """C̈ (T, rows) at `times` (T,), less what their targets ask for: 0 where the motion keeps to the constraints."""
     frames = state.of_frames()
     found = np.zeros((len(times), len(model.rows)))
@@ -141,7 +141,7 @@ def row_accelerations(model: SpatialModel, state: Accelerated, times: Array) -> 
 
 
 def _row(
-    row: SpatialRow, state: Accelerated, motion: Callable[[Section], tuple[Motion, Acceleration]], times: Array
+    row: ConstraintRow, state: Accelerated, motion: Callable[[Section], tuple[Motion, Acceleration]], times: Array
 ) -> Array:
     target = 0.0 if row.target is None else row.target.sample(times)[2]
     if row.kind == "coordinate":

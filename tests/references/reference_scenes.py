@@ -4,10 +4,10 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
-import planar_in_space
+import planar_tables
 from moved_scenes import tables_of
 from random_robots import random_scene
-from spatial_robots import random_spatial_scene
+from robots_3d import random_spatial_scene
 
 import ffrobot
 
@@ -70,7 +70,7 @@ def patched(**layout):
 
 
 def slider_crank(of_joints):
-    tables = planar_in_space.read(FOLDER / "slider_crank" / "scene.toml") | {"analysis": [INVERSE, RELEASED]}
+    tables = planar_tables.read(FOLDER / "slider_crank" / "scene.toml") | {"analysis": [INVERSE, RELEASED]}
     tables["joint"] = [joint | of_joints.get(joint["name"], {}) for joint in tables["joint"]]
     moments = {"O": 0.2, "guide": 0.1, "B": 0.3}
     return ffrobot.make_scene(**tables, load=[{"joint": j, "moment": f"{m}*sin(30*t)"} for j, m in moments.items()])
@@ -195,9 +195,9 @@ def patched_in_space(**layout):
 
 def planar_case_in_space(case, *analyses, **tables):
     """A planar case with its patches put into space."""
-    planar = planar_in_space.read(FOLDER / case / "scene.toml")
-    found = planar_in_space.in_space(planar) | {"pzt": planar.get("pzt", [])}
-    joints = planar_in_space.CRANK if case == "slider_crank" else planar_in_space.TWO_LINK
+    planar = planar_tables.read(FOLDER / case / "scene.toml")
+    found = planar_tables.in_space(planar) | {"pzt": planar.get("pzt", [])}
+    joints = planar_tables.CRANK if case == "slider_crank" else planar_tables.TWO_LINK
     return ffrobot.make_scene(**found | {"initial": {"joints": joints}, "analysis": list(analyses)} | tables)
 
 
@@ -238,7 +238,7 @@ SPATIAL = {
     "joints_of_all_types": joints_of_all_types,
     "redundant_by_torque": partial(seven_joints, "least-torque"),
     "redundant_by_motion": partial(seven_joints, "least-motion"),
-    "patches_in_space": partial(
+    "make_patches": partial(
         planar_case_in_space, "two_link_patched", INVERSE, AGAIN | {"apply": "joints+pzt"}, SAGGING
     ),
     "control_in_space": partial(

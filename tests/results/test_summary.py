@@ -7,8 +7,8 @@ from rich.console import Console
 
 from ffrobot.present.summary import print_summary
 from ffrobot.results.file import Results
-from ffrobot.results.spatial import spatial_image
-from ffrobot.run.spatial import solve_spatial
+from ffrobot.results.write import results_image
+from ffrobot.run.solve import solve_scene
 from ffrobot.run.watcher import Watcher
 from ffrobot.scene.load import make_scene
 
@@ -43,8 +43,8 @@ SPATIAL = PLANAR | {
 
 @pytest.mark.parametrize("keys", [PLANAR, SPATIAL], ids=["planar", "3D"])
 def test_planar_and_3d_scenes_have_the_same_summary(keys, tmp_path):
-    solution = solve_spatial(make_scene(**keys), Watcher())
-    verdict = Results.from_image(spatial_image(solution), tmp_path / "x.h5").verdict
+    solution = solve_scene(make_scene(**keys), Watcher())
+    verdict = Results.from_image(results_image(solution), tmp_path / "x.h5").verdict
     printed = StringIO()
     print_summary(solution, verdict, tmp_path / "x.h5", solution.seconds, Console(file=printed, width=200))
     lines = printed.getvalue().splitlines()

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 from table import at_most
 
-from ffrobot.actuation.patches.records import SpatialPztLayout
-from ffrobot.actuation.patches.spatial_patches import check_reach, link_patches
+from ffrobot.actuation.patches.link_patches import check_reach, link_patches
+from ffrobot.actuation.patches.records import PztLayout
 from ffrobot.actuation.patches.voltages import solve_voltages
 from ffrobot.common.errors import InputError
+from ffrobot.mbs.model.body import from_modal_body
 from ffrobot.mbs.model.projection import projected
-from ffrobot.mbs.model.spatial_body import from_modal_body
 
 GROUP = "PZT layouts"
 PATCH = {
@@ -34,7 +34,7 @@ def link(beam):
 
 def patches(link, **keys):
     path, spatial = Path("scene.toml"), projected(from_modal_body("link2", link, is_planar=True))
-    of_link = link_patches(path, [SpatialPztLayout(**(PATCH | keys))], link, spatial)
+    of_link = link_patches(path, [PztLayout(**(PATCH | keys))], link, spatial)
     check_reach(path, of_link)
     return of_link.reach
 

@@ -20,7 +20,7 @@ from ...common.errors import InputError
 from ...common.tables import shown
 from ...fe_models.modal_body import Interface, ModalBody
 from ...fe_models.modal_body.tensors import LEVI_CIVITA
-from ...mbs.model.spatial_body import from_modal_body
+from ...mbs.model.body import from_modal_body
 
 POSITIVE = 1e-9  # of the largest entry: less is rounding
 EXACT = 1e-12  # of the largest entry: modal masses are those of the shapes

@@ -13,17 +13,17 @@ from ...common.errors import InputError
 from ...common.validation import quoted
 from ...mbs import _core
 from ...mbs.analysis.forward import Forward
-from ...mbs.model.spatial_gears import with_compliance_in_space
-from ...mbs.model.spatial_model import SpatialModel, without_paths
-from ...run.spatial import prepare_spatial
-from ...run.spatial_mode_choice import mode_levels_in_space
-from ...run.spatial_prepare import with_bodies_in_space
+from ...mbs.model.gears import with_compliance
+from ...mbs.model.model import Model, without_paths
+from ...run.mode_choice import mode_levels
+from ...run.prepare import with_bodies
+from ...run.solve import prepare_scene
 from ...run.watcher import Watcher
 from ...scene.load import load_scene
-from ...scene.spatial import SpatialScene
+from ...scene.scene import Scene
 from .archive import PLATFORMS, identifier_of, zipped
 from .description import forward_description
-from .forward_model import AXES, HeldUnit, has_own_coordinates, held_unit, voltages_in_space
+from .forward_model import AXES, HeldUnit, has_own_coordinates, held_unit, voltages_of_patches
 
 logger = logging.getLogger(__name__)
 
@@ -68,23 +68,23 @@ class _Logged(Watcher):
         logger.info("%s", title)
 
 
-def _unit(scene: SpatialScene, analysis: Forward) -> tuple[SpatialModel, HeldUnit]:
+def _unit(scene: Scene, analysis: Forward) -> tuple[Model, HeldUnit]:
     """The motion of `analysis`."""
-    prepared = prepare_spatial(scene, _Logged())
-    bodies = mode_levels_in_space(scene, prepared.bodies)[-1]  # "auto": all of them
-    model = with_compliance_in_space(without_paths(with_bodies_in_space(prepared, bodies).model))
-    voltages = voltages_in_space(model, prepared.patches)
+    prepared = prepare_scene(scene, _Logged())
+    bodies = mode_levels(scene, prepared.bodies)[-1]  # "auto": all of them
+    model = with_compliance(without_paths(with_bodies(prepared, bodies).model))
+    voltages = voltages_of_patches(model, prepared.patches)
     return model, held_unit(model, voltages, prepared.links, analysis, AXES[:2] if scene.is_planar else AXES)
 
 
-def _silent(model: SpatialModel) -> list[str]:
+def _silent(model: Model) -> list[str]:
     """Joints whose coordinates are no outputs: those at which loops are cut, and those that are turned freely."""
     own = {node.joint.name for node in model.tree.nodes if has_own_coordinates(node)}
     nodes = [node.joint for node in model.tree.nodes]
     return [joint.name for joint in (*nodes, *model.tree.loops) if joint.units and joint.name not in own]
 
 
-def _chosen(path: Path, scene: SpatialScene, name: str | None) -> Forward:
+def _chosen(path: Path, scene: Scene, name: str | None) -> Forward:
     """The analysis of this name, or the first that fits."""
     found = {each.name: each for each in scene.analysis}
     if name is not None and name not in found:
@@ -103,7 +103,7 @@ def _chosen(path: Path, scene: SpatialScene, name: str | None) -> Forward:
     raise InputError(f'{path}: --analysis: expected {wanted}, found "{name}" of {what}')
 
 
-def _check(path: Path, scene: SpatialScene) -> None:
+def _check(path: Path, scene: Scene) -> None:
     if scene.load:
         raise InputError(f"{path}: load: expected none of a scene for an FMU, whose loads are its inputs, found some")
     for body in scene.body:

@@ -7,17 +7,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...actuation.patches.spatial_patches import LinkPatches
+from ...actuation.patches.link_patches import LinkPatches
 from ...common.arrays import Array
 from ...fe_models.modal_body import ModalBody
 from ...mbs import _core
 from ...mbs.analysis.forward import Forward
-from ...mbs.model.spatial_model import SpatialModel, modal_directions
-from ...mbs.model.spatial_system import SpatialSystem
-from ...mbs.model.spatial_tree import Node
+from ...mbs.model.model import Model, modal_directions
+from ...mbs.model.system import MultibodySystem
+from ...mbs.model.tree import Node
+from ...mbs.solve.integrator_choice import integrator_of
 from ...mbs.solve.integrators import METHODS
-from ...mbs.solve.spatial_integrators import integrator_of
-from ...mbs.solve.spatial_statics import initial_state
+from ...mbs.solve.statics import initial_state
 from .variables import Variable
 
 UNIT_OF_FORCE = {"rad": "N.m", "m": "N"}
@@ -42,7 +42,7 @@ class HeldUnit:
 
 
 def held_unit(
-    model: SpatialModel,
+    model: Model,
     voltages: Iterable[Input],
     links: Mapping[str, ModalBody],
     analysis: Forward,
@@ -55,7 +55,7 @@ def held_unit(
 
     Raises `InputError` and `SolveError` as the analysis itself does.
     """
-    data, start = SpatialSystem(model).held_model(), initial_state(model)
+    data, start = MultibodySystem(model).held_model(), initial_state(model)
     data.q, data.v = start.q, start.v
     data.method = METHODS[integrator_of(model, analysis.integrator)]
     data.spectral_radius, data.tolerance = analysis.spectral_radius, analysis.tolerance
@@ -80,7 +80,7 @@ def _numbered(joint: str, number: int, count: int) -> str:
     return f"{joint} {number}" if count > 1 else joint
 
 
-def _motors(model: SpatialModel) -> Iterator[Input]:
+def _motors(model: Model) -> Iterator[Input]:
     """Behind a gear that gives they act on its motor."""
     units = {joint.name: joint.units for joint in model.scene.joint}
     for joint, columns in model.motors.items():
@@ -90,7 +90,7 @@ def _motors(model: SpatialModel) -> Iterator[Input]:
             yield variable, model.sign(joint) * np.eye(model.tree.n_v)[column]
 
 
-def voltages_in_space(model: SpatialModel, patches: Mapping[str, LinkPatches]) -> Iterator[Input]:
+def voltages_of_patches(model: Model, patches: Mapping[str, LinkPatches]) -> Iterator[Input]:
     """Of all layouts, by the body that carries them."""
     for of_link in patches.values():
         directions = modal_directions(model, of_link.per_volt)
@@ -103,7 +103,7 @@ def voltage(layout: str, number: int) -> Variable:
     return Variable(f"pzt/{layout}/{number}", "V", f"voltage of patch {number} of {layout}")
 
 
-def _joints(model: SpatialModel) -> Iterator[tuple[Variable, _core.LinearOutput]]:
+def _joints(model: Model) -> Iterator[tuple[Variable, _core.LinearOutput]]:
     """Coordinates and rates of joints whose coordinates are those of the state."""
     tree = model.tree
     for joint in model.scene.joint:
@@ -125,7 +125,7 @@ def has_own_coordinates(node: Node) -> bool:
     return bool(joint.units) and joint.q_count == joint.freedoms and not (joint.type == "planar" and node.backwards)
 
 
-def _modes(model: SpatialModel) -> Iterator[tuple[Variable, _core.LinearOutput]]:
+def _modes(model: Model) -> Iterator[tuple[Variable, _core.LinearOutput]]:
     """Modal coordinates of the file of each body: of a planar scene those that move in its plane."""
     for node in model.tree.nodes:
         entries = list(range(node.p_q.start, node.p_q.stop))
@@ -136,7 +136,7 @@ def _modes(model: SpatialModel) -> Iterator[tuple[Variable, _core.LinearOutput]]
                 yield variable, _core.LinearOutput(entries, row.tolist())
 
 
-def _strains(model: SpatialModel, links: Mapping[str, ModalBody]) -> Iterator[tuple[Variable, _core.LinearOutput]]:
+def _strains(model: Model, links: Mapping[str, ModalBody]) -> Iterator[tuple[Variable, _core.LinearOutput]]:
     """At the points of links where their files have strains, in axes of the link: what the modes make of them."""
     for node in model.tree.nodes:
         name, entries = node.body.name, list(range(node.p_q.start, node.p_q.stop))
@@ -151,7 +151,7 @@ def _strains(model: SpatialModel, links: Mapping[str, ModalBody]) -> Iterator[tu
                     yield variable, _core.LinearOutput(entries, row.tolist())
 
 
-def _places(model: SpatialModel) -> Iterator[tuple[str, _core.PlaceOutput]]:
+def _places(model: Model) -> Iterator[tuple[str, _core.PlaceOutput]]:
     """By "BODY.POINT"."""
     for number, node in enumerate(model.tree.nodes):
         for label, at in node.body.points.items():

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from ...actuation.control.linear_model import LinearModel
-from ...mbs.joints.spatial.free import SpatialFree
-from ...mbs.joints.spatial.joints import SPATIAL_JOINT_TYPES
+from ...mbs.joints.free import FreeJoint
+from ...mbs.joints.joints import JOINT_TYPES
 
 UNITS: Mapping[str, Mapping[str, int]] = {
     "1": {},
@@ -43,7 +43,7 @@ def joint_units(scene: Mapping[str, Any]) -> dict[str, str]:
     """Unit of each coordinate of the joints of a scene, by "NAME", or "NAME 1", "NAME 2" of joints with several."""
     found = {}
     for joint in scene.get("joint", ()):
-        record = SPATIAL_JOINT_TYPES[joint["type"]]  # types that the plane has too have the same units there
+        record = JOINT_TYPES[joint["type"]]  # types that the plane has too have the same units there
         units = record.units or record.guess_units
         for number, unit in enumerate(units, 1):
             found[f"{joint['name']} {number}" if len(units) > 1 else str(joint["name"])] = unit
@@ -108,6 +108,6 @@ def _coordinate(name: str, units: Mapping[str, str]) -> tuple[str, str]:
         return "rad" if last == "angle" else "m", f"{last} of the frame of {place}"
     if kind == "frame":  # in space
         body, _, number = rest.rpartition(" ")
-        return SpatialFree.guess_units[int(number) - 1], f"coordinate {number} of the frame of {body}"
+        return FreeJoint.guess_units[int(number) - 1], f"coordinate {number} of the frame of {body}"
     of = "coordinate of the motor of" if kind == "motor" else "coordinate of joint"
     return units[rest], f"{of} {rest}"

@@ -12,7 +12,7 @@ from ...common.errors import InputError
 from ...common.numbers import SMALLEST
 from ...common.tables import shown
 from ...common.validation import quoted
-from ...mbs.scene.spatial.bodies import ROUNDING, check_inertia
+from ...mbs.scene.bodies import ROUNDING, check_inertia
 from .robot import HERE, MASSLESS, Inertial, Origin, Place, Robot, UrdfJoint
 
 

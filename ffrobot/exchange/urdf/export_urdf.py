@@ -11,14 +11,14 @@ import numpy as np
 from ...common.arrays import Array
 from ...common.errors import InputError
 from ...mbs.fields.field_types import GROUND
-from ...mbs.joints.spatial.joint import SpatialJoint
-from ...mbs.model.spatial_body import SpatialBody
-from ...mbs.model.spatial_model import build_spatial_model
-from ...mbs.model.spatial_tree import Node
-from ...mbs.solve.spatial_posture import robot_size
-from ...run.spatial_bodies import LoadedSpatialBody, load_spatial_bodies
+from ...mbs.joints.joint import JointRecord
+from ...mbs.model.body import Body
+from ...mbs.model.model import build_model
+from ...mbs.model.tree import Node
+from ...mbs.solve.posture import robot_size
+from ...run.bodies import LoadedBody, load_bodies
 from ...scene.load import load_scene
-from ...scene.spatial import SpatialScene
+from ...scene.scene import Scene
 from .names import Names
 from .not_carried import not_carried
 from .robot import Inertial, Mimic, Numbers3, Origin, Primitive, Robot, UrdfJoint, UrdfLink
@@ -44,7 +44,7 @@ def scene_as_urdf(path: Path) -> tuple[str, str, tuple[str, ...]]:
             f'{path}: --format urdf: expected a scene with space = "spatial", found a planar one, which has no'
             " moments of inertia about x and y"
         )
-    bodies = load_spatial_bodies(scene, lambda stage: logger.info("%s", stage))
+    bodies = load_bodies(scene, lambda stage: logger.info("%s", stage))
     loaded = {body.name: part for body, part in zip(scene.body, bodies, strict=True)}
     made = UrdfOfScene(scene, loaded)
     counts = f"{len(scene.body)} bodies and {len(scene.joint) - len(made.tree.loops)} joints of {scene.name}"
@@ -61,10 +61,10 @@ class UrdfOfScene:
         size: of the robot, m.
     """
 
-    def __init__(self, scene: SpatialScene, loaded: Mapping[str, LoadedSpatialBody]) -> None:
+    def __init__(self, scene: Scene, loaded: Mapping[str, LoadedBody]) -> None:
         self._scene, self._loaded = scene, loaded
         without = scene.model_copy(update={"payload": ()})  # they are part of their links
-        model = build_spatial_model(without, [loaded[body.name].carrying for body in scene.body])
+        model = build_model(without, [loaded[body.name].carrying for body in scene.body])
         self.tree, self.size = model.tree, robot_size(model)
         self._link_names = Names((GROUND, *(body.name for body in scene.body)))
         self._joint_names = Names(joint.name for joint in scene.joint)
@@ -135,11 +135,11 @@ class UrdfOfScene:
         rpy = rpy_of(node.joint.orientation.T) if node.backwards else node.joint.rpy
         return Origin(_three(at), _three(rpy))
 
-    def _type(self, joint: SpatialJoint, step: Step) -> str:
+    def _type(self, joint: JointRecord, step: Step) -> str:
         has_end = step.coordinate >= 0 and np.all(np.isfinite(joint.position_limits[step.coordinate]))
         return "continuous" if step.type == "revolute" and not has_end else step.type
 
-    def _limits(self, joint: SpatialJoint, step: Step) -> dict[str, float]:
+    def _limits(self, joint: JointRecord, step: Step) -> dict[str, float]:
         """URDF wants them of all joints but continuous ones: 0 stands for no limit of effort and velocity."""
         if step.type not in ("revolute", "prismatic"):
             return {}
@@ -155,7 +155,7 @@ class UrdfOfScene:
         return {**limits, "effort": effort, "velocity": velocity} if limits or effort or velocity else {}
 
 
-def inertial_of(body: SpatialBody, anchor: Array) -> Inertial:
+def inertial_of(body: Body, anchor: Array) -> Inertial:
     """Of the undeformed body with what is attached to it; `anchor` (3,) is the link's frame in body axes, m.
 
     J_c = J0 − m (c·c I − c cᵀ) about the center c = s0/m (parallel axes).
@@ -165,7 +165,7 @@ def inertial_of(body: SpatialBody, anchor: Array) -> Inertial:
     return Inertial(m, c - anchor, (J + J.T) / 2)
 
 
-def _dynamics(joint: SpatialJoint, step: Step) -> dict[str, float]:
+def _dynamics(joint: JointRecord, step: Step) -> dict[str, float]:
     if not joint.frictions or step.coordinate < 0:
         return {}
     friction = joint.frictions[step.coordinate]
@@ -177,7 +177,7 @@ def _anchor(node: Node) -> Array:
     return node.body.points[node.outer.point].position if node.outer.point else ORIGIN
 
 
-def _own_points(loaded: LoadedSpatialBody) -> dict[str, Array]:
+def _own_points(loaded: LoadedBody) -> dict[str, Array]:
     """Points that the file of a body names, by name: (3,) m, body axes."""
     names = loaded.spatial.points if loaded.modal is None else loaded.modal.interfaces
     return {name: loaded.spatial.points[name].position for name in names}

@@ -7,17 +7,15 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from ...common.validation import quoted
-from ...mbs.joints.spatial.moving_joint import MovingSpatialJoint
-from ...mbs.model.spatial_tree import SpatialTree
-from ...run.spatial_bodies import LoadedSpatialBody
-from ...scene.spatial import SpatialScene
+from ...mbs.joints.moving_joint import MovingJoint
+from ...mbs.model.tree import KinematicTree
+from ...run.bodies import LoadedBody
+from ...scene.scene import Scene
 from .scene import GRAVITY
 from .steps import STEPS
 
 
-def not_carried(
-    scene: SpatialScene, loaded: Mapping[str, LoadedSpatialBody], tree: SpatialTree, size: float
-) -> Iterator[str]:
+def not_carried(scene: Scene, loaded: Mapping[str, LoadedBody], tree: KinematicTree, size: float) -> Iterator[str]:
     """A line for each; `size` of the robot (m) stands for ranges that URDF wants and the scene does not give."""
     if flexible := [name for name, body in loaded.items() if body.modal is not None]:
         yield f"{quoted(flexible)}: rigid in the URDF, undeformed"
@@ -34,7 +32,7 @@ def not_carried(
     yield f"left out: {', '.join(name for name, entries in tables.items() if entries)}"
 
 
-def _of_types(tree: SpatialTree) -> Iterator[str]:
+def _of_types(tree: KinematicTree) -> Iterator[str]:
     """Joints that are several there, and those whose coordinates are others."""
     for node in tree.nodes:
         joint, count = node.joint, len(STEPS[node.joint.type])
@@ -46,7 +44,7 @@ def _of_types(tree: SpatialTree) -> Iterator[str]:
             yield f"{joint.label}: its coordinates there are those of its first side on its second"
 
 
-def _of_keys(tree: SpatialTree, size: float) -> Iterator[str]:
+def _of_keys(tree: KinematicTree, size: float) -> Iterator[str]:
     """Keys of joints."""
     joints = [node.joint for node in tree.nodes]
     sliding = [joint for joint in joints if joint.type in ("prismatic", "cylindrical")]
@@ -56,7 +54,7 @@ def _of_keys(tree: SpatialTree, size: float) -> Iterator[str]:
         yield f"{quoted(rotors)}: rotor_inertia and compliance of gears left out"
     if powers := [joint.name for joint in joints if any(np.isfinite(each.power) for each in joint.motor_limits)]:
         yield f"{quoted(powers)}: power_limit left out"
-    moving = [joint for joint in joints if isinstance(joint, MovingSpatialJoint)]
+    moving = [joint for joint in joints if isinstance(joint, MovingJoint)]
     if smooth := [joint.name for joint in moving if "friction_speed" in joint.model_fields_set]:
         yield f"{quoted(smooth)}: friction_speed left out"
     several = [joint for joint in moving if len(joint.units) > 2 and (joint.motor_limits or joint.frictions)]

@@ -13,7 +13,7 @@ from ...common.errors import FfrobotError, InputError
 from ...common.tables import shown
 from ...fe_models.link import cached_modal_body
 from ...fe_models.link_file import LinkTable
-from ...mbs.model.spatial_body import SpatialBody, from_modal_body
+from ...mbs.model.body import Body, from_modal_body
 from .bodies import is_possible
 from .flexible import FlexibleLink
 from .robot import Inertial, Robot
@@ -28,7 +28,7 @@ class Replaced:
         """The link file will be in `folder`, which need not be there yet. Raises what stage 1 raises."""
         self.name = link.name
         table = LinkTable(_with_whole_path(link.keys, folder), folder / link.file_name)
-        self.body: SpatialBody = from_modal_body(link.name, cached_modal_body(table).body)
+        self.body: Body = from_modal_body(link.name, cached_modal_body(table).body)
         inertial = robot.links[link.name].inertial
         self.before = None if inertial is None else inertial.seen_from(link.place)
         center = self.body.first_moment / self.body.mass

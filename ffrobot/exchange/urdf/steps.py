@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...common.arrays import Array
-from ...mbs.joints.spatial.joint import SpatialJoint
-from ...mbs.joints.spatial.screw import SpatialScrew
+from ...mbs.joints.joint import JointRecord
+from ...mbs.joints.screw import ScrewJoint
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ STEPS: Mapping[str, tuple[Step, ...]] = {
 """By the type of joint in scenes, from the first side to the second."""
 
 
-def steps_outward(joint: SpatialJoint, backwards: bool) -> list[tuple[Step, Array]]:
+def steps_outward(joint: JointRecord, backwards: bool) -> list[tuple[Step, Array]]:
     """The steps from the inner side, each with its axis (3,) in the axes of the outer side where coordinates are zero.
 
     Coordinates are those of the scene: where the second side carries the first, `backwards`, steps come in the other
@@ -55,6 +55,6 @@ def steps_outward(joint: SpatialJoint, backwards: bool) -> list[tuple[Step, Arra
     return [(step, triad[:, step.axis]) for step in (reversed(steps) if backwards else steps)]
 
 
-def follows(joint: SpatialJoint, step: Step) -> float | None:
+def follows(joint: JointRecord, step: Step) -> float | None:
     """Way per angle (m/rad) of a screw's step that goes along with its turn; None of others."""
-    return joint.rise if isinstance(joint, SpatialScrew) and step.coordinate < 0 else None
+    return joint.rise if isinstance(joint, ScrewJoint) and step.coordinate < 0 else None

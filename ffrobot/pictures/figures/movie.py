@@ -19,8 +19,8 @@ from ..motion import visible_exaggeration
 from ..movie_file import Frame, MovieOptions, check_movie, movie_outputs, moving_analysis, write_movie
 from ..path_targets import Target, targets
 from .filled import closed_path
+from .movie_3d import Picture3D, moving_scene
 from .palette import COLORS
-from .spatial_movie import SpatialPicture, moving_scene
 from .style import literal, style
 
 SIZE, DPI = (8.0, 4.8), 120  # inches; 960 x 576 pixels
@@ -39,7 +39,7 @@ def write_motion(results_path: Path, path: Path, options: MovieOptions | None = 
     check_movie(path)
     with Results(results_path) as results, style():
         analysis = moving_analysis(results, options.analysis)
-        frames_of = spatial_frames if results.is_spatial else motion_frames
+        frames_of = frames_3d if results.is_spatial else motion_frames
         write_movie(path, frames_of(results, analysis, options, notes))
     return list(dict.fromkeys(notes))
 
@@ -58,13 +58,13 @@ def motion_frames(results: Results, analysis: str, options: MovieOptions, notes:
         yield picture.at(int(k))
 
 
-def spatial_frames(results: Results, analysis: str, options: MovieOptions, notes: list[str]) -> Iterator[Frame]:
+def frames_3d(results: Results, analysis: str, options: MovieOptions, notes: list[str]) -> Iterator[Frame]:
     """The frames of a scene in space, seen from a corner."""
     time = results.time(analysis)
     frames, shown = np.unique(movie_outputs(time, options.seconds), return_inverse=True)
     scene = moving_scene(results, analysis, frames, options.scale, notes)
     title = _title(results, analysis, scene.scale)
-    picture = SpatialPicture(results, title, time[frames], scene, _figure())
+    picture = Picture3D(results, title, time[frames], scene, _figure())
     for k in shown:
         yield picture.at(int(k))
 

@@ -19,11 +19,11 @@ from ...fe_models.modal_body_file import is_modal_body_file, read_modal_body
 from ...results.file import Results
 from .body_shape import draw_mesh, draw_modes
 from .configurations import draw_configurations
+from .configurations_3d import draw_configurations_3d, draw_path_3d
 from .figure_file import FigureRecord, load_figures
 from .linear import draw_bode, draw_robot_modes
 from .path import draw_path
 from .placement import draw_placement
-from .spatial_configurations import draw_spatial_configurations, draw_spatial_path
 from .standard import standard_figures
 from .style import literal, new_axes, style
 from .time_history import draw_time_history
@@ -38,7 +38,7 @@ DRAW = {
 }
 
 DRAW_WHOLE = {"bode": draw_bode, "modes": draw_robot_modes}  # with axes of their own
-DRAW_IN_SPACE = {"configurations": draw_spatial_configurations, "path": draw_spatial_path}
+DRAW_3D = {"configurations": draw_configurations_3d, "path": draw_path_3d}
 
 # No dates and no versions: the same results give the same files.
 METADATA = {
@@ -143,7 +143,7 @@ def draw(record: FigureRecord, results: Results) -> Figure:
             f'{results.path}: figure "{record.name}": exaggeration: expected it only of 3D scenes, found a planar'
             " one, whose configurations are to scale"
         )
-    whole = DRAW_WHOLE | DRAW_IN_SPACE if results.is_spatial else DRAW_WHOLE
+    whole = DRAW_WHOLE | DRAW_3D if results.is_spatial else DRAW_WHOLE
     if record.kind in whole:
         return whole[record.kind](record, results)
     picture, axes = new_axes(record.title)

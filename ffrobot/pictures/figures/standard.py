@@ -21,7 +21,7 @@ from .shared import (
     tip_error_figures,
     voltage_figures,
 )
-from .spatial_standard import spatial_figures
+from .standard_3d import figures_3d
 
 ROUND_OFF = 1e-9  # rad: bodies that turn no further do not turn
 
@@ -29,7 +29,7 @@ ROUND_OFF = 1e-9  # rad: bodies that turn no further do not turn
 def standard_figures(results: Results) -> tuple[FigureRecord, ...]:
     """Configurations, paths, angles, deflections, forces, moments and voltages; analyses are laid over each other."""
     if results.is_spatial:
-        return spatial_figures(results)
+        return figures_3d(results)
     return tuple(
         [
             *moving_configurations(results),

@@ -9,13 +9,13 @@ import numpy as np
 
 from ...common.arrays import Array, Indices
 from ..coarse_surface import coarsened, triangles_of
+from ..drawn_3d.joints import Marker, ground_places, joint_markers, tool_marker
+from ..drawn_3d.marks import AXIS_LENGTH, TOOL_COLORS, TOOL_LENGTH
+from ..drawn_3d.shapes import surface_shape, thickened
 from ..figures.palette import COLORS
 from ..motion import MovingBody, moving_bodies, visible_exaggeration
 from ..path_targets import Target, targets
 from ..projection import SPACE
-from ..spatial.joints import Marker, ground_places, joint_markers, tool_marker
-from ..spatial.marks import AXIS_LENGTH, TOOL_COLORS, TOOL_LENGTH
-from ..spatial.shapes import surface_shape, thickened
 from .charts import encoded, plain
 from .mechanism import PLAYING_SECONDS, SLOWEST, Mechanism
 from .runs import Run
@@ -25,7 +25,7 @@ MAX_TRIANGLES = 4000  # of a body
 BAR = 0.008  # of the mechanism's size: radius of bars that stand for rigid bodies
 
 
-def spatial_mechanism(runs: Sequence[Run]) -> Mechanism:
+def mechanism_data(runs: Sequence[Run]) -> Mechanism:
     """The moving picture of several runs in space, each in a colour of its own."""
     notes: list[str] = []
     moved = [moving_bodies(run.results, run.analysis, _frames(run)) for run in runs]

@@ -18,7 +18,7 @@ from .charts import Chart
 from .diagrams import DrawnDiagram
 from .histories import folded, history_charts
 from .mechanism import mechanism
-from .mechanism_3d import spatial_mechanism
+from .mechanism_3d import mechanism_data
 from .modes import link_modes
 from .modes_3d import modes_3d
 from .runs import runs, sources
@@ -65,7 +65,7 @@ def report(files: Sequence[Results], studies: Sequence[tuple[Path, Study]] = ())
         page_js=(HERE / "page.js").read_text(encoding="utf-8"),
         modes_3d_js=(HERE / "modes_3d.js").read_text(encoding="utf-8"),
         player_js=(HERE / "player.js").read_text(encoding="utf-8"),
-        mechanism_js=(HERE / f"mechanism{'_3d' if _all_spatial(files) else ''}.js").read_text(encoding="utf-8"),
+        mechanism_js=(HERE / f"mechanism{'_3d' if _all_3d(files) else ''}.js").read_text(encoding="utf-8"),
         page_css=(HERE / "page.css").read_text(encoding="utf-8"),
         ffrobot_version=program_version(),
     )
@@ -90,8 +90,8 @@ def _content(files: Sequence[Results], studies: Sequence[StudyPart]) -> dict[str
 def _of_results(files: Sequence[Results]) -> tuple[dict[str, Any], list[Chart]]:
     """The parts of the page that need solved scenes, and their charts."""
     all_runs = runs(files)
-    spatial = _all_spatial(files)
-    moving = spatial_mechanism(all_runs) if spatial else mechanism(all_runs)
+    spatial = _all_3d(files)
+    moving = mechanism_data(all_runs) if spatial else mechanism(all_runs)
     modes, histories = link_modes(all_runs), history_charts(files)
     shapes = modes_3d(modes)
     content = {
@@ -115,7 +115,7 @@ def _of_results(files: Sequence[Results]) -> tuple[dict[str, Any], list[Chart]]:
     return content, [*histories, *(chart for link in modes for chart in link.charts)]
 
 
-def _all_spatial(files: Sequence[Results]) -> bool:
+def _all_3d(files: Sequence[Results]) -> bool:
     """Whether the files are of scenes in space; `InputError` where some are and some are not."""
     kinds = {results.is_spatial: results.path for results in files}
     if len(kinds) == 2:

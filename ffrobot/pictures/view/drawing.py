@@ -12,8 +12,8 @@ import numpy as np
 
 from ...common.arrays import Array
 from ..body_surface import drawn_mode
+from ..drawn_3d.marks import AXIS_LENGTH, TOOL_COLORS, TOOL_LENGTH
 from ..projection import LINK, SPACE, View
-from ..spatial.marks import AXIS_LENGTH, TOOL_COLORS, TOOL_LENGTH
 
 SIZE, MOVIE_SIZE = (1400, 800), (960, 576)  # pixels
 PANEL = (700, 360)  # pixels, of a mode

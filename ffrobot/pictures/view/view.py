@@ -19,8 +19,8 @@ from ..drawn_body import ground_points
 from ..figures.shared import file_name
 from ..motion import visible_exaggeration
 from .grids import joint_places, modes_grid, results_grid
+from .grids_3d import marks_3d, results_grid_3d
 from .pictures import Picture, draw_pictures
-from .spatial_grids import spatial_marks, spatial_results_grid
 from .vtkhdf import Grid, vtkhdf_image
 from .xdmf import xdmf_text
 
@@ -97,7 +97,7 @@ def _results(path: Path, options: Options, notes: list[str]) -> Iterator[View]:
     with Results(path) as results:
         for analysis in _analyses(results, options.analysis):
             frames = _frames(results, analysis, options.frames)
-            grid_of = spatial_results_grid if results.is_spatial else results_grid
+            grid_of = results_grid_3d if results.is_spatial else results_grid
             grid, name = grid_of(results, analysis, frames, notes), file_name(analysis)
             pictures = [_snapshot(results, analysis, frames, grid, options, color) for color in _colors(grid)]
             pictures[0] = replace(pictures[0], path=f"{name}.png")
@@ -159,7 +159,7 @@ def motion_picture(
         color=color,
     )
     if results.is_spatial:
-        return replace(picture, **spatial_marks(results, analysis, frames[list(steps)], scale))
+        return replace(picture, **marks_3d(results, analysis, frames[list(steps)], scale))
     at, exaggeration = joint_places(results, analysis, frames[list(steps)])
     joints = at + (scale - 1.0) * exaggeration
     nothing: list[list[list[list[float]]]] = [[] for _ in steps]

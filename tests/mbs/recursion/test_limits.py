@@ -7,11 +7,11 @@ from scipy.special import ellipk, ellipkinc
 
 import ffrobot
 from ffrobot.mbs import _core
-from ffrobot.mbs.model.spatial_model import build_spatial_model
-from ffrobot.mbs.model.spatial_system import SpatialSystem
-from ffrobot.mbs.solve.spatial_limits import watch_limits, watched
-from ffrobot.mbs.solve.spatial_statics import initial_state
-from ffrobot.run.spatial_bodies import load_spatial_bodies
+from ffrobot.mbs.model.model import build_model
+from ffrobot.mbs.model.system import MultibodySystem
+from ffrobot.mbs.solve.limits import watch_limits, watched
+from ffrobot.mbs.solve.statics import initial_state
+from ffrobot.run.bodies import load_bodies
 
 METHODS = {"dop853": 1e-11, "dopri5": 1e-11, "radau": 1e-11, "generalized_alpha": 1e-7}  # with tolerances
 ROD = {"mass": 2.0, "center": [0.0, 0.0, -0.3], "inertia": [0.07, 0.05, 0.02],
@@ -27,8 +27,8 @@ def system_of(joints, bodies, joints_at=None, rates=None, turn=None):
         joint=joints, initial={"joints": joints_at or {}, "joint_rates": rates or {}},
         analysis=[{"name": "free", "kind": "forward", "end": 1.0, "output_step": 0.1}],
     )  # fmt: skip
-    model = build_spatial_model(scene, [body.spatial for body in load_spatial_bodies(scene, lambda _: None)])
-    return SpatialSystem(model), initial_state(model)
+    model = build_model(scene, [body.spatial for body in load_bodies(scene, lambda _: None)])
+    return MultibodySystem(model), initial_state(model)
 
 
 def controls(name="dop853", tolerance=1e-11, max_steps=0, keep_steps=False):
@@ -39,7 +39,7 @@ def controls(name="dop853", tolerance=1e-11, max_steps=0, keep_steps=False):
 
 
 def run(system, start, times, controls, checkpoint=None, is_watched=True):
-    core, scene, _ = SpatialSystem(system.model).integrated
+    core, scene, _ = MultibodySystem(system.model).integrated
     if is_watched:
         watch_limits(scene, system.model.tree)
     return _core.tree_motion(core, scene, list(times), start.q, start.v, controls, lambda _: True, checkpoint)

@@ -11,12 +11,12 @@ import pytest
 import zoo
 from closed_chains import COUNT, FRICTION, closed_chain
 from mechanisms import assemble
-from points_in_space import Body, J, Mechanism, r
+from points_3d import Body, J, Mechanism, r
 from random_bodies import GRAVITY, JOINTS, ground, random_body, random_state, row, three_links
 from recursion_trees import tree_of
 
 from ffrobot.mbs import _core
-from ffrobot.mbs.model.spatial_system import SpatialSystem
+from ffrobot.mbs.model.system import MultibodySystem
 
 FACTORS = [(0.02, 3e-4), (3.0, 20.0), (0.7 + 0.4j, 5.0 - 8.0j)]
 STILL = _core.TimeFunction.constant(0.0)
@@ -165,7 +165,7 @@ def with_friction(chain, viscous):
         name: {key: value for key, value in table.items() if key not in FRICTION} | {"viscous_friction": viscous}
         for name, table in chain.tables.items()
     }
-    return SpatialSystem(replace(chain, tables=tables).model(list(tables)[-1]))
+    return MultibodySystem(replace(chain, tables=tables).model(list(tables)[-1]))
 
 
 def test_driven_coordinate_in_space():

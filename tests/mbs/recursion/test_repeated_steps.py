@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from points_in_space import J, Mechanism
+from points_3d import J, Mechanism
 from random_bodies import ground, random_body, three_links
 
 from ffrobot.mbs import _core

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from points_in_space import J, Mechanism, r
+from points_3d import J, Mechanism, r
 from random_bodies import GRAVITY, JOINTS, check_balance, ground, random_body, random_state, row, three_links
 
 

@@ -8,7 +8,7 @@ from functools import partial
 
 import numpy as np
 import pytest
-from points_in_space import J, Mechanism, Series, r
+from points_3d import J, Mechanism, Series, r
 from random_bodies import GRAVITY, JOINTS, check_balance, ground, random_body, random_state, row, three_links
 
 check = partial(check_balance, deflection=0.3)

@@ -1,0 +1,234 @@
+"""Forward dynamics under a sampled controller: sensors, delay, saturation, feed-forward, disturbances."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from dataclasses import replace
+from functools import partial
+from typing import NamedTuple
+
+import numpy as np
+
+from ...common.arrays import Array, as_list
+from ...common.errors import InputError, SolveError
+from ...mbs.analysis.drive import Control, drive_robot
+from ...mbs.analysis.forward import actuator_commands, largest_moments
+from ...mbs.analysis.gears import WoundUp, wound_up
+from ...mbs.analysis.outcome import Outcome
+from ...mbs.analysis.replay import replay_times, supplied
+from ...mbs.model.drives import Drives, PointDrive
+from ...mbs.model.gears import with_compliance
+from ...mbs.model.model import Model, without_paths
+from ...mbs.solve.linearisation import LinearEquations
+from ...mbs.solve.state import State
+from ...mbs.solve.statics import initial_state
+from ..context import ActuatedContext, place_of
+from .choice import make_controller, needed_sensors
+from .controllers import Setup
+from .linear_model import LinearModel, state_space
+from .loop import Loop
+from .loop_keys import SampledAnalysis
+from .loop_record import between, held_commands, held_until, loop_record, sample_times, times_of_run
+from .margins import lowest_frequency
+from .metrics import Followed, place_of_tip
+from .robot import Robot, input_names
+from .signals import Sensing, Signal, make_signals, merged
+
+
+class ClosedLoop(SampledAnalysis):
+    """Motion under sampled control; reference, feed-forward and start are those of the inverse analysis `actuation`.
+
+    Samples are at 0, sample_time, …; a zero-order hold applies the command of each `delay` later. Torques and voltages
+    are limited as in the scene unless `unlimited`. The initial state is that of the inverse analysis, or [initial] of
+    the scene, on the trajectories. `seed` initializes the noise. `tip` is the point of the reported error.
+
+    Sensors name patches by their layout. Joints with several coordinates have one signal per coordinate, "joint/NAME
+    1", "joint/NAME 2", with the same gains.
+    """
+
+    def run(self, context: ActuatedContext) -> Outcome:
+        """Motion and commands."""
+        return run_closed_loop(context, self)
+
+
+class _Plant(NamedTuple):
+    """The robot as it moves: gears give where the scene says so.
+
+    Attributes:
+        model: its equations of motion.
+        source: the motion of the inverse analysis in its coordinates, and what that found of gears that give.
+    """
+
+    model: Model
+    source: WoundUp
+
+
+def run_closed_loop(context: ActuatedContext, analysis: ClosedLoop) -> Outcome:
+    """The closed loop of `analysis` about the motion of an inverse analysis, from its initial state.
+
+    The run's details are a `LoopRecord`. One that diverges ends there and is kept. Raises `InputError` for controllers
+    that do not fit the robot, `SolveError` where a user's function fails.
+    """
+    assert analysis.actuation is not None
+    source = context.outcomes[analysis.actuation]
+    plant, robot, whole = _plant(context, source), _robot(context, source), context.whole
+    given, more = (
+        [s for sensor in sensors for s in make_signals(plant.model, context.patches, sensor, whole)]
+        for sensors in (analysis.sensor, needed_sensors(robot, analysis.controller))
+    )
+    read = merged(given, more)
+    sensing = Sensing(plant.model, read)
+    outputs, tip = replay_times(source, analysis), place_of(whole, analysis.tip) or _default_tip(plant.model)
+    models = loop_models(plant.model, source.time, plant.source)
+    place_at = _place_of_tip(analysis, plant.model, source, tip)
+    lowest = lowest_frequency(models, analysis.controller, analysis.sample_time, analysis.delay)
+    times, rows = times_of_run(outputs, place_at, lowest)
+    setup = _setup(context, analysis, source, robot, plant, read, outputs, sensing.read(*plant.source[:3]))
+    acting = [make_controller(record, setup, analysis.controller) for record in analysis.controller]
+    limit = np.full(len(setup.inputs), np.inf) if analysis.unlimited else _limits(context)
+    loop = Loop(setup, read, acting, limit, analysis.seed)
+    splits = plant.model.tree.n_q, plant.model.tree.n_q + plant.model.tree.n_v
+
+    def at_sample(k: int, t: float, state: Array) -> Array:
+        return loop(k, t, sensing.read(*(part[None] for part in np.split(state, splits)))[0])
+
+    held = partial(held_commands, setup=setup, loop=loop)
+    before, inputs = partial(held, after=-1e-9), actuator_commands(plant.model, context.patches)
+    control = Control(inputs, loop.first, setup.times, analysis.delay, at_sample, before)
+    disturbing = ((place_of(whole, str(load.point)), load.components) for load in analysis.disturbance)
+    drives = Drives(at_points=tuple(PointDrive(*load) for load in disturbing))
+    run = drive_robot(
+        plant.model, analysis, _start(context, analysis, plant), context.progress, drives=drives, times=times,
+        control=control,
+    )  # fmt: skip
+    closer, run = run.closer, run.at([k for k in rows if k < len(run.time)])
+    runs, gears = (_followed(run, place_at, held, tip), _followed(closer, place_at, held, tip)), plant.model.tree.gears
+    record = loop_record(analysis, setup, loop, acting, runs, models, lowest, gears=bool(gears))
+
+    def told(of: Outcome) -> Outcome:
+        commanded = _by_joint(context.model, held(of.time))
+        return replace(of, forces=replace(of.forces, commanded=commanded), details=record)
+
+    return replace(told(run), look_closer=lambda: told(closer))
+
+
+def _robot(context: ActuatedContext, source: Outcome) -> Robot:
+    """What controllers know of: whole links also where the plant has their pieces."""
+    if context.whole is None:
+        return Robot(without_paths(context.model), context.patches, source)
+    return Robot(without_paths(context.whole.model), context.patches, context.whole.told(source))
+
+
+def loop_models(model: Model, time: Array, reference: WoundUp) -> tuple[LinearModel, ...]:
+    """The robot at rest on its reference at start, middle and end; none where it is singular, or has none yet."""
+    rest, rows = np.zeros(model.tree.n_v), sorted({0, len(time) // 2, len(time) - 1})
+    with suppress(SolveError, InputError):
+        linearisation = LinearEquations(model, reference.q[0])
+        return tuple(state_space(linearisation.at(float(time[k]), reference.q[k], rest, rest), {}) for k in rows)
+    return ()
+
+
+def _plant(context: ActuatedContext, source: Outcome) -> _Plant:
+    model = with_compliance(without_paths(context.model))
+    return _Plant(model, wound_up(source, model))
+
+
+def _setup(
+    context: ActuatedContext,
+    analysis: ClosedLoop,
+    source: Outcome,
+    robot: Robot,
+    plant: _Plant,
+    read: Sequence[Signal],
+    outputs: Array,
+    readings: Array,
+) -> Setup:
+    """What controllers may know; `readings` (T, sensors) are those of the inverse analysis at its outputs."""
+    times = sample_times(outputs, analysis.sample_time)
+    return Setup(
+        robot, robot.model, context.patches, input_names(robot), tuple(s.name for s in read), times,
+        analysis.sample_time, analysis.delay, between(times, source.time, readings),
+        _feed_forward(context, analysis, source, plant, times), robot.source,
+    )  # fmt: skip
+
+
+def _feed_forward(
+    context: ActuatedContext, analysis: ClosedLoop, source: Outcome, plant: _Plant, times: Array
+) -> Array:
+    """(K, inputs) moments and voltages of the inverse analysis, in the middle of the time for which each is held."""
+    middle = held_until(times, analysis, source.time[-1])
+
+    most = largest_moments(context.model, limits=False)
+    values = supplied(source, most, context.patches, limited=not analysis.unlimited).sample(as_list(middle))
+    if analysis.feed_forward == "none":
+        values[:, : len(most)] = 0.0
+    if analysis.feed_forward != "joints+pzt":
+        values[:, len(most) :] = 0.0
+    column = 0
+    for joint, columns in context.model.motors.items():  # beside gears that give: known at outputs
+        if plant.source.gears and analysis.feed_forward != "none":
+            moments = plant.source.moments[joint]
+            values[:, column : column + len(columns)] = between(middle, source.time, moments)
+        column += len(columns)
+    return values
+
+
+def _limits(context: ActuatedContext) -> Array:
+    """(inputs,) largest moments and voltages, infinite where the scene gives none."""
+    return np.concatenate(
+        [largest_moments(context.model, limits=True), *(of.reach.limit for of in context.patches.values())]
+    )
+
+
+def _start(context: ActuatedContext, analysis: ClosedLoop, plant: _Plant) -> State:
+    """As the inverse analysis starts, or as the scene says, gears that give wound as in that."""
+    q, v = plant.source.q[0].copy(), plant.source.v[0].copy()
+    if analysis.start == "actuation":
+        return State(q, v)
+    first = initial_state(context.model)
+    twists = [[part[0] for part in gear.twist(q[None], v[None])] for gear in plant.model.tree.gears]
+    q[: len(first.q)], v[: len(first.v)] = first.q, first.v
+    for gear, (way, rate) in zip(plant.model.tree.gears, twists, strict=True):
+        q[gear.motor.q.start] = gear.sign * q[gear.joint.q.start] + way
+        v[gear.motor.v.start] = gear.sign * v[gear.joint.v.start] + rate
+    return State(q, v)
+
+
+def _followed(run: Outcome, place_at: Callable[[Array], Array], held: Callable[[Array], Array], tip: str) -> Followed:
+    """Where the tip went against where it should be."""
+    assert isinstance(run.analysis, ClosedLoop)
+    model = run.model
+    columns = np.concatenate([*model.motors.values(), np.zeros(0, dtype=int)]).astype(int)
+    rates = np.array([model.sign(joint) for joint, of in model.motors.items() for _ in of]) * run.v[:, columns]
+    completed, is_disturbed = run.status == "completed", bool(run.analysis.disturbance)
+    error = _position(run, tip) - place_at(run.time)
+    return Followed(run.time, error, place_at, rates, held(run.time), completed, is_disturbed)
+
+
+def _place_of_tip(analysis: ClosedLoop, model: Model, source: Outcome, tip: str) -> Callable[[Array], Array]:
+    paths, run = [path.components for path in model.scene.trajectory if path.point == tip], source.closer
+    return partial(place_of_tip, end=analysis.last_time, known=(run.time, _position(run, tip)), paths=paths)
+
+
+def _position(run: Outcome, point: str) -> Array:
+    tree = run.model.tree
+    return tree.motion(tree.section(point, np.eye(3)), run.q, tree.frames(run.q)).r
+
+
+def _default_tip(model: Model) -> str:
+    """The point of the first trajectory of one, or the last tip."""
+    driven = [trajectory.point for trajectory in model.scene.trajectory if trajectory.point is not None]
+    if driven:
+        return driven[0]
+    body = next(node.body for node in reversed(model.tree.nodes) if node.body.points)
+    return f"{body.name}.{'tip' if 'tip' in body.points else next(iter(body.points))}"
+
+
+def _by_joint(model: Model, held: Array) -> dict[str, Array]:
+    """Moments (T, k) of motors, of all commands (T, inputs)."""
+    found, column = {}, 0
+    for joint, columns in model.motors.items():
+        found[joint] = held[:, column : column + len(columns)]
+        column += len(columns)
+    return found

@@ -1,0 +1,275 @@
+"""Patches of a link: several layouts side by side, their reach, and voltages that they find together.
+
+The modes to be served are those of the link that moves in the families which some patch reaches, and in no other:
+in-plane bending by patches on ±y, out-of-plane bending by those on ±z, torsion by fibres at an angle, the axial family
+by one named face. Modal forces on the other families are left as they are, and told as what voltages leave unmet.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from ...common.arrays import Array, Indices, as_floats
+from ...common.errors import InputError
+from ...fe_models.modal_body import ModalBody
+from ...mbs import _core
+from ...mbs.model.body import Body
+from ...mbs.model.divided_link import spread_of
+from .composite import Placed
+from .effects import Effects, effects
+from .patches import PatchArray, assembled, check_edges, edges_on_piece, patch_edges
+from .reach import Reach, check_all_served, served_first, weights
+from .reached_modes import ReachedModes, reached_modes
+from .records import PztLayout
+from .sections import check_sections
+from .voltages import Voltages, allocation, solve_voltages
+
+
+@dataclass(frozen=True)
+class OnBody:
+    """What all k patches of a link do to one body that may carry them, on the n modes of the body's file.
+
+    Attributes:
+        Phi_V: (n, k) modal forces per volt.
+        turn: (n, k) by how much each mode turns the ends of each patch against each other, rad.
+        to_link: modal forces on the modes of the link's file by those on these, (modes of the link, n).
+    """
+
+    Phi_V: Array
+    turn: Array
+    to_link: Array
+
+
+@dataclass(frozen=True)
+class LinkPatches:
+    """All patches of one link, k in all, on the n modes of its modal body.
+
+    Voltages serve the modes of the link. They act on whichever of the `bodies` a model has: the link, or its pieces.
+
+    Attributes:
+        arrays: by layout, each on the modes that it reaches, `modes`.
+        modes: by layout.
+        reach: of all patches side by side on the modes that they reach together, `reached`.
+        reached: likewise.
+        bodies: by name, the link and, where it is divided, its pieces.
+        on_kept: (n, n) of modal forces the part that the equations keep, where the patches serve that alone.
+    """
+
+    arrays: Mapping[str, PatchArray]
+    modes: Mapping[str, ReachedModes]
+    reach: Reach
+    reached: ReachedModes
+    bodies: Mapping[str, OnBody]
+    on_kept: Array | None = None
+
+    @property
+    def body(self) -> str:
+        """Name of the link."""
+        return next(iter(self.arrays.values())).body
+
+    @property
+    def Phi_V(self) -> Array:
+        """(n, k) modal forces per volt on the modes of the link's file."""
+        return self.bodies[self.body].Phi_V
+
+    def voltages(self, F_p: Array) -> dict[str, Voltages]:
+        """By layout, of modal forces F_p (T, n); `unmet` is what all layouts leave of those that this one reaches."""
+        found = solve_voltages(self.reach, self.reached.forces(F_p))
+        return self._by_layout(found.required, found.within_limit, self.unmet(F_p, found.within_limit))
+
+    @property
+    def limit(self) -> Array:
+        """(k,) largest voltages, V; infinite where the scene gives none."""
+        return self.reach.limit
+
+    def at_voltages(self, V: Array, F_p: Array) -> dict[str, Voltages]:
+        """By layout, of known V (T, k) where modal forces F_p (T, n) are wanted."""
+        within = np.clip(V, -self.limit, self.limit)
+        return self._by_layout(V, within, self.unmet(F_p, within))
+
+    def _by_layout(self, required: Array, within: Array, unmet: Array) -> dict[str, Voltages]:
+        ends = np.cumsum([len(array.edges) for array in self.arrays.values()])
+        pairs = (np.split(x, ends[:-1], axis=1) for x in (required, within))
+        return {
+            name: Voltages(one, other, self.modes[name].forces(unmet), self.modes[name].served)
+            for name, one, other in zip(self.arrays, *pairs, strict=True)
+        }
+
+    @property
+    def per_volt(self) -> dict[str, Array]:
+        """By body, (n, k) modal forces per volt on the modes of its file."""
+        return {name: of.Phi_V for name, of in self.bodies.items()}
+
+    @property
+    def to_reached(self) -> dict[str, Array]:
+        """By body, (m, n) modal forces on `reached` by those on the modes of its file."""
+        return {name: self.reached.forces(of.to_link.T).T for name, of in self.bodies.items()}
+
+    def on_link(self, modal: Mapping[str, Array]) -> Array:
+        """Modal forces (T, …) on the modes of the link's file, by those of bodies that carry it on theirs."""
+        found = [modal[name] @ of.to_link.T for name, of in self.bodies.items() if name in modal]
+        return as_floats(np.sum(found, axis=0))
+
+    def allocation(self, *, limited: bool) -> _core.Allocation:
+        """From modal forces on `reached` to voltages (k,), with the limits of the patches or without."""
+        return allocation(self.reach, limited=limited)
+
+    def placed_on(self, start: float, length: float) -> list[tuple[Indices, Placed]]:
+        """By layout with patches on a piece of the link: which of the k these are, and where they are on the piece.
+
+        The piece is `length` (m) long and begins at `start` (m) from the root.
+        """
+        found = []
+        for label, array in self.arrays.items():
+            which, edges = edges_on_piece(array.layout, array.edges, start, length)
+            if which.size:
+                found.append((self.columns(label).start + which, Placed(array.layout, edges)))
+        return found
+
+    def columns(self, layout: str) -> slice:
+        """Which of the k patches are those of one layout."""
+        ends = np.cumsum([len(array.edges) for array in self.arrays.values()])
+        end = int(ends[list(self.arrays).index(layout)])
+        return slice(end - len(self.arrays[layout].edges), end)
+
+    def unmet(self, F_p: Array, voltages: Array) -> Array:
+        """(T, n) of modal forces F_p, at voltages (T, k) of all patches."""
+        left: Array = F_p - voltages @ self.Phi_V.T
+        return left if self.on_kept is None else left @ self.on_kept
+
+
+def placed_patches(path: Path, layouts: Sequence[PztLayout], body: ModalBody) -> list[Placed]:
+    """Where the patches of layouts are on their link. Raises `InputError` for patches that do not fit it."""
+    return [_placed(path, layout, body) for layout in layouts]
+
+
+def link_patches(path: Path, layouts: Sequence[PztLayout], body: ModalBody, spatial: Body) -> LinkPatches:
+    """Place the layouts of one link: they serve all modes of its file that they reach; see `kept_modes`, too.
+
+    Raises `InputError` for patches that do not fit the link, or weights that do not.
+    """
+    spatial = spatial.whole
+    key = _key(path, layouts[0].label if len(layouts) == 1 else layouts[0].body)
+    placed = placed_patches(path, layouts, body)
+    found = effects(key, placed, body)
+    Phi_V, turn = (np.concatenate(of).T for of in ([of.Phi_V for of in found], [of.turn for of in found]))
+    modes = {one.layout.label: reached_modes(of.Phi_V, body, spatial) for one, of in zip(placed, found, strict=True)}
+    for layout in layouts:
+        _check_reached(path, layout, modes[layout.label], body)
+    arrays = {
+        one.layout.label: _array(path, one, body, spatial, of, modes[one.layout.label])
+        for one, of in zip(placed, found, strict=True)
+    }
+    if len(layouts) == 1:
+        reached, reach = modes[layouts[0].label], _alone(arrays[layouts[0].label])
+    else:
+        reached = reached_modes(Phi_V.T, body, spatial)
+        reach = _together(path, layouts, arrays, reached, Phi_V.T)
+    own = {layouts[0].body: OnBody(Phi_V, turn, np.eye(body.mode_count))}
+    return LinkPatches(arrays, modes, reach, reached, own)
+
+
+def check_reach(path: Path, of_link: LinkPatches) -> None:
+    """Raise `InputError` unless patches reach all modes that they are to serve, or the scene is content with less."""
+    layouts = [array.layout for array in of_link.arrays.values()]
+    if all(layout.allocation == "exact" for layout in layouts):
+        check_all_served(_key(path, layouts[0].label if len(layouts) == 1 else of_link.body), of_link.reach)
+
+
+def on_pieces(
+    path: Path, whole: LinkPatches, link: ModalBody, pieces: Mapping[str, tuple[float, ModalBody]]
+) -> LinkPatches:
+    """The patches of a link, on its pieces as well: a patch across a cut acts on both sides of it.
+
+    `pieces` by name from the root to the tip: where each begins, m from the root, and its modal body.
+    """
+    body, bodies = whole.body, {whole.body: whole.bodies[whole.body]}
+    spread = spread_of(link, list(pieces.values()))
+    ends = np.cumsum([modal.mode_count for _, modal in pieces.values()])
+    for (name, (start, modal)), to_piece in zip(pieces.items(), np.split(spread, ends[:-1]), strict=True):
+        Phi_V, turn = np.zeros((2, modal.mode_count, whole.Phi_V.shape[1]))
+        on_piece = whole.placed_on(start, modal.length)
+        found = effects(_key(path, body), [placed for _, placed in on_piece], modal) if on_piece else []
+        for (which, _), of in zip(on_piece, found, strict=True):
+            Phi_V[:, which], turn[:, which] = of.Phi_V.T, of.turn.T
+        bodies[name] = OnBody(Phi_V, turn, to_piece.T)
+    return replace(whole, bodies=bodies)
+
+
+def by_body(layouts: Sequence[PztLayout]) -> Iterator[tuple[str, list[PztLayout]]]:
+    """Bodies with patches, in the order of their first layouts."""
+    for body in dict.fromkeys(layout.body for layout in layouts):
+        yield body, [layout for layout in layouts if layout.body == body]
+
+
+def with_count(path: Path, layout: PztLayout, body: ModalBody, spatial: Body, count: int) -> LinkPatches | None:
+    """As many of the same patches, evenly spread over the link, alone, with one limit; None where they have no room."""
+    if count * layout.length > body.length * (1 + 1e-9):
+        return None
+    limit = min(layout.limit) if isinstance(layout.limit, tuple) else layout.limit
+    changed = {"count": count, "centers": None, "limit": limit, "allocation": "least-squares"}
+    try:
+        return link_patches(path, [layout.model_copy(update=changed)], body, spatial)
+    except InputError:  # across a step of the section, or weights for another number
+        return None
+
+
+def _placed(path: Path, layout: PztLayout, body: ModalBody) -> Placed:
+    key, edges = _key(path, layout.label), patch_edges(layout, body.length)
+    check_sections(key, body, layout.normal, twists=layout.fibre_angle is not None)
+    check_edges(key, edges, body.length)
+    return Placed(layout, edges)
+
+
+def _check_reached(path: Path, layout: PztLayout, modes: ReachedModes, body: ModalBody) -> None:
+    """Raise `InputError` where a layout bends or twists the link in no mode."""
+    if not modes.served:
+        families = ", ".join(dict.fromkeys(str(family) for family in body.family)) or "none"
+        raise InputError(
+            f'{_key(path, layout.label)}: bends: expected modes of the link that patches for "{layout.acts_in}" reach,'
+            f" found modes in {families}: move the patches, or add such modes to the link ([modes] family)"
+        )
+
+
+def _array(path: Path, placed: Placed, body: ModalBody, spatial: Body, of: Effects, modes: ReachedModes) -> PatchArray:
+    T_inverse = spatial.on_file
+    points = {name: modes.seen(at.translation @ T_inverse) for name, at in spatial.points.items()}
+    W_sqrt = weights(_key(path, placed.layout.label), placed.layout, modes.served, modes.stiffness, points)
+    to_modes = np.zeros((body.mode_count, len(modes.rows)))
+    to_modes[modes.rows] = modes.T
+    return assembled(placed, body, of, to_modes, modes.stiffness, W_sqrt, modes.served)
+
+
+def _alone(array: PatchArray) -> Reach:
+    """Of a layout by itself, with its weights."""
+    return Reach(**{key: getattr(array, key) for key in ("Phi_V", "limit", "W_sqrt", "frequency", "served")})
+
+
+def _together(
+    path: Path,
+    layouts: Sequence[PztLayout],
+    arrays: Mapping[str, PatchArray],
+    reached: ReachedModes,
+    per_volt: Array,
+) -> Reach:
+    """Of layouts side by side: all modal forces that are left count alike."""
+    for layout in layouts:
+        if layout.mode_weights is not None or layout.point_weights is not None:
+            beside = f'with other layouts on "{layout.body}"'
+            raise InputError(f"{_key(path, layout.label)}: expected no weights {beside}, found them")
+    Phi_V = reached.seen(per_volt).T
+    return Reach(
+        Phi_V=Phi_V,
+        limit=np.concatenate([array.limit for array in arrays.values()]),
+        W_sqrt=served_first(reached.served, *Phi_V.shape),
+        frequency=np.sqrt(reached.stiffness) / (2 * np.pi),
+        served=reached.served,
+    )
+
+
+def _key(path: Path, label: str) -> str:
+    return f'{path}: pzt "{label}"'

@@ -1,0 +1,227 @@
+"""Actuation points (Shabana 2022, Eqs. 5–10): generalized driving forces of a body as forces along x, y, z.
+
+Forces F_a at points of a body do L_a F_a on it, with a column [e; u × e; Φᵀe] for a unit force along e at u = x + Φp:
+on R and on the rotation, both in axes of the body, and on its modes. Q_a are the forces that the trajectories have on
+it, and those that hold a shape.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
+from pathlib import Path
+from types import MappingProxyType
+from typing import Annotated
+
+import numpy as np
+
+from ..common.arrays import Array
+from ..common.errors import InputError
+from ..common.validation import Record, did_you_mean, quoted
+from ..fe_models.modal_body import ModalBody
+from ..mbs.fields.field_types import Name
+from ..mbs.fields.references import Reference
+from ..mbs.fields.spelling import IN_PLANE, IN_SPACE
+from ..mbs.model.body import Body, BodyPoint
+from ..mbs.scene.space import Space
+
+DEPENDENT = 1e-10  # ratio of singular values of L_a below which components count as saying the same
+AXES = "xyz"
+ALONG = {"x": "x", "axial": "x", "y": "y", "transverse": "y", "z": "z"}
+"""The axis along which forces act at the places of a key."""
+
+Place = float | Name
+"""Where on a link: the distance from its root (m), or the name of one of its points."""
+
+
+class ActuationPoints(Record):
+    """Components of force on one body, equivalent to its generalized driving forces (Shabana 2022, sec. 4).
+
+    `x`, `y` and `z` list the points of components along that axis of the body's frame; in planar scenes `axial` and
+    `transverse` those along x and y. Without them, ffrobot chooses as many independent components as possible.
+    """
+
+    body: str
+    """Body with these forces."""
+    x: Annotated[tuple[Place, ...], IN_SPACE] = ()
+    """Points (m from the root, or a name) at which a force along the body's x axis acts."""
+    y: Annotated[tuple[Place, ...], IN_SPACE] = ()
+    """Points at which a force along the body's y axis acts."""
+    z: Annotated[tuple[Place, ...], IN_SPACE] = ()
+    """Points at which a force along the body's z axis acts."""
+    axial: Annotated[tuple[Place, ...], IN_PLANE] = ()
+    """Points (m from the root, or a name) at which a force along the body's x axis acts."""
+    transverse: Annotated[tuple[Place, ...], IN_PLANE] = ()
+    """Points at which a force along the body's y axis acts."""
+
+    @property
+    def places(self) -> list[tuple[str, Place]]:
+        """Key and place of each component."""
+        return [(key, place) for key in ALONG for place in getattr(self, key)]
+
+    def references(self) -> Iterator[Reference]:
+        """The body, and the places on it that are named."""
+        yield Reference("body", self.body)
+        for key, place in self.places:
+            if isinstance(place, str):
+                yield Reference(key, f"{self.body}.{place}")
+
+
+@dataclass(frozen=True)
+class PointSet:
+    """Components of force at points of one body.
+
+    Attributes:
+        body: its name.
+        names: of the points, one for each component.
+        axes: "x", "y" or "z", likewise.
+        points: likewise, in the coordinates of the `Body`.
+        scale: (6 + n) factors that make the rows of L_a forces in N: 1, 1/length, √mass.
+    """
+
+    body: str
+    names: tuple[str, ...]
+    axes: tuple[str, ...]
+    points: tuple[BodyPoint, ...]
+    scale: Array
+
+    @property
+    def direction(self) -> Array:
+        """(3, c) unit vectors in body axes."""
+        return np.eye(3)[:, [AXES.index(axis) for axis in self.axes]]
+
+    def of_core(self) -> tuple[Array, Array, Array, Array]:
+        """What the core takes of them: mbs/core/analysis/found_forces.h."""
+        position = np.transpose([point.position for point in self.points])
+        return self.direction, position, np.vstack([point.translation for point in self.points]), self.scale
+
+    def L_a(self, p: Array) -> Array:
+        """(T, 6 + n, c) at modal coordinates p (T, n) of the equations."""
+        e, columns = self.direction, []
+        for k, point in enumerate(self.points):
+            u = point.position + p @ point.translation.T
+            on_frame = np.hstack([np.broadcast_to(e[:, k], u.shape), np.cross(u, e[:, k])])
+            on_modes = np.broadcast_to(point.translation.T @ e[:, k], p.shape)
+            columns.append(np.hstack([on_frame, on_modes]))
+        return np.stack(columns, axis=2)
+
+    def scaled(self, p: Array) -> Array:
+        """L_a (T, 6 + n, c) at p (T, n), its rows as forces in N."""
+        found: Array = self.scale[:, None] * self.L_a(p)
+        return found
+
+
+def make_point_set(
+    scene_path: Path, layout: ActuationPoints, body: ModalBody | None, spatial: Body, space: Space
+) -> PointSet:
+    """The components that the scene asks for, or as many well-conditioned ones in `space` as are independent.
+
+    Raises `InputError` for places that the body has not, for more components than coordinates, and for components that
+    do the same to the body; in the plane for a body whose points cannot carry all its generalized forces.
+    """
+    key = f'{scene_path}: actuation_points "{layout.body}"'
+    coordinates = len(space.translations) + len(space.rotations) + spatial.n_modes
+    if not layout.places:
+        chosen = _automatic(key, layout.body, body, spatial, "".join(AXES[k] for k in space.translations))
+        if space.is_plane and len(chosen.names) < coordinates:  # in 3D forces on an axis do not turn about it
+            raise InputError(
+                f"{key}: expected points that carry all {coordinates} generalized forces of the body, found"
+                f" {len(chosen.names)} independent components among all its stations"
+            )
+        return chosen
+    if len(layout.places) > coordinates:
+        raise InputError(
+            f"{key}: expected at most as many components as the body has coordinates ({coordinates}), found"
+            f" {len(layout.places)}"
+        )
+    points = [_point(key, place, body, spatial) for _, place in layout.places]
+    _check_apart(key, layout.places, points, 1e-9 * (spatial.length or 0.0))
+    chosen = _named(layout.body, tuple(ALONG[along] for along, _ in layout.places), points, spatial)
+    sizes = np.linalg.svd(chosen.scaled(np.zeros((1, spatial.n_modes)))[0], compute_uv=False)
+    rank = int(np.count_nonzero(sizes > DEPENDENT * sizes[0]))
+    if rank < len(points):
+        along_x = "axial ones" if space.is_plane else "those along x"
+        raise InputError(
+            f"{key}: expected components that differ in what they do to the body, found {len(points)} of which only"
+            f" {rank} are independent: {along_x} coincide where no mode moves along the link, and it has {coordinates}"
+            " coordinates"
+        )
+    return chosen
+
+
+def _check_apart(key: str, places: Sequence[tuple[str, Place]], points: Sequence[BodyPoint], near: float) -> None:
+    """Raise `InputError` for components along one axis at points less than `near` (m) apart."""
+    for (i, (along, first)), (k, (other, second)) in combinations(enumerate(places), 2):
+        if along == other and np.allclose(points[i].position, points[k].position, rtol=0, atol=near):
+            raise InputError(
+                f"{key}: {along}: expected points apart from each other, found two at {first} and {second} that"
+                " coincide"
+            )
+
+
+def with_points(spatial: Body, chosen: PointSet) -> Body:
+    """The body with the actuation points among its points, where forces can act."""
+    own = dict(zip(chosen.names, chosen.points, strict=True))
+    return replace(spatial, points=MappingProxyType({**spatial.points, **own}))
+
+
+def _automatic(key: str, name: str, body: ModalBody | None, spatial: Body, axes: str) -> PointSet:
+    """Out of all components at every station, those that QR with column pivoting takes first: far from dependent."""
+    from scipy.linalg import qr
+
+    points = [_point(key, place, body, spatial) for place in _candidate_places(key, body, spatial.points)]
+    candidates = _named(name, tuple(axis for axis in axes for _ in points), points * len(axes), spatial)
+    _, R, order = qr(candidates.scaled(np.zeros((1, spatial.n_modes)))[0], mode="economic", pivoting=True)
+    sizes = np.abs(np.diag(R))
+    kept = sorted(order[: int(np.count_nonzero(sizes > DEPENDENT * sizes[0]))])
+    return _named(name, tuple(candidates.axes[k] for k in kept), [candidates.points[k] for k in kept], spatial)
+
+
+def _named(name: str, axes: tuple[str, ...], points: list[BodyPoint], spatial: Body) -> PointSet:
+    per_length, per_mass = np.full(3, 1.0 / _length_of(spatial)), np.full(spatial.n_modes, np.sqrt(spatial.mass))
+    scale = np.concatenate([np.ones(3), per_length, per_mass])
+    return PointSet(name, _point_names(len(points)), axes, tuple(points), scale)
+
+
+def _point_names(count: int) -> tuple[str, ...]:
+    """What the points of so many components are called in results."""
+    return tuple(f"actuation{k}" for k in range(1, count + 1))
+
+
+def _length_of(body: Body) -> float:
+    """By which moments on a body are measured against forces, m."""
+    return body.length or max(float(np.linalg.norm(point.position)) for point in body.points.values()) or 1.0
+
+
+def _candidate_places(key: str, body: ModalBody | None, points: Mapping[str, BodyPoint]) -> list[Place]:
+    """Where components may be put: the stations of a link, the points of a rigid body.
+
+    Raises `InputError` where there are none.
+    """
+    if body is not None:
+        return [float(x) for x in np.unique(body.stations.position[:, 0])]
+    if not points:
+        raise InputError(f"{key}: expected a rigid body with points, found none")
+    return list(points)
+
+
+def _point(key: str, place: Place, body: ModalBody | None, spatial: Body) -> BodyPoint:
+    """One of the points of a body by its name, or the section at a distance from its link's root.
+
+    Raises `InputError` for a place that the body has not.
+    """
+    points = spatial.points
+    if isinstance(place, str):
+        if place not in points:
+            raise InputError(
+                f'{key}: expected a point of the body ({quoted(points)}), found "{place}"' + did_you_mean(place, points)
+            )
+        return points[place]
+    if body is None:
+        raise InputError(f"{key}: expected points of the rigid body by name ({quoted(points)}), found {place:g}")
+    slack = 1e-9 * body.length
+    if not -slack <= place <= body.length + slack:
+        raise InputError(f"{key}: expected places within the link, 0 … {body.length:g} m, found {place:g} m")
+    at, T = body.interpolate(place), spatial.modal_transform
+    return BodyPoint(at.position, at.translation @ T, at.rotation @ T)

@@ -1,0 +1,153 @@
+"""Frames of scenes in space: surfaces in parallel projection, the axes of joints and tools, the paths of points."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import cast
+
+import matplotlib
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.figure import Figure
+
+from ...common.arrays import Array, Indices, Integers
+from ...results.file import Results
+from ..coarse_surface import coarsened, triangles_of
+from ..drawn_3d.joints import Marker, ground_places, joint_markers, tool_marker
+from ..drawn_3d.marks import AXIS_LENGTH, TOOL_COLORS, TOOL_LENGTH
+from ..drawn_3d.shapes import surface_shape, thickened
+from ..motion import moving_bodies, visible_exaggeration
+from ..movie_file import Frame
+from ..path_targets import Target, targets
+from ..projection import SPACE
+from .palette import COLORS
+from .parallel import directions, lit, normals, projected
+from .style import literal
+
+MAX_TRIANGLES = 3000  # of a body
+BAR = 0.008  # of the robot's size: radius of bars that stand for rigid bodies
+MARGIN = 0.04  # of the width of what is seen
+DIRECTIONS = 0.07  # of the robot's size: length of the arrows along x, y, z
+FACE, AXIS, GROUND, WANTED = "#8fb8d4", "#30465c", "#8b95a3", "black"
+TAKEN = COLORS[3]  # no colour of a tool
+
+
+@dataclass(frozen=True)
+class Scene:
+    """All that moves, over T outputs, as far exaggerated as it is drawn; lengths in m, global axes.
+
+    Attributes:
+        size: largest extent of the robot over all outputs.
+        scale: of deflections.
+        points: (T, p, 3) of the surfaces of all bodies.
+        triangles: (t, 3) on these.
+        joints: of these, `axes` (T, a, 2, 3) are the ends of the lines along their axes.
+        tools: (T, 3 k, 2, 3) ends of the axes x, y, z of each of k sections that follow paths.
+        paths: the paths wanted, and (T, 3) where each point is in truth.
+    """
+
+    size: float
+    scale: float
+    points: Array
+    triangles: Integers
+    joints: Array
+    axes: Array
+    tools: Array
+    paths: Sequence[tuple[Target, Array]]
+
+
+def moving_scene(results: Results, analysis: str, frames: Indices, scale: float | None, notes: list[str]) -> Scene:
+    """The scene at the outputs `frames`; `scale` as large as can be seen if None."""
+    bodies, shift = moving_bodies(results, analysis, frames)
+    at = np.concatenate([body.global_points.reshape(-1, 3) for body in bodies])
+    size = float(np.ptp(at, axis=0).max()) or 1.0
+    if scale is None:
+        scale = visible_exaggeration(size, max(float(np.abs(b.deflection).max(initial=0.0)) for b in bodies))
+    points, triangles, count = [], [], 0
+    for body, carried in zip(bodies, shift, strict=True):
+        shape = thickened(surface_shape(results, body, notes), BAR * size)
+        kept, cells = coarsened(shape.points, triangles_of(shape.cells), MAX_TRIANGLES)
+        points.append(shape.placed(body, carried, scale)[:, kept])
+        triangles.append(cells + count)
+        count += len(kept)
+    wanted = targets(results, analysis)
+    tools = [tool_marker(point, bodies, shift) for point in dict.fromkeys(target.point for target in wanted)]
+    joints, T = joint_markers(results.scene, bodies, shift), len(frames)
+    reach = AXIS_LENGTH * size
+    return Scene(
+        size=size,
+        scale=scale,
+        points=np.concatenate(points, axis=1),
+        triangles=np.concatenate(triangles),
+        joints=np.stack([joint.exaggerated(scale) for joint in joints], 1) if joints else np.zeros((T, 0, 3)),
+        axes=_ends(joints, scale, (-reach, reach), T),
+        tools=_ends(tools, scale, (0.0, TOOL_LENGTH * size), T),
+        paths=[(target, tool_marker(target.point, bodies, shift).position) for target in wanted],
+    )
+
+
+def _ends(markers: Sequence[Marker], scale: float, reach: tuple[float, float], outputs: int) -> Array:
+    """(T, a, 2, 3) of lines along all directions of markers, from one distance (m) to the other."""
+    found = [
+        marker.exaggerated(scale)[:, None, None] + np.array(reach)[:, None] * marker.directions[:, :, None]
+        for marker in markers
+    ]
+    return np.concatenate([np.zeros((outputs, 0, 2, 3)), *found], axis=1)
+
+
+class Picture3D:
+    """Axes on which a scene is painted anew for every frame, over a background that is drawn once."""
+
+    def __init__(self, results: Results, title: str, time: Array, scene: Scene, figure: Figure) -> None:
+        self.scene, self.time = scene, time
+        self.canvas, self.axes = FigureCanvasAgg(figure), figure.subplots()
+        self.axes.set_title(title, loc="left")
+        self.axes.set_aspect("equal", adjustable="datalim")
+        self.axes.set_axis_off()
+        self._draw_still(results)
+        literal(figure)
+        self.canvas.draw()  # also lays the figure out, once
+        self.background = self.canvas.copy_from_bbox(figure.bbox)
+        self.clock = self.axes.set_title("", loc="right")
+        self.surface = PolyCollection([], linewidths=0.3)
+        self.lines = LineCollection([], linewidths=1.0)
+        self.joints = self.axes.plot([], [], "o", color=AXIS, markersize=3)[0]
+        self.taken = [self.axes.plot([], [], color=TAKEN, linewidth=1.0)[0] for _ in scene.paths]
+        for collection in (self.surface, self.lines):
+            self.axes.add_collection(collection, autolim=False)
+
+    def _draw_still(self, results: Results) -> None:
+        """The ground, the paths wanted, directions; and room for all that moves."""
+        self.axes.plot(*projected(ground_places([results.scene]), SPACE).T, "s", color=GROUND, markersize=8)
+        for target, _ in self.scene.paths:
+            if target.columns == (0, 1, 2):
+                wanted = projected(target.wanted, SPACE)
+                self.axes.plot(*wanted.T, color=WANTED, linestyle="--", linewidth=0.8)
+        for places in (self.scene.points, self.scene.axes, self.scene.tools):
+            self.axes.update_datalim(projected(places, SPACE).reshape(-1, 2))
+        self.axes.margins(MARGIN)
+        self.axes.autoscale_view()
+        directions(self.axes, DIRECTIONS * self.scene.size, SPACE)
+
+    def at(self, k: int) -> Frame:
+        """The frame of output k: what faces away is left out, far triangles are painted first, near ones hide them."""
+        points = self.scene.points[k]
+        triangles = self.scene.triangles[normals(points, self.scene.triangles) @ SPACE.viewer > 0.0]
+        colors = lit(points, triangles, np.array(matplotlib.colors.to_rgb(FACE)), SPACE)
+        order = np.argsort((points @ SPACE.viewer)[triangles].mean(axis=1), kind="stable")
+        # An array is drawn faster than the list of corners that Matplotlib's types ask for.
+        self.surface.set_verts(cast(Sequence[Array], projected(points, SPACE)[triangles[order]]))
+        self.surface.set(facecolors=colors[order], edgecolors=colors[order])
+        axes, tools = self.scene.axes[k], self.scene.tools[k]
+        self.lines.set_segments(list(projected(np.concatenate([axes, tools]), SPACE)))
+        self.lines.set_colors([AXIS] * len(axes) + [TOOL_COLORS[j % 3] for j in range(len(tools))])
+        self.joints.set_data(*projected(self.scene.joints[k], SPACE).T)
+        for line, (_, places) in zip(self.taken, self.scene.paths, strict=True):
+            line.set_data(*projected(places[: k + 1], SPACE).T)
+        self.clock.set_text(f"t = {self.time[k]:.3f} s")
+        self.canvas.restore_region(self.background)
+        for artist in (self.surface, *self.taken, self.lines, self.joints, self.clock):
+            self.axes.draw_artist(artist)
+        return np.asarray(self.canvas.buffer_rgba())[..., :3].copy()

@@ -1,0 +1,150 @@
+"""Results files (HDF5): one group per analysis, written whole or not at all."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import h5py
+
+from ..actuation.control.linear_models import LinearModels
+from ..actuation.control.loop_record import LoopRecord
+from ..actuation.control.placing import Placed
+from ..common.checksum import MARK, sealed
+from ..common.checksum import METHOD as CHECKSUM
+from ..common.files import write_atomically
+from ..common.version import program_version
+from ..mbs.analysis.outcome import Details, Outcome
+from ..mbs.analysis.tracking import TrackedPath
+from ..mbs.fields.steps import DATASET, METHOD
+from ..mbs.quantities.motion import RobotMotion
+from ..mbs.solve.redundancy import resolving_joints
+from ..run.solution import AnalysisResult, Solution
+from .actuators import write_actuation, write_placement, write_point_forces, write_structure, write_tracking
+from .bodies import write_bending, write_bodies, write_stress
+from .control import write_loop
+from .file import FORMAT
+from .forces import write_joints, write_paths
+from .linear import write_linear
+from .peaks import write_peaks
+from .resume import write_state
+
+FORMAT_VERSION = 1
+
+DETAILS: dict[type[Details], Callable[[h5py.Group, RobotMotion, Any], None]] = {
+    LinearModels: write_linear,
+    LoopRecord: write_loop,
+    Placed: write_placement,
+    TrackedPath: write_tracking,
+}
+"""What writes to the group of an analysis that which only its kind finds."""
+
+
+def write_results(solution: Solution, path: Path) -> None:
+    """Write every analysis of a solution to `path`. Raises `SolveError` where that fails; no half file is left."""
+    write_atomically(path, sealed(results_image(solution)), "results file")
+
+
+def results_image(solution: Solution) -> bytes:
+    """The content of the results file of a solution."""
+    with h5py.File("results", "w", driver="core", backing_store=False) as file:
+        _write_head(file, solution)
+        for name, result in solution.analyses.items():
+            group, closer = file.create_group(name), result.closer
+            _write_analysis(group, solution, result)
+            write_peaks(group, None if closer is None else partial(_write_analysis, solution=solution, result=closer))
+        if (run := solution.unread) is not None:
+            _write_run(file.create_group(run.analysis.name), run, run.statistics.warnings, ())
+        write_state(file, solution)
+        file.flush()
+        image: bytes = file.id.get_file_image()
+    return image
+
+
+def _write_head(file: h5py.File, solution: Solution) -> None:
+    """What every results file says of itself, of the scene, and of the files of modal bodies."""
+    file.attrs["format"] = FORMAT
+    file.attrs["format_version"] = FORMAT_VERSION
+    file.attrs[MARK] = CHECKSUM
+    file.attrs["ffrobot_version"] = program_version()
+    file.attrs["name"] = solution.scene.name
+    file.attrs["scene"] = solution.scene.text
+    file.attrs["space"] = solution.scene.space
+    files = {
+        name: {"path": str(body.path.absolute()), "sha256": body.file_hash, "input_hash": body.modal.input_hash}
+        for name, body in solution.bodies.items()
+        if body.modal is not None and body.path is not None
+    }
+    file.attrs["modal_bodies"] = json.dumps(files)
+    file.attrs["geometric_stiffening"] = solution.is_stiffened
+    file.attrs.create("skipped", [*solution.omissions, *solution.notes], dtype=h5py.string_dtype())
+
+
+def _write_analysis(group: h5py.Group, solution: Solution, result: AnalysisResult) -> None:
+    run, motion = result.run, result.motion
+    _write_run(group, run, result.warnings, result.notes)
+    _write_judgement(group, solution, result)
+    if joints := resolving_joints(motion.model):
+        group.attrs.update({"redundancy": motion.model.scene.redundancy, "resolved_by": joints})
+    write_bodies(group, solution, result)
+    write_bending(group, result.bending)
+    write_joints(group, solution, result)
+    write_structure(group, {name: body.structure for name, body in solution.bodies.items() if body.structure})
+    for point, shift in result.predicted_shift.items():
+        group[f"points/{point}/predicted_shift"] = motion.space.along(shift)
+    for body, forces in result.point_forces.items():
+        write_point_forces(group.create_group(f"actuation_points/{body}"), solution.points[body], forces, motion.space)
+    for body, stress in result.stresses.items():
+        write_stress(group.create_group(f"stress/{body}"), stress)
+    write_paths(group, result)
+    for key, values in vars(result.energies).items():
+        group[f"energy/{key}"] = values
+    group["momentum/linear"] = motion.space.along(result.momentum.linear)
+    group["momentum/angular"] = motion.space.about(result.momentum.angular)
+    if result.actuation is not None:
+        write_actuation(group, solution, result.actuation)
+    violation = group.create_dataset("constraint_violation", data=motion.violation)
+    violation.attrs["columns"] = ["position", "velocity", "acceleration"]
+    for found, write in DETAILS.items():
+        if isinstance(run.details, found):
+            write(group, motion, run.details)
+
+
+def _write_run(group: h5py.Group, outcome: Outcome, warnings: Sequence[str], notes: Sequence[str]) -> None:
+    """What is known of a run whether it has outputs or not: its analysis, how it went, its times and steps.
+
+    `warnings` say why its results may be wrong, `notes` what is worth knowing of right ones.
+    """
+    analysis, run = outcome.analysis, outcome.statistics
+    group.attrs["kind"] = analysis.kind
+    group.attrs["integrator"] = run.integrator.name if analysis.is_integrated else "none"
+    group.attrs["integrator_reason"] = run.integrator.reason if analysis.is_integrated else ""
+    group.attrs["tolerance"] = analysis.tolerance
+    group.attrs["actuation"] = (analysis.source or "") if analysis.takes_actuation else ""
+    group.attrs["apply"] = getattr(analysis, "apply", None) or ""  # of every kind, for those who read the file
+    for key in ("steps", "rejected", "evaluations", "wall_seconds", "status", "cause"):
+        group.attrs[key] = getattr(run, key)
+    for name, texts in (("warnings", warnings), ("notes", notes)):
+        group.attrs.create(name, list(texts), dtype=h5py.string_dtype())
+    group["time"] = outcome.time
+    if len(run.step_ends):
+        group[DATASET] = run.step_ends
+        group[DATASET].attrs[METHOD] = run.integrator.name
+
+
+def _write_judgement(group: h5py.Group, solution: Solution, result: AnalysisResult) -> None:
+    """How well modes resolve a motion, by estimates and by a replay on finer links, and what loads do to stiffness."""
+    group.attrs["stiffening_effect"] = result.stiffening_effect
+    if result.analysis.is_integrated:
+        group.attrs["start_jolt"] = result.start_jolt
+    if result.mode_error is not None:
+        group.attrs["mode_error"] = result.mode_error
+    if solution.mode_choice is not None:
+        for kind, error in solution.mode_choice.errors.get(result.analysis.name, {}).items():
+            group.attrs[f"mode_error_{kind}"] = error
+    if (found := result.check) is not None:
+        check = vars(found) | {"modes": json.dumps(dict(found.modes))}
+        group.attrs.update({f"check_{key}": value for key, value in check.items()})

@@ -1,0 +1,113 @@
+"""From the modal forces of a motion in space to voltages of patches, and to whether motors and patches can do it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..actuation.feasibility import Feasibility
+from ..actuation.judgement import judge_actuators, links_in_motion
+from ..actuation.patches.kept_modes import on_kept_modes
+from ..actuation.patches.link_patches import LinkPatches, by_body, check_reach, link_patches
+from ..actuation.patches.voltages import Voltages
+from ..actuation.points import PointSet, make_point_set
+from ..common.arrays import Array
+from ..mbs.model.drives import Drive
+from ..mbs.model.model import Model, modal_directions
+from ..mbs.quantities.motion import RobotMotion
+from ..mbs.scene.analysis import Analysis
+from ..mbs.scene.space import SPACES
+from ..scene.scene import Scene
+from .bodies import LoadedBody
+
+Bodies = Mapping[str, LoadedBody]
+FORCES_AT_POINTS = ("trajectory", "points")  # values of `apply` that need no modal forces
+
+
+@dataclass(frozen=True)
+class Actuation:
+    """What an analysis asks of motors and patches.
+
+    Attributes:
+        voltages: by layout.
+        unmet: by body with patches, (T, n) modal forces that voltages within their limits leave, modes of its file.
+        feasibility: whether motors and patches can do it, within their limits.
+    """
+
+    voltages: Mapping[str, Voltages]
+    unmet: Mapping[str, Array]
+    feasibility: Feasibility
+
+
+def make_patches(scene: Scene, bodies: Bodies) -> dict[str, LinkPatches]:
+    """By body. Raises `InputError` for layouts that do not fit their link, or do not serve what an analysis asks."""
+    found = {}
+    for name, layouts in by_body(scene.pzt):
+        body = bodies[name]
+        assert body.modal is not None
+        of_link = link_patches(scene.path, layouts, body.modal, body.carrying)
+        found[name] = on_kept_modes(of_link, body.spatial)
+    if scene.trajectory and any(analysis.allocates_patches for analysis in scene.analysis):
+        for of_link in found.values():
+            check_reach(scene.path, of_link)
+    return found
+
+
+def points_3d(scene: Scene, bodies: Bodies) -> dict[str, PointSet]:
+    """Actuation points by body. Raises `InputError` for those that do not fit it."""
+    return {
+        layout.body: make_point_set(
+            scene.path, layout, bodies[layout.body].modal, bodies[layout.body].spatial, SPACES[scene.space]
+        )
+        for layout in scene.actuation_points
+    }
+
+
+def given_voltages(model: Model, patches: Mapping[str, LinkPatches]) -> Iterator[Drive]:
+    """What the voltages that the scene gives to patches do on modes."""
+    bodies = {label: body for body, of_link in patches.items() for label in of_link.arrays}
+    for load in model.scene.load:
+        if load.pzt is not None:
+            of_link = patches[bodies[load.pzt]]
+            directions = modal_directions(model, of_link.per_volt)[of_link.columns(load.pzt)]
+            yield from map(Drive, directions, load.voltage or ())
+
+
+def find_actuation(
+    scene: Scene,
+    motion: RobotMotion,
+    analysis: Analysis,
+    bodies: Bodies,
+    patches: Mapping[str, LinkPatches],
+    known: Mapping[str, Array],
+) -> Actuation:
+    """Voltages that produce the modal forces of a motion, or as much of them as they can, and what is asked by it.
+
+    Links with actuation points need no patches, and none does where a later analysis has the forces on the paths.
+    `known`: voltages (T, k) by body, V.
+    """
+    flexible = {name: (body.modal, body.carrying) for name, body in bodies.items() if body.modal is not None}
+    links = links_in_motion(motion, flexible)
+    voltages: dict[str, Voltages] = {}
+    unmet = {}
+    for name, of_link in patches.items():
+        F_p = links[name].F_p
+        found = of_link.at_voltages(known[name], F_p) if name in known else of_link.voltages(F_p)
+        within = np.concatenate([of_layout.within_limit for of_layout in found.values()], axis=1)
+        unmet[name] = of_link.unmet(links[name].F_p, within)
+        voltages |= found
+    others = {of.body for of in scene.actuation_points}
+    if any(getattr(one, "apply", None) in FORCES_AT_POINTS for one in scene.analysis if one.source == analysis.name):
+        others |= links.keys()
+    judged = judge_actuators(scene.path, motion, links, patches, voltages, analysis, others)
+    return Actuation(voltages, unmet, judged)
+
+
+def missing_forces(motion: RobotMotion, actuation: Actuation) -> dict[str, Array]:
+    """By body, modal forces (T, n), modes of its file, that nothing supplies; none where nothing is missing."""
+    forces = motion.motor_forces
+    if forces is None or not motion.motors_fit or not (actuation.unmet or actuation.feasibility.unsupplied):
+        return {}
+    return {**forces.modal, **actuation.unmet}

@@ -1,0 +1,106 @@
+"""The bodies of a scene in space: from links, modal body files or numbers, with their payloads."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..actuation.patches.composite import Placed
+from ..actuation.patches.link_patches import by_body, link_patches, placed_patches
+from ..actuation.patches.records import PztLayout
+from ..actuation.patches.structure import StructureEffect, patched_body, structure_effect_of
+from ..common.errors import of_file
+from ..fe_models.link_records import FAMILIES
+from ..fe_models.modal_body_file import read_modal_body
+from ..mbs.model.body import Body, from_modal_body, rigid_body
+from ..mbs.model.masses import with_payload
+from ..mbs.model.payloads import turns_as_a_body
+from ..mbs.model.projection import projected
+from ..mbs.scene.bodies import BodyKeys, tensor
+from ..scene.scene import Scene
+from .loaded_body import IN_PLANE, Loaded, payloads_on
+
+
+@dataclass(frozen=True, kw_only=True)
+class LoadedBody(Loaded):
+    """A body of the scene with its equations in space, and what patches that are part of it change.
+
+    `spatial` is that of the equations, in which payloads with inertia on links are bodies of their own; `carrying` has
+    these as well, as small rotations turn them: its modes are those of the loaded link.
+    """
+
+    spatial: Body
+    carrying: Body
+    structure: StructureEffect | None = None
+
+
+def load_bodies(scene: Scene, stage: Callable[[str], None]) -> list[LoadedBody]:
+    """In the order of the scene, with payloads and patches; stage 1 runs where links are out of date: `stage` is told.
+
+    They have geometric stiffening where the scene, or the key `pieces` of the body, may put it into the equations.
+
+    Raises `InputError` for files that are none, and payloads and patches that do not fit.
+    """
+    patches = dict(by_body(scene.pzt))
+    with of_file(scene.path):
+        wanted = bool(scene.geometric_stiffening)
+        loaded = [_loaded(scene, body, wanted or body.pieces is not None, stage) for body in scene.body]
+    bodies = [(body.spatial.name, _with_payloads(scene, body)) for body in loaded]
+    complete = [_patched(scene, loaded, patches[name]) if name in patches else loaded for name, loaded in bodies]
+    return [_projected(body) for body in complete] if scene.is_planar else complete
+
+
+def _projected(body: LoadedBody) -> LoadedBody:
+    return replace(body, spatial=projected(body.spatial), carrying=projected(body.carrying))
+
+
+def _loaded(scene: Scene, body: BodyKeys, stiffened: bool, stage: Callable[[str], None]) -> LoadedBody:
+    """Without payloads and patches, which in a planar scene are on modes that move in the plane."""
+    path, computed, reused, modal = None, False, "", None
+    if body.rigid is not None:
+        rigid = body.rigid
+        points = {name: np.array(position) for name, position in rigid.points.items()}
+        made = rigid_body(body.name, rigid.mass, np.array(rigid.center), tensor(rigid.inertia), points)
+    elif body.modal is not None:
+        modal, path = read_modal_body(body.modal), body.modal
+    else:
+        from ..fe_models.link import cached_modal_body
+
+        assert body.link is not None
+        outcome = cached_modal_body(body.link, stage)
+        modal, path, computed, reused = outcome.body, outcome.path, outcome.computed, outcome.reused
+    if modal is not None:
+        made = from_modal_body(body.name, modal, stiffened, is_planar=scene.is_planar)
+    made = projected(made) if scene.is_planar else made
+    return LoadedBody(
+        spatial=made, carrying=made, modal=modal, path=path, computed=computed, reused=reused,
+        motions=IN_PLANE if scene.is_planar else FAMILIES,
+    )  # fmt: skip
+
+
+def _with_payloads(scene: Scene, body: LoadedBody) -> LoadedBody:
+    spatial = carrying = body.spatial
+    for point, payload in payloads_on(scene.payload, spatial.name, spatial.points, scene.path):
+        about = point, payload.mass, np.array(payload.center), tensor(payload.inertia)
+        carrying = with_payload(carrying, *about)
+        if body.modal is None or not turns_as_a_body(scene, payload):
+            spatial = with_payload(spatial, *about)
+    return replace(body, spatial=spatial, carrying=carrying)
+
+
+def _patched(scene: Scene, body: LoadedBody, layouts: Sequence[PztLayout]) -> LoadedBody:
+    """With the mass and stiffness of its patches, as far as the scene asks for it."""
+    assert body.modal is not None
+    link_patches(scene.path, layouts, body.modal, body.carrying)  # refuses patches that do not fit
+    return with_structure(body, placed_patches(scene.path, layouts, body.modal))
+
+
+def with_structure(body: LoadedBody, placed: Sequence[Placed]) -> LoadedBody:
+    """A link, or a piece of one, with the mass and stiffness of patches, as far as layouts say so."""
+    if body.modal is None or not any(one.layout.adds_mass or one.layout.adds_stiffness for one in placed):
+        return body
+    spatial, carrying = (patched_body(of, body.modal, placed) for of in (body.spatial, body.carrying))
+    effect = structure_effect_of(body.carrying, carrying)
+    return replace(body, spatial=spatial, carrying=carrying, structure=effect)

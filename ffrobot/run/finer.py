@@ -1,0 +1,174 @@
+"""`check = "finer"`: an inverse analysis replayed on links with twice the modes, which holds the error of too few."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..actuation.control.linear import held_by_motors
+from ..common.arrays import Array
+from ..common.errors import InputError
+from ..fe_models.link_file import LinkTable, link_keys, link_path
+from ..fe_models.modal_body import ModalBody
+from ..mbs.analysis.drive import drive_robot
+from ..mbs.analysis.forward import Forward, actuator_commands, largest_moments
+from ..mbs.analysis.outcome import Outcome
+from ..mbs.analysis.replay import replay_times, supplied
+from ..mbs.model.drives import Drives, Replayed
+from ..mbs.model.model import Model, without_paths
+from ..mbs.quantities.motion import RobotMotion
+from ..mbs.scene.analysis import TimedAnalysis
+from ..mbs.scene.bodies import BodyKeys
+from ..mbs.solve.redundancy import resolved
+from ..mbs.solve.start import undeformed_posture
+from ..mbs.solve.state import State
+from ..mbs.solve.statics import static_equilibrium
+from ..scene.scene import Scene
+from .solution import FinerCheck, Solution
+from .watcher import Watcher
+
+Prepare = Callable[[Scene, Watcher], Solution]
+"""All that analyses of a scene start from."""
+
+TIGHTEST = 1e-5  # tolerance: what is looked for is larger
+
+
+def with_finer_check(solution: Solution, prepare: Prepare, watcher: Watcher) -> Solution:
+    """The solution with completed analyses replayed on finer links where the scene asks for that."""
+    wanted = [name for name, run in solution.outcomes.items() if run.analysis.is_checked and run.status == "completed"]
+    if not wanted:
+        return solution
+    results, failure = dict(solution.analyses), solution.failure
+    try:
+        finer = prepare(_finer_scene(solution), watcher)
+        for name in wanted:
+            watcher.stage(f'check of "{name}" on finer links')
+            results[name] = replace(results[name], check=_check(solution, results[name].run, finer, watcher))
+    except Exception as error:
+        failure = failure or error
+    return replace(solution, analyses=results, failure=failure)
+
+
+def _finer_scene(solution: Solution) -> Scene:
+    """The scene with twice the eigenmodes of each link, of whose patches only the modal forces per volt are asked."""
+    scene = solution.scene
+    bodies = _with_twice_the_modes(scene.path, scene.body, solution.links)
+    forward = Forward(name="replay", kind="forward", end=1.0, output_step=1.0)  # asks nothing of patches
+    served = {"allocation": "least-squares", "mode_weights": None, "point_weights": None}
+    pzt = tuple(layout.model_copy(update=served) for layout in scene.pzt)
+    stiffening = solution.stiffened if scene.geometric_stiffening == "auto" else scene.geometric_stiffening
+    changed = {"body": bodies, "pzt": pzt, "analysis": (forward,), "geometric_stiffening": stiffening}
+    return scene.model_copy(update=changed)
+
+
+def _with_twice_the_modes(
+    path: Path, bodies: Sequence[BodyKeys], links: Mapping[str, ModalBody]
+) -> tuple[BodyKeys, ...]:
+    """The bodies of the scene at `path` with twice the eigenmodes of each link and nothing left out.
+
+    `links`: their modal bodies. Raises `InputError` for a body whose link is not known, only its modal body file.
+    """
+    finer = []
+    for body in bodies:
+        modal = links.get(body.name)
+        if modal is not None:
+            if body.link is None:
+                raise InputError(
+                    f'{path}: analysis: check: expected "link" in body "{body.name}" for "finer", which computes'
+                    f" it with twice the modes, found only the modal body file {body.modal}"
+                )
+            table = LinkTable(_twice_as_many(link_keys(body.link), modal), link_path(body.link))
+            body = body.model_copy(update={"link": table, "modes": None})
+        finer.append(body)
+    return tuple(finer)
+
+
+def _twice_as_many(keys: dict[str, Any], modal: ModalBody) -> dict[str, Any]:
+    """The keys of a link, for twice the eigenmodes that `modal` has."""
+    modes = {key: value for key, value in keys.get("modes", {}).items() if key != "indices"}
+    damping = dict(keys.get("damping", {}))
+    if isinstance(damping.get("ratio"), list | tuple):  # one for each mode: the last is that of all above
+        damping["ratio"] = [*damping["ratio"], *[damping["ratio"][-1]] * modal.eigenmode_count]
+    return keys | {"modes": modes | {"count": 2 * modal.eigenmode_count}, "damping": damping}
+
+
+def _check(solution: Solution, source: Outcome, finer: Solution, watcher: Watcher) -> FinerCheck:
+    """Replay `source`, a run of `solution`, on the same robot with finer links."""
+    scene = solution.scene
+    if not source.model.motors or finer.model.tree.gears or any(getattr(j, "stiffness", None) for j in scene.joint):
+        raise InputError(
+            f'{scene.path}: analysis "{source.analysis.name}": check: expected motors, and joints without stiffness,'
+            ' for "finer"'
+        )
+    run = _replayed(source, finer.model, _drives(solution, source, finer), watcher)
+    followed = [trajectory.point for trajectory in scene.trajectory if trajectory.point is not None]
+    nodes = (solution.model.tree.nodes[solution.model.tree.index[name]] for name in solution.links)
+    points = followed or [f"{node.body.name}.{point}" for node in nodes for point in node.body.points]
+    errors = {point: _distance(source, run, point) for point in points}
+    worst = max(errors, key=lambda point: errors[point])
+    modes = {name: link.eigenmode_count for name, link in finer.links.items()}
+    return FinerCheck(modes, worst, errors[worst], run.status)
+
+
+def _drives(solution: Solution, source: Outcome, finer: Solution) -> Drives:
+    """What the source found of moments and voltages, on the finer links."""
+    bends = "joints+pzt" in source.analysis.applicable
+    patches, on_finer = (of.patches if bends else {} for of in (solution, finer))
+    found = supplied(source, largest_moments(source.model, limits=False), patches, limited=False)
+    return Drives(replayed=Replayed(found, actuator_commands(finer.model, on_finer)))
+
+
+def _replayed(source: Outcome, finer: Model, drives: Drives, watcher: Watcher) -> Outcome:
+    """Forward dynamics of the finer robot under moments of its motors and voltages of its patches."""
+    given = source.analysis
+    assert isinstance(given, TimedAnalysis)
+    analysis = Forward(
+        name=f"check of {given.name}", kind="forward", end=given.end, output_step=given.output_step,
+        tolerance=max(given.tolerance, TIGHTEST),
+    )  # fmt: skip
+    end = float(source.time[-1])
+
+    def progress(t: float) -> bool:
+        return watcher.advance(t, end)
+
+    times = replay_times(source, analysis)[: len(source.time)]
+    return drive_robot(without_paths(finer), analysis, _start(source, finer), progress, drives=drives, times=times)
+
+
+def _start(source: Outcome, finer: Model) -> State:
+    """Where the source starts: on its trajectories, or of motors alone with their coordinates.
+
+    Links are in equilibrium there, or undeformed where those of the source are.
+    """
+    follows = any(row.is_trajectory for row in source.model.rows)
+    if follows:
+        model = resolved(finer, source.analysis.last_time)
+    else:
+        alone = without_paths(finer)
+        model = replace(alone, rows=(*alone.rows, *held_by_motors(alone, _as_in(source, alone))))
+    start = undeformed_posture(model)
+    is_bent = any(source.q[0, node.p_q].any() for node in source.model.tree.nodes)
+    return static_equilibrium(model, start) if is_bent else start
+
+
+def _as_in(source: Outcome, model: Model) -> Array:
+    """Q (n_q,) of `model`, links undeformed, with the joints where `source` has them at its start."""
+    q = np.zeros(model.tree.n_q)
+    for node, other in zip(model.tree.nodes, source.model.tree.nodes, strict=True):
+        q[node.q] = source.q[0, other.q]
+    return q
+
+
+def _distance(source: Outcome, run: Outcome, point: str) -> float:
+    """The largest, m, between where the two runs have a point."""
+    path, found = (_motion(one).point(point).position for one in (source, run))
+    rows = min(len(path), len(found))
+    return float(np.linalg.norm(path[:rows] - found[:rows], axis=1).max(initial=0.0))
+
+
+def _motion(run: Outcome) -> RobotMotion:
+    return RobotMotion(run.model, run.time, run.q, run.v, run.a, run.multipliers)

@@ -1,0 +1,255 @@
+"""Links in space in pieces as the one link: what was computed of the pieces, told in frame and modes of the link.
+
+The frame is where the link's reference condition has it: at its root, as the section there (cantilever), or along the
+chord to its tip, turned from the section at the root by no more than that takes (simply supported: no twist there). The
+modal coordinates are those whose shape is nearest to the link's; its points are where the pieces have them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property, partial
+
+import numpy as np
+
+from ..common.arrays import Array, as_floats
+from ..common.rotations import exponential, left_jacobian, logarithm, of_quaternion, quaternions
+from ..fe_models.link_records import HOLDING_ROOT
+from ..fe_models.modal_body import ModalBody
+from ..mbs.model.divided_link import spread_of
+from ..mbs.model.motors import MotorForces
+from ..mbs.quantities.body_motion import BodyMotion, PointMotion
+from ..mbs.quantities.motion import RobotMotion, continuous
+from ..mbs.quantities.pieces_error import PieceInMotion, missed_by_pieces
+from ..mbs.quantities.second_order import IN_MOTION, Missing, largest_displacement
+from ..mbs.quantities.validity import ENOUGH, Bending, enough_pieces, link_bending, shape_from_chord
+from ..scene.pieces import BodyInPieces, bodies_in_pieces
+from .bent_links import shared_in_motion, with_advice, worst_of_pieces
+from .solution import Solution
+
+MOST = 64
+AT_END = 1e-9  # of the length
+X = np.array([1.0, 0.0, 0.0])
+
+
+@dataclass(frozen=True)
+class Divided:
+    """A link in pieces: its modal body, how it is cut, and the modal bodies of its pieces from the root to the tip.
+
+    `to_own` (n_file, n): modal coordinates of the whole link in the equations, by those of its file.
+    """
+
+    modal: ModalBody
+    body: BodyInPieces
+    pieces: tuple[ModalBody, ...]
+    to_own: Array
+
+
+@dataclass(frozen=True)
+class SectionMotion:
+    """A section over time: place r (T, 3), axes A (T, 3, 3), their velocity (T, 3) and angular velocity (T, 3)."""
+
+    r: Array
+    A: Array
+    r_dot: Array
+    omega: Array
+
+
+@dataclass(frozen=True)
+class MotionOfLinks(RobotMotion):
+    """A motion of pieces, in which links in pieces are told as the one link each."""
+
+    divided: Mapping[str, Divided] = field(default_factory=dict)
+
+    @property
+    def points(self) -> dict[str, tuple[str, ...]]:
+        """By body that is reported: names of its sections; links stand where their first pieces do."""
+        own, found = super().points, {}
+        first = {link.body.names[0]: name for name, link in self.divided.items()}
+        others = {name for link in self.divided.values() for name in link.body.names[1:]}
+        for name, points in own.items():
+            if name in first:
+                found[first[name]] = tuple(self.divided[first[name]].body.cut.places)
+            elif name not in others:
+                found[name] = points
+        return found
+
+    def body(self, name: str) -> BodyMotion:
+        """Of a body's frame and modes, or of a link's."""
+        return self._links[name] if name in self.divided else super().body(name)
+
+    def modal_velocity(self, body: str) -> Array:
+        """Rates (T, n) of the modes that a body, or the whole link, has in the equations."""
+        if body not in self.divided:
+            return super().modal_velocity(body)
+        return as_floats(self._links[body].modal_velocity @ self.divided[body].to_own)
+
+    def point(self, point: str) -> PointMotion:
+        """Of the section "BODY.POINT": where the piece has it, and how far that is from its place in the link."""
+        name, _, label = point.partition(".")
+        if name not in self.divided:
+            return super().point(point)
+        link, frame = self.divided[name], self._links[name]
+        found = super().point(link.body.point(label))
+        position = link.modal.length / 2 * X if label == "mid" else link.modal.interfaces[label].position
+        in_frame = np.einsum("tji,tj->ti", of_quaternion(frame.orientation), found.position - frame.position)
+        return replace(found, deflection=in_frame - position)
+
+    def _turned(self, body: str) -> Array:
+        """Of a link that of its first piece."""
+        return super()._turned(self.divided[body].body.names[0] if body in self.divided else body)
+
+    @cached_property
+    def _links(self) -> dict[str, BodyMotion]:
+        return {name: _motion_of_link(self, link) for name, link in self.divided.items()}
+
+    def _found_motor_forces(self) -> MotorForces | None:
+        """Modal forces of links by virtual work, from those on their pieces."""
+        found = super()._found_motor_forces()
+        if found is None:
+            return None
+        modal = dict(found.modal)
+        for name, link in self.divided.items():
+            spread = spread_of(link.modal, list(zip(link.body.cut.starts, link.pieces, strict=True)))
+            modal[name] = np.hstack([modal.pop(piece) for piece in link.body.names]) @ spread
+        return replace(found, modal=modal)
+
+
+def divided_links(solution: Solution) -> dict[str, Divided]:
+    """The links in pieces of a solution, by name."""
+    found = {}
+    for name, body in solution.divided.items():
+        modal = solution.bodies[name].modal
+        pieces = [solution.parts[piece].modal for piece in body.names]
+        to_own = np.linalg.pinv(solution.bodies[name].spatial.modal_transform).T
+        assert modal is not None
+        found[name] = Divided(modal, body, tuple(piece for piece in pieces if piece is not None), as_floats(to_own))
+    return found
+
+
+def wanted_pieces(solution: Solution) -> dict[str, int]:
+    """How many pieces bodies with `pieces = "auto"` want after a solve; empty where they have them.
+
+    What a piece loses of its length goes down with the square of their number. A run that failed has bent links
+    farther than they are.
+    """
+    wanted, now = {}, {}
+    for body in solution.scene.body:
+        if body.pieces == "auto":
+            names = solution.divided[body.name].names if body.name in solution.divided else (body.name,)
+            worst = max((_shortening(solution, name) for name in names), default=0.0)
+            count = enough_pieces(worst, len(names)) if worst > ENOUGH else 1
+            wanted[body.name], now[body.name] = max(min(MOST, count), len(names)), len(names)
+    return {} if wanted == now else wanted
+
+
+def bending_of_links(solution: Solution, motion: RobotMotion) -> dict[str, Bending]:
+    """How far flexible bodies bend, links in pieces as their worst piece, and whether they can be divided further."""
+    bodies = solution.parts or solution.bodies
+    links = {name: body.modal for name, body in bodies.items() if body.modal is not None}
+    worst = worst_of_pieces(link_bending(motion, links), solution.divided)
+    for name in solution.divided:
+        if worst[name].is_stiffened:
+            worst[name] = replace(worst[name], missing=_missing(solution, motion, name))
+    if not motion.is_at_rest:
+        worst = shared_in_motion(worst)
+    return with_advice(worst, partial(bodies_in_pieces, solution.scene))
+
+
+def _missing(solution: Solution, motion: RobotMotion, name: str) -> Missing:
+    """What the pieces of a link miss, which have geometric stiffening; in motion it makes the link vibrate besides."""
+    link, pieces = solution.bodies[name].modal, []
+    assert link is not None
+    for piece in solution.divided[name].names:
+        modal, node = solution.parts[piece].modal, motion.node(piece)
+        assert modal is not None
+        ends = (motion.section(f"{piece}.{end}") for end in ("root", "tip"))
+        pieces.append(PieceInMotion(modal, node.body, motion.q[:, node.p_q], *ends))
+    of_length = float(np.linalg.norm(missed_by_pieces(pieces), axis=1).max(initial=0.0)) / link.length
+    of_length *= 1.0 if motion.is_at_rest else IN_MOTION
+    whole = largest_displacement(link, motion.body(name).modal)
+    return Missing(of_length, min(1.0, of_length / whole) if whole else 0.0)
+
+
+def _shortening(solution: Solution, name: str) -> float:
+    """The largest of a body of the equations over all analyses, of its length."""
+    modal = (solution.parts or solution.bodies)[name].modal
+    assert modal is not None
+    found = [
+        shape_from_chord(modal, RobotMotion.body(result.motion, name).modal)[2].max(initial=0.0)
+        for result in solution.analyses.values()
+    ]
+    return float(max(found, default=0.0)) / modal.length
+
+
+def _motion_of_link(motion: RobotMotion, link: Divided) -> BodyMotion:
+    """Of the frame of the one link, and of the modes of its file."""
+    x = link.modal.stations.position[:, 0]
+    sections = [_section(motion, link, at) for at in x]
+    root, tip = sections[int(np.argmin(x))], sections[int(np.argmax(x))]
+    holds_root = link.modal.reference_condition in HOLDING_ROOT
+    A, omega = (root.A, root.omega) if holds_root else _along_chord(root, tip)
+    u, u_dot = (np.zeros((len(x), 4, len(root.r))) for _ in range(2))
+    for k, at in enumerate(sections):
+        arm, rate = at.r - root.r, at.r_dot - root.r_dot
+        phi = logarithm(np.swapaxes(A, -1, -2) @ at.A)
+        spin = _seen_from(A, at.omega - omega)
+        u[k, :3] = (_seen_from(A, arm) - x[k] * X).T
+        u_dot[k, :3] = _seen_from(A, rate - np.cross(omega, arm)).T
+        u[k, 3] = link.modal.length * phi[:, 0]
+        u_dot[k, 3] = link.modal.length * np.linalg.solve(left_jacobian(phi), spin[:, :, None])[:, 0, 0]
+    p, p_dot = (_nearest_shape(link.modal, each) for each in (u, u_dot))
+    return BodyMotion(root.r, continuous(quaternions(A)), root.r_dot, omega, p, p_dot)
+
+
+def _section(motion: RobotMotion, link: Divided, x: float) -> SectionMotion:
+    """Of the section at x (m from the root of the link); to second order in p at the ends of pieces, where K is."""
+    starts, names = link.body.cut.starts, link.body.names
+    k = int(np.clip(np.searchsorted(starts, x, side="right") - 1, 0, len(names) - 1))
+    at = link.pieces[k].interpolate(min(x - starts[k], link.pieces[k].length))
+    for end, interface in link.pieces[k].interfaces.items():
+        if abs(interface.position[0] - at.position[0]) < AT_END * link.modal.length:
+            found = motion.section(f"{names[k]}.{end}")
+            rates = np.einsum("tij,tj->ti", found.L, motion.v)
+            return SectionMotion(found.r, found.F, rates[:, :3], rates[:, 3:])
+    node, frame = motion.node(names[k]), motion.frames[motion.model.tree.index[names[k]]]
+    Phi, Phi_r = at.translation @ node.body.modal_transform, at.rotation @ node.body.modal_transform
+    p, p_dot = motion.q[:, node.p_q], motion.v[:, node.p_v]
+    velocity = np.einsum("tij,tj->ti", frame.L, motion.v)
+    arm, phi = np.einsum("tij,tj->ti", frame.F, at.position + p @ Phi.T), p @ Phi_r.T
+    turning = np.einsum("tij,tj->ti", left_jacobian(phi), p_dot @ Phi_r.T)
+    r_dot = velocity[:, :3] + np.cross(velocity[:, 3:], arm) + np.einsum("tij,tj->ti", frame.F, p_dot @ Phi.T)
+    omega = velocity[:, 3:] + np.einsum("tij,tj->ti", frame.F, turning)
+    return SectionMotion(frame.r + arm, frame.F @ exponential(phi), r_dot, omega)
+
+
+def _along_chord(root: SectionMotion, tip: SectionMotion) -> tuple[Array, Array]:
+    """Axes (T, 3, 3) with x along the chord, in which the section at the root is not twisted, and their spin (T, 3).
+
+    With the section at exp(φ~) from these axes, φ₁ = 0 at all times: with the spin c × ċ + α c, α follows from φ̇₁ = 0.
+    """
+    d, d_dot = tip.r - root.r, tip.r_dot - root.r_dot
+    size = np.linalg.norm(d, axis=1)[:, None]
+    c = d / size
+    c_dot = (d_dot - c * np.sum(c * d_dot, axis=1)[:, None]) / size
+    across = np.cross(root.A[:, :, 0], c)
+    sine, cosine = np.linalg.norm(across, axis=1), np.sum(root.A[:, :, 0] * c, axis=1)
+    turn = across * np.divide(np.arctan2(sine, cosine), sine, out=np.ones_like(sine), where=sine > 0.0)[:, None]
+    A = as_floats(exponential(turn) @ root.A)
+    J = left_jacobian(-_seen_from(A, turn))
+    swing = np.cross(c, c_dot)
+    left, of_x = (np.linalg.solve(J, b[:, :, None])[:, 0, 0] for b in (_seen_from(A, root.omega - swing), 0 * c + X))
+    return A, as_floats(swing + (left / of_x)[:, None] * c)
+
+
+def _seen_from(A: Array, vectors: Array) -> Array:
+    """Aᵀ times vectors (T, 3)."""
+    return as_floats(np.einsum("tji,tj->ti", A, vectors))
+
+
+def _nearest_shape(modal: ModalBody, u: Array) -> Array:
+    """P (T, n) for which Φp comes nearest to displacements and twists at the length u (stations, 4, T), m."""
+    stations = modal.stations
+    rows = np.concatenate([stations.translation, modal.length * stations.rotation[:, :1]], axis=1)
+    return as_floats(np.linalg.lstsq(rows.reshape(-1, modal.mode_count), u.reshape(-1, u.shape[2]), rcond=None)[0].T)

@@ -1,0 +1,161 @@
+"""Everything of a scene in space but its analyses: equations of its bodies, of links in pieces too."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+
+from ..actuation.patches.link_patches import LinkPatches, on_pieces
+from ..actuation.points import PointSet, with_points
+from ..mbs.model.body import Body
+from ..mbs.model.model import Model, build_model
+from ..mbs.solve.robot_damping import with_robot_damping
+from ..scene.pieces import BodyInPieces, bodies_in_pieces, scene_of_pieces
+from ..scene.scene import Scene
+from .actuation import given_voltages, make_patches, points_3d
+from .bodies import LoadedBody, load_bodies, with_structure
+from .loaded_body import robot_damping_ratios
+from .mode_choice import mode_levels
+from .solution import Solution
+from .watcher import Watcher
+
+Bodies = Mapping[str, LoadedBody]
+
+
+def made_solution(scene: Scene, bodies: Bodies, seconds: Mapping[str, float]) -> Solution:
+    """A solution without analyses, of links with as few modes as the scene begins with.
+
+    Raises `InputError` for patches and actuation points that do not fit.
+    """
+    bodies = _with_equations(bodies, mode_levels(scene, bodies)[0])
+    patches, points, stiffened = (
+        make_patches(scene, bodies),
+        points_3d(scene, bodies),
+        _all_stiffened(scene, False),
+    )
+    bodies, stiffened = _with_points(bodies, points), _all_stiffened(scene, False)
+    model = _model(scene, bodies, patches, {}, {}, stiffened)
+    return Solution(scene, model, bodies, patches, {}, seconds, points=points, stiffened=stiffened)
+
+
+def with_bodies(solution: Solution, spatial: Mapping[str, Body]) -> Solution:
+    """The scene with some of its bodies replaced, nothing solved yet. Raises `InputError` as `made_solution`."""
+    scene, divided = solution.scene, solution.divided
+    bodies, parts = (_with_equations(of, spatial) for of in (solution.bodies, solution.parts))
+    found, points = make_patches(scene, bodies), points_3d(scene, bodies)
+    patches = {name: solution.patches[name] if name in divided else of_link for name, of_link in found.items()}
+    bodies, parts = (_with_points(of, points) for of in (bodies, parts))
+    return _unsolved(replace(solution, bodies=bodies, parts=parts, patches=patches, points=points))
+
+
+def _with_equations(bodies: Bodies, spatial: Mapping[str, Body]) -> Bodies:
+    return {name: replace(body, spatial=spatial.get(name, body.spatial)) for name, body in bodies.items()}
+
+
+def _with_points(bodies: Bodies, points: Mapping[str, PointSet]) -> Bodies:
+    """With actuation points among their points."""
+    return {
+        name: replace(body, spatial=with_points(body.spatial, points[name])) if name in points else body
+        for name, body in bodies.items()
+    }
+
+
+def with_scene(solution: Solution, scene: Scene) -> Solution:
+    """The same bodies in a scene with other trajectories or analyses, nothing solved yet."""
+    return _unsolved(replace(solution, scene=scene))
+
+
+def with_pieces(solution: Solution, counts: Mapping[str, int], watcher: Watcher) -> Solution:
+    """The scene with the bodies named in so many pieces each, nothing solved yet: equations are those of the pieces."""
+    divided = bodies_in_pieces(solution.scene, counts)
+    if not divided and not solution.divided:
+        return solution
+    parts: dict[str, LoadedBody] = {}
+    patches = dict(solution.patches)
+    if divided:
+        scene = scene_of_pieces(solution.scene, divided)
+        own = {name: body for name, body in solution.bodies.items() if name not in divided}
+        alone = {"body": tuple(body for body in scene.body if body.name not in own), "pzt": ()}
+        may_be = {"geometric_stiffening": scene.geometric_stiffening is not False}
+        new = scene.model_copy(update=alone | may_be)
+        loaded = load_bodies(new, watcher.stage)
+        parts = own | {body.name: part for body, part in zip(new.body, loaded, strict=True)}
+        parts = {body.name: parts[body.name] for body in scene.body}
+    for name in divided.keys() & patches.keys():
+        patches[name] = _on_pieces(solution, divided[name], patches[name], parts)
+        for piece, start in zip(divided[name].names, divided[name].cut.starts, strict=True):
+            length = parts[piece].spatial.length or 0.0
+            placed = [one for _, one in patches[name].placed_on(start, length)]
+            parts[piece] = with_structure(parts[piece], placed)
+    return _unsolved(replace(solution, divided=divided, parts=parts, patches=patches))
+
+
+def _on_pieces(solution: Solution, body: BodyInPieces, patches: LinkPatches, parts: Bodies) -> LinkPatches:
+    link, pieces = solution.bodies[patches.body].modal, [parts[name].modal for name in body.names]
+    assert link is not None
+    starts = {
+        name: (start, piece)
+        for name, start, piece in zip(body.names, body.cut.starts, pieces, strict=True)
+        if piece is not None
+    }
+    return on_pieces(solution.scene.path, patches, link, starts)
+
+
+def with_stiffening(solution: Solution) -> Solution:
+    """The scene with geometric stiffening of all links, nothing solved yet."""
+    return _unsolved(replace(solution, stiffened=True))
+
+
+def _unsolved(solution: Solution) -> Solution:
+    stiffened = _all_stiffened(solution.scene, solution.stiffened)
+    scene, bodies, patches = solution.scene, solution.bodies, solution.patches
+    model, divided = _model(scene, bodies, patches, solution.divided, solution.parts, stiffened), solution.divided
+    whole = _model(scene, bodies, patches, {}, {}, stiffened) if divided else None
+    seconds = {"links and files": solution.seconds["links and files"]}
+    return replace(solution, model=model, whole=whole, analyses={}, seconds=seconds, stiffened=stiffened)
+
+
+def _all_stiffened(scene: Scene, is_needed: bool) -> bool:
+    """Whether all links are stiffened; with "auto" where that `is_needed`; in the plane beside links in pieces, too."""
+    in_pieces = any(body.pieces is not None for body in scene.body)
+    if scene.geometric_stiffening == "auto":
+        return is_needed or in_pieces
+    return scene.geometric_stiffening is True or (scene.is_planar and in_pieces)
+
+
+def _model(
+    scene: Scene,
+    bodies: Bodies,
+    patches: Mapping[str, LinkPatches],
+    divided: Mapping[str, BodyInPieces],
+    parts: Bodies,
+    stiffened: bool,
+) -> Model:
+    """The equations, of pieces in place of their links, with the voltages that the scene gives to patches."""
+    heavy = {layout.body for layout in scene.pzt if layout.adds_mass}  # between the ends of pieces
+    links = [
+        divided[body.name].names if body.name in divided else (body.name,)
+        for body in scene.body
+        if body.pieces and body.name not in heavy
+    ]
+    if divided:
+        scene, bodies = scene_of_pieces(scene, divided), parts
+    spatial = {name: body.spatial for name, body in bodies.items()}
+    if not stiffened:
+        known = set() if scene.geometric_stiffening is False else _known_between(scene, spatial, links)
+        spatial |= {name: replace(body, stiffening=None) for name, body in spatial.items() if name not in known}
+    model = build_model(scene, list(spatial.values()))
+    model = with_robot_damping(model, robot_damping_ratios(bodies))
+    return replace(model, modal_loads=tuple(given_voltages(model, patches)))
+
+
+def _known_between(scene: Scene, bodies: Mapping[str, Body], links: Iterable[tuple[str, ...]]) -> set[str]:
+    """Bodies of those `links` in pieces on which nothing acts between the ends of a piece.
+
+    Modal body files have the geometric stiffness of loads at interfaces alone.
+    """
+    at = [point for reference in scene.references() if (point := reference.body_and_point) is not None]
+    between = {
+        body for body, point in at if (found := bodies[body].stiffening) is not None and point not in found.K_points
+    }
+    return {name for names in links if between.isdisjoint(names) for name in names}

@@ -1,0 +1,223 @@
+"""What a solve of a scene in space computed: of the scene as a whole, and of each analysis."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+
+from ..actuation.control.loop_record import LoopRecord
+from ..actuation.patches.link_patches import LinkPatches
+from ..actuation.patches.patches import PatchArray
+from ..actuation.point_forces import PointForces
+from ..actuation.points import PointSet
+from ..common.arrays import Array
+from ..fe_models.modal_body import ModalBody
+from ..mbs.analysis.elastic_joints import unresolved_gears
+from ..mbs.analysis.outcome import EarlierRun, Outcome
+from ..mbs.model.model import Model
+from ..mbs.model.truncation import modes_kept
+from ..mbs.model.wrench import Wrench
+from ..mbs.quantities.attachment_error import mode_error, modes_in_motion, start_jolt, start_of_motion
+from ..mbs.quantities.doubts import doubts
+from ..mbs.quantities.energy import Energies, Momentum
+from ..mbs.quantities.motion import RobotMotion
+from ..mbs.quantities.path_seen import path_warnings
+from ..mbs.quantities.sharing import Sharing
+from ..mbs.quantities.stress import BodyStress
+from ..mbs.quantities.validity import Bending, deflection_warning
+from ..mbs.scene.analysis import Analysis
+from ..scene.pieces import BodyInPieces
+from ..scene.scene import Scene
+from .actuation import Actuation
+from .bodies import LoadedBody
+from .loaded_body import remarks_on_parts, rigid_in_words
+from .mode_search import ModeChoice
+from .omissions import omissions
+
+
+@dataclass(frozen=True)
+class FinerCheck:
+    """What a replay on twice the modes found.
+
+    Attributes:
+        modes: eigenmodes of each flexible body in it.
+        point: that is farthest from where the inverse analysis has it, of those on trajectories where there are any.
+        error: by how much, m, at worst.
+        status: how the replay ended.
+    """
+
+    modes: Mapping[str, int]
+    point: str
+    error: float
+    status: str
+
+    @property
+    def in_words(self) -> str:
+        """On how many modes, and how far off."""
+        ended = "" if self.status == "completed" else f", which ended early ({self.status})"
+        modes = ", ".join(map(str, dict.fromkeys(self.modes.values())))
+        return f"forward simulation on {modes} modes{ended}: {self.point} is off by {1e3 * self.error:.2g} mm"
+
+
+@dataclass(frozen=True)
+class AnalysisResult:
+    """What was computed of one analysis.
+
+    Attributes:
+        run: how it went, and states.
+        motion: what is read off them.
+        reactions: forces in joints by name.
+        energies, momentum: of the robot.
+        actuation: what patches have to do, and whether motors and patches can; None where nothing is prescribed.
+        stresses: by body, where modal body files hold modal stresses.
+        point_forces: at actuation points, by body.
+        check: what a replay on finer links found, where that is asked for.
+        bending: how far flexible bodies leave small deformations, and what loads do to their stiffness.
+        sharing: reactions that redundant constraints leave open; None where there are none.
+        predicted_shift: by point, (T, 3) m: what voltages within their limits leave undone.
+        closer: the same at the outputs and between, from which all peaks are; None where nothing is between.
+    """
+
+    run: Outcome
+    motion: RobotMotion
+    reactions: Mapping[str, Wrench]
+    energies: Energies
+    momentum: Momentum
+    actuation: Actuation | None
+    stresses: Mapping[str, BodyStress] = field(default_factory=dict)
+    point_forces: Mapping[str, PointForces] = field(default_factory=dict)
+    check: FinerCheck | None = None
+    bending: Mapping[str, Bending] = field(default_factory=dict)
+    sharing: Sharing | None = None
+    predicted_shift: Mapping[str, Array] = field(default_factory=dict)
+    closer: AnalysisResult | None = field(default=None, repr=False)
+
+    @property
+    def analysis(self) -> Analysis:
+        """What was asked for."""
+        return self.run.analysis
+
+    @cached_property
+    def mode_error(self) -> float | None:
+        """Estimated for too few modes, of peaks; None where it is not known. It does not see what a jolt does."""
+        return mode_error(modes_in_motion(self.motion)) if self._is_integrated else None
+
+    @cached_property
+    def start_jolt(self) -> float:
+        """See `attachment_error`."""
+        return start_jolt(start_of_motion(self.motion)) if self._is_integrated else 0.0
+
+    @property
+    def _is_integrated(self) -> bool:
+        return self.analysis.is_integrated and len(self.motion.time) > 0
+
+    @property
+    def status(self) -> str:
+        """How the run ended."""
+        return self.run.status
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Why results may be wrong, or not mean what they seem to, a text each, the most serious first."""
+        missed = None if self.actuation is None else self.actuation.feasibility.unsupplied
+        bent = deflection_warning(self.bending)
+        told = (
+            *([bent] if bent else []),
+            *self._doubts,
+            *self.run.statistics.warnings,
+            *unresolved_gears(self.motion.gears),
+        )
+        if isinstance(self.run.details, LoopRecord):
+            told = (*told, *self.run.details.warnings)
+        elif self.motion.is_prescribed:
+            told = (*told, *path_warnings(self.run.analysis, self.run.time, self.motion.model.scene.trajectory))
+        return told if missed is None else (*told, missed.in_words)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What is worth knowing of results that are right, a text each."""
+        return () if self.sharing is None else (self.sharing.in_words,)
+
+    @cached_property
+    def _doubts(self) -> tuple[str, ...]:
+        return tuple(doubts(self.motion, self.run.analysis.tolerance))
+
+    @property
+    def stiffening_effect(self) -> float:
+        """Largest relative change of a link's stiffness by the loads of the run."""
+        return max((link.stiffness_change for link in self.bending.values()), default=0.0)
+
+
+@dataclass(frozen=True)
+class Solution:
+    """Everything a solve of a scene in space computed.
+
+    Attributes:
+        scene, model: what was solved.
+        bodies: by name.
+        patches: by body.
+        analyses: by name, in the order of the scene.
+        seconds: wall time by stage.
+        failure: what ended the run after these analyses; None where all ran, or the last of them did not complete.
+        unread: the run of the analysis of which outputs failed; its integration is kept.
+        path_notes: what was found of paths before the analyses, one line each.
+        points: actuation points, by body.
+        earlier: runs of analyses to go on with, from a results file: see `results.spatial_resume`.
+        mode_choice: where `modes = "auto"`.
+        divided: bodies in pieces by name; then `model` is that of the pieces, whose bodies are `parts`, and `whole`
+            that of the links.
+        stiffened: whether all links have geometric stiffening.
+    """
+
+    scene: Scene
+    model: Model
+    bodies: Mapping[str, LoadedBody]
+    patches: Mapping[str, LinkPatches]
+    analyses: Mapping[str, AnalysisResult]
+    seconds: Mapping[str, float]
+    failure: Exception | None = None
+    unread: Outcome | None = None
+    path_notes: tuple[str, ...] = ()
+    points: Mapping[str, PointSet] = field(default_factory=dict)
+    earlier: Mapping[str, EarlierRun] = field(default_factory=dict)
+    mode_choice: ModeChoice | None = None
+    divided: Mapping[str, BodyInPieces] = field(default_factory=dict)
+    parts: Mapping[str, LoadedBody] = field(default_factory=dict)
+    whole: Model | None = None
+    stiffened: bool = False
+
+    @property
+    def outcomes(self) -> dict[str, Outcome]:
+        """How each analysis went, by its name."""
+        runs = [*(result.run for result in self.analyses.values()), *([self.unread] if self.unread else [])]
+        return {run.analysis.name: run for run in runs}
+
+    @property
+    def links(self) -> dict[str, ModalBody]:
+        """The modal bodies of the flexible bodies, as their files have them."""
+        return {name: body.modal for name, body in self.bodies.items() if body.modal is not None}
+
+    @property
+    def is_stiffened(self) -> bool:
+        """Whether geometric stiffening is in the equations, of all links or of those in pieces."""
+        return self.stiffened or any(node.body.stiffening is not None for node in self.model.tree.nodes)
+
+    @property
+    def patch_arrays(self) -> tuple[PatchArray, ...]:
+        """Of all layouts."""
+        return tuple(array for of in self.patches.values() for array in of.arrays.values())
+
+    @property
+    def omissions(self) -> tuple[str, ...]:
+        """What a planar scene does not need, one line each."""
+        return tuple(omissions(self.scene, self.bodies)) if self.scene.is_planar else ()
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What links cannot do, and modes left out, one line each."""
+        found = [*rigid_in_words(self.bodies)]
+        for name, body in self.bodies.items():
+            if body.spatial.reduction is not None and not self.scene.is_planar:
+                found.append(f"{name}: all modes but {modes_kept(body.spatial)}")
+        return (*found, *remarks_on_parts(self.bodies))

@@ -1,0 +1,277 @@
+"""The analyses of a scene in space, run one after the other."""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ..actuation.context import ActuatedContext
+from ..actuation.feasibility import Feasibility
+from ..actuation.point_forces import forces_at_points, solve_points
+from ..actuation.unsupplied import held_shift
+from ..common.arrays import Array
+from ..common.errors import FfrobotError, InputError, SolveError, of_file
+from ..mbs.analysis.operating_points import InstantAnalysis
+from ..mbs.analysis.outcome import Outcome
+from ..mbs.quantities.energy import totals
+from ..mbs.quantities.motion import RobotMotion
+from ..mbs.quantities.reactions import reactions
+from ..mbs.quantities.sharing import shared_evenly
+from ..mbs.quantities.validity import NOTABLE
+from ..mbs.scene.analysis import Analysis
+from ..mbs.solve.reach import turned_guesses
+from ..scene.load import load_scene
+from ..scene.scene import Scene
+from .actuation import find_actuation, missing_forces
+from .bodies import load_bodies
+from .enough import completed, goes_on, is_replayed, log_outcome, progress_of, with_enough_modes, with_enough_pieces
+from .finer import with_finer_check
+from .mode_choice import mode_levels, reported_modes
+from .mode_search import ModeSearch, error_tolerances
+from .paths import with_paths
+from .pieces import MotionOfLinks, bending_of_links, divided_links, wanted_pieces
+from .prepare import (
+    made_solution,
+    with_bodies,
+    with_pieces,
+    with_scene,
+    with_stiffening,
+)
+from .solution import AnalysisResult, Solution
+from .stresses import find_stresses
+from .watcher import Interruption, Watcher
+from .whole_links import make_whole_links
+
+if TYPE_CHECKING:
+    from scipy.interpolate import BSpline
+
+logger = logging.getLogger(__name__)
+
+
+Keep = Callable[[Solution], None]
+
+
+def solve_scene(scene: Scene | Path, watcher: Watcher | None = None, keep: Keep | None = None) -> Solution:
+    """Run every analysis of a scene, or of a scene file, in space; stage 1 runs first for links that are out of date.
+
+    Shapers for the robot's frequencies and the fastest motion are found first (see `paths`).
+    With `modes = "auto"` they are run with more and more modes, until the estimated error meets the tolerances.
+
+    An analysis that does not reach its end is kept as far as it got, and ends the run (`Outcome.check_completed`).
+    So does Ctrl-C during an analysis. `keep` is given what there is before an error is raised.
+    Raises `InputError` for anything wrong with the scene or the files it names, `SolveError` where no state is found.
+    """
+    watcher = watcher or Watcher()
+    return run_analyses(prepare_scene(scene, watcher), watcher, keep)
+
+
+def prepare_scene(scene: Scene | Path, watcher: Watcher | None = None) -> Solution:
+    """All that analyses start from, nothing solved yet. Raises `InputError` as `solve_scene`."""
+    watcher = watcher or Watcher()
+    if isinstance(scene, Path):
+        scene = load_scene(scene)
+    began = time.perf_counter()
+    loaded = load_bodies(scene, watcher.stage)
+    seconds = {"links and files": time.perf_counter() - began}
+    bodies = {body.name: part for body, part in zip(scene.body, loaded, strict=True)}
+    counts = {body.name: 1 if body.pieces == "auto" else body.pieces for body in scene.body if body.pieces is not None}
+    return with_pieces(made_solution(scene, bodies, seconds), counts, watcher)
+
+
+def run_analyses(solution: Solution, watcher: Watcher, keep: Keep | None = None) -> Solution:
+    """What `solve_scene` does with everything prepared; analyses go on from where `solution.earlier` has them."""
+    with Interruption(watcher.stopping) as interruption:
+        judge = partial(_judged, replace(solution, earlier={}), watcher, interruption)
+        scene, notes = with_paths(solution.scene, solution.model, judge, watcher.stage)
+        solution = replace(with_scene(solution, scene) if notes else solution, path_notes=notes)
+        if any(body.modes == "auto" for body in scene.body):
+            solution = _with_enough_modes(solution, watcher, interruption)
+        elif any(body.pieces == "auto" for body in scene.body):
+            solution = _with_enough_pieces(solution, watcher, interruption)
+        else:
+            solution = _completed(solution, watcher, interruption)
+        solution = with_finer_check(solution, prepare_scene, watcher)
+        if keep is not None and solution.outcomes:
+            keep(solution)
+    if solution.failure is not None:
+        raise solution.failure
+    return solution
+
+
+def _with_enough_modes(solution: Solution, watcher: Watcher, interruption: Interruption) -> Solution:
+    """The scene solved with as many modes as its tolerances need: see `mode_search`."""
+    return with_enough_modes(
+        solution,
+        ModeSearch(error_tolerances(solution.scene), mode_levels(solution.scene, solution.bodies)),
+        lambda last, bodies: _completed(with_bodies(last, bodies), watcher, interruption),
+        reported_modes,
+        interruption,
+    )
+
+
+def _with_enough_pieces(solution: Solution, watcher: Watcher, interruption: Interruption) -> Solution:
+    """The scene solved with links in as many pieces as they bend far, those of `pieces = "auto"`."""
+    return with_enough_pieces(
+        solution,
+        lambda trial: _completed(trial, watcher, interruption),
+        lambda last, counts: with_pieces(last, counts, watcher),
+        wanted_pieces,
+        interruption,
+    )
+
+
+def _judged(solution: Solution, watcher: Watcher, interruption: Interruption, trial: Scene) -> Feasibility | None:
+    """What the one analysis of a scene asks of motors and patches; None where it fails."""
+    try:
+        found = _completed(with_scene(solution, trial), watcher, interruption)
+        if found.unread is not None:
+            assert found.failure is not None
+            raise found.failure
+        (result,) = found.analyses.values()
+    except SolveError:
+        return None
+    return None if result.run.failed or result.actuation is None else result.actuation.feasibility
+
+
+def _completed(solution: Solution, watcher: Watcher, interruption: Interruption) -> Solution:
+    return completed(solution, lambda trial: _run_all(trial, watcher, interruption), with_stiffening)
+
+
+def _run_all(solution: Solution, watcher: Watcher, interruption: Interruption) -> Solution | None:
+    """The analyses up to the first that fails; None where `geometric_stiffening = "auto"` asks for them all again."""
+    results: dict[str, AnalysisResult] = {}
+    seconds = dict(solution.seconds)
+    for analysis in solution.scene.analysis:
+        if interruption.requested and results:
+            break
+        watcher.stage(f'analysis "{analysis.name}"')
+        began = time.perf_counter()
+        try:
+            with of_file(f'{solution.scene.path}: analysis "{analysis.name}"'):
+                run = analysis.run(_context(solution, analysis, results, watcher, interruption))
+                assert isinstance(run, Outcome)
+            if not results:
+                told = (*run.statistics.warnings, *turned_guesses(solution.scene))
+                run = replace(run, statistics=replace(run.statistics, warnings=told))
+        except Exception as error:  # raised once the analyses before it are kept
+            if not results:
+                raise
+            return replace(solution, analyses=results, seconds=seconds, failure=error)
+        try:
+            with of_file(solution.scene.path):
+                result = _with_peaks(solution, run)
+        except Exception as error:  # raised once the integration is kept
+            return _unread(replace(solution, analyses=results, seconds=seconds), run, error)
+        automatic = solution.scene.geometric_stiffening == "auto" and not solution.stiffened
+        if automatic and result.stiffening_effect > NOTABLE and run.status != "interrupted":
+            return None
+        results[analysis.name] = result
+        seconds[analysis.name] = time.perf_counter() - began
+        log_outcome(run)
+        if run.failed:
+            break
+    return replace(solution, analyses=results, seconds=seconds)
+
+
+def _unread(solution: Solution, run: Outcome, error: Exception) -> Solution:
+    """The solution with a run whose outputs failed with `error`: its states are kept where `resume` takes them up."""
+    kept = replace(run, statistics=replace(run.statistics, status="not evaluated"))
+    if run.continuation is None or not goes_on(solution, kept):
+        if not solution.analyses:
+            raise error
+        return replace(solution, failure=error)
+    if isinstance(error, FfrobotError):
+        return replace(solution, unread=kept, failure=error)
+    logger.error('analysis "%s": outputs failed', run.analysis.name, exc_info=error)
+    failure = SolveError(
+        f'{solution.scene.path}: analysis "{run.analysis.name}": outputs failed after the integration, which is kept'
+        f" for --resume: {type(error).__name__}: {error}"
+    )
+    failure.__cause__ = error
+    return replace(solution, unread=kept, failure=failure)
+
+
+def _context(
+    solution: Solution,
+    analysis: Analysis,
+    results: Mapping[str, AnalysisResult],
+    watcher: Watcher,
+    interruption: Interruption,
+) -> ActuatedContext:
+    return ActuatedContext(
+        model=solution.model,
+        outcomes={name: result.run for name, result in results.items()},
+        progress=progress_of(analysis, watcher, interruption),
+        is_replayed=is_replayed(analysis, solution.scene.analysis),
+        earlier=solution.earlier.get(analysis.name),
+        points=solution.points,
+        at_points=partial(forces_at_points, solution.points),
+        patches=solution.patches,
+        links=solution.links,
+        carrying={name: body.carrying for name, body in solution.bodies.items()},
+        whole=make_whole_links(solution),
+    )
+
+
+def _with_peaks(solution: Solution, run: Outcome) -> AnalysisResult:
+    """What is read off a run; what is judged by peaks, by those between outputs."""
+    found, closer = _evaluated(solution, run), run.closer
+    found = replace(found, predicted_shift=_predicted_shift(solution, found))
+    twists = {joint: gear.curve for joint, gear in found.motion.gears.items()}  # splines through outputs
+    known = {joint: curve for joint, curve in twists.items() if curve is not None}
+    if closer is run or len(known) < len(twists):
+        return replace(found, bending=bending_of_links(solution, found.motion))
+    between = _evaluated(solution, closer, known)
+    actuation = found.actuation
+    if actuation is not None and between.actuation is not None:
+        actuation = replace(actuation, feasibility=between.actuation.feasibility)
+    return replace(found, actuation=actuation, bending=bending_of_links(solution, between.motion), closer=between)
+
+
+def _predicted_shift(solution: Solution, found: AnalysisResult) -> dict[str, Array]:
+    """Shift (T, 3), m, of all points by modal forces that nothing supplies; of links in pieces as of the whole links.
+
+    None where the joints of whole links cannot say how the pieces move.
+    """
+    motion = found.motion
+    forces = {} if found.actuation is None else missing_forces(motion, found.actuation)
+    if not forces:
+        return {}
+    points = [f"{body}.{label}" for body, labels in motion.points.items() for label in labels]
+    if (whole := make_whole_links(solution)) is not None:
+        try:
+            told = whole.told(found.run)
+        except InputError:
+            return {}
+        motion = RobotMotion(told.model, told.time, told.q, told.v, told.a, told.multipliers)
+    return held_shift(motion, forces, points)
+
+
+def _evaluated(solution: Solution, run: Outcome, twists: Mapping[str, BSpline] | None = None) -> AnalysisResult:
+    """What is read off a run; `twists` of compliant gears where they are known."""
+    forces = run.forces
+    found = MotionOfLinks(
+        run.model, run.time, run.q, run.v, run.a, run.multipliers, forces.required, run.motion.is_at_rest,
+        forces.applied, forces.commanded, twists or {}, divided_links(solution),
+    )  # fmt: skip
+    motion, sharing = shared_evenly(found)
+    actuation = None
+    is_judged = motion.motor_forces is not None and not isinstance(run.analysis, InstantAnalysis)
+    if is_judged:  # else nothing is asked of motors and patches
+        actuation = find_actuation(
+            solution.scene, motion, run.analysis, solution.bodies, solution.patches, forces.voltages
+        )
+    whole = {name: body for name, body in solution.bodies.items() if name not in solution.divided}
+    stresses = find_stresses(motion, whole, solution.patches)
+    at_points = {}
+    if run.analysis.allocates_patches and any(row.is_trajectory for row in run.model.rows):
+        at_points = {name: solve_points(points, run) for name, points in solution.points.items()}
+    return AnalysisResult(
+        run, motion, reactions(motion), *totals(motion), actuation, stresses, at_points,
+        sharing=sharing,
+    )  # fmt: skip

@@ -1,0 +1,74 @@
+"""Stresses of links in space over a motion, where their files hold those of modes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from ..actuation.patches.composite import Placed, section_loads
+from ..actuation.patches.link_patches import LinkPatches
+from ..actuation.patches.patches import PatchArray
+from ..actuation.patches.voltages import voltage_gain
+from ..common.arrays import Array
+from ..fe_models.modal_body import ModalBody
+from ..mbs.model.body import Body
+from ..mbs.quantities.link_loads import LinkLoads, loads_on_links
+from ..mbs.quantities.motion import RobotMotion
+from ..mbs.quantities.stress import (
+    BodyStress,
+    SectionLoads,
+    body_stress,
+    has_stresses,
+    mode_acceleration,
+    mode_displacement,
+)
+from .bodies import LoadedBody
+
+
+def find_stresses(
+    motion: RobotMotion, bodies: Mapping[str, LoadedBody], patches: Mapping[str, LinkPatches]
+) -> dict[str, BodyStress]:
+    """By body; by mode acceleration where files and loads allow it.
+
+    By mode displacement of links that patches stiffen otherwise than by bending in the plane, as static stresses of
+    their files are those of the bare link, and of those on which forces act elsewhere than at interfaces.
+    """
+    links = {name: body.modal for name, body in bodies.items() if body.modal is not None and has_stresses(body.modal)}
+    stiff = {name: of for name, of in patches.items() if any(one.layout.adds_stiffness for one in of.arrays.values())}
+    unknown = {name for name, of in stiff.items() if _in_plane(of) is None}
+    known = [name for name, link in links.items() if link.stress_loads and name not in unknown]
+    loads = loads_on_links(motion, known) if known else {}
+    found = {}
+    for name, link in links.items():
+        p, spatial = motion.body(name).modal, bodies[name].spatial
+        recovery = mode_displacement(p)
+        if name in loads and _is_known(link, loads[name].sizes):
+            sections = _sections(stiff[name], link, spatial, p, loads[name]) if name in stiff else None
+            recovery = mode_acceleration(link, spatial.modal_transform, p, loads[name].sizes, sections)
+        found[name] = body_stress(link, recovery)
+    return found
+
+
+def _in_plane(of_link: LinkPatches) -> PatchArray | None:
+    """The patches of a link where all that they do to its sections is to bend them in the plane, and to stretch."""
+    array, *others = of_link.arrays.values()
+    is_plain = array.layout.acts_in == "in-plane" and array.layout.fibre_angle is None
+    return array if is_plain and not others else None
+
+
+def _sections(of_link: LinkPatches, link: ModalBody, spatial: Body, p: Array, loads: LinkLoads) -> SectionLoads | None:
+    """What the patches do to the sections of their link at file coordinates p (T, n); None of old files.
+
+    Voltages are those whose modal forces the motion shows.
+    """
+    array = _in_plane(of_link)
+    if array is None or not np.isfinite(array.authority).all():
+        return None
+    F_p = of_link.reached.forces(loads.modal_force @ spatial.on_file)
+    return section_loads(Placed(array.layout, array.edges), link, p, F_p @ voltage_gain(of_link.reach).T)
+
+
+def _is_known(link: ModalBody, sizes: Mapping[str, Array]) -> bool:
+    """Whether the file of a link has the static stress of everything that acts on it."""
+    return all(name in link.stress_loads or not np.any(size) for name, size in sizes.items())

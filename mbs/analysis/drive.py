@@ -1,0 +1,246 @@
+"""Running the integrators of the core from an initial state to an outcome: all kinds that integrate do it here."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cache
+
+import numpy as np
+
+from ...common.arrays import Array, Indices, as_list
+from .. import _core
+from .._core import TimeFunction
+from ..fields.waypoints import spline
+from ..model.drives import NO_DRIVES, Command, Drives, PointDrive, Replayed
+from ..model.model import Model
+from ..model.motors import integrated_mechanism
+from ..model.system import MultibodySystem
+from ..scene.analysis import IntegratedAnalysis
+from ..solve.diagnosis import find_cause
+from ..solve.integrator_choice import choose_integrator
+from ..solve.integrators import beyond_rounding, integration_controls, with_steps_of
+from ..solve.limits import left_ranges, watch_limits
+from ..solve.posture import NEARLY_SINGULAR, SINGULAR, robot_size, told_posture
+from ..solve.reach import out_of_reach
+from ..solve.state import State
+from .earlier_check import check_earlier, going_on
+from .outcome import Continuation, EarlierRun, Forces, Motion, Outcome, Statistics
+from .samples import in_order, new_samples, reached_samples, stops, worth_a_look
+
+Progress = Callable[[float], bool]
+"""Called now and then with the time reached; False stops the run."""
+
+STATUS = {
+    _core.IntegrationStatus.completed: "completed",
+    _core.IntegrationStatus.step_underflow: "step underflow",
+    _core.IntegrationStatus.too_many_steps: "too many steps",
+    _core.IntegrationStatus.interrupted: "interrupted",
+    _core.IntegrationStatus.diverged: "diverged",
+}
+
+
+@dataclass(frozen=True)
+class Control:
+    """What acts on motors and patches from sample to sample.
+
+    Attributes:
+        commands: what a unit of each does.
+        first: (inputs,) before those of the first sample act.
+        times: (K,) s, of the samples; the commands of each act `delay` (s) later.
+        controller: commands (inputs,) from sample number, time and what was read: q (n_q,), v (n_v,), a (n_v,) in one.
+        held: commands (T, inputs) that have acted up to times (T,), s, after a run.
+    """
+
+    commands: tuple[Command, ...]
+    first: Array
+    times: Array
+    delay: float
+    controller: Callable[[int, float, Array], Array]
+    held: Callable[[Array], Array]
+
+
+def drive_robot(
+    model: Model,
+    analysis: IntegratedAnalysis,
+    start: State,
+    progress: Progress,
+    *,
+    drives: Drives = NO_DRIVES,
+    warnings: tuple[str, ...] = (),
+    times: Array | None = None,
+    control: Control | None = None,
+    earlier: EarlierRun | None = None,
+    is_recorded: bool = False,
+) -> Outcome:
+    """The run of an integration from `start`, with outputs at `times`, those of the analysis where not given.
+
+    Sampled `control` and `drives` act beside the loads of the scene. The rows of `model` hold. It ends early where
+    `progress` says so, and in a posture in which the joints cannot follow the path, with a warning. It goes on with an
+    `earlier` run of the same analysis. `is_recorded`: with its steps, for a replay.
+    """
+    times = analysis.times if times is None else times
+    commands = control.commands if control is not None else ()
+    system, began = MultibodySystem(model, drives, commands), time.perf_counter()
+    is_sampled = control is not None
+    integrator = with_steps_of(
+        analysis,
+        float(times[-1]),
+        lambda: choose_integrator(system, analysis, start, len(times), is_sampled=is_sampled),
+    )
+    if earlier is not None:  # with the same candidates, and what they have become since
+        known = earlier.statistics.integrator
+        integrator = replace(integrator, name=known.name, reason=known.reason)
+    controls = integration_controls(analysis, integrator)
+    paths = model.scene.trajectory if any(row.is_trajectory for row in model.rows) else ()
+    loads = (size for load in model.scene.load for size in load.components.values())
+    controls.stops = as_list(stops(times, paths, loads))
+    system.integrated.scene.watch_posture(
+        [model.rows[k].is_trajectory for k in system.integrated.rows], robot_size(model)
+    )
+    watch_limits(system.integrated.scene, model.tree)
+    recording = _core.Recording() if is_recorded else None
+    continuation = Continuation(_core.TreeCheckpoint(), recording, new_samples(times, analysis))
+    continuation = continuation if earlier is None else earlier.continuation
+    if earlier is not None:
+        _check(earlier, model, times, is_recorded=is_recorded)
+    with going_on(earlier, times):
+        run = _integrated(system, times, start, controls, control, progress, continuation)
+    motion = _motion(system, run, times)
+    motion = motion if earlier is None else earlier.motion.followed_by(motion)
+    in_posture = _ends_in_posture(run)
+    posture = told_posture(model, run.least_ratio, run.singular_at, run.singular_posture, is_end=in_posture)
+    cause = f"{posture}: {_advice(model, times)}" if in_posture else ""
+    if not in_posture and STATUS[run.status] not in ("completed", "interrupted"):
+        cause = find_cause(system, analysis, integrator, run)
+    scatter = beyond_rounding(analysis.tolerance, run.rounding)
+    told = (*warnings, *(text for text in (posture, scatter) if text))
+    told = (*told, *left_ranges(model, run.ranges, motion.time, motion.q, motion.v))
+
+    statistics = Statistics(
+        "diverged" if in_posture else STATUS[run.status], integrator.changed_in(run), run.steps, run.rejected,
+        run.evaluations, time.perf_counter() - began, continuation.checkpoint.time if control is None else None, cause,
+        np.array(run.step_ends), told,
+    )  # fmt: skip
+    found = Outcome(
+        analysis=analysis,
+        model=model,
+        motion=motion,
+        forces=Forces(applied=drives.at_points),
+        statistics=statistics if earlier is None else statistics.added_to(earlier.statistics),
+        continuation=continuation if control is None else None,
+    )
+    numbers = _numbers(drives.replayed, run, found, 0 if earlier is None else len(earlier.motion.time))
+    acting = _under(drives, found, numbers)
+    if (reached := reached_samples(continuation.samples, found.time)) is None:
+        return acting
+
+    @cache
+    def look_closer() -> Outcome:
+        between, more = _between(system, *reached, found, control)
+        order = in_order(found.time, between.time)
+        return _under(drives, found.among(between), np.concatenate([numbers, more])[order])
+
+    return replace(acting, look_closer=look_closer)
+
+
+def _advice(model: Model, times: Array) -> str:
+    """How to come past a posture in which a run at `times` (T,) ended."""
+    far = out_of_reach(model, times)
+    return far if far else "move the path, or start in another posture"
+
+
+def _numbers(replayed: Replayed | None, run: _core.TreeRun, found: Outcome, known: int) -> Array:
+    """What a replay does (T, numbers) at outputs of `run`, of which those that were `known` say nothing."""
+    if replayed is None:
+        return np.zeros((len(found.time), 0))
+    before = replayed.source.sample(as_list(found.time[:known]))
+    return np.concatenate([before, run.replayed[known:]]) if known else run.replayed
+
+
+def _under(drives: Drives, run: Outcome, numbers: Array) -> Outcome:
+    """The run with what a replay does on joints and points at its times."""
+    if drives.replayed is None or not len(run.time):
+        return run
+    constant = len(run.time) == 1
+    acting = [TimeFunction.constant(x) for x in numbers[0]] if constant else spline(run.time, numbers, 1)
+    applied = (
+        PointDrive(point, {component: acting[number] for component, number in of_point.items()})
+        for point, of_point in drives.replayed.at_points.items()
+    )
+    commanded = {joint: numbers[:, list(columns)] for joint, columns in drives.replayed.moments.items()}
+    forces = replace(run.forces, commanded=commanded, applied=(*drives.at_points, *applied))
+    return replace(run, forces=forces)
+
+
+def _check(earlier: EarlierRun, model: Model, times: Array, *, is_recorded: bool) -> None:
+    motion, n_q, n_v = earlier.motion, model.tree.n_q, model.tree.n_v
+    datasets = {
+        "q": (motion.q, n_q),
+        "v": (motion.v, n_v),
+        "a": (motion.a, n_v),
+        "multipliers": (motion.multipliers, len(model.rows)),
+    }
+    check_earlier(earlier, times, (n_q, n_v), datasets, is_recorded=is_recorded)
+
+
+def _between(
+    system: MultibodySystem, times: Array, states: Array, found: Outcome, control: Control | None
+) -> tuple[Outcome, Array]:
+    """The run at `times` (k,) of it, with `states` (k, n), and what a replay does there (T, numbers)."""
+    core, scene, _ = system.integrated
+
+    def at(rows: Indices) -> _core.TreeRun:
+        chosen, of_rows = as_list(times[rows]), np.ascontiguousarray(states[rows])
+        if control is None:
+            return _core.tree_outputs(core, scene, chosen, of_rows, system.replay)
+        held = system.held_forces(control.commands)
+        return _core.tree_outputs_under(core, scene, chosen, of_rows, held, control.held(times[rows]))
+
+    rows = worth_a_look(len(times), lambda rows: system.multipliers(at(rows).multipliers))
+    run = at(rows)
+    return replace(found, motion=_motion(system, run, times[rows])), run.replayed
+
+
+def _judged(system: MultibodySystem) -> _core.PlanarDriven | _core.SpatialDriven | None:
+    """The mechanism with its motors, where these take the place of forces on a path: their errors count, too."""
+    is_followed = any(row.is_trajectory for row in system.model.rows)
+    return integrated_mechanism(system) if is_followed and system.model.motors else None
+
+
+def _motion(system: MultibodySystem, run: _core.TreeRun, times: Array) -> Motion:
+    """The motion of a run of the core, as far as it got."""
+    q, v = (np.ascontiguousarray(part) for part in np.split(run.states, [system.model.tree.n_q], axis=1))
+    return Motion(times[: len(q)], q, v, run.accelerations, system.multipliers(run.multipliers))
+
+
+def _ends_in_posture(run: _core.TreeRun) -> bool:
+    """Whether a posture ended the run: joints cannot follow there, or steps vanish next to it as none leads across."""
+    if STATUS[run.status] == "step underflow" and run.singular_at == run.time_reached:
+        return run.least_ratio < NEARLY_SINGULAR
+    return STATUS[run.status] == "diverged" and run.least_ratio < SINGULAR
+
+
+def _integrated(
+    system: MultibodySystem,
+    times: Array,
+    start: State,
+    controls: _core.IntegrationControls,
+    control: Control | None,
+    progress: Progress,
+    continuation: Continuation,
+) -> _core.TreeRun:
+    core, scene, _ = system.integrated
+    if control is None:
+        motion: Callable[..., _core.TreeRun] = _core.tree_motion  # core and motors are of one space
+        return motion(
+            core, scene, as_list(times), start.q, start.v, controls, progress, continuation.checkpoint,
+            continuation.samples, continuation.recording, system.replay, _judged(system),
+        )  # fmt: skip
+    return _core.tree_sampled(
+        model=core, scene=scene, times=as_list(times), q=start.q, v=start.v, controls=controls,
+        carry_on=progress, held=system.held_forces(control.commands), first_command=control.first,
+        samples=as_list(control.times), delay=control.delay, controller=control.controller,
+        between=continuation.samples,
+    )  # fmt: skip

@@ -1,0 +1,183 @@
+"""What an inverse analysis in space found, at any time of it, to act again in other runs.
+
+Steps that were recorded are made again, stage by stage where another run has the same ones; prescribed motions are
+solved anew.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ...common.arrays import Array
+from .. import _core
+from .._core import TimeFunction
+from ..fields.waypoints import spline
+from ..model.model import Model, row_values
+from ..model.motors import (
+    MotorForces,
+    driven_mechanism,
+    driven_system,
+    frames_in_core,
+    integrated_mechanism,
+    motor_forces,
+    path_forces,
+)
+from ..model.rows import ConstraintRow
+from ..model.system import MultibodySystem
+from ..scene.analysis import TimedAnalysis, output_times
+from ..scene.loads import OF_POINT
+from ..solve.posture import robot_size
+from .context import ActuationPoints, PatchedLink
+from .outcome import Outcome
+
+OFF_PATH = 0.01  # sizes of the robot, rad: a replay that is off by more has left its path
+
+Reader = Callable[[Any], Any]
+"""Makes what reads forces of the states of a `_core.PlanarDriven`, or of a `_core.SpatialDriven`."""
+
+
+def replay_times(source: Outcome, analysis: TimedAnalysis) -> Array:
+    """Output times (T,) of a run under what `source` found, s.
+
+    With what it does before t = 0 and, where the run goes to the end of the path, after that.
+    """
+    after = source.details.post_actuation if analysis.end == source.analysis.last_time else 0.0
+    return output_times(analysis.end, analysis.output_step, source.details.pre_actuation, after)
+
+
+def supplied(run: Outcome, most: Array, patches: Mapping[str, PatchedLink], *, limited: bool) -> _core.ForceSource:
+    """Forces of all motors, `most` (motors,) at most, and voltages of the patches of links by body, within limits.
+
+    In the order of `Model.motors`, N·m or N on second sides, then of `patches`, V.
+    """
+    if run.prescribed is not None and run.prescribed.voltages:
+        return _with_known_voltages(run, most, patches, limited=limited)
+    links = [(*_reached(run.model, of.to_reached), of.allocation(limited=limited)) for of in patches.values()]
+    return _found(run, lambda driven: _core.actuator_reader(driven, most, links), MultibodySystem(run.model))
+
+
+def _reached(model: Model, to_reached: Mapping[str, Array]) -> tuple[int, Array]:
+    """Where the modes of the bodies that carry patches begin in v, and (m, …) what makes `reached` of v from there."""
+    nodes = [node for node in model.tree.nodes if node.body.name in to_reached]
+    first, end = nodes[0].p_v.start, nodes[-1].p_v.stop
+    found = np.zeros((len(to_reached[nodes[0].body.name]), end - first))
+    for node in nodes:
+        found[:, node.p_v.start - first : node.p_v.stop - first] = to_reached[node.body.name] @ node.body.on_file.T
+    return first, found
+
+
+def _with_known_voltages(
+    run: Outcome, most: Array, patches: Mapping[str, PatchedLink], *, limited: bool
+) -> _core.ForceSource:
+    torques = _found(run, lambda driven: _core.actuator_reader(driven, most, []))
+    assert run.prescribed is not None
+    voltages: list[TimeFunction] = []
+    for name, of_link in patches.items():
+        breaks, V = run.prescribed.voltages[name]
+        within = np.clip(V, -of_link.limit, of_link.limit) if limited else V
+        voltages += [function.held(breaks[0], breaks[-1]) for function in spline(breaks, within, 1)]
+    return _core.ForcesOfBoth(torques, _core.ForcesOfTime(voltages)) if voltages else torques
+
+
+class OfPaths(NamedTuple):
+    """Forces that hold paths: numbers along the coordinates of joints, and at points by component.
+
+    There are `total` numbers; those at points that no component has are zero.
+    """
+
+    source: _core.ForceSource
+    joints: Mapping[str, list[int]]
+    points: Mapping[str, Mapping[str, int]]
+    total: int
+
+
+def path_numbers(run: Outcome) -> OfPaths:
+    """Forces on the points of paths, about there, and along the coordinates of joints that follow one."""
+    model = run.model
+    rows = [(k, row) for k, row in enumerate(model.rows) if row.is_trajectory]
+    along = [(k, row) for k, row in rows if row.kind == "coordinate"]
+    on_points = [(k, row, *side) for k, row in rows if row.kind != "coordinate" for side in _sides(model, row)]
+    joints = {model.joint_of(row): [number] for number, (_, row) in enumerate(along)}
+    firsts = range(len(along), len(along) + len(OF_POINT) * len(on_points), len(OF_POINT))
+    points = dict(zip(dict.fromkeys(point for *_, point, _ in on_points), firsts, strict=False))
+    parts = [(k, number, float(row.sign)) for number, (k, row) in enumerate(along)]
+    parts += [(k, points[point], sign) for k, _, point, sign in on_points]
+    count = len(along) + len(OF_POINT) * len(points)
+    system = MultibodySystem(model)
+
+    def reader(driven: _core.PlanarDriven | _core.SpatialDriven) -> _core.PlanarForceReader | _core.SpatialForceReader:
+        if isinstance(driven, _core.SpatialDriven):
+            return _core.path_reader(driven, np.eye(3), parts, count)
+        assert system.plane is not None
+        at = {int(k): number for number, k in enumerate(system.plane.followed)}
+        in_plane = [(at[k], number, sign) for k, number, sign in parts]
+        return _core.path_reader(driven, system.plane.axes.T, in_plane, count)
+
+    ways = [row.f for _, row, *_ in on_points if row.kind == "point"]
+    are_in_plane = system.lie_in_plane(ways)  # else joints carry what is across it
+    source = _found(run, reader, system if are_in_plane else None)
+    turned = {point for _, row, point, _ in on_points if row.kind != "point"}
+    components = {
+        point: {name: first + k for k, name in enumerate(OF_POINT if point in turned else OF_POINT[:3])}
+        for point, first in points.items()
+    }
+    return OfPaths(source, joints, components, count)
+
+
+def _sides(model: Model, row: ConstraintRow) -> Iterator[tuple[str, float]]:
+    """Sections of bodies on which the force along a row acts, and its sign there: "BODY.POINT", or "BODY"."""
+    for section, sign in ((row.b, 1.0), (row.a, -1.0)):
+        if section.body >= 0:
+            yield ".".join(filter(None, (model.tree.nodes[section.body].body.name, section.point))), sign
+
+
+def point_numbers(run: Outcome, chosen: Mapping[str, ActuationPoints]) -> _core.ForceSource:
+    """Driving forces at the actuation points, global axes: three numbers of each component."""
+    tree, in_core = run.model.tree, frames_in_core(run.model, driven_system(run.model).core, run.q[0])
+    bodies = [(tree.index[name], *in_core[tree.index[name]], *of_body.of_core()) for name, of_body in chosen.items()]
+    return _found(run, lambda driven: _core.point_reader(driven, bodies))
+
+
+def _found(run: Outcome, reader: Reader, system: MultibodySystem | None = None) -> _core.ForceSource:
+    """Read of the recorded steps of a run, as `system` was integrated (None: in 3D), or of its prescribed motion."""
+    if run.recording is not None:
+        of_run = driven_mechanism(run.model, has_motors=False) if system is None else integrated_mechanism(system)
+        return _core.recorded_forces(of_run, run.recording, reader(of_run))
+    assert run.prescribed is not None
+    equations, shape, near, _ = run.prescribed
+    motion = equations()
+    return _core.prescribed_forces(motion, shape, near, reader(motion.driven))
+
+
+def motor_forces_of(run: Outcome) -> MotorForces:
+    """τ and F_p of a run, its gears rigid (see `mbs.model.spatial_motors`)."""
+    return motor_forces(run.model, run.q, supplied_in(run))
+
+
+def supplied_in(run: Outcome) -> Array:
+    """What the paths of a run, or a prescribed shape, take along v (T, n_v)."""
+    if run.forces.required is not None:
+        return run.forces.required
+    return path_forces(run.model, run.time, run.q, run.multipliers)
+
+
+def left_paths(source: Outcome, run: Outcome) -> Iterator[str]:
+    """Of a replay under the forces on all rows, which would move as `source` did: a warning where it does not."""
+    now = (run.time >= 0.0) & (run.time <= source.time[-1])
+    model, times, q = source.model, run.time[now], run.q[now]
+    if not len(times):
+        return
+    sizes = np.array([robot_size(model) if model.measures_way(row) else 1.0 for row in model.rows])
+    share = np.abs(row_values(model, q, times)[0]) / sizes
+    for path in dict.fromkeys(row.owner for row in model.rows if row.is_trajectory):
+        off = share[:, [row.is_trajectory and row.owner == path for row in model.rows]].max(axis=1)
+        if off.max() > OFF_PATH:
+            yield (
+                f'the forces of "{source.analysis.name}" do not follow trajectory "{path}": from t ='
+                f" {times[int(np.argmax(off > OFF_PATH))]:.4g} s on the deviation is up to {100 * off.max():.3g} % of"
+                " the robot's size, or of 1 rad. Open-loop forces are unstable near singular postures; apply ="
+                ' "joints", or a controller, keeps to the path'
+            )

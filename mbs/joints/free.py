@@ -1,0 +1,50 @@
+"""Free joints: nothing is held; they say where a body is."""
+
+from __future__ import annotations
+
+from typing import ClassVar, Literal
+
+import numpy as np
+
+from ...common.arrays import Array
+from ...common.rotations import exponential, of_quaternion, quaternions
+from ..fields.spelling import SPATIAL
+from .joint import JointRecord, Place
+
+
+class FreeJoint(JointRecord):
+    """The second side moves freely; [initial] has its position (m) and rotation vector (rad), in axes of the first.
+
+    A body without any joint is free, too, from the origin on.
+    """
+
+    type: Literal["free"]
+    only_in = SPATIAL
+    motor: bool = False
+    """Only `false`: motors need coordinates, which free joints do not have."""
+
+    guess_units = ("m", "m", "m", "rad", "rad", "rad")
+    q_count = 7
+    freedoms = 6
+    held = ()
+    locates: ClassVar[bool] = False
+
+    def place(self, q: Array) -> Place:
+        """At q[:3], turned by the quaternion q[3:]."""
+        return Place(q[..., :3], of_quaternion(q[..., 3:]))
+
+    def motion(self, q: Array) -> Array:
+        """v: the velocity in axes of the inner triad, the angular velocity in those of the outer one."""
+        found = np.zeros((*q.shape[:-1], 6, 6))
+        found[..., :3, :3], found[..., 3:, 3:] = np.eye(3), of_quaternion(q[..., 3:])
+        return found
+
+    def state(self, coordinates: Array) -> Array:
+        """Place, and the quaternion of a rotation vector."""
+        return np.concatenate([coordinates[..., :3], quaternions(exponential(coordinates[..., 3:]))], axis=-1)
+
+    def turned_around(self, coordinates: Array) -> Array:
+        """The place of the first side, and its rotation vector, in the axes of the second."""
+        C = exponential(coordinates[..., 3:])
+        back = -np.einsum("...ij,...i->...j", C, coordinates[..., :3])
+        return np.concatenate([back, -coordinates[..., 3:]], axis=-1)

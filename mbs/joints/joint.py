@@ -1,0 +1,230 @@
+"""What all types of joints have in common: two triads, and how the outer one stands on the inner one.
+
+Triads coincide where the coordinates are zero. Motion is along and about z, of universal joints about x of the inner
+triad and y of the outer one. `q` (…, q_count) and `v` (…, freedoms) are the core's (mbs/core/recursion/joint): of
+single coordinates these themselves, of free orientations a quaternion, and the angular velocity in outer axes.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterator, Sequence
+from typing import Annotated, ClassVar, Literal, NamedTuple, Self, get_args
+
+import numpy as np
+from pydantic import field_validator, model_validator
+
+from ...common.arrays import Array
+from ...common.rotations import of_rpy, smallest_turn
+from ...common.validation import Record
+from ..fields.field_types import GROUND, Name, Quantity, Side, Vector3, split_point
+from ..fields.references import Reference, body_of, marker_reference
+from ..fields.spelling import IN_SPACE, Vector
+from .transmission import Friction, MotorLimits
+
+RecordType = type[Record]  # `type` is a key below
+Angles = tuple[Quantity, Quantity, Quantity]
+
+
+class Place(NamedTuple):
+    """The outer triad on the inner one: way d (…, 3) and axes C (…, 3, 3), columns, in axes of the inner one."""
+
+    d: Array
+    C: Array
+
+
+class Held(NamedTuple):
+    """One of what a joint holds where it closes a loop; axes 0, 1, 2 of the inner triad (`f`) and the outer one (`g`).
+
+    "point": three components of the way; "slide": the way along f; "dot": f and g are square.
+    """
+
+    kind: Literal["point", "slide", "dot"]
+    f: int = 0
+    g: int = 0
+
+
+class Along(NamedTuple):
+    """A coordinate of a joint where it closes a loop; axes of the inner triad, or of the outer one if `of_outer`.
+
+    "slide": the way along f; "turn": the angle about f by which the outer triad's axis g has left the inner one's.
+    """
+
+    kind: Literal["slide", "turn"]
+    f: int
+    g: int = 0
+    of_outer: bool = False
+
+
+POINT = Held("point")
+ALIGNED = (Held("dot", 0, 2), Held("dot", 1, 2))  # the axes z
+GUIDED = (Held("slide", 0), Held("slide", 1), *ALIGNED)
+NOT_TURNED = Held("dot", 0, 1)  # beside ALIGNED
+
+
+class JointRecord(Record, ABC):
+    """A joint between two points, or a point and the ground: two sides, and how it moves."""
+
+    name: Name
+    """Name of the joint, unique in the scene."""
+    type: str
+    """How it moves."""
+    between: tuple[Side, Side]
+    """Sides of the joint, "BODY.POINT" or "ground"; coordinate, torque and reaction are of the second relative to the
+    first."""
+    at: Vector = (0.0, 0.0, 0.0)
+    """Position on the ground, m, global axes."""
+    rpy: Annotated[Angles, IN_SPACE] = (0.0, 0.0, 0.0)
+    """Orientation of the second side's axes in the first's at coordinate zero: roll, pitch, yaw about fixed axes, rad
+    (or such as "90*deg")."""
+
+    units: ClassVar[tuple[str, ...]] = ()  # of its coordinates, "rad" or "m"
+    guess_units: ClassVar[tuple[str, ...]] = ()  # of the numbers by which [initial] gives its place, where those differ
+    q_count: ClassVar[int] = 0
+    freedoms: ClassVar[int] = 0
+    held: ClassVar[tuple[Held, ...] | None] = None  # None where it cannot close a loop
+    along: ClassVar[tuple[Along, ...]] = ()  # its coordinates where it does, in the scene's order
+    locates: ClassVar[bool] = True
+    """Whether it fixes the place of one body on the other; the initial guess goes along such joints first."""
+
+    @model_validator(mode="after")
+    def _fits_two_bodies(self) -> Self:
+        points = [side for side in self.between if side != GROUND]
+        if not points:
+            raise ValueError('expected at most one "ground" in between, found two')
+        bodies = [split_point(point)[0] for point in points]
+        if len(points) == 2 and bodies[0] == bodies[1]:
+            raise ValueError(f'expected two bodies in between, found "{bodies[0]}" twice')
+        if len(points) == 2 and "at" in self.model_fields_set:
+            raise ValueError('expected the key "at" only in joints to "ground", found it between two bodies')
+        return self
+
+    @classmethod
+    def type_name(cls) -> str:
+        """What the key `type` says."""
+        return str(get_args(cls.model_fields["type"].annotation)[0])
+
+    @classmethod
+    def refuse_key(cls, key: str, others: Sequence[RecordType]) -> str:
+        """What to say of a key that only joints of other types have."""
+        having = " or ".join(other.type_name() for other in others if issubclass(other, JointRecord))
+        return f'expected the key "{key}" only in {having} joints, found it in a {cls.type_name()} joint'
+
+    @property
+    def label(self) -> str:
+        """What messages call it."""
+        return f'joint "{self.name}"'
+
+    @property
+    def bodies(self) -> tuple[str, str]:
+        """The two bodies it joins; one may be the ground."""
+        first, second = self.between
+        return body_of(first), body_of(second)
+
+    def references(self) -> Iterator[Reference]:
+        """The points it joins."""
+        for k, side in enumerate(self.between):
+            yield from marker_reference(f"between[{k}]", side, loaded=True)
+
+    @field_validator("motor", check_fields=False)
+    @classmethod
+    def _motor_has_coordinates(cls, motor: bool | None) -> bool | None:
+        if motor and cls.guess_units:
+            raise ValueError(
+                f"expected false of a {cls.type_name()} joint, which has no coordinates for motors, found true:"
+                " revolute and prismatic joints in series have them"
+            )
+        return motor
+
+    @property
+    def orientation(self) -> Array:
+        """R (3, 3): the second side's axes in those of the first where the coordinate is zero."""
+        return of_rpy(*self.rpy)
+
+    def triads(self) -> tuple[Array, Array]:
+        """Columns (3, 3): axes of the joint on its first side and on its second one, in the axes of the sections."""
+        return np.eye(3), self.orientation.T
+
+    def outward_triads(self, backwards: bool) -> tuple[Array, Array]:
+        """The triads on the inner side and on the outer one, which is the first of `between` if `backwards`."""
+        first, second = self.triads()
+        return (second, first) if backwards else (first, second)
+
+    @abstractmethod
+    def place(self, q: Array) -> Place:
+        """Where q (…, q_count) puts the outer triad."""
+
+    @abstractmethod
+    def motion(self, q: Array) -> Array:
+        """(…, 6, freedoms): velocity and angular velocity of the outer triad by v, in axes of the inner one."""
+
+    def motion_rate(self, q: Array, v: Array) -> Array:
+        """(…, 6): Ṡ v in axes of the inner triad, what v̇ = 0 leaves of the acceleration; S is `motion`."""
+        return np.zeros((*q.shape[:-1], 6))
+
+    def action(self, q: Array) -> Array:
+        """(…, 6, freedoms): force and moment of motors on the outer side, at its triad, by generalized forces along v.
+
+        In axes of the inner triad. Motors act along axes of the joint: a force where it slides, a moment where it
+        turns, `action`ᵀ `motion` = 1.
+        """
+        return self.motion(q)  # its columns are of length one and at right angles
+
+    def turned_around(self, coordinates: Array) -> Array:
+        """Coordinates (…, k) with the sides exchanged: of the first on the second; done twice, the same again."""
+        return -coordinates
+
+    def rate_turned_around(self, coordinates: Array, rate: Array) -> Array:
+        """Rate (…, k) of `turned_around(coordinates)` while the coordinates have this rate (…, k)."""
+        return self.turned_around(rate)
+
+    def state(self, coordinates: Array) -> Array:
+        """Q (q_count,) from the numbers by which the scene gives its place."""
+        return coordinates
+
+    def coordinates(self, q: Array) -> Array:
+        """Its coordinates (…, k) in the scene's order, from q (…, q_count); likewise rates from v."""
+        return q
+
+    # What a motor and a gear add; joints that can have them override this.
+
+    def has_motor(self, default: bool) -> bool:
+        """Whether a motor drives it; `default` where the scene leaves that open."""
+        return False
+
+    @property
+    def asks_for_motor(self) -> bool:
+        """Whether the scene says in so many words that it has a motor."""
+        return False
+
+    @property
+    def motor_limits(self) -> tuple[MotorLimits, ...]:
+        """What its motor can do, for each coordinate."""
+        return ()
+
+    @property
+    def given_gear_ratio(self) -> float | None:
+        """The ratio of its gear where the scene gives one."""
+        return getattr(self, "gear_ratio", None) if "gear_ratio" in self.model_fields_set else None
+
+    @property
+    def position_limits(self) -> tuple[tuple[float, float], ...]:
+        """Least and largest value of each coordinate; infinite where the scene gives none."""
+        return ((-np.inf, np.inf),) * len(self.units)
+
+    @property
+    def frictions(self) -> tuple[Friction, ...]:
+        """Friction along each coordinate; empty where there is none."""
+        return ()
+
+    @property
+    def asks_for_coordinate(self) -> tuple[str, ...]:
+        """Keys that ask for its coordinate in the tree; where a loop is cut there is only that of a rotor."""
+        keys = ("stiffness",) if getattr(self, "rotor_inertia", 0.0) else ("motor",)
+        return tuple(key for key in keys if getattr(self, key, None))
+
+
+def with_axis(axis: Vector3, orientation: Array) -> tuple[Array, Array]:
+    """Triads whose z is along `axis`, by the smallest turn on the first side; equal at zero coordinates."""
+    first = smallest_turn(np.array(axis))
+    return first, orientation.T @ first

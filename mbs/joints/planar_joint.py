@@ -1,0 +1,52 @@
+"""Planar joints: the second point moves in a plane of the first side, and the second side turns about its normal."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+
+from ...common.arrays import Array
+from ...common.rotations import about
+from ..fields.spelling import SPATIAL
+from .joint import ALIGNED, Along, Held, Place
+from .moving_joint import AxialJoint
+
+
+class PlanarJoint(AxialJoint):
+    """The second point moves in the plane across `axis`, the second side turns about it.
+
+    Coordinates: two displacements (m) and the angle (rad). The displacements are along the axes x and y that the
+    smallest rotation of z onto `axis` yields.
+    """
+
+    type: Literal["planar"]
+    only_in = SPATIAL
+
+    units = ("m", "m", "rad")
+    q_count = 3
+    freedoms = 3
+    held = (Held("slide", 2), *ALIGNED)
+    along = (Along("slide", 0), Along("slide", 1), Along("turn", 2))
+
+    def place(self, q: Array) -> Place:
+        """By q[0], q[1] along x, y, turned by q[2] about z."""
+        d = np.concatenate([q[..., :2], np.zeros((*q.shape[:-1], 1))], axis=-1)
+        return Place(d, about(2, q[..., 2]))
+
+    def motion(self, q: Array) -> Array:
+        """Along x and y, about z."""
+        return np.broadcast_to(np.eye(6)[:, [0, 1, 5]], (*q.shape[:-1], 6, 3))
+
+    def turned_around(self, coordinates: Array) -> Array:
+        """The way from the second side to the first, in the axes of the second."""
+        x, y, angle = np.moveaxis(coordinates, -1, 0)
+        c, s = np.cos(angle), np.sin(angle)
+        return np.stack([-(c * x + s * y), s * x - c * y, -angle], axis=-1)
+
+    def rate_turned_around(self, coordinates: Array, rate: Array) -> Array:
+        """As `turned_around` of displacements, whose axes turn besides."""
+        X, Y, _ = np.moveaxis(self.turned_around(coordinates), -1, 0)
+        turn = rate[..., 2]
+        x, y, _ = np.moveaxis(self.turned_around(np.concatenate([rate[..., :2], coordinates[..., 2:]], axis=-1)), -1, 0)
+        return np.stack([x + turn * Y, y - turn * X, -turn], axis=-1)

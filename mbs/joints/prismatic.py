@@ -1,0 +1,56 @@
+"""Prismatic joints: the second side slides along an axis of the first and does not turn on it."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+import numpy as np
+
+from ...common.arrays import Array
+from ..fields.field_types import NotNegative, Positive, Vector2, Vector3
+from ..fields.spelling import Spelled, place
+from .joint import GUIDED, NOT_TURNED, Along, Place
+from .moving_joint import AxialJoint
+
+
+def _direction(axis: Vector2) -> Vector3:
+    if not any(axis):
+        raise ValueError(f"expected an axis that is not zero in a prismatic joint, found {list(axis)}")
+    return place(axis)
+
+
+class PrismaticJoint(AxialJoint):
+    """The second point slides along `axis` by its coordinate, m; `rpy` is the orientation of the second side.
+
+    In planar scenes the second side keeps the angle of the initial guess.
+
+    Drivetrain: `rotor_inertia` J (kg·m²) of a rotor that turns by `gear_ratio` N (rad/m) times the coordinate: a mass J
+    N² along it; that the first side turns the rotor is left out.
+    """
+
+    type: Literal["prismatic"]
+    axis: Annotated[Vector3, Spelled(Vector2, _direction)]
+    """Axis of motion in the axes of the first of `between` (ground: global), of any length."""
+    gear_ratio: Positive = 1.0
+    """Rotor rotation per joint displacement, rad/m."""
+    rotor_inertia: NotNegative = 0.0
+    """Moment of inertia of the rotor about its axis, kg·m², before the gear."""
+
+    @classmethod
+    def demand_key(cls, key: str) -> str:
+        """Of the axis: the others have defaults, or are those of all joints."""
+        return "expected an axis that is not zero in a prismatic joint, found none" if key == "axis" else ""
+
+    units = ("m",)
+    q_count = 1
+    freedoms = 1
+    held = (*GUIDED, NOT_TURNED)
+    along = (Along("slide", 2),)
+
+    def place(self, q: Array) -> Place:
+        """By q[0] along z."""
+        return Place(q[..., :1] * np.eye(3)[2], np.broadcast_to(np.eye(3), (*q.shape[:-1], 3, 3)))
+
+    def motion(self, q: Array) -> Array:
+        """Sliding along z."""
+        return np.broadcast_to(np.eye(6)[:, 2:3], (*q.shape[:-1], 6, 1))

@@ -1,0 +1,51 @@
+"""Screw joints: the second side turns about an axis of the first and moves along it in proportion."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+from pydantic import model_validator
+
+from ...common.arrays import Array
+from ...common.rotations import about
+from ..fields.spelling import SPATIAL
+from .joint import Place
+from .moving_joint import AxialJoint
+
+
+class ScrewJoint(AxialJoint):
+    """The second side turns about `axis` by its coordinate, rad, and slides along it by `lead` per turn."""
+
+    type: Literal["screw"]
+    only_in = SPATIAL
+    lead: float
+    """Displacement along the axis per turn, m; positive: right-handed."""
+
+    units = ("rad",)
+    q_count = 1
+    freedoms = 1
+
+    @model_validator(mode="after")
+    def _has_lead(self) -> ScrewJoint:
+        if self.lead == 0.0:
+            raise ValueError("expected a lead that is not 0, found 0: without it the joint is a revolute one")
+        return self
+
+    @property
+    def rise(self) -> float:
+        """The way h along the axis, m/rad."""
+        return self.lead / (2 * np.pi)
+
+    def place(self, q: Array) -> Place:
+        """Turned by q[0] about z, and h q[0] along it."""
+        return Place(self.rise * q[..., :1] * np.eye(3)[2], about(2, q[..., 0]))
+
+    def motion(self, q: Array) -> Array:
+        """Along and about z."""
+        unit = np.array([0.0, 0.0, self.rise, 0.0, 0.0, 1.0])[:, None]
+        return np.broadcast_to(unit, (*q.shape[:-1], 6, 1))
+
+    def action(self, q: Array) -> Array:
+        """A moment about z: the thread makes of it what force there is."""
+        return np.broadcast_to(np.eye(6)[:, 5:], (*q.shape[:-1], 6, 1))

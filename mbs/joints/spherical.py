@@ -1,0 +1,39 @@
+"""Spherical joints: two points coincide."""
+
+from __future__ import annotations
+
+from typing import ClassVar, Literal
+
+import numpy as np
+
+from ...common.arrays import Array
+from ...common.rotations import exponential, of_quaternion, quaternions
+from ..fields.spelling import SPATIAL
+from .joint import POINT, JointRecord, Place
+
+
+class SphericalJoint(JointRecord):
+    """Two points coincide, the second side rotates freely; [initial] has a rotation vector, rad."""
+
+    type: Literal["spherical"]
+    only_in = SPATIAL
+    motor: bool = False
+    """Only `false`: motors need coordinates, which spherical joints do not have."""
+
+    guess_units = ("rad", "rad", "rad")
+    q_count = 4
+    freedoms = 3
+    held = (POINT,)
+    locates: ClassVar[bool] = False  # a loop is best cut here: three rows, no angle
+
+    def place(self, q: Array) -> Place:
+        """Turned by the quaternion q."""
+        return Place(np.zeros((*q.shape[:-1], 3)), of_quaternion(q))
+
+    def motion(self, q: Array) -> Array:
+        """v: the angular velocity in axes of the outer triad."""
+        return np.concatenate([np.zeros((*q.shape[:-1], 3, 3)), of_quaternion(q)], axis=-2)
+
+    def state(self, coordinates: Array) -> Array:
+        """The quaternion of a rotation vector."""
+        return quaternions(exponential(coordinates))

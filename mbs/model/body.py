@@ -1,0 +1,249 @@
+"""What a scene in space needs of a body: invariants of the (R, e, p) equations and the sections where things attach."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from types import MappingProxyType
+
+import numpy as np
+
+from ...common.arrays import Array, as_floats
+from ...common.errors import InputError
+from ...fe_models.modal_body import ModalBody
+from ...fe_models.modal_body.tensors import LEVI_CIVITA
+from . import stiffening as stiffenings
+from .stiffening import Stiffening
+
+
+@dataclass(frozen=True)
+class BodyPoint:
+    """A section of a body: position (3,) m, Φ as `translation` (3, n), Φ_r as `rotation` (3, n), in body axes."""
+
+    position: Array
+    translation: Array
+    rotation: Array
+
+
+@dataclass(frozen=True)
+class Body:
+    """Constants of one body in the equations of motion in space (Shabana, Dynamics of Multibody Systems, ch. 5).
+
+    Arrays are over all n modes of the link; `m_ff` is the identity. Twist φ of a line of mass counts by the last three.
+
+    Attributes:
+        name: of the body.
+        mass: m in kg.
+        first_moment: s0 (3,) = ∫ρ x dV in kg·m, body axes.
+        second_moment: (3, 3) ∫ρ x xᵀ dV in kg·m².
+        S_bar: (3, n) ∫ρ Φ dV.
+        I_bar: (3, 3, n) ∫ρ x_k Φ_l dV at [k, l].
+        S_bar_kl: (3, 3, n, n) ∫ρ Φ_kᵀΦ_l dV at [k, l], without S_spin, which files book at [2, 2].
+        J_spin: J_s = ∫ρI_p dx in kg·m², where x is the axis of a line of mass.
+        h_spin: (n,) ∫ρI_p φ dx.
+        S_spin: (n, n) ∫ρI_p φᵀφ dx.
+        stiffness: K_ff (n,) in rad²/s².
+        damping: D_ff (n, n) in 1/s.
+        points: its sections by name.
+        modal_transform: (n_file, n) p of the modal file is this times p.
+        length: of a link in m; None of a rigid body.
+        reduction: where it has fewer modes than its file.
+        attachment_modes: how many of the n, after all others, are static shapes of loads at interfaces.
+        stiffening: what bending does to second order; left out of the equations where None.
+    """
+
+    name: str
+    mass: float
+    first_moment: Array
+    second_moment: Array
+    S_bar: Array
+    I_bar: Array
+    S_bar_kl: Array
+    J_spin: float
+    h_spin: Array
+    S_spin: Array
+    stiffness: Array
+    damping: Array
+    points: Mapping[str, BodyPoint]
+    modal_transform: Array
+    length: float | None = None
+    reduction: Reduction | None = None
+    attachment_modes: int = 0
+    stiffening: Stiffening | None = None
+
+    @property
+    def n_modes(self) -> int:
+        """Number n of modal coordinates in the equations."""
+        return len(self.stiffness)
+
+    @property
+    def n_eigenmodes(self) -> int:
+        """How many of them count as modes of the link: for `modes = k`."""
+        return self.n_modes - self.attachment_modes
+
+    @property
+    def whole(self) -> Body:
+        """With all modes of its file."""
+        return self if self.reduction is None else self.reduction.whole
+
+    @cached_property
+    def on_file(self) -> Array:
+        """(n, n_file): forces (…, n) on p times this are those on the modes of the file that do the same work on them.
+
+        Of a body with fewer modes they are those of loads at its loaded points, which act on all modes.
+        """
+        if self.reduction is not None:
+            return as_floats(self.reduction.lift.T @ self.whole.on_file)
+        return as_floats(np.linalg.pinv(self.modal_transform))
+
+    @property
+    def inertia(self) -> Array:
+        """J0 (3, 3) about the origin of the frame, kg·m²: tr(J2) I − J2, and J_s about the axis of a line of mass."""
+        J: Array = np.trace(self.second_moment) * np.eye(3) - self.second_moment
+        J[0, 0] += self.J_spin
+        return J
+
+    @property
+    def largest_moment(self) -> float:
+        """Of inertia about the origin of the frame, kg·m²; with |p|² as large the body is bent by about its length."""
+        return max(float(np.linalg.eigvalsh(self.inertia)[-1]), 0.0)
+
+    @property
+    def inertia_slope(self) -> Array:
+        """J1 (3, 3, n): J1_ij = 2δ_ij tr Ī − Ī_ij − Ī_ji."""
+        slope: Array = 2 * np.einsum("ij,kkn->ijn", np.eye(3), self.I_bar) - self.I_bar - self.I_bar.transpose(1, 0, 2)
+        return slope
+
+    @property
+    def spin(self) -> Array:
+        """h0 (3, n): h0_a = ε_abc Ī_bc, and h_s about the axis of a line of mass."""
+        h: Array = np.einsum("abc,bcn->an", LEVI_CIVITA, self.I_bar)
+        h[0] += self.h_spin
+        return h
+
+    @property
+    def spin_slope(self) -> Array:
+        """H (3, n, n), skew: H_a = ε_abc S̄_bc, so that h_a(p) = h0_a + pᵀH_a."""
+        S: Array = self.S_bar_kl
+        return np.array([S[1, 2] - S[2, 1], S[2, 0] - S[0, 2], S[0, 1] - S[1, 0]])
+
+
+@dataclass(frozen=True)
+class Reduction:
+    """How a body came by fewer modes: see `truncation.with_fewer_modes`.
+
+    Attributes:
+        whole: the body with all n modes of its file.
+        lowest: how many of these it kept; the other coordinates stand for the rest.
+        T: (n, m) coordinates of `whole` from the m that it has, TᵀT = 1.
+        lift: (n, m) modal forces on all modes from those on the m coordinates, Tᵀ lift = 1: exact for forces that come
+            from loads at the loaded points.
+    """
+
+    whole: Body
+    lowest: int
+    T: Array
+    lift: Array
+
+
+def transformed(body: Body, T: Array, stiffness: Array) -> Body:
+    """The body in coordinates p' with p = T p', T (n, m), in which m_ff is the identity and K_ff diag(stiffness)."""
+    return replace(
+        body,
+        stiffness=stiffness,
+        damping=T.T @ body.damping @ T,
+        S_bar=body.S_bar @ T,
+        I_bar=body.I_bar @ T,
+        S_bar_kl=T.T @ body.S_bar_kl @ T,
+        h_spin=body.h_spin @ T,
+        S_spin=T.T @ body.S_spin @ T,
+        points=MappingProxyType(
+            {
+                label: BodyPoint(section.position, section.translation @ T, section.rotation @ T)
+                for label, section in body.points.items()
+            }
+        ),
+        modal_transform=body.modal_transform @ T,
+        stiffening=body.stiffening and body.stiffening.transformed(T),
+    )
+
+
+def from_modal_body(name: str, body: ModalBody, stiffened: bool = False, *, is_planar: bool = False) -> Body:
+    """All modes of a modal body; `stiffened`: with geometric stiffening; `is_planar`: for motion in z = 0 alone.
+
+    Raises:
+        InputError: the file of a beam does not say what inertia it has about its own axis; it has to be stiffened, and
+            the file does not say how.
+    """
+    stiffening = stiffenings.from_modal_body(body, is_planar=is_planar) if stiffened else None
+    if stiffened and stiffening is None:
+        raise InputError(
+            "geometric_stiffening: expected modal bodies with the geometric stiffness of all accelerations"
+            f' (geometric_stiffness/t_x to omega_yz), found none in that of "{name}": make it again from its link file'
+            " with `ffrobot link`"
+        )
+    J_spin, h_spin, S_spin = _spin_inertia(name, body, is_planar=is_planar)
+    S_bar_kl = body.S_bar_kl.copy()
+    S_bar_kl[2, 2] -= S_spin
+    omega = 2 * np.pi * body.frequency
+    sections = dict(body.interfaces)
+    sections.setdefault("mid", body.interpolate(body.length / 2))
+    return Body(
+        name=name,
+        mass=body.mass,
+        first_moment=body.first_moment,
+        second_moment=body.second_moment,
+        S_bar=body.S_bar,
+        I_bar=body.I_bar,
+        S_bar_kl=S_bar_kl,
+        J_spin=J_spin,
+        h_spin=h_spin,
+        S_spin=S_spin,
+        stiffness=np.diag(body.stiffness).copy(),
+        damping=np.diag(2 * body.damping_ratio * omega),
+        points=MappingProxyType(
+            {label: BodyPoint(at.position, at.translation, at.rotation) for label, at in sections.items()}
+        ),
+        modal_transform=np.eye(len(omega)),
+        length=body.length,
+        attachment_modes=int(body.residual.sum()),
+        stiffening=stiffening,
+    )
+
+
+def rigid_body(name: str, mass: float, center: Array, inertia: Array, points: Mapping[str, Array]) -> Body:
+    """A body without modes, of `mass` (kg) at `center` (3,) (m) with `inertia` (3, 3) about it (kg·m²); body axes."""
+    places = {label: np.asarray(position, dtype=float) for label, position in points.items()}
+    if "mid" not in places and {"root", "tip"} <= places.keys():
+        places["mid"] = (places["root"] + places["tip"]) / 2
+    none, center = np.zeros((3, 0)), np.asarray(center, dtype=float)
+    return Body(
+        name=name,
+        mass=mass,
+        first_moment=mass * center,
+        second_moment=0.5 * np.trace(inertia) * np.eye(3) - inertia + mass * np.outer(center, center),
+        S_bar=none,
+        I_bar=np.zeros((3, 3, 0)),
+        S_bar_kl=np.zeros((3, 3, 0, 0)),
+        J_spin=0.0,
+        h_spin=np.zeros(0),
+        S_spin=np.zeros((0, 0)),
+        stiffness=np.zeros(0),
+        damping=np.zeros((0, 0)),
+        points=MappingProxyType({label: BodyPoint(position, none, none) for label, position in places.items()}),
+        modal_transform=np.zeros((0, 0)),
+    )
+
+
+def _spin_inertia(name: str, body: ModalBody, *, is_planar: bool) -> tuple[float, Array, Array]:
+    """J_s, h_s, S_s; files of earlier versions lack them, which matters for beams alone, and not in the plane."""
+    if body.J_spin is not None and body.h_spin is not None and body.S_spin is not None:
+        return body.J_spin, body.h_spin, body.S_spin
+    if is_planar or body.kind != "beam":
+        return 0.0, np.zeros(body.mode_count), np.zeros((body.mode_count, body.mode_count))
+    raise InputError(
+        f'body "{name}": expected a modal body file with the inertia of the beam about its own axis'
+        ' (invariants/J_spin, h_spin, S_spin), which space = "spatial" needs, found one of an earlier version without'
+        " it. Recompute it from its link file with `ffrobot link`"
+    )

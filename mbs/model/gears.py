@@ -1,0 +1,110 @@
+"""Robots in space with gears that give: motors as coordinates of their own, with springs to those of the joints."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from ...common.errors import InputError
+from ..joints.joint import JointRecord
+from ..scene.analysis import Analysis
+from .drives import Drive
+from .model import Model
+from .rows import ConstraintRow
+from .transmission import compliance
+from .tree import ElasticGearInSpace, KinematicTree, Node, Section
+
+
+def elastic_joints(model: Model) -> list[Node]:
+    """The nodes whose joints have gears that give, in the order of the tree.
+
+    Raises `InputError` for such a gear in a joint without a motor of the tree.
+    """
+    for joint in model.scene.joint:
+        if getattr(joint, "stiffness", None) is not None and joint.name not in model.motors:
+            raise InputError(
+                f"{model.scene.path}: {joint.label}: stiffness: expected a joint with a motor, found one without"
+            )
+    return [node for node in model.tree.nodes if compliance(node) is not None]
+
+
+def with_compliance(model: Model) -> Model:
+    """The robot with gears that give where the scene says so; motors and moments on joints act before these gears.
+
+    The output of such a gear is a body of the tree without inertia. It turns on the first side of the joint by θ_m, the
+    rotor N times as fast (J. Spong, J. Dyn. Syst. Meas. Control 109, 1987, with the rotor's whole angular velocity).
+    Coordinates of the outputs stand after all others.
+    """
+    elastic = elastic_joints(model)
+    if not elastic or model.tree.gears:
+        return model
+    tree = model.tree.with_outputs([_output(node) for node in elastic])
+    outputs = tree.nodes[-len(elastic) :]
+    firm = {node.body.name: _without_rotor(node) for node in elastic}
+    tree.nodes = tuple(firm.get(node.body.name, node) for node in tree.nodes)
+    tree.gears = tuple(
+        ElasticGearInSpace(output, firm[node.body.name], -1.0 if node.backwards else 1.0, *(compliance(node) or (0, 0)))
+        for output, node in zip(outputs, elastic, strict=True)
+    )
+    more = np.zeros(len(outputs))
+    loads = tuple(Drive(np.append(at, more), size) for at, size in model.modal_loads)
+    return replace(model, tree=tree, rows=tuple(_rows_at_motors(model, tree)), modal_loads=loads)
+
+
+def with_held_motors(model: Model) -> Model:
+    """The robot with its gears where trajectories of motors are followed; the same where all gears are firm.
+
+    Raises `InputError` for trajectories of something else beside them: no motor could do both.
+    """
+    if not any(path.motor for path in model.scene.trajectory):
+        return model
+    found = with_compliance(model)
+    outputs = {gear.motor.v.start for gear in found.tree.gears}
+    behind = {gear.joint.v.start for gear in found.tree.gears}
+    for row in found.rows if outputs else ():
+        if row.is_trajectory and (row.kind != "coordinate" or row.coordinate in behind):
+            raise InputError(
+                f'{model.scene.path}: trajectory: expected motors ("motor") in all of them, or in none, with compliant'
+                f' gears, found "{row.owner}" with trajectories of motors'
+            )
+    return found
+
+
+def refuse_held_motors(model: Model, analysis: Analysis) -> None:
+    """Raise `InputError` where gears that give leave an analysis nothing to do with trajectories of motors."""
+    if any(path.motor for path in model.scene.trajectory) and elastic_joints(model):
+        raise InputError(
+            f'{model.scene.path}: analysis "{analysis.name}": kind: expected "pcid" or "static" with trajectories of'
+            f' motors with compliant gears, found "{analysis.kind}": the robot behind them is not prescribed'
+        )
+
+
+def _rows_at_motors(model: Model, tree: KinematicTree) -> Iterator[ConstraintRow]:
+    """The rows of the robot, those of trajectories of motors at the outputs of gears that give."""
+    motors = {path.name: path.motor for path in model.scene.trajectory if path.motor is not None}
+    outputs = {gear.joint.joint.name: gear.motor for gear in tree.gears}
+    for row in model.rows:
+        output = outputs.get(motors.get(row.owner, "")) if row.is_trajectory else None
+        if output is None:
+            yield row
+        else:  # the coordinate of an output counts as the joint of the scene does
+            yield replace(
+                row, a=output.inner, b=output.outer, coordinate=output.v.start, q_index=output.q.start, sign=1.0
+            )
+
+
+def _output(node: Node) -> tuple[JointRecord, str, Section]:
+    """The joint, name and place of the output of the gear in the joint of `node`."""
+    label = f"{node.joint.name}/rotor"
+    joint = node.joint.model_copy(
+        update={
+            "name": label, "stiffness": None, "position_limit": None, "viscous_friction": 0.0, "coulomb_friction": 0.0
+        }
+    )  # fmt: skip
+    return joint, label, node.outer if node.backwards else node.inner
+
+
+def _without_rotor(node: Node) -> Node:
+    return replace(node, joint=node.joint.model_copy(update={"rotor_inertia": 0.0}))

@@ -1,0 +1,144 @@
+"""What motions in 3D that are known take, as the core's recursive Newton–Euler algorithm finds it. SI units."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple, Protocol
+
+import numpy as np
+
+from ...common.arrays import Array, as_floats
+from .. import _core
+from .model import Model
+from .system import MultibodySystem
+from .tree import Section
+from .wrench import Wrench
+
+
+class States(Protocol):
+    """States q (T, n_q), v and a (T, n_v) of a tree."""
+
+    @property
+    def q(self) -> Array:
+        """(T, n_q)."""
+
+    @property
+    def v(self) -> Array:
+        """(T, n_v)."""
+
+    @property
+    def a(self) -> Array:
+        """(T, n_v)."""
+
+
+class KnownStates(NamedTuple):
+    """States q (T, n_q), v and a (T, n_v) of a tree."""
+
+    q: Array
+    v: Array
+    a: Array
+
+
+class SectionMotion(NamedTuple):
+    """Acceleration, angular acceleration and angular velocity (T, 3) of a triad, global axes."""
+
+    a: Array
+    alpha: Array
+    omega: Array
+
+
+@dataclass(frozen=True)
+class MotionForces:
+    """What bodies and joints do to each other over states (T, …), global axes.
+
+    Moments are about the origins of the sections on which they act: mbs/core/recursion/motion_forces.h.
+    """
+
+    system: MultibodySystem
+    found: _core.MotionForces
+
+    def of_joint(self, number: int) -> Wrench:
+        """What the joint that carries body no. `number` does to its outer side, with a rotor that sits there."""
+        node, on_section = self.system.model.tree.nodes[number], _wrench(self.found.joints, number)
+        if not node.backwards:
+            return on_section
+        return Wrench(on_section.force, on_section.moment + self.of_rotor(number))
+
+    def of_rotor(self, number: int) -> Array:
+        """Rate (T, 3) of the angular momentum of the rotor in the joint that carries body no. `number`."""
+        return self.found.rotors[:, 3 * number : 3 * number + 3]
+
+    def of_row(self, number: int) -> tuple[Wrench, Wrench]:
+        """What row no. `number` does to its sections a and b; nothing where it is a joint coordinate of the tree."""
+        return _wrench(self.found.constraints, 2 * number), _wrench(self.found.constraints, 2 * number + 1)
+
+    @cached_property
+    def at_points(self) -> list[list[tuple[Section, Wrench]]]:
+        """By body of the tree all that acts on it at its points and its frame, section by section."""
+        found: list[list[tuple[Section, Wrench]]] = [[] for _ in self.system.model.tree.nodes]
+        for number, section in enumerate(self.system.sections):
+            found[section.body].append((section, _wrench(self.found.sections, number)))
+        return found
+
+    def of_body(self, number: int) -> SectionMotion:
+        """Of the frame of body no. `number`."""
+        return _motion(self.found.bodies, number)
+
+    def of_point(self, point: str) -> SectionMotion:
+        """Of the section "BODY.POINT", which is one of those on which a drive of the system acts."""
+        return _motion(self.found.points, self.system.point_number(point))
+
+
+def _wrench(table: Array, number: int) -> Wrench:
+    return Wrench(table[:, 6 * number : 6 * number + 3], table[:, 6 * number + 3 : 6 * number + 6])
+
+
+def _motion(table: Array, number: int) -> SectionMotion:
+    return SectionMotion(*np.hsplit(table[:, 9 * number : 9 * number + 9], 3))
+
+
+def motion_forces(system: MultibodySystem, states: States, times: Array, multipliers: Array) -> MotionForces:
+    """Under multipliers (T, rows) and all given forces of the system at `times` (T,)."""
+    of_core = multipliers * system.row_signs
+    found = system.core.motion_forces(system.scene, times.tolist(), states.q, states.v, states.a, of_core)
+    return MotionForces(system, found)
+
+
+def multiplier_forces(system: MultibodySystem, q: Array, times: Array, multipliers: Array) -> MotionForces:
+    """What multipliers (T, rows) do by themselves to joints and constraints, at q (T, n_q)."""
+    found = system.core.multiplier_forces(system.scene, times.tolist(), q, multipliers * system.row_signs)
+    return MotionForces(system, found)
+
+
+def rotor_torques(model: Model, states: States, times: Array) -> Array:
+    """J u̇ (T, bodies) N·m about the axis of each rotor in a revolute joint, by the body that the joint carries."""
+    tree, system = model.tree, MultibodySystem(model)
+    forces = motion_forces(system, states, times, np.zeros((len(times), len(model.rows))))
+    frames, found = tree.frames(states.q), np.zeros((len(times), len(tree.nodes)))
+    for number, node in enumerate(tree.nodes):
+        if node.joint.type == "revolute":
+            axis = tree.motion(node.inner, states.q, frames).F[:, :, 2]
+            found[:, number] = np.sum(axis * forces.of_rotor(number), axis=1)
+    return found
+
+
+def required_forces(model: Model, state: States, times: Array) -> Array:
+    """M v̇ − Q (T, n_v) along v: what gravity, elasticity, friction and given loads leave for others to supply."""
+    system = MultibodySystem(model)
+    return system.core.required_forces(system.scene, times.tolist(), state.q, state.v, state.a)
+
+
+def row_accelerations(model: Model, state: States, times: Array) -> Array:
+    """C̈ (T, rows) at `times` (T,), less what their targets ask for: 0 where the motion keeps to the constraints."""
+    system = MultibodySystem(model)
+    return system.core.row_accelerations(system.scene, times.tolist(), state.q, state.v, state.a) * system.row_signs
+
+
+def mass_matrices(model: Model, q: Array, t: float = 0.0) -> Array:
+    """M (T, n_v, n_v) at q (T, n_q): what unit accelerations take more than none."""
+    T, n = len(q), model.tree.n_v
+    system, a = MultibodySystem(model), np.tile(np.vstack([np.zeros(n), np.eye(n)]), (T, 1))
+    states = np.repeat(q, n + 1, axis=0), np.zeros((T * (n + 1), n)), a
+    found = system.core.required_forces(system.scene, [t] * len(a), *states).reshape(T, n + 1, n)
+    return as_floats(np.swapaxes(found[:, 1:] - found[:, :1], 1, 2))

@@ -1,0 +1,90 @@
+"""Masses attached to sections of bodies in space: payloads, and what lies along a beam."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from ...common.arrays import Array, Indices
+from ...common.rotations import skew
+from ...fe_models.modal_body.lumped_masses import attached_integrals
+from .body import Body, BodyPoint, transformed
+
+UNCOUPLED = 1e-12  # of the geometric mean of two modes' own terms: what couples them less is rounding
+
+
+def with_payload(body: Body, point: str, mass: float, center: Array, inertia: Array) -> Body:
+    """The body with a mass (kg) whose center is at `center` (3,) m from a section and goes with it, axes of the body.
+
+    `inertia` J (3, 3) in kg·m² about that center: ∫ρ ξ ξᵀ dV = E = ½ tr(J) I − J.
+    """
+    at = body.points[point]
+    x, phi = at.position + center, at.rotation
+    Phi = at.translation - skew(center) @ phi
+    E = 0.5 * np.trace(inertia) * np.eye(3) - inertia
+    added = attached_integrals(mass, x, E, Phi, phi)
+    # J about the center counts as it is, however far the section turns: see `Stiffening.S_turned`
+    added["S_bar_kl"] = mass * np.einsum("km,ln->klmn", Phi, Phi)
+    loaded = _with_integrals(body, added)
+    if body.stiffening is not None:
+        stiffening = body.stiffening.with_payload(point, at.position, phi, mass, center, E)
+        loaded = replace(loaded, stiffening=stiffening)
+    return _uncoupled(loaded, np.eye(body.n_modes) + mass * Phi.T @ Phi + phi.T @ inertia @ phi)
+
+
+def with_line_masses(body: Body, points: Sequence[BodyPoint], masses: Array, spins: Array, stiffness: Array) -> Body:
+    """The body with masses (kg) on its axis at sections, and more stiffness (n, n): what lies along a beam.
+
+    They have moments of inertia `spins` (kg·m²) about the axis alone, as a line of mass has: J_s, h_s, S_s.
+    """
+    m_ff, loaded = np.eye(body.n_modes), body
+    for at, mass, spin in zip(points, masses, spins, strict=True):
+        Phi, twist = at.translation, at.rotation[0]
+        loaded = _with_integrals(loaded, attached_integrals(mass, at.position, np.zeros((3, 3)), Phi, at.rotation))
+        about = {"J_spin": spin, "h_spin": spin * twist, "S_spin": spin * np.outer(twist, twist)}
+        loaded = _with_integrals(loaded, about)
+        m_ff += mass * Phi.T @ Phi + about["S_spin"]
+    return _uncoupled(loaded, m_ff, stiffness)
+
+
+def _with_integrals(body: Body, added: Mapping[str, Any]) -> Body:
+    return replace(body, **{key: getattr(body, key) + more for key, more in added.items()})
+
+
+def _uncoupled(body: Body, m_ff: Array, added: Array | None = None) -> Body:
+    """The body in modal coordinates that make m_ff (n, n) the identity, and K_ff, with what is `added`, diagonal."""
+    if not body.n_modes:
+        return body
+    T, stiffness = uncoupling(m_ff, np.diag(body.stiffness) + (0.0 if added is None else added))
+    return transformed(body, T, stiffness)
+
+
+def uncoupling(M: Array, K: Array) -> tuple[Array, Array]:
+    """T (n, n) with TᵀMT = 1 and TᵀKT = diag(stiffness), and that stiffness (n,).
+
+    Modes that do not feel each other stay apart, so that the coordinates keep their families: those of a round link
+    that bend it in one plane and the other, with equal frequencies, are not mixed. Those that do are in ascending order
+    in the places that they had.
+    """
+    T, stiffness = np.zeros_like(M), np.zeros(len(M))
+    for block in coupled_blocks(M, K):
+        square = np.ix_(block, block)
+        L_inverse = np.linalg.inv(np.linalg.cholesky(M[square]))
+        stiffness[block], vectors = np.linalg.eigh(L_inverse @ K[square] @ L_inverse.T)
+        T[square] = L_inverse.T @ vectors
+    return T, stiffness
+
+
+def coupled_blocks(*matrices: Array) -> list[Indices]:
+    """Numbers of the modes that feel each other in any of the matrices (n, n), set by set."""
+    coupled = np.eye(len(matrices[0]), dtype=bool)
+    for matrix in matrices:
+        scale = np.sqrt(np.diag(matrix))
+        coupled |= np.abs(matrix) > UNCOUPLED * np.outer(scale, scale)
+    coupled |= coupled.T
+    while np.any((further := coupled @ coupled) != coupled):
+        coupled = further
+    return [np.array(block) for block in dict.fromkeys(tuple(np.flatnonzero(row)) for row in coupled)]

@@ -1,0 +1,253 @@
+"""From a scene in space and its bodies to a tree, and to the rows of constraints that close loops or follow paths."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TypeVar
+
+import numpy as np
+
+from ...common.arrays import Array, Booleans
+from ...common.errors import InputError
+from ...common.rotations import smallest_turn
+from ...common.validation import did_you_mean, quoted
+from ..joints.free import FreeJoint
+from ..joints.joint import JointRecord
+from ..joints.planar_joint import PlanarJoint
+from ..scene.mechanism import MechanismScene
+from ..scene.topology import Edge, spanning_forest
+from ..scene.trajectories import Trajectory
+from .body import Body
+from .cut import CutCoordinate, cut_coordinates, cut_row, with_rotors_beside
+from .drives import Drive
+from .frames import with_coordinates_of_frames
+from .payloads import welded_payloads
+from .rows import ConstraintRow, value_and_gradient
+from .tree import KinematicTree, Motion, Node, Section
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class Model:
+    """A scene in space with its bodies: everything analyses share.
+
+    `cut` are the coordinates of joints at which loops are cut; `modal_loads` act beside the loads of the scene.
+    """
+
+    scene: MechanismScene
+    tree: KinematicTree
+    rows: tuple[ConstraintRow, ...]
+    cut: tuple[CutCoordinate, ...] = ()
+    modal_loads: tuple[Drive, ...] = ()
+
+    @property
+    def loop_rows(self) -> Booleans:
+        """(rows,) which rows close loops."""
+        return np.array([not row.is_trajectory for row in self.rows], dtype=bool)
+
+    @property
+    def motors(self) -> dict[str, Array]:
+        """By joint with motors: indices in v of its coordinates, in the scene's order."""
+        return {joint.name: _in_order(self.driven(joint.name)) for joint in self.scene.motor_joints}
+
+    def columns(self, joint: str) -> Array:
+        """Indices in v of the coordinates of a joint of the tree, in the scene's order; none of a spherical one."""
+        return _in_order(self.tree.nodes[self.tree.carried[joint]])
+
+    def joint_of(self, row: ConstraintRow) -> str:
+        """The joint of the scene whose coordinate, or whose motor's, a "coordinate" row measures."""
+        behind = {gear.motor.v.start: gear.joint.joint.name for gear in self.tree.gears}
+        return behind.get(row.coordinate, self.tree.nodes[row.b.body].joint.name)
+
+    def measures_way(self, row: ConstraintRow) -> bool:
+        """Whether a row measures a way, m; others measure angles, rad, or cosines of these."""
+        if row.kind == "coordinate":
+            return self.tree.nodes[row.b.body].joint.units == ("m",)
+        return row.kind in ("point", "slide")
+
+    def along(self, joint: str) -> Array:
+        """Directions in v (k, n_v) of moments on the second side of a joint along its k coordinates."""
+        directions: Array = self.sign(joint) * np.eye(self.tree.n_v)[_in_order(self.driven(joint))]
+        return directions
+
+    def sign(self, joint: str) -> float:
+        """−1 where the tree has a joint's coordinates the other way round."""
+        return -1.0 if self.driven(joint).backwards else 1.0
+
+    def driven(self, joint: str) -> Node:
+        """What moments on a joint of the tree turn: the body that it carries, or its motor behind a gear that gives."""
+        behind = {gear.joint.joint.name: gear.motor for gear in self.tree.gears}
+        return behind.get(joint, self.tree.nodes[self.tree.carried[joint]])
+
+
+def without_paths(model: Model) -> Model:
+    """The robot alone: joints hold, nothing is followed."""
+    return replace(model, rows=tuple(row for row in model.rows if not row.is_trajectory))
+
+
+def modal_directions(model: Model, on_modes: Mapping[str, Array]) -> Array:
+    """Along v of the tree (k, n_v): k forces (n, k) on the modes of the files of bodies, as far as these are in it.
+
+    Gradients of what depends on modal coordinates are alike.
+    """
+    (count,) = {forces.shape[1] for forces in on_modes.values()}
+    directions = np.zeros((count, model.tree.n_v))
+    for node in model.tree.nodes:
+        if node.body.name in on_modes:
+            directions[:, node.p_v] = on_modes[node.body.name].T @ node.body.modal_transform
+    return directions
+
+
+def _in_order(node: Node) -> Array:
+    ordered = node.joint.coordinates(np.arange(node.v.start, node.v.stop))[: len(node.joint.units)]
+    return ordered[::-1] if node.backwards and node.joint.type == "universal" else ordered
+
+
+def build_model(scene: MechanismScene, bodies: Sequence[Body]) -> Model:
+    """Check that points exist, and lay out tree and rows. Raises `InputError` for what does not exist or fit."""
+    _check_points(scene, {body.name: body for body in bodies})
+    carried = list(welded_payloads(scene))
+    joints = (*scene.joint, *(weld for _, weld in carried))
+    names = [*(body.name for body in scene.body), *(body.name for body, _ in carried)]
+    topology = spanning_forest(names, [*scene.edges, *(Edge(weld.between) for _, weld in carried)])
+    floating = PlanarJoint if scene.is_planar else FreeJoint
+    tree = KinematicTree([*(body for body, _ in carried), *bodies], joints, topology, floating)
+    _check_cut_joints(scene, tree)
+    tree = with_coordinates_of_frames(tree) if scene.motors == "frame" else tree
+    tree, rows = with_rotors_beside(tree)
+    rows = [*(row for joint in tree.loops for row in _loop_rows(scene, tree, joint)), *rows]
+    rows += [row for trajectory in scene.trajectory for row in _path_rows(scene, tree, trajectory)]
+    return Model(scene, tree, tuple(rows), tuple(cut_coordinates(scene, tree)))
+
+
+def _check_cut_joints(scene: MechanismScene, tree: KinematicTree) -> None:
+    """Raise `InputError` for a motor without a rotor, or a compliant gear, in the joint at which a loop is cut."""
+    for joint in tree.loops:
+        if found := joint.asks_for_coordinate:
+            raise InputError(
+                f"{scene.path}: {joint.label}: expected a loop with a joint that has neither a motor without"
+                f" rotor_inertia nor a compliant gear, to be cut, found {quoted(found)} here and one of them in each of"
+                " the others: not available in 3D yet"
+            )
+
+
+def _loop_rows(scene: MechanismScene, tree: KinematicTree, joint: JointRecord) -> Iterator[ConstraintRow]:
+    if joint.held is None:
+        raise InputError(
+            f"{scene.path}: {joint.label}: expected another type of joint where a loop closes, found a {joint.type}"
+            " joint: list it before the other joints of its loop"
+        )
+    first, second = joint.triads()
+    a, b = tree.section(joint.between[0], first, joint.at), tree.section(joint.between[1], second, joint.at)
+    unit = np.eye(3)
+    for held in joint.held:
+        if held.kind == "point":
+            yield from (ConstraintRow(joint.name, "point", a, b, e, e, is_trajectory=False) for e in unit)
+        else:
+            yield ConstraintRow(joint.name, held.kind, a, b, unit[held.f], unit[held.g], is_trajectory=False)
+
+
+def _path_rows(scene: MechanismScene, tree: KinematicTree, path: Trajectory) -> Iterator[ConstraintRow]:
+    unit, ground = np.eye(3), Section(-1, "", np.eye(3), np.zeros(3))
+    if path.coordinate_of is not None:
+        yield _coordinate_row(scene, tree, path, path.coordinate_of)
+        return
+    if path.angle is not None:
+        section, triad = tree.section(path.angle, np.eye(3)), smallest_turn(np.array(path.turning_axis))
+        target = path.components["value"]
+        yield ConstraintRow(path.name, "turn", ground, section, triad[:, 2], triad[:, 0], target=target)
+        return
+    assert path.point is not None
+    section = tree.section(path.point, np.eye(3))
+    for component, target in path.components.items():
+        e = unit["xyz".index(component)]
+        yield ConstraintRow(path.name, "point", ground, section, e, e, target=target)
+    if path.orientation is None:
+        return
+    if path.tool_axis is None:
+        yield from (ConstraintRow(path.name, "rotation", ground, section, e, e, law=path.orientation) for e in unit)
+    else:
+        tool = section._replace(triad=np.array(path.tool_triad))
+        for f in unit[:2]:
+            yield ConstraintRow(path.name, "dot", tool, ground, f, unit[2], law=path.orientation)
+
+
+def _coordinate_row(scene: MechanismScene, tree: KinematicTree, path: Trajectory, name: str) -> ConstraintRow:
+    joint = next(each for each in scene.joint if each.name == name)
+    label = f'{scene.path}: trajectory "{path.name}": {"joint" if path.motor is None else "motor"}'
+    if len(joint.units) != 1:
+        raise InputError(
+            f'{label}: expected a joint with one coordinate, found "{joint.name}", {len(joint.units)} coordinates'
+        )
+    if path.motor is not None and joint not in scene.motor_joints:
+        raise InputError(f'{label}: expected a joint with a motor, found "{joint.name}", which has none')
+    if joint.name not in tree.carried:  # a loop is cut there
+        return replace(cut_row(tree, joint), owner=path.name, is_trajectory=True, target=path.components["value"])
+    node = tree.nodes[tree.carried[joint.name]]
+    return ConstraintRow(
+        path.name, "coordinate", node.inner, node.outer, np.zeros(3), np.zeros(3), coordinate=node.v.start,
+        q_index=node.q.start, sign=-1.0 if node.backwards else 1.0, target=path.components["value"],
+    )  # fmt: skip
+
+
+def row_values(model: Model, q: Array, times: Array, frames: Sequence[Motion] | None = None) -> tuple[Array, Array]:
+    """C (T, rows) at q (T, n_q) and `times` (T,), and its Jacobian C_v (T, rows, n_v); `frames` of q where known."""
+    frames = model.tree.frames(q) if frames is None else frames
+    values, gradients = np.zeros((len(q), len(model.rows))), np.zeros((len(q), len(model.rows), model.tree.n_v))
+    motion = by_section(lambda section: model.tree.motion(section, q, frames))
+    for k, row in enumerate(model.rows):
+        a, b = motion(row.a), motion(row.b)
+        values[:, k], gradients[:, k] = value_and_gradient(row, a, b, q, times)
+    return values, gradients
+
+
+def by_section(compute: Callable[[Section], T]) -> Callable[[Section], T]:
+    """`compute` with what it found of each section kept: rows of one point share theirs."""
+    known: dict[int, T] = {}
+
+    def found(section: Section) -> T:
+        if id(section) not in known:
+            known[id(section)] = compute(section)
+        return known[id(section)]
+
+    return found
+
+
+def target_rates(model: Model, q: Array, times: Array, frames: Sequence[Motion] | None = None) -> Array:
+    """What C_v v has to be (T, rows), for Ċ = 0; `frames` of q where known."""
+    found = np.zeros((len(q), len(model.rows)))
+    for k, row in enumerate(model.rows):
+        if row.target is not None:
+            found[:, k] = row.target.sample(times)[1]
+        elif row.law is not None:
+            omega = row.law.rates(times)[0]
+            if row.kind == "rotation":
+                found[:, k] = omega @ row.f
+            else:  # f·g with g turning by ω
+                frames = model.tree.frames(q) if frames is None else frames
+                f = np.einsum("tij,j->ti", model.tree.motion(row.a, q, frames).F, row.f)
+                found[:, k] = -np.sum(f * np.cross(omega, row.law.sample(times)[:, :, 2]), axis=-1)
+    return found
+
+
+def _check_points(scene: MechanismScene, bodies: dict[str, Body]) -> None:
+    """Raise `InputError` for a reference to a point that its body has not."""
+    for reference in scene.references():
+        if reference.kind != "body" or reference.body_and_point is None:
+            continue
+        body, point = reference.body_and_point
+        if point not in bodies[body].points:
+            known = bodies[body].points
+            raise InputError(
+                f'{scene.path}: {reference.key}: expected a point of "{body}" ({quoted(known)}), found'
+                f' "{reference.name}"{did_you_mean(point, known)}'
+            )
+        stiffening = bodies[body].stiffening
+        if stiffening is not None and point not in stiffening.K_points:
+            raise InputError(
+                f"{scene.path}: {reference.key}: expected, with geometric_stiffening, a point whose loads' geometric"
+                f" stiffness is in the modal body file ({quoted(stiffening.K_points)}), found"
+                f' "{reference.name}"'
+            )

@@ -1,0 +1,163 @@
+"""What motors and modal forces do in place of the forces on a path: the split of generalized forces in space."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from ...common.arrays import Array, as_list
+from ...common.rotations import left_jacobian, left_jacobian_slope
+from .. import _core
+from .drives import Command
+from .frame_motors import turning_motors
+from .model import Model
+from .system import MultibodySystem
+
+
+@dataclass(frozen=True)
+class MotorForces:
+    """τ (T, k) by joint, N·m or N, on its second side, and F_p (T, n) by body, what patches would have to supply.
+
+    F_p belongs to the modes of the modal body file.
+    """
+
+    moments: Mapping[str, Array]
+    modal: Mapping[str, Array]
+
+
+def driven_system(model: Model) -> MultibodySystem:
+    """The model in the core, with forces along the coordinates of its motors."""
+    return MultibodySystem(model, commands=[Command(along) for joint in model.motors for along in model.along(joint)])
+
+
+def driven_mechanism(model: Model, *, has_motors: bool = True) -> _core.SpatialDriven:
+    """The model in the core, under the loads of its scene, with its motors where asked for."""
+    system = driven_system(model)
+    driven = _core.SpatialDriven(system.core, system.scene, (~model.loop_rows).tolist())
+    if has_motors:
+        _add_motors(driven, model)
+    return driven
+
+
+def fastest_mechanism(model: Model, *, has_motors: bool = True) -> _core.PlanarDriven | _core.SpatialDriven:
+    """The same; of open chains that move in a plane in it, where their constraint equations are the same."""
+    system = driven_system(model)
+    if model.loop_rows.any() or system.plane is None:
+        return driven_mechanism(model, has_motors=has_motors)
+    return integrated_mechanism(system, has_motors=has_motors)
+
+
+def integrated_mechanism(
+    system: MultibodySystem, *, has_motors: bool = True
+) -> _core.PlanarDriven | _core.SpatialDriven:
+    """The same as it is integrated: in the plane where all moves in one."""
+    (core, scene, rows), model = system.integrated, system.model
+    is_path = [model.rows[k].is_trajectory for k in rows]
+    driven: _core.PlanarDriven | _core.SpatialDriven
+    if isinstance(core, _core.PlanarModel):
+        driven = _core.PlanarDriven(core, scene, is_path)
+    else:
+        driven = _core.SpatialDriven(core, scene, is_path)
+    if has_motors:
+        _add_motors(driven, model)
+    return driven
+
+
+def _add_motors(driven: _core.PlanarDriven | _core.SpatialDriven, model: Model) -> None:
+    turning = turning_motors(model)
+    for joint, coordinates in model.motors.items():
+        for coordinate in coordinates.tolist():
+            driven.add_motor(coordinate, model.sign(joint), joint in turning)
+
+
+def path_forces(model: Model, times: Array, q: Array, multipliers: Array) -> Array:
+    """−C_sᵀλ_s (T, n_v): what the forces on the paths do along v at q (T, n_q) and `times` (T,), with λ (T, rows)."""
+    signs = np.array([row.sign for row in model.rows])
+    return driven_mechanism(model).path_forces(as_list(times), q, multipliers * signs)
+
+
+class InCore(NamedTuple):
+    """A body's axes and origin in the frame that the core has of it, which is elsewhere: where it suits joints."""
+
+    axes: Array
+    origin: Array
+
+
+def frames_in_core(model: Model, core: _core.SpatialModel, q: Array) -> list[InCore]:
+    """Of all bodies, found at q (n_q,)."""
+    of_core, frames = core.frames(q, np.zeros(model.tree.n_v)), model.tree.frames(q[None])
+    return [
+        InCore(frame.R.T @ own.F[0], frame.R.T @ (own.r[0] - frame.r))
+        for frame, own in zip(of_core, frames, strict=True)
+    ]
+
+
+def path_forces_on_bodies(model: Model, times: Array, q: Array, multipliers: Array) -> dict[str, Array]:
+    """By body what the forces on the paths do on it alone (T, 6 + n): on its frame, in its axes, and on its modes."""
+    system = driven_system(model)
+    driven = driven_mechanism(model, has_motors=False)
+    on_bodies = driven.path_forces_on_bodies(as_list(times), q, multipliers * system.row_signs)
+    found = {}
+    for node, (axes, origin), forces in zip(
+        model.tree.nodes, frames_in_core(model, system.core, q[0]), on_bodies, strict=True
+    ):
+        force, moment = forces[:, :3], forces[:, 3:6]
+        on_frame = [force @ axes, (moment - np.cross(origin, force)) @ axes]
+        found[node.body.name] = np.hstack([*on_frame, forces[:, 6:]])
+    return found
+
+
+class SplitForces(NamedTuple):
+    """τ (T, k) by joint, EᵀF_p (T, n_v) and multipliers λ_c (T, constraint equations of loops)."""
+
+    moments: dict[str, Array]
+    left: Array
+    loops: Array
+
+
+def split_forces(model: Model, q: Array, wanted: Array) -> SplitForces:
+    """Gᵀτ + EᵀF_p − C_cᵀλ_c = `wanted` (T, n_v) at q (T, n_q), by the core (core/recursion/motors.h)."""
+    tau, left, multipliers = driven_mechanism(model).split(q, wanted)
+    moments, first = {}, 0
+    for joint, coordinates in model.motors.items():
+        moments[joint] = tau[:, first : first + len(coordinates)]
+        first += len(coordinates)
+    return SplitForces(moments, left, multipliers)
+
+
+def motor_forces(model: Model, q: Array, wanted: Array) -> MotorForces:
+    """The same, modal forces by body and in the modes of the modal body files."""
+    moments, left, _ = split_forces(model, q, wanted)
+    stored = {node.body.name: left[:, node.p_v] @ node.body.on_file for node in model.tree.nodes}
+    return MotorForces(moments, stored)
+
+
+class FrameShare(NamedTuple):
+    """What a unit moment of a motor on frames, along the tree's coordinate, does on modes beside.
+
+    `direction` (n_v,), and `slope` (n_v, n_v), its derivative along v: the axis turns with the section.
+    """
+
+    direction: Array
+    slope: Array
+
+
+def frame_share(model: Model, joint: str, q: Array) -> FrameShare:
+    """Of the motor of a revolute joint at q (n_q,): −Φ_rᵀ J_l(φ) z of both its sections.
+
+    Why: core/recursion/frame_motor.h.
+    """
+    tree = model.tree
+    direction, slope = np.zeros(tree.n_v), np.zeros((tree.n_v, tree.n_v))
+    node = tree.nodes[tree.carried[joint]]
+    for section, side in ((node.outer, 1.0), (node.inner, -1.0)):
+        if section.body >= 0 and section.point:
+            of = tree.nodes[section.body]
+            Phi_r, axis = of.body.points[section.point].rotation, side * section.triad[:, 2]
+            phi = Phi_r @ q[of.p_q]
+            direction[of.p_v] -= Phi_r.T @ left_jacobian(phi) @ axis
+            slope[of.p_v, of.p_v] -= Phi_r.T @ left_jacobian_slope(phi, axis) @ Phi_r
+    return FrameShare(direction, slope)

@@ -1,0 +1,272 @@
+"""Mechanisms in space that move in a plane, as the core solves them there: with the same q, v and forces along them.
+
+All joints turn about its normal or slide in it, bodies bend in it. What is across it does no work then: offsets of
+points and masses, forces, and rows that close loops, which hold there by themselves. Joints carry it all the same:
+reactions (`quantities/reactions.py`) follow from the motion, with the masses where they are in space.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from ...common.arrays import Array, Booleans, Integers, as_floats
+from .. import _core
+from .parts import CutPlace, ModelParts
+from .plane_bodies import EXACT, AcrossError, axes_across, axes_of_triad, planar_data, planar_marker
+
+PLANAR = {
+    _core.JointKind.revolute: _core.JointKind.revolute,
+    _core.JointKind.prismatic: _core.JointKind.prismatic,
+    _core.JointKind.weld: _core.JointKind.weld,
+    _core.JointKind.planar: _core.JointKind.free,
+}
+
+
+class Plane(NamedTuple):
+    """A mechanism of the core in the plane.
+
+    Attributes:
+        model: of it.
+        axes: (3, 3) rows: its axes x and y and its normal, global axes.
+        followed: by its rows: which row of the mechanism in space says what they follow.
+        spread: (rows in space, its rows) multipliers of the rows in space by its own; 0 of those that do nothing in it.
+        cut: joints at which loops are cut, with axes of planar markers: of angles the component along the normal.
+    """
+
+    model: _core.PlanarModel
+    axes: Array
+    followed: Integers
+    spread: Array
+    cut: tuple[CutPlace, ...]
+
+    def shares(self, component: int) -> list[tuple[int, float]]:
+        """Of a force (0, 1, 2) or moment (3, 4, 5) along a global axis: components of a planar wrench, with shares."""
+        along = self.axes[:, component % 3]
+        found = [(2, along[2])] if component >= 3 else [(0, along[0]), (1, along[1])]
+        return [(k, float(share)) for k, share in found if abs(share) > EXACT]
+
+
+def in_plane(parts: ModelParts, is_path: Booleans) -> Plane | None:
+    """The same mechanism in its plane; None where it has none. `is_path` (rows,): which rows may not be left out."""
+    if any(marker.turns for marker in parts.ground) or not all(body.joint in PLANAR for body in parts.bodies):
+        return None
+    frames = list(_frames(parts))
+    for normal in _normals(parts, frames):
+        try:
+            return _Reduction(parts, frames, normal).plane(is_path)
+        except AcrossError:
+            continue
+    return None
+
+
+class _Frame(NamedTuple):
+    """Of a body where all coordinates are zero: place r (3,), axes R (3, 3), columns; the triad that carries it."""
+
+    r: Array
+    R: Array
+    carrier: Array
+
+
+def _frames(parts: ModelParts) -> Iterator[_Frame]:
+    found: list[_Frame] = []
+    for body in parts.bodies:
+        markers = parts.ground if body.parent < 0 else parts.bodies[body.parent].data.markers
+        inner, outer = markers[body.parent_marker], body.data.markers[body.inboard_marker]
+        r, R = (np.zeros(3), np.eye(3)) if body.parent < 0 else found[body.parent][:2]
+        carrier = R @ inner.triad
+        own = carrier @ outer.triad.T
+        found.append(_Frame(r + R @ inner.position - own @ outer.position, own, carrier))
+        yield found[-1]
+
+
+def _normals(parts: ModelParts, frames: Sequence[_Frame]) -> list[Array]:
+    """Of planes in which it may move: about the first axis that turns, or one of the global planes."""
+    turning = (_core.JointKind.revolute, _core.JointKind.planar)
+    axes = [frame.carrier[:, 2] for body, frame in zip(parts.bodies, frames, strict=True) if body.joint in turning]
+    return axes[:1] or list(np.eye(3)[::-1])
+
+
+def _ends(row: _core.RowModel) -> tuple[int, int, int, int]:
+    return row.a.body, row.a.marker, row.b.body, row.b.marker
+
+
+def _like(row: _core.RowModel, f: Array) -> _core.RowModel:
+    """The same between the same markers, along f."""
+    found = _core.RowModel()
+    found.name, found.kind, found.a, found.b, found.coordinate = row.name, row.kind, row.a, row.b, row.coordinate
+    found.f = f
+    return found
+
+
+def _is_mixed(f: Array) -> bool:
+    """Whether it has components in the plane and across it."""
+    return bool(np.linalg.norm(f[:2]) > EXACT and abs(f[2]) > EXACT)
+
+
+class _Reduction:
+    """To the plane across `normal` (3,), global axes; raises `AcrossError` for what does not move in it."""
+
+    def __init__(self, parts: ModelParts, frames: Sequence[_Frame], normal: Array) -> None:
+        self._parts = parts
+        self._ground = axes_across(normal)
+        self._axes = [axes_across(frame.R.T @ normal) for frame in frames]
+        self._frames, self._normal = frames, normal
+        self._shifted: list[_core.PlanarMarker] = []
+
+    def plane(self, is_path: Booleans) -> Plane:
+        bodies = [self._body(number) for number in range(len(self._parts.bodies))]
+        rows, followed, spread = self._rows(is_path)
+        ground = [planar_marker(marker, self._ground) for marker in self._parts.ground]
+        gravity = np.ascontiguousarray(self._ground[:2] @ self._parts.gravity)
+        model = _core.PlanarModel(bodies, ground + self._shifted, rows, self._parts.wrenches, gravity)
+        cut = tuple(self._cut(place) for place in self._parts.cut)
+        return Plane(model, self._ground, np.array(followed, dtype=int), np.column_stack(spread), cut)
+
+    def _cut(self, place: CutPlace) -> CutPlace:
+        axis = self._of_marker(self._parts.wrenches[place.a]) @ place.axis
+        axis[slice(0, 2) if place.turns else 2] = 0.0
+        return place._replace(axis=axis)
+
+    def _rows(self, is_path: Booleans) -> tuple[list[_core.RowModel], list[int], list[Array]]:
+        """Rows of the plane, which ones in space they follow, and columns of `spread`."""
+        rows = self._parts.rows
+        spread: list[Array] = [np.zeros((len(rows), 0))]
+        found, followed, unit = [], [], np.eye(len(rows))
+        for k, row in enumerate(rows):
+            group = [] if is_path[k] else self._askew(k)
+            if not group:
+                in_plane = self._row(row)
+                if in_plane is None and is_path[k]:
+                    raise AcrossError
+                of_row = [] if in_plane is None else [(in_plane, unit[k])]
+            else:
+                of_row = list(self._together(group)) if group[0] == k else []
+            for in_plane, column in of_row:
+                found.append(in_plane)
+                followed.append(k)
+                spread.append(column)
+        return found, followed, spread
+
+    def _askew(self, k: int) -> list[int]:
+        """Rows of a loop that hold one way in several directions, k among them, where the plane is askew to these."""
+        rows, ends = self._parts.rows, _ends(self._parts.rows[k])
+        ways = (_core.RowKind.point, _core.RowKind.slide)
+        held = [i for i, row in enumerate(rows) if row.kind in ways and row.coordinate < 0]  # none that rotors follow
+        same = [i for i in held if rows[i].kind == rows[k].kind and _ends(rows[i]) == ends]
+        return same if k in same and any(_is_mixed(self._direction(rows[i])) for i in same) else []
+
+    def _together(self, group: Sequence[int]) -> Iterator[tuple[_core.RowModel, Array]]:
+        """The rows of such a group in the plane, and their columns of `spread`; the normal is one of what they hold."""
+        rows = self._parts.rows
+        F = np.array([self._direction(rows[i]) for i in group])
+        if abs(float(F[:, 2] @ F[:, 2]) - 1.0) > EXACT:
+            raise AcrossError
+        held, directions = np.linalg.eigh(F[:, :2].T @ F[:, :2])
+        for size, direction in zip(held, directions.T, strict=True):
+            if size > 0.5:  # 1: held, 0: left free
+                column = np.zeros(len(rows))
+                column[list(group)] = F[:, :2] @ direction
+                yield _like(rows[group[0]], np.array([*direction, 0.0])), column
+
+    def _direction(self, row: _core.RowModel) -> Array:
+        """Its f in axes of the plane, or of its planar marker a."""
+        axes = self._ground if row.kind == _core.RowKind.point else self._of_marker(row.a)
+        return as_floats(axes @ row.f)
+
+    def _body(self, number: int) -> _core.PlanarBody:
+        body, axes = self._parts.bodies[number], self._axes[number]
+        data = body.data
+        self._check_joint(body.joint, self._normal @ self._frames[number].carrier)
+        found = _core.PlanarBody()
+        for key in (
+            "name",
+            "parent",
+            "parent_marker",
+            "inboard_marker",
+            "rotor_inertia",
+            "gear_ratio",
+            "driven",
+            "of_section",
+        ):
+            setattr(found, key, getattr(body, key))
+        found.joint, found.data = PLANAR[body.joint], planar_data(data, axes)
+        return found
+
+    @staticmethod
+    def _check_joint(kind: _core.JointKind, normal: Array) -> None:
+        """`normal` (3,) in axes of the joint."""
+        if kind == _core.JointKind.weld:
+            return
+        slides = kind == _core.JointKind.prismatic
+        off = abs(normal[2]) if slides else np.linalg.norm(normal - np.eye(3)[2])
+        if off > EXACT:
+            raise AcrossError
+
+    def _row(self, row: _core.RowModel) -> _core.RowModel | None:
+        """In axes of planar markers; None where it does nothing in the plane."""
+        found = _like(row, row.f)
+        if row.kind == _core.RowKind.coordinate:
+            return found
+        if row.kind == _core.RowKind.turn:
+            return self._turn(found, row)
+        f = self._direction(row)
+        g = self._of_marker(row.b) @ row.g if row.kind == _core.RowKind.dot else row.g
+        if np.linalg.norm(f[:2]) <= EXACT or (row.kind == _core.RowKind.dot and np.linalg.norm(g[:2]) <= EXACT):
+            return None
+        if row.kind != _core.RowKind.dot:
+            if _is_mixed(f):
+                found.a = self._shifted_for(row, f)
+            f[2] = 0.0
+        found.f, found.g = f, g
+        return found
+
+    def _turn(self, found: _core.RowModel, row: _core.RowModel) -> _core.RowModel:
+        """The difference of angles of planar markers, in which directions are those of their x: see `axes_of_triad`."""
+        a, b = self._of_marker(row.a), self._of_marker(row.b)
+        f = a @ row.f
+        if np.linalg.norm(f[:2]) > EXACT:
+            raise AcrossError
+        (x_a, y_a, _), (x_b, y_b, _) = a @ row.g, b @ row.g
+        turned = float(np.arctan2(x_a * y_b - y_a * x_b, x_a * x_b + y_a * y_b))
+        found.kind, found.f = _core.RowKind.rotation, np.array([0.0, 0.0, np.sign(f[2])])
+        if abs(turned) > EXACT:
+            found.a = self._turned(row.a, -turned)
+        return found
+
+    def _turned(self, at: _core.MarkerAt, angle: float) -> _core.MarkerAt:
+        """A marker of the ground in the place of another one, its axes turned by `angle`."""
+        if at.body >= 0:
+            raise AcrossError
+        marker = planar_marker(self._parts.ground[at.marker], self._ground)
+        marker.angle += angle
+        return self._added(marker)
+
+    def _added(self, marker: _core.PlanarMarker) -> _core.MarkerAt:
+        self._shifted.append(marker)
+        return _core.MarkerAt(-1, len(self._parts.ground) + len(self._shifted) - 1)
+
+    def _shifted_for(self, row: _core.RowModel, f: Array) -> _core.MarkerAt:
+        """A point of the ground from which f in the plane measures what it does in space: d_n is a constant."""
+        if row.kind != _core.RowKind.point or row.a.body >= 0:
+            raise AcrossError
+        a = self._ground @ self._parts.ground[row.a.marker].position
+        marker = _core.PlanarMarker()
+        marker.position = a[:2] - f[:2] * (f[2] * (self._height(row.b) - a[2]) / (f[:2] @ f[:2]))
+        marker.Phi = np.zeros((3, 0))
+        return self._added(marker)
+
+    def _height(self, at: _core.MarkerAt) -> float:
+        """Of a marker over the plane through the origin, m: it keeps it."""
+        markers = self._parts.ground if at.body < 0 else self._parts.bodies[at.body].data.markers
+        r, R = (np.zeros(3), np.eye(3)) if at.body < 0 else self._frames[at.body][:2]
+        return float(self._normal @ (r + R @ markers[at.marker].position))
+
+    def _of_marker(self, at: _core.MarkerAt) -> Array:
+        """(3, 3) rows: axes of a planar marker in those of its triad."""
+        if at.body < 0:
+            return axes_of_triad(self._parts.ground[at.marker].triad.T @ self._normal)
+        markers = self._parts.bodies[at.body].data.markers
+        return axes_of_triad(markers[at.marker].triad.T @ self._axes[at.body][2])

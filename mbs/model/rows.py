@@ -1,0 +1,101 @@
+"""Rows of constraints between sections of a tree in space: what they measure, and how it changes with velocities."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from ...common.arrays import Array
+from ...common.rotations import logarithm
+from .._core import TimeFunction
+from ..fields.orientations import OrientationLaw
+from .tree import Motion, Section
+
+RowKind = Literal["point", "slide", "dot", "rotation", "turn", "coordinate"]
+
+
+@dataclass(frozen=True)
+class ConstraintRow:
+    """One constraint: a measure of section b on section a that follows `target`, or is 0.
+
+    Attributes:
+        owner: the joint or trajectory.
+        kind: "point", f·(r_b − r_a) with f in global axes; "slide", the same with f in axes of a; "dot", f·g with f in
+            axes of a and g in axes of b; "rotation", the turn of b against a about f, global axes; "turn", the angle of
+            g of b about f of a, unit vectors across each other in axes of both; "coordinate", the joint coordinate
+            v[coordinate], `sign` times.
+        coordinate, q_index: in v and q; of "turn" and "slide" rows it is taken off, where there is one.
+        target: of points, angles and coordinates.
+        law: an orientation in time: of "rotation" rows that of a, whose triad is then A(t); of "dot" rows that of b.
+    """
+
+    owner: str
+    kind: RowKind
+    a: Section
+    b: Section
+    f: Array
+    g: Array
+    is_trajectory: bool = True
+    coordinate: int = -1
+    q_index: int = -1
+    sign: float = 1.0
+    target: TimeFunction | None = None
+    law: OrientationLaw | None = None
+
+    @property
+    def carries_moment(self) -> bool:
+        """Whether its multiplier is a moment."""
+        return self.kind in ("dot", "rotation", "turn")
+
+
+def value_and_gradient(row: ConstraintRow, a: Motion, b: Motion, q: Array, times: Array) -> tuple[Array, Array]:
+    """C (T,) at q (T, n_q) and `times` (T,), and its derivative C_v (T, n_v), from the motions of its sections."""
+    value, gradient = _measured(row, a, b, q, times)
+    if row.target is not None:
+        value = value - row.target.sample(times)[0]
+    if row.kind in ("turn", "slide") and row.coordinate >= 0:
+        value = value - q[:, row.q_index]
+        gradient[:, row.coordinate] -= 1.0
+    return value - 2 * np.pi * np.round(value / (2 * np.pi)) if row.kind == "turn" else value, gradient
+
+
+def _measured(row: ConstraintRow, a: Motion, b: Motion, q: Array, times: Array) -> tuple[Array, Array]:
+    """Without its target, and the coordinate that is taken off."""
+    if row.kind == "coordinate":
+        gradient = np.zeros((len(q), a.L.shape[-1]))
+        gradient[:, row.coordinate] = row.sign
+        return row.sign * q[:, row.q_index], gradient
+    turning = b.L[:, 3:] - a.L[:, 3:]
+    if row.kind == "rotation":
+        assert row.law is not None
+        residual = logarithm(b.F @ np.swapaxes(row.law.sample(times), -1, -2))
+        return residual @ row.f, np.einsum("i,tij->tj", row.f, b.L[:, 3:])
+    if row.kind == "turn":
+        return turned_by(row, a, b), np.einsum("ti,tij->tj", turning_axis(row, a, b), turning)
+    if row.kind == "dot":
+        f = np.einsum("tij,j->ti", a.F, row.f)
+        g = b.F @ row.g if row.law is None else row.law.sample(times)[:, :, 2]
+        return np.sum(f * g, axis=-1), -np.einsum("ti,tij->tj", np.cross(f, g), turning)
+    f = np.einsum("tij,j->ti", a.F, row.f) if row.kind == "slide" else np.broadcast_to(row.f, a.r.shape)
+    d = b.r - a.r
+    gradient = np.einsum("ti,tij->tj", f, b.L[:, :3] - a.L[:, :3])
+    if row.kind == "slide":
+        gradient = gradient + np.einsum("ti,tij->tj", np.cross(f, d), a.L[:, 3:])
+    return np.sum(f * d, axis=-1), gradient
+
+
+def turned_by(row: ConstraintRow, a: Motion, b: Motion) -> Array:
+    """The angle (T,) of a "turn" row, within ±π: that of b's g about a's f, from a's g on."""
+    axis, zero, turned = a.F @ row.f, a.F @ row.g, b.F @ row.g
+    found: Array = np.arctan2(np.sum(np.cross(axis, zero) * turned, axis=-1), np.sum(zero * turned, axis=-1))
+    return found
+
+
+def turning_axis(row: ConstraintRow, a: Motion, b: Motion) -> Array:
+    """Its rate (T, 3) by the angular velocity of b against a; core/recursion/rows.h."""
+    axis, turned = a.F @ row.f, b.F @ row.g
+    along = np.sum(axis * turned, axis=-1, keepdims=True)
+    found: Array = axis - along / (1.0 - along**2) * (turned - along * axis)
+    return found

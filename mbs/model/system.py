@@ -1,0 +1,344 @@
+"""The equations of motion of a scene in space under its constraints, as the core's recursion evaluates them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from ...common.arrays import Array, Booleans, Integers
+from ...common.errors import InputError
+from ...common.rotations import exponential
+from .. import _core
+from .._core import TimeFunction
+from ..fields.orientations import OrientationLaw
+from ..joints.transmission import Friction
+from ..scene.loads import OF_POINT, Load
+from .drives import NO_DRIVES, Command, Drive, Drives, PointDrive
+from .frame_motors import held_forces
+from .model import Model
+from .parts import CutPlace, ModelParts, Placed, carried_body, standing_marker
+from .plane import Plane, in_plane
+from .plane_bodies import EXACT
+from .rows import ConstraintRow
+from .transmission import gear_forces, tree_resistance, tree_resistance_slope
+from .tree import Section
+
+ZERO = _core.TimeFunction.constant(0.0)
+
+
+class Derivatives(NamedTuple):
+    """By increments δ of q, by v and by generalized forces, all along v (n_v).
+
+    Attributes:
+        a_q, a_v, a_f: (n_v, n_v) of accelerations; joints with friction resist more the faster they are. Springs in
+            gears are left as they are: see `gear_matrices`.
+        value_q: (rows, n_v) of the values of rows, and of their rates by v.
+        rate_q: (rows, n_v) of their rates.
+    """
+
+    a_q: Array
+    a_v: Array
+    a_f: Array
+    value_q: Array
+    rate_q: Array
+
+
+class Integrated(NamedTuple):
+    """A mechanism of the core, what acts on it and what its rows follow: those of the model with these numbers."""
+
+    core: _core.PlanarModel | _core.SpatialModel
+    scene: _core.TreeScene
+    rows: Integers
+
+
+class MultibodySystem:
+    """A core model of a tree with the rows of its constraints; states (q, v) are those of the tree.
+
+    Rows of coordinates are those of the tree in the core, `sign` times the scene's: they follow `sign` times the
+    target, and their multipliers are `sign` times those of `Model.rows`.
+
+    Attributes:
+        model: what it was made from.
+        replayed: what an earlier analysis found, to act again.
+    """
+
+    def __init__(self, model: Model, drives: Drives = NO_DRIVES, commands: Sequence[Command] = ()) -> None:
+        """`drives` act beside the loads of the scene, and `commands` will, held."""
+        self.model, tree, self.replayed = model, model.tree, drives.replayed
+        self._markers: list[list[Section]] = [[] for _ in tree.nodes]
+        self._ground: list[Section] = []
+        self._turning: list[tuple[int, OrientationLaw]] = []
+        sides = [(self._place(node.inner), self._place(node.outer)) for node in tree.nodes]
+        rows = [self._row(row) for row in model.rows]
+        self._wrenches: list[Placed] = []
+        loads = [load for load in model.scene.load if load.point is not None]
+        at_points = [*(PointDrive(str(load.point), load.components) for load in loads), *drives.at_points]
+        self._at_points = [self._point_drive(drive) for drive in at_points]
+        at_loads = zip(self._at_points, loads, strict=False)
+        self._of_motion = [(wrench, load.force) for (wrench, _), load in at_loads if load.force is not None]
+        replayed = drives.replayed.at_points if drives.replayed else {}
+        self._numbers_at = [(self._wrench(tree.section(at, np.eye(3))), of) for at, of in replayed.items()]
+        self._cut = [one for one in model.cut if one.is_loaded]
+        cut = tuple(self._cut_place(one.row) for one in self._cut)
+        self._check()
+        moments = [drive for load in model.scene.load if load.joint in tree.carried for drive in self._drives(load)]
+        self._along = [*moments, *model.modal_loads, *drives.along]
+        driven = self._driven((*commands, *(drives.replayed.commands if drives.replayed else ())))
+        bodies = [
+            carried_body(node, *of_node, self._markers[number], bool(driven[node.v].any()))
+            for number, (node, of_node) in enumerate(zip(tree.nodes, sides, strict=True))
+        ]
+        turning = [number for number, _ in self._turning]
+        ground = [standing_marker(section, number in turning) for number, section in enumerate(self._ground)]
+        wrenches = [_core.MarkerAt(*at) for at in self._wrenches]
+        for number, at in enumerate(wrenches):
+            at.only_forces = number not in self._with_moments(cut)
+        self._parts = ModelParts(bodies, ground, rows, wrenches, np.array(model.scene.gravity), cut)
+
+    @cached_property
+    def core(self) -> _core.SpatialModel:
+        """In space."""
+        return self._parts.model()
+
+    @cached_property
+    def scene(self) -> _core.TreeScene:
+        """What the rows of `core` follow, and what acts on it."""
+        return self._follow(None)
+
+    @cached_property
+    def plane(self) -> Plane | None:
+        """In the plane in which all moves, with the same q and v; None where there is none.
+
+        Forces of the motion of points may lead out of it, but for those of scenes in the plane.
+        """
+        if not all(function.is_planar for _, function in self._of_motion):
+            return None
+        return in_plane(self._parts, ~self.model.loop_rows)
+
+    def lie_in_plane(self, directions: Sequence[Array]) -> bool:
+        """Whether all moves in a plane, and these (3,), global axes, lie in it."""
+        plane = self.plane
+        return plane is not None and all(abs(plane.axes[2] @ direction) <= EXACT for direction in directions)
+
+    @cached_property
+    def integrated(self) -> Integrated:
+        """What integrators take: in the plane where all moves in one."""
+        if self.plane is None:
+            return Integrated(self.core, self.scene, np.arange(len(self.model.rows)))
+        return Integrated(self.plane.model, self._follow(self.plane), self.plane.followed)
+
+    @cached_property
+    def replay(self) -> _core.Replay | None:
+        """What integrators take of the numbers that are replayed; None where there are none."""
+        if self.replayed is None:
+            return None
+        size = len(OF_POINT) if self.plane is None else 3
+        at_points = [
+            (number, size * wrench + along, share)
+            for wrench, numbers in self._numbers_at
+            for name, number in numbers.items()
+            for along, share in _shares(OF_POINT.index(name), self.plane)
+        ]
+        return _core.Replay(self.replayed.source, self.held_forces(self.replayed.commands), at_points)
+
+    def multipliers(self, of_core: Array) -> Array:
+        """(T, rows) of the model from those of `integrated`: 0 of rows that this has not, as of dependent ones."""
+        found = of_core if self.plane is None else of_core @ self.plane.spread.T
+        return found * self.row_signs
+
+    @property
+    def sections(self) -> list[Section]:
+        """Of the core's sections."""
+        return [self._markers[body][marker] for body, marker in self.core.sections]
+
+    def point_number(self, point: str) -> int:
+        """Of "BODY.POINT", on which a load or a drive acts, among the core's wrenches."""
+        return self._wrenches.index(self._place(self.model.tree.section(point, np.eye(3))))
+
+    def held_model(self) -> _core.HeldModel:
+        """The model for motions under held inputs, without loads of the scene; rows must follow nothing."""
+        parts = self._parts
+        return _core.HeldModel(parts.bodies, parts.ground, parts.rows, parts.wrenches, parts.gravity, self.scene)
+
+    def _with_moments(self, cut: Sequence[CutPlace]) -> set[int]:
+        """Numbers of wrenches that may have a moment; where there is none, pins in the plane pass none on."""
+        at_points = (number for number, of in (*self._at_points, *self._numbers_at) if not set("xyz").issuperset(of))
+        of_motion = (number for number, _ in self._of_motion)
+        return {*at_points, *of_motion, *(number for place in cut for number in (place.a, place.b))}
+
+    def _driven(self, commands: Sequence[Command]) -> Booleans:
+        """(n_v,) along which coordinates given forces act, of which inverse analyses have none."""
+        tree = self.model.tree
+        found: Booleans = np.zeros(tree.n_v, dtype=bool)
+        for direction in (*(drive.direction for drive in self._along), *(command.direction for command in commands)):
+            found |= direction != 0
+        resisting = [node for node in tree.nodes if node.joint.frictions]
+        for node in (*resisting, *(side for gear in tree.gears for side in (gear.motor, gear.joint))):
+            found[node.v] = True
+        for body in (c.frame[0] for c in commands if c.frame):
+            found[tree.nodes[body].v] = True
+        return found
+
+    def _check(self) -> None:
+        """Raise `InputError` for what the core does not take."""
+        path = self.model.scene.path
+        loaded = {load.joint for load in self.model.scene.load}
+        for node in self.model.tree.nodes:
+            if node.joint.type == "planar" and node.joint.frictions and node.backwards:
+                raise InputError(
+                    f"{path}: {node.joint.label}: between: expected the side nearer to the ground first where a planar"
+                    " joint has friction, found it second"
+                )
+            if node.joint.type == "planar" and node.backwards and node.joint.name in loaded:
+                raise InputError(
+                    f"{path}: {node.joint.label}: between: expected the side nearer to the ground first where a load"
+                    " acts along a planar joint, found it second"
+                )
+
+    def turn_markers(self, t: float) -> None:
+        """Put the orientations that rows follow where they are at time t, for `core`'s next evaluations."""
+        for number, law in self._turning:
+            at = np.array([t])
+            omega, alpha = law.rates(at)
+            self.core.turn_marker(number, law.sample(at)[0], omega[0], alpha[0])
+
+    @property
+    def row_signs(self) -> Array:
+        """(rows,) −1 where the core's row, target and multiplier count the tree's coordinate, not the joint's."""
+        return np.array([row.sign for row in self.model.rows])
+
+    def target(self, t: float) -> Array:
+        """Second derivatives that the core's rows follow at time t (rows,)."""
+        return self.row_signs * [0.0 if row.target is None else row.target(t)[2] for row in self.model.rows]
+
+    def force(self, t: float) -> Array | None:
+        """Given forces along v (n_v,) at time t; None where there are none."""
+        if not self._along:
+            return None
+        return sum((function(t)[0] * direction for direction, function in self._along), np.zeros(self.model.tree.n_v))
+
+    def derivatives(self, t: float, q: Array, v: Array, supplied: Array) -> Derivatives:
+        """How accelerations and rows answer to small changes of q, v and forces, at time t under the scene's loads.
+
+        `supplied` (n_v,) acts beside loads, friction and springs in gears; the core knows what acts along cut joints.
+        Rows that depend on others at q, v are left out.
+        """
+        self.turn_markers(t)
+        self.core.keep_independent_rows(q, v)
+        tree = self.model.tree
+        rest = gear_forces(tree, q[None], v[None])[0] - tree_resistance(tree, v[None])[0]
+        loads = self.force(t)
+        force = supplied + rest + (0.0 if loads is None else loads)
+        wrench = np.zeros((len(self._wrenches), len(OF_POINT)))
+        for number, components in self._at_points:
+            for name, magnitude in components.items():
+                wrench[number, OF_POINT.index(name)] += magnitude(t)[0]
+        found = self.core.derivatives(q, v, self.target(t), force, wrench.ravel(), self.scene, t)
+        signs = self.row_signs[:, None]
+        by_v = found.a_v - found.a_f * tree_resistance_slope(tree, v[None])[0]
+        return Derivatives(found.a_q, by_v, found.a_f, signs * found.value_q, signs * found.rate_q)
+
+    def _follow(self, plane: Plane | None) -> _core.TreeScene:
+        """Targets of the rows, and given forces along joints and at points; in the plane where it is given."""
+        scene = _core.TreeScene()
+        for row in self.model.rows if plane is None else (self.model.rows[k] for k in plane.followed):
+            scene.add_target(ZERO if row.target is None else row.target, row.sign)
+        for direction, magnitude in self._along:
+            scene.add_load(direction, magnitude)
+        for wrench, components in self._at_points:
+            for name, magnitude in components.items():
+                for along, share in _shares(OF_POINT.index(name), plane):
+                    scene.add_point_load(wrench, along, magnitude, share)
+        for wrench, function in self._of_motion:
+            scene.add_point_force(wrench, function)
+        for node in self.model.tree.nodes:
+            for number, friction in enumerate(node.joint.frictions):  # the same along all of a joint's coordinates
+                at = node.q.start + number, node.v.start + number
+                scene.add_joint_force(*at, 0.0, 0.0, friction.viscous, friction.coulomb, friction.speed)
+        for gear in self.model.tree.gears:
+            motor, joint = ((node.q.start, node.v.start) for node in (gear.motor, gear.joint))
+            scene.add_gear(motor, joint, gear.sign, gear.stiffness, gear.damping)
+        self._act_along_cut(scene, self._parts.cut if plane is None else plane.cut)
+        scene.most_bent = [node.body.largest_moment for node in self.model.tree.nodes]
+        has_loops = bool(self.model.loop_rows.any())
+        scene.has_loops = has_loops and plane is not None  # in space round-off moves rows that hold by themselves
+        scene.keeps_all_rows = not has_loops  # `check_path` refuses paths whose rows depend on each other
+        for number, law in self._turning:
+            scene.turn_marker(number, _turning_law(law))
+        return scene
+
+    def _act_along_cut(self, scene: _core.TreeScene, places: Sequence[CutPlace]) -> None:
+        """Friction and loads of joints at which loops are cut."""
+        for number, (one, place) in enumerate(zip(self._cut, places, strict=True)):
+            friction = one.friction or Friction(0.0, 0.0, 1.0)
+            scene.add_cut_joint(*place, friction.viscous, friction.coulomb, friction.speed)
+            for load in one.loads:
+                scene.add_cut_load(number, load, one.row.sign)
+
+    def held_forces(self, commands: Sequence[Command]) -> _core.HeldForces:
+        """Forces of commands that are held, in their order."""
+        return held_forces(self.model, commands)
+
+    def _drives(self, load: Load) -> Iterator[Drive]:
+        """Directions (n_v,) and sizes of the moments of a joint."""
+        assert load.joint is not None
+        for direction, moment in zip(self.model.along(load.joint), load.moments, strict=True):
+            yield Drive(direction, moment)
+
+    def _point_drive(self, drive: PointDrive) -> tuple[int, Mapping[str, TimeFunction]]:
+        """Number of the wrench, and its components over time."""
+        return self._wrench(self.model.tree.section(drive.point, np.eye(3))), drive.components
+
+    def _cut_place(self, row: ConstraintRow) -> CutPlace:
+        return CutPlace(self._wrench(row.a), self._wrench(row.b), row.kind == "turn", row.f)
+
+    def _wrench(self, section: Section) -> int:
+        """Number of a wrench on a section, made for it."""
+        self._wrenches.append(self._place(section))
+        return len(self._wrenches) - 1
+
+    def _turning_marker(self, law: OrientationLaw) -> int:
+        """Number of the ground's marker that turns as `law` says; made where it is new."""
+        for number, known in self._turning:
+            if known is law:
+                return number
+        self._ground.append(Section(-1, f"turning {len(self._turning)}", np.eye(3), np.zeros(3)))
+        self._turning.append((len(self._ground) - 1, law))
+        return len(self._ground) - 1
+
+    def _place(self, section: Section) -> Placed:
+        """Body (−1: the ground) and number of the marker of a section there; made where it is new."""
+        known = self._ground if section.body < 0 else self._markers[section.body]
+        for number, other in enumerate(known):
+            same = other.point == section.point and other.still == section.still
+            if same and np.array_equal(other.triad, section.triad) and np.array_equal(other.position, section.position):
+                return section.body, number
+        known.append(section)
+        return section.body, len(known) - 1
+
+    def _row(self, row: ConstraintRow) -> _core.RowModel:
+        found = _core.RowModel()
+        found.name, found.kind = row.owner, getattr(_core.RowKind, row.kind)
+        if row.kind == "coordinate":
+            found.coordinate = row.coordinate
+            return found
+        a, b = self._place(row.a), self._place(row.b)
+        if row.law is not None:  # see ConstraintRow: of "dot" rows it is that of b
+            turning = (-1, self._turning_marker(row.law))
+            a, b = (a, turning) if row.kind == "dot" else (turning, b)
+        found.a, found.b = _core.MarkerAt(*a), _core.MarkerAt(*b)
+        found.f, found.g, found.coordinate = np.array(row.f), np.array(row.g), row.coordinate
+        return found
+
+
+def _shares(component: int, plane: Plane | None) -> list[tuple[int, float]]:
+    """Of a component of a wrench: those of the core, with shares; see `Plane.shares`."""
+    return [(component, 1.0)] if plane is None else plane.shares(component)
+
+
+def _turning_law(law: OrientationLaw) -> _core.TurningLaw:
+    kind = getattr(_core.OrientationKind, law.kind)
+    return _core.TurningLaw(kind, list(law.functions), exponential(np.array(law.reference)))

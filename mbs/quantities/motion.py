@@ -1,0 +1,272 @@
+"""What is read off a motion in space: places of bodies and points, joint coordinates, path forces, motor moments.
+
+All arrays are over the output times (T, …), SI units, global axes unless a name says otherwise.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ...common.arrays import Array
+from ...common.rotations import quaternions
+from ..analysis.gears import Supplied, supplied_through_gears, with_motors
+from ..analysis.outcome import GearMotion
+from ..model.bending import bent_section
+from ..model.cut import CutCoordinate
+from ..model.cut_motion import CutMotion, cut_motions
+from ..model.drives import Drives, PointDrive
+from ..model.gears import with_compliance
+from ..model.known_motion import MotionForces, motion_forces, row_accelerations
+from ..model.model import Model, row_values, target_rates
+from ..model.motors import MotorForces, path_forces
+from ..model.payloads import turns_as_a_body
+from ..model.system import MultibodySystem
+from ..model.tree import Motion, Node, Section
+from ..scene.space import SPACES, Space
+from ..scene.trajectories import Trajectory
+from ..solve.posture import mobility
+from .body_motion import BodyMotion, PointMotion
+
+if TYPE_CHECKING:
+    from scipy.interpolate import BSpline
+
+
+@dataclass(frozen=True)
+class RobotMotion:
+    """States q (T, n_q), v and a (T, n_v) of a model's tree, and multipliers (T, rows) of its rows, at `time` (T,).
+
+    `required` (T, n_v): generalized forces that prescribed motion takes, of links that are held to a shape as well.
+    `is_at_rest`: targets stand still, as in an equilibrium. `applied`: forces on points beside the scene's loads.
+    `commanded`: moments (T, k) by joint that act along joints beside the scene's loads, N·m or N. `twists`: of
+    compliant gears, by joint, where they are known.
+    """
+
+    model: Model
+    time: Array
+    q: Array
+    v: Array
+    a: Array
+    multipliers: Array
+    required: Array | None = None
+    is_at_rest: bool = False
+    applied: tuple[PointDrive, ...] = ()
+    commanded: Mapping[str, Array] = field(default_factory=dict)
+    twists: Mapping[str, BSpline] = field(default_factory=dict)
+
+    @cached_property
+    def frames(self) -> list[Motion]:
+        """Of all bodies, in the order of the tree."""
+        return self.model.tree.frames(self.q)
+
+    @cached_property
+    def system(self) -> MultibodySystem:
+        """Its equations, with drives on all points where payloads sit."""
+        scene = self.model.scene
+        payloads = (PointDrive(load.point, {}) for load in scene.payload if not turns_as_a_body(scene, load))
+        return MultibodySystem(self.model, Drives(at_points=(*self.applied, *payloads)))
+
+    @cached_property
+    def forces(self) -> MotionForces:
+        """What bodies and joints do to each other in it."""
+        return motion_forces(self.system, self, self.time, self.multipliers)
+
+    @cached_property
+    def rows(self) -> tuple[Array, Array]:
+        """C (T, rows) and C_v (T, rows, n_v)."""
+        return row_values(self.model, self.q, self.time, self.frames)
+
+    @cached_property
+    def cut(self) -> list[tuple[CutCoordinate, CutMotion]]:
+        """Coordinates of joints at which loops are cut."""
+        motions = cut_motions(self.model, self.q, self.v, self.time, self.frames)
+        return list(zip(self.model.cut, motions, strict=True))
+
+    @cached_property
+    def violation(self) -> Array:
+        """(T, 3) of C, Ċ, C̈: the largest of all rows over 1 + that of q, v, a; of an equilibrium, C alone."""
+        C, C_v = self.rows
+        levels = [(C, self.q)]
+        if not self.is_at_rest:
+            C_dot = np.einsum("tij,tj->ti", C_v, self.v) - target_rates(self.model, self.q, self.time, self.frames)
+            levels += [(C_dot, self.v), (row_accelerations(self.model, self, self.time), self.a)]
+        off = np.zeros((len(self.time), 3))
+        for k, (values, size) in enumerate(levels):
+            off[:, k] = np.abs(values).max(axis=1, initial=0.0) / (1 + np.abs(size).max(axis=1, initial=0.0))
+        return off
+
+    @property
+    def space(self) -> Space:
+        """That of the scene."""
+        return SPACES[self.model.scene.space]
+
+    @property
+    def points(self) -> dict[str, tuple[str, ...]]:
+        """By body that is reported, in the scene's order: names of its sections."""
+        return {body.name: tuple(self.node(body.name).body.points) for body in self.model.scene.body}
+
+    def node(self, body: str) -> Node:
+        """The node of a body."""
+        return self.model.tree.nodes[self.model.tree.index[body]]
+
+    def body(self, name: str) -> BodyMotion:
+        """Of a body's frame and modes."""
+        node, frame = self.node(name), self.frames[self.model.tree.index[name]]
+        velocity = np.einsum("tij,tj->ti", frame.L, self.v)
+        stored = node.body.modal_transform.T
+        return BodyMotion(
+            frame.r, continuous(quaternions(frame.F)), velocity[:, :3], velocity[:, 3:],
+            self.q[:, node.p_q] @ stored, self.v[:, node.p_v] @ stored,
+        )  # fmt: skip
+
+    def modal_velocity(self, body: str) -> Array:
+        """Rates (T, n) of the modes that a body has in the equations."""
+        return self.v[:, self.node(body).p_v]
+
+    def angle(self, body: str) -> Array:
+        """θ (T,) of the frame of a body that moves in the plane, rad; turns of the joints before it count."""
+        e = self.body(body).orientation
+        angle = 2 * np.arctan2(e[:, 3], e[:, 0])
+        found: Array = angle + 2 * np.pi * np.round((self._turned(body) - angle) / (2 * np.pi))
+        return found
+
+    def _turned(self, body: str) -> Array:
+        """θ (T,) of the frame of a body of the tree that moves in the plane, rad: turns of joints and bent links."""
+        node = self.node(body)
+        coordinate = self.joint(node.joint.name)
+        if node.joint.freedoms and coordinate is None:
+            A = self.frames[self.model.tree.index[body]].F
+            return np.unwrap(np.arctan2(A[:, 1, 0], A[:, 0, 0]))
+        turn = node.joint.rpy[2] + np.zeros(len(self.time))
+        if coordinate is not None and node.joint.units == ("rad",):
+            turn += coordinate[0][:, 0]
+        turn = (-turn if node.backwards else turn) + self._bent(node.inner) - self._bent(node.outer)
+        return turn + (self._turned(self.model.tree.nodes[node.inner.body].body.name) if node.inner.body >= 0 else 0.0)
+
+    def _bent(self, section: Section) -> Array | float:
+        """By how much (T,) a section turns about z on its body, rad."""
+        if section.body < 0 or not section.point:
+            return 0.0
+        node = self.model.tree.nodes[section.body]
+        phi = bent_section(node.body, section.point, self.q[:, node.p_q]).phi
+        found: Array = section.turned(phi[..., None])[:, 2, 0]
+        return found
+
+    def section(self, point: str) -> Motion:
+        """Of the section "BODY.POINT"."""
+        return self.model.tree.motion(self.model.tree.section(point, np.eye(3)), self.q, self.frames)
+
+    def point(self, point: str) -> PointMotion:
+        """Of the section "BODY.POINT"."""
+        found, (body, _, label) = self.section(point), point.partition(".")
+        node = self.node(body)
+        deflection = bent_section(node.body, label, self.q[:, node.p_q]).u - node.body.points[label].position
+        return PointMotion(found.r, deflection, continuous(quaternions(found.F)))
+
+    def joint(self, name: str) -> tuple[Array, Array] | None:
+        """Coordinates, unwrapped, and rates (T, k) of a joint; None where it has none."""
+        if of_cut := [motion for one, motion in self.cut if one.joint.name == name]:
+            return np.array([one.coordinate for one in of_cut]).T, np.array([one.rate for one in of_cut]).T
+        number = self.model.tree.carried.get(name)
+        if number is None or not self.model.tree.nodes[number].joint.units:
+            return None
+        node = self.model.tree.nodes[number]
+        x, x_dot = (node.joint.coordinates(values) for values in (self.q[:, node.q], self.v[:, node.v]))
+        if not node.backwards:
+            return x, x_dot
+        return node.joint.turned_around(x), node.joint.rate_turned_around(x, x_dot)
+
+    def path_force(self, trajectory: str) -> Array:
+        """−λ (T, m) of its rows: forces on the point, then moments on the section about global axes."""
+        chosen = [k for k, row in enumerate(self.model.rows) if row.is_trajectory and row.owner == trajectory]
+        return -self.multipliers[:, chosen]
+
+    @cached_property
+    def supplied(self) -> Array:
+        """(T, n_v) what actuators supply along v: see `mbs.model.spatial_motors.path_forces`."""
+        return (
+            self.required if self.required is not None else path_forces(self.model, self.time, self.q, self.multipliers)
+        )
+
+    @property
+    def followed(self) -> list[Trajectory]:
+        """The trajectories that hold in it: all, or none."""
+        held = {row.owner for row in self.model.rows if row.is_trajectory}
+        return [trajectory for trajectory in self.model.scene.trajectory if trajectory.name in held]
+
+    @property
+    def is_prescribed(self) -> bool:
+        """Whether trajectories hold in it, motors their angles, or all is given with the forces that it takes."""
+        return any(row.is_trajectory for row in self.model.rows) or self.required is not None
+
+    @cached_property
+    def motor_forces(self) -> MotorForces | None:
+        """Of `supplied`: see `mbs.model.spatial_motors`. None where nothing is prescribed.
+
+        Moments behind gears that give are what motors must do there.
+        """
+        return self._found_motor_forces()
+
+    @property
+    def motor_moments(self) -> Mapping[str, Array]:
+        """By joint (T, k), N·m or N: what motors do, or have to do in place of what is prescribed."""
+        return self.commanded if self.motor_forces is None else self.motor_forces.moments
+
+    def _found_motor_forces(self) -> MotorForces | None:
+        return None if self._supplied is None else self._supplied.forces
+
+    @cached_property
+    def _supplied(self) -> Supplied | None:
+        if not self.is_prescribed or (self.space.is_plane and not self.motors_fit):
+            return None
+        return supplied_through_gears(self.model, self, self.time, self.supplied, self.twists or None)
+
+    @cached_property
+    def motors_fit(self) -> bool:
+        """Whether there are as many as the mechanism has degrees of freedom with rigid links."""
+        count = sum(map(len, self.model.motors.values()))
+        return len(self.time) > 0 and count == mobility(self.model, self.q[0]).freedom
+
+    @property
+    def gears(self) -> Mapping[str, GearMotion]:
+        """By joint, of inverse analyses and equilibria with compliant gears."""
+        return {} if self._supplied is None else self._supplied.gears
+
+    @cached_property
+    def behind_gears(self) -> RobotMotion:
+        """The same with motors as far ahead of gears that give as they have to be; itself where gears give in it."""
+        if not self.gears:
+            return self
+        model = with_compliance(self.model)
+        q, v, a = with_motors(model, (self.q, self.v, self.a), self.gears)
+        return RobotMotion(model, self.time, q, v, a, self.multipliers, applied=self.applied)
+
+    def gear_moment(self, joint: str) -> Array | None:
+        """What a gear that gives transmits to the second side of its joint (T,), N·m; else None."""
+        if joint in self.gears:
+            return self.gears[joint].gear_moment
+        for gear in self.model.tree.gears:
+            if gear.joint.joint.name == joint:
+                way, rate = gear.twist(self.q, self.v)
+                return gear.stiffness * way + gear.damping * rate
+        return None
+
+    def motor_motion(self, joint: str) -> tuple[Array, Array] | None:
+        """Angle and rate (T,), rad, rad/s, of the motor behind a gear that gives, reduced to its joint; else None."""
+        if joint in self.gears:
+            return self.gears[joint].angle, self.gears[joint].rate
+        for gear in self.model.tree.gears:
+            if gear.joint.joint.name == joint:
+                return self.q[:, gear.motor.q.start], self.v[:, gear.motor.v.start]
+        return None
+
+
+def continuous(e: Array) -> Array:
+    """Quaternions (T, 4) with signs that do not jump, the first e0 ≥ 0."""
+    flips = np.sum(e[1:] * e[:-1], axis=1) < 0
+    signs: Array = np.where(np.cumsum(np.append(False, flips)) % 2, -1.0, 1.0)
+    return e * signs[:, None]

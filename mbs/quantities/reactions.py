@@ -1,0 +1,54 @@
+"""Forces in the joints of a tree in 3D: what the core's Newton–Euler algorithm sums from the outermost body inwards."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from ...common.arrays import Array
+from ..model.known_motion import MotionForces, multiplier_forces
+from ..model.tree import Node
+from ..model.wrench import Wrench, without_work
+from .motion import RobotMotion
+
+
+def reactions(motion: RobotMotion) -> Mapping[str, Wrench]:
+    """By joint: force on its second side, and moment about where that side is, N and N·m.
+
+    A joint of the tree carries what its body and all that hangs on it need, less what else acts there and what acts
+    along its coordinates: motors, friction, loads, rotors. One that closes a loop has its multipliers.
+    """
+    return _carried(motion, motion.behind_gears.forces)
+
+
+def reactions_of_loops(motion: RobotMotion, forces: Array) -> Mapping[str, Wrench]:
+    """What forces (T, rows that close loops) along these rows are in `reactions`."""
+    multipliers = np.zeros_like(motion.multipliers)
+    multipliers[:, motion.model.loop_rows] = -forces
+    return _carried(motion, multiplier_forces(motion.system, motion.q, motion.time, multipliers))
+
+
+def _carried(motion: RobotMotion, forces: MotionForces) -> dict[str, Wrench]:
+    """By joint what it carries but does no work along it."""
+    found, model = dict[str, Wrench](), motion.model
+    for number, row in enumerate(model.rows):
+        if not row.is_trajectory and row.coordinate < 0:  # else it turns a rotor, along the joint
+            on_b = forces.of_row(number)[1]
+            found[row.owner] = found[row.owner].plus(on_b) if row.owner in found else on_b
+    loops = {joint.name for joint in model.tree.loops}
+    for number, node in enumerate(model.tree.nodes):
+        if node.joint.name not in loops:
+            carried = without_work(model.tree, node, forces.of_joint(number), motion.q, motion.frames)
+            found[node.joint.name] = _on_second(motion, node, carried)
+    return found
+
+
+def _on_second(motion: RobotMotion, node: Node, on_outer: Wrench) -> Wrench:
+    """Of what acts on the outer side of the joint that carries a body: the same, or what answers it, on the second."""
+    if not node.backwards:
+        return on_outer
+    outer, inner = (
+        motion.model.tree.motion(section, motion.q, motion.frames).r for section in (node.outer, node.inner)
+    )
+    return Wrench(-on_outer.force, -on_outer.moment).seen_from(outer - inner)

@@ -1,0 +1,186 @@
+"""Bodies and payloads of a scene, key by key. SI units."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Annotated, Literal, Self
+
+import numpy as np
+from pydantic import Field, PlainValidator, ValidationInfo, field_validator, model_validator
+
+from ...common.arrays import Array
+from ...common.names import Title
+from ...common.numbers import MOST_MODES, SMALLEST
+from ...common.validation import InputFile, Record, existing_file
+from ...fe_models.link_file import LinkSource, LinkTable
+from ...fe_models.link_records import BeamLink, SolidLink
+from ..fields.field_types import Name, NotNegative, PointReference, Positive, Vector3, one_of
+from ..fields.references import Reference
+from ..fields.spelling import IN_SPACE, Spelled, Vector, inertia_about_z
+
+Inertia = Vector3 | tuple[Vector3, Vector3, Vector3]
+ROUNDING = 1e-9  # of the largest entry of an inertia tensor
+
+
+def tensor(inertia: Inertia) -> Array:
+    """(3, 3) from [xx, yy, zz] or all nine entries."""
+    array = np.array(inertia, dtype=float)
+    return np.diag(array) if array.ndim == 1 else array
+
+
+def check_inertia(inertia: Inertia, least: float) -> None:
+    """Raise `ValueError` unless it is symmetric, and that of a body: no moment larger than the sum of the others."""
+    J = tensor(inertia)
+    slack = ROUNDING * np.abs(J).max()
+    if np.abs(J - J.T).max() > slack:
+        raise ValueError(f"expected a symmetric inertia, found {J.tolist()}")
+    moments = np.linalg.eigvalsh(J)
+    if moments[0] < least:
+        raise ValueError(
+            f"expected principal moments of inertia greater than 0, found {moments[0]:g}: a body without them cannot be"
+            " turned about that axis (a point mass is a [[payload]])"
+            if least > 0
+            else f"expected principal moments of inertia not below 0, found {moments[0]:g}"
+        )
+    if moments[2] > moments[0] + moments[1] + slack:
+        raise ValueError(
+            f"expected no principal moment of inertia larger than the sum of the others, found"
+            f" {', '.join(f'{moment:g}' for moment in moments)}"
+        )
+
+
+def _about_center(J: float) -> Vector3:
+    """Of a rigid body of a planar scene, by its moment of inertia about z."""
+    if not J >= SMALLEST:
+        raise ValueError(
+            f"expected a moment of inertia greater than 0, found {J:g}: without it the body's rotation has no"
+            " equation of motion (a point mass is a [[payload]])"
+        )
+    return inertia_about_z(J)
+
+
+PRIMITIVES = ("box", "cylinder", "sphere")
+
+
+class Visual(Record):
+    """A shape that pictures show of a rigid body, without effect on the motion: mesh, box, cylinder or sphere."""
+
+    mesh: Title | None = None
+    """File of a surface (.stl, .obj, .dae …), from the folder of the scene on; coordinates in m."""
+    scale: Vector3 = (1.0, 1.0, 1.0)
+    """Factors of the coordinates of `mesh` along its axes."""
+    box: tuple[Positive, Positive, Positive] | None = None
+    """Lengths along x, y and z, m."""
+    cylinder: tuple[Positive, Positive] | None = None
+    """Radius and length along z, m."""
+    sphere: Positive | None = None
+    """Radius, m."""
+    at: Vector3 = (0.0, 0.0, 0.0)
+    """Origin of the shape, m, axes of the body: the center of a box, cylinder or sphere."""
+    rpy: Vector3 = (0.0, 0.0, 0.0)
+    """Roll, pitch and yaw of the shape about the fixed axes x, y, z of the body, rad."""
+
+    @model_validator(mode="after")
+    def _is_one_shape(self) -> Visual:
+        one_of(self, ("mesh", *PRIMITIVES))
+        return self
+
+
+class RigidBody(Record):
+    """Mass (kg), inertia about the center (kg·m²), center and named points (m), in the axes of the body."""
+
+    mass: Positive
+    """Mass, kg."""
+    inertia: Annotated[Inertia, Spelled(float, _about_center)]
+    """Inertia about the center of mass, body axes, kg·m²: [xx, yy, zz], or three rows; in planar scenes about z."""
+    center: Vector
+    """Center of mass, m, axes of the body."""
+    points: dict[Name, Vector] = Field(default_factory=dict)
+    """Points for joints, loads and trajectories by name: m, axes of the body."""
+    visual: Annotated[tuple[Visual, ...], IN_SPACE] = ()
+    """Shapes that pictures show."""
+
+    @field_validator("inertia")
+    @classmethod
+    def _is_of_a_body(cls, inertia: Inertia) -> Inertia:
+        check_inertia(inertia, SMALLEST)
+        return inertia
+
+
+def _link(value: object, info: ValidationInfo) -> LinkSource:
+    if isinstance(value, str):
+        return existing_file(Path(value), info)
+    if not isinstance(value, dict):
+        raise ValueError(f"expected the name of a link file in quotes or a table of its keys, found {value!r}")
+    name, path = info.data.get("name", "?"), info.context["path"] if info.context else Path("scene")
+    return LinkTable({"name": name, **value}, path.with_name(f'{path.name}: body "{name}": link'))
+
+
+LinkInput = Annotated[LinkSource, PlainValidator(_link, json_schema_input_type=str | BeamLink | SolidLink)]
+
+
+ModeCount = Literal["auto"] | Annotated[int, Field(ge=0, le=MOST_MODES)]
+
+
+class BodyKeys(Record):
+    """A link file or a table of its keys (stage 1 runs if needed), a modal body file, or a rigid body.
+
+    The default `name` in a table of a link's keys is that of the body. A link moves in the families of modes that its
+    file has, and is rigid in the others.
+
+    `modes` of a flexible body is the number of its lowest modes, in planar scenes of those in the plane; the others are
+    represented by their static flexibility. Patches that are enough for all modes of the file serve these, others those
+    kept. "auto" takes as many as the tolerances of the analyses need; the default is all.
+
+    `pieces` is the number of segments of a beam link for large deflections, in 3D scenes in both planes, and twist;
+    "auto" chooses it. Results are those of the whole link, and geometric stiffening is on by default.
+    """
+
+    name: Name
+    """Name of the body, unique in the scene."""
+    link: LinkInput | None = None
+    """Link file, or a table with its keys; stage 1 runs if needed."""
+    modal: InputFile | None = None
+    """Modal body file, written by stage 1."""
+
+    modes: ModeCount | None = None
+    """Number of the lowest modes; "auto": as many as the tolerances need; default: all. Planar scenes count in-plane
+    modes, 3D scenes those of all families."""
+    pieces: Literal["auto"] | Annotated[int, Field(ge=1, le=100)] | None = None
+    """Number of welded segments of a beam link for large deflections; "auto" chooses it."""
+    rigid: RigidBody | None = None
+    """Data of a rigid body."""
+
+    @model_validator(mode="after")
+    def _is_one_of_three(self) -> Self:
+        one_of(self, ("link", "modal", "rigid"))
+        if self.modes is not None and self.link is None and self.modal is None:
+            raise ValueError(f'expected the key "modes" only in flexible bodies, found it in a rigid one: {self.modes}')
+        if self.pieces is not None and (self.link is None or self.modes is not None):
+            beside = "modes" if self.modes is not None else "modal" if self.modal is not None else "rigid"
+            raise ValueError(f'expected "pieces" with "link" alone, found "{beside}"')
+        return self
+
+
+class Payload(Record):
+    """A mass (kg) on a section of a body, with its inertia about its own center of mass (kg·m²)."""
+
+    point: PointReference
+    """Point of the mass, "BODY.POINT"."""
+    mass: NotNegative
+    """Mass, kg."""
+    center: Vector = (0.0, 0.0, 0.0)
+    """Center of mass, m from the point, axes of the body."""
+    inertia: Annotated[Inertia, Spelled(NotNegative, inertia_about_z)] = (0.0, 0.0, 0.0)
+    """Inertia about that center, axes of the body, kg·m²: [xx, yy, zz], or three rows; in planar scenes about z."""
+
+    @field_validator("inertia")
+    @classmethod
+    def _is_of_a_body(cls, inertia: Inertia) -> Inertia:
+        check_inertia(inertia, 0.0)
+        return inertia
+
+    def references(self) -> Iterator[Reference]:
+        """The point that carries it."""
+        yield Reference("point", self.point)

@@ -1,0 +1,86 @@
+"""Given loads of a scene, key by key. SI units."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Annotated
+
+from pydantic import ValidationInfo, model_validator
+
+from ...common.validation import Record, quoted
+from .._core import TimeFunction
+from ..fields.field_types import Expression, Expressions, PointReference, one_of, only, present
+from ..fields.references import Reference, marker_reference
+from ..fields.spelling import IN_SPACE, Spelled, as_written, is_planar, keys_here
+from ..fields.state_forces import StateForce
+
+OF_POINT = ("x", "y", "z", "mx", "my", "mz")
+
+
+class Load(Record):
+    """A prescribed load: force (N) and moment (N·m) on a section in global axes, joint torque, or voltages (V).
+
+    `force` on a point, in scenes made in Python: a function of its motion, see `state_forces.state_function`.
+    """
+
+    point: PointReference | None = None
+    """Loaded point, "BODY.POINT"."""
+    joint: str | None = None
+    """Joint that it acts on, along its coordinate."""
+    pzt: str | None = None
+    """Name of the layout with the driven patches (default: the name of the body)."""
+    x: Expression | None = None
+    """Force along the ground's x axis, N; expression in t."""
+    y: Expression | None = None
+    """Force along the ground's y axis, N; expression in t."""
+    z: Annotated[Expression | None, IN_SPACE] = None
+    """Force along the ground's z axis, N; expression in t."""
+    mx: Annotated[Expression | None, IN_SPACE] = None
+    """Moment about the ground's x axis on the section, N·m; expression in t."""
+    my: Annotated[Expression | None, IN_SPACE] = None
+    """Moment about the ground's y axis on the section, N·m; expression in t."""
+    mz: Annotated[Expression | None, IN_SPACE] = None
+    """Moment about the ground's z axis on the section, N·m; expression in t."""
+    moment: Annotated[Expressions | None, Spelled(Expression, as_written)] = None
+    """Torque on the second side of the joint along its coordinate, N·m (N along sliding coordinates); expression in t,
+    or a list of them for several coordinates. In planar scenes also the counter-clockwise moment on a point."""
+    force: StateForce | None = None
+    """Function of t, position and velocity that returns force (N) and moment (N·m); in scenes made in Python only."""
+    voltage: tuple[Expression, ...] | None = None
+    """Voltages, V: one expression in t per patch of the layout."""
+
+    @model_validator(mode="after")
+    def _consistent(self, info: ValidationInfo) -> Load:
+        subject = one_of(self, ("point", "joint", "pzt"))
+        of_point = keys_here(self, (*OF_POINT, "force"), info)
+        moment = ("moment",) if is_planar(info) else ()
+        allowed = {"point": (*of_point, *moment), "joint": ("moment",), "pzt": ("voltage",)}[subject]
+        found = only(self, subject, allowed, (*of_point, "moment", "voltage"))
+        if self.force is not None and len(found) > 1:
+            raise ValueError(f'expected "force" alone with "point", found {quoted(found)}')
+        return self
+
+    def references(self) -> Iterator[Reference]:
+        """Where it acts."""
+        yield from marker_reference("point", self.point, loaded=True)
+        if self.joint is not None:
+            yield Reference("joint", self.joint, "joint")
+        if self.pzt is not None:
+            yield Reference("pzt", self.pzt, "patches")
+
+    @property
+    def components(self) -> dict[str, TimeFunction]:
+        """The given functions of time by component; of joints "moment[k]", of voltages "voltage[k]"."""
+        if self.point is not None and self.moments:  # in the plane: about its normal
+            return present(x=self.x, y=self.y, mz=self.moments[0])
+        of_point = present(x=self.x, y=self.y, z=self.z, mx=self.mx, my=self.my, mz=self.mz)
+        voltages = {f"voltage[{k}]": function for k, function in enumerate(self.voltage or ())}
+        moments = {f"moment[{k}]": function for k, function in enumerate(self.moments)}
+        return of_point | moments | voltages
+
+    @property
+    def moments(self) -> tuple[TimeFunction, ...]:
+        """Along each coordinate of the joint."""
+        if self.moment is None:
+            return ()
+        return self.moment if isinstance(self.moment, tuple) else (self.moment,)

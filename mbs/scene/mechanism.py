@@ -1,0 +1,116 @@
+"""What a scene says of a mechanism: bodies, joints, trajectories, loads, and the state it starts from."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated, Literal
+
+from ...common.names import Title
+from ...common.validation import Record
+from ..fields.field_types import NotEmpty
+from ..fields.references import Reference, under
+from ..fields.spelling import Vector
+from ..joints.joints import AnyJoint
+from .bodies import BodyKeys, Payload
+from .initial import Initial
+from .loads import Load
+from .topology import Edge, Topology, spanning_forest
+from .trajectories import Trajectory
+
+
+class MechanismKeys(Record):
+    """The keys of a scene that concern the mechanism; lists of tables keep the singular name of the file."""
+
+    name: Title
+    """Name of the scene."""
+    space: Literal["planar", "spatial"] = "planar"
+    """Dimension of the motion."""
+    gravity: Vector
+    """Acceleration of gravity, m/s², global axes."""
+    motors: Literal["section", "frame"] = "section"
+    """Reference of motors and, in planar scenes, joint coordinates: sections at the joint, or frames of the bodies."""
+    geometric_stiffening: bool | Literal["auto"] | None = None
+    """Stiffness of links depends on their loads; "auto": if these change it by more than 1 %. Default: on for
+    subdivided links only, except links with loads between the ends of a segment."""
+    redundancy: Literal["least-torque", "least-motion"] | None = None
+    """Redundancy resolution with undeformed links: "least-torque" minimizes the integral of squared motor torques from
+    the state at t = 0, "least-motion" the sum of squared joint velocities at every time (translations relative to the
+    robot's size). Default: the redundant motion is unactuated."""
+    body: Annotated[tuple[BodyKeys, ...], NotEmpty]
+    """Links and rigid bodies."""
+    joint: tuple[AnyJoint, ...] = ()
+    """Joints between bodies, or to the ground; bodies without a joint are free."""
+    trajectory: tuple[Trajectory, ...] = ()
+    """Prescribed motions."""
+    load: tuple[Load, ...] = ()
+    """Prescribed forces, torques and voltages."""
+    payload: tuple[Payload, ...] = ()
+    """Masses on points."""
+    initial: Initial = Initial()
+    """Initial state."""
+
+    @property
+    def is_planar(self) -> bool:
+        """Whether the mechanism is projected on the plane z = 0, by declaration."""
+        return self.space == "planar"
+
+    @property
+    def edges(self) -> list[Edge]:
+        """The joints for a spanning forest.
+
+        Loops are cut at spherical joints, then where nothing acts along the joint, then where friction or loads do,
+        then where there is a rotor or a trajectory. The tree needs the coordinates of motors without rotors, and those
+        that analyses read.
+        """
+        return [Edge(joint.between, self._rank(joint)) for joint in self.joint]
+
+    def _rank(self, joint: AnyJoint) -> int:
+        followed = any(trajectory.coordinate_of == joint.name for trajectory in self.trajectory)
+        if not joint.locates:
+            return 4
+        if joint.held is None or joint.asks_for_coordinate:
+            return 0
+        if getattr(joint, "rotor_inertia", 0.0):
+            return 1
+        if joint.name in self.read_joints:
+            return 0
+        if followed:
+            return 1
+        return 2 if joint.frictions or any(load.joint == joint.name for load in self.load) else 3
+
+    @property
+    def read_joints(self) -> frozenset[str]:
+        """Names of joints whose coordinates analyses read."""
+        return frozenset()
+
+    @property
+    def topology(self) -> Topology:
+        """Which joint carries which body, by numbers of `joint`."""
+        return spanning_forest([body.name for body in self.body], self.edges)
+
+    @property
+    def motor_joints(self) -> tuple[AnyJoint, ...]:
+        """Joints with motors: by default all that move in an open chain, and none in a closed loop."""
+        default = self.topology.is_open_chain
+        return tuple(joint for joint in self.joint if joint.has_motor(default))
+
+    def references(self) -> Iterator[Reference]:
+        """All that records of the scene refer to, with their full keys."""
+        records: list[tuple[str, AnyJoint | Trajectory | Load | Payload]] = [
+            (joint.label, joint) for joint in self.joint
+        ]
+        records += [(f'trajectory "{trajectory.name}"', trajectory) for trajectory in self.trajectory]
+        records += [(f"load no. {k}", load) for k, load in enumerate(self.load, 1)]
+        records += [(f"payload no. {k}", payload) for k, payload in enumerate(self.payload, 1)]
+        for label, record in records:
+            yield from under(label, record.references())
+        yield from (replace(found, key=f"initial.{found.key}") for found in self.initial.references())
+
+
+class MechanismScene(MechanismKeys):
+    """A validated scene, with the absolute `path` of its file and the raw `text` that results files carry."""
+
+    path: Path
+    text: str

@@ -1,1 +1,0 @@
-"""The records of a scene; planar scenes are read by the same."""

@@ -1,0 +1,270 @@
+"""Trajectories of a scene, key by key: motion that is specified. SI units; angles in rad."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import cached_property
+from typing import Annotated
+
+import numpy as np
+from pydantic import ValidationInfo, model_validator
+
+from ...common.arrays import Array, as_rows
+from ...common.errors import InputError
+from ...common.rotations import of_rpy, smallest_turn
+from ...common.validation import quoted
+from .._core import TimeFunction
+from ..fields.field_types import Expression, Name, PointReference, Quantity, Vector3, WaypointTable, one_of, present
+from ..fields.orientations import QUATERNION, OrientationLaw, Reference, about_their_middle, orientation_of
+from ..fields.piecewise import Piecewise
+from ..fields.references import Reference as RecordReference
+from ..fields.references import marker_reference
+from ..fields.spelling import IN_SPACE, Spelled, as_written, is_planar, keys_here
+from ..fields.waypoints import Waypoints
+from .motion_keys import LIMITS, MotionKeys, OfPlaces, Place
+
+PLACES = ("x", "y", "z")
+SUBJECTS = ("point", "joint", "angle", "motor")
+ORIENTATIONS = ("rotation_vector", "rpy", "direction")
+POSE = 6
+OF_POINT = {2: "places [x, y]", 3: "[x, y, z]", POSE: "[x, y, z, roll, pitch, yaw]"}
+"""How `via` of a point is written, by the number of components."""
+OfPlane = Annotated[Place, Spelled(Quantity | tuple[Quantity, Quantity], as_written)]
+Triple = tuple[Expression, Expression, Expression]
+
+
+class Trajectory(MotionKeys):
+    """Prescribed motion of a point (m, global axes), of the section there, of an absolute angle, a joint or a motor.
+
+    The section's orientation is that of its axes in global axes: by a rotation vector, by roll, pitch and yaw about
+    fixed axes, or by one direction of the section, about which rotation is then unconstrained.
+    """
+
+    via: Annotated[tuple[OfPlane, ...], OfPlaces] | None = None
+    """Waypoints from rest to rest, the first at t = 0: [x, y] (m), or values of the joint or angle (rad, m). In 3D
+    scenes also [x, y, z], and [x, y, z, roll, pitch, yaw] (m, rad); [x, y] does not prescribe z."""
+    name: Name
+    """Name of the trajectory, unique in the scene."""
+    point: PointReference | None = None
+    """Point that follows the trajectory, "BODY.POINT"."""
+    joint: str | None = None
+    """Joint whose coordinate follows the trajectory: second side relative to the first."""
+    angle: str | None = None
+    """Body, or section "BODY.POINT", whose absolute angle about `axis` follows the trajectory: one component of its
+    orientation, the others are free; in planar scenes about z. Of the section's direction that is across `axis` where
+    its axes are global ones, the projection on the plane across `axis` has this angle."""
+    axis: Annotated[Vector3 | None, IN_SPACE] = None
+    """Axis of `angle`, global axes; by default z."""
+    motor: str | None = None
+    """Joint whose motor follows the trajectory; a compliant gear (`stiffness`) lets the joint coordinate differ from
+    that of the motor."""
+    x: Expression | None = None
+    """Position along the ground's x axis, m; expression in t (s)."""
+    y: Expression | None = None
+    """Position along the ground's y axis, m; expression in t (s)."""
+    z: Annotated[Expression | None, IN_SPACE] = None
+    """Position along the ground's z axis, m; expression in t (s)."""
+    rotation_vector: Annotated[Triple | None, IN_SPACE] = None
+    """Orientation of the section: axis times angle, rad, global axes; expressions in t."""
+    reference_rotation_vector: Annotated[Vector3 | None, IN_SPACE] = None
+    """Orientation that `rotation_vector` rotates, rad; by default the global axes."""
+    rpy: Annotated[Triple | None, IN_SPACE] = None
+    """Orientation of the section: roll, pitch, yaw about the ground's x, y, z in this order, rad; expressions in t."""
+    tool_axis: Annotated[Vector3 | None, IN_SPACE] = None
+    """Direction of the section, in its axes, that stays along `direction`."""
+    direction: Annotated[Triple | None, IN_SPACE] = None
+    """Direction of `tool_axis` in global axes, of any length; expressions in t."""
+    value: Expression | None = None
+    """Joint coordinate (rad; sliding: m) or angle (rad); expression in t (s)."""
+    waypoints: WaypointTable | None = None
+    """CSV file with the columns t (s) and x, y (m), in 3D scenes also z, and qw, qx, qy, qz for the orientation. Of a
+    joint: with the column value, or one of the joint's name (rad, m)."""
+
+    @model_validator(mode="after")
+    def _consistent(self, info: ValidationInfo) -> Trajectory:
+        subject = one_of(self, keys_here(self, SUBJECTS, info))
+        if self.axis is not None and (self.angle is None or not any(self.axis)):
+            raise ValueError(f'expected the key "axis" only with angle, a direction, found {list(self.axis)}')
+        allowed = keys_here(self, (*PLACES, *ORIENTATIONS), info) if subject == "point" else ("value",)
+        given = [key for key in (*PLACES, *ORIENTATIONS, "value", "waypoints", "via") if getattr(self, key) is not None]
+        if not given or not set(given) <= {*allowed, "waypoints", "via"}:
+            raise ValueError(
+                f'expected the keys {quoted((*allowed, "waypoints", "via"))} with "{subject}", found {quoted(given)}'
+            )
+        if self.waypoints is not None:
+            self._check_columns(given, allowed)
+        if self.via is not None and set(given) & {*PLACES, "value"}:
+            raise ValueError(f"expected either waypoints, via or expressions, found {quoted(given)}")
+        of_point = {2: OF_POINT[2]} if is_planar(info) else OF_POINT
+        self.check_motion(of_point if subject == "point" else {1: "numbers"}, self.waypoints)
+        self._check_orientation()
+        self._check_poses()
+        self._check_size()
+        return self
+
+    def _check_columns(self, given: list[str], allowed: tuple[str, ...]) -> None:
+        assert self.waypoints is not None
+        if given != ["waypoints"]:
+            raise ValueError(f"expected either waypoints, via or expressions, found {quoted(given)}")
+        columns = self.waypoints.columns
+        places = tuple(key for key in allowed if key not in ORIENTATIONS)
+        wanted = (*places, *QUATERNION) if "z" in allowed else places
+        turned = set(columns) & set(QUATERNION)
+        if not set(columns) <= set(wanted) or (turned and turned != set(QUATERNION)):
+            header = ",".join(("t", *places))
+            header += " or t,JOINT" if allowed == ("value",) else " or t,x,y,z,qw,qx,qy,qz" if "z" in allowed else ""
+            raise ValueError(f'expected waypoints with the header {header}, found "{",".join(("t", *columns))}"')
+        if turned:
+            try:
+                orientation_of(self.waypoints)
+            except InputError as error:
+                raise ValueError(f"waypoints: {error}") from None
+
+    def _check_orientation(self) -> None:
+        found = [key for key in ORIENTATIONS if getattr(self, key) is not None]
+        if len(found) > 1:
+            raise ValueError(f"expected one orientation at most ({quoted(ORIENTATIONS)}), found {quoted(found)}")
+        for key, beside in (("reference_rotation_vector", "rotation_vector"), ("tool_axis", "direction")):
+            if getattr(self, key) is not None and getattr(self, beside) is None:
+                raise ValueError(f'expected the key "{key}" only with {beside}, found it alone')
+        if self.direction is not None and self.tool_axis is None:
+            raise ValueError('expected the key "tool_axis" with direction: which direction of the section, found none')
+        if self.tool_axis is not None and not any(self.tool_axis):
+            raise ValueError(f"expected tool_axis with a direction, found {list(self.tool_axis)}")
+
+    def _check_poses(self) -> None:
+        """Of places with an orientation."""
+        if not self._has_poses:
+            return
+        if found := [key for key in ORIENTATIONS if getattr(self, key) is not None]:
+            raise ValueError(f"expected an orientation either in via or by {quoted(found)}, found both")
+        if self.duration is None:
+            limits = [key for key in LIMITS if getattr(self, key) is not None]
+            raise ValueError(
+                f'expected a "duration" with poses in via (limits in m/s say nothing of turning), found'
+                f" {quoted(limits)}"
+            )
+        try:
+            self._turns  # noqa: B018 (looked at for what it raises)
+        except InputError as error:
+            raise ValueError(f"via: {error}") from None
+
+    def _check_size(self) -> None:
+        with np.errstate(all="ignore"):
+            paths = [path for path in (self.path, self._turning) if path is not None]
+        if any(not (np.isfinite(path.coefficients).all() and np.isfinite(path.breaks).all()) for path in paths):
+            raise ValueError("expected limits and times that fit each other in size, found infinite derivatives")
+
+    def references(self) -> Iterator[RecordReference]:
+        """What follows it."""
+        yield from marker_reference("point", self.point, loaded=True)
+        yield from marker_reference("angle", self.angle, loaded=True)
+        for key in ("joint", "motor"):
+            if (name := getattr(self, key)) is not None:
+                yield RecordReference(key, name, "joint")
+
+    def changed(self, **keys: object) -> Trajectory:
+        """The same with some keys replaced."""
+        return Trajectory(**({key: getattr(self, key) for key in self.model_fields_set} | keys))
+
+    @property
+    def coordinate_of(self) -> str | None:
+        """The joint whose coordinate, or whose motor's, follows it."""
+        return self.joint if self.motor is None else self.motor
+
+    @property
+    def turning_axis(self) -> Vector3:
+        """Of an absolute angle."""
+        return self.axis or (0.0, 0.0, 1.0)
+
+    @property
+    def force_components(self) -> tuple[str, ...]:
+        """What its forces are: those of `components`, then moments about global axes, or two about a tool's axis."""
+        if self.orientation is None:
+            return tuple(self.components)
+        return (*self.components, *(("mx", "my", "mz") if self.tool_axis is None else ("tool 1", "tool 2")))
+
+    @cached_property
+    def path(self) -> Piecewise | None:
+        """The motion of the place, or of the joint, where it is made of polynomials; None where expressions give it."""
+        if self.via is not None:
+            return self.through(self._places[:, :3])
+        if self.waypoints is None:
+            return None
+        places = [k for k, name in enumerate(self.waypoints.columns) if name not in QUATERNION]
+        whole = self.along_table(self.waypoints)
+        return Piecewise(whole.breaks, whole.coefficients[:, :, places])
+
+    @cached_property
+    def components(self) -> dict[str, TimeFunction]:
+        """The specified functions of time by component: "x", "y", "z", or "value"."""
+        if self.path is None:
+            return present(x=self.x, y=self.y, z=self.z, value=self.value)
+        if self.waypoints is not None:
+            names = tuple(name for name in self.waypoints.columns if name not in QUATERNION)
+        else:
+            names = ("value",) if self.point is None else PLACES[: self._places.shape[1]]
+        return dict(zip(names, self.path.functions(), strict=True)) if names else {}
+
+    @property
+    def targets(self) -> list[tuple[str, TimeFunction]]:
+        """All functions of time that it follows, by component; those of an orientation by its kind."""
+        law = self.orientation
+        turning = [] if law is None else [(law.kind, function) for function in law.functions]
+        return [*self.components.items(), *turning]
+
+    @cached_property
+    def orientation(self) -> OrientationLaw | None:
+        """How the section turns; None where that is left open."""
+        if self._turning is not None:
+            assert self._turns is not None
+            return OrientationLaw("rotation_vector", tuple(self._turning.functions()), self._turns[1])
+        if self.rotation_vector is not None:
+            return OrientationLaw(
+                "rotation_vector", self.rotation_vector, self.reference_rotation_vector or (0.0, 0.0, 0.0)
+            )
+        if self.rpy is not None:
+            return OrientationLaw("rpy", self.rpy)
+        return None if self.direction is None else OrientationLaw("direction", self.direction)
+
+    @property
+    def tool_triad(self) -> tuple[tuple[float, ...], ...]:
+        """Of a tool axis: rows of the triad of the section whose z is along it."""
+        assert self.tool_axis is not None
+        return tuple(map(tuple, as_rows(smallest_turn(np.array(self.tool_axis)))))
+
+    @property
+    def row_count(self) -> int:
+        """How many constraints it is: three of a full orientation, two of a direction."""
+        turning = 0 if self.orientation is None else 2 if self.direction is not None else 3
+        return len(self.components) + turning
+
+    @property
+    def _has_poses(self) -> bool:
+        return self.via is not None and self._places.shape[1] == POSE
+
+    @property
+    def _places(self) -> Array:
+        """(k + 1, n) of `via`."""
+        assert self.via is not None
+        return np.array(self.via, dtype=float).reshape(len(self.via), -1)
+
+    @cached_property
+    def _turns(self) -> tuple[Array, Reference] | None:
+        """Orientations of a table or of poses, rotation vectors (k, 3) about their middle; and it."""
+        if self.waypoints is not None and QUATERNION[0] in self.waypoints.columns:
+            table, reference = orientation_of(self.waypoints)
+            return table.values, reference
+        if not self._has_poses:
+            return None
+        return about_their_middle(np.array([of_rpy(*place[3:]) for place in self._places]), "place no.")
+
+    @cached_property
+    def _turning(self) -> Piecewise | None:
+        """Their motion, with the times of the places."""
+        if self._turns is None:
+            return None
+        vectors = self._turns[0]
+        if self.waypoints is not None:
+            return self.along_table(Waypoints(("rx", "ry", "rz"), self.waypoints.times, vectors))
+        return self.through(vectors)

@@ -1,0 +1,244 @@
+"""Postures of a robot in space: Newton on the rows, how it can move there, and what to say of singular ones."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...common.arrays import Array, as_floats
+from ...common.errors import InputError
+from ...common.validation import quoted
+from ..joints.joint import JointRecord
+from ..model.model import Model, row_values, target_rates, without_paths
+from .path_checks import check_smooth
+from .state import State
+
+BoolArray = NDArray[np.bool_]
+
+TOLERANCE = 1e-13  # of constraints, relative to the size of the robot
+SINGULAR = 1e-6  # ratio of singular values below which a posture counts as singular
+NEARLY_SINGULAR = 1e-3  # ratio of singular values that is worth a warning
+MOVING = 0.05  # share of a joint in the motion that a singular posture leaves, of the largest
+MOVES = 1e-6  # share of a joint in a motion that is left free
+BESIDE = 0.05  # rad (and sizes of the robot) before a singular posture, where rows of loops are told apart
+MOST_ITERATIONS = 60
+LARGEST_TURN = 0.5  # rad (and sizes of the robot) that a Newton step may move: keeps to the branch of the guess
+
+
+def robot_size(model: Model) -> float:
+    """A length (m): the largest distance of two named points of a body, or the reach of trajectories' places."""
+    sizes = [
+        float(np.linalg.norm(at.position - other.position))
+        for node in model.tree.nodes
+        for at in node.body.points.values()
+        for other in node.body.points.values()
+    ]
+    return max(sizes, default=0.0) or 1.0
+
+
+def solve_posture(model: Model, t: float, q: Array) -> Array | None:
+    """Q (n_q,) moved onto C(q, t) = 0 by least steps of the joints, p kept; None where that does not converge."""
+    found, is_met = solve_postures(model, np.array([t]), q[None])
+    return found[0] if is_met[0] else None
+
+
+def solve_postures(model: Model, times: Array, q: Array) -> tuple[Array, BoolArray]:
+    """Q (T, n_q) moved onto C(q, t) = 0 at `times` (T,) as in `solve_posture`, and of which that converged (T,)."""
+    q, left = np.array(q), np.full(len(q), np.inf)
+    if not model.rows:
+        return q, np.ones(len(q), dtype=bool)
+    scales, length = joint_scales(model), robot_size(model)
+    row_scales = np.array([1.0 if row.carries_moment else length for row in model.rows])
+    going, joints = np.arange(len(q)), scales > 0
+    for _ in range(MOST_ITERATIONS):
+        with np.errstate(over="ignore", invalid="ignore"):  # from anywhere: what is not finite ends there
+            C, C_v = row_values(model, q[going], times[going])
+            J = C_v[:, :, joints] * scales[joints] / row_scales[:, None]
+        left[going] = np.where(np.isfinite(J).all(axis=(1, 2)), np.abs(C / row_scales).max(axis=1), np.nan)
+        on = left[going] > TOLERANCE
+        going = going[on]
+        if not len(going):
+            break
+        step = np.zeros((len(going), len(scales)))
+        step[:, joints] = -np.einsum("tij,tj->ti", np.linalg.pinv(J[on], rcond=1e-10), C[on] / row_scales)
+        longest = np.abs(step).max(axis=1, keepdims=True)
+        step *= np.minimum(1.0, LARGEST_TURN / np.maximum(longest, 1e-300))
+        q[going] = model.tree.integrate(q[going], step * scales)
+    return q, left <= 1e3 * TOLERANCE
+
+
+def with_rates(model: Model, q: Array, v: Array, t: float = 0.0) -> State:
+    """The state at q with the joints' rates moved onto Ċ = 0 at time t by the least change, ṗ kept."""
+    if not model.rows:
+        return State(q, v)
+    scales, now = joint_scales(model), np.array([t])
+    C_v = row_values(model, q[None], now)[1][0]
+    left = target_rates(model, q[None], now)[0] - C_v @ v
+    return State(q, v + scales * np.linalg.lstsq(C_v * scales, left, rcond=1e-10)[0])
+
+
+def joint_scales(model: Model) -> Array:
+    """(n_v,) natural size of the joints' coordinates: 1 rad, or the size of the robot; 0 of modes, which stay."""
+    scales = np.zeros(model.tree.n_v)
+    for node in model.tree.nodes:
+        units = node.joint.units or node.joint.guess_units
+        sizes = np.array([1.0 if unit == "rad" else robot_size(model) for unit in units])
+        scales[node.v] = node.joint.state(sizes) if node.joint.units else sizes
+    return scales
+
+
+@dataclass(frozen=True)
+class Mobility:
+    """How the rigid mechanism can move in a posture.
+
+    Attributes:
+        freedom: degrees of freedom that joints and loops leave.
+        followed: how many of these the trajectories take.
+        ratio: smallest of largest singular value of the path's rows in these freedoms, lengths in sizes of the robot.
+        left: joints that still move with all trajectories held.
+        loop_rank: how many rows of the loops are independent with rigid links.
+    """
+
+    freedom: int
+    followed: int
+    ratio: float
+    left: tuple[str, ...]
+    loop_rank: int
+
+
+def mobility(model: Model, q: Array) -> Mobility:
+    """Of the mechanism with rigid links at q (n_q,)."""
+    J, is_loop = _scaled_rows(model, q), model.loop_rows
+    free, loop_rank = _null_space(J[is_loop])
+    path = J[~is_loop] @ free
+    values = np.linalg.svd(path, compute_uv=False)
+    still_free, followed = _null_space(path)
+    moving = np.abs(free @ still_free).max(axis=1, initial=0.0) > MOVES
+    names = np.array([node.joint.name for node in model.tree.nodes for _ in range(node.joint.freedoms)])
+    ratio = float(values[-1] / values[0]) if len(values) and values[0] > 0 else 1.0
+    return Mobility(free.shape[1], followed, ratio, tuple(dict.fromkeys(names[moving].tolist())), loop_rank)
+
+
+def told_posture(model: Model, ratio: float, t: float, q: Array, *, is_end: bool) -> str:
+    """What to say of the worst posture q (n_q,) on a path, at time t, where its ratio is that; "" where it is fine.
+
+    Of one in which the run ends it is said to be singular.
+    """
+    if not ratio < NEARLY_SINGULAR:
+        return ""
+    J, is_loop = _scaled_rows(model, q, t), model.loop_rows
+    free, _ = _null_space(J[is_loop])
+    least = np.abs(free @ np.linalg.svd(J[~is_loop] @ free)[2][-1])
+    names = np.array([node.joint.name for node in model.tree.nodes for _ in range(node.joint.freedoms)])
+    moving = quoted(dict.fromkeys(names[least > MOVING * least.max()].tolist()))
+    how = "a singular posture" if is_end else f"nearly a singular posture (ratio {ratio:.1e})"
+    return f"at t = {t:.6g} s {how}: motions of {moving} against each other hardly move what follows the path"
+
+
+def told_loops(model: Model, t: float, q: Array, v: Array) -> str:
+    """Of loops, and of paths through them, at q (n_q,), v (n_v,) and time t: whether their rows hardly differ here.
+
+    "" where they do, or did not before.
+    """
+    loops = without_paths(model)
+    before = solve_posture(loops, 0.0, model.tree.integrate(q, -BESIDE / max(float(np.abs(v).max()), 1e-300) * v))
+    if not loops.rows or before is None:
+        return ""
+    found = mobility(model, before)
+    ratio = _ratio(_scaled_rows(loops, q), found.loop_rank)
+    if ratio < NEARLY_SINGULAR:
+        return (
+            f"the configuration is singular or nearly so (ratio of singular values {ratio:.1g}; loops that"
+            f" {quoted(dict.fromkeys(row.owner for row in loops.rows))} close): a mechanism at a dead center, or cranks"
+            " and coupler in a line, where no finite force says which way to go on. Keep clear of it, or drive a joint"
+            " instead"
+        )
+    ratio = _ratio(_scaled_rows(model, q, t), found.loop_rank + found.followed)
+    if ratio < NEARLY_SINGULAR:
+        paths = quoted(dict.fromkeys(row.owner for row in model.rows if row.is_trajectory))
+        return (
+            f"the configuration is singular or nearly so (ratio of singular values {ratio:.1g}; trajectory {paths}): a"
+            " mechanism at a dead center, where forces on the driven point do not determine the direction of motion."
+            " Keep clear of it, or drive a joint instead"
+        )
+    return ""
+
+
+def _ratio(J: Array, rank: int) -> float:
+    """Of the singular values that are not zero by its `rank`, the least over the largest."""
+    values = np.linalg.svd(J, compute_uv=False)
+    return float(values[rank - 1] / values[0]) if rank else 1.0
+
+
+def _scaled_rows(model: Model, q: Array, t: float = 0.0) -> Array:
+    """C_v (rows, joint coordinates) at q (n_q,) and time t, in radians and sizes of the robot."""
+    row_scales = np.array([1.0 if row.carries_moment else robot_size(model) for row in model.rows]).reshape(-1, 1)
+    C_v = row_values(model, q[None], np.array([t]))[1][0]
+    return as_floats((C_v * joint_scales(model) / row_scales)[:, model.tree.joint_columns])
+
+
+def _null_space(J: Array) -> tuple[Array, int]:
+    """Orthonormal columns that J (m, k) takes to zero, and its rank."""
+    if not len(J):
+        return np.eye(J.shape[1]), 0
+    _, values, V = np.linalg.svd(J)
+    rank = int(np.count_nonzero(values > SINGULAR * max(values[0], 1.0)))
+    return V[rank:].T, rank
+
+
+def check_path(model: Model, q: Array, end: float) -> Iterator[str]:
+    """Warnings on what paths and motors leave open at q.
+
+    Raises `InputError` for more rows than the mechanism can follow, motors that do not fit, a singular posture, and a
+    path that jumps before `end` (s).
+    """
+    path, found = model.scene.path, mobility(model, q)
+    for each in model.scene.trajectory if end > 0 else ():
+        check_smooth(path, ((f'trajectory "{each.name}": {name}', target) for name, target in each.targets), end)
+    rows = int(np.count_nonzero(~model.loop_rows))
+    names = quoted(trajectory.name for trajectory in model.scene.trajectory)
+    if rows > found.freedom:
+        raise InputError(
+            f"{path}: trajectory: expected at most {found.freedom} components, as many as the mechanism has degrees of"
+            f" freedom with rigid links, found {rows} in {names}: only vibrations could follow the others"
+        )
+    if found.followed < rows:
+        raise InputError(
+            f"{path}: initial: expected a posture in which the links can follow trajectory {names} in every direction,"
+            " found a singular one (two axes in line, an arm stretched or folded?). Bend it, or move the start of the"
+            " path"
+        )
+    if found.ratio < NEARLY_SINGULAR:
+        yield f"near a singular posture at the start: {names} can hardly be followed (ratio {found.ratio:.1e})"
+    if rows and found.followed < found.freedom:
+        yield (
+            f"{found.freedom - found.followed} degrees of freedom are not prescribed: {', '.join(found.left)} are"
+            " unactuated and follow gravity and inertia; prescribe a joint by a trajectory, or set redundancy ="
+            ' "least-motion" or "least-torque"'
+        )
+    if rows:
+        yield from _check_motors(model, found)
+
+
+def _check_motors(model: Model, found: Mobility) -> Iterator[str]:
+    motors = {name: len(columns) for name, columns in model.motors.items()}
+    count, named = sum(motors.values()), any(joint.asks_for_motor for joint in model.scene.joint)
+    if count > found.freedom or (count < found.freedom and named and model.scene.is_planar):
+        raise InputError(
+            f"{model.scene.path}: joint: expected as many motors as the mechanism has degrees of freedom"
+            f" ({found.freedom}), found {count} ({quoted(motors)})"
+        )
+    if count < found.freedom and (named or model.scene.topology.is_open_chain):
+        moving = [joint.name for joint in _movable(model) if joint.name not in motors and joint.type != "free"]
+        if moving:
+            names = ", ".join(moving)
+            yield f"joints without motor: {names}: motor torques for the path are undetermined and not computed"
+
+
+def _movable(model: Model) -> Iterator[JointRecord]:
+    for node in model.tree.nodes:
+        if node.joint.freedoms:
+            yield node.joint

@@ -1,0 +1,74 @@
+"""Motion in space that is wholly prescribed, by the core: modal coordinates by functions of time, joints by paths."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from ...common.arrays import Array, as_list
+from ...common.errors import SolveError
+from .. import _core
+from ..model.model import Model
+from ..model.rows import ConstraintRow
+
+
+class Prescribed(NamedTuple):
+    """States q (T, n_q), v and a (T, n_v), multipliers (T, rows), and the forces M v̇ − Q (T, n_v) that they take."""
+
+    q: Array
+    v: Array
+    a: Array
+    multipliers: Array
+    required: Array
+
+
+def following_motors(model: Model) -> Model:
+    """The robot with the coordinates of its motors in place of its paths; of planar joints between its sections."""
+    rows, zero = [row for row in model.rows if not row.is_trajectory], np.zeros(3)
+    for joint, coordinates in model.motors.items():
+        node = model.driven(joint)
+        if node.joint.type == "planar":  # the core prescribes no coordinates whose axes turn
+            x, y, z = np.eye(3)
+            rows += [ConstraintRow(joint, "slide", node.inner, node.outer, f, f) for f in (x, y)]
+            rows.append(ConstraintRow(joint, "turn", node.inner, node.outer, z, x))
+            continue
+        for k in coordinates.tolist():
+            at = {"coordinate": k, "q_index": node.q.start + k - node.v.start}
+            rows.append(ConstraintRow(joint, "coordinate", node.inner, node.outer, zero, zero, **at))
+    return replace(model, rows=tuple(rows))
+
+
+PrescribedMotion = _core.PlanarPrescribedMotion | _core.SpatialPrescribedMotion
+
+
+def prescribed_by(mechanism: _core.PlanarDriven | _core.SpatialDriven, q: Array) -> PrescribedMotion:
+    """What prescribes the modes of a mechanism, and finds its postures from q (n_q,) on."""
+    if isinstance(mechanism, _core.PlanarDriven):
+        return _core.PlanarPrescribedMotion(mechanism, q)
+    return _core.SpatialPrescribedMotion(mechanism, q)
+
+
+def prescribed_motion(model: Model, motion: PrescribedMotion, modes: Array, times: Array, near: Array) -> Prescribed:
+    """At `times` (T,), with `modes` (3, T, n): p, ṗ and p̈ of all bodies, from postures near (T, n_q).
+
+    From a single one, near the first, postures are found one after the other. The multipliers are those that go with
+    joints that move freely: what is left of the forces on the modes holds the shape.
+
+    Raises `SolveError` where no posture meets the rows.
+    """
+    found = motion.motion(as_list(times), modes[0], modes[1], modes[2], near)
+    is_met = np.isfinite(found.q).all(axis=1)
+    if not is_met.all():
+        raise SolveError(
+            f"{model.scene.path}: no posture was found at t = {times[int(is_met.argmin())]:g} s: the prescribed shape"
+            " takes the trajectories out of reach"
+        )
+    signs = np.array([row.sign for row in model.rows])
+    return Prescribed(found.q, found.v, found.a, found.multipliers * signs, found.required)
+
+
+def joint_places(model: Model) -> Array:
+    """Where the joints of all bodies stand in q."""
+    return np.concatenate([np.arange(node.q.start, node.q.stop) for node in model.tree.nodes])

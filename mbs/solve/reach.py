@@ -1,0 +1,163 @@
+"""What to say where the links do not reach a path: how far it is, how far they reach, and a guess that works."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from ...common.arrays import Array, as_floats
+from ...common.errors import InputError
+from ..fields.field_types import split_point
+from ..model.model import Model, row_values
+from ..model.tree import Node
+from ..scene.mechanism import MechanismKeys
+from ..scene.space import SPACES
+from ..scene.trajectories import Trajectory
+from .posture import joint_scales, robot_size, solve_postures
+
+TURNING = ("revolute", "universal", "spherical", "weld")
+TRIES = 60
+REACH_CHECKS = 1001
+REGULAR = 1e-3  # ratio of singular values of the rows: less is next to a singular posture
+BEYOND = 1e-6  # of the reach: less is rounding
+
+
+class _Chain(NamedTuple):
+    """The joint on the ground behind which a point is, its place (3,), m, and the most that links reach from there."""
+
+    joint: str
+    at: Array
+    reach: float
+
+
+def out_of_reach(model: Model, times: Array) -> str:
+    """How far the first path that leads beyond the reach of the links does, at the first of `times` (T,); else ""."""
+    return next((f'trajectory "{name}" {how}' for name, how in _all_beyond(model, times)), "")
+
+
+def _all_beyond(model: Model, times: Array) -> Iterator[tuple[str, str]]:
+    """Each path that leads beyond the reach of the links at some of `times` (T,): its name, and how far."""
+    found = ((path.name, _beyond(model, path, times)) for path in model.scene.trajectory)
+    yield from ((name, how) for name, how in found if how)
+
+
+def check_reach(model: Model, end: float) -> None:
+    """Raise `InputError` for a path that leads beyond the reach of the undeformed links before `end` (s).
+
+    Flexible links would stretch beyond all sense instead of failing.
+    """
+    for name, how in _all_beyond(model, as_floats(np.linspace(0.0, end, REACH_CHECKS))):
+        raise InputError(
+            f'{model.scene.path}: trajectory "{name}": expected a target within reach, found one that {how}'
+        )
+
+
+def _beyond(model: Model, path: Trajectory, times: Array) -> str:
+    places = {axis: path.components[axis] for axis in "xyz" if path.point is not None and axis in path.components}
+    chain = _chain(model, str(path.point)) if places else None
+    if chain is None:
+        return ""
+    away = [function.sample(times)[0] - chain.at["xyz".index(axis)] for axis, function in places.items()]
+    distance = np.sqrt(np.sum(np.square(away), axis=0))
+    beyond = np.flatnonzero(distance > (1 + BEYOND) * chain.reach)
+    if not beyond.size:
+        return ""
+    axes = SPACES[model.scene.space].translations
+    first, along = distance[beyond[0]], "" if len(places) == len(axes) else f" along {' and '.join(places)}"
+    unit = ': are these m? (mm are written "750*mm")' if first > 10 * chain.reach else ""
+    return (
+        f'is {first:.4g} m{along} from joint "{chain.joint}" on the ground at t ='
+        f" {times[beyond[0]]:.6g} s, from which the links reach {chain.reach:.4g} m{unit}"
+    )
+
+
+def _chain(model: Model, point: str) -> _Chain | None:
+    """Of a point ("BODY.POINT"), by the undeformed links that carry it; None where a way between them is open."""
+    tree, reach = model.tree, 0.0
+    body, label = split_point(point)
+    number = tree.index[body]
+    while True:
+        node = tree.nodes[number]
+        if node.joint.type not in TURNING or not node.outer.point:
+            return None
+        reach += float(np.linalg.norm(node.body.points[label].position - node.body.points[node.outer.point].position))
+        if node.inner.body < 0:
+            return _Chain(node.joint.name, np.array(node.inner.position), reach)
+        if not node.inner.point:
+            return None
+        number, label = node.inner.body, node.inner.point
+
+
+def working_guess(model: Model, guess: Array) -> str:
+    """`joints = { … }`, in whole degrees, from which a regular posture meets all rows at t = 0; "" if none is found.
+
+    Of random coordinates of joints that turn, those nearest to `guess` (n_q,); others stay there.
+    """
+    tree, random = model.tree, np.random.default_rng(0)
+    turning = [node for node in tree.nodes if node.joint.name in tree.carried and "rad" in node.joint.units]
+    columns = np.array([node.q.start + k for node in turning for k in _angles(node)], dtype=int)
+    if not columns.size or not model.rows:
+        return ""
+    starts = np.tile(guess, (TRIES, 1))
+    starts[:, columns] = random.uniform(-np.pi, np.pi, (TRIES, len(columns)))
+    found = _met(model, starts)
+    rounded = np.tile(guess, (len(found), 1))
+    rounded[:, columns] = np.radians(np.round(np.degrees(np.angle(np.exp(1j * found[:, columns])))))
+    works = [q for q in rounded if len(_met(model, q[None]))]
+    if not works:
+        return ""
+    nearest = min(works, key=lambda q: float(np.abs(q[columns] - guess[columns]).sum()))
+    return f"joints = {{ {', '.join(_written(turning, nearest))} }}"
+
+
+def _angles(node: Node) -> list[int]:
+    """Which of the joint's entries in q are angles."""
+    of_state = node.joint.state(np.array([1.0 if unit == "rad" else 0.0 for unit in node.joint.units]))
+    return [int(k) for k in np.flatnonzero(of_state)]
+
+
+def _met(model: Model, q: Array) -> Array:
+    """Of postures next to q (T, n_q) those (…, n_q) that meet all rows at t = 0 and are regular."""
+    found, is_met = solve_postures(model, np.zeros(len(q)), q)
+    joints, length = model.tree.joint_columns, robot_size(model)
+    scales = joint_scales(model)[joints]
+    row_scales = np.array([1.0 if row.carries_moment else length for row in model.rows])[:, None]
+    found = found[is_met]
+    J = row_values(model, found, np.zeros(len(found)))[1][:, :, joints] * scales / row_scales
+    values = np.linalg.svd(J, compute_uv=False)
+    regular: Array = found[values[:, -1] > REGULAR * values[:, 0]]
+    return regular
+
+
+def _written(nodes: Sequence[Node], q: Array) -> Iterator[str]:
+    """The coordinates of joints as a scene has them."""
+    for node in nodes:
+        x = node.joint.coordinates(q[node.q])
+        x = node.joint.turned_around(x) if node.backwards else x
+        numbers = [
+            f'"{np.degrees(value):.4g}*deg"' if unit == "rad" else f"{value:.6g}"
+            for value, unit in zip(x.tolist(), node.joint.units, strict=True)
+        ]
+        yield f"{node.joint.name} = " + (numbers[0] if len(numbers) == 1 else f"[{', '.join(numbers)}]")
+
+
+def turned_guesses(scene: MechanismKeys) -> list[str]:
+    """Guesses of angles beyond a whole turn, which are degrees as a rule; a text each.
+
+    A trajectory of the joint's own coordinate says in which turn it begins.
+    """
+    followed = {path.coordinate_of for path in scene.trajectory}
+    units = {joint.name: joint.guess_units or joint.units for joint in scene.joint}
+    guesses = ((name, np.atleast_1d(np.array(value, dtype=float))) for name, value in scene.initial.joints.items())
+    return [
+        f'initial.joints: {name} = {angle:g} rad is more than a turn (degrees are written "{angle:g}*deg")'
+        for name, values in guesses
+        if name not in followed
+        for angle in _turns(values.tolist(), units.get(name, ()))
+    ]
+
+
+def _turns(values: Iterable[float], units: Sequence[str]) -> list[float]:
+    return [value for value, unit in zip(values, units, strict=False) if unit == "rad" and abs(value) > 2 * np.pi]

@@ -1,0 +1,211 @@
+"""A path in space whose force enters through the joint motors alone, as `servo` in the plane: `internal_dynamics`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from ...common.arrays import Array, Indices, as_floats, as_list
+from ...common.errors import InputError
+from .. import _core
+from .._core import TimeFunction
+from ..model.frame_motors import turning_motors
+from ..model.model import Model
+from ..model.motors import driven_mechanism, fastest_mechanism
+from ..model.rows import ConstraintRow
+from .internal_dynamics import Stopped, Target, by_differences, slopes_by_differences
+from .posture import mobility, solve_posture, told_posture
+from .prescribed import PrescribedMotion, following_motors
+from .reach import out_of_reach
+from .start import undeformed_posture
+
+POSTURES = 201  # along the path, from which others are looked for
+EVERY = 10  # of these is looked at for singular ones
+MOST_STATES = 10_000  # that are evaluated at once, a fraction of a second
+
+
+@dataclass(frozen=True)
+class Servo:
+    """The robot under its path, held before 0 and after `end`; `factor` 1 takes the path's own points as output.
+
+    A smaller factor takes where they would be with the same motor coordinates and the deflections `factor` p +
+    `offset`, which is what is expected of the rest (Wang and Vidyasagar 1991; De Luca and Siciliano 1993).
+
+    Attributes:
+        near_times, near: along the path, (N,) s, postures without deflections (N, n_q).
+        where: scene and analysis, for messages.
+        goes_on: is asked again and again whether to go on.
+        offset: one for each mode of all bodies, or none.
+    """
+
+    model: Model
+    end: float
+    factor: float
+    near_times: Array
+    near: Array
+    where: str
+    goes_on: Callable[[], bool]
+    offset: tuple[TimeFunction, ...] = ()
+
+    @cached_property
+    def scale(self) -> Array:
+        """Frequencies ω of all modes (n,), rad/s."""
+        omega: Array = np.sqrt(np.concatenate([node.body.stiffness for node in self.model.tree.nodes]))
+        return omega
+
+    @property
+    def mode_sizes(self) -> Array:
+        """√J of the bodies of all modes (n,), m·√kg."""
+        nodes = self.model.tree.nodes
+        largest = [np.linalg.eigvalsh(node.body.inertia)[-1] for node in nodes]
+        return np.concatenate([np.full(node.body.n_modes, J**0.5) for node, J in zip(nodes, largest, strict=True)])
+
+    @property
+    def mode_counts(self) -> list[int]:
+        """By body of the tree."""
+        return [node.body.n_modes for node in self.model.tree.nodes]
+
+    @cached_property
+    def doubt(self) -> str:
+        """What to say of the worst posture along the path; "" where all are fine."""
+        ratios = [mobility(self.model, q).ratio for q in self.near[::EVERY]]
+        worst = EVERY * int(np.argmin(ratios))
+        return told_posture(self.model, min(ratios), float(self.near_times[worst]), self.near[worst], is_end=False)
+
+    def targets(self) -> Iterator[Target]:
+        """What the path follows."""
+        for path in self.model.scene.trajectory:
+            for component, function in path.targets:
+                yield Target(path.name, component, function)
+
+    def with_factor(self, factor: float) -> Servo:
+        """The same with another factor."""
+        return replace(self, factor=factor)
+
+    def with_offset(self, offset: tuple[TimeFunction, ...]) -> Servo:
+        """The same with what is expected of the deflections that the output leaves out."""
+        return replace(self, offset=offset)
+
+    @cached_property
+    def motion(self) -> PrescribedMotion:
+        """With p(t) given, the motors' coordinates as on the path with the deflections `factor` p + `offset`."""
+        path = fastest_mechanism(self.model)
+        if isinstance(path, _core.SpatialDriven):
+            return self.equations()
+        motion = _core.PlanarPrescribedMotion(path, self.near[0])
+        if self._is_redefined:
+            motion = _core.PlanarRedefinedMotion(path, path, self.near[0], self.factor, list(self.offset))
+        motion.hold_loads(0.0, self.end)
+        return motion
+
+    def equations(self) -> _core.SpatialPrescribedMotion:
+        """The same anew, in 3D."""
+        path = driven_mechanism(self.model)
+        motion = _core.SpatialPrescribedMotion(path, self.near[0])
+        if self._is_redefined:
+            has_loops = self.model.loop_rows.any()
+            driven = driven_mechanism(following_motors(self.model)) if has_loops else path
+            motion = _core.SpatialRedefinedMotion(driven, path, self.near[0], self.factor, list(self.offset))
+        motion.hold_loads(0.0, self.end)
+        return motion
+
+    @property
+    def _is_redefined(self) -> bool:
+        return self.factor != 1.0 or bool(self.offset)
+
+    def postures(self, times: Array) -> Array:
+        """Those along the path without deflections, (T, n_q), nearest to `times` (T,)."""
+        found: Array = self.near[np.abs(times[:, None] - self.near_times).argmin(axis=1)]
+        return found
+
+    def residuals(self, times: Array, p: Array, v: Array, a: Array) -> Array:
+        """Modal forces r (N, n) that motors do not supply; NaN where no posture is found. Raises `Stopped`."""
+        r, near = np.zeros_like(p), self.postures(times)
+        for k in range(0, len(times), MOST_STATES):
+            if not self.goes_on():
+                raise Stopped
+            part = slice(k, k + MOST_STATES)
+            r[part] = self.motion.left_on_modes(as_list(times[part]), p[part], v[part], a[part], near[part])[1]
+        return r
+
+    def derivatives(self, times: Array, p: Array, v: Array, a: Array) -> tuple[Array, Array, Array]:
+        """M, D and K (N, n, n) of these by p̈, ṗ and p: exact, unless motors turn frames or follow a redefined loop."""
+        if not self._has_exact_slopes:
+            return by_differences(self, times, p, v, a)
+        n = p.shape[1]
+        M, D, K = self.slopes(times, p, v, a)
+        return M[:, :n], D[:, :n], K[:, :n]
+
+    @property
+    def _has_exact_slopes(self) -> bool:
+        return not turning_motors(self.model) and not (self._is_redefined and self.model.loop_rows.any())
+
+    def forces(self, times: Array, p: Array, v: Array, a: Array) -> tuple[Array, Array]:
+        """The same r (N, n), and what the motors do, τ (N, motors), N·m or N."""
+        found = self.motion.motion(as_list(times), p, v, a, self.postures(times))
+        return found.left[:, self.of_modes], found.tau
+
+    @cached_property
+    def of_modes(self) -> Indices:
+        """Places (n,) of all modes along v."""
+        return np.concatenate([np.arange(node.p_v.start, node.p_v.stop) for node in self.model.tree.nodes])
+
+    def slopes(self, times: Array, p: Array, v: Array, a: Array) -> tuple[Array, Array, Array]:
+        """Derivatives (N, n + motors, n) of (r, τ) by p̈, ṗ and p."""
+        if not self._has_exact_slopes:
+            return slopes_by_differences(
+                lambda *at: np.concatenate(self.forces(*at), axis=1), self.mode_sizes, times, p, v, a
+            )
+        found = self.motion.derivatives(as_list(times), p, v, a, self.postures(times))
+        M, D, K = (x.reshape(len(times), -1, p.shape[1]) for x in found)
+        return M, D, K
+
+
+def make_servo(
+    model: Model, end: float, where: str, goes_on: Callable[[], bool], factor: float, kind: str = "motors-only"
+) -> Servo:
+    """The equations for a path that is held before 0 and after `end`.
+
+    Raises `InputError` unless there are as many motors and specified components as degrees of freedom, and modes, and
+    for a path that the undeformed robot cannot follow; `Stopped`.
+    """
+    held = replace(model, rows=tuple(_held(row, end) for row in model.rows))
+    start = undeformed_posture(held).q
+    freedom = mobility(held, start).freedom
+    motors = sum(len(columns) for columns in model.motors.values())
+    for found, what in ((motors, "motors"), (np.count_nonzero(~model.loop_rows), "trajectory components")):
+        if found != freedom:
+            raise InputError(
+                f'{where}: expected for kind = "{kind}" as many {what} as the mechanism has degrees of freedom'
+                f" ({freedom}), found {found}"
+            )
+    if not any(node.body.n_modes for node in model.tree.nodes):
+        raise InputError(
+            f'{where}: expected at least one flexible body for kind = "{kind}", found only rigid ones: use kind'
+            ' = "pcid"'
+        )
+    times = as_floats(np.linspace(0.0, end, POSTURES))
+    near = [start]
+    for t in times[1:]:
+        if not goes_on():
+            raise Stopped
+        q = solve_posture(held, float(t), near[-1])
+        if q is None:
+            far = out_of_reach(held, times)
+            raise InputError(
+                f"{where}: trajectory: expected a path within reach, found no posture at t = {t:.6g} s"
+                + (f": {far}" if far else "")
+            )
+        near.append(q)
+    return Servo(held, end, factor, times, np.array(near), where, goes_on)
+
+
+def _held(row: ConstraintRow, end: float) -> ConstraintRow:
+    target = None if row.target is None else row.target.held(0.0, end)
+    law = row.law
+    if law is not None:
+        law = replace(law, functions=tuple(function.held(0.0, end) for function in law.functions))
+    return replace(row, target=target, law=law)

@@ -1,0 +1,103 @@
+"""The posture that a robot in space starts from: the guess of joint coordinates, then Newton on the rows."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+
+from ...common.arrays import Array
+from ...common.errors import InputError
+from ...common.validation import quoted
+from ..model.model import Model, row_values
+from .posture import MOST_ITERATIONS, solve_posture, with_rates
+from .reach import check_reach, turned_guesses, working_guess
+from .state import State
+
+
+def undeformed_posture(model: Model) -> State:
+    """The state with p = ṗ = 0 that meets all rows at t = 0, next to the guessed coordinates and rates.
+
+    Raises `InputError` where no posture near the guess does.
+    """
+    tree = model.tree
+    guess = _with_slides(model, tree.at_rest(_numbers(model, model.scene.initial.joints, "joints")))
+    q = solve_posture(model, 0.0, guess)
+    if q is None:
+        check_reach(model, 0.0)
+        owners, advice = quoted(dict.fromkeys(row.owner for row in model.rows)), "; ".join(_advice(model, guess))
+        raise InputError(
+            f"{model.scene.path}: initial.joints: expected a guess near a posture with undeformed links that meets"
+            f" {owners} at t = 0, found none within {MOST_ITERATIONS} steps"
+            f" ({advice or 'out of reach, or on another branch?'})"
+        )
+    return relaxed_gears(model, with_rates(model, q, _guessed_rates(model)))
+
+
+def _with_slides(model: Model, q: Array) -> Array:
+    """The guess q (n_q,), in planar scenes with slides that these do not guess where the guessed angles close loops.
+
+    They enter the rows of loops linearly.
+    """
+    guesses, is_loop = model.scene.initial.joints, model.loop_rows
+    slides = [node for node in model.tree.nodes if node.joint.type == "prismatic" and node.joint.name not in guesses]
+    if not (slides and model.scene.is_planar and is_loop.any()):
+        return q
+    values, gradients = row_values(model, q[None], np.zeros(1))
+    dv, along = np.zeros(model.tree.n_v), [node.v.start for node in slides]
+    dv[along] = np.linalg.lstsq(gradients[0, is_loop][:, along], -values[0, is_loop], rcond=1e-10)[0]
+    return model.tree.integrate(q, dv)
+
+
+def relaxed_gears(model: Model, state: State) -> State:
+    """The state with motors where their gears are not strained; joints where motors follow a trajectory."""
+    q, v = state.q.copy(), state.v.copy()
+    held = {row.coordinate for row in model.rows if row.kind == "coordinate"}
+    for gear in model.tree.gears:
+        way, rate = gear.twist(q, v)
+        if gear.motor.v.start in held:
+            q[gear.joint.q.start] += gear.sign * way
+            v[gear.joint.v.start] += gear.sign * rate
+        else:
+            q[gear.motor.q.start] -= way
+            v[gear.motor.v.start] -= rate
+    return State(q, v)
+
+
+def _advice(model: Model, guess: Array) -> Iterator[str]:
+    """What keeps a guess (n_q,) from meeting the rows at t = 0: degrees, or another branch."""
+    yield from turned_guesses(model.scene)
+    if works := working_guess(model, guess):
+        yield f"from [initial] {works}, for one, it goes"
+
+
+def _numbers(model: Model, table: Mapping[str, object], key: str) -> dict[str, Array]:
+    """The lists of numbers of a table by joint. Raises `InputError` for a wrong number of them."""
+    joints = {joint.name: joint for joint in (*(node.joint for node in model.tree.nodes), *model.scene.joint)}
+    found = {}
+    for name, value in table.items():
+        joint = joints[name]
+        wanted, numbers = len(joint.guess_units or joint.units), np.atleast_1d(np.array(value, dtype=float))
+        if len(numbers) != wanted:
+            raise InputError(
+                f"{model.scene.path}: initial.{key}.{name}: expected {wanted} numbers of a {joint.type} joint, found"
+                f" {len(numbers)}"
+            )
+        found[name] = numbers
+    return found
+
+
+def _guessed_rates(model: Model) -> Array:
+    v = np.zeros(model.tree.n_v)
+    for name, rates in _numbers(model, model.scene.initial.joint_rates, "joint_rates").items():
+        number = model.tree.carried.get(name)
+        if number is None:
+            continue  # where a loop is cut the other joints' rates say all
+        node = model.tree.nodes[number]
+        if node.backwards and len(node.joint.units) != 1:
+            raise InputError(
+                f"{model.scene.path}: initial.joint_rates.{name}: expected the side nearer to the ground first in"
+                f" between of a {node.joint.type} joint with rates, found it second"
+            )
+        v[node.v] = -rates if node.backwards else (node.joint.state(rates) if node.joint.units else rates)
+    return v

@@ -1,0 +1,299 @@
+"""Patches in space on a link from stage 1: closed forms of bending in both planes and of twist, and what is refused."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ffrobot.actuation.patches.lamina import Fibres, fibre_lamina
+from ffrobot.actuation.patches.link_patches import check_reach, link_patches, placed_patches
+from ffrobot.actuation.patches.records import PztLayout
+from ffrobot.actuation.patches.structure import patched_body
+from ffrobot.common.errors import InputError
+from ffrobot.common.validation import validate
+from ffrobot.fe_models.beam.section_stress import surface_shear
+from ffrobot.fe_models.link import cached_modal_body
+from ffrobot.mbs.model.body import from_modal_body
+
+SCENE = Path("scene.toml")
+E, NU, L = 70e9, 0.33, 0.4
+G = E / (2 * (1 + NU))
+START, END, VOLT = 0.06, 0.14, 100.0
+PLAIN = {"modulus": 63e9, "d31": 110e-12, "thickness": 0.5e-3}
+FIBRES = {
+    "modulus": 30.3e9, "modulus_across": 15.9e9, "shear_modulus": 5.5e9, "poissons_ratio": 0.31, "d33": 400e-12,
+    "d31": -170e-12, "thickness": 0.3e-3, "electrode_spacing": 0.5e-3,
+}  # fmt: skip
+LINK = """
+name = "{name}"
+[material]
+youngs_modulus = 70e9
+poissons_ratio = 0.33
+density = 2700.0
+[geometry]
+kind = "beam"
+length = 0.4
+section = {section}
+[mesh]
+elements = 10
+[reference]
+condition = "cantilever"
+[modes]
+count = {count}
+family = "{family}"
+"""
+
+
+def rectangle(height, width):
+    return f'{{ shape = "rectangle", height = {height}, width = {width} }}'
+
+
+TUBE = '{ shape = "tube", outer = 0.020, inner = 0.018 }'
+
+
+@pytest.fixture(scope="module")
+def link(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("links")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("XDG_CACHE_HOME", str(folder / "cache"))
+
+        def make(section, count=12, family="all"):
+            path = folder / "link.toml"
+            path.write_text(LINK.format(name="link", section=section, count=count, family=family))
+            return cached_modal_body(path).body
+
+        yield make
+
+
+def layout(**keys):
+    places = {} if keys.keys() & {"count", "centers"} else {"centers": [(START + END) / 2], "length": END - START}
+    tables = {"body": "link", "width": 0.01, "allocation": "least-squares"} | places | keys
+    material = FIBRES if "fibre_angle" in tables else PLAIN
+    return validate(PztLayout, material | tables, SCENE)
+
+
+def tip(body, layouts, volts=None):
+    """Φp (3,) and Φ_r p (3,) of the tip under a voltage on all patches, statically, with what the patches stiffen."""
+    spatial = patched_body(from_modal_body("link", body), body, placed_patches(SCENE, layouts, body))
+    found = link_patches(SCENE, layouts, body, spatial)
+    V = np.full(found.Phi_V.shape[1], VOLT) if volts is None else np.asarray(volts, dtype=float)
+    p = spatial.modal_transform.T @ (found.Phi_V @ V) / spatial.stiffness
+    at = spatial.points["tip"]
+    return at.translation @ p, at.rotation @ p
+
+
+def bending(h, b, w, faces):
+    """Curvature of the composite Euler–Bernoulli section, layers on faces h apart, N·m over N·m²; (stretch, too)."""
+    t, Ep = PLAIN["thickness"], PLAIN["modulus"]
+    A, S, I = (w * np.diff([(h / 2) ** k, (h / 2 + t) ** k])[0] / k for k in (1, 2, 3))  # noqa: E741
+    stiffness = np.diag([E * b * h**3 / 12, E * b * h]) + Ep * faces * np.array([[I, 0], [0, A]])
+    load = np.array([faces * S, 0.0])
+    if faces == 1:
+        stiffness[0, 1] = stiffness[1, 0] = -Ep * S
+        load = np.array([S, -A])
+    return np.linalg.solve(stiffness, Ep * PLAIN["d31"] * VOLT / t * load)
+
+
+@pytest.mark.parametrize(("bends", "axis", "names"), [("in-plane", 1, ("+y", "-y")), ("out-of-plane", 2, ("+z", "-z"))])
+@pytest.mark.parametrize("face", [None, "both", 0, 1])
+def test_tip_of_a_cantilever_in_both_planes(link, bends, axis, names, face):
+    """w(L) = κ (x2 − x1)(L − (x1 + x2)/2) of the composite section: towards +y or +z on whichever face patches lie."""
+    h, b = 0.006, 0.014
+    body = link(rectangle(h, b))
+    name = names[face] if isinstance(face, int) else face
+    translation, rotation = tip(body, [layout(bends=bends, face=name)])
+    across = (h, b) if axis == 1 else (b, h)
+    curvature, stretch = bending(*across, 0.01, 2 if face == "both" else 1)
+    expected = np.zeros(3)
+    expected[axis] = curvature * (END - START) * (L - (START + END) / 2)
+    if isinstance(face, int):
+        expected[0] = stretch * (1 if face == 0 else -1) * (END - START)
+    np.testing.assert_allclose(translation, expected, atol=2e-7 * abs(expected[axis]))
+    assert rotation[3 - axis] == pytest.approx((1 if axis == 1 else -1) * curvature * (END - START), rel=1e-6)
+    assert abs(rotation[0]) < 1e-12 * abs(rotation[3 - axis])
+
+
+def classical(angle):
+    """(C, stress per volt) of the layer with σ_s = 0 by transformed stiffnesses Q̄ (Jones 1999, eq. 2.84), not S̄."""
+    E1, E2, G12, nu = (FIBRES[key] for key in ("modulus", "modulus_across", "shear_modulus", "poissons_ratio"))
+    q = 1 - nu**2 * E2 / E1
+    Q = np.array([[E1, nu * E2, 0], [nu * E2, E2, 0], [0, 0, q * G12]]) / q
+    c, s = np.cos(angle), np.sin(angle)
+    of_strain = np.array([[c * c, s * s, s * c], [s * s, c * c, -s * c], [-2 * s * c, 2 * s * c, c * c - s * s]])
+    Q_bar = of_strain.T @ Q @ of_strain
+    free = np.linalg.solve(of_strain, np.array([FIBRES["d33"], FIBRES["d31"], 0.0]) / FIBRES["electrode_spacing"])
+    kept, out = [0, 2], [1]
+    reduce = Q_bar[np.ix_(kept, out)] / Q_bar[1, 1]
+    C = Q_bar[np.ix_(kept, kept)] - reduce @ Q_bar[np.ix_(out, kept)]
+    held = Q_bar @ free
+    return C, held[kept] - reduce[:, 0] * held[1]
+
+
+@pytest.mark.parametrize("angle", [-0.7, 0.0, 0.3, np.pi / 4, 1.2])
+def test_layer_of_fibres_at_an_angle(angle):
+    keys = ("modulus", "modulus_across", "shear_modulus", "poissons_ratio", "d33", "d31")
+    found = fibre_lamina(Fibres(*(FIBRES[key] for key in keys), angle, FIBRES["electrode_spacing"]))
+    C, per_volt = classical(angle)
+    np.testing.assert_allclose(found.C, C, rtol=1e-12, atol=1e-3)
+    np.testing.assert_allclose(found.per_volt, per_volt, rtol=1e-12, atol=1e-9 * np.abs(per_volt).max())
+
+
+@pytest.mark.parametrize("angle", [np.pi / 4, -np.pi / 4, 0.4])
+def test_tube_with_fibres_at_an_angle_twists(link, angle):
+    """Layers on both faces of a tube, γ = r φ': (u', φ') of the section with stiffness and coupling of the layers."""
+    body, w, t = link(TUBE), 0.01, FIBRES["thickness"]
+    _, rotation = tip(body, [layout(bends="twist", face="both", fibre_angle=angle)])
+    C, n = classical(angle)
+    r = 0.01
+    A, S, I = (2 * w * ((r + t) ** k - r**k) / k for k in (1, 2, 3))  # noqa: E741
+    area, moment = np.pi * (0.01**2 - 0.009**2), np.pi / 2 * (0.01**4 - 0.009**4)
+    stiffness = np.diag([E * area, G * moment]) + np.array([[C[0, 0] * A, C[0, 1] * S], [C[0, 1] * S, C[1, 1] * I]])
+    _, twist = np.linalg.solve(stiffness, VOLT * np.array([n[0] * A, n[1] * S]))
+    assert rotation[0] == pytest.approx(twist * (END - START), rel=1e-6)
+    assert np.sign(rotation[0]) == np.sign(angle)
+    assert np.abs(rotation[1:]).max() < 1e-9 * abs(rotation[0])
+
+
+def test_thin_strip_with_fibres_at_45_degrees_twists_like_a_plate(link):
+    """κ_xy = 2φ' of plates: GJ φ' = 2 (h + t) w N_xs V/2 on each face; beyond the strip's edges GJ is St Venant's."""
+    h, b, w, t = 0.001, 0.03, 0.02, FIBRES["thickness"]
+    body = link(rectangle(h, b))
+    _, rotation = tip(body, [layout(bends="twist", face="both", fibre_angle=np.pi / 4, width=w, structural=False)])
+    N_xs = classical(np.pi / 4)[1][1] * t
+    GJ = G * b * h**3 / 3 * (1 - 0.63025 * h / b)  # Timoshenko & Goodier, Theory of Elasticity, §109
+    expected = 2 * w * (h + t) * N_xs * VOLT / GJ * (END - START)
+    assert rotation[0] == pytest.approx(expected, rel=1e-5)
+
+
+@pytest.mark.parametrize("ratio", [0.05, 0.3, 1.0, 2.0, 7.0])
+def test_shear_around_a_rectangle(ratio):
+    """Twice the area is the circulation of the shear of unit twist (Timoshenko & Goodier, §102)."""
+    h, b = ratio * 0.01, 0.01
+    around = 2 * (b * surface_shear(h, b, b) + h * surface_shear(b, h, h))
+    assert around == pytest.approx(2 * h * b, rel=1e-4)
+
+
+def test_fibres_along_the_axis_bend_as_plain_ceramic_does(link):
+    """E_1 d33 (t/s) in the place of E d31, with the stiffness of E_1."""
+    body = link(rectangle(0.006, 0.014))
+    fibres = layout(face="both", fibre_angle=0.0)
+    d31 = FIBRES["d33"] * FIBRES["thickness"] / FIBRES["electrode_spacing"]
+    plain = layout(face="both", modulus=FIBRES["modulus"], d31=d31, thickness=FIBRES["thickness"])
+    np.testing.assert_allclose(tip(body, [fibres])[0], tip(body, [plain])[0], rtol=1e-9, atol=1e-15)
+
+
+def test_layouts_side_by_side_are_one_layout(link):
+    body = link(rectangle(0.006, 0.014), 8)
+    one = layout(centers=[0.1, 0.22, 0.34], length=0.06, face="+y")
+    parts = [layout(name=f"part{k}", centers=[x], length=0.06, face="+y") for k, x in enumerate((0.1, 0.22, 0.34))]
+    V = [30.0, -70.0, 50.0]
+    for found, expected in zip(tip(body, parts, V), tip(body, [one], V), strict=True):
+        np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-13)
+
+
+def test_both_faces_driven_apart_are_the_layout_on_both(link):
+    """Two layouts on the same stretch of the link, a little longer one below: they share it, and stretch cancels."""
+    body = link(rectangle(0.006, 0.014), 8)
+    both = tip(body, [layout(face="both")])
+    apart = tip(body, [layout(name="above", face="+y"), layout(name="below", face="-y")])
+    np.testing.assert_allclose(apart[0], both[0], atol=1e-9 * np.abs(both[0]).max())
+
+
+def test_overlap_of_layouts_is_shared(link):
+    """Of patches that overlap in part each stretch has its own composite section: curvatures add up to the tip."""
+    h, b = 0.006, 0.014
+    body = link(rectangle(h, b), 8)
+    long, short = layout(name="long", face="both"), layout(name="short", bends="out-of-plane", face="both",
+                                                           centers=[0.16], length=0.08)  # fmt: skip
+    together = tip(body, [long, short])[0]
+    alone = tip(body, [long])[0] + tip(body, [short])[0]  # planes do not feel each other
+    np.testing.assert_allclose(together, alone, rtol=1e-7, atol=1e-12)
+
+
+def test_round_links_do_not_mix_their_planes(link):
+    """Frequencies in the two planes are equal; patches in one leave the other's modes alone, payload or not."""
+    body = link(TUBE)
+    spatial = patched_body(
+        from_modal_body("link", body), body, placed_patches(SCENE, [layout(structural=True, density=7600.0)], body)
+    )
+    families = np.array(body.family)
+    assert not spatial.modal_transform[families[:, None] != families].any()
+
+
+def test_mass_of_layers(link):
+    """∫ρ(y² + z²) over the layers; modes stay orthonormal."""
+    body = link(rectangle(0.006, 0.014))
+    keys = {"count": 5, "length": 0.05, "structural": True, "density": 7600.0, "face": "both"}
+    spatial = patched_body(from_modal_body("link", body), body, placed_patches(SCENE, [layout(**keys)], body))
+    A, I = 2 * 0.01 * 0.5e-3, 2 * 0.01 * (0.0035**3 - 0.003**3) / 3  # noqa: E741
+    assert spatial.mass - body.mass == pytest.approx(5 * 0.05 * 7600.0 * A, rel=1e-9)
+    layers = 5 * 0.05 * 7600.0 * (I + A * 0.01**2 / 12)
+    assert spatial.J_spin - body.J_spin == pytest.approx(layers, rel=1e-9)
+    np.testing.assert_allclose(spatial.S_bar_kl.trace(axis1=0, axis2=1) + spatial.S_spin, np.eye(len(body.family)),
+                               atol=1e-9)  # fmt: skip
+
+
+def test_voltages_of_two_planes_do_not_disturb_each_other(link):
+    """Each plane finds its voltages as if alone; torsion and stretch are left as they are, mode by mode."""
+    body = link(rectangle(0.006, 0.014))
+    spatial = from_modal_body("link", body)
+    side, up = (
+        layout(name="side", count=4, length=0.05, limit=200.0),
+        layout(name="up", bends="out-of-plane", count=3, length=0.05, limit=200.0),
+    )
+    F_p = np.random.default_rng(0).standard_normal((3, spatial.n_modes))
+    together = link_patches(SCENE, [side, up], body, spatial)
+    found = together.voltages(F_p)
+    for one in (side, up):
+        alone = link_patches(SCENE, [one], body, spatial).voltages(F_p)[one.label]
+        np.testing.assert_allclose(found[one.label].required, alone.required, rtol=1e-8, atol=1e-8 * alone.largest)
+        np.testing.assert_allclose(found[one.label].within_limit, alone.within_limit, atol=1e-4)
+    unmet = together.unmet(F_p, np.concatenate([found[name].within_limit for name in ("side", "up")], axis=1))
+    left = np.isin(body.family, ("torsion", "axial"))
+    np.testing.assert_allclose(unmet[:, left], F_p[:, left], rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("keys", "message"),
+    [
+        ({"bends": "twist"}, "plain piezoceramic strains alike in all directions of its plane and twists at no angle"),
+        ({"bends": "twist", "fibre_angle": 0.0}, "expected fibers at an angle that shear under a voltage"),
+        ({"bends": "twist", "fibre_angle": "90*deg"}, "expected fibers at an angle that shear under a voltage"),
+        ({"bends": "out-of-plane", "face": "+y"}, r'expected face "\+z", "-z", "both"'),
+        ({"face": "-z"}, r'expected face "\+y", "-y", "both" with bends = "in-plane"'),
+        ({"d33": 4e-10}, r'expected the keys "fibre_angle", "modulus_across"'),
+        ({"fibre_angle": 0.3, "poissons_ratio": 1.5}, "expected a poissons_ratio between -1.38 and 1.38"),
+        ({"bends": "sideways"}, "in-plane"),
+    ],
+)
+def test_layouts_that_do_nothing_or_contradict_themselves(keys, message):
+    with pytest.raises(InputError, match=message):
+        layout(**keys)
+
+
+def test_isotropic_layers_twist_at_no_angle():
+    """Alike along and across, moduli of an isotropic layer: no shear under a voltage at any angle."""
+    alike = {"d33": 110e-12, "d31": 110e-12, "modulus": 60e9, "modulus_across": 60e9, "poissons_ratio": 0.3}
+    for angle in np.linspace(0.1, 3.0, 7):
+        with pytest.raises(InputError, match="expected fibers at an angle that shear under a voltage"):
+            layout(bends="twist", fibre_angle=float(angle), **alike, shear_modulus=60e9 / 2.6)
+
+
+def test_patches_that_do_not_fit_their_link(link):
+    body = link(rectangle(0.006, 0.014))
+    spatial = from_modal_body("link", body)
+    with pytest.raises(InputError, match=r'pzt "up": expected patches within the link'):
+        link_patches(SCENE, [layout(name="up", centers=[0.39], length=0.06)], body, spatial)
+    with pytest.raises(InputError, match=r"expected as many patches as modes \(\d+\) or more, found 1"):
+        check_reach(SCENE, link_patches(SCENE, [layout(allocation="exact")], body, spatial))
+    old = replace(body, stations=replace(body.stations, width=None, outline=None))
+    with pytest.raises(InputError, match="recompute it from its link file"):
+        link_patches(SCENE, [layout(bends="out-of-plane")], old, spatial)
+    upright = link(rectangle(0.006, 0.014), 4, "out-of-plane-bending")
+    for allocation in ("exact", "least-squares"):
+        with pytest.raises(InputError, match=r'bends: expected modes of the link that patches for "in-plane" reach'):
+            link_patches(SCENE, [layout(allocation=allocation)], upright, from_modal_body("link", upright))
+    with pytest.raises(InputError, match="expected no weights with other layouts"):
+        link_patches(SCENE, [layout(name="a", point_weights={"tip": 1.0}), layout(name="b", bends="out-of-plane")],
+                     body, spatial)  # fmt: skip

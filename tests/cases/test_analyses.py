@@ -1,0 +1,243 @@
+"""Analyses of scenes in space beside pcid, through `ffrobot solve`: an independent code's numbers, and identities."""
+
+import warnings
+
+import numpy as np
+import pytest
+from robots_3d import random_spatial_scene
+from space import close, solved, write_scene
+from spatial_checkpoints import load
+
+import ffrobot
+
+FCID = ('kind = "pcid"', 'kind = "fcid"\nshape = "zero"')
+STATIC = '\n[[analysis]]\nname = "rest"\nkind = "static"\n'
+
+
+def rows_at(file, analysis, samples):
+    """The outputs at which the samples are."""
+    time = file[f"{analysis}/time"][()]
+    rows = [int(np.abs(time - sample["t"]).argmin()) for sample in samples]
+    np.testing.assert_allclose(time[rows], [sample["t"] for sample in samples], atol=1e-12)
+    return rows
+
+
+@pytest.mark.parametrize("name", ["arm3_line", "arm6"])
+def test_links_that_are_held_straight(name, tmp_path, ffrobot):
+    """FCID with p = 0 is algebraic: to rounding, position and pose alike."""
+    samples = load(f"{name}_fcid")["samples"]
+    with solved(ffrobot, write_scene(f"{name}_static", tmp_path, FCID)) as file:
+        rows, group = rows_at(file, "inverse", samples), file["inverse"]
+        assert group.attrs["kind"] == "fcid"
+        for number in range(len(samples[0]["joints"])):
+            joint = group[f"joints/q{number + 1}"]
+            for key, dataset in (("joints", "coordinate"), ("joint_rates", "rate"), ("F_a", "moment")):
+                expected = np.array([sample[key] for sample in samples])
+                found = joint[dataset][()][rows]
+                np.testing.assert_allclose(found, expected[:, number], atol=1e-11 * np.abs(expected).max())
+        for body in samples[0]["F_p"]:
+            expected = np.array([sample["F_p"][body] for sample in samples])
+            found = group[f"bodies/{body}/modal_force"][()][rows]
+            np.testing.assert_allclose(found, expected, atol=1e-11 * np.abs(expected).max())
+            assert not np.any(group[f"bodies/{body}/modal"])
+        assert np.max(group["constraint_violation"]) < 1e-11
+
+
+@pytest.mark.parametrize("name", ["arm3_line_static", "arm6_static"])
+def test_equilibrium_is_where_static_starts_begin(name, tmp_path, ffrobot):
+    """Paths that begin from rest: the first sample of an independent code."""
+    sample = load(name)["samples"][0]
+    scene = write_scene(name, tmp_path)
+    text = scene.read_text()
+    scene.write_text(text[: text.index("[[analysis]]")] + STATIC)
+    with solved(ffrobot, scene) as file:
+        group = file["rest"]
+        np.testing.assert_array_equal(group["time"], [0.0])
+        close(group["trajectories/path/force"], [sample["path_force"][: group["trajectories/path/force"].shape[1]]])
+        moments = [group[f"joints/q{k + 1}/moment"][0] for k in range(len(sample["moments"]))]
+        close(np.array(moments), sample["moments"])
+        for name, body in sample["bodies"].items():
+            for key in ("modal", "modal_force"):
+                if key in body:
+                    close(group[f"bodies/{name}/{key}"], [body[key]])
+            assert not np.any(group[f"bodies/{name}/velocity"])
+
+
+def test_shape_with_which_motors_are_enough(tmp_path, ffrobot):
+    """Where the path has come to rest, shape = "static" asks nothing of patches, which straight links need there."""
+    change = ('kind = "pcid"', 'kind = "fcid"\nshape = "static"')
+    straight = '\n[[analysis]]\nname = "straight"\nkind = "fcid"\nshape = "zero"\nend = 0.6\noutput_step = 0.1\n'
+    with solved(ffrobot, write_scene("arm3_line_static", tmp_path, change, more=straight)) as file:
+        for body in ("upper", "fore"):
+            F_p, of_straight = (file[f"{name}/bodies/{body}/modal_force"][-1] for name in ("inverse", "straight"))
+            assert np.abs(of_straight).max() > 0.1
+            assert np.abs(F_p).max() < 1e-6 * np.abs(of_straight).max()
+            assert np.abs(file[f"inverse/bodies/{body}/modal"][-1]).max() > 0
+
+
+def forward_scene(folder):
+    """Checkpoint arm3_forward: moments given to the motors, no path."""
+    data = load("arm3_forward")
+    scene = write_scene("arm3_line_undeformed", folder)
+    text = scene.read_text()
+    guess = ", ".join(f"q{k} = {x}" for k, x in enumerate(data["joints_at_0"], 1))
+    lines = [text[: text.index("[initial]")], f"[initial]\njoints = {{ {guess} }}\n"]
+    for k, (a, b, w) in enumerate(data["motor_parameters"], 1):
+        lines.append(f'[[load]]\njoint = "q{k}"\nmoment = "{a} + ({b})*sin({w}*t)"\n')
+    lines.append('[[analysis]]\nname = "free"\nkind = "forward"\nend = 0.3\noutput_step = 0.02\ntolerance = 1e-8\n')
+    scene.write_text("\n".join(lines))
+    return scene
+
+
+def test_forward_motion_under_given_moments(tmp_path, ffrobot):
+    samples = load("arm3_forward")["samples"]
+    with solved(ffrobot, forward_scene(tmp_path)) as file:
+        group = file["free"]
+        for key, dataset in (("joints", "coordinate"), ("joint_rates", "rate")):
+            found = np.column_stack([group[f"joints/q{k}/{dataset}"] for k in (1, 2, 3)])
+            close(found, [sample[key] for sample in samples])
+        close(group["points/fore.tip/position"], [sample["tip_position"] for sample in samples])
+        modal = np.hstack([group[f"bodies/{body}/modal"] for body in ("upper", "fore")])
+        expected = np.array([sample["modal"] for sample in samples])
+        for found, wanted in zip(modal.T, expected.T, strict=True):
+            close(found, wanted)
+        assert "trajectories" not in group
+        assert "moment" not in group["joints/q1"]
+
+
+def test_energy_of_forward_motion_is_what_motors_and_damping_do(tmp_path, ffrobot):
+    """E(t) − E(0) = ∫ (Σ τ α̇ − ṗᵀDṗ) dt, by Simpson's rule over fine outputs."""
+    data, scene = load("arm3_forward"), forward_scene(tmp_path)
+    scene.write_text(scene.read_text().replace("output_step = 0.02", "output_step = 2e-5"))
+    with solved(ffrobot, scene) as file:
+        group, t = file["free"], file["free/time"][()]
+        energy = sum(group[f"energy/{key}"][()] for key in ("kinetic", "strain", "gravitational"))
+        power = -group["energy/dissipated_power"][()]
+        for k, (a, b, w) in enumerate(data["motor_parameters"], 1):
+            power = power + (a + b * np.sin(w * t)) * group[f"joints/q{k}/rate"][()]
+        h = t[1] - t[0]
+        work = h / 3 * np.cumsum(power[:-2:2] + 4 * power[1:-1:2] + power[2::2])
+        assert np.ptp(energy) > 0.01
+        np.testing.assert_allclose(energy[2::2] - energy[0], work, atol=2e-8 * np.ptp(energy))
+
+
+def rigid(text):
+    """The arm of the checkpoints with rigid links of about the same masses."""
+    for name, length, mass in (("upper", 0.7, 0.06), ("fore", 0.6, 0.04)):
+        across = mass * length**2 / 12
+        body = f"mass = {mass}, center = [{length / 2}, 0.0, 0.0], inertia = [1e-5, {across}, {across}]"
+        points = f"points = {{ root = [0.0, 0.0, 0.0], tip = [{length}, 0.0, 0.0] }}"
+        text = text.replace(f'link = "{name}.toml"', f"rigid = {{ {body}, {points} }}")
+    return text
+
+
+REPLAY = '\n[[analysis]]\nname = "again"\nkind = "forward"\nactuation = "inverse"\napply = "joints"\ntolerance = 1e-8\n'
+
+
+@pytest.mark.parametrize("kind", ["pcid", "fcid"])
+def test_moments_of_rigid_arm_carry_it_along_its_path(kind, tmp_path, ffrobot):
+    scene = write_scene("arm3_line_undeformed", tmp_path, *([FCID] if kind == "fcid" else []), more=REPLAY)
+    scene.write_text(rigid(scene.read_text()))
+    with solved(ffrobot, scene) as file:
+        close(file["again/points/fore.tip/position"], file["inverse/points/fore.tip/position"])
+        for k in (1, 2, 3):
+            for key in ("coordinate", "rate"):
+                close(file[f"again/joints/q{k}/{key}"], file[f"inverse/joints/q{k}/{key}"])
+        assert file["again"].attrs["actuation"] == "inverse"
+        assert np.ptp(file["again/joints/q1/coordinate"]) > 0.5
+        close(file["inverse/momentum/linear"], file["again/momentum/linear"])
+
+
+@pytest.mark.parametrize("name", ["arm3_line_undeformed", "slider_crank_3d", "arm5_tool_axis"])
+def test_forces_on_paths_bring_the_motion_again(name, tmp_path, ffrobot):
+    """Links that vibrate, a loop, a tool axis: the robot alone under the path's forces moves as on the path."""
+    scene = write_scene(name, tmp_path, more=REPLAY.replace('"joints"', '"trajectory"'))
+    with solved(ffrobot, scene) as file:
+        for body, group in file["inverse/bodies"].items():
+            for key in ("position", "modal"):
+                if group[key].size:
+                    close(file[f"again/bodies/{body}/{key}"], group[key][()], 1e-3 if key == "position" else 1e-12)
+        for joint, group in file["inverse/joints"].items():
+            if "coordinate" in group:
+                close(file[f"again/joints/{joint}/coordinate"], group["coordinate"][()], 0.1)
+            largest = np.abs(group["reaction"]).max()
+            np.testing.assert_allclose(file[f"again/joints/{joint}/reaction"], group["reaction"], atol=2e-5 * largest)
+        told = list(file["again"].attrs["warnings"])  # the reference has no stiffening
+        assert all("geometric stiffening is off" in text for text in told)
+
+
+def test_motors_keep_within_their_limits(tmp_path, ffrobot):
+    """A motor whose limit is below all that is needed lets the arm sink; with one that is above it goes as without."""
+    sunk = {}
+    for limit in (10.0, 0.1):
+        change = ('name = "q2"\n', f'name = "q2"\nmoment_limit = {limit}\n')
+        scene = write_scene("arm3_line_undeformed", tmp_path / f"{limit}", change, more=REPLAY + "limits = true\n")
+        scene.write_text(rigid(scene.read_text()).replace("tolerance = 1e-08", "tolerance = 1e-6"))
+        with solved(ffrobot, scene) as file:
+            tip, path = (file[f"{name}/points/fore.tip/position"][()] for name in ("again", "inverse"))
+            sunk[limit] = (path - tip)[:, 2].max()
+    assert abs(sunk[10.0]) < 1e-6
+    assert sunk[0.1] > 0.1
+
+
+def test_shape_that_is_given(tmp_path, ffrobot):
+    """p as asked for; what holds it is what the equations of one mode say where nothing else moves."""
+    given = 'kind = "fcid"\nshape = "given"\nmodal = { fore = ["1e-3*sin(20*t)"] }'
+    scene = write_scene("arm3_line_static", tmp_path, ('kind = "pcid"', given))
+    with solved(ffrobot, scene) as file:
+        group, t = file["inverse"], file["inverse/time"][()]
+        np.testing.assert_allclose(group["bodies/fore/modal"][:, 0], 1e-3 * np.sin(20 * t), atol=1e-15)
+        np.testing.assert_allclose(group["bodies/fore/modal_velocity"][:, 0], 0.02 * np.cos(20 * t), atol=1e-13)
+        assert not np.any(group["bodies/fore/modal"][:, 1:])
+        assert np.max(group["constraint_violation"]) < 1e-11
+
+
+def test_fcid_needs_a_path_for_every_freedom(tmp_path, ffrobot):
+    scene = write_scene("arm3_line_static", tmp_path, FCID)
+    text = scene.read_text()
+    scene.write_text("\n".join(line for line in text.splitlines() if not line.startswith("z = ")))
+    done = ffrobot("solve", scene)
+    assert done.returncode == 2
+    assert 'expected as many trajectory components as the mechanism has degrees of freedom (3) for "fcid", found 2' in (
+        done.stderr.replace("\n", " ")
+    )
+
+
+@pytest.mark.parametrize(("seed", "number"), [(301, 1), (303, 17)])
+def test_equilibrium_whose_forces_are_all_of_the_links(seed, number):
+    """Upright axes hold nothing: what is left of gravity and elasticity together is rounding, the same as all of it."""
+    _, scene = random_spatial_scene(seed, number, [("rest", 1e-3, "dop853")], 60_000)
+    results = ffrobot.solve(scene)
+    assert scene.initial.state == "static"
+    modal = np.abs(results["rest/bodies/b1/modal"][0]).max()
+    assert modal > 0.0
+    assert np.abs(results["rest/bodies/b1/modal_velocity"][0]).max() < 1e-9 * modal
+
+
+@pytest.mark.parametrize("kind", ["static", "linear"])
+@pytest.mark.parametrize(
+    ("upper", "lower", "is_stable"), [(1.4, 0.1, True), (-1.4, 3.0, False), (-1.4, 0.1, False), (1.4, 3.0, False)]
+)
+def test_a_double_pendulum_has_one_stable_equilibrium(kind, upper, lower, is_stable):
+    """Both bars down, of four; joints about y carry x to -z."""
+    bar = {"mass": 1.0, "inertia": [0.1] * 3, "center": [0.25, 0, 0], "points": {"root": [0] * 3, "tip": [0.5, 0, 0]}}
+    hinge = {"type": "revolute", "axis": [0.0, 1.0, 0.0], "motor": False}
+    scene = ffrobot.make_scene(
+        name="pendulum",
+        space="spatial",
+        gravity=[0.0, 0.0, -9.81],
+        body=[{"name": "a", "rigid": bar}, {"name": "b", "rigid": bar}],
+        joint=[
+            {"name": "A", "between": ["ground", "a.root"], **hinge},
+            {"name": "B", "between": ["a.tip", "b.root"], **hinge},
+        ],
+        initial={"joints": {"A": upper, "B": lower}},
+        analysis=[{"name": "rest", "kind": kind}],
+    )
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ffrobot.FfrobotWarning)
+        results = ffrobot.solve(scene)
+    told = [text for text in results.warnings.get("rest", ()) if "equilibrium is unstable" in text]
+    assert len(told) == (not is_stable)
+    angles = [results[f"rest/joints/{name}/coordinate"][0] for name in "AB"]
+    np.testing.assert_allclose(angles, [np.copysign(np.pi / 2, upper), np.pi * (lower > 1)], atol=1e-9)

@@ -1,0 +1,106 @@
+"""Free bodies in space: an independent code's motion, and what cannot change: momentum and energy."""
+
+import numpy as np
+import pytest
+from space import FOLDER, close, solved
+from spatial_checkpoints import load
+
+from ffrobot.common.rotations import of_quaternion
+from ffrobot.mbs.analysis.drive import drive_robot
+from ffrobot.mbs.analysis.forward import Forward
+from ffrobot.mbs.model.model import build_model
+from ffrobot.mbs.quantities.energy import totals
+from ffrobot.mbs.quantities.motion import RobotMotion
+from ffrobot.mbs.solve.state import State
+from ffrobot.run.bodies import load_bodies
+from ffrobot.scene.load import validated_scene
+
+RIGID = """
+name = "top"
+space = "spatial"
+gravity = [0.0, 0.0, 0.0]
+[[body]]
+name = "top"
+rigid = {{ mass = {mass}, center = [0.0, 0.0, 0.0], inertia = {inertia}, points = {{ middle = [0.0, 0.0, 0.0] }} }}
+[[joint]]
+name = "floats"
+type = "free"
+between = ["ground", "top.middle"]
+[initial]
+joint_rates = {{ floats = [0.0, 0.0, 0.0, {omega}] }}
+[[analysis]]
+name = "spin"
+kind = "forward"
+end = 4.0
+output_step = 0.1
+tolerance = 1e-8
+"""
+
+
+def test_rigid_top(tmp_path, ffrobot):
+    """Euler's equations through the command; joint_rates of a free joint are in the axes of its body."""
+    data, scene = load("top_rigid"), tmp_path / "scene.toml"
+    samples = data["samples"]
+    omega = ", ".join(str(x) for x in samples[0]["angular_velocity_body"])
+    scene.write_text(RIGID.format(mass=data["mass"], inertia=data["inertia"], omega=omega))
+    with solved(ffrobot, scene) as file:
+        group = file["spin/bodies/top"]
+        e, expected = group["quaternion"][()], np.array([sample["quaternion"] for sample in samples])
+        np.testing.assert_allclose(np.abs(np.sum(e * expected, axis=1)), 1, atol=1e-12)
+        spin = np.einsum("tji,tj->ti", of_quaternion(e), group["angular_velocity"][()])
+        close(spin, [sample["angular_velocity_body"] for sample in samples])
+        close(file["spin/momentum/angular"], [sample["angular_momentum"] for sample in samples])
+        np.testing.assert_allclose(file["spin/energy/kinetic"], samples[0]["energy"], rtol=1e-8)
+
+
+@pytest.fixture(scope="module")
+def spinner():
+    """The model of a free link in all families, and its state at the first sample, centre of mass at rest."""
+    tables = {
+        "name": "spinner", "space": "spatial", "gravity": (0.0, 0.0, 0.0),
+        "body": ({"name": "spinner", "link": "links/spinner.toml"},),
+        "analysis": ({"name": "spin", "kind": "forward", "end": 1.0, "output_step": 1.0},),
+    }  # fmt: skip
+    scene = validated_scene(tables, FOLDER / "scene.toml", "")
+    model = build_model(scene, [body.spatial for body in load_bodies(scene, lambda _: None)])
+    sample, (node,) = load("top_flexible")["samples"][0], model.tree.nodes
+    q, v = np.zeros(model.tree.n_q), np.zeros(model.tree.n_v)
+    q[node.q], q[node.p_q] = [*sample["position"], *sample["quaternion"]], sample["modal"]
+    v[3:6] = sample["angular_velocity_body"]
+    v[:3] = -totals(motion_of(model, [0.0], q[None], v[None]))[1].linear[0] / node.body.mass
+    return model, State(q, v)
+
+
+def motion_of(model, times, q, v):
+    return RobotMotion(model, np.array(times), q, v, 0 * v, np.zeros((len(q), 0)))
+
+
+def spun(spinner, end, step, tolerance):
+    model, start = spinner
+    analysis = Forward(name="spin", kind="forward", end=end, output_step=step, tolerance=tolerance)
+    run = drive_robot(model, analysis, start, lambda _: True)
+    assert run.status == "completed"
+    return motion_of(model, run.time, run.q, run.v)
+
+
+def test_flexible_top(spinner):
+    samples = load("top_flexible")["samples"]
+    motion = spun(spinner, samples[-1]["t"], samples[1]["t"], 1e-8)
+    body = motion.body("spinner")
+    modal = np.array([sample["modal"] for sample in samples])
+    for found, expected in zip(body.modal.T, modal.T, strict=True):
+        close(found, expected)
+    spin = np.einsum("tji,tj->ti", motion.frames[0].F, body.angular_velocity)
+    close(spin, [sample["angular_velocity_body"] for sample in samples])
+    close(body.position - body.position[0], np.array([x["position"] for x in samples]) - samples[0]["position"], 0.1)
+
+
+def test_momentum_and_energy_of_a_free_link_stay(spinner):
+    """Over 2 s, some 25 turns and hundreds of vibrations."""
+    motion = spun(spinner, 2.0, 0.1, 1e-8)
+    found, H = totals(motion)
+    energy = found.kinetic + found.strain
+    assert np.ptp(found.strain) > 0.01 * energy[0]
+    np.testing.assert_allclose(energy, energy[0], rtol=1e-6)
+    np.testing.assert_allclose(H.angular, H.angular[:1] + 0 * H.angular, atol=1e-6 * np.linalg.norm(H.angular[0]))
+    np.testing.assert_allclose(H.linear, 0, atol=1e-8)

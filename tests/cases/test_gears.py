@@ -1,0 +1,275 @@
+"""Compliant gears, in space: two masses on a spring, momentum and energy, the plane's numbers, acting again."""
+
+import numpy as np
+import planar_tables
+import pytest
+from checkpoints import CASES
+from scipy.integrate import simpson
+from space import write_scene
+
+import ffrobot
+from ffrobot.common.errors import InputError
+
+J, N, K, C = 3e-3, 9.0, 500.0, 0.4
+GIVES = {"gear_ratio": N, "rotor_inertia": J, "stiffness": K}
+GEARED = {"gear_ratio": 60.0, "rotor_inertia": 2e-4, "stiffness": 3e3, "damping": 2.0}
+RUN = {"name": "run", "kind": "forward", "end": 1.0, "output_step": 0.002, "tolerance": 1e-10, "integrator": "dop853"}
+FIRM = {"gear_ratio": 30.0, "rotor_inertia": 1e-4}
+SOFTER = FIRM | {"stiffness": 1e3, "damping": 0.7}
+STRAIGHT, AXIS = [0.0, 0.0, 0.0], np.array([0.48, -0.6, 0.64])  # of length 1
+
+
+def rigid(name, inertia, mass=1.0, center=STRAIGHT):
+    points = {"root": STRAIGHT, "tip": [0.5, 0.1, -0.2]}
+    return {"name": name, "rigid": {"mass": mass, "center": center, "inertia": inertia, "points": points}}
+
+
+def revolute(name, first, second, axis, **keys):
+    return {"name": name, "type": "revolute", "between": [first, second], "axis": list(axis), **keys}
+
+
+def scene(bodies, joints, *analyses, **tables):
+    found = {"name": "gears", "space": "spatial", "gravity": STRAIGHT, "body": bodies, "joint": joints}
+    return found | {"analysis": list(analyses)} | tables
+
+
+def solve(tables, folder, name="scene"):
+    return ffrobot.solve(planar_tables.write(tables, folder / f"{name}.toml"))
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_two_masses_turn_and_swing(tmp_path, turned):
+    """A moment τ behind the gear: the center of inertia turns with τ/(I_m + I), the twist goes as 1 − cos ωt.
+
+    ω² = k (1/I_m + 1/I). I_m = J N² where the rotor sits on the ground; on the body, that turns then (first of
+    `between`), u = (N − 1) γ̇' and I has its part: with coordinates q of the body and θ_m the kinetic energy is
+    ½ I q̇² + ½ J (N θ̇_m + q̇)², and q = −γ.
+    """
+    tau, inertia = 2.0, np.diag([0.3, 0.2, 0.4])
+    I = AXIS @ inertia @ AXIS  # noqa: E741
+    sides = ("b.root", "ground") if turned else ("ground", "b.root")
+    joint = revolute("O", *sides, AXIS, **GIVES)
+    with solve(scene([rigid("b", inertia.tolist())], [joint], RUN, load=[{"joint": "O", "moment": str(tau)}]),
+               tmp_path) as found:  # fmt: skip
+        t, gamma, motor = (found[f"run/{key}"] for key in ("time", "joints/O/coordinate", "joints/O/motor_angle"))
+        M = np.array([[N**2 * J, -N * J], [-N * J, I + J]]) if turned else np.diag([N**2 * J, I])
+        values, S = np.linalg.eigh(np.linalg.inv(np.linalg.cholesky(M)) @ (K * np.array([[1, -1], [-1, 1]]))
+                                   @ np.linalg.inv(np.linalg.cholesky(M)).T)  # fmt: skip
+        T = np.linalg.inv(np.linalg.cholesky(M)).T @ S  # modes of (θ_m, γ)
+        along = T.T @ [tau, 0.0]
+        omega = np.sqrt(values[1])
+        modal = np.stack([along[0] * t**2 / 2, along[1] / omega**2 * (1 - np.cos(omega * t))])
+        expected = T @ modal
+        assert abs(values[0]) < 1e-9 * values[1]
+        np.testing.assert_allclose(motor, expected[0], atol=1e-8 * np.abs(expected).max())
+        np.testing.assert_allclose(gamma, expected[1], atol=1e-8 * np.abs(expected).max())
+
+
+def free_arm(**keys):
+    """Two bodies on a free one, joints askew, rotors on links that turn: no axis is a principal one."""
+    bodies = [
+        rigid("base", [0.3, 0.2, 0.4], 2.0, [0.1, 0.0, 0.05]),
+        rigid("a", [0.05, 0.04, 0.03], 0.8, [0.2, 0.1, 0.0]),
+        rigid("b", [0.02, 0.05, 0.04], 0.5, [0.1, -0.1, 0.1]),
+    ]
+    soft = GIVES | {"stiffness": 1.0} | keys
+    first = revolute("A", "base.tip", "a.root", AXIS, **soft)
+    second = revolute("B", "b.root", "a.tip", [1.0, 0.5, 0.2], **soft)  # its rotor sits on b
+    return scene(bodies, [first, second], RUN, initial={"joint_rates": {"A": 2.0, "B": -3.0}})
+
+
+def test_momentum_and_energy_of_a_free_arm_are_kept(tmp_path):
+    with solve(free_arm(), tmp_path) as found:
+        for key in ("linear", "angular"):
+            momentum = found[f"run/momentum/{key}"]
+            np.testing.assert_allclose(momentum, momentum[:1] + 0 * momentum, atol=2e-8 * np.abs(momentum).max())
+        energy = found["run/energy/kinetic"] + found["run/energy/strain"]
+        assert np.ptp(found["run/energy/strain"]) > 0.01 * energy[0]
+        np.testing.assert_allclose(energy, energy[0], rtol=2e-8)
+
+
+def test_dampers_and_motors_make_up_the_energy(tmp_path):
+    tables = free_arm(damping=0.05) | {"load": [{"joint": joint, "moment": "5*sin(10*t)"} for joint in "AB"]}
+    with solve(tables, tmp_path) as found:
+        t, energy = found["run/time"], found["run/energy/kinetic"] + found["run/energy/strain"]
+        power = [
+            np.gradient(found[f"run/joints/{joint}/motor_angle"], t, edge_order=2) * 5 * np.sin(10 * t)
+            for joint in "AB"
+        ]
+        losses = simpson(found["run/energy/dissipated_power"], x=t)
+        assert losses > 0.02 * energy[0]
+        assert abs(simpson(sum(power), x=t) - losses - (energy[-1] - energy[0])) < 2e-4 * losses
+
+
+def test_planar_arm_with_gears_that_give_in_space(tmp_path):
+    """Inverse analysis and equilibrium of the two-link arm: numbers of the plane."""
+    analyses = [
+        {"name": "inverse", "kind": "fcid", "shape": "zero", "end": 1.0, "output_step": 0.005},
+        {"name": "rest", "kind": "static"},
+    ]
+    planar = planar_tables.read(CASES / "two_link" / "scene.toml")
+    planar.pop("pzt", None)
+    planar["joint"] = [joint | GEARED for joint in planar["joint"]]
+    planar["analysis"] = analyses
+    spatial = planar_tables.in_space(planar) | {"analysis": analyses}
+    spatial["initial"] = {"joints": {"O": 0.0, "A": 1.0471975511965976}}
+    with solve(planar, tmp_path, "planar") as plane, solve(spatial, tmp_path, "spatial") as space:
+        for joint in ("O", "A"):
+            for key in ("moment", "gear_moment", "motor_angle", "motor_rate"):
+                for analysis in ("inverse", "rest"):
+                    name = f"{analysis}/joints/{joint}/{key}"
+                    least = 1e-6 * np.abs(plane[f"inverse/joints/O/{key}"]).max()
+                    np.testing.assert_allclose(
+                        space[name], plane[name], atol=1e-7 * max(np.abs(plane[name]).max(), least), rtol=0
+                    )
+
+
+def test_motors_behind_gears_carry_out_an_inverse_analysis(tmp_path):
+    """The 3R arm with rigid links, rotors on links that move: their motors keep the tool on its path."""
+    tables = planar_tables.read(write_scene("arm3_line_undeformed", tmp_path))
+    stiff = {"gear_ratio": 20.0, "rotor_inertia": 2e-4, "stiffness": 2e3, "damping": 5.0}
+    tables["joint"] = [joint | stiff for joint in tables["joint"]]
+    tables["body"] = [
+        body if "rigid" in body else {"name": body["name"], **_rod(0.3, 0.7 if body["name"] == "upper" else 0.6)}
+        for body in tables["body"]
+    ]
+    tables["analysis"] = [
+        {"name": "inverse", "kind": "pcid", "end": 0.4, "output_step": 0.001, "tolerance": 1e-10},
+        RUN | {"actuation": "inverse", "apply": "joints", "end": 0.4},
+    ]
+    with solve(tables, tmp_path) as found:
+        for joint in (joint["name"] for joint in tables["joint"]):
+            twist = found[f"inverse/joints/{joint}/motor_angle"] - found[f"inverse/joints/{joint}/coordinate"]
+            assert np.abs(twist).max() > 5e-5
+            off = found[f"run/joints/{joint}/coordinate"] - found[f"inverse/joints/{joint}/coordinate"][::2]
+            assert np.abs(off).max() < 1e-9
+
+
+@pytest.mark.parametrize("second", [FIRM, SOFTER], ids=["firm", "soft"])
+@pytest.mark.parametrize("between", [("b.root", "a.tip"), ("a.tip", "b.root")])
+@pytest.mark.parametrize(("kind", "followed"), [("pcid", "joint"), ("pcid", "motor"), ("fcid", "joint")])
+def test_inverse_analyses_account_for_what_gears_store_and_lose(tmp_path, kind, followed, between, second):
+    """What motors put in is in kinetic, strain and gravitational energy, or dissipated; springs k δ² / 2, c δ̇².
+
+    The rotor of the second joint sits on either body, both of which move.
+    """
+    soft = GEARED | {"viscous_friction": 0.3}
+    joints = [
+        revolute("O", "ground", "a.root", AXIS, **soft),
+        revolute("A", *between, [0.3, 1.0, -0.2], **second, viscous_friction=0.1),
+    ]
+    bodies = [rigid(name, [0.02, 0.03, 0.04], 1.5, [0.2, 0.05, -0.1]) for name in "ab"]
+    paths = [
+        {"name": "o", followed: "O", "value": "0.8*sin(pi*t)**4"},
+        {"name": "a", followed: "A", "value": "0.5-0.6*sin(pi*t)**4"},
+    ]
+    run = {"name": "run", "kind": kind, "end": 1.0, "output_step": 1e-3, "tolerance": 1e-10}
+    run |= {"shape": "zero"} if kind == "fcid" else {"integrator": "dop853"}
+    tables = scene(bodies, joints, run, trajectory=paths, initial={"state": "static", "joints": {"A": 0.5}})
+    with solve(tables | {"gravity": [1.0, -3.0, 9.0]}, tmp_path) as found:
+        t = found["run/time"]
+        twist, rate = (
+            found[f"run/joints/O/motor_{key}"] - found[f"run/joints/O/{of}"]
+            for key, of in (("angle", "coordinate"), ("rate", "rate"))
+        )
+        if second is FIRM:
+            np.testing.assert_allclose(found["run/energy/strain"], 1500 * twist**2, rtol=1e-9, atol=1e-15)
+        moment = 3e3 * twist + 2.0 * rate
+        np.testing.assert_allclose(found["run/joints/O/gear_moment"], moment, atol=1e-9 * np.abs(moment).max())
+        power = found["run/joints/O/moment"] * found["run/joints/O/motor_rate"]
+        power = (
+            power + found["run/joints/A/moment"] * found[f"run/joints/A/{'rate' if second is FIRM else 'motor_rate'}"]
+        )
+        energy = sum(found[f"run/energy/{key}"] for key in ("kinetic", "strain", "gravitational"))
+        left = power - found["run/energy/dissipated_power"]
+        for last in (250, 500, 800):
+            assert simpson(left[: last + 1], x=t[: last + 1]) == pytest.approx(energy[last] - energy[0], abs=1e-8)
+        assert np.ptp(energy) > 1.0
+
+
+def test_motors_behind_gears_are_judged_between_outputs(tmp_path):
+    """γ = A sin ωt against inertia I: k δ = I γ̈ and τ = (I + J N²) γ̈ + J N² δ̈, θ̇_m = γ̇ + δ̇; peaks at no output."""
+    A, w, I = 0.3, 7.4, 0.4  # noqa: E741
+    joint = revolute("O", "ground", "b.root", AXIS, **GIVES, moment_limit=100.0, speed_limit=9.0)
+    path = {"name": "o", "joint": "O", "value": f"{A}*sin({w}*t)"}
+    run = {"name": "run", "kind": "fcid", "shape": "zero", "end": 1.0, "output_step": 0.05}
+    tables = scene([rigid("b", np.diag([I, I, I]).tolist())], [joint], run, trajectory=[path])
+    with solve(tables, tmp_path) as found:
+        judged = found.attributes("run/feasibility/joints/O")
+        moment = A * w**2 * abs(I + J * N**2 - J * N**2 * I * w**2 / K)
+        assert np.abs(found["run/joints/O/moment"]).max() < 0.998 * moment
+        assert judged["moment"] == pytest.approx(moment, rel=1e-4)
+        assert judged["speed"] == pytest.approx(A * w * (1 - I * w**2 / K), rel=1e-4)
+
+
+@pytest.mark.parametrize("tolerance", [1e-9, 1e-10])
+def test_moments_that_set_out_from_nothing(tmp_path, tolerance):
+    """Springs that hold nothing, in no gravity: moments of their rounding are not what steps follow.
+
+    The springs vibrate at 700 rad/s, 110 times in all; before, the run ended at its start in steps of nothing.
+    """
+    stiff = {"gear_ratio": 60.0, "rotor_inertia": 2e-4, "stiffness": 4e4}
+    joints = [
+        revolute("O", "ground", "a.root", [0.0, 0.0, 1.0], **stiff),
+        revolute("A", "a.tip", "b.root", [0.0, 0.0, 1.0], **stiff),
+    ]
+    bodies = [{"name": name, **_rod(1.0, 1.0)} for name in "ab"]
+    load = [{"joint": "O", "moment": "4*sin(2*t)**4"}, {"joint": "A", "moment": "sin(2*t)**4"}]
+    run = RUN | {"tolerance": tolerance, "output_step": 0.05, "max_steps": 2000}
+    tables = scene(bodies, joints, run, load=load, initial={"joints": {"O": 0.4, "A": 0.9}})
+    with solve(tables, tmp_path) as found:
+        for joint in "OA":
+            motor, link = (found[f"run/joints/{joint}/{key}"] for key in ("motor_angle", "coordinate"))
+            assert np.abs(motor - link).max() < 4.0 / 4e4  # the largest moment on the softest spring
+
+
+def wrist_at_rest():
+    """A tube that carries a wrist and a tool straight down behind stiff gears; motors set out smoothly.
+
+    The springs make more accelerations of the rounding of angles than a share of the tolerance that falls with the step
+    has room for.
+    """
+    strain_wave = {"gear_ratio": 101.0, "stiffness": 5e3, "damping": 0.6, "rotor_inertia": 1.5e-5}
+    hand = rigid("hand", [0.02, 0.04, 0.04], 6.0, [0.1, 0.0, 0.0])
+    tool = rigid("tool", [0.007, 0.009, 0.009], 5.0, [0.06, 0.0, 0.0])
+    hand["rigid"]["points"]["tip"] = [0.2, 0.0, 0.0]
+    joints = [
+        revolute("elbow", "ground", "forearm.root", [0.0, 1.0, 0.0], **strain_wave | {"stiffness": 1.6e4}),
+        revolute("wrist", "forearm.tip", "hand.root", [0.0, 1.0, 0.0], **strain_wave),
+        revolute("roll", "hand.tip", "tool.root", [1.0, 0.0, 0.0], **strain_wave),
+    ]
+    start = {"elbow": 0.6, "wrist": 0.9708, "roll": -0.24}
+    paths = [
+        {"name": name, "motor": name, "via": [angle, angle + 0.5], "profile": "rest-to-rest", "duration": 0.27}
+        for name, angle in start.items()
+    ]
+    lift = {"name": "lift", "kind": "pcid", "end": 0.3, "output_step": 0.005, "tolerance": 1e-6, "max_steps": 40_000}
+    bodies = [{"name": "forearm", "link": str(CASES / "arm_6r" / "forearm.toml")}, hand, tool]
+    tables = scene(bodies, joints, lift, initial={"state": "static", "joints": start}, trajectory=paths)
+    return tables | {"gravity": [0.0, 0.0, -9.81]}
+
+
+def test_springs_at_rest_do_not_hold_the_steps(tmp_path):
+    """Rounding of the angles at their ends once drove steps below any size: 100 000 led to 0.6 ms."""
+    with solve(wrist_at_rest(), tmp_path) as found:
+        assert found.attributes("lift")["status"] == "completed"
+
+
+def _rod(mass, length):
+    inertia = [1e-6, mass * length**2 / 12, mass * length**2 / 12]
+    points = {"root": STRAIGHT, "tip": [length, 0.0, 0.0]}
+    return {"rigid": {"mass": mass, "center": [length / 2, 0.0, 0.0], "inertia": inertia, "points": points}}
+
+
+@pytest.mark.parametrize(
+    ("keys", "told"),
+    [
+        ({"stiffness": 10.0}, "rotor_inertia above 0 with stiffness"),
+        ({"damping": 1.0}, '"damping" only with stiffness'),
+        (GIVES | {"motor": False}, "stiffness: expected a joint with a motor, found one without"),
+    ],
+)
+def test_what_is_missing_beside_a_spring_is_told(tmp_path, keys, told):
+    tables = scene([rigid("b", [0.1, 0.1, 0.1])], [revolute("O", "ground", "b.root", AXIS, **keys)], RUN)
+    with pytest.raises(InputError, match=told):
+        solve(tables, tmp_path)

@@ -1,0 +1,122 @@
+"""Links in pieces in space whose shape is prescribed, that motors alone move, or that get patches elsewhere.
+
+The plane is asked with links cut by hand and welded, which no code for links in pieces touches.
+"""
+
+from pathlib import Path
+
+import numpy as np
+from planar_tables import joint_keys
+
+import ffrobot
+from ffrobot.fe_models.link_file import LinkTable
+from ffrobot.fe_models.pieces import cut
+from ffrobot.mbs.fields.spelling import place
+
+S = "(10*(t/0.8)**3-15*(t/0.8)**4+6*(t/0.8)**5)"
+NAMES = "upper", "fore"
+LINK = {
+    "name": "link",
+    "material": {"youngs_modulus": 7e10, "poissons_ratio": 0.3, "density": 2700.0},
+    "geometry": {"kind": "beam", "length": 0.8, "section": {"shape": "rectangle", "height": 0.01, "width": 0.02}},
+    "mesh": {"elements": 8},
+    "reference": {"condition": "cantilever"},
+    "modes": {"count": 4, "family": "in-plane-bending"},
+}
+RUN = {"end": 0.8, "output_step": 0.04}
+STATIC = {"name": "static", "kind": "fcid", "shape": "static", **RUN}
+ZERO = {"name": "zero", "kind": "fcid", "shape": "zero", **RUN}
+ALONE = {"name": "alone", "kind": "motors-only", "tolerance": 1e-9, "output": "redefined", "factor": 0.0, **RUN}
+PATCHES = {"body": "fore", "count": 4, "length": 0.1, "width": 0.02, "thickness": 5e-4, "modulus": 63e9} | {
+    "d31": 1.1e-10, "allocation": "least-squares"
+}  # fmt: skip
+
+
+def planar(bodies, welds, ends, analyses, **changes):
+    """Two links on a path of the tip; `ends` are root and tip of each."""
+    upper, fore = ends
+    joints = [
+        {"name": "O", "type": "revolute", "between": ["ground", upper[0]], "motor": True},
+        {"name": "A", "type": "revolute", "between": [upper[1], fore[0]], "motor": True},
+    ]
+    path = {"x": f"1.46-0.1*{S}", "y": f"0.53+0.1*{S}"}
+    return {
+        "name": "arm",
+        "space": "planar",
+        "gravity": [0.0, -9.81],
+        "geometric_stiffening": True,
+        "body": bodies,
+        "joint": joints + welds,
+        "payload": [{"point": fore[1], "mass": 0.1}],
+        "initial": {"angles": {body["name"]: 0.6 if body["name"].startswith("fore") else 0.1 for body in bodies}},
+        "trajectory": [{"name": "tip", "point": fore[1], **path}],
+        "analysis": analyses,
+    } | changes
+
+
+def in_pieces(analyses, count=2, link=LINK, **changes):
+    """In space."""
+    divided = {} if count is None else {"pieces": count}
+    bodies = [{"name": name, "link": link, **divided} for name in NAMES]
+    tables = planar(bodies, [], [(f"{name}.root", f"{name}.tip") for name in NAMES], analyses)
+    return tables | {
+        "space": "spatial",
+        "gravity": place(tables["gravity"]),
+        "joint": [joint_keys(joint) for joint in tables["joint"]],
+        "initial": {"joints": {"O": 0.1, "A": 0.5}},
+    } | changes  # fmt: skip
+
+
+def by_hand(analyses):
+    """In the plane, of links in two pieces."""
+    tables = [dict(table.keys) for table in cut(LinkTable(LINK, Path("link.toml")), 2).tables]
+    bodies = [{"name": f"{name}{k}", "link": tables[k]} for name in NAMES for k in range(2)]
+    welds = [{"name": name, "type": "weld", "between": [f"{name}0.tip", f"{name}1.root"]} for name in NAMES]
+    return planar(bodies, welds, [(f"{name}0.root", f"{name}1.tip") for name in NAMES], analyses)
+
+
+def solved(tables):
+    return ffrobot.solve(ffrobot.make_scene(**tables))
+
+
+def agree(found, expected, share, at=slice(None)):
+    np.testing.assert_allclose(found[at], expected[at], rtol=0, atol=share * np.abs(expected).max())
+
+
+def test_motors_and_tips_are_those_of_links_cut_by_hand():
+    """Under static shapes, none, and motors alone, which leave the path by what bends."""
+    analyses = [STATIC, ZERO, ALONE]
+    with solved(in_pieces(analyses)) as space, solved(by_hand(analyses)) as plane:
+        for name in ("static", "zero", "alone"):
+            for joint in "OA":
+                found, expected = (of[f"{name}/joints/{joint}/moment"].ravel() for of in (space, plane))
+                agree(found, expected, 1e-8)
+            found, expected = space[f"{name}/points/fore.tip/position"], plane[f"{name}/points/fore1.tip/position"]
+            agree(found[:, :2], expected, 1e-8)
+
+
+def test_a_shape_is_given_in_the_modes_of_the_whole_link():
+    """Small, so that what is told of the pieces as the one link is the same again."""
+    given = {"name": "given", "kind": "fcid", "shape": "given", "modal": {"fore": ["1e-3*sin(5*t)", "1e-4*t"]}, **RUN}
+    with solved(in_pieces([given], 3)) as results:
+        t = results["given/time"]
+        found = results["given/bodies/fore/modal"]
+        wanted = np.zeros_like(found)
+        wanted[:, 0], wanted[:, 1] = 1e-3 * np.sin(5 * t), 1e-4 * t
+        agree(found, wanted, 1e-4)
+        assert np.abs(results["given/bodies/upper/modal"]).max() < 1e-12
+
+
+def test_patches_are_placed_as_on_the_whole_link():
+    """By what they reach of the robot's modes, which two pieces have to 1 %, and by voltages for a straight link."""
+    reach = {"name": "reach", "kind": "placement", "placement": {"body": "fore", "count": 2, "spacing": 0.1}}
+    volts = {"name": "volts", "kind": "placement", "about": "zero"} | {
+        "placement": {"body": "fore", "count": 2, "spacing": 0.1, "criterion": "voltage"}
+    }
+    shown = "best/centers", "best/reach", "frequency", "share", "largest_voltage"
+    whole, pieces = (solved(in_pieces([ZERO, reach, volts], count, pzt=[PATCHES])) for count in (None, 2))
+    with whole, pieces:
+        for name in ("reach", "volts"):
+            for key in shown:
+                found, expected = (of[f"{name}/placement/{key}"] for of in (pieces, whole))
+                np.testing.assert_allclose(found, expected, rtol=2e-2, err_msg=key)

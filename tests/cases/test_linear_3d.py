@@ -1,0 +1,152 @@
+"""Linear models of robots in space: those of planar robots put there, patches, closed forms, bad input."""
+
+from itertools import zip_longest
+
+import numpy as np
+import planar_tables
+import pytest
+from checkpoints import CASES
+from planar_tables import CRANK, TWO_LINK
+
+import ffrobot
+
+INVERSE = {"name": "inverse", "kind": "pcid", "end": 0.2, "output_step": 0.05, "tolerance": 1e-10}
+RIGID_GEAR = {"gear_ratio": 60.0, "rotor_inertia": 2e-4}
+GEARED = RIGID_GEAR | {"stiffness": 3e3, "damping": 2.0}
+MOVING = {"name": "moving", "kind": "linear", "about": "inverse", "times": [0.0, 0.1, 0.2]}
+
+
+def both(case, guess, analyses, folder, of_joints=(), of_bodies=None, **changes):
+    """Results of a planar scene and of the same in space; the joint on the ground has a motor."""
+    planar = planar_tables.read(CASES / case / "scene.toml") | changes
+    planar.pop("pzt", None)
+    planar["joint"] = [joint | own for joint, own in zip_longest(planar["joint"], of_joints, fillvalue={})]
+    planar["body"] = [body | (of_bodies or {}) for body in planar["body"]]
+    planar["joint"][0]["motor"] = True
+    planar["analysis"] = analyses
+    spatial = planar_tables.in_space(planar) | {"initial": {"joints": guess}, "analysis": analyses}
+    return [
+        ffrobot.solve(planar_tables.write(tables, folder / f"{name}.toml"))
+        for name, tables in (("planar", planar), ("spatial", spatial))
+    ]
+
+
+def same_models(planar, spatial, close, outputs=("joint/", "point/")):
+    """The same transfer from motors and forces in the plane to joints and points, and the same poles."""
+    for in_plane, in_space in zip(planar, spatial, strict=True):
+        sources = [name for name in in_plane.input_names if name in in_space.input_names]
+        targets = [name for name in in_plane.output_names if name in in_space.output_names and name.startswith(outputs)]
+        assert any(name.startswith("joint/") for name in sources)
+        for start in outputs:
+            assert any(name.startswith(start) for name in targets)
+        omega = np.array([0.0, 3.0, 40.0, 700.0]) + 0.2
+        expected, found = (model.frequency_response(omega, sources, targets) for model in (in_plane, in_space))
+        for k in range(len(omega)):
+            np.testing.assert_allclose(found[k], expected[k], rtol=0, atol=close * np.abs(expected[k]).max())
+
+
+def test_two_links_along_their_path(tmp_path):
+    planar, spatial = both("two_link", TWO_LINK, [INVERSE, MOVING], tmp_path)
+    with planar, spatial:
+        same_models(planar.linear("moving"), spatial.linear("moving"), 1e-7)
+        expected, found = (results["moving/linear/frequency"] for results in (planar, spatial))
+        np.testing.assert_allclose(found, expected, rtol=1e-7, atol=1e-6)
+        for name in ("position", "modal"):
+            key = f"moving/linear/modes/link2/{name}"
+            sign = np.sign(np.sum(planar[key][0, 3] * spatial[key][0, 3][..., : planar[key].shape[-1]]))
+            shape = sign * spatial[key][0, 3][..., : planar[key].shape[-1]]
+            np.testing.assert_allclose(shape, planar[key][0, 3], atol=1e-6 * np.abs(planar[key][0, 3]).max())
+
+
+def test_two_links_at_rest(tmp_path):
+    planar, spatial = both("two_link", TWO_LINK, [{"name": "rest", "kind": "linear"}], tmp_path)
+    with planar, spatial:
+        same_models(planar.linear("rest"), spatial.linear("rest"), 1e-9)
+        assert spatial.linear("rest")[0].freedom == planar.linear("rest")[0].freedom
+
+
+def test_a_loop(tmp_path):
+    inverse = INVERSE | {"end": 0.02, "output_step": 0.01}
+    moving = MOVING | {"times": [0.0, 0.02]}
+    planar, spatial = both("slider_crank", CRANK, [inverse, moving], tmp_path)
+    with planar, spatial:
+        same_models(planar.linear("moving"), spatial.linear("moving"), 1e-6)
+
+
+def test_motors_that_turn_frames(tmp_path):
+    """Links bend in the plane of the joints alone: coordinates are those of frames, too."""
+    about = [INVERSE, MOVING, {"name": "rest", "kind": "linear"}]
+    planar, spatial = both("two_link", TWO_LINK, about, tmp_path, motors="frame")
+    with planar, spatial:
+        for name in ("moving", "rest"):
+            same_models(planar.linear(name), spatial.linear(name), 1e-7)
+            expected, found = (results[f"{name}/linear/pole"] for results in (planar, spatial))
+            np.testing.assert_allclose(np.hypot(*found.T), np.hypot(*expected.T), rtol=1e-7, atol=1e-3)
+
+
+@pytest.mark.parametrize("motors", ["section", "frame"])
+def test_gears_that_give(motors, tmp_path):
+    """About an equilibrium, an inverse analysis, for which motors are found, and a forward run that has them.
+
+    The gear on the ground alone is compliant: what the rotor of another does to the link that carries it is left out
+    in 2D (docs/theory.md). At rest gravity bears 12 N·m/rad, which are what is left of springs of 3000: rounding counts
+    the more.
+    """
+    inverse = INVERSE | {"output_step": 0.0005, "tolerance": 1e-9}
+    forward = inverse | {"name": "forward", "kind": "forward", "actuation": "inverse", "apply": "joints"}
+    beside = MOVING | {"name": "beside", "about": "forward"}
+    about = [inverse, MOVING, {"name": "rest", "kind": "linear"}, forward, beside]
+    planar, spatial = both(
+        "two_link", TWO_LINK, about, tmp_path, of_joints=(GEARED, RIGID_GEAR), of_bodies={"modes": 2}, motors=motors
+    )
+    with planar, spatial:
+        for name, close in (("rest", 1e-7), ("moving", 1e-6), ("beside", 1e-6)):
+            same_models(planar.linear(name), spatial.linear(name), close, outputs=("joint/", "motor/", "point/"))
+            assert spatial.linear(name)[0].freedom == planar.linear(name)[0].freedom
+            assert spatial[f"{name}/linear/modes/link2/modal"].shape[1] == spatial.linear(name)[0].freedom
+
+
+def test_a_gear_between_links_gives_between_their_frames(tmp_path):
+    """At rest, where its rotor does nothing to the link that carries it."""
+    rest = [{"name": "rest", "kind": "linear"}]
+    planar, spatial = both(
+        "two_link", TWO_LINK, rest, tmp_path, of_joints=(RIGID_GEAR, GEARED), of_bodies={"modes": 2}, motors="frame"
+    )
+    with planar, spatial:
+        same_models(planar.linear("rest"), spatial.linear("rest"), 1e-7, outputs=("joint/", "motor/", "point/"))
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_a_motor_behind_its_gear_swings_against_a_body(tmp_path, turned):
+    """ω² of k (1, −1)ᵀ(1, −1) in the kinetic energy ½ I q̇² + ½ J (N θ̇ + q̇)² on the body, ½ J N² θ̇² on the ground."""
+    J, N, k, axis, inertia = 3e-3, 9.0, 500.0, np.array([0.48, -0.6, 0.64]), np.diag([0.3, 0.2, 0.4])
+    sides = ["b.root", "ground"] if turned else ["ground", "b.root"]
+    rigid = {"mass": 1.0, "center": [0.0, 0.0, 0.0], "inertia": inertia.tolist(), "points": {"root": [0.0, 0.0, 0.0]}}
+    joint = {"name": "O", "type": "revolute", "between": sides, "axis": axis.tolist(), "gear_ratio": N}
+    scene = ffrobot.make_scene(
+        name="gear", space="spatial", gravity=[0.0, 0.0, 0.0], body=[{"name": "b", "rigid": rigid}],
+        joint=[joint | {"rotor_inertia": J, "stiffness": k}], analysis=[{"name": "rest", "kind": "linear"}],
+    )  # fmt: skip
+    I = axis @ inertia @ axis  # noqa: E741
+    M = np.array([[N**2 * J, -N * J], [-N * J, I + J]]) if turned else np.diag([N**2 * J, I])
+    expected = np.linalg.eigvals(np.linalg.solve(M, k * np.array([[1.0, -1.0], [-1.0, 1.0]]))).real.max()
+    with ffrobot.solve(scene) as results:
+        assert results["rest/linear/frequency"][0, 1] == pytest.approx(np.sqrt(expected) / (2 * np.pi), rel=1e-9)
+        (model,) = results.linear("rest")
+        low = model.frequency_response(np.array([1e-3]), "joint/O", ["joint/O", "motor/O"])[0, :, 0]
+        whole = np.ones(2) @ M @ np.ones(2)  # θ = γ: both turn together
+        np.testing.assert_allclose(low, -1e6 / whole, rtol=1e-4)
+
+
+def test_what_cannot_be_had_is_refused(tmp_path):
+    planar = planar_tables.read(CASES / "two_link" / "scene.toml")
+    planar.pop("pzt", None)
+    planar["analysis"] = [{"name": "rest", "kind": "linear"}]
+    spatial = planar_tables.in_space(planar) | {"initial": {"joints": TWO_LINK}, "analysis": planar["analysis"]}
+    for change, message in (
+        ({"analysis": [{"name": "rest", "kind": "linear", "points": ["link2.nose"]}]}, r'points: .*found "link2.nose"'),
+        ({"analysis": [{"name": "rest", "kind": "linear", "about": "inverse"}]}, "about: expected an earlier analysis"),
+    ):
+        path = planar_tables.write(spatial | change, tmp_path / "spatial.toml")
+        with pytest.raises(ffrobot.InputError, match=message):
+            ffrobot.solve(path)

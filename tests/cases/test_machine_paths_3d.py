@@ -1,0 +1,273 @@
+"""Paths as machines run them, in space: those of the plane, poses, motors behind gears, shapers, time scaling."""
+
+import numpy as np
+import planar_tables
+import pytest
+from checkpoints import CASES
+from scipy.integrate import solve_ivp
+
+import ffrobot
+from ffrobot.common.errors import InputError
+from ffrobot.common.rotations import exponential, logarithm, of_quaternion, of_rpy
+from ffrobot.mbs.fields.motion_laws import law_in, law_peak
+from ffrobot.mbs.fields.shapers import Impulse, impulses
+
+RUN = {"name": "inverse", "kind": "pcid", "end": 0.5, "output_step": 0.002, "tolerance": 1e-10}
+GUESS = {"O": 0.0, "A": 1.0471975511965976}
+TURNS = {"O": [0.0, "20*deg", "-5*deg"], "A": ["60*deg", "40*deg", "70*deg"]}
+PLACES = [[1.5, "sqrt(3)/2"], [1.3, 1.0], [1.35, 1.1]]
+LIMITS = {"profile": "s-curve", "speed": 2.0, "acceleration": 30.0, "jerk": 900.0, "start": 0.02, "hold": 0.03}
+
+
+def both(trajectories, folder, guess=GUESS, **keys):
+    """Results of the two links of a case along other paths, in the plane and in space."""
+    planar = planar_tables.read(CASES / "two_link" / "scene.toml") | keys
+    planar.pop("pzt", None)
+    planar |= {"trajectory": trajectories, "analysis": [RUN]}
+    spatial = planar_tables.in_space(planar) | {"initial": {"joints": guess}, "analysis": [RUN]}
+    return [
+        ffrobot.solve(planar_tables.write(tables, folder / f"{name}.toml"))
+        for name, tables in (("planar", planar), ("spatial", spatial))
+    ]
+
+
+def same(plane, space, trajectories, share=1e-8):
+    """Targets, coordinates and deflections to 1e-8 of their peaks, moments to 1e-6."""
+    for path in trajectories:
+        name = f"inverse/trajectories/{path['name']}"
+        np.testing.assert_allclose(space[f"{name}/target"], plane[f"{name}/target"], atol=1e-12)
+        for key in ("begin", "end", "stretch", "shaper_frequency"):
+            if key in plane.attributes(name):
+                np.testing.assert_allclose(space.attributes(name)[key], plane.attributes(name)[key], rtol=1e-8)
+    for joint in GUESS:
+        for key, of_peak in (("coordinate", share), ("moment", 1e-6)):
+            name = f"inverse/joints/{joint}/{key}"
+            np.testing.assert_allclose(space[name], plane[name], rtol=0, atol=of_peak * np.abs(plane[name]).max())
+    name = "inverse/points/link2.tip/deflection"
+    np.testing.assert_allclose(space[name][:, :2], plane[name], rtol=0, atol=share * np.abs(plane[name]).max())
+
+
+def joints(**keys):
+    return [{"name": joint, "joint": joint, "via": places, **keys} for joint, places in TURNS.items()]
+
+
+@pytest.mark.parametrize("held", [{"value": "60*deg"}, {"waypoints": "constant.csv"}])
+def test_a_shaper_that_asks_the_robot_beside_a_held_joint(held, tmp_path):
+    """In the plane as in space: the motion is over half a period of the frequency later (a ZV shaper)."""
+    (tmp_path / "constant.csv").write_text(f"t,value\n0,{np.pi / 3!r}\n1,{np.pi / 3!r}\n", encoding="utf-8")
+    moved = {"name": "O", "joint": "O", "via": [0.0, "20*deg"], "duration": 0.2, "shaper": {"kind": "zv"}}
+    plane, space = both([moved, {"name": "A", "joint": "A", **held}], tmp_path)
+    with plane, space:
+        same(plane, space, [moved])
+        kept = plane["inverse/joints/A/coordinate"]
+        np.testing.assert_allclose(kept, np.pi / 3, rtol=0, atol=1e-9)
+        about = plane.attributes("inverse/trajectories/O")
+        (frequency,) = about["shaper_frequency"]
+        assert about["end"] - about["begin"] == pytest.approx(0.2 + 0.5 / frequency, rel=1e-3)  # half a period later
+
+
+@pytest.mark.parametrize(
+    "keys",
+    [
+        LIMITS,
+        {"duration": [0.2, 0.15], "stretch": 1.2},
+        {"duration": 0.2, "profile": "trapezoid", "blend": 0.3},
+        {"duration": 0.1, "shaper": {"kind": "zvd", "frequency": [40.0, 90.0], "damping_ratio": 0.01}},
+        {"duration": 0.15, "shaper": {"kind": "zv", "modes": 2}},
+    ],
+)
+def test_joints_of_the_plane(keys, tmp_path):
+    paths = joints(**keys)
+    plane, space = both(paths, tmp_path)
+    with plane, space:
+        same(plane, space, paths)
+
+
+def test_places_of_the_plane(tmp_path):
+    """[x, y] leaves z open, which the plane has not."""
+    paths = [{"name": "tip", "point": "link2.tip", "via": PLACES, **LIMITS}]
+    plane, space = both(paths, tmp_path)
+    with plane, space:
+        same(plane, space, paths)
+
+
+INERTIA, TURN = 0.3, 1.2
+STILL = [0.0, 0.0, 0.0]
+BODY = {
+    "name": "arm",
+    "rigid": {"mass": 2.0, "inertia": [0.2, 0.2, INERTIA], "center": STILL, "points": {"root": STILL}},
+}
+
+
+def arm(path, joint=None, end=2.0, body=BODY, **keys):
+    """One body on a shoulder about z."""
+    shoulder = {"name": "shoulder", "type": "revolute", "between": ["ground", "arm.root"], "axis": [0.0, 0.0, 1.0]}
+    return ffrobot.make_scene(
+        name="arm",
+        space="spatial",
+        gravity=STILL,
+        body=[body],
+        joint=[shoulder | (joint or {})],
+        trajectory=[
+            {"name": "swing", "via": [0.0, TURN], **({} if "motor" in path else {"joint": "shoulder"}), **path}
+        ],
+        analysis=[{"name": "inverse", "kind": "pcid", "end": end, "output_step": 1e-3, **keys}],
+    )
+
+
+@pytest.mark.parametrize("limit", [0.5, 30.0])
+def test_fastest_rigid_arm_takes_its_limit(limit):
+    """I h p/(s T)² = limit, where p is the peak acceleration of the law."""
+    results = ffrobot.solve(arm({"duration": 0.5, "fastest": True}, {"moment_limit": limit}, end=4.0))
+    exact = np.sqrt(INERTIA * TURN * law_peak(4, 2) / limit) / 0.5
+    found = results.attributes("inverse/trajectories/swing")["stretch"]
+    assert exact <= found * (1 + 1e-4)  # a peak lies between outputs
+    assert found <= 1.0051 * exact
+    assert np.abs(results["inverse/joints/shoulder/moment"]).max() <= limit * (1 + 1e-9)
+
+
+def test_what_cannot_be_made_faster_says_so():
+    with pytest.raises(InputError, match="expected limits of motors"):
+        ffrobot.solve(arm({"duration": 0.5, "fastest": True}))
+
+
+def test_shapers_know_the_robot():
+    """With its joint held the arm is a cantilever: 1.8751² √(EI/ρA)/(2π L²) of its weaker plane, out of the swing."""
+    link = {
+        "material": {"youngs_modulus": 70e9, "poissons_ratio": 0.33, "density": 2700.0},
+        "geometry": {"kind": "beam", "length": 0.8, "section": {"shape": "rectangle", "height": 4e-3, "width": 3e-3}},
+        "mesh": {"elements": 12},
+        "reference": {"condition": "cantilever"},
+        "modes": {"count": 3, "family": ["in-plane-bending", "out-of-plane-bending"], "attachment_modes": False},
+        "damping": {"ratio": 0.005},
+    }
+    found = ffrobot.solve(
+        arm({"duration": 0.5, "shaper": {"kind": "zvd", "modes": 2}}, body={"name": "arm", "link": link})
+    )
+    exact = [1.8751041**2 * np.sqrt(70e9 * h**2 / 12 / 2700.0) / (2 * np.pi * 0.8**2) for h in (3e-3, 4e-3)]
+    assert found.attributes("inverse/trajectories/swing")["shaper_frequency"] == pytest.approx(exact, rel=1e-4)
+
+
+GEAR = {"gear_ratio": 50.0, "rotor_inertia": 2e-5, "stiffness": 400.0, "damping": 0.5}
+
+
+@pytest.mark.parametrize("shaper", [None, {"kind": "zvd"}])
+def test_a_motor_goes_and_its_gear_swings(shaper):
+    """I γ̈ = k (θ − γ) + c (θ̇ − γ̇) with θ(t) given; the motor does J N² θ̈ besides. ω² = k/I, ζ = c/(2 I ω)."""
+    path = {"motor": "shoulder", "profile": "s-curve", "duration": 0.2} | ({"shaper": shaper} if shaper else {})
+    found = ffrobot.solve(arm(path, GEAR, end=1.0, tolerance=1e-10))
+    k, c, J = GEAR["stiffness"], GEAR["damping"], GEAR["rotor_inertia"] * GEAR["gear_ratio"] ** 2
+    omega = np.sqrt(k / INERTIA)
+    zeta, motion = c / (2 * INERTIA * omega), law_in(0.2, "s-curve", 2)
+    parts = impulses("zvd", omega / (2 * np.pi), zeta) if shaper else [Impulse(1.0, 0.0)]
+
+    def target(t, order):
+        return TURN * sum(part.share * motion.sample(np.atleast_1d(t) - part.delay, order)[:, 0] for part in parts)
+
+    def slope(t, y):
+        twist, rate = target(t, 0)[0] - y[0], target(t, 1)[0] - y[1]
+        return [y[1], (k * twist + c * rate) / INERTIA]
+
+    t = found["inverse/time"]
+    y = solve_ivp(slope, (0.0, t[-1]), [0.0, 0.0], t_eval=t, rtol=1e-10, atol=1e-13, max_step=2e-3).y
+    np.testing.assert_allclose(found["inverse/joints/shoulder/coordinate"], y[0], atol=1e-7)
+    np.testing.assert_allclose(found["inverse/joints/shoulder/motor_angle"], target(t, 0), atol=1e-9)
+    expected = J * target(t, 2) + k * (target(t, 0) - y[0]) + c * (target(t, 1) - y[1])
+    smooth = np.min([np.abs(t - b - p.delay) for b in motion.breaks for p in parts], axis=0) > 2e-3  # jerk jumps there
+    np.testing.assert_allclose(
+        found["inverse/joints/shoulder/moment"][smooth], expected[smooth], atol=1e-5 * np.abs(expected).max()
+    )
+    if shaper:
+        of_path = found.attributes("inverse/trajectories/swing")
+        assert of_path["shaper_frequency"] == pytest.approx([omega / (2 * np.pi)], rel=1e-9)
+        late = t > of_path["end"]
+        assert np.abs(y[0][late] - TURN).max() < 1e-4 * TURN
+        assert np.abs(found["inverse/joints/shoulder/coordinate"][late] - TURN).max() < 1e-6 * TURN
+
+
+def posed(via, **keys):
+    """A body without joints that goes through poses."""
+    body = {"mass": 2.0, "inertia": [0.2, 0.3, 0.4], "center": [0.1, 0.0, 0.05]}
+    return ffrobot.make_scene(
+        name="posed", space="spatial", gravity=[0.0, 0.0, -9.81],
+        body=[{"name": "part", "rigid": body | {"points": {"grip": [0.2, -0.1, 0.3]}}}],
+        trajectory=[{"name": "way", "point": "part.grip", "via": via, **keys}],
+        analysis=[{"name": "inverse", "kind": "pcid", "end": 1.5, "output_step": 0.005, "tolerance": 1e-9}],
+    )  # fmt: skip
+
+
+FROM, TO = [0.1, 0.2, 0.3, 0.0, "90*deg", -0.3], [0.5, -0.1, 0.4, 0.4, "80*deg", 1.3]
+
+
+def test_a_part_turns_about_a_fixed_axis_between_two_poses():
+    """r = r₀ + s Δr and A = exp(s φ~) A₀, φ the rotation vector of A₁ A₀ᵀ, with the s of the law for both."""
+    found = ffrobot.solve(posed([FROM, TO], duration=0.8, start=0.2))
+    s = law_in(0.8, "rest-to-rest", 4).sample(found["inverse/time"] - 0.2)
+    begin, end = np.array([0.1, 0.2, 0.3]), np.array([0.5, -0.1, 0.4])
+    A_0, A_1 = of_rpy(0.0, np.pi / 2, -0.3), of_rpy(0.4, np.radians(80.0), 1.3)
+    np.testing.assert_allclose(found["inverse/points/part.grip/position"], begin + s * (end - begin), atol=1e-8)
+    A = of_quaternion(found["inverse/points/part.grip/quaternion"])
+    np.testing.assert_allclose(A, exponential(s * logarithm(A_1 @ A_0.T)) @ A_0, atol=1e-8)
+
+
+def test_a_part_rests_in_every_pose():
+    via = [FROM, [0.3, 0.2, 0.5, 0.0, 1.2, 0.5], [0.3, 0.2, 0.5, 0.6, 0.9, 0.8], TO]  # it turns in place from 1 to 2
+    found = ffrobot.solve(posed(via, duration=[0.5, 0.3, 0.4], hold=0.05, profile="s-curve"))
+    t, name = found["inverse/time"], "inverse/bodies/part"
+    for instant, place in ((0.0, via[0]), (0.5, via[1]), (0.55, via[1]), (0.85, via[2]), (0.9, via[2]), (1.3, via[3])):
+        k = int(np.abs(t - instant).argmin())
+        np.testing.assert_allclose(found["inverse/points/part.grip/position"][k], place[:3], atol=1e-8)
+        angles = [np.radians(float(x.removesuffix("*deg"))) if isinstance(x, str) else x for x in place[3:]]
+        A = of_quaternion(found["inverse/points/part.grip/quaternion"][k])
+        np.testing.assert_allclose(A, of_rpy(*angles), atol=1e-8)
+        for rate in ("velocity", "angular_velocity"):
+            np.testing.assert_allclose(found[f"{name}/{rate}"][k], 0.0, atol=1e-7)
+    turning = (t > 0.56) & (t < 0.84)
+    place = found["inverse/points/part.grip/position"][turning]
+    np.testing.assert_allclose(place, [[0.3, 0.2, 0.5]] * len(place), atol=1e-8)
+    assert np.abs(found[f"{name}/angular_velocity"][turning]).max() > 1.0
+
+
+def test_places_go_with_an_orientation_of_their_own():
+    """via of three numbers beside rpy: both are followed."""
+    found = ffrobot.solve(posed([FROM[:3], TO[:3]], duration=0.8, rpy=["0.1", "0.2*t", "-0.3"]))
+    t = found["inverse/time"]
+    A = of_quaternion(found["inverse/points/part.grip/quaternion"])
+    np.testing.assert_allclose(A, np.array([of_rpy(0.1, 0.2 * x, -0.3) for x in t]), atol=1e-8)
+    np.testing.assert_allclose(found["inverse/points/part.grip/position"][-1], TO[:3], atol=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("via", "keys", "told"),
+    [
+        (
+            [[0.0] * 4, [1.0] * 4],
+            {"duration": 1.0},
+            r"expected places \[x, y\] or \[x, y, z\] or .*, all alike, in via",
+        ),
+        ([[0.0] * 3, [1.0] * 6], {"duration": 1.0}, "all alike, in via"),
+        ([FROM, TO], {"speed": 1.0}, 'expected a "duration" with poses in via'),
+        ([FROM, TO], {"duration": 1.0, "rpy": ["0", "0", "0"]}, 'expected an orientation either in via or by "rpy"'),
+        ([FROM[:3], TO[:3]], {"duration": 1.0, "x": "t"}, "expected either waypoints, via or expressions"),
+        ([FROM[:3], TO[:3]], {}, r'expected either limits \(.*\) or a "duration" with "via", found neither'),
+        ([[0.0] * 3 + [0, 0, a] for a in (0, 3, 6)], {"duration": 1.0}, "place no. .: expected orientations within"),
+    ],
+)
+def test_mistakes_in_places_are_told(via, keys, told):
+    with pytest.raises(InputError, match=told):
+        ffrobot.solve(posed(via, **keys))
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        ({"joint": {"motor": False}}, 'motor: expected a joint with a motor, found "shoulder", which has none'),
+        ({"analysis": {"kind": "fcid", "shape": "zero"}}, 'expected "pcid" or "static" with trajectories of motors'),
+        ({"path": {"joint": "shoulder"}}, 'exactly one of the keys "point", "joint", "angle", "motor"'),
+    ],
+)
+def test_mistakes_with_motors_are_told(change, told):
+    joint = {"stiffness": 400.0, "rotor_inertia": 2e-5} | change.get("joint", {})
+    scene_keys = change.get("analysis", {})
+    with pytest.raises(InputError, match=told):
+        ffrobot.solve(arm({"motor": "shoulder", "duration": 0.2} | change.get("path", {}), joint, **scene_keys))

@@ -1,0 +1,203 @@
+"""`modes` of bodies in space: planar scenes in space choose as in the plane, and what is promised of "auto" holds."""
+
+import numpy as np
+import planar_tables
+import pytest
+from checkpoints import CASES
+
+import ffrobot
+from ffrobot.common.errors import InputError
+from ffrobot.mbs.model.truncation import interface_loads, with_fewer_modes
+from ffrobot.present.summary import print_summary, summary_console
+from ffrobot.results.file import Results
+from ffrobot.results.write import results_image
+from ffrobot.run.bodies import load_bodies
+from ffrobot.run.mode_choice import reported_modes
+from ffrobot.run.mode_search import difference
+from ffrobot.run.solve import solve_scene
+from ffrobot.run.watcher import Watcher
+from ffrobot.scene.load import load_scene
+
+S = "(10*t**3-15*t**4+6*t**5)"  # from rest to rest with zero acceleration at both ends
+QUINTIC = {"x": f"1.5-0.5*{S}", "y": f"sqrt(3)/2+0.3*{S}"}
+TWO_LINK = {"O": 0.0, "A": 1.0471975511965976}
+POINTS = ("root", "tip")
+
+
+def two_links(modes, **analysis):
+    """The paper's arm from rest, with patches: tables of the planar scene and of the same in space."""
+    planar = planar_tables.read(CASES / "two_link" / "scene.toml")
+    for body in planar["body"]:
+        body["modes"] = modes
+    planar["initial"]["state"] = "static"
+    planar["trajectory"][0] |= QUINTIC
+    planar["analysis"] = [planar["analysis"][0] | {"end": 0.3} | analysis]
+    same = {key: planar[key] for key in ("pzt", "analysis")}
+    spatial = planar_tables.in_space(planar) | same | {"initial": {"state": "static", "joints": TWO_LINK}}
+    return planar, spatial
+
+
+def results_of(tables, folder, name):
+    return ffrobot.solve(planar_tables.write(tables, folder / f"{name}.toml"))
+
+
+def close(found, expected, share):
+    np.testing.assert_allclose(found, expected, rtol=0, atol=share * np.abs(expected).max())
+
+
+def test_planar_arm_with_few_modes_in_space(tmp_path):
+    """Explicit numbers: the same coordinates, hence the planar numbers; voltages serve the modes left out, too."""
+    planar, spatial = (results_of(t, tmp_path, n) for t, n in zip(two_links(3, tolerance=1e-10), "ps", strict=True))
+    with planar, spatial:
+        for joint in TWO_LINK:
+            close(spatial[f"inverse/joints/{joint}/moment"], planar[f"inverse/joints/{joint}/moment"], 1e-8)
+            close(spatial[f"inverse/joints/{joint}/reaction"][:, :2], planar[f"inverse/joints/{joint}/reaction"], 1e-8)
+        close(spatial["inverse/trajectories/tip/force"], planar["inverse/trajectories/tip/force"], 1e-8)
+        for link in ("link1", "link2"):
+            close(spatial.modal("inverse", link), planar.modal("inverse", link), 1e-8)
+            name = f"inverse/pzt/{link}/required_voltage"
+            close(spatial[name], planar[name], 1e-8)
+            kept = planar.attributes(f"inverse/bodies/{link}")["modes_kept"]
+            assert spatial.attributes(f"inverse/bodies/{link}")["modes_kept"] == kept
+
+
+def test_planar_arm_chooses_the_same_modes_in_space(tmp_path):
+    """The search takes the same steps; estimates differ by what integrations err, a small part of the tolerance."""
+    tolerance = 3e-3
+    tables = two_links("auto", tolerance=tolerance, integrator="dop853")
+    planar, spatial = (results_of(t, tmp_path, n) for t, n in zip(tables, "ps", strict=True))
+    with planar, spatial:
+        for kind in ("deflections", "forces", "motors", "voltages"):
+            estimates = [of.attributes("inverse")[f"mode_error_{kind}"] for of in (planar, spatial)]
+            assert estimates[1] == pytest.approx(estimates[0], abs=0.05 * tolerance)
+            assert 0.0 < estimates[1] < 1.5e-3
+        for link in ("link1", "link2"):
+            kept = [of.attributes(f"inverse/bodies/{link}")["modes_kept"] for of in (planar, spatial)]
+            assert kept[0] == kept[1]
+            close(spatial.modal("inverse", link), planar.modal("inverse", link), 3e-3)
+
+
+ARM_MODES = '[modes]\nfamily = ["in-plane-bending", "out-of-plane-bending", "torsion"]\ncount = 18\n'
+
+
+@pytest.fixture(scope="module")
+def arm(tmp_path_factory):
+    """The 3R arm of tubes with 18 modes a link, from rest: its folder, the tables, and what all modes give."""
+    folder = tmp_path_factory.mktemp("arm")
+    case = CASES / "arm_3r"
+    for link in ("upper", "fore"):
+        text = (case / f"{link}.toml").read_text(encoding="utf-8")
+        head, tail = text[: text.index("[modes]")], text[text.index("[damping]") :]
+        (folder / f"{link}.toml").write_text(head + ARM_MODES + "attachment_modes = false\n" + tail, encoding="utf-8")
+    tables = planar_tables.read(case / "scene.toml")
+    for body in tables["body"]:
+        if "link" in body:
+            body["link"] = f"{body['name']}.toml"
+    # Errors are those of modes alone: steps of DOP853 that vibrations hold err less than their tolerance.
+    tables["analysis"] = [tables["analysis"][0] | {"tolerance": 1e-6, "integrator": "dop853"}]
+    return folder, tables, solved(folder, tables, None)
+
+
+def solved(folder, tables, modes, **analysis):
+    bodies = [body | {"modes": modes} if "link" in body and modes is not None else body for body in tables["body"]]
+    tables = tables | {"body": bodies, "analysis": [tables["analysis"][0] | analysis]}
+    return solve_scene(planar_tables.write(tables, folder / "arm.toml"), Watcher())
+
+
+@pytest.mark.parametrize("tolerance", [1e-2, 1e-3])
+def test_the_estimate_of_an_arm_in_space_is_honest(tolerance, arm):
+    """All modes tell the error of a line in three dimensions: within the tolerance, and not far from the estimate."""
+    folder, tables, exact = arm
+    solution = solved(folder, tables, "auto", tolerance=tolerance)
+    check_estimate(solution, exact, tolerance)
+    for name in ("upper", "fore"):
+        assert solution.bodies[name].spatial.reduction.lowest % 2 == 0  # of tubes both planes
+        assert any(note.startswith(f"{name}: all modes but 6 of 18 modes and") for note in solution.notes)
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_the_estimate_is_honest_on_lines_it_was_not_made_with(seed, arm):
+    """Other ways of the tip, drawn by seed."""
+    folder, tables, _ = arm
+    way = np.random.default_rng(seed).uniform([-0.4, -0.5, -0.3], [0.0, 0.5, 0.3]).tolist()
+    law = "where(t < 0.5, 10*(t/0.5)**3 - 15*(t/0.5)**4 + 6*(t/0.5)**5, 1)"
+    line = {c: f"{at} + {by!r}*{law}" for c, at, by in zip("xyz", (0.95, 0.15, 0.55), way, strict=True)}
+    other = tables | {"trajectory": [tables["trajectory"][0] | line]}
+    exact = solved(folder, other, None)
+    check_estimate(solved(folder, other, "auto", tolerance=3e-3), exact, 3e-3)
+
+
+def check_estimate(solution, exact, tolerance):
+    """As in the plane: 3 times too small never, 6 times too large at most; half of the tolerance is kept."""
+    found, expected = (reported_modes(of.analyses["inverse"]) for of in (solution, exact))
+    errors = difference(found, expected)
+    assert set(errors) == {"deflections", "forces", "motors"}
+    worst, estimated = max(errors.values()), max(solution.mode_choice.errors["inverse"].values())
+    assert worst <= tolerance
+    assert worst / 3 < estimated < 6 * worst
+    assert estimated <= tolerance / 2
+    assert solution.mode_choice.tried[-1] < 36
+
+
+def test_the_summary_tells_the_choice_in_space(arm, tmp_path, capsys):
+    folder, tables, _ = arm
+    solution = solved(folder, tables, "auto", tolerance=1e-2, end=0.2)
+    image, path = results_image(solution), tmp_path / "x.h5"
+    print_summary(solution, Results.from_image(image, path).verdict, path, solution.seconds, summary_console())
+    printed = " ".join(capsys.readouterr().out.split())
+    assert "inverse: error of leaving out the others, estimated: deflections" in printed
+    assert "the same without search: modes = " in printed
+    assert f"solved with {', '.join(map(str, solution.mode_choice.tried))} modal coordinates" in printed
+
+
+@pytest.fixture(scope="module", params=[None, "fore.tip"])
+def link(request, arm):
+    """The fore arm with all its modes, bare and with a payload off its axis, which couples families."""
+    folder, tables, _ = arm
+    load = [{"point": request.param, "mass": 0.2, "center": [0.01, 0.02, 0.03]}] if request.param else []
+    path = planar_tables.write(tables | {"payload": load}, folder / "loaded.toml")
+    scene = load_scene(path)
+    (loaded,) = (body for body in load_bodies(scene, lambda _: None) if body.spatial.name == "fore")
+    return loaded.spatial
+
+
+@pytest.mark.parametrize("lowest", [0, 2, 5])
+def test_what_is_left_out_keeps_its_static_flexibility_in_space(link, lowest):
+    body = with_fewer_modes(link, lowest, POINTS)
+    assert body.n_modes < link.n_modes
+    assert body.reduction.lowest == lowest
+
+    def flexibility(of):
+        rows = [np.vstack([of.points[name].translation, of.points[name].rotation]) for name in POINTS]
+        B_T = np.vstack(rows).T
+        return B_T.T @ (B_T / of.stiffness[:, None])
+
+    np.testing.assert_allclose(flexibility(body), flexibility(link), rtol=0, atol=1e-9 * flexibility(link).max())
+
+
+def test_coordinates_with_fewer_modes_are_orthonormal_and_their_forces_known(link):
+    body = with_fewer_modes(link, 4, POINTS)
+    T, lift = body.reduction.T, body.reduction.lift
+    np.testing.assert_allclose(T.T @ T, np.eye(body.n_modes), atol=1e-11)
+    K = T.T @ np.diag(link.stiffness) @ T
+    np.testing.assert_allclose(K, np.diag(body.stiffness), rtol=0, atol=1e-10 * body.stiffness.max())
+    B_T = interface_loads(link, POINTS)
+    np.testing.assert_allclose(lift @ T.T @ B_T, B_T, atol=1e-10)
+    np.testing.assert_allclose(body.on_file @ body.modal_transform, np.eye(body.n_modes), atol=1e-9)
+    lowest = np.sort(link.stiffness)[:4]
+    np.testing.assert_array_equal(np.sort(body.stiffness[:4]), lowest)
+
+
+@pytest.mark.parametrize("modes", ["many", -1, 2.5])
+def test_wrong_numbers_of_modes_in_space(modes, tmp_path):
+    tables = two_links(modes)[1]
+    with pytest.raises(InputError, match=r'body "link1": modes: expected "auto" or a .*number'):
+        load_scene(planar_tables.write(tables, tmp_path / "wrong.toml"))
+
+
+def test_rigid_bodies_have_no_modes_in_space(arm, tmp_path):
+    _, tables, _ = arm
+    column = tables["body"][0] | {"modes": 2}
+    path = planar_tables.write(tables | {"body": [column]}, tmp_path / "rigid.toml")
+    with pytest.raises(InputError, match=r'expected the key "modes" only in flexible bodies, found it in a rigid one'):
+        load_scene(path)

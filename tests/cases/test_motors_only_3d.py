@@ -1,0 +1,274 @@
+"""Motors alone in space: the planar numbers of a planar robot, and moments that carry an arm along its path."""
+
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import planar_tables
+import pytest
+import tomli_w
+from checkpoints import CASES
+from drawn_arms import drawn_arm, posed
+from patched_arms import ARM, LINK
+from scipy.interpolate import CubicSpline
+from spatial_rod_chain import Body, RodChain, X, Y, Z, bar
+
+import ffrobot
+from ffrobot.run.solve import solve_scene
+from ffrobot.run.watcher import Watcher
+
+KEPT = ("exact", "redefined")
+
+
+@pytest.fixture(scope="module")
+def two_link(tmp_path_factory):
+    """The case of the plane with two modes a link, its inversions alone, in the plane and in space."""
+    folder, found = tmp_path_factory.mktemp("two_link"), {}
+    tables = planar_tables.read(CASES / "two_link_motors_only" / "scene.toml")
+    tables["analysis"] = [
+        analysis | {"end": 0.5, "output_step": 0.005} for analysis in tables["analysis"] if analysis["name"] in KEPT
+    ]
+    for body in tables["body"]:
+        link = tomllib.loads(Path(body["link"]).read_text(encoding="utf-8"))
+        link["modes"]["count"] = 2
+        body["link"] = str(folder / f"{body['name']}.toml")
+        Path(body["link"]).write_text(tomli_w.dumps(link), encoding="utf-8")
+    spatial = planar_tables.in_space(tables) | {"analysis": tables["analysis"]}
+    spatial["initial"] = {"state": "static", "joints": {"O": 0.0, "A": np.pi / 3}}
+    for space, scene in (("planar", tables), ("spatial", spatial)):
+        found[space] = ffrobot.solve(planar_tables.write(scene, folder / f"{space}.toml"))
+    yield found
+    for results in found.values():
+        results.close()
+
+
+@pytest.mark.parametrize("name", KEPT)
+def test_planar_robot_in_space_has_the_planar_moments(name, two_link):
+    """Zeros on both sides: moments before the path and after it; or integrated forward."""
+    plane, space = two_link["planar"], two_link["spatial"]
+    np.testing.assert_allclose(space[f"{name}/time"], plane[f"{name}/time"], atol=1e-12)
+    assert plane[f"{name}/time"][0] < -0.01 or name == "redefined"
+    for joint in ("O", "A"):
+        expected = plane[f"{name}/joints/{joint}/moment"]
+        np.testing.assert_allclose(space[f"{name}/joints/{joint}/moment"], expected, atol=2e-6 * np.abs(expected).max())
+
+
+PATH = """
+[[trajectory]]
+name = "tip"
+point = "link.tip"
+y = "0.1*({s})"
+z = "0.25 - 0.15*({s})"
+[[analysis]]
+name = "exact"
+kind = "motors-only"
+end = 0.4
+output_step = 0.01
+tolerance = 1e-6
+[[analysis]]
+name = "again"
+kind = "forward"
+actuation = "exact"
+apply = "joints"
+tolerance = 1e-7
+"""
+S = "10*(t/0.4)**3 - 15*(t/0.4)**4 + 6*(t/0.4)**5"
+
+
+@pytest.mark.parametrize("motors", ["section", "frame"])
+def test_moments_carry_the_arm_along_its_path_and_to_rest(motors, tmp_path):
+    """A link that bends in both planes, yaw and pitch: motors alone keep its tip on the path, and it rests after."""
+    modes = 'count = 2\nfamily = ["in-plane-bending", "out-of-plane-bending"]'
+    (tmp_path / "link.toml").write_text(LINK.format(name="link", length=0.4, modes=modes, height=0.006, width=0.012))
+    (tmp_path / "scene.toml").write_text(ARM.format(motors=motors) + PATH.format(s=S))
+    with ffrobot.solve(tmp_path / "scene.toml") as results:
+        t, tip = results["again/time"], results["again/points/link.tip/position"]
+        assert t[0] < -0.03
+        assert t[-1] > 0.43
+        u = np.clip(t / 0.4, 0.0, 1.0)
+        s = 10 * u**3 - 15 * u**4 + 6 * u**5
+        expected = np.column_stack([0.1 * s, 0.25 - 0.15 * s])
+        np.testing.assert_allclose(tip[:, 1:], expected, atol=2e-6)
+        assert np.abs(results["exact/points/link.tip/deflection"]).max(axis=0)[1:].min() > 1e-4
+        swing = np.abs(results["again/bodies/link/modal_velocity"])
+        assert swing[-1].max() < 1e-4 * swing.max()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ('z = "0.25', '# z = "0.25', "trajectory components as the mechanism has degrees of freedom (2), found 1"),
+        ('y = "0.1*', 'y = "0.1*t + 0*', "expected a path at rest at t = 0 s"),
+    ],
+)
+def test_mistakes(old, new, message, tmp_path):
+    modes = 'count = 2\nfamily = ["in-plane-bending", "out-of-plane-bending"]'
+    (tmp_path / "link.toml").write_text(LINK.format(name="link", length=0.4, modes=modes, height=0.006, width=0.012))
+    text = ARM.format(motors="section") + PATH.format(s=S)
+    assert old in text
+    (tmp_path / "scene.toml").write_text(text.replace(old, new))
+    with pytest.raises(ffrobot.InputError) as error:
+        ffrobot.solve(tmp_path / "scene.toml")
+    assert message in " ".join(str(error.value).split())
+
+
+@pytest.fixture(scope="module")
+def leaning_arm(solved):
+    return solved("arm_3r_motors_only", timeout=600)  # a few seconds where nothing else runs
+
+
+def off_its_line(case, run):
+    """Largest distance of the tip from the straight line, m."""
+    start, end = np.array([[0.65, 0.10, 0.50], [0.40, 0.45, 0.65]])
+    way = (end - start) / np.linalg.norm(end - start)
+    tip = case.file[f"{run}/points/fore.tip/position"][()] - start
+    return np.linalg.norm(tip - np.outer(tip @ way, way), axis=1).max()
+
+
+def test_leaning_arm_keeps_to_its_line(leaning_arm):
+    """Offsets, a leaning axis, bending in both planes, gravity, a payload: the replay in the nonlinear model."""
+    assert off_its_line(leaning_arm, "exact") < 1e-9
+    assert off_its_line(leaning_arm, "exact_forward") < 5e-6
+    assert off_its_line(leaning_arm, "joints_only") > 1e-3
+    last = leaning_arm.file["exact_forward/points/fore.tip/position"][-1]
+    np.testing.assert_allclose(last, [0.40, 0.45, 0.65], atol=5e-6)
+    for body in ("upper", "fore"):
+        bent = np.abs(leaning_arm.file[f"exact/points/{body}.tip/deflection"]).max(axis=0)
+        assert bent[1:].min() > 5e-4
+
+
+def test_moments_carry_an_arm_of_rods_along_the_same_line(leaning_arm):
+    """Rods and springs of another program: within what 1/(4 · 3²) of too much stiffness is of the deflections."""
+    axis = np.array([0.0, -1.0, 0.2]) / np.hypot(1.0, 0.2)
+    column = Body(np.zeros(3), Z, 4.0, 0.2 * Z, np.diag([0.06, 0.06, 0.02]))
+    upper = bar(0.5, 0.010, 0.014, 3, np.array([0.0, 0.1, 0.4]), -Y)
+    fore = bar(0.4, 0.008, 0.010, 3, 0.5 / 6 * X, axis, payload=0.2)
+    arm = RodChain([column, *upper, *fore], 0.4 / 6 * X, [0, 1, 1 + len(upper)])
+    file, names = leaning_arm.file, ("waist", "shoulder", "elbow")
+    t = file["exact/time"][()]
+    t = t[t < 0.55]
+    found = np.array([file[f"exact/joints/{name}/moment"][: len(t)] for name in names]).T
+    guess = [file[f"exact/joints/{name}/coordinate"][0] for name in names]
+    target = file["exact/points/fore.tip/position"][: len(t)]
+    q, holding = arm.at_rest(target[0], guess)
+    np.testing.assert_allclose(holding, found[0], atol=1e-4)  # N·m of 2: the weight alone
+    moments = CubicSpline(t, found - found[0] + holding)
+    tip = arm.moved(moments, t, q, damping=0.0)
+    assert np.linalg.norm(tip - target, axis=1).max() < 0.15e-3
+
+
+@pytest.mark.parametrize(
+    ("seed", "stout"),
+    [(0, False), (1, False), (127, False), (129, False), (121, True), (124, True)],
+)
+def test_drawn_arms_follow_their_paths(seed, stout, tmp_path):
+    """Any axes, offsets and sections, undamped or not.
+
+    Zeros of arm 1 cross the imaginary axis; one of arms 121, 124 and 127 passes through infinity, which leaves the ends
+    with one condition more or less than unknowns; of arm 129 derivatives at rest do not lead to the motion.
+    """
+    path, tool = drawn_arm(seed, tmp_path, stout=stout)
+    with ffrobot.solve(path) as results:
+        target, replayed = (results[f"{run}/points/{tool}/position"] for run in ("exact", "again"))
+        way = np.linalg.norm(target[-1] - target[0])
+        assert way > 0.03
+        assert np.linalg.norm(replayed - target, axis=1).max() < 2e-4 * way
+
+
+def universal_arm(folder):
+    """Six joints with the offsets and lengths of a small industrial arm, two links of which bend and twist.
+
+    Along x where all angles are zero: axes z, y, y, y, z, y with d_1, a_2, a_3, d_4, d_5, d_6 (Denavit and Hartenberg).
+    """
+    d1, a2, a3, d4, d5, d6 = 0.09, 0.42, 0.39, 0.11, 0.095, 0.08
+    stiff = {"youngs_modulus": 70e9, "density": 2700.0, "poissons_ratio": 0.33}
+
+    def tube(name, length, outer):
+        section = {"shape": "tube", "outer": outer, "inner": outer - 0.006}
+        geometry = {"kind": "beam", "length": length, "section": section}
+        modes = {"count": 1, "family": ["in-plane-bending", "out-of-plane-bending", "torsion"]}
+        link = {"name": name, "material": stiff, "geometry": geometry, "mesh": {"elements": 8}, "modes": modes}
+        return {"name": name, "link": link | {"reference": {"condition": "cantilever"}, "damping": {"ratio": 0.01}}}
+
+    def drive(name, mass, tip):
+        center = [0.5 * x for x in tip]
+        rigid = {"mass": mass, "center": center, "inertia": [0.004 * mass, 0.004 * mass, 0.003 * mass]}
+        return {"name": name, "rigid": rigid | {"points": {"root": [0.0, 0.0, 0.0], "tip": tip}}}
+
+    bodies = [
+        drive("shoulder", 3.7, [0.0, 0.135, 0.0]), tube("upper", a2, 0.07), tube("fore", a3, 0.055),
+        drive("wrist1", 1.2, [0.0, d4 - 0.02, 0.0]), drive("wrist2", 1.2, [0.0, 0.0, -d5]),
+        drive("wrist3", 0.3, [0.0, d6, 0.0]),
+    ]  # fmt: skip
+    points = ["ground", *(f"{body['name']}.tip" for body in bodies)]
+    joints = [
+        {"name": f"j{k}", "type": "revolute", "between": [points[k], f"{body['name']}.root"],
+         "axis": [float(axis == "x"), float(axis == "y"), float(axis == "z")]}
+        for k, (body, axis) in enumerate(zip(bodies, "zyyyzy", strict=True))
+    ]  # fmt: skip
+    joints[0]["at"] = [0.0, 0.0, d1]
+    angles = [0.2, -1.2, 1.6, -0.9, 0.7, 0.1], [0.6, -0.9, 1.3, -0.8, 0.9, 0.3]
+    postures = [{f"j{k}": angle for k, angle in enumerate(of)} for of in angles]
+    scene = {
+        "name": "arm", "space": "spatial", "gravity": [0.0, 0.0, -9.81], "body": bodies, "joint": joints,
+        "payload": [{"point": "wrist3.tip", "mass": 1.0}],
+    }  # fmt: skip
+    return posed(scene, postures, "wrist3.tip", 0.8, folder / "arm.toml", 1e-8), "wrist3.tip"
+
+
+def test_arm_with_six_joints_and_links_that_bend_and_twist_follows_poses(tmp_path):
+    """Place and orientation of the tool, a payload, gravity: the replay in the nonlinear model.
+
+    Nothing holds its joints: what the inversion leaves of forces, its tolerance, they integrate twice, light wrists
+    most. At 1e-6 the replay is off by 1.5e-5 of the way, whatever its own tolerance.
+    """
+    path, tool = universal_arm(tmp_path)
+    with ffrobot.solve(path) as results:
+        for key, size in (("position", 0.2), ("quaternion", 0.1)):
+            target, replayed = (results[f"{run}/points/{tool}/{key}"] for run in ("exact", "again"))
+            way = np.linalg.norm(target[-1] - target[0])
+            assert way > size
+            assert np.linalg.norm(replayed - target, axis=1).max() < 1e-6 * way
+        assert np.abs(results["exact/points/upper.tip/deflection"]).max() > 5e-5
+
+
+def test_arm_that_starts_next_to_a_singular_posture_is_told_so(tmp_path):
+    """Undeformed it reaches its start, where bent links would need postures beyond the reach of its joints."""
+    path, _ = drawn_arm(126, tmp_path)
+    with pytest.raises(ffrobot.SolveError, match=r"at t = 0 s: at t = 0 s nearly a singular posture.*Move the path"):
+        ffrobot.solve(path)
+
+
+class StopsAfter(Watcher):
+    """Stops an analysis at its n-th question, or at the first beyond a time."""
+
+    def __init__(self, questions=10**9, time=np.inf):
+        self.questions, self.time = questions, time
+
+    def advance(self, t, end):
+        self.questions -= 1
+        return self.questions > 0 and t < self.time
+
+
+def stopped(tmp_path, watcher, analysis=""):
+    modes = 'count = 2\nfamily = ["in-plane-bending", "out-of-plane-bending"]'
+    (tmp_path / "link.toml").write_text(LINK.format(name="link", length=0.4, modes=modes, height=0.006, width=0.012))
+    path = PATH.format(s=S).partition('[[analysis]]\nname = "again"')[0] + analysis
+    (tmp_path / "scene.toml").write_text(ARM.format(motors="section") + path)
+    return solve_scene(tmp_path / "scene.toml", watcher)
+
+
+@pytest.mark.parametrize("questions", [1, 3, 205])
+def test_stop_before_a_motion_is_found_says_so(questions, tmp_path):
+    """At the first posture, among postures, and in the linearisation."""
+    with pytest.raises(ffrobot.SolveError, match=r'analysis "exact": stopped on request before any of its motion'):
+        stopped(tmp_path, StopsAfter(questions))
+
+
+def test_stop_keeps_the_motion_that_was_found(tmp_path):
+    run = stopped(tmp_path, StopsAfter(time=0.1), 'output = "redefined"\n').outcomes["exact"]
+    assert run.status == "interrupted"
+    assert 0.1 < run.time[-1] < 0.4
+    assert np.isfinite(run.q).all()
+    with pytest.raises(ffrobot.SolveError, match=r'"exact" ended at t = 0\.\d+ s \(interrupted\): stopped on request'):
+        run.check_completed()

@@ -1,0 +1,112 @@
+"""Patches placed on links in space: those of planar robots put there, out of plane, bad input."""
+
+import numpy as np
+import planar_tables
+import pytest
+from checkpoints import CASES
+
+import ffrobot
+from ffrobot.common.errors import InputError
+
+INVERSE = {"name": "inverse", "kind": "pcid", "end": 0.2, "output_step": 0.002, "tolerance": 1e-9}
+REACH = {"name": "reach", "kind": "placement", "placement": {"body": "link2"}}
+MOVED = {
+    "name": "moved", "kind": "placement", "about": "inverse", "times": [0.1],
+    "placement": {"body": "link1", "measure": "product", "count": 2},
+}  # fmt: skip
+PATH = {"name": "path", "kind": "placement", "about": "inverse", "placement": {"body": "link2", "criterion": "voltage"}}
+
+
+def tables():
+    return planar_tables.read(CASES / "two_link_placement" / "scene.toml")
+
+
+def in_space(planar, **keys):
+    spatial = planar_tables.in_space(planar) | {"pzt": planar["pzt"], "analysis": planar["analysis"]}
+    return spatial | {"initial": {"joints": {"O": 0.0, "A": np.pi / 3}}} | keys
+
+
+def solve(scene, folder, name="scene"):
+    return ffrobot.solve(planar_tables.write(scene, folder / f"{name}.toml"))
+
+
+def test_planar_robot_put_into_space_gets_the_same_patches(tmp_path):
+    planar = tables() | {"analysis": [INVERSE, REACH, MOVED, PATH]}
+    with solve(planar, tmp_path, "planar") as plane, solve(in_space(planar), tmp_path, "spatial") as space:
+        for name in ("reach", "moved", "path"):
+            for dataset in (
+                "best/centers", "best/reach", "best/value", "even/reach", "even/value", "frequency", "share",
+                "candidates", "candidate_reach",
+            ):  # fmt: skip
+                expected, found = (results[f"{name}/placement/{dataset}"] for results in (plane, space))
+                np.testing.assert_allclose(found, expected, rtol=1e-6, err_msg=f"{name}/{dataset}")
+        expected, found = (results["path/placement/largest_voltage"] for results in (plane, space))
+        np.testing.assert_allclose(found, expected, rtol=1e-6)
+        assert len(expected) == 2
+        for results in (plane, space):
+            assert results.attributes("path")["wall_seconds"] == 0.0  # the integration was that of "inverse"
+            assert results.attributes("path")["steps"] == 0 < results.attributes("inverse")["steps"]
+
+
+STRIP = {
+    "name": "strip", "material": {"youngs_modulus": 70e9, "density": 2700.0},
+    "geometry": {
+        "kind": "beam", "length": 0.6, "section": {"shape": "rectangle", "height": 0.02, "width": 0.004},
+    },
+    "mesh": {"elements": 20}, "reference": {"condition": "cantilever"},
+    "modes": {"count": 4, "family": ["in-plane-bending", "out-of-plane-bending"]},
+}  # fmt: skip
+LAYOUT = {
+    "body": "arm", "count": 1, "length": 0.06, "width": 0.02, "thickness": 0.5e-3, "modulus": 63e9, "d31": 110e-12,
+    "structural": False, "bends": "out-of-plane", "limit": 200.0, "allocation": "least-squares",
+}  # fmt: skip
+
+
+BESIDE = {"name": "b", "bends": "in-plane", "width": 0.004}
+
+
+def strip(folder, layouts, placement):
+    planar_tables.write(STRIP, folder / "strip.toml")
+    hub = {"name": "hub", "type": "revolute", "between": ["ground", "arm.root"], "axis": [0.0, 1.0, 0.0]}
+    return {
+        "name": "strip", "space": "spatial", "gravity": [0.0, 0.0, 0.0],
+        "body": [{"name": "arm", "link": "strip.toml"}],
+        "joint": [hub], "pzt": layouts, "analysis": [{"name": "where", "kind": "placement", "placement": placement}],
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("layouts", "placement"),
+    [([LAYOUT], {"body": "arm"}), ([LAYOUT | {"name": "up"}, LAYOUT | BESIDE], {"body": "arm", "pzt": "up"})],
+)
+def test_patches_out_of_plane_reach_modes_out_of_plane_alone(tmp_path, layouts, placement):
+    """A cantilever that its motor holds: one patch for its first mode sits at the root, where the curvature is most.
+
+    Whatever other layouts the link has.
+    """
+    with solve(strip(tmp_path, layouts, placement), tmp_path) as found:
+        assert found["where/placement/best/centers"] == pytest.approx([0.03])
+        reach = found["where/placement/candidate_reach"][0]
+        assert (np.diff(reach) < 0).all()
+        x, beta = found["where/placement/candidates"], 1.8751040687 / 0.6
+        edges = np.stack([x - 0.03, x + 0.03])
+        s = (np.cosh(1.8751040687) + np.cos(1.8751040687)) / (np.sinh(1.8751040687) + np.sin(1.8751040687))
+        slope = np.sinh(beta * edges) + np.sin(beta * edges) - s * (np.cosh(beta * edges) - np.cos(beta * edges))
+        turn = np.diff(slope, axis=0)[0] ** 2
+        np.testing.assert_allclose(reach, turn / turn.max(), rtol=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("layouts", "placement", "expected"),
+    [
+        ([LAYOUT], {"body": "hub"}, 'found "hub"'),
+        ([LAYOUT], {"body": "arm", "count": 20}, "expected patches that fit side by side"),
+        ([LAYOUT], {"body": "arm", "modes": 9}, "placement.modes: expected at most"),
+        ([LAYOUT, LAYOUT | BESIDE], {"body": "arm"}, 'pzt: expected one of the layouts "arm", "b" of "arm"'),
+        ([LAYOUT, LAYOUT | BESIDE], {"body": "arm", "pzt": "c"}, "placement.pzt: expected one of the layouts"),
+        ([LAYOUT], {"body": "arm", "criterion": "voltage"}, "about: expected an earlier analysis"),
+    ],
+)  # fmt: skip
+def test_bad_input(tmp_path, layouts, placement, expected):
+    with pytest.raises(InputError, match=expected):
+        solve(strip(tmp_path, layouts, placement), tmp_path)

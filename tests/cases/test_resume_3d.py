@@ -1,0 +1,246 @@
+"""Runs in space that were stopped go on from their results file as if they had never been."""
+
+import re
+
+import h5py
+import numpy as np
+import pytest
+from stopped_runs import SAME, Stops, check_attributes, differences, edit, go_on, stop
+
+import ffrobot
+
+END = 0.3
+PATCHES = """
+[[pzt]]
+body = "fore"
+count = 3
+length = 0.05
+width = 0.01
+thickness = 0.5e-3
+modulus = 63e9
+d31 = 110e-12
+"""
+FORWARD = """
+[[analysis]]
+name = "forward"
+kind = "forward"
+actuation = "inverse"
+apply = "joints+pzt"
+integrator = "dop853"
+tolerance = 1e-6
+"""
+
+
+@pytest.fixture
+def arm(case_copy, ffrobot, monkeypatch):
+    """The arm of three joints, a part of its motion, with patches on its forearm; and texts replaced."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(ffrobot.cache))
+
+    def copy(*edits):
+        scene = case_copy("arm_3r")
+        short = [("end = 0.6", f"end = {END}"), ("tolerance = 1e-8", "tolerance = 1e-6")]
+        text = scene.read_text(encoding="utf-8")
+        text = text.replace("[[analysis]]", PATCHES + "\n[[analysis]]", 1) + FORWARD
+        for old, new in (*short, *edits):
+            assert old in text, old
+            text = text.replace(old, new)
+        scene.write_text(text, encoding="utf-8")
+        return scene
+
+    return copy
+
+
+@pytest.mark.parametrize("stopped", ["inverse", "forward"])
+def test_a_resumed_run_is_the_uninterrupted_one(arm, stopped):
+    """To the last bit: explicit methods go on with the same step."""
+    scene = arm()
+    watcher = Stops()
+    expected = ffrobot.solve(scene, None, watcher)
+    assert expected.attributes(stopped)["integrator"] == "dop853"
+    message = stop(scene, stopped, 0.02, watcher.passed(stopped))
+    with h5py.File(scene.with_suffix(".h5")) as file:
+        reached = file[stopped]["resume/checkpoint"].attrs["time"]
+        outputs = len(file[stopped]["time"])
+    assert 0.02 <= reached < END
+    assert message.endswith(f"solve(…, resume=True) resumes from t = {reached:.9g} s")
+    watcher = Stops()
+    results = go_on(scene, watcher)
+    assert (f'analysis "{stopped}"', reached) in watcher.asked
+    for name, difference in differences(results, expected):
+        assert difference < SAME, name
+    check_attributes(results, expected)
+    assert 1 < outputs < len(expected.time(stopped))
+    assert not results.has(f"{stopped}/resume")
+
+
+def test_joints_that_leave_their_ranges_are_told_as_of_a_whole_run(arm):
+    """The elbow has left its own before the run is stopped."""
+    joint = 'between = ["upper.tip", "fore.root"]'
+    scene = arm()
+    plain = ffrobot.solve(scene)
+    t, q = plain.time("inverse"), plain["inverse/joints/elbow/coordinate"]
+    early = np.interp([0.0, 0.015], t, q)
+    lowest, highest = (-9.0, early[1]) if early[1] > early[0] else (early[1], 9.0)
+    edit(scene, {joint: f"{joint}\nposition_limit = [{lowest}, {highest}]"})
+    expected = [text for text in ffrobot.solve(scene).warnings["inverse"] if "leaves its position_limit" in text]
+    assert len(expected) == 1
+    stop(scene, "inverse", 0.02)
+    found = go_on(scene)
+    assert [text for text in found.warnings["inverse"] if "leaves its position_limit" in text] == expected
+    for name, values in plain.columns("inverse").items():
+        np.testing.assert_array_equal(found.columns("inverse")[name], values, err_msg=name)
+
+
+def test_a_body_that_tumbles_goes_on(tmp_path):
+    """Where q has a quaternion, which is brought to length one once more: the same to rounding."""
+    scene = ffrobot.make_scene(
+        folder=tmp_path,
+        name="top",
+        space="spatial",
+        body=[{"name": "top", "rigid": {"mass": 2.0, "center": [0.0, 0.0, 0.3], "inertia": [0.03, 0.05, 0.02],
+                                        "points": {"foot": [0.0, 0.0, 0.0]}}}],
+        joint=[{"name": "pivot", "type": "spherical", "between": ["ground", "top.foot"]}],
+        gravity=[0.0, 1.0, -9.81],
+        initial={"joint_rates": {"pivot": [3.0, 1.0, 40.0]}},
+        analysis=[{"name": "spin", "kind": "forward", "end": 20.0, "output_step": 0.05, "tolerance": 1e-9}],
+    )  # fmt: skip
+    expected, path = ffrobot.solve(scene), tmp_path / "top.h5"
+    with pytest.raises(ffrobot.SolveError, match=r"resume=True\) resumes from t = "):
+        ffrobot.solve(scene, path, Stops("spin", 4.0))
+    results = ffrobot.solve(scene, path, resume=True)
+    assert results.attributes("spin")["steps"] == expected.attributes("spin")["steps"]
+    found = dict(differences(results, expected))
+    for name in ("bodies/top/quaternion[0]", "bodies/top/angular_velocity[2]", "joints/pivot/reaction[2]"):
+        assert found[name] < 1e-10, name
+
+
+def test_runs_behind_gears_that_give_go_on(arm):
+    gear = "gear_ratio = 50.0\nrotor_inertia = 1e-4\nstiffness = 5e3\ndamping = 5.0"
+    joint = 'between = ["upper.tip", "fore.root"]'
+    scene = arm((joint, f"{joint}\n{gear}"), ('apply = "joints+pzt"', 'apply = "joints"'))
+    expected = ffrobot.solve(scene)
+    stop(scene, "forward", 0.02)
+    found = dict(differences(go_on(scene), expected))
+    assert found["joints/elbow/motor_angle"] < 1e-12
+    assert found["joints/elbow/moment"] < 1e-12
+
+
+def test_implicit_methods_go_on_within_the_tolerance(arm):
+    tolerance = 1e-4
+    keys = f'tolerance = {tolerance}\nintegrator = "radau"\nmax_steps = 60'
+    scene = arm(("tolerance = 1e-6", keys))
+    text = scene.read_text(encoding="utf-8")
+    scene.write_text(text[: text.index('[[analysis]]\nname = "forward"')], encoding="utf-8")
+    with pytest.raises(ffrobot.SolveError, match=r"too many steps.*resumes from t = 0\.0"):
+        go_on(scene)  # from the start where there is nothing to go on with
+    scene.write_text(scene.read_text(encoding="utf-8").replace("max_steps = 60", "max_steps = 100_000"), "utf-8")
+    expected = ffrobot.solve(scene)
+    found = dict(differences(go_on(scene), expected))
+    for name in ("joints/waist/moment", "joints/elbow/moment", "pzt/fore/required_voltage[1]"):
+        assert 0.0 < found[name] < tolerance, name
+
+
+@pytest.mark.parametrize(
+    ("file", "old", "new", "change"),
+    [
+        ("scene.toml", "tolerance = 1e-6", "tolerance = 1e-7", 'the scene (analysis "inverse": tolerance)'),
+        ("scene.toml", "waist = 0.2", "waist = 0.3", "the scene (initial.joints.waist)"),
+        ("fore.toml", "outer = ", "outer = 1e-4 + ", None),
+    ],
+)
+def test_input_that_has_changed(arm, file, old, new, change):
+    scene = arm()
+    stop(scene, "inverse", 0.02)
+    place = scene.parent / file
+    text = place.read_text(encoding="utf-8")
+    if change is None:  # a wider tube
+        change = 'the modal body of "fore"'
+        text, count = re.subn(r"outer = ([\d.]+)", lambda m: f"outer = {float(m[1]) * 1.01}", text)
+        assert count == 1
+    else:
+        assert old in text
+        text = text.replace(old, new)
+    place.write_text(text, encoding="utf-8")
+    with pytest.raises(ffrobot.InputError, match="resume: expected results of the same input") as error:
+        go_on(scene)
+    assert f"found that {change} has changed" in str(error.value)
+
+
+def _cut_rows(group):
+    for name in ("q", "v"):
+        values = group[name][()][:-1]
+        del group[name]
+        group[name] = values
+
+
+def _shorten(name):
+    def edit(group):
+        values = group[name][()][:-1]
+        del group[name]
+        group[name] = values
+
+    return edit
+
+
+def _attribute(name, value):
+    return lambda group: group["checkpoint"].attrs.__setitem__(name, value)
+
+
+@pytest.mark.parametrize(
+    ("edit", "names"),
+    [
+        (_cut_rows, "resume/q: expected finite numbers"),
+        (_shorten("checkpoint/state"), "resume/checkpoint/state: expected finite numbers"),
+        (_shorten("checkpoint/force_peaks"), "resume/checkpoint: expected what a run of this scene remembers"),
+        (_shorten("checkpoint/singular_posture"), "resume/checkpoint/singular_posture: expected a posture or none"),
+        (_attribute("time", 99.0), "resume/checkpoint: expected a time after"),
+        (_shorten("samples/times"), "resume/samples/states: expected finite numbers"),
+        (lambda group: group["samples"].attrs.__setitem__("every", 0), "resume/samples: expected states between"),
+        (_attribute("next_step", np.nan), "resume/checkpoint: expected finite numbers"),
+        (_attribute("outputs", 2), "expected as many outputs as times"),
+        (lambda group: group.__delitem__("a"), "resume/a: expected a dataset, found none"),
+        (
+            lambda group: group["checkpoint"].attrs.__delitem__("accepted"),
+            'resume/checkpoint: expected the attribute "accepted", found none',
+        ),
+    ],
+)
+def test_files_that_are_damaged(arm, edit, names):
+    scene = arm()
+    stop(scene, "inverse", 0.02)
+    with h5py.File(scene.with_suffix(".h5"), "r+") as file:
+        edit(file["inverse/resume"])
+        file.attrs.pop("checksum", None)
+    with pytest.raises(ffrobot.InputError, match=names):
+        go_on(scene)
+
+
+def test_on_the_command_line(arm, ffrobot):
+    scene = arm(("tolerance = 1e-6", "tolerance = 1e-6\nmax_steps = 800"))
+    text = scene.read_text(encoding="utf-8")
+    scene.write_text(text[: text.index('[[analysis]]\nname = "forward"')], encoding="utf-8")
+    command, messages = ["solve", "scene.toml", "-o", "r.h5", "--resume"], []
+    while not messages or messages[-1].returncode:
+        messages.append(ffrobot(*command, cwd=scene.parent))
+        assert len(messages) < 20, messages[-1].stderr
+    assert len(messages) > 1
+    assert "; ffrobot solve scene.toml -o r.h5 --resume resumes from t = 0.0" in messages[0].stderr
+    assert ffrobot(*command, cwd=scene.parent).stdout == "r.h5: complete, nothing to go on with\n"
+
+
+def test_outputs_that_fail_leave_the_integration(arm, monkeypatch):
+    """It is kept as if it had been stopped at its end: outputs are made from it without another step."""
+    scene = arm()
+    expected, path = ffrobot.solve(scene), scene.with_suffix(".h5")
+    with monkeypatch.context() as fault:
+        fault.setattr("ffrobot.run.solve.totals", lambda motion: 1 / 0)
+        with pytest.raises(ffrobot.SolveError, match=r'"inverse": outputs failed .* kept .*ZeroDivisionError'):
+            ffrobot.solve(scene, path)
+    kept = ffrobot.Results(path)
+    assert kept.attributes("inverse")["status"] == "not evaluated"
+    assert len(kept.time("inverse")) == len(expected.time("inverse"))
+    results = go_on(scene)
+    found = dict(differences(results, expected))
+    del found["joints/waist/reaction_moment[2]"]  # along the axis of the motor: round-off of zero
+    assert max(found.values()) < SAME
+    assert results.attributes("inverse")["evaluations"] < expected.attributes("inverse")["evaluations"] + 5

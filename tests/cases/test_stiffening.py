@@ -1,0 +1,309 @@
+"""Geometric stiffening in space: blades that spin, links that bend far, planar scenes put there, bad input."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import planar_tables
+import pytest
+from checkpoints import CASES
+from planar_bodies import from_modal_body as planar_body
+from planar_tables import CRANK, REST, STRAIGHT, TIGHT, TWO_LINK, close, compare_two_links
+from rod_chain import falling_tip
+from scipy.linalg import eigh
+
+import ffrobot
+from ffrobot.fe_models.link import computed_modal_body
+from ffrobot.fe_models.modal_body_file import write_modal_body
+from ffrobot.mbs.model.body import from_modal_body as spatial_body
+
+LINK = """
+name = "blade"
+material = {{ youngs_modulus = {E}, poissons_ratio = 0.3, density = 2700.0 }}
+geometry = {{ kind = "beam", length = 1.0, section = {{ shape = "rectangle", height = {height}, width = {width} }} }}
+mesh = {{ elements = 40 }}
+reference = {{ condition = "cantilever" }}
+modes = {{ count = {count}, family = {family} }}
+damping = {{ ratio = 0.0 }}
+"""
+BOTH = '["in-plane-bending", "out-of-plane-bending"]'
+
+
+def write_link(folder, E=7e10, height=0.01, width=0.01, count=24, family=BOTH):
+    path = folder / "blade.toml"
+    path.write_text(LINK.format(E=E, height=height, width=width, count=count, family=family))
+    return str(path)
+
+
+def blade(folder, **keys):
+    """A link on a hub that turns about z."""
+    tables = {
+        "name": "blade",
+        "space": "spatial",
+        "gravity": [0.0, 0.0, 0.0],
+        "geometric_stiffening": True,
+        "body": [{"name": "blade", "link": write_link(folder)}],
+        "joint": [{"name": "hub", "type": "revolute", "between": ["ground", "blade.root"], "axis": [0.0, 0.0, 1.0]}],
+        "trajectory": [{"name": "spin", "joint": "hub", "value": "1.0*t"}],
+        "analysis": [
+            {"name": "turning", "kind": "pcid", "end": 1e-3, "output_step": 1e-3},
+            {"name": "about", "kind": "linear", "about": "turning", "times": [0.0]},
+        ],
+    }
+    return tables | keys
+
+
+# Spin and frequencies over √(EI/ρAL⁴), hub radius 0: first and second flap (Wright, Smith, Thresher, Wang, Vibration
+# modes of centrifugally stiffened beams, J. Appl. Mech. 49, 1982).
+FLAP = {
+    1: (3.6816, 22.181),
+    2: (4.1373, 22.615),
+    3: (4.7973, 23.320),
+    6: (7.3604, 26.809),
+    12: (13.1702, 37.603),
+}
+
+
+@pytest.mark.parametrize("spin", FLAP)
+def test_frequencies_of_a_rotating_cantilever(spin, tmp_path):
+    """Across the plane (flap), and in it with the hub held (lag): ω_lag² = ω_flap² − Ω²."""
+    unit = np.sqrt(7e10 * 0.01**4 / 12 / (2700 * 0.01**2))
+    path = [{"name": "spin", "joint": "hub", "value": f"{float(spin * unit)!r}*t"}]
+    scene = planar_tables.write(blade(tmp_path, trajectory=path), tmp_path / "scene.toml")
+    with ffrobot.solve(scene) as results:
+        flap = 2 * np.pi * results["about/linear/frequency"][0] / unit
+        zeros = np.sort(np.abs(results["about/linear/zeros/1"][0]).max(axis=-1)) / unit  # from the hub's motor to it
+    expected = np.array(FLAP[spin])
+    for flapping in expected:  # with twelve shapes; the numbers have five digits
+        assert np.abs(flap / flapping - 1).min() < 3e-5
+        lag = np.sqrt(flapping**2 - spin**2)
+        assert np.abs(zeros / lag - 1).min() < 1e-4
+
+
+def test_modal_forces_of_small_loads_are_those_without_stiffening(tmp_path):
+    """What forces along a link change goes to zero with them."""
+    path = [{"name": "tip", "point": "blade.tip", "y": "1e-3*t**2"}]
+    analysis = [{"name": "turning", "kind": "pcid", "end": 0.02, "output_step": 0.005}]
+    found = []
+    for stiffened in (True, False):
+        tables = blade(tmp_path, trajectory=path, analysis=analysis, geometric_stiffening=stiffened)
+        with ffrobot.solve(ffrobot.make_scene(**tables)) as results:
+            found.append(results["turning/bodies/blade/modal_force"])
+    assert np.abs(found[1]).max() > 0
+    np.testing.assert_allclose(found[0], found[1], rtol=0, atol=1e-5 * np.abs(found[1]).max())
+
+
+def test_links_that_bend_far_across_the_plane(tmp_path):
+    """Two cantilevers of eight shapes each fall about y: a chain of rigid rods, and their energy, which stays."""
+    E = 7e9
+    link = write_link(tmp_path, E, 0.02, 0.01, 8, '"out-of-plane-bending"')
+    joints = [("O", "ground", "link1.root"), ("A", "link1.tip", "link2.root")]
+    scene = {
+        "name": "falling",
+        "space": "spatial",
+        "gravity": [0.0, 0.0, -9.81],
+        "geometric_stiffening": True,
+        "body": [{"name": name, "link": link} for name in ("link1", "link2")],
+        "joint": [
+            {"name": name, "type": "revolute", "between": [a, b], "axis": [0.0, 1.0, 0.0]} for name, a, b in joints
+        ],
+        "analysis": [{"name": "fall", "kind": "forward", "end": 0.5, "output_step": 0.05, "tolerance": 1e-7}],
+    }
+    with ffrobot.solve(planar_tables.write(scene, tmp_path / "scene.toml")) as results:
+        tip = results["fall/points/link2.tip/position"]
+        energy = sum(results[f"fall/energy/{key}"] for key in ("kinetic", "strain", "gravitational"))
+        exchanged = np.ptp(results["fall/energy/gravitational"])
+    expected = falling_tip(E, 20, np.linspace(0, 0.5, 11))
+    assert np.abs(tip[:, [0, 2]] - expected).max() < 2e-4
+    assert np.abs(tip[:, 1]).max() < 1e-9
+    assert np.abs(energy - energy[0]).max() < 1e-6 * exchanged
+
+
+def both(case, analyses, guess, folder, payload=None, geometric_stiffening=True):
+    """Results of a planar scene with geometric stiffening, and of the same in space."""
+    keys = {"geometric_stiffening": geometric_stiffening, "analysis": analyses}
+    planar = planar_tables.read(CASES / case / "scene.toml") | keys
+    planar.pop("pzt", None)
+    spatial = planar_tables.in_space(planar) | {"initial": {"joints": guess}} | keys
+    if payload is not None:
+        planar["payload"] = spatial["payload"] = [payload]
+    return [
+        ffrobot.solve(planar_tables.write(tables, folder / f"{name}.toml"))
+        for name, tables in (("planar", planar), ("spatial", spatial))
+    ]
+
+
+POINT_MASS = {"point": "link2.tip", "mass": 0.3}
+
+
+@pytest.mark.parametrize("payload", [None, POINT_MASS], ids=["bare", "loaded"])
+def test_two_links_of_the_plane(payload, tmp_path):
+    """A point mass at the tip loads the link as well. (With inertia it is part of the link in the plane alone.)"""
+    planar, spatial = both("two_link", [TIGHT, STRAIGHT, REST], TWO_LINK, tmp_path, payload)
+    with planar, spatial:
+        for analysis, share in (("inverse", 1e-8), ("straight", 1e-11), ("rest", 1e-9)):
+            compare_two_links(planar, spatial, analysis, share)
+        for key in ("kinetic", "strain", "gravitational"):
+            close(spatial[f"inverse/energy/{key}"], planar[f"inverse/energy/{key}"], 1e-8)
+
+
+def test_a_payload_in_space_is_a_body_welded_in_the_plane(tmp_path):
+    """With inertia; a payload of the plane is part of its link, whose fields keep 3e-4 of the moments less of it."""
+    J, keys = 2e-3, {"geometric_stiffening": True, "analysis": [TIGHT | {"end": 0.15, "output_step": 0.01}]}
+    planar = planar_tables.read(CASES / "two_link" / "scene.toml") | keys
+    planar.pop("pzt", None)
+    spatial = planar_tables.in_space(planar) | {"initial": {"joints": TWO_LINK}} | keys
+    spatial["payload"] = [POINT_MASS | {"inertia": [0.7 * J, 0.6 * J, J]}]
+    rigid = {"mass": POINT_MASS["mass"], "inertia": J, "center": [0.0, 0.0], "points": {"root": [0.0, 0.0]}}
+    planar["body"] = [*planar["body"], {"name": "load", "rigid": rigid}]
+    planar["joint"] = [
+        *planar["joint"],
+        {"name": "grip", "type": "weld", "between": [POINT_MASS["point"], "load.root"]},
+    ]
+    found, expected = (
+        ffrobot.solve(planar_tables.write(tables, tmp_path / f"{name}.toml"))
+        for name, tables in (("spatial", spatial), ("planar", planar))
+    )
+    with found, expected:
+        for joint in TWO_LINK:
+            close(found[f"inverse/joints/{joint}/moment"], expected[f"inverse/joints/{joint}/moment"], 1e-8)
+
+
+@pytest.mark.parametrize("stiffened", [False, True])
+def test_two_links_bend_as_those_of_the_plane(stiffened, tmp_path):
+    """How far, how much loads change their stiffness, what that may do to results, and what is said of it.
+
+    In motion the largest values are those of steps, which plane and space end at other times.
+    """
+    planar, spatial = both("two_link", [TIGHT, STRAIGHT, REST], TWO_LINK, tmp_path, geometric_stiffening=stiffened)
+    with planar, spatial:
+        for analysis, rel in (("inverse", 1e-3), ("straight", 1e-3), ("rest", 1e-7)):
+            effects = [of.attributes(analysis)["stiffening_effect"] for of in (spatial, planar)]
+            assert effects[0] == pytest.approx(effects[1], rel=rel)
+            for link in ("link1", "link2"):
+                found, expected = (of.attributes(f"{analysis}/bodies/{link}") for of in (spatial, planar))
+                for key in WRITTEN:
+                    assert found[key] == pytest.approx(expected[key], rel=rel, abs=1e-15), (analysis, link, key)
+            _same_errors(spatial, planar, analysis, rel)
+        told = [
+            {name: [text for text in texts if "bends by" in text] for name, texts in of.warnings.items()}
+            for of in (spatial, planar)
+        ]
+    assert told[0] == told[1]
+    assert bool(told[0]["inverse"]) == (not stiffened)  # loads change their stiffness by more than 1 %
+
+
+WRITTEN = (
+    "largest_deflection", "largest_rotation", "foreshortening", "foreshortening_moment", "stiffness_change",
+)  # fmt: skip
+
+
+def _same_errors(spatial, planar, analysis, rel):
+    """In motion the worst link sets the relative error of all in 3D; in 2D each has its own."""
+    errors = [
+        [of.attributes(f"{analysis}/bodies/{link}")["relative_error"] for link in ("link1", "link2")]
+        for of in (spatial, planar)
+    ]
+    expected = errors[1] if analysis == "rest" else [max(errors[1])] * 2
+    np.testing.assert_allclose(errors[0], expected, rtol=rel, atol=1e-15)
+
+
+def test_how_far_a_cantilever_bends_in_an_oblique_plane(tmp_path):
+    """Under P at its tip: 0.06415 PL³/EI from its chord, shorter by P²L⁵/15(EI)² (w = P(3Lx² − x³)/6EI)."""
+    EI, P = 7e10 * 0.01**4 / 12, 2.0
+    wall = [{"name": "wall", "type": "weld", "between": ["ground", "blade.root"]}]
+    force = {"y": repr(float(P * np.cos(0.8))), "z": repr(float(P * np.sin(0.8)))}
+    rest = {"load": [{"point": "blade.tip", **force}], "joint": wall, "trajectory": [], "analysis": [REST]}
+    with ffrobot.solve(planar_tables.write(blade(tmp_path, **rest), tmp_path / "scene.toml")) as results:
+        found = results.attributes("rest/bodies/blade")
+    at = 1 - 1 / np.sqrt(3)
+    from_chord = P / EI * (2 * at + at**3 - 3 * at**2) / 6
+    assert found["largest_deflection"] == pytest.approx(from_chord, rel=2e-3)  # at stations, between which it may be
+    assert found["largest_rotation"] == pytest.approx(P / EI / 3, rel=1e-6)  # of the root from the chord
+    assert found["foreshortening"] == pytest.approx(P**2 / EI**2 / 15, rel=2e-3)
+    assert found["foreshortening_moment"] == pytest.approx(P**3 / EI**2 / 15, rel=2e-3)
+
+
+def softest_under_spin():
+    """Largest ∫ ½(1 − x²) w'² dx / ∫ w''² dx of clamped w = x², x³, …"""
+    x, weights = np.polynomial.legendre.leggauss(20)
+    x, k = 0.5 * (x[:, None] + 1), np.arange(2, 12)
+    slope, curvature = k * x ** (k - 1), k * (k - 1) * x ** (k - 2)
+    pull = slope.T @ (0.5 * weights[:, None] * 0.5 * (1 - x**2) * slope)
+    return eigh(pull, curvature.T @ (0.5 * weights[:, None] * curvature))[0].max()
+
+
+@pytest.mark.parametrize(("spin", "stiffened"), [(0.05, False), (3.0, True)])
+def test_auto_where_loads_change_the_stiffness(spin, stiffened, tmp_path):
+    """A spin Ω pulls the blade with ρAΩ²(L² − x²)/2: much or little of the stiffness of the shape it stiffens most."""
+    unit = np.sqrt(7e10 * 0.01**4 / 12 / (2700 * 0.01**2))
+    path = [{"name": "spin", "joint": "hub", "value": f"{float(spin * unit)!r}*t"}]
+    frequencies = []
+    for key in ("auto", stiffened):
+        tables = blade(tmp_path, trajectory=path, geometric_stiffening=key)
+        with ffrobot.solve(planar_tables.write(tables, tmp_path / "scene.toml")) as results:
+            assert results.attributes("/")["geometric_stiffening"] == stiffened
+            effect = results.attributes("turning")["stiffening_effect"]
+            frequencies.append(results["about/linear/frequency"][0])
+    assert effect == pytest.approx(softest_under_spin() * spin**2, rel=1e-3)
+    np.testing.assert_array_equal(*frequencies)
+
+
+def test_linear_model_of_two_links_of_the_plane(tmp_path):
+    moving = {"name": "moving", "kind": "linear", "about": "inverse", "times": [0.0, 0.1, 0.2]}
+    planar, spatial = both("two_link", [TIGHT, moving], TWO_LINK, tmp_path)
+    with planar, spatial:
+        found, expected = (results["moving/linear/frequency"] for results in (spatial, planar))
+        np.testing.assert_allclose(found, expected, rtol=1e-7, atol=1e-6)
+
+
+def test_slider_crank_of_the_plane(tmp_path):
+    planar, spatial = both("slider_crank", [TIGHT | {"end": 0.05}], CRANK, tmp_path)
+    with planar, spatial:
+        close(spatial["inverse/trajectories/slider/force"], planar["inverse/trajectories/slider/force"], 1e-8)
+        close(spatial["inverse/bodies/rod/modal"], planar["inverse/bodies/rod/modal"], 1e-8)
+        name = "inverse/points/rod.mid/deflection"
+        close(spatial[name][:, :2], planar[name], 1e-8)
+
+
+def test_what_a_file_of_a_beam_says_of_the_plane_and_of_space(tmp_path):
+    """∫ρxG_x is K_omega of the plane, ∫ρG_x its K_s; nothing else, in the plane or across it, of a straight beam."""
+    modal = computed_modal_body(Path(write_link(tmp_path)))
+    in_plane, in_space = planar_body("b", modal).stiffening, spatial_body("b", modal, stiffened=True).stiffening
+    chosen = np.ix_(*[np.flatnonzero(np.array(modal.family) == "in-plane-bending")] * 2)
+    peak = np.abs(in_plane.K_omega).max()
+    np.testing.assert_allclose(in_space.K_x[0, 0][chosen], in_plane.K_omega, atol=1e-12 * peak)
+    np.testing.assert_allclose(in_space.K_s[0][chosen], in_plane.K_s[0], atol=1e-12 * peak)
+    rest = in_space.K_x.copy()
+    rest[0, 0] = 0.0
+    assert np.abs(rest).max() < 1e-12 * peak
+    assert np.abs(in_space.K_s[1:]).max() < 1e-12 * peak
+
+
+REFUSED = {
+    "point between interfaces": (
+        {"load": [{"point": "blade.mid", "y": 1.0}]},
+        r'load no. 1: point: expected, with geometric_stiffening, a point .* \("root", "tip"\), found "blade.mid"',
+    ),
+    "neither true, false nor auto": (
+        {"geometric_stiffening": "yes"},
+        'geometric_stiffening: expected true or false or "auto", found "yes"',
+    ),
+}
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_bad_input(case, tmp_path):
+    keys, says = REFUSED[case]
+    scene = planar_tables.write(blade(tmp_path, **keys), tmp_path / "scene.toml")
+    with pytest.raises(ffrobot.InputError, match=says):
+        ffrobot.solve(scene)
+
+
+def test_files_without_geometric_stiffness_are_named(tmp_path):
+    scene = blade(tmp_path)
+    bare = replace(computed_modal_body(tmp_path / "blade.toml"), geometric_stiffness={})
+    write_modal_body(tmp_path / "blade.h5", bare)
+    scene["body"] = [{"name": "blade", "modal": "blade.h5"}]
+    with pytest.raises(ffrobot.InputError, match=r'geometric_stiffening: expected modal bodies .* of "blade"'):
+        ffrobot.solve(planar_tables.write(scene, tmp_path / "scene.toml"))

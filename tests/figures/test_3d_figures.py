@@ -1,0 +1,152 @@
+"""Figures of scenes in space: which there are, that bodies are drawn where they were solved, and to scale."""
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+from mpl_toolkits.mplot3d.art3d import Line3DCollection
+from PIL import Image
+from scipy.sparse.csgraph import minimum_spanning_tree
+from scipy.spatial import distance
+
+from ffrobot.common.errors import InputError
+from ffrobot.pictures.drawn_3d.shapes import line_shape, shortest_tree, surface_shape
+from ffrobot.pictures.figures.configurations_3d import draw_configurations_3d
+from ffrobot.pictures.figures.figure_file import FigureRecord
+from ffrobot.pictures.figures.plot import draw, plot_results
+from ffrobot.pictures.figures.standard import standard_figures
+from ffrobot.pictures.motion import moving_bodies, section_axes
+from ffrobot.results.file import Results
+
+FRAMES = np.array([0, 20, 61, 120])
+
+
+@pytest.fixture(scope="module")
+def arm(arm_3r):
+    with Results(arm_3r.folder / "scene.results.h5") as results:
+        yield results
+
+
+@pytest.fixture(scope="module")
+def crank(slider_crank_3d):
+    with Results(slider_crank_3d.folder / "scene.results.h5") as results:
+        yield results
+
+
+def test_standard_figures(arm, crank):
+    names = {record.name for record in standard_figures(arm)}
+    per_joint = {f"{what}_{joint}" for joint in ("waist", "shoulder", "elbow")
+                 for what in ("coordinate", "moment", "torque_speed", "reaction")}  # fmt: skip
+    assert per_joint <= names
+    assert {"configurations_inverse", "path_tool", "force_tool", "energy_inverse", "deflection_fore.tip",
+            "modal_inverse_upper", "modal_force_inverse_fore"} <= names  # fmt: skip
+    names = {record.name for record in standard_figures(crank)}
+    assert {"coordinate_universal_1", "coordinate_universal_2", "reaction_ball", "coordinate_guide"} <= names
+    assert not {"moment_universal_1", "coordinate_ball", "deflection_crank.tip"} & names  # no motor, no angle, rigid
+
+
+def test_deflections_are_drawn_by_axes_of_the_body(arm):
+    record = next(r for r in standard_figures(arm) if r.name == "deflection_fore.tip")
+    labels = {curve.label: curve.data for curve in record.curves}
+    assert labels == {f"inverse, {c}": f"inverse/points/fore.tip/deflection[{k}]" for k, c in ((1, "y"), (2, "z"))}
+
+
+def test_every_standard_figure_is_drawn(arm_3r, tmp_path):
+    results = tmp_path / "scene.results.h5"  # without figures.toml beside it
+    results.write_bytes((arm_3r.folder / "scene.results.h5").read_bytes())
+    paths = plot_results(results, tmp_path / "figures", ["png"])
+    with Results(results) as opened:
+        assert [path.stem for path in paths] == [record.name for record in standard_figures(opened)]
+    for path in paths:
+        assert (np.asarray(Image.open(path).convert("L")) < 100).sum() > 300  # axes, labels, curves
+
+
+@pytest.mark.parametrize("s", [1.0, 40.0])
+def test_links_are_drawn_where_they_were_solved_and_joined(arm, s):
+    """Ends of the lines against the file; at 40 times the deflection, too, each begins where the one before it ends."""
+    bodies, shift = moving_bodies(arm, "inverse", FRAMES)
+    drawn = {}
+    for body, carried in zip(bodies, shift, strict=True):
+        at = line_shape(arm, body, []).placed(body, carried, s)
+        drawn[body.name] = at
+        if s == 1.0:
+            for end, label in ((0, "root"), (-1, "tip" if body.name != "column" else "top")):
+                expected = arm[f"inverse/points/{body.name}.{label}/position"][FRAMES]
+                at_end = at[:, end] if body.name != "column" else at[:, np.argsort(body.points[:, 2])[end]]
+                np.testing.assert_allclose(at_end, expected, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(drawn["fore"][:, 0], drawn["upper"][:, -1], rtol=0, atol=1e-12)
+    bent = np.linalg.norm(drawn["fore"][:, -1] - arm["inverse/points/fore.tip/position"][FRAMES], axis=1)
+    assert bent.max() < 1e-12 if s == 1.0 else bent.max() > 0.1
+
+
+def test_surface_is_the_section_swept_along_the_line(arm):
+    """Every corner of the tube is its outer radius off the deformed axis, to second order of the slopes."""
+    bodies, shift = moving_bodies(arm, "inverse", FRAMES)
+    for body, carried, radius in zip(bodies[1:], shift[1:], (0.0055, 0.004), strict=True):
+        line = line_shape(arm, body, []).placed(body, carried, 1.0)
+        surface = surface_shape(arm, body, []).placed(body, carried, 1.0)
+        corners = surface.shape[1] // line.shape[1]
+        away = np.linalg.norm(surface.reshape(len(FRAMES), -1, corners, 3) - line[:, :, None], axis=3)
+        np.testing.assert_allclose(away, radius, rtol=1e-3)
+
+
+def test_sections_have_the_axes_of_the_file(crank):
+    """The universal joint's axes are square at all times: z of the crank's tip, y of the rod's root."""
+    bodies, _ = moving_bodies(crank, "inverse", FRAMES)
+    z = section_axes(bodies, "crank.tip", len(FRAMES))[:, :, 2]
+    y = section_axes(bodies, "rod.root", len(FRAMES))[:, :, 1]
+    np.testing.assert_allclose(np.sum(z * y, axis=1), 0.0, atol=1e-10)
+    axis = [0.19047253607043549, -0.47618134017608871, 0.85847046790847781]  # of the crank, scene.toml
+    np.testing.assert_allclose(z, np.tile(axis, (len(FRAMES), 1)), atol=1e-12)
+
+
+def test_tree_of_points_is_the_shortest():
+    points = np.random.default_rng(7).normal(size=(9, 3))
+    edges = shortest_tree(points)
+    length = np.linalg.norm(points[edges[:, 0]] - points[edges[:, 1]], axis=1).sum()
+    expected = minimum_spanning_tree(distance.squareform(distance.pdist(points))).sum()
+    assert length == pytest.approx(expected, rel=1e-12)
+    assert len({int(k) for k in edges.ravel()}) == 9
+    assert shortest_tree(points[:1]).shape == (0, 2)
+
+
+def test_a_metre_is_as_long_on_all_axes(arm, crank):
+    """The parallel projection of the figure takes the unit vectors of space to rows of equal length at right angles."""
+    for results in (arm, crank):
+        record = next(r for r in standard_figures(results) if r.kind == "configurations")
+        picture = draw_configurations_3d(record, results)
+        assert isinstance(picture, Figure)
+        (axes,) = picture.axes
+        rows = axes.get_proj()[:2, :3]
+        scale = rows[0] @ rows[0]
+        np.testing.assert_allclose(rows @ rows.T, scale * np.eye(2), atol=1e-9 * scale)
+
+
+def test_configurations_hold_every_link_at_every_time(arm):
+    record = FigureRecord(name="c", kind="configurations", analysis="inverse", times=(0.0, 0.1, 0.6), exaggeration=3.0)
+    (axes,) = draw_configurations_3d(record, arm).axes
+    assert "deflections × 3" in axes.get_title(loc="left")
+    lines = [artist for artist in axes.collections if isinstance(artist, Line3DCollection)]
+    assert len(lines) == 3 * 3  # times, bodies
+    limits = np.array([axes.get_xlim(), axes.get_ylim(), axes.get_zlim()])
+    bodies, shift = moving_bodies(arm, "inverse", FRAMES[[0, 1, 3]])
+    for body, carried in zip(bodies, shift, strict=True):
+        at = line_shape(arm, body, []).placed(body, carried, 3.0)
+        assert np.all(at > limits[:, 0])
+        assert np.all(at < limits[:, 1])
+
+
+def test_exaggeration_is_of_configurations_in_space_only(slider_crank):
+    with pytest.raises(ValueError, match='"exaggeration" only in kind = "configurations", found kind = "time"'):
+        FigureRecord(name="t", curves=({"data": "a", "label": "a"},), exaggeration=2.0)
+    plane = FigureRecord(name="p", kind="configurations", analysis="inverse", times=(0.0,), exaggeration=2.0)
+    with Results(slider_crank.folder / "scene.results.h5") as results, pytest.raises(InputError, match="a planar one"):
+        draw(plane, results)
+
+
+def test_paths_in_space_have_three_columns(arm):
+    curve = {"data": "inverse/points/fore.tip/position", "label": "tip"}
+    (axes,) = draw(FigureRecord(name="p", kind="path", curves=(curve,)), arm).axes
+    np.testing.assert_allclose(np.array(axes.lines[0].get_data_3d()).T, arm[curve["data"]])
+    wrong = {"data": "inverse/points/fore.tip/quaternion", "label": "tip"}
+    with pytest.raises(InputError, match=r'expected three columns \(x, y, z\) in ".*quaternion", found 4'):
+        draw(FigureRecord(name="p", kind="path", curves=(wrong,)), arm)

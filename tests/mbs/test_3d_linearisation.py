@@ -1,0 +1,160 @@
+"""Linear equations in space against differences of the nonlinear ones: all joints, loops, in motion."""
+
+import ctypes
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from moving_trees import moving
+from rotations import logarithm
+from spatial_trees import TYPES
+
+from ffrobot.common.rotations import of_quaternion
+from ffrobot.mbs import _core
+from ffrobot.mbs._core import StateFunction
+from ffrobot.mbs.model.model import row_values
+from ffrobot.mbs.model.system import MultibodySystem
+from ffrobot.mbs.scene.loads import Load
+from ffrobot.mbs.solve.linearisation import LinearEquations
+
+KINDS = ("rigid", "solid", "beam", "supported beam")
+
+
+def kinds_of(joint):
+    return ("rigid", "beam") if joint == "free" else KINDS
+
+
+def differences(function, n, h=1e-4):
+    """∂function/∂x (…, n) at x = 0 by differences of fourth order."""
+    columns = []
+    for k in range(n):
+        dx = np.zeros(n)
+        dx[k] = h
+        values = [function(s * dx) for s in (-2, -1, 1, 2)]
+        columns.append((values[0] - 8 * values[1] + 8 * values[2] - values[3]) / (12 * h))
+    return np.stack(columns, axis=-1)
+
+
+@pytest.mark.parametrize("loops", [0, 1])
+@pytest.mark.parametrize("joint", TYPES)
+def test_derivatives_are_those_of_evaluations(joint, loops):
+    if loops and joint not in ("revolute", "spherical", "universal"):
+        pytest.skip("random loops of these are rigid")
+    rng = np.random.default_rng(TYPES.index(joint))
+    motion, system = moving(rng, [joint] * 3, kinds_of(joint), loops=loops)
+    tree, q, v = motion.model.tree, motion.q[0], motion.v[0]
+    target = rng.standard_normal(len(motion.model.rows))
+    force = rng.standard_normal(tree.n_v)
+    found = system.core.derivatives(q, v, target, force, None)
+
+    def a(dq=0.0, dv=0.0, df=0.0):
+        return system.core.evaluate(tree.integrate(q, np.zeros(tree.n_v) + dq), v + dv, target, force + df, None)[0]
+
+    # By forces a is linear: with a step of 1 differences are exact but for rounding, which a small step magnifies.
+    for derivative, by, h in ((found.a_q, "dq", 1e-5), (found.a_v, "dv", 1e-5), (found.a_f, "df", 1.0)):
+        expected = differences(lambda x, by=by: a(**{by: x}), tree.n_v, h)
+        np.testing.assert_allclose(derivative, expected, rtol=0, atol=2e-8 * max(1, np.abs(expected).max()))
+    if loops:
+        np.testing.assert_allclose(found.value_q, row_values(motion.model, q[None], np.zeros(1))[1][0], atol=1e-12)
+        expected = differences(lambda x: system.core.measure(tree.integrate(q, x), v)[1], tree.n_v)
+        np.testing.assert_allclose(found.rate_q, expected, atol=1e-8 * np.abs(expected).max())
+
+
+def pull(t, position, rate, force):
+    """On a section: a cubic spring, a damper that turns with it, moments of its orientation, and of its spin."""
+    r, R, v, omega = np.array(position[:3]), np.array(position[3:12]).reshape(3, 3), rate[:3], rate[3:6]
+    force[:3] = -3.0 * (r - 0.2) * (1 + r @ r) - R @ np.diag([1.0, 2.0, 0.5]) @ R.T @ v
+    force[3:6] = 2.0 * R[:, 0] + t * R[:, 1] - np.square(omega) * np.sign(omega)
+
+
+@pytest.mark.parametrize("joint", ["revolute", "spherical", "free"])
+def test_derivatives_with_a_force_of_the_motion(joint):
+    """Its own derivatives are central differences, which leave about 1e-9."""
+    numbers = ctypes.POINTER(ctypes.c_double)
+
+    @ctypes.CFUNCTYPE(None, ctypes.c_double, numbers, numbers, numbers)
+    def compiled(t, position, rate, force):
+        position, rate, force = (np.ctypeslib.as_array(x, (n,)) for x, n in ((position, 12), (rate, 6), (force, 6)))
+        pull(t, position, rate, force)
+
+    motion, _ = moving(np.random.default_rng(TYPES.index(joint)), [joint] * 3, kinds_of(joint))
+    model, q, v, t = motion.model, motion.q[0], motion.v[0], 0.7
+    body = model.tree.nodes[-1].body
+    function = StateFunction.compiled(ctypes.cast(compiled, ctypes.c_void_p).value, is_planar=False)
+    load = Load(point=f"{body.name}.{list(body.points)[-1]}", force=function)
+    system = MultibodySystem(replace(model, scene=model.scene.model_copy(update={"load": (load,)})))
+    found, n = system.derivatives(t, q, v, np.zeros(model.tree.n_v)), model.tree.n_v
+
+    def a(dq=0.0, dv=0.0):
+        states = np.concatenate([model.tree.integrate(q, np.zeros(n) + dq), v + dv])[None]
+        return _core.tree_outputs(system.core, system.scene, [t], states, None).accelerations[0]
+
+    without = MultibodySystem(model).derivatives(t, q, v, np.zeros(n))
+    for key, by in (("a_q", "dq"), ("a_v", "dv")):
+        expected = differences(lambda x, by=by: a(**{by: x}), n, 1e-4)
+        difference = getattr(found, key) - expected
+        np.testing.assert_allclose(difference, 0, atol=2e-7 * max(1, np.abs(expected).max()))
+        assert np.abs(getattr(without, key) - expected).max() > 1e3 * np.abs(difference).max()
+
+
+@pytest.mark.parametrize("loops", [0, 1])
+@pytest.mark.parametrize("joint", TYPES)
+def test_the_motion_itself_is_one_of_the_motions_beside_it(joint, loops):
+    """Begun a little later, a free motion is δ = v, δs̈ the rate of its accelerations."""
+    if loops and joint not in ("revolute", "spherical", "universal"):
+        pytest.skip("random loops of these are rigid")
+    motion, system = moving(np.random.default_rng(20 + TYPES.index(joint)), [joint] * 3, kinds_of(joint), loops=loops)
+    q, v, a = motion.q[0], motion.v[0], motion.a[0]
+    linearisation = LinearEquations(motion.model, q)
+    found = linearisation.at(0.0, q, v, a)
+    s, none = linearisation.independent, np.zeros(len(motion.model.rows))
+    core = system.core.derivatives(q, v, none, None, None)
+    signs = found.transformation[s].diagonal()
+    jerk = signs * (core.a_q @ v + core.a_v @ a)[s]
+    terms = [found.M @ jerk, found.D @ (signs * a[s]), found.K @ (signs * v[s])]
+    np.testing.assert_allclose(sum(terms), 0, atol=1e-9 * max(np.abs(term).max() for term in terms))
+    np.testing.assert_allclose(found.force, 0, atol=1e-9 * max(1.0, np.abs(found.M @ a[s]).max()))
+
+
+@pytest.mark.parametrize("types", [["free", "revolute"], ["spherical", "universal"], ["free"], ["revolute"] * 3])
+def test_motions_beside_a_motion(types):
+    """Of two motions that begin beside each other, orientations among them, along the body's own axes."""
+    rng = np.random.default_rng(len(types))
+    motion, system = moving(rng, types, ("beam",))
+    tree, q, v = motion.model.tree, motion.q[0], motion.v[0]
+    linearisation = LinearEquations(motion.model, q)
+    found = linearisation.at(0.0, q, v, motion.a[0])
+    s, h, epsilon = linearisation.independent, 2e-4, 3e-5
+    signs = found.transformation[s].diagonal()
+    ds, ds_dot = rng.standard_normal((2, len(s)))
+    dq, dv = found.transformation @ ds, found.transformation @ ds_dot + found.transformation_rate @ ds
+    times = h * np.arange(7)
+    controls = _core.IntegrationControls(
+        tolerance=1e-13, max_steps=100000, methods=[(_core.MethodKind.dop853, 1.0, 0.0)], spectral_radius=1.0
+    )
+
+    def states(size):
+        start = tree.integrate(q, size * dq), v + size * dv
+        run = _core.tree_motion(system.core, system.scene, list(times), *start, controls, lambda t: True)
+        return run.states[:, : tree.n_q]
+
+    beside = [states(size) for size in (epsilon, -epsilon)]
+    path = np.array([_difference(tree, one, other)[s] for one, other in zip(*beside, strict=True)]) / (2 * epsilon)
+    derivatives = np.polyfit(times / h, signs * path, 6)
+    np.testing.assert_allclose(derivatives[-2] / h, ds_dot, rtol=0, atol=1e-6 * np.abs(ds_dot).max())
+    expected = -np.linalg.solve(found.M, found.D @ ds_dot + found.K @ ds)
+    np.testing.assert_allclose(2 * derivatives[-3] / h**2, expected, rtol=0, atol=1e-5 * np.abs(expected).max())
+
+
+def _difference(tree, q1, q0):
+    """Increment along v from q0 to q1, both beside each other."""
+    found = np.zeros(tree.n_v)
+    for node in tree.nodes:
+        found[node.p_v] = q1[node.p_q] - q0[node.p_q]
+        own, straight = (q1[node.q], q0[node.q]), max(0, node.joint.q_count - 4)
+        if node.joint.q_count == node.joint.freedoms:
+            found[node.v] = own[0] - own[1]
+            continue
+        R1, R0 = (of_quaternion(x[straight:]) for x in own)
+        found[node.v] = np.concatenate([own[0][:straight] - own[1][:straight], logarithm(R0.T @ R1)])
+    return found

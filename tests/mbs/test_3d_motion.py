@@ -1,0 +1,117 @@
+"""What is read off a motion in space, at the states and path forces of independent numbers."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from checkpoint_scenes import checkpoint_scene
+from spatial_checkpoints import CASES, load
+
+from ffrobot.mbs.model.model import build_model, row_values
+from ffrobot.mbs.quantities.motion import RobotMotion, continuous
+from ffrobot.run.bodies import load_bodies
+
+CLOSE = 2e-9  # of the peak: the digits in which two step sizes of the numbers agree
+
+
+def motion_of(name, motors="section"):
+    """The samples of a checkpoint as a motion: multipliers of paths are their forces, those of loops are left 0."""
+    scene, data = checkpoint_scene(name), load(name)
+    if motors == "frame":
+        scene = scene.model_copy(update={"motors": "frame"})
+    model = build_model(scene, [body.spatial for body in load_bodies(scene, lambda _: None)])
+    tree, samples = model.tree, data["samples"]
+    time = np.array([sample["t"] for sample in samples])
+    q, v = np.zeros((len(time), tree.n_q)), np.zeros((len(time), tree.n_v))
+    angles, rates = (np.array([sample[key] for sample in samples]) for key in ("joints", "joint_rates"))
+    first = 0
+    for node in tree.nodes:
+        body = samples[0]["bodies"].get(node.body.name)
+        if body is None:  # the slider of the slider-crank: its way is that of the rod's tip
+            continue
+        count = node.joint.freedoms
+        q[:, node.q], v[:, node.v] = angles[:, first : first + count], rates[:, first : first + count]
+        first += count
+        if node.body.n_modes:
+            q[:, node.p_q] = [sample["bodies"][node.body.name]["modal"] for sample in samples]
+            v[:, node.p_v] = [sample["bodies"][node.body.name]["modal_velocity"] for sample in samples]
+    if name == "slider_crank_3d":
+        guide = tree.nodes[tree.index["slider"]]
+        q[:, guide.q] = row_values(model, q, time)[0][:, :1] * -1.0  # rod tip to slider pin along x
+        q[:, guide.q] *= np.sign(guide.inner.triad[0, 2])
+    forces = np.array([sample["path_force"] for sample in samples])
+    multipliers = np.zeros((len(time), len(model.rows)))
+    count = int(np.count_nonzero(~model.loop_rows))
+    multipliers[:, ~model.loop_rows] = -forces[:, :count]
+    return RobotMotion(model, time, q, v, np.zeros_like(v), multipliers), data
+
+
+@pytest.fixture(params=CASES, scope="module")
+def case(request):
+    return motion_of(request.param)
+
+
+def test_rows_hold(case):
+    motion, _ = case
+    assert np.abs(motion.rows[0]).max() < 1e-10
+
+
+def close(found, expected, scale=None):
+    expected = np.array(expected)
+    np.testing.assert_allclose(found, expected, atol=CLOSE * max(np.abs(expected).max(), scale or 1e-12))
+
+
+def test_bodies_and_points(case):
+    motion, data = case
+    for name in data["samples"][0]["bodies"]:
+        if name == "cross":
+            continue
+        of_body = [sample["bodies"][name] for sample in data["samples"]]
+        found = motion.body(name)
+        close(found.position, [each["position"] for each in of_body], 1.0)
+        expected = continuous(np.array([each["quaternion"] for each in of_body]))
+        close(found.orientation * np.sign(found.orientation[0] @ expected[0]), expected)
+        body_axes = np.einsum("tij,ti->tj", motion.frames[motion.model.tree.index[name]].F, found.angular_velocity)
+        close(body_axes, [each["angular_velocity_body"] for each in of_body], 1.0)
+    for name in data["samples"][0]["points"]:
+        close(motion.point(name).deflection, [sample["points"][name]["deflection"] for sample in data["samples"]])
+
+
+def test_motor_moments_and_modal_forces(case):
+    motion, data = case
+    loop = "motor_moment" in data["samples"][0]
+    found = motion.motor_forces
+    if loop:
+        close(found.moments["crank"][:, 0], [sample["motor_moment"] for sample in data["samples"]])
+    else:
+        close(np.hstack(list(found.moments.values())), [sample["moments"] for sample in data["samples"]])
+    for name, values in found.modal.items():
+        if values.shape[1]:
+            close(values, [sample["bodies"][name]["modal_force"] for sample in data["samples"]])
+
+
+@pytest.mark.parametrize("name", [name for name in CASES if name != "slider_crank_3d"])
+def test_motors_between_frames(name):
+    """The same moments, other modal forces: no angle, but a virtual work."""
+    motion, data = motion_of(name, "frame")
+    close(np.hstack(list(motion.motor_forces.moments.values())), [sample["moments"] for sample in data["samples"]])
+    for body, values in motion.motor_forces.modal.items():
+        if values.shape[1]:
+            close(values, [sample["bodies"][body]["modal_force_frame"] for sample in data["samples"]])
+
+
+def test_quaternions_do_not_jump():
+    angle = np.linspace(0, 4 * np.pi, 50)
+    e = np.stack([np.cos(angle / 2), np.sin(angle / 2), 0 * angle, 0 * angle], axis=1)
+    jumping = e * np.where(e[:, :1] < 0, -1.0, 1.0)
+    np.testing.assert_allclose(continuous(jumping), e, atol=1e-15)
+
+
+def test_coordinates_are_those_of_the_sides_as_named():
+    """A joint named from the outside in has the opposite coordinate, and rate."""
+    motion, data = motion_of("stanford")
+    for number, name in enumerate(("q1", "q2", "q3")):
+        x, rate = motion.joint(name)
+        close(x[:, 0], [sample["joints"][number] for sample in data["samples"]])
+        close(rate[:, 0], [sample["joint_rates"][number] for sample in data["samples"]])
+    assert replace(motion, time=motion.time).joint("nothing") is None

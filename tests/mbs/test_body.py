@@ -1,0 +1,102 @@
+"""What a scene in space takes from modal bodies and rigid ones: inertia about the link's axis, files without it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from spatial_checkpoints import modal_body
+from spatial_oracle import body_mass_matrix
+from spatial_trees import random_beam, stiffened
+
+from ffrobot.common.errors import InputError
+from ffrobot.common.rotations import exponential
+from ffrobot.mbs.model.bending import bent_section
+from ffrobot.mbs.model.body import from_modal_body, rigid_body
+from ffrobot.mbs.model.masses import with_payload
+
+
+def test_straight_line_of_mass_has_inertia_about_its_axis():
+    """J_11 = ρI_p l of a tube; twist couples with spin, and moves nothing along z."""
+    link = modal_body("links/upper.toml")
+    body = from_modal_body("upper", link)
+    I_p = np.pi / 32 * (0.011**4 - 0.009**4)
+    assert body.inertia[0, 0] == pytest.approx(2700.0 * I_p * 0.7, rel=1e-12)
+    torsion = [family == "torsion" for family in link.family]
+    assert np.all(np.abs(body.spin[0, torsion]) > 0)
+    assert not np.any(np.abs(body.S_bar_kl[2, 2][np.ix_(torsion, torsion)]) > 1e-12)
+
+
+def test_all_of_the_kinetic_energy_is_positive():
+    """M of the straight link, its frame held nowhere, has no singular direction."""
+    body = from_modal_body("upper", modal_body("links/upper.toml"))
+    s = body.first_moment
+    cross = np.array([[0, -s[2], s[1]], [s[2], 0, -s[0]], [-s[1], s[0], 0]])
+    m, J, h = body.mass * np.eye(3), body.inertia, body.spin
+    M = np.block([[m, -cross, body.S_bar], [cross, J, h], [body.S_bar.T, h.T, np.eye(body.n_modes)]])
+    scale = 1 / np.sqrt(np.diag(M))
+    assert np.linalg.eigvalsh(scale[:, None] * M * scale).min() > 1e-4
+
+
+def test_beam_of_an_earlier_version_is_refused_with_the_way_out():
+    link = replace(modal_body("links/upper.toml"), J_spin=None, h_spin=None, S_spin=None)
+    with pytest.raises(InputError, match=r'body "upper": expected .* inertia of the beam .* with `ffrobot link`'):
+        from_modal_body("upper", link)
+    whole = replace(link, kind="solid")  # integrated over its volume: nothing is missing
+    assert from_modal_body("upper", whole).inertia[0, 0] == pytest.approx(link.second_moment[1, 1] * 2, abs=1e-15)
+
+
+def test_rigid_body_about_its_origin():
+    """Steiner's theorem, with products of inertia."""
+    inertia, c = np.array([[0.3, 0.02, 0.01], [0.02, 0.4, -0.03], [0.01, -0.03, 0.5]]), np.array([0.1, -0.2, 0.3])
+    body = rigid_body("b", 2.0, c, inertia, {"root": np.zeros(3), "tip": np.array([0.4, 0, 0])})
+    np.testing.assert_allclose(body.inertia, inertia + 2.0 * (c @ c * np.eye(3) - np.outer(c, c)), rtol=1e-14)
+    np.testing.assert_allclose(body.points["mid"].position, [0.2, 0, 0])
+    assert body.n_modes == 0
+
+
+def test_payload_has_the_energy_of_a_body_on_the_section():
+    """½ m |v_c|² + ½ Ωᵀ J Ω more than without, at any velocity of the straight link; modes are uncoupled again."""
+    rng = np.random.default_rng(4)
+    bare = from_modal_body("upper", modal_body("links/upper.toml"))
+    center, J, m = np.array([0.03, -0.02, 0.05]), np.diag([2e-3, 3e-3, 4e-3]), 0.6
+    loaded = with_payload(bare, "tip", m, center, J)
+    v = rng.standard_normal(6 + bare.n_modes)
+    p_dot = loaded.modal_transform @ v[6:]
+    A = np.eye(3)
+
+    def energy(body, v):
+        return 0.5 * v @ body_mass_matrix(body, A, np.zeros(body.n_modes)) @ v
+
+    at = bare.points["tip"]
+    Omega = v[3:6] + at.rotation @ p_dot
+    v_c = v[:3] + np.cross(v[3:6], at.position) + at.translation @ p_dot + np.cross(Omega, center)
+    expected = energy(bare, np.concatenate([v[:6], p_dot])) + 0.5 * m * v_c @ v_c + 0.5 * Omega @ J @ Omega
+    assert energy(loaded, v) == pytest.approx(expected, rel=1e-12)
+    K = loaded.modal_transform.T @ np.diag(bare.stiffness) @ loaded.modal_transform
+    np.testing.assert_allclose(K, np.diag(loaded.stiffness), atol=1e-9 * loaded.stiffness.max())
+    assert np.all(loaded.stiffness < bare.stiffness * (1 + 1e-12))
+
+
+def test_payload_of_a_stiffened_body_moves_to_second_order():
+    """Integrals of G over points that turn with the section, from where they are at ±p: exp φ~ is not 1 + φ~."""
+    rng = np.random.default_rng(6)
+    bare = stiffened(rng, random_beam(rng, "b"))
+    m, d = rng.uniform(0.1, 0.4, 5), 0.1 * rng.standard_normal((5, 3))
+    center = m @ d / m.sum()
+    spread = np.einsum("i,ik,il->kl", m, d - center, d - center)
+    loaded = with_payload(bare, "tip", m.sum(), center, np.trace(spread) * np.eye(3) - spread)
+    T, h, x = loaded.modal_transform, 1e-4, bare.points["tip"].position
+
+    def points(p):
+        at = bent_section(bare, "tip", p)
+        return at.u + d @ exponential(at.phi).T
+
+    for p in rng.standard_normal((4, bare.n_modes)):
+        second = -(points(h * p) + points(-h * p) - 2 * points(0 * p)) / h**2  # pᵀG p of the points
+        p_loaded = np.linalg.solve(T, p)
+        for found, given, weights in (
+            (loaded.stiffening.K_s, bare.stiffening.K_s, m[None]),
+            (loaded.stiffening.K_x, bare.stiffening.K_x, m * (x + d).T),
+        ):
+            more = p_loaded @ found @ p_loaded - p @ given @ p
+            np.testing.assert_allclose(more.reshape(-1, 3), weights @ second, atol=1e-5 * np.abs(second).max())

@@ -1,0 +1,116 @@
+"""Motors that turn frames in space: what the core makes of them is the virtual work of two frames."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from checkpoint_scenes import as_scene, coordinates, motor_on_frames, tree_model
+from spatial_trees import random_tree
+from tree_accelerations import Accelerated
+
+import ffrobot
+from ffrobot.mbs import _core
+from ffrobot.mbs.model.drives import Drive, Drives
+from ffrobot.mbs.model.known_motion import required_forces
+from ffrobot.mbs.model.system import MultibodySystem
+from ffrobot.mbs.solve.linearisation import LinearEquations
+
+MOMENT = 0.7  # N·m
+
+
+def state_of(turned, drives):
+    """A chain of three solids and beams at random q and v under a motor in its second joint: model, and state."""
+    tree = random_tree(np.random.default_rng(8), ["revolute"] * 3, ("solid", "beam"), chain=True, size=0.02)
+    plain, tables = as_scene(tree, turned)
+    model = tree_model(plain, tables)
+    system = MultibodySystem(model, drives(model))
+    rng = np.random.default_rng(1)
+    q = model.tree.at_rest(coordinates(model, plain, turned))
+    for node in model.tree.nodes:
+        q[node.p_q] = 0.03 * rng.standard_normal(node.body.n_modes)
+    v = rng.standard_normal(model.tree.n_v)
+    state = np.concatenate([q, v])[None]
+    a = _core.tree_outputs(system.core, system.scene, [0.1], state, system.replay).accelerations
+    return model, Accelerated(model.tree, q[None], v[None], a, model.tree.frames(q[None]))
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_generalized_forces_are_the_virtual_work_of_the_frames(turned):
+    """M v̇ − Q of what the core finds is τ z·(∂ω_b − ∂ω_a), z of the joint, ω of the two frames."""
+    size = _core.TimeFunction.constant(MOMENT)
+    model, state = state_of(turned, lambda model: motor_on_frames(model, 1, size))
+    node = model.tree.nodes[1]
+    axis = model.tree.motion(node.inner, state.q, state.frames).F[0, :, 2]
+    expected = MOMENT * axis @ (state.frames[1].L[0, 3:] - state.frames[node.inner.body].L[0, 3:])
+    (found,) = required_forces(model, state, np.array([0.1]))
+    np.testing.assert_allclose(found, expected, atol=1e-9 * MOMENT)
+    modal = ~model.tree.joint_columns
+    assert np.abs(expected[modal]).max() > 1e-3 * MOMENT
+
+
+def test_sections_have_no_part_of_it():
+    """The same moment on sections acts along the joint alone."""
+
+    def along(model):
+        direction = np.zeros(model.tree.n_v)
+        direction[model.tree.nodes[1].v] = 1.0
+        return Drives(along=(Drive(direction, _core.TimeFunction.constant(MOMENT)),))
+
+    model, state = state_of(False, along)
+    (found,) = required_forces(model, state, np.array([0.1]))
+    expected = np.zeros(model.tree.n_v)
+    expected[model.tree.nodes[1].v] = MOMENT
+    np.testing.assert_allclose(found, expected, atol=1e-9 * MOMENT)
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_linear_models_are_those_of_motions_beside_it(turned):
+    """Under a moment that stays as it is the motion itself is one of them, begun a little later: δ = v.
+
+    Its jerk is found by differences of accelerations along it. Of what drives it, the moment alone is left.
+    """
+    size = _core.TimeFunction.constant(MOMENT)
+    model, state = state_of(turned, lambda model: motor_on_frames(model, 1, size))
+    on_frames = replace(model, scene=model.scene.model_copy(update={"motors": "frame"}))
+    q, v, a = state.q[0], state.v[0], state.a[0]
+    linearisation = LinearEquations(on_frames, q)
+    found, tree = linearisation.at(0.0, q, v, a), model.tree
+    expected = np.zeros(tree.n_v)
+    joint = tree.nodes[1].joint.name
+    expected[found.names.index(f"joint/{joint}")] = model.sign(joint) * MOMENT
+    np.testing.assert_allclose(found.force, expected, atol=1e-8)
+
+    system = MultibodySystem(model, motor_on_frames(model, 1, size))
+
+    def acceleration(dt):
+        beside = np.concatenate([tree.integrate(q, dt * v), v + dt * a])
+        return _core.tree_outputs(system.core, system.scene, [0.0], beside[None], system.replay).accelerations[0]
+
+    h = 1e-4  # of a straight line through the state, along which the motion begins
+    s, signs = linearisation.independent, found.transformation[linearisation.independent].diagonal()
+    jerk = (acceleration(-2 * h) - 8 * acceleration(-h) + 8 * acceleration(h) - acceleration(2 * h)) / (12 * h)
+    terms = [found.M @ (signs * jerk[s]), found.D @ (signs * a[s]), found.K @ (signs * v[s])]
+    np.testing.assert_allclose(sum(terms), 0, atol=1e-6 * max(np.abs(term).max() for term in terms))
+    held = LinearEquations(model, q).at(0.0, q, v, a)  # with sections driven K is another
+    assert np.abs(held.K - found.K).max() > 1e-4 * MOMENT
+
+
+LINK = {
+    "material": {"youngs_modulus": 70e9, "poissons_ratio": 0.3, "density": 2700.0},
+    "geometry": {"kind": "beam", "length": 0.4, "section": {"shape": "rectangle", "height": 0.01, "width": 0.02}},
+    "mesh": {"elements": 8}, "reference": {"condition": "cantilever"},
+}  # fmt: skip
+
+
+def test_gears_do_not_give_between_frames_where_modes_tilt_their_axis():
+    """No angle goes with a moment between frames there, of which a spring could be a function."""
+    joint, gear = {"type": "revolute", "axis": [0.0, 0.0, 1.0]}, {"rotor_inertia": 1e-3, "stiffness": 2e3}
+    scene = ffrobot.make_scene(
+        name="arm", space="spatial", motors="frame", gravity=[0.0, 0.0, -9.8],
+        body=[{"name": name, "link": LINK | {"modes": {"count": 2, "family": "all"}}} for name in ("upper", "fore")],
+        joint=[joint | {"name": "shoulder", "between": ["ground", "upper.root"]},
+               joint | gear | {"name": "elbow", "between": ["upper.tip", "fore.root"]}],
+        analysis=[{"name": "rest", "kind": "linear"}],
+    )  # fmt: skip
+    with pytest.raises(ffrobot.InputError, match=r"modes tilt the joint's axis .\"elbow\"."):
+        ffrobot.solve(scene)

@@ -1,0 +1,330 @@
+"""Prescribed motion and the forces of motors in 3D: the core against NumPy on random trees and loops."""
+
+import copy
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from closed_chains import closed_chain
+from moving_trees import SMALL, moving
+from prescribed_oracle import Motor, prescribed_motion, split
+from rotations import random_rotation
+from scipy.linalg import qr
+from spatial_trees import TYPES
+
+from ffrobot.mbs import _core
+from ffrobot.mbs.fields.state_forces import state_function
+from ffrobot.mbs.model.drives import Command, Drive
+from ffrobot.mbs.model.model import row_values
+from ffrobot.mbs.model.rows import ConstraintRow
+from ffrobot.mbs.model.system import MultibodySystem
+from ffrobot.mbs.model.tree import Section
+from ffrobot.mbs.scene.loads import Load
+from ffrobot.mbs.solve.servo import Servo
+
+TIMES = np.array([0.0, 0.01, 0.01, 0.05])
+GROUND = Section(-1, "", np.eye(3), np.zeros(3))
+FAMILIES = ("rigid", "solid", "beam", "supported beam")
+
+
+def polynomial(value, rate, acceleration):
+    """A function of time with these at t = 0, from t = −1 on."""
+    second, first = acceleration / 2, rate - acceleration
+    return _core.TimeFunction.polynomial(np.array([-1.0, 1.0]), np.array([[second, first, value - first - second]]))
+
+
+def candidates(rng, model, q):
+    """Rows of all kinds that may follow a path, which measure 0 at q (n_q,): several for each body."""
+    tree = model.tree
+    frames = tree.frames(q[None])
+    for number, node in enumerate(tree.nodes):
+        for label in ("tip", "side"):
+            section = Section(number, label, np.eye(3), np.zeros(3))
+            yield from (ConstraintRow("path", "point", GROUND, section, f, f) for f in rng.standard_normal((3, 3)))
+            for f in rng.standard_normal((3, 3)):
+                g = tree.motion(section, q[None], frames).F[0].T @ np.cross(f, rng.standard_normal(3))
+                yield ConstraintRow("path", "dot", GROUND, section, f, g)
+        if number:
+            a, f = Section(number - 1, "side", np.eye(3), np.zeros(3)), rng.standard_normal(3)
+            yield ConstraintRow("path", "slide", a, section, f, f)
+        yield from coordinate_rows(node, range(node.v.start, node.v.stop))
+
+
+def angles(rng, model):
+    """Rows of the angles of all bodies against the one before, about any axes."""
+    for number in range(len(model.tree.nodes)):
+        a = Section(number - 1, "side", np.eye(3), np.zeros(3)) if number else GROUND
+        f, g, _ = random_rotation(rng)
+        yield ConstraintRow("path", "turn", a, Section(number, "tip", np.eye(3), np.zeros(3)), f, g)
+
+
+def coordinate_rows(node, coordinates):
+    """Of a joint whose coordinates are numbers; the core has none of planar joints."""
+    zero = np.zeros(3)
+    for k in coordinates if node.joint.q_count == node.joint.freedoms and node.joint.type != "planar" else ():
+        place = node.q.start + k - node.v.start
+        yield ConstraintRow("path", "coordinate", node.inner, node.outer, zero, zero, coordinate=k, q_index=place)
+
+
+def following(rng, model, q, count_more=0, pool=()):
+    """The model with as many path rows as it has freedom, targets that move, and equations that only repeat others."""
+    pool = tuple(pool or candidates(rng, model, q))
+    at, joints = np.zeros(1), model.tree.joint_columns
+    free = freedom(model, q)
+    values, gradients = (found[0] for found in row_values(replace(model, rows=pool), q[None], at))
+    chosen = qr((gradients[:, joints] @ free).T, pivoting=True)[2][: free.shape[1]]
+    path = [
+        pool[k] if pool[k].kind == "dot" else replace(pool[k], target=polynomial(values[k], *rng.standard_normal(2)))
+        for k in chosen
+    ]
+    return replace(model, rows=(*model.rows, *model.rows[:count_more], *path, *path[:count_more]))
+
+
+def freedom(model, q):
+    """Orthonormal columns (joint coordinates, k) of what loops leave of the joints at q (n_q,)."""
+    joints = model.tree.joint_columns
+    if not model.rows:
+        return np.eye(np.count_nonzero(joints))
+    _, values, V = np.linalg.svd(row_values(model, q[None], np.zeros(1))[1][0][:, joints])
+    return V[np.count_nonzero(values > 1e-9 * values[0]) :].T
+
+
+def motors_of(rng, model, q):
+    """As many motors as the loops leave freedom; those along single angles may turn frames."""
+    coordinates = np.flatnonzero(model.tree.joint_columns)
+    free = freedom(model, q)
+    chosen = coordinates[qr(free.T, pivoting=True)[2][: free.shape[1]]]
+    angles = {node.v.start for node in model.tree.nodes if node.joint.type == "revolute"}
+    return [Motor(int(k), rng.choice([-1.0, 1.0]), k in angles and bool(rng.integers(2))) for k in chosen]
+
+
+def in_core(model, motors):
+    """The model in the core with motors."""
+    moved = np.isin(np.arange(model.tree.n_v), [motor.coordinate for motor in motors])
+    system = MultibodySystem(model, commands=[Command(moved.astype(float))])
+    driven = _core.SpatialDriven(system.core, system.scene, (~model.loop_rows).tolist())
+    for motor in motors:
+        driven.add_motor(*motor)
+    return driven
+
+
+def drawn(seed, types, loops=0, count_more=0, pool=lambda *_: ()):
+    """A random robot on its path, its motors, modes (3, T, n), and postures near (T, n_q)."""
+    rng = np.random.default_rng(seed)
+    while True:
+        motion, _ = moving(rng, types, FAMILIES, loops=loops)
+        q = motion.q[0]
+        if freedom(motion.model, q).shape[1] + len(motion.model.rows) == sum(motion.model.tree.joint_columns):
+            break  # loops that rigid links can close, too
+    motors = motors_of(rng, motion.model, q)
+    model = following(rng, motion.model, q, count_more, tuple(pool(rng, motion.model)))
+    modal = np.concatenate([np.r_[node.p_q] for node in model.tree.nodes]).astype(int)
+    sizes = np.array([0.03 * SMALL, 1.0, 1.0])[:, None, None]
+    modes = sizes * rng.standard_normal((3, len(TIMES), len(modal)))
+    modes[0] += q[modal]
+    return model, motors, modes, np.tile(q, (len(TIMES), 1))
+
+
+def check(found, expected, model, motors):
+    """Agreement of all that the core finds, relative to the largest; rounding grows with the condition of C_J."""
+    C_J = expected.C_v[:, :, model.tree.joint_columns]
+    values = np.linalg.svd(C_J, compute_uv=False)
+    grows = max(1.0, 0.1 * (values[:, :1] / np.where(values > 1e-9 * values[:, :1], values, values[:, :1])).max())
+    tau, loops, left = split(model, expected, motors)
+    pairs = {name: (getattr(found, name), getattr(expected, name)) for name in ("q", "v", "a", "required")}
+    pairs |= {"multipliers": (found.multipliers, expected.multipliers), "loops": (found.loops, loops)}
+    pairs |= {"tau": (found.tau, tau), "left": (found.left, left)}
+    for name, (x, y) in pairs.items():
+        tolerance = 1e-12 * grows * max(1.0, np.abs(y).max(initial=0.0))
+        np.testing.assert_allclose(x, y, rtol=0, atol=tolerance, err_msg=name)
+
+
+@pytest.mark.parametrize("types", [["revolute"] * 3, ["revolute", "screw", "revolute"]])
+def test_angles_between_sections_follow_targets(types):
+    """Of one direction about one axis each, however the sections turn otherwise."""
+    model, motors, modes, near = drawn(11, types, pool=angles)
+    assert [row.kind for row in model.rows] == ["turn"] * 3
+    motion = _core.SpatialPrescribedMotion(in_core(model, motors), near[0])
+    check(motion.motion(TIMES.tolist(), *modes, near), prescribed_motion(model, modes, TIMES, near), model, motors)
+
+
+CASES = [([joint] * 3, 0, 0) for joint in TYPES if joint != "weld"]
+CASES += [(["revolute", "weld", "spherical", "universal"], 0, 0), (["planar", "prismatic", "screw"], 0, 2)]
+CASES += [(["revolute"] * 6, 1, 0), (["revolute", "prismatic", "spherical", "revolute"], 1, 1)]
+
+
+@pytest.mark.parametrize(("types", "loops", "count_more"), CASES, ids=str)
+@pytest.mark.parametrize("seed", range(3))
+def test_the_core_finds_the_motion_and_forces_of_numpy(seed, types, loops, count_more):
+    model, motors, modes, near = drawn(seed, types, loops, count_more)
+    driven = in_core(model, motors)
+    found = _core.SpatialPrescribedMotion(driven, near[0]).motion(TIMES.tolist(), *modes, near)
+    check(found, prescribed_motion(model, modes, TIMES, near), model, motors)
+
+
+def motor_rows(model, motors, targets):
+    """The model with the motors' coordinates, which follow `targets`, in place of its path."""
+    rows = [row for row in model.rows if not row.is_trajectory]
+    for motor, target in zip(motors, targets, strict=True):
+        node = next(node for node in model.tree.nodes if node.v.start <= motor.coordinate < node.v.stop)
+        (row,) = coordinate_rows(node, [motor.coordinate])
+        rows.append(replace(row, target=target))
+    return replace(model, rows=tuple(rows))
+
+
+@pytest.mark.parametrize(
+    ("types", "loops"), [(["revolute"] * 3, 0), (["universal", "screw"], 0), (["revolute"] * 6, 1)]
+)
+def test_motors_of_a_redefined_output_are_those_of_less_deflection(types, loops):
+    """The motors' coordinates, rates and accelerations are those on the path with the deflections a p + p_e."""
+    model, motors, modes, near = drawn(3, types, loops)
+    factor, shift = 0.6, 0.3 * modes[0, 0]
+    offset = [_core.TimeFunction.constant(float(p)) for p in shift]
+    still = [_core.TimeFunction.constant(0.0)] * len(motors)
+    path = in_core(model, motors)
+    driven = in_core(motor_rows(model, motors, still), motors) if loops else path
+    motion = _core.SpatialRedefinedMotion(driven, path, near[0], factor, offset)
+    found = motion.motion(TIMES.tolist(), *modes, near)
+    seen = factor * modes
+    seen[0] += shift
+    on_path = prescribed_motion(model, seen, TIMES, near)
+    for k in range(len(TIMES)):
+        targets = []
+        for motor in motors:
+            node = next(node for node in model.tree.nodes if node.v.start <= motor.coordinate < node.v.stop)
+            place = node.q.start + motor.coordinate - node.v.start
+            targets.append(
+                polynomial(on_path.q[k, place], on_path.v[k, motor.coordinate], on_path.a[k, motor.coordinate])
+            )
+        one = motor_rows(model, motors, targets)
+        expected = prescribed_motion(one, modes[:, k : k + 1], np.zeros(1), on_path.q[k : k + 1])
+        tau, lambdas, left = split(one, expected, motors)
+        for x, y in (
+            (found.q[k], expected.q[0]), (found.v[k], expected.v[0]), (found.a[k], expected.a[0]),
+            (found.tau[k], tau[0]), (found.loops[k], lambdas[0]), (found.left[k], left[0]),
+        ):  # fmt: skip
+            np.testing.assert_allclose(x, y, rtol=0, atol=1e-11 * max(1.0, np.abs(y).max(initial=0.0)))
+
+
+def test_loads_are_held_before_and_after_the_path():
+    """Loads of time stay outside of an interval what they are at its ends."""
+    model, motors, modes, near = drawn(0, ["revolute"] * 3)
+    direction = np.ones(model.tree.n_v)
+    model = replace(model, modal_loads=(Drive(direction, polynomial(1.0, 20.0, 5.0)),))
+    motion = _core.SpatialPrescribedMotion(in_core(model, motors), near[0])
+    free = motion.motion(TIMES.tolist(), *modes, near).required
+    motion.hold_loads(0.005, 0.02)
+    held = motion.motion(TIMES.tolist(), *modes, near).required
+    change = [20.0 * (t - h) + 2.5 * (t**2 - h**2) for t, h in zip(TIMES, np.clip(TIMES, 0.005, 0.02), strict=True)]
+    np.testing.assert_allclose(held - free, np.outer(change, direction), atol=1e-10)
+
+
+def test_motion_ends_where_a_path_leaves_the_reach():
+    """From one posture to the next up to the first time without any; with postures near, all others are found."""
+    model, motors, modes, near = drawn(0, ["revolute"] * 3)
+    k = next(k for k, row in enumerate(model.rows) if row.target is not None)
+    rows, away = list(model.rows), polynomial(model.rows[k].target(0.0)[0], 1e4, 0.0)
+    rows[k] = replace(rows[k], target=away)
+    motion = _core.SpatialPrescribedMotion(in_core(replace(model, rows=tuple(rows)), motors), near[0])
+    times, modes = [0.0, 0.04, 0.0], np.repeat(modes[:, :1], 3, axis=1)
+    one_by_one, apart = (motion.motion(times, *modes, start).q for start in (near[:1], near[:3]))
+    np.testing.assert_array_equal(np.isfinite(one_by_one).all(axis=1), [True, False, False])
+    np.testing.assert_array_equal(np.isfinite(apart).all(axis=1), [True, False, True])
+    np.testing.assert_allclose(apart[2], one_by_one[0], atol=1e-13)
+
+
+@pytest.mark.parametrize(("types", "loops"), [(["revolute"] * 3, 0), (["revolute"] * 6, 1), (["spherical"] * 2, 0)])
+def test_forces_of_paths_are_split_as_in_numpy(types, loops):
+    """−C_sᵀλ_s of any multipliers, and of any generalized forces what motors and loops leave."""
+    model, motors, modes, near = drawn(5, types, loops, count_more=1)
+    driven, expected = in_core(model, motors), prescribed_motion(model, modes, TIMES, near)
+    rng = np.random.default_rng(0)
+    multipliers, wanted = (rng.standard_normal((len(TIMES), k)) for k in (len(model.rows), model.tree.n_v))
+    of_paths = -np.einsum("tij,ti->tj", expected.C_v[:, ~model.loop_rows], multipliers[:, ~model.loop_rows])
+    found = driven.path_forces(TIMES.tolist(), expected.q, multipliers)
+    np.testing.assert_allclose(found, of_paths, rtol=0, atol=1e-12 * np.abs(of_paths).max())
+    tau, loads, left = split(model, expected._replace(required=wanted), motors)
+    for x, y in zip(driven.split(expected.q, wanted), (tau, left, loads), strict=True):
+        np.testing.assert_allclose(x, y, rtol=0, atol=1e-11 * max(1.0, np.abs(y).max(initial=0.0)))
+
+
+def with_friction(model):
+    """In all joints that have one coordinate."""
+    friction, tree = {"viscous_friction": 0.3, "coulomb_friction": 0.2, "friction_speed": 0.5}, copy.copy(model.tree)
+    tree.nodes = tuple(
+        replace(node, joint=node.joint.model_copy(update=friction)) if len(node.joint.units) == 1 else node
+        for node in tree.nodes
+    )
+    return replace(model, tree=tree)
+
+
+def pulled(model):
+    """By a cubic spring and a damper at a point of the last body."""
+
+    def pull(t, position, velocity):
+        return -30.0 * (position - 0.2) * (1 + position @ position) - (2 + position[1] ** 2) * velocity
+
+    body = model.tree.nodes[-1].body
+    load = Load(point=f"{body.name}.{list(body.points)[-1]}", force=state_function(pull, is_planar=False))
+    return replace(model, scene=model.scene.model_copy(update={"load": (load,)}))
+
+
+@pytest.mark.parametrize(
+    ("types", "loops", "factor"),
+    [
+        (["revolute"] * 3, 0, 1.0),
+        (["revolute"] * 3, 0, 0.6),
+        (["spherical", "universal"], 0, 1.0),
+        (["planar", "cylindrical"], 0, 1.0),
+        (["revolute"] * 6, 1, 1.0),
+    ],
+    ids=str,
+)
+def test_derivatives_of_what_motors_leave_are_those_of_differences(types, loops, factor):
+    """And of torques: by p, ṗ and p̈, with friction along coordinates and a force of the motion; of fourth order."""
+    model, motors, modes, near = drawn(2, types, loops, count_more=1 if loops else 0)
+    model = pulled(with_friction(model))
+    motors = [motor._replace(turns_frames=False) for motor in motors]
+    driven = in_core(model, motors)
+    motion = _core.SpatialPrescribedMotion(driven, near[0])
+    if factor != 1.0:
+        motion = _core.SpatialRedefinedMotion(driven, driven, near[0], factor, [])
+    times, modes, n = TIMES[:1], modes[:, :1], modes.shape[2]
+    found = [x.reshape(-1, n) for x in motion.derivatives(times.tolist(), *modes, near[:1])]
+    for order, (exact, size) in enumerate(zip(found[::-1], (2e-5, 1e-3, 0.1), strict=True)):
+        steps = size * np.array([-2.0, -1.0, 1.0, 2.0])
+        moved = np.repeat(modes, 4 * n, axis=1)
+        moved[order] += np.kron(np.eye(n), steps[:, None])
+        at = [0.0] * (4 * n), *moved, np.repeat(near[:1], 4 * n, axis=0)
+        forces = np.hstack([motion.left_on_modes(*at)[1], motion.motion(*at).tau]).reshape(n, 4, -1)
+        by_differences = np.einsum("k,jki->ij", np.array([1.0, -8.0, 8.0, -1.0]) / (12 * size), forces)
+        for rows in (slice(0, n), slice(n, None)):
+            largest = np.abs(by_differences[rows]).max()
+            np.testing.assert_allclose(exact[rows], by_differences[rows], rtol=0, atol=1e-8 * largest)
+
+
+@pytest.mark.parametrize("cut", ["j2", "j4"])
+def test_motors_of_planar_joints_in_loops_go_with_the_redefined_output(cut):
+    """Their coordinates are those on the path with a share of the deflections; loops stay closed."""
+    rng, factor = np.random.default_rng(4), 0.6
+    chain = closed_chain(rng, ("planar", "universal", "cylindrical", "universal"), ("beam",), size=SMALL)
+    chain.tables["j1"]["motor"] = True
+    model = chain.model(cut)
+    q = chain.position(model)
+    model = following(rng, model, q)
+    near, tree = np.tile(q, (len(TIMES), 1)), model.tree
+    modal = np.concatenate([np.r_[node.p_q] for node in tree.nodes]).astype(int)
+    modes = np.array([0.03 * SMALL, 1.0, 1.0])[:, None, None] * rng.standard_normal((3, len(TIMES), len(modal)))
+    modes[0] += q[modal]
+    servo = Servo(model, 1.0, factor, TIMES, near, "", lambda: True)
+    found, on_path = servo.motion.motion(TIMES, *modes, near), prescribed_motion(model, factor * modes, TIMES, near)
+    node = tree.nodes[tree.carried["j1"]]
+    assert len(model.motors["j1"]) == 3
+    for name, columns in (("q", node.q), ("v", node.v), ("a", node.v)):
+        expected = getattr(on_path, name)[:, columns]
+        np.testing.assert_allclose(getattr(found, name)[:, columns], expected, atol=1e-10 * np.abs(expected).max())
+    np.testing.assert_allclose(found.q[:, modal], modes[0], atol=1e-14)
+    C, C_v = row_values(model, found.q, TIMES)
+    assert np.abs(C[:, model.loop_rows]).max() < 1e-10
+    assert np.abs(np.einsum("tij,tj->ti", C_v, found.v)[:, model.loop_rows]).max() < 1e-9
+    assert np.abs(found.q - on_path.q).max() > 1e-3

@@ -1,0 +1,109 @@
+"""Where robots in space start: postures of the checkpoints, undeformed and in equilibrium, mobility, messages."""
+
+import warnings
+
+import numpy as np
+import pytest
+from checkpoint_scenes import checkpoint_scene, tree_model
+from rotations import quaternion
+from spatial_checkpoints import CASES, load
+from spatial_trees import Tree
+
+from ffrobot.mbs.model.body import rigid_body
+from ffrobot.mbs.model.model import build_model, row_values, target_rates
+from ffrobot.mbs.solve.posture import check_path, mobility, solve_posture
+from ffrobot.mbs.solve.start import undeformed_posture
+from ffrobot.mbs.solve.statics import static_equilibrium
+from ffrobot.run.bodies import load_bodies
+
+
+def model_of(name):
+    scene = checkpoint_scene(name)
+    return build_model(scene, [body.spatial for body in load_bodies(scene, lambda _: None)])
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_starts_are_those_of_the_numbers(name):
+    """Every body's place and orientation, deformations and spin at t = 0."""
+    model, data = model_of(name), load(name)
+    start = undeformed_posture(model)
+    if data["start"] == "static":
+        start = static_equilibrium(model, start)
+    frames, sample = model.tree.frames(start.q[None]), data["samples"][0]
+    for node, frame in zip(model.tree.nodes, frames, strict=True):
+        expected = sample["bodies"].get(node.body.name)
+        if expected is None:  # the slider, which the numbers have as a mass on the rod
+            continue
+        np.testing.assert_allclose(frame.r[0], expected["position"], atol=1e-11)
+        found = quaternion(frame.F[0])
+        np.testing.assert_allclose(found * np.sign(found @ expected["quaternion"]), expected["quaternion"], atol=1e-11)
+        omega = frame.F[0].T @ frame.L[0, 3:] @ start.v
+        np.testing.assert_allclose(omega, expected["angular_velocity_body"], atol=1e-9)
+        if node.body.n_modes:
+            np.testing.assert_allclose(start.q[node.p_q], expected["modal"], atol=1e-11)
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_rates_of_rows_are_those_of_their_values(name):
+    """What C_v v has to be, against differences of C in time at the posture of t = 0.01 s."""
+    model, h, t = model_of(name), 1e-6, 0.01
+    q = solve_posture(model, t, undeformed_posture(model).q)
+    values = row_values(model, np.array([q, q]), np.array([t - h, t + h]))[0]
+    rates = target_rates(model, q[None], np.array([t]))[0]
+    assert np.abs(row_values(model, q[None], np.array([t]))[0]).max() < 1e-12
+    np.testing.assert_allclose((values[0] - values[1]) / (2 * h), rates, atol=1e-9 * max(1.0, np.abs(rates).max()))
+
+
+@pytest.mark.parametrize(
+    ("name", "freedom"),
+    [("arm3_line_static", 3), ("arm5_tool_axis", 5), ("arm6_static", 6), ("slider_crank_3d", 1), ("stanford", 3)],
+)
+def test_paths_take_all_freedom(name, freedom):
+    model = model_of(name)
+    found = mobility(model, undeformed_posture(model).q)
+    assert (found.freedom, found.followed, found.left) == (freedom, freedom, ())
+    assert found.ratio > 0.01
+    assert list(check_path(model, undeformed_posture(model).q, 1.0)) == []
+
+
+def test_loops_are_cut_at_the_spherical_joint():
+    model = model_of("slider_crank_3d")
+    assert [joint.name for joint in model.tree.loops] == ["rod_tip"]
+    assert [row.kind for row in model.rows] == ["point"] * 4
+
+
+@pytest.mark.parametrize(
+    ("of_joints", "cut"),
+    [
+        ({}, "last"),
+        ({"second": {}}, "second"),
+        ({"last": {"rotor_inertia": 1e-4}}, "third"),
+        ({"third": {"motor": True}, "last": {"rotor_inertia": 1e-4}}, "second"),
+        ({"first": {"rotor_inertia": 1e-4}, "second": {"position_limit": (-1.0, 1.0)}}, "second"),
+    ],
+)
+def test_loops_are_cut_where_nothing_acts_then_where_there_is_neither_motor_nor_rotor(of_joints, cut):
+    """There is friction in all joints that are not named."""
+    pins = {
+        "first": ("ground", "crank.root"), "second": ("crank.tip", "coupler.root"), "third": ("ground", "rocker.root"),
+        "last": ("rocker.tip", "coupler.tip"),
+    }  # fmt: skip
+    keys = {"type": "revolute", "axis": (0.0, 0.0, 1.0)}
+    joints = [
+        {"name": name, "between": sides} | keys | of_joints.get(name, {"viscous_friction": 0.1})
+        for name, sides in pins.items()
+    ]
+    points = dict.fromkeys(("root", "tip"), (0.0, 0.0, 0.0))
+    bodies = [rigid_body(name, 1.0, np.zeros(3), np.eye(3), points) for name in ("crank", "coupler", "rocker")]
+    model = tree_model(Tree(bodies, []), joints)
+    assert [joint.name for joint in model.tree.loops] == [cut]
+
+
+def test_a_search_that_leaves_all_bounds_ends_in_silence():
+    """From angles of 3e10 rad series of rotations overflow; the search says whether it converged, NumPy nothing."""
+    model = model_of("stanford")
+    q = undeformed_posture(model).q
+    q[model.tree.nodes[model.tree.carried["q2"]].q] = 3e10
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert solve_posture(model, 0.0, q) is None

@@ -1,0 +1,361 @@
+"""Scene files in space: what their records take, and the message of each mistake."""
+
+import copy
+import tomllib
+from importlib.util import find_spec
+from pathlib import Path
+
+import numpy as np
+import pytest
+import scene_of
+from checkpoint_scenes import checkpoint_scene
+from spatial_checkpoints import CASES, load
+
+from ffrobot.common.errors import InputError
+from ffrobot.common.key_descriptions import key_descriptions
+from ffrobot.common.rotations import exponential, quaternions
+from ffrobot.mbs.fields.orientations import OrientationLaw
+from ffrobot.scene.load import validated_scene
+from ffrobot.scene.scene import SceneKeys
+from ffrobot.scene.unsupported import UNSUPPORTED
+from ffrobot.schema import DIALECT
+
+FOLDER = Path(scene_of.__file__).parent
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_checkpoints_are_scenes(name):
+    scene = checkpoint_scene(name)
+    assert [joint.type for joint in scene.joint][:1] == ["revolute"]
+    assert scene.trajectory[0].row_count == len(load(name)["scene"]["path"]["rows"]) - 2 * (name == "slider_crank_3d")
+
+
+ARM = """
+name = "arm"
+space = "spatial"
+gravity = [0.0, 0.0, -9.81]
+
+[[body]]
+name = "base"
+
+[body.rigid]
+mass = 4.0
+center = [0.0, 0.0, 0.1]
+inertia = [0.02, 0.02, 0.01]
+points = { root = [0.0, 0.0, 0.0], top = [0.0, 0.0, 0.2] }
+
+[[body]]
+name = "hand"
+
+[body.rigid]
+mass = 1.0
+center = [0.1, 0.0, 0.0]
+inertia = [[0.01, 0.0, 0.0], [0.0, 0.02, 0.001], [0.0, 0.001, 0.02]]
+points = { root = [0.0, 0.0, 0.0], tip = [0.2, 0.0, 0.0] }
+
+[[joint]]
+name = "waist"
+type = "revolute"
+between = ["ground", "base.root"]
+axis = [0.0, 0.0, 1.0]
+position_limit = [-3.0, "180*deg"]
+
+[[joint]]
+name = "wrist"
+type = "universal"
+between = ["base.top", "hand.root"]
+axis = [0.0, 1.0, 0.0]
+second_axis = [1.0, 0.0, 0.0]
+moment_limit = [10.0, 5.0]
+
+[initial]
+joints = { waist = 0.3, wrist = [0.1, "10*deg"] }
+
+[[trajectory]]
+name = "tool"
+point = "hand.tip"
+x = "0.1*cos(t)"
+y = "0.1*sin(t)"
+
+[[load]]
+joint = "waist"
+moment = "0.1*t"
+
+[[payload]]
+point = "hand.tip"
+mass = 0.5
+center = [0.02, 0.0, 0.0]
+
+[[analysis]]
+name = "inverse"
+kind = "pcid"
+end = 1.0
+output_step = 0.1
+"""
+
+
+def scene(change=lambda tables: None):
+    data = tomllib.loads(ARM)
+    change(data)
+    return validated_scene(data, FOLDER / "scene.toml", ARM)
+
+
+def test_keys_and_their_meaning():
+    found = scene()
+    waist, wrist = found.joint
+    assert waist.position_limits == ((-3.0, pytest.approx(np.pi)),)
+    assert [limits.moment for limits in wrist.motor_limits] == [10.0, 5.0]
+    assert [limits.moment for limits in waist.motor_limits] == [np.inf]
+    assert found.topology.is_open_chain
+    assert [joint.name for joint in found.motor_joints] == ["waist", "wrist"]
+    first, second = wrist.triads()
+    np.testing.assert_allclose(first[:, 0], [0, 1, 0], atol=1e-15)
+    np.testing.assert_allclose(second[:, 1], [1, 0, 0], atol=1e-15)
+
+
+def put(table, number=0, **keys):
+    def change(data):
+        entry = data[table][number] if isinstance(data.get(table), list) else data.setdefault(table, {})
+        entry.update(keys)
+        for key in [key for key, value in entry.items() if value is None]:
+            del entry[key]
+
+    return change
+
+
+def add(table, **keys):
+    return lambda data: data.setdefault(table, []).append(keys)
+
+
+RIGID = tomllib.loads(ARM)["body"][0]["rigid"]
+MISTAKES = {
+    "planar gravity": (lambda data: data.update(gravity=[0.0, -9.81]), "gravity"),
+    "inertia of no body": (
+        put("body", rigid=RIGID | {"inertia": [1.0, 0.1, 0.1]}),
+        "rigid.inertia: expected no principal moment of inertia larger than the sum of the others, found 0.1, 0.1, 1",
+    ),
+    "lopsided inertia": (
+        put("body", rigid=RIGID | {"inertia": [[1.0, 0.1, 0.0], [0.2, 1.0, 0.0], [0.0, 0.0, 1.0]]}),
+        "rigid.inertia: expected a symmetric inertia",
+    ),
+    "inertia of a line": (
+        put("body", rigid=RIGID | {"inertia": [0.0, 1.0, 1.0]}),
+        "expected principal moments of inertia greater than 0, found 0",
+    ),
+    "no axis": (put("joint", axis=None), 'joint "waist": axis: expected a value, since this key is required'),
+    "axis without direction": (put("joint", axis=[0.0, 0.0, 0.0]), "expected axis with a direction"),
+    "axis of a weld": (
+        put("joint", type="weld", position_limit=None),
+        'joint "waist": expected the key "axis" only in revolute or .* joints, found it in a weld joint',
+    ),
+    "axes that are not square": (
+        put("joint", 1, second_axis=[1.0, 1.0, 0.0]),
+        "expected axis and second_axis at right angles .* found 45 degrees",
+    ),
+    "lead of none": (
+        put("joint", type="screw", lead=0.0),
+        "expected a lead that is not 0, found 0: without it the joint is a revolute one",
+    ),
+    "limits that are too few": (put("joint", 1, moment_limit=10.0), "expected 2 numbers, one for each coordinate in"),
+    "limits upside down": (
+        put("joint", position_limit=[1.0, -1.0]),
+        r"expected position_limit = \\[least, largest\\], found \\[1, -1\\]",
+    ),
+    "unknown type": (put("joint", type="hinge"), 'joint "waist": type: expected "revolute", .* found "hinge"'),
+    "motor of a spherical joint": (
+        lambda data: (
+            put("joint", type="spherical", axis=None, position_limit=None, motor=True)(data),
+            data.update(load=[]),
+        ),
+        'joint "waist": motor: expected false of a spherical joint, which has no coordinates for motors, found true',
+    ),
+    "value of a point": (
+        put("trajectory", value="t"),
+        'expected the keys "x", "y", "z", .* with "point", found "x", "y", "value"',
+    ),
+    "two orientations": (
+        put("trajectory", rpy=["0", "0", "t"], rotation_vector=["0", "0", "t"]),
+        'expected one orientation at most .*, found "rotation_vector", "rpy"',
+    ),
+    "direction of nothing": (
+        put("trajectory", direction=["1", "0", "0"]),
+        'expected the key "tool_axis" with direction',
+    ),
+    "tool axis of nothing": (put("trajectory", tool_axis=[1.0, 0.0, 0.0]), 'expected the key "tool_axis" only with'),
+    "reference of nothing": (
+        put("trajectory", reference_rotation_vector=[0.0, 0.0, 1.0]),
+        'expected the key "reference_rotation_vector" only with rotation_vector, found it alone',
+    ),
+    "direction that vanishes": (
+        put("trajectory", tool_axis=[1.0, 0.0, 0.0], direction=["0", "0", "t-0.5"]),
+        "direction: expected a direction at all times, found none at t = 0.5 s",
+    ),
+    "point that is none": (
+        put("trajectory", point="hands.tip"),
+        'expected one of the bodies .* found "hands.tip" .did you',
+    ),
+    "joint that is none": (
+        lambda data: data["initial"]["joints"].update(elbow=1.0),
+        'initial.joints: expected one of the joints "waist", "wrist", found "elbow"',
+    ),
+    "two of one name": (
+        add("joint", **tomllib.loads(ARM)["joint"][0]),
+        'joint "waist": expected one joint of this name',
+    ),
+    "kind that is none": (
+        add("analysis", name="where", kind="inverse"),
+        'kind: expected .*"closed-loop".*found "inverse"',
+    ),
+    "what is applied by patches that are not there": (
+        add("analysis", name="again", kind="forward", actuation="inverse", apply="joints+pzt"),
+        r'analysis "again": apply: expected at least one \\[\\[pzt\\]\\] for "joints\+pzt", found none',
+    ),
+    "key of other kinds of analysis": (
+        add("analysis", name="rest", kind="static", integrator="radau"),
+        'analysis "rest": expected the key "integrator" only in kind = "pcid", "forward" or "closed-loop", found kind ='
+        ' "static"',
+    ),
+    "shape of a rigid body": (
+        put("analysis", kind="fcid", shape="given", modal={"base": ["0.1*t"]}),
+        'analysis "inverse": modal: expected a flexible body, found "base", which is rigid',
+    ),
+    "shape without a value": (
+        lambda data: (
+            put("body", 1, rigid=None, link="links/upper.toml")(data),
+            put("analysis", kind="fcid", shape="given", modal={"hand": ["1/(t - 0.1)"]})(data),
+        ),
+        r'analysis "inverse": modal.hand\[0\]: expected a finite value during the whole run, found none at t = 0.1',
+    ),
+    "function in a file": (
+        lambda data: data.update(load=[{"point": "hand.tip", "force": "f"}]),
+        "load no. 1: force: expected a function of t, position and velocity, in scenes made in Python, found 'f'",
+    ),
+    "angles of bodies": (
+        lambda data: data.update(initial={"angles": {"upper": 0.1}}),
+        'initial: angles: expected no such key in space = "spatial", found it: the guess is of joint coordinates',
+    ),
+    "axis of no angle": (
+        put("trajectory", axis=[0.0, 0.0, 1.0]),
+        'trajectory.*expected the key "axis" only with angle',
+    ),
+    "axis of an angle without direction": (
+        put("trajectory", point=None, x=None, y=None, angle="hand.tip", axis=[0.0, 0.0, 0.0], value="t"),
+        'trajectory.*expected the key "axis" only with angle, a direction',
+    ),
+    "rotor of a joint that slides and turns": (
+        put("joint", type="cylindrical", rotor_inertia=1e-3),
+        'expected the key "rotor_inertia" only in',
+    ),
+    "compliant gear without a rotor": (
+        put("joint", stiffness=100.0),
+        "expected a rotor_inertia above 0 with stiffness, found none",
+    ),
+    "load on a joint with two coordinates": (
+        add("load", joint="wrist", moment="1.0"),
+        'load no. 2: moment: expected 2 expressions, one for each coordinate of "wrist" .rad, rad., found 1',
+    ),
+    "nothing to follow": (lambda data: data.pop("trajectory"), r"expected at least one \\[\\[trajectory\\]\\]"),
+}
+
+
+@pytest.mark.parametrize("name", MISTAKES)
+def test_mistakes_are_told(name):
+    change, message = MISTAKES[name]
+    with pytest.raises(InputError, match=message.replace(r"\\[", r"\[").replace(r"\\]", r"\]")) as caught:
+        scene(change)
+    assert str(FOLDER / "scene.toml") in str(caught.value)
+
+
+def test_every_key_says_what_it_means():
+    """The text under the field in its record, of all records of the file."""
+    described = SceneKeys.model_json_schema()
+    assert DIALECT
+    records = {cls.__name__: cls for cls in _records(SceneKeys)}
+    for name, table in described["$defs"].items():
+        if name.startswith("Spatial") or name == "BodyKeys":
+            missing = set(table.get("properties", {})) - set(key_descriptions(records[name]))
+            assert not missing, (name, missing)
+
+
+def _records(record):
+    from ffrobot.common.validation import Record
+
+    def below(cls):
+        for child in cls.__subclasses__():
+            yield child
+            yield from below(child)
+
+    yield from below(Record)
+
+
+@pytest.mark.parametrize("turn", [0.4, 2.5])
+def test_waypoints_with_quaternions(tmp_path, turn):
+    """Orientations of a table are met at its times, whichever sign quaternions have; the motion is smooth between."""
+    rng = np.random.default_rng(1)
+    times = np.linspace(0, 1, 9)
+    axis = rng.standard_normal(3)
+    vectors = np.outer(np.sin(np.pi * times / 2) * turn, axis / np.linalg.norm(axis))
+    A = exponential(vectors) @ exponential(np.array([2.0, 1.0, -1.0]))
+    e = quaternions(A) * rng.choice([-1, 1], (9, 1))
+    table = np.column_stack([times, np.sin(times), np.cos(times), times, e])
+    np.savetxt(tmp_path / "pose.csv", table, delimiter=",", header="t,x,y,z,qw,qx,qy,qz", comments="")
+    data = copy.deepcopy(tomllib.loads(ARM))
+    data["trajectory"] = [{"name": "tool", "point": "hand.tip", "waypoints": "pose.csv"}]
+    found = validated_scene(data, tmp_path / "scene.toml", ARM).trajectory[0]
+    assert set(found.components) == {"x", "y", "z"}
+    assert found.row_count == 6
+    np.testing.assert_allclose(found.orientation.sample(times), A, atol=1e-12)
+    check_rates(found.orientation, np.linspace(0.05, 0.95, 7))
+
+
+def test_waypoints_that_are_no_rotation(tmp_path):
+    (tmp_path / "pose.csv").write_text("t,x,y,z,qw,qx,qy,qz\n0,0,0,0,1,0,0,0\n1,0,0,0,1,1,0,0\n")
+    data = copy.deepcopy(tomllib.loads(ARM))
+    data["trajectory"] = [{"name": "tool", "point": "hand.tip", "waypoints": "pose.csv"}]
+    with pytest.raises(InputError, match=r"waypoints: row 2: expected qw, qx, qy, qz of length 1, found 1\.41421"):
+        validated_scene(data, tmp_path / "scene.toml", ARM)
+
+
+@pytest.mark.parametrize(
+    "keys",
+    [
+        {"rotation_vector": ["0.3*sin(t)", "t", "t**2"], "reference_rotation_vector": [1.0, 2.0, -0.5]},
+        {"rpy": ["t", "2*sin(t)", "1-t**2"]},
+        {"tool_axis": [0.0, 1.0, 1.0], "direction": ["cos(t)", "2*sin(t)", "0.3+t"]},
+    ],
+)
+def test_rates_of_orientations_by_differences(keys):
+    check_rates(scene(put("trajectory", **keys)).trajectory[0].orientation, np.linspace(0.1, 0.9, 5))
+
+
+def check_rates(law: OrientationLaw, times):
+    h = 1e-5
+    omega, alpha = law.rates(times)
+    if law.kind == "direction":
+        z = [law.sample(times + s)[:, :, 2] for s in (-h, 0, h)]
+        np.testing.assert_allclose((z[2] - z[0]) / (2 * h), np.cross(omega, z[1]), atol=1e-8)
+        np.testing.assert_allclose(np.sum(omega * z[1], axis=1), 0, atol=1e-14)
+        twice = (z[2] - 2 * z[1] + z[0]) / h**2
+        np.testing.assert_allclose(np.cross(alpha, z[1]) + np.cross(omega, np.cross(omega, z[1])), twice, atol=1e-4)
+        return
+    spin = (law.sample(times + h) - law.sample(times - h)) / (2 * h) @ law.sample(times).transpose(0, 2, 1)
+    np.testing.assert_allclose(np.stack([spin[:, 2, 1], spin[:, 0, 2], spin[:, 1, 0]], axis=1), omega, atol=1e-7)
+    ahead, behind = law.rates(times + h)[0], law.rates(times - h)[0]
+    np.testing.assert_allclose((ahead - behind) / (2 * h), alpha, atol=1e-7)
+
+
+def test_what_space_does_not_have_is_in_one_list():
+    """What modules of space refuse as "not available" is in the list, and modules that it names exist."""
+    listed = {lack.where for lack in UNSUPPORTED}
+    refusing = set()
+    for name in listed:
+        spec = find_spec(name)
+        assert spec is not None, name
+        text = Path(spec.origin).read_text(encoding="utf-8")
+        assert "raise InputError" in text or "raise ValueError" in text, name
+    for package in ("ffrobot.mbs", "ffrobot.actuation", "ffrobot.run", "ffrobot.scene"):
+        for folder in find_spec(package).submodule_search_locations:
+            for path in Path(folder).rglob("*spatial*.py"):
+                if "not available" in path.read_text(encoding="utf-8"):
+                    refusing.add(path.stem)
+    assert refusing <= {name.rpartition(".")[2] for name in listed} | {"spatial_lacks"}
