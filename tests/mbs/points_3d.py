@@ -156,7 +156,7 @@ class Body:
             marker.K = [] if self.K is None else list(self.K[k])
             markers.append(marker)
         data.markers = markers
-        body = r.Body()
+        body = r.SpatialBody()
         body.name, body.joint, body.lead, body.data = name, self.joint, self.lead, data
         body.parent, body.parent_marker, body.inboard_marker = self.parent, self.parent_marker, self.inboard_marker
         return body
@@ -179,7 +179,7 @@ class Mechanism:
             ground.append(marker)
         bodies = [body.core(f"b{i}") for i, body in enumerate(self.bodies)]
         wrenches = [r.MarkerAt(*at) for at in self.wrenches]
-        return r.Model(bodies, ground, self.rows, wrenches, self.gravity)
+        return r.SpatialModel(bodies, ground, self.rows, wrenches, self.gravity)
 
     def motion(self, model, q, z):
         """Sections and points for coordinates z (n_v) from q on: series along t.

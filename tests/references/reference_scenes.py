@@ -238,7 +238,7 @@ SPATIAL = {
     "joints_of_all_types": joints_of_all_types,
     "redundant_by_torque": partial(seven_joints, "least-torque"),
     "redundant_by_motion": partial(seven_joints, "least-motion"),
-    "make_patches": partial(
+    "patches_in_space": partial(
         planar_case_in_space, "two_link_patched", INVERSE, AGAIN | {"apply": "joints+pzt"}, SAGGING
     ),
     "control_in_space": partial(

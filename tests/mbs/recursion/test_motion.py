@@ -89,12 +89,12 @@ def test_rows_are_kept_along_a_motion_in_space():
 
 def test_a_free_rigid_body_turns_as_jacobi_says():
     """formulation_spatial.md, checkpoint A: I = diag(0.02, 0.03, 0.045), omega = (3, 0, 4) at t = 0, at 4 s."""
-    body, data, marker = r.Body(), r.SpatialData(), r.SpatialMarker()
+    body, data, marker = r.SpatialBody(), r.SpatialData(), r.SpatialMarker()
     inertia = np.array([0.02, 0.03, 0.045])
     data.mass, data.J2 = 1.0, np.diag(inertia.sum() / 2 - inertia)
     data.markers = [marker]
     body.name, body.joint, body.data = "top", J.free, data
-    model = r.Model([body], [r.SpatialMarker()], [], [], np.zeros(3))
+    model = r.SpatialModel([body], [r.SpatialMarker()], [], [], np.zeros(3))
     q, v = np.array([0, 0, 0, 1.0, 0, 0, 0]), np.array([0, 0, 0, 3.0, 0, 4.0])
     states = _core.tree_motion(model, _core.TreeScene(), [0.0, 4.0], q, v, controls(1e-12), on).states
     assert np.abs(states[-1, -3:] - [2.64241551, -1.49727169, 3.92456121]).max() < 1e-8
@@ -121,12 +121,12 @@ def test_a_flexible_tree_keeps_momentum_and_energy():
 
 def test_laws_that_share_parts():
     """A mass on sines and cosines of one angle: place, rate and, opposite to multipliers, m (a - g), by calculus."""
-    body, data = r.Body(), r.SpatialData()
+    body, data = r.SpatialBody(), r.SpatialData()
     data.mass, data.J2, data.markers = 2.0, np.eye(3), [r.SpatialMarker()]
     body.name, body.joint, body.data = "mass", J.free, data
     rows = [row(r.RowKind.point, (-1, 0), (0, 0), axis)[0] for axis in np.eye(3)]
     gravity = np.array([0.0, 0, -9.81])
-    model = r.Model([body], [r.SpatialMarker()], rows, [], gravity)
+    model = r.SpatialModel([body], [r.SpatialMarker()], rows, [], gravity)
     scene = _core.TreeScene()
     for law in ("2+0.5*cos(3*t-1)", "0.3*sin(3*t-1)-(3*t-1)/7", "0.1*cos(3*t-1)*sin(3*t-1)-0.3*sin(3*t-1)"):
         scene.add_target(parse_expression(law))
@@ -190,7 +190,7 @@ def test_a_section_follows_an_orientation():
     turning.turns = True
     bodies = [random_body(rng, 2, J.free).core("a"), random_body(rng, 3, J.revolute).core("b")]
     bodies[1].parent, bodies[1].parent_marker = 0, 1
-    model = r.Model(bodies, [r.SpatialMarker(), turning], rows, [], np.array([0, 0, -9.81]))
+    model = r.SpatialModel(bodies, [r.SpatialMarker(), turning], rows, [], np.array([0, 0, -9.81]))
     q, v = np.zeros(model.n_q), np.zeros(model.n_v)
     q[3] = 1
     model.turn_marker(1, np.eye(3), np.zeros(3), np.zeros(3))
