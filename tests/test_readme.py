@@ -36,6 +36,15 @@ def test_arm_of_the_readme_swings_a_quarter_turn(arm):
     assert moment == pytest.approx(9.81 * length * (bar / 2 + payload), rel=1e-3)
 
 
+def test_solve_prints_what_the_readme_quotes(arm, capsys):
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    quoted = re.search(r"prints, among other lines:\n\n((?:    .*\n)+)", text)[1]
+    cli(["solve", str(arm / "scene.toml")], standalone_mode=False)
+    printed = " ".join(capsys.readouterr().out.split())
+    for line in quoted.splitlines():
+        assert " ".join(line.split()) in printed
+
+
 DOCUMENTS = ["README.md", *sorted(str(path.relative_to(ROOT)) for path in ROOT.glob("cases/*/README.md"))]
 
 
