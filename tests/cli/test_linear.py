@@ -114,7 +114,7 @@ MISTAKES = {
     ),
     "an end": (
         {'kind = "linear"\nabout': 'kind = "linear"\nend = 1.0\nabout'},
-        ['expected the key "end" only in kind = "pcid", "fcid", "forward", "motors-only" or "closed-loop"'],
+        ['expected the key "end" only in kind = "pcid", "fcid", "forward", "motors-only", "tracking" or "closed-loop"'],
     ),
     "placement without patches": (
         {'kind = "linear"\nabout': 'kind = "placement"\nplacement = { body = "arm" }\nabout'},
