@@ -296,13 +296,10 @@ template <class Space> void MotionNorm<Space>::take_accelerations(const Workspac
 }
 
 template <class Space> void MotionNorm<Space>::set_peaks(const NormPeaks &peaks) {
-  // both as before 0.2.0: without accelerations, without forces on the ground; and in 3D without motors
-  const bool is_state = peaks.state.size() == peak_.size() || peaks.state.size() == size_.size();
-  const std::size_t on_ground = 2 * alone_.size(), missing = force_peak_.size() - peaks.force.size();
-  if (!is_state || (missing != 0 && missing != on_ground && missing != motors_))
+  if (peaks.state.size() != peak_.size() || peaks.force.size() != force_peak_.size())
     throw std::invalid_argument("peaks: expected those of the same mechanism, found those of another one");
-  std::copy(peaks.state.begin(), peaks.state.end(), peak_.begin());
-  std::copy(peaks.force.begin(), peaks.force.end(), force_peak_.begin());
+  peak_ = peaks.state;
+  force_peak_ = peaks.force;
   inertial_ = peaks.inertial;
 }
 
