@@ -94,3 +94,20 @@ def test_few_iterations_with_a_warm_start():
     V = solver.solve(F)
     assert np.mean(np.abs(V) == 1.0) > 0.2
     assert solver.iterations < 4 * len(F)
+
+
+def test_round_off_does_not_scatter_voltages_that_are_hardly_unique():
+    """With the same voltages at limits the others are linear in the force, or steps of any length err by the scatter.
+
+    Weights of one point above all, more pairs than modes: A^T A has a condition number of 1e13 with its ridge.
+    """
+    rng = np.random.default_rng(9)
+    Phi, limit = np.geomspace(1, 500, 8)[:, None] * rng.standard_normal((8, 12)), np.full(12, 0.7)
+    W_sqrt = np.vstack([rng.standard_normal(8) / np.geomspace(1, 500, 8), 1e-2 * np.diag(1 / np.geomspace(1, 500, 8))])
+    start, way = Phi @ rng.uniform(-0.9, 0.9, 12), Phi @ rng.uniform(-1e-4, 1e-4, 12)
+    shares = np.linspace(0, 1, 41)
+    V = allocation(Phi, limit, W_sqrt).solve(start + shares[:, None] * way)
+    at_limit = np.abs(V) == limit
+    assert at_limit[0].any()
+    assert np.array_equal(at_limit, np.broadcast_to(at_limit[0], V.shape))
+    np.testing.assert_allclose(V, V[0] + shares[:, None] * (V[-1] - V[0]), atol=1e-9)

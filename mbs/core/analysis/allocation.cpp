@@ -14,10 +14,10 @@ using Eigen::VectorXd;
 
 namespace {
 
-constexpr double vanishing = 1e-12;      // eigenvalues of the Hessian below this fraction of the largest are zeros
+constexpr double vanishing = 1e-12;      // eigenvalues of A^T A below this fraction of the largest are zeros
 constexpr double ridge = 1e-9;           // of the smallest other one is added then: picks one of many solutions
 constexpr double smallest_ridge = 1e-13; // of the largest
-constexpr double rounding = 1e-14;       // of the gradient, relative to its terms
+constexpr double rounding = 1e-15;       // of the gradient, relative to its terms
 constexpr int most_changes = 500;
 
 } // namespace
@@ -26,8 +26,8 @@ Allocation::Allocation(MatrixXd Phi, const MatrixXd &W_sqrt, MatrixXd gain, Vect
     : Phi_(std::move(Phi)), gain_(std::move(gain)), limit_(std::move(limit)), scale_(std::move(scale)) {
   const Index k = Phi_.cols();
   const MatrixXd A = W_sqrt * Phi_ * scale_.asDiagonal();
-  H_ = A.transpose() * A;
-  const VectorXd sizes = Eigen::SelfAdjointEigenSolver<MatrixXd>(H_, Eigen::EigenvaluesOnly).eigenvalues();
+  const VectorXd sizes =
+      Eigen::SelfAdjointEigenSolver<MatrixXd>(A.transpose() * A, Eigen::EigenvaluesOnly).eigenvalues();
   const double largest = sizes[k - 1];
   double added = 0;
   if (largest == 0)
@@ -36,10 +36,13 @@ Allocation::Allocation(MatrixXd Phi, const MatrixXd &W_sqrt, MatrixXd gain, Vect
     added =
         std::max(smallest_ridge * largest,
                  ridge * *std::find_if(sizes.begin(), sizes.end(), [&](double x) { return x >= vanishing * largest; }));
-  H_.diagonal().array() += added;
-  back_ = A.transpose() * W_sqrt;
+  A_ = MatrixXd::Zero(A.rows() + k, k);
+  A_.topRows(A.rows()) = A;
+  A_.bottomRows(k).diagonal().setConstant(std::sqrt(added));
+  W_sqrt_ = W_sqrt;
+  d_ = left_ = VectorXd::Zero(A_.rows());
   bound_ = limit_.cwiseQuotient(scale_);
-  V_ = u_ = b_ = gradient_ = VectorXd::Zero(k);
+  V_ = u_ = gradient_ = VectorXd::Zero(k);
   held_.assign(static_cast<std::size_t>(k), 0);
 }
 
@@ -50,7 +53,7 @@ const VectorXd &Allocation::solve(const Eigen::Ref<const VectorXd> &F) {
     std::fill(held_.begin(), held_.end(), 0);
     return V_;
   }
-  b_.noalias() = back_ * F;
+  d_.head(W_sqrt_.rows()).noalias() = W_sqrt_ * F;
   for (int i = 0; i < most_changes; ++i) {
     ++iterations_;
     if (!move())
@@ -101,26 +104,20 @@ void Allocation::minimise() {
       free_.push_back(j);
   const auto count = static_cast<Index>(free_.size());
   if (free_ != factorised_) {
-    MatrixXd H_free(count, count);
-    for (Index c = 0; c < count; ++c)
-      for (Index r = 0; r < count; ++r)
-        H_free(r, c) = H_(free_[static_cast<std::size_t>(r)], free_[static_cast<std::size_t>(c)]);
-    llt_.compute(H_free);
+    qr_.compute(A_(Eigen::all, free_));
     factorised_ = free_;
   }
-  gradient_.noalias() = b_ - H_ * held;
-  target_.resize(count);
-  for (Index f = 0; f < count; ++f)
-    target_[f] = gradient_[free_[static_cast<std::size_t>(f)]];
-  if (count)
-    llt_.solveInPlace(target_);
+  left_ = d_;
+  left_.noalias() -= A_ * held;
+  target_ = count ? VectorXd(qr_.solve(left_)) : VectorXd();
 }
 
 // Frees the voltage that presses most against the inner side of its limit; false where none does: the solution.
 bool Allocation::release() {
-  gradient_.noalias() = H_ * u_ - b_;
-  const double size = b_.lpNorm<Eigen::Infinity>() + H_.lpNorm<Eigen::Infinity>() * u_.lpNorm<Eigen::Infinity>();
-  double largest = rounding * size;
+  left_ = d_;
+  left_.noalias() -= A_ * u_;
+  gradient_.noalias() = -A_.transpose() * left_;
+  double largest = rounding * A_.norm() * (d_.norm() + A_.norm() * u_.norm());
   Index most = -1;
   for (Index j = 0; j < u_.size(); ++j) {
     const double inward = held_[static_cast<std::size_t>(j)] * gradient_[j];

@@ -1,8 +1,8 @@
 // Voltages within limits: bounded weighted least squares, warm-started from one time to the next.
 #pragma once
 
-#include <Eigen/Cholesky>
 #include <Eigen/Core>
+#include <Eigen/QR>
 #include <vector>
 
 namespace ffrobot {
@@ -12,7 +12,8 @@ namespace ffrobot {
 //
 // Active sets (P. B. Stark and R. L. Parker, Comput. Stat. 10, 1995: BVLS): voltages at a limit are held there, the
 // others go to their minimum or to the first limit on the way; then the one that presses most against the inner side of
-// its limit is let go. Ends after finitely many changes; from one time to the next there are few.
+// its limit is let go. Ends after finitely many changes; from one time to the next there are few. QR finds the free
+// voltages: in normal equations round-off scatters those that are hardly unique, and steps of any length err by that.
 class Allocation {
 public:
   // Phi: (n, k) modal forces per volt; W_sqrt: (rows, n); gain: (k, n) the best voltages without limits, V = gain F,
@@ -32,12 +33,12 @@ private:
   void minimise();
   bool release();
 
-  Eigen::MatrixXd Phi_, gain_, H_, back_; // in u = V / scale: H = A^T A, b = back F with A = W_sqrt Phi scale
-  Eigen::VectorXd limit_, scale_, bound_; // bound: limits of u
-  Eigen::VectorXd V_, u_, b_, gradient_, target_;
-  std::vector<int> held_; // sign of the limit at which a voltage is held, 0 where free
+  Eigen::MatrixXd Phi_, gain_, W_sqrt_, A_; // A u = d with u = V / scale: W_sqrt Phi scale u = W_sqrt F, ridge u = 0
+  Eigen::VectorXd limit_, scale_, bound_;   // bound: limits of u
+  Eigen::VectorXd V_, u_, d_, left_, gradient_, target_; // left: d - A u
+  std::vector<int> held_;                                // sign of the limit at which a voltage is held, 0 where free
   std::vector<Eigen::Index> free_, factorised_;
-  Eigen::LLT<Eigen::MatrixXd> llt_{Eigen::MatrixXd::Identity(1, 1)}; // copied before it is of anything
+  Eigen::HouseholderQR<Eigen::MatrixXd> qr_{Eigen::MatrixXd::Identity(1, 1)}; // copied before it is of anything
   unsigned long iterations_ = 0;
 };
 
