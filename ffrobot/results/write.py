@@ -140,7 +140,8 @@ def _write_judgement(group: h5py.Group, solution: Solution, result: AnalysisResu
     group.attrs["stiffening_effect"] = result.stiffening_effect
     if result.analysis.is_integrated:
         group.attrs["start_jolt"] = result.start_jolt
-    if result.mode_error is not None and not any(body.rigid_in for body in solution.bodies.values()):
+    is_rigid = solution.scene.is_planar and any(body.rigid_in for body in solution.bodies.values())
+    if result.mode_error is not None and not is_rigid:
         group.attrs["mode_error"] = result.mode_error
     if solution.mode_choice is not None:
         for kind, error in solution.mode_choice.errors.get(result.analysis.name, {}).items():
