@@ -7,6 +7,7 @@
 #include "core/integrate/integrate.h"
 #include "core/recursion/observe.h"
 
+#include <algorithm>
 #include <functional>
 #include <optional>
 #include <string>
@@ -165,9 +166,16 @@ TreeRun integrated(const Model<Space> &model, const Scene &scene, RecursiveMotio
     if (limits)
       limits->go_on(checkpoint->ranges);
   }
+  Eigen::VectorXd output(run.last.size());
   run.report = integrate(
       motion, times, run.last, controls,
-      [&](std::size_t i, double t, const double *state) { run.evaluate(i, t, state, reader, model.mechanism, replay); },
+      [&](std::size_t i, double t, const double *state) {
+        run.evaluate(i, t, state, reader, model.mechanism, replay);
+        output = Eigen::Map<const Eigen::VectorXd>(state, output.size());
+        reader.project(t, output.data(), output.data() + model.mechanism.n_q); // interpolated ones are off the rows
+        if (!std::equal(output.begin(), output.end(), state))
+          run.evaluate(i, t, output.data(), reader, model.mechanism, replay);
+      },
       locked(carry_on), recording, breaks, checkpoint ? &checkpoint->integration : nullptr, limits ? &*limits : nullptr,
       samples);
   if (limits)
