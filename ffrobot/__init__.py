@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     from .results.file import Results
     from .run.watcher import Watcher
     from .scene.load import make_scene
-    from .scene.scene import Scene as Scene
+    from .scene.scene import Scene
 
     __version__: str
 
@@ -67,7 +67,7 @@ _HOME = {
     "SolveError": ".common.errors",
     "ModalBody": ".fe_models.modal_body",
     "make_scene": ".scene.load",
-    "Scene": ".scene.scene:Scene",
+    "Scene": ".scene.scene",
     "Results": ".results.file",
     "Watcher": ".run.watcher",
 }
@@ -106,8 +106,7 @@ def __getattr__(name: str) -> object:
 
         value: object = program_version()
     elif name in _HOME:
-        home, _, known = _HOME[name].partition(":")
-        value = getattr(import_module(home, __name__), known or name)
+        value = getattr(import_module(_HOME[name], __name__), name)
     else:
         raise AttributeError(f"module 'ffrobot' has no attribute {name!r}")
     globals()[name] = value

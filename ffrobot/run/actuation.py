@@ -1,4 +1,4 @@
-"""From the modal forces of a motion in space to voltages of patches, and to whether motors and patches can do it."""
+"""From the modal forces of a motion to voltages of patches, and to whether motors and patches can do it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The bodies of a scene in space: from links, modal body files or numbers, with their payloads."""
+"""The bodies of a scene: from links, modal body files or numbers, with their payloads."""
 
 from __future__ import annotations
 

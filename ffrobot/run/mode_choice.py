@@ -1,4 +1,4 @@
-"""`modes = "auto"` in scenes in space: what counts, and the bodies to choose from."""
+"""`modes = "auto"` of bodies: what counts, and the bodies to choose from."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Links in space in pieces as the one link: what was computed of the pieces, told in frame and modes of the link.
+"""Links in pieces as the one link: what was computed of the pieces, told in frame and modes of the link.
 
 The frame is where the link's reference condition has it: at its root, as the section there (cantilever), or along the
 chord to its tip, turned from the section at the root by no more than that takes (simply supported: no twist there). The

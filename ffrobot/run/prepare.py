@@ -1,4 +1,4 @@
-"""Everything of a scene in space but its analyses: equations of its bodies, of links in pieces too."""
+"""Everything of a scene but its analyses: equations of its bodies, of links in pieces too."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a solve of a scene in space computed: of the scene as a whole, and of each analysis."""
+"""What a solve of a scene computed: of the scene as a whole, and of each analysis."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The analyses of a scene in space, run one after the other."""
+"""The analyses of a scene, run one after the other."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Stresses of links in space over a motion, where their files hold those of modes."""
+"""Stresses of links over a motion, where their files hold those of modes."""
 
 from __future__ import annotations
 

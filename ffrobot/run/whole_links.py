@@ -1,4 +1,4 @@
-"""What analyses in space have to know of whole links where the equations are those of their pieces."""
+"""What analyses have to know of whole links where the equations are those of their pieces."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a scene in space needs of a body: invariants of the (R, e, p) equations and the sections where things attach."""
+"""What a scene needs of a body: invariants of the (R, e, p) equations and the sections where things attach."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Forces of time that act on a robot in space beside gravity, elasticity and constraints. SI units."""
+"""Forces of time that act on a robot beside gravity, elasticity and constraints. SI units."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Robots in space with gears that give: motors as coordinates of their own, with springs to those of the joints."""
+"""Robots with compliant gears: motors as coordinates of their own, with springs to those of the joints."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Masses attached to sections of bodies in space: payloads, and what lies along a beam."""
+"""Masses attached to sections of bodies: payloads, and what lies along a beam."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""From a scene in space and its bodies to a tree, and to the rows of constraints that close loops or follow paths."""
+"""From a scene and its bodies to a tree, and to the rows of constraints that close loops or follow paths."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What motors and modal forces do in place of the forces on a path: the split of generalized forces in space."""
+"""What motors and modal forces do in place of the forces on a path: the split of generalized forces."""
 
 from __future__ import annotations
 

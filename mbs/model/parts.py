@@ -1,4 +1,4 @@
-"""What the core wants of bodies and sections in space: mbs/core/recursion/model.h."""
+"""What the core wants of bodies and sections: mbs/core/recursion/model.h."""
 
 from __future__ import annotations
 

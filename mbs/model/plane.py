@@ -1,4 +1,4 @@
-"""Mechanisms in space that move in a plane, as the core solves them there: with the same q, v and forces along them.
+"""Mechanisms that move in a plane, as the core solves them there: with the same q, v and forces along them.
 
 All joints turn about its normal or slide in it, bodies bend in it. What is across it does no work then: offsets of
 points and masses, forces, and rows that close loops, which hold there by themselves. Joints carry it all the same:

@@ -1,4 +1,4 @@
-"""Bodies and sections in space as the core takes them in a plane in which they move: see `spatial_plane`."""
+"""Bodies and sections as the core takes them in a plane in which they move: see `plane`."""
 
 from __future__ import annotations
 

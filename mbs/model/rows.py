@@ -1,4 +1,4 @@
-"""Rows of constraints between sections of a tree in space: what they measure, and how it changes with velocities."""
+"""Rows of constraints between sections of a tree: what they measure, and how it changes with velocities."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Geometric stiffening of a body in space: what bending does to second order, u = x + Φp − ½ pᵀG p.
+"""Geometric stiffening of a body: what bending does to second order, u = x + Φp − ½ pᵀG p.
 
 A unit load has the geometric stiffness K (n, n) of the prestress it causes; by virtual work the displacement along that
 load is Φp − ½ pᵀK p (docs/theory.md, Geometric stiffness). SI units, axes of the body.

@@ -1,4 +1,4 @@
-"""The equations of motion of a scene in space under its constraints, as the core's recursion evaluates them."""
+"""The equations of motion of a scene under its constraints, as the core's recursion evaluates them."""
 
 from __future__ import annotations
 

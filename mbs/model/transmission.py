@@ -1,4 +1,4 @@
-"""What sits in joints in space as they are built: friction along coordinates, and geared rotors."""
+"""What sits in joints as they are built: friction along coordinates, and geared rotors."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A tree of bodies in space: where they are and how they move by joint coordinates and modes.
+"""A tree of bodies: where they are and how they move by joint coordinates and modes.
 
 State q: of each body in the order of the tree the q of its joint, then its p; v likewise, with the joint's freedoms.
 It is the core's. All functions take states (…, n_q) at once; what comes out is in global axes, SI units.
@@ -99,7 +99,7 @@ class ElasticGearInSpace(NamedTuple):
 class KinematicTree:
     """Bodies on the joints of a spanning forest; `loops` are the joints beside it, in the scene's order.
 
-    `gears` are between its joints: none where they are taken for rigid (see `spatial_gears.with_compliance`).
+    `gears` are between its joints: none where they are taken for rigid (see `gears.with_compliance`).
     `on_frames` names joints whose angles are those of frames (see `frames_3d`).
     """
 

@@ -1,4 +1,4 @@
-"""Forces and moments on sections in space. Global axes, SI units, (T, …)."""
+"""Forces and moments on sections. Global axes, SI units, (T, …)."""
 
 from __future__ import annotations
 

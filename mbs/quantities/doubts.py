@@ -1,4 +1,4 @@
-"""Why a motion in space may be wrong, read off the motion itself: one text each."""
+"""Why a motion may be wrong, read off the motion itself: one text each."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is read off a motion in space: places of bodies and points, joint coordinates, path forces, motor moments.
+"""What is read off a motion: places of bodies and points, joint coordinates, path forces, motor moments.
 
 All arrays are over the output times (T, …), SI units, global axes unless a name says otherwise.
 """

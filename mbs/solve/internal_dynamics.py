@@ -1,4 +1,4 @@
-"""Internal dynamics of a path under motors alone, in the plane and in space: r(t, p, ṗ, p̈) = 0, and its zeros.
+"""Internal dynamics of a path under motors alone: r(t, p, ṗ, p̈) = 0, and its zeros.
 
 With p(t) given the joints follow from the path, and r, the modal forces that motors do not supply, is what has to
 vanish: the zero dynamics about a path that is held (Blajer and Kolodziejczyk 2004; Seifried 2014, ch. 4).
@@ -35,7 +35,7 @@ class Target(NamedTuple):
 
 
 class Output(Protocol):
-    """A path that motors alone are to carry; `factor` and `offset` as in `spatial_servo.Servo`."""
+    """A path that motors alone are to carry; `factor` and `offset` as in `servo.Servo`."""
 
     @property
     def factor(self) -> float:

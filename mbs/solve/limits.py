@@ -1,4 +1,4 @@
-"""Joints in space that leave the range which the scene gives them.
+"""Joints that leave the range which the scene gives them.
 
 Those of the tree are watched by the core while it integrates, between outputs, too. Others are looked at in outputs:
 joints at which loops are cut have no coordinate in the tree, and those of planar joints that lead backwards are no

@@ -1,4 +1,4 @@
-"""Postures of a robot in space: Newton on the rows, how it can move there, and what to say of singular ones."""
+"""Postures of a robot: Newton on the rows, how it can move there, and what to say of singular ones."""
 
 from __future__ import annotations
 

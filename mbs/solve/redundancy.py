@@ -1,4 +1,4 @@
-"""Freedom that paths leave to a robot in space, as six components do to seven joints: settled with rigid links.
+"""Freedom that paths leave to a robot, as six components do to seven joints: settled with rigid links.
 
 The motion of the joints along the path is found with undeformed links, by the criterion that the scene names. Of the
 joints those that tell the motion left free best then follow it, as joints that the scene prescribes do: with flexible

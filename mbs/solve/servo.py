@@ -1,4 +1,4 @@
-"""A path in space whose force enters through the joint motors alone, as `servo` in the plane: `internal_dynamics`."""
+"""A path whose force enters through the joint motors alone: see `internal_dynamics`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The posture that a robot in space starts from: the guess of joint coordinates, then Newton on the rows."""
+"""The posture that a robot starts from: the guess of joint coordinates, then Newton on the rows."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Static equilibrium in space under gravity, given loads and the constraints at one time."""
+"""Static equilibrium under gravity, given loads and the constraints at one time."""
 
 from __future__ import annotations
 
