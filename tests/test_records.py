@@ -1,4 +1,4 @@
-"""Scene files in space: what their records take, and the message of each mistake."""
+"""Scene files in 3D: what their records take, and the message of each mistake."""
 
 import copy
 import tomllib
@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 import scene_of
+from checkpoint_mechanisms import CASES, load
 from checkpoint_scenes import checkpoint_scene
-from spatial_checkpoints import CASES, load
 
 from ffrobot.common.errors import InputError
 from ffrobot.common.key_descriptions import key_descriptions
@@ -358,4 +358,4 @@ def test_what_space_does_not_have_is_in_one_list():
             for path in Path(folder).rglob("*spatial*.py"):
                 if "not available" in path.read_text(encoding="utf-8"):
                     refusing.add(path.stem)
-    assert refusing <= {name.rpartition(".")[2] for name in listed} | {"spatial_lacks"}
+    assert refusing <= {name.rpartition(".")[2] for name in listed} | {"lacks_in_3d"}

@@ -78,9 +78,9 @@ assert dict(results.attributes("turn"))["kind"] == "turntable"
 
 solid = ROD | {"inertia": [0.1, 0.5, 0.5], "center": [0.5, 0.0, 0.0]}
 solid["points"] = {"root": [0.0, 0.0, 0.0], "tip": [1.0, 0.0, 0.0]}
-in_space = KEYS | {"space": "spatial", "gravity": [0.0, 0.0, 0.0], "body": [{"name": "rod", "rigid": solid}]}
-in_space["joint"] = [KEYS["joint"][0] | {"axis": [0.0, 0.0, 1.0]}]
-turned = ffrobot.solve(ffrobot.make_scene(**in_space, analysis=[TURN]))
+in_3d = KEYS | {"space": "spatial", "gravity": [0.0, 0.0, 0.0], "body": [{"name": "rod", "rigid": solid}]}
+in_3d["joint"] = [KEYS["joint"][0] | {"axis": [0.0, 0.0, 1.0]}]
+turned = ffrobot.solve(ffrobot.make_scene(**in_3d, analysis=[TURN]))
 np.testing.assert_allclose(turned["turn/joints/O/coordinate"], 2.0 * np.linspace(0.0, 1.0, 5))
 np.testing.assert_allclose(turned["turn/points/rod.tip/position"][-1], [np.cos(2.0), np.sin(2.0), 0.0], atol=1e-14)
 assert "integration of turn, algebraic" in results.skipped

@@ -1,4 +1,4 @@
-"""The Python interface and sweeps with scenes in space: what the command line does."""
+"""The Python interface and sweeps with scenes in 3D: what the command line does."""
 
 import csv
 import signal

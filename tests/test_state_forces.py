@@ -120,7 +120,7 @@ AT = np.array([0.6, 0.1, -0.2])
 AXIS = np.array([1.0, 2.0, 2.0]) / 3
 
 
-def in_space(force, analysis, *joints, **keys):
+def in_3d(force, analysis, *joints, **keys):
     """A body whose point "center" is its center of mass, free where no joint is given."""
     body = {"mass": MASS, "center": [0.3, 0.0, 0.0], "inertia": [0.01, 0.02, 0.03],
             "points": {"root": [0, 0, 0], "center": [0.3, 0.0, 0.0]}}  # fmt: skip
@@ -135,10 +135,10 @@ def pull_back(t, position, velocity):
     return -K * (position - AT) - C * velocity
 
 
-def test_mass_on_a_spring_in_space():
+def test_mass_on_a_spring_in_3d():
     """A free body at its center, from 0.3 m along x: a damped oscillation along each axis about AT + m g / k."""
     g = np.array([1.0, -2.0, -9.81])
-    results = ffrobot.solve(in_space(pull_back, FREE, gravity=g.tolist()))
+    results = ffrobot.solve(in_3d(pull_back, FREE, gravity=g.tolist()))
     t, decay, rest = results.time("free")[:, None], C / (2 * MASS), AT + MASS * g / K
     omega = np.sqrt(K / MASS - decay**2)
     back = np.exp(-decay * t) * (np.cos(omega * t) + decay / omega * np.sin(omega * t))
@@ -146,7 +146,7 @@ def test_mass_on_a_spring_in_space():
     np.testing.assert_allclose(found, rest + ([0.3, 0.0, 0.0] - rest) * back, atol=1e-8)
 
 
-def test_torque_that_it_asks_of_a_motor_in_space():
+def test_torque_that_it_asks_of_a_motor_in_3d():
     """Held, a hinge about `AXIS` feels force and moment of the function: τ = −e·(r × F + M)."""
     moment = np.array([1.0, -2.0, 3.0])
 
@@ -155,29 +155,29 @@ def test_torque_that_it_asks_of_a_motor_in_space():
 
     hinge = {"name": "O", "type": "revolute", "between": ["ground", "arm.root"], "axis": AXIS.tolist()}
     hold = {"name": "turn", "joint": "O", "value": "0"}
-    results = ffrobot.solve(in_space(force, {"name": "held", "kind": "pcid", "end": 0.1}, hinge, trajectory=[hold]))
+    results = ffrobot.solve(in_3d(force, {"name": "held", "kind": "pcid", "end": 0.1}, hinge, trajectory=[hold]))
     r = np.array([0.3, 0.0, 0.0])
     expected = -AXIS @ np.cross(r, -K * (r - AT)) - (1 + results.time("held")) * (AXIS @ moment)
     np.testing.assert_allclose(results["held/joints/O/moment"], expected, rtol=1e-10)
 
 
-def test_static_equilibrium_and_linear_model_in_space():
+def test_static_equilibrium_and_linear_model_in_3d():
     """On an oblique slide: the way m g·e / k + AT·e − 0.3 e_x, ω² = k / m and damping c / m."""
     slide = {"name": "O", "type": "prismatic", "between": ["ground", "arm.root"], "axis": AXIS.tolist()}
     g = np.array([1.0, -2.0, -9.81])
     static = {"initial": {"state": "static"}, "gravity": g.tolist()}
-    sagged = ffrobot.solve(in_space(pull_back, FREE, slide | {"motor": False}, **static))
+    sagged = ffrobot.solve(in_3d(pull_back, FREE, slide | {"motor": False}, **static))
     way = MASS * g @ AXIS / K + (AT - [0.3, 0.0, 0.0]) @ AXIS
     np.testing.assert_allclose(sagged["free/joints/O/coordinate"], way, rtol=1e-9)
     about = {"name": "rest", "kind": "linear", "output_step": None}
-    results = ffrobot.solve(in_space(pull_back, about, slide))
+    results = ffrobot.solve(in_3d(pull_back, about, slide))
     eigenvalues = np.linalg.eigvals(results["rest/linear/A"][0])
     np.testing.assert_allclose(eigenvalues.real, -C / (2 * MASS), rtol=1e-6)
     np.testing.assert_allclose(np.abs(eigenvalues), np.sqrt(K / MASS), rtol=1e-6)
 
 
-def test_a_flexible_arm_in_space_is_the_one_in_the_plane():
-    """The same spring on the link that swings about z: the core in space against the one in the plane."""
+def test_a_flexible_arm_in_3d_is_the_one_in_the_plane():
+    """The same spring on the link that swings about z: the core in 3D against the one in the plane."""
     link = LINK | {"modes": LINK["modes"] | {"attachment_modes": False}}  # whose masses the plane raises
     motion = {"name": "free", "kind": "forward", "end": 0.02, "output_step": 0.002, "tolerance": 1e-10}
     planar = ffrobot.solve(scene(spring, joint=HINGE, link=link, analysis=motion, initial={"angles": {"arm": 0.5}}))
@@ -196,12 +196,12 @@ def test_a_flexible_arm_in_space_is_the_one_in_the_plane():
     assert np.ptp(planar[key][:, 1]) > 1e-3  # it moves
 
 
-def test_what_functions_return_in_space():
+def test_what_functions_return_in_3d():
     with pytest.raises(ffrobot.InputError, match=r"expected a force \(x, y, z\), or \(x, y, z, mx, my, mz\), found"):
-        ffrobot.solve(in_space(lambda t, x, v: (1.0, 2.0), FREE))
+        ffrobot.solve(in_3d(lambda t, x, v: (1.0, 2.0), FREE))
     beside = [{"point": "arm.center", "x": "1", "force": pull_back}]
     with pytest.raises(ffrobot.InputError, match='expected "force" alone with "point", found "x", "force"'):
-        in_space(None, FREE, load=beside)
+        in_3d(None, FREE, load=beside)
 
 
 @pytest.mark.parametrize(

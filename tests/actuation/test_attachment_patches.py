@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from planar_patches import SCENE, on_link, planar_body
+from patches_on_links import SCENE, on_link, planar_body
 
 from ffrobot.actuation.patches.kept_modes import on_kept_modes
 from ffrobot.actuation.patches.link_patches import check_reach

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
+from bodies_by_invariants import with_payload
 from links import arm, arm_links, ritz_link
 from mechanisms import make_model, revolute
-from planar_bodies import with_payload
-from planar_runs import energies, evaluated
+from oracle_runs import energies, evaluated
 from scipy.io import loadmat
 from scipy.optimize import brentq
 

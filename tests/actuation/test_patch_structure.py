@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from planar_patches import SCENE, planar_body
+from patches_on_links import SCENE, planar_body
 
 from ffrobot.actuation.patches.link_patches import placed_patches
 from ffrobot.actuation.patches.records import PztLayout

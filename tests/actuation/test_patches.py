@@ -5,7 +5,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from planar_patches import SCENE, bent, layout, modes_in_the_plane, on_link, patches, planar_body, tip_deflection
+from patches_on_links import SCENE, bent, layout, modes_in_the_plane, on_link, patches, planar_body, tip_deflection
 
 from ffrobot.actuation.patches.link_patches import check_reach, link_patches
 from ffrobot.actuation.patches.voltages import solve_voltages

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from planar_patches import SCENE, layout, patches, planar_body
+from patches_on_links import SCENE, layout, patches, planar_body
 from scipy.linalg import solve_continuous_lyapunov
 
 from ffrobot.actuation.control.linear_model import state_space

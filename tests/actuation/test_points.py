@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from planar_patches import SCENE, planar_body
+from patches_on_links import SCENE, planar_body
 
 from ffrobot.actuation.points import ActuationPoints, make_point_set, with_points
 from ffrobot.common.errors import InputError

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from planar_patches import on_link
+from patches_on_links import on_link
 
 from ffrobot.fe_models.link import cached_modal_body
 

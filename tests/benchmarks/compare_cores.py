@@ -21,7 +21,7 @@ import json, sys, time
 sys.path[:0] = sys.argv[1:]
 from links import ANGLES, arm, arm_links
 from mechanisms import pcid
-from planar_runs import run
+from oracle_runs import run
 from ffrobot.mbs import _core
 for line in sys.stdin:
     modes, integrator = json.loads(line)

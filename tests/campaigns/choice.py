@@ -19,7 +19,7 @@ sys.path.append(str(Path(__file__).parents[1] / "mbs"))
 
 from links import ANGLES, TIP, arm, arm_links, quintic, ritz_link
 from mechanisms import forward, make_model, pcid, revolute
-from planar_runs import run
+from oracle_runs import run
 from record import record
 
 from ffrobot.mbs.analysis.motors_only import MotorsOnly

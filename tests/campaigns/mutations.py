@@ -1,4 +1,4 @@
-"""Every key of every case, and of scenes in space, with hostile values: what is solved, refused, or falls over.
+"""Every key of every case, and of scenes in 3D, with hostile values: what is solved, refused, or falls over.
 
     python tests/campaigns/mutations.py [--count 100] [--seed 0] [--case NAME …] [--folder FOLDER] [--record]
 
@@ -73,7 +73,7 @@ def shortened(scene: dict[str, Any]) -> dict[str, Any]:
     return scene
 
 
-def write_scene_in_space(name: str, folder: Path) -> None:
+def write_scene_in_3d(name: str, folder: Path) -> None:
     text, links = scene(json.loads((CHECKPOINTS / f"{name}.json").read_text(encoding="utf-8")), 1e-5)
     folder.mkdir()
     (folder / "scene.toml").write_text(text, encoding="utf-8")
@@ -91,7 +91,7 @@ class Campaign:
         if not ready.exists():
             shutil.copytree(CASES, ready, ignore=shutil.ignore_patterns("*.h5", "figures", "README.md"))
             for name in IN_SPACE:
-                write_scene_in_space(name, ready / f"checkpoint_{name}")  # cases may have the same name
+                write_scene_in_3d(name, ready / f"checkpoint_{name}")  # cases may have the same name
         names = sorted(path.parent.name for path in ready.glob("*/scene.toml"))
         self.cases = [self.prepared(ready / name) for name in names if cases is None or name in cases]
         keys = {

@@ -1,4 +1,4 @@
-"""Random scenes in space by seed and number: arms along lines and joint paths, swinging chains, closed loops.
+"""Random scenes in 3D by seed and number: arms along lines and joint paths, swinging chains, closed loops.
 
 Lengths in m, angles in rad; steel and aluminium beams with bending in two planes, torsion and, at times, axial modes.
 """
@@ -13,7 +13,7 @@ UP = np.array([0.0, 0.0, 1.0])
 ALONG = np.array([1.0, 0.0, 0.0])  # links, in their axes
 
 
-def random_spatial_scene(seed, number, runs, most_steps):
+def random_scene_in_3d(seed, number, runs, most_steps):
     """Kind and scene of that number, analysed once for each of `runs` (name, tolerance, integrator)."""
     kind = list(KINDS)[number % len(KINDS)]
     robot = Robot(np.random.default_rng([seed, number]))

@@ -19,7 +19,7 @@ import numpy as np
 from judging import largest_errors, nothing_of_rounding, peaks, record_of_run, with_body_velocity, with_slow_rates
 from random_robots import random_scene
 from record import record
-from robots_3d import random_spatial_scene
+from robots_3d import random_scene_in_3d
 
 import ffrobot
 from ffrobot.common.errors import FfrobotError
@@ -66,7 +66,7 @@ def planar_scene(seed, number, analyses):
 
 def validated_scene(seed, number, analyses):
     """Its kind and scene."""
-    return random_spatial_scene(seed, number, analyses, MOST_STEPS)
+    return random_scene_in_3d(seed, number, analyses, MOST_STEPS)
 
 
 def histories(file, name):

@@ -1,4 +1,4 @@
-"""Arms in space drawn at random: offsets, leaning axes, sections, families, payload, gravity, a path of the tool."""
+"""Arms in 3D drawn at random: offsets, leaning axes, sections, families, payload, gravity, a path of the tool."""
 
 import numpy as np
 import tomli_w

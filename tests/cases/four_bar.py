@@ -1,7 +1,7 @@
-"""A four-bar linkage of rigid bars in the plane, as a planar scene and as one in space, with any keys of its joints."""
+"""A four-bar linkage of rigid bars in the plane, as a planar scene and as one in 3D, with any keys of its joints."""
 
 import numpy as np
-from planar_tables import joint_keys, rigid_keys
+from scenes_in_3d import joint_keys, rigid_keys
 
 from ffrobot.mbs.fields.spelling import place
 
@@ -49,8 +49,8 @@ def planar(of_joints, analyses, **tables):
     } | follows | tables  # fmt: skip
 
 
-def in_space(of_joints, analyses, **tables):
-    """Tables of the same in space."""
+def in_3d(of_joints, analyses, **tables):
+    """Tables of the same in 3D."""
     found = planar(of_joints, analyses, **tables)
     return found | {
         "space": "spatial",

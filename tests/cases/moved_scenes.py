@@ -1,4 +1,4 @@
-"""Scenes in space as a whole turned, or seen in a mirror: tables of keys, and what becomes of their results.
+"""Scenes in 3D as a whole turned, or seen in a mirror: tables of keys, and what becomes of their results.
 
 Vectors change by Q; those that belong to a sense of rotation (angular velocities, moments, axes to turn about) by
 det(Q) Q: with a mirror they keep their component along its normal and change the others.
@@ -8,9 +8,9 @@ import tomllib
 
 import numpy as np
 import scene_of
+from checkpoint_mechanisms import load
 from checkpoint_scenes import rpy
 from rotations import exponential, logarithm
-from spatial_checkpoints import load
 
 MIRROR = np.diag([1.0, -1.0, 1.0])
 

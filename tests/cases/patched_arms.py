@@ -1,4 +1,4 @@
-"""Parts of files of arms in space with patches: links, layouts of patches, an arm of a waist and a shoulder."""
+"""Parts of files of arms in 3D with patches: links, layouts of patches, an arm of a waist and a shoulder."""
 
 LINK = """
 name = "{name}"

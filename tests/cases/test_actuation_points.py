@@ -1,8 +1,8 @@
-"""Forces at actuation points of links in space: they carry the motion by themselves, and are those of the plane."""
+"""Forces at actuation points of links in 3D: they carry the motion by themselves, and are those of the plane."""
 
 import numpy as np
-import planar_tables
 import pytest
+import scenes_in_3d
 from checkpoints import CASES
 
 import ffrobot
@@ -23,11 +23,11 @@ ACROSS = [0.05, 0.10, 0.18, 0.27, 0.36, 0.45, 0.54, 0.63, 0.72, 0.81, 0.91, "tip
 
 def test_planar_points_put_into_space(tmp_path):
     """Components along and across the links chosen by hand: the forces of the plane, which return the motion."""
-    planar = planar_tables.read(CASES / "two_link_points" / "scene.toml") | {"analysis": ANALYSES}
-    spatial = planar_tables.in_space(planar) | {"initial": {"joints": GUESS}, "analysis": ANALYSES}
+    planar = scenes_in_3d.read(CASES / "two_link_points" / "scene.toml") | {"analysis": ANALYSES}
+    spatial = scenes_in_3d.in_3d(planar) | {"initial": {"joints": GUESS}, "analysis": ANALYSES}
     spatial["actuation_points"] = [{"body": "link1"}, {"body": "link2", "x": ["tip"], "y": ACROSS}]
     results = [
-        ffrobot.solve(planar_tables.write(tables, tmp_path / f"{name}.toml"))
+        ffrobot.solve(scenes_in_3d.write(tables, tmp_path / f"{name}.toml"))
         for name, tables in (("planar", planar), ("spatial", spatial))
     ]
     with results[0] as plane, results[1] as space:

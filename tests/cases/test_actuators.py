@@ -1,10 +1,10 @@
-"""Motors and patches of scenes in space, acting again or with given voltages."""
+"""Motors and patches of scenes in 3D, acting again or with given voltages."""
 
 import h5py
 import numpy as np
 import pytest
+from checkpoint_scene_files import close
 from patched_arms import ARM, LINK, PZT, SEVEN
-from space import close
 
 PATH = """
 [[trajectory]]

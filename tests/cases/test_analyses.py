@@ -1,12 +1,12 @@
-"""Analyses of scenes in space beside pcid, through `ffrobot solve`: an independent code's numbers, and identities."""
+"""Analyses of scenes in 3D beside pcid, through `ffrobot solve`: an independent code's numbers, and identities."""
 
 import warnings
 
 import numpy as np
 import pytest
-from robots_3d import random_spatial_scene
-from space import close, solved, write_scene
-from spatial_checkpoints import load
+from checkpoint_mechanisms import load
+from checkpoint_scene_files import close, solved, write_scene
+from robots_3d import random_scene_in_3d
 
 import ffrobot
 
@@ -206,7 +206,7 @@ def test_fcid_needs_a_path_for_every_freedom(tmp_path, ffrobot):
 @pytest.mark.parametrize(("seed", "number"), [(301, 1), (303, 17)])
 def test_equilibrium_whose_forces_are_all_of_the_links(seed, number):
     """Upright axes hold nothing: what is left of gravity and elasticity together is rounding, the same as all of it."""
-    _, scene = random_spatial_scene(seed, number, [("rest", 1e-3, "dop853")], 60_000)
+    _, scene = random_scene_in_3d(seed, number, [("rest", 1e-3, "dop853")], 60_000)
     results = ffrobot.solve(scene)
     assert scene.initial.state == "static"
     modal = np.abs(results["rest/bodies/b1/modal"][0]).max()

@@ -1,12 +1,12 @@
-"""`integrator = "auto"` in space: what it chooses, and what becomes of a choice that turns out badly."""
+"""`integrator = "auto"` in 3D: what it chooses, and what becomes of a choice that turns out badly."""
 
 import re
 
 import h5py
 import numpy as np
 import pytest
+from checkpoint_scene_files import solved, write_scene
 from checkpoint_scenes import checkpoint_scene
-from space import solved, write_scene
 
 from ffrobot.mbs import _core
 from ffrobot.mbs.model.model import build_model

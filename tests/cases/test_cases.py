@@ -1,4 +1,4 @@
-"""The cases in space through `ffrobot solve`, against an independent code, and by what has to hold in any motion."""
+"""The cases in 3D through `ffrobot solve`, against an independent code, and by what has to hold in any motion."""
 
 import numpy as np
 import pytest

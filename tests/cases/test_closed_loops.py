@@ -1,10 +1,10 @@
-"""Closed loops of robots in space: those of planar robots put there, work, linear models, bad input."""
+"""Closed loops of robots in 3D: those of planar robots put there, work, linear models, bad input."""
 
 import numpy as np
-import planar_tables
 import pytest
+import scenes_in_3d
 from checkpoints import CASES
-from planar_tables import CRANK
+from scenes_in_3d import CRANK
 from scipy.linalg import expm
 
 import ffrobot
@@ -28,13 +28,13 @@ def loop(name, *controllers, actuation="split", **keys):
 
 
 def both(folder, analyses, **keys):
-    """Results of the case in the plane and of the same robot in space."""
-    planar = planar_tables.read(CASES / "two_link_closed_loop" / "scene.toml") | keys
+    """Results of the case in the plane and of the same robot in 3D."""
+    planar = scenes_in_3d.read(CASES / "two_link_closed_loop" / "scene.toml") | keys
     planar["analysis"] = analyses
-    spatial = planar_tables.in_space(planar) | {"pzt": planar["pzt"], "analysis": analyses}
+    spatial = scenes_in_3d.in_3d(planar) | {"pzt": planar["pzt"], "analysis": analyses}
     spatial["initial"] = {"joints": {"O": 0.0, "A": np.pi / 3}}
     return [
-        ffrobot.solve(planar_tables.write(tables, folder / f"{name}.toml"))
+        ffrobot.solve(scenes_in_3d.write(tables, folder / f"{name}.toml"))
         for name, tables in (("planar", planar), ("spatial", spatial))
     ]
 
@@ -102,7 +102,7 @@ def test_gears_that_give(tmp_path):
     """The gear on the ground alone: what the rotor of another does to its link is left out in 2D (docs/theory.md)."""
     geared = {"gear_ratio": 60.0, "rotor_inertia": 2e-4}
     compliant = geared | {"stiffness": 3e3, "damping": 2.0}
-    rods = planar_tables.read(CASES / "two_link_closed_loop" / "scene.toml")
+    rods = scenes_in_3d.read(CASES / "two_link_closed_loop" / "scene.toml")
     points = {"root": [0.0, 0.0], "tip": [1.0, 0.0]}
     for k, body in enumerate(rods["body"]):
         del body["link"]
@@ -128,7 +128,7 @@ def test_gears_that_give(tmp_path):
 
 def test_a_crank_that_drives_a_slider(tmp_path):
     """A loop that a joint closes: its rows hold under the controller."""
-    tables = planar_tables.read(CASES / "slider_crank" / "scene.toml")
+    tables = scenes_in_3d.read(CASES / "slider_crank" / "scene.toml")
     crank = tables["joint"][0]["name"]
     pd = {"kind": "joint-pid", "proportional": {crank: 20.0}, "derivative": {crank: 0.5}}
     inverse = INVERSE | {"end": 0.05}
@@ -136,7 +136,7 @@ def test_a_crank_that_drives_a_slider(tmp_path):
     tables |= {"analysis": [inverse, loop("pd", pd, **keys)]}
     tables.pop("pzt", None)
     tables["joint"][0] |= {"motor": True, "gear_ratio": 20.0, "rotor_inertia": 1e-5}
-    spatial = planar_tables.in_space(tables) | {"analysis": tables["analysis"], "initial": {"joints": CRANK}}
+    spatial = scenes_in_3d.in_3d(tables) | {"analysis": tables["analysis"], "initial": {"joints": CRANK}}
     with solve(tables, tmp_path, "planar") as planar, solve(spatial, tmp_path, "spatial") as found:
         for dataset in ("control/commands", "control/readings", "tip_error", f"joints/{crank}/moment"):
             expected = planar[f"pd/{dataset}"]
@@ -153,7 +153,7 @@ HOLDS = {"kind": "joint-pid", "proportional": GAINS, "derivative": RATES}
 
 def arm(*analyses, still=False, rotors=True, **keys):
     """The case `arm_3r`, with rotors as motors have them; `still`: its tip stays where the line begins."""
-    tables = planar_tables.read(CASES / "arm_3r" / "scene.toml")
+    tables = scenes_in_3d.read(CASES / "arm_3r" / "scene.toml")
     for joint in tables["joint"] if rotors else ():
         joint |= {"gear_ratio": 80.0, "rotor_inertia": 3e-5}
     if still:
@@ -166,7 +166,7 @@ def held(name, *controllers, **keys):
 
 
 def solve(tables, folder, name="scene"):
-    return ffrobot.solve(planar_tables.write(tables, folder / f"{name}.toml"))
+    return ffrobot.solve(scenes_in_3d.write(tables, folder / f"{name}.toml"))
 
 
 PUSH = (1.0, -2.0, 1.5)  # N on the tip for each N of size
@@ -346,7 +346,7 @@ MISTAKES = [
 
 @pytest.mark.parametrize(("keys", "expected"), MISTAKES)
 def test_bad_keys_are_refused(tmp_path, keys, expected):
-    path = planar_tables.write(arm(HOLD, held("loop", HOLDS) | keys), tmp_path / "scene.toml")
+    path = scenes_in_3d.write(arm(HOLD, held("loop", HOLDS) | keys), tmp_path / "scene.toml")
     with pytest.raises(InputError, match=expected):
         ffrobot.solve(path)
 

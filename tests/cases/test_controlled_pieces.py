@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from planar_tables import joint_keys
+from scenes_in_3d import joint_keys
 
 import ffrobot
 from ffrobot.mbs.fields.spelling import place
@@ -72,7 +72,7 @@ def arm(pieces, analyses, family="in-plane-bending", count=4, **changes):
     } | changes
 
 
-def in_space(tables, **changes):
+def in_3d(tables, **changes):
     return tables | {
         "space": "spatial",
         "gravity": place(tables["gravity"]),
@@ -83,11 +83,11 @@ def in_space(tables, **changes):
 
 @pytest.fixture(scope="module")
 def both():
-    """Solutions of the arm with its links in three pieces, in the plane and in space."""
+    """Solutions of the arm with its links in three pieces, in the plane and in 3D."""
     tables = arm(
         3, [INVERSE, REST, MOVING, LOOP | {"sensor": [*LOOP["sensor"], {"pzt": "link2"}]}, DESIGN], pzt=PATCHED
     )
-    plane, space = (ffrobot.make_scene(**of) for of in (tables, in_space(tables)))
+    plane, space = (ffrobot.make_scene(**of) for of in (tables, in_3d(tables)))
     return solve_scene(plane, Watcher()), solve_scene(space, Watcher())
 
 
@@ -152,7 +152,7 @@ def test_patches_across_cuts_are_those_of_the_plane():
     path = [{"name": "tip", "point": "link2.tip", "x": f"1.82-0.2*{S}", "y": f"0.66+0.2*{S}"}]
     tables = arm(3, [INVERSE, REPLAY], pzt=PATCHED, trajectory=path)
     plane = solve_scene(ffrobot.make_scene(**tables), Watcher())
-    space = solve_scene(ffrobot.make_scene(**in_space(tables)), Watcher())
+    space = solve_scene(ffrobot.make_scene(**in_3d(tables)), Watcher())
     for link in CONDITIONS:
         expected, found = (of.analyses["inverse"].actuation.voltages[link] for of in (plane, space))
         assert np.abs(expected.required).max() > 10.0
@@ -178,7 +178,7 @@ def test_an_arm_that_bends_in_both_planes_and_twists():
     for pieces in (None, 3):
         tables = arm(pieces, [INVERSE, REST, DESIGN], ["in-plane-bending", "out-of-plane-bending", "torsion"], 12)
         payload = [{"point": "link2.tip", "mass": 0.2, "center": [0.0, 0.05, 0.02]}]
-        tables = in_space(tables, gravity=[0.0, 0.0, 0.0], payload=payload)
+        tables = in_3d(tables, gravity=[0.0, 0.0, 0.0], payload=payload)
         tables["joint"] = [joint | {"axis": axes[joint["name"]]} for joint in tables["joint"]]
         found.append(ffrobot.solve(ffrobot.make_scene(**tables)))
     with found[0] as one, found[1] as two:

@@ -1,4 +1,4 @@
-"""`check = "finer"` in space: what inverse results leave on links with twice the modes."""
+"""`check = "finer"` in 3D: what inverse results leave on links with twice the modes."""
 
 import json
 
@@ -47,7 +47,7 @@ def planar(modes, kind="pcid", patches=True, **keys):
     }
 
 
-def in_space(tables):
+def in_3d(tables):
     """The same with y up, and the motion about z."""
     keys = tables | {"space": "spatial", "gravity": [*tables["gravity"], 0.0]}
     keys["initial"] = {"state": "static", "joints": {"O": 0.4}}
@@ -67,7 +67,7 @@ def test_it_is_that_of_the_plane(kind, patches):
     keys = planar(MODES, kind, patches)
     if kind == "fcid":
         keys["analysis"][0]["shape"] = "static"
-    found, expected = checked(in_space(keys)), checked(keys)
+    found, expected = checked(in_3d(keys)), checked(keys)
     assert {key: found[key] for key in ("modes", "point", "status")} == {
         key: expected[key] for key in ("modes", "point", "status")
     }
@@ -77,13 +77,13 @@ def test_it_is_that_of_the_plane(kind, patches):
 
 def test_error_is_that_of_the_modes_left_out():
     """It falls with every mode."""
-    errors = [checked(in_space(planar(modes)))["error"] for modes in (1, 3)]
+    errors = [checked(in_3d(planar(modes)))["error"] for modes in (1, 3)]
     assert errors[0] > 4 * errors[1]
 
 
 def test_it_is_told_and_kept(tmp_path, ffrobot):
     path = tmp_path / "scene.toml"
-    path.write_text(library.make_scene(**in_space(planar(MODES))).text, encoding="utf-8")
+    path.write_text(library.make_scene(**in_3d(planar(MODES))).text, encoding="utf-8")
     done = ffrobot("solve", path)
     assert done.returncode == 0, done.stderr
     assert "inverse, forward simulation on 4 modes: link.tip is off by" in " ".join(done.stdout.split())
@@ -93,14 +93,14 @@ def test_it_is_told_and_kept(tmp_path, ffrobot):
 
 def test_modal_body_files_cannot_be_refined(tmp_path):
     library.make_link(link(MODES), tmp_path / "link.h5")
-    keys = in_space(planar(MODES)) | {"body": [{"name": "link", "modal": str(tmp_path / "link.h5")}]}
+    keys = in_3d(planar(MODES)) | {"body": [{"name": "link", "modal": str(tmp_path / "link.h5")}]}
     with pytest.raises(library.InputError, match=r'check: expected "link" in body "link" for "finer"'):
         library.solve(library.make_scene(**keys))
 
 
 @pytest.mark.parametrize("change", [{"motor": False}, {"stiffness": 1e4, "damping": 1.0, "rotor_inertia": 1e-4}])
 def test_what_a_replay_cannot_do(change):
-    keys = in_space(planar(MODES, patches=False))
+    keys = in_3d(planar(MODES, patches=False))
     keys["joint"] = [keys["joint"][0] | change]
     with pytest.raises(library.InputError, match="check: expected motors, and joints without stiffness"):
         library.solve(library.make_scene(**keys))

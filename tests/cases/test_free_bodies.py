@@ -1,9 +1,9 @@
-"""Free bodies in space: an independent code's motion, and what cannot change: momentum and energy."""
+"""Free bodies in 3D: an independent code's motion, and what cannot change: momentum and energy."""
 
 import numpy as np
 import pytest
-from space import FOLDER, close, solved
-from spatial_checkpoints import load
+from checkpoint_mechanisms import load
+from checkpoint_scene_files import FOLDER, close, solved
 
 from ffrobot.common.rotations import of_quaternion
 from ffrobot.mbs.analysis.drive import drive_robot

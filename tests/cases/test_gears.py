@@ -1,11 +1,11 @@
-"""Compliant gears, in space: two masses on a spring, momentum and energy, the plane's numbers, acting again."""
+"""Compliant gears, in 3D: two masses on a spring, momentum and energy, the plane's numbers, acting again."""
 
 import numpy as np
-import planar_tables
 import pytest
+import scenes_in_3d
+from checkpoint_scene_files import write_scene
 from checkpoints import CASES
 from scipy.integrate import simpson
-from space import write_scene
 
 import ffrobot
 from ffrobot.common.errors import InputError
@@ -34,7 +34,7 @@ def scene(bodies, joints, *analyses, **tables):
 
 
 def solve(tables, folder, name="scene"):
-    return ffrobot.solve(planar_tables.write(tables, folder / f"{name}.toml"))
+    return ffrobot.solve(scenes_in_3d.write(tables, folder / f"{name}.toml"))
 
 
 @pytest.mark.parametrize("turned", [False, True])
@@ -101,17 +101,17 @@ def test_dampers_and_motors_make_up_the_energy(tmp_path):
         assert abs(simpson(sum(power), x=t) - losses - (energy[-1] - energy[0])) < 2e-4 * losses
 
 
-def test_planar_arm_with_gears_that_give_in_space(tmp_path):
+def test_planar_arm_with_gears_that_give_in_3d(tmp_path):
     """Inverse analysis and equilibrium of the two-link arm: numbers of the plane."""
     analyses = [
         {"name": "inverse", "kind": "fcid", "shape": "zero", "end": 1.0, "output_step": 0.005},
         {"name": "rest", "kind": "static"},
     ]
-    planar = planar_tables.read(CASES / "two_link" / "scene.toml")
+    planar = scenes_in_3d.read(CASES / "two_link" / "scene.toml")
     planar.pop("pzt", None)
     planar["joint"] = [joint | GEARED for joint in planar["joint"]]
     planar["analysis"] = analyses
-    spatial = planar_tables.in_space(planar) | {"analysis": analyses}
+    spatial = scenes_in_3d.in_3d(planar) | {"analysis": analyses}
     spatial["initial"] = {"joints": {"O": 0.0, "A": 1.0471975511965976}}
     with solve(planar, tmp_path, "planar") as plane, solve(spatial, tmp_path, "spatial") as space:
         for joint in ("O", "A"):
@@ -126,7 +126,7 @@ def test_planar_arm_with_gears_that_give_in_space(tmp_path):
 
 def test_motors_behind_gears_carry_out_an_inverse_analysis(tmp_path):
     """The 3R arm with rigid links, rotors on links that move: their motors keep the tool on its path."""
-    tables = planar_tables.read(write_scene("arm3_line_undeformed", tmp_path))
+    tables = scenes_in_3d.read(write_scene("arm3_line_undeformed", tmp_path))
     stiff = {"gear_ratio": 20.0, "rotor_inertia": 2e-4, "stiffness": 2e3, "damping": 5.0}
     tables["joint"] = [joint | stiff for joint in tables["joint"]]
     tables["body"] = [

@@ -1,4 +1,4 @@
-"""Links in pieces in space whose shape is prescribed, that motors alone move, or that get patches elsewhere.
+"""Links in pieces in 3D whose shape is prescribed, that motors alone move, or that get patches elsewhere.
 
 The plane is asked with links cut by hand and welded, which no code for links in pieces touches.
 """
@@ -6,7 +6,7 @@ The plane is asked with links cut by hand and welded, which no code for links in
 from pathlib import Path
 
 import numpy as np
-from planar_tables import joint_keys
+from scenes_in_3d import joint_keys
 
 import ffrobot
 from ffrobot.fe_models.link_file import LinkTable

@@ -1,8 +1,8 @@
-"""Joints of all types with motors under control in space, named from either side: signs, order of coordinates."""
+"""Joints of all types with motors under control in 3D, named from either side: signs, order of coordinates."""
 
 import numpy as np
-import planar_tables
 import pytest
+import scenes_in_3d
 
 import ffrobot
 
@@ -54,7 +54,7 @@ def scene(kind, turned):
 @pytest.mark.parametrize("kind", JOINTS)
 def test_sensors_and_motors_have_the_signs_of_the_joint(tmp_path, kind, turned):
     """Readings are the coordinates in results, commands P e + D ė; fed forward or by computed torque it follows."""
-    with ffrobot.solve(planar_tables.write(scene(kind, turned), tmp_path / "scene.toml")) as found:
+    with ffrobot.solve(scenes_in_3d.write(scene(kind, turned), tmp_path / "scene.toml")) as found:
         outputs = list(found.attributes("pd/control")["outputs"])
         labels = ["J"] if len(outputs) == 2 else ["J 1", "J 2"]
         at = [[outputs.index(f"joint/{name}{ending}") for name in labels] for ending in ("", "/rate")]

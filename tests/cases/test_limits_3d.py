@@ -1,4 +1,4 @@
-"""Limits of positions, told of whole runs in space: of what joints do between outputs, too."""
+"""Limits of positions, told of whole runs in 3D: of what joints do between outputs, too."""
 
 import numpy as np
 import pytest

@@ -1,12 +1,12 @@
-"""Linear models of robots in space: those of planar robots put there, patches, closed forms, bad input."""
+"""Linear models of robots in 3D: those of planar robots put there, patches, closed forms, bad input."""
 
 from itertools import zip_longest
 
 import numpy as np
-import planar_tables
 import pytest
+import scenes_in_3d
 from checkpoints import CASES
-from planar_tables import CRANK, TWO_LINK
+from scenes_in_3d import CRANK, TWO_LINK
 
 import ffrobot
 
@@ -17,30 +17,30 @@ MOVING = {"name": "moving", "kind": "linear", "about": "inverse", "times": [0.0,
 
 
 def both(case, guess, analyses, folder, of_joints=(), of_bodies=None, **changes):
-    """Results of a planar scene and of the same in space; the joint on the ground has a motor."""
-    planar = planar_tables.read(CASES / case / "scene.toml") | changes
+    """Results of a planar scene and of the same in 3D; the joint on the ground has a motor."""
+    planar = scenes_in_3d.read(CASES / case / "scene.toml") | changes
     planar.pop("pzt", None)
     planar["joint"] = [joint | own for joint, own in zip_longest(planar["joint"], of_joints, fillvalue={})]
     planar["body"] = [body | (of_bodies or {}) for body in planar["body"]]
     planar["joint"][0]["motor"] = True
     planar["analysis"] = analyses
-    spatial = planar_tables.in_space(planar) | {"initial": {"joints": guess}, "analysis": analyses}
+    spatial = scenes_in_3d.in_3d(planar) | {"initial": {"joints": guess}, "analysis": analyses}
     return [
-        ffrobot.solve(planar_tables.write(tables, folder / f"{name}.toml"))
+        ffrobot.solve(scenes_in_3d.write(tables, folder / f"{name}.toml"))
         for name, tables in (("planar", planar), ("spatial", spatial))
     ]
 
 
 def same_models(planar, spatial, close, outputs=("joint/", "point/")):
     """The same transfer from motors and forces in the plane to joints and points, and the same poles."""
-    for in_plane, in_space in zip(planar, spatial, strict=True):
-        sources = [name for name in in_plane.input_names if name in in_space.input_names]
-        targets = [name for name in in_plane.output_names if name in in_space.output_names and name.startswith(outputs)]
+    for in_plane, in_3d in zip(planar, spatial, strict=True):
+        sources = [name for name in in_plane.input_names if name in in_3d.input_names]
+        targets = [name for name in in_plane.output_names if name in in_3d.output_names and name.startswith(outputs)]
         assert any(name.startswith("joint/") for name in sources)
         for start in outputs:
             assert any(name.startswith(start) for name in targets)
         omega = np.array([0.0, 3.0, 40.0, 700.0]) + 0.2
-        expected, found = (model.frequency_response(omega, sources, targets) for model in (in_plane, in_space))
+        expected, found = (model.frequency_response(omega, sources, targets) for model in (in_plane, in_3d))
         for k in range(len(omega)):
             np.testing.assert_allclose(found[k], expected[k], rtol=0, atol=close * np.abs(expected[k]).max())
 
@@ -139,14 +139,14 @@ def test_a_motor_behind_its_gear_swings_against_a_body(tmp_path, turned):
 
 
 def test_what_cannot_be_had_is_refused(tmp_path):
-    planar = planar_tables.read(CASES / "two_link" / "scene.toml")
+    planar = scenes_in_3d.read(CASES / "two_link" / "scene.toml")
     planar.pop("pzt", None)
     planar["analysis"] = [{"name": "rest", "kind": "linear"}]
-    spatial = planar_tables.in_space(planar) | {"initial": {"joints": TWO_LINK}, "analysis": planar["analysis"]}
+    spatial = scenes_in_3d.in_3d(planar) | {"initial": {"joints": TWO_LINK}, "analysis": planar["analysis"]}
     for change, message in (
         ({"analysis": [{"name": "rest", "kind": "linear", "points": ["link2.nose"]}]}, r'points: .*found "link2.nose"'),
         ({"analysis": [{"name": "rest", "kind": "linear", "about": "inverse"}]}, "about: expected an earlier analysis"),
     ):
-        path = planar_tables.write(spatial | change, tmp_path / "spatial.toml")
+        path = scenes_in_3d.write(spatial | change, tmp_path / "spatial.toml")
         with pytest.raises(ffrobot.InputError, match=message):
             ffrobot.solve(path)

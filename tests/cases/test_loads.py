@@ -1,12 +1,12 @@
-"""Loads on points, friction and rotors in space through `ffrobot solve`, against forces written by hand."""
+"""Loads on points, friction and rotors in 3D through `ffrobot solve`, against forces written by hand."""
 
 import re
 
 import h5py
 import numpy as np
 import pytest
+from checkpoint_scene_files import solved, write_scene
 from scipy.interpolate import CubicSpline
-from space import solved, write_scene
 
 import ffrobot
 

@@ -1,8 +1,8 @@
-"""Friction and loads in all joints of a loop in space, where one of them is cut: the numbers of the planar scene."""
+"""Friction and loads in all joints of a loop in 3D, where one of them is cut: the numbers of the planar scene."""
 
 import numpy as np
 import pytest
-from four_bar import SIDES, closed, in_space, planar
+from four_bar import SIDES, closed, in_3d, planar
 from scipy.interpolate import CubicSpline
 
 import ffrobot
@@ -39,7 +39,7 @@ def in_the_plane():
 
 @pytest.fixture(scope="module", params=ORDERS)
 def solved(request, in_the_plane):
-    return in_the_plane, ffrobot.solve(ffrobot.make_scene(**in_space(of_joints(request.param), ANALYSES, load=LOADS)))
+    return in_the_plane, ffrobot.solve(ffrobot.make_scene(**in_3d(of_joints(request.param), ANALYSES, load=LOADS)))
 
 
 def close(found, expected, share=1e-9):
@@ -74,8 +74,8 @@ def test_linear_models(solved, analysis):
 
 
 def test_the_plane_is_that_of_space(monkeypatch):
-    """The same cut solved by the core in the plane and by that in space."""
-    scene = ffrobot.make_scene(**in_space(of_joints("ABDC"), ANALYSES[:3], load=LOADS))
+    """The same cut solved by the core in the plane and by that in 3D."""
+    scene = ffrobot.make_scene(**in_3d(of_joints("ABDC"), ANALYSES[:3], load=LOADS))
     plane = ffrobot.solve(scene)
     monkeypatch.setattr(system, "in_plane", lambda *_: None)
     space = ffrobot.solve(scene)
@@ -87,7 +87,7 @@ def test_the_plane_is_that_of_space(monkeypatch):
 def test_friction_and_rotors_in_every_joint_of_a_loop(name):
     """The motor gives what friction takes and the rotor gains; the loop is cut elsewhere."""
     plain, built = (
-        ffrobot.solve(ffrobot.make_scene(**in_space({key: {} for key in SIDES} | {name: keys}, [INVERSE])))
+        ffrobot.solve(ffrobot.make_scene(**in_3d({key: {} for key in SIDES} | {name: keys}, [INVERSE])))
         for keys in ({}, {"viscous_friction": 2.0, "rotor_inertia": 0.7})
     )
     rate, body = built[f"inverse/joints/{name}/rate"], SIDES[name][0].partition(".")[0]
@@ -107,7 +107,7 @@ def test_friction_and_rotors_in_every_joint_of_a_loop(name):
 @pytest.mark.parametrize("cut", ["D", "C"])
 def test_computed_torque_knows_the_friction_of_the_joint_that_is_cut(cut):
     own = of_joints([*(name for name in "ABCD" if name != cut), cut])
-    scene = ffrobot.make_scene(**in_space(own, [INVERSE]))
+    scene = ffrobot.make_scene(**in_3d(own, [INVERSE]))
     results = ffrobot.solve(scene)
     t, moment, rate = (results[f"inverse/{key}"][30] for key in ("time", "joints/A/moment", "joints/A/rate"))
     model = build_model(scene, [body.spatial for body in load_bodies(scene, lambda _: None)])
@@ -122,7 +122,7 @@ def test_computed_torque_knows_the_friction_of_the_joint_that_is_cut(cut):
     [({"motor": True}, "motor"), ({"motor": True, "rotor_inertia": 1e-3, "stiffness": 100.0}, "stiffness")],
 )
 def test_motors_without_a_rotor_and_compliant_gears_in_all_joints_are_refused(keys, named):
-    scene = ffrobot.make_scene(**in_space(dict.fromkeys(SIDES, keys), [INVERSE]))
+    scene = ffrobot.make_scene(**in_3d(dict.fromkeys(SIDES, keys), [INVERSE]))
     expected = 'joint "D": expected a loop with a joint that has neither a motor without rotor_inertia'
     with pytest.raises(ffrobot.InputError, match=f'{expected}.*found "{named}"'):
         ffrobot.solve(scene)
@@ -144,7 +144,7 @@ def test_rotors_and_trajectories_in_all_joints(followed, bare):
 
     expected = solved(planar, "ABDC")
     for order in ORDERS:
-        found = solved(in_space, order)
+        found = solved(in_3d, order)
         close(found["inverse/trajectories/turn/force"].ravel(), expected["inverse/trajectories/turn/force"].ravel())
         for analysis in ("inverse", "replay", "along", "released", "implicit", "rest"):
             test_motion_and_forces((expected, found), analysis)
@@ -156,7 +156,7 @@ def test_rotors_and_trajectories_in_all_joints(followed, bare):
 def test_limits_of_the_joint_that_is_cut(limits, is_told):
     own = of_joints("ABDC")
     own["C"] = ROUGH | {"position_limit": limits}
-    results = ffrobot.solve(ffrobot.make_scene(**in_space(own, [INVERSE])))
+    results = ffrobot.solve(ffrobot.make_scene(**in_3d(own, [INVERSE])))
     peak = results["inverse/joints/C/coordinate"].max()
     assert 1.0 < peak < 1.5
     told = [text for text in results.warnings.get("inverse", ()) if 'joint "C": leaves its position_limit' in text]
@@ -176,9 +176,7 @@ HELD = {
 def test_sensors_on_any_joint_of_a_loop(built):
     """Also on the one that is listed last, at which it would be cut; with rotors in all, where it is cut."""
     own = of_joints("ABDC") | built
-    expected, found = (
-        ffrobot.solve(ffrobot.make_scene(**tables(own, [INVERSE, HELD]))) for tables in (planar, in_space)
-    )
+    expected, found = (ffrobot.solve(ffrobot.make_scene(**tables(own, [INVERSE, HELD]))) for tables in (planar, in_3d))
     outputs, known = (list(results.attributes("held/control")["outputs"]) for results in (found, expected))
     assert {"joint/C", "joint/C/rate", "joint/A"} <= set(outputs)
     for number, output in enumerate(known):
@@ -192,4 +190,4 @@ def test_sensors_on_all_joints_of_a_loop_without_a_rotor_are_refused():
     own = {name: ROUGH for name in SIDES}
     sensed = HELD | {"sensor": [{"joint": name} for name in SIDES]}
     with pytest.raises(ffrobot.InputError, match=r'expected one with coordinates, found "D".* at which a loop is cut'):
-        ffrobot.solve(ffrobot.make_scene(**in_space(own, [INVERSE, sensed])))
+        ffrobot.solve(ffrobot.make_scene(**in_3d(own, [INVERSE, sensed])))

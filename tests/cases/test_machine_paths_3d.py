@@ -1,8 +1,8 @@
-"""Paths as machines run them, in space: those of the plane, poses, motors behind gears, shapers, time scaling."""
+"""Paths as machines run them, in 3D: those of the plane, poses, motors behind gears, shapers, time scaling."""
 
 import numpy as np
-import planar_tables
 import pytest
+import scenes_in_3d
 from checkpoints import CASES
 from scipy.integrate import solve_ivp
 
@@ -20,13 +20,13 @@ LIMITS = {"profile": "s-curve", "speed": 2.0, "acceleration": 30.0, "jerk": 900.
 
 
 def both(trajectories, folder, guess=GUESS, **keys):
-    """Results of the two links of a case along other paths, in the plane and in space."""
-    planar = planar_tables.read(CASES / "two_link" / "scene.toml") | keys
+    """Results of the two links of a case along other paths, in the plane and in 3D."""
+    planar = scenes_in_3d.read(CASES / "two_link" / "scene.toml") | keys
     planar.pop("pzt", None)
     planar |= {"trajectory": trajectories, "analysis": [RUN]}
-    spatial = planar_tables.in_space(planar) | {"initial": {"joints": guess}, "analysis": [RUN]}
+    spatial = scenes_in_3d.in_3d(planar) | {"initial": {"joints": guess}, "analysis": [RUN]}
     return [
-        ffrobot.solve(planar_tables.write(tables, folder / f"{name}.toml"))
+        ffrobot.solve(scenes_in_3d.write(tables, folder / f"{name}.toml"))
         for name, tables in (("planar", planar), ("spatial", spatial))
     ]
 
@@ -53,7 +53,7 @@ def joints(**keys):
 
 @pytest.mark.parametrize("held", [{"value": "60*deg"}, {"waypoints": "constant.csv"}])
 def test_a_shaper_that_asks_the_robot_beside_a_held_joint(held, tmp_path):
-    """In the plane as in space: the motion is over half a period of the frequency later (a ZV shaper)."""
+    """In the plane as in 3D: the motion is over half a period of the frequency later (a ZV shaper)."""
     (tmp_path / "constant.csv").write_text(f"t,value\n0,{np.pi / 3!r}\n1,{np.pi / 3!r}\n", encoding="utf-8")
     moved = {"name": "O", "joint": "O", "via": [0.0, "20*deg"], "duration": 0.2, "shaper": {"kind": "zv"}}
     plane, space = both([moved, {"name": "A", "joint": "A", **held}], tmp_path)

@@ -1,8 +1,8 @@
-"""`modes` of bodies in space: planar scenes in space choose as in the plane, and what is promised of "auto" holds."""
+"""`modes` of bodies in 3D: planar scenes in 3D choose as in the plane, and what is promised of "auto" holds."""
 
 import numpy as np
-import planar_tables
 import pytest
+import scenes_in_3d
 from checkpoints import CASES
 
 import ffrobot
@@ -25,27 +25,27 @@ POINTS = ("root", "tip")
 
 
 def two_links(modes, **analysis):
-    """The paper's arm from rest, with patches: tables of the planar scene and of the same in space."""
-    planar = planar_tables.read(CASES / "two_link" / "scene.toml")
+    """The paper's arm from rest, with patches: tables of the planar scene and of the same in 3D."""
+    planar = scenes_in_3d.read(CASES / "two_link" / "scene.toml")
     for body in planar["body"]:
         body["modes"] = modes
     planar["initial"]["state"] = "static"
     planar["trajectory"][0] |= QUINTIC
     planar["analysis"] = [planar["analysis"][0] | {"end": 0.3} | analysis]
     same = {key: planar[key] for key in ("pzt", "analysis")}
-    spatial = planar_tables.in_space(planar) | same | {"initial": {"state": "static", "joints": TWO_LINK}}
+    spatial = scenes_in_3d.in_3d(planar) | same | {"initial": {"state": "static", "joints": TWO_LINK}}
     return planar, spatial
 
 
 def results_of(tables, folder, name):
-    return ffrobot.solve(planar_tables.write(tables, folder / f"{name}.toml"))
+    return ffrobot.solve(scenes_in_3d.write(tables, folder / f"{name}.toml"))
 
 
 def close(found, expected, share):
     np.testing.assert_allclose(found, expected, rtol=0, atol=share * np.abs(expected).max())
 
 
-def test_planar_arm_with_few_modes_in_space(tmp_path):
+def test_planar_arm_with_few_modes_in_3d(tmp_path):
     """Explicit numbers: the same coordinates, hence the planar numbers; voltages serve the modes left out, too."""
     planar, spatial = (results_of(t, tmp_path, n) for t, n in zip(two_links(3, tolerance=1e-10), "ps", strict=True))
     with planar, spatial:
@@ -61,7 +61,7 @@ def test_planar_arm_with_few_modes_in_space(tmp_path):
             assert spatial.attributes(f"inverse/bodies/{link}")["modes_kept"] == kept
 
 
-def test_planar_arm_chooses_the_same_modes_in_space(tmp_path):
+def test_planar_arm_chooses_the_same_modes_in_3d(tmp_path):
     """The search takes the same steps; estimates differ by what integrations err, a small part of the tolerance."""
     tolerance = 3e-3
     tables = two_links("auto", tolerance=tolerance, integrator="dop853")
@@ -89,7 +89,7 @@ def arm(tmp_path_factory):
         text = (case / f"{link}.toml").read_text(encoding="utf-8")
         head, tail = text[: text.index("[modes]")], text[text.index("[damping]") :]
         (folder / f"{link}.toml").write_text(head + ARM_MODES + "attachment_modes = false\n" + tail, encoding="utf-8")
-    tables = planar_tables.read(case / "scene.toml")
+    tables = scenes_in_3d.read(case / "scene.toml")
     for body in tables["body"]:
         if "link" in body:
             body["link"] = f"{body['name']}.toml"
@@ -101,11 +101,11 @@ def arm(tmp_path_factory):
 def solved(folder, tables, modes, **analysis):
     bodies = [body | {"modes": modes} if "link" in body and modes is not None else body for body in tables["body"]]
     tables = tables | {"body": bodies, "analysis": [tables["analysis"][0] | analysis]}
-    return solve_scene(planar_tables.write(tables, folder / "arm.toml"), Watcher())
+    return solve_scene(scenes_in_3d.write(tables, folder / "arm.toml"), Watcher())
 
 
 @pytest.mark.parametrize("tolerance", [1e-2, 1e-3])
-def test_the_estimate_of_an_arm_in_space_is_honest(tolerance, arm):
+def test_the_estimate_of_an_arm_in_3d_is_honest(tolerance, arm):
     """All modes tell the error of a line in three dimensions: within the tolerance, and not far from the estimate."""
     folder, tables, exact = arm
     solution = solved(folder, tables, "auto", tolerance=tolerance)
@@ -139,7 +139,7 @@ def check_estimate(solution, exact, tolerance):
     assert solution.mode_choice.tried[-1] < 36
 
 
-def test_the_summary_tells_the_choice_in_space(arm, tmp_path, capsys):
+def test_the_summary_tells_the_choice_in_3d(arm, tmp_path, capsys):
     folder, tables, _ = arm
     solution = solved(folder, tables, "auto", tolerance=1e-2, end=0.2)
     image, path = results_image(solution), tmp_path / "x.h5"
@@ -155,14 +155,14 @@ def link(request, arm):
     """The fore arm with all its modes, bare and with a payload off its axis, which couples families."""
     folder, tables, _ = arm
     load = [{"point": request.param, "mass": 0.2, "center": [0.01, 0.02, 0.03]}] if request.param else []
-    path = planar_tables.write(tables | {"payload": load}, folder / "loaded.toml")
+    path = scenes_in_3d.write(tables | {"payload": load}, folder / "loaded.toml")
     scene = load_scene(path)
     (loaded,) = (body for body in load_bodies(scene, lambda _: None) if body.spatial.name == "fore")
     return loaded.spatial
 
 
 @pytest.mark.parametrize("lowest", [0, 2, 5])
-def test_what_is_left_out_keeps_its_static_flexibility_in_space(link, lowest):
+def test_what_is_left_out_keeps_its_static_flexibility_in_3d(link, lowest):
     body = with_fewer_modes(link, lowest, POINTS)
     assert body.n_modes < link.n_modes
     assert body.reduction.lowest == lowest
@@ -189,15 +189,15 @@ def test_coordinates_with_fewer_modes_are_orthonormal_and_their_forces_known(lin
 
 
 @pytest.mark.parametrize("modes", ["many", -1, 2.5])
-def test_wrong_numbers_of_modes_in_space(modes, tmp_path):
+def test_wrong_numbers_of_modes_in_3d(modes, tmp_path):
     tables = two_links(modes)[1]
     with pytest.raises(InputError, match=r'body "link1": modes: expected "auto" or a .*number'):
-        load_scene(planar_tables.write(tables, tmp_path / "wrong.toml"))
+        load_scene(scenes_in_3d.write(tables, tmp_path / "wrong.toml"))
 
 
-def test_rigid_bodies_have_no_modes_in_space(arm, tmp_path):
+def test_rigid_bodies_have_no_modes_in_3d(arm, tmp_path):
     _, tables, _ = arm
     column = tables["body"][0] | {"modes": 2}
-    path = planar_tables.write(tables | {"body": [column]}, tmp_path / "rigid.toml")
+    path = scenes_in_3d.write(tables | {"body": [column]}, tmp_path / "rigid.toml")
     with pytest.raises(InputError, match=r'expected the key "modes" only in flexible bodies, found it in a rigid one'):
         load_scene(path)

@@ -1,17 +1,17 @@
-"""Motors alone in space: the planar numbers of a planar robot, and moments that carry an arm along its path."""
+"""Motors alone in 3D: the planar numbers of a planar robot, and moments that carry an arm along its path."""
 
 import tomllib
 from pathlib import Path
 
 import numpy as np
-import planar_tables
 import pytest
+import scenes_in_3d
 import tomli_w
 from checkpoints import CASES
 from drawn_arms import drawn_arm, posed
 from patched_arms import ARM, LINK
+from rod_chain_3d import Body, RodChain, X, Y, Z, bar
 from scipy.interpolate import CubicSpline
-from spatial_rod_chain import Body, RodChain, X, Y, Z, bar
 
 import ffrobot
 from ffrobot.run.solve import solve_scene
@@ -22,9 +22,9 @@ KEPT = ("exact", "redefined")
 
 @pytest.fixture(scope="module")
 def two_link(tmp_path_factory):
-    """The case of the plane with two modes a link, its inversions alone, in the plane and in space."""
+    """The case of the plane with two modes a link, its inversions alone, in the plane and in 3D."""
     folder, found = tmp_path_factory.mktemp("two_link"), {}
-    tables = planar_tables.read(CASES / "two_link_motors_only" / "scene.toml")
+    tables = scenes_in_3d.read(CASES / "two_link_motors_only" / "scene.toml")
     tables["analysis"] = [
         analysis | {"end": 0.5, "output_step": 0.005} for analysis in tables["analysis"] if analysis["name"] in KEPT
     ]
@@ -33,17 +33,17 @@ def two_link(tmp_path_factory):
         link["modes"]["count"] = 2
         body["link"] = str(folder / f"{body['name']}.toml")
         Path(body["link"]).write_text(tomli_w.dumps(link), encoding="utf-8")
-    spatial = planar_tables.in_space(tables) | {"analysis": tables["analysis"]}
+    spatial = scenes_in_3d.in_3d(tables) | {"analysis": tables["analysis"]}
     spatial["initial"] = {"state": "static", "joints": {"O": 0.0, "A": np.pi / 3}}
     for space, scene in (("planar", tables), ("spatial", spatial)):
-        found[space] = ffrobot.solve(planar_tables.write(scene, folder / f"{space}.toml"))
+        found[space] = ffrobot.solve(scenes_in_3d.write(scene, folder / f"{space}.toml"))
     yield found
     for results in found.values():
         results.close()
 
 
 @pytest.mark.parametrize("name", KEPT)
-def test_planar_robot_in_space_has_the_planar_moments(name, two_link):
+def test_planar_robot_in_3d_has_the_planar_moments(name, two_link):
     """Zeros on both sides: moments before the path and after it; or integrated forward."""
     plane, space = two_link["planar"], two_link["spatial"]
     np.testing.assert_allclose(space[f"{name}/time"], plane[f"{name}/time"], atol=1e-12)

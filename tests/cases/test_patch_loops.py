@@ -1,8 +1,8 @@
 """Patches in two planes of one link as sensors and as dampers: closed forms of a held cantilever."""
 
 import numpy as np
-import planar_tables
 import pytest
+import scenes_in_3d
 
 import ffrobot
 from ffrobot.common.errors import InputError
@@ -25,7 +25,7 @@ ZETA = 0.03
 
 
 def rod(folder, *analyses, layouts=(FLAT, EDGE)):
-    planar_tables.write(ROD, folder / "rod.toml")
+    scenes_in_3d.write(ROD, folder / "rod.toml")
     hub = {"name": "hub", "type": "revolute", "between": ["ground", "rod.root"], "axis": [0.0, 0.0, 1.0]}
     return {
         "name": "rod", "space": "spatial", "gravity": [0.0, 0.0, 0.0], "body": [{"name": "rod", "link": "rod.toml"}],
@@ -45,7 +45,7 @@ def loop(**keys):
 
 
 def solve(scene, folder):
-    return ffrobot.solve(planar_tables.write(scene, folder / "scene.toml"))
+    return ffrobot.solve(scenes_in_3d.write(scene, folder / "scene.toml"))
 
 
 def modal(found, ending=""):

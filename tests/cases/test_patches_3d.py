@@ -1,4 +1,4 @@
-"""Patches of scenes in space through `ffrobot solve`: against the plane, turned links, and what no patch reaches."""
+"""Patches of scenes in 3D through `ffrobot solve`: against the plane, turned links, and what no patch reaches."""
 
 from dataclasses import dataclass
 
@@ -12,9 +12,9 @@ from ffrobot import Results
 
 @dataclass
 class Arm:
-    """Two links, shoulder and elbow about z, the tip on a path in the plane; in the plane and in space.
+    """Two links, shoulder and elbow about z, the tip on a path in the plane; in the plane and in 3D.
 
-    Without attachment modes, whose mass the planar program raises and that in space does not.
+    Without attachment modes, whose mass the planar program raises and that in 3D does not.
     """
 
     keys: str = 'structural = true\nface = "both"'
@@ -102,7 +102,7 @@ def test_planar_scene_put_into_space_has_the_planar_voltages(arm, tmp_path, ffro
                                            rtol=1e-12)  # fmt: skip
             judged = f"inverse/feasibility/pzt/{body}"
             for key in ("factor", "field", "strain", "mode_required"):
-                # peaks between outputs, at ends of steps, which are others in space
+                # peaks between outputs, at ends of steps, which are others in 3D
                 np.testing.assert_allclose(found[f"{judged}/{key}"], plane[f"{judged}/{key}"], rtol=1e-3)
         assert found.verdict["inverse"].feasible == plane.verdict["inverse"].feasible
         assert found.verdict["inverse"].answer == plane.verdict["inverse"].answer
@@ -180,7 +180,7 @@ def test_turning_a_link_about_its_axis_exchanges_its_planes(straight, tmp_path, 
         np.testing.assert_allclose(moments[1], moments[0], atol=2e-6 * np.abs(moments[0]).max())
 
 
-def test_feasibility_of_a_scene_in_space(straight, ffrobot):
+def test_feasibility_of_a_scene_in_3d(straight, ffrobot):
     done = ffrobot("feasibility", straight)
     assert done.returncode == 0, done.stderr
     assert "yaw 1" in done.stdout  # motors of a universal joint, one for each axis

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from space import solved, write_scene
+from checkpoint_scene_files import solved, write_scene
 
 MASS, CENTER = 0.3, [0.03, -0.02, 0.05]
 SLIGHT = 1e-12  # kg·m²: rigid bodies have to have some; it is 1e-9 of that of the payload about the point

@@ -1,4 +1,4 @@
-"""Links in space in pieces: bent far in both planes and twisted, told as the one link, and in the plane as there."""
+"""Links in 3D in pieces: bent far in both planes and twisted, told as the one link, and in the plane as there."""
 
 from pathlib import Path
 
@@ -240,7 +240,7 @@ def test_rates_of_the_one_link_are_derivatives(condition):
 
 
 def test_pieces_are_those_of_the_plane():
-    """A double pendulum in pieces in space, and in the plane of links cut by hand and welded, with stiffening.
+    """A double pendulum in pieces in 3D, and in the plane of links cut by hand and welded, with stiffening.
 
     At rest the same but for rounding, where it falls to the tolerance of its steps.
     """
@@ -254,7 +254,7 @@ def test_pieces_are_those_of_the_plane():
         hinge | {"name": "O", "between": ["ground", "first.root"]},
         hinge | {"name": "A", "between": ["first.tip", "second.root"]},
     ]
-    in_space = [joint | {"axis": [0.0, 0.0, 1.0]} for joint in joints]
+    in_3d = [joint | {"axis": [0.0, 0.0, 1.0]} for joint in joints]
     bodies = [{"name": name, "link": soft, "pieces": 2} for name in ("first", "second")]
     tables = cut(LinkTable(soft, Path("link.toml")), 2).tables
     by_hand = [{"name": f"{name}{k}", "link": dict(tables[k].keys)} for name in ("first", "second") for k in range(2)]
@@ -273,7 +273,7 @@ def test_pieces_are_those_of_the_plane():
     )  # fmt: skip
     load = [{"point": "second.tip", **wind}]
     keys = {"load": load, "initial": {"joints": {"O": -1.2}}, "analysis": runs}
-    spatial = solved(bodies, gravity=[0.0, -9.81, 0.0], joint=in_space, **keys)
+    spatial = solved(bodies, gravity=[0.0, -9.81, 0.0], joint=in_3d, **keys)
     with spatial, ffrobot.solve(planar) as plane:
         for analysis, share in (("rest", 1e-8), ("fall", 1e-5)):
             for point, by in (

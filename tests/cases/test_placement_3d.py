@@ -1,8 +1,8 @@
-"""Patches placed on links in space: those of planar robots put there, out of plane, bad input."""
+"""Patches placed on links in 3D: those of planar robots put there, out of plane, bad input."""
 
 import numpy as np
-import planar_tables
 import pytest
+import scenes_in_3d
 from checkpoints import CASES
 
 import ffrobot
@@ -18,21 +18,21 @@ PATH = {"name": "path", "kind": "placement", "about": "inverse", "placement": {"
 
 
 def tables():
-    return planar_tables.read(CASES / "two_link_placement" / "scene.toml")
+    return scenes_in_3d.read(CASES / "two_link_placement" / "scene.toml")
 
 
-def in_space(planar, **keys):
-    spatial = planar_tables.in_space(planar) | {"pzt": planar["pzt"], "analysis": planar["analysis"]}
+def in_3d(planar, **keys):
+    spatial = scenes_in_3d.in_3d(planar) | {"pzt": planar["pzt"], "analysis": planar["analysis"]}
     return spatial | {"initial": {"joints": {"O": 0.0, "A": np.pi / 3}}} | keys
 
 
 def solve(scene, folder, name="scene"):
-    return ffrobot.solve(planar_tables.write(scene, folder / f"{name}.toml"))
+    return ffrobot.solve(scenes_in_3d.write(scene, folder / f"{name}.toml"))
 
 
 def test_planar_robot_put_into_space_gets_the_same_patches(tmp_path):
     planar = tables() | {"analysis": [INVERSE, REACH, MOVED, PATH]}
-    with solve(planar, tmp_path, "planar") as plane, solve(in_space(planar), tmp_path, "spatial") as space:
+    with solve(planar, tmp_path, "planar") as plane, solve(in_3d(planar), tmp_path, "spatial") as space:
         for name in ("reach", "moved", "path"):
             for dataset in (
                 "best/centers", "best/reach", "best/value", "even/reach", "even/value", "frequency", "share",
@@ -66,7 +66,7 @@ BESIDE = {"name": "b", "bends": "in-plane", "width": 0.004}
 
 
 def strip(folder, layouts, placement):
-    planar_tables.write(STRIP, folder / "strip.toml")
+    scenes_in_3d.write(STRIP, folder / "strip.toml")
     hub = {"name": "hub", "type": "revolute", "between": ["ground", "arm.root"], "axis": [0.0, 1.0, 0.0]}
     return {
         "name": "strip", "space": "spatial", "gravity": [0.0, 0.0, 0.0],

@@ -1,27 +1,27 @@
 """Planar scenes put into space give the planar numbers, whichever way the scene is turned and its bodies are listed."""
 
 import numpy as np
-import planar_tables
 import pytest
+import scenes_in_3d
+from checkpoint_scene_files import write_scene
 from checkpoints import CASES
-from planar_tables import CRANK, REST, STRAIGHT, TIGHT, TWO_LINK, close, compare_two_links
-from space import write_scene
+from scenes_in_3d import CRANK, REST, STRAIGHT, TIGHT, TWO_LINK, close, compare_two_links
 
 import ffrobot
 from ffrobot.common.rotations import exponential, of_rpy
 
 
 def both(case, analyses, guess, folder, payload=None):
-    """Results of a planar scene and of the same in space."""
-    planar = planar_tables.read(CASES / case / "scene.toml")
+    """Results of a planar scene and of the same in 3D."""
+    planar = scenes_in_3d.read(CASES / case / "scene.toml")
     planar.pop("pzt", None)
     planar["analysis"] = analyses
-    spatial = planar_tables.in_space(planar) | {"initial": {"joints": guess}, "analysis": analyses}
+    spatial = scenes_in_3d.in_3d(planar) | {"initial": {"joints": guess}, "analysis": analyses}
     if payload is not None:
         J = payload["inertia"]  # about z; the others are of no account in the plane
         planar["payload"], spatial["payload"] = [payload], [payload | {"inertia": [0.7 * J, 0.6 * J, J]}]
     return [
-        ffrobot.solve(planar_tables.write(tables, folder / f"{name}.toml"))
+        ffrobot.solve(scenes_in_3d.write(tables, folder / f"{name}.toml"))
         for name, tables in (("planar", planar), ("spatial", spatial))
     ]
 
@@ -49,7 +49,7 @@ def test_split_of_duties(tmp_path):
         compare_two_links(planar, spatial, "split", 1e-8)
 
 
-def test_slider_crank_has_redundant_rows_in_space(tmp_path):
+def test_slider_crank_has_redundant_rows_in_3d(tmp_path):
     """A loop of parallel axes: reactions across the plane are not unique, what is in the plane is that of the plane."""
     planar, spatial = both("slider_crank", [TIGHT | {"end": 0.05}], CRANK, tmp_path)
     with planar, spatial:
@@ -101,9 +101,9 @@ ARM = [
 def arm(tmp_path_factory):
     """The 3R arm of the checkpoints: tables of its scene, and results."""
     folder = tmp_path_factory.mktemp("arm")
-    tables = planar_tables.read(write_scene("arm3_line_static", folder)) | {"analysis": ARM}
+    tables = scenes_in_3d.read(write_scene("arm3_line_static", folder)) | {"analysis": ARM}
     tables["initial"]["state"] = "undeformed"
-    with ffrobot.solve(planar_tables.write(tables, folder / "arm.toml")) as results:
+    with ffrobot.solve(scenes_in_3d.write(tables, folder / "arm.toml")) as results:
         yield tables, results
 
 
@@ -131,12 +131,12 @@ def test_nothing_depends_on_how_the_scene_is_turned(seed, arm, tmp_path):
     tables, expected = arm
     vector = np.random.default_rng(seed).standard_normal(3)
     C = exponential(2.5 * vector / np.linalg.norm(vector))
-    with ffrobot.solve(planar_tables.write(turned(tables, C), tmp_path / "turned.toml")) as found:
+    with ffrobot.solve(scenes_in_3d.write(turned(tables, C), tmp_path / "turned.toml")) as found:
         same(found, expected, C)
 
 
 def test_nothing_depends_on_the_order_of_bodies(arm, tmp_path):
     tables, expected = arm
     shuffled = tables | {"body": tables["body"][::-1]}
-    with ffrobot.solve(planar_tables.write(shuffled, tmp_path / "shuffled.toml")) as found:
+    with ffrobot.solve(scenes_in_3d.write(shuffled, tmp_path / "shuffled.toml")) as found:
         same(found, expected)

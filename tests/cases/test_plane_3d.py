@@ -1,10 +1,10 @@
-"""Whole runs of scenes in space that move in a plane: solved in the plane, their results are those of space."""
+"""Whole runs of scenes in 3D that move in a plane: solved in the plane, their results are those of space."""
 
 import h5py
 import numpy as np
-import planar_tables
+import scenes_in_3d
 from checkpoints import CASES
-from planar_tables import CRANK, TWO_LINK
+from scenes_in_3d import CRANK, TWO_LINK
 
 import ffrobot
 from ffrobot.common.rotations import exponential
@@ -23,9 +23,9 @@ ROUNDING = "constraint_violation"
 
 
 def tables_of(case, guess, analyses):
-    planar = planar_tables.read(CASES / case / "scene.toml")
+    planar = scenes_in_3d.read(CASES / case / "scene.toml")
     planar.pop("pzt", None)
-    return planar_tables.in_space(planar) | {"initial": {"joints": guess}, "analysis": analyses}
+    return scenes_in_3d.in_3d(planar) | {"initial": {"joints": guess}, "analysis": analyses}
 
 
 def numbers(path):
@@ -43,8 +43,8 @@ def numbers(path):
 
 
 def in_both(tables, folder, monkeypatch):
-    """Numbers of a scene solved in its plane, and in space."""
-    scene = planar_tables.write(tables, folder / "scene.toml")
+    """Numbers of a scene solved in its plane, and in 3D."""
+    scene = scenes_in_3d.write(tables, folder / "scene.toml")
     planes, found = [], []
     in_plane = system.in_plane
 
@@ -88,7 +88,7 @@ def test_implicit_integrator(tmp_path, monkeypatch):
 
 
 def test_gravity_across_the_plane_is_carried_by_the_joints(tmp_path, monkeypatch):
-    """Reactions across it are those of the inverse sweep in space."""
+    """Reactions across it are those of the inverse sweep in 3D."""
     tables = tables_of("two_link", TWO_LINK, [INVERSE]) | {"gravity": [0.0, -1.0, -9.81]}
     plane, space = in_both(tables, tmp_path, monkeypatch)
     assert_same(plane, space)
@@ -130,7 +130,7 @@ def test_a_loop_in_a_plane_that_stands_askew(tmp_path):
     path["x"] = f"({float(C[0, 0])!r})*({path['x']})"
     found = []
     for name, tables in (("upright", upright), ("askew", askew)):
-        scene = planar_tables.write(tables, tmp_path / f"{name}.toml")
+        scene = scenes_in_3d.write(tables, tmp_path / f"{name}.toml")
         with ffrobot.solve(scene, output=tmp_path / f"{name}.h5") as results:
             assert results.attributes("inverse")["steps"] < 2000
         found.append(numbers(tmp_path / f"{name}.h5"))

@@ -1,4 +1,4 @@
-"""Singular postures and limits of joints along a path in space: a wrist of three axes that turns its tool about y."""
+"""Singular postures and limits of joints along a path in 3D: a wrist of three axes that turns its tool about y."""
 
 import re
 

@@ -1,10 +1,10 @@
 """Arms with seven joints under six components: what settles the freedom left, and what is said where nothing does."""
 
 import numpy as np
-import planar_tables
 import pytest
+import scenes_in_3d
+from checkpoint_scene_files import write_scene
 from scipy.integrate import simpson
-from space import write_scene
 
 import ffrobot
 from ffrobot.common.errors import InputError
@@ -69,7 +69,7 @@ def arm(*analyses, **keys):
 
 
 def solve(tables, folder, name="scene"):
-    return ffrobot.solve(planar_tables.write(tables, folder / f"{name}.toml"))
+    return ffrobot.solve(scenes_in_3d.write(tables, folder / f"{name}.toml"))
 
 
 def read(found, key):
@@ -136,7 +136,7 @@ def test_equilibrium_and_prescribed_shape_are_settled_as_well(tmp_path):
 @pytest.mark.parametrize("criterion", ["least-motion", "least-torque"])
 def test_flexible_arm_on_a_turntable_follows_its_path_and_comes_back(tmp_path, criterion):
     """The 6R arm of the checkpoints with a seventh joint below: six rows hold, motors and forces replay the motion."""
-    tables = planar_tables.read(write_scene("arm6_undeformed", tmp_path))
+    tables = scenes_in_3d.read(write_scene("arm6_undeformed", tmp_path))
     points = {"root": [0.0, 0.0, 0.0], "top": [0.1, 0.0, 0.0]}
     table = {"mass": 3.0, "center": [0.05, 0.0, 0.0], "inertia": [0.02, 0.03, 0.04], "points": points}
     first = next(joint for joint in tables["joint"] if "ground" in joint["between"])

@@ -1,8 +1,8 @@
-"""Scenes in space against numbers of other codes and closed forms, and what cannot change over a long time."""
+"""Scenes in 3D against numbers of other codes and closed forms, and what cannot change over a long time."""
 
 import numpy as np
 import pytest
-from space import solved
+from checkpoint_scene_files import solved
 
 from ffrobot.mbs.model.known_motion import KnownStates, required_forces
 from ffrobot.mbs.model.model import build_model
@@ -175,7 +175,7 @@ kind = "static"
 
 
 def whirling(model, Omega):
-    """Frequencies in space of small motions of a shaft that spins about its axis at Ω, both whirls of each, rad/s.
+    """Frequencies in 3D of small motions of a shaft that spins about its axis at Ω, both whirls of each, rad/s.
 
     In the frame that spins by the equations of its modes; seen from there forward whirls are Ω slower, backward Ω
     faster. By steps in p, ṗ and p̈, of which the forces on modes are of second degree.

@@ -1,4 +1,4 @@
-"""Inverse analyses and the forward runs that replay them agree in every dataset and attribute, in space."""
+"""Inverse analyses and the forward runs that replay them agree in every dataset and attribute, in 3D."""
 
 import h5py
 import numpy as np

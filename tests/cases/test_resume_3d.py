@@ -1,4 +1,4 @@
-"""Runs in space that were stopped go on from their results file as if they had never been."""
+"""Runs in 3D that were stopped go on from their results file as if they had never been."""
 
 import re
 

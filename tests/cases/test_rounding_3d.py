@@ -1,4 +1,4 @@
-"""Round-off that light parts amplify ends no run in space: it is told from errors of steps, and reported."""
+"""Round-off that light parts amplify ends no run in 3D: it is told from errors of steps, and reported."""
 
 import re
 

@@ -1,11 +1,11 @@
-"""Scenes in space through `ffrobot solve`, against an independent code: all quantities to 1e-6 of their peaks."""
+"""Scenes in 3D through `ffrobot solve`, against an independent code: all quantities to 1e-6 of their peaks."""
 
 import h5py
 import numpy as np
 import pytest
 import tomli_w
-from space import close, write_scene
-from spatial_checkpoints import load
+from checkpoint_mechanisms import load
+from checkpoint_scene_files import close, write_scene
 
 from ffrobot import Results
 

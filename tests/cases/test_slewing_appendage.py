@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
+from checkpoint_scene_files import solved as run
 from checkpoints import check_table, peak
-from space import solved as run
 
 from ffrobot.common.rotations import exponential, of_quaternion
 

@@ -1,4 +1,4 @@
-"""Joints in space at the limits of what keys may say: friction that is nearly a brake, tiny axes, starts that hang."""
+"""Joints in 3D at the limits of what keys may say: friction that is nearly a brake, tiny axes, starts that hang."""
 
 import numpy as np
 import pytest

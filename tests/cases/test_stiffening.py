@@ -1,21 +1,21 @@
-"""Geometric stiffening in space: blades that spin, links that bend far, planar scenes put there, bad input."""
+"""Geometric stiffening in 3D: blades that spin, links that bend far, planar scenes put there, bad input."""
 
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-import planar_tables
 import pytest
+import scenes_in_3d
+from bodies_by_invariants import from_modal_body as planar_body
 from checkpoints import CASES
-from planar_bodies import from_modal_body as planar_body
-from planar_tables import CRANK, REST, STRAIGHT, TIGHT, TWO_LINK, close, compare_two_links
 from rod_chain import falling_tip
+from scenes_in_3d import CRANK, REST, STRAIGHT, TIGHT, TWO_LINK, close, compare_two_links
 from scipy.linalg import eigh
 
 import ffrobot
 from ffrobot.fe_models.link import computed_modal_body
 from ffrobot.fe_models.modal_body_file import write_modal_body
-from ffrobot.mbs.model.body import from_modal_body as spatial_body
+from ffrobot.mbs.model.body import from_modal_body as body_in_3d
 
 LINK = """
 name = "blade"
@@ -69,7 +69,7 @@ def test_frequencies_of_a_rotating_cantilever(spin, tmp_path):
     """Across the plane (flap), and in it with the hub held (lag): ω_lag² = ω_flap² − Ω²."""
     unit = np.sqrt(7e10 * 0.01**4 / 12 / (2700 * 0.01**2))
     path = [{"name": "spin", "joint": "hub", "value": f"{float(spin * unit)!r}*t"}]
-    scene = planar_tables.write(blade(tmp_path, trajectory=path), tmp_path / "scene.toml")
+    scene = scenes_in_3d.write(blade(tmp_path, trajectory=path), tmp_path / "scene.toml")
     with ffrobot.solve(scene) as results:
         flap = 2 * np.pi * results["about/linear/frequency"][0] / unit
         zeros = np.sort(np.abs(results["about/linear/zeros/1"][0]).max(axis=-1)) / unit  # from the hub's motor to it
@@ -109,7 +109,7 @@ def test_links_that_bend_far_across_the_plane(tmp_path):
         ],
         "analysis": [{"name": "fall", "kind": "forward", "end": 0.5, "output_step": 0.05, "tolerance": 1e-7}],
     }
-    with ffrobot.solve(planar_tables.write(scene, tmp_path / "scene.toml")) as results:
+    with ffrobot.solve(scenes_in_3d.write(scene, tmp_path / "scene.toml")) as results:
         tip = results["fall/points/link2.tip/position"]
         energy = sum(results[f"fall/energy/{key}"] for key in ("kinetic", "strain", "gravitational"))
         exchanged = np.ptp(results["fall/energy/gravitational"])
@@ -120,15 +120,15 @@ def test_links_that_bend_far_across_the_plane(tmp_path):
 
 
 def both(case, analyses, guess, folder, payload=None, geometric_stiffening=True):
-    """Results of a planar scene with geometric stiffening, and of the same in space."""
+    """Results of a planar scene with geometric stiffening, and of the same in 3D."""
     keys = {"geometric_stiffening": geometric_stiffening, "analysis": analyses}
-    planar = planar_tables.read(CASES / case / "scene.toml") | keys
+    planar = scenes_in_3d.read(CASES / case / "scene.toml") | keys
     planar.pop("pzt", None)
-    spatial = planar_tables.in_space(planar) | {"initial": {"joints": guess}} | keys
+    spatial = scenes_in_3d.in_3d(planar) | {"initial": {"joints": guess}} | keys
     if payload is not None:
         planar["payload"] = spatial["payload"] = [payload]
     return [
-        ffrobot.solve(planar_tables.write(tables, folder / f"{name}.toml"))
+        ffrobot.solve(scenes_in_3d.write(tables, folder / f"{name}.toml"))
         for name, tables in (("planar", planar), ("spatial", spatial))
     ]
 
@@ -147,12 +147,12 @@ def test_two_links_of_the_plane(payload, tmp_path):
             close(spatial[f"inverse/energy/{key}"], planar[f"inverse/energy/{key}"], 1e-8)
 
 
-def test_a_payload_in_space_is_a_body_welded_in_the_plane(tmp_path):
+def test_a_payload_in_3d_is_a_body_welded_in_the_plane(tmp_path):
     """With inertia; a payload of the plane is part of its link, whose fields keep 3e-4 of the moments less of it."""
     J, keys = 2e-3, {"geometric_stiffening": True, "analysis": [TIGHT | {"end": 0.15, "output_step": 0.01}]}
-    planar = planar_tables.read(CASES / "two_link" / "scene.toml") | keys
+    planar = scenes_in_3d.read(CASES / "two_link" / "scene.toml") | keys
     planar.pop("pzt", None)
-    spatial = planar_tables.in_space(planar) | {"initial": {"joints": TWO_LINK}} | keys
+    spatial = scenes_in_3d.in_3d(planar) | {"initial": {"joints": TWO_LINK}} | keys
     spatial["payload"] = [POINT_MASS | {"inertia": [0.7 * J, 0.6 * J, J]}]
     rigid = {"mass": POINT_MASS["mass"], "inertia": J, "center": [0.0, 0.0], "points": {"root": [0.0, 0.0]}}
     planar["body"] = [*planar["body"], {"name": "load", "rigid": rigid}]
@@ -161,7 +161,7 @@ def test_a_payload_in_space_is_a_body_welded_in_the_plane(tmp_path):
         {"name": "grip", "type": "weld", "between": [POINT_MASS["point"], "load.root"]},
     ]
     found, expected = (
-        ffrobot.solve(planar_tables.write(tables, tmp_path / f"{name}.toml"))
+        ffrobot.solve(scenes_in_3d.write(tables, tmp_path / f"{name}.toml"))
         for name, tables in (("spatial", spatial), ("planar", planar))
     )
     with found, expected:
@@ -214,7 +214,7 @@ def test_how_far_a_cantilever_bends_in_an_oblique_plane(tmp_path):
     wall = [{"name": "wall", "type": "weld", "between": ["ground", "blade.root"]}]
     force = {"y": repr(float(P * np.cos(0.8))), "z": repr(float(P * np.sin(0.8)))}
     rest = {"load": [{"point": "blade.tip", **force}], "joint": wall, "trajectory": [], "analysis": [REST]}
-    with ffrobot.solve(planar_tables.write(blade(tmp_path, **rest), tmp_path / "scene.toml")) as results:
+    with ffrobot.solve(scenes_in_3d.write(blade(tmp_path, **rest), tmp_path / "scene.toml")) as results:
         found = results.attributes("rest/bodies/blade")
     at = 1 - 1 / np.sqrt(3)
     from_chord = P / EI * (2 * at + at**3 - 3 * at**2) / 6
@@ -241,7 +241,7 @@ def test_auto_where_loads_change_the_stiffness(spin, stiffened, tmp_path):
     frequencies = []
     for key in ("auto", stiffened):
         tables = blade(tmp_path, trajectory=path, geometric_stiffening=key)
-        with ffrobot.solve(planar_tables.write(tables, tmp_path / "scene.toml")) as results:
+        with ffrobot.solve(scenes_in_3d.write(tables, tmp_path / "scene.toml")) as results:
             assert results.attributes("/")["geometric_stiffening"] == stiffened
             effect = results.attributes("turning")["stiffening_effect"]
             frequencies.append(results["about/linear/frequency"][0])
@@ -269,15 +269,15 @@ def test_slider_crank_of_the_plane(tmp_path):
 def test_what_a_file_of_a_beam_says_of_the_plane_and_of_space(tmp_path):
     """∫ρxG_x is K_omega of the plane, ∫ρG_x its K_s; nothing else, in the plane or across it, of a straight beam."""
     modal = computed_modal_body(Path(write_link(tmp_path)))
-    in_plane, in_space = planar_body("b", modal).stiffening, spatial_body("b", modal, stiffened=True).stiffening
+    in_plane, in_3d = planar_body("b", modal).stiffening, body_in_3d("b", modal, stiffened=True).stiffening
     chosen = np.ix_(*[np.flatnonzero(np.array(modal.family) == "in-plane-bending")] * 2)
     peak = np.abs(in_plane.K_omega).max()
-    np.testing.assert_allclose(in_space.K_x[0, 0][chosen], in_plane.K_omega, atol=1e-12 * peak)
-    np.testing.assert_allclose(in_space.K_s[0][chosen], in_plane.K_s[0], atol=1e-12 * peak)
-    rest = in_space.K_x.copy()
+    np.testing.assert_allclose(in_3d.K_x[0, 0][chosen], in_plane.K_omega, atol=1e-12 * peak)
+    np.testing.assert_allclose(in_3d.K_s[0][chosen], in_plane.K_s[0], atol=1e-12 * peak)
+    rest = in_3d.K_x.copy()
     rest[0, 0] = 0.0
     assert np.abs(rest).max() < 1e-12 * peak
-    assert np.abs(in_space.K_s[1:]).max() < 1e-12 * peak
+    assert np.abs(in_3d.K_s[1:]).max() < 1e-12 * peak
 
 
 REFUSED = {
@@ -295,7 +295,7 @@ REFUSED = {
 @pytest.mark.parametrize("case", REFUSED)
 def test_bad_input(case, tmp_path):
     keys, says = REFUSED[case]
-    scene = planar_tables.write(blade(tmp_path, **keys), tmp_path / "scene.toml")
+    scene = scenes_in_3d.write(blade(tmp_path, **keys), tmp_path / "scene.toml")
     with pytest.raises(ffrobot.InputError, match=says):
         ffrobot.solve(scene)
 
@@ -306,4 +306,4 @@ def test_files_without_geometric_stiffness_are_named(tmp_path):
     write_modal_body(tmp_path / "blade.h5", bare)
     scene["body"] = [{"name": "blade", "modal": "blade.h5"}]
     with pytest.raises(ffrobot.InputError, match=r'geometric_stiffening: expected modal bodies .* of "blade"'):
-        ffrobot.solve(planar_tables.write(scene, tmp_path / "scene.toml"))
+        ffrobot.solve(scenes_in_3d.write(scene, tmp_path / "scene.toml"))

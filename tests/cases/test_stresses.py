@@ -1,10 +1,10 @@
-"""Stresses of links in space: those of planar scenes put into space, and beams by closed forms."""
+"""Stresses of links in 3D: those of planar scenes put into space, and beams by closed forms."""
 
 from pathlib import Path
 
 import numpy as np
-import planar_tables
 import pytest
+import scenes_in_3d
 from checkpoints import CASES
 
 import ffrobot
@@ -26,8 +26,8 @@ def stressed(path):
 
 
 def both(case, analyses, folder):
-    """Results of a planar scene, its links with stresses, and of the same in space."""
-    planar = planar_tables.read(CASES / case / "scene.toml")
+    """Results of a planar scene, its links with stresses, and of the same in 3D."""
+    planar = scenes_in_3d.read(CASES / case / "scene.toml")
     planar.pop("pzt", None)
     planar["analysis"] = analyses
     for body in planar["body"]:
@@ -35,10 +35,10 @@ def both(case, analyses, folder):
             body["link"] = stressed(Path(body["link"]))
     tip = planar["trajectory"][0].get("point")
     planar["payload"] = [{"point": tip, "mass": 0.3}] if case == "two_link" else []
-    spatial = planar_tables.in_space(planar) | {"initial": {"joints": GUESS[case]}, "payload": planar["payload"]}
+    spatial = scenes_in_3d.in_3d(planar) | {"initial": {"joints": GUESS[case]}, "payload": planar["payload"]}
     spatial["analysis"] = analyses
     return [
-        ffrobot.solve(planar_tables.write(tables, folder / f"{name}.toml"))
+        ffrobot.solve(scenes_in_3d.write(tables, folder / f"{name}.toml"))
         for name, tables in (("planar", planar), ("spatial", spatial))
     ]
 

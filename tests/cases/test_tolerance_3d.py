@@ -1,12 +1,12 @@
-"""The tolerance at every output in space, also of what joints hand on that are no constraint rows.
+"""The tolerance at every output in 3D, also of what joints hand on that are no constraint rows.
 
 Many more robots, others each time: tests/campaigns/tolerance.py --space.
 """
 
 import h5py
 import pytest
+from checkpoint_scene_files import write_scene
 from judging import largest_errors
-from space import write_scene
 from tolerance import histories, scales
 
 # Reactions that were outside before they were judged, by that many tolerances

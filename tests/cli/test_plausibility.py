@@ -83,7 +83,7 @@ def test_links(keys, expected, tmp_path):
 
 
 def test_outputs_that_do_not_fit_into_memory():
-    """A link of four modes in space took 0.55 GB for 1e5 outputs, and over 12 GB for 1e7."""
+    """A link of four modes in 3D took 0.55 GB for 1e5 outputs, and over 12 GB for 1e7."""
     (remark,) = remarks_on_memory(10_000_001, 1, 16e9, "long")
     assert "10000001 outputs may take 50 GB of memory, of 16 GB" in remark
     assert not list(remarks_on_memory(100_001, 1, 16e9, "short"))

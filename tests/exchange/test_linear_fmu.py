@@ -329,7 +329,7 @@ analysis = [{ name = "at_rest", kind = "linear" }]
 """
 
 
-def test_a_linear_model_in_space(ffrobot, folder):
+def test_a_linear_model_in_3d(ffrobot, folder):
     (folder / "space.toml").write_text(IN_SPACE)
     for command in (("solve", "space.toml"), ("export", "space.results.h5", "--format", "fmu")):
         done = ffrobot(*command, cwd=folder)

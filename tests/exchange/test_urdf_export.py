@@ -1,4 +1,4 @@
-"""Scenes in space as URDF: motor moments there and back, and where links stand by another reader of URDF (yourdfpy)."""
+"""Scenes in 3D as URDF: motor moments there and back, and where links stand by another reader of URDF (yourdfpy)."""
 
 import re
 from xml.etree import ElementTree

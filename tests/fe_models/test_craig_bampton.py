@@ -77,7 +77,7 @@ def test_fixed_interface_modes_are_those_of_a_clamped_beam(bar):
 
 
 @pytest.mark.parametrize("kind", ["beam", "solid"])
-def test_free_in_space(bar, kind):
+def test_free_in_3d(bar, kind):
     """Rigid motions strain nothing and weigh what the link weighs; eigenfrequencies are those of the free link."""
     body, _ = bar(kind, count=12, more=GRIP)
     found = craig_bampton(body)
@@ -99,7 +99,7 @@ def test_free_in_space(bar, kind):
 
 
 def free_frequencies(body):
-    """ω of a link in space, from the invariants of any frame: p with the frame's motion eliminated."""
+    """ω of a link in 3D, from the invariants of any frame: p with the frame's motion eliminated."""
     s, second = body.first_moment, body.second_moment
     rigid = np.array(
         [[body.mass, 0, -s[1]], [0, body.mass, s[0]], [-s[1], s[0], second[0, 0] + second[1, 1]]],

@@ -99,7 +99,7 @@ def test_gif_keeps_colours():
 
 
 @pytest.mark.usefixtures("can_draw")
-def test_movie_in_space_follows_the_slider(results, slider_crank, tmp_path):
+def test_movie_in_3d_follows_the_slider(results, slider_crank, tmp_path):
     """By PyVista: the rod ends where the solver has the slider."""
     path = tmp_path / "m.gif"
     view_movie(results, path, MovieOptions(analysis="forward", seconds=0.2, scale=1.0))

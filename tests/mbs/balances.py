@@ -1,6 +1,6 @@
 """The energy of a run."""
 
-from planar_runs import energies
+from oracle_runs import energies
 from scipy.integrate import simpson
 
 OUTPUT_STEP = 2.5e-4  # fine enough that Simpson's rule errs by less than 1e-10 here

@@ -1,4 +1,4 @@
-"""Scenes in space for tests: those of the checkpoints, and random ones with the joints of a `spatial_trees.Tree`."""
+"""Scenes in 3D for tests: those of the checkpoints, and random ones with the joints of a `random_mechanisms.Tree`."""
 
 import tomllib
 from dataclasses import replace
@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 import scene_of
+from checkpoint_mechanisms import load
+from random_mechanisms import Tree
 from rotations import logarithm
-from spatial_checkpoints import load
-from spatial_trees import Tree
 
 from ffrobot.mbs import _core
 from ffrobot.mbs.model.drives import Command, Drives, Replayed

@@ -1,10 +1,10 @@
-"""Random closed chains in space with friction and loads along all joints, cut at the one that a scene lists last."""
+"""Random closed chains in 3D with friction and loads along all joints, cut at the one that a scene lists last."""
 
 from dataclasses import dataclass
 
 import numpy as np
 from checkpoint_scenes import as_scene, coordinates, rpy, tree_model
-from spatial_trees import Tree, random_tree
+from random_mechanisms import Tree, random_tree
 
 from ffrobot.mbs import _core
 from ffrobot.mbs.model.system import MultibodySystem

@@ -1,6 +1,6 @@
 """Arms whose links have the damping ratio RATIO, of their own modes or of the robot's vibrations."""
 
-from planar_tables import joint_keys
+from scenes_in_3d import joint_keys
 
 import ffrobot
 from ffrobot.mbs.fields.spelling import place
@@ -42,8 +42,8 @@ def planar_arm(conditions, of, **keys):
     } | keys
 
 
-def in_space(arm, joints):
-    """The same in space, its joints at the coordinates `joints`."""
+def in_3d(arm, joints):
+    """The same in 3D, its joints at the coordinates `joints`."""
     return arm | {
         "space": "spatial",
         "gravity": place(arm["gravity"]),

@@ -4,9 +4,9 @@ from types import MappingProxyType
 
 import mpmath
 import numpy as np
+from bodies_by_invariants import GeometricStiffening, PlanarBody, PlanarPoint
 from mechanisms import make_model, revolute
 from numpy.polynomial import Legendre, Polynomial
-from planar_bodies import GeometricStiffening, PlanarBody, PlanarPoint
 
 CLAMPED = Polynomial([0, 0, 1])  # ξ²: deflection and slope vanish at the root
 SUPPORTED = Polynomial([0, 1, -1])  # ξ (1 − ξ): deflection vanishes at both ends

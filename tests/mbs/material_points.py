@@ -3,7 +3,7 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from planar_bodies import from_modal_body
+from bodies_by_invariants import from_modal_body
 
 from ffrobot.fe_models.modal_body import Interface, ModalBody, PictureMesh, Stations
 

@@ -4,9 +4,19 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from bodies_by_invariants import in_3d
+from marker_measures import (
+    Kind,
+    Marker,
+    Measure,
+    coordinate,
+    friction,
+    joint_constraints,
+    marker_at,
+    path_measures,
+    rotor,
+)
 from oracle import Mechanism
-from planar_bodies import in_3d
-from planar_rows import Kind, Marker, Measure, coordinate, friction, joint_constraints, marker_at, path_measures, rotor
 
 from ffrobot.mbs import _core
 from ffrobot.mbs._core import TimeFunction
@@ -42,7 +52,7 @@ class ModalLoad:
 
 @dataclass(frozen=True)
 class Robot:
-    """A scene with `PlanarBody`s: rows by `planar_rows`, and the model in 3D, projected on the plane."""
+    """A scene with `PlanarBody`s: rows by `marker_measures`, and the model in 3D, projected on the plane."""
 
     scene: object
     bodies: tuple

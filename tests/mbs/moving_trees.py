@@ -1,8 +1,8 @@
-"""Random trees in space that move: one instant of their motion by the recursion."""
+"""Random trees in 3D that move: one instant of their motion by the recursion."""
 
 import numpy as np
 from checkpoint_scenes import as_scene, coordinates, tree_model
-from spatial_trees import random_tree
+from random_mechanisms import random_tree
 
 from ffrobot.mbs.model.model import row_values
 from ffrobot.mbs.model.system import MultibodySystem

@@ -1,6 +1,6 @@
 """The planar equations as docs/theory.md states them: dense matrices, written to be read, not to be fast.
 
-Shares nothing with the compiled core but its input: `PlanarBody`, rows (`planar_rows.Measure`) and
+Shares nothing with the compiled core but its input: `PlanarBody`, rows (`marker_measures.Measure`) and
 functions of time.
 Coordinates q = (R, θ, p) of one body after the other; symbols as in Shabana, Dynamics of Multibody Systems, ch. 5.
 """

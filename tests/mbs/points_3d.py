@@ -1,4 +1,4 @@
-"""Mechanisms in space as what they are, material points: d'Alembert's principle without any invariant or recursion.
+"""Mechanisms in 3D as what they are, material points: d'Alembert's principle without any invariant or recursion.
 
 Positions of all points follow from the coordinates by their definitions; time derivatives are exact (Taylor series of
 degree 2), and so are gradients. Coordinates of a joint, of sections against one another: mbs/core/recursion/joint.

@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
+from marker_measures import Kind
 from mechanisms import random_state
-from planar_rows import Kind
 
 from ffrobot.mbs import _core
 

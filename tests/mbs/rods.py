@@ -1,7 +1,7 @@
 """Rigid rods, and a slider-crank of them."""
 
+from bodies_by_invariants import rigid_body
 from mechanisms import make_model, revolute
-from planar_bodies import rigid_body
 
 
 def rod(name, length, mass):

@@ -1,4 +1,4 @@
-"""Rotations in space: quaternions (scalar first), rotation vectors, and their rates."""
+"""Rotations in 3D: quaternions (scalar first), rotation vectors, and their rates."""
 
 from math import factorial
 

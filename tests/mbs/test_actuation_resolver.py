@@ -5,7 +5,7 @@ import pytest
 import velocity_transformation
 import zoo
 from mechanisms import oracle_of, pcid, relative
-from planar_runs import evaluated, posture_of, run
+from oracle_runs import evaluated, posture_of, run
 
 from ffrobot.common.errors import InputError
 

@@ -7,12 +7,12 @@ import numpy as np
 import oracle
 import pytest
 import zoo
+from bodies_by_invariants import GeometricStiffening, with_payload
 from links import ritz_link
 from material_points import PointCloud, random_cloud
 from mechanisms import assemble, make_model, oracle_of, random_state, relative
 from oracle import mass_matrix
-from planar_bodies import GeometricStiffening, with_payload
-from planar_runs import energies, evaluated, freely
+from oracle_runs import energies, evaluated, freely
 
 STEP = 1e-30  # complex step: exact to rounding
 GRAVITY = np.array([1.3, -9.81])

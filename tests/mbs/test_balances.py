@@ -6,7 +6,7 @@ import zoo
 from balances import OUTPUT_STEP, energy_and_losses
 from links import arm, arm_links
 from mechanisms import forward, make_model, oracle_of, pcid, revolute
-from planar_runs import energies, run
+from oracle_runs import energies, run
 from scipy.integrate import simpson
 
 

@@ -1,12 +1,12 @@
-"""What a scene in space takes from modal bodies and rigid ones: inertia about the link's axis, files without it."""
+"""What a scene in 3D takes from modal bodies and rigid ones: inertia about the link's axis, files without it."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from spatial_checkpoints import modal_body
-from spatial_oracle import body_mass_matrix
-from spatial_trees import random_beam, stiffened
+from checkpoint_mechanisms import modal_body
+from oracle_3d import body_mass_matrix
+from random_mechanisms import random_beam, stiffened
 
 from ffrobot.common.errors import InputError
 from ffrobot.common.rotations import exponential

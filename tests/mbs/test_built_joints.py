@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 from balances import OUTPUT_STEP, energy_and_losses
+from bodies_by_invariants import rigid_body
 from links import ANGLES, arm, arm_links
 from mechanisms import Assembly, checked_scene, forward, make_model, oracle_of, pcid, relative, revolute
 from oracle import mass_matrix
+from oracle_runs import evaluated, joint_forces, posture_of, run
 from patch_sets import Patches
-from planar_bodies import rigid_body
-from planar_runs import evaluated, joint_forces, posture_of, run
 from rods import rod
 
 from ffrobot.common.errors import InputError

@@ -1,15 +1,15 @@
-"""The oracle in space at the states of independent numbers: λ_s, τ, F_p, voltages, accelerations of joints."""
+"""The oracle in 3D at the states of independent numbers: λ_s, τ, F_p, voltages, accelerations of joints."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from checkpoint_mechanisms import CASES, load, mechanism_of, modal_body, state_of
+from oracle_3d import Mechanism
+from random_mechanisms import JointState, Tree, placed
 from rotations import rotation, rotation_about
 from scipy.integrate import solve_ivp
-from spatial_checkpoints import CASES, load, mechanism_of, modal_body, state_of
-from spatial_oracle import Mechanism
-from spatial_rows import Section
-from spatial_trees import JointState, Tree, placed
+from triad_measures import Section
 
 from ffrobot.mbs.model.body import from_modal_body, rigid_body
 

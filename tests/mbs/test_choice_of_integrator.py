@@ -7,7 +7,7 @@ import pytest
 import zoo
 from links import ANGLES, arm, arm_links
 from mechanisms import forward, oracle_of, pcid, relative
-from planar_runs import evaluated, run
+from oracle_runs import evaluated, run
 from scipy.linalg import eigh, null_space
 
 from ffrobot.mbs.solve.start import undeformed_posture

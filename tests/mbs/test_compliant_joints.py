@@ -5,8 +5,8 @@ import pytest
 from balances import OUTPUT_STEP, energy_and_losses
 from links import ANGLES, TIP, arm, arm_links, quintic
 from mechanisms import checked_scene, forward, make_model, pcid, relative, revolute
+from oracle_runs import joint_forces, point_motion, run
 from patch_sets import Patches
-from planar_runs import joint_forces, point_motion, run
 from rods import rod
 from scipy.integrate import simpson
 

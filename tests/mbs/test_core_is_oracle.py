@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import zoo
 from mechanisms import ModalLoad, oracle_of, relative
-from planar_runs import energies, evaluated, posture_of, random_tree_state
+from oracle_runs import energies, evaluated, posture_of, random_tree_state
 
 from ffrobot.mbs.fields.expressions import parse_expression
 

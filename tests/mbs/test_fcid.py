@@ -6,8 +6,8 @@ import velocity_transformation
 import zoo
 from links import arm, arm_links, quintic, ritz_link
 from mechanisms import make_model, oracle_of, pcid, relative, revolute
+from oracle_runs import run
 from patch_sets import Patches
-from planar_runs import run
 
 from ffrobot.common.errors import InputError, SolveError
 from ffrobot.mbs.analysis.fcid import Fcid

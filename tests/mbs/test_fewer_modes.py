@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+from bodies_by_invariants import in_3d
 from links import arm, ritz_link
-from planar_bodies import in_3d
-from spatial_oracle import body_mass_matrix
+from oracle_3d import body_mass_matrix
 
 from ffrobot.common.rotations import exponential
 from ffrobot.mbs.model.truncation import interface_loads, loaded_points

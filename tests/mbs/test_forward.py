@@ -5,8 +5,8 @@ import pytest
 import velocity_transformation
 from links import arm
 from mechanisms import forward, oracle_of, pcid, relative, revolute
+from oracle_runs import point_motion, run
 from patch_sets import FULL, N, patches
-from planar_runs import point_motion, run
 from scipy.optimize import lsq_linear
 
 from ffrobot.mbs.analysis.fcid import Fcid

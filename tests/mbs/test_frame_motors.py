@@ -1,11 +1,11 @@
-"""Motors that turn frames in space: what the core makes of them is the virtual work of two frames."""
+"""Motors that turn frames in 3D: what the core makes of them is the virtual work of two frames."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from checkpoint_scenes import as_scene, coordinates, motor_on_frames, tree_model
-from spatial_trees import random_tree
+from random_mechanisms import random_tree
 from tree_accelerations import Accelerated
 
 import ffrobot

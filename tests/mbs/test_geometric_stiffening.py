@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from links import arm, arm_links, ritz_link
 from mechanisms import forward, make_model, oracle_of, pcid, revolute
-from planar_runs import energies, point_motion, run
+from oracle_runs import energies, point_motion, run
 from scipy.linalg import eigh
 
 import ffrobot

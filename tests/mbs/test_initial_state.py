@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from links import ANGLES, TIP, arm, arm_links, ritz_link
 from mechanisms import make_model, oracle_of, pcid, revolute
-from planar_runs import evaluated, point_motion, run
+from oracle_runs import evaluated, point_motion, run
 from rods import rod, slider_crank
 
 from ffrobot.common.errors import InputError, SolveError

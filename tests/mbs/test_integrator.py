@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from links import ANGLES, TIP, arm, arm_links, quintic, ritz_link
 from mechanisms import pcid, relative
-from planar_runs import run
+from oracle_runs import run
 
 from ffrobot.common.errors import SolveError
 from ffrobot.mbs import _core

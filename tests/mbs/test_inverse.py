@@ -5,7 +5,7 @@ import pytest
 from body_equations import accelerated, body_forces, energies, momentum, required_forces
 from checkpoint_scenes import as_scene, tree_model
 from moving_trees import NOW, SMALL, moving
-from spatial_trees import TYPES, random_tree
+from random_mechanisms import TYPES, random_tree
 from tree_accelerations import Accelerated, row_accelerations
 from tree_reactions import carried, needed
 

@@ -3,7 +3,7 @@
 import numpy as np
 from links import ANGLES, arm
 from mechanisms import make_model, oracle_of, pcid, revolute
-from planar_runs import run
+from oracle_runs import run
 from rods import rod, slider_crank
 
 

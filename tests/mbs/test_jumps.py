@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from links import arm
 from mechanisms import forward, make_model, pcid, relative, revolute
-from planar_runs import joint_forces, run
+from oracle_runs import joint_forces, run
 from rods import rod
 
 MASS, LENGTH, MOMENT = 2.0, 0.7, 3.0

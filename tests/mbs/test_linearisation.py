@@ -5,7 +5,7 @@ import pytest
 import zoo
 from links import arm, arm_links, ritz_link
 from mechanisms import ModalLoad, make_model, oracle_of, pcid, relative, revolute
-from planar_runs import evaluated, run
+from oracle_runs import evaluated, run
 
 from ffrobot.common.errors import SolveError
 from ffrobot.mbs import _core

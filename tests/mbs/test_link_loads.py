@@ -6,7 +6,7 @@ import zoo
 from links import arm, arm_links
 from mechanisms import forward, pcid
 from oracle import elastic_forces, gravity_forces, mass_matrix, quadratic_velocity_forces
-from planar_runs import joint_forces, run
+from oracle_runs import joint_forces, run
 
 from ffrobot.common.plane import rotated
 from ffrobot.mbs.quantities.link_loads import loads_on_links

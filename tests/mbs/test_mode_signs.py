@@ -5,10 +5,10 @@ from types import MappingProxyType
 
 import numpy as np
 import zoo
+from bodies_by_invariants import PlanarPoint
 from links import arm, arm_links
 from mechanisms import pcid, relative
-from planar_bodies import PlanarPoint
-from planar_runs import energies, evaluated, joint_forces, point_motion, random_tree_state, run, trajectory_force
+from oracle_runs import energies, evaluated, joint_forces, point_motion, random_tree_state, run, trajectory_force
 
 
 def with_signs(body, signs):

@@ -1,15 +1,15 @@
-"""The oracle in space against what it does not know: sums over points, differences, closed forms, turned scenes."""
+"""The oracle in 3D against what it does not know: sums over points, differences, closed forms, turned scenes."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
-import spatial_trees
+import random_mechanisms
 from mechanisms import relative
+from oracle_3d import Mechanism, body_forces, body_mass_matrix
+from random_mechanisms import TYPES, G, Tree, random_solid, random_tree, stiffened, symmetric
 from rotations import exponential, left_jacobian, left_jacobian_rate, logarithm, quaternion, random_rotation, rotation
-from spatial_oracle import Mechanism, body_forces, body_mass_matrix
-from spatial_rows import UNIT, About, Along, Driven, Ground, Joint, Section, Spinning
-from spatial_trees import TYPES, G, Tree, random_solid, random_tree, stiffened, symmetric
+from triad_measures import UNIT, About, Along, Driven, Ground, Joint, Section, Spinning
 
 from ffrobot.mbs.model.body import from_modal_body, rigid_body
 from ffrobot.mbs.model.stiffening import Stiffening
@@ -53,7 +53,7 @@ def test_rates_of_rotation_vectors_by_differences(rng):
 
 def test_equations_are_newtons_of_every_point(rng):
     """M v̇ − Q = Σ m (∂ṙ/∂v)ᵀ(r̈ − g) at any motion, without elastic forces."""
-    cloud = spatial_trees.random_cloud(rng, "b", n=5)
+    cloud = random_mechanisms.random_cloud(rng, "b", n=5)
     body = from_modal_body("b", cloud.modal_body())
     A, p, omega, p_dot = random_rotation(rng), *(rng.standard_normal(k) for k in (5, 3, 5))
     a = rng.standard_normal(11)
@@ -72,7 +72,7 @@ def test_equations_are_newtons_of_every_point(rng):
 def test_stiffened_equations_are_newtons_of_every_point(rng):
     """Of points that move by −½ pᵀG p besides, with G affine in x: its projection is itself."""
     n = 4
-    cloud = spatial_trees.random_cloud(rng, "b", n=n)
+    cloud = random_mechanisms.random_cloud(rng, "b", n=n)
     G_fields = symmetric(rng, 4, 3, n) / n
     fields = np.hstack([np.ones((len(cloud.x), 1)), cloud.x])
     G_points = np.einsum("if,flmn->ilmn", fields, G_fields)
@@ -99,7 +99,7 @@ def test_stiffened_equations_are_newtons_of_every_point(rng):
     assert 0.5 * v @ M @ v == pytest.approx(energy, rel=1e-13)
 
 
-@pytest.mark.parametrize("make", [random_solid, spatial_trees.random_beam], ids=["solid", "beam"])
+@pytest.mark.parametrize("make", [random_solid, random_mechanisms.random_beam], ids=["solid", "beam"])
 def test_stiffened_equations_with_nothing_of_second_order_are_the_plain_ones(rng, make):
     plain = make(rng, "b")
     n = plain.n_modes
@@ -111,7 +111,7 @@ def test_stiffened_equations_with_nothing_of_second_order_are_the_plain_ones(rng
     assert relative(body_forces(zero, A, p, omega, p_dot, G), body_forces(plain, A, p, omega, p_dot, G)) < 1e-13
 
 
-@pytest.mark.parametrize("make", [random_solid, spatial_trees.random_beam], ids=["solid", "beam"])
+@pytest.mark.parametrize("make", [random_solid, random_mechanisms.random_beam], ids=["solid", "beam"])
 def test_mass_matrices_stay_positive_definite_however_far_bodies_bend(rng, make):
     body = stiffened(rng, make(rng, "b"))
     for size in (0.1, 1.0, 10.0):
@@ -248,12 +248,12 @@ def test_geared_rotor_keeps_momentum(rng):
         "j", "revolute", Section("a", "tip", random_rotation(rng)), Section("b", "root", random_rotation(rng))
     )
     base = Joint("base", "free", Ground(), Section("a", "root"))
-    tree = Tree([spatial_trees.random_solid(rng, "a"), spatial_trees.random_beam(rng, "b")], [base, hinge])
-    tree.poses = {joint.name: spatial_trees.random_pose(rng, joint) for joint in tree.joints}
-    tree.q = spatial_trees.placed(tree, [0.1 * rng.standard_normal(body.n_modes) for body in tree.bodies])
+    tree = Tree([random_mechanisms.random_solid(rng, "a"), random_mechanisms.random_beam(rng, "b")], [base, hinge])
+    tree.poses = {joint.name: random_mechanisms.random_pose(rng, joint) for joint in tree.joints}
+    tree.q = random_mechanisms.placed(tree, [0.1 * rng.standard_normal(body.n_modes) for body in tree.bodies])
     rotor, J, h = Spinning(hinge.a, hinge.b, 30.0), 2e-2, 1e-5
     mechanism = tree.mechanism(gravity=np.zeros(3), rotors=[(rotor, J)])
-    v = spatial_trees.admissible(tree, rng.standard_normal(mechanism.size))
+    v = random_mechanisms.admissible(tree, rng.standard_normal(mechanism.size))
     a, _ = mechanism.solve(0.0, tree.q, v)
 
     def momentum(s):

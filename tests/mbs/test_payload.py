@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from bodies_by_invariants import PlanarBody, PlanarPoint, in_3d, rigid_body
+from marker_measures import Kind, Marker, Measure
 from material_points import random_cloud
 from mechanisms import Assembly, Robot, make_model, oracle_of, random_state, relative
 from oracle import Mechanism
-from planar_bodies import PlanarBody, PlanarPoint, in_3d, rigid_body
-from planar_rows import Kind, Marker, Measure
 
 from ffrobot.mbs.fields.expressions import parse_expression
 from ffrobot.mbs.model.masses import with_payload

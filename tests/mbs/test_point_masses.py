@@ -5,7 +5,7 @@ import oracle
 import pytest
 from material_points import random_cloud
 from mechanisms import make_model, random_state, relative
-from planar_runs import energies, evaluated, freely
+from oracle_runs import energies, evaluated, freely
 
 STEP = 1e-30  # complex step: exact to rounding
 GRAVITY = np.array([1.3, -9.81])

@@ -8,9 +8,9 @@ import pytest
 from closed_chains import closed_chain
 from moving_trees import SMALL, moving
 from prescribed_oracle import Motor, prescribed_motion, split
+from random_mechanisms import TYPES
 from rotations import random_rotation
 from scipy.linalg import qr
-from spatial_trees import TYPES
 
 from ffrobot.mbs import _core
 from ffrobot.mbs.fields.state_forces import state_function

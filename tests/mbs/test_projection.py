@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from checkpoint_scenes import tree_model
 from material_points import random_cloud
-from spatial_trees import random_solid, stiffened
+from random_mechanisms import random_solid, stiffened
 
 from ffrobot.mbs.model.body import from_modal_body
 from ffrobot.mbs.model.model import build_model

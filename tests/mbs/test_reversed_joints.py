@@ -1,4 +1,4 @@
-"""A scene in space does not depend on which side of a joint comes first in `between`."""
+"""A scene in 3D does not depend on which side of a joint comes first in `between`."""
 
 import numpy as np
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from links import ANGLES, TIP, arm, arm_links, quintic
 from mechanisms import make_model, pcid, relative, revolute
-from planar_runs import joint_forces, run, trajectory_force
+from oracle_runs import joint_forces, run, trajectory_force
 from rods import rod, slider_crank
 
 G = 9.81

@@ -1,8 +1,8 @@
-"""Damping ratios wanted of an assembled robot (`of = "robot"`) in space: those of the plane, and those asked for."""
+"""Damping ratios wanted of an assembled robot (`of = "robot"`) in 3D: those of the plane, and those asked for."""
 
 import numpy as np
 import pytest
-from damped_arms import RATIO, in_space, link, planar_arm, vibrations_of
+from damped_arms import RATIO, in_3d, link, planar_arm, vibrations_of
 
 TUBE = {"shape": "tube", "outer": 0.03, "inner": 0.024}
 START = {"O": 0.4, "A": -1.0}
@@ -10,12 +10,12 @@ SIDES = ("simply-supported", "cantilever")
 
 
 @pytest.mark.parametrize("changes", [{}, {"geometric_stiffening": True}, {"modes": 4}])
-def test_a_planar_arm_in_space_has_the_numbers_of_the_plane(changes):
+def test_a_planar_arm_in_3d_has_the_numbers_of_the_plane(changes):
     """With `of = "link"` the second ratio is 0.0164, see the plane's test."""
     of_bodies = {key: changes[key] for key in changes if key == "modes"}
     planar = planar_arm(SIDES, "robot") | {key: changes[key] for key in changes if key != "modes"}
     planar["body"] = [body | of_bodies for body in planar["body"]]
-    expected, found = vibrations_of(planar), vibrations_of(in_space(planar, START))
+    expected, found = vibrations_of(planar), vibrations_of(in_3d(planar, START))
     for one, other in zip(expected, found, strict=True):
         np.testing.assert_allclose(other, one, rtol=1e-6)
     assert abs(found[1][1] - 0.0164) > 1e-3
@@ -32,12 +32,12 @@ def test_gears_that_give_and_links_in_pieces_have_the_numbers_of_the_plane():
                 "pieces": pieces,
                 "link": first["link"] | {"damping": {"rayleigh": [0.0, 1e-5]}},
             }
-        expected, found = vibrations_of(planar), vibrations_of(in_space(planar, START))
+        expected, found = vibrations_of(planar), vibrations_of(in_3d(planar, START))
         for one, other in zip(expected, found, strict=True):
             np.testing.assert_allclose(other, one, rtol=1e-6)
 
 
-def spatial_arm(conditions, of):
+def arm_in_3d(conditions, of):
     """Yaw, pitch and, with two links, pitch; tubes that bend in both planes, stretch and twist."""
     modes = {"family": "all", "count": 6}
     points = {"root": [0.0, 0.0, 0.0], "top": [0.0, 0.0, 0.3]}
@@ -70,15 +70,15 @@ def spatial_arm(conditions, of):
 @pytest.mark.parametrize("condition", SIDES)
 def test_one_flexible_link_has_the_ratio_in_all_its_vibrations(condition):
     """Bent, twisted and stretched at once by a payload beside its axis, on joints and bodies that move with it."""
-    _, ratio = vibrations_of(spatial_arm([condition], "robot"))
-    _, of_link = vibrations_of(spatial_arm([condition], "link"))
+    _, ratio = vibrations_of(arm_in_3d([condition], "robot"))
+    _, of_link = vibrations_of(arm_in_3d([condition], "link"))
     np.testing.assert_allclose(ratio, RATIO, rtol=1e-6)
     assert np.abs(of_link[:6] / RATIO - 1).max() > 0.3
 
 
 def test_a_slender_link_on_a_stout_one():
     """The square of the highest frequency is 2e10 times that of the lowest: slow vibrations are damped all the same."""
-    arm = spatial_arm(SIDES[1:] * 2, "robot")
+    arm = arm_in_3d(SIDES[1:] * 2, "robot")
     for body, length, diameter in zip(arm["body"][1:], (0.1, 1.0), (0.05, 0.004), strict=True):
         section = {"shape": "circle", "diameter": diameter}
         body["link"]["geometry"] = body["link"]["geometry"] | {"length": length, "section": section}
@@ -89,8 +89,8 @@ def test_a_slender_link_on_a_stout_one():
 
 def test_ratios_of_two_links_do_not_depend_on_their_frames():
     """Damping between links is left out: of two vibrations that twist the same link one gets more, the other less."""
-    (_, first), (_, second) = (vibrations_of(spatial_arm(sides, "robot")) for sides in (SIDES, SIDES[1:] * 2))
+    (_, first), (_, second) = (vibrations_of(arm_in_3d(sides, "robot")) for sides in (SIDES, SIDES[1:] * 2))
     np.testing.assert_allclose(second[:8], first[:8], rtol=5e-3)
     assert 0.6 * RATIO < first[:8].min() < first[:8].max() < 2.0 * RATIO
-    _, of_links = vibrations_of(spatial_arm(SIDES, "link"))
+    _, of_links = vibrations_of(arm_in_3d(SIDES, "link"))
     assert of_links[:8].min() < 0.3 * RATIO

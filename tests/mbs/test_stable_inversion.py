@@ -6,7 +6,7 @@ import velocity_transformation
 from links import TIP, arm, arm_links, quintic, ritz_link
 from mechanisms import ZERO, Assembly, Constraint, assemble, forward, make_model, oracle_of, relative, revolute
 from numpy.polynomial import Polynomial
-from planar_runs import evaluated, point_motion, run
+from oracle_runs import evaluated, point_motion, run
 
 from ffrobot.common.errors import InputError, SolveError
 from ffrobot.mbs.analysis.inverted_path import is_minimum_phase

@@ -1,13 +1,13 @@
-"""Where robots in space start: postures of the checkpoints, undeformed and in equilibrium, mobility, messages."""
+"""Where robots in 3D start: postures of the checkpoints, undeformed and in equilibrium, mobility, messages."""
 
 import warnings
 
 import numpy as np
 import pytest
+from checkpoint_mechanisms import CASES, load
 from checkpoint_scenes import checkpoint_scene, tree_model
+from random_mechanisms import Tree
 from rotations import quaternion
-from spatial_checkpoints import CASES, load
-from spatial_trees import Tree
 
 from ffrobot.mbs.model.body import rigid_body
 from ffrobot.mbs.model.model import build_model, row_values, target_rates

@@ -1,13 +1,13 @@
-"""The recursion, as scenes in space make it, against the oracle in absolute coordinates: random trees, all joints."""
+"""The recursion, as scenes in 3D make it, against the oracle in absolute coordinates: random trees, all joints."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from checkpoint_scenes import as_scene, coordinates, tree_model
-from spatial_rows import UNIT, About, Along, Ground, Section, Spinning
-from spatial_trees import TYPES, placed, random_tree
+from random_mechanisms import TYPES, placed, random_tree
 from tree_accelerations import Accelerated
+from triad_measures import UNIT, About, Along, Ground, Section, Spinning
 
 from ffrobot.mbs import _core
 from ffrobot.mbs.fields.expressions import parse_expression

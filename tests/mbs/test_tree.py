@@ -1,10 +1,10 @@
-"""The tree of a scene in space against the oracle: places, coordinates, gradients, loops, both orders of sides."""
+"""The tree of a scene in 3D against the oracle: places, coordinates, gradients, loops, both orders of sides."""
 
 import numpy as np
 import pytest
 from checkpoint_scenes import as_scene, coordinates, tree_model
+from random_mechanisms import TYPES, placed, random_tree
 from rotations import quaternion
-from spatial_trees import TYPES, placed, random_tree
 
 from ffrobot.mbs.model.model import row_values
 

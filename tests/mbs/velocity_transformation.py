@@ -1,9 +1,9 @@
 """q̇ = D (ȧ, ṗ): motor coordinates a and modal coordinates p as the independent ones (Shabana 2022, Eqs. 18–21)."""
 
 import numpy as np
+from marker_measures import coordinate as coordinate_of
+from marker_measures import joint_constraints
 from oracle import rotation
-from planar_rows import coordinate as coordinate_of
-from planar_rows import joint_constraints
 
 
 def open_chain(mechanism, scene, q):

@@ -3,9 +3,9 @@
 from dataclasses import replace
 
 import numpy as np
+from bodies_by_invariants import GeometricStiffening, with_payload
 from material_points import random_cloud
 from mechanisms import ModalLoad, make_model, revolute
-from planar_bodies import GeometricStiffening, with_payload
 
 from ffrobot.mbs.fields.expressions import parse_expression
 

@@ -4,10 +4,10 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
-import planar_tables
+import scenes_in_3d
 from moved_scenes import tables_of
 from random_robots import random_scene
-from robots_3d import random_spatial_scene
+from robots_3d import random_scene_in_3d
 
 import ffrobot
 
@@ -70,7 +70,7 @@ def patched(**layout):
 
 
 def slider_crank(of_joints):
-    tables = planar_tables.read(FOLDER / "slider_crank" / "scene.toml") | {"analysis": [INVERSE, RELEASED]}
+    tables = scenes_in_3d.read(FOLDER / "slider_crank" / "scene.toml") | {"analysis": [INVERSE, RELEASED]}
     tables["joint"] = [joint | of_joints.get(joint["name"], {}) for joint in tables["joint"]]
     moments = {"O": 0.2, "guide": 0.1, "B": 0.3}
     return ffrobot.make_scene(**tables, load=[{"joint": j, "moment": f"{m}*sin(30*t)"} for j, m in moments.items()])
@@ -151,7 +151,7 @@ FREE = {"mass": 1.2, "center": [0.15, 0.02, -0.01], "inertia": [4e-3, 9e-3, 8e-3
         "points": {"root": [0.0, 0.0, 0.0], "tip": [0.3, 0.05, -0.04]}}  # fmt: skip
 
 
-def in_space(name, bodies, joints, *analyses, **tables):
+def in_3d(name, bodies, joints, *analyses, **tables):
     return ffrobot.make_scene(
         name=name, space="spatial", gravity=[0.3, -0.5, -9.8], body=bodies, joint=joints, analysis=list(analyses),
         **tables,
@@ -175,13 +175,13 @@ def joints_of_all_types():
     moments = [
         {"joint": f"to_{name}", "moment": f"0.05*cos({9 + k}*t)"} for k, name in enumerate(("revolute", "screw"))
     ]
-    return in_space(
+    return in_3d(
         "joints", bodies, [joint | ({} if joint["type"] == "weld" else {"motor": False}) for joint in joints], RELEASED,
         load=[*moments, {"point": "spherical.tip", "x": "2*t", "mz": "0.1"}, {"point": "free.tip", "y": "t"}],
     )  # fmt: skip
 
 
-def arm_in_space(*analyses, checkpoint="arm3_line_static", of_joints=(), of_bodies=(), **tables):
+def arm_in_3d(*analyses, checkpoint="arm3_line_static", of_joints=(), of_bodies=(), **tables):
     """The arm of a checkpoint with other analyses."""
     found = tables_of(checkpoint, 1e-8)
     found["joint"] = [joint | dict(of_joints) for joint in found["joint"]]
@@ -189,15 +189,15 @@ def arm_in_space(*analyses, checkpoint="arm3_line_static", of_joints=(), of_bodi
     return ffrobot.make_scene(**found | {"analysis": list(analyses)} | tables)
 
 
-def patched_in_space(**layout):
+def patched_in_3d(**layout):
     return [{"body": name, "count": 3, "axis": "y"} | PATCHES | layout for name in ("upper", "fore")]
 
 
-def planar_case_in_space(case, *analyses, **tables):
+def planar_case_in_3d(case, *analyses, **tables):
     """A planar case with its patches put into space."""
-    planar = planar_tables.read(FOLDER / case / "scene.toml")
-    found = planar_tables.in_space(planar) | {"pzt": planar.get("pzt", [])}
-    joints = planar_tables.CRANK if case == "slider_crank" else planar_tables.TWO_LINK
+    planar = scenes_in_3d.read(FOLDER / case / "scene.toml")
+    found = scenes_in_3d.in_3d(planar) | {"pzt": planar.get("pzt", [])}
+    joints = scenes_in_3d.CRANK if case == "slider_crank" else scenes_in_3d.TWO_LINK
     return ffrobot.make_scene(**found | {"initial": {"joints": joints}, "analysis": list(analyses)} | tables)
 
 
@@ -206,7 +206,7 @@ def in_pieces():
     of_link = LINK | {"modes": {"count": 6, "family": "all"}, "damping": {"rayleigh": [0.0, 1e-5]}}
     joint = {"name": "O", "type": "universal", "between": ["ground", "link.root"], "axis": [0.0, 1.0, 0.0],
              "second_axis": [0.0, 0.0, 1.0], "motor": False}  # fmt: skip
-    return in_space("pieces", [{"name": "link", "link": of_link, "pieces": 2}], [joint], RELEASED)
+    return in_3d("pieces", [{"name": "link", "link": of_link, "pieces": 2}], [joint], RELEASED)
 
 
 def seven_joints(redundancy):
@@ -217,37 +217,37 @@ def seven_joints(redundancy):
     joints = [revolute(f"q{k}", ends[k], f"l{k}.root", axis=axis) for k, axis in enumerate(axes)]
     guess = {"q0": 0.2, "q1": -0.6, "q2": 0.3, "q3": 1.1}
     path = {"name": "tip", "point": "l3.tip", "x": "0.75 + 0.5*t**2", "y": "0.35 - 0.4*t**2", "z": "0.0 + t**2"}
-    return in_space("redundant", bodies, joints, INVERSE | {"end": 0.2, "output_step": 0.01}, trajectory=[path],
+    return in_3d("redundant", bodies, joints, INVERSE | {"end": 0.2, "output_step": 0.01}, trajectory=[path],
                     initial={"joints": guess}, redundancy=redundancy)  # fmt: skip
 
 
 SPATIAL = {
-    "arm_in_space": partial(arm_in_space, INVERSE, AGAIN, STATIC, SAGGING, LINEAR),
-    "arm_in_space_as_built": partial(
-        arm_in_space, INVERSE, AGAIN | {"apply": "joints"}, SAGGING, of_joints=BUILT,
+    "arm_in_3d": partial(arm_in_3d, INVERSE, AGAIN, STATIC, SAGGING, LINEAR),
+    "arm_in_3d_as_built": partial(
+        arm_in_3d, INVERSE, AGAIN | {"apply": "joints"}, SAGGING, of_joints=BUILT,
         payload=[{"point": "fore.tip", "mass": 0.2, "inertia": [1e-3, 2e-3, 1.5e-3]}],
         load=[{"point": "upper.tip", "x": "3*t", "my": "0.5"}, {"joint": "q2", "moment": "sin(30*t)"}],
     ),
-    "arm_in_space_with_gears": partial(arm_in_space, INVERSE, AGAIN | {"apply": "joints"}, of_joints=GIVES),
-    "arm_in_space_with_frame_motors": partial(arm_in_space, INVERSE, SAGGING, motors="frame"),
-    "arm_in_space_stiffened": partial(arm_in_space, INVERSE, AGAIN, SAGGING, geometric_stiffening=True),
-    "pieces_in_space": in_pieces,
-    "tool_axis": partial(arm_in_space, INVERSE, AGAIN, checkpoint="arm5_tool_axis"),
-    "pose": partial(arm_in_space, INVERSE, SAGGING, checkpoint="arm6_static"),
-    "stanford": partial(arm_in_space, INVERSE, AGAIN | {"apply": "joints"}, STATIC, checkpoint="stanford"),
+    "arm_in_3d_with_gears": partial(arm_in_3d, INVERSE, AGAIN | {"apply": "joints"}, of_joints=GIVES),
+    "arm_in_3d_with_frame_motors": partial(arm_in_3d, INVERSE, SAGGING, motors="frame"),
+    "arm_in_3d_stiffened": partial(arm_in_3d, INVERSE, AGAIN, SAGGING, geometric_stiffening=True),
+    "pieces_in_3d": in_pieces,
+    "tool_axis": partial(arm_in_3d, INVERSE, AGAIN, checkpoint="arm5_tool_axis"),
+    "pose": partial(arm_in_3d, INVERSE, SAGGING, checkpoint="arm6_static"),
+    "stanford": partial(arm_in_3d, INVERSE, AGAIN | {"apply": "joints"}, STATIC, checkpoint="stanford"),
     "joints_of_all_types": joints_of_all_types,
     "redundant_by_torque": partial(seven_joints, "least-torque"),
     "redundant_by_motion": partial(seven_joints, "least-motion"),
-    "patches_in_space": partial(
-        planar_case_in_space, "two_link_patched", INVERSE, AGAIN | {"apply": "joints+pzt"}, SAGGING
+    "patches_in_3d": partial(
+        planar_case_in_3d, "two_link_patched", INVERSE, AGAIN | {"apply": "joints+pzt"}, SAGGING
     ),
-    "control_in_space": partial(
-        planar_case_in_space, "two_link_closed_loop", INVERSE, LOOP, LOOP | {"name": "patches", "controller": [PD, LQR]}
+    "control_in_3d": partial(
+        planar_case_in_3d, "two_link_closed_loop", INVERSE, LOOP, LOOP | {"name": "patches", "controller": [PD, LQR]}
     ),
-    "loop_in_space": partial(
-        planar_case_in_space, "slider_crank", INVERSE, RELEASED,
+    "loop_in_3d": partial(
+        planar_case_in_3d, "slider_crank", INVERSE, RELEASED,
     ),
-    **{f"random_in_space_{k}": lambda k=k: random_spatial_scene(3717, k, [("a", 1e-7, "dop853")], 60_000)[1]
+    **{f"random_in_3d_{k}": lambda k=k: random_scene_in_3d(3717, k, [("a", 1e-7, "dop853")], 60_000)[1]
        for k in range(8)},
 }  # fmt: skip
 MADE = PLANAR | SPATIAL

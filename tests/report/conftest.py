@@ -11,7 +11,7 @@ from ffrobot.cli import cli
 
 CHROMIUM, DRIVER = shutil.which("chromium"), shutil.which("chromedriver")
 
-# Remarks of the browser on the speed of its own graphics, made where Plotly draws in space.
+# Remarks of the browser on the speed of its own graphics, made where Plotly draws in 3D.
 GRAPHICS = ("willReadFrequently", "GPU stall due to ReadPixels", "software WebGL")
 
 
@@ -38,7 +38,7 @@ class Browser:
     def __init__(self):
         options = ChromeOptions()
         options.binary_location = CHROMIUM
-        # WebGL in software, with which Plotly draws in space.
+        # WebGL in software, with which Plotly draws in 3D.
         for argument in ("--headless=new", "--enable-unsafe-swiftshader", "--no-sandbox", "--disable-gpu",
                          "--disable-dev-shm-usage", "--force-device-scale-factor=1",
                          "--window-size=1400,1000"):  # fmt: skip

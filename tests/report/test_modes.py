@@ -1,4 +1,4 @@
-"""Modes in space: what the page is given, coarse where meshes are large, and what the browser draws of it."""
+"""Modes in 3D: what the page is given, coarse where meshes are large, and what the browser draws of it."""
 
 import io
 
@@ -57,7 +57,7 @@ def test_small_surfaces_stay_as_they_are():
 
 @pytest.fixture
 def shown(browser, page, solid_arm):
-    """The page of a solid link, its modes in space drawn."""
+    """The page of a solid link, its modes in 3D drawn."""
     browser.open(page(solid_arm / "scene.results.h5"))
     browser.run("modeStage.scrollIntoView()")
     browser.wait("modeStage.data && modeStage.data.length === 2")

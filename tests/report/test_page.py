@@ -1,4 +1,4 @@
-"""Pages of scenes in space in a real browser: drawn without a complaint, as it was solved, moving, turned by a drag."""
+"""Pages of scenes in 3D in a real browser: drawn without a complaint, as it was solved, moving, turned by a drag."""
 
 import io
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from planar_bodies import from_modal_body
+from bodies_by_invariants import from_modal_body
 from table import PAGE, ROWS, Table, render
 
 from ffrobot.fe_models.link import cached_modal_body

@@ -1,10 +1,10 @@
 """Closed loops of rods or flexible links, runs of them, and what they keep."""
 
 import numpy as np
+from bodies_by_invariants import rigid_body
 from links import arm, ritz_link
 from mechanisms import forward, make_model, oracle_of, pcid, revolute
-from planar_bodies import rigid_body
-from planar_runs import energies, run
+from oracle_runs import energies, run
 from rods import rod
 
 CRANK, ROD = 0.2, 0.5

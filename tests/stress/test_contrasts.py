@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from links import ANGLES, arm, ritz_link
 from mechanisms import relative
-from planar_runs import point_motion
+from oracle_runs import point_motion
 from robots import inverse
 from table import at_most
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from links import arm
 from mechanisms import ModalLoad, forward, make_model, oracle_of, pcid, revolute
+from oracle_runs import evaluated, run
 from patch_sets import FULL
-from planar_runs import evaluated, run
 from robots import free_run
 from rods import rod
 from table import at_most

@@ -10,7 +10,7 @@ import pytest
 import tomli_w
 from links import ANGLES, TIP, arm, quintic
 from mechanisms import relative
-from planar_runs import run
+from oracle_runs import run
 from robots import inverse
 from table import at_most
 from units import SI, SYSTEMS, Units
@@ -122,7 +122,7 @@ def test_space(integrator):
     assert max(relative(other, angle) for other, _ in found.values()) < 1e-9
 
 
-# Powers of length, mass and time of the results in space.
+# Powers of length, mass and time of the results in 3D.
 DIMENSIONS = {
     r"points/.*/(position|deflection)|bodies/.*/position": (1, 0, 0),
     r".*/quaternion|joints/.*/coordinate": (0, 0, 0),
@@ -195,7 +195,7 @@ def all_numbers(scene):
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_flexible_arms_in_space(seed, tmp_path):
+def test_flexible_arms_in_3d(seed, tmp_path):
     """Links, modes and all results, from the link files on."""
     expected = all_numbers(flexible_arm(seed, SI, tmp_path / "SI"))
     assert len(expected) > 40

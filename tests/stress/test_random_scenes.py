@@ -9,8 +9,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from links import arm, quintic, ritz_link
 from mechanisms import forward, oracle_of, pcid, relative
+from oracle_runs import energies, evaluated, posture_of, random_tree_state, run
 from patch_sets import FULL
-from planar_runs import energies, evaluated, posture_of, random_tree_state, run
 from table import at_most
 
 GROUP = "Random scenes"

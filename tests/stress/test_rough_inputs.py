@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from links import arm
 from mechanisms import make_model, relative, revolute
-from planar_runs import run
+from oracle_runs import run
 from robots import free_run, inverse, pendulum, reaching
 from rods import rod
 from table import at_most

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from links import arm_links
 from mechanisms import make_model, oracle_of, relative, revolute
-from planar_runs import joint_forces
+from oracle_runs import joint_forces
 from robots import free_run, inverse, parallelogram, reaching, slider_crank, through_dead_centre
 from rods import rod
 

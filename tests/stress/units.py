@@ -3,9 +3,9 @@
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 
+from bodies_by_invariants import PlanarPoint
 from links import ANGLES, TIP, arm_links, quintic
 from mechanisms import make_model, revolute
-from planar_bodies import PlanarPoint
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@
 writes time, force on the tip (N) and its deflection (m), and prints one line of JSON: seconds, versions, settings.
 `ffrobot bench --peer exudyn` runs it and compares. Needs no ffrobot: modal body files are self-contained.
 
-Links are ObjectFFRFreducedOrder; its invariants are ours in other clothes (`reduced_order`). They move in space there,
+Links are ObjectFFRFreducedOrder; its invariants are ours in other clothes (`reduced_order`). They move in 3D there,
 held to the plane by coordinate constraints. The tip is joined to a point without mass that follows the path.
 
 Two things EXUDYN does otherwise. Its gravity leaves the deformation out of the moment on the frame: `--gravity full`

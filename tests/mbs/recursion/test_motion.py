@@ -60,7 +60,7 @@ def test_inverse_dynamics_of_plane_trees(name):
         assert relative(run.multipliers[i], expected_lambda[tree.rows]) < 1e-8
 
 
-def test_rows_are_kept_along_a_motion_in_space():
+def test_rows_are_kept_along_a_motion_in_3d():
     """A loop with flexible links, one joint driven: rows and rates at every output within rounding."""
     rng = np.random.default_rng(5)
     bodies = [

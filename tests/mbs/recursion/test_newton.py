@@ -82,7 +82,7 @@ def check_mechanism(mechanism, rng, with_springs=True):
 
 @pytest.mark.parametrize("curved", [False, True], ids=["", "stiffened"])
 @pytest.mark.parametrize("seed", range(6))
-def test_trees_in_space(seed, curved):
+def test_trees_in_3d(seed, curved):
     """Random joints, rigid bodies and bodies of up to five modes, clamped or not."""
     rng = np.random.default_rng(seed)
     bodies = []
@@ -95,7 +95,7 @@ def test_trees_in_space(seed, curved):
 
 
 @pytest.mark.parametrize("curved", [False, True], ids=["", "stiffened"])
-def test_rows_of_every_kind_in_space(curved):
+def test_rows_of_every_kind_in_3d(curved):
     rng = np.random.default_rng(4)
     K = r.RowKind
     rows = [
@@ -168,7 +168,7 @@ def with_friction(chain, viscous):
     return MultibodySystem(replace(chain, tables=tables).model(list(tables)[-1]))
 
 
-def test_driven_coordinate_in_space():
+def test_driven_coordinate_in_3d():
     rng = np.random.default_rng(6)
     bodies = [random_body(rng, 3, J.revolute), random_body(rng, 3, J.revolute, parent=0, parent_marker=1)]
     mechanism = Mechanism(bodies, ground(rng), GRAVITY)

@@ -1,4 +1,4 @@
-"""The recursion in space against d'Alembert's principle over material points: all joints, trees, loops, rows, loads."""
+"""The recursion in 3D against d'Alembert's principle over material points: all joints, trees, loops, rows, loads."""
 
 import numpy as np
 import pytest

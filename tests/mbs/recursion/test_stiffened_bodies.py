@@ -1,4 +1,4 @@
-"""Geometric stiffening in the recursion in space, against d'Alembert's principle over points that move to second order.
+"""Geometric stiffening in the recursion in 3D, against d'Alembert's principle over points that move to second order.
 
 Their second-order field is affine, so that the projection in the core is exact.
 """

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from body_equations import accelerated
 from checkpoint_scenes import as_scene, coordinates, tree_model
-from spatial_trees import TYPES, placed, random_tree
+from random_mechanisms import TYPES, placed, random_tree
 
 from ffrobot.mbs.quantities.motion import RobotMotion
 from ffrobot.mbs.quantities.reactions import reactions

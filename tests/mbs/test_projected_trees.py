@@ -1,10 +1,10 @@
-"""Mechanisms in space that move in a plane: the recursion in the plane is the recursion in space."""
+"""Mechanisms in 3D that move in a plane: the recursion in the plane is the recursion in 3D."""
 
 import numpy as np
 import pytest
 from checkpoint_scenes import motor_on_frames, tree_model
-from planar_trees import TYPES, flat_and_stiffened, flat_beam, planar_model
-from spatial_trees import random_beam, random_solid, stiffened
+from random_mechanisms import random_beam, random_solid, stiffened
+from trees_in_a_plane import TYPES, flat_and_stiffened, flat_beam, planar_model
 
 from ffrobot.mbs import _core
 from ffrobot.mbs.fields.expressions import parse_expression
@@ -149,7 +149,7 @@ PATH = {"name": "path", "point": "b2.tip", "x": ZERO, "y": TIME}
     ],
 )  # fmt: skip
 def test_what_does_not_move_in_a_plane(changes, is_planar):
-    """Is solved in space: axes that are not parallel, links that bend otherwise, rows across the plane."""
+    """Is solved in 3D: axes that are not parallel, links that bend otherwise, rows across the plane."""
     assert (MultibodySystem(chain(**changes)).plane is not None) == is_planar
 
 

@@ -1,4 +1,4 @@
-"""Patches in space on a link from stage 1: closed forms of bending in both planes and of twist, and what is refused."""
+"""Patches in 3D on a link from stage 1: closed forms of bending in both planes and of twist, and what is refused."""
 
 from dataclasses import replace
 from pathlib import Path

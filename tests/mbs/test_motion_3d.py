@@ -1,11 +1,11 @@
-"""What is read off a motion in space, at the states and path forces of independent numbers."""
+"""What is read off a motion in 3D, at the states and path forces of independent numbers."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from checkpoint_mechanisms import CASES, load
 from checkpoint_scenes import checkpoint_scene
-from spatial_checkpoints import CASES, load
 
 from ffrobot.mbs.model.model import build_model, row_values
 from ffrobot.mbs.quantities.motion import RobotMotion, continuous

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 import scene_of
+from oracle_3d import Mechanism
 from rotations import exponential, left_jacobian, left_jacobian_rate, rotation_about
-from spatial_oracle import Mechanism
-from spatial_rows import UNIT, About, Along, Dot, Driven, Ground, Joint, Section
+from triad_measures import UNIT, About, Along, Dot, Driven, Ground, Joint, Section
 
 from ffrobot.fe_models.link import cached_modal_body
 from ffrobot.mbs.fields.expressions import parse_expression

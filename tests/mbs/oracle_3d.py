@@ -1,4 +1,4 @@
-"""The equations in space: absolute coordinates, dense matrices, written to be read, not to be fast.
+"""The equations in 3D: absolute coordinates, dense matrices, written to be read, not to be fast.
 
 Shares nothing with the compiled core but `Body`. Of one body after the other q = (R, e, p) with the quaternion e
 (scalar first) and v = (Ṙ, ω̄, ṗ) with ω̄ in body axes. Symbols: Shabana, Dynamics of Multibody Systems, ch. 5; turning
@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from rotations import exponential, left_jacobian, left_jacobian_rate, rotation, skew, turned
-from spatial_rows import Coordinates, RowState
+from triad_measures import Coordinates, RowState
 
 
 @dataclass
@@ -232,7 +232,7 @@ class Mechanism:
         return Q
 
     def marker(self, at, q, v, t=0.0):
-        """A section's triad (`spatial_rows.Section`), of a body or the ground, or one driven in time."""
+        """A section's triad (`triad_measures.Section`), of a body or the ground, or one driven in time."""
         L = np.zeros((6, self.size))
         if at.body is None:
             r, F, velocity, acceleration = at.motion(t)

@@ -1,4 +1,4 @@
-"""Scene files of the checkpoints in space, and how closely datasets have to meet their numbers."""
+"""Scene files of the checkpoints in 3D, and how closely datasets have to meet their numbers."""
 
 import subprocess
 import sys

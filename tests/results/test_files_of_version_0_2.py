@@ -1,6 +1,6 @@
 """Results of planar scenes that version 0.2 wrote, when it had a program of its own for the plane.
 
-`of_planar_0.2` holds an arm of a rigid and a flexible link: its modal body, its results, and those of the same scene
+`of_0.2` holds an arm of a rigid and a flexible link: its modal body, its results, and those of the same scene
 stopped after 100 steps, all as commit fb4bd6aa wrote them.
 """
 
@@ -14,7 +14,7 @@ import pytest
 import ffrobot as library
 from ffrobot.results.file import Results
 
-OLD = Path(__file__).with_name("of_planar_0.2")
+OLD = Path(__file__).with_name("of_0.2")
 
 
 @pytest.fixture

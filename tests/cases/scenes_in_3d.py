@@ -1,4 +1,4 @@
-"""Planar scenes as scenes in space: the same robot in the plane z = 0, every joint about z."""
+"""Planar scenes as scenes in 3D: the same robot in the plane z = 0, every joint about z."""
 
 import tomllib
 
@@ -7,7 +7,7 @@ import tomli_w
 
 from ffrobot.mbs.fields.spelling import NORMAL, inertia_about_z, place
 
-# Where the joints of these cases start: [initial] of scenes in space
+# Where the joints of these cases start: [initial] of scenes in 3D
 TWO_LINK = {"O": 0.0, "A": 1.0471975511965976}
 CRANK = {
     "O": 1.3548358281099402,
@@ -21,8 +21,8 @@ STRAIGHT = {"name": "straight", "kind": "fcid", "shape": "zero", "end": 0.2, "ou
 REST = {"name": "rest", "kind": "static"}
 
 
-def in_space(tables):
-    """The tables of a planar scene, without patches and analyses, as those of one in space."""
+def in_3d(tables):
+    """The tables of a planar scene, without patches and analyses, as those of one in 3D."""
     found = {key: tables[key] for key in ("name", "motors") if key in tables}
     found |= {"space": "spatial", "gravity": place(tables["gravity"])}
     found["body"] = [_body(body) for body in tables["body"]]
@@ -69,7 +69,7 @@ def close(found, expected, share, least=1e-9):
 
 
 def compare_two_links(planar, spatial, analysis, share):
-    """What joints, the path and links of cases/two_link do, in the plane and in space."""
+    """What joints, the path and links of cases/two_link do, in the plane and in 3D."""
     for joint in TWO_LINK:
         for key in ("moment", "coordinate", "rate"):
             name = f"{analysis}/joints/{joint}/{key}"

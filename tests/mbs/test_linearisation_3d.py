@@ -1,4 +1,4 @@
-"""Linear equations in space against differences of the nonlinear ones: all joints, loops, in motion."""
+"""Linear equations in 3D against differences of the nonlinear ones: all joints, loops, in motion."""
 
 import ctypes
 from dataclasses import replace
@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from moving_trees import moving
+from random_mechanisms import TYPES
 from rotations import logarithm
-from spatial_trees import TYPES
 
 from ffrobot.common.rotations import of_quaternion
 from ffrobot.mbs import _core

@@ -1,4 +1,4 @@
-"""`ffrobot view` of scenes in space: grids hold what was solved, joints stay shut, the picture stands upright."""
+"""`ffrobot view` of scenes in 3D: grids hold what was solved, joints stay shut, the picture stands upright."""
 
 import numpy as np
 import pytest
@@ -109,7 +109,7 @@ def test_up_is_up():
     assert SPACE.right[2] == 0.0
 
 
-def test_solid_in_space_carries_the_stress_of_the_plane(solid_arm, ffrobot, tmp_path):
+def test_solid_in_3d_carries_the_stress_of_the_plane(solid_arm, ffrobot, tmp_path):
     """At rest: from an undeformed start attachment modes ring, whose mass the plane raises."""
     found = {}
     for space in ("planar", "spatial"):

@@ -1,4 +1,4 @@
-"""Movies of scenes in space: both programs show the tool where it was solved, from the corner that they say."""
+"""Movies of scenes in 3D: both programs show the tool where it was solved, from the corner that they say."""
 
 import numpy as np
 import pytest

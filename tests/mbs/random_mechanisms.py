@@ -1,4 +1,4 @@
-"""Random mechanisms in space: trees and loops with every type of joint, of rigid bodies, solids and beams.
+"""Random mechanisms in 3D: trees and loops with every type of joint, of rigid bodies, solids and beams.
 
 Beams are lines of mass with polynomial modes (Ritz) of all four families; solids have modes without any order.
 """
@@ -9,9 +9,9 @@ from types import MappingProxyType
 import numpy as np
 from material_points import random_cloud
 from numpy.polynomial import Legendre, Polynomial
+from oracle_3d import Mechanism
 from rotations import quaternion, random_rotation, rotation, rotation_about
-from spatial_oracle import Mechanism
-from spatial_rows import Ground, Joint, Section
+from triad_measures import Ground, Joint, Section
 
 from ffrobot.mbs.model.body import Body, BodyPoint, from_modal_body, rigid_body
 from ffrobot.mbs.model.stiffening import Stiffening

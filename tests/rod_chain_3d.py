@@ -1,4 +1,4 @@
-"""An arm in space of rigid rods with bending springs between them, driven by moments: a reference that shares nothing.
+"""An arm in 3D of rigid rods with bending springs between them, driven by moments: a reference that shares nothing.
 
 Each bar is a row of rods, the first and the last half as long, with universal springs EI/rod about the bar's y and z
 between them (no twist). Minimal coordinates, bodies by Jacobians, SciPy integrates. A bar's compliance is the midpoint

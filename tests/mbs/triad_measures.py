@@ -1,4 +1,4 @@
-"""Rows between two triads in space, joints made of them, and where each body's coordinates are.
+"""Rows between two triads in 3D, joints made of them, and where each body's coordinates are.
 
 A row is a scalar measure of triad b on triad a. It says its value, the wrenches on_a, on_b (6,) (force, moment) that a
 unit force along it puts on a and b, so that its rate is on_a·(ṙ_a, Ω_a) + on_b·(ṙ_b, Ω_b), and `extra`, what of its

@@ -1,4 +1,4 @@
-"""Figures of scenes in space: which there are, that bodies are drawn where they were solved, and to scale."""
+"""Figures of scenes in 3D: which there are, that bodies are drawn where they were solved, and to scale."""
 
 import numpy as np
 import pytest
@@ -135,7 +135,7 @@ def test_configurations_hold_every_link_at_every_time(arm):
         assert np.all(at < limits[:, 1])
 
 
-def test_exaggeration_is_of_configurations_in_space_only(slider_crank):
+def test_exaggeration_is_of_configurations_in_3d_only(slider_crank):
     with pytest.raises(ValueError, match='"exaggeration" only in kind = "configurations", found kind = "time"'):
         FigureRecord(name="t", curves=({"data": "a", "label": "a"},), exaggeration=2.0)
     plane = FigureRecord(name="p", kind="configurations", analysis="inverse", times=(0.0,), exaggeration=2.0)
@@ -143,7 +143,7 @@ def test_exaggeration_is_of_configurations_in_space_only(slider_crank):
         draw(plane, results)
 
 
-def test_paths_in_space_have_three_columns(arm):
+def test_paths_in_3d_have_three_columns(arm):
     curve = {"data": "inverse/points/fore.tip/position", "label": "tip"}
     (axes,) = draw(FigureRecord(name="p", kind="path", curves=(curve,)), arm).axes
     np.testing.assert_allclose(np.array(axes.lines[0].get_data_3d()).T, arm[curve["data"]])

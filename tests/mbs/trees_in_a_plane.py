@@ -1,4 +1,4 @@
-"""Random trees in space that move in a plane, which stands anywhere; offsets and masses across it are anything."""
+"""Random trees in 3D that move in a plane, which stands anywhere; offsets and masses across it are anything."""
 
 from dataclasses import replace
 from types import MappingProxyType, SimpleNamespace
@@ -6,8 +6,8 @@ from types import MappingProxyType, SimpleNamespace
 import numpy as np
 from checkpoint_scenes import rpy, tree_model
 from material_points import random_cloud
+from random_mechanisms import random_beam, random_rigid, random_solid, stiffened
 from rotations import random_rotation, rotation_about
-from spatial_trees import random_beam, random_rigid, random_solid, stiffened
 
 from ffrobot.mbs.model.body import Body, BodyPoint, from_modal_body
 from ffrobot.mbs.model.projection import projected
