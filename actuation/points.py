@@ -17,8 +17,8 @@ from typing import Annotated
 import numpy as np
 
 from ..common.arrays import Array
-from ..common.errors import InputError
-from ..common.validation import Record, did_you_mean, quoted
+from ..common.errors import InputError, did_you_mean, quoted
+from ..common.validation import Record
 from ..fe_models.modal_body import ModalBody
 from ..mbs.fields.field_types import Name
 from ..mbs.fields.references import Reference

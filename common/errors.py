@@ -1,8 +1,8 @@
-"""The two ways a run can fail, each with the exit code the command line returns for it."""
+"""The two ways a run can fail, each with the exit code of the command line, and words of their messages."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -61,3 +61,23 @@ def of_file(name: object) -> Iterator[None]:
         raise type(error)(f"{name}: {error}") from None
     except (LinAlgError, FloatingPointError) as error:
         raise SolveError(f"{name}: {error}: numbers that differ too much in size, or are too large or small") from error
+
+
+def did_you_mean(word: str, known: Iterable[str]) -> str:
+    """` (did you mean "…"?)`, or nothing when no known word is close, or begins with this one and an underscore."""
+    from difflib import get_close_matches
+
+    words = list(known)
+    close = get_close_matches(word, words, n=1) or [one for one in words if one.startswith(f"{word}_")]
+    return f' (did you mean "{close[0]}"?)' if close else ""
+
+
+def quoted(words: Iterable[str]) -> str:
+    """`"a", "b"`, for the list of what is known; "none" when empty."""
+    return ", ".join(f'"{word}"' for word in words) or "none"
+
+
+def either(words: Iterable[str]) -> str:
+    """`"a", "b" or "c"`."""
+    *first, last = (f'"{word}"' for word in words)
+    return f"{', '.join(first)} or {last}" if first else last

@@ -15,7 +15,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, GetCoreSchemaHandler
 from pydantic.fields import FieldInfo
 from pydantic_core import CoreSchema, ErrorDetails, PydanticKnownError, core_schema
 
-from .errors import InputError
+from .errors import InputError, did_you_mean, either
 from .function_content import digest_of_function
 from .tables import key_path, shown
 from .toml_files import check_limits
@@ -140,24 +140,6 @@ def plain(value: Any, functions: dict[str, object] | None = None) -> Any:  # noq
         functions[name] = value
         return name
     return str(value) if isinstance(value, PathLike) else value
-
-
-def did_you_mean(word: str, known: Iterable[str]) -> str:
-    """` (did you mean "…"?)`, or nothing when no known word is close, or begins with this one and an underscore."""
-    words = list(known)
-    close = get_close_matches(word, words, n=1) or [one for one in words if one.startswith(f"{word}_")]
-    return f' (did you mean "{close[0]}"?)' if close else ""
-
-
-def quoted(words: Iterable[str]) -> str:
-    """`"a", "b"`, for the list of what is known; "none" when empty."""
-    return ", ".join(f'"{word}"' for word in words) or "none"
-
-
-def either(words: Iterable[str]) -> str:
-    """`"a", "b" or "c"`."""
-    *first, last = (f'"{word}"' for word in words)
-    return f"{', '.join(first)} or {last}" if first else last
 
 
 class _Problem(NamedTuple):

@@ -13,8 +13,7 @@ from math import ceil
 from pathlib import Path
 from typing import Any
 
-from ..common.errors import InputError
-from ..common.validation import quoted
+from ..common.errors import InputError, quoted
 from .link_file import LinkSource, LinkTable, link_path, read_link
 from .link_records import BeamLink, Family, Link
 

@@ -17,8 +17,7 @@ from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
 from ..common.arrays import Array, Integers
-from ..common.errors import InputError
-from ..common.validation import did_you_mean, quoted
+from ..common.errors import InputError, did_you_mean, quoted
 from .part_mesh import PartMesh, boundary_facets, facet_geometry, facet_keys
 from .records import Outlines, PlaceRecord, RectangleSection, SolidGeometry
 from .source import Source

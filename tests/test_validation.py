@@ -6,9 +6,9 @@ from typing import Annotated, Literal
 import pytest
 from pydantic import Field
 
-from ffrobot.common.errors import InputError
+from ffrobot.common.errors import InputError, did_you_mean
 from ffrobot.common.toml_files import load_toml
-from ffrobot.common.validation import InputFile, Record, did_you_mean, validate
+from ffrobot.common.validation import InputFile, Record, validate
 
 
 class Circle(Record):

@@ -9,8 +9,7 @@ from typing import Protocol
 import numpy as np
 
 from ...common.arrays import Array, Indices
-from ...common.errors import InputError
-from ...common.validation import quoted
+from ...common.errors import InputError, quoted
 from ...mbs.analysis.outcome import Outcome
 from ...mbs.model.model import Model
 from ..patches.link_patches import LinkPatches

@@ -10,10 +10,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...common.arrays import Array, ComplexArray
-from ...common.errors import InputError
+from ...common.errors import InputError, did_you_mean, quoted
 from ...common.extras import extras
 from ...common.files import write_atomically
-from ...common.validation import did_you_mean, quoted
 from ...mbs.solve.linearisation import LinearMechanism
 
 if TYPE_CHECKING:

@@ -12,14 +12,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ...common.arrays import Array
 from ...common.peaks import largest, root_mean_square, shares
-from .controllers import Setup
-from .loop import Loop
+
+if TYPE_CHECKING:  # metrics are read from files, too, by what does not control
+    from .controllers import Setup
+    from .loop import Loop
 
 SETTLED = 0.05  # of the largest error
 PERIODS = 3.0  # of the lowest frequency, over which what is slower is found

@@ -8,8 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from ...common.errors import InputError
-from ...common.validation import quoted
+from ...common.errors import InputError, quoted
 from ...mbs.analysis.operating_points import InstantAnalysis, of_earlier, row_at
 from ...mbs.analysis.outcome import Outcome
 from ...mbs.analysis.replay import motor_forces_of

@@ -8,8 +8,9 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, PlainValidator, ValidationInfo, model_validator
 
+from ...common.errors import quoted
 from ...common.python_files import check_python_file
-from ...common.validation import Record, existing_file, quoted
+from ...common.validation import Record, existing_file
 from ...mbs.fields.field_types import (
     ModeCount,
     Name,

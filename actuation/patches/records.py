@@ -9,8 +9,9 @@ from typing import Annotated, Literal, Self
 import numpy as np
 from pydantic import Field, model_validator
 
+from ...common.errors import quoted
 from ...common.numbers import MOST_PATCHES, SMALLEST
-from ...common.validation import Record, quoted
+from ...common.validation import Record
 from ...mbs.fields.field_types import Name, NotEmpty, NotNegative, PatchCount, Positive, Quantity, one_of
 from ...mbs.fields.references import Reference
 from ...mbs.fields.spelling import IN_SPACE, Spelled, as_written

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 from math import isfinite
 from pathlib import Path
 
-from ...common.errors import InputError
+from ...common.errors import InputError, did_you_mean, quoted
 from ...common.tables import LARGEST, shown
 from ...common.toml_files import read_text
-from ...common.validation import InputFile, Record, did_you_mean, quoted
+from ...common.validation import InputFile, Record
 
 COLUMNS = ("mode", "family", "frequency", "damping_ratio", "uncertainty")
 

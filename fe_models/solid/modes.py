@@ -9,8 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...common.arrays import Array
-from ...common.errors import InputError
-from ...common.validation import quoted
+from ...common.errors import InputError, quoted
 from ..link_records import SolidLink
 from ..modal_body.attachment_modes import DEFAULT_COUNT, ResidualModes
 from .eigen import Inverse, Mass, lowest_modes

@@ -10,9 +10,8 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
-from ..common.errors import InputError
+from ..common.errors import InputError, did_you_mean, quoted
 from ..common.files import check_folder
-from ..common.validation import did_you_mean, quoted
 from ..mbs.scene.analysis import TIGHTEST_TOLERANCE
 from ..run.solve import prepare_scene
 from ..run.watcher import Watcher

@@ -7,8 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from ..common.arrays import Array
-from ..common.errors import InputError
-from ..common.validation import did_you_mean, quoted
+from ..common.errors import InputError, did_you_mean, quoted
 from ..mbs.scene.analysis import IntegratedAnalysis
 from ..results.file import Results
 from ..results.write import results_image

@@ -7,9 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..common.errors import InputError
+from ..common.errors import InputError, did_you_mean, either, quoted
 from ..common.peaks import root_mean_square
-from ..common.validation import did_you_mean, either, quoted
 from ..fe_models.modal_body import ModalBody
 from ..results.file import Results
 from ..sweep.files import value_of

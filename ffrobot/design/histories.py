@@ -8,8 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..common.arrays import Array, as_floats
-from ..common.errors import InputError
-from ..common.validation import did_you_mean
+from ..common.errors import InputError, did_you_mean
 from ..mbs.joints.joints import JOINT_TYPES
 from ..results.file import COLUMN, Results
 from ..results.meanings import RESULTS, meaning

@@ -9,12 +9,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..common.errors import InputError
+from ..common.errors import InputError, quoted
 from ..common.files import check_new_file, check_new_folder, check_output, write_atomically
 from ..common.outputs import check_not_an_input
 from ..common.tables import shown
 from ..common.toml_files import read_text
-from ..common.validation import quoted
 from ..fe_models.modal_body import ModalBody
 from ..fe_models.modal_body_file import FORMAT, is_modal_body_file, read_modal_body, write_modal_body
 from .bodies.craig_bampton import craig_bampton_file

@@ -13,10 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..common.arrays import Indices
-from ..common.errors import InputError, SolveError
+from ..common.errors import InputError, SolveError, did_you_mean
 from ..common.files import write_atomically
 from ..common.outputs import check_not_an_input
-from ..common.validation import did_you_mean
 from ..results.file import Results
 
 Frame = NDArray[np.uint8]  # (height, width, 3) red, green, blue

@@ -9,32 +9,14 @@ from rich.table import Table
 
 from ..actuation.control.linear_models import LinearModels
 from ..actuation.control.loop_record import LoopRecord
-from ..actuation.control.metrics import DEFINITIONS, Metrics
+from ..actuation.control.metrics import DEFINITIONS
 from ..actuation.control.placing import Placed
 from ..mbs.analysis.outcome import Details
+from .closed_loops import LOOP_COLUMNS, loop_row
 from .tables import plain_table
 
 FREQUENCIES = 5  # that are listed, and damping ratios
 UNDAMPED = 1e-9  # ratios below are rounding
-
-LOOP_COLUMNS = (
-    "closed loop", "verdict", "rms (m)", "max (m)", "settling\n(s)", "overshoot\n(m)", "vibration\n(m)",
-    "final (m)", "work (J)", "torque\n(N·m)", "voltage\n(V)", "at\nlimits",
-)  # fmt: skip
-
-
-def loop_row(name: str, metrics: Metrics) -> Iterator[str]:
-    """One run as text, below `LOOP_COLUMNS`."""
-    yield name
-    yield metrics.verdict
-    for value in (metrics.tip_error_rms, metrics.tip_error_max):
-        yield f"{value:.3g}"
-    yield "no" if np.isnan(metrics.settling_time) else f"{metrics.settling_time:.3g}"
-    yield from (
-        f"{value:.3g}" for value in (metrics.overshoot, metrics.vibration, metrics.residual, metrics.motor_work)
-    )
-    yield from (f"{value:.3g}" for value in (metrics.peak_moment, metrics.peak_voltage))
-    yield f"{100 * metrics.saturated:.2g} %"
 
 
 def control_tables(details: Mapping[str, Details]) -> Iterator[Table]:

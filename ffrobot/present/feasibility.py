@@ -12,9 +12,8 @@ from rich.console import Console, Group
 from rich.table import Table
 
 from ..actuation.motors import MotorFeasibility
-from ..common.errors import InputError
+from ..common.errors import InputError, quoted
 from ..common.hdf5 import open_checked
-from ..common.validation import quoted
 
 
 def feasibility_tables(path: Path, analysis: str | None) -> Group:

@@ -22,7 +22,7 @@ from ..results.control import read_metrics
 from ..results.file import FORMAT as RESULTS_FORMAT
 from ..results.file import status_in_words
 from ..results.meanings import MODAL_BODY, RESULTS, Meaning, meaning
-from .control import LOOP_COLUMNS, loop_row
+from .closed_loops import LOOP_COLUMNS, loop_row
 
 
 def describe(path: Path) -> str:

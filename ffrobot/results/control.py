@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import h5py
 
-from ..actuation.control.loop_record import LoopRecord
 from ..actuation.control.metrics import Metrics
-from ..mbs.quantities.motion import RobotMotion
+
+if TYPE_CHECKING:  # reading does without what solves
+    from ..actuation.control.loop_record import LoopRecord
+    from ..mbs.quantities.motion import RobotMotion
 
 
 def write_loop(group: h5py.Group, _motion: RobotMotion, record: LoopRecord) -> None:

@@ -20,11 +20,10 @@ import h5py
 
 from ..common.arrays import Array
 from ..common.checksum import sealed
-from ..common.errors import InputError
+from ..common.errors import InputError, did_you_mean, quoted
 from ..common.extras import extras
 from ..common.files import write_atomically
 from ..common.hdf5 import blaming, numbers, open_checked
-from ..common.validation import did_you_mean, quoted
 from ..fe_models.modal_body import ModalBody
 from ..fe_models.modal_body_file import read_mass, read_modal_body
 

@@ -12,8 +12,7 @@ from dataclasses import dataclass, field
 from math import inf, sqrt
 
 from ..actuation.feasibility import Feasibility
-from ..common.errors import InputError
-from ..common.validation import quoted
+from ..common.errors import InputError, quoted
 from ..mbs.joints.transmission import MotorLimits
 from ..mbs.scene.analysis import TimedAnalysis
 from ..scene.scene import Scene

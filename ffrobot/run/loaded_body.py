@@ -8,8 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol, TypeVar
 
-from ..common.errors import InputError
-from ..common.validation import did_you_mean, quoted
+from ..common.errors import InputError, did_you_mean, quoted
 from ..fe_models.link_records import FAMILIES, Family
 from ..fe_models.modal_body import ModalBody
 from ..mbs.fields.field_types import split_point

@@ -9,8 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from ..common.arrays import Array
-from ..common.errors import InputError
-from ..common.validation import did_you_mean, quoted
+from ..common.errors import InputError, did_you_mean, quoted
 from ..mbs._core import TimeFunction
 from ..mbs.fields.derivatives import check_derivatives
 from ..mbs.fields.field_types import GROUND

@@ -5,13 +5,16 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..common.errors import InputError
 from ..fe_models.link_file import read_link
 from ..fe_models.link_records import Link
-from .scene import Scene
+
+if TYPE_CHECKING:  # remarks on links do without the records of scenes
+    from .scene import Scene
 
 TURNS = 4 * np.pi  # rad: joints of robots that come to rest do so within two turns
 SPINNING = 0.1  # rate at the end over the largest: what still turns then is a wheel

@@ -10,12 +10,11 @@ from typing import Any
 
 import tomli_w
 
-from ..common.errors import InputError
+from ..common.errors import InputError, did_you_mean, quoted
 from ..common.files import write_atomically
 from ..common.names import check_name
 from ..common.tables import shown
 from ..common.toml_files import load_toml
-from ..common.validation import did_you_mean, quoted
 from ..run.inputs import FILE_KEYS, digest_of_file, fingerprints, named_files
 from .variation import Value
 

@@ -11,8 +11,7 @@ import numpy as np
 from pydantic import model_validator
 
 from ...common.arrays import Array
-from ...common.errors import InputError
-from ...common.validation import either
+from ...common.errors import InputError, either
 from .. import _core
 from ..fields.waypoints import spline
 from ..model.drives import Command, Drives, Replayed

@@ -13,8 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from ...common.arrays import Array
-from ...common.errors import InputError
-from ...common.validation import quoted
+from ...common.errors import InputError, quoted
 from ..model.frame_motors import turning_motors
 from ..model.gears import elastic_joints, with_compliance
 from ..model.known_motion import KnownStates, States, required_forces, rotor_torques

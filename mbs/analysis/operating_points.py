@@ -10,8 +10,7 @@ import numpy as np
 from pydantic import Field
 
 from ...common.arrays import Array
-from ...common.errors import InputError
-from ...common.validation import did_you_mean, quoted
+from ...common.errors import InputError, did_you_mean, quoted
 from ..fields.field_types import NotNegative
 from ..scene.analysis import Analysis, Surroundings, TimedAnalysis
 from .outcome import Outcome

@@ -8,6 +8,7 @@ from typing import Annotated, TypeVar
 
 from pydantic import AfterValidator, PlainValidator, ValidationInfo
 
+from ...common.errors import quoted
 from ...common.names import Name as Name  # offered here, with the other types of keys
 from ...common.numbers import ModeCount as ModeCount
 from ...common.numbers import NotNegative as NotNegative
@@ -16,7 +17,7 @@ from ...common.numbers import Positive as Positive
 from ...common.numbers import Vector2 as Vector2
 from ...common.numbers import Vector3 as Vector3
 from ...common.tables import LARGEST, shown
-from ...common.validation import Record, existing_file, quoted
+from ...common.validation import Record, existing_file
 from .._core import TimeFunction
 from .expressions import parse_expression
 from .functions import user_function

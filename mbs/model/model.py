@@ -9,9 +9,8 @@ from typing import TypeVar
 import numpy as np
 
 from ...common.arrays import Array, Booleans
-from ...common.errors import InputError
+from ...common.errors import InputError, did_you_mean, quoted
 from ...common.rotations import smallest_turn
-from ...common.validation import did_you_mean, quoted
 from ..joints.free import FreeJoint
 from ..joints.joint import JointRecord
 from ..joints.planar_joint import PlanarJoint

@@ -7,7 +7,8 @@ from typing import Annotated
 
 from pydantic import ValidationInfo, model_validator
 
-from ...common.validation import Record, quoted
+from ...common.errors import quoted
+from ...common.validation import Record
 from .._core import TimeFunction
 from ..fields.field_types import Expression, Expressions, PointReference, one_of, only, present
 from ..fields.references import Reference, marker_reference

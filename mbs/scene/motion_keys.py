@@ -11,7 +11,8 @@ import numpy as np
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from ...common.arrays import Array
-from ...common.validation import Record, quoted
+from ...common.errors import quoted
+from ...common.validation import Record
 from ..fields.field_types import NotNegative, Positive, Quantity
 from ..fields.motion_laws import SMOOTHNESS, Limits
 from ..fields.paths import Legs, path_of

@@ -10,9 +10,8 @@ import numpy as np
 from pydantic import ValidationInfo, model_validator
 
 from ...common.arrays import Array, as_rows
-from ...common.errors import InputError
+from ...common.errors import InputError, quoted
 from ...common.rotations import of_rpy, smallest_turn
-from ...common.validation import quoted
 from .._core import TimeFunction
 from ..fields.field_types import Expression, Name, PointReference, Quantity, Vector3, WaypointTable, one_of, present
 from ..fields.orientations import QUATERNION, OrientationLaw, Reference, about_their_middle, orientation_of

@@ -9,8 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from ...common.arrays import Array, as_floats
-from ...common.errors import InputError
-from ...common.validation import quoted
+from ...common.errors import InputError, quoted
 from ..model.gears import with_held_motors
 from ..model.model import Model
 from .posture import solve_posture

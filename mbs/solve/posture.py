@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...common.arrays import Array, as_floats
-from ...common.errors import InputError
-from ...common.validation import quoted
+from ...common.errors import InputError, quoted
 from ..joints.joint import JointRecord
 from ..model.model import Model, row_values, target_rates, without_paths
 from .path_checks import check_smooth

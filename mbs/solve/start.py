@@ -7,8 +7,7 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from ...common.arrays import Array
-from ...common.errors import InputError
-from ...common.validation import quoted
+from ...common.errors import InputError, quoted
 from ..model.model import Model, row_values
 from .posture import MOST_ITERATIONS, solve_posture, with_rates
 from .reach import check_reach, turned_guesses, working_guess

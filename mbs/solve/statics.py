@@ -7,8 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from ...common.arrays import Array, as_floats
-from ...common.errors import SolveError
-from ...common.validation import quoted
+from ...common.errors import SolveError, quoted
 from ..model.known_motion import KnownStates, required_forces
 from ..model.model import Model, row_values
 from .posture import robot_size, with_rates

@@ -9,8 +9,7 @@ from importlib.metadata import version
 from pathlib import Path
 from uuid import NAMESPACE_URL, uuid5
 
-from ...common.errors import InputError
-from ...common.validation import quoted
+from ...common.errors import InputError, quoted
 from ...mbs import _core
 from ...mbs.analysis.forward import Forward
 from ...mbs.model.gears import with_compliance

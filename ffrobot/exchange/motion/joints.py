@@ -10,9 +10,8 @@ from pathlib import Path
 import numpy as np
 
 from ...common.arrays import Array, as_rows
-from ...common.errors import InputError
+from ...common.errors import InputError, did_you_mean, quoted
 from ...common.tables import TableWriter
-from ...common.validation import did_you_mean, quoted
 from ...results.file import Results
 
 

@@ -8,10 +8,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ...common.arrays import Array, as_rows
-from ...common.errors import InputError
+from ...common.errors import InputError, quoted
 from ...common.numbers import SMALLEST
 from ...common.tables import shown
-from ...common.validation import quoted
 from ...mbs.scene.bodies import ROUNDING, check_inertia
 from .robot import HERE, MASSLESS, Inertial, Origin, Place, Robot, UrdfJoint
 

@@ -15,10 +15,9 @@ from typing import Any
 import numpy as np
 
 from ...common.arrays import Array
-from ...common.errors import InputError
+from ...common.errors import InputError, did_you_mean
 from ...common.tables import shown
 from ...common.toml_files import load_toml
-from ...common.validation import did_you_mean
 from ...fe_models.link_file import LinkTable, read_link
 from .names import Names
 from .robot import Place, Robot, UrdfJoint

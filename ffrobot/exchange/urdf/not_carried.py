@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from ...common.validation import quoted
+from ...common.errors import quoted
 from ...mbs.joints.moving_joint import MovingJoint
 from ...mbs.model.tree import KinematicTree
 from ...run.bodies import LoadedBody

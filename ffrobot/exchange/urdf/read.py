@@ -9,11 +9,10 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from ...common.errors import InputError
+from ...common.errors import InputError, quoted
 from ...common.rotations import of_rpy
 from ...common.tables import LARGEST, shown
 from ...common.toml_files import read_bytes
-from ...common.validation import quoted
 from .robot import TYPES, Inertial, MeshFile, Mimic, Numbers3, Origin, Primitive, Robot, UrdfJoint, UrdfLink
 from .topology import check_mimics, root_of
 

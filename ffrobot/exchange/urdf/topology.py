@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from ...common.errors import InputError
+from ...common.errors import InputError, did_you_mean, quoted
 from ...common.tables import shown
-from ...common.validation import did_you_mean, quoted
 from .robot import UrdfJoint
 
 

@@ -12,9 +12,8 @@ from typing import TypeVar
 
 from matplotlib.figure import Figure
 
-from ...common.errors import InputError, of_file
+from ...common.errors import InputError, did_you_mean, of_file, quoted
 from ...common.files import check_folder, write_atomically
-from ...common.validation import did_you_mean, quoted
 from ...fe_models.modal_body_file import is_modal_body_file, read_modal_body
 from ...results.file import Results
 from .body_shape import draw_mesh, draw_modes

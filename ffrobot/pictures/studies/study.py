@@ -6,9 +6,9 @@ import json
 from pathlib import Path
 from typing import Literal, get_args
 
-from ...common.errors import InputError
+from ...common.errors import InputError, quoted
 from ...common.files import write_atomically
-from ...common.validation import Record, quoted, validate
+from ...common.validation import Record, validate
 from .diagrams import Diagram
 
 FORMAT = "ffrobot-study"

@@ -10,9 +10,8 @@ from pathlib import Path
 import numpy as np
 
 from ...common.arrays import Indices, as_rows
-from ...common.errors import InputError, SolveError
+from ...common.errors import InputError, SolveError, did_you_mean
 from ...common.files import check_folder, write_atomically
-from ...common.validation import did_you_mean
 from ...fe_models.modal_body_file import is_modal_body_file, read_modal_body
 from ...results.file import Results
 from ..drawn_body import ground_points
