@@ -20,7 +20,7 @@ from .abaqus_deck import Keyword, Sets
 from .abaqus_model import Deck, Instance
 from .cells import TO_GMSH
 from .included import number_of
-from .source import RawMesh
+from .source import PointMass, RawMesh
 
 # Corners of the sides S1, S2 … (Abaqus Analysis User's Guide, "Three-dimensional solid element library").
 _SIDES: dict[int, list[tuple[int, ...]]] = {
@@ -28,6 +28,7 @@ _SIDES: dict[int, list[tuple[int, ...]]] = {
     8: [(0, 1, 2, 3), (4, 7, 6, 5), (0, 4, 5, 1), (1, 5, 6, 2), (2, 6, 7, 3), (3, 7, 4, 0)],
 }
 _CORNERS = {"tetra": 4, "tetra10": 4, "hexahedron": 8, "hexahedron20": 8}
+_SIDE = re.compile(r"S([1-6])")
 # Nodes of tied surfaces closer than this, relative to the part, are one.
 _COINCIDENT = 1e-5
 
@@ -81,8 +82,9 @@ class _Assembled:
         faces = {name: [same[piece] for piece in pieces] for name, pieces in self._faces().items()}
         groups = {name: same[group] for name, group in self._node_sets().items()}
         return RawMesh(
-            self.points, tuple(blocks), self._regions(), faces, groups, (), (), (*remarks, *self._left_out())
-        )
+            self.points, tuple(blocks), self._regions(), faces, groups, (), (), (*remarks, *self._left_out()),
+            tuple(self._masses()),
+        )  # fmt: skip
 
     def _node(self, instance: str, number: int, of: str) -> int:
         try:
@@ -138,7 +140,7 @@ class _Assembled:
             return
         sets = self.scopes[own].scope.elsets
         for row, place in keyword.rows():
-            side = re.fullmatch(r"S([1-6])", row[1].upper()) if len(row) > 1 else None
+            side = _SIDE.fullmatch(row[1].upper()) if len(row) > 1 else None
             if side is None:
                 continue
             for instance, number, _ in sets.meant(row[0], place):
@@ -210,19 +212,37 @@ class _Assembled:
                 return np.unique(np.array(nodes, dtype=np.int64))
         return None
 
+    def _masses(self) -> Iterator[PointMass]:
+        for keyword in self.deck.masses:
+            value = next((number_of(row[0], place) for row, place in keyword.rows()), 0.0)
+            name = keyword.options.get("ELSET", "").upper()
+            for own, instance in self.scopes.items():
+                sets = instance.scope.elsets
+                for of, number, _ in sets.numbers(name) if name in sets.members else ():
+                    node = self.scopes[of or own].scope.masses.get(number)
+                    if node is not None:
+                        place = self._node(of or own, node, f"element {number}")
+                        yield PointMass(f"{keyword}, element {number}", value, self.points[place])
+
     def _left_out(self) -> Iterator[str]:
         others = Counter(kind for one in self.scopes.values() for kind in one.scope.others.values())
         if others:
             listed = ", ".join(f"{count} {kind}" for kind, count in others.items())
             yield f"elements that are not solids are left out, with their stiffness and mass: {listed}"
-        for keyword in self.deck.masses:
-            value = next((number_of(row[0], place) for row, place in keyword.rows()), 0.0)
-            name = keyword.options.get("ELSET", "").upper()
-            sets = [one.scope.elsets for one in self.scopes.values()]
-            count = sum(1 for of in sets if name in of.members for _ in of.numbers(name))
-            yield f"{keyword}: left out, {count} of {value:g} each: give an interface its `mass`"
+        for one in self.scopes.values():
+            for keyword in one.scope.faces.values():
+                if strange := [", ".join(row) for row, _ in keyword.rows() if not _is_read(keyword, row)]:
+                    name = keyword.options["NAME"]
+                    yield f'{keyword}: of surface {name} {len(strange)} lines are not read: "{strange[0]}"'
         if unread := [f"*{name}" for name, count in self.deck.not_read.items() if count]:
             yield f"not read: {', '.join(unread)}"
+
+
+def _is_read(surface: Keyword, row: list[str]) -> bool:
+    """Whether a line of a surface is of nodes, or of sides of solids; sides of shells are faces by their set."""
+    if surface.options.get("TYPE", "ELEMENT").upper() == "NODE":
+        return True
+    return len(row) > 1 and _SIDE.fullmatch(row[1].upper()) is not None and "COMBINE" not in surface.options
 
 
 def _runs(kinds: list[str]) -> Iterator[tuple[int, int]]:

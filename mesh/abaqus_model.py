@@ -17,7 +17,8 @@ from .abaqus_deck import Keyword, Sets, keywords
 from .frames import GLOBAL, Frame
 from .included import number_of, whole_of
 
-_SOLID = re.compile(r"C3D(4|5|6|8|10|15|20)[A-Z]*")
+_SOLID = re.compile(r"D?C3D(4|5|6|8|10|15|20)[A-Z]*")  # those of heat (DC3D) have the same nodes
+_OTHER_SOLID = re.compile(r"(?:C3D|Q3D|CCL)\d+[A-Z]*|SC[68]R[A-Z]*|CSS8[A-Z]*")
 _KINDS = {4: "tetra", 5: "pyramid", 6: "wedge", 8: "hexahedron", 10: "tetra10", 15: "wedge15", 20: "hexahedron20"}
 # Surface elements, which name faces; the digit is their number of nodes.
 _SURFACE = re.compile(r"(?:STRI|S|DS|CPS|CPE|CPEG|CAX|M3D|R3D|SFM3D)(3|4|65|6|8|9)(?![0-9]{2})[A-Z0-9]*")
@@ -36,13 +37,18 @@ _OF_THE_LINK = (
 
 @dataclass
 class Scope:
-    """A part, an instance, or the assembly: `nodes` number → coordinates, `solids` number → (type, nodes), and sets."""
+    """A part, an instance, or the assembly: what it has by number, and sets.
+
+    `nodes` are coordinates, `solids` (type, nodes), `surfaces` corners, `others` the type of all that are no solids,
+    `masses` the node of each of type MASS.
+    """
 
     frame: Frame = GLOBAL
     nodes: dict[int, tuple[float, float, float]] = field(default_factory=dict)
     solids: dict[int, tuple[str, tuple[int, ...]]] = field(default_factory=dict)
     surfaces: dict[int, tuple[int, ...]] = field(default_factory=dict)
     others: dict[int, str] = field(default_factory=dict)
+    masses: dict[int, int] = field(default_factory=dict)
     nsets: Sets = field(default_factory=lambda: Sets("nodes"))
     elsets: Sets = field(default_factory=lambda: Sets("elements"))
     faces: dict[str, Keyword] = field(default_factory=dict)
@@ -51,7 +57,8 @@ class Scope:
         """One of the same content, which can be added to."""
         return replace(
             self, nodes=dict(self.nodes), solids=dict(self.solids), surfaces=dict(self.surfaces),
-            others=dict(self.others), nsets=self.nsets.copy(), elsets=self.elsets.copy(), faces=dict(self.faces),
+            others=dict(self.others), masses=dict(self.masses), nsets=self.nsets.copy(), elsets=self.elsets.copy(),
+            faces=dict(self.faces),
         )  # fmt: skip
 
     def read(self, keyword: Keyword) -> bool:
@@ -105,6 +112,8 @@ class Scope:
     def _elements(self, keyword: Keyword) -> None:
         kind = keyword.option("TYPE").upper()
         solid, surface = _SOLID.fullmatch(kind), _SURFACE.fullmatch(kind)
+        if not solid and _OTHER_SOLID.fullmatch(kind):
+            raise InputError(f"{keyword}: expected solids of the types C3D4, C3D8, C3D10, C3D20, found TYPE={kind}")
         count = int(solid[1]) if solid else {"65": 6}.get(surface[1], int(surface[1])) if surface else 0
         found: list[tuple[int, str]] = []
         for entries, place in _of_length(keyword, count + 1) if count else keyword.rows():
@@ -112,6 +121,8 @@ class Scope:
                 if entries[0].isdigit():
                     self.others[int(entries[0])] = kind
                     found.append((int(entries[0]), place))
+                    if kind == "MASS" and len(entries) > 1:
+                        self.masses[int(entries[0])] = whole_of(entries[1], place)
                 continue
             number = whole_of(entries[0], place)
             found.append((number, place))

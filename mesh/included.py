@@ -14,11 +14,11 @@ from typing import NamedTuple
 from ..common.errors import InputError
 
 _ABAQUS = re.compile(  # the keyword line goes on after a comma at its end
-    rb"""^[ \t]*\*(?:[^*\n,]|,[ \t]*+(?:\r?\n)?+)*?\bINPUT[ \t]*=[ \t]*["']?([^"',\r\n]+)""",
+    r"""^[ \t]*\*(?:[^*\n,]|,[ \t]*+(?:\r?\n)?+)*?\bINPUT[ \t]*=[ \t]*["']?([^"',\r\n]+)""",
     re.MULTILINE | re.IGNORECASE,
 )
-_NASTRAN = re.compile(rb"""^[ \t]*INCLUDE[ \t]*["']([^"']+)["']""", re.MULTILINE | re.IGNORECASE)
-_XDMF = re.compile(rb">\s*([^<>:]+?)\s*:")
+_NASTRAN = re.compile(r"""^[ \t]*INCLUDE[ \t]*["']([^"']+)["']""", re.MULTILINE | re.IGNORECASE)
+_XDMF = re.compile(r">\s*([^<>:]+?)\s*:")
 _REFERENCES = {
     ".inp": _ABAQUS, ".bdf": _NASTRAN, ".nas": _NASTRAN, ".fem": _NASTRAN, ".dat": _NASTRAN, ".xdmf": _XDMF,
     ".xmf": _XDMF,
@@ -42,8 +42,8 @@ def files_of(path: Path) -> list[Path]:
         found[file] = None
         if pattern is None or not file.is_file():
             return
-        for name in pattern.findall(file.read_bytes()):
-            other = included(name.decode("utf-8", errors="replace"), file, path)
+        for name in pattern.findall(text_of(file)):
+            other = included(name, file, path)
             if other is not None and other not in found:
                 add(other)
 
@@ -51,9 +51,19 @@ def files_of(path: Path) -> list[Path]:
     return list(found)
 
 
+def text_of(file: Path) -> str:
+    """What stands in a file of UTF-8, or of UTF-16 where it begins with a byte order mark that says so."""
+    content = file.read_bytes()
+    encoding = "utf-16" if content.startswith((b"\xff\xfe", b"\xfe\xff")) else "utf-8-sig"
+    return content.decode(encoding, errors="replace")
+
+
 def included(name: str, file: Path, first: Path) -> Path | None:
-    """The file that `file` calls `name`: beside it, or beside the `first` one of the deck; None where it is not."""
-    name = re.sub(r"\s*[\r\n]\s*", "", name).strip()
+    """The file that `file` calls `name`: beside it, or beside the `first` one of the deck; None where it is not.
+
+    Names may have backslashes between folders, as Windows writes them.
+    """
+    name = re.sub(r"\s*[\r\n]\s*", "", name).strip().replace("\\", "/")
     try:
         return next((path for path in (file.parent / name, first.parent / name) if name and path.is_file()), None)
     except (OSError, ValueError):  # no name of a file at all
@@ -72,7 +82,7 @@ def lines_of(first: Path, include: Callable[[Iterator[str], str], str | None]) -
     """
 
     def of(file: Path, within: tuple[Path, ...]) -> Iterator[Line]:
-        text = file.read_bytes().decode("utf-8-sig", errors="replace")
+        text = text_of(file)
         number = 0
 
         def counted() -> Iterator[str]:

@@ -6,7 +6,7 @@ The faces are those that interfaces of a link choose from (`faces.Boundary.smoot
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
@@ -20,6 +20,7 @@ from .faces import Boundary, SmoothFace
 from .jacobian import volume_of_tetrahedra
 from .part import is_step, source_of_file
 from .records import SolidMeshRecord
+from .source import PointMass
 
 Unit = Literal["m", "mm", "in"]
 LONGEST = 5.0  # m of a link: a larger number is in mm
@@ -61,6 +62,7 @@ class Inspection:
         points, facets: (p, 3), (b, 3 or 4) of the boundary; `face_of` (b,) is the number of each facet's face.
         groups: names of volumes and faces in the file.
         remarks: on what the file holds besides.
+        masses: concentrated ones of the file, as it has them but for their points, m.
     """
 
     unit: Unit
@@ -75,6 +77,7 @@ class Inspection:
     face_of: Integers
     groups: Sequence[str]
     remarks: Sequence[str]
+    masses: Sequence[PointMass] = ()
 
 
 def inspect_part(file: Path, unit: Unit | None = None) -> Inspection:
@@ -107,6 +110,7 @@ def inspect_part(file: Path, unit: Unit | None = None) -> Inspection:
         part.points.min(axis=0), part.points.max(axis=0), volume, center,
         [_part_face(boundary, face) for face in faces], boundary.points, boundary.facets, face_of,
         [*part.regions, *source.facet_groups, *source.point_groups], part.remarks,
+        [replace(mass, point=as_floats(METRES[known] * mass.point)) for mass in source.masses],
     )  # fmt: skip
 
 

@@ -9,6 +9,7 @@ import io
 import re
 from collections.abc import Iterator, Mapping
 from contextlib import redirect_stderr, redirect_stdout
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -24,10 +25,12 @@ from .source import RawMesh
 if TYPE_CHECKING:
     import meshio
 
-_VOLUMES = re.compile(r"tetra|hexahedron|wedge|pyramid|polyhedron")
-_SURFACES = {"triangle": 3, "triangle6": 3, "quad": 4, "quad8": 4, "quad9": 4}
-_LINES = ("line", "line3")
+_OTHERS = re.compile(r"(vertex|line|triangle|quad)\d*")
+_CORNERS = {"line": 2, "triangle": 3, "quad": 4}
+_VOXEL = [0, 1, 3, 2, 4, 5, 7, 6]  # corners of VTK's voxel, which are in order of x, then y, then z, as a hexahedron's
 _TECPLOT = re.compile(rb"^\s*ZONE\b", re.MULTILINE | re.IGNORECASE)  # other files with the ending .dat are Nastran's
+_LEFT_OUT = "cells that meshio cannot handle"
+_ENDINGS = (".step", ".stp", ".msh", ".inp", ".bdf", ".nas", ".fem", ".dat", ".vtk", ".vtu", ".med", ".xdmf", ".mesh")
 # Integer data of cells with more values than this number cells, not groups.
 _MOST_GROUPS = 1000
 
@@ -70,11 +73,43 @@ def read_foreign(path: Path, where: str) -> RawMesh:
     said = io.StringIO()
     try:
         with redirect_stdout(said), redirect_stderr(said):
-            return _raw_mesh(meshio.read(path))
+            raw = _raw_mesh(_read(path, said))
     except (Exception, SystemExit) as error:  # whatever a reader meets in a corrupt file, it raises as it comes
         reason = said.getvalue() if isinstance(error, SystemExit) else f"{said.getvalue()} {error!r}"
         reason = " ".join(reason.replace(str(path), path.name).split())
+        if isinstance(error, meshio.ReadError) and path.suffix.lower() not in meshio.extension_to_filetypes:
+            reason = f"its ending is not one of {', '.join(_ENDINGS)}: another program has to convert it"
         raise InputError(f"{where}: expected a mesh that meshio can read, found one that it cannot: {reason}") from None
+    words = " ".join(said.getvalue().replace(str(path), path.name).split())
+    return replace(raw, remarks=(f"meshio on {path.name}: {words}",)) if words else raw
+
+
+def _read(path: Path, said: io.StringIO) -> meshio.Mesh:
+    """By meshio; what it cannot read of VTK's files VTK reads, where PyVista is installed (binary 5.1, LZ4, voxels)."""
+    import meshio
+
+    try:
+        mesh = meshio.read(path)
+        if _LEFT_OUT in said.getvalue():
+            raise ValueError("cells of other types")
+        return mesh
+    except (Exception, SystemExit):
+        if path.suffix.lower() not in (".vtk", ".vtu"):
+            raise
+        try:
+            import pyvista
+        except ModuleNotFoundError:
+            pyvista = None
+        if pyvista is None:
+            raise
+        said.truncate(said.seek(0))
+    failed = list[str]()
+    reader = pyvista.get_reader(path)
+    reader.reader.AddObserver("ErrorEvent", lambda *_: failed.append("VTK finds an error in it"))
+    found = reader.read()
+    if failed:
+        raise ValueError(failed[0])
+    return pyvista.to_meshio(found)
 
 
 def _raw_mesh(mesh: meshio.Mesh) -> RawMesh:
@@ -86,18 +121,18 @@ def _raw_mesh(mesh: meshio.Mesh) -> RawMesh:
     surfaces, lines = list[Integers](), list[Integers]()
     count = 0
     for block, groups in zip(mesh.cells, _groups(mesh), strict=True):
-        if block.type not in (*_SURFACES, *_LINES) and not _VOLUMES.match(block.type):
-            continue
         cells = np.asarray(block.data, dtype=np.int64)
-        if block.type in _SURFACES:
-            surfaces.append(cells[:, : _SURFACES[block.type]])
-            for name, rows in groups.items():
-                faces.setdefault(name, []).append(surfaces[-1][rows])
-        elif block.type in _LINES:
-            lines.append(cells[:, :2])
-        else:
-            order = TO_GMSH.get(block.type)
-            blocks.append((block.type, cells if order is None else cells[:, order]))
+        if other := _OTHERS.fullmatch(block.type):
+            if other[1] == "line":
+                lines.append(cells[:, :2])
+            elif other[1] != "vertex":
+                surfaces.append(cells[:, : _CORNERS[other[1]]])
+                for name, rows in groups.items():
+                    faces.setdefault(name, []).append(surfaces[-1][rows])
+        else:  # of unknown types, too: these are rejected by name
+            kind = "hexahedron" if block.type == "voxel" else block.type
+            order = _VOXEL if block.type == "voxel" else TO_GMSH.get(kind)
+            blocks.append((kind, cells if order is None else cells[:, order]))
             for name, rows in groups.items():
                 regions.setdefault(name, []).append(count + rows)
             count += len(cells)

@@ -5,6 +5,7 @@ Elements beside solids are left out, and said to be; materials, properties, load
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
@@ -16,7 +17,7 @@ from ..common.errors import InputError
 from .cells import TO_GMSH
 from .frames import GLOBAL, Frame, Kind
 from .nastran_cards import Card, cards
-from .source import RawMesh
+from .source import PointMass, RawMesh
 
 # Solid elements: corners, all nodes, names of both types.
 _SOLIDS = {
@@ -28,6 +29,7 @@ _SOLIDS = {
 }
 # Nastran numbers the upright edges of a hexahedron before those of its upper face, VTK after them.
 _AS_VTK = {"hexahedron20": [*range(12), *range(16, 20), *range(12, 16)]}
+_OTHER_SOLIDS = re.compile(r"C(?:I?HEX|TET|PEN|PYR|WEDGE|HAC|IFHEX|IFPEN)\w+")
 _SHELLS = {"CTRIA3": 3, "CTRIAR": 3, "CTRIA6": 3, "CQUAD4": 4, "CQUADR": 4, "CQUAD8": 4}
 _OTHERS = (
     "CBAR", "CBEAM", "CBEAM3", "CBEND", "CBUSH", "CBUSH1D", "CDAMP1", "CDAMP2", "CDAMP3", "CDAMP4", "CELAS1", "CELAS2",
@@ -67,7 +69,7 @@ class _Deck:
         self.solids: dict[int, Card] = {}
         self.shells: dict[int, Card] = {}
         self.others: Counter[str] = Counter()
-        self.masses: list[float] = []
+        self.masses: list[Card] = []
         self.not_read: Counter[str] = Counter()
         self.system = 0  # of grid points that name none
         self._frames: dict[int, Frame | None] = {0: GLOBAL}
@@ -94,7 +96,11 @@ class _Deck:
         elif name in _OTHERS:
             self.others[name] += 1
             if name in ("CONM1", "CONM2"):
-                self.masses.append(card.real(3))
+                self.masses.append(card)
+        elif _OTHER_SOLIDS.fullmatch(name):
+            raise InputError(f"{card}: expected solids of {', '.join(_SOLIDS)}, found {name}")
+        elif name == "PARAM" and card.text(0).upper() == "WTMASS":
+            self.not_read["PARAM WTMASS"] += 1
         else:
             self.not_read[name] += name not in _OF_THE_LINK
 
@@ -126,7 +132,21 @@ class _Deck:
         for card in self.shells.values():
             corners = [self._place(place, card.whole(2 + k), card) for k in range(_SHELLS[card.name])]
             faces.setdefault(str(card.whole(1, card.whole(0))), []).append(np.array([corners], dtype=np.int64))
-        return RawMesh(self._points(), tuple(blocks), regions, faces, {}, (), (), tuple(self._left_out()))
+        masses = tuple(map(self._mass, self.masses))
+        return RawMesh(self._points(), tuple(blocks), regions, faces, {}, (), (), tuple(self._left_out()), masses)
+
+    def _mass(self, card: Card) -> PointMass:
+        """Of CONM1 or CONM2, whose offset is in rectangular axes; with CID = -1 it is the place in the basic ones."""
+        point, offset = self._point(card.whole(1), card), np.zeros(3)
+        if card.name == "CONM2":
+            offset = np.array([card.real(k) for k in (4, 5, 6)])
+        if (system := card.whole(2, 0)) == -1:
+            point, offset = offset, np.zeros(3)
+        elif np.any(offset):
+            frame = self._frame(system, card)
+            offset = frame.C @ offset if frame.kind == "rectangular" else np.zeros(3)
+        turned = " and its inertia" if any(card.fields[7:]) else ""
+        return PointMass(f"{card.name} {card.whole(0)}{turned}, {card.place}", card.real(3), point + offset)
 
     @staticmethod
     def _place(place: dict[int, int], node: int, card: Card) -> int:
@@ -184,8 +204,7 @@ class _Deck:
     def _left_out(self) -> Iterator[str]:
         if self.others:
             listed = ", ".join(f"{count} {name}" for name, count in self.others.items())
-            mass = f" (concentrated masses: {sum(self.masses):g} in all)" if self.masses else ""
-            yield f"elements that are not solids are left out, with their stiffness and mass: {listed}{mass}"
+            yield f"elements that are not solids are left out, with their stiffness and mass: {listed}"
         if unread := [name for name, count in self.not_read.items() if count]:
             yield f"not read: {', '.join(unread)}"
 

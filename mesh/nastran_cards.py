@@ -15,6 +15,7 @@ from ..common.errors import InputError
 from .included import Line, lines_of, number_of, whole_of
 
 _BEGIN = re.compile(r"\s*BEGIN\b[\s,]*(\w*)", re.IGNORECASE)
+_BY_BLANKS = re.compile(r"(GRID|C(?:HEXA|TETRA|PENTA|PYRAM?|ORD[12][RCS]|ONM[12]))\*?(?= )", re.IGNORECASE)
 _CONTROL = re.compile(r"\s*CEND\b", re.IGNORECASE)
 
 
@@ -142,6 +143,10 @@ def _row(line: Line) -> _Row:
             *(text[8 + columns * k : 8 + columns * (k + 1)].strip() for k in range(width)),
             text[72:80].strip(),
         ]
+    if first := _BY_BLANKS.match(name):
+        raise InputError(
+            f'{line.place}: expected fields of 8 columns or commas between them, found "{first[0]}" and a blank'
+        )
     if name.startswith("=") or any(entry.startswith("=") for entry in entries):
         raise InputError(f"{line.place}: expected cards one by one, found replicated ones (=)")
     follows = not name or name[0] in "+*"

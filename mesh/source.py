@@ -26,6 +26,22 @@ _SUPPORTED: dict[str, tuple[CellName, int]] = {
 # Mid-side nodes closer to the middle of their edge than this, relative to the part, make a straight edge: files carry
 # as few as five digits.
 STRAIGHT = 5e-6
+_LISTED = 5  # concentrated masses, one by one
+
+
+@dataclass(frozen=True, eq=False)
+class PointMass:
+    """A concentrated mass, which a link can have on an interface.
+
+    Attributes:
+        label: what the file calls it, and where.
+        mass: in the file's unit, kg where lengths are in m.
+        point: (3,) in the source's unit and axes.
+    """
+
+    label: str
+    mass: float
+    point: Array
 
 
 @dataclass(frozen=True)
@@ -41,6 +57,7 @@ class RawMesh:
         surfaces: corners of all triangles and quadrilaterals, as arrays (k, 3 or 4).
         lines: ends of all elements that are lines, as arrays (k, 2).
         remarks: what the file holds and the link does not, a sentence each.
+        masses: concentrated ones, which the link does not have either.
     """
 
     points: Array
@@ -51,6 +68,7 @@ class RawMesh:
     surfaces: Sequence[Integers] = ()
     lines: Sequence[Integers] = ()
     remarks: Sequence[str] = ()
+    masses: Sequence[PointMass] = ()
 
 
 @dataclass(frozen=True)
@@ -61,11 +79,13 @@ class Source:
         part: not placed yet, no faces named.
         facet_groups: name → (k, 3 or 4) corners.
         point_groups: name → (k,) points.
+        masses: concentrated ones that the part does not have.
     """
 
     part: PartMesh
     facet_groups: Mapping[str, Integers]
     point_groups: Mapping[str, Integers]
+    masses: Sequence[PointMass] = ()
 
 
 def source_from(raw: RawMesh, where: str) -> Source:
@@ -92,7 +112,7 @@ def source_from(raw: RawMesh, where: str) -> Source:
     used, flat = np.unique(cells, return_inverse=True)
     number = np.full(len(raw.points), -1, dtype=np.int64)
     number[used] = np.arange(used.size)
-    remarks = [*raw.remarks, *_left_out(raw, cells, cell)]
+    remarks = [*raw.remarks, *_masses_left_out(raw.masses), *_left_out(raw, cells, cell)]
     if doubles := len(once) - len(cells):
         remarks.append(f"{doubles} of {len(once)} cells are duplicates in the file, and count once")
     part = PartMesh(
@@ -107,7 +127,15 @@ def source_from(raw: RawMesh, where: str) -> Source:
     )
     facets = {name: _facets(pieces, number, part) for name, pieces in raw.facet_groups.items()}
     points = {name: number[group][number[group] >= 0] for name, group in raw.point_groups.items()}
-    return Source(part, facets, points)
+    return Source(part, facets, points, raw.masses)
+
+
+def _masses_left_out(masses: Sequence[PointMass]) -> Iterator[str]:
+    for one in masses[:_LISTED]:
+        place = ", ".join(f"{value:.6g}" for value in one.point)
+        yield f"{one.label}: mass {one.mass:g} at ({place}) is left out: give the interface there its `mass`, kg"
+    if more := masses[_LISTED:]:
+        yield f"{len(more)} more concentrated masses, {sum(one.mass for one in more):g} in all, are left out"
 
 
 def _facets(pieces: Sequence[Integers], number: Integers, part: PartMesh) -> Integers:

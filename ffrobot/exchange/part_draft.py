@@ -26,6 +26,7 @@ def draft_link(part: Inspection, file: Path, name: str, folder: Path) -> str:
     """The text of a link file in `folder`, of aluminium: root and tip are the faces that joints most likely take.
 
     These are two bores across the part, else its plane ends. All other plane faces and bores are there as comments.
+    Concentrated masses of a file in m are on the nearest of all these faces.
 
     Raises:
         InputError: the part has no two such faces.
@@ -39,9 +40,13 @@ def draft_link(part: Inspection, file: Path, name: str, folder: Path) -> str:
     axes = np.stack([x, y, np.cross(x, y)])
     in_file = METRES[part.unit]
 
+    others = [face for face in part.faces if face.kind in ("plane", "bore") and face is not root and face is not tip]
+    mass_on = _masses(part, [root, tip, *others])
+
     def interface(label: str, face: PartFace) -> dict[str, Any]:
         place = axes @ (face.point - root.point)
-        return {"name": label, "position": _numbers(place), "normal": _numbers(axes @ face.direction)}
+        keys = {"name": label, "position": _numbers(place), "normal": _numbers(axes @ face.direction)}
+        return keys | ({"mass": mass_on[face]} if face in mass_on else {})
 
     keys = {
         "name": name,
@@ -60,7 +65,6 @@ def draft_link(part: Inspection, file: Path, name: str, folder: Path) -> str:
         "damping": {"ratio": 0.01},
         "interface": [interface("root", root), interface("tip", tip)],
     }
-    others = [face for face in part.faces if face.kind in ("plane", "bore") and face is not root and face is not tip]
     tables = [interface(f"{face.kind}_{k}", face) for k, face in enumerate(others, start=1)]
     head = f"# Draft by `ffrobot link {file.name} --inspect`. Check material, unit, root and tip.\n\n"
     return head + toml_text(keys) + "".join(_commented(tables))
@@ -100,6 +104,15 @@ def _ends(part: Inspection) -> tuple[PartFace, PartFace]:
         )
     _, root, tip = max(pairs, key=lambda pair: float(pair[0]))
     return root, tip
+
+
+def _masses(part: Inspection, faces: list[PartFace]) -> dict[PartFace, float]:
+    """The concentrated masses on each face; none of files in another unit of length, whose unit of mass is unknown."""
+    found = dict[PartFace, float]()
+    for mass in part.masses if part.unit == "m" else ():
+        face = min(faces, key=lambda face: float(np.linalg.norm(face.center - mass.point)))
+        found[face] = found.get(face, 0.0) + mass.mass
+    return found
 
 
 def _is_outermost(part: Inspection, face: PartFace, slack: float) -> bool:

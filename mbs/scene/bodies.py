@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import Field, PlainValidator, ValidationInfo, field_validator, model_validator
 
 from ...common.arrays import Array
-from ...common.names import Title
+from ...common.names import PathName
 from ...common.numbers import MOST_MODES, SMALLEST
 from ...common.validation import InputFile, Record, existing_file
 from ...fe_models.link_file import LinkSource, LinkTable
@@ -66,7 +66,7 @@ PRIMITIVES = ("box", "cylinder", "sphere")
 class Visual(Record):
     """A shape that pictures show of a rigid body, without effect on the motion: mesh, box, cylinder or sphere."""
 
-    mesh: Title | None = None
+    mesh: PathName | None = None
     """File of a surface (.stl, .obj, .dae …), from the folder of the scene on; coordinates in m."""
     scale: Vector3 = (1.0, 1.0, 1.0)
     """Factors of the coordinates of `mesh` along its axes."""

@@ -1,14 +1,18 @@
-"""Every URDF below a folder through `ffrobot import` and `ffrobot solve`: moments against Newton and Euler on its XML.
+"""Every URDF below a folder through `ffrobot import` and `ffrobot solve`: motor torques against another program.
 
-    python tests/campaigns/urdfs.py FOLDER [--seed N] [--record]
+    python tests/campaigns/urdfs.py FOLDER [--seed N] [--pinocchio PYTHON] [--fix] [--record]
 
-The wheel `example-robot-data` (pip download, 131 MB) unpacked is such a folder. One line for each file: moments equal
-(to what part of the largest), or why it is not imported. Of robots with more than 15 joints these are drawn at random
-and the others welded, which keeps runs short. Exit code 1 where moments differ or there is a traceback.
+The folder has wheels unpacked (pip download, no installation). One line for each different file: torques equal (to what
+part of the largest), or why it is not imported. Of robots with more than 15 joints these are drawn at random and the
+others welded, which keeps runs short. Right values are those of Newton and Euler on the XML, and of Pinocchio where
+`--pinocchio` names a Python that has it. `--fix` imports with `--fix-inertia`, for which there is no comparison. Exit
+code 1 where torques differ or there is a traceback.
 """
 
 import argparse
 import sys
+import traceback
+from collections import Counter
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -17,6 +21,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent.parent / "exchange"))
 
+from other_codes import pinocchio_moments
 from record import record
 from rigid_robots import moments, with_motion
 
@@ -32,8 +37,8 @@ EQUAL = 1e-10  # of the largest moment
 MOST = 15  # joints that move at once
 
 
-def difference(urdf, folder, rng):
-    """Largest difference of moments over the largest moment, and the number of joints."""
+def difference(urdf, folder, rng, python):
+    """Largest difference of torques over the largest torque, and the number of joints; `python` may have Pinocchio."""
     imported = import_urdf(urdf, folder, {})
     by_scene_name = {joint["name"]: joint for joint in imported.scene["joint"]}
     called = {name: name.translate(FORBIDDEN) for name in imported.robot.joints}
@@ -52,8 +57,10 @@ def difference(urdf, folder, rng):
     expected = moments(urdf.read_bytes(), *({**part, **dict.fromkeys(still, 0.0)} for part in motion))
     with h5py.File(results) as file:
         found = np.array([file[f"inverse/joints/{called[name]}/moment"][0] for name in moving])
-    wanted = np.array([expected[name] for name in moving])
-    return np.abs(found - wanted).max() / np.abs(wanted).max(), len(moving)
+    rights = [np.array([expected[name] for name in moving])]
+    if python is not None:
+        rights.append(pinocchio_moments(python, urdf, moving, motion))
+    return max(np.abs(found - wanted).max() / np.abs(wanted).max() for wanted in rights), len(moving)
 
 
 def without_friction(keys, welded):
@@ -68,37 +75,48 @@ def without_friction(keys, welded):
     return {**keys, "joint": joints}
 
 
+def different_files(folder):
+    """URDFs below `folder`, those of the same content once."""
+    return list({path.read_bytes(): path for path in reversed(sorted(folder.rglob("*.urdf")))}.values())[::-1]
+
+
 def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("folder", type=Path)
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--pinocchio", type=Path)
+    parser.add_argument("--fix", action="store_true")
     parser.add_argument("--record", action="store_true")
     arguments = parser.parse_args()
-    rng, equal, wrong, refused, worst = np.random.default_rng(arguments.seed), 0, 0, [], 0.0
-    files = sorted(arguments.folder.rglob("*.urdf"))
+    rng, found, worst = np.random.default_rng(arguments.seed), Counter(), 0.0
+    files = different_files(arguments.folder)
     for urdf in files:
         with TemporaryDirectory() as folder:
             try:
-                error, count = difference(urdf, Path(folder) / "scene", rng)
+                if arguments.fix:
+                    import_urdf(urdf, Path(folder) / "scene", {}, fix_inertia=True)
+                    found["imported"] += 1
+                    continue
+                error, count = difference(urdf, Path(folder) / "scene", rng, arguments.pinocchio)
+                outcome, says = "equal" if error < EQUAL else "different", f"{count} joints, {error:.1e}"
+                worst = max(worst, error)
             except FfrobotError as refusal:
-                refused.append(urdf)
-                print(f"{urdf.name}: rejected: {str(refusal).splitlines()[0].partition(': ')[2]}")
-                continue
-            equal += error < EQUAL
-            wrong += not error < EQUAL
-            worst = max(worst, error)
-            print(f"{urdf.name}: {count} joints, {error:.1e}", flush=True)
-    print(f"{equal} equal, {wrong} different, {len(refused)} rejected; largest difference {worst:.1e}")
+                outcome, says = "rejected", str(refusal).splitlines()[0].partition(": ")[2]
+            except Exception:  # whatever is no message of the program
+                outcome, says = "traceback", traceback.format_exc(limit=-1).replace("\n", " ")
+        found[outcome] += 1
+        print(f"{urdf.relative_to(arguments.folder)}: {outcome}: {says}", flush=True)
+    print(", ".join(f"{number} {outcome}" for outcome, number in found.items()) + f"; largest difference {worst:.1e}")
     if arguments.record:
         record(
             "urdfs",
-            tried=f"{len(files)} URDFs of example-robot-data 6.0.0 through import and solve, all joints moving at once"
-            f" (or {MOST} of them, drawn), motor torques against Newton and Euler on the XML",
-            found=f"{equal} equal to {worst:.0e} of the largest moment, {wrong} different, {len(refused)} rejected, all"
-            " with the reason: no link, nothing with mass that moves, inertias of zero or that no body has, a mimic of"
-            " a joint that is not there; 0 × traceback",
+            tried=f"{len(files)} different URDFs of the packages in {arguments.folder.name} through import and solve,"
+            f" all joints moving at once (or {MOST} of them, drawn), motor torques against Newton and Euler on the XML"
+            + (" and Pinocchio" if arguments.pinocchio else ""),
+            found=f"{found['equal']} equal to {worst:.0e} of the largest torque, {found['different']} different,"
+            f" {found['rejected']} rejected with the reason; {found['traceback']} × traceback",
         )
-    return 1 if wrong else 0
+    return 1 if found["different"] or found["traceback"] else 0
 
 
 if __name__ == "__main__":

@@ -108,6 +108,14 @@ def test_names_follow_the_rules_of_scenes(imported):
     assert '"ns/arm.v2" is called "ns_arm_v2" in the scene' in out
 
 
+def test_prefixes_that_are_not_declared(imported):
+    """As published files have them: drake:, gazebo:; a namespace of all elements, too."""
+    limit = '<limit drake:acceleration="2" effort="5" velocity="3" lower="-1" upper="1"/><drake:gear ratio="2"/>'
+    text = robot(link("base"), link("arm"), joint("j", "base", "arm", limit))
+    keys, _ = imported(text.replace("<robot ", '<robot xmlns="http://drake.mit.edu" ', 1))
+    assert keys["joint"][0]["moment_limit"] == 5
+
+
 def test_all_types_of_joints(imported):
     kinds = ("revolute", "continuous", "prismatic", "planar", "floating")
     names = [f"l{k}" for k in range(len(kinds))]
@@ -135,6 +143,11 @@ WRONG = {
         '<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro"><xacro:include filename="a"/></robot>',
         "found <xacro:include>: run `xacro FILE.xacro > ROBOT.urdf` first",
     ),
+    "xacro of another prefix": (
+        '<robot name="r" xmlns:x="http://ros.org/wiki/xacro"><x:arg name="a"/></robot>',
+        "found <x:arg>: run `xacro FILE.xacro > ROBOT.urdf` first",
+    ),
+    "xacro that is not declared": ('<robot name="r"><xacro:if value="1"/></robot>', "found <xacro:if>: run"),
     "no links": (robot(), "expected at least one <link>, found none"),
     "two roots": (robot(BASE, ARM), 'expected one link that no joint carries, found 2: "base", "arm"'),
     "circle": (

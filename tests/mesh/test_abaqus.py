@@ -46,6 +46,8 @@ def moved_first(text):
         b"\xef\xbb\xbf" + PLAIN.encode(),
         PLAIN.replace("\n", "\r\n"),
         PLAIN.replace("\n", "\r"),
+        PLAIN.encode("utf-16"),
+        PLAIN.replace("C3D8", "DC3D8"),  # of heat
         PLAIN.replace("*ELEMENT, TYPE=C3D8, ELSET=E", "** comment\n\n * element , type = c3d8 ,\n  elset = E"),
         PLAIN.replace("*NODE", "*HEADING\na bar\n*NODE, NSET=ALL"),
         moved_first(PLAIN),
@@ -108,6 +110,8 @@ def test_undefined_surfaces_of_a_tie_are_told(read):
         (PLAIN + elements(CELLS[:1] + 100, first=50), "element 50: expected nodes that are there, found node 101"),
         (PLAIN + "*ELEMENT, TYPE=C3D8\n50, 1, 2, 3, 4\n", "line .*: expected 8 nodes of an element, found 4"),
         (PLAIN + "*ELEMENT, TYPE=C3D8\n50, 1, 2, 3, 4, 5, 6, 7, 8, 9\n", "expected 8 nodes of an element, found 9"),
+        (PLAIN + "*ELEMENT, TYPE=C3D27\n50, 1\n", r"\*ELEMENT, line \d+: expected solids .*, found TYPE=C3D27"),
+        (PLAIN.replace("TYPE=C3D8", "TYPE=SC8R"), r"\*ELEMENT, line \d+: expected solids .*, found TYPE=SC8R"),
         (PLAIN + "*ELEMENT\n50, 1\n", r"\*ELEMENT, line \d+: expected TYPE="),
         (PLAIN + "*ELSET, ELSET=F\nG\n", 'expected elements or a set of them, found "G"'),
         (PLAIN + "*ELSET, ELSET=F\nF\n", 'expected elements or a set of them, found "F"'),
@@ -187,7 +191,15 @@ def test_sides_of_a_surface(read):
     [
         ("*ELEMENT, TYPE=B31, ELSET=RIB\n9001, 1, 7\n9002, 7, 13\n", "2 B31"),
         ("*ELEMENT, TYPE=S4R, ELSET=SKIN\n9001, 1, 2, 8, 7\n*SHELL SECTION, ELSET=SKIN\n0.002\n", "1 S4R"),
-        ("*ELEMENT, TYPE=MASS, ELSET=M\n9001, 1\n*MASS, ELSET=M\n5.\n", "1 of 5 each"),
+        (
+            "*ELEMENT, TYPE=MASS, ELSET=M\n9001, 2\n*MASS, ELSET=M\n5.\n",
+            "element 9001: mass 5 at (0, -0.1, 0.05) is left",
+        ),
+        ("*SURFACE, NAME=SKIN\nE,\n", 'of surface SKIN 1 lines are not read: "E"'),
+        (
+            "*SURFACE, NAME=A\n1, S6\n*SURFACE, NAME=B, COMBINE=UNION\nA, A\n",
+            'of surface B 1 lines are not read: "A, A"',
+        ),
         ("*MPC\nBEAM, 1, 2\n", r"not read: \*MPC"),
         ("*ELEMNT, TYPE=C3D8\n9, 1, 2, 3, 4, 5, 6, 7, 8\n", r"not read: \*ELEMNT"),
         (elements(CELLS[2:4], elset="AGAIN", first=101), "2 of 8 cells are duplicates in the file"),
@@ -207,5 +219,8 @@ def test_included_files_count(read, tmp_path):
     assert integrate(part) == pytest.approx(VOLUME, rel=1e-9)
     (tmp_path / "part.inp").write_text("*INCLUDE, INPUT=sub/mesh.txt\n")
     assert [path.name for path in files_of(tmp_path / "part.inp")] == ["part.inp", "mesh.txt", "cells.txt"]
+    assert integrate(read("*INCLUDE, INPUT=sub\\mesh.txt\n")) == pytest.approx(VOLUME, rel=1e-9)  # Windows'
+    (tmp_path / "part.inp").write_text("*INCLUDE, INPUT=sub\\mesh.txt\n", encoding="utf-16")
+    assert len(files_of(tmp_path / "part.inp")) == 3
     (tmp_path / "rows.txt").write_text(nodes(POINTS).partition("\n")[2])
     assert integrate(read("*NODE, INPUT=rows.txt\n" + elements(CELLS))) == pytest.approx(VOLUME, rel=1e-9)

@@ -152,6 +152,9 @@ def test_nodes_on_edges(read, card, cells, edges):
         ("SOL 103\nCEND\n" + PLAIN, "expected BEGIN BULK after CEND, found none"),
         (HEAD + PLAIN + "BEGIN SUPER=1\n", "expected one BEGIN BULK, found another"),
         (fixed(POINTS, CELLS, mark="+A").replace("\n+A ", "\n+B ", 1), "expected one card that this line continues"),
+        (PLAIN.replace("CHEXA,4,", "CIHEX1,4,"), r"CIHEX1, line \d+: expected solids of CTETRA, CHEXA"),
+        (PLAIN.replace(",", " "), 'line 1: expected fields of 8 columns or commas between them, found "GRID"'),
+        (PLAIN + "CONM2,99,500,,1.\n", r"CONM2, line \d+: expected grid points that are there, found 500"),
         (PLAIN + "CPENTA,99,1,1,2,3,4,5,6\n", "found unsupported elements: 6 hexahedron, 1 wedge"),
     ],
 )  # fmt: skip
@@ -163,7 +166,13 @@ def test_what_cannot_be_is_rejected_by_name(read, text, says):
 @pytest.mark.parametrize(
     ("more", "says"),
     [
-        ("CONM2,99,1,,5.\nCONM2,98,2,,2.5\n", "2 CONM2 (concentrated masses: 7.5 in all)"),
+        ("CONM2,99,2,,5.\n", "CONM2 99, line 37: mass 5 at (0, -0.1, 0.05) is left out"),
+        ("CONM2,99,1,,2.,.1,.2,.3\n", "mass 2 at (0.1, 0.1, 0.25) is left out"),
+        ("CONM2,99,1,7,2.,.1,.2,.3\nCORD2R,7,0,1.,0.,0.,1.,1.,0.\n,2.,0.,0.\n", "mass 2 at (0.1, 0.2, -0.25)"),
+        ("CONM2,99,1,-1,2.,.1,.2,.3\n", "mass 2 at (0.1, 0.2, 0.3) is left out"),
+        ("CONM2,99,1,,2.,,,,,\n,1.,,1.\n", "CONM2 99 and its inertia, line 37: mass 2 at (0, -0.1, -0.05)"),
+        ("".join(f"CONM1,{k},1,,2.\n" for k in range(91, 99)), "3 more concentrated masses, 6 in all, are left out"),
+        ("PARAM,WTMASS,.00259\n", "not read: PARAM WTMASS"),
         ("CBAR,99,3,1,2,0.,0.,1.\n", "1 CBAR"),
         ("CQUAD4,99,4,1,2,8,7\n", "1 CQUAD4"),
         ("RBE2,99,1,123456,2,3\n", "1 RBE2"),
@@ -191,6 +200,9 @@ def test_endings(read, name):
 
 def test_included_files_count(read, tmp_path):
     (tmp_path / "grids.bdf").write_text(PLAIN[: PLAIN.index("CHEXA")])
-    part = read(HEAD + "include 'gri\nds.bdf'\n" + PLAIN[PLAIN.index("CHEXA") :], name="part.nas")
+    (tmp_path / "sub").mkdir()
+    (tmp_path / "sub" / "more.bdf").write_text("$\n")
+    windows = "include 'sub\\more.bdf'\n"
+    part = read(HEAD + "include 'gri\nds.bdf'\n" + windows + PLAIN[PLAIN.index("CHEXA") :], name="part.nas")
     assert integrate(part) == pytest.approx(VOLUME, rel=1e-6)
-    assert [path.name for path in files_of(tmp_path / "part.nas")] == ["part.nas", "grids.bdf"]
+    assert [path.name for path in files_of(tmp_path / "part.nas")] == ["part.nas", "grids.bdf", "more.bdf"]

@@ -1,5 +1,7 @@
 """Parts from files: STEP and meshes of several formats become the part that they describe, or a clear error."""
 
+import sys
+
 import gmsh
 import meshio
 import numpy as np
@@ -8,6 +10,7 @@ from solid_parts import face_area, integrate
 
 from ffrobot.common.errors import InputError
 from ffrobot.mesh.gmsh_session import gmsh_session
+from ffrobot.mesh.mesh_files import read_foreign
 from ffrobot.mesh.records import PlaceRecord
 from ffrobot.mesh.structured import structured_box
 
@@ -204,6 +207,53 @@ def test_foreign_meshes(solid, mesh_part, tmp_path, ending, kind):
     part = mesh_part(solid(file=tmp_path / f"part.{ending}"))
     assert integrate(part) == pytest.approx(VOLUME, rel=1e-6)
     assert face_area(part, "tip") == pytest.approx(VOLUME, rel=1e-6)
+
+
+@pytest.mark.parametrize("kind", ["TETRA", "VOXEL"])
+@pytest.mark.parametrize("compressed", ["", "ZLib", "LZ4"])
+def test_files_of_vtk_itself(solid, mesh_part, tmp_path, kind, compressed):
+    """What VTK 9 and ParaView write: version 5.1 in binary form, or XML with appended data, with data of points."""
+    pyvista = pytest.importorskip("pyvista")
+    from vtkmodules.vtkIOLegacy import vtkUnstructuredGridWriter
+    from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridWriter
+
+    cell = "tetrahedron" if kind == "TETRA" else "hexahedron"
+    box = structured_box(1.0, (0.015, 0.025), (0.015, 0.025), (8, 2, 2), cell)
+    cells = box.cells if kind == "TETRA" else box.cells[:, [0, 1, 3, 2, 4, 5, 7, 6]]
+    grid = pyvista.UnstructuredGrid({pyvista.CellType[kind]: cells}, box.points)
+    grid.point_data["u"] = box.points / 7
+    writer = vtkXMLUnstructuredGridWriter() if compressed else vtkUnstructuredGridWriter()
+    path = tmp_path / ("part.vtu" if compressed else "part.vtk")
+    if compressed:
+        getattr(writer, f"SetCompressorTypeTo{compressed}")()
+        writer.SetDataModeToAppended()
+    else:
+        writer.SetFileTypeToBinary()
+    writer.SetFileName(str(path))
+    writer.SetInputData(grid)
+    writer.Write()
+    part = mesh_part(solid(file=path))
+    assert integrate(part) == pytest.approx(VOLUME, rel=1e-6)
+    assert not part.remarks
+
+
+def test_cells_that_meshio_leaves_out_are_not_dropped(tmp_path, monkeypatch):
+    """A voxel beside tetrahedra, where VTK is not installed."""
+    pyvista = pytest.importorskip("pyvista")
+    cells = np.array([[0, 1, 2, 4]]), np.array([[0, 1, 2, 3, 4, 5, 6, 7]])
+    points = np.array([[i, j, k] for k in (0, 1) for j in (0, 1) for i in (0, 1)], dtype=float)
+    kinds = pyvista.CellType.TETRA, pyvista.CellType.VOXEL
+    pyvista.UnstructuredGrid(dict(zip(kinds, cells, strict=True)), points).save(tmp_path / "part.vtu")
+    monkeypatch.setitem(sys.modules, "pyvista", None)
+    with pytest.raises(InputError, match="cells that meshio cannot handle"):
+        read_foreign(tmp_path / "part.vtu", "part")
+
+
+@pytest.mark.parametrize("name", ["part.unv", "part.cdb", "part.k"])
+def test_unknown_endings_are_named(solid, mesh_part, tmp_path, name):
+    (tmp_path / name).write_text("*KEYWORD\n")
+    with pytest.raises(InputError, match=r"its ending is not one of \.step, "):
+        mesh_part(solid(file=tmp_path / name))
 
 
 def with_mid_sides(box, bend=0.0):

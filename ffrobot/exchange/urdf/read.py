@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterable
 from pathlib import Path
 from xml.etree import ElementTree
+from xml.parsers import expat
 
 import numpy as np
 
@@ -40,18 +41,27 @@ def _in_file(path: Path, text: str) -> str:
 
 def _root_element(content: bytes) -> Element:
     try:
-        root = ElementTree.fromstring(content)  # bytes: in the encoding that the XML declares
-    except (ElementTree.ParseError, LookupError, ValueError) as error:
+        root = _parsed(content)
+    except (expat.ExpatError, LookupError, ValueError) as error:
         raise InputError(f"expected a URDF file, found XML that is not well-formed: {error}") from None
     if root.tag != "robot":
         raise InputError(f"expected a URDF file, whose root is <robot>, found <{shown(root.tag)}>")
-    if xacro := next((each.tag for each in root.iter() if "ros.org/wiki/xacro" in str(each.tag)), None):
-        name = xacro.partition("}")[2]
+    prefixes = {key.partition(":")[2] for key, value in root.items() if "ros.org/wiki/xacro" in value} | {"xacro"}
+    if xacro := next((each.tag for each in root.iter() if each.tag.partition(":")[0] in prefixes), None):
         raise InputError(
-            f"expected a URDF file, found <xacro:{name}>: run `xacro FILE.xacro > ROBOT.urdf` first,"
+            f"expected a URDF file, found <{shown(xacro)}>: run `xacro FILE.xacro > ROBOT.urdf` first,"
             " in an environment with ROS or with PyPI's xacro"
         )
     return root
+
+
+def _parsed(content: bytes) -> Element:
+    """Elements with their prefixes as they are: published files use some (drake:, gazebo:) that they do not declare."""
+    builder, parser = ElementTree.TreeBuilder(), expat.ParserCreate()
+    parser.StartElementHandler, parser.EndElementHandler = builder.start, builder.end
+    parser.CharacterDataHandler = builder.data
+    parser.Parse(content, True)  # bytes: in the encoding that the XML declares
+    return builder.close()
 
 
 def robot_of(root: Element) -> Robot:
