@@ -110,10 +110,10 @@ def test_names_follow_the_rules_of_scenes(imported):
 
 def test_prefixes_that_are_not_declared(imported):
     """As published files have them: drake:, gazebo:; a namespace of all elements, too."""
-    limit = '<limit drake:acceleration="2" effort="5" velocity="3" lower="-1" upper="1"/><drake:gear ratio="2"/>'
-    text = robot(link("base"), link("arm"), joint("j", "base", "arm", limit))
-    keys, _ = imported(text.replace("<robot ", '<robot xmlns="http://drake.mit.edu" ', 1))
-    assert keys["joint"][0]["moment_limit"] == 5
+    text = robot(link("base"), link("arm"), joint("j", "base", "arm", '<drake:gear ratio="2"/>'))
+    text = text.replace("<robot ", '<robot xmlns="http://drake.mit.edu" ', 1).replace("<limit ", '<limit drake:jerk="2" ')
+    keys, _ = imported(text)
+    assert keys["joint"][0]["moment_limit"] == 30
 
 
 def test_all_types_of_joints(imported):
