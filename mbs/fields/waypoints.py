@@ -132,6 +132,10 @@ def _read_table(path: Path) -> tuple[list[str], Array, Indices]:
         about = getattr(error, "strerror", None) or error
         raise InputError(f"{path}: cannot read the waypoint table: {about}") from None
     header = [name.strip() for name in rows[0][1]] if rows else []
+    if header and header[0].startswith(("{", "[")):
+        raise InputError(
+            f"{path}: expected a table, found JSON: ffrobot import {path.name} -o path.csv makes one of it"
+        )
     if len(header) < 2 or TIME.fullmatch(header[0]) is None or not all(header) or len(set(header)) < len(header):
         raise InputError(f"{path}: line 1: expected a header such as t,x,y or t,value, found {','.join(header)!r}")
     table = np.array([_numbers(path, line, row, len(header)) for line, row in rows[1:]])

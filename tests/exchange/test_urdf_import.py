@@ -111,7 +111,9 @@ def test_names_follow_the_rules_of_scenes(imported):
 def test_prefixes_that_are_not_declared(imported):
     """As published files have them: drake:, gazebo:; a namespace of all elements, too."""
     text = robot(link("base"), link("arm"), joint("j", "base", "arm", '<drake:gear ratio="2"/>'))
-    text = text.replace("<robot ", '<robot xmlns="http://drake.mit.edu" ', 1).replace("<limit ", '<limit drake:jerk="2" ')
+    text = text.replace("<robot ", '<robot xmlns="http://drake.mit.edu" ', 1).replace(
+        "<limit ", '<limit drake:jerk="2" '
+    )
     keys, _ = imported(text)
     assert keys["joint"][0]["moment_limit"] == 30
 
