@@ -4,19 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TypeVar
 
 from ..fe_models.modal_body import ModalBody
-from ..mbs.analysis.context import Context, WholeLinks
+from ..mbs.analysis.context import Context
 from ..mbs.model.body import Body
 from .patches.link_patches import LinkPatches
-
-Point = TypeVar("Point", str, str | None)
-
-
-def place_of(whole: WholeLinks | None, point: Point) -> Point:
-    """Where a point of the scene is in the model, of whose links some are in pieces where there are `whole` ones."""
-    return point if whole is None or point is None else whole.places.get(point, point)
 
 
 @dataclass(frozen=True, kw_only=True)

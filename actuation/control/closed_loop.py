@@ -12,6 +12,7 @@ import numpy as np
 
 from ...common.arrays import Array, as_list
 from ...common.errors import InputError, SolveError
+from ...mbs.analysis.context import place_of
 from ...mbs.analysis.drive import Control, drive_robot
 from ...mbs.analysis.forward import actuator_commands, largest_moments
 from ...mbs.analysis.gears import WoundUp, wound_up
@@ -23,7 +24,7 @@ from ...mbs.model.model import Model, without_paths
 from ...mbs.solve.linearisation import LinearEquations
 from ...mbs.solve.state import State
 from ...mbs.solve.statics import initial_state
-from ..context import ActuatedContext, place_of
+from ..context import ActuatedContext
 from .choice import make_controller, needed_sensors
 from .controllers import Setup
 from .linear_model import LinearModel, state_space

@@ -7,8 +7,10 @@ from dataclasses import dataclass
 from itertools import combinations
 
 from ...mbs.analysis.outcome import Details
+from ...mbs.solve.held_joints import HeldJoints
+from ...mbs.solve.robot_modes import RobotModes
 from .linear_model import LinearModel
-from .modes import Reach, RobotModes, controllability, observability, robot_modes
+from .modes import Reach, controllability, observability, robot_modes
 from .suggestion import Suggestion, unhurried_gains
 from .zeros import Zeros, zeros
 
@@ -20,7 +22,7 @@ class LinearModels(Details):
     `controllable`: by motors and patches together; `observable`: by joints and points together; `zeros` by
     (inputs, outputs): from each motor to its own joint and to each coordinate of a point, from all motors to their
     joints (the frequencies with held joints), and to as many coordinates of a point. `suggested`: gains of joint PD
-    controllers and the longest sample time (s) for them, of all models.
+    controllers and the longest sample time (s) for them, of all models. `held`: see `held_joints`.
     """
 
     models: tuple[LinearModel, ...]
@@ -29,6 +31,12 @@ class LinearModels(Details):
     observable: tuple[Reach, ...]
     zeros: Mapping[tuple[str, ...], tuple[Zeros, ...]]
     suggested: tuple[Suggestion, float] | None = None
+    held: tuple[Mapping[str, HeldJoints], ...] = ()
+
+    @property
+    def times(self) -> tuple[float, ...]:
+        """Of the models, s."""
+        return tuple(model.time for model in self.models)
 
     @property
     def advice(self) -> str:

@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 
 from ...common.errors import InputError, quoted
-from ...mbs.analysis.operating_points import InstantAnalysis, of_earlier, row_at
+from ...mbs.analysis.operating_points import InstantAnalysis, find_operating_points, of_earlier, row_at
 from ...mbs.analysis.outcome import Outcome
 from ...mbs.analysis.replay import motor_forces_of
 from ...mbs.fields.references import Reference
@@ -18,7 +18,6 @@ from ...mbs.solve.linearisation import LinearEquations
 from ..context import ActuatedContext
 from ..patches.link_patches import LinkPatches, link_patches
 from ..patches.patches import PatchArray
-from .linear import find_operating_points
 from .linear_model import state_space
 from .placing import PatchableLink, elsewhere, place
 from .records import Placement

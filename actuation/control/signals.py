@@ -9,7 +9,7 @@ import numpy as np
 
 from ...common.arrays import Array, Indices
 from ...common.errors import InputError
-from ...mbs.analysis.context import WholeLinks
+from ...mbs.analysis.context import WholeLinks, place_of
 from ...mbs.model.drives import Drives, PointDrive
 from ...mbs.model.known_motion import KnownStates, motion_forces
 from ...mbs.model.model import Model, modal_directions
@@ -17,7 +17,6 @@ from ...mbs.model.system import MultibodySystem
 from ...mbs.model.tree import KinematicTree, Section
 from ...mbs.scene.space import SPACES
 from ...mbs.solve.linearisation import labelled
-from ..context import place_of
 from ..patches.link_patches import LinkPatches
 from ..patches.patches import PatchArray
 from .records import PERMITTIVITY, Sensor

@@ -32,6 +32,11 @@ class Zeros:
         """Whether there is no zero with positive real part."""
         return not self.unstable.size
 
+    @property
+    def slowest(self) -> float:
+        """The size of the slowest zero with positive real part, rad/s; infinite where there is none."""
+        return float(np.abs(self.unstable).min(initial=np.inf))
+
     def describe(self) -> str:
         """In words, for tables."""
         if self.minimum_phase:

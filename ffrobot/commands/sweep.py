@@ -21,7 +21,9 @@ MOST = 100_000  # runs
     "--sample", metavar="N", type=click.IntRange(1, MOST), help="N points of a Latin hypercube, not the full grid."
 )
 @click.option("--seed", type=click.IntRange(0, 2**63 - 1), default=0, show_default=True, help="Seed of the sample.")
-@click.option("--collect", metavar="DATASET[:max|rms|first|last]", multiple=True, help="Further columns; repeatable.")
+@click.option(
+    "--collect", metavar="DATASET[:max|rms|first|last|lowest]", multiple=True, help="Further columns; repeatable."
+)
 @click.option("--keep/--no-keep", default=True, show_default=True, help="Retention of the results files of the runs.")
 @runs_options("SCENE.sweep", "Folder of the sweep")
 @python_option

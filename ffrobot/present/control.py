@@ -11,11 +11,15 @@ from ..actuation.control.linear_models import LinearModels
 from ..actuation.control.loop_record import LoopRecord
 from ..actuation.control.metrics import DEFINITIONS
 from ..actuation.control.placing import Placed
+from ..common.arrays import Array
 from ..mbs.analysis.outcome import Details
+from ..mbs.analysis.static import HeldRobot
+from ..mbs.solve.held_joints import translational_stiffness
 from .closed_loops import LOOP_COLUMNS, loop_row
 from .tables import plain_table
 
 FREQUENCIES = 5  # that are listed, and damping ratios
+TRANSFERS = 3  # of one motor to one output, whose zeros are listed: those with the slowest to the right
 UNDAMPED = 1e-9  # ratios below are rounding
 
 
@@ -23,8 +27,14 @@ def control_tables(details: Mapping[str, Details]) -> Iterator[Table]:
     """A table of each kind that was found, from what analyses found by name."""
     loops = [loop_row(name, found.metrics) for name, found in details.items() if isinstance(found, LoopRecord)]
     linear = [row for name, found in details.items() if isinstance(found, LinearModels) for row in _linear(name, found)]
+    held = [row for name, found in details.items() if isinstance(found, HELD) for row in _held(name, found)]
     placements = [_placement(name, found) for name, found in details.items() if isinstance(found, Placed)]
-    for columns, rows in ((LOOP_COLUMNS, loops), (LINEAR_COLUMNS, linear), (PLACEMENT_COLUMNS, placements)):
+    for columns, rows in (
+        (LOOP_COLUMNS, loops),
+        (LINEAR_COLUMNS, linear),
+        (HELD_COLUMNS, held),
+        (PLACEMENT_COLUMNS, placements),
+    ):
         if rows:
             table = plain_table(*columns)
             for row in rows:
@@ -41,6 +51,34 @@ def _linear(name: str, found: LinearModels) -> Iterator[tuple[str, ...]]:
         vibrating = modes.frequency[modes.frequency > 0.0]
         lowest = ", ".join(f"{f:.4g}" for f in vibrating[:FREQUENCIES])
         yield name, f"{model.time:g}", f"{model.freedom}", lowest, f"{modes.growth:.3g}" if modes.growth else ""
+
+
+HELD = (LinearModels, HeldRobot)
+HELD_COLUMNS = ("joints", "t (s)", "natural frequencies (Hz)", "at", "stiffness along axes\n(N/mm)", "least, along")
+
+
+def _held(name: str, found: LinearModels | HeldRobot) -> Iterator[tuple[str, ...]]:
+    """Natural frequencies with motors at rest, and the stiffness of points, at every time."""
+    for t, at in zip(found.times, found.held, strict=True):
+        for condition, held in at.items():
+            frequency = held.modes.frequency
+            lowest = ", ".join(f"{f:.4g}" for f in frequency[frequency > 0.0][:FREQUENCIES]) or "none"
+            label = (f"{name}: {condition}", f"{t:g}", lowest)
+            for point, C in held.compliance.items():
+                yield (*label, point, *_stiffness(C))
+                label = ("", "", "")
+            if not held.compliance:
+                yield (*label, "", "", "")
+
+
+def _stiffness(compliance: Array) -> tuple[str, str]:
+    """Force over displacement along each axis, and the least of any direction, of a (3, 3) or (6, 6) compliance."""
+    stiffness = translational_stiffness(compliance)
+    if stiffness is None:
+        return "0", ""
+    along, least, direction = stiffness
+    way = ", ".join(f"{x:g}" for x in np.round(direction, 2) + 0.0)
+    return ", ".join(f"{k / 1e3:.4g}" for k in along), f"{least / 1e3:.4g} ({way})"
 
 
 PLACEMENT_COLUMNS = ("placement", "on", "by", "optimum", "evenly spaced", "sets tried")
@@ -86,11 +124,17 @@ def _damping(name: str, linear: LinearModels) -> Iterator[str]:
 
 
 def _zeros_and_lost(name: str, linear: LinearModels) -> Iterator[str]:
-    for pair, found in linear.zeros.items():
+    worst = {
+        pair: next((zeros for zeros in found if not zeros.minimum_phase), found[0])
+        for pair, found in linear.zeros.items()
+    }
+    alone = sorted((pair for pair in worst if len(pair) == 2), key=lambda pair: worst[pair].slowest)
+    shown = [pair for pair in worst if len(pair) > 2 or pair in alone[:TRANSFERS]]
+    for pair in shown:
         half = len(pair) // 2
-        transfer = f"{', '.join(pair[:half])} → {', '.join(pair[half:])}"
-        worst = next((zeros for zeros in found if not zeros.minimum_phase), found[0])
-        yield f"{name}: {transfer}: {worst.describe()}"
+        yield f"{name}: {', '.join(pair[:half])} → {', '.join(pair[half:])}: {worst[pair].describe()}"
+    if len(worst) > len(shown):
+        yield f"{name}: zeros of {len(worst) - len(shown)} more transfers are in the results file, linear/zeros"
     for verb, reaches in (
         ("uncontrollable:", linear.controllable), ("unobservable:", linear.observable)
     ):  # fmt: skip

@@ -13,6 +13,7 @@ from ..actuation.control.linear_model import LinearModel, save_arrays
 from ..actuation.control.linear_models import LinearModels
 from ..actuation.control.zeros import Zeros
 from ..common.arrays import Array
+from ..mbs.analysis.static import HeldRobot
 from ..mbs.quantities.motion import RobotMotion
 
 MATRICES = ("A", "B", "C", "D", "mass", "transformation")
@@ -24,21 +25,46 @@ Shapes = Mapping[str, Mapping[str, Array]]
 
 
 def write_linear(group: h5py.Group, motion: RobotMotion, linear: LinearModels) -> None:
-    """Of an analysis: linear/; `motion` is what it is about."""
-    along_v, shapes = _motion(linear)[:, :, : motion.model.tree.n_v], {}  # motors behind gears come last
-    T, f, n_v = along_v.shape
-    moving = replace(motion, time=np.repeat(motion.time, f), q=np.repeat(motion.q, f, 0), v=along_v.reshape(-1, n_v))
-    space, turning = motion.space, "angle" if motion.space.is_plane else "rotation"
-    for name in motion.points:  # what bodies do in a mode is what they do at these rates
-        body = moving.body(name)
-        rates = {"position": space.along(body.velocity), turning: space.about(body.angular_velocity)}
-        rates["modal"] = body.modal_velocity
-        shapes[name] = {key: values.reshape(T, f, *values.shape[1:]) for key, values in rates.items()}
+    """Of an analysis: linear/, and what is held; `motion` is what it is about."""
+    n_v, space = motion.model.tree.n_v, motion.space
+    shapes = _shapes(motion, np.array([modes.motion.real for modes in linear.modes]))
+    write_held(group, motion, linear)
     if space.is_plane:
         models = (replace(model, transformation=_of_frames(motion, k) @ model.transformation[:n_v])
                   for k, model in enumerate(linear.models))  # fmt: skip
         linear = replace(linear, models=tuple(models))
     _write_models(group, linear, shapes)
+
+
+def write_held(group: h5py.Group, motion: RobotMotion, found: LinearModels | HeldRobot) -> None:
+    """Of an analysis, by condition of the joints (`held_joints`): joints_locked/ and joints_compliant/."""
+    for condition in found.held[0]:
+        held, own = [at[condition] for at in found.held], group.create_group(f"joints_{condition}")
+        own["frequency"] = np.array([one.modes.frequency for one in held])
+        own["damping_ratio"] = np.array([one.modes.damping_ratio for one in held])
+        _write_shapes(own, _shapes(motion, np.array([one.modes.motion.real for one in held])))
+        for point in held[0].compliance:
+            own[f"compliance/{point}"] = np.array([one.compliance[point] for one in held])
+
+
+def _shapes(motion: RobotMotion, along_v: Array) -> Shapes:
+    """What modes with rates `along_v` (T, f, coordinates) do to bodies about the states of `motion`."""
+    along_v, shapes = along_v[:, :, : motion.model.tree.n_v], {}  # motors behind gears come last
+    T, f, n_v = along_v.shape
+    moving = replace(motion, time=np.repeat(motion.time, f), q=np.repeat(motion.q, f, 0), v=along_v.reshape(-1, n_v))
+    space, turning = motion.space, "angle" if motion.space.is_plane else "rotation"
+    for name in motion.points if T * f else ():
+        body = moving.body(name)
+        rates = {"position": space.along(body.velocity), turning: space.about(body.angular_velocity)}
+        rates["modal"] = body.modal_velocity
+        shapes[name] = {key: values.reshape(T, f, *values.shape[1:]) for key, values in rates.items()}
+    return shapes
+
+
+def _write_shapes(group: h5py.Group, shapes: Shapes) -> None:
+    for body, parts in shapes.items():
+        for key, values in parts.items():
+            group[f"modes/{body}/{key}"] = values
 
 
 def _of_frames(motion: RobotMotion, row: int) -> Array:
@@ -52,11 +78,6 @@ def _of_frames(motion: RobotMotion, row: int) -> Array:
         turn = space.about(body.angular_velocity)
         found += [space.along(body.velocity).T, turn[None], moving.modal_velocity(name).T]
     return np.concatenate(found)
-
-
-def _motion(linear: LinearModels) -> Array:
-    """(T, f, coordinates) of the robot's modes."""
-    return np.array([modes.motion.real for modes in linear.modes])
 
 
 def _write_models(group: h5py.Group, linear: LinearModels, shapes: Shapes) -> None:
@@ -74,9 +95,7 @@ def _write_models(group: h5py.Group, linear: LinearModels, shapes: Shapes) -> No
     for kind, reaches in (("controllability", linear.controllable), ("observability", linear.observable)):
         group[kind] = np.array([reach.measure for reach in reaches])
         group[kind].attrs["lost"] = sorted({name for reach in reaches for name in reach.lost})
-    for body, parts in shapes.items():
-        for key, values in parts.items():
-            group[f"modes/{body}/{key}"] = values
+    _write_shapes(group, shapes)
     group.attrs["advice"] = linear.advice
     for k, (pair, found) in enumerate(linear.zeros.items(), 1):
         _write_zeros(group, f"zeros/{k}", pair, found)

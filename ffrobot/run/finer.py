@@ -9,13 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from ..actuation.control.linear import held_by_motors
 from ..common.arrays import Array
 from ..common.errors import InputError
 from ..fe_models.link_file import LinkTable, link_keys, link_path
 from ..fe_models.modal_body import ModalBody
 from ..mbs.analysis.drive import drive_robot
 from ..mbs.analysis.forward import Forward, actuator_commands, largest_moments
+from ..mbs.analysis.operating_points import held_by_motors
 from ..mbs.analysis.outcome import Outcome
 from ..mbs.analysis.replay import replay_times, supplied
 from ..mbs.model.drives import Drives, Replayed

@@ -33,6 +33,7 @@ REDUCTIONS: Mapping[str, Callable[[Array], Any]] = {
     "rms": lambda values: np.sqrt(np.mean(values**2)),
     "first": lambda values: values[0],
     "last": lambda values: values[-1],
+    "lowest": lambda values: values.min(),
 }
 """What becomes of a history (T,), by the word behind the colon of `--collect`."""
 
@@ -44,7 +45,8 @@ PER_COORDINATE = ("coordinate", "rate", "moment")
 
 
 PER_MODE = ("frequency", "damping_ratio")
-"""Datasets of linear models whose columns are the robot's vibrations, the lowest first, no vector."""
+OF_MODES = {"linear", "joints_locked", "joints_compliant"}
+"""Groups with datasets `PER_MODE` whose columns are the robot's vibrations, the lowest first, no vector."""
 
 
 @dataclass(frozen=True)
@@ -184,7 +186,7 @@ def _reduce(results: Results, name: str, reduction: str) -> float:
 
 def is_spectrum(name: str) -> bool:
     """Whether columns of the dataset `name` are vibrations."""
-    return name.rpartition("/")[2] in PER_MODE and "linear" in name.split("/")
+    return name.rpartition("/")[2] in PER_MODE and not OF_MODES.isdisjoint(name.split("/"))
 
 
 def is_vector(results: Results, name: str, values: Array) -> bool:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import Protocol, TypeVar
 
 from ...common.arrays import Array
 from .. import _core
@@ -12,6 +12,8 @@ from ..model.divided_link import DividedLink
 from ..model.model import Model
 from .drive import Progress
 from .outcome import EarlierRun, Outcome
+
+Point = TypeVar("Point", str, str | None)
 
 
 class PatchedLink(Protocol):
@@ -91,3 +93,8 @@ class Context:
     points: Mapping[str, ActuationPoints] = field(default_factory=dict)
     at_points: ForcesAtPoints = no_points
     whole: WholeLinks | None = None
+
+
+def place_of(whole: WholeLinks | None, point: Point) -> Point:
+    """Where a point of the scene is in the model, of whose links some are in pieces where there are `whole` ones."""
+    return point if whole is None or point is None else whole.places.get(point, point)

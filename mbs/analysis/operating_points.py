@@ -1,18 +1,27 @@
-"""About what a robot is linearised: an equilibrium, or instants of an earlier analysis."""
+"""States about which a robot is linear: an equilibrium, or instants of an earlier analysis."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from pydantic import Field
 
 from ...common.arrays import Array
 from ...common.errors import InputError, did_you_mean, quoted
+from .._core import TimeFunction
 from ..fields.field_types import NotNegative
+from ..model.gears import with_compliance
+from ..model.model import Model, without_paths
+from ..model.rows import ConstraintRow
 from ..scene.analysis import Analysis, Surroundings, TimedAnalysis
+from ..solve.start import undeformed_posture
+from .context import Context, place_of
+from .equilibrium import run_static
+from .gears import wound_up
 from .outcome import Outcome
 
 STATIC = "static"  # instead of an analysis' name: about the static equilibrium
@@ -63,6 +72,51 @@ class InstantAnalysis(Analysis):
                 yield f'times: expected at most {source.last_time!r}, where "{source.name}" ends, found {t!r}'
 
 
+class OperatingPoints(NamedTuple):
+    """States about which a robot is linear: `model` follows nothing, its gears give where the scene says so.
+
+    time (T,) s; q (T, n_q), v and a (T, n_v).
+    """
+
+    model: Model
+    time: Array
+    q: Array
+    v: Array
+    a: Array
+
+
+def find_operating_points(context: Context, analysis: InstantAnalysis) -> tuple[Outcome, OperatingPoints]:
+    """The equilibrium, or the instants of a motion, that an analysis is about, as they were found, and their states."""
+    if analysis.source is None:
+        run = _equilibrium(context, analysis)
+        return run, linear_states(context, run, [0])
+    source = context.outcomes[analysis.source]
+    rows = [row_at(context.model.scene.path, analysis, source, float(t)) for t in analysis.times]
+    return of_earlier(source, analysis).at(rows), linear_states(context, source, rows)
+
+
+def linear_states(context: Context, source: Outcome, rows: Sequence[int]) -> OperatingPoints:
+    """The states of some outputs of a motion, of the robot that follows nothing and whose gears are compliant."""
+    model = with_compliance(without_paths(context.model))
+    q, v, a = wound_up(source, model)[:3]
+    at = list(rows)
+    return OperatingPoints(model, source.time[at], q[at], v[at], a[at])
+
+
+def places_of(context: Context, points: Sequence[str] | None) -> dict[str, str]:
+    """Where each point of the scene is in the model, of whose links some may be in pieces.
+
+    Where no `points` are given: those of trajectories, and where there are none, the tips of all bodies that have one.
+    """
+    whole = context.whole
+    if points is None:
+        model = context.model if whole is None else whole.model
+        followed = [path.point for path in model.scene.trajectory if path.point is not None]
+        tips = [f"{node.body.name}.tip" for node in model.tree.nodes if "tip" in node.body.points]
+        points = tuple(dict.fromkeys(followed or tips))
+    return {point: place_of(whole, point) or point for point in points}
+
+
 def of_earlier(source: Outcome, analysis: Analysis) -> Outcome:
     """The motion of `source` as that of `analysis`, which has made no steps of its own."""
     statistics = replace(source.statistics, steps=0, evaluations=0, wall_seconds=0.0, warnings=())
@@ -79,3 +133,30 @@ def row_at(path: Path, analysis: Analysis, source: Outcome, t: float) -> int:
             f" {every}up to {source.time[-1]:g} s, found {t:g}"
         )
     return row
+
+
+def _equilibrium(context: Context, analysis: Analysis) -> Outcome:
+    """Static; where nothing is followed, motors keep the initial posture."""
+    model = context.model
+    if not any(row.is_trajectory for row in model.rows):
+        context = replace(
+            context, model=replace(model, rows=(*model.rows, *held_by_motors(model, undeformed_posture(model).q)))
+        )
+    return run_static(context, analysis)
+
+
+def held_by_motors(model: Model, q: Array) -> list[ConstraintRow]:
+    """Rows that keep the coordinates of motors where they are at q (n_q,)."""
+    rows = []
+    for joint, columns in model.motors.items():
+        node = model.tree.nodes[model.tree.carried[joint]]
+        for k in columns:
+            q_index = node.q.start + int(k) - node.v.start
+            target, nothing = TimeFunction.constant(float(q[q_index])), np.zeros(3)
+            rows.append(
+                ConstraintRow(
+                    joint, "coordinate", node.inner, node.outer, nothing, nothing, coordinate=int(k), q_index=q_index,
+                    target=target,
+                )
+            )  # fmt: skip
+    return rows

@@ -1,49 +1,57 @@
-"""Equilibrium under gravity, loads and the trajectories at t = 0, with the moments that hold it."""
+"""The analysis `kind = "static"`: equilibrium, torques, natural frequencies and stiffness with the joints locked."""
 
 from __future__ import annotations
 
-import time
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
 from typing import Literal
 
-import numpy as np
-
-from ..model.gears import with_held_motors
+from ...common.errors import InputError, SolveError
+from ..fields.field_types import PointReference
+from ..fields.references import Reference
 from ..scene.analysis import Analysis
-from ..solve.redundancy import resolved
-from ..solve.start import undeformed_posture
-from ..solve.statics import holding_multipliers, static_equilibrium, unstable_ways
+from ..solve.held_joints import HeldJoints, held_joints
+from ..solve.linearisation import LinearEquations
 from .context import Context
-from .outcome import Motion, Outcome, Statistics
+from .equilibrium import run_static
+from .operating_points import linear_states, places_of
+from .outcome import Details, Outcome
+
+
+@dataclass(frozen=True)
+class HeldRobot(Details):
+    """Natural frequencies and compliance in the equilibrium, by condition of its joints: see `held_joints`."""
+
+    held: tuple[Mapping[str, HeldJoints], ...]
+    times = (0.0,)
 
 
 class Static(Analysis):
-    """The equilibrium at t = 0 with the torques, forces and voltages that it needs."""
+    """The equilibrium at t = 0 with the torques, forces and voltages that it needs.
+
+    With it come natural frequencies and the compliance at points, with joints locked and behind compliant gears.
+    """
 
     kind: Literal["static"]
+    points: tuple[PointReference, ...] | None = None
+    """Points whose compliance is computed; by default those of trajectories, or all tips."""
 
     is_algebraic = True
     allocates_patches = True
 
+    def references(self) -> Iterator[Reference]:
+        """The points."""
+        for point in self.points or ():
+            yield Reference("points", point, needs_marker=True)
+
     def run(self, context: Context) -> Outcome:
         """Motion and forces at t = 0."""
-        return run_static(context, self)
-
-
-def run_static(context: Context, analysis: Analysis) -> Outcome:
-    """The equilibrium at the one time t = 0: at rest, however fast the trajectories are there.
-
-    Raises `SolveError` where there is none.
-    """
-    began = time.perf_counter()
-    model = with_held_motors(resolved(context.model, analysis.last_time))
-    q = static_equilibrium(model, undeformed_posture(model)).q[None]
-    at_rest, times = np.zeros((1, model.tree.n_v)), np.zeros(1)
-    multipliers = holding_multipliers(model, q[0])
-    return Outcome(
-        analysis=analysis,
-        model=model,
-        motion=Motion(times, q, at_rest, at_rest, multipliers[None], is_at_rest=True),
-        statistics=Statistics(
-            wall_seconds=time.perf_counter() - began, warnings=tuple(unstable_ways(model, q[0], multipliers))
-        ),
-    )
+        found = run_static(context, self)
+        try:
+            model, _, (q,), (v,), (a,) = linear_states(context, found, [0])
+            mechanism = LinearEquations(model, q, places_of(context, self.points)).at(0.0, q, v, a)
+        except (InputError, SolveError) as error:
+            told = f"no natural frequencies and no compliance: {error}"
+            statistics = replace(found.statistics, warnings=(*found.statistics.warnings, told))
+            return replace(found, statistics=statistics)
+        return replace(found, details=HeldRobot((held_joints(mechanism),)))

@@ -44,6 +44,7 @@ class LinearMechanism:
         inputs: (f,) per unit of each motor ("joint/NAME") and force at a point ("force/BODY.POINT/x", "…/y").
         outputs: (f,) derivatives of joint coordinates ("joint/NAME"), of motors behind gears that give ("motor/NAME"),
             and places of points ("point/BODY.POINT/x", …).
+        points: (k, f) by "BODY.POINT": translations along the axes of the space, then rotations about them.
         transformation: H = ∂q/∂s (coordinates, f).
         transformation_rate: its rate along the motion: δv = H δṡ + H_dot δs.
         force: (f,) what drives the motion itself: forces along the independent rows, modal forces beside the loads.
@@ -59,6 +60,7 @@ class LinearMechanism:
     K: Array
     inputs: Mapping[str, Array]
     outputs: Mapping[str, Array]
+    points: Mapping[str, Array]
     transformation: Array
     transformation_rate: Array
     force: Array
@@ -119,6 +121,7 @@ class LinearEquations:
         H, H_dot = H * self._signs, H_dot * self._signs
         shares = {joint: frame_share(self.model, joint, q) for joint in self._on_frames}
         moments = {joint: along_s[self.model.motors[joint][0]] for joint in shares}
+        points = self._points(state, H)
         on_modes = sum((moments[joint] * shares[joint].direction for joint in shares), np.zeros(tree.n_v))
         # Not by way of M⁻¹, whose rounding is that of the stiffest modes
         K_more, D_more = gear_matrices(tree)
@@ -126,7 +129,7 @@ class LinearEquations:
         return LinearMechanism(
             t, q, v, a, sides * (M + M.T) / 2, H.T @ D_more @ H - sides * (M @ by_rate),
             H.T @ (K_more @ H + D_more @ H_dot) - sides * (M @ by_s),
-            self._inputs(state, H, shares), self._outputs(state, H), H, H_dot,
+            self._inputs(H, shares, points), self._outputs(state, H, points), MappingProxyType(points), H, H_dot,
             self._signs * force - on_modes @ H, self.names,
         )  # fmt: skip
 
@@ -150,16 +153,16 @@ class LinearEquations:
         H[others] = -determine @ C_v[:, s]
         return H, determine
 
-    def _inputs(self, state: _State, H: Array, shares: Mapping[str, FrameShare]) -> Mapping[str, Array]:
+    def _inputs(self, H: Array, shares: Mapping[str, FrameShare], points: Mapping[str, Array]) -> Mapping[str, Array]:
         """By s: a unit of each motor, and of forces on points along x, y, z."""
         found = {}
         for joint, columns in self.model.motors.items():
             beside = shares[joint].direction @ H if joint in shares else 0.0
             for name, k in _labelled(joint, columns):
                 found[name] = self.model.sign(joint) * (H[k] + beside)
-        return MappingProxyType(found | {f"force/{name}": row for name, row in self._places(state, H).items()})
+        return MappingProxyType(found | self._along_axes("force", points))
 
-    def _outputs(self, state: _State, H: Array) -> Mapping[str, Array]:
+    def _outputs(self, state: _State, H: Array, points: Mapping[str, Array]) -> Mapping[str, Array]:
         """By s: joint coordinates, those of motors behind gears that give, and places of points."""
         tree, found = self.model.tree, dict[str, Array]()
         for joint in self.model.scene.joint:
@@ -171,15 +174,20 @@ class LinearEquations:
             own = [G @ H for one, G in zip(self.model.cut, gradients, strict=True) if one.joint is cut]
             found |= dict(zip(_names(cut.name, len(own)), own, strict=True))
         found |= {_of_motor(gear): H[gear.motor.v.start] for gear in tree.gears}
-        return MappingProxyType(found | {f"point/{name}": row for name, row in self._places(state, H).items()})
+        return MappingProxyType(found | self._along_axes("point", points))
 
-    def _places(self, state: _State, H: Array) -> dict[str, Array]:
-        found: dict[str, Array] = {}
+    def _points(self, state: _State, H: Array) -> dict[str, Array]:
+        """(k, f) translations along the axes of the space, then rotations about them, of each point."""
+        space, found = SPACES[self.model.scene.space], {}
         for point, place in self.points.items():
             L = self.model.tree.motion(self.model.tree.section(place, np.eye(3)), state.q, state.frames).L[0]
-            axes = SPACES[self.model.scene.space].translations
-            found |= {f"{point}/{'xyz'[k]}": L[k] @ H for k in axes}
+            found[point] = np.concatenate([L[list(space.translations)], L[3:][list(space.rotations)]]) @ H
         return found
+
+    def _along_axes(self, kind: str, points: Mapping[str, Array]) -> dict[str, Array]:
+        """By "KIND/BODY.POINT/x", …: translations of points."""
+        axes = SPACES[self.model.scene.space].translations
+        return {f"{kind}/{point}/{'xyz'[k]}": J[k] for point, J in points.items() for k in axes}
 
 
 def _check(model: Model) -> None:

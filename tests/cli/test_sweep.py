@@ -167,7 +167,7 @@ def test_wrong_variations(refused, short_scene, vary, message):
 def test_wrong_reduction_and_folder(refused, ffrobot, short_scene):
     folder = short_scene.parent
     message = refused(folder, "sweep", "scene.toml", "--vary", MASSES, "--collect", "inverse/time:mean")
-    assert "max|rms|first|last" in message
+    assert "max|rms|first|last|lowest" in message
     assert ffrobot("sweep", "scene.toml", "--vary", MASSES, cwd=folder).returncode == 0
     assert "another's" in refused(folder, "sweep", "scene.toml", "--vary", HEIGHTS)
 

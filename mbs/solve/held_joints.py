@@ -1,0 +1,119 @@
+"""A robot whose motors stand still: natural frequencies, shapes, and static compliance at points.
+
+With the coordinates of motors fixed, R δs = 0, the linear equations M δs̈ + D δṡ + K δs = F are those of δs = N δz:
+
+    NᵀM N δz̈ + NᵀD N δż + NᵀK N δz = NᵀF,      compliance at a point with δx = J δs:  C = J N (NᵀK N)⁻¹ NᵀJᵀ.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from ...common.arrays import Array, ComplexArray, as_floats
+from .linearisation import LinearMechanism
+from .robot_modes import RIGID, RobotModes, robot_modes
+
+LOCKED, COMPLIANT = "locked", "compliant"
+DEPENDENT = 1e-9  # of the largest singular value: below it a coordinate follows from others
+
+
+@dataclass(frozen=True)
+class HeldJoints:
+    """Of a robot at one instant, with the joints that have motors locked, or the motors alone behind compliant gears.
+
+    Attributes:
+        modes: of the robot, its coordinates s left free; `modes.frequency` in Hz, the lowest first.
+        compliance: (k, k) by "BODY.POINT": translations (m) along the axes of the space, then rotations (rad) about
+            them, by forces (N) and moments (N·m); infinite where a joint without a motor lets the robot move.
+    """
+
+    modes: RobotModes
+    compliance: Mapping[str, Array]
+
+
+class Stiffness(NamedTuple):
+    """Of a point: `along` each axis (d,) force over displacement, N/m; the `least` of all directions, and its (d,)."""
+
+    along: Array
+    least: float
+    direction: Array
+
+
+def translational_stiffness(compliance: Array) -> Stiffness | None:
+    """Of a point with this compliance (3, 3) in the plane or (6, 6); None where it is not fixed.
+
+    Rows of the compliance that are zero have infinite stiffness.
+    """
+    d = {3: 2, 6: 3}[len(compliance)]
+    C = compliance[:d, :d]
+    if not np.isfinite(C).all():
+        return None
+    values, directions = np.linalg.eigh(C)
+    with np.errstate(divide="ignore"):
+        return Stiffness(1 / np.diag(C), float(1 / values[-1]), directions[:, -1])
+
+
+def held_joints(mechanism: LinearMechanism) -> dict[str, HeldJoints]:
+    """By "locked", and by "compliant" where gears are compliant. `mechanism` has the points to be judged."""
+    has_gears = any(name.startswith("motor/") for name in mechanism.outputs)
+    return {condition: _held(mechanism, condition) for condition in (LOCKED, COMPLIANT)[: 1 + has_gears]}
+
+
+def held_coordinates(mechanism: LinearMechanism, condition: str) -> tuple[Array, Array, Array]:
+    """N (f, m), of unit kinetic amplitude, with what joints do held; NᵀK N and NᵀD N."""
+    names = list(_coordinates(mechanism) if condition == LOCKED else _shafts(mechanism))
+    back = np.linalg.inv(np.linalg.cholesky(mechanism.M)).T
+    R = np.array([mechanism.outputs[name] for name in names]).reshape(len(names), len(back))
+    N = back @ free_directions(np.asarray(R @ back, dtype=float))
+    return N, N.T @ mechanism.K @ N, N.T @ mechanism.D @ N
+
+
+def frequency_response(mechanism: LinearMechanism, condition: str, point: str, omega: Array) -> ComplexArray:
+    """(F, k) of a point at `omega` (F,), rad/s: its motion along and about each axis by a force or moment there."""
+    N, K, D = held_coordinates(mechanism, condition)
+    J, w = mechanism.points[point] @ N, omega[:, None, None]
+    X = np.linalg.solve(K + 1j * w * D - w**2 * np.eye(len(K)), np.broadcast_to(J.T, (len(omega), *J.T.shape)))
+    return np.asarray(np.einsum("ki,fik->fk", J, X))
+
+
+def _coordinates(mechanism: LinearMechanism) -> Iterator[str]:
+    """Coordinates of joints with motors, and of motors behind compliant gears, which then stand still, too."""
+    yield from (name for name in mechanism.inputs if name.startswith("joint/"))
+    yield from (name for name in mechanism.outputs if name.startswith("motor/"))
+
+
+def _shafts(mechanism: LinearMechanism) -> Iterator[str]:
+    """Coordinates of motors: of their joints where no compliant gear is between."""
+    for name in mechanism.inputs:
+        if name.startswith("joint/"):
+            behind = name.replace("joint/", "motor/", 1)
+            yield behind if behind in mechanism.outputs else name
+
+
+def _held(mechanism: LinearMechanism, condition: str) -> HeldJoints:
+    N, K, D = held_coordinates(mechanism, condition)
+    modes = robot_modes(K, D, N, mechanism.transformation)
+    compliance = {point: _compliance(K, J @ N) for point, J in mechanism.points.items()}
+    return HeldJoints(modes, compliance)
+
+
+def free_directions(R: Array) -> Array:
+    """(f, m) orthonormal directions z with R z = 0, of `R` (r, f), whose entries may depend on each other."""
+    sizes = np.linalg.norm(R, axis=1, keepdims=True)
+    _, values, V = np.linalg.svd(R / np.where(sizes > 0.0, sizes, 1.0))
+    return as_floats(V[int(np.count_nonzero(values > DEPENDENT * values.max(initial=0.0))) :].T)
+
+
+def _compliance(K: Array, J: Array) -> Array:
+    """J K⁻¹ Jᵀ; infinite where K (m, m) is singular."""
+    if not len(K):
+        return np.zeros((len(J), len(J)))
+    values = np.linalg.svd(K, compute_uv=False)
+    if not values[-1] > RIGID**2 * values[0]:
+        return np.full((len(J), len(J)), np.inf)
+    C = J @ np.linalg.solve(K, J.T)
+    return (C + C.T) / 2
