@@ -15,6 +15,7 @@ from .commands.design import optimise, sensitivity
 from .commands.exchange import export, import_
 from .commands.fit import fit
 from .commands.link import link
+from .commands.map import map_
 from .commands.pictures import plot, report, view
 from .commands.read import feasibility, info, linear
 from .commands.solve import solve
@@ -56,7 +57,7 @@ def schema(kind: str) -> None:
 
 
 for command in (
-    link, solve, info, feasibility, plot, view, report, linear, sweep, fit, sensitivity, optimise, uncertainty,
+    link, solve, info, feasibility, plot, view, report, linear, sweep, map_, fit, sensitivity, optimise, uncertainty,
     import_, export, bench,
 ):  # fmt: skip
     cli.add_command(command)

@@ -1,0 +1,96 @@
+"""The command `map`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+import numpy as np
+
+from ..common.arrays import Array
+from ..common.errors import InputError
+from ..common.parallel import processors
+from ..present.logs import FILE, logging_options, python_option
+from .protect import protect
+
+
+@click.command("map")
+@click.argument("scene_file", metavar="SCENE.toml", type=FILE)
+@click.option("--over", metavar="NAME=VALUES", multiple=True, required=True, help="Axis of the grid; repeatable.")
+@click.option("--point", metavar="BODY.POINT", help="Point of the tool.  [default: that of the path, or the last tip]")
+@click.option(
+    "--orientation",
+    type=click.Choice(["auto", "start", "free"]),
+    default="auto",
+    show_default="start, if the path of the scene has an orientation",
+    help="Orientation of the tool over x, y, z.",
+)
+@click.option("--modes", type=click.IntRange(1, 50), default=3, show_default=True, help="Natural frequencies per pose.")
+@click.option(
+    "--response",
+    metavar="FIRST:LAST:COUNT",
+    help="Frequency response of the point, with these frequencies (Hz).",
+)
+@click.option("--figures/--no-figures", default=True, show_default=True, help="Pictures of the map.")
+@click.option(
+    "-j", "--processes", type=click.IntRange(1, 1000), default=processors, show_default="one for each processor",
+    help="Number of parallel processes.",
+)  # fmt: skip
+@click.option("-o", "--output", metavar="DIR", type=FILE, help="Folder of the map [SCENE.map next to the input].")
+@python_option
+@logging_options
+def map_(
+    scene_file: Path,
+    over: tuple[str, ...],
+    point: str | None,
+    orientation: str,
+    modes: int,
+    response: str | None,
+    figures: bool,
+    processes: int,
+    output: Path | None,
+) -> None:
+    """Map of the workspace: natural frequencies, stiffness, torque and deflection at rest, pose by pose.
+
+    \b
+    --over shoulder=-90*deg:90*deg:31 --over elbow=0:2:21    a grid of joint coordinates (rad or m)
+    --over x=0.2:0.8:31 --over z=0.2:1.0:31                  a grid of places of the point (m), inverse kinematics
+
+    Motors keep the pose; links and compliant gears deflect under weight and loads. Joints that the grid leaves open
+    stay as near to the start of the scene as they can. The same command resumes a stopped map.
+    """  # noqa: D301 (click wants the backspace itself)
+    from ..map.map_file import TABLE, write_map
+    from ..map.pose_map import make_map, plan_map
+    from ..present.pose_map import print_map
+    from ..present.progress import Display
+    from ..present.summary import summary_console
+    from ..run.inputs import files_of
+
+    folder = output or scene_file.with_suffix(".map")
+    protect(files_of(scene_file))
+    plan = plan_map(scene_file, over, folder, point, orientation, modes, _frequencies(response))
+    with Display() as display:
+        found = make_map(plan, processes, display)
+    path, console = write_map(found), summary_console()
+    print_map(found, console)
+    if figures:
+        from ..pictures.pose_map import draw_map
+
+        for picture in draw_map(found):
+            console.print(f"figure     {picture}", soft_wrap=True)
+    console.print(f"table      {folder / TABLE}", soft_wrap=True)
+    console.print(f"map        {path}", soft_wrap=True)
+
+
+def _frequencies(text: str | None) -> Array:
+    """FIRST:LAST:COUNT in Hz, evenly spaced; none without a text."""
+    if text is None:
+        return np.zeros(0)
+    try:
+        first, last, count = text.split(":")
+        ends, number = (float(first), float(last)), int(count)
+    except ValueError:
+        ends, number = (0.0, 0.0), 0
+    if not (0.0 <= ends[0] <= ends[1] < np.inf and 1 <= number <= 10_000):
+        raise InputError(f'--response: expected FIRST:LAST:COUNT in Hz, such as 1:100:200, found "{text}"')
+    return np.linspace(*ends, number)

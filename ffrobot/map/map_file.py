@@ -1,0 +1,80 @@
+"""The files of a map: map.h5 with all arrays over the grid, table.csv with a line for each pose."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+
+import h5py
+import numpy as np
+
+from ..common.arrays import Array
+from ..common.checksum import MARK, sealed
+from ..common.checksum import METHOD as CHECKSUM
+from ..common.files import write_atomically
+from ..common.tables import TableWriter
+from ..common.version import program_version
+from .pose_map import STATUS, PoseMap
+
+FORMAT, VERSION = "ffrobot-map", 1
+TABLE, FILE = "table.csv", "map.h5"
+UNITS = {
+    "frequency": "Hz", "compliance": "m/N, rad/N, m/(N·m), rad/(N·m)", "stiffness": "N/m", "least_stiffness": "N/m",
+    "direction": "", "response": "m/N", "sag": "m", "torque": "N·m or N", "torque_share": "", "place": "m",
+    "manipulability": "", "robot": "m",
+}  # fmt: skip
+NOT_IN_TABLE = ("compliance", "response", "robot")
+
+
+def torque_share(found: PoseMap) -> Array:
+    """(P, motors) of the torque of each motor in the pose in its limit; nan where it has none."""
+    return np.abs(found.values["torque"]) / found.limits
+
+
+def write_map(found: PoseMap) -> Path:
+    """Both files in the folder of the plan; the HDF5 file."""
+    plan = found.plan
+    with h5py.File("map", "w", driver="core", backing_store=False) as file:
+        file.attrs.update({"format": FORMAT, "format_version": VERSION, MARK: CHECKSUM})
+        file.attrs.update({"ffrobot_version": program_version(), "scene": str(plan.scene), "point": plan.point})
+        file.attrs["axes"], file.attrs["motors"] = [axis.name for axis in plan.axes], list(found.motors)
+        for axis in plan.axes:
+            file[f"axes/{axis.name}"] = axis.values
+        file["status"] = found.status.reshape(plan.shape)
+        file["status"].attrs["meaning"] = list(STATUS)
+        file["torque_limit"], file["frequencies"] = found.limits, plan.frequencies
+        for name, values in {**found.values, "torque_share": torque_share(found), "q": found.q}.items():
+            file[name] = values.reshape(*plan.shape, *values.shape[1:])
+            file[name].attrs["unit"] = UNITS.get(name.rpartition("/")[2], "")
+        file.flush()
+        image: bytes = file.id.get_file_image()
+    write_atomically(plan.folder / FILE, sealed(image), "map", make_folder=True, ours=True)
+    write_atomically(plan.folder / TABLE, _table(found).encode(), "table of the map", ours=True)
+    return plan.folder / FILE
+
+
+def _table(found: PoseMap) -> str:
+    """A line for each pose: the grid's coordinates, how it went, and all that is not a matrix."""
+    plan, text = found.plan, io.StringIO()
+    grid = np.stack(np.meshgrid(*(axis.values for axis in plan.axes), indexing="ij"), axis=-1)
+    names = [axis.name for axis in plan.axes]
+    columns = {name: column for name, column in zip(names, grid.reshape(-1, len(names)).T, strict=True)}
+    for name, values in {**found.values, "torque_share": torque_share(found)}.items():
+        if name.rpartition("/")[2] not in NOT_IN_TABLE:
+            columns |= _columns(found, name, values)
+    writer = TableWriter(text)
+    writer.writerow([*names, "status", *(name for name in columns if name not in names)])
+    rows = zip(*(column.tolist() for column in columns.values()), strict=True)
+    for status, row in zip(found.status, rows, strict=True):
+        writer.writerow([*row[: len(names)], STATUS[status], *("" if x != x else x for x in row[len(names) :])])
+    return text.getvalue()
+
+
+def _columns(found: PoseMap, name: str, values: Array) -> dict[str, Array]:
+    if values.ndim == 1:
+        return {name: values}
+    labels = {"torque": found.motors, "torque_share": found.motors}.get(name)
+    if labels is None:
+        is_vector = name.rpartition("/")[2] in ("place", "sag", "stiffness", "direction")
+        labels = tuple("xyz" if is_vector else map(str, range(1, values.shape[1] + 1)))
+    return {f"{name} {label}": column for label, column in zip(labels, values.T, strict=False)}

@@ -1,0 +1,261 @@
+"""A map from its plan to its file: postures first, then their judgement in parallel, part by part, resumable."""
+
+from __future__ import annotations
+
+import ctypes
+import hashlib
+import io
+import json
+import os
+import signal
+from collections.abc import Iterator, Mapping
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from contextlib import suppress
+from dataclasses import dataclass
+from multiprocessing import get_context
+from pathlib import Path
+
+import numpy as np
+
+from ..common.arrays import Array, Booleans, Indices
+from ..common.errors import InputError, SolveError, did_you_mean, quoted
+from ..common.files import check_folder, write_atomically
+from ..common.interrupts import SIGNALS
+from ..mbs.solve.poses import PoseEvaluator
+from ..mbs.solve.workspace import GridAxis, Postures, grid_postures
+from ..run.inputs import changed, fingerprints, read_tables
+from ..run.solution import Solution
+from ..run.solve import prepare_scene
+from ..run.watcher import Watcher
+from ..scene.load import load_scene
+from ..scene.scene import Scene
+from .grid import parse_grid
+
+PLAN, PARTS = "plan.json", "parts"
+A_PART = 64  # poses that one process judges before it asks for more
+OUT_OF_REACH, OUTSIDE_LIMITS, NO_EQUILIBRIUM = 1, 2, 3
+STATUS = ("found", "out of reach", "outside joint limits", "no equilibrium")
+
+
+@dataclass(frozen=True)
+class MapPlan:
+    """What a map is made of.
+
+    Attributes:
+        point: "BODY.POINT" whose stiffness and place it has.
+        keeps_orientation: whether the body of the point keeps the orientation of the start.
+        count: natural frequencies of each pose.
+        frequencies: (F,) Hz of the frequency response.
+    """
+
+    scene: Path
+    axes: tuple[GridAxis, ...]
+    point: str
+    keeps_orientation: bool
+    count: int
+    frequencies: Array
+    folder: Path
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Of the grid."""
+        return tuple(len(axis.values) for axis in self.axes)
+
+
+@dataclass(frozen=True)
+class PoseMap:
+    """A map: `values` by name, (P, …) with nan where a pose is none; `status` (P,) numbers of `STATUS`."""
+
+    plan: MapPlan
+    motors: tuple[str, ...]
+    limits: Array
+    status: Indices
+    values: Mapping[str, Array]
+    q: Array
+
+
+def plan_map(
+    scene: Path,
+    over: tuple[str, ...],
+    folder: Path,
+    point: str | None = None,
+    orientation: str = "auto",
+    count: int = 3,
+    frequencies: Array | None = None,
+) -> MapPlan:
+    """Raises `InputError` for a scene, a grid or a point that is wrong, and for a folder of something else."""
+    check_folder(folder)
+    loaded = load_scene(scene)
+    axes = parse_grid(over, loaded)
+    keeps = _keeps_orientation(loaded, axes, orientation)
+    omega = np.zeros(0) if frequencies is None else frequencies
+    return MapPlan(scene, axes, point or _default_point(loaded), keeps, count, omega, folder)
+
+
+def _default_point(scene: Scene) -> str:
+    """The last point that a trajectory leads, else the tip of the last body of the scene."""
+    followed = [path.point for path in scene.trajectory if path.point is not None]
+    return followed[-1] if followed else f"{scene.body[-1].name}.tip"
+
+
+def _keeps_orientation(scene: Scene, axes: tuple[GridAxis, ...], wanted: str) -> bool:
+    if wanted != "auto":
+        return wanted == "start"
+    return axes[0].is_place and any(path.orientation is not None for path in scene.trajectory)
+
+
+def make_map(plan: MapPlan, processes: int, watcher: Watcher) -> PoseMap:
+    """All poses of the grid; parts that an earlier run of the same plan has judged are read from the folder.
+
+    Raises `InputError` for a point or an axis that the robot has not, `SolveError` where no pose is found at all.
+    """
+    solution = prepare_scene(plan.scene, watcher)
+    _check_point(solution, plan.point)
+    watcher.stage("postures")
+    postures = grid_postures(solution.model, plan.axes, plan.point, keeps_orientation=plan.keeps_orientation)
+    good = postures.reached & postures.within
+    if not good.any():
+        raise SolveError(f"{plan.scene}: no pose of the grid is within reach and the limits of the joints")
+    evaluator = PoseEvaluator(
+        solution.model, postures.q[int(good.argmax())], plan.point, count=plan.count, omega=2 * np.pi * plan.frequencies
+    )
+    _claim(plan)
+    parts = {_name(part, postures): part for part in _parts(np.flatnonzero(good))}
+    found = dict(_judged(plan, evaluator, postures, parts, processes, watcher))
+    return _assembled(plan, solution, evaluator, postures, [(parts[name], found[name]) for name in parts])
+
+
+def _check_point(solution: Solution, point: str) -> None:
+    known = [f"{body}.{name}" for body, of in solution.bodies.items() for name in of.spatial.points]
+    if point not in known:
+        raise InputError(
+            f'{solution.scene.path}: --point: expected one of {quoted(known)}, found "{point}"'
+            f"{did_you_mean(point, known)}"
+        )
+
+
+def _parts(numbers: Indices) -> Iterator[Indices]:
+    yield from (numbers[k : k + A_PART] for k in range(0, len(numbers), A_PART))
+
+
+def _name(part: Indices, postures: Postures) -> str:
+    """Of the file of a part: by its postures."""
+    return hashlib.sha256(part.tobytes() + postures.q[part].tobytes()).hexdigest()[:24] + ".npz"
+
+
+def _judged(
+    plan: MapPlan,
+    evaluator: PoseEvaluator,
+    postures: Postures,
+    parts: Mapping[str, Indices],
+    processes: int,
+    watcher: Watcher,
+) -> Iterator[tuple[str, Mapping[str, Array]]]:
+    """By name of the part what was found, from files or by processes of their own."""
+    folder, left, done = plan.folder / PARTS, {}, 0
+    for name, part in parts.items():
+        if (found := _read(folder / name)) is None:
+            left[name] = part
+        else:
+            done += 1
+            yield name, found
+    watcher.stage(f"{sum(map(len, left.values()))} poses")
+    global _evaluator
+    _evaluator = evaluator
+    context = get_context("fork")  # with the robot as it is, which no process has to read again
+    with ProcessPoolExecutor(processes, mp_context=context, initializer=_serve, initargs=(os.getpid(),)) as pool:
+        futures = {pool.submit(_judge, postures.q[part]): name for name, part in left.items()}
+        try:
+            for future in as_completed(futures):
+                name, done = futures[future], done + 1
+                _write(folder / name, found := future.result())
+                watcher.advance(done, len(parts))
+                yield name, found
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
+
+
+_evaluator: PoseEvaluator
+
+
+def _serve(parent: int) -> None:
+    """Leave signals to the parent, and end with it where it is killed."""
+    for number in SIGNALS:
+        signal.signal(number, signal.SIG_IGN)
+    with suppress(Exception):
+        ctypes.CDLL(None).prctl(1, int(signal.SIGKILL), 0, 0, 0)  # PR_SET_PDEATHSIG
+    if os.getppid() != parent:
+        os._exit(1)
+
+
+def _judge(q: Array) -> dict[str, Array]:
+    """Findings of the poses q (N, n_q) by name, (N, …); nan where there is no equilibrium."""
+    found: list[dict[str, Array] | None] = []
+    for each in q:
+        try:
+            found.append(_evaluator.at(each))
+        except SolveError:
+            found.append(None)
+    judged = next((one for one in found if one is not None), {})
+    none = {name: np.full_like(value, np.nan) for name, value in judged.items()}
+    table = {name: np.array([(one or none)[name] for one in found]) for name in judged}
+    return {"stands": np.array([one is not None for one in found]), **table}
+
+
+def _read(path: Path) -> dict[str, Array] | None:
+    with suppress(OSError, ValueError, KeyError, EOFError), np.load(path, allow_pickle=False) as file:
+        return {name: file[name] for name in file.files}
+    return None
+
+
+def _write(path: Path, found: Mapping[str, Array]) -> None:
+    content = io.BytesIO()
+    np.savez(content, **found)
+    write_atomically(path, content.getvalue(), "part of the map", make_folder=True, ours=True)
+
+
+def _claim(plan: MapPlan) -> None:
+    """Start the folder, or go on with the same map; what was made from other input is judged again."""
+    tables = read_tables(plan.scene)
+    inputs = fingerprints(tables, plan.scene)
+    asked = {
+        "scene": str(plan.scene.absolute()),
+        "axes": [[axis.name, axis.values.tolist()] for axis in plan.axes],
+        "point": plan.point, "keeps_orientation": plan.keeps_orientation, "count": plan.count,
+        "frequencies": plan.frequencies.tolist(),
+    }  # fmt: skip
+    path = plan.folder / PLAN
+    before: dict[str, object] = {}
+    with suppress(OSError, ValueError):
+        before = json.loads(path.read_text(encoding="utf-8"))
+    if not before and plan.folder.exists() and any(plan.folder.iterdir()):
+        raise InputError(f"{plan.folder}: output: expected a new folder or one of a map, found one with other files")
+    if before and (before.get("asked") != asked or changed(before.get("inputs", {}), inputs)):  # type: ignore[arg-type]
+        for file in (plan.folder / PARTS).glob("*.npz"):
+            file.unlink()
+    text = json.dumps({"asked": asked, "inputs": inputs})
+    write_atomically(path, text.encode(), "plan of the map", make_folder=True, ours=True)
+
+
+def _assembled(
+    plan: MapPlan,
+    solution: Solution,
+    evaluator: PoseEvaluator,
+    postures: Postures,
+    parts: list[tuple[Indices, Mapping[str, Array]]],
+) -> PoseMap:
+    status = np.where(postures.reached, np.where(postures.within, 0, OUTSIDE_LIMITS), OUT_OF_REACH).astype(np.intp)
+    values: dict[str, Array] = {}
+    for part, found in parts:
+        stands: Booleans = found["stands"].astype(bool)
+        status[part[~stands]] = NO_EQUILIBRIUM
+        for name, value in found.items():
+            if name != "stands":
+                whole = values.setdefault(name, np.full((len(status), *value.shape[1:]), np.nan))
+                whole[part] = value
+    joints = {joint.name: joint for joint in solution.scene.joint}
+    names = tuple(name.split("/")[1] for name in evaluator.motors)
+    limits = [getattr(joints[name.split(" ")[0]], "moment_limit", None) for name in names]
+    return PoseMap(plan, names, np.array([np.nan if one is None else np.max(one) for one in limits]), status, values,
+                   postures.q)  # fmt: skip

@@ -1,0 +1,35 @@
+"""What `ffrobot map` prints: how far each quantity ranges over the grid, and where its worst pose is."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from rich.console import Console
+
+from ..map.pose_map import STATUS, PoseMap
+from ..map.quantities import quantities
+from .tables import print_table
+
+
+def print_map(found: PoseMap, console: Console) -> None:
+    """A table of quantities: the worst and the best value with the poses; then how many poses there are."""
+    console.print(f"{found.plan.point} over {' and '.join(axis.name for axis in found.plan.axes)}", soft_wrap=True)
+    print_table(console, ("quantity", "worst", "at", "best", "at"), _rows(found))
+    counts = ", ".join(f"{int((found.status == k).sum())} {name}" for k, name in enumerate(STATUS))
+    console.print(f"poses      {counts}", soft_wrap=True)
+
+
+def _rows(found: PoseMap) -> Iterator[tuple[str, ...]]:
+    for quantity in quantities(found).values():
+        if np.isfinite(quantity.values).any():
+            ends = (f"{quantity.values[k]:.4g}" for k in (quantity.worst, quantity.best))
+            worst, best = ends
+            yield quantity.title, worst, _place(found, quantity.worst), best, _place(found, quantity.best)
+
+
+def _place(found: PoseMap, number: int) -> str:
+    """The values of the axes that have more than one."""
+    place = np.unravel_index(number, found.plan.shape)
+    pairs = zip(found.plan.axes, place, strict=True)
+    return ", ".join(f"{axis.values[k]:.3g}" for axis, k in pairs if len(axis.values) > 1)

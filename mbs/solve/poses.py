@@ -1,0 +1,148 @@
+"""What a robot is like in one posture: torques, sag, natural frequencies, stiffness, manipulability, response."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...common.arrays import Array
+from ...common.errors import SolveError
+from ..model.gears import with_compliance
+from ..model.model import Model, without_paths
+from ..model.tree import Section
+from ..scene.space import SPACES
+from .held_joints import (
+    COMPLIANT,
+    LOCKED,
+    HeldJoints,
+    frequency_response,
+    held_coordinates,
+    held_joints,
+    translational_stiffness,
+)  # fmt: skip
+from .linearisation import LinearEquations, LinearMechanism
+from .posture import solve_posture
+from .start import relaxed_gears
+from .state import State
+
+MOST_STEPS = 12
+SETTLED = 1e-16  # of the strain energy of the first step: of a step after which there is nothing left to correct
+
+
+class PoseEvaluator:
+    """Judges undeformed postures of one robot: motors keep their coordinates, links and gears give under loads.
+
+    Attributes:
+        motors: names of the coordinates of motors, as `torque` has them.
+        segments: pairs of sections, straight lines between which show the robot.
+    """
+
+    def __init__(self, model: Model, q: Array, point: str, *, count: int, omega: Array) -> None:
+        """`q` (n_q,) is any posture of `model`; `count` frequencies are kept, and responses at `omega` (F,), rad/s."""
+        self.model = with_compliance(without_paths(model))
+        self.space, self.point, self._count, self._omega = SPACES[model.scene.space], point, count, omega
+        self._linear = LinearEquations(self.model, self._all(q), {point: point})
+        shafts = [name for name in self._linear.names if name.startswith("motor/")]
+        direct = [
+            name for name in self._linear.names if name.startswith("joint/") and _joint(name) in self.model.motors
+        ]
+        geared = [name.replace("motor/", "joint/") for name in shafts]
+        self.motors = (*(name for name in direct if name not in geared), *shafts)
+        self.segments = tuple(_segments(self.model, point))
+
+    def at(self, q: Array) -> dict[str, Array]:
+        """Findings by name in the undeformed posture q (n_q,). Raises `SolveError` where there is no equilibrium.
+
+        joints_locked and joints_compliant: `frequency` (count,) Hz, `compliance` (k, k), `stiffness` (d,) and
+        `least_stiffness` N/m, its `direction` (d,), `response` (F, d) m/N. Else: `sag` (d,) m of the point, `torque`
+        (motors,), `place` (d,) m, `manipulability`, `robot` (segments, 2, 3) m.
+        """
+        q, tree = self._all(q), self.model.tree
+        before = self._place(q)
+        straight, mechanism, bent = self._equilibrium(q)
+        found = {"place": before, "sag": self._place(bent) - before, "torque": self._torques(mechanism)}
+        found["manipulability"] = np.array(self._manipulability(straight))
+        for condition, held in held_joints(mechanism).items():
+            found |= {f"joints_{condition}/{name}": value for name, value in self._of_held(held).items()}
+            if len(self._omega):
+                J = frequency_response(mechanism, condition, self.point, self._omega)
+                found[f"joints_{condition}/response"] = np.abs(J[:, : len(self.space.translations)])
+        frames = tree.frames(q[None])
+        found["robot"] = np.array([[tree.motion(end, q[None], frames).r[0] for end in pair] for pair in self.segments])
+        return found
+
+    def _all(self, q: Array) -> Array:
+        """With the coordinates of motors behind compliant gears that are not strained."""
+        more = np.zeros(self.model.tree.n_q - len(q))
+        return relaxed_gears(self.model, State(np.append(q, more), np.zeros(self.model.tree.n_v))).q
+
+    def _place(self, q: Array) -> Array:
+        tree = self.model.tree
+        motion = tree.motion(tree.section(self.point, np.eye(3)), q[None], tree.frames(q[None]))
+        return self.space.along(motion.r[0])
+
+    def _equilibrium(self, q: Array) -> tuple[LinearMechanism, LinearMechanism, Array]:
+        """The linear equations in q (n_q,) and in the equilibrium next to it with motors held, and its coordinates.
+
+        Newton with the exact stiffness K: the forces F that keep the robot at rest in q vanish on what motors leave
+        free, NᵀF + NᵀK N δz = 0.
+        """
+        condition = COMPLIANT if self.model.tree.gears else LOCKED
+        rest, first, last = np.zeros(self.model.tree.n_v), 0.0, np.inf
+        mechanism = straight = self._linear.at(0.0, q, rest, rest)
+        for _ in range(MOST_STEPS):
+            N, K, _ = held_coordinates(mechanism, condition)
+            try:
+                step = -np.linalg.solve(K, N.T @ mechanism.force)
+            except np.linalg.LinAlgError:
+                raise SolveError("joints without motors leave the robot free to move") from None
+            energy = float(step @ K @ step)
+            first = first or energy
+            if not np.isfinite(energy) or energy < -SETTLED * abs(first) or energy > 1e2 * last:
+                break
+            q = self._closed(self.model.tree.integrate(q, mechanism.transformation @ (N @ step)))
+            if energy <= SETTLED * first:
+                return straight, mechanism, q
+            mechanism, last = self._linear.at(0.0, q, rest, rest), energy
+        raise SolveError("no stable equilibrium near the posture with straight links")
+
+    def _closed(self, q: Array) -> Array:
+        """The posture with loops closed again, links bent as they are."""
+        found = solve_posture(self.model, 0.0, q) if self.model.rows else q
+        if found is None:
+            raise SolveError("loops cannot be closed")
+        return found
+
+    def _torques(self, mechanism: LinearMechanism) -> Array:
+        return np.array([mechanism.force[mechanism.names.index(name)] for name in self.motors])
+
+    def _manipulability(self, mechanism: LinearMechanism) -> float:
+        """√det(J Jᵀ) of the point's velocity by the rates of joints with motors (Yoshikawa, 1985)."""
+        columns = [mechanism.names.index(name.replace("motor/", "joint/")) for name in self.motors]
+        J = mechanism.points[self.point][: len(self.space.translations), columns]
+        return float(np.prod(np.linalg.svd(J, compute_uv=False)[: len(J)])) if len(columns) >= len(J) else 0.0
+
+    def _of_held(self, held: HeldJoints) -> dict[str, Array]:
+        C, frequency = held.compliance[self.point], held.modes.frequency
+        frequency = np.append(frequency[frequency > 0.0], np.full(self._count, np.nan))[: self._count]
+        stiffness, d = translational_stiffness(C), len(self.space.translations)
+        along, least, direction = stiffness or (np.zeros(d), 0.0, np.full(d, np.nan))
+        return {
+            "frequency": frequency, "compliance": C, "stiffness": along, "least_stiffness": np.array(least),
+            "direction": direction,
+        }  # fmt: skip
+
+
+def _joint(name: str) -> str:
+    """Of "joint/NAME" and "joint/NAME 2"."""
+    return name.removeprefix("joint/").split(" ")[0]
+
+
+def _segments(model: Model, point: str) -> list[tuple[Section, Section]]:
+    """From the section at which a body is carried to those at which it carries others, and to the point."""
+    tree, found = model.tree, []
+    for number, node in enumerate(tree.nodes):
+        ends = [other.inner for other in tree.nodes if other.inner.body == number]
+        if point.partition(".")[0] == node.body.name:
+            ends.append(tree.section(point, np.eye(3)))
+        found += [(node.outer, end) for end in ends]
+    return found

@@ -1,0 +1,202 @@
+"""Maps over the workspace: closed forms, single runs of the same poses, branches, limits, resuming."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import h5py
+import numpy as np
+import pytest
+
+from ffrobot import solve
+from ffrobot.common.errors import InputError
+from ffrobot.map.map_file import write_map
+from ffrobot.map.pose_map import make_map, plan_map
+from ffrobot.map.quantities import quantities
+from ffrobot.pictures.pose_map import draw_map
+from ffrobot.run.watcher import Watcher
+
+LINK = """name = "{name}"
+[material]
+youngs_modulus = 70e9
+poissons_ratio = 0.3
+density = 2700.0
+[geometry]
+kind = "beam"
+length = {length}
+section = {{ shape = "rectangle", height = 0.02, width = 0.03 }}
+[mesh]
+elements = 10
+[reference]
+condition = "cantilever"
+[modes]
+count = 4
+family = "in-plane-bending"
+"""
+ARM = """name = "arm"
+space = "planar"
+gravity = [0.0, -9.81]
+[[body]]
+name = "upper"
+link = "upper.toml"
+[[body]]
+name = "fore"
+link = "fore.toml"
+[[joint]]
+name = "shoulder"
+type = "revolute"
+between = ["ground", "upper.root"]
+gear_ratio = 100.0
+rotor_inertia = 6e-5
+stiffness = 3000.0
+moment_limit = 20.0
+[[joint]]
+name = "elbow"
+type = "revolute"
+between = ["upper.tip", "fore.root"]
+position_limit = [-2.5, 2.5]
+moment_limit = 10.0
+[initial]
+joints = { shoulder = 0.3, elbow = 0.8 }
+[[analysis]]
+name = "rest"
+kind = "static"
+"""
+
+
+@pytest.fixture(scope="module")
+def arm(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("arm")
+    for name, length in (("upper", 0.6), ("fore", 0.4)):
+        (folder / f"{name}.toml").write_text(LINK.format(name=name, length=length))
+    (folder / "scene.toml").write_text(ARM)
+    return folder / "scene.toml"
+
+
+def mapped(scene, folder, *over, **keys):
+    return make_map(plan_map(scene, over, folder, **keys), 1, Watcher())
+
+
+def test_a_pose_is_what_static_finds_there(arm, tmp_path):
+    """The same pose as the start of a scene with its joints kept by motors."""
+    found = mapped(arm, tmp_path / "map", "shoulder=0.3", "elbow=-1.0,0.8")
+    pose = 1
+    keep = '[[trajectory]]\nname = "a"\nmotor = "shoulder"\nvalue = "0.3"\n'
+    keep += '[[trajectory]]\nname = "b"\njoint = "elbow"\nvalue = "0.8"\n'
+    single = arm.with_name("single.toml")
+    single.write_text(ARM + keep)
+    with solve(single) as results:
+        for condition in ("locked", "compliant"):
+            for name, ours in (("frequency", "frequency"), ("compliance/fore.tip", "compliance")):
+                expected = results[f"rest/joints_{condition}/{name}"][0]
+                values = found.values[f"joints_{condition}/{ours}"][pose]
+                np.testing.assert_allclose(values, expected[: len(values)], rtol=1e-7, atol=1e-12)
+        tip = results["rest/points/fore.tip/position"][0]
+        moment = results["rest/joints/shoulder/gear_moment"][0]
+    np.testing.assert_allclose(found.values["place"][pose] + found.values["sag"][pose], tip, atol=1e-9)
+    torque = found.values["torque"][pose][found.motors.index("shoulder")]
+    np.testing.assert_allclose(torque, moment, rtol=1e-7)
+
+
+def test_torque_and_manipulability_have_their_closed_forms(arm, tmp_path):
+    """Weight times lever of nearly straight links; √det(J Jᵀ) = l₁ l₂ |sin φ|."""
+    found = mapped(arm, tmp_path / "map", "shoulder=-60*deg:60*deg:5", "elbow=0.2:1.4:4")
+    angles = np.stack(np.meshgrid(np.radians(np.linspace(-60, 60, 5)), np.linspace(0.2, 1.4, 4), indexing="ij"), -1)
+    first, second = angles.reshape(-1, 2).T
+    weight = 9.81 * 2700 * 0.02 * 0.03 * np.array([0.6, 0.4])
+    elbow = weight[1] * 0.2 * np.cos(first + second)
+    shoulder = weight[0] * 0.3 * np.cos(first) + weight[1] * 0.6 * np.cos(first) + elbow
+    order = [found.motors.index(name) for name in ("shoulder", "elbow")]
+    np.testing.assert_allclose(found.values["torque"][:, order].T, [shoulder, elbow], atol=5e-3 * shoulder.max())
+    np.testing.assert_allclose(found.values["manipulability"], 0.6 * 0.4 * np.abs(np.sin(second)), rtol=1e-12)
+    np.testing.assert_allclose(found.limits[order], [20.0, 10.0])
+
+
+def test_places_keep_the_branch_of_the_start_and_say_what_is_out_of_reach(arm, tmp_path):
+    found = mapped(arm, tmp_path / "map", "x=0.11:1.31:13", "y=-0.6:0.6:9")
+    x, y = (
+        values.ravel() for values in np.meshgrid(np.linspace(0.11, 1.31, 13), np.linspace(-0.6, 0.6, 9), indexing="ij")
+    )
+    distance = np.hypot(x, y)
+    reachable = (distance < 1.0 - 1e-9) & (distance > 0.2 + 1e-9)
+    cosine = (distance**2 - 0.6**2 - 0.4**2) / (2 * 0.6 * 0.4)
+    elbow = np.arccos(np.clip(cosine, -1, 1))
+    within = reachable & (elbow <= 2.5)
+    np.testing.assert_array_equal(found.status == 0, within)
+    np.testing.assert_array_equal(found.status == 1, ~reachable)
+    np.testing.assert_allclose(found.values["place"][within], np.column_stack([x, y])[within], atol=1e-9)
+    np.testing.assert_allclose(found.values["manipulability"][within], 0.24 * np.sin(elbow[within]), rtol=1e-6)
+    assert np.isnan(found.values["manipulability"][~within]).all()
+
+
+def test_response_at_zero_frequency_is_the_compliance(arm, tmp_path):
+    found = mapped(arm, tmp_path / "map", "elbow=0.5,1.0", frequencies=np.array([0.0, 5.0]))
+    for condition in ("locked", "compliant"):
+        diagonal = np.array([np.diag(C)[:2] for C in found.values[f"joints_{condition}/compliance"]])
+        np.testing.assert_allclose(found.values[f"joints_{condition}/response"][:, 0], diagonal, rtol=1e-9)
+
+
+def test_files_and_pictures(arm, tmp_path):
+    found = mapped(arm, tmp_path / "map", "shoulder=-1:1:4", "elbow=0.2:1.4:3")
+    path = write_map(found)
+    with h5py.File(path) as file:
+        assert file["joints_locked/frequency"].shape == (4, 3, 3)
+        assert file["joints_locked/compliance"].shape == (4, 3, 3, 3)
+        np.testing.assert_array_equal(file["axes/elbow"], np.linspace(0.2, 1.4, 3))
+        assert file["status"].attrs["meaning"][0] == "found"
+    lines = (tmp_path / "map" / "table.csv").read_text().splitlines()
+    assert len(lines) == 13
+    assert lines[0].startswith("shoulder,elbow,status,")
+    files = draw_map(found)
+    assert {file.stem for file in files} == set(quantities(found))
+    assert all(file.stat().st_size > 5000 for file in files)
+
+
+def test_a_killed_map_goes_on_and_is_the_same(arm, tmp_path):
+    over = ("shoulder=-1:1:20", "elbow=0.2:1.4:20")
+    whole = mapped(arm, tmp_path / "whole", *over)
+    folder = tmp_path / "killed"
+    command = [sys.executable, "-m", "ffrobot", "map", str(arm), "-o", str(folder), "--no-figures", "-j", "1"]
+    for axis in over:
+        command += ["--over", axis]
+    run = subprocess.Popen(command, start_new_session=True)
+    parts = folder / "parts"
+    while run.poll() is None and not list(parts.glob("*.npz")):
+        time.sleep(0.02)
+    if run.poll() is None:
+        os.killpg(run.pid, signal.SIGKILL)
+    run.wait()
+    before = {file.name: file.stat().st_mtime_ns for file in parts.glob("*.npz")}
+    assert before
+    again = mapped(arm, folder, *over)
+    after = {file.name: file.stat().st_mtime_ns for file in parts.glob("*.npz")}
+    assert before.items() <= after.items()
+    for name, values in whole.values.items():
+        np.testing.assert_array_equal(again.values[name], values)
+
+
+@pytest.mark.parametrize(
+    ("over", "message"),
+    [
+        (("elbo=0:1:3",), r'NAME=FIRST:LAST:COUNT of a joint .* found "elbo=0:1:3".*did you mean "elbow"'),
+        (("elbow=0:1",), "expected NAME=FIRST:LAST:COUNT or NAME=VALUE,VALUE"),
+        (("elbow=0:1:3", "x=0:1:3"), "expected joints alone or directions of a point alone"),
+        (("elbow=0:1:3", "elbow=0:1:3"), "expected each joint or direction once"),
+        (("z=0:1:3",), "expected NAME=FIRST:LAST:COUNT of a joint"),
+        (("x=0:1:1000", "y=0:1:1000"), "expected at most 100000 poses, found 1000000"),
+    ],
+)
+def test_wrong_grids(arm, tmp_path, over, message):
+    with pytest.raises(InputError, match=message):
+        plan_map(arm, over, tmp_path / "map")
+
+
+def test_a_wrong_point_and_a_folder_of_something_else(arm, tmp_path):
+    with pytest.raises(InputError, match=r'--point: expected one of .*"fore.tip".* found "fore.tp"'):
+        mapped(arm, tmp_path / "map", "elbow=0:1:3", point="fore.tp")
+    (tmp_path / "other").mkdir()
+    (tmp_path / "other" / "letter.txt").write_text("mine")
+    with pytest.raises(InputError, match="expected a new folder or one of a map"):
+        mapped(arm, tmp_path / "other", "elbow=0:1:3")
