@@ -24,7 +24,9 @@ check "clang-format" .venv/bin/clang-format --dry-run --Werror "${cpp[@]}"
 
 status=0
 # A process for each core; a file's tests share one, and what it sets up. -n 0 among the arguments: one after the other.
-.venv/bin/python -m pytest -n auto --dist loadfile "$@" || status=$?
+# build/tests.xml keeps what each test took.
+.venv/bin/python -m pytest -n auto --dist loadfile --junitxml build/tests.xml "$@" || status=$?
+.venv/bin/python scripts/test_costs.py build/tests.xml
 
 if ((${#failed[@]})); then
   printf 'failed, see above: %s\n' "${failed[@]}" >&2

@@ -9,39 +9,46 @@ import subprocess
 import sys
 import tempfile
 import tomllib
-from dataclasses import dataclass
+from collections import defaultdict
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import h5py
 import numpy as np
 import pytest
+from forked_commands import Commands
 
 from ffrobot.common.parallel import environment_without_mpi
+from ffrobot.mesh import form_cache
 
+pytest_plugins = ["costs"]
+MANY_SEEDS = 6
 CASES = Path(__file__).parent.parent / "cases"
+OTHER_COMMAND = os.environ.get("FFROBOT_COMMAND")  # an older version's, to see whether a test fails there
 
 
 @dataclass(frozen=True)
 class Command:
-    """Runs `ffrobot` as a process; links are cached in a folder of the test session, empty at its start."""
+    """Runs `ffrobot` in a process of its own; links are cached in a folder of the test run, empty at its start.
+
+    The process is a fork of one that has loaded the program. A test of how a process starts or ends uses `path`.
+    """
 
     cache: Path
     path: Path
+    forks: Commands = field(default_factory=Commands)
 
     @property
     def environment(self):
         """Without what MPI leaves behind in a process that has loaded dolfinx: a nested mpirun trips over it."""
         return environment_without_mpi() | {"XDG_CACHE_HOME": str(self.cache), "TERM": "dumb"}
 
-    def __call__(self, *arguments, timeout=120, **options):
-        return subprocess.run(
-            [self.path, *map(str, arguments)],
-            env=self.environment,
-            timeout=timeout,
-            capture_output=True,
-            text=True,
-            **options,
-        )
+    def __call__(self, *arguments, cwd=None, timeout=120, **options):
+        arguments = [str(argument) for argument in arguments]
+        if not options and OTHER_COMMAND is None:
+            return self.forks.run(arguments, self.environment, cwd, timeout)
+        options |= {"env": self.environment, "cwd": cwd, "timeout": timeout, "capture_output": True, "text": True}
+        return subprocess.run([self.path, *arguments], **options)
 
 
 @dataclass(frozen=True)
@@ -59,6 +66,33 @@ class SolvedCase:
         rows = np.abs(output[:, None] - times).argmin(axis=0)
         np.testing.assert_allclose(output[rows], times, rtol=0, atol=1e-12)
         return rows
+
+
+def pytest_addoption(parser):
+    parser.addoption("--all-seeds", action="store_true", help="tests of random inputs with all seeds, not every third")
+
+
+def pytest_collection_modifyitems(config, items):
+    """Of many seeds of a test every third, unless all are asked for (scripts/nightly.sh)."""
+    if config.getoption("--all-seeds"):
+        return
+    seeds = defaultdict(set)
+    for item in items:
+        seeds[_function(item)].add(_seed(item))
+    left_out = [item for item in items if len(seeds[_function(item)]) >= MANY_SEEDS and (_seed(item) or 0) % 3]
+    if left_out:
+        config.hook.pytest_deselected(items=left_out)
+        left_out = set(left_out)
+        items[:] = [item for item in items if item not in left_out]
+
+
+def _function(item):
+    return item.nodeid.partition("[")[0]
+
+
+def _seed(item):
+    seed = item.callspec.params.get("seed") if hasattr(item, "callspec") else None
+    return seed if isinstance(seed, int) else None
 
 
 @pytest.hookimpl(wrapper=True, tryfirst=True)
@@ -84,19 +118,32 @@ def pytest_xdist_make_scheduler(config, log):
     return Scheduling(config, log) if config.getoption("dist") == "loadfile" else None
 
 
+@pytest.fixture(scope="session")
+def shared_folder(tmp_path_factory):
+    """A folder that all processes of the test run share, empty at its start."""
+    base = tmp_path_factory.getbasetemp()
+    return base.parent if "PYTEST_XDIST_WORKER" in os.environ else base
+
+
 @pytest.fixture(scope="session", autouse=True)
-def own_cache(tmp_path_factory):
-    """Nothing that tests compute goes to the user's cache or comes from there."""
+def own_cache(shared_folder):
+    """Nothing that tests compute goes to the user's cache or comes from there; returns the cache of the test run.
+
+    Finite element forms are compiled once for all tests, those with caches of their own included.
+    """
+    cache = shared_folder / "cache"
     with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("own_cache")))
-        yield
+        patch.setenv("XDG_CACHE_HOME", str(cache))
+        patch.setattr(form_cache, "user_cache_path", lambda name: cache / name)
+        yield cache
 
 
 @pytest.fixture(scope="session")
-def ffrobot(tmp_path_factory):
-    """The installed command, or that of FFROBOT_COMMAND: an older version, to see whether a test fails there."""
-    path = os.environ.get("FFROBOT_COMMAND") or Path(sys.executable).with_name("ffrobot")
-    return Command(tmp_path_factory.mktemp("cache"), Path(path))
+def ffrobot(own_cache):
+    """The installed command, or that of FFROBOT_COMMAND."""
+    command = Command(own_cache, Path(OTHER_COMMAND or Path(sys.executable).with_name("ffrobot")))
+    yield command
+    command.forks.end()
 
 
 @pytest.fixture(scope="session")
@@ -113,13 +160,12 @@ def _as_it_is(text):
 
 
 @pytest.fixture(scope="session")
-def solved(ffrobot, tmp_path_factory):
+def solved(ffrobot, shared_folder, tmp_path_factory):
     """Copy a case, edit the text of its scene and of its link files, run it; within `timeout` (s).
 
     A case as it is runs once for all processes of the test session, in a folder that its tests share.
     """
-    base = tmp_path_factory.getbasetemp()
-    shared = (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / "solved"
+    shared = shared_folder / "solved"
     shared.mkdir(exist_ok=True)
 
     def solve(name, edit=_as_it_is, edit_link=_as_it_is, timeout=120):

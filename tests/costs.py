@@ -1,0 +1,54 @@
+"""What tests cost, for the report of `pytest --junitxml` (scripts/test_costs.py sums it up), and less of it.
+
+Each test has the properties `seconds`, of processors, of the commands it ran, too, and `megabytes`, of its process at
+its end.
+"""
+
+import ctypes
+import gc
+import resource
+
+import pytest
+from forked_commands import Commands
+
+LIBC = ctypes.CDLL(None)
+MEMORY_MAP_THRESHOLD, LARGE = -3, 1 << 20
+if hasattr(LIBC, "mallopt"):  # the GNU C library: arrays of that many bytes go back to the system when they are deleted
+    LIBC.mallopt(MEMORY_MAP_THRESHOLD, LARGE)
+BEGAN = pytest.StashKey[float]()
+
+
+def pytest_collection_finish():
+    """What is loaded by now stays: no search for unused objects looks at it again."""
+    gc.collect()
+    gc.freeze()
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_setup(item):
+    item.stash[BEGAN] = processor_time()
+
+
+@pytest.hookimpl(wrapper=True, trylast=True)
+def pytest_runtest_teardown(item, nextitem):
+    try:
+        return (yield)
+    finally:
+        if nextitem is None or nextitem.path != item.path:
+            gc.collect()
+            if hasattr(LIBC, "malloc_trim"):
+                LIBC.malloc_trim(0)
+        seconds = processor_time() - item.stash.get(BEGAN, processor_time())
+        item.user_properties += [("seconds", f"{seconds:.2f}"), ("megabytes", f"{memory():.0f}")]
+
+
+def processor_time():
+    """Seconds of this process, of processes that it started and that have ended, and of all commands."""
+    used = [resource.getrusage(of) for of in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
+    return sum(one.ru_utime + one.ru_stime for one in used) + Commands.seconds
+
+
+def memory():
+    """Megabytes that this process has now."""
+    with open("/proc/self/statm") as file:
+        return int(file.read().split()[1]) * resource.getpagesize() / 2**20
