@@ -17,7 +17,6 @@ sys.path.insert(0, str(Path(__file__).parent / "mbs"))
 from rod_chains import extrapolated
 
 SOFT, STIFF = 1e9, 7e10
-FALL = [{"name": "fall", "kind": "forward", "end": 1.0, "output_step": 0.01, "tolerance": 1e-5}]
 DRIVEN = [
     {"name": "O", "type": "revolute", "between": ["ground", "link1.root"]},
     {"name": "A", "type": "revolute", "between": ["link1.tip", "link2.root"]},

@@ -1,23 +1,16 @@
-"""Closed loops of robots in 3D: those of planar robots put there, work, linear models, bad input."""
+"""Closed loops of robots in 3D: linear models, work, controllers of the user, bad input."""
 
 import numpy as np
 import pytest
 import scenes_in_3d
 from checkpoints import CASES
-from scenes_in_3d import CRANK
 from scipy.linalg import expm
 
 import ffrobot
 from ffrobot.common.errors import InputError
 
-CLOSE = 1e-6  # of the peak of each quantity
 BLOW = [{"point": "link2.tip", "y": "where(t < 0.02, 0, where(t < 0.03, 30*sin(pi*(t - 0.02)/0.01), 0))"}]
 PD = {"kind": "joint-pid", "proportional": {"O": 500.0, "A": 100.0}, "derivative": {"O": 40.0, "A": 8.0}}
-ENCODERS = [{"joint": "O", "resolution": 9.587e-5}, {"joint": "A", "resolution": 9.587e-5}]
-STRAINS = [{"pzt": "link1", "resolution": 0.005, "noise": 0.005}, {"pzt": "link2", "noise": 0.005}]
-SPLIT = {"name": "split", "kind": "fcid", "shape": "static", "end": 0.1, "output_step": 0.001, "tolerance": 1e-9}
-INVERSE = {"name": "inverse", "kind": "pcid", "end": 0.1, "output_step": 0.001, "tolerance": 1e-9}
-TIP = [{"point": "link2.tip", "measure": measure} for measure in ("value", "rate", "acceleration")]
 
 
 def loop(name, *controllers, actuation="split", **keys):
@@ -25,124 +18,6 @@ def loop(name, *controllers, actuation="split", **keys):
         "name": name, "kind": "closed-loop", "actuation": actuation, "sample_time": 0.001, "delay": 0.0005,
         "tolerance": 1e-9, "disturbance": BLOW, "controller": list(controllers),
     } | keys  # fmt: skip
-
-
-def both(folder, analyses, **keys):
-    """Results of the case in the plane and of the same robot in 3D."""
-    planar = scenes_in_3d.read(CASES / "two_link_closed_loop" / "scene.toml") | keys
-    planar["analysis"] = analyses
-    spatial = scenes_in_3d.in_3d(planar) | {"pzt": planar["pzt"], "analysis": analyses}
-    spatial["initial"] = {"joints": {"O": 0.0, "A": np.pi / 3}}
-    return [
-        ffrobot.solve(scenes_in_3d.write(tables, folder / f"{name}.toml"))
-        for name, tables in (("planar", planar), ("spatial", spatial))
-    ]
-
-
-def same_loops(planar, spatial, name):
-    """Readings, references and commands of all samples, what the motors did, and what is made of it in numbers."""
-    about, there = (results.attributes(f"{name}/control") for results in (planar, spatial))
-    assert list(about["inputs"]) == list(there["inputs"])
-    columns = [list(there["outputs"]).index(output) for output in about["outputs"]]
-    modal = [output.startswith("modal/") for output in about["outputs"]]
-    assert len(about["outputs"]) == len(set(columns))
-    for dataset, chosen in (("commands", slice(None)), ("wanted", slice(None)), ("readings", columns)):
-        expected, found = planar[f"{name}/control/{dataset}"], spatial[f"{name}/control/{dataset}"][:, chosen]
-        if dataset == "readings":  # modes may have the other sign
-            expected, found = (np.where(modal, np.abs(values), values) for values in (expected, found))
-        peaks = np.abs(expected).max(axis=0)
-        assert (np.abs(found - expected).max(axis=0) <= CLOSE * peaks).all(), (
-            dataset,
-            np.abs(found - expected) / peaks,
-        )
-    for joint in ("O", "A"):
-        for dataset in ("coordinate", "rate", "moment"):
-            expected, found = (results[f"{name}/joints/{joint}/{dataset}"] for results in (planar, spatial))
-            np.testing.assert_allclose(found, expected, atol=CLOSE * np.abs(expected).max())
-    expected, found = (results[f"{name}/tip_error"] for results in (planar, spatial))
-    np.testing.assert_allclose(found, expected, atol=CLOSE * np.abs(expected).max())
-    for key in ("verdict", "advice"):
-        assert np.all(about[key] == there[key])
-    assert planar.verdict[name].margins == spatial.verdict[name].margins
-
-
-def test_motors_and_patches_of_two_links(tmp_path):
-    damper = {"kind": "modal-velocity", "bodies": ["link1", "link2"], "modes": 2, "damping_ratio": 0.05}
-    patches = {"kind": "lqr", "inputs": "patches", "modes": 4, "deflection": 1e-4, "voltage": 200.0}
-    together = {"kind": "lqr", "modes": 4, "rate": 0.1, "deflection": 2e-4, "moment": 3.0, "voltage": 500.0}
-    analyses = [
-        SPLIT, INVERSE,
-        loop("pd", PD, sensor=[*ENCODERS, *TIP], start="scene"),
-        loop("full", actuation="inverse", feed_forward="joints+pzt", unlimited=True),
-        loop("limited", actuation="inverse", feed_forward="joints+pzt", delay=0.0),
-        loop("ideal", PD, {**damper, "sensor": "ideal"}),
-        loop("damper", PD, damper, sensor=STRAINS),
-        loop("patches", PD, patches, sensor=[*ENCODERS, *STRAINS]),
-        loop("lqr", together, delay=0.0025, sensor=STRAINS),
-        loop("torque", {"kind": "computed-torque", "bandwidth": 20.0}),
-    ]  # fmt: skip
-    planar, spatial = both(tmp_path, analyses)
-    with planar, spatial:
-        assert planar.verdict["pd"].margins
-        assert np.abs(planar["limited/control/commands"]).max() == 200.0
-        for analysis in analyses[2:]:
-            same_loops(planar, spatial, analysis["name"])
-
-
-def test_motors_on_frames(tmp_path):
-    """Links bend in the plane of the joints alone: rotors and sensors are between frames, too."""
-    keys = {"motors": "frame", "pzt": []}
-    held = loop("held", PD, actuation="inverse", sample_time=0.002, sensor=[{"joint": "O"}, {"joint": "A"}])
-    planar, spatial = both(tmp_path, [INVERSE, held], **keys)
-    with planar, spatial:
-        same_loops(planar, spatial, "held")
-
-
-def test_gears_that_give(tmp_path):
-    """The gear on the ground alone: what the rotor of another does to its link is left out in 2D (docs/theory.md)."""
-    geared = {"gear_ratio": 60.0, "rotor_inertia": 2e-4}
-    compliant = geared | {"stiffness": 3e3, "damping": 2.0}
-    rods = scenes_in_3d.read(CASES / "two_link_closed_loop" / "scene.toml")
-    points = {"root": [0.0, 0.0], "tip": [1.0, 0.0]}
-    for k, body in enumerate(rods["body"]):
-        del body["link"]
-        body["rigid"] = {"mass": 2.0 - k, "inertia": 0.15, "center": [0.5, 0.0], "points": points}
-    joints = [joint | own for joint, own in zip(rods["joint"], (compliant, geared), strict=True)]
-    hip, knee = (
-        {"kind": "joint-pid", "proportional": {joint: p}, "derivative": {joint: d}}
-        for joint, p, d in (("O", 300.0, 40.0), ("A", 100.0, 10.0))
-    )
-    analyses = [
-        INVERSE,
-        loop("motors", {**hip, "side": "motor"}, knee, actuation="inverse"),
-        loop("joints", hip, knee, actuation="inverse", start="scene"),
-    ]
-    planar, spatial = both(tmp_path, analyses, body=rods["body"], joint=joints, pzt=[])
-    with planar, spatial:
-        assert spatial.attributes("motors/control")["outputs"][0] == "motor/O"
-        for name in ("motors", "joints"):
-            for dataset in ("control/commands", "control/readings", "joints/O/motor_angle", "tip_error"):
-                expected, found = (results[f"{name}/{dataset}"] for results in (planar, spatial))
-                np.testing.assert_allclose(found, expected, atol=CLOSE * np.abs(expected).max())
-
-
-def test_a_crank_that_drives_a_slider(tmp_path):
-    """A loop that a joint closes: its rows hold under the controller."""
-    tables = scenes_in_3d.read(CASES / "slider_crank" / "scene.toml")
-    crank = tables["joint"][0]["name"]
-    pd = {"kind": "joint-pid", "proportional": {crank: 20.0}, "derivative": {crank: 0.5}}
-    inverse = INVERSE | {"end": 0.05}
-    keys = {"actuation": "inverse", "disturbance": [], "delay": 0.0002, "feed_forward": "none"}
-    tables |= {"analysis": [inverse, loop("pd", pd, **keys)]}
-    tables.pop("pzt", None)
-    tables["joint"][0] |= {"motor": True, "gear_ratio": 20.0, "rotor_inertia": 1e-5}
-    spatial = scenes_in_3d.in_3d(tables) | {"analysis": tables["analysis"], "initial": {"joints": CRANK}}
-    with solve(tables, tmp_path, "planar") as planar, solve(spatial, tmp_path, "spatial") as found:
-        for dataset in ("control/commands", "control/readings", "tip_error", f"joints/{crank}/moment"):
-            expected = planar[f"pd/{dataset}"]
-            np.testing.assert_allclose(found[f"pd/{dataset}"], expected, atol=CLOSE * np.abs(expected).max())
-        assert found["pd/constraint_violation"].max() < 1e-9
-        assert planar.verdict["pd"].margins == found.verdict["pd"].margins
 
 
 HOLD = {"name": "hold", "kind": "pcid", "end": 0.1, "output_step": 0.0005, "tolerance": 1e-10}

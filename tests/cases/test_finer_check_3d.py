@@ -2,7 +2,6 @@
 
 import json
 
-import numpy as np
 import pytest
 
 import ffrobot as library
@@ -59,20 +58,6 @@ def checked(keys):
     with library.solve(library.make_scene(**keys)) as results:
         about = results.attributes("inverse")
         return {name: about[f"check_{name}"] for name in ("modes", "point", "error", "status")}
-
-
-@pytest.mark.parametrize(("kind", "patches"), [("pcid", True), ("fcid", True), ("motors-only", False)])
-def test_it_is_that_of_the_plane(kind, patches):
-    """Joints that follow a path: all points of the link are looked at."""
-    keys = planar(MODES, kind, patches)
-    if kind == "fcid":
-        keys["analysis"][0]["shape"] = "static"
-    found, expected = checked(in_3d(keys)), checked(keys)
-    assert {key: found[key] for key in ("modes", "point", "status")} == {
-        key: expected[key] for key in ("modes", "point", "status")
-    }
-    assert expected["error"] > 1e-6
-    np.testing.assert_allclose(found["error"], expected["error"], rtol=1e-2)  # replays at 1e-5 of the path
 
 
 def test_error_is_that_of_the_modes_left_out():

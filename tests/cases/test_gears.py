@@ -1,4 +1,4 @@
-"""Compliant gears, in 3D: two masses on a spring, momentum and energy, the plane's numbers, acting again."""
+"""Compliant gears, in 3D: two masses on a spring, momentum and energy, acting again."""
 
 import numpy as np
 import pytest
@@ -99,29 +99,6 @@ def test_dampers_and_motors_make_up_the_energy(tmp_path):
         losses = simpson(found["run/energy/dissipated_power"], x=t)
         assert losses > 0.02 * energy[0]
         assert abs(simpson(sum(power), x=t) - losses - (energy[-1] - energy[0])) < 2e-4 * losses
-
-
-def test_planar_arm_with_gears_that_give_in_3d(tmp_path):
-    """Inverse analysis and equilibrium of the two-link arm: numbers of the plane."""
-    analyses = [
-        {"name": "inverse", "kind": "fcid", "shape": "zero", "end": 1.0, "output_step": 0.005},
-        {"name": "rest", "kind": "static"},
-    ]
-    planar = scenes_in_3d.read(CASES / "two_link" / "scene.toml")
-    planar.pop("pzt", None)
-    planar["joint"] = [joint | GEARED for joint in planar["joint"]]
-    planar["analysis"] = analyses
-    spatial = scenes_in_3d.in_3d(planar) | {"analysis": analyses}
-    spatial["initial"] = {"joints": {"O": 0.0, "A": 1.0471975511965976}}
-    with solve(planar, tmp_path, "planar") as plane, solve(spatial, tmp_path, "spatial") as space:
-        for joint in ("O", "A"):
-            for key in ("moment", "gear_moment", "motor_angle", "motor_rate"):
-                for analysis in ("inverse", "rest"):
-                    name = f"{analysis}/joints/{joint}/{key}"
-                    least = 1e-6 * np.abs(plane[f"inverse/joints/O/{key}"]).max()
-                    np.testing.assert_allclose(
-                        space[name], plane[name], atol=1e-7 * max(np.abs(plane[name]).max(), least), rtol=0
-                    )
 
 
 def test_motors_behind_gears_carry_out_an_inverse_analysis(tmp_path):

@@ -1,4 +1,4 @@
-"""Linear models of robots in 3D: those of planar robots put there, patches, closed forms, bad input."""
+"""Linear models of robots in 3D: gears, closed forms, bad input."""
 
 from itertools import zip_longest
 
@@ -6,14 +6,12 @@ import numpy as np
 import pytest
 import scenes_in_3d
 from checkpoints import CASES
-from scenes_in_3d import CRANK, TWO_LINK
+from scenes_in_3d import TWO_LINK
 
 import ffrobot
 
-INVERSE = {"name": "inverse", "kind": "pcid", "end": 0.2, "output_step": 0.05, "tolerance": 1e-10}
 RIGID_GEAR = {"gear_ratio": 60.0, "rotor_inertia": 2e-4}
 GEARED = RIGID_GEAR | {"stiffness": 3e3, "damping": 2.0}
-MOVING = {"name": "moving", "kind": "linear", "about": "inverse", "times": [0.0, 0.1, 0.2]}
 
 
 def both(case, guess, analyses, folder, of_joints=(), of_bodies=None, **changes):
@@ -43,67 +41,6 @@ def same_models(planar, spatial, close, outputs=("joint/", "point/")):
         expected, found = (model.frequency_response(omega, sources, targets) for model in (in_plane, in_3d))
         for k in range(len(omega)):
             np.testing.assert_allclose(found[k], expected[k], rtol=0, atol=close * np.abs(expected[k]).max())
-
-
-def test_two_links_along_their_path(tmp_path):
-    planar, spatial = both("two_link", TWO_LINK, [INVERSE, MOVING], tmp_path)
-    with planar, spatial:
-        same_models(planar.linear("moving"), spatial.linear("moving"), 1e-7)
-        expected, found = (results["moving/linear/frequency"] for results in (planar, spatial))
-        np.testing.assert_allclose(found, expected, rtol=1e-7, atol=1e-6)
-        for name in ("position", "modal"):
-            key = f"moving/linear/modes/link2/{name}"
-            sign = np.sign(np.sum(planar[key][0, 3] * spatial[key][0, 3][..., : planar[key].shape[-1]]))
-            shape = sign * spatial[key][0, 3][..., : planar[key].shape[-1]]
-            np.testing.assert_allclose(shape, planar[key][0, 3], atol=1e-6 * np.abs(planar[key][0, 3]).max())
-
-
-def test_two_links_at_rest(tmp_path):
-    planar, spatial = both("two_link", TWO_LINK, [{"name": "rest", "kind": "linear"}], tmp_path)
-    with planar, spatial:
-        same_models(planar.linear("rest"), spatial.linear("rest"), 1e-9)
-        assert spatial.linear("rest")[0].freedom == planar.linear("rest")[0].freedom
-
-
-def test_a_loop(tmp_path):
-    inverse = INVERSE | {"end": 0.02, "output_step": 0.01}
-    moving = MOVING | {"times": [0.0, 0.02]}
-    planar, spatial = both("slider_crank", CRANK, [inverse, moving], tmp_path)
-    with planar, spatial:
-        same_models(planar.linear("moving"), spatial.linear("moving"), 1e-6)
-
-
-def test_motors_that_turn_frames(tmp_path):
-    """Links bend in the plane of the joints alone: coordinates are those of frames, too."""
-    about = [INVERSE, MOVING, {"name": "rest", "kind": "linear"}]
-    planar, spatial = both("two_link", TWO_LINK, about, tmp_path, motors="frame")
-    with planar, spatial:
-        for name in ("moving", "rest"):
-            same_models(planar.linear(name), spatial.linear(name), 1e-7)
-            expected, found = (results[f"{name}/linear/pole"] for results in (planar, spatial))
-            np.testing.assert_allclose(np.hypot(*found.T), np.hypot(*expected.T), rtol=1e-7, atol=1e-3)
-
-
-@pytest.mark.parametrize("motors", ["section", "frame"])
-def test_gears_that_give(motors, tmp_path):
-    """About an equilibrium, an inverse analysis, for which motors are found, and a forward run that has them.
-
-    The gear on the ground alone is compliant: what the rotor of another does to the link that carries it is left out
-    in 2D (docs/theory.md). At rest gravity bears 12 N·m/rad, which are what is left of springs of 3000: rounding counts
-    the more.
-    """
-    inverse = INVERSE | {"output_step": 0.0005, "tolerance": 1e-9}
-    forward = inverse | {"name": "forward", "kind": "forward", "actuation": "inverse", "apply": "joints"}
-    beside = MOVING | {"name": "beside", "about": "forward"}
-    about = [inverse, MOVING, {"name": "rest", "kind": "linear"}, forward, beside]
-    planar, spatial = both(
-        "two_link", TWO_LINK, about, tmp_path, of_joints=(GEARED, RIGID_GEAR), of_bodies={"modes": 2}, motors=motors
-    )
-    with planar, spatial:
-        for name, close in (("rest", 1e-7), ("moving", 1e-6), ("beside", 1e-6)):
-            same_models(planar.linear(name), spatial.linear(name), close, outputs=("joint/", "motor/", "point/"))
-            assert spatial.linear(name)[0].freedom == planar.linear(name)[0].freedom
-            assert spatial[f"{name}/linear/modes/link2/modal"].shape[1] == spatial.linear(name)[0].freedom
 
 
 def test_a_gear_between_links_gives_between_their_frames(tmp_path):

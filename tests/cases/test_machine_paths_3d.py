@@ -1,4 +1,4 @@
-"""Paths as machines run them, in 3D: those of the plane, poses, motors behind gears, shapers, time scaling."""
+"""Paths as machines run them, in 3D: poses, motors behind gears, shapers, time scaling."""
 
 import numpy as np
 import pytest
@@ -15,8 +15,6 @@ from ffrobot.mbs.fields.shapers import Impulse, impulses
 RUN = {"name": "inverse", "kind": "pcid", "end": 0.5, "output_step": 0.002, "tolerance": 1e-10}
 GUESS = {"O": 0.0, "A": 1.0471975511965976}
 TURNS = {"O": [0.0, "20*deg", "-5*deg"], "A": ["60*deg", "40*deg", "70*deg"]}
-PLACES = [[1.5, "sqrt(3)/2"], [1.3, 1.0], [1.35, 1.1]]
-LIMITS = {"profile": "s-curve", "speed": 2.0, "acceleration": 30.0, "jerk": 900.0, "start": 0.02, "hold": 0.03}
 
 
 def both(trajectories, folder, guess=GUESS, **keys):
@@ -64,31 +62,6 @@ def test_a_shaper_that_asks_the_robot_beside_a_held_joint(held, tmp_path):
         about = plane.attributes("inverse/trajectories/O")
         (frequency,) = about["shaper_frequency"]
         assert about["end"] - about["begin"] == pytest.approx(0.2 + 0.5 / frequency, rel=1e-3)  # half a period later
-
-
-@pytest.mark.parametrize(
-    "keys",
-    [
-        LIMITS,
-        {"duration": [0.2, 0.15], "stretch": 1.2},
-        {"duration": 0.2, "profile": "trapezoid", "blend": 0.3},
-        {"duration": 0.1, "shaper": {"kind": "zvd", "frequency": [40.0, 90.0], "damping_ratio": 0.01}},
-        {"duration": 0.15, "shaper": {"kind": "zv", "modes": 2}},
-    ],
-)
-def test_joints_of_the_plane(keys, tmp_path):
-    paths = joints(**keys)
-    plane, space = both(paths, tmp_path)
-    with plane, space:
-        same(plane, space, paths)
-
-
-def test_places_of_the_plane(tmp_path):
-    """[x, y] leaves z open, which the plane has not."""
-    paths = [{"name": "tip", "point": "link2.tip", "via": PLACES, **LIMITS}]
-    plane, space = both(paths, tmp_path)
-    with plane, space:
-        same(plane, space, paths)
 
 
 INERTIA, TURN = 0.3, 1.2

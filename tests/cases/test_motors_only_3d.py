@@ -1,13 +1,7 @@
-"""Motors alone in 3D: the planar numbers of a planar robot, and moments that carry an arm along its path."""
-
-import tomllib
-from pathlib import Path
+"""Motors alone in 3D: moments that carry an arm along its path."""
 
 import numpy as np
 import pytest
-import scenes_in_3d
-import tomli_w
-from checkpoints import CASES
 from drawn_arms import drawn_arm, posed
 from patched_arms import ARM, LINK
 from rod_chain_3d import Body, RodChain, X, Y, Z, bar
@@ -16,42 +10,6 @@ from scipy.interpolate import CubicSpline
 import ffrobot
 from ffrobot.run.solve import solve_scene
 from ffrobot.run.watcher import Watcher
-
-KEPT = ("exact", "redefined")
-
-
-@pytest.fixture(scope="module")
-def two_link(tmp_path_factory):
-    """The case of the plane with two modes a link, its inversions alone, in the plane and in 3D."""
-    folder, found = tmp_path_factory.mktemp("two_link"), {}
-    tables = scenes_in_3d.read(CASES / "two_link_motors_only" / "scene.toml")
-    tables["analysis"] = [
-        analysis | {"end": 0.5, "output_step": 0.005} for analysis in tables["analysis"] if analysis["name"] in KEPT
-    ]
-    for body in tables["body"]:
-        link = tomllib.loads(Path(body["link"]).read_text(encoding="utf-8"))
-        link["modes"]["count"] = 2
-        body["link"] = str(folder / f"{body['name']}.toml")
-        Path(body["link"]).write_text(tomli_w.dumps(link), encoding="utf-8")
-    spatial = scenes_in_3d.in_3d(tables) | {"analysis": tables["analysis"]}
-    spatial["initial"] = {"state": "static", "joints": {"O": 0.0, "A": np.pi / 3}}
-    for space, scene in (("planar", tables), ("spatial", spatial)):
-        found[space] = ffrobot.solve(scenes_in_3d.write(scene, folder / f"{space}.toml"))
-    yield found
-    for results in found.values():
-        results.close()
-
-
-@pytest.mark.parametrize("name", KEPT)
-def test_planar_robot_in_3d_has_the_planar_moments(name, two_link):
-    """Zeros on both sides: moments before the path and after it; or integrated forward."""
-    plane, space = two_link["planar"], two_link["spatial"]
-    np.testing.assert_allclose(space[f"{name}/time"], plane[f"{name}/time"], atol=1e-12)
-    assert plane[f"{name}/time"][0] < -0.01 or name == "redefined"
-    for joint in ("O", "A"):
-        expected = plane[f"{name}/joints/{joint}/moment"]
-        np.testing.assert_allclose(space[f"{name}/joints/{joint}/moment"], expected, atol=2e-6 * np.abs(expected).max())
-
 
 PATH = """
 [[trajectory]]

@@ -1,6 +1,4 @@
-"""Patches of scenes in 3D through `ffrobot solve`: against the plane, turned links, and what no patch reaches."""
-
-from dataclasses import dataclass
+"""Patches of scenes in 3D through `ffrobot solve`: turned links, and what no patch reaches."""
 
 import h5py
 import numpy as np
@@ -8,105 +6,6 @@ import pytest
 from patched_arms import LINK, PZT, SEVEN
 
 from ffrobot import Results
-
-
-@dataclass
-class Arm:
-    """Two links, shoulder and elbow about z, the tip on a path in the plane; in the plane and in 3D.
-
-    Without attachment modes, whose mass the planar program raises and that in 3D does not.
-    """
-
-    keys: str = 'structural = true\nface = "both"'
-    limit: float = 200.0
-    payload: str = "mass = 0.2"
-
-    def write(self, folder, space):
-        modes = 'count = 4\nfamily = "in-plane-bending"'
-        for name, length in (("upper", 0.4), ("fore", 0.3)):
-            size = {"height": 0.006, "width": 0.02}
-            (folder / f"{name}.toml").write_text(LINK.format(name=name, length=length, modes=modes, **size))
-        vector = ("0.0, -9.81, 0.0", "0.0, 0.0, 0.0", "axis = [0.0, 0.0, 1.0]")
-        guess = "angles = { upper = -0.3, fore = 0.9 }"
-        if space == "spatial":
-            guess = "joints = { shoulder = -0.3, elbow = 1.2 }"
-        gravity, at, axis = ("0.0, -9.81", "0.0, 0.0", "") if space == "planar" else vector
-        text = f"""
-name = "arm"
-space = "{space}"
-gravity = [{gravity}]
-[[body]]
-name = "upper"
-link = "upper.toml"
-[[body]]
-name = "fore"
-link = "fore.toml"
-[[joint]]
-name = "shoulder"
-type = "revolute"
-between = ["ground", "upper.root"]
-at = [{at}]
-{axis}
-[[joint]]
-name = "elbow"
-type = "revolute"
-between = ["upper.tip", "fore.root"]
-{axis}
-[[payload]]
-point = "fore.tip"
-{self.payload}
-[initial]
-{guess}
-[[trajectory]]
-name = "tip"
-point = "fore.tip"
-x = "0.45 + 0.05*sin(4*t)**3"
-y = "0.2 - 0.06*sin(3*t)**3"
-{PZT.format(body="upper", keys=self.keys, limit=self.limit)}
-{PZT.format(body="fore", keys=self.keys, limit=self.limit)}
-[[analysis]]
-name = "inverse"
-kind = "pcid"
-end = 0.1
-output_step = 0.01
-tolerance = 1e-10
-"""
-        path = folder / f"{space}.toml"
-        path.write_text(text)
-        return path
-
-
-@pytest.mark.parametrize(
-    "arm",
-    [
-        Arm(),
-        Arm(limit=20.0),
-        Arm('structural = false\ncoupling = "rotation"'),
-        Arm('allocation = "least-squares"\npoint_weights = { tip = 1.0 }\nstructural = ["stiffness"]', limit=30.0),
-    ],
-    ids=["structural", "limited", "paper", "weights"],
-)
-def test_planar_scene_put_into_space_has_the_planar_voltages(arm, tmp_path, ffrobot):
-    """To 1e-8 of each peak, with mass and stiffness of patches, limits that bind, and weights."""
-    for space in ("planar", "spatial"):
-        done = ffrobot("solve", arm.write(tmp_path, space))
-        assert done.returncode == 0, done.stderr
-    with Results(tmp_path / "planar.results.h5") as plane, Results(tmp_path / "spatial.results.h5") as found:
-        for body in ("upper", "fore"):
-            for key in ("required_voltage", "voltage", "residual"):
-                expected = plane[f"inverse/pzt/{body}/{key}"]
-                size = np.abs(plane[f"inverse/pzt/{body}/required_voltage"]).max() if "volt" in key else expected.max()
-                np.testing.assert_allclose(found[f"inverse/pzt/{body}/{key}"], expected, atol=1e-8 * max(size, 1e-6))
-            for key in ("edges", "moment_per_volt", "stiffness_ratio", "authority"):
-                np.testing.assert_allclose(found[f"inverse/pzt/{body}/{key}"], plane[f"inverse/pzt/{body}/{key}"],
-                                           rtol=1e-12)  # fmt: skip
-            judged = f"inverse/feasibility/pzt/{body}"
-            for key in ("factor", "field", "strain", "mode_required"):
-                # peaks between outputs, at ends of steps, which are others in 3D
-                np.testing.assert_allclose(found[f"{judged}/{key}"], plane[f"{judged}/{key}"], rtol=1e-3)
-        assert found.verdict["inverse"].feasible == plane.verdict["inverse"].feasible
-        assert found.verdict["inverse"].answer == plane.verdict["inverse"].answer
-
 
 ONE_LINK = """
 name = "turned"

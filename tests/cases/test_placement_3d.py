@@ -1,24 +1,11 @@
-"""Patches placed on links in 3D: those of planar robots put there, out of plane, bad input."""
+"""Patches placed on links in 3D: out of plane, bad input."""
 
 import numpy as np
 import pytest
 import scenes_in_3d
-from checkpoints import CASES
 
 import ffrobot
 from ffrobot.common.errors import InputError
-
-INVERSE = {"name": "inverse", "kind": "pcid", "end": 0.2, "output_step": 0.002, "tolerance": 1e-9}
-REACH = {"name": "reach", "kind": "placement", "placement": {"body": "link2"}}
-MOVED = {
-    "name": "moved", "kind": "placement", "about": "inverse", "times": [0.1],
-    "placement": {"body": "link1", "measure": "product", "count": 2},
-}  # fmt: skip
-PATH = {"name": "path", "kind": "placement", "about": "inverse", "placement": {"body": "link2", "criterion": "voltage"}}
-
-
-def tables():
-    return scenes_in_3d.read(CASES / "two_link_placement" / "scene.toml")
 
 
 def in_3d(planar, **keys):
@@ -28,24 +15,6 @@ def in_3d(planar, **keys):
 
 def solve(scene, folder, name="scene"):
     return ffrobot.solve(scenes_in_3d.write(scene, folder / f"{name}.toml"))
-
-
-def test_planar_robot_put_into_space_gets_the_same_patches(tmp_path):
-    planar = tables() | {"analysis": [INVERSE, REACH, MOVED, PATH]}
-    with solve(planar, tmp_path, "planar") as plane, solve(in_3d(planar), tmp_path, "spatial") as space:
-        for name in ("reach", "moved", "path"):
-            for dataset in (
-                "best/centers", "best/reach", "best/value", "even/reach", "even/value", "frequency", "share",
-                "candidates", "candidate_reach",
-            ):  # fmt: skip
-                expected, found = (results[f"{name}/placement/{dataset}"] for results in (plane, space))
-                np.testing.assert_allclose(found, expected, rtol=1e-6, err_msg=f"{name}/{dataset}")
-        expected, found = (results["path/placement/largest_voltage"] for results in (plane, space))
-        np.testing.assert_allclose(found, expected, rtol=1e-6)
-        assert len(expected) == 2
-        for results in (plane, space):
-            assert results.attributes("path")["wall_seconds"] == 0.0  # the integration was that of "inverse"
-            assert results.attributes("path")["steps"] == 0 < results.attributes("inverse")["steps"]
 
 
 STRIP = {

@@ -1,65 +1,61 @@
-"""Planar scenes put into space give the planar numbers, whichever way the scene is turned and its bodies are listed."""
+"""Planar scenes have the numbers of the same in 3D, however that is turned and its bodies are listed."""
 
+import h5py
 import numpy as np
 import pytest
 import scenes_in_3d
 from checkpoint_scene_files import write_scene
-from checkpoints import CASES
-from scenes_in_3d import CRANK, REST, STRAIGHT, TIGHT, TWO_LINK, close, compare_two_links
+from planar_features import COMPARED, FEATURES, peaks, same_models
+from scenes_in_3d import REST, STRAIGHT, TIGHT, close
 
 import ffrobot
 from ffrobot.common.rotations import exponential, of_rpy
+from ffrobot.mbs.model import system
+
+ATTRIBUTES = ("status", "check_point", "check_modes", "check_error", "check_status")
 
 
-def both(case, analyses, guess, folder, payload=None):
-    """Results of a planar scene and of the same in 3D."""
-    planar = scenes_in_3d.read(CASES / case / "scene.toml")
-    planar.pop("pzt", None)
-    planar["analysis"] = analyses
-    spatial = scenes_in_3d.in_3d(planar) | {"initial": {"joints": guess}, "analysis": analyses}
-    if payload is not None:
-        J = payload["inertia"]  # about z; the others are of no account in the plane
-        planar["payload"], spatial["payload"] = [payload], [payload | {"inertia": [0.7 * J, 0.6 * J, J]}]
-    return [
-        ffrobot.solve(scenes_in_3d.write(tables, folder / f"{name}.toml"))
-        for name, tables in (("planar", planar), ("spatial", spatial))
-    ]
+def solved(tables, path):
+    """Datasets that are compared, attributes of the analyses, and linear models of a scene."""
+    with ffrobot.solve(ffrobot.make_scene(**tables), output=path) as results, h5py.File(path) as file:
+        found = {}
+        file.visititems(lambda name, item: found.__setitem__(name, item))
+        about = {
+            name: {key: file[name].attrs[key] for key in ATTRIBUTES if key in file[name].attrs}
+            for name in file
+            if isinstance(file[name], h5py.Group)
+        }
+        numbers = {
+            name: item[()] for name, item in found.items()
+            if isinstance(item, h5py.Dataset) and item.size and name.rpartition("/")[2] in COMPARED
+            and not ("/linear/" in name and not name.endswith("frequency"))
+            and not ("link1" in name and "actuation" in name)  # points of other components in the plane
+        }  # fmt: skip
+        return about, numbers, {name: results.linear(name) for name in about if f"{name}/linear" in file}
 
 
-GRIPPER = {"point": "link2.tip", "mass": 0.3, "inertia": 2e-3}
-
-
-@pytest.mark.parametrize("payload", [None, GRIPPER], ids=["bare", "with a payload that has inertia"])
-def test_two_links(payload, tmp_path):
-    planar, spatial = both("two_link", [TIGHT, STRAIGHT, REST], TWO_LINK, tmp_path, payload)
-    with planar, spatial:
-        assert spatial.names("inverse/bodies") == planar.names("inverse/bodies")
-        assert spatial.names("inverse/joints") == planar.names("inverse/joints")
-        for analysis, share in (("inverse", 1e-8), ("straight", 1e-11), ("rest", 1e-9)):
-            compare_two_links(planar, spatial, analysis, share)
-        for key in ("kinetic", "strain"):
-            close(spatial[f"inverse/energy/{key}"], planar[f"inverse/energy/{key}"], 1e-8)
-
-
-def test_split_of_duties(tmp_path):
-    """Links in the shape in which motors are enough: found, and made a spline, twice."""
-    split = STRAIGHT | {"name": "split", "shape": "static"}
-    planar, spatial = both("two_link_split", [STRAIGHT, split], TWO_LINK, tmp_path)
-    with planar, spatial:
-        compare_two_links(planar, spatial, "split", 1e-8)
-
-
-def test_slider_crank_has_redundant_rows_in_3d(tmp_path):
-    """A loop of parallel axes: reactions across the plane are not unique, what is in the plane is that of the plane."""
-    planar, spatial = both("slider_crank", [TIGHT | {"end": 0.05}], CRANK, tmp_path)
-    with planar, spatial:
-        close(spatial["inverse/trajectories/slider/force"], planar["inverse/trajectories/slider/force"], 1e-8)
-        close(spatial["inverse/bodies/rod/modal"], planar["inverse/bodies/rod/modal"], 1e-8)
-        for joint in ("O", "A"):
-            for key in ("coordinate", "rate"):
-                close(spatial[f"inverse/joints/{joint}/{key}"], planar[f"inverse/joints/{joint}/{key}"], 1e-8)
-            name = f"inverse/joints/{joint}/reaction"
-            close(spatial[name][:, :2], planar[name], 1e-8)
+@pytest.mark.parametrize("feature", FEATURES)
+def test_a_planar_scene_is_that_in_3d(feature, tmp_path, monkeypatch):
+    """The equations in 3D are integrated as they are, without a projection on the plane in which the robot moves."""
+    kind, tables, share = FEATURES[feature]
+    planar, spatial = tables()
+    about, plane, models = solved(planar, tmp_path / "planar.h5")
+    monkeypatch.setattr(system, "in_plane", lambda *_: None)
+    about_3d, found, models_3d = solved(spatial, tmp_path / "spatial.h5")
+    errors = [[one[name].pop("check_error", 0.0) for name in about] for one in (about, about_3d)]
+    assert errors[1] == pytest.approx(errors[0], rel=1e-2)  # of replays at 1e-5 of the path
+    assert about_3d == about
+    for name, of_plane in models.items():
+        same_models(of_plane, models_3d[name], share)
+    assert any(name.endswith(kind) for name in plane)
+    sizes = peaks(plane)
+    for name, expected in plane.items():
+        there = found[name]
+        if there.shape != expected.shape:  # vectors in 3D
+            assert there.shape[:-1] == expected.shape[:-1]
+            there = there[..., : expected.shape[-1]]
+        size = sizes[name.rpartition("/")[2]]
+        np.testing.assert_allclose(there, expected, rtol=0, atol=share * max(size, 1e-9), err_msg=name)
 
 
 def turned(tables, C):

@@ -9,7 +9,7 @@ import scenes_in_3d
 from bodies_by_invariants import from_modal_body as planar_body
 from checkpoints import CASES
 from rod_chain import falling_tip
-from scenes_in_3d import CRANK, REST, STRAIGHT, TIGHT, TWO_LINK, close, compare_two_links
+from scenes_in_3d import REST, STRAIGHT, TIGHT, TWO_LINK, close
 from scipy.linalg import eigh
 
 import ffrobot
@@ -136,17 +136,6 @@ def both(case, analyses, guess, folder, payload=None, geometric_stiffening=True)
 POINT_MASS = {"point": "link2.tip", "mass": 0.3}
 
 
-@pytest.mark.parametrize("payload", [None, POINT_MASS], ids=["bare", "loaded"])
-def test_two_links_of_the_plane(payload, tmp_path):
-    """A point mass at the tip loads the link as well. (With inertia it is part of the link in the plane alone.)"""
-    planar, spatial = both("two_link", [TIGHT, STRAIGHT, REST], TWO_LINK, tmp_path, payload)
-    with planar, spatial:
-        for analysis, share in (("inverse", 1e-8), ("straight", 1e-11), ("rest", 1e-9)):
-            compare_two_links(planar, spatial, analysis, share)
-        for key in ("kinetic", "strain", "gravitational"):
-            close(spatial[f"inverse/energy/{key}"], planar[f"inverse/energy/{key}"], 1e-8)
-
-
 def test_a_payload_in_3d_is_a_body_welded_in_the_plane(tmp_path):
     """With inertia; a payload of the plane is part of its link, whose fields keep 3e-4 of the moments less of it."""
     J, keys = 2e-3, {"geometric_stiffening": True, "analysis": [TIGHT | {"end": 0.15, "output_step": 0.01}]}
@@ -247,23 +236,6 @@ def test_auto_where_loads_change_the_stiffness(spin, stiffened, tmp_path):
             frequencies.append(results["about/linear/frequency"][0])
     assert effect == pytest.approx(softest_under_spin() * spin**2, rel=1e-3)
     np.testing.assert_array_equal(*frequencies)
-
-
-def test_linear_model_of_two_links_of_the_plane(tmp_path):
-    moving = {"name": "moving", "kind": "linear", "about": "inverse", "times": [0.0, 0.1, 0.2]}
-    planar, spatial = both("two_link", [TIGHT, moving], TWO_LINK, tmp_path)
-    with planar, spatial:
-        found, expected = (results["moving/linear/frequency"] for results in (spatial, planar))
-        np.testing.assert_allclose(found, expected, rtol=1e-7, atol=1e-6)
-
-
-def test_slider_crank_of_the_plane(tmp_path):
-    planar, spatial = both("slider_crank", [TIGHT | {"end": 0.05}], CRANK, tmp_path)
-    with planar, spatial:
-        close(spatial["inverse/trajectories/slider/force"], planar["inverse/trajectories/slider/force"], 1e-8)
-        close(spatial["inverse/bodies/rod/modal"], planar["inverse/bodies/rod/modal"], 1e-8)
-        name = "inverse/points/rod.mid/deflection"
-        close(spatial[name][:, :2], planar[name], 1e-8)
 
 
 def test_what_a_file_of_a_beam_says_of_the_plane_and_of_space(tmp_path):

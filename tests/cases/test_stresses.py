@@ -1,73 +1,9 @@
-"""Stresses of links in 3D: those of planar scenes put into space, and beams by closed forms."""
-
-from pathlib import Path
+"""Stresses of links in 3D: beams by closed forms."""
 
 import numpy as np
 import pytest
-import scenes_in_3d
-from checkpoints import CASES
 
 import ffrobot
-from ffrobot.fe_models.link_file import link_keys
-
-TIGHT = {"name": "inverse", "kind": "pcid", "end": 0.1, "output_step": 0.005, "tolerance": 1e-10}
-STRAIGHT = {"name": "straight", "kind": "fcid", "shape": "zero", "end": 0.1, "output_step": 0.005}
-REST = {"name": "rest", "kind": "static"}
-GUESS = {
-    "two_link": {"O": 0.0, "A": 1.0471975511965976},
-    "slider_crank": {"O": 1.3548358281099402, "A": -1.7867568254780147, "B": 0.43192099736991246, "guide": 0.233},
-}
-POINTS = {"top": [0.1, 0.0025, 0.0], "axis": [0.05, 0.0, 0.0], "root": [0.0, -0.002, 0.001]}
-
-
-def stressed(path):
-    """The keys of a link file, with stresses at points and all that statics takes."""
-    return dict(link_keys(path)) | {"stress": {"points": POINTS}}
-
-
-def both(case, analyses, folder):
-    """Results of a planar scene, its links with stresses, and of the same in 3D."""
-    planar = scenes_in_3d.read(CASES / case / "scene.toml")
-    planar.pop("pzt", None)
-    planar["analysis"] = analyses
-    for body in planar["body"]:
-        if "link" in body:
-            body["link"] = stressed(Path(body["link"]))
-    tip = planar["trajectory"][0].get("point")
-    planar["payload"] = [{"point": tip, "mass": 0.3}] if case == "two_link" else []
-    spatial = scenes_in_3d.in_3d(planar) | {"initial": {"joints": GUESS[case]}, "payload": planar["payload"]}
-    spatial["analysis"] = analyses
-    return [
-        ffrobot.solve(scenes_in_3d.write(tables, folder / f"{name}.toml"))
-        for name, tables in (("planar", planar), ("spatial", spatial))
-    ]
-
-
-def compare(planar, spatial, analysis, link, share):
-    names = [f"points/{point}/{key}" for point in POINTS for key in ("stress", "von_mises")]
-    peak = max(planar[f"{analysis}/stress/{link}/points/{point}/von_mises"].max() for point in POINTS)
-    for name in names:
-        found, expected = (of[f"{analysis}/stress/{link}/{name}"] for of in (spatial, planar))
-        np.testing.assert_allclose(found, expected, rtol=0, atol=share * peak, err_msg=name)
-    for of in (planar, spatial):
-        assert of.attributes(f"{analysis}/stress/{link}")["method"] == "mode acceleration"
-    assert peak > 1e4
-
-
-def test_two_links_with_a_payload(tmp_path):
-    forward = {"name": "again", "kind": "forward", "actuation": "inverse", "apply": "trajectory", "tolerance": 1e-9}
-    planar, spatial = both("two_link", [TIGHT, STRAIGHT, REST, forward], tmp_path)
-    with planar, spatial:
-        for analysis, share in (("inverse", 1e-8), ("straight", 1e-9), ("rest", 1e-8), ("again", 1e-6)):
-            for link in ("link1", "link2"):
-                compare(planar, spatial, analysis, link, share)
-
-
-def test_a_loop(tmp_path):
-    planar, spatial = both("slider_crank", [TIGHT | {"end": 0.05}], tmp_path)
-    with planar, spatial:
-        compare(planar, spatial, "inverse", "rod", 1e-8)
-
 
 LENGTH, R_OUTER, R_INNER = 0.8, 0.02, 0.016
 AREA, INERTIA = np.pi * (R_OUTER**2 - R_INNER**2), np.pi / 4 * (R_OUTER**4 - R_INNER**4)

@@ -1,0 +1,132 @@
+"""Deliberate faults in the program, one at a time, and tests that must catch each.
+
+    python tests/campaigns/faults.py [NUMBER …]
+
+writes each fault (a sign, a factor, an index, a term that is left out) into the source, runs its tests until the first
+fails, and puts the source back. Exit code 1 where a fault stayed unseen. Run it in a work tree without other changes.
+"""
+
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import NamedTuple
+
+ROOT = Path(__file__).parents[2]
+PROJECTION, MASSES, LOADS = "mbs/model/projection.py", "mbs/model/masses.py", "mbs/quantities/link_loads.py"
+PATCHES = "actuation/patches"
+PROJECTED = "tests/mbs/test_projection.py tests/mbs/test_projected_trees.py"
+POINTS = "tests/cases/test_actuation_points.py"
+ARM = "tests/references/test_references.py::test_made_scenes[arm]"
+PATCHED = "tests/references/test_references.py::test_made_scenes[arm_with_patches]"
+REDUCED = "tests/references/test_references.py::test_made_scenes[arm_with_attachment_modes]"
+
+
+class Fault(NamedTuple):
+    """`old`, once in `file`, becomes `new`; `tests` are files or node ids."""
+
+    file: str
+    old: str
+    new: str
+    tests: str
+
+
+FAULTS = [
+    Fault(PROJECTION, "0.5 * (I[0, 1] - I[1, 0])", "0.5 * (I[0, 1] + I[1, 0])", PROJECTED),
+    Fault(PROJECTION, "0.5 * about_center * np.eye(3)", "0.25 * about_center * np.eye(3)", PROJECTED),
+    Fault(PROJECTION, "(1.0 - ALONG)[:, None] * at.rotation", "ALONG[:, None] * at.rotation", ARM),
+    Fault(PROJECTION, "ALONG[:, None] * kept.S_bar,", "ALONG[:, None] * kept.S_bar[[1, 0, 2]],", PROJECTED),
+    Fault(PROJECTION, "return as_floats(moved + _keeping_shapes(I - moved))", "return as_floats(moved)", PROJECTED),
+    Fault(
+        MASSES,
+        "at.translation - skew(center) @ phi",
+        "at.translation + skew(center) @ phi",
+        "tests/cases/test_payloads.py",
+    ),
+    Fault(MASSES, "E = 0.5 * np.trace(inertia)", "E = np.trace(inertia)", "tests/mbs/test_payload.py"),
+    Fault(
+        LOADS,
+        "force = -payload.mass * (of_point.a",
+        "force = payload.mass * (of_point.a",
+        "tests/test_mode_acceleration.py",
+    ),
+    Fault(LOADS, "left -= wrench @", "left += wrench @", "tests/mbs/test_link_loads.py"),
+    Fault("ffrobot/results/forces.py", "motion.space.along(acting.force)", "motion.space.along(-acting.force)", ARM),
+    Fault("ffrobot/results/forces.py", "function.sample(inside)[0]", "function.sample(inside)[1]", ARM),
+    Fault(
+        "ffrobot/results/peaks.py",
+        "largest(time, column) for column in values.T",
+        "largest(time, column) for column in values.T[::-1]",
+        ARM,
+    ),
+    Fault(
+        "ffrobot/results/bodies.py",
+        "(moved.modal, moved.modal_velocity))",
+        "(moved.modal_velocity, moved.modal))",
+        REDUCED,
+    ),
+    Fault(
+        "actuation/point_forces.py",
+        "unmet = Q_a - np.einsum",
+        "unmet = Q_a + np.einsum",
+        POINTS,
+    ),
+    Fault("actuation/point_forces.py", "rcond=DEPENDENT), chosen.scale * Q_a", "rcond=DEPENDENT), Q_a", POINTS),
+    Fault(
+        f"{PATCHES}/lamina.py",
+        "np.array([modulus * d31 / thickness, 0.0])",
+        "np.array([modulus * d31, 0.0])",
+        "tests/actuation/test_patches.py",
+    ),
+    Fault(
+        f"{PATCHES}/lamina.py",
+        "s * c**3 - (2 * S_22",
+        "s * c**3 + (2 * S_22",
+        "tests/actuation/test_patched_links_3d.py",
+    ),
+    Fault(f"{PATCHES}/voltages.py", "F_p - within_limit @", "F_p + within_limit @", PATCHED),
+    Fault(
+        "actuation/control/lqr.py",
+        "np.eye(len(R)) + B.T @ X @ B, B.T",
+        "np.eye(len(R)), B.T",
+        "tests/actuation/test_closed_loop.py",
+    ),
+    Fault(
+        "actuation/control/margins.py",
+        'record.rate == "measured"',
+        'record.rate != "measured"',
+        "tests/actuation/test_margins.py",
+    ),
+]
+
+
+def main() -> None:
+    chosen = [int(number) for number in sys.argv[1:]] or range(1, len(FAULTS) + 1)
+    unseen = []
+    for number in chosen:
+        fault, began = FAULTS[number - 1], time.monotonic()
+        by = caught_by(fault)
+        print(f"{number:3d} {fault.file}: {fault.old!r} → {fault.new!r}: {by or 'NOT CAUGHT'} ", end="")
+        print(f"({time.monotonic() - began:.0f} s)", flush=True)
+        unseen += [] if by else [number]
+    sys.exit(bool(unseen))
+
+
+def caught_by(fault: Fault) -> str:
+    """The first test that fails; empty where all pass."""
+    path = ROOT / fault.file
+    sound = path.read_text(encoding="utf-8")
+    assert sound.count(fault.old) == 1, f"{fault.file}: expected {fault.old!r} once"
+    command = [sys.executable, "-m", "pytest", "-n", "0", "-x", "-q", "--tb=no", "-p", "no:cacheprovider"]
+    try:
+        path.write_text(sound.replace(fault.old, fault.new), encoding="utf-8")
+        done = subprocess.run([*command, *fault.tests.split()], cwd=ROOT, capture_output=True, text=True, check=False)
+    finally:
+        path.write_text(sound, encoding="utf-8")
+    assert done.returncode in (0, 1), done.stdout + done.stderr
+    failed = [line for line in done.stdout.splitlines() if line.startswith(("FAILED", "ERROR"))]
+    return failed[0].split(" - ")[0].split(maxsplit=1)[1] if failed else ""
+
+
+if __name__ == "__main__":
+    main()
