@@ -99,7 +99,6 @@ void bind_rows(nb::module_ &m) {
       .def_ro("r", &FrameMotion::r)
       .def_ro("v", &FrameMotion::v)
       .def_ro("a", &FrameMotion::a)
-      .def_ro("a_origin", &FrameMotion::a_origin)
       .def_ro("omega", &FrameMotion::omega)
       .def_ro("alpha", &FrameMotion::alpha)
       .def_ro("R", &FrameMotion::R)

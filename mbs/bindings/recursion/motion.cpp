@@ -2,7 +2,6 @@
 #include "core/recursion/motion.h"
 #include "core/integrate/integrate.h"
 #include "core/recursion/motors.h"
-#include "core/recursion/observe.h"
 
 #include <nanobind/stl/complex.h>
 #include <nanobind/stl/function.h>
@@ -62,7 +61,7 @@ TreeRun outputs_of(const Model<Space> &model, const Scene &scene, const std::vec
   RecursiveMotion<Space> reader(model.mechanism, scene, times.front(), first, first + model.mechanism.n_q, nullptr,
                                 replay);
   for (std::size_t i = 0; i < times.size(); ++i)
-    run.evaluate(i, times[i], states.row(static_cast<Index>(i)).data(), reader, model.mechanism, replay);
+    run.evaluate(i, times[i], states.row(static_cast<Index>(i)).data(), reader, model.mechanism.n_q, false, replay);
   return run;
 }
 
@@ -228,9 +227,7 @@ void bind_run_and_laws(nb::module_ &m) {
       .def_ro("states", &TreeRun::states, "(T, n_q + n_v) q, then v.")
       .def_ro("accelerations", &TreeRun::accelerations, "(T, n_v)")
       .def_ro("multipliers", &TreeRun::lambda, "(T, rows); 0 of rows that depend on others.")
-      .def_ro("frames", &TreeRun::frames, "(T, 6 bodies): of each body R_ddot of its origin and alpha, global axes.")
-      .def_ro("replayed", &TreeRun::replayed, "(T, numbers) of the source of a replay.")
-      .def_ro("energy", &TreeRun::energy, "(T, 3) kinetic, strain, gravitational, J.");
+      .def_ro("replayed", &TreeRun::replayed, "(T, numbers) of the source of a replay.");
   nb::enum_<OrientationKind>(m, "OrientationKind")
       .value("rotation_vector", OrientationKind::rotation_vector)
       .value("rpy", OrientationKind::rpy)
@@ -302,14 +299,6 @@ void bind_tree_motion(nb::module_ &m) {
           "Friction in a joint at which a loop is cut, between two wrenches of the model: of the turn of b about an "
           "axis "
           "of a, or of its way along it.")
-      .def(
-          "add_cut_gear",
-          [](Scene &s, int a, int b, int coordinate, double stiffness, double damping) {
-            s.cut_joints.push_back({a, b, true, Eigen::Vector3d::UnitZ(), {damping, 0, 1}, stiffness, coordinate});
-          },
-          "a"_a, "b"_a, "coordinate"_a, "stiffness"_a, "damping"_a,
-          "In the plane, between two wrenches of the model: spring and damper of the turn of b on a, less "
-          "v[coordinate].")
       .def(
           "add_cut_load",
           [](Scene &s, int joint, const TimeFunction &magnitude, double share) {

@@ -80,7 +80,7 @@ TreeRun held_outputs_of(const Model<Space> &model, const Scene &scene, const std
   for (std::size_t i = 0; i < times.size(); ++i) {
     const auto row = static_cast<Index>(i);
     held.hold(commands.row(row).transpose());
-    run.evaluate(i, times[i], states.row(row).data(), reader, model.mechanism);
+    run.evaluate(i, times[i], states.row(row).data(), reader, model.mechanism.n_q, false, nullptr);
   }
   return run;
 }

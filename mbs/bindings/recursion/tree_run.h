@@ -5,7 +5,7 @@
 #include "core/analysis/replay.h"
 #include "core/check_index.h"
 #include "core/integrate/integrate.h"
-#include "core/recursion/observe.h"
+#include "core/recursion/motion.h"
 
 #include <algorithm>
 #include <functional>
@@ -45,14 +45,9 @@ template <class Space> void check_scene(const Model<Space> &model, const Scene &
   for (const GearSpring &gear : scene.gears)
     for (const GearSpring::Side &side : {gear.a, gear.b})
       check_index("q of a gear", side.q, n_q), check_index("v of a gear", side.v, n_v);
-  for (const CutJoint &cut : scene.cut_joints) {
+  for (const CutJoint &cut : scene.cut_joints)
     for (const int wrench : {cut.a, cut.b})
       check_index("wrench of a cut joint", wrench, model.mechanism.wrenches.size());
-    if (Space::dim != 3 && (cut.stiffness != 0 || cut.coordinate >= 0))
-      throw std::invalid_argument("springs and coordinates of cut joints: expected none in space");
-    if (cut.coordinate >= 0)
-      check_index("coordinate of a cut joint", cut.coordinate, n_v);
-  }
   for (const CutLoad &load : scene.cut_loads)
     check_index("joint of a load", load.joint, scene.cut_joints.size());
   for (const LimitedCoordinate &limited : scene.limits) {
@@ -96,8 +91,6 @@ struct TreeRun {
   IntegrationReport report;
   Eigen::VectorXd last;                         // (q, v) of the last accepted step
   RowMajorMatrix states, accelerations, lambda; // (T, n_q + n_v), (T, n_v), (T, rows)
-  RowMajorMatrix frames;                        // (T, 6 bodies) of each body: R_ddot of its origin, alpha
-  RowMajorMatrix energy;                        // (T, 3) kinetic, strain, gravitational
   RowMajorMatrix replayed;                      // (T, numbers of its source) what a replay does
   double least_ratio = 1, singular_at = 0;      // of the scene's watch
   Eigen::VectorXd singular_posture;
@@ -107,33 +100,31 @@ struct TreeRun {
     const auto T = static_cast<Eigen::Index>(count);
     const Eigen::Index n = model.mechanism.n_q + model.mechanism.n_v;
     last.resize(n), states.resize(T, n), accelerations.resize(T, model.mechanism.n_v), lambda.resize(T, model.rows());
-    frames.resize(T, 6 * static_cast<Eigen::Index>(model.mechanism.nodes.size())), energy.resize(T, 3);
     replayed.resize(T, 0);
   }
 
-  // All that is read off a state (q, v), into row i; `reader` evaluates it, under `replay` if that is not null
+  // All that is read off a state (q, v), into row i; `reader` evaluates it, under `replay` if that is not null.
+  // Interpolated states (`is_interpolated`) leave the constraint equations: they are moved back onto these along
+  // M^-1 C^T of the first evaluation, and where that moves them they are evaluated again.
   template <class Space>
-  void evaluate(std::size_t output, double t, const double *state, RecursiveMotion<Space> &reader,
-                const Mechanism<Space> &mechanism, const Replay *replay = nullptr) {
+  void evaluate(std::size_t output, double t, const double *state, RecursiveMotion<Space> &reader, int n_q,
+                bool is_interpolated, const Replay *replay) {
     const auto i = static_cast<Eigen::Index>(output);
-    states.row(i) = Eigen::Map<const Eigen::RowVectorXd>(state, states.cols());
-    const double *q = states.row(i).data(), *v = q + mechanism.n_q;
-    reader.evaluate(t, q, v, accelerations.row(i).data());
-    lambda.row(i) = Eigen::Map<const Eigen::RowVectorXd>(reader.workspace().lambda.data(), lambda.cols());
-    Eigen::Index column = 0;
-    for (const FrameMotion &frame : frame_motions(mechanism, q, v, reader.workspace())) {
-      frames.row(i).segment<3>(column) = frame.a_origin.transpose();
-      frames.row(i).segment<3>(column + 3) = frame.alpha.transpose();
-      column += 6;
+    double *q = states.row(i).data(), *v = q + n_q, *a = accelerations.row(i).data();
+    std::copy_n(state, states.cols(), q);
+    reader.evaluate(t, q, v, a);
+    if (is_interpolated) {
+      reader.project(t, q, v);
+      if (!std::equal(q, q + states.cols(), state))
+        reader.evaluate(t, q, v, a);
     }
+    lambda.row(i) = Eigen::Map<const Eigen::RowVectorXd>(reader.workspace().lambda.data(), lambda.cols());
     if (replay) {
       const Eigen::VectorXd &values = replay->source().values();
       if (replayed.cols() != values.size())
         replayed.resize(replayed.rows(), values.size());
       replayed.row(i) = values.transpose();
     }
-    const Totals sum = totals(mechanism, q, v, reader.workspace());
-    energy.row(i) << sum.kinetic, sum.strain, sum.gravitational;
   }
 
   // What only the end of an integration tells
@@ -141,7 +132,7 @@ struct TreeRun {
     motion.watch_posture(report.time, last.data());
     least_ratio = motion.least_ratio(), singular_at = motion.singular_at();
     singular_posture = motion.singular_posture();
-    for (auto *x : {&states, &accelerations, &lambda, &frames, &energy, &replayed})
+    for (auto *x : {&states, &accelerations, &lambda, &replayed})
       x->conservativeResize(static_cast<Eigen::Index>(report.outputs), Eigen::NoChange);
   }
 };
@@ -166,15 +157,10 @@ TreeRun integrated(const Model<Space> &model, const Scene &scene, RecursiveMotio
     if (limits)
       limits->go_on(checkpoint->ranges);
   }
-  Eigen::VectorXd output(run.last.size());
   run.report = integrate(
       motion, times, run.last, controls,
       [&](std::size_t i, double t, const double *state) {
-        run.evaluate(i, t, state, reader, model.mechanism, replay);
-        output = Eigen::Map<const Eigen::VectorXd>(state, output.size());
-        reader.project(t, output.data(), output.data() + model.mechanism.n_q); // interpolated ones are off the rows
-        if (!std::equal(output.begin(), output.end(), state))
-          run.evaluate(i, t, output.data(), reader, model.mechanism, replay);
+        run.evaluate(i, t, state, reader, model.mechanism.n_q, true, replay);
       },
       locked(carry_on), recording, breaks, checkpoint ? &checkpoint->integration : nullptr, limits ? &*limits : nullptr,
       samples);

@@ -44,15 +44,6 @@ void cut_rates(const Mechanism<Space> &m, const std::vector<CutJoint> &cuts, con
   }
 }
 
-template <class Space, class T>
-void cut_turns(const Mechanism<Space> &m, const std::vector<CutJoint> &cuts, const Workspace<Space, T> &w, T *turn) {
-  CutPose<T> at;
-  for (std::size_t k = 0; k < cuts.size(); ++k) {
-    cut_pose(m, cuts[k], w, at);
-    turn[k] = at.b.angle - at.a.angle;
-  }
-}
-
 // A force on b acts where b is: at a it has a moment, too.
 template <class Space, class T>
 void add_along_cuts(const Mechanism<Space> &m, const std::vector<CutJoint> &cuts, const T *size,

@@ -21,8 +21,6 @@ void stiff_terms(const Mechanism<Space> &m, const Scene &scene, VectorXd &stiffn
     }
   for (const JointForce &joint : scene.joint_forces)
     stiffness[joint.v] += joint.stiffness;
-  for (std::size_t k = 0; k < scene.cut_joints.size(); ++k)
-    stiffness[m.n_v + static_cast<Index>(k)] = scene.cut_joints[k].stiffness;
 }
 
 // Of friction in joints, at the rates v (n_v, then cut joints). Near rest dry friction is a stiff damper: a light
@@ -57,7 +55,6 @@ template <class Space> void RecursiveMotion<Space>::find_coupling() {
     unit[i] = 1;
     place_all(mechanism_, evaluated_.data(), unit.data(), Forces<double>(), measured_);
     cut_rates(mechanism_, scene_.cut_joints, measured_, along_cuts_.data());
-    take_coordinates_off(scene_.cut_joints, unit.data(), along_cuts_.data());
     coupling_.row(i) = along_cuts_.transpose();
     unit[i] = 0;
   }

@@ -61,8 +61,7 @@ RecursiveMotion<Space>::RecursiveMotion(const Mechanism<Space> &mechanism, const
       sign_(signs_of(scene, mechanism.rows.size())), target_time_(std::numeric_limits<double>::quiet_NaN()),
       norm_(mechanism), shifted_(VectorXd::Zero(2 * mechanism.n_v)), unused_(VectorXd::Zero(mechanism.n_v)),
       evaluated_(VectorXd::Zero(mechanism.n_q)), rates_(force_), posture_(mechanism) {
-  has_given_ = held_ || steering_ || !scene_.loads.empty() || !scene_.joint_forces.empty() || !scene_.gears.empty() ||
-               std::ranges::any_of(scene_.cut_joints, [](const CutJoint &cut) { return cut.coordinate >= 0; });
+  has_given_ = held_ || steering_ || !scene_.loads.empty() || !scene_.joint_forces.empty() || !scene_.gears.empty();
   has_wrenches_ =
       steering_ || !scene_.point_loads.empty() || !scene_.point_forces.empty() || !scene_.cut_joints.empty();
   update_targets(t);
@@ -80,10 +79,6 @@ RecursiveMotion<Space>::RecursiveMotion(const Mechanism<Space> &mechanism, const
     for (const Node<Space> &node : mechanism.nodes)
       if (node.v == gear.a.v)
         norm_.add_spring(gear.stiffness, node.rotor_inertia * node.gear_ratio * node.gear_ratio);
-  for (const CutJoint &cut : scene_.cut_joints)
-    for (const Node<Space> &node : mechanism.nodes)
-      if (node.v == cut.coordinate && cut.stiffness > 0)
-        norm_.add_spring(cut.stiffness, node.rotor_inertia * node.gear_ratio * node.gear_ratio);
   for (const Node<Space> &node : mechanism.nodes)
     for (int k = 0; k < node.n(); ++k)
       fastest_ = std::max(fastest_, std::sqrt(node.body.K[static_cast<std::size_t>(k)])), steps_between_postures_ = 10;
@@ -144,7 +139,7 @@ template <class Space> Forces<double> RecursiveMotion<Space>::act(double t, cons
     if (!scene_.point_forces.empty() || !scene_.cut_joints.empty()) {
       place_all(mechanism_, q, v, forces, workspace_), forces.is_placed = true;
       add_at_points(mechanism_, scene_.point_forces, t, norm_.sizes().length(), workspace_, wrench_.data());
-      act_along_cuts(t, q, v);
+      act_along_cuts(t);
     }
     forces.wrench = wrench_.data();
   }
@@ -168,39 +163,16 @@ template <class Space> void RecursiveMotion<Space>::evaluate(double t, const dou
   evaluate_here(t, q, v, a);
 }
 
-namespace {
-
-// k (turn - coordinate) of all cut joints
-VectorXd spring_moments(const Mechanism<Planar> &m, const std::vector<CutJoint> &cuts, const double *q,
-                        const Workspace<Planar, double> &w) {
-  VectorXd moments(static_cast<Index>(cuts.size()));
-  cut_turns(m, cuts, w, moments.data());
-  take_coordinates_off(cuts, q, moments.data());
-  for (std::size_t k = 0; k < cuts.size(); ++k)
-    moments[static_cast<Index>(k)] *= cuts[k].stiffness;
-  return moments;
-}
-
-} // namespace
-
-template <class Space> void RecursiveMotion<Space>::act_along_cuts(double t, const double *q, const double *v) {
+template <class Space> void RecursiveMotion<Space>::act_along_cuts(double t) {
   const std::vector<CutJoint> &cuts = scene_.cut_joints;
   cut_rates(mechanism_, cuts, workspace_, along_cuts_.data());
-  take_coordinates_off(cuts, v, along_cuts_.data());
   for (std::size_t k = 0; k < cuts.size(); ++k) {
     double &along = along_cuts_[static_cast<Index>(k)];
     along = -cuts[k].friction.resistance(along);
   }
-  if constexpr (Space::dim == 3)
-    along_cuts_ -= spring_moments(mechanism_, cuts, q, workspace_);
-  if (steering_)
-    steering_->add_along_cuts(along_cuts_.data());
   for (const CutLoad &load : scene_.cut_loads)
     along_cuts_[load.joint] += load.share * load.magnitude(t).value;
   add_along_cuts(mechanism_, cuts, along_cuts_.data(), workspace_, wrench_.data());
-  for (std::size_t k = 0; k < cuts.size(); ++k)
-    if (cuts[k].coordinate >= 0)
-      force_[cuts[k].coordinate] -= along_cuts_[static_cast<Index>(k)];
 }
 
 template <class Space> void RecursiveMotion<Space>::slope(double t, const double *z, double *z_dot) {

@@ -90,7 +90,6 @@ public:
   // Adds those at time t along v (n_v), and on the wrenches of the mechanism (wrenches, dim); q (n_q) says where
   // directions are that modes turn.
   virtual void add(double t, const double *q, double *force, double *wrench) = 0;
-  virtual void add_along_cuts(double *) {}     // the same (cut joints) of the scene, at the time of the last add()
   virtual void foresee(const double *, int) {} // as OdeSystem has it
   virtual double end_of_step(double t, double h) { return t + h; }
 };
@@ -214,7 +213,7 @@ private:
   void find_laws(const double *times, int count);
   void residuals(double t, const double *q, const double *v, Workspace<Space, double> &w);
   double project(double t, double *q, double *v, Workspace<Space, double> &w); // w: where residuals are measured
-  void act_along_cuts(double t, const double *q, const double *v);             // the same; and to force_
+  void act_along_cuts(double t);                                               // the same
   const Eigen::VectorXd *motors_at(const double *q); // of the last evaluation; null where they are not judged
   void find_stiff_terms();
   void take_posture();

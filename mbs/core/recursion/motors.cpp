@@ -26,10 +26,7 @@ template <class Space> void DrivenMechanism<Space>::check() const {
     throw std::invalid_argument("is_path: expected " + std::to_string(mechanism.rows.size()) + " values, got " +
                                 std::to_string(is_path.size()));
   for (const Motor &motor : motors)
-    if (motor.cut >= 0)
-      check_index("cut joint of a motor", motor.cut, scene.cut_joints.size());
-    else
-      check_index("coordinate of a motor", motor.coordinate, mechanism.n_v);
+    check_index("coordinate of a motor", motor.coordinate, mechanism.n_v);
 }
 
 template <class Space>
@@ -42,19 +39,14 @@ Motors<Space>::Motors(DrivenMechanism<Space> driven)
       cuts_.push_back(static_cast<int>(r));
   lambda_c_ = VectorXd::Zero(static_cast<Index>(cuts_.size()));
   columns_.resize(driven_.mechanism.n_v, lambda_c_.size() + tau_.size());
-  for (const Motor &motor : driven_.motors)
-    is_along_coordinates_ = is_along_coordinates_ && motor.cut < 0;
 }
 
 template <class Space> std::vector<bool> Motors<Space>::are_moments() const {
   std::vector<bool> found;
-  for (const Motor &motor : driven_.motors) {
-    if (motor.cut >= 0)
-      found.push_back(driven_.scene.cut_joints[static_cast<std::size_t>(motor.cut)].turns);
+  for (const Motor &motor : driven_.motors)
     for (const auto &node : driven_.mechanism.nodes)
       if (const int k = motor.coordinate - node.v; k >= 0 && k < node.shape.freedoms.count)
         found.push_back(node.shape.freedoms.component[k] >= Space::linear);
-  }
   return found;
 }
 
@@ -102,12 +94,12 @@ template <class Space> void Motors<Space>::split(const double *q, const VectorXd
 }
 
 template <class Space> void Motors<Space>::split(const double *q, const TreeWorkspace &w) {
-  if (has_equations())
+  if (!cuts_.empty())
     close_loops(q, w);
   for (std::size_t k = 0; k < driven_.motors.size(); ++k) {
     const Motor &motor = driven_.motors[k];
     double &tau = tau_[static_cast<Index>(k)];
-    if (!has_equations())
+    if (cuts_.empty())
       tau = motor.sign * Q_[motor.coordinate], Q_[motor.coordinate] = 0;
     if (motor.turns_frames)
       turn_frames(motor.coordinate, motor.sign * tau, w);
@@ -118,7 +110,7 @@ template <class Space> Eigen::MatrixXd Motors<Space>::shares_of(const Eigen::Mat
   const auto modes = static_cast<Index>(driven_.of_modes.size());
   Eigen::MatrixXd found(modes + tau_.size(), dQ.cols());
   found.topRows(modes) = dQ(driven_.of_modes, Eigen::all);
-  if (has_equations()) {
+  if (!cuts_.empty()) {
     const Eigen::MatrixXd solved = factors_.solve(dQ(driven_.of_joints, Eigen::all).eval());
     found.topRows(modes) -= columns_(driven_.of_modes, Eigen::all) * solved;
     found.bottomRows(tau_.size()) = solved.bottomRows(tau_.size());
@@ -145,29 +137,15 @@ template <class Space> void Motors<Space>::close_loops(const double *q, const Tr
     lambda_[cuts_[static_cast<std::size_t>(k)]] = 1;
     project(q, w, columns_.col(k));
   }
-  for (Index k = 0; k < tau_.size(); ++k)
-    add_motor(k, q, w);
+  columns_.rightCols(tau_.size()).setZero();
+  for (Index k = 0; k < tau_.size(); ++k) {
+    const Motor &motor = driven_.motors[static_cast<std::size_t>(k)];
+    columns_(motor.coordinate, cuts + k) = motor.sign;
+  }
   factors_.compute(columns_(driven_.of_joints, Eigen::all));
   const VectorXd found = factors_.solve(VectorXd(Q_(driven_.of_joints)));
   lambda_c_ = found.head(cuts), tau_ = found.tail(tau_.size());
   Q_ -= columns_ * found;
-}
-
-template <class Space> void Motors<Space>::add_motor(Index k, const double *q, const TreeWorkspace &w) {
-  const Mechanism<Space> &m = driven_.mechanism;
-  const Motor &motor = driven_.motors[static_cast<std::size_t>(k)];
-  auto column = columns_.col(lambda_c_.size() + k);
-  if (motor.cut < 0) {
-    column.setZero();
-    column[motor.coordinate] = motor.sign;
-    return;
-  }
-  const std::vector<CutJoint> joint{driven_.scene.cut_joints[static_cast<std::size_t>(motor.cut)]};
-  VectorXd wrench = VectorXd::Zero(Space::dim * static_cast<Index>(m.wrenches.size()));
-  const double unit = 1;
-  add_along_cuts(m, joint, &unit, w, wrench.data());
-  forces_.load(nullptr, wrench.data(), w);
-  forces_.project(q, w, column.data());
 }
 
 template struct DrivenMechanism<Planar>;

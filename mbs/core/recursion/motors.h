@@ -8,10 +8,9 @@
 namespace ffrobot::recursion {
 
 struct Motor {
-  int coordinate; // in v; -1 of one along a cut joint
+  int coordinate; // in v
   double sign;
   bool turns_frames; // in place of the sections, which modes turn against these
-  int cut = -1;      // of the scene's cut joints
 };
 
 // A mechanism with what it follows and what acts on it, its motors, and which constraint equations are a path; others
@@ -61,18 +60,15 @@ public:
   const Eigen::VectorXd &loops() const { return lambda_c_; } // (constraint equations of loops)
 
 private:
-  bool has_equations() const { return !cuts_.empty() || !is_along_coordinates_; }
   void take_path(const double *lambda);                                                 // into lambda_
   void project(const double *q, const TreeWorkspace &w, Eigen::Ref<Eigen::VectorXd> Q); // of lambda_
   void split(const double *q, const TreeWorkspace &w);                                  // Q_
   void close_loops(const double *q, const TreeWorkspace &w);
-  void add_motor(Eigen::Index k, const double *q, const TreeWorkspace &w); // its column
   void turn_frames(int coordinate, double moment, const TreeWorkspace &w);
 
   const DrivenMechanism<Space> driven_;
   NewtonEuler<Space> forces_;
-  std::vector<int> cuts_;            // constraint equations
-  bool is_along_coordinates_ = true; // all motors: what they do is known without equations, but for cuts
+  std::vector<int> cuts_; // constraint equations of loops; without any, what motors do is known without equations
   Eigen::VectorXd lambda_, tau_, Q_, lambda_c_;
   Eigen::MatrixXd columns_; // (n_v, cuts, then motors) -C_c^T, T^T
   LeastNorm factors_;       // of joint coordinates by cuts, then motors

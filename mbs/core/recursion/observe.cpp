@@ -165,15 +165,8 @@ Totals totals(const Mechanism<Space> &m, const Scene &scene, const double *q, co
   }
   std::vector<double> rates(scene.cut_joints.size());
   cut_rates(m, scene.cut_joints, w, rates.data());
-  take_coordinates_off(scene.cut_joints, v, rates.data());
   for (std::size_t k = 0; k < rates.size(); ++k)
     sum.dissipated += scene.cut_joints[k].friction.resistance(rates[k]) * rates[k];
-  if constexpr (Space::dim == 3) {
-    cut_turns(m, scene.cut_joints, w, rates.data());
-    take_coordinates_off(scene.cut_joints, q, rates.data());
-    for (std::size_t k = 0; k < rates.size(); ++k)
-      sum.strain += 0.5 * scene.cut_joints[k].stiffness * rates[k] * rates[k];
-  }
   return sum;
 }
 

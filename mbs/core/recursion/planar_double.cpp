@@ -15,7 +15,6 @@ template void measure(const M &, const double *, const double *, W &, double *, 
 template void place_all(const M &, const double *, const double *, const Forces<double> &, W &);
 template Pose<double> wrench_pose(const M &, int, const W &);
 template void cut_rates(const M &, const std::vector<CutJoint> &, const W &, double *);
-template void cut_turns(const M &, const std::vector<CutJoint> &, const W &, double *);
 template void add_along_cuts(const M &, const std::vector<CutJoint> &, const double *, const W &, double *);
 
 } // namespace ffrobot::recursion

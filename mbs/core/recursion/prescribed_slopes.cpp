@@ -69,8 +69,7 @@ template <class Space> JointSlopes PrescribedMotion<Space>::joint_slopes() {
 
 // M a - Q + C_c^T lambda_c = f with the loops' multipliers leads to f_q = -(M a_q + C_c^T lambda_q) at given a.
 template <class Space> LeftSlopes PrescribedMotion<Space>::left_slopes(const JointSlopes &joints) {
-  const auto turns_frames = [](const Motor &motor) { return motor.turns_frames || motor.cut >= 0; };
-  if (!motors_ || std::ranges::any_of(driven_.motors, turns_frames))
+  if (!motors_ || std::ranges::any_of(driven_.motors, &Motor::turns_frames))
     throw std::invalid_argument("derivatives: expected motors along joint coordinates");
   motors_->split(q(), required_, w_);
   VectorXd forces = VectorXd::Zero(a_.size()), unit = forces, f = forces;
