@@ -1,7 +1,7 @@
 // The recursion in joint coordinates (docs/developer/kernel.md), for tests and for what is built upon it.
-#include "core/recursion/derivatives.h"
-#include "core/recursion/independent_rows.h"
-#include "core/recursion/observe.h"
+#include "core/recursion/constrained_aba/derivatives.h"
+#include "core/recursion/constrained_aba/independent_constraints.h"
+#include "core/recursion/inverse/observe.h"
 
 #include <nanobind/stl/array.h>
 #include <nanobind/stl/optional.h>
@@ -52,7 +52,7 @@ std::tuple<VectorXd, VectorXd> evaluate(Model<Space> &model, const VectorXd &q, 
 }
 
 template <class Space>
-std::tuple<VectorXd, VectorXd> row_values(Model<Space> &model, const VectorXd &q, const VectorXd &v) {
+std::tuple<VectorXd, VectorXd> constraint_values_of(Model<Space> &model, const VectorXd &q, const VectorXd &v) {
   model.check_state(q, v);
   VectorXd value(model.rows()), rate(model.rows());
   measure(model.mechanism, q.data(), v.data(), model.w, value.data(), rate.data());
@@ -96,7 +96,8 @@ double time_of(Model<Space> &model, const VectorXd &q, const VectorXd &v, const 
 
 template <class Space> auto bind_model(nb::module_ &m, const char *name, const char *body_name, const char *text) {
   using Body = BodyModel<typename Space::Data>;
-  nb::class_<Body>(m, body_name, "A body of a tree and the joint that it hangs on; see mbs/core/recursion/model.h.")
+  nb::class_<Body>(m, body_name,
+                   "A body of a tree and the joint that it hangs on; see mbs/core/recursion/mechanism/model.h.")
       .def(nb::init<>())
       .def_rw("name", &Body::name)
       .def_rw("parent", &Body::parent)
@@ -111,7 +112,7 @@ template <class Space> auto bind_model(nb::module_ &m, const char *name, const c
       .def_rw("data", &Body::data);
   return nb::class_<Model<Space>>(m, name, text)
       .def(nb::init<const std::vector<Body> &, const std::vector<typename Space::Marker> &,
-                    const std::vector<RowModel> &, const std::vector<MarkerAt> &, const VectorXd &>(),
+                    const std::vector<ConstraintModel> &, const std::vector<MarkerAt> &, const VectorXd &>(),
            "bodies"_a, "ground"_a, "rows"_a, "wrenches"_a, "gravity"_a)
       .def_prop_ro("n_q", [](const Model<Space> &model) { return model.mechanism.n_q; })
       .def_prop_ro("n_v", [](const Model<Space> &model) { return model.mechanism.n_v; })
@@ -127,10 +128,10 @@ template <class Space> auto bind_model(nb::module_ &m, const char *name, const c
       .def("evaluate", &evaluate<Space>, "q"_a, "v"_a, "target"_a, "force"_a.none(), "wrench"_a.none(),
            "(a, lambda): accelerations (n_v) and multipliers (rows).")
       .def(
-          "keep_independent_rows",
+          "keep_independent_constraints",
           [](Model<Space> &model, const VectorXd &q, const VectorXd &v) {
             model.check_state(q, v);
-            return keep_independent_rows(model.mechanism, q.data(), v.data(), model.w);
+            return keep_independent_constraints(model.mechanism, q.data(), v.data(), model.w);
           },
           "q"_a, "v"_a, "Indices of rows that do not depend on others at a state; the rest is left out from now on.")
       .def(
@@ -143,7 +144,7 @@ template <class Space> auto bind_model(nb::module_ &m, const char *name, const c
           },
           "marker"_a, "A"_a, "omega"_a, "alpha"_a,
           "How a marker of the ground that turns stands and turns in the evaluations that follow, global axes.")
-      .def("measure", &row_values<Space>, "q"_a, "v"_a, "Values and rates of rows.")
+      .def("measure", &constraint_values_of<Space>, "q"_a, "v"_a, "Values and rates of rows.")
       .def("response", &answer_of<Space>, "q"_a, "residual"_a,
            "-M^-1 C^T (C M^-1 C^T)^-1 residual, at the state of the last evaluation.")
       .def("derivatives", &derivatives_at<Space>, "q"_a, "v"_a, "target"_a, "force"_a.none(), "wrench"_a.none(),
@@ -167,7 +168,7 @@ template <class Space> auto bind_model(nb::module_ &m, const char *name, const c
       .def("required_forces", &required_forces<Space>, "scene"_a, "times"_a, "q"_a, "v"_a, "a"_a,
            "M a - Q (T, n_v) along v at states q (T, n_q), v and a (T, n_v): what gravity, elasticity, damping and the "
            "forces of the scene leave for others.")
-      .def("row_accelerations", &row_accelerations<Space>, "scene"_a, "times"_a, "q"_a, "v"_a, "a"_a,
+      .def("constraint_accelerations", &constraint_accelerations<Space>, "scene"_a, "times"_a, "q"_a, "v"_a, "a"_a,
            "Second derivatives of the values of rows (T, rows), less those of their targets.")
       .def(
           "motion_forces", &motion_forces<Space>, "scene"_a, "times"_a, "q"_a, "v"_a, "a"_a, "multipliers"_a,

@@ -20,8 +20,8 @@ def state_function(function: object, *, is_planar: bool = True) -> StateFunction
 
     Position and velocity have the shape (2,) in the plane, where f returns (x, y) or (x, y, moment); in space (3,), and
     f returns (x, y, z) or (x, y, z, mx, my, mz). One that has been compiled (`numba.cfunc` and its like, with an
-    `address`) is `void(double t, const double *position, const double *rates, double *force)`, and runs at the speed of
-    the core; mbs/core/recursion/point_force.h says which numbers. Raises `ValueError` for anything else.
+    `address`) is `void(double t, const double *position, const double *rates, double *force)`, runs at the speed of the
+    core, and has the numbers of mbs/core/recursion/constrained_aba/point_force.h. Raises `ValueError` for all else.
     """
     address = getattr(function, "address", None)
     if isinstance(address, int):

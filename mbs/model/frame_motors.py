@@ -1,4 +1,4 @@
-"""Motors that turn frames of bodies, not sections, as the core takes them: core/recursion/frame_motor.h."""
+"""Motors that turn frames of bodies, not sections, as the core takes them: core/recursion/motion/frame_motor.h."""
 
 from __future__ import annotations
 

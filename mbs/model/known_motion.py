@@ -52,7 +52,7 @@ class SectionMotion(NamedTuple):
 class MotionForces:
     """What bodies and joints do to each other over states (T, …), global axes.
 
-    Moments are about the origins of the sections on which they act: mbs/core/recursion/motion_forces.h.
+    Moments are about the origins of the sections on which they act: mbs/core/recursion/inverse/motion_forces.h.
     """
 
     system: MultibodySystem
@@ -132,7 +132,9 @@ def required_forces(model: Model, state: States, times: Array) -> Array:
 def row_accelerations(model: Model, state: States, times: Array) -> Array:
     """C̈ (T, rows) at `times` (T,), less what their targets ask for: 0 where the motion keeps to the constraints."""
     system = MultibodySystem(model)
-    return system.core.row_accelerations(system.scene, times.tolist(), state.q, state.v, state.a) * system.row_signs
+    return (
+        system.core.constraint_accelerations(system.scene, times.tolist(), state.q, state.v, state.a) * system.row_signs
+    )
 
 
 def mass_matrices(model: Model, q: Array, t: float = 0.0) -> Array:

@@ -119,7 +119,7 @@ class SplitForces(NamedTuple):
 
 
 def split_forces(model: Model, q: Array, wanted: Array) -> SplitForces:
-    """Gᵀτ + EᵀF_p − C_cᵀλ_c = `wanted` (T, n_v) at q (T, n_q), by the core (core/recursion/motors.h)."""
+    """Gᵀτ + EᵀF_p − C_cᵀλ_c = `wanted` (T, n_v) at q (T, n_q), by the core (core/recursion/inverse/motors.h)."""
     tau, left, multipliers = driven_mechanism(model).split(q, wanted)
     moments, first = {}, 0
     for joint, coordinates in model.motors.items():
@@ -148,7 +148,7 @@ class FrameShare(NamedTuple):
 def frame_share(model: Model, joint: str, q: Array) -> FrameShare:
     """Of the motor of a revolute joint at q (n_q,): −Φ_rᵀ J_l(φ) z of both its sections.
 
-    Why: core/recursion/frame_motor.h.
+    Why: core/recursion/motion/frame_motor.h.
     """
     tree = model.tree
     direction, slope = np.zeros(tree.n_v), np.zeros((tree.n_v, tree.n_v))

@@ -1,4 +1,4 @@
-"""What the core wants of bodies and sections: mbs/core/recursion/model.h."""
+"""What the core wants of bodies and sections: mbs/core/recursion/mechanism/model.h."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class ModelParts(NamedTuple):
 
     bodies: list[_core.SpatialBody]
     ground: list[_core.SpatialMarker]
-    rows: list[_core.RowModel]
+    rows: list[_core.ConstraintModel]
     wrenches: list[_core.MarkerAt]
     gravity: Array
     cut: tuple[CutPlace, ...]

@@ -94,7 +94,7 @@ def turned_by(row: ConstraintRow, a: Motion, b: Motion) -> Array:
 
 
 def turning_axis(row: ConstraintRow, a: Motion, b: Motion) -> Array:
-    """Its rate (T, 3) by the angular velocity of b against a; core/recursion/rows.h."""
+    """Its rate (T, 3) by the angular velocity of b against a; core/recursion/constrained_aba/constraints.h."""
     axis, turned = a.F @ row.f, b.F @ row.g
     along = np.sum(axis * turned, axis=-1, keepdims=True)
     found: Array = axis - along / (1.0 - along**2) * (turned - along * axis)

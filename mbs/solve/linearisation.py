@@ -1,8 +1,8 @@
 """The equations of motion, linear about a posture or a motion, in independent coordinates.
 
-The core differentiates them exactly (core/recursion/derivatives.h). For increments δ of the coordinates of the tree,
-rotation vectors in body axes for orientations, δ̇ = δv + B δ with B = −ω~ at orientations, else 0. Loops leave
-δ = H δs and δv = H δv_s + N δs, where v_s are the rates of the independent coordinates s. So
+The core differentiates them exactly (core/recursion/constrained_aba/derivatives.h). For increments δ of the
+coordinates of the tree, rotation vectors in body axes for orientations, δ̇ = δv + B δ; B = −ω~ at orientations, else 0.
+Loops leave δ = H δs and δv = H δv_s + N δs, where v_s are the rates of the independent coordinates s. So
 
     δv = H δṡ + Ḣ δs,  Ḣ = N − H B_s H;    δs̈ = a_v,s (H δṡ + Ḣ δs) + a_q,s H δs + d/dt (B_s δ).
 

@@ -156,7 +156,9 @@ def test_geared_rotors(turned):
 
     for kinds in (("rigid",), ("beam",), ("solid",), ("supported beam",)):
         tree = random_tree(rng, ["revolute"] * 3, kinds, chain=True, size=SMALL)
-        found, nodes, (energies, expected) = systems(tree, turned, dict.fromkeys(("j1", "j2", "j3"), keys), acting=acting)
+        found, nodes, (energies, expected) = systems(
+            tree, turned, dict.fromkeys(("j1", "j2", "j3"), keys), acting=acting
+        )
         assert_same(found, nodes)
         assert energies[0] == pytest.approx(expected[0], rel=1e-12)
 

@@ -1,6 +1,6 @@
-// What a mechanism in joint coordinates is made of: mbs/core/recursion/model.h.
-#include "core/recursion/motion_forces.h"
-#include "core/recursion/observe.h"
+// What a mechanism in joint coordinates is made of: mbs/core/recursion/mechanism/model.h.
+#include "core/recursion/inverse/motion_forces.h"
+#include "core/recursion/inverse/observe.h"
 
 #include <nanobind/stl/array.h>
 #include <nanobind/stl/string.h>
@@ -62,7 +62,7 @@ void bind_data(nb::module_ &m) {
       .def_rw("markers", &SpatialData::markers);
 }
 
-void bind_rows(nb::module_ &m) {
+void bind_constraints(nb::module_ &m) {
   nb::enum_<JointKind>(m, "JointKind")
       .value("revolute", JointKind::revolute)
       .value("prismatic", JointKind::prismatic)
@@ -73,28 +73,29 @@ void bind_rows(nb::module_ &m) {
       .value("planar", JointKind::planar)
       .value("weld", JointKind::weld)
       .value("free", JointKind::free);
-  nb::enum_<RowKind>(m, "RowKind")
-      .value("point", RowKind::point)
-      .value("slide", RowKind::slide)
-      .value("dot", RowKind::dot)
-      .value("rotation", RowKind::rotation)
-      .value("turn", RowKind::turn)
-      .value("coordinate", RowKind::coordinate);
+  nb::enum_<ConstraintKind>(m, "ConstraintKind")
+      .value("point", ConstraintKind::point)
+      .value("slide", ConstraintKind::slide)
+      .value("dot", ConstraintKind::dot)
+      .value("rotation", ConstraintKind::rotation)
+      .value("turn", ConstraintKind::turn)
+      .value("coordinate", ConstraintKind::coordinate);
   nb::class_<MarkerAt>(m, "MarkerAt", "A marker of a body, or of the ground: body -1.")
       .def(
           "__init__", [](MarkerAt *at, int body, int marker) { new (at) MarkerAt{body, marker}; }, "body"_a, "marker"_a)
       .def_ro("body", &MarkerAt::body)
       .def_ro("marker", &MarkerAt::marker)
       .def_rw("only_forces", &MarkerAt::only_forces, "Of a wrench in the plane: its moment is zero at all times.");
-  nb::class_<RowModel>(m, "RowModel", "A constraint row between markers a and b; see mbs/core/recursion/model.h.")
+  nb::class_<ConstraintModel>(m, "ConstraintModel",
+                              "A constraint row between markers a and b; see mbs/core/recursion/mechanism/model.h.")
       .def(nb::init<>())
-      .def_rw("name", &RowModel::name)
-      .def_rw("kind", &RowModel::kind)
-      .def_rw("a", &RowModel::a)
-      .def_rw("b", &RowModel::b)
-      .def_rw("f", &RowModel::f)
-      .def_rw("g", &RowModel::g)
-      .def_rw("coordinate", &RowModel::coordinate);
+      .def_rw("name", &ConstraintModel::name)
+      .def_rw("kind", &ConstraintModel::kind)
+      .def_rw("a", &ConstraintModel::a)
+      .def_rw("b", &ConstraintModel::b)
+      .def_rw("f", &ConstraintModel::f)
+      .def_rw("g", &ConstraintModel::g)
+      .def_rw("coordinate", &ConstraintModel::coordinate);
   nb::class_<FrameMotion>(m, "FrameMotion", "Motion of a body's frame, global axes.")
       .def_ro("r", &FrameMotion::r)
       .def_ro("v", &FrameMotion::v)
@@ -109,9 +110,10 @@ void bind_rows(nb::module_ &m) {
       .def_ro("gravitational", &Totals::gravitational)
       .def_ro("momentum", &Totals::momentum)
       .def_ro("angular_momentum", &Totals::angular_momentum);
-  nb::class_<MotionForces>(m, "MotionForces",
-                           "What bodies and joints do to each other, over states (T, …): forces with their moments "
-                           "about the sections on which they act, global axes; mbs/core/recursion/motion_forces.h.")
+  nb::class_<MotionForces>(
+      m, "MotionForces",
+      "What bodies and joints do to each other, over states (T, …): forces with their moments "
+      "about the sections on which they act, global axes; mbs/core/recursion/inverse/motion_forces.h.")
       .def_ro("bodies", &MotionForces::bodies, "(T, 9 bodies) acceleration, angular acceleration, angular velocity.")
       .def_ro("points", &MotionForces::points, "(T, 9 wrenches) the same of sections on which wrenches may act.")
       .def_ro("sections", &MotionForces::sections, "(T, dim sections) all that acts on each of the model's sections.")
@@ -126,5 +128,5 @@ void bind_rows(nb::module_ &m) {
 
 void bind_tree_data(nb::module_ &m) {
   bind_data(m);
-  bind_rows(m);
+  bind_constraints(m);
 }

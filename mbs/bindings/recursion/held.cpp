@@ -31,7 +31,7 @@ void bind_held_motion(nb::module_ &m) {
       .def(
           "__init__",
           [](HeldModel *model, const std::vector<BodyModel<SpatialData>> &bodies,
-             const std::vector<SpatialMarker> &ground, const std::vector<RowModel> &rows,
+             const std::vector<SpatialMarker> &ground, const std::vector<ConstraintModel> &rows,
              const std::vector<MarkerAt> &wrenches, const VectorXd &gravity, const Scene &scene) {
             new (model) HeldModel();
             model->bodies = bodies, model->ground = ground, model->rows = rows, model->gravity = gravity;

@@ -1,7 +1,8 @@
-// What motions that are known take: mbs/core/recursion/newton_euler.h, at many states of a mechanism and its scene.
+// What motions that are known take: mbs/core/recursion/inverse/newton_euler.h, at many states of a mechanism and its
+// scene.
 #pragma once
 
-#include "core/recursion/motion_forces.h"
+#include "core/recursion/inverse/motion_forces.h"
 
 #include "bindings/recursion/tree_run.h"
 
@@ -57,12 +58,12 @@ RowMajorMatrix required_forces(Model<Space> &model, const Scene &scene, const st
 
 // (T, rows) second derivatives of the rows' values, less those that their targets have
 template <class Space>
-RowMajorMatrix row_accelerations(Model<Space> &model, const Scene &scene, const std::vector<double> &times,
-                                 const RowMajorMatrix &q, const RowMajorMatrix &v, const RowMajorMatrix &a) {
+RowMajorMatrix constraint_accelerations(Model<Space> &model, const Scene &scene, const std::vector<double> &times,
+                                        const RowMajorMatrix &q, const RowMajorMatrix &v, const RowMajorMatrix &a) {
   RowMajorMatrix found(a.rows(), model.rows());
   at_known_states(model, scene, {times, q, v, a}, [&](Eigen::Index i, const auto &, auto &forces, auto &w) {
     for (std::size_t r = 0; r < scene.targets.size(); ++r)
-      found(i, static_cast<Eigen::Index>(r)) = forces.of_row(r, a.row(i).data(), w).value -
+      found(i, static_cast<Eigen::Index>(r)) = forces.of_constraint(r, a.row(i).data(), w).value -
                                                scene.targets[r](times[static_cast<std::size_t>(i)]).acceleration;
   });
   return found;

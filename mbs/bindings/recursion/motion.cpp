@@ -1,7 +1,7 @@
-// Motions of mechanisms in joint coordinates: mbs/core/recursion/motion.h.
-#include "core/recursion/motion.h"
+// Motions of mechanisms in joint coordinates: mbs/core/recursion/motion/motion.h.
+#include "core/recursion/motion/motion.h"
 #include "core/integrate/integrate.h"
-#include "core/recursion/motors.h"
+#include "core/recursion/inverse/motors.h"
 
 #include <nanobind/stl/complex.h>
 #include <nanobind/stl/function.h>
@@ -159,11 +159,7 @@ void make_checkpoint(TreeCheckpoint *made, double time, VectorXd state, const St
   new (made) TreeCheckpoint{{time, std::move(state), steps, outputs, methods},
                             {{state_peaks, force_peaks, inertial_peak},
                              accepted,
-                             least_ratio,
-                             singular_at,
-                             std::move(singular_posture),
-                             watched_at,
-                             determinant},
+                             {least_ratio, singular_at, std::move(singular_posture), watched_at, determinant}},
                             ranges_of(ranges)};
 }
 
@@ -182,11 +178,11 @@ void bind_checkpoint(nb::module_ &m) {
       .def_prop_ro("force_peaks", [](const TreeCheckpoint &c) { return as_vector(c.history.peaks.force); })
       .def_prop_ro("inertial_peak", [](const TreeCheckpoint &c) { return c.history.peaks.inertial; })
       .def_prop_ro("accepted", [](const TreeCheckpoint &c) { return c.history.accepted; })
-      .def_prop_ro("least_ratio", [](const TreeCheckpoint &c) { return c.history.least_ratio; })
-      .def_prop_ro("singular_at", [](const TreeCheckpoint &c) { return c.history.singular_at; })
-      .def_prop_ro("singular_posture", [](const TreeCheckpoint &c) { return c.history.singular_posture; })
-      .def_prop_ro("watched_at", [](const TreeCheckpoint &c) { return c.history.watched_at; })
-      .def_prop_ro("determinant", [](const TreeCheckpoint &c) { return c.history.determinant; })
+      .def_prop_ro("least_ratio", [](const TreeCheckpoint &c) { return c.history.postures.least_ratio; })
+      .def_prop_ro("singular_at", [](const TreeCheckpoint &c) { return c.history.postures.singular_at; })
+      .def_prop_ro("singular_posture", [](const TreeCheckpoint &c) { return c.history.postures.singular_posture; })
+      .def_prop_ro("watched_at", [](const TreeCheckpoint &c) { return c.history.postures.watched_at; })
+      .def_prop_ro("determinant", [](const TreeCheckpoint &c) { return c.history.postures.determinant; })
       .def_prop_ro(
           "ranges", [](const TreeCheckpoint &c) { return as_vector(numbers_of(c.ranges)); },
           "(4 limits,) of each: least and largest value, whether it has left its range, and when.");
@@ -210,10 +206,14 @@ void bind_run_and_laws(nb::module_ &m) {
       .def_prop_ro(
           "step_ends", [](const TreeRun &r) { return r.report.step_ends; },
           "Times (s) where steps ended, as controls ask for them; none where they cannot be repeated.")
-      .def_ro("least_ratio", &TreeRun::least_ratio,
-              "Of the scene's watch: 1 without; see mbs/core/recursion/posture.h.")
-      .def_ro("singular_at", &TreeRun::singular_at, "When that was, s.")
-      .def_ro("singular_posture", &TreeRun::singular_posture, "(n_q) q there; empty without a watch.")
+      .def_prop_ro(
+          "least_ratio", [](const TreeRun &r) { return r.postures.least_ratio; },
+          "Of the scene's watch: 1 without; see mbs/core/recursion/motion/singular_posture.h.")
+      .def_prop_ro(
+          "singular_at", [](const TreeRun &r) { return r.postures.singular_at; }, "When that was, s.")
+      .def_prop_ro(
+          "singular_posture", [](const TreeRun &r) { return r.postures.singular_posture; },
+          "(n_q) q there; empty without a watch.")
       .def_prop_ro(
           "ranges",
           [](const TreeRun &r) {
@@ -232,7 +232,7 @@ void bind_run_and_laws(nb::module_ &m) {
       .value("rotation_vector", OrientationKind::rotation_vector)
       .value("rpy", OrientationKind::rpy)
       .value("direction", OrientationKind::direction);
-  nb::class_<OrientationLaw>(m, "TurningLaw", "A triad A(t); see mbs/core/recursion/orientation.h.")
+  nb::class_<OrientationLaw>(m, "TurningLaw", "A triad A(t); see mbs/core/recursion/motion/orientation.h.")
       .def(
           "__init__",
           [](OrientationLaw *law, OrientationKind kind, const std::vector<TimeFunction> &functions,
@@ -319,7 +319,7 @@ void bind_tree_motion(nb::module_ &m) {
           "lowest"_a, "highest"_a,
           "Watch whether the coordinate with this index in v, a number, stays in a range; the run does not end there.")
       .def_rw("has_loops", &Scene::has_loops, "Whether rows close loops: the run ends where these are singular.")
-      .def_rw("keeps_all_rows", &Scene::keeps_all_rows, "Whether no rows depend on others.")
+      .def_rw("keeps_all_constraints", &Scene::keeps_all_constraints, "Whether no rows depend on others.")
       .def_rw("most_bent", &Scene::most_bent, "(bodies) kg m^2: largest p^T p of each that makes sense; empty: any.")
       .def(
           "turn_marker", [](Scene &s, int marker, const OrientationLaw &law) { s.driven.push_back({marker, law}); },

@@ -1,6 +1,6 @@
 // Motions that are wholly prescribed, and what motors do in place of what holds them: mbs/core/recursion/
 // prescribed_motion.h and motors.h.
-#include "core/recursion/prescribed_motion.h"
+#include "core/recursion/inverse/prescribed_motion.h"
 
 #include <nanobind/stl/pair.h>
 #include <nanobind/stl/string.h>
@@ -145,17 +145,16 @@ void at_postures(const DrivenMechanism<Space> &driven, const std::vector<double>
   recursion::Workspace<Space, double> w(driven.mechanism);
   Motors<Space> motors(driven);
   const VectorXd v = VectorXd::Zero(driven.mechanism.n_v);
-  const VectorXd target = VectorXd::Zero(static_cast<Index>(driven.mechanism.rows.size()));
+  const VectorXd target = VectorXd::Zero(static_cast<Index>(driven.mechanism.constraints.size()));
   VectorXd a(driven.mechanism.n_v);
   w.keep({});
   for (Index i = 0; i < q.rows(); ++i) {
     if (!times.empty())
       for (const DrivenMarker &marker : driven.scene.driven)
         w.turning[static_cast<std::size_t>(marker.marker)] = marker.law(times[static_cast<std::size_t>(i)]);
-    Forces<double> none;
-    place_all(driven.mechanism, q.row(i).data(), v.data(), none, w), none.is_placed = true;
+    const auto at = place_all(driven.mechanism, q.row(i).data(), v.data(), nullptr, w);
     // for the mass matrix of the modes of stiffened bodies, and their rows
-    accelerations(driven.mechanism, q.row(i).data(), v.data(), none, target.data(), w, a.data());
+    accelerations(at, nullptr, target.data(), a.data());
     each(i, motors, w);
   }
 }
@@ -165,7 +164,7 @@ RowMajorMatrix path_forces(const DrivenMechanism<Space> &driven, const std::vect
                            const RowMajorMatrix &q, const RowMajorMatrix &multipliers) {
   check_size("times", static_cast<Index>(times.size()), q.rows());
   check_size("times of multipliers", multipliers.rows(), q.rows());
-  check_size("multipliers", multipliers.cols(), static_cast<Index>(driven.mechanism.rows.size()));
+  check_size("multipliers", multipliers.cols(), static_cast<Index>(driven.mechanism.constraints.size()));
   RowMajorMatrix found(q.rows(), driven.mechanism.n_v);
   at_postures(driven, times, q, [&](Index i, Motors<Space> &motors, const auto &w) {
     found.row(i) = motors.path_forces(q.row(i).data(), multipliers.row(i).data(), w).transpose();
@@ -179,7 +178,7 @@ std::vector<RowMajorMatrix> path_forces_on_bodies(const DrivenMechanism<Space> &
                                                   const RowMajorMatrix &multipliers) {
   check_size("times", static_cast<Index>(times.size()), q.rows());
   check_size("times of multipliers", multipliers.rows(), q.rows());
-  check_size("multipliers", multipliers.cols(), static_cast<Index>(driven.mechanism.rows.size()));
+  check_size("multipliers", multipliers.cols(), static_cast<Index>(driven.mechanism.constraints.size()));
   std::vector<RowMajorMatrix> found;
   for (const auto &node : driven.mechanism.nodes)
     found.emplace_back(q.rows(), Space::dim + node.n());

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "core/recursion/motion.h"
+#include "core/recursion/motion/motion.h"
 
 #include <nanobind/eigen/dense.h>
 #include <nanobind/nanobind.h>
@@ -23,10 +23,10 @@ template <class Space> struct Model {
   Workspace<Space, double> w;
 
   Model(const std::vector<BodyModel<typename Space::Data>> &bodies, const std::vector<typename Space::Marker> &ground,
-        const std::vector<RowModel> &rows, const std::vector<MarkerAt> &wrenches, const Eigen::VectorXd &gravity)
+        const std::vector<ConstraintModel> &rows, const std::vector<MarkerAt> &wrenches, const Eigen::VectorXd &gravity)
       : mechanism(bodies, ground, rows, wrenches, gravity), w(mechanism) {}
 
-  Eigen::Index rows() const { return static_cast<Eigen::Index>(mechanism.rows.size()); }
+  Eigen::Index rows() const { return static_cast<Eigen::Index>(mechanism.constraints.size()); }
   void check_state(const Eigen::VectorXd &q, const Eigen::VectorXd &v) const {
     check_size("q", q.size(), mechanism.n_q);
     check_size("v", v.size(), mechanism.n_v);

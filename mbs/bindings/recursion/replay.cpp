@@ -42,8 +42,9 @@ Reader<Space> paths_of(const DrivenMechanism<Space> &driven, const Eigen::Matrix
                        const std::vector<std::tuple<int, int, double>> &parts, Index count) {
   std::vector<typename PathReader<Space>::Part> found;
   for (const auto &[row, column, sign] : parts) {
-    check_index("constraint equation", row, driven.mechanism.rows.size());
-    const bool is_coordinate = driven.mechanism.rows[static_cast<std::size_t>(row)].model.kind == RowKind::coordinate;
+    check_index("constraint equation", row, driven.mechanism.constraints.size());
+    const bool is_coordinate =
+        driven.mechanism.constraints[static_cast<std::size_t>(row)].model.kind == ConstraintKind::coordinate;
     check_index("column of a path", column, is_coordinate ? count : count - 5);
     found.push_back({row, column, sign});
   }

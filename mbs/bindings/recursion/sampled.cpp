@@ -98,7 +98,8 @@ template <class Space> void bind_sampled_motion(nb::module_ &m) {
 } // namespace
 
 void bind_tree_sampled(nb::module_ &m) {
-  nb::class_<HeldForces>(m, "HeldForces", "What a unit of each command does: see mbs/core/recursion/held_forces.h.")
+  nb::class_<HeldForces>(m, "HeldForces",
+                         "What a unit of each command does: see mbs/core/recursion/motion/held_forces.h.")
       .def(nb::init<Eigen::MatrixXd>(), "direction"_a, "Generalized forces (n_v, inputs).")
       .def(
           "add_frame_motor",
@@ -108,7 +109,8 @@ void bind_tree_sampled(nb::module_ &m) {
             held.add_frame_motor(input, {q, v, rotation, axis});
           },
           "input"_a, "q"_a, "v"_a, "rotation"_a, "axis"_a,
-          "What a motor that turns the frame of a body takes back on its modes: see core/recursion/frame_motor.h.");
+          "What a motor that turns the frame of a body takes back on its modes: see "
+          "core/recursion/motion/frame_motor.h.");
   bind_sampled_motion<Planar>(m);
   bind_sampled_motion<Spatial>(m);
 }

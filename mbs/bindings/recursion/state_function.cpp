@@ -1,5 +1,5 @@
-// Forces of the user's, of how points move: mbs/core/recursion/point_force.h.
-#include "core/recursion/point_force.h"
+// Forces of the user's, of how points move: mbs/core/recursion/constrained_aba/point_force.h.
+#include "core/recursion/constrained_aba/point_force.h"
 
 #include <nanobind/stl/function.h>
 #include <nanobind/stl/vector.h>
@@ -46,7 +46,8 @@ Numbers called(const StateFunction &function, double t, const Numbers &position,
 } // namespace
 
 void bind_state_function(nb::module_ &m) {
-  nb::class_<StateFunction>(m, "StateFunction", "A force of the user's; see mbs/core/recursion/point_force.h.")
+  nb::class_<StateFunction>(m, "StateFunction",
+                            "A force of the user's; see mbs/core/recursion/constrained_aba/point_force.h.")
       .def("__call__", &called, "t"_a, "position"_a, "rate"_a, "Force and moment: N, N m.")
       .def_ro("is_planar", &StateFunction::is_planar)
       .def_static("python", &python_force, "function"_a, "is_planar"_a,

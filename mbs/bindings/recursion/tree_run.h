@@ -5,7 +5,7 @@
 #include "core/analysis/replay.h"
 #include "core/check_index.h"
 #include "core/integrate/integrate.h"
-#include "core/recursion/motion.h"
+#include "core/recursion/motion/motion.h"
 
 #include <algorithm>
 #include <functional>
@@ -92,9 +92,8 @@ struct TreeRun {
   Eigen::VectorXd last;                         // (q, v) of the last accepted step
   RowMajorMatrix states, accelerations, lambda; // (T, n_q + n_v), (T, n_v), (T, rows)
   RowMajorMatrix replayed;                      // (T, numbers of its source) what a replay does
-  double least_ratio = 1, singular_at = 0;      // of the scene's watch
-  Eigen::VectorXd singular_posture;
-  std::vector<RangeSeen> ranges; // of the scene's limits
+  PostureHistory postures;                      // of the scene's watch
+  std::vector<RangeSeen> ranges;                // of the scene's limits
 
   template <class Space> TreeRun(const Model<Space> &model, std::size_t count) {
     const auto T = static_cast<Eigen::Index>(count);
@@ -130,8 +129,7 @@ struct TreeRun {
   // What only the end of an integration tells
   template <class Space> void finish(RecursiveMotion<Space> &motion) {
     motion.watch_posture(report.time, last.data());
-    least_ratio = motion.least_ratio(), singular_at = motion.singular_at();
-    singular_posture = motion.singular_posture();
+    postures = motion.postures();
     for (auto *x : {&states, &accelerations, &lambda, &replayed})
       x->conservativeResize(static_cast<Eigen::Index>(report.outputs), Eigen::NoChange);
   }

@@ -1,6 +1,6 @@
 #include "core/analysis/found_forces.h"
 
-#include "core/recursion/rows.h"
+#include "core/recursion/constrained_aba/constraints.h"
 
 #include <algorithm>
 
@@ -71,14 +71,14 @@ template <class Space>
 void PathReader<Space>::read(const double *, const Workspace<Space, double> &w, const VectorXd *, double *to) {
   std::fill_n(to, count_, 0.0);
   for (const auto &[row, column, sign] : parts_) {
-    const Row &of = mechanism_.rows[static_cast<std::size_t>(row)];
+    const Constraint &of = mechanism_.constraints[static_cast<std::size_t>(row)];
     const double size = -sign * w.lambda[static_cast<std::size_t>(row)];
-    if (of.model.kind == RowKind::coordinate) {
+    if (of.model.kind == ConstraintKind::coordinate) {
       to[column] += size;
       continue;
     }
-    RowMotion<double> motion;
-    row_motion(mechanism_, of, w, of.moves, motion);
+    ConstraintMotion<double> motion;
+    constraint_motion(mechanism_, of, w, of.moves, motion);
     Eigen::Map<Eigen::Vector3d> force(to + column), moment(to + column + 3);
     force += size * axes_ * Eigen::Map<const Eigen::Vector3d>(motion.force);
     moment += size * axes_ * Eigen::Map<const Eigen::Vector3d>(sign > 0 ? motion.moment_b : motion.moment_a);

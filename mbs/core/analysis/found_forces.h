@@ -5,7 +5,7 @@
 #include "core/analysis/allocation.h"
 #include "core/analysis/force_source.h"
 #include "core/integrate/recorded_motion.h"
-#include "core/recursion/prescribed_motion.h"
+#include "core/recursion/inverse/prescribed_motion.h"
 
 #include <memory>
 

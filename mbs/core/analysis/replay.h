@@ -2,14 +2,14 @@
 #pragma once
 
 #include "core/analysis/force_source.h"
-#include "core/recursion/held_forces.h"
-#include "core/recursion/motion.h"
+#include "core/recursion/motion/held_forces.h"
+#include "core/recursion/motion/motion.h"
 
 #include <memory>
 
 namespace ffrobot::recursion {
 
-class Replay final : public Steering {
+class Replay final : public ExternalForces {
 public:
   struct AtPoint {
     Eigen::Index number; // of the source's

@@ -21,7 +21,7 @@ template <class Archive> void fields(Archive &a, BodyModel<SpatialData> &x) {
                x.driven, x.of_section, x.data);
 }
 template <class Archive> void fields(Archive &a, MarkerAt &x) { archived_all(a, x.body, x.marker); }
-template <class Archive> void fields(Archive &a, RowModel &x) {
+template <class Archive> void fields(Archive &a, ConstraintModel &x) {
   archived_all(a, x.name, x.kind, x.a, x.b, x.f, x.g, x.coordinate);
 }
 template <class Archive> void fields(Archive &a, JointForce &x) {

@@ -2,8 +2,8 @@
 #pragma once
 
 #include "core/integrate/integrate.h"
-#include "core/recursion/motion.h"
-#include "core/recursion/observe.h"
+#include "core/recursion/inverse/observe.h"
+#include "core/recursion/motion/motion.h"
 
 #include <optional>
 #include <string>
@@ -30,7 +30,7 @@ struct HeldModel {
   std::string guid; // of the export that it belongs to
   std::vector<recursion::BodyModel<recursion::SpatialData>> bodies;
   std::vector<recursion::SpatialMarker> ground;
-  std::vector<recursion::RowModel> rows;
+  std::vector<recursion::ConstraintModel> rows;
   Eigen::VectorXd gravity; // (3) m/s^2
   std::vector<recursion::JointForce> joint_forces;
   std::vector<recursion::GearSpring> gears;

@@ -9,24 +9,12 @@ namespace ffrobot {
 
 class LeastNorm {
 public:
-  void compute(const Eigen::MatrixXd &A) {
-    is_square_ = A.rows() == A.cols();
-    if (is_square_)
-      lu_.compute(A);
-    else
-      qr_.setThreshold(dependent).compute(A);
-  }
-  template <class Columns> Columns solve(const Columns &b) const {
-    if (is_square_)
-      return lu_.solve(b);
-    return qr_.solve(b);
-  }
-  Eigen::VectorXd solve_transposed(const Eigen::VectorXd &c) const {
-    return is_square_ ? lu_.transpose().solve(c).eval() : qr_.transpose().solve(c).eval();
-  }
+  void compute(const Eigen::MatrixXd &A);
+  Eigen::VectorXd solve(const Eigen::VectorXd &b) const;
+  Eigen::MatrixXd solve(const Eigen::MatrixXd &b) const; // column by column
+  Eigen::VectorXd solve_transposed(const Eigen::VectorXd &c) const;
 
 private:
-  static constexpr double dependent = 1e-10; // of the largest pivot: rounding leaves 1e-15 of dependent equations
   bool is_square_ = true;
   Eigen::PartialPivLU<Eigen::MatrixXd> lu_;
   Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> qr_;

@@ -1,7 +1,7 @@
 // Products with matrices of a few rows, where Eigen's have more instructions around them than in them.
 #pragma once
 
-#include "core/recursion/pack.h"
+#include "core/recursion/numbers/pack.h"
 
 #include <Eigen/Core>
 

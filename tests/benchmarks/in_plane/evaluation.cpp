@@ -7,7 +7,7 @@
 //     four     a driven rigid crank, a coupler and a rocker of six modes (three rows)
 //
 //     valgrind --tool=callgrind ./evaluation two 3000     # less that of 1000, by 2000
-#include "core/recursion/workspace.h"
+#include "core/recursion/constrained_aba/workspace.h"
 #include "links.h"
 
 #include <chrono>
@@ -23,7 +23,7 @@ namespace {
 
 struct Model {
   std::vector<BodyModel<PlanarData>> bodies;
-  std::vector<RowModel> rows;
+  std::vector<ConstraintModel> rows;
   std::vector<PlanarMarker> ground{PlanarMarker()};
 
   void hang(PlanarData data, int parent, JointKind joint = JointKind::revolute) {
@@ -33,11 +33,11 @@ struct Model {
   }
   void tie(int tip_of, MarkerAt to) { // its tip to a marker
     for (int k = 0; k < 2; ++k)
-      rows.push_back({"tip", RowKind::point, to, {tip_of, 1}, Eigen::Vector3d::Unit(k)});
+      rows.push_back({"tip", ConstraintKind::point, to, {tip_of, 1}, Eigen::Vector3d::Unit(k)});
   }
   void drive_first() {
     bodies[0].driven = true;
-    rows.push_back({"drive", RowKind::coordinate});
+    rows.push_back({"drive", ConstraintKind::coordinate});
     rows.back().coordinate = 0;
   }
 };

@@ -4,7 +4,7 @@
 //
 //     valgrind --tool=callgrind ./two_link e 3000     # less that of 1000, by 2000
 #include "core/integrate/integrate.h"
-#include "core/recursion/motion.h"
+#include "core/recursion/motion/motion.h"
 #include "links.h"
 
 #include <chrono>
@@ -34,7 +34,7 @@ int main(int, char **given) {
   for (int i = 0; i < 2; ++i)
     bodies[i].parent = i - 1, bodies[i].parent_marker = i, bodies[i].data = link(i == 1);
   bodies[0].of_section = true;
-  std::vector<RowModel> rows(2);
+  std::vector<ConstraintModel> rows(2);
   for (int k = 0; k < 2; ++k)
     rows[k].name = "tip", rows[k].f = Eigen::Vector3d::Unit(k), rows[k].a = {-1, 0}, rows[k].b = {1, 1};
   const Mechanism<Planar> mechanism(bodies, {PlanarMarker()}, rows, {}, Eigen::Vector2d(0, -9.81));
@@ -42,7 +42,7 @@ int main(int, char **given) {
   const Eigen::Index second = mechanism.nodes[1].q;
   state[second] = pi / 3;
   Scene scene;
-  scene.targets = {{component(1.5)}, {component(std::sqrt(3) / 2)}}, scene.keeps_all_rows = true;
+  scene.targets = {{component(1.5)}, {component(std::sqrt(3) / 2)}}, scene.keeps_all_constraints = true;
   RecursiveMotion<Planar> motion(mechanism, scene, 0, state.data(), state.data() + mechanism.n_q);
   const auto start = std::chrono::steady_clock::now();
   double count = std::atof(given[2]);

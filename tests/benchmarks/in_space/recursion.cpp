@@ -1,8 +1,8 @@
 // One evaluation of the recursion in space, of chains of revolute joints: 3 or 6 links with 10 modes and rows at the
 // tip, or 6 rigid ones. `CHAIN ROWS REPETITIONS` prints the microseconds of the fastest of 20 rounds,
 // with `d` behind them those of an evaluation in duals, with derivatives in eight directions.
-#include "core/recursion/dual.h"
-#include "core/recursion/workspace.h"
+#include "core/recursion/numbers/dual.h"
+#include "core/recursion/constrained_aba/workspace.h"
 
 #include <Eigen/Geometry>
 
@@ -141,10 +141,10 @@ int main(int count, char **given) {
     body.parent = i - 1, body.parent_marker = i ? 1 : 0, body.data = link(modes);
     bodies.push_back(body);
   }
-  std::vector<RowModel> held;
+  std::vector<ConstraintModel> held;
   for (int k = 0; k < rows; ++k) {
-    RowModel row;
-    row.kind = k < 3 ? RowKind::point : RowKind::rotation, row.f = Vector3d::Unit(k % 3);
+    ConstraintModel row;
+    row.kind = k < 3 ? ConstraintKind::point : ConstraintKind::rotation, row.f = Vector3d::Unit(k % 3);
     row.a = {-1, 0}, row.b = {links - 1, 1};
     held.push_back(row);
   }

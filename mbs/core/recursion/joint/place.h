@@ -7,7 +7,7 @@
 // joint_elimination.h).
 #pragma once
 
-#include "core/recursion/small.h"
+#include "core/recursion/numbers/small.h"
 
 #include <initializer_list>
 

@@ -80,7 +80,7 @@ void Body::fill_rows(const PlanarData &data, const std::vector<int> &used, int t
     port.row = i == 0 ? 3 : 8 * ((i + 1) / 2) + 3 * ((i + 1) % 2);
     if (n) {
       W.middleRows<3>(port.row) = marker.Phi;
-      port.is_soft = !vanishes(marker.Phi, 1 / std::sqrt(mass));
+      port.is_flexible = !vanishes(marker.Phi, 1 / std::sqrt(mass));
       port.shifts = !vanishes(marker.Phi.topRows<2>(), 1 / std::sqrt(mass));
       port.turns = !vanishes(marker.Phi.row(2), 1 / std::sqrt(mass));
     }
@@ -91,7 +91,7 @@ void Body::fill_rows(const PlanarData &data, const std::vector<int> &used, int t
     for (Port &port : ports)
       for (const Stiffening::Row &curved : stiffening->at_ports)
         if (const int component = curved.row - port.row; component >= 0 && component < 3)
-          port.is_soft = true, (component == 2 ? port.turns : port.shifts) = true;
+          port.is_flexible = true, (component == 2 ? port.turns : port.shifts) = true;
   }
   is_tilted = n && tilted >= 0;
   if (is_tilted)

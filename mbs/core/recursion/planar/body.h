@@ -3,14 +3,14 @@
 //
 // Everything that p_ddot = Q_f - m^T A + sum of P^T f meets are products with the rows
 //     W = [S_bar_x; S_bar_y; h; Phi_x, Phi_y, Phi_rotation of port 0; of port 1; ...]
-// and G = W W^T, both constant (but for h where S_tilde is not zero, and with geometric stiffening: bent.h). They lie
+// and G = W W^T, both constant (but for h where S_tilde is not zero, and with stiffening: stiffened.h). They lie
 // in blocks of eight: the frame's three and port 0, ports 1 and 2, ports 3 and 4 … Where modes turn the section of a
-// pin (pins.h), that rotation is row TILT of the first block; FORCE is a row of zeros, but in bent.h.
+// pin (pin_joints.h), that rotation is row TILT of the first block; FORCE is a row of zeros, but in stiffened.h.
 #pragma once
 
+#include "core/recursion/numbers/register.h"
+#include "core/recursion/numbers/small.h"
 #include "core/recursion/planar/stiffening.h"
-#include "core/recursion/register.h"
-#include "core/recursion/small.h"
 
 #include <memory>
 
@@ -19,7 +19,7 @@ namespace ffrobot::recursion::planar {
 struct Port {
   double x = 0, y = 0, angle = 0; // undeformed, body axes
   int row = 3;                    // its first in W
-  bool is_soft = false;           // modes move it
+  bool is_flexible = false;       // modes move it
   bool shifts = false;            // … along x or y
   bool turns = false;             // … and turn it
 };
@@ -65,7 +65,7 @@ template <class T> struct Inertia {
   T bx, by, ba;             // -(Q_r - m Q_f)
 };
 
-// Of a body with geometric stiffening (bent.h); names as in stiffening.h
+// Of a body with geometric stiffening (stiffened.h); names as in stiffening.h
 template <class T> struct Bent {
   using Fields = Pack<T, fields>;
   explicit Bent(int n, int width)

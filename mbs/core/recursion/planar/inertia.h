@@ -1,7 +1,7 @@
 // The inertia of a planar body with its modes eliminated, the forces on it, and its modes by what acts on them.
 #pragma once
 
-#include "core/recursion/planar/bent.h"
+#include "core/recursion/planar/stiffened.h"
 
 namespace ffrobot::recursion::planar {
 
@@ -139,9 +139,9 @@ inline void modal_accelerations(const Body &b, const T *p, T *z, State<T> &s, T 
   }
 }
 
-// The same of a body with one block (pins.h)
+// The same of a body with one block (pin_joints.h)
 template <bool by_multipliers, class T>
-FFROBOT_APART void modes_of_pin(const Body &b, const T *p, T *z, State<T> &s, T *a) {
+FFROBOT_NOINLINE void modes_of_pin(const Body &b, const T *p, T *z, State<T> &s, T *a) {
   if constexpr (std::is_same_v<T, double>)
     if (!b.has_more) {
       const double ww = s.omega * s.omega, *elastic = s.elastic.data(), *tiles = b.tiles.data();

@@ -1,9 +1,9 @@
 // Outward, in the plane: angles, angular velocities, what velocities do at joints.
 #pragma once
 
-#include "core/recursion/angles.h"
+#include "core/recursion/constrained_aba/workspace.h"
+#include "core/recursion/numbers/angles.h"
 #include "core/recursion/planar/inertia.h"
-#include "core/recursion/workspace.h"
 
 namespace ffrobot::recursion {
 
@@ -16,15 +16,14 @@ template <class T> FFROBOT_INLINE T section_rate(const planar::Body &b, int port
 }
 
 template <class T>
-FFROBOT_APART void kinematics(const Mechanism<Planar> &m, const T *q, const T *v, const Forces<T> &forces,
-                              Workspace<Planar, T> &w) {
+FFROBOT_NOINLINE void kinematics(const Mechanism<Planar> &m, const T *q, const T *v,
+                                 const std::type_identity_t<T> *generalized, Workspace<Planar, T> &w) {
   const std::size_t count = w.hinges.size();
   Angles<T> angles;
   for (std::size_t i = 0; i < count; ++i) {
     const Node<Planar> &node = m.nodes[i];
     planar::State<T> &s = w.bodies[i];
-    project(node.body, q + node.p_q(), v + node.p_v(), forces.generalized ? forces.generalized + node.p_v() : nullptr,
-            s);
+    project(node.body, q + node.p_q(), v + node.p_v(), generalized ? generalized + node.p_v() : nullptr, s);
     if (node.body.stiffening)
       bend(node.body, q + node.p_q(), v + node.p_v(), s);
     T angle = T(node.inner_angle);
@@ -87,8 +86,8 @@ template <class T> FFROBOT_INLINE PlanarTurn<T> inboard_tilt(const Node<Planar> 
 }
 
 template <class T>
-FFROBOT_APART void evaluate_inertia(const Node<Planar> &node, const T *p, const T *v, planar::State<T> &s,
-                                    Pack<T, 3> *M, T *b) {
+FFROBOT_NOINLINE void evaluate_inertia(const Node<Planar> &node, const T *p, const T *v, planar::State<T> &s,
+                                       Pack<T, 3> *M, T *b) {
   forces_on_rows(node.body, p, v, s);
   const planar::Inertia<T> I = inertia(node.body, s);
   const T rows[3][3] = {{I.xx, I.xy, I.xa}, {I.xy, I.yy, I.ya}, {I.xa, I.ya, I.aa}};
@@ -101,14 +100,15 @@ FFROBOT_APART void evaluate_inertia(const Node<Planar> &node, const T *p, const 
 }
 
 template <class T>
-FFROBOT_APART void port_gram(const planar::Body &b, const planar::State<T> &s, int i, int j, Pack<T, 3> *G) {
+FFROBOT_NOINLINE void port_gram(const planar::Body &b, const planar::State<T> &s, int i, int j, Pack<T, 3> *G) {
   for (int r = 0; r < 3; ++r)
     for (int c = 0; c < 3; ++c)
       G[r].set(c, s.gram(b, b.ports[i].row + r, b.ports[j].row + c));
 }
 
 template <class T>
-FFROBOT_APART void port_rows(const planar::Body &b, int i, planar::State<T> &s, Pack<T, 3> *X, T *beta, Pack<T, 3> *G) {
+FFROBOT_NOINLINE void port_rows(const planar::Body &b, int i, planar::State<T> &s, Pack<T, 3> *X, T *beta,
+                                Pack<T, 3> *G) {
   const planar::Port &port = b.ports[i];
   const T *u = s.u.data() + port.row, *u_dot = s.u_dot.data() + port.row, *Q = s.Q.data() + port.row;
   const T ww = s.omega * s.omega, w2 = 2. * s.omega;
@@ -123,7 +123,7 @@ FFROBOT_APART void port_rows(const planar::Body &b, int i, planar::State<T> &s, 
   beta[0] = Q[0] - ww * (port.x + u[0]) - w2 * u_dot[1];
   beta[1] = Q[1] - ww * (port.y + u[1]) + w2 * u_dot[0];
   beta[2] = Q[2];
-  if (port.is_soft)
+  if (port.is_flexible)
     port_gram(b, s, i, i, G);
 }
 
@@ -134,7 +134,7 @@ FFROBOT_INLINE void put_force(const planar::Body &b, const planar::State<T> &, i
 }
 
 template <bool by_multipliers, class T>
-FFROBOT_APART void modes(const Node<Planar> &node, const T *p, T *z, planar::State<T> &s, T *a) {
+FFROBOT_NOINLINE void modes(const Node<Planar> &node, const T *p, T *z, planar::State<T> &s, T *a) {
   modal_accelerations<by_multipliers>(node.body, p, z, s, a);
 }
 

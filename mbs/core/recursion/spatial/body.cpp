@@ -191,7 +191,7 @@ void Body::fill_rows(const SpatialData &data, const std::vector<int> &used, cons
     if (n) {
       all.middleRows<3>(port.row) = marker.triad.transpose() * marker.Phi.topRows<3>();
       all.middleRows<3>(port.row + 3) = marker.triad.transpose() * marker.Phi.bottomRows<3>();
-      port.is_soft = marker.Phi.cwiseAbs().maxCoeff() > negligible / std::sqrt(mass) || is_curved(port.row);
+      port.is_flexible = marker.Phi.cwiseAbs().maxCoeff() > negligible / std::sqrt(mass) || is_curved(port.row);
     }
     ports.push_back(port);
   }

@@ -13,9 +13,9 @@
 // need them); these are in W alone, not in `rows` and G, which the other products are made of.
 #pragma once
 
-#include "core/recursion/mode_matrix.h"
-#include "core/recursion/model.h"
-#include "core/recursion/small.h"
+#include "core/recursion/mechanism/model.h"
+#include "core/recursion/numbers/small.h"
+#include "core/recursion/spatial/mode_matrix.h"
 #include "core/recursion/spatial/stiffening.h"
 
 #include <memory>
@@ -30,7 +30,7 @@ struct Port {
   int row = 8;                   // its first in W
   double T[6][lanes] = {};       // X - P m^T of the undeformed body; with geometric stiffening, X
   double turning[3][lanes] = {}; // axes of the section, in the place of alpha
-  bool is_soft = false;          // some row of Phi is not zero
+  bool is_flexible = false;      // some row of Phi is not zero
 };
 
 // T_s and b_s

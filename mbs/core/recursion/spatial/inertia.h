@@ -1,7 +1,7 @@
 // The inertia of a spatial body with its modes eliminated, and the forces on it.
 #pragma once
 
-#include "core/recursion/spatial/bent.h"
+#include "core/recursion/spatial/stiffened.h"
 
 namespace ffrobot::recursion::spatial {
 
@@ -42,7 +42,7 @@ template <class T> inline void project(const Body &b, const T *p, const T *v, co
   if (b.stiffening)
     bend(b, s);
   for (std::size_t i = 0; i < b.ports.size(); ++i)
-    if (b.ports[i].is_soft) {
+    if (b.ports[i].is_flexible) {
       PortMotion<T> &m = s.ports[i];
       const int row = b.ports[i].row + 3;
       for (int k = 0; k < 3; ++k)

@@ -32,7 +32,7 @@ FFROBOT_INLINE void inner_section(const Mechanism<Spatial> &m, const Node<Spatia
   const int port = node.parent_port - parent.first_port;
   turn_back(parent.body.ports[port].R, p.omega, to.omega);
   product(p.absolute, parent.body.ports[port].R, to.axes);
-  if (parent.body.ports[port].is_soft) {
+  if (parent.body.ports[port].is_flexible) {
     for (int i = 0; i < 3; ++i)
       to.omega[i] += p.ports[port].rate[i];
     to.tilt = p.ports[port].turn;
@@ -112,8 +112,8 @@ template <class T> FFROBOT_INLINE void force_columns(const Node<Spatial> &node, 
 } // namespace spatial
 
 template <class T>
-FFROBOT_APART void kinematics(const Mechanism<Spatial> &m, const T *q, const T *v, const Forces<T> &forces,
-                              Workspace<Spatial, T> &w) {
+FFROBOT_NOINLINE void kinematics(const Mechanism<Spatial> &m, const T *q, const T *v,
+                                 const std::type_identity_t<T> *generalized, Workspace<Spatial, T> &w) {
   Angles<T> angles;
   for (std::size_t i = 0; i < m.nodes.size(); ++i) {
     const bool turns = m.nodes[i].joint == JointKind::revolute;
@@ -123,8 +123,7 @@ FFROBOT_APART void kinematics(const Mechanism<Spatial> &m, const T *q, const T *
     const Node<Spatial> &node = m.nodes[i];
     spatial::State<T> &s = w.bodies[i];
     Hinge<Spatial, T> &hinge = w.hinges[i];
-    project(node.body, q + node.p_q(), v + node.p_v(), forces.generalized ? forces.generalized + node.p_v() : nullptr,
-            s);
+    project(node.body, q + node.p_q(), v + node.p_v(), generalized ? generalized + node.p_v() : nullptr, s);
     spatial::InnerSection<T> inner;
     spatial::inner_section(m, node, w, inner);
     if (node.joint == JointKind::revolute)
@@ -169,14 +168,14 @@ template <class T> FFROBOT_INLINE SpatialTurn<T> inboard_tilt(const Node<Spatial
 }
 
 template <class T>
-FFROBOT_APART void evaluate_inertia(const Node<Spatial> &node, const T *, const T *, spatial::State<T> &s,
-                                    Pack<T, 6> *M, T *b) {
+FFROBOT_NOINLINE void evaluate_inertia(const Node<Spatial> &node, const T *, const T *, spatial::State<T> &s,
+                                       Pack<T, 6> *M, T *b) {
   spatial::FrameTerms<T> found(M, b);
   inertia(node.body, s, found);
 }
 
 template <bool by_multipliers, class T>
-FFROBOT_APART void modes(const Node<Spatial> &node, const T *, const T *z, spatial::State<T> &s, T *a) {
+FFROBOT_NOINLINE void modes(const Node<Spatial> &node, const T *, const T *z, spatial::State<T> &s, T *a) {
   modal_accelerations<by_multipliers>(node.body, z, s, a);
 }
 

@@ -81,7 +81,7 @@ inline Vector relative_acceleration(const Body &b, int i, const State<double> &s
   double wr[3], swept[3], du[3], wdu[3], wp[3], turned[3];
   Vector found{};
   cross(w, motion.r, wr), cross(w, wr, swept);
-  if (!port.is_soft) {
+  if (!port.is_flexible) {
     turn_back(port.R, swept, found.data());
     return found;
   }
@@ -132,7 +132,7 @@ inline Eigen::VectorXd accelerations_by(const Body &b, const KnownBody &known, c
   Eigen::VectorXd found = vector_of(s.Q_f, b.n) + known.m.transpose() * z.head(6);
   const Rows W = rows_of(b, s);
   for (const Port &port : b.ports)
-    if (port.is_soft)
+    if (port.is_flexible)
       found += W.middleRows(port.row, 6).transpose() * z.segment(port.row, 6);
   return found;
 }
@@ -167,7 +167,7 @@ inline void to_port(const Body &b, int i, const State<double> &s, Vector &f) {
 // act(row of W, force) of a force on port i: Phi^T (f, J_l^T moment)
 template <class Act> void put_on_rows(const Body &b, int i, const State<double> &s, const Vector &f, const Act &act) {
   const Port &port = b.ports[static_cast<std::size_t>(i)];
-  if (!port.is_soft)
+  if (!port.is_flexible)
     return;
   double moment[3];
   turn_back(s.ports[static_cast<std::size_t>(i)].excess, f.data() + 3, moment);
@@ -201,7 +201,7 @@ inline void body_to_global(const State<double> &s, const double *x, double *y) {
 
 inline double modal_terms(const Body &b, int i, const State<double> &s) { // sizes of W Q_f of port i
   const Port &port = b.ports[static_cast<std::size_t>(i)];
-  if (!port.is_soft)
+  if (!port.is_flexible)
     return 0;
   double sum = 0;
   for (int k = 0; k < 6; ++k)

@@ -10,7 +10,7 @@ template <class T> FFROBOT_INLINE void place_port(const Body &b, int i, State<T>
   const Port &port = b.ports[i];
   for (int k = 0; k < 3; ++k) {
     s.ports[i].r[k] = T(port.r[k]);
-    if (port.is_soft)
+    if (port.is_flexible)
       for (int l = 0; l < 3; ++l)
         s.ports[i].r[k] += port.R[k][l] * s.u[port.row + l];
   }
@@ -23,7 +23,7 @@ template <class T> FFROBOT_INLINE void port_bias(const Body &b, int i, const Sta
   const T *w = s.omega;
   T wr[3], wwr[3];
   cross(w, m.r, wr), cross(w, wr, wwr);
-  if (!port.is_soft) {
+  if (!port.is_flexible) {
     turn_back(port.R, wwr, beta);
     for (int k = 0; k < 3; ++k)
       beta[3 + k] = T(0.);
@@ -42,20 +42,20 @@ template <class T> FFROBOT_INLINE void port_bias(const Body &b, int i, const Sta
 
 // X = X_rigid - P m^T at p: P = H Phi, H = diag(1, J_l)
 template <class T> FFROBOT_INLINE void port_by_frame(const Body &b, int i, const State<T> &s, Pack<T, 6> *X) {
-  using Row = Pack<T, 6>;
+  using Vector = Pack<T, 6>;
   const Port &port = b.ports[i];
-  if (!port.is_soft) {
+  if (!port.is_flexible) {
     for (int r = 0; r < 6; ++r)
       X[r] = constant_row<6, T>(port.T[r]);
     return;
   }
   const std::size_t twists = b.twists.size();
-  const Row z = twists ? constant_row<6, T>(b.twists[0].axis) : Row::zero(); // most bodies have one twist or none
+  const Vector z = twists ? constant_row<6, T>(b.twists[0].axis) : Vector::zero(); // most bodies have one twist or none
   const T *Wh = s.Wh[0].data() + port.row;
   const auto change = [&](int r) { // what row r of Phi m^T has beside its constant part
     if (b.stiffening)
-      return Row::read(s.bent.gram.data() + (port.row + r) * b.width);
-    Row x = Wh[r] * z;
+      return Vector::read(s.bent.gram.data() + (port.row + r) * b.width);
+    Vector x = Wh[r] * z;
     for (std::size_t c = 1; c < twists; ++c)
       add_scaled(s.Wh[c][port.row + r], b.twists[c].axis, x);
     return x;
@@ -63,13 +63,13 @@ template <class T> FFROBOT_INLINE void port_by_frame(const Body &b, int i, const
   const T *du = s.u.data() + port.row;
   for (int i1 = 0; i1 < 3; ++i1) { // e_k . (alpha x R du) = alpha . R (du x e_k)
     const int i2 = (i1 + 1) % 3, i3 = (i1 + 2) % 3;
-    Row x = constant_row<6, T>(port.T[i1]) - change(i1);
+    Vector x = constant_row<6, T>(port.T[i1]) - change(i1);
     add_scaled(du[i3], port.turning[i2], x), add_scaled(T(-1.) * du[i2], port.turning[i3], x);
     X[i1] = x;
   }
-  Row P[3], left[3]; // Phi_r m^T; rows of X without J_l - 1
+  Vector P[3], left[3]; // Phi_r m^T; rows of X without J_l - 1
   for (int r = 0; r < 3; ++r) {
-    const Row moved = change(3 + r);
+    const Vector moved = change(3 + r);
     left[r] = constant_row<6, T>(port.T[3 + r]) - moved;
     P[r] = b.stiffening ? moved : constant_row<6, T>(b.gram(port.row + 3 + r, 0)) + moved;
   }
@@ -79,7 +79,7 @@ template <class T> FFROBOT_INLINE void port_by_frame(const Body &b, int i, const
 }
 
 // G of forces on port j by accelerations of port i: H_i Phi_i Phi_j^T H_j^T
-template <class T> FFROBOT_APART void port_gram(const Body &b, const State<T> &s, int i, int j, Pack<T, 6> *G) {
+template <class T> FFROBOT_NOINLINE void port_gram(const Body &b, const State<T> &s, int i, int j, Pack<T, 6> *G) {
   const auto &L = s.ports[i].excess;
   Pack<T, 6> rows[3], left[3]; // rows of H_j^T - 1
   for (int k = 0; k < 3; ++k)
@@ -97,17 +97,17 @@ template <class T> FFROBOT_APART void port_gram(const Body &b, const State<T> &s
 
 // A_port = X A + beta + G f of a port, in axes of the undeformed section; f: force and moment on it
 template <class T>
-FFROBOT_APART void port_rows(const Body &b, int i, State<T> &s, Pack<T, 6> *X, T *beta, Pack<T, 6> *G) {
+FFROBOT_NOINLINE void port_rows(const Body &b, int i, State<T> &s, Pack<T, 6> *X, T *beta, Pack<T, 6> *G) {
   port_bias(b, i, s, beta);
   port_by_frame(b, i, s, X);
-  if (b.ports[i].is_soft)
+  if (b.ports[i].is_flexible)
     port_gram(b, s, i, i, G);
 }
 
 // Puts the force and moment on a port into z, by rows of W
 template <class T> FFROBOT_INLINE void put_force(const Body &b, const State<T> &s, int i, const T *f, T *z) {
   const Port &port = b.ports[i];
-  if (!port.is_soft)
+  if (!port.is_flexible)
     return;
   T moment[3];
   turn_back(s.ports[i].excess, f + 3, moment);

@@ -1,8 +1,8 @@
 // How the section of a port turns: by exp(phi), with the exact Jacobian J_l, so that reactions do no work.
 #pragma once
 
-#include "core/recursion/mode_matrix.h"
-#include "core/recursion/small.h"
+#include "core/recursion/numbers/small.h"
+#include "core/recursion/spatial/mode_matrix.h"
 
 #include <array>
 #include <cmath>

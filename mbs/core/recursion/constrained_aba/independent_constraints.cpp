@@ -1,0 +1,64 @@
+#include "core/recursion/constrained_aba/independent_constraints.h"
+
+#include <algorithm>
+#include <numeric>
+
+namespace ffrobot::recursion {
+
+namespace {
+
+// A constraint counts as dependent below this part of its own mobility: rounding leaves 1e-13, a badly placed
+// constraint 1e-7.
+constexpr double dependent = 1e-10;
+
+// Nothing moves a constraint whose mobility is below this part of the largest: rounding leaves 1e-30, and units of
+// constraints (m, mm, rad) make a difference of 1e6.
+constexpr double immobile = 1e-24;
+
+std::vector<int> pivots(Eigen::MatrixXd S) {
+  const Eigen::VectorXd own = S.diagonal();
+  const double least = immobile * own.maxCoeff();
+  std::vector<int> left(static_cast<std::size_t>(S.rows())), kept;
+  std::iota(left.begin(), left.end(), 0);
+  while (!left.empty()) {
+    const auto part = [&](int i) { return own[i] > least ? S(i, i) / own[i] : 0; };
+    const auto best = std::max_element(left.begin(), left.end(), [&](int i, int j) { return part(i) < part(j); });
+    const int k = *best;
+    if (!(part(k) > dependent))
+      break;
+    kept.push_back(k), left.erase(best);
+    for (const int i : left)
+      for (const int j : left)
+        S(i, j) -= S(i, k) * S(k, j) / S(k, k);
+  }
+  std::sort(kept.begin(), kept.end());
+  return kept;
+}
+
+} // namespace
+
+template <class Space>
+std::vector<int> keep_independent_constraints(const Mechanism<Space> &m, const double *q, const double *v,
+                                              Workspace<Space, double> &w) {
+  const auto count = static_cast<Eigen::Index>(m.constraints.size());
+  std::vector<int> all(m.constraints.size());
+  std::iota(all.begin(), all.end(), 0);
+  w.keep(all);
+  if (count == 0)
+    return all;
+  const std::vector<double> target(m.constraints.size(), 0.0);
+  std::vector<double> a(static_cast<std::size_t>(m.n_v));
+  w.keeps_delassus = true;
+  accelerations(m, q, v, Forces<double>(), target.data(), w, a.data());
+  w.keeps_delassus = false;
+  const Eigen::MatrixXd S = Eigen::Map<const Eigen::MatrixXd>(w.delassus.data(), count, count);
+  w.keep(pivots(S));
+  return w.active;
+}
+
+template std::vector<int> keep_independent_constraints(const Mechanism<Planar> &, const double *, const double *,
+                                                       Workspace<Planar, double> &);
+template std::vector<int> keep_independent_constraints(const Mechanism<Spatial> &, const double *, const double *,
+                                                       Workspace<Spatial, double> &);
+
+} // namespace ffrobot::recursion

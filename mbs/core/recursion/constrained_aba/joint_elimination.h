@@ -1,0 +1,167 @@
+// Inward through a joint: its freedoms leave the inertia of what it carries.
+#pragma once
+
+#include "core/recursion/constrained_aba/delassus.h"
+#include "core/recursion/planar/kinematics.h"
+#include "core/recursion/spatial/kinematics.h"
+
+namespace ffrobot::recursion {
+
+// In axes of the cross of a universal joint, and back: x and z turn about y
+template <class T, class X> FFROBOT_INLINE void to_cross(const Hinge<Spatial, T> &h, X *x) {
+  for (const int k : {0, 3}) {
+    const X u = h.cross_cosine * x[k] + h.cross_sine * x[k + 2], v = h.cross_cosine * x[k + 2] - h.cross_sine * x[k];
+    x[k] = u, x[k + 2] = v;
+  }
+}
+template <class T, class X> FFROBOT_INLINE void from_cross(const Hinge<Spatial, T> &h, X *x) {
+  for (const int k : {0, 3}) {
+    const X u = h.cross_cosine * x[k] - h.cross_sine * x[k + 2], v = h.cross_cosine * x[k + 2] + h.cross_sine * x[k];
+    x[k] = u, x[k + 2] = v;
+  }
+}
+
+// Symmetric matrix of rows, from both sides
+template <class F, int d, class T> FFROBOT_INLINE void both_sides(const F &change, Pack<T, d> *M) {
+  change(M);
+  for (int i = 0; i < d; ++i) {
+    T x[d];
+    for (int j = 0; j < d; ++j)
+      x[j] = M[i][j];
+    change(x);
+    for (int j = 0; j < d; ++j)
+      M[i].set(j, x[j]);
+  }
+}
+
+// Whether a constraint has the coordinate of a freedom of the node's joint
+template <class Space>
+FFROBOT_INLINE bool is_along(const Mechanism<Space> &m, const Constraint &row, const Node<Space> &node, int freedom) {
+  return row.node >= 0 && &m.nodes[row.node] == &node && row.freedom == freedom;
+}
+
+// What unit multipliers do along a freedom of the node's joint, by columns: constraints that have this coordinate.
+template <class T, int W, class Space>
+FFROBOT_INLINE Pack<T, W> multiplier_forces(const Mechanism<Space> &m, const Node<Space> &node, int freedom,
+                                            const Workspace<Space, T> &w) {
+  auto forces = Pack<T, W>::zero();
+  if (node.has_constraints)
+    for (std::size_t r = 0; r < w.active.size(); ++r)
+      if (is_along(m, m.constraints[w.active[r]], node, freedom))
+        forces.set(static_cast<int>(r) + 1, T(-m.constraints[w.active[r]].share));
+  return forces;
+}
+
+// What the multipliers y do along it
+template <class T, int W, class Space>
+FFROBOT_INLINE T multiplier_force(const Mechanism<Space> &m, const Node<Space> &node, int freedom,
+                                  const Workspace<Space, T> &w, const Pack<T, W> &y) {
+  if constexpr (W == most_columns)
+    if (!w.blocks.empty()) { // y is 1 then, and the answers of all columns are added up
+      T sum(0.);
+      for (std::size_t r = 0; r < w.active.size(); ++r)
+        if (is_along(m, m.constraints[w.active[r]], node, freedom))
+          sum -= m.constraints[w.active[r]].share * w.y[r + 1];
+      return sum;
+    }
+  return (multiplier_forces<T, W>(m, node, freedom, w) * y).sum();
+}
+
+// One freedom along component f, `known` while compiling, or -1: row and column of M leave, with what the rotor on the
+// inner section adds.
+template <int known, class Space, class T, int W>
+FFROBOT_INLINE void eliminate_freedom(const Node<Space> &node, int freedom, const T *force, Hinge<Space, T> &hinge,
+                                      const Mechanism<Space> &m, Workspace<Space, T> &w, Pack<T, Space::dim> *M,
+                                      Pack<T, W> *H, Delassus<T, W> &S) {
+  constexpr int d = Space::dim, stride = stride_of(W);
+  using Cols = Pack<T, W>;
+  const int f = known >= 0 ? known : node.shape.freedoms.component[freedom];
+  Cols applied = multiplier_forces<T, W>(m, node, freedom, w); // along the freedom
+  if (force)
+    applied.set(0, force[freedom]);
+  const Cols before = H[f], su = before - applied;
+  Pack<T, d> U = M[f];
+  const double J = node.rotor_inertia, N = node.gear_ratio, c = node.rotor_turns;
+  const T M_ff = U[f], D_inverse = T(1.) / (J > 0 ? M_ff + N * N * J : M_ff);
+  const Cols sd = D_inverse * su;
+  sd.write(w.stored.data() + node.joint_slot(freedom) * stride);
+  if (W > 1)
+    add_dyad(S, sd, su);
+  const Pack<T, d> U_by_D = D_inverse * U;
+  for (int j = 0; j < d; ++j)
+    if (known != j) { // row f is written below
+      const T U_j = U[j];
+      M[j] -= U_j * U_by_D;
+      M[j].set(f, T(0.));
+      H[j] -= U_j * sd;
+    }
+  M[f] = Pack<T, d>::zero();
+  H[f] = applied;
+  if (J > 0) {
+    M[f] = (N * (N - c) * J) * U_by_D;
+    for (int j = 0; j < d; ++j)
+      M[j].set(f, M[f][j]);
+    M[f].set(f, M_ff * ((N - c) * (N - c) * J) * D_inverse);
+    U.set(f, M_ff + c * N * J);
+    H[f] = before - U[f] * sd;
+  }
+  hinge.U[freedom] = U, hinge.D_inverse[freedom] = D_inverse;
+}
+
+template <class Space, class T, int W>
+inline void eliminate_joint(const Mechanism<Space> &m, const Node<Space> &node, const T *q, const T *force,
+                            Workspace<Space, T> &w, Pack<T, Space::dim> *M, Pack<T, W> *H, Delassus<T, W> &S) {
+  constexpr int d = Space::dim;
+  Hinge<Space, T> &hinge = w.hinges[node.index];
+  T applied[6], outer[6];
+  if (force) {
+    for (int i = 0; i < 6; ++i)
+      applied[i] = T(0.);
+    for (int k = 0; k < node.shape.freedoms.count; ++k)
+      applied[k] = force[k];
+    if (node.shape.in_inner_axes) { // freedoms ascending: translations first
+      T x[6] = {applied[0], applied[1], T(0.), T(0.), T(0.), T(0.)};
+      if (Space::dim == 6 && node.joint == JointKind::free)
+        x[2] = applied[2];
+      to_outer_axes(node, q, x, outer);
+      for (int k = 0; k < (node.joint == JointKind::free ? Space::linear : 2); ++k)
+        applied[k] = outer[k];
+    }
+  }
+  const bool universal = d == 6 && node.joint == JointKind::universal, screw = d == 6 && node.joint == JointKind::screw;
+  if constexpr (d == 6) {
+    if (universal) {
+      const auto change = [&](auto *x) { to_cross(hinge, x); };
+      both_sides<decltype(change), d, T>(change, M);
+      change(H);
+    } else if (screw) { // a_z = a_z' + lead alpha_z: the free direction is the last axis
+      const auto change = [&](auto *x) { x[5] += node.lead * x[2]; };
+      both_sides<decltype(change), d, T>(change, M);
+      change(H);
+    }
+  }
+  for (int k = node.shape.freedoms.count - 1; k >= 0; --k)
+    if (std::is_same_v<T, double> && node.shape.freedoms.component[k] == Space::axis)
+      eliminate_freedom<Space::axis, Space, T, W>(node, k, force ? applied : nullptr, hinge, m, w, M, H, S);
+    else
+      eliminate_freedom<-1, Space, T, W>(node, k, force ? applied : nullptr, hinge, m, w, M, H, S);
+  if (M != hinge.Lambda)
+    for (int i = 0; i < d; ++i)
+      hinge.Lambda[i] = M[i]; // in axes of the cross, or without the last row: `factors` knows
+  if (node.is_single_grounded)
+    for (int i = 0; i < d; ++i)
+      H[i].write(w.stored.data() + (node.ground_slot() + i) * stride_of(W));
+  if constexpr (d == 6) {
+    if (universal) {
+      const auto change = [&](auto *x) { from_cross(hinge, x); };
+      both_sides<decltype(change), d, T>(change, M);
+      change(H);
+    } else if (screw) {
+      const auto change = [&](auto *x) { x[5] -= node.lead * x[2]; };
+      both_sides<decltype(change), d, T>(change, M);
+      change(H);
+    }
+  }
+}
+
+} // namespace ffrobot::recursion

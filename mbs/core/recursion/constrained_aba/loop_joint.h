@@ -1,0 +1,29 @@
+// Joints at which loops are cut. They have no coordinate in the tree; what acts along theirs acts on the two sections,
+// as a moment or force on the second one and its opposite on the first.
+#pragma once
+
+#include "core/recursion/constrained_aba/workspace.h"
+#include "core/recursion/motion/friction.h"
+
+#include <vector>
+
+namespace ffrobot::recursion {
+
+// A coordinate of such a joint, of the section on which wrench b of the mechanism acts on that of wrench a: the turn
+// about (rad), or the way along (m), an axis of a.
+struct CutJoint {
+  int a = 0, b = 0; // wrenches
+  bool turns = true;
+  Eigen::Vector3d axis = Eigen::Vector3d::UnitZ(); // in axes of section a
+  Friction friction;
+};
+
+// Rates (cuts) rad/s, m/s
+template <class Space, class T>
+void cut_rates(const Placed<Space, T> &placed, const std::vector<CutJoint> &cuts, T *rate);
+
+// Adds moments (N m) or forces (N) of `size` (cuts) along the coordinates to wrenches (wrenches, dim).
+template <class Space, class T>
+void add_along_cuts(const Placed<Space, T> &placed, const std::vector<CutJoint> &cuts, const T *size, T *wrench);
+
+} // namespace ffrobot::recursion

@@ -1,0 +1,132 @@
+#include "core/recursion/inverse/motion_forces.h"
+
+#include "core/recursion/constrained_aba/constraints.h"
+#include "core/recursion/inverse/observe.h"
+
+#include <algorithm>
+
+namespace ffrobot::recursion {
+
+using Eigen::Index;
+using Eigen::Vector3d;
+
+namespace {
+
+using Motion = Eigen::Map<Eigen::Matrix<double, 9, 1>>;
+
+double *block(MotionForces::Table &table, Index row, Index size, std::size_t number) {
+  return table.row(row).data() + size * static_cast<Index>(number);
+}
+
+// A force (3) and its moment (3), of which a space has some
+template <class Space> void write_wrench(const double *force, const double *moment, double factor, double *to) {
+  for (int k = 0; k < Space::linear; ++k)
+    to[k] = factor * force[k];
+  for (int k = Space::linear; k < Space::dim; ++k)
+    to[k] = factor * moment[k + 3 - Space::dim];
+}
+
+// The same with three components each
+template <class Space> std::array<Vector3d, 2> in_three_axes(const std::array<double, Space::dim> &x) {
+  if constexpr (Space::dim == 3)
+    return {Vector3d(x[0], x[1], 0), Vector3d(0, 0, x[2])};
+  else
+    return {Vector3d(x[0], x[1], x[2]), Vector3d(x[3], x[4], x[5])};
+}
+
+} // namespace
+
+template <class Space> std::vector<std::array<int, 2>> ForcesOfStates<Space>::sections(const Mechanism<Space> &m) {
+  std::vector<std::array<int, 2>> found;
+  for (const Node<Space> &node : m.nodes)
+    for (const int marker : node.markers)
+      found.push_back({node.index, marker});
+  return found;
+}
+
+template <class Space>
+ForcesOfStates<Space>::ForcesOfStates(const Mechanism<Space> &mechanism, Index states) : mechanism_(mechanism) {
+  const auto resize = [states](MotionForces::Table &table, std::size_t size, std::size_t count) {
+    table.setZero(states, static_cast<Index>(size * count));
+  };
+  const std::size_t bodies = mechanism.nodes.size(), wrenches = mechanism.wrenches.size();
+  resize(found_.bodies, 9, bodies), resize(found_.points, 9, wrenches);
+  resize(found_.sections, Space::dim, sections(mechanism).size()), resize(found_.joints, Space::dim, bodies);
+  resize(found_.constraints, 2 * Space::dim, mechanism.constraints.size()),
+      resize(found_.wrenches, Space::dim, wrenches);
+  resize(found_.modal, 1, static_cast<std::size_t>(mechanism.n_v)), resize(found_.rotors, 3, bodies);
+}
+
+template <class Space>
+void ForcesOfStates<Space>::write_loads(Index i, const double *lambda, NewtonEuler<Space> &forces,
+                                        const Workspace<Space, double> &w) {
+  forces.transmit(w, false);
+  write_joints(i, forces);
+  ConstraintMotion<double> motion;
+  for (std::size_t r = 0; r < mechanism_.constraints.size(); ++r) {
+    constraint_motion(mechanism_, mechanism_.constraints[r], w, mechanism_.constraints[r].moves, motion);
+    double *to = block(found_.constraints, i, 2 * Space::dim, r);
+    write_wrench<Space>(motion.force, motion.moment_a, lambda[r], to);
+    write_wrench<Space>(motion.force, motion.moment_b, -lambda[r], to + Space::dim);
+  }
+}
+
+template <class Space>
+void ForcesOfStates<Space>::write(Index i, const double *q, const double *v, const double *a, const double *lambda,
+                                  const double *wrench, NewtonEuler<Space> &forces, Workspace<Space, double> &w) {
+  write_loads(i, lambda, forces, w);
+  forces.transmit(w);
+  write_joints(i, forces);
+  write_sections(i, forces, w);
+  for (std::size_t k = 0; k < mechanism_.wrenches.size(); ++k)
+    write_point(mechanism_.wrenches[k], forces, w, block(found_.points, i, 9, k));
+  if (wrench)
+    std::copy_n(wrench, found_.wrenches.cols(), found_.wrenches.row(i).data());
+  forces.require_of_modes(q, a, w, found_.modal.row(i).data());
+  forces.leave_frames(w);
+  const std::vector<FrameMotion> frames = frame_motions(mechanism_, q, v, w);
+  for (std::size_t k = 0; k < frames.size(); ++k)
+    Motion(block(found_.bodies, i, 9, k)) << frames[k].a_origin, frames[k].alpha, frames[k].omega;
+}
+
+template <class Space> void ForcesOfStates<Space>::write_joints(Index i, const NewtonEuler<Space> &forces) {
+  for (std::size_t k = 0; k < mechanism_.nodes.size(); ++k)
+    std::copy_n(forces.in_global_axes(k).data(), Space::dim, block(found_.joints, i, Space::dim, k));
+}
+
+template <class Space>
+void ForcesOfStates<Space>::write_sections(Index i, const NewtonEuler<Space> &forces,
+                                           const Workspace<Space, double> &w) {
+  double *to = found_.sections.row(i).data();
+  for (std::size_t k = 0; k < mechanism_.nodes.size(); ++k) {
+    const Node<Space> &node = mechanism_.nodes[k];
+    for (int port = 0; port < node.outboard; ++port, to += Space::dim)
+      port_to_global(node.body, port, w.bodies[k],
+                     forces.on_port(static_cast<std::size_t>(node.first_port + port)).data(), to);
+    std::copy_n(forces.in_global_axes(k).data(), Space::dim, to), to += Space::dim;
+    const Vector3d rotor = in_three_axes<Space>(forces.of_rotor(k))[1];
+    std::copy_n(rotor.data(), 3, block(found_.rotors, i, 3, k));
+  }
+}
+
+template <class Space>
+void ForcesOfStates<Space>::write_point(const Attachment &at, const NewtonEuler<Space> &forces,
+                                        const Workspace<Space, double> &w, double *to) const {
+  if (at.node < 0)
+    return;
+  const auto number = static_cast<std::size_t>(at.node);
+  typename NewtonEuler<Space>::Vector global;
+  port_to_global(mechanism_.nodes[number].body, at.port, w.bodies[number],
+                 forces.of_port(static_cast<std::size_t>(at.global_port)).data(), global.data());
+  const auto [a, alpha] = in_three_axes<Space>(global);
+  Pose<double> pose;
+  attachment_motion(mechanism_, at, w, pose);
+  Motion found(to);
+  found << a, alpha, pose.omega[0], pose.omega[1], pose.omega[2];
+  found.head(mechanism_.gravity.size()) += mechanism_.gravity;
+}
+
+template class ForcesOfStates<Planar>;
+template class ForcesOfStates<Spatial>;
+
+} // namespace ffrobot::recursion

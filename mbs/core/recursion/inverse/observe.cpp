@@ -1,0 +1,205 @@
+#include "core/recursion/inverse/observe.h"
+
+#include "core/recursion/constrained_aba/constraints.h"
+
+#include <Eigen/Geometry>
+
+namespace ffrobot::recursion {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+
+namespace {
+
+Vector3d vector(const double *x) { return {x[0], x[1], x[2]}; }
+
+Matrix3d axes(const Pose<double> &frame) {
+  Matrix3d R;
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j)
+      R(i, j) = frame.R[i][j];
+  return R;
+}
+
+// A in body axes as linear and angular parts with three components each
+std::pair<Vector3d, Vector3d> parts(const planar::State<double> &s) { return {{s.A[0], s.A[1], 0}, {0, 0, s.A[2]}}; }
+std::pair<Vector3d, Vector3d> parts(const spatial::State<double> &s) { return {vector(s.A), vector(s.A + 3)}; }
+
+// Of one body: s and M_rr of the frame (translation, rotation; body axes), m p_dot (linear, angular), 1/2 p_dot^T m_ff
+// p_dot
+struct Inertia {
+  double mass;
+  Vector3d s, S_p_dot, h_p_dot;
+  Matrix3d J;
+  double modal;
+};
+
+double half_square(int n, const double *v) { return 0.5 * Eigen::Map<const Eigen::VectorXd>(v, n).squaredNorm(); }
+
+Inertia inertia_of(const planar::Body &b, const double *p, const double *v, planar::State<double> &s) {
+  Inertia to{b.mass, Vector3d::Zero(), Vector3d::Zero(), Vector3d::Zero(), Matrix3d::Zero(), half_square(b.n, v)};
+  forces_on_rows(b, p, v, s);
+  to.s << b.sx, b.sy, 0;
+  to.J(2, 2) = b.J;
+  if (b.n) {
+    to.s += Vector3d(s.u[0], s.u[1], 0), to.S_p_dot << s.u_dot[0], s.u_dot[1], 0;
+    to.h_p_dot[2] = s.u_dot[2], to.J(2, 2) += s.p_p;
+    for (int i = 0; b.has_more && i < b.n; ++i)
+      to.h_p_dot[2] += s.h[i] * v[i];
+    if (b.stiffening)
+      to.modal += planar::bending_energy(s);
+  }
+  return to;
+}
+
+Inertia inertia_of(const spatial::Body &b, const double *, const double *v, spatial::State<double> &s) {
+  Inertia to{b.mass, Vector3d::Zero(), Vector3d::Zero(), Vector3d::Zero(), Matrix3d::Zero(), half_square(b.n, v)};
+  Pack<double, 6> M[6];
+  double bias[6];
+  spatial::FrameTerms<double> frame(M, bias);
+  inertia(b, s, frame);
+  to.s = vector(s.s);
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j)
+      to.J(i, j) = frame.J[symmetric_index(i, j)];
+  if (b.n) {
+    to.S_p_dot = vector(s.u_dot.data()), to.h_p_dot = vector(s.h_rate);
+    if (b.stiffening)
+      to.modal += spatial::bending_energy(b, s);
+  }
+  return to;
+}
+
+// p_dot^T D p_dot
+template <class Body> double damping_power(const Body &b, const double *p_dot) {
+  const Eigen::Map<const Eigen::VectorXd> rates(p_dot, b.n);
+  if (b.D_full.size())
+    return rates.dot(b.D_full * rates);
+  return rates.cwiseAbs2().dot(Eigen::Map<const Eigen::VectorXd>(b.D.data(), b.n));
+}
+
+// z of the section that the joint holds
+template <class Space>
+Vector3d joint_axis(const Mechanism<Space> &m, std::size_t i, const Workspace<Space, double> &w) {
+  const Node<Space> &node = m.nodes[i];
+  if (node.inboard < 0)
+    return axes(w.frames[i]).col(2);
+  Pose<double> section;
+  section_pose(node.body, node.inboard, w.bodies[i], w.frames[i], section);
+  return axes(section).col(2);
+}
+
+} // namespace
+
+template <class Space>
+const std::vector<Pose<double>> &frame_poses(const Mechanism<Space> &m, const double *q, const double *v,
+                                             Workspace<Space, double> &w) {
+  place_all(m, q, v, nullptr, w);
+  return w.frames;
+}
+
+template <class Space>
+std::vector<FrameMotion> frame_motions(const Mechanism<Space> &m, const double *q, const double *v,
+                                       Workspace<Space, double> &w) {
+  frame_poses(m, q, v, w);
+  Vector3d g = Vector3d::Zero();
+  g.head(m.gravity.size()) = m.gravity;
+  std::vector<FrameMotion> all;
+  for (std::size_t i = 0; i < m.nodes.size(); ++i) {
+    const Pose<double> &frame = w.frames[i];
+    const auto [a, alpha] = parts(w.bodies[i]);
+    const Matrix3d R = axes(frame);
+    const Vector3d acceleration = R * a + g, turning = R * alpha, omega = vector(frame.omega);
+    const Vector3d d = R * m.nodes[i].origin;
+    const Vector3d at_origin = acceleration + turning.cross(d) + omega.cross(omega.cross(d));
+    all.push_back({vector(frame.r), vector(frame.v), acceleration, omega, turning, R, frame.angle, at_origin});
+  }
+  return all;
+}
+
+namespace {
+
+template <class Space> Totals totals(const Placed<Space, double> &at) {
+  const auto &[m, w, q, v, generalized] = at;
+  Totals sum;
+  Vector3d g = Vector3d::Zero();
+  g.head(m.gravity.size()) = m.gravity;
+  for (std::size_t i = 0; i < m.nodes.size(); ++i) {
+    const Node<Space> &node = m.nodes[i];
+    const double *p = q + node.p_q(), *p_dot = v + node.p_v();
+    const Inertia body = inertia_of(node.body, p, p_dot, w.bodies[i]);
+    const Matrix3d R = axes(w.frames[i]);
+    const Vector3d r = vector(w.frames[i].r), u = R.transpose() * vector(w.frames[i].v),
+                   omega = R.transpose() * vector(w.frames[i].omega);
+    const Vector3d linear = body.mass * u + omega.cross(body.s) + body.S_p_dot;
+    const Vector3d angular = body.s.cross(u) + body.J * omega + body.h_p_dot;
+    sum.kinetic +=
+        0.5 * (u.dot(linear) + omega.dot(angular) + u.dot(body.S_p_dot) + omega.dot(body.h_p_dot)) + body.modal;
+    for (int k = 0; k < node.n(); ++k)
+      sum.strain += 0.5 * node.body.K[static_cast<std::size_t>(k)] * p[k] * p[k];
+    sum.dissipated += damping_power(node.body, p_dot);
+    sum.gravitational -= g.dot(body.mass * r + R * body.s);
+    sum.momentum += R * linear;
+    sum.angular_momentum += R * angular + r.cross(R * linear);
+    if (node.rotor_inertia > 0) {
+      const double spin = w.hinges[i].spin;
+      sum.kinetic += 0.5 * node.rotor_inertia * spin * spin;
+      sum.angular_momentum += node.rotor_turns * node.rotor_inertia * spin * joint_axis(m, i, w);
+    }
+  }
+  return sum;
+}
+
+} // namespace
+
+template <class Space>
+Totals totals(const Mechanism<Space> &m, const double *q, const double *v, Workspace<Space, double> &w) {
+  return totals(place_all(m, q, v, nullptr, w));
+}
+
+template <class Space>
+Totals totals(const Mechanism<Space> &m, const Scene &scene, const double *q, const double *v,
+              Workspace<Space, double> &w) {
+  const Placed<Space, double> placed = place_all(m, q, v, nullptr, w);
+  Totals sum = totals(placed);
+  for (const JointForce &joint : scene.joint_forces) {
+    const double way = q[joint.q] - joint.rest, rate = v[joint.v];
+    sum.strain += 0.5 * joint.stiffness * way * way;
+    sum.dissipated += joint.friction.resistance(rate) * rate;
+  }
+  for (const auto &[a, b, ratio, stiffness, damping] : scene.gears) {
+    const double twist = q[a.q] - ratio * q[b.q], rate = v[a.v] - ratio * v[b.v];
+    sum.strain += 0.5 * stiffness * twist * twist;
+    sum.dissipated += damping * rate * rate;
+  }
+  std::vector<double> rates(scene.cut_joints.size());
+  cut_rates(placed, scene.cut_joints, rates.data());
+  for (std::size_t k = 0; k < rates.size(); ++k)
+    sum.dissipated += scene.cut_joints[k].friction.resistance(rates[k]) * rates[k];
+  return sum;
+}
+
+template <class Space>
+RowMajor totals_of_states(const Mechanism<Space> &m, const Scene &scene, const RowMajor &q, const RowMajor &v) {
+  Workspace<Space, double> w(m);
+  RowMajor found(q.rows(), 10);
+  for (Eigen::Index i = 0; i < q.rows(); ++i) {
+    const Totals sum = totals(m, scene, q.row(i).data(), v.row(i).data(), w);
+    found.row(i) << sum.kinetic, sum.strain, sum.gravitational, sum.dissipated, sum.momentum.transpose(),
+        sum.angular_momentum.transpose();
+  }
+  return found;
+}
+
+template const std::vector<Pose<double>> &frame_poses(const Mechanism<Planar> &, const double *, const double *,
+                                                      Workspace<Planar, double> &);
+template std::vector<FrameMotion> frame_motions(const Mechanism<Planar> &, const double *, const double *,
+                                                Workspace<Planar, double> &);
+template std::vector<FrameMotion> frame_motions(const Mechanism<Spatial> &, const double *, const double *,
+                                                Workspace<Spatial, double> &);
+template Totals totals(const Mechanism<Planar> &, const double *, const double *, Workspace<Planar, double> &);
+template Totals totals(const Mechanism<Spatial> &, const double *, const double *, Workspace<Spatial, double> &);
+template RowMajor totals_of_states(const Mechanism<Planar> &, const Scene &, const RowMajor &, const RowMajor &);
+template RowMajor totals_of_states(const Mechanism<Spatial> &, const Scene &, const RowMajor &, const RowMajor &);
+
+} // namespace ffrobot::recursion

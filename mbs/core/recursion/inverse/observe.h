@@ -1,0 +1,47 @@
+// What a mechanism does at a state, in global axes: for outputs and tests, not for steps.
+#pragma once
+
+#include "core/recursion/motion/motion.h"
+
+namespace ffrobot::recursion {
+
+// Frames of all bodies after accelerations(): rows (3) of position, velocity, acceleration, angular velocity, angular
+// acceleration; R: body axes to global ones. In the plane the third components are angles' and zero. Frames may sit at
+// joints (mechanism.h): a_origin is the acceleration of the origin of the body's data.
+struct FrameMotion {
+  Eigen::Vector3d r, v, a, omega, alpha;
+  Eigen::Matrix3d R;
+  double angle = 0; // in the plane, full turns counted
+  Eigen::Vector3d a_origin;
+};
+
+// Where all frames are and how they move, accelerations aside: w.frames.
+template <class Space>
+const std::vector<Pose<double>> &frame_poses(const Mechanism<Space> &m, const double *q, const double *v,
+                                             Workspace<Space, double> &w);
+
+template <class Space>
+std::vector<FrameMotion> frame_motions(const Mechanism<Space> &m, const double *q, const double *v,
+                                       Workspace<Space, double> &w);
+
+// Kinetic, strain and gravitational energy (J), the power (W) that is dissipated, and momentum: linear, angular about
+// the origin (3 each).
+struct Totals {
+  double kinetic = 0, strain = 0, gravitational = 0, dissipated = 0;
+  Eigen::Vector3d momentum = Eigen::Vector3d::Zero(), angular_momentum = Eigen::Vector3d::Zero();
+};
+template <class Space>
+Totals totals(const Mechanism<Space> &m, const double *q, const double *v, Workspace<Space, double> &w);
+
+// With what springs and friction of a scene store and dissipate
+template <class Space>
+Totals totals(const Mechanism<Space> &m, const Scene &scene, const double *q, const double *v,
+              Workspace<Space, double> &w);
+
+// The same of states q (T, n_q), v (T, n_v): (T, 10) kinetic, strain, gravitational, dissipated; momentum, linear and
+// angular
+using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+template <class Space>
+RowMajor totals_of_states(const Mechanism<Space> &m, const Scene &scene, const RowMajor &q, const RowMajor &v);
+
+} // namespace ffrobot::recursion

@@ -1,0 +1,255 @@
+#include "core/recursion/inverse/prescribed_motion.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+#include <string>
+
+namespace ffrobot::recursion {
+
+using Eigen::Index;
+using Eigen::VectorXd;
+
+ModalMotion modes_at(const std::vector<ModalShape> &shape, double t) {
+  Index n = 0, k = 0;
+  for (const ModalShape &of_body : shape)
+    n += static_cast<Index>(of_body.size());
+  ModalMotion modes{VectorXd(n), VectorXd(n), VectorXd(n)};
+  for (const ModalShape &of_body : shape)
+    for (const TimeFunction &function : of_body) {
+      const Jet jet = function(t);
+      modes.p[k] = jet.value, modes.p_dot[k] = jet.rate, modes.p_ddot[k++] = jet.acceleration;
+    }
+  return modes;
+}
+
+namespace {
+
+template <class Space> const VectorXd &checked(const DrivenMechanism<Space> &driven, const VectorXd &q) {
+  const std::size_t equations = driven.mechanism.constraints.size(), joints = driven.of_joints.size();
+  if (equations < joints)
+    throw std::invalid_argument("rows: expected " + std::to_string(joints) +
+                                ", as many as joints have coordinates, got " + std::to_string(equations));
+  if (q.size() != driven.mechanism.n_q)
+    throw std::invalid_argument("q: expected " + std::to_string(driven.mechanism.n_q) + " coordinates, got " +
+                                std::to_string(q.size()));
+  return q;
+}
+
+double largest(const VectorXd &x) { return x.lpNorm<Eigen::Infinity>(); }
+
+} // namespace
+
+template <class Space>
+PrescribedMotion<Space>::PrescribedMotion(DrivenMechanism<Space> driven, const VectorXd &q)
+    : driven_(std::move(driven)), space_(driven_.mechanism.n_v, driven_.mechanism.rotations),
+      motion_(driven_.mechanism, driven_.scene, 0, checked(driven_, q).data(),
+              VectorXd::Zero(driven_.mechanism.n_v).eval().data()),
+      w_(driven_.mechanism), forces_(driven_.mechanism),
+      state_(VectorXd::Zero(driven_.mechanism.n_q + driven_.mechanism.n_v)), a_(VectorXd::Zero(driven_.mechanism.n_v)),
+      required_(a_), f_(a_), Q_(a_), step_(a_), first_(-std::numeric_limits<double>::infinity()), last_(-first_) {
+  const auto equations = static_cast<Index>(driven_.mechanism.constraints.size());
+  int joint = 0;
+  for (const auto &node : driven_.mechanism.nodes)
+    for (int k = 0; k < node.shape.v_count; ++k, ++joint)
+      if (node.shape.freedoms.component[k] >= Space::linear)
+        angles_.push_back(joint);
+  for (const int v : driven_.of_modes)
+    for (const auto &numbers : space_.numbers())
+      if (v >= numbers.v && v < numbers.v + numbers.count)
+        modes_in_q_.push_back(v + static_cast<int>(numbers.q - numbers.v));
+  lambda_ = value_ = rate_ = unit_ = VectorXd::Zero(equations);
+  C_J_.resize(equations, static_cast<Index>(driven_.of_joints.size()));
+  targets_.resize(driven_.mechanism.constraints.size());
+  state_.head(q.size()) = q;
+  if (!driven_.motors.empty())
+    motors_.emplace(driven_);
+}
+
+template <class Space> void PrescribedMotion<Space>::start_at(const VectorXd &q) {
+  state_.head(q.size()) = q;
+  goes_on_ = false;
+}
+
+template <class Space> void PrescribedMotion<Space>::set_modes(const ModalMotion &modes) {
+  state_(modes_in_q_) = modes.p;
+  state_.tail(a_.size())(driven_.of_modes) = modes.p_dot;
+  a_(driven_.of_modes) = modes.p_ddot;
+}
+
+template <class Space> void PrescribedMotion<Space>::turn_markers(double t) {
+  for (const DrivenMarker &driven : driven_.scene.driven)
+    w_.turning[static_cast<std::size_t>(driven.marker)] = driven.law(t);
+}
+
+template <class Space> void PrescribedMotion<Space>::measure() {
+  recursion::measure(driven_.mechanism, q(), v(), w_, value_.data(), rate_.data());
+  for (std::size_t r = 0; r < targets_.size(); ++r) {
+    double &value = value_[static_cast<Index>(r)];
+    value = driven_.mechanism.constraints[r].apart(value, targets_[r].value);
+    rate_[static_cast<Index>(r)] -= targets_[r].rate;
+  }
+}
+
+// C_J, equation by equation from the generalized forces of its unit multiplier, at the state that was measured.
+template <class Space> void PrescribedMotion<Space>::factorise() {
+  for (Index r = 0; r < lambda_.size(); ++r) {
+    unit_[r] = -1;
+    forces_.load(unit_.data(), nullptr, w_);
+    forces_.project_on_joints(q(), w_, Q_.data());
+    C_J_.row(r) = Q_(driven_.of_joints).transpose();
+    unit_[r] = 0;
+  }
+  factors_.compute(C_J_);
+}
+
+template <class Space> void PrescribedMotion<Space>::go(double factor, const VectorXd &values) {
+  step_(driven_.of_joints) = values;
+  space_.integrate(q(), factor, step_.data(), state_.data());
+}
+
+template <class Space> bool PrescribedMotion<Space>::find_position() {
+  constexpr double tolerance = 1e-15, floor = 1e-11; // second derivatives of splines through shapes are taken
+  constexpr double largest_turn = 0.5;               // rad, of a step: keeps to the branch of the guess
+  constexpr int most_iterations = 60;
+  double previous = 1e300;
+  for (int i = 0; i < most_iterations; ++i) {
+    measure();
+    factorise();
+    const double left = largest(value_) / (1 + largest(state_.head(driven_.mechanism.n_q)));
+    if (left <= tolerance || (left <= floor && left > 0.2 * previous))
+      return true;
+    if (!std::isfinite(left))
+      return false;
+    previous = left;
+    const VectorXd step = -factors_.solve(value_);
+    const double turn = angles_.empty() ? 0 : largest(step(angles_));
+    go(turn > largest_turn ? largest_turn / turn : 1, step);
+  }
+  return false;
+}
+
+template <class Space> bool PrescribedMotion<Space>::move(double t, const ModalMotion &modes) {
+  return follow(t, modes, targets_at(driven_.scene, t));
+}
+
+template <class Space>
+bool PrescribedMotion<Space>::follow(double t, const ModalMotion &modes, std::vector<Jet> targets) {
+  targets_ = std::move(targets);
+  auto v_all = state_.tail(a_.size());
+  if (goes_on_)
+    go(t - time_, v_all(driven_.of_joints));
+  v_all(driven_.of_joints).setZero(), a_(driven_.of_joints).setZero();
+  set_modes(modes);
+  turn_markers(t);
+  goes_on_ = true;
+  time_ = t;
+  if (!find_position())
+    return false;
+  v_all(driven_.of_joints) -= factors_.solve(rate_); // linear in v: exact in one step
+  measure();
+  act(t);
+  forces_.accelerate(q(), a_.data(), w_);
+  VectorXd bias(lambda_.size());
+  for (std::size_t r = 0; r < targets_.size(); ++r)
+    bias[static_cast<Index>(r)] = forces_.of_constraint(r, a_.data(), w_).value - targets_[r].acceleration;
+  a_(driven_.of_joints) -= factors_.solve(bias);
+  return a_.allFinite();
+}
+
+template <class Space> void PrescribedMotion<Space>::act(double t) {
+  acting_ = motion_.act(std::clamp(t, first_, last_), q(), v());
+  forces_.prepare(q(), v(), acting_.generalized, w_);
+}
+
+template <class Space>
+void PrescribedMotion<Space>::take_joints(double t, const ModalMotion &modes, const PrescribedMotion &other) {
+  targets_ = other.targets_;
+  state_ = other.state_, a_ = other.a_;
+  set_modes(modes);
+  turn_markers(t);
+  time_ = t;
+  measure();
+  factorise();
+  act(t);
+}
+
+template <class Space> std::vector<Jet> PrescribedMotion<Space>::measured_in(const PrescribedMotion &other) {
+  recursion::measure(driven_.mechanism, other.q(), other.v(), w_, value_.data(), rate_.data());
+  forces_.prepare(other.q(), other.v(), nullptr, w_);
+  forces_.accelerate(other.q(), other.a_.data(), w_);
+  std::vector<Jet> found;
+  for (std::size_t r = 0; r < targets_.size(); ++r) {
+    const auto i = static_cast<Index>(r);
+    found.push_back({value_[i], rate_[i], forces_.of_constraint(r, other.a_.data(), w_).value});
+  }
+  return found;
+}
+
+template <class Space> void PrescribedMotion<Space>::balance() {
+  forces_.accelerate(q(), a_.data(), w_);
+  forces_.leave_frames(w_);
+  forces_.load(nullptr, acting_.wrench, w_);
+  forces_.require(q(), a_.data(), w_, required_.data());
+  for (const int i : driven_.of_joints)
+    required_[i] -= acting_.generalized ? acting_.generalized[i] : 0;
+  lambda_ = -factors_.solve_transposed(required_(driven_.of_joints));
+  forces_.load(lambda_.data(), nullptr, w_);
+  forces_.project(q(), w_, Q_.data()); // -C_v^T lambda
+  f_ = required_ - Q_;
+  std::copy_n(lambda_.data(), lambda_.size(), w_.lambda.data());
+}
+
+template <class Space> VectorXd PrescribedMotion<Space>::shape_force() const { return f_(driven_.of_modes); }
+
+template <class Space> const Motors<Space> *PrescribedMotion<Space>::motors() {
+  if (!motors_)
+    return nullptr;
+  motors_->split(q(), required_, w_);
+  return &*motors_;
+}
+
+template <class Space> VectorXd PrescribedMotion<Space>::left() {
+  const Motors<Space> *found = motors();
+  return found ? found->left()(driven_.of_modes).eval() : shape_force();
+}
+
+template <class Space>
+RedefinedMotion<Space>::RedefinedMotion(DrivenMechanism<Space> driven, DrivenMechanism<Space> path, const VectorXd &q,
+                                        double factor, std::vector<TimeFunction> offset)
+    : PrescribedMotion<Space>(std::move(driven), q), path_(std::move(path), q), factor_(factor),
+      offset_(std::move(offset)) {
+  const auto count = static_cast<Index>(offset_.size());
+  if (count != 0 && count != this->modes())
+    throw std::invalid_argument("offset: expected " + std::to_string(this->modes()) +
+                                " functions, one for each mode, or none, got " + std::to_string(count));
+}
+
+template <class Space> bool RedefinedMotion<Space>::move(double t, const ModalMotion &modes) {
+  ModalMotion seen{factor_ * modes.p, factor_ * modes.p_dot, factor_ * modes.p_ddot};
+  if (!offset_.empty()) {
+    const ModalMotion more = modes_at({offset_}, t);
+    seen.p += more.p, seen.p_dot += more.p_dot, seen.p_ddot += more.p_ddot;
+  }
+  if (!path_.move(t, seen))
+    return false;
+  const auto &driven = this->driven();
+  if (&driven.mechanism == &path_.driven().mechanism) {
+    this->take_joints(t, modes, path_);
+    return true;
+  }
+  std::vector<Jet> targets = targets_at(driven.scene, t), motors = this->measured_in(path_);
+  for (std::size_t r = 0; r < targets.size(); ++r)
+    if (driven.is_path[r])
+      targets[r] = motors[r];
+  PrescribedMotion<Space>::start_at(path_.state().head(driven.mechanism.n_q));
+  return this->follow(t, modes, std::move(targets));
+}
+
+template class PrescribedMotion<Planar>;
+template class PrescribedMotion<Spatial>;
+template class RedefinedMotion<Planar>;
+template class RedefinedMotion<Spatial>;
+
+} // namespace ffrobot::recursion

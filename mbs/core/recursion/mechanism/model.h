@@ -1,0 +1,104 @@
+// What a mechanism is made of, as the caller says it. All arrays in axes of the body (those of its modal file), SI
+// units; modes are mass-orthonormal. Symbols: docs/theory.md; Shabana, Dynamics of Multibody Systems, ch. 5.
+#pragma once
+
+#include "core/recursion/joint/place.h"
+
+#include <Eigen/Core>
+
+#include <array>
+#include <string>
+#include <vector>
+
+namespace ffrobot::recursion {
+
+// A section of a body: where joints, constraints and forces attach. Its rows of Phi are displacements, then rotations.
+struct PlanarMarker {
+  Eigen::Vector2d position = Eigen::Vector2d::Zero();
+  double angle = 0;               // of its axes
+  Eigen::MatrixXd Phi;            // (3, n)
+  std::vector<Eigen::MatrixXd> K; // three (n, n): it moves and turns by -1/2 p^T K p besides; empty: it does not
+};
+struct SpatialMarker {
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d triad = Eigen::Matrix3d::Identity(); // columns: its axes
+  Eigen::MatrixXd Phi;                                 // (6, n)
+  std::vector<Eigen::MatrixXd> K; // six (n, n): it moves and turns by -1/2 p^T K p besides; empty: it does not
+  bool turns = false; // of the ground: its axes follow an orientation in time; constraint equations alone attach there
+};
+
+// Empty matrices are zero; an empty m_xy is the identity.
+struct PlanarData {
+  double mass = 0, inertia = 0; // kg; kg m^2, about the origin
+  Eigen::Vector2d first_moment = Eigen::Vector2d::Zero();
+  Eigen::VectorXd stiffness;     // (n) 1/s^2
+  Eigen::MatrixXd damping;       // (n, 1) or (n, n) 1/s
+  Eigen::MatrixXd S_bar;         // (2, n)
+  Eigen::VectorXd h, j;          // (n) I_bar_12 - I_bar_21, I_bar_11 + I_bar_22
+  Eigen::MatrixXd S_tilde, m_xy; // (n, n) S_bar_12 - S_bar_21, S_bar_11 + S_bar_22
+  // Geometric stiffening, empty without: points move by -1/2 p^T G p besides. Integrals of G_x, G_y, x G_x + y G_y and
+  // x G_y - y G_x dm, each (n, n) and symmetric.
+  std::vector<Eigen::MatrixXd> K;
+  std::vector<PlanarMarker> markers;
+  Eigen::Index modes() const { return stiffness.size(); }
+};
+struct SpatialData {
+  double mass = 0;
+  Eigen::Vector3d first_moment = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d J2 = Eigen::Matrix3d::Zero(); // kg m^2, integral of x x^T dm
+  Eigen::VectorXd stiffness;                    // (n) 1/s^2
+  Eigen::MatrixXd damping;                      // (n, 1) or (n, n) 1/s
+  Eigen::MatrixXd S_bar;                        // (3, n)
+  Eigen::MatrixXd I_bar;                        // (9, n), row 3 k + l: integral of x_k S_l dm
+  std::array<Eigen::MatrixXd, 9> S_bar_kl;      // (n, n), 3 k + l
+  // Geometric stiffening, empty without: points move by -1/2 p^T G p besides. Integrals of G_l dm (3) and, at 3 k + l,
+  // of x_k G_l dm (9), each (n, n) and symmetric.
+  std::vector<Eigen::MatrixXd> K_s, K_x;
+  // Rotary inertia that a line of mass has not, of spin about `spin_axis`: J_s, h_s (n), S_s (n, n), with S_s booked in
+  // S_bar_kl as motion along `spin_booked` (formulation of Euler-Bernoulli links).
+  double J_spin = 0;
+  Eigen::VectorXd h_spin;
+  Eigen::MatrixXd S_spin;
+  Eigen::Vector3d spin_axis = Eigen::Vector3d::UnitX(), spin_booked = Eigen::Vector3d::UnitZ();
+  Eigen::Matrix3d axes = Eigen::Matrix3d::Identity(); // columns: those of the modal file, where most blocks vanish
+  std::vector<SpatialMarker> markers;
+  Eigen::Index modes() const { return stiffness.size(); }
+};
+
+// The tree: body i hangs on marker `parent_marker` of a body before it, or of the ground (parent -1).
+template <class Data> struct BodyModel {
+  std::string name;
+  int parent = -1, parent_marker = 0, inboard_marker = 0;
+  JointKind joint = JointKind::revolute;
+  double lead = 0;          // m/rad, of a screw
+  double rotor_inertia = 0; // kg m^2, of a rotor on the inner section about z that turns `gear_ratio` times
+  double gear_ratio = 1;    // as fast as the joint; rad/m in prismatic ones, where that the section turns is left out
+  bool driven = false;      // forces or constraints act along the joint's coordinates
+  bool of_section = false;  // these are the section's even where modes turn it and nothing acts along them
+  Data data;
+};
+
+struct MarkerAt {
+  int body = -1, marker = 0; // body -1: of the ground
+  bool only_forces = false;  // of a wrench in the plane: its moment is zero at all times
+};
+
+// Constraint equations between two markers: what is zero, or follows a target. In the plane axes have two components,
+// and `rotation` is the difference of angles; in space it is f . log(A_b A_a^T), which is meant to stay zero.
+enum class ConstraintKind {
+  point,      // n . (r_b - r_a), n in global axes
+  slide,      // n . (r_b - r_a), n in axes of section a
+  dot,        // f . g, f in axes of section a, g in axes of section b (space)
+  rotation,   // rotation of b against a about n, global axes; as a rate n . (Omega_b - Omega_a)
+  turn,       // angle of g of b about f of a (space), f and g unit vectors across each other in axes of both
+  coordinate, // joint coordinate v[coordinate]
+};
+struct ConstraintModel {
+  std::string name;
+  ConstraintKind kind = ConstraintKind::point;
+  MarkerAt a, b;
+  Eigen::Vector3d f = Eigen::Vector3d::UnitX(), g = Eigen::Vector3d::UnitX(); // n is f
+  int coordinate = -1; // in v; of a rotation, turn or slide it is taken off, where there is one
+};
+
+} // namespace ffrobot::recursion

@@ -1,0 +1,42 @@
+// Forces that stay as they were last set: those of the commands of a sampled controller.
+#pragma once
+
+#include "core/recursion/motion/frame_motor.h"
+
+#include <utility>
+#include <vector>
+
+namespace ffrobot::recursion {
+
+class HeldForces {
+public:
+  // direction (n_v, inputs): generalized forces of a unit of each command
+  explicit HeldForces(Eigen::MatrixXd direction)
+      : direction_(std::move(direction)), u_(Eigen::VectorXd::Zero(direction_.cols())),
+        force_(Eigen::VectorXd::Zero(direction_.rows())) {}
+
+  // What a motor on frames takes back on the modes of a body, per unit of its command.
+  void add_frame_motor(Eigen::Index input, FrameShare share) { shares_.emplace_back(input, std::move(share)); }
+
+  const Eigen::MatrixXd &direction() const { return direction_; }
+  const std::vector<std::pair<Eigen::Index, FrameShare>> &frame_motors() const { return shares_; }
+
+  void hold(const Eigen::VectorXd &u) {
+    u_ = u;
+    force_.noalias() = direction_ * u;
+  }
+
+  // Adds them at q to those along v.
+  void add(const double *q, double *force) const {
+    Eigen::Map<Eigen::VectorXd>(force, force_.size()) += force_;
+    for (const auto &[input, share] : shares_)
+      share.add(u_[input], q, force);
+  }
+
+private:
+  Eigen::MatrixXd direction_;
+  std::vector<std::pair<Eigen::Index, FrameShare>> shares_;
+  Eigen::VectorXd u_, force_;
+};
+
+} // namespace ffrobot::recursion

@@ -1,0 +1,58 @@
+#include "core/recursion/motion/loop_watch.h"
+
+#include <cmath>
+
+namespace ffrobot::recursion {
+
+using Eigen::Index;
+using Eigen::VectorXd;
+
+namespace {
+
+// Of the volume of regular constraints. At such a distance from a singular posture, relative to one radian, branches
+// are this distance apart, and constraints tell them apart by its square: by more than the 1e-12 to which projections
+// keep them.
+constexpr double singular = 1e-5;
+
+// sqrt(det C M^-1 C^T) of the active constraints, from its factors
+template <class Space> double volume(const Workspace<Space, double> &w) {
+  const auto next = static_cast<std::size_t>(w.factored() + 1); // on the diagonal
+  double inverse = 1;
+  for (std::size_t r = 0; r < w.active.size(); ++r)
+    inverse *= w.factor[r * next];
+  return 1 / std::sqrt(inverse);
+}
+
+} // namespace
+
+template <class Space>
+LoopWatch<Space>::LoopWatch(const Mechanism<Space> &mechanism, const Workspace<Space, double> &w)
+    : mechanism_(mechanism), posture_(mechanism),
+      multiplier_(VectorXd::Zero(static_cast<Index>(mechanism.constraints.size()))), answer_(mechanism.n_v),
+      least_volume_(singular * volume(w)) {}
+
+template <class Space>
+void LoopWatch<Space>::begin_at(const double *q, const Workspace<Space, double> &w, Workspace<Space, double> &other) {
+  posture_.take(q, other);
+  C_0_ = posture_.gradients()(w.active, Eigen::all);
+  product_.resize(C_0_.rows(), C_0_.rows());
+  volume_ = volume(w), cosine_ = 1;
+}
+
+template <class Space> double LoopWatch<Space>::cosine(const double *q, Workspace<Space, double> &w) {
+  const double now = volume(w);
+  if (!(now > least_volume_))
+    return cosine_ = 0;
+  for (std::size_t k = 0; k < w.active.size(); ++k) {
+    multiplier_[w.active[k]] = 1;
+    respond(mechanism_, q, multiplier_.data(), w, answer_.data()); // -M^-1 C^T of one constraint
+    multiplier_[w.active[k]] = 0;
+    product_.col(static_cast<Index>(k)).noalias() = C_0_ * -answer_;
+  }
+  return cosine_ = lu_.compute(product_).determinant() / (volume_ * now);
+}
+
+template class LoopWatch<Planar>;
+template class LoopWatch<Spatial>;
+
+} // namespace ffrobot::recursion

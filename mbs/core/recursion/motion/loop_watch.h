@@ -1,0 +1,42 @@
+// Whether a step leads to, or across, a posture in which constraints depend on each other, as those of a parallelogram
+// that turns flat. Branches of the motion meet there, and rounding would decide between them. A step can jump over the
+// posture, but det C M^-1 C_0^T, C_0 being C at an earlier step, changes its sign where the motion keeps to its branch:
+// near the posture C is a sum of dyads, one of which goes through zero. Next to it branches are closer to each other
+// than constraints are kept, and a step can change to another one, along which the sign stays: so none ends there.
+#pragma once
+
+#include "core/recursion/newton/newton_posture.h"
+
+#include <Eigen/LU>
+
+namespace ffrobot::recursion {
+
+template <class Space> class LoopWatch {
+public:
+  // `w` has accelerations() at a posture that counts as regular.
+  LoopWatch(const Mechanism<Space> &mechanism, const Workspace<Space, double> &w);
+
+  // C_0 at q (n_q). `w`: as accelerations() near q have left it; `other` becomes one at rest.
+  void begin_at(const double *q, const Workspace<Space, double> &w, Workspace<Space, double> &other);
+  bool has_begun() const { return C_0_.rows() > 0; }
+
+  // Cosine of the angle between the spaces of constraints at q and where it began,
+  // det C M^-1 C_0^T / sqrt(det C M^-1 C^T det C_0 M_0^-1 C_0^T): free of units; 0 next to a singular posture.
+  // `w` has accelerations() at q; what it has of ports and sections is something else afterwards.
+  double cosine(const double *q, Workspace<Space, double> &w);
+  bool is_far() const { return cosine_ < 0.5; } // it is time to begin where the last cosine was found
+
+private:
+  const Mechanism<Space> &mechanism_;
+  NewtonPosture<Space> posture_;
+  Eigen::MatrixXd C_0_, product_;       // (active constraints, n_v), (active constraints, active constraints)
+  Eigen::VectorXd multiplier_, answer_; // (constraints), (n_v)
+  Eigen::PartialPivLU<Eigen::MatrixXd> lu_;
+  double least_volume_, volume_ = 0; // sqrt(det C M^-1 C^T): next to singular postures; where C_0 is
+  double cosine_ = 1;
+};
+
+extern template class LoopWatch<Planar>;
+extern template class LoopWatch<Spatial>;
+
+} // namespace ffrobot::recursion

@@ -1,0 +1,279 @@
+#include "core/recursion/motion/motion.h"
+
+#include "core/recursion/constrained_aba/independent_constraints.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+namespace ffrobot::recursion {
+
+using Eigen::Index;
+using Eigen::VectorXd;
+
+namespace {
+
+constexpr double singular_ratio = 1e-6; // of Posture: below, joints cannot follow
+constexpr double least_shift = 1e-8;    // of a state, relative: forces change by more than their rounding
+constexpr double is_on = 1e-11;         // residuals of a state on its constraint equations
+
+} // namespace
+
+template <class Space>
+RecursiveMotion<Space>::RecursiveMotion(const Mechanism<Space> &mechanism, const Scene &scene, double t,
+                                        const double *q, const double *v, const HeldForces *held,
+                                        ExternalForces *external)
+    : ImplicitSystem(ConfigurationSpace(mechanism.n_v, mechanism.rotations)), mechanism_(mechanism), scene_(scene),
+      workspace_(mechanism), measured_(mechanism), forces_(mechanism, scene, held, external),
+      laws_(scene, mechanism.constraints.size()), norm_(mechanism), newton_(mechanism, scene),
+      value_(VectorXd::Zero(static_cast<Index>(mechanism.constraints.size()))), rate_(value_),
+      correction_(VectorXd::Zero(mechanism.n_v)), state_(VectorXd::Zero(mechanism.n_q + mechanism.n_v)),
+      shifted_(VectorXd::Zero(2 * mechanism.n_v)), unused_(correction_) {
+  go_to(t);
+  if (!scene.keeps_all_constraints)
+    keep_independent_constraints(mechanism, q, v, workspace_);
+  else if (!mechanism.constraints.empty())
+    evaluate(t, q, v, correction_.data()); // projections need its factors
+  newton_.keep(workspace_.active);
+  if (scene.has_loops && !workspace_.active.empty()) {
+    evaluate(t, q, v, correction_.data()); // with the factors of the equations that are kept
+    loops_.emplace(mechanism, workspace_);
+  }
+  for (const GearSpring &gear : scene_.gears)
+    for (const Node<Space> &node : mechanism.nodes)
+      if (node.v == gear.a.v)
+        norm_.add_spring(gear.stiffness, node.rotor_inertia * node.gear_ratio * node.gear_ratio);
+  for (const Node<Space> &node : mechanism.nodes)
+    for (int k = 0; k < node.n(); ++k)
+      fastest_ = std::max(fastest_, std::sqrt(node.body.K[static_cast<std::size_t>(k)])), steps_between_postures_ = 10;
+}
+
+template <class Space> void RecursiveMotion<Space>::turn_markers(double t) {
+  for (const DrivenMarker &driven : scene_.driven) {
+    const auto i = static_cast<std::size_t>(driven.marker);
+    workspace_.turning[i] = measured_.turning[i] = newton_.workspace().turning[i] = driven.law(t);
+  }
+}
+
+template <class Space> void RecursiveMotion<Space>::foresee(const double *times, int count) {
+  laws_.foresee(times, count);
+  forces_.foresee(times, count);
+}
+
+template <class Space>
+[[gnu::always_inline]] inline void RecursiveMotion<Space>::evaluate_here(double t, const double *q, const double *v,
+                                                                         double *a) {
+  go_to(t);
+  auto placed = std::exchange(placed_, std::nullopt);
+  Forces<double> forces;
+  if (forces_.acts()) {
+    const auto acting = forces_.at(t, q, v, workspace_);
+    forces = acting.forces;
+    if (acting.placed)
+      placed.emplace(*acting.placed);
+  }
+  if (placed)
+    accelerations(*placed, forces.wrench, laws_.accelerations(), a);
+  else
+    accelerations(mechanism_, q, v, forces, laws_.accelerations(), workspace_, a);
+}
+
+template <class Space> void RecursiveMotion<Space>::evaluate(double t, const double *q, const double *v, double *a) {
+  evaluate_here(t, q, v, a);
+}
+
+template <class Space> void RecursiveMotion<Space>::slope(double t, const double *z, double *z_dot) {
+  const double *q = local().state(z), *v = z + n_v();
+  local().rate(z, z_dot);
+  evaluate_here(t, q, v, z_dot + n_v());
+  if (loops_ && !loops_->has_begun())
+    loops_->begin_at(q, workspace_, newton_.workspace());
+  if (remembers_slopes())
+    newton_.set_state(q, v);
+}
+
+template <class Space>
+Placed<Space, double> RecursiveMotion<Space>::residuals(double t, const double *q, const double *v,
+                                                        Workspace<Space, double> &w) {
+  go_to(t);
+  const auto at = measure(mechanism_, q, v, w, value_.data(), rate_.data());
+  for (Index r = 0; r < value_.size(); ++r) {
+    const Jet law = laws_.of(static_cast<std::size_t>(r));
+    value_[r] = mechanism_.constraints[static_cast<std::size_t>(r)].apart(value_[r], law.value);
+    rate_[r] -= law.rate;
+  }
+  return at;
+}
+
+template <class Space> double RecursiveMotion<Space>::project(double t, double *q, double *v) {
+  return project(t, q, v, measured_);
+}
+
+template <class Space>
+double RecursiveMotion<Space>::project(double t, double *q, double *v, Workspace<Space, double> &w) {
+  // Rounding of positions, moved into fast modes, is noise in their forces.
+  constexpr double tolerance = 1e-12;
+  constexpr int refresh_after = 3, most_iterations = 12;
+  if (mechanism_.constraints.empty())
+    return 0;
+  Eigen::Map<VectorXd> v_(v, n_v());
+  double left = 0, previous = std::numeric_limits<double>::infinity();
+  for (int i = 0; i < most_iterations; ++i) {
+    const auto at = residuals(t, q, v, w);
+    const double position = norm_.sizes().of_values(value_, q);
+    left = std::max(position, norm_.sizes().of_rates(rate_, v));
+    if (!(left > tolerance) || (left < is_on && left > 0.2 * previous)) { // done, at the rounding floor, or NaN
+      if (&w == &workspace_)
+        placed_.emplace(at);
+      break;
+    }
+    previous = left;
+    if (i >= refresh_after)
+      evaluate(t, q, v, correction_.data());
+    response(mechanism_, q, rate_.data(), workspace_, correction_.data());
+    v_ += correction_;
+    if (position > tolerance) {
+      response(mechanism_, q, value_.data(), workspace_, correction_.data());
+      local().space().integrate(q, 1, correction_.data(), q);
+    }
+  }
+  return left;
+}
+
+template <class Space> bool RecursiveMotion<Space>::correct(double t, double *z) {
+  if (local().space().is_flat())
+    return project(t, z, z + n_v()) < is_on;
+  state_ = Eigen::Map<const VectorXd>(local().state(z), local().state_size());
+  const double left = project(t, state_.data(), state_.data() + mechanism_.n_q);
+  local().from_state(state_.data(), z);
+  return left < is_on;
+}
+
+// Residuals are measured with the kinematics that the slope needs, too.
+template <class Space> bool RecursiveMotion<Space>::finish(double t, double *z, double *z_dot) {
+  if (forces_.acts() || !local().space().is_flat())
+    return ImplicitSystem::finish(t, z, z_dot);
+  const bool is_on_constraints = project(t, z, z + n_v(), workspace_) < is_on;
+  if (is_on_constraints)
+    slope(t, z, z_dot);
+  placed_.reset();
+  return is_on_constraints;
+}
+
+template <class Space> void RecursiveMotion<Space>::judge(MotorForces<Space> &motors) {
+  motors_ = &motors;
+  norm_.add_motors(motors.are_moments());
+}
+
+template <class Space> const VectorXd *RecursiveMotion<Space>::motors_at(const double *q) {
+  return motors_ && norm_.judges_motors() ? &motors_->find(q, workspace_) : nullptr;
+}
+
+template <class Space> double RecursiveMotion<Space>::error_size(double t, const double *z, const double *e) {
+  const double size = norm_.of_state(e);
+  norm_.observe(workspace_, motors_at(local().state(z)));
+  if (!norm_.observes())
+    return size;
+  if (loops_ && !(loops_->cosine(local().state(z), workspace_) > 0)) // shorter steps end before that posture
+    return std::numeric_limits<double>::infinity();
+  // Forces amplify errors of the state (stiffness times the error of a fast mode): measure what e does to them. Where
+  // it is small, in a difference that rounding of forces does not disturb.
+  const double stretch = size > 0 ? std::max(1.0, least_shift / size) : 1;
+  shifted_ = Eigen::Map<const VectorXd>(z, 2 * n_v()) + stretch * Eigen::Map<const VectorXd>(e, 2 * n_v());
+  const double *q = local().state(shifted_.data());
+  evaluate(t, q, shifted_.data() + n_v(), unused_.data());
+  const double of_forces = norm_.of_observed(workspace_, motors_at(q)) / stretch;
+  return of_forces <= size || std::isnan(size) ? size : of_forces; // keeps NaN
+}
+
+template <class Space>
+double RecursiveMotion<Space>::change_size(const double *, const double *change, double rate) const {
+  return norm_.of_change(change, rate);
+}
+
+template <class Space> void RecursiveMotion<Space>::accepted(double t, const double *z, const double *z_dot) {
+  if (accepted_ == 0)
+    norm_.observe(workspace_, motors_at(local().state(z)));
+  if (loops_ && loops_->is_far())
+    loops_->begin_at(local().state(z), workspace_, newton_.workspace());
+  norm_.take(z, z_dot, forces_.generalized(), workspace_);
+  if (accepted_ % steps_between_postures_ == 0)
+    watch_posture(t, local().state(z));
+  ++accepted_;
+}
+
+template <class Space> void RecursiveMotion<Space>::watch_posture(double t, const double *q) {
+  if (!scene_.watch)
+    return;
+  go_to(t);
+  look(mechanism_, *scene_.watch, t, q, measured_, postures_);
+}
+
+template <class Space> Index RecursiveMotion<Space>::prescribed() const {
+  const std::size_t count =
+      scene_.targets.size() + scene_.loads.size() + scene_.point_loads.size() + scene_.cut_loads.size();
+  return static_cast<Index>(count);
+}
+
+template <class Space> void RecursiveMotion<Space>::prescribe(double t, double *f) {
+  go_to(t);
+  f = std::copy_n(laws_.accelerations(), scene_.targets.size(), f);
+  for (const Load &load : scene_.loads)
+    *f++ = load.magnitude(t).value;
+  for (const PointLoad &load : scene_.point_loads)
+    *f++ = load.magnitude(t).value;
+  for (const CutLoad &load : scene_.cut_loads)
+    *f++ = load.magnitude(t).value;
+}
+
+template <class Space> bool RecursiveMotion<Space>::is_sensible(const double *z) const {
+  for (std::size_t i = 0; i < scene_.most_bent.size(); ++i) {
+    const Node<Space> &node = mechanism_.nodes[i];
+    if (!(Eigen::Map<const VectorXd>(z + node.p_v(), node.n()).squaredNorm() <= scene_.most_bent[i]))
+      return false;
+  }
+  return postures_.least_ratio >= singular_ratio &&
+         (0 * Eigen::Map<const Eigen::ArrayXd>(z, 2 * n_v())).sum() == 0; // all finite
+}
+
+template <class Space> void RecursiveMotion<Space>::go_on(const MotionHistory &history) {
+  norm_.set_peaks(history.peaks);
+  accepted_ = history.accepted;
+  postures_ = history.postures;
+}
+
+template <class Space> void RecursiveMotion<Space>::check_slopes() const {
+  if (!remembers_slopes())
+    throw std::logic_error("factorise: expected remember_slopes() before the slope");
+}
+
+template <class Space> void RecursiveMotion<Space>::factorise(double damping_factor, double stiffness_factor) {
+  check_slopes();
+  newton_.factorise(damping_factor, stiffness_factor);
+}
+
+template <class Space> void RecursiveMotion<Space>::factorise(Complex damping_factor, Complex stiffness_factor) {
+  check_slopes();
+  newton_.factorise(damping_factor, stiffness_factor);
+}
+
+template <class Space>
+void RecursiveMotion<Space>::constraint_values(double t, const double *z, double *value, double *rate) {
+  residuals(t, local().state(z), z + n_v(), measured_);
+  Eigen::Map<VectorXd>(value, value_.size()) = value_;
+  Eigen::Map<VectorXd>(rate, rate_.size()) = rate_;
+}
+
+template <class Space> double RecursiveMotion<Space>::value_size(const double *z, const VectorXd &value) const {
+  return norm_.sizes().of_values(value, local().state(z));
+}
+
+template <class Space> double RecursiveMotion<Space>::rate_size(const double *z, const VectorXd &rate) const {
+  return norm_.sizes().of_rates(rate, z + n_v());
+}
+
+template class RecursiveMotion<Planar>;
+template class RecursiveMotion<Spatial>;
+
+} // namespace ffrobot::recursion

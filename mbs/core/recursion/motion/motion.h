@@ -1,0 +1,112 @@
+// The motion of a mechanism in joint coordinates as a system that all methods integrate: constraint equations follow
+// functions of time, forces act along joints and on modes; after every step the state is moved back onto the constraint
+// equations with the columns of the last evaluation.
+#pragma once
+
+#include "core/integrate/ode.h"
+#include "core/recursion/motion/constraint_laws.h"
+#include "core/recursion/motion/loop_watch.h"
+#include "core/recursion/motion/motion_norm.h"
+#include "core/recursion/motion/newton_system.h"
+#include "core/recursion/motion/scene_forces.h"
+
+#include <algorithm>
+#include <optional>
+#include <utility>
+
+namespace ffrobot::recursion {
+
+// What a motion remembers of its steps: with it another one of the same mechanism goes on as if it had taken them.
+struct MotionHistory {
+  NormPeaks peaks;
+  unsigned long accepted = 0; // steps
+  PostureHistory postures;
+};
+
+template <class Space> class RecursiveMotion final : public ImplicitSystem {
+public:
+  // Constraint equations that depend on others at time t and (q, v) are left out from there on; they are to be
+  // consistent. Mechanism, scene and what acts beside its forces (as in SceneForces) must outlive this.
+  RecursiveMotion(const Mechanism<Space> &mechanism, const Scene &scene, double t, const double *q, const double *v,
+                  const HeldForces *held = nullptr, ExternalForces *external = nullptr);
+
+  void plan(double duration) { norm_.plan(duration); } // s, of the run to come
+  void judge(MotorForces<Space> &motors);              // their errors, too; must outlive this
+
+  void slope(double t, const double *z, double *z_dot) override;
+  void foresee(const double *times, int count) override;
+  double end_of_step(double t, double h) override { return forces_.end_of_step(t, h); }
+  bool correct(double t, double *z) override;
+  bool finish(double t, double *z, double *z_dot) override;
+  double error_size(double t, const double *z, const double *e) override;
+  double change_size(const double *z, const double *change, double rate) const override;
+  void accepted(double t, const double *z, const double *z_dot) override;
+  bool is_sensible(const double *z) const override;
+  Eigen::Index prescribed() const override; // of the scene's loads and targets, which limit steps
+  void prescribe(double t, double *f) override;
+  double initial_step() const override { return 0.1 / std::max(fastest_, norm_.sizes().pace()); }
+  unsigned long evaluations() const override { return workspace_.evaluations; }
+
+  Eigen::Index constraints() const override { return value_.size(); }
+  const Eigen::VectorXd &stiffness() const override { return newton_.stiffness(); }
+  const Eigen::VectorXd &damping() const override { return newton_.damping(); }
+  const Eigen::MatrixXd &coupling() const override { return newton_.coupling(); }
+  void factorise(double damping_factor, double stiffness_factor) override;
+  void factorise(Complex damping_factor, Complex stiffness_factor) override;
+  void solve(const double *r, const double *c, double *x) override { newton_.solve(r, c, x); }
+  void solve(const Complex *r, Complex *x) override { newton_.solve(r, x); }
+  void constrain(const double *x, double *c) override { newton_.constrain(x, c); }
+  void constraint_values(double t, const double *z, double *value, double *rate) override;
+  double value_size(const double *z, const Eigen::VectorXd &value) const override;
+  double rate_size(const double *z, const Eigen::VectorXd &rate) const override;
+
+  // At a state (q, v): accelerations (n_v); multipliers are in workspace().lambda
+  void evaluate(double t, const double *q, const double *v, double *a);
+  // What acts there beside gravity, elasticity and damping of modes; valid until the next call
+  Forces<double> act(double t, const double *q, const double *v) { return forces_.at(t, q, v, workspace_).forces; }
+  // Moves q (n_q) and v (n_v) onto the constraint equations at time t; the largest residual left, as the norm compares
+  // these
+  double project(double t, double *q, double *v);
+
+  // Of the scene's watch, which looks at some of the accepted steps and where it is asked to
+  void watch_posture(double t, const double *q);
+  const PostureHistory &postures() const { return postures_; }
+
+  MotionHistory history() const { return {norm_.peaks(), accepted_, postures_}; }
+  void go_on(const MotionHistory &history); // throws std::invalid_argument where it is that of another mechanism
+
+  const Workspace<Space, double> &workspace() const { return workspace_; }
+  Workspace<Space, double> &workspace() { return workspace_; }
+
+private:
+  void go_to(double t) {
+    if (laws_.go_to(t) && !scene_.driven.empty())
+      turn_markers(t);
+  }
+  void turn_markers(double t);
+  void evaluate_here(double t, const double *q, const double *v, double *a); // evaluate(), inline
+  Placed<Space, double> residuals(double t, const double *q, const double *v, Workspace<Space, double> &w);
+  double project(double t, double *q, double *v, Workspace<Space, double> &w); // w: where residuals are measured
+  void check_slopes() const;
+  const Eigen::VectorXd *motors_at(const double *q); // of the last evaluation; null where they are not judged
+
+  const Mechanism<Space> &mechanism_;
+  const Scene &scene_;
+  Workspace<Space, double> workspace_, measured_; // of accelerations; of residuals, which must not disturb these
+  // Where workspace_ has the kinematics of the state that will be evaluated next
+  std::optional<Placed<Space, double>> placed_;
+  SceneForces<Space> forces_;
+  ConstraintLaws laws_;
+  MotionNorm<Space> norm_;
+  NewtonSystem<Space> newton_;
+  MotorForces<Space> *motors_ = nullptr;
+  std::optional<LoopWatch<Space>> loops_; // where the scene has some
+  PostureHistory postures_;
+  unsigned long accepted_ = 0, steps_between_postures_ = 1; // many where steps follow vibrations
+  double fastest_ = 0;                                      // 1/s, of modes
+
+  Eigen::VectorXd value_, rate_;                          // (constraints)
+  Eigen::VectorXd correction_, state_, shifted_, unused_; // of projections; (q, v); of error_size()
+};
+
+} // namespace ffrobot::recursion

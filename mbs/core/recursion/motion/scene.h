@@ -1,0 +1,97 @@
+// What a mechanism follows and what acts on it, as the caller says it.
+#pragma once
+
+#include "core/integrate/limit_watch.h"
+#include "core/recursion/constrained_aba/loop_joint.h"
+#include "core/recursion/constrained_aba/point_force.h"
+#include "core/recursion/motion/friction.h"
+#include "core/recursion/motion/singular_posture.h"
+#include "core/time_function/time_function.h"
+
+#include <optional>
+#include <utility>
+#include <vector>
+
+namespace ffrobot::recursion {
+
+// `magnitude`(t) times a direction in generalized forces: joint moments, modal
+// forces of patches.
+struct Load {
+  Load(const Eigen::VectorXd &direction,
+       TimeFunction magnitude_); // direction (n_v)
+
+  std::vector<std::pair<int, double>> along; // entries of v that it acts on
+  TimeFunction magnitude;
+};
+
+// `share` times `magnitude`(t) along a component of the force (N), then the
+// moment (N m), global axes, on a wrench of the mechanism.
+struct PointLoad {
+  int wrench = 0, component = 0;
+  TimeFunction magnitude;
+  double share = 1;
+};
+
+// How a marker of the ground turns.
+struct DrivenMarker {
+  int marker = 0;
+  OrientationLaw law;
+};
+
+// Along a joint's coordinate: spring about `rest`, viscous and Coulomb
+// friction.
+struct JointForce {
+  int q = 0, v = 0;     // of the coordinate
+  double stiffness = 0; // N m/rad, N/m
+  double rest = 0;      // rad, m
+  Friction friction;
+};
+
+// Between two joint coordinates, as a gear that gives: moments (N m) of the twist a - ratio b on both.
+struct GearSpring {
+  struct Side {
+    int q = 0, v = 0;
+  } a, b;
+  double ratio = 1;
+  double stiffness = 0, damping = 0; // N m/rad, N m s/rad
+};
+
+// `share` times `magnitude`(t), N m or N, along the coordinate of a joint at which a loop is cut.
+struct CutLoad {
+  int joint = 0; // of the scene's cut joints
+  TimeFunction magnitude;
+  double share = 1;
+};
+
+// What a constraint equation follows: sign * law(t), with rate and acceleration.
+struct Target {
+  TimeFunction law;
+  double sign = 1;
+
+  Jet operator()(double t) const {
+    const Jet jet = law(t);
+    return {sign * jet.value, sign * jet.rate, sign * jet.acceleration};
+  }
+};
+
+struct Scene {
+  std::vector<Target> targets; // of constraint equations
+  std::vector<Load> loads;
+  std::vector<PointLoad> point_loads;
+  std::vector<PointForce> point_forces;
+  std::vector<JointForce> joint_forces;
+  std::vector<GearSpring> gears;
+  std::vector<CutJoint> cut_joints;
+  std::vector<CutLoad> cut_loads;
+  std::vector<DrivenMarker> driven;
+  std::optional<PostureWatch> watch;
+  std::vector<LimitedCoordinate> limits; // of joints; told, nothing acts there
+  bool has_loops =
+      false; // closed by constraint equations: steps do not lead across postures in which all depend on each other
+  bool keeps_all_constraints = false; // who makes the scene has refused constraint equations that depend on others
+  std::vector<double> most_bent;      // of each node, kg m^2: p^T p beyond it makes no sense; empty: none is too large
+};
+
+std::vector<Jet> targets_at(const Scene &scene, double t); // of all constraint equations
+
+} // namespace ffrobot::recursion

@@ -1,0 +1,110 @@
+#include "core/recursion/motion/singular_posture.h"
+
+#include <Eigen/LU>
+#include <Eigen/SVD>
+
+#include <algorithm>
+
+namespace ffrobot::recursion {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+namespace {
+
+constexpr double singular = 1e-10; // of the largest singular value: rank of the loops' constraints
+
+// Rates of constraints by the joints' velocities (constraints, joint coordinates), lengths in
+// units of `length`
+template <class Space>
+MatrixXd gradients(const Mechanism<Space> &m, double length, const double *q, Workspace<Space, double> &w) {
+  const auto rows = static_cast<Index>(m.constraints.size());
+  VectorXd v = VectorXd::Zero(m.n_v), value(rows), rate(rows), at_rest(rows);
+  measure(m, q, v.data(), w, value.data(),
+          at_rest.data()); // markers that turn have a rate of their own
+  std::vector<VectorXd> columns;
+  for (const Node<Space> &node : m.nodes)
+    for (int k = 0; k < node.shape.freedoms.count; ++k) {
+      v[node.v + k] = 1;
+      measure(m, q, v.data(), w, value.data(), rate.data());
+      v[node.v + k] = 0;
+      const bool is_way = node.shape.freedoms.component[k] < Space::linear;
+      columns.emplace_back((is_way ? length : 1) * (rate - at_rest));
+    }
+  MatrixXd J(rows, static_cast<Index>(columns.size()));
+  for (std::size_t j = 0; j < columns.size(); ++j)
+    J.col(static_cast<Index>(j)) = columns[j];
+  for (Index r = 0; r < rows; ++r) {
+    const Constraint &row = m.constraints[static_cast<std::size_t>(r)];
+    bool is_way = row.model.kind == ConstraintKind::point || row.model.kind == ConstraintKind::slide;
+    if (row.model.kind == ConstraintKind::coordinate)
+      is_way = m.nodes[static_cast<std::size_t>(row.node)].shape.freedoms.component[row.freedom] < Space::linear;
+    if (is_way)
+      J.row(r) /= length;
+  }
+  return J;
+}
+
+MatrixXd rows_of(const MatrixXd &J, const std::vector<char> &is_path, bool path) {
+  std::vector<Index> chosen;
+  for (std::size_t r = 0; r < is_path.size(); ++r)
+    if ((is_path[r] != 0) == path)
+      chosen.push_back(static_cast<Index>(r));
+  return J(chosen, Eigen::all);
+}
+
+// Orthonormal columns that J takes to zero
+MatrixXd null_space(const MatrixXd &J) {
+  if (J.rows() == 0)
+    return MatrixXd::Identity(J.cols(), J.cols());
+  const Eigen::JacobiSVD<MatrixXd> svd(J, Eigen::ComputeFullV);
+  const double least = singular * std::max(svd.singularValues()[0], 1.0);
+  const Index rank = (svd.singularValues().array() > least).count();
+  return svd.matrixV().rightCols(J.cols() - rank);
+}
+
+} // namespace
+
+template <class Space>
+Posture posture_at(const Mechanism<Space> &m, const PostureWatch &watch, const double *q, Workspace<Space, double> &w) {
+  if (std::none_of(watch.is_path.begin(), watch.is_path.end(), [](char is_path) { return is_path; }))
+    return {};
+  const MatrixXd J = gradients(m, watch.length, q, w), path = rows_of(J, watch.is_path, true);
+  const MatrixXd loops = rows_of(J, watch.is_path, false), followed = path * null_space(loops);
+  if (followed.rows() > followed.cols())
+    return {0, 0};
+  const VectorXd values = followed.jacobiSvd().singularValues();
+  Posture found;
+  found.ratio = values[0] > 0 ? values[values.size() - 1] / values[0] : 0;
+  if (loops.rows() == 0 && followed.rows() == followed.cols()) // else the basis of freedoms has no sign
+    found.determinant = followed.determinant();
+  return found;
+}
+
+template <class Space>
+void look(const Mechanism<Space> &m, const PostureWatch &watch, double t, const double *q, Workspace<Space, double> &w,
+          PostureHistory &history) {
+  Posture posture = posture_at(m, watch, q, w);
+  double at = t;
+  if (posture.determinant * history.determinant < 0) { // between this posture and the last
+    posture.ratio = 0;
+    at -= (t - history.watched_at) * posture.determinant / (posture.determinant - history.determinant);
+  }
+  history.determinant = posture.determinant, history.watched_at = t;
+  if (posture.ratio < history.least_ratio) {
+    history.least_ratio = posture.ratio, history.singular_at = at;
+    history.singular_posture = Eigen::Map<const VectorXd>(q, m.n_q);
+  }
+}
+
+template Posture posture_at(const Mechanism<Planar> &, const PostureWatch &, const double *,
+                            Workspace<Planar, double> &);
+template Posture posture_at(const Mechanism<Spatial> &, const PostureWatch &, const double *,
+                            Workspace<Spatial, double> &);
+template void look(const Mechanism<Planar> &, const PostureWatch &, double, const double *, Workspace<Planar, double> &,
+                   PostureHistory &);
+template void look(const Mechanism<Spatial> &, const PostureWatch &, double, const double *,
+                   Workspace<Spatial, double> &, PostureHistory &);
+
+} // namespace ffrobot::recursion
