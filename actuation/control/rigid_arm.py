@@ -73,7 +73,7 @@ class RigidArm:
         rates = np.zeros(len(C_v))
         rates[self._motors] = gamma_dot
         v: Array = np.linalg.pinv(C_v) @ rates
-        self._system.core.keep_independent_constraints(q, v)
+        self._system.core.keep_independent_rows(q, v)
         friction = -resistance(self._model, q[None], v[None])[0]
 
         def moments(target: Array) -> Array:

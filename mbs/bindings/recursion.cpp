@@ -128,7 +128,7 @@ template <class Space> auto bind_model(nb::module_ &m, const char *name, const c
       .def("evaluate", &evaluate<Space>, "q"_a, "v"_a, "target"_a, "force"_a.none(), "wrench"_a.none(),
            "(a, lambda): accelerations (n_v) and multipliers (rows).")
       .def(
-          "keep_independent_constraints",
+          "keep_independent_rows",
           [](Model<Space> &model, const VectorXd &q, const VectorXd &v) {
             model.check_state(q, v);
             return keep_independent_constraints(model.mechanism, q.data(), v.data(), model.w);
@@ -168,7 +168,7 @@ template <class Space> auto bind_model(nb::module_ &m, const char *name, const c
       .def("required_forces", &required_forces<Space>, "scene"_a, "times"_a, "q"_a, "v"_a, "a"_a,
            "M a - Q (T, n_v) along v at states q (T, n_q), v and a (T, n_v): what gravity, elasticity, damping and the "
            "forces of the scene leave for others.")
-      .def("constraint_accelerations", &constraint_accelerations<Space>, "scene"_a, "times"_a, "q"_a, "v"_a, "a"_a,
+      .def("row_accelerations", &constraint_accelerations<Space>, "scene"_a, "times"_a, "q"_a, "v"_a, "a"_a,
            "Second derivatives of the values of rows (T, rows), less those of their targets.")
       .def(
           "motion_forces", &motion_forces<Space>, "scene"_a, "times"_a, "q"_a, "v"_a, "a"_a, "multipliers"_a,

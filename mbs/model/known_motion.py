@@ -132,9 +132,7 @@ def required_forces(model: Model, state: States, times: Array) -> Array:
 def row_accelerations(model: Model, state: States, times: Array) -> Array:
     """C̈ (T, rows) at `times` (T,), less what their targets ask for: 0 where the motion keeps to the constraints."""
     system = MultibodySystem(model)
-    return (
-        system.core.constraint_accelerations(system.scene, times.tolist(), state.q, state.v, state.a) * system.row_signs
-    )
+    return system.core.row_accelerations(system.scene, times.tolist(), state.q, state.v, state.a) * system.row_signs
 
 
 def mass_matrices(model: Model, q: Array, t: float = 0.0) -> Array:

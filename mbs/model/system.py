@@ -227,7 +227,7 @@ class MultibodySystem:
         Rows that depend on others at q, v are left out.
         """
         self.turn_markers(t)
-        self.core.keep_independent_constraints(q, v)
+        self.core.keep_independent_rows(q, v)
         tree = self.model.tree
         rest = gear_forces(tree, q[None], v[None])[0] - tree_resistance(tree, v[None])[0]
         loads = self.force(t)
@@ -265,7 +265,7 @@ class MultibodySystem:
         scene.most_bent = [node.body.largest_moment for node in self.model.tree.nodes]
         has_loops = bool(self.model.loop_rows.any())
         scene.has_loops = has_loops and plane is not None  # in space round-off moves rows that hold by themselves
-        scene.keeps_all_constraints = not has_loops  # `check_path` refuses paths whose rows depend on each other
+        scene.keeps_all_rows = not has_loops  # `check_path` refuses paths whose rows depend on each other
         for number, law in self._turning:
             scene.turn_marker(number, _turning_law(law))
         return scene
@@ -319,9 +319,9 @@ class MultibodySystem:
         known.append(section)
         return section.body, len(known) - 1
 
-    def _row(self, row: ConstraintRow) -> _core.ConstraintModel:
-        found = _core.ConstraintModel()
-        found.name, found.kind = row.owner, getattr(_core.ConstraintKind, row.kind)
+    def _row(self, row: ConstraintRow) -> _core.RowModel:
+        found = _core.RowModel()
+        found.name, found.kind = row.owner, getattr(_core.RowKind, row.kind)
         if row.kind == "coordinate":
             found.coordinate = row.coordinate
             return found

@@ -25,6 +25,6 @@ def moving(rng, types, kinds, loops=0):
     C_v = row_values(model, q[None], NOW)[1][0]
     v -= np.linalg.pinv(C_v, rcond=1e-10) @ (C_v @ v)
     if len(model.rows):
-        system.core.keep_independent_constraints(q, v)
+        system.core.keep_independent_rows(q, v)
     a, multipliers = system.core.evaluate(q, v, np.zeros(len(model.rows)), None, None)
     return RobotMotion(model, NOW, q[None], v[None], a[None], multipliers[None]), system

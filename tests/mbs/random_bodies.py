@@ -72,7 +72,7 @@ def state_near_rest(rng, mechanism, model, deflection, speed):
 
 
 def row(kind, a, b, f, g=(1, 0, 0), name="row"):
-    row = r.ConstraintModel()
+    row = r.RowModel()
     row.name, row.kind, row.a, row.b = name, kind, r.MarkerAt(*a), r.MarkerAt(*b)
     row.f, row.g = np.array(f, dtype=float), np.array(g, dtype=float)
     return row, (a, b)
@@ -108,7 +108,7 @@ def check_known_motion(mechanism, model, q, v, a, bound):
         scene.add_target(r.TimeFunction.constant(0.0), 1.0)
     expected, size, accelerations = mechanism.forces(model, q, v, a, np.zeros(len(mechanism.rows)), None, unloaded)
     state = [0.0], q[None], v[None], a[None]
-    required, of_rows = model.required_forces(scene, *state)[0], model.constraint_accelerations(scene, *state)[0]
+    required, of_rows = model.required_forces(scene, *state)[0], model.row_accelerations(scene, *state)[0]
     np.testing.assert_allclose(required, expected, rtol=0, atol=bound * size)
     if len(of_rows):
         np.testing.assert_allclose(of_rows, accelerations, rtol=0, atol=bound * (1 + np.abs(a).max()))

@@ -1,8 +1,8 @@
 #include "core/analysis/allocation.h"
 
+#include "core/linear/singular_values.h"
 #include "core/linear/small_product.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 
@@ -26,8 +26,9 @@ Allocation::Allocation(MatrixXd Phi, const MatrixXd &W_sqrt, MatrixXd gain, Vect
     : Phi_(std::move(Phi)), gain_(std::move(gain)), limit_(std::move(limit)), scale_(std::move(scale)) {
   const Index k = Phi_.cols();
   const MatrixXd A = W_sqrt * Phi_ * scale_.asDiagonal();
-  const VectorXd sizes =
-      Eigen::SelfAdjointEigenSolver<MatrixXd>(A.transpose() * A, Eigen::EigenvaluesOnly).eigenvalues();
+  const VectorXd values = singular_values(A);
+  VectorXd sizes = VectorXd::Zero(k); // eigenvalues of A^T A, ascending
+  sizes.tail(values.size()) = values.reverse().cwiseAbs2();
   const double largest = sizes[k - 1];
   double added = 0;
   if (largest == 0)

@@ -97,7 +97,7 @@ def test_trees_in_3d(seed, curved):
 @pytest.mark.parametrize("curved", [False, True], ids=["", "stiffened"])
 def test_rows_of_every_kind_in_3d(curved):
     rng = np.random.default_rng(4)
-    K = r.ConstraintKind
+    K = r.RowKind
     rows = [
         *(row(K.point, (-1, 1), (2, 1), axis) for axis in np.eye(3)),
         *(row(K.rotation, (-1, 1), (2, 2), axis) for axis in np.eye(3)[:2]),
@@ -138,7 +138,7 @@ def test_friction_where_a_loop_is_cut(types, kinds):
     chain = closed_chain(rng, types, kinds)
     rough, smooth = (with_friction(chain, viscous) for viscous in (0.4, 0.0))
     q, n = chain.position(rough.model), rough.model.tree.n_v
-    rough.core.keep_independent_constraints(q, np.zeros(n))
+    rough.core.keep_independent_rows(q, np.zeros(n))
     rows = len(rough.row_signs)
     P, R = responses(rough.core, q, rows)
 
@@ -172,7 +172,7 @@ def test_driven_coordinate_in_3d():
     rng = np.random.default_rng(6)
     bodies = [random_body(rng, 3, J.revolute), random_body(rng, 3, J.revolute, parent=0, parent_marker=1)]
     mechanism = Mechanism(bodies, ground(rng), GRAVITY)
-    driven, at = row(r.ConstraintKind.coordinate, (0, 0), (0, 0), (1, 0, 0))
+    driven, at = row(r.RowKind.coordinate, (0, 0), (0, 0), (1, 0, 0))
     driven.coordinate = mechanism.model().first[1][2]
     mechanism.rows, mechanism.row_sides = [driven], [at]
     check_mechanism(mechanism, rng)

@@ -61,11 +61,21 @@ Turning by_rpy(const Vectors &angle) {
               angle.rate[0] * (by_yaw + by_pitch).cross(roll)};
 }
 
+// The shortest rotation that takes e_z to the unit vector z
+Matrix3d from_e_z_to(const Vector3d &z) {
+  const Vector3d axis = Vector3d::UnitZ().cross(z); // times the sine
+  const double cosine = z[2], square = axis.squaredNorm();
+  if (cosine < 0 && square == 0) // any axis across does
+    return Vector3d(1, -1, -1).asDiagonal();
+  const double share = cosine < 0 ? (1 - cosine) / square : 1 / (1 + cosine);
+  return cosine * Matrix3d::Identity() + skew(axis) + share * axis * axis.transpose();
+}
+
 // omega = z x z_dot, alpha = z x z_ddot
 Turning by_direction(const Vectors &d) {
   const double size = d.x.norm(), slope = d.rate.dot(d.x) / (size * size);
   const Vector3d z = d.x / size, z_dot = d.rate / size - slope * z;
-  return {Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitZ(), z).toRotationMatrix(), z.cross(z_dot),
+  return {from_e_z_to(z), z.cross(z_dot),
           z.cross(d.acceleration / size - 2 * slope * z_dot)};
 }
 

@@ -1,7 +1,8 @@
 #include "core/recursion/motion/singular_posture.h"
 
+#include "core/linear/singular_values.h"
+
 #include <Eigen/LU>
-#include <Eigen/SVD>
 
 #include <algorithm>
 
@@ -54,16 +55,6 @@ MatrixXd rows_of(const MatrixXd &J, const std::vector<char> &is_path, bool path)
   return J(chosen, Eigen::all);
 }
 
-// Orthonormal columns that J takes to zero
-MatrixXd null_space(const MatrixXd &J) {
-  if (J.rows() == 0)
-    return MatrixXd::Identity(J.cols(), J.cols());
-  const Eigen::JacobiSVD<MatrixXd> svd(J, Eigen::ComputeFullV);
-  const double least = singular * std::max(svd.singularValues()[0], 1.0);
-  const Index rank = (svd.singularValues().array() > least).count();
-  return svd.matrixV().rightCols(J.cols() - rank);
-}
-
 } // namespace
 
 template <class Space>
@@ -71,10 +62,10 @@ Posture posture_at(const Mechanism<Space> &m, const PostureWatch &watch, const d
   if (std::none_of(watch.is_path.begin(), watch.is_path.end(), [](char is_path) { return is_path; }))
     return {};
   const MatrixXd J = gradients(m, watch.length, q, w), path = rows_of(J, watch.is_path, true);
-  const MatrixXd loops = rows_of(J, watch.is_path, false), followed = path * null_space(loops);
+  const MatrixXd loops = rows_of(J, watch.is_path, false), followed = path * null_space(loops, singular);
   if (followed.rows() > followed.cols())
     return {0, 0};
-  const VectorXd values = followed.jacobiSvd().singularValues();
+  const VectorXd values = singular_values(followed);
   Posture found;
   found.ratio = values[0] > 0 ? values[values.size() - 1] / values[0] : 0;
   if (loops.rows() == 0 && followed.rows() == followed.cols()) // else the basis of freedoms has no sign
