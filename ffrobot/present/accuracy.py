@@ -37,14 +37,14 @@ def _modes(solution: Solution, results: Sequence[AnalysisResult]) -> str:
     if solution.mode_choice is not None:
         known = [error for of in solution.mode_choice.errors.values() for error in of.values()]
         return f"{max(known):.0e} of peaks, against all modes of the files" if any(known) else NOT_ESTIMATED
-    if any(result.start_jolt >= JOLT for result in results):
-        return (
-            f"{NOT_ESTIMATED}: the motion starts with a step in acceleration (links not in equilibrium), which excites"
-            " missing modes"
-        )
-    errors = [error for result in results if (error := result.mode_error) is not None]
-    if not errors or len(errors) < len(results):
-        return NOT_ESTIMATED
-    if max(errors) > RESOLVED:
+    errors = [result.mode_error for result in results]
+    known = [error for error in errors if error is not None]
+    if not known or len(known) < len(errors):
+        without = [name for name, link in solution.links.items() if not link.residual.any()]
+        return f"{NOT_ESTIMATED}: no attachment modes in {', '.join(without)}" if without else NOT_ESTIMATED
+    if max(known) > RESOLVED:
         return "too few: vibrations above the highest mode are excited"
-    return f"{max(errors):.0e} of peaks, estimated"
+    estimate = f"{max(known):.0e} of peaks, estimated"
+    if any(result.start_jolt >= JOLT for result in results):
+        estimate += "; a start without its step in acceleration (links not in equilibrium) lowers it"
+    return estimate

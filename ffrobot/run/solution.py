@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from math import hypot
 
 from ..actuation.control.loop_record import LoopRecord
 from ..actuation.patches.link_patches import LinkPatches
@@ -18,7 +19,14 @@ from ..mbs.analysis.outcome import EarlierRun, Outcome
 from ..mbs.model.model import Model
 from ..mbs.model.truncation import modes_kept
 from ..mbs.model.wrench import Wrench
-from ..mbs.quantities.attachment_error import mode_error, modes_in_motion, start_jolt, start_of_motion
+from ..mbs.quantities.attachment_error import (
+    Start,
+    mode_error,
+    modes_in_motion,
+    phase_error,
+    start_jolt,
+    start_of_motion,
+)
 from ..mbs.quantities.doubts import doubts
 from ..mbs.quantities.energy import Energies, Momentum
 from ..mbs.quantities.motion import RobotMotion
@@ -100,13 +108,18 @@ class AnalysisResult:
 
     @cached_property
     def mode_error(self) -> float | None:
-        """Estimated for too few modes, of peaks; None where it is not known. It does not see what a jolt does."""
-        return mode_error(modes_in_motion(self.motion)) if self._is_integrated else None
+        """Estimated for too few modes, of peaks; None where it is not known."""
+        error = mode_error(modes_in_motion(self.motion)) if self._is_integrated else None
+        return None if error is None else hypot(error, phase_error(self._start))
 
     @cached_property
     def start_jolt(self) -> float:
         """See `attachment_error`."""
-        return start_jolt(start_of_motion(self.motion)) if self._is_integrated else 0.0
+        return start_jolt(self._start) if self._is_integrated else 0.0
+
+    @cached_property
+    def _start(self) -> Start:
+        return start_of_motion(self.motion)
 
     @property
     def _is_integrated(self) -> bool:

@@ -25,32 +25,46 @@ class ModesInMotion(NamedTuple):
 
 
 class Start(NamedTuple):
-    """First state of a run: M (n_v, n_v), C_q (rows, n_v), accelerations (n_v,), stiffness of coordinates (n_v,)."""
+    """First state of a run, and what then counts: M (n_v, n_v), C_q (rows, n_v), accelerations (n_v,).
+
+    K (n_v,), D (n_v, n_v) and `late` (n_v,) of `mode_error`, s², are those of modal coordinates, and 0 of others.
+    """
 
     M: Array
     C_q: Array
     a: Array
     stiffness: Array
+    damping: Array
+    late: Array
     largest: float  # Σ pᵀ K p over the run, J
+    duration: float  # s
+
+
+class Vibrations(NamedTuple):
+    """Of a robot about its first configuration: ω² (m,), shapes (n_v, m) with φᵀMφ = 1, amplitudes (m,) of √(2 J)."""
+
+    squares: Array
+    shapes: Array
+    amplitudes: Array
 
 
 def mode_error(links: Iterable[ModesInMotion]) -> float | None:
-    """Estimated error of moments and deflections for too few modes, of their peaks; None where nothing is known.
+    """Estimated error of torques and deflections for too few modes, of their peaks; None where nothing is known.
 
-    Attachment modes carry what the eigenmodes left out do statically. What these do besides, by their inertia, is at
-    most as if they vibrated at the frequency ω_k of the highest eigenmode kept: δp = (1/ω_k² − 1/ω²) p̈, and no more
-    than they do at all: the largest p counts where attachment modes ring at their own ω. The estimate is the largest
-    √(δpᵀ K δp) of a link against the largest √(pᵀ K p). It is 0.6 to 5 times the error of the worst moment of two-link
-    arms with two to six modes, for errors of 2e-7 to 2e-3 (tests/mbs/test_mode_error.py). Modes that
-    ring after a jolt (`start_jolt`) and are not there have no part in it: `run.modal_error` sees those, for the price
-    of a solve. Nothing is known of links without attachment modes.
+    Attachment modes carry what the eigenmodes left out do statically. What these do besides, by their inertia, is
+    about as if they vibrated at ω_m, where the first of them is: between the highest eigenmode kept, ω_k, and the
+    lowest attachment mode above it, ω_a (Rayleigh); ω_m² = ω_k ω_a. So δp = (1/ω_m² − 1/ω²) p̈, and no more than they do
+    at all: the largest p counts where attachment modes ring at their own ω, as after a jump of the acceleration. The
+    estimate is the largest √(δpᵀ K δp) of a link against the largest √(pᵀ K p). What rings from the start on gets out
+    of step besides: `phase_error`. Both together are 0.2 to 5 times the error of the worst torque of arms with two or
+    more modes, up to 10 times it with one (tests/mbs/test_mode_error.py). Nothing is known of links without attachment
+    modes.
     """
     ratios = []
     for body, p, p_ddot in links:
         if not body.attachment_modes or not body.n_eigenmodes:
             return None
-        highest = np.sort(body.stiffness)[body.n_eigenmodes - 1]
-        late = np.maximum(1.0 / highest - 1.0 / body.stiffness, 0.0)
+        late = _late(body)
         most = np.abs(p).max(axis=0, initial=0.0)
         wrong = np.sqrt((np.minimum(late * np.abs(p_ddot), most) ** 2 * body.stiffness).sum(axis=1).max(initial=0.0))
         whole = np.sqrt((p**2 * body.stiffness).sum(axis=1).max(initial=0.0))
@@ -58,16 +72,44 @@ def mode_error(links: Iterable[ModesInMotion]) -> float | None:
     return max(ratios, default=None)
 
 
+def _late(body: Body) -> Array:
+    """1/ω_m² − 1/ω² (n,), s², of `mode_error`, where that is above 0."""
+    highest, lowest_after = np.sort(body.stiffness)[body.n_eigenmodes - 1 : body.n_eigenmodes + 1]
+    late: Array = np.maximum(1.0 / np.sqrt(highest * lowest_after) - 1.0 / body.stiffness, 0.0)
+    return late
+
+
 def start_jolt(start: Start) -> float:
     """How much of a motion's deformation begins to ring at its start all at once, of the largest there is in it.
 
-    The vibrations φ_i, ω_i of the robot under the constraints of the run, about its first configuration, have of the
-    first accelerations those that bend links, z̈_i = φ_iᵀ K q̈/ω_i², and stand z̈_i/ω_i² from where they vibrate about:
-    √(Σ (z̈_i/ω_i)²) is compared with the largest √(Σ pᵀ K p) of all links. It is 0 on smooth paths from equilibrium, 0.1
-    to 1 where links start undeformed under gravity, or a path with a jump of its acceleration.
+    The amplitudes of `start_vibrations` against the largest √(Σ pᵀ K p) of all links. It is 0 on smooth paths from
+    equilibrium, 0.1 to 1 where links start undeformed under gravity, or a path with a jump of its acceleration.
+    """
+    return _of_largest(start, start_vibrations(start).amplitudes) if start.largest else 0.0
+
+
+def phase_error(start: Start) -> float:
+    """How far what rings from the start on gets out of step for too few modes, of the largest deformation.
+
+    With the attachment modes as late as `mode_error` has them, Rayleigh's quotient lowers the frequency ω_i of a
+    vibration φ_i by δω_i/ω_i = ½ Σ_a K_a φ_ia² (1/ω_m² − 1/ω_a²). Its phase is off by δω_i T at the end of the run, and
+    matters most when damping δ_i has left 1/e of it: by δω_i/(e δ_i) at most.
     """
     if not start.largest:
         return 0.0
+    found = start_vibrations(start)
+    slower = 0.5 * (start.stiffness * start.late) @ found.shapes**2
+    decay = 0.5 * np.einsum("ki,kl,li->i", found.shapes, start.damping, found.shapes)
+    time = start.duration / np.maximum(1.0, np.e * decay * start.duration)
+    return _of_largest(start, found.amplitudes * np.minimum(2.0, np.sqrt(found.squares) * slower * time))
+
+
+def start_vibrations(start: Start) -> Vibrations:
+    """What the links begin to do at the start of a run, under its constraints.
+
+    The vibrations φ_i, ω_i have of the first accelerations those that bend links, z̈_i = φ_iᵀ K q̈/ω_i², and stand
+    z̈_i/ω_i² from where they vibrate about: their amplitudes are z̈_i/ω_i in √(2 J).
+    """
     sizes, directions = np.linalg.svd(start.C_q)[1:]
     free = directions[np.count_nonzero(sizes > DEPENDENT * sizes.max(initial=0.0)) :].T
     inverse = np.linalg.inv(np.linalg.cholesky(free.T @ start.M @ free))
@@ -75,7 +117,11 @@ def start_jolt(start: Start) -> float:
     elastic = squares > RIGID * squares.max(initial=0.0)
     squares, shapes = squares[elastic], free @ inverse.T @ shapes[:, elastic]
     accelerations = shapes.T @ (start.stiffness * start.a) / squares
-    return float(np.sqrt((accelerations**2 / squares).sum() / start.largest))
+    return Vibrations(squares, shapes, accelerations / np.sqrt(squares))
+
+
+def _of_largest(start: Start, amplitudes: Array) -> float:
+    return float(np.sqrt((amplitudes**2).sum() / start.largest))
 
 
 def modes_in_motion(motion: RobotMotion) -> Iterator[ModesInMotion]:
@@ -87,10 +133,15 @@ def modes_in_motion(motion: RobotMotion) -> Iterator[ModesInMotion]:
 
 def start_of_motion(motion: RobotMotion) -> Start:
     """Of a run."""
-    tree, stiffness = motion.model.tree, np.zeros(motion.model.tree.n_v)
+    tree, n_v = motion.model.tree, motion.model.tree.n_v
+    stiffness, late, damping = np.zeros(n_v), np.zeros(n_v), np.zeros((n_v, n_v))
     energy: Array = np.zeros(len(motion.time))
     for node in tree.nodes:
-        stiffness[node.p_v] = node.body.stiffness
+        stiffness[node.p_v], damping[node.p_v, node.p_v] = node.body.stiffness, node.body.damping
         energy += motion.q[:, node.p_q] ** 2 @ node.body.stiffness
+        if node.body.attachment_modes and node.body.n_eigenmodes:
+            late[node.p_v] = _late(node.body)
     (M,) = mass_matrices(motion.model, motion.q[:1], float(motion.time[0]))
-    return Start(M, motion.rows[1][0], motion.a[0], stiffness, float(energy.max(initial=0.0)))
+    duration = float(motion.time[-1] - motion.time[0])
+    largest = float(energy.max(initial=0.0))
+    return Start(M, motion.rows[1][0], motion.a[0], stiffness, damping, late, largest, duration)
