@@ -57,7 +57,7 @@ def results_image(solution: Solution) -> bytes:
         for name, result in solution.analyses.items():
             group, closer = file.create_group(name), result.closer
             _write_analysis(group, solution, result)
-            write_peaks(group, None if closer is None else partial(_write_analysis, solution=solution, result=closer))
+            write_peaks(group, None if closer is None else partial(_write_peaking, solution=solution, result=closer))
         if (run := solution.unread) is not None:
             _write_run(file.create_group(run.analysis.name), run, run.statistics.warnings, ())
         write_state(file, solution)
@@ -93,26 +93,41 @@ def _write_analysis(group: h5py.Group, solution: Solution, result: AnalysisResul
         group.attrs.update({"redundancy": motion.model.scene.redundancy, "resolved_by": joints})
     write_bodies(group, solution, result)
     write_bending(group, result.bending)
-    write_joints(group, solution, result)
+    _write_forces(group, solution, result)
     write_structure(group, {name: body.structure for name, body in solution.bodies.items() if body.structure})
     for point, shift in result.predicted_shift.items():
         group[f"points/{point}/predicted_shift"] = motion.space.along(shift)
-    for body, forces in result.point_forces.items():
-        write_point_forces(group.create_group(f"actuation_points/{body}"), solution.points[body], forces, motion.space)
-    for body, stress in result.stresses.items():
-        write_stress(group.create_group(f"stress/{body}"), stress)
-    write_paths(group, result)
     for key, values in vars(result.energies).items():
         group[f"energy/{key}"] = values
     group["momentum/linear"] = motion.space.along(result.momentum.linear)
     group["momentum/angular"] = motion.space.about(result.momentum.angular)
-    if result.actuation is not None:
-        write_actuation(group, solution, result.actuation)
     violation = group.create_dataset("constraint_violation", data=motion.violation)
     violation.attrs["columns"] = ["position", "velocity", "acceleration"]
     for found, write in DETAILS.items():
         if isinstance(run.details, found):
             write(group, motion, run.details)
+
+
+def _write_peaking(group: h5py.Group, solution: Solution, result: AnalysisResult) -> None:
+    """Of an analysis what has peaks."""
+    group["time"], motion = result.run.time, result.motion
+    for body, labels in motion.points.items():
+        for point in (f"{body}.{label}" for label in labels):
+            group[f"points/{point}/deflection"] = motion.space.along(motion.deflection(point))
+    _write_forces(group, solution, result)
+
+
+def _write_forces(group: h5py.Group, solution: Solution, result: AnalysisResult) -> None:
+    """Of an analysis: joints/, trajectories/, actuation_points/, stress/, pzt/ and feasibility/."""
+    write_joints(group, solution, result)
+    for body, forces in result.point_forces.items():
+        points = group.create_group(f"actuation_points/{body}")
+        write_point_forces(points, solution.points[body], forces, result.motion.space)
+    for body, stress in result.stresses.items():
+        write_stress(group.create_group(f"stress/{body}"), stress)
+    write_paths(group, result)
+    if result.actuation is not None:
+        write_actuation(group, solution, result.actuation)
 
 
 def _write_run(group: h5py.Group, outcome: Outcome, warnings: Sequence[str], notes: Sequence[str]) -> None:

@@ -96,6 +96,11 @@ class MotionOfLinks(RobotMotion):
         in_frame = np.einsum("tji,tj->ti", of_quaternion(frame.orientation), found.position - frame.position)
         return replace(found, deflection=in_frame - position)
 
+    def deflection(self, point: str) -> Array:
+        """Of the section "BODY.POINT", in the axes of its body or link."""
+        is_divided = point.partition(".")[0] in self.divided
+        return self.point(point).deflection if is_divided else super().deflection(point)
+
     def _turned(self, body: str) -> Array:
         """Of a link that of its first piece."""
         return super()._turned(self.divided[body].body.names[0] if body in self.divided else body)

@@ -162,10 +162,15 @@ class RobotMotion:
 
     def point(self, point: str) -> PointMotion:
         """Of the section "BODY.POINT"."""
-        found, (body, _, label) = self.section(point), point.partition(".")
+        found = self.section(point)
+        return PointMotion(found.r, self.deflection(point), continuous(quaternions(found.F)))
+
+    def deflection(self, point: str) -> Array:
+        """Φ p (T, 3), m, of the section "BODY.POINT" in the axes of its body."""
+        body, _, label = point.partition(".")
         node = self.node(body)
-        deflection = bent_section(node.body, label, self.q[:, node.p_q]).u - node.body.points[label].position
-        return PointMotion(found.r, deflection, continuous(quaternions(found.F)))
+        moved: Array = bent_section(node.body, label, self.q[:, node.p_q]).u
+        return moved - node.body.points[label].position
 
     def joint(self, name: str) -> tuple[Array, Array] | None:
         """Coordinates, unwrapped, and rates (T, k) of a joint; None where it has none."""
