@@ -1,6 +1,8 @@
-"""Files that users bring (URDF, tables, HDF5), and arguments of studies, with one change each: refused, or taken.
+"""URDF, tables, HDF5, SID and .fem files, and arguments of studies, with one change each: refused, or taken.
 
-    python tests/campaigns/inputs.py [--count 100] [--seed 0] [--kind urdf|csv|modal|results|study …] [--record]
+    python tests/campaigns/inputs.py [--count 100] [--seed 0] [--kind KIND …] [--record]
+
+Kinds are urdf, csv, modal, results, sid, fem and study.
 
 Run by hand, some 0.3 s each. Attributes, cells and datasets get values of other types, huge, tiny, not finite, empty,
 names that lead elsewhere, and text that programs would run: a file CANARY must not appear, nor anything beside the
@@ -63,6 +65,7 @@ mesh = { elements = 6 }
 reference = { condition = "cantilever" }
 modes = { count = 2, family = "in-plane-bending" }
 """
+BODIES = {".SID_FEM": "sid", ".fem": "mbdyn"}
 TABLE = "t,value\n0,0\n0.02,0.1\n0.04,0.15\n0.06,0.2\n"
 
 
@@ -74,7 +77,8 @@ class Campaign:
         self.ready.mkdir()
         for name, text in (("scene.toml", SCENE), ("arm.toml", LINK), ("path.csv", TABLE)):
             (self.ready / name).write_text(text, encoding="utf-8")
-        for command in (["link", "arm.toml"], ["solve", "scene.toml"]):
+        exports = [["export", "arm.h5", "-o", f"body{end}", "--format", form] for end, form in BODIES.items()]
+        for command in (["link", "arm.toml"], ["solve", "scene.toml"], *exports):
             code, told = run(command, self.ready)
             assert code == 0, told
 
@@ -127,6 +131,26 @@ class Campaign:
         commands = [["info", "arm.h5"], ["export", "arm.h5", "--format", self.draw.choice(("sid", "mbdyn", "exudyn"))]]
         return label, "arm.h5", commands
 
+    def sid(self):
+        return self.exchanged("body.SID_FEM")
+
+    def fem(self):
+        return self.exchanged("body.fem")
+
+    def exchanged(self, name: str):
+        """A word, a line or a stretch of a body in text is another."""
+        lines = (self.place / name).read_text(encoding="utf-8").splitlines()
+        row, how = self.draw.randrange(len(lines)), self.draw.choice(("word", "word", "word", "line", "twice", "cut"))
+        words = lines[row].split(" ")
+        if how == "word":
+            words[self.draw.randrange(len(words))] = self.draw.choice((*TEXTS, "(1, )", "(99, 1)", "2", "end", "-7"))
+        lines[row] = " ".join(words)
+        end = {"line": row + 1, "cut": row + self.draw.randrange(1, 40)}.get(how, row)
+        label = f"{how} {row + 1}: {lines[row][:80]!r}"
+        lines[row:end] = [lines[row]] if how == "twice" else []
+        (self.place / name).write_text("\n".join(lines) + "\n", encoding="utf-8")
+        return label, name, [["import", name, "-o", "out.h5"]]
+
     def results(self):
         label, name = self.damaged(self.place / "scene.results.h5"), "scene.results.h5"
         reads = [["info", name], ["feasibility", name], ["export", name, "--format", "csv"], ["linear", name],
@@ -175,7 +199,7 @@ class Campaign:
         return " ".join(command), "scene.toml", [command]
 
 
-KINDS = ("urdf", "csv", "modal", "results", "study")
+KINDS = ("urdf", "csv", "modal", "results", "sid", "fem", "study")
 
 
 def main() -> None:
