@@ -42,9 +42,9 @@ def _modes(solution: Solution, results: Sequence[AnalysisResult]) -> str:
     if not known or len(known) < len(errors):
         without = [name for name, link in solution.links.items() if not link.residual.any()]
         return f"{NOT_ESTIMATED}: no attachment modes in {', '.join(without)}" if without else NOT_ESTIMATED
-    if max(known) > RESOLVED:
-        return "too few: vibrations above the highest mode are excited"
     estimate = f"{max(known):.0e} of peaks, estimated"
+    if max(known) > RESOLVED:
+        estimate = "too few: vibrations above the highest mode are excited"
     if any(result.start_jolt >= JOLT for result in results):
-        estimate += "; a start without its step in acceleration (links not in equilibrium) lowers it"
+        estimate += "; a start in equilibrium, without a step in acceleration, lowers it"
     return estimate
