@@ -34,6 +34,8 @@ def integrated(solution: Solution) -> list[AnalysisResult]:
 def _modes(solution: Solution, results: Sequence[AnalysisResult]) -> str:
     if rigid := [f"{name} in {', '.join(body.rigid_in)}" for name, body in solution.bodies.items() if body.rigid_in]:
         return f"{NOT_ESTIMATED}: rigid for want of modes: {'; '.join(rigid)}"
+    if not solution.links:
+        return "links are rigid"
     if solution.mode_choice is not None:
         known = [error for of in solution.mode_choice.errors.values() for error in of.values()]
         return f"{max(known):.0e} of peaks, against all modes of the files" if any(known) else NOT_ESTIMATED
