@@ -147,6 +147,12 @@ def test_same_as_a_payload_of_stage_2(body, name, position, inertia):
     h, j = ([each.I_bar[0, 1] - each.I_bar[1, 0], each.I_bar[0, 0] + each.I_bar[1, 1]] for each in (loaded, payload))
     for left, right in zip(h, j, strict=True):
         np.testing.assert_allclose(left[low], right[low] * sign, rtol=1e-6, atol=1e-8)
+    in_plane, expected = (each.S_bar_kl[0, 0] + each.S_bar_kl[1, 1] for each in (loaded, payload))
+    rotation = payload.points[name].rotation[2]  # the file books all rotary inertia there, as in solids
+    expected = (expected + inertia * np.outer(rotation, rotation))[low, low] * np.outer(sign, sign)
+    np.testing.assert_allclose(in_plane[low, low], expected, atol=1e-7)
+    m_ff = np.einsum("kkmn->mn", loaded.S_bar_kl) + loaded.S_spin
+    np.testing.assert_allclose(m_ff, np.eye(len(m_ff)), atol=1e-10)
 
 
 def test_hub_on_the_root_of_a_cantilever_only_adds_mass(body):

@@ -15,7 +15,7 @@ GROUP = "Modes and contrasts"
 def forces(links, **keys):
     outcome = inverse(arm(links, initial=STATIC), **({"end": 0.2, "tolerance": 1e-4} | keys))
     outcome.check_completed()
-    assert outcome.motion.violation.max() < 1e-10
+    assert outcome.motion.violation.max() < 1e-11
     return outcome.lambda_
 
 

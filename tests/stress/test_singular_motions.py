@@ -49,7 +49,8 @@ def test_passes_the_stretched_position(distance, record):
     outcomes = [inverse(reaching(path), tolerance=1e-5, integrator=name) for name in ("dop853", "radau")]
     for outcome in outcomes:
         outcome.check_completed()
-        assert off_rows(outcome) < 1e-8  # a thousandth of the tolerance; elsewhere 1e-11
+        assert outcome.motion.violation.max() < 1e-11  # to which states are projected, of 1 + the largest rate
+        assert off_rows(outcome) < 1e-10  # rates of the tip are smaller than those of the joints here
     largest = [np.abs(outcome.lambda_).max() for outcome in outcomes]
     assert largest[0] == pytest.approx(largest[1], rel=1e-3)
     record(GROUP, f"tip passes {distance:g} m before the arm is stretched", "forces up to {force} N", force=largest[0])
