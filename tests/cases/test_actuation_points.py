@@ -57,7 +57,7 @@ def test_forces_along_three_axes_carry_an_arm(case_copy, ffrobot, monkeypatch):
 
 
 def test_forces_at_points_hold_links_straight():
-    """A shape that a path does not give by itself: forces on modes besides, without which links bend by 2e-4 m."""
+    """A replay of a shape that the path's force does not give by itself: what holds it acts at the points, too."""
     tables, _ = at_points()
     again = {"name": "again", "kind": "forward", "actuation": "straight", "apply": "points", "tolerance": 1e-8}
     with ffrobot.solve(ffrobot.make_scene(**tables | {"analysis": [STRAIGHT, again]})) as results:
