@@ -56,6 +56,7 @@ class LinkPatches:
         reach: of all patches side by side on the modes that they reach together, `reached`.
         reached: likewise.
         bodies: by name, the link and, where it is divided, its pieces.
+        slowness: √(ρA/EI) of the link, in s/m².
         on_kept: (n, n) of modal forces the part that the equations keep, where the patches serve that alone.
     """
 
@@ -64,6 +65,7 @@ class LinkPatches:
     reach: Reach
     reached: ReachedModes
     bodies: Mapping[str, OnBody]
+    slowness: float
     on_kept: Array | None = None
 
     @property
@@ -85,6 +87,11 @@ class LinkPatches:
     def limit(self) -> Array:
         """(k,) largest voltages, V; infinite where the scene gives none."""
         return self.reach.limit
+
+    @property
+    def edges(self) -> Array:
+        """(k, 2) where patches begin and end, m from the root."""
+        return np.concatenate([array.edges for array in self.arrays.values()])
 
     def at_voltages(self, V: Array, F_p: Array) -> dict[str, Voltages]:
         """By layout, of known V (T, k) where modal forces F_p (T, n) are wanted."""
@@ -170,7 +177,14 @@ def link_patches(path: Path, layouts: Sequence[PztLayout], body: ModalBody, spat
         reached = reached_modes(Phi_V.T, body, spatial)
         reach = _together(path, layouts, arrays, reached, Phi_V.T)
     own = {layouts[0].body: OnBody(Phi_V, turn, np.eye(body.mode_count))}
-    return LinkPatches(arrays, modes, reach, reached, own)
+    return LinkPatches(arrays, modes, reach, reached, own, _slowness(body))
+
+
+def _slowness(body: ModalBody) -> float:
+    """√(ρA/EI) in s/m², of the mode that bends the link most softly: ω² = ∫ EI φ''² dx."""
+    x, rotation = body.stations.position[:, 0], body.stations.rotation[:, 1:]
+    bent = np.diff(rotation, axis=0) ** 2 / np.diff(x)[:, None, None]
+    return float(np.sqrt(body.mass / body.length * (bent.sum(axis=(0, 1)) / np.diag(body.stiffness)).max(initial=0.0)))
 
 
 def check_reach(path: Path, of_link: LinkPatches) -> None:

@@ -151,11 +151,26 @@ def write_placement(group: h5py.Group, _motion: RobotMotion, placed: Placed) -> 
         group[key] = getattr(placed, key)
 
 
+OF_TRACKING = (
+    "objective", "least_voltage", "least_share", "cost", "pre_actuation", "post_actuation", "unmet", "without_patches",
+    "is_needed",
+)  # fmt: skip
+
+
 def write_tracking(group: h5py.Group, motion: RobotMotion, found: TrackedPath) -> None:
-    """tracking/ of an analysis: what it made small, and work (J) and largest power (W) of motors and of patches."""
-    about = group.create_group("tracking").attrs
-    for key in ("objective", "least_voltage", "least_share", "cost", "pre_actuation", "post_actuation"):
-        about[key] = getattr(found, key)
+    """tracking/ of an analysis: what it made small, and what that takes.
+
+    Work (J) and largest power (W) of motors and of patches, what each zero asks for (V), prices of limits.
+    """
+    group = group.create_group("tracking")
+    about = group.attrs
+    about.update({key: getattr(found, key) for key in OF_TRACKING})
+    for kind, prices in (("voltage", found.voltage_prices), ("torque", found.torque_prices)):
+        for name, values in prices.items():
+            group[f"{kind}_price/{name}"] = values
+    if (bounds := found.bounds) is not None:
+        group["bound/voltage"], group["bound/time"] = bounds.voltages, bounds.times
+        group["bound/zero"] = np.stack([bounds.zeros.real, bounds.zeros.imag], axis=1)
     for name, power in zip(("motor", "patch"), _powers(motion), strict=True):
         about[f"{name}_work"] = float(np.diff(motion.time) @ (power[1:] + power[:-1]) / 2)
         about[f"{name}_power"] = float(np.abs(power).max(initial=0.0))

@@ -197,7 +197,12 @@ def _answer(
     if (missed := read_unsupplied(group["feasibility"])) is not None:
         means = "motors and patches" if missed.with_patches else "motor torques"
         return f"{means} cannot do it: see the warning ({within})", False
-    least = f"; least voltage {group['tracking'].attrs['least_voltage']:.3g} V" if "tracking" in group else ""
+    least = ""
+    if "tracking" in group:
+        about = group["tracking"].attrs
+        off = about.get("without_patches", np.nan)
+        alone = f"; torques alone are off by {1e3 * off:.3g} mm" if np.isfinite(off) else ""
+        least = f"; least voltage {about['least_voltage']:.3g} V{alone}"
     return f"motors{' and patches' if patches else ''} can do it, {within}{least}", True
 
 
@@ -278,6 +283,8 @@ def _advice(
     if asked and read_unsupplied(group["feasibility"]) is not None:
         inversion = 'kind = "motors-only", or ' if at_rest else ""
         yield f'{inversion}patches ([[pzt]]) on the links with kind = "tracking"'
+    if "tracking" in group and asked and not group["tracking"].attrs["is_needed"]:
+        yield "patches are not needed: torques alone stay on the path within the tolerance, relative to its length"
     if "linear" in group and (text := str(group["linear"].attrs.get("advice", ""))):
         yield text
     if "control" in group:

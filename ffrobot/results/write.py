@@ -165,4 +165,4 @@ def _write_judgement(group: h5py.Group, solution: Solution, result: AnalysisResu
             group.attrs[f"mode_error_{kind}"] = error
     if (found := result.check) is not None:
         check = vars(found) | {"modes": json.dumps(dict(found.modes))}
-        group.attrs.update({f"check_{key}": value for key, value in check.items()})
+        group.attrs.update({f"check_{key}": value for key, value in check.items() if value is not None})

@@ -18,6 +18,7 @@ from ..mbs.analysis.forward import Forward, actuator_commands, largest_moments
 from ..mbs.analysis.operating_points import held_by_motors
 from ..mbs.analysis.outcome import Outcome
 from ..mbs.analysis.replay import replay_times, supplied
+from ..mbs.analysis.tracking import Tracking, least_voltage
 from ..mbs.model.drives import Drives, Replayed
 from ..mbs.model.model import Model, without_paths
 from ..mbs.quantities.motion import RobotMotion
@@ -111,7 +112,9 @@ def _check(solution: Solution, source: Outcome, finer: Solution, watcher: Watche
     errors = {point: _distance(source, run, point) for point in points}
     worst = max(errors, key=lambda point: errors[point])
     modes = {name: link.eigenmode_count for name, link in finer.links.items()}
-    return FinerCheck(modes, worst, errors[worst], run.status)
+    asked = source.analysis
+    least = least_voltage(finer.model, finer.patches, asked) if isinstance(asked, Tracking) else None
+    return FinerCheck(modes, worst, errors[worst], run.status, least)
 
 
 def _drives(solution: Solution, source: Outcome, finer: Solution) -> Drives:

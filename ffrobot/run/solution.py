@@ -53,19 +53,22 @@ class FinerCheck:
         point: that is farthest from where the inverse analysis has it, of those on trajectories where there are any.
         error: by how much, m, at worst.
         status: how the replay ended.
+        least_voltage: V, that tracking needs with these modes; None of other kinds.
     """
 
     modes: Mapping[str, int]
     point: str
     error: float
     status: str
+    least_voltage: float | None = None
 
     @property
     def in_words(self) -> str:
         """On how many modes, and how far off."""
         ended = "" if self.status == "completed" else f", which ended early ({self.status})"
         modes = ", ".join(map(str, dict.fromkeys(self.modes.values())))
-        return f"forward simulation on {modes} modes{ended}: {self.point} is off by {1e3 * self.error:.2g} mm"
+        least = "" if self.least_voltage is None else f"; least voltage {self.least_voltage:.3g} V"
+        return f"forward simulation on {modes} modes{ended}: {self.point} is off by {1e3 * self.error:.2g} mm{least}"
 
 
 @dataclass(frozen=True)

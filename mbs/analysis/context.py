@@ -28,6 +28,14 @@ class PatchedLink(Protocol):
         """(k,) largest voltages, V; infinite where there are none."""
 
     @property
+    def edges(self) -> Array:
+        """(k, 2) where patches begin and end, m from the root of the link."""
+
+    @property
+    def slowness(self) -> float:
+        """√(ρA/EI) of the link, s/m²."""
+
+    @property
     def to_reached(self) -> Mapping[str, Array]:
         """(m, n) modal forces as `allocation` takes them, by those on the modes of the file."""
 

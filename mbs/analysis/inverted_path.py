@@ -79,9 +79,13 @@ def decay_times(linear: Linearisation, end: float, *, needs_future: bool) -> tup
     return pre, min(DECAY / decay.min(initial=np.inf), end) if needs_future else 0.0
 
 
-def whole_steps(times: Sequence[float], step: float) -> tuple[float, float]:
-    """As many output steps as these times (s) take."""
-    before, after = (math.ceil(time / step - 1e-9) * step for time in times)
+def durations(
+    linear: Linearisation, given: tuple[float | None, float | None], step: float, *, needs_future: bool
+) -> tuple[float, float]:
+    """Pre- and post-actuation (s): as given, or until the zero dynamics has died out; whole output steps."""
+    automatic = decay_times(linear, float(linear.times[-1]), needs_future=needs_future)
+    chosen = (found if value is None else value for value, found in zip(given, automatic, strict=True))
+    before, after = (math.ceil(time / step - 1e-9) * step for time in chosen)
     return before, after
 
 

@@ -35,11 +35,10 @@ from .inverted_path import (
     AroundPath,
     cause_of,
     check_rest,
-    decay_times,
     describe_zeros,
+    durations,
     is_minimum_phase,
     where,
-    whole_steps,
 )
 from .outcome import Forces, Motion, Outcome, Prescription, Statistics
 from .samples import path_times
@@ -116,7 +115,8 @@ def run_motors_only(context: Context, analysis: MotorsOnly) -> Outcome:
         servo, linear = choose_output(partial(make_servo, model, analysis.end, place, progress), analysis)
         needs_future = bool(linear.is_future[0].any())
         check_rest(servo, analysis, rests(analysis, needs_future))
-        pre, post = durations(analysis, linear, needs_future)
+        given = analysis.pre_actuation, analysis.post_actuation
+        pre, post = durations(linear, given, analysis.output_step, needs_future=needs_future)
         inversion = invert(servo, linear, pre, post, analysis.tolerance, progress)
     except Stopped:
         raise SolveError(f"{place}: stopped on request before any of its motion was found") from None
@@ -236,16 +236,3 @@ def _check_relative_degree(servo: Output, linear: Linearisation) -> None:
 def rests(analysis: MotorsOnly, needs_future: bool) -> list[float]:
     """Times (s) at which motors alone need the robot at rest."""
     return [0.0, analysis.end] if needs_future or analysis.post_actuation else [0.0]
-
-
-def durations(analysis: MotorsOnly, linear: Linearisation, needs_future: bool) -> tuple[float, float]:
-    """Pre- and post-actuation (s): as given, or until the zero dynamics has died out; whole output steps."""
-    chosen = [
-        automatic if value is None else value
-        for automatic, value in zip(
-            decay_times(linear, analysis.end, needs_future=needs_future),
-            (analysis.pre_actuation, analysis.post_actuation),
-            strict=True,
-        )
-    ]
-    return whole_steps(chosen, analysis.output_step)

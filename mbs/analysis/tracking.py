@@ -1,13 +1,14 @@
 """Motors and patches carry the robot along its path together, within their limits: `kind = "tracking"`.
 
 The problem, its discretization and its solver are in `mbs.solve.tracking`. First comes the least voltage with which
-patches can do it; where that is within their limits, the motion of least effort follows.
+patches can do it; where that is within their limits, the motion of least effort follows. What each zero asks for, and
+what would do beyond limits, is in `tracking_advice`; torques alone are replayed to see whether patches are needed.
 """
 
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from typing import Annotated, Literal
@@ -21,23 +22,26 @@ from ...common.validation import Record
 from ..fields.field_types import NotNegative, Positive
 from ..model.gears import refuse_held_motors
 from ..model.model import Model, modal_directions, without_paths
-from ..scene.analysis import Need, TimedAnalysis, output_times
+from ..scene.analysis import Check, Need, TimedAnalysis, output_times
 from ..solve.integrators import Choice
 from ..solve.internal_dynamics import Stopped, equilibrium
 from ..solve.servo import Servo, make_servo
 from ..solve.stable_inversion import shape_of
 from ..solve.tracking import Limits, Objective, Tracked, Transition, Weights, refined, start_breaks, track
-from ..solve.zero_dynamics import linearise
-from .context import Context
-from .inverted_path import AroundPath, check_rest, decay_times, where, whole_steps
+from ..solve.zero_dynamics import Linearisation, linearise
+from .context import Context, PatchedLink
+from .forward import Forward, run_forward
+from .inverted_path import AroundPath, check_rest, durations, where
+from .motors_only import path_errors
 from .outcome import Forces, Motion, Outcome, Prescription, Statistics
 from .samples import path_times
+from .tracking_advice import Bounds, bounds_of_zeros, enough_path_time, enough_time, far_patches, rough_ends
 
 RATE = 0.005  # s, T_r where the scene does not say
 VOLT = 200.0  # V_ref where patches have no limits
-NEAR = 0.97  # times the limits of patches, which a longer time is sought for
-MOST_TIMES = 6  # tried
 ENOUGH = 1e-6  # of the limits: least voltages beyond them by less are within
+AT_REST = 1e-9  # of the path's time: so much before it begins, and after it ends, it has no acceleration
+REPLAYED = 1e-5  # tolerance of torques alone, at most
 
 Around = NotNegative | Literal["auto"]
 
@@ -73,6 +77,8 @@ class Tracking(TimedAnalysis):
     """Sizes that count alike in the effort."""
     intervals: Annotated[int, Field(ge=8, le=2000)] = 64
     """Number of intervals to begin with; where they leave more than the tolerance, more follow."""
+    check: Check = None
+    """Forward simulation under the result with twice the modes ("finer"), and the least voltage with these."""
 
     is_integrated = True
     applicable = ("joints", "joints+pzt")
@@ -103,6 +109,11 @@ class TrackedPath(AroundPath):
         objective: what was made small, `effort` unless limits do not allow it.
         cost: the effort, without unit.
         held: the robot whose constraint equations hold it on its path.
+        unmet: see `Tracked`.
+        bounds: what each zero asks for, V; None where motors alone have no bounded motion.
+        voltage_prices, torque_prices: `Tracked.prices` by body, and by joint.
+        without_patches: m or rad, how far off the path the same torques alone are at most; NaN where not found.
+        is_needed: whether that is more than the tolerance times the path's way.
     """
 
     least_voltage: float
@@ -110,6 +121,29 @@ class TrackedPath(AroundPath):
     objective: Objective
     cost: float
     held: Model
+    unmet: float
+    bounds: Bounds | None
+    voltage_prices: Mapping[str, Array]
+    torque_prices: Mapping[str, Array]
+    without_patches: float = float("nan")
+    is_needed: bool = True
+
+
+@dataclass(frozen=True)
+class _Posed:
+    """What is asked for, on which breaks (s), with the time before and after the path (s)."""
+
+    servo: Servo
+    linear: Linearisation
+    around: tuple[float, float]
+    asked: Transition
+    breaks: Array
+
+    @property
+    def units(self) -> Array:
+        """V by which shares count (m,)."""
+        limit = self.asked.limits.voltage
+        return np.where(np.isfinite(limit), limit, self.asked.weights.voltage)
 
 
 def run_tracking(context: Context, analysis: Tracking) -> Outcome:
@@ -119,25 +153,29 @@ def run_tracking(context: Context, analysis: Tracking) -> Outcome:
     reach; `SolveError` where no motion is found.
     """
     began, model = time.perf_counter(), context.model
-    place = where(model.scene.path, analysis)
 
     def progress() -> bool:
         return context.progress(0.0)
 
-    refuse_held_motors(model, analysis)
     try:
-        servo = make_servo(model, analysis.end, place, progress, 1.0, analysis.kind)
-        check_rest(servo, analysis, (0.0, analysis.end))
-        pre, post = _durations(servo, analysis)
-        solved = _solve(context, servo, analysis, (pre, post))
+        posed = _pose(model, context.patches, analysis, progress)
+        least = track(posed.asked, posed.breaks)
+        _check_found(context, posed, least)
+        told = list(_told(context, posed, analysis, least))
+        found, objective = _solve(posed, analysis, least)
+        bounds = _bounds(posed)
     except Stopped:
+        place = where(model.scene.path, analysis)
         raise SolveError(f"{place}: stopped on request before any of its motion was found") from None
-    found, least, asked, told = solved
-    units = np.where(np.isfinite(asked.limits.voltage), asked.limits.voltage, asked.weights.voltage)
+    (pre, post), servo = posed.around, posed.servo
+    has_limits = np.isfinite(posed.asked.limits.voltage).any()
+    by_joint = np.cumsum([len(columns) for columns in model.motors.values()])[:-1]
     around = TrackedPath(
-        pre_actuation=pre, post_actuation=post, least_voltage=least * float(units.max()),
-        least_share=least if np.isfinite(asked.limits.voltage).any() else float("nan"), objective=asked.objective,
-        cost=found.cost, held=servo.model,
+        pre_actuation=pre, post_actuation=post, least_voltage=least.share * float(posed.units.max()),
+        least_share=least.share if has_limits else float("nan"), objective=objective, cost=found.cost,
+        held=servo.model, unmet=found.unmet, bounds=bounds,
+        voltage_prices={name: prices[0] for name, prices in _by_body(context, found.prices[0][None]).items()},
+        torque_prices=dict(zip(model.motors, np.split(found.prices[1], by_joint), strict=True)),
     )  # fmt: skip
     times = output_times(analysis.end, analysis.output_step, pre, post)
 
@@ -145,107 +183,132 @@ def run_tracking(context: Context, analysis: Tracking) -> Outcome:
         return replace(_outcome(analysis, model, servo, found, context, times), details=around)
 
     run = at(times)
-    run = replace(
-        run, statistics=replace(run.statistics, wall_seconds=time.perf_counter() - began, warnings=tuple(told))
-    )
+    around = _with_torques_alone(context, run, around)
+    statistics = replace(run.statistics, wall_seconds=time.perf_counter() - began, warnings=tuple(told))
 
     @cache
     def look_closer() -> Outcome:
         return at(path_times(run.time, model.scene.trajectory, analysis.end))
 
-    return replace(run, look_closer=look_closer)
+    return replace(run, details=around, statistics=statistics, look_closer=look_closer)
 
 
-def _durations(servo: Servo, analysis: Tracking) -> tuple[float, float]:
-    given = analysis.pre_actuation, analysis.post_actuation
-    automatic = (0.0, 0.0)
-    if "auto" in given:
-        linear = linearise(servo, analysis.end)
-        automatic = decay_times(linear, analysis.end, needs_future=bool(linear.is_future[0].any()))
-    chosen = [found if value == "auto" else value for value, found in zip(given, automatic, strict=True)]
-    return whole_steps(chosen, analysis.output_step)
+def least_voltage(model: Model, patches: Mapping[str, PatchedLink], analysis: Tracking) -> float:
+    """V, as in `TrackedPath`, of another model of the same robot; NaN where no motion is found."""
+    posed = _pose(model, patches, analysis, lambda: True)
+    least = track(posed.asked, posed.breaks)
+    return least.share * float(posed.units.max()) if least.converged else float("nan")
 
 
-def _solve(
-    context: Context, servo: Servo, analysis: Tracking, around: tuple[float, float]
-) -> tuple[Tracked, float, Transition, list[str]]:
-    """What carries the path, the least share of limits, what was asked for last, and warnings."""
-    place = servo.where
-    Phi_V, limits = _patches(context, servo), _limits(context)
+def _pose(model: Model, patches: Mapping[str, PatchedLink], analysis: Tracking, progress: Callable[[], bool]) -> _Posed:
+    """The least voltage on the first breaks. Raises as `run_tracking`, and `Stopped`."""
+    place, end = where(model.scene.path, analysis), analysis.end
+    refuse_held_motors(model, analysis)
+    servo = make_servo(model, end, place, progress, 1.0, analysis.kind)
+    check_rest(servo, analysis, (0.0, end))
+    Phi_V, limits = _patches(patches, servo), _limits(model, patches)
     if not np.any(Phi_V):
         raise InputError(f'{place}: expected patches on flexible links for kind = "tracking", found none that bend one')
-    start, end = -around[0], analysis.end + around[1]
-    breaks = start_breaks(start, analysis.end, end, analysis.intervals)
-    rest = equilibrium(servo, start), equilibrium(servo, end)
-    weights = _weights(servo, analysis, limits)
-    asked = Transition(servo, Phi_V, limits, weights, rest, "least-voltage")
-    least = track(asked, breaks)
-    if not least.converged and np.isfinite(limits.torque).any():
+    linear = linearise(servo, end)
+    pre, post = (None if value == "auto" else value for value in (analysis.pre_actuation, analysis.post_actuation))
+    needs_future = bool(linear.is_future[0].any())
+    around = durations(linear, (pre, post), analysis.output_step, needs_future=needs_future)
+    first, last = -around[0], end + around[1]
+    rest = equilibrium(servo, first - AT_REST * end), equilibrium(servo, last + AT_REST * end)
+    asked = Transition(servo, Phi_V, limits, _weights(servo, analysis, limits), rest, "least-voltage")
+    return _Posed(servo, linear, around, asked, start_breaks(first, end, last, analysis.intervals))
+
+
+def _check_found(context: Context, posed: _Posed, least: Tracked) -> None:
+    """Raise `SolveError` where there is no least voltage: motors are too weak, or the path is too fast."""
+    if least.converged:
+        return
+    asked, limits = posed.asked, posed.asked.limits
+    if np.isfinite(limits.torque).any():
         free = replace(asked, limits=replace(limits, torque=np.full_like(limits.torque, np.inf)))
-        if track(free, breaks).converged:
+        if track(free, posed.breaks).converged:
             raise SolveError(
-                f"{place}: no motion follows the path within the motors' limits, whatever the voltages: slow the path"
-                " down, or raise moment_limit"
+                f"{posed.servo.where}: no motion follows the path within the motors' limits, whatever the voltages:"
+                " slow the path down, or raise moment_limit"
             )
-    if not least.converged:
-        raise SolveError(
-            f"{place}: no motion of motors and patches was found: slow the path down, let it begin and end more"
-            " smoothly (35*s**4 - 84*s**5 + 70*s**6 - 20*s**7), or allow pre_actuation and post_actuation"
-        )
-    told = []
+    causes = [*rough_ends(posed.servo), *far_patches(context, posed.linear.zeros[[0, -1]])]
+    raise SolveError(
+        f"{posed.servo.where}: no motion of motors and patches was found: "
+        + ("; ".join(causes) or "slow the path down, or allow pre_actuation and post_actuation")
+    )
+
+
+def _is_beyond(posed: _Posed, least: Tracked) -> bool:
+    return least.share > 1.0 + ENOUGH and bool(np.isfinite(posed.asked.limits.voltage).any())
+
+
+def _solve(posed: _Posed, analysis: Tracking, least: Tracked) -> tuple[Tracked, Objective]:
+    """The motion of least effort or what else is wanted; of the least voltage where limits do not allow that."""
     objective: Objective = "least-torque" if analysis.objective == "least-moment" else analysis.objective
-    if least.share > 1.0 + ENOUGH and np.isfinite(limits.voltage).any():
-        more = _more_time(asked, analysis, around, least.share)
-        longer = f", or {1e3 * more:.3g} ms more of pre_actuation and post_actuation" if np.isfinite(more) else ""
-        told.append(
-            f"patches cannot do it within their limits: {least.share:.3g} times these would do{longer}."
-            " Slow the path down, or add patches"
-        )
+    if _is_beyond(posed, least):
         objective = "least-voltage"
-    asked = replace(asked, objective=objective)
-    found = refined(asked, breaks, analysis.tolerance, servo.goes_on, least)
+    asked = replace(posed.asked, objective=objective)
+    found = refined(asked, posed.breaks, analysis.tolerance, posed.servo.goes_on, least)
     if not found.converged:
-        raise SolveError(f"{place}: the motion of least {analysis.objective} was not found: loosen limits or tolerance")
-    return found, least.share, asked, told
+        raise SolveError(
+            f"{posed.servo.where}: the motion of least {analysis.objective} was not found: loosen limits or tolerance"
+        )
+    return found, objective
 
 
-def _more_time(asked: Transition, analysis: Tracking, around: tuple[float, float], share: float) -> float:
-    """How much earlier (s) actuators must begin, and later end, for voltages within their limits; NaN where not found.
-
-    The least voltage falls about as e^{−s t}, s the slowest zero to the right (Zou and Devasia, 1999): secants in its
-    logarithm, from there.
-    """
-    servo = asked.driven
-    assert isinstance(servo, Servo)
-    zeros = linearise(servo, analysis.end).zeros.real
-    growing = zeros[zeros > 1.0 / analysis.end]
-    if not growing.size:
-        return float("nan")
-    rate, more, tried = float(growing.min()), 0.0, [(0.0, np.log(share))]
-    for _ in range(MOST_TIMES):
-        more += (tried[-1][1] - np.log(NEAR)) / rate
-        start, end = -around[0] - more, analysis.end + around[1] + more
-        least = track(asked, start_breaks(start, analysis.end, end, analysis.intervals))
-        if not (least.converged and servo.goes_on()):
-            break
-        if NEAR**2 <= least.share <= 1.0:
-            return float(more)
-        tried.append((more, np.log(least.share)))
-        (t_0, log_0), (t_1, log_1) = tried[-2:]
-        rate = max((log_0 - log_1) / (t_1 - t_0), 0.1 * rate)
-    return float("nan")
+def _told(context: Context, posed: _Posed, analysis: Tracking, least: Tracked) -> Iterator[str]:
+    """Warnings: what would do where limits are too small, ends of the path and places of patches that cost voltage."""
+    if _is_beyond(posed, least):
+        given = posed.servo, posed.asked, analysis.intervals, posed.around, least.share
+        limits = np.unique(posed.units)
+        would = [
+            f"{least.share * limits[0]:.3g} V instead of {limits[0]:g} V"
+            if len(limits) == 1
+            else f"{least.share:.3g} times their limits"
+        ]
+        if np.isfinite(more := enough_time(*given)):
+            would.append(f"{1e3 * more:.3g} ms more of pre_actuation and post_actuation")
+        if np.isfinite(longer := enough_path_time(*given)):
+            would.append(f"the same path in {longer:.3g} s instead of {analysis.end:g} s")
+        yield f"patches cannot do it within their limits. Any of these would do: {'; '.join(would)}; or more patches"
+    yield from rough_ends(posed.servo)
+    yield from far_patches(context, posed.linear.zeros[[0, -1]])
 
 
-def _patches(context: Context, servo: Servo) -> Array:
+def _bounds(posed: _Posed) -> Bounds | None:
+    try:
+        return bounds_of_zeros(posed.servo, posed.asked, posed.linear, posed.around, posed.units)
+    except SolveError:
+        return None
+
+
+def _with_torques_alone(context: Context, run: Outcome, around: TrackedPath) -> TrackedPath:
+    """With the distance from the path under the same torques without voltages, by forward simulation."""
+    analysis = run.analysis
+    assert isinstance(analysis, Tracking)
+    alone = Forward(
+        name="torques alone", kind="forward", actuation=analysis.name, apply="joints", end=analysis.end,
+        output_step=analysis.output_step, tolerance=min(analysis.tolerance, REPLAYED),
+    )  # fmt: skip
+    replay = run_forward(replace(context, outcomes={analysis.name: run}, earlier=None), alone)
+    if replay.failed:
+        return around
+    off = max(float(np.abs(of).max(initial=0.0)) for of in path_errors(around.held, replay.time, replay.q).values())
+    inside = run.time[(run.time >= 0.0) & (run.time <= analysis.end)]
+    way = max(float(np.ptp(target.sample(inside)[0])) for row in around.held.rows if (target := row.target))
+    return replace(around, without_patches=off, is_needed=off > analysis.tolerance * way)
+
+
+def _patches(patches: Mapping[str, PatchedLink], servo: Servo) -> Array:
     """Φ_V (n, k) on all modes, of all patches of all links."""
-    rows = [modal_directions(servo.model, of_link.per_volt) for of_link in context.patches.values()]
+    rows = [modal_directions(servo.model, of_link.per_volt) for of_link in patches.values()]
     return np.concatenate(rows)[:, servo.of_modes].T
 
 
-def _limits(context: Context) -> Limits:
-    joints = {joint.name: joint for joint in context.model.scene.joint}
-    torque = np.array([of.moment for name in context.model.motors for of in joints[name].motor_limits])
-    voltage = np.concatenate([of_link.limit for of_link in context.patches.values()] or [np.zeros(0)])
+def _limits(model: Model, patches: Mapping[str, PatchedLink]) -> Limits:
+    joints = {joint.name: joint for joint in model.scene.joint}
+    torque = np.array([of.moment for name in model.motors for of in joints[name].motor_limits])
+    voltage = np.concatenate([of_link.limit for of_link in patches.values()] or [np.zeros(0)])
     return Limits(voltage, torque)
 
 

@@ -43,9 +43,10 @@ class Program:
 
 
 class Minimum(NamedTuple):
-    """x (N+1, s), and whether the method converged."""
+    """x (N+1, s), the multipliers (N, i) ≥ 0 of C z ≤ d, and whether the method converged."""
 
     x: Array
+    multipliers: Array
     converged: bool
 
 
@@ -123,7 +124,7 @@ def minimize(program: Program, x: Array) -> Minimum:
     for _ in range(MOST_ITERATIONS):
         if way.is_at_end() or not way.advance():
             break
-    return Minimum(way.unknown[way.layout.x], way.is_at_end())
+    return Minimum(way.unknown[way.layout.x], way.z, way.is_at_end())
 
 
 class _CentralPath:

@@ -17,6 +17,7 @@ from ..model.model import Model
 from ..model.motors import driven_mechanism, fastest_mechanism
 from ..model.rows import ConstraintRow
 from .internal_dynamics import Stopped, Target, by_differences, slopes_by_differences
+from .path_checks import check_smooth
 from .posture import mobility, solve_posture, told_posture
 from .prescribed import PrescribedMotion, following_motors
 from .reach import out_of_reach
@@ -24,6 +25,8 @@ from .start import undeformed_posture
 
 POSTURES = 201  # along the path, from which others are looked for
 EVERY = 10  # of these is looked at for singular ones
+PIECES = 400  # of a path that is slowed down
+TINY = 1e-12  # of its time
 MOST_STATES = 10_000  # that are evaluated at once, a fraction of a second
 
 
@@ -88,6 +91,23 @@ class Servo:
     def with_offset(self, offset: tuple[TimeFunction, ...]) -> Servo:
         """The same with what is expected of the deflections that the output leaves out."""
         return replace(self, offset=offset)
+
+    def slowed(self, factor: float) -> Servo:
+        """The same path in `factor` times the time, by quintic Hermite pieces of what it is."""
+        from scipy.interpolate import BPoly, PPoly
+
+        times = self.end * np.linspace(0.0, 1.0, PIECES + 1)
+        inside = times.clip(TINY * self.end, (1.0 - TINY) * self.end)  # outside it rests
+
+        def slower(function: TimeFunction) -> TimeFunction:
+            values = function.sample(inside).T / factor ** np.arange(3.0)
+            curve = PPoly.from_bernstein_basis(BPoly.from_derivatives(factor * times, values))
+            found = TimeFunction.polynomial(curve.x, np.ascontiguousarray(curve.c.T))
+            return found.held(0.0, factor * self.end)
+
+        rows = tuple(_with_functions(row, slower) for row in self.model.rows)
+        model = replace(self.model, rows=rows)
+        return replace(self, model=model, end=factor * self.end, near_times=factor * self.near_times)
 
     @cached_property
     def motion(self) -> PrescribedMotion:
@@ -170,9 +190,10 @@ def make_servo(
     """The equations for a path that is held before 0 and after `end`.
 
     Raises `InputError` unless there are as many motors and specified components as degrees of freedom, and modes, and
-    for a path that the undeformed robot cannot follow; `Stopped`.
+    for a path that jumps, or that the undeformed robot cannot follow; `Stopped`.
     """
-    held = replace(model, rows=tuple(_held(row, end) for row in model.rows))
+    rows = tuple(_with_functions(row, lambda function: function.held(0.0, end)) for row in model.rows)
+    held = replace(model, rows=rows)
     start = undeformed_posture(held).q
     freedom = mobility(held, start).freedom
     motors = sum(len(columns) for columns in model.motors.values())
@@ -187,6 +208,9 @@ def make_servo(
             f'{where}: expected at least one flexible body for kind = "{kind}", found only rigid ones: use kind'
             ' = "pcid"'
         )
+    for path in model.scene.trajectory:
+        targets = ((f'trajectory "{path.name}": {name}', target) for name, target in path.targets)
+        check_smooth(model.scene.path, targets, end)
     times = as_floats(np.linspace(0.0, end, POSTURES))
     near = [start]
     for t in times[1:]:
@@ -203,9 +227,10 @@ def make_servo(
     return Servo(held, end, factor, times, np.array(near), where, goes_on)
 
 
-def _held(row: ConstraintRow, end: float) -> ConstraintRow:
-    target = None if row.target is None else row.target.held(0.0, end)
+def _with_functions(row: ConstraintRow, change: Callable[[TimeFunction], TimeFunction]) -> ConstraintRow:
+    """With each function of time that it follows changed."""
+    target = None if row.target is None else change(row.target)
     law = row.law
     if law is not None:
-        law = replace(law, functions=tuple(function.held(0.0, end) for function in law.functions))
+        law = replace(law, functions=tuple(change(function) for function in law.functions))
     return replace(row, target=target, law=law)

@@ -12,12 +12,12 @@ sag. Links rest at both ends. Output transition with free internal states: Perez
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal, Protocol
 
 import numpy as np
 
-from ...common.arrays import Array, as_floats
+from ...common.arrays import Array, Indices, as_floats
 from .collocation import GAUSS, Elimination, piecewise, stage_states
 from .interior_point import Minimum, Program, minimize
 from .internal_dynamics import Output
@@ -30,9 +30,11 @@ if TYPE_CHECKING:
 Objective = Literal["effort", "least-voltage", "least-torque"]
 
 GRADING = 2.5  # of breaks to both ends: tanh
-MOST_ITERATIONS = 25
+MOST_ITERATIONS = 30
 TOLERANCE = 1e-8  # of the last Newton step, relative to the peak of its quantity
 MOST_INTERVALS = 1500
+UNIQUE = (1e-7, 1e-3)  # of the effort, which chooses among motions of the same least share
+EVERY = 8  # iterations of such a problem, after which the next one is taken
 
 
 class Driven(Output, Protocol):
@@ -84,6 +86,9 @@ class Tracked:
     Attributes:
         share: σ, the least share of limits (`objective` "least-…"), or of V_ref or τ_ref where there are none.
         cost: J.
+        prices: by how much less J, or σ, is for a limit that is larger by one: of patches (m,) 1/V, of motors
+            (motors,) 1/(N·m) or 1/N; zero where a limit is not reached.
+        unmet: largest force on modes that nobody supplies between Gauss points, relative to the largest elastic one.
     """
 
     curve: PPoly
@@ -92,6 +97,8 @@ class Tracked:
     iterations: int
     share: float
     cost: float
+    prices: tuple[Array, Array]
+    unmet: float = np.nan
 
 
 def graded(start: float, end: float, intervals: int, grading: float = GRADING) -> Array:
@@ -120,7 +127,7 @@ def refined(asked: Transition, breaks: Array, tolerance: float, goes_on: Callabl
         unmet = np.abs(r).max(axis=1).reshape(len(breaks) - 1, -1).max(axis=1)
         finer = cut(breaks, unmet / (tolerance * largest))
         if not found.converged or not len(breaks) < len(finer) <= MOST_INTERVALS or not goes_on():
-            return found
+            return replace(found, unmet=float(unmet.max()) / largest)
         breaks = finer
 
 
@@ -143,6 +150,7 @@ def track(asked: Transition, breaks: Array, near: Tracked | None = None) -> Trac
     converged, iteration, previous, previous_share = False, 0, np.inf, np.inf
     found: Minimum | None = None
     while not converged and iteration < MOST_ITERATIONS:
+        steps.unique = UNIQUE[min(iteration // EVERY, len(UNIQUE) - 1)]
         iteration += 1
         state = p, v, K
         p, v, K, u_new, found = steps.take(state, u)
@@ -163,18 +171,21 @@ def track(asked: Transition, breaks: Array, near: Tracked | None = None) -> Trac
     slope = np.diff(u, axis=0) / h[:, None]
     return Tracked(
         piecewise(GAUSS, breaks, p, v, K), PPoly(np.array([slope, u[:-1]]), breaks), bool(converged), iteration,
-        steps.sigma, steps.cost(found),
+        steps.sigma, steps.cost(found), steps.prices(found),
     )  # fmt: skip
 
 
 class _Steps:
     """Newton's steps, each the minimum of the linearized problem in x = (p, ṗ, V, σ) at breaks.
 
-    σ, the share of limits, is a constant, and there where it is the objective.
+    σ, the share of limits, is a constant, and there where it is the objective. A little of the effort then picks one of
+    many V(t): more of it where Newton's steps would wander among them, at most a thousandth.
     """
 
     program: Program
     constant = 0.0  # of J, which the program leaves out
+    unique = UNIQUE[0]
+    owners: Indices  # of inequalities (i,): patches, then motors
 
     def __init__(self, asked: Transition, breaks: Array, tau_qs: Array, size: float) -> None:
         self.asked, self.breaks, self.h, self.tau_qs = asked, breaks, np.diff(breaks), tau_qs
@@ -254,8 +265,10 @@ class _Steps:
         F, G = scaled[..., :width], scaled[..., width:]
         c = offset / self.y_unit
         now = x / self.unit
-        H, g = self._effort(tau_0, tau_z, now) if not self.has_share else self._of_share(N)
+        H, g = self._effort(tau_0, tau_z, now)
         if self.has_share:
+            H, g = self.unique * H, self.unique * g
+            g[0, width - 1] += 1.0
             keep = np.zeros((N, 1, width))
             keep[..., -1] = 1.0
             F, G, c = np.hstack([F, -keep]), np.hstack([G, keep]), np.hstack([c, np.zeros((N, 1))])
@@ -266,11 +279,6 @@ class _Steps:
             np.concatenate([p / self.y_unit[:n], np.zeros(len(rows) - n)]) - at[: len(rows)] for p, at in ends
         )
         return Program(H, g, F, G, c, (rows, start), (rows, end), C, d)
-
-    def _of_share(self, N: int) -> tuple[Array, Array]:
-        g = np.zeros((N, 2 * self.width))
-        g[0, self.width - 1] = 1.0
-        return np.zeros((N, 2 * self.width, 2 * self.width)), g
 
     def _effort(self, tau_0: Array, tau_z: Array, now: Array) -> tuple[Array, Array]:
         """H and g of J, whose value without a change is `constant`."""
@@ -301,7 +309,7 @@ class _Steps:
         """C and d: limits of voltages at breaks, each in the interval that it begins, and of torques at stages."""
         asked, N, width = self.asked, len(tau_z), self.width
         V_max, tau_max = asked.limits.voltage, asked.limits.torque
-        rows, most = [], []
+        rows, most, owners = [], [], []
         is_shared = asked.objective == "least-voltage"
         bounded = np.arange(self.m) if is_shared else np.flatnonzero(np.isfinite(V_max))
         limit = np.where(np.isfinite(V_max), V_max, asked.weights.voltage)[bounded] / asked.weights.voltage
@@ -318,6 +326,7 @@ class _Steps:
                 rows.append(of)
                 reached = (of @ np.hstack([now[:-1], now[1:]])[..., None])[..., 0]
                 most.append(np.where(of.any(axis=2) & is_shared, 0.0, 1.0) - reached)
+                owners.append(bounded)
         is_shared = asked.objective == "least-torque"
         motors = np.arange(len(tau_max)) if is_shared else np.flatnonzero(np.isfinite(tau_max))
         limit = np.where(np.isfinite(tau_max), tau_max, asked.weights.torque)[motors]
@@ -328,7 +337,21 @@ class _Steps:
             rows.append(of.reshape(N, -1, 2 * width))
             share = self.sigma if is_shared else 1.0
             most.append((share - sign * tau_0[:, :, motors] / limit).reshape(N, -1))
+            owners.append(self.m + np.tile(motors, tau_z.shape[1]))
+        self.owners = np.concatenate(owners)
         return np.concatenate(rows, axis=1), np.concatenate(most, axis=1)
+
+    def prices(self, found: Minimum) -> tuple[Array, Array]:
+        """Those of `Tracked`, by the multipliers of the last program, whose rows are shares of limits."""
+        limits, weights = self.asked.limits, self.asked.weights
+        sizes = [
+            np.where(np.isfinite(limit), limit, unit)
+            for limit, unit in ((limits.voltage, weights.voltage), (limits.torque, weights.torque))
+        ]
+        of_shares = np.bincount(self.owners, found.multipliers.sum(axis=0), minlength=sum(map(len, sizes)))
+        by_voltage, by_torque = np.split(of_shares, [self.m])
+        own = {"least-voltage": (self.sigma, 1.0), "least-torque": (1.0, self.sigma)}.get(self.asked.objective, (1, 1))
+        return own[0] * by_voltage / sizes[0], own[1] * by_torque / sizes[1]
 
     def cost(self, found: Minimum) -> float:
         """J; 0 where it is not the objective."""

@@ -7,11 +7,24 @@ import numpy as np
 import pytest
 
 import ffrobot
-from ffrobot.common.errors import InputError
+from ffrobot.common.errors import InputError, SolveError
 
 pytestmark = pytest.mark.filterwarnings("ignore::ffrobot.FfrobotWarning")
 
 PAGE = Path(__file__).parents[2] / "docs" / "howto" / "tracking.md"
+
+
+SEPTIC = "35*(t/0.6)**4 - 84*(t/0.6)**5 + 70*(t/0.6)**6 - 20*(t/0.6)**7"
+
+
+HAND = """[[body]]
+name = "hand"
+rigid = { mass = 0.1, inertia = 1e-4, center = [0.0, 0.0], points = { root = [0.0, 0.0] } }
+[[joint]]
+name = "wrist"
+type = "weld"
+between = ["arm.tip", "hand.root"]
+[[joint]]"""
 
 
 @pytest.fixture
@@ -74,14 +87,69 @@ def test_limits_that_are_too_small(scene):
         assert 1.5 < about["least_share"] < 1.7
         required = results["carried/pzt/arm/required_voltage"]
         assert np.abs(required).max() == pytest.approx(about["least_voltage"], rel=1e-3)
-        (warning,) = [text for text in results.warnings["carried"] if "times these would do" in text]
-    more = float(re.search(r"or (.*) ms more", warning)[1]) / 1e3
+        (warning,) = [text for text in results.warnings["carried"] if "would do" in text]
+        assert f"{about['least_voltage']:.3g} V instead of 100 V" in warning
+    more = float(re.search(r"; (\S*) ms more", warning)[1]) / 1e3
+    longer = re.search(r"the same path in (\S*) s", warning)[1]
     keys = f"tolerance = 1e-4\npre_actuation = {more}\npost_actuation = {more}\noutput_step = 1e-4"
-    path = scene(("limit = 200.0", "limit = 100.0"), ("output_step = 0.002\ntolerance = 1e-4", keys))
-    with ffrobot.solve(path) as results:
-        about = results.attributes("carried/tracking")
-        assert about["objective"] == "effort"
-        assert 0.9 < about["least_share"] <= 1.0
+    for changes in (
+        [("output_step = 0.002\ntolerance = 1e-4", keys)],
+        [("/0.6", f"/{longer}"), ("end = 0.6", f"end = {longer}"), ("output_step = 0.002", f"output_step = {longer}")],
+    ):
+        with ffrobot.solve(scene(("limit = 200.0", "limit = 100.0"), *changes)) as results:
+            about = results.attributes("carried/tracking")
+            assert about["objective"] == "effort"
+            assert 0.9 < about["least_share"] <= 1.0
+
+
+def test_patches_that_are_not_needed(scene):
+    """In two seconds the torques alone leave less than a thousandth of the path; the replay is this distance."""
+    changes = [("/0.6", "/2.0"), ("end = 0.6", "end = 2.0"), ("tolerance = 1e-4", "tolerance = 1e-3")]
+    with ffrobot.solve(scene(*changes)) as results:
+        about, verdict = results.attributes("carried/tracking"), results.verdict["carried"]
+        assert about["without_patches"] == pytest.approx(off_path(results, "without_patches"), rel=0.05)
+        assert not about["is_needed"]
+        assert any("patches are not needed" in text for text in verdict.advice)
+    with ffrobot.solve(scene()) as results:
+        about, verdict = results.attributes("carried/tracking"), results.verdict["carried"]
+        assert about["is_needed"]
+        assert not verdict.advice
+        assert f"torques alone are off by {1e3 * about['without_patches']:.3g} mm" in verdict.answer
+        # each zero asks for less than all together; the least voltage is that of 64 intervals
+        assert 0.5 < results["carried/tracking/bound/voltage"].max() / about["least_voltage"] < 0.8
+        prices, voltage = results["carried/tracking/voltage_price/arm"], results["carried/pzt/arm/voltage"]
+        at_limit = np.abs(voltage).max(axis=0) > 199.0
+        assert (prices[at_limit] > 1e-6).all()
+        assert (prices[~at_limit] < 1e-9).all()
+
+
+def test_twice_the_modes(scene):
+    """Spill-over, and the least voltage with four modes: 139.7 V by the prototype's mesh and free ends."""
+    with ffrobot.solve(scene(("tolerance = 1e-4", 'tolerance = 1e-4\ncheck = "finer"'))) as results:
+        about = results.attributes("carried")
+        assert about["check_least_voltage"] == pytest.approx(139.7, rel=0.03)
+        assert 1e-6 < about["check_error"] < 3e-4
+
+
+@pytest.mark.parametrize(
+    ("changes", "text"),
+    [
+        ([(SEPTIC, "10*(t/0.6)**3 - 15*(t/0.6)**4 + 6*(t/0.6)**5")], "the path's jerk jumps where it begins and"),
+        ([(SEPTIC, "3*(t/0.6)**2 - 2*(t/0.6)**3")], "the path's acceleration jumps where it begins and where it ends"),
+        ([("count = 4", "centers = [0.5]")], "the last patch ends 0.46 m before arm.tip"),
+        ([("moment_limit = 2.0", "moment_limit = 1.1")], ""),
+    ],
+)
+def test_what_takes_more_voltage(scene, changes, text):
+    """It is said, and no answer calls it feasible; the patches are twice to ten times too weak."""
+    with ffrobot.solve(scene(*changes)) as results:
+        if not text:
+            assert results.attributes("carried/tracking")["objective"] == "effort"
+            assert results["carried/tracking/torque_price/hub"].max() > 1e-6
+            return
+        assert any(text in warning for warning in results.warnings["carried"])
+        assert results.verdict["carried"].feasible is False
+        assert results.attributes("carried/tracking")["least_share"] > 1.8
 
 
 def test_time_before_and_after_lowers_voltages(scene):
@@ -106,7 +174,11 @@ def off_path_of_first(results):
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ([("35*(t/0.6)**4 - 84*(t/0.6)**5 + 70*(t/0.6)**6 - 20*(t/0.6)**7", "t/0.6")], "a path at rest"),
+        ([(SEPTIC, "t/0.6")], "a path at rest"),
+        ([("end = 0.6", "end = 0.5")], "a path at rest at t = 0.5 s"),
+        ([(SEPTIC, "where(t > 0.3, 1, 0)")], "expected a continuous value, found a jump"),
+        ([(SEPTIC, "where(t > 0.3, 0.2 + t, t/0.6)")], "expected a continuous velocity"),
+        ([('body = "arm"\ncount', 'body = "hand"\ncount'), ("[[joint]]", HAND)], 'flexible body, found "hand"'),
         ([("motor = true\nmoment_limit = 2.0         # N·m\n", "motor = false\n")], "as many motors"),
         ([("tolerance = 1e-4", 'objective = "speed"')], "objective"),
     ],
@@ -114,6 +186,11 @@ def off_path_of_first(results):
 def test_what_does_not_fit(scene, changes, message):
     with pytest.raises(InputError, match=message):
         ffrobot.solve(scene(*changes))
+
+
+def test_motors_that_are_too_weak(scene):
+    with pytest.raises(SolveError, match="within the motors' limits, whatever the voltages: slow"):
+        ffrobot.solve(scene(("moment_limit = 2.0", "moment_limit = 0.8")))
 
 
 def test_no_patches(scene):

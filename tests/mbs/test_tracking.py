@@ -4,12 +4,14 @@ The numbers are those of ../shared/tracking_notes.md, section 7: a soft strip of
 45°, septic timing, and the arm of the paper.
 """
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from ffrobot.common.arrays import as_list
+from ffrobot.mbs.analysis.tracking_advice import bounds_of_zeros
 from ffrobot.mbs.model.model import modal_directions
 from ffrobot.mbs.solve.internal_dynamics import equilibrium
 from ffrobot.mbs.solve.servo import make_servo
@@ -122,25 +124,105 @@ def test_closed_form_of_one_mode():
     assert np.sqrt(mean_square) == pytest.approx(0.535967, abs=2e-4)
 
 
-@pytest.mark.parametrize(("T", "expected"), [(0.5, 129.4), (0.7, 35.3)])
-def test_least_voltage_of_the_paper(tmp_path, T, expected):
-    """Section 4: the paper's arm with four modes and ten patches a link, to 1 % (it names no mesh)."""
+@pytest.fixture
+def arm(tmp_path):
+    """The paper's arm on its line, with so many eigenmodes and patches a link."""
     case = Path(__file__).parents[2] / "cases" / "two_link_tracking"
-    text = (case / "scene.toml").read_text(encoding="utf-8").replace("../two_link", str(case.parent / "two_link"))
-    timing, s = "(560*t**4 - 2688*t**5 + 4480*t**6 - 2560*t**7)", f"(t/{T})"
-    assert timing in text
-    text = text.replace(timing, f"(35*{s}**4 - 84*{s}**5 + 70*{s}**6 - 20*{s}**7)").replace("end = 0.5", f"end = {T}")
-    (tmp_path / "scene.toml").write_text(text[: text.index("# The same torques and voltages")], encoding="utf-8")
-    solution = prepare_scene(tmp_path / "scene.toml", Watcher())
-    servo = make_servo(solution.model, T, "arm", lambda: True, 1.0)
-    per_volt = [modal_directions(servo.model, of_link.per_volt) for of_link in solution.patches.values()]
-    Phi_V = np.concatenate(per_volt)[:, servo.of_modes].T
-    asked = Transition(
-        servo, Phi_V, Limits(np.full(20, 200.0), np.full(2, np.inf)), Weights(50.0, 200.0, 0.005),
-        tuple(equilibrium(servo, t) for t in (0.0, T)), "least-voltage", is_free=True,
+    timing = "(560*t**4 - 2688*t**5 + 4480*t**6 - 2560*t**7)"
+
+    def make(modes, patches, T):
+        for link in ("link1", "link2"):
+            text = (case.parent / "two_link" / f"{link}.toml").read_text(encoding="utf-8")
+            assert "count = 10" in text
+            (tmp_path / f"{link}.toml").write_text(text.replace("count = 10", f"count = {modes}"), encoding="utf-8")
+        text, s = (case / "scene.toml").read_text(encoding="utf-8"), f"(t/{T})"
+        for old, new in (
+            ("../two_link/", ""), ("modes = 4\n", ""), ("count = 10", f"count = {patches}"),
+            ("end = 0.5", f"end = {T}"), (timing, f"(35*{s}**4 - 84*{s}**5 + 70*{s}**6 - 20*{s}**7)"),
+        ):  # fmt: skip
+            assert old in text
+            text = text.replace(old, new)
+        text = text[: text.index("# The same torques and voltages")]
+        (tmp_path / "scene.toml").write_text(text, encoding="utf-8")
+        solution = prepare_scene(tmp_path / "scene.toml", Watcher())
+        servo = make_servo(solution.model, T, "arm", lambda: True, 1.0)
+        per_volt = [modal_directions(servo.model, of_link.per_volt) for of_link in solution.patches.values()]
+        return servo, np.concatenate(per_volt)[:, servo.of_modes].T
+
+    return make
+
+
+def asked_of_arm(servo, Phi_V, objective, limit, *, is_free):
+    return Transition(
+        servo, Phi_V, Limits(np.full(Phi_V.shape[1], limit), np.full(2, np.inf)), Weights(50.0, 200.0, 0.005),
+        tuple(equilibrium(servo, t) for t in (0.0, servo.end)), objective, is_free,
     )  # fmt: skip
-    found = track(asked, graded(0.0, T, 64, grading=2.0))
-    assert 200.0 * found.share == pytest.approx(expected, rel=1e-2)
+
+
+@pytest.mark.parametrize(
+    ("modes", "patches", "T", "intervals", "expected", "within"),
+    [
+        (2, 5, 0.7, 140, 72.3911, 2e-6),  # checkpoint 2
+        (4, 10, 0.5, 64, 129.4, 1e-2),  # section 4, which names no mesh
+        (4, 10, 0.7, 64, 35.3, 1e-2),
+    ],
+)
+def test_least_voltage_of_the_paper(arm, modes, patches, T, intervals, expected, within):
+    servo, Phi_V = arm(modes, patches, T)
+    found = track(asked_of_arm(servo, Phi_V, "least-voltage", 200.0, is_free=True), graded(0.0, T, intervals))
+    assert 200.0 * found.share == pytest.approx(expected, rel=within)
+
+
+def test_least_effort_of_the_paper(arm):
+    """Checkpoint 4, at 140 intervals."""
+    servo, Phi_V = arm(2, 5, 0.7)
+    found = track(asked_of_arm(servo, Phi_V, "effort", 120.0, is_free=False), graded(0.0, 0.7, 140))
+    assert found.cost == pytest.approx(0.0241177, abs=1e-7)
+    times = np.array([0.1, 0.2, 0.6, 0.68])
+    tau = servo.forces(times, *(found.curve(times, k) for k in range(3)))[1]
+    expected = [[49.783816, 7.279802], [36.530793, 8.429446], [58.572953, -5.241064], [43.211319, 1.390667]]
+    assert np.abs(tau - expected).max() < 2e-6
+    expected = [-2.50895, -8.95866, -15.8538, -16.6934, -7.28926, -10.5947, -55.0307, -65.0616, -46.1778, -7.83145]
+    assert np.abs(found.voltage(0.68) - expected).max() < 3e-4
+
+
+def test_bounds_of_zeros(strip, arm):
+    """Section 7: what the slowest zeros ask for at least; less than what is needed."""
+    for servo, Phi_V, T, expected in ((*strip(4, 1.0), 1.0, 14.719), (*strip(4, 0.5), 0.5, 200.90)):
+        problem = asked(servo, Phi_V, (0.0, T), "least-voltage", 200.0)
+        found = bounds_of_zeros(servo, problem, linearise(servo, T), (0.0, 0.0), np.full(4, 200.0))
+        assert found.voltages.max() == pytest.approx(expected, abs=1e-2)
+        assert found.zeros[found.voltages.argmax()].real == pytest.approx(-64.405, abs=1e-3)
+        assert found.voltages.max() < 200.0 * track(problem, graded(0.0, T, 64)).share
+    servo, Phi_V = arm(4, 10, 1.0)
+    problem = asked_of_arm(servo, Phi_V, "least-voltage", 200.0, is_free=True)
+    found = bounds_of_zeros(servo, problem, linearise(servo, 1.0), (0.0, 0.0), np.full(20, 200.0))
+    assert found.voltages.max() == pytest.approx(4.310, abs=1e-3)
+
+
+def test_prices_of_limits(strip):
+    """By how much J changes with limits of voltages and torques, against differences of J."""
+    servo, Phi_V = strip(2, 0.7)
+    breaks, tracked = graded(0.0, 0.7, 40), []
+    for V_max, tau_max in ((120.0, 0.825), (120.5, 0.825), (119.5, 0.825), (120.0, 0.826), (120.0, 0.824)):
+        problem = asked(servo, Phi_V, (0.0, 0.7), "effort", V_max)
+        found = track(replace(problem, limits=Limits(problem.limits.voltage, np.array([tau_max]))), breaks)
+        assert found.converged
+        tracked.append(found)
+    prices, costs = tracked[0].prices, [found.cost for found in tracked]
+    assert prices[0].sum() == pytest.approx(costs[2] - costs[1], rel=1e-3)
+    assert prices[1][0] == pytest.approx((costs[4] - costs[3]) / 2e-3, rel=1e-3)
+    assert min(prices[0].min(), costs[2] - costs[1], costs[4] - costs[3]) >= 0
+
+
+def test_a_path_that_is_slowed_down(strip):
+    """Twice the time: the values of the path, half its rates, and zeros that belong to its time."""
+    servo, _ = strip(2, 0.8)
+    slower, times = servo.slowed(2.0), np.linspace(0.0, 0.8, 57)
+    (old,), (new,) = list(servo.targets()), [row.target for row in slower.model.rows if row.target is not None]
+    for k, (a, b) in enumerate(zip(old.function.sample(times), new.sample(2 * times), strict=True)):
+        assert np.abs(b - a / 2**k).max() < 1e-9 * np.abs(a).max()
+    assert slower.end == pytest.approx(1.6)
 
 
 @pytest.mark.parametrize(("intervals", "expected"), [(100, 53.7562), (200, 53.6953)])

@@ -1,0 +1,165 @@
+"""What a tracking problem asks for at least, and what would do where limits are too small."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ...common.arrays import Array, ComplexArray, as_floats
+from ...common.errors import SolveError
+from ..solve.internal_dynamics import equilibrium, first_order, linear_dynamics
+from ..solve.servo import Servo
+from ..solve.stable_inversion import invert
+from ..solve.tracking import Transition, start_breaks, track
+from ..solve.zero_dynamics import LIGHT, Linearisation, linearise
+from .context import Context
+from .inverted_path import decay_times
+
+NEAR = 0.97  # times the limits of patches, which more time is sought for
+MOST_TRIES = 6
+NEAR_END = 1e-3  # of the path's time, at which its start and its end are looked at
+FAR = 0.1  # of the time constant of the slowest zero: t_ℓ of patches whose voltages need not converge with modes
+INVERTED = 1e-6  # tolerance of stable inversion
+
+
+@dataclass(frozen=True)
+class Bounds:
+    """Voltages (k,) V that zeros (k,) 1/s need at least, the largest first, at the `times` (k,) s when they count."""
+
+    zeros: ComplexArray
+    times: Array
+    voltages: Array
+
+
+def bounds_of_zeros(
+    servo: Servo, asked: Transition, linear: Linearisation, around: tuple[float, float], unit: Array
+) -> Bounds:
+    """Least voltages that each zero needs, V, by the motion of motors alone; patches take shares of `unit` (m,), V.
+
+    Rest at the start asks for ∫ e^{−st} ℓᵀB V dt = −ζ of each zero in the right half plane, with its left eigenvector ℓ
+    and ζ = ℓᵀ(y − y_rest) of stable inversion there: |V| ≥ |ζ| Re s / Σ|ℓᵀB|; likewise the others at the end.
+    Vibrations (`LIGHT`) are left out. Raises `SolveError` where motors alone have no bounded motion.
+    """
+    end = float(linear.times[-1])
+    pre, post = decay_times(linear, end, needs_future=True)
+    pre, post = max(pre, around[0]), max(post, around[1])
+    found = invert(servo, linear, pre, post, INVERTED, lambda _: True)
+    if found.status != "completed":
+        raise SolveError(f"{servo.where}: motors alone have no bounded motion: {found.status}")
+    zeros, times, shares = [], [], []
+    for t, rest, sign in ((-around[0], asked.rest[0], 1.0), (end + around[1], asked.rest[1], -1.0)):
+        still = np.zeros((1, len(rest)))
+        dynamics = linear_dynamics(servo, np.array([t]), rest[None], still, still)
+        s, left = np.linalg.eig(first_order(dynamics, 0, servo.scale).T)
+        y = np.concatenate([servo.scale * (found.curve(t) - rest), found.curve(t, 1)])
+        B = np.linalg.solve(dynamics.M[0], asked.Phi_V) * unit
+        counts = (sign * s.real > LIGHT * np.abs(s)) & (s.imag >= 0)
+        for k in np.flatnonzero(counts):
+            reach = float(np.abs(left[len(rest) :, k] @ B).sum())
+            zeros.append(s[k])
+            times.append(t)
+            shares.append(abs(left[:, k] @ y) * abs(s[k].real) / reach if reach else np.inf)
+    voltages = np.array(shares) * float(unit.max())
+    order = np.argsort(-voltages)
+    return Bounds(np.array(zeros, dtype=complex)[order], np.array(times)[order], voltages[order])
+
+
+def enough_time(servo: Servo, asked: Transition, intervals: int, around: tuple[float, float], share: float) -> float:
+    """How much earlier (s) actuators must begin, and later end, for voltages within their limits; NaN where not found.
+
+    The least voltage falls about as e^{−s t}, s the slowest zero to the right (Zou and Devasia, 1999).
+    """
+    end, zeros = servo.end, linearise(servo, servo.end).zeros.real
+    rate = float(zeros[zeros > 1.0 / end].min(initial=np.inf))
+
+    def share_with(more: float) -> float:
+        start, last = -around[0] - more, end + around[1] + more
+        return _share(servo, asked, start_breaks(start, end, last, intervals))
+
+    return _enough(share_with, share, rate)
+
+
+def enough_path_time(
+    servo: Servo, asked: Transition, intervals: int, around: tuple[float, float], share: float
+) -> float:
+    """The path's time (s) for voltages within their limits, of the same path slowed down; NaN where not found.
+
+    The least voltage falls about as T^−m, m the order with which the path starts.
+    """
+
+    def share_with(more: float) -> float:
+        slower = servo.slowed(float(np.exp(more)))
+        end = slower.end + around[1]
+        rest = equilibrium(slower, -around[0] - NEAR_END), equilibrium(slower, end + NEAR_END)
+        breaks = start_breaks(-around[0], slower.end, end, intervals)
+        return _share(servo, replace(asked, driven=slower, rest=rest), breaks)
+
+    orders = [order for order in path_orders(servo) if order > 1]
+    return float(servo.end * np.exp(_enough(share_with, share, min(orders, default=4.0))))
+
+
+def _share(servo: Servo, asked: Transition, breaks: Array) -> float:
+    least = track(asked, breaks)
+    return least.share if least.converged and servo.goes_on() else np.nan
+
+
+def _enough(share_with: Callable[[float], float], share: float, rate: float) -> float:
+    """The least x ≥ 0 with share_with(x) just below one, by secants of its logarithm; about `share` e^{−rate x}."""
+    more, tried = 0.0, [(0.0, np.log(share))]
+    for _ in range(MOST_TRIES):
+        more += (tried[-1][1] - np.log(NEAR)) / rate
+        found = share_with(more)
+        if not np.isfinite(found):
+            break
+        if NEAR**2 <= found <= 1.0:
+            return float(more)
+        tried.append((more, np.log(found)))
+        (x_0, log_0), (x_1, log_1) = tried[-2:]
+        rate = max((log_0 - log_1) / (x_1 - x_0), 0.1 * rate)
+    return np.nan
+
+
+def path_orders(servo: Servo) -> tuple[float, float]:
+    """With which power of time the path leaves its start, and reaches its end: 2 where its acceleration jumps there."""
+    end, orders = servo.end, []
+    for t, ahead in ((0.0, 1.0), (end, -1.0)):
+        near = as_floats(t + ahead * NEAR_END * end * np.array([1.0, 2.0]))
+        size = np.sqrt(sum(target.function.sample(near)[2] ** 2 for target in servo.targets()))
+        orders.append(2.0 + np.log2(size[1] / size[0]) if size[0] > 0 else np.inf)
+    return float(orders[0]), float(orders[1])
+
+
+def rough_ends(servo: Servo) -> Iterator[str]:
+    """A warning for a path whose acceleration or jerk jumps where it begins or ends."""
+    names = {2: "acceleration", 3: "jerk"}
+    found = [(where, round(order)) for where, order in zip(("begins", "ends"), path_orders(servo), strict=True)
+             if np.isfinite(order) and round(order) in names]  # fmt: skip
+    for order in sorted({order for _, order in found}):
+        where = " and ".join(f"where it {name}" for name, of in found if of == order)
+        cost = "no voltage without jumps makes up for that" if order == 2 else "that takes several times the voltage"
+        yield (f"the path's {names[order]} jumps {where}: {cost}. Smoother ends: 35*s**4 - 84*s**5 + 70*s**6 - 20*s**7")
+
+
+def far_patches(context: Context, zeros: ComplexArray) -> Iterator[str]:
+    """A warning for each point of a path that is far from the last patch: voltages need not converge with modes.
+
+    In the continuum the path must start flatter than exp(−t_ℓ/t), t_ℓ = ℓ² √(ρA/EI)/8 (`docs/theory.md`).
+    """
+    rate = float(zeros.real[zeros.real > LIGHT * np.abs(zeros)].min(initial=np.inf))
+    model = context.model if context.whole is None else context.whole.model
+    for name in dict.fromkeys(path.point for path in model.scene.trajectory if path.point is not None):
+        body, _, point = name.partition(".")
+        of_link = context.patches.get(body)
+        if of_link is None or not np.isfinite(rate):
+            continue
+        at = float(model.tree.nodes[model.tree.index[body]].body.points[point].position[0])
+        length = float(np.maximum(at - of_link.edges[:, 1], 0.0).min())
+        t_l = length**2 * of_link.slowness / 8
+        if t_l * rate > FAR:
+            yield (
+                f"the last patch ends {length:.3g} m before {name}: voltages need not converge with the number of"
+                f" modes (ℓ²√(ρA/EI)/8 = {1e3 * t_l:.3g} ms, more than {FAR:g} of 1/s = {1e3 / rate:.3g} ms of the"
+                " slowest zero). Put patches nearer to the point"
+            )
