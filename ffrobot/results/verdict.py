@@ -283,7 +283,7 @@ def _advice(
     if asked and read_unsupplied(group["feasibility"]) is not None:
         inversion = 'kind = "motors-only", or ' if at_rest else ""
         yield f'{inversion}patches ([[pzt]]) on the links with kind = "tracking"'
-    if "tracking" in group and asked and not group["tracking"].attrs["is_needed"]:
+    if "tracking" in group and asked and not group["tracking"].attrs.get("is_needed", True):
         yield "patches are not needed: torques alone stay on the path within the tolerance, relative to its length"
     if "linear" in group and (text := str(group["linear"].attrs.get("advice", ""))):
         yield text
