@@ -84,7 +84,7 @@ constraint_violation | | of position, velocity, acceleration; relative
 resume/** | | what --resume needs
 tracking/voltage_price/* | 1/V | by how much less the objective is per volt of limit
 tracking/torque_price/* | SI | by how much less the objective is per unit of limit
-tracking/bound/voltage | V | what a zero asks for at least
+tracking/bound/voltage | V | that a zero requires at least
 tracking/bound/time | s | at which that counts
 tracking/bound/zero | 1/s | real and imaginary part
 zero_dynamics/time | s | of the zeros

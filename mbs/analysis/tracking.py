@@ -2,7 +2,7 @@
 
 The problem, its discretization and its solver are in `mbs.solve.tracking`. First comes the least voltage with which
 patches can do it; where that is within their limits, the motion of least effort follows. What each zero asks for, and
-what would do beyond limits, is in `tracking_advice`; torques alone are replayed to see whether patches are needed.
+what would do beyond limits, is in `tracking_advice`; a simulation under torques alone shows whether patches are needed.
 """
 
 from __future__ import annotations
@@ -110,7 +110,7 @@ class TrackedPath(AroundPath):
         cost: the effort, without unit.
         held: the robot whose constraint equations hold it on its path.
         unmet: see `Tracked`.
-        bounds: what each zero asks for, V; None where motors alone have no bounded motion.
+        bounds: what each zero requires, V; None where motors alone have no bounded motion.
         voltage_prices, torque_prices: `Tracked.prices` by body, and by joint.
         without_patches: m or rad, how far off the path the same torques alone are at most; NaN where not found.
         is_needed: whether that is more than the tolerance times the path's way.

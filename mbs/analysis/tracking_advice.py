@@ -1,4 +1,4 @@
-"""What a tracking problem asks for at least, and what would do where limits are too small."""
+"""What a tracking problem requires at least, and what would do where limits are too small."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from .inverted_path import decay_times
 
 NEAR = 0.97  # times the limits of patches, which more time is sought for
 MOST_TRIES = 6
-NEAR_END = 1e-3  # of the path's time, at which its start and its end are looked at
+NEAR_END = 1e-3  # of the path's time, of its start and of its end, for derivatives there
 FAR = 0.1  # of the time constant of the slowest zero: t_ℓ of patches whose voltages need not converge with modes
 INVERTED = 1e-6  # tolerance of stable inversion
 
@@ -38,7 +38,7 @@ def bounds_of_zeros(
 ) -> Bounds:
     """Least voltages that each zero needs, V, by the motion of motors alone; patches take shares of `unit` (m,), V.
 
-    Rest at the start asks for ∫ e^{−st} ℓᵀB V dt = −ζ of each zero in the right half plane, with its left eigenvector ℓ
+    Rest at the start requires ∫ e^{−st} ℓᵀB V dt = −ζ of each zero in the right half plane, with its left eigenvector ℓ
     and ζ = ℓᵀ(y − y_rest) of stable inversion there: |V| ≥ |ζ| Re s / Σ|ℓᵀB|; likewise the others at the end.
     Vibrations (`LIGHT`) are left out. Raises `SolveError` where motors alone have no bounded motion.
     """
@@ -47,7 +47,7 @@ def bounds_of_zeros(
     pre, post = max(pre, around[0]), max(post, around[1])
     found = invert(servo, linear, pre, post, INVERTED, lambda _: True)
     if found.status != "completed":
-        raise SolveError(f"{servo.where}: motors alone have no bounded motion: {found.status}")
+        raise SolveError(f"{servo.where}: torques without voltages have no bounded motion: {found.status}")
     zeros, times, shares = [], [], []
     for t, rest, sign in ((-around[0], asked.rest[0], 1.0), (end + around[1], asked.rest[1], -1.0)):
         still = np.zeros((1, len(rest)))
