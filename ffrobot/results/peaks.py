@@ -58,8 +58,9 @@ def _write(group: h5py.Group, closer: h5py.Group) -> None:
             tops = np.array([largest(time, column) for column in values.T])
             means = np.array([root_mean_square(time, column) for column in values.T])
             single = values.shape[1] == 1
+            attributes = group[name].attrs
             for key, found in (("peak", tops[:, 0]), ("peak_time", tops[:, 1]), ("rms", means)):
-                group[name].attrs[key] = found[0] if single else found
+                attributes[key] = found[0] if single else found
     for name, joint in closer.get("joints", {}).items():
         rate = joint.get("motor_rate", joint.get("rate"))
         if "moment" in joint and rate is not None and rate.ndim == 1 and len(time):

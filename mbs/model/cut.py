@@ -110,8 +110,9 @@ def cut_resistance(
 def cut_damping(tree: KinematicTree, cut: Sequence[CutCoordinate], q: Array) -> Array:
     """D (n_v, n_v) of viscous friction in cut joints at q (n_q,)."""
     rough, found = [one for one in cut if one.friction is not None], np.zeros((tree.n_v, tree.n_v))
-    _, gradients = measured(tree, rough, q[None], tree.frames(q[None]))
-    for one, G in zip(rough, gradients[0], strict=True):
-        assert one.friction is not None
-        found += one.friction.viscous * np.outer(G, G)
+    if rough:
+        _, gradients = measured(tree, rough, q[None], tree.frames(q[None]))
+        for one, G in zip(rough, gradients[0], strict=True):
+            assert one.friction is not None
+            found += one.friction.viscous * np.outer(G, G)
     return found

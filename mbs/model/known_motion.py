@@ -118,7 +118,7 @@ def rotor_torques(model: Model, states: States, times: Array) -> Array:
     frames, found = tree.frames(states.q), np.zeros((len(times), len(tree.nodes)))
     for number, node in enumerate(tree.nodes):
         if node.joint.type == "revolute":
-            axis = tree.motion(node.inner, states.q, frames).F[:, :, 2]
+            axis = tree.pose(node.inner, states.q, frames).F[:, :, 2]
             found[:, number] = np.sum(axis * forces.of_rotor(number), axis=1)
     return found
 
@@ -129,9 +129,8 @@ def required_forces(model: Model, state: States, times: Array) -> Array:
     return system.core.required_forces(system.scene, times.tolist(), state.q, state.v, state.a)
 
 
-def row_accelerations(model: Model, state: States, times: Array) -> Array:
+def row_accelerations(system: MultibodySystem, state: States, times: Array) -> Array:
     """C̈ (T, rows) at `times` (T,), less what their targets ask for: 0 where the motion keeps to the constraints."""
-    system = MultibodySystem(model)
     return system.core.row_accelerations(system.scene, times.tolist(), state.q, state.v, state.a) * system.row_signs
 
 

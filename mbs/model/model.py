@@ -226,7 +226,7 @@ def target_rates(model: Model, q: Array, times: Array, frames: Sequence[Motion] 
                 found[:, k] = omega @ row.f
             else:  # f·g with g turning by ω
                 frames = model.tree.frames(q) if frames is None else frames
-                f = np.einsum("tij,j->ti", model.tree.motion(row.a, q, frames).F, row.f)
+                f = np.einsum("tij,j->ti", model.tree.pose(row.a, q, frames).F, row.f)
                 found[:, k] = -np.sum(f * np.cross(omega, row.law.sample(times)[:, :, 2]), axis=-1)
     return found
 

@@ -45,6 +45,13 @@ class Section(NamedTuple):
         return found
 
 
+class Pose(NamedTuple):
+    """Of a triad: place r (…, 3) and axes F (…, 3, 3)."""
+
+    r: Array
+    F: Array
+
+
 class Motion(NamedTuple):
     """Of a triad: place r (…, 3), axes F (…, 3, 3), and L (…, 6, n_v): velocity and angular velocity by v."""
 
@@ -224,7 +231,8 @@ class KinematicTree:
 
     def _frame_of(self, node: Node, q: Array, outer: Motion) -> Motion:
         """The frame of a body from the motion of its section at the joint."""
-        u, E, Phi, turning = _bent(node.body, node.outer, q[..., node.p_q])
+        p = q[..., node.p_q]
+        (u, E), (Phi, turning) = _bent(node.body, node.outer, p), _by_modes(node.body, node.outer, p)
         A = outer.F @ np.swapaxes(E @ node.outer.triad, -1, -2)
         arm, L = np.einsum("...ij,...j->...i", A, u), outer.L.copy()
         L[..., 3:, node.p_v] -= A @ turning
@@ -232,30 +240,51 @@ class KinematicTree:
         L[..., :3, node.p_v] -= A @ Phi
         return Motion(outer.r - arm, A, L)
 
+    def pose(self, section: Section, q: Array, frames: Sequence[Motion]) -> Pose:
+        """Of a section's triad, for less than its motion."""
+        if section.body < 0:
+            shape = q.shape[:-1]
+            return Pose(np.broadcast_to(section.position, (*shape, 3)), np.broadcast_to(section.triad, (*shape, 3, 3)))
+        arm, F = self._from_frame(section, q, frames)
+        return Pose(frames[section.body].r + arm, F)
+
+    def _from_frame(self, section: Section, q: Array, frames: Sequence[Motion]) -> tuple[Array, Array]:
+        """From the origin of its body's frame to a section, (…, 3), and the axes (…, 3, 3) of its triad."""
+        node, A = self.nodes[section.body], frames[section.body].F
+        u, E = _bent(node.body, section, q[..., node.p_q])
+        return np.einsum("...ij,...j->...i", A, u), A @ E @ section.triad
+
     def motion(self, section: Section, q: Array, frames: Sequence[Motion]) -> Motion:
         """Of a section's triad."""
         if section.body < 0:
-            shape = q.shape[:-1]
-            r, F = np.broadcast_to(section.position, (*shape, 3)), np.broadcast_to(section.triad, (*shape, 3, 3))
-            return Motion(r, F, np.zeros((*shape, 6, self.n_v)))
+            return Motion(*self.pose(section, q, frames), np.zeros((*q.shape[:-1], 6, self.n_v)))
         node, frame = self.nodes[section.body], frames[section.body]
-        u, E, Phi, turning = _bent(node.body, section, q[..., node.p_q])
-        arm, L = np.einsum("...ij,...j->...i", frame.F, u), frame.L.copy()
+        arm, F = self._from_frame(section, q, frames)
+        Phi, turning = _by_modes(node.body, section, q[..., node.p_q])
+        L = frame.L.copy()
         L[..., :3, :] -= skew(arm) @ frame.L[..., 3:, :]
         L[..., :3, node.p_v] += frame.F @ Phi
         L[..., 3:, node.p_v] += frame.F @ turning
-        return Motion(frame.r + arm, frame.F @ E @ section.triad, L)
+        return Motion(frame.r + arm, F, L)
 
 
-def _bent(body: Body, section: Section, p: Array) -> tuple[Array, Array, Array, Array]:
-    """In body axes: u (…, 3), E (…, 3, 3) = exp φ~, Φ (…, 3, n), and J_l Φ_r (…, 3, n), which gives the spin by ṗ."""
+def _bent(body: Body, section: Section, p: Array) -> tuple[Array, Array]:
+    """In body axes: u (…, 3) and E (…, 3, 3) = exp φ~."""
     if not section.point or not body.n_modes:
-        u, none = body.points[section.point].position if section.point else np.zeros(3), np.zeros((3, body.n_modes))
-        shape = (*p.shape[:-1], 3)
-        return np.broadcast_to(u, shape), np.broadcast_to(np.eye(3), (*shape, 3)), none, none
+        u, shape = body.points[section.point].position if section.point else np.zeros(3), (*p.shape[:-1], 3)
+        return np.broadcast_to(u, shape), np.broadcast_to(np.eye(3), (*shape, 3))
+    at = bent_section(body, section.point, p)
+    return at.u, exponential(section.turned(at.phi[..., None])[..., 0])
+
+
+def _by_modes(body: Body, section: Section, p: Array) -> tuple[Array, Array]:
+    """In body axes: Φ (…, 3, n), and J_l Φ_r (…, 3, n), which gives the spin by ṗ."""
+    if not section.point or not body.n_modes:
+        none = np.zeros((3, body.n_modes))
+        return none, none
     at = bent_section(body, section.point, p)
     phi = section.turned(at.phi[..., None])[..., 0]
-    return at.u, exponential(phi), at.u_p, left_jacobian(phi) @ section.turned(at.phi_p)
+    return at.u_p, left_jacobian(phi) @ section.turned(at.phi_p)
 
 
 def _at_origin(body: str, floating: type[FreeJoint | PlanarJoint]) -> JointRecord:

@@ -31,7 +31,11 @@ def along_joint(tree: KinematicTree, node: Node, force: Array, q: Array, frames:
 
     The opposite acts on its inner side.
     """
-    F = tree.motion(node.inner, q, frames).F
+    return _in_global_axes(tree.pose(node.inner, q, frames).F, node, force, q)
+
+
+def _in_global_axes(F: Array, node: Node, force: Array, q: Array) -> Wrench:
+    """The same, of the axes F (T, 3, 3) of the inner side."""
     acting = np.einsum("tij,tj->ti", node.joint.action(q[:, node.q]), force)
     return Wrench(*(np.einsum("tij,tj->ti", F, part) for part in (acting[:, :3], acting[:, 3:])))
 
@@ -41,7 +45,7 @@ def without_work(tree: KinematicTree, node: Node, on_outer: Wrench, q: Array, fr
 
     That is what drives, loads and brakes it along its coordinates: Sᵀ (force, moment) is 0 of the rest, S = `motion`.
     """
-    F = tree.motion(node.inner, q, frames).F
+    F = tree.pose(node.inner, q, frames).F
     in_axes = np.hstack([np.einsum("tji,tj->ti", F, part) for part in on_outer])
     along = np.einsum("tik,ti->tk", node.joint.motion(q[:, node.q]), in_axes)
-    return on_outer.plus(along_joint(tree, node, along, q, frames), -1.0)
+    return on_outer.plus(_in_global_axes(F, node, along, q), -1.0)

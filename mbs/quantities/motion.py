@@ -93,7 +93,7 @@ class RobotMotion:
         levels = [(C, self.q)]
         if not self.is_at_rest:
             C_dot = np.einsum("tij,tj->ti", C_v, self.v) - target_rates(self.model, self.q, self.time, self.frames)
-            levels += [(C_dot, self.v), (row_accelerations(self.model, self, self.time), self.a)]
+            levels += [(C_dot, self.v), (row_accelerations(self.system, self, self.time), self.a)]
         off = np.zeros((len(self.time), 3))
         for k, (values, size) in enumerate(levels):
             off[:, k] = np.abs(values).max(axis=1, initial=0.0) / (1 + np.abs(size).max(axis=1, initial=0.0))
@@ -162,8 +162,10 @@ class RobotMotion:
 
     def point(self, point: str) -> PointMotion:
         """Of the section "BODY.POINT"."""
-        found = self.section(point)
-        return PointMotion(found.r, self.deflection(point), continuous(quaternions(found.F)))
+        tree = self.model.tree
+        found = tree.pose(tree.section(point, np.eye(3)), self.q, self.frames)
+        turned = None if self.space.is_plane else continuous(quaternions(found.F))
+        return PointMotion(found.r, self.deflection(point), turned)
 
     def deflection(self, point: str) -> Array:
         """Φ p (T, 3), m, of the section "BODY.POINT" in the axes of its body."""

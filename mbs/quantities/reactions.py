@@ -48,7 +48,5 @@ def _on_second(motion: RobotMotion, node: Node, on_outer: Wrench) -> Wrench:
     """Of what acts on the outer side of the joint that carries a body: the same, or what answers it, on the second."""
     if not node.backwards:
         return on_outer
-    outer, inner = (
-        motion.model.tree.motion(section, motion.q, motion.frames).r for section in (node.outer, node.inner)
-    )
+    outer, inner = (motion.model.tree.pose(section, motion.q, motion.frames).r for section in (node.outer, node.inner))
     return Wrench(-on_outer.force, -on_outer.moment).seen_from(outer - inner)

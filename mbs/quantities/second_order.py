@@ -52,7 +52,7 @@ def missing_to_first_order(loads: ModalLoads, p: Array, stations: Array, length:
     if not len(p) or not loads.f.size:
         return Missing(0.0, 0.0)
     at = _worst_outputs(loads, p)
-    S = np.einsum("tj,jmn->tmn", loads.f[at], loads.K)
+    S = np.tensordot(loads.f[at], loads.K, axes=1)
     stiffness = np.diag(loads.stiffness) + S
     whole = _largest(p, stations)
     if np.linalg.eigvalsh(stiffness)[:, 0].min() <= 0.0:  # buckles for good, or for a moment
@@ -61,7 +61,7 @@ def missing_to_first_order(loads: ModalLoads, p: Array, stations: Array, length:
     change *= 1.0 if is_at_rest else IN_MOTION
     missed = _largest(change, stations)
     for translation, K in loads.points:
-        moved = change @ translation.T - 0.5 * np.einsum("tm,kmn,tn->tk", p[at], K, p[at])
+        moved = change @ translation.T - 0.5 * ((p[at] @ K) * p[at]).sum(axis=2).T
         missed = max(missed, float(np.linalg.norm(moved, axis=1).max()))
     return Missing(missed / length, min(1.0, missed / whole) if whole else 0.0)
 
@@ -92,10 +92,9 @@ def largest_rotations(link: ModalBody, p: Array) -> Rotations:
     if not len(p):
         return Rotations(0.0, 0.0, 0.0)
     stations, x = link.stations, link.stations.position[:, 0]
-    turned, moved = (np.einsum("tn,kan->tka", p, of) for of in (stations.rotation, stations.translation))
-    chord = (moved[:, -1] - moved[:, 0]) / (x[-1] - x[0])
-    off = turned - np.stack([turned[:, 0, 0], -chord[:, 2], chord[:, 1]], axis=1)[:, None]
-    return Rotations(*(float(angle) for angle in np.abs(off).max(axis=(0, 1))))
+    chord = (stations.translation[-1] - stations.translation[0]) / (x[-1] - x[0])
+    shapes = stations.rotation - np.stack([stations.rotation[0, 0], -chord[2], chord[1]])  # (k, 3, n)
+    return Rotations(*(float(np.abs(p @ shapes[:, axis].T).max()) for axis in range(3)))
 
 
 def largest_displacement(link: ModalBody, p: Array) -> float:
@@ -113,5 +112,5 @@ def _worst_outputs(loads: ModalLoads, p: Array) -> Indices:
 
 def _largest(p: Array, shapes: Array) -> float:
     """Largest displacement (m) of stations of `shapes` (k, 3, n)."""
-    moved = np.einsum("tn,kan->tka", p, shapes)
-    return float(np.linalg.norm(moved, axis=2).max(initial=0.0))
+    squares = sum((p @ shapes[:, axis].T) ** 2 for axis in range(shapes.shape[1]))
+    return float(np.sqrt(np.max(squares, initial=0.0)))

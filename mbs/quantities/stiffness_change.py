@@ -75,5 +75,5 @@ def _eigenvalues(loads: ModalLoads) -> Iterator[tuple[float, Array]]:
     norms = np.append(np.sqrt(squares[order]), 0.0)
     for start in range(0, len(order), AT_ONCE):
         some = order[start : start + AT_ONCE]
-        S = np.einsum("tj,jmn->tmn", f[some], K)
+        S = np.tensordot(f[some], K, axes=1)
         yield float(norms[start + len(some)]), as_floats(np.linalg.eigvalsh(S))
