@@ -3,10 +3,13 @@
 import re
 import tomllib
 
+import gmsh
 import h5py
 import numpy as np
 import pytest
 from rigid_robots import moments, with_motion
+
+from ffrobot.mesh.gmsh_session import gmsh_session
 
 DENSITY, SIDE = 7850.0, 0.03  # a square bar, so stiff that it is rigid
 LENGTH = 0.5
@@ -135,3 +138,58 @@ def test_links_of_any_name_get_files_of_their_own_in_the_folder(name, tmp_path, 
     }
     assert found["scene.toml"].keys() == plain["scene.toml"].keys()
     assert len(found["scene.toml"]["body"]) == len(plain["scene.toml"]["body"])
+
+
+PLATE = """
+material = { youngs_modulus = 70e9, poissons_ratio = 0.33, density = 2700.0 }
+reference = { condition = "cantilever" }
+modes = { count = 2 }
+[geometry]
+kind = "solid"
+file = "plate.step"
+unit = "mm"
+origin = [25.0, 0.0, 0.0]
+x_axis = [1, 0, 0]
+y_axis = [0, 1, 0]
+"""
+
+
+@pytest.fixture
+def plate(tmp_path, ffrobot):
+    """Import a plate in mm with three bores along z, at joints of which the middle one has its `axis`."""
+    with gmsh_session():
+        cad = gmsh.model.occ
+        bores = [(3, cad.addCylinder(x, 0, -5, 0, 0, 10, 12)) for x in (25, 150, 275)]
+        cad.cut([(3, cad.addBox(0, -20, -5, 300, 40, 10))], bores)
+        cad.synchronize()
+        gmsh.write(str(tmp_path / "plate.step"))
+    (tmp_path / "plate.toml").write_text(PLATE)
+
+    def run(axis):
+        joints = joint("hip", "revolute", "base", "plate", 'xyz="0 0 0.1"', "0 0 1")
+        joints += joint("wheel", "revolute", "plate", "disk", 'xyz="0.125 0 0.004"', axis)
+        joints += joint("knee", "revolute", "plate", "shin", 'xyz="0.25 0 0"', "0 0 1")
+        names = "".join(f'<link name="{name}">{SMALL}</link>' for name in ("plate", "disk", "shin"))
+        (tmp_path / "r.urdf").write_text(f'<robot name="r"><link name="base"/>{names}{joints}</robot>')
+        return ffrobot(
+            "import", tmp_path / "r.urdf", "-o", tmp_path / "out", "--flexible", f"plate={tmp_path}/plate.toml"
+        )
+
+    return run
+
+
+def test_bores_are_interfaces_of_the_joints_in_them(tmp_path, plate):
+    done = plate("0 0 -1")
+    assert done.returncode == 0, done.stderr
+    assert 'joint "hip" is in a bore of radius 12 mm\n' in done.stdout
+    assert 'joint "wheel" is in a bore of radius 12 mm, whose center is 4 mm along the axis' in done.stdout
+    tables = {table["name"]: table for table in tomllib.loads((tmp_path / "out/plate.toml").read_text())["interface"]}
+    for name, x in (("root", 0.0), ("wheel", 0.125), ("tip", 0.25)):
+        np.testing.assert_allclose(tables[name]["position"], [x, 0, 0], atol=1e-8)
+        np.testing.assert_allclose(np.abs(tables[name]["normal"]), [0, 0, 1], atol=1e-6)
+
+
+def test_bores_along_another_axis_than_the_joint_are_not(plate):
+    done = plate("0 1 0")
+    assert done.returncode == 2
+    assert "interface.normal of wheel: expected the outward normal of the face at position" in done.stderr

@@ -19,11 +19,13 @@ from ...common.errors import InputError, did_you_mean
 from ...common.tables import shown
 from ...common.toml_files import load_toml
 from ...fe_models.link_file import LinkTable, read_link
+from .bores import Axis, bores_at
 from .names import Names
 from .robot import Place, Robot, UrdfJoint
 
 ON_AXIS = 1e-6  # of the length: how far a joint may be off the axis of a beam
 SAME_LENGTH = 1e-6  # relative
+_ENDS = ("root", "tip")
 SQUARE = 1e-3  # least sine between x and the axis of the joint for a plane of swing
 
 
@@ -72,6 +74,8 @@ def flexible_link(robot: Robot, name: str, source: Path, folder: Path, stem: str
     keys["name"] = str(keys.get("name", stem))
     part = _place_part(geometry, axes, source, remarks)
     point_of = _interfaces(keys, beyond, tip, place, length, f"{source}: link {shown(name)}")
+    if part is not None:
+        remarks += _in_bores(keys, part, _axes_of_joints(robot, name, point_of, place), length)
     file_name = f"{stem}.toml"
     read_link(LinkTable(keys, folder / file_name))
     if part is not None:  # only now: the check above cannot go up from a folder that is not there yet
@@ -149,6 +153,34 @@ def _interfaces(
     if tables:
         keys["interface"] = tables
     return point_of
+
+
+def _axes_of_joints(robot: Robot, name: str, point_of: Mapping[str, str], place: Place) -> dict[str, Axis]:
+    """The joints of a link that move, by their interfaces."""
+    moving = [joint for joint in robot.joints.values() if joint.type in ("revolute", "continuous")]
+    found = dict[str, Axis]()
+    for joint in moving:
+        if joint.child == name:
+            found["root"] = Axis(joint.name, place.d, place.C @ np.array(joint.axis))
+        elif joint.parent == name:
+            at, axis = np.array(joint.origin.xyz), joint.origin.place.C @ np.array(joint.axis)
+            found.setdefault(point_of[joint.name], Axis(joint.name, place.d + place.C @ at, place.C @ axis))
+    return found
+
+
+def _in_bores(keys: dict[str, Any], part: Path, joints: Mapping[str, Axis], length: float) -> list[str]:
+    """Make bores the interfaces of joints that the link file itself has no table for; what to say of them."""
+    tables = [table for table in keys.get("interface", ()) if isinstance(table, dict)]
+    own = {table.get("name") for table in tables if "normal" in table or "group" in table or table.get("name") in _ENDS}
+    wanted = {name: joint for name, joint in joints.items() if name not in own}
+    if not wanted:
+        return []
+    found = list(bores_at(keys["geometry"], part, wanted, length))
+    matched = {table["name"]: table for table, _ in found}
+    kept = [table for table in tables if table.get("name") not in matched]
+    if matched:
+        keys["interface"] = [*matched.values(), *kept]
+    return [remark for _, remark in found]
 
 
 def _position(keys: Mapping[str, Any], x: Array, length: float, label: str) -> dict[str, Any]:
