@@ -23,3 +23,8 @@ def rotated(theta: Array | float, vectors: Array) -> Array:
 def perpendicular(vectors: Array) -> Array:
     """`vectors` (…, 2) turned by +π/2; of A x it is the derivative A_θ x."""
     return np.stack([-vectors[..., 1], vectors[..., 0]], axis=-1)
+
+
+def in_3d(vectors: Array) -> Array:
+    """(…, 3) of `vectors` (…, 2) of the plane z = 0; longer ones as they are."""
+    return vectors if vectors.shape[-1] > 2 else np.concatenate([vectors, np.zeros_like(vectors[..., :1])], axis=-1)

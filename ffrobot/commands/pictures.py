@@ -74,7 +74,7 @@ def view(
     seconds: float,
     **options: Any,  # noqa: ANN401 (the fields of Options)
 ) -> None:
-    """Write links and motions as solids: VTKHDF and XDMF files for ParaView, pictures by PyVista.
+    """Write links and motions as solids: VTKHDF files for ParaView, pictures by PyVista.
 
     Of a modal body file, the link with its mode shapes; of a results file, the moving and deforming bodies. With
     --movie, a movie by PyVista instead.

@@ -1,7 +1,8 @@
 """How the bodies of a scene move, as a results file has it: what every moving picture is drawn from.
 
 r = R + A (x + s Φ p) with the exaggeration s (docs/theory.md, Kinematics). Exaggerated bodies would come apart at their
-joints: each is moved with the point it hangs from, along a tree of joints that starts at the ground.
+joints: each is moved with the point it hangs from, along a tree of joints that starts at the ground. Planar scenes are
+drawn in 3D: they move in z = 0 and turn about z.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from ..common.arrays import Array, Indices
-from ..common.plane import rotated
+from ..common.plane import in_3d
 from ..common.rotations import of_quaternion
 from ..mbs.scene.topology import Edge, Topology, spanning_forest
 from ..results.file import Results
@@ -24,17 +25,17 @@ VISIBLE_DEFORMATION = 0.05  # of the mechanism's size
 
 @dataclass(frozen=True)
 class MovingBody:
-    """A body over T outputs, in the plane (d = 2) or in 3D (d = 3).
+    """A body over T outputs; global axes but where it says so.
 
     Attributes:
         name: in the scene.
-        position: (T, d) R, origin of its frame, in m, global axes.
-        orientation: of its frame: in the plane (T,) θ, rad; in 3D (T, 4) quaternions, scalar first.
+        position: (T, 3) R, origin of its frame, in m.
+        orientation: (T, 4) of its frame, quaternions, scalar first.
         modal: (T, n) its modal coordinates; None of a rigid body.
         point_names: of its k points, as in the results: `link2.tip`; in the order of x.
-        points: (k, d) where they are in the frame, undeformed, in m.
-        deflection: (T, k, d) their Φ p, in the frame, in m.
-        sections: (T, k, 4) in 3D: quaternions of the sections there, global axes.
+        points: (k, 3) where they are in the frame, undeformed, in m.
+        deflection: (T, k, 3) their Φ p, in the frame, in m.
+        sections: (T, k, 4) quaternions of the sections there; (T, 0, 4) in planar scenes, whose files have none.
     """
 
     name: str
@@ -48,32 +49,37 @@ class MovingBody:
 
     @property
     def axes(self) -> Array:
-        """A (T, d, d), columns the axes of the frame."""
-        return _axes(self.orientation)
+        """A (T, 3, 3), columns the axes of the frame."""
+        return of_quaternion(self.orientation)
 
     def turned(self, vectors: Array) -> Array:
-        """A times vectors (T, …, d) of the frame: in global axes."""
+        """A times vectors (T, …, 3) of the frame: in global axes."""
         found: Array = np.einsum("tij,t...j->t...i", self.axes, vectors)
         return found
 
     def placed(self, places: Array) -> Array:
-        """R + A x of places x (T, k, d) in the frame, m: in global axes."""
+        """R + A x of places x (T, k, 3) in the frame, m: in global axes."""
         return self.position[:, None] + self.turned(places)
 
     @property
     def global_points(self) -> Array:
-        """Where the points are in global axes (T, k, d), m."""
+        """Where the points are in global axes (T, k, 3), m."""
         return self.placed(self.points + self.deflection)
 
+    def exaggerated(self, shift: Array, s: float) -> Array:
+        """Where the points are (T, k, 3), m, with deflections s times as large; joints stay shut by `shift` (T, 3)."""
+        found: Array = self.placed(self.points + s * self.deflection) + (s - 1.0) * shift[:, None]
+        return found
+
     def global_deflection(self, point: str) -> Array:
-        """A Φ p of a point (T, d), in m: how much a unit of s moves it in global axes."""
+        """A Φ p of a point (T, 3), in m: how much a unit of s moves it in global axes."""
         return self.turned(self.deflection[:, self.point_names.index(point)])
 
 
 def moving_bodies(results: Results, analysis: str, frames: Indices) -> tuple[list[MovingBody], list[Array]]:
     """All bodies at the outputs `frames`, each after the one it hangs from.
 
-    And how much a unit of s moves each as a whole (T, d), m, so that joints stay shut.
+    And how much a unit of s moves each as a whole (T, 3), m, so that joints stay shut.
     """
     bodies = [_moving_body(results, analysis, name, frames) for name in topology(results.scene).carriers]
     return bodies, _carried(bodies, results.scene)
@@ -81,38 +87,41 @@ def moving_bodies(results: Results, analysis: str, frames: Indices) -> tuple[lis
 
 def _moving_body(results: Results, analysis: str, name: str, frames: Indices) -> MovingBody:
     group, points = f"{analysis}/bodies/{name}", f"{analysis}/points"
-    position = results[f"{group}/position"][frames]
-    orientation = results[f"{group}/{'quaternion' if results.is_spatial else 'angle'}"][frames]
-    labels, d = [label for label in results.names(points) if label.startswith(f"{name}.")], position.shape[1]
+    position, orientation = in_3d(results[f"{group}/position"][frames]), _orientation(results, group, frames)
+    labels = [label for label in results.names(points) if label.startswith(f"{name}.")]
 
     def of_all(dataset: str, columns: int) -> Array:
-        found = [results[f"{points}/{label}/{dataset}"][frames] for label in labels]
+        names = [f"{points}/{label}/{dataset}" for label in labels]
+        found = [in_3d(results[name][frames]) for name in names if results.has(name)]
         return np.stack(found, axis=1) if found else np.zeros((len(frames), 0, columns))
 
-    deflection, reached = of_all("deflection", d), of_all("position", d)
-    sections = of_all("quaternion", 4) if results.is_spatial else np.zeros((len(frames), len(labels), 0))
+    deflection, reached, sections = of_all("deflection", 3), of_all("position", 3), of_all("quaternion", 4)
     # x = Aᵀ (r − R) − Φ p, the same at all outputs
-    at = (reached[0] - position[0]) @ _axes(orientation[:1])[0] - deflection[0]
+    at = (reached[0] - position[0]) @ of_quaternion(orientation[0]) - deflection[0]
     along = np.argsort(at[:, 0], kind="stable")
     modal = results.modal(analysis, name)[frames] if name in results.modal_files else None
     return MovingBody(
         name, position, orientation, modal, tuple(labels[i] for i in along), at[along], deflection[:, along],
-        sections[:, along],
+        sections[:, along] if sections.size else sections,
     )  # fmt: skip
 
 
-def _axes(orientation: Array) -> Array:
-    """A (T, d, d) of angles (T,) or quaternions (T, 4)."""
-    if orientation.ndim == 2:
-        return of_quaternion(orientation)
-    return np.stack([rotated(orientation, unit) for unit in np.eye(2)], axis=-1)
+def _orientation(results: Results, group: str, frames: Indices) -> Array:
+    """(T, 4) of the frame of a body; of the angle θ in a plane, (cos θ/2, 0, 0, sin θ/2)."""
+    if results.has(f"{group}/quaternion"):
+        return results[f"{group}/quaternion"][frames]
+    half = 0.5 * results[f"{group}/angle"][frames]
+    return np.stack([np.cos(half), np.zeros_like(half), np.zeros_like(half), np.sin(half)], axis=-1)
 
 
 def section_axes(bodies: Sequence[MovingBody], side: str, outputs: int) -> Array:
-    """(T, 3, 3) the axes of the section on a `side` of a joint, "BODY.POINT"; of the ground the global ones."""
+    """(T, 3, 3) the axes of the section on a `side` of a joint, "BODY.POINT"; of the ground the global ones.
+
+    Those of the frame where sections are not known.
+    """
     for body in bodies:
         if side in body.point_names:
-            return of_quaternion(body.sections[:, body.point_names.index(side)])
+            return of_quaternion(body.sections[:, body.point_names.index(side)]) if body.sections.size else body.axes
     return np.broadcast_to(np.eye(3), (outputs, 3, 3))
 
 
@@ -124,7 +133,7 @@ def topology(scene: Mapping[str, Any]) -> Topology:
 
 
 def _carried(bodies: Sequence[MovingBody], scene: Mapping[str, Any]) -> list[Array]:
-    """For each body (T, d), m: how much a unit of s moves it as a whole, so that joints stay shut."""
+    """For each body (T, 3), m: how much a unit of s moves it as a whole, so that joints stay shut."""
     by_name, carriers = {body.name: body for body in bodies}, topology(scene).carriers
     shift: dict[str, Array] = {}
     for body in bodies:
@@ -137,6 +146,12 @@ def _carried(bodies: Sequence[MovingBody], scene: Mapping[str, Any]) -> list[Arr
         if parent is not None and carrier.other in parent.point_names:
             shift[body.name] += shift[parent.name] + parent.global_deflection(carrier.other)
     return list(shift.values())
+
+
+def size_of(bodies: Sequence[MovingBody]) -> float:
+    """Largest extent, m, of the points of all bodies over all outputs; 1 of a single place."""
+    points = [body.global_points.reshape(-1, 3) for body in bodies]
+    return float(np.ptp(np.concatenate(points), axis=0).max(initial=0.0)) or 1.0
 
 
 def visible_exaggeration(size: float, deflection: float) -> float:

@@ -21,6 +21,13 @@ class Target:
     columns: tuple[int, ...]
     wanted: Array
 
+    @property
+    def places(self) -> Array:
+        """(T, 3) m, zero where it specifies nothing."""
+        found = np.zeros((len(self.wanted), 3))
+        found[:, self.columns] = self.wanted
+        return found
+
 
 def targets(results: Results, analysis: str) -> list[Target]:
     """The target of every trajectory of a point, over the first outputs of the analysis.

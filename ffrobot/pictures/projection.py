@@ -1,10 +1,13 @@
-"""Where the viewer stands: of a link in all pictures of it the same, and of a scene in space."""
+"""Where the viewer stands: before a link, before a planar scene, or before a 3D one; and how marks look there."""
 
 from typing import NamedTuple
 
 import numpy as np
 
 from ..common.arrays import Array
+
+AXIS_LENGTH, TOOL_LENGTH = 0.07, 0.09  # of the robot's size: how far from a joint its axes reach, axes of tools
+TOOL_COLORS = ("#D55E00", "#009E73", "#0072B2")  # of x, y, z
 
 
 class View(NamedTuple):
@@ -22,7 +25,9 @@ UP = np.array([np.sin(ELEVATION) * np.sin(AZIMUTH), np.cos(ELEVATION), -np.sin(E
 VIEWER = np.cross(RIGHT, UP)
 LINK = View(RIGHT, UP, VIEWER)
 
-# Scenes in space: z goes up, the viewer stands in front of −y, towards +x and above.
+PLANE = View(*np.eye(3))  # of planar scenes: the viewer looks against z
+
+# Of 3D scenes: z goes up, the viewer stands in front of −y, towards +x and above.
 _AZIMUTH, _ELEVATION = np.radians(-55.0), np.radians(25.0)
 _TOWARDS = np.array([np.cos(_ELEVATION) * np.cos(_AZIMUTH), np.cos(_ELEVATION) * np.sin(_AZIMUTH), np.sin(_ELEVATION)])
 _RIGHT = np.array([-np.sin(_AZIMUTH), np.cos(_AZIMUTH), 0.0])

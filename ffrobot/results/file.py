@@ -26,6 +26,7 @@ from ..common.files import write_atomically
 from ..common.hdf5 import blaming, numbers, open_checked
 from ..fe_models.modal_body import ModalBody
 from ..fe_models.modal_body_file import read_mass, read_modal_body
+from ..mbs.scene.space import SPACES, Space
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -167,11 +168,9 @@ class Results:
         return str(self.attributes("/")["name"])
 
     @property
-    def is_spatial(self) -> bool:
-        """Whether they are of a scene in space."""
-        from .joints import is_spatial
-
-        return is_spatial(self.scene)
+    def space(self) -> Space:
+        """The axes of the scene: x, y of planar ones, x, y, z of 3D ones."""
+        return SPACES[str(self.scene.get("space", "planar"))]
 
     @property
     def ffrobot_version(self) -> str:

@@ -1,4 +1,4 @@
-"""Joints as the scene text of a results file has them: coordinates, units, limits of motors, in plane and space."""
+"""Joints as the scene text of a results file has them: coordinates, units, limits of motors, planar and 3D."""
 
 from __future__ import annotations
 
@@ -14,11 +14,6 @@ from ..mbs.joints.transmission import MotorLimits
 
 Scene = Mapping[str, Any]
 """A scene file as TOML has it."""
-
-
-def is_spatial(scene: Scene) -> bool:
-    """Whether the scene is one in space."""
-    return bool(scene.get("space") == "spatial")
 
 
 class Coordinate(NamedTuple):

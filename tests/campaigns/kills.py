@@ -191,7 +191,7 @@ def _is_whole(path: Path) -> bool:
         elif path.suffix == ".fmu":
             zipfile.ZipFile(path).testzip()
         content = path.read_bytes()
-        ends = {".html": b"</html>", ".png": b"IEND\xaeB`\x82", ".xdmf": b"</Xdmf>"}
+        ends = {".html": b"</html>", ".png": b"IEND\xaeB`\x82"}
         return ".tmp" not in path.name and content.rstrip().endswith(ends.get(path.suffix, b""))
     except Exception as error:  # whatever is wrong with it
         print(f"{path}: {error}")

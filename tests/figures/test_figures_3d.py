@@ -1,7 +1,8 @@
-"""Figures of scenes in 3D: which there are, that bodies are drawn where they were solved, and to scale."""
+"""Figures of motions: which there are, that bodies are drawn where they were solved, and to scale."""
 
 import numpy as np
 import pytest
+from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d.art3d import Line3DCollection
 from PIL import Image
@@ -9,12 +10,14 @@ from scipy.sparse.csgraph import minimum_spanning_tree
 from scipy.spatial import distance
 
 from ffrobot.common.errors import InputError
-from ffrobot.pictures.drawn_3d.shapes import line_shape, shortest_tree, surface_shape
-from ffrobot.pictures.figures.configurations_3d import draw_configurations_3d
+from ffrobot.mbs.scene.space import PLANE
+from ffrobot.pictures.figures.configurations import draw_configurations
 from ffrobot.pictures.figures.figure_file import FigureRecord
 from ffrobot.pictures.figures.plot import draw, plot_results
+from ffrobot.pictures.figures.scene_axes import SceneAxes
 from ffrobot.pictures.figures.standard import standard_figures
 from ffrobot.pictures.motion import moving_bodies, section_axes
+from ffrobot.pictures.shapes import line_shape, shortest_tree, surface_shape
 from ffrobot.results.file import Results
 
 FRAMES = np.array([0, 20, 61, 120])
@@ -113,7 +116,7 @@ def test_a_metre_is_as_long_on_all_axes(arm, crank):
     """The parallel projection of the figure takes the unit vectors of space to rows of equal length at right angles."""
     for results in (arm, crank):
         record = next(r for r in standard_figures(results) if r.kind == "configurations")
-        picture = draw_configurations_3d(record, results)
+        picture = draw_configurations(record, results)
         assert isinstance(picture, Figure)
         (axes,) = picture.axes
         rows = axes.get_proj()[:2, :3]
@@ -123,7 +126,7 @@ def test_a_metre_is_as_long_on_all_axes(arm, crank):
 
 def test_configurations_hold_every_link_at_every_time(arm):
     record = FigureRecord(name="c", kind="configurations", analysis="inverse", times=(0.0, 0.1, 0.6), exaggeration=3.0)
-    (axes,) = draw_configurations_3d(record, arm).axes
+    (axes,) = draw_configurations(record, arm).axes
     assert "deflections × 3" in axes.get_title(loc="left")
     lines = [artist for artist in axes.collections if isinstance(artist, Line3DCollection)]
     assert len(lines) == 3 * 3  # times, bodies
@@ -135,12 +138,48 @@ def test_configurations_hold_every_link_at_every_time(arm):
         assert np.all(at < limits[:, 1])
 
 
-def test_exaggeration_is_of_configurations_in_3d_only(slider_crank):
+def test_exaggeration_is_of_configurations_only():
     with pytest.raises(ValueError, match='"exaggeration" only in kind = "configurations", found kind = "time"'):
         FigureRecord(name="t", curves=({"data": "a", "label": "a"},), exaggeration=2.0)
-    plane = FigureRecord(name="p", kind="configurations", analysis="inverse", times=(0.0,), exaggeration=2.0)
-    with Results(slider_crank.folder / "scene.results.h5") as results, pytest.raises(InputError, match="a planar one"):
-        draw(plane, results)
+
+
+@pytest.mark.parametrize("s", [None, 3.0])
+def test_planar_bodies_are_drawn_where_they_were_solved(slider_crank, s):
+    """Ends of the crank (a line), corners of the rod (its section swept along the axis): in x and y of the figure."""
+    record = FigureRecord(name="p", kind="configurations", analysis="inverse", times=(0.05,), exaggeration=s)
+    with Results(slider_crank.folder / "scene.results.h5") as results:
+        (axes,) = draw(record, results).axes
+        (row,) = slider_crank.rows("inverse", [0.05])
+        pin, mid, away = (
+            results[f"inverse/points/{name}"][row]
+            for name in ("crank.tip/position", "rod.mid/position", "rod.mid/deflection")
+        )
+        angle, half = results["inverse/bodies/rod/angle"][row], results.modal_body("rod").stations.height.max() / 2
+    crank, rod, *_ = (one.get_segments() for one in axes.collections if isinstance(one, LineCollection))
+    np.testing.assert_allclose(crank[0], [[0.0, 0.0], pin], rtol=0, atol=1e-12)
+    normal = np.array([-np.sin(angle), np.cos(angle)])
+    turned = np.array([normal[1] * away[0] + normal[0] * away[1], -normal[0] * away[0] + normal[1] * away[1]])
+    expected = mid + ((s or 1.0) - 1.0) * turned
+    off = np.abs((np.concatenate(rod) - expected) @ normal)
+    along = np.abs((np.concatenate(rod) - expected) @ [normal[1], -normal[0]])
+    assert along.min() < 1e-3
+    np.testing.assert_allclose(off[along < 1e-3], half, rtol=1e-3)
+
+
+def test_outline_of_a_surface_goes_around_its_opening():
+    """Area by Gauss' theorem over the edges that are drawn: of a plate with a square hole, seen from its face."""
+    x = np.arange(4.0)
+    points = np.stack([*np.meshgrid(x, x, indexing="ij"), np.zeros((4, 4))], axis=-1).reshape(-1, 3)
+    cells = np.array([[4 * i + j, 4 * i + j + 4, 4 * i + j + 5, 4 * i + j + 1] for i in range(3) for j in range(3)])
+    picture = Figure()
+    axes = SceneAxes(picture, PLANE)
+    axes.body(points, np.delete(cells, 4, axis=0), "C0")
+    axes.body(points, cells[:, ::-1], "C1")  # from behind: nothing is seen
+    axes.finish()
+    outline, behind = (np.array(one.get_segments()) for one in axes.axes.collections if isinstance(one, LineCollection))
+    assert len(outline) == 16
+    assert np.sum(np.cross(outline[:, 0], outline[:, 1])) / 2 == pytest.approx(8.0)
+    assert len(behind) == 0
 
 
 def test_paths_in_3d_have_three_columns(arm):

@@ -9,8 +9,7 @@ from PIL import Image
 
 from ffrobot.cli import cli
 from ffrobot.common.errors import InputError, SolveError
-from ffrobot.pictures.figures.movie import SIZE, write_motion
-from ffrobot.pictures.figures.palette import COLORS
+from ffrobot.pictures.figures.movie import FACE, GROUND, SIZE, write_motion
 from ffrobot.pictures.movie_file import MovieOptions, gif_image, movie_outputs
 from ffrobot.pictures.view import view_movie
 
@@ -48,11 +47,11 @@ def test_gif_shows_the_whole_motion(gif, slider_crank):
     assert gif.shape == (13, *PIXELS, 3)
     time = slider_crank.file["forward/time"][()]
     angle = slider_crank.file["forward/bodies/crank/angle"][()]
-    ground_y, ground_x = centre_of(near(gif[0], "#8b95a3", 20))
+    ground_y, ground_x = centre_of(near(gif[0], GROUND, 20))
     for k, t in enumerate(np.linspace(time[0], time[-1], 13)):
         row = np.flatnonzero(time <= t + 1e-9)[-1]
         way = np.array([np.cos(angle[row]), np.sin(angle[row])])
-        blue = np.argwhere(near(gif[k], COLORS[0], 60))
+        blue = np.argwhere(near(gif[k], FACE, 60))
         arm = np.stack([blue[:, 1] - ground_x, ground_y - blue[:, 0]], axis=1)
         across, along = np.abs(arm @ [-way[1], way[0]]), arm @ way
         assert np.count_nonzero((across < 6) & (along > 20) & (along < 100)) > 60, k

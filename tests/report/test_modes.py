@@ -8,7 +8,7 @@ from PIL import Image
 
 from ffrobot.pictures.body_surface import AMPLITUDE, body_surface, drawn_mode
 from ffrobot.pictures.coarse_surface import coarsened
-from ffrobot.pictures.report.modes_3d import MAX_TRIANGLES
+from ffrobot.pictures.report.modes import MAX_TRIANGLES
 from ffrobot.results.file import Results
 
 

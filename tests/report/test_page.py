@@ -9,13 +9,13 @@ from scipy.spatial.transform import Rotation
 from selenium.webdriver import ActionChains
 
 from ffrobot.common.errors import InputError
-from ffrobot.pictures.drawn_3d.joints import joint_markers
-from ffrobot.pictures.drawn_3d.shapes import Shape, thickened
+from ffrobot.pictures.markers import joint_markers
 from ffrobot.pictures.motion import moving_bodies
 from ffrobot.pictures.report import write_report
 from ffrobot.pictures.report.histories import history_charts
 from ffrobot.pictures.report.runs import runs
 from ffrobot.pictures.report.tables import peaks_table
+from ffrobot.pictures.shapes import Shape, thickened
 from ffrobot.results.file import Results
 
 FLOATS = 2e-6  # m: numbers of the page have 7 digits, lengths are about 1 m
@@ -198,5 +198,5 @@ def test_bars_stand_for_lines():
 
 def test_plane_and_space_have_pages_of_their_own(arm_3r, slider_crank, tmp_path):
     paths = [case.folder / "scene.results.h5" for case in (arm_3r, slider_crank)]
-    with pytest.raises(InputError, match=r"all of the plane or all of space, found .* of space and .* of the plane"):
+    with pytest.raises(InputError, match=r"all of planar or all of 3D scenes, found .* of a 3D and .* of a planar one"):
         write_report(paths, tmp_path / "r.html")

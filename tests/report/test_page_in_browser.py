@@ -36,15 +36,27 @@ def paused(browser, two_link_page):
     return browser
 
 
+JOINTS = {"O": "link1.root", "A": "link2.root"}  # scene.toml
+
+
 def joints_drawn(browser, run):
-    """Coordinates of the points of a run, by name."""
+    """Coordinates of the joints of a run, and of the end of the path taken so far, by point."""
     drawn = browser.value(
         f"(() => {{ const r = MECHANISM.runs.findIndex((run) => run.label === '{run}'), run = MECHANISM.runs[r];"
-        "const names = run.bodies.flatMap((body) => body.names).filter((name) => !name.endsWith('.mid'));"
-        "const trace = stage.data[first[r] + run.bodies.length];"
-        "return names.map((name, i) => [name, trace.x[i], trace.y[i]]) })()"
+        "const at = first[r] + run.bodies.length, trace = stage.data[at + 1], path = stage.data[at + 5];"
+        "return [...run.joints.map((joint, i) => [joint.name, trace.x[i], trace.y[i]]),"
+        "[run.tools[0].name, path.x.at(-1), path.y.at(-1)]] })()"
     )
-    return {name: np.array(at) for name, *at in drawn}
+    return {JOINTS.get(name, name): np.array(at) for name, *at in drawn}
+
+
+def tip_drawn(browser, run, link):
+    """Middle of the last section of a link."""
+    corners = browser.value(
+        f"(() => {{ const r = MECHANISM.runs.findIndex((run) => run.label === '{run}');"
+        f"const trace = stage.data[first[r] + {link}]; return ['x', 'y'].map((c) => Array.from(trace[c])) }})()"
+    )
+    return np.array(corners).T[-4:].mean(axis=0)
 
 
 def solved(two_link, point, t, analysis="inverse"):
@@ -93,15 +105,15 @@ def test_links_bend_as_much_as_the_slider_says_and_stay_joined(paused, two_link)
     show(paused, t, 40.0)
     factor = paused.value("state.s")  # the slider has steps
     assert 39 < factor < 41
-    drawn = joints_drawn(paused, "inverse")
-    np.testing.assert_allclose(drawn["link2.root"], drawn["link1.tip"], rtol=0, atol=1e-6)
+    elbow = joints_drawn(paused, "inverse")["link2.root"]
+    np.testing.assert_allclose(elbow, tip_drawn(paused, "inverse", 0), rtol=0, atol=1e-6)
     # Link 2 is fixed to its frame at the root, so that its tip alone moves: by its deflection, exaggerated.
     (row,) = two_link.rows("inverse", [t])
     theta = two_link.file["inverse/bodies/link2/angle"][row]
     deflection = two_link.file["inverse/points/link2.tip/deflection"][row]
     turned = np.array([[np.cos(theta), -np.sin(theta)], [np.sin(theta), np.cos(theta)]]) @ deflection
     assert np.linalg.norm(turned) > 8e-4  # m: 0.83 mm at that time (checkpoints of the case)
-    moved = drawn["link2.tip"] - solved(two_link, "link2.tip", t)
+    moved = tip_drawn(paused, "inverse", 1) - solved(two_link, "link2.tip", t)
     np.testing.assert_allclose(moved, (factor - 1) * turned, rtol=0, atol=5e-6)
 
 
@@ -114,7 +126,7 @@ def test_hidden_run_catches_up_when_shown(paused, two_link):
         "Plotly.restyle(stage, { visible: true }, stage.data.map((_, i) => i).filter("
         "(i) => i >= first[run] && (run + 1 === first.length || i < first[run + 1])))"
     )
-    paused.wait("Math.abs(stage.data[first[2] + 3].x.length - 1001) < 1")  # the path taken, up to the end
+    paused.wait("Math.abs(stage.data[first[2] + 7].x.length - 1001) < 1")  # the path taken, up to the end
     shown = joints_drawn(paused, "joints_only")["link2.tip"]
     np.testing.assert_allclose(shown, solved(two_link, "link2.tip", 1.0, "joints_only"), rtol=0, atol=1e-6)
 
@@ -124,11 +136,11 @@ def test_picture_of_the_mechanism(paused):
     pictures = []
     for t in (0.0, 1.0):
         show(paused, t, 50.0)
-        paused.wait("!stage._transitioning")
+        paused.wait("!state.showing")
         image = np.asarray(Image.open(io.BytesIO(paused.screenshot("#mechanism"))).convert("RGB"), dtype=int)
         pictures.append(np.abs(image - INVERSE_BLUE).max(axis=2) < 40)
     start, end = pictures
-    # Two links of about 300 pixels each, two edges of two pixels.
+    # Two links of about 300 pixels each, four pixels high.
     assert start.sum() > 1000
     assert end.sum() > 1000
     assert (start & ~end).sum() > 500

@@ -1,4 +1,4 @@
-"""What a report is made of: outlines, trees of joints, curves of many points, tables, and what it refuses."""
+"""What a report is made of: trees of joints, curves of many points, tables, and what it refuses."""
 
 import html
 import shutil
@@ -17,7 +17,6 @@ from ffrobot.common.version import program_version
 from ffrobot.pictures.figures.shared import bending_points
 from ffrobot.pictures.figures.standard import standard_figures
 from ffrobot.pictures.motion import topology
-from ffrobot.pictures.outline import body_outline, points_outline
 from ffrobot.pictures.path_targets import targets
 from ffrobot.pictures.report import write_report
 from ffrobot.pictures.report.charts import MAX_POINTS, kept_outputs
@@ -31,30 +30,6 @@ from ffrobot.results.file import Results
 def results(two_link):
     with Results(two_link.folder / "scene.results.h5") as results:
         yield results
-
-
-def test_outline_of_a_link_is_its_section_moved_along(results):
-    """Ten bending modes at once: edges are half a height off the axis, and turn with the section."""
-    body = results.modal_body("link2")
-    p = 1e-3 * np.arange(1.0, 11.0)
-    outline = body_outline(body, p[None])
-    deformed = outline.at + outline.modes @ p
-    upper = deformed[: len(deformed) // 2]
-    for x in (0.0, 0.5, 1.0):
-        place = body.interpolate(x)
-        # Plane sections of small rotation θ: r = (x, h/2) + Φ p + θ (−h/2, 0); h = 0.015 m (link2.toml).
-        theta = place.rotation[2] @ p
-        expected = np.array([x, 0.0075]) + place.translation[:2] @ p + theta * np.array([-0.0075, 0.0])
-        assert np.linalg.norm(upper - expected, axis=1).min() < 1e-12
-    np.testing.assert_array_equal(outline.at[0], outline.at[-1])
-
-
-def test_outline_through_points_is_a_parabola():
-    at = np.array([[0.0, 0.0], [0.5, 0.0], [1.0, 0.0]])
-    deflection = np.array([[[0.0, 0.0], [0.0, 0.3], [0.0, 0.4]]])
-    outline = points_outline(["root", "mid", "tip"], at, deflection)
-    x, y = (outline.at + outline.modes @ outline.p[0]).T
-    np.testing.assert_allclose(y, 0.8 * x - 0.4 * x**2, atol=1e-15)  # through those three points
 
 
 def test_bodies_hang_from_the_ground(slider_crank):

@@ -48,7 +48,7 @@ def two_link_grids(two_link, tmp_path_factory):
     folder = tmp_path_factory.mktemp("view")
     options = Options(analysis="joints_only", frames=5, pictures=False)
     viewed = view_file(two_link.folder / "scene.results.h5", folder, options)
-    assert viewed.paths == [folder / "joints_only.vtkhdf", folder / "joints_only.xdmf"]
+    assert viewed.paths == [folder / "joints_only.vtkhdf"]
     return viewed.paths[0]
 
 
@@ -96,7 +96,7 @@ def test_exaggeration_keeps_joints_shut(read, two_link, two_link_grids):
 
 def test_solid_deforms_with_its_modes_and_carries_its_stress(read, solid_arm, tmp_path):
     path = solid_arm / "scene.results.h5"
-    grid, _ = view_file(path, tmp_path, GRIDS).paths
+    (grid,) = view_file(path, tmp_path, GRIDS).paths
     with Results(path) as results:
         body, p = results.modal_body("arm"), results["inverse/bodies/arm/modal"]
         R, theta = results["inverse/bodies/arm/position"], results["inverse/bodies/arm/angle"]
@@ -124,32 +124,6 @@ def test_closed_loop_with_rigid_bodies(read, slider_crank, tmp_path):
     assert {kind for kind, body in zip(kinds, cells["body"], strict=True) if body == 1} == {9}  # quadrilaterals
     assert kinds[-1] == 1  # a vertex
     np.testing.assert_allclose(points[-1, 0], 0.35 - 0.12 * np.sin(100 * time), rtol=0, atol=1e-6)  # scene.toml
-
-
-def corners(grid):
-    cells = [grid.GetCell(i) for i in range(grid.GetNumberOfCells())]
-    return [[cell.GetPointId(c) for c in range(cell.GetNumberOfPoints())] for cell in cells]
-
-
-def test_xdmf_says_the_same(read, slider_crank, tmp_path):
-    """Read by VTK's reader of XDMF 2, as in ParaView before 5.12: lines, quadrilaterals and a point, at every step."""
-    xdmf = pytest.importorskip("vtkmodules.vtkIOXdmf2")
-    numpy_support = pytest.importorskip("vtkmodules.util.numpy_support")
-    options = Options(analysis="inverse", frames=3, pictures=False)
-    grid, index = view_file(slider_crank.folder / "scene.results.h5", tmp_path, options).paths
-    reader = xdmf.vtkXdmfReader()
-    reader.SetFileName(str(index))
-    reader.UpdateInformation()
-    for time, expected, points, data, cells in read(grid):
-        reader.UpdateTimeStep(time)
-        found = reader.GetOutputDataObject(0)
-        kinds = [[g.GetCellType(i) for i in range(g.GetNumberOfCells())] for g in (found, expected)]
-        assert [{2: 1, 4: 3}.get(kind, kind) for kind in kinds[0]] == kinds[1]  # XDMF has points and lines as "poly"
-        np.testing.assert_array_equal(numpy_support.vtk_to_numpy(found.GetPoints().GetData()), points)
-        moved = numpy_support.vtk_to_numpy(found.GetPointData().GetArray("exaggeration"))
-        np.testing.assert_array_equal(moved, data["exaggeration"])
-        np.testing.assert_array_equal(numpy_support.vtk_to_numpy(found.GetCellData().GetArray("body")), cells["body"])
-        assert corners(found) == corners(expected)
 
 
 def test_modal_body_has_its_modes_as_vectors(read, solid_arm, tmp_path):
@@ -191,7 +165,7 @@ def test_picture_shows_the_arm_exaggerated(solid_arm, tmp_path, capsys):
     arguments = ["view", solid_arm / "scene.results.h5", "-o", tmp_path, "--scale", 60, "--pictures"]
     cli([str(argument) for argument in arguments], standalone_mode=False)
     assert capsys.readouterr().out.split() == [
-        str(tmp_path / name) for name in ("inverse.vtkhdf", "inverse.xdmf", "inverse.png", "inverse.stress.png")
+        str(tmp_path / name) for name in ("inverse.vtkhdf", "inverse.png", "inverse.stress.png")
     ]
     image = np.asarray(Image.open(tmp_path / "inverse.png").convert("RGB"), dtype=int)[30:700, 200:]
     spread = np.ptp(image, axis=2)
@@ -211,11 +185,11 @@ def test_machine_without_opengl_gets_grids_and_a_clear_message(solid_arm, tmp_pa
         pytest.skip("OSMesa is installed here")
     path = solid_arm / "scene.results.h5"
     viewed = view_file(path, tmp_path / "a")
-    assert [p.name for p in viewed.paths] == ["inverse.vtkhdf", "inverse.xdmf"]
+    assert [p.name for p in viewed.paths] == ["inverse.vtkhdf"]
     assert "expected OpenGL through EGL" in viewed.notes[0]
     with pytest.raises(SolveError, match="PyVista cannot draw on this machine"):
         view_file(path, tmp_path / "b", Options(pictures=True))
-    assert {p.name for p in (tmp_path / "b").iterdir()} == {"inverse.vtkhdf", "inverse.xdmf"}
+    assert {p.name for p in (tmp_path / "b").iterdir()} == {"inverse.vtkhdf"}
 
 
 def test_what_is_refused(solid_arm, tmp_path):

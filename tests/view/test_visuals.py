@@ -12,7 +12,7 @@ from ffrobot import InputError, Results
 from ffrobot.common.validation import validate
 from ffrobot.exchange.urdf.import_urdf import import_urdf
 from ffrobot.mbs.scene.bodies import Visual
-from ffrobot.pictures.view.grids_3d import results_grid_3d
+from ffrobot.pictures.view.grids import results_grid
 
 INERTIAL = '<inertial><mass value="1"/><inertia ixx="0.01" ixy="0" ixz="0" iyy="0.01" iyz="0" izz="0.01"/></inertial>'
 MESH_AT, BALL_AT, HIP = [0.1, 0.2, -0.1], [0.0, 0.3, 0.0], np.array([0.0, 0.0, 0.5])
@@ -59,7 +59,7 @@ def test_shapes_move_with_their_body(solved):
     ]
     notes = []
     with Results(path) as results:
-        grid = results_grid_3d(results, "inverse", np.arange(3), notes)
+        grid = results_grid(results, "inverse", np.arange(3), notes)
     assert not notes
     corners = 0.5 * np.array([[x, y, z] for x in (-0.2, 0.2) for y in (-0.1, 0.1) for z in (-0.4, 0.4)])
     for t, points in zip((0.0, 0.25, 0.5), grid.points, strict=True):
@@ -77,7 +77,7 @@ def test_a_missing_mesh_is_noted(solved):
     (scene.parents[1] / "robot" / "arm.stl").unlink()
     notes = []
     with Results(path) as results:
-        grid = results_grid_3d(results, "inverse", np.arange(3), notes)
+        grid = results_grid(results, "inverse", np.arange(3), notes)
     assert len(notes) == 1
     assert notes[0].startswith("arm is drawn without its mesh: ")
     assert len(grid.points[0]) < 8

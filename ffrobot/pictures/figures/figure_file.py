@@ -49,7 +49,7 @@ class FigureRecord(Record):
     """One figure. Axes without a range take that of the data; units are in the labels of the axes.
 
     Kinds: "time" draws its curves over time; "path" draws (x, y) or (x, y, z) datasets as paths; "configurations" draws
-    the bodies of `analysis` at `times` (s), and its curves as paths (in 3D, the paths of points with trajectories);
+    the bodies of `analysis` at `times` (s), and its curves as paths, by default those of points with trajectories;
     "torque-speed" draws its curves over their `x`, and the limits of the motor of `joint`. Of a linear `analysis`, at
     the first of `times`: "bode" draws the frequency responses of `transfers` [input, output], "modes" the mode shapes
     of the robot; "placement" the patches of such an analysis.
@@ -72,7 +72,7 @@ class FigureRecord(Record):
     times: tuple[float, ...] = ()
     """Instants of the configurations, s."""
     exaggeration: Positive | None = None
-    """Exaggeration of deflections in 3D configurations; default: chosen for visibility."""
+    """Exaggeration of deflections in configurations; default: 1 in planar scenes, chosen for visibility in 3D ones."""
     x_label: str = "time (s)"
     """Label of the horizontal axis, with its unit, in kind = "time" and "torque-speed"."""
     y_label: str = ""

@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ...common.arrays import Array
 from ...common.errors import InputError
-from ...common.plane import perpendicular, rotation
+from ...common.plane import in_3d
 from ...results.file import Results
-from .configurations import body_shape
+from ..motion import MovingBody, moving_bodies
+from ..shapes import Shape, line_shape
 from .figure_file import FigureRecord
+from .scene_axes import SceneAxes
 from .style import SIZE, legend, shades
 
 POINTS = 4000  # of a frequency response
 DECADE_BELOW, MODES_SHOWN = 10.0, 8  # range: from a tenth of the lowest frequency to beyond the eighth
-SHAPES = 6  # of modes that are drawn at most
+SHAPES, COLUMNS = 6, 3  # modes that are drawn at most, and beside each other
 AMPLITUDE = 0.12  # of the robot's size: the largest displacement as drawn
 GHOST = "#9a9a9a"
 
@@ -52,49 +55,42 @@ def draw_robot_modes(figure: FigureRecord, results: Results) -> Figure:
     k = _nearest(results, figure)
     frequency = results[f"{figure.analysis}/linear/frequency"][k]
     shown = np.flatnonzero(frequency > 0.0)[:SHAPES]
-    columns = 3
-    rows = max(1, -(-len(shown) // columns))
-    picture = Figure(figsize=(2 * SIZE[0], 2.1 * rows), layout="constrained")
+    rows = max(1, -(-len(shown) // COLUMNS))
+    picture = Figure(figsize=(2 * SIZE[0], (2.1 if results.space.is_plane else 2.6) * rows), layout="constrained")
     if not len(shown):
         picture.suptitle("no mode vibrates")
+    bodies, _ = moving_bodies(results, figure.analysis, np.array([k]))
+    shapes = [line_shape(results, body, []) for body in bodies]
     for place, mode in enumerate(shown, 1):
-        axes = picture.add_subplot(rows, columns, place)
-        axes.set_title(f"{mode + 1}: {frequency[mode]:.4g} Hz", loc="left")
-        _draw_mode(axes, results, figure.analysis, k, int(mode))
-        axes.set_aspect("equal", adjustable="datalim")
-        axes.tick_params(labelsize=6)
-        axes.set_xlabel("x (m)", fontsize=6)
-        axes.set_ylabel("y (m)", fontsize=6)
+        axes = SceneAxes(picture, results.space, (rows, COLUMNS, place))
+        axes.axes.set_title(f"{mode + 1}: {frequency[mode]:.4g} Hz", loc="left")
+        group = f"{figure.analysis}/linear/modes"
+        ways = [_way(results, group, body, shape, k, int(mode)) for body, shape in zip(bodies, shapes, strict=True)]
+        _draw_mode(axes, [shape.placed(body)[0] for body, shape in zip(bodies, shapes, strict=True)], shapes, ways)
+        axes.finish(label_size=6)
     return picture
 
 
-def _draw_mode(axes: Axes, results: Results, analysis: str, k: int, mode: int) -> None:
-    lines = [_lines(results, analysis, body, k, mode) for body in results.names(f"{analysis}/bodies")]
-    everything = np.vstack([places for places, _ in lines])
-    size = np.ptp(everything, axis=0).max()
-    largest = max(float(np.linalg.norm(way, axis=1).max()) for _, way in lines)
+def _draw_mode(axes: SceneAxes, places: Sequence[Array], shapes: Sequence[Shape], ways: Sequence[Array]) -> None:
+    size = np.ptp(np.vstack(places), axis=0).max()
+    largest = max(float(np.linalg.norm(way, axis=1).max()) for way in ways)
     scale = AMPLITUDE * size / max(largest, 1e-300)
-    for places, way in lines:
-        axes.plot(*places.T, color=GHOST, linewidth=0.8)
+    for at, shape, way in zip(places, shapes, ways, strict=True):
+        axes.body(at, shape.cells, GHOST, 0.8)
         for sign, color in zip((1.0, -1.0), shades(3)[:2], strict=True):
-            axes.plot(*(places + sign * scale * way).T, color=color, linewidth=1.2)
+            axes.body(at + sign * scale * way, shape.cells, color, 1.2)
 
 
-def _lines(results: Results, analysis: str, body: str, k: int, mode: int) -> tuple[Array, Array]:
-    """Places (m, 2) along a body at output k, and how they move in a mode; straight between points where rigid."""
-    motion = f"{analysis}/bodies/{body}"
-    shape = f"{analysis}/linear/modes/{body}"
-    position, angle, p = (results[f"{motion}/{key}"][k] for key in ("position", "angle", "modal"))
-    d_position, d_angle, d_p = (results[f"{shape}/{key}"][k, mode] for key in ("position", "angle", "modal"))
-    if not len(p):
-        places, _ = body_shape(results, f"{analysis}/points", body, k)
-        arm = places - position
-        return places, d_position + float(d_angle) * perpendicular(arm)
-    stations = results.modal_body(body).stations
-    Phi = stations.translation[:, :2]
-    A = rotation(angle)
-    arm = (stations.position[:, :2] + Phi @ p) @ A.T
-    return position + arm, d_position + d_angle * perpendicular(arm) + (Phi @ d_p) @ A.T
+def _way(results: Results, group: str, body: MovingBody, shape: Shape, k: int, mode: int) -> Array:
+    """(p, 3) how the points of a body move in a mode: δR + δφ × A (x + Φ p) + A Φ δp, in global axes."""
+    turning = "angle" if results.space.is_plane else "rotation"
+    d_position, turn, d_p = (results[f"{group}/{body.name}/{key}"][k, mode] for key in ("position", turning, "modal"))
+    turn = np.array([0.0, 0.0, float(turn)]) if results.space.is_plane else turn
+    arm = shape.placed(body)[0] - body.position[0]
+    is_flexible = len(d_p) == shape.shapes.shape[2]  # bodies drawn through their points do not show it
+    bent = body.turned((shape.shapes @ d_p)[None])[0] if is_flexible else np.zeros_like(arm)
+    found: Array = in_3d(d_position) + np.cross(turn, arm) + bent
+    return found
 
 
 def _nearest(results: Results, figure: FigureRecord) -> int:

@@ -3,29 +3,36 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from typing import cast
 
+import matplotlib
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
-from matplotlib.patches import PathPatch
 
-from ...common.arrays import Array, Indices
+from ...common.arrays import Array, Indices, Integers
 from ...results.file import Results
-from ..drawn_body import DrawnBody, box, drawn_bodies, ground_points
-from ..motion import visible_exaggeration
+from ..coarse_surface import coarsened, triangles_of
+from ..markers import Marker, ground_places, joint_markers, tool_marker, tool_markers
+from ..motion import moving_bodies, size_of, visible_exaggeration
 from ..movie_file import Frame, MovieOptions, check_movie, movie_outputs, moving_analysis, write_movie
 from ..path_targets import Target, targets
-from .filled import closed_path
-from .movie_3d import Picture3D, moving_scene
+from ..projection import AXIS_LENGTH, PLANE, SPACE, TOOL_COLORS, TOOL_LENGTH
+from ..shapes import surface_shape, thickened
 from .palette import COLORS
+from .parallel import directions, lit, normals, projected
 from .style import literal, style
 
 SIZE, DPI = (8.0, 4.8), 120  # inches; 960 x 576 pixels
+MAX_TRIANGLES = 3000  # of a body
+BAR = 0.008  # of the robot's size: radius of bars that stand for rigid bodies
 MARGIN = 0.06  # of the size of what is seen
-GROUND, WANTED = "#8b95a3", "black"
+DIRECTIONS = 0.07  # of the robot's size: length of the arrows along x, y, z
+FACE, AXIS, GROUND, WANTED = "#8fb8d4", "#30465c", "#8b95a3", "black"
+TAKEN = COLORS[3]  # no colour of a tool
 
 
 def write_motion(results_path: Path, path: Path, options: MovieOptions | None = None) -> list[str]:
@@ -39,104 +46,138 @@ def write_motion(results_path: Path, path: Path, options: MovieOptions | None = 
     check_movie(path)
     with Results(results_path) as results, style():
         analysis = moving_analysis(results, options.analysis)
-        frames_of = frames_3d if results.is_spatial else motion_frames
-        write_movie(path, frames_of(results, analysis, options, notes))
+        write_movie(path, _frames(results, analysis, options, notes))
     return list(dict.fromkeys(notes))
 
 
-def motion_frames(results: Results, analysis: str, options: MovieOptions, notes: list[str]) -> Iterator[Frame]:
-    """The frames of a scene in the plane, one after the other."""
-    outputs = movie_outputs(results.time(analysis), options.seconds)
-    frames, shown = np.unique(outputs, return_inverse=True)
-    bodies = drawn_bodies(results, analysis, frames, notes)
-    scale = options.scale
-    if scale is None:
-        size = float(np.ptp(box(bodies), axis=0).max())
-        scale = visible_exaggeration(size, max(float(np.abs(b.motion.deflection).max(initial=0.0)) for b in bodies))
-    picture = _Picture(results, analysis, bodies, frames, scale)
-    for k in shown:
-        yield picture.at(int(k))
-
-
-def frames_3d(results: Results, analysis: str, options: MovieOptions, notes: list[str]) -> Iterator[Frame]:
-    """The frames of a scene in space, seen from a corner."""
+def _frames(results: Results, analysis: str, options: MovieOptions, notes: list[str]) -> Iterator[Frame]:
+    """One after the other; of planar scenes seen along z, of 3D ones from a corner."""
     time = results.time(analysis)
     frames, shown = np.unique(movie_outputs(time, options.seconds), return_inverse=True)
     scene = moving_scene(results, analysis, frames, options.scale, notes)
-    title = _title(results, analysis, scene.scale)
-    picture = Picture3D(results, title, time[frames], scene, _figure())
+    exaggerated = "" if scene.scale == 1.0 else f", deformations × {scene.scale:g}"
+    picture = _Picture(results, f"{results.name}: {analysis}{exaggerated}", time[frames], scene)
     for k in shown:
         yield picture.at(int(k))
 
 
-def _figure() -> Figure:
-    return Figure(figsize=SIZE, dpi=DPI, layout="constrained")
+@dataclass(frozen=True)
+class Scene:
+    """All that moves, over T outputs, as far exaggerated as it is drawn; lengths in m, global axes.
+
+    Attributes:
+        size: largest extent of the robot over all outputs.
+        scale: of deflections.
+        points: (T, p, 3) of the surfaces of all bodies.
+        triangles: (t, 3) on these.
+        joints: of these, `axes` (T, a, 2, 3) are the ends of the lines along their axes.
+        tools: (T, 3 k, 2, 3) ends of the axes x, y, z of each of k sections that follow paths.
+        paths: the paths wanted, and (T, 3) where each point is in truth.
+    """
+
+    size: float
+    scale: float
+    points: Array
+    triangles: Integers
+    joints: Array
+    axes: Array
+    tools: Array
+    paths: Sequence[tuple[Target, Array]]
 
 
-def _title(results: Results, analysis: str, scale: float) -> str:
-    return f"{results.name}: {analysis}" + ("" if scale == 1.0 else f", deformation × {scale:g}")
+def moving_scene(results: Results, analysis: str, frames: Indices, scale: float | None, notes: list[str]) -> Scene:
+    """The scene at the outputs `frames`; `scale` as large as can be seen if None."""
+    bodies, shift = moving_bodies(results, analysis, frames)
+    size = size_of(bodies)
+    if scale is None:
+        scale = visible_exaggeration(size, max(float(np.abs(b.deflection).max(initial=0.0)) for b in bodies))
+    points, triangles, count = [], [], 0
+    for body, carried in zip(bodies, shift, strict=True):
+        shape = thickened(surface_shape(results, body, notes), BAR * size)
+        kept, cells = coarsened(shape.points, triangles_of(shape.cells), MAX_TRIANGLES)
+        points.append(shape.placed(body, carried, scale)[:, kept])
+        triangles.append(cells + count)
+        count += len(kept)
+    wanted, T, reach = targets(results, analysis), len(frames), AXIS_LENGTH * size
+    joints = joint_markers(results.scene, bodies, shift)
+    return Scene(
+        size=size,
+        scale=scale,
+        points=np.concatenate(points, axis=1),
+        triangles=np.concatenate(triangles),
+        joints=np.stack([joint.exaggerated(scale) for joint in joints], 1) if joints else np.zeros((T, 0, 3)),
+        axes=_ends(joints, scale, (-reach, reach), T),
+        tools=_ends(tool_markers(wanted, bodies, shift), scale, (0.0, TOOL_LENGTH * size), T),
+        paths=[(target, tool_marker(target.point, bodies, shift).position) for target in wanted],
+    )
+
+
+def _ends(markers: Sequence[Marker], scale: float, reach: tuple[float, float], outputs: int) -> Array:
+    """(T, a, 2, 3) of lines along all directions of markers, from one distance (m) to the other."""
+    found = [
+        marker.exaggerated(scale)[:, None, None] + np.array(reach)[:, None] * marker.directions[:, :, None]
+        for marker in markers
+    ]
+    return np.concatenate([np.zeros((outputs, 0, 2, 3)), *found], axis=1)
 
 
 class _Picture:
-    """Axes on which bodies are moved from frame to frame, over a background that is drawn once."""
+    """Axes on which a scene is painted anew for every frame, over a background that is drawn once."""
 
-    def __init__(
-        self, results: Results, analysis: str, bodies: Sequence[DrawnBody], frames: Indices, scale: float
-    ) -> None:
-        self.bodies, self.scale, self.time = bodies, scale, results.time(analysis)[frames]
-        figure = _figure()
+    def __init__(self, results: Results, title: str, time: Array, scene: Scene) -> None:
+        self.scene, self.time, self.is_plane = scene, time, results.space.is_plane
+        self.view = PLANE if self.is_plane else SPACE
+        figure = Figure(figsize=SIZE, dpi=DPI, layout="constrained")
         self.canvas, self.axes = FigureCanvasAgg(figure), figure.subplots()
-        self.axes.set_title(_title(results, analysis, scale), loc="left")
-        self._draw_still(results, targets(results, analysis))
+        self.axes.set_title(title, loc="left")
+        self._draw_still(results)
         literal(figure)
         self.canvas.draw()  # also lays the figure out, once
         self.background = self.canvas.copy_from_bbox(figure.bbox)
         self.clock = self.axes.set_title("", loc="right")
-        self.patches = [_patch(self.axes, body, COLORS[0]) for body in bodies]
-        (self.joints,) = self.axes.plot([], [], "o", color=COLORS[0], markersize=5, markerfacecolor="white")
+        self.surface = PolyCollection([], linewidths=0.3)
+        self.lines = LineCollection([], linewidths=1.0)
+        self.joints = self.axes.plot([], [], "o", color=AXIS, markersize=3)[0]
+        self.taken = [self.axes.plot([], [], color=TAKEN, linewidth=1.0)[0] for _ in scene.paths]
+        for collection in (self.surface, self.lines):
+            self.axes.add_collection(collection, autolim=False)
 
-    def _draw_still(self, results: Results, paths: Sequence[Target]) -> None:
-        """What does not move: the ground and the paths wanted; and everything that the axes have to show."""
-        ground = np.array(ground_points([results.scene])).reshape(-1, 2)
-        in_plane = [target for target in paths if target.columns == (0, 1)]
-        self.axes.plot(*ground.T, "^", color=GROUND, markersize=13)
-        for target in in_plane:
-            self.axes.plot(*target.wanted.T, color=WANTED, linestyle="--", linewidth=0.8)
-        self.taken = [(_line(self.axes), _taken(self.bodies, target.point)) for target in in_plane]
-        self.axes.update_datalim(box(self.bodies, self.scale))
-        self.axes.margins(MARGIN)
+    def _draw_still(self, results: Results) -> None:
+        """The ground, the paths wanted, room for all that moves; labels of x and y, or directions."""
+        self.axes.plot(*projected(ground_places([results.scene]), self.view).T, "^", color=GROUND, markersize=10)
+        for target, _ in self.scene.paths:
+            if target.columns == results.space.translations:
+                wanted = projected(target.places, self.view)
+                self.axes.plot(*wanted.T, color=WANTED, linestyle="--", linewidth=0.8)
+        for places in (self.scene.points, self.scene.axes, self.scene.tools):
+            self.axes.update_datalim(projected(places, self.view).reshape(-1, 2))
         self.axes.set_aspect("equal", adjustable="datalim")
+        self.axes.margins(MARGIN)
         self.axes.autoscale_view()
-        self.axes.set_xlabel("x (m)")
-        self.axes.set_ylabel("y (m)")
+        if self.is_plane:
+            self.axes.set_xlabel("x (m)")
+            self.axes.set_ylabel("y (m)")
+        else:
+            self.axes.set_axis_off()
+            directions(self.axes, DIRECTIONS * self.scene.size, self.view)
 
     def at(self, k: int) -> Frame:
-        """The frame of output k."""
-        for body, patch in zip(self.bodies, self.patches, strict=True):
-            patch.set_path(closed_path(body.corners(k, self.scale)))
-        joints = np.concatenate([body.joints(k, self.scale) for body in self.bodies])
-        self.joints.set_data(*joints.T)
-        for line, places in self.taken:
-            line.set_data(*places[: k + 1].T)
+        """The frame of output k: what faces away is left out, far triangles are painted first, near ones hide them."""
+        points, view = self.scene.points[k], self.view
+        triangles = self.scene.triangles[normals(points, self.scene.triangles) @ view.viewer > 0.0]
+        colors = lit(points, triangles, np.array(matplotlib.colors.to_rgb(FACE)), view)
+        order = np.argsort((points @ view.viewer)[triangles].mean(axis=1), kind="stable")
+        # An array is drawn faster than the list of corners that Matplotlib's types ask for.
+        self.surface.set_verts(cast(Sequence[Array], projected(points, view)[triangles[order]]))
+        self.surface.set(facecolors=colors[order], edgecolors=colors[order])
+        axes, tools = self.scene.axes[k], self.scene.tools[k]
+        self.lines.set_segments(list(projected(np.concatenate([axes, tools]), view)))
+        self.lines.set_colors([AXIS] * len(axes) + [TOOL_COLORS[j % 3] for j in range(len(tools))])
+        self.joints.set_data(*projected(self.scene.joints[k], view).T)
+        for line, (_, places) in zip(self.taken, self.scene.paths, strict=True):
+            line.set_data(*projected(places[: k + 1], view).T)
         self.clock.set_text(f"t = {self.time[k]:.3f} s")
         self.canvas.restore_region(self.background)
-        for artist in (*(line for line, _ in self.taken), *self.patches, self.joints, self.clock):
+        for artist in (self.surface, *self.taken, self.lines, self.joints, self.clock):
             self.axes.draw_artist(artist)
         return np.asarray(self.canvas.buffer_rgba())[..., :3].copy()
-
-
-def _patch(axes: Axes, body: DrawnBody, color: str) -> PathPatch:
-    face = f"{color}55" if body.outline.filled else "none"
-    patch = PathPatch(closed_path(body.corners(0)), facecolor=face, edgecolor=color, linewidth=1.5, zorder=3)
-    axes.add_patch(patch)
-    return patch
-
-
-def _line(axes: Axes) -> Line2D:
-    return axes.plot([], [], color=COLORS[1], linewidth=1.0)[0]
-
-
-def _taken(bodies: Sequence[DrawnBody], point: str) -> Array:
-    """Where a point is at all outputs (T, 2), m, in truth."""
-    body = next(body.motion for body in bodies if point in body.motion.point_names)
-    return body.global_points[:, body.point_names.index(point)]

@@ -17,27 +17,23 @@ from ...common.files import check_folder, write_atomically
 from ...fe_models.modal_body_file import is_modal_body_file, read_modal_body
 from ...results.file import Results
 from .body_shape import draw_mesh, draw_modes
-from .configurations import draw_configurations
-from .configurations_3d import draw_configurations_3d, draw_path_3d
+from .configurations import draw_configurations, draw_path
 from .figure_file import FigureRecord, load_figures
 from .linear import draw_bode, draw_robot_modes
-from .path import draw_path
 from .placement import draw_placement
 from .standard import standard_figures
 from .style import literal, new_axes, style
 from .time_history import draw_time_history
 from .torque_speed import draw_torque_speed
 
-DRAW = {
-    "time": draw_time_history,
+DRAW = {"time": draw_time_history, "placement": draw_placement, "torque-speed": draw_torque_speed}
+
+DRAW_WHOLE = {  # with axes of their own
     "path": draw_path,
     "configurations": draw_configurations,
-    "placement": draw_placement,
-    "torque-speed": draw_torque_speed,
+    "bode": draw_bode,
+    "modes": draw_robot_modes,
 }
-
-DRAW_WHOLE = {"bode": draw_bode, "modes": draw_robot_modes}  # with axes of their own
-DRAW_3D = {"configurations": draw_configurations_3d, "path": draw_path_3d}
 
 # No dates and no versions: the same results give the same files.
 METADATA = {
@@ -137,20 +133,15 @@ def _formulas(label: str) -> Iterator[None]:
 
 def draw(record: FigureRecord, results: Results) -> Figure:
     """Draw one figure."""
-    if record.exaggeration is not None and not results.is_spatial:
-        raise InputError(
-            f'{results.path}: figure "{record.name}": exaggeration: expected it only of 3D scenes, found a planar'
-            " one, whose configurations are to scale"
-        )
-    whole = DRAW_WHOLE | DRAW_3D if results.is_spatial else DRAW_WHOLE
-    if record.kind in whole:
-        return whole[record.kind](record, results)
-    picture, axes = new_axes(record.title)
-    DRAW[record.kind](axes, record, results)
+    if record.kind in DRAW_WHOLE:
+        picture = DRAW_WHOLE[record.kind](record, results)
+    else:
+        picture, axes = new_axes(record.title)
+        DRAW[record.kind](axes, record, results)
     if record.x_range is not None:
-        axes.set_xlim(*record.x_range)
+        picture.axes[0].set_xlim(*record.x_range)
     if record.y_range is not None:
-        axes.set_ylim(*record.y_range)
+        picture.axes[0].set_ylim(*record.y_range)
     return picture
 
 

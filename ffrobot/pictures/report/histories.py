@@ -10,7 +10,7 @@ from ...common.arrays import Array
 from ...results.file import Results
 from ..figures.figure_file import Curve, FigureRecord
 from ..figures.reading import curve_points
-from ..figures.shared import energy_figures, file_name
+from ..figures.shared import file_name
 from ..figures.standard import standard_figures
 from ..path_targets import Target, targets
 from ..torque_speed import limit_curves, limits_of
@@ -22,7 +22,7 @@ def history_charts(files: Sequence[Results]) -> list[Chart]:
     """Path errors, paths, angles, deflections, forces, moments, voltages and energies."""
     charts = {chart.name: chart for chart in _path_errors(files)}
     for number, (results, source) in enumerate(zip(files, sources(files), strict=True)):
-        records = {record.name: record for record in (*standard_figures(results), *energy_figures(results))}
+        records = {record.name: record for record in standard_figures(results)}
         for record in records.values():
             if record.kind == "configurations" or not record.curves:  # the mechanism moves instead; no histories
                 continue

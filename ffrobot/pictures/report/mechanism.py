@@ -8,16 +8,21 @@ from typing import Any
 
 import numpy as np
 
-from ...common.arrays import Indices
-from ..drawn_body import ground_points, outline
+from ...common.arrays import Array, Indices
+from ..coarse_surface import coarsened, triangles_of
 from ..figures.palette import COLORS
-from ..motion import MovingBody, moving_bodies, topology, visible_exaggeration
-from ..outline import Outline
+from ..markers import Marker, ground_places, joint_markers, tool_markers
+from ..motion import MovingBody, moving_bodies, visible_exaggeration
 from ..path_targets import Target, targets
+from ..projection import AXIS_LENGTH, PLANE, SPACE, TOOL_COLORS, TOOL_LENGTH
+from ..shapes import surface_shape, thickened
 from .charts import encoded, plain
 from .runs import Run
 
 MAX_FRAMES = 2000
+ABOVE = 0.1  # of the mechanism's size: how far before the bodies of a planar scene its joints and paths are drawn
+MAX_TRIANGLES = 4000  # of a body
+BAR = 0.008  # of the mechanism's size: radius of bars that stand for rigid bodies
 PLAYING_SECONDS = 8.0
 SLOWEST = 1e-3  # the slider's end
 
@@ -31,68 +36,92 @@ class Mechanism:
 
 
 def mechanism(runs: Sequence[Run]) -> Mechanism:
-    """The moving picture of several runs, each in a colour of its own."""
+    """The moving picture of several runs, each in a colour of its own; planar scenes are seen along z."""
     notes: list[str] = []
-    entries, corners, deflections, end = [], [], [0.0], 0.0
-    for k, run in enumerate(runs):
-        time = run.results.time(run.analysis)
-        frames = np.unique(np.linspace(0, len(time) - 1, min(len(time), MAX_FRAMES)).astype(np.intp))
-        bodies, _ = moving_bodies(run.results, run.analysis, frames)
-        entries.append(
-            {
-                "label": plain(run.label),
-                "color": COLORS[k % len(COLORS)],
-                "visible": run.analysis == run.results.analyses[0],
-                "time": encoded(time[frames]),
-                "bodies": [_body_data(run, body, bodies, outline(run.results, body, notes)) for body in bodies],
-                "paths": [_path_data(target, bodies, frames) for target in targets(run.results, run.analysis)],
-            }
-        )
-        if run.analysis != run.results.analyses[0]:
-            continue  # hidden at first: does not set the scale
-        corners += [np.array([p.min((0, 1)), p.max((0, 1))]) for body in bodies if (p := body.global_points).size]
-        deflections += [float(np.abs(body.deflection).max(initial=0.0)) for body in bodies]
-        end = max(end, float(time[-1]))
-    box = np.array([np.min(corners, axis=(0, 1)), np.max(corners, axis=(0, 1))])
-    size = float(np.max(box[1] - box[0]))
-    margin = 0.1 * size
+    moved = [moving_bodies(run.results, run.analysis, _frames(run)) for run in runs]
+    shown = [k for k, run in enumerate(runs) if run.analysis == run.results.analyses[0]]  # others are hidden at first
+    corners = np.concatenate([body.global_points.reshape(-1, 3) for k in shown for body in moved[k][0]])
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    size = float((high - low).max()) or 1.0
+    deflections = [float(np.abs(body.deflection).max(initial=0.0)) for k in shown for body in moved[k][0]]
+    entries = [
+        {
+            "label": plain(run.label),
+            "color": COLORS[k % len(COLORS)],
+            "visible": k in shown,
+            "time": encoded(run.results.time(run.analysis)[_frames(run)]),
+            **_run_data(run, *moved[k], size, notes),
+        }
+        for k, run in enumerate(runs)
+    ]
+    end = max(float(runs[k].results.time(runs[k].analysis)[-1]) for k in shown)
+    margin = np.maximum(0.06 * size, 0.12 * size - 0.5 * (high - low))
+    is_plane = runs[0].results.space.is_plane
     data = {
         "runs": entries,
-        "exaggeration": visible_exaggeration(size, max(deflections)),
+        "exaggeration": visible_exaggeration(size, max(deflections, default=0.0)),
         "speed": max(end / PLAYING_SECONDS, SLOWEST),
-        "range": [[box[0, i] - margin, box[1, i] + margin] for i in range(2)],
-        "ground": ground_points([run.results.scene for run in runs]),
+        "range": [[float(low[i] - margin[i]), float(high[i] + margin[i])] for i in range(3)],
+        "size": size,
+        "is_plane": is_plane,
+        "view": {name: axis.tolist() for name, axis in (PLANE if is_plane else SPACE)._asdict().items()},
+        "axis_length": AXIS_LENGTH * size,
+        "tool_length": TOOL_LENGTH * size,
+        "tool_colors": TOOL_COLORS,
+        "above": ABOVE * size if is_plane else 0.0,
+        "ground": ground_places(run.results.scene for run in runs).tolist(),
     }
     return Mechanism(data, list(dict.fromkeys(notes)))
 
 
-def _body_data(run: Run, body: MovingBody, bodies: Sequence[MovingBody], shape: Outline) -> dict[str, Any]:
-    data: dict[str, Any] = {
-        "name": body.name,
-        "position": encoded(body.position),
-        "angle": encoded(body.orientation),
-        "outline": encoded(shape.at),
-        "modes": encoded(shape.modes),
-        "p": encoded(shape.p),
-        "filled": shape.filled,
-        "points": encoded(body.points),
-        "names": body.point_names,
-        "deflection": encoded(body.deflection),
+def _frames(run: Run) -> Indices:
+    outputs = len(run.results.time(run.analysis))
+    return np.unique(np.linspace(0, outputs - 1, min(outputs, MAX_FRAMES)).astype(np.intp))
+
+
+def _run_data(run: Run, bodies: list[MovingBody], shift: list[Array], size: float, notes: list[str]) -> dict[str, Any]:
+    scene = run.results.scene
+    wanted = targets(run.results, run.analysis)
+    return {
+        "bodies": [_body_data(run, body, s, BAR * size, notes) for body, s in zip(bodies, shift, strict=True)],
+        "joints": [_marker_data(marker) for marker in joint_markers(scene, bodies, shift)],
+        "tools": [_marker_data(marker) for marker in tool_markers(wanted, bodies, shift)],
+        "paths": [_path_data(run, target) for target in wanted],
     }
-    carrier = topology(run.results.scene).carriers[body.name]
-    if carrier is not None and carrier.own in body.point_names:
-        data["hangs"] = {"own": body.point_names.index(carrier.own), "from": _index(carrier.other, bodies)}
+
+
+def _body_data(run: Run, body: MovingBody, shift: Array, bar: float, notes: list[str]) -> dict[str, Any]:
+    """Surface points x (p, 3), their displacements Φ (p, 3, n), and the motion R, e, p of the body with its shift."""
+    shape = thickened(surface_shape(run.results, body, notes), bar)
+    kept, triangles = coarsened(shape.points, triangles_of(shape.cells), MAX_TRIANGLES)
+    return {
+        "name": plain(body.name),
+        "position": encoded(body.position),
+        "quaternion": encoded(body.orientation),
+        "shift": encoded(shift),
+        "points": encoded(shape.points[kept]),
+        "shapes": encoded(shape.shapes[kept].reshape(len(kept), -1)),
+        "p": encoded(shape.coordinates),
+        "triangles": encoded(triangles, "i4"),
+    }
+
+
+def _marker_data(marker: Marker) -> dict[str, Any]:
+    """Position, exaggeration (T, 3) and k directions (T, 3 k)."""
+    count = marker.directions.shape[1]
+    return {
+        "name": plain(marker.name),
+        "position": encoded(marker.position),
+        "exaggeration": encoded(marker.exaggeration),
+        "directions": encoded(marker.directions.reshape(len(marker.position), 3 * count)),
+        "count": count,
+    }
+
+
+def _path_data(run: Run, target: Target) -> dict[str, Any]:
+    """A point to be followed, and the path it should take where all components are specified."""
+    data: dict[str, Any] = {"name": plain(target.point)}
+    if target.columns == run.results.space.translations:
+        frames = _frames(run)
+        data["target"] = encoded(target.places[frames[frames < len(target.wanted)]])
     return data
-
-
-def _path_data(target: Target, bodies: Sequence[MovingBody], frames: Indices) -> dict[str, Any]:
-    """A point to be followed, and the path it should take where both components are specified."""
-    data: dict[str, Any] = {"name": plain(target.point), "point": _index(target.point, bodies)}
-    if target.columns == (0, 1):
-        data["target"] = encoded(target.wanted[frames[frames < len(target.wanted)]])
-    return data
-
-
-def _index(point: str, bodies: Sequence[MovingBody]) -> list[int] | None:
-    """Numbers of the body and of its point; None for the ground."""
-    return next(([i, b.point_names.index(point)] for i, b in enumerate(bodies) if point in b.point_names), None)

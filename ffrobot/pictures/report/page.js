@@ -14,8 +14,8 @@ const COMMON_LAYOUT = {
 };
 const paint = () => ({ font: { size: 12, color: pageColor("--ink") }, plot_bgcolor: pageColor("--paper"), paper_bgcolor: pageColor("--paper") });
 const axis = () => ({ gridcolor: pageColor("--grid"), zerolinecolor: pageColor("--line"), linecolor: pageColor("--axis"), ticks: "outside" });
-// In space; of the axes themselves, which keep their ranges.
-const axisInSpace = () => ({ color: pageColor("--ink"), gridcolor: pageColor("--grid"), zerolinecolor: pageColor("--line") });
+// In 3D; of the axes themselves, which keep their ranges.
+const axis3D = () => ({ color: pageColor("--ink"), gridcolor: pageColor("--grid"), zerolinecolor: pageColor("--line") });
 const CONFIG = {
   responsive: true,
   displaylogo: false,
@@ -42,12 +42,16 @@ function chartLayout(layout) {
 
 // A chart that is drawn takes the colours of the page anew.
 function repaint(element) {
-  const colors = { ...paint() }, inSpace = element.layout.scene !== undefined;
-  const names = inSpace ? ["scene.xaxis", "scene.yaxis", "scene.zaxis"] : ["xaxis", "yaxis"];
+  const colors = { ...paint() }, is3D = element.layout.scene !== undefined;
+  const names = is3D ? ["scene.xaxis", "scene.yaxis", "scene.zaxis"] : ["xaxis", "yaxis"];
   for (const name of names)
-    for (const [key, value] of Object.entries(inSpace ? axisInSpace() : axis())) if (key !== "ticks") colors[`${name}.${key}`] = value;
+    for (const [key, value] of Object.entries(is3D ? axis3D() : axis())) if (key !== "ticks") colors[`${name}.${key}`] = value;
   return Plotly.relayout(element, { "font.color": colors.font.color, ...Object.fromEntries(Object.entries(colors).filter(([key]) => key !== "font")) });
 }
+
+// The numbers of an entry as the page has them: little-endian, in base64.
+const TYPED = { f4: Float32Array, i4: Int32Array, i2: Int16Array };
+const typedArray = (entry) => new TYPED[entry.dtype](Uint8Array.from(atob(entry.bdata), (c) => c.charCodeAt(0)).buffer);
 
 // Every `step`-th of values, from `offset` on.
 const every = (values, step, offset) => Array.from(values).filter((_, i) => i % step === offset);

@@ -18,9 +18,7 @@ from .charts import Chart
 from .diagrams import DrawnDiagram
 from .histories import folded, history_charts
 from .mechanism import mechanism
-from .mechanism_3d import mechanism_data
-from .modes import link_modes
-from .modes_3d import modes_3d
+from .modes import link_modes, surface_modes
 from .runs import runs, sources
 from .studies import StudyPart, study_parts
 from .tables import analyses_table, bending_table, origins_table, peaks_table, voltages_table, warnings_table
@@ -63,9 +61,9 @@ def report(files: Sequence[Results], studies: Sequence[tuple[Path, Study]] = ())
         plotly_js=get_plotlyjs(),
         plotly_version=get_plotlyjs_version(),
         page_js=(HERE / "page.js").read_text(encoding="utf-8"),
-        modes_3d_js=(HERE / "modes_3d.js").read_text(encoding="utf-8"),
+        modes_js=(HERE / "modes.js").read_text(encoding="utf-8"),
         player_js=(HERE / "player.js").read_text(encoding="utf-8"),
-        mechanism_js=(HERE / f"mechanism{'_3d' if _all_3d(files) else ''}.js").read_text(encoding="utf-8"),
+        mechanism_js=(HERE / "mechanism.js").read_text(encoding="utf-8"),
         page_css=(HERE / "page.css").read_text(encoding="utf-8"),
         ffrobot_version=program_version(),
     )
@@ -90,13 +88,13 @@ def _content(files: Sequence[Results], studies: Sequence[StudyPart]) -> dict[str
 def _of_results(files: Sequence[Results]) -> tuple[dict[str, Any], list[Chart]]:
     """The parts of the page that need solved scenes, and their charts."""
     all_runs = runs(files)
-    spatial = _all_3d(files)
-    moving = mechanism_data(all_runs) if spatial else mechanism(all_runs)
+    is_plane = _is_plane(files)
+    moving = mechanism(all_runs)
     modes, histories = link_modes(all_runs), history_charts(files)
-    shapes = modes_3d(modes)
+    shapes = surface_modes(modes)
     content = {
         "mechanism": _script_data(moving.data),
-        "spatial": spatial,
+        "is_plane": is_plane,
         "shapes": shapes["links"],
         "modes_3d": _script_data(shapes),
         "histories": folded(histories),
@@ -115,13 +113,13 @@ def _of_results(files: Sequence[Results]) -> tuple[dict[str, Any], list[Chart]]:
     return content, [*histories, *(chart for link in modes for chart in link.charts)]
 
 
-def _all_3d(files: Sequence[Results]) -> bool:
-    """Whether the files are of scenes in space; `InputError` where some are and some are not."""
-    kinds = {results.is_spatial: results.path for results in files}
+def _is_plane(files: Sequence[Results]) -> bool:
+    """Whether the files are of planar scenes; `InputError` where some are and some are not."""
+    kinds = {results.space.is_plane: results.path for results in files}
     if len(kinds) == 2:
         raise InputError(
-            f"report: expected results all of the plane or all of space, found {kinds[True]} of space and"
-            f" {kinds[False]} of the plane: write a report of each"
+            f"report: expected results all of planar or all of 3D scenes, found {kinds[False]} of a 3D and"
+            f" {kinds[True]} of a planar one: write a report of each"
         )
     return True in kinds
 

@@ -1,15 +1,10 @@
-// The clock and the sliders below the moving mechanism, in plane and space; its own script draws (`start`) and moves it (`show`).
+// The clock and the sliders below the moving mechanism, which its own script draws (`start`) and moves (`show`).
 
 const MECHANISM = JSON.parse(document.getElementById("mechanism-data").textContent);
 const stage = document.getElementById("mechanism");
 const control = (id) => document.getElementById(id);
 
-function decoded(entry) {
-  const bytes = Uint8Array.from(atob(entry.bdata), (c) => c.charCodeAt(0));
-  return new Float32Array(bytes.buffer);
-}
-
-for (const run of MECHANISM.runs) run.time = decoded(run.time);
+for (const run of MECHANISM.runs) run.time = typedArray(run.time);
 
 // The last output of a run not after time t.
 function outputAt(run, t) {

@@ -12,8 +12,7 @@ import numpy as np
 
 from ...common.arrays import Array
 from ..body_surface import drawn_mode
-from ..drawn_3d.marks import AXIS_LENGTH, TOOL_COLORS, TOOL_LENGTH
-from ..projection import LINK, SPACE, View
+from ..projection import AXIS_LENGTH, LINK, SPACE, TOOL_COLORS, TOOL_LENGTH, View
 
 SIZE, MOVIE_SIZE = (1400, 800), (960, 576)  # pixels
 PANEL = (700, 360)  # pixels, of a mode
@@ -24,7 +23,7 @@ COLORS = "viridis"
 GHOST, METAL, BARE = "#9a9a9a", "#4a5563", "#c9ced6"
 FOLD = 30.0  # degrees: an edge at which a surface bends by more is shown
 ROD, PIN, STAND = 0.006, 0.009, 0.06  # of the size of the robot: radius of lines and of pins, height of the ground
-AXIS = 0.003  # of the size of the robot: radius of axes in space
+AXIS = 0.003  # of the size of the robot: radius of axes
 ROUND = np.array([1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0])  # ends of colour bars, times a power of ten
 SHOWN = {"deflection": ("deflection (mm)", 1e3), "von_mises": ("von Mises stress (MPa)", 1e-6)}
 BAR = {
@@ -59,10 +58,8 @@ def _draw_motion(job: dict[str, Any]) -> None:
         if job["scale"] != 1.0 and not job["movie"]:
             _add_ghost(plotter, grid)
         _add(plotter, shown, name, limit, ROD * size, BAR)
-        if job["in_space"]:
-            _add_axes(plotter, job, k, size)
-        else:
-            _add_joints(plotter, job["joints"][k], job["ground"], size, float(np.ptp(everything[:, 2])))
+        depth = 0.0 if job["in_space"] else 1.2 * float(np.ptp(everything[:, 2])) + 3.0 * PIN * size
+        _add_marks(plotter, job, k, size, depth)
         _finish(plotter, job["title"].format(time=f"{job['times'][k]:.4g}"), everything, view, BAR_ROOM)
         plotter.screenshot(str(Path(job["path"]) / f"{k:05d}.png") if job["movie"] else job["path"])
         plotter.close()
@@ -146,28 +143,26 @@ def _add_ghost(plotter: Any, grid: Any) -> None:  # noqa: ANN401
     plotter.add_mesh(edges if edges.n_points else grid, style="wireframe", color=GHOST, line_width=2)
 
 
-def _add_joints(plotter: Any, joints: list[list[float]], ground: list[list[float]], size: float, depth: float) -> None:  # noqa: ANN401
-    """In the plane: pins through the robot, which is `depth` thick, where it turns, and what stands on the ground."""
-    for at in joints:
-        _add_bar(plotter, at, (0.0, 0.0, 1.0), PIN * size, 1.2 * depth + 3.0 * PIN * size, METAL)
-    for at in ground:
-        _add_stand(plotter, at, (0.0, 1.0, 0.0), size)
+def _add_marks(plotter: Any, job: dict[str, Any], k: int, size: float, depth: float) -> None:  # noqa: ANN401
+    """Joints with their axes, the axes x, y, z of what follows paths, what stands on the ground.
 
-
-def _add_axes(plotter: Any, job: dict[str, Any], k: int, size: float) -> None:  # noqa: ANN401
-    """In space: joints as balls with their axes, the axes x, y, z of what follows paths, what stands on the ground."""
+    Joints are balls, or in planar scenes, with a `depth`, pins through the robot.
+    """
     import pyvista
 
-    for at in job["joints"][k]:
-        plotter.add_mesh(pyvista.Sphere(PIN * size, at), color=METAL, smooth_shading=True, ambient=0.3)
-    for at, axis in job["axes"][k]:
-        _add_bar(plotter, at, axis, AXIS * size, 2.0 * AXIS_LENGTH * size, METAL)
+    for at, *axes in job["joints"][k]:
+        if depth:
+            _add_bar(plotter, at, (0.0, 0.0, 1.0), PIN * size, depth, METAL)
+        else:
+            plotter.add_mesh(pyvista.Sphere(PIN * size, at), color=METAL, smooth_shading=True, ambient=0.3)
+        for axis in axes:
+            _add_bar(plotter, at, axis, AXIS * size, 2.0 * AXIS_LENGTH * size, METAL)
     for at, *axes in job["tools"][k]:
         for axis, color in zip(np.array(axes), TOOL_COLORS, strict=True):
             middle = np.array(at) + 0.5 * TOOL_LENGTH * size * axis
             _add_bar(plotter, middle.tolist(), axis.tolist(), AXIS * size, TOOL_LENGTH * size, color)
     for at in job["ground"]:
-        _add_stand(plotter, at, (0.0, 0.0, 1.0), size)
+        _add_stand(plotter, at, (0.0, 0.0, 1.0) if job["in_space"] else (0.0, 1.0, 0.0), size)
 
 
 def _add_bar(plotter: Any, at: list[float], along: Sequence[float], radius: float, length: float, color: str) -> None:  # noqa: ANN401

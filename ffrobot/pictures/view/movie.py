@@ -15,7 +15,6 @@ from ...fe_models.modal_body_file import is_modal_body_file
 from ...results.file import Results
 from ..movie_file import Frame, MovieOptions, check_movie, movie_outputs, moving_analysis, write_movie
 from .grids import results_grid
-from .grids_3d import results_grid_3d
 from .pictures import draw_pictures
 from .view import motion_picture, visible_scale
 from .vtkhdf import vtkhdf_image
@@ -35,8 +34,7 @@ def view_movie(results_path: Path, path: Path, options: MovieOptions | None = No
     with Results(results_path) as results, tempfile.TemporaryDirectory() as place:
         analysis = moving_analysis(results, options.analysis)
         outputs, shown = np.unique(movie_outputs(results.time(analysis), options.seconds), return_inverse=True)
-        grid_of = results_grid_3d if results.is_spatial else results_grid
-        grid = grid_of(results, analysis, outputs, notes)
+        grid = results_grid(results, analysis, outputs, notes)
         steps = tuple(range(len(outputs)))
         scale = visible_scale(grid, steps) if options.scale is None else options.scale
         picture = motion_picture(results, analysis, outputs, grid, steps, scale, "deflection")

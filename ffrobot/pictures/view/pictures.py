@@ -30,11 +30,10 @@ class Picture:
         times: of these, in s; the title's `{time}`.
         scale: of deflections; None for a modal body, whose modes are drawn.
         length: of a modal body, in m.
-        in_space: whether z goes up, as in scenes in space.
+        in_space: whether z goes up, as in 3D scenes; y in planar ones.
         color: "deflection" or "von_mises".
-        joints: for each of the steps where joints are, exaggerated, in m.
-        axes: likewise the axes of joints in space: a place and a unit vector.
-        tools: likewise sections that follow paths in space: a place and the unit vectors x, y, z.
+        joints: for each of the steps joints: a place, exaggerated, in m, and the unit vectors of its axes.
+        tools: likewise sections that follow paths: a place and the unit vectors x, y, z.
         ground: where joints sit on the ground, in m.
         movie: whether it is one.
     """
@@ -48,8 +47,7 @@ class Picture:
     length: float = 0.0
     in_space: bool = False
     color: str = "deflection"
-    joints: Sequence[Sequence[Place]] = ((),)
-    axes: Sequence[Sequence[Sequence[Place]]] = ((),)
+    joints: Sequence[Sequence[Sequence[Place]]] = ((),)
     tools: Sequence[Sequence[Sequence[Place]]] = ((),)
     ground: Sequence[Place] = ()
     movie: bool = False

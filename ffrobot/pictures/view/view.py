@@ -14,14 +14,13 @@ from ...common.errors import InputError, SolveError, did_you_mean
 from ...common.files import check_folder, write_atomically
 from ...fe_models.modal_body_file import is_modal_body_file, read_modal_body
 from ...results.file import Results
-from ..drawn_body import ground_points
 from ..figures.shared import file_name
-from ..motion import visible_exaggeration
-from .grids import joint_places, modes_grid, results_grid
-from .grids_3d import marks_3d, results_grid_3d
+from ..markers import Marker, ground_places, joint_markers, tool_markers
+from ..motion import moving_bodies, visible_exaggeration
+from ..path_targets import targets
+from .grids import modes_grid, results_grid
 from .pictures import Picture, draw_pictures
 from .vtkhdf import Grid, vtkhdf_image
-from .xdmf import xdmf_text
 
 FRAMES = 201  # of an animation, unless asked for otherwise
 
@@ -54,9 +53,7 @@ class Viewed:
 
 
 def view_file(path: Path, folder: Path, options: Options | None = None) -> Viewed:
-    """Write grids and pictures (.png) of a modal body file or of a results file into `folder`.
-
-    Grids are .vtkhdf files, each with an .xdmf for programs that cannot read those.
+    """Write grids (.vtkhdf) and pictures (.png) of a modal body file or of a results file into `folder`.
 
     Raises `InputError` where the file cannot be read or has no such analysis, `SolveError` where a file cannot be
     written, or pictures that are asked for cannot be drawn: grids are written all the same. Where stresses of a surface
@@ -70,9 +67,7 @@ def view_file(path: Path, folder: Path, options: Options | None = None) -> Viewe
     for name, grid, shown in views:
         paths.append(folder / f"{name}.vtkhdf")
         write_atomically(paths[-1], vtkhdf_image(grid), "grid", make_folder=True)
-        paths.append(folder / f"{name}.xdmf")
-        write_atomically(paths[-1], xdmf_text(grid, paths[-2].name), "index of the grid")
-        pictures += [replace(picture, grid=str(paths[-2])) for picture in shown]
+        pictures += [replace(picture, grid=str(paths[-1])) for picture in shown]
     if options.pictures is not False:
         try:
             paths += _draw(pictures, folder)
@@ -96,8 +91,7 @@ def _results(path: Path, options: Options, notes: list[str]) -> Iterator[View]:
     with Results(path) as results:
         for analysis in _analyses(results, options.analysis):
             frames = _frames(results, analysis, options.frames)
-            grid_of = results_grid_3d if results.is_spatial else results_grid
-            grid, name = grid_of(results, analysis, frames, notes), file_name(analysis)
+            grid, name = results_grid(results, analysis, frames, notes), file_name(analysis)
             pictures = [_snapshot(results, analysis, frames, grid, options, color) for color in _colors(grid)]
             pictures[0] = replace(pictures[0], path=f"{name}.png")
             yield name, grid, [pictures[0], *(replace(other, path=f"{name}.stress.png") for other in pictures[1:])]
@@ -150,25 +144,28 @@ def motion_picture(
     assert grid.time is not None
     name, exaggerated = f"{results.name}: {analysis}", "" if scale == 1.0 else f", deformation x {scale:g}"
     braces = name.replace("{", "{{").replace("}", "}}")
-    picture = Picture(
+    bodies, shift = moving_bodies(results, analysis, frames[list(steps)])
+    joints = joint_markers(results.scene, bodies, shift)
+    tools = tool_markers(targets(results, analysis), bodies, shift)
+    return Picture(
         f"{braces}, t = {{time}} s{exaggerated}",
         steps=steps,
         times=tuple(float(t) for t in grid.time[list(steps)]),
         scale=scale,
         color=color,
+        in_space=not results.space.is_plane,
+        joints=_directed(joints, scale, len(steps)),
+        tools=_directed([tool for tool in tools if tool.directions.size], scale, len(steps)),
+        ground=as_rows(ground_places([results.scene])),
     )
-    if results.is_spatial:
-        return replace(picture, **marks_3d(results, analysis, frames[list(steps)], scale))
-    at, exaggeration = joint_places(results, analysis, frames[list(steps)])
-    joints = at + (scale - 1.0) * exaggeration
-    nothing: list[list[list[list[float]]]] = [[] for _ in steps]
-    return replace(
-        picture,
-        joints=[as_rows(places) for places in joints],
-        axes=nothing,
-        tools=nothing,
-        ground=[(x, y, 0.0) for x, y in ground_points([results.scene])],
-    )
+
+
+def _directed(markers: Sequence[Marker], scale: float, steps: int) -> list[list[list[list[float]]]]:
+    """At each of the steps, of each marker: its place, and its directions."""
+    return [
+        [as_rows(np.stack([marker.exaggerated(scale)[k], *marker.directions[k]])) for marker in markers]
+        for k in range(steps)
+    ]
 
 
 def _draw(pictures: Sequence[Picture], folder: Path) -> list[Path]:

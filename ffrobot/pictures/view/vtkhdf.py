@@ -18,9 +18,6 @@ from ...common.arrays import Array, Integers
 # VTK's number of the cell with so many corners: vertex, line, triangle, quadrilateral.
 CELL_TYPE = {1: 1, 2: 3, 3: 5, 4: 9}
 ROOT = "VTKHDF"
-TOPOLOGY = "XDMF/topology"  # outside of what VTKHDF describes: the cells as `xdmf` refers to them
-# How cells begin there, by number of corners: XDMF's number of the cell, and how many corners where that can vary.
-XDMF_HEADING = {1: (1, 1), 2: (2, 2), 3: (4,), 4: (5,)}
 
 
 @dataclass(frozen=True)
@@ -56,20 +53,9 @@ def vtkhdf_image(grid: Grid) -> bytes:
             _write(root, f"CellData/{name}", cell_values)
         if grid.time is not None:
             _write_steps(root, grid, grid.time)
-        _write(file, TOPOLOGY, mixed_topology(grid))
         file.flush()
         image: bytes = file.id.get_file_image()
         return image
-
-
-def mixed_topology(grid: Grid) -> Integers:
-    """The cells as XDMF has them where kinds are mixed, in one row."""
-    rows = []
-    for block in grid.cells:
-        heading = XDMF_HEADING[block.shape[1]]
-        rows.append(np.concatenate([np.broadcast_to(heading, (len(block), len(heading))), block], axis=1).ravel())
-    topology: Integers = np.concatenate(rows).astype(np.int64)
-    return topology
 
 
 def _write_cells(root: h5py.Group, grid: Grid) -> None:

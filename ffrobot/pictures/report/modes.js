@@ -1,17 +1,11 @@
-// Mode shapes in space: x + a Φ_k on the surface of a link, a being what the slider says.
+// Mode shapes: x + a Φ_k on the surface of a link, a being what the slider says.
 
 const MODES_3D = JSON.parse(document.getElementById("modes-3d-data").textContent);
 const modeStage = document.getElementById("modes-3d");
 const modeState = { link: 0, mode: 0, amplitude: 1, playing: false };
 
-function typed(entry, Kind) {
-  return new Kind(Uint8Array.from(atob(entry.bdata), (c) => c.charCodeAt(0)).buffer);
-}
-
 for (const link of MODES_3D.links) {
-  link.points = typed(link.points, Float32Array);
-  link.triangles = typed(link.triangles, Int32Array);
-  link.modes = typed(link.modes, Int16Array);
+  for (const key of ["points", "triangles", "modes"]) link[key] = typedArray(link[key]);
   link.count = link.points.length / 3;
 }
 
@@ -38,7 +32,7 @@ function modeAxes(link) {
     return [Math.min(...values) - reach, Math.max(...values) + reach];
   });
   const longest = Math.max(...ranges.map(([a, b]) => b - a));
-  const axis = (c, name) => ({ ...axisInSpace(), range: ranges[c], title: { text: `${name} (m)` }, showbackground: false });
+  const axis = (c, name) => ({ ...axis3D(), range: ranges[c], title: { text: `${name} (m)` }, showbackground: false });
   const ratio = (c) => (2.6 * (ranges[c][1] - ranges[c][0])) / longest;
   return {
     xaxis: axis(0, "x"), yaxis: axis(1, "y"), zaxis: axis(2, "z"),

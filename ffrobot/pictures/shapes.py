@@ -1,4 +1,4 @@
-"""What a body looks like in space, in its frame: its surface, the line of its stations, or lines between its points."""
+"""What a body looks like, in its frame: its surface, the line of its stations, or lines between its points."""
 
 from __future__ import annotations
 
@@ -6,13 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...common.arrays import Array, Integers
-from ...common.errors import InputError
-from ...common.rotations import smallest_turn
-from ...fe_models.modal_body import ModalBody
-from ...results.file import Results
-from ..body_surface import body_surface
-from ..motion import MovingBody
+from ..common.arrays import Array, Integers
+from ..common.errors import InputError
+from ..common.rotations import smallest_turn
+from ..fe_models.modal_body import ModalBody
+from ..results.file import Results
+from .body_surface import body_surface
+from .motion import MovingBody
 from .visuals import visual_surface
 
 SIDES = 8  # of bars that stand for lines
@@ -39,11 +39,11 @@ class Shape:
         """A Φ p (T, p, 3), m, global axes."""
         return body.turned(np.einsum("pin,tn->tpi", self.shapes, self.coordinates, optimize=True))
 
-    def placed(self, body: MovingBody, shift: Array, s: float) -> Array:
+    def placed(self, body: MovingBody, shift: Array | None = None, s: float = 1.0) -> Array:
         """Where its points are (T, p, 3), m, with deflections s times as large; joints stay shut by `shift` (T, 3)."""
         rest = body.placed(np.broadcast_to(self.points, (len(body.position), *self.points.shape)))
-        found: Array = rest + s * self.deflection(body) + (s - 1.0) * shift[:, None]
-        return found
+        found: Array = rest + s * self.deflection(body)
+        return found if shift is None else found + (s - 1.0) * shift[:, None]
 
 
 def surface_shape(results: Results, body: MovingBody, notes: list[str]) -> Shape:

@@ -1,4 +1,4 @@
-"""Joints and tool frames of scenes in space as pictures have them: where they are, along which directions they move."""
+"""Joints and tool frames as pictures have them: where they are, along which directions they move."""
 
 from __future__ import annotations
 
@@ -8,9 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from ...common.arrays import Array
-from ...mbs.fields.field_types import GROUND
-from ..motion import MovingBody, section_axes
+from ..common.arrays import Array
+from ..common.plane import in_3d
+from ..mbs.fields.field_types import GROUND
+from .motion import MovingBody, section_axes
+from .path_targets import Target
 
 
 @dataclass(frozen=True)
@@ -41,9 +43,16 @@ def joint_markers(scene: Mapping[str, Any], bodies: Sequence[MovingBody], shift:
 
 
 def tool_marker(point: str, bodies: Sequence[MovingBody], shift: Sequence[Array]) -> Marker:
-    """The section "BODY.POINT" with its axes x, y, z."""
+    """The section "BODY.POINT" with its axes x, y, z, without them in planar scenes."""
     position, exaggeration = _place(point, bodies, shift)
-    return Marker(point, position, exaggeration, section_axes(bodies, point, len(position)).swapaxes(1, 2))
+    T, is_known = len(position), any(body.sections.size for body in bodies)
+    axes = section_axes(bodies, point, T).swapaxes(1, 2) if is_known else np.zeros((T, 0, 3))
+    return Marker(point, position, exaggeration, axes)
+
+
+def tool_markers(targets: Iterable[Target], bodies: Sequence[MovingBody], shift: Sequence[Array]) -> list[Marker]:
+    """Of each point that follows a path, once."""
+    return [tool_marker(point, bodies, shift) for point in dict.fromkeys(target.point for target in targets)]
 
 
 def _joint(keys: Mapping[str, Any], bodies: Sequence[MovingBody], shift: Sequence[Array]) -> Marker:
@@ -52,7 +61,7 @@ def _joint(keys: Mapping[str, Any], bodies: Sequence[MovingBody], shift: Sequenc
     position, exaggeration = _place(side, bodies, shift)
     T = len(position)
     directions = [
-        section_axes(bodies, of, T) @ (np.array(keys[key]) / np.linalg.norm(keys[key]))
+        section_axes(bodies, of, T) @ in_3d(np.array(keys[key]) / np.linalg.norm(keys[key]))
         for key, of in (("axis", first), ("second_axis", second))
         if key in keys
     ]
@@ -70,5 +79,5 @@ def _place(side: str, bodies: Sequence[MovingBody], shift: Sequence[Array]) -> t
 def ground_places(scenes: Iterable[Mapping[str, Any]]) -> Array:
     """(g, 3) where joints of any of the scenes sit on the ground, each place once, in m."""
     joints = [joint for scene in scenes for joint in scene.get("joint", []) if GROUND in joint["between"]]
-    places = dict.fromkeys(tuple(map(float, joint.get("at", (0.0, 0.0, 0.0)))) for joint in joints)
-    return np.array(list(places)).reshape(-1, 3)
+    places = [in_3d(np.array(joint.get("at", (0.0, 0.0)), dtype=float)) for joint in joints]
+    return np.array(list(dict.fromkeys(map(tuple, places)))).reshape(-1, 3)

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...common.arrays import Array, Integers, as_floats
-from ...common.rotations import of_rpy
-from ...common.tables import shown
-from ...mbs.scene.bodies import PRIMITIVES
-from ...mesh.skins import loaded_skin, primitive_skin
-from ...results.file import Results
+from ..common.arrays import Array, Integers, as_floats
+from ..common.rotations import of_rpy
+from ..common.tables import shown
+from ..mbs.scene.bodies import PRIMITIVES
+from ..mesh.skins import loaded_skin, primitive_skin
+from ..results.file import Results
 
 if TYPE_CHECKING:
     import trimesh
