@@ -14,6 +14,7 @@ PACKAGES: Mapping[str, str] = {
     "pyvista": "pyvista",
     "imageio_ffmpeg": "imageio-ffmpeg",
     "pandas": "pandas",
+    "xarray": "xarray",
     "control": "control",
     "rosbags": "rosbags",
     "trimesh": "trimesh pycollada",

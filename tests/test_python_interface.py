@@ -227,6 +227,28 @@ def test_library_that_is_not_installed(results, monkeypatch):
     monkeypatch.setitem(sys.modules, "pandas", None)
     with pytest.raises(ffrobot.SolveError, match=r"this needs pandas, which is not installed: pip install pan"):
         results.frame("inverse")
+    monkeypatch.setitem(sys.modules, "xarray", None)
+    monkeypatch.delitem(sys.modules, "ffrobot.results.labelled", raising=False)
+    with pytest.raises(ffrobot.SolveError, match=r"this needs xarray, which is not installed: pip install xarray"):
+        results.to_xarray("inverse")
+
+
+def test_xarray_has_dimensions_units_and_coordinates(results):
+    """Every history as in the file; components by the names of their axes, modes by their numbers."""
+    pytest.importorskip("xarray")
+    dataset = results.to_xarray("inverse")
+    assert set(dataset.data_vars) | {"time"} == set(results.histories("inverse"))
+    for name, values in dataset.data_vars.items():
+        np.testing.assert_array_equal(values, results[f"inverse/{name}"])
+        assert values.dims[0] == "time"
+        assert "units" in values.attrs
+    np.testing.assert_array_equal(dataset["time"], results.time("inverse"))
+    tip, modal = dataset["points/arm.tip/position"], dataset["bodies/arm/modal"]
+    np.testing.assert_array_equal(tip.sel(axis="y"), results["inverse/points/arm.tip/position"][:, 1])
+    assert list(modal["mode of arm"]) == list(range(1, results.modal_body("arm").mode_count + 1))
+    units = {name: dataset[f"joints/shoulder/{name}"].attrs["units"] for name in ("coordinate", "rate", "moment")}
+    assert units == {"coordinate": "rad", "rate": "rad/s", "moment": "N m"}
+    assert dataset.attrs["kind"] == "pcid"
 
 
 def test_payload_without_mass(folder):

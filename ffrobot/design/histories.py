@@ -10,7 +10,8 @@ import numpy as np
 from ..common.arrays import Array, as_floats
 from ..common.errors import InputError, did_you_mean
 from ..mbs.joints.joints import JOINT_TYPES
-from ..results.file import COLUMN, Results
+from ..results.datasets import COLUMN
+from ..results.file import Results
 from ..results.meanings import RESULTS, meaning
 from ..sweep.runs import is_vector
 

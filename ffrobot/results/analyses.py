@@ -1,0 +1,129 @@
+"""Access to results by analysis: its histories as arrays and tables, its linear models, its verdict."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import h5py
+
+from ..common.arrays import Array
+from ..common.errors import InputError, quoted
+from ..common.extras import extras
+from ..common.hdf5 import blaming
+from .datasets import Datasets
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
+    from xarray import Dataset
+
+    from ..actuation.control.linear_model import LinearModel
+    from .verdict import Verdict
+
+
+class AnalysisAccess(Datasets):
+    """What a results file has of its analyses."""
+
+    @property
+    def analyses(self) -> list[str]:
+        """Names of the analyses that the file holds, in the order of the scene."""
+        return [entry["name"] for entry in self.scene["analysis"] if entry["name"] in self._file]
+
+    @property
+    def verdict(self) -> Verdict:
+        """Of every analysis: can it be done, peaks and RMS of motors, deflection, stress, warnings, what to try next.
+
+        `print(results.verdict)` is what `ffrobot solve` prints; `results.verdict["inverse"]` that of one analysis.
+        """
+        from .verdict import judge
+
+        with blaming(self.path):
+            return judge(self._file, self.analyses, self.scene)
+
+    @property
+    def warnings(self) -> dict[str, list[str]]:
+        """Why results of an analysis may be wrong, or not mean what they seem to; by analysis, where there is any."""
+        return self._texts("warnings")
+
+    @property
+    def notes(self) -> dict[str, list[str]]:
+        """What is worth knowing of right results of an analysis; by analysis, where there is any."""
+        return self._texts("notes")
+
+    def _texts(self, kind: str) -> dict[str, list[str]]:
+        told = {name: self.attributes(name).get(kind, ()) for name in self.analyses}
+        return {name: [str(text) for text in texts] for name, texts in told.items() if len(texts)}
+
+    def histories(self, analysis: str) -> list[str]:
+        """Names, inside an analysis, of its datasets with a row for each output."""
+        known: dict[str, list[str]] = self.__dict__.setdefault("_histories", {})  # a walk through a file takes ms
+        if analysis not in known:
+            found, outputs = known.setdefault(analysis, []), len(self.time(analysis))
+
+            def collect(name: str, item: h5py.Dataset | h5py.Group) -> None:
+                if isinstance(item, h5py.Dataset) and item.shape[:1] == (outputs,) and not name.startswith("resume/"):
+                    found.append(name)
+
+            self._file[analysis].visititems(collect)
+        return list(known[analysis])
+
+    def columns(self, analysis: str) -> dict[str, Array]:
+        """Everything an analysis holds over time, one (T,) array each.
+
+        The name is the dataset's inside the analysis, with the column where it has several:
+        `points/link2.tip/position[0]`.
+        """
+        found: dict[str, Array] = {}
+        for name in self.histories(analysis):
+            values = self[f"{analysis}/{name}"]
+            columns = values.reshape(len(values), -1)
+            labels = [name] if values.ndim == 1 else [f"{name}[{k}]" for k in range(columns.shape[1])]
+            found.update(zip(labels, columns.T, strict=True))
+        return found
+
+    def frame(self, analysis: str) -> DataFrame:
+        """`columns` of an analysis as a table of pandas, by time (s)."""
+        with extras():
+            from pandas import DataFrame
+
+        return DataFrame(self.columns(analysis)).set_index("time")
+
+    def to_xarray(self, analysis: str) -> Dataset:
+        """All histories of an analysis as a Dataset of xarray, named as in the file: dimensions, units, coordinates.
+
+        Dimension `time` (s), of what is in `control/` of a closed loop `control/time`; further dimensions have the
+        axes, modes, patches or components as coordinates. Attributes: `units`, `long_name`; of the Dataset those of the
+        analysis. Raises `SolveError` where xarray is not installed.
+        """
+        with extras():
+            from .labelled import labelled
+
+            return labelled(self, analysis)
+
+    def linear(self, analysis: str) -> tuple[LinearModel, ...]:
+        """The linear models of an analysis, one for each of its times. Raises `InputError` where it has none."""
+        if not self.has(f"{analysis}/linear"):
+            raise InputError(
+                f'{self.path}: expected a linear analysis ({quoted(self._with_models())}), found "{analysis}"'
+            )
+        from .linear import read_linear
+
+        return read_linear(self._file, analysis)
+
+    def linear_analysis(self, analysis: str | None) -> str:
+        """`analysis`, or the first that has linear models. Raises `InputError` where there is none."""
+        known = self._with_models()
+        if analysis is None and not known:
+            raise InputError(f'{self.path}: expected an analysis of kind = "linear", found none')
+        return analysis or known[0]
+
+    def export_linear(self, analysis: str | None, path: Path) -> str:
+        """Write the linear models of an analysis, the first that has any if not named, to .npz or .mat; its name."""
+        from .linear import save_models
+
+        name = self.linear_analysis(analysis)
+        save_models(self.linear(name), path)
+        return name
+
+    def _with_models(self) -> list[str]:
+        return [name for name in self.analyses if self.has(f"{name}/linear")]

@@ -1,0 +1,171 @@
+"""A results file as it lies on the disk: datasets, groups and attributes by name."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from os import PathLike
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from types import TracebackType
+from typing import Any, Self
+
+import h5py
+
+from ..common.arrays import Array
+from ..common.checksum import sealed
+from ..common.errors import InputError, did_you_mean, quoted
+from ..common.files import write_atomically
+from ..common.hdf5 import blaming, numbers, open_checked
+
+COLUMN = re.compile(r"(?P<dataset>.*?)\[(?P<column>\d+)\]")
+
+
+class _Attributes(dict[str, Any]):
+    """Attributes of a group, which messages call `where`; `InputError` for one that it does not have."""
+
+    def __init__(self, where: str, values: Mapping[str, Any]) -> None:
+        super().__init__(values)
+        self._where = where
+
+    def __missing__(self, name: str) -> Any:  # noqa: ANN401
+        raise InputError(f'{self._where}: expected the attribute "{name}", found none')
+
+
+class Datasets:
+    """An open HDF5 file with a scene; datasets are named as in the file: `inverse/points/link2.tip/position`.
+
+    Attributes:
+        path: of the file, as messages call it.
+        scene, scene_text: the scene file, as TOML has it and as text.
+    """
+
+    def _open(self, path: Path, content: PathLike[str] | str | h5py.h5f.FileID) -> None:
+        self.path, self._in_memory = path, isinstance(content, h5py.h5f.FileID)
+        try:
+            self._file = h5py.File(content, "r") if isinstance(content, h5py.h5f.FileID) else open_checked(path)
+        except OSError as error:
+            reason = "no such file" if not self.path.exists() else f"not a readable HDF5 file ({error})"
+            if self.path.suffix.lower() == ".toml" and self.path.exists():
+                reason = f"a scene or link file: solve it first (ffrobot solve {path}, which writes .results.h5)"
+            raise InputError(f"{path}: expected a results file, found {reason}") from None
+        if "scene" not in self._file.attrs:
+            self._file.close()
+            raise InputError(f"{path}: expected a results file, found an HDF5 file without a scene")
+        with blaming(path):
+            self.scene_text: str = self._file.attrs["scene"]
+            self.scene: dict[str, Any] = tomllib.loads(self.scene_text)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Close the file; nothing can be read afterwards."""
+        self._file.close()
+
+    def keys(self) -> list[str]:
+        """Names of all datasets, as `results[…]` takes them."""
+        names: list[str] = []
+        self._file.visititems(lambda name, item: names.append(name) if isinstance(item, h5py.Dataset) else None)
+        return [name for name in names if "/resume/" not in name]
+
+    def _ipython_key_completions_(self) -> list[str]:
+        """What an interactive session offers behind `results["`."""
+        return self.keys()
+
+    def __contains__(self, dataset: object) -> bool:
+        return isinstance(dataset, str) and self.has(dataset)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.keys())
+
+    def save(self, path: PathLike[str] | str) -> Path:
+        """Write results that are in memory only to the file `path`, or a copy of those that are in one.
+
+        Raises `InputError` where that would cost a file of another kind, `SolveError` where it cannot be written.
+        """
+        self._file.flush()
+        content: bytes = self._file.id.get_file_image()
+        write_atomically(Path(path), sealed(content), "results file")
+        return Path(path)
+
+    @contextmanager
+    def on_disk(self) -> Iterator[Path]:
+        """The file of the results; of those in memory a temporary one."""
+        if not self._in_memory:
+            yield self.path
+            return
+        with TemporaryDirectory() as folder:
+            yield self.save(Path(folder) / f"{Path(self.path).stem.strip('<>').replace(' ', '_')}.results.h5")
+
+    def attributes(self, group: str) -> Mapping[str, Any]:
+        """Attributes of an analysis or of one of its groups, such as `inverse/pzt/link1`.
+
+        Raises `InputError` where there is no such group, and when an attribute is asked for that it does not have.
+        """
+        if group not in self._file:
+            raise InputError(f'{self.path}: expected the group "{group}", found none{self._near(group)}')
+        return _Attributes(f"{self.path}: {group}", dict(self._file[group].attrs))
+
+    def names(self, group: str) -> list[str]:
+        """Names inside a group such as `inverse/points`; none when the file does not have it."""
+        return list(self._file[group]) if group in self._file else []
+
+    def has(self, dataset: str) -> bool:
+        """Whether the file holds this dataset or group."""
+        return dataset in self._file
+
+    def __getitem__(self, dataset: str) -> Array:
+        """A dataset with the shape it has in the file. Raises `InputError` if absent."""
+        item = self._file.get(dataset)
+        if isinstance(item, h5py.Group):
+            inside = quoted(f"{dataset}/{name}" for name in item)
+            raise InputError(f'{self.path}: expected the name of a dataset, found the group "{dataset}" of {inside}')
+        if not isinstance(item, h5py.Dataset):
+            raise InputError(f'{self.path}: expected the dataset "{dataset}", found none{self._near(dataset)}')
+        return numbers(item, f"{self.path}: {dataset}")
+
+    def time(self, dataset: str) -> Array:
+        """Output times (T,), in s, of the analysis that `dataset` belongs to; the analysis' own name does, too.
+
+        Of what is in `control/` of a closed loop, the times of its samples.
+        """
+        analysis, *inside = dataset.strip("/").split("/")
+        return self[f"{analysis}/control/time" if inside[:1] == ["control"] else f"{analysis}/time"]
+
+    def data(self, name: str) -> Array:
+        """A dataset as (T, columns), or one of its columns, `name[k]`, as (T, 1). Raises `InputError` if absent."""
+        match = COLUMN.fullmatch(name)
+        dataset = match["dataset"] if match else name
+        values = self[dataset]
+        values = values.reshape(len(values), -1)
+        if match is None:
+            return values
+        k = int(match["column"])
+        if k >= values.shape[1]:
+            raise InputError(f'{self.path}: expected column {k} of "{dataset}", found {values.shape[1]} columns')
+        return values[:, k : k + 1]
+
+    def peak(self, name: str) -> tuple[float, float]:
+        """The largest size of a history and when it has that, s, between outputs too where the file says so.
+
+        Of all columns, of one of them, `name[k]`, or of the length of a deflection or a reaction.
+        """
+        from .peaks import peak_of
+
+        match = COLUMN.fullmatch(name)
+        dataset = match["dataset"] if match else name
+        self[dataset]  # raises where there is none
+        return peak_of(self._file[dataset], self.time(dataset), int(match["column"]) if match else None)
+
+    def _near(self, dataset: str) -> str:
+        known: list[str] = []
+        self._file.visit(known.append)
+        return did_you_mean(dataset, known)

@@ -1,0 +1,96 @@
+"""Histories of an analysis as a Dataset of xarray: dimensions, coordinates, units."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from fnmatch import fnmatchcase
+from typing import TYPE_CHECKING, Any
+
+from xarray import Dataset
+
+from .joints import joint_coordinates
+from .meanings import RESULTS, meaning
+
+if TYPE_CHECKING:
+    from ..common.arrays import Array
+    from .analyses import AnalysisAccess
+
+TIME, SAMPLES = "time", "control/time"
+AXES, QUATERNION, STRESS = ("x", "y", "z"), ("w", "x", "y", "z"), ("xx", "yy", "zz", "yz", "xz", "xy")
+DIMENSIONS: tuple[tuple[str, str, tuple[str, ...]], ...] = (
+    ("bodies/*/modal*", "mode of {}", ()),
+    ("*/quaternion", "quaternion", QUATERNION),
+    ("bodies/*/*", "axis", AXES),
+    ("points/*/*", "axis", AXES),
+    ("momentum/*", "axis", AXES),
+    ("joints/*/reaction*", "axis", AXES),
+    ("joints/*/*", "coordinate of {}", ()),
+    ("pzt/*/residual_force", "mode", ()),
+    ("pzt/*/*", "patch of {}", ()),
+    ("trajectories/*/*", "component of {}", ()),
+    ("stress/*/points/*/stress", "stress", STRESS),
+    ("constraint_violation", "level", ("position", "velocity", "acceleration")),
+    ("control/*", "{}", ()),
+)
+"""Of datasets with columns: the name of their dimension, {} for the second part of their own, and its labels.
+
+Without labels columns are numbered from 1.
+"""
+
+
+def labelled(results: AnalysisAccess, analysis: str) -> Dataset:
+    """All histories of an analysis; see `AnalysisAccess.to_xarray`."""
+    names = [name for name in results.histories(analysis) if name != TIME]
+    if results.has(f"{analysis}/{SAMPLES}"):
+        inside = results.names(f"{analysis}/control")
+        names = [n for n in names if not n.startswith("control/")] + [f"control/{n}" for n in inside if n != TIME]
+    coordinates: dict[str, Any] = {}
+    variables: dict[str, Any] = {}
+    for name in names:
+        if not name.startswith("control/") or results.has(f"{analysis}/{name}"):
+            _add(results, analysis, name, variables, coordinates)
+    for name in (TIME, SAMPLES):
+        if results.has(f"{analysis}/{name}"):
+            coordinates[name] = (name, results[f"{analysis}/{name}"], {"units": "s"})
+    about = {key: value for key, value in results.attributes(analysis).items() if not isinstance(value, bytes)}
+    return Dataset(
+        variables, coordinates, {"scene": str(results.attributes("/")["name"]), "analysis": analysis} | about
+    )
+
+
+def _add(
+    results: AnalysisAccess, analysis: str, name: str, variables: dict[str, Any], coordinates: dict[str, Any]
+) -> None:
+    values = results[f"{analysis}/{name}"]
+    dimensions = [SAMPLES if name.startswith("control/") and results.has(f"{analysis}/{SAMPLES}") else TIME]
+    if values.ndim == 2:
+        dimension, labels = _columns(results, analysis, name, values)
+        if dimension in coordinates and list(coordinates[dimension][1]) != labels:
+            dimension = f"{dimension}, {name}"  # the same dimension with other labels
+        coordinates[dimension] = (dimension, labels)
+        dimensions.append(dimension)
+    else:
+        dimensions += [f"{name} {k}" for k in range(1, values.ndim)]
+    variables[name] = (dimensions, values, _about(results, name))
+
+
+def _columns(results: AnalysisAccess, analysis: str, name: str, values: Array) -> tuple[str, Sequence[Any]]:
+    """Name and labels of the second dimension of a dataset (T, columns)."""
+    count, part = values.shape[1], [*name.split("/"), name][1]
+    pattern = next((row for row in DIMENSIONS if fnmatchcase(name, row[0])), (name, name, ()))
+    dimension, labels = pattern[1].format(part), list(pattern[2][:count])
+    if name.startswith("trajectories/"):
+        labels = [str(one) for one in results.attributes(f"{analysis}/trajectories/{part}")["components"]]
+    return dimension, labels if len(labels) == count else list(range(1, count + 1))
+
+
+def _about(results: AnalysisAccess, name: str) -> dict[str, str]:
+    """Unit and meaning; of a joint's datasets those of its kind of coordinate."""
+    known = meaning(name, RESULTS)
+    if known is None:
+        return {}
+    units, parts = known.unit.split(", "), name.split("/")
+    if parts[0] == "joints" and len(units) == 2:  # of angles, of displacements
+        kinds = {one.unit for one in joint_coordinates(results.scene, parts[1])}
+        units = [unit for unit, kind in zip(units, ("rad", "m"), strict=True) if kind in kinds]
+    return {"units": ", ".join(units), "long_name": known.what}
