@@ -98,7 +98,7 @@ class AnalysisAccess(Datasets):
         with extras():
             from .labelled import labelled
 
-            return labelled(self, analysis)
+            return labelled(self, analysis, self.histories(analysis))
 
     def linear(self, analysis: str) -> tuple[LinearModel, ...]:
         """The linear models of an analysis, one for each of its times. Raises `InputError` where it has none."""

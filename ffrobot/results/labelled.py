@@ -13,7 +13,7 @@ from .meanings import RESULTS, meaning
 
 if TYPE_CHECKING:
     from ..common.arrays import Array
-    from .analyses import AnalysisAccess
+    from .datasets import Datasets
 
 TIME, SAMPLES = "time", "control/time"
 AXES, QUATERNION, STRESS = ("x", "y", "z"), ("w", "x", "y", "z"), ("xx", "yy", "zz", "yz", "xz", "xy")
@@ -38,9 +38,9 @@ Without labels columns are numbered from 1.
 """
 
 
-def labelled(results: AnalysisAccess, analysis: str) -> Dataset:
-    """All histories of an analysis; see `AnalysisAccess.to_xarray`."""
-    names = [name for name in results.histories(analysis) if name != TIME]
+def labelled(results: Datasets, analysis: str, histories: Sequence[str]) -> Dataset:
+    """All `histories` of an analysis, and the samples of a closed loop; see `AnalysisAccess.to_xarray`."""
+    names = [name for name in histories if name != TIME]
     if results.has(f"{analysis}/{SAMPLES}"):
         inside = results.names(f"{analysis}/control")
         names = [n for n in names if not n.startswith("control/")] + [f"control/{n}" for n in inside if n != TIME]
@@ -58,9 +58,7 @@ def labelled(results: AnalysisAccess, analysis: str) -> Dataset:
     )
 
 
-def _add(
-    results: AnalysisAccess, analysis: str, name: str, variables: dict[str, Any], coordinates: dict[str, Any]
-) -> None:
+def _add(results: Datasets, analysis: str, name: str, variables: dict[str, Any], coordinates: dict[str, Any]) -> None:
     values = results[f"{analysis}/{name}"]
     dimensions = [SAMPLES if name.startswith("control/") and results.has(f"{analysis}/{SAMPLES}") else TIME]
     if values.ndim == 2:
@@ -74,7 +72,7 @@ def _add(
     variables[name] = (dimensions, values, _about(results, name))
 
 
-def _columns(results: AnalysisAccess, analysis: str, name: str, values: Array) -> tuple[str, Sequence[Any]]:
+def _columns(results: Datasets, analysis: str, name: str, values: Array) -> tuple[str, Sequence[Any]]:
     """Name and labels of the second dimension of a dataset (T, columns)."""
     count, part = values.shape[1], [*name.split("/"), name][1]
     pattern = next((row for row in DIMENSIONS if fnmatchcase(name, row[0])), (name, name, ()))
@@ -84,7 +82,7 @@ def _columns(results: AnalysisAccess, analysis: str, name: str, values: Array) -
     return dimension, labels if len(labels) == count else list(range(1, count + 1))
 
 
-def _about(results: AnalysisAccess, name: str) -> dict[str, str]:
+def _about(results: Datasets, name: str) -> dict[str, str]:
     """Unit and meaning; of a joint's datasets those of its kind of coordinate."""
     known = meaning(name, RESULTS)
     if known is None:

@@ -148,7 +148,7 @@ def test_picture_of_the_mechanism(paused):
 
 def test_histories_show_what_the_file_holds(paused, two_link):
     draw_all(paused)
-    curve = "document.querySelector('[data-chart=\"deflection_link2.tip\"]').data.find((d) => d.name === 'inverse')"
+    curve = "document.querySelector('[data-chart=\"deflection_link2.tip\"]').data.find((d) => d.name === 'inverse, y')"
     # Plotly decodes the binary text into a typed array of its own.
     drawn = np.array(paused.value(f"Array.from({curve}._inputArray || {curve}.y._inputArray || {curve}.y)"))
     expected = 1e3 * two_link.file["inverse/points/link2.tip/deflection"][:, 1]  # in mm

@@ -5,8 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
+from matplotlib.patches import PathPatch
+from matplotlib.path import Path
 from mpl_toolkits.mplot3d.art3d import Line3DCollection  # type: ignore[import-untyped]
 
 from ...common.arrays import Array, Integers
@@ -45,10 +47,8 @@ class SceneAxes:
             self._lines(points[cells], color, width)
         elif cells.shape[1] > 2:
             front = cells[normals(points, cells) @ PLANE.viewer > FACING]
-            faces = points[front][..., self.columns]
-            # as pixels without smoothing: translucent neighbors would show a line between them
-            self.axes.add_collection(
-                PolyCollection(list(faces), facecolors=[color], alpha=FILL, antialiaseds=False, rasterized=True)
+            self.axes.add_patch(
+                PathPatch(_covered(points[front][..., self.columns]), color=color, alpha=FILL, linewidth=0)
             )
             self._lines(points[_ends(front)], color, 0.5 * width)
 
@@ -72,6 +72,13 @@ class SceneAxes:
             _equal_axes(self.axes, points)
         if label_size is not None:
             self.axes.tick_params(labelsize=label_size)
+
+
+def _covered(faces: Array) -> Path:
+    """One path around all faces (c, v, 2), so that neighbors are filled once, without a line between them."""
+    count, corners = faces.shape[:2]
+    codes = np.tile([Path.MOVETO, *[Path.LINETO] * (corners - 1), Path.CLOSEPOLY], count)
+    return Path(np.concatenate([faces, faces[:, :1]], axis=1).reshape(-1, 2), codes)
 
 
 def _ends(cells: Integers) -> Integers:

@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.image import NonUniformImage
 
+from ...common.arrays import Array
 from ...results.file import Results
 from .figure_file import Curve, FigureRecord
 from .palette import COLORS
 from .reading import curve_points, read_points
 from .style import legend, line_style, shades
+
+MANY, OFTEN = 4, 0.2  # columns, and part of the time at limits, above which lines hide each other
+NEAR = 1e-3  # of a limit: how close values are that are at it
 
 
 def draw_time_history(axes: Axes, figure: FigureRecord, results: Results) -> None:
@@ -19,18 +25,45 @@ def draw_time_history(axes: Axes, figure: FigureRecord, results: Results) -> Non
             axes.plot(time, values, "x", color="black", markersize=5, zorder=4, label=curve.label)
         else:
             _draw_columns(axes, curve, k, figure, results)
-    for k, limit in enumerate(figure.limits):
-        axes.axhline(limit, color=COLORS[1], linestyle="--", label="limit" if k == 0 else None)
     axes.set_xlabel(figure.x_label)
-    axes.set_ylabel(figure.y_label)
-    legend(axes)
+    if not axes.images:
+        for k, limit in enumerate(figure.limits):
+            axes.axhline(limit, color=COLORS[1], linestyle="--", label="limit" if k == 0 else None)
+        axes.set_ylabel(figure.y_label)
+        legend(axes)
 
 
 def _draw_columns(axes: Axes, curve: Curve, k: int, figure: FigureRecord, results: Results) -> None:
     time, values = curve_points(results, curve, figure.scale)
     axes.margins(x=0)
+    if is_crowded(values, figure.limits):
+        _draw_map(axes, time, values, curve.label, figure)
+        return
     if values.shape[1] == 1:
         axes.plot(time, values[:, 0], label=curve.label, **line_style(k, len(values), alone=len(figure.curves) == 1))
         return
     for column, color in enumerate(shades(values.shape[1])):
         axes.plot(time, values[:, column], color=color, linewidth=0.7, label=f"{curve.label} {column + 1}")
+
+
+def is_crowded(values: Array, limits: tuple[float, ...]) -> bool:
+    """Whether many columns of values (T, n) go from limit to limit, so that the last line hides the others."""
+    if values.shape[1] <= MANY or not limits:
+        return False
+    saturated = np.isclose(np.abs(values), max(map(abs, limits)), rtol=NEAR, atol=0.0)
+    return bool(saturated.mean() > OFTEN)
+
+
+def _draw_map(axes: Axes, time: Array, values: Array, label: str, figure: FigureRecord) -> None:
+    """A row for each column, in the color of its value: red at the upper limit, blue at the lower one."""
+    count, limit = values.shape[1], max(map(abs, figure.limits))
+    picture = NonUniformImage(axes, cmap="RdBu_r", extent=(time[0], time[-1], 0.5, count + 0.5))
+    picture.set_data(time, np.arange(1, count + 1), values.T)
+    picture.set_clim(-limit, limit)
+    axes.add_image(picture)
+    axes.set_xlim(time[0], time[-1])
+    axes.set_ylim(0.5, count + 0.5)
+    axes.set_yticks(range(1, count + 1))
+    axes.grid(visible=False)
+    axes.set_ylabel(label)
+    axes.figure.colorbar(picture, ax=axes, label=figure.y_label)
