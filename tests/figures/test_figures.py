@@ -4,6 +4,7 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,9 +12,11 @@ import pytest
 from ffrobot.cli import cli
 from ffrobot.common.errors import InputError
 from ffrobot.mbs.joints.transmission import MotorLimits
-from ffrobot.pictures.figures.figure_file import Curve, load_figures
+from ffrobot.pictures.figures.figure_file import Curve, FigureRecord, load_figures
 from ffrobot.pictures.figures.plot import plot_results
 from ffrobot.pictures.figures.reading import curve_points
+from ffrobot.pictures.figures.style import new_axes
+from ffrobot.pictures.figures.time_history import draw_time_history
 from ffrobot.pictures.torque_speed import limit_curves
 from ffrobot.results.file import Results
 
@@ -152,3 +155,20 @@ def test_magnitude_scale_and_x_of_a_curve(results):
         x, values = curve_points(held, Curve(data=name, label="", magnitude=True, x="inverse/joints/O/rate"), 1e3)
         np.testing.assert_allclose(values[:, 0], 1e3 * np.hypot(*held[name].T), rtol=1e-12)
         np.testing.assert_array_equal(x, held["inverse/joints/O/rate"])
+
+
+@pytest.mark.parametrize(("patches", "is_map"), [(10, True), (4, False)])
+def test_many_saturated_voltages_are_drawn_as_a_map(patches, is_map):
+    """A row for each patch with its voltage; few patches as lines, with their limits."""
+    time = np.linspace(0.0, 1.0, 50)
+    voltages = 200.0 * np.sign(np.sin(np.outer(time + 0.01, np.arange(1.0, patches + 1.0)) * 9.0))
+    results = SimpleNamespace(data=lambda _: voltages, time=lambda _: time)
+    record = FigureRecord(name="v", curves=(Curve(data="v", label="patch"),), y_label="voltage (V)", limits=(-200, 200))
+    figure, axes = new_axes("")
+    draw_time_history(axes, record, results)
+    figure.canvas.draw()
+    assert len(axes.images) == is_map
+    assert len(axes.lines) == (0 if is_map else patches + 2)
+    if is_map:
+        assert axes.images[0].get_clim() == (-200.0, 200.0)
+        assert axes.get_ylabel() == "patch"
