@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
-import numpy as np
 
-from ..common.arrays import Array
 from ..common.errors import InputError
 from ..common.parallel import processors
 from ..present.logs import FILE, logging_options, python_option
 from .protect import protect
+
+if TYPE_CHECKING:
+    from ..common.arrays import Array
 
 
 @click.command("map")
@@ -84,6 +86,8 @@ def map_(
 
 def _frequencies(text: str | None) -> Array:
     """FIRST:LAST:COUNT in Hz, evenly spaced; none without a text."""
+    import numpy as np
+
     if text is None:
         return np.zeros(0)
     try:
