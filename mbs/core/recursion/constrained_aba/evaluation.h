@@ -127,7 +127,7 @@ void response(const Mechanism<Space> &m, const T *q, const T *residual, Workspac
 template <class Space, class T>
 Placed<Space, T> place_all(const Mechanism<Space> &m, const T *q, const T *v,
                            const std::type_identity_t<T> *generalized, Workspace<Space, T> &w) {
-  kinematics(m, q, v, generalized, w);
+  kinematics(m, q, v, Forces<T>{generalized, nullptr}, w);
   locate(m, q, w);
   return {m, w, q, v, generalized};
 }

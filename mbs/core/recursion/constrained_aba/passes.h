@@ -10,7 +10,7 @@ namespace ffrobot::recursion {
 template <class Space, class T>
 FFROBOT_INLINE void kinematic_pass(const Mechanism<Space> &m, const T *q, const T *v, const Forces<T> &forces,
                                    Workspace<Space, T> &w) {
-  kinematics(m, q, v, forces.generalized, w);
+  kinematics(m, q, v, forces, w);
   if (m.needs_positions)
     locate(m, q, w);
 }

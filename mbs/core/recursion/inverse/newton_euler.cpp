@@ -99,7 +99,7 @@ NewtonEuler<Space>::NewtonEuler(const Mechanism<Space> &mechanism)
 template <class Space>
 void NewtonEuler<Space>::prepare(const double *q, const double *v, const double *generalized,
                                  Workspace<Space, double> &w) {
-  kinematics(mechanism_, q, v, generalized, w);
+  kinematics(mechanism_, q, v, recursion::Forces<double>{generalized, nullptr}, w);
   locate(mechanism_, q, w);
   for (std::size_t i = 0; i < mechanism_.nodes.size(); ++i) {
     const Node<Space> &node = mechanism_.nodes[i];

@@ -206,7 +206,7 @@ template <class Space> void NewtonPosture<Space>::find_gradients(const Workspace
 }
 
 template <class Space> void NewtonPosture<Space>::take(const double *q, Workspace<Space, double> &w) {
-  kinematics(mechanism_, q, rest_.data(), nullptr, w);
+  kinematics(mechanism_, q, rest_.data(), recursion::Forces<double>(), w);
   if (mechanism_.needs_positions)
     locate(mechanism_, q, w);
   for (std::size_t i = 0; i < bodies_.size(); ++i)

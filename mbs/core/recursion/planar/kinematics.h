@@ -16,14 +16,15 @@ template <class T> FFROBOT_INLINE T section_rate(const planar::Body &b, int port
 }
 
 template <class T>
-FFROBOT_NOINLINE void kinematics(const Mechanism<Planar> &m, const T *q, const T *v,
-                                 const std::type_identity_t<T> *generalized, Workspace<Planar, T> &w) {
+FFROBOT_NOINLINE void kinematics(const Mechanism<Planar> &m, const T *q, const T *v, const Forces<T> &forces,
+                                 Workspace<Planar, T> &w) {
   const std::size_t count = w.hinges.size();
   Angles<T> angles;
   for (std::size_t i = 0; i < count; ++i) {
     const Node<Planar> &node = m.nodes[i];
     planar::State<T> &s = w.bodies[i];
-    project(node.body, q + node.p_q(), v + node.p_v(), generalized ? generalized + node.p_v() : nullptr, s);
+    project(node.body, q + node.p_q(), v + node.p_v(), forces.generalized ? forces.generalized + node.p_v() : nullptr,
+            s);
     if (node.body.stiffening)
       bend(node.body, q + node.p_q(), v + node.p_v(), s);
     T angle = T(node.inner_angle);

@@ -112,8 +112,8 @@ template <class T> FFROBOT_INLINE void force_columns(const Node<Spatial> &node, 
 } // namespace spatial
 
 template <class T>
-FFROBOT_NOINLINE void kinematics(const Mechanism<Spatial> &m, const T *q, const T *v,
-                                 const std::type_identity_t<T> *generalized, Workspace<Spatial, T> &w) {
+FFROBOT_NOINLINE void kinematics(const Mechanism<Spatial> &m, const T *q, const T *v, const Forces<T> &forces,
+                                 Workspace<Spatial, T> &w) {
   Angles<T> angles;
   for (std::size_t i = 0; i < m.nodes.size(); ++i) {
     const bool turns = m.nodes[i].joint == JointKind::revolute;
@@ -123,7 +123,8 @@ FFROBOT_NOINLINE void kinematics(const Mechanism<Spatial> &m, const T *q, const 
     const Node<Spatial> &node = m.nodes[i];
     spatial::State<T> &s = w.bodies[i];
     Hinge<Spatial, T> &hinge = w.hinges[i];
-    project(node.body, q + node.p_q(), v + node.p_v(), generalized ? generalized + node.p_v() : nullptr, s);
+    project(node.body, q + node.p_q(), v + node.p_v(), forces.generalized ? forces.generalized + node.p_v() : nullptr,
+            s);
     spatial::InnerSection<T> inner;
     spatial::inner_section(m, node, w, inner);
     if (node.joint == JointKind::revolute)
