@@ -44,7 +44,8 @@ class Linearisation:
         Those in the right half plane; but lightly damped vibrations, whose zeros may cross the imaginary axis along the
         path, only where they grow too far over all of it, by exp ∫ Re s dt. Else they start at rest and ring on: a jump
         in jerk excites them by about 10/(|s| T) of a deflection, of which they may come to a tenth. A zero that leaves
-        through infinity and comes back elsewhere counts at each time as it is then.
+        through infinity and comes back elsewhere counts at each time as it is then. So do conjugates of which one
+        was a motion that the future tells, and the other was not.
         """
         from scipy.integrate import trapezoid
 
@@ -56,7 +57,13 @@ class Linearisation:
         flags = np.where(jumps, is_unstable(s) & ~light, future)
         found = np.zeros(s.shape, dtype=bool)
         np.put_along_axis(found, places, flags, axis=1)
-        return found
+        return np.where(self._is_parted(found), is_unstable(self.zeros) & ~self.is_light, found)
+
+    def _is_parted(self, flags: Booleans) -> Booleans:
+        """Which zeros (N, 2n) have another flag than their conjugates: two real ones of both sides that have met."""
+        apart = np.abs(self.zeros[:, :, None] - self.zeros[:, None].conj())
+        parted: Booleans = flags != np.take_along_axis(flags, apart.argmin(axis=2), axis=1)
+        return parted
 
     @property
     def _followed(self) -> tuple[NDArray[np.int_], Booleans]:

@@ -319,3 +319,14 @@ def test_light_vibrations_that_cross_the_axis_are_of_the_past_until_they_grow_to
     assert not is_unstable(linear.zeros[0][is_vibration[0]]).any()
     assert (linear.is_future[is_vibration] == future).all()
     np.testing.assert_array_equal(linear.is_future[~is_vibration], linear.zeros[~is_vibration].real > 0)
+
+
+def test_conjugate_zeros_belong_to_the_same_side():
+    """p̈ + 2 ζ ṗ + k p = 0, k from −100 to 100 1/s²: zeros at ±10 1/s meet and become a light vibration at ±10i 1/s."""
+    times = np.linspace(0.0, 1.0, 41)
+    M, D = np.ones((41, 1, 1)), np.full((41, 1, 1), 0.02)
+    K = np.linspace(-100.0, 100.0, 41)[:, None, None]
+    linear = Linearisation(LinearDynamics(times, M, D, K), np.zeros((41, 1)), np.array([10.0]))
+    np.testing.assert_array_equal(linear.is_future[0], linear.zeros[0].real > 0)
+    assert linear.is_future[0].sum() == 1
+    assert not linear.is_future[-1].any()
