@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.linalg import eigh
 from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
@@ -149,3 +150,43 @@ def test_a_free_joint_without_motor_has_no_stiffness(tmp_path):
     with write(tmp_path, scene) as results:
         assert np.isinf(results["rest/joints_locked/compliance/bob.tip"][0]).all()
         assert results["rest/joints_locked/frequency"][0] == pytest.approx([0.0])
+
+
+def test_frequencies_of_a_rigid_arm_of_six_axes_on_compliant_gears(tmp_path):
+    """M = Σ m JᵥᵀJᵥ + JωᵀI Jω of the links assembled here, K of the gears: rotors stand still, gravity is off."""
+    rng = np.random.default_rng(6)
+    axes = np.eye(3)[[2, 1, 1, 0, 1, 0]]
+    offsets, angles = rng.uniform(-0.3, 0.5, (6, 3)), rng.uniform(-1.2, 1.2, 6)
+    masses, centers = rng.uniform(1.0, 6.0, 6), rng.uniform(-0.1, 0.2, (6, 3))
+    stiffness, inertias = rng.uniform(2e3, 3e4, 6), []
+    scene, before = 'name = "six"\nspace = "spatial"\ngravity = [0.0, 0.0, 0.0]\n', "ground"
+    for k in range(6):
+        turn = Rotation.random(random_state=k).as_matrix()
+        inertias.append(turn @ np.diag(masses[k] * np.array([2e-3, 3e-3, 4e-3])) @ turn.T)
+        rows = inertias[k].tolist()
+        scene += f'[[body]]\nname = "b{k}"\nrigid = {{ mass = {masses[k]!r}, center = {centers[k].tolist()}, '
+        scene += f"inertia = {rows}, points = {{ root = [0.0, 0.0, 0.0], tip = {offsets[k].tolist()} }} }}\n"
+        scene += f'[[joint]]\nname = "j{k}"\ntype = "revolute"\nbetween = ["{before}", "b{k}.root"]\n'
+        scene += f"axis = {axes[k].tolist()}\ngear_ratio = 80.0\nrotor_inertia = 3e-5\nstiffness = {stiffness[k]!r}\n"
+        before = f"b{k}.tip"
+    start = ", ".join(f"j{k} = {angle!r}" for k, angle in enumerate(angles.tolist()))
+    scene += f'[initial]\njoints = {{ {start} }}\n[[analysis]]\nname = "rest"\nkind = "static"\npoints = ["b5.tip"]\n'
+    R, place, joints, M = np.eye(3), np.zeros(3), [], np.zeros((6, 6))
+    for k in range(6):
+        axis = R @ axes[k]
+        R = R @ Rotation.from_rotvec(angles[k] * axes[k]).as_matrix()
+        joints.append((place, axis))
+        center, inertia = place + R @ centers[k], R @ inertias[k] @ R.T
+        J_v, J_w = np.zeros((3, 6)), np.zeros((3, 6))
+        for i, (at, about) in enumerate(joints):
+            J_v[:, i], J_w[:, i] = np.cross(about, center - at), about
+        carrier = axis @ J_w - np.eye(6)[k]  # the rotor turns with the body before, about its own axis, too
+        M += masses[k] * J_v.T @ J_v + J_w.T @ inertia @ J_w + 3e-5 * np.outer(carrier, carrier)
+        place = place + R @ offsets[k]
+    J = np.array([np.concatenate([np.cross(about, place - at), about]) for at, about in joints]).T
+    expected = np.sqrt(eigh(np.diag(stiffness), M, eigvals_only=True)) / (2 * np.pi)
+    with write(tmp_path, scene) as results:
+        np.testing.assert_allclose(results["rest/joints_compliant/frequency"][0], expected, rtol=1e-10)
+        C = results["rest/joints_compliant/compliance/b5.tip"][0]
+        assert results["rest/joints_locked/frequency"].shape == (1, 0)
+    np.testing.assert_allclose(C, J @ np.diag(1 / stiffness) @ J.T, atol=1e-10 * np.abs(C).max())
