@@ -23,14 +23,23 @@ def info(file: Path) -> None:
 @click.command()
 @click.argument("results_file", metavar="RESULTS.h5", type=FILE)
 @click.option("--analysis", metavar="NAME", help="Single analysis.")
-def feasibility(results_file: Path, analysis: str | None) -> None:
-    """Compare required torques and voltages of a results file with the limits, and list remedies."""
+@click.option("--catalog", metavar="MOTORS.csv", type=FILE, help="Catalog of motors to choose from (CSV or TOML).")
+def feasibility(results_file: Path, analysis: str | None, catalog: Path | None) -> None:
+    """Compare required torques and voltages of a results file with the limits, and list remedies.
+
+    With a catalog: motors and gears that can do it, for each joint.
+    """
     from ..common.hdf5 import reading
     from ..present.feasibility import print_feasibility
     from ..present.summary import summary_console
 
     with reading(results_file):
-        print_feasibility(results_file, analysis, summary_console())
+        if catalog is None:
+            print_feasibility(results_file, analysis, summary_console())
+            return
+        from ..present.motor_choice import print_motor_choice
+
+        print_motor_choice(results_file, catalog, analysis, summary_console())
 
 
 @click.command()
