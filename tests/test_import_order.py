@@ -24,6 +24,7 @@ FLOORS = {
         "scene",
         "run",
         "results",
+        "map",
         "present",
         "exchange",
         "pictures",

@@ -76,7 +76,7 @@ def map_(
     path, console = write_map(found), summary_console()
     print_map(found, console)
     if figures:
-        from ..pictures.pose_map import draw_map
+        from ..pictures.studies.pose_map import draw_map
 
         for picture in draw_map(found):
             console.print(f"figure     {picture}", soft_wrap=True)

@@ -15,7 +15,7 @@ from ffrobot.common.errors import InputError
 from ffrobot.map.map_file import write_map
 from ffrobot.map.pose_map import make_map, plan_map
 from ffrobot.map.quantities import quantities
-from ffrobot.pictures.pose_map import draw_map
+from ffrobot.pictures.studies.pose_map import draw_map
 from ffrobot.run.watcher import Watcher
 
 LINK = """name = "{name}"

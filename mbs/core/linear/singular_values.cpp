@@ -8,9 +8,7 @@ namespace ffrobot {
 
 using Eigen::MatrixXd;
 
-Eigen::VectorXd singular_values(const MatrixXd &A) {
-  return Eigen::JacobiSVD<MatrixXd>(A).singularValues();
-}
+Eigen::VectorXd singular_values(const MatrixXd &A) { return Eigen::JacobiSVD<MatrixXd>(A).singularValues(); }
 
 MatrixXd null_space(const MatrixXd &A, double dependent) {
   if (A.rows() == 0)

@@ -75,8 +75,7 @@ Matrix3d from_e_z_to(const Vector3d &z) {
 Turning by_direction(const Vectors &d) {
   const double size = d.x.norm(), slope = d.rate.dot(d.x) / (size * size);
   const Vector3d z = d.x / size, z_dot = d.rate / size - slope * z;
-  return {from_e_z_to(z), z.cross(z_dot),
-          z.cross(d.acceleration / size - 2 * slope * z_dot)};
+  return {from_e_z_to(z), z.cross(z_dot), z.cross(d.acceleration / size - 2 * slope * z_dot)};
 }
 
 } // namespace

@@ -11,12 +11,12 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ..common.arrays import Array
-from ..common.files import write_atomically
-from ..map.pose_map import PoseMap
-from ..map.quantities import Quantity, quantities
-from ..mbs.solve.workspace import GridAxis
-from .figures.style import ORDERED, SIZE, style
+from ...common.arrays import Array
+from ...common.files import write_atomically
+from ...map.pose_map import PoseMap
+from ...map.quantities import Quantity, quantities
+from ...mbs.solve.workspace import GridAxis
+from ..figures.style import ORDERED, SIZE, style
 
 WORST, BEST = "#c22f2f", "#1f5fa8"
 WIDE = (2 * SIZE[0], 1.3 * SIZE[1])  # inches
