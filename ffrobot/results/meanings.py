@@ -89,6 +89,14 @@ tracking/bound/time | s | at which that counts
 tracking/bound/zero | 1/s | real and imaginary part
 zero_dynamics/time | s | of the zeros
 zero_dynamics/zeros | 1/s | along the path, real and imaginary part
+joints_locked/frequency | Hz | natural frequencies, joints locked
+joints_locked/damping_ratio | | of these vibrations
+joints_locked/modes/** | | their mode shapes
+joints_locked/compliance/* | m/N, rad/N, 1/(N m) | of the point: motion by forces and moments
+joints_compliant/frequency | Hz | natural frequencies, motors locked behind compliant gears
+joints_compliant/damping_ratio | | of these vibrations
+joints_compliant/modes/** | | their mode shapes
+joints_compliant/compliance/* | m/N, rad/N, 1/(N m) | of the point: motion by forces and moments
 linear/A | | of x' = A x + B u
 linear/B | | of x' = A x + B u
 linear/C | | of y = C x + D u
