@@ -17,7 +17,7 @@ from .commands.fit import fit
 from .commands.link import link
 from .commands.map import map_
 from .commands.pictures import plot, report, view
-from .commands.read import feasibility, info, linear
+from .commands.read import feasibility, info, linear, pose
 from .commands.solve import solve
 from .commands.sweep import sweep
 from .commands.uncertainty import uncertainty
@@ -57,8 +57,8 @@ def schema(kind: str) -> None:
 
 
 for command in (
-    link, solve, info, feasibility, plot, view, report, linear, sweep, map_, fit, sensitivity, optimise, uncertainty,
-    import_, export, bench,
+    link, solve, info, feasibility, plot, view, report, linear, pose, sweep, map_, fit, sensitivity, optimise,
+    uncertainty, import_, export, bench,
 ):  # fmt: skip
     cli.add_command(command)
 optimize = copy(optimise)

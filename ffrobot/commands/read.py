@@ -1,4 +1,4 @@
-"""The commands that say what files hold: `info`, `feasibility` and `linear`."""
+"""The commands that say what files hold: `info`, `feasibility`, `linear` and `pose`."""
 
 from __future__ import annotations
 
@@ -6,7 +6,8 @@ from pathlib import Path
 
 import click
 
-from ..present.logs import FILE
+from ..present.logs import FILE, logging_options, python_option
+from .protect import protect
 
 
 @click.command()
@@ -55,3 +56,19 @@ def linear(results_file: Path, analysis: str | None, output: Path | None) -> Non
     with reading(results_file), Results(results_file) as results:
         name = results.export_linear(analysis, path)
     click.echo(f"{path}: linear model of {name}")
+
+
+@click.command()
+@click.argument("scene_file", metavar="SCENE.toml", type=FILE)
+@python_option
+@logging_options
+def pose(scene_file: Path) -> None:
+    """Print the posture in which a scene starts, and the other ones that reach the same places (elbow, wrist)."""
+    from ..present.progress import Display
+    from ..present.start_postures import print_start
+    from ..present.summary import summary_console
+    from ..run.inputs import files_of
+
+    protect(files_of(scene_file))
+    with Display() as display:
+        print_start(scene_file, display, summary_console())

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...common.arrays import Array, as_floats
+from ...common.arrays import Array, Indices, as_floats
 from ...common.errors import InputError
 from ..fields.field_types import split_point
 from ..model.model import Model, row_values
@@ -95,21 +95,31 @@ def working_guess(model: Model, guess: Array) -> str:
 
     Of random coordinates of joints that turn, those nearest to `guess` (n_q,); others stay there.
     """
-    tree, random = model.tree, np.random.default_rng(0)
-    turning = [node for node in tree.nodes if node.joint.name in tree.carried and "rad" in node.joint.units]
-    columns = np.array([node.q.start + k for node in turning for k in _angles(node)], dtype=int)
+    turning, columns = turning_joints(model)
     if not columns.size or not model.rows:
         return ""
-    starts = np.tile(guess, (TRIES, 1))
-    starts[:, columns] = random.uniform(-np.pi, np.pi, (TRIES, len(columns)))
-    found = _met(model, starts)
+    found = regular_postures(model, random_angles(guess, columns, TRIES))
     rounded = np.tile(guess, (len(found), 1))
     rounded[:, columns] = np.radians(np.round(np.degrees(np.angle(np.exp(1j * found[:, columns])))))
-    works = [q for q in rounded if len(_met(model, q[None]))]
+    works = [q for q in rounded if len(regular_postures(model, q[None]))]
     if not works:
         return ""
     nearest = min(works, key=lambda q: float(np.abs(q[columns] - guess[columns]).sum()))
-    return f"joints = {{ {', '.join(_written(turning, nearest))} }}"
+    return as_guess(turning, nearest)
+
+
+def turning_joints(model: Model) -> tuple[list[Node], Indices]:
+    """The joints of the tree that turn, and where their angles are in q."""
+    tree = model.tree
+    turning = [node for node in tree.nodes if node.joint.name in tree.carried and "rad" in node.joint.units]
+    return turning, np.array([node.q.start + k for node in turning for k in _angles(node)], dtype=np.intp)
+
+
+def random_angles(guess: Array, columns: Indices, count: int) -> Array:
+    """`count` postures (…, n_q) as `guess` (n_q,) with random angles in `columns`, the same each time."""
+    starts = np.tile(guess, (count, 1))
+    starts[:, columns] = np.random.default_rng(0).uniform(-np.pi, np.pi, (count, len(columns)))
+    return starts
 
 
 def _angles(node: Node) -> list[int]:
@@ -118,7 +128,7 @@ def _angles(node: Node) -> list[int]:
     return [int(k) for k in np.flatnonzero(of_state)]
 
 
-def _met(model: Model, q: Array) -> Array:
+def regular_postures(model: Model, q: Array) -> Array:
     """Of postures next to q (T, n_q) those (…, n_q) that meet all rows at t = 0 and are regular."""
     found, is_met = solve_postures(model, np.zeros(len(q)), q)
     joints, length = model.tree.joint_columns, robot_size(model)
@@ -131,13 +141,17 @@ def _met(model: Model, q: Array) -> Array:
     return regular
 
 
+def as_guess(nodes: Sequence[Node], q: Array) -> str:
+    """The coordinates of joints at q (n_q,) as [initial] has them: "joints = { … }"."""
+    return f"joints = {{ {', '.join(_written(nodes, q))} }}"
+
+
 def _written(nodes: Sequence[Node], q: Array) -> Iterator[str]:
-    """The coordinates of joints as a scene has them."""
     for node in nodes:
         x = node.joint.coordinates(q[node.q])
         x = node.joint.turned_around(x) if node.backwards else x
         numbers = [
-            f'"{np.degrees(value):.4g}*deg"' if unit == "rad" else f"{value:.6g}"
+            f'"{round(np.degrees(value), 4) + 0.0:.6g}*deg"' if unit == "rad" else f"{value:.6g}"
             for value, unit in zip(x.tolist(), node.joint.units, strict=True)
         ]
         yield f"{node.joint.name} = " + (numbers[0] if len(numbers) == 1 else f"[{', '.join(numbers)}]")

@@ -62,7 +62,7 @@ def grid_postures(model: Model, axes: Sequence[GridAxis], point: str, *, keeps_o
     robot = replace(robot, rows=(*robot.rows, *rows))
     seed = tuple(int(np.abs(axis.values - now).argmin()) for axis, now in zip(axes, measured, strict=True))
     q, reached = _flooded(robot, start, shape, int(np.ravel_multi_index(seed, shape)))
-    return Postures(q, reached, _within_limits(model, q))
+    return Postures(q, reached, within_limits(model, q))
 
 
 def _flooded(model: Model, start: Array, shape: tuple[int, ...], seed: int) -> tuple[Array, Booleans]:
@@ -144,8 +144,8 @@ def _orientation(model: Model, point: str, start: Array) -> list[ConstraintRow]:
     return [ConstraintRow("orientation", "rotation", ground, section, e, e, law=law) for e in axes]
 
 
-def _within_limits(model: Model, q: Array) -> Booleans:
-    """(P,) of the joints of the tree with one coordinate each."""
+def within_limits(model: Model, q: Array) -> Booleans:
+    """(P,) whether postures q (P, n_q) keep the limits of the joints of the tree with one coordinate each."""
     within = np.ones(len(q), dtype=bool)
     for joint in model.scene.joint:
         if joint.name in model.tree.carried and len(joint.units) == 1:

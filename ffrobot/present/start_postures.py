@@ -1,0 +1,61 @@
+"""What `ffrobot pose` prints: where a scene starts, and the other postures that it could start in."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+from rich.console import Console
+
+from ..common.arrays import Array
+from ..mbs.model.model import Model
+from ..mbs.scene.space import SPACES
+from ..mbs.solve.branches import start_postures
+from ..mbs.solve.workspace import within_limits
+from ..run.solve import prepare_scene
+from ..run.watcher import Watcher
+from .tables import print_table
+
+
+def print_start(path: Path, watcher: Watcher, console: Console) -> None:
+    """Joints with their guesses, the points of paths, and lines for [initial] that choose other postures."""
+    model = prepare_scene(path, watcher).model
+    first, *others = start_postures(model)
+    print_table(console, ("joint", "start", "guess in [initial]", "limits"), _joints(model, first.q))
+    print_table(console, ("point", "at (m)"), _points(model, first.q))
+    if others:
+        console.print(f"other starts: {len(others)} found; a line of [initial] chooses one")
+    for other in others:
+        beyond = "" if within_limits(model, other.q[None])[0] else " (beyond joint limits)"
+        console.print(f"  {np.degrees(other.away):.0f}° away{beyond}: {other.guess}", soft_wrap=True)
+
+
+def _joints(model: Model, q: Array) -> Iterator[tuple[str, ...]]:
+    for joint in model.scene.joint:
+        if joint.name not in model.tree.carried:
+            yield joint.name, "closes a loop", "", ""
+            continue
+        node = model.tree.nodes[model.tree.carried[joint.name]]
+        values = joint.coordinates(q[node.q])
+        values = joint.turned_around(values) if node.backwards else values
+        guesses = np.atleast_1d(np.array(model.scene.initial.joints.get(joint.name, np.nan), dtype=float))
+        for k, (value, unit) in enumerate(zip(values.tolist(), joint.units, strict=True)):
+            guess = guesses[k] if k < len(guesses) else np.nan
+            limits = joint.position_limits[k]
+            known = f"{_in(limits[0], unit)} … {_in(limits[1], unit)}" if np.isfinite(limits).any() else ""
+            yield (joint.name if k == 0 else ""), _in(value, unit), _in(guess, unit), known
+
+
+def _in(value: float, unit: str) -> str:
+    if np.isnan(value):
+        return ""
+    return f"{round(np.degrees(value), 6) + 0.0:.5g}°" if unit == "rad" else f"{value:.5g} m"
+
+
+def _points(model: Model, q: Array) -> Iterator[tuple[str, str]]:
+    tree, frames = model.tree, model.tree.frames(q[None])
+    for point in dict.fromkeys(path.point for path in model.scene.trajectory if path.point is not None):
+        r = tree.motion(tree.section(point, np.eye(3)), q[None], frames).r[0]
+        place = SPACES[model.scene.space].along(r)
+        yield point, ", ".join(f"{round(x, 9) + 0.0:.5g}" for x in place)
