@@ -14,7 +14,7 @@ from .drives import Drive
 from .model import Model
 from .rows import ConstraintRow
 from .transmission import compliance
-from .tree import ElasticGearInSpace, KinematicTree, Node, Section
+from .tree import CompliantGear, KinematicTree, Node, Section
 
 
 def elastic_joints(model: Model) -> list[Node]:
@@ -45,7 +45,7 @@ def with_compliance(model: Model) -> Model:
     firm = {node.body.name: _without_rotor(node) for node in elastic}
     tree.nodes = tuple(firm.get(node.body.name, node) for node in tree.nodes)
     tree.gears = tuple(
-        ElasticGearInSpace(output, firm[node.body.name], -1.0 if node.backwards else 1.0, *(compliance(node) or (0, 0)))
+        CompliantGear(output, firm[node.body.name], -1.0 if node.backwards else 1.0, *(compliance(node) or (0, 0)))
         for output, node in zip(outputs, elastic, strict=True)
     )
     more = np.zeros(len(outputs))

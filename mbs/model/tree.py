@@ -84,7 +84,7 @@ class Node:
     p_v: slice
 
 
-class ElasticGearInSpace(NamedTuple):
+class CompliantGear(NamedTuple):
     """A gear that gives: spring `stiffness` k (N·m/rad) and damper `damping` c (N·m·s/rad) behind a motor of the tree.
 
     The twist δ is that of `motor`, whose coordinate is θ_m, against `joint`, whose coordinate is `sign` γ: δ = θ_m − γ.
@@ -110,7 +110,7 @@ class KinematicTree:
     `on_frames` names joints whose angles are those of frames (see `frames_3d`).
     """
 
-    gears: tuple[ElasticGearInSpace, ...] = ()
+    gears: tuple[CompliantGear, ...] = ()
     on_frames: frozenset[str] = frozenset()
 
     def __init__(

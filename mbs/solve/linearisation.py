@@ -29,7 +29,7 @@ from ..model.model import Model, row_values
 from ..model.motors import FrameShare, frame_share
 from ..model.system import MultibodySystem
 from ..model.transmission import gear_matrices
-from ..model.tree import ElasticGearInSpace, Motion, Node
+from ..model.tree import CompliantGear, Motion, Node
 from ..scene.space import SPACES
 
 DEPENDENT = 1e-8  # of a row's gradient, what others must leave of it to count as independent
@@ -212,7 +212,7 @@ def _names(joint: str, count: int) -> list[str]:
     return [f"joint/{joint}" + (f" {number}" if count > 1 else "") for number in range(1, count + 1)]
 
 
-def _of_motor(gear: ElasticGearInSpace) -> str:
+def _of_motor(gear: CompliantGear) -> str:
     """Of the coordinate of a motor behind a gear that gives."""
     return f"motor/{gear.joint.joint.name}"
 
