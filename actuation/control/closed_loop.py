@@ -15,7 +15,7 @@ from ...common.errors import InputError, SolveError
 from ...mbs.analysis.context import place_of
 from ...mbs.analysis.drive import Control, drive_robot
 from ...mbs.analysis.forward import actuator_commands, largest_moments
-from ...mbs.analysis.gears import WoundUp, wound_up
+from ...mbs.analysis.gears import MotorCoordinates, with_motor_coordinates
 from ...mbs.analysis.outcome import Outcome
 from ...mbs.analysis.replay import replay_times, supplied
 from ...mbs.model.drives import Drives, PointDrive
@@ -62,7 +62,7 @@ class _Plant(NamedTuple):
     """
 
     model: Model
-    source: WoundUp
+    source: MotorCoordinates
 
 
 def run_closed_loop(context: ActuatedContext, analysis: ClosedLoop) -> Outcome:
@@ -107,21 +107,21 @@ def run_closed_loop(context: ActuatedContext, analysis: ClosedLoop) -> Outcome:
     runs, gears = (_followed(run, place_at, held, tip), _followed(closer, place_at, held, tip)), plant.model.tree.gears
     record = loop_record(analysis, setup, loop, acting, runs, models, lowest, gears=bool(gears))
 
-    def told(of: Outcome) -> Outcome:
+    def completed(of: Outcome) -> Outcome:
         commanded = _by_joint(context.model, held(of.time))
         return replace(of, forces=replace(of.forces, commanded=commanded), details=record)
 
-    return replace(told(run), look_closer=lambda: told(closer))
+    return replace(completed(run), look_closer=lambda: completed(closer))
 
 
 def _robot(context: ActuatedContext, source: Outcome) -> Robot:
     """What controllers know of: whole links also where the plant has their pieces."""
     if context.whole is None:
         return Robot(without_paths(context.model), context.patches, source)
-    return Robot(without_paths(context.whole.model), context.patches, context.whole.told(source))
+    return Robot(without_paths(context.whole.model), context.patches, context.whole.as_links(source))
 
 
-def loop_models(model: Model, time: Array, reference: WoundUp) -> tuple[LinearModel, ...]:
+def loop_models(model: Model, time: Array, reference: MotorCoordinates) -> tuple[LinearModel, ...]:
     """The robot at rest on its reference at start, middle and end; none where it is singular, or has none yet."""
     rest, rows = np.zeros(model.tree.n_v), sorted({0, len(time) // 2, len(time) - 1})
     with suppress(SolveError, InputError):
@@ -132,7 +132,7 @@ def loop_models(model: Model, time: Array, reference: WoundUp) -> tuple[LinearMo
 
 def _plant(context: ActuatedContext, source: Outcome) -> _Plant:
     model = with_compliance(without_paths(context.model))
-    return _Plant(model, wound_up(source, model))
+    return _Plant(model, with_motor_coordinates(source, model))
 
 
 def _setup(

@@ -136,10 +136,10 @@ def remarks(found: Sensitivity) -> Iterator[str]:
             f", and {failed - 1} more in the table of runs" if failed > 1 else ""
         )
     methods = {one.method for row in found.entries for one in row}
-    told = [words for method, words in HOW.items() if method in methods]
+    texts = [words for method, words in HOW.items() if method in methods]
     yield (
         f"how        {found.runs} run{'s' if found.runs > 1 else ''} with a tolerance of at most {found.tolerance:g};"
-        f" {'; '.join([*told, ERRORS])}"
+        f" {'; '.join([*texts, ERRORS])}"
     )
 
 

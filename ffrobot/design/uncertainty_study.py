@@ -44,11 +44,11 @@ def uncertainty_study(found: Uncertainty) -> Study:
 
 def _headline(found: Uncertainty) -> str:
     """Between what goals are, most of the time."""
-    told = []
+    texts = []
     for g, (goal, reading) in enumerate(zip(found.goals, found.readings, strict=True)):
         low, _, high = found.statistics.quantiles[:, g]
-        told.append(f"{goal}: {low:.5g} to {high:.5g} {reading.unit}".rstrip() + f" ({NAMES[0]} to {NAMES[-1]})")
-    return "; ".join([*told, *(f"band of {band.name}" for band in found.bands)])
+        texts.append(f"{goal}: {low:.5g} to {high:.5g} {reading.unit}".rstrip() + f" ({NAMES[0]} to {NAMES[-1]})")
+    return "; ".join([*texts, *(f"band of {band.name}" for band in found.bands)])
 
 
 def _ranking(found: Uncertainty, g: int) -> Bars:

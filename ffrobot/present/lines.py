@@ -24,8 +24,8 @@ def warning_lines(bending: Mapping[str, Mapping[str, Bending]], warnings: Mappin
         worst = max(bent, key=lambda name: max(link.position_error for link in bending[name].values()))
         others = [name for name in bent if name != worst]
         yield f"{worst}: {bent[worst]}" + (f" (likewise, but less: {', '.join(others)})" if others else "")
-    told = ((name, text) for name, of in warnings.items() for text in of)
-    yield from alike((name, text) for name, text in told if text != bent.get(name))
+    texts = ((name, text) for name, of in warnings.items() for text in of)
+    yield from alike((name, text) for name, text in texts if text != bent.get(name))
 
 
 def deflection_in_words(bending: Iterable[Mapping[str, Bending]]) -> str:

@@ -38,8 +38,8 @@ def print_summary(
     """Tables of the analyses and what they found, wall time per stage, what was skipped, where the results are."""
     console.print(_analyses(solution))
     bending = {name: result.bending for name, result in solution.analyses.items()}
-    told = {name: result.warnings for name, result in solution.analyses.items()}
-    for line in warning_lines(bending, told):
+    texts = {name: result.warnings for name, result in solution.analyses.items()}
+    for line in warning_lines(bending, texts):
         console.print(f"warning    {line}")
     for line in alike((name, text) for name, result in solution.analyses.items() for text in result.notes):
         console.print(f"note       {line}")

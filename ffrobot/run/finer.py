@@ -15,7 +15,7 @@ from ..fe_models.link_file import LinkTable, link_keys, link_path
 from ..fe_models.modal_body import ModalBody
 from ..mbs.analysis.drive import drive_robot
 from ..mbs.analysis.forward import Forward, actuator_commands, largest_moments
-from ..mbs.analysis.operating_points import held_by_motors
+from ..mbs.analysis.operating_points import locked_motors
 from ..mbs.analysis.outcome import Outcome
 from ..mbs.analysis.replay import replay_times, supplied
 from ..mbs.analysis.tracking import Tracking, least_voltage
@@ -152,7 +152,7 @@ def _start(source: Outcome, finer: Model) -> State:
         model = resolved(finer, source.analysis.last_time)
     else:
         alone = without_paths(finer)
-        model = replace(alone, rows=(*alone.rows, *held_by_motors(alone, _as_in(source, alone))))
+        model = replace(alone, rows=(*alone.rows, *locked_motors(alone, _as_in(source, alone))))
     start = undeformed_posture(model)
     is_bent = any(source.q[0, node.p_q].any() for node in source.model.tree.nodes)
     return static_equilibrium(model, start) if is_bent else start

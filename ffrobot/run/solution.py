@@ -138,17 +138,17 @@ class AnalysisResult:
         """Why results may be wrong, or not mean what they seem to, a text each, the most serious first."""
         missed = None if self.actuation is None else self.actuation.feasibility.unsupplied
         bent = deflection_warning(self.bending)
-        told = (
+        texts = (
             *([bent] if bent else []),
             *self._doubts,
             *self.run.statistics.warnings,
             *unresolved_gears(self.motion.gears),
         )
         if isinstance(self.run.details, LoopRecord):
-            told = (*told, *self.run.details.warnings)
+            texts = (*texts, *self.run.details.warnings)
         elif self.motion.is_prescribed:
-            told = (*told, *path_warnings(self.run.analysis, self.run.time, self.motion.model.scene.trajectory))
-        return told if missed is None else (*told, missed.in_words)
+            texts = (*texts, *path_warnings(self.run.analysis, self.run.time, self.motion.model.scene.trajectory))
+        return texts if missed is None else (*texts, missed.in_words)
 
     @property
     def notes(self) -> tuple[str, ...]:

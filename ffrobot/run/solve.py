@@ -245,7 +245,7 @@ def _predicted_shift(solution: Solution, found: AnalysisResult) -> dict[str, Arr
     points = [f"{body}.{label}" for body, labels in motion.points.items() for label in labels]
     if (whole := make_whole_links(solution)) is not None:
         try:
-            told = whole.told(found.run)
+            told = whole.as_links(found.run)
         except InputError:
             return {}
         motion = RobotMotion(told.model, told.time, told.q, told.v, told.a, told.multipliers)

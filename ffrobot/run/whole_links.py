@@ -26,7 +26,7 @@ def make_whole_links(solution: Solution) -> WholeLinks | None:
     if solution.whole is None:
         return None
     divided = {name: _divided(solution, name) for name in solution.divided}
-    return WholeLinks(solution.whole, divided, places_on_pieces(solution.divided), partial(_told, solution))
+    return WholeLinks(solution.whole, divided, places_on_pieces(solution.divided), partial(_as_links, solution))
 
 
 def _divided(solution: Solution, name: str) -> DividedLink:
@@ -40,7 +40,7 @@ def _divided(solution: Solution, name: str) -> DividedLink:
     return divided_link_of(link.modal, link.spatial, pieces)
 
 
-def _told(solution: Solution, run: Outcome) -> Outcome:
+def _as_links(solution: Solution, run: Outcome) -> Outcome:
     """A run of the pieces in the coordinates of the robot with whole links: those of joints, and the nearest shapes.
 
     Its multipliers and what drives it stay behind. Raises `InputError` for joints that have no coordinates there.

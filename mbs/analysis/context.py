@@ -67,13 +67,13 @@ class WholeLinks:
         model: the robot with one body for each link.
         divided: the links in pieces by name.
         places: which point of which piece "BODY.POINT" of such a link is.
-        told: an outcome of the pieces, as one of the links; `InputError` where their joints cannot say it.
+        as_links: an outcome of the pieces as one of the links; `InputError` where their joints lack coordinates.
     """
 
     model: Model
     divided: Mapping[str, DividedLink]
     places: Mapping[str, str]
-    told: Callable[[Outcome], Outcome]
+    as_links: Callable[[Outcome], Outcome]
 
 
 @dataclass(frozen=True, kw_only=True)

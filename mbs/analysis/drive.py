@@ -22,7 +22,7 @@ from ..solve.diagnosis import find_cause
 from ..solve.integrator_choice import choose_integrator
 from ..solve.integrators import beyond_rounding, integration_controls, with_steps_of
 from ..solve.limits import left_ranges, watch_limits
-from ..solve.posture import NEARLY_SINGULAR, SINGULAR, robot_size, told_posture
+from ..solve.posture import NEARLY_SINGULAR, SINGULAR, describe_posture, robot_size
 from ..solve.reach import out_of_reach
 from ..solve.state import State
 from .earlier_check import check_earlier, going_on
@@ -110,18 +110,18 @@ def drive_robot(
     motion = _motion(system, run, times)
     motion = motion if earlier is None else earlier.motion.followed_by(motion)
     in_posture = _ends_in_posture(run)
-    posture = told_posture(model, run.least_ratio, run.singular_at, run.singular_posture, is_end=in_posture)
+    posture = describe_posture(model, run.least_ratio, run.singular_at, run.singular_posture, is_end=in_posture)
     cause = f"{posture}: {_advice(model, times)}" if in_posture else ""
     if not in_posture and STATUS[run.status] not in ("completed", "interrupted"):
         cause = find_cause(system, analysis, integrator, run)
     scatter = beyond_rounding(analysis.tolerance, run.rounding)
-    told = (*warnings, *(text for text in (posture, scatter) if text))
-    told = (*told, *left_ranges(model, run.ranges, motion.time, motion.q, motion.v))
+    texts = (*warnings, *(text for text in (posture, scatter) if text))
+    texts = (*texts, *left_ranges(model, run.ranges, motion.time, motion.q, motion.v))
 
     statistics = Statistics(
         "diverged" if in_posture else STATUS[run.status], integrator.changed_in(run), run.steps, run.rejected,
         run.evaluations, time.perf_counter() - began, continuation.checkpoint.time if control is None else None, cause,
-        np.array(run.step_ends), told,
+        np.array(run.step_ends), texts,
     )  # fmt: skip
     found = Outcome(
         analysis=analysis,

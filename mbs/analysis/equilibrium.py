@@ -6,7 +6,7 @@ import time
 
 import numpy as np
 
-from ..model.gears import with_held_motors
+from ..model.gears import with_prescribed_motors
 from ..scene.analysis import Analysis
 from ..solve.redundancy import resolved
 from ..solve.start import undeformed_posture
@@ -21,7 +21,7 @@ def run_static(context: Context, analysis: Analysis) -> Outcome:
     Raises `SolveError` where there is none.
     """
     began = time.perf_counter()
-    model = with_held_motors(resolved(context.model, analysis.last_time))
+    model = with_prescribed_motors(resolved(context.model, analysis.last_time))
     q = static_equilibrium(model, undeformed_posture(model)).q[None]
     at_rest, times = np.zeros((1, model.tree.n_v)), np.zeros(1)
     multipliers = holding_multipliers(model, q[0])

@@ -25,7 +25,7 @@ from ..solve.statics import hanging_joints, initial_state
 from .context import Context, PatchedLink
 from .drive import drive_robot
 from .elastic_joints import DEGREE
-from .gears import wound_up
+from .gears import with_motor_coordinates
 from .outcome import Outcome
 from .replay import left_paths, path_numbers, point_numbers, replay_times, supplied
 
@@ -90,8 +90,8 @@ def run_forward(context: Context, analysis: Forward) -> Outcome:
     model, progress = with_compliance(without_paths(context.model)), context.progress
     if analysis.actuation is None:
         start = initial_state(model)
-        told = tuple(hanging_joints(model, start))
-        return drive_robot(model, analysis, start, progress, warnings=told, earlier=context.earlier)
+        texts = tuple(hanging_joints(model, start))
+        return drive_robot(model, analysis, start, progress, warnings=texts, earlier=context.earlier)
     source = context.outcomes[analysis.actuation]
     if model.tree.gears:
         return _behind_gears(source, model, analysis, context)
@@ -153,7 +153,7 @@ def _behind_gears(source: Outcome, model: Model, analysis: Forward, context: Con
             f' with stiffness, found "{source.analysis.name}"'
         )
     _check_motors(source.model, analysis, source.q[0])
-    wound = wound_up(source, model)
+    wound = with_motor_coordinates(source, model)
     most = largest_moments(source.model, limits=analysis.limits)
     wanted = np.hstack([wound.moments[joint] for joint in model.motors])
     given = np.clip(wanted, -most, most)

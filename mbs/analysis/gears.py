@@ -131,7 +131,7 @@ def _wound(compliant: Model, state: States, gears: Mapping[str, GearMotion] | No
     return KnownStates(*(np.hstack(pair) for pair in zip((state.q, state.v, state.a), motors, strict=True)))
 
 
-class WoundUp(NamedTuple):
+class MotorCoordinates(NamedTuple):
     """A motion in the coordinates of a robot whose gears give.
 
     Attributes:
@@ -147,13 +147,13 @@ class WoundUp(NamedTuple):
     moments: Mapping[str, Array]
 
 
-def wound_up(run: Outcome, model: Model) -> WoundUp:
+def with_motor_coordinates(run: Outcome, model: Model) -> MotorCoordinates:
     """The motion of `run` in the coordinates of `model`: where its gears give, motors as far ahead as they have to be.
 
     Raises `InputError` where motors turn frames and modes tilt the joint's axis: no angle goes with their moments.
     """
     if not model.tree.gears or run.model.tree.gears:
-        return WoundUp(run.q, run.v, run.a, {}, {})
+        return MotorCoordinates(run.q, run.v, run.a, {}, {})
     turning = set(turning_motors(run.model)).intersection(gear.joint.joint.name for gear in model.tree.gears)
     if turning:
         raise InputError(
@@ -163,7 +163,7 @@ def wound_up(run: Outcome, model: Model) -> WoundUp:
         )
     forces, gears = supplied_through_gears(run.model, run, run.time, supplied_in(run))
     q, v, a = with_motors(model, (run.q, run.v, run.a), gears)
-    return WoundUp(q, v, a, gears, forces.moments)
+    return MotorCoordinates(q, v, a, gears, forces.moments)
 
 
 def with_motors(model: Model, firm: Sequence[Array], gears: Mapping[str, GearMotion]) -> list[Array]:

@@ -168,17 +168,17 @@ def path_errors(held: Model, times: Array, q: Array) -> dict[str, Array]:
 
 def _told(inversion: Inversion[Servo], run: Outcome) -> tuple[str, ...]:
     """How far a redefined output leaves the path itself."""
-    told = []
+    texts = []
     if not run.failed and inversion.servo.factor < 1:
         off = max(
             float(np.abs(of).max(initial=0.0)) for of in path_errors(inversion.servo.model, run.time, run.q).values()
         )
         if off > NOTABLE:
-            told.append(
+            texts.append(
                 f"a point with {inversion.servo.factor:.2g} of the vibration follows the path: that of the trajectory"
                 f" is off by up to {off:.3g} (m or rad)"
             )
-    return tuple(told)
+    return tuple(texts)
 
 
 def choose_output(make: Callable[[float], S], analysis: MotorsOnly) -> tuple[S, Linearisation]:

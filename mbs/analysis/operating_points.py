@@ -21,7 +21,7 @@ from ..scene.analysis import Analysis, Surroundings, TimedAnalysis
 from ..solve.start import undeformed_posture
 from .context import Context, place_of
 from .equilibrium import run_static
-from .gears import wound_up
+from .gears import with_motor_coordinates
 from .outcome import Outcome
 
 STATIC = "static"  # instead of an analysis' name: about the static equilibrium
@@ -98,7 +98,7 @@ def find_operating_points(context: Context, analysis: InstantAnalysis) -> tuple[
 def linear_states(context: Context, source: Outcome, rows: Sequence[int]) -> OperatingPoints:
     """The states of some outputs of a motion, of the robot that follows nothing and whose gears are compliant."""
     model = with_compliance(without_paths(context.model))
-    q, v, a = wound_up(source, model)[:3]
+    q, v, a = with_motor_coordinates(source, model)[:3]
     at = list(rows)
     return OperatingPoints(model, source.time[at], q[at], v[at], a[at])
 
@@ -140,12 +140,12 @@ def _equilibrium(context: Context, analysis: Analysis) -> Outcome:
     model = context.model
     if not any(row.is_trajectory for row in model.rows):
         context = replace(
-            context, model=replace(model, rows=(*model.rows, *held_by_motors(model, undeformed_posture(model).q)))
+            context, model=replace(model, rows=(*model.rows, *locked_motors(model, undeformed_posture(model).q)))
         )
     return run_static(context, analysis)
 
 
-def held_by_motors(model: Model, q: Array) -> list[ConstraintRow]:
+def locked_motors(model: Model, q: Array) -> list[ConstraintRow]:
     """Rows that keep the coordinates of motors where they are at q (n_q,)."""
     rows = []
     for joint, columns in model.motors.items():

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Literal
 
-from ..model.gears import with_held_motors
+from ..model.gears import with_prescribed_motors
 from ..scene.analysis import Check, IntegratedAnalysis, Need
 from ..solve.posture import check_path
 from ..solve.reach import check_reach
@@ -49,7 +49,7 @@ def run_pcid(context: Context, analysis: IntegratedAnalysis) -> Outcome:
     firm = resolved(context.model, analysis.last_time)
     check_reach(firm, analysis.last_time)
     warnings = tuple(check_path(firm, undeformed_posture(firm).q, analysis.last_time))
-    model = with_held_motors(firm)
+    model = with_prescribed_motors(firm)
     return drive_robot(
         model, analysis, initial_state(model), context.progress, warnings=warnings, earlier=context.earlier,
         is_recorded=context.is_replayed,

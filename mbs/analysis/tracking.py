@@ -161,7 +161,7 @@ def run_tracking(context: Context, analysis: Tracking) -> Outcome:
         posed = _pose(model, context.patches, analysis, progress)
         least = track(posed.asked, posed.breaks)
         _check_found(context, posed, least)
-        told = list(_told(context, posed, analysis, least))
+        texts = list(_told(context, posed, analysis, least))
         found, objective = _solve(posed, analysis, least)
         bounds = _bounds(posed)
     except Stopped:
@@ -184,7 +184,7 @@ def run_tracking(context: Context, analysis: Tracking) -> Outcome:
 
     run = at(times)
     around = _with_torques_alone(context, run, around)
-    statistics = replace(run.statistics, wall_seconds=time.perf_counter() - began, warnings=tuple(told))
+    statistics = replace(run.statistics, wall_seconds=time.perf_counter() - began, warnings=tuple(texts))
 
     @cache
     def look_closer() -> Outcome:

@@ -53,7 +53,7 @@ def with_compliance(model: Model) -> Model:
     return replace(model, tree=tree, rows=tuple(_rows_at_motors(model, tree)), modal_loads=loads)
 
 
-def with_held_motors(model: Model) -> Model:
+def with_prescribed_motors(model: Model) -> Model:
     """The robot with its gears where trajectories of motors are followed; the same where all gears are firm.
 
     Raises `InputError` for trajectories of something else beside them: no motor could do both.

@@ -14,7 +14,7 @@ from ..scene.analysis import IntegratedAnalysis
 from .integrator_choice import TOO_STIFF, fastest_friction
 from .integrators import EXPLICIT, Choice, beyond_order, unmet
 from .path_checks import JUMP
-from .posture import told_loops
+from .posture import describe_loops
 from .state import State
 
 FAR_BENT = 0.5  # of a link's radius of gyration, in the mean
@@ -32,7 +32,7 @@ def find_cause(system: MultibodySystem, analysis: IntegratedAnalysis, choice: Ch
         or too_far_bent(_links(system, at))
         or load_jump(_loads(system), t)
         or _friction(system, analysis, choice, at)
-        or told_loops(system.model, t, at.q, at.v)
+        or describe_loops(system.model, t, at.q, at.v)
     )
     if found or run.status != _core.IntegrationStatus.step_underflow:
         return found

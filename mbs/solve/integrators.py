@@ -86,12 +86,12 @@ class Choice:
         before = {*self.name.split(AFTER), *(names[before] for _, before, _, _ in run.changes)} - {last}
         earlier, _, times = self.reason.partition(IN_ALL)  # of a run that was stopped
         known = int(times.split()[0]) if times else earlier.count(CHANGED)
-        told = [
+        texts = [
             f"{names[to]}{CHANGED}{t:.4g} s, where steps of {names[before]} were {step:.2g} s"
             for t, before, to, step in run.changes[: max(0, MOST_TOLD - known)]
         ]
         count = known + len(run.changes)
-        reason = "; ".join([earlier, *told]) + (f"{IN_ALL}{count} times in all" if count > MOST_TOLD else "")
+        reason = "; ".join([earlier, *texts]) + (f"{IN_ALL}{count} times in all" if count > MOST_TOLD else "")
         return replace(self, name=f"{last}{AFTER}{' and '.join(before)}", reason=reason)
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from ...common.arrays import Array, as_floats
 from ...common.errors import InputError, quoted
-from ..model.gears import with_held_motors
+from ..model.gears import with_prescribed_motors
 from ..model.model import Model
 from .posture import solve_posture
 from .redundancy import resolved
@@ -35,7 +35,7 @@ def frequencies_along(model: Model, begin: float, end: float, modes: int) -> Pat
     Where motors follow them, gears that give are among its springs. Joints that the paths leave free are free.
     Raises `InputError` where the path is out of reach, or there are fewer vibrations.
     """
-    model = with_held_motors(resolved(model, end))
+    model = with_prescribed_motors(resolved(model, end))
     unheld = without_rows(model)
     state, found = undeformed_posture(model), []
     for t in np.linspace(begin, end, INSTANTS):

@@ -121,7 +121,7 @@ def mobility(model: Model, q: Array) -> Mobility:
     return Mobility(free.shape[1], followed, ratio, tuple(dict.fromkeys(names[moving].tolist())), loop_rank)
 
 
-def told_posture(model: Model, ratio: float, t: float, q: Array, *, is_end: bool) -> str:
+def describe_posture(model: Model, ratio: float, t: float, q: Array, *, is_end: bool) -> str:
     """What to say of the worst posture q (n_q,) on a path, at time t, where its ratio is that; "" where it is fine.
 
     Of one in which the run ends it is said to be singular.
@@ -137,7 +137,7 @@ def told_posture(model: Model, ratio: float, t: float, q: Array, *, is_end: bool
     return f"at t = {t:.6g} s {how}: motions of {moving} against each other hardly move what follows the path"
 
 
-def told_loops(model: Model, t: float, q: Array, v: Array) -> str:
+def describe_loops(model: Model, t: float, q: Array, v: Array) -> str:
     """Of loops, and of paths through them, at q (n_q,), v (n_v,) and time t: whether their rows hardly differ here.
 
     "" where they do, or did not before.

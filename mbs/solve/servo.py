@@ -18,7 +18,7 @@ from ..model.motors import driven_mechanism, fastest_mechanism
 from ..model.rows import ConstraintRow
 from .internal_dynamics import Stopped, Target, by_differences, slopes_by_differences
 from .path_checks import check_smooth
-from .posture import mobility, solve_posture, told_posture
+from .posture import describe_posture, mobility, solve_posture
 from .prescribed import PrescribedMotion, following_motors
 from .reach import out_of_reach
 from .start import undeformed_posture
@@ -76,7 +76,7 @@ class Servo:
         """What to say of the worst posture along the path; "" where all are fine."""
         ratios = [mobility(self.model, q).ratio for q in self.near[::EVERY]]
         worst = EVERY * int(np.argmin(ratios))
-        return told_posture(self.model, min(ratios), float(self.near_times[worst]), self.near[worst], is_end=False)
+        return describe_posture(self.model, min(ratios), float(self.near_times[worst]), self.near[worst], is_end=False)
 
     def targets(self) -> Iterator[Target]:
         """What the path follows."""

@@ -15,7 +15,7 @@ from ffrobot.actuation.control.modes import robot_modes
 from ffrobot.actuation.motors import judge_motors
 from ffrobot.common.errors import InputError
 from ffrobot.mbs.analysis.elastic_joints import unresolved_gears
-from ffrobot.mbs.analysis.gears import wound_up
+from ffrobot.mbs.analysis.gears import with_motor_coordinates
 from ffrobot.mbs.analysis.motors_only import MotorsOnly
 from ffrobot.mbs.analysis.static import Static
 from ffrobot.mbs.model.gears import with_compliance
@@ -219,7 +219,7 @@ def test_equilibrium_winds_the_gears():
     held = [{"name": name, "joint": name, "value": value} for name, value in (("O", "0.4"), ("A", "0.9"))]
     model = geared_arm(GEARED, trajectory=held)
     about = run(model, Static(name="static", kind="static"))
-    q = wound_up(about.outcome, with_compliance(without_paths(model.model))).q[0]
+    q = with_motor_coordinates(about.outcome, with_compliance(without_paths(model.model))).q[0]
     mechanism = linearised(model, q, *np.zeros((2, len(q))))
     along = [mechanism.names.index(f"motor/{joint}") for joint in "OA"]
     assert mechanism.force[along].min() > 1.0

@@ -148,8 +148,8 @@ def with_agreed_masses(found: ShapeIntegrals) -> tuple[ShapeIntegrals, tuple[str
             f"modal masses: expected the sums over masses and shapes, as nothing has inertia about the axis, found them"
             f" off by {off:.2g} of the largest"
         )
-    told = f"modal masses are sums over masses and shapes: those in the file are off by {off:.1e} of the largest"
-    return replace(found, modal_mass=found.translational_mass), (told,)
+    texts = f"modal masses are sums over masses and shapes: those in the file are off by {off:.1e} of the largest"
+    return replace(found, modal_mass=found.translational_mass), (texts,)
 
 
 def about_center(found: ShapeIntegrals) -> Array:

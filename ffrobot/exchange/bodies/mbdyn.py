@@ -118,8 +118,8 @@ def read_fem(text: str, name: str) -> tuple[ModalBody, tuple[str, ...]]:
         for label, place, phi in zip(labels, x, shapes.transpose(1, 2, 0), strict=True)
     ]
     condition, numbers = noted("\n".join(line for line in text.splitlines()[:5] if line.startswith("**")), nodes)
-    found, told = with_agreed_masses(found)
-    return modal_body(name, found, nodes, numbers, condition), (*remarks, *told)
+    found, texts = with_agreed_masses(found)
+    return modal_body(name, found, nodes, numbers, condition), (*remarks, *texts)
 
 
 def _records(text: str) -> dict[int, list[str]]:

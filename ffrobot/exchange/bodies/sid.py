@@ -100,8 +100,8 @@ def read_sid(text: str, name: str) -> tuple[ModalBody, tuple[str, ...]]:
     if not nodes:
         raise InputError("frame: expected at least one node, found none")
     condition, numbers = noted(head, nodes)
-    agreed, told = with_agreed_masses(found)
-    remarks = (NOT_IN_THE_FILE, *told, *_checks(modal, found, layout))
+    agreed, texts = with_agreed_masses(found)
+    remarks = (NOT_IN_THE_FILE, *texts, *_checks(modal, found, layout))
     return modal_body(name, agreed, nodes, numbers, condition), remarks
 
 
