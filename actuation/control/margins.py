@@ -24,6 +24,7 @@ GRID = 60  # points of the search for the first crossing, before bisection
 RELATIVE = 1e-3  # to which margins are found
 LIGHTLY = 0.2  # damping ratio, above which motion of a loop is no vibration
 GONE = 1e-6  # eigenvalues below are commands on their way
+ALIAS = 1e-3  # of an eigenvalue: how near it is to that of a vibration that samples are too rare for, and no other
 SAMPLED = 0.99  # of half the sampling frequency, where eigenvalues are that of no motion
 RIGID = 1e-6  # of the fastest eigenvalue: slower ones are rounding of motion without stiffness
 
@@ -107,12 +108,21 @@ def lowest_frequency(
         locked *= 0.5
     elif pids and models:
         gains = joint_gains(models[0], pids)
-        z = np.concatenate([loop_eigenvalues(model, gains, T, delay) for model in models])
+        z = np.concatenate([_without_aliases(loop_eigenvalues(model, gains, T, delay), model, T) for model in models])
         s = np.log(z[np.abs(z) > GONE]) / T
         ringing = s[(s.imag > 0.0) & (-s.real < LIGHTLY * np.abs(s)) & (np.abs(s.imag) * T < np.pi * SAMPLED)]
         vibrating = ringing[np.abs(ringing) > RIGID * np.abs(s).max(initial=0.0)]
         locked = min(locked, float(vibrating.imag.min(initial=np.inf)) / (2 * np.pi))
     return locked if np.isfinite(locked) else float("nan")
+
+
+def _without_aliases(z: ComplexArray, model: LinearModel, T: float) -> ComplexArray:
+    """Those of the eigenvalues z of a loop that are no vibrations of the robot above half the sampling frequency."""
+    s = np.linalg.eigvals(model.A)
+    aliases = np.exp(s[np.abs(s.imag) * T > np.pi] * T)
+    distance = np.abs(z[:, np.newaxis] - aliases).min(axis=1, initial=np.inf)
+    found: ComplexArray = z[distance > ALIAS * np.abs(z)]
+    return found
 
 
 def loop_eigenvalues(model: LinearModel, gains: JointGains, T: float, delay: float) -> ComplexArray:

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from ffrobot.actuation.control.margins import joint_gains, margins, spectral_radius
+from ffrobot.actuation.control.linear_model import LinearModel
+from ffrobot.actuation.control.margins import joint_gains, lowest_frequency, margins, spectral_radius
 from ffrobot.actuation.control.modes import held_frequencies
 from ffrobot.actuation.control.records import JointPid
 from ffrobot.actuation.control.suggestion import (
@@ -83,6 +84,19 @@ def test_margins_of_an_inertia_are_those_of_the_closed_form():
     slack = margins(plants, joint_gains(plants[0], [pid(400.0, 1.9)]), T, 0.0)
     assert not slack.is_stable
     assert (slack.gain, slack.delay) == (0.0, 0.0)  # no factor helps: D < P T/2
+
+
+def test_vibrations_that_samples_miss_are_not_taken_for_slow_ones():
+    """A wheel on P and D, ω² = P/I, beside what vibrates unmoved by motors: at 0.3 Hz above the sampling frequency."""
+    P, omega = 20.0, 2 * np.pi * (1 / T + 0.3)
+    A, B, C = np.zeros((4, 4)), np.zeros((4, 1)), np.zeros((1, 4))
+    A[:2, 2:], A[3, 1], A[3, 3], B[2, 0], C[0, 0] = np.eye(2), -(omega**2), -1e-4 * omega, 1 / INERTIA, 1.0
+    names = ("joint/O", "modal/a/1")
+    states = (*names, *(f"rate of {name}" for name in names))
+    D, mass = np.zeros((1, 1)), np.diag([INERTIA, 1.0])
+    model = LinearModel(A, B, C, D, states, ("joint/O",), ("joint/O",), 0.0, mass, np.eye(2))
+    found = lowest_frequency([model], [pid(P, 0.2)], T, 0.0)
+    assert found == pytest.approx(np.sqrt(P / INERTIA) / (2 * np.pi), rel=0.01)
 
 
 def test_delay_margin_of_a_fast_sampled_loop_is_that_of_the_continuous_one():
