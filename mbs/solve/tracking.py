@@ -33,8 +33,9 @@ GRADING = 2.5  # of breaks to both ends: tanh
 MOST_ITERATIONS = 30
 TOLERANCE = 1e-8  # of the last Newton step, relative to the peak of its quantity
 MOST_INTERVALS = 1500
-UNIQUE = (1e-7, 1e-3)  # of the effort, which chooses among motions of the same least share
-EVERY = 8  # iterations of such a problem, after which the next one is taken
+UNIQUE = 1e-7  # of the effort, which chooses among motions of the same least share
+FEWEST_ITERATIONS = 8  # after which Newton's steps are taken to wander among these motions
+WANDERING = (1e-2, 1e-3)  # of the effort, one after the other, where they do
 
 
 class Driven(Output, Protocol):
@@ -146,49 +147,80 @@ def track(asked: Transition, breaks: Array, near: Tracked | None = None) -> Trac
         p, v, u = near.curve(breaks), near.curve(breaks, 1), near.voltage(breaks)
         K = near.curve(flat, 2).reshape(K.shape)
     steps = _Steps(asked, breaks, tau_qs, size)
-    steps.sigma = near.share if near is not None and steps.has_share else 1.0
-    converged, iteration, previous, previous_share = False, 0, np.inf, np.inf
+    start = _Iterate(p, v, K, u, near.share if near is not None and steps.has_share else 1.0)
+    last = _newton(steps, start, FEWEST_ITERATIONS if steps.has_share else MOST_ITERATIONS)
+    if steps.has_share and not last.converged:
+        start = replace(start, iterations=last.iterations)
+        for steps.unique in WANDERING:
+            found = _newton(steps, start, MOST_ITERATIONS)
+            if not found.converged:
+                break
+            start = last = found
+    return last.tracked(steps)
+
+
+@dataclass(frozen=True)
+class _Iterate:
+    """p, ṗ, V at breaks (N+1, …), p̈ at stages (N, 4, n) and σ, and the minimum they come from."""
+
+    p: Array
+    v: Array
+    K: Array
+    V: Array
+    share: float
     found: Minimum | None = None
-    while not converged and iteration < MOST_ITERATIONS:
-        steps.unique = UNIQUE[min(iteration // EVERY, len(UNIQUE) - 1)]
-        iteration += 1
-        state = p, v, K
-        p, v, K, u_new, found = steps.take(state, u)
-        moved = max(float(np.abs(driven.scale * (p - state[0])).max()), float(np.abs(v - state[1]).max())) / max(
-            float(np.abs(driven.scale * p).max()), float(np.abs(v).max()), size
+    converged: bool = False
+    iterations: int = 0
+
+    def tracked(self, steps: _Steps) -> Tracked:
+        """As piecewise polynomials."""
+        from scipy.interpolate import PPoly
+
+        assert self.found is not None
+        breaks, steps.sigma = steps.breaks, self.share
+        slope = np.diff(self.V, axis=0) / steps.h[:, None]
+        return Tracked(
+            piecewise(GAUSS, breaks, self.p, self.v, self.K), PPoly(np.array([slope, self.V[:-1]]), breaks),
+            self.converged, self.iterations, self.share, steps.cost(self.found), steps.prices(self.found),
+        )  # fmt: skip
+
+
+def _newton(steps: _Steps, start: _Iterate, most: int) -> _Iterate:
+    """Newton's steps from `start`, no more than `most`, counted on from it."""
+    scale, size = steps.asked.driven.scale, steps.size
+    now, steps.sigma, previous, previous_share = replace(start, converged=False), start.share, np.inf, np.inf
+    for iteration in range(start.iterations + 1, start.iterations + most + 1):
+        old = now
+        p, v, K, V, found = steps.take((old.p, old.v, old.K), old.V)
+        moved = max(float(np.abs(scale * (p - old.p)).max()), float(np.abs(v - old.v).max())) / max(
+            float(np.abs(scale * p).max()), float(np.abs(v).max()), size
         )
-        u, share = u_new, steps.sigma
+        now = _Iterate(p, v, K, V, steps.sigma, found, iterations=iteration)
         if not (np.isfinite(moved) and found.converged):
             break
         if steps.has_share:  # V(t) of linear programs is not unique
-            moved = abs(share - previous_share) / abs(share)
-            previous_share = share
-        converged = moved <= TOLERANCE or (moved <= 1e-7 and moved > 0.3 * previous)
+            moved = abs(now.share - previous_share) / abs(now.share)
+            previous_share = now.share
+        if moved <= TOLERANCE or (moved <= 1e-7 and moved > 0.3 * previous):
+            return replace(now, converged=True)
         previous = moved
-    assert found is not None
-    from scipy.interpolate import PPoly
-
-    slope = np.diff(u, axis=0) / h[:, None]
-    return Tracked(
-        piecewise(GAUSS, breaks, p, v, K), PPoly(np.array([slope, u[:-1]]), breaks), bool(converged), iteration,
-        steps.sigma, steps.cost(found), steps.prices(found),
-    )  # fmt: skip
+    return now
 
 
 class _Steps:
     """Newton's steps, each the minimum of the linearized problem in x = (p, ṗ, V, σ) at breaks.
 
     σ, the share of limits, is a constant, and there where it is the objective. A little of the effort then picks one of
-    many V(t): more of it where Newton's steps would wander among them, at most a thousandth.
+    many V(t); where Newton's steps would wander among them, enough of it for steps that shrink, and then less.
     """
 
     program: Program
     constant = 0.0  # of J, which the program leaves out
-    unique = UNIQUE[0]
+    unique = UNIQUE
     owners: Indices  # of inequalities (i,): patches, then motors
 
     def __init__(self, asked: Transition, breaks: Array, tau_qs: Array, size: float) -> None:
-        self.asked, self.breaks, self.h, self.tau_qs = asked, breaks, np.diff(breaks), tau_qs
+        self.asked, self.breaks, self.h, self.tau_qs, self.size = asked, breaks, np.diff(breaks), tau_qs, size
         self.n, self.m = asked.Phi_V.shape
         self.has_share = asked.objective != "effort"
         self.y, self.V = slice(0, 2 * self.n), slice(2 * self.n, 2 * self.n + self.m)

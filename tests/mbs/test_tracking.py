@@ -249,16 +249,17 @@ def test_least_voltage_falls_with_time(strip):
 
 
 @pytest.mark.parametrize(
-    ("modes", "pairs", "expected"),
-    [(2, 4, 158.5), (3, 4, 144.0), (6, 4, 133.0), (8, 4, 129.8),
-     (6, 2, 244.0), (6, 3, 168.0), (6, 6, 91.0), (6, 10, 55.0)],
+    ("modes", "pairs", "intervals", "expected"),
+    [(2, 4, 64, 158.5), (3, 4, 64, 144.0), (6, 4, 64, 133.0), (8, 4, 64, 129.8), (6, 4, 128, 131.6),
+     (6, 2, 64, 244.0), (6, 3, 64, 168.0), (6, 6, 64, 91.0), (6, 10, 64, 55.0)],
 )  # fmt: skip
-def test_least_voltage_by_modes_and_patches(strip, modes, pairs, expected):
+def test_least_voltage_by_modes_and_patches(strip, modes, pairs, intervals, expected):
     """Section 3, T = 0.6 s."""
     servo, Phi_V = strip(modes, 0.6, pairs)
-    found = track(asked(servo, Phi_V, (0.0, 0.6), "least-voltage", 200.0, is_free=True), graded(0.0, 0.6, 64))
+    problem = asked(servo, Phi_V, (0.0, 0.6), "least-voltage", 200.0, is_free=True)
+    found = track(problem, graded(0.0, 0.6, intervals))
     assert found.converged
-    assert 200.0 * found.share == pytest.approx(expected, rel=1e-2)
+    assert 200.0 * found.share == pytest.approx(expected, rel=5e-3, abs=0.5)  # which are rounded to volts
 
 
 @pytest.mark.parametrize(("count", "by_shape", "least"), [(3, 764, 195), (4, 620, 140), (6, 445, 91)])
