@@ -40,6 +40,7 @@ from .tracking_advice import Bounds, bounds_of_zeros, enough_path_time, enough_t
 RATE = 0.005  # s, T_r where the scene does not say
 VOLT = 200.0  # V_ref where patches have no limits
 ENOUGH = 1e-6  # of the limits: least voltages beyond them by less are within
+RESERVE = 1e-9  # of the limits of voltages
 AT_REST = 1e-9  # of the path's time: so much before it begins, and after it ends, it has no acceleration
 REPLAYED = 1e-5  # tolerance of torques alone, at most
 
@@ -163,6 +164,7 @@ def run_tracking(context: Context, analysis: Tracking) -> Outcome:
         _check_found(context, posed, least)
         texts = list(_told(context, posed, analysis, least))
         found, objective = _solve(posed, analysis, least)
+        told += _of_mesh(found, analysis)
         bounds = _bounds(posed)
     except Stopped:
         place = where(model.scene.path, analysis)
@@ -247,7 +249,9 @@ def _solve(posed: _Posed, analysis: Tracking, least: Tracked) -> tuple[Tracked, 
     objective: Objective = "least-torque" if analysis.objective == "least-moment" else analysis.objective
     if _is_beyond(posed, least):
         objective = "least-voltage"
-    asked = replace(posed.asked, objective=objective)
+    limits = posed.asked.limits  # torques reach beyond them between Gauss points, voltages by rounding
+    kept = Limits(limits.voltage * (1.0 - RESERVE), limits.torque * (1.0 - analysis.tolerance))
+    asked = replace(posed.asked, objective=objective, limits=kept)
     found = refined(asked, posed.breaks, analysis.tolerance, posed.servo.goes_on, least)
     if not found.converged:
         raise SolveError(
@@ -273,6 +277,15 @@ def _told(context: Context, posed: _Posed, analysis: Tracking, least: Tracked) -
         yield f"patches cannot do it within their limits. Any of these would do: {'; '.join(would)}; or more patches"
     yield from rough_ends(posed.servo)
     yield from far_patches(context, posed.linear.zeros[[0, -1]])
+
+
+def _of_mesh(found: Tracked, analysis: Tracking) -> Iterator[str]:
+    """A warning where the mesh is too coarse for the tolerance."""
+    if found.unmet > analysis.tolerance:
+        yield (
+            f"between Gauss points modal forces up to {found.unmet:.2g} of the largest elastic one are left over, more"
+            f" than the tolerance, {analysis.tolerance:g}: raise intervals, or loosen the tolerance"
+        )
 
 
 def _bounds(posed: _Posed) -> Bounds | None:

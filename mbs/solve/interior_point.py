@@ -19,7 +19,7 @@ from ...common.arrays import Array, Indices, as_floats
 
 MOST_ITERATIONS = 60
 FEASIBLE = 1e-10  # of equations and inequalities, relative to their data
-GAP = 1e-11  # of the objective
+GAP = 1e-9  # of the objective: closer, weights of dependent limits spoil the factors
 STATIONARY = 1e-8  # of the Lagrangian's gradient, relative to its terms
 BACK = 0.995  # of the way to the nearest bound
 
@@ -145,7 +145,7 @@ class _CentralPath:
         least = 1e-1 * float(np.abs(slack).max(initial=self.reach))
         self.slack = slack + max(0.0, least - float(slack.min(initial=np.inf)))
         self.count = max(1, slack.size)
-        self.z = self.force * float(self.slack.mean()) / (self.count * self.slack)  # on the central path
+        self.z = self.force * float(self.slack.sum()) / (self.count**2 * self.slack)  # on the central path
         self._look()
 
     def _slack(self) -> Array:
@@ -163,11 +163,14 @@ class _CentralPath:
         off = np.abs(right[layout.equations]).max(initial=0.0) / (1 + np.abs(program.c).max(initial=0.0))
         if max(off, np.abs(self.of_slack).max(initial=0.0) / self.reach) > FEASIBLE:
             return False
-        if self.gap * self.count > GAP * (1 + abs(_objective(program, self.unknown[layout.z]))):
+        if self.gap * self.count > self._small_gap():
             return False
         multipliers = np.abs(self.unknown[layout.equations])
         terms = np.einsum("kea,ke->ka", np.abs(program.F), multipliers).max(initial=self.force)
         return bool(np.abs(right[layout.x]).max() <= STATIONARY * terms)
+
+    def _small_gap(self) -> float:
+        return GAP * (1 + abs(_objective(self.program, self.unknown[self.layout.z])))
 
     def advance(self) -> bool:
         """One step of predictor and corrector; False where there is none."""
@@ -179,6 +182,9 @@ class _CentralPath:
         ways = min(1.0, _way(slack, d_slack)), min(1.0, _way(z, dz))
         after = float(((slack + ways[0] * d_slack) * (z + ways[1] * dz)).sum()) / self.count
         target = self.gap * (after / self.gap) ** 3 if self.gap else 0.0
+        target = max(
+            target, 0.5 * self._small_gap() / self.count
+        )  # less spoils the factors, whose weights are z / slack
         dx, d_slack, dz = self._toward(newton, slack * z + d_slack * dz - target)
         step = min(1.0, BACK * min(_way(slack, d_slack), _way(z, dz)))
         self.unknown, self.slack, self.z = self.unknown + step * dx, slack + step * d_slack, z + step * dz

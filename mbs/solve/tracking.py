@@ -117,16 +117,21 @@ def start_breaks(start: float, path_end: float, end: float, intervals: int) -> A
 
 
 def refined(asked: Transition, breaks: Array, tolerance: float, goes_on: Callable[[], bool], near: Tracked) -> Tracked:
-    """The same on intervals that are cut until no force above `tolerance` of the largest elastic one is left over."""
+    """The same on intervals that are cut until no force above `tolerance` of the largest elastic one is left over.
+
+    Nor are torques then further beyond the limits asked for than by this share of them, between Gauss points.
+    """
     driven, found = asked.driven, near
     while True:
         found = track(asked, breaks, found)
         times = (breaks[:-1, None] + np.diff(breaks)[:, None] * PROBES).ravel()
         motion = [found.curve(times, k) for k in range(3)]
-        r = driven.forces(times, *motion)[0] - found.voltage(times) @ asked.Phi_V.T
+        r, tau = driven.forces(times, *motion)
+        r = r - found.voltage(times) @ asked.Phi_V.T
         largest = float(np.abs(driven.scale**2 * motion[0]).max())
         unmet = np.abs(r).max(axis=1).reshape(len(breaks) - 1, -1).max(axis=1)
-        finer = cut(breaks, unmet / (tolerance * largest))
+        beyond = (np.abs(tau) / asked.limits.torque - 1.0).max(axis=1, initial=0.0).reshape(len(unmet), -1).max(axis=1)
+        finer = cut(breaks, np.maximum(unmet / largest, beyond) / tolerance)
         if not found.converged or not len(breaks) < len(finer) <= MOST_INTERVALS or not goes_on():
             return replace(found, unmet=float(unmet.max()) / largest)
         breaks = finer
