@@ -70,7 +70,7 @@ class _Band:
 
     def __init__(self, program: Program, layout: _Layout) -> None:
         self.layout, self.C = layout, program.C
-        self.ab = np.zeros((3 * layout.band + 1, layout.size))
+        self.ab = np.zeros((layout.size, 3 * layout.band + 1)).T  # columns contiguous, as LAPACK takes them
         self._add_costs(self.ab, program.H)
         for rows, columns, of in (
             (layout.equations, layout.x[:-1], program.F),
@@ -83,7 +83,7 @@ class _Band:
 
     def newton(self, W: Array) -> _Newton:
         """Factors of [H + CᵀWC, Aᵀ; A, 0]."""
-        ab = self.ab.copy()
+        ab = self.ab.copy(order="F")
         self._add_costs(ab, (self.C * W[:, :, None]).transpose(0, 2, 1) @ self.C)
         return _Newton(ab, self.layout)
 
@@ -103,8 +103,8 @@ class _Newton:
     def __init__(self, ab: Array, layout: _Layout) -> None:
         from scipy.linalg.lapack import dgbtrf
 
-        self.ab, self.layout = ab, layout
-        self.lu, self.pivots, info = dgbtrf(ab, layout.band, layout.band)
+        self.layout, self.matrix = layout, np.asfortranarray(ab[layout.band :])
+        self.lu, self.pivots, info = dgbtrf(ab, layout.band, layout.band, overwrite_ab=True)
         self.is_singular = info != 0
 
     def solve(self, right: Array) -> Array:
@@ -114,7 +114,7 @@ class _Newton:
 
         b, size = self.layout.band, self.layout.size
         found: Array = dgbtrs(self.lu, b, b, right, self.pivots)[0]
-        left = right - dgbmv(size, size, b, b, 1.0, self.ab[b:], found)
+        left = right - dgbmv(size, size, b, b, 1.0, self.matrix, found)
         return found + as_floats(dgbtrs(self.lu, b, b, left, self.pivots)[0])
 
 
