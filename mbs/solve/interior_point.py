@@ -124,7 +124,8 @@ def minimize(program: Program, x: Array) -> Minimum:
     for _ in range(MOST_ITERATIONS):
         if way.is_at_end() or not way.advance():
             break
-    return Minimum(way.unknown[way.layout.x], way.z, way.is_at_end())
+    multipliers = np.where(way.slack < way.z, way.z, 0.0)  # of bounds that are reached
+    return Minimum(way.unknown[way.layout.x], multipliers, way.is_at_end())
 
 
 class _CentralPath:
