@@ -164,7 +164,7 @@ def run_tracking(context: Context, analysis: Tracking) -> Outcome:
         _check_found(context, posed, least)
         texts = list(_told(context, posed, analysis, least))
         found, objective = _solve(posed, analysis, least)
-        told += _of_mesh(found, analysis)
+        texts += _of_mesh(found, analysis)
         bounds = _bounds(posed)
     except Stopped:
         place = where(model.scene.path, analysis)
