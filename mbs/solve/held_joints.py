@@ -8,7 +8,7 @@ With the coordinates of motors fixed, R δs = 0, the linear equations M δs̈ + 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -96,9 +96,17 @@ def _shafts(mechanism: LinearMechanism) -> Iterator[str]:
 
 def _held(mechanism: LinearMechanism, condition: str) -> HeldJoints:
     N, K, D = held_coordinates(mechanism, condition)
-    modes = robot_modes(K, D, N, mechanism.transformation)
+    modes = _largest_real(robot_modes(K, D, N, mechanism.transformation))
     compliance = {point: _compliance(K, J @ N) for point, J in mechanism.points.items()}
     return HeldJoints(modes, compliance)
+
+
+def _largest_real(modes: RobotModes) -> RobotModes:
+    """With the largest entry of each δs real and positive, whatever the columns of N are."""
+    shape = modes.shape
+    largest = np.take_along_axis(shape, np.abs(shape).argmax(axis=1)[:, None], axis=1) if shape.size else shape[:, :1]
+    turn = np.abs(largest) / largest
+    return replace(modes, shape=shape * turn, motion=modes.motion * turn)
 
 
 def free_directions(R: Array) -> Array:
