@@ -112,7 +112,7 @@ def test_linear_models_are_those_of_the_plane(both):
 
 def test_controllers_know_the_whole_links(both):
     """Modal coordinates of these, their rates and accelerations along the motion, as the plane tells them."""
-    told, found = (make_whole_links(of).told(of.outcomes["inverse"]) for of in both)
+    told, found = (make_whole_links(of).as_links(of.outcomes["inverse"]) for of in both)
     for node, of_plane in zip(found.model.tree.nodes, told.model.tree.nodes, strict=True):
         to_file, in_plane = node.body.modal_transform.T, of_plane.body.modal_transform.T
         for share, values, expected in (
