@@ -97,10 +97,11 @@ def _workspace(axes: Axes, found: PoseMap, quantity: Quantity) -> None:
 def _workspace_3d(axes: Any, found: PoseMap, quantity: Quantity) -> None:  # noqa: ANN401 (of matplotlib's 3D axes)
     """Likewise in 3D."""
     place = found.values["place"]
+    axes.computed_zorder = False  # the robot in front of the cloud of places
     cloud = axes.scatter(*place.T, c=quantity.values, cmap=ORDERED, s=5, alpha=0.5, linewidths=0)
     for (number, color, marker), label in zip(_marks(quantity), LABELS, strict=True):
         for line in found.values["robot"][number]:
-            axes.plot(*line.T, color=color, linewidth=2.0)
+            axes.plot(*line.T, color=color, linewidth=2.0, zorder=5)
         axes.plot(*place[number][:, None], marker, color=color, label=label)
     axes.set_aspect("equal")
     axes.set_box_aspect(None, zoom=ZOOM)
