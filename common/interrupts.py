@@ -6,7 +6,7 @@ import os
 import signal
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from types import FrameType
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
@@ -80,3 +80,11 @@ def _is_importing(frame: FrameType | None) -> bool:
 
 def _in_main_thread() -> bool:
     return threading.current_thread() is threading.main_thread()
+
+
+def end_with_parent() -> None:
+    """Have Linux end this process when the one that started it ends, even by SIGKILL; other systems do not know it."""
+    import ctypes  # loaded here: other commands start without it
+
+    with suppress(Exception):
+        ctypes.CDLL(None).prctl(1, int(signal.SIGKILL), 0, 0, 0)  # PR_SET_PDEATHSIG

@@ -10,7 +10,6 @@ runs print on the error stream goes where this process's does.
 from __future__ import annotations
 
 import atexit
-import ctypes
 import json
 import os
 import random
@@ -24,7 +23,7 @@ from tempfile import TemporaryFile
 from types import FrameType
 from typing import Any, BinaryIO, NoReturn
 
-from .common.interrupts import SIGNALS, EndOfCommand
+from .common.interrupts import SIGNALS, EndOfCommand, end_with_parent
 from .common.python_files import imported_files
 from .common.validation import USED
 
@@ -81,7 +80,7 @@ def _wait(child: int) -> int:
 
 def _run(arguments: Sequence[str], report: BinaryIO) -> NoReturn:
     """`ffrobot ARGUMENTS` in the process of one run, which ends with it; what it has loaded it writes to `report`."""
-    _end_with_parent()
+    end_with_parent()  # nobody waits for the run any more, and another may write its file
     for number in SIGNALS:
         signal.signal(number, EndOfCommand())
     signal.pthread_sigmask(signal.SIG_UNBLOCK, SIGNALS)
@@ -148,12 +147,6 @@ def _seed() -> None:
 
     random.seed()
     np.random.seed()  # noqa: NPY002 (the one generator that there is without asking)
-
-
-def _end_with_parent() -> None:
-    """Have Linux end a run whose worker was killed: nobody waits for it any more, and another may write its file."""
-    with suppress(Exception):
-        ctypes.CDLL(None).prctl(1, int(signal.SIGKILL), 0, 0, 0)  # PR_SET_PDEATHSIG
 
 
 if __name__ == "__main__":

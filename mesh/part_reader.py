@@ -7,7 +7,6 @@ parent, and at a limit of processor time.
 
 from __future__ import annotations
 
-import ctypes
 import os
 import pickle
 import resource
@@ -20,6 +19,7 @@ from tempfile import TemporaryDirectory
 from typing import Any, TypeVar
 
 from ..common.errors import FfrobotError, InputError
+from ..common.interrupts import end_with_parent
 from ..common.parallel import environment_without_mpi
 
 Found = TypeVar("Found")
@@ -87,8 +87,7 @@ def main() -> None:
     global _is_apart
     _is_apart = True
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # of a terminal: the parent decides
-    with suppress(AttributeError):  # Linux has it
-        ctypes.CDLL(None).prctl(1, int(signal.SIGKILL), 0, 0, 0)  # PR_SET_PDEATHSIG
+    end_with_parent()
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     answer = os.fdopen(os.dup(1), "wb")
     nowhere = os.open(os.devnull, os.O_WRONLY)

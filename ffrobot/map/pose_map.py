@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ctypes
 import hashlib
 import io
 import json
@@ -20,7 +19,7 @@ import numpy as np
 from ..common.arrays import Array, Booleans, Indices
 from ..common.errors import InputError, SolveError, did_you_mean, quoted
 from ..common.files import check_folder, write_atomically
-from ..common.interrupts import SIGNALS
+from ..common.interrupts import SIGNALS, end_with_parent
 from ..mbs.solve.poses import PoseEvaluator
 from ..mbs.solve.workspace import GridAxis, Postures, grid_postures
 from ..run.inputs import changed, fingerprints, read_tables
@@ -183,8 +182,7 @@ def _serve(parent: int) -> None:
     """Leave signals to the parent, and end with it where it is killed."""
     for number in SIGNALS:
         signal.signal(number, signal.SIG_IGN)
-    with suppress(Exception):
-        ctypes.CDLL(None).prctl(1, int(signal.SIGKILL), 0, 0, 0)  # PR_SET_PDEATHSIG
+    end_with_parent()
     if os.getppid() != parent:
         os._exit(1)
 
