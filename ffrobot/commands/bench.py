@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -90,9 +91,22 @@ def bench(
     settings = Settings(integrators or INTEGRATORS, tolerances or TOLERANCES, repeat, budget)
     folder = output or (scene_file.with_suffix(".bench") if scene_file else Path("bench"))
     with Display() as display:
-        campaign = Campaign(folder, settings, display, summary_console())
         if scene_file is not None:
+            campaign = Campaign(folder, settings, display, summary_console())
             campaign.scene(scene_file, analysis, folder, parts or OF_A_SCENE)
         else:
             wanted = (*(parts or PARTS), *([PEER] if peer else []))
-            campaign.everything(source, wanted, peer_python or Path(sys.executable))
+            tree = _source_tree(source)(folder, settings, display, summary_console())
+            tree.everything(source, wanted, peer_python or Path(sys.executable))
+
+
+def _source_tree(source: Path) -> Any:  # noqa: ANN401 (a class outside the package)
+    """`SourceTree` of tools/bench. Raises `InputError` where `source` is no source tree."""
+    from importlib import import_module
+
+    from ..common.errors import InputError
+
+    if not (source / "tools" / "bench" / "source_tree.py").is_file():
+        raise InputError(f"{source}: --source: expected ffrobot's source tree, found no tools/bench in it")
+    sys.path.insert(0, str(source.resolve() / "tools"))
+    return import_module("bench.source_tree").SourceTree

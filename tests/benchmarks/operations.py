@@ -15,6 +15,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 ROOT = Path(__file__).parents[2]
+sys.path.insert(0, str(ROOT / "tools"))
 SCENE = ROOT / "cases" / "two_link" / "scene.toml"
 FEW, MANY = 1_000, 3_000
 TARGET = "-march=x86-64-v3"
@@ -47,8 +48,8 @@ def evaluate(core, count):
     module = importlib.util.module_from_spec(spec)
     sys.modules[spec.name] = ffrobot.mbs._core = module
     spec.loader.exec_module(module)
-    from ffrobot.bench.evaluation import evaluation_seconds
-    from ffrobot.bench.hand_written import TIME, general_state
+    from bench.evaluation import evaluation_seconds
+    from bench.hand_written import TIME, general_state
 
     evaluation_seconds(general_state(two_link()), TIME, count)
 
@@ -88,7 +89,7 @@ def per_evaluation(command):
 
 
 def main():
-    from ffrobot.bench.hand_written import FLAGS, HandWritten
+    from bench.hand_written import FLAGS, HandWritten
 
     with TemporaryDirectory() as name:
         folder = Path(name)

@@ -12,11 +12,11 @@ from typing import Any
 
 import numpy as np
 
-from ..common.errors import InputError, SolveError
-from ..run.watcher import Watcher
-from ..scene.scene import Scene
-from .errors import relative
-from .precision import PATIENCE, Point, Reference, Row, fastest, repeat_point
+from ffrobot.bench.errors import relative
+from ffrobot.bench.precision import PATIENCE, Point, Reference, Row, fastest, repeat_point
+from ffrobot.common.errors import InputError, SolveError
+from ffrobot.run.watcher import Watcher
+from ffrobot.scene.scene import Scene
 
 SCRIPT = Path("tests/benchmarks/peers/exudyn_two_link.py")
 NAME = "EXUDYN generalized-alpha"

@@ -8,14 +8,15 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from statistics import median
 
-from ..run.solve import prepare_scene
-from ..run.watcher import Watcher
-from ..scene.load import make_scene
-from ..scene.scene import Scene
-from .errors import KINDS
+from ffrobot.bench.errors import KINDS
+from ffrobot.bench.precision import Point, Row, fastest, find_reference, measure_points, repeat_point
+from ffrobot.run.solve import prepare_scene
+from ffrobot.run.watcher import Watcher
+from ffrobot.scene.load import make_scene
+from ffrobot.scene.scene import Scene
+
 from .evaluation import State, evaluation_seconds
 from .hand_written import TIME, HandWritten, general_state
-from .precision import Point, Row, fastest, find_reference, measure_points, repeat_point
 from .ratio import ratios
 
 ACCURACY = 1e-4

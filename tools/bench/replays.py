@@ -5,11 +5,12 @@ from __future__ import annotations
 import tomllib
 from statistics import median
 
-from ..run.solve import solve_scene
-from ..run.watcher import Watcher
-from ..scene.load import make_scene
-from ..scene.scene import Scene
-from .precision import Row
+from ffrobot.bench.precision import Row
+from ffrobot.run.solve import solve_scene
+from ffrobot.run.watcher import Watcher
+from ffrobot.scene.load import make_scene
+from ffrobot.scene.scene import Scene
+
 from .ratio import ratios
 
 APPLIED = ("trajectory", "joints+pzt", "joints")

@@ -12,17 +12,18 @@ from types import MappingProxyType
 
 import numpy as np
 
-from ..mbs.analysis.context import Context
-from ..mbs.analysis.pcid import run_pcid
-from ..mbs.model.body import Body, BodyPoint
-from ..mbs.model.model import Model, build_model
-from ..mbs.model.projection import projected
-from ..mbs.scene.analysis import IntegratedAnalysis
-from ..run.watcher import Watcher
-from ..scene.load import make_scene
-from ..scene.scene import Scene
+from ffrobot.bench.precision import Row
+from ffrobot.mbs.analysis.context import Context
+from ffrobot.mbs.analysis.pcid import run_pcid
+from ffrobot.mbs.model.body import Body, BodyPoint
+from ffrobot.mbs.model.model import Model, build_model
+from ffrobot.mbs.model.projection import projected
+from ffrobot.mbs.scene.analysis import IntegratedAnalysis
+from ffrobot.run.watcher import Watcher
+from ffrobot.scene.load import make_scene
+from ffrobot.scene.scene import Scene
+
 from .evaluation import State, evaluation_seconds, start_at_rest
-from .precision import Row
 
 MASS, LENGTH, STIFFNESS = 1.0, 1.0, 100.0  # kg, m, EI in N·m²
 MODES, LINKS, OUTPUTS = (2, 5, 10, 20, 50, 100, 200), (2, 5, 10, 20, 50), (100, 1000, 10_000, 100_000)

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..common.arrays import Array
-from ..mbs.model.model import Model
-from ..mbs.model.system import MultibodySystem
-from ..mbs.solve.start import undeformed_posture
+from ffrobot.common.arrays import Array
+from ffrobot.mbs.model.model import Model
+from ffrobot.mbs.model.system import MultibodySystem
+from ffrobot.mbs.solve.start import undeformed_posture
 
 State = tuple[MultibodySystem, Array, Array]
 """Equations, q (n_q,) and v (n_v,)."""

@@ -9,12 +9,13 @@ from pathlib import Path
 
 import numpy as np
 
-from ..common.errors import InputError, SolveError
-from ..mbs.model.body import Body
-from ..mbs.model.model import Model
-from ..mbs.model.system import MultibodySystem
-from ..mbs.solve.posture import solve_posture, with_rates
-from ..mbs.solve.start import undeformed_posture
+from ffrobot.common.errors import InputError, SolveError
+from ffrobot.mbs.model.body import Body
+from ffrobot.mbs.model.model import Model
+from ffrobot.mbs.model.system import MultibodySystem
+from ffrobot.mbs.solve.posture import solve_posture, with_rates
+from ffrobot.mbs.solve.start import undeformed_posture
+
 from .evaluation import State
 
 SOURCE = Path("tests/benchmarks/hand_written/two_link.cpp")

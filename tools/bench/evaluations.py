@@ -15,16 +15,17 @@ from typing import Any
 
 import numpy as np
 
-from ..mbs.model.model import build_model
-from ..mbs.model.system import MultibodySystem
-from ..run.bodies import load_bodies
-from ..run.solve import prepare_scene
-from ..run.watcher import Watcher
-from ..scene.load import load_scene, make_scene
+from ffrobot.bench.precision import Row
+from ffrobot.mbs.model.model import build_model
+from ffrobot.mbs.model.system import MultibodySystem
+from ffrobot.run.bodies import load_bodies
+from ffrobot.run.solve import prepare_scene
+from ffrobot.run.watcher import Watcher
+from ffrobot.scene.load import load_scene, make_scene
+
 from .evaluation import evaluation_seconds, start_at_rest
 from .growth import LINKS, chain
 from .hand_written import TIME, HandWritten, general_state
-from .precision import Row
 from .ratio import ratios
 
 ROUNDS = 30

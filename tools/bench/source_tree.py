@@ -1,0 +1,83 @@
+"""What `ffrobot bench` runs without a scene: the two cases of the paper, growth, and ratios to hand-written code."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+
+from ffrobot.bench import OF_A_SCENE, PEER
+from ffrobot.bench.campaign import Campaign, Swept, inputs_of
+from ffrobot.bench.figures import draw_growth, draw_work_precision
+from ffrobot.bench.measuring import find_analysis
+from ffrobot.common.errors import InputError
+from ffrobot.run.solve import prepare_scene
+from ffrobot.scene.load import load_scene
+from ffrobot.scene.scene import Scene
+
+from .aims import measure_aims
+from .evaluations import measure_evaluations
+from .growth import measure_growth
+from .peer import Exudyn, measure_peer
+from .replays import measure_replays
+
+CASES = ("two_link", "slider_crank")  # of the paper
+
+
+class SourceTree(Campaign):
+    """Measures what needs ffrobot's source tree."""
+
+    def everything(self, repository: Path, parts: Sequence[str], peer_python: Path) -> None:
+        """Those of `parts` that are told no scene, and the two cases of the paper."""
+        paths = {name: repository / "cases" / name / "scene.toml" for name in CASES}
+        of_cases = [part for part in parts if part in OF_A_SCENE]
+        if set(parts) - {"growth"} and not all(path.is_file() for path in paths.values()):
+            raise InputError(f"{repository}: --source: expected ffrobot's source tree, found no cases in it")
+        exudyn = self._exudyn(paths["two_link"], repository, peer_python) if PEER in parts else None
+        if "growth" in parts:
+            rows = measure_growth(self.settings.repeat, self.display)
+            self.keep("growth", rows, {}, self.folder, "growth")
+            self.drawn(draw_growth(rows, self.folder))
+        if "evaluations" in parts:
+            self._evaluations(repository)
+        if "aims" in parts:
+            self._aims(load_scene(paths["two_link"]), repository)
+        if "replays" in parts:
+            self._replays(load_scene(paths["two_link"]))
+        swept = {name: self.scene(path, None, self.folder / name, of_cases) for name, path in paths.items() if of_cases}
+        if exudyn is not None:
+            self._peer(exudyn, load_scene(paths["two_link"]), swept.get("two_link"))
+
+    def _aims(self, scene: Scene, repository: Path) -> None:
+        with tempfile.TemporaryDirectory(prefix="ffrobot-bench-") as folder:
+            rows = measure_aims(
+                scene, repository, Path(folder), self.settings.repeat, self.settings.budget, self.display
+            )
+        self.keep("aims", rows, {"inputs": inputs_of(scene, {})}, self.folder, "ratios to the hand-written version")
+
+    def _replays(self, scene: Scene) -> None:
+        rows = measure_replays(scene, self.settings.repeat, self.display)
+        self.keep("replays", rows, {"inputs": inputs_of(scene, {})}, self.folder, "forward runs that replay PCID")
+
+    def _evaluations(self, repository: Path) -> None:
+        with tempfile.TemporaryDirectory(prefix="ffrobot-bench-") as folder:
+            rows = measure_evaluations(repository, Path(folder), self.display)
+        self.keep("evaluations", rows, {}, self.folder, "one evaluation of accelerations and multipliers")
+
+    def _exudyn(self, scene_path: Path, repository: Path, python: Path) -> Exudyn:
+        bodies = prepare_scene(load_scene(scene_path), self.display).bodies
+        links = [body.path for body in bodies.values() if body.path is not None]
+        return Exudyn(repository, python, links, self.settings.budget)
+
+    def _peer(self, exudyn: Exudyn, scene: Scene, swept: Swept | None) -> None:
+        """The peer beside our sweep, on whose figures it comes."""
+        name, folder = find_analysis(scene, None).name, self.folder / scene.name
+        reference, points = swept or self.work_precision(scene, name, folder)
+        settings = self.settings
+        rows, verdict = measure_peer(
+            exudyn, scene, name, reference, points, settings.repeat, settings.budget, self.display
+        )
+        about = {"inputs": inputs_of(scene, reference.bodies), "reference": reference.about(), "verdict": verdict}
+        self.keep("peer", rows, about, folder, "EXUDYN on the same modal bodies; force without its start")
+        self.drawn(draw_work_precision([point.row() for point in points], rows, scene.name, folder))
+        self.console.print(f"at the peer's best error: {verdict}")
