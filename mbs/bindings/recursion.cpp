@@ -96,8 +96,7 @@ double time_of(Model<Space> &model, const VectorXd &q, const VectorXd &v, const 
 
 template <class Space> auto bind_model(nb::module_ &m, const char *name, const char *body_name, const char *text) {
   using Body = BodyModel<typename Space::Data>;
-  nb::class_<Body>(m, body_name,
-                   "A body of a tree and the joint that it hangs on; see mbs/core/recursion/mechanism/model.h.")
+  nb::class_<Body>(m, body_name, "A body of a tree and its inboard joint; see mbs/core/recursion/mechanism/model.h.")
       .def(nb::init<>())
       .def_rw("name", &Body::name)
       .def_rw("parent", &Body::parent)

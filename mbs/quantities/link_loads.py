@@ -1,6 +1,6 @@
 """All loads on a link over a motion as multiples of unit loads: forces at interfaces, and of its inertia.
 
-What a joint hands to the body that it carries is what that body and all that hangs on it need for their motion, less
+What a joint hands to the body that it carries is what that body and its outboard subtree need for their motion, less
 what else acts there (Newton and Euler, in the core). Where motors carry the motion they do so in place of the forces
 along its trajectories: loops then transmit their share of M v̇ − Q (`split_forces`).
 """

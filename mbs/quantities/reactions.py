@@ -16,7 +16,7 @@ from .motion import RobotMotion
 def reactions(motion: RobotMotion) -> Mapping[str, Wrench]:
     """By joint: force on its second side, and moment about where that side is, N and N·m.
 
-    A joint of the tree carries what its body and all that hangs on it need, less what else acts there and what acts
+    A joint of the tree carries what its body and its outboard subtree need, less what else acts there and what acts
     along its coordinates: motors, friction, loads, rotors. One that closes a loop has its multipliers.
     """
     return _carried(motion, motion.behind_gears.forces)

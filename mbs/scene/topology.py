@@ -37,7 +37,7 @@ class Topology:
 
     Attributes:
         carriers: of each body the joint on the way to the root of its tree, None of a root; bodies stand in an order in
-            which each comes after its parent, those that hang from the ground first.
+            which each comes after its parent, those on the ground first.
         loop_joints: numbers of the joints that are in no tree: each closes a loop.
     """
 

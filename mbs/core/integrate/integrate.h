@@ -90,7 +90,7 @@ struct IntegrationControls {
 
 using StateFunctionOfTime = std::function<void(std::size_t, double, const double *)>; // of number, time and (q, v)
 
-// Times, ascending, at which loads jump: steps end there, and `at` is told index, time and state before the next
+// Times, ascending, at which loads jump: steps end there, and `at` receives index, time and state before the next
 // begins.
 struct Breaks {
   std::vector<double> times;

@@ -72,7 +72,7 @@ inline void accelerate_joint(const Node<Space> &node, const T *q, Hinge<Space, T
     a[k] = x[k];
 }
 
-// Accelerations of ports, and forces f on those that modes move or where a joint hangs, whose forces steps are judged
+// Accelerations of ports, and forces f on those that modes move or that carry a joint, whose forces steps are judged
 // by; the last eliminated first.
 template <class Space, class T, int W>
 inline void accelerate_ports(const Mechanism<Space> &m, const Node<Space> &node, bool by_multipliers,

@@ -63,7 +63,7 @@ inline void propagate_to_parent(const Mechanism<Space> &m, const Node<Space> &no
     P[i].write(to + i * stride);
 }
 
-// A body after those that hang on it: its ports, its modes, its joint.
+// A body after its children: its ports, its modes, its joint.
 template <class Space, class T, int W>
 inline void eliminate_body(const Mechanism<Space> &m, const Node<Space> &node, const T *q, const T *v,
                            const Forces<T> &forces, Workspace<Space, T> &w, Delassus<T, W> &S, Pack<T, W> &gamma) {

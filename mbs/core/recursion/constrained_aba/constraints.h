@@ -6,7 +6,7 @@
 
 namespace ffrobot::recursion {
 
-// What a moment does with the angular acceleration of a marker that turns as it is told
+// What a moment does with the angular acceleration of a marker whose orientation is prescribed
 template <class Space, class T>
 FFROBOT_INLINE T by_turning(const Mechanism<Space> &m, const Attachment &at, const Workspace<Space, T> &w,
                             const T *moment) {
@@ -161,7 +161,7 @@ FFROBOT_INLINE void in_port_axes(const spatial::Body &body, int port, const spat
   turn_back(s.absolute, moment, local), turn_back(body.ports[port].R, local, to + 3);
 }
 
-// What acts on ports before anything that hangs there: constraint equations in their columns, wrenches in column 0. Of
+// What acts on ports before outboard subtrees: constraint equations in their columns, wrenches in column 0. Of
 // equations that move, S gets what they measure by velocities and, at the ground, by its acceleration -g; of others
 // that is in w.lift.
 template <class Space, class T, int W>

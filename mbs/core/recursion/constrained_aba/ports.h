@@ -1,4 +1,4 @@
-// Inward over the ports of a body: what hangs there, by elimination of the body's modes.
+// Inward over the ports of a body: their outboard subtrees, by elimination of the body's modes.
 #pragma once
 
 #include "core/recursion/constrained_aba/subtree_inertia.h"
@@ -144,7 +144,7 @@ FFROBOT_INLINE void answer_of_port(PortWork<Space, T> &port, bool is_flexible, b
     subtract_dyads(S, D, F);
 }
 
-// Ports of the body, one after the other: M, H, S and gamma gain what hangs there.
+// Ports of the body, one after the other: M, H, S and gamma gain their outboard subtrees.
 template <class Space, class T, int W>
 inline void eliminate_ports(const Mechanism<Space> &m, const Node<Space> &node, Workspace<Space, T> &w,
                             Pack<T, Space::dim> *M, Pack<T, W> *H, Delassus<T, W> &S, Pack<T, W> &gamma) {

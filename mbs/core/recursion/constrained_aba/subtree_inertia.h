@@ -1,4 +1,5 @@
-// What hangs on a port as a stiffness: Y = (Lambda^-1 + G)^-1, Lambda of the child's joint in its section's axes.
+// The outboard subtree of a port as a stiffness: Y = (Lambda^-1 + G)^-1, Lambda of the child's joint in its section's
+// axes.
 #pragma once
 
 #include "core/recursion/constrained_aba/delassus.h"
@@ -8,7 +9,7 @@ namespace ffrobot::recursion {
 // What is left of a diagonal of Lambda by rounding where the body has no inertia there, of that diagonal
 constexpr double no_inertia = 1e-13;
 
-// Columns C of forces (port axes) and numbers D with Lambda = sum of D c c^T, `rank` of them; fewer where what hangs
+// Columns C of forces (port axes) and numbers D with Lambda = sum of D c c^T, `rank` of them; fewer where the subtree
 // there has no inertia in some direction (a point mass, a thin rod): its row and column in Lambda are zero by then.
 template <class Space, class T>
 FFROBOT_NOINLINE int factors(const Node<Space> &child, const Hinge<Space, T> &hinge, Pack<T, Space::dim> *C, T *D) {
@@ -184,7 +185,7 @@ FFROBOT_INLINE void series_stiffness(const H &hinge, const Pack<T, d> *G, Pack<T
   }
 }
 
-// Y of what hangs on a port
+// Y of the outboard subtree of a port
 template <class Space, class T>
 FFROBOT_NOINLINE void subtree_inertia(const Node<Space> &child, const Hinge<Space, T> &hinge, bool is_flexible,
                                       const Pack<T, Space::dim> *G, Pack<T, Space::dim> *Y) {

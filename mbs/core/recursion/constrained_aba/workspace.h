@@ -38,7 +38,7 @@ template <class T> struct Block {
 // A joint, in axes of the outer section
 template <class Space, class T> struct Hinge {
   static constexpr int d = Space::dim;
-  typename Space::template Turn<T> turn;    // to axes of the port on which it hangs
+  typename Space::template Turn<T> turn;    // to axes of the inboard port
   T cross_cosine, cross_sine;               // of a universal joint's second angle
   T r[Space::linear], r_dot[Space::linear]; // origin of the section from the port's, and its rate
   T c[d];                                   // acceleration by velocities

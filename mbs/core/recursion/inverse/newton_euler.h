@@ -78,7 +78,7 @@ public:
   const Vector &about_inner(std::size_t i) const { return about_inner_[i]; }
   // The rate of angular momentum of the rotor in it, a moment in global axes
   const Vector &of_rotor(std::size_t i) const { return of_rotor_[i]; }
-  // All that acts on a port, with what hangs there: about the origin of its section, axes of the undeformed one
+  // All that acts on a port, with its outboard subtree: about the origin of its section, axes of the undeformed one
   const Vector &on_port(std::size_t port) const { return with_joints_[port]; }
 
   // After accelerate(): acceleration less gravity of the section of a port, in axes of the undeformed one
@@ -94,7 +94,7 @@ private:
 
   const Mechanism<Space> &mechanism_;
   std::vector<typename KnownBodyOf<Space>::type> bodies_;
-  std::vector<Vector> ports_, on_ports_, with_joints_; // of all ports: accelerations; loads; loads and what hangs there
+  std::vector<Vector> ports_, on_ports_, with_joints_; // of all ports: accelerations; loads; the latter with subtrees
   std::vector<double> terms_;                          // of all ports: what modes accelerate by
   std::vector<Vector> frames_;                         // of bodies: accelerations, axes of the body
   std::vector<Vector> inertia_;                        // of bodies: (force, moment) at the frame, axes of the body

@@ -315,7 +315,7 @@ template <class Space> void Mechanism<Space>::check_coordinates() const {
   }
 }
 
-// Numbers of ports among all of the mechanism: what a joint hangs on, what a constraint equation or wrench acts on
+// Numbers of ports among all of the mechanism: inboard ports of joints, what a constraint equation or wrench acts on
 template <class Space> void Mechanism<Space>::connect_ports() {
   children.assign(static_cast<std::size_t>(ports), -1);
   cleared.assign(static_cast<std::size_t>(ports), 0);
@@ -388,14 +388,14 @@ template <class Space> void Mechanism<Space>::connect_pins() {
     node.carries_pin = child >= 0 && nodes[static_cast<std::size_t>(child)].is_pin;
     if (node.is_pin && child >= 0 && nodes[static_cast<std::size_t>(child)].is_driven)
       node.moment_on_port = nodes[static_cast<std::size_t>(child)].v;
-    node.hangs_on_pin = node.is_pin;
+    node.parent_is_pin = node.is_pin;
     if (node.parent < 0) {
       if constexpr (std::is_same_v<Space, Planar>)
         node.inner_angle = ground[static_cast<std::size_t>(node.parent_port)].angle;
       continue;
     }
     const Node<Space> &parent = nodes[static_cast<std::size_t>(node.parent)];
-    node.hangs_on_pin = node.is_pin && parent.is_pin;
+    node.parent_is_pin = node.is_pin && parent.is_pin;
     node.adds_up = cleared[static_cast<std::size_t>(node.parent_port)];
     if constexpr (std::is_same_v<Space, Planar>) {
       const planar::Port &port = parent.body.ports[static_cast<std::size_t>(node.parent_port - parent.first_port)];

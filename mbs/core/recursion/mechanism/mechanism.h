@@ -1,6 +1,6 @@
 // The constants of a mechanism, made once from what the caller says. Whatever can be decided before an evaluation is
-// decided here: which blocks of a body exist, whether its frame can sit at its joint, what hangs on which port, which
-// ports pass moments, where constraint equations attach.
+// decided here: which blocks of a body exist, whether its frame can sit at its joint, which child each port carries,
+// which ports pass moments, where constraint equations attach.
 #pragma once
 
 #include "core/recursion/mechanism/space.h"
@@ -11,7 +11,7 @@
 
 namespace ffrobot::recursion {
 
-// A body with the joint that it hangs on.
+// A body with its inboard joint.
 template <class Space> struct Node {
   std::string name;
   typename Space::Body body;
@@ -36,17 +36,17 @@ template <class Space> struct Node {
   int first_cross = 0; // of blocks between ports: (0, 1), (0, 2) … (1, 2) …; none with a single port
   bool is_pin = false; // plane: a revolute joint, at most one port, which passes forces, and moments that are given
                        // (planar/pin_joints.h)
-  // … of a pin: so is what it hangs on, unless that is the ground; something hangs on its port, and that is a pin; what
+  // … of a pin: so is its parent, unless that is the ground; its port carries a child, and that is a pin; what
   // it hands to its port is added to what acts there
-  bool hangs_on_pin = false, is_loaded = false, carries_pin = false, adds_up = false;
+  bool parent_is_pin = false, is_loaded = false, carries_pin = false, adds_up = false;
   int moment_on_port = -1;         // … of v, along which given forces act on its port, too; -1 where none do
   int angle = -1;                  // plane: of the joint, its place in q; -1 where it does not turn
-  int inner_rotation = -1;         // plane: row of W of the body it hangs on, the rotation of the section where it does
+  int inner_rotation = -1;         // plane: row of W of its parent, the rotation of the section where it does
   double inner_angle = 0;          // plane: of that section undeformed, in axes of its body; of a marker of the ground
   bool is_driven = false;          // forces or constraints act along the joint's coordinates
   bool has_constraints = false;    // constraint equations that are coordinates of the joint
-  bool is_single_grounded = false; // hangs on the ground, and nothing on it: forces on the ground are kept (Hinge::f)
-  bool is_weightless = false; // nothing but a rotor's inertia, nothing hangs on it: what carries it feels no inertia
+  bool is_single_grounded = false; // on the ground, without a child: forces on the ground are kept (Hinge::f)
+  bool is_weightless = false;      // a rotor's inertia alone and no child: what carries it feels no inertia
   Eigen::Vector3d origin = Eigen::Vector3d::Zero(); // of the body's data, in axes of the frame
   double turn = 0;                                  // in the plane: of the frame's axes in those of the body's data
 
@@ -107,7 +107,7 @@ template <class Space> struct Mechanism {
   std::vector<Attachment> wrenches; // markers on which forces act
   Eigen::VectorXd gravity;          // (linear) m/s^2
   int n_q = 0, n_v = 0, ports = 0, slots = 0, crosses = 0;
-  std::vector<int> children; // of each port: the node that hangs on it, or -1
+  std::vector<int> children; // of each port: its child, or -1
   std::vector<char> cleared; // of each port: what acts on it is summed up, and starts at zero
   struct Actions {
     int node, port, global_port; // of cleared ports

@@ -65,7 +65,7 @@ struct SpatialData {
   Eigen::Index modes() const { return stiffness.size(); }
 };
 
-// The tree: body i hangs on marker `parent_marker` of a body before it, or of the ground (parent -1).
+// The tree: body i is joined to marker `parent_marker` of a body before it, or of the ground (parent -1).
 template <class Data> struct BodyModel {
   std::string name;
   int parent = -1, parent_marker = 0, inboard_marker = 0;

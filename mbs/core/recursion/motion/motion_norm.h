@@ -13,7 +13,7 @@ struct NormPeaks {
 
 // Alike are all ways of joints, all their angles, each body's modes, the rates of each of these, the multipliers of one
 // joint or path that are forces, or moments, and so what one joint of the tree hands to the body that carries it, and
-// to the ground where no other body hangs on it: those on the ground of chains follow from what is between bodies.
+// to the ground where it has no child: those on the ground of chains follow from what is between bodies.
 // Errors e and states z are local coordinates (space/local_coordinates.h).
 template <class Space> class MotionNorm {
 public:
@@ -76,7 +76,7 @@ private:
   std::vector<double> peak_;   // of each group: of what it is of, of rates, of accelerations
   mutable std::vector<double> size_;
   std::vector<double> by_forces_, by_given_, of_rates_; // as in take(), squared
-  std::vector<std::size_t> carriers_;                   // of all ports: on which a joint of the tree hangs
+  std::vector<std::size_t> carriers_;                   // of all ports: that carry a joint of the tree
   std::vector<std::size_t> alone_;                      // nodes whose forces on the ground are judged
   std::size_t motors_ = 0;                              // judged
   std::vector<int>

@@ -11,7 +11,7 @@
 namespace ffrobot::recursion {
 
 // A = (a, alpha) of the frame, of ports and sections as in backward_pass.h. "Linked" ports come first: those on which
-// a node hangs, then the inboard one.
+// a node has its joint, then the inboard one.
 template <class Space> struct NewtonBody {
   static constexpr int d = Space::dim;
   using Square = Eigen::Matrix<double, d, d>;
@@ -27,7 +27,7 @@ template <class Space> struct NewtonBody {
   Square M;               // M_rr - m m_ff^-1 m^T
   std::vector<Square> X;  // of ports: X_rigid - P m_ff^-1 m^T
   Square tilt;            // undeformed axes of the inboard port by those of the section
-  Square to_section;      // A of the section by that of the port on which it hangs, the joint held
+  Square to_section;      // A of the section by that of the inboard port, the joint locked
   Joint J;                // A of the section by accelerations of the joint
   Eigen::VectorXd turn; // (n) Phi_r of a pin's section that modes turn: A = … + J (q_ddot - turn . p_ddot); else empty
 
@@ -59,9 +59,8 @@ private:
   const Mechanism<Space> &mechanism_;
   std::vector<NewtonBody<Space>> bodies_;
   Eigen::MatrixXd C_;
-  Eigen::VectorXd rest_; // (n_v) zeros
-  std::vector<Forces>
-      acting_; // of each port (d, constraints), in its axes: what a unit of each constraint does, and what hangs there
+  Eigen::VectorXd rest_;       // (n_v) zeros
+  std::vector<Forces> acting_; // of each port (d, constraints), in its axes: of unit multipliers, of the subtree
 };
 
 extern template class NewtonPosture<Planar>;

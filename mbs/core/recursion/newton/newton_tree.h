@@ -30,7 +30,7 @@ private:
   using Real = Square<double, d>;
   using Part = Column<Scalar, d>;
 
-  // What hangs on a port
+  // The outboard subtree of a port
   struct Port {
     Block Y, passed; // (1 + Lambda G)^-1 Lambda, (1 + Lambda G)^-1
   };
@@ -43,12 +43,12 @@ private:
     Block M_inverse, N;          // of an inboard port: N = (X M^-1 X^T + G)^-1
     Real J, tilt, to_section;    // of the body, J with
     Block U, D_inverse;          // columns of freedoms, as U = I J
-    Block Lambda;                // in axes of the port on which it hangs
+    Block Lambda;                // in axes of the inboard port
     // of a solve
     std::vector<Scalar> u;            // (n) e^-1 r
     std::vector<Part> motion, forces; // of parts: rows times u; -A and forces on ports
     Part along;                       // D^-1 (r - J^T H)
-    Part pi;                          // in axes of the port on which it hangs
+    Part pi;                          // in axes of the inboard port
 
     Block &block(int r, int c) { return blocks[static_cast<std::size_t>(parts * r + c)]; }
   };

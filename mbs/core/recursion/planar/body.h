@@ -93,7 +93,7 @@ template <class T> struct State {
         h(body.padded, T(0.)), WH(body.width(), T(0.)), products(body.products.begin(), body.products.end()),
         bent(body.stiffening ? body.n : 0, body.stiffening ? body.width() : 0) {}
 
-  T cosine, sine;                   // of the frame against the port it hangs on
+  T cosine, sine;                   // of the frame against the inboard port
   T absolute_cosine, absolute_sine; // of the frame
   T omega;                          // of the frame
   T A[3];                           // of the last evaluation

@@ -42,7 +42,7 @@ FFROBOT_NOINLINE void kinematics(const Mechanism<Planar> &m, const T *q, const T
     Hinge<Planar, T> &hinge = w.hinges[i];
     const T cosine = w.cosine[i], sine = w.sine[i];
     hinge.turn = {cosine, sine};
-    T omega(0.); // of the section that it hangs on
+    T omega(0.); // of the inboard section
     if (node.parent >= 0) {
       const planar::State<T> &p = w.bodies[node.parent];
       omega = p.omega + p.u_dot[node.inner_rotation];
@@ -63,7 +63,7 @@ FFROBOT_NOINLINE void kinematics(const Mechanism<Planar> &m, const T *q, const T
         hinge.r[k] = to.r[k], hinge.r_dot[k] = to.r_dot[k];
       hinge.c[0] = -(oo * to.r[0]) - o2 * to.r_dot[1], hinge.c[1] = o2 * to.r_dot[0] - oo * to.r[1], hinge.c[2] = T(0.);
     }
-    if (!node.hangs_on_pin) {
+    if (!node.parent_is_pin) {
       hinge.column[0][0] = cosine, hinge.column[0][1] = sine, hinge.column[0][2] = -hinge.r[1];
       hinge.column[1][0] = -sine, hinge.column[1][1] = cosine, hinge.column[1][2] = hinge.r[0];
       hinge.column[2][2] = T(1.);

@@ -13,7 +13,7 @@
 
 namespace ffrobot::recursion {
 
-// What hangs on the port: Lambda of the child that is no pin (pins leave theirs there)
+// Lambda of the port's outboard subtree, whose joint is no pin (pins leave theirs there)
 template <class T> FFROBOT_INLINE void load_of_pin(const Mechanism<Planar> &m, int index, Workspace<Planar, T> &w) {
   PortWork<Planar, T> &port = w.ports[index];
   T L[2][2];
@@ -28,7 +28,7 @@ template <class T> FFROBOT_INLINE void load_of_pin(const Mechanism<Planar> &m, i
 }
 
 // What a moment does to the modes that turn a section by a row of W: along the coordinate of the joint (TILT), and
-// that along the joint of what hangs on the port.
+// that along the joint of the port's outboard subtree.
 template <int turn, class T> inline void push_modes(const planar::Body &body, const T &moment, planar::State<T> &s) {
   const auto by_moment = [&](int row) { return s.gram_of_block(turn, row) * moment; };
   for (int r = 0; r < 8; ++r)
@@ -165,7 +165,7 @@ FFROBOT_INLINE void propagate_pin_to_parent(const Mechanism<Planar> &m, const No
   const int index = node.parent_port;
   T *to = w.force.data() + index * 3 * stride;
   const bool add = node.adds_up;
-  if (node.hangs_on_pin) {
+  if (node.parent_is_pin) {
     PortWork<Planar, T> &port = w.ports[index];
     const T cc = c * c, nn = n * n;
     port.Lambda_xx = cc * xx - twice + nn * yy;
@@ -264,7 +264,7 @@ FFROBOT_INLINE void accelerate_port_of_pin(const Node<Planar> &node, const T &Ax
   port.A[2] = rotation;
 }
 
-// A_port (2): acceleration of the port that the body hangs on, in and out: of its own port
+// A_port (2): acceleration of the inboard port, in and out: of its own port
 template <bool by_multipliers, class T, int W>
 FFROBOT_INLINE void accelerate_pin(const Mechanism<Planar> &m, std::size_t i_node, const T *q, Workspace<Planar, T> &w,
                                    const Pack<T, W> &y, T *a) {

@@ -7,7 +7,7 @@ namespace ffrobot::recursion {
 
 namespace spatial {
 
-// The section that a joint hangs on: its axes against undeformed ones (null: the same), axes of the undeformed section
+// The inboard section of a joint: its axes against undeformed ones (null: the same), axes of the undeformed section
 // in global ones, angular velocity in axes of the undeformed section.
 template <class T> struct InnerSection {
   const T (*tilt)[3];
