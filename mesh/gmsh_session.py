@@ -8,8 +8,9 @@ from __future__ import annotations
 import os
 import signal
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from tempfile import TemporaryFile
 
 import gmsh
 import numpy as np
@@ -21,6 +22,7 @@ from .defaults import CIRCLE, GROWTH
 from .jacobian import SLIVER, cell_quality
 from .source import RawMesh
 
+_MOST_PRINTED = 1 << 20  # bytes
 # gmsh's newer algorithm, HXT, makes better meshes faster, but other ones in every run.
 _DELAUNAY = 1
 # A mesh too coarse for the shape crosses itself: then finer ones along curved faces are tried. Now and then one has a
@@ -29,10 +31,10 @@ _ATTEMPTS = ((1, 1.0), (1, 0.94), (1, 0.88), (2, 0.5), (4, 0.25))
 
 
 @contextmanager
-def gmsh_session() -> Iterator[None]:
-    """An empty gmsh model; reproducible: one thread, no settings files."""
+def gmsh_session() -> Iterator[Callable[[], str]]:
+    """An empty gmsh model; reproducible: one thread, no settings files. Returns what libraries have printed so far."""
     interrupt = signal.getsignal(signal.SIGINT)
-    with _stdout_silenced():
+    with _stdout_captured() as printed:
         gmsh.initialize([], False)
         try:
             signal.signal(signal.SIGINT, interrupt)
@@ -43,24 +45,23 @@ def gmsh_session() -> Iterator[None]:
                 ("Mesh.Algorithm3D", _DELAUNAY),
             ):
                 gmsh.option.setNumber(name, value)
-            yield
+            yield printed
         finally:
             gmsh.finalize()
 
 
 @contextmanager
-def _stdout_silenced() -> Iterator[None]:
+def _stdout_captured() -> Iterator[Callable[[], str]]:
     # OpenCASCADE writes to the process's standard output itself, past Python.
     sys.stdout.flush()
     kept = os.dup(1)
-    nowhere = os.open(os.devnull, os.O_WRONLY)
-    try:
-        os.dup2(nowhere, 1)
-        yield
-    finally:
-        os.dup2(kept, 1)
-        os.close(kept)
-        os.close(nowhere)
+    with TemporaryFile() as file:
+        try:
+            os.dup2(file.fileno(), 1)
+            yield lambda: os.pread(file.fileno(), _MOST_PRINTED, 0).decode(errors="replace")
+        finally:
+            os.dup2(kept, 1)
+            os.close(kept)
 
 
 def volume_and_surface() -> tuple[float, float]:

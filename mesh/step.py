@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
 import gmsh
+import numpy as np
 
 from ..common.arrays import as_floats
 from ..common.errors import InputError
@@ -20,6 +22,10 @@ from .source import Source, source_from
 # Units of length that a STEP file can declare, in mm: OpenCASCADE turns all numbers into millimetres.
 _SI_PREFIXES = {"$": 1e3, ".MILLI.": 1.0, ".CENTI.": 10.0, ".DECI.": 100.0, ".MICRO.": 1e-3, ".KILO.": 1e6}
 _OTHER_UNITS = {"INCH": 25.4, "FOOT": 304.8, "MILE": 1609344.0}
+_SOLID = re.compile(r"=\s*(?:MANIFOLD_SOLID_BREP|BREP_WITH_VOIDS|FACETED_BREP)\s*\(")
+_FACE = re.compile(r"=\s*(?:ADVANCED_FACE|FACE_SURFACE)\s*\(")
+_COMPLAINT = re.compile(r"ERR \w+ : ([\w ]+?) : Fails Count : (\d+)")  # of OpenCASCADE's reader
+_OFF = 1e-3  # how far edges may be from their faces and ends, relative to the part: files are exact to 1e-5 or so
 
 
 def mesh_step(file: Path, record: SolidMeshRecord, scale: float, where: str) -> Source:
@@ -34,13 +40,13 @@ def mesh_step(file: Path, record: SolidMeshRecord, scale: float, where: str) -> 
         where: beginning of the message of an error.
 
     Raises:
-        InputError: the file is corrupt, holds no closed volume, or cannot be meshed.
+        InputError: the file is damaged, holds no closed volume, or cannot be meshed.
     """
     text = file.read_text(encoding="latin-1")
     if "ISO-10303-21" not in text[:4096]:
         raise InputError(f"{where}: expected a STEP file, which begins with ISO-10303-21, found none")
     declared = declared_unit(text)
-    with gmsh_session():
+    with gmsh_session() as printed:
         gmsh.option.setNumber("Geometry.OCCImportLabels", 1)
         try:
             gmsh.model.occ.importShapes(str(file), highestDimOnly=False, format="step")
@@ -49,7 +55,10 @@ def mesh_step(file: Path, record: SolidMeshRecord, scale: float, where: str) -> 
             raise InputError(
                 f"{where}: expected a STEP file, found one that OpenCASCADE cannot read: {error}"
             ) from None
-        _check_volumes(where)
+        _check_volumes(text, where)
+        _check_complaints(printed(), where)
+        _check_edges(where)
+        remarks = tuple(_left_out(text))
         _join()
         _name_groups()
         order = record.order or default_order("tetrahedron")
@@ -59,7 +68,8 @@ def mesh_step(file: Path, record: SolidMeshRecord, scale: float, where: str) -> 
         allow(MESHING + MESHING_CELL * check_size(size * metres, volume * metres**3, where))
         mesh_model(size, metres, where)
         source = source_from(extract_mesh(), where)
-    return replace(source, part=source.part.moved(as_floats(source.part.points / declared)))
+    part = source.part.moved(as_floats(source.part.points / declared))
+    return replace(source, part=replace(part, remarks=(*remarks, *part.remarks)))
 
 
 def declared_unit(content: str) -> float:
@@ -74,16 +84,52 @@ def declared_unit(content: str) -> float:
     return _SI_PREFIXES.get(prefixes[0], 1.0) if prefixes else 1.0
 
 
-def _check_volumes(where: str) -> None:
-    if gmsh.model.getEntities(3):
+def _check_volumes(text: str, where: str) -> None:
+    found, declared = len(gmsh.model.getEntities(3)), len(_SOLID.findall(text))
+    if 0 < found < declared:
+        raise InputError(f"{where}: expected the {declared} solids of the file, found {found} that can be read")
+    if found:
         return
     faces = len(gmsh.model.getEntities(2))
-    found = (
+    instead = (
         f"{faces} faces that enclose none: an open surface; close its gaps and export a solid"
         if faces
         else "nothing: the file is empty or corrupt"
     )
-    raise InputError(f"{where}: expected a closed volume, found {found}")
+    raise InputError(f"{where}: expected a closed volume, found {instead}")
+
+
+def _check_edges(where: str) -> None:
+    """Check that edges lie on their faces and end at their vertices, in places of a few parameters each."""
+    model = gmsh.model
+    box = np.reshape(model.getBoundingBox(-1, -1), (2, 3))
+    most = _OFF * float(np.linalg.norm(box[1] - box[0]))
+    for _, face in model.getEntities(2):
+        for _, edge in model.getBoundary([(2, face)], combined=False, oriented=False):
+            at = np.linspace(*np.ravel(model.getParametrizationBounds(1, edge)), 5)
+            points = np.reshape(model.getValue(1, edge, at), (-1, 3))
+            on_face = np.reshape(model.getValue(2, face, model.reparametrizeOnSurface(1, edge, at, face)), (-1, 3))
+            ends = [model.getValue(0, end, []) for _, end in model.getBoundary([(1, edge)], combined=False)]
+            off = [np.linalg.norm(points - on_face, axis=1).max()]
+            off += [np.linalg.norm(points[[0, -1]] - end, axis=1).min() for end in ends]
+            if not max(off) <= most:
+                place = ", ".join(f"{value:.4g}" for value in points[2])
+                raise InputError(
+                    f"{where}: expected edges that lie on their faces and end at their vertices, found one"
+                    f" {max(off):.3g} mm off, near ({place}) mm: a damaged file"
+                )
+
+
+def _check_complaints(printed: str, where: str) -> None:
+    """Check what OpenCASCADE has printed: of a damaged file it makes a part of what is left."""
+    if complaints := [f"{what.lower()} ({count})" for what, count in _COMPLAINT.findall(printed)]:
+        raise InputError(f"{where}: expected a sound STEP file, found one damaged: {', '.join(complaints)}")
+
+
+def _left_out(text: str) -> Iterator[str]:
+    faces, declared = len(gmsh.model.getEntities(2)), len(_FACE.findall(text))
+    if faces < declared:
+        yield f"{declared - faces} of the {declared} faces in the file are in no shape that OpenCASCADE makes of it"
 
 
 def _join() -> None:

@@ -1,5 +1,6 @@
 """Parts from files: STEP and meshes of several formats become the part that they describe, or a clear error."""
 
+import re
 import sys
 
 import gmsh
@@ -117,6 +118,42 @@ def test_cut_off_files_are_refused(solid, mesh_part, step_file, tmp_path):
         (tmp_path / name).write_text(text)
         with pytest.raises(InputError, match=rf"geometry.file: {name}: expected .*, found "):
             mesh_part(solid(file=tmp_path / name, unit="mm"))
+
+
+def two_halves(occ):
+    bar(occ, 0, 400)
+    bar(occ, 400, 1000)
+
+
+DAMAGE = {
+    "a corner elsewhere": (r"(VERTEX_POINT\('',#(\d+)\);\s+#\2 = CARTESIAN_POINT\('',\()[^,]*,", r"\g<1>1500.,",
+                           r"edges that lie on their faces and end at their vertices, found one \S+ mm off, near"),
+    "an edge less": (r"#\d+ = EDGE_CURVE[^;]*;", "", r"found one damaged: unresolved reference \(\d+\)"),
+    "no number": (r"(CARTESIAN_POINT\('',\()0\.,", r"\1,", r"found one damaged: incorrect syntax \(1\)"),
+    "a solid less": ("= MANIFOLD_SOLID_BREP", "= MANIFOLD_SOLID_BREP('',$);\n#9999 = MANIFOLD_SOLID_BREP",
+                     "expected the 3 solids of the file, found 1 that can be read"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("damage", DAMAGE)
+def test_damaged_step_files_are_refused(solid, mesh_part, step_file, damage):
+    """OpenCASCADE makes closed volumes of all of these, with up to a third of the volume less."""
+    old, new, says = DAMAGE[damage]
+    path = step_file(two_halves)
+    text, count = re.subn(old, new, path.read_text(), count=1)
+    assert count == 1
+    path.write_text(text)
+    with pytest.raises(InputError, match=says):
+        mesh_part(solid(file=path, unit="mm"))
+
+
+def test_faces_of_a_step_file_in_no_shape_are_told(solid, mesh_part, step_file):
+    path = step_file(bar)
+    face = re.search(r"= ADVANCED_FACE[^;]*;", path.read_text())
+    path.write_text(path.read_text().replace("ENDSEC;\nEND-ISO", f"#9999 {face[0]}\nENDSEC;\nEND-ISO"))
+    part = mesh_part(solid(file=path, unit="mm"))
+    assert integrate(part) == pytest.approx(VOLUME, rel=1e-9)
+    assert part.remarks == ("1 of the 7 faces in the file are in no shape that OpenCASCADE makes of it",)
 
 
 def test_parts_apart_are_refused(solid, mesh_part, step_file):
