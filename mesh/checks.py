@@ -163,8 +163,8 @@ def check_boundary(part: PartMesh, where: str) -> None:
 
 def oriented(part: PartMesh) -> PartMesh:
     """`part` with its cells mirrored where all of them are left-handed, as some formats number them."""
-    determinants = _determinants(part)
-    if np.all(determinants.max(axis=1) < 0):
+    at_corners = jacobians(part.points[part.corners], part.cell, 1, part.shape.corners)
+    if np.all(np.linalg.det(at_corners) < 0):  # others may be curved too much
         nodes = reference_nodes(part.cell, part.degree)
         swapped = nodes[:, [1, 0, 2]]
         order = np.argmin(np.linalg.norm(nodes[None] - swapped[:, None], axis=2), axis=1)

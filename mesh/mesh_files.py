@@ -1,4 +1,4 @@
-"""Ready meshes: which reader a file gets, and those in formats that meshio reads (VTK, MED, XDMF …).
+"""Ready meshes: which reader a file gets, and those in formats that meshio reads (VTK, XDMF …).
 
 meshio is loaded where it is used, in a process of its own.
 """
@@ -57,6 +57,10 @@ def read_mesh(path: Path, where: str) -> RawMesh:
         from .msh import read_msh
 
         return read_apart(read_msh, path.stat().st_size, where, path, where)
+    if ending == ".med":
+        from .med import read_med
+
+        return read_apart(read_med, path.stat().st_size, where, path, where)
     return read_apart(read_foreign, path.stat().st_size, where, path, where)
 
 
@@ -144,15 +148,12 @@ def _raw_mesh(mesh: meshio.Mesh) -> RawMesh:
 def _groups(mesh: meshio.Mesh) -> Iterator[Mapping[str, Integers]]:
     """For each block, the cells of each group that has any in it."""
     values = _numbered(mesh)
-    titles = {int(tag): [name] for name, (tag, *_) in mesh.field_data.items()}
-    titles |= {int(tag): names for tag, names in getattr(mesh, "cell_tags", {}).items()}  # families of MED, with groups
+    titles = {int(tag): name for name, (tag, *_) in mesh.field_data.items()}
     for k, block in enumerate(mesh.cells):
         found: dict[str, Integers] = {}  # cells may belong to several
         if values is not None:
             for value in np.unique(values[k]).tolist():
-                for name in titles.get(value, [str(value)]):
-                    rows = np.flatnonzero(values[k] == value)
-                    found[name] = np.concatenate([found.get(name, rows[:0]), rows])
+                found[titles.get(value, str(value))] = np.flatnonzero(values[k] == value)
         for name, sets in mesh.cell_sets.items():
             rows = np.asarray(sets[k] if k < len(sets) and sets[k] is not None else [], dtype=np.int64)
             if np.any((rows < 0) | (rows >= len(block.data))):

@@ -106,12 +106,13 @@ def _check_edges(where: str) -> None:
     most = _OFF * float(np.linalg.norm(box[1] - box[0]))
     for _, face in model.getEntities(2):
         for _, edge in model.getBoundary([(2, face)], combined=False, oriented=False):
-            at = np.linspace(*np.ravel(model.getParametrizationBounds(1, edge)), 5)
+            (begin,), (end,) = model.getParametrizationBounds(1, edge)
+            at = np.linspace(begin, end, 5)
             points = np.reshape(model.getValue(1, edge, at), (-1, 3))
             on_face = np.reshape(model.getValue(2, face, model.reparametrizeOnSurface(1, edge, at, face)), (-1, 3))
-            ends = [model.getValue(0, end, []) for _, end in model.getBoundary([(1, edge)], combined=False)]
+            vertices = model.getBoundary([(1, edge)], combined=False, oriented=False)
             off = [np.linalg.norm(points - on_face, axis=1).max()]
-            off += [np.linalg.norm(points[[0, -1]] - end, axis=1).min() for end in ends]
+            off += [np.linalg.norm(points[[0, -1]] - model.getValue(*of, []), axis=1).min() for of in vertices]
             if not max(off) <= most:
                 place = ", ".join(f"{value:.4g}" for value in points[2])
                 raise InputError(

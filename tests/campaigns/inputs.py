@@ -170,7 +170,8 @@ class Campaign:
                 name = f"{name} @ {(key := self.draw.choice(list(owner.attrs)))}"
                 owner.attrs[key] = self.draw.choice(TEXTS).replace("\0", "") if self.draw.random() < 0.5 else value
             elif self.draw.random() < 0.3:
-                file.move(name, f"{name[: name.rfind('/') + 1]}{self.draw.choice(('..', '=x', 'a b', '関', 'tip'))}")
+                end = self.draw.choice([end for end in ("..", "=x", "a b", "関", "tip") if end not in item.parent])
+                file.move(name, f"{name[: name.rfind('/') + 1]}{end}")
             elif isinstance(item, h5py.Dataset) and item.shape and not isinstance(value, str | bytes | list):
                 content = np.array(item[()], dtype=complex if value == 1j else None)
                 if content.dtype.kind in "fc":

@@ -396,15 +396,3 @@ def test_nodes_that_are_not_there_are_refused(solid, mesh_part, tmp_path, number
     path.write_text(text[:at] + text[at:].replace(f"\n{box.cells[0][0]}", f"\n{number}", 1))
     with pytest.raises(InputError, match=r"geometry.file: part.vtk: expected .*, found "):
         mesh_part(solid(file=path))
-
-
-def test_families_of_med_with_two_groups(solid, mesh_part, tmp_path):
-    box = structured_box(1.0, (0.015, 0.025), (0.015, 0.025), (8, 2, 2), "tetrahedron")
-    inner = np.arange(len(box.cells)) < 48  # two of eight layers
-    mesh = meshio.Mesh(box.points, [("tetra", box.cells)], cell_data={"cell_tags": [np.where(inner, -6, -7)]})
-    mesh.cell_tags = {-6: ["all", "hub"], -7: ["all"]}
-    mesh.write(tmp_path / "part.med")
-    part = mesh_part(solid(file=tmp_path / "part.med"))
-    assert list(part.regions) == ["all", "hub"]
-    np.testing.assert_array_equal(part.cell_tag == part.regions["hub"], inner)
-    assert part.overlaps == {"all": (part.regions["hub"],)}

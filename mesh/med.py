@@ -1,0 +1,151 @@
+"""Meshes in MED files, of Salome, code_aster and gmsh: HDF5 with the library's own names.
+
+meshio 5.0 knows neither families without groups nor hexahedra of 27 nodes, and takes coordinates of any system for
+Cartesian ones. See "MED file format" in the documentation of MED 4.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+
+from ..common.arrays import Integers
+from ..common.errors import InputError
+from .cells import TO_GMSH
+from .source import RawMesh
+
+# Types of cells with their nodes.
+_SOLIDS = {
+    "TE4": (4, "tetra"), "T10": (10, "tetra10"), "HE8": (8, "hexahedron"), "H20": (20, "hexahedron20"),
+    "H27": (27, "hexahedron27"), "PE6": (6, "wedge"), "P15": (15, "wedge15"), "P18": (18, "wedge18"),
+    "PY5": (5, "pyramid"), "P13": (13, "pyramid13"),
+}  # fmt: skip
+_SURFACES = {"TR3": (3, 3), "TR6": (6, 3), "TR7": (7, 3), "QU4": (4, 4), "QU8": (8, 4), "QU9": (9, 4)}  # and corners
+_LINES = {"SE2": 2, "SE3": 3, "SE4": 4}
+# MED's nodes in VTK's order: those on faces are those of the lower face, of the four around it, of the upper face.
+_AS_VTK = {"hexahedron27": [*range(20), 24, 22, 21, 23, 20, 25, 26]}
+_WHOLE = "MED_NO_PROFILE_INTERNAL"
+
+
+def read_med(path: Path, where: str) -> RawMesh:
+    """The mesh in a MED file; `where` (file and key) begins the message of an error. Groups name regions and faces.
+
+    Raises:
+        InputError: it is none, damaged, or has what cannot be read: several meshes or steps, grids, polyhedra, other
+            coordinates than Cartesian ones.
+    """
+    try:
+        with h5py.File(path) as file:
+            return _mesh(file)
+    except InputError as error:
+        raise InputError(f"{where}: {error}") from None
+    except Exception as error:  # whatever h5py and NumPy meet in a damaged file
+        raise InputError(f"{where}: expected a MED file, found one that cannot be read: {error!r}") from None
+
+
+def _mesh(file: h5py.File) -> RawMesh:
+    name, mesh = _only(file["ENS_MAA"], "mesh")
+    attributes = mesh.attrs
+    if attributes.get("TYP", 0) != 0:
+        raise InputError(f"expected a mesh of cells, found a structured grid, {name}")
+    if attributes.get("REP", 0) != 0:
+        raise InputError("expected Cartesian coordinates, found cylindrical or spherical ones")
+    if attributes["ESP"] != 3:
+        raise InputError(f"expected a mesh in space, found one in {attributes['ESP']} dimensions")
+    step = mesh if "NOE" in mesh else _only(mesh, "step of the mesh")[1]
+    points = _columns(step["NOE/COO"], 3).astype(np.float64)
+    families = file["FAS"][name] if name in file.get("FAS", ()) else {}
+    blocks: list[tuple[str, Integers]] = []
+    regions, facets = dict[str, list[Integers]](), dict[str, list[Integers]]()
+    surfaces, lines = list[Integers](), list[Integers]()
+    polygons = False
+    groups, count = _groups(families.get("ELEME", {})), 0
+    for kind, of in step["MAI"].items():
+        if _text(of.attrs, "PFL") not in ("", _WHOLE):
+            raise InputError(f"expected all cells of type {kind}, found a profile of some")
+        if kind in _SOLIDS:
+            width, name = _SOLIDS[kind]
+            cells = _in_order(name, _cells(of, width))
+            blocks.append((name, cells))
+            for group, rows in _members(of, groups, len(cells)):
+                regions.setdefault(group, []).append(count + rows)
+            count += len(cells)
+        elif kind in _SURFACES:
+            width, corners = _SURFACES[kind]
+            surfaces.append(_cells(of, width)[:, :corners])
+            for group, rows in _members(of, groups, len(surfaces[-1])):
+                facets.setdefault(group, []).append(surfaces[-1][rows])
+        elif kind in _LINES:
+            lines.append(_cells(of, _LINES[kind])[:, :2])
+        elif kind.startswith("POG"):
+            polygons = True
+        elif kind != "PO1":  # points
+            raise InputError(f"expected cells of {', '.join(_SOLIDS)}, found {kind} (polyhedra, or structure elements)")
+    nodes = _members(step["NOE"], _groups(families.get("NOEUD", {})), len(points))
+    return RawMesh(
+        points, tuple(blocks), {group: np.concatenate(rows) for group, rows in regions.items()}, facets,
+        dict(nodes), tuple(surfaces), tuple(lines), tuple(_remarks(attributes, polygons)),
+    )  # fmt: skip
+
+
+def _only(parent: h5py.Group, what: str) -> tuple[str, Any]:
+    if len(parent) != 1:
+        raise InputError(f"expected one {what}, found {len(parent)}: {', '.join(parent)}")
+    found: tuple[str, Any] = next(iter(parent.items()))
+    return found
+
+
+def _columns(data: h5py.Dataset, width: int) -> Any:  # noqa: ANN401 (of the type in the file)
+    """(n, width) of a dataset that has all first entries, then all second ones."""
+    return np.asarray(data[()]).reshape((width, -1)).T
+
+
+def _cells(of: h5py.Group, width: int) -> Integers:
+    nodes = _columns(of["NOD"], width)
+    if nodes.dtype.kind not in "iu":
+        raise InputError(f"expected whole numbers of nodes, found {nodes.dtype}")
+    cells: Integers = nodes.astype(np.int64) - 1
+    return cells
+
+
+def _in_order(kind: str, cells: Integers) -> Integers:
+    """In gmsh's order of nodes."""
+    for order in (_AS_VTK.get(kind), TO_GMSH.get(kind)):
+        cells = cells if order is None else cells[:, order]
+    return cells
+
+
+def _groups(families: Mapping[str, Any]) -> dict[int, list[str]]:
+    """Names of the groups that the members of each family belong to."""
+    found = dict[int, list[str]]()
+    for family in families.values():
+        names = family["GRO/NOM"][()] if "GRO" in family else ()
+        texts = (np.asarray(name).astype(np.uint8).tobytes().decode("utf-8", errors="replace") for name in names)
+        found[int(family.attrs["NUM"])] = [text.partition("\0")[0].strip() for text in texts]
+    return found
+
+
+def _members(of: h5py.Group, groups: Mapping[int, list[str]], count: int) -> Iterator[tuple[str, Integers]]:
+    """The members of each group among `count` nodes or cells."""
+    family = np.asarray(of["FAM"][()]) if "FAM" in of else np.zeros(count, dtype=np.int64)
+    if family.shape != (count,):
+        raise InputError(f"expected a family for each of {count} cells or nodes, found {family.size}")
+    present = set(np.unique(family).tolist())
+    for name in {name: None for number in present for name in groups.get(number, ())}:
+        yield name, np.flatnonzero(np.isin(family, [number for number in present if name in groups.get(number, ())]))
+
+
+def _remarks(attributes: Mapping[str, Any], polygons: bool) -> Iterator[str]:
+    if polygons:
+        yield "polygons (shells?) are left out"
+    if unit := _text(attributes, "UNI")[:16].strip():
+        yield f"the file says that its unit is {unit}: `unit` in the link file counts"
+
+
+def _text(attributes: Mapping[str, Any], key: str) -> str:
+    text = attributes.get(key, "")
+    return (text.decode("utf-8", errors="replace") if isinstance(text, bytes) else str(text)).strip("\0 ")
