@@ -14,8 +14,8 @@ from ffrobot.bench.record import as_text
 
 INTRODUCTION = """# What was measured
 
-Made from the records in `docs/benchmarks`; [Benchmarks](../benchmarks.md) says what the numbers mean and which command
-makes them. Seconds are those of the machine named beside them, and of how busy it was (processes that wanted to run).
+Made from the records in `docs/benchmarks`; [Benchmarks](../benchmarks.md) explains the numbers and names the commands
+that make them. Seconds depend on the machine, which each table names, and on its load (processes that wanted to run).
 """
 
 

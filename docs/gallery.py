@@ -75,7 +75,7 @@ def gallery_page() -> str:
     """The text of docs/cases.md."""
     return (
         "# Cases\n\n<!-- written by docs/gallery.py from the READMEs of the cases -->\n\nEach is a folder of `cases/`"
-        " with its scene, figures and a README that says what it shows and what numbers to expect.\n\n"
+        " with its scene, figures and a README that explains what it shows and what numbers to expect.\n\n"
         f"## Gallery\n\n{cards()}"
     )
 

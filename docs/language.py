@@ -26,6 +26,7 @@ HISTORY = re.compile(
 FENCE = re.compile(r"^ *(```|~~~).*?^ *\1 *$", re.DOTALL | re.MULTILINE)
 INDENTED = re.compile(r"(?:(?<=\n\n)|\A)(?:(?: {4}|\t).*\n?|\n(?= {4}))+")
 EXEMPT = re.compile(r"``[^`]+``|`[^`]*`|\$\$.*?\$\$|\$[^$\n]+\$|<[^>\n]+>|https?://\S+", re.DOTALL)
+TABLE = re.compile(r"^ *\|.*$|^#+ .*$", re.MULTILINE)  # and headings: no sentences
 LINK = re.compile(r"!?\[((?:[^\[\]]|\[[^\[\]]*\])*)\]\([^)]*\)")
 SENTENCE = re.compile(r"(?<=[.!?])\s+|:\s*\n|\n\s*(?:[*+-]|\d+\.|#+|>)\s+|\n\s*\n|\s*\|\s*")
 WORD = re.compile(r"\w*[^\W\d_]\w*(?:[-'’]\w+)*")
@@ -38,6 +39,11 @@ class Count(NamedTuple):
     history: int
     sentences: int
     long: int
+
+    @property
+    def findings(self) -> tuple[int, int, int]:
+        """What the ratchet bounds."""
+        return self.private, self.history, self.long
 
 
 def vocabulary() -> list[tuple[re.Pattern[str], str]]:
@@ -58,8 +64,13 @@ def length(sentence: str) -> int:
 
 
 def sentences(text: str) -> Iterator[str]:
-    """The sentences of prose: list items, headings and cells of tables are sentences of their own."""
+    """The sentences of prose; a list item, a heading or a cell of a table counts as one."""
     yield from (" ".join(part.split()) for part in SENTENCE.split(text) if part and length(part) > 3)
+
+
+def running(text: str) -> str:
+    """Prose without tables and headings."""
+    return TABLE.sub("", text)
 
 
 def found(text: str) -> Iterator[tuple[str, str]]:
@@ -70,8 +81,8 @@ def found(text: str) -> Iterator[tuple[str, str]]:
 
 
 def count(text: str) -> Count:
-    """Counts of one page of prose."""
-    lengths = [length(sentence) for sentence in sentences(text)]
+    """Counts of one page of prose; sentences are those of its running text."""
+    lengths = [length(sentence) for sentence in sentences(running(text))]
     history = len(HISTORY.findall(" ".join(text.split())))
     return Count(sum(1 for _ in found(text)), history, len(lengths), sum(words > LONG for words in lengths))
 
@@ -119,27 +130,28 @@ def _strings(file: Path) -> Iterator[str]:
             yield node.value
 
 
-def read_counts() -> dict[str, Count]:
-    """The counts that are committed."""
+def read_counts() -> dict[str, tuple[int, ...]]:
+    """The committed counts by file: private, history, long."""
     with COUNTS.open(encoding="utf-8", newline="") as file:
-        return {
-            row.pop("file"): Count(**{key: int(value) for key, value in row.items()}) for row in csv.DictReader(file)
-        }
+        return {name: tuple(map(int, counts)) for name, *counts in list(csv.reader(file))[1:]}
 
 
 def write_counts() -> None:
-    """Write `docs/language.csv` anew."""
+    """Write `docs/language.csv` anew: files that have any."""
+    counts = {name: count(text) for name, text in sorted(texts().items())}
     with COUNTS.open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(["file", *Count._fields])
-        writer.writerows([name, *count(text)] for name, text in sorted(texts().items()))
+        writer.writerow(["file", "private", "history", "long"])
+        writer.writerows([name, *one.findings] for name, one in counts.items() if any(one.findings))
 
 
 def show(name: str) -> None:
     """Print where a page has private words, history and long sentences."""
-    for sentence in sentences(texts()[name]):
+    text = texts()[name]
+    counted = set(sentences(running(text)))
+    for sentence in sentences(text):
         words = [f"{private!r} → {plain}" for private, plain in found(sentence)]
-        words += [f"{length(sentence)} words"] if length(sentence) > LONG else []
+        words += [f"{length(sentence)} words"] if length(sentence) > LONG and sentence in counted else []
         words += [f"{match[0]!r} → history" for match in HISTORY.finditer(sentence)]
         if words:
             print(f"{name}: {sentence}\n    {'; '.join(words)}")

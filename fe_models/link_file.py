@@ -215,7 +215,7 @@ def _check_shape(link: SolidLink, path: Path) -> None:
     ):
         _reject(path, "geometry.tip_section", "a taper between two rectangles without wall", "another shape")
     if geometry.file is not None and geometry.hole:
-        _reject(path, "geometry.hole", "no holes where geometry.file gives the part", len(geometry.hole))
+        _reject(path, "geometry.hole", "no holes if geometry.file names a part", len(geometry.hole))
     sizes = np.linalg.norm(geometry.x_axis) * np.linalg.norm(geometry.y_axis)
     if np.linalg.norm(np.cross(geometry.x_axis, geometry.y_axis)) <= 1e-6 * sizes:
         _reject(path, "geometry.y_axis", f"a direction across x_axis, {list(geometry.x_axis)}", list(geometry.y_axis))

@@ -227,5 +227,5 @@ def _nodes(card: Card) -> tuple[str, list[int]]:
     if not middles:
         return linear, nodes[:corners]
     if len(middles) < most - corners:
-        raise InputError(f"{card}: expected a grid point in the middle of all edges or none, found {len(middles)}")
+        raise InputError(f"{card}: expected midside grid points on all edges or none, found {len(middles)}")
     return quadratic, nodes

@@ -117,7 +117,7 @@ class SolidGeometry(Record):
     hole: tuple[Hole, ...] = ()
     """Round holes along z."""
     file: InputFile | None = None
-    """STEP file or mesh (.msh, .inp, .bdf, .vtk …) in place of `section`."""
+    """STEP file or mesh (.msh, .inp, .bdf, .vtk …) instead of `section`."""
     unit: Literal["m", "mm", "in"] = "m"
     """Unit of the coordinates in `file`."""
     # Where the link's frame stands in the file's axes: origin in the file's unit, directions of any length.

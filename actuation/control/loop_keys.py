@@ -33,7 +33,7 @@ class SampledAnalysis(ActuatedAnalysis):
     seed: Annotated[int, Field(ge=0)] = 0
     """Seed of the sensor noise."""
     tip: PointReference | None = None
-    """Point "BODY.POINT" of the reported error."""
+    """Point "BODY.POINT" whose position error is computed."""
     controller: tuple[Controller, ...] = ()
     """Controllers; their commands add up."""
     sensor: tuple[Sensor, ...] = ()

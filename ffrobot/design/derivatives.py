@@ -192,7 +192,7 @@ def _notes(base: Base, g: int, k: int, samples: Sequence[Sample], error: float, 
     if jump := next((one for one in nearest if one.goals and one.goals[g].elsewhere), None):
         yield f"a kink: {at(jump)} the largest value is {jump.goals[g].elsewhere}"
     if _relative(error, base, g, k) > ROUGH and error > ROUGH * abs(value):
-        yield "not smooth, or noisy: half of the step gives another derivative"
+        yield "not smooth, or noisy: half of the step yields another derivative"
 
 
 def _relative(error: float, base: Base, g: int, k: int) -> float:

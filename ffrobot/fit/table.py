@@ -53,6 +53,6 @@ def remarks(fit: Fit) -> Iterator[str]:
             )
     if fit.misfit > 2.0:
         yield (
-            f"the remaining errors are {fit.misfit:.3g} times the uncertainties: the model lacks something that no key"
-            " varied here can give"
+            f"the remaining errors are {fit.misfit:.3g} times the uncertainties: the model lacks something that no"
+            " varied key describes"
         )

@@ -61,7 +61,7 @@ def fastest(scene: Scene, judge: Judge) -> tuple[Scene, str]:
         raise InputError(
             f"{scene.path}: trajectory {_names(scene)}: fastest: expected actuators that can follow within"
             f' end = {search.analysis.end:g} s of "{search.analysis.name}", found {name}, with required/available ='
-            f" {factor:.3g} at stretch = {most:.4g}: a later end leaves more time, where moments are not those of rest"
+            f" {factor:.3g} at stretch = {most:.4g}. A later end helps, unless torques at rest exceed the limits"
         )
     factor, name = search.tried[found]
     at = f"{name} is at {100 * factor:.3g} % of its limit"

@@ -46,7 +46,7 @@ def gear_motion(
     if len(time) > 1 and lasts > longest:
         raise InputError(
             f"{spring.where}: damping: expected a compliant gear that relaxes within {longest:.3g} s (damping /"
-            f" stiffness, {SLOWEST:g} times the analysis), found {lasts:.3g} s; without stiffness it does not give at"
+            f" stiffness, {SLOWEST:g} times the analysis), found {lasts:.3g} s; without stiffness it does not deform at"
             " all"
         )
     transmitted, unresolved = tau - rotor, 0.0

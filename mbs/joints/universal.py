@@ -19,7 +19,7 @@ EXCHANGED = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])  # x 
 
 
 class UniversalJoint(AxialJoint):
-    """Two points coincide; the second side turns about `axis` of the first, then about `second_axis` of its own.
+    """Two points coincide; the second side turns about `axis` of the first, then about its `second_axis`.
 
     Coordinates: the two angles, rad. The axes are at right angles at zero coordinates, and stay so.
     """

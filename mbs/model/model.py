@@ -128,7 +128,7 @@ def _check_cut_joints(scene: MechanismScene, tree: KinematicTree) -> None:
             raise InputError(
                 f"{scene.path}: {joint.label}: expected a loop with a joint that has neither a motor without"
                 f" rotor_inertia nor a compliant gear, to be cut, found {quoted(found)} here and one of them in each of"
-                " the others: not available in 3D yet"
+                " the others. Such loops are not available in 3D"
             )
 
 

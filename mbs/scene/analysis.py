@@ -54,7 +54,7 @@ class Analysis(Record):
     kind: str
     """What is computed."""
     tolerance: Annotated[float, Field(ge=TIGHTEST_TOLERANCE, lt=1.0)] = 1e-6
-    """Requested error of each reported quantity, relative to its peak."""
+    """Requested error of each result, relative to its peak."""
 
     follows_trajectories: ClassVar[bool] = True  # whether targets have to have values at all its `times`
     is_motion: ClassVar[bool] = True  # whether it finds a motion, at whose instants other analyses may look

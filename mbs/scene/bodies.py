@@ -93,7 +93,7 @@ class RigidBody(Record):
     mass: Positive
     """Mass, kg."""
     inertia: Annotated[Inertia, Spelled(float, _about_center)]
-    """Inertia about the center of mass, body axes, kg·m²: [xx, yy, zz], or three rows; in planar scenes about z."""
+    """Inertia about the center of mass, body axes, kg·m²: [xx, yy, zz], or a 3 × 3 matrix; planar scenes about z."""
     center: Vector
     """Center of mass, m, axes of the body."""
     points: dict[Name, Vector] = Field(default_factory=dict)
@@ -173,7 +173,7 @@ class Payload(Record):
     center: Vector = (0.0, 0.0, 0.0)
     """Center of mass, m from the point, axes of the body."""
     inertia: Annotated[Inertia, Spelled(NotNegative, inertia_about_z)] = (0.0, 0.0, 0.0)
-    """Inertia about that center, axes of the body, kg·m²: [xx, yy, zz], or three rows; in planar scenes about z."""
+    """Inertia about that center, axes of the body, kg·m²: [xx, yy, zz], or a 3 × 3 matrix; planar scenes about z."""
 
     @field_validator("inertia")
     @classmethod

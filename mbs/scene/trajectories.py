@@ -35,8 +35,8 @@ Triple = tuple[Expression, Expression, Expression]
 class Trajectory(MotionKeys):
     """Prescribed motion of a point (m, global axes), of the section there, of an absolute angle, a joint or a motor.
 
-    The section's orientation is that of its axes in global axes: by a rotation vector, by roll, pitch and yaw about
-    fixed axes, or by one direction of the section, about which rotation is then unconstrained.
+    The section's axes in global axes are prescribed by a rotation vector, by roll, pitch and yaw about
+    fixed axes, or by one direction of the section. The rotation about this direction is then unconstrained.
     """
 
     via: Annotated[tuple[OfPlane, ...], OfPlaces] | None = None

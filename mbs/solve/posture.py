@@ -152,7 +152,7 @@ def describe_loops(model: Model, t: float, q: Array, v: Array) -> str:
         return (
             f"the configuration is singular or nearly so (ratio of singular values {ratio:.1g}; loops that"
             f" {quoted(dict.fromkeys(row.owner for row in loops.rows))} close): a mechanism at a dead center, or cranks"
-            " and coupler in a line, where no finite force says which way to go on. Keep clear of it, or drive a joint"
+            " and coupler in a line. No finite force determines the further motion. Avoid this posture or drive a joint"
             " instead"
         )
     ratio = _ratio(_scaled_rows(model, q, t), found.loop_rank + found.followed)

@@ -25,15 +25,15 @@ def seconds(rows, what):
 
 def test_time_grows_linearly_with_links(rows):
     """Ten times the links take about ten times as long; wide bounds for caches and a busy machine."""
-    few, many = (seconds(rows, f"chain of {n} links × 10 modes, 2 rows") for n in (5, 50))
+    few, many = (seconds(rows, f"chain of {n} links × 10 modes, 2 constraints") for n in (5, 50))
     assert 6.0 < many / few < 16.0
 
 
 def test_more_is_slower(rows):
     """Six links than three, flexible ones than rigid; the program written by hand is the least and its own measure."""
     arms = [f"arm of {n} links × 10 modes in space, {n} rows" for n in (3, 6)]
-    by_hand = rows["two links × 10 modes, by hand"]
+    hand_written = rows["two links × 10 modes, hand-written"]
     assert seconds(rows, arms[0]) < seconds(rows, arms[1])
-    assert seconds(rows, "arm of 6 rigid links in space, 6 rows") < seconds(rows, arms[1])
-    assert float(by_hand["of_hand_written"]) == 1.0
+    assert seconds(rows, "arm of 6 rigid links in 3D, 6 constraints") < seconds(rows, arms[1])
+    assert float(hand_written["of_hand_written"]) == 1.0
     assert all(float(row["of_hand_written"]) >= 1.0 for row in rows.values())

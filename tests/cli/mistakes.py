@@ -213,7 +213,7 @@ MISTAKES = {
         {"end = 1.0": "end = 1e300"},
         ['analysis "inverse": end: expected a number between -1e+30 and 1e+30, found 1e+300'],
     ),
-    "number next to nothing": (
+    "number close to zero": (
         "link1.toml",
         {"density = 7850.0": "density = 1e-300"},
         ["link1.toml: material.density: expected a number of at least 1e-30, found 1e-300"],

@@ -141,7 +141,7 @@ def test_nodes_on_edges(read, card, cells, edges):
         (PLAIN + "GRID,2,,9.,9.,9.\n", r"with unique numbers, found 2 again \(line 2\)"),
         (PLAIN.replace("GRID,2,,", "GRID,2000,,"), r"CHEXA, line \d+: expected grid points that are there, found 2"),
         (PLAIN + "CTETRA,99,1,1,2,3\n", r'CTETRA, line \d+: expected a whole number, found ""'),
-        (PLAIN + "CTETRA,99,1,1,2,3,4,5\n", "expected a grid point in the middle of all edges or none, found 1"),
+        (PLAIN + "CTETRA,99,1,1,2,3,4,5\n", "expected midside grid points on all edges or none, found 1"),
         (PLAIN + "CTETRA,99,1,1,2,3,4,5,6\n,7,8,9,10,11,12\n", "expected 4 or 10 grid points"),
         (PLAIN.replace("-0.1", "-0.x", 1), 'GRID, line 1: expected a number, found "-0.x"'),
         (fixed(POINTS, CELLS, wide=True).replace("*       -0.05           \n", "", 1), "line 1: .* continues this one"),

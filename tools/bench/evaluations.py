@@ -70,21 +70,21 @@ def measure_evaluations(repository: Path, folder: Path, display: Watcher) -> lis
     )
     hand_written = HandWritten(repository, two_link, folder)
     timed = [
-        Timed("two links × 10 modes, by hand", hand_written.evaluation_seconds),
-        Timed("two links × 10 modes, 2 rows", partial(evaluation_seconds, general_state(two_link), TIME)),
+        Timed("two links × 10 modes, hand-written", hand_written.evaluation_seconds),
+        Timed("two links × 10 modes, 2 constraints", partial(evaluation_seconds, general_state(two_link), TIME)),
         *(
             Timed(
-                f"chain of {n} links × {MODES} modes, 2 rows",
+                f"chain of {n} links × {MODES} modes, 2 constraints",
                 partial(evaluation_seconds, start_at_rest(chain(n, MODES)), 0.0),
                 55e-9 * n,
             )
             for n in LINKS
         ),
-        Timed("slider-crank, 3 rows", partial(evaluation_seconds, start_at_rest(slider_crank), 0.0), 0.15e-6),
-        Timed(f"arm of 3 links × {MODES} modes in space, 3 rows", _arm_3d(3, TUBE), 1.4e-6),
-        Timed(f"arm of 6 links × {MODES} modes in space, 6 rows", _arm_3d(6, TUBE), 3e-6),
-        Timed("arm of 6 rigid links in space, 6 rows", _arm_3d(6, RIGID)),
-        Timed("arm of 6 rigid links in space, free", _arm_3d(6, RIGID, rows=0)),
+        Timed("slider-crank, 3 constraints", partial(evaluation_seconds, start_at_rest(slider_crank), 0.0), 0.15e-6),
+        Timed(f"arm of 3 links × {MODES} modes in 3D, 3 constraints", _arm_3d(3, TUBE), 1.4e-6),
+        Timed(f"arm of 6 links × {MODES} modes in 3D, 6 constraints", _arm_3d(6, TUBE), 3e-6),
+        Timed("arm of 6 rigid links in 3D, 6 constraints", _arm_3d(6, RIGID)),
+        Timed("arm of 6 rigid links in 3D, free", _arm_3d(6, RIGID, rows=0)),
     ]
     counts = [max(1, int(SECONDS / one.seconds(100))) for one in timed]
     measured: list[list[float]] = [[] for _ in timed]

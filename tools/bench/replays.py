@@ -1,4 +1,4 @@
-"""Time of forward runs that replay PCID of the two-link case, beside that of the PCID which they follow."""
+"""Time of forward runs with results of PCID of the two-link case, beside that of the PCID which they follow."""
 
 from __future__ import annotations
 

@@ -98,7 +98,7 @@ def _without_mass(robot: Robot) -> str:
     if any(link.inertial is not None and link.inertial.mass > 0 for link in robot.links.values()):
         return f'expected a link with mass that moves on "{shown(robot.root)}", found none'
     return (
-        "expected links with mass, found no <inertial> with one in the whole file, which is made for viewers: add"
+        "expected links with mass, found no <inertial> with one in the whole file: it was made for viewers. Add"
         " <inertial> to its links, from CAD or a data sheet, take a description of the robot for dynamics, or estimate"
         " masses by --density"
     )

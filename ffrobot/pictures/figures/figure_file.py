@@ -48,8 +48,8 @@ class Curve(Record):
 class FigureRecord(Record):
     """One figure. Axes without a range take that of the data; units are in the labels of the axes.
 
-    Kinds: "time" draws its curves over time; "path" draws (x, y) or (x, y, z) datasets as paths; "configurations" draws
-    the bodies of `analysis` at `times` (s), and its curves as paths, by default those of points with trajectories;
+    Kinds: "time" draws its curves over time. "path" draws (x, y) or (x, y, z) datasets as paths. "configurations" draws
+    the bodies of `analysis` at `times` (s), and its curves as paths, by default those of points with trajectories.
     "torque-speed" draws its curves over their `x`, and the limits of the motor of `joint`. Of a linear `analysis`, at
     the first of `times`: "bode" draws the frequency responses of `transfers` [input, output], "modes" the mode shapes
     of the robot; "placement" the patches of such an analysis.

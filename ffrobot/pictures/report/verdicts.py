@@ -17,7 +17,7 @@ LOOP_KEYS = (
     ("vibration (mm)", "vibration", 1e3),
     ("at the end (mm)", "residual", 1e3),
     ("work (J)", "motor_work", 1.0),
-    ("largest moment (N·m)", "peak_moment", 1.0),
+    ("peak torque (N·m)", "peak_moment", 1.0),
     ("largest voltage (V)", "peak_voltage", 1.0),
     ("at limits (% of samples)", "saturated", 100.0),
 )
