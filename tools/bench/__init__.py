@@ -6,7 +6,7 @@ growth       time per evaluation against modes and links, time of a run against 
 hand_written the two-link case written by hand, compiled
 ratio        of times that were taken in turn
 aims         ratios to it
-replays      forward runs that replay PCID, beside that
+replays      forward runs with results of PCID, beside that
 peer         EXUDYN on the same modal bodies
 source_tree  what runs in which order
 """

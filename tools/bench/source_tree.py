@@ -57,7 +57,7 @@ class SourceTree(Campaign):
 
     def _replays(self, scene: Scene) -> None:
         rows = measure_replays(scene, self.settings.repeat, self.display)
-        self.keep("replays", rows, {"inputs": inputs_of(scene, {})}, self.folder, "forward runs that replay PCID")
+        self.keep("replays", rows, {"inputs": inputs_of(scene, {})}, self.folder, "forward runs with results of PCID")
 
     def _evaluations(self, repository: Path) -> None:
         with tempfile.TemporaryDirectory(prefix="ffrobot-bench-") as folder:
