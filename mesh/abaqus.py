@@ -107,6 +107,10 @@ class _Assembled:
         found: dict[str, list[int]] = {}
         for name, scope, instance, number in self._members("nsets"):
             found.setdefault(name, []).append(self._node(instance, number, f"*NSET {name}{scope}"))
+        for own, one in self.scopes.items():
+            for keyword in one.scope.faces.values():
+                if nodes := self._surface_node_list(own, keyword):
+                    found.setdefault(keyword.options["NAME"], []).extend(nodes)
         return {name: np.unique(np.array(nodes, dtype=np.int64)) for name, nodes in found.items()}
 
     def _members(self, kind: str) -> Iterator[tuple[str, str, str, int]]:
@@ -204,13 +208,17 @@ class _Assembled:
             if keyword is None or (of and of != own):
                 continue
             nodes = [node for face in self._sides(own, keyword) for node in face]
-            if keyword.options.get("TYPE", "ELEMENT").upper() == "NODE":
-                for row, place in keyword.rows():
-                    found = instance.scope.nsets.meant(row[0], place)
-                    nodes += [self._node(of_node or own, node, place) for of_node, node, _ in found]
-            if nodes:
+            if nodes := nodes or self._surface_node_list(own, keyword):
                 return np.unique(np.array(nodes, dtype=np.int64))
         return None
+
+    def _surface_node_list(self, own: str, keyword: Keyword) -> list[int]:
+        """The nodes of *SURFACE, TYPE=NODE."""
+        if keyword.options.get("TYPE", "").upper() != "NODE":
+            return []
+        sets = self.scopes[own].scope.nsets
+        rows = [(place, sets.meant(row[0], place)) for row, place in keyword.rows()]
+        return [self._node(of or own, node, place) for place, found in rows for of, node, _ in found]
 
     def _masses(self) -> Iterator[PointMass]:
         for keyword in self.deck.masses:
@@ -234,6 +242,8 @@ class _Assembled:
                 if strange := [", ".join(row) for row, _ in keyword.rows() if not _is_read(keyword, row)]:
                     name = keyword.options["NAME"]
                     yield f'{keyword}: of surface {name} {len(strange)} lines are not read: "{strange[0]}"'
+        if self.deck.unused:
+            yield f"parts without an instance are left out: {', '.join(sorted(self.deck.unused))}"
         if unread := [f"*{name}" for name, count in self.deck.not_read.items() if count]:
             yield f"not read: {', '.join(unread)}"
 

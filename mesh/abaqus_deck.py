@@ -12,6 +12,8 @@ from .included import Line, included, lines_of, whole_of
 
 MOST = 1e7  # members of a set
 _OF_DATA = ("NODE", "ELEMENT", "NSET", "ELSET", "SURFACE")  # whose data may stand in a file of their own
+# Options that are read; decks may shorten them to what is unique: GEN, ELS …
+_OPTIONS = ("COMBINE", "ELSET", "GENERATE", "INPUT", "INSTANCE", "LIBRARY", "NAME", "NSET", "PART", "SYSTEM", "TYPE")
 
 
 @dataclass
@@ -102,7 +104,9 @@ def _keyword(text: str, place: str) -> Keyword:
     options = {}
     for other in others:
         name, _, value = other.partition("=")
-        options[" ".join(name.split()).upper()] = value.strip().strip("\"'")
+        name = " ".join(name.split()).upper()
+        whole = [option for option in _OPTIONS if name and option.startswith(name)]
+        options[whole[0] if len(whole) == 1 else name] = value.strip().strip("\"'")
     return Keyword(" ".join(first.split()).upper(), options, place)
 
 
@@ -150,7 +154,8 @@ class Sets:
             if isinstance(entry, int):
                 yield instance, entry, place
                 continue
-            for found, number, _ in self.meant(entry, place, (name, *within)):
+            owner = self.of_instances.get(instance, self)
+            for found, number, _ in owner.meant(entry, place, (name, *within) if owner is self else ()):
                 yield instance or found, number, place
 
     def meant(self, entry: str, place: str, within: tuple[str, ...] = ()) -> Iterator[tuple[str, int, str]]:

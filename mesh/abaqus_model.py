@@ -218,6 +218,7 @@ class Deck:
         self.ties: list[Keyword] = []
         self.masses: list[Keyword] = []
         self.not_read: Counter[str] = Counter()
+        self.unused: set[str] = set()  # parts
         scope, in_step = self.assembly, False
         for keyword in keywords(path):
             if keyword.name in _MAKING:
@@ -245,16 +246,20 @@ class Deck:
             if len(self.parts) > 1:
                 raise InputError(f"expected an *INSTANCE of each part, found none of {', '.join(self.parts)}")
             self.instances = {name: Instance(part) for name, part in self.parts.items()}
+            self.unused.clear()
+        self.unused -= {name for name in self.unused if not self.parts[name].solids}
 
     def _new_part(self, keyword: Keyword) -> Scope:
         name = keyword.option("NAME").upper()
         if name in self.parts:
             raise InputError(f"{keyword}: expected parts with unique names, found {name} again")
+        self.unused.add(name)
         return self.parts.setdefault(name, Scope())
 
     def _new_instance(self, keyword: Keyword) -> Scope:
         if {"LIBRARY", "INSTANCE"} & keyword.options.keys():
             raise InputError(f"{keyword}: expected an instance of a part in this deck, found one of results (LIBRARY=)")
+        self.unused.discard(keyword.option("PART").upper())
         name = keyword.option("NAME").upper()
         if name in self.instances:
             raise InputError(f"{keyword}: expected instances with unique names, found {name} again")

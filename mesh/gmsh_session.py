@@ -151,6 +151,12 @@ def _growing_field(begin: float, end: float, faces: list[int]) -> int:
     return size
 
 
+def own_entities(dim: int = -1) -> list[tuple[int, int]]:
+    """Entities of a dimension, or of all, but for copies that partitions have of elements of others."""
+    found: list[tuple[int, int]] = gmsh.model.getEntities(dim)
+    return [entity for entity in found if not gmsh.model.getType(*entity).startswith("Ghost")]
+
+
 def extract_mesh() -> RawMesh:
     """The model's volume elements, with the names of its physical groups; of all volumes where no group has any."""
     number, points = _points()
@@ -158,7 +164,7 @@ def extract_mesh() -> RawMesh:
     blocks: list[tuple[str, Integers]] = []
     numbers: dict[int, Integers] = {}  # of the cells of each volume
     count = 0
-    for _, volume in gmsh.model.getEntities(3):
+    for _, volume in own_entities(3):
         before = count
         for kind, cells in _elements(3, volume, number):
             blocks.append((VOLUME_ELEMENTS.get(kind, f"gmsh type {kind}"), cells))

@@ -11,7 +11,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -113,10 +113,18 @@ def _read(path: Path, said: io.StringIO) -> meshio.Mesh:
     found = reader.read()
     if failed:
         raise ValueError(failed[0])
+    _check_ghosts(found.cell_data)
     return pyvista.to_meshio(found)
 
 
+def _check_ghosts(data: Mapping[str, Any]) -> None:
+    """Check that all cells are shown: some readers drop the others."""
+    if hidden := sum(int(np.count_nonzero(values)) for values in data.get("vtkGhostType", ())):
+        raise ValueError(f"{hidden} cells that vtkGhostType hides or has as copies of others")
+
+
 def _raw_mesh(mesh: meshio.Mesh) -> RawMesh:
+    _check_ghosts(mesh.cell_data)
     points = np.zeros((len(mesh.points), 3))
     points[:, : mesh.points.shape[1]] = mesh.points
     blocks: list[tuple[str, Integers]] = []

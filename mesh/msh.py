@@ -17,7 +17,7 @@ import numpy as np
 from ..common.arrays import Array, Integers
 from ..common.errors import InputError
 from .cells import GMSH_CORNERS, GMSH_NODES, VOLUME_ELEMENTS
-from .gmsh_session import extract_mesh, gmsh_session
+from .gmsh_session import extract_mesh, gmsh_session, own_entities
 from .source import RawMesh
 
 _HEADER = b"$MeshFormat"
@@ -55,22 +55,33 @@ def _by_gmsh(content: bytes) -> RawMesh:
         alone = Path(folder) / "mesh.msh"
         alone.write_bytes(content)
         gmsh.merge(str(alone))
-        for name, tags in (
-            (b"Nodes", [gmsh.model.mesh.getNodes()[0]]),
-            (b"Elements", gmsh.model.mesh.getElements()[1]),
-        ):
-            announced, found = _announced(content, name), sum(map(len, tags))
+        elements = [tags for entity in own_entities() for tags in gmsh.model.mesh.getElements(*entity)[1]]
+        for name, tags in ((b"Nodes", [gmsh.model.mesh.getNodes()[0]]), (b"Elements", elements)):
+            announced, found = _counts(content, name)[1], sum(map(len, tags))
             if announced != found:
                 what = name.decode()
                 raise InputError(f"expected the {announced} {what.lower()} that ${what} announces, found {found}")
+        _check_partitions(content)
         return extract_mesh()
 
 
-def _announced(content: bytes, name: bytes) -> int:
-    """How many nodes or elements a file of version 4 says that it has."""
+def _check_partitions(content: bytes) -> None:
+    """Check that a file of version 4 has all partitions of a mesh."""
+    if b"$PartitionedEntities" not in content:
+        return
+    entities = [entity for entity in gmsh.model.getEntities(3) if gmsh.model.mesh.getElements(*entity)[0].size]
+    found = {int(number) for entity in entities for number in gmsh.model.getPartitions(*entity)}
+    announced = _counts(content, b"PartitionedEntities")[0]
+    if len(found) < announced:
+        raise InputError(f"expected all {announced} partitions of the mesh in one file, found {len(found)}")
+
+
+def _counts(content: bytes, name: bytes) -> tuple[int, int]:
+    """The first two numbers of a section of version 4."""
     is_binary = content.split(maxsplit=3)[2] != b"0"
     data = content.partition(b"$" + name)[2].partition(b"\n")[2]
-    return int(np.frombuffer(data, dtype="<u8", count=2)[1] if is_binary else data.split(maxsplit=2)[1])
+    first, second = np.frombuffer(data, dtype="<u8", count=2) if is_binary else data.split(maxsplit=2)[:2]
+    return int(first), int(second)
 
 
 class _Version2:
@@ -91,9 +102,11 @@ class _Version2:
         facets: dict[str, list[Integers]] = {}
         surfaces, lines = list[Integers](), list[Integers]()
         count = 0
-        for kind, groups, tags in (self._binary_elements if self._is_binary else self._text_elements)():
-            cells = number(tags)
-            volume = kind in VOLUME_ELEMENTS
+        partitions = set[int]()
+        for kind, tags, nodes in (self._binary_elements if self._is_binary else self._text_elements)():
+            cells, volume = number(nodes), kind in VOLUME_ELEMENTS
+            groups = tags[:, 0] if tags.size else np.zeros(len(cells), dtype=np.int64)
+            partitions.update(tags[:, 3].tolist() if volume and tags.shape[1] > 3 else ())
             for group in np.unique(groups[groups != 0]).tolist():
                 name = names.get((3 if volume else 2, abs(group)), str(abs(group)))
                 rows = np.flatnonzero(groups == group)
@@ -109,7 +122,9 @@ class _Version2:
             elif GMSH_NODES[kind] > 1:
                 lines.append(cells[:, :2])
         whole = {name: np.concatenate(rows) for name, rows in regions.items()}
-        return RawMesh(points, tuple(blocks), whole, facets, {}, tuple(surfaces), tuple(lines))
+        remarks = [f"all cells are of partition {number}: others may be in files of their own" for number in partitions]
+        remarks = remarks if len(remarks) == 1 else []
+        return RawMesh(points, tuple(blocks), whole, facets, {}, tuple(surfaces), tuple(lines), tuple(remarks))
 
     @staticmethod
     def _section(content: bytes, name: bytes) -> bytes:
@@ -122,6 +137,8 @@ class _Version2:
 
     def _nodes(self) -> tuple[Callable[[Integers], Integers], Array]:
         """How tags of nodes become places among them, and (p, 3) coordinates."""
+        if b"$ParametricNodes" in self._content:
+            raise InputError("expected $Nodes, found $ParametricNodes: save without parametric coordinates")
         count, _, data = self._section(self._content, b"Nodes").partition(b"\n")
         if self._is_binary:
             rows = np.frombuffer(data, dtype=[("tag", "<i4"), ("x", "<f8", 3)], count=int(count))
@@ -150,7 +167,7 @@ class _Version2:
         return {(int(row[0]), int(row[1])): row[2].strip().strip('"') for row in rows}
 
     def _text_elements(self) -> Iterator[tuple[int, Integers, Integers]]:
-        """Type, (c,) physical group of each element (0: none) and (c, v) tags of its nodes."""
+        """Type, (c, t) tags of each element (physical group first, partition fourth) and (c, v) of its nodes."""
         lines = self._section(self._content, b"Elements").splitlines()
         rows: dict[tuple[int, int, int], list[list[bytes]]] = {}
         found = 0
@@ -164,7 +181,7 @@ class _Version2:
             if length - 3 - tags != GMSH_NODES.get(kind):
                 known = GMSH_NODES.get(kind, "elements of a known type, not")
                 raise InputError(f"expected {known} nodes of elements of type {kind}, found {length - 3 - tags}")
-            yield kind, data[:, 3] if tags else np.zeros(len(of), dtype=np.int64), data[:, 3 + tags :]
+            yield kind, data[:, 3 : 3 + tags], data[:, 3 + tags :]
 
     def _binary_elements(self) -> Iterator[tuple[int, Integers, Integers]]:
         announced, _, data = self._section(self._content, b"Elements").partition(b"\n")
@@ -177,4 +194,4 @@ class _Version2:
             rows = np.frombuffer(data, dtype="<i4", count=count * width, offset=at + 12).reshape(count, width)
             at, found = at + 12 + 4 * count * width, found + count
             values = rows.astype(np.int64)
-            yield kind, values[:, 1] if tags else np.zeros(count, dtype=np.int64), values[:, 1 + tags :]
+            yield kind, values[:, 1 : 1 + tags], values[:, 1 + tags :]

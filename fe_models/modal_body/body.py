@@ -173,6 +173,9 @@ def _check(body: ModalBody) -> None:
             _fail(body, f"{name}: expected a positive number, found {value}")
     if k < 2 or np.any(np.diff(body.stations.position[:, 0]) <= 0):
         _fail(body, "stations.position: expected at least two, ascending in x")
+    first, last = body.stations.position[[0, -1], 0]
+    if not first <= body.length / 2 <= last:
+        _fail(body, f"length: expected a middle between the first and the last station, found {body.length} m")
     element = body.stations.element
     if element is not None and not _is_chain(element, k):
         _fail(body, "stations.element: expected four ascending stations for each element, from the first to the last")

@@ -171,6 +171,29 @@ def test_sets_of_sets_and_surfaces(read):
     assert face_area(ends, "root") == pytest.approx(2 * VOLUME)
 
 
+@pytest.mark.parametrize("option", ["GENERATE", "GEN", "GENER"])
+def test_shortened_options(read, option):
+    text = PLAIN.replace("ELSET=E", "ELS=E") + f"*SURFACE, NAME=S, TYPE=NODE\nLEFT,\n*NSET, NSET=LEFT, {option}\n1, 6\n"
+    for name in ("LEFT", "S"):
+        part = read(text, (PlaceRecord(name="root", group=name),))
+        assert face_area(part, "root") == pytest.approx(VOLUME)
+    assert list(part.regions) == ["E"]
+
+
+def test_sets_of_the_assembly_name_those_of_an_instance(read):
+    part = PART.format("*Nset, nset=L, generate\n1, 4\n") + "*Instance, name=H-1, part=HALF\n*End Instance\n"
+    part = read(part + SECOND + SURFACES + "*Tie, name=g\nDOWN, UP\n*Nset, nset=ROOT, instance=H-2\n L,\n",
+                (PlaceRecord(name="root", group="ROOT"),))  # fmt: skip
+    assert face_area(part, "root") == pytest.approx(VOLUME / 2)
+
+
+def test_parts_without_an_instance_are_told(read):
+    other = PART.replace("HALF", "OTHER").partition("*Assembly")[0].format("")
+    part = read(other + PART.format("") + "*Instance, name=H-1, part=HALF\n*End Instance\n*End Assembly\n")
+    assert integrate(part) == pytest.approx(VOLUME / 2)
+    assert part.remarks == ("parts without an instance are left out: OTHER",)
+
+
 def test_nodes_of_a_set_of_elements(read):
     """The two elements at the tip have the nodes of x = 2/3 and 1."""
     text = PLAIN + "*ELSET, ELSET=TIP\n5, 6\n*NSET, NSET=END, ELSET=TIP\n"

@@ -80,6 +80,7 @@ def test_elements_that_stand_in_the_file_twice_count_once(read, cells, binary):
         ((b"\n2.2 0", b"\n2.2 1"), "found big-endian ones"),
         ((b" 5 2 8 1", b" 55 2 8 1"), "elements of a known type"),
         ((b"-0.05", b"x"), "damaged one"),
+        ((b"$Nodes", b"$ParametricNodes"), r".Nodes, found .ParametricNodes: save without parametric coordinates"),
     ],
 )
 def test_damaged_files_are_rejected(read, change, says):
@@ -87,6 +88,26 @@ def test_damaged_files_are_rejected(read, change, says):
     assert change[0] in content
     with pytest.raises(InputError, match=rf"part\.msh: expected .*{says}"):
         read(content.replace(*change, 1))
+
+
+@pytest.mark.parametrize("binary", [False, True])
+@pytest.mark.parametrize("partitions", [(1, 1), (1, 2)])
+def test_partitions_of_version_2(read, partitions, binary):
+    """Tags: physical group, entity, number of partitions, partition. One alone may be a part of the mesh."""
+    content = version_2(CELLS, [8] * 6, binary=binary)
+    for number, (cell, partition) in enumerate(zip(CELLS[:2], partitions, strict=True), start=3):
+        nodes = [10 * (node + 1) for node in cell]
+        old, new = [8, 1, *nodes], [8, 1, 1, partition, *nodes]
+        if binary:
+            before, after = (np.array([5, 1, t, number, *of], "<i4").tobytes() for t, of in ((2, old), (4, new)))
+        else:
+            before, after = (f" 5 {t} {' '.join(map(str, of))}\n".encode() for t, of in ((2, old), (4, new)))
+        assert before in content
+        content = content.replace(before, after)
+    part = read(content)
+    assert integrate(part) == pytest.approx(VOLUME, rel=1e-9)
+    alone = "all cells are of partition 1: others may be in files of their own"
+    assert part.remarks == (() if partitions == (1, 2) else (alone,))
 
 
 def test_scripts_do_not_run(read, tmp_path):

@@ -215,6 +215,36 @@ def test_gmsh_meshes_keep_their_groups(solid, mesh_part, tmp_path, hexahedra, or
     assert face_area(part, "root") == pytest.approx(VOLUME, rel=1e-9)
 
 
+PARTITIONS = {
+    "one file": ({}, None),
+    "with copies at their faces": ({"PartitionCreateGhostCells": 1}, None),
+    "a file for each": ({"PartitionSplitMeshFiles": 1}, "expected all 2 partitions of the mesh in one file, found 1"),
+}
+
+
+@pytest.mark.parametrize("partitions", PARTITIONS)
+@pytest.mark.parametrize("binary", [0, 1])
+def test_partitions_of_gmsh(solid, mesh_part, tmp_path, partitions, binary):
+    options, says = PARTITIONS[partitions]
+    path = tmp_path / "part.msh"
+    with gmsh_session():
+        bar(gmsh.model.occ)
+        gmsh.model.occ.synchronize()
+        gmsh.model.setPhysicalName(3, gmsh.model.addPhysicalGroup(3, [1]), "bar")
+        for name, value in (options | {"MeshSizeMax": 25, "Binary": binary}).items():
+            gmsh.option.setNumber(f"Mesh.{name}", value)
+        gmsh.model.mesh.generate(3)
+        gmsh.model.mesh.partition(2)
+        gmsh.write(str(path))
+    if says:
+        with pytest.raises(InputError, match=says):
+            mesh_part(solid(file=tmp_path / "part_1.msh", unit="mm"))
+        return
+    part = mesh_part(solid(file=path, unit="mm"))
+    assert integrate(part) == pytest.approx(VOLUME, rel=1e-9)
+    assert (list(part.regions), part.remarks) == (["bar"], ())
+
+
 def test_a_group_inside_the_part_is_no_face(solid, mesh_part, tmp_path):
     path = write_mesh(tmp_path / "part.msh")
     with pytest.raises(InputError, match=r"interface.group of hub: expected a face on the boundary .* not connected"):
@@ -284,6 +314,24 @@ def test_cells_that_meshio_leaves_out_are_not_dropped(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "pyvista", None)
     with pytest.raises(InputError, match="cells that meshio cannot handle"):
         read_foreign(tmp_path / "part.vtu", "part")
+
+
+@pytest.mark.parametrize("compressed", ["ZLib", "LZ4"])
+def test_hidden_cells_of_vtk_are_rejected(solid, mesh_part, tmp_path, compressed):
+    """ParaView's blanking: meshio shows all cells, VTK's own reader the others."""
+    pyvista = pytest.importorskip("pyvista")
+    from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridWriter
+
+    box = structured_box(1.0, (0.015, 0.025), (0.015, 0.025), (8, 2, 2), "hexahedron")
+    grid = pyvista.UnstructuredGrid({pyvista.CellType.HEXAHEDRON: box.cells}, box.points)
+    grid.cell_data["vtkGhostType"] = np.repeat(np.array([0, 32], dtype=np.uint8), [30, 2])
+    writer = vtkXMLUnstructuredGridWriter()
+    getattr(writer, f"SetCompressorTypeTo{compressed}")()
+    writer.SetFileName(str(tmp_path / "part.vtu"))
+    writer.SetInputData(grid)
+    writer.Write()
+    with pytest.raises(InputError, match="2 cells that vtkGhostType hides"):
+        mesh_part(solid(file=tmp_path / "part.vtu"))
 
 
 @pytest.mark.parametrize("name", ["part.unv", "part.cdb", "part.k"])
