@@ -169,3 +169,47 @@ class Mutator:
         }
         name = self.chance.choice(list(kinds))
         return kinds[name], name
+
+
+class Damage:
+    """Changes of a file's bytes, drawn from a seed."""
+
+    def __init__(self, chance: random.Random, script: bytes) -> None:
+        self.chance, self.script, self.mutator = chance, script, Mutator(chance, ["NODE"])
+
+    def of(self, content: bytes) -> tuple[bytes, str]:
+        kind = self.chance.choice(["token", "token", "token", "line", "line", "cut out", "bits", "text", "script"])
+        at = self.chance.randrange(len(content))
+        if kind == "cut out":
+            return content[:at] + content[at + self.chance.randrange(1, 2000) :], f"a part cut out at {at}"
+        if kind == "bits":
+            changed = bytearray(content)
+            for _ in range(self.chance.choice([1, 1, 4, 40])):
+                changed[self.chance.randrange(len(changed))] ^= 1 << self.chance.randrange(8)
+            return bytes(changed), "bits turned"
+        if kind == "script":
+            at = self.chance.choice([0, 0, content.find(b"\n", at) + 1])
+            return content[:at] + self.script + content[at:], f"a script at {at}"
+        if kind == "text":
+            try:
+                return self.mutator.damage(content.decode())
+            except UnicodeDecodeError:
+                return content[:at], "cut off"
+        lines = content.split(b"\n")
+        k = self.chance.randrange(len(lines))
+        if kind == "line":
+            how = self.chance.choice(["removed", "doubled", "moved"])
+            line = lines.pop(k)
+            for _ in range({"removed": 0, "doubled": 2, "moved": 1}[how]):
+                lines.insert(k if how == "doubled" else self.chance.randrange(len(lines)), line)
+            return b"\n".join(lines), f"line {k + 1} {how}: {line[:60]!r}"
+        return self._token(lines, k)
+
+    def _token(self, lines: list[bytes], k: int) -> tuple[bytes, str]:
+        pieces = [piece for piece in lines[k].replace(b",", b" ").split() if piece.strip()]
+        if not pieces:
+            return b"\n".join(lines), "nothing"
+        old = self.chance.choice(pieces)
+        new = str(self.chance.choice([*NUMBERS, *NAMES[:20], "", "*", "1,2", "2147483648", "-1", "1e5", "7"])).encode()
+        lines[k] = lines[k].replace(old, new, 1)
+        return b"\n".join(lines), f"line {k + 1}: {old[:30]!r} → {new[:30]!r}"

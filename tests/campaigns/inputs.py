@@ -1,8 +1,8 @@
-"""URDF, tables, HDF5, SID and .fem files, and arguments of studies, with one change each: refused, or taken.
+"""URDF and its meshes, motions, tables, HDF5, SID and .fem files, arguments of studies with one change: refused, or taken.
 
     python tests/campaigns/inputs.py [--count 100] [--seed 0] [--kind KIND …] [--record]
 
-Kinds are urdf, csv, modal, results, sid, fem and study.
+Kinds are urdf, skin, motion, bag, csv, modal, results, sid, fem and study.
 
 Run by hand, some 0.3 s each. Attributes, cells and datasets get values of other types, huge, tiny, not finite, empty,
 names that lead elsewhere, and text that programs would run: a file CANARY must not appear, nor anything beside the
@@ -21,7 +21,9 @@ from xml.etree import ElementTree
 
 import h5py
 import numpy as np
+import trimesh
 from forked_command import BAD, load_once, outcome, run
+from hostile import Damage
 from record import record
 
 from ffrobot.common.checksum import seal
@@ -66,6 +68,12 @@ reference = { condition = "cantilever" }
 modes = { count = 2, family = "in-plane-bending" }
 """
 BODIES = {".SID_FEM": "sid", ".fem": "mbdyn"}
+ROBOT = """<robot name="r"><link name="base"/><link name="arm">
+<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>
+<visual><geometry><mesh filename="{}"/></geometry></visual></link>
+<joint name="j" type="revolute"><parent link="base"/><child link="arm"/><axis xyz="0 0 1"/>
+<limit lower="-1" upper="1" effort="1" velocity="1"/></joint></robot>"""
+SKINS = ("3mf", "dae", "glb", "obj", "off", "ply", "stl")
 TABLE = "t,value\n0,0\n0.02,0.1\n0.04,0.15\n0.06,0.2\n"
 
 
@@ -81,6 +89,13 @@ class Campaign:
         for command in (["link", "arm.toml"], ["solve", "scene.toml"], *exports):
             code, told = run(command, self.ready)
             assert code == 0, told
+        box = trimesh.creation.box((0.1, 0.2, 0.3))
+        for ending in SKINS:
+            box.export(self.ready / f"skin.{ending}")
+        for form, name in (("joint-trajectory", "motion.json"), ("rosbag2", "bag")):
+            code, told = run(["export", "scene.results.h5", "--format", form, "-o", name], self.ready)
+            assert code == 0, told
+        self.damage = Damage(self.draw, b'import os; os.system("touch CANARY")\n')
 
     def one(self, kind: str, number: int) -> None:
         shutil.rmtree(self.place.parent, ignore_errors=True)
@@ -111,6 +126,29 @@ class Campaign:
         (self.place / "robot.urdf").write_bytes(ElementTree.tostring(root))
         options = ["--fix-inertia"] if self.draw.random() < 0.3 else []
         return f"{how} {element.tag} {element.attrib}", "robot.urdf", [["import", "robot.urdf", "-o", "out", *options]]
+
+    def skin(self):
+        """A mesh that a robot shows, and whose filled volume can be its mass."""
+        name = f"skin.{self.draw.choice(SKINS)}"
+        label = self.of_bytes(self.place / name)
+        robot, filled = ROBOT.format(name), self.draw.random() < 0.5
+        if filled:
+            robot = robot.replace(robot[robot.index("<inertial>") : robot.index("<visual>")], "")
+        (self.place / "robot.urdf").write_text(robot)
+        commands = [["import", "robot.urdf", "-o", "out", *(["--density", "1000"] if filled else [])]]
+        return f"{name} {label}", "robot.urdf", commands
+
+    def motion(self):
+        return self.of_bytes(self.place / "motion.json"), "motion.json", [["import", "motion.json", "-o", "m.csv"]]
+
+    def bag(self):
+        path = self.draw.choice(sorted((self.place / "bag").iterdir()))
+        return f"{path.name} {self.of_bytes(path)}", "bag", [["import", "bag", "-o", "m.csv"]]
+
+    def of_bytes(self, path: Path) -> str:
+        content, how = self.damage.of(path.read_bytes())
+        path.write_bytes(content)
+        return how
 
     def csv(self):
         lines = TABLE.splitlines()
@@ -200,7 +238,7 @@ class Campaign:
         return " ".join(command), "scene.toml", [command]
 
 
-KINDS = ("urdf", "csv", "modal", "results", "sid", "fem", "study")
+KINDS = ("urdf", "skin", "motion", "bag", "csv", "modal", "results", "sid", "fem", "study")
 
 
 def main() -> None:
