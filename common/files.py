@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import tempfile
 from contextlib import suppress
+from os import PathLike
 from pathlib import Path
 from typing import BinaryIO
 from uuid import uuid4
@@ -13,6 +14,8 @@ from .errors import InputError, SolveError
 from .outputs import DAMAGED, check_not_an_input, check_same_kind, kind_of_file
 
 PIECE = 1 << 22  # bytes
+
+AnyPath = str | PathLike[str]
 
 
 def write_atomically(path: Path, content: bytes, what: str, *, make_folder: bool = False, ours: bool = False) -> None:

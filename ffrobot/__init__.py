@@ -20,24 +20,24 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from .api import (
-        fit_measured,
         load_scene,
         make_link,
-        optimise,
         plot_results,
         read_modal_body,
-        screening,
-        sensitivity,
         solve,
-        trade_off,
-        uncertainty,
         view_file,
         write_movie,
         write_report,
         write_study,
     )
     from .common.errors import FfrobotError, FfrobotWarning, InputError, SolveError
+    from .design.front import trade_off
+    from .design.optimise import optimise
+    from .design.screening import screening
+    from .design.sensitivity import sensitivity
+    from .design.uncertainty import uncertainty
     from .fe_models.modal_body import ModalBody
+    from .fit.fitting import fit_measured
     from .results.file import Results
     from .run.watcher import Watcher
     from .scene.load import make_scene
@@ -46,17 +46,17 @@ if TYPE_CHECKING:
     __version__: str
 
 _HOME = {
-    "fit_measured": ".api",
+    "fit_measured": ".fit.fitting",
     "load_scene": ".api",
     "make_link": ".api",
-    "optimise": ".api",
+    "optimise": ".design.optimise",
     "plot_results": ".api",
     "read_modal_body": ".api",
-    "screening": ".api",
-    "sensitivity": ".api",
+    "screening": ".design.screening",
+    "sensitivity": ".design.sensitivity",
     "solve": ".api",
-    "trade_off": ".api",
-    "uncertainty": ".api",
+    "trade_off": ".design.front",
+    "uncertainty": ".design.uncertainty",
     "view_file": ".api",
     "write_movie": ".api",
     "write_report": ".api",

@@ -5,28 +5,20 @@ from __future__ import annotations
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
-from dataclasses import replace
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
+
+from .common.files import AnyPath
 
 if TYPE_CHECKING:
-    from .design.front import Front
-    from .design.optimise import Method
-    from .design.optimum import Optimum
-    from .design.record import Sensitivity
-    from .design.screening import Screening
-    from .design.studies import Found
-    from .design.uncertainty import Uncertainty
+    from .design.finding import Finding
     from .fe_models.link import LinkOutcome
     from .fe_models.modal_body import ModalBody
-    from .fit import Fit
     from .results.file import Results
     from .run.solution import Solution
     from .run.watcher import Watcher
     from .scene.scene import Scene
-
-AnyPath = str | PathLike[str]
 
 
 def solve(
@@ -109,173 +101,12 @@ def make_link(link: AnyPath | Mapping[str, Any], output: AnyPath | None = None, 
     return make_link(source, None if output is None else Path(output), force)
 
 
-def fit_measured(
-    file: AnyPath,
-    measured: AnyPath,
-    vary: Sequence[str],
-    output: AnyPath | None = None,
-    *,
-    motors: Literal["free", "held"] | None = None,
-    force: bool = False,
-) -> Fit:
-    """Fit keys of a link or a scene file to measured natural frequencies: `ffrobot fit`. See `fit.fitting`."""
-    from .fit import fit_measured
-
-    where = None if output is None else Path(output)
-    return fit_measured(Path(file), Path(measured), vary, where, motors=motors, force=force)
-
-
-def sensitivity(
-    scene: AnyPath,
-    of: Sequence[str],
-    to: Sequence[str],
-    output: AnyPath | None = None,
-    *,
-    processes: int = 1,
-    step: float = 0.01,
-    tolerance: float | None = None,
-    allow_python: Sequence[AnyPath] = (),
-) -> Sensitivity:
-    """Derivatives of scalar results `of` a scene file by the numbers at keys `to`: `ffrobot sensitivity`.
-
-    Runs stay in the folder `output`, and are not run again; without one they are forgotten. See `design.sensitivity`.
-    """
-    from .design.sensitivity import sensitivity
-
-    with _designs(Path(scene), output, allow_python) as folder:
-        found = sensitivity(Path(scene), of, to, folder, processes=processes, step=step, tolerance=tolerance)
-    return found if output is not None else replace(found, table=None)
-
-
-def optimise(
-    scene: AnyPath,
-    vary: Sequence[str],
-    output: AnyPath | None = None,
-    *,
-    minimise: str | None = None,
-    maximise: str | None = None,
-    subject_to: Sequence[str] = (),
-    method: Method = "auto",
-    starts: int = 1,
-    seed: int = 0,
-    runs: int = 1000,
-    processes: int = 1,
-    tolerance: float = 1e-8,
-    allow_python: Sequence[AnyPath] = (),
-) -> Optimum:
-    """The design with the least, or largest, goal within limits: `ffrobot optimise`, whose options these are.
-
-    Where no design keeps the limits the nearest one is returned, not `feasible`. Runs stay in the folder `output`, and
-    are not run again; without one they are forgotten. See `design.optimise`.
-    """
-    from .design.optimise import optimise
-
-    with _designs(Path(scene), output, allow_python) as folder:
-        found = optimise(
-            Path(scene), vary, folder, minimise=minimise, maximise=maximise, subject_to=subject_to, method=method,
-            starts=starts, seed=seed, most=runs, processes=processes, tolerance=tolerance,
-        )  # fmt: skip
-    return found if output is not None else replace(found, best_scene=None, designs=None)
-
-
-def trade_off(
-    scene: AnyPath,
-    vary: Sequence[str],
-    output: AnyPath | None = None,
-    *,
-    minimise: str,
-    against: str,
-    points: int = 8,
-    subject_to: Sequence[str] = (),
-    runs: int = 1000,
-    processes: int = 1,
-    tolerance: float = 1e-8,
-    allow_python: Sequence[AnyPath] = (),
-) -> Front:
-    """The least of one goal for each of `points` values of another: `ffrobot optimise … --against`.
-
-    Runs stay in the folder `output`, and are not run again; without one they are forgotten. See `design.front`.
-    """
-    from .design.front import trade_off
-
-    with _designs(Path(scene), output, allow_python) as folder:
-        return trade_off(
-            Path(scene), vary, folder, minimise=minimise, against=against, points=points, subject_to=subject_to,
-            most=runs, processes=processes, tolerance=tolerance,
-        )  # fmt: skip
-
-
-@contextmanager
-def _designs(scene: Path, output: AnyPath | None, allow_python: Sequence[AnyPath]) -> Iterator[Path]:
-    """The folder of designs of a scene file, a temporary one without `output`."""
-    from tempfile import TemporaryDirectory
-
-    from .common.outputs import protected
-    from .common.python_files import python_allowed
-    from .run.inputs import files_of
-
-    with ExitStack() as stack:
-        folder = output if output is not None else stack.enter_context(TemporaryDirectory())
-        stack.enter_context(protected(files_of(scene)))
-        stack.enter_context(python_allowed(Path(place) for place in allow_python))
-        yield Path(folder)
-
-
-def uncertainty(
-    scene: AnyPath,
-    of: Sequence[str],
-    spread: Sequence[str],
-    output: AnyPath | None = None,
-    *,
-    samples: int = 200,
-    seed: int = 0,
-    by: Literal["samples", "gradients"] = "samples",
-    indices: bool = False,
-    processes: int = 1,
-    allow_python: Sequence[AnyPath] = (),
-) -> Uncertainty:
-    """Statistics of goals and histories `of` a scene file whose keys are `spread`: `ffrobot uncertainty`.
-
-    Runs stay in the folder `output`, and are not run again; without one they are forgotten. See `design.uncertainty`.
-    """
-    from .design.uncertainty import uncertainty
-
-    with _designs(Path(scene), output, allow_python) as folder:
-        found = uncertainty(
-            Path(scene), of, spread, folder, samples=samples, seed=seed, by=by, indices=indices, processes=processes
-        )
-    return found if output is not None else replace(found, table=None)
-
-
-def screening(
-    scene: AnyPath,
-    of: Sequence[str],
-    spread: Sequence[str],
-    output: AnyPath | None = None,
-    *,
-    trajectories: int = 10,
-    seed: int = 0,
-    processes: int = 1,
-    allow_python: Sequence[AnyPath] = (),
-) -> Screening:
-    """Elementary effects on goals `of` a scene file of keys that are `spread`: `ffrobot uncertainty --by screening`.
-
-    Runs stay in the folder `output`, and are not run again; without one they are forgotten. See `design.screening`.
-    """
-    from .design.screening import screening
-
-    with _designs(Path(scene), output, allow_python) as folder:
-        found = screening(Path(scene), of, spread, folder, trajectories=trajectories, seed=seed, processes=processes)
-    return found if output is not None else replace(found, table=None)
-
-
-def write_study(found: Found, folder: AnyPath, *, figures: bool = True) -> list[Path]:
+def write_study(found: Finding, folder: AnyPath, *, figures: bool = True) -> list[Path]:
     """Write what the design functions return as files for `write_report`, and as figures; the files written."""
     from .common.extras import extras
-    from .design.studies import keep_study
 
     with extras():
-        return list(keep_study(found, Path(folder), figures=figures))
+        return list(found.write_study(Path(folder), figures=figures))
 
 
 def read_modal_body(path: AnyPath) -> ModalBody:

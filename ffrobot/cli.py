@@ -11,7 +11,7 @@ from copy import copy
 import click
 
 from .commands.bench import bench
-from .commands.design import optimise, sensitivity
+from .commands.design import optimise, sensitivity, uncertainty
 from .commands.exchange import export, import_
 from .commands.fit import fit
 from .commands.link import link
@@ -20,7 +20,6 @@ from .commands.pictures import plot, report, view
 from .commands.read import feasibility, info, linear, pose
 from .commands.solve import solve
 from .commands.sweep import sweep
-from .commands.uncertainty import uncertainty
 from .common.errors import FfrobotError
 from .common.interrupts import SIGNALS, EndOfCommand
 from .common.parallel import end_all, is_first

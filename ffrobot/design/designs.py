@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
-from ..common.errors import InputError
-from ..common.files import check_folder
-from ..common.python_files import allowed_python
+from ..common.errors import InputError, SolveError
+from ..common.files import AnyPath, check_folder
+from ..common.outputs import protected
+from ..common.parallel import processes as of_mpi
+from ..common.python_files import allowed_python, python_allowed
 from ..common.tables import DEEPEST
 from ..results.file import Results
 from ..run.inputs import changed, digest_of_file, files_of
@@ -23,6 +26,45 @@ from ..sweep.workers import Workers
 
 Point = tuple[float, ...]
 """A value for each key."""
+
+
+@dataclass(frozen=True)
+class Runs:
+    """How designs are run: of which scene file, in which folder, whether they are `kept` there, so many in parallel.
+
+    `retry`: whether what failed in an earlier command is run again.
+    """
+
+    path: Path
+    folder: Path
+    kept: bool = True
+    processes: int = 1
+    retry: bool = False
+    watcher: Watcher = field(default_factory=Watcher)
+
+
+@contextmanager
+def runs_of(
+    command: str,
+    scene: AnyPath,
+    output: AnyPath | None,
+    allow_python: Sequence[AnyPath],
+    processes: int,
+    retry: bool,
+    watcher: Watcher | None,
+) -> Iterator[Runs]:
+    """Runs of a scene file in the folder `output`, or in a temporary one; no output replaces an input.
+
+    Raises `InputError` under mpirun.
+    """
+    if of_mpi() > 1:
+        raise InputError(f"{command}: expected one process, found several under mpirun: -j runs designs in parallel")
+    path, places = Path(scene), [Path(place) for place in allow_python]
+    with ExitStack() as stack:
+        folder = output if output is not None else stack.enter_context(TemporaryDirectory())
+        stack.enter_context(protected(files_of(path)))
+        stack.enter_context(python_allowed(places))
+        yield Runs(path, Path(folder), output is not None, processes, retry, watcher or Watcher())
 
 
 @dataclass(frozen=True)
@@ -46,36 +88,24 @@ class Design:
 
 
 class Designs:
-    """All designs so far of the scene at `path`, by the values of `keys`, which the scene has `own` ones of.
+    """All designs so far of the scene of `runs`, by the values of `keys`, which the scene has `own` ones of.
 
-    `fixed` are changes that they share. `retry`: whether what failed in an earlier command is run again.
+    `fixed` are changes that they share.
     """
 
-    def __init__(
-        self,
-        path: Path,
-        keys: Sequence[Key],
-        own: Point,
-        folder: Path,
-        fixed: Mapping[Key, Any],
-        *,
-        processes: int,
-        watcher: Watcher,
-        retry: bool = False,
-    ) -> None:
-        check_folder(folder)
-        allowed = (path.absolute().parent, *allowed_python())
+    def __init__(self, runs: Runs, keys: Sequence[Key], own: Point, fixed: Mapping[Key, Any]) -> None:
+        check_folder(runs.folder)
+        allowed = (runs.path.absolute().parent, *allowed_python())
         variations = tuple(Variation(key, ()) for key in keys)
-        self._sweep = Sweep(path, variations, (), folder, (), allowed, fixed, own, growing=True)
-        self._processes, self._watcher, self._retry = processes, watcher, retry
-        self._workers = Workers()
+        self._sweep = Sweep(runs.path, variations, (), runs.folder, (), allowed, fixed, own, growing=True)
+        self._runs, self._workers = runs, Workers()
         self._designs: dict[Path, Design] = {}
-        self._inputs = _digests(path)
+        self._inputs = _digests(runs.path)
 
     @property
-    def table(self) -> Path:
-        """The file with a row for every design."""
-        return self._sweep.table
+    def table(self) -> Path | None:
+        """The file with a row for every design; None where they are not kept."""
+        return self._sweep.table if self._runs.kept else None
 
     @property
     def count(self) -> int:
@@ -97,6 +127,14 @@ class Designs:
             return str(error)
         return ""
 
+    def run_first(self, point: Point) -> Design:
+        """The design at `point`. Raises `InputError` or `SolveError` where it does not complete."""
+        (design,) = self.run([point])
+        if not design.completed:
+            error = InputError if design.row.status == "wrong input" else SolveError
+            raise error(f"{self._runs.path}: {design.row.status}: {design.row.message}")
+        return design
+
     def run(self, points: Sequence[Point], changes: Mapping[Key, Any] | None = None) -> list[Design]:
         """The designs at `points`, failed ones too, with these `changes` beside; none is run twice in one folder.
 
@@ -112,9 +150,9 @@ class Designs:
         if new:
             earlier = tuple(design.row for design in self._designs.values())
             lot = replace(wanted, points=tuple(new.values()), earlier=earlier)
-            if self._retry:
+            if self._runs.retry:
                 forget_failures(lot)
-            rows = run_sweep(lot, self._processes, self._watcher, self._workers)
+            rows = run_sweep(lot, self._runs.processes, self._runs.watcher, self._workers)
             triples = zip(new.items(), rows, strict=True)
             self._designs |= {folder: Design(point, row, folder) for (folder, point), row in triples}
         return [self._designs[folder] for folder in folders]

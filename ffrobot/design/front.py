@@ -15,9 +15,11 @@ import numpy as np
 
 from ..common.arrays import Array, as_floats
 from ..common.errors import InputError, SolveError
+from ..common.files import AnyPath
 from ..run.watcher import Watcher
-from .designs import Designs
+from .designs import Designs, runs_of
 from .evaluations import Evaluated, Evaluations, SpentError
+from .front_record import Front, FrontPoint
 from .goals import parse_goal
 from .local_search import search_from
 from .optimality import Optimality
@@ -33,72 +35,25 @@ POINTS = 8
 SAME = 1e-6  # of the second goal: ends of a front that are one design
 
 
-@dataclass(frozen=True)
-class FrontPoint:
-    """The best design with one limit of the second goal.
-
-    Attributes:
-        point: values of the keys.
-        goal, against: of both goals there, in the `units` of the front.
-        price: ∂goal/∂against along the front; NaN at its ends.
-        converged: whether gradients say that nothing better is near. `feasible`: whether it keeps all limits.
-        message: why the search ended where it is not.
-        design: itself.
-    """
-
-    point: tuple[object, ...]
-    goal: float
-    against: float
-    price: float
-    converged: bool
-    feasible: bool
-    message: str
-    design: Evaluated
-
-
-@dataclass(frozen=True)
-class Front:
-    """What a trade-off has found: `points` from the least `goals[0]` to the least `goals[1]`; `runs` in all.
-
-    `tried` are the designs of all searches, each once, with readings of the goals of `problem`, its limits along the
-    whole curve among them, and then of the second goal.
-    """
-
-    scene: Path
-    goals: tuple[str, str]
-    units: tuple[str, str]
-    keys: tuple[str, ...]
-    points: tuple[FrontPoint, ...]
-    runs: int
-    tolerance: float
-    space: Space
-    problem: Problem
-    tried: tuple[Evaluated, ...]
-
-    @property
-    def values(self) -> Array:
-        """(N, 2) of both goals."""
-        return np.array([(one.goal, one.against) for one in self.points])
-
-
 def trade_off(
-    path: Path,
+    scene: AnyPath,
     vary: Sequence[str],
-    folder: Path,
+    output: AnyPath | None = None,
     *,
     minimise: str,
     against: str,
     points: int = POINTS,
     subject_to: Sequence[str] = (),
-    most: int = MOST,
-    processes: int = 1,
+    runs: int = MOST,
     tolerance: float = TOLERANCE,
+    processes: int = 1,
     retry: bool = False,
+    allow_python: Sequence[AnyPath] = (),
     watcher: Watcher | None = None,
 ) -> Front:
-    """The least goal `minimise` of the scene file at `path` for each of `points` values of the goal `against`.
+    """The least of one goal for each of `points` values of another: `ffrobot optimise … --against`.
 
-    Other arguments are those of `optimise`; `most` counts the runs of all searches together.
+    Other arguments are those of `optimise`; `runs` counts those of all searches together.
 
     Raises:
         InputError: as of `optimise`; catalogues; fewer than three points; goals that are least in one design.
@@ -106,17 +61,18 @@ def trade_off(
     """
     if points < 3:
         raise InputError(f"optimise: --points: expected at least 3, found {points}")
-    problem, space, watcher = read_problem(minimise, None, subject_to), read_space(path, vary), watcher or Watcher()
-    other = parse_goal(against, "--against")
-    if other.text == problem.objective.text:
-        raise InputError(f'--against: expected another response than "{other.text}", which is minimized')
-    if catalogue := next((v for v in space.variables if v.is_catalogue), None):
-        raise InputError(f"--against: expected numbers between bounds, found the discrete set of {catalogue.name}")
-    check_start(path, space, "slsqp")
-    fixed = changes_for(path, (*problem.goals, other), tolerance, keep_steps=may_repeat(space.keys))
-    designs = Designs(path, space.keys, space.own, folder, fixed, processes=processes, watcher=watcher, retry=retry)
-    check_bounds(designs, space)
-    return _Searches(path, space, designs, problem, other, most, tolerance, watcher).front(points)
+    with runs_of("optimise", scene, output, allow_python, processes, retry, watcher) as runner:
+        path, problem = runner.path, read_problem(minimise, None, subject_to)
+        space, other = read_space(path, vary), parse_goal(against, "--against")
+        if other.text == problem.objective.text:
+            raise InputError(f'--against: expected another response than "{other.text}", which is minimized')
+        if catalogue := next((v for v in space.variables if v.is_catalogue), None):
+            raise InputError(f"--against: expected numbers between bounds, found the discrete set of {catalogue.name}")
+        check_start(path, space, "slsqp")
+        fixed = changes_for(path, (*problem.goals, other), tolerance, keep_steps=may_repeat(space.keys))
+        designs = Designs(runner, space.keys, space.own, fixed)
+        check_bounds(designs, space)
+        return _Searches(path, space, designs, problem, other, runs, tolerance, runner.watcher).front(points)
 
 
 @dataclass

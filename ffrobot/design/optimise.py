@@ -16,13 +16,13 @@ from typing import Literal
 from scipy.stats.qmc import LatinHypercube
 
 from ..common.errors import InputError, SolveError
-from ..common.parallel import processes as of_mpi
+from ..common.files import AnyPath
 from ..run.watcher import Watcher
 from ..sweep.files import run_files
-from .designs import Designs
+from .designs import Designs, Runs, runs_of
 from .evaluations import Evaluations, SpentError, write_designs
 from .local_search import Local, best_of, search_from
-from .optimum import Optimum
+from .optimum_record import Optimum
 from .problem import read_problem
 from .scenes import changes_for, may_repeat
 from .slopes import Differentiation
@@ -39,9 +39,9 @@ EVERY = 500  # combinations of rows: more are sought among
 
 
 def optimise(
-    path: Path,
+    scene: AnyPath,
     vary: Sequence[str],
-    folder: Path,
+    output: AnyPath | None = None,
     *,
     minimise: str | None = None,
     maximise: str | None = None,
@@ -49,43 +49,46 @@ def optimise(
     method: Method = "auto",
     starts: int = 1,
     seed: int = 0,
-    most: int = MOST,
-    processes: int = 1,
+    runs: int = MOST,
     tolerance: float = TOLERANCE,
+    processes: int = 1,
     retry: bool = False,
+    allow_python: Sequence[AnyPath] = (),
     watcher: Watcher | None = None,
 ) -> Optimum:
-    """The design of the scene file at `path` with the least (or largest) goal within limits; runs stay in `folder`.
+    """The design of a scene file with the least, or largest, goal within limits: `ffrobot optimise`.
 
-    `vary`, `subject_to`: as on the command line, see `variables` and `problem`. `method`: by default
-    "slsqp", and where there are catalogues "all" of them or "differential-evolution". `starts`: how many searches
-    along gradients, from the scene itself and from a Latin hypercube with `seed`. `most`: runs. `tolerance`: of the
-    runs, where the scene has a larger one. `processes`: runs side by side. `retry`: whether designs that failed before
-    are run again.
+    Where no design keeps the limits the nearest one is returned, not `feasible`. Designs stay in the folder `output`,
+    and are not run again; without one they are forgotten. `vary`, `subject_to`: as on the command line, see `variables`
+    and `problem`. `method`: by default "slsqp", and where there are catalogues "all" of them or
+    "differential-evolution". `starts`: how many searches along gradients, from the scene itself and from a Latin
+    hypercube with `seed`. `runs`: how many at most. `tolerance`: of the runs, where the scene has a larger one.
+    `processes`: runs in parallel. `retry`: whether designs that failed before are run again. `allow_python` as in
+    `solve`.
 
     Raises:
         InputError: goals, limits or keys that mean nothing, bounds that no design can have.
         SolveError: no design completed.
     """
-    if of_mpi() > 1:
-        raise InputError("optimise: expected one process, found several under mpirun: -j runs designs in parallel")
-    problem, space, watcher = read_problem(minimise, maximise, subject_to), read_space(path, vary), watcher or Watcher()
-    chosen = _method(space, method, most)
-    check_start(path, space, chosen)
-    fixed = changes_for(path, problem.goals, tolerance, keep_steps=may_repeat(space.keys))
-    designs = Designs(path, space.keys, space.own, folder, fixed, processes=processes, watcher=watcher, retry=retry)
-    check_bounds(designs, space)
-    evaluations = Evaluations(designs, space, problem, most)
-    differentiation = Differentiation(path, evaluations, tolerance)
-    try:
-        searches = _search(chosen, differentiation, _starts(space, starts, seed), seed, watcher)
-    finally:
-        if evaluations.searched:
-            write_designs(evaluations, folder / "designs.csv")
-    best = min(searches, key=lambda one: rank(evaluations, one.best))
-    if not best.best.completed:
-        raise SolveError(f"{path}: no design could be run to its end; the first one: {evaluations.failures[0]}")
-    return _optimum(path, folder, chosen, evaluations, best, searches, tolerance)
+    with runs_of("optimise", scene, output, allow_python, processes, retry, watcher) as runner:
+        path, problem = runner.path, read_problem(minimise, maximise, subject_to)
+        space = read_space(path, vary)
+        chosen = _method(space, method, runs)
+        check_start(path, space, chosen)
+        fixed = changes_for(path, problem.goals, tolerance, keep_steps=may_repeat(space.keys))
+        designs = Designs(runner, space.keys, space.own, fixed)
+        check_bounds(designs, space)
+        evaluations = Evaluations(designs, space, problem, runs)
+        differentiation = Differentiation(path, evaluations, tolerance)
+        try:
+            searches = _search(chosen, differentiation, _starts(space, starts, seed), seed, runner.watcher)
+        finally:
+            if evaluations.searched:
+                write_designs(evaluations, runner.folder / "designs.csv")
+        best = min(searches, key=lambda one: rank(evaluations, one.best))
+        if not best.best.completed:
+            raise SolveError(f"{path}: no design could be run to its end; the first one: {evaluations.failures[0]}")
+        return _optimum(runner, chosen, evaluations, best, searches, tolerance)
 
 
 def _method(space: Space, method: Method, most: int) -> Method:
@@ -179,17 +182,18 @@ def _tell(watcher: Watcher, title: str, text: str) -> None:
 
 
 def _optimum(
-    path: Path, folder: Path, method: Method, evaluations: Evaluations, best: Local, searches: Sequence[Local],
-    tolerance: float,
-) -> Optimum:  # fmt: skip
+    runs: Runs, method: Method, evaluations: Evaluations, best: Local, searches: Sequence[Local], tolerance: float
+) -> Optimum:
     space, problem = evaluations.space, evaluations.problem
     with best.best.design.results() as results:
         verdict = results.verdict
     point = space.point(best.best.place)
     changes = {key: value for key, value, own in zip(space.keys, point, space.own, strict=True) if value != own}
-    scene = run_files(path, changes, folder / BEST).write(folder / BEST)
+    folder = runs.folder / BEST
+    scene = run_files(runs.path, changes, folder).write(folder)
     return Optimum(
-        path, problem, space, method, best.start, best.best, best.optimality, best.conflict, best.message,
-        tuple(searches), evaluations.runs, tuple(evaluations.failures), tolerance, verdict, scene,
-        designs=folder / "designs.csv", tried=tuple(evaluations.searched),
+        runs.path, problem, space, method, best.start, best.best, best.optimality, best.conflict, best.message,
+        tuple(searches), evaluations.runs, tuple(evaluations.failures), tolerance, verdict,
+        scene if runs.kept else None, designs=runs.folder / "designs.csv" if runs.kept else None,
+        tried=tuple(evaluations.searched),
     )  # fmt: skip

@@ -8,8 +8,8 @@ import numpy as np
 
 from ..pictures.studies.diagrams import Axis, Numbers, Parallel, Progress, State, axis_of_goal
 from .evaluations import Evaluated
+from .finding import numbers, with_unit
 from .problem import KEPT, Limit, Problem
-from .study_parts import numbers, with_unit
 from .variables import Space, Variable
 
 

@@ -11,26 +11,25 @@ and still fall with smaller steps, steps of a quarter follow, twice at most.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from pathlib import Path
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
-from ..common.errors import InputError, SolveError
-from ..common.parallel import processes as of_mpi
+from ..common.errors import InputError
+from ..common.files import AnyPath
 from ..run.watcher import Watcher
 from ..sweep.files import number_at
 from ..sweep.runs import RESULTS
 from ..sweep.sweep import Key
 from .derivatives import SIZES, Base, Exact, Known, Sample, entries, wants_larger_steps, wants_smaller_steps
-from .designs import Designs, Point, parse_key
+from .designs import Designs, Point, Runs, parse_key, runs_of
 from .frequencies import exact_entries
 from .goals import parse_goal
 from .pairs import OTHERS, samples_at, take_pairs
 from .readings import Goal, Reading
-from .record import Sensitivity
 from .scenes import changes_for, may_repeat, repeated_steps
+from .sensitivity_record import Sensitivity
 
 STEP = 0.01  # of a key's value, the largest; of keys that are 0, in their unit
 FINER = ((0.125, 0.0625), (0.03125, 0.015625))  # of those that follow where these are too large
@@ -39,62 +38,53 @@ TOLERANCE_REPEATED = 1e-7  # of those that take the same steps: their noise is n
 
 
 def sensitivity(
-    path: Path,
+    scene: AnyPath,
     of: Sequence[str],
     to: Sequence[str],
-    folder: Path,
+    output: AnyPath | None = None,
     *,
     processes: int = 1,
     step: float = STEP,
     tolerance: float | None = None,
     retry: bool = False,
+    allow_python: Sequence[AnyPath] = (),
     watcher: Watcher | None = None,
 ) -> Sensitivity:
-    """Derivatives of the goals `of` the scene file at `path` by the numbers at its keys `to`; runs stay in `folder`.
+    """Derivatives of scalar results `of` a scene file by the numbers at keys `to`: `ffrobot sensitivity`.
 
-    `step`: the largest, of the keys' values. `tolerance`: of the runs, where the scene has a larger one; None: 1e-7
-    where steps are repeated, 1e-9 elsewhere. `processes`: runs side by side. `retry`: whether designs that failed
-    before are run again.
+    Runs stay in the folder `output`, and are not run again; without one they are forgotten. `step`: the largest, of the
+    keys' values. `tolerance`: of the runs, where the scene has a larger one; None: 1e-7 where steps are repeated, 1e-9
+    elsewhere. `processes`: runs in parallel. `retry`: whether designs that failed before are run again. `allow_python`
+    as in `solve`.
 
     Raises:
         InputError: goals or keys that mean nothing, or keys that may take no other value.
         SolveError: the scene itself cannot be solved.
     """
-    if of_mpi() > 1:
-        raise InputError("sensitivity: expected one process, found several under mpirun: -j runs designs in parallel")
-    goals = tuple(parse_goal(text) for text in dict.fromkeys(of))
-    keys = tuple(parse_key(text, "--to") for text in dict.fromkeys(to))
-    if not goals or not keys:
-        raise InputError("sensitivity: expected at least one response (--of) and one key (--to)")
-    point = tuple(number_at(path, key, "--to") for key in keys)
-    steps = tuple(step * (abs(value) or 1.0) for value in point)
-
-    def designs_with(fixed: Mapping[Key, Any]) -> Designs:
-        return Designs(path, keys, point, folder, fixed, processes=processes, watcher=watcher or Watcher(), retry=retry)
-
-    designs, readings, repeats, again = _base(path, goals, keys, point, tolerance, designs_with)
-    tolerance = repeats or tolerance or TOLERANCE
-    base = Base(goals, readings, keys, point, steps, repeats=repeats, again=again)
-    _check_steps(designs, base)
-    known = _all_known(designs, base, exact_entries(path, base))
+    with runs_of("sensitivity", scene, output, allow_python, processes, retry, watcher) as runs:
+        goals = tuple(parse_goal(text) for text in dict.fromkeys(of))
+        keys = tuple(parse_key(text, "--to") for text in dict.fromkeys(to))
+        if not goals or not keys:
+            raise InputError("sensitivity: expected at least one response (--of) and one key (--to)")
+        point = tuple(number_at(runs.path, key, "--to") for key in keys)
+        steps = tuple(step * (abs(value) or 1.0) for value in point)
+        designs, readings, repeats, again = _base(runs, goals, keys, point, tolerance)
+        base = Base(goals, readings, keys, point, steps, repeats=repeats, again=again)
+        _check_steps(designs, base)
+        known = _all_known(designs, base, exact_entries(runs.path, base))
     failures = tuple(
         f"{'.'.join(keys[one.k])} = {point[one.k] + one.offset:.6g}: {one.failure}"
         for one in known.samples
         if one.failure
     )
     return Sensitivity(
-        path, tuple(goal.text for goal in goals), base.readings, tuple(map(".".join, keys)), np.array(point),
-        entries(base, known), failures, tolerance, designs.count, designs.table,
+        runs.path, tuple(goal.text for goal in goals), base.readings, tuple(map(".".join, keys)), np.array(point),
+        entries(base, known), failures, repeats or tolerance or TOLERANCE, designs.count, designs.table,
     )  # fmt: skip
 
 
 def _base(
-    path: Path,
-    goals: Sequence[Goal],
-    keys: Sequence[Key],
-    point: Point,
-    tolerance: float | None,
-    designs_with: Callable[[Mapping[Key, Any]], Designs],
+    runs: Runs, goals: Sequence[Goal], keys: Sequence[Key], point: Point, tolerance: float | None
 ) -> tuple[Designs, tuple[Reading, ...], float, Mapping[Key, Any]]:
     """Designs, the goals of the scene's own, the tolerance of runs that repeat its steps, 0 where they cannot, and how.
 
@@ -102,23 +92,20 @@ def _base(
     """
     if may_repeat(keys):
         repeats = tolerance or TOLERANCE_REPEATED
-        designs = designs_with(changes_for(path, goals, repeats, keep_steps=True))
-        readings, steps = _nominal(path, designs, goals, point)
+        designs = Designs(runs, keys, point, changes_for(runs.path, goals, repeats, keep_steps=True))
+        readings, steps = _nominal(designs, goals, point)
         if steps:
             return designs, readings, repeats, steps
-    designs = designs_with(changes_for(path, goals, tolerance or TOLERANCE))
-    readings, _ = _nominal(path, designs, goals, point)
+    designs = Designs(runs, keys, point, changes_for(runs.path, goals, tolerance or TOLERANCE))
+    readings, _ = _nominal(designs, goals, point)
     return designs, readings, 0.0, {}
 
 
 def _nominal(
-    path: Path, designs: Designs, goals: Sequence[Goal], point: Point
+    designs: Designs, goals: Sequence[Goal], point: Point
 ) -> tuple[tuple[Reading, ...], dict[Key, Any] | None]:
     """The goals of the scene's own design, and what has its steps taken again."""
-    (design,) = designs.run([point])
-    if not design.completed:
-        error = InputError if design.row.status == "wrong input" else SolveError
-        raise error(f"{path}: {design.row.status}: {design.row.message}")
+    design = designs.run_first(point)
     with design.results() as results:
         return tuple(goal.read(results) for goal in goals), repeated_steps(results, design.folder / RESULTS)
 

@@ -3,26 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
-from ..common.errors import InputError, SolveError
-from ..common.parallel import processes as of_mpi
-from ..run.watcher import Watcher
-from .designs import Design, Designs, Point
+from ..common.errors import InputError
+from .designs import Design, Designs, Point, Runs
 from .readings import Goal, Reading
 from .scenes import changes_for
 from .spreads import Spread, parse_spread
-
-
-@dataclass(frozen=True)
-class Runs:
-    """How designs are run: where they are kept, so many side by side, failed ones again or not, who is told."""
-
-    folder: Path
-    processes: int = 1
-    retry: bool = False
-    watcher: Watcher | None = None
 
 
 class SpreadDesigns:
@@ -36,10 +23,9 @@ class SpreadDesigns:
 
     def __init__(
         self,
-        path: Path,
+        runs: Runs,
         spreads: Sequence[Spread],
         goals: Sequence[Goal],
-        runs: Runs,
         *,
         others: Sequence[Goal] = (),
         tolerance: float | None = None,
@@ -50,24 +36,17 @@ class SpreadDesigns:
             InputError: goals or spreads that mean nothing, or that make scenes impossible.
             SolveError: the scene all parameters at nominal values cannot be solved.
         """
-        if of_mpi() > 1:
-            raise InputError(
-                "uncertainty: expected one process, found several under mpirun: -j runs samples in parallel"
-            )
-        self.path, self.spreads, self.goals = path, tuple(spreads), tuple(goals)
+        self.path, self.spreads, self.goals = runs.path, tuple(spreads), tuple(goals)
         keys, own = [one.key for one in spreads], tuple(one.own for one in spreads)
-        self._designs = Designs(
-            path, keys, own, runs.folder, changes_for(path, (*goals, *others), tolerance),
-            processes=runs.processes, watcher=runs.watcher or Watcher(), retry=runs.retry,
-        )  # fmt: skip
+        self._designs = Designs(runs, keys, own, changes_for(runs.path, (*goals, *others), tolerance))
         self.failures: list[str] = []
         self.middle = self._run_middle()
         with self.middle.results() as results:
             self.readings: tuple[Reading, ...] = tuple(goal.read(results) for goal in goals)
 
     @property
-    def table(self) -> Path:
-        """The file with a row for every run."""
+    def table(self) -> Path | None:
+        """The file with a row for every run; None where they are not kept."""
         return self._designs.table
 
     def run(self, points: Sequence[Point]) -> list[Design]:
@@ -101,11 +80,7 @@ class SpreadDesigns:
                     raise InputError(
                         f"--spread: expected spreads with which the scene makes sense, found {one.text}:\n{problem}"
                     )
-        (design,) = self._designs.run([centre])
-        if not design.completed:
-            error = InputError if design.row.status == "wrong input" else SolveError
-            raise error(f"{self.path}: {design.row.status}: {design.row.message}")
-        return design
+        return self._designs.run_first(centre)
 
 
 def read_spreads(path: Path, texts: Sequence[str]) -> tuple[Spread, ...]:

@@ -9,22 +9,23 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Literal
 
 import numpy as np
 
 from ..common.arrays import Array, as_floats
 from ..common.errors import InputError, SolveError
+from ..common.files import AnyPath
 from ..run.watcher import Watcher
-from .designs import Design, Point
+from .designs import Design, Point, runs_of
 from .goals import parse_goal
 from .histories import History, read_history
 from .linear_spread import LinearModel
-from .readings import Goal, Reading
-from .spread_designs import Runs, SpreadDesigns, read_spreads
-from .spreads import Spread, spread_points
+from .readings import Goal
+from .spread_designs import SpreadDesigns, read_spreads
+from .spreads import spread_points
 from .statistics import Indices, Statistics, regression_shares, sobol_indices, statistics
+from .uncertainty_record import Band, Uncertainty
 
 TOLERANCE = 1e-8  # of runs for gradients, at most: differences of one standard deviation
 FEWEST = 8  # samples that a quantile of 5 % is told from
@@ -51,57 +52,11 @@ class Curve(Goal):
         return found
 
 
-@dataclass(frozen=True)
-class Band:
-    """A history's statistics at `time` (T,), s; `nominal` (T,) with all keys at the middle of their spreads."""
-
-    name: str
-    unit: str
-    time: Array
-    nominal: Array
-    statistics: Statistics
-
-
-@dataclass(frozen=True)
-class Uncertainty:
-    """What is known of g goals and some histories with k keys spread.
-
-    Attributes:
-        scene: its file.
-        spreads: (k,) of the keys.
-        method: how it was found.
-        goals, readings: (g,) what was asked for, and with all keys at the middle of their spreads.
-        statistics: of the goals, (g,).
-        bands: of the histories.
-        shares: (g, k) of the variance by the linear part; `explained` (g,) what part of it that is, NaN by gradients.
-        indices: Sobol's, where they were asked for.
-        samples: (n, g) the goals, NaN where a run failed; (0, g) by gradients.
-        failures: runs that failed, in words; `runs` in all, of which `table` is the file.
-        notes: peaks, by gradients, that others overtake beside the middle.
-    """
-
-    scene: Path
-    spreads: tuple[Spread, ...]
-    method: Literal["samples", "gradients"]
-    goals: tuple[str, ...]
-    readings: tuple[Reading, ...]
-    statistics: Statistics
-    bands: tuple[Band, ...]
-    shares: Array
-    explained: Array
-    indices: Indices | None
-    samples: Array
-    failures: tuple[str, ...]
-    notes: tuple[str, ...]
-    runs: int
-    table: Path | None
-
-
 def uncertainty(
-    path: Path,
+    scene: AnyPath,
     of: Sequence[str],
     spread: Sequence[str],
-    folder: Path,
+    output: AnyPath | None = None,
     *,
     samples: int = 200,
     seed: int = 0,
@@ -109,9 +64,13 @@ def uncertainty(
     indices: bool = False,
     processes: int = 1,
     retry: bool = False,
+    allow_python: Sequence[AnyPath] = (),
     watcher: Watcher | None = None,
 ) -> Uncertainty:
-    """Statistics of goals and histories `of` the scene file at `path` with keys `spread`; runs stay in `folder`.
+    """Statistics of goals and histories `of` a scene file whose keys are `spread`: `ffrobot uncertainty`.
+
+    Runs stay in the folder `output`, and are not run again; without one they are forgotten. `processes`, `retry` and
+    `allow_python` as in `optimise`.
 
     Raises:
         InputError: goals, keys or spreads that mean nothing, or that make scenes impossible.
@@ -124,15 +83,13 @@ def uncertainty(
     names = list(dict.fromkeys(of))
     goals = tuple(parse_goal(text) for text in names if not is_history(text))
     curves = tuple(Curve(text) for text in names if is_history(text))
-    spreads = read_spreads(path, spread)
-    if not names or not spreads:
-        raise InputError("uncertainty: expected at least one response or history (--of) and one key (--spread)")
-    designs = SpreadDesigns(
-        path, spreads, goals, Runs(folder, processes, retry, watcher),
-        others=curves, tolerance=TOLERANCE if by == "gradients" else None,
-    )  # fmt: skip
-    study = _Study(designs, curves)
-    return study.by_gradients() if by == "gradients" else study.by_samples(samples, seed, indices=indices)
+    with runs_of("uncertainty", scene, output, allow_python, processes, retry, watcher) as runs:
+        spreads = read_spreads(runs.path, spread)
+        if not names or not spreads:
+            raise InputError("uncertainty: expected at least one response or history (--of) and one key (--spread)")
+        tolerance = TOLERANCE if by == "gradients" else None
+        study = _Study(SpreadDesigns(runs, spreads, goals, others=curves, tolerance=tolerance), curves)
+        return study.by_gradients() if by == "gradients" else study.by_samples(samples, seed, indices=indices)
 
 
 def is_history(text: str) -> bool:

@@ -1,51 +1,220 @@
-"""What `ffrobot uncertainty` tells: tables, files with all numbers."""
+"""What `ffrobot uncertainty` tells: tables, files with all numbers, bands, and which key matters most."""
 
 from __future__ import annotations
 
-import io
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
-from rich.console import Console
 
 from ..common.arrays import Array
-from ..common.files import write_atomically
-from ..common.tables import TableWriter
-from ..present.tables import print_table
+from ..pictures.studies.diagrams import Band as BandDiagram
+from ..pictures.studies.diagrams import Bars, Diagram, Series
+from ..pictures.studies.study import StudyTable
+from .finding import CsvFile, Finding, Section, failed_runs, file_name, floats, numbers, with_unit
 from .readings import Reading
-from .statistics import LEVELS, Statistics
-from .study_parts import file_name
-from .uncertainty import Band, Uncertainty
+from .spreads import Spread
+from .statistics import LEVELS, Indices, Statistics
 
 NAMES = tuple(f"{100 * level:g}%" for level in LEVELS)
 ROUNDING = 1e-13  # of a goal: smaller deviations are none
 UNCHANGED = "none of the keys changes it"
 LINEAR = 0.9  # of a variance: below, shares by regression are told to be few
+BAND_HEADINGS = ("history", "unit", "deviation, at most", "at t = (s)", "widest 5 % to 95 %", "at t = (s)")
+WORST = {"samples": "lowest and highest sample", "gradients": "keys at their worse ends (linear)"}
 
 
-def write_uncertainty(found: Uncertainty, folder: Path) -> list[Path]:
-    """`uncertainty.csv`, one line for each goal, and `band_HISTORY.csv`, one for each time; the files written."""
-    written = []
-    if found.goals:
-        written.append(folder / "uncertainty.csv")
-        _write(written[-1], _goal_columns(found), _goal_rows(found))
-    for band in found.bands:
-        written.append(folder / f"band_{file_name(band.name)}.csv")
-        _write(written[-1], ("time", "nominal", *_columns()), _band_rows(band))
-    return written
+@dataclass(frozen=True)
+class Band:
+    """A history's statistics at `time` (T,), s; `nominal` (T,) with all keys at the middle of their spreads."""
+
+    name: str
+    unit: str
+    time: Array
+    nominal: Array
+    statistics: Statistics
 
 
-def print_uncertainty(found: Uncertainty, console: Console) -> None:
-    """Each goal with what the keys do to it, the bands, and what there is to mind."""
-    for g in range(len(found.goals)):
-        console.print(goal_line(found.goals[g], found.readings[g]), soft_wrap=True, markup=False, highlight=False)
-        for headings, rows in ((statistics_headings(), [statistics_row(found, g)]), parts(found, g)):
-            print_table(console, headings, rows)
-    if found.bands:
-        print_table(console, BAND_HEADINGS, band_rows(found))
-    for line in remarks(found):
-        console.print(line, soft_wrap=True, markup=False, highlight=False)
+@dataclass(frozen=True)
+class Uncertainty(Finding):
+    """What is known of g goals and some histories with k keys spread.
+
+    Attributes:
+        scene: its file.
+        spreads: (k,) of the keys.
+        method: how it was found.
+        goals, readings: (g,) what was asked for, and with all keys at the middle of their spreads.
+        statistics: of the goals, (g,).
+        bands: of the histories.
+        shares: (g, k) of the variance by the linear part; `explained` (g,) what part of it that is, NaN by gradients.
+        indices: Sobol's, where they were asked for.
+        samples: (n, g) the goals, NaN where a run failed; (0, g) by gradients.
+        failures: runs that failed, in words; `runs` in all, of which `table` is the file.
+        notes: peaks, by gradients, that others overtake beside the middle.
+    """
+
+    name = "uncertainty"
+    title = "Uncertainty"
+
+    scene: Path
+    spreads: tuple[Spread, ...]
+    method: Literal["samples", "gradients"]
+    goals: tuple[str, ...]
+    readings: tuple[Reading, ...]
+    statistics: Statistics
+    bands: tuple[Band, ...]
+    shares: Array
+    explained: Array
+    indices: Indices | None
+    samples: Array
+    failures: tuple[str, ...]
+    notes: tuple[str, ...]
+    runs: int
+    table: Path | None
+
+    def headline(self) -> str:
+        """Between what goals are, most of the time."""
+        texts = []
+        for g, (goal, reading) in enumerate(zip(self.goals, self.readings, strict=True)):
+            low, _, high = self.statistics.quantiles[:, g]
+            texts.append(f"{goal}: {low:.5g} to {high:.5g} {reading.unit}".rstrip() + f" ({NAMES[0]} to {NAMES[-1]})")
+        return "; ".join([*texts, *(f"band of {band.name}" for band in self.bands)])
+
+    def sections(self) -> Iterator[Section]:
+        """Each goal with what the keys do to it, then the bands."""
+        for g, (goal, reading) in enumerate(zip(self.goals, self.readings, strict=True)):
+            yield Section(_statistics_heading(), [self._statistics_row(g)], line=goal_line(goal, reading))
+            yield self._parts(g)
+        if self.bands:
+            yield Section(BAND_HEADINGS, self._band_rows())
+
+    def report_tables(self) -> Iterator[StudyTable]:
+        """The statistics of all goals in one table."""
+        if self.goals:
+            rows = [
+                (goal, reading.unit, f"{reading.value:.6g}", *self._statistics_row(g))
+                for g, (goal, reading) in enumerate(zip(self.goals, self.readings, strict=True))
+            ]
+            yield Section(("goal", "unit", "nominal values", *_statistics_heading()), rows).for_report()
+        yield from (self._parts(g).for_report() for g in range(len(self.goals)))
+        if self.bands:
+            yield Section(BAND_HEADINGS, self._band_rows()).for_report()
+
+    def _statistics_row(self, g: int) -> tuple[str, ...]:
+        """Of goal g, each with its error."""
+        s = self.statistics
+        pairs = [(s.mean[g], s.mean_error[g]), (s.deviation[g], s.deviation_error[g])]
+        pairs += list(zip(s.quantiles[:, g], s.quantile_errors[:, g], strict=True))
+        return (*(with_error(*pair) for pair in pairs), f"{s.lowest[g]:.5g} to {s.highest[g]:.5g}")
+
+    def _parts(self, g: int) -> Section:
+        """The keys' shares of the variance of goal g, the largest first; Sobol indices where known."""
+        rows = []
+        for k in self.ranked(g):
+            one = self.spreads[k]
+            cells = [f"{100.0 * self.shares[g, k]:.1f} %"]
+            if i := self.indices:
+                cells = [with_error(i.first[g, k], i.first_error[g, k]), with_error(i.total[g, k], i.total_error[g, k])]
+            rows.append((".".join(one.key), one.text.partition("=")[2], *cells))
+        parts = ("alone", "with others") if self.indices else ("share of the variance",)
+        return Section(("key", "spread", *parts), rows, of=self.goals[g])
+
+    def ranked(self, g: int) -> list[int]:
+        """Keys by number, the one that matters most for goal g first."""
+        by = self.indices.total[g] if self.indices else self.shares[g]
+        return [int(k) for k in np.argsort(-np.nan_to_num(by), kind="stable")]
+
+    def _band_rows(self) -> Iterator[tuple[str, ...]]:
+        """Where each history is least sure."""
+        for band in self.bands:
+            width = band.statistics.quantiles[-1] - band.statistics.quantiles[0]
+            cells: list[str] = []
+            for values in (band.statistics.deviation, width):
+                k = int(np.argmax(values))
+                cells += [f"{values[k]:.4g}", f"{band.time[k]:g}"]
+            yield (band.name, band.unit, *cells)
+
+    def remarks(self) -> Iterator[str]:
+        """What there is to mind, and how it was found."""
+        deviations = self.statistics.deviation
+        for goal, reading, explained, deviation in zip(
+            self.goals, self.readings, self.explained, deviations, strict=True
+        ):
+            if deviation <= ROUNDING * abs(reading.value):
+                yield f"note       {goal}: {UNCHANGED}"
+            if explained < LINEAR and self.indices is None:
+                yield (
+                    f"note       {goal}: a linear function of the keys makes {100.0 * explained:.0f} % of the variance:"
+                    " --indices computes the effect of each, alone and with others"
+                )
+        yield from (f"note       {text}" for text in self.notes)
+        yield from failed_runs(self.failures, self.runs)
+        how = (
+            "± the standard error of as many independent samples: the mean of a Latin hypercube is better; worst case:"
+            " the lowest and the highest sample"
+        )
+        if self.method == "gradients":
+            how = (
+                "linear between runs one standard deviation to both sides; ± the difference that curvature makes; worst"
+                " case: all keys at the worse ends of their spreads, normal ones two deviations off"
+            )
+        yield f"how        {self.runs} runs; {how}"
+
+    def csv_files(self) -> Iterator[CsvFile]:
+        """One line for each goal, and of each history one for each time."""
+        if self.goals:
+            yield CsvFile("uncertainty.csv", "table of uncertainties", self._goal_columns(), self._goal_rows())
+        for band in self.bands:
+            lines = ([t, band.nominal[k], *_numbers(band.statistics, k)] for k, t in enumerate(band.time))
+            columns = ("time", "nominal", *_columns())
+            yield CsvFile(f"band_{file_name(band.name)}.csv", "table of uncertainties", columns, lines)
+
+    def _goal_columns(self) -> list[str]:
+        keys = [".".join(one.key) for one in self.spreads]
+        parts = [f"share {key}" for key in keys]
+        if self.indices:
+            parts += [f"{word} {key}" for word in ("first", "first_error", "total", "total_error") for key in keys]
+        return ["goal", "unit", "middle", *_columns(), "linear", *parts]
+
+    def _goal_rows(self) -> Iterator[list[object]]:
+        for g, (goal, reading) in enumerate(zip(self.goals, self.readings, strict=True)):
+            parts = list(self.shares[g])
+            if i := self.indices:
+                parts += [*i.first[g], *i.first_error[g], *i.total[g], *i.total_error[g]]
+            yield [goal, reading.unit, reading.value, *_numbers(self.statistics, g), self.explained[g], *parts]
+
+    def diagrams(self) -> list[Diagram]:
+        """The ranking of keys for each goal, and the bands."""
+        return [*(self._ranking(g) for g in range(len(self.goals))), *map(self._band, self.bands)]
+
+    def _ranking(self, g: int) -> Bars:
+        """Shares of the variance, or Sobol indices with their errors, in percent."""
+        order = self.ranked(g)
+        if i := self.indices:
+            pairs = {"alone": (i.first, i.first_error), "with others": (i.total, i.total_error)}
+            series = [
+                Series(label=label, values=numbers(100.0 * value[g, order]), errors=floats(100.0 * error[g, order]))
+                for label, (value, error) in pairs.items()
+            ]
+        else:
+            series = [Series(values=numbers(100.0 * self.shares[g, order]))]
+        return Bars(
+            name=f"ranking_{file_name(self.goals[g])}", title=self.goals[g],
+            x_label="Sobol index (%)" if self.indices else "share of the variance (%)",
+            labels=tuple(".".join(self.spreads[k].key) for k in order), series=tuple(series),
+        )  # fmt: skip
+
+    def _band(self, band: Band) -> BandDiagram:
+        low, median, high = band.statistics.quantiles
+        return BandDiagram(
+            name=f"band_{file_name(band.name)}", title=band.name,
+            y_label=with_unit(band.name.rpartition(".")[2], band.unit),
+            time=floats(band.time), nominal=floats(band.nominal), median=floats(median), low=floats(low),
+            high=floats(high), lowest=floats(band.statistics.lowest), highest=floats(band.statistics.highest),
+            band_label=f"{NAMES[0]} to {NAMES[-1]}", worst_label=WORST[self.method],
+        )  # fmt: skip
 
 
 def goal_line(goal: str, reading: Reading) -> str:
@@ -53,98 +222,8 @@ def goal_line(goal: str, reading: Reading) -> str:
     return f"{goal}: {reading.value:.6g} {reading.unit}".rstrip() + " all parameters at nominal values"
 
 
-def statistics_headings() -> tuple[str, ...]:
-    """Of the columns of `statistics_row`."""
+def _statistics_heading() -> tuple[str, ...]:
     return ("mean", "deviation", *NAMES, "worst case")
-
-
-def statistics_row(found: Uncertainty, g: int) -> tuple[str, ...]:
-    """Of goal g, each with its error."""
-    s = found.statistics
-    pairs = [(s.mean[g], s.mean_error[g]), (s.deviation[g], s.deviation_error[g])]
-    pairs += list(zip(s.quantiles[:, g], s.quantile_errors[:, g], strict=True))
-    return (*(with_error(*pair) for pair in pairs), f"{s.lowest[g]:.5g} to {s.highest[g]:.5g}")
-
-
-def parts(found: Uncertainty, g: int) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
-    """Headings and rows of the keys' shares of the variance of goal g, the largest first; Sobol indices where known."""
-    rows = []
-    for k in ranked(found, g):
-        one = found.spreads[k]
-        cells = [f"{100.0 * found.shares[g, k]:.1f} %"]
-        if i := found.indices:
-            cells = [with_error(i.first[g, k], i.first_error[g, k]), with_error(i.total[g, k], i.total_error[g, k])]
-        rows.append((".".join(one.key), one.text.partition("=")[2], *cells))
-    return ("key", "spread", *(("alone", "with others") if found.indices else ("share of the variance",))), rows
-
-
-def ranked(found: Uncertainty, g: int) -> list[int]:
-    """Keys by number, the one that matters most for goal g first."""
-    by = found.indices.total[g] if found.indices else found.shares[g]
-    return [int(k) for k in np.argsort(-np.nan_to_num(by), kind="stable")]
-
-
-BAND_HEADINGS = ("history", "unit", "deviation, at most", "at t = (s)", "widest 5 % to 95 %", "at t = (s)")
-
-
-def band_rows(found: Uncertainty) -> Iterator[tuple[str, ...]]:
-    """Where each history is least sure."""
-    for band in found.bands:
-        width = band.statistics.quantiles[-1] - band.statistics.quantiles[0]
-        cells: list[str] = []
-        for values in (band.statistics.deviation, width):
-            k = int(np.argmax(values))
-            cells += [f"{values[k]:.4g}", f"{band.time[k]:g}"]
-        yield (band.name, band.unit, *cells)
-
-
-def remarks(found: Uncertainty) -> Iterator[str]:
-    """What there is to mind, and how it was found."""
-    deviations = found.statistics.deviation
-    for goal, reading, explained, deviation in zip(
-        found.goals, found.readings, found.explained, deviations, strict=True
-    ):
-        if deviation <= ROUNDING * abs(reading.value):
-            yield f"note       {goal}: {UNCHANGED}"
-        if explained < LINEAR and found.indices is None:
-            yield (
-                f"note       {goal}: a linear function of the keys makes {100.0 * explained:.0f} % of the variance:"
-                " --indices computes the effect of each, alone and with others"
-            )
-    yield from (f"note       {text}" for text in found.notes)
-    if failed := len(found.failures):
-        yield f"failed     {failed} of {found.runs} runs, left out: {found.failures[0]}"
-    how = (
-        "± the standard error of as many independent samples: the mean of a Latin hypercube is better; worst case:"
-        " the lowest and the highest sample"
-    )
-    if found.method == "gradients":
-        how = (
-            "linear between runs one standard deviation to both sides; ± the difference that curvature makes; worst"
-            " case: all keys at the worse ends of their spreads, normal ones two deviations off"
-        )
-    yield f"how        {found.runs} runs; {how}"
-
-
-def _goal_columns(found: Uncertainty) -> list[str]:
-    keys = [".".join(one.key) for one in found.spreads]
-    parts = [f"share {key}" for key in keys]
-    if found.indices:
-        parts += [f"{word} {key}" for word in ("first", "first_error", "total", "total_error") for key in keys]
-    return ["goal", "unit", "middle", *_columns(), "linear", *parts]
-
-
-def _goal_rows(found: Uncertainty) -> Iterator[list[object]]:
-    for g, (goal, reading) in enumerate(zip(found.goals, found.readings, strict=True)):
-        parts = list(found.shares[g])
-        if i := found.indices:
-            parts += [*i.first[g], *i.first_error[g], *i.total[g], *i.total_error[g]]
-        yield [goal, reading.unit, reading.value, *_numbers(found.statistics, g), found.explained[g], *parts]
-
-
-def _band_rows(band: Band) -> Iterator[list[object]]:
-    for k, t in enumerate(band.time):
-        yield [t, band.nominal[k], *_numbers(band.statistics, k)]
 
 
 def _columns() -> list[str]:
@@ -163,14 +242,6 @@ def _numbers(s: Statistics, k: int) -> list[float]:
     pairs: list[Array] = [s.mean, s.mean_error, s.deviation, s.deviation_error]
     quantiles = zip(s.quantiles, s.quantile_errors, strict=True)
     return [float(one[k]) for one in (*pairs, *(value for pair in quantiles for value in pair), s.lowest, s.highest)]
-
-
-def _write(path: Path, columns: Sequence[str], rows: Iterator[list[object]]) -> None:
-    text = io.StringIO()
-    writer = TableWriter(text)
-    writer.writerow(columns)
-    writer.writerows(rows)
-    write_atomically(path, text.getvalue().encode(), "table of uncertainties", ours=True)
 
 
 def with_error(value: float, error: float) -> str:

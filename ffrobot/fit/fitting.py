@@ -11,7 +11,7 @@ import numpy as np
 
 from ..common.arrays import Array, as_floats
 from ..common.errors import FfrobotError, InputError
-from ..common.files import check_new_file, write_atomically
+from ..common.files import AnyPath, check_new_file, write_atomically
 from ..common.toml_files import load_toml
 from ..fe_models.link_records import MeasuredMode, paired, read_measured
 from .least_squares import Fit, fit_frequencies
@@ -40,15 +40,15 @@ class Target(Protocol):
 
 
 def fit_measured(
-    path: Path,
-    measured: Path,
+    file: AnyPath,
+    measured: AnyPath,
     vary: Sequence[str],
-    output: Path | None = None,
+    output: AnyPath | None = None,
     *,
     motors: Motors | None = None,
     force: bool = False,
 ) -> Fit:
-    """Fit keys of the link or scene file at `path` to the table `measured`, and write what was found to new files.
+    """Fit keys of a link or a scene file to measured natural frequencies: `ffrobot fit`. Writes new files.
 
     `vary` are keys with dots; "KEY=KEY" are changed by one factor. `motors` of a robot: "free" (the default) or "held".
     New files are beside the old ones, with names that end in `.fitted.toml`, or at `output`; they replace
@@ -58,10 +58,11 @@ def fit_measured(
         InputError: anything wrong with files or keys, parameters that frequencies cannot tell apart, a file in the way.
         SolveError: no convergence, or a model without frequencies.
     """
+    path, table, place = Path(file), Path(measured), None if output is None else Path(output)
     target = _target(path, motors)
     groups = [tuple(tuple(name.strip().split(".")) for name in text.split("=")) for text in vary]
     starts = {key: _start(path, target, key) for group in groups for key in group}
-    rows = [row for row in read_measured(measured, target.families) if row.frequency is not None]
+    rows = [row for row in read_measured(table, target.families) if row.frequency is not None]
 
     def changes(values: Array) -> dict[Key, float]:
         factors = values / np.array([starts[group[0]] for group in groups])
@@ -73,17 +74,17 @@ def fit_measured(
         except FfrobotError as error:
             at = ", ".join(f"{'.'.join(key)} = {value:.6g}" for key, value in changes(values).items())
             raise type(error)(f"with {at}:\n{error}") from None
-        return _of_rows(measured, rows, family, found)
+        return _of_rows(table, rows, family, found)
 
-    for new in target.files(starts, output):  # before any work is done
+    for new in target.files(starts, place):  # before any work is done
         check_new_file(new, replace=force)
     keys = ["=".join(".".join(key) for key in group) for group in groups]
     start = np.array([starts[group[0]] for group in groups])
     measured_at = np.array([row.frequency for row in rows], dtype=np.float64)
     found = fit_frequencies(
-        frequencies, keys, start, [row.label for row in rows], measured_at, _uncertainty(measured, rows)
+        frequencies, keys, start, [row.label for row in rows], measured_at, _uncertainty(table, rows)
     )
-    texts = target.files({key: float(f"{value:.{DIGITS}g}") for key, value in changes(found.value).items()}, output)
+    texts = target.files({key: float(f"{value:.{DIGITS}g}") for key, value in changes(found.value).items()}, place)
     for new, text in texts.items():
         write_atomically(new, text.encode(), "fitted file")
     return replace(found, files=tuple(map(str, texts)))

@@ -8,7 +8,6 @@ import tomli_w
 from small_robots import BEAM, CANTILEVER, FORCE, RHO, E, L
 
 import ffrobot
-from ffrobot.design.studies import study_of
 
 WIDTH = BEAM["geometry"]["section"]["width"]
 HEIGHT = "links.beam.geometry.section.height=0.01:0.04:log"
@@ -36,7 +35,7 @@ def test_mass_against_deflection_is_a_power_law(scene):
         assert one.price == pytest.approx(-one.goal / (3.0 * one.against), rel=1e-4)
     assert all(one.converged and one.feasible for one in found.points)
     assert found.units == ("kg", "m")
-    curve, designs = study_of(found).diagrams
+    curve, designs = found.study().diagrams
     np.testing.assert_allclose([curve.x, curve.y], [tip, mass], rtol=1e-14)
     axes = {axis.label: axis.values for axis in designs.axes}
     assert list(axes) == [HEIGHT.partition("=")[0], "mass (kg)", f"{TIP} (m)"]

@@ -8,13 +8,12 @@ import tomli_w
 from small_robots import SWING
 
 import ffrobot
-from ffrobot.design.designs import Designs
+from ffrobot.design.designs import Designs, Runs
 from ffrobot.design.evaluations import Evaluations
 from ffrobot.design.problem import read_problem
 from ffrobot.design.scenes import changes_for
 from ffrobot.design.slopes import Differentiation
 from ffrobot.design.variables import read_space
-from ffrobot.run.watcher import Watcher
 
 OUTER, LOAD = "links.arm.geometry.section.outer", "payload.0.mass"
 GOALS = ("rms joints.shoulder.moment", "rms points.arm.tip.deflection")
@@ -27,7 +26,7 @@ def differentiation(tmp_path, scene):
     problem = read_problem(GOALS[0], None, [f"{GOALS[1]} <= 1"])
     space = read_space(path, [f"{OUTER}=0.018:0.03", f"{LOAD}=0.1:1:log"])
     fixed = changes_for(path, problem.goals, 1e-7, keep_steps=True)
-    designs = Designs(path, space.keys, space.own, tmp_path / "runs", fixed, processes=2, watcher=Watcher())
+    designs = Designs(Runs(path, tmp_path / "runs", processes=2), space.keys, space.own, fixed)
     evaluations = Evaluations(designs, space, problem, 100)
     (first,) = evaluations.at([tuple(float(u) for u in space.start())])
     found = Differentiation(path, evaluations, 1e-7)

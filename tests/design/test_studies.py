@@ -8,7 +8,6 @@ import tomli_w
 from small_robots import SWING
 
 import ffrobot
-from ffrobot.design.studies import study_of
 from ffrobot.pictures.studies.diagrams import Axis, Band, Bars, Parallel, Points, Progress, axis_of_goal, wrapped
 from ffrobot.pictures.studies.study import read_study, study_files
 
@@ -65,7 +64,7 @@ def test_labels_break_at_dots_and_blanks():
 
 def test_all_designs_of_a_search(searched):
     """Each as what it is; the line of a failed one ends where its goals would begin."""
-    study = study_of(searched)
+    study = searched.study()
     assert study.good
     parallel, progress = diagrams(study)["designs"], diagrams(study)["convergence"]
     assert isinstance(parallel, Parallel)
@@ -116,7 +115,7 @@ def test_files_of_a_command(ffrobot, scene, tmp_path):
 def test_tornado_bands_and_screening(scene, tmp_path):
     """From Python: `write_study` writes what the commands do."""
     matters = ffrobot.sensitivity(scene, ["mass"], [OUTER, INNER], processes=2)
-    (tornado,) = study_of(matters).diagrams
+    (tornado,) = matters.study().diagrams
     assert isinstance(tornado, Bars)
     assert tornado.labels == (OUTER, INNER)
     np.testing.assert_allclose(tornado.series[0].values, [2.0 / 0.36, -2.0 * 0.64 / 0.36], rtol=1e-6)
@@ -124,7 +123,7 @@ def test_tornado_bands_and_screening(scene, tmp_path):
         scene, ["mass", "joints.shoulder.moment"], ["payload.0.mass=±5%", f"{DENSITY}=normal:1%"], by="gradients",
         processes=2,
     )  # fmt: skip
-    study = study_of(sure)
+    study = sure.study()
     band = diagrams(study)["band_joints_shoulder_moment"]
     assert isinstance(band, Band)
     for low, inner_low, middle, inner_high, high in zip(
@@ -134,7 +133,7 @@ def test_tornado_bands_and_screening(scene, tmp_path):
     deviations = np.array(sure.bands[0].statistics.deviation)
     assert np.all(np.array(band.highest) - band.nominal <= 2.0 * np.sqrt(2.0) * deviations)
     screened = ffrobot.screening(scene, ["mass"], [f"{OUTER}=±1%", f"{INNER}=±1%"], trajectories=2, processes=2)
-    (points,) = study_of(screened).diagrams
+    (points,) = screened.study().diagrams
     assert isinstance(points, Points)
     assert points.labels[0] == OUTER
     written = [path.name for found in (matters, sure, screened) for path in ffrobot.write_study(found, tmp_path)]

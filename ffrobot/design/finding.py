@@ -1,0 +1,166 @@
+"""What the design commands find, whatever it is: printed, written as tables and drawn in one way."""
+
+from __future__ import annotations
+
+import io
+import re
+from abc import ABC, abstractmethod
+from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
+from typing import ClassVar, NamedTuple
+
+import numpy as np
+from rich.console import Console
+
+from ..common.files import write_atomically
+from ..common.tables import TableWriter
+from ..common.toml_files import load_toml
+from ..common.version import program_version
+from ..pictures.studies.diagrams import Diagram, Numbers
+from ..pictures.studies.study import Study, StudyName, StudyTable, write_study
+from ..present.tables import print_table
+
+
+class Section(NamedTuple):
+    """A table of text: in print below a `line`; on the page of a report its heading begins with `of`."""
+
+    heading: Sequence[str]
+    rows: Iterable[Sequence[str]]
+    line: str = ""
+    of: str = ""
+
+    def for_report(self) -> StudyTable:
+        """As the file of a study has it."""
+        first, *others = self.heading
+        heading = (f"{self.of}: {first}" if self.of else first, *others)
+        return StudyTable(heading=heading, rows=tuple(map(tuple, self.rows)))
+
+
+class CsvFile(NamedTuple):
+    """A table of numbers: the file's name, what messages call it, columns, rows."""
+
+    name: str
+    what: str
+    columns: Sequence[str]
+    rows: Iterable[Sequence[object]]
+
+
+class Finding(ABC):
+    """What one command has found of the scene file `scene`."""
+
+    scene: Path
+    name: ClassVar[StudyName]
+    title: ClassVar[str]
+
+    @property
+    def shortfall(self) -> str:
+        """Why it is not what was asked for; empty where it is."""
+        return ""
+
+    @property
+    def good(self) -> bool | None:
+        """Whether it is what was asked for; None where that is no question."""
+        return None
+
+    @abstractmethod
+    def headline(self) -> str:
+        """The answer in one line."""
+
+    @abstractmethod
+    def sections(self) -> Iterator[Section]:
+        """Tables of text."""
+
+    @abstractmethod
+    def remarks(self) -> Iterator[str]:
+        """What to mind, and how it was found."""
+
+    @abstractmethod
+    def csv_files(self) -> Iterator[CsvFile]:
+        """Tables with all numbers."""
+
+    @abstractmethod
+    def diagrams(self) -> Sequence[Diagram]:
+        """Its pictures."""
+
+    def report_tables(self) -> Iterator[StudyTable]:
+        """Tables of text for the page of a report."""
+        return (section.for_report() for section in self.sections())
+
+    def print(self, console: Console) -> None:
+        """Tables of text, then what to mind."""
+        for section in self.sections():
+            if section.line:
+                _say(console, section.line)
+            print_table(console, section.heading, section.rows)
+        for line in self.remarks():
+            _say(console, line)
+
+    def __str__(self) -> str:
+        console = Console(file=io.StringIO(), width=120)
+        self.print(console)
+        assert isinstance(console.file, io.StringIO)
+        return console.file.getvalue()
+
+    def write_tables(self, folder: Path) -> Iterator[Path]:
+        """Write the tables with all numbers; the files one after the other."""
+        for file in self.csv_files():
+            text = io.StringIO()
+            writer = TableWriter(text)
+            writer.writerow(file.columns)
+            writer.writerows(file.rows)
+            write_atomically(folder / file.name, text.getvalue().encode(), file.what, ours=True)
+            yield folder / file.name
+
+    def study(self) -> Study:
+        """Words, tables and diagrams."""
+        facts = tuple(_fact(line) for line in self.remarks() if line)
+        return Study(
+            ffrobot_version=program_version(), name=self.name, title=self.title, scene=str(self.scene),
+            scene_name=str(load_toml(self.scene, "scene").get("name", self.scene.stem)), headline=self.headline(),
+            good=self.good, facts=facts, tables=tuple(self.report_tables()), diagrams=tuple(self.diagrams()),
+        )  # fmt: skip
+
+    def write_study(self, folder: Path, *, figures: bool) -> Iterator[Path]:
+        """Write the file for the report, and the diagrams as figures; the files one after the other."""
+        study = self.study()
+        yield write_study(study, folder)
+        if figures:
+            from ..pictures.studies.figures import write_diagrams
+
+            yield from write_diagrams(study.diagrams, folder)
+
+
+def numbers(values: Iterable[float]) -> Numbers:
+    """None for what is not finite."""
+    return tuple(float(value) if np.isfinite(value) else None for value in values)
+
+
+def floats(values: Iterable[float]) -> tuple[float, ...]:
+    """Python's own numbers; 0 for what is not finite."""
+    return tuple(float(value) if np.isfinite(value) else 0.0 for value in values)
+
+
+def with_unit(text: str, unit: str) -> str:
+    """`mass (kg)`."""
+    return f"{text} ({unit})" if unit else text
+
+
+def file_name(text: str) -> str:
+    """Of a goal or a history, without what file names do not take."""
+    return re.sub(r"\W+", "_", text).strip("_")
+
+
+def failed_runs(failures: Sequence[str], runs: int) -> Iterator[str]:
+    """A line about runs that failed, if any did."""
+    if failures:
+        yield f"failed     {len(failures)} of {runs} runs, left out: {failures[0]}"
+
+
+def _say(console: Console, line: str) -> None:
+    console.print(line, soft_wrap=True, markup=False, highlight=False)
+
+
+def _fact(line: str) -> str:
+    """`price      text` of the terminal as `price: text`."""
+    word, blanks, text = line.strip().partition("  ")
+    return f"{word}: {text.strip()}" if blanks else word

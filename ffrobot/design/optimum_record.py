@@ -1,0 +1,276 @@
+"""The best design as it was found: values, limits that are reached with their prices, files, the text of it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ..common.arrays import Array, as_floats
+from ..pictures.studies.diagrams import Diagram
+from ..pictures.studies.study import StudyTable
+from ..results.verdict import Verdict
+from .evaluations import Evaluated
+from .finding import CsvFile, Finding, Section
+from .local_search import Local
+from .optimality import Conflict, Optimality
+from .problem import KEPT, Problem
+from .readings import Reading
+from .searched_diagrams import parallel, progress, states_of
+from .steps import AIM
+from .variables import Space
+
+SHARE = 0.01  # of a limit: the room that prices are told for
+COLUMNS = ("what", "name", "start", "best", "low", "high", "reached", "price")
+
+
+@dataclass(frozen=True)
+class Optimum(Finding):
+    """What a search has found.
+
+    Attributes:
+        scene: its file. `problem`, `space`: what was asked for.
+        method: the optimiser; `message`: why it ended where that was not at an optimum.
+        start, best: designs; of the search that has found the best one. `searches`: all of them.
+        optimality: how the best one stands; None without gradients.
+        conflict: limits that no design near the best one keeps together; None where it keeps all, or that is not known.
+        runs: in all; `failures` of them in words. `tolerance`: of the runs, at most.
+        verdict: of the best design.
+        best_scene: the scene file of the best design, whole; None where it was not kept.
+        designs: the table of all designs with their goals; None likewise.
+        tried: these designs, in the order of the search.
+    """
+
+    name = "optimum"
+    title = "The best design"
+
+    scene: Path
+    problem: Problem
+    space: Space
+    method: str
+    start: Evaluated
+    best: Evaluated
+    optimality: Optimality | None
+    conflict: Conflict | None
+    message: str
+    searches: tuple[Local, ...]
+    runs: int
+    failures: tuple[str, ...]
+    tolerance: float
+    verdict: Verdict
+    best_scene: Path | None
+    designs: Path | None
+    tried: tuple[Evaluated, ...]
+
+    @property
+    def keys(self) -> tuple[str, ...]:
+        """With dots."""
+        return tuple(map(".".join, self.space.keys))
+
+    @property
+    def values(self) -> tuple[object, ...]:
+        """Of the keys, in the best design."""
+        return self.space.point(self.best.place)
+
+    @property
+    def value(self) -> float:
+        """Of the goal that is least or largest."""
+        return self.best.readings[0].value
+
+    @property
+    def limits(self) -> Array:
+        """(m) values of the goals that are limited."""
+        return np.array([reading.value for reading in self.best.readings[1:]])
+
+    @property
+    def violation(self) -> float:
+        """The largest excess of a limit, of the limit; up to 1e-6 the design is `feasible`."""
+        return self.problem.violation(self.best.readings)
+
+    @property
+    def feasible(self) -> bool:
+        """Whether the best design keeps all limits."""
+        return self.violation <= KEPT
+
+    @property
+    def converged(self) -> bool:
+        """Whether gradients say that nothing better is near."""
+        return self.optimality is not None and self.optimality.reached(AIM)
+
+    @property
+    def prices(self) -> Array:
+        """(m) ∂goal/∂limit: the change of the best value for one unit more of each limit; NaN of those not reached."""
+        if self.optimality is None:
+            return np.full(len(self.problem.limits), np.nan)
+        room = np.array([limit.sense / limit.scale for limit in self.problem.limits])
+        return as_floats(-self.optimality.limits * room / self.problem.factors(self.best.values)[0])
+
+    @property
+    def bound_prices(self) -> Array:
+        """(n) ∂goal/∂bound likewise, of the bounds that numbers are at."""
+        if self.optimality is None:
+            return np.full(len(self.space.variables), np.nan)
+        found = -self.optimality.bounds / self.problem.factors(self.best.values)[0]
+        pairs = zip(self.space.variables, self.best.place, strict=True)
+        return np.array(found / [np.nan if variable.is_catalogue else variable.slope(u) for variable, u in pairs])
+
+    @property
+    def good(self) -> bool:
+        """Whether it keeps all limits."""
+        return self.feasible
+
+    @property
+    def shortfall(self) -> str:
+        """That it does not."""
+        return "" if self.feasible else "no design found that keeps all limits: see the table of limits"
+
+    def sections(self) -> Iterator[Section]:
+        """Keys and limits, at the start and in the best design."""
+        yield Section(("key", "start", "best", "bounds"), self._key_rows(), line=self.headline())
+        if self.problem.limits:
+            yield Section(("limit", "start", "best", ""), [row[:4] for row in self._limit_rows()])
+
+    def report_tables(self) -> Iterator[StudyTable]:
+        """With prices of limits."""
+        keys, *limits = self.sections()
+        yield keys.for_report()
+        if limits:
+            heading = ("limit", "start", "best", "", "shadow price: objective per unit of the limit")
+            yield Section(heading, self._limit_rows()).for_report()
+
+    def headline(self) -> str:
+        """The best value and what it saves, or that no design keeps all limits."""
+        word = "least" if self.problem.sense > 0 else "largest"
+        text = f"{word} {self.problem.objective.text}: {_value(self.best.readings[0])}"
+        if self.start.completed and (own := self.start.values[0]):
+            text += f", {100 * (self.value - own) / abs(own):+.4g} % of the start's {own:.6g}"
+        return text if self.feasible else f"no design found that keeps all limits; nearest is one with {text}"
+
+    def remarks(self) -> Iterator[str]:
+        """Prices of limits and bounds in words, what to mind, and how the design was found."""
+        yield from (f"price      {text}" for text in self._prices_in_words())
+        if self.optimality is not None:
+            yield from (f"note       {text}" for text in self.optimality.kinks)
+        if self.message:
+            yield f"note       {self.message}"
+        if len(self.searches) > 1:
+            yield f"starts     {self._starts()}"
+        if failed := len(self.failures):
+            yield f"failed     {failed} of {self.runs} runs, passed over: {self.failures[0]}"
+        runs = f"{self.runs} runs with a tolerance of at most {self.tolerance:g}"
+        yield f"how        {self.method}, {runs}; {self._standing()}"
+        yield ""
+        yield from self.verdict.lines()
+
+    def _prices_in_words(self) -> Iterator[str]:
+        """What a little more room saves, for each limit and bound that is reached."""
+        if not self.feasible:
+            return
+        for limit, price in zip(self.problem.limits, self.prices, strict=True):
+            if np.isfinite(price):
+                unit = self.best.readings[1 + self.problem.limits.index(limit)].unit
+                room = limit.sense * SHARE * limit.scale
+                yield f"{limit.goal.text}: {self._trade(limit.bound, room, price, unit)}"
+        for variable, price, u in zip(self.space.variables, self.bound_prices, self.best.place, strict=True):
+            if np.isfinite(price):
+                bound = variable.low if u < 0.5 else variable.high
+                room = (-1.0 if u < 0.5 else 1.0) * SHARE * (abs(bound) or variable.high - variable.low)
+                yield f"{variable.name}: {self._trade(bound, room, price, '')}"
+
+    def write_tables(self, folder: Path) -> Iterator[Path]:
+        """Next to the scene of the best design and the table of all, which the search has written."""
+        yield from (path for path in (self.best_scene, self.designs) if path is not None)
+        yield from super().write_tables(folder)
+
+    def csv_files(self) -> Iterator[CsvFile]:
+        """Goal, keys and limits with their prices, one line each."""
+        yield CsvFile("optimum.csv", "table of the optimum", COLUMNS, self._numbers())
+
+    def _numbers(self) -> Iterator[list[object]]:
+        problem, starts = self.problem, self.start.values or (np.nan,) * len(self.best.values)
+        yield ["goal", problem.objective.text, starts[0], self.value, "", "", "", ""]
+        for variable, price in zip(self.space.variables, self.bound_prices, strict=True):
+            bounds = ("", "") if variable.is_catalogue else (variable.low, variable.high)
+            for key in variable.keys:
+                k = self.space.keys.index(key)
+                start = self.space.point(self.start.place)[k]
+                yield ["key", self.keys[k], start, self.values[k], *bounds, *_reached(price)]
+        for k, (limit, price) in enumerate(zip(problem.limits, self.prices, strict=True)):
+            within = ("", limit.bound) if limit.sense > 0 else (limit.bound, "")
+            yield ["limit", limit.goal.text, starts[k + 1], self.limits[k], *within, *_reached(price)]
+
+    def diagrams(self) -> list[Diagram]:
+        """All designs, and how the search went."""
+        problem = self.problem
+        states = states_of(problem, self.tried, [self.best])
+        goals = [(problem.objective.text, None), *((limit.goal.text, limit) for limit in problem.limits)]
+        best = "best" if self.feasible else "nearest"
+        return [parallel(self.space, goals, self.tried, states, best), progress(problem, self.tried, states)]
+
+    def _key_rows(self) -> Iterator[tuple[str, str, str, str]]:
+        """Of each key its name, where the search began, its best value, and its bounds."""
+        start, best = self.space.point(self.start.place), self.values
+        for variable in self.space.variables:
+            for key in variable.keys:
+                k = self.space.keys.index(key)
+                bounds = (
+                    f"{len(variable.rows)} rows" if variable.is_catalogue else f"{variable.low:g} to {variable.high:g}"
+                )
+                yield self.keys[k], _number(start[k]), _number(best[k]), bounds
+
+    def _limit_rows(self) -> Iterator[tuple[str, str, str, str, str]]:
+        """Of each limit its text, the goal at first and in the best design, whether it is reached, its price."""
+        for k, (limit, price) in enumerate(zip(self.problem.limits, self.prices, strict=True)):
+            cost = f"{price:.4g}" if np.isfinite(price) else ""
+            yield limit.text, _at(self.start, k + 1), _at(self.best, k + 1), self._state(k), cost
+
+    def _state(self, k: int) -> str:
+        limit, value = self.problem.limits[k], self.limits[k]
+        excess = limit.sense * (value - limit.bound) / limit.scale
+        if excess > KEPT:
+            return f"exceeded by {100 * excess:.3g} %"
+        return "active" if self.optimality is not None and np.isfinite(self.optimality.limits[k]) else "satisfied"
+
+    def _trade(self, bound: float, room: float, price: float, unit: str) -> str:
+        """`20.2 N in place of 20 saves 0.012 kg (0.5 %)`."""
+        gained = abs(price * room)
+        verb = "saves" if self.problem.sense > 0 else "gains"
+        of = f" {self.best.readings[0].unit}".rstrip()
+        share = f" ({100 * gained / abs(self.value):.3g} %)" if self.value else ""
+        return f"{bound + room:.6g}{f' {unit}' if unit else ''} instead of {bound:g} {verb} {gained:.4g}{of}{share}"
+
+    def _starts(self) -> str:
+        """How many of the searches end at the best design."""
+        ends = [one.best.values[0] for one in self.searches if one.best.completed]
+        near = sum(abs(end - self.value) <= AIM * abs(self.value) for end in ends)
+        worst = max((self.problem.sense * end for end in ends), default=np.nan) * self.problem.sense
+        return f"{near} of {len(self.searches)} end at this value, within {AIM:g}; the worst at {worst:.6g}"
+
+    def _standing(self) -> str:
+        """How near to an optimum it is."""
+        if self.optimality is None:
+            return "the best of the designs that were tried"
+        stands = self.optimality
+        return (
+            f"{'converged' if self.converged else 'not converged'}: the gradient of the Lagrangian is"
+            f" {stands.residual:.1g} of the objective over the range of a parameter,"
+            f" known to {stands.gradient_error:.1g}"
+        )
+
+
+def _reached(price: float) -> tuple[str, object]:
+    return ("yes", price) if np.isfinite(price) else ("no", "")
+
+
+def _at(design: Evaluated, k: int) -> str:
+    return _value(design.readings[k]) if design.completed else "failed"
+
+
+def _value(reading: Reading) -> str:
+    return f"{reading.value:.6g}{' ' if reading.unit else ''}{reading.unit}"
+
+
+def _number(value: object) -> str:
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
