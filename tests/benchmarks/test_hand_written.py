@@ -1,4 +1,4 @@
-"""The general core against the two-link case written by hand (hand_written/two_link.cpp), in one run on one core.
+"""The general core against the two-link case written by hand (tools/bench/hand_written.cpp), in one run on one core.
 
     .venv/bin/python -m pytest tests/benchmarks/test_hand_written.py --benchmark-enable -s
 
@@ -62,7 +62,7 @@ def test_both_compute_the_same(two_link, program):
 
 
 def test_without_the_source_tree_it_says_what_is_missing(two_link, tmp_path):
-    with pytest.raises(InputError, match=r"expected ffrobot's source tree, found no tests/benchmarks/hand_written"):
+    with pytest.raises(InputError, match=r"expected ffrobot's source tree, found no tools/bench/hand_written"):
         HandWritten(tmp_path, two_link, tmp_path)
 
 

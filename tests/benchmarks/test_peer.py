@@ -11,7 +11,7 @@ import pytest
 pytest.importorskip("exudyn")
 
 ROOT = Path(__file__).parents[2]
-SCRIPT = ROOT / "tests" / "benchmarks" / "peers" / "exudyn_two_link.py"
+SCRIPT = ROOT / "tools" / "bench" / "peers" / "exudyn_two_link.py"
 
 
 @pytest.fixture(scope="module")

@@ -1,4 +1,4 @@
-"""The parts of `ffrobot bench` that need ffrobot's source tree: they compile and run files of tests/benchmarks.
+"""The parts of `ffrobot bench` that need ffrobot's source tree: they compile and run programs next to it.
 
 evaluation   time of one evaluation of the equations
 evaluations  of several mechanisms in 2D and 3D, beside the two-link case written by hand

@@ -1,4 +1,4 @@
-"""The two-link case written by hand (tests/benchmarks/hand_written/two_link.cpp), compiled; needs the source tree."""
+"""The two-link case written by hand (tools/bench/hand_written.cpp), compiled; needs the source tree."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from ffrobot.mbs.solve.start import undeformed_posture
 
 from .evaluation import State
 
-SOURCE = Path("tests/benchmarks/hand_written/two_link.cpp")
+SOURCE = Path("tools/bench/hand_written.cpp")
 FLAGS = ("-std=c++20", "-O3", "-march=native", "-fno-math-errno", "-fno-trapping-math")
 STEPS = 30_000  # of DOP853 over the second: λ within 5e-5 of its peak (tests/benchmarks/test_hand_written.py)
 TIME = 0.3  # s, at which both evaluate

@@ -1,4 +1,4 @@
-"""EXUDYN on the two-link case with our modal bodies (tests/benchmarks/peers/exudyn_two_link.py): error and time."""
+"""EXUDYN on the two-link case with our modal bodies (tools/bench/peers/exudyn_two_link.py): error and time."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from ffrobot.common.errors import InputError, SolveError
 from ffrobot.run.watcher import Watcher
 from ffrobot.scene.scene import Scene
 
-SCRIPT = Path("tests/benchmarks/peers/exudyn_two_link.py")
+SCRIPT = Path("tools/bench/peers/exudyn_two_link.py")
 NAME = "EXUDYN generalized-alpha"
 STEPS, GRAVITY = (1e-4, 1e-5, 3.125e-6), ("full", "native")
 FORCE, DEFLECTION = "trajectories/tip/force", "points/link2.tip/deflection"

@@ -1,6 +1,6 @@
 """Speed of compiled cores: the one of this environment, tuned for this machine, and the two that a wheel holds.
 
-    .venv/bin/python tests/benchmarks/compare_cores.py WHEEL [--repeat 5]
+    .venv/bin/python tools/bench/compare_cores.py WHEEL [--repeat 5]
 
 An arm of two links of 3, 8 and 16 modes by DOP853 and by Radau IIA; all cores in turn. Printed are ratios of the
 shortest processor times to those of this environment. scripts/build_wheel.sh builds a wheel.
@@ -32,7 +32,7 @@ for line in sys.stdin:
     seconds = time.process_time() - before
     print(json.dumps([seconds, statistics.evaluations, _core.build]), flush=True)
 """
-HELPERS = Path(__file__).parents[1] / "mbs"
+HELPERS = Path(__file__).parents[2] / "tests" / "mbs"
 
 
 def started(core, folder):

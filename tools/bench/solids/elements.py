@@ -1,6 +1,6 @@
 """Accuracy against cost of solid elements: the paper's bar, clamped at its root, 20 modes.
 
-    .venv/bin/python tests/benchmarks/solids/elements.py [--repeat 3]
+    .venv/bin/python tools/bench/solids/elements.py [--repeat 3]
 
 Error: largest relative error of the first five in-plane bending frequencies, against cubic tetrahedra on a fine mesh
 (graded by nothing: the clamp's singularity leaves about 0.01 % unresolved). Time: assembly, factorisation and

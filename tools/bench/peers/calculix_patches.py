@@ -1,7 +1,7 @@
 """Patches on a cantilever: ffrobot against CalculiX (solid elements) and the exact composite beam.
 
     apt install calculix-ccx
-    python tests/benchmarks/peers/calculix_patches.py
+    python tools/bench/peers/calculix_patches.py
 
 A strip of aluminium (0.3 m × 20 mm) under a volt's free strain d31/t_p along x in patches of 60 × 0.5 mm, ν = 0: in
 CalculiX thermal strain in elements C3D20R with an orthotropic coefficient of expansion. Prints tip deflections in µm.

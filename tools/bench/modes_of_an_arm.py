@@ -1,6 +1,6 @@
 """How many modes an arm needs: joint moments and the tip with default modes, and others, against all 80 of the mesh.
 
-    python tests/benchmarks/modes_of_an_arm.py [--payload 2] [--repeat 5]
+    python tools/bench/modes_of_an_arm.py [--payload 2] [--repeat 5]
 
 Two steel links (1 m, 15 x 25 mm, undamped, the first simply supported, the second a cantilever), a payload, both joints
 on quintics, from equilibrium under gravity. Reference: all 80 eigenmodes that 40 elements have, of which five are kept

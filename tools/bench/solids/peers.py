@@ -1,6 +1,6 @@
 """Stage 1 of a solid link against its peers, on the same mesh: run time and memory of whole processes.
 
-    .venv/bin/python tests/benchmarks/solids/peers.py [--sizes 0.012 0.006 …] [--order 2] [--repeat 3]
+    .venv/bin/python tools/bench/solids/peers.py [--sizes 0.012 0.006 …] [--order 2] [--repeat 3]
 
 * ffrobot: `ffrobot link`, everything that a modal body file holds;
 * dolfinx: raw_dolfinx.py, 20 frequencies and nothing else;

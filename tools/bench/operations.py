@@ -1,6 +1,6 @@
 """Operations and memory traffic of one evaluation: the general core and the two-link case written by hand.
 
-    .venv/bin/python tests/benchmarks/operations.py
+    .venv/bin/python tools/bench/operations.py
 
 counts them with valgrind (lackey and callgrind), which has to be installed, in builds for AVX2, which is what valgrind
 knows: the difference of runs of 3 000 and of 1 000 evaluations. Some minutes.
