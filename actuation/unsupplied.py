@@ -28,6 +28,7 @@ class Unsupplied:
         at_start: m, likewise at the first output: what the links sag by.
         moments_repeated: m, likewise where they repeat the moments that were found: the first vibration. The robot
             drifts away from there, which no quasi-static estimate knows.
+        growth: 1/s, of deviations under these moments (`open_loop_growth`); 0 where none grows, nan if unknown.
         families: in 3D, of each body, those of the modes concerned, in words.
         deflection: in 3D, m, of each, the largest of a point by Φ K⁻¹ r, quasi-static, the link held as its modes are.
         rotation: in 3D, rad, likewise, of a section.
@@ -39,9 +40,15 @@ class Unsupplied:
     angles_kept: float = 0.0
     at_start: float = 0.0
     moments_repeated: float = 0.0
+    growth: float = 0.0
     families: tuple[str, ...] = ()
     deflection: tuple[float, ...] = ()
     rotation: tuple[float, ...] = ()
+
+    @property
+    def drift(self) -> str:
+        """What becomes of the error where the motors repeat their moments, in words."""
+        return f"unstable (growth rate {self.growth:.2g} 1/s)" if self.growth > 0.0 else "drifting"
 
     @property
     def in_words(self) -> str:
@@ -56,7 +63,7 @@ class Unsupplied:
         of_point = (
             f" With {'patches within their limits' if self.with_patches else 'motors only'}, {self.point} is off its"
             f" path by {_length(self.angles_kept)} if joints are position-controlled on the computed angles"
-            f" ({_length(self.at_start)} at the start), and by {_length(self.moments_repeated)} and drifting if the"
+            f" ({_length(self.at_start)} at the start), and by {_length(self.moments_repeated)} and {self.drift} if the"
             ' computed torques are applied open loop. kind = "motors-only" finds torques that follow the path'
         )
         return f"no actuator provides all modal forces required on {of_links}.{of_point if self.point else ''}"

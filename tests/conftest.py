@@ -53,7 +53,7 @@ class Command:
 
 @dataclass(frozen=True)
 class SolvedCase:
-    """A case of the repository after `ffrobot solve scene.toml`."""
+    """A case of the repository after `ffrobot solve scene.toml --verbose`."""
 
     folder: Path
     stdout: str
@@ -188,7 +188,7 @@ def solved(ffrobot, shared_folder, tmp_path_factory):
             if "link" in body:
                 link = scene.parent / body["link"]
                 link.write_text(edit_link(link.read_text(encoding="utf-8")), encoding="utf-8")
-        done = ffrobot("solve", "scene.toml", cwd=scene.parent, timeout=timeout)
+        done = ffrobot("solve", "scene.toml", "--verbose", cwd=scene.parent, timeout=timeout)
         assert done.returncode == 0, done.stderr
         file = h5py.File(scene.with_suffix(".results.h5"), "r")
         return SolvedCase(scene.parent, done.stdout, done.stderr, file)

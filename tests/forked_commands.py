@@ -20,7 +20,8 @@ from pathlib import Path
 LOADED = (
     "h5py", "scipy.linalg", "scipy.optimize", "scipy.interpolate", "matplotlib.backends.backend_agg",
     "ffrobot.cli", "ffrobot.run.solve", "ffrobot.run.inputs", "ffrobot.results.write", "ffrobot.results.resume",
-    "ffrobot.fe_models.link", "ffrobot.present.summary", "ffrobot.pictures.figures.plot", "ffrobot.pictures.report",
+    "ffrobot.fe_models.link", "ffrobot.present.details", "ffrobot.present.summary",
+    "ffrobot.pictures.figures.plot", "ffrobot.pictures.report",
 )  # fmt: skip
 BEFORE_LOADING = ("PYTHON", "OMP_", "OPENBLAS_", "LD_", "MPL")  # begin variables that are read as a process starts
 

@@ -141,7 +141,7 @@ def soft_pendulum(tmp_path_factory):
 
 
 def test_a_run_that_is_wrong_never_says_completed_alone(soft_pendulum, ffrobot):
-    done = ffrobot("solve", soft_pendulum)
+    done = ffrobot("solve", soft_pendulum, "--verbose")
     assert done.returncode == 0, done.stderr
     after_table = done.stdout.split("fall      forward")[1].splitlines()[1]
     assert after_table.startswith("warning")

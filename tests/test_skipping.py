@@ -145,7 +145,7 @@ def test_no_analysis_loads_finite_elements_or_plotting(folder):
     (folder / "scene.toml").write_text(arm(folder, "solid", body=body, analysis=analyses).text)
     code = f"""
 import sys
-sys.argv = ["ffrobot", "solve", {str(folder / "scene.toml")!r}]
+sys.argv = ["ffrobot", "solve", {str(folder / "scene.toml")!r}, "--verbose"]
 from ffrobot.cli import main
 main()
 print("loaded", [name for name in {FAR} if name in sys.modules])

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from ..present.logs import FILE, logging_options, python_option
+from ..present.logs import FILE, VERBOSE, logging_options, python_option
 from .protect import protect
 
 if TYPE_CHECKING:
@@ -32,8 +32,9 @@ if TYPE_CHECKING:
 def solve(scene_file: Path, output: Path | None, *, resume: bool, strict: bool) -> None:
     """Run the analyses of a scene (stage 2).
 
-    Stage 1 runs first for link files that are not up to date. Prints a summary: verdict, peaks and limits, steps,
-    constraint violation, errors, wall times.
+    Stage 1 runs first for link files that are not up to date. Prints a summary of at most fifteen lines: by analysis
+    the answer, tip error and deflection, by motor peaks, RMS and limits, warnings. With --verbose all else: steps,
+    constraint violation, voltages, stresses, zeros, errors, wall times.
 
     Ctrl-C keeps computed results; --resume continues from there, or from the start if there are none.
     """
@@ -51,9 +52,11 @@ def solve(scene_file: Path, output: Path | None, *, resume: bool, strict: bool) 
 def _solve(scene_file: Path, path: Path, again: str, *, resume: bool, strict: bool) -> None:
     """Solve, write and tell; `again` is the command that goes on with it."""
     from ..common.errors import SolveError, StoppedError
+    from ..present.accuracy import error_budget
+    from ..present.details import print_details
     from ..present.progress import Display
     from ..present.start_posture import chosen_posture
-    from ..present.summary import print_summary, summary_console
+    from ..present.summary import summary_console, summary_lines
     from ..results.file import Results
     from ..results.resume import resume_scene
     from ..results.stopped import how_to_go_on
@@ -61,7 +64,7 @@ def _solve(scene_file: Path, path: Path, again: str, *, resume: bool, strict: bo
     from ..run.solve import solve_scene
     from ..scene.plausibility import remarks_on_file
 
-    for remark in remarks_on_file(scene_file):  # first: they may be why the run fails
+    for remark in (remarks := remarks_on_file(scene_file)):  # first: they may be why the run fails
         click.echo(f"note       {remark}")
     writing, kept = 0.0, []
 
@@ -87,9 +90,15 @@ def _solve(scene_file: Path, path: Path, again: str, *, resume: bool, strict: bo
         return
     with Results(path) as results:
         verdict, posture = results.verdict, chosen_posture(results)
-    print_summary(solution, verdict, path, {**solution.seconds, "writing": writing}, summary_console())
-    if posture:
-        click.echo(f"note       {posture}")
+    console = summary_console()
+    if click.get_current_context().meta.get(VERBOSE):
+        print_details(solution, verdict, path, {**solution.seconds, "writing": writing}, console)
+        click.echo(f"note       {posture}" if posture else "", nl=bool(posture))
+    else:
+        notes = [*solution.path_notes, *([posture] if posture else [])]
+        accuracy = "; ".join(error_budget(solution))
+        lines = summary_lines(verdict, notes, accuracy, str(path), console.width, len(remarks))
+        click.echo("\n".join(lines))
     _check_ended(solution, display, scene_file, again)
     if strict:
         _check_without_warnings(solution, scene_file)

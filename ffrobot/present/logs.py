@@ -34,6 +34,9 @@ FILE = _FileName(path_type=Path)
 
 F = TypeVar("F", bound=Callable[..., object])
 
+VERBOSE = f"{__name__}.verbose"
+"""In the meta data of a click context whether `--verbose` is given."""
+
 LOGGER = logging.getLogger("ffrobot")
 LOGGER.addHandler(logging.NullHandler())
 
@@ -71,6 +74,7 @@ def logging_options(command: F) -> F:
 
 
 def _verbose(context: click.Context, parameter: click.Parameter, verbose: bool) -> None:
+    context.meta[VERBOSE] = verbose
     if verbose:
         handler = logging.StreamHandler()
         handler.addFilter(lambda record: record.levelno < logging.ERROR)  # the command prints its errors itself

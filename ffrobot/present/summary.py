@@ -1,29 +1,29 @@
-"""What a solve prints at its end."""
+"""What a solve prints at its end: the answer of every analysis, what motors have to do, warnings, on one screen."""
 
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator, Mapping
-from pathlib import Path
+from collections.abc import Iterable, Iterator, Sequence
+from textwrap import wrap
 
 import numpy as np
 from rich.console import Console
-from rich.table import Table
 
-from ..mbs.analysis.inverted_path import AroundPath, describe_zeros, is_minimum_phase
-from ..mbs.analysis.motors_only import path_errors
-from ..mbs.analysis.outcome import Details, Outcome
-from ..results.verdict import Verdict
-from ..run.solution import AnalysisResult, Solution
-from .accuracy import error_budget, integrated
-from .control import control_lines, control_tables
-from .lines import alike, integrator_lines, warning_lines
-from .modes import chosen_modes, pieces_in_words
-from .stresses import stress_table
-from .tables import plain_table
-from .voltages import voltage_table
+from ..actuation.motors import MotorFeasibility
+from ..results.verdict import AnalysisVerdict, Verdict
+from .lines import alike
 
 PLAIN_WIDTH = 120  # columns where the output is no terminal
+LINES = 15  # that a summary has at most
+MOTORS = 6  # rows of motors for which analyses make room
+TEXTS = 2  # lines of warnings and advice, likewise
+REST = "--verbose"
+SMALLEST = 1e-9  # m, N·m, rad/s, W: below it numbers are rounding
+
+ANALYSES = ("analysis", "kind", "answer", "tip error, controlled", "tip error, open loop", "deflection", "remark")
+MOTOR = ("motor", "peak", "RMS", "speed", "power", "of limits", "in")
+
+Row = tuple[str, ...]
 
 
 def summary_console() -> Console:
@@ -32,115 +32,153 @@ def summary_console() -> Console:
     return Console(width=width, markup=False, highlight=False, emoji=False)
 
 
-def print_summary(
-    solution: Solution, verdict: Verdict, path: Path, seconds: Mapping[str, float], console: Console
-) -> None:
-    """Tables of the analyses and what they found, wall time per stage, what was skipped, where the results are."""
-    console.print(_analyses(solution))
-    bending = {name: result.bending for name, result in solution.analyses.items()}
-    texts = {name: result.warnings for name, result in solution.analyses.items()}
-    for line in warning_lines(bending, texts):
-        console.print(f"warning    {line}")
-    for line in alike((name, text) for name, result in solution.analyses.items() for text in result.notes):
-        console.print(f"note       {line}")
-    for table in _tables(solution):
-        console.print()
-        console.print(table)
-    console.print()
-    for line in verdict.lines():
-        console.print(line)
-    for line in control_lines(_details(solution)):
-        console.print(line)
-    notes = Table.grid(padding=(0, 2))
-    for title, text in _notes(solution, seconds):
-        notes.add_row(title, text)
-    console.print()
-    console.print(notes)
-    console.print(f"results    {path}", soft_wrap=True)
+def summary_lines(
+    verdict: Verdict, notes: Sequence[str], accuracy: str, results: str, width: int, printed: int = 0
+) -> list[str]:
+    """At most `LINES` lines of `width` columns, less those that are `printed` already.
+
+    What has no room is counted, and left to `--verbose`. `notes` stand below warnings; `accuracy` and `results` (the
+    name of the file) come last.
+    """
+    texts = [*_texts(verdict), *_labelled("note", notes)]
+    motors, worst = list(_motors(verdict.analyses)), list(_worst_motors(verdict.analyses))
+    room = LINES - printed - 3 - bool(motors)  # without both headers, accuracy, results
+    analyses = _at_most([_analysis(one) for one in verdict.analyses], room - min(len(worst), MOTORS)
+                        - min(len(texts), TEXTS))  # fmt: skip
+    room -= len(analyses)
+    rows = motors if len(motors) + min(len(texts), TEXTS) <= room else worst
+    rows = _at_most(rows, max(MOTORS, room - len(texts)))
+    lines = _aligned([ANALYSES, *analyses]) + (_aligned([MOTOR, *rows]) if rows else [])
+    lines += _fitted(texts, room - len(rows), width)
+    lines += [f"accuracy   {accuracy}"]
+    return [_cut(line.rstrip(), width) for line in lines] + [f"results    {results}"]
 
 
-def _closest(solution: Solution) -> Iterator[tuple[str, AnalysisResult]]:
-    """The analyses by name, at outputs and between."""
-    yield from ((name, one.closer or one) for name, one in solution.analyses.items())
-
-
-def _details(solution: Solution) -> dict[str, Details]:
-    """What only kinds of analyses find, by analysis."""
-    return {name: result.run.details for name, result in solution.analyses.items()}
-
-
-def _tables(solution: Solution) -> Iterator[Table]:
-    """What was found of each kind, where there is any."""
-    voltages = voltage_table(
-        (name, layout, array, result.actuation.voltages[layout])
-        for name, result in _closest(solution)
-        if result.actuation is not None
-        for of_link in solution.patches.values()
-        for layout, array in of_link.arrays.items()
-    )
-    stresses = stress_table((name, one.run.time, one.stresses) for name, one in _closest(solution))
-    yield from (table for table in (voltages, stresses) if table.row_count)
-    yield from control_tables(_details(solution))
-
-
-def _notes(solution: Solution, seconds: Mapping[str, float]) -> Iterator[tuple[str, str]]:
-    runs = {result.analysis.name: result.run for result in integrated(solution)}
-    yield from (("path", note) for note in solution.path_notes)
-    chosen = {name: run.statistics.integrator for name, run in runs.items()}
-    yield from (("integrator", line) for line in integrator_lines(chosen))
-    for name, run in runs.items():
-        if isinstance(run.details, AroundPath) and run.details.inversion is not None:
-            yield "motors only", f"{name}: {_inversion(run, run.details)}"
-    if solution.mode_choice is not None:
-        yield "modes", chosen_modes([body.spatial for body in solution.bodies.values()], solution.mode_choice)
-    if solution.divided:
-        yield "pieces", pieces_in_words(solution.divided)
-    yield from (("links", note) for note in solution.notes)
-    yield "accuracy", "\n".join(error_budget(solution))
-    yield "wall time", ", ".join(f"{stage} {value:.2f} s" for stage, value in seconds.items())
-    if solution.omissions:
-        yield "omitted", "; ".join(solution.omissions)
-
-
-def _inversion(run: Outcome, around: AroundPath) -> str:
-    """What the zeros are, how the path was inverted, and what that leaves of it."""
-    inversion = around.inversion
-    assert inversion is not None
-    linear, factor = inversion.linearisation, inversion.servo.factor
-    held = inversion.servo.model
-    error = max(float(np.abs(off).max(initial=0.0)) for off in path_errors(held, run.time, run.q).values())
-    left = f"largest error of the path {error:.2g}"
-    if is_minimum_phase(linear):
-        output = "the path's own points" if factor == 1 else f"the output with {factor:.2g} times the vibration"
-        return f"{output}: minimum phase, integrated forward; {left}"
+def _analysis(one: AnalysisVerdict) -> Row:
+    error, deflection = one.tool_error, one.deflection
+    unstable = f", unstable {error.growth:.2g} 1/s" if error.growth else ""
     return (
-        f"not minimum phase, zeros at {describe_zeros(linear)} 1/s; stable inversion with"
-        f" {around.pre_actuation:.3g} s of pre- and {around.post_actuation:.3g} s of post-actuation"
-        f" (start off rest by {inversion.off_rest:.1g}); {left}"
+        one.name,
+        one.kind,
+        one.in_short,
+        _length(error.controlled),
+        _length(error.open_loop) + unstable,
+        _length(None if deflection is None else deflection[0]),
+        _remark(one),
     )
 
 
-def _analyses(solution: Solution) -> Table:
-    table = plain_table(
-        "analysis", "kind", "integrator", "end (s)", "steps", "tolerance", "constraint\nviolation", "wall (s)"
+def _remark(one: AnalysisVerdict) -> str:
+    """What matters most beside the numbers."""
+    if one.status != "completed":
+        return one.status
+    name, factor = one.worst
+    _, saturated, _ = one.answer.rpartition(", ")[2].partition(" % of the samples saturated")
+    texts = (
+        one.answer.partition("; ")[2] if one.feasible else "",
+        f"{name} {_percent(factor)} of limits" if factor and one.feasible is not None else "",
+        one.answer.rpartition(", ")[2] if saturated else "",
     )
-    for name, result in solution.analyses.items():
-        analysis, run, is_integrated = result.analysis, result.run.statistics, result.analysis.is_integrated
-        table.add_row(
-            name,
-            analysis.kind,
-            run.integrator.in_words if is_integrated else "",
-            _end(result),
-            f"{run.steps}" if is_integrated else "",
-            f"{analysis.tolerance:.0e}" if is_integrated else "",
-            f"{result.motion.violation.max(initial=0.0):.0e}",
-            f"{run.wall_seconds:.3f}",
-        )
-    return table
+    return "; ".join(filter(None, texts))
 
 
-def _end(result: AnalysisResult) -> str:
-    """The last output, s, or how far a run came that ended early."""
-    run = result.run
-    ended_early = run.status != "completed"
-    return f"{run.time_reached:g} of {run.analysis.last_time:g}" if ended_early else f"{run.time[-1]:g}"
+def _judged(analyses: Sequence[AnalysisVerdict]) -> list[AnalysisVerdict]:
+    """Those that say what motors have to do, rather than replay it; all where there are none of them."""
+    completed = [one for one in analyses if one.status == "completed"]
+    return [one for one in completed if one.feasible is not None or one.kind == "closed-loop"] or list(analyses)
+
+
+def _motors(analyses: Sequence[AnalysisVerdict]) -> Iterator[Row]:
+    """Every motor in every analysis."""
+    for one in _judged(analyses):
+        yield from (_motor(name, motor, one) for name, motor in one.motors.items())
+
+
+def _worst_motors(analyses: Sequence[AnalysisVerdict]) -> Iterator[Row]:
+    """Every motor in the analysis that asks most of it, the motors in the order of the scene."""
+    judged = _judged(analyses)
+    for name in dict.fromkeys(name for one in judged for name in one.motors):
+        having = [one for one in judged if name in one.motors]
+        most = max(having, key=lambda one: (one.motors[name].factor, one.motors[name].moment))
+        yield _motor(name, most.motors[name], most)
+
+
+def _motor(name: str, motor: MotorFeasibility, one: AnalysisVerdict) -> Row:
+    unit = one.units[name]
+    speed = "rad/s" if unit == "N·m" else "m/s"
+    return (
+        name,
+        _of(motor.moment, motor.moment_limit, unit),
+        f"{_number(motor.rms_moment)} {unit}",
+        _of(motor.speed, motor.speed_limit, speed),
+        _of(motor.power, motor.power_limit, "W"),
+        _percent(motor.factor) if motor.has_limits else "none",
+        one.name,
+    )
+
+
+def _texts(verdict: Verdict) -> Iterator[str]:
+    """Warnings, what robots at rest do, what to try, notes, once for all analyses of which they are said."""
+    warnings = ((one.name, text) for one in verdict.analyses for text in one.warnings)
+    advice = ((one.name, text) for one in verdict.analyses for text in one.advice)
+    yield from _labelled("warning", alike(warnings))
+    yield from _labelled("at rest", alike((one.name, one.held) for one in verdict.analyses if one.held))
+    yield from _labelled("to try", alike(advice))
+    yield from _labelled("note", alike((one.name, text) for one in verdict.analyses for text in one.notes))
+
+
+def _labelled(label: str, texts: Iterable[str]) -> Iterator[str]:
+    yield from (f"{label:<9}  {text}" for text in texts)
+
+
+def _fitted(texts: Sequence[str], room: int, width: int) -> list[str]:
+    """A line each, the first ones in full as long as there is room; the last line counts those without a line."""
+    if not texts or room < 1:
+        return []
+    shown = texts[:room]
+    lines: list[str] = []
+    for k, text in enumerate(shown):
+        free = room - len(lines) - (len(shown) - k - 1)
+        whole = wrap(text, width, subsequent_indent=" " * 11, break_long_words=False)
+        if len(whole) > free:
+            whole = [*whole[: free - 1], _cut(" ".join(whole[free - 1 : free + 1]), width)]
+        lines += whole
+    more = f" (+{len(texts) - room} more: {REST})" if len(texts) > room else ""
+    return [*lines[:-1], _cut(lines[-1], width - len(more)) + more]
+
+
+def _at_most(rows: Sequence[Row], room: int) -> list[Row]:
+    """The first ones, and how many more there are."""
+    room = max(room, 1)
+    if len(rows) <= room:
+        return list(rows)
+    return [*rows[: room - 1], (f"{len(rows) - room + 1} more: {REST}", *[""] * (len(rows[0]) - 1))]
+
+
+def _aligned(rows: Sequence[Row]) -> list[str]:
+    """As lines, columns of numbers to the right."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    shown = [k for k, of in enumerate(zip(*rows[1:], strict=True)) if any(of)]
+    return ["  ".join(row[k].ljust(widths[k]) for k in shown) for row in rows]
+
+
+def _cut(line: str, width: int) -> str:
+    return line if len(line) <= width else f"{line[: width - 1]}…"
+
+
+def _length(value: float | None) -> str:
+    if value is None:
+        return ""
+    return f"{1e3 * value:.3g} mm" if value >= SMALLEST else f"< {1e3 * SMALLEST:g} mm"
+
+
+def _percent(factor: float) -> str:
+    return f"{100 * factor if factor > SMALLEST else 0:.3g} %" if factor < 10.0 else f"{factor:.3g} ×"
+
+
+def _of(peak: float, limit: float, unit: str) -> str:
+    return f"{_number(peak)}" + (f" of {limit:g}" if np.isfinite(limit) else "") + f" {unit}"
+
+
+def _number(value: float) -> str:
+    return f"{value if value > SMALLEST else 0:.4g}"

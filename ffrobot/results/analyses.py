@@ -33,7 +33,8 @@ class AnalysisAccess(Datasets):
     def verdict(self) -> Verdict:
         """Of every analysis: can it be done, peaks and RMS of motors, deflection, stress, warnings, what to try next.
 
-        `print(results.verdict)` is what `ffrobot solve` prints; `results.verdict["inverse"]` that of one analysis.
+        `print(results.verdict)` is what `ffrobot solve --verbose` prints of them; `results.verdict["inverse"]` that of
+        one analysis.
         """
         from .verdict import judge
 

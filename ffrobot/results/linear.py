@@ -15,9 +15,11 @@ from ..actuation.control.zeros import Zeros
 from ..common.arrays import Array
 from ..mbs.analysis.static import HeldRobot
 from ..mbs.quantities.motion import RobotMotion
+from ..mbs.solve.held_joints import COMPLIANT, LOCKED, translational_stiffness
 
 MATRICES = ("A", "B", "C", "D", "mass", "transformation")
 NAMES = ("state_names", "input_names", "output_names")
+LISTED = 3  # natural frequencies
 
 
 Shapes = Mapping[str, Mapping[str, Array]]
@@ -45,6 +47,24 @@ def write_held(group: h5py.Group, motion: RobotMotion, found: LinearModels | Hel
         _write_shapes(own, _shapes(motion, np.array([one.modes.motion.real for one in held])))
         for point in held[0].compliance:
             own[f"compliance/{point}"] = np.array([one.compliance[point] for one in held])
+
+
+def held_in_words(group: h5py.Group) -> str:
+    """Natural frequencies with motors at rest, and the least stiffness of a point, at the first time of an analysis."""
+    texts = []
+    for condition, name in ((LOCKED, "joints locked"), (COMPLIANT, "compliant gears")):
+        if (held := group.get(f"joints_{condition}")) is None:
+            continue
+        frequency = held["frequency"][0]
+        lowest = ", ".join(f"{f:.4g}" for f in frequency[frequency > 0.0][:LISTED])
+        least = [
+            (stiffness.least, point)
+            for point, C in held.get("compliance", {}).items()
+            if (stiffness := translational_stiffness(C[0])) is not None and np.isfinite(stiffness.least)
+        ]
+        of_point = f"; least stiffness {min(least)[0] / 1e3:.4g} N/mm at {min(least)[1]}" if least else ""
+        texts.append(f"{name} {lowest} Hz{of_point}" if lowest else f"{name}: rigid")
+    return "; ".join(texts)
 
 
 def _shapes(motion: RobotMotion, along_v: Array) -> Shapes:

@@ -12,8 +12,9 @@ from ..actuation.motors import MotorFeasibility, judge_motion
 from ..common.arrays import Array
 from .actuators import read_motors, read_unsupplied
 from .joints import Coordinates, Scene, labelled_coordinates
-from .off_path import off_path_in_words
+from .linear import held_in_words
 from .peaks import POWER, peak_of
+from .tool_error import ToolError, off_path_in_words, tool_error
 
 FAR_BEYOND = 10.0  # times their limit: no realistic patch supplies that
 AT_REST = 0.3  # of the mean rate of a path: what its first and last steps have at most
@@ -43,9 +44,11 @@ class AnalysisVerdict:
         motors: by joint, in the order of the scene: peaks, RMS and limits at the joint.
         units: of the force along each of these joints, "N·m" or "N".
         patches: by body, of an inverse analysis.
+        tool_error: how far the point of a path is off it, under control and open loop.
         deflection: largest of a point, m, which, and when.
         stress: largest von Mises, Pa, the body, and when; None where none was asked for.
         margins: of a closed loop by its linear model, in words; empty where not known.
+        held: natural frequencies and least stiffness with motors at rest, in words; empty where not asked for.
         warnings: why results may be wrong, or not mean what they seem to.
         notes: what is worth knowing of results that are right.
         advice: what to try next, a text each.
@@ -60,9 +63,11 @@ class AnalysisVerdict:
     motors: Mapping[str, MotorFeasibility]
     units: Mapping[str, str]
     patches: Mapping[str, PatchNeed]
+    tool_error: ToolError
     deflection: Place | None
     stress: Place | None
     margins: str
+    held: str
     warnings: tuple[str, ...]
     notes: tuple[str, ...]
     advice: tuple[str, ...]
@@ -77,9 +82,28 @@ class AnalysisVerdict:
             yield f"  largest deflection {_place(1e3 * self.deflection[0], 'mm', *self.deflection[1:])}"
         if self.stress is not None:
             yield f"  largest stress {_place(self.stress[0] / 1e6, 'MPa', *self.stress[1:])} (von Mises)"
-        if self.margins:
-            yield f"  {self.margins}"
+        for text in filter(None, (self.margins, self.held)):
+            yield f"  {text}"
         yield from (f"  to try: {text}" for text in self.advice)
+
+    @property
+    def in_short(self) -> str:
+        """The answer in two words; empty where nothing is asked."""
+        if self.status != "completed":
+            return "ended early"
+        if self.feasible is None:
+            return self.answer.partition(":")[0] if self.kind == "closed-loop" else ""
+        factor = self.worst[1]
+        if self.feasible:
+            return "within limits" if factor else "no limits given"
+        return "limits exceeded" if factor > 1.0 else "cannot do it"
+
+    @property
+    def worst(self) -> tuple[str, float]:
+        """The actuator that is nearest to its limit, or farthest beyond, with the ratio; "" and 0 without limits."""
+        motors = [(f"motor {name}", motor.factor) for name, motor in self.motors.items()]
+        patches = [(f"patches of {name}", need.factor) for name, need in self.patches.items()]
+        return max((*motors, *patches), key=lambda one: one[1], default=("", 0.0))
 
     @property
     def motor_texts(self) -> dict[str, str]:
@@ -135,9 +159,11 @@ def _judge(name: str, group: h5py.Group, scene: Scene, coordinates: Coordinates)
         motors=motors,
         units=units,
         patches=patches,
+        tool_error=tool_error(group, scene, feasible=feasible),
         deflection=None if _ended_early(group) else _deflection(group),
         stress=None if _ended_early(group) else _stress(group),
         margins=_margins(group),
+        held=held_in_words(group),
         warnings=tuple(map(str, about.get("warnings", ()))),
         notes=tuple(map(str, about.get("notes", ()))),
         advice=tuple(_advice(group, motors, units, patches)),

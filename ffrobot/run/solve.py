@@ -16,7 +16,7 @@ from ..actuation.point_forces import forces_at_points, solve_points
 from ..actuation.unsupplied import held_shift
 from ..common.arrays import Array
 from ..common.errors import FfrobotError, InputError, SolveError, of_file
-from ..mbs.analysis.operating_points import InstantAnalysis
+from ..mbs.analysis.operating_points import InstantAnalysis, open_loop_growth
 from ..mbs.analysis.outcome import Outcome
 from ..mbs.quantities.energy import totals
 from ..mbs.quantities.motion import RobotMotion
@@ -266,6 +266,9 @@ def _evaluated(solution: Solution, run: Outcome, twists: Mapping[str, BSpline] |
         actuation = find_actuation(
             solution.scene, motion, run.analysis, solution.bodies, solution.patches, forces.voltages
         )
+        if (missed := actuation.feasibility.unsupplied) is not None and missed.point:
+            missed = replace(missed, growth=open_loop_growth(run))
+            actuation = replace(actuation, feasibility=replace(actuation.feasibility, unsupplied=missed))
     whole = {name: body for name, body in solution.bodies.items() if name not in solution.divided}
     stresses = find_stresses(motion, whole, solution.patches)
     at_points = {}

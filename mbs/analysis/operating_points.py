@@ -11,13 +11,15 @@ import numpy as np
 from pydantic import Field
 
 from ...common.arrays import Array
-from ...common.errors import InputError, did_you_mean, quoted
+from ...common.errors import InputError, SolveError, did_you_mean, quoted
 from .._core import TimeFunction
 from ..fields.field_types import NotNegative
 from ..model.gears import with_compliance
 from ..model.model import Model, without_paths
 from ..model.rows import ConstraintRow
 from ..scene.analysis import Analysis, Surroundings, TimedAnalysis
+from ..solve.linearisation import LinearEquations, LinearMechanism
+from ..solve.robot_modes import robot_modes
 from ..solve.start import undeformed_posture
 from .context import Context, place_of
 from .equilibrium import run_static
@@ -25,6 +27,7 @@ from .gears import with_motor_coordinates
 from .outcome import Outcome
 
 STATIC = "static"  # instead of an analysis' name: about the static equilibrium
+INSTANTS = 9  # of a run, at which it is linearized for its growth
 NEAR = 1e-9  # of the end of an analysis: how far from an output a time may be for rounding
 
 
@@ -89,18 +92,41 @@ def find_operating_points(context: Context, analysis: InstantAnalysis) -> tuple[
     """The equilibrium, or the instants of a motion, that an analysis is about, as they were found, and their states."""
     if analysis.source is None:
         run = _equilibrium(context, analysis)
-        return run, linear_states(context, run, [0])
+        return run, linear_states(context.model, run, [0])
     source = context.outcomes[analysis.source]
     rows = [row_at(context.model.scene.path, analysis, source, float(t)) for t in analysis.times]
-    return of_earlier(source, analysis).at(rows), linear_states(context, source, rows)
+    return of_earlier(source, analysis).at(rows), linear_states(context.model, source, rows)
 
 
-def linear_states(context: Context, source: Outcome, rows: Sequence[int]) -> OperatingPoints:
+def linear_states(model: Model, source: Outcome, rows: Sequence[int]) -> OperatingPoints:
     """The states of some outputs of a motion, of the robot that follows nothing and whose gears are compliant."""
-    model = with_compliance(without_paths(context.model))
+    model = with_compliance(without_paths(model))
     q, v, a = with_motor_coordinates(source, model)[:3]
     at = list(rows)
     return OperatingPoints(model, source.time[at], q[at], v[at], a[at])
+
+
+def open_loop_growth(run: Outcome) -> float:
+    """Mean over a run of the fastest growth, 1/s, of small deviations where its torques act open loop.
+
+    By linear models about `INSTANTS` of the run; 0 where none of them has a pole that grows; nan where the robot has no
+    linear model.
+    """
+    first, last = run.time[[0, -1]]
+    rows = [int(np.abs(run.time - t).argmin()) for t in np.linspace(first, last, INSTANTS)]
+    try:
+        model, *states = linear_states(run.model, run, rows)
+        equations = LinearEquations(model, states[1][0])
+        growth = [_growth(equations.at(float(t), q, v, a)) for t, q, v, a in zip(*states, strict=True)]
+    except (InputError, SolveError):
+        return float("nan")
+    return float(np.mean([*growth[:-1], *growth[1:]]))  # the trapezoidal rule
+
+
+def _growth(mechanism: LinearMechanism) -> float:
+    back = np.linalg.inv(np.linalg.cholesky(mechanism.M)).T
+    K, D = (back.T @ matrix @ back for matrix in (mechanism.K, mechanism.D))
+    return robot_modes(K, D, back, mechanism.transformation).growth
 
 
 def places_of(context: Context, points: Sequence[str] | None) -> dict[str, str]:

@@ -48,7 +48,7 @@ class Static(Analysis):
         """Motion and forces at t = 0."""
         found = run_static(context, self)
         try:
-            model, _, (q,), (v,), (a,) = linear_states(context, found, [0])
+            model, _, (q,), (v,), (a,) = linear_states(context.model, found, [0])
             mechanism = LinearEquations(model, q, places_of(context, self.points)).at(0.0, q, v, a)
         except (InputError, SolveError) as error:
             told = f"no natural frequencies and no compliance: {error}"

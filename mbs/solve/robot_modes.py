@@ -20,11 +20,13 @@ class RobotModes:
         shape: (f, f) complex, δs of the first pole's eigenvector by mode, of unit kinetic amplitude (δsᴴ M δs = 1) and
             with its largest entry real.
         motion: (f, coordinates) complex, the same as δq of all bodies.
+        rounding: 1/s, by which a double pole at 0 may be off: `RIGID` √max(‖K̂‖, ‖D̂‖).
     """
 
     poles: ComplexArray
     shape: ComplexArray
     motion: ComplexArray
+    rounding: float
 
     @property
     def frequency(self) -> Array:
@@ -37,7 +39,7 @@ class RobotModes:
     def growth(self) -> float:
         """The largest real part of a pole, 1/s; 0 where it is round-off: the robot falls or is driven to vibrate."""
         largest = float(self.poles.real.max(initial=0.0))
-        return largest if largest > RIGID * np.abs(self.poles).max(initial=0.0) else 0.0
+        return largest if largest > self.rounding else 0.0
 
     @property
     def damping_ratio(self) -> Array:
@@ -67,7 +69,8 @@ def robot_modes(K: Array, D: Array, back: Array, transformation: Array) -> Robot
     Z = Z * (np.abs(largest) / largest) / np.linalg.norm(Z, axis=0)
     shape = (back @ Z).T
     motion = shape @ transformation.T
-    return RobotModes(poles, np.asarray(shape, dtype=complex), np.asarray(motion, dtype=complex))
+    rounding = RIGID * float(np.sqrt(max(np.abs(K).max(initial=0.0), np.abs(D).max(initial=0.0))))
+    return RobotModes(poles, np.asarray(shape, dtype=complex), np.asarray(motion, dtype=complex), rounding)
 
 
 def _pairs(poles: ComplexArray) -> Indices:

@@ -90,7 +90,7 @@ def test_links_with_all_that_matters_leave_nothing():
 def test_it_is_told_and_kept(tmp_path, ffrobot):
     path = tmp_path / "scene.toml"
     path.write_text(arm(2).text, encoding="utf-8")
-    done = ffrobot("solve", path)
+    done = ffrobot("solve", path, "--verbose")
     assert done.returncode == 0, done.stderr
     assert "inverse, forward simulation on 4 modes: link2.tip is off by" in " ".join(done.stdout.split())
     with library.Results(path.with_suffix(".results.h5")) as results:

@@ -63,7 +63,7 @@ def test_stiff_links_that_do_not_ring_are_integrated_implicitly(tmp_path, ffrobo
     counts = {}
     for name, keys in {"auto": "", "explicit": 'integrator = "dop853"'}.items():
         scene.write_text(scene.read_text().replace("tolerance = 1e-3", f"tolerance = 1e-3\n{keys}"))
-        done = ffrobot("solve", scene)
+        done = ffrobot("solve", scene, "--verbose")
         assert done.returncode == 0, done.stderr
         with h5py.File(scene.with_suffix(".results.h5")) as file:
             counts[name] = file["inverse"].attrs["evaluations"]

@@ -69,7 +69,7 @@ def test_error_is_that_of_the_modes_left_out():
 def test_it_is_told_and_kept(tmp_path, ffrobot):
     path = tmp_path / "scene.toml"
     path.write_text(library.make_scene(**in_3d(planar(MODES))).text, encoding="utf-8")
-    done = ffrobot("solve", path)
+    done = ffrobot("solve", path, "--verbose")
     assert done.returncode == 0, done.stderr
     assert "inverse, forward simulation on 4 modes: link.tip is off by" in " ".join(done.stdout.split())
     with library.Results(path.with_suffix(".results.h5")) as results:

@@ -8,7 +8,8 @@ from checkpoints import CASES
 import ffrobot
 from ffrobot.common.errors import InputError
 from ffrobot.mbs.model.truncation import interface_loads, with_fewer_modes
-from ffrobot.present.summary import print_summary, summary_console
+from ffrobot.present.details import print_details
+from ffrobot.present.summary import summary_console
 from ffrobot.results.file import Results
 from ffrobot.results.write import results_image
 from ffrobot.run.bodies import load_bodies
@@ -143,7 +144,7 @@ def test_the_summary_tells_the_choice_in_3d(arm, tmp_path, capsys):
     folder, tables, _ = arm
     solution = solved(folder, tables, "auto", tolerance=1e-2, end=0.2)
     image, path = results_image(solution), tmp_path / "x.h5"
-    print_summary(solution, Results.from_image(image, path).verdict, path, solution.seconds, summary_console())
+    print_details(solution, Results.from_image(image, path).verdict, path, solution.seconds, summary_console())
     printed = " ".join(capsys.readouterr().out.split())
     assert "inverse: error of leaving out the others, estimated: deflections" in printed
     assert "the same without search: modes = " in printed

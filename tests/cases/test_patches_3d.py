@@ -60,7 +60,7 @@ def solve_turned(folder, ffrobot, *, turned):
         "rpy": [-np.pi / 2, 0.0, 0.0] if turned else [0.0, 0.0, 0.0],
     }
     (folder / "scene.toml").write_text(ONE_LINK.format(layouts=layouts(*names), **keys))
-    done = ffrobot("solve", folder / "scene.toml")
+    done = ffrobot("solve", folder / "scene.toml", "--verbose")
     assert done.returncode == 0, done.stderr
     assert "voltages of" in done.stdout
     return folder / "scene.results.h5"

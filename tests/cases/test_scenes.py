@@ -25,7 +25,7 @@ SOLVED = (
 @pytest.fixture(scope="module", params=SOLVED)
 def solved(request, tmp_path_factory, ffrobot):
     scene = write_scene(request.param, tmp_path_factory.mktemp(request.param))
-    done = ffrobot("solve", scene)
+    done = ffrobot("solve", scene, "--verbose")
     assert done.returncode == 0, done.stderr
     told = [line for line in done.stdout.splitlines() if line.startswith("warning  ")]
     known = ("no actuator provides all modal forces", "bends by")  # no patches and stiffening, as the reference has it
@@ -103,7 +103,7 @@ def test_links_say_what_they_cannot_do(tmp_path, ffrobot):
     text = link.read_text().replace("indices = [1, 2, 3, 4, 5, 6, 11, 14]", "count = 2")
     link.write_text(text.replace('family = "all"', 'family = "out-of-plane-bending"'))
     scene.write_text(scene.read_text().replace("tolerance = 1e-08", "tolerance = 1e-5"))
-    done = ffrobot("solve", scene)
+    done = ffrobot("solve", scene, "--verbose")
     assert done.returncode == 0, done.stderr
     assert "fore: rigid in in-plane-bending, axial, torsion" in done.stdout.replace("\n", " ")
 
@@ -131,7 +131,7 @@ def test_links_say_what_they_cannot_do_in_the_plane(tmp_path, ffrobot, family, i
     }
     for name, tables in (("arm", link), ("scene", scene)):
         (tmp_path / f"{name}.toml").write_text(tomli_w.dumps(tables))
-    done = ffrobot("solve", tmp_path / "scene.toml", "-o", tmp_path / "results.h5")
+    done = ffrobot("solve", tmp_path / "scene.toml", "-o", tmp_path / "results.h5", "--verbose")
     assert done.returncode == 0, done.stderr
     told = " ".join(done.stdout.split())
     assert ("arm: rigid in in-plane-bending, of which its file has no modes" in told) == is_rigid

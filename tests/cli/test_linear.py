@@ -63,7 +63,7 @@ def scene(tmp_path):
 def test_a_rigid_arm_held_by_its_motor_and_in_motion(ffrobot, scene):
     """δθ̈ = (δτ + m g l sin θ δθ)/J: gravity's stiffness at the angle at which the arm is."""
     path = scene()
-    done = ffrobot("solve", path)
+    done = ffrobot("solve", path, "--verbose")
     assert done.returncode == 0, done.stderr
     assert "held: joint/hub → joint/hub: minimum phase" in done.stdout
     with Results(path.with_suffix(".results.h5")) as results:
@@ -79,7 +79,7 @@ def test_a_rigid_arm_held_by_its_motor_and_in_motion(ffrobot, scene):
 
 def test_export(ffrobot, scene, tmp_path):
     path = scene()
-    assert ffrobot("solve", path).returncode == 0
+    assert ffrobot("solve", path, "--verbose").returncode == 0
     results = path.with_suffix(".results.h5")
     assert ffrobot("linear", results, "-o", tmp_path / "held.npz").returncode == 0
     assert ffrobot("linear", results, "--analysis", "along", "-o", tmp_path / "along.mat").returncode == 0

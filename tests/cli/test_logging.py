@@ -1,4 +1,4 @@
-"""`--verbose` and `--log-file`: stages, analyses and errors, without a change of what a command prints."""
+"""`--verbose` and `--log-file`: stages, analyses and errors, and all that the summary leaves out."""
 
 import re
 
@@ -9,7 +9,8 @@ def test_verbose_goes_to_the_error_stream(ffrobot, case_copy):
     quiet, verbose = ffrobot("solve", scene), ffrobot("solve", scene, "--verbose")
     assert quiet.stderr == ""
     assert re.search(r'analysis "inverse": completed at t = 0.2 s, \d+ steps, \d+ rejected', verbose.stderr)
-    assert re.sub(r"\d", "", verbose.stdout).split() == re.sub(r"\d", "", quiet.stdout).split()
+    assert "wall time" in verbose.stdout
+    assert "wall time" not in quiet.stdout
 
 
 def test_log_file_keeps_the_runs_in_order(ffrobot, case_copy):

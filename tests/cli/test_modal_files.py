@@ -42,7 +42,7 @@ def test_solve_uses_the_cache(two_link_copy, ffrobot, two_link):
     """The links were computed for the session's `two_link`; nothing is written beside the scene but the results."""
     folder = two_link_copy({"scene.toml": SHORT})
     before = {path.name for path in folder.iterdir()}
-    done = ffrobot("solve", "scene.toml", cwd=folder)
+    done = ffrobot("solve", "scene.toml", "--verbose", cwd=folder)
     assert done.returncode == 0, done.stderr
     assert "link1: stage 1, up to date" in done.stdout
     assert "link2: stage 1, up to date" in done.stdout

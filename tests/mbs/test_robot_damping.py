@@ -61,12 +61,12 @@ damping = { ratio = 0.02, of = "robot" }
 """,
         encoding="utf-8",
     )
-    done = ffrobot("solve", scene)
+    done = ffrobot("solve", scene, "--verbose")
     assert done.returncode == 0, done.stderr
     assert "damping ratios" in done.stdout
     assert "0.02, 0.02, 0.02" in done.stdout
     link = tmp_path / "link.toml"
     link.write_text(link.read_text(encoding="utf-8").replace("ratio = 0.02", "ratio = [0.1, 0.1, 0.1]"))
-    done = ffrobot("solve", scene)
+    done = ffrobot("solve", scene, "--verbose")
     assert done.returncode == 2
     assert 'damping: expected one ratio, with of = "robot"' in done.stderr

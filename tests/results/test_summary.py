@@ -1,11 +1,15 @@
-"""The summary of a solve: one for planar and 3D scenes."""
+"""The summary of a solve: one for planar and 3D scenes, of at most fifteen lines."""
 
+import re
 from io import StringIO
+from itertools import takewhile
+from pathlib import Path
 
 import pytest
 from rich.console import Console
 
-from ffrobot.present.summary import print_summary
+from ffrobot.present.details import print_details
+from ffrobot.present.summary import LINES, summary_lines
 from ffrobot.results.file import Results
 from ffrobot.results.write import results_image
 from ffrobot.run.solve import solve_scene
@@ -42,11 +46,11 @@ SPATIAL = PLANAR | {
 
 
 @pytest.mark.parametrize("keys", [PLANAR, SPATIAL], ids=["planar", "3D"])
-def test_planar_and_3d_scenes_have_the_same_summary(keys, tmp_path):
+def test_planar_and_3d_scenes_have_the_same_details(keys, tmp_path):
     solution = solve_scene(make_scene(**keys), Watcher())
     verdict = Results.from_image(results_image(solution), tmp_path / "x.h5").verdict
     printed = StringIO()
-    print_summary(solution, verdict, tmp_path / "x.h5", solution.seconds, Console(file=printed, width=200))
+    print_details(solution, verdict, tmp_path / "x.h5", solution.seconds, Console(file=printed, width=200))
     lines = printed.getvalue().splitlines()
     header = next(line for line in lines if line.startswith("analysis"))
     columns = ("analysis", "kind", "integrator", "end (s)", "steps", "tolerance", "violation", "wall (s)")
@@ -61,3 +65,58 @@ def test_planar_and_3d_scenes_have_the_same_summary(keys, tmp_path):
     assert {"accuracy", "wall time", "results"} <= titles
     assert ("omitted" in titles) == (keys is PLANAR)
     assert any(line.startswith("wall time") and "links and files" in line for line in lines)
+
+
+CASES = sorted(path.parent.name for path in (Path(__file__).parents[2] / "cases").glob("*/scene.toml"))
+
+
+@pytest.mark.parametrize("width", [80, 120])
+@pytest.mark.parametrize("case", CASES)
+def test_every_case_has_a_summary_of_one_screen(case, width, solved):
+    """With the verdicts of all analyses, of all motors, and warnings, or the number of those that had no room."""
+    with Results(solved(case).folder / "scene.results.h5") as results:
+        verdict = results.verdict
+    lines = summary_lines(verdict, ["a note"], 30 * "accuracy ", "scene.results.h5", width)
+    assert len(lines) <= LINES == 15
+    assert max(map(len, lines)) <= width
+    shown = sum(line.startswith(one.name) for one in verdict.analyses for line in lines[1 : 1 + len(verdict.analyses)])
+    left_out = sum(int(line.split()[0]) for line in lines if line.endswith("more: --verbose"))
+    judged = [one for one in verdict.analyses if one.feasible is not None]
+    assert shown + left_out >= len(verdict.analyses)
+    for motor in {name for one in judged for name in one.motors}:
+        assert any(line.startswith(f"{motor} ") for line in lines)
+    if any(one.warnings for one in verdict.analyses):
+        assert any(line.startswith("warning") for line in lines)
+
+
+def many(count, motors):
+    """A robot with so many joints, whose path is given for each, so many times."""
+    joint = {"type": "revolute", "axis": [0.0, 0.0, 1.0], "moment_limit": 50.0}
+    names = [f"b{k}" for k in range(motors)]
+    return make_scene(
+        name="many", space="spatial", gravity=[0.0, -9.81, 0.0],
+        body=[{"name": name, "rigid": SPACIOUS} for name in names],
+        joint=[joint | {"name": f"j{k}", "between": [f"{names[k - 1]}.tip" if k else "ground", f"{name}.root"]}
+               for k, name in enumerate(names)],
+        trajectory=[{"name": f"p{k}", "joint": f"j{k}", "value": "0.1*t"} for k in range(motors)],
+        analysis=[{"name": f"a{k}", "kind": "pcid", "end": 0.02, "output_step": 0.01} for k in range(count)],
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(("count", "motors"), [(1, 3), (2, 3), (1, 12), (9, 12), (30, 1)])
+def test_rows_are_left_out_and_counted(count, motors, tmp_path):
+    """Peaks of motors of each analysis where there is room, else of the analysis that asks most; over limits."""
+    solution = solve_scene(many(count, motors), Watcher())
+    verdict = Results.from_image(results_image(solution), tmp_path / "x.h5").verdict
+    lines = summary_lines(verdict, (), "known", "x.h5", 120)
+    assert len(lines) <= LINES
+    rows = [line.split() for line in lines]
+    begin = next(k for k, row in enumerate(rows) if row[0] == "motor")
+    of_motors = list(takewhile(lambda row: re.fullmatch(r"j\d+", row[0]), rows[begin + 1 :]))
+    if count * motors <= 6:
+        assert len(of_motors) == count * motors
+    for name, peak, _of, limit, *_, share, sign, analysis in of_motors:
+        motor = verdict[analysis].motors[name]
+        assert float(peak) == pytest.approx(motor.moment, rel=1e-3)
+        assert float(limit) == motor.moment_limit
+        assert float(share) == pytest.approx({"%": 100, "×": 1}[sign] * motor.moment / 50.0, rel=0.01)

@@ -116,7 +116,7 @@ def test_solid_in_3d_carries_the_stress_of_the_plane(solid_arm, ffrobot, tmp_pat
         folder = tmp_path / space
         folder.mkdir()
         (folder / "scene.toml").write_text(_at_rest(solid_arm, space), encoding="utf-8")
-        done = ffrobot("solve", "scene.toml", cwd=folder)
+        done = ffrobot("solve", "scene.toml", "--verbose", cwd=folder)
         assert done.returncode == 0, done.stderr
         assert "largest von Mises (MPa)" in done.stdout
         with Results(folder / "scene.results.h5") as results:
