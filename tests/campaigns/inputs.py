@@ -1,4 +1,4 @@
-"""URDF and its meshes, motions, tables, HDF5, SID and .fem files, arguments of studies with one change: refused, or taken.
+"""URDF, its meshes, motions, tables, HDF5, SID, .fem files, arguments of studies, one change each: refused, or taken.
 
     python tests/campaigns/inputs.py [--count 100] [--seed 0] [--kind KIND …] [--record]
 
