@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ...common.arrays import Array, Indices
+from ...common.arrays import Array, Booleans, Indices
 from ...common.errors import InputError
 from ...common.tables import LARGEST, shown
 from .._core import TimeFunction
@@ -18,12 +18,15 @@ from .piecewise import Piecewise, superposed
 
 TIME = re.compile(r"_*(t|time|times?tamp|stamp|sec(?:ond)?s?)[ _.]*[(\[]?(s|sec|ms|us|µs|ns)?[)\]]?", re.IGNORECASE)
 """Names of the column of times, as programs write them, with or without a unit: t, time, time [ms], timestamp_ns."""
+NANOSECONDS = re.compile(r"_*(nano|n)secs?(onds?)?", re.IGNORECASE)
+"""Names of a column after that of whole seconds, as ROS has them."""
 UNITS = {"ms": 1e-3, "us": 1e-6, "µs": 1e-6, "ns": 1e-9}
 SINCE_1970 = ((1e17, 1e-9), (1e14, 1e-6), (1e11, 1e-3), (1e8, 1.0))
 """Clocks of computers by their number now: from so many on, and the unit in s that this then is."""
 OF_A_JOINT = ("value", "{0}", "{0}.coordinate", "{0}.position", "position", "positions", "angle")
 """Names of the column of a joint, {0} being the joint's, the first that is there."""
-MANY, GAP = 20, 20.0  # intervals of a table with a step; how many times the usual one a gap is
+MANY, GAP = 20, 20.0  # intervals of a table with a usual step; how many times this a gap is
+SAMPLES, LOST = 6, 2.5  # the same where at least three of four steps are equal, as those of records are
 
 
 @dataclass(frozen=True)
@@ -73,6 +76,9 @@ def load_waypoints(path: Path) -> Waypoints:
     """
     columns, table, lines = _read_table(path)
     times, remarks = _seconds(columns[0], table[:, 0])
+    if len(columns) > 2 and NANOSECONDS.fullmatch(columns[1]):
+        times = times + 1e-9 * (table[:, 1] - (table[0, 1] if remarks else 0.0))
+        columns, table = [columns[0], *columns[2:]], np.delete(table, 1, axis=1)
     again = np.append(False, (np.diff(table, axis=0) == 0).all(axis=1))
     if again.any():
         remarks.append(f"line {lines[int(again.argmax())]}: {again.sum()} rows that repeat the one before count once")
@@ -85,7 +91,7 @@ def load_waypoints(path: Path) -> Waypoints:
         )
     if len(times) < 2:
         raise InputError(f"{path}: expected at least 2 waypoints, found {len(times)}")
-    remarks += _gaps(times)
+    remarks += _gaps(times, np.any(np.diff(values, axis=0), axis=1))
     return Waypoints(tuple(columns[1:]), times, values, tuple(f"{path.name}: {remark}" for remark in remarks))
 
 
@@ -102,11 +108,16 @@ def _seconds(header: str, times: Array) -> tuple[Array, list[str]]:
     return (times - first) * scale, [f"times are those of a clock, in {scale:g} s since 1970; the first is taken as 0"]
 
 
-def _gaps(times: Array) -> list[str]:
+def _gaps(times: Array, moves: Booleans) -> list[str]:
+    """A remark on the longest interval in which the path moves, where it is far longer than is usual."""
     steps = np.diff(times)
-    if len(steps) < MANY or steps.max() <= GAP * (usual := float(np.median(steps))):
+    usual = float(np.median(steps))
+    is_record = np.mean(np.abs(steps - usual) <= 0.05 * usual) >= 0.75
+    least, ratio = (SAMPLES, LOST) if is_record else (MANY, GAP)
+    moving = np.where(moves, steps, 0.0)
+    k = int(moving.argmax())
+    if len(steps) < least or moving[k] <= ratio * usual:
         return []
-    k = int(steps.argmax())
     return [
         f"no rows between t = {times[k]:g} and {times[k + 1]:g} s, where others are {usual:.3g} s apart: the path there"
         " is the spline's alone"

@@ -201,7 +201,7 @@ class Damage:
             how = self.chance.choice(["removed", "doubled", "moved"])
             line = lines.pop(k)
             for _ in range({"removed": 0, "doubled": 2, "moved": 1}[how]):
-                lines.insert(k if how == "doubled" else self.chance.randrange(len(lines)), line)
+                lines.insert(k if how == "doubled" else self.chance.randrange(len(lines) + 1), line)
             return b"\n".join(lines), f"line {k + 1} {how}: {line[:60]!r}"
         return self._token(lines, k)
 

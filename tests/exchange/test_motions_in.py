@@ -81,6 +81,28 @@ def test_rows_twice_and_gaps(tmp_path):
         load_waypoints(write(tmp_path / "path.csv", "t,value", [(0, 1), (0, 2)]))
 
 
+@pytest.mark.parametrize("lost", [1, 2, 5])
+def test_samples_lost_of_a_record(lost, tmp_path):
+    """Two steps of 0.01 s in a row are not yet a gap; nor is a hold, in which nothing moves."""
+    rows = [(0.01 * k, 0.02 * k) for k in (*range(5), *range(4 + 1 + lost, 20))]
+    table = load_waypoints(write(tmp_path / "path.csv", "t,value", rows))
+    says = f"no rows between t = 0.04 and {0.05 + 0.01 * lost:g} s, where others are 0.01 s apart"
+    assert [remark.partition(": ")[2].startswith(says) for remark in table.remarks] == [True] * (lost > 1)
+    still = [(t, 0.08) if 0.035 < t < 0.051 + 0.01 * lost else (t, q) for t, q in rows]
+    assert load_waypoints(write(tmp_path / "path.csv", "t,value", still)).remarks == ()
+
+
+@pytest.mark.parametrize("epoch", [0, EPOCH])
+def test_whole_seconds_and_nanoseconds(epoch, tmp_path):
+    """As ROS writes them, from 0.5 s on."""
+    rows = [(epoch + int(t + 0.5), round((t + 0.5) % 1 * 10**9), a, b) for t, a, b in ROWS]
+    table = load_waypoints(write(tmp_path / "path.csv", "sec,nanosec,hip,knee", rows))
+    first = 0.0 if epoch else 0.5
+    np.testing.assert_allclose(table.times, np.add([0, 0.5, 1.25], first), rtol=0, atol=1e-12)
+    assert table.columns == ("hip", "knee")
+    np.testing.assert_array_equal(table.values, [row[1:] for row in ROWS])
+
+
 def test_remarks_are_printed(tmp_path, ffrobot):
     write(tmp_path / "path.csv", "time,value", [(EPOCH + t, a) for t, a, _ in ROWS])
     (tmp_path / "scene.toml").write_text(
@@ -118,7 +140,9 @@ MESSAGES = {
         "joint_names": ["hip", "knee"],
         "points": points(lambda t: {"secs": int(t), "nsecs": round(t % 1 * 1e9)}),
     },
-    "numbers": {"trajectory": {"joint_trajectory": {"joint_names": ["hip", "knee"], "points": points(float)}}},
+    "numbers": {
+        "goal": {"trajectory": {"joint_trajectory": {"joint_names": ["hip", "knee"], "points": points(float)}}}
+    },
 }
 
 
@@ -138,6 +162,7 @@ WRONG = {
     '{"joint_names": ["a"], "points": [{"positions": [1, 2], "time_from_start": 0}]}': "expected 1 positions",
     '{"joint_names": ["a"], "points": [{"positions": ["x"], "time_from_start": 0}]}': "expected points",
     '{"joint_names": ["a"], "points": [{"positions": [1]}]}': "expected points",
+    f'{{"joint_names": ["a"], "points": [{{"positions": [1{400 * "0"}], "time_from_start": 0}}]}}': "expected points",
     '{"joint_names": ["a"], "points": [{"positions": [NaN], "time_from_start": 0},'
     ' {"positions": [1], "time_from_start": 1}]}': "finite positions",
     '{"joint_names": ["a"], "points": [{"positions": [0], "time_from_start": 1},'

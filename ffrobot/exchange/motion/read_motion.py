@@ -20,7 +20,7 @@ from .joint_trajectory import NANO
 
 TRAJECTORY = "trajectory_msgs/msg/JointTrajectory"
 STATES = "sensor_msgs/msg/JointState"
-NESTED = ("joint_trajectory", "trajectory")
+NESTED = ("goal", "planned_trajectory", "joint_trajectory", "trajectory")
 """Keys under which messages of planners have a JointTrajectory."""
 
 
@@ -83,7 +83,7 @@ def _from_json(path: Path) -> JointPath:
         raise InputError('expected a JointTrajectory with "joint_names" and "points", found none')
     try:
         return _of_points([str(name) for name in message["joint_names"]], message["points"])
-    except (TypeError, KeyError, ValueError, AttributeError) as error:
+    except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
         raise InputError(f"expected points with positions and time_from_start, found others: {error!r}") from None
 
 
