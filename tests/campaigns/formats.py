@@ -110,7 +110,7 @@ def written(folder, points, kind, cells):
 
 
 def by_calculix(folder, points):
-    """By CalculiX: the first two frequencies, Hz, with the root clamped; mass; second moments (3, 3) about the origin."""
+    """By CalculiX: two frequencies, Hz, with the root clamped; mass; second moments (3, 3) about the origin."""
     clamped = "".join(f"{k + 1}\n" for k in np.flatnonzero(np.abs(points[:, 0]) < 1e-9))
     text = (folder / "part.inp").read_text() + f"*NSET, NSET=ROOT\n{clamped}*BOUNDARY\nROOT, 1, 3\n"
     text += f"*MATERIAL, NAME=M\n*ELASTIC\n{E}, {NU}\n*DENSITY\n{RHO}\n*SOLID SECTION, ELSET=E, MATERIAL=M\n"
