@@ -7,6 +7,9 @@ from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
 from ffrobot import solve
+from ffrobot.mbs.solve.poses import PoseEvaluator
+from ffrobot.mbs.solve.start import undeformed_posture
+from ffrobot.run.solve import prepare_scene
 
 E, NU, RHO, HEIGHT, WIDTH = 70e9, 0.3, 2700.0, 0.02, 0.03
 G = E / (2 * (1 + NU))
@@ -190,3 +193,133 @@ def test_frequencies_of_a_rigid_arm_of_six_axes_on_compliant_gears(tmp_path):
         C = results["rest/joints_compliant/compliance/b5.tip"][0]
         assert results["rest/joints_locked/frequency"].shape == (1, 0)
     np.testing.assert_allclose(C, J @ np.diag(1 / stiffness) @ J.T, atol=1e-10 * np.abs(C).max())
+
+
+STRIP = """name = "{name}"
+material = {{ youngs_modulus = 2.4e11, density = 4000.0 }}
+geometry = {{ kind = "beam", length = {length}, section = {{ shape = "rectangle", height = 0.001, width = 0.05 }} }}
+mesh = {{ elements = {elements} }}
+reference = {{ condition = "cantilever" }}
+modes = {{ count = {count}, family = "in-plane-bending", attachment_modes = {attachment} }}
+damping = {{ ratio = {damping} }}
+"""  # EI = 1 N·m², ρA = 0.2 kg/m
+
+
+def strip(folder, name, length, elements, count, damping=0.0, attachment="true"):
+    text = STRIP.format(
+        name=name, length=length, elements=elements, count=count, damping=damping, attachment=attachment
+    )
+    (folder / f"{name}.toml").write_text(text)
+
+
+@pytest.mark.parametrize(
+    ("mass", "inertia", "published"), [(1.2, 0.1 + 0.1 * 0.25 / 3 + 0.0005 + 0.1 * 0.25, [0.48, 1.80]),
+                                       (0.1, 0.0005, [2.18, 15.91])]
+)  # fmt: skip
+def test_published_frequencies_of_a_two_link_arm(tmp_path, mass, inertia, published):
+    """De Luca and Siciliano (1991), IEEE Trans. Syst. Man Cybern. 21(4): links of 0.5 m, 0.2 kg/m, EI = 1 N·m².
+
+    The first link carries hub, second link and payload (1.2 kg; inertia of the stretched link about the joint), the
+    second one the payload. The paper has two decimals.
+    """
+    strip(tmp_path, "arm", 0.5, 20, 6)
+    scene = 'name = "one"\nspace = "planar"\ngravity = [0.0, 0.0]\n[[body]]\nname = "arm"\nlink = "arm.toml"\n'
+    scene += '[[body]]\nname = "hub"\n'
+    scene += (
+        f"rigid = {{ mass = {mass}, inertia = {inertia}, center = [0.0, 0.0], points = {{ root = [0.0, 0.0] }} }}\n"
+    )
+    scene += '[[joint]]\nname = "O"\ntype = "revolute"\nbetween = ["ground", "arm.root"]\n'
+    scene += '[[joint]]\nname = "w"\ntype = "weld"\nbetween = ["arm.tip", "hub.root"]\n'
+    scene += '[[analysis]]\nname = "rest"\nkind = "static"\npoints = ["arm.tip"]\n'
+    with write(tmp_path, scene) as results:
+        found = results["rest/joints_locked/frequency"][0, :2]
+    np.testing.assert_allclose(found, published, atol=0.0051)
+
+
+def beam_matrices(length, elements):
+    """K and M (2 e + 2) of Hermite elements with EI = 1, ρA = 0.2, and ∫ρA w, ∫ρA x w; deflection and slope by node."""
+    h, n = length / elements, 2 * elements + 2
+    K, M, sums, moments = np.zeros((n, n)), np.zeros((n, n)), np.zeros(n), np.zeros(n)
+    k = np.array([[12, 6 * h, -12, 6 * h], [6 * h, 4 * h * h, -6 * h, 2 * h * h], [-12, -6 * h, 12, -6 * h],
+                  [6 * h, 2 * h * h, -6 * h, 4 * h * h]]) / h**3  # fmt: skip
+    at, weights = np.polynomial.legendre.leggauss(5)
+    for e in range(elements):
+        place = slice(2 * e, 2 * e + 4)
+        K[place, place] += k
+        for s, weight in zip((at + 1) / 2, weights * h / 2 * 0.2, strict=True):
+            N = np.array([1 - 3 * s**2 + 2 * s**3, h * (s - 2 * s**2 + s**3), 3 * s**2 - 2 * s**3, h * (s**3 - s**2)])
+            M[place, place] += weight * np.outer(N, N)
+            sums[place] += weight * N
+            moments[place] += weight * (e + s) * h * N
+    return K[2:, 2:], M[2:, 2:], sums[2:], moments[2:]
+
+
+def test_frequencies_and_compliance_of_two_links_against_an_assembly_to_1e_8(tmp_path):
+    """Links at an angle, a payload, gears: Hermite beams, clamped at their roots, assembled here; all modes are kept.
+
+    ṙ = n₁ ẇ₁(L₁) + (φ̇₁ + γ̇₂)(x n₂) + n₂ ẇ₂(x), with φ₁ the slope at the tip of the first link and γ the twist of gears.
+    """
+    L1, L2, elements, turn, mass, rotor, gear = 0.5, 0.4, 4, 0.8, 0.3, 1e-5, 4.0
+    for name, length in (("a", L1), ("b", L2)):
+        strip(tmp_path, name, length, elements, 2 * elements, attachment="false")
+    scene = 'name = "two"\nspace = "planar"\ngravity = [0.0, 0.0]\n'
+    for name, before in (("a", "ground"), ("b", "a.tip")):
+        scene += f'[[body]]\nname = "{name}"\nlink = "{name}.toml"\n[[joint]]\nname = "to_{name}"\ntype = "revolute"\n'
+        scene += (
+            f'between = ["{before}", "{name}.root"]\nstiffness = {gear}\nrotor_inertia = {rotor}\ngear_ratio = 10.0\n'
+        )
+    scene += f'[initial]\njoints = {{ to_b = {turn} }}\n[[payload]]\npoint = "b.tip"\nmass = {mass}\n'
+    scene += '[[analysis]]\nname = "rest"\nkind = "static"\npoints = ["b.tip"]\n'
+    (K1, M1, s1, m1), (K2, M2, s2, m2) = (beam_matrices(length, elements) for length in (L1, L2))
+    n, c, s = 2 * elements, np.cos(turn), np.sin(turn)
+    K, M = np.zeros((2 * n + 2, 2 * n + 2)), np.zeros((2 * n + 2, 2 * n + 2))  # of w₁, w₂, γ₁, γ₂
+    one, two, g1, g2 = slice(0, n), slice(n, 2 * n), 2 * n, 2 * n + 1
+    K[one, one], K[two, two], K[g1, g1], K[g2, g2] = K1, K2, gear, gear
+    M[one, one] += M1
+    M[one, g1] = M[g1, one] = m1
+    M[g1, g1] += 0.2 * L1**3 / 3
+    tip, slope, along, bent = (np.zeros(2 * n + 2) for _ in range(4))
+    tip[n - 2], tip[g1], slope[n - 1], slope[g1] = 1.0, L1, 1.0, 1.0
+    spin = slope.copy()
+    spin[g2] = 1.0
+    M[two, two] += M2
+    M += 0.2 * L2 * np.outer(tip, tip) + 0.2 * L2**3 / 3 * np.outer(spin, spin)
+    M += 0.2 * L2**2 / 2 * c * (np.outer(tip, spin) + np.outer(spin, tip))
+    along[two], bent[two] = s2, m2
+    M += c * (np.outer(tip, along) + np.outer(along, tip)) + np.outer(spin, bent) + np.outer(bent, spin)
+    end = np.array([np.zeros(2 * n + 2), tip])  # x, y of the tip of b, n₁ = (0, 1), n₂ = (−s, c)
+    end += np.outer([-s, c], L2 * spin + np.eye(2 * n + 2)[2 * n - 2])
+    M += mass * end.T @ end + rotor * np.outer(slope, slope)
+    with write(tmp_path, scene) as results:
+        for condition, kept in (("locked", slice(0, 2 * n)), ("compliant", slice(0, 2 * n + 2))):
+            expected = np.sqrt(eigh(K[kept, kept], M[kept, kept], eigvals_only=True)) / (2 * np.pi)
+            found = results[f"rest/joints_{condition}/frequency"][0]
+            np.testing.assert_allclose(found, expected, rtol=1e-8)
+            J = end[:, kept]
+            C = results[f"rest/joints_{condition}/compliance/b.tip"][0][:2, :2]
+            exact = J @ np.linalg.solve(K[kept, kept], J.T)
+            np.testing.assert_allclose(C, exact, atol=1e-8 * np.abs(exact).max())
+
+
+@pytest.mark.parametrize(("condition", "frequency"), [("locked", 1.0), ("locked", 4.0), ("compliant", 1.0)])
+def test_frequency_response_against_time_integration(tmp_path, condition, frequency):
+    """A small oscillating force at the tip; after the transient the amplitude of the tip is |H|."""
+    strip(tmp_path, "arm", 0.5, 10, 3, damping=0.2)
+    path = "motor" if condition == "compliant" else "joint"
+    gear = "stiffness = 4.0\ndamping = 0.5\nrotor_inertia = 1e-5\ngear_ratio = 10.0\n" * (condition == "compliant")
+    omega, force = 2 * np.pi * frequency, 1e-4
+    scene = 'name = "one"\nspace = "planar"\ngravity = [0.0, 0.0]\n[[body]]\nname = "arm"\nlink = "arm.toml"\n'
+    scene += f'[[joint]]\nname = "O"\ntype = "revolute"\nbetween = ["ground", "arm.root"]\n{gear}'
+    scene += '[[payload]]\npoint = "arm.tip"\nmass = 0.1\n'
+    scene += f'[[load]]\npoint = "arm.tip"\ny = "{force}*sin({omega}*t)"\n'
+    scene += f'[[trajectory]]\nname = "held"\n{path} = "O"\nvalue = "0"\n'
+    scene += '[[analysis]]\nname = "shaken"\nkind = "pcid"\nend = 12.0\noutput_step = 0.01\ntolerance = 1e-8\n'
+    with write(tmp_path, scene) as results:
+        time, y = results["shaken/time"], results["shaken/points/arm.tip/position"][:, 1]
+    model = prepare_scene(tmp_path / "scene.toml").model
+    found = PoseEvaluator(model, undeformed_posture(model).q, "arm.tip", count=1, omega=np.array([omega]))
+    expected = found.at(undeformed_posture(model).q)[f"joints_{condition}/response"][0, 1]
+    late = time > 10.0
+    waves = np.column_stack([np.sin(omega * time), np.cos(omega * time)])[late]
+    amplitude = np.linalg.norm(np.linalg.lstsq(waves, y[late], rcond=None)[0]) / force
+    assert amplitude == pytest.approx(expected, rel=1e-5)
