@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 from ..common.errors import InputError
-from ..mbs.quantities.second_order import Missing, missing_in_pieces
+from ..mbs.quantities.second_order import Missing
 from ..mbs.quantities.validity import Bending
 from ..scene.pieces import BodyInPieces
 
@@ -20,14 +20,9 @@ def worst_of_pieces(bending: Mapping[str, Bending], divided: Mapping[str, BodyIn
         if name not in worst or found.position_error > worst[name].position_error:
             worst[name] = found
     return {
-        name: _in_pieces(found, len(divided[name].names)) if name in divided else found for name, found in worst.items()
+        name: replace(found, pieces=len(divided[name].names)) if name in divided else found
+        for name, found in worst.items()
     }
-
-
-def _in_pieces(piece: Bending, count: int) -> Bending:
-    """A link in `count` pieces as its worst one."""
-    missing = missing_in_pieces(piece.rotations, count) if piece.is_stiffened else piece.missing
-    return replace(piece, pieces=count, missing=missing)
 
 
 def shared_in_motion(bending: Mapping[str, Bending]) -> dict[str, Bending]:

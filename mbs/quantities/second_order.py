@@ -19,7 +19,6 @@ from .stiffness_change import ModalLoads
 
 OUTPUTS = 64  # at which Δp is found: those with the largest ‖S‖ ‖p‖, and as many with the largest ‖p‖
 IN_MOTION = 2.0  # times what is missed at rest: loads that come at once
-IN_ONE_PLANE = 0.015  # times θ³/N of a link in N pieces, of its length, with the rotation θ of bending in the worst
 
 
 class Missing(NamedTuple):
@@ -74,17 +73,6 @@ def missing_to_second_order(
         return Missing(np.inf, np.inf)
     of_deflections = sum(angle**2 for angle in rotations) / 3 / (1 - stiffness_change) ** 2
     return Missing(min(of_deflections * displacement, shortening / 2), min(1.0, of_deflections))
-
-
-def missing_in_pieces(rotations: Rotations, count: int) -> Missing:
-    """What a planar link misses in `count` pieces with geometric stiffening, by the rotation in its worst piece.
-
-    In 3D `pieces_error` knows better.
-    """
-    most = rotations.bending_z
-    of_length = IN_ONE_PLANE * most**3 / count
-    whole = 2 / 3 * count * most  # of a cantilever under a force, whose slope is N θ at its tip
-    return Missing(of_length, min(1.0, of_length / whole) if whole else 0.0)
 
 
 def largest_rotations(link: ModalBody, p: Array) -> Rotations:
