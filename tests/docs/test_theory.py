@@ -1,4 +1,4 @@
-"""The theory page: equations are numbered in order, references have one, figures are those of their script."""
+"""The theory page: equations are numbered in order, references have one, the script draws all figures."""
 
 import re
 import sys
@@ -31,7 +31,7 @@ def test_formulas_of_several_lines_keep_their_number_on_the_site():
     assert not [formula for formula in re.findall(r"\$\$.+?\$\$", PAGE, re.DOTALL) if r"\\" in formula]
 
 
-def test_figures_are_those_of_their_script(tmp_path):
+def test_figures_of_the_page_are_those_that_the_script_draws(tmp_path):
     pytest.importorskip("matplotlib")
     from theory_sketches import draw_all
 
