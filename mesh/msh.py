@@ -122,7 +122,7 @@ class _Version2:
             elif GMSH_NODES[kind] > 1:
                 lines.append(cells[:, :2])
         whole = {name: np.concatenate(rows) for name, rows in regions.items()}
-        remarks = [f"all cells are of partition {number}: others may be in files of their own" for number in partitions]
+        remarks = [f"all cells are of partition {number}: others may be in separate files" for number in partitions]
         remarks = remarks if len(remarks) == 1 else []
         return RawMesh(points, tuple(blocks), whole, facets, {}, tuple(surfaces), tuple(lines), tuple(remarks))
 

@@ -106,7 +106,7 @@ def test_partitions_of_version_2(read, partitions, binary):
         content = content.replace(before, after)
     part = read(content)
     assert integrate(part) == pytest.approx(VOLUME, rel=1e-9)
-    alone = "all cells are of partition 1: others may be in files of their own"
+    alone = "all cells are of partition 1: others may be in separate files"
     assert part.remarks == (() if partitions == (1, 2) else (alone,))
 
 
