@@ -9,6 +9,7 @@ import pytest
 from ffrobot import FfrobotError
 from ffrobot.exchange.urdf.bodies import least_change
 from ffrobot.exchange.urdf.import_urdf import import_urdf
+from ffrobot.exchange.urdf.read import read_urdf
 
 INERTIA = 'ixx="0.01" ixy="0" ixz="0" iyy="0.02" iyz="0" izz="0.025"'
 TIAGO = 'ixx="0.0019" ixy="0" ixz="0" iyy="0.00846" iyz="0" izz="0.01059"'  # its first arm link, 2 % off
@@ -66,6 +67,34 @@ def test_inertias_that_are_not_positive_stay_refused(tmp_path):
     nothing = 'ixx="0" ixy="0" ixz="0" iyy="0" iyz="0" izz="0"'
     with pytest.raises(FfrobotError, match="greater than 0"):
         imported(tmp_path, link("base"), link("arm", nothing), joint("j", "base", "arm"), fix_inertia=True)
+
+
+@pytest.mark.parametrize(("moments", "hint"), [("-0.01 0.01 0.01", False), ("0.01 0.01 0.03", True)])
+def test_the_way_on_is_named_where_it_is_one(tmp_path, moments, hint):
+    xx, yy, zz = moments.split()
+    inertia = f'ixx="{xx}" ixy="0" ixz="0" iyy="{yy}" iyz="0" izz="{zz}"'
+    with pytest.raises(FfrobotError) as error:
+        imported(tmp_path, link("base"), link("arm", inertia), joint("j", "base", "arm"))
+    assert ("--fix-inertia" in str(error.value)) == hint
+
+
+ENCODINGS = ["utf-8", "utf-8-sig", "utf-16", "ISO-8859-1", "windows-1251", "GB2312", "Shift_JIS"]
+
+
+@pytest.mark.parametrize("encoding", ENCODINGS)
+def test_encodings_that_xml_declares(tmp_path, encoding):
+    name = {"ISO-8859-1": "größe", "windows-1251": "плечо"}.get(encoding, "関節" if encoding == "Shift_JIS" else "关节")
+    text = f'<robot name="r">{link("base")}{link("arm")}{joint(name, "base", "arm")}</robot>'
+    declared = encoding.removesuffix("-sig")
+    (tmp_path / "r.urdf").write_bytes(f'<?xml version="1.0" encoding="{declared}"?>{text}'.encode(encoding))
+    assert list(read_urdf(tmp_path / "r.urdf").joints) == [name]
+
+
+@pytest.mark.parametrize("encoding", ["hex", "nonsense", "ascii"])
+def test_encodings_that_are_none(tmp_path, encoding):
+    (tmp_path / "r.urdf").write_bytes(f'<?xml version="1.0" encoding="{encoding}"?><robot name="größe"/>'.encode())
+    with pytest.raises(FfrobotError, match="found XML that is not well-formed"):
+        read_urdf(tmp_path / "r.urdf")
 
 
 @pytest.mark.parametrize("huge", ["18446744073709551616", "999999999999999999999", "1e31", "-1e29"])

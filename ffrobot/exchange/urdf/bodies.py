@@ -190,6 +190,12 @@ def is_possible(inertia: Array) -> bool:
     return bool(moments[2] <= moments[0] + moments[1] + ROUNDING * np.abs(inertia).max())
 
 
+def _is_mended(inertia: Array) -> bool:
+    """Whether the least change makes an impossible inertia one of a body."""
+    moments = np.linalg.eigvalsh(least_change(inertia))
+    return not is_possible(inertia) and bool(moments[0] > ROUNDING * moments[2])
+
+
 def _check_inertias(bodies: list[Body]) -> None:
     found = []
     for body in bodies:
@@ -199,7 +205,7 @@ def _check_inertias(bodies: list[Body]) -> None:
             xx, yy, zz = (tuple(row) for row in as_rows(body.inertial.inertia))
             check_inertia((xx, yy, zz), SMALLEST)
         except ValueError as error:
-            way = "" if is_possible(body.inertial.inertia) else ": --fix-inertia makes the least change"
+            way = ": --fix-inertia makes the least change" if _is_mended(body.inertial.inertia) else ""
             found.append(f"{body.label}: <inertia>: {error}{way}")
     if found:
         raise InputError("\n".join(found))

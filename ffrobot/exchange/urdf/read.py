@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable
 from pathlib import Path
 from xml.etree import ElementTree
@@ -19,6 +20,7 @@ from .topology import check_mimics, root_of
 
 Element = ElementTree.Element
 
+_ENCODING = re.compile(rb"""(?:\xef\xbb\xbf)?<\?xml[^>]*?\sencoding=["']([\w.-]+)["']""")
 ENTRIES = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
 
 
@@ -44,23 +46,26 @@ def _root_element(content: bytes) -> Element:
         root = _parsed(content)
     except (expat.ExpatError, LookupError, ValueError) as error:
         raise InputError(f"expected a URDF file, found XML that is not well-formed: {error}") from None
-    if root.tag != "robot":
-        raise InputError(f"expected a URDF file, whose root is <robot>, found <{shown(root.tag)}>")
     prefixes = {key.partition(":")[2] for key, value in root.items() if "ros.org/wiki/xacro" in value} | {"xacro"}
     if xacro := next((each.tag for each in root.iter() if each.tag.partition(":")[0] in prefixes), None):
         raise InputError(
             f"expected a URDF file, found <{shown(xacro)}>: run `xacro FILE.xacro > ROBOT.urdf` first,"
             " in an environment with ROS or with PyPI's xacro"
         )
+    if root.tag != "robot":
+        raise InputError(f"expected a URDF file, whose root is <robot>, found <{shown(root.tag)}>")
     return root
 
 
 def _parsed(content: bytes) -> Element:
     """Elements with their prefixes as they are: published files use some (drake:, gazebo:) that they do not declare."""
-    builder, parser = ElementTree.TreeBuilder(), expat.ParserCreate()
+    declared = _ENCODING.match(content)  # not in UTF-16, which expat knows
+    if declared:
+        content = content.decode(declared[1].decode()).encode()  # expat knows none of several bytes a character
+    builder, parser = ElementTree.TreeBuilder(), expat.ParserCreate("utf-8" if declared else None)
     parser.StartElementHandler, parser.EndElementHandler = builder.start, builder.end
     parser.CharacterDataHandler = builder.data
-    parser.Parse(content, True)  # bytes: in the encoding that the XML declares
+    parser.Parse(content, True)
     return builder.close()
 
 
