@@ -19,6 +19,7 @@ ALUMINIUM = {"youngs_modulus": 70e9, "poissons_ratio": 0.33, "density": 2700.0}
 AT_END = 1e-3  # of the length: how far a plane end is from the end of the bounding box
 ROUND_JOINT = 0.1  # least radius of a bore for a joint, of the part's extent across
 SQUARE = 0.1  # largest cosine between the axis of such a bore and the part
+NEARLY = 0.98  # cosine between a normal and a direction that may be the same
 DIGITS = 9
 
 
@@ -33,8 +34,8 @@ def draft_link(part: Inspection, file: Path, name: str, folder: Path) -> str:
     """
     root, tip = _ends(part)
     way = tip.point - root.point
-    if root.kind == "plane":  # x is square to it
-        way = (way @ root.direction) * root.direction
+    along = (way @ root.direction) * root.direction
+    way = along if root.kind == "plane" else way - along  # x is square to a plane root, and to the axis of a bore
     x = way / np.linalg.norm(way)
     y = _across(part, root, x)
     axes = np.stack([x, y, np.cross(x, y)])
@@ -121,13 +122,19 @@ def _is_outermost(part: Inspection, face: PartFace, slack: float) -> bool:
 
 def _across(part: Inspection, root: PartFace, x: Array) -> Array:
     """The link's y axis: square to the axis of the root's bore, else the direction in which the part is thinnest."""
-    z = root.direction if root.kind == "bore" else _principal(part)[0][1]
+    z = root.direction if root.kind == "bore" else _squared(part, _principal(part)[0][1])
     z = z - (z @ x) * x
     if np.linalg.norm(z) < SQUARE:
         z = np.eye(3)[np.abs(x).argmin()]
         z = z - (z @ x) * x
     y: Array = np.cross(z / np.linalg.norm(z), x)
     return y
+
+
+def _squared(part: Inspection, direction: Array) -> Array:
+    """The normal of the largest plane face that nearly has `direction`, which nodes of a mesh show roughly."""
+    near = (face.direction for face in part.faces if face.kind == "plane" and abs(face.direction @ direction) > NEARLY)
+    return next(near, direction)
 
 
 def _commented(tables: list[dict[str, Any]]) -> Iterator[str]:

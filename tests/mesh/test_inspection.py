@@ -1,5 +1,7 @@
 """What is found in a part's file without a link file, and the draft of one: a plate with bores, by closed forms."""
 
+import tomllib
+
 import gmsh
 import numpy as np
 import pytest
@@ -84,6 +86,31 @@ def test_a_draft_wherever_the_part_lies(bores, length, tmp_path):
     assert there.length == pytest.approx(length, rel=1e-6)
     assert here.mass == pytest.approx(there.mass, rel=1e-9)
     np.testing.assert_allclose(here.frequency[:3], there.frequency[:3], rtol=1e-6)
+
+
+def test_axes_of_a_fork_are_those_of_its_faces(tmp_path):
+    """Of the two lugs at its end the draft takes one, 10 mm off the plane of symmetry."""
+    with gmsh_session():
+        cad = gmsh.model.occ
+        whole, slot = cad.addBox(0, -20, -15, 300, 40, 30), cad.addBox(230, -20, -5, 70, 40, 10)
+        bores = [(3, cad.addCylinder(x, 0, -15, 0, 0, 30, RADIUS)) for x in (25, 275)]
+        cad.cut([(3, whole)], [(3, slot), *bores])
+        cad.synchronize()
+        gmsh.write(str(tmp_path / "fork.step"))
+    keys = tomllib.loads(draft_link(inspect_part(tmp_path / "fork.step"), tmp_path / "fork.step", "fork", tmp_path))
+    assert keys["geometry"]["length"] == pytest.approx(0.25, rel=1e-9)
+    np.testing.assert_allclose(
+        np.abs([keys["geometry"][axis] for axis in ("x_axis", "y_axis")]), np.eye(3)[:2], atol=1e-9
+    )
+    np.testing.assert_allclose(np.abs(keys["interface"][1]["position"]), [0.25, 0, 0.01], atol=1e-9)
+
+
+def test_axes_of_a_plate_are_those_of_its_faces(tmp_path):
+    """Nodes of a mesh that is not symmetric are longest in a direction off these."""
+    plate(tmp_path / "plate.step", ())
+    keys = tomllib.loads(draft_link(inspect_part(tmp_path / "plate.step"), tmp_path / "plate.step", "plate", tmp_path))
+    y_axis = keys["geometry"]["y_axis"]
+    np.testing.assert_array_equal(np.abs(y_axis), [0, 0, 1])
 
 
 def test_what_has_no_ends(tmp_path):
