@@ -27,6 +27,12 @@ if TYPE_CHECKING:
 
 _OTHERS = re.compile(r"(vertex|line|triangle|quad)\d*")
 _CORNERS = {"line": 2, "triangle": 3, "quad": 4}
+# VTK's cells of any degree that others have names for.
+_LAGRANGE = {
+    ("VTK_LAGRANGE_TETRAHEDRON", 4): "tetra",
+    ("VTK_LAGRANGE_TETRAHEDRON", 10): "tetra10",
+    ("VTK_LAGRANGE_HEXAHEDRON", 8): "hexahedron",
+}
 _VOXEL = [0, 1, 3, 2, 4, 5, 7, 6]  # corners of VTK's voxel, which are in order of x, then y, then z, as a hexahedron's
 _TECPLOT = re.compile(rb"^\s*ZONE\b", re.MULTILINE | re.IGNORECASE)  # other files with the ending .dat are Nastran's
 _LEFT_OUT = "cells that meshio cannot handle"
@@ -143,6 +149,7 @@ def _raw_mesh(mesh: meshio.Mesh) -> RawMesh:
                     faces.setdefault(name, []).append(surfaces[-1][rows])
         else:  # of unknown types, too: these are rejected by name
             kind = "hexahedron" if block.type == "voxel" else block.type
+            kind = _LAGRANGE.get((kind, cells.shape[1]), kind)
             order = _VOXEL if block.type == "voxel" else TO_GMSH.get(kind)
             blocks.append((kind, cells if order is None else cells[:, order]))
             for name, rows in groups.items():

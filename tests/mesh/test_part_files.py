@@ -316,6 +316,21 @@ def test_cells_that_meshio_leaves_out_are_not_dropped(tmp_path, monkeypatch):
         read_foreign(tmp_path / "part.vtu", "part")
 
 
+@pytest.mark.parametrize(
+    ("kind", "bend"), [("HEXAHEDRON", None), ("TETRAHEDRON", None), ("TETRAHEDRON", 0.0), ("TETRAHEDRON", 0.3)]
+)
+def test_cells_of_any_degree_of_vtk(solid, mesh_part, tmp_path, kind, bend):
+    """As FEniCSx and ParaView write them; with 10 nodes the volume is that of parabolas: ∫ 1 + 0.3 x² dx = 1.1."""
+    pyvista = pytest.importorskip("pyvista")
+    box = structured_box(1.0, (0.015, 0.025), (0.015, 0.025), (8, 1, 1), kind.lower())
+    points, cells = (box.points, box.cells) if bend is None else with_mid_sides(box, bend)
+    of = np.column_stack([np.full(len(cells), cells.shape[1]), cells]).ravel()
+    kinds = np.full(len(cells), int(pyvista.CellType[f"LAGRANGE_{kind}"]))
+    pyvista.UnstructuredGrid(of, kinds, points).save(tmp_path / "part.vtu")
+    part = mesh_part(solid(file=tmp_path / "part.vtu"))
+    assert integrate(part) == pytest.approx((1.1 if bend else 1.0) * VOLUME, rel=1e-6)
+
+
 @pytest.mark.parametrize("compressed", ["ZLib", "LZ4"])
 def test_hidden_cells_of_vtk_are_rejected(solid, mesh_part, tmp_path, compressed):
     """ParaView's blanking: meshio shows all cells, VTK's own reader the others."""
