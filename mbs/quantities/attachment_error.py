@@ -49,7 +49,7 @@ class Vibrations(NamedTuple):
 
 
 def mode_error(links: Iterable[ModesInMotion]) -> float | None:
-    """Estimated error of torques and deflections for too few modes, of their peaks; None where nothing is known.
+    """Estimated error of torques, reactions and deflections for too few modes, of their peaks; None: nothing is known.
 
     Attachment modes carry what the eigenmodes left out do statically. What these do besides, by their inertia, is
     about as if they vibrated at ω_m, where the first of them is: between the highest eigenmode kept, ω_k, and the
@@ -57,8 +57,8 @@ def mode_error(links: Iterable[ModesInMotion]) -> float | None:
     at all: the largest p counts where attachment modes ring at their own ω, as after a jump of the acceleration. The
     estimate is the largest √(δpᵀ K δp) of a link against the largest √(pᵀ K p). What rings from the start on gets out
     of step besides: `phase_error`. Both together are 0.2 to 5 times the error of the worst torque of arms with two or
-    more modes, up to 10 times it with one (tests/mbs/test_mode_error.py). Nothing is known of links without attachment
-    modes.
+    more modes, up to 10 times it with one (tests/mbs/test_mode_error.py). What bends a link across the axes of all
+    motors counts too: reactions feel it, motors do not. Nothing is known of links without attachment modes.
     """
     ratios = []
     for body, p, p_ddot in links:

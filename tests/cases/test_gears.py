@@ -122,6 +122,28 @@ def test_motors_behind_gears_carry_out_an_inverse_analysis(tmp_path):
             assert np.abs(off).max() < 1e-9
 
 
+def test_replays_behind_gears_are_as_good_as_outputs_are_close(tmp_path):
+    """Motors act by splines through the outputs of the inverse analysis: with the fourth power of their step at least.
+
+    Steps of the integrators have no part in it: the path of a rigid arm is known at any time.
+    """
+    arm = rigid("arm", [0.02, 0.05, 0.04], 0.8, [0.3, 0.1, 0.0])
+    path = "0.9*(10*(t/0.3)**3 - 15*(t/0.3)**4 + 6*(t/0.3)**5)"
+    apart = []
+    for outputs in (20, 80, 320):
+        analyses = [
+            {"name": "inverse", "kind": "pcid", "end": 0.3, "output_step": 0.3 / outputs},
+            RUN | {"actuation": "inverse", "apply": "joints", "end": 0.3, "output_step": 0.015},
+        ]
+        joint = revolute("A", "ground", "arm.root", AXIS, **SOFTER)
+        keys = {"gravity": [0.0, 0.0, -9.81], "trajectory": [{"name": "path", "joint": "A", "value": path}]}
+        with solve(scene([arm], [joint], *analyses, **keys), tmp_path) as found:
+            exact = found["inverse/joints/A/coordinate"][:: outputs // 20]
+            apart.append(np.abs(found["run/joints/A/coordinate"] - exact).max())
+    assert apart[0] > 1e-8
+    assert np.all(np.divide(apart[:-1], apart[1:]) > 4.0**4)
+
+
 @pytest.mark.parametrize("second", [FIRM, SOFTER], ids=["firm", "soft"])
 @pytest.mark.parametrize("between", [("b.root", "a.tip"), ("a.tip", "b.root")])
 @pytest.mark.parametrize(("kind", "followed"), [("pcid", "joint"), ("pcid", "motor"), ("fcid", "joint")])
