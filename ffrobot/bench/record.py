@@ -22,9 +22,10 @@ COLUMNS = {
     "growth": ("with", "size", "seconds_min", "order"),
     "evaluations": ("what", "seconds_min", "seconds", "aim", "of_hand_written", "of_hand_written_median"),
     "aims": ("what", "run", "status", "integrator", "tolerance", "ratio", "ratio_median", "aim", "accurate"),
-    "replays": ("what", "integrator", "seconds", "of_pcid", "of_pcid_median", "aim", "steps", "steps_of_pcid"),
+    "replays": ("scene", "what", "integrator", "tolerance", "seconds", "of_pcid", "of_pcid_median", "steps",
+                "steps_of_pcid", "off"),
     "peer": ("step", "gravity", "status", "seconds", "error_force", "error_displacement", "error_force_at_start"),
-}
+}  # fmt: skip
 
 # The least time of repetitions is what the machine can do: what tables and figures show, and say that they do.
 HEADINGS = {"seconds_min": "least seconds"}

@@ -2,9 +2,9 @@
 
 Loads of sizes f_j with geometric stiffness K_j change the stiffness of the modes by S = Σ f_j K_j, and move the points
 of the link by −½ pᵀK p besides Φp. Without geometric stiffening both are missing: p is off by
-Δp = −(K_ff + S)⁻¹ S p, a point by |ΦΔp − ½ pᵀK p|. With it, what is missing is of third order in the rotations θ of
-sections, θ²/3, and grows near buckling as 1/(1 − μ)², μ the largest relative change of stiffness.
-Measured against exact rods: docs/theory.md, Limits.
+Δp = −(K_ff + S)⁻¹ S p, a point by |ΦΔp − ½ pᵀK p|, as seen from the section that the inner joint carries.
+With it, what is missing is of third order in the rotations θ of sections, θ²/3, and grows near buckling as 1/(1 − μ)²,
+μ the largest relative change of stiffness. Measured against exact rods: docs/theory.md, Limits.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import numpy as np
 
 from ...common.arrays import Array, Indices
 from ...fe_models.modal_body import ModalBody
-from .stiffness_change import ModalLoads
+from .stiffness_change import LoadedPoint, ModalLoads
 
 OUTPUTS = 64  # at which Δp is found: those with the largest ‖S‖ ‖p‖, and as many with the largest ‖p‖
 IN_MOTION = 2.0  # times what is missed at rest: loads that come at once
@@ -43,26 +43,46 @@ class Rotations(NamedTuple):
     bending_z: float
 
 
-def missing_to_first_order(loads: ModalLoads, p: Array, stations: Array, length: float, *, is_at_rest: bool) -> Missing:
+def missing_to_first_order(
+    loads: ModalLoads, p: Array, stations: Array, places: Array, length: float, *, is_at_rest: bool
+) -> Missing:
     """What a link without geometric stiffening misses; infinite where its loads at rest buckle it.
 
-    p (T, n) and `stations` (k, c, n), the translations of stations, in the modes of the equations.
+    p (T, n) and `stations` (k, 3, n), the translations of stations at `places` (k, 3), in the modes of the equations.
     """
     if not len(p) or not loads.f.size:
         return Missing(0.0, 0.0)
     at = _worst_outputs(loads, p)
     S = np.tensordot(loads.f[at], loads.K, axes=1)
     stiffness = np.diag(loads.stiffness) + S
+    if loads.held is not None:
+        stations = stations - _carried(loads.held, loads.held.by_modes, places)
     whole = _largest(p, stations)
     if np.linalg.eigvalsh(stiffness)[:, 0].min() <= 0.0:  # buckles for good, or for a moment
         return Missing(np.inf, np.inf) if is_at_rest else Missing(whole / length, 1.0)
     change = -np.linalg.solve(stiffness, np.einsum("tmn,tn->tm", S, p[at])[:, :, None])[:, :, 0]
     change *= 1.0 if is_at_rest else IN_MOTION
     missed = _largest(change, stations)
-    for translation, K in loads.points:
-        moved = change @ translation.T - 0.5 * ((p[at] @ K) * p[at]).sum(axis=2).T
-        missed = max(missed, float(np.linalg.norm(moved, axis=1).max()))
+    of_held = None if loads.held is None else _moved(loads.held, p[at], change)
+    for point in loads.points:
+        moved = _moved(point, p[at], change)[:3]
+        if loads.held is not None and of_held is not None:
+            moved = moved - _carried(loads.held, of_held, point.position[None])[0]
+        missed = max(missed, float(np.linalg.norm(moved, axis=0).max()))
     return Missing(missed / length, min(1.0, missed / whole) if whole else 0.0)
+
+
+def _moved(point: LoadedPoint, p: Array, change: Array) -> Array:
+    """(6, T) ΦΔp − ½ pᵀK p of p and Δp (T, n)."""
+    found: Array = point.by_modes @ change.T - 0.5 * ((p @ point.K) * p).sum(axis=2)
+    return found
+
+
+def _carried(held: LoadedPoint, moved: Array, places: Array) -> Array:
+    """What a section that is `moved` (6, m) does to points at `places` (k, 3) that it carries: (k, 3, m)."""
+    arms = places - held.position
+    found: Array = moved[:3] + np.cross(moved[3:].T, arms[:, None]).swapaxes(1, 2)
+    return found
 
 
 def missing_to_second_order(

@@ -28,19 +28,24 @@ class StiffnessChange(NamedTuple):
 
 
 class LoadedPoint(NamedTuple):
-    """An interface: translation (c, n) by modes along c axes, and K (c, n, n) of forces along these."""
+    """An interface at `position` (3,): what modes do there (6, n), and K (6, n, n) of forces and moments there."""
 
-    translation: Array
+    position: Array
+    by_modes: Array
     K: Array
 
 
 class ModalLoads(NamedTuple):
-    """Loads of sizes f (T, J) with geometric stiffness K (J, n, n), on modes of stiffness K_ff (n,)."""
+    """Loads of sizes f (T, J) with geometric stiffness K (J, n, n), on modes of stiffness K_ff (n,).
+
+    `held`: where the inner joint carries the link; rotations that the joint leaves free are 0 there.
+    """
 
     f: Array
     K: Array
     stiffness: Array
     points: tuple[LoadedPoint, ...] = ()
+    held: LoadedPoint | None = None
 
     @property
     def relative(self) -> Array:

@@ -18,7 +18,9 @@ import numpy as np
 
 from ...common.arrays import Array
 from ...fe_models.modal_body import ModalBody
+from ...fe_models.modal_body.unit_loads import interface_load_names
 from ..model.body import Body
+from ..model.tree import Node
 from .link_loads import loads_in_equations
 from .motion import RobotMotion
 from .second_order import (
@@ -143,28 +145,52 @@ def link_bending(motion: RobotMotion, links: Mapping[str, ModalBody]) -> dict[st
     for name, link in links.items():
         body, sizes = motion.node(name).body, loads[name].sizes if name in loads else {}
         p = motion.q[:, motion.node(name).p_q] @ body.modal_transform.T
-        on_modes = _on_modes(link, body, sizes) if body.n_modes else None
+        on_modes = _on_modes(link, motion, name, sizes) if body.n_modes else None
         run = LinkInRun(p, body.modal_transform, on_modes, body.stiffening is not None, motion.is_at_rest)
         found[name] = bending_of_link(link, run, _largest_force(body, sizes, len(p)))
     return found
 
 
-def _on_modes(link: ModalBody, body: Body, sizes: Mapping[str, Array]) -> ModalLoads:
+def _on_modes(link: ModalBody, motion: RobotMotion, name: str, sizes: Mapping[str, Array]) -> ModalLoads:
     """Loads of `sizes` (T,) on a body, whether their geometric stiffness is in the equations or not.
 
     Loads by the names of `fe_models.modal_body.unit_loads`; those alone of which the file has a geometric stiffness.
     """
-    T, n = body.modal_transform, len(body.stiffness)
+    node = motion.node(name)
+    T, n = node.body.modal_transform, len(node.body.stiffness)
     K = {load: T.T @ of_load @ T for load, of_load in link.geometric_stiffness.items()}
     known = [load for load in sizes if load in K]
     f = np.stack([sizes[load] for load in known], axis=1) if known else np.zeros((0, 0))
-    along = {point: [f"force/{point}/{axis}" for axis in "xyz"] for point in link.interfaces}
-    points = tuple(
-        LoadedPoint(link.interfaces[point].translation @ T, np.stack([K[load] for load in of]))
-        for point, of in along.items()
-        if all(load in K for load in of)
-    )
-    return ModalLoads(f, np.array([K[load] for load in known]).reshape(-1, n, n), body.stiffness, points)
+    points = {
+        point: LoadedPoint(
+            at.position,
+            np.vstack([at.translation, at.rotation]) @ T,
+            np.stack([K.get(load, np.zeros((n, n))) for load in interface_load_names([point])]),
+        )
+        for point, at in link.interfaces.items()
+        if all(f"force/{point}/{axis}" in K for axis in "xyz")
+    }
+    held = points.get(node.outer.point)
+    if held is not None:
+        counts = np.eye(6)
+        counts[3:, 3:] = _turns_that_count(motion, node)
+        held = LoadedPoint(held.position, counts @ held.by_modes, np.tensordot(counts, held.K, axes=1))
+    K_known = np.array([K[load] for load in known]).reshape(-1, n, n)
+    return ModalLoads(f, K_known, node.body.stiffness, tuple(points.values()), held)
+
+
+def _turns_that_count(motion: RobotMotion, node: Node) -> Array:
+    """(3, 3), axes of the body: what is left of a rotation of its section at a joint without those that it is free to.
+
+    What trajectories hold is not free. Joints that turn about more than one axis leave nothing.
+    """
+    along = [row for row in motion.model.rows if row.is_trajectory and row.kind == "coordinate"]
+    if node.joint.name in map(motion.model.joint_of, along):
+        return np.eye(3)
+    turns = node.joint.motion(motion.q[0, node.q])[3:]
+    free = np.linalg.matrix_rank(turns) if turns.size else 0
+    axis = node.outer.triad[:, 2:]
+    return np.eye(3) - axis @ axis.T if free == 1 else np.eye(3) * (free == 0)
 
 
 def _largest_force(body: Body, sizes: Mapping[str, Array], count: int) -> Array:
@@ -200,7 +226,8 @@ def bending_of_link(link: ModalBody, run: LinkInRun, force: Array) -> Bending:
         missing = missing_to_second_order(largest_displacement(link, run.p), s / link.length, rotations, change.largest)
     else:
         p, stations = run.p @ np.linalg.pinv(run.T).T, link.stations.translation @ run.T
-        missing = missing_to_first_order(run.loads, p, stations, link.length, is_at_rest=run.is_at_rest)
+        places = link.stations.position
+        missing = missing_to_first_order(run.loads, p, stations, places, link.length, is_at_rest=run.is_at_rest)
     return Bending(
         w, phi, s, moment, change.largest, link.length, run.is_stiffened, missing, rotations, buckling=change.buckling
     )
