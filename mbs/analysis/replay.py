@@ -29,7 +29,7 @@ from ..model.rows import ConstraintRow
 from ..model.system import MultibodySystem
 from ..scene.analysis import TimedAnalysis, output_times
 from ..scene.loads import OF_POINT
-from ..solve.posture import robot_size
+from ..solve.posture import row_sizes
 from .context import ActuationPoints, PatchedLink
 from .outcome import Outcome
 
@@ -170,8 +170,7 @@ def left_paths(source: Outcome, run: Outcome) -> Iterator[str]:
     model, times, q = source.model, run.time[now], run.q[now]
     if not len(times):
         return
-    sizes = np.array([robot_size(model) if model.measures_way(row) else 1.0 for row in model.rows])
-    share = np.abs(row_values(model, q, times)[0]) / sizes
+    share = np.abs(row_values(model, q, times)[0]) / row_sizes(model)
     for path in dict.fromkeys(row.owner for row in model.rows if row.is_trajectory):
         off = share[:, [row.is_trajectory and row.owner == path for row in model.rows]].max(axis=1)
         if off.max() > OFF_PATH:

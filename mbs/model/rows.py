@@ -44,11 +44,6 @@ class ConstraintRow:
     target: TimeFunction | None = None
     law: OrientationLaw | None = None
 
-    @property
-    def carries_moment(self) -> bool:
-        """Whether its multiplier is a moment."""
-        return self.kind in ("dot", "rotation", "turn")
-
 
 def value_and_gradient(row: ConstraintRow, a: Motion, b: Motion, q: Array, times: Array) -> tuple[Array, Array]:
     """C (T,) at q (T, n_q) and `times` (T,), and its derivative C_v (T, n_v), from the motions of its sections."""

@@ -15,7 +15,7 @@ import numpy as np
 from ...common.arrays import Array, Integers
 from ..model.wrench import Wrench
 from ..scene.loads import OF_POINT
-from ..solve.posture import SINGULAR, robot_size
+from ..solve.posture import SINGULAR, robot_size, row_sizes
 from ..solve.statics import natural_sizes
 from .motion import RobotMotion
 from .reactions import reactions, reactions_of_loops
@@ -54,11 +54,11 @@ def shared_evenly(motion: M) -> tuple[M, Sharing | None]:
 
     None where nothing is: then the motion is as it was.
     """
-    is_loop, length = motion.model.loop_rows, robot_size(motion.model)
+    is_loop = motion.model.loop_rows
     if not is_loop.any() or not len(motion.time):
         return motion, None
     B, measured = _multipliers_of_loops(motion)
-    row_scales = np.array([1.0 if motion.model.rows[k].carries_moment else length for k in measured])
+    row_scales = row_sizes(motion.model)[measured]
     J = np.einsum("rm,tri->tmi", B, motion.rows[1][:, is_loop]) * natural_sizes(motion.model) / row_scales[:, None]
     some = np.unique(np.linspace(0, len(J) - 1, SAMPLES).astype(int))
     values = np.linalg.svd(J[some], compute_uv=False)

@@ -38,6 +38,12 @@ def robot_size(model: Model) -> float:
     return max(sizes, default=0.0) or 1.0
 
 
+def row_sizes(model: Model) -> Array:
+    """(rows,) natural sizes of C: 1 rad, or the robot's size."""
+    length = robot_size(model)
+    return np.array([length if model.measures_way(row) else 1.0 for row in model.rows])
+
+
 def solve_posture(model: Model, t: float, q: Array) -> Array | None:
     """Q (n_q,) moved onto C(q, t) = 0 by least steps of the joints, p kept; None where that does not converge."""
     found, is_met = solve_postures(model, np.array([t]), q[None])
@@ -49,8 +55,7 @@ def solve_postures(model: Model, times: Array, q: Array) -> tuple[Array, BoolArr
     q, left = np.array(q), np.full(len(q), np.inf)
     if not model.rows:
         return q, np.ones(len(q), dtype=bool)
-    scales, length = joint_scales(model), robot_size(model)
-    row_scales = np.array([1.0 if row.carries_moment else length for row in model.rows])
+    scales, row_scales = joint_scales(model), row_sizes(model)
     going, joints = np.arange(len(q)), scales > 0
     for _ in range(MOST_ITERATIONS):
         with np.errstate(over="ignore", invalid="ignore"):  # from anywhere: what is not finite ends there
@@ -174,9 +179,8 @@ def _ratio(J: Array, rank: int) -> float:
 
 def _scaled_rows(model: Model, q: Array, t: float = 0.0) -> Array:
     """C_v (rows, joint coordinates) at q (n_q,) and time t, in radians and sizes of the robot."""
-    row_scales = np.array([1.0 if row.carries_moment else robot_size(model) for row in model.rows]).reshape(-1, 1)
     C_v = row_values(model, q[None], np.array([t]))[1][0]
-    return as_floats((C_v * joint_scales(model) / row_scales)[:, model.tree.joint_columns])
+    return as_floats((C_v * joint_scales(model) / row_sizes(model)[:, None])[:, model.tree.joint_columns])
 
 
 def _null_space(J: Array) -> tuple[Array, int]:

@@ -15,7 +15,7 @@ from ..model.tree import Node
 from ..scene.mechanism import MechanismKeys
 from ..scene.space import SPACES
 from ..scene.trajectories import Trajectory
-from .posture import joint_scales, robot_size, solve_postures
+from .posture import joint_scales, row_sizes, solve_postures
 
 TURNING = ("revolute", "universal", "spherical", "weld")
 TRIES = 60
@@ -131,11 +131,10 @@ def _angles(node: Node) -> list[int]:
 def regular_postures(model: Model, q: Array) -> Array:
     """Of postures next to q (T, n_q) those (…, n_q) that meet all rows at t = 0 and are regular."""
     found, is_met = solve_postures(model, np.zeros(len(q)), q)
-    joints, length = model.tree.joint_columns, robot_size(model)
+    joints = model.tree.joint_columns
     scales = joint_scales(model)[joints]
-    row_scales = np.array([1.0 if row.carries_moment else length for row in model.rows])[:, None]
     found = found[is_met]
-    J = row_values(model, found, np.zeros(len(found)))[1][:, :, joints] * scales / row_scales
+    J = row_values(model, found, np.zeros(len(found)))[1][:, :, joints] * scales / row_sizes(model)[:, None]
     values = np.linalg.svd(J, compute_uv=False)
     regular: Array = found[values[:, -1] > REGULAR * values[:, 0]]
     return regular

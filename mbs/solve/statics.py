@@ -10,7 +10,7 @@ from ...common.arrays import Array, as_floats
 from ...common.errors import SolveError, quoted
 from ..model.known_motion import KnownStates, required_forces
 from ..model.model import Model, row_values
-from .posture import robot_size, with_rates
+from .posture import robot_size, row_sizes, with_rates
 from .start import undeformed_posture
 from .state import State
 
@@ -62,7 +62,7 @@ def hanging_joints(model: Model, start: State) -> Iterator[str]:
 def holding_multipliers(model: Model, q: Array) -> Array:
     """λ (rows,) with C_vᵀλ = Q at rest at q (n_q,), t = 0; of least size where rows depend on others."""
     C_v = row_values(model, q[None], np.zeros(1))[1][0]
-    return _least_multipliers(C_v, forces_at_rest(model, q[None])[0], natural_sizes(model), _row_scales(model))
+    return _least_multipliers(C_v, forces_at_rest(model, q[None])[0], natural_sizes(model), row_sizes(model))
 
 
 def static_equilibrium(model: Model, start: State, t: float = 0.0) -> State:
@@ -71,7 +71,7 @@ def static_equilibrium(model: Model, start: State, t: float = 0.0) -> State:
     Raises `SolveError` where there is no equilibrium near the start.
     """
     tree, n, m = model.tree, model.tree.n_v, len(model.rows)
-    sizes, row_scales = natural_sizes(model), _row_scales(model)
+    sizes, row_scales = natural_sizes(model), row_sizes(model)
     q = start.q
     C_v = row_values(model, q[None], np.array([t]))[1][0]
     multipliers = _least_multipliers(C_v, forces_at_rest(model, q[None], t)[0], sizes, row_scales)
@@ -100,7 +100,7 @@ def unstable_ways(model: Model, q: Array, multipliers: Array) -> Iterator[str]:
     """
     from scipy.linalg import null_space  # loaded here: others do not pay for it
 
-    tree, n, row_scales = model.tree, model.tree.n_v, _row_scales(model)
+    tree, n, row_scales = model.tree, model.tree.n_v, row_sizes(model)
     jacobian = _jacobian(model, q, 0.0, multipliers, natural_sizes(model), row_scales)
     K, size = -jacobian[:n, :n], _residual(model, q[None], 0.0, multipliers, row_scales)[1]
     scale = 1 / np.sqrt(np.maximum(np.abs(np.diag(K)), max(SLACK * size, 1e-300)))
@@ -128,12 +128,6 @@ def natural_sizes(model: Model) -> Array:
         sizes[node.v] = node.joint.state(of_joint) if node.joint.units else of_joint
         sizes[node.p_v] = np.sqrt(node.body.largest_moment)
     return sizes
-
-
-def _row_scales(model: Model) -> Array:
-    """(rows,) natural sizes of C: 1 rad, or the robot's size."""
-    length = robot_size(model)
-    return np.array([1.0 if row.carries_moment else length for row in model.rows])
 
 
 def _least_multipliers(C_v: Array, Q: Array, sizes: Array, row_scales: Array) -> Array:

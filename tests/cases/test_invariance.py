@@ -114,3 +114,41 @@ def test_bodies_in_another_order_move_as_before(case):
     tables, before, points = case
     with solved(tables | {"body": tables["body"][::-1]}) as after:
         compare(before, after, tables, np.eye(3), points)
+
+
+def crank(unit):
+    """Of a rigid loop of revolute, universal, spherical and revolute joints: angles, and torque, in m, kg, s."""
+    lengths = {"crank": 0.1, "rod": 0.4, "rocker": 0.35}
+
+    def body(name, length):
+        inertia = [0.02 * length**2 * unit**2] * 3
+        points = {"root": [0.0, 0.0, 0.0], "tip": [length * unit, 0.0, 0.0]}
+        center = [0.4 * length * unit, 0.0, 0.0]
+        return {"name": name, "rigid": {"mass": 0.3, "center": center, "inertia": inertia, "points": points}}
+
+    at = [0.35 * unit, 0.05 * unit, 0.1 * unit]
+    joints = [
+        {"name": "A", "type": "revolute", "between": ["ground", "crank.root"], "axis": [0, 0, 1], "motor": True},
+        {"name": "B", "type": "universal", "between": ["crank.tip", "rod.root"], "axis": [0, 0, 1],
+         "second_axis": [0, 1, 0], "motor": False},
+        {"name": "D", "type": "revolute", "between": ["ground", "rocker.root"], "axis": [0.2, -0.1, 1.0], "at": at,
+         "motor": False},
+        {"name": "C", "type": "spherical", "between": ["rod.tip", "rocker.tip"]},
+    ]  # fmt: skip
+    scene = ffrobot.make_scene(
+        name="crank", space="spatial", gravity=[0.0, -9.81 * unit, 0.0], joint=joints,
+        body=[body(name, length) for name, length in lengths.items()],
+        initial={"joints": {"A": 0.7, "B": [-0.4, 0.0], "D": 1.8}},
+        trajectory=[{"name": "turn", "joint": "A", "value": "0.7+0.9*(1-cos(3*t))"}],
+        analysis=[{"name": "inverse", "kind": "pcid", "end": 0.3, "output_step": 0.05, "tolerance": 1e-10}],
+    )  # fmt: skip
+    with ffrobot.solve(scene) as results:
+        coordinates = np.column_stack([results[f"inverse/joints/{name}/coordinate"] for name in "ABD"])
+        return coordinates, results["inverse/joints/A/moment"] / unit**2
+
+
+@pytest.mark.parametrize("unit", [1e-3, 1e9], ids=["km", "nm"])
+def test_a_loop_moves_alike_in_any_unit_of_length(unit):
+    """A driven angle is 1 rad in any of them: measured in lengths it was no motion of a robot of 4e8 nm."""
+    for found, expected in zip(crank(unit), crank(1.0), strict=True):
+        close(found, expected, "crank")
