@@ -71,7 +71,7 @@ def _shapes(motion: RobotMotion, along_v: Array) -> Shapes:
     """What modes with rates `along_v` (T, f, coordinates) do to bodies about the states of `motion`."""
     along_v, shapes = along_v[:, :, : motion.model.tree.n_v], {}  # motors behind gears come last
     T, f, n_v = along_v.shape
-    moving = replace(motion, time=np.repeat(motion.time, f), q=np.repeat(motion.q, f, 0), v=along_v.reshape(-1, n_v))
+    moving = replace(motion, time=np.repeat(motion.time, f), q=np.repeat(motion.q, f, 0), v=along_v.reshape(T * f, n_v))
     space, turning = motion.space, "angle" if motion.space.is_plane else "rotation"
     for name in motion.points if T * f else ():
         body = moving.body(name)

@@ -57,6 +57,7 @@ def solve_postures(model: Model, times: Array, q: Array) -> tuple[Array, BoolArr
         return q, np.ones(len(q), dtype=bool)
     scales, row_scales = joint_scales(model), row_sizes(model)
     going, joints = np.arange(len(q)), scales > 0
+    farthest = np.inf if all(row.kind == "coordinate" for row in model.rows) else LARGEST_TURN  # these have no branches
     for _ in range(MOST_ITERATIONS):
         with np.errstate(over="ignore", invalid="ignore"):  # from anywhere: what is not finite ends there
             C, C_v = row_values(model, q[going], times[going])
@@ -69,7 +70,7 @@ def solve_postures(model: Model, times: Array, q: Array) -> tuple[Array, BoolArr
         step = np.zeros((len(going), len(scales)))
         step[:, joints] = -np.einsum("tij,tj->ti", np.linalg.pinv(J[on], rcond=1e-10), C[on] / row_scales)
         longest = np.abs(step).max(axis=1, keepdims=True)
-        step *= np.minimum(1.0, LARGEST_TURN / np.maximum(longest, 1e-300))
+        step *= np.minimum(1.0, farthest / np.maximum(longest, 1e-300))
         q[going] = model.tree.integrate(q[going], step * scales)
     return q, left <= 1e3 * TOLERANCE
 

@@ -77,7 +77,7 @@ def static_equilibrium(model: Model, start: State, t: float = 0.0) -> State:
     multipliers = _least_multipliers(C_v, forces_at_rest(model, q[None], t)[0], sizes, row_scales)
     for _ in range(MOST_ITERATIONS):
         residual, size = _residual(model, q[None], t, multipliers, row_scales)
-        if np.abs(residual[0, :n] * sizes).max() <= TOLERANCE * size and (
+        if np.abs(residual[0, :n] * sizes).max(initial=0.0) <= TOLERANCE * size and (
             not m or np.abs(residual[0, n:]).max() <= TOLERANCE
         ):
             return with_rates(model, q, start.v, t)

@@ -63,12 +63,11 @@ def test_bodies_are_where_their_joints_have_turned_them(kind, joint, rates, lead
     assert 'joint "j": rpy = [0, 0, 30] rad is more than a turn' in told
 
 
-def test_a_path_may_begin_many_turns_from_zero():
+@pytest.mark.parametrize("initial", [{}, {"joints": {"j": "20*pi"}}], ids=["", "guessed"])
+def test_a_path_may_begin_many_turns_from_zero(initial):
     joint = {"name": "j", "type": "revolute", "between": ["ground", "a.root"], "axis": [0, 0, 1]}
     path = {"name": "t", "joint": "j", "value": "20*pi+0.3+t**2"}
-    results = solved(
-        body=[bar("a")], joint=[joint], trajectory=[path], initial={"joints": {"j": "20*pi"}}, analysis=analysis("pcid")
-    )
+    results = solved(body=[bar("a")], joint=[joint], trajectory=[path], initial=initial, analysis=analysis("pcid"))
     angle = 0.3 + results["a/time"] ** 2
     expected = 0.5 * np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
     np.testing.assert_allclose(results["a/points/a.tip/position"], expected, atol=1e-12)

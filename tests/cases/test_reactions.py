@@ -203,3 +203,18 @@ def test_a_block_that_slides_with_friction_in_closed_form(closes):
     expected = np.tile([0.0, 0.0, 10.0 * m / shares], (len(time), 1))
     for joint in joints:
         np.testing.assert_allclose(results[f"fall/joints/{joint['name']}/reaction"], expected, atol=1e-8)
+
+
+def test_a_weld_carries_a_robot_that_cannot_move():
+    """Its weight, at a lever: without a joint that moves or a link that bends no equation is left to solve."""
+    kinds = [{"name": "rest", "kind": "static"}, {"name": "about", "kind": "linear"}]
+    kinds += [{"name": "on", "kind": "forward", "end": END, "output_step": STEP}]
+    weld = {"name": "W", "type": "weld", "between": ["ground", "b.root"]}
+    tables = {"name": "still", "space": "spatial", "gravity": [0.0, 0.0, -9.81], "joint": [weld], "analysis": kinds}
+    with ffrobot.solve(ffrobot.make_scene(**tables, body=[body("b", [0.3, 0.0, 0.0])])) as results:
+        for kind in ("rest", "on"):
+            force, moment = (results[f"{kind}/joints/W/{key}"] for key in ("reaction", "reaction_moment"))
+            np.testing.assert_allclose(force, np.tile([0.0, 0.0, 0.7 * 9.81], (len(force), 1)), atol=1e-12)
+            lever = np.cross([0.1, 0.02, -0.01], [0.0, 0.0, 0.7 * 9.81])
+            np.testing.assert_allclose(moment, np.tile(lever, (len(force), 1)), atol=1e-12)
+        assert results["about/linear/A"].shape == (1, 0, 0)
