@@ -9,7 +9,7 @@ import ffrobot
 from ffrobot.fe_models.link import computed_modal_body
 from ffrobot.fe_models.link_file import LinkTable
 
-CALCULIX = np.array([-0.00738836e-3, 0.3931271e-3, -1.681775e-3])  # m: tests/benchmarks/peers/calculix_strip.py
+CALCULIX = np.array([-0.00738836e-3, 0.3931271e-3, -1.681775e-3])  # m: tools/bench/peers/calculix_strip.py
 BENDING = ("in-plane-bending", "out-of-plane-bending")
 E, NU, L = 70e9, 0.33, 0.5
 EXACT = np.array([-0.0146514e-3, 0.8532886e-3, -3.3620076e-3])  # m, Kirchhoff's rod: tests/mbs/test_bending_twist.py

@@ -1,4 +1,4 @@
-"""Time of forward runs with results of PCID of the two-link case, beside that of the PCID which they follow."""
+"""Forward runs with results of PCID, in the plane and in 3D: time beside that of PCID, and how far off they are."""
 
 from __future__ import annotations
 
@@ -6,7 +6,10 @@ import tomllib
 from collections.abc import Iterable
 from statistics import median
 
+import numpy as np
+
 from ffrobot.bench.precision import Row
+from ffrobot.mbs.analysis.outcome import Outcome
 from ffrobot.run.solve import solve_scene
 from ffrobot.run.watcher import Watcher
 from ffrobot.scene.load import make_scene

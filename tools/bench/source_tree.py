@@ -22,6 +22,7 @@ from .peer import Exudyn, measure_peer
 from .replays import measure_replays
 
 CASES = ("two_link", "slider_crank")  # of the paper
+REPLAYED = ("two_link", "arm_3r")  # in the plane and in 3D
 
 
 class SourceTree(Campaign):
@@ -43,7 +44,7 @@ class SourceTree(Campaign):
         if "aims" in parts:
             self._aims(load_scene(paths["two_link"]), repository)
         if "replays" in parts:
-            self._replays(load_scene(paths["two_link"]))
+            self._replays([load_scene(repository / "cases" / name / "scene.toml") for name in REPLAYED])
         swept = {name: self.scene(path, None, self.folder / name, of_cases) for name, path in paths.items() if of_cases}
         if exudyn is not None:
             self._peer(exudyn, load_scene(paths["two_link"]), swept.get("two_link"))
@@ -55,9 +56,10 @@ class SourceTree(Campaign):
             )
         self.keep("aims", rows, {"inputs": inputs_of(scene, {})}, self.folder, "ratios to the hand-written version")
 
-    def _replays(self, scene: Scene) -> None:
-        rows = measure_replays(scene, self.settings.repeat, self.display)
-        self.keep("replays", rows, {"inputs": inputs_of(scene, {})}, self.folder, "forward runs with results of PCID")
+    def _replays(self, scenes: Sequence[Scene]) -> None:
+        rows = measure_replays(scenes, self.settings.repeat, self.display)
+        about = {"inputs": {scene.name: inputs_of(scene, {}) for scene in scenes}}
+        self.keep("replays", rows, about, self.folder, "forward runs with results of PCID")
 
     def _evaluations(self, repository: Path) -> None:
         with tempfile.TemporaryDirectory(prefix="ffrobot-bench-") as folder:

@@ -1,7 +1,7 @@
 """A clamped strip that a force beside its axis bends and twists: ffrobot's solid against CalculiX, geometrically exact.
 
     apt install calculix-ccx
-    python tests/benchmarks/peers/calculix_strip.py 50x2x8 80x2x12
+    python tools/bench/peers/calculix_strip.py 50x2x8 80x2x12
 
 Aluminium, 250 × 4 × 20 mm, its tip face rigid, 60 N down at 30 mm beside the axis: elements C3D20 with NLGEOM, and
 ffrobot's hexahedra of order 2 with `geometric_stiffening`, on the same cells. Prints displacements of the tip, mm.
