@@ -10,6 +10,7 @@ Importing this loads dolfinx.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING
@@ -60,19 +61,26 @@ def section_quadrature(mesh: Mesh, x: float, degree: int) -> SectionQuadrature:
         x: where the plane cuts; beyond the part the section is empty.
         degree: of the rule on each triangle that the section consists of.
     """
-    nodes = geometry_nodes(mesh)
-    coordinates = mesh.geometry.x
+    (section,) = section_quadratures(mesh, np.array([x]), degree)
+    return section
+
+
+def section_quadratures(mesh: Mesh, x: Array, degree: int) -> Iterator[SectionQuadrature]:
+    """The same on each of the cross sections at `x` (k,)."""
+    nodes, coordinates = geometry_nodes(mesh), mesh.geometry.x
     begin, end = _extent(mesh)
     tolerance = IN_PLANE * (end - begin)
-    at_end = abs(x - end) <= tolerance
-    f = (coordinates[:, 0] - x)[nodes]
-    above = _above(f, at_end, tolerance)
-    cut = np.flatnonzero(above.any(axis=1) & ~above.all(axis=1))
-    if not cut.size:
-        none = (np.inf, -np.inf)
-        return SectionQuadrature(cut, np.empty((0, 3)), np.empty(0), np.empty((0, 3)), none, none)
-    cells = _Cells(mesh, cut, coordinates[nodes[cut]], f[cut])
-    return _integrate(cells, _march(cells, at_end, tolerance), degree)
+    along = coordinates[nodes, 0]
+    low, high = along.min(axis=1), along.max(axis=1)
+    for place in x:
+        at_end = abs(place - end) <= tolerance
+        cut = np.flatnonzero(_above(high - place, at_end, tolerance) & ~_above(low - place, at_end, tolerance))
+        if not cut.size:
+            none = (np.inf, -np.inf)
+            yield SectionQuadrature(cut, np.empty((0, 3)), np.empty(0), np.empty((0, 3)), none, none)
+            continue
+        cells = _Cells(mesh, cut, coordinates[nodes[cut]], along[cut] - place)
+        yield _integrate(cells, _march(cells, at_end, tolerance), degree)
 
 
 def _above(f: Array, at_end: bool, tolerance: float) -> Booleans:

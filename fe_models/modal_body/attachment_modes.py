@@ -82,12 +82,15 @@ class ResidualModes:
         return ResidualModes(self.omega2[:count], self.families[:count], self.X[:, :count])
 
 
-def residual_modes(static: Mapping[Family, tuple[Array, Array]], X: Array, inertia: Inertia) -> ResidualModes:
+def residual_modes(
+    static: Mapping[Family, tuple[Array, Array]], X: Array, highest: float, inertia: Inertia
+) -> ResidualModes:
     """Attachment modes from static shapes, by family of their loads.
 
     Args:
         static: for each family K⁻¹B (m, loads) and the loads B (m, loads): forces, and moments of these times a length.
         X: (m, n) eigenmodes, XᵀMX = I.
+        highest: their highest ω² in rad²/s²; inf where there is none.
         inertia: of the model.
     """
     known, families = X, list[Family]()
@@ -102,7 +105,6 @@ def residual_modes(static: Mapping[Family, tuple[Array, Array]], X: Array, inert
             found = _independent(shapes[:, moved] / np.sqrt(own[moved]), known, inertia)
             families += [family] * found.shape[1]
             known = np.concatenate([known, found], axis=1)
-    highest = np.diag(inertia.energy(X)).max() if X.shape[1] else np.inf
     return _uncoupled(known[:, X.shape[1] :], families, inertia).up_to(STIFFEST**2 * highest)
 
 

@@ -64,20 +64,13 @@ class ScalarMass:
         n = U.shape[1]
         if self.scatter is None:
             return np.asarray(self.csr @ U.reshape(-1, 3 * n)).reshape(-1, n)
-        result = np.empty_like(U)
+        foreign = np.empty((self.foreign.getLocalSize(), n))
         vector = PETSc.Vec().createMPI((U.shape[0], None), bsize=3, comm=self.comm)
         for k in range(n):
             vector.array[:] = U[:, k]
-            result[:, k] = self.apply(vector).ravel()
-        return result
-
-    def apply(self, vector: PETSc.Vec) -> Array:
-        """(owned, 3) M u of the displacements in `vector`; collective."""
-        own = vector.array_r.reshape(-1, 3)
-        if self.scatter is None:
-            return np.asarray(self.csr @ own)
-        self.scatter.scatter(vector, self.foreign)
-        return np.asarray(self.csr @ np.concatenate([own, self.foreign.array_r.reshape(-1, 3)]))
+            self.scatter.scatter(vector, self.foreign)
+            foreign[:, k] = self.foreign.array_r
+        return np.asarray(self.csr @ np.concatenate([U, foreign]).reshape(-1, 3 * n)).reshape(-1, n)
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from petsc4py import PETSc
 
 from ...common.arrays import Array
 from ..link_records import Family
@@ -39,12 +38,14 @@ class HeldFlexibility:
 
     def __matmul__(self, loads: Array) -> Array:
         """Displacements under loads (3 owned, k); collective."""
-        displacements = self._free @ loads
-        return np.asarray(displacements - self._shapes @ (self._inverse @ self.model.total(self._rows @ displacements)))
+        return self._at_rest(self._free @ loads)
 
-    def apply(self, load: PETSc.Vec, result: PETSc.Vec) -> None:
-        """As above, of one PETSc vector."""
-        result.array[:] = (self @ load.array_r[:, None])[:, 0]
+    def allowed(self, U: Array) -> Array:
+        """U (3 owned, k) less what the supports and the interfaces at rest do not allow; collective."""
+        return self._at_rest(self._free.allowed(U))
+
+    def _at_rest(self, U: Array) -> Array:
+        return np.asarray(U - self._shapes @ (self._inverse @ self.model.total(self._rows @ U)))
 
 
 def fixed_interfaces(

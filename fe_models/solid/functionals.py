@@ -18,7 +18,7 @@ from dolfinx.mesh import meshtags
 
 from ...common.arrays import Array
 from ...mesh.compat import compiled_form, geometry_degree, lagrange_element, lagrange_space, node_map
-from ...mesh.slices import section_quadrature
+from ...mesh.slices import section_quadratures
 from ..modal_body.tensors import LEVI_CIVITA
 from .elasticity import SolidModel
 
@@ -81,8 +81,7 @@ def section_averages(model: SolidModel, x: Array) -> Averages:
     degree = model.order + geometry_degree(model.mesh)
     size = model.V.dofmap.index_map.size_local + model.V.dofmap.index_map.num_ghosts
     rows, moments, ranges, masses = [], [], [], []
-    for place in x:
-        section = section_quadrature(model.mesh, float(place), degree)
+    for section in section_quadratures(model.mesh, x, degree):
         w = section.weights
         monomials = np.concatenate([np.ones((w.size, 1)), section.points], axis=1)
         shapes = element.tabulate(0, section.X)[0, :, :, 0] if w.size else np.empty((0, element.dim))

@@ -92,6 +92,9 @@ def solid_modal_body(
     progress(f"{link.name}: factorising {3 * model.V.dofmap.index_map.size_global} unknowns")
     flexibility = _held(link, model, solid, places, path)
     mass = _loaded(link, model, places)
+    progress(f"{link.name}: solving for the static shapes")
+    loads = unit_loads(model, places.rows)
+    shapes = static_shapes(flexibility, loads)
     progress(f"{link.name}: solving for the modes")
     fixed = link.reference.condition == "craig-bampton"
     modes = wanted_modes(
@@ -103,10 +106,12 @@ def solid_modal_body(
         ),
         str(path),
     )
+    flexibility.release()
     count = modes.omega2.size
     if link.modes.attachment_modes:
-        length = link.geometry.length
-        residual = attachment_modes(link.families, flexibility, mass, modes.X, places.rows, length, not fixed)
+        progress(f"{link.name}: adding the attachment modes")
+        length, named = link.geometry.length, list(places.rows)
+        residual = attachment_modes(link.families, mass, modes, loads, shapes, named, length, not fixed)
         modes = modes.followed_by(residual)
     if fixed:
         modes = ritz_modes(model, modes, count)
@@ -119,8 +124,7 @@ def solid_modal_body(
     attached = lumps(link.interface, interfaces)
     integrals = with_lumped_masses(shape_integrals(model, X), attached)
     omega = np.sqrt(modes.omega2)
-    loads = unit_loads(model, places.rows)
-    shapes = static_shapes(flexibility, loads)
+    progress(f"{link.name}: integrating the geometric stiffness")
     supports = {} if link.coupling == "rigid" else HELD[link.reference.condition]
     stiffness = without_their_turn(
         prestressed(model, X, shapes), flexibility, loads, shapes, places.rows, interfaces, supports

@@ -10,11 +10,12 @@ import numpy as np
 
 from ...common.arrays import Array
 from ...common.errors import InputError, quoted
-from ..link_records import SolidLink
-from ..modal_body.attachment_modes import DEFAULT_COUNT, ResidualModes
-from .eigen import Inverse, Mass, lowest_modes
+from ..link_records import FAMILIES, SolidLink
+from ..modal_body.attachment_modes import DEFAULT_COUNT, ResidualModes, ascending
+from ..modal_body.lanczos import BlockLanczos
+from .eigen import Inverse, Mass
 from .elasticity import SolidModel
-from .families import NEARLY, SectionMotion, aligned, names
+from .families import LOCAL, NEARLY, SectionMotion, aligned, names
 from .strain_energy import strain_energy
 
 # Mean motion of the sections, of modes (3 owned, n).
@@ -47,12 +48,12 @@ class SolidModes:
 def wanted_modes(link: SolidLink, flexibility: Inverse, mass: Mass, read: Reader, where: str) -> SolidModes:
     """The modes that `link.modes` asks for; collective.
 
-    Lowest modes are computed in batches, those found before deflated, until the wanted ones are among them. The size of
-    a batch follows from the share of wanted ones so far.
+    The search for the lowest modes goes on until the wanted ones are among them; for how many more follows from the
+    share of wanted ones so far.
 
     Raises:
         InputError: more are asked for than the mesh has, or than can be found in reasonable time.
-        SolveError: the eigensolver did not converge.
+        SolveError: modes are lost in round-off.
     """
     family, model = "all" if link.modes.family == "all" else link.families, flexibility.model
     numbers = np.array(link.modes.indices or range(1, (link.modes.count or 0) + 1)) - 1
@@ -60,32 +61,41 @@ def wanted_modes(link: SolidLink, flexibility: Inverse, mass: Mass, read: Reader
     batch = needed + 2 if family == "all" else 2 * needed + 2
     key = "count" if link.modes.indices is None else "indices"
     most = min(available, 40 * needed + 200)  # far more than slender parts need
-    X: Array = np.empty((3 * model.owned, 0))
+    search = BlockLanczos(
+        flexibility,
+        mass,
+        3 * model.owned,
+        available,
+        total=model.total,
+        allowed=flexibility.allowed,
+        process=model.comm.rank,
+    )
+    found = 0
     while True:
-        if (family == "all" and needed > available) or X.shape[1] == available:
+        if (family == "all" and needed > available) or found == available:
             raise InputError(
                 f"{where}: modes.{key}: expected at most the number of modes available in family "
                 f'"{" + ".join(link.families) if family != "all" else family}" on this mesh, which has {available} of'
                 f" all families, found {needed}"
             )
-        X = lowest_modes(flexibility, mass, min(batch, most - X.shape[1]), X)
-        omega2, X = _ritz(model, X)
+        found = min(found + batch, most)
+        omega2, X = _ritz(model, search.lowest(found))
         motion = read(X)
         Q = aligned(omega2, motion, family)
         kinds = names(motion.turned(Q))
-        settled = available if X.shape[1] == available else _settled(omega2)
+        settled = available if found == available else _settled(omega2)
         hits = [k for k, kind in enumerate(kinds[:settled]) if family == "all" or kind in family]
         if not numbers.size:
             hits = _lowest_of_each(hits, kinds)
         if len(hits) >= needed:
             chosen = np.array(hits)[numbers] if numbers.size else np.array(hits)
             return _chosen(omega2, X, Q[:, chosen], [kinds[k] for k in chosen])
-        if X.shape[1] == most < available:
+        if found == most < available:
             raise InputError(
                 f"{where}: modes.{key}: expected {needed} modes of family {quoted(link.families)} among the lowest"
-                f" {X.shape[1]}, found {len(hits)} (short, wide parts hardly bend): request fewer"
+                f" {found}, found {len(hits)} (short, wide parts hardly bend): request fewer"
             )
-        share = max(len(hits), 1) / X.shape[1]
+        share = max(len(hits), 1) / found
         batch = int(np.ceil((needed - len(hits)) / share)) + 2
 
 
@@ -116,13 +126,13 @@ def _ritz(model: SolidModel, X: Array) -> tuple[Array, Array]:
     return omega2, X @ Q
 
 
-def _chosen(omega2: Array, X: Array, Q: Array, kinds: list[str]) -> SolidModes:
+def _chosen(omega2: Array, X: Array, Q: Array, kinds: Sequence[str]) -> SolidModes:
     """Modes X Q, uncoupled among each other."""
     K = (Q.T * omega2) @ Q
-    order = np.argsort(np.diag(K), kind="stable")
-    squares, turn = np.linalg.eigh(K[np.ix_(order, order)])
-    if not np.allclose(K, np.diag(np.diag(K)), rtol=0, atol=1e-12 * squares[0]):
-        Q = Q[:, order] @ turn
-    else:
-        Q, squares = Q[:, order], np.diag(K)[order]
+    order = ascending(np.diag(K), np.array([[*FAMILIES, LOCAL].index(kind) for kind in kinds]))
+    K, Q = K[np.ix_(order, order)], Q[:, order]
+    squares = np.diag(K)
+    if not np.allclose(K, np.diag(squares), rtol=0, atol=1e-12 * squares.min()):
+        squares, turn = np.linalg.eigh(K)
+        Q = Q @ turn
     return SolidModes(squares, [kinds[k] for k in order], X @ Q)

@@ -24,11 +24,8 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from ...common.arrays import Array, Integers, as_floats
-from ...common.errors import SolveError
 from .elasticity import SolidModel, stiffness_matrix
-
-# Beyond this size MUMPS orders by approximate minimum fill: its default takes too long and too much.
-LARGE, AMF = 50_000, 2
+from .factors import Factors
 
 
 @dataclass(frozen=True)
@@ -70,9 +67,7 @@ class Flexibility:
         self.clamped = clamped.reshape(-1)
         T = _plate_motions(model, faces)
         KT = _times_stiffness(model, T) if T.shape[1] else T
-        self._factored = _factorised(self._supported(faces))
-        self._factor = self._factored.getPC().getFactorMatrix()
-        self._load, self._result = model.vector(), model.vector()
+        self._factor = Factors(self._supported(faces))
         self._condense(T, KT)
         if B is not None:
             self._BR_inverse = np.linalg.inv(model.total(B @ self.R))
@@ -100,7 +95,7 @@ class Flexibility:
         if not T.shape[1]:
             return
         inside = np.where(self.clamped[:, None], 0.0, KT)
-        self.W = T - self._solve(inside)
+        self.W = T - self._factor.solve(inside)
         S = self.model.total(KT.T @ self.W)
         S = 0.5 * (S + S.T)
         if self.B is not None:
@@ -118,13 +113,22 @@ class Flexibility:
         total = 3 * self.model.V.dofmap.index_map.size_global - self.model.comm.allreduce(int(self.clamped.sum()))
         return int(total + self.W.shape[1] - (0 if self.B is None else len(self.B)))
 
-    def apply(self, load: PETSc.Vec, result: PETSc.Vec) -> None:
-        """As above, of one PETSc vector."""
-        result.array[:] = (self @ load.array_r[:, None])[:, 0]
+    def allowed(self, U: Array) -> Array:
+        """U (3 owned, k) less what the supports do not allow: plates move as such, mean supports rest; collective."""
+        if self.faces:
+            T = self.W[self.clamped]
+            q = np.linalg.solve(self.model.total(T.T @ T), self.model.total(T.T @ U[self.clamped]))
+            U = U.copy()
+            U[self.clamped] = T @ q
+        return self._projected(U)
+
+    def release(self) -> None:
+        """Free the factors: no loads after that; collective."""
+        self._factor.release()
 
     def _condensed_solve(self, loads: Array) -> Array:
         """G f."""
-        result = self._solve(np.where(self.clamped[:, None], 0.0, loads))
+        result = self._factor.solve(np.where(self.clamped[:, None], 0.0, loads))
         if self.W.shape[1]:
             result += self.W @ (self._S_inverse @ self.model.total(self.W.T @ loads))
         return result
@@ -144,26 +148,6 @@ class Flexibility:
     def supported(self, loads: Array) -> Array:
         """Pᵀ f: `loads` with the forces of mean supports."""
         return loads if self.B is None else np.asarray(loads + self.B.T @ self.reactions(loads))
-
-    def _solve(self, loads: Array) -> Array:
-        """K_0⁻¹ f, all columns at once: several times as fast as one by one."""
-        rows, columns = loads.shape
-        if columns == 1:
-            self._load.array[:] = loads[:, 0]
-            self._factor.solve(self._load, self._result)
-            return np.array(self._result.array_r[:, None])
-        total = self.model.V.dofmap.index_map.size_global * 3
-        F, U = (PETSc.Mat().createDense(((rows, total), (None, columns)), comm=self.model.comm) for _ in range(2))
-        for matrix in (F, U):
-            matrix.setUp()
-        F.getDenseArray()[:] = loads
-        F.assemble()
-        U.assemble()
-        self._factor.matSolve(F, U)
-        result = U.getDenseArray().copy()
-        F.destroy()
-        U.destroy()
-        return np.asarray(result)
 
 
 def rigid_motions(x: Array) -> Array:
@@ -199,28 +183,6 @@ def _times_stiffness(model: SolidModel, T: Array) -> Array:
         result[:, k] = f.array_r
     K.destroy()
     return result
-
-
-def _factorised(K: PETSc.Mat) -> PETSc.KSP:
-    """Cholesky factors of K by MUMPS."""
-    solver = PETSc.KSP().create(K.comm)
-    solver.setOperators(K)
-    solver.setType(PETSc.KSP.Type.PREONLY)
-    pc = solver.getPC()
-    pc.setType(PETSc.PC.Type.CHOLESKY)
-    pc.setFactorSolverType("mumps")
-    pc.setFactorSetUpSolverType()
-    if K.getSize()[0] > LARGE:
-        pc.getFactorMatrix().setMumpsIcntl(7, AMF)
-    try:
-        solver.setUp()
-    except PETSc.Error:
-        raise SolveError(
-            f"stiffness matrix of size {K.getSize()[0]}: it is not positive definite in double precision, or memory "
-            "does not suffice for its factors; check material and mesh, or use larger elements"
-        ) from None
-    K.destroy()
-    return solver
 
 
 def _add_springs(model: SolidModel, K: PETSc.Mat, R: Array) -> None:

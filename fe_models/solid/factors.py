@@ -1,0 +1,104 @@
+"""Cholesky factors of a solid's supported stiffness matrix by MUMPS, in memory or, of a large one, in files."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import tempfile
+import weakref
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+
+import numpy as np
+from petsc4py import PETSc
+from platformdirs import user_cache_path
+
+from ...common.arrays import Array
+from ...common.errors import SolveError
+from ...common.locks import is_running, this_process
+
+# Unknowns above which the factors are kept in files: measured, that takes as long and a quarter of the memory.
+OUT_OF_CORE = 300_000
+_ICNTL_OUT_OF_CORE = 22
+# Columns solved for at once, for each of which the factors are read.
+COLUMNS = 16
+
+
+class Factors:
+    """K = L Lᵀ, ordered by MUMPS' own PORD. Vectors hold this rank's own degrees of freedom.
+
+    Args:
+        K: symmetric positive definite, upper triangle; destroyed.
+
+    Raises:
+        SolveError: K is not positive definite in double precision, or memory or disk does not suffice.
+    """
+
+    _remove: Callable[[], object] | None = None
+
+    def __init__(self, K: PETSc.Mat) -> None:
+        solver = PETSc.KSP().create(K.comm)
+        solver.setOperators(K)
+        solver.setType(PETSc.KSP.Type.PREONLY)
+        pc = solver.getPC()
+        pc.setType(PETSc.PC.Type.CHOLESKY)
+        pc.setFactorSolverType("mumps")
+        pc.setFactorSetUpSolverType()
+        self.matrix, self._sizes = pc.getFactorMatrix(), K.getSizes()[0]
+        folder = _new_folder() if K.getSize()[0] > OUT_OF_CORE else None
+        if folder:
+            os.environ["MUMPS_OOC_TMPDIR"] = str(folder)
+            self.matrix.setMumpsIcntl(_ICNTL_OUT_OF_CORE, 1)
+            self._remove = weakref.finalize(self, shutil.rmtree, folder, ignore_errors=True)
+        try:
+            solver.setUp()
+        except PETSc.Error:
+            raise SolveError(
+                f"stiffness matrix of size {K.getSize()[0]}: it is not positive definite in double precision, or"
+                f" memory{f' or space in {folder}' if folder else ''} does not suffice for its factors;"
+                " check material and mesh, or use larger elements"
+            ) from None
+        solver.destroy()  # with K: only the factors stay
+        K.destroy()
+
+    def solve(self, loads: Array) -> Array:
+        """K⁻¹ f of loads (own, k), as many columns at once as MUMPS takes well; collective."""
+        result = np.empty_like(loads)
+        for start in range(0, loads.shape[1], COLUMNS):
+            part = slice(start, start + COLUMNS)
+            f = np.asfortranarray(loads[:, part])
+            u = np.empty_like(f)
+            F, U = (self._dense(block) for block in (f, u))
+            self.matrix.matSolve(F, U)
+            F.destroy()
+            U.destroy()
+            result[:, part] = u
+        return result
+
+    def release(self) -> None:
+        """Free memory and files; collective."""
+        self.matrix.destroy()
+        if self._remove:
+            self._remove()
+
+    def _dense(self, block: Array) -> PETSc.Mat:
+        """PETSc's view of an array (own, k) in Fortran's order."""
+        matrix = PETSc.Mat().createDense((self._sizes, (None, block.shape[1])), array=block, comm=self.matrix.comm)
+        matrix.assemble()
+        return matrix
+
+
+def _new_folder() -> Path | None:
+    """For this process alone, in the user's cache, which is on a disk; None where nothing can be written there.
+
+    Those of processes that were killed are removed.
+    """
+    shared = user_cache_path("ffrobot") / "factors"
+    with suppress(OSError):
+        shared.mkdir(parents=True, exist_ok=True)
+        for folder in shared.iterdir():
+            if not is_running(folder.name.rpartition(".")[0]):
+                shutil.rmtree(folder, ignore_errors=True)
+        return Path(tempfile.mkdtemp(prefix=f"{this_process()}.", dir=shared))
+    return None
