@@ -116,11 +116,9 @@ def held_mode_frequencies(links: Sequence[BeamLink], family: Family, number: int
 
     Raises `SolveError` where the modes cannot be computed.
     """
-    without_daemon()
-    with ending_at_once(), deferred_interrupts():
-        from .beam.rayleigh import held_mode_frequencies
+    from .beam.rayleigh import held_mode_frequencies  # loads SciPy
 
-        return held_mode_frequencies(links, family, number)
+    return held_mode_frequencies(links, family, number)
 
 
 def _beside(source: LinkSource) -> list[Path]:
@@ -197,21 +195,20 @@ def _has_mesh(link: Link) -> bool:
 
 
 def _computation(link: Link, source_path: Path, remesh: bool) -> Callable[..., ModalBody]:
+    if isinstance(link, BeamLink):
+        from .beam.link import beam_modal_body  # loads SciPy
+
+        return beam_modal_body
     try:
         without_daemon()
         with ending_at_once(), deferred_interrupts():
-            if isinstance(link, BeamLink):
-                from .beam.link import beam_modal_body
-
-                return beam_modal_body
             from .solid.link import solid_modal_body
 
             return partial(solid_modal_body, remesh=remesh)
     except ModuleNotFoundError as error:
         raise SolveError(
-            f"{source_path}: computing a link needs the finite element libraries, and {error.name} is not installed: "
-            "install dolfinx and slepc4py (Debian: python3-dolfinx python3-slepc4py), or use a modal body file made "
-            "elsewhere"
+            f"{source_path}: computing a solid link needs the finite element libraries, and {error.name} is not"
+            " installed: install dolfinx (Debian: python3-dolfinx), or use a modal body file made elsewhere"
         ) from None
 
 

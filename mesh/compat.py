@@ -8,11 +8,10 @@ from __future__ import annotations
 import logging
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 import petsc4py
-import scipy.sparse as sp
 
 from ..common.arrays import Array, Integers
 from .cells import CellName
@@ -35,52 +34,6 @@ if _OLD:
     from basix import ufl_wrapper as basix_ufl
 else:
     from basix import ufl as basix_ufl
-
-ElementName = Literal["Hermite", "P"]
-
-_INTERVAL = basix.CellType.interval
-_FAMILIES = {"Hermite": basix.ElementFamily.Hermite, "P": basix.ElementFamily.P}
-
-
-def basix_element(family: ElementName, degree: int) -> basix.finite_element.FiniteElement:
-    """Basix element on the reference interval [0, 1]; Lagrange ("P") with Gauss–Lobatto–Legendre points."""
-    if family == "P":
-        return basix.create_element(_FAMILIES["P"], _INTERVAL, degree, basix.LagrangeVariant.gll_warped)
-    return basix.create_element(_FAMILIES[family], _INTERVAL, degree)
-
-
-def function_space(mesh: Mesh, family: ElementName, degree: int, *, discontinuous: bool = False) -> FunctionSpace:
-    """Scalar space on an interval mesh, with the same basis functions as `basix_element(family, degree)`."""
-    options: dict[str, Any] = {"discontinuous": discontinuous}
-    if family == "P":
-        options["lagrange_variant"] = basix.LagrangeVariant.gll_warped
-    with _compiling(mesh.comm) as jit:
-        if _OLD:
-            element = basix_ufl.create_element(_FAMILIES[family], _INTERVAL, degree, **options)
-            return fem.FunctionSpace(mesh, element, **jit)
-        return fem.functionspace(mesh, basix_ufl.element(_FAMILIES[family], _INTERVAL, degree, **options), **jit)
-
-
-def create_interval_mesh(points: Array, cells: Integers) -> Mesh:
-    """Serial dolfinx mesh of intervals on a line.
-
-    Args:
-        points: (m,) coordinates of the vertices.
-        cells: (c, 2) vertices of each cell; either order.
-    """
-    if _OLD:
-        domain = ufl.Mesh(ufl.VectorElement("Lagrange", ufl.Cell("interval", geometric_dimension=1), 1))
-    else:
-        domain = ufl.Mesh(basix_ufl.element("Lagrange", "interval", 1, shape=(1,)))
-    return create_mesh(MPI.COMM_SELF, np.asarray(cells, dtype=np.int64), points.reshape(-1, 1), domain)
-
-
-def cell_vertices(mesh: Mesh) -> Array:
-    """(c, 2) coordinates of each cell's vertices, in the order of the reference cell."""
-    dofmap = mesh.geometry.dofmap
-    corners = dofmap.array.reshape(-1, 2) if _OLD else np.asarray(dofmap)
-    vertices: Array = mesh.geometry.x[corners, 0]
-    return vertices
 
 
 def create_solid_mesh(comm: MPI.Comm, cell: CellName, degree: int, cells: Integers, points: Array) -> Mesh:
@@ -123,27 +76,7 @@ def coordinate_element(mesh: Mesh) -> basix.finite_element.FiniteElement:
     """Basix element that maps the reference cell to the cells of `mesh`, by `geometry_nodes`."""
     cell = getattr(basix.CellType, mesh.ufl_domain().ufl_cell().cellname())
     equispaced = basix.LagrangeVariant.equispaced
-    return basix.create_element(_FAMILIES["P"], cell, geometry_degree(mesh), equispaced)
-
-
-def cell_dofs(space: FunctionSpace) -> Integers:
-    """(c, d) degrees of freedom of each cell, in the order of `basix_element`'s basis."""
-    dofs = space.dofmap.list
-    cells = space.mesh.topology.index_map(1).size_local
-    return np.asarray(dofs.array if _OLD else dofs, dtype=np.int64).reshape(cells, -1)
-
-
-def assemble_matrix(form: ufl.Form) -> sp.csr_matrix:
-    """Assemble a bilinear form, without boundary conditions, to (test, trial) dofs."""
-    compiled = compiled_form(form)
-    matrix = fem.assemble_matrix(compiled)
-    if _OLD:
-        matrix.finalize()
-    else:
-        matrix.scatter_reverse()
-    test, trial = (argument.ufl_function_space().dofmap.index_map.size_local for argument in form.arguments())
-    # Copies: dolfinx owns the arrays that it shows.
-    return sp.csr_matrix((matrix.data.copy(), matrix.indices.copy(), matrix.indptr.copy()), shape=(test, trial))
+    return basix.create_element(basix.ElementFamily.P, cell, geometry_degree(mesh), equispaced)
 
 
 def compiled_form(form: ufl.Form) -> fem.Form:
@@ -193,8 +126,8 @@ def _space(mesh: Mesh, degree: int, shape: tuple[int, ...]) -> FunctionSpace:
     cell = getattr(basix.CellType, mesh.ufl_domain().ufl_cell().cellname())
     with _compiling(mesh.comm) as jit:
         if _OLD:
-            element = basix_ufl.create_element(_FAMILIES["P"], cell, degree, **options)
+            element = basix_ufl.create_element(basix.ElementFamily.P, cell, degree, **options)
             wrap = {0: lambda e: e, 1: basix_ufl.VectorElement, 2: basix_ufl.TensorElement}[len(shape)]
             return fem.FunctionSpace(mesh, wrap(element, *([shape] if len(shape) == 2 else shape)), **jit)
-        element = basix_ufl.element(_FAMILIES["P"], cell, degree, shape=shape or None, **options)
+        element = basix_ufl.element(basix.ElementFamily.P, cell, degree, shape=shape or None, **options)
         return fem.functionspace(mesh, element, **jit)

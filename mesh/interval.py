@@ -1,17 +1,12 @@
-"""The interval mesh of a beam link: where its nodes lie, and the dolfinx mesh on them. Importing this loads dolfinx."""
+"""Where the nodes along the axis of a link lie. NumPy only."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..common.arrays import Array, Integers
-from .compat import cell_vertices, create_interval_mesh
-
-if TYPE_CHECKING:
-    from dolfinx.mesh import Mesh
+from ..common.arrays import Array
 
 # Points closer than this, relative to the length, are one point.
 COINCIDENT = 1e-9
@@ -54,28 +49,3 @@ def with_points(nodes: Array, points: Sequence[float]) -> Array:
         if np.min(np.abs(np.asarray(merged) - point)) > COINCIDENT * length:
             merged.append(point)
     return np.sort(np.asarray(merged, dtype=np.float64))
-
-
-def interval_mesh(nodes: Array, flipped: Sequence[int] = ()) -> Mesh:
-    """Mesh of the intervals between neighbouring `nodes` (m,), ascending, in m.
-
-    Args:
-        nodes: coordinates along the link's axis.
-        flipped: cells whose second vertex comes first, as mesh files may have them.
-    """
-    cells = np.stack([np.arange(nodes.size - 1), np.arange(1, nodes.size)], axis=1)
-    cells[list(flipped)] = cells[list(flipped)][:, ::-1]
-    return create_interval_mesh(nodes, cells)
-
-
-def cells_containing(mesh: Mesh, points: Array) -> tuple[Integers, Array]:
-    """Cell and reference coordinate X ∈ [0, 1] of each of `points` (k,) in m: two arrays (k,).
-
-    A point on a boundary belongs to either of its cells. Points must lie on the mesh.
-    """
-    vertices = cell_vertices(mesh)
-    order = np.argsort(vertices.min(axis=1))
-    starts = vertices.min(axis=1)[order]
-    cells = order[np.clip(np.searchsorted(starts, points, side="right") - 1, 0, order.size - 1)]
-    first, second = vertices[cells].T
-    return cells, (points - first) / (second - first)

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 
 import numpy as np
-from scipy.sparse.linalg import splu
 
 from ...common.arrays import Array
 from ..link_records import Family
 from ..modal_body.attachment_modes import COMPONENTS, Inertia, ResidualModes, residual_modes
 from .beam import R_X, FamilyModel
+from .eigen import Flexibility
 
 
 def attachment_modes(
@@ -45,10 +45,11 @@ def _of_family(
         torque = model.M @ np.ones(model.M.shape[0])
         loads.append(torque * (length / torque.sum()))
     B = np.array(loads).T
-    static = splu(model.K.tocsc()).solve(B)
+    static = Flexibility(model.K, model.strain) @ B
 
     def energy(U: Array) -> Array:
         strain = model.strain @ U
         return np.asarray(strain.T @ strain)
 
-    return residual_modes({family: (static, B)}, X, Inertia(lambda U: model.M @ U, energy, np.asarray))
+    highest = float(np.diag(energy(X)).max(initial=0.0)) if X.shape[1] else np.inf
+    return residual_modes({family: (static, B)}, X, highest, Inertia(lambda U: model.M @ U, energy, np.asarray))

@@ -1,15 +1,14 @@
-"""The lowest modes of K x = ω² M x with SLEPc."""
+"""The lowest modes of K x = ω² M x of a beam."""
 
 from __future__ import annotations
 
 import numpy as np
 import scipy.sparse as sp
-from mpi4py import MPI
-from petsc4py import PETSc
-from slepc4py import SLEPc
+from scipy.sparse.linalg import splu
 
-from ...common.arrays import Array, as_floats
+from ...common.arrays import Array
 from ...common.errors import SolveError
+from ..modal_body.lanczos import BlockLanczos
 
 # Multipliers amplify relative errors of the model data some 400 times within 0.2 s of the two-link case.
 TOLERANCE = 1e-13
@@ -19,7 +18,7 @@ ROUNDING_LIMIT = 1e-6
 
 
 def lowest_modes(K: sp.csr_matrix, M: sp.csr_matrix, strain: sp.csr_matrix, count: int) -> tuple[Array, Array]:
-    """Lowest eigenpairs of K x = ω² M x by Krylov–Schur, shift-inverted at zero, K factorised by Cholesky.
+    """Lowest eigenpairs of K x = ω² M x by block Lanczos on the inverse of K.
 
     Assembly rounds K's large entries, of order EI/h³; against the lowest ω² these errors grow as elements⁴. The
     Rayleigh quotient of the strains, which are differences of x once and not twice over (elements²), gives ω² without
@@ -35,11 +34,11 @@ def lowest_modes(K: sp.csr_matrix, M: sp.csr_matrix, strain: sp.csr_matrix, coun
         ω² (count,) ascending in rad²/s² and X (m, count) with Xᵀ M X = I to rounding.
 
     Raises:
-        SolveError: fewer than `count` pairs converged, or rounding errors spoil them.
+        SolveError: rounding errors spoil them.
     """
     try:
-        X = orthonormalised(M, _krylov_schur(K, M, count))
-    except (PETSc.Error, np.linalg.LinAlgError):
+        X = BlockLanczos(Flexibility(K, strain), M, *K.shape, tolerance=TOLERANCE).lowest(count)
+    except (RuntimeError, np.linalg.LinAlgError):  # singular, or not finite
         raise SolveError(
             f"eigenproblem of size {K.shape[0]}: stiffness or mass is not positive definite in double precision; "
             "check the units of material and geometry, and the mesh for elements of very different length"
@@ -55,60 +54,22 @@ def lowest_modes(K: sp.csr_matrix, M: sp.csr_matrix, strain: sp.csr_matrix, coun
     return omega2[order], X[:, order]
 
 
-def orthonormalised(M: sp.csr_matrix, X: Array) -> Array:
-    """X (m, n), lowest mode first, made orthonormal in M (m, m) to rounding, the lowest changed least."""
-    for _ in range(2):  # twice is enough (Kahan; Parlett, The Symmetric Eigenvalue Problem, §6.9)
-        gram = X.T @ (M @ X)
-        X = as_floats(np.linalg.solve(np.linalg.cholesky(0.5 * (gram + gram.T)), X.T)).T
-    return X
+class Flexibility:
+    """K⁻¹; factors of K with a unit diagonal, since its entries are in N/m, N and N·m.
 
-
-def _krylov_schur(K: sp.csr_matrix, M: sp.csr_matrix, count: int) -> Array:
-    """Eigenvectors (m, count). PETSc's own Cholesky, ordered to a narrow band, has no fill on the matrices of beams.
-
-    PETSc compares pivots with a bare number: K gets a unit diagonal, for pivots without unit.
+    Args:
+        K: (m, m) stiffness.
+        strain: (s, m) with K = strainᵀ strain but for rounding, which one step of refinement by the strains takes out.
     """
-    scale = sp.diags(1.0 / np.sqrt(K.diagonal()))
-    solver = SLEPc.EPS().create(MPI.COMM_SELF)
-    solver.setOperators(_petsc(scale @ K @ scale), _petsc(scale @ M @ scale))
-    solver.setProblemType(SLEPc.EPS.ProblemType.GHEP)
-    solver.setDimensions(count, _subspace(count, K.shape[0]))
-    solver.setTolerances(TOLERANCE, 1000)
-    solver.setWhichEigenpairs(SLEPc.EPS.Which.TARGET_MAGNITUDE)
-    solver.setTarget(0.0)
-    transform = solver.getST()
-    transform.setType(SLEPc.ST.Type.SINVERT)
-    linear = transform.getKSP()
-    linear.setType(PETSc.KSP.Type.PREONLY)
-    linear.getPC().setType(PETSc.PC.Type.CHOLESKY)
-    linear.getPC().setFactorOrdering(PETSc.Mat.OrderingType.RCM)
-    solver.solve()
-    converged = solver.getConverged()
-    if converged < count:
-        raise SolveError(
-            f"eigenproblem of size {K.shape[0]}: {converged} of {count} modes converged to {TOLERANCE:g}; "
-            "request fewer modes or use fewer elements"
-        )
-    X = np.empty((K.shape[0], count))
-    vector = solver.getOperators()[0].createVecRight()
-    for k in range(count):
-        solver.getEigenvector(k, vector)
-        X[:, k] = vector.array
-    solver.destroy()
-    return np.asarray(scale @ X)
 
+    def __init__(self, K: sp.csr_matrix, strain: sp.csr_matrix) -> None:
+        self._strain, self._scale = strain, 1.0 / np.sqrt(K.diagonal())[:, None]
+        self._factors = splu((sp.diags(self._scale[:, 0]) @ K @ sp.diags(self._scale[:, 0])).tocsc())
 
-def _subspace(count: int, size: int) -> int:
-    """Dimension of the Krylov space: SLEPc's default, but never a restart where the whole space is as small."""
-    return min(size, max(2 * count, count + 40))
+    def __matmul__(self, loads: Array) -> Array:
+        """Displacements under loads f (m, k)."""
+        displacements = self._solve(loads)
+        return displacements + self._solve(loads - self._strain.T @ (self._strain @ displacements))
 
-
-def _petsc(matrix: sp.csr_matrix) -> PETSc.Mat:
-    matrix = matrix.tocsr()
-    converted = PETSc.Mat().createAIJ(
-        matrix.shape,
-        csr=(matrix.indptr.astype(PETSc.IntType), matrix.indices.astype(PETSc.IntType), matrix.data),
-        comm=MPI.COMM_SELF,
-    )
-    converted.setOption(PETSc.Mat.Option.SPD, True)
-    return converted
+    def _solve(self, loads: Array) -> Array:
+        return np.asarray(self._scale * self._factors.solve(self._scale * loads))

@@ -27,13 +27,14 @@ from ..modal_body.lumped_masses import of_turning
 from ..modal_body.tensors import LEVI_CIVITA
 from ..modal_body.unit_loads import inertia_wrenches, interface_load_names, unit_load_names
 from .beam import R_X, Property
-from .invariants import StationSpace, weighted
+from .invariants import weighted
+from .line import Functions
 
 POINTS = 5  # Gauss points of an element: exact, since of cubics no product is of a degree above 8
 
 
 def geometric_stiffness(
-    link: BeamLink, stations: StationSpace, fields: Array, interfaces: dict[str, float]
+    link: BeamLink, stations: Functions, fields: Array, interfaces: dict[str, float]
 ) -> dict[str, Array]:
     """(n, n) K by unit load (`unit_loads`), of the link as its reference condition holds it.
 
@@ -59,7 +60,7 @@ def geometric_stiffness(
     return matrices
 
 
-def _at_gauss_points(stations: StationSpace, fields: Array) -> tuple[Array, Array, Array, Array]:
+def _at_gauss_points(stations: Functions, fields: Array) -> tuple[Array, Array, Array, Array]:
     """Points x (g,) m with their weights (g,) m, and fields (6, g, n) there with their derivatives by x."""
     x = stations.x[stations.element]  # (e, 4)
     nodes, weights = roots_legendre(POINTS)
@@ -149,7 +150,7 @@ def _beyond(link: BeamLink, x: Array, moment: Property, power: int) -> Array:
     return total
 
 
-def _of_turning_sections(link: BeamLink, stations: StationSpace, phi: Array) -> Iterator[tuple[str, Array]]:
+def _of_turning_sections(link: BeamLink, stations: Functions, phi: Array) -> Iterator[tuple[str, Array]]:
     """What sections with rotary inertia that turn by φ (3, k, n) add to K (n, n) of d'Alembert's loads."""
     for k, moment in ((1, lambda s: s.I_yy), (2, lambda s: s.I_zz)):
         W = weighted(link, stations, moment, link.material.density)

@@ -1,60 +1,22 @@
 """Inertia shape integrals of a beam, from its fields at the stations.
 
-The stations are the cubic Lagrange points of the station mesh, so values at stations *are* the degrees of freedom of
+The stations are the Gauss–Lobatto points of cubic elements, so values at stations *are* the degrees of freedom of
 the fields and every integral is a product with a mass matrix, without error.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import scipy.sparse as sp
-import ufl
-from dolfinx import fem
-from dolfinx.mesh import Mesh
 
-from ...common.arrays import Array, Integers
-from ...mesh.compat import assemble_matrix, cell_dofs, cell_vertices, function_space
+from ...common.arrays import Array
 from ..link_records import BeamLink
 from ..modal_body.invariants import Invariants
 from .beam import R_X, R_Y, R_Z, U_X, U_Y, U_Z, Property, cellwise
+from .line import Functions, gram
 
 
-@dataclass(frozen=True)
-class StationSpace:
-    """Continuous cubics on the station mesh, numbered along the axis.
-
-    Attributes:
-        space: the dolfinx space.
-        order: (k,) its degree of freedom at each station.
-        x: (k,) where the stations lie, in m.
-        element: (e, 4) stations of each cell, both ascending.
-    """
-
-    space: fem.FunctionSpace
-    order: Integers
-    x: Array
-    element: Integers
-
-    def matrix(self, form: ufl.Form) -> sp.csr_matrix:
-        """(k, k): a bilinear form of two fields given by their values at the stations."""
-        return assemble_matrix(form)[self.order][:, self.order]
-
-
-def station_space(mesh: Mesh) -> StationSpace:
-    """Stations at the vertices of the station mesh (exactly) and at two points inside each cell."""
-    space = function_space(mesh, "P", 3)
-    x = space.tabulate_dof_coordinates()[:, 0].copy()
-    order = np.argsort(x)
-    rank = np.argsort(order)
-    cells = cell_dofs(space)
-    x[cells[:, :2]] = cell_vertices(mesh)  # as given, not as mapped from the reference cell
-    element = np.sort(rank[cells], axis=1)
-    return StationSpace(space, order, x[order], element[np.argsort(element[:, 0])])
-
-
-def shape_integrals(link: BeamLink, stations: StationSpace, fields: Array) -> Invariants:
+def shape_integrals(link: BeamLink, stations: Functions, fields: Array) -> Invariants:
     """Inertia shape integrals (docs/theory.md) over axis and cross section.
 
     With displacement (u, v, w) and rotation (φ, θ_y, θ_z) of the section, a point (x, y, z) moves by Φ0 + y Φy + z Φz,
@@ -113,8 +75,6 @@ def shape_integrals(link: BeamLink, stations: StationSpace, fields: Array) -> In
     )
 
 
-def weighted(link: BeamLink, stations: StationSpace, moment: Property, rho: float) -> sp.csr_matrix:
+def weighted(link: BeamLink, stations: Functions, moment: Property, rho: float) -> sp.csr_matrix:
     """(k, k): ∫ρ·moment·a b dx of two fields a, b at the stations."""
-    a, b = ufl.TrialFunction(stations.space), ufl.TestFunction(stations.space)
-    weight = cellwise(link, stations.space.mesh, lambda s: rho * moment(s))
-    return stations.matrix(weight * a * b * ufl.dx)
+    return gram(stations.root(cellwise(link, stations.nodes, lambda s: rho * moment(s))))

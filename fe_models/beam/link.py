@@ -1,4 +1,4 @@
-"""From a beam's link file to its modal body: mesh, modes, their sign, integrals. Importing this loads dolfinx."""
+"""From a beam's link file to its modal body: mesh, modes, their sign, integrals."""
 
 from __future__ import annotations
 
@@ -13,9 +13,7 @@ import scipy.sparse as sp
 from ...common.arrays import Array, as_floats
 from ...common.errors import InputError
 from ...common.version import program_version
-
-# First of all that load dolfinx: mesh.compat sets PETSc up.
-from ...mesh.interval import graded_nodes, interval_mesh, with_points
+from ...mesh.interval import graded_nodes, with_points
 from ..link_records import FAMILIES, BeamLink, Family
 from ..modal_body import Interface, ModalBody, PictureMesh, Stations
 from ..modal_body.attachment_modes import DEFAULT_COUNT, ascending
@@ -27,7 +25,8 @@ from .beam import R_X, FamilyModel, family_model, shear_modulus
 from .eigen import lowest_modes
 from .fixed_interfaces import fixed_interfaces, ritz_modes
 from .geometric_stiffness import geometric_stiffness
-from .invariants import StationSpace, shape_integrals, station_space
+from .invariants import shape_integrals
+from .line import Functions, lagrange
 from .section_outline import section_outlines
 from .stress import beam_stresses, segments, stress_loads
 
@@ -50,7 +49,7 @@ def beam_modal_body(link: BeamLink, path: Path, progress: Progress) -> ModalBody
 
     Raises:
         InputError: more modes are asked for than the mesh has.
-        SolveError: the eigensolver did not converge.
+        SolveError: round-off errors spoil the modes.
     """
     length = link.geometry.length
     named = link.places
@@ -97,22 +96,20 @@ def beam_modal_body(link: BeamLink, path: Path, progress: Progress) -> ModalBody
 
 def loaded_models(
     link: BeamLink, families: Sequence[Family], progress: Progress = lambda _: None
-) -> tuple[dict[Family, FamilyModel], StationSpace]:
+) -> tuple[dict[Family, FamilyModel], Functions]:
     """The eigenproblems of `families` with the masses on interfaces, and the stations at which they are read."""
     nodes = _element_boundaries(link)
-    mesh = interval_mesh(nodes)
-    # The fields are read on a mesh of their own: there also the middle and the interfaces are vertices.
-    station_mesh = interval_mesh(with_points(nodes, [0.5 * link.geometry.length, *link.places.values()]))
-    stations = station_space(station_mesh)
+    # The fields are read on elements of their own: there also the middle and the interfaces are nodes.
+    stations = lagrange(with_points(nodes, [0.5 * link.geometry.length, *link.places.values()]), 3)
     models: dict[Family, FamilyModel] = {}
     for family in families:
         progress(f"{link.name}: assembling {family}")
-        models[family] = _loaded(family_model(link, family, mesh, stations.x), link, stations.x)
+        models[family] = _loaded(family_model(link, family, nodes, stations.x), link, stations.x)
     return models, stations
 
 
 def _with_sections(
-    link: BeamLink, stations: StationSpace, position: Array, translation: Array, rotation: Array
+    link: BeamLink, stations: Functions, position: Array, translation: Array, rotation: Array
 ) -> Stations:
     """The stations, with extents, outlines and rigidities of the sections from each on; GJ where there is a ν."""
     segment = segments(link, stations.x)
@@ -256,7 +253,7 @@ def _wanted(link: BeamLink, models: Mapping[Family, FamilyModel], path: Path) ->
     return wanted
 
 
-def _interface(stations: StationSpace, fields: Array, position: float) -> Interface:
+def _interface(stations: Functions, fields: Array, position: float) -> Interface:
     station = int(np.argmin(np.abs(stations.x - position)))
     return Interface(_on_axis(np.array([position]))[0], fields[:R_X, station], fields[R_X:, station])
 

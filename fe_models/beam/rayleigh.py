@@ -1,4 +1,4 @@
-"""Frequencies of beams that differ a little, by the mode of one of them held: for derivatives. Loads dolfinx.
+"""Frequencies of beams that differ a little, by the mode of one of them held: for derivatives.
 
 With K x = λ M x and x held, the derivative of Rayleigh's quotient xᵀK(θ)x / xᵀM(θ)x at that beam is that of the
 eigenvalue, xᵀ(∂K/∂θ − λ ∂M/∂θ)x / xᵀMx: no mode but the one is needed, as long as its eigenvalue is simple (Fox and

@@ -7,10 +7,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from ffrobot.fe_models.beam.geometric_stiffness import geometric_stiffness
-from ffrobot.fe_models.beam.invariants import station_space
+from ffrobot.fe_models.beam.line import lagrange
 from ffrobot.fe_models.link_file import read_link
 from ffrobot.fe_models.modal_body.unit_loads import unit_load_names
-from ffrobot.mesh.interval import interval_mesh
 
 L, RHO = 0.8, 3100.0
 LINK = """name = "rod"
@@ -161,7 +160,7 @@ def works(shapes, p, theory, condition, x):
 def test_work_of_every_load_is_that_on_the_exact_motion(tmp_path, theory, condition):
     """Forces, moments and inertia at a bent, twisted and stretched rod of two sections, rotated without expansion."""
     link = link_of(tmp_path, theory, condition)
-    stations = station_space(interval_mesh(np.linspace(0.0, L, 5)))
+    stations = lagrange(np.linspace(0.0, L, 5), 3)
     shapes = shapes_of(theory, condition)
     K = geometric_stiffness(link, stations, shapes.at(stations.x), PLACES)
     assert set(K) == set(unit_load_names(PLACES))
@@ -190,7 +189,7 @@ def test_closed_forms(tmp_path):
         "r_z": {(W, PHI): -rho_A * L**5 / 15},
     }
     link = link_of(tmp_path, replace=("height = 0.012, width = 0.02", "height = 0.009, width = 0.015"))
-    stations = station_space(interval_mesh(np.linspace(0.0, L, 5)))
+    stations = lagrange(np.linspace(0.0, L, 5), 3)
     x, fields = stations.x, np.zeros((6, stations.x.size, 4))
     fields[1, :, V], fields[5, :, V] = x**3, 3 * x**2
     fields[2, :, W], fields[4, :, W] = x**2, -2 * x

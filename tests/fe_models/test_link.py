@@ -7,6 +7,7 @@ import time
 
 import h5py
 import pytest
+from solids import write_solid
 
 from ffrobot.common.errors import InputError
 from ffrobot.fe_models.link import cached_modal_body, input_hash, make_link
@@ -50,9 +51,9 @@ print([m for m in ("dolfinx", "gmsh", "petsc4py", "slepc4py", "mpi4py", "basix",
     assert time.perf_counter() - start < 2.0  # 0.3 s where nothing else runs
 
 
-@pytest.mark.parametrize("missing", ["dolfinx", "petsc4py", "slepc4py"])
-def test_without_the_finite_element_libraries(link_file, missing):
-    path = link_file()
+@pytest.mark.parametrize("missing", ["dolfinx", "petsc4py"])
+def test_without_the_finite_element_libraries(tmp_path, missing):
+    path = write_solid(tmp_path, divisions=(2, 1, 1))
     code = f"""
 import sys
 from pathlib import Path
@@ -65,7 +66,7 @@ except SolveError as error:
     print(error)
 """
     result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert f"link1.toml: computing a link needs the finite element libraries, and {missing}" in result.stdout
+    assert f"link1.toml: computing a solid link needs the finite element libraries, and {missing}" in result.stdout
 
 
 def test_a_run_prints_nothing_and_repeats_bit_for_bit(link_file, tmp_path):
@@ -81,9 +82,9 @@ make_link(Path({str(path)!r}), Path({str(tmp_path / "again.h5")!r}), force=True)
     assert (tmp_path / "again.h5").read_bytes() == path.with_suffix(".h5").read_bytes()
 
 
-def test_signals_end_the_process_as_ever(link_file):
+def test_signals_end_the_process_as_ever(tmp_path):
     """PETSc installs handlers that print pages and exit with its own code, unless told not to."""
-    path = link_file()
+    path = write_solid(tmp_path, divisions=(2, 1, 1), family="all", count=1)
     code = f"""
 import os, signal
 from pathlib import Path

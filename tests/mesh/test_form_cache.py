@@ -10,14 +10,14 @@ import pytest
 from ffrobot.common.locks import held, is_running, this_process
 
 COMPILE = """
-from ffrobot.mesh.compat import MPI, assemble_matrix, create_interval_mesh, function_space
+from ffrobot.mesh.compat import MPI, compiled_form, lagrange_space
 from ffrobot.mesh.form_cache import form_folder
-import numpy as np
+from dolfinx.mesh import create_unit_cube
 import ufl
-mesh = create_interval_mesh(np.array([0.0, 1.0]), np.array([[0, 1]]))
+mesh = create_unit_cube(MPI.COMM_SELF, 1, 1, 1)
 {between}
-space = function_space(mesh, "P", 1)
-assemble_matrix(ufl.TestFunction(space) * ufl.TrialFunction(space) * ufl.dx)
+space = lagrange_space(mesh, 1, vector=False)
+compiled_form(ufl.TestFunction(space) * ufl.TrialFunction(space) * ufl.dx)
 """
 KILLED = """
 with form_folder(MPI.COMM_SELF, "test") as own:

@@ -1,10 +1,9 @@
-"""Where the nodes of a beam lie, and the mesh on them."""
+"""Where the nodes of a beam lie."""
 
 import numpy as np
 import pytest
 
-from ffrobot.mesh.compat import cell_vertices
-from ffrobot.mesh.interval import cells_containing, graded_nodes, interval_mesh, with_points
+from ffrobot.mesh.interval import graded_nodes, with_points
 
 
 def test_a_uniform_mesh_is_uniform():
@@ -30,19 +29,3 @@ def test_fewer_elements_than_segments_is_refused():
 def test_points_are_added_once():
     nodes = with_points(np.array([0.0, 0.5, 1.0]), [0.5, 0.5 + 1e-12, 0.25, 1.0])
     np.testing.assert_array_equal(nodes, [0.0, 0.25, 0.5, 1.0])
-
-
-@pytest.mark.parametrize("flipped", [(), (0, 3, 4)])
-def test_points_are_found_in_their_cells(flipped):
-    nodes = np.array([0.0, 0.1, 0.35, 0.6, 0.62, 1.0])
-    mesh = interval_mesh(nodes, flipped)
-    points = np.concatenate([nodes, np.linspace(0, 1, 57)])
-    cells, X = cells_containing(mesh, points)
-    vertices = cell_vertices(mesh)[cells]
-    assert np.all((X >= 0) & (X <= 1))
-    np.testing.assert_allclose(vertices[:, 0] + X * (vertices[:, 1] - vertices[:, 0]), points, atol=1e-15)
-
-
-def test_flipped_cells_run_backwards():
-    vertices = cell_vertices(interval_mesh(np.linspace(0, 1, 6), flipped=[2]))
-    assert np.sum(vertices[:, 1] < vertices[:, 0]) == 1

@@ -81,9 +81,12 @@ def test_scene_is_solved_as_here(environment, scene, two_link):
     assert scene.with_suffix(".results.html").exists()
 
 
-def test_stage_1_says_what_it_needs(environment, two_link):
-    done = run(
-        environment / "ffrobot", "link", two_link.folder / "link1.toml", "--force", "-o", "x.h5", cwd=environment
+def test_stage_1_of_beams_is_in_the_wheel_and_solids_say_what_they_need(environment, two_link):
+    solid = ROOT / "cases" / "two_link_solid" / "link1.toml"
+    beam, other = (
+        run(environment / "ffrobot", "link", link, "--force", "-o", "x.h5", cwd=environment)
+        for link in (two_link.folder / "link1.toml", solid)
     )
-    assert done.returncode == 1
-    assert "computing a link needs the finite element libraries" in done.stderr
+    assert beam.returncode == 0, beam.stderr
+    assert other.returncode == 1
+    assert "computing a solid link needs the finite element libraries" in other.stderr

@@ -1,0 +1,86 @@
+"""Piecewise polynomials along the axis of a beam, and their exact integrals. NumPy and SciPy only."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import perm
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.special import roots_legendre
+
+from ...common.arrays import Array, Integers
+
+# Points of an element: exact for products of two cubics.
+GAUSS = 4
+
+
+@dataclass(frozen=True)
+class Functions:
+    """Continuous functions on the elements between neighbouring nodes, from their degrees of freedom.
+
+    Attributes:
+        nodes: (e + 1,) ascending, in m.
+        x: (size,) where the degrees of freedom are, ascending, in m.
+        element: (e, d) degrees of freedom of each element, numbered along the axis.
+        powers: (p, d) coefficients of the powers of X ∈ [0, 1] in each shape function.
+        slopes: (d,) 1 of degrees of freedom that are derivatives by x, else 0.
+    """
+
+    nodes: Array
+    x: Array
+    element: Integers
+    powers: Array
+    slopes: Integers
+
+    @property
+    def lengths(self) -> Array:
+        """(e,) of the elements, in m."""
+        return np.diff(self.nodes)
+
+    def at(self, x: Array, derivative: int = 0) -> sp.csr_matrix:
+        """(k, size): values, or a derivative by x, at points x (k,) of the axis."""
+        cell = np.clip(np.searchsorted(self.nodes, x, side="right") - 1, 0, len(self.element) - 1)
+        return self._within(cell, (x - self.nodes[cell]) / self.lengths[cell], derivative)
+
+    def _within(self, cell: Integers, X: Array, derivative: int) -> sp.csr_matrix:
+        """The same at X (k,) ∈ [0, 1] of the elements `cell` (k,)."""
+        order = np.arange(derivative, len(self.powers))
+        factor = np.array([perm(power, derivative) for power in order])
+        shapes = (factor * X[:, None] ** (order - derivative)) @ self.powers[derivative:]
+        shapes = shapes * self.lengths[cell, None] ** (self.slopes - derivative)
+        row = np.repeat(np.arange(X.size), self.element.shape[1])
+        return sp.csr_matrix((shapes.ravel(), (row, self.element[cell].ravel())), shape=(X.size, self.x.size))
+
+    def root(self, weight: Array, derivative: int = 0) -> sp.csr_matrix:
+        """B (4e, size) with BᵀB = ∫ weight f⁽ᵈ⁾ g⁽ᵈ⁾ dx, for weights (e,) of the elements."""
+        points, weights = roots_legendre(GAUSS)
+        elements = len(self.element)
+        values = self._within(np.repeat(np.arange(elements), GAUSS), np.tile(0.5 * (points + 1), elements), derivative)
+        scale = np.sqrt((weight * self.lengths)[:, None] * (0.5 * weights))
+        return sp.diags(scale.ravel()) @ values
+
+
+def gram(B: sp.csr_matrix) -> sp.csr_matrix:
+    """BᵀB of a `root`, or of several one upon the other.
+
+    Gauss point after Gauss point: what neighbouring elements add to an entry is then rounded alike and cancels in rigid
+    motions, where one sum over all leaves a soft elastic foundation.
+    """
+    return sum(B[g::GAUSS].T @ B[g::GAUSS] for g in range(GAUSS)).tocsr()
+
+
+def lagrange(nodes: Array, degree: int) -> Functions:
+    """Of degree 2 or 3, by their values at the Gauss–Lobatto points of each element between `nodes` (e + 1,)."""
+    inner = {2: [0.0], 3: [-np.sqrt(0.2), np.sqrt(0.2)]}[degree]
+    X = 0.5 * (1.0 + np.array([-1.0, *inner, 1.0]))
+    element = degree * np.arange(nodes.size - 1)[:, None] + np.arange(degree + 1)
+    x = np.append(nodes[:-1, None] + np.diff(nodes)[:, None] * X[:-1], nodes[-1])
+    return Functions(nodes, x, element, np.linalg.inv(X[:, None] ** np.arange(degree + 1)), 0 * element[0])
+
+
+def hermite(nodes: Array) -> Functions:
+    """Cubics, by value and slope at each of `nodes` (e + 1,)."""
+    powers = np.array([[1, 0, -3, 2], [0, 1, -2, 1], [0, 0, 3, -2], [0, 0, -1, 1]], dtype=np.float64).T
+    element = 2 * np.arange(nodes.size - 1)[:, None] + np.arange(4)
+    return Functions(nodes, np.repeat(nodes, 2), element, powers, np.array([0, 1, 0, 1]))
