@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import ast
 import csv
+import inspect
 import re
 import sys
 from collections.abc import Iterator
@@ -26,6 +27,7 @@ HISTORY = re.compile(
 FENCE = re.compile(r"^ *(```|~~~).*?^ *\1 *$", re.DOTALL | re.MULTILINE)
 INDENTED = re.compile(r"(?:(?<=\n\n)|\A)(?:(?: {4}|\t).*\n?|\n(?= {4}))+")
 EXEMPT = re.compile(r"``[^`]+``|`[^`]*`|\$\$.*?\$\$|\$[^$\n]+\$|<[^>\n]+>|https?://\S+", re.DOTALL)
+EXAMPLES = re.compile(r"^\x08\n(?:.+\n?)+", re.MULTILINE)  # paragraphs that click prints line by line
 TABLE = re.compile(r"^ *\|.*$|^#+ .*$", re.MULTILINE)  # and headings: no sentences
 LINK = re.compile(r"!?\[((?:[^\[\]]|\[[^\[\]]*\])*)\]\([^)]*\)")
 SENTENCE = re.compile(r"(?<=[.!?])\s+|:\s*\n|\n\s*(?:[*+-]|\d+\.|#+|>)\s+|\n\s*\n|\s*\|\s*")
@@ -88,13 +90,14 @@ def count(text: str) -> Count:
 
 
 def texts(root: Path = ROOT) -> dict[str, str]:
-    """The prose of all pages by file, and what `--help` prints."""
+    """The prose of all pages by file, texts in figures, and what `--help` prints."""
     pages = [root / "README.md", *sorted((root / "docs").rglob("*.md")), *sorted((root / "cases").glob("*/README.md"))]
     named = {
         str(page.relative_to(root)): page.read_text(encoding="utf-8") for page in pages if "_build" not in page.parts
     }
     printed = {f"printed by {package}": printed_texts(root / package) for package in PACKAGES}
-    return {name: prose(text) for name, text in named.items()} | printed | {"ffrobot --help": help_texts()}
+    drawn = {str(path.relative_to(root)): figure_texts(path) for path in root.glob("cases/*/figures*.toml")}
+    return {name: prose(text) for name, text in named.items()} | printed | drawn | {"ffrobot --help": help_texts()}
 
 
 def help_texts() -> str:
@@ -103,9 +106,14 @@ def help_texts() -> str:
 
     parts = [cli.help or ""]
     for command in cli.commands.values():
-        parts += [command.help or "", command.epilog or ""]
+        parts += [inspect.cleandoc(text) for text in (command.help, command.epilog) if text]
         parts += [option.help or "" for option in command.params if isinstance(option, click.Option)]
-    return prose("\n\n".join(part.replace("\b", "") for part in parts))
+    return prose("\n\n".join(EXAMPLES.sub("", part) for part in parts))
+
+
+def figure_texts(path: Path) -> str:
+    """Titles and labels in a figures file of a case."""
+    return "\n\n".join(re.findall(r'\b(?:\w*title|\w*label) = "([^"]*)"', path.read_text(encoding="utf-8")))
 
 
 def printed_texts(package: Path) -> str:

@@ -55,7 +55,7 @@ def _mesh(file: h5py.File) -> RawMesh:
     if attributes.get("REP", 0) != 0:
         raise InputError("expected Cartesian coordinates, found cylindrical or spherical ones")
     if attributes["ESP"] != 3:
-        raise InputError(f"expected a mesh in space, found one in {attributes['ESP']} dimensions")
+        raise InputError(f"expected a mesh in 3D, found one in {attributes['ESP']} dimensions")
     step = mesh if "NOE" in mesh else _only(mesh, "step of the mesh")[1]
     points = _columns(step["NOE/COO"], 3).astype(np.float64)
     families = file["FAS"][name] if name in file.get("FAS", ()) else {}

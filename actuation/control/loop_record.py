@@ -138,7 +138,7 @@ def _warnings(analysis: SampledAnalysis, controllers: Sequence[Controller], metr
             f" {fastest / (2 * np.pi):.4g} Hz: expected at least {SAMPLES_PER_PERIOD} samples a period"
         )
     if gears and any(isinstance(record, Lqr | ComputedTorque) for record in analysis.controller):
-        lines.append("the controller is designed for rigid gears, and some give")
+        lines.append("the controller is designed for rigid gears, but some are compliant")
     if metrics.verdict != "stable":
         lines.append(f"the loop {metrics.verdict}: gains too high for sampling and delay, or for the links?")
     return lines

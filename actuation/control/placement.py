@@ -101,7 +101,7 @@ def _link(context: ActuatedContext, wanted: Placement) -> PatchableLink:
         keys = {"allocation": "least-squares", "mode_weights": None, "point_weights": None} | changes
         found = link_patches(path, [layout.model_copy(update=elsewhere(layout, keys))], body, context.carrying[name])
         if not np.array_equal(found.modes[label].rows, reached.rows):
-            raise InputError(f'{path}: placement.body: expected patches that reach the modes of "{label}"')
+            raise InputError(f'{path}: placement.body: expected patches that excite the modes of "{label}"')
         return found.arrays[label]
 
     own = reached.coordinates(to_file.T).T

@@ -144,8 +144,8 @@ def advice(
         texts.append(f"gains too high: times {found.gain:.2g} they are at the bound of stability")
     if light := light_roots(models):
         texts.append(
-            f"{', '.join(light)}: no rotor_inertia to speak of at the joint, so that a moment turns the root of the"
-            " link at once: give the rotor (or hub) its inertia"
+            f"{', '.join(light)}: negligible rotor_inertia at the joint, so that a torque turns the root of the"
+            " link at once: specify the inertia of the rotor (or hub)"
         )
     if (suggestion := suggested_gains(models, T, delay, records[0].side)) is not None:
         texts.append(f"start with {suggestion.in_words()}")

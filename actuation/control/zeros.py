@@ -43,7 +43,7 @@ class Zeros:
             return "minimum phase"
         slowest = self.unstable[np.abs(self.unstable).argmin()]
         number = f"{slowest.real:.4g}" + (f" ± {abs(slowest.imag):.4g}i" if abs(slowest.imag) > 0 else "")
-        return f"non-minimum phase: {len(self.unstable)} zeros to the right, the slowest {number} rad/s"
+        return f"non-minimum phase: {len(self.unstable)} zeros in the right half plane, the slowest {number} rad/s"
 
 
 def zeros(model: LinearModel, inputs: Names, outputs: Names) -> Zeros:

@@ -101,7 +101,7 @@ def weights(key: str, layout: PztLayout, served: int, stiffness: Array, points: 
 
 def check_all_served(key: str, reach: Reach) -> None:
     """Raise `InputError` unless the patches reach every mode that they are to serve."""
-    advice = 'or be content with the best they can do: allocation = "least-squares"'
+    advice = 'or accept unmet modal forces: allocation = "least-squares"'
     n, k = reach.served, reach.Phi_V.shape[1]
     if not n:
         raise InputError(f"{key}: expected modes of the link for the patches to serve, found none")
@@ -111,7 +111,7 @@ def check_all_served(key: str, reach: Reach) -> None:
     if unreached.size:
         modes = ", ".join(f"{j + 1} ({reach.frequency[j]:.4g} Hz)" for j in unreached)
         raise InputError(
-            f"{key}: expected patches that reach every mode, found a singular Φ_V (condition number"
+            f"{key}: expected patches that excite every mode, found a singular Φ_V (condition number"
             f" {min(reach.condition_number, MOST_CONDITION):.1g}): no voltages serve mode {modes};"
             f" move patches, {advice}"
         )

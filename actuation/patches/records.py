@@ -136,7 +136,7 @@ class PztLayout(Record):
 
     def _check_plain(self) -> None:
         if abs(self.d31) < SMALLEST:
-            raise ValueError(f"expected a d31 other than 0, found {self.d31:g}: such patches do nothing")
+            raise ValueError(f"expected a d31 other than 0, found {self.d31:g}: such patches have no effect")
         if self.bends == "twist":
             raise ValueError(
                 f'expected the keys {quoted(OF_FIBRES)} with bends = "twist", found none: plain piezoceramic strains'
@@ -157,7 +157,7 @@ class PztLayout(Record):
             )
         along, shear = np.abs(self.lamina.per_volt)
         if max(along, shear) * self.thickness < SMALLEST:
-            raise ValueError("expected d33 or d31 other than 0, found neither: such patches do nothing")
+            raise ValueError("expected d33 or d31 other than 0, found neither: such patches have no effect")
         if self.bends == "twist" and shear <= NO_SHEAR * along:
             raise ValueError(
                 f'expected fibers at an angle that shear under a voltage with bends = "twist", found fibre_angle ='

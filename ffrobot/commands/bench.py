@@ -71,10 +71,10 @@ def bench(
 ) -> None:
     """Measure run time against error, and where the error comes from.
 
-    With a scene: one of its analyses with every integrator at every tolerance, against a reference that two integrators
-    agree on; then the error of its mesh, of its number of modes and of time integration. Without one, in ffrobot's
-    source tree: the same for the two cases of the paper, how time grows with modes, links and outputs, and ratios to
-    hand-written code for the two-link case. Tables as CSV and JSON, figures as PNG and PDF.
+    With a scene: one of its analyses with every integrator at every tolerance, against a reference that two
+    integrators agree on. Then the error of its mesh, of its number of modes and of time integration. Without a scene,
+    in ffrobot's source tree: the same for the two cases of the paper, the growth of time with modes, links and outputs,
+    and ratios to hand-written code for the two-link case. Tables as CSV and JSON, figures as PNG and PDF.
     """
     from ..bench.campaign import Campaign, Settings
     from ..bench.precision import INTEGRATORS, TOLERANCES

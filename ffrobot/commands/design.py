@@ -136,7 +136,7 @@ def optimise(scene_file: Path, vary: tuple[str, ...], output: Path | None, **how
     --vary joint.1.gear_ratio=10:200:log            steps in the logarithm
     --vary trajectory.tip.duration,analysis.inverse.end=0.5:2     one parameter for several keys
     --vary "joint.1.gear_ratio in {50, 80, 100}"    a discrete set
-    --vary "joint.1.gear_ratio,joint.1.rotor_inertia in {50:2e-5, 100:1.2e-5}"     rows of one
+    --vary "joint.1.gear_ratio,joint.1.rotor_inertia in {50:2e-5, 100:1.2e-5}"     pairs
     --minimise mass --against "rms tip_error" --points 6     the least mass for six tip errors (Pareto front)
 
     Gradient searches start from the scene's own values (and --starts - 1 others); discrete sets are enumerated or
@@ -200,7 +200,7 @@ def uncertainty(
     --spread gravity.1=uniform:-9.83:-9.78     between two values
 
     --by screening finds the influential ones of many parameters with R runs for each and R more. Every number has an
-    error estimate. The same command resumes a stopped study; failed runs are reported and omitted.
+    error estimate. The same command resumes a stopped study; failed runs are listed and omitted.
     """  # noqa: D301 (click wants the backspace itself)
     folder = output or scene_file.with_suffix(".uncertainty")
     if how["by"] == "screening":

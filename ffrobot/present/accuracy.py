@@ -33,7 +33,7 @@ def integrated(solution: Solution) -> list[AnalysisResult]:
 
 def _modes(solution: Solution, results: Sequence[AnalysisResult]) -> str:
     if rigid := [f"{name} in {', '.join(body.rigid_in)}" for name, body in solution.bodies.items() if body.rigid_in]:
-        return f"{NOT_ESTIMATED}: rigid for want of modes: {'; '.join(rigid)}"
+        return f"{NOT_ESTIMATED}: rigid without modes: {'; '.join(rigid)}"
     if not solution.links:
         return "links are rigid"
     if solution.mode_choice is not None:

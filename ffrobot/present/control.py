@@ -101,7 +101,7 @@ def control_lines(details: Mapping[str, Details]) -> Iterator[str]:
     """Meaning of columns of closed loops, damping ratios, zeros, modes out of reach, places of patches: a line each."""
     loops = {name: found.metrics for name, found in details.items() if isinstance(found, LoopRecord)}
     if loops:
-        yield f"closed loops: {DEFINITIONS}"
+        yield f"closed-loop control: {DEFINITIONS}"
     for name, metrics in loops.items():
         if np.isfinite(metrics.lowest_frequency):
             yield f"{name}: vibration at {metrics.lowest_frequency:.3g} Hz and above"

@@ -135,12 +135,12 @@ def run_sweep(sweep: Sweep, side_by_side: int, watcher: Watcher, workers: Worker
     with _performed(list(waiting.values()), side_by_side, workers or Workers()) as finished:
         for row in finished:
             if row is None:
-                raise StoppedError(f"{sweep.folder}: stopped; the same command takes it up again", signal.SIGINT)
+                raise StoppedError(f"{sweep.folder}: stopped; the same command resumes it", signal.SIGINT)
             run = waiting[row.number]
             if what := row.changes(_files(sweep, run).inputs):
                 raise InputError(
                     f"{sweep.folder}: {' and '.join(what)} changed while the sweep ran, and the runs under way with it;"
-                    " the same command takes it up again, and computes what is out of date"
+                    " the same command resumes it, and computes what is out of date"
                 )
             keep_row(run.folder, row)
             rows[row.number] = row

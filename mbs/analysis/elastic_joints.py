@@ -87,5 +87,5 @@ def unresolved_gears(gears: Mapping[str, GearMotion]) -> Iterator[str]:
         if motion.unresolved > UNRESOLVED:
             yield (
                 f'joint "{joint}": outputs are too far apart for its motor behind a compliant gear: with every second'
-                f" one its moment changes by {100 * motion.unresolved:.2g} %; smooth the path or refine output_step"
+                f" one its torque changes by {100 * motion.unresolved:.2g} %; smooth the path or refine output_step"
             )

@@ -37,7 +37,7 @@ def _outside(path: Trajectory, analysis: TimedAnalysis) -> Iterator[str]:
         share = f"{max(0.0, 100 * end / over):.3g} % of its time"
         yield f'{where}: is over at t = {over:g} s, beyond the end of "{analysis.name}" at {end:g} s, which has {share}'
     elif path.waypoints is not None and over < STILL * end:
-        yield f'{where}: its way points are over at t = {over:g} s, and "{analysis.name}" rests until {end:g} s'
+        yield f'{where}: its waypoints are over at t = {over:g} s, and "{analysis.name}" rests until {end:g} s'
 
 
 def _unseen(path: Trajectory, times: Array, analysis: TimedAnalysis) -> Iterator[str]:

@@ -75,7 +75,7 @@ def _check(model: Model, criterion: str, found: Mobility) -> None:
     for node in model.tree.nodes:
         if node.joint.q_count != node.joint.freedoms:
             raise InputError(
-                f"{path}: redundancy: expected joints with angles and ways for coordinates, found"
+                f"{path}: redundancy: expected joints with angles or displacements for coordinates, found"
                 f' "{node.joint.name}", a {node.joint.type} joint: prescribe joints by trajectories'
             )
 

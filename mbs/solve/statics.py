@@ -39,7 +39,7 @@ def initial_state(model: Model) -> State:
 
 
 def hanging_joints(model: Model, start: State) -> Iterator[str]:
-    """A warning where the equilibrium `start` has joints elsewhere than [initial], as nothing holds them there."""
+    """A warning where the equilibrium `start` has joints elsewhere than [initial], as nothing keeps them there."""
     if model.scene.initial.state != "static":
         return
     away, length = np.abs(start.q - undeformed_posture(model).q), robot_size(model)

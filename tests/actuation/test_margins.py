@@ -224,7 +224,7 @@ def test_a_loop_that_diverges_says_why_and_what_to_start_with():
     assert record.metrics.verdict == "diverges"
     assert record.margins.radius > 1.0 > record.margins.gain
     advice = Results.from_image(results_image(solution), solution.scene.path).verdict["loop"].advice
-    assert any("J0: no rotor_inertia to speak of" in text for text in advice)
+    assert any("J0: negligible rotor_inertia" in text for text in advice)
     assert light_roots(solution.outcomes["linear"].details.models) == ["J0"]
     (start,) = [text for text in advice if text.startswith("start with ")]
     P, D = (float(start.split(f"{what} = {{ J0 = ")[1].split(" }")[0]) for what in ("proportional", "derivative"))

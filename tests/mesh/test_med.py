@@ -90,7 +90,7 @@ def test_curved_hexahedra_of_27_nodes(solid, mesh_part, tmp_path, mirror):
 REJECTED = {
     "cylindrical": ({"REP": 1}, "expected Cartesian coordinates, found cylindrical"),
     "grid": ({"TYP": 1}, "expected a mesh of cells, found a structured grid"),
-    "plane": ({"ESP": 2}, "expected a mesh in space, found one in 2 dimensions"),
+    "plane": ({"ESP": 2}, "expected a mesh in 3D, found one in 2 dimensions"),
 }
 
 

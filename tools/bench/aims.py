@@ -87,7 +87,7 @@ def _rows(aim: Aim, scene: Scene, hand_written: HandWritten, repeat: int, budget
     reference = find_reference(scene, NAME, REFERENCE_TOLERANCE, budget, display)
     points = measure_points(scene, NAME, reference, INTEGRATORS, TOLERANCES, 2, budget, display)
     asked = next(point for point in points if (point.integrator, point.tolerance) == ("auto", ACCURACY))
-    chosen = {"asked for 1e-4": asked, "fastest within 1e-4": fastest(points, dict.fromkeys(aim.within, ACCURACY))}
+    chosen = {"requested 1e-4": asked, "fastest within 1e-4": fastest(points, dict.fromkeys(aim.within, ACCURACY))}
     pairs: dict[str, list[tuple[float, float]]] = {label: [] for label in chosen}
     for repetition in range(repeat):
         display.stage(f"{aim.title}: repetition {repetition + 1} of {repeat}")

@@ -175,7 +175,7 @@ class SceneOfRobot:
             self.remarks.append(
                 f'{name} follows "{shown(mimic.joint)}": give it a separate trajectory,'
                 f" {mimic.multiplier:g} times that one plus {mimic.offset:g}; the motor of that one then has to supply"
-                f" {mimic.multiplier:g} times this one's moment in addition to its own"
+                f" {mimic.multiplier:g} times this one's torque in addition to its own"
             )
 
     def _friction(self, joint: UrdfJoint) -> dict[str, Any]:
