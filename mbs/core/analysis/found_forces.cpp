@@ -1,5 +1,6 @@
 #include "core/analysis/found_forces.h"
 
+#include "core/linear/small_product.h"
 #include "core/recursion/constrained_aba/constraints.h"
 
 #include <algorithm>
@@ -58,11 +59,13 @@ void ActuatorReader<Space>::read(const double *q, const Workspace<Space, double>
   motors_.resolve(q, w.lambda.data(), w);
   for (Index k = 0; k < limit_.size(); ++k)
     *to++ = std::clamp(motors_.tau()[k], -limit_[k], limit_[k]);
+  modal_ = motors_.left();
+  if (shape)
+    modal_ += *shape;
   for (auto &[first, reached, allocation] : patches_) {
-    VectorXd modal = motors_.left().segment(first, reached.cols());
-    if (shape)
-      modal += shape->segment(first, reached.cols());
-    const VectorXd &V = allocation.solve(reached * modal);
+    reached_.resize(reached.rows());
+    multiply_small(reached, modal_.data() + first, reached_.data());
+    const VectorXd &V = allocation.solve(reached_);
     to = std::copy_n(V.data(), V.size(), to);
   }
 }

@@ -74,6 +74,7 @@ private:
   Motors<Space> motors_;
   Eigen::VectorXd limit_;
   std::vector<LinkPatches> patches_;
+  Eigen::VectorXd modal_, reached_; // (n_v) for patches; what those of a link reach of it
 };
 
 // Forces -lambda of constraint equations: along joint coordinates as they are, and of others the force and the moment

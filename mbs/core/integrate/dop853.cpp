@@ -20,6 +20,12 @@ FourDoubles square_root(FourDoubles x) {
   return x;
 }
 
+// Weighted sum of the slopes in row k of the dense output
+template <class Tableau, int k, class T> [[gnu::always_inline]] inline T dense_sum(const double *K, Index n, Index i) {
+  static constexpr auto &row = Tableau::d[k];
+  return Combination<row, Tableau::dense_stages, T, 1>(K, n, i).sum[0];
+}
+
 } // namespace
 
 Dop853::Dop853(OdeSystem &system)
@@ -69,15 +75,16 @@ void Dop853::prepare_dense(double t, const double *y, double h) {
   run_stages<Tableau, Tableau::stages + 1, Tableau::dense_stages - 1>(system_, t, y, h, K_, stage_);
   t0_ = t;
   h_ = h;
-  start_ = Eigen::Map<const Eigen::VectorXd>(y, n_);
-  F_.col(0) = end_ - start_;
-  F_.col(1) = h * K_.col(0) - F_.col(0);
-  F_.col(2) = 2 * F_.col(0) - h * (K_.col(Tableau::stages) + K_.col(0));
-  for (Index row = 0; row < 4; ++row) {
-    F_.col(3 + row).setZero();
-    for (Index j = 0; j < Tableau::dense_stages; ++j)
-      F_.col(3 + row) += (h * Tableau::d[row][j]) * K_.col(j);
-  }
+  for_entries<1>(n_, [&]<class T, int>(Index i) __attribute__((always_inline)) {
+    const T start = read_at<T>(y + i), way = read_at<T>(end_.data() + i) - start;
+    const T first = h * read_at<T>(K_.data() + i), last = h * read_at<T>(last_slope() + i);
+    double *F = F_.data() + i;
+    write_at(start_.data() + i, start);
+    write_at(F, way), write_at(F + n_, first - way), write_at(F + 2 * n_, 2 * way - (last + first));
+    [&]<int... k>(std::integer_sequence<int, k...>) __attribute__((always_inline)) {
+      (write_at(F + (3 + k) * n_, h * dense_sum<Tableau, k, T>(K_.data(), n_, i)), ...);
+    }(std::make_integer_sequence<int, 4>());
+  });
 }
 
 // The last term of the interpolation is at most (4/7)^4 (3/7)^3 of its coefficient. On a vibration of 0.3 to 7 radians
@@ -91,11 +98,12 @@ bool Dop853::estimate_dense(Eigen::VectorXd &error) const {
 
 void Dop853::interpolate(double t, double *y) const {
   const double x = (t - t0_) / h_;
-  Eigen::Map<Eigen::VectorXd> out(y, n_);
-  out = x * F_.col(Tableau::dense_order - 1);
-  for (int i = Tableau::dense_order - 2; i >= 0; --i)
-    out = (i % 2 == 0 ? x : 1 - x) * (out + F_.col(i));
-  out += start_;
+  for_entries<1>(n_, [&]<class T, int>(Index i) __attribute__((always_inline)) {
+    T out{};
+    for (int k = Tableau::dense_order - 1; k >= 0; --k)
+      out = (k % 2 == 0 ? x : 1 - x) * (out + read_at<T>(F_.data() + k * n_ + i));
+    write_at(y + i, read_at<T>(start_.data() + i) + out);
+  });
 }
 
 } // namespace ffrobot

@@ -61,7 +61,7 @@ template <class Space>
 void ForcesOfStates<Space>::write_loads(Index i, const double *lambda, NewtonEuler<Space> &forces,
                                         const Workspace<Space, double> &w) {
   forces.transmit(w, false);
-  write_joints(i, forces);
+  write_joints(i, forces, w);
   ConstraintMotion<double> motion;
   for (std::size_t r = 0; r < mechanism_.constraints.size(); ++r) {
     constraint_motion(mechanism_, mechanism_.constraints[r], w, mechanism_.constraints[r].moves, motion);
@@ -76,7 +76,7 @@ void ForcesOfStates<Space>::write(Index i, const double *q, const double *v, con
                                   const double *wrench, NewtonEuler<Space> &forces, Workspace<Space, double> &w) {
   write_loads(i, lambda, forces, w);
   forces.transmit(w);
-  write_joints(i, forces);
+  write_joints(i, forces, w);
   write_sections(i, forces, w);
   for (std::size_t k = 0; k < mechanism_.wrenches.size(); ++k)
     write_point(mechanism_.wrenches[k], forces, w, block(found_.points, i, 9, k));
@@ -89,9 +89,10 @@ void ForcesOfStates<Space>::write(Index i, const double *q, const double *v, con
     Motion(block(found_.bodies, i, 9, k)) << frames[k].a_origin, frames[k].alpha, frames[k].omega;
 }
 
-template <class Space> void ForcesOfStates<Space>::write_joints(Index i, const NewtonEuler<Space> &forces) {
+template <class Space>
+void ForcesOfStates<Space>::write_joints(Index i, const NewtonEuler<Space> &forces, const Workspace<Space, double> &w) {
   for (std::size_t k = 0; k < mechanism_.nodes.size(); ++k)
-    std::copy_n(forces.in_global_axes(k).data(), Space::dim, block(found_.joints, i, Space::dim, k));
+    std::copy_n(forces.in_global_axes(k, w).data(), Space::dim, block(found_.joints, i, Space::dim, k));
 }
 
 template <class Space>
@@ -103,7 +104,7 @@ void ForcesOfStates<Space>::write_sections(Index i, const NewtonEuler<Space> &fo
     for (int port = 0; port < node.outboard; ++port, to += Space::dim)
       port_to_global(node.body, port, w.bodies[k],
                      forces.on_port(static_cast<std::size_t>(node.first_port + port)).data(), to);
-    std::copy_n(forces.in_global_axes(k).data(), Space::dim, to), to += Space::dim;
+    std::copy_n(forces.in_global_axes(k, w).data(), Space::dim, to), to += Space::dim;
     const Vector3d rotor = in_three_axes<Space>(forces.of_rotor(k))[1];
     std::copy_n(rotor.data(), 3, block(found_.rotors, i, 3, k));
   }

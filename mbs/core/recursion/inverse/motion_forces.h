@@ -43,7 +43,7 @@ public:
   static std::vector<std::array<int, 2>> sections(const Mechanism<Space> &mechanism);
 
 private:
-  void write_joints(Eigen::Index i, const NewtonEuler<Space> &forces);
+  void write_joints(Eigen::Index i, const NewtonEuler<Space> &forces, const Workspace<Space, double> &w);
   void write_sections(Eigen::Index i, const NewtonEuler<Space> &forces, const Workspace<Space, double> &w);
   void write_point(const Attachment &at, const NewtonEuler<Space> &forces, const Workspace<Space, double> &w,
                    double *to) const;

@@ -90,8 +90,7 @@ template <class Space>
 NewtonEuler<Space>::NewtonEuler(const Mechanism<Space> &mechanism)
     : mechanism_(mechanism), ports_(static_cast<std::size_t>(mechanism.ports)), on_ports_(ports_), with_joints_(ports_),
       terms_(ports_.size()), frames_(mechanism.nodes.size()), inertia_(frames_), rotor_(inertia_.size()),
-      on_coordinates_(VectorXd::Zero(mechanism.n_v)), of_joint_(inertia_), in_global_axes_(inertia_),
-      at_section_(inertia_), about_inner_(inertia_), of_rotor_(inertia_) {
+      on_coordinates_(VectorXd::Zero(mechanism.n_v)), of_joint_(inertia_), at_section_(inertia_), of_rotor_(inertia_) {
   for (const auto &node : mechanism.nodes)
     bodies_.emplace_back(node.body);
 }
@@ -179,10 +178,8 @@ template <class Space> void NewtonEuler<Space>::transmit(const Workspace<Space, 
     at_section_[i] = of_joint_[i] = f;
     if (node.inboard >= 0)
       inboard_tilt(node, s).back(f.data(), of_joint_[i].data());
-    section_to_global(node, s, f.data(), in_global_axes_[i].data());
     Vector on_inner = of_joint_[i], turned;
     std::remove_cvref_t<decltype(hinge.turn)>::add_moment(hinge.r, on_inner.data());
-    about_inner_[i] = on_inner;
     if (with_inertia && node.rotor_inertia > 0) {
       Vector moment{}, at_section;
       moment[Space::axis] = node.rotor_turns * rotor_[i];
@@ -199,6 +196,14 @@ template <class Space> void NewtonEuler<Space>::transmit(const Workspace<Space, 
     hinge.turn.apply(on_inner.data(), turned.data());
     add(turned, with_joints_[static_cast<std::size_t>(node.parent_port)], -1);
   }
+}
+
+template <class Space>
+typename NewtonEuler<Space>::Vector NewtonEuler<Space>::in_global_axes(std::size_t i,
+                                                                       const Workspace<Space, double> &w) const {
+  Vector found;
+  section_to_global(mechanism_.nodes[i], w.bodies[i], at_section_[i].data(), found.data());
+  return found;
 }
 
 // Of what joint i transmits, by its free components

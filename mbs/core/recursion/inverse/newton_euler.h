@@ -72,10 +72,8 @@ public:
   ConstraintAcceleration of_constraint(std::size_t row, const double *a, const Workspace<Space, double> &w) const;
 
   // After transmit(), of the joint of node i: force on the outer section, with its moment about the origin of that
-  // section, in axes of the joint; in global axes; the same about the origin of the inner section, axes of the joint.
-  const Vector &in_joint_axes(std::size_t i) const { return of_joint_[i]; }
-  const Vector &in_global_axes(std::size_t i) const { return in_global_axes_[i]; }
-  const Vector &about_inner(std::size_t i) const { return about_inner_[i]; }
+  // section, in global axes
+  Vector in_global_axes(std::size_t i, const Workspace<Space, double> &w) const;
   // The rate of angular momentum of the rotor in it, a moment in global axes
   const Vector &of_rotor(std::size_t i) const { return of_rotor_[i]; }
   // All that acts on a port, with its outboard subtree: about the origin of its section, axes of the undeformed one
@@ -100,8 +98,8 @@ private:
   std::vector<Vector> inertia_;                        // of bodies: (force, moment) at the frame, axes of the body
   std::vector<double> rotor_;                          // rate of spin of the rotor on the inner section, times inertia
   Eigen::VectorXd on_coordinates_;                     // (n_v) what constraints that are joint coordinates do to these
-  std::vector<Vector> of_joint_, in_global_axes_, at_section_; // by nodes; at_section_: in axes of the inboard port
-  std::vector<Vector> about_inner_, of_rotor_;
+  std::vector<Vector> of_joint_, at_section_;          // by nodes, in axes of the joint; of the inboard port
+  std::vector<Vector> of_rotor_;
 };
 
 extern template class NewtonEuler<Planar>;

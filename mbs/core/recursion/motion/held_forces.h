@@ -1,6 +1,7 @@
 // Forces that stay as they were last set: those of the commands of a sampled controller.
 #pragma once
 
+#include "core/linear/small_product.h"
 #include "core/recursion/motion/frame_motor.h"
 
 #include <utility>
@@ -23,7 +24,7 @@ public:
 
   void hold(const Eigen::VectorXd &u) {
     u_ = u;
-    force_.noalias() = direction_ * u;
+    multiply_small(direction_, u_.data(), force_.data());
   }
 
   // Adds them at q to those along v.
