@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import sys
 import traceback
@@ -70,6 +71,7 @@ def main() -> None:
 
     Exit code 0, 1 where a solve failed, 2 for wrong input, 130 after Ctrl-C, 143 after SIGTERM.
     """
+    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")  # it would read the metadata of all packages
     stop = EndOfCommand()
     LOGGER.propagate = False  # libraries give the root logger handlers of their own
     ready_streams()

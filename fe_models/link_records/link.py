@@ -166,15 +166,15 @@ class _Link(Record):
     """Name of the link; in a scene by default that of its body."""
     reference: Reference
     """Reference condition of the link's frame."""
-    modes: Modes = Modes()
+    modes: Modes = Modes.model_construct()
     """Modes of the link; by default six of each bending family, one axial, one of torsion."""
-    damping: Damping = Damping()
+    damping: Damping = Damping.model_construct()
     """Damping of the modes."""
     measured: Measured | None = None
     """Measured natural frequencies and damping ratios instead of computed ones."""
     interface: tuple[InterfaceRecord, ...] = ()
     """Interfaces for joints and loads in addition to `root` and `tip`."""
-    stress: StressRecovery = StressRecovery()
+    stress: StressRecovery = StressRecovery.model_construct()
     """Points and surfaces for stress output."""
 
     @model_validator(mode="after")
@@ -202,7 +202,7 @@ class BeamLink(_Link):
     """Length and cross section."""
     mesh: BeamMesh
     """Finite elements."""
-    model: BeamModel = BeamModel()
+    model: BeamModel = BeamModel.model_construct()
     """Beam theory."""
 
     @property
@@ -232,7 +232,7 @@ class SolidLink(_Link):
     """Parts of another material."""
     geometry: SolidGeometry
     """Shape, extruded along x or from a file."""
-    mesh: SolidMeshRecord = SolidMeshRecord()
+    mesh: SolidMeshRecord = SolidMeshRecord.model_construct()
     """Mesh; by default chosen for the part."""
     surface_patch: SurfacePatches | None = None
     """Outlines of piezoelectric patches in the mesh."""

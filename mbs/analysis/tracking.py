@@ -74,7 +74,7 @@ class Tracking(TimedAnalysis):
     """Duration of actuation before the path begins, s; "auto" takes it from the zero dynamics."""
     post_actuation: Around = 0.0
     """Duration of actuation after the path, s; "auto" takes it from the zero dynamics."""
-    weights: EffortWeights = EffortWeights()
+    weights: EffortWeights = EffortWeights.model_construct()
     """Sizes that count alike in the effort."""
     intervals: Annotated[int, Field(ge=8, le=2000)] = 64
     """Number of intervals to begin with; where they leave more than the tolerance, more follow."""

@@ -48,7 +48,7 @@ class MechanismKeys(Record):
     """Prescribed forces, torques and voltages."""
     payload: tuple[Payload, ...] = ()
     """Masses on points."""
-    initial: Initial = Initial()
+    initial: Initial = Initial.model_construct()
     """Initial state."""
 
     @property
