@@ -167,6 +167,7 @@ def test_what_cannot_be_is_refused(body, name):
         ({"element": lambda _: np.array([[0, 1, 2, 3]])}, "stations.element"),
         ({"height": lambda h: h[1:]}, "stations.height: expected shape"),
         ({"translation": lambda t: t * np.inf}, "stations.translation: expected finite"),
+        ({"position": lambda p: p / 4}, "length: expected a middle between the first and the last station"),
     ],
 )
 @pytest.mark.filterwarnings("ignore:invalid value")
