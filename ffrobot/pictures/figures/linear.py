@@ -36,8 +36,10 @@ def draw_bode(figure: FigureRecord, results: Results) -> Figure:
     picture = Figure(figsize=(2 * SIZE[0], 1.5 * SIZE[1]), layout="constrained")
     magnitude, phase = picture.subplots(2, 1, sharex=True, height_ratios=[2, 1])
     magnitude.set_title(figure.title, loc="left")
+    sources, targets = (list(dict.fromkeys(names)) for names in zip(*figure.transfers, strict=True))
+    responses = model.frequency_response(2 * np.pi * hertz, sources, targets)
     for (source, target), color in zip(figure.transfers, shades(len(figure.transfers)), strict=True):
-        response = model.frequency_response(2 * np.pi * hertz, source, target)[:, 0, 0]
+        response = responses[:, targets.index(target), sources.index(source)]
         magnitude.loglog(hertz, np.abs(response), color=color, label=f"{source} → {target}", linewidth=0.9)
         phase.semilogx(hertz, np.degrees(np.angle(response)), color=color, linewidth=0.9)
     phase.margins(x=0)
