@@ -187,6 +187,12 @@ class Instance:
         part = parts[name.upper()]
         own = part.copy()
         rows = [([number_of(entry or "0", place) for entry in row], place) for row, place in keyword.rows()]
+        for sets, option, members in (
+            (own.nsets, "NSET", [*own.nodes]),
+            (own.elsets, "ELSET", [*own.solids, *own.others]),
+        ):
+            if whole := keyword.options.get(option):
+                sets.add(whole, [("", number, str(keyword)) for number in members])
         found = cls(own, str(keyword))
         if len(rows) > 2 or (rows and len(rows[0][0]) > 3):
             raise InputError(f"{keyword}: expected a line of 3 numbers (translation) and one of 7 (rotation) at most")

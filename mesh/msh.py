@@ -84,6 +84,18 @@ def _counts(content: bytes, name: bytes) -> tuple[int, int]:
     return int(first), int(second)
 
 
+_NODE = np.dtype([("tag", "<i4"), ("x", "<f8", 3)])
+
+
+def _plain_nodes(data: bytes, count: int) -> Iterator[bytes]:
+    """Of binary nodes with dimension, tag and as many parameters (of curves and surfaces) each: tag and place alone."""
+    at = 0
+    for _ in range(count):
+        yield data[at : at + _NODE.itemsize]
+        (dim,) = np.frombuffer(data, dtype="<i4", count=1, offset=at + _NODE.itemsize)
+        at += _NODE.itemsize + 8 + 8 * {1: 1, 2: 2}.get(int(dim), 0)
+
+
 class _Version2:
     """A file of version 2: `$Nodes`, `$Elements` with the tag of their physical group first, `$PhysicalNames`."""
 
@@ -137,14 +149,17 @@ class _Version2:
 
     def _nodes(self) -> tuple[Callable[[Integers], Integers], Array]:
         """How tags of nodes become places among them, and (p, 3) coordinates."""
-        if b"$ParametricNodes" in self._content:
-            raise InputError("expected $Nodes, found $ParametricNodes: save without parametric coordinates")
-        count, _, data = self._section(self._content, b"Nodes").partition(b"\n")
+        parametric = b"$ParametricNodes" in self._content
+        name = b"ParametricNodes" if parametric else b"Nodes"
+        count, _, data = self._section(self._content, name).partition(b"\n")
         if self._is_binary:
-            rows = np.frombuffer(data, dtype=[("tag", "<i4"), ("x", "<f8", 3)], count=int(count))
+            data = b"".join(_plain_nodes(data, int(count))) if parametric else data
+            rows = np.frombuffer(data, dtype=_NODE, count=int(count))
             tags, points = rows["tag"].astype(np.int64), rows["x"].astype(np.float64)
         else:
-            values = np.array(data.split(), dtype=np.float64).reshape(int(count), 4)
+            lines = [line.split() for line in data.splitlines() if line.strip()] if parametric else [data.split()]
+            entries = [entry for line in lines for entry in (line[:4] if parametric else line)]
+            values = np.array(entries, dtype=np.float64).reshape(int(count), 4)
             tags, points = values[:, 0].astype(np.int64), values[:, 1:]
         order = np.argsort(tags, kind="stable")
         ordered = tags[order]

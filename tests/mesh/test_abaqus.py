@@ -6,6 +6,7 @@ from decks import HEIGHT, VOLUME, bar, elements, nodes, tetrahedra
 from solid_parts import face_area, integrate
 
 from ffrobot.common.errors import InputError
+from ffrobot.mesh.abaqus import read_abaqus
 from ffrobot.mesh.included import files_of
 from ffrobot.mesh.records import PlaceRecord
 
@@ -185,6 +186,16 @@ def test_sets_of_the_assembly_name_those_of_an_instance(read):
     part = read(part + SECOND + SURFACES + "*Tie, name=g\nDOWN, UP\n*Nset, nset=ROOT, instance=H-2\n L,\n",
                 (PlaceRecord(name="root", group="ROOT"),))  # fmt: skip
     assert face_area(part, "root") == pytest.approx(VOLUME / 2)
+
+
+def test_sets_of_whole_instances(read, tmp_path):
+    """As HyperMesh writes them."""
+    first = "*Instance, name=H-1, part=HALF, elset=LOW, nset=LOW_NODES\n*End Instance\n"
+    text = PART.format("") + first + SECOND + SURFACES + "*Tie, name=g\nDOWN, UP\n"
+    part = read(text)
+    low = part.points[part.corners[np.isin(part.cell_tag, [part.regions["LOW"], *part.overlaps.get("LOW", ())])]]
+    assert (len(low), low[..., 1].max()) == (3, pytest.approx(0.0, abs=1e-12))
+    assert len(read_abaqus(tmp_path / "part.inp", "").point_groups["LOW_NODES"]) == len(HALF)
 
 
 def test_parts_without_an_instance_are_told(read):

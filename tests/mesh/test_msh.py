@@ -80,7 +80,6 @@ def test_elements_that_stand_in_the_file_twice_count_once(read, cells, binary):
         ((b"\n2.2 0", b"\n2.2 1"), "found big-endian ones"),
         ((b" 5 2 8 1", b" 55 2 8 1"), "elements of a known type"),
         ((b"-0.05", b"x"), "damaged one"),
-        ((b"$Nodes", b"$ParametricNodes"), r".Nodes, found .ParametricNodes: save without parametric coordinates"),
     ],
 )
 def test_damaged_files_are_rejected(read, change, says):
@@ -108,6 +107,25 @@ def test_partitions_of_version_2(read, partitions, binary):
     assert integrate(part) == pytest.approx(VOLUME, rel=1e-9)
     alone = "all cells are of partition 1: others may be in separate files"
     assert part.remarks == (() if partitions == (1, 2) else (alone,))
+
+
+@pytest.mark.parametrize("binary", [False, True])
+def test_nodes_with_parameters(read, binary):
+    """Each has the dimension of its entity, the tag of that, and as many parameters, of curves and surfaces only."""
+    content = version_2(CELLS, [8] * 6, binary=binary)
+    head, _, rest = content.partition(b"$Nodes\n%d\n" % len(POINTS))
+    data, _, rest = rest.partition(b"$EndNodes")
+    if binary:
+        rows = [data[28 * k : 28 * k + 28] for k in range(len(POINTS))]
+        more = [
+            np.array([k % 4, 7], dtype="<i4").tobytes() + np.full(k % 4 % 3, 0.5).tobytes() for k in range(len(rows))
+        ]
+        nodes = b"".join(map(bytes.__add__, rows, more)) + b"\n"
+    else:
+        lines = data.splitlines()
+        nodes = b"".join(b"%s %d 7%s\n" % (line, k % 4, b" 0.5" * (k % 4 % 3)) for k, line in enumerate(lines))
+    part = read(b"%s$ParametricNodes\n%d\n%s$EndParametricNodes%s" % (head, len(POINTS), nodes, rest))
+    assert integrate(part) == pytest.approx(VOLUME, rel=1e-9)
 
 
 def test_scripts_do_not_run(read, tmp_path):
