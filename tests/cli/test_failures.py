@@ -3,9 +3,11 @@
 import os
 import pty
 import resource
+import shutil
 import signal
 import subprocess
 import time
+from pathlib import Path
 
 import h5py
 import numpy as np
@@ -19,6 +21,8 @@ ENDLESS = {
     'x = "1.5*cos(pi*t/4)"': 'x = "1.5 - 0.1*sin(t)"',
     'y = "sqrt(3)/2*cos(pi*t/4)"': 'y = "sqrt(3)/2"',
 }
+
+SOLID = Path(__file__).parents[2] / "cases" / "two_link_solid" / "link1.toml"  # stage 1 of beams is over at once
 
 
 def _limit_files():
@@ -140,6 +144,7 @@ def _read_until(terminal, text):
 def test_ctrl_c_before_any_analysis_writes_nothing(two_link_copy, ffrobot, tmp_path):
     """Stage 1 takes seconds; nothing is worth keeping then."""
     folder = two_link_copy()
+    shutil.copy(SOLID, folder)
     before = sorted(folder.iterdir())
     process = subprocess.Popen(
         [ffrobot.path, "solve", "scene.toml"], cwd=folder, env=ffrobot.environment | {"XDG_CACHE_HOME": str(tmp_path)},
@@ -160,6 +165,7 @@ def test_ctrl_c_before_any_analysis_writes_nothing(two_link_copy, ffrobot, tmp_p
 def test_a_link_after_one_that_was_ended_while_it_compiled(two_link_copy, ffrobot, tmp_path, number):
     """Half a form in the cache holds nobody up: FFCx itself would wait for its compiler for ever."""
     folder = two_link_copy()
+    shutil.copy(SOLID, folder)
     options = {"cwd": folder, "env": ffrobot.environment | {"XDG_CACHE_HOME": str(tmp_path / "cache")}}
     process = subprocess.Popen([ffrobot.path, "link", "link1.toml"], **options, stdout=subprocess.PIPE)
     while not any((tmp_path / "cache").rglob("libffcx_*.c")):
