@@ -29,7 +29,7 @@ class SolveError(FfrobotError):
 
 
 class FfrobotWarning(UserWarning):
-    """Results may be wrong, or do not mean what they seem to: the message says why, by how much, what to do."""
+    """Results may be wrong: the message has the reason, the size of the error and a remedy."""
 
     __module__ = "ffrobot"
 

@@ -1,4 +1,4 @@
-"""Sphinx configuration: Markdown pages, the command reference from the code, the keys of files from their schema."""
+"""Sphinx configuration: Markdown pages; commands, Python interface and keys of files from the program."""
 
 from __future__ import annotations
 
@@ -12,21 +12,20 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 from benchmark_tables import write_benchmark_tables
 from gallery import read_on_site, write_case_pages
+from interfaces import write_interface_pages
 from key_tables import write_key_tables
 
 project = "ffrobot"
 author = "the ffrobot developers"
 version = release = ffrobot.__version__
 # Formulas are set by a MathJax that is part of the site: pages open without a network.
-extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.mathjax", "sphinx-mathjax-offline", "sphinx_click"]
+extensions = ["myst_parser", "sphinx.ext.mathjax", "sphinx-mathjax-offline"]
 myst_enable_extensions = ["dollarmath"]
 myst_heading_anchors = 3
 html_theme = "furo"
 html_static_path = ["_static"]
 html_css_files = ["gallery.css"]
 html_title = f"ffrobot {version}"
-autodoc_typehints = "description"
-autodoc_use_type_comments = False  # there are none, and Python 3.13 looks for them in the wrong file
 exclude_patterns = ["_build"]
 
 
@@ -38,6 +37,7 @@ def setup(app: Any) -> None:  # noqa: ANN401 (Sphinx)
 
 def _write_pages(folder: Path) -> None:
     write_key_tables(folder / "reference")
+    write_interface_pages(folder / "reference")
     write_case_pages(folder / "cases")
     write_benchmark_tables(folder / "benchmarks", folder / "developer" / "benchmark_records.md")
 

@@ -32,14 +32,14 @@ Progress = Callable[[str], None]
 
 @dataclass(frozen=True)
 class LinkOutcome:
-    """What stage 1 did.
+    """Result of stage 1.
 
     Attributes:
         path: the modal body file.
-        body: what it holds.
-        computed: False where it was up to date.
-        reused: what of earlier runs made it quicker: "modes" or "mesh"; empty where nothing did.
-        seconds: of wall time, reading and writing included.
+        body: its content.
+        computed: False if the file was up to date.
+        reused: "modes" or "mesh" of an earlier run, or empty.
+        seconds: wall time, reading and writing included.
     """
 
     path: Path

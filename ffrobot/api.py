@@ -29,14 +29,28 @@ def solve(
     resume: bool = False,
     allow_python: Sequence[AnyPath] = (),
 ) -> Results:
-    """Run the analyses of a scene, or of a scene file, and return the results: `ffrobot solve`.
+    """Run the analyses of a scene, or of a scene file: `ffrobot solve`.
 
-    They are written to `output` where one is given, and kept in memory otherwise. `watcher` is told how it goes.
-    Python files that a scene file names run from below its folder, and from `allow_python` (files and folders).
-    `resume` goes on with a run that was stopped, from `output`; functions of Python have to be the same then.
-    Raises `InputError` for anything wrong with the scene, `SolveError` where an analysis does not reach its end; what
-    was computed until then is in `output` all the same. Warns (`FfrobotWarning`) where results may be wrong, or do not
-    mean what they seem to; `Results.warnings` has the same texts.
+    Args:
+        scene: a scene file, or a scene from `make_scene` or `load_scene`.
+        output: results file; None: results stay in memory.
+        watcher: an object that observes progress and can stop the run.
+        resume: whether to resume a stopped run from `output`; Python functions have to be the same.
+        allow_python: files and folders whose Python files may run, in addition to those below the folder of the scene.
+
+    Returns:
+        The results; `results["inverse/joints/shoulder/moment"]` is a dataset.
+
+    Raises:
+        InputError: something in the scene is wrong.
+        SolveError: an analysis does not reach its end; `output` has the part until then.
+
+    Warns:
+        FfrobotWarning: results may be wrong; `Results.warnings` has the same texts.
+
+    Example:
+        results = ffrobot.solve("scene.toml", "scene.results.h5")
+        torque = results["inverse/joints/shoulder/moment"]  # (T,) in N·m
     """
     from .common.errors import FfrobotWarning, InputError
     from .common.files import check_output
@@ -80,7 +94,21 @@ def solve(
 
 
 def load_scene(path: AnyPath, *, allow_python: Sequence[AnyPath] = ()) -> Scene:
-    """Read and validate a scene file, `allow_python` as in `solve`. Raises `InputError`, a line for each wrong key."""
+    """Read and validate a scene file.
+
+    Args:
+        path: the scene file.
+        allow_python: as in `solve`.
+
+    Returns:
+        The scene, which is immutable.
+
+    Raises:
+        InputError: one line for each wrong key.
+
+    Example:
+        scene = ffrobot.load_scene("scene.toml")
+    """
     from .common.python_files import python_allowed
     from .scene.load import load_scene as load
 
@@ -89,9 +117,23 @@ def load_scene(path: AnyPath, *, allow_python: Sequence[AnyPath] = ()) -> Scene:
 
 
 def make_link(link: AnyPath | Mapping[str, Any], output: AnyPath | None = None, *, force: bool = False) -> LinkOutcome:
-    """Compute the modal body of a link unless it is up to date: `ffrobot link`. See `fe_models.link`.
+    """Compute the modal body of a link unless it is up to date: `ffrobot link`.
 
-    `link` is a link file or a dictionary of its keys, whose modal body goes to the user's cache without `output`.
+    Args:
+        link: a link file, or a dictionary of its keys.
+        output: modal body file; None: next to the link file, or in the user's cache for a dictionary.
+        force: whether to compute it in any case.
+
+    Returns:
+        The modal body, its file, and whether it was computed.
+
+    Raises:
+        InputError: something in the link file is wrong.
+        SolveError: no modes were found.
+
+    Example:
+        body = ffrobot.make_link("arm.toml").body
+        body.frequency  # (n,) in Hz
     """
     from .common.validation import plain
     from .fe_models.link import make_link
@@ -102,7 +144,20 @@ def make_link(link: AnyPath | Mapping[str, Any], output: AnyPath | None = None, 
 
 
 def write_study(found: Finding, folder: AnyPath, *, figures: bool = True) -> list[Path]:
-    """Write what the design functions return as files for `write_report`, and as figures; the files written."""
+    """Write the result of a design function as files for `write_report`, and as figures.
+
+    Args:
+        found: what `sensitivity`, `optimise`, `trade_off`, `uncertainty` or `screening` returned.
+        folder: where to write.
+        figures: whether to draw figures.
+
+    Returns:
+        The written files.
+
+    Example:
+        ffrobot.write_study(found, "study")
+        ffrobot.write_report("study", "study.html")
+    """
     from .common.extras import extras
 
     with extras():
@@ -110,7 +165,20 @@ def write_study(found: Finding, folder: AnyPath, *, figures: bool = True) -> lis
 
 
 def read_modal_body(path: AnyPath) -> ModalBody:
-    """Read and check a modal body file. Raises `InputError` naming what is wrong with it."""
+    """Read and check a modal body file.
+
+    Args:
+        path: the file, `LINK.h5`.
+
+    Returns:
+        The modal body.
+
+    Raises:
+        InputError: the file is damaged or inconsistent.
+
+    Example:
+        ffrobot.read_modal_body("arm.h5").mass  # kg
+    """
     from .fe_models.modal_body_file import read_modal_body
 
     return read_modal_body(Path(path))
@@ -119,9 +187,22 @@ def read_modal_body(path: AnyPath) -> ModalBody:
 def plot_results(
     results: AnyPath | Results, folder: AnyPath, formats: Sequence[str] = ("png", "pdf"), *, only: Sequence[str] = ()
 ) -> list[Path]:
-    """Draw the figures of results into `folder`: `ffrobot plot`. Returns the files written.
+    """Draw the figures of results: `ffrobot plot`.
 
-    `formats` are "png", "pdf", "svg"; `only` names of figures that are wanted, or patterns such as "moment_*".
+    Args:
+        results: a results file, or results.
+        folder: where to write.
+        formats: "png", "pdf", "svg".
+        only: names of figures, or patterns such as "moment_*"; empty: all.
+
+    Returns:
+        The written files.
+
+    Raises:
+        InputError: `figures.toml` next to the results, or a name in `only`, is wrong.
+
+    Example:
+        ffrobot.plot_results("scene.results.h5", "figures", ["svg"], only=["moment_*"])
     """
     from .common.extras import extras
 
@@ -134,7 +215,16 @@ def plot_results(
 def write_report(results: AnyPath | Results | Sequence[AnyPath | Results], path: AnyPath) -> None:
     """Write one HTML page about results, or several side by side: `ffrobot report`.
 
-    Folders of `sensitivity`, `optimise`, `trade_off`, `uncertainty` and `screening` may be among them, or alone.
+    Args:
+        results: a results file, results, or a sequence of them. Folders of `sensitivity`, `optimise`, `trade_off`,
+            `uncertainty` and `screening` may be among them.
+        path: the page, `.html`.
+
+    Raises:
+        InputError: planar and 3D results are mixed, or a file is none of these.
+
+    Example:
+        ffrobot.write_report(["before.results.h5", "after.results.h5"], "compare.html")
     """
     from .common.extras import extras
     from .common.outputs import protected
@@ -162,8 +252,23 @@ def view_file(
 ) -> list[Path]:
     """Write grids for ParaView, and pictures, of results or of a modal body file: `ffrobot view`.
 
-    `frames` outputs at most of one `analysis`, or of all; the picture at `time` (s) with deflections `scale` times as
-    large. `pictures`: whether to draw them; None: where PyVista can. Returns the files written.
+    Args:
+        file: a results file, results, or a modal body file.
+        folder: where to write.
+        analysis: the analysis; None: all.
+        frames: largest number of outputs; None: 201.
+        time: time of the picture, s; None: that of the largest deflections.
+        scale: factor of deflections; None: chosen for visibility.
+        pictures: whether to draw pictures; None: if PyVista can.
+
+    Returns:
+        The written files.
+
+    Raises:
+        InputError: no such analysis, or PyVista cannot draw requested pictures.
+
+    Example:
+        ffrobot.view_file("scene.results.h5", "view", analysis="inverse", scale=100)
     """
     from .pictures.view.view import FRAMES, Options, view_file
 
@@ -180,10 +285,21 @@ def write_movie(
     scale: float | None = None,
     rendered: bool = False,
 ) -> None:
-    """Write a movie of the motion, .gif or .mp4: `ffrobot plot --movie`; `rendered` by PyVista: `view --movie`.
+    """Write a movie of the motion: `ffrobot plot --movie`.
 
-    Of one `analysis`, the first that goes through time if None; it plays for 8 s or so many `seconds`, with deflections
-    `scale` times as large, by default as large as can be seen.
+    Args:
+        results: a results file, or results.
+        path: the movie, `.gif` or `.mp4`.
+        analysis: the analysis; None: the first that goes through time.
+        seconds: duration of the movie; None: 8 s.
+        scale: factor of deflections; None: chosen for visibility.
+        rendered: whether PyVista renders solids (`ffrobot view --movie`), instead of a drawing.
+
+    Raises:
+        InputError: no such analysis, or ffmpeg is missing for MP4.
+
+    Example:
+        ffrobot.write_movie("scene.results.h5", "motion.gif", rendered=True, scale=100)
     """
     from .common.extras import extras
 

@@ -51,8 +51,8 @@ class ModalBody:
         interfaces: by name; `root` and `tip` always.
         stations: along the axis.
         mesh: for pictures.
-        stress: modal stresses by the name of their point, where the link file asks for them.
-        surface_stress: (p, 6, n) stress at the points of `mesh`, as in `StressPoint`; None where not asked for.
+        stress: modal stresses by the name of their point, if the link file has any.
+        surface_stress: (p, 6, n) stress at the points of `mesh`, as in `StressPoint`; None unless requested.
         stress_loads: names of the l unit loads (`unit_loads`) whose static stresses are known; none in old files.
         surface_static: (p, 6, l) likewise, as `static` in `StressPoint`.
         surface_patches: modal forces of patches outlined in the mesh; None where there are none.
@@ -133,10 +133,10 @@ class ModalBody:
     def interpolate(self, x: float) -> Interface:
         """What the modes do at `x` (m from the root) on the axis.
 
-        Where the stations of each element are known (files made here) all six components are the cubic through the
-        four stations of the element: exactly the finite element functions of a beam, of either theory. Where they are
-        not, y and z motion is the cubic Hermite polynomial of (translation, rotation) between two stations, exact for
-        Euler–Bernoulli, and axial motion and twist are the cubic through the four nearest stations.
+        If the stations of each element are known (files made here), all six components are the cubic through the
+        four stations of the element: exactly the finite element functions of a beam, of either theory. Otherwise
+        motion along y and z is the cubic Hermite polynomial of (translation, rotation) between two stations, exact for
+        Euler–Bernoulli. Axial motion and twist are then the cubic through the four nearest stations.
 
         Raises:
             InputError: x is outside the body.

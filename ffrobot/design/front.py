@@ -51,13 +51,34 @@ def trade_off(
     allow_python: Sequence[AnyPath] = (),
     watcher: Watcher | None = None,
 ) -> Front:
-    """The least of one goal for each of `points` values of another: `ffrobot optimise … --against`.
+    """Pareto front: the least of one response for each of `points` values of another: `ffrobot optimise … --against`.
 
-    Other arguments are those of `optimise`; `runs` counts those of all searches together.
+    Args:
+        scene: the scene file.
+        vary: parameters, as in `optimise`.
+        output: folder of the designs, which a later call reuses; None: they are not kept.
+        minimise: the first response.
+        against: the second response.
+        points: number of designs on the front.
+        subject_to: limits, as in `optimise`.
+        runs: largest number of runs of all searches together.
+        tolerance: of the runs, if the scene has a larger one.
+        processes: runs in parallel.
+        retry: whether to repeat designs that failed before.
+        allow_python: as in `solve`.
+        watcher: an object that observes progress and can stop the study.
+
+    Returns:
+        The designs of the front.
 
     Raises:
-        InputError: as of `optimise`; catalogues; fewer than three points; goals that are least in one design.
-        SolveError: a design that a search begins with does not complete.
+        InputError: as in `optimise`; discrete sets; fewer than three points; responses with the same optimum.
+        SolveError: a design with which a search begins does not complete.
+
+    Example:
+        front = ffrobot.trade_off(
+            "scene.toml", ["joint.1.gear_ratio=10:200"], minimise="mass", against="rms tip_error", points=6
+        )
     """
     if points < 3:
         raise InputError(f"optimise: --points: expected at least 3, found {points}")

@@ -42,10 +42,10 @@ class FrontPoint:
 
 @dataclass(frozen=True)
 class Front(Finding):
-    """What a trade-off has found: `points` from the least `goals[0]` to the least `goals[1]`; `runs` in all.
+    """A Pareto front: `points` from the least `goals[0]` to the least `goals[1]`, found with `runs` runs.
 
-    `tried` are the designs of all searches, each once, with readings of the goals of `problem`, its limits along the
-    whole curve among them, and then of the second goal.
+    `tried` are the designs of all searches, each once. They have the responses of `problem`, its limits along the whole
+    curve included, and then the second response.
     """
 
     name = "front"

@@ -56,19 +56,40 @@ def optimise(
     allow_python: Sequence[AnyPath] = (),
     watcher: Watcher | None = None,
 ) -> Optimum:
-    """The design of a scene file with the least, or largest, goal within limits: `ffrobot optimise`.
+    """The design with the least, or largest, objective within limits: `ffrobot optimise`.
 
-    Where no design keeps the limits the nearest one is returned, not `feasible`. Designs stay in the folder `output`,
-    and are not run again; without one they are forgotten. `vary`, `subject_to`: as on the command line, see `variables`
-    and `problem`. `method`: by default "slsqp", and where there are catalogues "all" of them or
-    "differential-evolution". `starts`: how many searches along gradients, from the scene itself and from a Latin
-    hypercube with `seed`. `runs`: how many at most. `tolerance`: of the runs, where the scene has a larger one.
-    `processes`: runs in parallel. `retry`: whether designs that failed before are run again. `allow_python` as in
-    `solve`.
+    Args:
+        scene: the scene file.
+        vary: parameters, such as "links.arm.geometry.section.outer=0.02:0.08" or "joint.1.gear_ratio in {50, 80, 100}".
+        output: folder of the designs, which a later call reuses; None: they are not kept.
+        minimise: the objective, or
+        maximise: the objective.
+        subject_to: limits, such as "peak joints.elbow.moment <= 20".
+        method: of the search; "auto" is "slsqp", and with discrete sets "all" of them or
+            "differential-evolution".
+        starts: number of gradient searches, from the scene and from a Latin hypercube with `seed`.
+        seed: of random numbers.
+        runs: largest number of runs.
+        tolerance: of the runs, if the scene has a larger one.
+        processes: runs in parallel.
+        retry: whether to repeat designs that failed before.
+        allow_python: as in `solve`.
+        watcher: an object that observes progress and can stop the study.
+
+    Returns:
+        The best design. If no design satisfies the limits it is the nearest one, and not `feasible`.
 
     Raises:
-        InputError: goals, limits or keys that mean nothing, bounds that no design can have.
+        InputError: responses, limits or keys are wrong, or bounds exclude all designs.
         SolveError: no design completed.
+
+    Example:
+        best = ffrobot.optimise(
+            "scene.toml",
+            ["links.arm.geometry.section.outer=0.02:0.08"],
+            minimise="mass",
+            subject_to=["peak joints.elbow.moment <= 20"],
+        )
     """
     with runs_of("optimise", scene, output, allow_python, processes, retry, watcher) as runner:
         path, problem = runner.path, read_problem(minimise, maximise, subject_to)

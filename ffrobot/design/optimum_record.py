@@ -28,18 +28,20 @@ COLUMNS = ("what", "name", "start", "best", "low", "high", "reached", "price")
 
 @dataclass(frozen=True)
 class Optimum(Finding):
-    """What a search has found.
+    """The result of a search.
 
     Attributes:
-        scene: its file. `problem`, `space`: what was asked for.
-        method: the optimiser; `message`: why it ended where that was not at an optimum.
-        start, best: designs; of the search that has found the best one. `searches`: all of them.
-        optimality: how the best one stands; None without gradients.
-        conflict: limits that no design near the best one keeps together; None where it keeps all, or that is not known.
-        runs: in all; `failures` of them in words. `tolerance`: of the runs, at most.
-        verdict: of the best design.
-        best_scene: the scene file of the best design, whole; None where it was not kept.
-        designs: the table of all designs with their goals; None likewise.
+        scene: its file.
+        problem, space: the objective with its limits, and the parameters.
+        method, message: the optimiser; why it ended, if not at an optimum.
+        start, best: designs of the best search; `searches` are all.
+        optimality: conditions of optimality at `best`; None without gradients.
+        conflict: limits that no design near `best` satisfies together; None if it satisfies all, or if that is unknown.
+        runs: their number; `failures` has failed ones in words.
+        tolerance: largest tolerance of the runs.
+        verdict: of `best`.
+        best_scene: the scene file of `best`, complete; None if it was not kept.
+        designs: the table of all designs with their responses; None likewise.
         tried: these designs, in the order of the search.
     """
 

@@ -33,14 +33,29 @@ def screening(
     allow_python: Sequence[AnyPath] = (),
     watcher: Watcher | None = None,
 ) -> Screening:
-    """Elementary effects on goals `of` a scene file of keys that are `spread`: `ffrobot uncertainty --by screening`.
+    """Elementary effects of many uncertain keys (Morris): `ffrobot uncertainty --by screening`.
 
-    Runs stay in the folder `output`, and are not run again; without one they are forgotten. `processes`, `retry` and
-    `allow_python` as in `optimise`.
+    Args:
+        scene: the scene file.
+        of: responses.
+        spread: keys with their distributions, as in `uncertainty`.
+        output: folder of the runs, which a later call reuses; None: they are not kept.
+        trajectories: number R of trajectories; each has one run per key and one more.
+        seed: of the trajectories.
+        processes: runs in parallel.
+        retry: whether to repeat designs that failed before.
+        allow_python: as in `solve`.
+        watcher: an object that observes progress and can stop the study.
+
+    Returns:
+        μ*, σ and μ of each key and response.
 
     Raises:
-        InputError: goals, keys or spreads that mean nothing, or that make scenes impossible; histories as a whole.
-        SolveError: the scene all parameters at nominal values, or all others, cannot be solved.
+        InputError: responses, keys or distributions are wrong; a whole history.
+        SolveError: the scene with nominal values, or all others, cannot be solved.
+
+    Example:
+        found = ffrobot.screening("scene.toml", ["peak joints.elbow.moment"], ["payload.0.mass=±5%"], trajectories=10)
     """
     if trajectories < FEWEST:
         raise InputError(f"uncertainty: --trajectories: expected at least {FEWEST}, found {trajectories}")

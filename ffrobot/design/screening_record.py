@@ -22,15 +22,15 @@ COLUMNS = ("goal", "unit", "middle", "key", "mu_star", "mu_star_error", "sigma",
 
 @dataclass(frozen=True)
 class Screening(Finding):
-    """What each of k keys does to g goals over its whole spread.
+    """Elementary effects of k keys, over their whole distributions, on g responses.
 
     Attributes:
         scene: its file.
-        spreads: (k,) of the keys; a normal one is taken two standard deviations to both sides.
-        goals, readings: (g,) what was asked for, and with all keys at the middle of their spreads.
-        effects: (g, k) μ*, σ and μ, in units of the goals.
-        values: (r, k + 1, g) the goals along the trajectories, NaN where a run failed.
-        failures: runs that failed, in words; `runs` in all, of which `table` is the file.
+        spreads: (k,) distributions of the keys; a normal one is taken two standard deviations to both sides.
+        goals, readings: (g,) the responses, and their values with all keys at nominal values.
+        effects: (g, k) μ*, σ and μ, in units of the responses.
+        values: (r, k + 1, g) the responses along the trajectories, NaN for failed runs.
+        failures: failed runs in words; `runs` is the number of all, `table` their file.
     """
 
     name = "screening"

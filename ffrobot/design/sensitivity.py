@@ -50,16 +50,29 @@ def sensitivity(
     allow_python: Sequence[AnyPath] = (),
     watcher: Watcher | None = None,
 ) -> Sensitivity:
-    """Derivatives of scalar results `of` a scene file by the numbers at keys `to`: `ffrobot sensitivity`.
+    """Derivatives of scalar responses by keys of a scene and its links: `ffrobot sensitivity`.
 
-    Runs stay in the folder `output`, and are not run again; without one they are forgotten. `step`: the largest, of the
-    keys' values. `tolerance`: of the runs, where the scene has a larger one; None: 1e-7 where steps are repeated, 1e-9
-    elsewhere. `processes`: runs in parallel. `retry`: whether designs that failed before are run again. `allow_python`
-    as in `solve`.
+    Args:
+        scene: the scene file.
+        of: responses, such as "peak joints.elbow.moment".
+        to: keys with dots, such as "payload.0.mass".
+        output: folder of the runs, which a later call reuses; None: they are not kept.
+        step: largest change of a key, relative to its value.
+        tolerance: of the runs, if the scene has a larger one; None: 1e-7 with reused time steps, else 1e-9.
+        processes: runs in parallel.
+        retry: whether to repeat designs that failed before.
+        allow_python: as in `solve`.
+        watcher: an object that observes progress and can stop the study.
+
+    Returns:
+        Derivatives with their errors.
 
     Raises:
-        InputError: goals or keys that mean nothing, or keys that may take no other value.
+        InputError: responses or keys are wrong, or a key has no other valid value.
         SolveError: the scene itself cannot be solved.
+
+    Example:
+        found = ffrobot.sensitivity("scene.toml", ["peak joints.elbow.moment"], ["payload.0.mass"])
     """
     with runs_of("sensitivity", scene, output, allow_python, processes, retry, watcher) as runs:
         goals = tuple(parse_goal(text) for text in dict.fromkeys(of))

@@ -29,16 +29,16 @@ ERRORS = "errors: by differences of lower order or of all keys at once, noise, a
 
 @dataclass(frozen=True)
 class Sensitivity(Finding):
-    """Derivatives of g goals by k keys.
+    """Derivatives of g responses by k keys.
 
     Attributes:
         scene: its file.
-        goals, readings: what was asked for, and what it is at the scene's own values.
-        keys: with dots; `values` (k,) in the scene.
-        entries: [goal][key].
+        goals, readings: the responses, and their values in the scene.
+        keys: with dots; `values` (k,) are theirs in the scene.
+        entries: the derivatives, [response][key].
         failures: designs that failed, in words.
-        tolerance: of the runs, at most; they are `runs` in all.
-        table: the file of all runs; None where they were not kept.
+        tolerance: largest tolerance of the runs; `runs` is their number.
+        table: the file of all runs; None if they were not kept.
     """
 
     name = "sensitivity"

@@ -67,14 +67,31 @@ def uncertainty(
     allow_python: Sequence[AnyPath] = (),
     watcher: Watcher | None = None,
 ) -> Uncertainty:
-    """Statistics of goals and histories `of` a scene file whose keys are `spread`: `ffrobot uncertainty`.
+    """Statistics of responses and histories for uncertain keys: `ffrobot uncertainty`.
 
-    Runs stay in the folder `output`, and are not run again; without one they are forgotten. `processes`, `retry` and
-    `allow_python` as in `optimise`.
+    Args:
+        scene: the scene file.
+        of: responses, and histories such as "joints.elbow.moment".
+        spread: keys with their distributions, such as "payload.0.mass=±5%".
+        output: folder of the runs, which a later call reuses; None: they are not kept.
+        samples: number of samples of a Latin hypercube.
+        seed: of the samples.
+        by: "samples", or "gradients" with two runs per key.
+        indices: whether to compute Sobol indices, with N/2 more runs per key.
+        processes: runs in parallel.
+        retry: whether to repeat designs that failed before.
+        allow_python: as in `solve`.
+        watcher: an object that observes progress and can stop the study.
+
+    Returns:
+        Mean, deviation and quantiles of responses, and bands of histories.
 
     Raises:
-        InputError: goals, keys or spreads that mean nothing, or that make scenes impossible.
-        SolveError: the scene all parameters at nominal values, or all others, cannot be solved.
+        InputError: responses, keys or distributions are wrong.
+        SolveError: the scene with nominal values, or all others, cannot be solved.
+
+    Example:
+        found = ffrobot.uncertainty("scene.toml", ["peak joints.elbow.moment"], ["payload.0.mass=±5%"], samples=100)
     """
     if by == "samples" and samples < FEWEST:
         raise InputError(f"uncertainty: expected at least {FEWEST} samples, found {samples}")

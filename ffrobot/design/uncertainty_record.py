@@ -39,20 +39,20 @@ class Band:
 
 @dataclass(frozen=True)
 class Uncertainty(Finding):
-    """What is known of g goals and some histories with k keys spread.
+    """Statistics of g responses and some histories for k uncertain keys.
 
     Attributes:
         scene: its file.
-        spreads: (k,) of the keys.
-        method: how it was found.
-        goals, readings: (g,) what was asked for, and with all keys at the middle of their spreads.
-        statistics: of the goals, (g,).
+        spreads: (k,) distributions of the keys.
+        method: samples or gradients.
+        goals, readings: (g,) the responses, and their values with all keys at nominal values.
+        statistics: (g,) of the responses.
         bands: of the histories.
-        shares: (g, k) of the variance by the linear part; `explained` (g,) what part of it that is, NaN by gradients.
-        indices: Sobol's, where they were asked for.
-        samples: (n, g) the goals, NaN where a run failed; (0, g) by gradients.
-        failures: runs that failed, in words; `runs` in all, of which `table` is the file.
-        notes: peaks, by gradients, that others overtake beside the middle.
+        shares: (g, k) shares of the variance by the linear part; `explained` (g,) is their sum, NaN by gradients.
+        indices: Sobol indices, if requested.
+        samples: (n, g) the responses, NaN for failed runs; (0, g) by gradients.
+        failures: failed runs in words; `runs` is the number of all, `table` their file.
+        notes: peaks that other peaks exceed near the nominal values (by gradients).
     """
 
     name = "uncertainty"

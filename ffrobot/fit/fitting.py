@@ -48,15 +48,26 @@ def fit_measured(
     motors: Motors | None = None,
     force: bool = False,
 ) -> Fit:
-    """Fit keys of a link or a scene file to measured natural frequencies: `ffrobot fit`. Writes new files.
+    """Fit keys of a link or a scene file to measured natural frequencies: `ffrobot fit`.
 
-    `vary` are keys with dots; "KEY=KEY" are changed by one factor. `motors` of a robot: "free" (the default) or "held".
-    New files are beside the old ones, with names that end in `.fitted.toml`, or at `output`; they replace
-    others only where `force` says so.
+    Args:
+        file: the link or scene file.
+        measured: table with mode, frequency (Hz), and optionally uncertainty (Hz).
+        vary: keys with dots; "KEY=KEY" have a common factor.
+        output: new file; None: next to the old one, with a name that ends in `.fitted.toml`.
+        motors: of a robot during the measurement, `free` (the default) or `held`.
+        force: whether to replace existing files.
+
+    Returns:
+        Fitted values with their deviations, frequencies before and after, and the new files.
 
     Raises:
-        InputError: anything wrong with files or keys, parameters that frequencies cannot tell apart, a file in the way.
+        InputError: files or keys are wrong, frequencies do not distinguish parameters, or a file exists.
         SolveError: no convergence, or a model without frequencies.
+
+    Example:
+        fit = ffrobot.fit_measured("arm.toml", "modes.csv", ["material.youngs_modulus"])
+        fit.value, fit.relative_deviation
     """
     path, table, place = Path(file), Path(measured), None if output is None else Path(output)
     target = _target(path, motors)

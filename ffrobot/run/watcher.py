@@ -11,17 +11,17 @@ from ..common.interrupts import SIGNALS, EndOfCommand
 
 
 class Watcher:
-    """Is told how a solve goes; the command line shows it, a library user need not care."""
+    """Observes the progress of a solve. The command line shows it; library users may omit it."""
 
     def stage(self, title: str) -> None:
-        """Something that may take long begins."""
+        """A step begins that may take long."""
 
     def advance(self, t: float, end: float) -> bool:
         """An analysis has reached time t of `end`; False stops it."""
         return True
 
     def stopping(self, number: int) -> None:
-        """Signal `number` asks for an end: what has been computed is kept, unless another signal follows."""
+        """Signal `number` requests an end: computed results are kept, unless another signal follows."""
 
 
 class Interruption:

@@ -40,11 +40,21 @@ def load_scene(path: Path) -> Scene:
 
 
 def make_scene(*, folder: PathLike[str] | str = ".", **keys: Any) -> Scene:  # noqa: ANN401 (whatever TOML may hold)
-    """A scene from Python, with the keys of a scene file: tables are dictionaries, arrays of tables lists of them.
+    """Make a scene in Python, with the keys of a scene file.
 
-    Files it names are looked for in `folder`. NumPy numbers and arrays, tuples and paths may stand for numbers, lists
-    and text; keys that are None are left out. Functions may stand for expressions: see `time_functions.user_function`.
-    Raises `InputError` as `load_scene` does.
+    Args:
+        folder: folder of the files that the scene names.
+        keys: tables are dictionaries, arrays of tables lists of them. NumPy numbers and arrays, tuples and paths can
+            replace numbers, lists and text; functions can replace expressions. None omits a key.
+
+    Returns:
+        The scene, for `solve`.
+
+    Raises:
+        InputError: one line for each wrong key.
+
+    Example:
+        scene = ffrobot.make_scene(name="arm", body=[{"name": "arm", "link": "arm.toml"}], joint=[...], analysis=[...])
     """
     import tomli_w
 

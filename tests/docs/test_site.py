@@ -80,14 +80,15 @@ def test_search_knows_keys_and_messages(site):
 
 
 def test_pages_that_are_generated_are_those_in_the_repository(monkeypatch):
-    """They can be read there without building anything. Where this fails: python docs/key_tables.py, or the other."""
+    """They can be read there without building anything. If this fails: python docs/key_tables.py, interfaces.py, …"""
     monkeypatch.syspath_prepend(str(DOCS))
     from benchmark_tables import benchmark_page
     from gallery import gallery_page
+    from interfaces import interface_pages
     from key_tables import key_pages
 
     measured = DOCS / "developer" / "benchmark_records.md"
-    pages = {**key_pages(), measured.name: benchmark_page(DOCS / "benchmarks", measured)}
+    pages = {**key_pages(), **interface_pages(), measured.name: benchmark_page(DOCS / "benchmarks", measured)}
     assert (DOCS / "cases.md").read_text(encoding="utf-8") == gallery_page(), "python docs/gallery.py"
     for name, text in pages.items():
         assert (measured if name == measured.name else DOCS / "reference" / name).read_text(encoding="utf-8") == text, (
