@@ -91,7 +91,12 @@ def count(text: str) -> Count:
 
 def texts(root: Path = ROOT) -> dict[str, str]:
     """The prose of all pages by file, texts in figures, and what `--help` prints."""
-    pages = [root / "README.md", *sorted((root / "docs").rglob("*.md")), *sorted((root / "cases").glob("*/README.md"))]
+    pages = [
+        root / "README.md",
+        root / "CONTRIBUTING.md",
+        *sorted((root / "docs").rglob("*.md")),
+        *sorted((root / "cases").glob("*/README.md")),
+    ]
     named = {
         str(page.relative_to(root)): page.read_text(encoding="utf-8") for page in pages if "_build" not in page.parts
     }
