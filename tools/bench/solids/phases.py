@@ -73,7 +73,9 @@ def plate(folder: Path, name: str, ccx: bool) -> None:
         gmsh.model.mesh.setOrder(2)
         tags, points, _ = gmsh.model.mesh.getNodes()
         _, (elements,), (nodes,) = gmsh.model.mesh.getElements(3)
-        deck(folder / f"{name}.inp", tags, points.reshape(-1, 3), elements, nodes.reshape(-1, 10))
+        path = folder / f"{name}.inp"
+        deck(path, tags, points.reshape(-1, 3), elements, nodes.reshape(-1, 10))
+        path.write_text(path.read_text().replace("2.068427e11, 0.3", "7.0e10, 0.33").replace("7850.", "2700."))
     gmsh.finalize()
 
 
