@@ -76,7 +76,7 @@ def _section(name: str, record: Schema, parts: dict[str, Schema]) -> Iterator[st
     yield from (f"## {name}", "", *(line.replace("*", "\\*") for line in about), "")
     if len(parts) < 2 and "" not in parts:
         yield from (f"In {next(iter(parts))} scenes only.", "")
-    yield from ("| key | what | value | default |", "|---|---|---|---|")
+    yield from ("| key | description | value | default |", "|---|---|---|---|")
     for key, entry in record["properties"].items():
         having = {space: part for space, part in parts.items() if key in part["properties"]}
         only = f" ({next(iter(having))} only)" if len(having) < len(parts) else ""

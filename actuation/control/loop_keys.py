@@ -23,7 +23,7 @@ class SampledAnalysis(ActuatedAnalysis):
     sample_time: Positive
     """Time between samples, s."""
     delay: NotNegative = 0.0
-    """From a sample to its command, s."""
+    """Delay from a sample to its command, s."""
     start: Literal["actuation", "scene"] = "actuation"
     """Initial state: that of `actuation`, or [initial]."""
     feed_forward: Literal["none", "joints", "joints+pzt"] = "joints"

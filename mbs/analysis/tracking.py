@@ -69,7 +69,7 @@ class Tracking(TimedAnalysis):
 
     kind: Literal["tracking"]
     objective: Literal["effort", "least-voltage", "least-moment"] = "effort"
-    """What is made small."""
+    """Objective of the optimal control problem."""
     pre_actuation: Around = 0.0
     """Duration of actuation before the path begins, s; "auto" takes it from the zero dynamics."""
     post_actuation: Around = 0.0
