@@ -66,6 +66,7 @@ def test_sag_of_a_solid():
     """As of a geometrically exact solid of as many cells; a rod, whose ends warp, is 1.9 % off that."""
     shape = {"kind": "solid", "length": 0.25, "section": {"shape": "rectangle", "height": 0.004, "width": 0.02}}
     solid = link(density=1e-3) | {"geometry": shape, "mesh": {"divisions": [50, 2, 8], "order": 2}}
+    solid |= {"interface": [{"name": "tip", "coupling": "rigid"}]}
     payload = [{"point": "c.tip", "mass": 60.0 / 9.81, "center": [0.0, 0.03, 0.0], "inertia": [1e-4] * 3}]
     with solved(solid, geometric_stiffening=True, gravity=[0.0, 0.0, -9.81], payload=payload) as results:
         sag = results["run/points/c.tip/position"][0] - [0.25, 0.0, 0.0]

@@ -66,6 +66,7 @@ def ffrobot_tip(cells: tuple[int, int, int]) -> np.ndarray:
         "geometry": {"kind": "solid", "length": L, "section": section},
         "mesh": {"divisions": list(cells), "order": 2},
         "reference": {"condition": "cantilever"},
+        "interface": [{"name": "tip", "coupling": "rigid"}],
     }
     payload = {"point": "strip.tip", "mass": FORCE / 9.81, "center": [0.0, ARM, 0.0], "inertia": [1e-4] * 3}
     scene = ffrobot.make_scene(
