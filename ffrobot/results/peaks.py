@@ -21,6 +21,8 @@ SCALARS = (
 VECTORS = ("points/*/deflection", "joints/*/reaction", "joints/*/reaction_moment")
 """Datasets whose length has one; the moment in a joint of the plane is its own length."""
 
+VOLTAGE = "pzt/*/voltage"
+
 POWER = "peak_power"
 """Attribute of a joint with one coordinate: the largest power of its motor, W."""
 
@@ -56,6 +58,9 @@ def _write(group: h5py.Group, closer: h5py.Group) -> None:
     for name, values in _histories(closer, len(time)):
         if name in group and len(time):
             tops = np.array([largest(time, column) for column in values.T])
+            if fnmatchcase(name, VOLTAGE):  # cut off at its limit, it has no smooth top there
+                limit = group[name].parent.attrs.get("limit", np.inf)
+                tops[:, 0] = np.minimum(tops[:, 0], np.maximum(np.abs(values).max(axis=0), limit))
             means = np.array([root_mean_square(time, column) for column in values.T])
             single = values.shape[1] == 1
             attributes = group[name].attrs
