@@ -89,7 +89,8 @@ def static_equilibrium(model: Model, start: State, t: float = 0.0) -> State:
         q, multipliers = tree.integrate(q, step[:n] * sizes), multipliers + step[n:] * _force_scale(size, row_scales)
     raise SolveError(
         f"{model.scene.path}: no static equilibrium was found near the initial posture: a robot without motors or"
-        " trajectories may have none there; give joint coordinates closer to it"
+        " trajectories may have none there, nor one whose links are too soft for their loads; give joint coordinates"
+        " closer to it, or stiffer links"
     )
 
 
