@@ -88,9 +88,8 @@ def static_equilibrium(model: Model, start: State, t: float = 0.0) -> State:
         step *= min(1.0, LARGEST_STEP / max(float(np.abs(step[:n]).max()), 1e-300))
         q, multipliers = tree.integrate(q, step[:n] * sizes), multipliers + step[n:] * _force_scale(size, row_scales)
     raise SolveError(
-        f"{model.scene.path}: no static equilibrium was found near the initial posture: a robot without motors or"
-        " trajectories may have none there, nor one whose links are too soft for their loads; give joint coordinates"
-        " closer to it, or stiffer links"
+        f"{model.scene.path}: no static equilibrium was found near the initial posture. Without motors or trajectories,"
+        " or with links too soft for their loads, there may be none; else give joint coordinates closer to it"
     )
 
 
