@@ -12,6 +12,8 @@ from ..common.peaks import largest, root_mean_square, shares
 from ..mbs._core import TimeFunction
 from ..mbs.analysis.motors_only import MotorsOnly
 from ..mbs.joints.transmission import MotorLimits
+from ..mbs.model.known_motion import mass_matrices
+from ..mbs.model.transmission import rotor
 from ..mbs.quantities.motion import RobotMotion
 from ..mbs.scene.analysis import Analysis
 
@@ -19,6 +21,7 @@ SHORT = 0.01  # of the time: a peak that lasts less is one of its own
 APART = 1.1  # times the moment of the other 99 % of the time: likewise
 NEARBY = 1e-3  # of the path's duration: a jump of the path this near to a peak may have made it
 INSTANT = 1e-4  # of the path's duration: over which one-sided derivatives are taken
+ROWS = 50  # of a run, at most, at which inertias are computed
 JUMP = 0.05  # of the largest acceleration or jerk of the path: less is none
 
 
@@ -34,6 +37,8 @@ class MotorFeasibility:
         usual_moment: that is not exceeded for 99 % of the time, pre- and post-actuation included.
         moment_time: when the moment is largest, s.
         share_beyond: of the time that any of them is.
+        load_inertia: largest of the robot along the joint, with other joints locked and links rigid, without the rotor,
+            kg·m² (kg); NaN where loops share it among joints.
         jump: "acceleration" or "jerk" of the path where that jumps at a short peak which follows from it; else "".
     """
 
@@ -48,6 +53,7 @@ class MotorFeasibility:
     usual_moment: float = np.nan
     moment_time: float = np.nan
     share_beyond: float = np.nan
+    load_inertia: float = np.nan
     jump: str = ""
 
     @property
@@ -84,6 +90,7 @@ def judge_motors(motion: RobotMotion, analysis: Analysis) -> dict[str, MotorFeas
     """
     forces, found = motion.motor_forces, {}
     assert forces is not None
+    inertias = _load_inertias(motion)
     for joint in motion.model.scene.motor_joints:
         of_joint = motion.joint(joint.name)
         assert of_joint is not None
@@ -93,7 +100,23 @@ def judge_motors(motion: RobotMotion, analysis: Analysis) -> dict[str, MotorFeas
             name = joint.name if len(joint.units) == 1 else f"{joint.name} {k + 1}"
             judged = judge_motion(motion.time, moments[:, k], rates[:, k], limits, analysis.last_time)
             jump = path_jump(motion, analysis, judged.moment_time) if judged.has_spike else ""
-            found[name] = replace(judged, jump=jump)
+            found[name] = replace(judged, jump=jump, load_inertia=inertias.get(joint.name, (np.nan,) * (k + 1))[k])
+    return found
+
+
+def _load_inertias(motion: RobotMotion) -> dict[str, tuple[float, ...]]:
+    """By joint of an open chain, along each of its coordinates; see `load_inertia`."""
+    model = motion.model
+    if model.loop_rows.any() or not len(motion.time):
+        return {}
+    rows = np.unique(np.linspace(0, len(motion.time) - 1, ROWS).astype(int))
+    inertia = mass_matrices(model, motion.q[rows])
+    most = inertia.diagonal(axis1=1, axis2=2).max(axis=0)
+    found = {}
+    for joint, columns in model.motors.items():
+        node = model.tree.nodes[model.tree.carried[joint]]
+        J, N = rotor(node)
+        found[joint] = tuple(float(most[int(k)]) - J * N**2 for k in columns)
     return found
 
 

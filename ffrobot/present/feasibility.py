@@ -5,6 +5,7 @@ from __future__ import annotations
 import tomllib
 from collections.abc import Iterator, Mapping
 from pathlib import Path
+from typing import Any
 
 import h5py
 import numpy as np
@@ -42,12 +43,15 @@ def _tables(name: str, group: h5py.Group) -> Iterator[Table | str]:
     from ..results.joints import labelled_coordinates
 
     yield f'analysis "{name}" ({group.attrs["kind"]})'
-    coordinates = labelled_coordinates(tomllib.loads(group.file.attrs["scene"]))
+    scene = tomllib.loads(group.file.attrs["scene"])
+    coordinates = labelled_coordinates(scene)
     units = {label: one.force_unit for label, (_, one) in coordinates.items()}
     if motors := read_motors(group["feasibility"], list(units)):
         yield _motors(motors, units)
         spikes = ((name, motor.spike_in_words(units[name])) for name, motor in motors.items())
         yield from (f"motor of {name}: {text}" for name, text in spikes if text)
+        if (table := _at_motors(motors, scene)).row_count:
+            yield table
     if (missed := read_unsupplied(group["feasibility"])) is not None:
         yield missed.in_words
     for body, judged in group["feasibility"].get("pzt", {}).items():
@@ -77,6 +81,23 @@ def _motors(motors: Mapping[str, MotorFeasibility], units: Mapping[str, str]) ->
             ends = ("", "", "") if k else (share, since, can)
             times = "" if np.isinf(limit) else _number(peak / limit)
             table.add_row("" if k else name, what, _number(peak), _number(limit), times, rms, *ends)
+    return table
+
+
+def _at_motors(motors: Mapping[str, MotorFeasibility], scene: Mapping[str, Any]) -> Table:
+    """In front of gears, without their losses; the load's inertia is the largest, with other joints locked."""
+    table = _table(
+        "motor of", "ratio", "peak (N·m)", "RMS (N·m)", "speed (rad/s)", "(1/min)", "power (W)", "load / rotor inertia"
+    )
+    for joint in scene["joint"]:
+        motor, N, J = motors.get(joint["name"]), joint.get("gear_ratio", 1.0), joint.get("rotor_inertia", 0.0)
+        if motor is not None and N != 1.0:
+            speed = N * motor.speed
+            ratio = _number(motor.load_inertia / (J * N**2)) if J and np.isfinite(motor.load_inertia) else ""
+            table.add_row(
+                joint["name"], f"{N:g}", _number(motor.moment / N), _number(motor.rms_moment / N), _number(speed),
+                f"{60 * speed / (2 * np.pi):.0f}", _number(motor.power), ratio,
+            )  # fmt: skip
     return table
 
 

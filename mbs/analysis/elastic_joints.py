@@ -2,7 +2,7 @@
 
 Inverse analyses and equilibria take gears for rigid: their motion is that of the links, and their rotors turn with
 them. With the rigid rotor's angle ψ = N γ + α_a a gear transmits τ_s = τ − J N ψ̈ (Spong 1987). The twist
-δ = θ_m − γ follows from k δ + c δ̇ = τ_s as a quintic spline through the outputs, and the motor's torque is
+δ = θ_m − γ follows from k(δ) + c δ̇ = τ_s as a quintic spline through the outputs, and the motor's torque is
 τ_s + J N (ψ̈ + N δ̈).
 """
 
@@ -15,6 +15,7 @@ import numpy as np
 
 from ...common.arrays import Array
 from ...common.errors import InputError
+from ..joints.twist_spring import TwistSpring
 from .outcome import GearMotion
 
 if TYPE_CHECKING:
@@ -22,13 +23,14 @@ if TYPE_CHECKING:
 
 DEGREE = 5
 UNRESOLVED = 0.001  # of a motor's largest moment: what every second output may change of it
+MOST_STEPS = 50
 SLOWEST = 1e4  # s, of a gear to give way, per second of the analysis: beyond, splines do not find its twist
 
 
 class GearSpring(NamedTuple):
-    """k (N·m/rad), c (N·m·s/rad), and J N² (kg·m²) of the rotor in front of it; `where` messages say it is."""
+    """k(δ) (N·m), c (N·m·s/rad), and J N² (kg·m²) of the rotor in front of it; `where` messages say it is."""
 
-    stiffness: float
+    spring: TwistSpring
     damping: float
     inertia: float
     where: str
@@ -42,7 +44,7 @@ def gear_motion(
     `gamma` (T, 3): the joint's coordinate, its rate and acceleration. `curve`: δ(t) where it is known.
     Raises `InputError` where damping holds it so long that its moments say nothing of its twist.
     """
-    lasts, longest = spring.damping / spring.stiffness, SLOWEST * (time[-1] - time[0])
+    lasts, longest = spring.damping / min(spring.spring.slopes), SLOWEST * (time[-1] - time[0])
     if len(time) > 1 and lasts > longest:
         raise InputError(
             f"{spring.where}: damping: expected a compliant gear that relaxes within {longest:.3g} s (damping /"
@@ -52,7 +54,7 @@ def gear_motion(
     transmitted, unresolved = tau - rotor, 0.0
     is_known = curve is not None
     curve = curve if is_known or len(time) <= DEGREE else _twist(spring, time, transmitted)
-    twist = _read(curve, time) if curve else np.pad(transmitted[:, None] / spring.stiffness, ((0, 0), (0, 2)))
+    twist = _read(curve, time) if curve else np.pad(spring.spring.twist(transmitted)[:, None], ((0, 0), (0, 2)))
     moment = tau + spring.inertia * twist[:, 2]
     largest = float(np.abs(moment).max())
     if not is_known and len(time) > 2 * DEGREE + 1 and largest:
@@ -68,7 +70,10 @@ def _read(curve: BSpline, time: Array) -> Array:
 
 
 def _twist(gear: GearSpring, time: Array, moment: Array) -> BSpline:
-    """δ(t) with k δ + c δ̇ = `moment` at all outputs: a quintic spline without knots next to the ends."""
+    """δ(t) with k(δ) + c δ̇ = `moment` at all outputs: a quintic spline without knots next to the ends.
+
+    By Newton, which ends where no output changes its part of the spring.
+    """
     from scipy.interpolate import BSpline, make_interp_spline
     from scipy.sparse import diags
     from scipy.sparse.linalg import spsolve
@@ -78,7 +83,15 @@ def _twist(gear: GearSpring, time: Array, moment: Array) -> BSpline:
     widths = DEGREE / (knots[DEGREE + 1 : DEGREE + n] - knots[1:n])
     differences = diags([-widths, widths], [0, 1], shape=(n - 1, n))
     rates = BSpline.design_matrix(time, knots[1:-1], DEGREE - 1) @ differences
-    return BSpline(knots, spsolve((gear.stiffness * values + gear.damping * rates).tocsc(), moment), DEGREE)
+    twist = gear.spring.twist(moment)
+    for _ in range(MOST_STEPS):
+        slope = gear.spring.slope(twist)
+        left = (diags(slope) @ values + gear.damping * rates).tocsc()
+        found = spsolve(left, moment - gear.spring.moment(twist) + slope * twist)
+        twist = values @ found
+        if np.array_equal(gear.spring.slope(twist), slope):
+            break
+    return BSpline(knots, found, DEGREE)
 
 
 def unresolved_gears(gears: Mapping[str, GearMotion]) -> Iterator[str]:

@@ -14,6 +14,7 @@ import numpy as np
 
 from ...common.arrays import Array
 from ...common.errors import InputError, quoted
+from ..joints.twist_spring import TwistSpring
 from ..model.frame_motors import turning_motors
 from ..model.gears import elastic_joints, with_compliance
 from ..model.known_motion import KnownStates, States, required_forces, rotor_torques
@@ -80,7 +81,7 @@ def supplied_through_gears(
         before, felt = felt, needed[:, : felt.shape[1]]
         for gear in compliant.tree.gears:  # but for what their springs do along their own joints
             of = gears[gear.joint.joint.name].twist
-            felt[:, gear.joint.v.start] += gear.sign * (gear.stiffness * of[:, 0] + gear.damping * of[:, 1])
+            felt[:, gear.joint.v.start] += gear.sign * (gear.spring.moment(of[:, 0]) + gear.damping * of[:, 1])
         change, last = float(np.abs(felt - before).max(initial=0.0)), change
         if change <= REPEATS * float(np.abs(felt).max(initial=0.0)):
             break
@@ -111,7 +112,7 @@ def _gear(
     """Of the gear in the joint of `node`, whose rotor takes `torque` (T,), J u̇, where it is rigid."""
     joint, (inertia, N) = node.joint.name, rotor(node)
     where = f'{model.scene.path}: joint "{joint}"'
-    spring = GearSpring(*(compliance(node) or (0.0, 0.0)), inertia * N**2, where)
+    spring = GearSpring(*(compliance(node) or (TwistSpring((np.inf,)), 0.0)), inertia * N**2, where)
     curve = None if twists is None else twists[joint]
     return gear_motion(spring, time, forces.moments[joint][:, 0], N * torque, _along(node, state), curve)
 

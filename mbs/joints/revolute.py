@@ -12,6 +12,7 @@ from ...common.rotations import about
 from ..fields.field_types import NotNegative, Positive
 from .joint import ALIGNED, POINT, Along, Place
 from .moving_joint import AxialJoint
+from .twist_spring import StiffnessSteps
 
 
 class RevoluteJoint(AxialJoint):
@@ -19,7 +20,7 @@ class RevoluteJoint(AxialJoint):
 
     Drivetrain: `rotor_inertia` J (kg·m²) of a rotor that sits on the first body, its axis that of the joint, and turns
     `gear_ratio` times as fast as the second side does on the first. Between the gear of a motor and the second body a
-    spring `stiffness` (N·m/rad; default: rigid) and a damper `damping` (N·m·s/rad).
+    spring `stiffness` (N·m/rad; default: rigid; or in steps of the torque) and a damper `damping` (N·m·s/rad).
     """
 
     type: Literal["revolute"]
@@ -27,8 +28,9 @@ class RevoluteJoint(AxialJoint):
     """Rotor turns per turn of the joint."""
     rotor_inertia: NotNegative = 0.0
     """Moment of inertia of the rotor about its axis, kg·m², before the gear."""
-    stiffness: Positive | None = None
-    """Stiffness of a compliant gear, N·m/rad; default: rigid."""
+    stiffness: Positive | StiffnessSteps | None = None
+    """Stiffness of a compliant gear, N·m/rad, or { values = [K1, K2, …], torques = [T1, …] } in steps of its torque;
+    default: rigid."""
     damping: NotNegative = 0.0
     """Damping of that gear, N·m·s/rad."""
 

@@ -45,8 +45,9 @@ def with_compliance(model: Model) -> Model:
     firm = {node.body.name: _without_rotor(node) for node in elastic}
     tree.nodes = tuple(firm.get(node.body.name, node) for node in tree.nodes)
     tree.gears = tuple(
-        CompliantGear(output, firm[node.body.name], -1.0 if node.backwards else 1.0, *(compliance(node) or (0, 0)))
+        CompliantGear(output, firm[node.body.name], -1.0 if node.backwards else 1.0, *of_gear)
         for output, node in zip(outputs, elastic, strict=True)
+        if (of_gear := compliance(node)) is not None
     )
     more = np.zeros(len(outputs))
     loads = tuple(Drive(np.append(at, more), size) for at, size in model.modal_loads)

@@ -260,7 +260,7 @@ class MultibodySystem:
                 scene.add_joint_force(*at, 0.0, 0.0, friction.viscous, friction.coulomb, friction.speed)
         for gear in self.model.tree.gears:
             motor, joint = ((node.q.start, node.v.start) for node in (gear.motor, gear.joint))
-            scene.add_gear(motor, joint, gear.sign, gear.stiffness, gear.damping)
+            scene.add_gear(motor, joint, gear.sign, gear.spring.slopes, gear.spring.knots, gear.damping)
         self._act_along_cut(scene, self._parts.cut if plane is None else plane.cut)
         scene.most_bent = [node.body.largest_moment for node in self.model.tree.nodes]
         has_loops = bool(self.model.loop_rows.any())

@@ -8,6 +8,7 @@ import numpy as np
 
 from ...common.arrays import Array
 from ..joints.revolute import RevoluteJoint
+from ..joints.twist_spring import TwistSpring
 from .cut import cut_resistance
 from .model import Model
 from .tree import KinematicTree, Motion, Node
@@ -18,10 +19,12 @@ def rotor(node: Node) -> tuple[float, float]:
     return float(getattr(node.joint, "rotor_inertia", 0.0)), float(getattr(node.joint, "gear_ratio", 1.0))
 
 
-def compliance(node: Node) -> tuple[float, float] | None:
-    """Stiffness (N·m/rad) and damping (N·m·s/rad) of the gear in the joint that carries a body; None of a firm one."""
+def compliance(node: Node) -> tuple[TwistSpring, float] | None:
+    """Spring and damping (N·m·s/rad) of the gear in the joint that carries a body; None of a firm one."""
     joint = node.joint
-    return (joint.stiffness, joint.damping) if isinstance(joint, RevoluteJoint) and joint.stiffness else None
+    if not isinstance(joint, RevoluteJoint) or joint.stiffness is None:
+        return None
+    return TwistSpring.of(joint.stiffness), joint.damping
 
 
 def resistance(model: Model, q: Array, v: Array, frames: Sequence[Motion] | None = None) -> Array:
@@ -50,23 +53,23 @@ def tree_resistance_slope(tree: KinematicTree, v: Array) -> Array:
     return found
 
 
-def gear_matrices(tree: KinematicTree) -> tuple[Array, Array]:
-    """K and D (n_v, n_v) of gears that give, along v."""
+def gear_matrices(tree: KinematicTree, q: Array) -> tuple[Array, Array]:
+    """K and D (n_v, n_v) of gears that give, along v, at q (n_q,)."""
     K, D = np.zeros((2, tree.n_v, tree.n_v))
     for gear in tree.gears:
         twist = np.zeros(tree.n_v)
         twist[gear.motor.v.start], twist[gear.joint.v.start] = 1.0, -gear.sign
-        K += gear.stiffness * np.outer(twist, twist)
+        K += gear.spring.slope(gear.twist(q, np.zeros(tree.n_v))[0]) * np.outer(twist, twist)
         D += gear.damping * np.outer(twist, twist)
     return K, D
 
 
 def gear_forces(tree: KinematicTree, q: Array, v: Array) -> Array:
-    """Of gears that give (T, n_v): k δ + c δ̇ on the second side of the joint, the opposite on the motor."""
+    """Of gears that give (T, n_v): k(δ) + c δ̇ on the second side of the joint, the opposite on the motor."""
     found = np.zeros_like(v)
     for gear in tree.gears:
         way, rate = gear.twist(q, v)
-        moment = gear.stiffness * way + gear.damping * rate
+        moment = gear.spring.moment(way) + gear.damping * rate
         found[:, gear.motor.v.start] -= moment
         found[:, gear.joint.v.start] += gear.sign * moment
     return found

@@ -19,6 +19,7 @@ from ..fields.field_types import GROUND
 from ..joints.free import FreeJoint
 from ..joints.joint import JointRecord
 from ..joints.planar_joint import PlanarJoint
+from ..joints.twist_spring import TwistSpring
 from ..scene.topology import Topology
 from .bending import bent_section
 from .body import Body, rigid_body
@@ -85,7 +86,7 @@ class Node:
 
 
 class CompliantGear(NamedTuple):
-    """A gear that gives: spring `stiffness` k (N·m/rad) and damper `damping` c (N·m·s/rad) behind a motor of the tree.
+    """A gear that gives: `spring`, and damper `damping` c (N·m·s/rad), behind a motor of the tree.
 
     The twist δ is that of `motor`, whose coordinate is θ_m, against `joint`, whose coordinate is `sign` γ: δ = θ_m − γ.
     """
@@ -93,7 +94,7 @@ class CompliantGear(NamedTuple):
     motor: Node
     joint: Node
     sign: float
-    stiffness: float
+    spring: TwistSpring
     damping: float
 
     def twist(self, q: Array, v: Array) -> tuple[Array, Array]:

@@ -259,7 +259,7 @@ class RobotMotion:
         for gear in self.model.tree.gears:
             if gear.joint.joint.name == joint:
                 way, rate = gear.twist(self.q, self.v)
-                return gear.stiffness * way + gear.damping * rate
+                return gear.spring.moment(way) + gear.damping * rate
         return None
 
     def motor_motion(self, joint: str) -> tuple[Array, Array] | None:

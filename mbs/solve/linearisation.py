@@ -124,7 +124,7 @@ class LinearEquations:
         points = self._points(state, H)
         on_modes = sum((moments[joint] * shares[joint].direction for joint in shares), np.zeros(tree.n_v))
         # Not by way of M⁻¹, whose rounding is that of the stiffest modes
-        K_more, D_more = gear_matrices(tree)
+        K_more, D_more = gear_matrices(tree, q)
         K_more -= sum((moments[joint] * shares[joint].slope for joint in shares), np.zeros_like(K_more))
         return LinearMechanism(
             t, q, v, a, sides * (M + M.T) / 2, H.T @ D_more @ H - sides * (M @ by_rate),

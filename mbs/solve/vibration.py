@@ -55,7 +55,7 @@ def vibrations_of(model: Model, unheld: MultibodySystem, t: float, q: Array) -> 
 
 def _springs(model: Model, q: Array) -> tuple[Array, Array]:
     """K and D (n_v, n_v) of modes, gears and viscous friction at q (n_q,)."""
-    K, D = gear_matrices(model.tree)
+    K, D = gear_matrices(model.tree, q)
     D += cut_damping(model.tree, model.cut, q)
     for node in model.tree.nodes:
         K[node.p_v, node.p_v] = np.diag(node.body.stiffness)

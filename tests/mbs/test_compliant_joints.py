@@ -18,8 +18,10 @@ from ffrobot.mbs.analysis.elastic_joints import unresolved_gears
 from ffrobot.mbs.analysis.gears import with_motor_coordinates
 from ffrobot.mbs.analysis.motors_only import MotorsOnly
 from ffrobot.mbs.analysis.static import Static
+from ffrobot.mbs.joints.twist_spring import StiffnessSteps, TwistSpring
 from ffrobot.mbs.model.gears import with_compliance
 from ffrobot.mbs.model.model import without_paths
+from ffrobot.mbs.solve.held_joints import held_joints
 from ffrobot.mbs.solve.linearisation import LinearEquations
 
 L, M, J, N, K, C = 0.7, 2.0, 3e-3, 9.0, 500.0, 0.4
@@ -260,3 +262,97 @@ def test_what_does_not_go_is_refused():
     loaded = geared_arm(GEARED, load=[{"joint": "O", "moment": "1"}])
     with pytest.raises(InputError, match=r"expected no \[\[load\]\] on"):
         run(loaded, pcid(end=0.1)).motion.gears  # noqa: B018
+
+
+K1, K2, KNEE = 400.0, 1200.0, 0.4  # N·m/rad up to a torque of 0.4 N·m, N·m/rad beyond
+STEPS = {"values": (K1, K2), "torques": (KNEE,)}
+
+
+def swing_beyond_a_knee(tau, t):
+    """The twist of two masses by a constant τ, from rest: two sinusoids that meet at the knee, to and fro.
+
+    δ̈ = τ/I_m − k(δ) (1/I_m + 1/I), so that δ₁ = a₁ (1 − cos ω₁t) up to the knee δ_k = T/k₁, from there on an
+    oscillation at ω₂ about e₂, where k(e₂)(1/I_m + 1/I) = τ/I_m.
+    """
+    m = 1 / MOTOR + 1 / LINK
+    o1, o2, knee = np.sqrt(K1 * m), np.sqrt(K2 * m), KNEE / K1
+    a1 = tau / MOTOR / o1**2
+    e2 = knee + (tau / MOTOR / m - KNEE) / K2
+    t1 = np.arccos(1 - knee / a1) / o1
+    rate = a1 * o1 * np.sin(o1 * t1)
+    size = np.hypot(knee - e2, rate / o2)
+    start = np.arctan2(-rate / o2, knee - e2)  # of the phase: e₂ + size cos(ω₂ s + start)
+    half = -start / o2  # to the largest twist
+    period = 2 * (t1 + half)
+    s = np.abs((t + period / 2) % period - period / 2)  # as far from rest, whichever way
+    return np.where(s < t1, a1 * (1 - np.cos(o1 * s)), e2 + size * np.cos(o2 * (s - t1) + start)), e2 + size
+
+
+def test_a_gear_that_stiffens_swings_as_two_sinusoids():
+    """Forward dynamics against the closed form; energy is kept, and beyond the knee for a good part of the time."""
+    tau, t = 2.0, np.linspace(0.0, 1.0, 101)
+    outcome = run(pendulum(str(tau), stiffness=STEPS), forward(tolerance=1e-10))
+    expected, most = swing_beyond_a_knee(tau, t)
+    twist = outcome.motion.motor_motion("O")[0] - outcome.q[:, 2]
+    assert relative(twist, expected) < 1e-6
+    assert most > 1.5 * KNEE / K1
+    gear = outcome.motion.gear_moment("O")
+    beyond = np.abs(twist) > KNEE / K1
+    np.testing.assert_allclose(gear, np.where(beyond, KNEE + K2 * (twist - KNEE / K1), K1 * twist), atol=1e-12)
+    work = tau * outcome.motion.motor_motion("O")[0]
+    energies, _ = energy_and_losses(outcome)
+    np.testing.assert_allclose(energies - energies[0], work - work[0], atol=1e-7 * np.abs(work).max())
+
+
+def test_one_step_without_torques_is_a_linear_gear():
+    tau = "2*sin(20*t)"
+    twists = []
+    for stiffness in (K, {"values": [K]}, {"values": [K, 2 * K], "torques": [1e6]}):
+        outcome = run(pendulum(tau, stiffness=stiffness), forward(tolerance=1e-9))
+        twists.append(outcome.motion.motor_motion("O")[0] - outcome.q[:, 2])
+    for other in twists[1:]:
+        np.testing.assert_allclose(other, twists[0], atol=1e-11 * np.abs(twists[0]).max())
+
+
+@pytest.mark.parametrize(("torque", "slope"), [(0.2, K1), (-0.2, K1), (3.0, K2), (-3.0, K2)])
+def test_the_linear_model_has_the_slope_of_its_torque(torque, slope):
+    """A weight holds the gear at a torque: the twist by the closed form, and √(k/I) of the link with the motor held."""
+    spring = TwistSpring.of(StiffnessSteps(**STEPS))
+    twist = np.copysign(min(abs(torque), KNEE) / K1 + max(abs(torque) - KNEE, 0.0) / K2, torque)
+    assert spring.twist(np.array(torque)) == pytest.approx(twist, rel=1e-14)
+    assert spring.moment(np.array(twist)) == pytest.approx(torque, rel=1e-14)
+    model = with_compliance(without_paths(pendulum(stiffness=STEPS).model))
+    q = np.zeros(model.tree.n_q)
+    (gear,) = model.tree.gears
+    q[gear.motor.q.start] = twist
+    mechanism = LinearEquations(model, q).at(0.0, q, *np.zeros((2, model.tree.n_v)))
+    held = held_joints(mechanism)["compliant"].modes.frequency
+    assert held == pytest.approx([np.sqrt(slope / LINK) / (2 * np.pi)], rel=1e-10)
+
+
+@pytest.mark.parametrize("damping", [0.0, 2.0])
+def test_motors_behind_stepped_gears_carry_out_the_path(damping):
+    """Inverse dynamics finds k(δ) + c δ̇ = τ: the replay stays on the path up to the kinks that the spline rounds."""
+    steps = {"values": (2e3, 3e3, 4e3), "torques": (2.0, 6.0)}
+    error, source, _ = carried_out(rigid_arm(RIGID | {"stiffness": steps, "damping": damping}, RIGID))
+    gear = source.motion.gears["O"]
+    spring = TwistSpring.of(StiffnessSteps(**steps))
+    assert np.abs(gear.gear_moment).max() > 6.0
+    np.testing.assert_allclose(
+        spring.moment(gear.twist[:, 0]) + damping * gear.twist[:, 1], gear.gear_moment,
+        atol=1e-8 * np.abs(gear.gear_moment).max(),
+    )  # fmt: skip
+    assert error.max() < 1e-5  # m; 5e-3 with rigid moments
+
+
+@pytest.mark.parametrize(
+    ("steps", "expected"),
+    [
+        ({"values": [1.0, 2.0]}, "one value more than torques"),
+        ({"values": [1.0, 2.0, 3.0], "torques": [2.0, 1.0]}, "rising order"),
+        ({"values": [-1.0]}, "greater than 0"),
+    ],
+)
+def test_bad_steps_are_refused(steps, expected):
+    with pytest.raises(InputError, match=expected):
+        checked_scene([revolute("O", "ground", "a.root") | GIVES | {"stiffness": steps}])

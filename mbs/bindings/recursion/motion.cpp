@@ -286,11 +286,15 @@ void bind_tree_motion(nb::module_ &m) {
           "Spring and friction along the coordinate with these indices in q and v.")
       .def(
           "add_gear",
-          [](Scene &s, std::pair<int, int> a, std::pair<int, int> b, double ratio, double stiffness, double damping) {
-            s.gears.push_back({{a.first, a.second}, {b.first, b.second}, ratio, stiffness, damping});
+          [](Scene &s, std::pair<int, int> a, std::pair<int, int> b, double ratio, const std::vector<double> &slopes,
+             const std::vector<double> &knots, double damping) {
+            if (slopes.size() != knots.size() + 1)
+              throw std::invalid_argument("slopes: expected one more than knots");
+            s.gears.push_back({{a.first, a.second}, {b.first, b.second}, ratio, {slopes, knots}, damping});
           },
-          "a"_a, "b"_a, "ratio"_a, "stiffness"_a, "damping"_a,
-          "Spring and damper between two coordinates, indices in q and v each: of the twist a - ratio b.")
+          "a"_a, "b"_a, "ratio"_a, "slopes"_a, "knots"_a, "damping"_a,
+          "Piecewise linear spring and damper between two coordinates, indices in q and v each: of the twist a - ratio "
+          "b, the next slope from each knot on.")
       .def(
           "add_cut_joint",
           [](Scene &s, int a, int b, bool turns, const Eigen::Vector3d &axis, double viscous, double coulomb,

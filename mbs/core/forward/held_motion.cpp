@@ -28,7 +28,7 @@ template <class Archive> void fields(Archive &a, JointForce &x) {
   archived_all(a, x.q, x.v, x.stiffness, x.rest, x.friction.viscous, x.friction.coulomb, x.friction.speed);
 }
 template <class Archive> void fields(Archive &a, GearSpring &x) {
-  archived_all(a, x.a.q, x.a.v, x.b.q, x.b.v, x.ratio, x.stiffness, x.damping);
+  archived_all(a, x.a.q, x.a.v, x.b.q, x.b.v, x.ratio, x.spring.slopes, x.spring.knots, x.damping);
 }
 
 template <class Archive> void fields(Archive &a, CutJoint &x) {

@@ -167,9 +167,9 @@ Totals totals(const Mechanism<Space> &m, const Scene &scene, const double *q, co
     sum.strain += 0.5 * joint.stiffness * way * way;
     sum.dissipated += joint.friction.resistance(rate) * rate;
   }
-  for (const auto &[a, b, ratio, stiffness, damping] : scene.gears) {
+  for (const auto &[a, b, ratio, spring, damping] : scene.gears) {
     const double twist = q[a.q] - ratio * q[b.q], rate = v[a.v] - ratio * v[b.v];
-    sum.strain += 0.5 * stiffness * twist * twist;
+    sum.strain += spring.energy(twist);
     sum.dissipated += damping * rate * rate;
   }
   std::vector<double> rates(scene.cut_joints.size());

@@ -14,15 +14,17 @@ using Eigen::VectorXd;
 namespace {
 
 // Of what the scene does along joints, by increments of q and by v
-void add_slopes(const Scene &scene, const double *v, MatrixXd &by_q, MatrixXd &by_v) {
+void add_slopes(const Scene &scene, const double *q, const double *v, MatrixXd &by_q, MatrixXd &by_v) {
   for (const JointForce &joint : scene.joint_forces) {
     by_q(joint.v, joint.v) += joint.stiffness;
     by_v(joint.v, joint.v) += joint.friction.slope(v[joint.v]);
   }
-  for (const auto &[a, b, ratio, stiffness, damping] : scene.gears)
+  for (const auto &[a, b, ratio, spring, damping] : scene.gears) {
+    const double stiffness = spring.slope(q[a.q] - ratio * q[b.q]);
     for (const auto &[i, of_i] : {std::pair{a.v, 1.}, std::pair{b.v, -ratio}})
       for (const auto &[j, of_j] : {std::pair{a.v, 1.}, std::pair{b.v, -ratio}})
         by_q(i, j) += of_i * of_j * stiffness, by_v(i, j) += of_i * of_j * damping;
+  }
 }
 
 } // namespace
@@ -94,7 +96,7 @@ template <class Space> LeftSlopes PrescribedMotion<Space>::left_slopes(const Joi
   }
   MatrixXd by_q = -(M * found.a_q + found.value_q.transpose() * found.lambda_q);
   MatrixXd by_v = -(M * found.a_v + found.value_q.transpose() * found.lambda_v);
-  add_slopes(driven_.scene, v(), by_q, by_v);
+  add_slopes(driven_.scene, q(), v(), by_q, by_v);
   return {motors_->shares_of(M * joints.q), motors_->shares_of(by_v * joints.q + M * joints.a_v),
           motors_->shares_of(by_q * joints.q + by_v * joints.v + M * joints.a_p)};
 }

@@ -43,7 +43,8 @@ RecursiveMotion<Space>::RecursiveMotion(const Mechanism<Space> &mechanism, const
   for (const GearSpring &gear : scene_.gears)
     for (const Node<Space> &node : mechanism.nodes)
       if (node.v == gear.a.v)
-        norm_.add_spring(gear.stiffness, node.rotor_inertia * node.gear_ratio * node.gear_ratio);
+        norm_.add_spring(*std::max_element(gear.spring.slopes.begin(), gear.spring.slopes.end()),
+                         node.rotor_inertia * node.gear_ratio * node.gear_ratio);
   for (const Node<Space> &node : mechanism.nodes)
     for (int k = 0; k < node.n(); ++k)
       fastest_ = std::max(fastest_, std::sqrt(node.body.K[static_cast<std::size_t>(k)])), steps_between_postures_ = 10;

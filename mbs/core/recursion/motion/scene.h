@@ -8,6 +8,9 @@
 #include "core/recursion/motion/singular_posture.h"
 #include "core/time_function/time_function.h"
 
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -47,13 +50,44 @@ struct JointForce {
   Friction friction;
 };
 
+// Moment (N m) of a twist (rad), odd and piecewise linear: slopes (N m/rad), and the twists from which on the next one
+// counts. A linear spring has one slope.
+struct TwistSpring {
+  std::vector<double> slopes{0}, knots;
+
+  double moment(double twist) const {
+    const double way = std::abs(twist);
+    double sum = slopes[0] * way;
+    for (std::size_t k = 0; k < knots.size(); ++k)
+      sum += (slopes[k + 1] - slopes[k]) * std::max(way - knots[k], 0.);
+    return std::copysign(sum, twist);
+  }
+
+  double slope(double twist) const {
+    std::size_t k = 0;
+    while (k < knots.size() && std::abs(twist) > knots[k])
+      ++k;
+    return slopes[k];
+  }
+
+  double energy(double twist) const { // J
+    const double way = std::abs(twist);
+    double sum = slopes[0] * way * way;
+    for (std::size_t k = 0; k < knots.size(); ++k)
+      if (const double beyond = way - knots[k]; beyond > 0)
+        sum += (slopes[k + 1] - slopes[k]) * beyond * beyond;
+    return 0.5 * sum;
+  }
+};
+
 // Between two joint coordinates, as a gear that gives: moments (N m) of the twist a - ratio b on both.
 struct GearSpring {
   struct Side {
     int q = 0, v = 0;
   } a, b;
   double ratio = 1;
-  double stiffness = 0, damping = 0; // N m/rad, N m s/rad
+  TwistSpring spring;
+  double damping = 0; // N m s/rad
 };
 
 // `share` times `magnitude`(t), N m or N, along the coordinate of a joint at which a loop is cut.

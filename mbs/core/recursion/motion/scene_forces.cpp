@@ -56,8 +56,8 @@ template <class Space> void SceneForces<Space>::add_along_coordinates(double t, 
   }
   for (const JointForce &joint : scene_.joint_forces)
     generalized_[joint.v] -= joint.stiffness * (q[joint.q] - joint.rest) + joint.friction.resistance(v[joint.v]);
-  for (const auto &[a, b, ratio, stiffness, damping] : scene_.gears) {
-    const double moment = stiffness * (q[a.q] - ratio * q[b.q]) + damping * (v[a.v] - ratio * v[b.v]);
+  for (const auto &[a, b, ratio, spring, damping] : scene_.gears) {
+    const double moment = spring.moment(q[a.q] - ratio * q[b.q]) + damping * (v[a.v] - ratio * v[b.v]);
     generalized_[a.v] -= moment, generalized_[b.v] += ratio * moment;
   }
   if (held_)
