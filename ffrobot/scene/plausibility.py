@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,7 +12,7 @@ import numpy as np
 
 from ..common.errors import InputError
 from ..fe_models.link_file import read_link
-from ..fe_models.link_records import Link
+from ..fe_models.link_records import BeamLink, Link
 
 if TYPE_CHECKING:  # remarks on links do without the records of scenes
     from .scene import Scene
@@ -21,6 +22,9 @@ SPINNING = 0.1  # rate at the end over the largest: what still turns then is a w
 LONGEST = 50.0  # m: booms of concrete pumps and cranes have less
 LIGHTEST, HEAVIEST = 1.0, 3e4  # kg/m³: foams have more, osmium has 2.3e4
 SLOWEST, FASTEST = 20.0, 5e4  # m/s, √(E/ρ): silicone rubber has 30, diamond 1.8e4
+SLOW, QUICK = 0.02, 1e5  # Hz: the first frequency of a link that is clamped at its root
+HEAVIEST_BODY = 1e5  # kg
+CARRIED = 100.0  # times its own mass: no robot carries more
 RESTING = 3.0  # how many times longer than its path a run may take
 SAMPLES = 201
 OUTPUT = 5e3  # bytes for each body and output, while results are evaluated: a link of four modes in space takes 5.5e3
@@ -37,6 +41,8 @@ def remarks(scene: Scene) -> Iterator[str]:
         elif body.rigid is not None:
             places = [body.rigid.center, *body.rigid.points.values()]
             yield from _long(max(float(np.linalg.norm(place)) for place in places), f'body "{body.name}"')
+    with suppress(InputError):  # of links, which stage 1 tells
+        yield from _masses(scene)
     yield from _angles(scene)
     yield from _times(scene)
     for analysis in scene.analysis:
@@ -52,10 +58,48 @@ def remarks_on_link(link: Link, label: str) -> Iterator[str]:
     if not LIGHTEST <= density <= HEAVIEST:
         yield f"{label}: density {density:g} kg/m³: units are SI; is it in g/cm³ or t/mm³?"
     elif not SLOWEST <= (speed := np.sqrt(modulus / density)) <= FASTEST:
+        likely = "density in g/cm³" if speed > FASTEST else "it in MPa or GPa"
         yield (
             f"{label}: youngs_modulus {modulus:g} Pa, at {density:g} kg/m³ a speed of sound of {speed:.2g} m/s: units"
-            " are SI; is it in MPa or GPa?"
+            f" are SI; is {likely}?"
         )
+    elif isinstance(link, BeamLink):
+        yield from _beam(link, label)
+
+
+def _beam(link: BeamLink, label: str) -> Iterator[str]:
+    """Of sections that are wider than the link is long, and of its lowest frequency as a cantilever."""
+    section, length = link.sections[0], link.geometry.length
+    if (widest := max(section.height, section.width)) > length:
+        yield f"{label} has a section of {widest:g} m at a length of {length:g} m: units are SI; is it in mm?"
+        return
+    EI = min(section.I_yy, section.I_zz) * link.material.youngs_modulus
+    frequency = 0.56 / length**2 * np.sqrt(EI / (link.material.density * section.area))
+    if not SLOW <= frequency <= QUICK and length <= LONGEST:
+        yield (
+            f"{label} vibrates at {frequency:.2g} Hz as a cantilever: units are SI; is a length in mm, or the modulus"
+            " in MPa?"
+        )
+
+
+def _masses(scene: Scene) -> Iterator[str]:
+    """Payloads that are far heavier than the robot that carries them, and bodies heavier than any."""
+    robot = 0.0
+    for body in scene.body:
+        if body.rigid is not None:
+            robot += body.rigid.mass
+            if body.rigid.mass > HEAVIEST_BODY:
+                yield f'body "{body.name}" has a mass of {body.rigid.mass:g} kg: units are SI; is it in g?'
+        elif body.link is not None and isinstance(link := read_link(body.link), BeamLink):
+            robot += link.material.density * link.sections[0].area * link.geometry.length
+        else:
+            return  # known after stage 1 alone
+    for payload in scene.payload:
+        if payload.mass > CARRIED * robot:
+            yield (
+                f'payload at "{payload.point}": {payload.mass:g} kg on a robot of {robot:.3g} kg: units are SI; is it'
+                " in g?"
+            )
 
 
 def remarks_on_memory(outputs: int, bodies: int, available: float, label: str) -> Iterator[str]:

@@ -21,11 +21,12 @@ LINK = {
 }
 
 
-def arm(end=1.0, body=BAR, **path):
+def arm(end=1.0, body=BAR, payload=(), **path):
     return program.make_scene(
         name="arm",
         gravity=[0.0, -9.81],
         body=[{"name": "arm", "rigid": body}],
+        payload=payload,
         joint=[{"name": "hub", "type": "revolute", "between": ["ground", "arm.root"]}],
         trajectory=[{"name": "turn", "joint": "hub", **path}],
         analysis=[{"name": "inverse", "kind": "pcid", "end": end, "output_step": 0.1}],
@@ -42,6 +43,10 @@ def arm(end=1.0, body=BAR, **path):
         ({"via": [0.0, 1.0], "duration": 2.0, "start": 1.5}, "begins at 1.5 s, when the run is over (1 s)"),
         ({"via": [0.0, 1.0], "duration": 0.2}, "ends at 0.2 s, and rests for the other 0.8 s"),
         ({"value": "t", "body": {**BAR, "center": [500.0, 0.0]}}, "is 500 m long: units are SI; is this in mm?"),
+        ({"value": "t", "body": {**BAR, "mass": 2e6}}, "a mass of 2e+06 kg: units are SI; is it in g?"),
+        ({"value": "t", "payload": [{"point": "arm.tip", "mass": 500.0}]}, "500 kg on a robot of 1 kg"),
+        ({"value": "t", "payload": [{"point": "arm.tip", "mass": 50.0}]}, None),
+        ({"value": "45*pi/180*t"}, None),
         ({"value": "-45*deg"}, None),
         ({"value": "45*deg*(1 - cos(pi*t))"}, None),
         ({"value": "150*t"}, None),  # a crank that turns on
@@ -72,6 +77,12 @@ def test_waypoints_before_and_after_the_run(tmp_path):
         ({"material": {"youngs_modulus": 210.0, "density": 7850.0}}, "is it in MPa or GPa?"),
         ({"material": {"youngs_modulus": 70e9, "density": 2.7e-9}}, "is it in g/cm³ or t/mm³?"),
         ({"geometry": {**LINK["geometry"], "length": 600.0}}, "arm is 600 m long: units are SI; is this in mm?"),
+        ({"material": {"youngs_modulus": 70e9, "density": 2.7}}, "is density in g/cm³?"),
+        ({"geometry": {**LINK["geometry"], "section": {"shape": "circle", "diameter": 20.0}}}, "is it in mm?"),
+        (
+            {"geometry": {**LINK["geometry"], "length": 40.0, "section": {"shape": "circle", "diameter": 2e-5}}},
+            "Hz as a cantilever",
+        ),
         ({"material": {"youngs_modulus": 1e6, "density": 1100.0}}, None),  # silicone rubber
         ({"material": {"youngs_modulus": 1050e9, "density": 3515.0}}, None),  # diamond
     ],
