@@ -19,7 +19,9 @@ if TYPE_CHECKING:
 @click.command("map")
 @click.argument("scene_file", metavar="SCENE.toml", type=FILE)
 @click.option("--over", metavar="NAME=VALUES", multiple=True, required=True, help="Axis of the grid; repeatable.")
-@click.option("--point", metavar="BODY.POINT", help="Point of the tool.  [default: that of the path, or the last tip]")
+@click.option(
+    "--point", metavar="BODY.POINT", help="Point of the tool.  [default: that of the path, or of the last body]"
+)
 @click.option(
     "--orientation",
     type=click.Choice(["auto", "start", "free"]),

@@ -92,9 +92,13 @@ def plan_map(
 
 
 def _default_point(scene: Scene) -> str:
-    """The last point that a trajectory leads, else the tip of the last body of the scene."""
-    followed = [path.point for path in scene.trajectory if path.point is not None]
-    return followed[-1] if followed else f"{scene.body[-1].name}.tip"
+    """The last point that a trajectory leads; else of the last body that of a payload, its tip, or its last point."""
+    body = scene.body[-1]
+    carried = [one.point for one in scene.payload if one.point.partition(".")[0] == body.name]
+    named = carried + [one.point for one in scene.trajectory if one.point is not None]
+    points = ["tip"] if body.rigid is None else list(body.rigid.points)
+    last = "tip" if "tip" in points else points[-1]
+    return named[-1] if named else f"{body.name}.{last}"
 
 
 def _keeps_orientation(scene: Scene, axes: tuple[GridAxis, ...], wanted: str) -> bool:

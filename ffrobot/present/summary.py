@@ -43,11 +43,11 @@ def summary_lines(
     texts = [*_texts(verdict), *_labelled("note", notes)]
     motors, worst = list(_motors(verdict.analyses)), list(_worst_motors(verdict.analyses))
     room = LINES - printed - 3 - bool(motors)  # without both headers, accuracy, results
-    analyses = _at_most([_analysis(one) for one in verdict.analyses], room - min(len(worst), MOTORS)
-                        - min(len(texts), TEXTS))  # fmt: skip
+    for_motors = min(len(worst), MOTORS, (room + 1) // 2)
+    analyses = _at_most([_analysis(one) for one in verdict.analyses], room - for_motors - min(len(texts), TEXTS))
     room -= len(analyses)
     rows = motors if len(motors) + min(len(texts), TEXTS) <= room else worst
-    rows = _at_most(rows, max(MOTORS, room - len(texts)))
+    rows = _at_most(rows, max(for_motors, room - len(texts)))
     lines = _aligned([ANALYSES, *analyses]) + (_aligned([MOTOR, *rows]) if rows else [])
     lines += _fitted(texts, room - len(rows), width)
     lines += [f"accuracy   {accuracy}"]

@@ -148,7 +148,7 @@ def _angles(scene: Scene) -> Iterator[str]:
 def _times(scene: Scene) -> Iterator[str]:
     """Paths with times of their own that do not fit those of the analyses that follow them."""
     for analysis in scene.analysis:
-        if not analysis.follows_trajectories:
+        if not analysis.follows_trajectories or not analysis.last_time:
             continue
         for one in scene.trajectory:
             if (path := one.path) is None:

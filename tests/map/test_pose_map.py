@@ -200,3 +200,18 @@ def test_a_wrong_point_and_a_folder_of_something_else(arm, tmp_path):
     (tmp_path / "other" / "letter.txt").write_text("mine")
     with pytest.raises(InputError, match="expected a new folder or one of a map"):
         mapped(arm, tmp_path / "other", "elbow=0:1:3")
+
+
+def test_the_tool_of_a_robot_without_path_is_on_its_last_body(tmp_path):
+    """Where a payload is, its "tip", or its last point, whatever its name."""
+    last = 'name = "hand"\nrigid = { mass = 1.0, inertia = 0.1, center = [0.1, 0.0], points = { root = [0.0, 0.0], %s'
+    joint = '[[joint]]\nname = "wrist"\ntype = "revolute"\nbetween = ["ground", "hand.root"]\n'
+    for points, more, expected in (
+        ("flange = [0.2, 0.0]", "", "hand.flange"),
+        ("tip = [0.1, 0.0], flange = [0.2, 0.0]", "", "hand.tip"),
+        ("tip = [0.1, 0.0], flange = [0.2, 0.0]", '[[payload]]\npoint = "hand.flange"\nmass = 1.0\n', "hand.flange"),
+    ):
+        path = tmp_path / "scene.toml"
+        text = 'name = "one"\nspace = "planar"\ngravity = [0.0, 0.0]\n[[body]]\n' + last % points + " } }\n" + joint + more
+        path.write_text(text + '[[analysis]]\nname = "rest"\nkind = "static"\n')
+        assert plan_map(path, ("wrist=0:1:2",), tmp_path / "map").point == expected
