@@ -13,7 +13,8 @@ def chosen_posture(results: Results) -> str:
     """Coordinates of the joints at the start, where a point follows a path and nothing says which posture; else ""."""
     scene = results.scene
     initial = scene.get("initial", {})
-    if initial.get("angles") or initial.get("joints") or not any("point" in one for one in scene.get("trajectory", ())):
+    named = any(initial.get(key) for key in ("angles", "joints", "branch"))
+    if named or not any("point" in one for one in scene.get("trajectory", ())):
         return ""
     for analysis in results.analyses:
         found = [

@@ -9,6 +9,7 @@ from ..actuation.patches.link_patches import LinkPatches, on_pieces
 from ..actuation.points import PointSet, with_points
 from ..mbs.model.body import Body
 from ..mbs.model.model import Model, build_model
+from ..mbs.solve.branches import chosen_start
 from ..mbs.solve.robot_damping import with_robot_damping
 from ..scene.pieces import BodyInPieces, bodies_in_pieces, scene_of_pieces
 from ..scene.scene import Scene
@@ -35,6 +36,10 @@ def made_solution(scene: Scene, bodies: Bodies, seconds: Mapping[str, float]) ->
     )
     bodies, stiffened = _with_points(bodies, points), _all_stiffened(scene, False)
     model = _model(scene, bodies, patches, {}, {}, stiffened)
+    if (start := chosen_start(model)) is not None:
+        own = {"joints": start.guesses, "angles": {}, "branch": {}}
+        scene = scene.model_copy(update={"initial": scene.initial.model_copy(update=own)})
+        model = _model(scene, bodies, patches, {}, {}, stiffened)
     return Solution(scene, model, bodies, patches, {}, seconds, points=points, stiffened=stiffened)
 
 

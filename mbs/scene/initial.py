@@ -36,11 +36,16 @@ class Initial(Record):
     """Their rates, rad/s or m/s; spherical and free joints: angular velocity in the axes of the second side, after
     the velocity in those of the first."""
 
+    branch: dict[str, Literal["up", "down", "positive", "negative"]] = Field(default_factory=dict)
+    """Which of several postures that meet the constraints at t = 0, by joint: "up" or "down" of an elbow, whose joint
+    is above or below the straight line between the joints (or the tool) next to it; "positive" or "negative", the
+    sign of the coordinate within ±180°, of a wrist. Of those the nearest to the guess."""
+
     def references(self) -> Iterator[Reference]:
         """The bodies and joints with guesses."""
         for table, of_bodies in (("angles", self.angles), ("rates", self.rates)):
             for body in of_bodies:
                 yield Reference(table, body)
-        for table, guesses in (("joints", self.joints), ("joint_rates", self.joint_rates)):
+        for table, guesses in (("joints", self.joints), ("joint_rates", self.joint_rates), ("branch", self.branch)):
             for joint in guesses:
                 yield Reference(table, joint, "joint")

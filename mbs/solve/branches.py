@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+import tomllib
 from typing import NamedTuple
 
 import numpy as np
 
 from ...common.arrays import Array, Indices
+from ...common.errors import InputError
 from ..model.model import Model
+from ..model.tree import Node, Section
+from ..scene.space import SPACES
 from .posture import mobility
 from .reach import as_guess, random_angles, regular_postures, turning_joints
 from .start import undeformed_posture
 
 TRIES = 600  # random postures from which Newton looks for others
+NEAR = 1e-9  # m: joints at one place
 SAME = 1e-6  # rad: angles that differ by less
 
 
@@ -22,6 +27,13 @@ class StartPosture(NamedTuple):
     q: Array
     guess: str
     away: float
+
+    @property
+    def guesses(self) -> dict[str, tuple[float, ...]]:
+        """The coordinates of that line by joint, rad."""
+        joints = tomllib.loads(self.guess)["joints"]
+        read = {name: value if isinstance(value, list) else [value] for name, value in joints.items()}
+        return {name: tuple(map(_number, values)) for name, values in read.items()}
 
 
 def start_postures(model: Model) -> list[StartPosture]:
@@ -42,6 +54,71 @@ def start_postures(model: Model) -> list[StartPosture]:
             q[columns] = np.angle(np.exp(1j * q[columns]))
             found.append(StartPosture(q, as_guess(nodes, q), _turn(q, start, columns)))
     return sorted(found, key=lambda one: one.away)
+
+
+def chosen_start(model: Model) -> StartPosture | None:
+    """The start that `initial.branch` names, the nearest to the guess of those that do; None where it names none.
+
+    Raises `InputError` where no start is so.
+    """
+    wanted = model.scene.initial.branch
+    if not wanted:
+        return None
+    found = start_postures(model)
+    for one in found:
+        if all(_is_so(model, one.q, joint, word) for joint, word in wanted.items()):
+            return one
+    asked = ", ".join(f'{joint} = "{word}"' for joint, word in wanted.items())
+    raise InputError(
+        f"{model.scene.path}: initial.branch: expected one of the {len(found)} postures that were found, found {asked},"
+        " which none of them is: see ffrobot pose without this key"
+    )
+
+
+def _is_so(model: Model, q: Array, joint: str, word: str) -> bool:
+    """Whether the `joint` is "up", …, in the posture q (n_q,)."""
+    if joint not in model.tree.carried:
+        raise InputError(
+            f'{model.scene.path}: initial.branch: expected joints of the tree, found "{joint}", which is cut'
+        )
+    node = model.tree.nodes[model.tree.carried[joint]]
+    if word in ("up", "down"):
+        return _above(model, q, node) == (word == "up")
+    x = node.joint.coordinates(q[node.q])
+    x = node.joint.turned_around(x) if node.backwards else x
+    return bool((np.angle(np.exp(1j * x[0])) >= 0.0) == (word == "positive"))
+
+
+def _above(model: Model, q: Array, node: Node) -> bool:
+    """Whether a joint is above the line from the joint before to the one after it, or to the tool, against gravity."""
+    tree, frames = model.tree, model.tree.frames(q[None])
+
+    def place(section: Section) -> Array:
+        found: Array = tree.motion(section, q[None], frames).r[0]
+        return found
+
+    own, before, after = place(node.inner), node, node
+    while before.inner.body >= 0 and np.allclose(place(before.inner), own, atol=NEAR):
+        before = tree.nodes[before.inner.body]
+    start, end = place(before.inner), own
+    while np.allclose(end, own, atol=NEAR):
+        number = tree.index[after.body.name]
+        outer = next((other for other in tree.nodes if other.inner.body == number), None)
+        if outer is None:
+            followed = [path.point for path in model.scene.trajectory if path.point is not None]
+            end = place(tree.section(followed[-1], np.eye(3))) if followed else end
+            break
+        after, end = outer, place(outer.inner)
+    chord, offset, down = end - start, own - start, np.zeros(3)
+    down[: len(model.scene.gravity)] = model.scene.gravity
+    if not down.any():
+        down[1 if SPACES[model.scene.space].is_plane else 2] = -1.0
+    across = offset - chord * (offset @ chord) / max(float(chord @ chord), NEAR**2)
+    return bool(across @ down < 0.0)
+
+
+def _number(text: str | float) -> float:
+    return float(np.radians(float(text.removesuffix("*deg")))) if isinstance(text, str) else text
 
 
 def _turn(q: Array, other: Array, columns: Indices) -> float:

@@ -212,6 +212,8 @@ def test_the_tool_of_a_robot_without_path_is_on_its_last_body(tmp_path):
         ("tip = [0.1, 0.0], flange = [0.2, 0.0]", '[[payload]]\npoint = "hand.flange"\nmass = 1.0\n', "hand.flange"),
     ):
         path = tmp_path / "scene.toml"
-        text = 'name = "one"\nspace = "planar"\ngravity = [0.0, 0.0]\n[[body]]\n' + last % points + " } }\n" + joint + more
+        text = (
+            'name = "one"\nspace = "planar"\ngravity = [0.0, 0.0]\n[[body]]\n' + last % points + " } }\n" + joint + more
+        )
         path.write_text(text + '[[analysis]]\nname = "rest"\nkind = "static"\n')
         assert plan_map(path, ("wrist=0:1:2",), tmp_path / "map").point == expected

@@ -3,8 +3,12 @@
 from pathlib import Path
 
 import numpy as np
+import pytest
 
+from ffrobot import make_scene, solve
+from ffrobot.common.errors import InputError
 from ffrobot.mbs.solve.branches import start_postures
+from ffrobot.mbs.solve.start import undeformed_posture
 from ffrobot.run.solve import prepare_scene
 
 CASES = Path(__file__).parents[2] / "cases"
@@ -33,3 +37,63 @@ def test_shoulder_elbow_and_wrist_of_six_axes():
         np.testing.assert_allclose(motion.F, held[0].F, atol=1e-10)
     wrist = np.array([one.q[tree.nodes[tree.carried["wrist_pitch"]].q.start] for one in found])
     np.testing.assert_allclose(np.sort(wrist), -np.sort(wrist)[::-1], atol=1e-9)
+
+
+def two_rods(**initial):
+    """Two rods of 0.5 m whose tip is at (0.6, 0.1)."""
+    points = {"root": [0.0, 0.0], "tip": [0.5, 0.0]}
+    rod = {"mass": 1.0, "inertia": 0.02, "center": [0.25, 0.0], "points": points}
+    return make_scene(
+        name="rods", gravity=[0.0, -9.81], body=[{"name": name, "rigid": rod} for name in "ab"],
+        joint=[{"name": "O", "type": "revolute", "between": ["ground", "a.root"]},
+               {"name": "A", "type": "revolute", "between": ["a.tip", "b.root"]}],
+        trajectory=[{"name": "tip", "point": "b.tip", "x": "0.6", "y": "0.1"}], initial=initial,
+        analysis=[{"name": "rest", "kind": "static"}],
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(("word", "side"), [("up", 1), ("down", -1), ("negative", 1), ("positive", -1)])
+def test_an_elbow_by_name(word, side):
+    """The law of cosines: the elbow is up where its angle is negative; the same from either guess."""
+    angle = np.pi - np.arccos((0.5 - (0.6**2 + 0.1**2)) / 0.5)
+    for guess in (0.5, -0.5):
+        results = solve(two_rods(joints={"A": guess}, branch={"A": word}))
+        assert results["rest/joints/A/coordinate"][0] == pytest.approx(-side * angle, abs=1e-6)
+        y = results["rest/points/a.tip/position"][0, 1]
+        assert (y > 0.1 * 0.5) == (side == 1)
+
+
+def test_elbow_and_wrist_of_six_axes_by_name(tmp_path):
+    """Of the eight starts those that are so; the tool is where the path begins in each of them."""
+    text = (CASES / "arm_6r" / "scene.toml").read_text(encoding="utf-8")
+    text = text.replace('link = "', f'link = "{CASES / "arm_6r"}/')
+    wrists, places = set(), []
+    for elbow in ("up", "down"):
+        for wrist in ("positive", "negative"):
+            path = tmp_path / f"{elbow}_{wrist}.toml"
+            named = f'[initial]\nbranch = {{ elbow = "{elbow}", wrist_pitch = "{wrist}" }}\n'
+            path.write_text(text.replace("[initial]\n", named), encoding="utf-8")
+            model = prepare_scene(path).model
+            tree, q = model.tree, undeformed_posture(model).q
+            angle = q[tree.nodes[tree.carried["wrist_pitch"]].q.start]
+            assert (angle > 0.0) == (wrist == "positive")
+            wrists.add((elbow, wrist, round(float(angle), 3)))
+            section = tree.section("flange.tool", np.eye(3))
+            places.append(tree.motion(section, q[None], tree.frames(q[None])).r[0])
+            inner = [tree.nodes[tree.carried[name]].inner for name in ("shoulder", "elbow", "wrist_pitch")]
+            a, b, c = (tree.motion(one, q[None], tree.frames(q[None])).r[0] for one in inner)
+            middle = a + (c - a) * ((b - a) @ (c - a)) / ((c - a) @ (c - a))
+            assert (b[2] > middle[2]) == (elbow == "up")
+    assert len(wrists) == 4
+    np.testing.assert_allclose(places, np.tile(places[0], (4, 1)), atol=1e-7)
+
+
+def test_a_branch_that_is_not_there(tmp_path):
+    with pytest.raises(
+        InputError, match=r'initial\.branch: expected one of the 2 postures .* A = "up", O = "negative"'
+    ):
+        prepare_scene(two_rods(branch={"A": "up", "O": "negative"}))
+    with pytest.raises(InputError, match="branch"):
+        two_rods(branch={"B": "up"})
+    with pytest.raises(InputError, match='"up"'):
+        two_rods(branch={"A": "above"})
