@@ -104,17 +104,24 @@ def stops(times: Array, paths: Iterable[Trajectory], loads: Iterable[TimeFunctio
 def path_times(times: Array, paths: Iterable[Trajectory], end: float) -> Array:
     """(T,) s: the outputs `times`, and as many between them as the motion along `paths` from 0 to `end` (s) needs."""
     paths = list(paths)
-    found = np.unique(np.concatenate([times, np.linspace(times[0], times[-1], FEWEST + 1)]))
+    found = _with_others(times, np.linspace(times[0], times[-1], FEWEST + 1))
     for path in paths:
         if path.path is not None:
             breaks = path.path.breaks
-            found = np.union1d(found, breaks[(breaks > times[0]) & (breaks < times[-1])])
+            found = _with_others(found, breaks[(breaks > times[0]) & (breaks < times[-1])])
     moving = (found >= 0.0) & (found <= end)
     inside = found[moving]
     if len(inside) > 1:  # a run may end before the path begins
         for target in (target for path in paths for target in targets_of(path)):
             inside = _resolved(target, inside)
     return np.union1d(found[~moving], inside)
+
+
+def _with_others(times: Array, others: Array) -> Array:
+    """(T,) s: `times`, and `others` that are not next to one of them: a spline through both would swing."""
+    at = np.clip(np.searchsorted(times, others), 1, max(len(times) - 1, 1))
+    gap = np.minimum(np.abs(others - times[at - 1]), np.abs(others - times[np.minimum(at, len(times) - 1)]))
+    return np.union1d(times, others[gap > SHORTEST * np.ptp(times)])
 
 
 def targets_of(path: Trajectory) -> tuple[TimeFunction, ...]:
