@@ -96,7 +96,7 @@ class Designs:
     def __init__(self, runs: Runs, keys: Sequence[Key], own: Point, fixed: Mapping[Key, Any]) -> None:
         check_folder(runs.folder)
         allowed = (runs.path.absolute().parent, *allowed_python())
-        variations = tuple(Variation(key, ()) for key in keys)
+        variations = tuple(Variation((key,), ()) for key in keys)
         self._sweep = Sweep(runs.path, variations, (), runs.folder, (), allowed, fixed, own, growing=True)
         self._runs, self._workers = runs, Workers()
         self._designs: dict[Path, Design] = {}

@@ -10,8 +10,9 @@ from typing import Any
 
 from ..fe_models.link_file import LinkTable, read_link
 from ..fe_models.link_records import Link
+from ..mbs.analysis.tracking import Tracking
 from ..mbs.fields.steps import DATASET
-from ..mbs.scene.analysis import TimedAnalysis
+from ..mbs.scene.analysis import IntegratedAnalysis, TimedAnalysis
 from ..results.file import Results
 from ..scene.load import load_scene
 from ..scene.scene import Scene
@@ -38,9 +39,9 @@ def changes_for(
     tables = deepcopy([table for table in whole if table["name"] in needed])
     for table, record in zip(tables, (one for one in scene.analysis if one.name in needed), strict=True):
         table.pop("check", None)
-        if tolerance is not None:
+        if tolerance is not None and not isinstance(record, Tracking):  # whose tolerance chooses a mesh
             table["tolerance"] = min(tolerance, record.tolerance)
-        if keep_steps and record.is_integrated:
+        if keep_steps and record.is_integrated and isinstance(record, IntegratedAnalysis):
             table["keep_steps"] = True
         if isinstance(record, TimedAnalysis) and any(goal.needs_motion for goal in goals):
             table["output_step"] = record.output_step / ceil(OUTPUTS * record.output_step / record.end * (1 - 1e-9))

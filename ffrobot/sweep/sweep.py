@@ -78,7 +78,7 @@ class Sweep:
     def changes(self, values: Sequence[Value]) -> dict[Key, Value]:
         """What is changed in the scene of one run, by key."""
         points = zip(self.variations, values, self.own or (None,) * len(values), strict=True)
-        return {**self.fixed, **{v.key: value for v, value, own in points if value != own}}
+        return {**self.fixed, **{key: value for v, value, own in points if value != own for key in v.keys}}
 
     def _name(self, number: int, values: Sequence[Value]) -> str:
         """Of the run's folder."""

@@ -21,24 +21,24 @@ Value: TypeAlias = Any
 
 @dataclass(frozen=True)
 class Variation:
-    """One key of the scene, or of a link file (`links.BODY.…`), and the values it takes.
+    """A key of the scene, or of a link file (`links.BODY.…`), or several alike, and the values taken.
 
     Attributes:
-        key: parts of the key, `("links", "link1", "geometry", "section", "height")`.
+        keys: parts of each key, `("links", "link1", "geometry", "section", "height")`.
         values: the values, in order.
         ends: first and last value of a range, from which a sample draws; None where values are listed.
         logarithmic: whether a range is even in the logarithm.
     """
 
-    key: tuple[str, ...]
+    keys: tuple[tuple[str, ...], ...]
     values: tuple[Value, ...]
     ends: tuple[float, float] | None = None
     logarithmic: bool = False
 
     @property
     def name(self) -> str:
-        """The key as the user writes it."""
-        return ".".join(self.key)
+        """The keys as the user writes them."""
+        return ",".join(".".join(key) for key in self.keys)
 
     def draw(self, u: float) -> Value:
         """The value at u in [0, 1) of the range, or of the list."""
@@ -51,16 +51,17 @@ class Variation:
 def parse_variation(text: str) -> Variation:
     """`key=0.01:0.03:9` (evenly spaced), `key=1e-6:1e-3:4:log`, or `key=0.1,0.2` and `key="static","undeformed"`.
 
+    `key,key=…` sets both to the same value.
     Raises `InputError` where it is none of these.
     """
     key, equals, values = text.partition("=")
-    parts = tuple(key.strip().split("."))
+    keys = tuple(tuple(one.strip().split(".")) for one in key.split(","))
     text = shown(text)
-    if not equals or not all(parts) or len(parts) > DEEPEST:
+    if not equals or not all(map(all, keys)) or max(map(len, keys)) > DEEPEST:
         raise InputError(f'--vary: expected KEY=VALUES, such as gravity.1=-9.81:0:5, found "{text}"')
     pieces = values.split(":")
     if len(pieces) in (3, 4) and '"' not in values:
-        return _range(parts, pieces, text)
+        return _range(keys, pieces, text)
     try:
         listed = tomllib.loads(f"values = [{values}]")["values"]
     except (ValueError, RecursionError):  # no TOML, a number of thousands of digits, lists in lists without end
@@ -70,10 +71,10 @@ def parse_variation(text: str) -> Variation:
             "--vary: expected FIRST:LAST:COUNT, FIRST:LAST:COUNT:log or a list with commas (texts in quotes), found"
             f' "{text}"'
         )
-    return Variation(parts, tuple(listed))
+    return Variation(keys, tuple(listed))
 
 
-def _range(key: tuple[str, ...], pieces: Sequence[str], text: str) -> Variation:
+def _range(keys: tuple[tuple[str, ...], ...], pieces: Sequence[str], text: str) -> Variation:
     logarithmic = len(pieces) == 4
     try:
         first, last, count = float(pieces[0]), float(pieces[1]), int(pieces[2])
@@ -86,7 +87,7 @@ def _range(key: tuple[str, ...], pieces: Sequence[str], text: str) -> Variation:
     if logarithmic and not np.sign(first) * np.sign(last) > 0:
         raise InputError(f'--vary: expected two ends of one sign for a logarithmic range, found "{text}"')
     spaced = np.geomspace(first, last, count) if logarithmic else np.linspace(first, last, count)
-    return Variation(key, tuple(float(value) for value in spaced), (first, last), logarithmic)
+    return Variation(keys, tuple(float(value) for value in spaced), (first, last), logarithmic)
 
 
 def grid(variations: Sequence[Variation]) -> list[tuple[Value, ...]]:
