@@ -34,7 +34,7 @@ class Record(BaseModel):
 
     @classmethod
     def refuse_key(cls, key: str, others: Sequence[type[Record]]) -> str:
-        """What to say of a key that only `others` of the records have that may stand in the place of this one.
+        """What to say of a key that this record does not have, but `others` that may stand in its place, if any.
 
         Nothing where it is to be called an unknown key.
         """
@@ -269,11 +269,11 @@ def is_key(field: FieldInfo, space: str | None) -> bool:
 
 
 def _refusal(record: type[BaseModel], loc: Sequence[int | str], space: str | None) -> str:
-    """What a record itself says of the key at `loc`, which others in its place have."""
+    """What a record itself says of the key at `loc`, which it does not have."""
     (taken, *more), allowed = _alternatives(record, loc[:-1])
     here = [other for other in allowed if issubclass(other, Record) and other.only_in in (None, space)]
     others = [other for other in here if str(loc[-1]) in _known_keys([other], space)]
-    return taken.refuse_key(str(loc[-1]), others) if others and not more and issubclass(taken, Record) else ""
+    return taken.refuse_key(str(loc[-1]), others) if not more and issubclass(taken, Record) else ""
 
 
 def _demand(record: type[BaseModel], loc: Sequence[int | str]) -> str:

@@ -90,6 +90,16 @@ class Tracking(TimedAnalysis):
         before, after = (0.0 if value == "auto" else value for value in (self.pre_actuation, self.post_actuation))
         return output_times(self.end, self.output_step, before, after)
 
+    @classmethod
+    def refuse_key(cls, key: str, others: Sequence[type[Record]]) -> str:
+        """Where a path error is planned; else which kinds have the key."""
+        if key == "path_tolerance":
+            return (
+                'expected no "path_tolerance": this kind follows its path exactly; torques without voltages plan a path'
+                ' error with kind = "motors-only" and `redefined`'
+            )
+        return super().refuse_key(key, others)
+
     def needs(self) -> Iterator[Need]:
         """Something to follow, and patches."""
         yield Need("kind", self.kind, "trajectory")

@@ -107,6 +107,8 @@ class JointRecord(Record, ABC):
     @classmethod
     def refuse_key(cls, key: str, others: Sequence[RecordType]) -> str:
         """What to say of a key that only joints of other types have."""
+        if not others:
+            return ""
         having = " or ".join(other.type_name() for other in others if issubclass(other, JointRecord))
         return f'expected the key "{key}" only in {having} joints, found it in a {cls.type_name()} joint'
 

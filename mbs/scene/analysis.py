@@ -81,6 +81,8 @@ class Analysis(Record):
     @classmethod
     def refuse_key(cls, key: str, others: Sequence[type[Record]]) -> str:
         """Which kinds have the key."""
+        if not others:
+            return ""
         kinds = either(other.kind_name() for other in others if issubclass(other, Analysis))
         return f'expected the key "{key}" only in kind = {kinds}, found kind = "{cls.kind_name()}"'
 

@@ -8,6 +8,8 @@ import pytest
 
 import ffrobot
 from ffrobot.common.errors import InputError, SolveError
+from ffrobot.run.watcher import Watcher
+from ffrobot.sweep.sweep import plan_sweep, run_sweep
 
 pytestmark = pytest.mark.filterwarnings("ignore::ffrobot.FfrobotWarning")
 
@@ -194,6 +196,13 @@ def off_path_of_first(results):
         ([('body = "arm"\ncount', 'body = "hand"\ncount'), ("[[joint]]", HAND)], 'flexible body, found "hand"'),
         ([("motor = true\nmoment_limit = 2.0         # N·m\n", "motor = false\n")], "as many motors"),
         ([("tolerance = 1e-4", 'objective = "speed"')], "objective"),
+        ([("tolerance = 1e-4", "path_tolerance = 1e-4")], 'expected no "path_tolerance": this kind follows its path'),
+        ([("end = 0.6", "end = nan")], "end: expected a finite number, found NaN"),
+        ([("limit = 200.0 ", "limit = 0.0 ")], "limit: expected a number greater than 0 or a list, found 0.0"),
+        ([("moment_limit = 2.0", "moment_limit = 0.0")], "moment_limit: expected a number greater than 0, found 0.0"),
+        ([("tolerance = 1e-4", "pre_actuation = -0.1")], "pre_actuation: expected .*found -0.1"),
+        ([("tolerance = 1e-4", "weights = { rate = -1.0 }")], "weights.rate: expected .*found -1.0"),
+        ([("count = 4", "centers = [0.02]")], "expected patches within the link, 0 … 1 m, found patch 1 from -0.02"),
     ],
 )
 def test_what_does_not_fit(scene, changes, message):
@@ -225,3 +234,89 @@ def test_planar_spelling(scene):
         with ffrobot.solve(scene(*changes)) as results:
             voltages.append(results["carried/pzt/arm/voltage"])
     assert np.abs(voltages[0] - voltages[1]).max() < 1e-6 * np.abs(voltages[0]).max()
+
+
+def test_a_mesh_that_is_too_coarse(scene, monkeypatch):
+    """The forces that are left over are said, and the replay is off its path for it."""
+    left, off = [], []
+    for most in (24, 1500):
+        monkeypatch.setattr("ffrobot.mbs.solve.tracking.MOST_INTERVALS", most)
+        with ffrobot.solve(scene(("tolerance = 1e-4", "tolerance = 1e-4\nintervals = 16"))) as results:
+            left.append(float(results.attributes("carried/tracking")["unmet"]))
+            off.append(off_path(results, "replay"))
+            said = [text for text in results.warnings["carried"] if "raise intervals, or loosen the tolerance" in text]
+            assert len(said) == (left[-1] > 1e-4)
+            assert all(f"up to {left[-1]:.2g} of the largest elastic one" in text for text in said)
+    assert left[0] > 1e-4 > left[1]
+    assert off[0] > 10 * off[1]
+
+
+SAMPLED = """
+[[analysis]]
+name = "loop{k}"
+kind = "closed-loop"
+actuation = "carried"
+feed_forward = "{given}"
+sample_time = {step}
+"""
+PD = """
+[[analysis.controller]]
+kind = "joint-pid"
+proportional = { hub = 5.0 }
+derivative = { hub = 0.05 }
+[[analysis.sensor]]
+joint = "hub"
+"""
+
+
+def test_feed_forward_of_a_closed_loop(scene):
+    """Held for 2, 1 and 0.5 ms torques and voltages leave 80, 40 and 3 µm; what the summary says is the distance."""
+    path = scene()
+    kinds = [("joints+pzt", 2e-3), ("joints+pzt", 1e-3), ("joints+pzt", 5e-4), ("joints", 5e-4)]
+    more = [SAMPLED.format(k=k, given=given, step=step) for k, (given, step) in enumerate(kinds)]
+    path.write_text(path.read_text(encoding="utf-8") + "".join(more), encoding="utf-8")
+    off = []
+    with ffrobot.solve(path) as results:
+        wanted = results["carried/points/arm.tip/position"]
+        for k in range(len(kinds)):
+            found = results[f"loop{k}/points/arm.tip/position"]
+            off.append(float(np.linalg.norm(found - wanted, axis=1).max()))
+            about = results.attributes(f"loop{k}/control")
+            assert about["tip_error_max"] == pytest.approx(off[-1], rel=0.05)
+            assert about["verdict"] == "stable"
+        assert off[0] < 1e-4
+        assert off[1] < 0.6 * off[0]
+        assert off[2] < 0.2 * off[1]
+        assert off[3] > 100 * off[2]
+
+
+def carried_alone(path, *changes):
+    """The least voltage of the page's scene, no replay."""
+    text = path.read_text(encoding="utf-8")
+    text = text[: text.index("[[analysis]]               # the same torques")]
+    for old, new in (('kind = "tracking"', 'kind = "tracking"\nobjective = "least-voltage"'), *changes):
+        assert old in text
+        text = text.replace(old, new)
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def test_patches_by_least_voltage(scene):
+    """Moments of patches that add no stiffness are proportional to their width: dV/dw = −V/w."""
+    found = ffrobot.sensitivity(carried_alone(scene()), ["peak pzt.arm.required_voltage"], ["pzt.0.width"])
+    ((entry,),) = found.entries
+    assert entry.derivative == pytest.approx(-found.readings[0].value / 0.02, rel=1e-3)
+
+
+def test_path_time_is_swept(scene, tmp_path):
+    """Keys that are set alike: slower paths of more continuous derivatives take less, by more than the third power."""
+    path = scene()
+    text = path.read_text(encoding="utf-8")
+    trajectory = text[text.index("[[trajectory]]") : text.index("[[pzt]]")]
+    turn = '[[trajectory]]\nname = "turn"\nangle = "arm.tip"\nvia = [{0}, {1}]\nsmoothness = 3\nduration = 0.6\n'
+    carried_alone(path, (trajectory, turn.format(-np.pi / 8, np.pi / 8)))
+    plan = plan_sweep(path, ["trajectory.0.duration,analysis.0.end=0.6,0.9"], tmp_path / "sweep", None, 0, ())
+    rows = run_sweep(plan, 1, Watcher())
+    assert [row.status for row in rows] == ["completed", "completed"]
+    voltages = [row.quantities["carried/pzt/arm/required_voltage max"] for row in rows]
+    assert voltages[0] > 1.5**3 * voltages[1]
