@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import signal
 import sys
@@ -71,6 +72,7 @@ def main() -> None:
 
     Exit code 0, 1 where a solve failed, 2 for wrong input, 130 after Ctrl-C, 143 after SIGTERM.
     """
+    gc.set_threshold(100_000)  # what a command loads stays: looking through it again and again costs a sixth of its start
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")  # it would read the metadata of all packages
     stop = EndOfCommand()
     LOGGER.propagate = False  # libraries give the root logger handlers of their own
@@ -102,5 +104,6 @@ def main() -> None:
         without_output()
         sys.exit(error.exit_code if isinstance(error, FfrobotError) else 1)
     finally:  # nothing is left to keep: at the interpreter's end an interrupt would be a traceback
+        gc.freeze()  # nor to look for, through all that is loaded
         for number in SIGNALS:
             signal.signal(number, signal.SIG_DFL)
