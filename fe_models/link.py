@@ -198,17 +198,23 @@ def _computation(link: Link, source_path: Path, remesh: bool) -> Callable[..., M
     if isinstance(link, BeamLink):
         from .beam.link import beam_modal_body  # loads SciPy
 
-        return beam_modal_body
+        if link.modes.solver != "slepc":
+            return beam_modal_body
     try:
         without_daemon()
         with ending_at_once(), deferred_interrupts():
+            if isinstance(link, BeamLink):
+                from . import krylov_schur  # noqa: F401 (what the computation loads)
+                from .beam import dolfinx_forms  # noqa: F401
+
+                return beam_modal_body
             from .solid.link import solid_modal_body
 
             return partial(solid_modal_body, remesh=remesh)
     except ModuleNotFoundError as error:
         raise SolveError(
-            f"{source_path}: computing a solid link needs the finite element libraries, and {error.name} is not"
-            " installed: install dolfinx (Debian: python3-dolfinx), or use a modal body file made elsewhere"
+            f"{source_path}: computing this link needs the finite element libraries, and {error.name} is not installed:"
+            " install dolfinx (Debian: python3-dolfinx), or use a modal body file made elsewhere"
         ) from None
 
 

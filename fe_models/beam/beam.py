@@ -3,7 +3,7 @@
 The families of a straight beam with principal axes y and z do not couple. Each gives its stiffness K and mass M over
 its free degrees of freedom, and what the motion is at the stations: all six fields (displacement and rotation of the
 cross section) are continuous piecewise cubics, so cubic Lagrange points hold them exactly. All matrices are products
-BᵀB of values at Gauss points, which integrate them exactly.
+BᵀB of values at Gauss points, which integrate them exactly; `dolfinx_forms` assembles the same from their weak forms.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from ...common.arrays import Array
-from ..link_records import BeamLink, Family
+from ..link_records import BeamLink, Family, Solver
 from ..link_records.section import Section
 from .line import gram, hermite, lagrange
 
@@ -31,27 +31,35 @@ class FamilyModel:
         K, M: (m, m).
         strain: (s, m) the strains at Gauss points, scaled such that K = strainᵀ strain.
         fields: for each of the rows U_X … R_Z that the family moves, (k, m): the field at k stations from x.
+        solver: of the eigenproblem.
     """
 
     K: sp.csr_matrix
     M: sp.csr_matrix
     strain: sp.csr_matrix
     fields: Mapping[int, sp.csr_matrix]
+    solver: Solver = "block-lanczos"
 
 
 def family_model(link: BeamLink, family: Family, nodes: Array, stations: Array) -> FamilyModel:
     """The eigenproblem of `family` on the elements between `nodes` (e + 1,), read at `stations` (k,), all in m."""
-    if family == "axial":
-        return _rod(link, nodes, stations, U_X, lambda s: link_modulus(link) * s.area, lambda s: s.area)
-    if family == "torsion":
-        return _rod(link, nodes, stations, R_X, lambda s: shear_modulus(link) * s.torsion, lambda s: s.I_p)
-    # Out of plane, w' is a rotation about −y.
-    in_plane = family == "in-plane-bending"
-    second_moment: Property = (lambda s: s.I_yy) if in_plane else (lambda s: s.I_zz)
-    row, rotation, sign = (U_Y, R_Z, 1.0) if in_plane else (U_Z, R_Y, -1.0)
-    bending = _timoshenko if link.model.theory == "timoshenko" else _euler_bernoulli
-    strain, inertia, deflection, slope, held = bending(link, nodes, stations, second_moment)
-    return _held(strain, inertia, {row: deflection, rotation: sign * slope}, held)
+    if family in ("axial", "torsion"):
+        strain, inertia, values = _rod(link, nodes, stations, *rod_properties(link, family))
+        fields, held = {U_X if family == "axial" else R_X: values}, [0]
+    else:
+        bending = _timoshenko if link.model.theory == "timoshenko" else _euler_bernoulli
+        strain, inertia, deflection, slope, held = bending(link, nodes, stations, second_moment(family))
+        # Out of plane, w' is a rotation about −y.
+        in_plane = family == "in-plane-bending"
+        fields = {U_Y: deflection, R_Z: slope} if in_plane else {U_Z: deflection, R_Y: -slope}
+    free = np.setdiff1d(np.arange(strain.shape[1]), held)
+    B, N, solver = strain.tocsr()[:, free], inertia.tocsr()[:, free], link.modes.solver
+    K, M = gram(B), gram(N)
+    if solver == "slepc":
+        from .dolfinx_forms import assembled  # loads dolfinx
+
+        K, M = (A[free][:, free] for A in assembled(link, family, nodes))
+    return FamilyModel(K, M, B, {row: values[:, free] for row, values in fields.items()}, solver)
 
 
 Property = Callable[[Section], float]
@@ -68,6 +76,20 @@ def shear_modulus(link: BeamLink) -> float:
     return link.material.youngs_modulus / (2 * (1 + link.material.poissons_ratio))
 
 
+def rod_properties(link: BeamLink, family: Family) -> tuple[Property, Property]:
+    """Stiffness, EA in N or GJ in N·m², and mass or moment of inertia per length, of axial or torsional motion."""
+    E, rho = link_modulus(link), link.material.density
+    if family == "axial":
+        return lambda s: E * s.area, lambda s: rho * s.area
+    G = shear_modulus(link)
+    return lambda s: G * s.torsion, lambda s: rho * s.I_p
+
+
+def second_moment(family: Family) -> Property:
+    """Of area in m⁴, for bending."""
+    return (lambda s: s.I_yy) if family == "in-plane-bending" else (lambda s: s.I_zz)
+
+
 def cellwise(link: BeamLink, nodes: Array, quantity: Property) -> Array:
     """(e,) of the section of each element between `nodes` (e + 1,)."""
     segment = np.searchsorted(link.geometry.breakpoints[1:-1], 0.5 * (nodes[1:] + nodes[:-1]))
@@ -75,12 +97,12 @@ def cellwise(link: BeamLink, nodes: Array, quantity: Property) -> Array:
 
 
 def _rod(
-    link: BeamLink, nodes: Array, stations: Array, row: int, stiffness: Property, inertia: Property
-) -> FamilyModel:
-    """Axial or torsional motion on cubic Lagrange elements: K = ∫EA u' v' dx, M = ∫ρA u v dx; root held, tip free."""
-    V, rho = lagrange(nodes, 3), link.material.density
+    link: BeamLink, nodes: Array, stations: Array, stiffness: Property, inertia: Property
+) -> tuple[sp.csr_matrix, sp.csr_matrix, sp.csr_matrix]:
+    """Axial or torsional motion on cubic Lagrange elements: K = ∫EA u' v' dx, M = ∫ρA u v dx; stations read u."""
+    V = lagrange(nodes, 3)
     strain = V.root(cellwise(link, nodes, stiffness), derivative=1)
-    return _held(strain, V.root(cellwise(link, nodes, lambda s: rho * inertia(s))), {row: V.at(stations)}, [0])
+    return strain, V.root(cellwise(link, nodes, inertia)), V.at(stations)
 
 
 # Roots of K and M, deflection and rotation at the stations, held degrees of freedom.
@@ -119,12 +141,3 @@ def _timoshenko(link: BeamLink, nodes: Array, stations: Array, second_moment: Pr
         sp.hstack([nothing_w, rotation], format="csr"),
         held,
     )
-
-
-def _held(
-    strain: sp.csr_matrix, inertia: sp.csr_matrix, fields: Mapping[int, sp.csr_matrix], held: list[int]
-) -> FamilyModel:
-    """The eigenproblem without the degrees of freedom `held`: K = strainᵀ strain, M = inertiaᵀ inertia."""
-    free = np.setdiff1d(np.arange(strain.shape[1]), held)
-    B, N = strain.tocsr()[:, free], inertia.tocsr()[:, free]
-    return FamilyModel(gram(B), gram(N), B, {row: values[:, free] for row, values in fields.items()})

@@ -8,6 +8,7 @@ from scipy.sparse.linalg import splu
 
 from ...common.arrays import Array
 from ...common.errors import SolveError
+from ..link_records import Solver
 from ..modal_body.lanczos import BlockLanczos
 
 # Multipliers amplify relative errors of the model data some 400 times within 0.2 s of the two-link case.
@@ -17,8 +18,10 @@ TOLERANCE = 1e-13
 ROUNDING_LIMIT = 1e-6
 
 
-def lowest_modes(K: sp.csr_matrix, M: sp.csr_matrix, strain: sp.csr_matrix, count: int) -> tuple[Array, Array]:
-    """Lowest eigenpairs of K x = ω² M x by block Lanczos on the inverse of K.
+def lowest_modes(
+    K: sp.csr_matrix, M: sp.csr_matrix, strain: sp.csr_matrix, count: int, solver: Solver = "block-lanczos"
+) -> tuple[Array, Array]:
+    """Lowest eigenpairs of K x = ω² M x by `solver` on the inverse of K.
 
     Assembly rounds K's large entries, of order EI/h³; against the lowest ω² these errors grow as elements⁴. The
     Rayleigh quotient of the strains, which are differences of x once and not twice over (elements²), gives ω² without
@@ -29,6 +32,7 @@ def lowest_modes(K: sp.csr_matrix, M: sp.csr_matrix, strain: sp.csr_matrix, coun
         M: (m, m) mass, symmetric positive definite.
         strain: (s, m) with K = strainᵀ strain but for rounding.
         count: how many, at most m.
+        solver: block Lanczos, or Krylov–Schur of SLEPc.
 
     Returns:
         ω² (count,) ascending in rad²/s² and X (m, count) with Xᵀ M X = I to rounding.
@@ -37,7 +41,13 @@ def lowest_modes(K: sp.csr_matrix, M: sp.csr_matrix, strain: sp.csr_matrix, coun
         SolveError: rounding errors spoil them.
     """
     try:
-        X = BlockLanczos(Flexibility(K, strain), M, *K.shape, tolerance=TOLERANCE).lowest(count)
+        F = Flexibility(K, strain)
+        if solver == "slepc":
+            from ..krylov_schur import KrylovSchur  # loads SLEPc
+
+            X = KrylovSchur(F, M, K.shape[0]).lowest(count)
+        else:
+            X = BlockLanczos(F, M, *K.shape, tolerance=TOLERANCE).lowest(count)
     except (RuntimeError, np.linalg.LinAlgError):  # singular, or not finite
         raise SolveError(
             f"eigenproblem of size {K.shape[0]}: stiffness or mass is not positive definite in double precision; "

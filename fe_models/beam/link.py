@@ -177,7 +177,7 @@ def select(models: Mapping[Family, FamilyModel], wanted: Sequence[int]) -> list[
     """
     modes = []
     for family, model in models.items():
-        omega2, X = lowest_modes(model.K, model.M, model.strain, min(wanted[-1], model.K.shape[0]))
+        omega2, X = lowest_modes(model.K, model.M, model.strain, min(wanted[-1], model.K.shape[0]), model.solver)
         modes += [Mode(square, family, x) for square, x in zip(omega2, X.T, strict=True)]
     modes = _by_frequency(modes)
     return [modes[number - 1] for number in wanted]

@@ -1,7 +1,7 @@
 """The link file as records: what stage 1 reads, checked key by key."""
 
 from .attached import Coupling, InterfaceRecord, SurfacePatches
-from .link import FAMILIES, HOLDING_ROOT, BeamLink, Family, Link, Material, OrthotropicMaterial, SolidLink
+from .link import FAMILIES, HOLDING_ROOT, BeamLink, Family, Link, Material, OrthotropicMaterial, SolidLink, Solver
 from .measured import Measured, MeasuredMode, paired, read_measured
 
 __all__ = [
@@ -17,6 +17,7 @@ __all__ = [
     "MeasuredMode",
     "OrthotropicMaterial",
     "SolidLink",
+    "Solver",
     "SurfacePatches",
     "paired",
     "read_measured",

@@ -28,6 +28,8 @@ Family = Literal["in-plane-bending", "out-of-plane-bending", "axial", "torsion"]
 
 FAMILIES: tuple[Family, ...] = ("in-plane-bending", "out-of-plane-bending", "axial", "torsion")
 
+Solver = Literal["block-lanczos", "slepc"]
+
 Poisson = Annotated[float, Field(gt=-1, lt=0.5)]
 
 
@@ -126,6 +128,8 @@ class Modes(Record):
     """Family or families of the eigenmodes."""
     attachment_modes: bool = True
     """Addition of static shapes of loads at the interfaces."""
+    solver: Solver = "block-lanczos"
+    """Solver of the eigenproblem: block Lanczos, or Krylov–Schur of SLEPc, for beams with matrices of dolfinx."""
 
     @property
     def are_default(self) -> bool:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,6 +18,9 @@ from .eigen import Inverse, Mass
 from .elasticity import SolidModel
 from .families import LOCAL, NEARLY, SectionMotion, aligned, names
 from .strain_energy import strain_energy
+
+if TYPE_CHECKING:
+    from ..krylov_schur import KrylovSchur
 
 # Mean motion of the sections, of modes (3 owned, n).
 Reader = Callable[[Array], SectionMotion]
@@ -61,15 +65,7 @@ def wanted_modes(link: SolidLink, flexibility: Inverse, mass: Mass, read: Reader
     batch = needed + 2 if family == "all" else 2 * needed + 2
     key = "count" if link.modes.indices is None else "indices"
     most = min(available, 40 * needed + 200)  # far more than slender parts need
-    search = BlockLanczos(
-        flexibility,
-        mass,
-        3 * model.owned,
-        available,
-        total=model.total,
-        allowed=flexibility.allowed,
-        process=model.comm.rank,
-    )
+    search = _search(link, flexibility, mass)
     found = 0
     while True:
         if (family == "all" and needed > available) or found == available:
@@ -97,6 +93,23 @@ def wanted_modes(link: SolidLink, flexibility: Inverse, mass: Mass, read: Reader
             )
         share = max(len(hits), 1) / found
         batch = int(np.ceil((needed - len(hits)) / share)) + 2
+
+
+def _search(link: SolidLink, flexibility: Inverse, mass: Mass) -> BlockLanczos | KrylovSchur:
+    model = flexibility.model
+    if link.modes.solver == "slepc":
+        from ..krylov_schur import KrylovSchur  # loads SLEPc
+
+        return KrylovSchur(flexibility, mass, 3 * model.owned, comm=model.comm, total=model.total)
+    return BlockLanczos(
+        flexibility,
+        mass,
+        3 * model.owned,
+        flexibility.rank,
+        total=model.total,
+        allowed=flexibility.allowed,
+        process=model.comm.rank,
+    )
 
 
 def _default_count(link: SolidLink) -> int:

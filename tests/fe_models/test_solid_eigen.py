@@ -94,6 +94,12 @@ def test_modes_are_those_of_krylov_schur_and_none_is_missed(tmp_path, part):
     assert below(K - shift * M) == np.count_nonzero(omega2 < shift)
 
 
+def test_slepc_on_request_finds_the_same(tmp_path):
+    part = SQUARE | {"cell": "hexahedron", "order": 2, "divisions": (12, 2, 2)}
+    own, other = (body_of(write_solid(tmp_path, **part, more=more)) for more in ("", 'solver = "slepc"'))
+    np.testing.assert_allclose(other.frequency, own.frequency, rtol=1e-9)
+
+
 def test_residuals(tmp_path, monkeypatch):
     """‖F M x − x/ω²‖ of what the search finds, by the factors of the clamped part itself."""
     path = write_solid(tmp_path, **SQUARE, cell="hexahedron", order=2, divisions=(12, 2, 2))
