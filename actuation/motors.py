@@ -86,7 +86,7 @@ class MotorFeasibility:
 def judge_motors(motion: RobotMotion, analysis: Analysis) -> dict[str, MotorFeasibility]:
     """What every motor has to do up to the end of the path; a number behind the joint tells coordinates apart.
 
-    Behind a gear that gives the motor turns otherwise than its joint.
+    Behind a compliant gear the motor turns otherwise than its joint.
     """
     forces, found = motion.motor_forces, {}
     assert forces is not None

@@ -1,4 +1,4 @@
-"""What a function of Python depends on, as far as it can be told: a digest that changes when the function does."""
+"""What a function of Python depends on, as far as it is known: a digest that changes when the function does."""
 
 from __future__ import annotations
 

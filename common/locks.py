@@ -1,4 +1,4 @@
-"""Locks that end with the process that holds them, and processes told apart for good."""
+"""Locks that end with the process that holds them, and names of processes that are never used again."""
 
 from __future__ import annotations
 

@@ -58,7 +58,7 @@ def make_link(
         source: the link file, or its content.
         output: where to write; if None, LINK.h5 beside the link file, or the user's cache where there is no file.
         force: compute in any case.
-        progress: is told what is being done, one line a step.
+        progress: is called with what is being done, one line a step.
 
     Under mpirun all processes call; only the first writes, and computes the links that are beams.
 

@@ -51,18 +51,18 @@ def main() -> None:
             for stream in (requests, answers):  # of a worker that dies nothing may stay open
                 stream.close()
             _run(json.loads(line)["arguments"], report)
-        code, told = _wait(child), _told(report)
-        answers.write(json.dumps({"code": code, "imported": told.get("imported", {})}).encode() + b"\n")
+        code, found = _wait(child), _report(report)
+        answers.write(json.dumps({"code": code, "imported": found.get("imported", {})}).encode() + b"\n")
         answers.flush()
-        _load(told.get("loaded", []))
+        _load(found.get("loaded", []))
 
 
-def _told(report: BinaryIO) -> dict[str, Any]:
+def _report(report: BinaryIO) -> dict[str, Any]:
     """What a run has left in `report`: nothing where it was killed, or the disk is full."""
     report.seek(0)
     with suppress(ValueError):
-        told: dict[str, Any] = json.loads(report.read())
-        return told
+        found: dict[str, Any] = json.loads(report.read())
+        return found
     return {}
 
 

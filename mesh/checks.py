@@ -102,7 +102,7 @@ def check_neighbours(part: PartMesh, where: str) -> None:
 
 
 def check_connected(part: PartMesh, where: str) -> None:
-    """Check that the cells hang together by their faces.
+    """Check that the cells are connected by their faces.
 
     Raises:
         InputError: they do not.

@@ -78,7 +78,7 @@ def part_mesh(
         places: its tables `interface`.
         outlines: of its patches.
         path: the link file, named in errors.
-        progress: is told what is being done.
+        progress: is called with what is being done.
 
     Raises:
         InputError: the part cannot be read or meshed, its mesh is unsound, or a face is not there.

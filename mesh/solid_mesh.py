@@ -84,7 +84,7 @@ def solid_mesh(
         outlines: of its patches.
         path: the link file, named in errors.
         comm: all its processes call.
-        progress: is told what is being done.
+        progress: is called with what is being done.
         remesh: whether a mesh of the same part kept from an earlier run does not count.
 
     Raises:
@@ -130,7 +130,7 @@ def distributed(part: PartMesh | None, comm: MPI.Comm = MPI.COMM_WORLD) -> Solid
 
 
 def _description(part: PartMesh) -> dict[str, Any]:
-    """What every process is told of the part beside its share of cells and points."""
+    """What every process knows of the part besides its share of cells and points."""
     x = part.points[part.corners, 0]
     return {
         "cell": part.cell,

@@ -54,11 +54,11 @@ class ClosedLoop(SampledAnalysis):
 
 
 class _Plant(NamedTuple):
-    """The robot as it moves: gears give where the scene says so.
+    """The robot as it moves: gears are compliant where the scene says so.
 
     Attributes:
         model: its equations of motion.
-        source: the motion of the inverse analysis in its coordinates, and what that found of gears that give.
+        source: the motion of the inverse analysis in its coordinates, and what that found of compliant gears.
     """
 
     model: Model
@@ -167,7 +167,7 @@ def _feed_forward(
     if analysis.feed_forward != "joints+pzt":
         values[:, len(most) :] = 0.0
     column = 0
-    for joint, columns in context.model.motors.items():  # beside gears that give: known at outputs
+    for joint, columns in context.model.motors.items():  # with compliant gears: known at outputs
         if plant.source.gears and analysis.feed_forward != "none":
             moments = plant.source.moments[joint]
             values[:, column : column + len(columns)] = between(middle, source.time, moments)
@@ -183,7 +183,7 @@ def _limits(context: ActuatedContext) -> Array:
 
 
 def _start(context: ActuatedContext, analysis: ClosedLoop, plant: _Plant) -> State:
-    """As the inverse analysis starts, or as the scene says, gears that give wound as in that."""
+    """As the inverse analysis starts, or as the scene says, compliant gears with their twist there."""
     q, v = plant.source.q[0].copy(), plant.source.v[0].copy()
     if analysis.start == "actuation":
         return State(q, v)

@@ -129,5 +129,5 @@ def input_names(robot: Robot) -> tuple[str, ...]:
 
 
 def estimate(volts: Array, count: int) -> Array:
-    """(count, k) of coordinates from what patches read of them, volts (k, m): as many as patches are told apart."""
+    """(count, k) of coordinates from what patches read of them, volts (k, m): as many as patches distinguish."""
     return as_floats(np.linalg.pinv(volts[:, : min(volts.shape)])[:count])

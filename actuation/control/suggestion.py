@@ -48,7 +48,7 @@ class Suggestion:
 def joint_inertia(model: LinearModel) -> Array | None:
     """(motors, motors) with rigid links and gears, rotors included; None where motors are no coordinates of the model.
 
-    With gears that give, the motor's angle and the joint's move as one.
+    With compliant gears, the motor's angle and the joint's move as one.
     """
     names = model.state_names[: model.freedom]
     motors = [model.input_names[k] for k in motor_inputs(model)]

@@ -172,7 +172,7 @@ def _loaded(model: FamilyModel, link: BeamLink, stations: Array) -> FamilyModel:
 def select(models: Mapping[Family, FamilyModel], wanted: Sequence[int]) -> list[Mode]:
     """The modes numbered `wanted` (ascending; 1 is the lowest of all families together).
 
-    Equal frequencies (bending of a square or round section) are told apart by the order of the families, not by
+    Equal frequencies (bending of a square or round section) are distinguished by the order of the families, not by
     rounding errors: the choice is the same on every machine.
     """
     modes = []

@@ -1,4 +1,4 @@
-"""Families of the modes of a solid: told by the kinetic energy in the mean motion of its cross sections.
+"""Families of the modes of a solid: found by the kinetic energy in the mean motion of its cross sections.
 
 Of a mode with unit modal mass, the sections' mean translation (u, v, w) and rotation (φ_x, φ_y, φ_z) carry the shares
 

@@ -22,7 +22,7 @@ from .searched_diagrams import parallel, progress, states_of
 from .steps import AIM
 from .variables import Space
 
-SHARE = 0.01  # of a limit: the room that prices are told for
+SHARE = 0.01  # of a limit: the change for which prices are printed
 COLUMNS = ("what", "name", "start", "best", "low", "high", "reached", "price")
 
 

@@ -35,7 +35,7 @@ class Limit:
 
     @property
     def scale(self) -> float:
-        """What its excess is told in: the bound; of 0 the goal's unit."""
+        """The scale of its excess: the bound; of 0 the goal's unit."""
         return abs(self.bound) or 1.0
 
 
@@ -93,7 +93,7 @@ class Problem:
         return max(0.0, float(excess.max())) if excess.size else 0.0
 
     def sized_by(self, value: float) -> Problem:
-        """The same with the objective told in its size at some design."""
+        """The same with the objective relative to its size at some design."""
         return replace(self, scale=value or 1.0)
 
 

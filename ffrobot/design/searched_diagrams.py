@@ -77,8 +77,8 @@ def _axis(variable: Variable, k: int, values: Sequence[object]) -> Axis:
     """Of a number between its bounds, or of column k of a catalogue."""
     if not variable.is_catalogue:
         low, high = variable.low, variable.high
-        told = tuple(float(value) for value in values)  # type: ignore[arg-type]
-        return Axis(label=variable.name, values=told, low=low, high=high, logarithmic=variable.logarithmic)
+        numbers_of = tuple(float(value) for value in values)  # type: ignore[arg-type]
+        return Axis(label=variable.name, values=numbers_of, low=low, high=high, logarithmic=variable.logarithmic)
     name, column = ".".join(variable.keys[k]), list(dict.fromkeys(row[k] for row in variable.rows))
     if all(isinstance(value, int | float) and not isinstance(value, bool) for value in column):
         axis = axis_of_goal(name, tuple(float(value) for value in column))

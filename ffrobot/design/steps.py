@@ -153,7 +153,7 @@ class Steps:
             if self._gradients and np.abs(np.subtract(one.place, self._good.place)).max() < self.shortest:
                 raise StalledError
             self._good = one
-            self._told(one)
+            self._report(one)
             factors = self._evaluations.split.factors(self._evaluations.row_values(one))
             self._gradients[one.place] = self._gradients_at(one) * factors[:, None]
         return self._gradients[one.place]
@@ -192,7 +192,7 @@ class Steps:
         (one,) = self._evaluations.at([tuple(map(float, place))])
         return one
 
-    def _told(self, one: Evaluated) -> None:
+    def _report(self, one: Evaluated) -> None:
         problem = self._evaluations.problem
         violation = problem.violation(one.readings)
         beyond = f", {100 * violation:.3g} % beyond a limit" if violation > KEPT else ""

@@ -28,7 +28,7 @@ from .statistics import Indices, Statistics, regression_shares, sobol_indices, s
 from .uncertainty_record import Band, Uncertainty
 
 TOLERANCE = 1e-8  # of runs for gradients, at most: differences of one standard deviation
-FEWEST = 8  # samples that a quantile of 5 % is told from
+FEWEST = 8  # samples for a quantile of 5 %
 
 
 @dataclass(frozen=True)

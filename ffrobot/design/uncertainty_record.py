@@ -21,7 +21,7 @@ from .statistics import LEVELS, Indices, Statistics
 NAMES = tuple(f"{100 * level:g}%" for level in LEVELS)
 ROUNDING = 1e-13  # of a goal: smaller deviations are none
 UNCHANGED = "none of the keys changes it"
-LINEAR = 0.9  # of a variance: below, shares by regression are told to be few
+LINEAR = 0.9  # of a variance: below, a note says that shares by regression are small
 BAND_HEADINGS = ("history", "unit", "deviation, at most", "at t = (s)", "widest 5 % to 95 %", "at t = (s)")
 WORST = {"samples": "lowest and highest sample", "gradients": "keys at their worse ends (linear)"}
 

@@ -43,7 +43,7 @@ def evolve(evaluations: Evaluations, seed: int, start: Place | None, tell: Calla
             -1, len(problem.goals)
         ).T  # fmt: skip
 
-    def told(x: Array, convergence: float) -> None:
+    def on_improvement(x: Array, convergence: float) -> None:
         tell(f"differential evolution, {evaluations.runs} runs")
 
     limits = (NonlinearConstraint(lambda places: values(places)[1:], -np.inf, 0.0),) if problem.limits else ()
@@ -51,7 +51,7 @@ def evolve(evaluations: Evaluations, seed: int, start: Place | None, tell: Calla
         done = differential_evolution(
             lambda places: values(places)[0], [(0.0, variable.top) for variable in space.variables],
             popsize=max(POPULATION, -(-SMALLEST // count)), maxiter=GENERATIONS, tol=SPREAD, seed=seed, polish=False,
-            updating="deferred", vectorized=True, constraints=limits, x0=start, callback=told,
+            updating="deferred", vectorized=True, constraints=limits, x0=start, callback=on_improvement,
             integrality=[variable.is_catalogue for variable in space.variables],
         )  # fmt: skip
         return "" if done.success else f"differential evolution: {done.message}"

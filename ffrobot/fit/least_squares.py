@@ -118,12 +118,12 @@ def fit_frequencies(
         return np.column_stack([(residuals(x + step) - residuals(x - step)) / (2 * STEP) for step in steps])
 
     origin = np.zeros(len(keys))
-    check_told_apart(jacobian(origin), keys)
+    check_distinguishable(jacobian(origin), keys)
     found = least_squares(residuals, origin, jac=jacobian, max_nfev=MOST_EVALUATIONS, xtol=1e-10, ftol=1e-14)
     if not found.success:
         raise SolveError(f"fit: no convergence within {MOST_EVALUATIONS} steps: start nearer to the measured values")
     J, r = jacobian(found.x), found.fun
-    check_told_apart(J, keys)
+    check_distinguishable(J, keys)
     deviation, correlation = _uncertainty(J, r, known=uncertainty is not None)
     before, after = (measured * (1.0 + residuals(x) / weight) for x in (origin, found.x))
     return Fit(
@@ -132,7 +132,7 @@ def fit_frequencies(
     )  # fmt: skip
 
 
-def check_told_apart(J: Array, keys: Sequence[str]) -> None:
+def check_distinguishable(J: Array, keys: Sequence[str]) -> None:
     """Raise `InputError` for parameters, or combinations of them, without effect: null vectors of J (m, n)."""
     _, values, V = np.linalg.svd(J)
     sizes = np.linalg.norm(J, axis=0)

@@ -11,7 +11,7 @@ from ..present.tables import plain_table
 from .least_squares import Fit
 
 FEW = 30  # degrees of freedom below which two standard deviations are less than a range of 95 %
-ALIKE = 0.95  # correlation of two parameters' errors from which their values are hardly told apart
+ALIKE = 0.95  # correlation of two parameters' errors from which their values are hardly distinguished
 
 
 def print_fit(fit: Fit, console: Console) -> None:

@@ -1,7 +1,7 @@
 """How the bodies of a scene move, as a results file has it: what every moving picture is drawn from.
 
 r = R + A (x + s Φ p) with the exaggeration s (docs/theory.md, Kinematics). Exaggerated bodies would come apart at their
-joints: each is moved with the point it hangs from, along a tree of joints that starts at the ground. Planar scenes are
+joints: each moves with the point that carries it, along a tree of joints that starts at the ground. Planar scenes are
 drawn in 3D: they move in z = 0 and turn about z.
 """
 
@@ -77,7 +77,7 @@ class MovingBody:
 
 
 def moving_bodies(results: Results, analysis: str, frames: Indices) -> tuple[list[MovingBody], list[Array]]:
-    """All bodies at the outputs `frames`, each after the one it hangs from.
+    """All bodies at the outputs `frames`, each after the one that carries it.
 
     And how much a unit of s moves each as a whole (T, 3), m, so that joints stay shut.
     """

@@ -111,7 +111,7 @@ def _bar() -> Integers:
 
 
 def shortest_tree(points: Array) -> Integers:
-    """(p − 1, 2) which of points (p, 3) to join so that all hang together by the shortest lines (Prim 1957)."""
+    """(p − 1, 2) which of points (p, 3) to join so that all are connected by the shortest lines (Prim 1957)."""
     distance = np.linalg.norm(points[:, None] - points, axis=2)
     nearest, way = np.zeros(len(points), dtype=np.int64), distance[0].copy()
     way[0] = np.inf

@@ -36,7 +36,7 @@ class AnalysisAccess(Datasets):
         `print(results.verdict)` is what `ffrobot solve --verbose` prints of them; `results.verdict["inverse"]` that of
         one analysis.
         """
-        from .verdict import judge
+        from .judging import judge
 
         with blaming(self.path):
             return judge(self._file, self.analyses, self.scene)
@@ -52,8 +52,8 @@ class AnalysisAccess(Datasets):
         return self._texts("notes")
 
     def _texts(self, kind: str) -> dict[str, list[str]]:
-        told = {name: self.attributes(name).get(kind, ()) for name in self.analyses}
-        return {name: [str(text) for text in texts] for name, texts in told.items() if len(texts)}
+        texts_of = {name: self.attributes(name).get(kind, ()) for name in self.analyses}
+        return {name: [str(text) for text in texts] for name, texts in texts_of.items() if len(texts)}
 
     def histories(self, analysis: str) -> list[str]:
         """Names, inside an analysis, of its datasets with a row for each output."""

@@ -84,7 +84,7 @@ def write_joints(group: h5py.Group, solution: Solution, result: AnalysisResult) 
 
 
 def _write_gear(entry: h5py.Group, motion: RobotMotion, joint: str) -> None:
-    """What a gear that gives adds to a joint."""
+    """What a compliant gear adds to a joint."""
     if (motor := motion.motor_motion(joint)) is not None:
         entry["motor_angle"], entry["motor_rate"] = motor
     if (moment := motion.gear_moment(joint)) is not None:

@@ -15,14 +15,14 @@ from ..common.python_files import allowed_python, imported_files
 from ..common.tables import key_path
 from ..common.version import program_version
 from ..run.inputs import digest_of_file, named_files, python_files
-from ..run.loaded_body import Loaded
+from ..run.loaded_body import LoadedBody
 from ..scene.scene import Scene
 from .file import Results
 
 MAY_CHANGE = "max_steps"  # counts from where a run goes on
 
 
-def check_same_input(scene: Scene, bodies: Mapping[str, Loaded], file: Results) -> None:
+def check_same_input(scene: Scene, bodies: Mapping[str, LoadedBody], file: Results) -> None:
     """Raise `InputError` naming the first thing that is not as it was."""
     found = next(_changes(scene, bodies, file), None)
     if found is not None:
@@ -32,7 +32,7 @@ def check_same_input(scene: Scene, bodies: Mapping[str, Loaded], file: Results) 
         )
 
 
-def _changes(scene: Scene, bodies: Mapping[str, Loaded], file: Results) -> Iterator[str]:
+def _changes(scene: Scene, bodies: Mapping[str, LoadedBody], file: Results) -> Iterator[str]:
     """What of the input is not that of the results file."""
     if file.ffrobot_version != program_version():
         yield f"ffrobot {file.ffrobot_version}, now {program_version()},"

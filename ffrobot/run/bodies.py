@@ -3,41 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from ..actuation.patches.composite import Placed
 from ..actuation.patches.link_patches import by_body, link_patches, placed_patches
 from ..actuation.patches.records import PztLayout
-from ..actuation.patches.structure import StructureEffect, patched_body, structure_effect_of
+from ..actuation.patches.structure import patched_body, structure_effect_of
 from ..common.errors import of_file
 from ..fe_models.link_records import FAMILIES
 from ..fe_models.modal_body_file import read_modal_body
-from ..mbs.model.body import Body, from_modal_body, rigid_body
+from ..mbs.model.body import from_modal_body, rigid_body
 from ..mbs.model.masses import with_payload
 from ..mbs.model.payloads import turns_as_a_body
 from ..mbs.model.projection import projected
 from ..mbs.scene.bodies import BodyKeys, tensor
 from ..scene.scene import Scene
-from .loaded_body import IN_PLANE, Loaded, payloads_on
-
-
-@dataclass(frozen=True, kw_only=True)
-class LoadedBody(Loaded):
-    """A body of the scene with its equations in space, and what patches that are part of it change.
-
-    `spatial` is that of the equations, in which payloads with inertia on links are bodies of their own; `carrying` has
-    these as well, as small rotations turn them: its modes are those of the loaded link.
-    """
-
-    spatial: Body
-    carrying: Body
-    structure: StructureEffect | None = None
+from .loaded_body import IN_PLANE, LoadedBody, payloads_on
 
 
 def load_bodies(scene: Scene, stage: Callable[[str], None]) -> list[LoadedBody]:
-    """In the order of the scene, with payloads and patches; stage 1 runs where links are out of date: `stage` is told.
+    """In the order of the scene, with payloads and patches; stage 1 (after `stage`) where links are out of date.
 
     They have geometric stiffening where the scene, or the key `pieces` of the body, may put it into the equations.
 

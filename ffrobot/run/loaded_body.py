@@ -1,4 +1,4 @@
-"""What is loaded of a body of a scene: its modal body, and the payloads on it."""
+"""A body of a scene as it is loaded: its equations, its modal body, and the payloads on it."""
 
 from __future__ import annotations
 
@@ -8,19 +8,30 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol, TypeVar
 
+from ..actuation.patches.structure import StructureEffect
 from ..common.errors import InputError, did_you_mean, quoted
 from ..fe_models.link_records import FAMILIES, Family
 from ..fe_models.modal_body import ModalBody
 from ..mbs.fields.field_types import split_point
+from ..mbs.model.body import Body
 
 
 @dataclass(frozen=True, kw_only=True)
-class Loaded:
-    """The modal body and its file (None where the body is rigid), and whether stage 1 ran for it.
+class LoadedBody:
+    """A body of the scene.
 
-    `motions` are the families of motion that the scene can ask of a link.
+    Attributes:
+        spatial: its equations in space, in which payloads with inertia on links are bodies of their own.
+        carrying: with these as well, as small rotations turn them: its modes are those of the loaded link.
+        structure: what patches that are part of it change.
+        modal, path: its modal body and the file of that, None where it is rigid.
+        computed, reused: whether stage 1 ran for it, and why not.
+        motions: the families of motion that the scene can ask of a link.
     """
 
+    spatial: Body
+    carrying: Body
+    structure: StructureEffect | None = None
     modal: ModalBody | None = None
     path: Path | None = None
     computed: bool = False
@@ -42,7 +53,7 @@ IN_PLANE: tuple[Family, ...] = ("in-plane-bending",)
 """Of planar scenes; stretch: see `omissions`."""
 
 
-def robot_damping_ratios(bodies: Mapping[str, Loaded]) -> dict[str, float]:
+def robot_damping_ratios(bodies: Mapping[str, LoadedBody]) -> dict[str, float]:
     """By body: ζ of the links that want it of the robot's vibrations."""
     return {
         name: float(modal.damping_ratio[0])
@@ -51,12 +62,12 @@ def robot_damping_ratios(bodies: Mapping[str, Loaded]) -> dict[str, float]:
     }
 
 
-def remarks_on_parts(bodies: Mapping[str, Loaded]) -> list[str]:
+def remarks_on_parts(bodies: Mapping[str, LoadedBody]) -> list[str]:
     """What the files of solid links' parts hold and the links do not, a line each."""
     return [f"{name}: {text}" for name, body in bodies.items() if body.modal for text in body.modal.remarks]
 
 
-def rigid_in_words(bodies: Mapping[str, Loaded]) -> list[str]:
+def rigid_in_words(bodies: Mapping[str, LoadedBody]) -> list[str]:
     """Which links are rigid in which motions, a line each."""
     return [
         f"{name}: rigid in {', '.join(body.rigid_in)}, of which its file has no modes"

@@ -10,7 +10,7 @@ from ..common.arrays import Array, as_floats
 from ..mbs.model.body import Body
 from ..mbs.model.truncation import with_fewer_modes
 from ..scene.scene import Scene
-from .bodies import LoadedBody
+from .loaded_body import LoadedBody
 from .mode_search import Reported, truncation_levels
 from .solution import AnalysisResult
 

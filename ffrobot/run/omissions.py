@@ -12,7 +12,7 @@ from ..mbs.model.body import Body
 from ..mbs.model.projection import vanishing_in_plane
 from ..mbs.model.truncation import modes_kept
 from ..scene.scene import Scene
-from .bodies import LoadedBody
+from .loaded_body import LoadedBody
 
 _STAGE_1 = {"modes": "stage 1 but for damping, stresses and name", "mesh": "the mesh, which is that of an earlier run"}
 

@@ -1,4 +1,4 @@
-"""Links in pieces as the one link: what was computed of the pieces, told in frame and modes of the link.
+"""Links in pieces as the one link: what was computed of the pieces, in frame and modes of the link.
 
 The frame is where the link's reference condition has it: at its root, as the section there (cantilever), or along the
 chord to its tip, turned from the section at the root by no more than that takes (simply supported: no twist there). The
@@ -58,7 +58,7 @@ class SectionMotion:
 
 @dataclass(frozen=True)
 class MotionOfLinks(RobotMotion):
-    """A motion of pieces, in which links in pieces are told as the one link each."""
+    """A motion of pieces, in which links in pieces are the one link each."""
 
     divided: Mapping[str, Divided] = field(default_factory=dict)
 

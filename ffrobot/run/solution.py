@@ -38,8 +38,7 @@ from ..mbs.scene.analysis import Analysis
 from ..scene.pieces import BodyInPieces
 from ..scene.scene import Scene
 from .actuation import Actuation
-from .bodies import LoadedBody
-from .loaded_body import remarks_on_parts, rigid_in_words
+from .loaded_body import LoadedBody, remarks_on_parts, rigid_in_words
 from .mode_search import ModeChoice
 from .omissions import omissions
 

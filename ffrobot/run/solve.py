@@ -156,8 +156,8 @@ def _run_all(solution: Solution, watcher: Watcher, interruption: Interruption) -
                 run = analysis.run(_context(solution, analysis, results, watcher, interruption))
                 assert isinstance(run, Outcome)
             if not results:
-                told = (*run.statistics.warnings, *turned_guesses(solution.scene))
-                run = replace(run, statistics=replace(run.statistics, warnings=told))
+                texts = (*run.statistics.warnings, *turned_guesses(solution.scene))
+                run = replace(run, statistics=replace(run.statistics, warnings=texts))
         except Exception as error:  # raised once the analyses before it are kept
             if not results:
                 raise
@@ -245,10 +245,10 @@ def _predicted_shift(solution: Solution, found: AnalysisResult) -> dict[str, Arr
     points = [f"{body}.{label}" for body, labels in motion.points.items() for label in labels]
     if (whole := make_whole_links(solution)) is not None:
         try:
-            told = whole.as_links(found.run)
+            as_links = whole.as_links(found.run)
         except InputError:
             return {}
-        motion = RobotMotion(told.model, told.time, told.q, told.v, told.a, told.multipliers)
+        motion = RobotMotion(as_links.model, as_links.time, as_links.q, as_links.v, as_links.a, as_links.multipliers)
     return held_shift(motion, forces, points)
 
 

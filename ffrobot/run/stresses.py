@@ -23,7 +23,7 @@ from ..mbs.quantities.stress import (
     mode_acceleration,
     mode_displacement,
 )
-from .bodies import LoadedBody
+from .loaded_body import LoadedBody
 
 
 def find_stresses(

@@ -1,4 +1,4 @@
-"""Who is told how a solve goes and may stop it: a watcher, Ctrl-C, a cluster's end of time."""
+"""Who follows a solve and may stop it: a watcher, Ctrl-C, a cluster's end of time."""
 
 from __future__ import annotations
 

@@ -93,7 +93,7 @@ def perform(run: Run, workers: Workers) -> Row | None:
             left.unlink(missing_ok=True)
     arguments = ["solve", str(run.folder / SCENE), "-o", str(made)]
     arguments += [f"--allow-python={path}" for path in run.allow_python]
-    code, told, imported = workers.perform(arguments)
+    code, printed, imported = workers.perform(arguments)
     if made.exists():
         made.replace(results)
     else:  # earlier ones are of other input, maybe
@@ -101,7 +101,7 @@ def perform(run: Run, workers: Workers) -> Row | None:
     if code in STOPPED:
         return None
     status = {0: "completed", 1: "failed", 2: "wrong input"}.get(code, "crashed")
-    message = "" if code == 0 else _last_message(told, run.folder) or _ended(code)
+    message = "" if code == 0 else _last_message(printed, run.folder) or _ended(code)
     quantities = _quantities(results, run.collect) if results.exists() else {}
     return Row(run.number, run.values, status, message, quantities, run.inputs | imported, tuple(imported))
 

@@ -153,20 +153,20 @@ def _behind_gears(source: Outcome, model: Model, analysis: Forward, context: Con
             f' with stiffness, found "{source.analysis.name}"'
         )
     _check_motors(source.model, analysis, source.q[0])
-    wound = with_motor_coordinates(source, model)
+    in_motors = with_motor_coordinates(source, model)
     most = largest_moments(source.model, limits=analysis.limits)
-    wanted = np.hstack([wound.moments[joint] for joint in model.motors])
+    wanted = np.hstack([in_motors.moments[joint] for joint in model.motors])
     given = np.clip(wanted, -most, most)
     sizes = spline(source.time, given, 1 if np.any(given != wanted) else DEGREE)
     found: _core.ForceSource = _core.ForcesOfTime(sizes)
     commands = actuator_commands(model, context.patches)
     motors, patches = commands[: len(most)], commands[len(most) :]
-    if analysis.apply == "joints+pzt":  # moments of firm gears come with the voltages, and do nothing
+    if analysis.apply == "joints+pzt":  # moments of rigid gears come with the voltages, and do nothing
         found = _core.ForcesOfBoth(found, supplied(source, most, context.patches, limited=analysis.limits))
         motors = (*motors, *[Command(np.zeros(model.tree.n_v))] * len(most), *patches)
     replayed = Replayed(found, motors, moments=numbers_of_motors(model))
     return drive_robot(
-        model, analysis, State(wound.q[0], wound.v[0]), context.progress, drives=Drives(replayed=replayed),
+        model, analysis, State(in_motors.q[0], in_motors.v[0]), context.progress, drives=Drives(replayed=replayed),
         times=replay_times(source, analysis), earlier=context.earlier,
     )  # fmt: skip
 

@@ -67,7 +67,7 @@ def supplied_through_gears(
         return Supplied(motor_forces(model, state.q, wanted), {})
     _refuse_loads(model, elastic)
     compliant, torques = with_compliance(model), rotor_torques(model, state, time)
-    firm = required_forces(compliant, _wound(compliant, state, None), time)
+    rigid = required_forces(compliant, _in_motor_coordinates(compliant, state, None), time)
     change = np.inf
     for passes in count(1):
         forces = motor_forces(model, state.q, wanted + felt)
@@ -77,7 +77,7 @@ def supplied_through_gears(
             )
             for node in elastic
         }
-        needed = required_forces(compliant, _wound(compliant, state, gears), time) - firm
+        needed = required_forces(compliant, _in_motor_coordinates(compliant, state, gears), time) - rigid
         before, felt = felt, needed[:, : felt.shape[1]]
         for gear in compliant.tree.gears:  # but for what their springs do along their own joints
             of = gears[gear.joint.joint.name].twist
@@ -124,7 +124,7 @@ def _along(node: Node, state: States) -> Array:
     return -columns if node.backwards else columns
 
 
-def _wound(compliant: Model, state: States, gears: Mapping[str, GearMotion] | None) -> KnownStates:
+def _in_motor_coordinates(compliant: Model, state: States, gears: Mapping[str, GearMotion] | None) -> KnownStates:
     """The motion of links with motors as far ahead as `gears` say, or not at all."""
     if gears is not None:
         return KnownStates(*with_motors(compliant, (state.q, state.v, state.a), gears))
@@ -137,8 +137,8 @@ class MotorCoordinates(NamedTuple):
 
     Attributes:
         q, v, a: (T, n_q), (T, n_v), (T, n_v).
-        gears: by joint, those that are firm in the motion; none where they give in it, too.
-        moments: (T, k) by joint, of all motors where gears are firm in the motion.
+        gears: by joint, those that are rigid in the motion; none where they give in it, too.
+        moments: (T, k) by joint, of all motors where gears are rigid in the motion.
     """
 
     q: Array
@@ -167,8 +167,8 @@ def with_motor_coordinates(run: Outcome, model: Model) -> MotorCoordinates:
     return MotorCoordinates(q, v, a, gears, forces.moments)
 
 
-def with_motors(model: Model, firm: Sequence[Array], gears: Mapping[str, GearMotion]) -> list[Array]:
-    """Q, v, a (T, …) of `model`, whose gears give, from those of a robot with `firm` gears, and of its motors."""
+def with_motors(model: Model, rigid: Sequence[Array], gears: Mapping[str, GearMotion]) -> list[Array]:
+    """Q, v, a (T, …) of `model`, whose gears give, from those of a robot with `rigid` gears, and of its motors."""
     known = [gears[gear.joint.joint.name] for gear in model.tree.gears]
     more = (np.column_stack([getattr(of, order) for of in known]) for order in ("angle", "rate", "acceleration"))
-    return [np.hstack(pair) for pair in zip(firm, more, strict=True)]
+    return [np.hstack(pair) for pair in zip(rigid, more, strict=True)]

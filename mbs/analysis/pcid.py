@@ -41,15 +41,15 @@ class Pcid(IntegratedAnalysis):
 
 
 def run_pcid(context: Context, analysis: IntegratedAnalysis) -> Outcome:
-    """C_m and C_s hold, p is free; and gears that give, where motors follow the trajectories.
+    """C_m and C_s hold, p is free; and compliant gears, where motors follow the trajectories.
 
     Raises `InputError` where the trajectories cannot be followed, `SolveError` where there is no equilibrium to start
     from.
     """
-    firm = resolved(context.model, analysis.last_time)
-    check_reach(firm, analysis.last_time)
-    warnings = tuple(check_path(firm, undeformed_posture(firm).q, analysis.last_time))
-    model = with_prescribed_motors(firm)
+    rigid = resolved(context.model, analysis.last_time)
+    check_reach(rigid, analysis.last_time)
+    warnings = tuple(check_path(rigid, undeformed_posture(rigid).q, analysis.last_time))
+    model = with_prescribed_motors(rigid)
     return drive_robot(
         model, analysis, initial_state(model), context.progress, warnings=warnings, earlier=context.earlier,
         is_recorded=context.is_replayed,

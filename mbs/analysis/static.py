@@ -51,7 +51,7 @@ class Static(Analysis):
             model, _, (q,), (v,), (a,) = linear_states(context.model, found, [0])
             mechanism = LinearEquations(model, q, places_of(context, self.points)).at(0.0, q, v, a)
         except (InputError, SolveError) as error:
-            told = f"no natural frequencies and no compliance: {error}"
-            statistics = replace(found.statistics, warnings=(*found.statistics.warnings, told))
+            text = f"no natural frequencies and no compliance: {error}"
+            statistics = replace(found.statistics, warnings=(*found.statistics.warnings, text))
             return replace(found, statistics=statistics)
         return replace(found, details=HeldRobot((held_joints(mechanism),)))

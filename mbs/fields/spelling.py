@@ -70,7 +70,7 @@ class NormalInPlane(OnlyIn):
 
 @dataclass(frozen=True)
 class TaggedInPlane:
-    """Marks a union of records, told apart by `type`, of which planar scenes have those without `only_in`."""
+    """Marks a union of records with the discriminator `type`, of which planar scenes have those without `only_in`."""
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:  # noqa: ANN401
         records: Sequence[type[Record]] = get_args(source)

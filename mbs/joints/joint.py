@@ -160,10 +160,6 @@ class JointRecord(Record, ABC):
     def motion(self, q: Array) -> Array:
         """(…, 6, freedoms): velocity and angular velocity of the outer triad by v, in axes of the inner one."""
 
-    def motion_rate(self, q: Array, v: Array) -> Array:
-        """(…, 6): Ṡ v in axes of the inner triad, what v̇ = 0 leaves of the acceleration; S is `motion`."""
-        return np.zeros((*q.shape[:-1], 6))
-
     def action(self, q: Array) -> Array:
         """(…, 6, freedoms): force and moment of motors on the outer side, at its triad, by generalized forces along v.
 

@@ -31,7 +31,7 @@ AnyJoint = Annotated[
     Field(discriminator="type"),
     TaggedInPlane(),
 ]
-"""The list of all types, told apart by the key `type`: a new one is a file beside this one and an entry here."""
+"""All types, by the key `type`: a new one is a file beside this one and an entry here."""
 
 JOINT_TYPES: dict[str, type[JointRecord]] = {record.type_name(): record for record in get_args(get_args(AnyJoint)[0])}
 """The records by what the key `type` says."""

@@ -71,13 +71,6 @@ class UniversalJoint(AxialJoint):
         found[..., 4, 1], found[..., 5, 1] = np.cos(q[..., 0]), np.sin(q[..., 0])
         return found
 
-    def motion_rate(self, q: Array, v: Array) -> Array:
-        """α̇ β̇ along the change of the second axis."""
-        found = np.zeros((*q.shape[:-1], 6))
-        found[..., 4], found[..., 5] = -np.sin(q[..., 0]), np.cos(q[..., 0])
-        found *= (v[..., 0] * v[..., 1])[..., None]
-        return found
-
     def turned_around(self, coordinates: Array) -> Array:
         """Both backwards, the second first."""
         return -coordinates[..., ::-1]

@@ -76,7 +76,7 @@ class Model:
         return -1.0 if self.driven(joint).backwards else 1.0
 
     def driven(self, joint: str) -> Node:
-        """What moments on a joint of the tree turn: the body that it carries, or its motor behind a gear that gives."""
+        """What moments on a joint of the tree turn: the body that it carries, or its motor behind a compliant gear."""
         behind = {gear.joint.joint.name: gear.motor for gear in self.tree.gears}
         return behind.get(joint, self.tree.nodes[self.tree.carried[joint]])
 

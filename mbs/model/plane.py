@@ -151,7 +151,7 @@ class _Reduction:
         return found, followed, spread
 
     def _askew(self, k: int) -> list[int]:
-        """Rows of a loop that hold one way in several directions, k among them, where the plane is askew to these."""
+        """Rows of a loop that hold one way in several directions, k among them, where the plane is oblique to these."""
         rows, ends = self._parts.rows, _ends(self._parts.rows[k])
         ways = (_core.RowKind.point, _core.RowKind.slide)
         held = [i for i, row in enumerate(rows) if row.kind in ways and row.coordinate < 0]  # none that rotors follow

@@ -26,16 +26,8 @@ class Wrench(NamedTuple):
         return Wrench(self.force + sign * other.force, self.moment + sign * other.moment)
 
 
-def along_joint(tree: KinematicTree, node: Node, force: Array, q: Array, frames: Sequence[Motion]) -> Wrench:
-    """What `force` (T, freedoms) along the joint that carries a body does on its outer side, about where that is.
-
-    The opposite acts on its inner side.
-    """
-    return _in_global_axes(tree.pose(node.inner, q, frames).F, node, force, q)
-
-
 def _in_global_axes(F: Array, node: Node, force: Array, q: Array) -> Wrench:
-    """The same, of the axes F (T, 3, 3) of the inner side."""
+    """What `force` (T, freedoms) along a joint does on its outer side; F (T, 3, 3): axes of the inner one."""
     acting = np.einsum("tij,tj->ti", node.joint.action(q[:, node.q]), force)
     return Wrench(*(np.einsum("tij,tj->ti", F, part) for part in (acting[:, :3], acting[:, 3:])))
 

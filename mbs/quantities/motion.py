@@ -214,7 +214,7 @@ class RobotMotion:
     def motor_forces(self) -> MotorForces | None:
         """Of `supplied`: see `mbs.model.spatial_motors`. None where nothing is prescribed.
 
-        Moments behind gears that give are what motors must do there.
+        Moments behind compliant gears are what motors must do there.
         """
         return self._found_motor_forces()
 
@@ -245,7 +245,7 @@ class RobotMotion:
 
     @cached_property
     def behind_gears(self) -> RobotMotion:
-        """The same with motors as far ahead of gears that give as they have to be; itself where gears give in it."""
+        """The same with motors as far ahead of compliant gears as they have to be; itself where gears give in it."""
         if not self.gears:
             return self
         model = with_compliance(self.model)
@@ -253,7 +253,7 @@ class RobotMotion:
         return RobotMotion(model, self.time, q, v, a, self.multipliers, applied=self.applied)
 
     def gear_moment(self, joint: str) -> Array | None:
-        """What a gear that gives transmits to the second side of its joint (T,), N·m; else None."""
+        """What a compliant gear transmits to the second side of its joint (T,), N·m; else None."""
         if joint in self.gears:
             return self.gears[joint].gear_moment
         for gear in self.model.tree.gears:
@@ -263,7 +263,7 @@ class RobotMotion:
         return None
 
     def motor_motion(self, joint: str) -> tuple[Array, Array] | None:
-        """Angle and rate (T,), rad, rad/s, of the motor behind a gear that gives, reduced to its joint; else None."""
+        """Angle and rate (T,), rad, rad/s, of the motor behind a compliant gear, reduced to its joint; else None."""
         if joint in self.gears:
             return self.gears[joint].angle, self.gears[joint].rate
         for gear in self.model.tree.gears:

@@ -48,7 +48,7 @@ def watched(tree: KinematicTree) -> list[Watched]:
     found = []
     for node in tree.nodes:
         if _is_limited(node.joint) and not _is_sampled(node):
-            # Which of q with which sign, read off numbers that are told apart
+            # Which of q with which sign, read off numbers that all differ
             numbers = node.joint.coordinates(np.arange(1.0, node.joint.q_count + 1))
             numbers = node.joint.turned_around(numbers) if node.backwards else numbers
             for number, entry in enumerate(numbers):

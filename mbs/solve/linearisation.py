@@ -42,7 +42,7 @@ class LinearMechanism:
     Attributes:
         M, D, K: (f, f).
         inputs: (f,) per unit of each motor ("joint/NAME") and force at a point ("force/BODY.POINT/x", "…/y").
-        outputs: (f,) derivatives of joint coordinates ("joint/NAME"), of motors behind gears that give ("motor/NAME"),
+        outputs: (f,) derivatives of joint coordinates ("joint/NAME"), of motors behind compliant gears ("motor/NAME"),
             and places of points ("point/BODY.POINT/x", …).
         points: (k, f) by "BODY.POINT": translations along the axes of the space, then rotations about them.
         transformation: H = ∂q/∂s (coordinates, f).
@@ -163,7 +163,7 @@ class LinearEquations:
         return MappingProxyType(found | self._along_axes("force", points))
 
     def _outputs(self, state: _State, H: Array, points: Mapping[str, Array]) -> Mapping[str, Array]:
-        """By s: joint coordinates, those of motors behind gears that give, and places of points."""
+        """By s: joint coordinates, those of motors behind compliant gears, and places of points."""
         tree, found = self.model.tree, dict[str, Array]()
         for joint in self.model.scene.joint:
             if joint.name in tree.carried:
@@ -213,7 +213,7 @@ def _names(joint: str, count: int) -> list[str]:
 
 
 def _of_motor(gear: CompliantGear) -> str:
-    """Of the coordinate of a motor behind a gear that gives."""
+    """Of the coordinate of a motor behind a compliant gear."""
     return f"motor/{gear.joint.joint.name}"
 
 

@@ -32,7 +32,7 @@ class PathFrequencies:
 def frequencies_along(model: Model, begin: float, end: float, modes: int) -> PathFrequencies:
     """Of the `modes` lowest vibrations of the undeformed robot with its trajectories held, from `begin` to `end`, s.
 
-    Where motors follow them, gears that give are among its springs. Joints that the paths leave free are free.
+    Where motors follow them, compliant gears are among its springs. Joints that the paths leave free are free.
     Raises `InputError` where the path is out of reach, or there are fewer vibrations.
     """
     model = with_prescribed_motors(resolved(model, end))

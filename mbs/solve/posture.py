@@ -22,7 +22,7 @@ SINGULAR = 1e-6  # ratio of singular values below which a posture counts as sing
 NEARLY_SINGULAR = 1e-3  # ratio of singular values that is worth a warning
 MOVING = 0.05  # share of a joint in the motion that a singular posture leaves, of the largest
 MOVES = 1e-6  # share of a joint in a motion that is left free
-BESIDE = 0.05  # rad (and sizes of the robot) before a singular posture, where rows of loops are told apart
+BESIDE = 0.05  # rad (and sizes of the robot) before a singular posture, where equations of loops are distinguished
 MOST_ITERATIONS = 60
 LARGEST_TURN = 0.5  # rad (and sizes of the robot) that a Newton step may move: keeps to the branch of the guess
 

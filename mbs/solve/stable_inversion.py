@@ -1,6 +1,6 @@
 """Stable inversion: the bounded p(t) for which motors alone carry a path (Devasia, Chen and Paden 1996; Seifried 2014).
 
-Where zeros lie in the right half plane, integrating forward diverges. Decaying motions are told by the past, growing
+Where zeros lie in the right half plane, integrating forward diverges. Decaying motions follow from the past, growing
 ones by the future: at rest long before the path the part in the stable subspace vanishes, at rest long after it the
 part in the unstable one (of lightly damped vibrations: `zero_dynamics`). Collocation solves this two-point
 problem at once, on intervals that are cut where r(t) ≠ 0 between the collocation points. Without such zeros it is an

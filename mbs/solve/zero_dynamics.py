@@ -1,7 +1,7 @@
 """The zero dynamics along a path: its zeros about quasi-static links, and whether past or future tells their motions.
 
-What decays is told by the past, what grows by the future (Devasia, Chen and Paden 1996). Lightly damped vibrations,
-whose zeros may cross the imaginary axis along the path, are told by the past unless they grow too far.
+What decays follows from the past, what grows from the future (Devasia, Chen and Paden 1996). Lightly damped vibrations,
+whose zeros may cross the imaginary axis along the path, follow from the past unless they grow too far.
 """
 
 from __future__ import annotations

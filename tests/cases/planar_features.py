@@ -68,6 +68,15 @@ def stressed(case, *analyses, **keys):
     return tables
 
 
+def damped(*analyses, **keys):
+    """With damping of the robot's vibrations in place of that of the links' modes."""
+    tables = pair("two_link", *analyses, **keys)
+    for one in tables:
+        for body in one["body"]:
+            body["link"] = dict(link_keys(Path(body["link"]))) | {"damping": {"ratio": 0.01, "of": "robot"}}
+    return tables
+
+
 def driven(**keys):
     """Joints that move from place to place."""
     places = {"O": [0.0, "20*deg", "-5*deg"], "A": ["60*deg", "40*deg", "70*deg"]}
@@ -144,6 +153,7 @@ FEATURES = {  # what is compared in any case, beside motion and moments; the sce
         "frequency",
         lambda: pair("slider_crank", INVERSE, MOVING, start=CRANK, of_joints=[{"motor": True}]), 1e-6,
     ),
+    "damping of the robot": ("frequency", lambda: damped(LINEAR, of_joints=GEARS), 1e-6),
     "shapers": ("target", lambda: driven(duration=0.15, shaper={"kind": "zv", "modes": 2}), 1e-7),
     "limits of paths": (
         "target", lambda: driven(profile="s-curve", speed=2.0, acceleration=30.0, jerk=900.0, hold=0.03), 1e-7

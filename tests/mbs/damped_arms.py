@@ -1,9 +1,6 @@
 """Arms whose links have the damping ratio RATIO, of their own modes or of the robot's vibrations."""
 
-from scenes_in_3d import joint_keys
-
 import ffrobot
-from ffrobot.mbs.fields.spelling import place
 
 RATIO = 0.01
 
@@ -40,16 +37,6 @@ def planar_arm(conditions, of, **keys):
         "initial": {"angles": {"link1": 0.4, "link2": -0.6}},
         "analysis": [{"name": "at_rest", "kind": "linear"}],
     } | keys
-
-
-def in_3d(arm, joints):
-    """The same in 3D, its joints at the coordinates `joints`."""
-    return arm | {
-        "space": "spatial",
-        "gravity": place(arm["gravity"]),
-        "joint": [joint_keys(joint) for joint in arm["joint"]],
-        "initial": {"joints": joints},
-    }
 
 
 def vibrations_of(scene):

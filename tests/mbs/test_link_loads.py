@@ -8,7 +8,7 @@ from mechanisms import forward, pcid
 from oracle import elastic_forces, gravity_forces, mass_matrix, quadratic_velocity_forces
 from oracle_runs import joint_forces, run
 
-from ffrobot.common.plane import rotated
+from ffrobot.common.plane import rotation
 from ffrobot.mbs.quantities.link_loads import loads_on_links
 
 MECHANISMS = (
@@ -46,7 +46,7 @@ def missing(outcome, name):
         for point, at in body.points.items():
             *force, moment = at_point(loads, point)[k]
             x = at.position + at.translation @ q[3:]
-            given[k, :2] += rotated(q[2], np.array(force))
+            given[k, :2] += rotation(q[2]) @ force
             given[k, 2] += x[0] * force[1] - x[1] * force[0] + moment
             given[k, 3:] += at.translation.T @ force + at.rotation * moment
     return needed - given, np.abs(needed).max()
@@ -79,7 +79,8 @@ def test_forces_in_joints_are_those_of_the_multipliers():
     """Of a forward run, whose multipliers are the reactions themselves; moments of the motors come with the loads."""
     outcome = run(arm(trajectory=[], load=LOADS), forward(output_step=0.1))
     loads, columns = link_loads(outcome, ["link2"])["link2"].sizes, outcome.coordinates("link2")
-    reaction = rotated(-outcome.q[:, columns][:, 2], joint_forces(outcome, "A").reaction)
+    turns = [rotation(-theta) for theta in outcome.q[:, columns][:, 2]]
+    reaction = np.einsum("tij,tj->ti", turns, joint_forces(outcome, "A").reaction)
     found = at_point(loads, "root")
     np.testing.assert_allclose(found[:, :2], reaction, rtol=1e-8, atol=1e-9 * np.abs(reaction).max())
     np.testing.assert_allclose(found[:, 2], 4 * np.sin(5 * outcome.time), atol=1e-9 * np.abs(reaction).max())

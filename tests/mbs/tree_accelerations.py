@@ -77,7 +77,7 @@ class Accelerated:
         S = node.joint.motion(q)
         d = np.einsum("tij,tj->ti", inner.F, node.joint.place(q).d)
         relative = np.einsum("tij,tj->ti", S, v)
-        change = np.einsum("tij,tj->ti", S, v_dot) + node.joint.motion_rate(q, v)
+        change = np.einsum("tij,tj->ti", S, v_dot) + motion_rate(node.joint, q, v)
         way, turn, way_rate, turn_rate = (
             np.einsum("tij,tj->ti", inner.F, x[:, part])
             for x in (relative, change)
@@ -105,6 +105,15 @@ class Accelerated:
         spin = np.einsum("tij,tj->ti", J_l, phi_dot)
         spin_rate = np.einsum("tij,tj->ti", J_l, phi_2dot) + left_jacobian_rate(at.phi, phi_dot)
         return _Bent(*(np.einsum("tij,tj->ti", A, x) for x in (at.u, u_dot, u_2dot, spin, spin_rate)))
+
+
+def motion_rate(joint, q: Array, v: Array) -> Array:
+    """(…, 6): Ṡ v in axes of the inner triad: of universal joints α̇ β̇ along the change of the second axis."""
+    found = np.zeros((*q.shape[:-1], 6))
+    if joint.type == "universal":
+        found[..., 4], found[..., 5] = -np.sin(q[..., 0]), np.cos(q[..., 0])
+        found *= (v[..., 0] * v[..., 1])[..., None]
+    return found
 
 
 def curvature(body, point: str, p_dot: Array) -> tuple[Array, Array]:

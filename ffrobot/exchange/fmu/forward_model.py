@@ -81,7 +81,7 @@ def _numbered(joint: str, number: int, count: int) -> str:
 
 
 def _motors(model: Model) -> Iterator[Input]:
-    """Behind a gear that gives they act on its motor."""
+    """Behind a compliant gear they act on its motor."""
     units = {joint.name: joint.units for joint in model.scene.joint}
     for joint, columns in model.motors.items():
         for k, (column, unit) in enumerate(zip(columns, units[joint], strict=True), 1):

@@ -16,7 +16,8 @@ from ...mbs.model.body import Body
 from ...mbs.model.model import build_model
 from ...mbs.model.tree import Node
 from ...mbs.solve.posture import robot_size
-from ...run.bodies import LoadedBody, load_bodies
+from ...run.bodies import load_bodies
+from ...run.loaded_body import LoadedBody
 from ...scene.load import load_scene
 from ...scene.scene import Scene
 from .names import Names
@@ -91,7 +92,7 @@ class UrdfOfScene:
             self.visuals[body.name] = list(bars(places, self.size / SLENDER))
 
     def _add_frames(self, node: Node) -> None:
-        """Points at which nothing hangs, such as tools: links without mass."""
+        """Points that carry nothing, such as tools: links without mass."""
         body, at = node.body, _anchor(node)
         taken = {other.inner.point for other in self.tree.nodes if other.inner.body == self.tree.index[body.name]}
         for point, place in _own_points(self._loaded[body.name]).items():

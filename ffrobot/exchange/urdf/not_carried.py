@@ -1,4 +1,4 @@
-"""What a URDF does not carry of a scene in space, told at export."""
+"""What a URDF does not carry of a scene: printed at export."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from ...common.errors import quoted
 from ...mbs.joints.moving_joint import MovingJoint
 from ...mbs.model.tree import KinematicTree
-from ...run.bodies import LoadedBody
+from ...run.loaded_body import LoadedBody
 from ...scene.scene import Scene
 from .scene import GRAVITY
 from .steps import STEPS

@@ -39,7 +39,7 @@ class Place:
     C: Array
 
     def __matmul__(self, inner: Place) -> Place:
-        """A frame in this one, told in the other."""
+        """A frame in this one, in coordinates of the other."""
         return Place(self.d + self.C @ inner.d, self.C @ inner.C)
 
     @property

@@ -26,7 +26,7 @@ def members(results: Results, group: str) -> list[str]:
 
 
 def bending_points(results: Results, analysis: str | None = None) -> list[str]:
-    """Points whose deflection can be told from zero beside that of the others, in one analysis or in any."""
+    """Points whose deflection is visible next to that of the others, in one analysis or in any."""
     largest: dict[str, float] = {}
     for each in results.analyses if analysis is None else [analysis]:
         for point in results.names(f"{each}/points"):

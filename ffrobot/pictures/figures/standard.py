@@ -86,7 +86,7 @@ def _angles(results: Results) -> Iterator[FigureRecord]:
 
 
 def _deflections(results: Results) -> Iterator[FigureRecord]:
-    """By axes of the body; components that cannot be told from zero are left out."""
+    """By axes of the body; components that are zero but for round-off are left out."""
     for point in bending_points(results):
         found = curves_of(results, f"points/{point}/deflection")
         largest = np.max([np.abs(results[curve.data]).max(axis=0) for curve in found], axis=0)

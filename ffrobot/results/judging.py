@@ -1,0 +1,238 @@
+"""The verdict of a results file: what its analyses say, and what to try next."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+
+import h5py
+import numpy as np
+
+from ..actuation.motors import MotorFeasibility, judge_motion
+from ..common.arrays import Array
+from .actuators import read_motors, read_unsupplied
+from .joints import Coordinates, Scene, labelled_coordinates
+from .linear import held_in_words
+from .peaks import POWER, peak_of
+from .tool_error import off_path_in_words, tool_error
+from .verdict import AnalysisVerdict, PatchNeed, Place, Verdict
+
+FAR_BEYOND = 10.0  # times their limit: no realistic patch supplies that
+AT_REST = 0.3  # of the mean rate of a path: what its first and last steps have at most
+
+
+def judge(file: h5py.File, analyses: Sequence[str], scene: Scene) -> Verdict:
+    """The verdict of the `analyses` of a results file of a `scene`."""
+    coordinates = labelled_coordinates(scene)
+    return Verdict(tuple(_judge(name, file[name], scene, coordinates) for name in analyses))
+
+
+def _judge(name: str, group: h5py.Group, scene: Scene, coordinates: Coordinates) -> AnalysisVerdict:
+    motors = _motors(group, coordinates)
+    units = {label: coordinate.force_unit for label, (_, coordinate) in coordinates.items()}
+    patches = {body: _patches(entry) for body, entry in group.get("feasibility/pzt", {}).items()}
+    answer, feasible = _answer(group, motors, patches)
+    answer = answer or off_path_in_words(group, scene)
+    about = group.attrs
+    return AnalysisVerdict(
+        name=name,
+        kind=str(about["kind"]),
+        status=str(about["status"]),
+        cause=str(about.get("cause", "")),
+        answer=answer,
+        feasible=feasible,
+        motors=motors,
+        units=units,
+        patches=patches,
+        tool_error=tool_error(group, scene, feasible=feasible),
+        deflection=None if _ended_early(group) else _deflection(group),
+        stress=None if _ended_early(group) else _stress(group),
+        margins=_margins(group),
+        held=held_in_words(group),
+        warnings=tuple(map(str, about.get("warnings", ()))),
+        notes=tuple(map(str, about.get("notes", ()))),
+        advice=tuple(_advice(group, motors, units, patches)),
+    )
+
+
+def _motors(group: h5py.Group, coordinates: Coordinates) -> dict[str, MotorFeasibility]:
+    """As the analysis judged them; of kinds that do not, such as closed loops, from what their motors did."""
+    if "feasibility" in group:
+        return read_motors(group["feasibility"], list(coordinates))
+    found, time = {}, group["time"][()]
+    for label, (joint, coordinate) in coordinates.items():
+        entry = group.get(f"joints/{joint}")
+        if entry is not None and "moment" in entry and "rate" in entry:
+            rate_of = "motor_rate" if "motor_rate" in entry else "rate"
+            moment, rate = (coordinate.of(entry[dataset][()]) for dataset in ("moment", rate_of))
+            found[label] = judge_motion(time, moment, rate, coordinate.limits, float(time[-1]))
+            if POWER in entry.attrs:
+                of_moment, of_rate = entry["moment"].attrs, entry[rate_of].attrs
+                found[label] = replace(
+                    found[label], moment=float(of_moment["peak"]), speed=float(of_rate["peak"]),
+                    power=float(entry.attrs[POWER]), moment_time=float(of_moment["peak_time"]),
+                    rms_moment=float(of_moment["rms"]),
+                )  # fmt: skip
+    return found
+
+
+def _patches(entry: h5py.Group) -> PatchNeed:
+    factors, since = entry["factor"][()], entry["saturation_time"][()]
+    beyond = since[~np.isnan(since)]
+    limit = float(entry["remedies"].attrs["limit"])
+    return PatchNeed(float(factors.max()), float(beyond.min()) if beyond.size else float("nan"), limit)
+
+
+def _answer(
+    group: h5py.Group, motors: Mapping[str, MotorFeasibility], patches: Mapping[str, PatchNeed]
+) -> tuple[str, bool | None]:
+    """Whether it can be done, in words and as such; of a run that ended early nothing is known of that."""
+    if "control" in group:
+        about = group["control"].attrs
+        held = f", {100 * about['saturated']:.2g} % of the samples saturated" if about["saturated"] else ""
+        error = f"tip off by {1e3 * about['tip_error_max']:.4g} mm at most, {1e3 * about['tip_error_rms']:.4g} mm RMS"
+        return f"loop {about['verdict']}: {error}{held}", None
+    if "feasibility" not in group or _ended_early(group):
+        return "", None
+    short = dict(_short(motors, patches))
+    if short:
+        lacking = [
+            f"{name} (required/available = {factor:.3g}, first at t = {since:g} s)"
+            for name, (factor, since) in short.items()
+        ]
+        return f"limits exceeded: {', '.join(lacking)}; details: ffrobot feasibility", False
+    has_limits = any(motor.has_limits for motor in motors.values()) or any(
+        np.isfinite(e["available_moment"]).any() for e in _of_patches(group)
+    )
+    within = "within the limits that are given" if has_limits else "no limits are given"
+    if (missed := read_unsupplied(group["feasibility"])) is not None:
+        means = "motors and patches" if missed.with_patches else "motor torques"
+        return f"{means} cannot do it: see the warning ({within})", False
+    least = ""
+    if "tracking" in group:
+        about = group["tracking"].attrs
+        off = about.get("without_patches", np.nan)
+        alone = f"; torques alone are off by {1e3 * off:.3g} mm" if np.isfinite(off) else ""
+        least = f"; least voltage {about['least_voltage']:.3g} V{alone}"
+    return f"motors{' and patches' if patches else ''} can do it, {within}{least}", True
+
+
+def _ended_early(group: h5py.Group) -> bool:
+    return bool(group.attrs["status"] != "completed")
+
+
+def _of_patches(group: h5py.Group) -> Iterator[h5py.Group]:
+    yield from group.get("feasibility/pzt", {}).values()
+
+
+def _short(
+    motors: Mapping[str, MotorFeasibility], patches: Mapping[str, PatchNeed]
+) -> Iterator[tuple[str, tuple[float, float]]]:
+    """Actuators that cannot do it: the factor they lack, and from what time on (s)."""
+    for name, motor in motors.items():
+        if motor.factor > 1.0:
+            yield f"motor {name}", (motor.factor, motor.saturation_time)
+    for body, need in patches.items():
+        if need.factor > 1.0:
+            yield f"patches of {body}", (need.factor, need.since)
+
+
+def _deflection(group: h5py.Group) -> Place | None:
+    """Of all points of flexible bodies."""
+    time = group["time"][()]
+    found = [_peak(point["deflection"], name, time) for name, point in group.get("points", {}).items()
+             if "deflection" in point]  # fmt: skip
+    worst = max(found, default=None)
+    return worst if worst is not None and worst[0] > 0.0 else None
+
+
+def _stress(group: h5py.Group) -> Place | None:
+    """Of stress points and surfaces."""
+    time, found = group["time"][()], []
+    for body, entry in group.get("stress", {}).items():
+        points = entry.get("points", {}).items()
+        found += [_peak(point["von_mises"], f"{body}, {name}", time) for name, point in points]
+        if "surface" in entry:
+            found.append(_peak(entry["surface/von_mises_max"], f"the surface of {body}", time))
+    return max(found, default=None)
+
+
+def _peak(dataset: h5py.Dataset, where: str, time: Array) -> Place:
+    value, at = peak_of(dataset, time)
+    return value, where, at
+
+
+def _advice(
+    group: h5py.Group,
+    motors: Mapping[str, MotorFeasibility],
+    units: Mapping[str, str],
+    patches: Mapping[str, PatchNeed],
+) -> Iterator[str]:
+    """What to try next, the nearest thing first."""
+    asked = "feasibility" in group and not _ended_early(group)
+    beyond = [name for name, motor in motors.items() if motor.factor > 1.0]
+    for name, motor in motors.items() if asked else ():
+        if (motor.jump or motor.moment > motor.moment_limit) and (text := motor.spike_in_words(units[name])):
+            yield f"motor of {name}: {text}"
+    if beyond and asked:
+        yield (
+            "a slower path (fastest = true finds the smallest time-scaling factor), or another motor or gear for"
+            f" {', '.join(beyond)}"
+        )
+    at_rest = asked and _is_from_rest_to_rest(group)
+    for body, need in patches.items() if asked else ():
+        if 1.0 < need.factor <= FAR_BEYOND:
+            yield (
+                f"patches of {body}: a limit of {_number(need.limit)} V is sufficient; sufficient layers, thickness or"
+                " number: ffrobot feasibility"
+            )
+    far = [body for body, need in patches.items() if asked and need.factor > FAR_BEYOND]
+    if far and group.attrs["kind"] != "tracking":
+        carried = 'kind = "tracking"' if at_rest else 'kind = "tracking" on a path from rest to rest'
+        other = "a slower path" if group.attrs["kind"] == "fcid" else 'kind = "fcid" with shape = "static"'
+        yield f"{carried}, or {other}: no realistic patch can supply the voltages of {', '.join(far)}"
+    if asked and read_unsupplied(group["feasibility"]) is not None:
+        inversion = 'kind = "motors-only", or ' if at_rest else ""
+        yield f'{inversion}patches ([[pzt]]) on the links with kind = "tracking"'
+    if "tracking" in group and asked and not group["tracking"].attrs.get("is_needed", True):
+        yield "patches are not needed: torques alone stay on the path within the tolerance, relative to its length"
+    if "linear" in group and (text := str(group["linear"].attrs.get("advice", ""))):
+        yield text
+    if "control" in group:
+        about = group["control"].attrs
+        general = ("smaller gains, a shorter sample_time, or rotor_inertia in the joints",)
+        yield from (
+            map(str, about.get("advice", ()))
+            if len(about.get("advice", ()))
+            else (general if about["verdict"] != "stable" else ())
+        )
+
+
+def _is_from_rest_to_rest(group: h5py.Group) -> bool:
+    """Whether the paths begin and end at rest, as inversion with motors alone needs: next to their mean rates."""
+    for entry in group.get("trajectories", {}).values():
+        target = entry["target"][()] if "target" in entry else np.zeros((0, 1))
+        steps = np.abs(np.diff(target.reshape(len(target), target[:1].size), axis=0))
+        if len(steps) and (steps[[0, -1]].max(axis=0) > AT_REST * steps.mean(axis=0)).any():
+            return False
+    return True
+
+
+def _margins(group: h5py.Group) -> str:
+    """Of a closed loop of joint PID controllers."""
+    about = group["control"].attrs if "control" in group else {}
+    if "gain_margin" not in about:
+        return ""
+    if about["delay_margin"] == 0.0:
+        return f"margins (linear model): none, spectral radius of the sampled loop {about['spectral_radius']:.6g}"
+    gain, delay = float(about["gain_margin"]), float(about["delay_margin"])
+    texts = (
+        f"gains may grow {gain:.3g}-fold" if np.isfinite(gain) else "gains may grow freely",
+        f"the delay by {1e3 * delay:.3g} ms" if np.isfinite(delay) else "the delay by 50 sample times or more",
+    )
+    return f"margins (linear model): {', '.join(texts)}"
+
+
+def _number(value: float) -> str:
+    """Four digits, large ones in full."""
+    return f"{value:.0f}" if 1e4 <= abs(value) < 1e7 else f"{value:.4g}"
