@@ -8,7 +8,7 @@ BᵀB of values at Gauss points, which integrate them exactly; `dolfinx_forms` a
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,8 +16,8 @@ import scipy.sparse as sp
 
 from ...common.arrays import Array
 from ..link_records import BeamLink, Family, Solver
-from ..link_records.section import Section
 from .line import gram, hermite, lagrange
+from .sections import Property, cellwise, link_modulus, rod_properties, second_moment, shear_modulus
 
 # Rows of a station: displacement and rotation of the cross section about x, y, z.
 U_X, U_Y, U_Z, R_X, R_Y, R_Z = range(6)
@@ -60,40 +60,6 @@ def family_model(link: BeamLink, family: Family, nodes: Array, stations: Array) 
 
         K, M = (A[free][:, free] for A in assembled(link, family, nodes))
     return FamilyModel(K, M, B, {row: values[:, free] for row, values in fields.items()}, solver)
-
-
-Property = Callable[[Section], float]
-
-
-def link_modulus(link: BeamLink) -> float:
-    """E in Pa."""
-    return link.material.youngs_modulus
-
-
-def shear_modulus(link: BeamLink) -> float:
-    """G = E / (2 (1 + ν)) in Pa; the link file has been checked for ν where G is needed."""
-    assert link.material.poissons_ratio is not None
-    return link.material.youngs_modulus / (2 * (1 + link.material.poissons_ratio))
-
-
-def rod_properties(link: BeamLink, family: Family) -> tuple[Property, Property]:
-    """Stiffness, EA in N or GJ in N·m², and mass or moment of inertia per length, of axial or torsional motion."""
-    E, rho = link_modulus(link), link.material.density
-    if family == "axial":
-        return lambda s: E * s.area, lambda s: rho * s.area
-    G = shear_modulus(link)
-    return lambda s: G * s.torsion, lambda s: rho * s.I_p
-
-
-def second_moment(family: Family) -> Property:
-    """Of area in m⁴, for bending."""
-    return (lambda s: s.I_yy) if family == "in-plane-bending" else (lambda s: s.I_zz)
-
-
-def cellwise(link: BeamLink, nodes: Array, quantity: Property) -> Array:
-    """(e,) of the section of each element between `nodes` (e + 1,)."""
-    segment = np.searchsorted(link.geometry.breakpoints[1:-1], 0.5 * (nodes[1:] + nodes[:-1]))
-    return np.array([quantity(section) for section in link.sections])[segment]
 
 
 def _rod(

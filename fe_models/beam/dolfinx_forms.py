@@ -13,8 +13,8 @@ from mpi4py import MPI
 from ...common.arrays import Array
 from ...mesh.compat import compiled_form, constant_space, lagrange_space
 from ..link_records import BeamLink, Family
-from .beam import Property, cellwise, link_modulus, rod_properties, second_moment, shear_modulus
 from .line import Functions, hermite, lagrange
+from .sections import Property, cellwise, link_modulus, rod_properties, second_moment, shear_modulus
 
 
 def assembled(link: BeamLink, family: Family, nodes: Array) -> tuple[sp.csr_matrix, sp.csr_matrix]:

@@ -26,9 +26,10 @@ from ..link_records import BeamLink
 from ..modal_body.lumped_masses import of_turning
 from ..modal_body.tensors import LEVI_CIVITA
 from ..modal_body.unit_loads import inertia_wrenches, interface_load_names, unit_load_names
-from .beam import R_X, Property
+from .beam import R_X
 from .invariants import weighted
 from .line import Functions
+from .sections import Property
 
 POINTS = 5  # Gauss points of an element: exact, since of cubics no product is of a degree above 8
 

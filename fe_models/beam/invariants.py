@@ -12,8 +12,9 @@ import scipy.sparse as sp
 from ...common.arrays import Array
 from ..link_records import BeamLink
 from ..modal_body.invariants import Invariants
-from .beam import R_X, R_Y, R_Z, U_X, U_Y, U_Z, Property, cellwise
+from .beam import R_X, R_Y, R_Z, U_X, U_Y, U_Z
 from .line import Functions, gram
+from .sections import Property, cellwise
 
 
 def shape_integrals(link: BeamLink, stations: Functions, fields: Array) -> Invariants:
