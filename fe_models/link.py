@@ -204,8 +204,8 @@ def _computation(link: Link, source_path: Path, remesh: bool) -> Callable[..., M
         without_daemon()
         with ending_at_once(), deferred_interrupts():
             if isinstance(link, BeamLink):
-                from . import krylov_schur  # noqa: F401 (what the computation loads)
                 from .beam import dolfinx_forms  # noqa: F401
+                from .modal_body import krylov_schur  # noqa: F401 (what the computation loads)
 
                 return beam_modal_body
             from .solid.link import solid_modal_body

@@ -43,7 +43,7 @@ def lowest_modes(
     try:
         F = Flexibility(K, strain)
         if solver == "slepc":
-            from ..krylov_schur import KrylovSchur  # loads SLEPc
+            from ..modal_body.krylov_schur import KrylovSchur  # loads SLEPc
 
             X = KrylovSchur(F, M, K.shape[0]).lowest(count)
         else:

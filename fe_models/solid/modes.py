@@ -20,7 +20,7 @@ from .families import LOCAL, NEARLY, SectionMotion, aligned, names
 from .strain_energy import strain_energy
 
 if TYPE_CHECKING:
-    from ..krylov_schur import KrylovSchur
+    from ..modal_body.krylov_schur import KrylovSchur
 
 # Mean motion of the sections, of modes (3 owned, n).
 Reader = Callable[[Array], SectionMotion]
@@ -98,7 +98,7 @@ def wanted_modes(link: SolidLink, flexibility: Inverse, mass: Mass, read: Reader
 def _search(link: SolidLink, flexibility: Inverse, mass: Mass) -> BlockLanczos | KrylovSchur:
     model = flexibility.model
     if link.modes.solver == "slepc":
-        from ..krylov_schur import KrylovSchur  # loads SLEPc
+        from ..modal_body.krylov_schur import KrylovSchur  # loads SLEPc
 
         return KrylovSchur(flexibility, mass, 3 * model.owned, comm=model.comm, total=model.total)
     return BlockLanczos(

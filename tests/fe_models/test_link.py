@@ -66,7 +66,7 @@ except SolveError as error:
     print(error)
 """
     result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert f"link1.toml: computing a solid link needs the finite element libraries, and {missing}" in result.stdout
+    assert f"link1.toml: computing this link needs the finite element libraries, and {missing}" in result.stdout
 
 
 def test_a_run_prints_nothing_and_repeats_bit_for_bit(link_file, tmp_path):

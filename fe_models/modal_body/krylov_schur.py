@@ -13,9 +13,9 @@ from mpi4py import MPI
 from petsc4py import PETSc
 from slepc4py import SLEPc
 
-from ..common.arrays import Array
-from ..common.errors import SolveError
-from .modal_body.lanczos import Product
+from ...common.arrays import Array
+from ...common.errors import SolveError
+from .lanczos import Product
 
 TOLERANCE = 1e-13
 
