@@ -53,10 +53,12 @@ SENSITIVE = {
 OF_SENSITIVE = 1e-3
 """with this as the allowed difference of their datasets."""
 LEFT_OUT = ("/linear/zeros/", "saturation_time", "@position_error", "@relative_error", "redefined/bodies/link1/modal_f",
-            "redefined/bodies/link2/modal_f", "unsupplied@growth", "@load_inertia")  # fmt: skip
+            "redefined/bodies/link2/modal_f")  # fmt: skip
 """Parts of names: invariant zeros at infinity are any large number, times are between outputs, the rule that estimates
-errors of far bent links is judged by campaigns, and modal forces of an inversion are what its iteration leaves. Growth
-under open-loop torques and inertias of loads are younger than the references; the latter have a closed form."""
+errors of far bent links is judged by campaigns, and modal forces of an inversion are what its iteration leaves."""
+
+
+NEW = "not in the reference"
 
 
 class Entry(NamedTuple):
@@ -162,8 +164,7 @@ def differences(found, expected, sensitive=()):
     found, expected = (_compared(entries, sensitive) for entries in (found, expected))
     scales = _scales(expected)
     one_sided = [
-        Difference(name, 0.0, 0.0, "missing" if name in expected else "not in the reference")
-        for name in found.keys() ^ expected.keys()
+        Difference(name, 0.0, 0.0, "missing" if name in expected else NEW) for name in found.keys() ^ expected.keys()
     ]
     both = [_difference(name, found[name], of, scales, sensitive) for name, of in expected.items() if name in found]
     return sorted([*one_sided, *both], key=lambda each: -each.share)
