@@ -38,7 +38,7 @@ class ModelParts(NamedTuple):
 
     bodies: list[_core.SpatialBody]
     ground: list[_core.SpatialMarker]
-    rows: list[_core.RowModel]
+    rows: list[_core.ConstraintModel]
     wrenches: list[_core.MarkerAt]
     gravity: Array
     cut: tuple[CutPlace, ...]

@@ -89,13 +89,13 @@ def _normals(parts: ModelParts, frames: Sequence[_Frame]) -> list[Array]:
     return axes[:1] or list(np.eye(3)[::-1])
 
 
-def _ends(row: _core.RowModel) -> tuple[int, int, int, int]:
+def _ends(row: _core.ConstraintModel) -> tuple[int, int, int, int]:
     return row.a.body, row.a.marker, row.b.body, row.b.marker
 
 
-def _like(row: _core.RowModel, f: Array) -> _core.RowModel:
+def _like(row: _core.ConstraintModel, f: Array) -> _core.ConstraintModel:
     """The same between the same markers, along f."""
-    found = _core.RowModel()
+    found = _core.ConstraintModel()
     found.name, found.kind, found.a, found.b, found.coordinate = row.name, row.kind, row.a, row.b, row.coordinate
     found.f = f
     return found
@@ -130,7 +130,7 @@ class _Reduction:
         axis[slice(0, 2) if place.turns else 2] = 0.0
         return place._replace(axis=axis)
 
-    def _rows(self, is_path: Booleans) -> tuple[list[_core.RowModel], list[int], list[Array]]:
+    def _rows(self, is_path: Booleans) -> tuple[list[_core.ConstraintModel], list[int], list[Array]]:
         """Rows of the plane, which ones in space they follow, and columns of `spread`."""
         rows = self._parts.rows
         spread: list[Array] = [np.zeros((len(rows), 0))]
@@ -153,12 +153,12 @@ class _Reduction:
     def _askew(self, k: int) -> list[int]:
         """Rows of a loop that hold one way in several directions, k among them, where the plane is oblique to these."""
         rows, ends = self._parts.rows, _ends(self._parts.rows[k])
-        ways = (_core.RowKind.point, _core.RowKind.slide)
+        ways = (_core.ConstraintKind.point, _core.ConstraintKind.slide)
         held = [i for i, row in enumerate(rows) if row.kind in ways and row.coordinate < 0]  # none that rotors follow
         same = [i for i in held if rows[i].kind == rows[k].kind and _ends(rows[i]) == ends]
         return same if k in same and any(_is_mixed(self._direction(rows[i])) for i in same) else []
 
-    def _together(self, group: Sequence[int]) -> Iterator[tuple[_core.RowModel, Array]]:
+    def _together(self, group: Sequence[int]) -> Iterator[tuple[_core.ConstraintModel, Array]]:
         """The rows of such a group in the plane, and their columns of `spread`; the normal is one of what they hold."""
         rows = self._parts.rows
         F = np.array([self._direction(rows[i]) for i in group])
@@ -171,9 +171,9 @@ class _Reduction:
                 column[list(group)] = F[:, :2] @ direction
                 yield _like(rows[group[0]], np.array([*direction, 0.0])), column
 
-    def _direction(self, row: _core.RowModel) -> Array:
+    def _direction(self, row: _core.ConstraintModel) -> Array:
         """Its f in axes of the plane, or of its planar marker a."""
-        axes = self._ground if row.kind == _core.RowKind.point else self._of_marker(row.a)
+        axes = self._ground if row.kind == _core.ConstraintKind.point else self._of_marker(row.a)
         return as_floats(axes @ row.f)
 
     def _body(self, number: int) -> _core.PlanarBody:
@@ -205,25 +205,25 @@ class _Reduction:
         if off > EXACT:
             raise AcrossError
 
-    def _row(self, row: _core.RowModel) -> _core.RowModel | None:
+    def _row(self, row: _core.ConstraintModel) -> _core.ConstraintModel | None:
         """In axes of planar markers; None where it does nothing in the plane."""
         found = _like(row, row.f)
-        if row.kind == _core.RowKind.coordinate:
+        if row.kind == _core.ConstraintKind.coordinate:
             return found
-        if row.kind == _core.RowKind.turn:
+        if row.kind == _core.ConstraintKind.turn:
             return self._turn(found, row)
         f = self._direction(row)
-        g = self._of_marker(row.b) @ row.g if row.kind == _core.RowKind.dot else row.g
-        if np.linalg.norm(f[:2]) <= EXACT or (row.kind == _core.RowKind.dot and np.linalg.norm(g[:2]) <= EXACT):
+        g = self._of_marker(row.b) @ row.g if row.kind == _core.ConstraintKind.dot else row.g
+        if np.linalg.norm(f[:2]) <= EXACT or (row.kind == _core.ConstraintKind.dot and np.linalg.norm(g[:2]) <= EXACT):
             return None
-        if row.kind != _core.RowKind.dot:
+        if row.kind != _core.ConstraintKind.dot:
             if _is_mixed(f):
                 found.a = self._shifted_for(row, f)
             f[2] = 0.0
         found.f, found.g = f, g
         return found
 
-    def _turn(self, found: _core.RowModel, row: _core.RowModel) -> _core.RowModel:
+    def _turn(self, found: _core.ConstraintModel, row: _core.ConstraintModel) -> _core.ConstraintModel:
         """The difference of angles of planar markers, in which directions are those of their x: see `axes_of_triad`."""
         a, b = self._of_marker(row.a), self._of_marker(row.b)
         f = a @ row.f
@@ -231,7 +231,7 @@ class _Reduction:
             raise AcrossError
         (x_a, y_a, _), (x_b, y_b, _) = a @ row.g, b @ row.g
         turned = float(np.arctan2(x_a * y_b - y_a * x_b, x_a * x_b + y_a * y_b))
-        found.kind, found.f = _core.RowKind.rotation, np.array([0.0, 0.0, np.sign(f[2])])
+        found.kind, found.f = _core.ConstraintKind.rotation, np.array([0.0, 0.0, np.sign(f[2])])
         if abs(turned) > EXACT:
             found.a = self._turned(row.a, -turned)
         return found
@@ -248,9 +248,9 @@ class _Reduction:
         self._shifted.append(marker)
         return _core.MarkerAt(-1, len(self._parts.ground) + len(self._shifted) - 1)
 
-    def _shifted_for(self, row: _core.RowModel, f: Array) -> _core.MarkerAt:
+    def _shifted_for(self, row: _core.ConstraintModel, f: Array) -> _core.MarkerAt:
         """A point of the ground from which f in the plane measures what it does in space: d_n is a constant."""
-        if row.kind != _core.RowKind.point or row.a.body >= 0:
+        if row.kind != _core.ConstraintKind.point or row.a.body >= 0:
             raise AcrossError
         a = self._ground @ self._parts.ground[row.a.marker].position
         marker = _core.PlanarMarker()

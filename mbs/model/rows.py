@@ -13,7 +13,7 @@ from .._core import TimeFunction
 from ..fields.orientations import OrientationLaw
 from .tree import Motion, Section
 
-RowKind = Literal["point", "slide", "dot", "rotation", "turn", "coordinate"]
+ConstraintKind = Literal["point", "slide", "dot", "rotation", "turn", "coordinate"]
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,7 @@ class ConstraintRow:
     """
 
     owner: str
-    kind: RowKind
+    kind: ConstraintKind
     a: Section
     b: Section
     f: Array

@@ -319,9 +319,9 @@ class MultibodySystem:
         known.append(section)
         return section.body, len(known) - 1
 
-    def _row(self, row: ConstraintRow) -> _core.RowModel:
-        found = _core.RowModel()
-        found.name, found.kind = row.owner, getattr(_core.RowKind, row.kind)
+    def _row(self, row: ConstraintRow) -> _core.ConstraintModel:
+        found = _core.ConstraintModel()
+        found.name, found.kind = row.owner, getattr(_core.ConstraintKind, row.kind)
         if row.kind == "coordinate":
             found.coordinate = row.coordinate
             return found

@@ -167,7 +167,7 @@ class Mechanism:
     bodies: list
     ground: list  # (position, triad)
     gravity: np.ndarray
-    rows: list = field(default_factory=list)  # RowModel
+    rows: list = field(default_factory=list)  # ConstraintModel
     row_sides: list = field(default_factory=list)  # ((body, marker), (body, marker)) of these
     wrenches: list = field(default_factory=list)  # (body, marker)
 
@@ -246,16 +246,16 @@ class Mechanism:
         row, ((body_a, a), (body_b, b)) = self.rows[k], self.row_sides[k]
         (R_a, r_a), (R_b, r_b) = self.section(frames, body_a, a), self.section(frames, body_b, b)
         f, g = np.array(row.f), np.array(row.g)
-        if row.kind == r.RowKind.rotation:
+        if row.kind == r.ConstraintKind.rotation:
             total = np.zeros(2)
             for sign, R in ((1, R_b), (-1, R_a)):
                 rate, change = R.c[1] @ R.c[0].T, 2 * R.c[2] @ R.c[0].T
                 for i, W in enumerate((rate, (change - change.T) / 2)):
                     total[i] += sign * f @ [W[2, 1], W[0, 2], W[1, 0]]
             return total
-        if row.kind == r.RowKind.dot:
+        if row.kind == r.ConstraintKind.dot:
             value = (R_a @ f) * (R_b @ g)
-        elif row.kind == r.RowKind.slide:
+        elif row.kind == r.ConstraintKind.slide:
             value = (R_a @ f) * (r_b - r_a)
         else:
             value = (r_b - r_a) * f

@@ -72,7 +72,7 @@ def state_near_rest(rng, mechanism, model, deflection, speed):
 
 
 def row(kind, a, b, f, g=(1, 0, 0), name="row"):
-    row = r.RowModel()
+    row = r.ConstraintModel()
     row.name, row.kind, row.a, row.b = name, kind, r.MarkerAt(*a), r.MarkerAt(*b)
     row.f, row.g = np.array(f, dtype=float), np.array(g, dtype=float)
     return row, (a, b)

@@ -104,16 +104,16 @@ def joint_of(assembly, indices):
 
 
 def row_of(measure, markers, number):
-    """A `RowModel` of a measure."""
-    row = r.RowModel()
+    """A `ConstraintModel` of a measure."""
+    row = r.ConstraintModel()
     row.name = measure.label
     (body_a, a), (body_b, b) = side(measure.a, markers), side(measure.b, markers)
     row.a, row.b = r.MarkerAt(number[body_a], a), r.MarkerAt(number[body_b], b)
     row.kind, row.f = {
-        Kind.x: lambda: (r.RowKind.point, np.array([1.0, 0, 0])),
-        Kind.y: lambda: (r.RowKind.point, np.array([0, 1.0, 0])),
-        Kind.angle: lambda: (r.RowKind.rotation, np.array([0, 0, 1.0])),
-        Kind.slide: lambda: (r.RowKind.slide, np.array([*measure.direction, 0.0])),
+        Kind.x: lambda: (r.ConstraintKind.point, np.array([1.0, 0, 0])),
+        Kind.y: lambda: (r.ConstraintKind.point, np.array([0, 1.0, 0])),
+        Kind.angle: lambda: (r.ConstraintKind.rotation, np.array([0, 0, 1.0])),
+        Kind.slide: lambda: (r.ConstraintKind.slide, np.array([*measure.direction, 0.0])),
     }[measure.kind]()
     return row
 

@@ -2,8 +2,8 @@
 
     python tests/references/make_references.py [NAME …]
 
-Without names of all cases and scenes: some two minutes. A reference that is met stays as it is, and gains what it lacks;
-of others the largest differences are printed, for the commit that makes them anew to explain.
+Without names of all cases and scenes: some two minutes. A reference that is met keeps its numbers, and gains what it
+lacks; of others the largest differences are printed, for the commit that makes them anew to explain.
 """
 
 import sys

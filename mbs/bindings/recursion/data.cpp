@@ -73,7 +73,7 @@ void bind_constraints(nb::module_ &m) {
       .value("planar", JointKind::planar)
       .value("weld", JointKind::weld)
       .value("free", JointKind::free);
-  nb::enum_<ConstraintKind>(m, "RowKind")
+  nb::enum_<ConstraintKind>(m, "ConstraintKind")
       .value("point", ConstraintKind::point)
       .value("slide", ConstraintKind::slide)
       .value("dot", ConstraintKind::dot)
@@ -86,7 +86,7 @@ void bind_constraints(nb::module_ &m) {
       .def_ro("body", &MarkerAt::body)
       .def_ro("marker", &MarkerAt::marker)
       .def_rw("only_forces", &MarkerAt::only_forces, "Of a wrench in the plane: its moment is zero at all times.");
-  nb::class_<ConstraintModel>(m, "RowModel",
+  nb::class_<ConstraintModel>(m, "ConstraintModel",
                               "A constraint row between markers a and b; see mbs/core/recursion/mechanism/model.h.")
       .def(nb::init<>())
       .def_rw("name", &ConstraintModel::name)

@@ -67,7 +67,7 @@ def test_rows_are_kept_along_a_motion_in_3d():
         random_body(rng, 2, J.revolute),
         random_body(rng, 2, J.spherical, parent=0, parent_marker=1),
     ]
-    rows = [row(r.RowKind.point, (-1, 1), (1, 2), axis) for axis in np.eye(3)[:2]]
+    rows = [row(r.ConstraintKind.point, (-1, 1), (1, 2), axis) for axis in np.eye(3)[:2]]
     mechanism = Mechanism(bodies, ground(rng, 2), np.array([0, 0, -9.81]), [x for x, _ in rows], [x for _, x in rows])
     model = mechanism.model()
     q, v = np.zeros(model.n_q), np.zeros(model.n_v)
@@ -124,7 +124,7 @@ def test_laws_that_share_parts():
     body, data = r.SpatialBody(), r.SpatialData()
     data.mass, data.J2, data.markers = 2.0, np.eye(3), [r.SpatialMarker()]
     body.name, body.joint, body.data = "mass", J.free, data
-    rows = [row(r.RowKind.point, (-1, 0), (0, 0), axis)[0] for axis in np.eye(3)]
+    rows = [row(r.ConstraintKind.point, (-1, 0), (0, 0), axis)[0] for axis in np.eye(3)]
     gravity = np.array([0.0, 0, -9.81])
     model = r.SpatialModel([body], [r.SpatialMarker()], rows, [], gravity)
     scene = _core.TreeScene()
@@ -144,7 +144,7 @@ def test_laws_that_share_parts():
 def test_dependent_rows_are_found_and_left_out():
     """The same point held twice: three of six rows are kept, motion as with three."""
     rng = np.random.default_rng(8)
-    rows = [row(r.RowKind.point, (-1, 1), (2, 1), axis) for axis in (*np.eye(3), *np.eye(3))]
+    rows = [row(r.ConstraintKind.point, (-1, 1), (2, 1), axis) for axis in (*np.eye(3), *np.eye(3))]
     bodies, bases = three_links(rng), ground(rng, 2)
     mechanism = Mechanism(bodies, bases, np.array([0, 0, -9.81]), [x for x, _ in rows], [x for _, x in rows])
     model = mechanism.model()
@@ -186,7 +186,7 @@ def test_orientations_are_those_of_the_scene(name):
 def test_a_section_follows_an_orientation():
     """A flexible arm on a free base: three rows about axes that turn as told hold, with their rates."""
     rng = np.random.default_rng(4)
-    turning, rows = r.SpatialMarker(), [row(r.RowKind.rotation, (-1, 1), (1, 1), axis)[0] for axis in np.eye(3)]
+    turning, rows = r.SpatialMarker(), [row(r.ConstraintKind.rotation, (-1, 1), (1, 1), axis)[0] for axis in np.eye(3)]
     turning.turns = True
     bodies = [random_body(rng, 2, J.free).core("a"), random_body(rng, 3, J.revolute).core("b")]
     bodies[1].parent, bodies[1].parent_marker = 0, 1
@@ -234,7 +234,7 @@ GENERALIZED_ALPHA = [(_core.MethodKind.generalized_alpha, 1.0, 0.0)]
 
 def sprung_tree(rng):
     """(model, scene, q, v): three damped links, the last in a moving plane, a stiff spring in the first joint."""
-    rows = [row(r.RowKind.point, (-1, 1), (2, 1), np.eye(3)[2])]
+    rows = [row(r.ConstraintKind.point, (-1, 1), (2, 1), np.eye(3)[2])]
     bodies = three_links(rng)
     bodies[0].driven = True
     bases = ground(rng, 2)

@@ -97,7 +97,7 @@ def test_trees_in_3d(seed, curved):
 @pytest.mark.parametrize("curved", [False, True], ids=["", "stiffened"])
 def test_rows_of_every_kind_in_3d(curved):
     rng = np.random.default_rng(4)
-    K = r.RowKind
+    K = r.ConstraintKind
     rows = [
         *(row(K.point, (-1, 1), (2, 1), axis) for axis in np.eye(3)),
         *(row(K.rotation, (-1, 1), (2, 2), axis) for axis in np.eye(3)[:2]),
@@ -172,7 +172,7 @@ def test_driven_coordinate_in_3d():
     rng = np.random.default_rng(6)
     bodies = [random_body(rng, 3, J.revolute), random_body(rng, 3, J.revolute, parent=0, parent_marker=1)]
     mechanism = Mechanism(bodies, ground(rng), GRAVITY)
-    driven, at = row(r.RowKind.coordinate, (0, 0), (0, 0), (1, 0, 0))
+    driven, at = row(r.ConstraintKind.coordinate, (0, 0), (0, 0), (1, 0, 0))
     driven.coordinate = mechanism.model().first[1][2]
     mechanism.rows, mechanism.row_sides = [driven], [at]
     check_mechanism(mechanism, rng)

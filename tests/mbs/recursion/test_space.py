@@ -25,11 +25,11 @@ def test_rows_in_several_blocks():
     rng = np.random.default_rng(3)
     bodies = [random_body(rng, 3, J.revolute if k == 4 else J.free, parent=-1 if k < 4 else 3) for k in range(6)]
     rows = [
-        row(r.RowKind.point, (k - 1, 1), (k, 2), axis, name=f"{k}")
+        row(r.ConstraintKind.point, (k - 1, 1), (k, 2), axis, name=f"{k}")
         for k in range(6)
         for axis in np.eye(3)[: 3 if k else 2]
     ]
-    rows.append(row(r.RowKind.slide, (-1, 0), (5, 1), (0.6, 0.8, 0.0)))
+    rows.append(row(r.ConstraintKind.slide, (-1, 0), (5, 1), (0.6, 0.8, 0.0)))
     check_balance(Mechanism(bodies, ground(rng, 2), GRAVITY, [x for x, _ in rows], [x for _, x in rows]), rng)
 
 
@@ -74,7 +74,7 @@ def test_trees(seed):
 def test_rows_of_every_kind():
     """Path of a point, two rotations, a slide to the ground, a right angle between bodies, a joint's coordinate."""
     rng = np.random.default_rng(4)
-    K = r.RowKind
+    K = r.ConstraintKind
     rows = [
         *(row(K.point, (-1, 1), (2, 1), axis) for axis in np.eye(3)),
         *(row(K.rotation, (-1, 1), (2, 2), axis) for axis in np.eye(3)[:2]),
@@ -96,7 +96,7 @@ def test_a_loop(modes):
         random_body(rng, modes, J.cylindrical, parent=2, parent_marker=2),
     ]
     bodies[2].parent_marker = 1
-    rows = [row(r.RowKind.point, (3, 1), (1, 2), axis) for axis in np.eye(3)]
+    rows = [row(r.ConstraintKind.point, (3, 1), (1, 2), axis) for axis in np.eye(3)]
     mechanism = Mechanism(bodies, ground(rng, 2), GRAVITY, [x for x, _ in rows], [x for _, x in rows])
     check_balance(mechanism, rng)
 
@@ -107,7 +107,7 @@ def test_a_driven_joint_coordinate():
     mechanism = Mechanism(bodies, ground(rng), GRAVITY)
     q, v = random_state(rng, mechanism, mechanism.model())
     coordinate = mechanism.model().first[1][2]
-    driven, _ = row(r.RowKind.coordinate, (0, 0), (0, 0), (1, 0, 0))
+    driven, _ = row(r.ConstraintKind.coordinate, (0, 0), (0, 0), (1, 0, 0))
     driven.coordinate = coordinate
     mechanism.rows = [driven]
     model = mechanism.model()

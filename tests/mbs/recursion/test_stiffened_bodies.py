@@ -43,7 +43,7 @@ def test_trees_of_bodies_with_and_without(seed):
 
 def test_rows_of_every_kind():
     rng = np.random.default_rng(4)
-    K = r.RowKind
+    K = r.ConstraintKind
     rows = [
         *(row(K.point, (-1, 1), (2, 1), axis) for axis in np.eye(3)),
         *(row(K.rotation, (-1, 1), (2, 2), axis) for axis in np.eye(3)[:2]),
@@ -62,7 +62,7 @@ def test_a_loop():
         random_body(rng, 3, J.universal, curved=True, parent_marker=1),
         random_body(rng, 3, J.cylindrical, curved=True, parent=2, parent_marker=2),
     ]
-    rows = [row(r.RowKind.point, (3, 1), (1, 2), axis) for axis in np.eye(3)]
+    rows = [row(r.ConstraintKind.point, (3, 1), (1, 2), axis) for axis in np.eye(3)]
     check(Mechanism(bodies, ground(rng, 2), GRAVITY, [x for x, _ in rows], [x for _, x in rows]), rng)
 
 
@@ -106,7 +106,7 @@ def test_derivatives_by_differences():
         random_body(rng, 3, joint, curved=True, line=k == 1, parent=k - 1, parent_marker=min(k, 1))
         for k, joint in enumerate(joints)
     ]
-    rows = [row(r.RowKind.point, (-1, 1), (2, 1), (0.6, 0.8, 0))]
+    rows = [row(r.ConstraintKind.point, (-1, 1), (2, 1), (0.6, 0.8, 0))]
     mechanism = Mechanism(bodies, ground(rng, 2), GRAVITY, [x for x, _ in rows], [x for _, x in rows])
     model = mechanism.model()
     q, v = random_state(rng, mechanism, model, deflection=0.3)
