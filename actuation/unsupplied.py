@@ -69,7 +69,7 @@ class Unsupplied:
         return f"no actuator provides all modal forces required on {of_links}.{of_point if self.point else ''}"
 
 
-def held_shift(motion: RobotMotion, modal: Mapping[str, Array], points: Iterable[str]) -> dict[str, Array]:
+def quasi_static_shift(motion: RobotMotion, modal: Mapping[str, Array], points: Iterable[str]) -> dict[str, Array]:
     """Shift (T, 3), m, global axes, of points by modal forces r (T, n) of modal body files, where motors stand still.
 
     To first order, and slowly: δp = −K⁻¹ r and δr = (∂r/∂p) δp. Vibration that a sudden lack of force starts can be
@@ -105,7 +105,7 @@ def seen_at_points(
     about: Unsupplied, motion: RobotMotion, modal: Mapping[str, Array], points: Iterable[str]
 ) -> Unsupplied:
     """With what modal forces r (T, n) that are left do to these points: `point` is the one that is farthest off."""
-    shift = {name: np.linalg.norm(found, axis=1) for name, found in held_shift(motion, modal, points).items()}
+    shift = {name: np.linalg.norm(found, axis=1) for name, found in quasi_static_shift(motion, modal, points).items()}
     point = max(shift, key=lambda name: float(shift[name].max()))
     kept, rows = shift[point], slice(None, None, max(1, len(motion.time) // ROWS))
     freed = np.linalg.norm(freed_shift(motion, modal, point, rows), axis=1)

@@ -111,14 +111,14 @@ def computed_modal_body(source: LinkSource) -> ModalBody:
     return body
 
 
-def held_mode_frequencies(links: Sequence[BeamLink], family: Family, number: int) -> Array | None:
+def fixed_mode_frequencies(links: Sequence[BeamLink], family: Family, number: int) -> Array | None:
     """Frequencies of beams that differ a little by a mode of the first one, held: see `beam.rayleigh`.
 
     Raises `SolveError` where the modes cannot be computed.
     """
-    from .beam.rayleigh import held_mode_frequencies  # loads SciPy
+    from .beam.rayleigh import fixed_mode_frequencies  # loads SciPy
 
-    return held_mode_frequencies(links, family, number)
+    return fixed_mode_frequencies(links, family, number)
 
 
 def _beside(source: LinkSource) -> list[Path]:

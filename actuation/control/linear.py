@@ -12,7 +12,7 @@ from ...mbs.analysis.outcome import Outcome
 from ...mbs.fields.field_types import PointReference
 from ...mbs.fields.references import Reference
 from ...mbs.model.model import Model, modal_directions
-from ...mbs.solve.held_joints import held_joints
+from ...mbs.solve.joint_conditions import joint_conditions
 from ...mbs.solve.linearisation import LinearEquations, LinearMechanism
 from ..context import ActuatedContext
 from ..patches.link_patches import LinkPatches
@@ -51,7 +51,7 @@ def make_linear_models(context: ActuatedContext, analysis: Linear, about: Operat
         linearization.at(float(t), q, v, a) for t, q, v, a in zip(about.time, about.q, about.v, about.a, strict=True)
     ]
     models = [state_space(one, voltages_at(free, one, context.patches)) for one in mechanisms]
-    return replace(analyse(tuple(models)), held=tuple(map(held_joints, mechanisms)))
+    return replace(analyse(tuple(models)), conditions=tuple(map(joint_conditions, mechanisms)))
 
 
 def voltages_at(model: Model, mechanism: LinearMechanism, patches: Mapping[str, LinkPatches]) -> dict[str, Array]:

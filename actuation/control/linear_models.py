@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from itertools import combinations
 
 from ...mbs.analysis.outcome import Details
-from ...mbs.solve.held_joints import HeldJoints
+from ...mbs.solve.joint_conditions import JointCondition
 from ...mbs.solve.robot_modes import RobotModes
 from .linear_model import LinearModel
 from .modes import Reach, controllability, observability, robot_modes
@@ -21,8 +21,8 @@ class LinearModels(Details):
 
     `controllable`: by motors and patches together; `observable`: by joints and points together; `zeros` by
     (inputs, outputs): from each motor to its own joint and to each coordinate of a point, from all motors to their
-    joints (the frequencies with held joints), and to as many coordinates of a point. `suggested`: gains of joint PD
-    controllers and the longest sample time (s) for them, of all models. `held`: see `held_joints`.
+    joints (the frequencies with locked joints), and to as many coordinates of a point. `suggested`: gains of joint PD
+    controllers and the longest sample time (s) for them, of all models. `conditions`: see `joint_conditions`.
     """
 
     models: tuple[LinearModel, ...]
@@ -31,7 +31,7 @@ class LinearModels(Details):
     observable: tuple[Reach, ...]
     zeros: Mapping[tuple[str, ...], tuple[Zeros, ...]]
     suggested: tuple[Suggestion, float] | None = None
-    held: tuple[Mapping[str, HeldJoints], ...] = ()
+    conditions: tuple[Mapping[str, JointCondition], ...] = ()
 
     @property
     def times(self) -> tuple[float, ...]:

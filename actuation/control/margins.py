@@ -14,7 +14,7 @@ import numpy as np
 
 from ...common.arrays import Array, ComplexArray, as_floats
 from .linear_model import LinearModel
-from .modes import held_frequencies
+from .modes import locked_frequencies
 from .records import ControllerRecord, JointPid, ModalVelocity
 from .sampling import sampled
 
@@ -102,7 +102,7 @@ def lowest_frequency(
     The lowest with all motors held and, where joints have PID controllers alone, of the sampled loop: its eigenvalues
     e^{sT} that are damped by less than `LIGHTLY`. With others half of the lowest with motors held.
     """
-    locked = min((float(held_frequencies(model).min(initial=np.inf)) for model in models), default=np.inf)
+    locked = min((float(locked_frequencies(model).min(initial=np.inf)) for model in models), default=np.inf)
     pids = [record for record in controllers if isinstance(record, JointPid)]
     if any(not isinstance(record, JointPid | ModalVelocity) for record in controllers):
         locked *= 0.5

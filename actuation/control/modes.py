@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...common.arrays import Array, as_floats
-from ...mbs.solve.held_joints import free_directions
+from ...mbs.solve.joint_conditions import free_directions
 from ...mbs.solve.robot_modes import RIGID, RobotModes
 from ...mbs.solve.robot_modes import robot_modes as modes_of
 from .linear_model import LinearModel, Names
@@ -21,7 +21,7 @@ def robot_modes(model: LinearModel) -> RobotModes:
     return modes_of(K, D, np.linalg.inv(np.linalg.cholesky(model.mass)).T, model.transformation)
 
 
-def held_frequencies(model: LinearModel) -> Array:
+def locked_frequencies(model: LinearModel) -> Array:
     """Undamped frequencies, Hz, the lowest first, with the shafts of all motors locked: of NᵀK̂ N, BᵀN = 0."""
     K, _, B, _ = model.second_order
     N = free_directions(B[:, [k for k, name in enumerate(model.input_names) if name.startswith("joint/")]].T)

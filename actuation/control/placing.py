@@ -114,7 +114,7 @@ class ModalReach:
     share: Array
 
 
-def held_modes(model: LinearModel, link: PatchableLink, count: int) -> ModalReach:
+def locked_modes(model: LinearModel, link: PatchableLink, count: int) -> ModalReach:
     """The lowest modes of the robot with its motors held in which the link bends."""
     from scipy.linalg import eigh
 
@@ -159,7 +159,7 @@ def place(
         most = link.served if F_p is None else min(count, link.served)
         raise InputError(f"{key}.modes: expected at most {most}, found {modes}")
     candidates = _candidates(scene_path, wanted, link, count)
-    reach = held_modes(model, link, modes) if model is not None else link_modes(link, modes)
+    reach = locked_modes(model, link, modes) if model is not None else link_modes(link, modes)
     even = link.patches(count=count, centers=None)
     largest = np.square(reach.shape @ candidates.Phi_V).max(axis=1)
     if not np.all(largest > 0.0):

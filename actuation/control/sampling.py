@@ -25,8 +25,8 @@ def sampled(A: Array, B: Array, T: float, delay: float) -> SampledModel:
     n, m = B.shape
     late, fraction = divmod(delay, T)
     waiting = int(late) + (fraction > 1e-9 * T)
-    Phi, Gamma = _held(A, B, T)
-    _, early = _held(A, B, T - fraction) if fraction > 1e-9 * T else (Phi, Gamma)
+    Phi, Gamma = _zero_order_hold(A, B, T)
+    _, early = _zero_order_hold(A, B, T - fraction) if fraction > 1e-9 * T else (Phi, Gamma)
     whole = np.zeros((n + waiting * m, n + waiting * m))
     inputs = np.zeros((n + waiting * m, m))
     whole[:n, :n] = Phi
@@ -47,7 +47,7 @@ def sampled(A: Array, B: Array, T: float, delay: float) -> SampledModel:
     return SampledModel(whole, inputs)
 
 
-def _held(A: Array, B: Array, T: float) -> tuple[Array, Array]:
+def _zero_order_hold(A: Array, B: Array, T: float) -> tuple[Array, Array]:
     """e^{A T} and ∫ e^{A s} ds B over T."""
     from scipy.linalg import expm
 

@@ -16,7 +16,7 @@ import numpy as np
 from ...common.arrays import Array, as_floats
 from .linear_model import LinearModel
 from .margins import STABLE, Margins, joint_gains, motor_inputs, spectral_radius
-from .modes import held_frequencies
+from .modes import locked_frequencies
 from .records import JointPid
 
 FRACTION = 1 / 3  # of the lowest frequency with held motors
@@ -74,7 +74,7 @@ def suggested_gains(
     if len(known) < len(models) or not known[0].size:
         return None
     J = np.max(known, axis=0)
-    lowest = min((held_frequencies(model).min(initial=np.inf) for model in models), default=np.inf)
+    lowest = min((locked_frequencies(model).min(initial=np.inf) for model in models), default=np.inf)
     omega = 2 * np.pi * min(FRACTION * lowest, 1 / (SAMPLES * T))
     names = [models[0].input_names[k].removeprefix("joint/") for k in motor_inputs(models[0])]
     for _ in range(MOST_TIMES):
@@ -92,7 +92,7 @@ def unhurried_gains(models: Sequence[LinearModel]) -> tuple[Suggestion, float] |
 
     Of a 1-2-5 series from 10 ms down to 10 µs, without delay; None of a robot that does not bend, or without such one.
     """
-    lowest = min(held_frequencies(model).min(initial=np.inf) for model in models)
+    lowest = min(locked_frequencies(model).min(initial=np.inf) for model in models)
     for T in SAMPLE_TIMES if np.isfinite(lowest) else ():
         found = suggested_gains(models, T)
         if found is not None and found.bandwidth > 0.999 * FRACTION * lowest:

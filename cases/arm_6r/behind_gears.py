@@ -1,4 +1,4 @@
-"""The arm with gears that give: its motors go where controllers hold them, the joints behind them where gears let them.
+"""The arm with compliant gears: its motors go where controllers hold them, the joints behind them where gears let them.
 
     .venv/bin/python cases/arm_6r/behind_gears.py
 

@@ -19,7 +19,7 @@ from .link import loaded_models
 GAP = 1e-3  # between neighbouring ω², relative: closer ones may turn into each other
 
 
-def held_mode_frequencies(links: Sequence[BeamLink], family: Family, number: int) -> Array | None:
+def fixed_mode_frequencies(links: Sequence[BeamLink], family: Family, number: int) -> Array | None:
     """(n,) Hz of `links` by the mode `number`, from 1, of `family` of the first one.
 
     None where its frequency is not simple, or the links differ in their meshes.

@@ -21,7 +21,7 @@ from .strain_energy import strain_energy
 from .supports import Flexibility
 
 
-class HeldFlexibility:
+class FixedInterfaceFlexibility:
     """Of a body whose interfaces rest, as `Flexibility`; vectors hold this rank's own degrees of freedom.
 
     Args:
@@ -50,10 +50,12 @@ class HeldFlexibility:
 
 def fixed_interfaces(
     flexibility: Flexibility, families: Sequence[Family], interfaces: Mapping[str, Array]
-) -> HeldFlexibility:
+) -> FixedInterfaceFlexibility:
     """Held at all interfaces but the root, in the directions of `families`; rows B (6, 3 owned) of each interface."""
     moving = sorted({k for family in families for k in COMPONENTS[family]})
-    return HeldFlexibility(flexibility, np.concatenate([B[moving] for name, B in interfaces.items() if name != ROOT]))
+    return FixedInterfaceFlexibility(
+        flexibility, np.concatenate([B[moving] for name, B in interfaces.items() if name != ROOT])
+    )
 
 
 def ritz_modes(model: SolidModel, both: SolidModes, count: int) -> SolidModes:

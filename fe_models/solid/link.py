@@ -44,7 +44,7 @@ ELEMENTS = (20, 40)
 
 # Components (translation 0 … 2, rotation 3 … 5) that each reference condition holds at root and tip.
 _CLAMPED: dict[str, tuple[int, ...]] = {"root": (0, 1, 2, 3, 4, 5), "tip": ()}
-HELD = {
+SUPPORTS = {
     **dict.fromkeys(HOLDING_ROOT, _CLAMPED),
     "simply-supported": {"root": (0, 1, 2, 3), "tip": (1, 2)},
 }
@@ -90,7 +90,7 @@ def solid_modal_body(
     x, element = _station_grid(link, solid)
     sections = section_averages(model, x)
     progress(f"{link.name}: factorising {3 * model.V.dofmap.index_map.size_global} unknowns")
-    flexibility = _held(link, model, solid, places, path)
+    flexibility = _supported(link, model, solid, places, path)
     mass = _loaded(link, model, places)
     progress(f"{link.name}: solving for the static shapes")
     loads = unit_loads(model, places.rows)
@@ -125,7 +125,7 @@ def solid_modal_body(
     integrals = with_lumped_masses(shape_integrals(model, X), attached)
     omega = np.sqrt(modes.omega2)
     progress(f"{link.name}: integrating the geometric stiffness")
-    supports = {} if link.coupling == "rigid" else HELD[link.reference.condition]
+    supports = {} if link.coupling == "rigid" else SUPPORTS[link.reference.condition]
     stiffness = without_their_turn(
         prestressed(model, X, shapes), flexibility, loads, shapes, places.rows, interfaces, supports
     )
@@ -194,9 +194,9 @@ def _places(link: SolidLink, model: SolidModel, solid: SolidMesh) -> Places:
     return Places(averages, {name: one.rows(model)[0] for name, one in averages.items()}, link.couplings)
 
 
-def _held(link: SolidLink, model: SolidModel, solid: SolidMesh, places: Places, path: Path) -> Flexibility:
+def _supported(link: SolidLink, model: SolidModel, solid: SolidMesh, places: Places, path: Path) -> Flexibility:
     """The body held by its reference condition, faces with rigid coupling made plates."""
-    held = HELD[link.reference.condition]
+    held = SUPPORTS[link.reference.condition]
     plates = sorted(name for name, coupling in link.couplings.items() if coupling == "rigid")
     faces, taken = [], np.zeros(model.owned, dtype=bool)
     for name in plates:

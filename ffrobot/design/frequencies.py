@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from ..common.errors import InputError
-from ..fe_models.link import held_mode_frequencies
+from ..fe_models.link import fixed_mode_frequencies
 from ..fe_models.link_records import BeamLink
 from ..sweep.files import LINKS
 from .derivatives import SIZES, Base, Entry, Exact
@@ -52,7 +52,7 @@ def _of_beam(path: Path, base: Base, k: int, goal: Frequency, reading: Reading) 
     except InputError:  # on one side no value is allowed
         return None
     family, number = reading.mode.rsplit(" ", 1)
-    frequencies = held_mode_frequencies(links, next(one for one in links[0].families if one == family), int(number))
+    frequencies = fixed_mode_frequencies(links, next(one for one in links[0].families if one == family), int(number))
     if frequencies is None:
         return None
     found = derivative(offsets, frequencies)

@@ -8,7 +8,7 @@ from typing import Any
 
 from ..actuation.control.linear_model import LinearModel
 from ..actuation.control.linear_models import LinearModels
-from ..actuation.control.modes import held_frequencies, robot_modes
+from ..actuation.control.modes import locked_frequencies, robot_modes
 from ..common.arrays import Array, as_floats
 from ..common.errors import InputError
 from ..common.toml_files import load_toml, read_text
@@ -54,7 +54,7 @@ class RobotTarget:
         solution = solve_scene(make_scene(folder=self._path.parent, **scene), Watcher())
         details = solution.outcomes["fit"].details
         assert isinstance(details, LinearModels)
-        frequency = held_frequencies(details.models[0]) if self._motors == "held" else _free(details.models[0])
+        frequency = locked_frequencies(details.models[0]) if self._motors == "held" else _free(details.models[0])
         return ("",) * len(frequency), frequency
 
     def files(self, changes: dict[Key, float], output: Path | None) -> dict[Path, str]:

@@ -13,8 +13,8 @@ from ..actuation.control.metrics import DEFINITIONS
 from ..actuation.control.placing import Placed
 from ..common.arrays import Array
 from ..mbs.analysis.outcome import Details
-from ..mbs.analysis.static import HeldRobot
-from ..mbs.solve.held_joints import translational_stiffness
+from ..mbs.analysis.static import RobotAtRest
+from ..mbs.solve.joint_conditions import translational_stiffness
 from .closed_loops import LOOP_COLUMNS, loop_row
 from .tables import plain_table
 
@@ -27,12 +27,17 @@ def control_tables(details: Mapping[str, Details]) -> Iterator[Table]:
     """A table of each kind that was found, from what analyses found by name."""
     loops = [loop_row(name, found.metrics) for name, found in details.items() if isinstance(found, LoopRecord)]
     linear = [row for name, found in details.items() if isinstance(found, LinearModels) for row in _linear(name, found)]
-    held = [row for name, found in details.items() if isinstance(found, HELD) for row in _held(name, found)]
+    at_rest = [
+        row
+        for name, found in details.items()
+        if isinstance(found, WITH_CONDITIONS)
+        for row in _condition_rows(name, found)
+    ]
     placements = [_placement(name, found) for name, found in details.items() if isinstance(found, Placed)]
     for columns, rows in (
         (LOOP_COLUMNS, loops),
         (LINEAR_COLUMNS, linear),
-        (HELD_COLUMNS, held),
+        (CONDITION_COLUMNS, at_rest),
         (PLACEMENT_COLUMNS, placements),
     ):
         if rows:
@@ -53,13 +58,20 @@ def _linear(name: str, found: LinearModels) -> Iterator[tuple[str, ...]]:
         yield name, f"{model.time:g}", f"{model.freedom}", lowest, f"{modes.growth:.3g}" if modes.growth else ""
 
 
-HELD = (LinearModels, HeldRobot)
-HELD_COLUMNS = ("joints", "t (s)", "natural frequencies (Hz)", "at", "stiffness along axes\n(N/mm)", "least, along")
+WITH_CONDITIONS = (LinearModels, RobotAtRest)
+CONDITION_COLUMNS = (
+    "joints",
+    "t (s)",
+    "natural frequencies (Hz)",
+    "at",
+    "stiffness along axes\n(N/mm)",
+    "least, along",
+)
 
 
-def _held(name: str, found: LinearModels | HeldRobot) -> Iterator[tuple[str, ...]]:
+def _condition_rows(name: str, found: LinearModels | RobotAtRest) -> Iterator[tuple[str, ...]]:
     """Natural frequencies with motors at rest, and the stiffness of points, at every time."""
-    for t, at in zip(found.times, found.held, strict=True):
+    for t, at in zip(found.times, found.conditions, strict=True):
         for condition, held in at.items():
             frequency = held.modes.frequency
             lowest = ", ".join(f"{f:.4g}" for f in frequency[frequency > 0.0][:FREQUENCIES]) or "none"

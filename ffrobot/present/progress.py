@@ -29,7 +29,7 @@ class Display(Watcher):
         self._task: TaskID | None = None
         self.signal = 0  # that has asked for an end
         self._title = ""
-        self._began = self._told = time.monotonic()
+        self._began = self._last_shown = time.monotonic()
 
     def __enter__(self) -> Display:
         if sys.stderr.isatty() and is_first():
@@ -74,6 +74,6 @@ class Display(Watcher):
     def _tell(self, reached: str = "") -> None:
         """A line on the error stream where the last one is long ago: nothing of short runs."""
         now = time.monotonic()
-        if now - self._told > EVERY and is_first():
-            self._told = now
+        if now - self._last_shown > EVERY and is_first():
+            self._last_shown = now
             print(f"ffrobot: {self._title}{reached} ({now - self._began:.0f} s)", file=sys.stderr, flush=True)

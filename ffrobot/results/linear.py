@@ -13,9 +13,9 @@ from ..actuation.control.linear_model import LinearModel, save_arrays
 from ..actuation.control.linear_models import LinearModels
 from ..actuation.control.zeros import Zeros
 from ..common.arrays import Array
-from ..mbs.analysis.static import HeldRobot
+from ..mbs.analysis.static import RobotAtRest
 from ..mbs.quantities.motion import RobotMotion
-from ..mbs.solve.held_joints import COMPLIANT, LOCKED, translational_stiffness
+from ..mbs.solve.joint_conditions import COMPLIANT, LOCKED, translational_stiffness
 
 MATRICES = ("A", "B", "C", "D", "mass", "transformation")
 NAMES = ("state_names", "input_names", "output_names")
@@ -30,7 +30,7 @@ def write_linear(group: h5py.Group, motion: RobotMotion, linear: LinearModels) -
     """Of an analysis: linear/, and what is held; `motion` is what it is about."""
     n_v, space = motion.model.tree.n_v, motion.space
     shapes = _shapes(motion, np.array([modes.motion.real for modes in linear.modes]))
-    write_held(group, motion, linear)
+    write_joint_conditions(group, motion, linear)
     if space.is_plane:
         models = (replace(model, transformation=_of_frames(motion, k) @ model.transformation[:n_v])
                   for k, model in enumerate(linear.models))  # fmt: skip
@@ -38,10 +38,10 @@ def write_linear(group: h5py.Group, motion: RobotMotion, linear: LinearModels) -
     _write_models(group, linear, shapes)
 
 
-def write_held(group: h5py.Group, motion: RobotMotion, found: LinearModels | HeldRobot) -> None:
-    """Of an analysis, by condition of the joints (`held_joints`): joints_locked/ and joints_compliant/."""
-    for condition in found.held[0]:
-        held, own = [at[condition] for at in found.held], group.create_group(f"joints_{condition}")
+def write_joint_conditions(group: h5py.Group, motion: RobotMotion, found: LinearModels | RobotAtRest) -> None:
+    """Of an analysis, by condition of the joints (`joint_conditions`): joints_locked/ and joints_compliant/."""
+    for condition in found.conditions[0]:
+        held, own = [at[condition] for at in found.conditions], group.create_group(f"joints_{condition}")
         own["frequency"] = np.array([one.modes.frequency for one in held])
         own["damping_ratio"] = np.array([one.modes.damping_ratio for one in held])
         _write_shapes(own, _shapes(motion, np.array([one.modes.motion.real for one in held])))

@@ -12,8 +12,8 @@ from pathlib import Path
 import h5py
 
 from ..common.hdf5 import blaming
-from ..run.enough import goes_on
 from ..run.prepare import with_stiffening
+from ..run.refinement import goes_on
 from ..run.solution import Solution
 from ..run.solve import Keep, prepare_scene, run_analyses
 from ..run.watcher import Watcher

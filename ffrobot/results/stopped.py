@@ -5,7 +5,7 @@ from __future__ import annotations
 from ..common.arrays import Array
 from ..common.errors import InputError
 from ..mbs.analysis.outcome import Outcome
-from ..run.enough import goes_on
+from ..run.refinement import goes_on
 from ..run.solution import Solution
 from .file import Results
 

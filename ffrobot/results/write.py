@@ -18,7 +18,7 @@ from ..common.checksum import METHOD as CHECKSUM
 from ..common.files import write_atomically
 from ..common.version import program_version
 from ..mbs.analysis.outcome import Details, Outcome
-from ..mbs.analysis.static import HeldRobot
+from ..mbs.analysis.static import RobotAtRest
 from ..mbs.analysis.tracking import TrackedPath
 from ..mbs.fields.steps import DATASET, METHOD
 from ..mbs.quantities.motion import RobotMotion
@@ -29,14 +29,14 @@ from .bodies import write_bending, write_bodies, write_stress
 from .control import write_loop
 from .file import FORMAT
 from .forces import write_joints, write_paths
-from .linear import write_held, write_linear
+from .linear import write_joint_conditions, write_linear
 from .peaks import write_peaks
 from .resume import write_state
 
 FORMAT_VERSION = 1
 
 DETAILS: dict[type[Details], Callable[[h5py.Group, RobotMotion, Any], None]] = {
-    HeldRobot: write_held,
+    RobotAtRest: write_joint_conditions,
     LinearModels: write_linear,
     LoopRecord: write_loop,
     Placed: write_placement,

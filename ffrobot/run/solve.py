@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from ..actuation.context import ActuatedContext
 from ..actuation.feasibility import Feasibility
 from ..actuation.point_forces import forces_at_points, solve_points
-from ..actuation.unsupplied import held_shift
+from ..actuation.unsupplied import quasi_static_shift
 from ..common.arrays import Array
 from ..common.errors import FfrobotError, InputError, SolveError, of_file
 from ..mbs.analysis.operating_points import InstantAnalysis, open_loop_growth
@@ -22,14 +22,13 @@ from ..mbs.quantities.energy import totals
 from ..mbs.quantities.motion import RobotMotion
 from ..mbs.quantities.reactions import reactions
 from ..mbs.quantities.sharing import shared_evenly
-from ..mbs.quantities.validity import NOTABLE
+from ..mbs.quantities.validity import NOTABLE_STIFFNESS_CHANGE
 from ..mbs.scene.analysis import Analysis
 from ..mbs.solve.reach import turned_guesses
 from ..scene.load import load_scene
 from ..scene.scene import Scene
 from .actuation import find_actuation, missing_forces
 from .bodies import load_bodies
-from .enough import completed, goes_on, is_replayed, log_outcome, progress_of, with_enough_modes, with_enough_pieces
 from .finer import with_finer_check
 from .mode_choice import mode_levels, reported_modes
 from .mode_search import ModeSearch, error_tolerances
@@ -42,6 +41,7 @@ from .prepare import (
     with_scene,
     with_stiffening,
 )
+from .refinement import completed, goes_on, is_replayed, log_outcome, progress_of, with_enough_modes, with_enough_pieces
 from .solution import AnalysisResult, Solution
 from .stresses import find_stresses
 from .watcher import Interruption, Watcher
@@ -168,7 +168,7 @@ def _run_all(solution: Solution, watcher: Watcher, interruption: Interruption) -
         except Exception as error:  # raised once the integration is kept
             return _unread(replace(solution, analyses=results, seconds=seconds), run, error)
         automatic = solution.scene.geometric_stiffening == "auto" and not solution.stiffened
-        if automatic and result.stiffening_effect > NOTABLE and run.status != "interrupted":
+        if automatic and result.stiffening_effect > NOTABLE_STIFFNESS_CHANGE and run.status != "interrupted":
             return None
         results[analysis.name] = result
         seconds[analysis.name] = time.perf_counter() - began
@@ -249,7 +249,7 @@ def _predicted_shift(solution: Solution, found: AnalysisResult) -> dict[str, Arr
         except InputError:
             return {}
         motion = RobotMotion(as_links.model, as_links.time, as_links.q, as_links.v, as_links.a, as_links.multipliers)
-    return held_shift(motion, forces, points)
+    return quasi_static_shift(motion, forces, points)
 
 
 def _evaluated(solution: Solution, run: Outcome, twists: Mapping[str, BSpline] | None = None) -> AnalysisResult:

@@ -37,17 +37,17 @@ class Worker:
 
     def __init__(self) -> None:
         self.place = _place()
-        self._told = TemporaryFile("a+b")  # noqa: SIM115 (as long as the worker)
+        self._messages = TemporaryFile("a+b")  # noqa: SIM115 (as long as the worker)
         command = [sys.executable, "-m", "ffrobot.worker"]
         environment = environment_without_mpi() | ALONE
-        self._process = Popen(command, env=environment, stdin=PIPE, stdout=PIPE, stderr=self._told)
+        self._process = Popen(command, env=environment, stdin=PIPE, stdout=PIPE, stderr=self._messages)
         assert self._process.stdin is not None
         assert self._process.stdout is not None
         self._requests, self._answers = self._process.stdin, self._process.stdout
 
     def perform(self, arguments: list[str]) -> Done:
         """`ffrobot ARGUMENTS`; exit code and messages are those of the worker where it ends with the run."""
-        self._told.truncate(0)
+        self._messages.truncate(0)
         answer = b""
         with suppress(BrokenPipeError):
             self._requests.write(json.dumps({"arguments": arguments}).encode() + b"\n")
@@ -55,8 +55,8 @@ class Worker:
             answer = self._answers.readline()
         found: dict[str, Any] = json.loads(answer) if answer.endswith(b"\n") else {}
         code = int(found["code"]) if found else self._process.wait()
-        self._told.seek(0)
-        return Done(code, self._told.read().decode(errors="replace"), found.get("imported", {}))
+        self._messages.seek(0)
+        return Done(code, self._messages.read().decode(errors="replace"), found.get("imported", {}))
 
     @property
     def is_alive(self) -> bool:
@@ -73,7 +73,7 @@ class Worker:
             self._requests.close()
         self._answers.close()
         self._process.wait()
-        self._told.close()
+        self._messages.close()
 
 
 class Workers:

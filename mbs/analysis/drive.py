@@ -195,7 +195,7 @@ def _between(
         chosen, of_rows = as_list(times[rows]), np.ascontiguousarray(states[rows])
         if control is None:
             return _core.tree_outputs(core, scene, chosen, of_rows, system.replay)
-        held = system.held_forces(control.commands)
+        held = system.zero_order_hold(control.commands)
         return _core.tree_outputs_under(core, scene, chosen, of_rows, held, control.held(times[rows]))
 
     rows = worth_a_look(len(times), lambda rows: system.multipliers(at(rows).multipliers))
@@ -240,7 +240,7 @@ def _integrated(
         )  # fmt: skip
     return _core.tree_sampled(
         model=core, scene=scene, times=as_list(times), q=start.q, v=start.v, controls=controls,
-        carry_on=progress, held=system.held_forces(control.commands), first_command=control.first,
+        carry_on=progress, held=system.zero_order_hold(control.commands), first_command=control.first,
         samples=as_list(control.times), delay=control.delay, controller=control.controller,
         between=continuation.samples,
     )  # fmt: skip

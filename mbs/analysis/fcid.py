@@ -21,7 +21,7 @@ from ..fields.references import Reference
 from ..fields.waypoints import spline
 from ..model.body import Body
 from ..model.divided_link import DividedLink
-from ..model.gears import refuse_held_motors
+from ..model.gears import refuse_prescribed_motors
 from ..model.motors import driven_mechanism, fastest_mechanism
 from ..scene.analysis import Check, Need, TimedAnalysis
 from ..solve.posture import check_path, mobility
@@ -97,7 +97,7 @@ def run_fcid(context: Context, analysis: Fcid) -> Outcome:
     Raises `InputError` where the trajectories do not fix the motion of the mechanism or cannot be followed,
     `SolveError` where no posture, or no static shape, is found.
     """
-    refuse_held_motors(context.model, analysis)
+    refuse_prescribed_motors(context.model, analysis)
     model = resolved(context.model, analysis.last_time)
     check_reach(model, analysis.last_time)
     q = undeformed_posture(model).q

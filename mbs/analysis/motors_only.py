@@ -21,7 +21,7 @@ from ...common.errors import InputError, SolveError
 from ...common.numbers import MOST_OUTPUTS
 from ..fields.field_types import NotNegative
 from ..fields.waypoints import spline
-from ..model.gears import refuse_held_motors
+from ..model.gears import refuse_prescribed_motors
 from ..model.model import Model, row_values, without_paths
 from ..scene.analysis import Check, Need, TimedAnalysis, output_times
 from ..solve.integrators import Choice
@@ -46,7 +46,7 @@ from .samples import path_times
 FACTOR_STEP = 0.02  # of the search for the largest factor
 MARGIN = 0.9  # of it that is taken: at the limit hardly damped motions are excited most
 SINGULAR = 1e-13  # of M of the internal dynamics, scaled
-NOTABLE = 1e-9  # m, rad: of a path that is left
+PATH_TOLERANCE = 1e-9  # m, rad: of a path that is left
 
 
 class MotorsOnly(TimedAnalysis):
@@ -110,7 +110,7 @@ def run_motors_only(context: Context, analysis: MotorsOnly) -> Outcome:
         reached = reached if t is None else t
         return context.progress(reached)
 
-    refuse_held_motors(model, analysis)
+    refuse_prescribed_motors(model, analysis)
     try:
         servo, linear = choose_output(partial(make_servo, model, analysis.end, place, progress), analysis)
         needs_future = bool(linear.is_future[0].any())
@@ -134,7 +134,7 @@ def run_motors_only(context: Context, analysis: MotorsOnly) -> Outcome:
         between = path_times(run.time, model.scene.trajectory, analysis.end)
         return replace(_run(analysis, model, inversion, between), details=around)
 
-    statistics = replace(run.statistics, wall_seconds=seconds, warnings=_told(inversion, run))
+    statistics = replace(run.statistics, wall_seconds=seconds, warnings=_warnings(inversion, run))
     return replace(run, details=around, statistics=statistics, look_closer=look_closer)
 
 
@@ -166,14 +166,14 @@ def path_errors(held: Model, times: Array, q: Array) -> dict[str, Array]:
     return {path.name: C[:, [owner == path.name for owner in owners]] for path in held.scene.trajectory}
 
 
-def _told(inversion: Inversion[Servo], run: Outcome) -> tuple[str, ...]:
+def _warnings(inversion: Inversion[Servo], run: Outcome) -> tuple[str, ...]:
     """How far a redefined output leaves the path itself."""
     texts = []
     if not run.failed and inversion.servo.factor < 1:
         off = max(
             float(np.abs(of).max(initial=0.0)) for of in path_errors(inversion.servo.model, run.time, run.q).values()
         )
-        if off > NOTABLE:
+        if off > PATH_TOLERANCE:
             texts.append(
                 f"a point with {inversion.servo.factor:.2g} of the vibration follows the path: that of the trajectory"
                 f" is off by up to {off:.3g} (m or rad)"

@@ -10,7 +10,7 @@ from ...common.errors import InputError, SolveError
 from ..fields.field_types import PointReference
 from ..fields.references import Reference
 from ..scene.analysis import Analysis
-from ..solve.held_joints import HeldJoints, held_joints
+from ..solve.joint_conditions import JointCondition, joint_conditions
 from ..solve.linearisation import LinearEquations
 from .context import Context
 from .equilibrium import run_static
@@ -19,10 +19,10 @@ from .outcome import Details, Outcome
 
 
 @dataclass(frozen=True)
-class HeldRobot(Details):
-    """Natural frequencies and compliance in the equilibrium, by condition of its joints: see `held_joints`."""
+class RobotAtRest(Details):
+    """Natural frequencies and compliance in the equilibrium, by condition of its joints: see `joint_conditions`."""
 
-    held: tuple[Mapping[str, HeldJoints], ...]
+    conditions: tuple[Mapping[str, JointCondition], ...]
     times = (0.0,)
 
 
@@ -54,4 +54,4 @@ class Static(Analysis):
             text = f"no natural frequencies and no compliance: {error}"
             statistics = replace(found.statistics, warnings=(*found.statistics.warnings, text))
             return replace(found, statistics=statistics)
-        return replace(found, details=HeldRobot((held_joints(mechanism),)))
+        return replace(found, details=RobotAtRest((joint_conditions(mechanism),)))

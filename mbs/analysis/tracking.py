@@ -20,7 +20,7 @@ from ...common.arrays import Array, as_floats, as_list
 from ...common.errors import InputError, SolveError
 from ...common.validation import Record
 from ..fields.field_types import NotNegative, Positive
-from ..model.gears import refuse_held_motors
+from ..model.gears import refuse_prescribed_motors
 from ..model.model import Model, modal_directions, without_paths
 from ..scene.analysis import Check, Need, TimedAnalysis, output_times
 from ..solve.integrators import Choice
@@ -172,7 +172,7 @@ def run_tracking(context: Context, analysis: Tracking) -> Outcome:
         posed = _pose(model, context.patches, analysis, progress)
         least = track(posed.asked, posed.breaks)
         _check_found(context, posed, least)
-        texts = list(_told(context, posed, analysis, least))
+        texts = list(_warnings(context, posed, analysis, least))
         found, objective = _solve(posed, analysis, least)
         texts += _of_mesh(found, analysis)
         bounds = _bounds(posed)
@@ -215,7 +215,7 @@ def least_voltage(model: Model, patches: Mapping[str, PatchedLink], analysis: Tr
 def _pose(model: Model, patches: Mapping[str, PatchedLink], analysis: Tracking, progress: Callable[[], bool]) -> _Posed:
     """The least voltage on the first breaks. Raises as `run_tracking`, and `Stopped`."""
     place, end = where(model.scene.path, analysis), analysis.end
-    refuse_held_motors(model, analysis)
+    refuse_prescribed_motors(model, analysis)
     servo = make_servo(model, end, place, progress, 1.0, analysis.kind)
     check_rest(servo, analysis, (0.0, end))
     Phi_V, limits = _patches(patches, servo), _limits(model, patches)
@@ -270,7 +270,7 @@ def _solve(posed: _Posed, analysis: Tracking, least: Tracked) -> tuple[Tracked, 
     return found, objective
 
 
-def _told(context: Context, posed: _Posed, analysis: Tracking, least: Tracked) -> Iterator[str]:
+def _warnings(context: Context, posed: _Posed, analysis: Tracking, least: Tracked) -> Iterator[str]:
     """Warnings: what would do where limits are too small, ends of the path and places of patches that cost voltage."""
     if _is_beyond(posed, least):
         given = posed.servo, posed.asked, analysis.intervals, posed.around, least.share

@@ -210,6 +210,6 @@ void bind_recursion(nb::module_ &m) {
   bind_replay(m);
   bind_tree_motion(m);
   bind_tree_sampled(m);
-  bind_held_motion(m);
+  bind_forward_motion(m);
   bind_prescribed(m);
 }

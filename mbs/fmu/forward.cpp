@@ -1,7 +1,7 @@
 // FMI 2.0, co-simulation, of the forward motion of a robot in space: the same library for all robots, whose model is in
-// resources/model.bin (core/forward/held_motion.h). Value references count inputs, then outputs. Inputs are held over
-// a communication step.
-#include "core/forward/held_motion.h"
+// resources/model.bin (core/forward/forward_motion.h). Value references count inputs, then outputs. Inputs are held
+// over a communication step.
+#include "core/forward/forward_motion.h"
 #include "fmu/fmi2.h"
 
 #include <algorithm>
@@ -19,8 +19,8 @@ namespace {
 struct Instance {
   std::string name;
   const fmi2CallbackFunctions *callbacks;
-  HeldModel model;
-  std::unique_ptr<HeldMotion> motion;
+  ForwardModel model;
+  std::unique_ptr<ForwardMotion> motion;
 };
 
 fmi2Status fail(const fmi2CallbackFunctions *callbacks, const std::string &name, const std::string &message) {
@@ -68,10 +68,10 @@ std::string bytes_in(const std::string &path) {
   return bytes;
 }
 
-HeldModel model_in(const std::string &uri) {
+ForwardModel model_in(const std::string &uri) {
   const std::string path = folder_of(uri) + "/model.bin", bytes = bytes_in(path);
   try {
-    return held_model_of(bytes);
+    return forward_model_of(bytes);
   } catch (const std::exception &error) {
     throw std::runtime_error(path + ": " + error.what());
   }
@@ -112,7 +112,7 @@ FMI2_EXPORT fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2St
     if (!guid || instance->model.guid != guid)
       throw std::runtime_error("expected the guid " + instance->model.guid +
                                " of modelDescription.xml, found another: resources/model.bin is of another export");
-    instance->motion = std::make_unique<HeldMotion>(instance->model);
+    instance->motion = std::make_unique<ForwardMotion>(instance->model);
     return instance.release();
   } catch (const std::exception &error) {
     fail(callbacks, called, std::string("fmi2Instantiate: ") + error.what());
@@ -135,7 +135,7 @@ FMI2_EXPORT fmi2Status fmi2Terminate(fmi2Component) { return fmi2OK; }
 FMI2_EXPORT fmi2Status fmi2Reset(fmi2Component c) {
   auto *instance = static_cast<Instance *>(c);
   try {
-    instance->motion = std::make_unique<HeldMotion>(instance->model);
+    instance->motion = std::make_unique<ForwardMotion>(instance->model);
     return fmi2OK;
   } catch (const std::exception &error) {
     return fail(c, std::string("fmi2Reset: ") + error.what());
@@ -146,7 +146,7 @@ FMI2_EXPORT fmi2Status fmi2Reset(fmi2Component c) {
 
 FMI2_EXPORT fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference r[], size_t n, fmi2Real value[]) {
   auto *instance = static_cast<Instance *>(c);
-  HeldMotion &motion = *instance->motion;
+  ForwardMotion &motion = *instance->motion;
   const std::size_t n_u = motion.inputs().size();
   try {
     for (size_t i = 0; i < n; ++i) {
@@ -226,11 +226,11 @@ NO_STATUS(fmi2GetStringStatus, fmi2String)
 
 FMI2_EXPORT fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *state) {
   try {
-    HeldState now = static_cast<Instance *>(c)->motion->state();
+    ForwardState now = static_cast<Instance *>(c)->motion->state();
     if (*state) // of an earlier call, to be written over
-      *static_cast<HeldState *>(*state) = std::move(now);
+      *static_cast<ForwardState *>(*state) = std::move(now);
     else
-      *state = new HeldState(std::move(now));
+      *state = new ForwardState(std::move(now));
     return fmi2OK;
   } catch (const std::exception &error) {
     return fail(c, std::string("fmi2GetFMUstate: ") + error.what());
@@ -241,7 +241,7 @@ FMI2_EXPORT fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate state) {
   if (!state)
     return fail(c, "fmi2SetFMUstate: expected a state of fmi2GetFMUstate, found none");
   try {
-    static_cast<Instance *>(c)->motion->bring_back(*static_cast<const HeldState *>(state));
+    static_cast<Instance *>(c)->motion->bring_back(*static_cast<const ForwardState *>(state));
     return fmi2OK;
   } catch (const std::exception &error) {
     return fail(c, std::string("fmi2SetFMUstate: ") + error.what());
@@ -250,7 +250,7 @@ FMI2_EXPORT fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate state) {
 
 FMI2_EXPORT fmi2Status fmi2FreeFMUstate(fmi2Component, fmi2FMUstate *state) {
   if (state) {
-    delete static_cast<HeldState *>(*state);
+    delete static_cast<ForwardState *>(*state);
     *state = nullptr;
   }
   return fmi2OK;

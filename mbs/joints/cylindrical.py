@@ -22,7 +22,7 @@ class CylindricalJoint(AxialJoint):
     units = ("rad", "m")
     q_count = 2
     freedoms = 2
-    held = GUIDED
+    loop_equations = GUIDED
     along = (Along("turn", 2), Along("slide", 2))
 
     def place(self, q: Array) -> Place:

@@ -1,4 +1,4 @@
-"""Free joints: nothing is held; they say where a body is."""
+"""Free joints: they constrain nothing and say where a body is."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class FreeJoint(JointRecord):
     guess_units = ("m", "m", "m", "rad", "rad", "rad")
     q_count = 7
     freedoms = 6
-    held = ()
+    loop_equations = ()
     locates: ClassVar[bool] = False
 
     def place(self, q: Array) -> Place:

@@ -33,7 +33,7 @@ class Place(NamedTuple):
     C: Array
 
 
-class Held(NamedTuple):
+class LoopEquation(NamedTuple):
     """One of what a joint holds where it closes a loop; axes 0, 1, 2 of the inner triad (`f`) and the outer one (`g`).
 
     "point": three components of the way; "slide": the way along f; "dot": f and g are square.
@@ -56,10 +56,10 @@ class Along(NamedTuple):
     of_outer: bool = False
 
 
-POINT = Held("point")
-ALIGNED = (Held("dot", 0, 2), Held("dot", 1, 2))  # the axes z
-GUIDED = (Held("slide", 0), Held("slide", 1), *ALIGNED)
-NOT_TURNED = Held("dot", 0, 1)  # beside ALIGNED
+POINT = LoopEquation("point")
+ALIGNED = (LoopEquation("dot", 0, 2), LoopEquation("dot", 1, 2))  # the axes z
+GUIDED = (LoopEquation("slide", 0), LoopEquation("slide", 1), *ALIGNED)
+NOT_TURNED = LoopEquation("dot", 0, 1)  # beside ALIGNED
 
 
 class JointRecord(Record, ABC):
@@ -82,7 +82,7 @@ class JointRecord(Record, ABC):
     guess_units: ClassVar[tuple[str, ...]] = ()  # of the numbers by which [initial] gives its place, where those differ
     q_count: ClassVar[int] = 0
     freedoms: ClassVar[int] = 0
-    held: ClassVar[tuple[Held, ...] | None] = None  # None where it cannot close a loop
+    loop_equations: ClassVar[tuple[LoopEquation, ...] | None] = None  # None where it cannot close a loop
     along: ClassVar[tuple[Along, ...]] = ()  # its coordinates where it does, in the scene's order
     locates: ClassVar[bool] = True
     """Whether it fixes the place of one body on the other; the initial guess goes along such joints first."""

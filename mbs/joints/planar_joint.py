@@ -9,7 +9,7 @@ import numpy as np
 from ...common.arrays import Array
 from ...common.rotations import about
 from ..fields.spelling import SPATIAL
-from .joint import ALIGNED, Along, Held, Place
+from .joint import ALIGNED, Along, LoopEquation, Place
 from .moving_joint import AxialJoint
 
 
@@ -26,7 +26,7 @@ class PlanarJoint(AxialJoint):
     units = ("m", "m", "rad")
     q_count = 3
     freedoms = 3
-    held = (Held("slide", 2), *ALIGNED)
+    loop_equations = (LoopEquation("slide", 2), *ALIGNED)
     along = (Along("slide", 0), Along("slide", 1), Along("turn", 2))
 
     def place(self, q: Array) -> Place:

@@ -44,7 +44,7 @@ class PrismaticJoint(AxialJoint):
     units = ("m",)
     q_count = 1
     freedoms = 1
-    held = (*GUIDED, NOT_TURNED)
+    loop_equations = (*GUIDED, NOT_TURNED)
     along = (Along("slide", 2),)
 
     def place(self, q: Array) -> Place:

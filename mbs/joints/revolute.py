@@ -45,7 +45,7 @@ class RevoluteJoint(AxialJoint):
     units = ("rad",)
     q_count = 1
     freedoms = 1
-    held = (POINT, *ALIGNED)
+    loop_equations = (POINT, *ALIGNED)
     along = (Along("turn", 2),)
 
     def place(self, q: Array) -> Place:

@@ -23,7 +23,7 @@ class SphericalJoint(JointRecord):
     guess_units = ("rad", "rad", "rad")
     q_count = 4
     freedoms = 3
-    held = (POINT,)
+    loop_equations = (POINT,)
     locates: ClassVar[bool] = False  # a loop is best cut here: three rows, no angle
 
     def place(self, q: Array) -> Place:

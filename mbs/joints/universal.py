@@ -32,7 +32,7 @@ class UniversalJoint(AxialJoint):
     units = ("rad", "rad")
     q_count = 2
     freedoms = 2
-    held = (POINT, NOT_TURNED)
+    loop_equations = (POINT, NOT_TURNED)
     along = (Along("turn", 0, 1), Along("turn", 1, 0, of_outer=True))
 
     @model_validator(mode="after")

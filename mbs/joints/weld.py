@@ -24,7 +24,7 @@ class WeldJoint(JointRecord):
             raise ValueError("expected no motor in a weld, which cannot move, found motor = true")
         return self
 
-    held = (POINT, *ALIGNED, NOT_TURNED)
+    loop_equations = (POINT, *ALIGNED, NOT_TURNED)
 
     def place(self, q: Array) -> Place:
         """At rest."""

@@ -47,7 +47,7 @@ class CutCoordinate(NamedTuple):
         return np.zeros_like(rate) if self.friction is None else self.friction.resistance(rate)
 
 
-def with_rotors_beside(tree: KinematicTree) -> tuple[KinematicTree, list[ConstraintRow]]:
+def with_auxiliary_rotors(tree: KinematicTree) -> tuple[KinematicTree, list[ConstraintRow]]:
     """The tree with the outputs of rotors in joints at which loops are cut, and the rows by which they turn with these.
 
     They are on the first sides of their joints, whose coordinates theirs are.

@@ -33,9 +33,9 @@ def motor_commands(model: Model) -> Iterator[Command]:
         yield from (Command(direction, frame) for direction in model.sign(joint) * np.eye(model.tree.n_v)[columns])
 
 
-def held_forces(model: Model, commands: Sequence[Command]) -> _core.HeldForces:
+def zero_order_hold(model: Model, commands: Sequence[Command]) -> _core.ZeroOrderHold:
     """Forces of commands that are held, in their order."""
-    found = _core.HeldForces(np.reshape([c.direction for c in commands], (len(commands), model.tree.n_v)).T)
+    found = _core.ZeroOrderHold(np.reshape([c.direction for c in commands], (len(commands), model.tree.n_v)).T)
     for number, command in enumerate(commands):
         for share in _shares(model, *command.frame) if command.frame is not None else ():
             found.add_frame_motor(number, *share)

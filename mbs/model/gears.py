@@ -18,7 +18,7 @@ from .tree import CompliantGear, KinematicTree, Node, Section
 
 
 def elastic_joints(model: Model) -> list[Node]:
-    """The nodes whose joints have gears that give, in the order of the tree.
+    """The nodes whose joints have compliant gears, in the order of the tree.
 
     Raises `InputError` for such a gear in a joint without a motor of the tree.
     """
@@ -31,7 +31,7 @@ def elastic_joints(model: Model) -> list[Node]:
 
 
 def with_compliance(model: Model) -> Model:
-    """The robot with gears that give where the scene says so; motors and moments on joints act before these gears.
+    """The robot with compliant gears where the scene says so; motors and moments on joints act before these gears.
 
     The output of such a gear is a body of the tree without inertia. It turns on the first side of the joint by θ_m, the
     rotor N times as fast (J. Spong, J. Dyn. Syst. Meas. Control 109, 1987, with the rotor's whole angular velocity).
@@ -42,10 +42,10 @@ def with_compliance(model: Model) -> Model:
         return model
     tree = model.tree.with_outputs([_output(node) for node in elastic])
     outputs = tree.nodes[-len(elastic) :]
-    firm = {node.body.name: _without_rotor(node) for node in elastic}
-    tree.nodes = tuple(firm.get(node.body.name, node) for node in tree.nodes)
+    rigid = {node.body.name: _without_rotor(node) for node in elastic}
+    tree.nodes = tuple(rigid.get(node.body.name, node) for node in tree.nodes)
     tree.gears = tuple(
-        CompliantGear(output, firm[node.body.name], -1.0 if node.backwards else 1.0, *of_gear)
+        CompliantGear(output, rigid[node.body.name], -1.0 if node.backwards else 1.0, *of_gear)
         for output, node in zip(outputs, elastic, strict=True)
         if (of_gear := compliance(node)) is not None
     )
@@ -55,7 +55,7 @@ def with_compliance(model: Model) -> Model:
 
 
 def with_prescribed_motors(model: Model) -> Model:
-    """The robot with its gears where trajectories of motors are followed; the same where all gears are firm.
+    """The robot with its gears where trajectories of motors are followed; the same where all gears are rigid.
 
     Raises `InputError` for trajectories of something else beside them: no motor could do both.
     """
@@ -73,8 +73,8 @@ def with_prescribed_motors(model: Model) -> Model:
     return found
 
 
-def refuse_held_motors(model: Model, analysis: Analysis) -> None:
-    """Raise `InputError` where gears that give leave an analysis nothing to do with trajectories of motors."""
+def refuse_prescribed_motors(model: Model, analysis: Analysis) -> None:
+    """Raise `InputError` where compliant gears leave an analysis nothing to do with trajectories of motors."""
     if any(path.motor for path in model.scene.trajectory) and elastic_joints(model):
         raise InputError(
             f'{model.scene.path}: analysis "{analysis.name}": kind: expected "pcid" or "static" with trajectories of'
@@ -83,7 +83,7 @@ def refuse_held_motors(model: Model, analysis: Analysis) -> None:
 
 
 def _rows_at_motors(model: Model, tree: KinematicTree) -> Iterator[ConstraintRow]:
-    """The rows of the robot, those of trajectories of motors at the outputs of gears that give."""
+    """The rows of the robot, those of trajectories of motors at the outputs of compliant gears."""
     motors = {path.name: path.motor for path in model.scene.trajectory if path.motor is not None}
     outputs = {gear.joint.joint.name: gear.motor for gear in tree.gears}
     for row in model.rows:

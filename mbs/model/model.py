@@ -18,7 +18,7 @@ from ..scene.mechanism import MechanismScene
 from ..scene.topology import Edge, spanning_forest
 from ..scene.trajectories import Trajectory
 from .body import Body
-from .cut import CutCoordinate, cut_coordinates, cut_row, with_rotors_beside
+from .cut import CutCoordinate, cut_coordinates, cut_row, with_auxiliary_rotors
 from .drives import Drive
 from .frames import with_coordinates_of_frames
 from .payloads import welded_payloads
@@ -115,7 +115,7 @@ def build_model(scene: MechanismScene, bodies: Sequence[Body]) -> Model:
     tree = KinematicTree([*(body for body, _ in carried), *bodies], joints, topology, floating)
     _check_cut_joints(scene, tree)
     tree = with_coordinates_of_frames(tree) if scene.motors == "frame" else tree
-    tree, rows = with_rotors_beside(tree)
+    tree, rows = with_auxiliary_rotors(tree)
     rows = [*(row for joint in tree.loops for row in _loop_rows(scene, tree, joint)), *rows]
     rows += [row for trajectory in scene.trajectory for row in _path_rows(scene, tree, trajectory)]
     return Model(scene, tree, tuple(rows), tuple(cut_coordinates(scene, tree)))
@@ -133,7 +133,7 @@ def _check_cut_joints(scene: MechanismScene, tree: KinematicTree) -> None:
 
 
 def _loop_rows(scene: MechanismScene, tree: KinematicTree, joint: JointRecord) -> Iterator[ConstraintRow]:
-    if joint.held is None:
+    if joint.loop_equations is None:
         raise InputError(
             f"{scene.path}: {joint.label}: expected another type of joint where a loop closes, found a {joint.type}"
             " joint: list it before the other joints of its loop"
@@ -141,11 +141,13 @@ def _loop_rows(scene: MechanismScene, tree: KinematicTree, joint: JointRecord) -
     first, second = joint.triads()
     a, b = tree.section(joint.between[0], first, joint.at), tree.section(joint.between[1], second, joint.at)
     unit = np.eye(3)
-    for held in joint.held:
-        if held.kind == "point":
+    for equation in joint.loop_equations:
+        if equation.kind == "point":
             yield from (ConstraintRow(joint.name, "point", a, b, e, e, is_trajectory=False) for e in unit)
         else:
-            yield ConstraintRow(joint.name, held.kind, a, b, unit[held.f], unit[held.g], is_trajectory=False)
+            yield ConstraintRow(
+                joint.name, equation.kind, a, b, unit[equation.f], unit[equation.g], is_trajectory=False
+            )
 
 
 def _path_rows(scene: MechanismScene, tree: KinematicTree, path: Trajectory) -> Iterator[ConstraintRow]:

@@ -136,7 +136,7 @@ class _Reduction:
         spread: list[Array] = [np.zeros((len(rows), 0))]
         found, followed, unit = [], [], np.eye(len(rows))
         for k, row in enumerate(rows):
-            group = [] if is_path[k] else self._askew(k)
+            group = [] if is_path[k] else self._oblique(k)
             if not group:
                 in_plane = self._row(row)
                 if in_plane is None and is_path[k]:
@@ -150,7 +150,7 @@ class _Reduction:
                 spread.append(column)
         return found, followed, spread
 
-    def _askew(self, k: int) -> list[int]:
+    def _oblique(self, k: int) -> list[int]:
         """Rows of a loop that hold one way in several directions, k among them, where the plane is oblique to these."""
         rows, ends = self._parts.rows, _ends(self._parts.rows[k])
         ways = (_core.ConstraintKind.point, _core.ConstraintKind.slide)

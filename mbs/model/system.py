@@ -17,7 +17,7 @@ from ..fields.orientations import OrientationLaw
 from ..joints.transmission import Friction
 from ..scene.loads import OF_POINT, Load
 from .drives import NO_DRIVES, Command, Drive, Drives, PointDrive
-from .frame_motors import held_forces
+from .frame_motors import zero_order_hold
 from .model import Model
 from .parts import CutPlace, ModelParts, Placed, carried_body, standing_marker
 from .plane import Plane, in_plane
@@ -142,7 +142,7 @@ class MultibodySystem:
             for name, number in numbers.items()
             for along, share in _shares(OF_POINT.index(name), self.plane)
         ]
-        return _core.Replay(self.replayed.source, self.held_forces(self.replayed.commands), at_points)
+        return _core.Replay(self.replayed.source, self.zero_order_hold(self.replayed.commands), at_points)
 
     def multipliers(self, of_core: Array) -> Array:
         """(T, rows) of the model from those of `integrated`: 0 of rows that this has not, as of dependent ones."""
@@ -158,10 +158,10 @@ class MultibodySystem:
         """Of "BODY.POINT", on which a load or a drive acts, among the core's wrenches."""
         return self._wrenches.index(self._place(self.model.tree.section(point, np.eye(3))))
 
-    def held_model(self) -> _core.HeldModel:
+    def forward_model(self) -> _core.ForwardModel:
         """The model for motions under held inputs, without loads of the scene; rows must follow nothing."""
         parts = self._parts
-        return _core.HeldModel(parts.bodies, parts.ground, parts.rows, parts.wrenches, parts.gravity, self.scene)
+        return _core.ForwardModel(parts.bodies, parts.ground, parts.rows, parts.wrenches, parts.gravity, self.scene)
 
     def _with_moments(self, cut: Sequence[CutPlace]) -> set[int]:
         """Numbers of wrenches that may have a moment; where there is none, pins in the plane pass none on."""
@@ -262,7 +262,7 @@ class MultibodySystem:
             motor, joint = ((node.q.start, node.v.start) for node in (gear.motor, gear.joint))
             scene.add_gear(motor, joint, gear.sign, gear.spring.slopes, gear.spring.knots, gear.damping)
         self._act_along_cut(scene, self._parts.cut if plane is None else plane.cut)
-        scene.most_bent = [node.body.largest_moment for node in self.model.tree.nodes]
+        scene.modal_amplitude_limits = [node.body.largest_moment for node in self.model.tree.nodes]
         has_loops = bool(self.model.loop_rows.any())
         scene.has_loops = has_loops and plane is not None  # in space round-off moves rows that hold by themselves
         scene.keeps_all_rows = not has_loops  # `check_path` refuses paths whose rows depend on each other
@@ -278,9 +278,9 @@ class MultibodySystem:
             for load in one.loads:
                 scene.add_cut_load(number, load, one.row.sign)
 
-    def held_forces(self, commands: Sequence[Command]) -> _core.HeldForces:
+    def zero_order_hold(self, commands: Sequence[Command]) -> _core.ZeroOrderHold:
         """Forces of commands that are held, in their order."""
-        return held_forces(self.model, commands)
+        return zero_order_hold(self.model, commands)
 
     def _drives(self, load: Load) -> Iterator[Drive]:
         """Directions (n_v,) and sizes of the moments of a joint."""

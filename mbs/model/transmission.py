@@ -20,7 +20,7 @@ def rotor(node: Node) -> tuple[float, float]:
 
 
 def compliance(node: Node) -> tuple[TwistSpring, float] | None:
-    """Spring and damping (N·m·s/rad) of the gear in the joint that carries a body; None of a firm one."""
+    """Spring and damping (N·m·s/rad) of the gear in the joint that carries a body; None of a rigid one."""
     joint = node.joint
     if not isinstance(joint, RevoluteJoint) or joint.stiffness is None:
         return None
@@ -54,7 +54,7 @@ def tree_resistance_slope(tree: KinematicTree, v: Array) -> Array:
 
 
 def gear_matrices(tree: KinematicTree, q: Array) -> tuple[Array, Array]:
-    """K and D (n_v, n_v) of gears that give, along v, at q (n_q,)."""
+    """K and D (n_v, n_v) of compliant gears, along v, at q (n_q,)."""
     K, D = np.zeros((2, tree.n_v, tree.n_v))
     for gear in tree.gears:
         twist = np.zeros(tree.n_v)
@@ -65,7 +65,7 @@ def gear_matrices(tree: KinematicTree, q: Array) -> tuple[Array, Array]:
 
 
 def gear_forces(tree: KinematicTree, q: Array, v: Array) -> Array:
-    """Of gears that give (T, n_v): k(δ) + c δ̇ on the second side of the joint, the opposite on the motor."""
+    """Of compliant gears (T, n_v): k(δ) + c δ̇ on the second side of the joint, the opposite on the motor."""
     found = np.zeros_like(v)
     for gear in tree.gears:
         way, rate = gear.twist(q, v)

@@ -86,7 +86,7 @@ class Node:
 
 
 class CompliantGear(NamedTuple):
-    """A gear that gives: `spring`, and damper `damping` c (N·m·s/rad), behind a motor of the tree.
+    """A compliant gear: `spring`, and damper `damping` c (N·m·s/rad), behind a motor of the tree.
 
     The twist δ is that of `motor`, whose coordinate is θ_m, against `joint`, whose coordinate is `sign` γ: δ = θ_m − γ.
     """

@@ -33,7 +33,7 @@ from .second_order import (
 )
 from .stiffness_change import LoadedPoint, ModalLoads, StiffnessChange, stiffness_change
 
-NOTABLE = 0.01  # relative change of a link's stiffness from which on "auto" switches geometric stiffening on
+NOTABLE_STIFFNESS_CHANGE = 0.01  # relative, of a link, from which on "auto" switches geometric stiffening on
 DEFLECTION_LIMIT = {False: 0.02, True: 0.05}  # of the length, from the chord; without and with geometric stiffening
 SHORTENING_LIMIT = {False: 1e-3, True: 1e-2}  # of the length: a half wave at 2 %; where the second order ends
 USELESS = 0.1  # of the length, in the position of points
@@ -94,7 +94,7 @@ class Bending:
         return (
             self.deflection > DEFLECTION_LIMIT[self.is_stiffened]
             or self.shortening > SHORTENING_LIMIT[self.is_stiffened]
-            or (not self.is_stiffened and self.stiffness_change > NOTABLE)
+            or (not self.is_stiffened and self.stiffness_change > NOTABLE_STIFFNESS_CHANGE)
             or self.buckling >= 1.0
         )
 

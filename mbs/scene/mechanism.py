@@ -70,7 +70,7 @@ class MechanismKeys(Record):
         followed = any(trajectory.coordinate_of == joint.name for trajectory in self.trajectory)
         if not joint.locates:
             return 4
-        if joint.held is None or joint.asks_for_coordinate:
+        if joint.loop_equations is None or joint.asks_for_coordinate:
             return 0
         if getattr(joint, "rotor_inertia", 0.0):
             return 1

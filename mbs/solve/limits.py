@@ -71,16 +71,16 @@ def left_ranges(model: Model, found: Sequence[Seen], times: Array, q: Array, v: 
     `v` (T, n_v).
     """
     for one, seen in zip(watched(model.tree), found, strict=True):
-        yield from _told(one.joint, one.number, one.seen(seen))
+        yield from _messages(one.joint, one.number, one.seen(seen))
     for joint, values in (*_sampled_in_tree(model, q), *_at_cuts(model, times, q, v)):
         for number, of_one in enumerate(values):
             lowest, highest = joint.position_limits[number]
             outside = np.flatnonzero((of_one < lowest) | (of_one > highest))
             left_at = float(times[outside[0]]) if outside.size else None
-            yield from _told(joint, number, (float(of_one.min()), float(of_one.max()), left_at))
+            yield from _messages(joint, number, (float(of_one.min()), float(of_one.max()), left_at))
 
 
-def _told(joint: JointRecord, number: int, seen: Seen) -> Iterator[str]:
+def _messages(joint: JointRecord, number: int, seen: Seen) -> Iterator[str]:
     (lowest, highest), unit, (least, largest, left_at) = joint.position_limits[number], joint.units[number], seen
     if left_at is not None:
         yield (

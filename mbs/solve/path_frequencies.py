@@ -36,7 +36,7 @@ def frequencies_along(model: Model, begin: float, end: float, modes: int) -> Pat
     Raises `InputError` where the path is out of reach, or there are fewer vibrations.
     """
     model = with_prescribed_motors(resolved(model, end))
-    unheld = without_rows(model)
+    unconstrained = without_rows(model)
     state, found = undeformed_posture(model), []
     for t in np.linspace(begin, end, INSTANTS):
         q = solve_posture(model, float(t), state.q)
@@ -46,7 +46,7 @@ def frequencies_along(model: Model, begin: float, end: float, modes: int) -> Pat
                 f" at t = {t:.6g} s that meets {quoted(dict.fromkeys(row.owner for row in model.rows))}"
             )
         state = relaxed_gears(model, State(q, np.zeros_like(state.v)))
-        found.append(vibrations_of(model, unheld, float(t), state.q)[:2])
+        found.append(vibrations_of(model, unconstrained, float(t), state.q)[:2])
     return common_modes(model.scene.path, found, modes)
 
 

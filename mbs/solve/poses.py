@@ -10,13 +10,13 @@ from ..model.gears import with_compliance
 from ..model.model import Model, without_paths
 from ..model.tree import Section
 from ..scene.space import SPACES
-from .held_joints import (
+from .joint_conditions import (
     COMPLIANT,
     LOCKED,
-    HeldJoints,
+    JointCondition,
+    condition_coordinates,
     frequency_response,
-    held_coordinates,
-    held_joints,
+    joint_conditions,
     translational_stiffness,
 )  # fmt: skip
 from .linearisation import LinearEquations, LinearMechanism
@@ -61,8 +61,8 @@ class PoseEvaluator:
         straight, mechanism, bent = self._equilibrium(q)
         found = {"place": before, "sag": self._place(bent) - before, "torque": self._torques(mechanism)}
         found["manipulability"] = np.array(self._manipulability(straight))
-        for condition, held in held_joints(mechanism).items():
-            found |= {f"joints_{condition}/{name}": value for name, value in self._of_held(held).items()}
+        for condition, found_there in joint_conditions(mechanism).items():
+            found |= {f"joints_{condition}/{name}": value for name, value in self._of_condition(found_there).items()}
             if len(self._omega):
                 J = frequency_response(mechanism, condition, self.point, self._omega)
                 found[f"joints_{condition}/response"] = np.abs(J[:, : len(self.space.translations)])
@@ -81,7 +81,7 @@ class PoseEvaluator:
         return self.space.along(motion.r[0])
 
     def _equilibrium(self, q: Array) -> tuple[LinearMechanism, LinearMechanism, Array]:
-        """The linear equations in q (n_q,) and in the equilibrium next to it with motors held, and its coordinates.
+        """The linear equations in q (n_q,) and in the equilibrium next to it with motors locked, and its coordinates.
 
         Newton with the exact stiffness K: the forces F that keep the robot at rest in q vanish on what motors leave
         free, NᵀF + NᵀK N δz = 0.
@@ -90,7 +90,7 @@ class PoseEvaluator:
         rest, first, last = np.zeros(self.model.tree.n_v), 0.0, np.inf
         mechanism = straight = self._linear.at(0.0, q, rest, rest)
         for _ in range(MOST_STEPS):
-            N, K, _ = held_coordinates(mechanism, condition)
+            N, K, _ = condition_coordinates(mechanism, condition)
             try:
                 step = -np.linalg.solve(K, N.T @ mechanism.force)
             except np.linalg.LinAlgError:
@@ -121,8 +121,8 @@ class PoseEvaluator:
         J = mechanism.points[self.point][: len(self.space.translations), columns]
         return float(np.prod(np.linalg.svd(J, compute_uv=False)[: len(J)])) if len(columns) >= len(J) else 0.0
 
-    def _of_held(self, held: HeldJoints) -> dict[str, Array]:
-        C, frequency = held.compliance[self.point], held.modes.frequency
+    def _of_condition(self, at: JointCondition) -> dict[str, Array]:
+        C, frequency = at.compliance[self.point], at.modes.frequency
         frequency = np.append(frequency[frequency > 0.0], np.full(self._count, np.nan))[: self._count]
         stiffness, d = translational_stiffness(C), len(self.space.translations)
         along, least, direction = stiffness or (np.zeros(d), 0.0, np.full(d, np.nan))

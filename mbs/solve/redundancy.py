@@ -48,10 +48,12 @@ def resolved(model: Model, end: float) -> Model:
     _check(model, criterion, found)
     times = as_floats(np.linspace(0.0, end, NODES)) if end > 0 else np.zeros(1)
     q = _least_motion(model, start.q, times)
-    nodes = _telling(model, q, times, found.freedom - found.followed)
+    nodes = _most_observable(model, q, times, found.freedom - found.followed)
     if not end > 0:
-        return _held(model, nodes, np.array([0.0, 1.0]), np.repeat(q, 2, axis=0), degree=1)
-    return _held(model, nodes, times, _least_torque(model, nodes, times, q) if criterion == "least-torque" else q)
+        return _with_prescribed_joints(model, nodes, np.array([0.0, 1.0]), np.repeat(q, 2, axis=0), degree=1)
+    return _with_prescribed_joints(
+        model, nodes, times, _least_torque(model, nodes, times, q) if criterion == "least-torque" else q
+    )
 
 
 def resolving_joints(model: Model) -> list[str]:
@@ -80,7 +82,7 @@ def _check(model: Model, criterion: str, found: Mobility) -> None:
             )
 
 
-def _held(model: Model, nodes: Sequence[Node], times: Array, q: Array, degree: int = 5) -> Model:
+def _with_prescribed_joints(model: Model, nodes: Sequence[Node], times: Array, q: Array, degree: int = 5) -> Model:
     """With rows by which the joints of `nodes` follow q (T, n_q) at `times` (T,), a spline between."""
     signs = [-1.0 if node.backwards else 1.0 for node in nodes]
     values = np.stack([sign * q[:, node.q.start] for sign, node in zip(signs, nodes, strict=True)], axis=1)
@@ -143,7 +145,7 @@ def _least_torque(model: Model, nodes: Sequence[Node], times: Array, q: Array) -
         return found
 
     def moments(c: Array) -> Array:
-        held = _held(model, nodes, times, moved(c, 0))
+        held = _with_prescribed_joints(model, nodes, times, moved(c, 0))
         try:
             mechanism = _core.SpatialPrescribedMotion(driven_mechanism(held, has_motors=False), start[0])
             motion = prescribed_motion(held, mechanism, still, times[::STRIDE], moved(c, 1))
@@ -170,7 +172,7 @@ def null_space(C_v: Array, scales: Array) -> Array:
     return found
 
 
-def _telling(model: Model, q: Array, times: Array, count: int) -> tuple[Node, ...]:
+def _most_observable(model: Model, q: Array, times: Array, count: int) -> tuple[Node, ...]:
     """The `count` joints with one coordinate whose share in the motion left free is never small at q (T, n_q).
 
     Raises `SolveError` where no such joints tell it all along the path.

@@ -34,13 +34,13 @@ def without_rows(model: Model) -> MultibodySystem:
     return MultibodySystem(replace(model, rows=()))
 
 
-def vibrations_of(model: Model, unheld: MultibodySystem, t: float, q: Array) -> Vibrations:
-    """Those about q (n_q,), with the rows of `model` held.
+def vibrations_of(model: Model, unconstrained: MultibodySystem, t: float, q: Array) -> Vibrations:
+    """Those about q (n_q,), with the constraint equations of `model`.
 
-    M⁻¹ is what the core says that forces do to accelerations where `unheld`. K are the stiffnesses of links and gears,
-    D their damping and viscous friction; neither gravity nor dry friction.
+    M⁻¹ is what the core says that forces do to accelerations where `unconstrained`. K are the stiffnesses of links and
+    gears, D their damping and viscous friction; neither gravity nor dry friction.
     """
-    M = np.linalg.inv(unheld.derivatives(t, q, np.zeros(model.tree.n_v), np.zeros(model.tree.n_v)).a_f)
+    M = np.linalg.inv(unconstrained.derivatives(t, q, np.zeros(model.tree.n_v), np.zeros(model.tree.n_v)).a_f)
     C_v = row_values(model, q[None], np.array([t]))[1][0]
     _, sizes, V = np.linalg.svd(C_v) if len(C_v) else (None, np.zeros(0), np.eye(len(M)))
     free = V[int(np.count_nonzero(sizes > DEPENDENT * sizes.max(initial=0.0))) :].T

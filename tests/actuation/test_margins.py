@@ -5,7 +5,7 @@ import pytest
 
 from ffrobot.actuation.control.linear_model import LinearModel
 from ffrobot.actuation.control.margins import joint_gains, lowest_frequency, margins, spectral_radius
-from ffrobot.actuation.control.modes import held_frequencies
+from ffrobot.actuation.control.modes import locked_frequencies
 from ffrobot.actuation.control.records import JointPid
 from ffrobot.actuation.control.suggestion import (
     FRACTION,
@@ -201,7 +201,7 @@ def test_suggested_gains_hold_the_simulated_arm():
     text = Results.from_image(results_image(solution), solution.scene.path).verdict["linear"].advice[0]
     assert f"sampled every {1e3 * sample_time:g} ms or faster" in text
     assert f"proportional = {{ J0 = {suggestion.proportional['J0']:.2g} }}" in text
-    (lowest, *_) = held_frequencies(plant)
+    (lowest, *_) = locked_frequencies(plant)
     assert suggestion.bandwidth == pytest.approx(FRACTION * lowest, rel=1e-9)
 
 

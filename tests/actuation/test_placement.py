@@ -6,7 +6,7 @@ from patches_on_links import SCENE, layout, patches, planar_body
 from scipy.linalg import solve_continuous_lyapunov
 
 from ffrobot.actuation.control.linear_model import state_space
-from ffrobot.actuation.control.placing import PatchableLink, held_modes, place
+from ffrobot.actuation.control.placing import PatchableLink, locked_modes, place
 from ffrobot.actuation.control.records import Placement
 from ffrobot.common.errors import InputError
 from ffrobot.mbs.model.model import build_model
@@ -46,7 +46,7 @@ def placed(arm, count, F_p=None, **keys):
 
 def test_held_modes_are_those_of_the_clamped_link(arm):
     modal, planar, model = arm
-    reach = held_modes(model, link_of(modal, planar, 1), 3)
+    reach = locked_modes(model, link_of(modal, planar, 1), 3)
     np.testing.assert_allclose(reach.frequency, np.sqrt(planar.stiffness[:3]) / (2 * np.pi), rtol=1e-9)
     np.testing.assert_allclose(reach.share, 1.0, rtol=1e-9)
 

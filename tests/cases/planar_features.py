@@ -143,7 +143,7 @@ FEATURES = {  # what is compared in any case, beside motion and moments; the sce
     "stiffening in a loop": (
         "deflection", lambda: pair("slider_crank", INVERSE, start=CRANK, geometric_stiffening=True), 1e-7
     ),
-    "gears that give": (
+    "compliant gears": (
         "gear_moment",
         lambda: pair("two_link", INVERSE, REPLAY, MOVING, LINEAR, of_joints=GEARS), 1e-6,
     ),

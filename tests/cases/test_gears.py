@@ -144,7 +144,7 @@ def test_replays_behind_gears_are_as_good_as_outputs_are_close(tmp_path):
     assert np.all(np.divide(apart[:-1], apart[1:]) > 4.0**4)
 
 
-@pytest.mark.parametrize("second", [FIRM, SOFTER], ids=["firm", "soft"])
+@pytest.mark.parametrize("second", [FIRM, SOFTER], ids=["stiff", "soft"])
 @pytest.mark.parametrize("between", [("b.root", "a.tip"), ("a.tip", "b.root")])
 @pytest.mark.parametrize(("kind", "followed"), [("pcid", "joint"), ("pcid", "motor"), ("fcid", "joint")])
 def test_inverse_analyses_account_for_what_gears_store_and_lose(tmp_path, kind, followed, between, second):

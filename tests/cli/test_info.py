@@ -6,7 +6,7 @@ import pytest
 from ffrobot.present.info import describe
 from ffrobot.results.meanings import MODAL_BODY, RESULTS, meaning
 
-# inverse and forward motion, patches, linear models, gears that give, motion in 3D
+# inverse and forward motion, patches, linear models, compliant gears, motion in 3D
 CASES = ("two_link_patched", "two_link_linear", "compliant_arm", "slider_crank_3d")
 
 

@@ -80,7 +80,7 @@ PLANAR = {
         "initial": {"angles": {"upper": -0.4, "fore": 0.3, "hand": 0.9, "tool": 0.2}, "rates": {"upper": 0.5},
                     "joints": {"way": 0.05}, "joint_rates": {"way": 0.2}},
     },
-    # gears that give; attachment modes, whose masses are raised
+    # compliant gears; attachment modes, whose masses are raised
     "flat gears": PLANE | {
         "gravity": [0.0, 0.0],
         "body": [{"name": "upper", "link": flat_link("upper", 2, reference={"condition": "craig-bampton"})},
@@ -135,7 +135,7 @@ SCENES = PLANAR | {
         ],
         "initial": {"joints": {"shoulder": -0.4, "elbow": 0.7}},
     },
-    # gears that give: motors turn rotors, from static equilibrium without motors' moments in the plane of the table
+    # compliant gears: motors turn rotors, from static equilibrium without motors' moments in the plane of the table
     "gears": {
         "gravity": [0.0, 0.0, 0.0],
         "body": [{"name": "upper", "link": link("upper", 2)}, {"name": "fore", "rigid": box(root=ROOT, tip=TIP)}],

@@ -189,7 +189,7 @@ def rotor_forces(state: Accelerated) -> Array:
 
 
 def gear_energy(tree, q: Array, v: Array) -> tuple[Array, Array]:
-    """½ k δ² (T,) J of all gears that give, and c δ̇² (T,) W that they dissipate."""
+    """½ k δ² (T,) J of all compliant gears, and c δ̇² (T,) W that they dissipate."""
     strain, dissipated = np.zeros((2, len(q)))
     for gear in tree.gears:
         way, rate = gear.twist(q, v)

@@ -21,7 +21,7 @@ from ffrobot.mbs.analysis.static import Static
 from ffrobot.mbs.joints.twist_spring import StiffnessSteps, TwistSpring
 from ffrobot.mbs.model.gears import with_compliance
 from ffrobot.mbs.model.model import without_paths
-from ffrobot.mbs.solve.held_joints import held_joints
+from ffrobot.mbs.solve.joint_conditions import joint_conditions
 from ffrobot.mbs.solve.linearisation import LinearEquations
 
 L, M, J, N, K, C = 0.7, 2.0, 3e-3, 9.0, 500.0, 0.4
@@ -32,7 +32,7 @@ RIGID = {key: GEARED[key] for key in ("gear_ratio", "rotor_inertia")}
 
 
 def pendulum(load="0", trajectory=(), **keys):
-    """A rod in no field of gravity, turned by a motor behind a gear that gives."""
+    """A rod in no field of gravity, turned by a motor behind a compliant gear."""
     return make_model(
         [rod("a", L, M)], joint=[revolute("O", "ground", "a.root", **(GIVES | keys))],
         load=[] if trajectory else [{"joint": "O", "moment": load}], trajectory=trajectory, gravity=(0.0, 0.0),
@@ -63,7 +63,7 @@ def test_two_masses_turn_and_swing():
 
 
 def linearised(robot, q, v, a):
-    """With gears that give."""
+    """With compliant gears."""
     return LinearEquations(with_compliance(without_paths(robot.model)), q).at(0.0, q, v, a)
 
 
@@ -150,7 +150,7 @@ def carried_out(model, end=1.0):
 
 
 def test_motor_moments_carry_out_the_path():
-    """Of one gear that gives at the ground: nothing is left out but the spline between outputs."""
+    """Of one compliant gear at the ground: nothing is left out but the spline between outputs."""
     error, source, outcome = carried_out(rigid_arm(GEARED, RIGID))
     assert error.max() < 1e-9  # of a path of 1.4 m; measured 7e-12, and 5e-3 with rigid moments
     assert relative(outcome.motion.motor_motion("O")[0], source.motion.gears["O"].angle) < 1e-9
@@ -326,7 +326,7 @@ def test_the_linear_model_has_the_slope_of_its_torque(torque, slope):
     (gear,) = model.tree.gears
     q[gear.motor.q.start] = twist
     mechanism = LinearEquations(model, q).at(0.0, q, *np.zeros((2, model.tree.n_v)))
-    held = held_joints(mechanism)["compliant"].modes.frequency
+    held = joint_conditions(mechanism)["compliant"].modes.frequency
     assert held == pytest.approx([np.sqrt(slope / LINK) / (2 * np.pi)], rel=1e-10)
 
 

@@ -164,7 +164,7 @@ GEARED = ("chain of 3", "backwards", "mixed", "mixed backwards", "tree", "loaded
 
 
 def geared(name, motor=None, **keys):
-    """A mechanism of `ALL` whose revolute joints have motors behind gears that give; rotors come with the analysis."""
+    """A mechanism of `ALL` whose revolute joints have motors behind compliant gears; rotors come with the analysis."""
     gear = {"gear_ratio": 7.0, "rotor_inertia": 0.02, "stiffness": 90.0, "damping": 0.3, "viscous_friction": 0.2}
     gear |= {} if motor is None else {"motor": motor}
     joints = build(name).tables["joint"]

@@ -13,7 +13,7 @@ import numpy as np
 from ...actuation.control.linear_model import LinearModel
 from ...common.arrays import Array
 from ...mbs.analysis.forward import Forward
-from .forward_model import HeldUnit
+from .forward_model import ForwardUnit
 from .variables import UNITS, Variable, derivatives_of
 
 SOURCE = "linear.c"
@@ -68,7 +68,7 @@ def model_description(unit: Unit, generator: str) -> bytes:
     return _text(root)
 
 
-def forward_description(unit: HeldUnit, identifier: str, name: str, analysis: Forward, generator: str) -> bytes:
+def forward_description(unit: ForwardUnit, identifier: str, name: str, analysis: Forward, generator: str) -> bytes:
     """That of a forward motion under held inputs, in UTF-8; outputs follow the state alone, no input."""
     about = "motion from the initial state under piecewise constant inputs; gravity and friction act as in the scene"
     root = _root(name, unit.data.guid, about, generator)

@@ -22,7 +22,7 @@ from ...scene.load import load_scene
 from ...scene.scene import Scene
 from .archive import PLATFORMS, identifier_of, zipped
 from .description import forward_description
-from .forward_model import AXES, HeldUnit, has_own_coordinates, held_unit, voltages_of_patches
+from .forward_model import AXES, ForwardUnit, forward_unit, has_own_coordinates, voltages_of_patches
 
 logger = logging.getLogger(__name__)
 
@@ -67,13 +67,13 @@ class _Logged(Watcher):
         logger.info("%s", title)
 
 
-def _unit(scene: Scene, analysis: Forward) -> tuple[Model, HeldUnit]:
+def _unit(scene: Scene, analysis: Forward) -> tuple[Model, ForwardUnit]:
     """The motion of `analysis`."""
     prepared = prepare_scene(scene, _Logged())
     bodies = mode_levels(scene, prepared.bodies)[-1]  # "auto": all of them
     model = with_compliance(without_paths(with_bodies(prepared, bodies).model))
     voltages = voltages_of_patches(model, prepared.patches)
-    return model, held_unit(model, voltages, prepared.links, analysis, AXES[:2] if scene.is_planar else AXES)
+    return model, forward_unit(model, voltages, prepared.links, analysis, AXES[:2] if scene.is_planar else AXES)
 
 
 def _silent(model: Model) -> list[str]:
@@ -118,7 +118,7 @@ def _check(path: Path, scene: Scene) -> None:
         raise InputError(f'{path}: motors: expected "section" of a scene for an FMU, found "frame"')
 
 
-def _remarks(unit: HeldUnit, silent: list[str], folder: str) -> list[str]:
+def _remarks(unit: ForwardUnit, silent: list[str], folder: str) -> list[str]:
     found = [f"inputs are constant over a communication step; binary for {folder} alone, without sources"]
     if not unit.inputs:
         found.append("there are no inputs: no joint has a motor, no link patches")

@@ -29,7 +29,7 @@ Input = tuple[Variable, Array]
 
 
 @dataclass(frozen=True)
-class HeldUnit:
+class ForwardUnit:
     """Inputs and outputs, and the `data` of the model.
 
     The library numbers inputs, then outputs; `references` are the numbers of those that the FMU has.
@@ -38,16 +38,16 @@ class HeldUnit:
     inputs: tuple[Variable, ...]
     outputs: tuple[Variable, ...]
     references: tuple[int, ...]
-    data: _core.HeldModel
+    data: _core.ForwardModel
 
 
-def held_unit(
+def forward_unit(
     model: Model,
     voltages: Iterable[Input],
     links: Mapping[str, ModalBody],
     analysis: Forward,
     axes: str = AXES,
-) -> HeldUnit:
+) -> ForwardUnit:
     """The motion of `analysis` from its initial state under moments of motors and `voltages` of patches.
 
     `links` are the modal bodies of flexible bodies, whose strains are outputs where their files have some; places of
@@ -55,7 +55,7 @@ def held_unit(
 
     Raises `InputError` and `SolveError` as the analysis itself does.
     """
-    data, start = MultibodySystem(model).held_model(), initial_state(model)
+    data, start = MultibodySystem(model).forward_model(), initial_state(model)
     data.q, data.v = start.q, start.v
     data.method = METHODS[integrator_of(model, analysis.integrator)]
     data.spectral_radius, data.tolerance = analysis.spectral_radius, analysis.tolerance
@@ -73,7 +73,7 @@ def held_unit(
     ]
     references = [*range(len(inputs)), *(k for k, (_, is_one) in enumerate(outputs, len(inputs)) if is_one)]
     chosen = tuple(variable for variable, is_one in outputs if is_one)
-    return HeldUnit(tuple(each for each, _ in inputs), chosen, tuple(references), data)
+    return ForwardUnit(tuple(each for each, _ in inputs), chosen, tuple(references), data)
 
 
 def _numbered(joint: str, number: int, count: int) -> str:

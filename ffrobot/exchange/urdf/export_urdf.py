@@ -20,8 +20,8 @@ from ...run.bodies import load_bodies
 from ...run.loaded_body import LoadedBody
 from ...scene.load import load_scene
 from ...scene.scene import Scene
+from .conversion_losses import conversion_losses
 from .names import Names
-from .not_carried import not_carried
 from .robot import Inertial, Mimic, Numbers3, Origin, Primitive, Robot, UrdfJoint, UrdfLink
 from .scene import rpy_of
 from .steps import Step, follows, steps_outward
@@ -49,7 +49,7 @@ def scene_as_urdf(path: Path) -> tuple[str, str, tuple[str, ...]]:
     loaded = {body.name: part for body, part in zip(scene.body, bodies, strict=True)}
     made = UrdfOfScene(scene, loaded)
     counts = f"{len(scene.body)} bodies and {len(scene.joint) - len(made.tree.loops)} joints of {scene.name}"
-    return urdf_text(made.robot, made.visuals), counts, tuple(not_carried(scene, loaded, made.tree, made.size))
+    return urdf_text(made.robot, made.visuals), counts, tuple(conversion_losses(scene, loaded, made.tree, made.size))
 
 
 class UrdfOfScene:

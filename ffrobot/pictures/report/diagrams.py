@@ -120,7 +120,7 @@ def _lines(diagram: Parallel, places: Array, rows: list[int], look: Look, label:
         known = np.flatnonzero(np.isfinite(places[row]))
         x += [*map(float, known), None]
         y += [*map(float, places[row, known]), None]
-        texts += [f"{diagram.designs[row]}: {_told(diagram.axes[k], row)}" for k in known] + [""]
+        texts += [f"{diagram.designs[row]}: {_value_text(diagram.axes[k], row)}" for k in known] + [""]
     dash, marker = look.plotly
     return {
         "type": "scatter", "mode": "lines+markers", "name": plain(label), "x": x, "y": y, "text": texts,
@@ -131,7 +131,7 @@ def _lines(diagram: Parallel, places: Array, rows: list[int], look: Look, label:
     }  # fmt: skip
 
 
-def _told(axis: Axis, row: int) -> str:
+def _value_text(axis: Axis, row: int) -> str:
     value = axis.values[row]
     text = "" if value is None else axis.names[round(value)] if axis.names else f"{value:.6g}"
     return plain(f"{axis.label} = {text}")

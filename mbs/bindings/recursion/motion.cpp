@@ -324,7 +324,8 @@ void bind_tree_motion(nb::module_ &m) {
           "Watch whether the coordinate with this index in v, a number, stays in a range; the run does not end there.")
       .def_rw("has_loops", &Scene::has_loops, "Whether rows close loops: the run ends where these are singular.")
       .def_rw("keeps_all_rows", &Scene::keeps_all_constraints, "Whether no rows depend on others.")
-      .def_rw("most_bent", &Scene::most_bent, "(bodies) kg m^2: largest p^T p of each that makes sense; empty: any.")
+      .def_rw("modal_amplitude_limits", &Scene::modal_amplitude_limits,
+              "(bodies) kg m^2: largest p^T p of each that makes sense; empty: any.")
       .def(
           "turn_marker", [](Scene &s, int marker, const OrientationLaw &law) { s.driven.push_back({marker, law}); },
           "marker"_a, "law"_a, "How a marker of the ground turns, which the model says it does.");

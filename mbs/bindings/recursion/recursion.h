@@ -12,7 +12,7 @@ void bind_tree_motion(nanobind::module_ &m);
 void bind_state_function(nanobind::module_ &m);
 void bind_prescribed(nanobind::module_ &m);
 void bind_tree_sampled(nanobind::module_ &m);
-void bind_held_motion(nanobind::module_ &m);
+void bind_forward_motion(nanobind::module_ &m);
 void bind_replay(nanobind::module_ &m);
 
 namespace ffrobot::recursion {

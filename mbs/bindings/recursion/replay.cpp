@@ -110,7 +110,7 @@ RowMajorMatrix sampled(ForceSource &source, const std::vector<double> &times) {
   return found;
 }
 
-void make_replay(Replay *made, Source source, const HeldForces &along,
+void make_replay(Replay *made, Source source, const ZeroOrderHold &along,
                  const std::vector<std::tuple<Index, Index, double>> &at_points) {
   check_size("inputs", along.direction().cols(), source->values().size());
   std::vector<Replay::AtPoint> found;

@@ -20,7 +20,7 @@ using Controller = std::function<VectorXd(std::size_t, double, const VectorXd &)
 // Reads (q, v, a)
 template <class Space> class Plant final : public SampledPlant {
 public:
-  Plant(const Mechanism<Space> &mechanism, RecursiveMotion<Space> &reader, HeldForces &held)
+  Plant(const Mechanism<Space> &mechanism, RecursiveMotion<Space> &reader, ZeroOrderHold &held)
       : reader_(reader), held_(held), n_q_(mechanism.n_q), n_v_(mechanism.n_v), read_(n_q_ + 2 * n_v_) {}
 
   void hold(const VectorXd &u) override {
@@ -36,7 +36,7 @@ public:
 
 private:
   RecursiveMotion<Space> &reader_;
-  HeldForces &held_;
+  ZeroOrderHold &held_;
   Index n_q_, n_v_;
   VectorXd read_;
 };
@@ -44,12 +44,12 @@ private:
 template <class Space>
 TreeRun sampled_motion_of(const Model<Space> &model, const Scene &scene, const std::vector<double> &times,
                           const VectorXd &q, const VectorXd &v, const IntegrationControls &controls,
-                          const std::function<bool(double)> &carry_on, HeldForces held, const VectorXd &first_command,
-                          const std::vector<double> &samples, double delay, const Controller &controller,
-                          Samples *between) {
+                          const std::function<bool(double)> &carry_on, ZeroOrderHold held,
+                          const VectorXd &first_command, const std::vector<double> &samples, double delay,
+                          const Controller &controller, Samples *between) {
   model.check_state(q, v);
   check_scene(model, scene);
-  check_held(model, held);
+  check_hold(model, held);
   check_size("first_command", first_command.size(), held.direction().cols());
   const nb::gil_scoped_release unlocked;
   held.hold(first_command);
@@ -63,10 +63,10 @@ TreeRun sampled_motion_of(const Model<Space> &model, const Scene &scene, const s
 }
 
 template <class Space>
-TreeRun held_outputs_of(const Model<Space> &model, const Scene &scene, const std::vector<double> &times,
-                        const RowMajorMatrix &states, HeldForces held, const RowMajorMatrix &commands) {
+TreeRun outputs_under_hold(const Model<Space> &model, const Scene &scene, const std::vector<double> &times,
+                           const RowMajorMatrix &states, ZeroOrderHold held, const RowMajorMatrix &commands) {
   check_scene(model, scene);
-  check_held(model, held);
+  check_hold(model, held);
   check_size("states", states.cols(), model.mechanism.n_q + model.mechanism.n_v);
   check_size("times", static_cast<Index>(times.size()), states.rows());
   check_size("commands", commands.rows(), states.rows());
@@ -91,19 +91,19 @@ template <class Space> void bind_sampled_motion(nb::module_ &m) {
         "between"_a = nb::none(),
         "As tree_motion, under commands that `controller`(k, t, (q, v, a)) gives at samples and that act as `held` "
         "says.");
-  m.def("tree_outputs_under", &held_outputs_of<Space>, "model"_a, "scene"_a, "times"_a, "states"_a, "held"_a,
+  m.def("tree_outputs_under", &outputs_under_hold<Space>, "model"_a, "scene"_a, "times"_a, "states"_a, "held"_a,
         "commands"_a, "As tree_outputs, under commands (T, inputs).");
 }
 
 } // namespace
 
 void bind_tree_sampled(nb::module_ &m) {
-  nb::class_<HeldForces>(m, "HeldForces",
-                         "What a unit of each command does: see mbs/core/recursion/motion/held_forces.h.")
+  nb::class_<ZeroOrderHold>(m, "ZeroOrderHold",
+                            "What a unit of each command does: see mbs/core/recursion/motion/zero_order_hold.h.")
       .def(nb::init<Eigen::MatrixXd>(), "direction"_a, "Generalized forces (n_v, inputs).")
       .def(
           "add_frame_motor",
-          [](HeldForces &held, Index input, int q, int v, const Eigen::MatrixXd &rotation,
+          [](ZeroOrderHold &held, Index input, int q, int v, const Eigen::MatrixXd &rotation,
              const Eigen::Vector3d &axis) {
             check_size("rotation", rotation.rows(), 3);
             held.add_frame_motor(input, {q, v, rotation, axis});

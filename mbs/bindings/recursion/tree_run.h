@@ -56,8 +56,8 @@ template <class Space> void check_scene(const Model<Space> &model, const Scene &
       if (first <= limited.v && limited.v < first + 3)
         throw std::invalid_argument("coordinate of a limit: expected a number, found a part of an orientation");
   }
-  if (!scene.most_bent.empty())
-    check_size("most_bent", static_cast<Eigen::Index>(scene.most_bent.size()),
+  if (!scene.modal_amplitude_limits.empty())
+    check_size("modal_amplitude_limits", static_cast<Eigen::Index>(scene.modal_amplitude_limits.size()),
                static_cast<Eigen::Index>(model.mechanism.nodes.size()));
   if (scene.watch)
     check_size("is_path", static_cast<Eigen::Index>(scene.watch->is_path.size()), model.rows());
@@ -65,7 +65,7 @@ template <class Space> void check_scene(const Model<Space> &model, const Scene &
     check_index("marker of the ground", driven.marker, model.mechanism.ground.size());
 }
 
-template <class Space> void check_held(const Model<Space> &model, const HeldForces &held) {
+template <class Space> void check_hold(const Model<Space> &model, const ZeroOrderHold &held) {
   check_size("rows of held forces", held.direction().rows(), model.mechanism.n_v);
   for (const auto &[input, share] : held.frame_motors()) {
     check_index("input of a motor on frames", input, held.direction().cols());
@@ -74,7 +74,7 @@ template <class Space> void check_held(const Model<Space> &model, const HeldForc
 }
 
 template <class Space> void check_replay(const Model<Space> &model, const Replay &replay) {
-  check_held(model, replay.along());
+  check_hold(model, replay.along());
   for (const auto &[number, entry, share] : replay.at_points())
     check_index("entry of wrenches", entry, Space::dim * model.mechanism.wrenches.size());
 }

@@ -24,7 +24,7 @@ public:
   }
 
   // As OdeSystem has them: the next times will be the stages of a step, and where one had best end.
-  void foresee(const double *times, int count) {
+  void set_stage_times(const double *times, int count) {
     time_ = nowhere;
     prepare(times, count);
   }
@@ -80,7 +80,7 @@ private:
     values_ << first_->values(), second_->values();
     return false; // they know themselves where they are
   }
-  void prepare(const double *times, int count) override { first_->foresee(times, count); }
+  void prepare(const double *times, int count) override { first_->set_stage_times(times, count); }
 
   std::shared_ptr<ForceSource> first_, second_;
 };

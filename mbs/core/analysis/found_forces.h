@@ -31,7 +31,7 @@ public:
 
 private:
   bool find(double t) override;
-  void prepare(const double *times, int count) override { recorded_.foresee(times, count); }
+  void prepare(const double *times, int count) override { recorded_.set_stage_times(times, count); }
 
   RecursiveMotion<Space> motion_;
   RecordedMotion recorded_;

@@ -2,8 +2,8 @@
 #pragma once
 
 #include "core/analysis/force_source.h"
-#include "core/recursion/motion/held_forces.h"
 #include "core/recursion/motion/motion.h"
+#include "core/recursion/motion/zero_order_hold.h"
 
 #include <memory>
 
@@ -17,7 +17,7 @@ public:
     double share;
   };
   // `along`: what units of all numbers of the source do along v.
-  Replay(std::shared_ptr<ForceSource> source, HeldForces along, std::vector<AtPoint> at_points)
+  Replay(std::shared_ptr<ForceSource> source, ZeroOrderHold along, std::vector<AtPoint> at_points)
       : source_(std::move(source)), along_(std::move(along)), at_points_(std::move(at_points)) {}
 
   void add(double t, const double *q, double *force, double *wrench) override {
@@ -27,16 +27,16 @@ public:
     for (const auto &[number, entry, share] : at_points_)
       wrench[entry] += share * source_->values()[number];
   }
-  void foresee(const double *times, int count) override { source_->foresee(times, count); }
+  void set_stage_times(const double *times, int count) override { source_->set_stage_times(times, count); }
   double end_of_step(double t, double h) override { return source_->end_of_step(t, h); }
 
   const ForceSource &source() const { return *source_; }
-  const HeldForces &along() const { return along_; }
+  const ZeroOrderHold &along() const { return along_; }
   const std::vector<AtPoint> &at_points() const { return at_points_; }
 
 private:
   std::shared_ptr<ForceSource> source_;
-  HeldForces along_;
+  ZeroOrderHold along_;
   std::vector<AtPoint> at_points_;
 };
 

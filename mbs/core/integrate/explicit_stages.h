@@ -89,7 +89,7 @@ template <class Tableau, int First, int Last>
 void run_stages(OdeSystem &system, double t, const double *y, double h, Eigen::MatrixXd &K, Eigen::VectorXd &stage) {
   [&]<int... i>(std::integer_sequence<int, i...>) {
     const double times[] = {t + Tableau::c[First + i] * h...};
-    system.foresee(times, sizeof...(i));
+    system.set_stage_times(times, sizeof...(i));
     (run_stage<Tableau, First + i>(system, times[i], y, h, K, stage), ...);
   }(std::make_integer_sequence<int, Last - First + 1>());
 }

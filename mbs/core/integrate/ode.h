@@ -26,7 +26,7 @@ public:
   virtual void slope(double t, const double *z, double *z_dot) = 0;
 
   // The next slopes will be at these times (count): what depends on time alone can be found for all at once.
-  virtual void foresee([[maybe_unused]] const double *times, [[maybe_unused]] int count) {}
+  virtual void set_stage_times([[maybe_unused]] const double *times, [[maybe_unused]] int count) {}
 
   // Where a step from t on that could be of length h had best end: what acts may cost less at times that it knows.
   virtual double end_of_step(double t, double h) { return t + h; }

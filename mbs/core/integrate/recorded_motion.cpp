@@ -88,7 +88,7 @@ bool RecordedMotion::is_stage(int i, double t) const {
   return t == followed_.method->stage_time(i, followed_.begin, followed_.length);
 }
 
-void RecordedMotion::foresee(const double *times, int count) {
+void RecordedMotion::set_stage_times(const double *times, int count) {
   stages_ = 0;
   find_interval(times[0]);
   set_off(followed_);
@@ -104,7 +104,7 @@ void RecordedMotion::foresee(const double *times, int count) {
   followed_.start.resize(z_.size());
   motion_.local().from_state(recorded(hint_), followed_.start.data());
   std::copy_n(end_slope_.data(), end_slope_.size(), method.first_slope());
-  motion_.foresee(times, count);
+  motion_.set_stage_times(times, count);
   next_stage_ = 0, stages_ = count;
 }
 

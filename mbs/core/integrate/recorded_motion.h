@@ -9,8 +9,8 @@
 namespace ffrobot {
 
 // Another run that depends on it is best off with its steps: both are one system then, of which each step is made by
-// one method, stage by stage (`foresee`). At any other time there is the dense output of the step around it, made
-// again.
+// one method, stage by stage (`set_stage_times`). At any other time there is the dense output of the step around it,
+// made again.
 class RecordedMotion {
 public:
   // `motion`: a system as the one that was recorded, which nothing else moves. Both must outlive this.
@@ -23,7 +23,7 @@ public:
   bool is_at_stage() const { return is_at_stage_; } // of a step: at this time there are other states, too
 
   // The next times will be the stages (count) of a step. If it is a recorded one, states are those of its stages.
-  void foresee(const double *times, int count);
+  void set_stage_times(const double *times, int count);
 
   // The end of a recorded step, if one ends about there.
   double end_of_step(double t, double h);

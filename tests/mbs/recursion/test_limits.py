@@ -116,7 +116,7 @@ def test_under_a_sampled_controller():
     watch_limits(scene, system.model.tree)
     found = _core.tree_sampled(
         model=core, scene=scene, times=[0.0, PERIOD], q=start.q, v=start.v, controls=controls(),
-        carry_on=lambda _: True, held=_core.HeldForces(np.ones((1, 1))), first_command=np.zeros(1),
+        carry_on=lambda _: True, held=_core.ZeroOrderHold(np.ones((1, 1))), first_command=np.zeros(1),
         samples=list(np.arange(0.0, PERIOD, 0.1)), delay=0.02, controller=lambda *_: np.zeros(1),
     )  # fmt: skip
     np.testing.assert_allclose(seen(system, found)["pin", 0], (-START, START, time_at(-1.0)), rtol=0, atol=1e-8)

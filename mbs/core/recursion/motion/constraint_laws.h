@@ -14,7 +14,7 @@ public:
   ConstraintLaws(const Scene &scene, std::size_t equations);
 
   // The next times will be these (count).
-  void foresee(const double *times, int count) {
+  void set_stage_times(const double *times, int count) {
     find(times, count);
     time_ = nowhere;
   }

@@ -22,7 +22,7 @@ constexpr double is_on = 1e-11;         // residuals of a state on its constrain
 
 template <class Space>
 RecursiveMotion<Space>::RecursiveMotion(const Mechanism<Space> &mechanism, const Scene &scene, double t,
-                                        const double *q, const double *v, const HeldForces *held,
+                                        const double *q, const double *v, const ZeroOrderHold *held,
                                         ExternalForces *external)
     : ImplicitSystem(ConfigurationSpace(mechanism.n_v, mechanism.rotations)), mechanism_(mechanism), scene_(scene),
       workspace_(mechanism), measured_(mechanism), forces_(mechanism, scene, held, external),
@@ -57,9 +57,9 @@ template <class Space> void RecursiveMotion<Space>::turn_markers(double t) {
   }
 }
 
-template <class Space> void RecursiveMotion<Space>::foresee(const double *times, int count) {
-  laws_.foresee(times, count);
-  forces_.foresee(times, count);
+template <class Space> void RecursiveMotion<Space>::set_stage_times(const double *times, int count) {
+  laws_.set_stage_times(times, count);
+  forces_.set_stage_times(times, count);
 }
 
 template <class Space>
@@ -229,9 +229,9 @@ template <class Space> void RecursiveMotion<Space>::prescribe(double t, double *
 }
 
 template <class Space> bool RecursiveMotion<Space>::is_sensible(const double *z) const {
-  for (std::size_t i = 0; i < scene_.most_bent.size(); ++i) {
+  for (std::size_t i = 0; i < scene_.modal_amplitude_limits.size(); ++i) {
     const Node<Space> &node = mechanism_.nodes[i];
-    if (!(Eigen::Map<const VectorXd>(z + node.p_v(), node.n()).squaredNorm() <= scene_.most_bent[i]))
+    if (!(Eigen::Map<const VectorXd>(z + node.p_v(), node.n()).squaredNorm() <= scene_.modal_amplitude_limits[i]))
       return false;
   }
   return postures_.least_ratio >= singular_ratio &&

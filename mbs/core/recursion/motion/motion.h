@@ -28,13 +28,13 @@ public:
   // Constraint equations that depend on others at time t and (q, v) are left out from there on; they are to be
   // consistent. Mechanism, scene and what acts beside its forces (as in SceneForces) must outlive this.
   RecursiveMotion(const Mechanism<Space> &mechanism, const Scene &scene, double t, const double *q, const double *v,
-                  const HeldForces *held = nullptr, ExternalForces *external = nullptr);
+                  const ZeroOrderHold *held = nullptr, ExternalForces *external = nullptr);
 
   void plan(double duration) { norm_.plan(duration); } // s, of the run to come
   void judge(MotorForces<Space> &motors);              // their errors, too; must outlive this
 
   void slope(double t, const double *z, double *z_dot) override;
-  void foresee(const double *times, int count) override;
+  void set_stage_times(const double *times, int count) override;
   double end_of_step(double t, double h) override { return forces_.end_of_step(t, h); }
   bool correct(double t, double *z) override;
   bool finish(double t, double *z, double *z_dot) override;

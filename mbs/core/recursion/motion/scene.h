@@ -80,7 +80,7 @@ struct TwistSpring {
   }
 };
 
-// Between two joint coordinates, as a gear that gives: moments (N m) of the twist a - ratio b on both.
+// Between two joint coordinates, as a compliant gear: moments (N m) of the twist a - ratio b on both.
 struct GearSpring {
   struct Side {
     int q = 0, v = 0;
@@ -123,7 +123,8 @@ struct Scene {
   bool has_loops =
       false; // closed by constraint equations: steps do not lead across postures in which all depend on each other
   bool keeps_all_constraints = false; // who makes the scene has refused constraint equations that depend on others
-  std::vector<double> most_bent;      // of each node, kg m^2: p^T p beyond it makes no sense; empty: none is too large
+  std::vector<double>
+      modal_amplitude_limits; // of each node, kg m^2: p^T p beyond it makes no sense; empty: none is too large
 };
 
 std::vector<Jet> targets_at(const Scene &scene, double t); // of all constraint equations

@@ -14,7 +14,7 @@ Load::Load(const VectorXd &direction, TimeFunction magnitude_) : magnitude(std::
 }
 
 template <class Space>
-SceneForces<Space>::SceneForces(const Mechanism<Space> &mechanism, const Scene &scene, const HeldForces *held,
+SceneForces<Space>::SceneForces(const Mechanism<Space> &mechanism, const Scene &scene, const ZeroOrderHold *held,
                                 ExternalForces *external)
     : mechanism_(mechanism), scene_(scene), held_(held), external_(external),
       length_(NaturalSizes<Space>(mechanism).length()),

@@ -1,8 +1,8 @@
 // What acts on a mechanism beside gravity, elasticity and damping of modes: the forces of a scene, and those of others.
 #pragma once
 
-#include "core/recursion/motion/held_forces.h"
 #include "core/recursion/motion/scene.h"
+#include "core/recursion/motion/zero_order_hold.h"
 
 namespace ffrobot::recursion {
 
@@ -13,7 +13,7 @@ public:
   // Adds those at time t along v (n_v), and on the wrenches of the mechanism (wrenches, dim); q (n_q) says where
   // directions are that modes turn.
   virtual void add(double t, const double *q, double *force, double *wrench) = 0;
-  virtual void foresee(const double *, int) {} // as OdeSystem has it
+  virtual void set_stage_times(const double *, int) {} // as OdeSystem has it
   virtual double end_of_step(double t, double h) { return t + h; }
 };
 
@@ -21,7 +21,8 @@ public:
 // may be null.
 template <class Space> class SceneForces {
 public:
-  SceneForces(const Mechanism<Space> &mechanism, const Scene &scene, const HeldForces *held, ExternalForces *external);
+  SceneForces(const Mechanism<Space> &mechanism, const Scene &scene, const ZeroOrderHold *held,
+              ExternalForces *external);
 
   bool acts() const { return has_generalized_ || has_wrenches_; }
 
@@ -34,9 +35,9 @@ public:
 
   const double *generalized() const { return has_generalized_ ? generalized_.data() : nullptr; } // of the last at()
 
-  void foresee(const double *times, int count) {
+  void set_stage_times(const double *times, int count) {
     if (external_)
-      external_->foresee(times, count);
+      external_->set_stage_times(times, count);
   }
   double end_of_step(double t, double h) { return external_ ? external_->end_of_step(t, h) : t + h; }
 
@@ -46,7 +47,7 @@ private:
 
   const Mechanism<Space> &mechanism_;
   const Scene &scene_;
-  const HeldForces *held_;
+  const ZeroOrderHold *held_;
   ExternalForces *external_;
   const double length_; // m, natural one
   const bool has_generalized_, has_wrenches_;

@@ -29,7 +29,8 @@ template <class T> FFROBOT_INLINE void load_of_pin(const Mechanism<Planar> &m, i
 
 // What a moment does to the modes that turn a section by a row of W: along the coordinate of the joint (TILT), and
 // that along the joint of the port's outboard subtree.
-template <int turn, class T> inline void push_modes(const planar::Body &body, const T &moment, planar::State<T> &s) {
+template <int turn, class T>
+inline void add_modal_load(const planar::Body &body, const T &moment, planar::State<T> &s) {
   const auto by_moment = [&](int row) { return s.gram_of_block(turn, row) * moment; };
   for (int r = 0; r < 8; ++r)
     s.Q[r] += by_moment(r);
@@ -58,9 +59,9 @@ FFROBOT_INLINE AlongPin<T, W> act_along_pin(const Mechanism<Planar> &m, const No
   forces_on_rows<true>(body, q + node.p_q(), v + node.p_v(), s);
   s.on_modes = s.on_port = T(0.);
   if (body.is_tilted && generalized)
-    s.on_modes = generalized[node.v], push_modes<planar::Body::TILT>(body, s.on_modes, s);
+    s.on_modes = generalized[node.v], add_modal_load<planar::Body::TILT>(body, s.on_modes, s);
   if (node.moment_on_port >= 0 && generalized)
-    s.on_port = -generalized[node.moment_on_port], push_modes<5>(body, s.on_port, s);
+    s.on_port = -generalized[node.moment_on_port], add_modal_load<5>(body, s.on_port, s);
   return along;
 }
 

@@ -9,10 +9,10 @@
 
 namespace ffrobot::recursion {
 
-class HeldForces {
+class ZeroOrderHold {
 public:
   // direction (n_v, inputs): generalized forces of a unit of each command
-  explicit HeldForces(Eigen::MatrixXd direction)
+  explicit ZeroOrderHold(Eigen::MatrixXd direction)
       : direction_(std::move(direction)), u_(Eigen::VectorXd::Zero(direction_.cols())),
         force_(Eigen::VectorXd::Zero(direction_.rows())) {}
 

@@ -26,7 +26,7 @@ struct PlaceOutput {
 };
 
 // Everything that such a motion needs; rows close loops.
-struct HeldModel {
+struct ForwardModel {
   std::string guid; // of the export that it belongs to
   std::vector<recursion::BodyModel<recursion::SpatialData>> bodies;
   std::vector<recursion::SpatialMarker> ground;
@@ -46,26 +46,26 @@ struct HeldModel {
   double duration = 1;
 };
 
-std::string bytes_of(const HeldModel &model);
+std::string bytes_of(const ForwardModel &model);
 // Throws std::runtime_error for bytes that are none of bytes_of().
-HeldModel held_model_of(const std::string &bytes);
+ForwardModel forward_model_of(const std::string &bytes);
 
 // Where a motion is, and how its integration came there.
-struct HeldState {
+struct ForwardState {
   Eigen::VectorXd y; // (q, v)
   IntegrationCheckpoint steps;
   recursion::MotionHistory motion;
   std::vector<double> inputs;
 };
 
-class HeldMotion {
+class ForwardMotion {
 public:
   // Throws std::invalid_argument where the model does not fit together.
-  explicit HeldMotion(HeldModel model);
-  HeldMotion(const HeldMotion &) = delete;
-  HeldMotion &operator=(const HeldMotion &) = delete;
+  explicit ForwardMotion(ForwardModel model);
+  ForwardMotion(const ForwardMotion &) = delete;
+  ForwardMotion &operator=(const ForwardMotion &) = delete;
 
-  const HeldModel &model() const { return model_; }
+  const ForwardModel &model() const { return model_; }
   std::vector<double> &inputs() { return inputs_; } // held from now on
   std::size_t output_count() const { return model_.linear.size() + 3 * model_.places.size(); }
 
@@ -76,14 +76,14 @@ public:
   const std::vector<double> &outputs(); // now: evaluated when first asked for after a step
 
   // What was kept of this model is brought back: explicit methods go on with the very steps that they took from there.
-  HeldState state() const { return {y_, history_, motion_->history(), inputs_}; }
-  void bring_back(const HeldState &state);
+  ForwardState state() const { return {y_, history_, motion_->history(), inputs_}; }
+  void bring_back(const ForwardState &state);
 
 private:
-  static recursion::Scene scene_of(const HeldModel &model);
+  static recursion::Scene scene_of(const ForwardModel &model);
   Eigen::Vector3d place(const PlaceOutput &at, const std::vector<recursion::FrameMotion> &frames) const;
 
-  HeldModel model_;
+  ForwardModel model_;
   recursion::Mechanism<recursion::Spatial> mechanism_;
   recursion::Scene scene_;
   Eigen::VectorXd y_;                                                    // (q, v)

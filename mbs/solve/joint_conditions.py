@@ -22,7 +22,7 @@ DEPENDENT = 1e-9  # of the largest singular value: below it a coordinate follows
 
 
 @dataclass(frozen=True)
-class HeldJoints:
+class JointCondition:
     """Of a robot at one instant, with the joints that have motors locked, or the motors alone behind compliant gears.
 
     Attributes:
@@ -57,14 +57,14 @@ def translational_stiffness(compliance: Array) -> Stiffness | None:
         return Stiffness(1 / np.diag(C), float(1 / values[-1]), directions[:, -1])
 
 
-def held_joints(mechanism: LinearMechanism) -> dict[str, HeldJoints]:
+def joint_conditions(mechanism: LinearMechanism) -> dict[str, JointCondition]:
     """By "locked", and by "compliant" where gears are compliant. `mechanism` has the points to be judged."""
     has_gears = any(name.startswith("motor/") for name in mechanism.outputs)
-    return {condition: _held(mechanism, condition) for condition in (LOCKED, COMPLIANT)[: 1 + has_gears]}
+    return {condition: _in_condition(mechanism, condition) for condition in (LOCKED, COMPLIANT)[: 1 + has_gears]}
 
 
-def held_coordinates(mechanism: LinearMechanism, condition: str) -> tuple[Array, Array, Array]:
-    """N (f, m), of unit kinetic amplitude, with what joints do held; NᵀK N and NᵀD N."""
+def condition_coordinates(mechanism: LinearMechanism, condition: str) -> tuple[Array, Array, Array]:
+    """N (f, m), of unit kinetic amplitude, with what the condition lets joints do; NᵀK N and NᵀD N."""
     names = list(_coordinates(mechanism) if condition == LOCKED else _shafts(mechanism))
     back = np.linalg.inv(np.linalg.cholesky(mechanism.M)).T
     R = np.array([mechanism.outputs[name] for name in names]).reshape(len(names), len(back))
@@ -74,7 +74,7 @@ def held_coordinates(mechanism: LinearMechanism, condition: str) -> tuple[Array,
 
 def frequency_response(mechanism: LinearMechanism, condition: str, point: str, omega: Array) -> ComplexArray:
     """(F, k) of a point at `omega` (F,), rad/s: its motion along and about each axis by a force or moment there."""
-    N, K, D = held_coordinates(mechanism, condition)
+    N, K, D = condition_coordinates(mechanism, condition)
     J, w = mechanism.points[point] @ N, omega[:, None, None]
     X = np.linalg.solve(K + 1j * w * D - w**2 * np.eye(len(K)), np.broadcast_to(J.T, (len(omega), *J.T.shape)))
     return np.asarray(np.einsum("ki,fik->fk", J, X))
@@ -94,11 +94,11 @@ def _shafts(mechanism: LinearMechanism) -> Iterator[str]:
             yield behind if behind in mechanism.outputs else name
 
 
-def _held(mechanism: LinearMechanism, condition: str) -> HeldJoints:
-    N, K, D = held_coordinates(mechanism, condition)
+def _in_condition(mechanism: LinearMechanism, condition: str) -> JointCondition:
+    N, K, D = condition_coordinates(mechanism, condition)
     modes = _largest_real(robot_modes(K, D, N, mechanism.transformation))
     compliance = {point: _compliance(K, J @ N) for point, J in mechanism.points.items()}
-    return HeldJoints(modes, compliance)
+    return JointCondition(modes, compliance)
 
 
 def _largest_real(modes: RobotModes) -> RobotModes:

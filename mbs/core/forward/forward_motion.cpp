@@ -1,4 +1,4 @@
-#include "core/forward/held_motion.h"
+#include "core/forward/forward_motion.h"
 
 #include "core/forward/archive.h"
 
@@ -39,7 +39,7 @@ template <class Archive> void fields(Archive &a, CutJoint &x) {
 
 template <class Archive> void fields(Archive &a, LinearOutput &x) { archived_all(a, x.entries, x.weights); }
 template <class Archive> void fields(Archive &a, PlaceOutput &x) { archived_all(a, x.body, x.position, x.Phi, x.K); }
-template <class Archive> void fields(Archive &a, HeldModel &x) {
+template <class Archive> void fields(Archive &a, ForwardModel &x) {
   archived_all(a, x.guid, x.bodies, x.ground, x.rows, x.gravity, x.joint_forces, x.gears, x.wrenches, x.cut_joints,
                x.inputs, x.linear, x.places, x.q, x.v, x.method, x.spectral_radius, x.tolerance, x.duration);
 }
@@ -65,27 +65,27 @@ void check(bool holds, const char *expected) {
 
 } // namespace
 
-std::string bytes_of(const HeldModel &model) {
+std::string bytes_of(const ForwardModel &model) {
   Writer writer;
-  HeldModel copy = model; // one description serves both ways
+  ForwardModel copy = model; // one description serves both ways
   writer.bytes = head;
   archived(writer, copy);
   return writer.bytes;
 }
 
-HeldModel held_model_of(const std::string &bytes) {
+ForwardModel forward_model_of(const std::string &bytes) {
   if (bytes.compare(0, head.size(), head) != 0)
     throw std::runtime_error("expected a model of this version of ffrobot, found another file");
   const std::string content = bytes.substr(head.size());
   Reader reader(content);
-  HeldModel model;
+  ForwardModel model;
   archived(reader, model);
   if (reader.left() != 0)
     throw std::runtime_error("expected the end of the file, found more data");
   return model;
 }
 
-HeldMotion::HeldMotion(HeldModel model)
+ForwardMotion::ForwardMotion(ForwardModel model)
     : model_(std::move(model)), mechanism_(model_.bodies, model_.ground, model_.rows, model_.wrenches, model_.gravity),
       scene_(scene_of(model_)), y_(joined(model_.q, model_.v)), inputs_(model_.inputs.size(), 0.0),
       outputs_(output_count(), 0.0) {
@@ -94,7 +94,7 @@ HeldMotion::HeldMotion(HeldModel model)
 }
 
 // Checked before anything reads the state.
-Scene HeldMotion::scene_of(const HeldModel &model) {
+Scene ForwardMotion::scene_of(const ForwardModel &model) {
   Index n_q = 0, n_v = 0;
   for (const auto &body : model.bodies) {
     const JointShape shape = Spatial::shape(body.joint);
@@ -126,7 +126,7 @@ Scene HeldMotion::scene_of(const HeldModel &model) {
   return scene;
 }
 
-IntegrationStatus HeldMotion::step(double t, double h) {
+IntegrationStatus ForwardMotion::step(double t, double h) {
   for (std::size_t i = 0; i < inputs_.size(); ++i)
     scene_.loads[i].magnitude = Constant(inputs_[i]);
   IntegrationControls controls;
@@ -142,7 +142,7 @@ IntegrationStatus HeldMotion::step(double t, double h) {
 }
 
 // Begun anew, since implicit methods keep matrices of the steps after it.
-void HeldMotion::bring_back(const HeldState &state) {
+void ForwardMotion::bring_back(const ForwardState &state) {
   motion_.emplace(mechanism_, scene_, 0, model_.q.data(), model_.v.data());
   motion_->plan(model_.duration);
   motion_->go_on(state.motion);
@@ -150,7 +150,7 @@ void HeldMotion::bring_back(const HeldState &state) {
   outputs_are_old_ = true;
 }
 
-const std::vector<double> &HeldMotion::outputs() {
+const std::vector<double> &ForwardMotion::outputs() {
   if (!outputs_are_old_)
     return outputs_;
   outputs_are_old_ = false;
@@ -175,7 +175,7 @@ const std::vector<double> &HeldMotion::outputs() {
   return outputs_;
 }
 
-Eigen::Vector3d HeldMotion::place(const PlaceOutput &at, const std::vector<FrameMotion> &frames) const {
+Eigen::Vector3d ForwardMotion::place(const PlaceOutput &at, const std::vector<FrameMotion> &frames) const {
   const auto number = static_cast<std::size_t>(at.body);
   const auto &node = mechanism_.nodes[number];
   const auto &body = model_.bodies[number].data;

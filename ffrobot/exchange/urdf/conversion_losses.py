@@ -15,7 +15,9 @@ from .scene import GRAVITY
 from .steps import STEPS
 
 
-def not_carried(scene: Scene, loaded: Mapping[str, LoadedBody], tree: KinematicTree, size: float) -> Iterator[str]:
+def conversion_losses(
+    scene: Scene, loaded: Mapping[str, LoadedBody], tree: KinematicTree, size: float
+) -> Iterator[str]:
     """A line for each; `size` of the robot (m) stands for ranges that URDF wants and the scene does not give."""
     if flexible := [name for name, body in loaded.items() if body.modal is not None]:
         yield f"{quoted(flexible)}: rigid in the URDF, undeformed"

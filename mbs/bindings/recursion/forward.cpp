@@ -1,5 +1,5 @@
-// Motions under held inputs, as FMUs run them: mbs/core/forward/held_motion.h.
-#include "core/forward/held_motion.h"
+// Motions under held inputs, as FMUs run them: mbs/core/forward/forward_motion.h.
+#include "core/forward/forward_motion.h"
 
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
@@ -12,7 +12,7 @@ using namespace ffrobot;
 using namespace ffrobot::recursion;
 using Eigen::VectorXd;
 
-void bind_held_motion(nb::module_ &m) {
+void bind_forward_motion(nb::module_ &m) {
   nb::class_<LinearOutput>(m, "LinearOutput", "An output that is linear in the state (q, v).")
       .def(
           "__init__",
@@ -26,33 +26,33 @@ void bind_held_motion(nb::module_ &m) {
           [](PlaceOutput *o, int body, const Eigen::Vector3d &position, const Eigen::MatrixXd &Phi,
              const std::vector<Eigen::MatrixXd> &K) { new (o) PlaceOutput{body, position, Phi, K}; },
           "body"_a, "position"_a, "Phi"_a, "K"_a);
-  nb::class_<HeldModel>(m, "HeldModel",
-                        "All that a motion under held inputs needs; see mbs/core/forward/held_motion.h.")
+  nb::class_<ForwardModel>(m, "ForwardModel",
+                           "All that a motion under held inputs needs; see mbs/core/forward/forward_motion.h.")
       .def(
           "__init__",
-          [](HeldModel *model, const std::vector<BodyModel<SpatialData>> &bodies,
+          [](ForwardModel *model, const std::vector<BodyModel<SpatialData>> &bodies,
              const std::vector<SpatialMarker> &ground, const std::vector<ConstraintModel> &rows,
              const std::vector<MarkerAt> &wrenches, const VectorXd &gravity, const Scene &scene) {
-            new (model) HeldModel();
+            new (model) ForwardModel();
             model->bodies = bodies, model->ground = ground, model->rows = rows, model->gravity = gravity;
             model->wrenches = wrenches, model->cut_joints = scene.cut_joints;
             model->joint_forces = scene.joint_forces, model->gears = scene.gears;
           },
           "bodies"_a, "ground"_a, "rows"_a, "wrenches"_a, "gravity"_a, "scene"_a,
           "Of the scene joint forces, gears and cut joints.")
-      .def_rw("guid", &HeldModel::guid)
-      .def_rw("inputs", &HeldModel::inputs)
-      .def_rw("linear", &HeldModel::linear)
-      .def_rw("places", &HeldModel::places)
-      .def_rw("q", &HeldModel::q)
-      .def_rw("v", &HeldModel::v)
-      .def_rw("method", &HeldModel::method)
-      .def_rw("spectral_radius", &HeldModel::spectral_radius)
-      .def_rw("tolerance", &HeldModel::tolerance)
-      .def_rw("duration", &HeldModel::duration)
+      .def_rw("guid", &ForwardModel::guid)
+      .def_rw("inputs", &ForwardModel::inputs)
+      .def_rw("linear", &ForwardModel::linear)
+      .def_rw("places", &ForwardModel::places)
+      .def_rw("q", &ForwardModel::q)
+      .def_rw("v", &ForwardModel::v)
+      .def_rw("method", &ForwardModel::method)
+      .def_rw("spectral_radius", &ForwardModel::spectral_radius)
+      .def_rw("tolerance", &ForwardModel::tolerance)
+      .def_rw("duration", &ForwardModel::duration)
       .def(
           "to_bytes",
-          [](const HeldModel &model) {
+          [](const ForwardModel &model) {
             const std::string bytes = bytes_of(model);
             return nb::bytes(bytes.data(), bytes.size());
           },
