@@ -71,7 +71,8 @@ def _analysis(one: AnalysisVerdict) -> Row:
 def _remark(one: AnalysisVerdict) -> str:
     """What matters most beside the numbers."""
     if one.status != "completed":
-        return one.status
+        reached, end = one.reached
+        return f"{one.status} at {reached:g} of {end:g} s"
     name, factor = one.worst
     _, saturated, _ = one.answer.rpartition(", ")[2].partition(" % of the samples saturated")
     texts = (

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 import h5py
 import numpy as np
@@ -39,6 +40,7 @@ def _judge(name: str, group: h5py.Group, scene: Scene, coordinates: Coordinates)
         kind=str(about["kind"]),
         status=str(about["status"]),
         cause=str(about.get("cause", "")),
+        reached=(float(group["time"][-1]), _end(scene, name)),
         answer=answer,
         feasible=feasible,
         motors=motors,
@@ -53,6 +55,12 @@ def _judge(name: str, group: h5py.Group, scene: Scene, coordinates: Coordinates)
         notes=tuple(map(str, about.get("notes", ()))),
         advice=tuple(_advice(group, motors, units, patches)),
     )
+
+
+def _end(scene: Scene, name: str) -> float:
+    """Of an analysis, s; 0 of one without duration."""
+    keys: Mapping[str, Any] = next((keys for keys in scene.get("analysis", []) if keys["name"] == name), {})
+    return float(keys.get("end") or 0.0)
 
 
 def _motors(group: h5py.Group, coordinates: Coordinates) -> dict[str, MotorFeasibility]:

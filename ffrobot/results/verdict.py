@@ -29,6 +29,7 @@ class AnalysisVerdict:
 
     Attributes:
         name, kind, status: of the analysis; `cause` why it ended early.
+        reached: s, the last output, and the end that was asked for.
         answer: whether motors and patches can do it, how a closed loop went, or how far a replay is off the path, in
             words; empty where nothing is asked.
         feasible: whether they can; None where that is not asked.
@@ -49,6 +50,7 @@ class AnalysisVerdict:
     kind: str
     status: str
     cause: str
+    reached: tuple[float, float]
     answer: str
     feasible: bool | None
     motors: Mapping[str, MotorFeasibility]
