@@ -98,7 +98,7 @@ def check_neighbours(part: PartMesh, where: str) -> None:
     if np.any(bad):
         cells = np.zeros(len(part.cells), dtype=bool)
         cells[np.flatnonzero(bad) // len(part.shape.facets)] = True
-        _reject_cells(part, cells, "elements that overlap", "elements side by side", where)
+        _reject_cells(part, cells, "overlapping elements", "elements side by side", where)
 
 
 def check_connected(part: PartMesh, where: str) -> None:

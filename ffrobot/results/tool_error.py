@@ -64,7 +64,7 @@ def _apart(group: h5py.Group, source: h5py.Group, scene: Scene) -> Iterator[tupl
     shared, now, then = np.intersect1d(times, path_times, return_indices=True)
     for record in scene.get("trajectory", ()):
         point, path = f"points/{record.get('point')}/position", f"trajectories/{record['name']}"
-        if not len(shared) or point not in group or path not in source:
+        if not len(shared) or point not in group or f"{path}/target" not in source:
             continue
         places = [(k, AXES.index(axis)) for k, axis in enumerate(source[path].attrs["components"]) if axis in AXES]
         target, position = source[f"{path}/target"][()][then], group[point][()][now]

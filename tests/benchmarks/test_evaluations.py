@@ -31,7 +31,7 @@ def test_time_grows_linearly_with_links(rows):
 
 def test_more_is_slower(rows):
     """Six links than three, flexible ones than rigid; the program written by hand is the least and its own measure."""
-    arms = [f"arm of {n} links × 10 modes in space, {n} rows" for n in (3, 6)]
+    arms = [f"arm of {n} links × 10 modes in 3D, {n} constraints" for n in (3, 6)]
     hand_written = rows["two links × 10 modes, hand-written"]
     assert seconds(rows, arms[0]) < seconds(rows, arms[1])
     assert seconds(rows, "arm of 6 rigid links in 3D, 6 constraints") < seconds(rows, arms[1])

@@ -138,7 +138,7 @@ def test_numbers_of_the_readme(arm, held):
     rows = {}
     for name, group in (
         ("joints locked on q_r(t)", held._file["held"]),
-        ("moments of the rigid arm", arm.file["rigid_moments"]),
+        ("torques of the rigid arm", arm.file["rigid_moments"]),
     ):
         way, turn = deviation(group)
         rows[name] = [way[0], way.max(), way[-1], turn.max()]

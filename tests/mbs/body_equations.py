@@ -193,7 +193,8 @@ def gear_energy(tree, q: Array, v: Array) -> tuple[Array, Array]:
     strain, dissipated = np.zeros((2, len(q)))
     for gear in tree.gears:
         way, rate = gear.twist(q, v)
-        strain += 0.5 * gear.stiffness * way**2
+        (k,) = gear.spring.slopes
+        strain += 0.5 * k * way**2
         dissipated += gear.damping * rate**2
     return strain, dissipated
 
@@ -201,7 +202,7 @@ def gear_energy(tree, q: Array, v: Array) -> tuple[Array, Array]:
 def energies(motion) -> Energies:
     """Of all bodies: ½ (m Ṙ² + ωᵀJω + ṗᵀṗ) + Ṙ·(ω × s + S̄ṗ) + ω·hṗ, in axes of the body; ½ pᵀKp; −g·(mR + As).
 
-    Gears that give store ½ k δ² beside, and their motors turn as they have to. With geometric stiffening, less what
+    Compliant gears store ½ k δ², and their motors turn as they have to. With geometric stiffening, less what
     affine fields have of the kinetic energy, and with what they have to second order.
     """
     motion = motion.behind_gears

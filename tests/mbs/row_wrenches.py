@@ -4,7 +4,13 @@ import numpy as np
 
 from ffrobot.common.rotations import left_jacobian
 from ffrobot.mbs.model.rows import turning_axis
-from ffrobot.mbs.model.wrench import Wrench, along_joint
+from ffrobot.mbs.model.wrench import Wrench
+
+
+def along_joint(tree, node, force, q, frames):
+    """What `force` (T, freedoms) along the joint that carries a body does on its outer side, about where that is."""
+    F, acting = tree.pose(node.inner, q, frames).F, np.einsum("tij,tj->ti", node.joint.action(q[:, node.q]), force)
+    return Wrench(*(np.einsum("tij,tj->ti", F, part) for part in (acting[:, :3], acting[:, 3:])))
 
 
 def row_wrenches(tree, row, size, q, times, frames):

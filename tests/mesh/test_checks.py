@@ -72,7 +72,7 @@ def test_elements_in_one_another_are_told():
 
     check_neighbours(part((0, 1, 2, 3), (0, 2, 1, 4)), "here")
     for cells in [((0, 1, 2, 3), (0, 1, 2, 5)), ((0, 1, 2, 3), (0, 2, 1, 4), (0, 1, 2, 5))]:
-        with pytest.raises(InputError, match=r"here: expected elements side by side, found 2 elements that lie in one"):
+        with pytest.raises(InputError, match=r"here: expected elements side by side, found 2 overlapping elements"):
             check_neighbours(part(*cells), "here")
 
 
