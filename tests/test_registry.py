@@ -101,7 +101,7 @@ import numpy as np
 from ffrobot.common.rotations import exponential, of_quaternion, quaternions
 from ffrobot.mbs.fields.field_types import Vector2, Vector3
 from ffrobot.mbs.fields.spelling import Spelled, place
-from ffrobot.mbs.joints.joint import Along, Held, Place
+from ffrobot.mbs.joints.joint import Along, LoopEquation, Place
 from ffrobot.mbs.joints.moving_joint import AxialJoint
 
 
@@ -115,7 +115,7 @@ class SlotJoint(AxialJoint):
     units = ("m",)
     q_count = 5
     freedoms = 4
-    held = (Held("slide", 0), Held("slide", 1))
+    loop_equations = (LoopEquation("slide", 0), LoopEquation("slide", 1))
     along = (Along("slide", 2),)
     locates: ClassVar[bool] = False  # it leaves a place open: loops are cut here
 
