@@ -104,6 +104,6 @@ def main() -> None:
         without_output()
         sys.exit(error.exit_code if isinstance(error, FfrobotError) else 1)
     finally:  # nothing is left to keep: at the interpreter's end an interrupt would be a traceback
-        gc.freeze()  # nor to look for, through all that is loaded
+        gc.freeze()  # else the interpreter searches all that is loaded for garbage at its end
         for number in SIGNALS:
             signal.signal(number, signal.SIG_DFL)

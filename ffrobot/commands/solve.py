@@ -95,8 +95,7 @@ def _solve(scene_file: Path, path: Path, again: str, *, resume: bool, strict: bo
         print_details(solution, verdict, path, {**solution.seconds, "writing": writing}, console)
         click.echo(f"note       {posture}" if posture else "", nl=bool(posture))
     else:
-        of_links = [note for note in solution.notes if ": all modes but " not in note]
-        notes = [*solution.path_notes, *of_links, *([posture] if posture else [])]
+        notes = [*solution.path_notes, *solution.link_notes, *([posture] if posture else [])]
         accuracy = "; ".join(error_budget(solution))
         lines = summary_lines(verdict, notes, accuracy, str(path), console.width, len(remarks))
         click.echo("\n".join(lines))

@@ -30,7 +30,7 @@ def control_tables(details: Mapping[str, Details]) -> Iterator[Table]:
     at_rest = [
         row
         for name, found in details.items()
-        if isinstance(found, WITH_CONDITIONS)
+        if isinstance(found, LinearModels | RobotAtRest)
         for row in _condition_rows(name, found)
     ]
     placements = [_placement(name, found) for name, found in details.items() if isinstance(found, Placed)]
@@ -58,15 +58,9 @@ def _linear(name: str, found: LinearModels) -> Iterator[tuple[str, ...]]:
         yield name, f"{model.time:g}", f"{model.freedom}", lowest, f"{modes.growth:.3g}" if modes.growth else ""
 
 
-WITH_CONDITIONS = (LinearModels, RobotAtRest)
 CONDITION_COLUMNS = (
-    "joints",
-    "t (s)",
-    "natural frequencies (Hz)",
-    "at",
-    "stiffness along axes\n(N/mm)",
-    "least, along",
-)
+    "joints", "t (s)", "natural frequencies (Hz)", "at", "stiffness along axes\n(N/mm)", "least, along",
+)  # fmt: skip
 
 
 def _condition_rows(name: str, found: LinearModels | RobotAtRest) -> Iterator[tuple[str, ...]]:

@@ -231,8 +231,14 @@ class Solution:
     @property
     def notes(self) -> tuple[str, ...]:
         """What links cannot do, and modes left out, one line each."""
-        found = [*rigid_in_words(self.bodies)]
-        for name, body in self.bodies.items():
-            if body.spatial.reduction is not None and not self.scene.is_planar:
-                found.append(f"{name}: all modes but {modes_kept(body.spatial)}")
-        return (*found, *remarks_on_parts(self.bodies))
+        left_out = (
+            f"{name}: all modes but {modes_kept(body.spatial)}"
+            for name, body in self.bodies.items()
+            if body.spatial.reduction is not None and not self.scene.is_planar
+        )
+        return (*self.link_notes, *left_out)
+
+    @property
+    def link_notes(self) -> tuple[str, ...]:
+        """What links cannot do, and what their meshes leave out, one line each."""
+        return (*rigid_in_words(self.bodies), *remarks_on_parts(self.bodies))
