@@ -9,6 +9,7 @@ import time
 import h5py
 import numpy as np
 import pytest
+from strip_link import LINK
 
 from ffrobot import solve
 from ffrobot.common.errors import InputError
@@ -18,23 +19,6 @@ from ffrobot.map.quantities import quantities
 from ffrobot.pictures.studies.pose_map import draw_map
 from ffrobot.run.watcher import Watcher
 
-LINK = """name = "{name}"
-[material]
-youngs_modulus = 70e9
-poissons_ratio = 0.3
-density = 2700.0
-[geometry]
-kind = "beam"
-length = {length}
-section = {{ shape = "rectangle", height = 0.02, width = 0.03 }}
-[mesh]
-elements = 10
-[reference]
-condition = "cantilever"
-[modes]
-count = 4
-family = "in-plane-bending"
-"""
 ARM = """name = "arm"
 space = "planar"
 gravity = [0.0, -9.81]
@@ -70,7 +54,9 @@ kind = "static"
 def arm(tmp_path_factory):
     folder = tmp_path_factory.mktemp("arm")
     for name, length in (("upper", 0.6), ("fore", 0.4)):
-        (folder / f"{name}.toml").write_text(LINK.format(name=name, length=length))
+        (folder / f"{name}.toml").write_text(
+            LINK.format(name=name, length=length, elements=10, count=4, family='"in-plane-bending"')
+        )
     (folder / "scene.toml").write_text(ARM)
     return folder / "scene.toml"
 

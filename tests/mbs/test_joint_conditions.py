@@ -5,6 +5,7 @@ import pytest
 from scipy.linalg import eigh
 from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
+from strip_link import LINK
 
 from ffrobot import solve
 from ffrobot.mbs.solve.poses import PoseEvaluator
@@ -15,29 +16,11 @@ E, NU, RHO, HEIGHT, WIDTH = 70e9, 0.3, 2700.0, 0.02, 0.03
 G = E / (2 * (1 + NU))
 GEAR = 3000.0  # N·m/rad
 
-LINK = """name = "{name}"
-[material]
-youngs_modulus = 70e9
-poissons_ratio = 0.3
-density = 2700.0
-[geometry]
-kind = "beam"
-length = {length}
-section = {{ shape = "rectangle", height = 0.02, width = 0.03 }}
-[mesh]
-elements = 20
-[reference]
-condition = "cantilever"
-[modes]
-count = {count}
-family = {family}
-"""
-
 
 def write(folder, scene, **links):
     """The results of a scene with these links: by name length, number of modes, families."""
     for name, (length, count, family) in links.items():
-        text = LINK.format(name=name, length=length, count=count, family=family)
+        text = LINK.format(name=name, length=length, elements=20, count=count, family=family)
         (folder / f"{name}.toml").write_text(text)
     path = folder / "scene.toml"
     path.write_text(scene)
