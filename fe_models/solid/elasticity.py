@@ -70,6 +70,7 @@ class ScalarMass:
             vector.array[:] = U[:, k]
             self.scatter.scatter(vector, self.foreign)
             foreign[:, k] = self.foreign.array_r
+        vector.destroy()
         return np.asarray(self.csr @ np.concatenate([U, foreign]).reshape(-1, 3 * n)).reshape(-1, n)
 
 
@@ -137,6 +138,7 @@ class SolidModel:
             vector.setValuesLocal(seen, row, addv=True)
             vector.assemble()
             target[:] = vector.array_r
+            vector.destroy()
         return result
 
     def with_ghosts(self, U: Array) -> Array:
@@ -176,7 +178,9 @@ def solid_model(mesh: Mesh, order: int, materials: MaterialMap) -> SolidModel:
     dx = ufl.dx(metadata={"quadrature_degree": mass_degree(mesh, order)})
     M = fem_petsc.assemble_matrix(compiled_form(rho * a * b * dx))
     M.assemble()
-    mass, pattern = _scalar_mass(M)
+    mass, pattern = _scalar_mass(M, mesh.comm)
+    local_to_global = M.getLGMap()[0]
+    M.destroy()  # PETSc keeps what Python alone lets go
     return SolidModel(
         mesh=mesh,
         order=order,
@@ -186,7 +190,7 @@ def solid_model(mesh: Mesh, order: int, materials: MaterialMap) -> SolidModel:
         materials=materials,
         mass=mass,
         pattern=pattern,
-        local_to_global=M.getLGMap()[0],
+        local_to_global=local_to_global,
         stiffness_form=compiled_form(_stiffness_form(V, materials, strain_degree(mesh, order))),
     )
 
@@ -254,7 +258,7 @@ def _is_simplex(mesh: Mesh) -> bool:
     return bool(mesh.ufl_domain().ufl_cell().cellname() == "tetrahedron")
 
 
-def _scalar_mass(M: PETSc.Mat) -> tuple[ScalarMass, tuple[Integers, Integers]]:
+def _scalar_mass(M: PETSc.Mat, comm: MPI.Comm) -> tuple[ScalarMass, tuple[Integers, Integers]]:
     """M's own rows as SciPy matrix, and how many blocks an upper triangle of the same pattern has in each."""
     indptr, columns, values = M.getValuesCSR()
     first, end = M.getOwnershipRange()
@@ -266,10 +270,10 @@ def _scalar_mass(M: PETSc.Mat) -> tuple[ScalarMass, tuple[Integers, Integers]]:
     local = np.where(inside, columns - first, end - first + np.searchsorted(foreign, columns))
     csr = sp.csr_matrix((values, local, indptr), shape=(end - first, end - first + foreign.size))
     scatter, target = None, PETSc.Vec().createSeq(3 * foreign.size, bsize=3, comm=PETSc.COMM_SELF)
-    if M.comm.size > 1:
-        source = PETSc.Vec().createMPI((3 * (end - first), None), bsize=3, comm=M.comm)
+    if comm.size > 1:
+        source = PETSc.Vec().createMPI((3 * (end - first), None), bsize=3, comm=comm)
         here = PETSc.IS().createBlock(3, foreign.astype(PETSc.IntType), comm=PETSc.COMM_SELF)
         there = PETSc.IS().createStride(3 * foreign.size, step=1, comm=PETSc.COMM_SELF)
         scatter = PETSc.Scatter().create(source, here, target, there)
     counts = (within.astype(PETSc.IntType), beyond.astype(PETSc.IntType))
-    return ScalarMass(csr, scatter, target, M.comm), counts
+    return ScalarMass(csr, scatter, target, comm), counts

@@ -59,8 +59,8 @@ class Factors:
                 f" memory{f' or space in {folder}' if folder else ''} does not suffice for its factors;"
                 " check material and mesh, or use larger elements"
             ) from None
-        solver.destroy()  # with K: only the factors stay
-        K.destroy()
+        for used in (solver, pc, K):  # only the factors stay; PETSc would keep what Python alone lets go
+            used.destroy()
 
     def solve(self, loads: Array) -> Array:
         """K⁻¹ f of loads (own, k), as many columns at once as MUMPS takes well; collective."""
