@@ -143,6 +143,15 @@ def of_rpy(roll: float, pitch: float, yaw: float) -> Array:
     return about(2, yaw) @ about(1, pitch) @ about(0, roll)
 
 
+def rpy_of(C: Array) -> list[float]:
+    """Roll, pitch, yaw about fixed axes of a rotation (3, 3), `of_rpy` back: pitch within ±π/2."""
+    across = float(np.hypot(C[0, 0], C[1, 0]))
+    yaw = float(np.arctan2(C[1, 0], C[0, 0])) if across > 1e-9 else 0.0  # else about the same axis as roll
+    B = about(2, yaw).T @ C
+    angles = np.arctan2(-B[1, 2], B[1, 1]), np.arctan2(-B[2, 0], B[0, 0]), yaw
+    return [float(angle) + 0.0 for angle in angles]  # no −0.0
+
+
 def unit(vector: Array) -> Array:
     """A vector (3,) of length 1 along one of any length that is not 0, also where squares of that are no numbers."""
     scaled: Array = vector / np.abs(vector).max()

@@ -218,8 +218,9 @@ def _position(run: Outcome, point: str) -> Array:
 
 
 def _default_tip(model: Model) -> str:
-    """The point of the first trajectory of one, or the last tip."""
+    """The point of the first trajectory of one, or the first tool, or the last tip."""
     driven = [trajectory.point for trajectory in model.scene.trajectory if trajectory.point is not None]
+    driven += [tool.reference for tool in model.scene.tool]
     if driven:
         return driven[0]
     body = next(node.body for node in reversed(model.tree.nodes) if node.body.points)

@@ -9,7 +9,7 @@ import numpy as np
 
 from ...common.arrays import Array
 from ...common.errors import InputError
-from ...mbs.model.body import Body, BodyPoint
+from ...mbs.model.body import Body
 from ...mbs.model.model import Model, build_model, row_values
 from ...mbs.model.rows import ConstraintRow
 from ...mbs.model.system import ZERO, MultibodySystem
@@ -110,7 +110,7 @@ def _motor_rows(model: Model) -> list[ConstraintRow]:
 def _rigid(body: Body) -> Body:
     """The undeformed body."""
     none, empty = np.zeros((3, 0)), np.zeros((0, 0))
-    points = {name: BodyPoint(at.position, none, none) for name, at in body.points.items()}
+    points = {name: replace(at, translation=none, rotation=none) for name, at in body.points.items()}
     return replace(
         body, S_bar=none, I_bar=np.zeros((3, 3, 0)), S_bar_kl=np.zeros((3, 3, 0, 0)), h_spin=np.zeros(0),
         S_spin=empty, stiffness=np.zeros(0), damping=empty, points=MappingProxyType(points), modal_transform=empty,

@@ -92,10 +92,11 @@ def plan_map(
 
 
 def _default_point(scene: Scene) -> str:
-    """The last point that a trajectory leads; else of the last body that of a payload, its tip, or its last point."""
+    """The last point that a trajectory leads; else the last tool, or a point of the last body: payload, tip, last."""
     body = scene.body[-1]
     carried = [one.point for one in scene.payload if one.point.partition(".")[0] == body.name]
-    named = carried + [one.point for one in scene.trajectory if one.point is not None]
+    named = carried + [tool.reference for tool in scene.tool]
+    named += [one.point for one in scene.trajectory if one.point is not None]
     points = ["tip"] if body.rigid is None else list(body.rigid.points)
     last = "tip" if "tip" in points else points[-1]
     return named[-1] if named else f"{body.name}.{last}"

@@ -9,6 +9,7 @@ import numpy as np
 from rich.console import Console
 
 from ..common.arrays import Array
+from ..common.rotations import rpy_of
 from ..mbs.model.model import Model
 from ..mbs.scene.space import SPACES
 from ..mbs.solve.branches import start_postures
@@ -23,7 +24,8 @@ def print_start(path: Path, watcher: Watcher, console: Console) -> None:
     model = prepare_scene(path, watcher).model
     first, *others = start_postures(model)
     print_table(console, ("joint", "start", "guess in [initial]", "limits"), _joints(model, first.q))
-    print_table(console, ("point", "at (m)"), _points(model, first.q))
+    columns = ("point", "at (m)", "roll, pitch, yaw")[: 2 + bool(model.scene.tool)]
+    print_table(console, columns, (row[: len(columns)] for row in _points(model, first.q)))
     if others:
         console.print(f"other starts: {len(others)} found; a line of [initial] chooses one")
     for other in others:
@@ -53,9 +55,12 @@ def _in(value: float, unit: str) -> str:
     return f"{round(np.degrees(value), 6) + 0.0:.5g}°" if unit == "rad" else f"{value:.5g} m"
 
 
-def _points(model: Model, q: Array) -> Iterator[tuple[str, str]]:
-    tree, frames = model.tree, model.tree.frames(q[None])
-    for point in dict.fromkeys(path.point for path in model.scene.trajectory if path.point is not None):
-        r = tree.motion(tree.section(point, np.eye(3)), q[None], frames).r[0]
-        place = SPACES[model.scene.space].along(r)
-        yield point, ", ".join(f"{round(x, 9) + 0.0:.5g}" for x in place)
+def _points(model: Model, q: Array) -> Iterator[tuple[str, str, str]]:
+    """Points of paths, and tools with their orientation, in the plane by yaw alone."""
+    tree, frames, space = model.tree, model.tree.frames(q[None]), SPACES[model.scene.space]
+    tools = [tool.reference for tool in model.scene.tool]
+    for point in dict.fromkeys([*(path.point for path in model.scene.trajectory if path.point is not None), *tools]):
+        pose = tree.pose(tree.section(point, np.eye(3)), q[None], frames)
+        angles = rpy_of(pose.F[0])[2:] if space.is_plane else rpy_of(pose.F[0])
+        turned = ", ".join(_in(angle, "rad") for angle in angles) if point in tools else ""
+        yield point, ", ".join(f"{round(x, 9) + 0.0:.5g}" for x in space.along(pose.r[0])), turned

@@ -11,16 +11,17 @@ from ..actuation.patches.composite import Placed
 from ..actuation.patches.link_patches import by_body, link_patches, placed_patches
 from ..actuation.patches.records import PztLayout
 from ..actuation.patches.structure import patched_body, structure_effect_of
-from ..common.errors import of_file
+from ..common.errors import InputError, of_file
 from ..fe_models.link_records import FAMILIES
 from ..fe_models.modal_body_file import read_modal_body
 from ..mbs.model.body import from_modal_body, rigid_body
 from ..mbs.model.masses import with_payload
 from ..mbs.model.payloads import turns_as_a_body
 from ..mbs.model.projection import projected
+from ..mbs.model.tools import with_tool
 from ..mbs.scene.bodies import BodyKeys, tensor
 from ..scene.scene import Scene
-from .loaded_body import IN_PLANE, LoadedBody, payloads_on
+from .loaded_body import IN_PLANE, LoadedBody, records_on
 
 
 def load_bodies(scene: Scene, stage: Callable[[str], None]) -> list[LoadedBody]:
@@ -61,6 +62,10 @@ def _loaded(scene: Scene, body: BodyKeys, stiffened: bool, stage: Callable[[str]
     if modal is not None:
         made = from_modal_body(body.name, modal, stiffened, is_planar=scene.is_planar)
     made = projected(made) if scene.is_planar else made
+    for _, tool in records_on("tool", scene.tool, made.name, made.points, scene.path):
+        if tool.name in made.points:
+            raise InputError(f'tool: name: expected one that no point of "{made.name}" has, found "{tool.name}"')
+        made = with_tool(made, tool)
     return LoadedBody(
         spatial=made, carrying=made, modal=modal, path=path, computed=computed, reused=reused,
         motions=IN_PLANE if scene.is_planar else FAMILIES,
@@ -69,8 +74,9 @@ def _loaded(scene: Scene, body: BodyKeys, stiffened: bool, stage: Callable[[str]
 
 def _with_payloads(scene: Scene, body: LoadedBody) -> LoadedBody:
     spatial = carrying = body.spatial
-    for point, payload in payloads_on(scene.payload, spatial.name, spatial.points, scene.path):
-        about = point, payload.mass, np.array(payload.center), tensor(payload.inertia)
+    for point, payload in records_on("payload", scene.payload, spatial.name, spatial.points, scene.path):
+        F = spatial.points[point].triad
+        about = point, payload.mass, F @ np.array(payload.center), F @ tensor(payload.inertia) @ F.T
         carrying = with_payload(carrying, *about)
         if body.modal is None or not turns_as_a_body(scene, payload):
             spatial = with_payload(spatial, *about)

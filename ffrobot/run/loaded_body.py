@@ -85,15 +85,17 @@ class _OnPoint(Protocol):
 P = TypeVar("P", bound=_OnPoint)
 
 
-def payloads_on(payloads: Iterable[P], body: str, points: Collection[str], scene: Path) -> Iterator[tuple[str, P]]:
-    """The payloads of a body with the names of their points. Raises `InputError` for a point that it does not have."""
-    for payload in payloads:
-        name, point = split_point(payload.point)
+def records_on(
+    kind: str, records: Iterable[P], body: str, points: Collection[str], scene: Path
+) -> Iterator[tuple[str, P]]:
+    """Payloads or tools (`kind`) of a body with their points. Raises `InputError` for a point that it does not have."""
+    for record in records:
+        name, point = split_point(record.point)
         if name != body:
             continue
         if point not in points:
             raise InputError(
-                f'{scene}: payload: point: expected a point of "{name}" ({quoted(points)}), found'
-                f' "{payload.point}"{did_you_mean(point, points)}'
+                f'{scene}: {kind}: point: expected a point of "{name}" ({quoted(points)}), found'
+                f' "{record.point}"{did_you_mean(point, points)}'
             )
-        yield point, payload
+        yield point, record

@@ -17,6 +17,7 @@ from ..common.arrays import Array, as_floats
 from ..common.rotations import exponential, left_jacobian, logarithm, of_quaternion, quaternions
 from ..fe_models.link_records import HOLDING_ROOT
 from ..fe_models.modal_body import ModalBody
+from ..mbs.model.body import BodyPoint
 from ..mbs.model.divided_link import spread_of
 from ..mbs.model.motors import MotorForces
 from ..mbs.quantities.body_motion import BodyMotion, PointMotion
@@ -37,13 +38,15 @@ X = np.array([1.0, 0.0, 0.0])
 class Divided:
     """A link in pieces: its modal body, how it is cut, and the modal bodies of its pieces from the root to the tip.
 
-    `to_own` (n_file, n): modal coordinates of the whole link in the equations, by those of its file.
+    `to_own` (n_file, n): modal coordinates of the whole link in the equations, by those of its file. `points` are those
+    of the whole link.
     """
 
     modal: ModalBody
     body: BodyInPieces
     pieces: tuple[ModalBody, ...]
     to_own: Array
+    points: Mapping[str, BodyPoint]
 
 
 @dataclass(frozen=True)
@@ -92,7 +95,7 @@ class MotionOfLinks(RobotMotion):
             return super().point(point)
         link, frame = self.divided[name], self._links[name]
         found = super().point(link.body.point(label))
-        position = link.modal.length / 2 * X if label == "mid" else link.modal.interfaces[label].position
+        position = link.points[label].position
         in_frame = np.einsum("tji,tj->ti", of_quaternion(frame.orientation), found.position - frame.position)
         return replace(found, deflection=in_frame - position)
 
@@ -127,9 +130,12 @@ def divided_links(solution: Solution) -> dict[str, Divided]:
     for name, body in solution.divided.items():
         modal = solution.bodies[name].modal
         pieces = [solution.parts[piece].modal for piece in body.names]
-        to_own = np.linalg.pinv(solution.bodies[name].spatial.modal_transform).T
+        whole = solution.bodies[name].spatial
+        to_own = np.linalg.pinv(whole.modal_transform).T
         assert modal is not None
-        found[name] = Divided(modal, body, tuple(piece for piece in pieces if piece is not None), as_floats(to_own))
+        found[name] = Divided(
+            modal, body, tuple(piece for piece in pieces if piece is not None), as_floats(to_own), whole.points
+        )
     return found
 
 

@@ -104,6 +104,10 @@ def _duplicates(kind: str, names: Iterable[str]) -> Iterator[str]:
 
 def _body_problems(scene: SceneKeys) -> Iterator[str]:
     bodies = {body.name: body for body in scene.body}
+    tools: dict[str, list[str]] = {}
+    for tool in scene.tool:
+        body, _, point = tool.reference.partition(".")
+        tools.setdefault(body, []).append(point)
     if GROUND in bodies:
         yield f'body "{GROUND}": name: expected any other name, found "{GROUND}", which is the fixed frame'
     for reference in scene.references():
@@ -115,10 +119,11 @@ def _body_problems(scene: SceneKeys) -> Iterator[str]:
             yield f'{reference.key}: expected one of the bodies {quoted(bodies)}, found "{reference.name}"{hint}'
             continue
         rigid = bodies[name].rigid
-        if point and rigid is not None and point not in rigid.points:
-            hint = did_you_mean(point, rigid.points)
+        known = [] if rigid is None else [*rigid.points, *tools.get(name, ())]
+        if point and rigid is not None and point not in known:
+            hint = did_you_mean(point, known)
             yield (
-                f'{reference.key}: expected one of the points {quoted(rigid.points)} of "{name}", found'
+                f'{reference.key}: expected one of the points {quoted(known)} of "{name}", found'
                 f' "{reference.name}"{hint}'
             )
 

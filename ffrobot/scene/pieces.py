@@ -6,13 +6,14 @@ What computes motions gets the scene of pieces; what is said of them is of the o
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
 from ..common.errors import InputError
 from ..common.validation import Record
 from ..fe_models.link_records import FAMILIES
 from ..fe_models.pieces import IN_PLANE, CutLink, cut
+from ..mbs.fields.field_types import split_point
 from ..mbs.joints.weld import WeldJoint
 from ..mbs.scene.bodies import BodyKeys
 from ..mbs.scene.mechanism import MechanismKeys
@@ -41,18 +42,30 @@ def bodies_in_pieces(scene: Scene, counts: Mapping[str, int]) -> dict[str, BodyI
     for body in scene.body:
         if body.link is not None and body.name in counts:
             names = tuple(f"{body.name}, piece {k}" for k in range(1, counts[body.name] + 1))
-            found[body.name] = BodyInPieces(cut(body.link, counts[body.name], families), names)
+            whole = cut(body.link, counts[body.name], families)
+            found[body.name] = BodyInPieces(replace(whole, places=_with_tools(scene, body.name, whole.places)), names)
     problems = [f"{scene.path}: {problem}" for problem in _problems(scene, found)]
     if problems:
         raise InputError("\n".join(problems))
     return {name: body for name, body in found.items() if len(body.names) > 1}
 
 
+def _with_tools(scene: Scene, body: str, places: Mapping[str, tuple[int, str]]) -> dict[str, tuple[int, str]]:
+    """Where points of a body are, by piece and name, tools too."""
+    found = dict(places)
+    for tool in scene.tool:
+        name, point = split_point(tool.point)
+        if name == body and point in found:
+            found[tool.name] = found[point][0], tool.name
+    return found
+
+
 def scene_of_pieces(scene: Scene, divided: Mapping[str, BodyInPieces]) -> Scene:
     """The scene in which each piece is a body; points that scene and analyses name are those of the pieces."""
     places = places_on_pieces(divided)
     keys = {
-        name: _renamed(getattr(scene, name), places) for name in ("joint", "trajectory", "load", "payload", "analysis")
+        name: _renamed(getattr(scene, name), places)
+        for name in ("tool", "joint", "trajectory", "load", "payload", "analysis")
     }
     bodies = tuple(piece for body in scene.body for piece in _pieces(body, divided))
     welds = (

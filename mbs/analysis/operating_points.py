@@ -129,17 +129,21 @@ def _growth(mechanism: LinearMechanism) -> float:
     return robot_modes(K, D, back, mechanism.transformation).growth
 
 
-def places_of(context: Context, points: Sequence[str] | None) -> dict[str, str]:
+def places_of(context: Context, points: Sequence[str] | None, *, loaded: bool = False) -> dict[str, str]:
     """Where each point of the scene is in the model, of whose links some may be in pieces.
 
-    Where no `points` are given: those of trajectories, and where there are none, the tips of all bodies that have one.
+    Where no `points` are given: those of trajectories, or else the tips of all bodies that have one; then tools, and
+    where payloads and loads are if `loaded`.
     """
     whole = context.whole
     if points is None:
         model = context.model if whole is None else whole.model
         followed = [path.point for path in model.scene.trajectory if path.point is not None]
         tips = [f"{node.body.name}.tip" for node in model.tree.nodes if "tip" in node.body.points]
-        points = tuple(dict.fromkeys(followed or tips))
+        scene = model.scene
+        carrying = [*(one.point for one in scene.payload), *(load.point for load in scene.load if load.point)]
+        tools = [tool.reference for tool in scene.tool]
+        points = tuple(dict.fromkeys([*(followed or tips), *tools, *(carrying if loaded else ())]))
     return {point: place_of(whole, point) or point for point in points}
 
 

@@ -34,7 +34,7 @@ class Static(Analysis):
 
     kind: Literal["static"]
     points: tuple[PointReference, ...] | None = None
-    """Points whose compliance is computed; by default those of trajectories, or all tips."""
+    """Points whose compliance is computed; by default those of trajectories, or all tips; tools, payloads and loads."""
 
     is_algebraic = True
     allocates_patches = True
@@ -49,7 +49,7 @@ class Static(Analysis):
         found = run_static(context, self)
         try:
             model, _, (q,), (v,), (a,) = linear_states(context.model, found, [0])
-            mechanism = LinearEquations(model, q, places_of(context, self.points)).at(0.0, q, v, a)
+            mechanism = LinearEquations(model, q, places_of(context, self.points, loaded=True)).at(0.0, q, v, a)
         except (InputError, SolveError) as error:
             text = f"no natural frequencies and no compliance: {error}"
             statistics = replace(found.statistics, warnings=(*found.statistics.warnings, text))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from types import MappingProxyType
 
@@ -19,11 +19,20 @@ from .stiffening import Stiffening
 
 @dataclass(frozen=True)
 class BodyPoint:
-    """A section of a body: position (3,) m, Φ as `translation` (3, n), Φ_r as `rotation` (3, n), in body axes."""
+    """A section of a body: position (3,) m, Φ as `translation` (3, n), Φ_r as `rotation` (3, n), in body axes.
+
+    `triad` (3, 3): its axes, columns, in those of the undeformed body; of a tool they may be others (see `tools`).
+    """
 
     position: Array
     translation: Array
     rotation: Array
+    triad: Array = field(default_factory=lambda: np.eye(3))
+
+    @property
+    def is_turned(self) -> bool:
+        """Whether its axes are others than those of the body."""
+        return not np.array_equal(self.triad, np.eye(3))
 
 
 @dataclass(frozen=True)
@@ -160,8 +169,8 @@ def transformed(body: Body, T: Array, stiffness: Array) -> Body:
         S_spin=T.T @ body.S_spin @ T,
         points=MappingProxyType(
             {
-                label: BodyPoint(section.position, section.translation @ T, section.rotation @ T)
-                for label, section in body.points.items()
+                label: replace(at, translation=at.translation @ T, rotation=at.rotation @ T)
+                for label, at in body.points.items()
             }
         ),
         modal_transform=body.modal_transform @ T,

@@ -170,7 +170,7 @@ def _path_rows(scene: MechanismScene, tree: KinematicTree, path: Trajectory) -> 
     if path.tool_axis is None:
         yield from (ConstraintRow(path.name, "rotation", ground, section, e, e, law=path.orientation) for e in unit)
     else:
-        tool = section._replace(triad=np.array(path.tool_triad))
+        tool = section._replace(triad=section.triad @ np.array(path.tool_triad))
         for f in unit[:2]:
             yield ConstraintRow(path.name, "dot", tool, ground, f, unit[2], law=path.orientation)
 

@@ -29,7 +29,9 @@ def projected(body: Body) -> Body:
     S_bar, S_bar_kl = ALONG[:, None] * kept.S_bar, _keeping_shapes(kept.S_bar_kl)
     about_center = np.trace(kept.second_moment[:2, :2]) - kept.mass * center @ center
     points = {
-        label: BodyPoint(at.position * ALONG, ALONG[:, None] * at.translation, (1.0 - ALONG)[:, None] * at.rotation)
+        label: BodyPoint(
+            at.position * ALONG, ALONG[:, None] * at.translation, (1.0 - ALONG)[:, None] * at.rotation, at.triad
+        )
         for label, at in kept.points.items()
     }
     found = replace(

@@ -12,7 +12,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from ...common.arrays import Array
+from ...common.arrays import Array, as_floats
 from ...fe_models.modal_body import ModalBody
 from ...fe_models.modal_body.lumped_masses import attached_integrals
 from ...fe_models.modal_body.tensors import LEVI_CIVITA
@@ -54,12 +54,8 @@ class Stiffening:
         position (3,) and `phi` = Φ_r (3, n) of the point. What is d from it moves by (exp φ~ − 1) d besides, so that
         pᵀG p = pᵀK p + pᵀK_r p × d − φ × (φ × d), with φ = Φ_r p, K along and K_r about the axes.
         """
-        K = self.at(point)
-        turning = np.einsum("am,bn->abmn", phi, phi)  # φ_a φ_b
-        turning = 0.5 * (turning + turning.transpose(1, 0, 2, 3))
-        by_arm = np.einsum("lab,amn->lbmn", LEVI_CIVITA, K[3:])
-        by_arm = by_arm + np.einsum("lb,aamn->lbmn", np.eye(3), turning) - turning
-        G_center = K[:3] + np.einsum("lbmn,b->lmn", by_arm, arm)
+        by_arm = self._by_arm(point, phi)
+        G_center = self.at(point)[:3] + np.einsum("lbmn,b->lmn", by_arm, arm)
         K_x = self.K_x + mass * np.einsum("k,lmn->klmn", position + arm, G_center)
         turned = attached_integrals(0.0, position, E, np.zeros_like(phi), phi)["S_bar_kl"]
         return replace(
@@ -68,6 +64,19 @@ class Stiffening:
             K_x=K_x + np.einsum("kb,lbmn->klmn", E, by_arm),
             S_turned=self.S_turned + turned,
         )
+
+    def with_tool(self, name: str, point: str, phi: Array, arm: Array) -> Stiffening:
+        """With a further point `name` at `arm` (3,) from one of its points, with which it moves and turns."""
+        K = self.at(point).copy()
+        K[:3] += np.einsum("lbmn,b->lmn", self._by_arm(point, phi), arm)
+        return replace(self, K_points=MappingProxyType({**self.K_points, name: K}))
+
+    def _by_arm(self, point: str, phi: Array) -> Array:
+        """(3, 3, n, n) at [l, b]: what d_b from a point adds to pᵀG_l p of the point itself, Φ_r = phi (3, n)."""
+        turning = np.einsum("am,bn->abmn", phi, phi)  # φ_a φ_b
+        turning = 0.5 * (turning + turning.transpose(1, 0, 2, 3))
+        by_arm = np.einsum("lab,amn->lbmn", LEVI_CIVITA, self.at(point)[3:])
+        return as_floats(by_arm + np.einsum("lb,aamn->lbmn", np.eye(3), turning) - turning)
 
 
 def from_modal_body(body: ModalBody, *, is_planar: bool = False) -> Stiffening | None:

@@ -107,7 +107,8 @@ class CompliantGear(NamedTuple):
 class KinematicTree:
     """Bodies on the joints of a spanning forest; `loops` are the joints beside it, in the scene's order.
 
-    `gears` are between its joints: none where they are taken for rigid (see `gears.with_compliance`).
+    `tools` are the points "BODY.POINT" with axes of their own, (3, 3) columns in those of the body. `gears` are between
+    its joints: none where they are taken for rigid (see `gears.with_compliance`).
     `on_frames` names joints whose angles are those of frames (see `frames_3d`).
     """
 
@@ -123,6 +124,9 @@ class KinematicTree:
     ) -> None:
         """`floating`: the type of joint, at the origin, of bodies that no joint carries."""
         by_name = {body.name: body for body in bodies}
+        self.tools = {
+            f"{body.name}.{label}": at.triad for body in bodies for label, at in body.points.items() if at.is_turned
+        }
         self.index = {name: number for number, name in enumerate(topology.carriers)}
         nodes, q, v = [], 0, 0
         for number, (name, carrier) in enumerate(topology.carriers.items()):
@@ -147,11 +151,12 @@ class KinematicTree:
         self.carried = {node.joint.name: number for number, node in enumerate(nodes)}
 
     def section(self, side: str, triad: Array, at: Sequence[float] = (0.0, 0.0, 0.0)) -> Section:
-        """The triad on "BODY.POINT", on the frame of "BODY" or on "ground" `at` (m)."""
+        """The triad, in the axes of what it is on: "BODY.POINT", the frame of "BODY" or "ground" `at` (m)."""
         if side == GROUND:
             return Section(-1, "", triad, np.array(at, dtype=float))
         body, _, point = side.partition(".")
-        return Section(self.index[body], point, triad, np.zeros(3))
+        own = self.tools[side] @ triad if side in self.tools else triad
+        return Section(self.index[body], point, own, np.zeros(3))
 
     def with_outputs(self, outputs: Sequence[tuple[JointRecord, str, Section]]) -> KinematicTree:
         """The tree with a body without inertia, of a label, on each joint with a rotor and one coordinate.

@@ -15,9 +15,9 @@ from ...common.numbers import MOST_MODES, SMALLEST
 from ...common.validation import InputFile, Record, existing_file
 from ...fe_models.link_file import LinkSource, LinkTable
 from ...fe_models.link_records import BeamLink, SolidLink
-from ..fields.field_types import Name, NotNegative, PointReference, Positive, Vector3, one_of
+from ..fields.field_types import Name, NotNegative, PointReference, Positive, Quantity, Vector3, one_of, split_point
 from ..fields.references import Reference
-from ..fields.spelling import IN_SPACE, Spelled, Vector, inertia_about_z
+from ..fields.spelling import IN_PLANE, IN_SPACE, Spelled, Vector, inertia_about_z
 
 Inertia = Vector3 | tuple[Vector3, Vector3, Vector3]
 ROUNDING = 1e-9  # of the largest entry of an inertia tensor
@@ -163,6 +163,30 @@ class BodyKeys(Record):
         return self
 
 
+class Tool(Record):
+    """A frame that moves and turns with a point of a body, without mass: one more point of the body, "BODY.NAME"."""
+
+    name: Name
+    """Name of the point, unique on its body."""
+    point: PointReference
+    """Point that carries it, "BODY.POINT"."""
+    at: Vector = (0.0, 0.0, 0.0)
+    """Position, m from that point, axes of the body."""
+    rpy: Annotated[tuple[Quantity, Quantity, Quantity], IN_SPACE] = (0.0, 0.0, 0.0)
+    """Orientation in the axes of the body: roll, pitch, yaw about its x, y, z in this order, rad (or "90*deg")."""
+    angle: Annotated[Quantity, IN_PLANE] = 0.0
+    """Angle of its x axis against that of the body, rad (or such as "90*deg")."""
+
+    @property
+    def reference(self) -> str:
+        """The point that it is, "BODY.NAME"."""
+        return f"{split_point(self.point)[0]}.{self.name}"
+
+    def references(self) -> Iterator[Reference]:
+        """The point that carries it."""
+        yield Reference("point", self.point)
+
+
 class Payload(Record):
     """A mass (kg) on a section of a body, with its inertia about its own center of mass (kg·m²)."""
 
@@ -171,9 +195,10 @@ class Payload(Record):
     mass: NotNegative
     """Mass, kg."""
     center: Vector = (0.0, 0.0, 0.0)
-    """Center of mass, m from the point, axes of the body."""
+    """Center of mass, m from the point, axes of the body or tool."""
     inertia: Annotated[Inertia, Spelled(NotNegative, inertia_about_z)] = (0.0, 0.0, 0.0)
-    """Inertia about that center, axes of the body, kg·m²: [xx, yy, zz], or a 3 × 3 matrix; planar scenes about z."""
+    """Inertia about that center, axes of the body or tool, kg·m²: [xx, yy, zz], or a 3 × 3 matrix; planar scenes about
+    z."""
 
     @field_validator("inertia")
     @classmethod

@@ -13,7 +13,7 @@ from ..fields.field_types import NotEmpty
 from ..fields.references import Reference, under
 from ..fields.spelling import Vector
 from ..joints.joints import AnyJoint
-from .bodies import BodyKeys, Payload
+from .bodies import BodyKeys, Payload, Tool
 from .initial import Initial
 from .loads import Load
 from .topology import Edge, Topology, spanning_forest
@@ -40,6 +40,8 @@ class MechanismKeys(Record):
     robot's size). Default: the redundant motion is unactuated."""
     body: Annotated[tuple[BodyKeys, ...], NotEmpty]
     """Links and rigid bodies."""
+    tool: tuple[Tool, ...] = ()
+    """Frames of tools, fixed to points of bodies."""
     joint: tuple[AnyJoint, ...] = ()
     """Joints between bodies, or to the ground; bodies without a joint are free."""
     trajectory: tuple[Trajectory, ...] = ()
@@ -98,9 +100,10 @@ class MechanismKeys(Record):
 
     def references(self) -> Iterator[Reference]:
         """All that records of the scene refer to, with their full keys."""
-        records: list[tuple[str, AnyJoint | Trajectory | Load | Payload]] = [
+        records: list[tuple[str, AnyJoint | Tool | Trajectory | Load | Payload]] = [
             (joint.label, joint) for joint in self.joint
         ]
+        records += [(f'tool "{tool.name}"', tool) for tool in self.tool]
         records += [(f'trajectory "{trajectory.name}"', trajectory) for trajectory in self.trajectory]
         records += [(f"load no. {k}", load) for k, load in enumerate(self.load, 1)]
         records += [(f"payload no. {k}", payload) for k, payload in enumerate(self.payload, 1)]

@@ -27,8 +27,9 @@ class JointCondition:
 
     Attributes:
         modes: of the robot, its coordinates s left free; `modes.frequency` in Hz, the lowest first.
-        compliance: (k, k) by "BODY.POINT": translations (m) along the axes of the space, then rotations (rad) about
-            them, by forces (N) and moments (N·m); infinite where a joint without a motor lets the robot move.
+        compliance: (k, k) by "BODY.POINT": translations (m) along the axes of the space, of a tool its own, then
+            rotations (rad) about them, by forces (N) and moments (N·m); infinite where a joint without a motor lets
+            the robot move.
     """
 
     modes: RobotModes
@@ -73,9 +74,9 @@ def condition_coordinates(mechanism: LinearMechanism, condition: str) -> tuple[A
 
 
 def frequency_response(mechanism: LinearMechanism, condition: str, point: str, omega: Array) -> ComplexArray:
-    """(F, k) of a point at `omega` (F,), rad/s: its motion along and about each axis by a force or moment there."""
+    """(F, k) of a point at `omega` (F,), rad/s: its motion along and about each axis (a tool's own) by a unit load."""
     N, K, D = condition_coordinates(mechanism, condition)
-    J, w = mechanism.points[point] @ N, omega[:, None, None]
+    J, w = mechanism.of_tool(point) @ N, omega[:, None, None]
     X = np.linalg.solve(K + 1j * w * D - w**2 * np.eye(len(K)), np.broadcast_to(J.T, (len(omega), *J.T.shape)))
     return np.asarray(np.einsum("ki,fik->fk", J, X))
 
@@ -97,7 +98,7 @@ def _shafts(mechanism: LinearMechanism) -> Iterator[str]:
 def _in_condition(mechanism: LinearMechanism, condition: str) -> JointCondition:
     N, K, D = condition_coordinates(mechanism, condition)
     modes = _largest_real(robot_modes(K, D, N, mechanism.transformation))
-    compliance = {point: _compliance(K, J @ N) for point, J in mechanism.points.items()}
+    compliance = {point: _compliance(K, mechanism.of_tool(point) @ N) for point in mechanism.points}
     return JointCondition(modes, compliance)
 
 

@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...common.arrays import Array, Indices
+from ...common.arrays import Array, Indices, as_floats
 from ...common.errors import InputError, SolveError
 from ...common.rotations import skew
 from ..model.cut import measured
@@ -45,6 +45,7 @@ class LinearMechanism:
         outputs: (f,) derivatives of joint coordinates ("joint/NAME"), of motors behind compliant gears ("motor/NAME"),
             and places of points ("point/BODY.POINT/x", …).
         points: (k, f) by "BODY.POINT": translations along the axes of the space, then rotations about them.
+        tool_axes: (k, k) by those points that have axes of their own: their components from those of the space.
         transformation: H = ∂q/∂s (coordinates, f).
         transformation_rate: its rate along the motion: δv = H δṡ + H_dot δs.
         force: (f,) what drives the motion itself: forces along the independent rows, modal forces beside the loads.
@@ -61,10 +62,16 @@ class LinearMechanism:
     inputs: Mapping[str, Array]
     outputs: Mapping[str, Array]
     points: Mapping[str, Array]
+    tool_axes: Mapping[str, Array]
     transformation: Array
     transformation_rate: Array
     force: Array
     names: tuple[str, ...]
+
+    def of_tool(self, point: str) -> Array:
+        """(k, f) as `points`, but in the axes of a point that has its own."""
+        J = self.points[point]
+        return as_floats(self.tool_axes[point] @ J) if point in self.tool_axes else J
 
     def modal(self, body: str) -> list[int]:
         """Where in s the modal coordinates of a body are."""
@@ -121,7 +128,7 @@ class LinearEquations:
         H, H_dot = H * self._signs, H_dot * self._signs
         shares = {joint: frame_share(self.model, joint, q) for joint in self._on_frames}
         moments = {joint: along_s[self.model.motors[joint][0]] for joint in shares}
-        points = self._points(state, H)
+        points, tool_axes = self._points(state, H)
         on_modes = sum((moments[joint] * shares[joint].direction for joint in shares), np.zeros(tree.n_v))
         # Not by way of M⁻¹, whose rounding is that of the stiffest modes
         K_more, D_more = gear_matrices(tree, q)
@@ -129,8 +136,8 @@ class LinearEquations:
         return LinearMechanism(
             t, q, v, a, sides * (M + M.T) / 2, H.T @ D_more @ H - sides * (M @ by_rate),
             H.T @ (K_more @ H + D_more @ H_dot) - sides * (M @ by_s),
-            self._inputs(H, shares, points), self._outputs(state, H, points), MappingProxyType(points), H, H_dot,
-            self._signs * force - on_modes @ H, self.names,
+            self._inputs(H, shares, points), self._outputs(state, H, points), MappingProxyType(points),
+            MappingProxyType(tool_axes), H, H_dot, self._signs * force - on_modes @ H, self.names,
         )  # fmt: skip
 
     def _followers(self, state: _State, t: float) -> tuple[Array, Array]:
@@ -176,13 +183,16 @@ class LinearEquations:
         found |= {_of_motor(gear): H[gear.motor.v.start] for gear in tree.gears}
         return MappingProxyType(found | self._along_axes("point", points))
 
-    def _points(self, state: _State, H: Array) -> dict[str, Array]:
-        """(k, f) translations along the axes of the space, then rotations about them, of each point."""
-        space, found = SPACES[self.model.scene.space], {}
+    def _points(self, state: _State, H: Array) -> tuple[dict[str, Array], dict[str, Array]]:
+        """(k, f) translations along the axes of the space, then rotations, of each point; (k, k) axes of tools."""
+        tree, space, found, axes = self.model.tree, SPACES[self.model.scene.space], {}, {}
+        components = [*space.translations, *(3 + k for k in space.rotations)]
         for point, place in self.points.items():
-            L = self.model.tree.motion(self.model.tree.section(place, np.eye(3)), state.q, state.frames).L[0]
-            found[point] = np.concatenate([L[list(space.translations)], L[3:][list(space.rotations)]]) @ H
-        return found
+            motion = tree.motion(tree.section(place, np.eye(3)), state.q, state.frames)
+            found[point] = motion.L[0, components] @ H
+            if place in tree.tools:
+                axes[point] = np.kron(np.eye(2), motion.F[0].T)[np.ix_(components, components)]
+        return found, axes
 
     def _along_axes(self, kind: str, points: Mapping[str, Array]) -> dict[str, Array]:
         """By "KIND/BODY.POINT/x", …: translations of points."""

@@ -9,10 +9,10 @@ from rigid_robots import of_rpy
 
 from ffrobot import InputError
 from ffrobot.common.rotations import of_rpy as of_rpy_here
+from ffrobot.common.rotations import rpy_of
 from ffrobot.common.validation import validate
 from ffrobot.exchange.urdf.import_urdf import import_urdf
 from ffrobot.exchange.urdf.names import Names
-from ffrobot.exchange.urdf.scene import rpy_of
 from ffrobot.mbs.scene.mechanism import MechanismKeys
 
 INERTIAL = '<inertial><mass value="2"/><inertia ixx="0.02" ixy="0" ixz="0" iyy="0.02" iyz="0" izz="0.01"/></inertial>'
@@ -49,6 +49,27 @@ def imported(tmp_path, ffrobot):
         return keys, done.stdout
 
     return run
+
+
+def test_the_tool_frame_of_the_last_body(imported, tmp_path, ffrobot):
+    """A link without mass on a fixed joint with axes of its own is a tool: where and how it stands, there and back."""
+    turned = '<joint name="flange" type="fixed"><parent link="arm"/><child link="tool0"/>'
+    turned += '<origin xyz="0.1 0 0.4" rpy="0.2 -0.3 0.4"/></joint>'
+    plain = '<joint name="camera" type="fixed"><parent link="arm"/><child link="lens"/><origin xyz="0 0.1 0"/></joint>'
+    parts = (link("base"), link("arm"), link("tool0", ""), link("lens", ""), joint("shoulder", "base", "arm"))
+    keys, _ = imported(robot(*parts, turned, plain))
+    (found,) = keys["tool"]
+    assert found["name"] == "tool0"
+    assert found["point"] == "arm.origin"
+    np.testing.assert_allclose([*found["at"], *found["rpy"]], [0.1, 0.0, 0.4, 0.2, -0.3, 0.4], atol=1e-15)
+    assert keys["body"][0]["rigid"]["points"] == {"origin": [0.0, 0.0, 0.0], "lens": [0.0, 0.1, 0.0]}
+    scene = tmp_path / "scene" / "scene.toml"
+    with scene.open("a") as file:
+        file.write('\n[[analysis]]\nname = "rest"\nkind = "static"\n')
+    done = ffrobot("export", scene, "--format", "urdf", "-o", tmp_path / "back.urdf")
+    assert done.returncode == 0, done.stderr
+    again, _ = imported((tmp_path / "back.urdf").read_text(), "--force")
+    np.testing.assert_allclose([*again["tool"][0]["at"], *again["tool"][0]["rpy"]], [*found["at"], *found["rpy"]])
 
 
 def test_keys_of_a_joint(imported):

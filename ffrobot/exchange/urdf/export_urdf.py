@@ -10,6 +10,7 @@ import numpy as np
 
 from ...common.arrays import Array
 from ...common.errors import InputError
+from ...common.rotations import rpy_of
 from ...mbs.fields.field_types import GROUND
 from ...mbs.joints.joint import JointRecord
 from ...mbs.model.body import Body
@@ -23,7 +24,6 @@ from ...scene.scene import Scene
 from .conversion_losses import conversion_losses
 from .names import Names
 from .robot import Inertial, Mimic, Numbers3, Origin, Primitive, Robot, UrdfJoint, UrdfLink
-from .scene import rpy_of
 from .steps import Step, follows, steps_outward
 from .visuals import SLENDER, bars, beam_visuals
 from .write import urdf_text
@@ -100,7 +100,7 @@ class UrdfOfScene:
                 name = self._link_names[f"{body.name}.{point}"]
                 self._links[name] = UrdfLink(name, None)
                 joint = self._joint_names[f"{name}.fixed"]
-                origin = Origin(_three(place - at))
+                origin = Origin(_three(place - at), _three(rpy_of(body.points[point].triad)))
                 self._joints[joint] = UrdfJoint(joint, "fixed", body.name, name, origin, (1.0, 0.0, 0.0), {}, {}, None)
 
     # Joints
@@ -109,13 +109,14 @@ class UrdfOfScene:
         """The steps of a joint one after the other, with links without mass in between."""
         joint, parent, origin = node.joint, self._parent(node), self._origin(node)
         steps = steps_outward(joint, node.backwards)
+        own = node.body.points[node.outer.point].triad if node.outer.point else np.eye(3)
         for number, (step, axis) in enumerate(steps, 1):
             name = self._joint_names[f"{joint.name}.{step.label}"] if step.label else self._name(node)
             child = node.body.name if number == len(steps) else self._link_names[f"{name}.link"]
             self._links.setdefault(child, UrdfLink(child, None))
             rise = follows(joint, step)
             self._joints[name] = UrdfJoint(
-                name, self._type(joint, step), parent, child, origin, _three(axis), self._limits(joint, step),
+                name, self._type(joint, step), parent, child, origin, _three(own @ axis), self._limits(joint, step),
                 _dynamics(joint, step), None if rise is None else Mimic(joint.name, rise, 0.0),
             )  # fmt: skip
             parent, origin = child, Origin()
@@ -133,6 +134,8 @@ class UrdfOfScene:
         if node.inner.body >= 0:
             carrier = self.tree.nodes[node.inner.body]
             at = carrier.body.points[node.inner.point].position - _anchor(carrier)
+        if self.tree.tools.keys() & {*node.joint.between}:
+            return Origin(_three(at), _three(rpy_of(node.inner.triad @ node.outer.triad.T)))
         rpy = rpy_of(node.joint.orientation.T) if node.backwards else node.joint.rpy
         return Origin(_three(at), _three(rpy))
 
@@ -179,9 +182,11 @@ def _anchor(node: Node) -> Array:
 
 
 def _own_points(loaded: LoadedBody) -> dict[str, Array]:
-    """Points that the file of a body names, by name: (3,) m, body axes."""
-    names = loaded.spatial.points if loaded.modal is None else loaded.modal.interfaces
-    return {name: loaded.spatial.points[name].position for name in names}
+    """Points that the file of a body names, and tools with axes of their own, by name: (3,) m, body axes."""
+    points, modal = loaded.spatial.points, loaded.modal
+    return {
+        name: at.position for name, at in points.items() if modal is None or name in modal.interfaces or at.is_turned
+    }
 
 
 def _three(values: Sequence[float] | Array) -> Numbers3:

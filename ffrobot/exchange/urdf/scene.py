@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ...common.arrays import Array
-from ...common.rotations import about
+from ...common.rotations import rpy_of
 from ...common.tables import shown
 from ...mbs.fields.field_types import GROUND
 from .bodies import Body, Mechanism
@@ -49,6 +49,8 @@ class SceneOfRobot:
             "body": [self._body(body) for body in found.bodies],
             "joint": joints,
         }
+        if tools := list(self._tool_records()):
+            self.keys["tool"] = tools
         self._remark_on_ground()
         changed = self.bodies.changed | self.joints.changed
         self.remarks += [f'"{shown(old)}" is called "{new}" in the scene' for old, new in changed.items()]
@@ -76,8 +78,8 @@ class SceneOfRobot:
             if self.found.body_of.get(joint.parent) is body:
                 points[of_body[joint.name]] = _numbers((body.members[joint.parent] @ joint.origin.place).d)
         for link, place in body.members.items():  # frames of tools and sensors keep their names
-            if link != body.top:
-                points[of_body[f"link {link}" if link in self.robot.joints else link]] = _numbers(place.d)
+            if link != body.top and link not in self._tools(body):
+                points[self._frame(body, link)] = _numbers(place.d)
         inertial = body.inertial
         rigid = {
             "mass": inertial.mass,
@@ -88,6 +90,28 @@ class SceneOfRobot:
         if visuals := list(self._visuals(body)):
             rigid["visual"] = visuals
         return {"name": name, "rigid": rigid}
+
+    def _tools(self, body: Body) -> list[str]:
+        """Links of a rigid body that carries no other: its frames with axes of their own, ends of fixed joints."""
+        carries = any(self.found.body_of.get(joint.parent) is body for joint in self.found.joints)
+        if carries or body.flexible or body.stands_still:
+            return []
+        return [
+            link
+            for link, place in body.members.items()
+            if link != body.top and not self.robot.joints_of(link) and not np.array_equal(place.C, np.eye(3))
+        ]
+
+    def _frame(self, body: Body, link: str) -> str:
+        """The name of the point where a link fixed to the body has its frame."""
+        return self.points[body.top][f"link {link}" if link in self.robot.joints else link]
+
+    def _tool_records(self) -> Iterator[dict[str, Any]]:
+        for body in self.found.bodies:
+            for link in self._tools(body):
+                place, keys = body.members[link], {"name": self._frame(body, link)}
+                keys |= {"point": f"{self.bodies[body.top]}.{ORIGIN}"}
+                yield {**keys, "at": _numbers(place.d), "rpy": rpy_of(place.C)}
 
     def _visuals(self, body: Body) -> Iterator[dict[str, Any]]:
         """Shapes of all its links, in the body's axes; meshes as far as their files are there."""
@@ -195,14 +219,6 @@ class SceneOfRobot:
 def _is_plain(parent: Body, joint: UrdfJoint, child: Body) -> bool:
     """Whether the joint's origin is between the axes of the two bodies themselves."""
     return parent.members[joint.parent] is HERE and child.members[joint.child] is HERE
-
-
-def rpy_of(C: Array) -> list[float]:
-    """Roll, pitch, yaw about fixed axes of a rotation (3, 3), `of_rpy` back: pitch within ±π/2."""
-    across = float(np.hypot(C[0, 0], C[1, 0]))
-    yaw = float(np.arctan2(C[1, 0], C[0, 0])) if across > 1e-9 else 0.0  # else about the same axis as roll
-    B = about(2, yaw).T @ C
-    return _numbers([np.arctan2(-B[1, 2], B[1, 1]), np.arctan2(-B[2, 0], B[0, 0]), yaw])
 
 
 def _numbers(vector: Iterable[float]) -> list[float]:

@@ -7,10 +7,9 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from ...common.arrays import Array
-from ...common.rotations import smallest_turn
+from ...common.rotations import rpy_of, smallest_turn
 from ...fe_models.modal_body import ModalBody
 from .robot import Numbers3, Origin, Primitive
-from .scene import rpy_of
 
 SLENDER = 40.0  # bars: length of the longest by their radius
 ALIKE = 1e-9  # sections whose sizes differ by less, relative, are one shape

@@ -1,0 +1,186 @@
+"""Frames of tools: position, orientation and compliance by closed forms, and by the same robot without a tool."""
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+from strip_link import LINK
+
+from ffrobot import make_scene, solve
+from ffrobot.common.errors import InputError
+from ffrobot.mbs.model.bending import bent_section
+from ffrobot.mbs.solve.poses import PoseEvaluator
+from ffrobot.mbs.solve.start import undeformed_posture
+from ffrobot.run.solve import prepare_scene
+
+RPY = (0.4, -0.7, 1.1)
+E, HEIGHT, LENGTH, BEYOND = 70e9, 0.02, 0.6, 0.25
+
+
+def turned(rpy):
+    return Rotation.from_euler("xyz", rpy).as_matrix()
+
+
+def wrist(**keys):
+    """Three axes through one point on a column: any orientation of the last body."""
+    body = {"mass": 1.0, "center": [0.0, 0.0, 0.05], "inertia": [0.01, 0.012, 0.009],
+            "points": {"root": [0.0, 0.0, 0.0], "end": [0.1, 0.0, 0.2]}}  # fmt: skip
+    axes, before = {"a": [0.0, 0.0, 1.0], "b": [0.0, 1.0, 0.0], "c": [1.0, 0.0, 0.0]}, ["ground", "a.end", "b.end"]
+    joints = [
+        {"name": f"to_{name}", "type": "revolute", "between": [side, f"{name}.root"], "axis": axis}
+        for (name, axis), side in zip(axes.items(), before, strict=True)
+    ]
+    scene = {
+        "name": "wrist", "space": "spatial", "gravity": [0.0, 0.0, -9.81], "joint": joints,
+        "body": [{"name": name, "rigid": body} for name in axes], "tool": [tool()],
+        "initial": {"joints": {"to_a": 0.3, "to_b": 0.5, "to_c": -0.4}},
+        "analysis": [{"name": "move", "kind": "pcid", "end": 0.5, "output_step": 0.05, "tolerance": 1e-10}],
+    }  # fmt: skip
+    return make_scene(**(scene | keys))
+
+
+def tool(**keys):
+    return {"name": "gripper", "point": "c.end", "at": [0.05, -0.02, 0.15], "rpy": list(RPY)} | keys
+
+
+def test_the_orientation_of_a_tool_follows_its_path():
+    """A path of a tool is that of its body turned back by the tool's rpy: the same angles of the joints."""
+    path = [f"{0.2 * k} + 0.3*t**2" for k in range(1, 4)]
+    with solve(wrist(trajectory=[{"name": "turn", "point": "c.gripper", "rpy": path}])) as of_tool:
+        q = [of_tool[f"move/joints/to_{name}/coordinate"].ravel() for name in "abc"]
+        times = of_tool["move/time"]
+        place = of_tool["move/points/c.gripper/position"]
+    A = Rotation.from_euler("z", q[0]) * Rotation.from_euler("y", q[1]) * Rotation.from_euler("x", q[2])
+    wanted = Rotation.from_euler("xyz", np.array([0.2, 0.4, 0.6]) + 0.3 * times[:, None] ** 2)
+    np.testing.assert_allclose((A * Rotation.from_matrix(turned(RPY))).as_matrix(), wanted.as_matrix(), atol=1e-9)
+    one, two = Rotation.from_euler("z", q[0]), Rotation.from_euler("z", q[0]) * Rotation.from_euler("y", q[1])
+    end = np.array([0.1, 0.0, 0.2])
+    expected = one.apply(end) + two.apply(end) + A.apply([0.15, -0.02, 0.35])
+    np.testing.assert_allclose(place, expected, atol=1e-9)
+
+
+def test_a_direction_of_a_tool_is_in_its_axes():
+    """z of the tool along a given direction: two equations, exact."""
+    keys = {"name": "point", "point": "c.gripper", "tool_axis": [0.0, 0.0, 1.0], "direction": ["0.2", "t", "1"]}
+    held = {"name": "held", "joint": "to_a", "value": "0.3"}
+    with solve(wrist(trajectory=[keys, held])) as results:
+        q = [results[f"move/joints/to_{name}/coordinate"].ravel() for name in "abc"]
+        times = results["move/time"]
+    A = Rotation.from_euler("z", q[0]) * Rotation.from_euler("y", q[1]) * Rotation.from_euler("x", q[2])
+    along = A.apply(turned(RPY)[:, 2])
+    wanted = np.stack([np.full_like(times, 0.2), times, np.ones_like(times)], axis=1)
+    np.testing.assert_allclose(along, wanted / np.linalg.norm(wanted, axis=1)[:, None], atol=1e-9)
+
+
+def test_payloads_and_joints_on_a_tool_are_in_its_axes():
+    """The same torques as with center and inertia turned by hand, and as with a body welded there by its rpy."""
+    F, center, inertia = turned(RPY), np.array([0.02, 0.01, 0.1]), np.diag([0.02, 0.03, 0.015])
+    paths = [{"name": n, "joint": f"to_{n}", "value": f"0.3 + {k}*t**3"} for k, n in enumerate("abc", 1)]
+    at_tool = {"point": "c.gripper", "mass": 2.0, "center": center.tolist(), "inertia": inertia.tolist()}
+    by_hand = {"point": "c.end", "mass": 2.0, "center": ([0.05, -0.02, 0.15] + F @ center).tolist(),
+               "inertia": (F @ inertia @ F.T).tolist()}  # fmt: skip
+    extra = {"mass": 2.0, "center": center.tolist(), "inertia": inertia.tolist(), "points": {"root": [0.0, 0.0, 0.0]}}
+    plain = wrist(trajectory=paths)
+    bodies = [*({"name": b.name, "rigid": b.rigid.model_dump(exclude_unset=True)} for b in plain.body),
+              {"name": "extra", "rigid": extra}]  # fmt: skip
+    joints = [joint.model_dump(exclude_unset=True) for joint in plain.joint]
+    weld = {"name": "weld", "type": "weld", "between": ["c.gripper", "extra.root"]}
+    found = []
+    for keys in (
+        {"payload": [at_tool]},
+        {"payload": [by_hand], "tool": []},
+        {"body": bodies, "joint": [*joints, weld]},
+    ):
+        with solve(wrist(trajectory=paths, **keys)) as results:
+            found.append(np.array([results[f"move/joints/to_{name}/moment"].ravel() for name in "abc"]))
+    np.testing.assert_allclose(found[0], found[1], rtol=1e-10, atol=1e-10)
+    np.testing.assert_allclose(found[0], found[2], rtol=1e-9, atol=1e-9)
+
+
+def strip(folder, **keys):
+    (folder / "strip.toml").write_text(
+        LINK.format(name="strip", length=LENGTH, elements=20, count=4, family='"in-plane-bending"')
+    )
+    scene = {
+        "name": "strip", "gravity": [0.0, 0.0], "body": [{"name": "strip", "link": str(folder / "strip.toml")}],
+        "joint": [{"name": "hub", "type": "revolute", "between": ["ground", "strip.root"]}],
+        "tool": [{"name": "nose", "point": "strip.tip", "at": [BEYOND, 0.0], "angle": 0.6}],
+        "initial": {"joints": {"hub": 0.4}},
+        "trajectory": [{"name": "still", "joint": "hub", "value": "0.4"}],
+        "analysis": [{"name": "rest", "kind": "static"}],
+    }  # fmt: skip
+    return make_scene(**(scene | keys))
+
+
+def test_compliance_at_a_tool_beyond_the_tip(tmp_path):
+    """A rigid nose on a cantilever: ∫ (L + d − x)²/EI dx across, L/EI in rotation; in the tool's axes, by F Cᵀ Fᵀ."""
+    EI = E * 0.03 * HEIGHT**3 / 12
+    a = LENGTH + BEYOND
+    across, mixed = (a**3 - BEYOND**3) / (3 * EI), (a**2 - BEYOND**2) / (2 * EI)
+    C = np.array([[0.0, 0.0, 0.0], [0.0, across, mixed], [0.0, mixed, LENGTH / EI]])
+    c, s = np.cos(0.6), np.sin(0.6)
+    own = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+    with solve(strip(tmp_path)) as results:
+        assert results.has("rest/joints_locked/compliance/strip.tip")
+        found = results["rest/joints_locked/compliance/strip.nose"][0]
+    np.testing.assert_allclose(found, own @ C @ own.T, rtol=1e-8, atol=1e-14)
+
+
+def test_a_map_and_static_have_one_compliance_at_a_tool(tmp_path):
+    scene = strip(tmp_path, gravity=[0.0, -9.81])
+    with solve(scene) as results:
+        static = results["rest/joints_locked/compliance/strip.nose"][0]
+    model = prepare_scene(scene).model
+    pose = PoseEvaluator(model, q := undeformed_posture(model).q, "strip.nose", count=2, omega=np.zeros(0)).at(q)
+    np.testing.assert_allclose(pose["joints_locked/compliance"], static, rtol=1e-7, atol=1e-14)
+    np.testing.assert_allclose(pose["place"], (LENGTH + BEYOND) * np.array([np.cos(0.4), np.sin(0.4)]), rtol=1e-12)
+
+
+@pytest.mark.parametrize("arm", [(0.0, 0.0, 0.2), (0.1, -0.05, 0.15)])
+def test_the_bent_place_of_a_tool_is_exact_to_second_order(tmp_path, arm):
+    """With geometric stiffening, u = u_tip + exp(φ~) d but for terms of third order: an eighth of half the bending."""
+    family = '["in-plane-bending", "out-of-plane-bending", "torsion"]'
+    text = LINK.format(name="strip", length=LENGTH, elements=10, count=6, family=family)
+    (tmp_path / "strip.toml").write_text(text)
+    scene = make_scene(
+        name="strip", space="spatial", gravity=[0.0, 0.0, 0.0], geometric_stiffening=True,
+        body=[{"name": "strip", "link": str(tmp_path / "strip.toml")}],
+        joint=[{"name": "hub", "type": "revolute", "between": ["ground", "strip.root"], "axis": [0.0, 0.0, 1.0]}],
+        tool=[{"name": "nose", "point": "strip.tip", "at": list(arm)}],
+        analysis=[{"name": "rest", "kind": "static"}],
+    )  # fmt: skip
+    body = prepare_scene(scene).model.tree.nodes[0].body
+    p = np.random.default_rng(3).normal(size=body.n_modes) / np.sqrt(body.stiffness)
+    off = []
+    for size in (0.1, 0.05):
+        tip, nose = (bent_section(body, name, size * p) for name in ("tip", "nose"))
+        off.append(np.linalg.norm(nose.u - tip.u - Rotation.from_rotvec(tip.phi).apply(arm)))
+    assert off[1] < 0.14 * off[0]
+
+
+def test_a_tool_on_a_link_in_pieces(tmp_path):
+    """Where the tip is, in the same axes."""
+    paths = {"trajectory": [{"name": "swing", "joint": "hub", "value": "0.4 + 0.2*t**3"}],
+             "analysis": [{"name": "move", "kind": "pcid", "end": 0.2, "output_step": 0.02}]}  # fmt: skip
+    places = []
+    for pieces in (None, 3):
+        more = {} if pieces is None else {"pieces": pieces}
+        body = {"name": "strip", "link": str(tmp_path / "strip.toml"), **more}
+        path = {"name": "tool", "point": "strip.nose", "y": "0.33 + 0.1*t**3"}
+        with solve(strip(tmp_path, body=[body], **(paths | {"trajectory": [path]}))) as results:
+            places.append(results["move/points/strip.nose/position"])
+    np.testing.assert_allclose(places[0], places[1], atol=1e-5)
+    np.testing.assert_allclose(places[1][:, 1], 0.33 + 0.1 * np.linspace(0, 0.2, 11) ** 3, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("keys", "message"),
+    [
+        ({"point": "c.ende"}, 'tool "gripper": point: expected one of the points .* of "c".*did you mean "end"'),
+        ({"point": "d.end"}, 'tool "gripper": point: .*"d'),
+        ({"name": "end"}, 'expected one that no point of "c" has, found "end"'),
+        ({"rpy": [0.0, 0.0]}, r"rpy"),
+    ],
+)
+def test_wrong_tools(keys, message):
+    with pytest.raises(InputError, match=message):
+        solve(wrist(tool=[tool(**keys)], trajectory=[{"name": "a", "joint": "to_a", "value": "0"}]))
