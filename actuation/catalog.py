@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -37,6 +37,8 @@ class CatalogMotor(Record):
     """Of the gear."""
     mass: Positive | None = None
     """Of motor and gear, kg: lighter ones are listed first."""
+    cost: Positive | None = None
+    """Of motor and gear, in any currency."""
 
 
 class _Catalog(Record):
@@ -107,7 +109,7 @@ def _numbers(text: Any) -> Any:  # noqa: ANN401 (a wrong one is for the record t
 
 def choices(task: JointTask, catalog: Sequence[CatalogMotor]) -> list[Choice]:
     """Every motor with each of its gears: those that fit first, of these the lightest (or smallest) first."""
-    found = [choice for motor in catalog for choice in _with_gears(task, motor)]
+    found = [choice_of(task, motor, N) for motor in catalog for N in motor.gear_ratio]
     return sorted(found, key=lambda one: (not one.fits, _size(one.motor) if one.fits else max(one.shares)))
 
 
@@ -115,11 +117,10 @@ def _size(motor: CatalogMotor) -> tuple[float, ...]:
     return (np.inf if motor.mass is None else motor.mass, motor.rated_torque, motor.peak_torque)
 
 
-def _with_gears(task: JointTask, motor: CatalogMotor) -> Iterator[Choice]:
-    """τ = J N α + L/(N η) where the load L takes power, J N α + η L/N where it returns it."""
+def choice_of(task: JointTask, motor: CatalogMotor, N: float) -> Choice:
+    """With the ratio N: τ = J N α + L/(N η) where the load L takes power, J N α + η L/N where it returns it."""
     is_driven = task.load * task.rate >= 0.0
     through = np.where(is_driven, 1.0 / motor.efficiency, motor.efficiency)
-    for N in motor.gear_ratio:
-        torque = motor.rotor_inertia * N * task.acceleration + task.load * through / N
-        speed = float(np.abs(N * task.rate).max())
-        yield Choice(motor, N, root_mean_square(task.time, torque), float(np.abs(torque).max()), speed)
+    torque = motor.rotor_inertia * N * task.acceleration + task.load * through / N
+    speed = float(np.abs(N * task.rate).max())
+    return Choice(motor, N, root_mean_square(task.time, torque), float(np.abs(torque).max()), speed)

@@ -137,6 +137,7 @@ def optimise(scene_file: Path, vary: tuple[str, ...], output: Path | None, **how
     --vary trajectory.tip.duration,analysis.inverse.end=0.5:2     one parameter for several keys
     --vary "joint.1.gear_ratio in {50, 80, 100}"    a discrete set
     --vary "joint.1.gear_ratio,joint.1.rotor_inertia in {50:2e-5, 100:1.2e-5}"     pairs
+    --vary "motor elbow in motors.csv" --minimise "motors mass"     a catalog as in feasibility; also cost, share
     --minimise mass --against "rms tip_error" --points 6     the least mass for six tip errors (Pareto front)
 
     Gradient searches start from the scene's own values (and --starts - 1 others); discrete sets are enumerated or

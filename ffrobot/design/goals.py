@@ -13,12 +13,14 @@ from ..fe_models.modal_body import ModalBody
 from ..results.file import Results
 from ..sweep.files import value_of
 from .histories import POWER, History, read_history
+from .motor_goals import OfMotors
 from .peaks import Peak
 from .readings import Followed, Goal, Reading
 
 FORMS = (
     "peak HISTORY", "rms HISTORY", "mean HISTORY", "integral HISTORY", "at TIME HISTORY", "energy joints.NAME",
-    "frequency NUMBER BODY", "mass", "mass BODY", "value KEY",
+    "frequency NUMBER BODY", "mass", "mass BODY", "motors mass", "motors cost",
+    "motors share", "value KEY",
 )  # fmt: skip
 
 
@@ -133,6 +135,8 @@ def parse_goal(text: str, option: str = "--of") -> Goal:
             return Mass(text)
         case "mass", [body]:
             return Mass(text, body)
+        case "motors", [what] if what in ("mass", "cost", "share"):
+            return OfMotors(text, what)
         case "value", [key] if all(key.split(".")):
             return Value(text, key)
     raise InputError(f'{option}: expected {either(FORMS)}, found "{text}"')

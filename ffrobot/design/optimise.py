@@ -23,7 +23,7 @@ from .designs import Designs, Runs, runs_of
 from .evaluations import Evaluations, SpentError, write_designs
 from .local_search import Local, best_of, search_from
 from .optimum_record import Optimum
-from .problem import read_problem
+from .problem import read_problem, with_motors
 from .scenes import changes_for, may_repeat
 from .slopes import Differentiation
 from .steps import rank
@@ -94,6 +94,7 @@ def optimise(
     with runs_of("optimise", scene, output, allow_python, processes, retry, watcher) as runner:
         path, problem = runner.path, read_problem(minimise, maximise, subject_to)
         space = read_space(path, vary)
+        problem = with_motors(problem, space)
         chosen = _method(space, method, runs)
         check_start(path, space, chosen)
         fixed = changes_for(path, problem.goals, tolerance, keep_steps=may_repeat(space.keys))

@@ -152,6 +152,9 @@ class Optimum(Finding):
 
     def remarks(self) -> Iterator[str]:
         """Prices of limits and bounds in words, what to mind, and how the design was found."""
+        for variable, u in zip(self.space.variables, self.best.place, strict=True):
+            if variable.motors:
+                yield f"motor      {variable.keys[0][1]}: {variable.motors[round(u)].name}, 1:{variable.values(u)[0]:g}"
         yield from (f"price      {text}" for text in self._prices_in_words())
         if self.optimality is not None:
             yield from (f"note       {text}" for text in self.optimality.kinks)

@@ -12,7 +12,9 @@ from ..common.arrays import Array, as_floats
 from ..common.errors import InputError
 from ..common.tables import shown
 from .goals import parse_goal
+from .motor_goals import OfMotors
 from .readings import Goal, Reading
+from .variables import Space
 
 LIMIT = re.compile(r"(?P<goal>.*\S)\s*(?P<sense><=|>=)\s*(?P<bound>\S+)\s*")
 
@@ -104,6 +106,19 @@ def read_problem(minimise: str | None, maximise: str | None, subject_to: Sequenc
         raise InputError(f"optimise: expected one objective, --minimise RESPONSE or --maximise RESPONSE, found {found}")
     objective = parse_goal(minimise, "--minimise") if minimise is not None else parse_goal(maximise or "", "--maximise")
     return Problem(objective, 1.0 if minimise is not None else -1.0, tuple(map(parse_limit, subject_to)))
+
+
+def with_motors(problem: Problem, space: Space) -> Problem:
+    """The problem with goals of motors by the variables that are such; within their limits, unless one says others."""
+    chosen = tuple(variable for variable in space.variables if variable.motors)
+
+    def bound(goal: Goal) -> Goal:
+        return replace(goal, chosen=chosen) if isinstance(goal, OfMotors) else goal
+
+    limits = tuple(replace(limit, goal=bound(limit.goal)) for limit in problem.limits)
+    if chosen and not any(isinstance(limit.goal, OfMotors) and limit.goal.what == "share" for limit in limits):
+        limits += (Limit(OfMotors("motors share", "share", chosen), 1.0, 1.0),)
+    return replace(problem, objective=bound(problem.objective), limits=limits)
 
 
 def parse_limit(text: str) -> Limit:

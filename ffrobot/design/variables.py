@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from ..actuation.catalog import CatalogMotor, read_catalog
 from ..common.errors import InputError
 from ..common.numbers import MOST_RUNS
 from ..common.tables import shown
@@ -26,18 +27,25 @@ Place = tuple[float, ...]
 """A coordinate for each variable."""
 
 CATALOGUE = re.compile(r"(?P<keys>.*\S)\s+in\s*\{(?P<rows>.*)\}\s*", re.DOTALL)
-FORMS = '"KEY=LOW:HIGH", "KEY=LOW:HIGH:log", "KEY in {A, B, C}" or "KEY,KEY in {A1:A2, B1:B2}"'
+MOTOR = re.compile(r"motor\s+(?P<joint>[^,\s]+)\s*(,\s*(?P<mass>\S+))?\s+in\s+(?P<file>[^{].*)")
+FORMS = (
+    '"KEY=LOW:HIGH", "KEY=LOW:HIGH:log", "KEY in {A, B, C}", "KEY,KEY in {A1:A2, B1:B2}" or "motor JOINT in CATALOG"'
+)
 
 
 @dataclass(frozen=True)
 class Variable:
-    """A number between `low` and `high` that all `keys` take, or one of the `rows` with a value for each key."""
+    """A number between `low` and `high` that all `keys` take, or one of the `rows` with a value for each key.
+
+    `motors`: of rows that are motors of the catalog with one of their gears, the motor of each.
+    """
 
     keys: tuple[Key, ...]
     low: float = np.nan
     high: float = np.nan
     logarithmic: bool = False
     rows: tuple[tuple[Any, ...], ...] = ()
+    motors: tuple[CatalogMotor, ...] = ()
 
     @property
     def name(self) -> str:
@@ -132,6 +140,8 @@ def _own(path: Path, variable: Variable, key: Key) -> Any:  # noqa: ANN401 (what
 
 def parse_variable(text: str) -> Variable:
     """`payload.0.mass=0.1:0.5`, or `a.outer,a.inner in {0.05:0.045, 0.06:0.054}`. Raises `InputError`."""
+    if match := MOTOR.fullmatch(text):
+        return _motors(match["joint"], match["mass"], Path(match["file"]))
     if match := CATALOGUE.fullmatch(text):
         keys = _keys(match["keys"])
         return Variable(keys, rows=_rows(match["rows"], len(keys), text))
@@ -149,6 +159,30 @@ def parse_variable(text: str) -> Variable:
     if logarithmic and low <= 0.0:
         raise InputError(f'--vary: expected bounds above 0 for steps in the logarithm, found "{shown(text)}"')
     return Variable(_keys(name), low, high, logarithmic)
+
+
+def _motors(joint: str, mass: str | None, catalog: Path) -> Variable:
+    """The motors of a joint, each with each of its gears: inertia and limits as the scene has them, at the joint.
+
+    With losses in the gear, the limit is the torque that is left of the motor's peak where it drives. `mass` is a key
+    that takes the mass of the motor, such as that of a payload.
+    """
+    keys = tuple(("joint", joint, key) for key in ("gear_ratio", "rotor_inertia", "moment_limit", "speed_limit"))
+    rows: dict[tuple[Any, ...], CatalogMotor] = {}
+    for motor in read_catalog(catalog):
+        if mass is not None and motor.mass is None:
+            raise InputError(f'{catalog}: expected a mass of motor "{motor.name}", for {mass}, found none')
+        for N in motor.gear_ratio:
+            limits = N * motor.peak_torque * motor.efficiency, motor.max_speed / N
+            row = (N, motor.rotor_inertia, *limits, *(() if mass is None else (motor.mass,)))
+            if row in rows:
+                raise InputError(
+                    f'{catalog}: expected motors that differ in inertia, peak torque or speed, found "{rows[row].name}"'
+                    f' and "{motor.name}"'
+                )
+            rows[row] = motor
+    more = () if mass is None else (parse_key(mass, "--vary"),)
+    return Variable((*keys, *more), rows=tuple(rows), motors=tuple(rows.values()))
 
 
 def _keys(text: str) -> tuple[Key, ...]:

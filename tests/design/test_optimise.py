@@ -47,6 +47,68 @@ def write(tmp_path):
     return scene
 
 
+CATALOG = """name, rated_torque, peak_torque, max_speed, rotor_inertia, gear_ratio, mass, cost
+tiny, 0.002, 0.006, 300, 1e-7, 50 100 200, 0.05, 90
+weak, 0.008, 0.04, 25, 2e-6, 20 50 100, 0.1, 40
+slow, 0.030, 0.08, 9, 5e-6, 10 20 50, 0.2, 20
+good, 0.020, 0.06, 60, 4e-6, 20 50 100, 0.3, 60
+best, 0.200, 0.60, 60, 2e-5, 20 50 100, 0.9, 30
+"""
+SPEED = 0.4  # rad/s at the end of ARM's motion, whose acceleration is 2 rad/s^2
+
+
+def choices_by_hand():
+    """Motor, ratio and the largest share: torque α (J/N + J_m N) at all times, speed N ω at the end."""
+    for line in CATALOG.splitlines()[1:]:
+        name, rated, _, fastest, rotor, ratios, mass, cost = (cell.strip() for cell in line.split(","))
+        for N in map(float, ratios.split()):
+            torque = 2.0 * (J / N + float(rotor) * N)
+            yield max(torque / float(rated), N * SPEED / float(fastest)), name, N, float(mass), float(cost)
+
+
+@pytest.mark.parametrize(("what", "column"), [("mass", 3), ("cost", 4), ("share", 0)])
+def test_a_motor_from_a_catalog(write, tmp_path, what, column):
+    """The lightest, cheapest or least used motor of those that are strong and fast enough."""
+    (tmp_path / "motors.csv").write_text(CATALOG)
+    scene = deepcopy(ARM)
+    scene["analysis"][0]["output_step"] = 0.02
+    found = ffrobot.optimise(
+        write(scene), [f"motor shoulder in {tmp_path / 'motors.csv'}"], minimise=f"motors {what}", processes=2
+    )
+    fitting = [one for one in choices_by_hand() if one[0] <= 1.0]
+    assert {one[1] for one in fitting} == {"slow", "good", "best"}
+    best = min(fitting, key=lambda one: one[column])
+    assert found.feasible
+    assert found.value == pytest.approx(best[column], rel=1e-6)
+    same = [one for one in fitting if one[column] == best[column]]
+    motor = next(line for line in found.remarks() if line.startswith("motor"))
+    assert any(motor == f"motor      shoulder: {one[1]}, 1:{one[2]:g}" for one in same)
+    assert found.limits[0] == pytest.approx(next(one[0] for one in same if motor.endswith(f":{one[2]:g}")), rel=1e-6)
+    joint = tomllib.loads(found.best_scene.read_text())["joint"][0] if found.best_scene else None
+    assert joint is None or joint["speed_limit"] >= SPEED
+
+
+def test_the_mass_of_a_motor_loads_the_joint_before_it(write, tmp_path):
+    """A motor at the tip that its own shoulder swings: J + m L²; its torque is what is needed for that."""
+    (tmp_path / "motors.csv").write_text(CATALOG)
+    scene = deepcopy(ARM) | {"payload": [{"point": "arm.tip", "mass": 0.5}]}
+    scene["analysis"][0]["output_step"] = 0.02
+    vary = [f"motor shoulder, payload.0.mass in {tmp_path / 'motors.csv'}"]
+    found = ffrobot.optimise(write(scene), vary, minimise="motors share", processes=2)
+    shares = {}
+    for line in CATALOG.splitlines()[1:]:
+        name, rated, _, fastest, rotor, ratios, mass, _ = (cell.strip() for cell in line.split(","))
+        for N in map(float, ratios.split()):
+            torque = 2.0 * ((J + float(mass) * 0.6**2) / N + float(rotor) * N)
+            shares[name, N] = max(torque / float(rated), N * SPEED / float(fastest))
+    assert found.value == pytest.approx(min(shares.values()), rel=1e-6)
+
+
+def test_goals_of_motors_want_motors(write):
+    with pytest.raises(ffrobot.InputError, match='expected `optimise` with --vary "motor JOINT in CATALOG"'):
+        ffrobot.optimise(write(ARM), [f"{RATIO}=20:500:log"], minimise="motors mass")
+
+
 @pytest.mark.parametrize("method", ["slsqp", "trust-constr"])
 def test_gear_ratio_of_matched_inertias(write, method):
     """Of a motor with inertia J_m behind a gear, α (J/N + J_m N) is least at N = √(J/J_m): 2 α √(J J_m)."""
