@@ -89,7 +89,7 @@ def _solve(scene_file: Path, path: Path, again: str, *, resume: bool, strict: bo
         click.echo(f"{path}: complete, nothing to go on with")
         return
     with Results(path) as results:
-        verdict, posture = results.verdict, chosen_posture(results)
+        verdict, posture = results.verdict, chosen_posture(results, solution.model)
     console = summary_console()
     if click.get_current_context().meta.get(VERBOSE):
         print_details(solution, verdict, path, {**solution.seconds, "writing": writing}, console)

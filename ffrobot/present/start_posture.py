@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..mbs.model.model import Model
+from ..mbs.solve.branch_names import branch_names, in_words
+from ..mbs.solve.start import undeformed_posture
 from ..results.file import Results
 
 UNITS = {"revolute": ("°", 180 / np.pi), "prismatic": (" m", 1.0)}
 
 
-def chosen_posture(results: Results) -> str:
-    """Coordinates of the joints at the start, where a point follows a path and nothing says which posture; else ""."""
+def chosen_posture(results: Results, model: Model) -> str:
+    """Joints and branch at the start of a run, where a point follows a path and nothing says which posture; else ""."""
     scene = results.scene
     initial = scene.get("initial", {})
     named = any(initial.get(key) for key in ("angles", "joints", "branch"))
@@ -25,8 +28,10 @@ def chosen_posture(results: Results) -> str:
             if unit is not None
         ]
         if found:
+            branch = branch_names(model, undeformed_posture(model).q)
+            as_line = f" ({in_words(branch)})" if branch else ""
             return (
-                f"no guess in [initial]: {analysis} starts at {', '.join(found)}, found from zeros; where another"
-                " posture reaches the path as well (elbow up or down), [initial] chooses"
+                f"no guess in [initial]: {analysis} starts at {', '.join(found)}{as_line}, found from zeros; where"
+                " another posture reaches the path as well (elbow up or down), [initial] chooses"
             )
     return ""

@@ -12,6 +12,7 @@ from ..common.arrays import Array
 from ..common.rotations import rpy_of
 from ..mbs.model.model import Model
 from ..mbs.scene.space import SPACES
+from ..mbs.solve.branch_names import in_words
 from ..mbs.solve.branches import start_postures
 from ..mbs.solve.workspace import within_limits
 from ..run.solve import prepare_scene
@@ -26,11 +27,14 @@ def print_start(path: Path, watcher: Watcher, console: Console) -> None:
     print_table(console, ("joint", "start", "guess in [initial]", "limits"), _joints(model, first.q))
     columns = ("point", "at (m)", "roll, pitch, yaw")[: 2 + bool(model.scene.tool)]
     print_table(console, columns, (row[: len(columns)] for row in _points(model, first.q)))
+    if first.branch:
+        console.print(in_words(first.branch), soft_wrap=True)
     if others:
         console.print(f"other starts: {len(others)} found; a line of [initial] chooses one")
     for other in others:
         beyond = "" if within_limits(model, other.q[None])[0] else " (beyond joint limits)"
-        console.print(f"  {np.degrees(other.away):.0f}° away{beyond}: {other.guess}", soft_wrap=True)
+        named = f", {in_words(other.branch)}" if other.branch else ""
+        console.print(f"  {np.degrees(other.away):.0f}° away{beyond}{named}: {other.guess}", soft_wrap=True)
 
 
 def _joints(model: Model, q: Array) -> Iterator[tuple[str, ...]]:

@@ -12,6 +12,9 @@ from ..fields.field_types import Quantity
 from ..fields.references import Reference
 from ..fields.spelling import IN_PLANE, Spelled, as_written
 
+Word = Literal["up", "down", "right", "left", "noflip", "flip", "positive", "negative"]
+"""How a joint stands in one of several postures: see `solve.branch_names`."""
+
 Numbers = Annotated[Quantity | tuple[Quantity, ...], Spelled(Quantity, as_written)]
 
 
@@ -36,10 +39,11 @@ class Initial(Record):
     """Their rates, rad/s or m/s; spherical and free joints: angular velocity in the axes of the second side, after
     the velocity in those of the first."""
 
-    branch: dict[str, Literal["up", "down", "positive", "negative"]] = Field(default_factory=dict)
-    """Which of several postures that meet the constraints at t = 0, by joint: "up" or "down" of an elbow, whose joint
-    is above or below the straight line between the joints (or the tool) next to it; "positive" or "negative", the
-    sign of the coordinate within ±180°, of a wrist. Of those the nearest to the guess."""
+    branch: dict[str, Word] = Field(default_factory=dict)
+    """Which of several postures that meet the constraints at t = 0, by joint. Elbow: "up" or "down", its joint is above
+    or below the straight line between the joints (or the tool) next to it. Shoulder: "right" or "left", a positive turn
+    raises or lowers the end of the arm along the axis of the joint before. Wrist: "noflip" or "flip" (also "positive"
+    or "negative"), the sign of the coordinate within ±180°. Of those the nearest to the guess."""
 
     def references(self) -> Iterator[Reference]:
         """The bodies and joints with guesses."""

@@ -10,23 +10,27 @@ import numpy as np
 from ...common.arrays import Array, Indices
 from ...common.errors import InputError
 from ..model.model import Model
-from ..model.tree import Node, Section
-from ..scene.space import SPACES
+from ..scene.initial import Word
+from .branch_names import branch_names, is_so
 from .posture import mobility
 from .reach import as_guess, random_angles, regular_postures, turning_joints
 from .start import undeformed_posture
 
 TRIES = 600  # random postures from which Newton looks for others
-NEAR = 1e-9  # m: joints at one place
 SAME = 1e-6  # rad: angles that differ by less
 
 
 class StartPosture(NamedTuple):
-    """One of them: `q` (n_q,); `guess`, the line of [initial] that chooses it; `away` (rad), the largest turn to it."""
+    """One of them.
+
+    `q` (n_q,); `guess`, the line of [initial] that chooses it; `away` (rad), the largest turn to it; `branch`, how
+    its joints stand, by name (see `branch_names`).
+    """
 
     q: Array
     guess: str
     away: float
+    branch: dict[str, Word]
 
     @property
     def guesses(self) -> dict[str, tuple[float, ...]]:
@@ -44,7 +48,7 @@ def start_postures(model: Model) -> list[StartPosture]:
     """
     start = undeformed_posture(model).q
     nodes, columns = turning_joints(model)
-    found = [StartPosture(start, as_guess(nodes, start), 0.0)]
+    found = [StartPosture(start, as_guess(nodes, start), 0.0, branch_names(model, start))]
     state = mobility(model, start)
     if not columns.size or not model.rows or state.followed < state.freedom:
         return found
@@ -52,7 +56,7 @@ def start_postures(model: Model) -> list[StartPosture]:
     for q in others:
         if all(_turn(q, one.q, columns) > SAME for one in found):
             q[columns] = np.angle(np.exp(1j * q[columns]))
-            found.append(StartPosture(q, as_guess(nodes, q), _turn(q, start, columns)))
+            found.append(StartPosture(q, as_guess(nodes, q), _turn(q, start, columns), branch_names(model, q)))
     return sorted(found, key=lambda one: one.away)
 
 
@@ -75,46 +79,13 @@ def chosen_start(model: Model) -> StartPosture | None:
     )
 
 
-def _is_so(model: Model, q: Array, joint: str, word: str) -> bool:
+def _is_so(model: Model, q: Array, joint: str, word: Word) -> bool:
     """Whether the `joint` is "up", …, in the posture q (n_q,)."""
     if joint not in model.tree.carried:
         raise InputError(
             f'{model.scene.path}: initial.branch: expected joints of the tree, found "{joint}", which is cut'
         )
-    node = model.tree.nodes[model.tree.carried[joint]]
-    if word in ("up", "down"):
-        return _above(model, q, node) == (word == "up")
-    x = node.joint.coordinates(q[node.q])
-    x = node.joint.turned_around(x) if node.backwards else x
-    return bool((np.angle(np.exp(1j * x[0])) >= 0.0) == (word == "positive"))
-
-
-def _above(model: Model, q: Array, node: Node) -> bool:
-    """Whether a joint is above the line from the joint before to the one after it, or to the tool, against gravity."""
-    tree, frames = model.tree, model.tree.frames(q[None])
-
-    def place(section: Section) -> Array:
-        found: Array = tree.motion(section, q[None], frames).r[0]
-        return found
-
-    own, before, after = place(node.inner), node, node
-    while before.inner.body >= 0 and np.allclose(place(before.inner), own, atol=NEAR):
-        before = tree.nodes[before.inner.body]
-    start, end = place(before.inner), own
-    while np.allclose(end, own, atol=NEAR):
-        number = tree.index[after.body.name]
-        outer = next((other for other in tree.nodes if other.inner.body == number), None)
-        if outer is None:
-            followed = [path.point for path in model.scene.trajectory if path.point is not None]
-            end = place(tree.section(followed[-1], np.eye(3))) if followed else end
-            break
-        after, end = outer, place(outer.inner)
-    chord, offset, down = end - start, own - start, np.zeros(3)
-    down[: len(model.scene.gravity)] = model.scene.gravity
-    if not down.any():
-        down[1 if SPACES[model.scene.space].is_plane else 2] = -1.0
-    across = offset - chord * (offset @ chord) / max(float(chord @ chord), NEAR**2)
-    return bool(across @ down < 0.0)
+    return is_so(model, q, model.tree.nodes[model.tree.carried[joint]], word)
 
 
 def _number(text: str | float) -> float:

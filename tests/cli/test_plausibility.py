@@ -118,6 +118,7 @@ def test_a_posture_that_nobody_chose_is_told(two_link_copy, ffrobot):
         for joint in ("O", "A"):
             angle = np.degrees(results[f"inverse/joints/{joint}/coordinate"][0])
             assert f"{joint} {round(angle, 6) + 0.0:.4g}°" in line
+    assert f'branch = {{ A = "{"down" if angle > 0.0 else "up"}" }}' in line
 
 
 def test_plotting_a_scene(two_link_copy, refused):

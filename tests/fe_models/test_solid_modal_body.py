@@ -120,7 +120,9 @@ def test_nothing_of_a_solid_stays_in_memory(tmp_path):
     """PETSc keeps objects that only Python let go: matrices and factors of 10 000 unknowns are 35 MB a body."""
 
     def memory_after(number):
-        body_of(write_solid(tmp_path, cell="hexahedron", order=2, divisions=(60 + number, 3, 1), condition="cantilever"))
+        body_of(
+            write_solid(tmp_path, cell="hexahedron", order=2, divisions=(60 + number, 3, 1), condition="cantilever")
+        )
         gc.collect()
         return memory()
 

@@ -39,6 +39,39 @@ def test_shoulder_elbow_and_wrist_of_six_axes():
     np.testing.assert_allclose(np.sort(wrist), -np.sort(wrist)[::-1], atol=1e-9)
 
 
+def test_all_eight_starts_of_six_axes_have_names_of_their_own(tmp_path):
+    """Each name leads to its start; the geometry of a spherical wrist behind a shoulder beside the first axis.
+
+    Left and right: the wrist's center is on one side or the other of the plane through the first axis along that of
+    the shoulder; flips of the wrist change its angle's sign and turn the joints next to it by half a turn.
+    """
+    model = prepare_scene(CASES / "arm_6r" / "scene.toml").model
+    found, tree = start_postures(model), model.tree
+    names = [tuple(one.branch.items()) for one in found]
+    joints = ["shoulder", "elbow", "wrist_pitch"]
+    assert [list(one.branch) for one in found] == [joints] * 8
+    assert len(set(names)) == 8
+    by_name = {tuple(one.branch.values()): one.q[[tree.nodes[tree.carried[n]].q.start for n in tree.carried]]
+               for one in found}  # fmt: skip
+    for (shoulder, elbow, _), q in by_name.items():
+        waist, pitch = q[0], q[4]
+        forward = abs(np.angle(np.exp(1j * (waist - found[0].q[0])))) < np.pi / 2
+        assert forward == (shoulder == "left")
+        other = by_name[shoulder, elbow, "noflip" if q[4] < 0 else "flip"]
+        turned = np.angle(np.exp(1j * (other - q)))
+        np.testing.assert_allclose(turned[:3], 0.0, atol=1e-8)
+        np.testing.assert_allclose(np.abs(turned[[3, 5]]), np.pi, atol=1e-8)
+        np.testing.assert_allclose(other[4], -pitch, atol=1e-8)
+    text = (CASES / "arm_6r" / "scene.toml").read_text(encoding="utf-8")
+    text = text.replace('link = "', f'link = "{CASES / "arm_6r"}/')
+    wanted = found[5]
+    path = tmp_path / "scene.toml"
+    inside = ", ".join(f'{joint} = "{word}"' for joint, word in wanted.branch.items())
+    path.write_text(text.replace("[initial]\n", f"[initial]\nbranch = {{ {inside} }}\n"), encoding="utf-8")
+    q = undeformed_posture(prepare_scene(path).model).q
+    np.testing.assert_allclose(np.exp(1j * q), np.exp(1j * wanted.q), atol=1e-7)
+
+
 def two_rods(**initial):
     """Two rods of 0.5 m whose tip is at (0.6, 0.1)."""
     points = {"root": [0.0, 0.0], "tip": [0.5, 0.0]}
