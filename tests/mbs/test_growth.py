@@ -1,0 +1,82 @@
+"""Growth of small deviations under open-loop torques: exponents of inverted pendulums, and motions that grow so."""
+
+import numpy as np
+import pytest
+from mechanisms import forward, make_model, pcid, relative, revolute
+from oracle_runs import run
+from rods import rod
+from scipy.integrate import trapezoid
+from scipy.linalg import eigh
+
+from ffrobot.mbs.analysis.operating_points import INSTANTS, open_loop_growth
+
+L, M, G = 0.7, 2.0, 9.81
+J, WEIGHT = M * L**2 / 3, M * G * L / 2
+
+
+def pendulum(trajectory, initial=np.pi / 2, **keys):
+    return make_model(
+        [rod("a", L, M)], joint=[revolute("O", "ground", "a.root", **keys)], initial={"joints": {"O": initial}},
+        trajectory=trajectory, gravity=(0.0, -G),
+    )  # fmt: skip
+
+
+def along(value):
+    return [{"name": "path", "joint": "O", "value": value}]
+
+
+def growth(robot, **keys):
+    return open_loop_growth(run(robot, pcid(**keys)).outcome)
+
+
+def test_an_inverted_pendulum():
+    """λ = √(m g l/J), l = L/2 and J = m L²/3: √(3 g/2 L)."""
+    assert growth(pendulum(along("pi/2"))) == pytest.approx(np.sqrt(1.5 * G / L), rel=1e-9)
+
+
+@pytest.mark.parametrize("angle", [-np.pi / 2, -0.5, 0.0])
+def test_no_growth_where_gravity_leads_back(angle):
+    """Hanging, and level, where the slope of the weight's moment is none."""
+    assert growth(pendulum(along(f"{angle!r}"), initial=angle)) == pytest.approx(0.0, abs=1e-6)
+
+
+def test_friction_and_a_rotor_slow_it():
+    """λ² (J + J_m N²) + λ c = m g l."""
+    c, rotor, N = 1.5, 3e-4, 50.0
+    total = J + rotor * N**2
+    expected = (-c + np.sqrt(c**2 + 4 * total * WEIGHT)) / (2 * total)
+    keys = {"viscous_friction": c, "rotor_inertia": rotor, "gear_ratio": N}
+    assert growth(pendulum(along("pi/2"), **keys)) == pytest.approx(expected, rel=1e-9)
+
+
+def test_the_mean_over_a_swing():
+    """√(m g l sin θ/J) at nine instants, by the trapezoidal rule; no growth below the level of the pivot."""
+    start, turn = 2.5, 1.5
+    found = growth(pendulum(along(f"{start} + {turn}*t**2"), initial=start), output_step=0.0125)
+    theta = start + turn * np.linspace(0.0, 1.0, INSTANTS) ** 2
+    rates = np.sqrt(np.maximum(np.sin(theta) * WEIGHT / J, 0.0))
+    assert np.count_nonzero(rates == 0.0) in range(1, INSTANTS)
+    assert found == pytest.approx(trapezoid(rates, dx=1 / (INSTANTS - 1)), rel=1e-8)
+
+
+def test_two_inverted_rods():
+    """The faster of two exponents, by mass matrix and slope of the weights of upright rods in absolute angles."""
+    a, b, m, n = 0.7, 0.5, 2.0, 1.2
+    robot = make_model(
+        [rod("a", a, m), rod("b", b, n)],
+        joint=[revolute("O", "ground", "a.root"), revolute("A", "a.tip", "b.root")],
+        initial={"joints": {"O": np.pi / 2, "A": 0.0}}, gravity=(0.0, -G),
+        trajectory=[{"name": "one", "joint": "O", "value": "pi/2"}, {"name": "two", "joint": "A", "value": "0"}],
+    )  # fmt: skip
+    mass = np.array([[m * a**2 / 3 + n * a**2, n * a * b / 2], [n * a * b / 2, n * b**2 / 3]])
+    slope = np.diag([m * G * a / 2 + n * G * a, n * G * b / 2])
+    assert growth(robot) == pytest.approx(np.sqrt(eigh(slope, mass, eigvals_only=True)[-1]), rel=1e-9)
+
+
+def test_deviations_grow_so():
+    """A run from 1e-6 rad beside the upright posture: δ cosh λt."""
+    away, t = 1e-6, np.linspace(0.0, 1.0, 101)
+    free = pendulum([], initial=np.pi / 2 + away)
+    theta = run(free, forward(tolerance=1e-10)).q[:, 2] - np.pi / 2
+    rate = growth(pendulum(along("pi/2")))
+    assert relative(theta, away * np.cosh(rate * t)) < 1e-5
