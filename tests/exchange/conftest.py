@@ -5,6 +5,7 @@ from functools import partial
 import pytest
 from other_codes import pinocchio_dynamics as dynamics
 from other_codes import pinocchio_moments, python_with_pinocchio
+from other_codes import pinocchio_stiffness as stiffness
 
 
 @pytest.fixture(scope="session")
@@ -24,3 +25,9 @@ def pinocchio(python_of_pinocchio):
 def pinocchio_dynamics(python_of_pinocchio):
     """Accelerations, moments and mass matrices by Pinocchio of (urdf, names, motion)."""
     return partial(dynamics, python_of_pinocchio)
+
+
+@pytest.fixture(scope="session")
+def pinocchio_stiffness(python_of_pinocchio):
+    """A rigid tree on springs at rest by Pinocchio of (urdf, request)."""
+    return partial(stiffness, python_of_pinocchio)

@@ -10,7 +10,9 @@ import numpy as np
 import pytest
 
 PACKAGE = "pin==2.6.20"  # of the Python versions that this program runs on; with NumPy below 2
-MOMENTS, DYNAMICS = (Path(__file__).with_name(f"pinocchio_{what}.py") for what in ("moments", "dynamics"))
+MOMENTS, DYNAMICS, STIFFNESS = (
+    Path(__file__).with_name(f"pinocchio_{what}.py") for what in ("moments", "dynamics", "stiffness")
+)
 PATIENCE = 600  # s for a download of 100 MB
 
 
@@ -51,7 +53,14 @@ def pinocchio_moments(python, urdf, names, motion):
 def pinocchio_dynamics(python, urdf, names, motion):
     """What `pinocchio_dynamics.py` answers for q, v, a and tau (T, n) of a `motion` of the joints `names`."""
     request = {"names": names} | {key: values.tolist() for key, values in motion._asdict().items()}
-    done = subprocess.run(
-        [python, DYNAMICS, urdf], input=json.dumps(request), capture_output=True, text=True, check=True
-    )
+    return _answer(python, DYNAMICS, urdf, request)
+
+
+def pinocchio_stiffness(python, urdf, **request):
+    """What `pinocchio_stiffness.py` answers."""
+    return _answer(python, STIFFNESS, urdf, request)
+
+
+def _answer(python, script, urdf, request):
+    done = subprocess.run([python, script, urdf], input=json.dumps(request), capture_output=True, text=True, check=True)
     return json.loads(done.stdout)
