@@ -193,7 +193,7 @@ def plot_results(
         results: a results file, or results.
         folder: where to write.
         formats: "png", "pdf", "svg".
-        only: names of figures, or patterns such as "moment_*"; empty: all.
+        only: names of figures, or patterns such as "moment_*", "*" for all; empty: the main ones.
 
     Returns:
         The written files.

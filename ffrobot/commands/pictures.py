@@ -30,7 +30,9 @@ def movie_options(command: Callable[..., Any]) -> Callable[..., Any]:
 @click.argument("file", metavar="RESULTS.h5|BODY.h5", type=FILE)
 @click.option("-o", "--output", metavar="DIR", type=FILE, help="Folder for the figures; FILE.figures if absent.")
 @click.option("--format", "formats", metavar="png,pdf,svg", default="png,pdf", help="One or several formats [png,pdf].")
-@click.option("--only", metavar="NAME", multiple=True, help='Figures of this name, or like "moment_*"; repeatable.')
+@click.option(
+    "--only", metavar="NAME", multiple=True, help='Figures of this name, or like "moment_*", or "*"; repeatable.'
+)
 @movie_options
 def plot(
     file: Path,
@@ -42,8 +44,8 @@ def plot(
 ) -> None:
     """Draw the figures of a results file, or mesh and modes of a modal body file.
 
-    A file figures.toml next to the results selects the figures; default: standard figures. With --movie, a movie of
-    the motion instead.
+    A file figures.toml next to the results selects the figures; default: the main ones of the standard figures. With
+    --movie, a movie of the motion instead.
     """
     from ..common.hdf5 import reading
     from ..pictures.figures.movie import write_motion

@@ -32,3 +32,5 @@ _AZIMUTH, _ELEVATION = np.radians(-55.0), np.radians(25.0)
 _TOWARDS = np.array([np.cos(_ELEVATION) * np.cos(_AZIMUTH), np.cos(_ELEVATION) * np.sin(_AZIMUTH), np.sin(_ELEVATION)])
 _RIGHT = np.array([-np.sin(_AZIMUTH), np.cos(_AZIMUTH), 0.0])
 SPACE = View(_RIGHT, np.cross(_TOWARDS, _RIGHT), _TOWARDS)
+_X, _Y, _Z = np.eye(3)
+FRONT, SIDE = View(_X, _Z, -_Y), View(_Y, _Z, _X)  # z goes up, as well; from above it is PLANE

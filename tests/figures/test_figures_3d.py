@@ -4,19 +4,18 @@ import numpy as np
 import pytest
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
-from mpl_toolkits.mplot3d.art3d import Line3DCollection
 from PIL import Image
 from scipy.sparse.csgraph import minimum_spanning_tree
 from scipy.spatial import distance
 
 from ffrobot.common.errors import InputError
-from ffrobot.mbs.scene.space import PLANE
 from ffrobot.pictures.figures.configurations import draw_configurations
 from ffrobot.pictures.figures.figure_file import FigureRecord
 from ffrobot.pictures.figures.plot import draw, plot_results
 from ffrobot.pictures.figures.scene_axes import SceneAxes
-from ffrobot.pictures.figures.standard import standard_figures
+from ffrobot.pictures.figures.standard import main_figures, standard_figures
 from ffrobot.pictures.motion import moving_bodies, section_axes
+from ffrobot.pictures.projection import FRONT, PLANE, SIDE, SPACE
 from ffrobot.pictures.shapes import line_shape, shortest_tree, surface_shape
 from ffrobot.results.file import Results
 
@@ -53,10 +52,18 @@ def test_deflections_are_drawn_by_axes_of_the_body(arm):
     assert labels == {f"inverse, {c}": f"inverse/points/fore.tip/deflection[{k}]" for k, c in ((1, "y"), (2, "z"))}
 
 
+def test_main_figures_answer_the_first_questions(arm):
+    """Where is the robot, does the tool follow, what do the motors do, how far do the links bend: one each."""
+    assert [record.name for record in main_figures(arm)] == [
+        "configurations_inverse", "path_tool", "moment_waist", "moment_shoulder", "moment_elbow", "deflection_fore.tip",
+        "deflection_upper.tip",
+    ]  # fmt: skip
+
+
 def test_every_standard_figure_is_drawn(arm_3r, tmp_path):
     results = tmp_path / "scene.results.h5"  # without figures.toml beside it
     results.write_bytes((arm_3r.folder / "scene.results.h5").read_bytes())
-    paths = plot_results(results, tmp_path / "figures", ["png"])
+    paths = plot_results(results, tmp_path / "figures", ["png"], ["*"])
     with Results(results) as opened:
         assert [path.stem for path in paths] == [record.name for record in standard_figures(opened)]
     for path in paths:
@@ -113,29 +120,38 @@ def test_tree_of_points_is_the_shortest():
 
 
 def test_a_metre_is_as_long_on_all_axes(arm, crank):
-    """The parallel projection of the figure takes the unit vectors of space to rows of equal length at right angles."""
+    """Every view has one scale; its two directions and that towards the viewer are a right-handed trihedron."""
     for results in (arm, crank):
         record = next(r for r in standard_figures(results) if r.kind == "configurations")
         picture = draw_configurations(record, results)
         assert isinstance(picture, Figure)
-        (axes,) = picture.axes
-        rows = axes.get_proj()[:2, :3]
-        scale = rows[0] @ rows[0]
-        np.testing.assert_allclose(rows @ rows.T, scale * np.eye(2), atol=1e-9 * scale)
+        assert [axes.get_aspect() for axes in picture.axes] == [1.0] * 3
+    for view in (PLANE, SPACE, FRONT, SIDE):
+        np.testing.assert_allclose(np.array(view) @ np.array(view).T, np.eye(3), atol=1e-15)
+        np.testing.assert_allclose(np.cross(view.right, view.up), view.viewer, atol=1e-15)
 
 
 def test_configurations_hold_every_link_at_every_time(arm):
+    """In all three views: one step of the arm at x, y, z is at its x, y from above and at its x, z from the front."""
     record = FigureRecord(name="c", kind="configurations", analysis="inverse", times=(0.0, 0.1, 0.6), exaggeration=3.0)
-    (axes,) = draw_configurations(record, arm).axes
-    assert "deflections × 3" in axes.get_title(loc="left")
-    lines = [artist for artist in axes.collections if isinstance(artist, Line3DCollection)]
-    assert len(lines) == 3 * 3  # times, bodies
-    limits = np.array([axes.get_xlim(), axes.get_ylim(), axes.get_zlim()])
+    corner, above, level = draw_configurations(record, arm).axes
+    assert "deflections × 3" in corner.get_title(loc="left")
+    assert [axes.get_xlabel() + axes.get_ylabel() for axes in (above, level)] == ["x (m)y (m)", "x (m)z (m)"]
     bodies, shift = moving_bodies(arm, "inverse", FRAMES[[0, 1, 3]])
-    for body, carried in zip(bodies, shift, strict=True):
-        at = line_shape(arm, body, []).placed(body, carried, 3.0)
-        assert np.all(at > limits[:, 0])
-        assert np.all(at < limits[:, 1])
+    for axes, right, up in (
+        (corner, SPACE.right, SPACE.up),
+        (above, [1, 0, 0], [0, 1, 0]),
+        (level, [1, 0, 0], [0, 0, 1]),
+    ):
+        drawn = np.concatenate([np.concatenate(c.get_segments()) for c in axes.collections])
+        assert len(axes.collections) == 3 * 3  # times, bodies
+        for body, carried in zip(bodies, shift, strict=True):
+            at = line_shape(arm, body, []).placed(body, carried, 3.0)
+            at = np.stack([at @ right, at @ up], axis=-1)
+            assert np.all(at > [axes.get_xlim()[0], axes.get_ylim()[0]])
+            assert np.all(at < [axes.get_xlim()[1], axes.get_ylim()[1]])
+            away = np.linalg.norm(at.reshape(-1, 1, 2) - drawn, axis=2).min(axis=1)
+            assert away.max() < (0.02 if axes is corner else 1e-12)  # tubes of 8 and 11 mm seen from the corner
 
 
 def test_exaggeration_is_of_configurations_only():
@@ -172,7 +188,7 @@ def test_outline_of_a_surface_goes_around_its_opening():
     points = np.stack([*np.meshgrid(x, x, indexing="ij"), np.zeros((4, 4))], axis=-1).reshape(-1, 3)
     cells = np.array([[4 * i + j, 4 * i + j + 4, 4 * i + j + 5, 4 * i + j + 1] for i in range(3) for j in range(3)])
     picture = Figure()
-    axes = SceneAxes(picture, PLANE)
+    axes = SceneAxes(picture.subplots(), PLANE)
     axes.body(points, np.delete(cells, 4, axis=0), "C0")
     axes.body(points, cells[:, ::-1], "C1")  # from behind: nothing is seen
     axes.finish()
@@ -184,8 +200,11 @@ def test_outline_of_a_surface_goes_around_its_opening():
 
 def test_paths_in_3d_have_three_columns(arm):
     curve = {"data": "inverse/points/fore.tip/position", "label": "tip"}
-    (axes,) = draw(FigureRecord(name="p", kind="path", curves=(curve,)), arm).axes
-    np.testing.assert_allclose(np.array(axes.lines[0].get_data_3d()).T, arm[curve["data"]])
+    corner, above, level = draw(FigureRecord(name="p", kind="path", curves=(curve,)), arm).axes
+    x, y, z = arm[curve["data"]].T
+    np.testing.assert_array_equal(above.lines[0].get_data(), [x, y])
+    np.testing.assert_array_equal(level.lines[0].get_data(), [y, z])  # the line goes farther in y than in x
+    np.testing.assert_allclose(corner.lines[0].get_data(), [arm[curve["data"]] @ d for d in SPACE[:2]], atol=1e-15)
     wrong = {"data": "inverse/points/fore.tip/quaternion", "label": "tip"}
     with pytest.raises(InputError, match=r'expected three columns \(x, y, z\) in ".*quaternion", found 4'):
         draw(FigureRecord(name="p", kind="path", curves=(wrong,)), arm)

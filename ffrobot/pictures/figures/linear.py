@@ -12,6 +12,7 @@ from ...common.errors import InputError
 from ...common.plane import in_3d
 from ...results.file import Results
 from ..motion import MovingBody, moving_bodies
+from ..projection import PLANE, SPACE
 from ..shapes import Shape, line_shape
 from .figure_file import FigureRecord
 from .scene_axes import SceneAxes
@@ -64,7 +65,7 @@ def draw_robot_modes(figure: FigureRecord, results: Results) -> Figure:
     bodies, _ = moving_bodies(results, figure.analysis, np.array([k]))
     shapes = [line_shape(results, body, []) for body in bodies]
     for place, mode in enumerate(shown, 1):
-        axes = SceneAxes(picture, results.space, (rows, COLUMNS, place))
+        axes = SceneAxes(picture.add_subplot(rows, COLUMNS, place), PLANE if results.space.is_plane else SPACE)
         axes.axes.set_title(f"{mode + 1}: {frequency[mode]:.4g} Hz", loc="left")
         group = f"{figure.analysis}/linear/modes"
         ways = [_way(results, group, body, shape, k, int(mode)) for body, shape in zip(bodies, shapes, strict=True)]

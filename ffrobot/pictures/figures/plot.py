@@ -21,7 +21,7 @@ from .configurations import draw_configurations, draw_path
 from .figure_file import FigureRecord, load_figures
 from .linear import draw_bode, draw_robot_modes
 from .placement import draw_placement
-from .standard import standard_figures
+from .standard import main_figures, standard_figures
 from .style import literal, new_axes, style
 from .time_history import draw_time_history
 from .torque_speed import draw_torque_speed
@@ -73,8 +73,8 @@ def plot_results(
 ) -> list[Path]:
     """Draw the figures of a results file into `folder`, which is made when absent.
 
-    A file `figures.toml` beside the results says which figures and how; without one, the standard figures are drawn.
-    `only` are names of those that are wanted, or patterns such as "moment_*"; all are where there are none.
+    A file `figures.toml` beside the results says which figures and how; without one, the main ones of the standard
+    figures are drawn. `only` are names of those that are wanted, or patterns such as "moment_*", or "*" for all.
     Returns the files written, each figure in all `formats`: "png", "pdf", "svg". Raises `InputError` where the results
     or `figures.toml` cannot be read, or name what is not there, or for another format.
     """
@@ -89,7 +89,7 @@ def plot_results(
                 with of_file(label), _formulas(label):
                     written += write_figure(draw(record, results), folder, record.name, formats)
         else:
-            for record in _records(standard_figures(results), only):
+            for record in _records((standard_figures if only else main_figures)(results), only):
                 written += write_figure(literal(draw(record, results)), folder, record.name, formats)
     return written
 

@@ -13,18 +13,22 @@ from .shared import bending_points, both_ways, curves_of, file_name, members
 
 SNAPSHOTS = 5
 ROUND_OFF = 1e-9  # rad: bodies that turn no further do not turn
-SEEN = 1e-3  # of the largest component of a deflection: smaller ones are the line at zero
+SEEN = 1e-3  # of the largest: smaller components of a deflection, differences of a voltage, cannot be seen
+KILO = 5e3  # V, from which on voltages are in kV
 AXES = "xyz"
 ABOUT = {"mx": "about x", "my": "about y", "mz": "about z"}
 ENERGIES = ("kinetic", "strain", "gravitational")
 
 
-def standard_figures(results: Results) -> tuple[FigureRecord, ...]:
-    """Robot, paths, angles, deflections, modes, forces, torques, stresses, energies, voltages, linear models.
+def main_figures(results: Results) -> tuple[FigureRecord, ...]:
+    """Robot, paths, motors, largest deflections, stresses, voltages, linear models; analyses over each other."""
+    return tuple(record for figures in MAIN for record in figures(results))
 
-    Analyses are laid over each other.
-    """
-    return tuple(record for figures in FIGURES for record in figures(results))
+
+def standard_figures(results: Results) -> tuple[FigureRecord, ...]:
+    """The main figures, then angles, modes, forces, reactions, energies and other points."""
+    main = main_figures(results)
+    return main + tuple(record for figures in OTHERS for record in figures(results) if record not in main)
 
 
 def _configurations(results: Results) -> Iterator[FigureRecord]:
@@ -85,22 +89,32 @@ def _angles(results: Results) -> Iterator[FigureRecord]:
             yield FigureRecord(name=file_name("angle", body), title=title, curves=curves, y_label="angle (rad)")
 
 
-def _deflections(results: Results) -> Iterator[FigureRecord]:
-    """By axes of the body; components that are zero but for round-off are left out."""
+def _largest_deflections(results: Results) -> Iterator[FigureRecord]:
+    """Of the point of each body that deflects most in any analysis."""
+    found: dict[str, tuple[float, str]] = {}
     for point in bending_points(results):
-        found = curves_of(results, f"points/{point}/deflection")
-        largest = np.max([np.abs(results[curve.data]).max(axis=0) for curve in found], axis=0)
-        shown = [k for k in range(len(largest)) if largest[k] > SEEN * largest.max()]
-        curves = tuple(
-            Curve(data=f"{curve.data}[{k}]", label=f"{curve.label}, {AXES[k]}") for curve in found for k in shown
-        )
-        yield FigureRecord(
-            name=file_name("deflection", point),
-            title=f"deflection of {point}, axes of the body",
-            curves=curves,
-            y_label="deflection (mm)",
-            scale=1e3,
-        )
+        size = max(np.abs(results[curve.data]).max() for curve in curves_of(results, f"points/{point}/deflection"))
+        body = point.split(".")[0]
+        found[body] = max(found.get(body, (0.0, "")), (float(size), point))
+    yield from (_deflection(results, point) for _, point in found.values())
+
+
+def _deflections(results: Results) -> Iterator[FigureRecord]:
+    yield from (_deflection(results, point) for point in bending_points(results))
+
+
+def _deflection(results: Results, point: str) -> FigureRecord:
+    """By axes of the body; components that are zero but for round-off are left out."""
+    found = curves_of(results, f"points/{point}/deflection")
+    largest = np.max([np.abs(results[curve.data]).max(axis=0) for curve in found], axis=0)
+    shown = [k for k in range(len(largest)) if largest[k] > SEEN * largest.max()]
+    return FigureRecord(
+        name=file_name("deflection", point),
+        title=f"deflection of {point}, axes of the body",
+        curves=tuple(Curve(data=f"{c.data}[{k}]", label=f"{c.label}, {AXES[k]}") for c in found for k in shown),
+        y_label="deflection (mm)",
+        scale=1e3,
+    )
 
 
 def _modes(results: Results) -> Iterator[FigureRecord]:
@@ -154,32 +168,56 @@ def _slides(results: Results, joint: str) -> bool:
     return any(coordinate.unit == "m" for coordinate in joint_coordinates(results.scene, joint))
 
 
+def _actuators(results: Results) -> Iterator[FigureRecord]:
+    """What drives the robot: its motors, or without any the forces along its trajectories."""
+    motors = list(_motors(results))
+    yield from motors or _trajectory_forces(results)
+
+
+def _motors(results: Results) -> Iterator[FigureRecord]:
+    """Torque or force of every motor, and over its speed where that or the power has limits."""
+    for joint, coordinate in _coordinates(results):
+        label = joint + coordinate.label
+        if driven := curves_of(results, f"joints/{joint}/moment", coordinate.column):
+            limit = coordinate.limits.moment
+            yield FigureRecord(
+                name=file_name("moment", label),
+                title=f"motor of joint {label}",
+                curves=driven,
+                y_label=_force(coordinate),
+                limits=both_ways(limit) if np.isfinite(limit) else (),
+            )
+        if np.isfinite([coordinate.limits.speed, coordinate.limits.power]).any():
+            yield from _torque_speed(results, joint, coordinate)
+
+
 def _joints(results: Results) -> Iterator[FigureRecord]:
-    """Coordinates, torques, torques over speed, and size of the reaction, of every joint."""
+    """Coordinates, torques over speed, and sizes of reactions, of every joint."""
+    for joint, coordinate in _coordinates(results):
+        moved = curves_of(results, f"joints/{joint}/coordinate", coordinate.column)
+        if any(np.ptp(results.data(curve.data)) for curve in moved):
+            label, unit = joint + coordinate.label, coordinate.unit
+            y_label = f"{'angle' if unit == 'rad' else 'displacement'} ({unit})"
+            yield FigureRecord(
+                name=file_name("coordinate", label), title=f"joint {label}", curves=moved, y_label=y_label
+            )
+        yield from _torque_speed(results, joint, coordinate)
     for joint in members(results, "joints"):
-        for coordinate in joint_coordinates(results.scene, joint):
-            yield from _coordinate(results, joint, coordinate)
         if curves := curves_of(results, f"joints/{joint}/reaction", magnitude=True):
             title = f"magnitude of the reaction, joint {joint}"
             yield FigureRecord(name=file_name("reaction", joint), title=title, curves=curves, y_label="reaction (N)")
 
 
-def _coordinate(results: Results, joint: str, coordinate: Coordinate) -> Iterator[FigureRecord]:
-    """Of one coordinate of a joint: itself, its motor's torque or force, and that over its speed."""
-    label, column, unit = joint + coordinate.label, coordinate.column, coordinate.unit
-    moved = curves_of(results, f"joints/{joint}/coordinate", column)
-    if any(np.ptp(results.data(curve.data)) for curve in moved):
-        title, y_label = f"joint {label}", f"{'angle' if unit == 'rad' else 'displacement'} ({unit})"
-        yield FigureRecord(name=file_name("coordinate", label), title=title, curves=moved, y_label=y_label)
-    if driven := curves_of(results, f"joints/{joint}/moment", column):
-        force = f"{'torque' if unit == 'rad' else 'force'} ({coordinate.force_unit})"
-        limit = coordinate.limits.moment
-        title, lines = f"motor of joint {label}", both_ways(limit) if np.isfinite(limit) else ()
-        yield FigureRecord(name=file_name("moment", label), title=title, curves=driven, y_label=force, limits=lines)
-        yield from _torque_speed(results, joint, coordinate, force)
+def _coordinates(results: Results) -> Iterator[tuple[str, Coordinate]]:
+    for joint in members(results, "joints"):
+        yield from ((joint, coordinate) for coordinate in joint_coordinates(results.scene, joint))
 
 
-def _torque_speed(results: Results, joint: str, coordinate: Coordinate, y_label: str) -> Iterator[FigureRecord]:
+def _force(coordinate: Coordinate) -> str:
+    return f"{'torque' if coordinate.unit == 'rad' else 'force'} ({coordinate.force_unit})"
+
+
+def _torque_speed(results: Results, joint: str, coordinate: Coordinate) -> Iterator[FigureRecord]:
     curves, label = [], joint + coordinate.label
     for analysis in results.analyses:
         moment, rate, of_motor = (f"{analysis}/joints/{joint}/{key}" for key in ("moment", "rate", "motor_rate"))
@@ -194,7 +232,7 @@ def _torque_speed(results: Results, joint: str, coordinate: Coordinate, y_label:
             joint=joint,
             curves=tuple(curves),
             x_label=f"speed ({coordinate.unit}/s)",
-            y_label=y_label,
+            y_label=_force(coordinate),
         )
 
 
@@ -225,19 +263,33 @@ def _energies(results: Results) -> Iterator[FigureRecord]:
 
 
 def _voltages(results: Results) -> Iterator[FigureRecord]:
-    """Voltages of all patches of a layout, required and within their limit; its name is the body's if it has none."""
+    """Voltages of all patches of a layout: required, and where these are too large, within their limit.
+
+    The name of a layout is the body's if it has none.
+    """
     limits = {layout.get("name", layout["body"]): layout.get("limit") for layout in results.scene.get("pzt", [])}
     for analysis in results.analyses:
         for body in results.names(f"{analysis}/pzt"):
-            limit = limits.get(body)
-            for dataset, title in (("required_voltage", "required voltages"), ("voltage", "voltages within the limit")):
-                yield FigureRecord(
-                    name=file_name(dataset, analysis, body),
-                    title=f"{title}, patches of {body}, {analysis}",
-                    curves=(Curve(data=f"{analysis}/pzt/{body}/{dataset}", label="patch"),),
-                    y_label="voltage (V)",
-                    limits=() if limit is None else both_ways(limit),
-                )
+            required, within = f"{analysis}/pzt/{body}/required_voltage", f"{analysis}/pzt/{body}/voltage"
+            top = np.abs(results.data(required)).max()
+            of = f"patches of {body}, {analysis}"
+            if top > 0.0:
+                yield _voltage(results, required, f"required voltages, {of}", limits.get(body))
+            if np.abs(results.data(within) - results.data(required)).max() > SEEN * top:
+                yield _voltage(results, within, f"voltages within the limit, {of}", limits.get(body))
+
+
+def _voltage(results: Results, data: str, title: str, limit: float | list[float] | None) -> FigureRecord:
+    analysis, _, body, dataset = data.split("/")
+    factor, unit = (1e-3, "kV") if np.abs(results.data(data)).max() > KILO else (1.0, "V")
+    return FigureRecord(
+        name=file_name(dataset, analysis, body),
+        title=title,
+        curves=(Curve(data=data, label="patch"),),
+        y_label=f"voltage ({unit})",
+        scale=factor,
+        limits=() if limit is None else tuple(factor * one for one in both_ways(limit)),
+    )
 
 
 def _linear(results: Results) -> Iterator[FigureRecord]:
@@ -270,8 +322,9 @@ def _responses(results: Results, analysis: str) -> Iterator[FigureRecord]:
             )
 
 
-FIGURES: tuple[Callable[[Results], Iterator[FigureRecord]], ...] = (
-    _configurations, _paths, _tip_errors, _angles, _deflections, _modes, _trajectory_forces, _joints, _stresses,
-    _energies, _voltages, _linear,
+Figures = tuple[Callable[[Results], Iterator[FigureRecord]], ...]
+MAIN: Figures = (
+    _configurations, _paths, _tip_errors, _actuators, _largest_deflections, _stresses, _voltages, _linear,
 )  # fmt: skip
+OTHERS: Figures = (_angles, _deflections, _modes, _trajectory_forces, _joints, _energies)
 """In this order."""

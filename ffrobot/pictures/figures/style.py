@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from contextlib import AbstractContextManager
 from typing import Any
 
@@ -16,7 +17,8 @@ SIZE = (3.5, 2.7)  # inches: one column of a journal page
 MARKERS = ("s", "^", "o", "D", "v", "P", "X")
 DASHES = ("-", "--", "-.", ":")
 MARKERS_A_CURVE = 14
-LEGEND_CHARACTERS = 60  # in a line; 6 stand for the sample of a curve
+TITLE_CHARACTERS = 52  # in a line
+LEGEND_CHARACTERS = 60  # in a line of a figure as wide as SIZE; 6 stand for the sample of a curve
 ORDERED = "viridis"  # for series with an order: patches along a link, configurations over time
 
 SETTINGS: dict[str, Any] = {
@@ -48,7 +50,8 @@ def new_axes(title: str) -> tuple[Figure, Axes]:
     """An empty figure with its axes."""
     figure = Figure(figsize=SIZE, layout="constrained")
     axes = figure.subplots()
-    axes.set_title(title, loc="left")
+    lines = [title] if "$" in title else textwrap.wrap(title, TITLE_CHARACTERS)  # no line ends within a formula
+    axes.set_title("\n".join(lines), loc="left")
     axes.locator_params(axis="x", nbins=6)
     return figure, axes
 
@@ -94,7 +97,10 @@ def legend(axes: Axes) -> None:
 
     One curve needs none.
     """
-    labels = axes.get_legend_handles_labels()[1]
-    if len(labels) > 1:
-        columns = max(1, min(len(labels), LEGEND_CHARACTERS // (max(map(len, labels)) + 6)))
-        axes.figure.legend(loc="outside lower center", ncols=columns, handlelength=1.8, columnspacing=1.0)
+    handles, labels = axes.get_legend_handles_labels()
+    figure = axes.get_figure(root=True)
+    if figure is not None and len(labels) > 1:
+        room = LEGEND_CHARACTERS * figure.get_figwidth() / SIZE[0]
+        columns = max(1, min(len(labels), int(room) // (max(map(len, labels)) + 6)))
+        look: dict[str, Any] = {"ncols": columns, "handlelength": 1.8, "columnspacing": 1.0}
+        figure.legend(handles, labels, loc="outside lower center", **look)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.image import NonUniformImage
@@ -11,18 +13,23 @@ from ...results.file import Results
 from .figure_file import Curve, FigureRecord
 from .palette import COLORS
 from .reading import curve_points, read_points
-from .style import legend, line_style, shades
+from .style import DASHES, legend, line_style, shades
 
 MANY, OFTEN = 4, 0.2  # columns, and part of the time at limits, above which lines hide each other
 NEAR = 1e-3  # of a limit: how close values are that are at it
+SHADE = 0.12  # opacity
+NAMED = 6  # columns: of more, the legend has the first and the last
 
 
 def draw_time_history(axes: Axes, figure: FigureRecord, results: Results) -> None:
-    """Draw every curve of `figure` over time; a dataset with several columns as one shade for each."""
+    """Draw every curve of `figure` over time; a dataset with several columns as one shade for each.
+
+    The times at which a value is at a limit are shaded.
+    """
     for k, curve in enumerate(figure.curves):
         if curve.file is not None:
             time, values = read_points(curve.file, curve.data)
-            axes.plot(time, values, "x", color="black", markersize=5, zorder=4, label=curve.label)
+            axes.plot(time, figure.scale * values, "x", color="black", markersize=5, zorder=4, label=curve.label)
         else:
             _draw_columns(axes, curve, k, figure, results)
     axes.set_xlabel(figure.x_label)
@@ -39,19 +46,31 @@ def _draw_columns(axes: Axes, curve: Curve, k: int, figure: FigureRecord, result
     if is_crowded(values, figure.limits):
         _draw_map(axes, time, values, curve.label, figure)
         return
-    if values.shape[1] == 1:
+    if len(time) > 1 and (at := is_at_limit(values, figure.limits).any(axis=1)).any():
+        label = None if axes.collections else "at a limit"
+        look: dict[str, Any] = {"color": COLORS[1], "alpha": SHADE, "linewidth": 0, "label": label}
+        axes.fill_between(time, 0.0, 1.0, where=at, transform=axes.get_xaxis_transform(), **look)
+    count = values.shape[1]
+    if count == 1:
         axes.plot(time, values[:, 0], label=curve.label, **line_style(k, len(values), alone=len(figure.curves) == 1))
         return
-    for column, color in enumerate(shades(values.shape[1])):
-        axes.plot(time, values[:, column], color=color, linewidth=0.7, label=f"{curve.label} {column + 1}")
+    for column, color in enumerate(shades(count)):
+        label = f"{curve.label} {column + 1}" if count <= NAMED or column in (0, count - 1) else None
+        dashes = DASHES[column % len(DASHES)] if count <= MANY else "-"
+        axes.plot(time, values[:, column], color=color, linestyle=dashes, linewidth=0.7, label=label)
+
+
+def is_at_limit(values: Array, limits: tuple[float, ...]) -> Array:
+    """Where values (T, n) are at one of the limits: (T, n)."""
+    near = np.isclose(values[..., None], limits or np.inf, rtol=NEAR, atol=0.0)
+    return np.asarray(near.any(axis=-1))
 
 
 def is_crowded(values: Array, limits: tuple[float, ...]) -> bool:
     """Whether many columns of values (T, n) go from limit to limit, so that the last line hides the others."""
     if values.shape[1] <= MANY or not limits:
         return False
-    saturated = np.isclose(np.abs(values), max(map(abs, limits)), rtol=NEAR, atol=0.0)
-    return bool(saturated.mean() > OFTEN)
+    return bool(is_at_limit(values, limits).mean() > OFTEN)
 
 
 def _draw_map(axes: Axes, time: Array, values: Array, label: str, figure: FigureRecord) -> None:
