@@ -16,8 +16,7 @@ from ..mbs.quantities.motion import RobotMotion
 from ..mbs.scene.analysis import Analysis
 from .feasibility import Feasibility, ModalMotion, PatchFeasibility, judge_patches
 from .motors import judge_motors
-from .patches.kept_modes import on_kept_modes
-from .patches.link_patches import LinkPatches, with_count
+from .patches.link_patches import LinkPatches, on_kept_modes, with_count
 from .patches.records import PztLayout
 from .patches.voltages import Voltages, voltage_gain
 from .unsupplied import Unsupplied, seen_at_points

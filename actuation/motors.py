@@ -11,7 +11,7 @@ from ..common.arrays import Array, Booleans, as_floats
 from ..common.peaks import largest, root_mean_square, shares
 from ..mbs._core import TimeFunction
 from ..mbs.analysis.motors_only import MotorsOnly
-from ..mbs.joints.transmission import MotorLimits
+from ..mbs.joints.joint import MotorLimits
 from ..mbs.model.known_motion import mass_matrices
 from ..mbs.model.transmission import rotor
 from ..mbs.quantities.motion import RobotMotion

@@ -1,4 +1,4 @@
-"""Rotations in space: rotation vectors, matrices (…, 3, 3), quaternions (…, 4) with the scalar first; angles in rad.
+"""Rotations in the plane, A(θ), and in space: rotation vectors, matrices (…, 3, 3), quaternions (…, 4; scalar first).
 
 φ~ is the matrix of the cross product. A section turns by exp φ~ (docs/theory.md), with Ω = J_l φ̇.
 """
@@ -171,3 +171,14 @@ def smallest_turn(axis: Array) -> Array:
         return np.diag([1.0, -1.0, -1.0])
     found: Array = np.eye(3) + S + S @ S * ((1.0 - cosine) / square)
     return found
+
+
+def rotation(theta: float) -> Array:
+    """A(θ), (2, 2)."""
+    c, s = np.cos(theta), np.sin(theta)
+    return np.array([[c, -s], [s, c]])
+
+
+def in_3d(vectors: Array) -> Array:
+    """(…, 3) of `vectors` (…, 2) of the plane z = 0; longer ones as they are."""
+    return vectors if vectors.shape[-1] > 2 else np.concatenate([vectors, np.zeros_like(vectors[..., :1])], axis=-1)

@@ -16,7 +16,7 @@ from pydantic.fields import FieldInfo
 from pydantic_core import CoreSchema, ErrorDetails, PydanticKnownError, core_schema
 
 from .errors import InputError, did_you_mean, either
-from .function_content import digest_of_function
+from .python_files import digest_of_function
 from .tables import key_path, shown
 from .toml_files import check_limits
 

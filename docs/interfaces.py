@@ -12,7 +12,7 @@ import ffrobot
 from ffrobot.cli import cli
 from ffrobot.design.front_record import Front
 from ffrobot.design.optimum_record import Optimum
-from ffrobot.design.screening_record import Screening
+from ffrobot.design.screening import Screening
 from ffrobot.design.sensitivity_record import Sensitivity
 from ffrobot.design.uncertainty_record import Uncertainty
 from ffrobot.fe_models.link import LinkOutcome

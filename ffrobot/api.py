@@ -56,8 +56,7 @@ def solve(
     from .common.files import check_output
     from .common.outputs import protected
     from .results.file import FORMAT, Results
-    from .results.resume import resume_scene
-    from .results.stopped import how_to_go_on
+    from .results.resume import how_to_go_on, resume_scene
     from .results.write import results_image, write_results
     from .run.inputs import files_of, files_of_tables
     from .run.solve import solve_scene

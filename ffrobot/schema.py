@@ -1,4 +1,4 @@
-"""JSON schemas of link, scene and figure files, generated from the records that validate these files.
+"""JSON schemas of link, scene and figure files, and meanings of keys, generated from the records that validate them.
 
 Editors complete and check TOML files by them, and show what a key means. What ties several keys together (a revolute
 joint has no axis) is beyond a schema: the records and the readers of the files say so.
@@ -6,15 +6,16 @@ joint has no axis) is beyond a schema: the records and the readers of the files 
 
 from __future__ import annotations
 
+import ast
+import inspect
 import json
 import re
-from typing import Any
+from typing import Any, Literal, get_args, get_origin
 
-from pydantic import TypeAdapter
+from pydantic import BaseModel, TypeAdapter
 from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
 from pydantic_core import core_schema
 
-from .common.key_descriptions import key_descriptions
 from .common.validation import is_key
 from .mbs.fields.spelling import PLANAR, SPATIAL, NormalInPlane, Spelled
 
@@ -148,3 +149,32 @@ def _is_noise(key: str, item: object, node: dict[str, Any]) -> bool:
     """Automatic titles, and defaults that stand for "not given": None, and 0 where the key has to be positive."""
     unset = item is None or (key == "default" and item == node.get("exclusiveMinimum"))
     return unset or (key == "title" and isinstance(item, str))
+
+
+def key_descriptions(record: type[BaseModel]) -> dict[str, str]:
+    """Meaning and unit of each key of `record` as files write it, those of its base classes included.
+
+    They are read from the source, when they are asked for: pydantic's `use_attribute_docstrings` would do so whenever a
+    scene is loaded. Of a key that tells which record a table is, such as `kind`, it is the first line about the record.
+    """
+    texts: dict[str, str] = {}
+    for cls in reversed(record.__mro__):
+        if issubclass(cls, BaseModel) and cls is not BaseModel:
+            texts |= _docstrings_of_fields(cls)
+    about = (inspect.getdoc(record) or "").partition("\n")[0]
+    for name, field in record.model_fields.items():
+        if get_origin(field.annotation) is Literal and field.is_required() and len(get_args(field.annotation)) == 1:
+            texts[name] = about
+    return {field.alias or name: texts[name] for name, field in record.model_fields.items() if name in texts}
+
+
+def _docstrings_of_fields(cls: type) -> dict[str, str]:
+    """Texts that stand directly under a field in the body of a class."""
+    (definition,) = ast.parse(inspect.cleandoc("\n" + inspect.getsource(cls))).body
+    assert isinstance(definition, ast.ClassDef)
+    found = {}
+    for field, below in zip(definition.body, definition.body[1:], strict=False):
+        match field, below:
+            case ast.AnnAssign(target=ast.Name(id=name)), ast.Expr(value=ast.Constant(value=str(text))):
+                found[name] = " ".join(text.split())
+    return found

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 import ffrobot
-from ffrobot.mbs.fields.derivatives import check_derivatives
-from ffrobot.mbs.fields.functions import user_function
+from ffrobot.mbs.fields.functions import check_derivatives, user_function
 
 SINE = "void sine(double t, double *out) { out[0] = 0.5 * sin(t); out[1] = 0.5 * cos(t); out[2] = -out[0]; }"
 

@@ -12,13 +12,12 @@ from checkpoint_mechanisms import CASES, load
 from checkpoint_scenes import checkpoint_scene
 
 from ffrobot.common.errors import InputError
-from ffrobot.common.key_descriptions import key_descriptions
 from ffrobot.common.rotations import exponential, quaternions
 from ffrobot.mbs.fields.orientations import OrientationLaw
 from ffrobot.scene.load import validated_scene
 from ffrobot.scene.scene import SceneKeys
 from ffrobot.scene.unsupported import UNSUPPORTED
-from ffrobot.schema import DIALECT
+from ffrobot.schema import DIALECT, key_descriptions
 
 FOLDER = Path(scene_of.__file__).parent
 

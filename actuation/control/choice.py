@@ -7,9 +7,15 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from ...common.arrays import Array
-from .computed_torque import ComputedTorqueControl
-from .controllers import Controller, Setup, joint_pid, modal_velocity
-from .python_controller import PythonControl, load_function
+from .controllers import (
+    ComputedTorqueControl,
+    Controller,
+    PythonControl,
+    Setup,
+    joint_pid,
+    load_function,
+    modal_velocity,
+)
 from .records import ComputedTorque, JointPid, Lqr, ModalVelocity, PythonController, Sensor
 from .records import Controller as Record
 from .robot import Robot

@@ -20,15 +20,14 @@ from ...mbs.analysis.outcome import Outcome
 from ...mbs.analysis.replay import replay_times, supplied
 from ...mbs.model.drives import Drives, PointDrive
 from ...mbs.model.gears import with_compliance
+from ...mbs.model.known_motion import State
 from ...mbs.model.model import Model, without_paths
 from ...mbs.solve.linearisation import LinearEquations
-from ...mbs.solve.state import State
 from ...mbs.solve.statics import initial_state
 from ..context import ActuatedContext
 from .choice import make_controller, needed_sensors
-from .controllers import Setup
+from .controllers import Loop, Setup
 from .linear_model import LinearModel, state_space
-from .loop import Loop
 from .loop_keys import SampledAnalysis
 from .loop_record import between, held_commands, held_until, loop_record, sample_times, times_of_run
 from .margins import lowest_frequency

@@ -1,20 +1,42 @@
-"""The protocol of controllers, and the linear ones: joint PID and modal velocity feedback."""
+"""Controllers: their protocol, joint PID, modal velocity feedback, computed torque, functions of Python.
+
+A user's own controller: a function in a Python file that is given the setup and returns what is asked at samples.
+
+    def controller(setup):                 # actuation.control.controllers.Setup
+        gamma = setup.columns("joint/O")   # where readings are in y, by name
+        tau = setup.places("joint/O")      # where commands are in u
+
+        def at_sample(k, y):               # sample number, readings (outputs,)
+            u = np.zeros(len(setup.inputs))
+            u[tau] = 100 * (setup.reference[k, gamma] - y[gamma])
+            return u                       # added to setup.feed_forward[k], then cut at the limits
+
+        return at_sample
+
+It reads the sensors that the scene gives.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+import runpy
+import traceback
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Protocol
 
 import numpy as np
 
 from ...common.arrays import Array, Indices
-from ...common.errors import InputError, quoted
+from ...common.errors import InputError, SolveError, quoted
+from ...common.python_files import count_failed, count_imports, imported_files
 from ...mbs.analysis.outcome import Outcome
 from ...mbs.model.model import Model
 from ..patches.link_patches import LinkPatches
-from .records import JointPid, ModalVelocity
+from .records import ComputedTorque, JointPid, ModalVelocity
+from .rigid_arm import RigidArm
 from .robot import Robot, estimate
+from .signals import Signal
 
 
 class Controller(Protocol):
@@ -150,3 +172,115 @@ def modal_velocity(record: ModalVelocity, setup: Setup) -> LinearFeedback:
 def modal_columns(setup: Setup, body: str, m: int, ending: str = "/rate") -> Indices:
     """The readings of the lowest m modal coordinates of a body, or of their rates."""
     return setup.columns(*(f"modal/{body}/{k}{ending}" for k in range(1, m + 1)))
+
+
+class ComputedTorqueControl:
+    """Moments for γ̈_ref + 2 ζ ω ė + ω² e with rigid links (Craig, Introduction to Robotics, sec. 10.4).
+
+    They replace the moments of the feed-forward, which are taken off.
+    """
+
+    def __init__(self, record: ComputedTorque, setup: Setup, arm: RigidArm) -> None:
+        motors = setup.robot.motors
+        self.arm, self.bandwidth = arm, record.bandwidth
+        self.gains = record.bandwidth**2, 2 * record.damping_ratio * record.bandwidth
+        self.values = setup.columns(*(f"joint/{name}" for name in motors))
+        self.rates = setup.columns(*(f"joint/{name}/rate" for name in motors))
+        self.reference, self.feed_forward = setup.reference, setup.feed_forward
+        self.accelerations = np.gradient(self.reference[:, self.rates], setup.times, axis=0, edge_order=2)
+
+    def __call__(self, k: int, y: Array) -> Array:
+        """Commands at sample k."""
+        r, m = self.reference[k], len(self.values)
+        e, e_dot = r[self.values] - y[self.values], r[self.rates] - y[self.rates]
+        wanted = self.accelerations[k] + self.gains[0] * e + self.gains[1] * e_dot
+        u: Array = np.zeros_like(self.feed_forward[k])
+        u[:m] = self.arm.moments(y[self.values], y[self.rates], wanted) - self.feed_forward[k, :m]
+        return u
+
+
+class PythonControl:
+    """Calls what `factory` makes, and checks what it returns. Raises `SolveError` where that fails."""
+
+    bandwidth = 0.0
+
+    def __init__(self, factory: Callable[[Setup], Callable[[int, Array], Array]], setup: Setup, label: str) -> None:
+        self.label, self.size, self.times = label, len(setup.inputs), setup.times
+        try:
+            self.act = factory(setup)
+        except (Exception, SystemExit) as error:  # the user's code may raise anything
+            raise SolveError(f"{label}: {_in_words(error)}") from error
+        if not callable(self.act):
+            raise SolveError(f"{label}: expected it to return a function (k, y) → u, found {self.act!r}")
+
+    def __call__(self, k: int, y: Array) -> Array:
+        """What the user's function commands at sample k."""
+        try:
+            u = np.asarray(self.act(k, y), dtype=float)
+        except (Exception, SystemExit) as error:  # the user's code may raise anything
+            raise SolveError(f"{self._at(k)}: {_in_words(error)}") from error
+        if u.shape != (self.size,) or not np.isfinite(u).all():
+            raise SolveError(f"{self._at(k)}: expected {self.size} finite commands, found shape {u.shape}: {u}")
+        return u
+
+    def _at(self, k: int) -> str:
+        return f"{self.label}: sample {k}, t = {self.times[k]:g} s"
+
+
+def _in_words(error: BaseException) -> str:
+    """What the user's code has raised, and in which line."""
+    count_failed(error)
+    last = traceback.extract_tb(error.__traceback__)[-1]
+    return f"{type(error).__name__}: {error} (line {last.lineno} of {Path(last.filename).name}, in {last.name})"
+
+
+def load_function(reference: str, folder: Path) -> Callable[[Setup], Callable[[int, Array], Array]]:
+    """The function of "FILE.py:FUNCTION" of a scene in `folder`.
+
+    What the file imports from below there counts among `python_files.imported_files`. Raises `InputError` where the
+    file fails or does not have the function.
+    """
+    path, _, name = reference.rpartition(":")
+    count_imports(folder, Path(path).parent)
+    try:
+        found = runpy.run_path(path)
+    except (Exception, SystemExit) as error:
+        raise InputError(f"{path}: controller: {_in_words(error)}") from error
+    finally:
+        imported_files()  # as they are now
+    if not callable(found.get(name)):
+        raise InputError(f'{path}: controller: expected the function "{name}", found none')
+    function: Callable[[Setup], Callable[[int, Array], Array]] = found[name]
+    return function
+
+
+class Loop:
+    """What the core asks at every sample: noise and resolution, controllers, limits."""
+
+    def __init__(
+        self, setup: Setup, read: Sequence[Signal], controllers: Sequence[Controller], limit: Array, seed: int
+    ) -> None:
+        samples = (len(setup.times), len(read))
+        noise = np.array([signal.noise for signal in read])
+        self._noise = np.random.default_rng(seed).standard_normal(samples) * noise if noise.any() else None
+        resolution = np.array([signal.resolution for signal in read])
+        self._coarse = np.flatnonzero(resolution)
+        self._resolution = resolution[self._coarse]
+        self._controllers, self._limit, self._feed_forward = controllers, limit, setup.feed_forward
+        self.readings = np.zeros(samples)
+        self.commands, self.wanted = np.zeros_like(setup.feed_forward), np.zeros_like(setup.feed_forward)
+        self.first: Array = np.clip(setup.feed_forward[0], -limit, limit)
+        self.taken = 0
+
+    def __call__(self, k: int, _t: float, y: Array) -> Array:
+        """Commands at sample k for what the sensors are exposed to."""
+        if self._noise is not None:
+            y += self._noise[k]
+        if self._coarse.size:
+            y[self._coarse] = np.round(y[self._coarse] / self._resolution) * self._resolution
+        wanted = self._feed_forward[k].copy()
+        for controller in self._controllers:
+            wanted += controller(k, y)
+        command: Array = np.minimum(np.maximum(wanted, -self._limit), self._limit)
+        self.readings[k], self.wanted[k], self.commands[k], self.taken = y, wanted, command, k + 1
+        return command

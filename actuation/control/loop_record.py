@@ -1,4 +1,4 @@
-"""What a closed loop leaves: samples, metrics, margins, advice."""
+"""What the core asks at every sample of a closed loop, and what a run leaves: samples, metrics, margins, advice."""
 
 from __future__ import annotations
 
@@ -10,9 +10,8 @@ import numpy as np
 from ...common.arrays import Array
 from ...mbs.analysis.outcome import Details
 from ...mbs.analysis.samples import in_order
-from .controllers import Controller, Setup
+from .controllers import Controller, Loop, Setup
 from .linear_model import LinearModel
-from .loop import Loop
 from .loop_keys import SampledAnalysis
 from .margins import Margins, joint_gains, margins
 from .metrics import Followed, Metrics, measure, resting, ringing, watched

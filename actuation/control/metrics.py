@@ -20,8 +20,7 @@ from ...common.arrays import Array
 from ...common.peaks import largest, root_mean_square, shares
 
 if TYPE_CHECKING:  # metrics are read from files, too, by what does not control
-    from .controllers import Setup
-    from .loop import Loop
+    from .controllers import Loop, Setup
 
 SETTLED = 0.05  # of the largest error
 PERIODS = 3.0  # of the lowest frequency, over which what is slower is found

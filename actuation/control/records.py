@@ -200,7 +200,7 @@ def _python_function(value: object, info: ValidationInfo) -> object:
 class PythonController(ControllerRecord):
     """A user's function: "FILE.py:FUNCTION" next to the scene, or the function itself in scenes made in Python.
 
-    See `actuation.control.python_controller`.
+    See `actuation.control.controllers`.
     """
 
     kind: Literal["python"]

@@ -155,7 +155,7 @@ def placed_patches(path: Path, layouts: Sequence[PztLayout], body: ModalBody) ->
 
 
 def link_patches(path: Path, layouts: Sequence[PztLayout], body: ModalBody, spatial: Body) -> LinkPatches:
-    """Place the layouts of one link: they serve all modes of its file that they reach; see `kept_modes`, too.
+    """Place the layouts of one link: they serve all modes of its file that they reach; see `on_kept_modes`, too.
 
     Raises `InputError` for patches that do not fit the link, or weights that do not.
     """
@@ -287,3 +287,50 @@ def _together(
 
 def _key(path: Path, label: str) -> str:
     return f'{path}: pzt "{label}"'
+
+
+def on_kept_modes(of_link: LinkPatches, equations: Body) -> LinkPatches:
+    """The patches of a link whose `equations` may have fewer modes than its file; the same where they reach all modes.
+
+    Modal forces on modes left out follow from the loads on the link. Patches that cannot produce all of these produce
+    those on the coordinates that are kept, and may bend the link in the others.
+    """
+    if equations.reduction is None or of_link.reach.serves_all:
+        return of_link
+    modes = {layout: _kept(reached, equations) for layout, reached in of_link.modes.items()}
+    reached = _kept(of_link.reached, equations)
+    arrays = {layout: _kept_array(of_link, layout, modes[layout], equations) for layout in of_link.arrays}
+    W_sqrt = of_link.reach.W_sqrt @ _lift(of_link.reached, equations)
+    reach = replace(
+        of_link.reach, Phi_V=reached.seen(of_link.Phi_V.T).T, W_sqrt=W_sqrt,
+        frequency=np.sqrt(reached.stiffness) / (2 * np.pi), served=reached.served,
+    )  # fmt: skip
+    on_kept = as_floats(equations.modal_transform @ equations.on_file)
+    return replace(of_link, arrays=arrays, modes=modes, reach=reach, reached=reached, on_kept=on_kept)
+
+
+def _columns(reached: ReachedModes, equations: Body) -> Indices:
+    """Numbers of the coordinates kept that move the link in these modes above all."""
+    squares = equations.modal_transform**2
+    return np.flatnonzero(squares[reached.rows].sum(axis=0) > 0.5 * squares.sum(axis=0))
+
+
+def _kept(reached: ReachedModes, equations: Body) -> ReachedModes:
+    columns = _columns(reached, equations)
+    T = equations.modal_transform[np.ix_(reached.rows, columns)]
+    served = int(np.count_nonzero(columns < equations.n_eigenmodes))
+    return ReachedModes(reached.rows, T, equations.stiffness[columns], served)
+
+
+def _lift(reached: ReachedModes, equations: Body) -> Array:
+    """(m, m') forces on all modes that patches reach from those on the coordinates kept."""
+    return reached.forces(equations.on_file[_columns(reached, equations)]).T
+
+
+def _kept_array(of_link: LinkPatches, layout: str, kept: ReachedModes, equations: Body) -> PatchArray:
+    array, columns, on_link = of_link.arrays[layout], of_link.columns(layout), of_link.bodies[of_link.body]
+    return replace(
+        array, turn=kept.seen(on_link.turn[:, columns].T).T, Phi_V=kept.seen(on_link.Phi_V[:, columns].T).T,
+        W_sqrt=array.W_sqrt @ _lift(of_link.modes[layout], equations),
+        frequency=np.sqrt(kept.stiffness) / (2 * np.pi), served=kept.served,
+    )  # fmt: skip

@@ -21,7 +21,7 @@ class ReachedModes:
     Attributes:
         rows: (m,) numbers (from 0) of the modes of the modal body in these families.
         T: (m, m) p of these rows from the coordinates p' in which m_ff is the identity and K_ff diagonal; (m, fewer) of
-            the coordinates that equations keep, see `kept_modes`.
+            the coordinates that equations keep, see `link_patches.on_kept_modes`.
         stiffness: (m,) of the p'.
         served: number of them, the first ones: the others are attachment modes.
     """

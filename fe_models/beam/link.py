@@ -13,22 +13,20 @@ import scipy.sparse as sp
 from ...common.arrays import Array, as_floats
 from ...common.errors import InputError
 from ...common.version import program_version
-from ...mesh.interval import graded_nodes, with_points
+from ...mesh.structured import graded_nodes, with_points
 from ..link_records import FAMILIES, BeamLink, Family
 from ..modal_body import Interface, ModalBody, PictureMesh, Stations
 from ..modal_body.attachment_modes import DEFAULT_COUNT, ascending
 from ..modal_body.damping import damping_ratio
 from ..modal_body.lumped_masses import lump_weights, lumps, with_lumped_masses, with_lumped_stiffness
 from ..modal_body.signs import canonical_signs
-from .attachment_modes import attachment_modes
+from .attachment_modes import attachment_modes, fixed_interfaces, ritz_modes
 from .beam import R_X, FamilyModel, family_model
 from .eigen import lowest_modes
-from .fixed_interfaces import fixed_interfaces, ritz_modes
 from .geometric_stiffness import geometric_stiffness
 from .invariants import shape_integrals
 from .line import Functions, lagrange
-from .section_outline import section_outlines
-from .sections import shear_modulus
+from .sections import section_outlines, shear_modulus
 from .stress import beam_stresses, segments, stress_loads
 
 # Elements are not cut closer to their ends than this fraction of their length.

@@ -1,7 +1,19 @@
 """The link file as records: what stage 1 reads, checked key by key."""
 
-from .attached import Coupling, InterfaceRecord, SurfacePatches
-from .link import FAMILIES, HOLDING_ROOT, BeamLink, Family, Link, Material, OrthotropicMaterial, SolidLink, Solver
+from .link import (
+    FAMILIES,
+    HOLDING_ROOT,
+    BeamLink,
+    Coupling,
+    Family,
+    InterfaceRecord,
+    Link,
+    Material,
+    OrthotropicMaterial,
+    SolidLink,
+    Solver,
+    SurfacePatches,
+)
 from .measured import Measured, MeasuredMode, paired, read_measured
 
 __all__ = [

@@ -22,8 +22,8 @@ from ...common.errors import InputError
 from ..link_records import FAMILIES, Family
 from .attachment_modes import COMPONENTS, ascending, uncoupled
 from .body import ModalBody
+from .invariants import LEVI_CIVITA
 from .parts import Interface
-from .tensors import LEVI_CIVITA
 
 CONDITION, ROOT = "craig-bampton", "root"
 AXES = ("x", "y", "z", "rx", "ry", "rz")

@@ -15,9 +15,8 @@ import numpy as np
 
 from ...common.arrays import Array
 from ..link_records import InterfaceRecord
-from .invariants import Invariants
+from .invariants import LEVI_CIVITA, Invariants
 from .parts import Interface
-from .tensors import LEVI_CIVITA
 from .unit_loads import PAIRS, inertia_wrenches, interface_load_names
 
 

@@ -17,10 +17,9 @@ from ..scene.load import load_scene
 from ..scene.scene import Scene
 from .axes import measure_axes
 from .figures import draw_axes, draw_work_precision
-from .machine import about_machine, content_hash, load
 from .measuring import find_analysis
 from .precision import INTEGRATORS, TIGHTER, Point, Reference, Row, find_reference, measure_points
-from .record import as_text, write_record
+from .record import about_machine, as_text, content_hash, load, write_record
 
 Swept = tuple[Reference, list[Point]]
 

@@ -1,14 +1,19 @@
-"""What was measured as files: a CSV of the rows, and a JSON of the same with machine, versions and inputs."""
+"""What was measured as files: a CSV of the rows, and a JSON of the same with machine, versions and inputs; no dates."""
 
 from __future__ import annotations
 
 import csv
+import hashlib
 import io
 import json
+import os
+import platform
 from collections.abc import Mapping, Sequence
+from importlib import import_module
 from pathlib import Path
 
 from ..common.files import write_atomically
+from ..mbs import _core
 from .errors import KINDS
 from .precision import Row
 
@@ -65,3 +70,42 @@ def _cell(value: object) -> str:
     if value is None:
         return ""
     return f"{value:.3g}" if isinstance(value, float) else str(value)
+
+
+LIBRARIES = ("ffrobot", "numpy", "scipy", "h5py")
+THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS")
+
+
+def about_machine() -> dict[str, object]:
+    """Processor, cores, operating system, compiler and flags of the core, versions, threads."""
+    return {
+        "processor": _processor(),
+        "cores": os.cpu_count(),
+        "system": platform.platform(),
+        "compiler": _core.build,
+        "versions": {"python": platform.python_version(), **{name: _version(name) for name in LIBRARIES}},
+        "threads": {name: os.environ.get(name) for name in THREADS},
+    }
+
+
+def load() -> float:
+    """Processes that want to run, mean of the last minute: beside the numbers it says how quiet the machine was."""
+    return os.getloadavg()[0]
+
+
+def content_hash(text: str) -> str:
+    """SHA-256 of a text."""
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _version(library: str) -> str:
+    return str(import_module(library).__version__)  # Debian's packages need not have metadata
+
+
+def _processor() -> str:
+    information = Path("/proc/cpuinfo")
+    if information.is_file():
+        for line in information.read_text(encoding="utf-8").splitlines():
+            if line.startswith("model name"):
+                return line.split(":", 1)[1].strip()
+    return platform.processor() or platform.machine()

@@ -10,8 +10,7 @@ import click
 
 from ..bench import OF_A_SCENE, PARTS, PEER
 from ..present.logs import FILE, logging_options, python_option
-from .options import POSITIVE
-from .protect import protect
+from .options import POSITIVE, protect
 
 
 def _texts(context: click.Context, parameter: click.Parameter, value: str | None) -> list[str] | None:

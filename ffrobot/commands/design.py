@@ -15,8 +15,7 @@ import click
 
 from ..common.errors import InputError, SolveError
 from ..present.logs import FILE, logging_options, python_option
-from .options import F, runs_options
-from .protect import protect
+from .options import F, protect, runs_options
 
 if TYPE_CHECKING:
     from ..design.finding import Finding

@@ -9,8 +9,7 @@ import click
 
 from ..common.errors import InputError
 from ..present.logs import FILE, logging_options
-from .options import POSITIVE
-from .protect import protect
+from .options import POSITIVE, protect
 
 
 @click.command(name="import")

@@ -8,7 +8,7 @@ from typing import Literal
 import click
 
 from ..present.logs import FILE, logging_options, python_option
-from .protect import protect
+from .options import protect
 
 
 @click.command()

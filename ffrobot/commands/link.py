@@ -11,8 +11,7 @@ from ..common.errors import InputError
 from ..common.files import check_new_file, write_atomically
 from ..common.parallel import is_first
 from ..present.logs import FILE, logging_options
-from .options import POSITIVE
-from .protect import protect
+from .options import POSITIVE, protect
 
 if TYPE_CHECKING:
     from ..mesh.inspection import Unit

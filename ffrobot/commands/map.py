@@ -10,7 +10,7 @@ import click
 from ..common.errors import InputError
 from ..common.parallel import processors
 from ..present.logs import FILE, logging_options, python_option
-from .protect import protect
+from .options import protect
 
 if TYPE_CHECKING:
     from ..common.arrays import Array

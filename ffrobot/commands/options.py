@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from pathlib import Path
 from typing import TypeVar
 
 import click
 
+from ..common.outputs import protected
 from ..common.parallel import processors
 from ..present.logs import FILE
 
@@ -35,3 +37,8 @@ def runs_options(folder: str, of: str = "Folder") -> Callable[[F], F]:
         return command
 
     return add
+
+
+def protect(paths: Iterable[Path]) -> None:
+    """Write to none of these files as long as the command runs."""
+    click.get_current_context().with_resource(protected(paths))

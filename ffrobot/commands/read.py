@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from ..present.logs import FILE, logging_options, python_option
-from .protect import protect
+from .options import protect
 
 
 @click.command()

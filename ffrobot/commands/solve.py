@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from ..present.logs import FILE, VERBOSE, logging_options, python_option
-from .protect import protect
+from .options import protect
 
 if TYPE_CHECKING:
     from ..present.progress import Display
@@ -55,11 +55,10 @@ def _solve(scene_file: Path, path: Path, again: str, *, resume: bool, strict: bo
     from ..present.accuracy import error_budget
     from ..present.details import print_details
     from ..present.progress import Display
-    from ..present.start_posture import chosen_posture
+    from ..present.start_postures import chosen_posture
     from ..present.summary import summary_console, summary_lines
     from ..results.file import Results
-    from ..results.resume import resume_scene
-    from ..results.stopped import how_to_go_on
+    from ..results.resume import how_to_go_on, resume_scene
     from ..results.write import write_results
     from ..run.solve import solve_scene
     from ..scene.plausibility import remarks_on_file
@@ -107,7 +106,7 @@ def _solve(scene_file: Path, path: Path, again: str, *, resume: bool, strict: bo
 def _check_ended(solution: Solution, display: Display, scene_file: Path, again: str) -> None:
     """Raise `SolveError` where an analysis ended early, `StoppedError` where a signal has asked for an end."""
     from ..common.errors import SolveError, StoppedError
-    from ..results.stopped import how_to_go_on, left_out
+    from ..results.resume import how_to_go_on, left_out
 
     go_on = how_to_go_on(solution, again)
     try:

@@ -8,8 +8,7 @@ import click
 
 from ..common.parallel import is_first, on_first
 from ..present.logs import FILE, logging_options, python_option
-from .options import runs_options
-from .protect import protect
+from .options import protect, runs_options
 
 MOST = 100_000  # runs
 

@@ -18,7 +18,7 @@ from ..common.toml_files import load_toml
 from ..common.version import program_version
 from ..pictures.studies.diagrams import Diagram, Numbers
 from ..pictures.studies.study import Study, StudyName, StudyTable, write_study
-from ..present.tables import print_table
+from ..present.lines import print_table
 
 
 class Section(NamedTuple):

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 from ..actuation.catalog import CatalogMotor, choice_of
 from ..common.errors import InputError
+from ..present.motor_choice import joint_tasks
 from ..results.file import Results
-from ..results.motor_tasks import joint_tasks
 from ..sweep.files import value_of
 from .readings import Goal, Reading
 from .variables import Variable

@@ -1,4 +1,4 @@
-"""How keys are spread: `KEY=±2%`, `KEY=±0.1`, `KEY=uniform:LO:HI`, `KEY=normal:SIGMA`, `KEY=normal:2%`."""
+"""How keys are spread (`KEY=±2%`, `KEY=uniform:LO:HI`, …), and statistics of what is linear in them."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ from ..common.tables import shown
 from ..sweep.files import number_at
 from ..sweep.sweep import Key
 from .designs import parse_key
+from .statistics import LEVELS, Statistics
 
 WIDE = 2.0  # standard deviations of a normal key within which scenes have to make sense
 
@@ -107,3 +108,56 @@ def _wrong(text: str) -> InputError:
         "--spread: expected KEY=±2%, KEY=±0.1, KEY=uniform:LOW:HIGH, KEY=normal:SIGMA or KEY=normal:2%, with positive"
         f' spreads, found "{shown(text)}"'
     )
+
+
+DRAWS = 4096  # of the model, for quantiles: no runs
+
+
+@dataclass(frozen=True)
+class LinearModel:
+    """f = f₀ + Σ d_k δ_k + ½ Σ c_k δ_k² with δ_k in standard deviations of key k.
+
+    `middle` (…), `slopes` (k, …) and `curvatures` (k, …); the last are for errors alone.
+    """
+
+    spreads: tuple[Spread, ...]
+    middle: Array
+    slopes: Array
+    curvatures: Array
+
+    @staticmethod
+    def through(spreads: Sequence[Spread], middle: Array, sides: Array) -> LinearModel:
+        """By values `sides` (k, 2, …) one standard deviation above and below the middle."""
+        above, below = sides[:, 0], sides[:, 1]
+        return LinearModel(tuple(spreads), middle, 0.5 * (above - below), above - 2.0 * middle + below)
+
+    @property
+    def shares(self) -> Array:
+        """(…, k) of the variance."""
+        squares = self.slopes**2
+        whole = squares.sum(axis=0)
+        return as_floats(np.divide(squares, whole, out=np.zeros_like(squares), where=whole > 0.0).T)
+
+    def statistics(self) -> Statistics:
+        """Of the linear part; errors are the differences that the curvatures make.
+
+        The worst case has every key at the end of its spread that makes it worst, a normal one two deviations off.
+        """
+        from scipy.stats.qmc import LatinHypercube
+
+        u = LatinHypercube(len(self.spreads), seed=0).random(DRAWS)
+        delta = np.column_stack(
+            [(one.values(u[:, k]) - one.mean) / one.deviation for k, one in enumerate(self.spreads)]
+        )
+        linear = self.middle + np.tensordot(delta, self.slopes, 1)
+        bent = linear + 0.5 * np.tensordot(delta**2, self.curvatures, 1)
+        quantiles = np.quantile(linear, LEVELS, axis=0)
+        deviation = np.sqrt((self.slopes**2).sum(axis=0))
+        ends = np.array([(one.ends[1] - one.mean) / one.deviation for one in self.spreads])
+        reach = np.tensordot(ends, np.abs(self.slopes), 1)
+        return Statistics(
+            self.middle, as_floats(np.abs(bent.mean(axis=0) - linear.mean(axis=0))),
+            as_floats(deviation), as_floats(np.abs(bent.std(axis=0) - linear.std(axis=0))),
+            as_floats(quantiles), as_floats(np.abs(np.quantile(bent, LEVELS, axis=0) - quantiles)),
+            as_floats(self.middle - reach), as_floats(self.middle + reach),
+        )  # fmt: skip

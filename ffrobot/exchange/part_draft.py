@@ -13,7 +13,7 @@ from ..common.arrays import Array, as_list
 from ..common.errors import InputError
 from ..mesh.checks import METRES
 from ..mesh.inspection import Inspection, PartFace
-from .urdf.toml import toml_text
+from .urdf.names import toml_text
 
 ALUMINIUM = {"youngs_modulus": 70e9, "poissons_ratio": 0.33, "density": 2700.0}
 AT_END = 1e-3  # of the length: how far a plane end is from the end of the bounding box

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from rich.console import Console
 
-from ..present.tables import plain_table
+from ..present.lines import plain_table
 from .export import Exported
 from .urdf.import_urdf import Imported
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 from rich.console import Console
 
-from ..present.tables import plain_table
+from ..present.lines import plain_table
 from .least_squares import Fit
 
 FEW = 30  # degrees of freedom below which two standard deviations are less than a range of 95 %

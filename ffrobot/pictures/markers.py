@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..common.arrays import Array
-from ..common.plane import in_3d
+from ..common.rotations import in_3d
 from ..mbs.fields.field_types import GROUND
 from .motion import MovingBody, section_axes
 from .path_targets import Target

@@ -14,8 +14,7 @@ from typing import Any
 import numpy as np
 
 from ..common.arrays import Array, Indices
-from ..common.plane import in_3d
-from ..common.rotations import of_quaternion
+from ..common.rotations import in_3d, of_quaternion
 from ..mbs.scene.topology import Edge, Topology, spanning_forest
 from ..results.file import Results
 from ..results.joints import joint_type

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..common.arrays import Array
-from ..mbs.joints.transmission import MotorLimits
+from ..mbs.joints.joint import MotorLimits
 from ..results.file import Results
 from ..results.joints import joint_coordinates
 

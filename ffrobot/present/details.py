@@ -2,25 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from ..mbs.analysis.inverted_path import AroundPath, describe_zeros, is_minimum_phase
-from ..mbs.analysis.motors_only import path_errors
+from ..actuation.patches.patches import PatchArray
+from ..actuation.patches.voltages import Voltages
+from ..common.arrays import Array
+from ..mbs.analysis.motors_only import AroundPath, describe_zeros, is_minimum_phase, path_errors
 from ..mbs.analysis.outcome import Details, Outcome
+from ..mbs.model.body import Body
+from ..mbs.model.truncation import modes_kept
+from ..mbs.quantities.stress import BodyStress
 from ..results.verdict import Verdict
+from ..run.mode_search import ModeChoice
 from ..run.solution import AnalysisResult, Solution
+from ..scene.pieces import BodyInPieces
 from .accuracy import error_budget, integrated
 from .control import control_lines, control_tables
-from .lines import alike, integrator_lines, warning_lines
-from .modes import chosen_modes, pieces_in_words
-from .stresses import stress_table
-from .tables import plain_table
-from .voltages import voltage_table
+from .lines import alike, integrator_lines, plain_table, warning_lines
 
 
 def print_details(
@@ -135,3 +138,58 @@ def _end(result: AnalysisResult) -> str:
     run = result.run
     ended_early = run.status != "completed"
     return f"{run.time_reached:g} of {run.analysis.last_time:g}" if ended_early else f"{run.time[-1]:g}"
+
+
+def voltage_table(found: Iterable[tuple[str, str, PatchArray, Voltages]]) -> Table:
+    """Of analyses and layouts, by name, with their patches."""
+    table = plain_table("voltages of", "on", "largest (V)", "limit (V)", "required /\nlimit", "condition\nnumber")
+    for analysis, layout, patches, values in found:
+        limit = patches.limit.min()
+        table.add_row(
+            analysis,
+            layout,
+            f"{values.largest:.0f}" if values.largest >= 1e3 else f"{values.largest:.3g}",
+            "none" if limit == np.inf else f"{limit:g}",
+            "" if limit == np.inf else f"{np.abs(values.required / patches.limit).max():.3g}",
+            f"{patches.condition_number:.3g}",
+        )
+    return table
+
+
+def stress_table(analyses: Iterable[tuple[str, Array, Mapping[str, BodyStress]]]) -> Table:
+    """Of each analysis its name, times (T,) in s, and stresses by body."""
+    table = plain_table("stress in", "of", "largest von Mises (MPa)", "at", "t (s)", "by")
+    for name, time, stresses in analyses:
+        for body, stress in stresses.items():
+            value, k, place = stress.largest()
+            table.add_row(name, body, f"{value / 1e6:.4g}", place, f"{time[k]:g}", stress.recovery.method)
+    return table
+
+
+def chosen_modes(bodies: Sequence[Body], choice: ModeChoice) -> str:
+    """How many modes were enough, and what leaving out the others costs and saves."""
+    kept = [f"{body.name}: {modes_kept(body)}" for body in bodies if body.n_modes]
+    lines = ["; ".join(kept)]
+    for name, errors in choice.errors.items():
+        if any(errors.values()):
+            found = ", ".join(f"{kind} {error:.0e}" for kind, error in errors.items() if error)
+            lines.append(f"{name}: error of leaving out the others, estimated: {found}")
+        else:
+            lines.append(
+                f"{name}: with fewer ({choice.tried[-2]}) results differ by {max(choice.before[name].values()):.0e}"
+            )
+    tried = ", ".join(map(str, choice.tried))
+    fewer = {body.name: body.reduction.lowest for body in bodies if body.reduction is not None}
+    if fewer:
+        keys = ", ".join(f"modes = {lowest} for {name}" for name, lowest in fewer.items())
+        lines.append(f"the same without search: {keys}")
+    lines.append(
+        f"solved with {tried} modal coordinates, {choice.seconds:.2f} s before the last; the highest frequency is"
+        f" {choice.highest[0]:.3g} of {choice.highest[1]:.3g} rad/s"
+    )
+    return "\n".join(lines)
+
+
+def pieces_in_words(divided: Mapping[str, BodyInPieces]) -> str:
+    """How many of each link."""
+    return ", ".join(f"{name}: {len(body.names)}" for name, body in divided.items())

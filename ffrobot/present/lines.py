@@ -1,8 +1,11 @@
-"""Lines of summaries."""
+"""Lines of summaries, and tables of text on a terminal."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+
+from rich.console import Console
+from rich.table import Table
 
 from ..mbs.quantities.validity import Bending, deflection_warning, largest
 from ..mbs.solve.integrators import Choice
@@ -40,3 +43,23 @@ def deflection_in_words(bending: Iterable[Mapping[str, Bending]]) -> str:
 def integrator_lines(choices: Mapping[str, Choice]) -> Iterator[str]:
     """By analysis: which integrators the program has chosen, and why."""
     return alike((name, f"{one.in_words}; {one.reason}") for name, one in choices.items() if one.is_automatic)
+
+
+def plain_table(*headers: str) -> Table:
+    """Columns of text without lines: the first ones left, numbers right; names fold where they must."""
+    table = Table(box=None, padding=(0, 2, 0, 0), pad_edge=False)
+    for k, header in enumerate(headers):
+        if k < 2 or header == "integrator":
+            table.add_column(header, overflow="fold")
+        else:
+            table.add_column(header, justify="right", no_wrap=True)
+    return table
+
+
+def print_table(console: Console, headers: Iterable[str], rows: Iterable[Iterable[str]]) -> None:
+    """Print `rows` below their headers, and an empty line."""
+    table = plain_table(*headers)
+    for row in rows:
+        table.add_row(*row)
+    console.print(table, highlight=False)
+    console.print()

@@ -8,7 +8,7 @@ from rich.console import Console
 
 from ..common.arrays import Array
 from ..mesh.inspection import Inspection
-from .tables import plain_table
+from .lines import plain_table
 
 LISTED = 30
 

@@ -9,7 +9,7 @@ from rich.console import Console
 
 from ..map.pose_map import STATUS, PoseMap
 from ..map.quantities import quantities
-from .tables import print_table
+from .lines import print_table
 
 
 def print_map(found: PoseMap, console: Console) -> None:

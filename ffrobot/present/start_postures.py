@@ -12,12 +12,14 @@ from ..common.arrays import Array
 from ..common.rotations import rpy_of
 from ..mbs.model.model import Model
 from ..mbs.scene.space import SPACES
-from ..mbs.solve.branch_names import in_words
+from ..mbs.solve.branch_names import branch_names, in_words
 from ..mbs.solve.branches import start_postures
+from ..mbs.solve.start import undeformed_posture
 from ..mbs.solve.workspace import within_limits
+from ..results.file import Results
 from ..run.solve import prepare_scene
 from ..run.watcher import Watcher
-from .tables import print_table
+from .lines import print_table
 
 
 def print_start(path: Path, watcher: Watcher, console: Console) -> None:
@@ -68,3 +70,31 @@ def _points(model: Model, q: Array) -> Iterator[tuple[str, str, str]]:
         angles = rpy_of(pose.F[0])[2:] if space.is_plane else rpy_of(pose.F[0])
         turned = ", ".join(_in(angle, "rad") for angle in angles) if point in tools else ""
         yield point, ", ".join(f"{round(x, 9) + 0.0:.5g}" for x in space.along(pose.r[0])), turned
+
+
+UNITS = {"revolute": ("°", 180 / np.pi), "prismatic": (" m", 1.0)}
+
+
+def chosen_posture(results: Results, model: Model) -> str:
+    """Joints and branch at the start of a run, where a point follows a path and nothing says which posture; else ""."""
+    scene = results.scene
+    initial = scene.get("initial", {})
+    named = any(initial.get(key) for key in ("angles", "joints", "branch"))
+    if named or not any("point" in one for one in scene.get("trajectory", ())):
+        return ""
+    for analysis in results.analyses:
+        found = [
+            f"{joint['name']} {round(results[name].ravel()[0] * factor, 6) + 0.0:.4g}{unit}"
+            for joint in scene.get("joint", ())
+            if results.has(name := f"{analysis}/joints/{joint['name']}/coordinate") and len(results[name])
+            for unit, factor in [UNITS.get(joint["type"], (None, 1.0))]
+            if unit is not None
+        ]
+        if found:
+            branch = branch_names(model, undeformed_posture(model).q)
+            as_line = f" ({in_words(branch)})" if branch else ""
+            return (
+                f"no guess in [initial]: {analysis} starts at {', '.join(found)}{as_line}, found from zeros; where"
+                " another posture reaches the path as well (elbow up or down), [initial] chooses"
+            )
+    return ""

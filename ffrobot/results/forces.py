@@ -7,8 +7,7 @@ from typing import Any
 import h5py
 import numpy as np
 
-from ..mbs.analysis.inverted_path import AroundPath, is_minimum_phase
-from ..mbs.analysis.motors_only import path_errors
+from ..mbs.analysis.motors_only import AroundPath, is_minimum_phase, path_errors
 from ..mbs.analysis.tracking import TrackedPath
 from ..mbs.quantities.motion import RobotMotion
 from ..mbs.scene.trajectories import Trajectory

@@ -8,9 +8,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..common.arrays import Array
-from ..mbs.joints.joint import JointRecord
+from ..mbs.joints.joint import JointRecord, MotorLimits
 from ..mbs.joints.joints import JOINT_TYPES
-from ..mbs.joints.transmission import MotorLimits
 
 Scene = Mapping[str, Any]
 """A scene file as TOML has it."""

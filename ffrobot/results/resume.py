@@ -6,22 +6,297 @@ that can be done (`is_resumable`) go on from there, or are taken over where they
 
 from __future__ import annotations
 
+import json
+import os
+import tomllib
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import h5py
+import numpy as np
 
+from ..common.arrays import Array, as_list
+from ..common.errors import InputError
 from ..common.hdf5 import blaming
+from ..common.python_files import allowed_python, imported_files
+from ..common.tables import key_path
+from ..common.version import program_version
+from ..mbs import _core
+from ..mbs.analysis.outcome import (
+    METHOD_HISTORY,
+    SAMPLED,
+    STEPS,
+    TREE_MEMORY,
+    TREE_VECTORS,
+    Continuation,
+    EarlierRun,
+    Motion,
+    Outcome,
+    Statistics,
+)
+from ..mbs.scene.analysis import Analysis, IntegratedAnalysis
+from ..mbs.solve.integrators import METHODS, Choice
+from ..run.inputs import digest_of_file, named_files, python_files
+from ..run.loaded_body import LoadedBody
 from ..run.prepare import with_stiffening
 from ..run.refinement import goes_on
 from ..run.solution import Solution
 from ..run.solve import Keep, prepare_scene, run_analyses
 from ..run.watcher import Watcher
 from ..scene.scene import Scene
-from .earlier_runs import earlier_runs, write_earlier_run
 from .file import Results
-from .same_input import check_same_input, write_input_files
-from .stopped import GROUP, analyses, is_kept
+
+GROUP = "resume"  # in the group of an analysis
+STOPPED = ("interrupted", "too many steps", "not evaluated")
+
+
+def how_to_go_on(solution: Solution, command: str) -> str:
+    """What a message about a run that was stopped adds; empty where it cannot be gone on with."""
+    outcome = stopped(solution)
+    if outcome is None:
+        return "".join(f'; {command} resumes with "{name}"' for name in left_out(solution)[:1])
+    if goes_on(solution, outcome):
+        return f"; {command} resumes from t = {outcome.time_reached:.9g} s"
+    return f'; {command} runs "{outcome.analysis.name}" again from its start'
+
+
+def left_out(solution: Solution) -> list[str]:
+    """Analyses that were not begun when the run was stopped, or ended by an error."""
+    if any(outcome.failed and outcome.status not in STOPPED for outcome in solution.outcomes.values()):
+        return []
+    return [name for name in analyses(solution) if name not in solution.outcomes]
+
+
+def is_kept(solution: Solution) -> bool:
+    """Whether there is something to go on with."""
+    return stopped(solution) is not None or bool(left_out(solution))
+
+
+def stopped(solution: Solution) -> Outcome | None:
+    """The analysis that was stopped."""
+    return next((outcome for outcome in solution.outcomes.values() if outcome.status in STOPPED), None)
+
+
+def analyses(solution: Solution) -> list[str]:
+    """Names of all that the scene asks for."""
+    return [analysis.name for analysis in solution.scene.analysis]
+
+
+def row_of_numbers(file: Results, name: str) -> Array:
+    """A dataset (k,) of what was kept. Raises `InputError` where it is something else."""
+    values = file[name]
+    if values.ndim != 1:
+        raise InputError(f"{file.path}: {name}: expected a row of numbers, found an array of shape {values.shape}")
+    return values
+
+
+MAY_CHANGE = "max_steps"  # counts from where a run goes on
+
+
+def check_same_input(scene: Scene, bodies: Mapping[str, LoadedBody], file: Results) -> None:
+    """Raise `InputError` naming the first thing that is not as it was."""
+    found = next(_changes(scene, bodies, file), None)
+    if found is not None:
+        raise InputError(
+            f"{file.path}: resume: expected results of the same input, found that {found} has changed; solve it from"
+            " the start, or undo the change"
+        )
+
+
+def _changes(scene: Scene, bodies: Mapping[str, LoadedBody], file: Results) -> Iterator[str]:
+    """What of the input is not that of the results file."""
+    if file.ffrobot_version != program_version():
+        yield f"ffrobot {file.ffrobot_version}, now {program_version()},"
+    then, now = _without_limits(file.scene), _without_limits(tomllib.loads(scene.text))
+    loc = _first_difference(then, now)
+    if loc is not None:
+        yield f"the scene ({key_path(loc, now)})"
+    for name, body in bodies.items():
+        if body.path is not None and body.file_hash != file.modal_files[name].sha256:
+            yield f'the modal body of "{name}"'
+    files = json.loads(file.attributes("/").get("input_files", "{}"))
+    for name, digest in input_files(scene).items():
+        if files.get(name) != digest:
+            yield name
+    for name, digest in json.loads(file.attributes("/").get("imported_files", "{}")).items():
+        if digest_of_file(scene.path.parent / name) != digest:
+            yield f"the file {name}, which a Python file imports,"
+
+
+def _without_limits(scene: Mapping[str, Any]) -> dict[str, Any]:
+    analyses = [{key: value for key, value in a.items() if key != MAY_CHANGE} for a in scene["analysis"]]
+    return {**scene, "analysis": analyses}
+
+
+def _first_difference(then: object, now: object, loc: tuple[int | str, ...] = ()) -> tuple[int | str, ...] | None:
+    """Where two values of TOML differ first; None where they are equal."""
+    if then == now:
+        return None
+    if isinstance(then, dict) and isinstance(now, dict):
+        inner = ((key, then.get(key), now.get(key)) for key in now | then)
+    elif isinstance(then, list) and isinstance(now, list) and len(then) == len(now):
+        inner = ((k, *pair) for k, pair in enumerate(zip(then, now, strict=True)))
+    else:
+        return loc
+    found = (_first_difference(old, new, (*loc, key)) for key, old, new in inner)
+    return next((place for place in found if place is not None), loc)
+
+
+def write_input_files(file: h5py.File, scene: Scene) -> None:
+    """Attributes `input_files`, and `imported_files` where the scene runs Python files: names from its folder on."""
+    file.attrs["input_files"] = json.dumps(input_files(scene))
+    folder = scene.path.parent
+    if python := python_files(tomllib.loads(scene.text), folder):
+        found = imported_files(folder, *(file.parent for file in python), *allowed_python())
+        names = {os.path.relpath(file, folder.resolve()): digest for file, digest in found.items()}
+        file.attrs["imported_files"] = json.dumps(names)
+
+
+def input_files(scene: Scene) -> dict[str, str]:
+    """SHA-256 of the files that a scene names besides links and modal bodies, by what messages call them."""
+    tables, folder = tomllib.loads(scene.text), scene.path.parent
+    waypoints = {entry["waypoints"] for entry in tables.get("trajectory", []) if "waypoints" in entry}
+    calls = {folder / name: f"the waypoints {name}" for name in waypoints}
+    besides = {key: value for key, value in tables.items() if key != "body"}
+    return {calls.get(file, f"the file {file.name}"): digest_of_file(file) for file in named_files(besides, folder)}
+
+
+ROWS = ("q", "v", "a", "multipliers")
+COUNTS = ("steps", "rejected", "evaluations", "wall_seconds")
+OF_PLANE = ("lambda_", "checkpoint/peaks")
+"""What earlier versions kept of runs of planar scenes, in coordinates of the plane, 0.1 in absolute ones."""
+
+
+def write_earlier_run(group: h5py.Group, outcome: Outcome) -> None:
+    """What the next step of a run depends on, and its numbers that results files do not hold anyway."""
+    assert outcome.continuation is not None
+    for name in ROWS:
+        group[name] = getattr(outcome, name)
+    _write_checkpoint(group, outcome.continuation.checkpoint)
+    if (samples := outcome.continuation.samples) is not None:
+        group["samples/times"] = samples.times
+        group["samples/states"] = samples.states
+        group["samples"].attrs.update({key: getattr(samples, key) for key in SAMPLED})
+    if (recording := outcome.continuation.recording) is not None:
+        group["recording/times"] = recording.times
+        group["recording/states"] = recording.states
+        names = {kind: name for name, kind in METHODS.items()}
+        group["recording"].attrs["methods"] = json.dumps([(first, names[kind]) for first, kind in recording.methods])
+
+
+def _write_checkpoint(group: h5py.Group, checkpoint: _core.TreeCheckpoint) -> None:
+    """Add "checkpoint" to what is kept of an analysis."""
+    for name in TREE_VECTORS:
+        group[f"checkpoint/{name}"] = getattr(checkpoint, name)
+    about = {name: getattr(checkpoint, name) for name in ("time", "outputs", *TREE_MEMORY)}
+    about |= {name: getattr(checkpoint.steps, name) for name in STEPS}
+    about |= {name: getattr(checkpoint.methods, name) for name in METHOD_HISTORY}
+    group["checkpoint"].attrs.update(about)
+
+
+def earlier_runs(file: Results, analyses: Iterable[Analysis]) -> dict[str, EarlierRun]:
+    """Of those `analyses` of which something was kept, by name.
+
+    A run that was stopped before its first step begins anew: what acts on it may not have been known yet.
+    """
+    return {one.name: _earlier_run(file, one) for one in analyses if _can_go_on(file, one.name)}
+
+
+def _can_go_on(file: Results, name: str) -> bool:
+    if not file.has(f"{name}/{GROUP}"):
+        return False
+    about = file.attributes(name)
+    return bool(about["steps"] > 0 or about["status"] == "completed")
+
+
+def _earlier_run(file: Results, analysis: Analysis) -> EarlierRun:
+    """The run of `analysis` as far as it got. Raises `InputError` where something is missing or damaged."""
+    name, about, group = analysis.name, file.attributes(analysis.name), f"{analysis.name}/{GROUP}"
+
+    if any(file.has(f"{group}/{kept}") for kept in OF_PLANE):
+        raise InputError(
+            f"{file.path}: {group}: expected a run in the coordinates of this version, found one that an earlier"
+            " version of ffrobot has stopped: solve again without --resume"
+        )
+
+    def dataset(row: str) -> Array:
+        if not file.has(f"{group}/{row}"):
+            raise InputError(f"{file.path}: {group}/{row}: expected a dataset, found none")
+        return file[f"{group}/{row}"]
+
+    q, v, a, multipliers = (dataset(row) for row in ROWS)
+    counts = {count: about[count].item() for count in COUNTS if count != "rejected" or count in about}
+    ends = row_of_numbers(file, f"{name}/step_ends") if file.has(f"{name}/step_ends") else np.zeros(0)
+    return EarlierRun(
+        Motion(file.time(name), q, v, a, multipliers),
+        Statistics(about["status"], Choice(about["integrator"], about["integrator_reason"]), **counts, step_ends=ends),
+        _continuation(file, analysis),
+        f"{file.path}: {group}",
+    )
+
+
+def _continuation(file: Results, analysis: Analysis) -> Continuation:
+    about, group = file.attributes(analysis.name), f"{analysis.name}/{GROUP}"
+    expected = len(file.time(analysis.name))
+    checkpoint = _read_checkpoint(file, f"{group}/checkpoint")
+    if checkpoint.outputs != expected or about["status"] not in (*STOPPED, "completed"):
+        raise InputError(
+            f"{file.path}: {group}: expected as many outputs as times, {expected}, found {checkpoint.outputs}"
+        )
+    samples = _samples(file, f"{group}/samples")
+    if not file.has(f"{group}/recording"):
+        return Continuation(checkpoint, samples=samples)
+    assert isinstance(analysis, IntegratedAnalysis)
+    times, states = (row_of_numbers(file, f"{group}/recording/{key}") for key in ("times", "states"))
+    methods = _methods(file, f"{group}/recording")
+    recording = _core.Recording(times, states, methods, analysis.spectral_radius, analysis.tolerance)
+    return Continuation(checkpoint, recording, samples)
+
+
+def _read_checkpoint(file: Results, group: str) -> _core.TreeCheckpoint:
+    """That of a group. Raises `InputError` where it lacks something."""
+    about = file.attributes(group)
+    try:
+        memory: dict[str, Any] = {name: about[name].item() for name in TREE_MEMORY}
+        memory |= {name: row_of_numbers(file, f"{group}/{name}") for name in TREE_VECTORS}
+        found: _core.TreeCheckpoint = _core.TreeCheckpoint(
+            time=float(about["time"]),
+            outputs=int(about["outputs"]),
+            steps=_core.StepHistory(**{name: about[name].item() for name in STEPS if name in about}),
+            methods=_core.MethodHistory(**{name: about[name].item() for name in METHOD_HISTORY}),
+            **memory,
+        )
+        return found
+    except (TypeError, ValueError, KeyError, AttributeError) as error:
+        raise InputError(f"{file.path}: {group}: expected where the run has stopped, found {error}") from None
+
+
+def _samples(file: Results, group: str) -> _core.Samples | None:
+    """States between outputs; None in files of earlier versions."""
+    if not file.has(group):
+        return None
+    about = file.attributes(group)
+    times, states = (row_of_numbers(file, f"{group}/{key}") for key in ("times", "states"))
+    try:
+        numbers = {key: about[key].item() for key in SAMPLED}
+        return _core.Samples(times=as_list(times), states=as_list(states), **numbers)
+    except (TypeError, ValueError, AttributeError) as error:
+        raise InputError(f"{file.path}: {group}: expected states between outputs, found {error}") from None
+
+
+def _methods(file: Results, group: str) -> list[tuple[int, _core.MethodKind]]:
+    """The first step of each integrator of a recording, and its kind."""
+    text = file.attributes(group).get("methods", "")
+    try:
+        methods = [(int(first), METHODS[name]) for first, name in json.loads(text)]
+    except (TypeError, ValueError, KeyError):
+        methods = []
+    firsts = [first for first, _ in methods]
+    if firsts[:1] != [0] or firsts != sorted(firsts):
+        raise InputError(f"{file.path}: {group}: methods: expected integrators from step 0 on, found {text!r}")
+    return methods
 
 
 def resume_scene(scene: Scene | Path, results: Path, watcher: Watcher, keep: Keep | None = None) -> Solution | None:

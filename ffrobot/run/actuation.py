@@ -9,8 +9,7 @@ import numpy as np
 
 from ..actuation.feasibility import Feasibility
 from ..actuation.judgement import judge_actuators, links_in_motion
-from ..actuation.patches.kept_modes import on_kept_modes
-from ..actuation.patches.link_patches import LinkPatches, by_body, check_reach, link_patches
+from ..actuation.patches.link_patches import LinkPatches, by_body, check_reach, link_patches, on_kept_modes
 from ..actuation.patches.voltages import Voltages
 from ..actuation.points import PointSet, make_point_set
 from ..common.arrays import Array

@@ -15,8 +15,7 @@ from ..common.errors import InputError, of_file
 from ..fe_models.link_records import FAMILIES
 from ..fe_models.modal_body_file import read_modal_body
 from ..mbs.model.body import from_modal_body, rigid_body
-from ..mbs.model.masses import with_payload
-from ..mbs.model.payloads import turns_as_a_body
+from ..mbs.model.masses import turns_as_a_body, with_payload
 from ..mbs.model.projection import projected
 from ..mbs.model.tools import with_tool
 from ..mbs.scene.bodies import BodyKeys, tensor

@@ -20,13 +20,13 @@ from ..mbs.analysis.outcome import Outcome
 from ..mbs.analysis.replay import replay_times, supplied
 from ..mbs.analysis.tracking import Tracking, least_voltage
 from ..mbs.model.drives import Drives, Replayed
+from ..mbs.model.known_motion import State
 from ..mbs.model.model import Model, without_paths
 from ..mbs.quantities.motion import RobotMotion
 from ..mbs.scene.analysis import TimedAnalysis
 from ..mbs.scene.bodies import BodyKeys
 from ..mbs.solve.redundancy import resolved
 from ..mbs.solve.start import undeformed_posture
-from ..mbs.solve.state import State
 from ..mbs.solve.statics import static_equilibrium
 from ..scene.scene import Scene
 from .solution import FinerCheck, Solution

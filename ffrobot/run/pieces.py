@@ -7,26 +7,26 @@ modal coordinates are those whose shape is nearest to the link's; its points are
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 
 import numpy as np
 
 from ..common.arrays import Array, as_floats
+from ..common.errors import InputError
 from ..common.rotations import exponential, left_jacobian, logarithm, of_quaternion, quaternions
 from ..fe_models.link_records import HOLDING_ROOT
 from ..fe_models.modal_body import ModalBody
 from ..mbs.model.body import BodyPoint
 from ..mbs.model.divided_link import spread_of
 from ..mbs.model.motors import MotorForces
+from ..mbs.quantities.attachment_error import PieceInMotion, missed_by_pieces
 from ..mbs.quantities.body_motion import BodyMotion, PointMotion
 from ..mbs.quantities.motion import RobotMotion, continuous
-from ..mbs.quantities.pieces_error import PieceInMotion, missed_by_pieces
 from ..mbs.quantities.second_order import IN_MOTION, Missing, largest_displacement
 from ..mbs.quantities.validity import ENOUGH, Bending, enough_pieces, link_bending, shape_from_chord
 from ..scene.pieces import BodyInPieces, bodies_in_pieces
-from .bent_links import shared_in_motion, with_advice, worst_of_pieces
 from .solution import Solution
 
 MOST = 64
@@ -264,3 +264,44 @@ def _nearest_shape(modal: ModalBody, u: Array) -> Array:
     stations = modal.stations
     rows = np.concatenate([stations.translation, modal.length * stations.rotation[:, :1]], axis=1)
     return as_floats(np.linalg.lstsq(rows.reshape(-1, modal.mode_count), u.reshape(-1, u.shape[2]), rcond=None)[0].T)
+
+
+def worst_of_pieces(bending: Mapping[str, Bending], divided: Mapping[str, BodyInPieces]) -> dict[str, Bending]:
+    """How far links bend, each divided one as its piece whose results are worst."""
+    link_of = {piece: name for name, body in divided.items() for piece in body.names}
+    worst: dict[str, Bending] = {}
+    for piece, found in bending.items():
+        name = link_of.get(piece, piece)
+        if name not in worst or found.position_error > worst[name].position_error:
+            worst[name] = found
+    return {
+        name: replace(found, pieces=len(divided[name].names)) if name in divided else found
+        for name, found in worst.items()
+    }
+
+
+def shared_in_motion(bending: Mapping[str, Bending]) -> dict[str, Bending]:
+    """How far links bend, none with smaller errors than the worst: what one does wrong moves and loads all others."""
+    missing = [of.missing for of in bending.values()] or [Missing(0.0, 0.0)]
+    worst = Missing(*(max(errors) for errors in zip(*missing, strict=True)))
+    return {name: replace(of, missing=of.missing.grown_to(worst)) for name, of in bending.items()}
+
+
+def with_advice(
+    bending: Mapping[str, Bending], divided: Callable[[Mapping[str, int]], Mapping[str, BodyInPieces]]
+) -> dict[str, Bending]:
+    """How far links bend, those beyond small deformations with whether the scene lets them be divided.
+
+    `divided` cuts bodies into so many pieces, and raises `InputError` where the scene does not let it.
+    """
+
+    def is_divisible(name: str) -> bool:
+        try:
+            return bool(divided({name: 2}))
+        except InputError:
+            return False
+
+    return {
+        name: replace(found, is_divisible=is_divisible(name)) if found.is_beyond else found
+        for name, found in bending.items()
+    }

@@ -18,9 +18,8 @@ from ..common.arrays import Array
 from ..common.errors import FfrobotError, InputError, SolveError, of_file
 from ..mbs.analysis.operating_points import InstantAnalysis, open_loop_growth
 from ..mbs.analysis.outcome import Outcome
-from ..mbs.quantities.energy import totals
 from ..mbs.quantities.motion import RobotMotion
-from ..mbs.quantities.reactions import reactions
+from ..mbs.quantities.reactions import reactions, totals
 from ..mbs.quantities.sharing import shared_evenly
 from ..mbs.quantities.validity import NOTABLE_STIFFNESS_CHANGE
 from ..mbs.scene.analysis import Analysis
@@ -29,10 +28,10 @@ from ..scene.load import load_scene
 from ..scene.scene import Scene
 from .actuation import find_actuation, missing_forces
 from .bodies import load_bodies
+from .fastest import with_paths
 from .finer import with_finer_check
 from .mode_choice import mode_levels, reported_modes
 from .mode_search import ModeSearch, error_tolerances
-from .paths import with_paths
 from .pieces import MotionOfLinks, bending_of_links, divided_links, wanted_pieces
 from .prepare import (
     made_solution,

@@ -11,9 +11,8 @@ import numpy as np
 from ..common.arrays import Array
 from ..common.errors import InputError, did_you_mean, quoted
 from ..mbs._core import TimeFunction
-from ..mbs.fields.derivatives import check_derivatives
 from ..mbs.fields.field_types import GROUND
-from ..mbs.fields.functions import check_domain
+from ..mbs.fields.functions import check_derivatives, check_domain
 from ..mbs.fields.orientations import OrientationLaw
 from ..mbs.joints.joint import JointRecord
 from ..mbs.scene.analysis import Surroundings

@@ -13,7 +13,6 @@ from ..common.validation import plain, validate
 from ..fe_models.link_file import LinkTable, read_link
 from ..mbs.fields.spelling import PLANAR, SPATIAL
 from ..mbs.scene.planar_spelling import in_3d
-from .actuation_times import with_times_of_actuation
 from .checks import check_functions, problems
 from .scene import Scene, SceneKeys
 
@@ -99,3 +98,17 @@ def _unavailable_keys(data: dict[str, object]) -> Iterator[str]:
             for key, instead in keys.items():
                 if isinstance(entry, dict) and key in entry:
                     yield f'{table}: {key}: expected no such key in space = "spatial", found it: {instead}'
+
+
+def with_times_of_actuation(data: dict[str, Any]) -> dict[str, Any]:
+    """`data` with the `end` and `output_step` of forward analyses taken from their actuation where not given."""
+    try:
+        sources = {analysis["name"]: analysis for analysis in data["analysis"]}
+        analyses = []
+        for analysis in data["analysis"]:
+            source = sources.get(analysis.get("actuation"), {})
+            times = {key: source[key] for key in ("end", "output_step") if key in source}
+            analyses.append(times | analysis)
+    except (KeyError, TypeError, AttributeError):
+        return data  # malformed: validation says how
+    return data | {"analysis": analyses}

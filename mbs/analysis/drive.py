@@ -14,6 +14,7 @@ from .. import _core
 from .._core import TimeFunction
 from ..fields.waypoints import spline
 from ..model.drives import NO_DRIVES, Command, Drives, PointDrive, Replayed
+from ..model.known_motion import State
 from ..model.model import Model
 from ..model.motors import integrated_mechanism
 from ..model.system import MultibodySystem
@@ -24,7 +25,6 @@ from ..solve.integrators import beyond_rounding, integration_controls, with_step
 from ..solve.limits import left_ranges, watch_limits
 from ..solve.posture import NEARLY_SINGULAR, SINGULAR, describe_posture, robot_size
 from ..solve.reach import out_of_reach
-from ..solve.state import State
 from .earlier_check import check_earlier, going_on
 from .outcome import Continuation, EarlierRun, Forces, Motion, Outcome, Statistics
 from .samples import in_order, new_samples, reached_samples, stops, worth_a_look

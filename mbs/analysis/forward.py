@@ -17,15 +17,14 @@ from ..fields.waypoints import spline
 from ..model.drives import Command, Drives, Replayed
 from ..model.frame_motors import motor_commands
 from ..model.gears import with_compliance
+from ..model.known_motion import State
 from ..model.model import Model, modal_directions, without_paths
 from ..scene.analysis import ActuatedAnalysis, Analysis, Need
 from ..solve.posture import mobility
-from ..solve.state import State
 from ..solve.statics import hanging_joints, initial_state
 from .context import Context, PatchedLink
 from .drive import drive_robot
-from .elastic_joints import DEGREE
-from .gears import with_motor_coordinates
+from .gears import DEGREE, with_motor_coordinates
 from .outcome import Outcome
 from .replay import left_paths, path_numbers, point_numbers, replay_times, supplied
 

@@ -1,7 +1,8 @@
-"""States about which a robot is linear: an equilibrium, or instants of an earlier analysis."""
+"""Equilibrium; and states about which a robot is linear: it, or instants of an earlier analysis."""
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -14,17 +15,39 @@ from ...common.arrays import Array
 from ...common.errors import InputError, SolveError, did_you_mean, quoted
 from .._core import TimeFunction
 from ..fields.field_types import NotNegative
-from ..model.gears import with_compliance
+from ..model.gears import with_compliance, with_prescribed_motors
 from ..model.model import Model, without_paths
 from ..model.rows import ConstraintRow
 from ..scene.analysis import Analysis, Surroundings, TimedAnalysis
 from ..solve.linearisation import LinearEquations, LinearMechanism
+from ..solve.redundancy import resolved
 from ..solve.robot_modes import robot_modes
 from ..solve.start import undeformed_posture
+from ..solve.statics import holding_multipliers, static_equilibrium, unstable_ways
 from .context import Context, place_of
-from .equilibrium import run_static
 from .gears import with_motor_coordinates
-from .outcome import Outcome
+from .outcome import Motion, Outcome, Statistics
+
+
+def run_static(context: Context, analysis: Analysis) -> Outcome:
+    """The equilibrium at the one time t = 0: at rest, however fast the trajectories are there.
+
+    Raises `SolveError` where there is none.
+    """
+    began = time.perf_counter()
+    model = with_prescribed_motors(resolved(context.model, analysis.last_time))
+    q = static_equilibrium(model, undeformed_posture(model)).q[None]
+    at_rest, times = np.zeros((1, model.tree.n_v)), np.zeros(1)
+    multipliers = holding_multipliers(model, q[0])
+    return Outcome(
+        analysis=analysis,
+        model=model,
+        motion=Motion(times, q, at_rest, at_rest, multipliers[None], is_at_rest=True),
+        statistics=Statistics(
+            wall_seconds=time.perf_counter() - began, warnings=tuple(unstable_ways(model, q[0], multipliers))
+        ),
+    )
+
 
 STATIC = "static"  # instead of an analysis' name: about the static equilibrium
 INSTANTS = 9  # of a run, at which it is linearized for its growth

@@ -15,7 +15,7 @@ from .. import _core
 from .._core import TimeFunction
 from ..scene.analysis import IntegratedAnalysis
 from ..scene.trajectories import Trajectory
-from ..solve.path_checks import misfits
+from ..solve.posture import misfits
 
 FEWEST = 2000  # intervals of a run
 KEPT = 16_384  # states of an integration at most

@@ -13,8 +13,7 @@ from ..scene.analysis import Analysis
 from ..solve.joint_conditions import JointCondition, joint_conditions
 from ..solve.linearisation import LinearEquations
 from .context import Context
-from .equilibrium import run_static
-from .operating_points import linear_states, places_of
+from .operating_points import linear_states, places_of, run_static
 from .outcome import Details, Outcome
 
 

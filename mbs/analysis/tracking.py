@@ -24,15 +24,13 @@ from ..model.gears import refuse_prescribed_motors
 from ..model.model import Model, modal_directions, without_paths
 from ..scene.analysis import Check, Need, TimedAnalysis, output_times
 from ..solve.integrators import Choice
-from ..solve.internal_dynamics import Stopped, equilibrium
 from ..solve.servo import Servo, make_servo
 from ..solve.stable_inversion import shape_of
 from ..solve.tracking import Limits, Objective, Tracked, Transition, Weights, refined, start_breaks, track
-from ..solve.zero_dynamics import Linearisation, linearise
+from ..solve.zero_dynamics import Linearisation, Stopped, equilibrium, linearise
 from .context import Context, PatchedLink
 from .forward import Forward, run_forward
-from .inverted_path import AroundPath, check_rest, durations, where
-from .motors_only import path_errors
+from .motors_only import AroundPath, check_rest, durations, path_errors, where
 from .outcome import Forces, Motion, Outcome, Prescription, Statistics
 from .samples import path_times
 from .tracking_advice import Bounds, bounds_of_zeros, enough_path_time, enough_time, far_patches, rough_ends

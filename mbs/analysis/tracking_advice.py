@@ -9,13 +9,12 @@ import numpy as np
 
 from ...common.arrays import Array, ComplexArray, as_floats
 from ...common.errors import SolveError
-from ..solve.internal_dynamics import equilibrium, first_order, linear_dynamics
 from ..solve.servo import Servo
 from ..solve.stable_inversion import invert
 from ..solve.tracking import Transition, start_breaks, track
-from ..solve.zero_dynamics import LIGHT, Linearisation, linearise
+from ..solve.zero_dynamics import LIGHT, Linearisation, equilibrium, first_order, linear_dynamics, linearise
 from .context import Context
-from .inverted_path import decay_times
+from .motors_only import decay_times
 
 NEAR = 0.97  # times the limits of patches, which more time is sought for
 MOST_TRIES = 6

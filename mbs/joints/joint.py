@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from typing import Annotated, ClassVar, Literal, NamedTuple, Self, get_args
 
 import numpy as np
@@ -20,7 +21,35 @@ from ...common.validation import Record
 from ..fields.field_types import GROUND, Name, Quantity, Side, Vector3, split_point
 from ..fields.references import Reference, body_of, marker_reference
 from ..fields.spelling import IN_SPACE, Vector
-from .transmission import Friction, MotorLimits
+
+
+@dataclass(frozen=True)
+class MotorLimits:
+    """Largest moment (N·m), speed (rad/s) and power (W) at the joint, infinite without a limit; N, m/s of a force."""
+
+    moment: float = np.inf
+    speed: float = np.inf
+    power: float = np.inf
+
+
+@dataclass(frozen=True)
+class Friction:
+    """−(c γ̇ + τ_c tanh(γ̇/γ̇_s)) on the coordinate γ of a joint: `viscous` c (N·m·s), `coulomb` τ_c (N·m), γ̇_s."""
+
+    viscous: float
+    coulomb: float
+    speed: float
+
+    def resistance(self, rate: Array) -> Array:
+        """C γ̇ + τ_c tanh(γ̇/γ̇_s) at rates γ̇ of any shape."""
+        found: Array = self.viscous * rate + self.coulomb * np.tanh(rate / self.speed)
+        return found
+
+    def slope(self, rate: Array) -> Array:
+        """Its derivative by γ̇: c + τ_c/γ̇_s / cosh²(γ̇/γ̇_s)."""
+        found: Array = self.viscous + self.coulomb / self.speed * (1.0 - np.tanh(rate / self.speed) ** 2)
+        return found
+
 
 RecordType = type[Record]  # `type` is a key below
 Angles = tuple[Quantity, Quantity, Quantity]

@@ -11,8 +11,7 @@ from pydantic import Field, model_validator
 from ...common.arrays import Array
 from ..fields.field_types import NotNegative, Positive, Quantity, Vector3
 from ..fields.spelling import SPATIAL, NormalInPlane, Spelled, as_written
-from .joint import JointRecord, with_axis
-from .transmission import Friction, MotorLimits
+from .joint import Friction, JointRecord, MotorLimits, with_axis
 
 Limit = Annotated[Positive | tuple[Positive, ...], Spelled(Positive, as_written)]
 Range = tuple[Quantity, Quantity]

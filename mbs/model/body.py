@@ -6,13 +6,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from types import MappingProxyType
+from typing import NamedTuple
 
 import numpy as np
 
 from ...common.arrays import Array, as_floats
 from ...common.errors import InputError
 from ...fe_models.modal_body import ModalBody
-from ...fe_models.modal_body.tensors import LEVI_CIVITA
+from ...fe_models.modal_body.invariants import LEVI_CIVITA
 from . import stiffening as stiffenings
 from .stiffening import Stiffening
 
@@ -255,4 +256,26 @@ def _spin_inertia(name: str, body: ModalBody, *, is_planar: bool) -> tuple[float
         f'body "{name}": expected a modal body file with the inertia of the beam about its own axis'
         ' (invariants/J_spin, h_spin, S_spin), which space = "spatial" needs, found one of an earlier version without'
         " it. Recompute it from its link file with `ffrobot link`"
+    )
+
+
+class Section(NamedTuple):
+    """Of a bent body: u = x + Φp − … (…, 3), φ = Φ_r p − … (…, 3), and their derivatives by p, (…, 3, n) or (3, n)."""
+
+    u: Array
+    phi: Array
+    u_p: Array
+    phi_p: Array
+
+
+def bent_section(body: Body, point: str, p: Array) -> Section:
+    """A point of a body, bent by p (…, n)."""
+    at = body.points[point]
+    u, phi = at.position + p @ at.translation.T, p @ at.rotation.T
+    if body.stiffening is None:
+        return Section(u, phi, at.translation, at.rotation)
+    K_p = np.einsum("kmn,...n->...km", body.stiffening.at(point), p)
+    second = 0.5 * np.einsum("...km,...m->...k", K_p, p)
+    return Section(
+        u - second[..., :3], phi - second[..., 3:], at.translation - K_p[..., :3, :], at.rotation - K_p[..., 3:, :]
     )

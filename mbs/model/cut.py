@@ -15,8 +15,7 @@ import numpy as np
 
 from ...common.arrays import Array
 from .._core import TimeFunction
-from ..joints.joint import JointRecord
-from ..joints.transmission import Friction
+from ..joints.joint import Friction, JointRecord
 from ..scene.mechanism import MechanismScene
 from .rows import ConstraintRow, value_and_gradient
 from .tree import KinematicTree, Motion

@@ -16,6 +16,14 @@ from .tree import Section
 from .wrench import Wrench
 
 
+@dataclass(frozen=True)
+class State:
+    """Positions q (n_q,) and velocities v (n_v,) of the tree: m, rad, √kg·m and these per s."""
+
+    q: Array
+    v: Array
+
+
 class States(Protocol):
     """States q (T, n_q), v and a (T, n_v) of a tree."""
 

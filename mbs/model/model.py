@@ -1,7 +1,14 @@
-"""From a scene and its bodies to a tree, and to the rows of constraints that close loops or follow paths."""
+"""From a scene and its bodies to a tree, and to the rows of constraints that close loops or follow paths.
+
+Coordinates of revolute joints between frames of bodies, not sections, for `motors = "frame"`.
+
+They are coordinates of a joint where modes turn its sections about its axis alone. Where they tilt the axis there are
+none: a moment between frames has virtual work there, but no angle that goes with it.
+"""
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TypeVar
@@ -20,8 +27,7 @@ from ..scene.trajectories import Trajectory
 from .body import Body
 from .cut import CutCoordinate, cut_coordinates, cut_row, with_auxiliary_rotors
 from .drives import Drive
-from .frames import with_coordinates_of_frames
-from .payloads import welded_payloads
+from .masses import welded_payloads
 from .rows import ConstraintRow, value_and_gradient
 from .tree import KinematicTree, Motion, Node, Section
 
@@ -252,3 +258,36 @@ def _check_points(scene: MechanismScene, bodies: dict[str, Body]) -> None:
                 f" stiffness is in the modal body file ({quoted(stiffening.K_points)}), found"
                 f' "{reference.name}"'
             )
+
+
+ALONG = 1e-12  # of the largest rotation of modes: what is left of them across an axis about which they all turn
+
+
+def with_coordinates_of_frames(tree: KinematicTree) -> KinematicTree:
+    """The tree with such coordinates of all joints that have them."""
+    found, joints = copy.copy(tree), (*(node.joint for node in tree.nodes), *tree.loops)
+    found.on_frames = frozenset(joint.name for joint in joints if _has_angle_of_frames(tree, joint))
+    found.nodes = tuple(
+        replace(node, inner=node.inner._replace(still=True), outer=node.outer._replace(still=True))
+        if node.joint.name in found.on_frames
+        else node
+        for node in tree.nodes
+    )
+    return found
+
+
+def _has_angle_of_frames(tree: KinematicTree, joint: JointRecord) -> bool:
+    sides = zip(joint.between, joint.triads(), strict=True)
+    return joint.type == "revolute" and all(_turns_about_z(tree, tree.section(side, triad)) for side, triad in sides)
+
+
+def _turns_about_z(tree: KinematicTree, section: Section) -> bool:
+    """Whether modes turn a section about z of its triad alone."""
+    if section.body < 0 or not section.point:
+        return True
+    body = tree.nodes[section.body].body
+    rotation = body.points[section.point].rotation
+    if body.stiffening is not None:
+        rotation = np.hstack([rotation, body.stiffening.at(section.point)[3:].reshape(3, -1)])
+    across = section._replace(still=True).turned(rotation)
+    return bool(np.abs(across).max(initial=0.0) <= ALONG * np.abs(rotation).max(initial=0.0))

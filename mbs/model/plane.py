@@ -15,7 +15,7 @@ import numpy as np
 from ...common.arrays import Array, Booleans, Integers, as_floats
 from .. import _core
 from .parts import CutPlace, ModelParts
-from .plane_bodies import EXACT, AcrossError, axes_across, axes_of_triad, planar_data, planar_marker
+from .projection import EXACT, AcrossError, axes_across, axes_of_triad, planar_data, planar_marker
 
 PLANAR = {
     _core.JointKind.revolute: _core.JointKind.revolute,

@@ -14,14 +14,14 @@ from ...common.rotations import exponential
 from .. import _core
 from .._core import TimeFunction
 from ..fields.orientations import OrientationLaw
-from ..joints.transmission import Friction
+from ..joints.joint import Friction
 from ..scene.loads import OF_POINT, Load
 from .drives import NO_DRIVES, Command, Drive, Drives, PointDrive
 from .frame_motors import zero_order_hold
 from .model import Model
 from .parts import CutPlace, ModelParts, Placed, carried_body, standing_marker
 from .plane import Plane, in_plane
-from .plane_bodies import EXACT
+from .projection import EXACT
 from .rows import ConstraintRow
 from .transmission import gear_forces, tree_resistance, tree_resistance_slope
 from .tree import Section

@@ -21,8 +21,7 @@ from ..joints.joint import JointRecord
 from ..joints.planar_joint import PlanarJoint
 from ..joints.twist_spring import TwistSpring
 from ..scene.topology import Topology
-from .bending import bent_section
-from .body import Body, rigid_body
+from .body import Body, bent_section, rigid_body
 
 
 class Section(NamedTuple):

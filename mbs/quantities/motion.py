@@ -16,15 +16,15 @@ from ...common.arrays import Array
 from ...common.rotations import quaternions
 from ..analysis.gears import Supplied, supplied_through_gears, with_motors
 from ..analysis.outcome import GearMotion
-from ..model.bending import bent_section
+from ..model.body import bent_section
 from ..model.cut import CutCoordinate
 from ..model.cut_motion import CutMotion, cut_motions
 from ..model.drives import Drives, PointDrive
 from ..model.gears import with_compliance
 from ..model.known_motion import MotionForces, motion_forces, row_accelerations
+from ..model.masses import turns_as_a_body
 from ..model.model import Model, row_values, target_rates
 from ..model.motors import MotorForces, path_forces
-from ..model.payloads import turns_as_a_body
 from ..model.system import MultibodySystem
 from ..model.tree import Motion, Node, Section
 from ..scene.space import SPACES, Space

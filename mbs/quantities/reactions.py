@@ -1,8 +1,9 @@
-"""Forces in the joints of a tree in 3D: what the core's Newton–Euler algorithm sums from the outermost body inwards."""
+"""Forces in the joints of a tree, by the core's Newton–Euler algorithm, and its energies and momentum. Global axes."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -50,3 +51,31 @@ def _on_second(motion: RobotMotion, node: Node, on_outer: Wrench) -> Wrench:
         return on_outer
     outer, inner = (motion.model.tree.pose(section, motion.q, motion.frames).r for section in (node.outer, node.inner))
     return Wrench(-on_outer.force, -on_outer.moment).seen_from(outer - inner)
+
+
+@dataclass(frozen=True)
+class Energies:
+    """Kinetic, strain and gravitational energy (T,) J, and the power (T,) W that modes, gears, friction dissipate.
+
+    Compliant gears store energy, too, and their motors turn as they have to.
+    """
+
+    kinetic: Array
+    strain: Array
+    gravitational: Array
+    dissipated_power: Array
+
+
+@dataclass(frozen=True)
+class Momentum:
+    """Linear (T, 3) kg·m/s, and angular about the global origin (T, 3) kg·m²/s."""
+
+    linear: Array
+    angular: Array
+
+
+def totals(motion: RobotMotion) -> tuple[Energies, Momentum]:
+    """Of all bodies and rotors."""
+    motion = motion.behind_gears
+    found = motion.system.core.states_totals(motion.system.scene, motion.q, motion.v)
+    return Energies(*found[:, :4].T), Momentum(found[:, 4:7], found[:, 7:])

@@ -20,7 +20,7 @@ import numpy as np
 from ...common.arrays import Array, as_floats
 from ..model.model import Model
 from ..model.tree import Node, Section
-from ..scene.initial import Word
+from ..scene.mechanism import Word
 from ..scene.space import SPACES
 from .posture import robot_size
 

@@ -10,7 +10,7 @@ import numpy as np
 from ...common.arrays import Array, Indices
 from ...common.errors import InputError
 from ..model.model import Model
-from ..scene.initial import Word
+from ..scene.mechanism import Word
 from .branch_names import branch_names, is_so
 from .posture import mobility
 from .reach import as_guess, random_angles, regular_postures, turning_joints

@@ -9,13 +9,12 @@ import numpy as np
 from ...common.arrays import Array
 from .. import _core
 from .._core import TimeFunction
+from ..model.known_motion import State
 from ..model.system import MultibodySystem
 from ..scene.analysis import IntegratedAnalysis
 from .integrator_choice import TOO_STIFF, fastest_friction
 from .integrators import EXPLICIT, Choice, beyond_order, unmet
-from .path_checks import JUMP
-from .posture import describe_loops
-from .state import State
+from .posture import JUMP, describe_loops
 
 FAR_BENT = 0.5  # of a link's radius of gyration, in the mean
 

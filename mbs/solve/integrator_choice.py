@@ -13,12 +13,12 @@ import numpy as np
 from ...common.arrays import Array
 from .. import _core
 from ..model.cut import cut_damping
+from ..model.known_motion import State
 from ..model.model import Model
 from ..model.system import MultibodySystem
 from ..model.transmission import tree_resistance_slope
 from ..scene.analysis import IntegratedAnalysis
 from .integrators import ASKED_FOR, EXPLICIT, Choice, faster_of
-from .state import State
 from .vibration import Vibrations, vibrations_of, without_rows
 
 # Steps of DOP853 in the time of one of Radau IIA: 0.7 to 1.5 in cases/arm_3r, cases/slider_crank_3d and a stiff arm of

@@ -7,6 +7,7 @@ import numpy as np
 from ...common.arrays import Array
 from ...common.errors import SolveError
 from ..model.gears import with_compliance
+from ..model.known_motion import State
 from ..model.model import Model, without_paths
 from ..model.tree import Section
 from ..scene.space import SPACES
@@ -22,7 +23,6 @@ from .joint_conditions import (
 from .linearisation import LinearEquations, LinearMechanism
 from .posture import solve_posture
 from .start import relaxed_gears
-from .state import State
 
 MOST_STEPS = 12
 SETTLED = 1e-16  # of the strain energy of the first step: of a step after which there is nothing left to correct

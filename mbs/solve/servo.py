@@ -1,4 +1,4 @@
-"""A path whose force enters through the joint motors alone: see `internal_dynamics`."""
+"""A path whose force enters through the joint motors alone: see `zero_dynamics`."""
 
 from __future__ import annotations
 
@@ -16,12 +16,11 @@ from ..model.frame_motors import turning_motors
 from ..model.model import Model
 from ..model.motors import driven_mechanism, fastest_mechanism
 from ..model.rows import ConstraintRow
-from .internal_dynamics import Stopped, Target, by_differences, slopes_by_differences
-from .path_checks import check_smooth
-from .posture import describe_posture, mobility, solve_posture
+from .posture import check_smooth, describe_posture, mobility, solve_posture
 from .prescribed import PrescribedMotion, following_motors
 from .reach import out_of_reach
 from .start import undeformed_posture
+from .zero_dynamics import Stopped, Target, by_differences, slopes_by_differences
 
 POSTURES = 201  # along the path, from which others are looked for
 EVERY = 10  # of these is looked at for singular ones

@@ -20,8 +20,7 @@ from ...common.arrays import Array, Booleans, ComplexArray, as_floats
 from ...common.errors import SolveError
 from .. import _core
 from .collocation import GAUSS, OF_SECOND_ORDER, Boundary, Problem, collocate
-from .internal_dynamics import LinearDynamics, Output, Stopped, equilibrium, first_order, linear_dynamics
-from .zero_dynamics import Linearisation
+from .zero_dynamics import LinearDynamics, Linearisation, Output, Stopped, equilibrium, first_order, linear_dynamics
 
 if TYPE_CHECKING:
     from scipy.interpolate import PPoly

@@ -8,10 +8,10 @@ import numpy as np
 
 from ...common.arrays import Array
 from ...common.errors import InputError, quoted
+from ..model.known_motion import State
 from ..model.model import Model, row_values
 from .posture import MOST_ITERATIONS, solve_posture, with_rates
 from .reach import check_reach, turned_guesses, working_guess
-from .state import State
 
 
 def undeformed_posture(model: Model) -> State:

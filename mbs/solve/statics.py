@@ -8,11 +8,10 @@ import numpy as np
 
 from ...common.arrays import Array, as_floats
 from ...common.errors import SolveError, quoted
-from ..model.known_motion import KnownStates, required_forces
+from ..model.known_motion import KnownStates, State, required_forces
 from ..model.model import Model, row_values
 from .posture import robot_size, row_sizes, with_rates
 from .start import undeformed_posture
-from .state import State
 
 MOST_ITERATIONS = 60
 TOLERANCE = 1e-12  # residual forces relative to the largest of their terms, positions to the size of the robot

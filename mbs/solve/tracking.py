@@ -1,6 +1,6 @@
 """Motors and patches together on a path, within limits: an optimal control problem on the internal dynamics.
 
-With patches r(t, p, ṗ, p̈) = Φ_V V (`internal_dynamics`). p̈ is a polynomial on each interval through the four Gauss
+With patches r(t, p, ṗ, p̈) = Φ_V V (`zero_dynamics`). p̈ is a polynomial on each interval through the four Gauss
 points of `collocation`, V is linear between breaks: limits at breaks are limits everywhere. Each Newton step solves
 
     min  1/(t₁−t₀) ∫ ½ |τ − τ_qs|²/τ_ref² + ½ |V|²/V_ref² + ½ T_r² |V̇|²/V_ref² dt,    |V| ≤ V_max, |τ| ≤ τ_max
@@ -20,9 +20,8 @@ import numpy as np
 from ...common.arrays import Array, Indices, as_floats
 from .collocation import GAUSS, Elimination, piecewise, stage_states
 from .interior_point import Minimum, Program, minimize
-from .internal_dynamics import Output
 from .stable_inversion import PROBES, cut
-from .zero_dynamics import shape_along
+from .zero_dynamics import Output, shape_along
 
 if TYPE_CHECKING:
     from scipy.interpolate import PPoly

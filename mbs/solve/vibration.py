@@ -1,17 +1,25 @@
-"""Small vibrations of an assembly about rest, under its constraints: frequencies, damping ratios, shapes."""
+"""Small vibrations of an assembly about rest, and along a path, under its constraints."""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
 from ...common.arrays import Array, as_floats
+from ...common.errors import InputError, quoted
 from ..model.cut import cut_damping
+from ..model.gears import with_prescribed_motors
+from ..model.known_motion import State
 from ..model.model import Model, row_values
 from ..model.system import MultibodySystem
 from ..model.transmission import gear_matrices
+from .posture import solve_posture
+from .redundancy import resolved
+from .start import relaxed_gears, undeformed_posture
 
 DEPENDENT = 1e-9  # of the largest singular value: below it a row repeats others
 RIGID = 1e-9  # of the largest strain of a unit motion, each in units of its spring: below it there is none
@@ -74,3 +82,47 @@ def strained(K: Array, free: Array) -> int:
     unit = np.divide(1.0, own, out=np.zeros_like(own), where=own > 0.0)
     sizes = np.linalg.svd((unit[:, None] * K * unit) @ free, compute_uv=False)
     return int(np.count_nonzero(sizes > RIGID * sizes.max(initial=0.0)))
+
+
+INSTANTS = 9
+
+
+@dataclass(frozen=True)
+class PathFrequencies:
+    """The lowest vibrations of the undeformed robot at instants of a path: (instants, modes), Hz and damping ratios."""
+
+    frequency: Array
+    damping_ratio: Array
+
+
+def frequencies_along(model: Model, begin: float, end: float, modes: int) -> PathFrequencies:
+    """Of the `modes` lowest vibrations of the undeformed robot with its trajectories held, from `begin` to `end`, s.
+
+    Where motors follow them, compliant gears are among its springs. Joints that the paths leave free are free.
+    Raises `InputError` where the path is out of reach, or there are fewer vibrations.
+    """
+    model = with_prescribed_motors(resolved(model, end))
+    unconstrained = without_rows(model)
+    state, found = undeformed_posture(model), []
+    for t in np.linspace(begin, end, INSTANTS):
+        q = solve_posture(model, float(t), state.q)
+        if q is None:
+            raise InputError(
+                f"{model.scene.path}: trajectory: expected paths within reach, found no posture of the undeformed robot"
+                f" at t = {t:.6g} s that meets {quoted(dict.fromkeys(row.owner for row in model.rows))}"
+            )
+        state = relaxed_gears(model, State(q, np.zeros_like(state.v)))
+        found.append(vibrations_of(model, unconstrained, float(t), state.q)[:2])
+    return common_modes(model.scene.path, found, modes)
+
+
+def common_modes(path: Path, found: Sequence[tuple[Array, Array]], modes: int) -> PathFrequencies:
+    """The `modes` lowest of ω (rad/s) and damping ratios by instant. Raises `InputError` where one has fewer."""
+    most = min(len(omega) for omega, _ in found)
+    if most < modes:
+        raise InputError(
+            f"{path}: trajectory: shaper.modes: expected at most {most}, the number of vibrations on the constrained"
+            f" path, found {modes}"
+        )
+    frequency = np.array([omega[:modes] for omega, _ in found]) / (2 * np.pi)
+    return PathFrequencies(as_floats(frequency), np.array([ratio[:modes] for _, ratio in found]))

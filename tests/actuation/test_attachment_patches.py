@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from patches_on_links import SCENE, on_link, planar_body
 
-from ffrobot.actuation.patches.kept_modes import on_kept_modes
-from ffrobot.actuation.patches.link_patches import check_reach
+from ffrobot.actuation.patches.link_patches import check_reach, on_kept_modes
 from ffrobot.actuation.patches.voltages import voltage_gain
 from ffrobot.common.errors import InputError
 from ffrobot.fe_models.link import cached_modal_body

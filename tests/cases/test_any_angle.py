@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 import ffrobot
 from ffrobot.exchange.urdf.read import read_urdf
-from ffrobot.mbs.quantities.doubts import doubts
+from ffrobot.mbs.quantities.validity import doubts
 from ffrobot.run.solve import solve_scene
 from ffrobot.run.watcher import Watcher
 

@@ -8,7 +8,7 @@ import tomli_w
 from loops import OWN_CONTROLLER
 
 import ffrobot as program
-from ffrobot.common.function_content import digest_of_function
+from ffrobot.common.python_files import digest_of_function
 
 HERE = "import os, sys\nsys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), {!r}))\n"
 CONTROLLER = """

@@ -8,7 +8,7 @@ import tomli_w
 from small_robots import ARM, MASS, PAYLOAD, SWING
 
 import ffrobot
-from ffrobot.design.elementary_effects import draw_trajectories, elementary_effects
+from ffrobot.design.screening import draw_trajectories, elementary_effects
 
 
 def test_a_trajectory_changes_every_key_once_on_the_levels_of_the_grid():

@@ -11,8 +11,7 @@ from scipy.stats import norm, qmc
 from small_robots import ARM, MASS, PAYLOAD
 
 import ffrobot
-from ffrobot.design.linear_spread import LinearModel
-from ffrobot.design.spreads import Spread, parse_spread, spread_points
+from ffrobot.design.spreads import LinearModel, Spread, parse_spread, spread_points
 from ffrobot.design.statistics import LEVELS, regression_shares, sobol_indices, statistics
 
 MOMENT = "joints.shoulder.moment"

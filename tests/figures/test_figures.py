@@ -11,7 +11,7 @@ import pytest
 
 from ffrobot.cli import cli
 from ffrobot.common.errors import InputError
-from ffrobot.mbs.joints.transmission import MotorLimits
+from ffrobot.mbs.joints.joint import MotorLimits
 from ffrobot.pictures.figures.figure_file import Curve, FigureRecord, load_figures
 from ffrobot.pictures.figures.plot import plot_results
 from ffrobot.pictures.figures.reading import curve_points

@@ -10,8 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from ffrobot.fe_models.link import computed_modal_body
 from ffrobot.fe_models.link_file import LinkTable
-from ffrobot.mbs.model.bending import bent_section
-from ffrobot.mbs.model.body import from_modal_body, transformed
+from ffrobot.mbs.model.body import bent_section, from_modal_body, transformed
 
 E, L = 70e9, 0.5
 BENDING = ("in-plane-bending", "out-of-plane-bending")

@@ -10,8 +10,7 @@ from random_mechanisms import random_beam, stiffened
 
 from ffrobot.common.errors import InputError
 from ffrobot.common.rotations import exponential
-from ffrobot.mbs.model.bending import bent_section
-from ffrobot.mbs.model.body import from_modal_body, rigid_body
+from ffrobot.mbs.model.body import bent_section, from_modal_body, rigid_body
 from ffrobot.mbs.model.masses import with_payload
 
 

@@ -14,8 +14,7 @@ from ffrobot.actuation.control.linear_model import state_space
 from ffrobot.actuation.control.modes import robot_modes
 from ffrobot.actuation.motors import judge_motors
 from ffrobot.common.errors import InputError
-from ffrobot.mbs.analysis.elastic_joints import unresolved_gears
-from ffrobot.mbs.analysis.gears import with_motor_coordinates
+from ffrobot.mbs.analysis.gears import unresolved_gears, with_motor_coordinates
 from ffrobot.mbs.analysis.motors_only import MotorsOnly
 from ffrobot.mbs.analysis.static import Static
 from ffrobot.mbs.joints.twist_spring import StiffnessSteps, TwistSpring

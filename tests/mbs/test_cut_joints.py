@@ -8,8 +8,7 @@ from closed_chains import NOW, closed_chain, evaluated
 from ffrobot.mbs import _core
 from ffrobot.mbs.model.model import row_values
 from ffrobot.mbs.model.system import MultibodySystem
-from ffrobot.mbs.quantities.energy import totals
-from ffrobot.mbs.quantities.reactions import reactions
+from ffrobot.mbs.quantities.reactions import reactions, totals
 
 CHAINS = [
     (("revolute", "universal", "cylindrical", "universal"), ("rigid",)),

@@ -8,7 +8,7 @@ from mechanisms import forward, pcid
 from oracle import elastic_forces, gravity_forces, mass_matrix, quadratic_velocity_forces
 from oracle_runs import joint_forces, run
 
-from ffrobot.common.plane import rotation
+from ffrobot.common.rotations import rotation
 from ffrobot.mbs.quantities.link_loads import loads_on_links
 
 MECHANISMS = (

@@ -8,7 +8,7 @@ from ffrobot.common.rotations import left_jacobian, logarithm
 from ffrobot.fe_models.link import computed_modal_body
 from ffrobot.fe_models.link_file import LinkTable
 from ffrobot.mbs.model.body import from_modal_body
-from ffrobot.mbs.quantities.pieces_error import ends_in_equations, rod_ends
+from ffrobot.mbs.quantities.attachment_error import ends_in_equations, rod_ends
 
 L = 0.2
 PIECE = {

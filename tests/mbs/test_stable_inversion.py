@@ -9,12 +9,17 @@ from numpy.polynomial import Polynomial
 from oracle_runs import evaluated, point_motion, run
 
 from ffrobot.common.errors import InputError, SolveError
-from ffrobot.mbs.analysis.inverted_path import is_minimum_phase
-from ffrobot.mbs.analysis.motors_only import MotorsOnly
+from ffrobot.mbs.analysis.motors_only import MotorsOnly, is_minimum_phase
 from ffrobot.mbs.solve import stable_inversion
-from ffrobot.mbs.solve.internal_dynamics import LinearDynamics, equilibrium, is_unstable, linear_dynamics, zeros
 from ffrobot.mbs.solve.servo import make_servo
-from ffrobot.mbs.solve.zero_dynamics import Linearisation
+from ffrobot.mbs.solve.zero_dynamics import (
+    LinearDynamics,
+    Linearisation,
+    equilibrium,
+    is_unstable,
+    linear_dynamics,
+    zeros,
+)
 
 C = np.sqrt(30.0)  # √(EI/ρA)/L² of `ritz_link`, 1/s
 

@@ -11,7 +11,7 @@ from triad_measures import UNIT, About, Along, Ground, Section, Spinning
 
 from ffrobot.mbs import _core
 from ffrobot.mbs.fields.expressions import parse_expression
-from ffrobot.mbs.joints.transmission import Friction
+from ffrobot.mbs.joints.joint import Friction
 from ffrobot.mbs.model.known_motion import required_forces
 from ffrobot.mbs.model.system import MultibodySystem
 

@@ -7,7 +7,7 @@ from strip_link import LINK
 
 from ffrobot import make_scene, solve
 from ffrobot.common.errors import InputError
-from ffrobot.mbs.model.bending import bent_section
+from ffrobot.mbs.model.body import bent_section
 from ffrobot.mbs.solve.poses import PoseEvaluator
 from ffrobot.mbs.solve.start import undeformed_posture
 from ffrobot.run.solve import prepare_scene

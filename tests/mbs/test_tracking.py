@@ -14,11 +14,10 @@ from ffrobot.common.arrays import as_list
 from ffrobot.mbs.analysis.fcid import sampled
 from ffrobot.mbs.analysis.tracking_advice import bounds_of_zeros
 from ffrobot.mbs.model.model import modal_directions
-from ffrobot.mbs.solve.internal_dynamics import equilibrium
 from ffrobot.mbs.solve.servo import make_servo
 from ffrobot.mbs.solve.stable_inversion import invert
 from ffrobot.mbs.solve.tracking import Limits, Transition, Weights, graded, start_breaks, track
-from ffrobot.mbs.solve.zero_dynamics import linearise
+from ffrobot.mbs.solve.zero_dynamics import equilibrium, linearise
 from ffrobot.run.solve import prepare_scene, solve_scene
 from ffrobot.run.watcher import Watcher
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from ffrobot.common.arrays import Array, as_floats
 from ffrobot.common.rotations import left_jacobian, left_jacobian_rate
-from ffrobot.mbs.model.bending import bent_section
+from ffrobot.mbs.model.body import bent_section
 from ffrobot.mbs.model.model import Model, by_section
 from ffrobot.mbs.model.rows import ConstraintRow
 from ffrobot.mbs.model.tree import KinematicTree, Motion, Node, Section

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from ffrobot.mesh.interval import graded_nodes, with_points
+from ffrobot.mesh.structured import graded_nodes, with_points
 
 
 def test_a_uniform_mesh_is_uniform():

@@ -16,7 +16,7 @@ from ...common.errors import InputError
 from ...common.extras import extras
 from ...common.tables import TableWriter, shown
 from ...common.toml_files import read_text
-from .joint_trajectory import NANO
+from .rosbag import NANO
 
 TRAJECTORY = "trajectory_msgs/msg/JointTrajectory"
 STATES = "sensor_msgs/msg/JointState"

@@ -1,7 +1,8 @@
-"""Motions as a rosbag2 of one trajectory_msgs/JointTrajectory, by `rosbags` (extra "ros"); ROS itself is not needed."""
+"""Motions as trajectory_msgs/JointTrajectory of ROS 2: JSON, or a rosbag2 by `rosbags` (extra "ros")."""
 
 from __future__ import annotations
 
+import json
 import tempfile
 from collections.abc import Mapping
 from pathlib import Path
@@ -9,9 +10,64 @@ from typing import Any
 
 import numpy as np
 
+from ...common.arrays import as_list, as_rows
 from ...common.extras import extras
-from .joint_trajectory import joint_trajectory
 from .joints import RobotMotion
+
+NANO = 1_000_000_000
+
+
+def joint_trajectory(motion: RobotMotion) -> tuple[dict[str, Any], tuple[str, ...]]:
+    """The message, of joints with a motor; and remarks on what it leaves out.
+
+    Accelerations stay empty, as the message allows: results have none of joints. Where no joint has a motor, all are
+    taken, without effort.
+    """
+    driven = [joint for joint in motion.joints if joint.moment is not None]
+    moments = [joint.moment for joint in motion.joints if joint.moment is not None]
+    joints, left = driven or list(motion.joints), [joint.name for joint in motion.joints if joint.moment is None]
+    remarks = list(motion.remarks)
+    if driven and left:
+        remarks.append(f"joints without motor left out: {', '.join(left)}")
+    if not driven:
+        remarks.append("no joint has a motor: effort is left empty")
+    positions, velocities = (
+        np.stack([getattr(joint, key) for joint in joints], axis=1) for key in ("coordinate", "rate")
+    )
+    efforts = np.stack(moments, axis=1) if moments else np.zeros((len(motion.time), 0))
+    points = [
+        {
+            "positions": position,
+            "velocities": velocity,
+            "accelerations": [],
+            "effort": effort,
+            "time_from_start": _duration(time),
+        }
+        for position, velocity, effort, time in zip(
+            as_rows(positions), as_rows(velocities), as_rows(efforts), as_list(motion.time), strict=True
+        )
+    ]
+    message = {
+        "header": {"stamp": {"sec": 0, "nanosec": 0}, "frame_id": ""},
+        "joint_names": [joint.name for joint in joints],
+        "points": points,
+    }
+    return message, tuple(remarks)
+
+
+def joint_trajectory_text(motion: RobotMotion) -> tuple[str, tuple[str, ...]]:
+    """The message as JSON, a line for each point; and remarks."""
+    message, remarks = joint_trajectory(motion)
+    points = ",\n".join(json.dumps(point) for point in message.pop("points"))
+    head = json.dumps(message, ensure_ascii=False)
+    return f'{head[:-1]}, "points": [\n{points}\n]}}\n', remarks
+
+
+def _duration(time: float) -> dict[str, int]:
+    """builtin_interfaces/Duration, to the nearest nanosecond."""
+    sec, nanosec = divmod(round(time * NANO), NANO)
+    return {"sec": sec, "nanosec": nanosec}
+
 
 TOPIC = "/joint_trajectory"
 TYPE = "trajectory_msgs/msg/JointTrajectory"

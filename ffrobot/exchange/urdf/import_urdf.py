@@ -14,14 +14,12 @@ from ...common.tables import beyond_limits
 from .bodies import mechanism
 from .flexible import FlexibleLink, flexible_link
 from .meshes import MeshMass, mesh_masses, mesh_path
-from .names import Names
+from .names import Names, toml_text
 from .read import read_urdf
-from .replaced import compared
+from .replaced import compared, remarks_on_scale
 from .robot import MeshFile, Robot
-from .scale import remarks_on_scale
 from .scene import SceneOfRobot
 from .shape_masses import Filling, with_masses, without_mass
-from .toml import toml_text
 
 SCENE = "scene.toml"
 TO_BE_APPENDED = """\

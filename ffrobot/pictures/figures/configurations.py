@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 
 from ...common.arrays import Array
 from ...common.errors import InputError
-from ...common.plane import in_3d
+from ...common.rotations import in_3d
 from ...results.file import Results
 from ..markers import ground_places
 from ..motion import MovingBody, moving_bodies, size_of, visible_exaggeration

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from ...common.arrays import Array
 from ...common.errors import InputError
-from ...common.plane import in_3d
+from ...common.rotations import in_3d
 from ...results.file import Results
 from ..motion import MovingBody, moving_bodies
 from ..projection import PLANE, SPACE

@@ -10,8 +10,7 @@ import numpy as np
 
 from ...common.arrays import Array
 from ..figures.palette import COLORS
-from ..studies.diagrams import Axis, Band, Bars, Diagram, Numbers, Parallel, Points, Progress, wrapped
-from ..studies.looks import LOOKS, Look
+from ..studies.diagrams import LOOKS, Axis, Band, Bars, Diagram, Look, Numbers, Parallel, Points, Progress, wrapped
 from .charts import encoded, plain
 
 AXIS = "#8b95a3"  # of parallel coordinates, on light and on dark pages

@@ -5,15 +5,18 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.container import BarContainer
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
+from ...common.arrays import Array, as_floats
+from ..figures.palette import COLORS
 from ..figures.plot import write_figure
-from ..figures.style import literal, style
-from .bars import draw_bars
-from .diagrams import Band, Bars, Diagram, Parallel, Points, Progress
-from .histories import draw_band, draw_progress
+from ..figures.style import legend, literal, new_axes, style
+from .diagrams import LOOKS, Band, Bars, Diagram, Parallel, Points, Progress, Series
 from .parallel_coordinates import draw_parallel
-from .points import draw_points
 
 
 def write_diagrams(diagrams: Sequence[Diagram], folder: Path) -> list[Path]:
@@ -34,3 +37,125 @@ def _draw(diagram: Diagram) -> Figure:
             return draw_progress(diagram)
         case Points():
             return draw_points(diagram)
+
+
+MOST = 15  # the largest
+WIDTH, BAR, REST = 5.0, 0.22, 0.8  # inches: of the figure, of a bar, of title and axis
+ROOM = 0.2  # of the axis, beside the longest bars: for their numbers
+
+
+def draw_bars(diagram: Bars) -> Figure:
+    """The first labels, on top the first of all."""
+    labels, count = diagram.labels[:MOST], len(diagram.series)
+    rows = max(1, len(labels)) * (1 if count == 1 else 0.8 * count)
+    picture = Figure(figsize=(WIDTH, REST + BAR * (rows + (count > 1))), layout="constrained")
+    axes = picture.subplots()
+    axes.set_title(diagram.title, loc="left")
+    height = 0.8 / count
+    for k, series in enumerate(diagram.series):
+        at = as_floats(np.arange(len(labels)) + (k - 0.5 * (count - 1)) * height)
+        _label(axes, _bars(axes, diagram, series, at, height, COLORS[k]), series, "+" if diagram.signed else "")
+    axes.margins(x=ROOM)
+    axes.locator_params(axis="x", nbins=7)
+    axes.set_yticks(range(len(labels)), labels)
+    axes.tick_params(axis="y", length=0)
+    axes.invert_yaxis()
+    axes.grid(visible=False, axis="y")
+    axes.set_axisbelow(True)
+    axes.axvline(0.0, color="black", linewidth=0.6)
+    axes.set_xlabel(diagram.x_label)
+    legend(axes)
+    return picture
+
+
+def _bars(axes: Axes, diagram: Bars, series: Series, at: Array, height: float, color: str) -> BarContainer:
+    values = [value or 0.0 for value in series.values[:MOST]]
+    colors = [COLORS[1] if diagram.signed and value < 0.0 else color for value in values]
+    errors = list(series.errors[:MOST]) or None
+    return axes.barh(
+        at, values, height, xerr=errors, color=colors, label=series.label or None,
+        error_kw={"elinewidth": 0.7, "capsize": 1.5},
+    )  # fmt: skip
+
+
+def _label(axes: Axes, bars: BarContainer, series: Series, sign: str) -> None:
+    """The number of each bar at its end."""
+    numbers = [_number(value, sign) for value in series.values[:MOST]]
+    axes.bar_label(bars, numbers, padding=2, fontsize=7)
+
+
+def _number(value: float | None, sign: str) -> str:
+    return "none" if value is None else f"{value:{sign}.3g}".replace("-", "−") if value else "0"
+
+
+def draw_band(band: Band) -> Figure:
+    """The worst case behind the band, the median, and the history all parameters at nominal values."""
+    figure, axes = new_axes(band.title)
+    axes.fill_between(
+        band.time, band.lowest, band.highest, color=COLORS[5], alpha=0.3, linewidth=0.0, label=band.worst_label
+    )
+    axes.fill_between(band.time, band.low, band.high, color=COLORS[4], alpha=0.7, linewidth=0.0, label=band.band_label)
+    axes.plot(band.time, band.median, color=COLORS[0], label="median")
+    axes.plot(band.time, band.nominal, color=COLORS[6], linestyle=":", label="nominal values")
+    axes.set_xlabel("Time (s)")
+    axes.set_ylabel(band.y_label)
+    axes.margins(x=0.0)
+    legend(axes)
+    return figure
+
+
+def draw_progress(diagram: Progress) -> Figure:
+    """A mark for each design, by its state, and the best so far as a line; of failed ones at the lower edge."""
+    figure, axes = new_axes(diagram.title)
+    number = np.arange(len(diagram.values))
+    values = _numbers(diagram.values)
+    axes.plot(number, _numbers(diagram.best), color=COLORS[0], drawstyle="steps-post", label="best so far")
+    for state, look in LOOKS.items():
+        mine = np.array([one == state for one in diagram.states])
+        if state == "failed" and mine.any():
+            axes.plot(
+                number[mine], np.full(mine.sum(), 0.02), look.marker, color=look.color, label=look.label,
+                transform=axes.get_xaxis_transform(),
+            )  # fmt: skip
+        elif mine.any():
+            axes.plot(number[mine], values[mine], look.marker, color=look.color, label=look.label, zorder=3)
+    if diagram.logarithmic:
+        axes.set_yscale("log")
+    axes.xaxis.set_major_locator(MaxNLocator(6, integer=True))
+    axes.set_xlabel("design, in the order of the search")
+    axes.set_ylabel(diagram.y_label)
+    legend(axes)
+    return figure
+
+
+def _numbers(values: tuple[float | None, ...]) -> Array:
+    return as_floats(np.array([np.nan if value is None else value for value in values]))
+
+
+NAMED = 12  # the first: more hide each other
+
+
+def draw_points(diagram: Points) -> Figure:
+    """Points with their names or joined by a line; those that are not sure hollow."""
+    figure, axes = new_axes(diagram.title)
+    x, y = np.array(diagram.x), np.array(diagram.y)
+    sure = np.array(diagram.sure or (True,) * len(x), dtype=bool)
+    if diagram.joined:
+        axes.plot(x, y, color=COLORS[0])
+    if diagram.x_errors:
+        axes.errorbar(x, y, xerr=diagram.x_errors, fmt="none", ecolor=COLORS[4], elinewidth=0.8)
+    axes.plot(x[sure], y[sure], "o", color=COLORS[0])
+    axes.plot(x[~sure], y[~sure], "o", color=COLORS[0], markerfacecolor="white")
+    if diagram.named:
+        for label, place in list(zip(diagram.labels, zip(x, y, strict=True), strict=True))[:NAMED]:
+            left = place[0] > 0.5 * x.max()
+            axes.annotate(
+                label, place, (-4 if left else 4, 3), textcoords="offset points", fontsize=6,
+                ha="right" if left else "left",
+            )  # fmt: skip
+        axes.set_xlim(left=0.0)
+        axes.set_ylim(bottom=0.0)
+        axes.margins(0.1)
+    axes.set_xlabel(diagram.x_label)
+    axes.set_ylabel(diagram.y_label)
+    return figure

@@ -10,8 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from ...common.arrays import Array
-from .diagrams import Axis, Parallel, wrapped
-from .looks import LOOKS, Look
+from .diagrams import LOOKS, Axis, Look, Parallel, wrapped
 
 WIDTH, HEIGHT = 1.25, 3.4  # inches: of an axis, of the figure
 LETTERS, LINE = 18, 9  # of a name, in a line; points that a line takes
