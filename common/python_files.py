@@ -8,6 +8,7 @@ import sysconfig
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
+from functools import cache
 from pathlib import Path
 from traceback import extract_tb
 from types import CodeType, ModuleType
@@ -63,6 +64,8 @@ def imported_files(*folders: Path) -> dict[Path, str]:
     Each as it was when it was seen here first. Without `folders`, of those of all `count_imports`. Installed packages
     and this program do not count.
     """
+    if not _folders:  # before anything else: finding the files of all modules takes longer than many a run
+        return {}
     for file in filter(None, map(own_file, list(sys.modules.values()))):
         _count(file)
     places = [folder.resolve() for folder in folders] or list(_folders)
@@ -88,14 +91,23 @@ def own_file(module: ModuleType) -> Path | None:
     name, file, program = about.get("__name__"), about.get("__file__"), __name__.partition(".")[0]
     if not isinstance(file, str) or str(name).partition(".")[0] in ("__main__", "__mp_main__", program):
         return None
+    return _unless_installed(file)
+
+
+@cache
+def _unless_installed(file: str) -> Path | None:
     path = Path(file).resolve()
     return None if _is_installed(path) else path
 
 
 def _is_installed(file: Path) -> bool:
-    libraries = {Path(sysconfig.get_path(name)).resolve() for name in ("stdlib", "platstdlib")}
     packages = {"site-packages", "dist-packages"} & set(file.parts)
-    return bool(packages) or any(file.is_relative_to(place) for place in libraries)
+    return bool(packages) or any(file.is_relative_to(place) for place in _libraries())
+
+
+@cache
+def _libraries() -> frozenset[Path]:
+    return frozenset(Path(sysconfig.get_path(name)).resolve() for name in ("stdlib", "platstdlib"))
 
 
 def sha256_of(file: Path) -> str:
