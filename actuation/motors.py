@@ -10,7 +10,6 @@ import numpy as np
 from ..common.arrays import Array, Booleans, as_floats
 from ..common.peaks import largest, root_mean_square, shares
 from ..mbs._core import TimeFunction
-from ..mbs.analysis.motors_only import MotorsOnly
 from ..mbs.joints.joint import MotorLimits
 from ..mbs.model.known_motion import mass_matrices
 from ..mbs.model.transmission import rotor
@@ -168,7 +167,7 @@ def path_jump(motion: RobotMotion, analysis: Analysis, at: float) -> str:
             return "acceleration"
         jerks = (before[0] - before[1]) / h, (after[1] - after[0]) / h
         largest = np.abs(np.diff(all_over)).max() / (end / 1000)
-        if isinstance(analysis, MotorsOnly) and np.any(np.abs(jerks[1] - jerks[0]) > JUMP * largest):
+        if analysis.follows_jerk and np.any(np.abs(jerks[1] - jerks[0]) > JUMP * largest):
             return "jerk"
     return ""
 

@@ -15,6 +15,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, GetCoreSchemaHandler
 from pydantic.fields import FieldInfo
 from pydantic_core import CoreSchema, ErrorDetails, PydanticKnownError, core_schema
 
+from .deferred import Deferred
 from .errors import InputError, did_you_mean, either
 from .python_files import digest_of_function
 from .tables import key_path, shown
@@ -286,4 +287,7 @@ def _models(annotation: object) -> list[type[BaseModel]]:
     """Every record in `annotation`, inside optionals, unions, lists and tables too."""
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return [annotation]
-    return [model for argument in get_args(annotation) for model in _models(argument)]
+    arguments = get_args(annotation)
+    if deferred := [mark for mark in arguments if isinstance(mark, Deferred) and mark.modules]:
+        return deferred[0].records()
+    return [model for argument in arguments for model in _models(argument)]

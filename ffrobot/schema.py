@@ -16,6 +16,7 @@ from pydantic import BaseModel, TypeAdapter
 from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
 from pydantic_core import core_schema
 
+from .common.deferred import RECORD, loaded
 from .common.validation import is_key
 from .mbs.fields.spelling import PLANAR, SPATIAL, NormalInPlane, Spelled
 
@@ -95,6 +96,11 @@ class _Described(GenerateJsonSchema):
             elif any(isinstance(mark, NormalInPlane) for mark in field.metadata):
                 described["required"].append(key)
         return described
+
+    def function_plain_schema(self, schema: core_schema.PlainValidatorFunctionSchema) -> JsonSchemaValue:
+        if record := schema.get("metadata", {}).get(RECORD):
+            return self.generate_inner(TypeAdapter(loaded(record)).core_schema)
+        return super().function_plain_schema(schema)
 
 
 class _Spatial(_Described):

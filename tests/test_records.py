@@ -15,9 +15,8 @@ from ffrobot.common.errors import InputError
 from ffrobot.common.rotations import exponential, quaternions
 from ffrobot.mbs.fields.orientations import OrientationLaw
 from ffrobot.scene.load import validated_scene
-from ffrobot.scene.scene import SceneKeys
 from ffrobot.scene.unsupported import UNSUPPORTED
-from ffrobot.schema import DIALECT, key_descriptions
+from ffrobot.schema import key_descriptions, scene_in
 
 FOLDER = Path(scene_of.__file__).parent
 
@@ -267,16 +266,14 @@ def test_mistakes_are_told(name):
 
 def test_every_key_says_what_it_means():
     """The text under the field in its record, of all records of the file."""
-    described = SceneKeys.model_json_schema()
-    assert DIALECT
-    records = {cls.__name__: cls for cls in _records(SceneKeys)}
+    described = scene_in(None)
+    records = {cls.__name__: cls for cls in _records()}
     for name, table in described["$defs"].items():
-        if name.startswith("Spatial") or name == "BodyKeys":
-            missing = set(table.get("properties", {})) - set(key_descriptions(records[name]))
-            assert not missing, (name, missing)
+        missing = set(table.get("properties", {})) - set(key_descriptions(records[name]))
+        assert not missing, (name, missing)
 
 
-def _records(record):
+def _records():
     from ffrobot.common.validation import Record
 
     def below(cls):

@@ -197,7 +197,7 @@ def solved_with(entry, module, own, program, folder):
 
 
 def test_a_kind_is_a_file_and_an_entry(tmp_path):
-    entry = "AnyKind = ", "from turntable import Turntable\n\nAnyKind = Turntable | "
+    entry = '        "pcid"', '        "turntable": "turntable:Turntable",\n        "pcid"'
     solved_with(entry, kinds, ("turntable", TOY), SOLVE, tmp_path)
 
 
@@ -208,6 +208,7 @@ def test_a_type_of_joint_is_a_file_and_an_entry(tmp_path):
 
 def test_every_kind_says_what_it_is():
     """A record's kind is its own, and it can be run."""
-    names = [kind.kind_name() for kind in kinds.KINDS]
-    assert len(set(names)) == len(names) == 9
-    assert all(callable(kind.run) for kind in kinds.KINDS)
+    records = kinds.KINDS.records()
+    assert [kind.kind_name() for kind in records] == list(kinds.KINDS.modules)
+    assert len(records) == 9
+    assert all("run" in vars(kind) for kind in records)

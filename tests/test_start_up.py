@@ -13,6 +13,8 @@ import time
 
 import pytest
 
+from ffrobot.scene.kinds import KINDS
+
 pytestmark = pytest.mark.alone
 
 HEAVY = ("numpy", "scipy", "h5py", "pydantic", "rich", "dolfinx", "matplotlib", "plotly")
@@ -71,6 +73,17 @@ analysis = [{ name = "driven", kind = "forward", end = 0.01, output_step = 0.005
 name = "arm"
 rigid = { mass = 1.0, center = [0.1, 0.0, 0.0], inertia = [0.01, 0.01, 0.01], points = { root = [0.0, 0.0, 0.0] } }
 """
+
+
+def test_a_solve_loads_what_its_scene_needs(ffrobot, tmp_path):
+    """Records of the kinds that it has, and nothing that draws, prints tables or comes with SciPy."""
+    scene = tmp_path / "scene.toml"
+    scene.write_text(RIGID)
+    found = loaded(f"sys.argv = ['ffrobot', 'solve', {str(scene)!r}]\nfrom ffrobot.cli import main\nmain()")
+    assert "ffrobot.mbs.analysis.forward" in found
+    kinds = {place.partition(":")[0] for place in KINDS.modules.values()}
+    assert kinds & found == {"ffrobot.mbs.analysis.forward"}
+    assert not {"rich", "scipy", "matplotlib", "ffrobot.present.details"} & found
 
 
 def test_a_solve_costs_a_few_times_what_its_libraries_cost(ffrobot, tmp_path):

@@ -8,12 +8,11 @@ from dataclasses import dataclass, field
 
 from ..common.arrays import Array
 from ..common.errors import InputError, did_you_mean, quoted
-from ..mbs.scene.analysis import IntegratedAnalysis
+from ..mbs.scene.analysis import Analysis, IntegratedAnalysis
 from ..results.file import Results
 from ..results.write import results_image
 from ..run.solve import solve_scene
 from ..run.watcher import Watcher
-from ..scene.kinds import AnyKind
 from ..scene.scene import Scene
 from .errors import histories
 
@@ -92,7 +91,7 @@ def find_analysis(scene: Scene, name: str | None) -> IntegratedAnalysis:
 
 def with_analysis(scene: Scene, name: str, **changes: object) -> Scene:
     """The scene with one analysis only, and the one whose actuation it takes; `changes` of keys concern both."""
-    kept: list[AnyKind] = []
+    kept: list[Analysis] = []
     for analysis in reversed(scene.analysis):
         if analysis.name == name or any(later.takes_actuation and later.source == analysis.name for later in kept):
             alike = {"max_steps": UNLIMITED, **changes} if analysis.is_resumable else {}

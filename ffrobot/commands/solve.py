@@ -53,10 +53,9 @@ def _solve(scene_file: Path, path: Path, again: str, *, resume: bool, strict: bo
     """Solve, write and tell; `again` is the command that goes on with it."""
     from ..common.errors import SolveError, StoppedError
     from ..present.accuracy import error_budget
-    from ..present.details import print_details
     from ..present.progress import Display
     from ..present.start_postures import chosen_posture
-    from ..present.summary import summary_console, summary_lines
+    from ..present.summary import summary_console, summary_lines, summary_width
     from ..results.file import Results
     from ..results.resume import how_to_go_on, resume_scene
     from ..results.write import write_results
@@ -89,14 +88,15 @@ def _solve(scene_file: Path, path: Path, again: str, *, resume: bool, strict: bo
         return
     with Results(path) as results:
         verdict, posture = results.verdict, chosen_posture(results, solution.model)
-    console = summary_console()
     if click.get_current_context().meta.get(VERBOSE):
-        print_details(solution, verdict, path, {**solution.seconds, "writing": writing}, console)
+        from ..present.details import print_details
+
+        print_details(solution, verdict, path, {**solution.seconds, "writing": writing}, summary_console())
         click.echo(f"note       {posture}" if posture else "", nl=bool(posture))
     else:
         notes = [*solution.path_notes, *solution.link_notes, *([posture] if posture else [])]
         accuracy = "; ".join(error_budget(solution))
-        lines = summary_lines(verdict, notes, accuracy, str(path), console.width, len(remarks))
+        lines = summary_lines(verdict, notes, accuracy, str(path), summary_width(), len(remarks))
         click.echo("\n".join(lines))
     _check_ended(solution, display, scene_file, again)
     if strict:

@@ -12,9 +12,10 @@ from rich.table import Table
 from ..actuation.patches.patches import PatchArray
 from ..actuation.patches.voltages import Voltages
 from ..common.arrays import Array
-from ..mbs.analysis.motors_only import AroundPath, describe_zeros, is_minimum_phase, path_errors
+from ..mbs.analysis.motors_only import AroundPath, describe_zeros, is_minimum_phase
 from ..mbs.analysis.outcome import Details, Outcome
 from ..mbs.model.body import Body
+from ..mbs.model.model import path_errors
 from ..mbs.model.truncation import modes_kept
 from ..mbs.quantities.stress import BodyStress
 from ..results.verdict import Verdict
@@ -101,8 +102,7 @@ def _inversion(run: Outcome, around: AroundPath) -> str:
     inversion = around.inversion
     assert inversion is not None
     linear, factor = inversion.linearisation, inversion.servo.factor
-    held = inversion.servo.model
-    error = max(float(np.abs(off).max(initial=0.0)) for off in path_errors(held, run.time, run.q).values())
+    error = max(float(np.abs(off).max(initial=0.0)) for off in path_errors(around.held, run.time, run.q).values())
     left = f"largest error of the path {error:.2g}"
     if is_minimum_phase(linear):
         output = "the path's own points" if factor == 1 else f"the output with {factor:.2g} times the vibration"

@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterable, Iterator, Sequence
+from shutil import get_terminal_size
 from textwrap import wrap
+from typing import TYPE_CHECKING
 
 import numpy as np
-from rich.console import Console
 
 from ..actuation.motors import MotorFeasibility
 from ..results.verdict import AnalysisVerdict, Verdict
 from .lines import alike
+
+if TYPE_CHECKING:
+    from rich.console import Console
 
 PLAIN_WIDTH = 120  # columns where the output is no terminal
 LINES = 15  # that a summary has at most
@@ -26,10 +30,16 @@ MOTOR = ("motor", "peak", "RMS", "speed", "power", "of limits", "in")
 Row = tuple[str, ...]
 
 
+def summary_width() -> int:
+    """Columns of the standard output; what goes to a file is not squeezed into 80."""
+    return get_terminal_size().columns if sys.stdout.isatty() else PLAIN_WIDTH
+
+
 def summary_console() -> Console:
-    """The standard output; names in a scene are no markup, and what goes to a file is not squeezed into 80 columns."""
-    width = None if sys.stdout.isatty() else PLAIN_WIDTH
-    return Console(width=width, markup=False, highlight=False, emoji=False)
+    """The standard output; names in a scene are no markup."""
+    from rich.console import Console
+
+    return Console(width=summary_width(), markup=False, highlight=False, emoji=False)
 
 
 def summary_lines(

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import MISSING, fields
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import h5py
 import numpy as np
 
-from ..actuation.control.placing import Placed
 from ..actuation.feasibility import Feasibility
 from ..actuation.motors import MotorFeasibility
 from ..actuation.patches.patches import PatchArray
@@ -20,11 +19,14 @@ from ..actuation.point_forces import PointForces
 from ..actuation.points import PointSet
 from ..actuation.unsupplied import Unsupplied
 from ..common.arrays import Array
-from ..mbs.analysis.tracking import TrackedPath
 from ..mbs.quantities.motion import RobotMotion
 from ..mbs.scene.space import SPACES, Space
 from ..run.actuation import Actuation
 from ..run.solution import Solution
+
+if TYPE_CHECKING:  # most scenes have none of these
+    from ..actuation.control.placing import Placed
+    from ..mbs.analysis.tracking import TrackedPath
 
 
 def write_actuation(group: h5py.Group, solution: Solution, actuation: Actuation) -> None:

@@ -7,8 +7,7 @@ from typing import Any
 import h5py
 import numpy as np
 
-from ..mbs.analysis.motors_only import AroundPath, is_minimum_phase, path_errors
-from ..mbs.analysis.tracking import TrackedPath
+from ..mbs.model.model import path_errors
 from ..mbs.quantities.motion import RobotMotion
 from ..mbs.scene.trajectories import Trajectory
 from ..mbs.solve.stable_inversion import Inversion
@@ -18,12 +17,10 @@ from ..run.solution import AnalysisResult, Solution
 def write_paths(group: h5py.Group, result: AnalysisResult) -> None:
     """Of an analysis: trajectories/ that hold in it, or that motors alone follow; at rest before and after."""
     run, motion, details = result.run, result.motion, result.run.details
-    inside, errors = np.clip(run.time, 0.0, run.analysis.last_time), {}
-    if isinstance(details, TrackedPath):
-        errors = path_errors(details.held, run.time, run.q)
-    elif isinstance(details, AroundPath) and details.inversion is not None:
-        errors = path_errors(details.inversion.servo.model, run.time, run.q)
-        _write_zero_dynamics(group, details.inversion)
+    inside = np.clip(run.time, 0.0, run.analysis.last_time)
+    errors = {} if details.held is None else path_errors(details.held, run.time, run.q)
+    if (inversion := getattr(details, "inversion", None)) is not None:
+        _write_zero_dynamics(group, inversion)
     for trajectory in motion.model.scene.trajectory if errors else motion.followed:
         entry = group.create_group(f"trajectories/{trajectory.name}")
         if errors:
@@ -38,6 +35,8 @@ def write_paths(group: h5py.Group, result: AnalysisResult) -> None:
 
 def _write_zero_dynamics(group: h5py.Group, inversion: Inversion[Any]) -> None:
     """Of motors-only inverse dynamics: zero_dynamics/."""
+    from ..mbs.analysis.motors_only import is_minimum_phase
+
     entry = group.create_group("zero_dynamics")
     entry["time"] = inversion.linearisation.times
     entry["zeros"] = np.stack([inversion.linearisation.zeros.real, inversion.linearisation.zeros.imag], axis=2)

@@ -5,17 +5,20 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import h5py
 import numpy as np
 
 from ..actuation.control.linear_model import LinearModel, save_arrays
-from ..actuation.control.linear_models import LinearModels
 from ..actuation.control.zeros import Zeros
 from ..common.arrays import Array
-from ..mbs.analysis.static import RobotAtRest
 from ..mbs.quantities.motion import RobotMotion
 from ..mbs.solve.joint_conditions import COMPLIANT, LOCKED, translational_stiffness
+
+if TYPE_CHECKING:  # most scenes have none of these
+    from ..actuation.control.linear_models import LinearModels
+    from ..mbs.analysis.static import RobotAtRest
 
 MATRICES = ("A", "B", "C", "D", "mass", "transformation")
 NAMES = ("state_names", "input_names", "output_names")

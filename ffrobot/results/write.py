@@ -10,16 +10,11 @@ from typing import Any
 
 import h5py
 
-from ..actuation.control.linear_models import LinearModels
-from ..actuation.control.loop_record import LoopRecord
-from ..actuation.control.placing import Placed
 from ..common.checksum import MARK, sealed
 from ..common.checksum import METHOD as CHECKSUM
 from ..common.files import write_atomically
 from ..common.version import program_version
-from ..mbs.analysis.outcome import Details, Outcome
-from ..mbs.analysis.static import RobotAtRest
-from ..mbs.analysis.tracking import TrackedPath
+from ..mbs.analysis.outcome import Outcome
 from ..mbs.fields.steps import DATASET, METHOD
 from ..mbs.quantities.motion import RobotMotion
 from ..mbs.solve.redundancy import resolving_joints
@@ -35,14 +30,14 @@ from .resume import write_state
 
 FORMAT_VERSION = 1
 
-DETAILS: dict[type[Details], Callable[[h5py.Group, RobotMotion, Any], None]] = {
-    RobotAtRest: write_joint_conditions,
-    LinearModels: write_linear,
-    LoopRecord: write_loop,
-    Placed: write_placement,
-    TrackedPath: write_tracking,
+DETAILS: dict[str, Callable[[h5py.Group, RobotMotion, Any], None]] = {
+    "RobotAtRest": write_joint_conditions,
+    "LinearModels": write_linear,
+    "LoopRecord": write_loop,
+    "Placed": write_placement,
+    "TrackedPath": write_tracking,
 }
-"""What writes to the group of an analysis that which only its kind finds."""
+"""What writes to the group of an analysis that which only its kind finds, by the name of the class of that."""
 
 
 def write_results(solution: Solution, path: Path) -> None:
@@ -103,9 +98,8 @@ def _write_analysis(group: h5py.Group, solution: Solution, result: AnalysisResul
     group["momentum/angular"] = motion.space.about(result.momentum.angular)
     violation = group.create_dataset("constraint_violation", data=motion.violation)
     violation.attrs["columns"] = ["position", "velocity", "acceleration"]
-    for found, write in DETAILS.items():
-        if isinstance(run.details, found):
-            write(group, motion, run.details)
+    if (write := DETAILS.get(type(run.details).__name__)) is not None:
+        write(group, motion, run.details)
 
 
 def _write_peaking(group: h5py.Group, solution: Solution, result: AnalysisResult) -> None:

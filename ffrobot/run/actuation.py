@@ -13,8 +13,6 @@ from ..actuation.patches.link_patches import LinkPatches, by_body, check_reach, 
 from ..actuation.patches.voltages import Voltages
 from ..actuation.points import PointSet, make_point_set
 from ..common.arrays import Array
-from ..mbs.analysis.motors_only import MotorsOnly
-from ..mbs.analysis.tracking import Tracking
 from ..mbs.model.drives import Drive
 from ..mbs.model.model import Model, modal_directions
 from ..mbs.quantities.motion import RobotMotion
@@ -102,7 +100,7 @@ def find_actuation(
     others = {of.body for of in scene.actuation_points}
     if any(getattr(one, "apply", None) in FORCES_AT_POINTS for one in scene.analysis if one.source == analysis.name):
         others |= links.keys()
-    if isinstance(analysis, MotorsOnly | Tracking):  # what they leave is less than their tolerance, or they say so
+    if analysis.supplies_all:
         others |= links.keys()
     judged = judge_actuators(scene.path, motion, links, patches, voltages, analysis, others)
     return Actuation(voltages, unmet, judged)

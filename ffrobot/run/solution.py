@@ -10,7 +10,6 @@ from math import hypot
 
 import numpy as np
 
-from ..actuation.control.loop_record import LoopRecord
 from ..actuation.patches.link_patches import LinkPatches
 from ..actuation.patches.patches import PatchArray
 from ..actuation.point_forces import PointForces
@@ -146,9 +145,8 @@ class AnalysisResult:
             *self.run.statistics.warnings,
             *unresolved_gears(self.motion.gears),
         )
-        if isinstance(self.run.details, LoopRecord):
-            texts = (*texts, *self.run.details.warnings)
-        elif self.motion.is_prescribed:
+        texts = (*texts, *self.run.details.warnings)
+        if self.motion.is_prescribed:
             texts = (*texts, *path_warnings(self.run.analysis, self.run.time, self.motion.model.scene.trajectory))
         return texts if missed is None else (*texts, missed.in_words)
 

@@ -16,7 +16,6 @@ from ..actuation.point_forces import forces_at_points, solve_points
 from ..actuation.unsupplied import quasi_static_shift
 from ..common.arrays import Array
 from ..common.errors import FfrobotError, InputError, SolveError, of_file
-from ..mbs.analysis.operating_points import InstantAnalysis, open_loop_growth
 from ..mbs.analysis.outcome import Outcome
 from ..mbs.quantities.motion import RobotMotion
 from ..mbs.quantities.reactions import reactions, totals
@@ -29,7 +28,6 @@ from ..scene.scene import Scene
 from .actuation import find_actuation, missing_forces
 from .bodies import load_bodies
 from .fastest import with_paths
-from .finer import with_finer_check
 from .mode_choice import mode_levels, reported_modes
 from .mode_search import ModeSearch, error_tolerances
 from .pieces import MotionOfLinks, bending_of_links, divided_links, wanted_pieces
@@ -94,7 +92,10 @@ def run_analyses(solution: Solution, watcher: Watcher, keep: Keep | None = None)
             solution = _with_enough_pieces(solution, watcher, interruption)
         else:
             solution = _completed(solution, watcher, interruption)
-        solution = with_finer_check(solution, prepare_scene, watcher)
+        if any(analysis.is_checked for analysis in scene.analysis):
+            from .finer import with_finer_check
+
+            solution = with_finer_check(solution, prepare_scene, watcher)
         if keep is not None and solution.outcomes:
             keep(solution)
     if solution.failure is not None:
@@ -260,12 +261,14 @@ def _evaluated(solution: Solution, run: Outcome, twists: Mapping[str, BSpline] |
     )  # fmt: skip
     motion, sharing = shared_evenly(found)
     actuation = None
-    is_judged = motion.motor_forces is not None and not isinstance(run.analysis, InstantAnalysis)
+    is_judged = motion.motor_forces is not None and run.analysis.is_motion
     if is_judged:  # else nothing is asked of motors and patches
         actuation = find_actuation(
             solution.scene, motion, run.analysis, solution.bodies, solution.patches, forces.voltages
         )
         if (missed := actuation.feasibility.unsupplied) is not None and missed.point:
+            from ..mbs.analysis.operating_points import open_loop_growth
+
             missed = replace(missed, growth=open_loop_growth(run))
             actuation = replace(actuation, feasibility=replace(actuation.feasibility, unsupplied=missed))
     whole = {name: body for name, body in solution.bodies.items() if name not in solution.divided}

@@ -15,9 +15,9 @@ from ..mbs.fields.field_types import GROUND
 from ..mbs.fields.functions import check_derivatives, check_domain
 from ..mbs.fields.orientations import OrientationLaw
 from ..mbs.joints.joint import JointRecord
-from ..mbs.scene.analysis import Surroundings
+from ..mbs.scene.analysis import Analysis, Surroundings
 from ..mbs.scene.trajectories import Trajectory
-from .kinds import KINDS, AnyKind
+from .kinds import KINDS
 from .scene import SceneKeys
 
 
@@ -32,7 +32,7 @@ def problems(scene: SceneKeys) -> Iterator[str]:
     yield from _load_problems(scene)
     yield from _stiffening_problems(scene)
     for k, analysis in enumerate(scene.analysis):
-        among = Surroundings(scene.analysis[:k], scene.analysis[k:], KINDS)
+        among = Surroundings(scene.analysis[:k], scene.analysis[k:], KINDS.records)
         for problem in (*_unmet_needs(scene, analysis), *analysis.problems(among)):
             yield f'analysis "{analysis.name}": {problem}'
 
@@ -221,7 +221,7 @@ def _stiffening_problems(scene: SceneKeys) -> Iterator[str]:
             )
 
 
-def _unmet_needs(scene: SceneKeys, analysis: AnyKind) -> Iterator[str]:
+def _unmet_needs(scene: SceneKeys, analysis: Analysis) -> Iterator[str]:
     for need in analysis.needs():
         if not getattr(scene, need.table):
             yield f'{need.key}: expected at least one [[{need.table}]] for "{need.value}", found none'

@@ -2,23 +2,26 @@
 
 from __future__ import annotations
 
-from typing import Annotated, get_args
+from typing import Annotated
 
-from pydantic import Field
+from ..common.deferred import Deferred
+from ..mbs.scene.analysis import Analysis
 
-from ..actuation.control.closed_loop import ClosedLoop
-from ..actuation.control.linear import Linear
-from ..actuation.control.placement import PatchPlacement
-from ..mbs.analysis.fcid import Fcid
-from ..mbs.analysis.forward import Forward
-from ..mbs.analysis.motors_only import MotorsOnly
-from ..mbs.analysis.pcid import Pcid
-from ..mbs.analysis.static import Static
-from ..mbs.analysis.tracking import Tracking
+KINDS = Deferred(
+    "kind",
+    {
+        "pcid": "ffrobot.mbs.analysis.pcid:Pcid",
+        "fcid": "ffrobot.mbs.analysis.fcid:Fcid",
+        "forward": "ffrobot.mbs.analysis.forward:Forward",
+        "static": "ffrobot.mbs.analysis.static:Static",
+        "linear": "ffrobot.actuation.control.linear:Linear",
+        "placement": "ffrobot.actuation.control.placement:PatchPlacement",
+        "motors-only": "ffrobot.mbs.analysis.motors_only:MotorsOnly",
+        "tracking": "ffrobot.mbs.analysis.tracking:Tracking",
+        "closed-loop": "ffrobot.actuation.control.closed_loop:ClosedLoop",
+    },
+)
+"""Where the record of each kind is: its module is imported when a scene has such an analysis."""
 
-AnyKind = Pcid | Fcid | Forward | Static | Linear | PatchPlacement | MotorsOnly | Tracking | ClosedLoop
-
-Analysis = Annotated[AnyKind, Field(discriminator="kind")]
+AnyKind = Annotated[Analysis, KINDS]
 """One table [[analysis]] of a scene, of the kind that it says."""
-
-KINDS: tuple[type[AnyKind], ...] = get_args(AnyKind)

@@ -7,10 +7,11 @@ from typing import Annotated
 
 from ..actuation.patches.records import PztLayout
 from ..actuation.points import ActuationPoints
+from ..common.deferred import Table
 from ..mbs.fields.field_types import NotEmpty
 from ..mbs.fields.references import Reference, under
 from ..mbs.scene.mechanism import MechanismKeys, MechanismScene
-from .kinds import Analysis
+from .kinds import AnyKind
 
 
 class SceneKeys(MechanismKeys):
@@ -19,11 +20,11 @@ class SceneKeys(MechanismKeys):
     `geometric_stiffening` "auto" includes it if the loads of a run change the stiffness of a link by more than 1 %.
     """
 
-    pzt: tuple[PztLayout, ...] = ()
+    pzt: tuple[Table[PztLayout], ...] = ()
     """Layouts of piezoelectric patches; names distinguish several on one body."""
-    actuation_points: tuple[ActuationPoints, ...] = ()
+    actuation_points: tuple[Table[ActuationPoints], ...] = ()
     """Points of forces that replace the driving forces."""
-    analysis: Annotated[tuple[Analysis, ...], NotEmpty]
+    analysis: Annotated[tuple[AnyKind, ...], NotEmpty]
     """Analyses, in this order."""
 
     @property

@@ -24,7 +24,7 @@ from ...common.numbers import MOST_OUTPUTS
 from ..fields.field_types import NotNegative
 from ..fields.waypoints import spline
 from ..model.gears import refuse_prescribed_motors
-from ..model.model import Model, row_values, without_paths
+from ..model.model import Model, path_errors, without_paths
 from ..scene.analysis import Analysis, Check, Need, TimedAnalysis, output_times
 from ..solve.integrators import Choice
 from ..solve.servo import Servo, make_servo
@@ -48,6 +48,7 @@ class AroundPath(Details):
 
     pre_actuation: float
     post_actuation: float
+    held: Model = field(repr=False)
     inversion: Inversion[Any] | None = field(default=None, repr=False)
 
 
@@ -154,6 +155,8 @@ class MotorsOnly(TimedAnalysis):
 
     is_integrated = True
     applicable = ("joints",)
+    supplies_all = True
+    follows_jerk = True
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
@@ -209,7 +212,7 @@ def run_motors_only(context: Context, analysis: MotorsOnly) -> Outcome:
         raise SolveError(f"{servo.where}: no motion was found ({inversion.status}): {cause_of(inversion)}")
     seconds = time.perf_counter() - began
 
-    around = AroundPath(pre_actuation=pre, post_actuation=post, inversion=inversion)
+    around = AroundPath(pre_actuation=pre, post_actuation=post, inversion=inversion, held=inversion.servo.model)
 
     @cache
     def look_closer() -> Outcome:
@@ -240,12 +243,6 @@ def _run(analysis: MotorsOnly, model: Model, inversion: Inversion[Servo], times:
         statistics=statistics,
         prescribed=Prescription(servo.equations, inversion.shape, servo.near[0]),
     )
-
-
-def path_errors(held: Model, times: Array, q: Array) -> dict[str, Array]:
-    """By trajectory of `held` how far (T, m) what follows it is off at `times` (T,) and q (T, n_q), in m or rad."""
-    C, owners = row_values(held, q, times)[0], [row.owner if row.is_trajectory else "" for row in held.rows]
-    return {path.name: C[:, [owner == path.name for owner in owners]] for path in held.scene.trajectory}
 
 
 def _warnings(inversion: Inversion[Servo], run: Outcome) -> tuple[str, ...]:

@@ -194,10 +194,14 @@ class Details:
 
     Attributes:
         pre_actuation, post_actuation: s for which motors act before and after the path.
+        held: the robot whose constraint equations hold it on a path that the run follows with an error.
+        warnings: why it may be wrong, a text each.
     """
 
     pre_actuation: float = 0.0
     post_actuation: float = 0.0
+    held: Model | None = None
+    warnings: tuple[str, ...] = ()
 
 
 class Prescription(NamedTuple):

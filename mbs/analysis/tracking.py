@@ -21,7 +21,7 @@ from ...common.errors import InputError, SolveError
 from ...common.validation import Record
 from ..fields.field_types import NotNegative, Positive
 from ..model.gears import refuse_prescribed_motors
-from ..model.model import Model, modal_directions, without_paths
+from ..model.model import Model, modal_directions, path_errors, without_paths
 from ..scene.analysis import Check, Need, TimedAnalysis, output_times
 from ..solve.integrators import Choice
 from ..solve.servo import Servo, make_servo
@@ -30,7 +30,7 @@ from ..solve.tracking import Limits, Objective, Tracked, Transition, Weights, re
 from ..solve.zero_dynamics import Linearisation, Stopped, equilibrium, linearise
 from .context import Context, PatchedLink
 from .forward import Forward, run_forward
-from .motors_only import AroundPath, check_rest, durations, path_errors, where
+from .motors_only import AroundPath, check_rest, durations, where
 from .outcome import Forces, Motion, Outcome, Prescription, Statistics
 from .samples import path_times
 from .tracking_advice import Bounds, bounds_of_zeros, enough_path_time, enough_time, far_patches, rough_ends
@@ -81,6 +81,7 @@ class Tracking(TimedAnalysis):
 
     is_integrated = True
     applicable = ("joints", "joints+pzt")
+    supplies_all = True
 
     @property
     def times(self) -> Array:
@@ -117,7 +118,6 @@ class TrackedPath(AroundPath):
         least_share: the same as a share of the limits; NaN where no patch has any.
         objective: what was made small, `effort` unless limits do not allow it.
         cost: the effort, without unit.
-        held: the robot whose constraint equations hold it on its path.
         unmet: see `Tracked`.
         bounds: what each zero requires, V; None where motors alone have no bounded motion.
         voltage_prices, torque_prices: `Tracked.prices` by body, and by joint.
@@ -129,7 +129,6 @@ class TrackedPath(AroundPath):
     least_share: float
     objective: Objective
     cost: float
-    held: Model
     unmet: float
     bounds: Bounds | None
     voltage_prices: Mapping[str, Array]

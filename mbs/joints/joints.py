@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, get_args
 
-from pydantic import Field
-
+from ...common.deferred import Deferred
 from ..fields.spelling import TaggedInPlane
 from .cylindrical import CylindricalJoint
 from .free import FreeJoint
@@ -28,7 +27,7 @@ AnyJoint = Annotated[
     | PlanarJoint
     | WeldJoint
     | FreeJoint,
-    Field(discriminator="type"),
+    Deferred("type"),
     TaggedInPlane(),
 ]
 """All types, by the key `type`: a new one is a file beside this one and an entry here."""

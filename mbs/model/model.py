@@ -210,6 +210,12 @@ def row_values(model: Model, q: Array, times: Array, frames: Sequence[Motion] | 
     return values, gradients
 
 
+def path_errors(held: Model, times: Array, q: Array) -> dict[str, Array]:
+    """By trajectory of `held` how far (T, m) what follows it is off at `times` (T,) and q (T, n_q), in m or rad."""
+    C, owners = row_values(held, q, times)[0], [row.owner if row.is_trajectory else "" for row in held.rows]
+    return {path.name: C[:, [owner == path.name for owner in owners]] for path in held.scene.trajectory}
+
+
 def by_section(compute: Callable[[Section], T]) -> Callable[[Section], T]:
     """`compute` with what it found of each section kept: rows of one point share theirs."""
     known: dict[int, T] = {}

@@ -5,8 +5,8 @@ THE list of kinds is `ffrobot.scene.kinds`. Times in s.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from typing import Annotated, ClassVar, Literal, NamedTuple, Self, get_args
+from collections.abc import Callable, Iterator, Sequence
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Self, get_args
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -31,15 +31,15 @@ class Need(NamedTuple):
 
 
 class Surroundings(NamedTuple):
-    """Where an analysis stands: those before it, itself and those after it, and all kinds that there are."""
+    """Where an analysis stands: those before it, itself and those after it, and what returns all kinds."""
 
     earlier: Sequence[Analysis]
     later: Sequence[Analysis]
-    kinds: Sequence[type[Analysis]]
+    kinds: Callable[[], Sequence[type[Analysis]]]
 
     def replayable(self, way: str | None = None) -> str:
         """The kinds whose findings forward runs can apply, in this `way` or in any: `"pcid" or "fcid"`."""
-        found = [kind for kind in self.kinds if (way in kind.applicable if way else kind.applicable)]
+        found = [kind for kind in self.kinds() if (way in kind.applicable if way else kind.applicable)]
         return either(kind.kind_name() for kind in found)
 
 
@@ -63,6 +63,8 @@ class Analysis(Record):
     is_resumable: ClassVar[bool] = False  # whether a run that was stopped can be gone on with, under one tolerance
     allocates_patches: ClassVar[bool] = False  # whether patches and actuation points have to carry the forces it finds
     needs_actuators: ClassVar[bool] = False  # whether it makes sense only with motors or patches
+    supplies_all: ClassVar[bool] = False  # whether motors and patches leave less than its tolerance, or it says so
+    follows_jerk: ClassVar[bool] = False  # whether torques jump where the jerk of a path does
     takes_actuation: ClassVar[bool] = False  # whether it replays the actuation of its `source`
     applicable: ClassVar[tuple[str, ...]] = ()  # values of `apply` by which forward runs can replay what it finds
     findings: ClassVar[tuple[str, ...]] = ()  # ends before the last time that are results, not failures
@@ -110,6 +112,10 @@ class Analysis(Record):
     def is_checked(self) -> bool:
         """Whether what it finds is to be replayed on links with more modes."""
         return getattr(self, "check", None) is not None
+
+    def run(self, context: Any) -> Any:  # noqa: ANN401 (of the folders above: a kind says what it takes and finds)
+        """What is found."""
+        raise NotImplementedError
 
     def needs(self) -> Iterator[Need]:
         """Tables without which the scene makes no sense."""

@@ -10,6 +10,7 @@ import numpy as np
 from pydantic import Field, PlainValidator, ValidationInfo, field_validator, model_validator
 
 from ...common.arrays import Array
+from ...common.deferred import Table
 from ...common.names import PathName
 from ...common.numbers import MOST_MODES, SMALLEST
 from ...common.validation import InputFile, Record, existing_file
@@ -98,7 +99,7 @@ class RigidBody(Record):
     """Center of mass, m, axes of the body."""
     points: dict[Name, Vector] = Field(default_factory=dict)
     """Points for joints, loads and trajectories by name: m, axes of the body."""
-    visual: Annotated[tuple[Visual, ...], IN_SPACE] = ()
+    visual: Annotated[tuple[Table[Visual], ...], IN_SPACE] = ()
     """Shapes that pictures show."""
 
     @field_validator("inertia")
@@ -149,7 +150,7 @@ class BodyKeys(Record):
     modes, 3D scenes those of all families."""
     pieces: Literal["auto"] | Annotated[int, Field(ge=1, le=100)] | None = None
     """Number of welded segments of a beam link for large deflections; "auto" chooses it."""
-    rigid: RigidBody | None = None
+    rigid: Table[RigidBody] | None = None
     """Data of a rigid body."""
 
     @model_validator(mode="after")

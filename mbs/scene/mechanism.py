@@ -9,6 +9,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
+from ...common.deferred import Table
 from ...common.names import Title
 from ...common.validation import Record
 from ..fields.field_types import NotEmpty, Quantity
@@ -87,13 +88,13 @@ class MechanismKeys(Record):
     """Frames of tools, fixed to points of bodies."""
     joint: tuple[AnyJoint, ...] = ()
     """Joints between bodies, or to the ground; bodies without a joint are free."""
-    trajectory: tuple[Trajectory, ...] = ()
+    trajectory: tuple[Table[Trajectory], ...] = ()
     """Prescribed motions."""
-    load: tuple[Load, ...] = ()
+    load: tuple[Table[Load], ...] = ()
     """Prescribed forces, torques and voltages."""
-    payload: tuple[Payload, ...] = ()
+    payload: tuple[Table[Payload], ...] = ()
     """Masses on points."""
-    initial: Initial = Initial.model_construct()
+    initial: Table[Initial] = Initial.model_construct()
     """Initial state."""
 
     @property

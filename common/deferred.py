@@ -1,0 +1,64 @@
+"""Tables whose validators are built when a file has such a table: most files have few of the kinds that there are."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from importlib import import_module
+from typing import Annotated, Any, TypeVar, get_args
+
+from pydantic import BaseModel, GetCoreSchemaHandler, ValidationInfo
+from pydantic_core import CoreSchema, core_schema
+
+RECORD = "deferred_record"
+"""Key of the metadata of a core schema: what `loaded` takes."""
+
+
+@dataclass(frozen=True)
+class Deferred:
+    """Marks the record of a table, or a union of records that the key `tag` tells apart.
+
+    `modules` has the records by the value of that key, "MODULE:RECORD", where no union does. A module is imported when
+    a file has such a table.
+    """
+
+    tag: str = ""
+    modules: Mapping[str, str] = field(default_factory=dict, hash=False)
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:  # noqa: ANN401
+        if not self.tag:
+            return _deferred(source)
+        of_union = {get_args(one.model_fields[self.tag].annotation)[0]: one for one in get_args(source)}
+        records = self.modules or of_union
+        return core_schema.tagged_union_schema(
+            {value: _deferred(record) for value, record in records.items()}, discriminator=self.tag
+        )
+
+    def records(self) -> list[type[Any]]:
+        """All of `modules`, imported."""
+        return [loaded(place) for place in self.modules.values()]
+
+
+def loaded(record: type[BaseModel] | str) -> type[BaseModel]:
+    """A record, or the one at "MODULE:RECORD"."""
+    if not isinstance(record, str):
+        return record
+    module, _, name = record.partition(":")
+    found: type[BaseModel] = getattr(import_module(module), name)
+    return found
+
+
+def _deferred(record: type[BaseModel] | str) -> CoreSchema:
+    def read(value: Any, info: ValidationInfo) -> BaseModel:  # noqa: ANN401
+        if isinstance(value, BaseModel):
+            return loaded(record).model_validate(value, context=info.context)
+        return loaded(record).model_validate_json(json.dumps(value, default=str), context=info.context)
+
+    return core_schema.with_info_plain_validator_function(read, metadata={RECORD: record})
+
+
+R = TypeVar("R", bound=BaseModel)
+
+Table = Annotated[R, Deferred()]
+"""A record whose validator is built when a file has such a table."""
