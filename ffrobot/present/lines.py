@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-
-from rich.console import Console
-from rich.table import Table
+from typing import TYPE_CHECKING
 
 from ..mbs.quantities.validity import Bending, deflection_warning, largest
 from ..mbs.solve.integrators import Choice
+
+if TYPE_CHECKING:  # a solve prints lines alone
+    from rich.console import Console
+    from rich.table import Table
 
 
 def alike(lines: Iterable[tuple[str, str]]) -> Iterator[str]:
@@ -47,6 +49,8 @@ def integrator_lines(choices: Mapping[str, Choice]) -> Iterator[str]:
 
 def plain_table(*headers: str) -> Table:
     """Columns of text without lines: the first ones left, numbers right; names fold where they must."""
+    from rich.table import Table
+
     table = Table(box=None, padding=(0, 2, 0, 0), pad_edge=False)
     for k, header in enumerate(headers):
         if k < 2 or header == "integrator":

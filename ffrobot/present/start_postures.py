@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
-from rich.console import Console
 
 from ..common.arrays import Array
 from ..common.rotations import rpy_of
@@ -20,6 +20,9 @@ from ..results.file import Results
 from ..run.solve import prepare_scene
 from ..run.watcher import Watcher
 from .lines import print_table
+
+if TYPE_CHECKING:
+    from rich.console import Console
 
 
 def print_start(path: Path, watcher: Watcher, console: Console) -> None:
