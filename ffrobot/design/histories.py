@@ -12,7 +12,7 @@ from ..common.errors import InputError, did_you_mean
 from ..mbs.joints.joints import JOINT_TYPES
 from ..results.datasets import COLUMN
 from ..results.file import Results
-from ..results.meanings import RESULTS, meaning
+from ..results.meanings import meaning
 from ..sweep.runs import is_vector
 
 JOINT = re.compile(r"(?P<analysis>[^/]+)/joints/(?P<joint>[^/]+)")
@@ -107,7 +107,7 @@ def _unit(results: Results, name: str) -> str:
     """Where the dataset has one only; of a joint that of its coordinates, where these are all angles or all ways."""
     if name.endswith(f"/{POWER}"):
         return "W"
-    known = meaning(name.partition("/")[2], RESULTS)
+    known = meaning(name.partition("/")[2])
     if known is None or "," not in known.unit:
         return known.unit if known is not None else ""
     match = JOINT.match(name)

@@ -109,14 +109,14 @@ def _results(file: h5py.File) -> str:
     lines = [f"results of scene {file.attrs['name']!r}, made by ffrobot {file.attrs['ffrobot_version']}"]
     for name, body in json.loads(file.attrs["modal_bodies"]).items():
         lines.append(f"body {name}: {body['path']} (sha256 {body['sha256'][:12]})")
-    analyses = Table("analysis", "kind", "status", "outputs", "up to t (s)", "steps", "wall (s)")
+    analyses = Table("analysis", "kind", "status", "outputs", "up to t (s)", "steps", "evaluations", "wall (s)")
     datasets = Table("dataset", "shape", "unit", "what")
     loops = Table(*LOOP_COLUMNS, box=None, padding=(0, 1, 0, 0))
     for name, group in file.items():
         time, attributes = group["time"], group.attrs
         analyses.add_row(
             name, attributes["kind"], status_in_words(attributes), f"{len(time)}", f"{time[-1]:g}",
-            f"{attributes['steps']}",
+            f"{attributes['steps']}", f"{attributes['evaluations']}",
             f"{attributes['wall_seconds']:.3f}",
         )  # fmt: skip
         if "control/commands" in group:

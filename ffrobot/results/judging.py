@@ -58,9 +58,9 @@ def _judge(name: str, group: h5py.Group, scene: Scene, coordinates: Coordinates)
 
 
 def _end(scene: Scene, name: str) -> float:
-    """Of an analysis, s; 0 of one without duration."""
+    """Of an analysis, s, by default that of its actuation; 0 of one without duration."""
     keys: Mapping[str, Any] = next((keys for keys in scene.get("analysis", []) if keys["name"] == name), {})
-    return float(keys.get("end") or 0.0)
+    return float(keys["end"]) if "end" in keys else _end(scene, keys["actuation"]) if "actuation" in keys else 0.0
 
 
 def _motors(group: h5py.Group, coordinates: Coordinates) -> dict[str, MotorFeasibility]:

@@ -3,39 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from fnmatch import fnmatchcase
 from typing import TYPE_CHECKING, Any
 
 from xarray import Dataset
 
 from .joints import joint_coordinates
-from .meanings import RESULTS, meaning
+from .meanings import LABELS, meaning
 
 if TYPE_CHECKING:
     from ..common.arrays import Array
     from .datasets import Datasets
 
 TIME, SAMPLES = "time", "control/time"
-AXES, QUATERNION, STRESS = ("x", "y", "z"), ("w", "x", "y", "z"), ("xx", "yy", "zz", "yz", "xz", "xy")
-DIMENSIONS: tuple[tuple[str, str, tuple[str, ...]], ...] = (
-    ("bodies/*/modal*", "mode of {}", ()),
-    ("*/quaternion", "quaternion", QUATERNION),
-    ("bodies/*/*", "axis", AXES),
-    ("points/*/*", "axis", AXES),
-    ("momentum/*", "axis", AXES),
-    ("joints/*/reaction*", "axis", AXES),
-    ("joints/*/*", "coordinate of {}", ()),
-    ("pzt/*/residual_force", "mode", ()),
-    ("pzt/*/*", "patch of {}", ()),
-    ("trajectories/*/*", "component of {}", ()),
-    ("stress/*/points/*/stress", "stress", STRESS),
-    ("constraint_violation", "level", ("position", "velocity", "acceleration")),
-    ("control/*", "{}", ()),
-)
-"""Of datasets with columns: the name of their dimension, {} for the second part of their own, and its labels.
-
-Without labels columns are numbered from 1.
-"""
 
 
 def labelled(results: Datasets, analysis: str, histories: Sequence[str]) -> Dataset:
@@ -75,8 +54,9 @@ def _add(results: Datasets, analysis: str, name: str, variables: dict[str, Any],
 def _columns(results: Datasets, analysis: str, name: str, values: Array) -> tuple[str, Sequence[Any]]:
     """Name and labels of the second dimension of a dataset (T, columns)."""
     count, part = values.shape[1], [*name.split("/"), name][1]
-    pattern = next((row for row in DIMENSIONS if fnmatchcase(name, row[0])), (name, name, ()))
-    dimension, labels = pattern[1].format(part), list(pattern[2][:count])
+    known = meaning(name)
+    columns = known.columns if known is not None and known.columns else name
+    dimension, labels = columns.format(part), list(LABELS.get(columns, ())[:count])
     if name.startswith("trajectories/"):
         labels = [str(one) for one in results.attributes(f"{analysis}/trajectories/{part}")["components"]]
     return dimension, labels if len(labels) == count else list(range(1, count + 1))
@@ -84,7 +64,7 @@ def _columns(results: Datasets, analysis: str, name: str, values: Array) -> tupl
 
 def _about(results: Datasets, name: str) -> dict[str, str]:
     """Unit and meaning; of a joint's datasets those of its kind of coordinate."""
-    known = meaning(name, RESULTS)
+    known = meaning(name)
     if known is None:
         return {}
     units, parts = known.unit.split(", "), name.split("/")

@@ -1,4 +1,4 @@
-"""Unit and meaning of every dataset of results and modal body files: for `ffrobot info`.
+"""Unit, meaning and columns of every dataset of results and modal body files: THE table.
 
 docs/reference/files.md says more of them; a test compares both with files as they are written.
 """
@@ -10,52 +10,61 @@ from fnmatch import fnmatchcase
 from types import MappingProxyType
 from typing import NamedTuple
 
+LABELS: Mapping[str, tuple[str, ...]] = MappingProxyType({
+    "axis": ("x", "y", "z"),
+    "quaternion": ("w", "x", "y", "z"),
+    "stress": ("xx", "yy", "zz", "yz", "xz", "xy"),
+    "level": ("position", "velocity", "acceleration"),
+})  # fmt: skip
+"""Names of columns by what they are of; others are numbered from 1."""
+
 
 class Meaning(NamedTuple):
-    """`unit` (empty: none) and a few words."""
+    """`unit` (empty: none) and a few words; what `columns` over time are of, {} for the second part of the name."""
 
     unit: str
     what: str
+    columns: str = ""
 
 
 def _table(text: str) -> Mapping[str, Meaning]:
-    """Lines "PATTERN | unit | what"; * stands for a name, ** at the end for all below."""
+    """Lines "PATTERN | unit | what | columns"; * stands for a name, ** at the end for all below."""
     rows = (tuple(part.strip() for part in line.split("|")) for line in text.strip().splitlines())
-    return MappingProxyType({pattern: Meaning(unit, what) for pattern, unit, what in rows})
+    return MappingProxyType({pattern: Meaning(*about) for pattern, *about in rows})
 
 
 RESULTS = _table("""
 time | s | of outputs
 step_ends | s | where steps end, with keep_steps
-bodies/*/position | m | of the body's frame
+bodies/*/position | m | of the body's frame | axis
 bodies/*/angle | rad | of the body's frame
-bodies/*/quaternion | | of the body's frame, w first
-bodies/*/velocity | m/s | of the body's frame
-bodies/*/angular_velocity | rad/s | of the body's frame
-bodies/*/modal | m √kg | modal coordinates
-bodies/*/modal_velocity | m √kg/s | their rates
+bodies/*/quaternion | | of the body's frame, w first | quaternion
+bodies/*/velocity | m/s | of the body's frame | axis
+bodies/*/angular_velocity | rad/s | of the body's frame | axis
+bodies/*/modal | m √kg | modal coordinates | mode of {}
+bodies/*/modal_velocity | m √kg/s | their rates | mode of {}
 bodies/*/modal_transform | | from fewer modes to those of the file
-bodies/*/modal_force | N/√kg | what patches would have to supply
-points/*/position | m | of the point
-points/*/deflection | m | in the body's frame
-points/*/quaternion | | of the section, w first
-points/*/predicted_shift | m | by unmet modal forces
-trajectories/*/force | N, N m | on the point, or on the joint
-trajectories/*/target | m, rad | the path
-trajectories/*/error | m, rad | how far the point is off the path
-joints/*/coordinate | rad, m | of the second body on the first
-joints/*/rate | rad/s, m/s | of the coordinate
-joints/*/moment | N m, N | of the motor, at the joint
-joints/*/motor_moment | N m, N | of the motor, before its gear
-joints/*/motor_angle | rad | of the motor, behind its compliant gear
-joints/*/motor_rate | rad/s | likewise
-joints/*/gear_moment | N m | that the gear transmits
-joints/*/reaction | N | on the second body
-joints/*/reaction_moment | N m | on the second body
-pzt/*/voltage | V | within the limit
-pzt/*/required_voltage | V | without the limit
+bodies/*/modal_force | N/√kg | what patches would have to supply | mode of {}
+points/*/position | m | of the point | axis
+points/*/deflection | m | in the body's frame | axis
+points/*/quaternion | | of the section, w first | quaternion
+points/*/predicted_shift | m | by unmet modal forces | axis
+trajectories/*/force | N, N m | on the point, or on the joint | component of {}
+trajectories/*/target | m, rad | the path | component of {}
+trajectories/*/error | m, rad | how far the point is off the path | component of {}
+joints/*/coordinate | rad, m | of the second body on the first | coordinate of {}
+joints/*/rate | rad/s, m/s | of the coordinate | coordinate of {}
+joints/*/moment | N m, N | of the motor, at the joint | coordinate of {}
+joints/*/motor_moment | N m, N | of the motor, before its gear | coordinate of {}
+joints/*/motor_angle | rad | of the motor, behind its compliant gear | coordinate of {}
+joints/*/motor_rate | rad/s | likewise | coordinate of {}
+joints/*/gear_moment | N m | that the gear transmits | coordinate of {}
+joints/*/reaction | N | on the second body | axis
+joints/*/reaction_moment | N m | on the second body | axis
+pzt/*/voltage | V | within the limit | patch of {}
+pzt/*/required_voltage | V | without the limit | patch of {}
 pzt/*/residual | N/√kg | modal force left unmet, its size
-pzt/*/residual_force | N/√kg | modal force left unmet, by mode
+pzt/*/residual_force | N/√kg | modal force left unmet, by mode | mode
 pzt/*/edges | m | begin and end of each patch
 pzt/*/moment_per_volt | N m/V | of each patch
 pzt/*/stiffness_ratio | | of link to patch
@@ -67,10 +76,10 @@ actuation_points/*/position | m | where a component acts
 actuation_points/*/direction | | of a component
 patch_structure/** | | without and with the patches' mass and stiffness
 feasibility/** | | required against available
-stress/*/points/*/stress | Pa | xx, yy, zz, yz, xz, xy
+stress/*/points/*/stress | Pa | xx, yy, zz, yz, xz, xy | stress
 stress/*/points/*/von_mises | Pa | von Mises
 stress/*/surface/von_mises_max | Pa | largest on the surface
-stress/*/surface/position_of_max | m | where, in the undeformed link
+stress/*/surface/position_of_max | m | where, in the undeformed link | axis
 stress/*/layers/** | SI | below patches that stiffen the link
 stress/*/modal | m √kg | vibrations with static deflection
 stress/*/loads | N, N m, m/s², 1/s² | sizes of the unit loads
@@ -78,9 +87,9 @@ energy/kinetic | J | of all bodies
 energy/strain | J | of all links
 energy/gravitational | J | of all bodies
 energy/dissipated_power | W | by damping and friction
-momentum/linear | kg m/s | of all bodies
-momentum/angular | kg m²/s | of all bodies, about the origin
-constraint_violation | | of position, velocity, acceleration; relative
+momentum/linear | kg m/s | of all bodies | axis
+momentum/angular | kg m²/s | of all bodies, about the origin | axis
+constraint_violation | | of position, velocity, acceleration; relative | level
 resume/** | | what --resume needs
 tracking/voltage_price/* | 1/V | by how much less the objective is per volt of limit
 tracking/torque_price/* | SI | by how much less the objective is per unit of limit
@@ -113,10 +122,10 @@ linear/zeros/* | rad/s | real and imaginary part
 placement/** | | patches that were found
 tip_error | m | distance from the reference
 control/time | s | of samples
-control/readings | | of sensors, in their units
-control/reference | | what they would read on the reference
-control/commands | N m, V | within limits
-control/wanted | N m, V | before limits
+control/readings | | of sensors, in their units | readings
+control/reference | | what they would read on the reference | reference
+control/commands | N m, V | within limits | commands
+control/wanted | N m, V | before limits | wanted
 """)
 
 MODAL_BODY = _table("""
@@ -170,7 +179,7 @@ remarks | | what the part's file holds and the body does not
 """)
 
 
-def meaning(name: str, table: Mapping[str, Meaning]) -> Meaning | None:
+def meaning(name: str, table: Mapping[str, Meaning] = RESULTS) -> Meaning | None:
     """Of a dataset by its name below its analysis, or in its file; None of one that is not known."""
     if name in table:
         return table[name]

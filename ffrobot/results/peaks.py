@@ -10,16 +10,14 @@ import numpy as np
 
 from ..common.arrays import Array, as_floats
 from ..common.peaks import largest, root_mean_square
+from .meanings import meaning
 
-SCALARS = (
-    "joints/*/rate", "joints/*/moment", "joints/*/motor_moment", "joints/*/motor_rate", "joints/*/gear_moment",
-    "pzt/*/voltage", "pzt/*/required_voltage", "trajectories/*/force", "actuation_points/*/force",
-    "stress/*/points/*/von_mises", "stress/*/surface/von_mises_max",
+PEAKING = (
+    "points/*/deflection", "joints/*/rate", "joints/*/moment", "joints/*/motor_moment", "joints/*/motor_rate",
+    "joints/*/gear_moment", "joints/*/reaction", "joints/*/reaction_moment", "pzt/*/voltage", "pzt/*/required_voltage",
+    "trajectories/*/force", "actuation_points/*/force", "stress/*/points/*/von_mises", "stress/*/surface/von_mises_max",
 )  # fmt: skip
-"""Datasets whose columns have a peak each."""
-
-VECTORS = ("points/*/deflection", "joints/*/reaction", "joints/*/reaction_moment")
-"""Datasets whose length has one; the moment in a joint of the plane is its own length."""
+"""Datasets with peaks: of each column, of vectors of the length; the moment in a joint of the plane is its own."""
 
 VOLTAGE = "pzt/*/voltage"
 
@@ -77,10 +75,11 @@ def _histories(group: h5py.Group, count: int) -> Iterator[tuple[str, Array]]:
     names: list[str] = []
     group.visititems(lambda name, item: names.append(name) if isinstance(item, h5py.Dataset) else None)
     for name in names:
-        if any(fnmatchcase(name, pattern) for pattern in (*SCALARS, *VECTORS)) and group[name].shape[0] == count:
+        if any(fnmatchcase(name, pattern) for pattern in PEAKING) and group[name].shape[0] == count:
             values = as_floats(group[name][()].reshape(count, -1))
             yield name, np.linalg.norm(values, axis=1, keepdims=True) if _is_vector(name) else values
 
 
 def _is_vector(name: str) -> bool:
-    return any(fnmatchcase(name, pattern) for pattern in VECTORS)
+    known = meaning(name)
+    return known is not None and known.columns == "axis"

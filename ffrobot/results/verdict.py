@@ -92,6 +92,12 @@ class AnalysisVerdict:
         return "limits exceeded" if factor > 1.0 else "cannot do it"
 
     @property
+    def reached_in_words(self) -> str:
+        """The last output, s; of a run that ended early also where it should have ended."""
+        reached, end = self.reached
+        return f"{reached:g}" if self.status == "completed" else f"{reached:g} of {end:g}"
+
+    @property
     def worst(self) -> tuple[str, float]:
         """The actuator that is nearest to its limit, or farthest beyond, with the ratio; "" and 0 without limits."""
         motors = [(f"motor {name}", motor.factor) for name, motor in self.motors.items()]

@@ -18,6 +18,7 @@ from ..common.errors import InputError
 from ..common.files import write_atomically
 from ..common.locks import is_running, this_process
 from ..results.file import Results
+from ..results.meanings import meaning
 from ..run.inputs import changed, digest_of_file
 from .files import SCENE
 from .workers import Workers
@@ -39,10 +40,6 @@ REDUCTIONS: Mapping[str, Callable[[Array], Any]] = {
 
 STANDARD = ("joints/{}/moment", "pzt/{}/required_voltage", "pzt/{}/voltage", "points/{}/deflection")
 """Histories of which the largest value is in every table."""
-
-PER_COORDINATE = ("coordinate", "rate", "moment")
-"""Datasets of joints whose columns are coordinates of one joint, no vector."""
-
 
 PER_MODE = ("frequency", "damping_ratio")
 OF_MODES = {"linear", "joints_locked", "joints_compliant"}
@@ -191,9 +188,9 @@ def is_spectrum(name: str) -> bool:
 
 def is_vector(results: Results, name: str, values: Array) -> bool:
     """Whether columns of the dataset `name`, `values` (T, columns), are components of one vector."""
-    parts = name.split("/")
+    known = meaning(name.partition("/")[2])
     dimension = 3 if results.scene.get("space") == "spatial" else 2
-    return values.shape[1] == dimension and "pzt" not in parts and parts[-1] not in (*PER_COORDINATE, *PER_MODE)
+    return known is not None and known.columns in ("axis", "component of {}") and values.shape[1] == dimension
 
 
 def collected(request: str) -> tuple[str, str]:
