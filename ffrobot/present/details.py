@@ -31,7 +31,7 @@ def print_details(
     solution: Solution, verdict: Verdict, path: Path, seconds: Mapping[str, float], console: Console
 ) -> None:
     """Tables of the analyses and what they found, wall time per stage, what was skipped, where the results are."""
-    console.print(_analyses(solution))
+    console.print(_analyses(solution, verdict))
     bending = {name: result.bending for name, result in solution.analyses.items()}
     texts = {name: result.warnings for name, result in solution.analyses.items()}
     for line in warning_lines(bending, texts):
@@ -114,9 +114,17 @@ def _inversion(run: Outcome, around: AroundPath) -> str:
     )
 
 
-def _analyses(solution: Solution) -> Table:
+def _analyses(solution: Solution, verdict: Verdict) -> Table:
     table = plain_table(
-        "analysis", "kind", "integrator", "end (s)", "steps", "tolerance", "constraint\nviolation", "wall (s)"
+        "analysis",
+        "kind",
+        "integrator",
+        "end (s)",
+        "steps",
+        "evaluations",
+        "tolerance",
+        "constraint\nviolation",
+        "wall (s)",
     )
     for name, result in solution.analyses.items():
         analysis, run, is_integrated = result.analysis, result.run.statistics, result.analysis.is_integrated
@@ -124,20 +132,14 @@ def _analyses(solution: Solution) -> Table:
             name,
             analysis.kind,
             run.integrator.in_words if is_integrated else "",
-            _end(result),
+            verdict[name].reached_in_words,
             f"{run.steps}" if is_integrated else "",
+            f"{run.evaluations}" if is_integrated else "",
             f"{analysis.tolerance:.0e}" if is_integrated else "",
             f"{result.motion.violation.max(initial=0.0):.0e}",
             f"{run.wall_seconds:.3f}",
         )
     return table
-
-
-def _end(result: AnalysisResult) -> str:
-    """The last output, s, or how far a run came that ended early."""
-    run = result.run
-    ended_early = run.status != "completed"
-    return f"{run.time_reached:g} of {run.analysis.last_time:g}" if ended_early else f"{run.time[-1]:g}"
 
 
 def voltage_table(found: Iterable[tuple[str, str, PatchArray, Voltages]]) -> Table:

@@ -81,8 +81,7 @@ def _analysis(one: AnalysisVerdict) -> Row:
 def _remark(one: AnalysisVerdict) -> str:
     """What matters most beside the numbers."""
     if one.status != "completed":
-        reached, end = one.reached
-        return f"{one.status} at {reached:g} of {end:g} s"
+        return f"{one.status} at {one.reached_in_words} s"
     name, factor = one.worst
     _, saturated, _ = one.answer.rpartition(", ")[2].partition(" % of the samples saturated")
     texts = (

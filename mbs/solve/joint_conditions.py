@@ -21,6 +21,14 @@ LOCKED, COMPLIANT = "locked", "compliant"
 DEPENDENT = 1e-9  # of the largest singular value: below it a coordinate follows from others
 
 
+class FreeCoordinates(NamedTuple):
+    """z of unit kinetic amplitude with δs = N z (f, m), NᵀK N and NᵀD N (m, m)."""
+
+    N: Array
+    K: Array
+    D: Array
+
+
 @dataclass(frozen=True)
 class JointCondition:
     """Of a robot at one instant, with the joints that have motors locked, or the motors alone behind compliant gears.
@@ -30,10 +38,12 @@ class JointCondition:
         compliance: (k, k) by "BODY.POINT": translations (m) along the axes of the space, of a tool its own, then
             rotations (rad) about them, by forces (N) and moments (N·m); infinite where a joint without a motor lets
             the robot move.
+        free: the coordinates that the condition leaves free.
     """
 
     modes: RobotModes
     compliance: Mapping[str, Array]
+    free: FreeCoordinates
 
 
 class Stiffness(NamedTuple):
@@ -64,19 +74,19 @@ def joint_conditions(mechanism: LinearMechanism) -> dict[str, JointCondition]:
     return {condition: _in_condition(mechanism, condition) for condition in (LOCKED, COMPLIANT)[: 1 + has_gears]}
 
 
-def condition_coordinates(mechanism: LinearMechanism, condition: str) -> tuple[Array, Array, Array]:
-    """N (f, m), of unit kinetic amplitude, with what the condition lets joints do; NᵀK N and NᵀD N."""
+def free_coordinates(mechanism: LinearMechanism, condition: str) -> FreeCoordinates:
+    """What the condition lets joints and modes do."""
     names = list(_coordinates(mechanism) if condition == LOCKED else _shafts(mechanism))
     back = np.linalg.inv(np.linalg.cholesky(mechanism.M)).T
     R = np.array([mechanism.outputs[name] for name in names]).reshape(len(names), len(back))
     N = back @ free_directions(np.asarray(R @ back, dtype=float))
-    return N, N.T @ mechanism.K @ N, N.T @ mechanism.D @ N
+    return FreeCoordinates(N, N.T @ mechanism.K @ N, N.T @ mechanism.D @ N)
 
 
-def frequency_response(mechanism: LinearMechanism, condition: str, point: str, omega: Array) -> ComplexArray:
-    """(F, k) of a point at `omega` (F,), rad/s: its motion along and about each axis (a tool's own) by a unit load."""
-    N, K, D = condition_coordinates(mechanism, condition)
-    J, w = mechanism.of_tool(point) @ N, omega[:, None, None]
+def frequency_response(free: FreeCoordinates, J: Array, omega: Array) -> ComplexArray:
+    """(F, k) at `omega` (F,), rad/s: motion along each row of `J` (k, f) by a unit load along it."""
+    (N, K, D), w = free, omega[:, None, None]
+    J = J @ N
     X = np.linalg.solve(K + 1j * w * D - w**2 * np.eye(len(K)), np.broadcast_to(J.T, (len(omega), *J.T.shape)))
     return np.asarray(np.einsum("ki,fik->fk", J, X))
 
@@ -96,10 +106,10 @@ def _shafts(mechanism: LinearMechanism) -> Iterator[str]:
 
 
 def _in_condition(mechanism: LinearMechanism, condition: str) -> JointCondition:
-    N, K, D = condition_coordinates(mechanism, condition)
+    N, K, D = free = free_coordinates(mechanism, condition)
     modes = _largest_real(robot_modes(K, D, N, mechanism.transformation))
     compliance = {point: _compliance(K, mechanism.of_tool(point) @ N) for point in mechanism.points}
-    return JointCondition(modes, compliance)
+    return JointCondition(modes, compliance, free)
 
 
 def _largest_real(modes: RobotModes) -> RobotModes:

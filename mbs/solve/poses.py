@@ -15,8 +15,8 @@ from .joint_conditions import (
     COMPLIANT,
     LOCKED,
     JointCondition,
-    condition_coordinates,
     frequency_response,
+    free_coordinates,
     joint_conditions,
     translational_stiffness,
 )  # fmt: skip
@@ -64,8 +64,8 @@ class PoseEvaluator:
         for condition, found_there in joint_conditions(mechanism).items():
             found |= {f"joints_{condition}/{name}": value for name, value in self._of_condition(found_there).items()}
             if len(self._omega):
-                J = frequency_response(mechanism, condition, self.point, self._omega)
-                found[f"joints_{condition}/response"] = np.abs(J[:, : len(self.space.translations)])
+                response = frequency_response(found_there.free, mechanism.of_tool(self.point), self._omega)
+                found[f"joints_{condition}/response"] = np.abs(response[:, : len(self.space.translations)])
         frames = tree.frames(q[None])
         found["robot"] = np.array([[tree.motion(end, q[None], frames).r[0] for end in pair] for pair in self.segments])
         return found
@@ -90,7 +90,7 @@ class PoseEvaluator:
         rest, first, last = np.zeros(self.model.tree.n_v), 0.0, np.inf
         mechanism = straight = self._linear.at(0.0, q, rest, rest)
         for _ in range(MOST_STEPS):
-            N, K, _ = condition_coordinates(mechanism, condition)
+            N, K, _ = free_coordinates(mechanism, condition)
             try:
                 step = -np.linalg.solve(K, N.T @ mechanism.force)
             except np.linalg.LinAlgError:
