@@ -40,7 +40,7 @@ def _judge(name: str, group: h5py.Group, scene: Scene, coordinates: Coordinates)
         kind=str(about["kind"]),
         status=str(about["status"]),
         cause=str(about.get("cause", "")),
-        reached=(float(group["time"][-1]), _end(scene, name)),
+        reached=(float(group["time"][-1]), end_of(scene, name)),
         answer=answer,
         feasible=feasible,
         motors=motors,
@@ -57,10 +57,10 @@ def _judge(name: str, group: h5py.Group, scene: Scene, coordinates: Coordinates)
     )
 
 
-def _end(scene: Scene, name: str) -> float:
+def end_of(scene: Scene, name: str) -> float:
     """Of an analysis, s, by default that of its actuation; 0 of one without duration."""
     keys: Mapping[str, Any] = next((keys for keys in scene.get("analysis", []) if keys["name"] == name), {})
-    return float(keys["end"]) if "end" in keys else _end(scene, keys["actuation"]) if "actuation" in keys else 0.0
+    return float(keys["end"]) if "end" in keys else end_of(scene, keys["actuation"]) if "actuation" in keys else 0.0
 
 
 def _motors(group: h5py.Group, coordinates: Coordinates) -> dict[str, MotorFeasibility]:

@@ -11,6 +11,7 @@ from rich.console import Console
 from ffrobot.present.details import print_details
 from ffrobot.present.summary import LINES, summary_lines
 from ffrobot.results.file import Results
+from ffrobot.results.judging import end_of
 from ffrobot.results.write import results_image
 from ffrobot.run.solve import solve_scene
 from ffrobot.run.watcher import Watcher
@@ -45,6 +46,12 @@ SPATIAL = PLANAR | {
 }
 
 
+def test_a_replay_ends_with_its_actuation():
+    static, inverse, replay = {"name": "rest"}, {"name": "inverse", "end": 0.4}, {"name": "replay"}
+    scene = {"analysis": [static, inverse, replay | {"actuation": "inverse"}]}
+    assert [end_of(scene, name) for name in ("rest", "inverse", "replay")] == [0.0, 0.4, 0.4]
+
+
 @pytest.mark.parametrize("keys", [PLANAR, SPATIAL], ids=["planar", "3D"])
 def test_planar_and_3d_scenes_have_the_same_details(keys, tmp_path):
     solution = solve_scene(make_scene(**keys), Watcher())
@@ -53,8 +60,8 @@ def test_planar_and_3d_scenes_have_the_same_details(keys, tmp_path):
     print_details(solution, verdict, tmp_path / "x.h5", solution.seconds, Console(file=printed, width=200))
     lines = printed.getvalue().splitlines()
     header = next(line for line in lines if line.startswith("analysis"))
-    columns = ("analysis", "kind", "integrator", "end (s)", "steps", "tolerance", "violation", "wall (s)")
-    assert " ".join(header.split()) == " ".join(columns)
+    columns = "analysis kind integrator end (s) steps evaluations tolerance violation wall (s)"
+    assert " ".join(header.split()) == columns
     table = {line.split()[0]: line.split() for line in lines if line.startswith(("inverse ", "short "))}
     assert table["inverse"][3] == "0.1"
     assert table["short"][4:6] == ["of", "0.1"]
