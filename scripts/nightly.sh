@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# What a push leaves out: all seeds of random inputs, tests that take minutes, faults that tests have to catch.
+# What a push leaves out: all seeds of random inputs, tests marked nightly or long, faults that tests have to catch.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
-./test.sh --all-seeds
+./test.sh --nightly
 .venv/bin/python -m pytest -n auto --dist loadfile tests/stress --long
 .venv/bin/python tests/campaigns/faults.py

@@ -23,6 +23,7 @@ from ffrobot.mesh import form_cache
 
 pytest_plugins = ["costs"]
 MANY_SEEDS = 6
+TOGETHER = {"stress": "tests/stress/", "cases": ("tests/references/test_references", "tests/results/test_summary")}
 CASES = Path(__file__).parent.parent / "cases"
 OTHER_COMMAND = os.environ.get("FFROBOT_COMMAND")  # an older version's, to see whether a test fails there
 
@@ -69,17 +70,19 @@ class SolvedCase:
 
 
 def pytest_addoption(parser):
-    parser.addoption("--all-seeds", action="store_true", help="tests of random inputs with all seeds, not every third")
+    parser.addoption("--nightly", action="store_true", help="all seeds of random inputs, and tests marked nightly")
 
 
 def pytest_collection_modifyitems(config, items):
-    """Of many seeds of a test every third, unless all are asked for (scripts/nightly.sh)."""
-    if config.getoption("--all-seeds"):
+    """Of many seeds of a test every third, and none marked nightly, unless all are asked for (scripts/nightly.sh)."""
+    if config.getoption("--nightly"):
         return
     seeds = defaultdict(set)
     for item in items:
         seeds[_function(item)].add(_seed(item))
-    left_out = [item for item in items if len(seeds[_function(item)]) >= MANY_SEEDS and (_seed(item) or 0) % 3]
+    many = {name for name, of_name in seeds.items() if len(of_name) >= MANY_SEEDS}
+    left_out = [item for item in items if item.get_closest_marker("nightly")
+                or (_function(item) in many and (_seed(item) or 0) % 3)]  # fmt: skip
     if left_out:
         config.hook.pytest_deselected(items=left_out)
         left_out = set(left_out)
@@ -108,12 +111,12 @@ def pytest_runtest_protocol(item):
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_make_scheduler(config, log):
-    """With --dist loadfile, all of tests/stress as one file: its table knows what all of them have tried."""
+    """With --dist loadfile some files go as one: those of tests/stress fill a table, two solve all cases."""
     from xdist.scheduler import LoadFileScheduling
 
     class Scheduling(LoadFileScheduling):
         def _split_scope(self, nodeid):
-            return "tests/stress" if nodeid.startswith("tests/stress/") else super()._split_scope(nodeid)
+            return next((group for group, names in TOGETHER.items() if nodeid.startswith(names)), nodeid.split("::")[0])
 
     return Scheduling(config, log) if config.getoption("dist") == "loadfile" else None
 

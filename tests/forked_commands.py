@@ -36,10 +36,10 @@ class Commands:
         self._seconds = 0.0  # of its commands, which the system counts as its own when it ends
         self._environment = {}
 
-    def run(self, arguments, environment, folder, timeout):
-        """As `subprocess.run(["ffrobot", *arguments], …)` with both streams captured as text."""
+    def run(self, arguments, environment, folder, timeout, *, merged=False):
+        """As `subprocess.run(["ffrobot", *arguments], …)` with both streams captured as text, `merged` in stdout."""
         with tempfile.TemporaryDirectory(prefix="ffrobot-command-") as streams:
-            out, err = (Path(streams, name) for name in ("out", "err"))
+            out, err = (Path(streams, name) for name in ("out", "out" if merged else "err"))
             request = {"arguments": arguments, "environment": environment, "folder": str(folder or Path.cwd())}
             server = self._started(environment)
             server.stdin.write(json.dumps(request | {"out": str(out), "err": str(err)}) + "\n")
@@ -51,7 +51,7 @@ class Commands:
             code, seconds = json.loads(server.stdout.readline())
             Commands.seconds += seconds
             self._seconds += seconds
-            told = [stream.read_text(encoding="utf-8") for stream in (out, err)]
+            told = [out.read_text(encoding="utf-8"), "" if merged else err.read_text(encoding="utf-8")]
         command = ["ffrobot", *arguments]
         if late:
             raise subprocess.TimeoutExpired(command, timeout, *told)
@@ -105,7 +105,7 @@ def perform(arguments, environment, folder, out, err):
     os.environ.update(environment)
     nothing = os.open(os.devnull, os.O_RDONLY)
     for path, stream in ((None, 0), (out, 1), (err, 2)):
-        os.dup2(nothing if path is None else os.open(path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600), stream)
+        os.dup2(nothing if path is None else os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o600), stream)
     sys.argv = ["ffrobot", *arguments]
     from ffrobot.__main__ import main as command_line
 

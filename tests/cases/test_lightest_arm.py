@@ -1,8 +1,6 @@
 """The lightest arm: tubes that `ffrobot optimise` finds, by the condition of an optimum, and as solids from STEP."""
 
 import re
-import subprocess
-import sys
 
 import numpy as np
 import pytest
@@ -44,6 +42,7 @@ def arm(case_copy):
     return case_copy("lightest_arm").parent
 
 
+@pytest.mark.nightly
 def test_the_chosen_tubes_are_at_the_optimum(arm):
     """What is found keeps the limit to 1e-6, and trades walls alike: a tip error that bending alone makes is
     a/I₁ + b/I₂ with moments of area I, b/I₂ found by a run with another forearm; dm/dI over dε/dI is the same for both.
@@ -83,8 +82,7 @@ def test_chosen_tubes_keep_the_limits(arm, scene):
 
 
 def test_solids_from_step_do_the_same(arm):
-    """Tubes as gmsh draws and meshes them, against Timoshenko beams: masses of the drawing, and the tip error."""
-    subprocess.run([sys.executable, arm / "make_parts.py"], check=True, capture_output=True)
+    """Tubes as gmsh meshes them, against Timoshenko beams: masses of the drawing, and the tip error."""
     with_holes(arm, CHOSEN)
     beam, _ = tip_error(arm / "scene.toml")
     with ffrobot.solve(arm / "solid.toml") as results:

@@ -31,7 +31,7 @@ def thrown(point, arm, **more):
     )  # fmt: skip
 
 
-@pytest.mark.parametrize("integrator", ["dop853", "radau"])
+@pytest.mark.parametrize("integrator", ["dop853", pytest.param("radau", marks=pytest.mark.nightly)])
 def test_a_link_flies_the_same_whichever_section_has_the_joint(integrator):
     """Modes of the clamped link move the tip, not the root: one flight in two sets of coordinates."""
     of_root = thrown("root", 0.0)
