@@ -13,6 +13,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from multiprocessing import get_context
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -30,7 +31,7 @@ from ..scene.load import load_scene
 from ..scene.scene import Scene
 from .grid import parse_grid
 
-PLAN, PARTS = "plan.json", "parts"
+PLAN, POSTURES, PARTS = "plan.json", "postures.npz", "parts"
 A_PART = 64  # poses that one process judges before it asks for more
 OUT_OF_REACH, OUTSIDE_LIMITS, NO_EQUILIBRIUM = 1, 2, 3
 STATUS = ("found", "out of reach", "outside joint limits", "no equilibrium")
@@ -116,14 +117,17 @@ def make_map(plan: MapPlan, processes: int, watcher: Watcher) -> PoseMap:
     solution = prepare_scene(plan.scene, watcher)
     _check_point(solution, plan.point)
     watcher.stage("postures")
-    postures = grid_postures(solution.model, plan.axes, plan.point, keeps_orientation=plan.keeps_orientation)
+    request = _request(plan)
+    kept = _kept_postures(plan, request)
+    postures = kept or grid_postures(solution.model, plan.axes, plan.point, keeps_orientation=plan.keeps_orientation)
     good = postures.reached & postures.within
     if not good.any():
         raise SolveError(f"{plan.scene}: no pose of the grid is within reach and the limits of the joints")
     evaluator = PoseEvaluator(
         solution.model, postures.q[int(good.argmax())], plan.point, count=plan.count, omega=2 * np.pi * plan.frequencies
     )
-    _claim(plan)
+    if kept is None:
+        _claim(plan, request, postures)
     parts = {_name(part, postures): part for part in _parts(np.flatnonzero(good))}
     found = dict(_judged(plan, evaluator, postures, parts, processes, watcher))
     return _assembled(plan, solution, evaluator, postures, [(parts[name], found[name]) for name in parts])
@@ -218,27 +222,41 @@ def _write(path: Path, found: Mapping[str, Array]) -> None:
     write_atomically(path, content.getvalue(), "part of the map", make_folder=True, ours=True)
 
 
-def _claim(plan: MapPlan) -> None:
-    """Start the folder, or go on with the same map; what was made from other input is judged again."""
-    tables = read_tables(plan.scene)
-    inputs = fingerprints(tables, plan.scene)
+def _request(plan: MapPlan) -> dict[str, Any]:
+    """What a map is of, and fingerprints of its input."""
     asked = {
         "scene": str(plan.scene.absolute()),
         "axes": [[axis.name, axis.values.tolist()] for axis in plan.axes],
         "point": plan.point, "keeps_orientation": plan.keeps_orientation, "count": plan.count,
         "frequencies": plan.frequencies.tolist(),
     }  # fmt: skip
-    path = plan.folder / PLAN
-    before: dict[str, object] = {}
+    return {"asked": asked, "inputs": fingerprints(read_tables(plan.scene), plan.scene)}
+
+
+def _kept_postures(plan: MapPlan, request: Mapping[str, Any]) -> Postures | None:
+    """Those of an earlier run of the same map, to the last digit, by which its parts are named; None without one.
+
+    Raises `InputError` where the folder has other files.
+    """
+    before: dict[str, Any] = {}
     with suppress(OSError, ValueError):
-        before = json.loads(path.read_text(encoding="utf-8"))
+        before = json.loads((plan.folder / PLAN).read_text(encoding="utf-8"))
     if not before and plan.folder.exists() and any(plan.folder.iterdir()):
         raise InputError(f"{plan.folder}: output: expected a new folder or one of a map, found one with other files")
-    if before and (before.get("asked") != asked or changed(before.get("inputs", {}), inputs)):  # type: ignore[arg-type]
-        for file in (plan.folder / PARTS).glob("*.npz"):
-            file.unlink()
-    text = json.dumps({"asked": asked, "inputs": inputs})
-    write_atomically(path, text.encode(), "plan of the map", make_folder=True, ours=True)
+    if before.get("asked") != request["asked"] or changed(before.get("inputs", {}), request["inputs"]):
+        return None
+    found = _read(plan.folder / POSTURES) or {}
+    if found.keys() != set(Postures._fields):
+        return None
+    return Postures(found["q"], found["reached"].astype(bool), found["within"].astype(bool))
+
+
+def _claim(plan: MapPlan, request: Mapping[str, Any], postures: Postures) -> None:
+    """Start the folder; what was made from other input goes."""
+    for file in (plan.folder / POSTURES, *(plan.folder / PARTS).glob("*.npz")):
+        file.unlink(missing_ok=True)
+    write_atomically(plan.folder / PLAN, json.dumps(request).encode(), "plan of the map", make_folder=True, ours=True)
+    _write(plan.folder / POSTURES, postures._asdict())
 
 
 def _assembled(

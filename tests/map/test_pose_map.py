@@ -13,6 +13,7 @@ from strip_link import LINK
 
 from ffrobot import solve
 from ffrobot.common.errors import InputError
+from ffrobot.map import pose_map
 from ffrobot.map.map_file import write_map
 from ffrobot.map.pose_map import make_map, plan_map
 from ffrobot.map.quantities import quantities
@@ -161,6 +162,28 @@ def test_a_killed_map_goes_on_and_is_the_same(arm, tmp_path):
     assert before.items() <= after.items()
     for name, values in whole.values.items():
         np.testing.assert_array_equal(again.values[name], values)
+
+
+def test_poses_judged_before_stay_where_inverse_kinematics_rounds_otherwise(arm, tmp_path, monkeypatch):
+    """It does from process to process: postures come from the folder, and what was judged of them is not lost."""
+    over = ("x=0.5:0.9:12", "y=-0.3:0.3:12")
+    whole = mapped(arm, tmp_path / "map", *over)
+    first, *others = sorted((tmp_path / "map" / "parts").glob("*.npz"))
+    assert others
+    first.unlink()
+    before = {file.name: file.stat().st_mtime_ns for file in others}
+    exact = pose_map.grid_postures
+
+    def rounded(*inputs, **keys):
+        found = exact(*inputs, **keys)
+        return found._replace(q=np.nextafter(found.q, np.inf))
+
+    monkeypatch.setattr(pose_map, "grid_postures", rounded)
+    again = mapped(arm, tmp_path / "map", *over)
+    after = {file.name: file.stat().st_mtime_ns for file in (tmp_path / "map" / "parts").glob("*.npz")}
+    assert before.items() <= after.items()
+    assert after.keys() == {first.name, *before}
+    np.testing.assert_array_equal(again.q, whole.q)
 
 
 @pytest.mark.parametrize(
