@@ -14,12 +14,11 @@ from ..fe_models.modal_body import ModalBody
 from ..mbs.model.body import Body
 from ..mbs.quantities.motion import RobotMotion
 from ..mbs.scene.analysis import Analysis
-from .feasibility import Feasibility, ModalMotion, PatchFeasibility, judge_patches
+from .feasibility import Feasibility, ModalMotion, PatchFeasibility, Unsupplied, judge_patches, seen_at_points
 from .motors import judge_motors
 from .patches.link_patches import LinkPatches, on_kept_modes, with_count
 from .patches.records import PztLayout
 from .patches.voltages import Voltages, voltage_gain
-from .unsupplied import Unsupplied, seen_at_points
 
 ROUNDING = 1e-6  # of the largest modal force: less is what ill-conditioned patches leave
 NEGLIGIBLE = 1e-6  # of the length of a link, of a deflection; rad

@@ -10,7 +10,7 @@ import click
 
 import ffrobot
 from ffrobot.cli import cli
-from ffrobot.design.front_record import Front
+from ffrobot.design.front import Front
 from ffrobot.design.optimum_record import Optimum
 from ffrobot.design.screening import Screening
 from ffrobot.design.sensitivity_record import Sensitivity

@@ -7,12 +7,10 @@ from dataclasses import dataclass
 from itertools import combinations
 
 from ...mbs.analysis.outcome import Details
-from ...mbs.solve.joint_conditions import JointCondition
-from ...mbs.solve.robot_modes import RobotModes
+from ...mbs.solve.joint_conditions import JointCondition, RobotModes
 from .linear_model import LinearModel
-from .modes import Reach, controllability, observability, robot_modes
+from .modes import Reach, Zeros, controllability, observability, robot_modes, zeros
 from .suggestion import Suggestion, unhurried_gains
-from .zeros import Zeros, zeros
 
 
 @dataclass(frozen=True)

@@ -11,11 +11,10 @@ from ...common.arrays import Array
 from ...common.errors import InputError
 from ...mbs.solve.linearisation import LinearMechanism
 from .controllers import Setup, modal_columns
-from .linear_model import LinearModel, state_space
+from .linear_model import LinearModel, SampledModel, sampled, state_space
 from .modes import controllability, observability
 from .records import JointPid, Lqr
 from .robot import estimate
-from .sampling import SampledModel, sampled
 
 MOST_STATES = 500  # with which the Riccati equation takes seconds, not minutes
 MOVED = 0.05  # of a discrete pole, from which on feedback acts on the motion

@@ -13,10 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...common.arrays import Array, ComplexArray, as_floats
-from .linear_model import LinearModel
+from .linear_model import LinearModel, sampled
 from .modes import locked_frequencies
 from .records import ControllerRecord, JointPid, ModalVelocity
-from .sampling import sampled
 
 STABLE = 1.0 + 1e-6  # of a spectral radius: undamped modes and joints without a controller are at 1, to rounding
 LARGEST_GAIN, LEAST_GAIN, LONGEST_DELAY = 1e4, 1e-2, 50.0  # that margins are sought to: factors, and sample times

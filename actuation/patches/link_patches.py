@@ -22,8 +22,7 @@ from ...mbs.model.divided_link import spread_of
 from .composite import Placed
 from .effects import Effects, effects
 from .patches import PatchArray, assembled, check_edges, edges_on_piece, patch_edges
-from .reach import Reach, check_all_served, served_first, weights
-from .reached_modes import ReachedModes, reached_modes
+from .reach import Reach, ReachedModes, check_all_served, reached_modes, served_first, weights
 from .records import PztLayout
 from .sections import check_sections
 from .voltages import Voltages, allocation, solve_voltages

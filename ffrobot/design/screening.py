@@ -26,8 +26,7 @@ from .designs import runs_of
 from .finding import CsvFile, Finding, Section, failed_runs, file_name, floats, with_unit
 from .goals import parse_goal
 from .readings import Reading
-from .spread_designs import SpreadDesigns, read_spreads
-from .spreads import Spread
+from .spreads import Spread, SpreadDesigns, read_spreads
 from .uncertainty import is_history
 from .uncertainty_record import UNCHANGED, goal_line, with_error
 

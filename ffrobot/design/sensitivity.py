@@ -38,6 +38,7 @@ from .derivatives import (
     Known,
     Sample,
     entries,
+    exact_entries,
     followed,
     sample,
     values_of,
@@ -45,7 +46,6 @@ from .derivatives import (
     wants_smaller_steps,
 )
 from .designs import Designs, Point, Runs, parse_key, runs_of
-from .frequencies import exact_entries
 from .goals import parse_goal
 from .readings import Goal, Reading
 from .scenes import changes_for, may_repeat, repeated_steps

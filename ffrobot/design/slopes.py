@@ -22,10 +22,9 @@ import numpy as np
 
 from ..common.arrays import Array, as_floats
 from ..sweep.sweep import Key
-from .derivatives import Base
+from .derivatives import Base, exact_entries
 from .differences import weights
 from .evaluations import Evaluated, Evaluations
-from .frequencies import exact_entries
 from .readings import Followed
 from .variables import Place
 

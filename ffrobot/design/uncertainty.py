@@ -21,8 +21,7 @@ from .designs import Design, Point, runs_of
 from .goals import parse_goal
 from .histories import History, read_history
 from .readings import Goal
-from .spread_designs import SpreadDesigns, read_spreads
-from .spreads import LinearModel, spread_points
+from .spreads import LinearModel, SpreadDesigns, read_spreads, spread_points
 from .statistics import Indices, Statistics, regression_shares, sobol_indices, statistics
 from .uncertainty_record import Band, Uncertainty
 

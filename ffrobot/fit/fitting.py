@@ -15,8 +15,7 @@ from ..common.files import AnyPath, check_new_file, write_atomically
 from ..common.toml_files import load_toml
 from ..fe_models.link_records import MeasuredMode, paired, read_measured
 from .least_squares import Fit, fit_frequencies
-from .robot_target import LinkTarget, RobotTarget
-from .toml_edit import Key
+from .robot_target import Key, LinkTarget, RobotTarget
 
 DIGITS = 8  # of fitted values in files: more than measured ones have
 

@@ -10,7 +10,7 @@ from rich.table import Table
 from ..actuation.control.linear_models import LinearModels
 from ..actuation.control.loop_record import LoopRecord
 from ..actuation.control.metrics import DEFINITIONS
-from ..actuation.control.placing import Placed
+from ..actuation.control.placement import Placed
 from ..common.arrays import Array
 from ..mbs.analysis.outcome import Details
 from ..mbs.analysis.static import RobotAtRest

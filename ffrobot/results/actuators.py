@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import h5py
 import numpy as np
 
-from ..actuation.feasibility import Feasibility
+from ..actuation.feasibility import Feasibility, Unsupplied
 from ..actuation.motors import MotorFeasibility
 from ..actuation.patches.patches import PatchArray
 from ..actuation.patches.records import PztLayout
@@ -17,7 +17,6 @@ from ..actuation.patches.structure import StructureEffect
 from ..actuation.patches.voltages import Voltages
 from ..actuation.point_forces import PointForces
 from ..actuation.points import PointSet
-from ..actuation.unsupplied import Unsupplied
 from ..common.arrays import Array
 from ..mbs.quantities.motion import RobotMotion
 from ..mbs.scene.space import SPACES, Space
@@ -25,7 +24,7 @@ from ..run.actuation import Actuation
 from ..run.solution import Solution
 
 if TYPE_CHECKING:  # most scenes have none of these
-    from ..actuation.control.placing import Placed
+    from ..actuation.control.placement import Placed
     from ..mbs.analysis.tracking import TrackedPath
 
 

@@ -11,7 +11,7 @@ import h5py
 import numpy as np
 
 from ..actuation.control.linear_model import LinearModel, save_arrays
-from ..actuation.control.zeros import Zeros
+from ..actuation.control.modes import Zeros
 from ..common.arrays import Array
 from ..mbs.quantities.motion import RobotMotion
 from ..mbs.solve.joint_conditions import COMPLIANT, LOCKED, translational_stiffness

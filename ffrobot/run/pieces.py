@@ -22,8 +22,7 @@ from ..mbs.model.body import BodyPoint
 from ..mbs.model.divided_link import spread_of
 from ..mbs.model.motors import MotorForces
 from ..mbs.quantities.attachment_error import PieceInMotion, missed_by_pieces
-from ..mbs.quantities.body_motion import BodyMotion, PointMotion
-from ..mbs.quantities.motion import RobotMotion, continuous
+from ..mbs.quantities.motion import BodyMotion, PointMotion, RobotMotion, continuous
 from ..mbs.quantities.second_order import IN_MOTION, Missing, largest_displacement
 from ..mbs.quantities.validity import ENOUGH, Bending, enough_pieces, link_bending, shape_from_chord
 from ..scene.pieces import BodyInPieces, bodies_in_pieces

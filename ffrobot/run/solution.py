@@ -33,8 +33,7 @@ from ..mbs.quantities.attachment_error import (
 )
 from ..mbs.quantities.motion import RobotMotion
 from ..mbs.quantities.path_seen import path_warnings
-from ..mbs.quantities.reactions import Energies, Momentum
-from ..mbs.quantities.sharing import Sharing
+from ..mbs.quantities.reactions import Energies, Momentum, Sharing
 from ..mbs.quantities.stress import BodyStress
 from ..mbs.quantities.validity import Bending, deflection_warning, doubts
 from ..mbs.scene.analysis import Analysis

@@ -11,15 +11,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..actuation.context import ActuatedContext
-from ..actuation.feasibility import Feasibility
+from ..actuation.feasibility import Feasibility, quasi_static_shift
 from ..actuation.point_forces import forces_at_points, solve_points
-from ..actuation.unsupplied import quasi_static_shift
 from ..common.arrays import Array
 from ..common.errors import FfrobotError, InputError, SolveError, of_file
 from ..mbs.analysis.outcome import Outcome
 from ..mbs.quantities.motion import RobotMotion
-from ..mbs.quantities.reactions import reactions, totals
-from ..mbs.quantities.sharing import shared_evenly
+from ..mbs.quantities.reactions import reactions, shared_evenly, totals
 from ..mbs.quantities.validity import NOTABLE_STIFFNESS_CHANGE
 from ..mbs.scene.analysis import Analysis
 from ..mbs.solve.reach import turned_guesses

@@ -19,9 +19,9 @@ from ..model.gears import with_compliance, with_prescribed_motors
 from ..model.model import Model, without_paths
 from ..model.rows import ConstraintRow
 from ..scene.analysis import Analysis, Surroundings, TimedAnalysis
+from ..solve.joint_conditions import robot_modes
 from ..solve.linearisation import LinearEquations, LinearMechanism
 from ..solve.redundancy import resolved
-from ..solve.robot_modes import robot_modes
 from ..solve.start import undeformed_posture
 from ..solve.statics import holding_multipliers, static_equilibrium, unstable_ways
 from .context import Context, place_of

@@ -1,16 +1,26 @@
-"""Forces in the joints of a tree, by the core's Newton–Euler algorithm, and its energies and momentum. Global axes."""
+"""Forces in the joints of a tree, by the core's Newton–Euler algorithm, and its energies and momentum. Global axes.
+
+How joints share loads where constraints of loops are redundant: what that leaves open, and a split.
+
+Constraints of loops depend on each other where rigid links hold what is held already, as parallel axes do. With C_v by
+joints and modes, multipliers λ0 with C_vᵀ λ0 = 0 change reactions without changing the motion.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 
-from ...common.arrays import Array
+from ...common.arrays import Array, Integers
 from ..model.known_motion import MotionForces, multiplier_forces
 from ..model.tree import Node
 from ..model.wrench import Wrench, without_work
+from ..scene.loads import OF_POINT
+from ..solve.posture import SINGULAR, robot_size, row_sizes
+from ..solve.statics import natural_sizes
 from .motion import RobotMotion
 
 
@@ -79,3 +89,90 @@ def totals(motion: RobotMotion) -> tuple[Energies, Momentum]:
     motion = motion.behind_gears
     found = motion.system.core.states_totals(motion.system.scene, motion.q, motion.v)
     return Energies(*found[:, :4].T), Momentum(found[:, 4:7], found[:, 7:])
+
+
+OPEN = 1e-6  # share of a component in reactions that change together, above which it is open
+SAMPLES = 5  # outputs that are looked at: constraints that depend on each other in all of them do so everywhere
+
+M = TypeVar("M", bound=RobotMotion)
+
+
+@dataclass(frozen=True)
+class Sharing:
+    """What redundant constraints of loops leave open.
+
+    Attributes:
+        redundant: how many constraints depend on others.
+        components: by joint those of its reaction that nothing determines: x, y, z, mx, my, mz, global axes.
+    """
+
+    redundant: int
+    components: Mapping[str, tuple[str, ...]]
+
+    @property
+    def in_words(self) -> str:
+        """One sentence."""
+        of_joints = "; ".join(f'"{joint}" ({", ".join(of)})' for joint, of in self.components.items())
+        return (
+            f"{self.redundant} constraints of kinematic loops are redundant: nothing determines how these reactions"
+            f" are shared: {of_joints}; the results are the least-squares solution. Use flexible links, or joints with"
+            " more degrees of freedom in loops"
+        )
+
+
+def shared_evenly(motion: M) -> tuple[M, Sharing | None]:
+    """The motion with the least sum of squares of all joints' forces, and moments over the robot's size; what is open.
+
+    None where nothing is: then the motion is as it was.
+    """
+    is_loop = motion.model.loop_rows
+    if not is_loop.any() or not len(motion.time):
+        return motion, None
+    B, measured = _multipliers_of_loops(motion)
+    row_scales = row_sizes(motion.model)[measured]
+    J = np.einsum("rm,tri->tmi", B, motion.rows[1][:, is_loop]) * natural_sizes(motion.model) / row_scales[:, None]
+    some = np.unique(np.linspace(0, len(J) - 1, SAMPLES).astype(int))
+    values = np.linalg.svd(J[some], compute_uv=False)
+    redundant = J.shape[1] - int(np.max(np.sum(values > SINGULAR * np.maximum(values[:, :1], 1.0), axis=1)))
+    if redundant == 0:
+        return motion, None
+    null = B @ (np.linalg.eigh(J @ J.swapaxes(1, 2))[1][:, :, :redundant] / row_scales[:, None])  # ascending
+    changes = [_side_by_side(motion, reactions_of_loops(motion, column)) for column in null.transpose(2, 0, 1)]
+    basis = np.stack(changes, axis=-1)  # (T, components, redundant)
+    even = -np.einsum("tkc,tc->tk", np.linalg.pinv(basis), _side_by_side(motion, reactions(motion)))
+    multipliers = motion.multipliers.copy()
+    multipliers[:, is_loop] -= np.einsum("trk,tk->tr", null, even)
+    components = _open(motion, basis)
+    return replace(motion, multipliers=multipliers), Sharing(redundant, components) if components else None
+
+
+def _multipliers_of_loops(motion: RobotMotion) -> tuple[Array, Integers]:
+    """B (rows that close loops, m): multipliers of these rows by those that do something; m rows with their measures.
+
+    In planar scenes only those in the plane do.
+    """
+    is_loop = motion.model.loop_rows
+    plane = motion.system.plane if motion.space.is_plane else None
+    if plane is None:
+        return np.eye(int(is_loop.sum())), np.flatnonzero(is_loop)
+    of_loops = is_loop[plane.followed]
+    B = motion.system.row_signs[:, None] * plane.spread
+    return B[np.ix_(is_loop, of_loops)], plane.followed[of_loops]
+
+
+def _side_by_side(motion: RobotMotion, found: Mapping[str, Wrench]) -> Array:
+    """(T, 6 joints) force and moment of the scene's joints, N, moments over the size of the robot."""
+    length = robot_size(motion.model)
+    parts = (found[joint.name] for joint in motion.model.scene.joint)
+    return np.hstack([values for acting in parts for values in (acting.force, acting.moment / length)])
+
+
+def _open(motion: RobotMotion, basis: Array) -> dict[str, tuple[str, ...]]:
+    """Components that the space has of joints which any combination of changes (T, 6 joints, redundant) moves."""
+    directions = np.linalg.svd(basis, full_matrices=False)[0]
+    joints = [joint.name for joint in motion.model.scene.joint]
+    moved = np.linalg.norm(directions, axis=2).max(axis=0).reshape(len(joints), len(OF_POINT)) > OPEN
+    space = motion.space
+    moved[:, [axis not in (*space.translations, *(3 + k for k in space.rotations)) for axis in range(6)]] = False
+    found = {name: tuple(np.array(OF_POINT)[of].tolist()) for name, of in zip(joints, moved, strict=True)}
+    return {name: components for name, components in found.items() if components}

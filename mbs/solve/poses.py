@@ -15,8 +15,8 @@ from .joint_conditions import (
     COMPLIANT,
     LOCKED,
     JointCondition,
-    frequency_response,
     free_coordinates,
+    frequency_response,
     joint_conditions,
     translational_stiffness,
 )  # fmt: skip

@@ -10,8 +10,7 @@ from scipy.io import loadmat
 from scipy.optimize import brentq
 
 from ffrobot.actuation.control.linear_model import state_space
-from ffrobot.actuation.control.modes import controllability, observability, robot_modes
-from ffrobot.actuation.control.zeros import zeros
+from ffrobot.actuation.control.modes import controllability, observability, robot_modes, zeros
 from ffrobot.common.errors import InputError
 from ffrobot.mbs.model.model import without_paths
 from ffrobot.mbs.solve.linearisation import LinearEquations

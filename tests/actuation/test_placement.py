@@ -6,7 +6,7 @@ from patches_on_links import SCENE, layout, patches, planar_body
 from scipy.linalg import solve_continuous_lyapunov
 
 from ffrobot.actuation.control.linear_model import state_space
-from ffrobot.actuation.control.placing import PatchableLink, locked_modes, place
+from ffrobot.actuation.control.placement import PatchableLink, locked_modes, place
 from ffrobot.actuation.control.records import Placement
 from ffrobot.common.errors import InputError
 from ffrobot.mbs.model.model import build_model
