@@ -109,6 +109,7 @@ def test_stated_errors_are_true_within_a_factor_of_five(name, stiffened):
             assert 0.2 < true / stated < 5
 
 
+@pytest.mark.nightly
 @pytest.mark.filterwarnings("ignore::ffrobot.FfrobotWarning")
 def test_stated_errors_of_two_pieces_against_six():
     """These are nearly ten times as accurate; the references above are not accurate enough to judge two."""

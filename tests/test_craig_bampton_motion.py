@@ -127,7 +127,7 @@ def slider_crank(folder, condition):
         joint=joints,
         initial={"state": "static", "angles": {"l1": 0.5, "l2": -0.18}},
         trajectory=[{"name": "turn", "joint": "main", "value": law(0.5, 2.0)}],
-        analysis=[{"name": "inverse", "kind": "pcid", "end": 0.5, "output_step": 0.005, "tolerance": 1e-6}],
+        analysis=[{"name": "inverse", "kind": "pcid", "end": 0.2, "output_step": 0.005, "tolerance": 1e-6}],
     )
 
 

@@ -176,26 +176,6 @@ def test_static_equilibrium_and_linear_model_in_3d():
     np.testing.assert_allclose(np.abs(eigenvalues), np.sqrt(K / MASS), rtol=1e-6)
 
 
-def test_a_flexible_arm_in_3d_is_the_one_in_the_plane():
-    """The same spring on the link that swings about z: the core in 3D against the one in the plane."""
-    link = LINK | {"modes": LINK["modes"] | {"attachment_modes": False}}  # whose masses the plane raises
-    motion = {"name": "free", "kind": "forward", "end": 0.02, "output_step": 0.002, "tolerance": 1e-10}
-    planar = ffrobot.solve(scene(spring, joint=HINGE, link=link, analysis=motion, initial={"angles": {"arm": 0.5}}))
-
-    def in_three_axes(t, position, velocity):
-        return *spring(t, position[:2], velocity[:2]), 0.0
-
-    turned = ffrobot.make_scene(
-        name="sprung", space="spatial", gravity=[0.0, 0.0, 0.0], body=[{"name": "arm", "link": link}],
-        joint=[HINGE | {"axis": [0.0, 0.0, 1.0]}], load=[{"point": "arm.tip", "force": in_three_axes}],
-        analysis=[{"output_step": 0.01} | motion], initial={"joints": {"O": 0.5}},
-    )  # fmt: skip
-    spatial = ffrobot.solve(turned)
-    key = "free/points/arm.tip/position"
-    np.testing.assert_allclose(spatial[key][:, :2], planar[key], rtol=0, atol=1e-8)
-    assert np.ptp(planar[key][:, 1]) > 1e-3  # it moves
-
-
 def test_what_functions_return_in_3d():
     with pytest.raises(ffrobot.InputError, match=r"expected a force \(x, y, z\), or \(x, y, z, mx, my, mz\), found"):
         ffrobot.solve(in_3d(lambda t, x, v: (1.0, 2.0), FREE))

@@ -13,7 +13,7 @@ pytestmark = pytest.mark.alone
 @pytest.fixture(scope="module")
 def rows(ffrobot, tmp_path_factory):
     folder = tmp_path_factory.mktemp("replays")
-    done = ffrobot("bench", "--part", "replays", "--repeat", "3", "--source", REPOSITORY, "-o", folder)
+    done = ffrobot("bench", "--part", "replays", "--repeat", "2", "--source", REPOSITORY, "-o", folder)
     assert done.returncode == 0, done.stderr
     with (folder / "replays.csv").open(encoding="utf-8", newline="") as stream:
         keys = ("scene", "what", "integrator", "tolerance")

@@ -91,13 +91,14 @@ def at_points():
     return planar, spatial | {"actuation_points": [{"body": "link1"}, {"body": "link2", "x": ["tip"], "y": across}]}
 
 
-def rough_loop():
-    """Friction and loads in all joints of a loop of rigid bars."""
+def rough_loop(order):
+    """Friction and loads in all joints of a loop of rigid bars, which is cut at the last."""
     rough = {"viscous_friction": 0.3, "coulomb_friction": 0.2, "friction_speed": 0.05}
-    joints = {name: rough | (RIGID_GEAR if name == "A" else {}) for name in "CABD"}
+    joints = {name: rough | (RIGID_GEAR if name == "A" else {}) for name in order}
     loads = [{"joint": "C", "moment": "0.7*sin(5*t)"}, {"joint": "B", "moment": "0.4 + t"}]
     released = INVERSE | {"name": "released", "kind": "forward"}
-    of_both = joints, [INVERSE, REPLAY, released, REST, LINEAR | {"points": ["coupler.tip"]}]
+    points = {"points": ["coupler.tip"]}
+    of_both = joints, [INVERSE, REPLAY, released, REST, LINEAR | points, MOVING | points]
     return four_bar.planar(*of_both, load=loads), four_bar.in_3d(*of_both, load=loads)
 
 
@@ -148,6 +149,9 @@ FEATURES = {  # what is compared in any case, beside motion and moments; the sce
         lambda: pair("two_link", INVERSE, REPLAY, MOVING, LINEAR, of_joints=GEARS), 1e-6,
     ),
     "motors on frames": ("frequency", lambda: pair("two_link", INVERSE, MOVING, LINEAR, motors="frame"), 1e-7),
+    "gears that give between frames": (
+        "frequency", lambda: pair("two_link", LINEAR, of_joints=GEARS[::-1], motors="frame"), 1e-7
+    ),
     "linear models": ("frequency", lambda: pair("two_link", INVERSE, MOVING, LINEAR), 1e-7),
     "linear models of a loop": (
         "frequency",
@@ -180,7 +184,8 @@ FEATURES = {  # what is compared in any case, beside motion and moments; the sce
     ),
     "stresses": ("von_mises", lambda: stressed("two_link", INVERSE, STRAIGHT, REST, payload=MASS), 1e-7),
     "stresses in a loop": ("von_mises", lambda: stressed("slider_crank", INVERSE, start=CRANK), 1e-7),
-    "friction in a loop": ("dissipated_power", rough_loop, 1e-8),
+    "friction in a loop": ("dissipated_power", lambda: rough_loop("CABD"), 1e-8),
+    "friction in a loop that is cut elsewhere": ("dissipated_power", lambda: rough_loop("ABDC"), 1e-8),
     "patches that stiffen": (
         "stiffness_ratio",
         lambda: one_link(PCID, structural=True, density=7800.0, face="both", limit=20.0), 1e-7,

@@ -66,23 +66,3 @@ def write(tables, path):
 def close(found, expected, share, least=1e-9):
     """To a share of the peak, which is `least` at the least."""
     np.testing.assert_allclose(found, expected, rtol=0, atol=share * max(np.abs(expected).max(), least))
-
-
-def compare_two_links(planar, spatial, analysis, share):
-    """What joints, the path and links of cases/two_link do, in the plane and in 3D."""
-    for joint in TWO_LINK:
-        for key in ("moment", "coordinate", "rate"):
-            name = f"{analysis}/joints/{joint}/{key}"
-            close(spatial[name], planar[name], share, 1e-6)
-        name = f"{analysis}/joints/{joint}/reaction"
-        close(spatial[name][:, :2], planar[name], share)
-        assert np.abs(spatial[name][:, 2]).max() < 1e-9 * np.abs(planar[name]).max()
-    name = f"{analysis}/trajectories/tip/force"
-    close(spatial[name], planar[name], share)
-    for link in ("link1", "link2"):
-        close(spatial[f"{analysis}/bodies/{link}/modal"], planar[f"{analysis}/bodies/{link}/modal"], share, 1e-6)
-        name = f"bodies/{link}/modal_force"  # of sagging links the small difference of large forces
-        peak = np.abs(planar[f"straight/{name}"]).max()
-        close(spatial[f"{analysis}/{name}"], planar[f"{analysis}/{name}"], share, peak)
-        name = f"{analysis}/points/{link}.tip/deflection"
-        close(spatial[name][:, :2], planar[name], share, 1e-6)

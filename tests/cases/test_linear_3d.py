@@ -1,7 +1,5 @@
 """Linear models of robots in 3D: gears, closed forms, bad input."""
 
-from itertools import zip_longest
-
 import numpy as np
 import pytest
 import scenes_in_3d
@@ -12,45 +10,6 @@ import ffrobot
 
 RIGID_GEAR = {"gear_ratio": 60.0, "rotor_inertia": 2e-4}
 GEARED = RIGID_GEAR | {"stiffness": 3e3, "damping": 2.0}
-
-
-def both(case, guess, analyses, folder, of_joints=(), of_bodies=None, **changes):
-    """Results of a planar scene and of the same in 3D; the joint on the ground has a motor."""
-    planar = scenes_in_3d.read(CASES / case / "scene.toml") | changes
-    planar.pop("pzt", None)
-    planar["joint"] = [joint | own for joint, own in zip_longest(planar["joint"], of_joints, fillvalue={})]
-    planar["body"] = [body | (of_bodies or {}) for body in planar["body"]]
-    planar["joint"][0]["motor"] = True
-    planar["analysis"] = analyses
-    spatial = scenes_in_3d.in_3d(planar) | {"initial": {"joints": guess}, "analysis": analyses}
-    return [
-        ffrobot.solve(scenes_in_3d.write(tables, folder / f"{name}.toml"))
-        for name, tables in (("planar", planar), ("spatial", spatial))
-    ]
-
-
-def same_models(planar, spatial, close, outputs=("joint/", "point/")):
-    """The same transfer from motors and forces in the plane to joints and points, and the same poles."""
-    for in_plane, in_3d in zip(planar, spatial, strict=True):
-        sources = [name for name in in_plane.input_names if name in in_3d.input_names]
-        targets = [name for name in in_plane.output_names if name in in_3d.output_names and name.startswith(outputs)]
-        assert any(name.startswith("joint/") for name in sources)
-        for start in outputs:
-            assert any(name.startswith(start) for name in targets)
-        omega = np.array([0.0, 3.0, 40.0, 700.0]) + 0.2
-        expected, found = (model.frequency_response(omega, sources, targets) for model in (in_plane, in_3d))
-        for k in range(len(omega)):
-            np.testing.assert_allclose(found[k], expected[k], rtol=0, atol=close * np.abs(expected[k]).max())
-
-
-def test_a_gear_between_links_gives_between_their_frames(tmp_path):
-    """At rest, where its rotor does nothing to the link that carries it."""
-    rest = [{"name": "rest", "kind": "linear"}]
-    planar, spatial = both(
-        "two_link", TWO_LINK, rest, tmp_path, of_joints=(RIGID_GEAR, GEARED), of_bodies={"modes": 2}, motors="frame"
-    )
-    with planar, spatial:
-        same_models(planar.linear("rest"), spatial.linear("rest"), 1e-7, outputs=("joint/", "motor/", "point/"))
 
 
 @pytest.mark.parametrize("turned", [False, True])

@@ -7,7 +7,6 @@ from scipy.interpolate import CubicSpline
 
 import ffrobot
 from ffrobot.actuation.control.rigid_arm import RigidArm
-from ffrobot.mbs.model import system
 from ffrobot.mbs.model.model import build_model
 from ffrobot.mbs.solve.start import undeformed_posture
 from ffrobot.run.bodies import load_bodies
@@ -32,23 +31,12 @@ def of_joints(order):
     return {name: ROUGH | ({"rotor_inertia": 1e-4, "gear_ratio": 30.0} if name == "A" else {}) for name in order}
 
 
-@pytest.fixture(scope="module")
-def in_the_plane():
-    return ffrobot.solve(ffrobot.make_scene(**planar(of_joints("ABDC"), ANALYSES, load=LOADS)))
-
-
-@pytest.fixture(scope="module", params=ORDERS)
-def solved(request, in_the_plane):
-    return in_the_plane, ffrobot.solve(ffrobot.make_scene(**in_3d(of_joints(request.param), ANALYSES, load=LOADS)))
-
-
 def close(found, expected, share=1e-9):
     np.testing.assert_allclose(found, expected, rtol=0, atol=share * max(np.abs(expected).max(), 1e-3))
 
 
-@pytest.mark.parametrize("analysis", ["inverse", "replay", "released", "implicit", "rest"])
-def test_motion_and_forces(solved, analysis):
-    expected, found = solved
+def same_motion(expected, found, analysis):
+    """Also forces."""
     for joint in SIDES:
         name = f"{analysis}/joints/{joint}"
         close(found[f"{name}/coordinate"], expected[f"{name}/coordinate"])
@@ -62,25 +50,14 @@ def test_motion_and_forces(solved, analysis):
             close(found[f"{analysis}/energy/{key}"], expected[f"{analysis}/energy/{key}"])
 
 
-@pytest.mark.parametrize("analysis", ["about rest", "in motion"])
-def test_linear_models(solved, analysis):
+def same_models(results, analysis):
     """Also in motion, where friction changes with the posture by way of the axes' rates."""
-    for expected, found in zip(*(results.linear(analysis) for results in solved), strict=True):
+    for expected, found in zip(*(of.linear(analysis) for of in results), strict=True):
         assert found.state_names == expected.state_names
         close(found.A, expected.A, 1e-8)
         close(found.B[:, found.inputs("joint/A")], expected.B[:, expected.inputs("joint/A")], 1e-8)
         names = [*(f"joint/{joint}" for joint in SIDES), "point/coupler.tip/x"]
         close(found.C[found.outputs(names)], expected.C[expected.outputs(names)], 1e-8)
-
-
-def test_the_plane_is_that_of_space(monkeypatch):
-    """The same cut solved by the core in the plane and by that in 3D."""
-    scene = ffrobot.make_scene(**in_3d(of_joints("ABDC"), ANALYSES[:3], load=LOADS))
-    plane = ffrobot.solve(scene)
-    monkeypatch.setattr(system, "in_plane", lambda *_: None)
-    space = ffrobot.solve(scene)
-    for name in ("inverse/joints/A/moment", "released/joints/C/rate", "released/joints/C/reaction"):
-        close(plane[name], space[name])
 
 
 @pytest.mark.parametrize("name", SIDES)
@@ -131,7 +108,9 @@ def test_motors_without_a_rotor_and_compliant_gears_in_all_joints_are_refused(ke
 BUILT = ROUGH | {"rotor_inertia": 0.05, "gear_ratio": 3.0}
 
 
-@pytest.mark.parametrize(("followed", "bare"), [("A", ""), ("C", ""), ("C", "C"), ("D", "D")])
+@pytest.mark.parametrize(
+    ("followed", "bare"), [pytest.param("A", "", marks=pytest.mark.nightly), ("C", ""), ("C", "C"), ("D", "D")]
+)
 def test_rotors_and_trajectories_in_all_joints(followed, bare):
     """The numbers of the plane, wherever the loop is cut: at a joint with a rotor, a trajectory or both."""
     start = closed(1.0)[followed]
@@ -147,9 +126,9 @@ def test_rotors_and_trajectories_in_all_joints(followed, bare):
         found = solved(in_3d, order)
         close(found["inverse/trajectories/turn/force"].ravel(), expected["inverse/trajectories/turn/force"].ravel())
         for analysis in ("inverse", "replay", "along", "released", "implicit", "rest"):
-            test_motion_and_forces((expected, found), analysis)
+            same_motion(expected, found, analysis)
         for analysis in ("about rest", "in motion"):
-            test_linear_models((expected, found), analysis)
+            same_models((expected, found), analysis)
 
 
 @pytest.mark.parametrize(("limits", "is_told"), [([0.0, 1.0], True), ([0.0, 1.5], False)])

@@ -1,7 +1,5 @@
 """Links in 3D in pieces: bent far in both planes and twisted, told as the one link, and in the plane as there."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from scipy.integrate import solve_bvp
@@ -9,8 +7,6 @@ from scipy.integrate import solve_bvp
 import ffrobot
 from ffrobot.common.errors import InputError
 from ffrobot.common.rotations import of_quaternion, of_rpy
-from ffrobot.fe_models.link_file import LinkTable
-from ffrobot.fe_models.pieces import cut
 
 BENT_AND_TWISTED = ["in-plane-bending", "out-of-plane-bending", "torsion"]
 RPY = (0.3, -0.4, 0.7)
@@ -216,7 +212,7 @@ def test_pieces_follow_a_path_at_a_tight_tolerance():
         assert results.attributes("inverse")["status"] == "completed"
 
 
-@pytest.mark.parametrize("condition", ["cantilever", "simply-supported"])
+@pytest.mark.parametrize("condition", ["cantilever", pytest.param("simply-supported", marks=pytest.mark.nightly)])
 def test_rates_of_the_one_link_are_derivatives(condition):
     """R, e and p of the link as found from the pieces, and the velocities that are told beside them."""
     fine = INVERSE | {"end": 0.4, "output_step": 0.0005}
@@ -237,56 +233,6 @@ def test_rates_of_the_one_link_are_derivatives(condition):
     np.testing.assert_allclose(found, body["angular_velocity"][1:-1], rtol=0, atol=1e-3 * size)
     again = body["position"] + np.einsum("tij,tj->ti", A, np.array([0.5, 0.0, 0.0]) + deflection)
     np.testing.assert_allclose(again, position, rtol=0, atol=1e-12)
-
-
-def test_pieces_are_those_of_the_plane():
-    """A double pendulum in pieces in 3D, and in the plane of links cut by hand and welded, with stiffening.
-
-    At rest the same but for rounding, where it falls to the tolerance of its steps.
-    """
-    soft = link(5e9, modes={"count": 8, "family": "in-plane-bending"})
-    runs = [
-        {"name": "fall", "kind": "forward", "end": 0.5, "output_step": 0.05, "tolerance": 1e-6},
-        {"name": "rest", "kind": "static"},
-    ]
-    hinge = {"type": "revolute", "motor": False}
-    joints = [
-        hinge | {"name": "O", "between": ["ground", "first.root"]},
-        hinge | {"name": "A", "between": ["first.tip", "second.root"]},
-    ]
-    in_3d = [joint | {"axis": [0.0, 0.0, 1.0]} for joint in joints]
-    bodies = [{"name": name, "link": soft, "pieces": 2} for name in ("first", "second")]
-    tables = cut(LinkTable(soft, Path("link.toml")), 2).tables
-    by_hand = [{"name": f"{name}{k}", "link": dict(tables[k].keys)} for name in ("first", "second") for k in range(2)]
-    welds = [
-        {"name": name, "type": "weld", "between": [f"{name}0.tip", f"{name}1.root"]} for name in ("first", "second")
-    ]
-    planar_joints = [
-        hinge | {"name": "O", "between": ["ground", "first0.root"]},
-        hinge | {"name": "A", "between": ["first1.tip", "second0.root"]},
-    ]
-    angles = {body["name"]: -1.2 for body in by_hand}
-    wind = {"x": "0.4", "y": "-0.1"}
-    planar = ffrobot.make_scene(
-        name="by_hand", gravity=[0.0, -9.81], geometric_stiffening=True, body=by_hand, joint=planar_joints + welds,
-        load=[{"point": "second1.tip", **wind}], initial={"angles": angles}, analysis=runs,
-    )  # fmt: skip
-    load = [{"point": "second.tip", **wind}]
-    keys = {"load": load, "initial": {"joints": {"O": -1.2}}, "analysis": runs}
-    spatial = solved(bodies, gravity=[0.0, -9.81, 0.0], joint=in_3d, **keys)
-    with spatial, ffrobot.solve(planar) as plane:
-        for analysis, share in (("rest", 1e-8), ("fall", 1e-5)):
-            for point, by in (
-                ("first.tip", "first1.tip"),
-                ("second.tip", "second1.tip"),
-                ("second.mid", "second0.tip"),
-            ):
-                found, expected = (of[f"{analysis}/points/{at}/position"] for of, at in ((spatial, point), (plane, by)))
-                np.testing.assert_allclose(found[:, :2], expected, rtol=0, atol=share)
-                assert np.abs(found[:, 2]).max() < 1e-9
-        for joint in "OA":
-            found, expected = (of[f"rest/joints/{joint}/reaction"] for of in (spatial, plane))
-            np.testing.assert_allclose(found[:, :2], expected, rtol=0, atol=1e-8 * np.abs(expected).max())
 
 
 def test_auto_takes_as_many_as_the_deflection_needs():

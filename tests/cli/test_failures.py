@@ -161,7 +161,14 @@ def test_ctrl_c_before_any_analysis_writes_nothing(two_link_copy, ffrobot, tmp_p
     assert sorted(folder.iterdir()) == before
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
+@pytest.mark.parametrize(
+    "number",
+    [
+        pytest.param(signal.SIGINT, marks=pytest.mark.nightly),
+        pytest.param(signal.SIGTERM, marks=pytest.mark.nightly),
+        signal.SIGKILL,
+    ],
+)
 def test_a_link_after_one_that_was_ended_while_it_compiled(two_link_copy, ffrobot, tmp_path, number):
     """Half a form in the cache holds nobody up: FFCx itself would wait for its compiler for ever."""
     folder = two_link_copy()
@@ -196,7 +203,7 @@ def test_reader_that_goes_away_is_no_error(ffrobot, two_link):
     assert process.stderr == ""
 
 
-LARGE = {"end = 1.0": "end = 0.2", "output_step = 0.001": "output_step = 2e-6"}
+LARGE = {"end = 1.0": "end = 0.1", "output_step = 0.001": "output_step = 2e-6"}
 
 
 @pytest.mark.parametrize("times", [1, 2])

@@ -28,7 +28,7 @@ def arrays(path):
     return found
 
 
-@pytest.mark.parametrize("condition", ["cantilever", "simply-supported"])
+@pytest.mark.parametrize("condition", ["cantilever", pytest.param("simply-supported", marks=pytest.mark.nightly)])
 def test_two_processes_make_the_same_file(ffrobot, link_on_two, tmp_path, condition):
     link = write_solid(tmp_path, condition=condition, divisions=(20, 1, 1), count=4)
     one, two = tmp_path / "one.h5", tmp_path / "two.h5"

@@ -6,7 +6,6 @@ from copy import deepcopy
 
 import numpy as np
 import pytest
-import tomli_w
 from small_robots import BEAM, CANTILEVER, FORCE, RHO, E, L
 
 import ffrobot
@@ -35,16 +34,6 @@ RATIO = "joint.shoulder.gear_ratio"
 DEFLECTION = 1e-3
 HEIGHT, WIDTH, OUTER, INNER = (f"links.beam.geometry.section.{key}" for key in ("height", "width", "outer", "inner"))
 STIFF = f"peak points.beam.tip.deflection <= {DEFLECTION}"
-
-
-@pytest.fixture
-def write(tmp_path):
-    def scene(keys):
-        path = tmp_path / "scene.toml"
-        path.write_text(tomli_w.dumps(keys), encoding="utf-8")
-        return path
-
-    return scene
 
 
 CATALOG = """name, rated_torque, peak_torque, max_speed, rotor_inertia, gear_ratio, mass, cost

@@ -5,7 +5,6 @@ from copy import deepcopy
 
 import numpy as np
 import pytest
-import tomli_w
 from small_robots import SWING, TUBE
 
 import ffrobot
@@ -29,16 +28,6 @@ SPACE = {
     "trajectory": [{"name": "swing", "joint": "shoulder", "value": "pi/4*(1 - cos(pi*t))"}],
     "analysis": [{"name": "inverse", "kind": "pcid", "end": 0.2, "output_step": 0.005}],
 }
-
-
-@pytest.fixture
-def write(tmp_path):
-    def scene(keys):
-        path = tmp_path / "scene.toml"
-        path.write_text(tomli_w.dumps(keys), encoding="utf-8")
-        return path
-
-    return scene
 
 
 def changed(scene, key, value):

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-import tomli_w
 from scipy.optimize import minimize
 from small_robots import CANTILEVER, FORCE, RHO, E, L
 
@@ -57,16 +56,6 @@ def least_peak(start):
     )  # fmt: skip
     assert found.success
     return found.x[:2], found.fun
-
-
-@pytest.fixture
-def write(tmp_path):
-    def scene(keys):
-        path = tmp_path / "scene.toml"
-        path.write_text(tomli_w.dumps(keys), encoding="utf-8")
-        return path
-
-    return scene
 
 
 def test_where_to_put_the_center_of_mass(write):

@@ -6,7 +6,6 @@ from math import sqrt
 import h5py
 import numpy as np
 import pytest
-import tomli_w
 from scipy.stats import norm, qmc
 from small_robots import ARM, MASS, PAYLOAD
 
@@ -27,16 +26,6 @@ BEAM = {
     "modes": {"count": 1, "family": "in-plane-bending", "attachment_modes": False},
     "damping": {"ratio": 0.02},
 }
-
-
-@pytest.fixture
-def write(tmp_path):
-    def scene(keys):
-        path = tmp_path / "scene.toml"
-        path.write_text(tomli_w.dumps(keys), encoding="utf-8")
-        return path
-
-    return scene
 
 
 def spread(kind, deviation, mean=0.0):

@@ -214,15 +214,3 @@ def oracle_of(assembly):
         (),
         robot.state_forces,
     )
-
-
-def on_constraints(assembly, t, q, v):
-    """(q, v) moved onto the constraints by least steps, as the oracle has these."""
-    oracle = oracle_of(assembly)
-    for _ in range(20):
-        C, _, C_q = oracle.constraint_values(t, q, v)
-        if np.abs(C).max(initial=0.0) < 1e-15:
-            break
-        q = q - np.linalg.lstsq(C_q, C, rcond=None)[0]
-    _, rate, C_q = oracle.constraint_values(t, q, v)
-    return q, v - np.linalg.lstsq(C_q, rate, rcond=None)[0]

@@ -70,7 +70,9 @@ def show(browser, t, exaggeration=1.0):
     browser.wait(f"Math.abs(state.t - {t}) < 1e-9")
 
 
-@pytest.mark.parametrize("cases", [("two_link",), ("slider_crank", "two_link")])
+@pytest.mark.parametrize(
+    "cases", [pytest.param(("two_link",), marks=pytest.mark.nightly), ("slider_crank", "two_link")]
+)
 def test_page_opens_without_a_complaint(browser, page, request, cases):
     folders = [request.getfixturevalue(case).folder for case in cases]
     browser.open(page(*(folder / "scene.results.h5" for folder in folders)))
