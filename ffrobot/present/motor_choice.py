@@ -15,6 +15,7 @@ from ..results.file import Results
 from .lines import print_table
 
 SHOWN = 3  # motors of each joint
+NOTHING = 1e-9  # of what a motor can do: less is rounding
 COLUMNS = ("motor of", "choice", "ratio", "RMS (N·m)", "of rated", "peak (N·m)", "of peak", "speed (rad/s)", "of max")
 
 
@@ -42,7 +43,8 @@ def _rows(joint: str, found: Sequence[Choice]) -> Iterator[tuple[str, ...]]:
     for k, choice in enumerate(fitting[:SHOWN] or found[:1]):
         name = choice.motor.name if choice.fits else f"none; nearest: {choice.motor.name}"
         values = (choice.rms, choice.peak, choice.speed)
-        pairs = zip((f"{value:.3g}" for value in values), (f"{100 * x:.0f} %" for x in choice.shares), strict=True)
+        used = [value if share > NOTHING else 0.0 for value, share in zip(values, choice.shares, strict=True)]
+        pairs = zip((f"{value:.3g}" for value in used), (f"{100 * x:.0f} %" for x in choice.shares), strict=True)
         yield ("" if k else joint, name, f"{choice.ratio:g}", *(cell for pair in pairs for cell in pair))
 
 

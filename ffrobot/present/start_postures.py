@@ -31,7 +31,8 @@ def print_start(path: Path, watcher: Watcher, console: Console) -> None:
     first, *others = start_postures(model)
     print_table(console, ("joint", "start", "guess in [initial]", "limits"), _joints(model, first.q))
     columns = ("point", "at (m)", "roll, pitch, yaw")[: 2 + bool(model.scene.tool)]
-    print_table(console, columns, (row[: len(columns)] for row in _points(model, first.q)))
+    if points := [row[: len(columns)] for row in _points(model, first.q)]:
+        print_table(console, columns, points)
     if first.branch:
         console.print(in_words(first.branch), soft_wrap=True)
     if others:
