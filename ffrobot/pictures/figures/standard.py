@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from itertools import islice
 
 import numpy as np
 
@@ -21,12 +22,15 @@ ENERGIES = ("kinetic", "strain", "gravitational")
 
 
 def main_figures(results: Results) -> tuple[FigureRecord, ...]:
-    """Robot, paths, motors, largest deflections, stresses, voltages, linear models; analyses over each other."""
+    """Robot, paths, motors, largest deflections, stresses, voltages, modes and first response of linear models.
+
+    Analyses are drawn over each other.
+    """
     return tuple(record for figures in MAIN for record in figures(results))
 
 
 def standard_figures(results: Results) -> tuple[FigureRecord, ...]:
-    """The main figures, then angles, modes, forces, reactions, energies and other points."""
+    """The main figures, then angles, modes, forces, reactions, energies, other points and responses."""
     main = main_figures(results)
     return main + tuple(record for figures in OTHERS for record in figures(results) if record not in main)
 
@@ -293,7 +297,7 @@ def _voltage(results: Results, data: str, title: str, limit: float | list[float]
 
 
 def _linear(results: Results) -> Iterator[FigureRecord]:
-    """Places of patches; of linear models the mode shapes of the robot, and responses."""
+    """Places of patches; of linear models the mode shapes of the robot, and responses to the first input."""
     for analysis in results.analyses:
         if results.has(f"{analysis}/placement"):
             name, title = file_name("placement", analysis), f"patches, {analysis}"
@@ -301,10 +305,17 @@ def _linear(results: Results) -> Iterator[FigureRecord]:
         if results.has(f"{analysis}/linear"):
             name, title = file_name("modes", analysis), f"modes, {analysis}"
             yield FigureRecord(name=name, title=title, kind="modes", analysis=analysis)
-            yield from _responses(results, analysis)
+            yield from islice(_responses_of(results, analysis), 1)
 
 
-def _responses(results: Results, analysis: str) -> Iterator[FigureRecord]:
+def _responses(results: Results) -> Iterator[FigureRecord]:
+    """Of linear models the responses to other inputs than the first."""
+    for analysis in results.analyses:
+        if results.has(f"{analysis}/linear"):
+            yield from islice(_responses_of(results, analysis), 1, None)
+
+
+def _responses_of(results: Results, analysis: str) -> Iterator[FigureRecord]:
     """How points and joints respond to each motor and to the first patch of each layout."""
     attributes = results.attributes(f"{analysis}/linear")
     inputs, outputs = ([str(name) for name in attributes[key]] for key in ("input_names", "output_names"))
@@ -326,5 +337,5 @@ Figures = tuple[Callable[[Results], Iterator[FigureRecord]], ...]
 MAIN: Figures = (
     _configurations, _paths, _tip_errors, _actuators, _largest_deflections, _stresses, _voltages, _linear,
 )  # fmt: skip
-OTHERS: Figures = (_angles, _deflections, _modes, _trajectory_forces, _joints, _energies)
+OTHERS: Figures = (_angles, _deflections, _modes, _trajectory_forces, _joints, _energies, _responses)
 """In this order."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import textwrap
 from contextlib import AbstractContextManager
 from typing import Any
@@ -9,6 +10,7 @@ from typing import Any
 import matplotlib
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import ScalarFormatter
 
 from .palette import COLORS
 
@@ -26,7 +28,6 @@ SETTINGS: dict[str, Any] = {
     "axes.titlesize": 8,
     "axes.grid": True,
     "axes.formatter.limits": (-3, 5),
-    "axes.formatter.use_mathtext": True,
     "axes.spines.top": False,
     "axes.spines.right": False,
     "grid.alpha": 0.3,
@@ -41,6 +42,17 @@ SETTINGS: dict[str, Any] = {
 }
 
 
+SUPERSCRIPTS = str.maketrans("−0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+
+class Ticks(ScalarFormatter):
+    """Labels of ticks as plain text: the parser of formulas takes a seventh of the time to draw a figure."""
+
+    def get_offset(self) -> str:
+        """The power of ten of all labels, "×10⁻⁵"."""
+        return re.sub(r"1e([−\d]+)$", lambda found: "×10" + found[1].translate(SUPERSCRIPTS), super().get_offset())
+
+
 def style() -> AbstractContextManager[None]:
     """The settings of matplotlib within which figures are drawn and written."""
     return matplotlib.rc_context(SETTINGS)
@@ -53,6 +65,8 @@ def new_axes(title: str) -> tuple[Figure, Axes]:
     lines = [title] if "$" in title else textwrap.wrap(title, TITLE_CHARACTERS)  # no line ends within a formula
     axes.set_title("\n".join(lines), loc="left")
     axes.locator_params(axis="x", nbins=6)
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_formatter(Ticks())
     return figure, axes
 
 
