@@ -41,7 +41,6 @@ from ..mbs.solve.integrators import METHODS, Choice
 from ..run.inputs import digest_of_file, named_files, python_files
 from ..run.loaded_body import LoadedBody
 from ..run.prepare import with_stiffening
-from ..run.refinement import goes_on
 from ..run.solution import Solution
 from ..run.solve import Keep, prepare_scene, run_analyses
 from ..run.watcher import Watcher
@@ -57,7 +56,7 @@ def how_to_go_on(solution: Solution, command: str) -> str:
     outcome = stopped(solution)
     if outcome is None:
         return "".join(f'; {command} resumes with "{name}"' for name in left_out(solution)[:1])
-    if goes_on(solution, outcome):
+    if solution.goes_on(outcome):
         return f"; {command} resumes from t = {outcome.time_reached:.9g} s"
     return f'; {command} runs "{outcome.analysis.name}" again from its start'
 
@@ -323,5 +322,5 @@ def write_state(file: h5py.File, solution: Solution) -> None:
     """Add to a results file, where the run was stopped, what `resume_scene` needs."""
     write_input_files(file, solution.scene)
     for name, run in solution.outcomes.items() if is_kept(solution) else ():
-        if goes_on(solution, run) and run.continuation is not None:
+        if solution.goes_on(run) and run.continuation is not None:
             write_earlier_run(file[name].create_group(GROUP), run)

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from functools import partial
 from math import inf, sqrt
 
 from ..actuation.feasibility import Feasibility
@@ -143,8 +142,6 @@ def _names(scene: Scene) -> str:
     return quoted(one.name for one in scene.trajectory if one.fastest)
 
 
-Frequencies = Callable[[float, float, int], PathFrequencies]
-"""Of so many of the lowest vibrations from one time to another, s."""
 Notes = tuple[str, ...]
 
 
@@ -153,7 +150,7 @@ def with_paths(scene: Scene, model: Model, judge: Judge, stage: Callable[[str], 
 
     `model` is what vibrates. Raises `InputError` where there are no such frequencies, or no motion keeps the limits.
     """
-    scene, notes = _shaped(scene, partial(frequencies_along, model))
+    scene, notes = _shaped(scene, model)
     if any(trajectory.fastest for trajectory in scene.trajectory):
         stage("fastest motion")
         scene, note = fastest(scene, judge)
@@ -161,7 +158,7 @@ def with_paths(scene: Scene, model: Model, judge: Judge, stage: Callable[[str], 
     return scene, notes
 
 
-def _shaped(scene: Scene, frequencies: Frequencies) -> tuple[Scene, Notes]:
+def _shaped(scene: Scene, model: Model) -> tuple[Scene, Notes]:
     """The scene with shapers for frequencies of the robot where they ask for these; notes on them and on tables."""
     asking = {one.name: one.shaper for one in scene.trajectory if one.shaper and one.shaper.asks_robot}
     tables = (one.waypoints for one in scene.trajectory if one.waypoints is not None)
@@ -169,7 +166,7 @@ def _shaped(scene: Scene, frequencies: Frequencies) -> tuple[Scene, Notes]:
     if not asking:
         return scene, of_tables
     begin, end = _span(scene)
-    found = frequencies(begin, end, max(shaper.modes for shaper in asking.values()))
+    found = frequencies_along(model, begin, end, max(shaper.modes for shaper in asking.values()))
     shapers: Mapping[str, Shaper] = {name: _for_robot(shaper, found) for name, shaper in asking.items()}
     changed = [one.changed(shaper=shapers[one.name]) if one.name in shapers else one for one in scene.trajectory]
     of_shapers: Notes = tuple(f"{name}: {_in_words(shaper, found)}" for name, shaper in asking.items())

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import numpy as np
 
 from ..common.arrays import Array, as_floats
 from ..mbs.model.body import Body
-from ..mbs.model.truncation import with_fewer_modes
+from ..mbs.model.truncation import loaded_points, with_fewer_modes
 from ..scene.scene import Scene
 from .loaded_body import LoadedBody
-from .mode_search import Reported, truncation_levels
+from .mode_search import Reported
 from .solution import AnalysisResult
+
+GROWTH = 1.5  # of the number of modes from one solve to the next
+ALIKE = 1e-9  # of ω²: of a round link, both planes of bending
 
 
 def reported_modes(result: AnalysisResult) -> Reported:
@@ -43,21 +46,47 @@ def reported_modes(result: AnalysisResult) -> Reported:
 
 
 def mode_levels(scene: Scene, bodies: Mapping[str, LoadedBody]) -> list[dict[str, Body]]:
-    """See `truncation_levels`; `bodies` may have fewer modes already.
+    """The flexible bodies with `modes` given, with more and more modes where that is "auto"; the last have all.
 
-    Counted is the family with most modes: with those of one plane alone, both planes of bending come at once. In a
-    planar scene all modes count.
+    A level has the modes up to one frequency, of all bodies: 1, 2, 3, 5, 8 … of each on average, of those that count.
+    These are the family with most modes: with those of one plane alone, both planes of bending come at once. In a
+    planar scene all modes count. `bodies` may have fewer modes already.
     """
-    whole = {name: body.spatial.whole for name, body in bodies.items()}
+    wanted = {body.name: body.modes for body in scene.body if body.modes is not None}
+    whole = {name: bodies[name].spatial.whole for name in wanted}
+    loaded = {name: loaded_points(scene, name) for name in wanted}
+    fixed = {
+        name: with_fewer_modes(whole[name], modes, loaded[name])
+        for name, modes in wanted.items()
+        if isinstance(modes, int)
+    }
+    auto = {name: whole[name] for name, modes in wanted.items() if modes == "auto"}
+    if not auto:
+        return [fixed]
+    found: list[dict[str, Body]] = []
+    squares = np.sort(_counted(scene, {name: bodies[name] for name in auto}))
+    each = 1
+    while each * len(auto) < len(squares):
+        cut = squares[each * len(auto) - 1] * (1 + ALIKE)
+        level = {
+            name: with_fewer_modes(body, int(np.count_nonzero(body.stiffness <= cut)), loaded[name])
+            for name, body in auto.items()
+        }
+        if all(body.reduction is None for body in level.values()):
+            break
+        found.append(fixed | level)
+        each = int(np.ceil(GROWTH * each))
+    found.append(fixed | auto)
+    return found
 
-    def counted(names: Sequence[str]) -> Array:
-        squares: dict[str, list[float]] = {}
-        for name in names:
-            modal, of_body = bodies[name].modal, whole[name].stiffness[: whole[name].n_eigenmodes]
-            assert modal is not None
-            families = [""] * len(of_body) if scene.is_planar else modal.family
-            for family, square in zip(families, of_body, strict=False):  # attachment modes come after them
-                squares.setdefault(family, []).append(square)
-        return np.array(max(squares.values(), key=len, default=[]))
 
-    return truncation_levels(scene, whole, with_fewer_modes, counted)
+def _counted(scene: Scene, bodies: Mapping[str, LoadedBody]) -> Array:
+    """ω² of the modes that count."""
+    squares: dict[str, list[float]] = {}
+    for body in bodies.values():
+        whole, modal = body.spatial.whole, body.modal
+        assert modal is not None
+        families = [""] * whole.n_eigenmodes if scene.is_planar else modal.family  # attachment modes come after them
+        for family, square in zip(families, whole.stiffness[: whole.n_eigenmodes], strict=False):
+            squares.setdefault(family, []).append(square)
+    return np.array(max(squares.values(), key=len, default=[]))

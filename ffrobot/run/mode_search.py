@@ -6,7 +6,7 @@ The first solves are cheap: few modes leave out the high frequencies, which hold
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -14,7 +14,6 @@ import numpy as np
 
 from ..common.arrays import Array
 from ..mbs.model.body import Body
-from ..mbs.model.truncation import loaded_points
 
 if TYPE_CHECKING:
     from ..scene.scene import Scene
@@ -46,10 +45,8 @@ class ModeChoice:
 Reported = Mapping[str, Mapping[str, Array]]
 """Quantities of an analysis by kind and name, (T, …)."""
 
-GROWTH = 1.5  # of the number of modes from one solve to the next
 LEAST_RATIO = 0.1  # of two differences one after the other: better ones are luck
 MARGIN = 0.5  # part of the tolerance that an estimate has to meet: it may be too small
-ALIKE = 1e-9  # of ω²: of a round link, both planes of bending
 SMALLEST = 1e-3  # of the largest peak of its kind: quantities below are measured against that
 
 
@@ -119,7 +116,7 @@ def difference(now: Reported, before: Reported) -> dict[str, float]:
 class ModeSearch:
     """How many modes to solve a scene with next, and when there are enough.
 
-    `tolerances` by analysis; `levels`: bodies with more and more modes, the last with all (`truncation_levels`).
+    `tolerances` by analysis; `levels`: bodies with more and more modes, the last with all (`mode_levels`).
     """
 
     def __init__(self, tolerances: Mapping[str, float], levels: Sequence[Mapping[str, Body]]) -> None:
@@ -182,36 +179,3 @@ def error_tolerances(scene: Scene) -> dict[str, float]:
         else analysis.tolerance
         for analysis in scene.analysis
     }
-
-
-def truncation_levels(
-    scene: Scene,
-    bodies: Mapping[str, Body],
-    fewer: Callable[[Body, int, Sequence[str]], Body],
-    counted: Callable[[Sequence[str]], Array],
-) -> list[dict[str, Body]]:
-    """The flexible bodies with `modes` given, with more and more modes where that is "auto"; the last have all.
-
-    A level has the modes up to one frequency, of all bodies: 1, 2, 3, 5, 8 … of each on average, of those that are
-    `counted` (their ω², of bodies by name). `bodies` have all, `fewer` leaves some out.
-    """
-    wanted = {body.name: body.modes for body in scene.body if body.modes is not None}
-    loaded = {name: loaded_points(scene, name) for name in wanted}
-    fixed = {name: fewer(bodies[name], modes, loaded[name]) for name, modes in wanted.items() if isinstance(modes, int)}
-    auto = {name: bodies[name] for name, modes in wanted.items() if modes == "auto"}
-    if not auto:
-        return [fixed]
-    found: list[dict[str, Body]] = []
-    squares = np.sort(counted(list(auto)))
-    each = 1
-    while each * len(auto) < len(squares):
-        cut = squares[each * len(auto) - 1] * (1 + ALIKE)
-        level = {
-            name: fewer(body, int(np.count_nonzero(body.stiffness <= cut)), loaded[name]) for name, body in auto.items()
-        }
-        if all(body.reduction is None for body in level.values()):
-            break
-        found.append(fixed | level)
-        each = int(np.ceil(GROWTH * each))
-    found.append(fixed | auto)
-    return found

@@ -7,9 +7,9 @@ modal coordinates are those whose shape is nearest to the link's; its points are
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from functools import cached_property, partial
+from functools import cached_property
 
 import numpy as np
 
@@ -26,6 +26,7 @@ from ..mbs.quantities.motion import BodyMotion, PointMotion, RobotMotion, contin
 from ..mbs.quantities.second_order import IN_MOTION, Missing, largest_displacement
 from ..mbs.quantities.validity import ENOUGH, Bending, enough_pieces, link_bending, shape_from_chord
 from ..scene.pieces import BodyInPieces, bodies_in_pieces
+from ..scene.scene import Scene
 from .solution import Solution
 
 MOST = 64
@@ -164,7 +165,10 @@ def bending_of_links(solution: Solution, motion: RobotMotion) -> dict[str, Bendi
             worst[name] = replace(worst[name], missing=_missing(solution, motion, name))
     if not motion.is_at_rest:
         worst = shared_in_motion(worst)
-    return with_advice(worst, partial(bodies_in_pieces, solution.scene))
+    return {
+        name: replace(found, is_divisible=is_divisible(solution.scene, name)) if found.is_beyond else found
+        for name, found in worst.items()
+    }
 
 
 def _missing(solution: Solution, motion: RobotMotion, name: str) -> Missing:
@@ -286,21 +290,9 @@ def shared_in_motion(bending: Mapping[str, Bending]) -> dict[str, Bending]:
     return {name: replace(of, missing=of.missing.grown_to(worst)) for name, of in bending.items()}
 
 
-def with_advice(
-    bending: Mapping[str, Bending], divided: Callable[[Mapping[str, int]], Mapping[str, BodyInPieces]]
-) -> dict[str, Bending]:
-    """How far links bend, those beyond small deformations with whether the scene lets them be divided.
-
-    `divided` cuts bodies into so many pieces, and raises `InputError` where the scene does not let it.
-    """
-
-    def is_divisible(name: str) -> bool:
-        try:
-            return bool(divided({name: 2}))
-        except InputError:
-            return False
-
-    return {
-        name: replace(found, is_divisible=is_divisible(name)) if found.is_beyond else found
-        for name, found in bending.items()
-    }
+def is_divisible(scene: Scene, name: str) -> bool:
+    """Whether the scene lets a body be divided into pieces."""
+    try:
+        return bool(bodies_in_pieces(scene, {name: 2}))
+    except InputError:
+        return False

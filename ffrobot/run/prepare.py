@@ -29,12 +29,8 @@ def made_solution(scene: Scene, bodies: Bodies, seconds: Mapping[str, float]) ->
     Raises `InputError` for patches and actuation points that do not fit.
     """
     bodies = _with_equations(bodies, mode_levels(scene, bodies)[0])
-    patches, points, stiffened = (
-        make_patches(scene, bodies),
-        points_3d(scene, bodies),
-        _all_stiffened(scene, False),
-    )
-    bodies, stiffened = _with_points(bodies, points), _all_stiffened(scene, False)
+    patches, points, stiffened = make_patches(scene, bodies), points_3d(scene, bodies), _all_stiffened(scene, False)
+    bodies = _with_points(bodies, points)
     model = _model(scene, bodies, patches, {}, {}, stiffened)
     if (start := chosen_start(model)) is not None:
         own = {"joints": start.guesses, "angles": {}, "branch": {}}

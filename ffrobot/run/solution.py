@@ -178,7 +178,7 @@ class Solution:
         unread: the run of the analysis of which outputs failed; its integration is kept.
         path_notes: what was found of paths before the analyses, one line each.
         points: actuation points, by body.
-        earlier: runs of analyses to go on with, from a results file: see `results.spatial_resume`.
+        earlier: runs of analyses to go on with, from a results file: see `results.resume`.
         mode_choice: where `modes = "auto"`.
         divided: bodies in pieces by name; then `model` is that of the pieces, whose bodies are `parts`, and `whole`
             that of the links.
@@ -207,6 +207,11 @@ class Solution:
         """How each analysis went, by its name."""
         runs = [*(result.run for result in self.analyses.values()), *([self.unread] if self.unread else [])]
         return {run.analysis.name: run for run in runs}
+
+    def goes_on(self, outcome: Outcome) -> bool:
+        """Whether `outcome` is of use to `resume`; a search for modes or pieces has its own bodies and starts again."""
+        searched = any("auto" in (body.modes, body.pieces) for body in self.scene.body)
+        return not searched and outcome.analysis.is_resumable
 
     @property
     def links(self) -> dict[str, ModalBody]:

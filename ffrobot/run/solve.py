@@ -36,7 +36,6 @@ from .prepare import (
     with_scene,
     with_stiffening,
 )
-from .refinement import completed, goes_on, is_replayed, log_outcome, progress_of, with_enough_modes, with_enough_pieces
 from .solution import AnalysisResult, Solution
 from .stresses import find_stresses
 from .watcher import Interruption, Watcher
@@ -54,7 +53,7 @@ Keep = Callable[[Solution], None]
 def solve_scene(scene: Scene | Path, watcher: Watcher | None = None, keep: Keep | None = None) -> Solution:
     """Run every analysis of a scene, or of a scene file, in space; stage 1 runs first for links that are out of date.
 
-    Shapers for the robot's frequencies and the fastest motion are found first (see `paths`).
+    Shapers for the robot's frequencies and the fastest motion are found first (see `fastest`).
     With `modes = "auto"` they are run with more and more modes, until the estimated error meets the tolerances.
 
     An analysis that does not reach its end is kept as far as it got, and ends the run (`Outcome.check_completed`).
@@ -80,16 +79,16 @@ def prepare_scene(scene: Scene | Path, watcher: Watcher | None = None) -> Soluti
 
 def run_analyses(solution: Solution, watcher: Watcher, keep: Keep | None = None) -> Solution:
     """What `solve_scene` does with everything prepared; analyses go on from where `solution.earlier` has them."""
-    with Interruption(watcher.stopping) as interruption:
-        judge = partial(_judged, replace(solution, earlier={}), watcher, interruption)
+    with Interruption(watcher) as interruption:
+        judge = partial(_judged, replace(solution, earlier={}), interruption)
         scene, notes = with_paths(solution.scene, solution.model, judge, watcher.stage)
         solution = replace(with_scene(solution, scene) if notes else solution, path_notes=notes)
         if any(body.modes == "auto" for body in scene.body):
-            solution = _with_enough_modes(solution, watcher, interruption)
+            solution = _with_enough_modes(solution, interruption)
         elif any(body.pieces == "auto" for body in scene.body):
-            solution = _with_enough_pieces(solution, watcher, interruption)
+            solution = _with_enough_pieces(solution, interruption)
         else:
-            solution = _completed(solution, watcher, interruption)
+            solution = _completed(solution, interruption)
         if any(analysis.is_checked for analysis in scene.analysis):
             from .finer import with_finer_check
 
@@ -101,32 +100,34 @@ def run_analyses(solution: Solution, watcher: Watcher, keep: Keep | None = None)
     return solution
 
 
-def _with_enough_modes(solution: Solution, watcher: Watcher, interruption: Interruption) -> Solution:
+def _with_enough_modes(solution: Solution, interruption: Interruption) -> Solution:
     """The scene solved with as many modes as its tolerances need: see `mode_search`."""
-    return with_enough_modes(
-        solution,
-        ModeSearch(error_tolerances(solution.scene), mode_levels(solution.scene, solution.bodies)),
-        lambda last, bodies: _completed(with_bodies(last, bodies), watcher, interruption),
-        reported_modes,
-        interruption,
-    )
+    search = ModeSearch(error_tolerances(solution.scene), mode_levels(solution.scene, solution.bodies))
+    while True:
+        solution = _completed(with_bodies(solution, search.bodies), interruption)
+        if solution.failure is not None:
+            return solution
+        found = solution.analyses
+        is_whole = len(found) == len(solution.scene.analysis) and all(of.status == "completed" for of in found.values())
+        reported = {name: reported_modes(result) for name, result in found.items()} if is_whole else None
+        search.add(reported, last=interruption.requested)
+        if search.is_over:
+            return replace(solution, mode_choice=search.choice())
 
 
-def _with_enough_pieces(solution: Solution, watcher: Watcher, interruption: Interruption) -> Solution:
+def _with_enough_pieces(solution: Solution, interruption: Interruption) -> Solution:
     """The scene solved with links in as many pieces as they bend far, those of `pieces = "auto"`."""
-    return with_enough_pieces(
-        solution,
-        lambda trial: _completed(trial, watcher, interruption),
-        lambda last, counts: with_pieces(last, counts, watcher),
-        wanted_pieces,
-        interruption,
-    )
+    solution = _completed(solution, interruption)
+    given = {body.name: body.pieces for body in solution.scene.body if isinstance(body.pieces, int)}
+    while solution.failure is None and not interruption.requested and (more := wanted_pieces(solution)):
+        solution = _completed(with_pieces(solution, {**given, **more}, interruption.watcher), interruption)
+    return solution
 
 
-def _judged(solution: Solution, watcher: Watcher, interruption: Interruption, trial: Scene) -> Feasibility | None:
+def _judged(solution: Solution, interruption: Interruption, trial: Scene) -> Feasibility | None:
     """What the one analysis of a scene asks of motors and patches; None where it fails."""
     try:
-        found = _completed(with_scene(solution, trial), watcher, interruption)
+        found = _completed(with_scene(solution, trial), interruption)
         if found.unread is not None:
             assert found.failure is not None
             raise found.failure
@@ -136,22 +137,25 @@ def _judged(solution: Solution, watcher: Watcher, interruption: Interruption, tr
     return None if result.run.failed or result.actuation is None else result.actuation.feasibility
 
 
-def _completed(solution: Solution, watcher: Watcher, interruption: Interruption) -> Solution:
-    return completed(solution, lambda trial: _run_all(trial, watcher, interruption), with_stiffening)
+def _completed(solution: Solution, interruption: Interruption) -> Solution:
+    """All analyses run, all of them stiffened where `geometric_stiffening = "auto"` asks for that."""
+    found = _run_all(solution, interruption) or _run_all(with_stiffening(solution), interruption)
+    assert found is not None
+    return found
 
 
-def _run_all(solution: Solution, watcher: Watcher, interruption: Interruption) -> Solution | None:
+def _run_all(solution: Solution, interruption: Interruption) -> Solution | None:
     """The analyses up to the first that fails; None where `geometric_stiffening = "auto"` asks for them all again."""
     results: dict[str, AnalysisResult] = {}
     seconds = dict(solution.seconds)
     for analysis in solution.scene.analysis:
         if interruption.requested and results:
             break
-        watcher.stage(f'analysis "{analysis.name}"')
+        interruption.watcher.stage(f'analysis "{analysis.name}"')
         began = time.perf_counter()
         try:
             with of_file(f'{solution.scene.path}: analysis "{analysis.name}"'):
-                run = analysis.run(_context(solution, analysis, results, watcher, interruption))
+                run = analysis.run(_context(solution, analysis, results, interruption))
                 assert isinstance(run, Outcome)
             if not results:
                 texts = (*run.statistics.warnings, *turned_guesses(solution.scene))
@@ -170,7 +174,7 @@ def _run_all(solution: Solution, watcher: Watcher, interruption: Interruption) -
             return None
         results[analysis.name] = result
         seconds[analysis.name] = time.perf_counter() - began
-        log_outcome(run)
+        _log(run)
         if run.failed:
             break
     return replace(solution, analyses=results, seconds=seconds)
@@ -179,7 +183,7 @@ def _run_all(solution: Solution, watcher: Watcher, interruption: Interruption) -
 def _unread(solution: Solution, run: Outcome, error: Exception) -> Solution:
     """The solution with a run whose outputs failed with `error`: its states are kept where `resume` takes them up."""
     kept = replace(run, statistics=replace(run.statistics, status="not evaluated"))
-    if run.continuation is None or not goes_on(solution, kept):
+    if run.continuation is None or not solution.goes_on(kept):
         if not solution.analyses:
             raise error
         return replace(solution, failure=error)
@@ -198,14 +202,14 @@ def _context(
     solution: Solution,
     analysis: Analysis,
     results: Mapping[str, AnalysisResult],
-    watcher: Watcher,
     interruption: Interruption,
 ) -> ActuatedContext:
+    others = (other for other in solution.scene.analysis if other.takes_actuation)
     return ActuatedContext(
         model=solution.model,
         outcomes={name: result.run for name, result in results.items()},
-        progress=progress_of(analysis, watcher, interruption),
-        is_replayed=is_replayed(analysis, solution.scene.analysis),
+        progress=lambda t: interruption.watcher.advance(t, analysis.last_time) and not interruption.requested,
+        is_replayed=analysis.is_checked or any(other.source == analysis.name for other in others),
         earlier=solution.earlier.get(analysis.name),
         points=solution.points,
         at_points=partial(forces_at_points, solution.points),
@@ -277,4 +281,14 @@ def _evaluated(solution: Solution, run: Outcome, twists: Mapping[str, BSpline] |
     return AnalysisResult(
         run, motion, reactions(motion), *totals(motion), actuation, stresses, at_points,
         sharing=sharing,
+    )  # fmt: skip
+
+
+def _log(outcome: Outcome) -> None:
+    """One line on how an analysis went."""
+    run = outcome.statistics
+    logger.info(
+        'analysis "%s": %s at t = %g s, %d steps, %d rejected, %d evaluations, %.3f s; integrator %s: %s',
+        outcome.analysis.name, run.status, outcome.time[-1] if len(outcome.time) else 0.0, run.steps, run.rejected,
+        run.evaluations, run.wall_seconds, run.integrator.name, run.integrator.reason,
     )  # fmt: skip

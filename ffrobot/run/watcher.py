@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import signal
 import threading
-from collections.abc import Callable
 from types import FrameType, TracebackType
 
 from ..common.interrupts import SIGNALS, EndOfCommand
@@ -27,15 +26,14 @@ class Watcher:
 class Interruption:
     """Within its context the first Ctrl-C (or SIGTERM) only sets `requested`; the next one interrupts as usual.
 
-    `tell` is called at once with the number of the signal.
+    `watcher.stopping` is called at once.
 
     Python would raise `KeyboardInterrupt` anywhere, in the calls from the core too, and the outputs so far were lost.
     Signals reach the main thread only: in any other the context does nothing.
     """
 
-    def __init__(self, tell: Callable[[int], None]) -> None:
-        self.requested = False
-        self._tell = tell
+    def __init__(self, watcher: Watcher) -> None:
+        self.watcher, self.requested = watcher, False
         self._is_main = threading.current_thread() is threading.main_thread()
 
     def __enter__(self) -> Interruption:
@@ -53,7 +51,7 @@ class Interruption:
     def _request(self, number: int, frame: FrameType | None) -> None:
         self.requested = True
         self._restore()
-        self._tell(number)
+        self.watcher.stopping(number)
 
     def _restore(self) -> None:
         for number, handler in self._previous.items():

@@ -81,7 +81,7 @@ class Context:
     """What the run of an analysis starts from.
 
     Attributes:
-        progress: see `drive_robot.Progress`.
+        progress: see `drive.Progress`.
         is_replayed: whether a later analysis takes its actuation.
         earlier: an earlier run of the same analysis, to go on with; None from the start.
         model: the robot, with the constraint equations of all joints that close loops and of all trajectories.

@@ -153,7 +153,7 @@ def _found(run: Outcome, reader: Reader, system: MultibodySystem | None = None) 
 
 
 def motor_forces_of(run: Outcome) -> MotorForces:
-    """τ and F_p of a run, its gears rigid (see `mbs.model.spatial_motors`)."""
+    """τ and F_p of a run, its gears rigid (see `mbs.model.motors`)."""
     return motor_forces(run.model, run.q, supplied_in(run))
 
 

@@ -2,7 +2,7 @@
 
 What a chain of stiffened pieces misses: by how much rods with the strains of its pieces end elsewhere.
 
-The equations know where the ends of a piece are to second order in its modal coordinates p (`model.spatial_bending`);
+The equations know where the ends of a piece are to second order in its modal coordinates p (`model.body`);
 its energy is that of the curvatures (Φ_r p)' and of the stretch and shear of Φp. A rod of the same strains, and so of
 the same energy, ends where its sections, each turned from the last, take it (Simo, Comput. Methods Appl. Mech. Eng. 49,
 1985). The difference of the ends, carried to the end of the chain, is the estimate: it is of third order, and needs no

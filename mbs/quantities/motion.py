@@ -275,7 +275,7 @@ class RobotMotion:
 
     @cached_property
     def motor_forces(self) -> MotorForces | None:
-        """Of `supplied`: see `mbs.model.spatial_motors`. None where nothing is prescribed.
+        """Of `supplied`: see `mbs.model.motors`. None where nothing is prescribed.
 
         Moments behind compliant gears are what motors must do there.
         """
