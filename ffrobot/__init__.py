@@ -45,59 +45,31 @@ if TYPE_CHECKING:
 
     __version__: str
 
-_HOME = {
-    "fit_measured": ".fit.fitting",
-    "load_scene": ".api",
-    "make_link": ".api",
-    "optimise": ".design.optimise",
-    "plot_results": ".api",
-    "read_modal_body": ".api",
-    "screening": ".design.screening",
-    "sensitivity": ".design.sensitivity",
-    "solve": ".api",
-    "trade_off": ".design.front",
-    "uncertainty": ".design.uncertainty",
-    "view_file": ".api",
-    "write_movie": ".api",
-    "write_report": ".api",
-    "write_study": ".api",
-    "FfrobotError": ".common.errors",
-    "FfrobotWarning": ".common.errors",
-    "InputError": ".common.errors",
-    "SolveError": ".common.errors",
-    "ModalBody": ".fe_models.modal_body",
-    "make_scene": ".scene.load",
-    "Scene": ".scene.scene",
-    "Results": ".results.file",
-    "Watcher": ".run.watcher",
-}
+_NAMES = {
+    ".api": (
+        "load_scene", "make_link", "plot_results", "read_modal_body", "solve", "view_file", "write_movie",
+        "write_report", "write_study",
+    ),
+    ".common.errors": ("FfrobotError", "FfrobotWarning", "InputError", "SolveError"),
+    ".design.front": ("trade_off",),
+    ".design.optimise": ("optimise",),
+    ".design.screening": ("screening",),
+    ".design.sensitivity": ("sensitivity",),
+    ".design.uncertainty": ("uncertainty",),
+    ".fe_models.modal_body": ("ModalBody",),
+    ".fit.fitting": ("fit_measured",),
+    ".results.file": ("Results",),
+    ".run.watcher": ("Watcher",),
+    ".scene.load": ("make_scene",),
+    ".scene.scene": ("Scene",),
+}  # fmt: skip
+_HOME = {name: module for module, names in _NAMES.items() for name in names}
 
 __all__ = [
-    "FfrobotError",
-    "FfrobotWarning",
-    "InputError",
-    "ModalBody",
-    "Results",
-    "Scene",
-    "SolveError",
-    "Watcher",
-    "fit_measured",
-    "load_scene",
-    "make_link",
-    "make_scene",
-    "optimise",
-    "plot_results",
-    "read_modal_body",
-    "screening",
-    "sensitivity",
-    "solve",
-    "trade_off",
-    "uncertainty",
-    "view_file",
-    "write_movie",
-    "write_report",
-    "write_study",
-]
+    "FfrobotError", "FfrobotWarning", "InputError", "ModalBody", "Results", "Scene", "SolveError", "Watcher",
+    "fit_measured", "load_scene", "make_link", "make_scene", "optimise", "plot_results", "read_modal_body", "screening",
+    "sensitivity", "solve", "trade_off", "uncertainty", "view_file", "write_movie", "write_report", "write_study",
+]  # fmt: skip
 
 
 def __getattr__(name: str) -> object:

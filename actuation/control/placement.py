@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from itertools import combinations_with_replacement
 from math import ceil, comb
 from pathlib import Path
-from typing import Literal, Protocol
+from typing import Literal
 
 import numpy as np
 
@@ -37,13 +37,6 @@ SEED = 0  # of the evolution: the same scene gives the same patches
 STEPS = 2  # candidates per length of a patch, where the scene gives no spacing
 
 
-class Patches(Protocol):
-    """The patches of the layout with some of its keys changed."""
-
-    def __call__(self, **changes: object) -> PatchArray:
-        """Raises `InputError` where they do not fit the link."""
-
-
 @dataclass(frozen=True)
 class PatchableLink:
     """A link that is to get patches, by the m coordinates p that these reach.
@@ -54,7 +47,7 @@ class PatchableLink:
         layout: of the patches.
         stiffness: (m,) of p, and `served` how many of p, the first ones, patches are to serve.
         own: (m, n) p from the modal coordinates of the `bodies`, side by side, as linear models have them.
-        patches: elsewhere, by the keys "count" or "centers".
+        patches: elsewhere, by the keys "count" or "centers"; `InputError` where they do not fit the link.
     """
 
     name: str
@@ -64,7 +57,7 @@ class PatchableLink:
     stiffness: Array
     served: int
     own: Array
-    patches: Patches
+    patches: Callable[..., PatchArray]
 
 
 @dataclass(frozen=True)
@@ -269,12 +262,6 @@ def _candidates(scene_path: Path, wanted: Placement, link: PatchableLink, count:
     return Candidates(centers, gap, columns)
 
 
-def elsewhere(layout: PztLayout, changes: dict[str, object]) -> dict[str, object]:
-    """The keys of a layout that change with the number or places of its patches: one limit holds for all."""
-    limit = min(layout.limit) if isinstance(layout.limit, tuple) else layout.limit
-    return {**changes, "limit": limit}
-
-
 class PatchPlacement(InstantAnalysis):
     """Optimal positions of patches; `placement` has the criterion."""
 
@@ -350,8 +337,9 @@ def _link(context: ActuatedContext, wanted: Placement) -> PatchableLink:
     reached, layout = of_link.modes[label], of_link.arrays[label].layout
 
     def patches(**changes: object) -> PatchArray:
-        keys = {"allocation": "least-squares", "mode_weights": None, "point_weights": None} | changes
-        found = link_patches(path, [layout.model_copy(update=elsewhere(layout, keys))], body, context.carrying[name])
+        limit = min(layout.limit) if isinstance(layout.limit, tuple) else layout.limit  # one holds for all
+        keys = {"allocation": "least-squares", "mode_weights": None, "point_weights": None, "limit": limit} | changes
+        found = link_patches(path, [layout.model_copy(update=keys)], body, context.carrying[name])
         if not np.array_equal(found.modes[label].rows, reached.rows):
             raise InputError(f'{path}: placement.body: expected patches that excite the modes of "{label}"')
         return found.arrays[label]
