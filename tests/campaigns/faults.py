@@ -1,11 +1,15 @@
 """Deliberate faults in the program, one at a time, and tests that must catch each.
 
-    python tests/campaigns/faults.py [NUMBER …]
+    python tests/campaigns/faults.py [--build "COMMAND"] [NUMBER …]
 
 writes each fault (a sign, a factor, an index, a term that is left out) into the source, runs its tests until the first
 fails, and puts the source back. Exit code 1 where a fault stayed unseen. Run it in a work tree without other changes.
+Faults of the core need the COMMAND that builds it and puts it in place; without it they are left out. The command runs
+once more at the end, for the sound core.
 """
 
+import argparse
+import shlex
 import subprocess
 import sys
 import time
@@ -14,7 +18,8 @@ from typing import NamedTuple
 
 ROOT = Path(__file__).parents[2]
 PROJECTION, MASSES, LOADS = "mbs/model/projection.py", "mbs/model/masses.py", "mbs/quantities/link_loads.py"
-PATCHES = "actuation/patches"
+PATCHES, CORE = "actuation/patches", "mbs/core"
+STIFFENED = "tests/mbs/recursion/test_stiffened_bodies.py"
 PROJECTED = "tests/mbs/test_projection.py tests/mbs/test_projected_trees.py"
 POINTS = "tests/cases/test_actuation_points.py"
 ARM = "tests/references/test_references.py::test_made_scenes[arm]"
@@ -98,22 +103,95 @@ FAULTS = [
         'record.rate != "measured"',
         "tests/actuation/test_margins.py",
     ),
+    Fault(
+        f"{CORE}/recursion/inverse/newton_euler.cpp",
+        "node.rotor_turns * A[Space::axis] + node",
+        "node",
+        "tests/mbs/test_inverse.py",
+    ),
+    Fault(
+        f"{CORE}/recursion/inverse/newton_euler.cpp",
+        "component *= action.sign;",
+        "component *= 1;",
+        "tests/mbs/test_path_forces_on_bodies.py",
+    ),
+    Fault(
+        f"{CORE}/recursion/spatial/stiffening.cpp",
+        "orthonormal_fields.L(1 + c, f)",
+        "orthonormal_fields.L(1 + (c + 1) % 3, f)",
+        STIFFENED,
+    ),
+    Fault(
+        f"{CORE}/integrate/dop853.cpp",
+        "2 * way - (last + first)",
+        "1 * way - (last + first)",
+        "tests/mbs/test_integrator.py",
+    ),
+    Fault(
+        f"{CORE}/integrate/generalized_alpha.cpp",
+        "rate_ - value_;",
+        "rate_ + value_;",
+        "tests/mbs/test_integrator.py",
+    ),
+    Fault(
+        f"{CORE}/recursion/planar/stiffening.cpp",
+        "products[1] - center.y() * products[0];",
+        "products[1] + center.y() * products[0];",
+        "tests/mbs/recursion/test_plane.py",
+    ),
+    Fault(
+        f"{CORE}/recursion/constrained_aba/joint_elimination.h",
+        "M[f] = (N * (N - c) * J) * U_by_D;",
+        "M[f] = (N * N * J) * U_by_D;",
+        "tests/mbs/test_built_joints.py",
+    ),
+    Fault(
+        f"{CORE}/recursion/inverse/observe.cpp",
+        "to.J(2, 2) += s.p_p;",
+        "to.J(2, 2) += 0;",
+        "tests/mbs/test_system.py",
+    ),
+    Fault(
+        f"{CORE}/recursion/inverse/motors.cpp",
+        "tau = motor.sign * Q_[motor.coordinate],",
+        "tau = Q_[motor.coordinate],",
+        "tests/mbs/test_reversed_joints.py",
+    ),
+    Fault(
+        f"{CORE}/recursion/constrained_aba/acceleration_pass.h",
+        "      A[2] += node.lead * A[5];",
+        "      A[2] -= node.lead * A[5];",
+        "tests/mbs/recursion/test_space.py",
+    ),
+    Fault(
+        f"{CORE}/recursion/constrained_aba/multipliers.h",
+        "      x[r] -= factor[k * m + r] * x[k];",
+        "      x[r] -= factor[r * m + k] * x[k];",
+        "tests/mbs/recursion/test_space.py",
+    ),
 ]
 
 
 def main() -> None:
-    chosen = [int(number) for number in sys.argv[1:]] or range(1, len(FAULTS) + 1)
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--build", type=shlex.split, default=[])
+    parser.add_argument("numbers", nargs="*", type=int)
+    asked = parser.parse_args()
     unseen = []
-    for number in chosen:
+    for number in asked.numbers or range(1, len(FAULTS) + 1):
         fault, began = FAULTS[number - 1], time.monotonic()
-        by = caught_by(fault)
+        if fault.file.startswith(CORE) and not asked.build:
+            continue
+        by = caught_by(fault, asked.build)
         print(f"{number:3d} {fault.file}: {fault.old!r} → {fault.new!r}: {by or 'NOT CAUGHT'} ", end="")
         print(f"({time.monotonic() - began:.0f} s)", flush=True)
         unseen += [] if by else [number]
+    if asked.build:
+        subprocess.run(asked.build, cwd=ROOT, check=True)
     sys.exit(bool(unseen))
 
 
-def caught_by(fault: Fault) -> str:
+def caught_by(fault: Fault, build: list[str]) -> str:
     """The first test that fails; empty where all pass."""
     path = ROOT / fault.file
     sound = path.read_text(encoding="utf-8")
@@ -121,6 +199,8 @@ def caught_by(fault: Fault) -> str:
     command = [sys.executable, "-m", "pytest", "-n", "0", "-x", "-q", "--tb=no", "-p", "no:cacheprovider"]
     try:
         path.write_text(sound.replace(fault.old, fault.new), encoding="utf-8")
+        if fault.file.startswith(CORE):
+            subprocess.run(build, cwd=ROOT, check=True)
         done = subprocess.run([*command, *fault.tests.split()], cwd=ROOT, capture_output=True, text=True, check=False)
     finally:
         path.write_text(sound, encoding="utf-8")
