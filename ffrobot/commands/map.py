@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 @click.argument("scene_file", metavar="SCENE.toml", type=FILE)
 @click.option("--over", metavar="NAME=VALUES", multiple=True, required=True, help="Axis of the grid; repeatable.")
 @click.option(
-    "--point", metavar="BODY.POINT", help="Point of the tool.  [default: that of the path, or of the last body]"
+    "--point", metavar="BODY.POINT", help="Tool or point.  [default: that of the path, a tool, or of the last body]"
 )
 @click.option(
     "--orientation",
