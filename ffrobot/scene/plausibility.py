@@ -31,7 +31,7 @@ OUTPUT = 5e3  # bytes for each body and output, while results are evaluated: a l
 
 
 def remarks(scene: Scene) -> Iterator[str]:
-    """Of a scene that is valid, one line each: units of links and bodies, angles, times of paths."""
+    """Of a scene that is valid, one line each: units of links, bodies and tools, angles, times of paths."""
     for body in scene.body:
         if body.link is not None:
             try:
@@ -41,6 +41,11 @@ def remarks(scene: Scene) -> Iterator[str]:
         elif body.rigid is not None:
             places = [body.rigid.center, *body.rigid.points.values()]
             yield from _long(max(float(np.linalg.norm(place)) for place in places), f'body "{body.name}"')
+    for tool in scene.tool:
+        label = f'tool "{tool.name}"'
+        yield from _long(float(np.linalg.norm(tool.at)), label)
+        if (angle := max(map(abs, (*tool.rpy, tool.angle)))) > TURNS / 2:
+            yield f"{label} is turned by {angle:g} rad: angles are in rad; is it in degrees (45*deg)?"
     with suppress(InputError):  # of links, which stage 1 tells
         yield from _masses(scene)
     yield from _angles(scene)

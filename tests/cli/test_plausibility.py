@@ -21,12 +21,13 @@ LINK = {
 }
 
 
-def arm(end=1.0, body=BAR, payload=(), **path):
+def arm(end=1.0, body=BAR, payload=(), tool=(), **path):
     return program.make_scene(
         name="arm",
         gravity=[0.0, -9.81],
         body=[{"name": "arm", "rigid": body}],
         payload=payload,
+        tool=[{"name": "pen", "point": "arm.tip", **keys} for keys in tool],
         joint=[{"name": "hub", "type": "revolute", "between": ["ground", "arm.root"]}],
         trajectory=[{"name": "turn", "joint": "hub", **path}],
         analysis=[{"name": "inverse", "kind": "pcid", "end": end, "output_step": 0.1}],
@@ -46,6 +47,9 @@ def arm(end=1.0, body=BAR, payload=(), **path):
         ({"value": "t", "body": {**BAR, "mass": 2e6}}, "a mass of 2e+06 kg: units are SI; is it in g?"),
         ({"value": "t", "payload": [{"point": "arm.tip", "mass": 500.0}]}, "500 kg on a robot of 1 kg"),
         ({"value": "t", "payload": [{"point": "arm.tip", "mass": 50.0}]}, None),
+        ({"value": "t", "tool": [{"at": [120.0, 0.0]}]}, 'tool "pen" is 120 m long'),
+        ({"value": "t", "tool": [{"angle": 45}]}, 'tool "pen" is turned by 45 rad'),
+        ({"value": "t", "tool": [{"at": [0.12, 0.0], "angle": "45*deg"}]}, None),
         ({"value": "45*pi/180*t"}, None),
         ({"value": "-45*deg"}, None),
         ({"value": "45*deg*(1 - cos(pi*t))"}, None),
