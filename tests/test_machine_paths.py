@@ -5,7 +5,6 @@ import pytest
 
 import ffrobot
 from ffrobot.common.errors import InputError
-from ffrobot.mbs.fields.motion_laws import law_peak
 from ffrobot.run.fastest import least_stretch
 
 INERTIA, TURN = 0.3, 1.2
@@ -31,18 +30,6 @@ def arm(body, path, joint=None, end=2.0):
         trajectory=[{"name": "swing", "joint": "shoulder", "via": [0.0, TURN], **path}],
         analysis=[{"name": "inverse", "kind": "pcid", "end": end, "output_step": 1e-3}],
     )
-
-
-@pytest.mark.parametrize("limit", [0.5, 2.0, 30.0])
-def test_fastest_rigid_arm_takes_its_limit(limit):
-    """I h p/(s T)² = limit, where p is the peak acceleration of the law."""
-    path = {"duration": 0.5, "fastest": True}
-    results = ffrobot.solve(arm(RIGID, path, {"moment_limit": limit}, end=4.0))
-    exact = np.sqrt(INERTIA * TURN * law_peak(4, 2) / limit) / 0.5
-    found = results.attributes("inverse/trajectories/swing")["stretch"]
-    assert exact <= found * (1 + 1e-4)  # a peak lies between outputs
-    assert found <= 1.0051 * exact
-    assert np.abs(results["inverse/joints/shoulder/moment"]).max() <= limit * (1 + 1e-9)
 
 
 def test_the_fastest_motion_is_sought_with_given_numbers_of_modes():

@@ -73,15 +73,6 @@ def test_soft_double_pendulum(pieces, bound, truth, tmp_path):
     assert np.abs(deflection[:, 1]).max() == pytest.approx(0.136, abs=0.002)
 
 
-def test_auto_takes_as_many_as_the_deflection_needs(truth, tmp_path):
-    """Four for 14 % of the length, none for a stiff link."""
-    with solved(pendulum("auto"), tmp_path) as file:
-        assert {file[f"fall/bodies/{name}"].attrs["pieces"] for name in ("link1", "link2")} <= {3, 4, 5}
-        assert np.linalg.norm(file["fall/points/link2.tip/position"] - truth, axis=1).max() < 1e-3
-    with solved(pendulum("auto", link(STIFF)), tmp_path) as file:
-        assert "pieces" not in file["fall/bodies/link1"].attrs
-
-
 def shapes_of(group):
     found = {}
     group.visititems(lambda key, entry: found.update({key: getattr(entry, "shape", None)}))

@@ -59,18 +59,6 @@ def test_a_resumed_run_is_the_uninterrupted_one(arm, stopped, keys):
     assert not results.has(f"{stopped}/resume")
 
 
-@pytest.mark.parametrize("stopped", ["inverse", "forward"])
-def test_runs_behind_gears_that_give_go_on(arm, stopped):
-    between = 'between = ["link1.tip", "link2.root"]'
-    gear = "gear_ratio = 50.0\nrotor_inertia = 1e-4\nstiffness = 5e3\ndamping = 5.0"
-    scene = arm(**{between: f"{between}\n{gear}"})
-    expected = ffrobot.solve(scene)
-    stop(scene, stopped, 0.03)
-    found = dict(differences(go_on(scene), expected))
-    assert found["joints/A/motor_angle"] < 1e-12
-    assert found["joints/A/moment"] < 1e-12
-
-
 @pytest.mark.parametrize("integrator", ["radau", "generalized-alpha"])
 def test_implicit_methods_go_on_within_the_tolerance(arm, integrator):
     tolerance = 1e-3
@@ -128,16 +116,6 @@ def test_input_that_has_changed(arm, file, old, new, change):
     with pytest.raises(ffrobot.InputError, match="resume: expected results of the same input") as error:
         go_on(scene)
     assert f"found that {change} has changed" in str(error.value)
-
-
-def test_on_the_command_line(arm, ffrobot):
-    scene = arm(**{"tolerance = 1e-7": "tolerance = 1e-7\nmax_steps = 4500"})
-    inverse_alone(scene)
-    command = ["solve", "scene.toml", "-o", "r.h5", "--resume"]
-    messages = [ffrobot(*command, cwd=scene.parent) for _ in range(3)]
-    assert [done.returncode for done in messages] == [1, 0, 0]
-    assert "; ffrobot solve scene.toml -o r.h5 --resume resumes from t = 0.0" in messages[0].stderr
-    assert messages[2].stdout == "r.h5: complete, nothing to go on with\n"
 
 
 def test_other_kinds_and_searches_for_modes_start_again(arm):

@@ -59,15 +59,6 @@ LINK = {
 }
 
 
-def test_mass_on_spring_and_damper():
-    """On a vertical slide, constant load g: y = −(m g / k)(1 − exp(−ζ ω t)(cos ω_d t + ζ ω / ω_d sin ω_d t))."""
-    results = ffrobot.solve(scene(spring, joint=SLIDE, analysis=FREE, gravity=[0.0, -9.81]))
-    t, decay = results.time("free"), C / (2 * MASS)
-    omega = np.sqrt(K / MASS - decay**2)
-    y = -(MASS * 9.81 / K) * (1 - np.exp(-decay * t) * (np.cos(omega * t) + decay / omega * np.sin(omega * t)))
-    np.testing.assert_allclose(results["free/points/arm.tip/position"][:, 1], y, atol=1e-8)
-
-
 @pytest.mark.parametrize("integrator", ["dop853", "radau"])
 def test_compiled_is_python(compiled_spring, integrator):
     """On a flexible link that is swung by its hinge and pulled back."""

@@ -8,10 +8,6 @@ from checkpoints import CASES
 import ffrobot
 from ffrobot.common.errors import InputError
 from ffrobot.mbs.model.truncation import interface_loads, with_fewer_modes
-from ffrobot.present.details import print_details
-from ffrobot.present.summary import summary_console
-from ffrobot.results.file import Results
-from ffrobot.results.write import results_image
 from ffrobot.run.bodies import load_bodies
 from ffrobot.run.mode_choice import reported_modes
 from ffrobot.run.mode_search import difference
@@ -122,17 +118,6 @@ def check_estimate(solution, exact, tolerance):
     assert worst / 3 < estimated < 6 * worst
     assert estimated <= tolerance / 2
     assert solution.mode_choice.tried[-1] < 36
-
-
-def test_the_summary_tells_the_choice_in_3d(arm, tmp_path, capsys):
-    folder, tables, _ = arm
-    solution = solved(folder, tables, "auto", tolerance=1e-2, end=0.2)
-    image, path = results_image(solution), tmp_path / "x.h5"
-    print_details(solution, Results.from_image(image, path).verdict, path, solution.seconds, summary_console())
-    printed = " ".join(capsys.readouterr().out.split())
-    assert "inverse: error of leaving out the others, estimated: deflections" in printed
-    assert "the same without search: modes = " in printed
-    assert f"solved with {', '.join(map(str, solution.mode_choice.tried))} modal coordinates" in printed
 
 
 @pytest.fixture(scope="module", params=[None, "fore.tip"])
