@@ -14,6 +14,9 @@ from pydantic_core import CoreSchema, core_schema
 RECORD = "deferred_record"
 """Key of the metadata of a core schema: what `loaded` takes."""
 
+USED: set[type[BaseModel]] = set()
+"""Records that this process has validated with: their validators are built."""
+
 
 @dataclass(frozen=True)
 class Deferred:
@@ -51,9 +54,11 @@ def loaded(record: type[BaseModel] | str) -> type[BaseModel]:
 
 def _deferred(record: type[BaseModel] | str) -> CoreSchema:
     def read(value: Any, info: ValidationInfo) -> BaseModel:  # noqa: ANN401
+        taken = loaded(record)
+        USED.add(taken)
         if isinstance(value, BaseModel):
-            return loaded(record).model_validate(value, context=info.context)
-        return loaded(record).model_validate_json(json.dumps(value, default=str), context=info.context)
+            return taken.model_validate(value, context=info.context)
+        return taken.model_validate_json(json.dumps(value, default=str), context=info.context)
 
     return core_schema.with_info_plain_validator_function(read, metadata={RECORD: record})
 

@@ -15,7 +15,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, GetCoreSchemaHandler
 from pydantic.fields import FieldInfo
 from pydantic_core import CoreSchema, ErrorDetails, PydanticKnownError, core_schema
 
-from .deferred import Deferred
+from .deferred import USED, Deferred
 from .errors import InputError, did_you_mean, either
 from .python_files import digest_of_function
 from .tables import key_path, shown
@@ -76,9 +76,6 @@ class OnlyIn:
 
 
 R = TypeVar("R", bound=Record)
-
-USED: set[type[Record]] = set()
-"""Records that this process has validated with: their validators are built."""
 
 
 def existing_file(path: Path, info: ValidationInfo) -> Path:

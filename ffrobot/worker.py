@@ -24,9 +24,9 @@ from tempfile import TemporaryFile
 from types import FrameType
 from typing import Any, BinaryIO, NoReturn
 
+from .common.deferred import USED
 from .common.interrupts import SIGNALS, EndOfCommand, end_with_parent
 from .common.python_files import imported_files
-from .common.validation import USED
 
 LOADED = (  # by every run; what else a run has loaded, the next one finds
     "ffrobot.cli", "ffrobot.run.solve", "ffrobot.run.inputs", "ffrobot.results.write",
