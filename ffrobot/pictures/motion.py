@@ -19,7 +19,7 @@ from ..mbs.scene.topology import Edge, Topology, spanning_forest
 from ..results.file import Results
 from ..results.joints import joint_type
 
-VISIBLE_DEFORMATION = 0.05  # of the mechanism's size
+VISIBLE_DEFORMATION, INVISIBLE = 0.05, 1e-3  # of the mechanism's size
 
 
 @dataclass(frozen=True)
@@ -154,6 +154,11 @@ def size_of(bodies: Sequence[MovingBody]) -> float:
 
 
 def visible_exaggeration(size: float, deflection: float) -> float:
-    """The largest of 1, 2, 5, 10, … 1000 that keeps `deflection` to a visible part of the mechanism's `size`, in m."""
+    """The largest of 1, 2, 5, 10, … 1000 that keeps `deflection` to a visible part of the mechanism's `size`, in m.
+
+    1 where not even 1000 times the deflection would be seen, as of rigid robots.
+    """
     steps = [1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0]
+    if steps[-1] * deflection < INVISIBLE * size:
+        return 1.0
     return max((s for s in steps if s * deflection <= VISIBLE_DEFORMATION * size), default=1.0)

@@ -11,7 +11,7 @@ from ..mbs.joints.joint import MotorLimits
 from ..results.file import Results
 from ..results.joints import joint_coordinates
 
-MARGIN = 1.15  # of the largest moment or speed, where no limit ends the curve of the power
+MARGIN = 1.15  # of the largest moment or speed, where no limit ends a curve
 POINTS = 60  # of that curve
 
 
@@ -28,12 +28,12 @@ def limits_of(results: Results, joint: str, datasets: Sequence[str]) -> MotorLim
 def limit_curves(limits: MotorLimits, speed: float, moment: float) -> Array:
     """Where |τ| ≤ τ_max, |γ̇| ≤ γ̇_max and |τ γ̇| ≤ P_max end: (n, 2) speeds and moments, NaN between pieces.
 
-    In all four quadrants; the curve of the power goes as far as the data, `speed` and `moment` at most, ask for. Empty
-    without limits.
+    In all four quadrants; where no limit ends a curve, it goes as far as the data, `speed` and `moment` at most, ask
+    for. Empty without limits.
     """
     power = limits.power if np.isfinite(limits.power) else 0.0  # without that limit nothing asks for more than the data
-    speed_end = min(limits.speed, MARGIN * max(speed, power / limits.moment, 1e-300))
-    moment_end = min(limits.moment, MARGIN * max(moment, power / speed_end, 1e-300))
+    speed_end = limits.speed if np.isfinite(limits.speed) else MARGIN * max(speed, power / limits.moment, 1e-300)
+    moment_end = limits.moment if np.isfinite(limits.moment) else MARGIN * max(moment, power / speed_end, 1e-300)
     pieces = []
     if np.isfinite(limits.moment):
         pieces.append(np.array([[0.0, limits.moment], [min(speed_end, limits.power / limits.moment), limits.moment]]))

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..actuation.motors import MotorFeasibility
+from ..results.rounded import ROUND_OFF, millimeters, number
 from ..results.verdict import AnalysisVerdict, Verdict
 from .lines import alike
 
@@ -22,7 +23,6 @@ LINES = 15  # that a summary has at most
 MOTORS = 6  # rows of motors for which analyses make room
 TEXTS = 2  # lines of warnings and advice, likewise
 REST = "--verbose"
-SMALLEST = 1e-9  # m, N·m, rad/s, W: below it numbers are rounding
 
 ANALYSES = ("analysis", "kind", "answer", "tip error, controlled", "tip error, open loop", "deflection", "remark")
 MOTOR = ("motor", "peak", "RMS", "speed", "power", "of limits", "in")
@@ -119,7 +119,7 @@ def _motor(name: str, motor: MotorFeasibility, one: AnalysisVerdict) -> Row:
     return (
         name,
         _of(motor.moment, motor.moment_limit, unit),
-        f"{_number(motor.rms_moment)} {unit}",
+        f"{number(motor.rms_moment)} {unit}",
         _of(motor.speed, motor.speed_limit, speed),
         _of(motor.power, motor.power_limit, "W"),
         _percent(motor.factor) if motor.has_limits else "none",
@@ -177,18 +177,12 @@ def _cut(line: str, width: int) -> str:
 
 
 def _length(value: float | None) -> str:
-    if value is None:
-        return ""
-    return f"{1e3 * value:.3g} mm" if value >= SMALLEST else f"< {1e3 * SMALLEST:g} mm"
+    return "" if value is None else millimeters(value, 3)
 
 
 def _percent(factor: float) -> str:
-    return f"{100 * factor if factor > SMALLEST else 0:.3g} %" if factor < 10.0 else f"{factor:.3g} ×"
+    return f"{100 * factor if factor > ROUND_OFF else 0:.3g} %" if factor < 10.0 else f"{factor:.3g} ×"
 
 
 def _of(peak: float, limit: float, unit: str) -> str:
-    return f"{_number(peak)}" + (f" of {limit:g}" if np.isfinite(limit) else "") + f" {unit}"
-
-
-def _number(value: float) -> str:
-    return f"{value if value > SMALLEST else 0:.4g}"
+    return number(peak) + (f" of {limit:g}" if np.isfinite(limit) else "") + f" {unit}"

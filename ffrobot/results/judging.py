@@ -15,6 +15,7 @@ from .actuators import read_motors, read_unsupplied
 from .joints import Coordinates, Scene, labelled_coordinates
 from .linear import held_in_words
 from .peaks import POWER, peak_of
+from .rounded import millimeters
 from .tool_error import off_path_in_words, tool_error
 from .verdict import AnalysisVerdict, PatchNeed, Place, Verdict
 
@@ -98,7 +99,8 @@ def _answer(
     if "control" in group:
         about = group["control"].attrs
         held = f", {100 * about['saturated']:.2g} % of the samples saturated" if about["saturated"] else ""
-        error = f"tip off by {1e3 * about['tip_error_max']:.4g} mm at most, {1e3 * about['tip_error_rms']:.4g} mm RMS"
+        most, rms = (millimeters(about[f"tip_error_{key}"]) for key in ("max", "rms"))
+        error = f"tip off by {most} at most, {rms} RMS"
         return f"loop {about['verdict']}: {error}{held}", None
     if "feasibility" not in group or _ended_early(group):
         return "", None

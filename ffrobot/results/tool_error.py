@@ -10,6 +10,7 @@ import numpy as np
 
 from .actuators import read_unsupplied
 from .joints import Scene
+from .rounded import millimeters
 
 AXES = "xyz"
 SAME_TIME = 9  # digits of output times (s) that count
@@ -77,5 +78,5 @@ def off_path_in_words(group: h5py.Group, scene: Scene) -> str:
     """As text; empty where there is nothing of that kind."""
     found = off_path(group, scene)
     return ", ".join(
-        f"{name} off its path by {1e3 * most:.4g} mm at most, {1e3 * rms:.4g} mm RMS" for name, most, rms in found
+        f"{name} off its path by {millimeters(most)} at most, {millimeters(rms)} RMS" for name, most, rms in found
     )

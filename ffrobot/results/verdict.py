@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..actuation.motors import MotorFeasibility
+from .rounded import millimeters, number
 from .tool_error import ToolError
 
 Place = tuple[float, str, float]
@@ -72,9 +73,9 @@ class AnalysisVerdict:
         if self.feasible is not None:  # of closed loops, a table has them
             yield from (f"  motor of {name}: {text}" for name, text in self.motor_texts.items())
         if self.deflection is not None:
-            yield f"  largest deflection {_place(1e3 * self.deflection[0], 'mm', *self.deflection[1:])}"
+            yield f"  largest deflection {_place(millimeters(self.deflection[0]), *self.deflection[1:])}"
         if self.stress is not None:
-            yield f"  largest stress {_place(self.stress[0] / 1e6, 'MPa', *self.stress[1:])} (von Mises)"
+            yield f"  largest stress {_place(f'{self.stress[0] / 1e6:.4g} MPa', *self.stress[1:])} (von Mises)"
         for text in filter(None, (self.margins, self.held)):
             yield f"  {text}"
         yield from (f"  to try: {text}" for text in self.advice)
@@ -138,7 +139,7 @@ class Verdict:
 def _motor(motor: MotorFeasibility, unit: str, interval: str) -> str:
     speed = "rad/s" if unit == "N·m" else "m/s"
     parts = [
-        f"peak {_of(motor.moment, motor.moment_limit)} {unit}, RMS {motor.rms_moment:.4g} {unit}{interval}",
+        f"peak {_of(motor.moment, motor.moment_limit)} {unit}, RMS {number(motor.rms_moment)} {unit}{interval}",
         f"{_of(motor.speed, motor.speed_limit)} {speed}",
         f"{_of(motor.power, motor.power_limit)} W",
     ]
@@ -147,8 +148,8 @@ def _motor(motor: MotorFeasibility, unit: str, interval: str) -> str:
 
 
 def _of(peak: float, limit: float) -> str:
-    return f"{peak:.4g}" + (f" of {limit:g}" if np.isfinite(limit) else "")
+    return number(peak) + (f" of {limit:g}" if np.isfinite(limit) else "")
 
 
-def _place(value: float, unit: str, where: str, time: float) -> str:
-    return f"{value:.4g} {unit}: {where}, t = {time:.4g} s"
+def _place(value: str, where: str, time: float) -> str:
+    return f"{value}: {where}, t = {time:.4g} s"

@@ -17,6 +17,7 @@ from ffrobot.pictures.figures.plot import plot_results
 from ffrobot.pictures.figures.reading import curve_points
 from ffrobot.pictures.figures.style import new_axes
 from ffrobot.pictures.figures.time_history import draw_time_history
+from ffrobot.pictures.motion import visible_exaggeration
 from ffrobot.pictures.torque_speed import limit_curves
 from ffrobot.results.file import Results
 
@@ -146,6 +147,8 @@ def test_limits_of_a_motor_over_its_speed():
     drawn = moment_alone[~np.isnan(moment_alone).any(axis=1)]
     np.testing.assert_array_equal(np.abs(drawn[:, 1]), 3.0)
     assert 4.0 < np.abs(drawn[:, 0]).max() < 5.0  # no farther than the data ask for
+    corners = limit_curves(MotorLimits(moment=3.0, speed=2.0), 0.1, 0.1)  # a rectangle, however small the data
+    assert {tuple(point) for point in np.abs(corners[~np.isnan(corners).any(axis=1)])} == {(0, 3), (2, 3), (2, 0)}
 
 
 def test_magnitude_scale_and_x_of_a_curve(results):
@@ -154,6 +157,12 @@ def test_magnitude_scale_and_x_of_a_curve(results):
         x, values = curve_points(held, Curve(data=name, label="", magnitude=True, x="inverse/joints/O/rate"), 1e3)
         np.testing.assert_allclose(values[:, 0], 1e3 * np.hypot(*held[name].T), rtol=1e-12)
         np.testing.assert_array_equal(x, held["inverse/joints/O/rate"])
+
+
+@pytest.mark.parametrize(("deflection", "s"), [(0.0, 1.0), (1e-7, 1.0), (1e-5, 1000.0), (1e-3, 50.0), (0.2, 1.0)])
+def test_exaggeration_of_what_can_be_seen(deflection, s):
+    """Five percent of a robot of one meter at most; none of a rigid robot."""
+    assert visible_exaggeration(1.0, deflection) == s
 
 
 @pytest.mark.parametrize(("patches", "is_map"), [(10, True), (4, False)])

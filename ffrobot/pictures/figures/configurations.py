@@ -25,8 +25,8 @@ GREY = "#8b95a3"
 def draw_configurations(figure: FigureRecord, results: Results) -> Figure:
     """Draw the bodies of an analysis at the outputs nearest to `figure.times`, and the curves of `figure` as paths.
 
-    Without curves, the paths of the points that have trajectories. Deflections are to scale in planar scenes, else as
-    large as can be seen, unless the figure says otherwise. Postures between the first and the last are lines.
+    Without curves, the paths of the points that have trajectories or tools. Deflections are to scale in planar scenes,
+    else as large as can be seen, unless the figure says otherwise. Postures between the first and the last are lines.
     """
     assert figure.analysis is not None
     outputs = results.time(figure.analysis)
@@ -93,10 +93,11 @@ Path = tuple[str | None, Array, dict[str, object]]
 
 
 def _paths(figure: FigureRecord, results: Results) -> list[Path]:
-    """Those of the figure, else those of the points that have trajectories, to scale."""
+    """Those of the figure, else those of the points that have trajectories or tools, to scale."""
     if figure.curves:
         return _curves(figure, results)
-    points = [trajectory["point"] for trajectory in results.scene.get("trajectory", []) if "point" in trajectory]
+    marked = [*results.scene.get("trajectory", []), *results.scene.get("tool", [])]
+    points = [entry["point"] for entry in marked if "point" in entry]
     style: dict[str, object] = {"color": COLORS[1], "linestyle": "--", "linewidth": 0.8}
     return [
         ("path" if number == 0 else None, in_3d(results[f"{figure.analysis}/points/{point}/position"]), style)

@@ -23,7 +23,7 @@ const state = { t: 0, playing: false, showing: false, last: null, s: MECHANISM.e
 function showValues() {
   control("time").value = end > 0 ? (1000 * state.t) / end : 0;
   control("time-value").value = state.t.toPrecision(4) + " s";
-  control("exaggeration-value").value = state.s.toPrecision(3);
+  control("exaggeration-value").value = Number(state.s.toPrecision(3));
   control("speed-value").value = state.speed.toPrecision(2);
 }
 

@@ -11,6 +11,7 @@ import numpy as np
 from ...common.peaks import largest
 from ...results.file import Results, status_in_words
 from ...results.joints import joint_coordinates
+from ...results.rounded import millimeters, number
 from ..figures.shared import bending_points
 from ..path_targets import targets
 from .histories import path_error
@@ -72,25 +73,26 @@ def bending_table(runs: Sequence[Run]) -> Table:
 def peaks_table(runs: Sequence[Run]) -> Table:
     """The largest absolute value of what a reader asks for first, in every run."""
     found = ((run.label, *peak) for run in runs for peak in _peaks(run))
-    rows = [(label, what, f"{value:.4g} {unit}", f"{at:.4g}") for label, what, unit, value, at in found]
+    rows = [(label, what, value, f"{at:.4g}") for label, what, value, at in found]
     return Table(("analysis", "largest", "value", "at (s)"), rows)
 
 
-def _peaks(run: Run) -> Iterator[tuple[str, str, float, float]]:
-    """(quantity, unit, its largest size, when it has that) of a run."""
+def _peaks(run: Run) -> Iterator[tuple[str, str, float]]:
+    """(quantity, its largest size, when it has that) of a run."""
     results, analysis = run.results, run.analysis
     for target in targets(run.results, run.analysis):
-        error = 1e3 * path_error(run, target)
-        found = largest(results.time(analysis)[: len(error)], error)
-        yield f"distance of {target.point} from its path", "mm", *found
+        error = path_error(run, target)
+        most, at = largest(results.time(analysis)[: len(error)], error)
+        yield f"distance of {target.point} from its path", millimeters(most), at
     for joint in (keys["name"] for keys in results.scene.get("joint", [])):
         for coordinate in joint_coordinates(results.scene, joint):
             if results.has(moment := f"{analysis}/joints/{joint}/moment"):
                 name = f"motor of joint {joint}{coordinate.label}"
-                yield name, coordinate.force_unit, *results.peak(moment + coordinate.column)
+                peak, at = results.peak(moment + coordinate.column)
+                yield name, f"{number(peak)} {coordinate.force_unit}", at
     for point in bending_points(results, analysis):
         deflection, at = results.peak(f"{analysis}/points/{point}/deflection")
-        yield f"deflection of {point}", "mm", 1e3 * deflection, at
+        yield f"deflection of {point}", millimeters(deflection), at
 
 
 def voltages_table(runs: Sequence[Run]) -> Table:

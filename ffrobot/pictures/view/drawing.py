@@ -14,11 +14,12 @@ from ...common.arrays import Array
 from ..body_surface import drawn_mode
 from ..projection import AXIS_LENGTH, LINK, SPACE, TOOL_COLORS, TOOL_LENGTH, View
 
-SIZE, MOVIE_SIZE = (1400, 800), (960, 576)  # pixels
+SIZE, MOVIE_SIZE = (1400, 800), (960, 576)  # pixels, at most so wide
+NARROWEST = 1.1  # width over height
 PANEL = (700, 360)  # pixels, of a mode
 COLUMNS = 2
 MODES = 6  # that are drawn at most
-MARGIN = 1.25  # how much larger than the link or robot the picture is
+MARGIN = 1.15  # how much larger than the link or robot the picture is
 COLORS = "viridis"
 GHOST, METAL, BARE = "#9a9a9a", "#4a5563", "#c9ced6"
 FOLD = 30.0  # degrees: an edge at which a surface bends by more is shown
@@ -31,6 +32,7 @@ BAR = {
     "color": "black", "title_font_size": 16, "label_font_size": 14, "n_labels": 5,
 }  # fmt: skip
 BAR_ROOM = 0.12  # of the height, at the bottom
+CORNER = (0.82, 0.0, 1.0, 0.18)  # of the picture, where the directions are: most robots stand on its left
 LINE, VERTEX = 3, 1  # VTK's numbers of cells
 
 
@@ -50,14 +52,18 @@ def _draw_motion(job: dict[str, Any]) -> None:
     grids = [_exaggerated(job, step) for step in job["steps"]]
     everything = np.concatenate([shown.points for _, shown in grids])
     name = SHOWN[job["color"]][0]
-    limit = round_above(max(float(np.nanmax(shown[name], initial=0.0)) for _, shown in grids))
+    largest = max(float(np.nanmax(shown[name], initial=0.0)) for _, shown in grids)
+    limit, bar = round_above(largest), BAR if largest > 0.0 else None
+    for _, shown in grids:
+        shown[name] = np.where(_is_bare(grids, name), np.nan, shown[name])
     size = float(np.ptp(everything, axis=0).max()) or 1.0
     view = SPACE if job["in_space"] else LINK
+    window = _window(MOVIE_SIZE if job["movie"] else SIZE, everything, view)
     for k, (grid, shown) in enumerate(grids):
-        plotter = pyvista.Plotter(off_screen=True, window_size=MOVIE_SIZE if job["movie"] else SIZE)
+        plotter = pyvista.Plotter(off_screen=True, window_size=window)
         if job["scale"] != 1.0 and not job["movie"]:
             _add_ghost(plotter, grid)
-        _add(plotter, shown, name, limit, ROD * size, BAR)
+        _add(plotter, shown, name, limit, ROD * size, bar)
         depth = 0.0 if job["in_space"] else 1.2 * float(np.ptp(everything[:, 2])) + 3.0 * PIN * size
         _add_marks(plotter, job, k, size, depth)
         _finish(plotter, job["title"].format(time=f"{job['times'][k]:.4g}"), everything, view, BAR_ROOM)
@@ -74,6 +80,24 @@ def _exaggerated(job: dict[str, Any], step: int) -> tuple[Any, Any]:
     values = grid[job["color"]]
     shown[name] = unit * (np.linalg.norm(values, axis=1) if values.ndim == 2 else values)
     return grid, shown
+
+
+def _window(size: tuple[int, int], points: Array, view: View) -> tuple[int, int]:
+    """Width and height in pixels: as high as `size`, no wider than it and than what is seen needs."""
+    wide, high, _ = np.ptp(points @ np.stack(view, axis=1), axis=0)
+    needed = (1.0 - BAR_ROOM) * wide / max(high, 1e-9 * wide, 1e-300)
+    return 2 * round(0.5 * min(size[0], max(NARROWEST, needed) * size[1])), size[1]
+
+
+def _is_bare(grids: Sequence[tuple[Any, Any]], name: str) -> Array:
+    """(p,) whether a point is on a body that is zero everywhere at all steps, as rigid ones are: they have no color."""
+    grid = grids[0][0]
+    owner = np.zeros(grid.n_points, dtype=np.int64)
+    owner[grid.cell_connectivity] = np.repeat(grid.cell_data["body"], np.diff(grid.offset))
+    largest = np.zeros(int(owner.max(initial=0)) + 1)
+    for _, shown in grids:
+        np.fmax.at(largest, owner, shown[name])
+    return np.asarray(largest[owner] == 0.0)
 
 
 def _draw_modes(job: dict[str, Any]) -> None:
@@ -187,7 +211,7 @@ def _finish(plotter: Any, title: str, points: Array, view: View, room: float = 0
     """
     plotter.set_background("white")
     plotter.add_text(title, font_size=9, color="black", position="upper_left")
-    plotter.add_axes(color="black")
+    plotter.add_axes(color="black", viewport=CORNER)
     plotter.enable_parallel_projection()
     plotter.view_vector(view.viewer, view.up)
     corners = points @ np.stack(view, axis=1)
