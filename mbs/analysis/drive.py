@@ -104,7 +104,7 @@ def drive_robot(
     continuation = Continuation(_core.TreeCheckpoint(), recording, new_samples(times, analysis))
     continuation = continuation if earlier is None else earlier.continuation
     if earlier is not None:
-        _check(earlier, model, times, is_recorded=is_recorded)
+        check_earlier(earlier, model, times, is_recorded=is_recorded)
     with going_on(earlier, times):
         run = _integrated(system, times, start, controls, control, progress, continuation)
     motion = _motion(system, run, times)
@@ -172,17 +172,6 @@ def _under(drives: Drives, run: Outcome, numbers: Array) -> Outcome:
     commanded = {joint: numbers[:, list(columns)] for joint, columns in drives.replayed.moments.items()}
     forces = replace(run.forces, commanded=commanded, applied=(*drives.at_points, *applied))
     return replace(run, forces=forces)
-
-
-def _check(earlier: EarlierRun, model: Model, times: Array, *, is_recorded: bool) -> None:
-    motion, n_q, n_v = earlier.motion, model.tree.n_q, model.tree.n_v
-    datasets = {
-        "q": (motion.q, n_q),
-        "v": (motion.v, n_v),
-        "a": (motion.a, n_v),
-        "multipliers": (motion.multipliers, len(model.rows)),
-    }
-    check_earlier(earlier, times, (n_q, n_v), datasets, is_recorded=is_recorded)
 
 
 def _between(

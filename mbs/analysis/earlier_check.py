@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 
@@ -11,16 +11,12 @@ import numpy as np
 from ...common.arrays import Array
 from ...common.errors import InputError
 from .. import _core
+from ..model.model import Model
 from .outcome import METHOD_HISTORY, STEPS, TREE_MEMORY, TREE_VECTORS, EarlierRun
 
-Datasets = Mapping[str, tuple[Array, int]]
-"""By name: numbers with one row per output, and how many columns are expected."""
 
-
-def check_earlier(
-    earlier: EarlierRun, times: Array, sizes: tuple[int, int], datasets: Datasets, *, is_recorded: bool = False
-) -> None:
-    """Make sure that `earlier` is a run with outputs at `times` (s), of a tree with `sizes` n_q and n_v.
+def check_earlier(earlier: EarlierRun, model: Model, times: Array, *, is_recorded: bool) -> None:
+    """Make sure that `earlier` is a run of `model` with outputs at `times` (s).
 
     `is_recorded`: whether a later analysis replays it. Raises `InputError` for sizes, times or numbers that are not
     those of such a run.
@@ -30,17 +26,18 @@ def check_earlier(
     fits = 0 < outputs <= len(times) and np.array_equal(earlier.motion.time, times[:outputs])
     kept.expect(fits, "time", "the times of the scene")
     kept.expect(not is_completed or outputs == len(times), "status", "a run up to its end")
-    for name, (values, columns) in datasets.items():
-        kept.numbers(name, values, (outputs, columns))
-    kept.tree_checkpoint(point, *sizes)
+    n_q, n_v = model.tree.n_q, model.tree.n_v
+    for name, columns in (("q", n_q), ("v", n_v), ("a", n_v), ("multipliers", len(model.rows))):
+        kept.numbers(name, getattr(earlier.motion, name), (outputs, columns))
+    kept.tree_checkpoint(point, n_q, n_v)
     kept.expect(is_completed or point.steps.next_step > 0.0, "checkpoint", "a positive step")
     kept.expect(
         is_recorded == (earlier.continuation.recording is not None), "recording", "one at which its forces are applied"
     )
     if earlier.continuation.recording is not None:
-        kept.recording(earlier.continuation.recording, sum(sizes), times[-1] if is_completed else point.time)
+        kept.recording(earlier.continuation.recording, n_q + n_v, times[-1] if is_completed else point.time)
     if earlier.continuation.samples is not None:
-        kept.samples(earlier.continuation.samples, sum(sizes))
+        kept.samples(earlier.continuation.samples, n_q + n_v)
 
 
 @contextmanager
