@@ -221,35 +221,13 @@ class Feasibility:
     @property
     def is_feasible(self) -> bool:
         """Whether there are actuators for all that is needed, within their limits."""
-        return self.unsupplied is None and not self.short
-
-    @property
-    def has_limits(self) -> bool:
-        """Whether any motor or patch has a limit."""
-        limits = [(of.moment_limit, of.speed_limit, of.power_limit) for of in self.motors.values()]
-        return bool(np.isfinite(limits).any()) or any(
-            np.isfinite(of.available_moment).any() for of in self.patches.values()
-        )
-
-    @property
-    def judged(self) -> dict[str, MotorFeasibility | PatchFeasibility]:
-        """Every actuator by the name that messages have for it."""
-        motors = {f"motor {name}": motor for name, motor in self.motors.items()}
-        return {**motors, **{f"patches of {name}": patches for name, patches in self.patches.items()}}
+        return self.unsupplied is None and not any(factor > 1.0 for factor in self.factors.values())
 
     @property
     def factors(self) -> dict[str, float]:
-        """The largest ratio of what is required of each actuator to its limit."""
-        return {name: float(np.max(judged.factor)) for name, judged in self.judged.items()}
-
-    @property
-    def short(self) -> dict[str, tuple[float, float]]:
-        """Actuators that cannot do it: the factor they lack, and from what time on (s)."""
-        return {
-            name: (factor, float(np.nanmin(self.judged[name].saturation_time)))
-            for name, factor in self.factors.items()
-            if factor > 1.0
-        }
+        """The largest ratio of what is required of each actuator to its limit, by its name in messages."""
+        motors = {f"motor {name}": float(motor.factor) for name, motor in self.motors.items()}
+        return motors | {f"patches of {name}": float(np.max(of.factor)) for name, of in self.patches.items()}
 
 
 class ModalMotion(NamedTuple):

@@ -35,7 +35,7 @@ class Linear(InstantAnalysis):
     def references(self) -> Iterator[Reference]:
         """The points."""
         for point in self.points or ():
-            yield Reference("points", point, needs_marker=True)
+            yield Reference("points", point)
 
     def run(self, context: ActuatedContext) -> Outcome:
         """The operating points, with `LinearModels` about them. Raises `SolveError` in singular postures."""

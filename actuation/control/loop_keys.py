@@ -77,7 +77,7 @@ class SampledAnalysis(ActuatedAnalysis):
             for k, record in enumerate(records, 1):
                 yield from under(f"{label} no. {k}", record.references())
         if self.tip is not None:
-            yield Reference("tip", self.tip, needs_marker=True)
+            yield Reference("tip", self.tip)
 
     def prescribed(self) -> Iterator[tuple[str, TimeFunction, int]]:
         """The disturbances."""

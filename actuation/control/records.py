@@ -70,7 +70,7 @@ class Sensor(Record):
     def references(self) -> Iterator[Reference]:
         """What is measured."""
         if self.point is not None:
-            yield Reference("", self.point, needs_marker=True)
+            yield Reference("", self.point)
         if self.modal is not None:
             yield Reference("modal", self.modal)
             yield Reference("modal", self.modal, "flexible body")

@@ -130,7 +130,7 @@ def beam_stresses(
         x, y, z = position
         material = _material(link, stations, x)
         inertia = material.with_lumps(attached).times_modes(W).beside(of_modes)
-        static = _unit_loads(link, material, attached, interfaces)
+        static = _unit_loads(material, attached, interfaces)
         F, M = np.concatenate([_section_forces(link, inertia, x), _section_forces(link, static, x)], axis=2)
         segment = int(segments(link, np.array(x)))
         stress = section_stress(link.shapes[segment], link.sections[segment], F, M, y, z)
@@ -155,9 +155,7 @@ def stress_loads(link: BeamLink, interfaces: Mapping[str, Interface]) -> tuple[s
     return tuple(unit_load_names(interfaces)) if link.stress.points else ()
 
 
-def _unit_loads(
-    link: BeamLink, material: Material, attached: Sequence[Lump], interfaces: Mapping[str, Interface]
-) -> SectionLoads:
+def _unit_loads(material: Material, attached: Sequence[Lump], interfaces: Mapping[str, Interface]) -> SectionLoads:
     """All unit loads, (q, 3, l), in the order of `unit_load_names`."""
     moving = material.with_lumps(attached).under_unit_motions()
     places, motions = len(interfaces), moving.force.shape[2]

@@ -113,10 +113,6 @@ class SolidModel:
         """Number of nodes that this rank owns."""
         return self.x.shape[0]
 
-    def vector(self) -> PETSc.Vec:
-        """A vector of displacements: three for each node."""
-        return PETSc.Vec().createMPI((3 * self.owned, None), bsize=3, comm=self.comm)
-
     def total(self, part: Array) -> Array:
         """Sum of each rank's `part`; collective."""
         part = np.ascontiguousarray(part, dtype=np.float64)

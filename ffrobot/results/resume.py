@@ -38,8 +38,8 @@ from ..mbs.analysis.outcome import (
 )
 from ..mbs.scene.analysis import Analysis, IntegratedAnalysis
 from ..mbs.solve.integrators import METHODS, Choice
+from ..run.bodies import LoadedBody
 from ..run.inputs import digest_of_file, named_files, python_files
-from ..run.loaded_body import LoadedBody
 from ..run.prepare import with_stiffening
 from ..run.solution import Solution
 from ..run.solve import Keep, prepare_scene, run_analyses

@@ -19,7 +19,7 @@ from ..mbs.quantities.motion import RobotMotion
 from ..mbs.scene.analysis import Analysis
 from ..mbs.scene.space import SPACES
 from ..scene.scene import Scene
-from .loaded_body import LoadedBody
+from .bodies import LoadedBody
 
 Bodies = Mapping[str, LoadedBody]
 FORCES_AT_POINTS = ("trajectory", "points")  # values of `apply` that need no modal forces

@@ -10,7 +10,7 @@ from ..common.arrays import Array, as_floats
 from ..mbs.model.body import Body
 from ..mbs.model.truncation import loaded_points, with_fewer_modes
 from ..scene.scene import Scene
-from .loaded_body import LoadedBody
+from .bodies import LoadedBody
 from .mode_search import Reported
 from .solution import AnalysisResult
 

@@ -14,8 +14,7 @@ from ..mbs.solve.joint_conditions import with_robot_damping
 from ..scene.pieces import BodyInPieces, bodies_in_pieces, scene_of_pieces
 from ..scene.scene import Scene
 from .actuation import given_voltages, make_patches, points_3d
-from .bodies import load_bodies, with_structure
-from .loaded_body import LoadedBody, robot_damping_ratios
+from .bodies import LoadedBody, load_bodies, robot_damping_ratios, with_structure
 from .mode_choice import mode_levels
 from .solution import Solution
 from .watcher import Watcher

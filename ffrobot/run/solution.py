@@ -40,7 +40,7 @@ from ..mbs.scene.analysis import Analysis
 from ..scene.pieces import BodyInPieces
 from ..scene.scene import Scene
 from .actuation import Actuation
-from .loaded_body import LoadedBody, remarks_on_parts, rigid_in_words
+from .bodies import LoadedBody, remarks_on_parts, rigid_in_words
 from .mode_search import ModeChoice
 
 

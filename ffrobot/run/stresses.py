@@ -23,7 +23,7 @@ from ..mbs.quantities.stress import (
     mode_acceleration,
     mode_displacement,
 )
-from .loaded_body import LoadedBody
+from .bodies import LoadedBody
 
 
 def find_stresses(

@@ -41,7 +41,7 @@ class Static(Analysis):
     def references(self) -> Iterator[Reference]:
         """The points."""
         for point in self.points or ():
-            yield Reference("points", point, needs_marker=True)
+            yield Reference("points", point)
 
     def run(self, context: Context) -> Outcome:
         """Motion and forces at t = 0."""

@@ -13,16 +13,13 @@ from .field_types import GROUND, split_point
 class Reference:
     """One reference: `key` of the record where it stands, `name` "BODY", "BODY.POINT" or the joint's.
 
-    "patches" are a layout of them, a "patched body" has some, an "elastic joint" has stiffness.
-
-    The equations of motion have a marker at a point that `needs_marker`; forces of the mechanism act there where it
-    is `loaded`.
+    "patches" are a layout of them, a "patched body" has some, an "elastic joint" has stiffness. Forces of the mechanism
+    act at a point that is `loaded`.
     """
 
     key: str
     name: str
     kind: Literal["body", "flexible body", "patches", "patched body", "joint", "elastic joint"] = "body"
-    needs_marker: bool = False
     loaded: bool = False
 
     @property
@@ -31,9 +28,9 @@ class Reference:
         return split_point(self.name) if self.kind == "body" and "." in self.name else None
 
 
-def marker_reference(key: str, side: str | None, loaded: bool = False) -> list[Reference]:
-    """The reference to a point (or a body's frame) with a marker; none to the ground, or where nothing is given."""
-    return [] if side is None or side == GROUND else [Reference(key, side, needs_marker=True, loaded=loaded)]
+def loaded_reference(key: str, side: str | None) -> list[Reference]:
+    """The reference to a point (or a body's frame) where forces act; none to the ground, or where nothing is given."""
+    return [] if side is None or side == GROUND else [Reference(key, side, loaded=True)]
 
 
 def body_of(side: str) -> str:

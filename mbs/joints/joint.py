@@ -19,7 +19,7 @@ from ...common.arrays import Array
 from ...common.rotations import of_rpy, smallest_turn
 from ...common.validation import Record
 from ..fields.field_types import GROUND, Name, Quantity, Side, Vector3, split_point
-from ..fields.references import Reference, body_of, marker_reference
+from ..fields.references import Reference, body_of, loaded_reference
 from ..fields.spelling import IN_SPACE, Vector
 
 
@@ -155,7 +155,7 @@ class JointRecord(Record, ABC):
     def references(self) -> Iterator[Reference]:
         """The points it joins."""
         for k, side in enumerate(self.between):
-            yield from marker_reference(f"between[{k}]", side, loaded=True)
+            yield from loaded_reference(f"between[{k}]", side)
 
     @field_validator("motor", check_fields=False)
     @classmethod

@@ -11,9 +11,9 @@ from ...common.errors import quoted
 from ...common.validation import Record
 from .._core import TimeFunction
 from ..fields.field_types import Expression, Expressions, PointReference, one_of, only, present
-from ..fields.references import Reference, marker_reference
+from ..fields.functions import StateForce
+from ..fields.references import Reference, loaded_reference
 from ..fields.spelling import IN_SPACE, Spelled, as_written, is_planar, keys_here
-from ..fields.state_forces import StateForce
 
 OF_POINT = ("x", "y", "z", "mx", "my", "mz")
 
@@ -63,7 +63,7 @@ class Load(Record):
 
     def references(self) -> Iterator[Reference]:
         """Where it acts."""
-        yield from marker_reference("point", self.point, loaded=True)
+        yield from loaded_reference("point", self.point)
         if self.joint is not None:
             yield Reference("joint", self.joint, "joint")
         if self.pzt is not None:

@@ -15,9 +15,8 @@ from ...common.errors import quoted
 from ...common.validation import Record
 from ..fields.field_types import NotNegative, Positive, Quantity
 from ..fields.motion_laws import SMOOTHNESS, Limits
-from ..fields.paths import Legs, path_of
+from ..fields.paths import Legs, impulses, path_of, shaped
 from ..fields.piecewise import Piecewise
-from ..fields.shapers import impulses, shaped
 from ..fields.waypoints import Waypoints
 
 Place = Quantity | tuple[Quantity, ...]

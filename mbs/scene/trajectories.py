@@ -17,7 +17,7 @@ from ..fields.field_types import Expression, Name, PointReference, Quantity, Vec
 from ..fields.orientations import QUATERNION, OrientationLaw, Reference, about_their_middle, orientation_of
 from ..fields.piecewise import Piecewise
 from ..fields.references import Reference as RecordReference
-from ..fields.references import marker_reference
+from ..fields.references import loaded_reference
 from ..fields.spelling import IN_SPACE, Spelled, as_written, is_planar, keys_here
 from ..fields.waypoints import Waypoints
 from .motion_keys import LIMITS, MotionKeys, OfPlaces, Place
@@ -156,8 +156,8 @@ class Trajectory(MotionKeys):
 
     def references(self) -> Iterator[RecordReference]:
         """What follows it."""
-        yield from marker_reference("point", self.point, loaded=True)
-        yield from marker_reference("angle", self.angle, loaded=True)
+        yield from loaded_reference("point", self.point)
+        yield from loaded_reference("angle", self.angle)
         for key in ("joint", "motor"):
             if (name := getattr(self, key)) is not None:
                 yield RecordReference(key, name, "joint")

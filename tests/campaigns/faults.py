@@ -79,13 +79,13 @@ FAULTS = [
     ),
     Fault("actuation/point_forces.py", "[:, 6:] += held", "[:, 6:] -= held", WRITTEN_POINTS),
     Fault(
-        f"{PATCHES}/lamina.py",
+        f"{PATCHES}/records.py",
         "np.array([modulus * d31 / thickness, 0.0])",
         "np.array([modulus * d31, 0.0])",
         "tests/actuation/test_patches.py",
     ),
     Fault(
-        f"{PATCHES}/lamina.py",
+        f"{PATCHES}/records.py",
         "s * c**3 - (2 * S_22",
         "s * c**3 + (2 * S_22",
         "tests/actuation/test_patched_links_3d.py",

@@ -10,7 +10,7 @@ import ffrobot
 from ffrobot.common.errors import InputError
 from ffrobot.common.rotations import exponential, logarithm, of_quaternion, of_rpy
 from ffrobot.mbs.fields.motion_laws import law_in, law_peak
-from ffrobot.mbs.fields.shapers import Impulse, impulses
+from ffrobot.mbs.fields.paths import Impulse, impulses
 
 RUN = {"name": "inverse", "kind": "pcid", "end": 0.5, "output_step": 0.002, "tolerance": 1e-10}
 GUESS = {"O": 0.0, "A": 1.0471975511965976}

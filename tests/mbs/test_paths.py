@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 
 from ffrobot.mbs.fields.motion_laws import Limits, averaged_step, law_in, law_within, polynomial_law
-from ffrobot.mbs.fields.paths import Legs, path_of
+from ffrobot.mbs.fields.paths import RESIDUAL, Legs, impulses, path_of, shaped
 from ffrobot.mbs.fields.piecewise import Piecewise, superposed
-from ffrobot.mbs.fields.shapers import RESIDUAL, impulses, shaped
 
 LAWS = [("rest-to-rest", 2), ("rest-to-rest", 4), ("s-curve", 2), ("s-curve", 4), ("trapezoid", 1)]
 

@@ -13,7 +13,7 @@ from rotations import random_rotation
 from scipy.linalg import qr
 
 from ffrobot.mbs import _core
-from ffrobot.mbs.fields.state_forces import state_function
+from ffrobot.mbs.fields.functions import state_function
 from ffrobot.mbs.model.drives import Command, Drive
 from ffrobot.mbs.model.model import row_values
 from ffrobot.mbs.model.rows import ConstraintRow

@@ -21,8 +21,7 @@ from ...mbs.model.body import Body
 from ...mbs.model.model import build_model
 from ...mbs.model.tree import KinematicTree, Node
 from ...mbs.solve.posture import robot_size
-from ...run.bodies import load_bodies
-from ...run.loaded_body import LoadedBody
+from ...run.bodies import LoadedBody, load_bodies
 from ...scene.load import load_scene
 from ...scene.scene import Scene
 from .names import Names
