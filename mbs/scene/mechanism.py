@@ -51,8 +51,9 @@ class Initial(Record):
     branch: dict[str, Word] = Field(default_factory=dict)
     """Which of several postures that meet the constraints at t = 0, by joint. Elbow: "up" or "down", its joint is above
     or below the straight line between the joints (or the tool) next to it. Shoulder: "right" or "left", a positive turn
-    raises or lowers the end of the arm along the axis of the joint before. Wrist: "noflip" or "flip" (also "positive"
-    or "negative"), the sign of the coordinate within ±180°. Of those the nearest to the guess."""
+    raises or lowers the end of the arm along the axis of the joint before. Wrist: "noflip" or "flip", a
+    positive or negative turn leads the axis of the joint before to that of the joint after. Any joint: "positive" or
+    "negative", the sign of the coordinate within ±180°. Of those the nearest to the guess."""
 
     def references(self) -> Iterator[Reference]:
         """The bodies and joints with guesses."""

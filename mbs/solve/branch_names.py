@@ -4,7 +4,9 @@ Each word is of one joint, and is right or wrong in any posture:
 
     up, down           the joint is above or below the line between the joints (or the tool) next to it
     right, left        a positive turn raises the end of the arm along the axis of the joint before, or lowers it
-    noflip, positive   the coordinate, within ±π, is not below zero; flip, negative: it is
+    noflip, flip       a positive turn, of less than π, leads the axis of the joint before to that of the joint after
+                       (but for their inclination), or a negative one: the arm is singular in between
+    positive, negative the sign of the coordinate within ±π
 
 Right and left are those of C. S. G. Lee and M. Ziegler, Geometric approach in solving inverse kinematics of PUMA
 robots, IEEE Transactions on Aerospace and Electronic Systems 20 (1984) 695–706.
@@ -34,7 +36,7 @@ def branch_names(model: Model, q: Array) -> dict[str, Word]:
     The wrist is the fifth of six turning joints. An arm whose first axis is not parallel to the next two has a shoulder
     and an elbow, one whose first two are parallel an elbow.
     """
-    joints = [node for node in _chain(model) if node.joint.units == ("rad",)]
+    joints = _turning(model)
     axes = _lines(model, q, joints)[1]
     parallel = [float(np.linalg.norm(np.cross(a, b))) < MEETING for a, b in pairwise(axes)]
     found: dict[str, Word] = {}
@@ -44,7 +46,7 @@ def branch_names(model: Model, q: Array) -> dict[str, Word]:
     elif len(joints) >= 2 and parallel[0]:
         found[joints[1].joint.name] = "up" if _above(model, q, joints[1]) else "down"
     if len(joints) == 6:
-        found[joints[4].joint.name] = "noflip" if _angle(q, joints[4]) >= 0.0 else "flip"
+        found[joints[4].joint.name] = "flip" if _flips(model, q, joints[4]) else "noflip"
     return found
 
 
@@ -60,7 +62,9 @@ def is_so(model: Model, q: Array, node: Node, word: Word) -> bool:
         return _above(model, q, node) == (word == "up")
     if word in ("left", "right"):
         return _raises(model, q, node) == (word == "right")
-    return (_angle(q, node) >= 0.0) == (word in ("positive", "noflip"))
+    if word in ("flip", "noflip"):
+        return _flips(model, q, node) == (word == "flip")
+    return (_angle(q, node) >= 0.0) == (word == "positive")
 
 
 def _angle(q: Array, node: Node) -> float:
@@ -68,6 +72,12 @@ def _angle(q: Array, node: Node) -> float:
     x = node.joint.coordinates(q[node.q])
     x = node.joint.turned_around(x) if node.backwards else x
     return float(np.angle(np.exp(1j * x[0])))
+
+
+def _turning(model: Model) -> list[Node]:
+    """The joints of the chain with one angle that no path of their own prescribes, as one does of a gripper."""
+    prescribed = {path.coordinate_of for path in model.scene.trajectory}
+    return [node for node in _chain(model) if node.joint.units == ("rad",) and node.joint.name not in prescribed]
 
 
 def _chain(model: Model) -> list[Node]:
@@ -98,13 +108,23 @@ def _lines(model: Model, q: Array, joints: list[Node]) -> tuple[Array, Array]:
 
 def _raises(model: Model, q: Array, node: Node) -> bool:
     """Whether a positive turn of a joint moves the end of the arm along the axis of the turning joint before it."""
-    joints = [each for each in _chain(model) if each.joint.units == ("rad",)]
+    joints = _turning(model)
     if node not in joints or joints.index(node) == 0:
         return False
     k = joints.index(node)
     places, axes = _lines(model, q, joints)
     arm = _end_of_arm(model, q, places, axes, k) - places[k]
     return bool(axes[k - 1] @ np.cross(axes[k], arm) > 0.0)
+
+
+def _flips(model: Model, q: Array, node: Node) -> bool:
+    """Whether the axis after a joint is on the negative side of the axis before it, about its own."""
+    joints = _turning(model)
+    k = joints.index(node) if node in joints else 0
+    if not 0 < k < len(joints) - 1:
+        return _angle(q, node) < 0.0
+    axes = _lines(model, q, joints)[1]
+    return bool(axes[k] @ np.cross(axes[k - 1], axes[k + 1]) < 0.0)
 
 
 def _end_of_arm(model: Model, q: Array, places: Array, axes: Array, k: int) -> Array:

@@ -1,5 +1,6 @@
 """The postures in which a scene can start: two of a planar arm, eight of an arm with a spherical wrist."""
 
+import tomllib
 from pathlib import Path
 
 import numpy as np
@@ -7,11 +8,13 @@ import pytest
 
 from ffrobot import make_scene, solve
 from ffrobot.common.errors import InputError
+from ffrobot.exchange.urdf.import_urdf import import_urdf
 from ffrobot.mbs.solve.branches import start_postures
 from ffrobot.mbs.solve.start import undeformed_posture
 from ffrobot.run.solve import prepare_scene
 
 CASES = Path(__file__).parents[2] / "cases"
+ROBOTS = Path(__file__).parents[1] / "exchange" / "robots"
 
 
 def test_elbow_up_and_down(tmp_path):
@@ -70,6 +73,29 @@ def test_all_eight_starts_of_six_axes_have_names_of_their_own(tmp_path):
     path.write_text(text.replace("[initial]\n", f"[initial]\nbranch = {{ {inside} }}\n"), encoding="utf-8")
     q = undeformed_posture(prepare_scene(path).model).q
     np.testing.assert_allclose(np.exp(1j * q), np.exp(1j * wanted.q), atol=1e-7)
+
+
+def test_names_of_an_arm_without_a_spherical_wrist(tmp_path):
+    """The Z1, three parallel pitches and a wrist of two, with a gripper that stays: the wrist flips there, too."""
+    import_urdf(ROBOTS / "z1.urdf", tmp_path / "z1", {})
+    keys = tomllib.loads((tmp_path / "z1" / "scene.toml").read_text(encoding="utf-8"))
+    keys["initial"] = {"joints": {"joint2": 0.8, "joint3": -1.2, "joint4": 0.2}}
+    keys["trajectory"] = [
+        {"name": "grip", "joint": "jointGripper", "value": "-0.5"},
+        {
+            "name": "hold",
+            "point": "gripperMover.origin",
+            "x": "0.35",
+            "y": "0.05",
+            "z": "0.3",
+            "rpy": ["0", "0.3", "0.4"],
+        },
+    ]
+    keys["analysis"] = [{"name": "rest", "kind": "static"}]
+    found = start_postures(prepare_scene(make_scene(**keys)).model)
+    assert len(found) == 8
+    assert all(list(one.branch) == ["joint2", "joint3", "joint5"] for one in found)
+    assert len({tuple(one.branch.values()) for one in found}) == 8
 
 
 def two_rods(**initial):
