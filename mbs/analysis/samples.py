@@ -41,9 +41,11 @@ def new_samples(times: Array, analysis: IntegratedAnalysis) -> _core.Samples | N
 
 def reached_samples(samples: _core.Samples | None, time: Array) -> tuple[Array, Array] | None:
     """Times (k,), s, and states (k, n) of those before the last output, of `time` (T,); None where there are none."""
-    if samples is None or not len(time) or not (reached := samples.times <= time[-1]).any():
+    if samples is None or not len(time):
         return None
-    return samples.times[reached], samples.states.reshape(len(reached), -1)[reached]
+    times = samples.times  # ascending
+    reached = int(np.searchsorted(times, time[-1], side="right"))
+    return (times[:reached], samples.states.reshape(len(times), -1)[:reached]) if reached else None
 
 
 def worth_a_look(count: int, read: Callable[[Indices], Array]) -> Indices:

@@ -11,14 +11,14 @@ namespace ffrobot {
 constexpr double largest_reduced = 1e5; // beyond it the reduction below loses digits, and means nothing at last
 
 // One by one, of lanes whose |x| is larger than that, or not finite
-[[gnu::noinline]] inline void large_sines_and_cosines(const FourDoubles &x, FourDoubles &s, FourDoubles &c) {
+[[gnu::noinline]] inline void large_sines_and_cosines(FourDoubles x, double *s, double *c) {
   for (int i = 0; i < 4; ++i)
     if (!(std::abs(x[i]) < largest_reduced))
       s[i] = std::sin(x[i]), c[i] = std::cos(x[i]);
 }
 
-// Of any x, within an ulp or two. Reduction after Cody and Waite, polynomials of Cephes.
-[[gnu::always_inline]] inline void sines_and_cosines(const FourDoubles &x, FourDoubles &s, FourDoubles &c) {
+// Four each, of any x, within an ulp or two. Reduction after Cody and Waite, polynomials of Cephes.
+[[gnu::always_inline]] inline void sines_and_cosines(const FourDoubles &x, double *s, double *c) {
   using V = FourDoubles;
   using I = std::int64_t __attribute__((vector_size(32)));
   const V shift = V{} + 6755399441055744.0, shifted = x * 0.63661977236758134308 + shift, k = shifted - shift;
@@ -35,9 +35,9 @@ constexpr double largest_reduced = 1e5; // beyond it the reduction below loses d
   const I p = __builtin_bit_cast(I, sine), q = __builtin_bit_cast(I, cosine);
   const I sine_bits = ((odd & q) | (~odd & p)) ^ ((quadrant & 2) << 62);
   const I cosine_bits = ((odd & p) | (~odd & q)) ^ (((quadrant + 1) & 2) << 62);
-  s = __builtin_bit_cast(V, sine_bits), c = __builtin_bit_cast(V, cosine_bits);
-  const auto is_small = (x < largest_reduced) & (x > -largest_reduced);
-  if (!(is_small[0] & is_small[1] & is_small[2] & is_small[3])) [[unlikely]]
+  write_at(s, sine_bits), write_at(c, cosine_bits);
+  const V squared = x * x; // one comparison for all, of which NaN fails
+  if (!(squared[0] + squared[1] + (squared[2] + squared[3]) < largest_reduced * largest_reduced)) [[unlikely]]
     large_sines_and_cosines(x, s, c);
 }
 

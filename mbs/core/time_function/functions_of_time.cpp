@@ -24,8 +24,9 @@ void put(const Jet &jet, Jets &to, std::size_t i) {
 
 // By lanes that do not look at each other: the same whatever is evaluated together
 void sine_and_cosine(const Jets &u, Jets &sine, Jets &cosine) {
-  FourDoubles s, c;
-  sines_and_cosines(u.value, s, c);
+  double values[8];
+  sines_and_cosines(u.value, values, values + 4);
+  const auto s = read_at<FourDoubles>(values), c = read_at<FourDoubles>(values + 4);
   sine = chain<FourDoubles>(u, s, c, -s), cosine = chain<FourDoubles>(u, c, -s, -c);
 }
 

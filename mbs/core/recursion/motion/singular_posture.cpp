@@ -21,21 +21,22 @@ constexpr double singular = 1e-10; // of the largest singular value: rank of the
 template <class Space>
 MatrixXd gradients(const Mechanism<Space> &m, double length, const double *q, Workspace<Space, double> &w) {
   const auto rows = static_cast<Index>(m.constraints.size());
-  VectorXd v = VectorXd::Zero(m.n_v), value(rows), rate(rows), at_rest(rows);
-  measure(m, q, v.data(), w, value.data(),
-          at_rest.data()); // markers that turn have a rate of their own
-  std::vector<VectorXd> columns;
+  VectorXd v = VectorXd::Zero(m.n_v), value(rows), at_rest = VectorXd::Zero(rows);
+  if (m.has_moving_constraints) // markers that turn have a rate of their own
+    measure(m, q, v.data(), w, value.data(), at_rest.data());
+  Index freedoms = 0, j = 0;
   for (const Node<Space> &node : m.nodes)
-    for (int k = 0; k < node.shape.freedoms.count; ++k) {
+    freedoms += node.shape.freedoms.count;
+  MatrixXd J(rows, freedoms);
+  for (const Node<Space> &node : m.nodes)
+    for (int k = 0; k < node.shape.freedoms.count; ++k, ++j) {
       v[node.v + k] = 1;
-      measure(m, q, v.data(), w, value.data(), rate.data());
+      measure(m, q, v.data(), w, value.data(), J.col(j).data());
       v[node.v + k] = 0;
-      const bool is_way = node.shape.freedoms.component[k] < Space::linear;
-      columns.emplace_back((is_way ? length : 1) * (rate - at_rest));
+      J.col(j) -= at_rest;
+      if (node.shape.freedoms.component[k] < Space::linear)
+        J.col(j) *= length;
     }
-  MatrixXd J(rows, static_cast<Index>(columns.size()));
-  for (std::size_t j = 0; j < columns.size(); ++j)
-    J.col(static_cast<Index>(j)) = columns[j];
   for (Index r = 0; r < rows; ++r) {
     const Constraint &row = m.constraints[static_cast<std::size_t>(r)];
     bool is_way = row.model.kind == ConstraintKind::point || row.model.kind == ConstraintKind::slide;
@@ -61,14 +62,18 @@ template <class Space>
 Posture posture_at(const Mechanism<Space> &m, const PostureWatch &watch, const double *q, Workspace<Space, double> &w) {
   if (std::none_of(watch.is_path.begin(), watch.is_path.end(), [](char is_path) { return is_path; }))
     return {};
-  const MatrixXd J = gradients(m, watch.length, q, w), path = rows_of(J, watch.is_path, true);
-  const MatrixXd loops = rows_of(J, watch.is_path, false), followed = path * null_space(loops, singular);
+  MatrixXd followed = gradients(m, watch.length, q, w);
+  const bool has_loops = !std::all_of(watch.is_path.begin(), watch.is_path.end(), [](char is_path) { return is_path; });
+  if (has_loops) {
+    const MatrixXd loops = rows_of(followed, watch.is_path, false);
+    followed = rows_of(followed, watch.is_path, true) * null_space(loops, singular);
+  }
   if (followed.rows() > followed.cols())
     return {0, 0};
   const VectorXd values = singular_values(followed);
   Posture found;
   found.ratio = values[0] > 0 ? values[values.size() - 1] / values[0] : 0;
-  if (loops.rows() == 0 && followed.rows() == followed.cols()) // else the basis of freedoms has no sign
+  if (!has_loops && followed.rows() == followed.cols()) // else the basis of freedoms has no sign
     found.determinant = followed.determinant();
   return found;
 }

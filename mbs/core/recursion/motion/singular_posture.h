@@ -21,7 +21,7 @@ struct Posture {
                           // singular posture
 };
 
-// At q; leaves the kinematics of `w` there, at rest.
+// At q; `w` is worked with.
 template <class Space>
 Posture posture_at(const Mechanism<Space> &m, const PostureWatch &watch, const double *q, Workspace<Space, double> &w);
 

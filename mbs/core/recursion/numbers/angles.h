@@ -6,7 +6,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <cstring>
 
 namespace ffrobot::recursion {
 
@@ -23,9 +22,7 @@ template <> struct Angles<double> {
     four = Integers{0, 1, 2, 3} == Integers{} + static_cast<std::int64_t>(lane) ? x - FourDoubles{} : four;
     if (lane != 3 && i + 1 != count)
       return;
-    FourDoubles sine, cosine;
-    sines_and_cosines(four, sine, cosine);
-    std::memcpy(s + (i - lane), &sine, sizeof sine), std::memcpy(c + (i - lane), &cosine, sizeof cosine);
+    sines_and_cosines(four, s + (i - lane), c + (i - lane));
   }
 };
 
