@@ -15,6 +15,8 @@ using Eigen::VectorXd;
 namespace {
 
 constexpr double singular_ratio = 1e-6; // of Posture: below, joints cannot follow
+constexpr double near = 0.01;           // likewise: above, …
+constexpr double brief = 1. / 4000;     // … postures hardly change within this part of a run
 constexpr double least_shift = 1e-8;    // of a state, relative: forces change by more than their rounding
 constexpr double is_on = 1e-11;         // residuals of a state on its constraint equations
 
@@ -48,6 +50,11 @@ RecursiveMotion<Space>::RecursiveMotion(const Mechanism<Space> &mechanism, const
   for (const Node<Space> &node : mechanism.nodes)
     for (int k = 0; k < node.n(); ++k)
       fastest_ = std::max(fastest_, std::sqrt(node.body.K[static_cast<std::size_t>(k)])), steps_between_postures_ = 10;
+}
+
+template <class Space> void RecursiveMotion<Space>::plan(double duration) {
+  norm_.plan(duration);
+  between_postures_ = brief * duration;
 }
 
 template <class Space> void RecursiveMotion<Space>::turn_markers(double t) {
@@ -199,7 +206,8 @@ template <class Space> void RecursiveMotion<Space>::accepted(double t, const dou
   if (loops_ && loops_->is_far())
     loops_->begin_at(local().state(z), workspace_, newton_.workspace());
   norm_.take(z, z_dot, forces_.generalized(), workspace_);
-  if (accepted_ % steps_between_postures_ == 0)
+  const bool is_new = postures_.least_ratio < near || t >= postures_.watched_at + between_postures_;
+  if (accepted_ == 0 || (accepted_ % steps_between_postures_ == 0 && is_new))
     watch_posture(t, local().state(z));
   ++accepted_;
 }

@@ -30,8 +30,8 @@ public:
   RecursiveMotion(const Mechanism<Space> &mechanism, const Scene &scene, double t, const double *q, const double *v,
                   const ZeroOrderHold *held = nullptr, ExternalForces *external = nullptr);
 
-  void plan(double duration) { norm_.plan(duration); } // s, of the run to come
-  void judge(MotorForces<Space> &motors);              // their errors, too; must outlive this
+  void plan(double duration);             // s, of the run to come
+  void judge(MotorForces<Space> &motors); // their errors, too; must outlive this
 
   void slope(double t, const double *z, double *z_dot) override;
   void set_stage_times(const double *times, int count) override;
@@ -103,6 +103,7 @@ private:
   std::optional<LoopWatch<Space>> loops_; // where the scene has some
   PostureHistory postures_;
   unsigned long accepted_ = 0, steps_between_postures_ = 1; // many where steps follow vibrations
+  double between_postures_ = 0;                             // s
   double fastest_ = 0;                                      // 1/s, of modes
 
   Eigen::VectorXd value_, rate_;                          // (constraints)
