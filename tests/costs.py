@@ -1,7 +1,7 @@
 """What tests cost, for the report of `pytest --junitxml` (scripts/test_costs.py sums it up), and less of it.
 
-Each test has the properties `seconds`, of processors, of the commands it ran, too, and `megabytes`, of its process at
-its end.
+Each test has the properties `seconds`, of processors, of the commands it ran, too, and of its process `megabytes`, at
+its end, and `peak`, the most so far.
 """
 
 import ctypes
@@ -39,7 +39,12 @@ def pytest_runtest_teardown(item, nextitem):
             if hasattr(LIBC, "malloc_trim"):
                 LIBC.malloc_trim(0)
         seconds = processor_time() - item.stash.get(BEGAN, processor_time())
-        item.user_properties += [("seconds", f"{seconds:.2f}"), ("megabytes", f"{memory():.0f}")]
+        peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024  # kB on Linux
+        item.user_properties += [
+            ("seconds", f"{seconds:.2f}"),
+            ("megabytes", f"{memory():.0f}"),
+            ("peak", f"{peak:.0f}"),
+        ]
 
 
 def processor_time():
