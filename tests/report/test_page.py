@@ -149,10 +149,14 @@ def test_plays_by_itself(browser, arm_page):
 
 def test_charts_and_tables_of_the_arm(arm_3r):
     with Results(arm_3r.folder / "scene.results.h5") as results:
-        names = {chart.name for chart in history_charts([results])}
+        charts = {chart.name: chart for chart in history_charts([results])}
         rows = {what: value.split() for _, what, value, _ in peaks_table(runs([results])).rows}
         largest = np.abs(results["inverse/joints/waist/moment"]).max()
-    assert {"error_tool", "path_tool", "force_tool", "moment_waist", "energy_inverse", "modal_inverse_fore"} <= names
+    range_of_error = charts["error_tool"].layout["yaxis"]["autorangeoptions"]["include"]
+    assert range_of_error == pytest.approx([0.0, 1e-6])  # mm: rounding is a line at zero
+    assert {"error_tool", "path_tool", "force_tool", "moment_waist", "energy_inverse", "modal_inverse_fore"} <= {
+        *charts
+    }
     value, unit = rows["motor of joint waist"]
     assert unit == "N·m"
     assert float(value) == pytest.approx(largest, rel=1e-3)

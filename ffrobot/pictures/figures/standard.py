@@ -15,7 +15,6 @@ from .shared import bending_points, both_ways, curves_of, file_name, members
 SNAPSHOTS = 5
 ROUND_OFF = 1e-9  # rad: bodies that turn no further do not turn
 SEEN = 1e-3  # of the largest: smaller components of a deflection, differences of a voltage, cannot be seen
-KILO = 5e3  # V, from which on voltages are in kV
 AXES = "xyz"
 ABOUT = {"mx": "about x", "my": "about y", "mz": "about z"}
 ENERGIES = ("kinetic", "strain", "gravitational")
@@ -278,21 +277,19 @@ def _voltages(results: Results) -> Iterator[FigureRecord]:
             top = np.abs(results.data(required)).max()
             of = f"patches of {body}, {analysis}"
             if top > 0.0:
-                yield _voltage(results, required, f"required voltages, {of}", limits.get(body))
+                yield _voltage(required, f"required voltages, {of}", limits.get(body))
             if np.abs(results.data(within) - results.data(required)).max() > SEEN * top:
-                yield _voltage(results, within, f"voltages within the limit, {of}", limits.get(body))
+                yield _voltage(within, f"voltages within the limit, {of}", limits.get(body))
 
 
-def _voltage(results: Results, data: str, title: str, limit: float | list[float] | None) -> FigureRecord:
+def _voltage(data: str, title: str, limit: float | list[float] | None) -> FigureRecord:
     analysis, _, body, dataset = data.split("/")
-    factor, unit = (1e-3, "kV") if np.abs(results.data(data)).max() > KILO else (1.0, "V")
     return FigureRecord(
         name=file_name(dataset, analysis, body),
         title=title,
         curves=(Curve(data=data, label="patch"),),
-        y_label=f"voltage ({unit})",
-        scale=factor,
-        limits=() if limit is None else tuple(factor * one for one in both_ways(limit)),
+        y_label="voltage (V)",
+        limits=() if limit is None else both_ways(limit),
     )
 
 

@@ -30,6 +30,7 @@ class Chart:
         title, x_label, y_label: with units.
         traces: in Plotly's terms.
         limits: horizontal lines.
+        includes: values that the range of y has at least.
         equal_axes: one metre is as long on both.
     """
 
@@ -39,6 +40,7 @@ class Chart:
     x_label: str = "time (s)"
     traces: list[dict[str, Any]] = field(default_factory=list)
     limits: tuple[float, ...] = ()
+    includes: tuple[float, ...] = ()
     equal_axes: bool = False
 
     def add(self, label: str, x: Array, y: Array, **style: Any) -> None:  # noqa: ANN401 (a trace's own keys)
@@ -62,6 +64,8 @@ class Chart:
             text = "limits " + ", ".join(f"{limit:g}" for limit in self.limits)
             lines[0]["label"] = {"text": text, "textposition": "start", "font": {"color": COLORS[1]}}
         y_axis: dict[str, Any] = {"title": {"text": self.y_label}, "automargin": True, "exponentformat": "power"}
+        if self.includes:
+            y_axis |= {"autorangeoptions": {"include": list(self.includes)}}
         if self.equal_axes:
             y_axis |= {"scaleanchor": "x"}
         return {

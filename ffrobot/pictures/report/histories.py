@@ -8,6 +8,7 @@ import numpy as np
 
 from ...common.arrays import Array
 from ...results.file import Results
+from ...results.rounded import ROUND_OFF
 from ..figures.figure_file import Curve, FigureRecord
 from ..figures.reading import curve_points
 from ..figures.shared import file_name
@@ -92,7 +93,8 @@ def _path_errors(files: Sequence[Results]) -> list[Chart]:
         time = run.results.time(run.analysis)
         for target in targets(run.results, run.analysis):
             name, title = target.trajectory, f"distance of {target.point} from its path"
-            chart = charts.setdefault(name, Chart(file_name("error", name), title, "distance (mm)"))
+            empty = Chart(file_name("error", name), title, "distance (mm)", includes=(0.0, 1e3 * ROUND_OFF))
+            chart = charts.setdefault(name, empty)
             error = path_error(run, target)
             chart.add(run.label, time[: len(error)], 1e3 * error, **style(len(chart.traces)))
     return list(charts.values())
