@@ -89,7 +89,7 @@ def test_a_solve_loads_what_its_scene_needs(ffrobot, tmp_path):
 def test_a_solve_costs_a_few_times_what_its_libraries_cost(ffrobot, tmp_path):
     """Processor time, which other processes do not change; bytecode is kept, as pip does when it installs.
 
-    Measured: 3.0 times the libraries. They are a third of the aim of 0.7 s for all that is not integration.
+    Measured: 2.0 times the libraries, which no cure reaches.
     """
     scene = tmp_path / "scene.toml"
     scene.write_text(RIGID)
@@ -104,7 +104,7 @@ def test_a_solve_costs_a_few_times_what_its_libraries_cost(ffrobot, tmp_path):
 
     commands = (
         (ffrobot.path, "solve", scene),
-        (sys.executable, "-c", "import numpy, h5py, pydantic, click, rich.console"),
+        (sys.executable, "-c", "import numpy, h5py, pydantic, click; pydantic.BaseModel"),
     )
     (_, *solves), (_, *libraries) = zip(*((cost(*one) for one in commands) for _ in range(6)), strict=True)
-    assert min(solves) < 4 * min(libraries)
+    assert min(solves) < 3 * min(libraries)
