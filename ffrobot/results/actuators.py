@@ -153,8 +153,8 @@ def write_placement(group: h5py.Group, _motion: RobotMotion, placed: Placed) -> 
 
 
 OF_TRACKING = (
-    "objective", "least_voltage", "least_share", "cost", "pre_actuation", "post_actuation", "unmet", "without_patches",
-    "is_needed",
+    "objective", "least_voltage", "least_voltage_doubt", "least_share", "cost", "pre_actuation", "post_actuation",
+    "unmet", "without_patches", "is_needed",
 )  # fmt: skip
 
 

@@ -113,7 +113,7 @@ def _check(solution: Solution, source: Outcome, finer: Solution, watcher: Watche
     worst = max(errors, key=lambda point: errors[point])
     modes = {name: link.eigenmode_count for name, link in finer.links.items()}
     asked = source.analysis
-    least = least_voltage(finer.model, finer.patches, asked) if isinstance(asked, Tracking) else None
+    least = least_voltage(finer.model, finer.patches, asked)[0] if isinstance(asked, Tracking) else None
     return FinerCheck(modes, worst, errors[worst], run.status, least)
 
 

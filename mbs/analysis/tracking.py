@@ -26,8 +26,19 @@ from ..scene.analysis import Check, Need, TimedAnalysis, output_times
 from ..solve.integrators import Choice
 from ..solve.servo import Servo, make_servo
 from ..solve.stable_inversion import shape_of
-from ..solve.tracking import Limits, Objective, Tracked, Transition, Weights, refined, start_breaks, track
-from ..solve.zero_dynamics import Linearisation, Stopped, equilibrium, linearise
+from ..solve.tracking import (
+    SETTLED,
+    Limits,
+    Objective,
+    Tracked,
+    Transition,
+    Weights,
+    refined,
+    settled,
+    start_breaks,
+    track,
+)
+from ..solve.zero_dynamics import LIGHT, Linearisation, Stopped, equilibrium, linearise
 from .context import Context, PatchedLink
 from .forward import Forward, run_forward
 from .motors_only import AroundPath, check_rest, durations, where
@@ -38,6 +49,7 @@ from .tracking_advice import Bounds, bounds_of_zeros, enough_path_time, enough_t
 RATE = 0.005  # s, T_r where the scene does not say
 VOLT = 200.0  # V_ref where patches have no limits
 ENOUGH = 1e-6  # of the limits: least voltages beyond them by less are within
+AMPLE = 0.9  # share of the limits: below it the mesh of least effort need not be that of the least voltage
 RESERVE = 1e-9  # of the limits of voltages
 AT_REST = 1e-9  # of the path's time: so much before it begins, and after it ends, it has no acceleration
 REPLAYED = 1e-5  # tolerance of torques alone, at most
@@ -115,6 +127,7 @@ class TrackedPath(AroundPath):
 
     Attributes:
         least_voltage: V, the largest voltage that is needed at least, of the patch next to its limit.
+        least_voltage_doubt: V, by how much a finer mesh may change it, estimated; infinite where it did not settle.
         least_share: the same as a share of the limits; NaN where no patch has any.
         objective: what was made small, `effort` unless limits do not allow it.
         cost: the effort, without unit.
@@ -126,6 +139,7 @@ class TrackedPath(AroundPath):
     """
 
     least_voltage: float
+    least_voltage_doubt: float
     least_share: float
     objective: Objective
     cost: float
@@ -139,19 +153,14 @@ class TrackedPath(AroundPath):
 
 @dataclass(frozen=True)
 class _Posed:
-    """What is asked for, on which breaks (s), with the time before and after the path (s)."""
+    """What is asked for, on which breaks (s), `coarse` ones for a least voltage; time before and after the path (s)."""
 
     servo: Servo
     linear: Linearisation
     around: tuple[float, float]
     asked: Transition
     breaks: Array
-
-    @property
-    def units(self) -> Array:
-        """V by which shares count (m,)."""
-        limit = self.asked.limits.voltage
-        return np.where(np.isfinite(limit), limit, self.asked.weights.voltage)
+    coarse: Array
 
 
 def run_tracking(context: Context, analysis: Tracking) -> Outcome:
@@ -167,20 +176,23 @@ def run_tracking(context: Context, analysis: Tracking) -> Outcome:
 
     try:
         posed = _pose(model, context.patches, analysis, progress)
-        least = track(posed.asked, posed.breaks)
+        least = settled(posed.asked, posed.coarse, progress)
         _check_found(context, posed, least)
-        texts = list(_warnings(context, posed, analysis, least))
         found, objective = _solve(posed, analysis, least)
+        if objective == "least-voltage":  # without the effort's share
+            least = replace(found, doubt=least.doubt)
+        texts = list(_warnings(context, posed, analysis, least))
         texts += _of_mesh(found, analysis)
         bounds = _bounds(posed)
     except Stopped:
         place = where(model.scene.path, analysis)
         raise SolveError(f"{place}: stopped on request before any of its motion was found") from None
     (pre, post), servo = posed.around, posed.servo
-    has_limits = np.isfinite(posed.asked.limits.voltage).any()
+    has_limits, most = np.isfinite(posed.asked.limits.voltage).any(), float(posed.asked.units.max())
     by_joint = np.cumsum([len(columns) for columns in model.motors.values()])[:-1]
     around = TrackedPath(
-        pre_actuation=pre, post_actuation=post, least_voltage=least.share * float(posed.units.max()),
+        pre_actuation=pre, post_actuation=post, least_voltage=least.share * most,
+        least_voltage_doubt=least.doubt * least.share * most,
         least_share=least.share if has_limits else float("nan"), objective=objective, cost=found.cost,
         held=servo.model, unmet=found.unmet, bounds=bounds,
         voltage_prices={name: prices[0] for name, prices in _by_body(context, found.prices[0][None]).items()},
@@ -202,11 +214,12 @@ def run_tracking(context: Context, analysis: Tracking) -> Outcome:
     return replace(run, details=around, statistics=statistics, look_closer=look_closer)
 
 
-def least_voltage(model: Model, patches: Mapping[str, PatchedLink], analysis: Tracking) -> float:
-    """V, as in `TrackedPath`, of another model of the same robot; NaN where no motion is found."""
+def least_voltage(model: Model, patches: Mapping[str, PatchedLink], analysis: Tracking) -> tuple[float, float]:
+    """V, and how uncertain, as in `TrackedPath`, of another model of the same robot; NaN where no motion is found."""
     posed = _pose(model, patches, analysis, lambda: True)
-    least = track(posed.asked, posed.breaks)
-    return least.share * float(posed.units.max()) if least.converged else float("nan")
+    least = settled(posed.asked, posed.coarse, lambda: True)
+    voltage = least.share * float(posed.asked.units.max()) if least.converged else float("nan")
+    return voltage, least.doubt * voltage
 
 
 def _pose(model: Model, patches: Mapping[str, PatchedLink], analysis: Tracking, progress: Callable[[], bool]) -> _Posed:
@@ -224,8 +237,18 @@ def _pose(model: Model, patches: Mapping[str, PatchedLink], analysis: Tracking, 
     around = durations(linear, (pre, post), analysis.output_step, needs_future=needs_future)
     first, last = -around[0], end + around[1]
     rest = equilibrium(servo, first - AT_REST * end), equilibrium(servo, last + AT_REST * end)
-    asked = Transition(servo, Phi_V, limits, _weights(servo, analysis, limits), rest, "least-voltage")
-    return _Posed(servo, linear, around, asked, start_breaks(first, end, last, analysis.intervals))
+    asked = Transition(
+        servo, Phi_V, limits, _weights(servo, analysis, limits), rest, "least-voltage", rate=_rate(linear)
+    )
+    meshes = (start_breaks(first, end, last, analysis.intervals // k) for k in (1, 2))
+    return _Posed(servo, linear, around, asked, *meshes)
+
+
+def _rate(linear: Linearisation) -> float:
+    """1/s, of the slowest zero where the path begins and ends; 0 without any but vibrations."""
+    zeros = linear.zeros[[0, -1]]
+    sizes = np.abs(zeros.real)[np.abs(zeros.real) > LIGHT * np.abs(zeros)]
+    return float(sizes.min(initial=np.inf)) if sizes.size else 0.0
 
 
 def _check_found(context: Context, posed: _Posed, least: Tracked) -> None:
@@ -259,7 +282,8 @@ def _solve(posed: _Posed, analysis: Tracking, least: Tracked) -> tuple[Tracked, 
     limits = posed.asked.limits  # torques reach beyond them between Gauss points, voltages by rounding
     kept = Limits(limits.voltage * (1.0 - RESERVE), limits.torque * (1.0 - analysis.tolerance))
     asked = replace(posed.asked, objective=objective, limits=kept)
-    found = refined(asked, posed.breaks, analysis.tolerance, posed.servo.goes_on, least)
+    breaks = posed.breaks if objective == "effort" and least.share < AMPLE else least.voltage.x
+    found = refined(asked, breaks, analysis.tolerance, posed.servo.goes_on, least)
     if not found.converged:
         raise SolveError(
             f"{posed.servo.where}: the motion of least {analysis.objective} was not found: loosen limits or tolerance"
@@ -271,7 +295,7 @@ def _warnings(context: Context, posed: _Posed, analysis: Tracking, least: Tracke
     """Warnings: what would do where limits are too small, ends of the path and places of patches that cost voltage."""
     if _is_beyond(posed, least):
         given = posed.servo, posed.asked, analysis.intervals, posed.around, least.share
-        limits = np.unique(posed.units)
+        limits = np.unique(posed.asked.units)
         would = [
             f"{least.share * limits[0]:.3g} V instead of {limits[0]:g} V"
             if len(limits) == 1
@@ -282,6 +306,14 @@ def _warnings(context: Context, posed: _Posed, analysis: Tracking, least: Tracke
         if np.isfinite(longer := enough_path_time(*given)):
             would.append(f"the same path in {longer:.3g} s instead of {analysis.end:g} s")
         yield f"patches cannot do it within their limits. Any of these would do: {'; '.join(would)}; or more patches"
+    if least.doubt > 3 * SETTLED:
+        yield (
+            f"the least voltage, {least.share * posed.asked.units.max():.3g} V, did not settle on finer meshes: it may"
+            f" be {100 * least.doubt:.2g} % less. Fewer modes, or more intervals"
+            if np.isfinite(least.doubt)
+            else "the least voltage is that of the first intervals: finer ones had no solution. Fewer modes, or more"
+            " intervals"
+        )
     yield from rough_ends(posed.servo)
     yield from far_patches(context, posed.linear.zeros[[0, -1]])
 
@@ -297,7 +329,7 @@ def _of_mesh(found: Tracked, analysis: Tracking) -> Iterator[str]:
 
 def _bounds(posed: _Posed) -> Bounds | None:
     try:
-        return bounds_of_zeros(posed.servo, posed.asked, posed.linear, posed.around, posed.units)
+        return bounds_of_zeros(posed.servo, posed.asked, posed.linear, posed.around, posed.asked.units)
     except SolveError:
         return None
 

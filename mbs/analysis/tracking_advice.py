@@ -11,7 +11,7 @@ from ...common.arrays import Array, ComplexArray, as_floats
 from ...common.errors import SolveError
 from ..solve.servo import Servo
 from ..solve.stable_inversion import invert
-from ..solve.tracking import Transition, start_breaks, track
+from ..solve.tracking import Transition, settled, start_breaks
 from ..solve.zero_dynamics import LIGHT, Linearisation, equilibrium, first_order, linear_dynamics, linearise
 from .context import Context
 from .motors_only import decay_times
@@ -75,7 +75,7 @@ def enough_time(servo: Servo, asked: Transition, intervals: int, around: tuple[f
 
     def share_with(more: float) -> float:
         start, last = -around[0] - more, end + around[1] + more
-        return _share(servo, asked, start_breaks(start, end, last, intervals))
+        return _share(servo, asked, start_breaks(start, end, last, intervals // 2))
 
     return _enough(share_with, share, rate)
 
@@ -92,7 +92,7 @@ def enough_path_time(
         slower = servo.slowed(float(np.exp(more)))
         end = slower.end + around[1]
         rest = equilibrium(slower, -around[0] - NEAR_END), equilibrium(slower, end + NEAR_END)
-        breaks = start_breaks(-around[0], slower.end, end, intervals)
+        breaks = start_breaks(-around[0], slower.end, end, intervals // 2)
         return _share(servo, replace(asked, driven=slower, rest=rest), breaks)
 
     orders = [order for order in path_orders(servo) if order > 1]
@@ -100,7 +100,7 @@ def enough_path_time(
 
 
 def _share(servo: Servo, asked: Transition, breaks: Array) -> float:
-    least = track(asked, breaks)
+    least = settled(asked, breaks, servo.goes_on)
     return least.share if least.converged and servo.goes_on() else np.nan
 
 

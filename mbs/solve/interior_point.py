@@ -118,9 +118,9 @@ class _Newton:
         return found + as_floats(dgbtrs(self.lu, b, b, left, self.pivots)[0])
 
 
-def minimize(program: Program, x: Array) -> Minimum:
-    """The minimum, from about x (N+1, s), which need not be feasible."""
-    way = _CentralPath(program, x)
+def minimize(program: Program, x: Array, gap: float = GAP) -> Minimum:
+    """The minimum within `gap` of its value, from about x (N+1, s), which need not be feasible."""
+    way = _CentralPath(program, x, gap)
     for _ in range(MOST_ITERATIONS):
         if way.is_at_end() or not way.advance():
             break
@@ -131,8 +131,8 @@ def minimize(program: Program, x: Array) -> Minimum:
 class _CentralPath:
     """Unknowns, slack and multipliers z (N, i) of the inequalities on their way to the minimum."""
 
-    def __init__(self, program: Program, x: Array) -> None:
-        self.program, self.layout = program, _Layout(program)
+    def __init__(self, program: Program, x: Array, relative_gap: float) -> None:
+        self.program, self.layout, self.relative_gap = program, _Layout(program), relative_gap
         self.band = _Band(program, self.layout)
         self.reach = np.abs(program.d).max(initial=1.0)
         self.force = 1 + float(np.abs(program.g).sum())
@@ -171,7 +171,7 @@ class _CentralPath:
         return bool(np.abs(right[layout.x]).max() <= STATIONARY * terms)
 
     def _small_gap(self) -> float:
-        return GAP * (1 + abs(_objective(self.program, self.unknown[self.layout.z])))
+        return self.relative_gap * (1 + abs(_objective(self.program, self.unknown[self.layout.z])))
 
     def advance(self) -> bool:
         """One step of predictor and corrector; False where there is none."""

@@ -17,9 +17,9 @@ from typing import TYPE_CHECKING, Literal, Protocol
 
 import numpy as np
 
-from ...common.arrays import Array, Indices, as_floats
+from ...common.arrays import Array, Booleans, Indices, as_floats
 from .collocation import GAUSS, Elimination, piecewise, stage_states
-from .interior_point import Minimum, Program, minimize
+from .interior_point import GAP, Minimum, Program, minimize
 from .stable_inversion import PROBES, cut
 from .zero_dynamics import Output, shape_along
 
@@ -33,8 +33,12 @@ MOST_ITERATIONS = 30
 TOLERANCE = 1e-8  # of the last Newton step, relative to the peak of its quantity
 MOST_INTERVALS = 1500
 UNIQUE = 1e-7  # of the effort, which chooses among motions of the same least share
-FEWEST_ITERATIONS = 8  # after which Newton's steps are taken to wander among these motions
+FEWEST_ITERATIONS = 6  # after which Newton's steps are taken to wander among these motions
 WANDERING = (1e-2, 1e-3)  # of the effort, one after the other, where they do
+SETTLED = 0.02  # change of the least share of voltages by finer intervals, relative
+WHILE_SETTLING = 1e-4  # of the last change of a share by Newton's steps, relative, where intervals are to change
+CALM = (1e-3, 0.1)  # of the effort in these steps; the second where they wander with the first
+TURNING = 0.3  # of the largest voltage: by so much one changes in intervals that are then halved
 
 
 class Driven(Output, Protocol):
@@ -68,7 +72,10 @@ class Weights:
 
 @dataclass(frozen=True)
 class Transition:
-    """What is asked for: `rest` are p at both ends, `is_free` whether V may begin and end at any value."""
+    """What is asked for: `rest` are p at both ends, `is_free` whether V may begin and end at any value.
+
+    `rate` is that of the slowest zero, 1/s: voltages matter less by e^{−rate t} at the time t from the nearer end.
+    """
 
     driven: Driven
     Phi_V: Array  # (n, m)
@@ -77,6 +84,13 @@ class Transition:
     rest: tuple[Array, Array]
     objective: Objective = "effort"
     is_free: bool = False
+    rate: float = 0.0
+
+    @property
+    def units(self) -> Array:
+        """V by which shares count (m,)."""
+        limit = self.limits.voltage
+        return np.where(np.isfinite(limit), limit, self.weights.voltage)
 
 
 @dataclass(frozen=True)
@@ -85,10 +99,12 @@ class Tracked:
 
     Attributes:
         share: σ, the least share of limits (`objective` "least-…"), or of V_ref or τ_ref where there are none.
-        cost: J.
+        cost: J; 0 where it is not the objective.
         prices: by how much less J, or σ, is for a limit that is larger by one: of patches (m,) 1/V, of motors
             (motors,) 1/(N·m) or 1/N; zero where a limit is not reached.
         unmet: largest force on modes that nobody supplies between Gauss points, relative to the largest elastic one.
+        added: what the effort adds to the objective "least-…".
+        doubt: of the share, relative: twice its change by the last finer intervals, and what the effort may add.
     """
 
     curve: PPoly
@@ -99,6 +115,8 @@ class Tracked:
     cost: float
     prices: tuple[Array, Array]
     unmet: float = np.nan
+    added: float = 0.0
+    doubt: float = np.inf
 
 
 def graded(start: float, end: float, intervals: int, grading: float = GRADING) -> Array:
@@ -136,8 +154,44 @@ def refined(asked: Transition, breaks: Array, tolerance: float, goes_on: Callabl
         breaks = finer
 
 
-def track(asked: Transition, breaks: Array, near: Tracked | None = None) -> Tracked:
-    """Solve on `breaks` (N + 1,), from a motion `near`, or from links as they sag and no voltages."""
+def settled(asked: Transition, breaks: Array, goes_on: Callable[[], bool]) -> Tracked:
+    """The least voltage, on intervals that are halved where voltages turn until that changes it by at most `SETTLED`.
+
+    V is linear on each interval: finer ones allow more voltages, so that the least share falls. Where steps wander,
+    more of the effort joins it, on intervals that are all halved.
+    """
+    found, is_settled = _descend(asked, breaks, CALM[0], goes_on)
+    if is_settled:
+        return found
+    calmer, _ = _descend(asked, _halved(breaks, np.ones(len(breaks) - 1, dtype=bool)), CALM[1], goes_on)
+    best = min(found, calmer, key=lambda one: one.share if one.converged else np.inf)
+    return best if best.converged else track(asked, breaks)
+
+
+def _descend(asked: Transition, breaks: Array, calm: float, goes_on: Callable[[], bool]) -> tuple[Tracked, bool]:
+    """The least voltage with a share `calm` of the effort on finer and finer intervals, and whether it settled."""
+    found, change = track(asked, breaks, None, calm), np.inf
+    while found.converged and change > SETTLED and len(breaks) <= MOST_INTERVALS and goes_on():
+        steps = np.abs(np.diff(found.voltage(breaks) / asked.units, axis=0)).max(axis=1)
+        breaks = _halved(breaks, steps > TURNING * found.share)
+        finer = track(asked, breaks, found, calm)
+        if not finer.converged:
+            break
+        change = abs(finer.share / found.share - 1.0)
+        found = replace(finer, doubt=2 * change + finer.added / finer.share)
+    return found, change <= SETTLED
+
+
+def _halved(breaks: Array, which: Booleans) -> Array:
+    return np.sort(np.concatenate([breaks, (0.5 * (breaks[1:] + breaks[:-1]))[which]]))
+
+
+def track(asked: Transition, breaks: Array, near: Tracked | None = None, calm: float | None = None) -> Tracked:
+    """Solve on `breaks` (N + 1,), from a motion `near`, or from links as they sag and no voltages.
+
+    With `calm`, such a share of the effort joins a least share, which a few steps find within `WHILE_SETTLING`. That of
+    voltages grows to one away from the ends: long intervals do not carry e^{st} of fast zeros, which they would abuse.
+    """
     driven, h = asked.driven, np.diff(breaks)
     times = breaks[:-1, None] + h[:, None] * GAUSS.c
     N, s, n, m = *times.shape, *asked.Phi_V.shape
@@ -152,6 +206,12 @@ def track(asked: Transition, breaks: Array, near: Tracked | None = None) -> Trac
         K = near.curve(flat, 2).reshape(K.shape)
     steps = _Steps(asked, breaks, tau_qs, size)
     start = _Iterate(p, v, K, u, near.share if near is not None and steps.has_share else 1.0)
+    if calm is not None:
+        middle = 0.5 * (breaks[1:] + breaks[:-1])
+        away = asked.rate * np.minimum(middle - breaks[0], breaks[-1] - middle)
+        steps.unique, steps.of_voltages = calm, np.minimum(1.0, calm * np.exp(away)) / calm
+        steps.tolerance, steps.gap = WHILE_SETTLING, 1e-4 * WHILE_SETTLING
+        return _newton(steps, start, FEWEST_ITERATIONS).tracked(steps)
     last = _newton(steps, start, FEWEST_ITERATIONS if steps.has_share else MOST_ITERATIONS)
     if steps.has_share and not last.converged:
         start = replace(start, iterations=last.iterations)
@@ -183,9 +243,11 @@ class _Iterate:
         assert self.found is not None
         breaks, steps.sigma = steps.breaks, self.share
         slope = np.diff(self.V, axis=0) / steps.h[:, None]
+        cost = steps.cost(self.found)
         return Tracked(
             piecewise(GAUSS, breaks, self.p, self.v, self.K), PPoly(np.array([slope, self.V[:-1]]), breaks),
-            self.converged, self.iterations, self.share, steps.cost(self.found), steps.prices(self.found),
+            self.converged, self.iterations, self.share, 0.0 if steps.has_share else cost, steps.prices(self.found),
+            added=steps.unique * cost if steps.has_share else 0.0,
         )  # fmt: skip
 
 
@@ -205,7 +267,7 @@ def _newton(steps: _Steps, start: _Iterate, most: int) -> _Iterate:
         if steps.has_share:  # V(t) of linear programs is not unique
             moved = abs(now.share - previous_share) / abs(now.share)
             previous_share = now.share
-        if moved <= TOLERANCE or (moved <= 1e-7 and moved > 0.3 * previous):
+        if moved <= steps.tolerance or (moved <= 1e-7 and moved > 0.3 * previous):
             return replace(now, converged=True)
         previous = moved
     return now
@@ -219,8 +281,10 @@ class _Steps:
     """
 
     program: Program
-    constant = 0.0  # of J, which the program leaves out
+    tolerance, gap = TOLERANCE, GAP
+    effort: tuple[Array, Array, float]  # H, g, and the constant that the program leaves out
     unique = UNIQUE
+    of_voltages: float | Array = 1.0  # (N,) times the share of the effort
     owners: Indices  # of inequalities (i,): patches, then motors
 
     def __init__(self, asked: Transition, breaks: Array, tau_qs: Array, size: float) -> None:
@@ -258,7 +322,7 @@ class _Steps:
         forward[:, width : width + 2 * n] = np.eye(2 * n)
         tau_z = self._torques(tau.reshape(N, s, -1), [of[:, :, n:] for of in slopes], moved, (starts, K_z))
         self.program = self._program(forward - ends, offset, *tau_z, x)
-        found = minimize(self.program, np.zeros_like(x))
+        found = minimize(self.program, np.zeros_like(x), self.gap)
         change = found.x * self.unit
         K_new = K + moved + np.einsum("Nsnz,Nz->Nsn", K_z, np.hstack([change[:-1], change[1:]]))
         x = x + change
@@ -317,7 +381,7 @@ class _Steps:
         return Program(H, g, F, G, c, (rows, start), (rows, end), C, d)
 
     def _effort(self, tau_0: Array, tau_z: Array, now: Array) -> tuple[Array, Array]:
-        """H and g of J, whose value without a change is `constant`."""
+        """H and g of J."""
         weights = self.asked.weights
         whole = self.breaks[-1] - self.breaks[0]
         b = self.h[:, None] * GAUSS.end_once / (whole * weights.torque**2)  # (N, s)
@@ -328,7 +392,7 @@ class _Steps:
         first = np.arange(self.V.start, self.V.stop)
         second = first + self.width
         rate = weights.rate**2 / self.h
-        same, other = (self.h / 3 + rate) / whole, (self.h / 6 - rate) / whole  # V in units of V_ref
+        same, other = (self.of_voltages * size / whole for size in (self.h / 3 + rate, self.h / 6 - rate))  # V / V_ref
         for i, j, size in (
             (first, first, same),
             (second, second, same),
@@ -338,8 +402,9 @@ class _Steps:
             of_voltages[:, i, j] += size[:, None]
         z = np.hstack([now[:-1], now[1:]])[..., None]
         pull = (of_voltages @ z)[..., 0]
-        self.constant = 0.5 * float(np.einsum("Ns,Nst->", b, off**2) + (pull * z[..., 0]).sum())
-        return H + of_voltages, g + pull
+        constant = 0.5 * float(np.einsum("Ns,Nst->", b, off**2) + (pull * z[..., 0]).sum())
+        self.effort = H + of_voltages, g + pull, constant
+        return self.effort[:2]
 
     def _inequalities(self, tau_0: Array, tau_z: Array, now: Array) -> tuple[Array, Array]:
         """C and d: limits of voltages at breaks, each in the interval that it begins, and of torques at stages."""
@@ -348,7 +413,7 @@ class _Steps:
         rows, most, owners = [], [], []
         is_shared = asked.objective == "least-voltage"
         bounded = np.arange(self.m) if is_shared else np.flatnonzero(np.isfinite(V_max))
-        limit = np.where(np.isfinite(V_max), V_max, asked.weights.voltage)[bounded] / asked.weights.voltage
+        limit = asked.units[bounded] / asked.weights.voltage
         at = np.arange(len(bounded))
         places = [(slice(None), 0)]
         if asked.is_free:  # else V ends at zero
@@ -390,8 +455,6 @@ class _Steps:
         return own[0] * by_voltage / sizes[0], own[1] * by_torque / sizes[1]
 
     def cost(self, found: Minimum) -> float:
-        """J; 0 where it is not the objective."""
-        if self.has_share:
-            return 0.0
-        z, program = np.hstack([found.x[:-1], found.x[1:]]), self.program
-        return float(0.5 * np.einsum("ka,kab,kb->", z, program.H, z) + (program.g * z).sum()) + self.constant
+        """J, with what `of_voltages` adds."""
+        (H, g, constant), z = self.effort, np.hstack([found.x[:-1], found.x[1:]])
+        return float(0.5 * np.einsum("ka,kab,kb->", z, H, z) + (g * z).sum()) + constant

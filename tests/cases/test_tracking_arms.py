@@ -117,7 +117,7 @@ def test_patches_that_are_not_needed(scene):
         assert about["is_needed"]
         assert not verdict.advice
         assert f"torques alone are off by {1e3 * about['without_patches']:.3g} mm" in verdict.answer
-        # each zero asks for less than all together; the least voltage is that of 64 intervals
+        # each zero asks for less than all together
         assert 0.5 < results["carried/tracking/bound/voltage"].max() / about["least_voltage"] < 0.8
         prices, voltage = results["carried/tracking/voltage_price/arm"], results["carried/pzt/arm/voltage"]
         at_limit = np.abs(voltage).max(axis=0) > 199.0
