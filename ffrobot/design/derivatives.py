@@ -74,7 +74,8 @@ Method = Literal["differences", "repeated steps", "one-sided", "exact", "none"]
 class Entry:
     """∂goal/∂key with the estimate of its error, both in SI units, NaN where there is none.
 
-    `method`: one of `Method`; `step`: the largest that was taken; `notes`: what to mind.
+    `method`: one of `Method`; `step`: the largest that was taken; `notes`: what to mind; `unresolved`: the part of the
+    error that outputs are too far apart for, which no other step lessens.
     """
 
     derivative: float
@@ -82,6 +83,7 @@ class Entry:
     step: float
     method: Method
     notes: tuple[str, ...] = ()
+    unresolved: float = 0.0
 
 
 def sample(base: Base, k: int, offset: float, design: Design) -> Sample:
@@ -157,7 +159,7 @@ def _rough_keys(base: Base, known: Known, best: Callable[[list[float]], float]) 
         largest = max((_relative(one.derivative, base, g, k) for k, one in enumerate(row)), key=np.nan_to_num)
         for k, one in enumerate(row):
             sizes = sorted({abs(sample.offset) for sample in known.of_key(k) if sample.goals}, reverse=True)
-            is_good = _relative(one.error, base, g, k) <= AIM * max(1.0, np.nan_to_num(largest))
+            is_good = _relative(one.error - one.unresolved, base, g, k) <= AIM * max(1.0, np.nan_to_num(largest))
             if sizes and not is_good and np.isclose(abs(one.step), best(sizes)):
                 rough.add(k)
     return sorted(rough)
@@ -180,8 +182,12 @@ def _entry(base: Base, g: int, k: int, known: Known) -> Entry:
     # Steps that are the same for all runs err alike: no difference of runs tells of that.
     size = abs(base.readings[g].value) / (abs(base.point[k]) or 1.0)
     found = found._replace(error=found.error + unresolved + base.repeats * max(abs(found.value), size))
-    notes = tuple(_notes(base, g, k, samples, found.error, found.value))
-    return Entry(*found, _method(base, offsets, found.value), notes)
+    notes = [*_notes(base, g, k, samples)]
+    if _is_rough(base, g, k, found.error - unresolved, found.value):
+        notes.append("not smooth, or noisy: half of the step yields another derivative")
+    if _is_rough(base, g, k, unresolved, found.value):
+        notes.append("the peak lies between outputs that are too far apart: take a smaller output_step")
+    return Entry(*found, _method(base, offsets, found.value), tuple(notes), unresolved)
 
 
 def _method(base: Base, offsets: Array, value: float) -> Method:
@@ -192,8 +198,8 @@ def _method(base: Base, offsets: Array, value: float) -> Method:
     return "repeated steps" if base.repeats else "differences"
 
 
-def _notes(base: Base, g: int, k: int, samples: Sequence[Sample], error: float, value: float) -> Iterator[str]:
-    """What to mind: runs that failed, peaks that another overtakes, goals that are not smooth."""
+def _notes(base: Base, g: int, k: int, samples: Sequence[Sample]) -> Iterator[str]:
+    """What to mind of runs: those that failed, and peaks that another overtakes."""
     nearest = sorted(samples, key=lambda one: abs(one.offset))
     name = ".".join(base.keys[k])
 
@@ -204,8 +210,10 @@ def _notes(base: Base, g: int, k: int, samples: Sequence[Sample], error: float, 
         yield f"{at(failed)}: {failed.failure}"
     if jump := next((one for one in nearest if one.goals and one.goals[g].elsewhere), None):
         yield f"a kink: {at(jump)} the largest value is {jump.goals[g].elsewhere}"
-    if _relative(error, base, g, k) > ROUGH and error > ROUGH * abs(value):
-        yield "not smooth, or noisy: half of the step yields another derivative"
+
+
+def _is_rough(base: Base, g: int, k: int, error: float, value: float) -> bool:
+    return _relative(error, base, g, k) > ROUGH and error > ROUGH * abs(value)
 
 
 def _relative(error: float, base: Base, g: int, k: int) -> float:
