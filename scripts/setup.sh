@@ -103,8 +103,8 @@ make_venv() {
   "$DEBIAN_PYTHON" -I -m venv --system-site-packages .venv && .venv/bin/python -m pip --version
 }
 
-# Everything that pyproject.toml asks for, but numpy, scipy and h5py: those have to be Debian's, which dolfinx and its
-# HDF5 go with. pip is told of them as constraints only, since it does not recognise Debian's h5py.
+# What pyproject.toml asks for, with figures and reports, but numpy, scipy and h5py: those have to be Debian's, which
+# dolfinx and its HDF5 go with. pip is told of them as constraints only, since it does not recognise Debian's h5py.
 install_dependencies() {
   .venv/bin/python -I - <<'PYTHON' || return
 import re
@@ -115,11 +115,10 @@ from pathlib import Path
 from_debian = {"numpy", "scipy", "h5py"}
 project = tomllib.loads(Path("pyproject.toml").read_text())
 extras = project["project"]["optional-dependencies"]
-wanted = project["build-system"]["requires"] + project["project"]["dependencies"]
-wanted += [line for extra in ("plot", "report", "docs", "test") for line in extras[extra]]
+wanted = project["build-system"]["requires"] + project["project"]["dependencies"] + extras["plot"] + extras["report"]
 wanted = [line for line in wanted if re.match(r"[\w.-]+", line)[0] not in from_debian]
 Path(".venv/requirements.txt").write_text("\n".join(wanted) + "\n")
-Path(".venv/view.txt").write_text("\n".join(extras["view"]) + "\n")
+Path(".venv/test_requirements.txt").write_text("\n".join(extras["docs"] + extras["test"] + extras["view"]) + "\n")
 
 # Debian's h5py calls itself h5py._debian_h5py_serial.
 debian = {d.name.split(".")[0]: d.version for d in distributions(path=["/usr/lib/python3/dist-packages"])}
@@ -129,9 +128,9 @@ PYTHON
   .venv/bin/python -m pip install -r .venv/requirements.txt -c .venv/constraints.txt
 }
 
-# VTK is a large download, and only pictures in space need it: test.sh asks for it, demo.sh does not.
-install_view() {
-  .venv/bin/python -m pip install -r .venv/view.txt -c .venv/constraints.txt
+# Checkers, the documentation's tools and VTK, a large download: test.sh asks for them, demo.sh does not.
+install_test_packages() {
+  .venv/bin/python -m pip install -r .venv/test_requirements.txt -c .venv/constraints.txt
 }
 
 # Python files are seen as they are edited; C++ sources and new files are taken in here.
@@ -184,7 +183,7 @@ setup() {
 
   dependencies_key=$({ installed_packages "${DEBIAN_PACKAGES[@]}" && cat pyproject.toml; } | digest)
   once dependencies "$dependencies_key" "installing Python packages" install_dependencies
-  [[ -z ${WITH_TEST_PACKAGES:-} ]] || once view "$dependencies_key" "installing PyVista for the tests" install_view
+  [[ -z ${WITH_TEST_PACKAGES:-} ]] || once tests "$dependencies_key" "installing what the tests need" install_test_packages
   once build "$(build_key) $dependencies_key" "building ffrobot" build_package
   once check "$(<.venv/build.stamp)" "checking the environment" check_environment
   exec 9<&-
