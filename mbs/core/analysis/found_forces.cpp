@@ -1,7 +1,8 @@
 #include "core/analysis/found_forces.h"
 
+#include "core/linear/products.h"
 #include "core/linear/small_product.h"
-#include "core/recursion/constrained_aba/constraints.h"
+#include "core/recursion/constrained_aba/once.h"
 
 #include <algorithm>
 
@@ -100,8 +101,10 @@ namespace {
 Eigen::MatrixXd L_a(const PointComponents &of, const Eigen::Ref<const VectorXd> &p) {
   Eigen::MatrixXd found(6 + p.size(), of.direction.cols());
   for (Index k = 0; k < found.cols(); ++k) {
-    const Eigen::Vector3d e = of.direction.col(k), u = of.position.col(k) + of.Phi.middleRows<3>(3 * k) * p;
-    found.col(k) << e, u.cross(e), of.Phi.middleRows<3>(3 * k).transpose() * e;
+    const ConstMatrix Phi = of.Phi.middleRows<3>(3 * k);
+    const Eigen::Vector3d e = of.direction.col(k), u = of.position.col(k) + matrix_product(Phi, p);
+    found.col(k) << e, u.cross(e), VectorXd::Zero(p.size());
+    add_transposed_product(Phi, e, found.col(k).tail(p.size()));
   }
   return found;
 }

@@ -1,5 +1,7 @@
 #include "core/linear/least_norm.h"
 
+#include <Eigen/QR>
+
 namespace ffrobot {
 
 using Eigen::MatrixXd;
@@ -14,27 +16,34 @@ constexpr double dependent = 1e-10; // of the largest pivot: rounding leaves 1e-
 void LeastNorm::compute(const MatrixXd &A) {
   is_square_ = A.rows() == A.cols();
   if (is_square_)
-    lu_.compute(A);
-  else
-    qr_.setThreshold(dependent).compute(A);
-}
-
-VectorXd LeastNorm::solve(const VectorXd &b) const {
-  if (is_square_)
-    return lu_.solve(b);
-  return qr_.solve(b);
+    return lu_.factorise(A);
+  Eigen::CompleteOrthogonalDecomposition<MatrixXd> factors;
+  pseudo_inverse_ = factors.setThreshold(dependent).compute(A).pseudoInverse();
 }
 
 MatrixXd LeastNorm::solve(const MatrixXd &b) const {
-  if (is_square_)
-    return lu_.solve(b);
-  return qr_.solve(b);
+  if (!is_square_)
+    return pseudo_inverse_ * b;
+  MatrixXd x = b;
+  for (auto column : x.colwise())
+    lu_.solve(column.data());
+  return x;
+}
+
+VectorXd LeastNorm::solve(const VectorXd &b) const {
+  if (!is_square_)
+    return pseudo_inverse_ * b;
+  VectorXd x = b;
+  lu_.solve(x.data());
+  return x;
 }
 
 VectorXd LeastNorm::solve_transposed(const VectorXd &c) const {
-  if (is_square_)
-    return lu_.transpose().solve(c);
-  return qr_.transpose().solve(c);
+  if (!is_square_)
+    return pseudo_inverse_.transpose() * c;
+  VectorXd x = c;
+  lu_.solve_transposed(x.data());
+  return x;
 }
 
 } // namespace ffrobot

@@ -2,8 +2,7 @@
 // closest the ones of least norm.
 #pragma once
 
-#include <Eigen/LU>
-#include <Eigen/QR>
+#include "core/linear/lu.h"
 
 namespace ffrobot {
 
@@ -16,8 +15,8 @@ public:
 
 private:
   bool is_square_ = true;
-  Eigen::PartialPivLU<Eigen::MatrixXd> lu_;
-  Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> qr_;
+  Lu<double> lu_;
+  Eigen::MatrixXd pseudo_inverse_; // where A is not square
 };
 
 } // namespace ffrobot

@@ -52,6 +52,27 @@ template <class Scalar> void Lu<Scalar>::solve(Scalar *x) const {
   }
 }
 
+template <class Scalar> void Lu<Scalar>::solve_transposed(Scalar *x) const {
+  const Index n = factors_.rows();
+  for (Index k = 0; k < n; ++k) {
+    for (Index r = 0; r < k; ++r)
+      x[k] -= factors_(r, k) * x[r];
+    x[k] /= factors_(k, k);
+  }
+  for (Index k = n; k-- > 0;)
+    for (Index r = k + 1; r < n; ++r)
+      x[k] -= factors_(r, k) * x[r];
+  for (Index k = n; k-- > 0;)
+    std::swap(x[k], x[from_[static_cast<std::size_t>(k)]]);
+}
+
+template <class Scalar> Scalar Lu<Scalar>::determinant() const {
+  Scalar product = 1;
+  for (Index k = 0; k < factors_.rows(); ++k)
+    product *= from_[static_cast<std::size_t>(k)] == k ? factors_(k, k) : -factors_(k, k);
+  return product;
+}
+
 template class Lu<double>;
 template class Lu<std::complex<double>>;
 

@@ -16,8 +16,10 @@ public:
   // A (n, n), with the largest pivot of each column. A singular one gives results that are not finite.
   void factorise(Matrix A);
 
-  // x (n): the right-hand side in, the solution out
+  // x (n): the right-hand side in, the solution out, of A x = b and of A^T x = b
   void solve(Scalar *x) const;
+  void solve_transposed(Scalar *x) const;
+  Scalar determinant() const;
 
 private:
   Matrix factors_;                 // U, and L without its diagonal of ones

@@ -157,4 +157,7 @@ void response(const Mechanism<Space> &m, const T *q, const T *residual, Workspac
 template <class Space, class T>
 Placed<Space, T> measure(const Mechanism<Space> &m, const T *q, const T *v, Workspace<Space, T> &w, T *value, T *rate);
 
+extern template struct Workspace<Planar, double>;
+extern template struct Workspace<Spatial, double>;
+
 } // namespace ffrobot::recursion

@@ -1,6 +1,7 @@
 #include "core/recursion/inverse/motors.h"
 
 #include "core/check_index.h"
+#include "core/linear/products.h"
 
 #include <stdexcept>
 
@@ -112,7 +113,7 @@ template <class Space> Eigen::MatrixXd Motors<Space>::shares_of(const Eigen::Mat
   found.topRows(modes) = dQ(driven_.of_modes, Eigen::all);
   if (!cuts_.empty()) {
     const Eigen::MatrixXd solved = factors_.solve(dQ(driven_.of_joints, Eigen::all).eval());
-    found.topRows(modes) -= columns_(driven_.of_modes, Eigen::all) * solved;
+    found.topRows(modes) -= matrix_product(columns_(driven_.of_modes, Eigen::all), solved);
     found.bottomRows(tau_.size()) = solved.bottomRows(tau_.size());
   } else
     for (Index k = 0; k < tau_.size(); ++k) {

@@ -1,7 +1,7 @@
 #include "core/recursion/inverse/newton_euler.h"
 
-#include "core/recursion/constrained_aba/constraints.h"
 #include "core/recursion/constrained_aba/joint_elimination.h"
+#include "core/recursion/constrained_aba/once.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,6 +1,6 @@
 #include "core/recursion/inverse/observe.h"
 
-#include "core/recursion/constrained_aba/constraints.h"
+#include "core/recursion/constrained_aba/once.h"
 
 #include <Eigen/Geometry>
 

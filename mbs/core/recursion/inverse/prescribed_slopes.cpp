@@ -1,4 +1,5 @@
 // How a prescribed motion and its forces answer to small changes of the modes: by dual numbers, without differences.
+#include "core/linear/products.h"
 #include "core/recursion/constrained_aba/derivatives.h"
 #include "core/recursion/inverse/prescribed_motion.h"
 
@@ -62,10 +63,11 @@ template <class Space> JointSlopes PrescribedMotion<Space>::joint_slopes() {
   JointSlopes to;
   to.q = to.v = to.a_p = to.a_v = MatrixXd::Zero(a_.size(), modes());
   to.q(driven_.of_modes, Eigen::all).setIdentity();
-  to.q(joints, Eigen::all) = -factors_.solve(C(Eigen::all, driven_.of_modes).eval());
-  to.v(joints, Eigen::all) = -factors_.solve((found.rate_q * to.q).eval());
-  to.a_v(joints, Eigen::all) = factors_.solve((C * (found.a_v * to.q)).eval());
-  to.a_p(joints, Eigen::all) = factors_.solve((C * (found.a_q * to.q + found.a_v * to.v)).eval());
+  const auto put = [&](const MatrixXd &rows, MatrixXd &all) { all(joints, Eigen::all) = factors_.solve(rows); };
+  put(-C(Eigen::all, driven_.of_modes), to.q);
+  put(-matrix_product(found.rate_q, to.q), to.v);
+  put(matrix_product(C, matrix_product(found.a_v, to.q)), to.a_v);
+  put(matrix_product(C, matrix_product(found.a_q, to.q) + matrix_product(found.a_v, to.v)), to.a_p);
   return to;
 }
 
@@ -94,11 +96,14 @@ template <class Space> LeftSlopes PrescribedMotion<Space>::left_slopes(const Joi
     M.col(j) -= f;
     unit[j] = 0;
   }
-  MatrixXd by_q = -(M * found.a_q + found.value_q.transpose() * found.lambda_q);
-  MatrixXd by_v = -(M * found.a_v + found.value_q.transpose() * found.lambda_v);
+  MatrixXd by_q = -matrix_product(M, found.a_q), by_v = -matrix_product(M, found.a_v);
+  add_transposed_product(found.value_q, found.lambda_q, by_q, -1);
+  add_transposed_product(found.value_q, found.lambda_v, by_v, -1);
   add_slopes(driven_.scene, q(), v(), by_q, by_v);
-  return {motors_->shares_of(M * joints.q), motors_->shares_of(by_v * joints.q + M * joints.a_v),
-          motors_->shares_of(by_q * joints.q + by_v * joints.v + M * joints.a_p)};
+  return {motors_->shares_of(matrix_product(M, joints.q)),
+          motors_->shares_of(matrix_product(by_v, joints.q) + matrix_product(M, joints.a_v)),
+          motors_->shares_of(matrix_product(by_q, joints.q) + matrix_product(by_v, joints.v) +
+                             matrix_product(M, joints.a_p))};
 }
 
 template <class Space> LeftSlopes RedefinedMotion<Space>::slopes() {

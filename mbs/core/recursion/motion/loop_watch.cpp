@@ -49,7 +49,8 @@ template <class Space> double LoopWatch<Space>::cosine(const double *q, Workspac
     multiplier_[w.active[k]] = 0;
     product_.col(static_cast<Index>(k)).noalias() = C_0_ * -answer_;
   }
-  return cosine_ = lu_.compute(product_).determinant() / (volume_ * now);
+  lu_.factorise(product_);
+  return cosine_ = lu_.determinant() / (volume_ * now);
 }
 
 template class LoopWatch<Planar>;

@@ -5,9 +5,8 @@
 // than constraints are kept, and a step can change to another one, along which the sign stays: so none ends there.
 #pragma once
 
+#include "core/linear/lu.h"
 #include "core/recursion/newton/newton_posture.h"
-
-#include <Eigen/LU>
 
 namespace ffrobot::recursion {
 
@@ -31,7 +30,7 @@ private:
   NewtonPosture<Space> posture_;
   Eigen::MatrixXd C_0_, product_;       // (active constraints, n_v), (active constraints, active constraints)
   Eigen::VectorXd multiplier_, answer_; // (constraints), (n_v)
-  Eigen::PartialPivLU<Eigen::MatrixXd> lu_;
+  Lu<double> lu_;
   double least_volume_, volume_ = 0; // sqrt(det C M^-1 C^T): next to singular postures; where C_0 is
   double cosine_ = 1;
 };

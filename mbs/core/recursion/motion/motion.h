@@ -110,4 +110,7 @@ private:
   Eigen::VectorXd correction_, state_, shifted_, unused_; // of projections; (q, v); of error_size()
 };
 
+extern template class RecursiveMotion<Planar>;
+extern template class RecursiveMotion<Spatial>;
+
 } // namespace ffrobot::recursion

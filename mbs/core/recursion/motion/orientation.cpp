@@ -11,7 +11,7 @@ using Eigen::Vector3d;
 
 namespace {
 
-struct Vectors {
+struct Components {
   Vector3d x, rate, acceleration;
 };
 
@@ -39,7 +39,7 @@ Matrix3d skew(const Vector3d &x) { return (Matrix3d() << 0, -x[2], x[1], x[2], 0
 Matrix3d about(int axis, double angle) { return Eigen::AngleAxisd(angle, Vector3d::Unit(axis)).toRotationMatrix(); }
 
 // A = exp(psi~), omega = J_l psi_dot, alpha = J_l psi_ddot + (dJ_l/dt) psi_dot with J_l = I + a psi~ + b psi~^2
-Turning by_vector(const Vectors &psi) {
+Turning by_vector(const Components &psi) {
   const double x = psi.x.squaredNorm(), x_dot = 2 * psi.x.dot(psi.rate);
   const auto [a, a_slope] = series(2, x);
   const auto [b, b_slope] = series(3, x);
@@ -51,7 +51,7 @@ Turning by_vector(const Vectors &psi) {
 }
 
 // omega = yaw_dot e_z + pitch_dot R_z e_y + roll_dot R_z R_y e_x
-Turning by_rpy(const Vectors &angle) {
+Turning by_rpy(const Components &angle) {
   const Matrix3d R_z = about(2, angle.x[2]), R_zy = R_z * about(1, angle.x[1]);
   const Vector3d roll = R_zy.col(0), pitch = R_z.col(1), yaw = Vector3d::UnitZ();
   const Vector3d by_yaw = angle.rate[2] * yaw, by_pitch = angle.rate[1] * pitch;
@@ -72,7 +72,7 @@ Matrix3d from_e_z_to(const Vector3d &z) {
 }
 
 // omega = z x z_dot, alpha = z x z_ddot
-Turning by_direction(const Vectors &d) {
+Turning by_direction(const Components &d) {
   const double size = d.x.norm(), slope = d.rate.dot(d.x) / (size * size);
   const Vector3d z = d.x / size, z_dot = d.rate / size - slope * z;
   return {from_e_z_to(z), z.cross(z_dot), z.cross(d.acceleration / size - 2 * slope * z_dot)};
@@ -81,7 +81,7 @@ Turning by_direction(const Vectors &d) {
 } // namespace
 
 Turning OrientationLaw::operator()(double t) const {
-  Vectors of;
+  Components of;
   for (int i = 0; i < 3; ++i) {
     const Jet jet = functions[static_cast<std::size_t>(i)](t);
     of.x[i] = jet.value, of.rate[i] = jet.rate, of.acceleration[i] = jet.acceleration;

@@ -1,9 +1,10 @@
 #include "core/recursion/newton/newton_posture.h"
 
-#include "core/recursion/constrained_aba/constraints.h"
+#include "core/linear/products.h"
+#include "core/linear/square.h"
+#include "core/recursion/constrained_aba/once.h"
 
 #include <Eigen/Cholesky>
-#include <Eigen/LU>
 
 namespace ffrobot::recursion {
 
@@ -170,6 +171,7 @@ template <class Space> void NewtonPosture<Space>::act(const Workspace<Space, dou
 
 // Rows of C are generalized forces of these: by virtual work, from the tips inwards.
 template <class Space> void NewtonPosture<Space>::find_gradients(const Workspace<Space, double> &w) {
+  using Port = typename NewtonBody<Space>::Square;
   act(w);
   for (std::size_t i = bodies_.size(); i-- > 0;) {
     const Node<Space> &node = mechanism_.nodes[i];
@@ -180,25 +182,30 @@ template <class Space> void NewtonPosture<Space>::find_gradients(const Workspace
     for (std::size_t k = 0; k < body.ports.size(); ++k)
       if (k != inboard) {
         const Forces &f = acting_[static_cast<std::size_t>(node.first_port + body.ports[k])];
-        on_modes.noalias() += body.P(k).transpose() * f;
-        on_frame.noalias() += body.X[k].transpose() * f;
+        add_transposed_product(body.P(k), f, on_modes);
+        add_transposed_product(body.X[k], f, on_frame);
       }
     const MatrixXd m = body.rows.template topRows<d>(); // X lacks P m_ff^-1 m^T
     const MatrixXd p_by_A = body.m_ff.size() ? body.p_by_A : MatrixXd(m.transpose());
-    on_frame.noalias() += p_by_A.transpose() * on_modes;
+    add_transposed_product(p_by_A, on_modes, on_frame);
     if (body.is_moved) {
-      const Eigen::Matrix<double, d, d> X = body.X[inboard] + body.P(inboard) * p_by_A;
-      const Forces on_port = X.transpose().inverse() * on_frame;
-      on_modes.noalias() -= body.P(inboard).transpose() * on_port;
-      on_frame.noalias() = body.tilt.transpose() * on_port;
+      Port X = body.X[inboard];
+      add_product(body.P(inboard), p_by_A, X);
+      const Square<double, d> X_inverse = inverse(Square<double, d>::of(X));
+      MatrixXd on_port = MatrixXd::Zero(d, on_frame.cols());
+      add_transposed_product(Eigen::Map<const Port>(X_inverse.column[0].x), on_frame, on_port);
+      add_transposed_product(body.P(inboard), on_port, on_modes, -1);
+      on_frame.setZero();
+      add_transposed_product(body.tilt, on_port, on_frame);
     }
-    const MatrixXd along = body.J.transpose() * on_frame;
+    MatrixXd along = MatrixXd::Zero(body.J.cols(), on_frame.cols());
+    add_transposed_product(body.J, on_frame, along);
     if (body.turn.size())
-      on_modes.noalias() -= body.turn * along;
+      add_product(body.turn, along, on_modes, -1);
     C_.middleCols(node.v, along.rows()) = along.transpose();
     C_.middleCols(node.p_v(), node.n()) = on_modes.transpose();
     if (node.parent >= 0)
-      acting_[static_cast<std::size_t>(node.parent_port)].noalias() += body.to_section.transpose() * on_frame;
+      add_transposed_product(body.to_section, on_frame, acting_[static_cast<std::size_t>(node.parent_port)]);
   }
   for (std::size_t r = 0; r < mechanism_.constraints.size(); ++r)
     if (const Constraint &row = mechanism_.constraints[r]; row.node >= 0)

@@ -208,7 +208,8 @@ void Body::fill_residuals(const SpatialData &data, const std::vector<int> &used)
   for (int r = 0; r < width; ++r)
     for (int k = 0; k < n; ++k)
       extended(r, k) = W[static_cast<std::size_t>(k * width + r)];
-  const ExtendedMatrix gram_ = n ? ExtendedMatrix(extended * extended.transpose()) : ExtendedMatrix::Zero(width, width);
+  const ExtendedMatrix gram_ =
+      n ? ExtendedMatrix(extended.lazyProduct(extended.transpose())) : ExtendedMatrix::Zero(width, width);
   G.resize(static_cast<std::size_t>(width * width));
   for (int r = 0; r < width; ++r)
     for (int c = 0; c < width; ++c)

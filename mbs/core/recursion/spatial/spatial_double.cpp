@@ -1,5 +1,6 @@
 #include "core/recursion/constrained_aba/evaluation.h"
 #include "core/recursion/constrained_aba/loop_joint_forces.h"
+#include "core/recursion/constrained_aba/once.h"
 
 namespace ffrobot::recursion {
 
@@ -17,5 +18,7 @@ template Placed<Spatial, double> measure(const M &, const double *, const double
 template Pose<double> wrench_pose(const Placed<Spatial, double> &, int);
 template void cut_rates(const Placed<Spatial, double> &, const std::vector<CutJoint> &, double *);
 template void add_along_cuts(const Placed<Spatial, double> &, const std::vector<CutJoint> &, const double *, double *);
+FFROBOT_ONCE(template, Spatial);
+FFROBOT_ONCE_SPATIAL(template);
 
 } // namespace ffrobot::recursion

@@ -1,0 +1,18 @@
+// Products of dynamic matrices as functions: Eigen's expressions of them are compiled once, in products.cpp, and not
+// again for every kind of operand (half the time of a file that has ten).
+#pragma once
+
+#include <Eigen/Core>
+
+namespace ffrobot {
+
+using ConstMatrix = Eigen::Ref<const Eigen::MatrixXd>;
+
+Eigen::MatrixXd matrix_product(const ConstMatrix &A, const ConstMatrix &B); // A B
+
+// To `to`: factor A B and factor A^T B
+void add_product(const ConstMatrix &A, const ConstMatrix &B, Eigen::Ref<Eigen::MatrixXd> to, double factor = 1);
+void add_transposed_product(const ConstMatrix &A, const ConstMatrix &B, Eigen::Ref<Eigen::MatrixXd> to,
+                            double factor = 1);
+
+} // namespace ffrobot
