@@ -60,9 +60,12 @@ def _solve(scene_file: Path, path: Path, again: str, *, resume: bool, strict: bo
     from ..results.resume import how_to_go_on, resume_scene
     from ..results.write import write_results
     from ..run.solve import solve_scene
-    from ..scene.plausibility import remarks_on_file
+    from ..scene.load import load_scene
+    from ..scene.plausibility import remarks
 
-    for remark in (remarks := remarks_on_file(scene_file)):  # first: they may be why the run fails
+    scene = load_scene(scene_file)
+    remarked = list(remarks(scene))
+    for remark in remarked:  # first: they may be why the run fails
         click.echo(f"note       {remark}")
     writing, kept = 0.0, []
 
@@ -75,9 +78,7 @@ def _solve(scene_file: Path, path: Path, again: str, *, resume: bool, strict: bo
 
     with Display() as display:
         try:
-            solution = (
-                resume_scene(scene_file, path, display, keep) if resume else solve_scene(scene_file, display, keep)
-            )
+            solution = resume_scene(scene_file, path, display, keep) if resume else solve_scene(scene, display, keep)
         except SolveError as error:  # what a signal has cut short may fail for that
             if not display.signal:
                 raise
@@ -96,7 +97,7 @@ def _solve(scene_file: Path, path: Path, again: str, *, resume: bool, strict: bo
     else:
         notes = [*solution.path_notes, *solution.link_notes, *([posture] if posture else [])]
         accuracy = "; ".join(error_budget(solution))
-        lines = summary_lines(verdict, notes, accuracy, str(path), summary_width(), len(remarks))
+        lines = summary_lines(verdict, notes, accuracy, str(path), summary_width(), len(remarked))
         click.echo("\n".join(lines))
     _check_ended(solution, display, scene_file, again)
     if strict:

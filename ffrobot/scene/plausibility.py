@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator
 from contextlib import suppress
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -170,13 +169,3 @@ def _times(scene: Scene) -> Iterator[str]:
                 yield f"{label} begins at {path.begin:g} s, before the run: what is before 0 s is not followed"
             elif last > RESTING * path.end:
                 yield f"{label} ends at {path.end:g} s, and rests for the other {last - path.end:g} s of the run"
-
-
-def remarks_on_file(path: Path) -> list[str]:
-    """Of the scene file at `path`; nothing where it is wrong, which whoever solves it tells."""
-    from .load import load_scene
-
-    try:
-        return list(remarks(load_scene(path)))
-    except InputError:
-        return []

@@ -171,6 +171,9 @@ def interpolated(nodes: Array, values: Array, degree: int = 5, at_rest: bool = T
 
     With `at_rest` its first two derivatives vanish at both ends.
     """
+    if degree == 1:
+        rates = np.diff(values, axis=0) / np.diff(nodes)[:, None]
+        return Piecewise(nodes, np.stack([rates, values[:-1]], axis=1))
     # Loaded here: a scene without waypoints does not pay for it.
     from scipy.interpolate import make_interp_spline
 

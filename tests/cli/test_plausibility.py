@@ -7,7 +7,7 @@ import pytest
 
 import ffrobot as program
 from ffrobot.fe_models.link_file import LinkTable, read_link
-from ffrobot.scene.plausibility import remarks, remarks_on_file, remarks_on_link, remarks_on_memory
+from ffrobot.scene.plausibility import remarks, remarks_on_link, remarks_on_memory
 
 CASES = Path(__file__).parents[2] / "cases"
 BAR = {"mass": 1.0, "inertia": 0.1, "center": [0.5, 0.0], "points": {"root": [0.0, 0.0], "tip": [1.0, 0.0]}}
@@ -105,7 +105,7 @@ def test_outputs_that_do_not_fit_into_memory():
 
 
 def test_cases_have_no_remarks_on_units():
-    found = [line for path in CASES.glob("*/scene*.toml") for line in remarks_on_file(path)]
+    found = [line for path in CASES.glob("*/scene*.toml") for line in remarks(program.load_scene(path))]
     assert not [line for line in found if "?" in line]
 
 
