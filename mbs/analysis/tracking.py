@@ -20,7 +20,7 @@ from ...common.arrays import Array, as_floats, as_list
 from ...common.errors import InputError, SolveError
 from ...common.validation import Record
 from ..fields.field_types import NotNegative, Positive
-from ..model.gears import refuse_prescribed_motors
+from ..model.gears import elastic_joints
 from ..model.model import Model, modal_directions, path_errors, without_paths
 from ..scene.analysis import Check, Need, TimedAnalysis, output_times
 from ..solve.integrators import Choice
@@ -225,7 +225,12 @@ def least_voltage(model: Model, patches: Mapping[str, PatchedLink], analysis: Tr
 def _pose(model: Model, patches: Mapping[str, PatchedLink], analysis: Tracking, progress: Callable[[], bool]) -> _Posed:
     """The least voltage on the first breaks. Raises as `run_tracking`, and `Stopped`."""
     place, end = where(model.scene.path, analysis), analysis.end
-    refuse_prescribed_motors(model, analysis)
+    if elastic := elastic_joints(model):
+        raise InputError(
+            f'{place}: expected rigid gears for kind = "tracking", found stiffness in joint "{elastic[0].joint.name}":'
+            " a motor behind a spring needs the second derivative of the joint's torque, which kinks where voltages do."
+            ' Leave stiffness out, or use kind = "motors-only"'
+        )
     servo = make_servo(model, end, place, progress, 1.0, analysis.kind)
     check_rest(servo, analysis, (0.0, end))
     Phi_V, limits = _patches(patches, servo), _limits(model, patches)
@@ -285,9 +290,8 @@ def _solve(posed: _Posed, analysis: Tracking, least: Tracked) -> tuple[Tracked, 
     breaks = posed.breaks if objective == "effort" and least.share < AMPLE else least.voltage.x
     found = refined(asked, breaks, analysis.tolerance, posed.servo.goes_on, least)
     if not found.converged:
-        raise SolveError(
-            f"{posed.servo.where}: the motion of least {analysis.objective} was not found: loosen limits or tolerance"
-        )
+        what = analysis.objective.removeprefix("least-")
+        raise SolveError(f"{posed.servo.where}: the motion of least {what} was not found: loosen limits or tolerance")
     return found, objective
 
 

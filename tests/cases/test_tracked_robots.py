@@ -1,0 +1,227 @@
+"""Motors and patches on the paths of different robots: solids, loops, layouts, stiffer links; loads on their tips."""
+
+import math
+
+import numpy as np
+import pytest
+
+import ffrobot
+from ffrobot.mbs.analysis.motors_only import decay_times
+from ffrobot.mbs.model.model import modal_directions
+from ffrobot.mbs.solve.servo import make_servo
+from ffrobot.mbs.solve.stable_inversion import invert
+from ffrobot.mbs.solve.tracking import Limits, Transition, Weights, track
+from ffrobot.mbs.solve.zero_dynamics import equilibrium, linearise
+from ffrobot.run.solve import prepare_scene
+from ffrobot.run.watcher import Watcher
+
+pytestmark = pytest.mark.filterwarnings("ignore::ffrobot.FfrobotWarning")
+
+ORIGIN, ZETA = [0.0, 0.0, 0.0], 0.005
+BOTH_PLANES = {"family": ["in-plane-bending", "out-of-plane-bending"], "count": 4}
+PART = {"structural": True, "density": 7600.0}
+
+
+def septic(T):
+    return f"(35*(t/{T})**4 - 84*(t/{T})**5 + 70*(t/{T})**6 - 20*(t/{T})**7)"
+
+
+def strip(length, height, width, *, solid=False, **modes):
+    return {
+        "name": "strip", "material": {"youngs_modulus": 70e9, "poissons_ratio": 0.33, "density": 2700.0},
+        "geometry": {
+            "kind": "solid" if solid else "beam", "length": length,
+            "section": {"shape": "rectangle", "height": height, "width": width},
+        },
+        "mesh": {"size": 0.02} if solid else {"elements": 12}, "reference": {"condition": "cantilever"},
+        "modes": {"family": "in-plane-bending", "count": 2, "attachment_modes": False} | modes,
+        "damping": {"ratio": ZETA},
+    }  # fmt: skip
+
+
+def patches(body, width, length=0.08, **keys):
+    where = {} if "centers" in keys else {"count": 4}
+    return {
+        "body": body, "face": "both", "length": length, "width": width, "thickness": 0.25e-3, "modulus": 63e9,
+        "d31": 110e-12, "structural": False, "limit": 300.0,
+    } | where | keys  # fmt: skip
+
+
+def revolute(name, inner, outer, **keys):
+    return {"name": name, "type": "revolute", "between": [inner, outer], **keys}
+
+
+def scene(T, gravity, trajectory, **tables):
+    """The path, which is carried and replayed."""
+    carried = {"name": "carried", "kind": "tracking", "end": T, "output_step": T / 20, "tolerance": 1e-5}
+    replay = {"name": "replay", "kind": "forward", "actuation": "carried", "apply": "joints+pzt", "tolerance": 1e-8}
+    space = "planar" if len(gravity) == 2 else "spatial"
+    return {
+        "name": "robot", "space": space, "gravity": gravity, "trajectory": [{"name": "tip", **trajectory}],
+        "analysis": [carried, replay], **tables,
+    }  # fmt: skip
+
+
+def in_plane(*layouts, solid=False, **tables):
+    """The strip of the page."""
+    return scene(
+        0.6, [0.0, 0.0], {"point": "arm.tip", "y": f"sin(pi/4*{septic(0.6)} - pi/8)"},
+        body=[{"name": "arm", "link": strip(1.0, 0.004, 0.02, solid=solid)}],
+        joint=[revolute("hub", "ground", "arm.root", motor=True)], initial={"angles": {"arm": -np.pi / 8}},
+        pzt=list(layouts) or [patches("arm", 0.02)], **tables,
+    )  # fmt: skip
+
+
+def in_3d(*, solid=False, patch=None, **tables):
+    """A rod on a waist and a shoulder, under gravity, with layouts in two planes."""
+    column = {"mass": 2.0, "center": [0.0, 0.0, 0.1], "inertia": [0.01, 0.01, 0.005]}
+    points = {"root": ORIGIN, "top": [0.0, 0.0, 0.2]}
+    return scene(
+        0.35, [0.0, 0.0, -9.81],
+        {"point": "arm.tip", "y": f"0.45*{septic(0.35)}", "z": f"0.28 + 0.25*{septic(0.35)}"},
+        body=[
+            {"name": "column", "rigid": column | {"points": points}},
+            {"name": "arm", "link": strip(0.8, 0.006, 0.006, solid=solid, **BOTH_PLANES)},
+        ],
+        joint=[
+            revolute("waist", "ground", "column.root", axis=[0.0, 0.0, 1.0]),
+            revolute("shoulder", "column.top", "arm.root", axis=[0.0, -1.0, 0.0]),
+        ],
+        initial={"state": "static", "joints": {"waist": 0.0, "shoulder": 0.1}},
+        pzt=[patches("arm", 0.006, name=way, bends=way, **(patch or {})) for way in ("in-plane", "out-of-plane")],
+        **tables,
+    )  # fmt: skip
+
+
+def five_bar():
+    """Two soft bars on motors, two rigid ones that meet at the tip: a loop in the plane."""
+    base, reach, T = 0.3, 0.4, 0.25
+
+    def angles(x, y, sign):
+        turn, bent = math.atan2(y, x), math.acos(math.hypot(x, y) / 2 / reach)
+        return turn + sign * bent, turn - sign * bent
+
+    at = [*angles(base / 2, 0.55, 1), *angles(-base / 2, 0.55, -1)]
+    soft = strip(reach, 0.003, 0.015, count=1)
+    rigid = {
+        "mass": 0.05, "inertia": 0.05 * reach**2 / 12, "center": [reach / 2, 0.0],
+        "points": {"root": [0.0, 0.0], "tip": [reach, 0.0]},
+    }  # fmt: skip
+    sides = ("near", "far")
+    return scene(
+        T, [0.0, 0.0], {"point": "near_rod.tip", "x": f"0.15 + 0.1*{septic(T)}", "y": f"0.55 - 0.05*{septic(T)}"},
+        body=[{"name": k, "link": soft} for k in sides] + [{"name": f"{k}_rod", "rigid": rigid} for k in sides],
+        joint=[
+            revolute("A", "ground", "near.root", motor=True), revolute("B", "near.tip", "near_rod.root"),
+            revolute("D", "ground", "far.root", at=[base, 0.0], motor=True), revolute("E", "far.tip", "far_rod.root"),
+            revolute("P", "near_rod.tip", "far_rod.tip"),
+        ],
+        initial={"angles": dict(zip(("near", "near_rod", "far", "far_rod"), at, strict=True))},
+        pzt=[patches(k, 0.015, 0.06) for k in sides],
+    )  # fmt: skip
+
+
+def slider_crank():
+    """A soft crank about a slanted axis moves a slider beside it: a loop in 3D."""
+    T = 0.25
+    rod = {"mass": 0.01, "center": [0.55, 0.0, 0.0], "inertia": [2e-6, 1e-3, 1e-3],
+           "points": {"root": ORIGIN, "tip": [1.1, 0.0, 0.0]}}  # fmt: skip
+    slider = {"mass": 0.05, "center": ORIGIN, "inertia": [1e-4] * 3, "points": {"pin": ORIGIN}}
+    slanted = {  # about z of axes that the rotation vector (0.5, 0.2, 0) turns
+        "axis": [0.19047253607043549, -0.47618134017608871, 0.85847046790847781],
+        "rpy": [0.50643360053616981, 0.19164347241770835, 0.049733913986023531],
+    }
+    return scene(
+        T, [0.0, 0.0, -9.81], {"point": "slider.pin", "x": f"1.0 - 0.15*{septic(T)}"},
+        body=[
+            {"name": "crank", "link": strip(0.3, 0.004, 0.012, count=1)}, {"name": "rod", "rigid": rod},
+            {"name": "slider", "rigid": slider},
+        ],
+        joint=[
+            revolute("crank", "ground", "crank.root", motor=True, **slanted),
+            {"name": "fork", "type": "universal", "between": ["crank.tip", "rod.root"], "axis": [0.0, 0.0, 1.0],
+             "second_axis": [0.0, -1.0, 0.0], "motor": False},
+            {"name": "ball", "type": "spherical", "between": ["rod.tip", "slider.pin"]},
+            {"name": "guide", "type": "prismatic", "between": ["ground", "slider.pin"], "at": [0.0, 0.075, 0.25],
+             "axis": [1.0, 0.0, 0.0], "motor": False},
+        ],
+        initial={"state": "static", "joints": {"crank": 1.2, "fork": [-1.4, 0.2]}},
+        pzt=[patches("crank", 0.012, 0.06)],
+    )  # fmt: skip
+
+
+TWO = [patches("arm", 0.02, name=name, centers=at, face=face, **more) for name, at, face, more in (
+    ("near", [0.1, 0.3], "both", {}), ("far", [0.6, 0.9], "+y", PART),
+)]  # fmt: skip
+ROBOTS = {
+    "two layouts, one part of its link": lambda: in_plane(*TWO),
+    "geometric stiffening": lambda: in_plane(geometric_stiffening=True),
+    "solid": lambda: in_plane(solid=True),
+    "loop": five_bar,
+    "3D, stiffening": lambda: in_3d(patch={"structural": ["stiffness"]}, geometric_stiffening=True),
+    "3D, solid with patches as parts": lambda: in_3d(solid=True, patch=PART),
+    "3D, loop": slider_crank,
+}
+
+
+@pytest.mark.parametrize("robot", ROBOTS)
+def test_replay_follows_the_path(robot):
+    """Torques and voltages in the nonlinear equations: 1e-8 of the way; torques alone are a hundred times farther."""
+    model = ffrobot.make_scene(**ROBOTS[robot]())
+    with ffrobot.solve(model) as results:
+        wanted, found = (
+            results[f"{name}/points/{model.trajectory[0].point}/position"] for name in ("carried", "replay")
+        )
+        off, way = np.abs(found - wanted).max(), np.linalg.norm(np.diff(wanted, axis=0), axis=1).sum()
+        about = results.attributes("carried/tracking")
+    assert about["objective"] == "effort"
+    assert off < 1e-8 * way
+    assert about["without_patches"] > 100 * off
+
+
+@pytest.mark.parametrize(
+    ("robot", "tolerance"), [("loop", 1e-10), ("geometric stiffening", 1e-10), ("3D, loop", 1e-11)]
+)
+def test_without_voltage_motors_alone_carry(robot, tolerance):
+    """V → 0 with time before and after: torques of stable inversion, from other collocation equations."""
+    solution = prepare_scene(ffrobot.make_scene(**ROBOTS[robot]()), Watcher())
+    end = solution.scene.analysis[0].end
+    servo = make_servo(solution.model, end, robot, lambda: True, 1.0)
+    per_volt = [modal_directions(servo.model, of.per_volt) for of in solution.patches.values()]
+    Phi_V, linear = np.concatenate(per_volt)[:, servo.of_modes].T, linearise(servo, end)
+    inverted = invert(servo, linear, *decay_times(linear, end, needs_future=True), tolerance, lambda _: True)
+    assert inverted.status == "completed"
+    breaks = inverted.curve.x
+    rest = tuple(equilibrium(servo, t) for t in (breaks[0], breaks[-1]))
+    limits = Limits(np.full(Phi_V.shape[1], 1e-3), np.full(len(servo.model.motors), np.inf))
+    found = track(Transition(servo, Phi_V, limits, Weights(0.4, 1e-3, 0.005), rest), breaks)
+    assert found.converged
+    times = np.linspace(0.0, end, 71)
+    torques = [servo.forces(times, *(curve(times, k) for k in range(3)))[1] for curve in (found.curve, inverted.curve)]
+    assert np.abs(torques[0] - torques[1]).max() < 1e-9 * np.abs(torques[1]).max()
+    assert np.abs(found.voltage(breaks)).max() < 1e-6
+
+
+def test_load_on_the_tip():
+    """By virtual work: torque and reaction at rest; from rest to rest, work of motors, patches and the load."""
+    F = np.array([0.2, -0.3])
+    tables = in_plane(load=[{"point": "arm.tip", "x": str(F[0]), "y": str(F[1])}])
+    tables["analysis"][0] |= {"output_step": 0.001, "tolerance": 1e-6}
+    tables["initial"]["state"] = "static"
+    with ffrobot.solve(ffrobot.make_scene(**tables)) as results:
+        about, time = results.attributes("carried/tracking"), results.time("carried/pzt/arm/voltage")
+        tip, p, rate, torque, reaction = (results[f"carried/{name}"] for name in (
+            "points/arm.tip/position", "bodies/arm/modal", "bodies/arm/modal_velocity", "joints/hub/moment",
+            "joints/hub/reaction",
+        ))  # fmt: skip
+        omega = 2 * np.pi * np.array(results.modal_body("arm").frequency[:2])
+    for k in (0, -1):
+        assert torque[k] == pytest.approx(tip[k, 1] * F[0] - tip[k, 0] * F[1], rel=1e-5)
+        np.testing.assert_allclose(reaction[k], -F, atol=1e-6)
+    loss = (2 * ZETA * omega * rate**2).sum(axis=1)
+    dissipated = float(np.diff(time) @ (loss[1:] + loss[:-1]) / 2)
+    stored = 0.5 * float(((omega * p[-1]) ** 2 - (omega * p[0]) ** 2).sum())
+    work = about["motor_work"] + about["patch_work"]
+    assert work == pytest.approx(dissipated + stored - F @ (tip[-1] - tip[0]), rel=1e-6)
+    assert dissipated > 1e-3 * work
+    assert stored > 1e-3 * work
