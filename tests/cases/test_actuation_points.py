@@ -96,3 +96,32 @@ def test_forces_at_points_need_points(case_copy):
 
     with pytest.raises(library.InputError, match=r'apply: expected at least one \[\[actuation_points\]\] for "points"'):
         library.load_scene(arm(case_copy, ""))
+
+
+def test_forces_that_turn_a_strip_and_hold_it_straight():
+    """In closed form: sum, moment and work on the lowest mode of a cantilever, √m w = cosh − cos − σ (sinh − sin).
+
+    Turned about its root a strip takes no force, the moment m L²/3 θ̈ and θ̈ ∫ρA x w dx = θ̈ √m L 2/λ² on the mode.
+    """
+    L, m, at = 1.0, 2700.0 * 0.004 * 0.02, (0.3, 0.6, 1.0)
+    link = {
+        "name": "strip", "material": {"youngs_modulus": 70e9, "density": 2700.0, "poissons_ratio": 0.33},
+        "geometry": {"kind": "beam", "length": L, "section": {"shape": "rectangle", "height": 0.004, "width": 0.02}},
+        "mesh": {"elements": 24}, "reference": {"condition": "cantilever"},
+        "modes": {"family": "in-plane-bending", "count": 1, "attachment_modes": False},
+    }  # fmt: skip
+    scene = ffrobot.make_scene(
+        name="strip", space="planar", gravity=[0.0, 0.0], body=[{"name": "arm", "link": link}],
+        joint=[{"name": "hub", "type": "revolute", "between": ["ground", "arm.root"]}],
+        trajectory=[{"name": "turn", "joint": "hub", "value": "0.5*t**2 + t**3"}],
+        actuation_points=[{"body": "arm", "transverse": [*at[:2], "tip"]}],
+        analysis=[{"name": "straight", "kind": "fcid", "shape": "zero", "end": 0.5, "output_step": 0.05}],
+    )  # fmt: skip
+    lam = 1.8751040687119612
+    sigma, x = (np.sinh(lam) - np.sin(lam)) / (np.cosh(lam) + np.cos(lam)), lam * np.array(at) / L
+    shape = (np.cosh(x) - np.cos(x) - sigma * (np.sinh(x) - np.sin(x))) / np.sqrt(m)
+    per_acceleration = np.linalg.solve([np.ones(3), at, shape], [0.0, m * L**2 / 3, np.sqrt(m) * L * 2 / lam**2])
+    with ffrobot.solve(scene) as results:
+        force = results["straight/actuation_points/arm/force"]
+        acceleration = 1.0 + 6.0 * results.time("straight/actuation_points/arm/force")
+    np.testing.assert_allclose(force, acceleration[:, None] * per_acceleration, rtol=1e-4)

@@ -196,6 +196,7 @@ def off_path_of_first(results):
         ([('body = "arm"\ncount', 'body = "hand"\ncount'), ("[[joint]]", HAND)], 'flexible body, found "hand"'),
         ([("motor = true\nmoment_limit = 2.0         # N·m\n", "motor = false\n")], "as many motors"),
         ([("motor = true", "rotor_inertia = 1e-6\nstiffness = 400.0")], 'rigid gears .*found stiffness in joint "hub"'),
+        ([('apply = "joints+pzt"', 'apply = "points"')], 'apply: expected "joints" or "joints\\+pzt"'),
         ([("tolerance = 1e-4", 'objective = "speed"')], "objective"),
         ([("tolerance = 1e-4", "path_tolerance = 1e-4")], 'expected no "path_tolerance": this kind follows its path'),
         ([("end = 0.6", "end = nan")], "end: expected a finite number, found NaN"),
