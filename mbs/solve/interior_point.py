@@ -11,9 +11,11 @@ side need it.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
+from numpy.lib.stride_tricks import as_strided
 
 from ...common.arrays import Array, Indices, as_floats
 
@@ -72,14 +74,15 @@ class _Band:
         self.layout, self.C = layout, program.C
         self.ab = np.zeros((layout.size, 3 * layout.band + 1)).T  # columns contiguous, as LAPACK takes them
         self._add_costs(self.ab, program.H)
-        for rows, columns, of in (
-            (layout.equations, layout.x[:-1], program.F),
-            (layout.equations, layout.x[1:], program.G),
-            (layout.of_start[None], layout.x[:1], program.start[0][None]),
-            (layout.of_end[None], layout.x[-1:], program.end[0][None]),
+        x, equations = layout.x[:, 0], layout.equations[0, 0]
+        for row, column, of in (
+            (equations, x[0], program.F),
+            (equations, x[1], program.G),
+            (0, x[0], program.start[0][None]),
+            (layout.size - layout.last, x[-1], program.end[0][None]),
         ):
-            self._add(self.ab, rows, columns, of)
-            self._add(self.ab, columns, rows, of.transpose(0, 2, 1))
+            self._add(self.ab, row, column, of)
+            self._add(self.ab, column, row, of.transpose(0, 2, 1))
 
     def newton(self, W: Array) -> _Newton:
         """Factors of [H + CᵀWC, Aᵀ; A, 0]."""
@@ -88,13 +91,17 @@ class _Band:
         return _Newton(ab, self.layout)
 
     def _add_costs(self, ab: Array, blocks: Array) -> None:
-        z = self.layout.z
-        for half in (0, 1):  # neighbours share x: not at once
-            self._add(ab, z[half::2], z[half::2], blocks[half::2])
+        (first, second), s = self.layout.x[:2, 0], self.layout.s
+        parts = (first, slice(None, s)), (second, slice(s, None))
+        for (row, of_rows), (column, of_columns) in product(parts, parts):
+            self._add(ab, row, column, blocks[:, of_rows, of_columns])
 
-    def _add(self, ab: Array, rows: Indices, columns: Indices, blocks: Array) -> None:
-        i, j = np.broadcast_arrays(rows[:, :, None], columns[:, None, :])
-        ab[2 * self.layout.band + i - j, j] += blocks
+    def _add(self, ab: Array, row: int, column: int, blocks: Array) -> None:
+        """Blocks (k, i, j), the first at (row, column), the others by one period each further down the diagonal."""
+        length = len(ab)
+        first = ab.T.ravel()[column * length + 2 * self.layout.band + row - column :]
+        strides = self.layout.period * length, 1, length - 1
+        as_strided(first, blocks.shape, [first.itemsize * stride for stride in strides])[...] += blocks
 
 
 class _Newton:

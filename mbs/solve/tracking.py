@@ -37,7 +37,7 @@ FEWEST_ITERATIONS = 6  # after which Newton's steps are taken to wander among th
 WANDERING = (1e-2, 1e-3)  # of the effort, one after the other, where they do
 SETTLED = 0.02  # change of the least share of voltages by finer intervals, relative
 WHILE_SETTLING = 1e-4  # of the last change of a share by Newton's steps, relative, where intervals are to change
-CALM = (1e-3, 0.1)  # of the effort in these steps; the second where they wander with the first
+CALM = (1e-3, 1e-2, 0.1)  # of the effort in these steps, each where they wander with those before
 TURNING = 0.3  # of the largest voltage: by so much one changes in intervals that are then halved
 
 
@@ -158,13 +158,15 @@ def settled(asked: Transition, breaks: Array, goes_on: Callable[[], bool]) -> Tr
     """The least voltage, on intervals that are halved where voltages turn until that changes it by at most `SETTLED`.
 
     V is linear on each interval: finer ones allow more voltages, so that the least share falls. Where steps wander,
-    more of the effort joins it, on intervals that are all halved.
+    more of the effort joins it, on intervals that are all halved. All that converge are motions: the least one counts.
     """
-    found, is_settled = _descend(asked, breaks, CALM[0], goes_on)
-    if is_settled:
-        return found
-    calmer, _ = _descend(asked, _halved(breaks, np.ones(len(breaks) - 1, dtype=bool)), CALM[1], goes_on)
-    best = min(found, calmer, key=lambda one: one.share if one.converged else np.inf)
+    best, is_settled = _descend(asked, breaks, CALM[0], goes_on)
+    every = _halved(breaks, np.ones(len(breaks) - 1, dtype=bool))
+    for calm in CALM[1:]:
+        if is_settled:
+            break
+        calmer, is_settled = _descend(asked, every, calm, goes_on)
+        best = min(best, calmer, key=lambda one: one.share if one.converged else np.inf)
     return best if best.converged else track(asked, breaks)
 
 
@@ -175,6 +177,8 @@ def _descend(asked: Transition, breaks: Array, calm: float, goes_on: Callable[[]
         steps = np.abs(np.diff(found.voltage(breaks) / asked.units, axis=0)).max(axis=1)
         breaks = _halved(breaks, steps > TURNING * found.share)
         finer = track(asked, breaks, found, calm)
+        if not finer.converged:  # from other voltages steps wander less
+            finer = track(asked, breaks, None, calm)
         if not finer.converged:
             break
         change = abs(finer.share / found.share - 1.0)
