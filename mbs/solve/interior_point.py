@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.lib.stride_tricks import as_strided
 
-from ...common.arrays import Array, Indices, as_floats
+from ...common.arrays import Array, as_floats
 
 MOST_ITERATIONS = 60
 FEASIBLE = 1e-10  # of equations and inequalities, relative to their data

@@ -271,7 +271,8 @@ def _newton(steps: _Steps, start: _Iterate, most: int) -> _Iterate:
         if steps.has_share:  # V(t) of linear programs is not unique
             moved = abs(now.share - previous_share) / abs(now.share)
             previous_share = now.share
-        if moved <= steps.tolerance or (moved <= 1e-7 and moved > 0.3 * previous):
+        shrinks = moved**2 <= steps.tolerance * previous < np.inf  # so does the next step, which is not taken
+        if moved <= steps.tolerance or (shrinks and not steps.has_share) or (moved <= 1e-7 and moved > 0.3 * previous):
             return replace(now, converged=True)
         previous = moved
     return now

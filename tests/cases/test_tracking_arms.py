@@ -149,6 +149,18 @@ def test_what_takes_more_voltage(scene, changes, text):
         assert results.attributes("carried/tracking")["least_share"] > 1.8
 
 
+@pytest.mark.parametrize(("timing", "is_said"), [(SEPTIC, False), ("3*(t/0.6)**2 - 2*(t/0.6)**3", True)])
+def test_least_voltage_that_does_not_settle(scene, timing, is_said):
+    """Where acceleration jumps: a warning says by how much it may be lower, where that is more than 6 %."""
+    with ffrobot.solve(scene((SEPTIC, timing))) as results:
+        about = results.attributes("carried/tracking")
+        doubt = about["least_voltage_doubt"] / about["least_voltage"]
+        said = [warning for warning in results.warnings["carried"] if "did not settle" in warning]
+    assert (doubt > 0.06) == is_said
+    assert len(said) == is_said
+    assert all(f"it may be {100 * doubt:.2g} % less" in warning for warning in said)
+
+
 @pytest.mark.parametrize("limit", [1.1, 1.09, 1.07])
 def test_motors_at_their_limits(scene, limit):
     """Torques and voltages stay within both limits, between Gauss points, too; in many intervals all four are at it."""

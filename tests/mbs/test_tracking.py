@@ -16,7 +16,7 @@ from ffrobot.mbs.analysis.tracking_advice import bounds_of_zeros
 from ffrobot.mbs.model.model import modal_directions
 from ffrobot.mbs.solve.servo import make_servo
 from ffrobot.mbs.solve.stable_inversion import invert
-from ffrobot.mbs.solve.tracking import Limits, Transition, Weights, graded, start_breaks, track
+from ffrobot.mbs.solve.tracking import SETTLED, Limits, Transition, Weights, graded, settled, start_breaks, track
 from ffrobot.mbs.solve.zero_dynamics import equilibrium, linearise
 from ffrobot.run.solve import prepare_scene, solve_scene
 from ffrobot.run.watcher import Watcher
@@ -237,6 +237,48 @@ def test_least_voltage(strip, intervals, expected):
     found = track(asked(servo, Phi_V, (0.0, 0.8), "least-voltage", 200.0, is_free=True), graded(0.0, 0.8, intervals))
     assert found.converged
     assert 200.0 * found.share == pytest.approx(expected, abs=1e-4)
+
+
+SLOWEST = 65.0  # 1/s, of the strip's zeros: −64.405 and 67.248
+
+
+def test_least_voltage_settles(strip):
+    """Checkpoint 2 at 400 intervals lies within the doubt of a few dozens, to which 32 come by themselves."""
+    servo, Phi_V = strip(2, 0.8)
+    problem = replace(asked(servo, Phi_V, (0.0, 0.8), "least-voltage", 200.0, is_free=True), rate=SLOWEST)
+    breaks = graded(0.0, 0.8, 32)
+    first, found = track(problem, breaks, None, 1e-3), settled(problem, breaks, lambda: True)
+    assert found.converged
+    assert np.isin(breaks, found.voltage.x).all()
+    assert 32 < len(found.voltage.x) < 100
+    assert found.share < first.share
+    assert 200.0 * found.share * (1 - found.doubt) < 53.6848 < 200.0 * found.share
+    assert found.doubt < 3 * SETTLED
+
+
+@pytest.mark.parametrize(("modes", "T"), [(3, 0.6), (4, 0.6)])
+def test_doubt_of_the_least_voltage(strip, modes, T):
+    """A mesh three times as fine, without the effort's share: within the doubt."""
+    servo, Phi_V = strip(modes, T)
+    problem = replace(asked(servo, Phi_V, (0.0, T), "least-voltage", 200.0), rate=SLOWEST)
+    found = settled(problem, graded(0.0, T, 32), lambda: True)
+    finest = track(problem, graded(0.0, T, 200))
+    assert finest.converged
+    assert found.share * (1 - found.doubt) < finest.share < found.share
+    assert found.doubt < 3 * SETTLED
+
+
+def test_least_voltage_where_steps_wander(strip):
+    """T = 0.45 s within 2 N·m, which torques reach: from the first mesh's motion the steps on the next one wander."""
+    servo, Phi_V = strip(4, 0.45)
+    problem = asked(servo, Phi_V, (0.0, 0.45), "least-voltage", 200.0)
+    problem = replace(problem, rate=SLOWEST, limits=replace(problem.limits, torque=np.full(1, 2.0)))
+    breaks = graded(0.0, 0.45, 32)
+    found, coarse = settled(problem, breaks, lambda: True), track(problem, breaks)
+    fine = track(problem, graded(0.0, 0.45, 128))
+    assert found.converged
+    assert fine.converged
+    assert found.share * (1 - found.doubt) < fine.share < found.share < coarse.share
 
 
 def test_least_voltage_falls_with_time(strip):
