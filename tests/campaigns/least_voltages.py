@@ -1,16 +1,18 @@
-"""Least voltages of the soft strip by modes, path time and pre-actuation.
+"""Least voltages of the soft strip by modes, path time and pre-actuation, and torques by modes.
 
-    python tests/campaigns/least_voltages.py [timing] [modes] [path_time] [pre_actuation]
+    python tests/campaigns/least_voltages.py [timing] [modes] [path_time] [pre_actuation] [torques]
 
-Prints the tables of docs/theory.md and of cases/soft_arm_tracking/README.md.
+Prints the tables of docs/howto/tracking.md and of cases/soft_arm_tracking/README.md.
 """
 
 from __future__ import annotations
 
 import sys
 import tempfile
+from itertools import product
 from pathlib import Path
 
+import ffrobot
 from ffrobot.mbs.analysis.tracking import least_voltage
 from ffrobot.run.solve import prepare_scene
 from ffrobot.run.watcher import Watcher
@@ -47,6 +49,17 @@ def least(**changes: object) -> tuple[float, float]:
     return least_voltage(solution.model, solution.patches, analysis)
 
 
+def torques(**changes: object) -> tuple[float, float]:
+    """Peaks of the hub, N·m, with patches and by the motor alone."""
+    alone = '\n[[analysis]]\nname = "alone"\nkind = "motors-only"\nend = 0.6\noutput_step = 0.001\n'
+    with tempfile.TemporaryDirectory() as folder:
+        scene = written(Path(folder), **changes)  # type: ignore[arg-type]
+        scene.write_text(scene.read_text(encoding="utf-8") + alone, encoding="utf-8")
+        with ffrobot.solve(scene) as results:
+            carried, by_motor = (results.peak(f"{name}/joints/hub/moment")[0] for name in ("carried", "alone"))
+    return carried, by_motor
+
+
 def main(tables: list[str]) -> None:
     """Print them."""
     for timing in TIMINGS if "timing" in tables else ():
@@ -59,7 +72,10 @@ def main(tables: list[str]) -> None:
     for ms in (0, 5, 10, 20, 30, 50) if "pre_actuation" in tables else ():
         around = f"pre_actuation = {1e-3 * ms}\npost_actuation = {1e-3 * ms}\n"
         print(f"{ms},{least(keys=around)[0]:.2f}", flush=True)
+    for timing, modes in product(("septic", "nonic"), (2, 4, 8)) if "torques" in tables else ():
+        peaks = "{:.4f} N·m, {:.4f} N·m by the motor alone".format(*torques(timing=timing, modes=modes))
+        print(f"{timing}, {modes} modes: {peaks}", flush=True)
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:] or ["timing", "modes", "path_time", "pre_actuation"])
+    main(sys.argv[1:] or ["timing", "modes", "path_time", "pre_actuation", "torques"])
