@@ -196,14 +196,16 @@ def _advice(
                 f"patches of {body}: a limit of {_number(need.limit)} V is sufficient; sufficient layers, thickness or"
                 " number: ffrobot feasibility"
             )
+    is_compliant = any("gear_moment" in joint for joint in group.get("joints", {}).values())
     far = [body for body, need in patches.items() if asked and need.factor > FAR_BEYOND]
     if far and group.attrs["kind"] != "tracking":
-        carried = 'kind = "tracking"' if at_rest else 'kind = "tracking" on a path from rest to rest'
+        carried = "" if is_compliant else f'kind = "tracking"{"" if at_rest else " on a path from rest to rest"}, or '
         other = "a slower path" if group.attrs["kind"] == "fcid" else 'kind = "fcid" with shape = "static"'
-        yield f"{carried}, or {other}: no realistic patch can supply the voltages of {', '.join(far)}"
+        yield f"{carried}{other}: no realistic patch can supply the voltages of {', '.join(far)}"
     if asked and read_unsupplied(group["feasibility"]) is not None:
         inversion = 'kind = "motors-only", or ' if at_rest else ""
-        yield f'{inversion}patches ([[pzt]]) on the links with kind = "tracking"'
+        tracked = "" if is_compliant else ' with kind = "tracking"'
+        yield f"{inversion}patches ([[pzt]]) on the links{tracked}"
     if "tracking" in group and asked and not group["tracking"].attrs.get("is_needed", True):
         yield "patches are not needed: torques alone stay on the path within the tolerance, relative to its length"
     if "linear" in group and (text := str(group["linear"].attrs.get("advice", ""))):
