@@ -56,7 +56,7 @@ def _deferred(record: type[BaseModel] | str) -> CoreSchema:
     def read(value: Any, info: ValidationInfo) -> BaseModel:  # noqa: ANN401
         taken = loaded(record)
         USED.add(taken)
-        if isinstance(value, BaseModel):
+        if info.mode == "python" or isinstance(value, BaseModel):
             return taken.model_validate(value, context=info.context)
         return taken.model_validate_json(json.dumps(value, default=str), context=info.context)
 

@@ -45,7 +45,8 @@ def solved(case_copy_of_module, ffrobot):
 
 
 @pytest.mark.parametrize(
-    "command", [("info",), ("feasibility",), ("report",), ("plot", "--format", "svg"), ("view", "--frames", "2")]
+    "command",
+    [("info",), ("feasibility",), ("report",), ("plot", "--format", "svg", "--only", "*"), ("view", "--frames", "2")],
 )
 def test_names_of_all_kinds(solved, ffrobot, command):
     done = ffrobot(command[0], "scene.results.h5", *command[1:], cwd=solved)
