@@ -63,7 +63,8 @@ def commands_page() -> str:
     """The help of every command."""
     parts = [COMMANDS]
     for name, command in cli.commands.items():
-        context = click.Context(command, info_name=f"ffrobot {name}", terminal_width=100, max_content_width=100)
+        settings = {**cli.context_settings, "terminal_width": 100, "max_content_width": 100}
+        context = click.Context(command, info_name=f"ffrobot {name}", **settings)
         lines = [line.rstrip() for line in command.get_help(context).splitlines()]
         parts.append(f"## ffrobot {name}\n\n```text\n" + "\n".join(lines) + "\n```\n")
     return "\n".join(parts)
