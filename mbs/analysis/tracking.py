@@ -26,18 +26,8 @@ from ..scene.analysis import Check, Need, TimedAnalysis, output_times
 from ..solve.integrators import Choice
 from ..solve.servo import Servo, make_servo
 from ..solve.stable_inversion import shape_of
-from ..solve.tracking import (
-    SETTLED,
-    Limits,
-    Objective,
-    Tracked,
-    Transition,
-    Weights,
-    refined,
-    settled,
-    start_breaks,
-    track,
-)
+from ..solve.tracking import Limits, Objective, Tracked, Transition, Weights, track
+from ..solve.tracking_intervals import SETTLED, refined, settled, start_breaks
 from ..solve.zero_dynamics import LIGHT, Linearisation, Stopped, equilibrium, linearise
 from .context import Context, PatchedLink
 from .forward import Forward, run_forward

@@ -11,7 +11,8 @@ from ...common.arrays import Array, ComplexArray, as_floats
 from ...common.errors import SolveError
 from ..solve.servo import Servo
 from ..solve.stable_inversion import invert
-from ..solve.tracking import Transition, settled, start_breaks
+from ..solve.tracking import Transition
+from ..solve.tracking_intervals import settled, start_breaks
 from ..solve.zero_dynamics import LIGHT, Linearisation, equilibrium, first_order, linear_dynamics, linearise
 from .context import Context
 from .motors_only import decay_times

@@ -148,7 +148,7 @@ class _Solver:
             elif not is_near:
                 self.problem, is_near = replace(self.problem, derivatives=along(guess, breaks)), True
             else:
-                breaks = _halved(breaks)
+                breaks = halved(breaks)
             if len(breaks) > MOST_INTERVALS + 1:
                 break
         self.unmet, self.curve = float(unmet.max()), self.curve or found.curve
@@ -291,8 +291,9 @@ def cut(breaks: Array, excess: Array) -> Array:
     return np.concatenate([*pieces, breaks[-1:]])
 
 
-def _halved(breaks: Array) -> Array:
-    return np.sort(np.concatenate([breaks, (breaks[1:] + breaks[:-1]) / 2]))
+def halved(breaks: Array, which: Booleans | slice = slice(None)) -> Array:
+    """Breaks (N + 1,) with those intervals halved, by default all."""
+    return np.sort(np.concatenate([breaks, ((breaks[1:] + breaks[:-1]) / 2)[which]]))
 
 
 def _constant(p: Array) -> States:

@@ -11,16 +11,14 @@ sag. Links rest at both ends. Output transition with free internal states: Perez
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal, Protocol
 
 import numpy as np
 
-from ...common.arrays import Array, Booleans, Indices, as_floats
+from ...common.arrays import Array, Indices
 from .collocation import GAUSS, Elimination, piecewise, stage_states
 from .interior_point import GAP, Minimum, Program, minimize
-from .stable_inversion import PROBES, cut
 from .zero_dynamics import Output, shape_along
 
 if TYPE_CHECKING:
@@ -28,17 +26,12 @@ if TYPE_CHECKING:
 
 Objective = Literal["effort", "least-voltage", "least-torque"]
 
-GRADING = 2.5  # of breaks to both ends: tanh
 MOST_ITERATIONS = 30
 TOLERANCE = 1e-8  # of the last Newton step, relative to the peak of its quantity
-MOST_INTERVALS = 1500
 UNIQUE = 1e-7  # of the effort, which chooses among motions of the same least share
 FEWEST_ITERATIONS = 6  # after which Newton's steps are taken to wander among these motions
 WANDERING = (1e-2, 1e-3)  # of the effort, one after the other, where they do
-SETTLED = 0.02  # change of the least share of voltages by finer intervals, relative
 WHILE_SETTLING = 1e-4  # of the last change of a share by Newton's steps, relative, where intervals are to change
-CALM = (1e-3, 1e-2, 0.1)  # of the effort in these steps, each where they wander with those before
-TURNING = 0.3  # of the largest voltage: by so much one changes in intervals that are then halved
 
 
 class Driven(Output, Protocol):
@@ -119,82 +112,11 @@ class Tracked:
     doubt: float = np.inf
 
 
-def graded(start: float, end: float, intervals: int, grading: float = GRADING) -> Array:
-    """Breaks (intervals + 1,), closer together at both ends."""
-    u = np.tanh(grading * np.linspace(-1.0, 1.0, intervals + 1)) / np.tanh(grading)
-    return as_floats(start + 0.5 * (end - start) * (1.0 + u))
-
-
-def start_breaks(start: float, path_end: float, end: float, intervals: int) -> Array:
-    """Graded breaks from `start` to `end`, with those next to 0 and to the end of the path moved there (s)."""
-    breaks = graded(start, end, intervals)
-    for t in (0.0, path_end):
-        breaks[np.abs(breaks - t).argmin()] = t
-    return breaks
-
-
-def refined(asked: Transition, breaks: Array, tolerance: float, goes_on: Callable[[], bool], near: Tracked) -> Tracked:
-    """The same on intervals that are cut until no force above `tolerance` of the largest elastic one is left over.
-
-    Nor are torques then further beyond the limits asked for than by this share of them, between Gauss points.
-    """
-    driven, found = asked.driven, near
-    while True:
-        found = track(asked, breaks, found)
-        times = (breaks[:-1, None] + np.diff(breaks)[:, None] * PROBES).ravel()
-        motion = [found.curve(times, k) for k in range(3)]
-        r, tau = driven.forces(times, *motion)
-        r = r - found.voltage(times) @ asked.Phi_V.T
-        largest = float(np.abs(driven.scale**2 * motion[0]).max())
-        unmet = np.abs(r).max(axis=1).reshape(len(breaks) - 1, -1).max(axis=1)
-        beyond = (np.abs(tau) / asked.limits.torque - 1.0).max(axis=1, initial=0.0).reshape(len(unmet), -1).max(axis=1)
-        finer = cut(breaks, np.maximum(unmet / largest, beyond) / tolerance)
-        if not found.converged or not len(breaks) < len(finer) <= MOST_INTERVALS or not goes_on():
-            return replace(found, unmet=float(unmet.max()) / largest)
-        breaks = finer
-
-
-def settled(asked: Transition, breaks: Array, goes_on: Callable[[], bool]) -> Tracked:
-    """The least voltage, on intervals that are halved where voltages turn until that changes it by at most `SETTLED`.
-
-    V is linear on each interval: finer ones allow more voltages, so that the least share falls. Where steps wander,
-    more of the effort joins it, on intervals that are all halved. All that converge are motions: the least one counts.
-    """
-    best, is_settled = _descend(asked, breaks, CALM[0], goes_on)
-    every = _halved(breaks, np.ones(len(breaks) - 1, dtype=bool))
-    for calm in CALM[1:]:
-        if is_settled:
-            break
-        calmer, is_settled = _descend(asked, every, calm, goes_on)
-        best = min(best, calmer, key=lambda one: one.share if one.converged else np.inf)
-    return best if best.converged else track(asked, breaks)
-
-
-def _descend(asked: Transition, breaks: Array, calm: float, goes_on: Callable[[], bool]) -> tuple[Tracked, bool]:
-    """The least voltage with a share `calm` of the effort on finer and finer intervals, and whether it settled."""
-    found, change = track(asked, breaks, None, calm), np.inf
-    while found.converged and change > SETTLED and len(breaks) <= MOST_INTERVALS and goes_on():
-        steps = np.abs(np.diff(found.voltage(breaks) / asked.units, axis=0)).max(axis=1)
-        breaks = _halved(breaks, steps > TURNING * found.share)
-        finer = track(asked, breaks, found, calm)
-        if not finer.converged:  # from other voltages steps wander less
-            finer = track(asked, breaks, None, calm)
-        if not finer.converged:
-            break
-        change = abs(finer.share / found.share - 1.0)
-        found = replace(finer, doubt=2 * change + finer.added / finer.share)
-    return found, change <= SETTLED
-
-
-def _halved(breaks: Array, which: Booleans) -> Array:
-    return np.sort(np.concatenate([breaks, (0.5 * (breaks[1:] + breaks[:-1]))[which]]))
-
-
 def track(asked: Transition, breaks: Array, near: Tracked | None = None, calm: float | None = None) -> Tracked:
     """Solve on `breaks` (N + 1,), from a motion `near`, or from links as they sag and no voltages.
 
     With `calm`, such a share of the effort joins a least share, which a few steps find within `WHILE_SETTLING`. That of
-    voltages grows to one away from the ends: long intervals do not carry e^{st} of fast zeros, which they would abuse.
+    voltages grows to one away from the ends: with equal weights, forces are left over between Gauss points (theory.md).
     """
     driven, h = asked.driven, np.diff(breaks)
     times = breaks[:-1, None] + h[:, None] * GAUSS.c

@@ -16,7 +16,8 @@ from ffrobot.mbs.analysis.tracking_advice import bounds_of_zeros
 from ffrobot.mbs.model.model import modal_directions
 from ffrobot.mbs.solve.servo import make_servo
 from ffrobot.mbs.solve.stable_inversion import invert
-from ffrobot.mbs.solve.tracking import SETTLED, Limits, Transition, Weights, graded, settled, start_breaks, track
+from ffrobot.mbs.solve.tracking import Limits, Transition, Weights, track
+from ffrobot.mbs.solve.tracking_intervals import SETTLED, graded, settled, start_breaks
 from ffrobot.mbs.solve.zero_dynamics import equilibrium, linearise
 from ffrobot.run.solve import prepare_scene, solve_scene
 from ffrobot.run.watcher import Watcher

@@ -1,0 +1,84 @@
+"""Intervals of tracking: graded at first, halved until the least voltage settles, cut until no force is left over."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from ...common.arrays import Array, as_floats
+from .stable_inversion import PROBES, cut, halved
+from .tracking import Tracked, Transition, track
+
+GRADING = 2.5  # of breaks to both ends: tanh
+MOST_INTERVALS = 1500
+SETTLED = 0.02  # change of the least share of voltages by finer intervals, relative
+CALM = (1e-3, 1e-2, 0.1)  # of the effort in these steps, each where they wander with those before
+TURNING = 0.3  # of the largest voltage: by so much one changes in intervals that are then halved
+
+
+def graded(start: float, end: float, intervals: int, grading: float = GRADING) -> Array:
+    """Breaks (intervals + 1,), closer together at both ends."""
+    u = np.tanh(grading * np.linspace(-1.0, 1.0, intervals + 1)) / np.tanh(grading)
+    return as_floats(start + 0.5 * (end - start) * (1.0 + u))
+
+
+def start_breaks(start: float, path_end: float, end: float, intervals: int) -> Array:
+    """Graded breaks from `start` to `end`, with those next to 0 and to the end of the path moved there (s)."""
+    breaks = graded(start, end, intervals)
+    for t in (0.0, path_end):
+        breaks[np.abs(breaks - t).argmin()] = t
+    return breaks
+
+
+def refined(asked: Transition, breaks: Array, tolerance: float, goes_on: Callable[[], bool], near: Tracked) -> Tracked:
+    """The same on intervals that are cut until no force above `tolerance` of the largest elastic one is left over.
+
+    Nor are torques then further beyond the limits asked for than by this share of them, between Gauss points.
+    """
+    driven, found = asked.driven, near
+    while True:
+        found = track(asked, breaks, found)
+        times = (breaks[:-1, None] + np.diff(breaks)[:, None] * PROBES).ravel()
+        motion = [found.curve(times, k) for k in range(3)]
+        r, tau = driven.forces(times, *motion)
+        r = r - found.voltage(times) @ asked.Phi_V.T
+        largest = float(np.abs(driven.scale**2 * motion[0]).max())
+        unmet = np.abs(r).max(axis=1).reshape(len(breaks) - 1, -1).max(axis=1)
+        beyond = (np.abs(tau) / asked.limits.torque - 1.0).max(axis=1, initial=0.0).reshape(len(unmet), -1).max(axis=1)
+        finer = cut(breaks, np.maximum(unmet / largest, beyond) / tolerance)
+        if not found.converged or not len(breaks) < len(finer) <= MOST_INTERVALS or not goes_on():
+            return replace(found, unmet=float(unmet.max()) / largest)
+        breaks = finer
+
+
+def settled(asked: Transition, breaks: Array, goes_on: Callable[[], bool]) -> Tracked:
+    """The least voltage, on intervals that are halved where voltages turn until that changes it by at most `SETTLED`.
+
+    V is linear on each interval: finer ones allow more voltages, so that the least share falls. Where steps wander,
+    more of the effort joins it, on intervals that are all halved. All that converge are motions: the least one counts.
+    """
+    best, is_settled = _descend(asked, breaks, CALM[0], goes_on)
+    for calm in CALM[1:]:
+        if is_settled:
+            break
+        calmer, is_settled = _descend(asked, halved(breaks), calm, goes_on)
+        best = min(best, calmer, key=lambda one: one.share if one.converged else np.inf)
+    return best if best.converged else track(asked, breaks)
+
+
+def _descend(asked: Transition, breaks: Array, calm: float, goes_on: Callable[[], bool]) -> tuple[Tracked, bool]:
+    """The least voltage with a share `calm` of the effort on finer and finer intervals, and whether it settled."""
+    found, change = track(asked, breaks, None, calm), np.inf
+    while found.converged and change > SETTLED and len(breaks) <= MOST_INTERVALS and goes_on():
+        steps = np.abs(np.diff(found.voltage(breaks) / asked.units, axis=0)).max(axis=1)
+        breaks = halved(breaks, steps > TURNING * found.share)
+        finer = track(asked, breaks, found, calm)
+        if not finer.converged:  # from other voltages steps wander less
+            finer = track(asked, breaks, None, calm)
+        if not finer.converged:
+            break
+        change = abs(finer.share / found.share - 1.0)
+        found = replace(finer, doubt=2 * change + finer.added / finer.share)
+    return found, change <= SETTLED
