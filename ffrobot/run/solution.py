@@ -31,9 +31,10 @@ from ..mbs.quantities.attachment_error import (
     start_jolt,
     start_of_motion,
 )
+from ..mbs.quantities.energy import Energies, Momentum
 from ..mbs.quantities.motion import RobotMotion
 from ..mbs.quantities.path_seen import path_warnings
-from ..mbs.quantities.reactions import Energies, Momentum, Sharing
+from ..mbs.quantities.reactions import Sharing
 from ..mbs.quantities.stress import BodyStress
 from ..mbs.quantities.validity import Bending, deflection_warning, doubts
 from ..mbs.scene.analysis import Analysis

@@ -16,8 +16,9 @@ from ..actuation.point_forces import forces_at_points, solve_points
 from ..common.arrays import Array
 from ..common.errors import FfrobotError, InputError, SolveError, of_file
 from ..mbs.analysis.outcome import Outcome
+from ..mbs.quantities.energy import totals
 from ..mbs.quantities.motion import RobotMotion
-from ..mbs.quantities.reactions import reactions, shared_evenly, totals
+from ..mbs.quantities.reactions import reactions, shared_evenly
 from ..mbs.quantities.validity import NOTABLE_STIFFNESS_CHANGE
 from ..mbs.scene.analysis import Analysis
 from ..mbs.solve.reach import turned_guesses

@@ -1,4 +1,4 @@
-"""Forces in the joints of a tree, by the core's Newton–Euler algorithm, and its energies and momentum. Global axes.
+"""Forces in the joints of a tree, by the core's Newton–Euler algorithm. Global axes.
 
 How joints share loads where constraints of loops are redundant: what that leaves open, and a split.
 
@@ -61,34 +61,6 @@ def _on_second(motion: RobotMotion, node: Node, on_outer: Wrench) -> Wrench:
         return on_outer
     outer, inner = (motion.model.tree.pose(section, motion.q, motion.frames).r for section in (node.outer, node.inner))
     return Wrench(-on_outer.force, -on_outer.moment).seen_from(outer - inner)
-
-
-@dataclass(frozen=True)
-class Energies:
-    """Kinetic, strain and gravitational energy (T,) J, and the power (T,) W that modes, gears, friction dissipate.
-
-    Compliant gears store energy, too, and their motors turn as they have to.
-    """
-
-    kinetic: Array
-    strain: Array
-    gravitational: Array
-    dissipated_power: Array
-
-
-@dataclass(frozen=True)
-class Momentum:
-    """Linear (T, 3) kg·m/s, and angular about the global origin (T, 3) kg·m²/s."""
-
-    linear: Array
-    angular: Array
-
-
-def totals(motion: RobotMotion) -> tuple[Energies, Momentum]:
-    """Of all bodies and rotors."""
-    motion = motion.behind_gears
-    found = motion.system.core.states_totals(motion.system.scene, motion.q, motion.v)
-    return Energies(*found[:, :4].T), Momentum(found[:, 4:7], found[:, 7:])
 
 
 OPEN = 1e-6  # share of a component in reactions that change together, above which it is open

@@ -14,7 +14,7 @@ from ffrobot.common.arrays import Array
 from ffrobot.mbs.model.cut import measured
 from ffrobot.mbs.model.transmission import gear_forces, resistance, rotor
 from ffrobot.mbs.model.tree import Section
-from ffrobot.mbs.quantities.reactions import Energies, Momentum
+from ffrobot.mbs.quantities.energy import Energies, Momentum
 
 
 def accelerated(motion) -> Accelerated:

@@ -8,7 +8,8 @@ from closed_chains import NOW, closed_chain, evaluated
 from ffrobot.mbs import _core
 from ffrobot.mbs.model.model import row_values
 from ffrobot.mbs.model.system import MultibodySystem
-from ffrobot.mbs.quantities.reactions import reactions, totals
+from ffrobot.mbs.quantities.energy import totals
+from ffrobot.mbs.quantities.reactions import reactions
 
 CHAINS = [
     (("revolute", "universal", "cylindrical", "universal"), ("rigid",)),

@@ -15,8 +15,9 @@ from ffrobot.mbs.model.gears import with_compliance
 from ffrobot.mbs.model.motors import path_forces
 from ffrobot.mbs.model.system import MultibodySystem
 from ffrobot.mbs.model.transmission import gear_forces
+from ffrobot.mbs.quantities.energy import totals
 from ffrobot.mbs.quantities.motion import RobotMotion
-from ffrobot.mbs.quantities.reactions import reactions, totals
+from ffrobot.mbs.quantities.reactions import reactions
 from ffrobot.mbs.solve.integrators import METHODS
 
 ONE = _core.TimeFunction.constant(1.0)
