@@ -6,6 +6,9 @@ import numpy as np
 import pytest
 from checkpoints import TABLES, check_table, peak, readme_table, tip_error
 
+from ffrobot.pictures.figures.standard import standard_figures
+from ffrobot.results.file import Results
+
 
 @pytest.fixture(scope="module")
 def geared(solved):
@@ -74,6 +77,15 @@ def test_compliant_arm(compliant, rigid_gears):
     check_table("compliant_arm", "joint", largest)
     assert tip_error(compliant.file, "forward", "inverse") == pytest.approx(8.1e-7, rel=0.1)
     assert not any("no actuator provides" in text for text in compliant.file["inverse"].attrs["warnings"])
+
+
+def test_static_analyses_are_no_histories(compliant):
+    """An analysis of one instant has no curve of its own: neither a force over time, nor modal coordinates."""
+    with Results(compliant.folder / "scene.results.h5") as results:
+        drawn = {record.name: record for record in standard_figures(results) if record.kind == "time"}
+    assert "force_tip" not in drawn  # only the static analysis has it
+    assert any("_inverse" in name for name in drawn)
+    assert not any("_frequencies" in name for name in drawn)
 
 
 def test_motors_and_joints_as_places_of_encoders(compliant):

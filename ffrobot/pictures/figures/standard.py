@@ -25,13 +25,23 @@ def main_figures(results: Results) -> tuple[FigureRecord, ...]:
 
     Analyses are drawn over each other.
     """
-    return tuple(record for figures in MAIN for record in figures(results))
+    return _drawn(results, MAIN)
 
 
 def standard_figures(results: Results) -> tuple[FigureRecord, ...]:
     """The main figures, then angles, modes, forces, reactions, energies, other points and responses."""
     main = main_figures(results)
-    return main + tuple(record for figures in OTHERS for record in figures(results) if record not in main)
+    return main + tuple(record for record in _drawn(results, OTHERS) if record not in main)
+
+
+def _drawn(results: Results, of: Figures) -> tuple[FigureRecord, ...]:
+    """The figures of `of`, without histories of a single instant: static analyses have numbers, no curves."""
+    records = (record for figures in of for record in figures(results))
+    return tuple(
+        record
+        for record in records
+        if record.kind != "time" or any(len(results.time(curve.data)) > 1 for curve in record.curves)
+    )
 
 
 def _configurations(results: Results) -> Iterator[FigureRecord]:
