@@ -60,7 +60,7 @@ class Unsupplied:
     def in_words(self) -> str:
         """What it means, and what to do."""
         links = [
-            f"{body} ({families}), off by {_length(deflection)} and {np.degrees(turn):.2g}°"
+            f"{body} ({families}), off by {_length(deflection)}{_turn(turn)}"
             for body, families, deflection, turn in zip(
                 self.bodies, self.families, self.deflection, self.rotation, strict=True
             )
@@ -137,6 +137,12 @@ def _length(value: float) -> str:
     return f"{1e3 * value:.2g} mm"
 
 
+def _turn(angle: float) -> str:
+    """Nothing of a section that turns by round-off only."""
+    return f" and {np.degrees(angle):.2g}°" if angle > ROUND_OFF else ""
+
+
+ROUND_OFF = 1e-12  # rad
 MOST_PATCHES = 200  # that are tried on one link
 
 

@@ -220,9 +220,9 @@ def check_path(model: Model, q: Array, end: float) -> Iterator[str]:
         yield f"near a singular posture at the start: {names} can hardly be followed (ratio {found.ratio:.1e})"
     if rows and found.followed < found.freedom:
         yield (
-            f"{found.freedom - found.followed} degrees of freedom are not prescribed: {', '.join(found.left)} are"
-            " unactuated and follow gravity and inertia; prescribe a joint by a trajectory, or set redundancy ="
-            ' "least-motion" or "least-torque"'
+            f"{found.freedom - found.followed} degrees of freedom are not prescribed; gravity and inertia move"
+            f' {", ".join(found.left)}: prescribe a joint by a trajectory, or set redundancy = "least-motion" or'
+            ' "least-torque"'
         )
     if rows:
         yield from _check_motors(model, found)

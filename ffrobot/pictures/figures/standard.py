@@ -36,11 +36,10 @@ def standard_figures(results: Results) -> tuple[FigureRecord, ...]:
 
 def _drawn(results: Results, of: Figures) -> tuple[FigureRecord, ...]:
     """The figures of `of`, without histories of a single instant: static analyses have numbers, no curves."""
-    records = (record for figures in of for record in figures(results))
     return tuple(
-        record
-        for record in records
-        if record.kind != "time" or any(len(results.time(curve.data)) > 1 for curve in record.curves)
+        record if record.curves == curves else record.model_copy(update={"curves": curves})
+        for record in (record for figures in of for record in figures(results))
+        if (curves := tuple(curve for curve in record.curves if len(results.time(curve.data)) > 1)) or not record.curves
     )
 
 

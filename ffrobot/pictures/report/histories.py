@@ -91,7 +91,7 @@ def _path_errors(files: Sequence[Results]) -> list[Chart]:
     charts: dict[str, Chart] = {}
     for run in runs(files):
         time = run.results.time(run.analysis)
-        for target in targets(run.results, run.analysis):
+        for target in targets(run.results, run.analysis) if len(time) > 1 else ():
             name, title = target.trajectory, f"distance of {target.point} from its path"
             empty = Chart(file_name("error", name), title, "distance (mm)", includes=(0.0, 1e3 * ROUND_OFF))
             chart = charts.setdefault(name, empty)
