@@ -8,8 +8,8 @@ const pageColor = (name) => getComputedStyle(document.documentElement).getProper
 // What all charts have in common, over the layout that each brings along.
 const COMMON_LAYOUT = {
   margin: { l: 70, r: 15, t: 55, b: 50 },
-  colorway: ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#000000"],
-  legend: { orientation: "h", y: -0.27, font: { size: 11 } },
+  colorway: ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#7A7A7A"],
+  legend: { orientation: "h", yref: "container", y: 0, yanchor: "bottom", font: { size: 11 } },
   hovermode: "closest",
 };
 const paint = () => ({ font: { size: 12, color: pageColor("--ink") }, plot_bgcolor: pageColor("--paper"), paper_bgcolor: pageColor("--paper") });
@@ -35,7 +35,7 @@ function chartLayout(layout) {
       ...layout.title, font: { size: NARROW ? 13 : 14 }, x: 0, xanchor: "left", xref: NARROW ? "container" : "paper", y: 1, yanchor: "top",
       pad: { t: 8 },
     },
-    xaxis: { ...axis(), ...layout.xaxis },
+    xaxis: { ...axis(), automargin: true, ...layout.xaxis },
     yaxis: { ...axis(), ...layout.yaxis },
   };
 }
@@ -63,6 +63,8 @@ function drawChart(element) {
   const chart = CHARTS[element.dataset.chart];
   if (chart && !element.dataset.drawn) {
     element.dataset.drawn = "yes";
+    const rows = Math.ceil(chart.data.length / 2) - 3; // of the legend, on a phone, beyond what the height is for
+    if (NARROW && rows > 0 && !element.style.height) element.style.height = `calc(19rem + ${19 * rows}px)`;
     Plotly.newPlot(element, chart.data, chartLayout(chart.layout), CONFIG);
   }
 }
@@ -82,15 +84,15 @@ const ROW = 14; // of a legend, in pixels
 const SIZES = {
   paper: {
     mechanism: { width: 690, height: 400, "legend.y": -0.2 },
-    broad: { width: 690, height: 400, "legend.y": -0.1, "title.font.size": 11 },
+    broad: { width: 690, height: 400, "title.font.size": 11 },
     long: { width: 690, "title.font.size": 11 },
-    chart: { width: 340, height: 265, "legend.y": -0.4, "legend.font.size": 8, "title.font.size": 11 },
+    chart: { width: 340, height: 265, "legend.font.size": 8, "title.font.size": 11 },
   },
   screen: {
     mechanism: { width: null, height: null, "legend.y": -0.13 },
-    broad: { width: null, height: null, "legend.y": -0.06, "title.font.size": NARROW ? 13 : 14 },
+    broad: { width: null, height: null, "title.font.size": NARROW ? 13 : 14 },
     long: { width: null, "title.font.size": NARROW ? 13 : 14 },
-    chart: { width: null, height: null, "legend.y": -0.27, "legend.font.size": 11, "title.font.size": NARROW ? 13 : 14 },
+    chart: { width: null, height: null, "legend.font.size": 11, "title.font.size": NARROW ? 13 : 14 },
   },
 };
 function resize(place) {
