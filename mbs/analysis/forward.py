@@ -92,7 +92,7 @@ def run_forward(context: Context, analysis: Forward) -> Outcome:
         texts = tuple(hanging_joints(model, start))
         return drive_robot(model, analysis, start, progress, warnings=texts, earlier=context.earlier)
     source = context.outcomes[analysis.actuation]
-    if model.tree.gears:
+    if model.tree.gears and not source.model.tree.gears:
         return _behind_gears(source, model, analysis, context)
     replayed = _replayed(context, source, analysis)
     if analysis.apply == "trajectory" and source.recording is not None:  # others may ring where `source` did not
@@ -145,11 +145,6 @@ def _behind_gears(source: Outcome, model: Model, analysis: Forward, context: Con
         raise InputError(
             f'{model.scene.path}: analysis "{analysis.name}": apply: expected "joints" or "joints+pzt" for joints with'
             f' stiffness, found "{analysis.apply}"'
-        )
-    if source.model.tree.gears:
-        raise InputError(
-            f'{model.scene.path}: analysis "{analysis.name}": actuation: expected an inverse analysis for joints'
-            f' with stiffness, found "{source.analysis.name}"'
         )
     _check_motors(source.model, analysis, source.q[0])
     in_motors = with_motor_coordinates(source, model)

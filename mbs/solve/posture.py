@@ -116,7 +116,7 @@ class Mobility:
 
 
 def mobility(model: Model, q: Array) -> Mobility:
-    """Of the mechanism with rigid links at q (n_q,)."""
+    """Of the mechanism with rigid links and gears at q (n_q,)."""
     J, is_loop = _scaled_rows(model, q), model.loop_rows
     free, loop_rank = _null_space(J[is_loop])
     path = J[~is_loop] @ free
@@ -125,7 +125,8 @@ def mobility(model: Model, q: Array) -> Mobility:
     moving = np.abs(free @ still_free).max(axis=1, initial=0.0) > MOVES
     names = np.array([node.joint.name for node in model.tree.nodes for _ in range(node.joint.freedoms)])
     ratio = float(values[-1] / values[0]) if len(values) and values[0] > 0 else 1.0
-    return Mobility(free.shape[1], followed, ratio, tuple(dict.fromkeys(names[moving].tolist())), loop_rank)
+    freedom = free.shape[1] - len(model.tree.gears)
+    return Mobility(freedom, followed, ratio, tuple(dict.fromkeys(names[moving].tolist())), loop_rank)
 
 
 def describe_posture(model: Model, ratio: float, t: float, q: Array, *, is_end: bool) -> str:

@@ -186,6 +186,49 @@ def test_inverse_analyses_account_for_what_gears_store_and_lose(tmp_path, kind, 
         assert np.ptp(energy) > 1.0
 
 
+@pytest.mark.parametrize("space", ["planar", "spatial"])
+def test_motors_that_follow_paths_drive_the_robot_along_them(tmp_path, space):
+    """Torques of motors on prescribed paths supply the energy, and a forward run under them moves alike.
+
+    The first gear is rigid, the second compliant: two motors for three coordinates.
+    """
+    is_plane = space == "planar"
+    points = {"root": [0.0, 0.0], "tip": [0.4, 0.0]}
+    joints = [
+        revolute("O", "ground", "a.root", [0.0, 0.0, 1.0], **FIRM),
+        revolute("A", "b.root", "a.tip", [0.0, 0.0, 1.0], **SOFTER, coulomb_friction=0.1, friction_speed=0.3),
+    ]
+    bodies = [
+        {"name": name, "rigid": {"mass": 1.5, "center": [0.2, 0.05], "inertia": 0.03, "points": points}}
+        for name in "ab"
+    ]
+    if is_plane:
+        joints = [{key: value for key, value in joint.items() if key != "axis"} for joint in joints]
+    else:
+        points |= {name: [*place, 0.0] for name, place in points.items()}
+        bodies = [
+            {**body, "rigid": body["rigid"] | {"center": [0.2, 0.05, 0.0], "inertia": [0.03, 0.03, 0.03]}}
+            for body in bodies
+        ]
+    paths = [
+        {"name": "o", "joint": "O", "value": "0.8*sin(pi*t)**4"},
+        {"name": "a", "motor": "A", "value": "0.5-0.6*sin(pi*t)**4"},
+    ]
+    inverse = {"name": "inverse", "kind": "pcid", "end": 1.0, "output_step": 2e-3, "tolerance": 1e-10}
+    replay = {"name": "replay", "kind": "forward", "actuation": "inverse", "apply": "joints", "tolerance": 1e-10}
+    tables = scene(bodies, joints, inverse, replay, trajectory=paths)
+    tables |= {"space": space, "gravity": [3.0, -9.0] if is_plane else [3.0, -9.0, 0.0]}
+    with ffrobot.solve(ffrobot.make_scene(**tables, initial={"state": "static", "joints": {"A": 0.5}})) as found:
+        of = {key: found[f"inverse/joints/{key}"] for key in ("O/moment", "O/rate", "A/moment", "A/motor_rate")}
+        power = of["O/moment"] * of["O/rate"] + of["A/moment"] * of["A/motor_rate"]
+        left = power - found["inverse/energy/dissipated_power"]
+        energy = sum(found[f"inverse/energy/{key}"] for key in ("kinetic", "strain", "gravitational"))
+        assert simpson(left, x=found["inverse/time"]) == pytest.approx(energy[-1] - energy[0], abs=1e-8)
+        assert np.ptp(energy) > 1.0
+        for key in ("O/coordinate", "A/coordinate", "A/motor_angle"):
+            np.testing.assert_allclose(found[f"replay/joints/{key}"], found[f"inverse/joints/{key}"], atol=1e-8)
+
+
 def test_motors_behind_gears_are_judged_between_outputs(tmp_path):
     """γ = A sin ωt against inertia I: k δ = I γ̈ and τ = (I + J N²) γ̈ + J N² δ̈, θ̇_m = γ̇ + δ̇; peaks at no output."""
     A, w, I = 0.3, 7.4, 0.4  # noqa: E741
