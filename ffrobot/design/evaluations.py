@@ -23,11 +23,9 @@ from ..common.tables import TableWriter
 from ..results.file import Results
 from ..sweep.runs import RESULTS
 from ..sweep.sweep import Key
-from .designs import Design, Designs, Point
-from .peaks import Peak, parts
+from .designs import Design, Designs, Point, repeated_steps
 from .problem import Limit, Problem
-from .readings import Followed, Goal, Reading
-from .scenes import repeated_steps
+from .readings import Followed, Goal, Peak, Reading, parts
 from .variables import Place, Space
 
 

@@ -18,19 +18,16 @@ from ..common.errors import InputError, SolveError
 from ..common.files import AnyPath
 from ..pictures.studies.diagrams import Diagram, Points
 from ..run.watcher import Watcher
-from .designs import Designs, runs_of
+from .designs import Designs, changes_for, may_repeat, runs_of
 from .evaluations import Evaluated, Evaluations, SpentError
 from .finding import CsvFile, Finding, Section, floats, numbers, with_unit
 from .goals import parse_goal
-from .local_search import search_from
-from .optimality import Optimality
+from .local_search import AIM, search_from
+from .optimality import Differentiation, Optimality
 from .optimise import MOST, TOLERANCE, check_bounds, check_start
+from .optimum_record import parallel, states_of
 from .problem import KEPT, Limit, Problem, read_problem
 from .readings import Goal, Reading
-from .scenes import changes_for, may_repeat
-from .searched_diagrams import parallel, states_of
-from .slopes import Differentiation
-from .steps import AIM
 from .variables import Place, Space, read_space
 
 

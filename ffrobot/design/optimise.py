@@ -19,14 +19,12 @@ from ..common.errors import InputError, SolveError
 from ..common.files import AnyPath
 from ..run.watcher import Watcher
 from ..sweep.files import run_files
-from .designs import Designs, Runs, runs_of
+from .designs import Designs, Runs, changes_for, may_repeat, runs_of
 from .evaluations import Evaluations, SpentError, write_designs
-from .local_search import Local, best_of, combinations, evolve, search_from, try_all
+from .local_search import Local, best_of, combinations, evolve, rank, search_from, try_all
+from .optimality import Differentiation
 from .optimum_record import Optimum
 from .problem import read_problem, with_motors
-from .scenes import changes_for, may_repeat
-from .slopes import Differentiation
-from .steps import rank
 from .variables import Place, Space, read_space
 
 Method = Literal["auto", "slsqp", "trust-constr", "differential-evolution", "all"]

@@ -11,8 +11,7 @@ import numpy as np
 from ..common.arrays import Array, as_floats
 from ..common.errors import InputError
 from ..common.tables import shown
-from .goals import parse_goal
-from .motor_goals import OfMotors
+from .goals import OfMotors, parse_goal
 from .readings import Goal, Reading
 from .variables import Space
 

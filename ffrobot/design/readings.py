@@ -1,11 +1,31 @@
-"""What a goal is: a scalar by results, which is followed to those of a changed scene."""
+"""What a goal is: a scalar by results, which is followed to those of a changed scene.
+
+Peaks of histories, and the local ones that may take turns as the largest.
+
+A peak belongs to a time and a column: its derivative by a parameter is that of the history there (envelope theorem,
+Danskin 1966), as long as no other time overtakes it. The time is that of the top itself, where d/dt = 0, which lies
+between outputs. Where others overtake it, the largest of several is no smooth function of the parameters, but each
+local peak is one: `parts` divides the outputs of a history into windows with one of them each, whose largest values
+together are the peak wherever they move.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import re
+from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Literal
 
+import numpy as np
+
+from ..common.arrays import Array, as_floats
+from ..common.errors import InputError, did_you_mean
+from ..common.peaks import top_at
+from ..mbs.joints.joints import JOINT_TYPES
+from ..results.datasets import COLUMN
 from ..results.file import Results
+from ..results.meanings import meaning
+from ..sweep.runs import is_vector
 
 
 @dataclass(frozen=True)
@@ -60,3 +80,235 @@ class Goal:
     def follow(self, results: Results, nominal: Reading) -> Followed:
         """Its value by results of a changed scene."""
         return Followed(self.read(results).value)
+
+
+JOINT = re.compile(r"(?P<analysis>[^/]+)/joints/(?P<joint>[^/]+)")
+POWER = "power"
+"""What joints have besides their datasets: the power of their motors, W."""
+
+SAME = 1e-6  # of an output step: times that are one
+SUPPORT = 6  # outputs that a value between outputs is made from
+
+
+@dataclass(frozen=True)
+class History:
+    """`values` (T, columns) at `time` (T,), s; of a vector its length, one column."""
+
+    name: str
+    unit: str
+    time: Array
+    values: Array
+
+    def at(self, t: float, column: int, every: int = 1) -> float:
+        """The value at t: that of an output, or of the polynomial through the six nearest (Lagrange).
+
+        With `every` = 2 every second of those about t alone is known, without the one next to it.
+        """
+        values, time = self.values[:, column], self.time
+        nearest = int(np.argmin(np.abs(time - t)))
+        if every > 1 and time.size > every * SUPPORT:
+            first = (nearest + 1) % every
+            values, time = values[first::every], time[first::every]
+            nearest = int(np.argmin(np.abs(time - t)))
+        step = time[1] - time[0] if time.size > 1 else 1.0
+        if abs(time[nearest] - t) <= SAME * step:
+            return float(values[nearest])
+        first = int(np.clip(np.searchsorted(time, t) - SUPPORT // 2, 0, max(0, time.size - SUPPORT)))
+        x, y = time[first : first + SUPPORT], values[first : first + SUPPORT]
+        parts = [yk * np.prod([(t - xj) / (xk - xj) for xj in x if xj != xk]) for xk, yk in zip(x, y, strict=True)]
+        return float(sum(parts))
+
+
+def read_history(results: Results, name: str, option: str) -> History:
+    """The history that `name` means; without an analysis in front it is of the first one that the results have.
+
+    Raises `InputError`, with the `option` that names it, where there is none.
+    """
+    match = COLUMN.fullmatch(name)
+    wanted = match["dataset"] if match else name
+    found = _known(results).get(wanted.replace("/", "."))
+    if found is None:
+        known = [key for key in _known(results) if "." in key]
+        raise InputError(
+            f'{option}: expected the name of a history, such as "{_example(known)}", found'
+            f' "{wanted}"{did_you_mean(wanted.replace("/", "."), known)}'
+        )
+    values = _power(results, found) if found.endswith(f"/{POWER}") else results.data(found)
+    if match:
+        k = int(match["column"])
+        if k >= values.shape[1]:
+            raise InputError(f'{option}: expected a column below {values.shape[1]} of "{wanted}", found {k}')
+        values = values[:, k : k + 1]
+    elif is_vector(results, found, values):
+        values = np.linalg.norm(values, axis=1, keepdims=True)
+    return History(name, _unit(results, found), results.time(found), as_floats(values))
+
+
+def _known(results: Results) -> dict[str, str]:
+    """Datasets over time by the names they go by, with dots; those of the first analysis without its name, too."""
+    found = [f"{analysis}/{name}" for analysis in results.analyses for name in _histories(results, analysis)]
+    found += [f"{m[0]}/{POWER}" for m in map(JOINT.match, found) if m and f"{m[0]}/moment" in results]
+    by_name = {name.replace("/", "."): name for name in found}
+    first = f"{results.analyses[0]}/" if results.analyses else "/"
+    short = {name.removeprefix(first).replace("/", "."): name for name in found if name.startswith(first)}
+    return short | by_name
+
+
+def _histories(results: Results, analysis: str) -> list[str]:
+    """Those over the outputs, and of closed loops those over the samples."""
+    control = results.names(f"{analysis}/control")
+    samples = len(results[f"{analysis}/control/time"]) if control else 0
+    of_loop = [f"control/{name}" for name in control if len(results[f"{analysis}/control/{name}"]) == samples]
+    return list(dict.fromkeys([*results.histories(analysis), *of_loop]))
+
+
+def _power(results: Results, name: str) -> Array:
+    """(T, 1) W: force times rate, summed over the coordinates of the joint; of the motor where a gear gives."""
+    joint = name.removesuffix(f"/{POWER}")
+    rate = "motor_rate" if f"{joint}/motor_rate" in results else "rate"
+    power = results.data(f"{joint}/moment") * results.data(f"{joint}/{rate}")
+    return as_floats(power.sum(axis=1, keepdims=True))
+
+
+def _unit(results: Results, name: str) -> str:
+    """Where the dataset has one only; of a joint that of its coordinates, where these are all angles or all ways."""
+    if name.endswith(f"/{POWER}"):
+        return "W"
+    known = meaning(name.partition("/")[2])
+    if known is None or "," not in known.unit:
+        return known.unit if known is not None else ""
+    match = JOINT.match(name)
+    kinds = {str(joint["name"]): str(joint["type"]) for joint in results.scene["joint"]} if match else {}
+    if match is None or match["joint"] not in kinds:
+        return ""
+    units = set(JOINT_TYPES[kinds[match["joint"]]].units)  # types that the plane has too have the same there
+    turning, sliding = known.unit.split(", ")
+    return {"rad": turning, "m": sliding}[units.pop()] if len(units) == 1 else ""
+
+
+def _example(known: list[str]) -> str:
+    return next((name for name in known if name.startswith("joints.")), known[0] if known else "tip_error")
+
+
+NEAR = 0.5  # of the largest value: local peaks that have a window of their own
+MOST = 12  # of them: vibrations have thousands
+COARSE = 2  # every second output: what a peak is with these tells how well all of them resolve it
+NOISE = 1e-6  # of a peak: a valley that is less deep lies between no two peaks
+
+
+@dataclass(frozen=True)
+class Peak(Goal):
+    """The largest absolute value of a history, of any of its columns; of vectors their length."""
+
+    text: str
+    name: str
+
+    @property
+    def analysis(self) -> str:  # type: ignore[override]
+        """The first part of the name."""
+        return self.name.replace("/", ".").partition(".")[0]
+
+    def read(self, results: Results) -> Reading:
+        """The value, when it is reached, and in which column."""
+        history = self._history(results)
+        k, column = _largest(self._seen(history).values)
+        sign = -1.0 if history.values[k, column] < 0.0 else 1.0
+        _, time = top_at(history.time, history.values[:, column], k)
+        edge: Literal["", "first", "last"] = "first" if k == 0 else "last" if k == history.time.size - 1 else ""
+        value, coarse = (sign * history.at(time, column, every) for every in (1, COARSE))
+        return Reading(value, history.unit, time, edge, column, sign, coarse=coarse)
+
+    def follow(self, results: Results, nominal: Reading) -> Followed:
+        """At the time, in the column and with the sign of the `nominal` peak."""
+        history = self._history(results)
+        time = {"first": history.time[0], "last": history.time[-1]}.get(nominal.edge, nominal.time)
+        if not history.time[0] <= time <= history.time[-1]:
+            return Followed(float("nan"), f"the run ends at t = {history.time[-1]:g} s")
+        value, coarse = (nominal.sign * history.at(float(time), nominal.column, every) for every in (1, COARSE))
+        return Followed(value, _overtaken(self._seen(history), nominal, float(time), value), coarse)
+
+    def _seen(self, history: History) -> History:
+        """What the largest value is sought in."""
+        return history
+
+    def _history(self, results: Results) -> History:
+        return read_history(results, self.name, f'"{self.text}"')
+
+
+@dataclass(frozen=True)
+class Window:
+    """Outputs of one column after the time `first` and up to `last`, s."""
+
+    column: int
+    first: float
+    last: float
+
+    def mask(self, history: History) -> Array:
+        """(T, columns) 1 within, 0 elsewhere."""
+        of_column = np.arange(history.values.shape[1]) == self.column
+        return np.outer((history.time > self.first) & (history.time <= self.last), of_column).astype(np.float64)
+
+
+@dataclass(frozen=True)
+class PartOfPeak(Peak):
+    """The largest absolute value within a window, or with `outside` in what several windows leave; 0 of nothing."""
+
+    windows: tuple[Window, ...] = ()
+    outside: bool = False
+
+    def follow(self, results: Results, nominal: Reading) -> Followed:
+        """As of any peak; where there is nothing to follow, nothing."""
+        return super().follow(results, nominal) if nominal.value else Followed(0.0)
+
+    def _seen(self, history: History) -> History:
+        mask = np.sum([window.mask(history) for window in self.windows], axis=0)
+        return replace(history, values=history.values * (1.0 - mask if self.outside else mask))
+
+
+def parts(peak: Peak, results: Results) -> tuple[Peak, ...]:
+    """Windows of local peaks that are at least `NEAR` the largest, the `MOST` highest, and what they leave.
+
+    The least values between two of them part their windows, so that each local peak may move within its own.
+    """
+    history = peak._history(results)
+    size = np.abs(history.values)
+    found = [(k, column) for column in range(size.shape[1]) for k in _local(size[:, column], NEAR * float(size.max()))]
+    found = sorted(sorted(found, key=lambda one: -size[one])[:MOST], key=lambda one: (one[1], one[0]))
+    if len(found) < 2:
+        return (peak,)
+    windows: list[Window] = []
+    for column in dict.fromkeys(column for _, column in found):
+        places = [k for k, of in found if of == column]
+        valleys = [a + int(np.argmin(size[a : b + 1, column])) for a, b in pairwise(places)]
+        ends = [-np.inf, *(float(history.time[k]) for k in valleys), np.inf]
+        windows += [Window(column, first, last) for first, last in pairwise(ends)]
+    inner = tuple(PartOfPeak(peak.text, peak.name, (window,)) for window in windows)
+    whole = {window.column for window in windows} == set(range(size.shape[1]))
+    return inner if whole else (*inner, PartOfPeak(peak.text, peak.name, tuple(windows), outside=True))
+
+
+def _local(size: Array, least: float) -> list[int]:
+    """Outputs (T,) where a value of at least `least` > 0 is not below those beside it; of equal ones the first."""
+    padded = np.concatenate([[-np.inf], size, [-np.inf]])
+    high = (padded[1:-1] > padded[:-2]) & (padded[1:-1] >= padded[2:]) & (size >= least) & (size > 0.0)
+    return [int(k) for k in np.flatnonzero(high)]
+
+
+def _largest(values: Array) -> tuple[int, int]:
+    """Output and column of the largest absolute value, the first one."""
+    k, column = np.unravel_index(int(np.argmax(np.abs(values))), values.shape)
+    return int(k), int(column)
+
+
+def _overtaken(history: History, nominal: Reading, time: float, value: float) -> str:
+    """Where the largest value is, if that is another peak: in another column, of the other sign, or past a valley."""
+    k, column = _largest(history.values)
+    now = history.values[k, column]
+    if abs(now) <= value * (1.0 + NOISE):
+        return ""
+    between = (history.time - time) * (history.time - history.time[k]) <= 0.0
+    same = column == nominal.column and now * nominal.sign > 0.0
+    if same and np.min(nominal.sign * history.values[between, column]) >= value * (1.0 - NOISE):
+        return ""  # the same peak, which moves
+    where = f", column {column}" if history.values.shape[1] > 1 else ""
+    return f"{abs(now):.6g} at t = {history.time[k]:g} s{where}"

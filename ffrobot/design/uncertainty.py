@@ -19,10 +19,18 @@ from ..common.files import AnyPath
 from ..run.watcher import Watcher
 from .designs import Design, Point, runs_of
 from .goals import parse_goal
-from .histories import History, read_history
-from .readings import Goal
-from .spreads import LinearModel, SpreadDesigns, read_spreads, spread_points
-from .statistics import Indices, Statistics, regression_shares, sobol_indices, statistics
+from .readings import Goal, History, read_history
+from .spreads import (
+    Indices,
+    LinearModel,
+    SpreadDesigns,
+    Statistics,
+    read_spreads,
+    regression_shares,
+    sobol_indices,
+    spread_points,
+    statistics,
+)
 from .uncertainty_record import Band, Uncertainty
 
 TOLERANCE = 1e-8  # of runs for gradients, at most: differences of one standard deviation

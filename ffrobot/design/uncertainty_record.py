@@ -15,8 +15,7 @@ from ..pictures.studies.diagrams import Bars, Diagram, Series
 from ..pictures.studies.study import StudyTable
 from .finding import CsvFile, Finding, Section, failed_runs, file_name, floats, numbers, with_unit
 from .readings import Reading
-from .spreads import Spread
-from .statistics import LEVELS, Indices, Statistics
+from .spreads import LEVELS, Indices, Spread, Statistics
 
 NAMES = tuple(f"{100 * level:g}%" for level in LEVELS)
 ROUNDING = 1e-13  # of a goal: smaller deviations are none

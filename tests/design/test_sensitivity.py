@@ -8,7 +8,7 @@ import pytest
 from small_robots import SWING, TUBE
 
 import ffrobot
-from ffrobot.design.histories import read_history
+from ffrobot.design.readings import read_history
 from ffrobot.sweep.files import set_key, value_of
 
 PLANE = SWING | {

@@ -10,8 +10,16 @@ from scipy.stats import norm, qmc
 from small_robots import ARM, MASS, PAYLOAD
 
 import ffrobot
-from ffrobot.design.spreads import LinearModel, Spread, parse_spread, spread_points
-from ffrobot.design.statistics import LEVELS, regression_shares, sobol_indices, statistics
+from ffrobot.design.spreads import (
+    LEVELS,
+    LinearModel,
+    Spread,
+    parse_spread,
+    regression_shares,
+    sobol_indices,
+    spread_points,
+    statistics,
+)
 
 MOMENT = "joints.shoulder.moment"
 SLOPES = np.array([9.81 * 0.3 + 2.0 * 0.3**2, 9.81 * 0.6 + 2.0 * 0.6**2])
