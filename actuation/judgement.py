@@ -17,8 +17,8 @@ from ..mbs.scene.analysis import Analysis
 from .feasibility import Feasibility, ModalMotion, PatchFeasibility, Unsupplied, judge_patches, seen_at_points
 from .motors import judge_motors
 from .patches.link_patches import LinkPatches, on_kept_modes, with_count
+from .patches.reach import Voltages, voltage_gain
 from .patches.records import PztLayout
-from .patches.voltages import Voltages, voltage_gain
 
 ROUNDING = 1e-6  # of the largest modal force: less is what ill-conditioned patches leave
 NEGLIGIBLE = 1e-6  # of the length of a link, of a deflection; rad

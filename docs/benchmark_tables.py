@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from ffrobot.bench.record import as_text
+from ffrobot.bench.campaign import as_text
 
 INTRODUCTION = """# What was measured
 

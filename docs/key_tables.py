@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from ffrobot.scene.unsupported import UNSUPPORTED
+from ffrobot.scene.checks import UNSUPPORTED
 from ffrobot.schema import scene_in, schema
 
 INTRODUCTION = {

@@ -14,8 +14,8 @@ from checkpoint_scenes import checkpoint_scene
 from ffrobot.common.errors import InputError
 from ffrobot.common.rotations import exponential, quaternions
 from ffrobot.mbs.fields.orientations import OrientationLaw
+from ffrobot.scene.checks import UNSUPPORTED
 from ffrobot.scene.load import validated_scene
-from ffrobot.scene.unsupported import UNSUPPORTED
 from ffrobot.schema import key_descriptions, scene_in
 
 FOLDER = Path(scene_of.__file__).parent

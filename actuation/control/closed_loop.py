@@ -36,11 +36,10 @@ from .controllers import (
     modal_velocity,
 )
 from .linear_model import LinearModel, state_space
-from .loop_keys import SampledAnalysis
 from .loop_record import between, held_commands, held_until, loop_record, sample_times, times_of_run
 from .margins import lowest_frequency
 from .metrics import Followed, place_of_tip
-from .records import ComputedTorque, JointPid, Lqr, ModalVelocity, PythonController, Sensor
+from .records import ComputedTorque, JointPid, Lqr, ModalVelocity, PythonController, SampledAnalysis, Sensor
 from .records import Controller as Record
 from .robot import Robot, input_names
 from .signals import Sensing, Signal, make_signals, merged

@@ -34,8 +34,7 @@ from ...mbs.analysis.outcome import Outcome
 from ...mbs.model.model import Model
 from ..patches.link_patches import LinkPatches
 from .records import ComputedTorque, JointPid, ModalVelocity
-from .rigid_arm import RigidArm
-from .robot import Robot, estimate
+from .robot import RigidArm, Robot, estimate
 from .signals import Signal
 
 

@@ -29,10 +29,24 @@ import numpy as np
 
 from ...common.arrays import Array, as_floats
 from ...fe_models.modal_body import ModalBody
+from ...mbs.model.body import Body, BodyPoint
+from ...mbs.model.masses import with_line_masses
 from ...mbs.quantities.stress import SectionLoads
-from .layers import LayerLoads, bending_row, felt_rows, layer_loads, own_row, straight_loads
 from .records import PztLayout
-from .sections import STRETCH, TWIST, LinkSections, link_sections, potentials
+from .sections import (
+    STRETCH,
+    TWIST,
+    LayerLoads,
+    LinkSections,
+    bending_row,
+    felt_rows,
+    layer_loads,
+    layer_section,
+    link_sections,
+    own_row,
+    potentials,
+    straight_loads,
+)
 
 SLIVER = 1e-6  # of a patch: what a station cuts off less of stays whole
 GAUSS_POINTS = 4  # products of the cubics of an element are of degree 6
@@ -226,3 +240,50 @@ def _strains(body: ModalBody, x: Array) -> Array:
     h = np.minimum(1e-3 * body.length, 0.5 * np.abs(stations - x[:, None]).min(axis=1))
     rise = potentials(body, x + h) - potentials(body, x - h)
     return as_floats(rise / (2 * h)[:, None, None])
+
+
+@dataclass(frozen=True)
+class StructureEffect:
+    """What patches change of a link, bare → with patches.
+
+    Attributes:
+        mass: (2,) kg.
+        inertia: (2,) about the body's z axis, kg·m².
+        frequency: (2, n) Hz.
+    """
+
+    mass: Array
+    inertia: Array
+    frequency: Array
+
+
+def patched_body(spatial: Body, body: ModalBody, placed: Sequence[Placed]) -> Body:
+    """The link, or a piece of it, with mass and stiffness of patches, as far as layouts say so; it keeps all modes.
+
+    Mass lies on the axis, like that of a beam, with its moment of inertia about the axis, ∫ρ (η² + ζ²) dA. The
+    stiffness is that of the `composite` section.
+    """
+    T, sections = spatial.modal_transform, link_sections(body)
+    points, masses, spins = [], [], []
+    for layout, edges in placed:
+        extent = sections.extent(layout.normal)
+        for place in gauss_points(body, edges) if layout.adds_mass else ():
+            at = body.interpolate(place.x)
+            points.append(BodyPoint(at.position, at.translation @ T, at.rotation @ T))
+            A, _, I = layer_section(layout, extent[place.station])  # noqa: E741
+            line_density = place.weight * (layout.density or 0.0)
+            masses.append(line_density * A)
+            spins.append(line_density * (I + A * layout.width**2 / 12))
+    stiff = [one for one in placed if one.layout.adds_stiffness]
+    added = T.T @ composite(stiff, body).stiffness @ T if stiff else np.zeros((spatial.n_modes, spatial.n_modes))
+    return with_line_masses(spatial, points, np.array(masses), np.array(spins), added)
+
+
+def structure_effect_of(bare: Body, patched: Body) -> StructureEffect:
+    """What the patches change."""
+    pair = (bare, patched)
+    return StructureEffect(
+        np.array([body.mass for body in pair]),
+        np.array([body.inertia[2, 2] for body in pair]),
+        np.array([np.sqrt(body.stiffness) / (2 * np.pi) for body in pair]),
+    )

@@ -11,9 +11,8 @@ from ...common.arrays import Array
 from ...common.errors import InputError
 from ...fe_models.modal_body import ModalBody
 from .composite import Placed, composite, place_of
-from .layers import load_per_volt, own_row, straight_loads
 from .records import PztLayout
-from .sections import LinkSections, link_sections, potentials
+from .sections import LinkSections, link_sections, load_per_volt, own_row, potentials, straight_loads
 
 STEP = 0.1  # of the extent, from one station to the next; less is a taper
 

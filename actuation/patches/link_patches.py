@@ -22,10 +22,19 @@ from ...mbs.model.divided_link import spread_of
 from .composite import Placed
 from .effects import Effects, effects
 from .patches import PatchArray, assembled, check_edges, edges_on_piece, patch_edges
-from .reach import Reach, ReachedModes, check_all_served, reached_modes, served_first, weights
+from .reach import (
+    Reach,
+    ReachedModes,
+    Voltages,
+    allocation,
+    check_all_served,
+    reached_modes,
+    served_first,
+    solve_voltages,
+    weights,
+)
 from .records import PztLayout
 from .sections import check_sections
-from .voltages import Voltages, allocation, solve_voltages
 
 
 @dataclass(frozen=True)

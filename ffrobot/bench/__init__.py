@@ -1,7 +1,6 @@
 """Run time against error, measured: `ffrobot bench`. What needs the source tree is in its tools/bench.
 
-measuring    one solve within a budget of time, and the histories it gives
-errors       how far histories are from a reference, by kind of quantity
+measuring    one solve within a budget of time, its histories, and how far these are from a reference
 precision    a reference, and every integrator at every tolerance: the work-precision diagram
 axes         error of mesh, of the number of modes, of time integration, and of all three
 campaign     what runs in which order, what is written and printed

@@ -15,8 +15,7 @@ from ..fe_models.link_file import link_keys, link_path
 from ..mbs.scene.analysis import TIGHTEST_TOLERANCE, IntegratedAnalysis
 from ..run.watcher import Watcher
 from ..scene.scene import Scene
-from .errors import KINDS, errors
-from .measuring import Run, run, with_analysis
+from .measuring import KINDS, Run, errors, run, with_analysis
 from .precision import Row
 
 Keys = dict[str, Any]

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from ..pictures.figures.plot import write_figure
 from ..pictures.figures.style import legend, line_style, new_axes, style
-from .errors import KINDS
+from .measuring import KINDS
 
 Rows = Sequence[Mapping[str, Any]]
 Curves = Mapping[str, tuple[Sequence[float], Sequence[float]]]

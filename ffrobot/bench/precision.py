@@ -13,8 +13,7 @@ from ..common.errors import SolveError
 from ..mbs.scene.analysis import TIGHTEST_TOLERANCE
 from ..run.watcher import Watcher
 from ..scene.scene import Scene
-from .errors import KINDS, errors
-from .measuring import Run, run, with_analysis
+from .measuring import KINDS, Run, errors, run, with_analysis
 
 INTEGRATORS = ("dopri5", "dop853", "radau", "generalized-alpha", "auto")
 TOLERANCES = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7)

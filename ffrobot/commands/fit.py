@@ -37,8 +37,7 @@ def fit(
     A link vibrates under its reference condition, a robot at the start of its scene. KEY=KEY: common factor.
     Prints uncertainties of the values, and rejects keys that the frequencies cannot distinguish.
     """  # noqa: D301 (click wants the backspace itself)
-    from ..fit.fitting import fit_measured
-    from ..fit.table import print_fit
+    from ..fit.fitting import fit_measured, print_fit
     from ..present.summary import summary_console
     from ..run.inputs import files_of
 

@@ -38,7 +38,7 @@ def feasibility(results_file: Path, analysis: str | None, catalog: Path | None) 
         if catalog is None:
             print_feasibility(results_file, analysis, summary_console())
             return
-        from ..present.motor_choice import print_motor_choice
+        from ..present.feasibility import print_motor_choice
 
         print_motor_choice(results_file, catalog, analysis, summary_console())
 

@@ -16,8 +16,7 @@ from ..common.files import write_atomically
 from ..common.tables import TableWriter
 from ..common.toml_files import load_toml
 from ..common.version import program_version
-from ..pictures.studies.diagrams import Diagram, Numbers
-from ..pictures.studies.study import Study, StudyName, StudyTable, write_study
+from ..pictures.studies.study import Diagram, Numbers, Study, StudyName, StudyTable, write_study
 from ..present.lines import print_table
 
 

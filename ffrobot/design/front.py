@@ -16,7 +16,7 @@ import numpy as np
 from ..common.arrays import Array, as_floats
 from ..common.errors import InputError, SolveError
 from ..common.files import AnyPath
-from ..pictures.studies.diagrams import Diagram, Points
+from ..pictures.studies.study import Diagram, Points
 from ..run.watcher import Watcher
 from .designs import Designs, changes_for, may_repeat, runs_of
 from .evaluations import Evaluated, Evaluations, SpentError

@@ -11,7 +11,7 @@ from ..actuation.catalog import CatalogMotor, choice_of
 from ..common.errors import InputError, did_you_mean, either, quoted
 from ..common.peaks import root_mean_square
 from ..fe_models.modal_body import ModalBody
-from ..present.motor_choice import joint_tasks
+from ..present.feasibility import joint_tasks
 from ..results.file import Results
 from ..sweep.files import value_of
 from .readings import POWER, Followed, Goal, History, Peak, Reading, read_history

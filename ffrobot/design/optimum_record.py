@@ -9,8 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from ..common.arrays import Array, as_floats
-from ..pictures.studies.diagrams import Axis, Diagram, Numbers, Parallel, Progress, State, axis_of_goal
-from ..pictures.studies.study import StudyTable
+from ..pictures.studies.study import Axis, Diagram, Numbers, Parallel, Progress, State, StudyTable, axis_of_goal
 from ..results.verdict import Verdict
 from .evaluations import Evaluated
 from .finding import CsvFile, Finding, Section, numbers, with_unit

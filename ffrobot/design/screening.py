@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from ..common.arrays import Array, Integers, as_floats
 from ..common.errors import InputError, SolveError
 from ..common.files import AnyPath
-from ..pictures.studies.diagrams import Points
+from ..pictures.studies.study import Points
 from ..run.watcher import Watcher
 from .designs import runs_of
 from .finding import CsvFile, Finding, Section, failed_runs, file_name, floats, with_unit

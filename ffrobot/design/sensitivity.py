@@ -5,7 +5,7 @@ differences have no noise but rounding, and central pairs with small steps are e
 (see below). Where they err by more than `AIM`, larger steps follow, as far as these are better.
 
 Otherwise every key takes steps of three sizes to both sides, h, h/2 and h/4 with h one percent, in runs that are
-integrated with a tighter tolerance than the scene's; `differences` has the extrapolation. Where errors are above `AIM`
+integrated with a tighter tolerance than the scene's; `derivatives` has the extrapolation. Where errors are above `AIM`
 and still fall with smaller steps, steps of a quarter follow, twice at most.
 
 Derivatives by runs that take the steps of the base again: a central pair for each key, and two that all share.
@@ -28,7 +28,7 @@ import numpy as np
 from ..common.arrays import Array, as_floats
 from ..common.errors import InputError
 from ..common.files import AnyPath
-from ..pictures.studies.diagrams import Bars, Series
+from ..pictures.studies.study import Bars, Series
 from ..run.watcher import Watcher
 from ..sweep.files import number_at
 from ..sweep.runs import RESULTS

@@ -10,9 +10,8 @@ from typing import Literal
 import numpy as np
 
 from ..common.arrays import Array
-from ..pictures.studies.diagrams import Band as BandDiagram
-from ..pictures.studies.diagrams import Bars, Diagram, Series
-from ..pictures.studies.study import StudyTable
+from ..pictures.studies.study import Band as BandDiagram
+from ..pictures.studies.study import Bars, Diagram, Series, StudyTable
 from .finding import CsvFile, Finding, Section, failed_runs, file_name, floats, numbers, with_unit
 from .readings import Reading
 from .spreads import LEVELS, Indices, Spread, Statistics

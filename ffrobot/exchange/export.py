@@ -22,9 +22,8 @@ from .bodies.mbdyn import fem_text, read_fem
 from .bodies.sid import read_sid, sid_text
 from .fmu.forward_fmu import forward_fmu
 from .fmu.linear_fmu import linear_fmu
-from .motion.joints import csv_text, robot_motion
 from .motion.read_motion import read_motion
-from .motion.rosbag import joint_trajectory_bag, joint_trajectory_text
+from .motion.rosbag import csv_text, joint_trajectory_bag, joint_trajectory_text, robot_motion
 from .urdf.export_urdf import scene_as_urdf
 
 Content = str | bytes | Mapping[str, bytes]

@@ -1,4 +1,6 @@
-"""Where the viewer stands: before a link, before a planar scene, or before a 3D one; and how marks look there."""
+"""Where the viewer stands: before a link, before a planar scene, or before a 3D one; marks there, and colors."""
+
+from __future__ import annotations
 
 from typing import NamedTuple
 
@@ -34,3 +36,8 @@ _RIGHT = np.array([-np.sin(_AZIMUTH), np.cos(_AZIMUTH), 0.0])
 SPACE = View(_RIGHT, np.cross(_TOWARDS, _RIGHT), _TOWARDS)
 _X, _Y, _Z = np.eye(3)
 FRONT, SIDE = View(_X, _Z, -_Y), View(_Y, _Z, _X)  # z goes up, as well; from above it is PLANE
+
+
+# Okabe and Ito, "Color universal design" (2008), without the yellow that paper swallows, and a gray that
+# is seen on light and dark pages for black.
+COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#7A7A7A")

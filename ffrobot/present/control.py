@@ -15,8 +15,7 @@ from ..common.arrays import Array
 from ..mbs.analysis.outcome import Details
 from ..mbs.analysis.static import RobotAtRest
 from ..mbs.solve.joint_conditions import translational_stiffness
-from .closed_loops import LOOP_COLUMNS, loop_row
-from .lines import plain_table
+from .lines import LOOP_COLUMNS, loop_row, plain_table
 
 FREQUENCIES = 5  # that are listed, and damping ratios
 TRANSFERS = 3  # of one motor to one output, whose zeros are listed: those with the slowest to the right

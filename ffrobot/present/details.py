@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.table import Table
 
 from ..actuation.patches.patches import PatchArray
-from ..actuation.patches.voltages import Voltages
+from ..actuation.patches.reach import Voltages
 from ..common.arrays import Array
 from ..mbs.analysis.motors_only import AroundPath, describe_zeros, is_minimum_phase
 from ..mbs.analysis.outcome import Details, Outcome

@@ -18,11 +18,11 @@ from ..common.hdf5 import open_checked
 from ..fe_models.modal_body import Interface, ModalBody
 from ..fe_models.modal_body_file import FORMAT as MODAL_FORMAT
 from ..fe_models.modal_body_file import read_modal_body
-from ..results.control import read_metrics
 from ..results.file import FORMAT as RESULTS_FORMAT
 from ..results.file import status_in_words
+from ..results.linear import read_metrics
 from ..results.meanings import MODAL_BODY, RESULTS, Meaning, meaning
-from .closed_loops import LOOP_COLUMNS, loop_row
+from .lines import LOOP_COLUMNS, loop_row
 
 
 def describe(path: Path) -> str:

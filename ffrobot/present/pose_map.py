@@ -7,8 +7,8 @@ from collections.abc import Iterator
 import numpy as np
 from rich.console import Console
 
+from ..map.map_file import quantities
 from ..map.pose_map import STATUS, PoseMap
-from ..map.quantities import quantities
 from .lines import print_table
 
 

@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..actuation.motors import MotorFeasibility
-from ..results.rounded import ROUND_OFF, millimeters, number
-from ..results.verdict import AnalysisVerdict, Verdict
+from ..results.verdict import ROUND_OFF, AnalysisVerdict, Verdict, millimeters, number
 from .lines import alike
 
 if TYPE_CHECKING:

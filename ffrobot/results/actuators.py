@@ -11,12 +11,11 @@ import numpy as np
 
 from ..actuation.feasibility import Feasibility, Unsupplied
 from ..actuation.motors import MotorFeasibility
+from ..actuation.patches.composite import StructureEffect
 from ..actuation.patches.patches import PatchArray
+from ..actuation.patches.reach import Voltages
 from ..actuation.patches.records import PztLayout
-from ..actuation.patches.structure import StructureEffect
-from ..actuation.patches.voltages import Voltages
-from ..actuation.point_forces import PointForces
-from ..actuation.points import PointSet
+from ..actuation.points import PointForces, PointSet
 from ..common.arrays import Array
 from ..mbs.quantities.motion import RobotMotion
 from ..mbs.scene.space import SPACES, Space

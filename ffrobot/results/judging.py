@@ -14,10 +14,8 @@ from ..common.arrays import Array
 from .actuators import read_motors, read_unsupplied
 from .joints import Coordinates, Scene, labelled_coordinates
 from .linear import held_in_words
-from .peaks import POWER, peak_of
-from .rounded import millimeters
-from .tool_error import off_path_in_words, tool_error
-from .verdict import AnalysisVerdict, PatchNeed, Place, Verdict
+from .meanings import POWER, peak_of
+from .verdict import AnalysisVerdict, PatchNeed, Place, Verdict, millimeters, off_path_in_words, tool_error
 
 FAR_BEYOND = 10.0  # times their limit: no realistic patch supplies that
 AT_REST = 0.3  # of the mean rate of a path: what its first and last steps have at most

@@ -1,11 +1,11 @@
-"""Linear models in results files, and in files of their own."""
+"""Linear models, robots with joints at rest, and closed loops in results files."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import h5py
 import numpy as np
@@ -18,6 +18,8 @@ from ..mbs.solve.joint_conditions import COMPLIANT, LOCKED, translational_stiffn
 
 if TYPE_CHECKING:  # most scenes have none of these
     from ..actuation.control.linear_models import LinearModels
+    from ..actuation.control.loop_record import LoopRecord
+    from ..actuation.control.metrics import Metrics
     from ..mbs.analysis.static import RobotAtRest
 
 MATRICES = ("A", "B", "C", "D", "mass", "transformation")
@@ -155,3 +157,26 @@ def save_models(models: Sequence[LinearModel], path: Path) -> None:
         key: np.array([getattr(model, key) for model in models]) for key in (*MATRICES, "time")
     }
     save_arrays(models[0].arrays() | stacked, path)
+
+
+def write_loop(group: h5py.Group, _motion: RobotMotion, record: LoopRecord) -> None:
+    """Of an analysis: tip_error at its outputs; in control/, samples, with metrics and names as attributes."""
+    group["tip_error"] = record.tip_error
+    group = group.create_group("control")
+    for key in ("time", "readings", "reference", "commands", "wanted"):
+        group[key] = getattr(record, key)
+    group.attrs["inputs"] = list(record.inputs)
+    group.attrs["outputs"] = list(record.outputs)
+    group.attrs["warnings"] = list(record.warnings)
+    group.attrs.update(vars(record.metrics))
+    group.attrs["advice"] = list(record.advice)
+    if record.margins is not None:
+        found = record.margins
+        group.attrs.update(spectral_radius=found.radius, gain_margin=found.gain, delay_margin=found.delay)
+
+
+def read_metrics(attributes: Mapping[str, Any]) -> Metrics:
+    """The metrics among the attributes of control/."""
+    from ..actuation.control.metrics import Metrics
+
+    return Metrics(**{key: attributes[key] for key in Metrics.__dataclass_fields__ if key in attributes})

@@ -61,7 +61,7 @@ class LinkAccess(Datasets):
 
     def modal(self, analysis: str, body: str) -> Array:
         """P (T, n) of a flexible body in the modes of its modal body file, however many of them the solve used."""
-        from .bodies import (
+        from .motion import (
             read_modal,  # here, as below: what writes a group loads the core, which reading can do without
         )
 
@@ -70,7 +70,7 @@ class LinkAccess(Datasets):
 
     def stress_recovery(self, analysis: str, body: str) -> Recovery:
         """What stresses of a flexible body are computed from, for `mbs.quantities.stress`."""
-        from .bodies import read_recovery
+        from .motion import read_recovery
 
         self[f"{analysis}/bodies/{body}/modal"]  # raises where there is none
         return read_recovery(self._file[analysis], body)

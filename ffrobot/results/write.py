@@ -20,12 +20,10 @@ from ..mbs.quantities.motion import RobotMotion
 from ..mbs.solve.redundancy import resolving_joints
 from ..run.solution import AnalysisResult, Solution
 from .actuators import write_actuation, write_placement, write_point_forces, write_structure, write_tracking
-from .bodies import write_bending, write_bodies, write_stress
-from .control import write_loop
 from .file import FORMAT
-from .forces import write_joints, write_paths
-from .linear import write_joint_conditions, write_linear
-from .peaks import write_peaks
+from .linear import write_joint_conditions, write_linear, write_loop
+from .meanings import write_peaks
+from .motion import write_bending, write_bodies, write_joints, write_paths, write_stress
 from .resume import write_state
 
 FORMAT_VERSION = 1

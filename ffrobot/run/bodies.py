@@ -10,10 +10,9 @@ from typing import Protocol, TypeVar
 
 import numpy as np
 
-from ..actuation.patches.composite import Placed
+from ..actuation.patches.composite import Placed, StructureEffect, patched_body, structure_effect_of
 from ..actuation.patches.link_patches import by_body, link_patches, placed_patches
 from ..actuation.patches.records import PztLayout
-from ..actuation.patches.structure import StructureEffect, patched_body, structure_effect_of
 from ..common.errors import InputError, did_you_mean, of_file, quoted
 from ..fe_models.link_records import FAMILIES, Family
 from ..fe_models.modal_body import ModalBody

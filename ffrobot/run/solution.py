@@ -12,8 +12,7 @@ import numpy as np
 
 from ..actuation.patches.link_patches import LinkPatches
 from ..actuation.patches.patches import PatchArray
-from ..actuation.point_forces import PointForces
-from ..actuation.points import PointSet
+from ..actuation.points import PointForces, PointSet
 from ..common.arrays import Array
 from ..fe_models.modal_body import ModalBody
 from ..mbs.analysis.gears import unresolved_gears

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from ..actuation.context import ActuatedContext
 from ..actuation.feasibility import Feasibility, quasi_static_shift
-from ..actuation.point_forces import forces_at_points, solve_points
+from ..actuation.points import forces_at_points, solve_points
 from ..common.arrays import Array
 from ..common.errors import FfrobotError, InputError, SolveError, of_file
 from ..mbs.analysis.outcome import Outcome

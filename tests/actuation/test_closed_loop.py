@@ -10,7 +10,7 @@ from scipy.linalg import expm, solve_discrete_are
 from ffrobot.actuation.context import ActuatedContext
 from ffrobot.actuation.control.linear_model import sampled
 from ffrobot.actuation.control.lqr import gains
-from ffrobot.actuation.control.rigid_arm import RigidArm
+from ffrobot.actuation.control.robot import RigidArm
 from ffrobot.actuation.control.signals import volts_on_file
 from ffrobot.common.errors import InputError, SolveError
 from ffrobot.common.python_files import python_allowed

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from patches_on_links import SCENE, planar_body
 
+from ffrobot.actuation.patches.composite import patched_body, structure_effect_of
 from ffrobot.actuation.patches.link_patches import placed_patches
 from ffrobot.actuation.patches.records import PztLayout
-from ffrobot.actuation.patches.structure import patched_body, structure_effect_of
 from ffrobot.fe_models.link import cached_modal_body
 
 E, RHO, H, B = 2.068427e11, 7850.0, 0.015, 0.025

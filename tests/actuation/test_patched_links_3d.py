@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from ffrobot.actuation.patches.composite import patched_body
 from ffrobot.actuation.patches.link_patches import check_reach, link_patches, placed_patches
 from ffrobot.actuation.patches.records import Fibres, PztLayout, fibre_lamina
-from ffrobot.actuation.patches.structure import patched_body
 from ffrobot.common.errors import InputError
 from ffrobot.common.validation import validate
 from ffrobot.fe_models.beam.section_stress import surface_shear

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from ffrobot.actuation.point_forces import find_driving_forces
+from ffrobot.actuation.points import find_driving_forces
 from ffrobot.run.solve import solve_scene
 
 SCENE = """

@@ -6,7 +6,7 @@ from four_bar import SIDES, closed, in_3d, planar
 from scipy.interpolate import CubicSpline
 
 import ffrobot
-from ffrobot.actuation.control.rigid_arm import RigidArm
+from ffrobot.actuation.control.robot import RigidArm
 from ffrobot.mbs.model.cut import cut_damping, cut_resistance
 from ffrobot.mbs.model.model import build_model
 from ffrobot.mbs.solve.start import undeformed_posture

@@ -8,8 +8,18 @@ import tomli_w
 from small_robots import SWING
 
 import ffrobot
-from ffrobot.pictures.studies.diagrams import Axis, Band, Bars, Parallel, Points, Progress, axis_of_goal, wrapped
-from ffrobot.pictures.studies.study import read_study, study_files
+from ffrobot.pictures.studies.study import (
+    Axis,
+    Band,
+    Bars,
+    Parallel,
+    Points,
+    Progress,
+    axis_of_goal,
+    read_study,
+    study_files,
+    wrapped,
+)
 
 OUTER, INNER = "links.arm.geometry.section.outer", "links.arm.geometry.section.inner"
 DENSITY = "links.arm.material.density"

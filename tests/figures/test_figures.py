@@ -14,11 +14,10 @@ from ffrobot.common.errors import InputError
 from ffrobot.mbs.joints.joint import MotorLimits
 from ffrobot.pictures.figures.figure_file import Curve, FigureRecord, load_figures
 from ffrobot.pictures.figures.plot import plot_results
-from ffrobot.pictures.figures.reading import curve_points
+from ffrobot.pictures.figures.shared import curve_points, limit_curves
 from ffrobot.pictures.figures.style import new_axes
 from ffrobot.pictures.figures.time_history import draw_time_history
 from ffrobot.pictures.motion import visible_exaggeration
-from ffrobot.pictures.torque_speed import limit_curves
 from ffrobot.results.file import Results
 
 CASES = Path(__file__).parents[2] / "cases"

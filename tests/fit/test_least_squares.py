@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from ffrobot.common.errors import InputError
+from ffrobot.fit.fitting import remarks
 from ffrobot.fit.least_squares import fit_frequencies
-from ffrobot.fit.table import remarks
 
 LABELS = [f"mode {k}" for k in range(1, 6)]
 KEYS = ("k1", "k2", "mass")

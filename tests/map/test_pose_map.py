@@ -14,9 +14,8 @@ from strip_link import LINK
 from ffrobot import solve
 from ffrobot.common.errors import InputError
 from ffrobot.map import pose_map
-from ffrobot.map.map_file import write_map
+from ffrobot.map.map_file import quantities, write_map
 from ffrobot.map.pose_map import make_map, plan_map
-from ffrobot.map.quantities import quantities
 from ffrobot.pictures.studies.pose_map import draw_map
 from ffrobot.run.watcher import Watcher
 

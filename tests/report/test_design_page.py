@@ -4,8 +4,19 @@ import numpy as np
 import pytest
 
 from ffrobot.pictures.report import write_report
-from ffrobot.pictures.studies.diagrams import Axis, Band, Bars, Parallel, Points, Progress, Series, axis_of_goal
-from ffrobot.pictures.studies.study import Study, StudyTable, write_study
+from ffrobot.pictures.studies.study import (
+    Axis,
+    Band,
+    Bars,
+    Parallel,
+    Points,
+    Progress,
+    Series,
+    Study,
+    StudyTable,
+    axis_of_goal,
+    write_study,
+)
 
 STATES = ("exceeded", "failed", "kept", "best")
 MASSES = (3.0, None, 2.5, 2.0)

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from ffrobot.pictures.body_surface import AMPLITUDE, body_surface, drawn_mode
-from ffrobot.pictures.coarse_surface import coarsened
+from ffrobot.pictures.body_surface import AMPLITUDE, body_surface, coarsened, drawn_mode
 from ffrobot.pictures.report.modes import MAX_TRIANGLES
 from ffrobot.results.file import Results
 

@@ -16,8 +16,8 @@ from ffrobot.common.errors import InputError, SolveError
 from ffrobot.common.version import program_version
 from ffrobot.pictures.figures.shared import bending_points
 from ffrobot.pictures.figures.standard import standard_figures
+from ffrobot.pictures.markers import targets
 from ffrobot.pictures.motion import topology
-from ffrobot.pictures.path_targets import targets
 from ffrobot.pictures.report import write_report
 from ffrobot.pictures.report.charts import MAX_POINTS, kept_outputs
 from ffrobot.pictures.report.histories import history_charts

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from ffrobot.bench.errors import relative
+from ffrobot.bench.measuring import relative
 from ffrobot.bench.precision import PATIENCE, Point, Reference, Row, fastest, repeat_point
 from ffrobot.common.errors import InputError, SolveError
 from ffrobot.run.watcher import Watcher

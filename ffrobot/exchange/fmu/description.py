@@ -1,10 +1,13 @@
-"""modelDescription.xml of FMI 2.0 for linear models and forward motions."""
+"""What FMUs (FMI 2.0) of linear models and forward motions say of themselves, and the archive that they are in."""
 
 from __future__ import annotations
 
+import re
+import zipfile
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from io import BytesIO
 from itertools import count
 from xml.etree import ElementTree
 
@@ -171,3 +174,30 @@ def _structure(parent: ElementTree.Element, unit: Unit) -> None:
 def _unknowns(first: int, matrix: Array, columns: Array) -> list[tuple[int, Iterable[int]]]:
     """Index of each row's variable, and of those that it depends on."""
     return [(first + k, columns[row != 0].tolist()) for k, row in enumerate(matrix)]
+
+
+LONGEST = 60  # characters of a name in the identifier
+DATE = (1980, 1, 1, 0, 0, 0)  # of all files in it: the same model is the same FMU, byte for byte
+PLATFORMS: Mapping[tuple[str, str], tuple[str, str]] = {
+    ("linux", "x86_64"): ("linux64", ".so"),
+    ("linux", "i686"): ("linux32", ".so"),
+    ("darwin", "x86_64"): ("darwin64", ".dylib"),
+    ("darwin", "arm64"): ("darwin64", ".dylib"),
+    ("win32", "AMD64"): ("win64", ".dll"),
+}
+"""By system and processor: FMI 2.0's name of the platform, and the end of a library's name there."""
+
+
+def identifier_of(scene: str, analysis: str) -> str:
+    """Of C, and in the name of the binary."""
+    plain = re.sub(r"[^A-Za-z0-9_]", "_", f"{scene}_{analysis}")[:LONGEST]
+    return plain if plain[0].isalpha() else f"robot_{plain}"[:LONGEST]
+
+
+def zipped(content: Mapping[str, bytes]) -> bytes:
+    """Files by name in one archive."""
+    archive = BytesIO()
+    with zipfile.ZipFile(archive, "w", zipfile.ZIP_DEFLATED) as file:
+        for name, data in content.items():
+            file.writestr(zipfile.ZipInfo(name, DATE), data, zipfile.ZIP_DEFLATED)
+    return archive.getvalue()

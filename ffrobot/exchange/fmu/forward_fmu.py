@@ -20,8 +20,7 @@ from ...run.solve import prepare_scene
 from ...run.watcher import Watcher
 from ...scene.load import load_scene
 from ...scene.scene import Scene
-from .archive import PLATFORMS, identifier_of, zipped
-from .description import forward_description
+from .description import PLATFORMS, forward_description, identifier_of, zipped
 from .forward_model import AXES, ForwardUnit, forward_unit, has_own_coordinates, voltages_of_patches
 
 logger = logging.getLogger(__name__)

@@ -21,8 +21,7 @@ from ...actuation.control.linear_model import LinearModel
 from ...common.arrays import Array
 from ...common.errors import InputError
 from ...results.file import Results
-from .archive import PLATFORMS, identifier_of, zipped
-from .description import SOURCE, Unit, model_description
+from .description import PLATFORMS, SOURCE, Unit, identifier_of, model_description, zipped
 from .variables import inputs_of, joint_units, outputs_of, states_of
 
 

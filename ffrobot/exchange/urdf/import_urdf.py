@@ -19,12 +19,11 @@ from ...fe_models.link_file import LinkTable
 from ...mbs.model.body import Body, from_modal_body
 from .bodies import is_possible, mechanism
 from .flexible import FlexibleLink, flexible_link
-from .meshes import MeshMass, mesh_masses, mesh_path
 from .names import Names, toml_text
 from .read import read_urdf
 from .robot import Inertial, MeshFile, Robot
 from .scene import SceneOfRobot
-from .shape_masses import Filling, with_masses, without_mass
+from .shape_masses import Filling, MeshMass, mesh_masses, mesh_path, with_masses, without_mass
 
 SAME = 1e-9  # relative: less is round-off
 

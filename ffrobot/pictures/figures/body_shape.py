@@ -12,8 +12,7 @@ from ...common.arrays import Array, Integers
 from ...fe_models.modal_body import ModalBody
 from ...mesh.inspection import Inspection
 from ..body_surface import AMPLITUDE, body_surface, drawn_mode
-from ..projection import LINK, View
-from .palette import COLORS
+from ..projection import COLORS, LINK, View
 from .parallel import EDGE, directions, lit, normals, projected
 from .style import ORDERED
 

@@ -15,14 +15,12 @@ from matplotlib.figure import Figure
 
 from ...common.arrays import Array, Indices, Integers
 from ...results.file import Results
-from ..coarse_surface import coarsened, triangles_of
-from ..markers import Marker, ground_places, joint_markers, tool_marker, tool_markers
+from ..body_surface import coarsened, triangles_of
+from ..markers import Marker, Target, ground_places, joint_markers, targets, tool_marker, tool_markers
 from ..motion import moving_bodies, size_of, visible_exaggeration
 from ..movie_file import Frame, MovieOptions, check_movie, movie_outputs, moving_analysis, write_movie
-from ..path_targets import Target, targets
-from ..projection import AXIS_LENGTH, PLANE, SPACE, TOOL_COLORS, TOOL_LENGTH
+from ..projection import AXIS_LENGTH, COLORS, PLANE, SPACE, TOOL_COLORS, TOOL_LENGTH
 from ..shapes import surface_shape, thickened
-from .palette import COLORS
 from .parallel import directions, lit, normals, projected
 from .style import literal, style
 

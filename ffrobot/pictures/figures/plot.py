@@ -17,14 +17,11 @@ from ...common.files import check_folder, write_atomically
 from ...fe_models.modal_body_file import is_modal_body_file, read_modal_body
 from ...results.file import Results
 from .body_shape import draw_mesh, draw_modes
-from .configurations import draw_configurations, draw_path
+from .configurations import draw_bode, draw_configurations, draw_path, draw_robot_modes
 from .figure_file import FigureRecord, load_figures
-from .linear import draw_bode, draw_robot_modes
-from .placement import draw_placement
 from .standard import main_figures, standard_figures
 from .style import literal, new_axes, style
-from .time_history import draw_time_history
-from .torque_speed import draw_torque_speed
+from .time_history import draw_placement, draw_time_history, draw_torque_speed
 
 DRAW = {"time": draw_time_history, "placement": draw_placement, "torque-speed": draw_torque_speed}
 

@@ -1,12 +1,19 @@
-"""What the standard figures are made of: curves, names, points that bend."""
+"""What standard figures and charts of reports are made of: curves, names, points that bend, limits of motors."""
 
 from __future__ import annotations
 
+import csv
 import hashlib
+from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 
+from ...common.arrays import Array
+from ...common.errors import InputError
+from ...mbs.joints.joint import MotorLimits
 from ...results.file import Results
+from ...results.joints import joint_coordinates
 from .figure_file import Curve
 
 NO_DEFLECTION = 1e-6  # of the largest: points that the reference condition fixes are there but for round-off
@@ -50,3 +57,70 @@ def file_name(*parts: str) -> str:
     plain = "".join(c if c.isascii() and (c.isalnum() or c in ".-") else "_" for c in joined)
     lost = any(c != p and c not in " /_" for c, p in zip(joined, plain, strict=True))
     return f"{plain}-{hashlib.sha256(joined.encode()).hexdigest()[:6]}" if lost else plain
+
+
+def curve_points(results: Results, curve: Curve, scale: float) -> tuple[Array, Array]:
+    """Of a curve over time (s), or over its `x`: x (T,), and `scale` times its values (T, columns)."""
+    values = results.data(curve.data)
+    if curve.magnitude:
+        values = np.linalg.norm(values, axis=1)[:, None]
+    x = results.time(curve.data) if curve.x is None else results.data(curve.x)[:, 0]
+    if len(x) != len(values):
+        raise InputError(
+            f'{results.path}: expected as many values in "{curve.x}" as in "{curve.data}" ({len(values)}), found'
+            f" {len(x)}"
+        )
+    return x, scale * values
+
+
+def read_points(path: Path, column: str) -> tuple[Array, Array]:
+    """Times and values of one column of a CSV file whose first column is the time; lines with # are comments."""
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+        rows = list(csv.reader(line for line in text.splitlines() if line and not line.startswith("#")))
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise InputError(f"{path}: cannot read the points: {getattr(error, 'strerror', None) or error}") from None
+    if not rows or column not in rows[0]:
+        header = rows[0] if rows else []
+        raise InputError(f'{path}: expected the column "{column}", found {header}')
+    k = rows[0].index(column)
+    try:
+        return np.array([float(row[0]) for row in rows[1:]]), np.array([float(row[k]) for row in rows[1:]])
+    except (ValueError, IndexError) as error:
+        raise InputError(f'{path}: expected numbers in the column "{column}": {error}') from None
+
+
+MARGIN = 1.15  # of the largest moment or speed, where no limit ends a curve
+POINTS = 60  # of that curve
+
+
+def limits_of(results: Results, joint: str, datasets: Sequence[str]) -> MotorLimits:
+    """Of the motor of a joint of which `datasets` such as "…/moment" or "…/moment[1]" are drawn; infinite without any.
+
+    Of several coordinates of a joint each has its limits: those of the one that the first dataset is of.
+    """
+    column = next((name.partition("[")[2].rstrip("]") for name in datasets), "")
+    coordinates, number = joint_coordinates(results.scene, joint), int(column or 0)
+    return coordinates[number].limits if number < len(coordinates) else MotorLimits()
+
+
+def limit_curves(limits: MotorLimits, speed: float, moment: float) -> Array:
+    """Where |τ| ≤ τ_max, |γ̇| ≤ γ̇_max and |τ γ̇| ≤ P_max end: (n, 2) speeds and moments, NaN between pieces.
+
+    In all four quadrants; where no limit ends a curve, it goes as far as the data, `speed` and `moment` at most, ask
+    for. Empty without limits.
+    """
+    power = limits.power if np.isfinite(limits.power) else 0.0  # without that limit nothing asks for more than the data
+    speed_end = limits.speed if np.isfinite(limits.speed) else MARGIN * max(speed, power / limits.moment, 1e-300)
+    moment_end = limits.moment if np.isfinite(limits.moment) else MARGIN * max(moment, power / speed_end, 1e-300)
+    pieces = []
+    if np.isfinite(limits.moment):
+        pieces.append(np.array([[0.0, limits.moment], [min(speed_end, limits.power / limits.moment), limits.moment]]))
+    if np.isfinite(limits.power) and limits.power / moment_end < speed_end:
+        rates = np.geomspace(limits.power / moment_end, speed_end, POINTS)
+        pieces.append(np.column_stack([rates, limits.power / rates]))
+    if np.isfinite(limits.speed):
+        pieces.append(np.array([[limits.speed, min(moment_end, limits.power / limits.speed)], [limits.speed, 0.0]]))
+    gap = np.full((1, 2), np.nan)
+    signs = [np.array(pair) for pair in ((1, 1), (-1, 1), (-1, -1), (1, -1))]
+    return np.concatenate([np.empty((0, 2)), *(part for sign in signs for p in pieces for part in (sign * p, gap))])

@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import ScalarFormatter
 
-from .palette import COLORS
+from ..projection import COLORS
 
 SIZE = (3.5, 2.7)  # inches: one column of a journal page
 

@@ -1,4 +1,4 @@
-"""Figures over time: motion, deflections, forces, moments, voltages."""
+"""Figures of curves: histories over time, torques over speed, and what patches reach along a link."""
 
 from __future__ import annotations
 
@@ -9,10 +9,11 @@ from matplotlib.axes import Axes
 from matplotlib.image import NonUniformImage
 
 from ...common.arrays import Array
+from ...common.errors import InputError
 from ...results.file import Results
+from ..projection import COLORS
 from .figure_file import Curve, FigureRecord
-from .palette import COLORS
-from .reading import curve_points, read_points
+from .shared import curve_points, limit_curves, limits_of, read_points
 from .style import DASHES, legend, line_style, shades
 
 MANY, OFTEN = 4, 0.2  # columns, and part of the time at limits, above which lines hide each other
@@ -86,3 +87,41 @@ def _draw_map(axes: Axes, time: Array, values: Array, label: str, figure: Figure
     axes.grid(visible=False)
     axes.set_ylabel(label)
     axes.figure.colorbar(picture, ax=axes, label=figure.y_label)
+
+
+def draw_torque_speed(axes: Axes, figure: FigureRecord, results: Results) -> None:
+    """Draw every curve of `figure` over its `x`, and the limits of the motor of `figure.joint`."""
+    assert figure.joint is not None
+    speed = moment = 0.0
+    for k, curve in enumerate(figure.curves):
+        x, values = curve_points(results, curve, figure.scale)
+        axes.plot(x, values[:, 0], label=curve.label, **line_style(k, len(x), alone=len(figure.curves) == 1))
+        speed, moment = max(speed, float(abs(x).max())), max(moment, float(abs(values).max()))
+    limits = limit_curves(limits_of(results, figure.joint, [curve.data for curve in figure.curves]), speed, moment)
+    if len(limits):
+        axes.plot(*limits.T, color=COLORS[1], linestyle="--", label="limits")
+    axes.set_xlabel(figure.x_label)
+    axes.set_ylabel(figure.y_label)
+    legend(axes)
+
+
+def draw_placement(axes: Axes, figure: FigureRecord, results: Results) -> None:
+    """Reach of a single patch along the link by mode; below, the patches found and those spread evenly."""
+    group = f"{figure.analysis}/placement"
+    if not results.has(group):
+        raise InputError(
+            f'{results.path}: figure "{figure.name}": expected an analysis of kind = "placement", found'
+            f' "{figure.analysis}"'
+        )
+    body = results.attributes(group)["body"]
+    length = next(layout["length"] for layout in results.scene["pzt"] if layout["body"] == body)
+    centers, frequency = results[f"{group}/candidates"], results[f"{group}/frequency"]
+    for reach, f, color in zip(results[f"{group}/candidate_reach"], frequency, shades(len(frequency)), strict=True):
+        axes.plot(centers, reach, color=color, label=f"{f:.4g} Hz")
+    for k, (key, label) in enumerate((("best", "found"), ("even", "evenly spaced"))):
+        places = [(x - length / 2, length) for x in results[f"{group}/{key}/centers"]]
+        axes.broken_barh(places, (-0.12 * (k + 1), 0.08), color=COLORS[k], label=label)
+    axes.set_yticks([0.0, 0.25, 0.5, 0.75, 1.0])
+    axes.set_xlabel(f"distance along {body} (m)")
+    axes.set_ylabel("controllability by one patch")
+    legend(axes)

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...common.arrays import Array
-from ..figures.palette import COLORS
+from ..projection import COLORS
 
 MAX_POINTS = 4000  # of a curve; more cannot be told apart on a screen
 

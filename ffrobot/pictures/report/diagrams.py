@@ -2,15 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 
 from ...common.arrays import Array
-from ..figures.palette import COLORS
-from ..studies.diagrams import LOOKS, Axis, Band, Bars, Diagram, Look, Numbers, Parallel, Points, Progress, wrapped
+from ..projection import COLORS
+from ..studies.study import (
+    LOOKS,
+    Axis,
+    Band,
+    Bars,
+    Diagram,
+    Look,
+    Numbers,
+    Parallel,
+    Points,
+    Progress,
+    Study,
+    StudyTable,
+    wrapped,
+)
 from .charts import encoded, plain
 
 AXIS = "#8b95a3"  # of parallel coordinates, on light and on dark pages
@@ -228,3 +243,37 @@ def _sides(diagram: Points) -> list[str]:
     """Names stay within the chart: to the left of points in its right half."""
     middle = 0.5 * max(diagram.x, default=0.0)
     return [f"top {'left' if x > middle else 'right'}" for x in diagram.x]
+
+
+@dataclass(frozen=True)
+class StudyPart:
+    """One study on the page; `file` it was read from."""
+
+    number: int
+    file: Path
+    study: Study
+
+    @property
+    def title(self) -> str:
+        """What was asked, and of which scene."""
+        return f"{self.study.title}: {self.study.scene_name}"
+
+    @property
+    def mood(self) -> str:
+        """For the colour of its headline."""
+        return {True: "good", False: "bad", None: ""}[self.study.good]
+
+    @property
+    def tables(self) -> Sequence[StudyTable]:
+        """As the command prints them."""
+        return self.study.tables
+
+    @property
+    def charts(self) -> list[DrawnDiagram]:
+        """Its diagrams."""
+        return [drawn(one, f"study_{self.number}_{one.name}") for one in self.study.diagrams]
+
+
+def study_parts(studies: Sequence[tuple[Path, Study]]) -> list[StudyPart]:
+    """Numbered in order."""
+    return [StudyPart(number, file, study) for number, (file, study) in enumerate(studies, start=1)]

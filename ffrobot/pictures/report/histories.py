@@ -8,13 +8,11 @@ import numpy as np
 
 from ...common.arrays import Array
 from ...results.file import Results
-from ...results.rounded import ROUND_OFF
+from ...results.verdict import ROUND_OFF
 from ..figures.figure_file import Curve, FigureRecord
-from ..figures.reading import curve_points
-from ..figures.shared import file_name
+from ..figures.shared import curve_points, file_name, limit_curves, limits_of
 from ..figures.standard import standard_figures
-from ..path_targets import Target, targets
-from ..torque_speed import limit_curves, limits_of
+from ..markers import Target, targets
 from .charts import DASHES, Chart, limit_style, shades, style
 from .runs import Run, runs, sources
 

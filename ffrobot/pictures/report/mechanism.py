@@ -9,12 +9,10 @@ from typing import Any
 import numpy as np
 
 from ...common.arrays import Array, Indices
-from ..coarse_surface import coarsened, triangles_of
-from ..figures.palette import COLORS
-from ..markers import Marker, ground_places, joint_markers, tool_markers
+from ..body_surface import coarsened, triangles_of
+from ..markers import Marker, Target, ground_places, joint_markers, targets, tool_markers
 from ..motion import MovingBody, moving_bodies, visible_exaggeration
-from ..path_targets import Target, targets
-from ..projection import AXIS_LENGTH, PLANE, SPACE, TOOL_COLORS, TOOL_LENGTH
+from ..projection import AXIS_LENGTH, COLORS, PLANE, SPACE, TOOL_COLORS, TOOL_LENGTH
 from ..shapes import surface_shape, thickened
 from .charts import encoded, plain
 from .runs import Run

@@ -14,8 +14,7 @@ import numpy as np
 from ...common.arrays import Array, Integers
 from ...common.errors import InputError
 from ...fe_models.modal_body import ModalBody
-from ..body_surface import AMPLITUDE, body_surface, drawn_mode
-from ..coarse_surface import coarsened, triangles_of
+from ..body_surface import AMPLITUDE, body_surface, coarsened, drawn_mode, triangles_of
 from ..figures.shared import file_name
 from ..projection import UP, VIEWER
 from .charts import Chart, encoded, shades

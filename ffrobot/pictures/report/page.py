@@ -15,14 +15,22 @@ from ...common.version import program_version
 from ...results.file import Results
 from ..studies.study import Study, read_study, study_files
 from .charts import Chart
-from .diagrams import DrawnDiagram
+from .diagrams import DrawnDiagram, StudyPart, study_parts
 from .histories import folded, history_charts
 from .mechanism import mechanism
 from .modes import link_modes, surface_modes
 from .runs import runs, sources
-from .studies import StudyPart, study_parts
-from .tables import analyses_table, bending_table, origins_table, peaks_table, voltages_table, warnings_table
-from .verdicts import loops_table, verdicts, zeros_table
+from .tables import (
+    analyses_table,
+    bending_table,
+    loops_table,
+    origins_table,
+    peaks_table,
+    verdicts,
+    voltages_table,
+    warnings_table,
+    zeros_table,
+)
 
 HERE = Path(__file__).parent
 

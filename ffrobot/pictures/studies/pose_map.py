@@ -13,8 +13,8 @@ from matplotlib.figure import Figure
 
 from ...common.arrays import Array
 from ...common.files import write_atomically
+from ...map.map_file import Quantity, quantities
 from ...map.pose_map import PoseMap
-from ...map.quantities import Quantity, quantities
 from ...mbs.solve.workspace import GridAxis
 from ..figures.style import ORDERED, SIZE, style
 

@@ -1,15 +1,219 @@
-"""The file of a study: what a design command has found, in words, tables and diagrams, for the report."""
+"""Studies of design commands: data of the diagrams, which figures and the report draw alike, and the file."""
 
 from __future__ import annotations
 
 import json
+import re
+import textwrap
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal, get_args
+from typing import Annotated, Literal, get_args
 
+import numpy as np
+from pydantic import Field
+
+from ...common.arrays import Array, as_floats
 from ...common.errors import InputError, quoted
 from ...common.files import write_atomically
 from ...common.validation import Record, validate
-from .diagrams import Diagram
+from ..projection import COLORS
+
+
+@dataclass(frozen=True)
+class Look:
+    """Of the lines and points of designs; the last of `LOOKS` are drawn last."""
+
+    label: str
+    color: str
+    width: float
+    dash: str  # of matplotlib
+    marker: str  # of matplotlib
+
+    @property
+    def plotly(self) -> tuple[str, str]:
+        """Dashes and marker in Plotly's words."""
+        return (
+            {"-": "solid", ":": "dot", "--": "dash"}[self.dash],
+            {"o": "circle", "x": "x-thin-open", "^": "triangle-up-open", "D": "diamond"}[self.marker],
+        )
+
+
+LOOKS: dict[State, Look] = {
+    "failed": Look("failed", "#8b95a3", 0.8, ":", "x"),
+    "exceeded": Look("beyond a limit", COLORS[5], 0.8, "--", "^"),
+    "kept": Look("within limits", COLORS[4], 0.8, "-", "o"),
+    "best": Look("best", COLORS[1], 2.4, "-", "D"),
+}
+
+
+Numbers = tuple[float | None, ...]
+"""None where there is no number: of runs that failed."""
+
+State = Literal["best", "kept", "exceeded", "failed"]
+"""Of a design: the best one or one of a front, one that keeps all limits, one that does not, one whose run failed."""
+
+ROOM = 0.05  # of an axis, beyond the least and the largest value
+DECADES = 2.0  # goals, all of one sign, that span more are drawn by their logarithms
+TICKS = 5  # about so many
+
+
+class Series(Record):
+    """Bars of one colour: a value for each label and its error, 0 where it is not known."""
+
+    label: str = ""
+    values: Numbers
+    errors: tuple[float, ...] = ()
+
+
+class Bars(Record):
+    """Horizontal bars, the first label on top; a single series has one colour for each sign where `signed`."""
+
+    kind: Literal["bars"] = "bars"
+    name: str
+    title: str
+    x_label: str
+    labels: tuple[str, ...]
+    series: tuple[Series, ...]
+    signed: bool = False
+
+
+class Axis(Record):
+    """One axis of parallel coordinates from `low` to `high`, with the value of every design.
+
+    `limit` is what a goal may not exceed (`sense` 1) or fall below (−1); `names` of a catalogue's rows, whose values
+    are then their numbers.
+    """
+
+    label: str
+    values: Numbers
+    low: float
+    high: float
+    logarithmic: bool = False
+    limit: float | None = None
+    sense: Literal[1, -1] = 1
+    names: tuple[str, ...] = ()
+
+    def place(self, values: Array) -> Array:
+        """Where values are on the axis, 0 at `low` and 1 at `high`."""
+        scaled = np.log if self.logarithmic else np.asarray
+        low, high = scaled(np.array([self.low, self.high]))
+        return as_floats((scaled(values) - low) / (high - low))
+
+    @property
+    def places(self) -> Array:
+        """(n) of all designs, NaN where they failed."""
+        return self.place(np.array([np.nan if value is None else value for value in self.values]))
+
+    @property
+    def ticks(self) -> list[tuple[float, str]]:
+        """Places of round numbers within the axis, or of the rows of a catalogue, and their texts."""
+        if self.names:
+            return [(float(self.place(np.array(float(k)))), name) for k, name in enumerate(self.names)]
+        values = _round_logarithms(self.low, self.high) if self.logarithmic else np.array([])
+        values = values if values.size > 1 else _round_numbers(self.low, self.high)
+        return [(float(self.place(value)), f"{value:.6g}") for value in values]
+
+
+def axis_of_goal(label: str, values: Numbers, limit: float | None = None, sense: Literal[1, -1] = 1) -> Axis:
+    """The axis of a goal, with room for all its values and its limit."""
+    shown = np.array([value for value in (*values, limit) if value is not None] or [0.0])
+    low, high = float(shown.min()), float(shown.max())
+    logarithmic = low > 0.0 and high > low * 10.0**DECADES
+    if logarithmic:
+        room = (high / low) ** ROOM
+        low, high = low / room, high * room
+    else:
+        room = ROOM * (high - low) or ROOM * abs(high) or 1.0
+        low, high = low - room, high + room
+    return Axis(label=label, values=values, low=low, high=high, logarithmic=logarithmic, limit=limit, sense=sense)
+
+
+class Parallel(Record):
+    """Parallel coordinates (Inselberg 1985): a line for each design over variables, goals and limits."""
+
+    kind: Literal["parallel"] = "parallel"
+    name: str
+    title: str
+    axes: tuple[Axis, ...]
+    states: tuple[State, ...]
+    designs: tuple[str, ...]  # what each is called
+    best_label: str = "best"
+
+
+class Progress(Record):
+    """The goal of one design after the other; `best` is the best so far that keeps all limits."""
+
+    kind: Literal["progress"] = "progress"
+    name: str
+    title: str
+    y_label: str
+    values: Numbers
+    states: tuple[State, ...]
+    best: Numbers
+    logarithmic: bool = False
+
+
+class Band(Record):
+    """A history with the band that keys which are spread make of it, at `time` (s)."""
+
+    kind: Literal["band"] = "band"
+    name: str
+    title: str
+    y_label: str
+    time: tuple[float, ...]
+    nominal: tuple[float, ...]
+    median: tuple[float, ...]
+    low: tuple[float, ...]
+    high: tuple[float, ...]
+    lowest: tuple[float, ...]
+    highest: tuple[float, ...]
+    band_label: str
+    worst_label: str
+
+
+class Points(Record):
+    """Named points with the errors of both coordinates; `joined` along a curve, hollow where not `sure`."""
+
+    kind: Literal["points"] = "points"
+    name: str
+    title: str
+    x_label: str
+    y_label: str
+    labels: tuple[str, ...]
+    x: tuple[float, ...]
+    y: tuple[float, ...]
+    x_errors: tuple[float, ...] = ()
+    sure: tuple[bool, ...] = ()
+    joined: bool = False
+    named: bool = False
+
+
+Diagram = Annotated[Bars | Parallel | Progress | Band | Points, Field(discriminator="kind")]
+
+
+def wrapped(label: str, letters: int) -> list[str]:
+    """A label in lines of about so many letters, broken at blanks and behind dots of names, not within its unit."""
+    whole = re.sub(r"\([^()]*\)$", lambda unit: unit[0].replace(" ", "\u00a0"), label)
+    lines = textwrap.wrap(whole.replace(".", ".\u200b "), letters, break_long_words=False, break_on_hyphens=False)
+    return [line.replace("\u200b ", "").replace("\u200b", "").replace("\u00a0", " ") for line in lines]
+
+
+def _round_numbers(low: float, high: float) -> Array:
+    """Multiples of 1, 2 or 5 times a power of ten."""
+    rough = (high - low) / TICKS
+    power = 10.0 ** np.floor(np.log10(rough))
+    step = power * min((1.0, 2.0, 5.0, 10.0), key=lambda round_one: abs(np.log(round_one * power / rough)))
+    first, last = np.ceil(low / step - 1e-9), np.floor(high / step + 1e-9)
+    return as_floats(step * np.arange(first, last + 1.0) + 0.0)  # no negative zero
+
+
+def _round_logarithms(low: float, high: float) -> Array:
+    """1, 2 and 5 times powers of ten; powers alone where these are enough."""
+    powers = 10.0 ** np.arange(np.floor(np.log10(low)), np.ceil(np.log10(high)) + 1.0)
+    several = (powers[:, None] * np.array([1.0, 2.0, 5.0])).ravel()
+    inside = [values[(values >= low * (1 - 1e-9)) & (values <= high * (1 + 1e-9))] for values in (powers, several)]
+    return as_floats(inside[0] if len(inside[0]) >= TICKS - 1 else inside[1])
+
 
 FORMAT = "ffrobot-study"
 VERSION = 1

@@ -1,6 +1,5 @@
 """Three-dimensional output for ParaView and PyVista: `ffrobot view`."""
 
-from .movie import view_movie
-from .view import Options, Viewed, view_file
+from .view import Options, Viewed, view_file, view_movie
 
 __all__ = ["Options", "Viewed", "view_file", "view_movie"]

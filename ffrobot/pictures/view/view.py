@@ -15,12 +15,11 @@ from ...common.files import check_folder, write_atomically
 from ...fe_models.modal_body_file import is_modal_body_file, read_modal_body
 from ...results.file import Results
 from ..figures.shared import file_name
-from ..markers import Marker, ground_places, joint_markers, tool_markers
+from ..markers import Marker, ground_places, joint_markers, targets, tool_markers
 from ..motion import moving_bodies, visible_exaggeration
-from ..path_targets import targets
-from .grids import modes_grid, results_grid
+from ..movie_file import Frame, MovieOptions, check_movie, movie_outputs, moving_analysis, write_movie
 from .pictures import Picture, draw_pictures
-from .vtkhdf import Grid, vtkhdf_image
+from .vtkhdf import Grid, modes_grid, results_grid, vtkhdf_image
 
 FRAMES = 201  # of an animation, unless asked for otherwise
 
@@ -176,3 +175,36 @@ def _draw(pictures: Sequence[Picture], folder: Path) -> list[Path]:
         for path in paths:
             write_atomically(path, (Path(place) / path.name).read_bytes(), "picture")
     return paths
+
+
+def view_movie(results_path: Path, path: Path, options: MovieOptions | None = None) -> list[str]:
+    """Write a movie (.gif, .mp4) of a results file. Returns notes on what could not be drawn as it is.
+
+    Raises `InputError` where the results cannot be read, have no such analysis or none that goes through time, or for
+    another suffix; `SolveError` where the movie cannot be made or written.
+    """
+    options = options or MovieOptions()
+    notes: list[str] = []
+    check_movie(path)
+    if is_modal_body_file(results_path):
+        raise InputError(f"{results_path}: movie: expected a results file, found a modal body: it does not move")
+    with Results(results_path) as results, tempfile.TemporaryDirectory() as place:
+        analysis = moving_analysis(results, options.analysis)
+        outputs, shown = np.unique(movie_outputs(results.time(analysis), options.seconds), return_inverse=True)
+        grid = results_grid(results, analysis, outputs, notes)
+        steps = tuple(range(len(outputs)))
+        scale = visible_scale(grid, steps) if options.scale is None else options.scale
+        picture = motion_picture(results, analysis, outputs, grid, steps, scale, "deflection")
+        file = Path(place) / "grid.vtkhdf"
+        write_atomically(file, vtkhdf_image(grid), "grid", ours=True)
+        draw_pictures([replace(picture, grid=str(file), path=place, movie=True)])
+        write_movie(path, _images(Path(place), [int(k) for k in shown]))
+    return list(dict.fromkeys(notes))
+
+
+def _images(folder: Path, shown: Sequence[int]) -> Iterator[Frame]:
+    from PIL import Image
+
+    for k in shown:
+        with Image.open(folder / f"{k:05d}.png") as image:
+            yield np.asarray(image.convert("RGB"))
