@@ -6,21 +6,23 @@ Importing this loads no finite element library; they are loaded where a link mus
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 from platformdirs import user_cache_path
 
 from ..common.arrays import Array
 from ..common.errors import FfrobotError, SolveError, of_file
-from ..common.files import check_output
+from ..common.files import AnyPath, check_output
 from ..common.interrupts import deferred_interrupts, ending_at_once
 from ..common.parallel import on_first, processes, without_daemon
+from ..common.validation import plain
 from ..mesh.kept_parts import kept_path
-from .link_file import LinkSource, link_path, read_link
+from .link_file import LinkSource, LinkTable, link_path, read_link
 from .link_records import BeamLink, Family, Link, SolidLink
 from .modal_body import ModalBody
 from .modal_body.measured import with_measured
@@ -50,32 +52,49 @@ class LinkOutcome:
 
 
 def make_link(
-    source: LinkSource, output: Path | None = None, force: bool = False, progress: Progress | None = None
+    link: AnyPath | LinkTable | Mapping[str, Any],
+    output: AnyPath | None = None,
+    *,
+    force: bool = False,
+    progress: Progress | None = None,
 ) -> LinkOutcome:
-    """Bring the modal body file of a link up to date.
-
-    Args:
-        source: the link file, or its content.
-        output: where to write; if None, LINK.h5 beside the link file, or the user's cache where there is no file.
-        force: compute in any case.
-        progress: is called with what is being done, one line a step.
+    """Compute the modal body of a link unless it is up to date: `ffrobot link`.
 
     Under mpirun all processes call; only the first writes, and computes the links that are beams.
 
+    Args:
+        link: a link file, or a dictionary of its keys.
+        output: modal body file; None: next to the link file, or in the user's cache for a dictionary.
+        force: whether to compute it in any case.
+        progress: is called with a line for each step.
+
+    Returns:
+        The modal body, its file, and whether it was computed.
+
     Raises:
-        InputError: the link file is wrong, or `output` is some other file that would be lost.
-        SolveError: the modes cannot be computed, or the file cannot be written.
+        InputError: something in the link file is wrong, or `output` is some other file that would be lost.
+        SolveError: no modes were found, or the file cannot be written.
+
+    Example:
+        body = ffrobot.make_link("arm.toml").body
+        body.frequency  # (n,) in Hz
     """
-    start = time.perf_counter()
-    link = read_link(source)
-    digest, beside = input_hash(link), _beside(source)
-    path = output or (beside[0] if beside else _cached(link))
+    start, source = time.perf_counter(), _source(link)
+    checked = read_link(source)
+    digest, beside = input_hash(checked), _beside(source)
+    path = Path(output) if output is not None else beside[0] if beside else _cached(checked)
     if not force and on_first(lambda: _up_to_date(path, digest) is not None):
         return LinkOutcome(path, read_modal_body(path), False, time.perf_counter() - start)
     if path.parent != _cache_folder():
         on_first(lambda: check_output(path, FORMAT))
     earlier = [] if force else [path, *beside]
-    return _compute(link, link_path(source), path, digest, start, progress, earlier, force=force)
+    return _compute(checked, link_path(source), path, digest, start, progress, earlier, force=force)
+
+
+def _source(link: AnyPath | LinkTable | Mapping[str, Any]) -> LinkSource:
+    if isinstance(link, Mapping):
+        return LinkTable(plain(link), Path("<link made in Python>"))
+    return link if isinstance(link, LinkTable) else Path(link)
 
 
 def cached_modal_body(source: LinkSource, progress: Progress | None = None) -> LinkOutcome:

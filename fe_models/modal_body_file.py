@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ..common.arrays import Array, Integers
 from ..common.checksum import MARK, METHOD, sealed
 from ..common.errors import InputError
-from ..common.files import write_atomically
+from ..common.files import AnyPath, write_atomically
 from ..common.hdf5 import numbers, open_checked, read
 from .modal_body import Interface, MeasuredValues, ModalBody, OutlinedPatches, PictureMesh, Stations, StressPoint
 
@@ -57,14 +57,22 @@ def write_modal_body(path: Path, body: ModalBody, *, make_folder: bool = False) 
     write_atomically(path, sealed(_image(body)), "modal body file", make_folder=make_folder, ours=make_folder)
 
 
-def read_modal_body(path: Path) -> ModalBody:
-    """Read and check the modal body file at `path`.
+def read_modal_body(path: AnyPath) -> ModalBody:
+    """Read and check a modal body file.
+
+    Args:
+        path: the file, `LINK.h5`.
+
+    Returns:
+        The modal body.
 
     Raises:
-        InputError: there is no such file, it is not a modal body file, is damaged or newer than this program, or what
-            it holds is not a valid modal body; names the file and what is wrong.
+        InputError: the file is missing, damaged, of another kind or version, or its modal body is inconsistent.
+
+    Example:
+        ffrobot.read_modal_body("arm.h5").mass  # kg
     """
-    return _read(path, _body)
+    return _read(Path(path), _body)
 
 
 def read_mass(path: Path) -> float:

@@ -19,48 +19,39 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from .api import (
-        load_scene,
-        make_link,
-        plot_results,
-        read_modal_body,
-        solve,
-        view_file,
-        write_movie,
-        write_report,
-        write_study,
-    )
+    from .api import plot_results, solve, view_file, write_movie, write_report, write_study
     from .common.errors import FfrobotError, FfrobotWarning, InputError, SolveError
     from .design.front import trade_off
     from .design.optimise import optimise
     from .design.screening import screening
     from .design.sensitivity import sensitivity
     from .design.uncertainty import uncertainty
+    from .fe_models.link import make_link
     from .fe_models.modal_body import ModalBody
+    from .fe_models.modal_body_file import read_modal_body
     from .fit.fitting import fit_measured
     from .results.file import Results
     from .run.watcher import Watcher
-    from .scene.load import make_scene
+    from .scene.load import load_scene, make_scene
     from .scene.scene import Scene
 
     __version__: str
 
 _NAMES = {
-    ".api": (
-        "load_scene", "make_link", "plot_results", "read_modal_body", "solve", "view_file", "write_movie",
-        "write_report", "write_study",
-    ),
+    ".api": ("plot_results", "solve", "view_file", "write_movie", "write_report", "write_study"),
     ".common.errors": ("FfrobotError", "FfrobotWarning", "InputError", "SolveError"),
     ".design.front": ("trade_off",),
     ".design.optimise": ("optimise",),
     ".design.screening": ("screening",),
     ".design.sensitivity": ("sensitivity",),
     ".design.uncertainty": ("uncertainty",),
+    ".fe_models.link": ("make_link",),
     ".fe_models.modal_body": ("ModalBody",),
+    ".fe_models.modal_body_file": ("read_modal_body",),
     ".fit.fitting": ("fit_measured",),
     ".results.file": ("Results",),
     ".run.watcher": ("Watcher",),
-    ".scene.load": ("make_scene",),
+    ".scene.load": ("load_scene", "make_scene"),
     ".scene.scene": ("Scene",),
 }  # fmt: skip
 _HOME = {name: module for module, names in _NAMES.items() for name in names}

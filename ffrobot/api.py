@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from .common.files import AnyPath
 
 if TYPE_CHECKING:
     from .design.finding import Finding
-    from .fe_models.link import LinkOutcome
-    from .fe_models.modal_body import ModalBody
     from .results.file import Results
     from .run.solution import Solution
     from .run.watcher import Watcher
@@ -61,6 +59,7 @@ def solve(
     from .run.inputs import files_of, files_of_tables
     from .run.solve import solve_scene
     from .run.watcher import Watcher
+    from .scene.load import load_scene
 
     path = None if output is None else Path(output)
     inputs = files_of(Path(scene)) if isinstance(scene, str | PathLike) else files_of_tables(scene.path, scene.text)
@@ -92,56 +91,6 @@ def solve(
     return Results(path) if path is not None else Results.from_image(results_image(solution), scene.path)
 
 
-def load_scene(path: AnyPath, *, allow_python: Sequence[AnyPath] = ()) -> Scene:
-    """Read and validate a scene file.
-
-    Args:
-        path: the scene file.
-        allow_python: as in `solve`.
-
-    Returns:
-        The scene, which is immutable.
-
-    Raises:
-        InputError: one line for each wrong key.
-
-    Example:
-        scene = ffrobot.load_scene("scene.toml")
-    """
-    from .common.python_files import python_allowed
-    from .scene.load import load_scene as load
-
-    with python_allowed(Path(place) for place in allow_python):
-        return load(Path(path))
-
-
-def make_link(link: AnyPath | Mapping[str, Any], output: AnyPath | None = None, *, force: bool = False) -> LinkOutcome:
-    """Compute the modal body of a link unless it is up to date: `ffrobot link`.
-
-    Args:
-        link: a link file, or a dictionary of its keys.
-        output: modal body file; None: next to the link file, or in the user's cache for a dictionary.
-        force: whether to compute it in any case.
-
-    Returns:
-        The modal body, its file, and whether it was computed.
-
-    Raises:
-        InputError: something in the link file is wrong.
-        SolveError: no modes were found.
-
-    Example:
-        body = ffrobot.make_link("arm.toml").body
-        body.frequency  # (n,) in Hz
-    """
-    from .common.validation import plain
-    from .fe_models.link import make_link
-    from .fe_models.link_file import LinkTable
-
-    source = LinkTable(plain(link), Path("<link made in Python>")) if isinstance(link, Mapping) else Path(link)
-    return make_link(source, None if output is None else Path(output), force)
-
-
 def write_study(found: Finding, folder: AnyPath, *, figures: bool = True) -> list[Path]:
     """Write the result of a design function as files for `write_report`, and as figures.
 
@@ -161,26 +110,6 @@ def write_study(found: Finding, folder: AnyPath, *, figures: bool = True) -> lis
 
     with extras():
         return list(found.write_study(Path(folder), figures=figures))
-
-
-def read_modal_body(path: AnyPath) -> ModalBody:
-    """Read and check a modal body file.
-
-    Args:
-        path: the file, `LINK.h5`.
-
-    Returns:
-        The modal body.
-
-    Raises:
-        InputError: the file is damaged or inconsistent.
-
-    Example:
-        ffrobot.read_modal_body("arm.h5").mass  # kg
-    """
-    from .fe_models.modal_body_file import read_modal_body
-
-    return read_modal_body(Path(path))
 
 
 def plot_results(

@@ -57,7 +57,7 @@ def link(
 
     protect(files_of(link_file))
     with Display() as display:
-        outcome = make_link(link_file, output, force, display.stage)
+        outcome = make_link(link_file, output, force=force, progress=display.stage)
     if not is_first():
         return
     body = outcome.body

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from os import PathLike
 from pathlib import Path
 from typing import Any
 
 from ..common.errors import InputError
+from ..common.files import AnyPath
+from ..common.python_files import python_allowed
 from ..common.toml_files import load_toml, parse_toml, read_text
 from ..common.validation import plain, validate
 from ..fe_models.link_file import LinkTable, read_link
@@ -29,13 +31,27 @@ UNAVAILABLE = {
 }
 
 
-def load_scene(path: Path) -> Scene:
-    """Read and validate the scene file at `path`; paths in it come out relative to its folder.
+def load_scene(path: AnyPath, *, allow_python: Sequence[AnyPath] = ()) -> Scene:
+    """Read and validate a scene file; paths in it come out relative to its folder.
 
-    Raises `InputError` with one line for each wrong key: file, key, expected, found. What depends on modal bodies
-    (their points, the length of a link) is checked when these are known.
+    What depends on modal bodies (their points, the length of a link) is checked when these are known.
+
+    Args:
+        path: the scene file.
+        allow_python: as in `solve`.
+
+    Returns:
+        The scene, which is immutable.
+
+    Raises:
+        InputError: one line for each wrong key.
+
+    Example:
+        scene = ffrobot.load_scene("scene.toml")
     """
-    return validated_scene(load_toml(path, "scene file"), path, read_text(path, "scene file"))
+    path = Path(path)
+    with python_allowed(map(Path, allow_python)):
+        return validated_scene(load_toml(path, "scene file"), path, read_text(path, "scene file"))
 
 
 def make_scene(*, folder: PathLike[str] | str = ".", **keys: Any) -> Scene:  # noqa: ANN401 (whatever TOML may hold)

@@ -33,9 +33,9 @@ def test_formulas_of_several_lines_keep_their_number_on_the_site():
 
 def test_figures_of_the_page_are_those_that_the_script_draws(tmp_path):
     pytest.importorskip("matplotlib")
-    from theory_sketches import draw_all
+    from sketches import draw_all
 
     draw_all(tmp_path)
-    drawn = {path.name for path in tmp_path.glob("*.svg")}
+    drawn = {path.name for path in tmp_path.glob("theory/*.svg")}
     assert drawn == set(re.findall(r"\(theory/(\w+\.svg)\)", PAGE)) == {path.name for path in DOCS.glob("theory/*.svg")}
     assert len(drawn) == 4

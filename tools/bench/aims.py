@@ -15,9 +15,8 @@ from ffrobot.run.watcher import Watcher
 from ffrobot.scene.load import make_scene
 from ffrobot.scene.scene import Scene
 
-from .evaluation import State, evaluation_seconds
+from .evaluation import State, evaluation_seconds, ratios
 from .hand_written import TIME, HandWritten, general_state
-from .ratio import ratios
 
 ACCURACY = 1e-4
 INTEGRATORS = ("auto", "dop853", "radau")

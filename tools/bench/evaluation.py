@@ -1,6 +1,9 @@
-"""The time of one evaluation of all accelerations and multipliers."""
+"""The time of one evaluation of all accelerations and multipliers, and ratios of times that were taken in turn."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
+from statistics import median
 
 import numpy as np
 
@@ -23,3 +26,8 @@ def evaluation_seconds(state: State, t: float, evaluations: int) -> float:
     system, q, v = state
     core, _, rows = system.integrated
     return core.time_evaluations(q, v, system.target(t)[rows], evaluations)
+
+
+def ratios(seconds: Sequence[float], beside: Sequence[float]) -> tuple[float, float]:
+    """Ratio of the minima, and median of the ratios of neighbours: when they disagree, the machine was busy."""
+    return min(seconds) / min(beside), median(a / b for a, b in zip(seconds, beside, strict=True))

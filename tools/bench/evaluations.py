@@ -23,10 +23,9 @@ from ffrobot.run.solve import prepare_scene
 from ffrobot.run.watcher import Watcher
 from ffrobot.scene.load import load_scene, make_scene
 
-from .evaluation import evaluation_seconds, start_at_rest
+from .evaluation import evaluation_seconds, ratios, start_at_rest
 from .growth import LINKS, chain
 from .hand_written import TIME, HandWritten, general_state
-from .ratio import ratios
 
 ROUNDS = 30
 SECONDS = 1e-3  # of a round, about

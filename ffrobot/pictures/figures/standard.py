@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import islice
+from typing import Any
 
 import numpy as np
 
@@ -43,6 +44,18 @@ def _drawn(results: Results, of: Figures) -> tuple[FigureRecord, ...]:
     )
 
 
+def _histories(
+    name: Sequence[str],
+    title: str,
+    curves: Iterable[Curve],
+    y_label: str,
+    **more: Any,  # noqa: ANN401
+) -> Iterator[FigureRecord]:
+    """Curves over time, if there are any; `name` in parts, `more` keys of `FigureRecord`."""
+    if drawn := tuple(curves):
+        yield FigureRecord(name=file_name(*name), title=title, curves=drawn, y_label=y_label, **more)
+
+
 def _configurations(results: Results) -> Iterator[FigureRecord]:
     """Of the first analysis that goes through time, else the first: in others the robot is hardly elsewhere."""
     moving = [analysis for analysis in results.analyses if len(results.time(analysis)) > 1]
@@ -78,27 +91,22 @@ def _paths(results: Results) -> Iterator[FigureRecord]:
                 for analysis, data in reached
                 for c in axes
             ]
-        yield FigureRecord(
-            name=file_name("path", name),
-            title=f"path of {point}",
-            kind="path" if whole else "time",
-            curves=tuple(curves),
-            y_label="y (m)" if whole else "position (m)",
-        )
+        kind, y_label = ("path", "y (m)") if whole else ("time", "position (m)")
+        yield from _histories(("path", name), f"path of {point}", curves, y_label, kind=kind)
 
 
 def _tip_errors(results: Results) -> Iterator[FigureRecord]:
     """Of all closed loops in one figure."""
-    if curves := curves_of(results, "tip_error"):
-        yield FigureRecord(name="tip_error", title="tip position error", curves=curves, y_label="error (mm)", scale=1e3)
+    yield from _histories(
+        ("tip_error",), "tip position error", curves_of(results, "tip_error"), "error (mm)", scale=1e3
+    )
 
 
 def _angles(results: Results) -> Iterator[FigureRecord]:
     for body in members(results, "bodies"):
         curves = curves_of(results, f"bodies/{body}/angle")
         if any(np.ptp(results.data(curve.data)) > ROUND_OFF for curve in curves):
-            title = f"angle of {body}"
-            yield FigureRecord(name=file_name("angle", body), title=title, curves=curves, y_label="angle (rad)")
+            yield from _histories(("angle", body), f"angle of {body}", curves, "angle (rad)")
 
 
 def _largest_deflections(results: Results) -> Iterator[FigureRecord]:
@@ -108,25 +116,23 @@ def _largest_deflections(results: Results) -> Iterator[FigureRecord]:
         size = max(np.abs(results[curve.data]).max() for curve in curves_of(results, f"points/{point}/deflection"))
         body = point.split(".")[0]
         found[body] = max(found.get(body, (0.0, "")), (float(size), point))
-    yield from (_deflection(results, point) for _, point in found.values())
+    for _, point in found.values():
+        yield from _deflection(results, point)
 
 
 def _deflections(results: Results) -> Iterator[FigureRecord]:
-    yield from (_deflection(results, point) for point in bending_points(results))
+    for point in bending_points(results):
+        yield from _deflection(results, point)
 
 
-def _deflection(results: Results, point: str) -> FigureRecord:
+def _deflection(results: Results, point: str) -> Iterator[FigureRecord]:
     """By axes of the body; components that are zero but for round-off are left out."""
     found = curves_of(results, f"points/{point}/deflection")
     largest = np.max([np.abs(results[curve.data]).max(axis=0) for curve in found], axis=0)
     shown = [k for k in range(len(largest)) if largest[k] > SEEN * largest.max()]
-    return FigureRecord(
-        name=file_name("deflection", point),
-        title=f"deflection of {point}, axes of the body",
-        curves=tuple(Curve(data=f"{c.data}[{k}]", label=f"{c.label}, {AXES[k]}") for c in found for k in shown),
-        y_label="deflection (mm)",
-        scale=1e3,
-    )
+    curves = (Curve(data=f"{c.data}[{k}]", label=f"{c.label}, {AXES[k]}") for c in found for k in shown)
+    title = f"deflection of {point}, axes of the body"
+    yield from _histories(("deflection", point), title, curves, "deflection (mm)", scale=1e3)
 
 
 def _modes(results: Results) -> Iterator[FigureRecord]:
@@ -139,12 +145,8 @@ def _modes(results: Results) -> Iterator[FigureRecord]:
             ):
                 data = f"{analysis}/bodies/{body}/{dataset}"
                 if results.has(data) and results.data(data).any():
-                    yield FigureRecord(
-                        name=file_name(dataset, analysis, body),
-                        title=f"{title} of {body}, {analysis}",
-                        curves=(Curve(data=data, label="mode"),),
-                        y_label=y_label,
-                    )
+                    curve, of = Curve(data=data, label="mode"), f"{title} of {body}, {analysis}"
+                    yield from _histories((dataset, analysis, body), of, [curve], y_label)
 
 
 def _trajectory_forces(results: Results) -> Iterator[FigureRecord]:
@@ -166,9 +168,7 @@ def _trajectory_forces(results: Results) -> Iterator[FigureRecord]:
             ("force", "force", "N", forces),
             ("path_moment" if "point" in trajectory else "force", "torque", "N·m", moments),
         ):
-            if curves:
-                title, y_label = f"{what} along trajectory {name}", f"{what} ({unit})"
-                yield FigureRecord(name=file_name(kind, name), title=title, curves=tuple(curves), y_label=y_label)
+            yield from _histories((kind, name), f"{what} along trajectory {name}", curves, f"{what} ({unit})")
 
 
 def _components(results: Results, group: str) -> list[str]:
@@ -190,15 +190,10 @@ def _motors(results: Results) -> Iterator[FigureRecord]:
     """Torque or force of every motor, and over its speed where that or the power has limits."""
     for joint, coordinate in _coordinates(results):
         label = joint + coordinate.label
-        if driven := curves_of(results, f"joints/{joint}/moment", coordinate.column):
-            limit = coordinate.limits.moment
-            yield FigureRecord(
-                name=file_name("moment", label),
-                title=f"motor of joint {label}",
-                curves=driven,
-                y_label=_force(coordinate),
-                limits=both_ways(limit) if np.isfinite(limit) else (),
-            )
+        limit = coordinate.limits.moment
+        driven = curves_of(results, f"joints/{joint}/moment", coordinate.column)
+        limits = both_ways(limit) if np.isfinite(limit) else ()
+        yield from _histories(("moment", label), f"motor of joint {label}", driven, _force(coordinate), limits=limits)
         if np.isfinite([coordinate.limits.speed, coordinate.limits.power]).any():
             yield from _torque_speed(results, joint, coordinate)
 
@@ -210,14 +205,11 @@ def _joints(results: Results) -> Iterator[FigureRecord]:
         if any(np.ptp(results.data(curve.data)) for curve in moved):
             label, unit = joint + coordinate.label, coordinate.unit
             y_label = f"{'angle' if unit == 'rad' else 'displacement'} ({unit})"
-            yield FigureRecord(
-                name=file_name("coordinate", label), title=f"joint {label}", curves=moved, y_label=y_label
-            )
+            yield from _histories(("coordinate", label), f"joint {label}", moved, y_label)
         yield from _torque_speed(results, joint, coordinate)
     for joint in members(results, "joints"):
-        if curves := curves_of(results, f"joints/{joint}/reaction", magnitude=True):
-            title = f"magnitude of the reaction, joint {joint}"
-            yield FigureRecord(name=file_name("reaction", joint), title=title, curves=curves, y_label="reaction (N)")
+        curves = curves_of(results, f"joints/{joint}/reaction", magnitude=True)
+        yield from _histories(("reaction", joint), f"magnitude of the reaction, joint {joint}", curves, "reaction (N)")
 
 
 def _coordinates(results: Results) -> Iterator[tuple[str, Coordinate]]:
@@ -236,16 +228,9 @@ def _torque_speed(results: Results, joint: str, coordinate: Coordinate) -> Itera
         rate = of_motor if results.has(of_motor) else rate  # behind a compliant gear
         if results.has(moment) and results.has(rate) and len(results.time(analysis)) > 1:
             curves.append(Curve(data=moment + coordinate.column, x=rate + coordinate.column, label=analysis))
-    if curves:
-        yield FigureRecord(
-            name=file_name("torque_speed", label),
-            title=f"torque–speed curve, joint {label}",
-            kind="torque-speed",
-            joint=joint,
-            curves=tuple(curves),
-            x_label=f"speed ({coordinate.unit}/s)",
-            y_label=_force(coordinate),
-        )
+    about = {"kind": "torque-speed", "joint": joint, "x_label": f"speed ({coordinate.unit}/s)"}
+    title = f"torque–speed curve, joint {label}"
+    yield from _histories(("torque_speed", label), title, curves, _force(coordinate), **about)
 
 
 def _stresses(results: Results) -> Iterator[FigureRecord]:
@@ -254,24 +239,17 @@ def _stresses(results: Results) -> Iterator[FigureRecord]:
         found = (point for a in results.analyses for point in results.names(f"{a}/stress/{body}/points"))
         places = [(f"points/{point}/von_mises", point) for point in dict.fromkeys(found)]
         for dataset, where in (*places, ("surface/von_mises_max", "surface")):
-            if curves := curves_of(results, f"stress/{body}/{dataset}"):
-                title = f"stress in {body}, {'largest on its surface' if where == 'surface' else where} (von Mises)"
-                yield FigureRecord(
-                    name=file_name("stress", body, where),
-                    title=title,
-                    curves=curves,
-                    y_label="stress (MPa)",
-                    scale=1e-6,
-                )
+            curves = curves_of(results, f"stress/{body}/{dataset}")
+            title = f"stress in {body}, {'largest on its surface' if where == 'surface' else where} (von Mises)"
+            yield from _histories(("stress", body, where), title, curves, "stress (MPa)", scale=1e-6)
 
 
 def _energies(results: Results) -> Iterator[FigureRecord]:
     """Energies of every analysis."""
     for analysis in results.analyses:
         names = ((kind, f"{analysis}/energy/{kind}") for kind in ENERGIES)
-        if curves := tuple(Curve(data=data, label=kind) for kind, data in names if results.has(data)):
-            name = file_name("energy", analysis)
-            yield FigureRecord(name=name, title=f"energies, {analysis}", curves=curves, y_label="energy (J)")
+        curves = (Curve(data=data, label=kind) for kind, data in names if results.has(data))
+        yield from _histories(("energy", analysis), f"energies, {analysis}", curves, "energy (J)")
 
 
 def _voltages(results: Results) -> Iterator[FigureRecord]:
@@ -285,44 +263,37 @@ def _voltages(results: Results) -> Iterator[FigureRecord]:
             required, within = f"{analysis}/pzt/{body}/required_voltage", f"{analysis}/pzt/{body}/voltage"
             top = np.abs(results.data(required)).max()
             of = f"patches of {body}, {analysis}"
-            if top > 0.0:
-                yield _voltage(required, f"required voltages, {of}", limits.get(body))
-            if np.abs(results.data(within) - results.data(required)).max() > SEEN * top:
-                yield _voltage(within, f"voltages within the limit, {of}", limits.get(body))
-
-
-def _voltage(data: str, title: str, limit: float | list[float] | None) -> FigureRecord:
-    analysis, _, body, dataset = data.split("/")
-    return FigureRecord(
-        name=file_name(dataset, analysis, body),
-        title=title,
-        curves=(Curve(data=data, label="patch"),),
-        y_label="voltage (V)",
-        limits=() if limit is None else both_ways(limit),
-    )
+            cut = np.abs(results.data(within) - results.data(required)).max() > SEEN * top
+            limit = () if limits.get(body) is None else both_ways(limits[body])
+            for data, title, is_shown in (
+                (required, f"required voltages, {of}", top > 0.0),
+                (within, f"voltages within the limit, {of}", cut),
+            ):
+                curves = [Curve(data=data, label="patch")] if is_shown else []
+                name = (data.rpartition("/")[2], analysis, body)
+                yield from _histories(name, title, curves, "voltage (V)", limits=limit)
 
 
 def _linear(results: Results) -> Iterator[FigureRecord]:
     """Places of patches; of linear models the mode shapes of the robot, and responses to the first input."""
     for analysis in results.analyses:
-        if results.has(f"{analysis}/placement"):
-            name, title = file_name("placement", analysis), f"patches, {analysis}"
-            yield FigureRecord(name=name, title=title, kind="placement", analysis=analysis)
-        if results.has(f"{analysis}/linear"):
-            name, title = file_name("modes", analysis), f"modes, {analysis}"
-            yield FigureRecord(name=name, title=title, kind="modes", analysis=analysis)
-            yield from islice(_responses_of(results, analysis), 1)
+        for kind, group, what in (("placement", "placement", "patches"), ("modes", "linear", "modes")):
+            if results.has(f"{analysis}/{group}"):
+                name, title = file_name(kind, analysis), f"{what}, {analysis}"
+                yield FigureRecord(name=name, title=title, kind=kind, analysis=analysis)
+        yield from islice(_responses_of(results, analysis), 1)
 
 
 def _responses(results: Results) -> Iterator[FigureRecord]:
     """Of linear models the responses to other inputs than the first."""
     for analysis in results.analyses:
-        if results.has(f"{analysis}/linear"):
-            yield from islice(_responses_of(results, analysis), 1, None)
+        yield from islice(_responses_of(results, analysis), 1, None)
 
 
 def _responses_of(results: Results, analysis: str) -> Iterator[FigureRecord]:
     """How points and joints respond to each motor and to the first patch of each layout."""
+    if not results.has(f"{analysis}/linear"):
+        return
     attributes = results.attributes(f"{analysis}/linear")
     inputs, outputs = ([str(name) for name in attributes[key]] for key in ("input_names", "output_names"))
     for source in inputs:
