@@ -15,8 +15,7 @@ from ..mbs.model.known_motion import mass_matrices
 from ..mbs.model.motors import split_forces
 from ..mbs.quantities.motion import RobotMotion
 from .motors import MotorFeasibility, first_time
-from .patches.patches import PatchArray
-from .patches.reach import Voltages
+from .patches.patches import PatchArray, Voltages
 
 ROWS = 50  # of a run, at most, at which mass matrices are made
 RINGING = 2.0  # times the static shift, of a force that is missing all at once

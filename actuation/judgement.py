@@ -17,7 +17,7 @@ from ..mbs.scene.analysis import Analysis
 from .feasibility import Feasibility, ModalMotion, PatchFeasibility, Unsupplied, judge_patches, seen_at_points
 from .motors import judge_motors
 from .patches.link_patches import LinkPatches, on_kept_modes, with_count
-from .patches.reach import Voltages, voltage_gain
+from .patches.patches import Voltages, voltage_gain
 from .patches.records import PztLayout
 
 ROUNDING = 1e-6  # of the largest modal force: less is what ill-conditioned patches leave

@@ -12,10 +12,9 @@ from ...mbs.analysis.outcome import Details
 from ...mbs.analysis.samples import in_order
 from .controllers import Controller, Loop, Setup
 from .linear_model import LinearModel
-from .margins import Margins, joint_gains, margins
+from .margins import Margins, advice, joint_gains, margins
 from .metrics import Followed, Metrics, measure, resting, ringing, watched
 from .records import ComputedTorque, JointPid, Lqr, SampledAnalysis
-from .suggestion import advice
 
 SAMPLES_PER_PERIOD = 10  # of the fastest motion that a controller acts on (Franklin, Powell and Workman ask for 20)
 

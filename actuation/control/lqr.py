@@ -11,8 +11,7 @@ from ...common.arrays import Array
 from ...common.errors import InputError
 from ...mbs.solve.linearisation import LinearMechanism
 from .controllers import Setup, modal_columns
-from .linear_model import LinearModel, SampledModel, sampled, state_space
-from .modes import controllability, observability
+from .linear_model import LinearModel, SampledModel, controllability, observability, sampled, state_space
 from .records import JointPid, Lqr
 from .robot import estimate
 

@@ -20,7 +20,7 @@ from ...mbs.model.system import ZERO, MultibodySystem
 from ...mbs.model.transmission import resistance
 from ...mbs.solve.linearisation import LinearEquations, LinearMechanism, labelled
 from ..patches.link_patches import LinkPatches
-from ..patches.reach import voltage_gain
+from ..patches.patches import voltage_gain
 from .linear import voltages_at
 from .signals import check_joint, volts_on_file
 

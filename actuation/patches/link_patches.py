@@ -21,13 +21,17 @@ from ...mbs.model.body import Body
 from ...mbs.model.divided_link import spread_of
 from .composite import Placed
 from .effects import Effects, effects
-from .patches import PatchArray, assembled, check_edges, edges_on_piece, patch_edges
-from .reach import (
+from .patches import (
+    PatchArray,
     Reach,
     ReachedModes,
     Voltages,
     allocation,
+    assembled,
     check_all_served,
+    check_edges,
+    edges_on_piece,
+    patch_edges,
     reached_modes,
     served_first,
     solve_voltages,

@@ -2,19 +2,236 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
 
-from ...common.arrays import Array, Indices
+from ...common.arrays import Array, Indices, as_floats
 from ...common.errors import InputError
 from ...fe_models.modal_body import ModalBody
+from ...mbs import _core
+from ...mbs.model.body import Body
+from ...mbs.model.masses import uncoupling
 from .composite import SLIVER, Placed, stiffness_ratios
 from .effects import Effects
-from .reach import Reach
 from .records import PztLayout
+
+SINGULAR = 1e12  # condition number of Φ_V beyond which voltages are rounding
+MOST_CONDITION = 1e16  # what more is found of a condition number is rounding itself
+LEAST_WEIGHT = 1e-6  # of any mode, relative to the largest: without it voltages would be neither unique nor steady
+OF_STATIC_SHAPES = 1e-3  # root of the weight of attachment modes beside modes: more patches than modes serve them last
+ENERGY_WEIGHT = 1e-4  # of the strain energy rᵀ K⁻¹ r beside weights of points, for the same reason
+
+
+@dataclass(frozen=True, kw_only=True)
+class Reach:
+    """What k patches do to n modes, and what is wanted of them.
+
+    Attributes:
+        Phi_V: (n, k) modal forces per volt.
+        limit: (k,) largest voltages, V; infinite where the scene gives none.
+        W_sqrt: (rows, n) what of the modal forces left unmet counts: |W_sqrt r|² is made small.
+        frequency: (n,) of the modes, Hz.
+        served: number of modes, the first ones, that the patches are to serve: attachment modes are not among them.
+    """
+
+    Phi_V: Array
+    limit: Array
+    W_sqrt: Array
+    frequency: Array
+    served: int
+
+    @property
+    def condition_number(self) -> float:
+        """Of Φ_V: how unequally the patches reach the modes; infinite where some mode is out of reach."""
+        return float(np.linalg.cond(self.Phi_V[: self.served]))
+
+    @property
+    def unreached_modes(self) -> Indices:
+        """Numbers (from 0) of the modes that take part in what no voltages can produce."""
+        left, sizes, _ = np.linalg.svd(self.Phi_V[: self.served])
+        rank = int(np.count_nonzero(sizes > sizes[0] / SINGULAR))
+        return np.flatnonzero(np.abs(left[:, rank:]).max(axis=1, initial=0.0) > 0.1)
+
+    @property
+    def serves_all(self) -> bool:
+        """Whether some voltages produce any forces on the modes to be served."""
+        return self.Phi_V.shape[1] >= self.served and not self.unreached_modes.size
+
+    @property
+    def in_order(self) -> Array:
+        """(rows, n) roots of weights: modes first, and attachment modes with what more patches than modes are left."""
+        n, k = self.Phi_V.shape
+        return served_first(self.served, n, k)
+
+
+def served_first(served: int, n: int, patches: int) -> Array:
+    """(rows, n) roots of weights of the `served` first of n modes; more patches than these serve the others, too."""
+    rows = n if patches > served else served
+    return np.diag(np.where(np.arange(n) < served, 1.0, OF_STATIC_SHAPES))[:rows]
+
+
+def weights(key: str, layout: PztLayout, served: int, stiffness: Array, points: Mapping[str, Array]) -> Array:
+    """W_sqrt (rows, n): of modes, or of the deflections Φ(x) K⁻¹ r that modal forces r cause at points.
+
+    `stiffness` (n,) of the modes, `points` their Φ (components, n) by name. Raises `InputError` for weights that do not
+    fit.
+    """
+    order = served_first(served, len(stiffness), layout.patch_count)
+    if layout.mode_weights is not None:
+        if len(layout.mode_weights) != served:
+            raise InputError(
+                f"{key}: mode_weights: expected {served} weights, one for each mode that the patches serve,"
+                f" found {len(layout.mode_weights)}"
+            )
+        shares = np.array(layout.mode_weights) / max(layout.mode_weights)
+        root = np.ones(len(order))
+        root[:served] = np.sqrt(shares.clip(min=LEAST_WEIGHT))
+        return root[:, None] * order
+    if layout.point_weights is None:
+        return order
+    unknown = layout.point_weights.keys() - points.keys()
+    if unknown:
+        raise InputError(
+            f"{key}: point_weights: expected points of the link, {', '.join(points)}, found"
+            f" {', '.join(sorted(unknown))}"
+        )
+    rows = np.vstack([np.sqrt(weight) * points[name] / stiffness for name, weight in layout.point_weights.items()])
+    size = np.linalg.norm(rows, 2)
+    if not size > 0.0:
+        raise InputError(f"{key}: point_weights: expected points that move with the modes, found none that do")
+    softest = np.sqrt(stiffness.min() / stiffness)
+    return np.vstack([rows / size, np.sqrt(ENERGY_WEIGHT) * np.diag(softest)])
+
+
+def check_all_served(key: str, reach: Reach) -> None:
+    """Raise `InputError` unless the patches reach every mode that they are to serve."""
+    advice = 'or accept unmet modal forces: allocation = "least-squares"'
+    n, k = reach.served, reach.Phi_V.shape[1]
+    if not n:
+        raise InputError(f"{key}: expected modes of the link for the patches to serve, found none")
+    if k < n:
+        raise InputError(f"{key}: expected as many patches as modes ({n}) or more, found {k}: add patches, {advice}")
+    unreached = reach.unreached_modes
+    if unreached.size:
+        modes = ", ".join(f"{j + 1} ({reach.frequency[j]:.4g} Hz)" for j in unreached)
+        raise InputError(
+            f"{key}: expected patches that excite every mode, found a singular Φ_V (condition number"
+            f" {min(reach.condition_number, MOST_CONDITION):.1g}): no voltages serve mode {modes};"
+            f" move patches, {advice}"
+        )
+
+
+OUT_OF_REACH = 1e-9  # of the largest modal force per volt: less is rounding
+
+
+@dataclass(frozen=True)
+class ReachedModes:
+    """The modes of a link that moves in some of its families alone, with what it carries.
+
+    Attributes:
+        rows: (m,) numbers (from 0) of the modes of the modal body in these families.
+        T: (m, m) p of these rows from the coordinates p' in which m_ff is the identity and K_ff diagonal; (m, fewer) of
+            the coordinates that equations keep, see `link_patches.on_kept_modes`.
+        stiffness: (m,) of the p'.
+        served: number of them, the first ones: the others are attachment modes.
+    """
+
+    rows: Indices
+    T: Array
+    stiffness: Array
+    served: int
+
+    def forces(self, F_p: Array) -> Array:
+        """(T, m) on the p' from those on the modes of the modal body (T, n)."""
+        on_modes: Array = F_p[:, self.rows] @ self.T
+        return on_modes
+
+    def coordinates(self, p: Array) -> Array:
+        """(T, m) p' from those of the modal body (T, n)."""
+        return as_floats(np.linalg.lstsq(self.T, p[:, self.rows].T, rcond=None)[0].T)
+
+    def seen(self, rows: Array) -> Array:
+        """(k, m) what is linear in the modes of the modal body, (k, n), over p'."""
+        return self.forces(rows)
+
+
+def reached_modes(per_volt: Array, body: ModalBody, spatial: Body) -> ReachedModes:
+    """By modal forces per volt (k, n) on the modes of the modal body: the families in which any is not 0."""
+    size = np.abs(per_volt).max(axis=0)
+    families = {body.family[k] for k in np.flatnonzero(size > OUT_OF_REACH * size.max())}
+    moving = spatial.modal_transform.any(axis=1)
+    rows = np.flatnonzero([moves and family in families for moves, family in zip(moving, body.family, strict=True)])
+    T_inverse, square = spatial.on_file, np.ix_(rows, rows)
+    T, stiffness = uncoupling((T_inverse.T @ T_inverse)[square], (T_inverse.T * spatial.stiffness @ T_inverse)[square])
+    modes_first = np.argsort(body.residual[rows], kind="stable")
+    served = int(np.count_nonzero(body.residual[rows] == 0))
+    return ReachedModes(rows, T[:, modes_first], stiffness[modes_first], served)
+
+
+@dataclass(frozen=True)
+class Voltages:
+    """Voltages of patches over time.
+
+    Attributes:
+        required: (T, k) V, with no limit; of least size or least residual where patches and modes differ in number.
+        within_limit: (T, k) V, the best within the limits of the patches.
+        unmet: (T, n) modal forces that `within_limit` leaves.
+        served: number of modes, the first ones, that the patches are to serve.
+    """
+
+    required: Array
+    within_limit: Array
+    unmet: Array
+    served: int
+
+    @property
+    def residual(self) -> Array:
+        """(T,) norm of the modal force on modes to be served that `within_limit` leaves unmet."""
+        norms: Array = np.linalg.norm(self.unmet[:, : self.served], axis=1)
+        return norms
+
+    @property
+    def largest(self) -> float:
+        """Largest required voltage, V."""
+        return float(np.abs(self.required).max(initial=0.0))
+
+
+def voltage_scale(patches: Reach) -> Array:
+    """Ordinary voltages (k,) of the patches: their limits, the largest of these where a patch has none, else 1 V."""
+    known = np.isfinite(patches.limit)
+    return np.where(known, patches.limit, patches.limit[known].max() if known.any() else 1.0)
+
+
+def voltage_gain(patches: Reach) -> Array:
+    """Voltages (k, n) per modal force without limits: Φ_V⁻¹, or those of least weighted residual.
+
+    Of many that do, the smallest relative to `voltage_scale`.
+    """
+    (n, k), served = patches.Phi_V.shape, patches.served
+    if k == served and patches.serves_all:
+        return as_floats(np.linalg.inv(patches.Phi_V[:served]) @ np.eye(served, n))
+    W_sqrt = patches.in_order if patches.serves_all else patches.W_sqrt
+    scale = voltage_scale(patches)
+    gain: Array = scale[:, None] * np.linalg.pinv(W_sqrt @ patches.Phi_V * scale) @ W_sqrt
+    return gain
+
+
+def allocation(patches: Reach, *, limited: bool) -> _core.Allocation:
+    """What turns modal forces into voltages, with the limits of the patches or without."""
+    limit = patches.limit if limited else np.full_like(patches.limit, np.inf)
+    return _core.Allocation(patches.Phi_V, patches.W_sqrt, voltage_gain(patches), limit, voltage_scale(patches))
+
+
+def solve_voltages(patches: Reach, F_p: Array) -> Voltages:
+    """Voltages that produce the modal forces F_p (T, n), or as much of them as they can."""
+    F_p = np.ascontiguousarray(F_p)
+    required = F_p @ voltage_gain(patches).T
+    within_limit = allocation(patches, limited=True).solve(F_p)
+    return Voltages(required, within_limit, F_p - within_limit @ patches.Phi_V.T, patches.served)
 
 
 @dataclass(frozen=True)

@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import tempfile
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from math import ceil
+from pathlib import Path
 from statistics import median
+from typing import Any
 
 import numpy as np
+import tomli_w
 
 from ..common.arrays import Array
-from ..common.errors import SolveError
-from ..mbs.scene.analysis import TIGHTEST_TOLERANCE
+from ..common.errors import FfrobotError, SolveError
+from ..fe_models.link_file import link_keys, link_path
+from ..mbs.scene.analysis import TIGHTEST_TOLERANCE, IntegratedAnalysis
 from ..run.watcher import Watcher
 from ..scene.scene import Scene
 from .measuring import KINDS, Run, errors, run, with_analysis
@@ -170,3 +176,156 @@ def fastest(points: Sequence[Point], largest: Mapping[str, float]) -> Point | No
         if point.first.completed and all(point.error.get(kind, 0.0) <= bound for kind, bound in largest.items())
     ]
     return min(good, key=lambda point: median(point.seconds), default=None)
+
+
+Keys = dict[str, Any]
+
+# Patches that fit the modes of the scene need not fit others; where they do, this changes nothing.
+_ANY_NUMBER_OF_MODES = {"allocation": "least-squares", "mode_weights": None}
+
+
+def refined(scene: Scene, elements: float, modes: float, folder: Path) -> Scene | None:
+    """The scene with `elements` and `modes` times as many of them in every link that is given by its link file.
+
+    Written to `folder`, one file a link. None where neither changes anything: no link files, or none with such keys.
+    """
+    changed = False
+    bodies = []
+    for k, body in enumerate(scene.body):
+        if body.link is not None:
+            keys = link_keys(body.link)
+            changed |= elements != 1 and _scale_mesh(keys, elements)
+            changed |= modes != 1 and _scale_modes(keys, modes)
+            if "file" in keys["geometry"]:
+                keys["geometry"]["file"] = str((link_path(body.link).parent / keys["geometry"]["file"]).absolute())
+            path = folder / f"{k}_{elements:g}_{modes:g}_{body.name}.toml"
+            path.write_text(tomli_w.dumps(keys), encoding="utf-8")
+            body = body.model_copy(update={"link": path})
+        bodies.append(body)
+    update: Keys = {"body": tuple(bodies)}
+    if modes != 1:
+        update["pzt"] = tuple(layout.model_copy(update=_ANY_NUMBER_OF_MODES) for layout in scene.pzt)
+    return scene.model_copy(update=update) if changed else None
+
+
+def elements_of(scene: Scene) -> str:
+    """What the mesh tables of the link files say, for the record: "20" or "20, 40"."""
+    return _listed(scene, lambda keys: keys.get("mesh", {}))
+
+
+def modes_of(scene: Scene) -> str:
+    """Likewise for the numbers of modes."""
+    return _listed(scene, lambda keys: {"count": keys.get("modes", {}).get("count", "")})
+
+
+def _listed(scene: Scene, table: Callable[[Keys], Keys]) -> str:
+    links = [link_keys(body.link) for body in scene.body if body.link is not None]
+    values = [str(value) for keys in links for key, value in table(keys).items() if key not in ("cell", "order")]
+    return ", ".join(dict.fromkeys(values))
+
+
+def _scale_mesh(keys: Keys, factor: float) -> bool:
+    """Whether the mesh table has what can be scaled: elements of a beam, size or divisions of a solid."""
+    mesh = keys.get("mesh", {})
+    if isinstance(mesh.get("elements"), int):
+        mesh["elements"] = ceil(factor * mesh["elements"])
+    elif "size" in mesh:
+        mesh["size"] /= factor
+    elif "divisions" in mesh:
+        mesh["divisions"] = [ceil(factor * count) for count in mesh["divisions"]]
+    else:
+        return False
+    return True
+
+
+def _scale_modes(keys: Keys, factor: float) -> bool:
+    """Whether there is a number of modes to scale, and damping that fits any number."""
+    modes = keys.get("modes", {})
+    if not isinstance(modes.get("count"), int) or isinstance(keys.get("damping", {}).get("ratio"), list):
+        return False
+    modes["count"] = ceil(factor * modes["count"])
+    return True
+
+
+# Times the elements and the modes of the link files; the last of each stands for the exact solution.
+ELEMENTS, MODES = (0.5, 1.0, 2.0, 4.0), (0.5, 1.0, 1.5, 2.0)
+UNSEEN = 0.1  # of the scene's tolerance, where time integration must not be seen
+
+
+def measure_axes(scene: Scene, analysis: IntegratedAnalysis, budget: float, display: Watcher) -> list[Row]:
+    """Rows of errors along each axis; runs that fail, or take longer than `budget` (s), stay as rows without errors.
+
+    "mesh" compares with four times the elements, "modes" with twice the modes, on that mesh, "time" with a tenth of the
+    tolerance (time integration alone), "total" the scene as it is with all three: at most the sum of the others. What
+    the link files do not let change is left out: scenes of rigid or ready-made modal bodies have "time" alone.
+    """
+    tight = max(TIGHTEST_TOLERANCE, UNSEEN * analysis.tolerance)
+    rows: list[Row] = []
+    with tempfile.TemporaryDirectory(prefix="ffrobot-bench-") as name:
+        trial = _Trials(scene, analysis, budget, display, Path(name))
+        fine = ELEMENTS[-1] if trial(ELEMENTS[-1], 1.0, tight) is not None else 1.0
+        axes = {"mesh": [(f, 1.0) for f in ELEMENTS], "modes": [(fine, f) for f in MODES]}
+        for axis, factors in axes.items():
+            best = trial(*factors[-1], tight)
+            if best is not None:
+                rows += [trial.row(axis, *factor, tight, best) for factor in factors[:-1]]
+        rows.append(trial.row("time", 1.0, 1.0, analysis.tolerance, trial(1.0, 1.0, tight)))
+        everything = trial(fine, MODES[-1], tight)
+        if everything is not None:
+            rows.append(trial.row("total", 1.0, 1.0, analysis.tolerance, everything))
+    return rows
+
+
+class _Trials:
+    """Runs of one analysis with links refined; each combination once."""
+
+    def __init__(
+        self, scene: Scene, analysis: IntegratedAnalysis, budget: float, display: Watcher, folder: Path
+    ) -> None:
+        self.scene, self.analysis, self.budget, self.display, self.folder = scene, analysis, budget, display, folder
+        self.done: dict[tuple[float, float, float], Run | str] = {}
+
+    def __call__(self, elements: float, modes: float, tolerance: float) -> Run | str | None:
+        """The run, why there is none, or None where the link files do not let elements or modes change."""
+        key = (elements, modes, tolerance)
+        if key not in self.done:
+            scene = self._scene(elements, modes)
+            if scene is None:
+                return None
+            self.display.stage(f"{elements:g} × elements, {modes:g} × modes, tolerance {tolerance:.0e}")
+            self.done[key] = self._run(scene, tolerance)
+        return self.done[key]
+
+    def row(self, axis: str, elements: float, modes: float, tolerance: float, best: Run | str | None) -> Row:
+        """The error of a combination against the run `best`."""
+        found, scene = self(elements, modes, tolerance), self._scene(elements, modes)
+        assert scene is not None
+        completed = isinstance(found, Run) and found.completed
+        error: dict[str, float] = {}
+        if completed and isinstance(best, Run) and isinstance(found, Run):
+            error = errors(found.histories, best.histories)
+        return {
+            "axis": axis,
+            "times": modes if axis == "modes" else elements,
+            "elements": elements_of(scene),
+            "modes": modes_of(scene),
+            "tolerance": tolerance,
+            "status": found.status if isinstance(found, Run) else "refused",
+            "against": best.status if isinstance(best, Run) else "refused",
+            "why": found if isinstance(found, str) else best if isinstance(best, str) else None,
+            "integrator": found.integrator if isinstance(found, Run) else None,
+            "seconds": found.seconds if isinstance(found, Run) else None,
+            **{f"error_{kind}": error.get(kind) for kind in KINDS},
+        }
+
+    def _scene(self, elements: float, modes: float) -> Scene | None:
+        if elements == modes == 1.0:
+            return self.scene
+        return refined(self.scene, elements, modes, self.folder)
+
+    def _run(self, scene: Scene, tolerance: float) -> Run | str:
+        name = self.analysis.name
+        try:
+            return run(with_analysis(scene, name, tolerance=tolerance), name, self.budget, self.display)
+        except FfrobotError as error:  # such as more modes than half the mesh has
+            return str(error).replace(f"{self.folder}/", "").splitlines()[0]

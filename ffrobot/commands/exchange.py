@@ -70,8 +70,7 @@ def import_(
     MOTION.json (a JointTrajectory) and bags of ROS (the first JointTrajectory, else JointStates) become waypoints,
     which trajectories of joints take as `waypoints = "PATH.csv"`.
     """
-    from ..exchange.export import MOTIONS, READERS, import_body, import_motion
-    from ..exchange.present import print_export, print_import
+    from ..exchange.export import MOTIONS, READERS, import_body, import_motion, print_export, print_import
     from ..exchange.urdf.import_urdf import import_urdf
     from ..exchange.urdf.shape_masses import Filling
     from ..present.summary import summary_console
@@ -150,8 +149,7 @@ def export(file: Path, file_format: str, analysis: str | None, output: Path | No
     fmu               of a scene: FMI 2.0, co-simulation, of a forward motion under torques and voltages
     """  # noqa: D301 (click wants the backspace itself)
     from ..common.hdf5 import reading
-    from ..exchange.export import export_file
-    from ..exchange.present import print_export
+    from ..exchange.export import export_file, print_export
     from ..present.summary import summary_console
 
     with reading(file):

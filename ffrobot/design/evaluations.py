@@ -24,7 +24,7 @@ from ..results.file import Results
 from ..sweep.runs import RESULTS
 from ..sweep.sweep import Key
 from .designs import Design, Designs, Point, repeated_steps
-from .problem import Limit, Problem
+from .goals import Limit, Problem
 from .readings import Followed, Goal, Peak, Reading, parts
 from .variables import Place, Space
 

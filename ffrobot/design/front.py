@@ -21,12 +21,11 @@ from ..run.watcher import Watcher
 from .designs import Designs, changes_for, may_repeat, runs_of
 from .evaluations import Evaluated, Evaluations, SpentError
 from .finding import CsvFile, Finding, Section, floats, numbers, with_unit
-from .goals import parse_goal
+from .goals import KEPT, Limit, Problem, parse_goal, read_problem
 from .local_search import AIM, search_from
 from .optimality import Differentiation, Optimality
 from .optimise import MOST, TOLERANCE, check_bounds, check_start
 from .optimum_record import parallel, states_of
-from .problem import KEPT, Limit, Problem, read_problem
 from .readings import Goal, Reading
 from .variables import Place, Space, read_space
 

@@ -19,8 +19,8 @@ from scipy.optimize import Bounds, NonlinearConstraint, differential_evolution, 
 
 from ..common.arrays import Array, as_floats
 from .evaluations import Evaluated, Evaluations, SpentError
+from .goals import KEPT
 from .optimality import Conflict, Differentiation, Optimality, Slopes, conflict, optimality
-from .problem import KEPT
 from .variables import Place, Space
 
 AIM = 1e-4  # gradient of the Lagrangian, of the objective over a number's range, at an optimum

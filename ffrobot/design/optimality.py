@@ -36,7 +36,7 @@ from ..common.arrays import Array, as_floats
 from ..sweep.sweep import Key
 from .derivatives import Base, exact_entries, weights
 from .evaluations import Evaluated, Evaluations
-from .problem import KEPT
+from .goals import KEPT
 from .readings import Followed
 from .variables import Place
 

@@ -21,10 +21,10 @@ from ..run.watcher import Watcher
 from ..sweep.files import run_files
 from .designs import Designs, Runs, changes_for, may_repeat, runs_of
 from .evaluations import Evaluations, SpentError, write_designs
+from .goals import read_problem, with_motors
 from .local_search import Local, best_of, combinations, evolve, rank, search_from, try_all
 from .optimality import Differentiation
 from .optimum_record import Optimum
-from .problem import read_problem, with_motors
 from .variables import Place, Space, read_space
 
 Method = Literal["auto", "slsqp", "trust-constr", "differential-evolution", "all"]

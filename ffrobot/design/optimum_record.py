@@ -13,9 +13,9 @@ from ..pictures.studies.study import Axis, Diagram, Numbers, Parallel, Progress,
 from ..results.verdict import Verdict
 from .evaluations import Evaluated
 from .finding import CsvFile, Finding, Section, numbers, with_unit
+from .goals import KEPT, Limit, Problem
 from .local_search import AIM, Local
 from .optimality import Conflict, Optimality
-from .problem import KEPT, Limit, Problem
 from .readings import Reading
 from .variables import Space, Variable
 

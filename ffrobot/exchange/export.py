@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from rich.console import Console
 
 from ..common.errors import InputError, quoted
 from ..common.files import check_new_file, check_new_folder, check_output, write_atomically
@@ -16,15 +17,16 @@ from ..common.tables import shown
 from ..common.toml_files import read_text
 from ..fe_models.modal_body import ModalBody
 from ..fe_models.modal_body_file import FORMAT, is_modal_body_file, read_modal_body, write_modal_body
+from ..present.lines import plain_table
 from .bodies.craig_bampton import craig_bampton_file
 from .bodies.exudyn import exudyn_file
 from .bodies.mbdyn import fem_text, read_fem
 from .bodies.sid import read_sid, sid_text
 from .fmu.forward_fmu import forward_fmu
 from .fmu.linear_fmu import linear_fmu
-from .motion.read_motion import read_motion
-from .motion.rosbag import csv_text, joint_trajectory_bag, joint_trajectory_text, robot_motion
+from .motion.read_motion import csv_text, joint_trajectory_bag, joint_trajectory_text, read_motion, robot_motion
 from .urdf.export_urdf import scene_as_urdf
+from .urdf.import_urdf import Imported
 
 Content = str | bytes | Mapping[str, bytes]
 """Of a file, or the files of a folder by name."""
@@ -197,3 +199,66 @@ def import_body(path: Path, output: Path) -> Exported:
     check_output(output, FORMAT)
     write_modal_body(output, body)
     return Exported(output, f"{body.name}, {body.modes_in_words}, interfaces {', '.join(body.interfaces)}", remarks)
+
+
+UNITS = {"revolute": "rad", "prismatic": "m"}
+
+
+def print_import(imported: Imported, console: Console) -> None:
+    """A line on the whole, tables of joints and of what meshes say, remarks, files."""
+    robot, scene = imported.robot, imported.scene
+    moving = [joint for joint in scene["joint"] if joint["type"] != "weld"]
+    mass = sum(body["rigid"]["mass"] for body in scene["body"] if "rigid" in body)
+    console.print(
+        f"{robot.name}: {len(robot.links)} links and {len(robot.joints)} joints, of which {len(scene['body'])} bodies"
+        f" and {len(moving)} joints move; {mass:.6g} kg in rigid bodies",
+        highlight=False, soft_wrap=True,
+    )  # fmt: skip
+    table = plain_table("joint", "type", "range", "moment or force", "speed", "damping", "friction")
+    for joint in moving:
+        low_high = joint.get("position_limit")
+        table.add_row(
+            joint["name"],
+            joint["type"],
+            f"{low_high[0]:.4g} … {low_high[1]:.4g} {UNITS[joint['type']]}" if low_high else "–",
+            *(f"{joint[key]:.4g}" if key in joint else "–"
+              for key in ("moment_limit", "speed_limit", "viscous_friction", "coulomb_friction")),
+        )  # fmt: skip
+    console.print(table)
+    if imported.masses:
+        _print_masses(imported, console)
+    for remark in imported.remarks:
+        console.print(f"note       {remark}", highlight=False, soft_wrap=True, markup=False)
+    _print_files(imported.files, console)
+
+
+def print_export(exported: Exported, console: Console) -> None:
+    """What was written, and what the format does not carry."""
+    for remark in exported.remarks:
+        console.print(f"note       {remark}", highlight=False, soft_wrap=True, markup=False)
+    console.print(f"written    {exported.path}: {exported.what}", highlight=False, soft_wrap=True, markup=False)
+
+
+def _print_masses(imported: Imported, console: Console) -> None:
+    table = plain_table(
+        "link", "mesh", "mass kg", "volume m³", "implied kg/m³", "inertia: mesh / URDF", "centers apart m"
+    )
+    for each in imported.masses:
+        inertial = imported.robot.links[each.link].inertial
+        mass = inertial.mass if inertial is not None else 0.0
+        table.add_row(
+            each.link, "closed" if each.is_closed else "open", f"{mass:.4g}", f"{each.volume:.3g}",
+            f"{each.density:.4g}", f"{each.inertia_ratio:.3g}", f"{each.center_distance:.2g}",
+        )  # fmt: skip
+    console.print()
+    console.print(table)
+    console.print(
+        "note       meshes are skins: a filled one has the stiffness of no real casting; links are rigid unless"
+        " --flexible names a file",
+        highlight=False, soft_wrap=True,
+    )  # fmt: skip
+
+
+def _print_files(files: tuple[Path, ...], console: Console) -> None:
+    for path in files:
+        console.print(f"written    {path}", highlight=False, soft_wrap=True, markup=False)

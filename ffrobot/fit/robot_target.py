@@ -13,9 +13,8 @@ from typing import Any
 
 import tomli_w
 
-from ..actuation.control.linear_model import LinearModel
-from ..actuation.control.linear_models import LinearModels
-from ..actuation.control.modes import locked_frequencies, robot_modes
+from ..actuation.control.linear import LinearModels
+from ..actuation.control.linear_model import LinearModel, locked_frequencies, robot_modes
 from ..common.arrays import Array, as_floats
 from ..common.errors import InputError
 from ..common.toml_files import load_toml, read_text

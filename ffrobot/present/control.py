@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 from rich.table import Table
 
-from ..actuation.control.linear_models import LinearModels
+from ..actuation.control.linear import LinearModels
 from ..actuation.control.loop_record import LoopRecord
 from ..actuation.control.metrics import DEFINITIONS
 from ..actuation.control.placement import Placed

@@ -9,8 +9,7 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from ..actuation.patches.patches import PatchArray
-from ..actuation.patches.reach import Voltages
+from ..actuation.patches.patches import PatchArray, Voltages
 from ..common.arrays import Array
 from ..mbs.analysis.motors_only import AroundPath, describe_zeros, is_minimum_phase
 from ..mbs.analysis.outcome import Details, Outcome

@@ -12,8 +12,7 @@ import numpy as np
 from ..actuation.feasibility import Feasibility, Unsupplied
 from ..actuation.motors import MotorFeasibility
 from ..actuation.patches.composite import StructureEffect
-from ..actuation.patches.patches import PatchArray
-from ..actuation.patches.reach import Voltages
+from ..actuation.patches.patches import PatchArray, Voltages
 from ..actuation.patches.records import PztLayout
 from ..actuation.points import PointForces, PointSet
 from ..common.arrays import Array

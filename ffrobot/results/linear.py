@@ -10,14 +10,13 @@ from typing import TYPE_CHECKING, Any
 import h5py
 import numpy as np
 
-from ..actuation.control.linear_model import LinearModel, save_arrays
-from ..actuation.control.modes import Zeros
+from ..actuation.control.linear_model import LinearModel, Zeros, save_arrays
 from ..common.arrays import Array
 from ..mbs.quantities.motion import RobotMotion
 from ..mbs.solve.joint_conditions import COMPLIANT, LOCKED, translational_stiffness
 
 if TYPE_CHECKING:  # most scenes have none of these
-    from ..actuation.control.linear_models import LinearModels
+    from ..actuation.control.linear import LinearModels
     from ..actuation.control.loop_record import LoopRecord
     from ..actuation.control.metrics import Metrics
     from ..mbs.analysis.static import RobotAtRest

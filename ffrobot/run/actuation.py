@@ -10,7 +10,7 @@ import numpy as np
 from ..actuation.feasibility import Feasibility
 from ..actuation.judgement import judge_actuators, links_in_motion
 from ..actuation.patches.link_patches import LinkPatches, by_body, check_reach, link_patches, on_kept_modes
-from ..actuation.patches.reach import Voltages
+from ..actuation.patches.patches import Voltages
 from ..actuation.points import PointSet, make_point_set
 from ..common.arrays import Array
 from ..mbs.model.drives import Drive

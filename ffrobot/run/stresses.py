@@ -8,8 +8,7 @@ import numpy as np
 
 from ..actuation.patches.composite import Placed, section_loads
 from ..actuation.patches.link_patches import LinkPatches
-from ..actuation.patches.patches import PatchArray
-from ..actuation.patches.reach import voltage_gain
+from ..actuation.patches.patches import PatchArray, voltage_gain
 from ..common.arrays import Array
 from ..fe_models.modal_body import ModalBody
 from ..mbs.model.body import Body

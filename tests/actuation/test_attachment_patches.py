@@ -5,7 +5,7 @@ import pytest
 from patches_on_links import SCENE, on_link, planar_body
 
 from ffrobot.actuation.patches.link_patches import check_reach, on_kept_modes
-from ffrobot.actuation.patches.reach import voltage_gain
+from ffrobot.actuation.patches.patches import voltage_gain
 from ffrobot.common.errors import InputError
 from ffrobot.fe_models.link import cached_modal_body
 from ffrobot.mbs.model.truncation import with_fewer_modes

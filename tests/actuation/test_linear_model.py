@@ -9,8 +9,7 @@ from oracle_runs import energies, evaluated
 from scipy.io import loadmat
 from scipy.optimize import brentq
 
-from ffrobot.actuation.control.linear_model import state_space
-from ffrobot.actuation.control.modes import controllability, observability, robot_modes, zeros
+from ffrobot.actuation.control.linear_model import controllability, observability, robot_modes, state_space, zeros
 from ffrobot.common.errors import InputError
 from ffrobot.mbs.model.model import without_paths
 from ffrobot.mbs.solve.linearisation import LinearEquations

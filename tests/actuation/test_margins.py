@@ -3,17 +3,19 @@
 import numpy as np
 import pytest
 
-from ffrobot.actuation.control.linear_model import LinearModel
-from ffrobot.actuation.control.margins import joint_gains, lowest_frequency, margins, spectral_radius
-from ffrobot.actuation.control.modes import locked_frequencies
-from ffrobot.actuation.control.records import JointPid
-from ffrobot.actuation.control.suggestion import (
+from ffrobot.actuation.control.linear_model import LinearModel, locked_frequencies
+from ffrobot.actuation.control.margins import (
     FRACTION,
     advice,
+    joint_gains,
     joint_inertia,
     light_roots,
+    lowest_frequency,
+    margins,
+    spectral_radius,
     suggested_gains,
 )
+from ffrobot.actuation.control.records import JointPid
 from ffrobot.results.file import Results
 from ffrobot.results.write import results_image
 from ffrobot.run.solve import solve_scene

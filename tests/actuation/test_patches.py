@@ -8,7 +8,7 @@ import pytest
 from patches_on_links import SCENE, bent, layout, modes_in_the_plane, on_link, patches, planar_body, tip_deflection
 
 from ffrobot.actuation.patches.link_patches import check_reach, link_patches
-from ffrobot.actuation.patches.reach import solve_voltages
+from ffrobot.actuation.patches.patches import solve_voltages
 from ffrobot.common.errors import InputError
 from ffrobot.fe_models.link import cached_modal_body
 from ffrobot.fe_models.modal_body import OutlinedPatches

@@ -7,8 +7,7 @@ import re
 import pytest
 
 from ffrobot import InputError
-from ffrobot.bench.campaign import as_text
-from ffrobot.bench.figures import TIME
+from ffrobot.bench.campaign import TIME, as_text
 from ffrobot.bench.measuring import Run
 from ffrobot.bench.precision import Point, _is_hopeless
 from ffrobot.cli import cli

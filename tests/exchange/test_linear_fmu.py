@@ -18,8 +18,8 @@ from scipy.signal import lsim
 
 from ffrobot import Results
 from ffrobot.actuation.control.linear_model import LinearModel
+from ffrobot.exchange.fmu.forward_model import joint_units
 from ffrobot.exchange.fmu.linear_fmu import make_unit
-from ffrobot.exchange.fmu.variables import joint_units
 
 LINK = """
 name = "arm"

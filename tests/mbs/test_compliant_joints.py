@@ -10,8 +10,7 @@ from patch_sets import Patches
 from rods import rod
 from scipy.integrate import simpson
 
-from ffrobot.actuation.control.linear_model import state_space
-from ffrobot.actuation.control.modes import robot_modes
+from ffrobot.actuation.control.linear_model import robot_modes, state_space
 from ffrobot.actuation.motors import judge_motors
 from ffrobot.common.errors import InputError
 from ffrobot.mbs.analysis.gears import unresolved_gears, with_motor_coordinates

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from ffrobot.pictures.body_surface import AMPLITUDE, body_surface, coarsened, drawn_mode
 from ffrobot.pictures.report.modes import MAX_TRIANGLES
+from ffrobot.pictures.shapes import AMPLITUDE, body_surface, coarsened, drawn_mode
 from ffrobot.results.file import Results
 
 

@@ -9,10 +9,9 @@ from scipy.spatial.transform import Rotation
 from selenium.webdriver import ActionChains
 
 from ffrobot.common.errors import InputError
-from ffrobot.pictures.markers import joint_markers
-from ffrobot.pictures.motion import moving_bodies
+from ffrobot.pictures.motion import joint_markers, moving_bodies
 from ffrobot.pictures.report import write_report
-from ffrobot.pictures.report.histories import history_charts
+from ffrobot.pictures.report.charts import history_charts
 from ffrobot.pictures.report.runs import runs
 from ffrobot.pictures.report.tables import peaks_table
 from ffrobot.pictures.shapes import Shape, thickened

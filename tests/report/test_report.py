@@ -16,11 +16,9 @@ from ffrobot.common.errors import InputError, SolveError
 from ffrobot.common.version import program_version
 from ffrobot.pictures.figures.shared import bending_points
 from ffrobot.pictures.figures.standard import standard_figures
-from ffrobot.pictures.markers import targets
-from ffrobot.pictures.motion import topology
+from ffrobot.pictures.motion import targets, topology
 from ffrobot.pictures.report import write_report
-from ffrobot.pictures.report.charts import MAX_POINTS, kept_outputs
-from ffrobot.pictures.report.histories import history_charts
+from ffrobot.pictures.report.charts import MAX_POINTS, history_charts, kept_outputs
 from ffrobot.pictures.report.runs import distinct_parts, runs
 from ffrobot.pictures.report.tables import peaks_table
 from ffrobot.results.file import Results

@@ -8,7 +8,7 @@ import pytest
 from table import at_most
 
 from ffrobot.actuation.patches.link_patches import check_reach, link_patches
-from ffrobot.actuation.patches.reach import solve_voltages
+from ffrobot.actuation.patches.patches import solve_voltages
 from ffrobot.actuation.patches.records import PztLayout
 from ffrobot.common.errors import InputError
 from ffrobot.mbs.model.body import from_modal_body

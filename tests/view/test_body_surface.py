@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from ffrobot import make_link
-from ffrobot.pictures.body_surface import AMPLITUDE, body_surface, drawn_mode
+from ffrobot.pictures.shapes import AMPLITUDE, body_surface, drawn_mode
 
 STEEL = "material = { youngs_modulus = 2.1e11, poissons_ratio = 0.3, density = 7850.0 }\n"
 RECTANGLE = 'section = { shape = "rectangle", height = 0.02, width = 0.03 }'

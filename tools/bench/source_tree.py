@@ -7,8 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from ffrobot.bench import OF_A_SCENE, PEER
-from ffrobot.bench.campaign import Campaign, Swept, inputs_of
-from ffrobot.bench.figures import draw_growth, draw_work_precision
+from ffrobot.bench.campaign import Campaign, Swept, draw_growth, draw_work_precision, inputs_of
 from ffrobot.bench.measuring import find_analysis
 from ffrobot.common.errors import InputError
 from ffrobot.run.solve import prepare_scene

@@ -16,8 +16,7 @@ import numpy as np
 from ...actuation.control.linear_model import LinearModel
 from ...common.arrays import Array
 from ...mbs.analysis.forward import Forward
-from .forward_model import ForwardUnit
-from .variables import UNITS, Variable, derivatives_of
+from .forward_model import UNITS, ForwardUnit, Variable, derivatives_of
 
 SOURCE = "linear.c"
 VIBRATION = 1e-6  # imaginary part of a pole over its size, from which it counts as one

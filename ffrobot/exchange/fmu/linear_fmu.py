@@ -22,7 +22,7 @@ from ...common.arrays import Array
 from ...common.errors import InputError
 from ...results.file import Results
 from .description import PLATFORMS, SOURCE, Unit, identifier_of, model_description, zipped
-from .variables import inputs_of, joint_units, outputs_of, states_of
+from .forward_model import inputs_of, joint_units, outputs_of, states_of
 
 
 def linear_fmu(path: Path, analysis: str | None) -> tuple[bytes, str, str, tuple[str, ...]]:

@@ -11,8 +11,8 @@ from matplotlib.figure import Figure
 from ...common.arrays import Array, Integers
 from ...fe_models.modal_body import ModalBody
 from ...mesh.inspection import Inspection
-from ..body_surface import AMPLITUDE, body_surface, drawn_mode
 from ..projection import COLORS, LINK, View
+from ..shapes import AMPLITUDE, body_surface, drawn_mode
 from .parallel import EDGE, directions, lit, normals, projected
 from .style import ORDERED
 

@@ -11,8 +11,7 @@ from ...common.arrays import Array
 from ...common.errors import InputError
 from ...common.rotations import in_3d
 from ...results.file import Results
-from ..markers import ground_places
-from ..motion import MovingBody, moving_bodies, size_of, visible_exaggeration
+from ..motion import MovingBody, ground_places, moving_bodies, size_of, visible_exaggeration
 from ..projection import COLORS, FRONT, PLANE, SIDE, SPACE
 from ..shapes import Shape, line_shape, surface_shape
 from .figure_file import Curve, FigureRecord

@@ -15,12 +15,21 @@ from matplotlib.figure import Figure
 
 from ...common.arrays import Array, Indices, Integers
 from ...results.file import Results
-from ..body_surface import coarsened, triangles_of
-from ..markers import Marker, Target, ground_places, joint_markers, targets, tool_marker, tool_markers
-from ..motion import moving_bodies, size_of, visible_exaggeration
+from ..motion import (
+    Marker,
+    Target,
+    ground_places,
+    joint_markers,
+    moving_bodies,
+    size_of,
+    targets,
+    tool_marker,
+    tool_markers,
+    visible_exaggeration,
+)
 from ..movie_file import Frame, MovieOptions, check_movie, movie_outputs, moving_analysis, write_movie
 from ..projection import AXIS_LENGTH, COLORS, PLANE, SPACE, TOOL_COLORS, TOOL_LENGTH
-from ..shapes import surface_shape, thickened
+from ..shapes import coarsened, surface_shape, thickened, triangles_of
 from .parallel import directions, lit, normals, projected
 from .style import literal, style
 

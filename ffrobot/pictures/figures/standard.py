@@ -277,10 +277,12 @@ def _voltages(results: Results) -> Iterator[FigureRecord]:
 def _linear(results: Results) -> Iterator[FigureRecord]:
     """Places of patches; of linear models the mode shapes of the robot, and responses to the first input."""
     for analysis in results.analyses:
-        for kind, group, what in (("placement", "placement", "patches"), ("modes", "linear", "modes")):
-            if results.has(f"{analysis}/{group}"):
-                name, title = file_name(kind, analysis), f"{what}, {analysis}"
-                yield FigureRecord(name=name, title=title, kind=kind, analysis=analysis)
+        if results.has(f"{analysis}/placement"):
+            name, title = file_name("placement", analysis), f"patches, {analysis}"
+            yield FigureRecord(name=name, title=title, kind="placement", analysis=analysis)
+        if results.has(f"{analysis}/linear"):
+            name, title = file_name("modes", analysis), f"modes, {analysis}"
+            yield FigureRecord(name=name, title=title, kind="modes", analysis=analysis)
         yield from islice(_responses_of(results, analysis), 1)
 
 

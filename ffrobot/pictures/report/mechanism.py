@@ -9,11 +9,19 @@ from typing import Any
 import numpy as np
 
 from ...common.arrays import Array, Indices
-from ..body_surface import coarsened, triangles_of
-from ..markers import Marker, Target, ground_places, joint_markers, targets, tool_markers
-from ..motion import MovingBody, moving_bodies, visible_exaggeration
+from ..motion import (
+    Marker,
+    MovingBody,
+    Target,
+    ground_places,
+    joint_markers,
+    moving_bodies,
+    targets,
+    tool_markers,
+    visible_exaggeration,
+)
 from ..projection import AXIS_LENGTH, COLORS, PLANE, SPACE, TOOL_COLORS, TOOL_LENGTH
-from ..shapes import surface_shape, thickened
+from ..shapes import coarsened, surface_shape, thickened, triangles_of
 from .charts import encoded, plain
 from .runs import Run
 

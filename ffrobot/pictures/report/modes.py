@@ -14,9 +14,9 @@ import numpy as np
 from ...common.arrays import Array, Integers
 from ...common.errors import InputError
 from ...fe_models.modal_body import ModalBody
-from ..body_surface import AMPLITUDE, body_surface, coarsened, drawn_mode, triangles_of
 from ..figures.shared import file_name
 from ..projection import UP, VIEWER
+from ..shapes import AMPLITUDE, body_surface, coarsened, drawn_mode, triangles_of
 from .charts import Chart, encoded, shades
 from .runs import Run
 

@@ -14,9 +14,8 @@ from ...common.outputs import check_not_an_input
 from ...common.version import program_version
 from ...results.file import Results
 from ..studies.study import Study, read_study, study_files
-from .charts import Chart
+from .charts import Chart, folded, history_charts
 from .diagrams import DrawnDiagram, StudyPart, study_parts
-from .histories import folded, history_charts
 from .mechanism import mechanism
 from .modes import link_modes, surface_modes
 from .runs import runs, sources

@@ -13,9 +13,9 @@ from ...results.file import Results, status_in_words
 from ...results.joints import joint_coordinates
 from ...results.verdict import AnalysisVerdict, millimeters, number
 from ..figures.shared import bending_points
-from ..markers import targets
+from ..motion import targets
+from .charts import path_error
 from .diagrams import StudyPart
-from .histories import path_error
 from .runs import Run, sources
 
 

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from ...common.arrays import Array
-from ..body_surface import drawn_mode
 from ..projection import AXIS_LENGTH, LINK, SPACE, TOOL_COLORS, TOOL_LENGTH, View
+from ..shapes import drawn_mode
 
 SIZE, MOVIE_SIZE = (1400, 800), (960, 576)  # pixels, at most so wide
 NARROWEST = 1.1  # width over height

@@ -15,8 +15,7 @@ from ...common.files import check_folder, write_atomically
 from ...fe_models.modal_body_file import is_modal_body_file, read_modal_body
 from ...results.file import Results
 from ..figures.shared import file_name
-from ..markers import Marker, ground_places, joint_markers, targets, tool_markers
-from ..motion import moving_bodies, visible_exaggeration
+from ..motion import Marker, ground_places, joint_markers, moving_bodies, targets, tool_markers, visible_exaggeration
 from ..movie_file import Frame, MovieOptions, check_movie, movie_outputs, moving_analysis, write_movie
 from .pictures import Picture, draw_pictures
 from .vtkhdf import Grid, modes_grid, results_grid, vtkhdf_image

@@ -18,9 +18,8 @@ from ...common.errors import InputError
 from ...fe_models.modal_body import ModalBody
 from ...mbs.quantities.stress import surface_stress, von_mises
 from ...results.file import Results
-from ..body_surface import body_surface
 from ..motion import moving_bodies
-from ..shapes import surface_shape
+from ..shapes import body_surface, surface_shape
 
 # VTK's number of the cell with so many corners: vertex, line, triangle, quadrilateral.
 CELL_TYPE = {1: 1, 2: 3, 3: 5, 4: 9}
