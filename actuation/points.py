@@ -183,12 +183,7 @@ def _automatic(key: str, name: str, body: ModalBody | None, spatial: Body, axes:
 def _named(name: str, axes: tuple[str, ...], points: list[BodyPoint], spatial: Body) -> PointSet:
     per_length, per_mass = np.full(3, 1.0 / _length_of(spatial)), np.full(spatial.n_modes, np.sqrt(spatial.mass))
     scale = np.concatenate([np.ones(3), per_length, per_mass])
-    return PointSet(name, _point_names(len(points)), axes, tuple(points), scale)
-
-
-def _point_names(count: int) -> tuple[str, ...]:
-    """What the points of so many components are called in results."""
-    return tuple(f"actuation{k}" for k in range(1, count + 1))
+    return PointSet(name, tuple(f"actuation{k}" for k in range(1, len(points) + 1)), axes, tuple(points), scale)
 
 
 def _length_of(body: Body) -> float:

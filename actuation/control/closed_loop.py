@@ -58,17 +58,14 @@ def needed_sensors(robot: Robot, controllers: Sequence[Record]) -> Iterator[Sens
                 yield Sensor(joint=joint)
                 yield Sensor(joint=joint, measure="rate")
         if isinstance(record, ModalVelocity | Lqr):
-            bodies = record.bodies if isinstance(record, ModalVelocity) else _bending(robot, record.sensor)
+            bending = robot.patches if record.sensor == "pzt" else robot.links
+            bodies = record.bodies if isinstance(record, ModalVelocity) else tuple(bending)
             for body in bodies:
                 if record.sensor == "pzt":
                     yield from (Sensor(pzt=layout) for layout in robot.patches[body].layouts)
                 else:
                     yield Sensor(modal=body)
                     yield Sensor(modal=body, measure="rate")
-
-
-def _bending(robot: Robot, sensor: str) -> list[str]:
-    return list(robot.patches if sensor == "pzt" else robot.links)
 
 
 def make_controller(record: Record, setup: Setup, beside: Sequence[Record]) -> Controller:

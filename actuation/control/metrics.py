@@ -152,7 +152,7 @@ def resting(place_at: Callable[[Array], Array], time: Array) -> tuple[Array, Arr
 
 def watched(end: float, window: float, lowest: float) -> Array:
     """(2 `WATCHED` + 1,) s: times over the `window` (s) before `end`, the last half of them in a period of `lowest`."""
-    begin = end - _period(window, lowest)
+    begin = end - (min(window, 1.0 / lowest) if lowest > 0.0 else window)
     before = np.linspace(end - window, begin, WATCHED, endpoint=False)
     found: Array = np.concatenate([before, np.linspace(begin, end, WATCHED + 1)])
     return found
@@ -170,10 +170,6 @@ def vibration(time: Array, error: Array, window: float, lowest: float) -> float:
     left = values - _slower(t, values, lowest)
     last = left[t >= t[-WATCHED - 1]]
     return float(np.sqrt(max(((last - one) ** 2).sum(axis=1).max() for one in last)))
-
-
-def _period(window: float, lowest: float) -> float:
-    return min(window, 1.0 / lowest) if lowest > 0.0 else window
 
 
 def _slower(t: Array, values: Array, lowest: float) -> Array:

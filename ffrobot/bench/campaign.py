@@ -96,7 +96,10 @@ def about_machine() -> dict[str, object]:
         "cores": os.cpu_count(),
         "system": platform.platform(),
         "compiler": _core.build,
-        "versions": {"python": platform.python_version(), **{name: _version(name) for name in LIBRARIES}},
+        "versions": {
+            "python": platform.python_version(),
+            **{name: str(import_module(name).__version__) for name in LIBRARIES},
+        },
         "threads": {name: os.environ.get(name) for name in THREADS},
     }
 
@@ -109,10 +112,6 @@ def load() -> float:
 def content_hash(text: str) -> str:
     """SHA-256 of a text."""
     return hashlib.sha256(text.encode()).hexdigest()
-
-
-def _version(library: str) -> str:
-    return str(import_module(library).__version__)  # Debian's packages need not have metadata
 
 
 def _processor() -> str:

@@ -229,7 +229,7 @@ class Evaluations:
         return self._followed[known]
 
     def _words(self, point: Point) -> str:
-        return ", ".join(f"{'.'.join(key)} = {_number(v)}" for key, v in zip(self.space.keys, point, strict=True))
+        return ", ".join(f"{'.'.join(key)} = {number(v)}" for key, v in zip(self.space.keys, point, strict=True))
 
 
 def write_designs(found: Evaluations, path: Path) -> None:
@@ -247,5 +247,6 @@ def write_designs(found: Evaluations, path: Path) -> None:
     write_atomically(path, text.getvalue().encode(), "table of designs", ours=True)
 
 
-def _number(value: object) -> str:
+def number(value: object) -> str:
+    """Of a key, in words."""
     return f"{value:.6g}" if isinstance(value, float) else str(value)

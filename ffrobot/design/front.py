@@ -19,7 +19,7 @@ from ..common.files import AnyPath
 from ..pictures.studies.study import Diagram, Points
 from ..run.watcher import Watcher
 from .designs import Designs, changes_for, may_repeat, runs_of
-from .evaluations import Evaluated, Evaluations, SpentError
+from .evaluations import Evaluated, Evaluations, SpentError, number
 from .finding import CsvFile, Finding, Section, floats, numbers, with_unit
 from .goals import KEPT, Limit, Problem, parse_goal, read_problem
 from .local_search import AIM, search_from
@@ -104,8 +104,7 @@ class Front(Finding):
         """Of each design both goals, what one unit less of the second costs, the keys, and what is wrong."""
         for one in self.points:
             cost = f"{-one.price:.4g}" if np.isfinite(one.price) else ""
-            keys = [f"{value:.6g}" if isinstance(value, float) else str(value) for value in one.point]
-            yield (f"{one.goal:.6g}", f"{one.against:.6g}", cost, *keys, _state(one))
+            yield (f"{one.goal:.6g}", f"{one.against:.6g}", cost, *map(number, one.point), _state(one))
 
     def remarks(self) -> Iterator[str]:
         """How it was found, and what to mind."""

@@ -11,7 +11,7 @@ import numpy as np
 from ..common.arrays import Array, as_floats
 from ..pictures.studies.study import Axis, Diagram, Numbers, Parallel, Progress, State, StudyTable, axis_of_goal
 from ..results.verdict import Verdict
-from .evaluations import Evaluated
+from .evaluations import Evaluated, number
 from .finding import CsvFile, Finding, Section, numbers, with_unit
 from .goals import KEPT, Limit, Problem
 from .local_search import AIM, Local
@@ -295,7 +295,7 @@ class Optimum(Finding):
                 bounds = (
                     f"{len(variable.rows)} rows" if variable.is_catalogue else f"{variable.low:g} to {variable.high:g}"
                 )
-                yield self.keys[k], _number(start[k]), _number(best[k]), bounds
+                yield self.keys[k], number(start[k]), number(best[k]), bounds
 
     def _limit_rows(self) -> Iterator[tuple[str, str, str, str, str]]:
         """Of each limit its text, the goal at first and in the best design, whether it is reached, its price."""
@@ -347,7 +347,3 @@ def _at(design: Evaluated, k: int) -> str:
 
 def _value(reading: Reading) -> str:
     return f"{reading.value:.6g}{' ' if reading.unit else ''}{reading.unit}"
-
-
-def _number(value: object) -> str:
-    return f"{value:.6g}" if isinstance(value, float) else str(value)

@@ -114,10 +114,9 @@ class Sensitivity(Finding):
     def logarithmic(self) -> Array:
         """(g, k) percent of the goal per percent of the key, θ/F ∂F/∂θ; NaN where F is 0."""
         with np.errstate(divide="ignore", invalid="ignore"):
-            return as_floats(np.where(self.value[:, None] == 0.0, np.nan, self.derivative * self._scale()))
-
-    def _scale(self) -> Array:
-        return self.values[None, :] / self.value[:, None]
+            return as_floats(
+                np.where(self.value[:, None] == 0.0, np.nan, self.derivative * (self.values / self.value[:, None]))
+            )
 
     def ranked(self, g: int) -> list[int]:
         """Keys by number, the largest percent per percent of goal g first; those without one by their derivative."""

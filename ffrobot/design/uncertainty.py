@@ -152,7 +152,9 @@ class _Study:
             )
         x = np.array(points[:n])[whole]
         shares, explained = regression_shares(x, values[:n][whole])
-        bands = tuple(self._sampled(m, [d for d, w in zip(designs[:n], whole, strict=True) if w]) for m in self._all())
+        complete = [design for design, is_whole in zip(designs[:n], whole, strict=True) if is_whole]
+        histories = (np.array([self._values(m, design) for design in complete]) for m in self._all())
+        bands = tuple(self._band(m, statistics(of)) for m, of in enumerate(histories))
         blocks = values.reshape(-1, count // 2, len(self._goals)) if indices else None
         found = sobol_indices(blocks[0], blocks[1], blocks[2:], seed) if blocks is not None else None
         return self._found(
@@ -212,9 +214,6 @@ class _Study:
             where = self._designs.where(design)
             raise InputError(f'--of: expected the same times of "{found.name}" in all runs, found others: {where}')
         return found.values[:, 0]
-
-    def _sampled(self, m: int, designs: Sequence[Design]) -> Band:
-        return self._band(m, statistics(np.array([self._values(m, design) for design in designs])))
 
     def _band(self, m: int, found: Statistics) -> Band:
         nominal = self._nominal[m]

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -109,10 +109,7 @@ class Space:
 
     def point(self, place: Place) -> Point:
         """The values of all keys; those that the scene has are its very own, not a rounding beside them."""
-        return tuple(value for _, values in self._of(place) for value in values)
-
-    def _of(self, place: Place) -> Iterator[tuple[Variable, tuple[Any, ...]]]:
-        return ((v, v.values(u)) for v, u in zip(self.variables, place, strict=True))
+        return tuple(value for v, u in zip(self.variables, place, strict=True) for value in v.values(u))
 
     def start(self) -> tuple[float | None, ...]:
         """Coordinates of the scene itself; None where it is out of bounds or in no catalogue."""

@@ -229,7 +229,8 @@ def print_import(imported: Imported, console: Console) -> None:
         _print_masses(imported, console)
     for remark in imported.remarks:
         console.print(f"note       {remark}", highlight=False, soft_wrap=True, markup=False)
-    _print_files(imported.files, console)
+    for path in imported.files:
+        console.print(f"written    {path}", highlight=False, soft_wrap=True, markup=False)
 
 
 def print_export(exported: Exported, console: Console) -> None:
@@ -257,8 +258,3 @@ def _print_masses(imported: Imported, console: Console) -> None:
         " --flexible names a file",
         highlight=False, soft_wrap=True,
     )  # fmt: skip
-
-
-def _print_files(files: tuple[Path, ...], console: Console) -> None:
-    for path in files:
-        console.print(f"written    {path}", highlight=False, soft_wrap=True, markup=False)

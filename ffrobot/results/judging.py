@@ -110,7 +110,7 @@ def _answer(
         ]
         return f"limits exceeded: {', '.join(lacking)}; details: ffrobot feasibility", False
     has_limits = any(motor.has_limits for motor in motors.values()) or any(
-        np.isfinite(e["available_moment"]).any() for e in _of_patches(group)
+        np.isfinite(e["available_moment"]).any() for e in group.get("feasibility/pzt", {}).values()
     )
     within = "within the limits that are given" if has_limits else "no limits are given"
     if (missed := read_unsupplied(group["feasibility"])) is not None:
@@ -127,10 +127,6 @@ def _answer(
 
 def _ended_early(group: h5py.Group) -> bool:
     return bool(group.attrs["status"] != "completed")
-
-
-def _of_patches(group: h5py.Group) -> Iterator[h5py.Group]:
-    yield from group.get("feasibility/pzt", {}).values()
 
 
 def _short(

@@ -123,7 +123,7 @@ def test_huge_numbers(huge, tmp_path):
 
 ODD = {
     "degrees": ([joint("j", "base", "a", more='<limit lower="-180" upper="180"/>')], "-180 … 180 rad are many turns"),
-    "turned in degrees": ([joint("j", "base", "a", origin='rpy="90 0 0"')], "rpy 90 0 0 rad: is it in degrees?"),
+    "turned in degrees": ([joint("j", "base", "a", origin='rpy="90 0 0"')], "rpy 90 0 0 is more than a turn"),
     "follows a fixed joint": (
         [link("b"), joint("j", "base", "a", "fixed"), joint("k", "a", "b", more='<mimic joint="j" offset="0.2"/>')],
         'joint "k" follows "j", which is fixed: its position is 0.2',

@@ -9,7 +9,6 @@ from statistics import median
 import numpy as np
 
 from ffrobot.bench.precision import Row
-from ffrobot.mbs.analysis.outcome import Outcome
 from ffrobot.run.solve import solve_scene
 from ffrobot.run.watcher import Watcher
 from ffrobot.scene.load import make_scene
@@ -59,14 +58,10 @@ def _row(scene: Scene, apply: str, integrator: str, tolerance: float, repeat: in
         "aim": AIM,
         "steps": forward.statistics.steps,
         "steps_of_pcid": pcid.statistics.steps,
-        "off": _off(pcid, forward),
+        # largest deviation of a coordinate at the outputs, of the longest way of any
+        "off": float(np.abs(forward.q - pcid.q).max() / np.ptp(pcid.q, axis=0).max()),
         "repetitions": repeat,
     }
-
-
-def _off(pcid: Outcome, forward: Outcome) -> float:
-    """Largest deviation of a coordinate at the outputs, of the longest way of any."""
-    return float(np.abs(forward.q - pcid.q).max() / np.ptp(pcid.q, axis=0).max())
 
 
 def _scene(scene: Scene, apply: str, integrator: str, tolerance: float) -> Scene:

@@ -18,7 +18,7 @@ from ...common.errors import InputError
 from ...common.tables import shown
 from ...fe_models.modal_body import Interface, ModalBody
 from ...fe_models.modal_body.invariants import LEVI_CIVITA
-from .integrals import Node, ShapeIntegrals, integrals_of, nodes_of, noted, slopes, with_agreed_masses
+from .integrals import Node, ShapeIntegrals, about_center, integrals_of, nodes_of, noted, slopes, with_agreed_masses
 from .make import NOT_IN_THE_FILE, modal_body
 
 GROUP = re.compile(r"\*\*\s*RECORD GROUP\s+(\d+)")
@@ -56,14 +56,12 @@ def fem_text(body: ModalBody) -> tuple[str, tuple[str, ...]]:
 
 
 def _integral_lines(found: ShapeIntegrals) -> Iterator[str]:
-    n, center = found.n_modes, found.first_moment / found.mass
-    J = found.inertia - found.mass * (center @ center * np.eye(3) - np.outer(center, center))
-    S = found.S_bar_kl
+    n, S = found.n_modes, found.S_bar_kl
     total = S[0, 0] + S[1, 1] + S[2, 2]
     inv9 = np.einsum("abkj->abjk", S) - np.einsum("ab,jk->abjk", np.eye(3), total)
     yield from _record(9, found.modal_mass)
     yield from _record(10, found.stiffness)
-    yield from _record(12, [[found.mass], center, *J])
+    yield from _record(12, [[found.mass], found.first_moment / found.mass, *about_center(found)])
     yield from _record(13, found.damping)
     yield from _record(14, found.S_bar)
     yield from _record(15, found.spin)

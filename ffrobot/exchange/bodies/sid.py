@@ -73,17 +73,14 @@ def _integral_lines(found: ShapeIntegrals) -> Iterator[str]:
     yield from lines_of("J", np.array([[J[k]] for k in ROWS]), np.array([slope[k] for k in ROWS])[:, :, None])
     yield from lines_of("Ct", found.S_bar.T)
     yield from lines_of("Cr", found.spin.T, found.spin_slope.transpose(1, 2, 0))
-    yield from lines_of("Me", found.modal_mass, structure=_structure(found.modal_mass))
+    is_unit = np.array_equal(found.modal_mass, np.eye(n))
+    yield from lines_of("Me", found.modal_mass, structure=IDENTITY if is_unit else None)
     yield from lines_of("Gr", found.gyroscopic.transpose(0, 2, 1).reshape(3, 3 * n))
     yield from lines_of("Ge", by_axis)
     yield from lines_of("Oe", found.centrifugal, found.centrifugal_slope.transpose(1, 2, 0))
     yield from lines_of("ksigma", np.zeros((n, 1)))
     yield from lines_of("Ke", found.stiffness)
     yield from lines_of("De", found.damping)
-
-
-def _structure(M: Array) -> int | None:
-    return 4 if np.array_equal(M, np.eye(len(M))) else None
 
 
 def read_sid(text: str, name: str) -> tuple[ModalBody, tuple[str, ...]]:

@@ -17,7 +17,6 @@ from ...mbs.fields.field_types import GROUND
 from ...mbs.joints.joint import JointRecord
 from ...mbs.joints.moving_joint import MovingJoint
 from ...mbs.joints.screw import ScrewJoint
-from ...mbs.model.body import Body
 from ...mbs.model.model import build_model
 from ...mbs.model.tree import KinematicTree, Node
 from ...mbs.solve.posture import robot_size
@@ -25,7 +24,7 @@ from ...run.bodies import LoadedBody, load_bodies
 from ...scene.load import load_scene
 from ...scene.scene import Scene
 from .names import Names
-from .robot import Inertial, Mimic, Numbers3, Origin, Primitive, Robot, UrdfJoint, UrdfLink
+from .robot import Inertial, Mimic, Origin, Primitive, Robot, UrdfJoint, UrdfLink, inertial_of, three
 from .scene import GRAVITY
 from .shape_masses import SLENDER, bars, beam_visuals
 
@@ -202,7 +201,7 @@ class UrdfOfScene:
                 name = self._link_names[f"{body.name}.{point}"]
                 self._links[name] = UrdfLink(name, None)
                 joint = self._joint_names[f"{name}.fixed"]
-                origin = Origin(_three(place - at), _three(rpy_of(body.points[point].triad)))
+                origin = Origin(three(place - at), three(rpy_of(body.points[point].triad)))
                 self._joints[joint] = UrdfJoint(joint, "fixed", body.name, name, origin, (1.0, 0.0, 0.0), {}, {}, None)
 
     # Joints
@@ -218,7 +217,7 @@ class UrdfOfScene:
             self._links.setdefault(child, UrdfLink(child, None))
             rise = follows(joint, step)
             self._joints[name] = UrdfJoint(
-                name, self._type(joint, step), parent, child, origin, _three(own @ axis), self._limits(joint, step),
+                name, self._type(joint, step), parent, child, origin, three(own @ axis), self._limits(joint, step),
                 _dynamics(joint, step), None if rise is None else Mimic(joint.name, rise, 0.0),
             )  # fmt: skip
             parent, origin = child, Origin()
@@ -237,9 +236,9 @@ class UrdfOfScene:
             carrier = self.tree.nodes[node.inner.body]
             at = carrier.body.points[node.inner.point].position - _anchor(carrier)
         if self.tree.tools.keys() & {*node.joint.between}:
-            return Origin(_three(at), _three(rpy_of(node.inner.triad @ node.outer.triad.T)))
+            return Origin(three(at), three(rpy_of(node.inner.triad @ node.outer.triad.T)))
         rpy = rpy_of(node.joint.orientation.T) if node.backwards else node.joint.rpy
-        return Origin(_three(at), _three(rpy))
+        return Origin(three(at), three(rpy))
 
     def _type(self, joint: JointRecord, step: Step) -> str:
         has_end = step.coordinate >= 0 and np.all(np.isfinite(joint.position_limits[step.coordinate]))
@@ -261,16 +260,6 @@ class UrdfOfScene:
         return {**limits, "effort": effort, "velocity": velocity} if limits or effort or velocity else {}
 
 
-def inertial_of(body: Body, anchor: Array) -> Inertial:
-    """Of the undeformed body with what is attached to it; `anchor` (3,) is the link's frame in body axes, m.
-
-    J_c = J0 − m (c·c I − c cᵀ) about the center c = s0/m (parallel axes).
-    """
-    m, c = body.mass, body.first_moment / body.mass
-    J: Array = body.inertia - m * (c @ c * np.eye(3) - np.outer(c, c))
-    return Inertial(m, c - anchor, (J + J.T) / 2)
-
-
 def _dynamics(joint: JointRecord, step: Step) -> dict[str, float]:
     if not joint.frictions or step.coordinate < 0:
         return {}
@@ -289,11 +278,6 @@ def _own_points(loaded: LoadedBody) -> dict[str, Array]:
     return {
         name: at.position for name, at in points.items() if modal is None or name in modal.interfaces or at.is_turned
     }
-
-
-def _three(values: Sequence[float] | Array) -> Numbers3:
-    x, y, z = (float(value) for value in values)
-    return x, y, z
 
 
 Element = ElementTree.Element
@@ -331,8 +315,7 @@ def _add_origin(parent: Element, origin: Origin) -> None:
 
 def _add_inertial(link: Element, inertial: Inertial) -> None:
     element, J = _add(link, "inertial"), inertial.inertia
-    x, y, z = inertial.center
-    _add_origin(element, Origin((float(x), float(y), float(z))))
+    _add_origin(element, Origin(three(inertial.center)))
     _add(element, "mass", value=inertial.mass)
     _add(element, "inertia", ixx=J[0, 0], ixy=J[0, 1], ixz=J[0, 2], iyy=J[1, 1], iyz=J[1, 2], izz=J[2, 2])
 

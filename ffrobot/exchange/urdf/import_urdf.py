@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 
-from ...common.arrays import Array, as_floats
 from ...common.errors import FfrobotError, InputError, of_file
 from ...common.files import check_folder, write_atomically
 from ...common.tables import beyond_limits, shown
@@ -21,7 +20,7 @@ from .bodies import is_possible, mechanism
 from .flexible import FlexibleLink, flexible_link
 from .names import Names, toml_text
 from .read import read_urdf
-from .robot import Inertial, MeshFile, Robot
+from .robot import Inertial, MeshFile, Robot, inertial_of
 from .scene import SceneOfRobot
 from .shape_masses import Filling, MeshMass, mesh_masses, mesh_path, with_masses, without_mass
 
@@ -38,8 +37,7 @@ class Replaced:
         self.body: Body = from_modal_body(link.name, cached_modal_body(table).body)
         inertial = robot.links[link.name].inertial
         self.before = None if inertial is None else inertial.seen_from(link.place)
-        center = self.body.first_moment / self.body.mass
-        self.after = Inertial(self.body.mass, center, self.body.inertia - _at(self.body.mass, center))
+        self.after = inertial_of(self.body, np.zeros(3))
 
     def remark(self) -> str:
         """Mass, center and inertia before and after, a line."""
@@ -104,11 +102,6 @@ def _with_whole_path(keys: Mapping[str, Any], folder: Path) -> dict[str, Any]:
     return {**keys, "geometry": geometry}
 
 
-def _at(mass: float, r: Array) -> Array:
-    """Inertia (3, 3) of a point mass at r (3,) about the origin."""
-    return as_floats(mass * (r @ r * np.eye(3) - np.outer(r, r)))
-
-
 def _words(inertial: Inertial) -> str:
     center = ", ".join(f"{1000 * value:.4g}" for value in inertial.center)
     moments = ", ".join(f"{moment:.4g}" for moment in np.linalg.eigvalsh(inertial.inertia))
@@ -121,7 +114,6 @@ SHORTEST = 1e-3  # m, the whole robot
 # kg·cm² in place of kg·m² is a factor of 100, kg·mm² of 1000.
 WIDEST, NARROWEST = 3.0, 1e-4
 TURNS = 4 * np.pi  # rad: limits of joints that turn are within; a full turn in degrees is 360
-ROTATION = 2 * np.pi  # rad: angles of frames are within
 
 
 def remarks_on_scale(robot: Robot) -> Iterator[str]:
@@ -138,8 +130,6 @@ def remarks_on_scale(robot: Robot) -> Iterator[str]:
         label, limits = f'joint "{shown(joint.name)}"', [joint.limits.get(key, 0.0) for key in ("lower", "upper")]
         if joint.type == "revolute" and max(map(abs, limits)) > TURNS:
             yield f"{label}: limits {limits[0]:g} … {limits[1]:g} rad are many turns: are they in degrees?"
-        if max(map(abs, joint.origin.rpy)) > ROTATION:
-            yield f"{label}: rpy {' '.join(f'{angle:g}' for angle in joint.origin.rpy)} rad: is it in degrees?"
     if 0 < reach < SHORTEST:
         yield f"all joints are within {reach:g} m: URDF is in metres; is this file in kilometres?"
     for link in robot.links.values():

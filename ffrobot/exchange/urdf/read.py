@@ -15,7 +15,7 @@ from ...common.errors import InputError, did_you_mean, quoted
 from ...common.rotations import of_rpy
 from ...common.tables import LARGEST, shown
 from ...common.toml_files import read_bytes
-from .robot import TYPES, Inertial, MeshFile, Mimic, Numbers3, Origin, Primitive, Robot, UrdfJoint, UrdfLink
+from .robot import TYPES, Inertial, MeshFile, Mimic, Numbers3, Origin, Primitive, Robot, UrdfJoint, UrdfLink, three
 
 Element = ElementTree.Element
 
@@ -32,12 +32,9 @@ def read_urdf(path: Path) -> Robot:
     try:
         return robot_of(_root_element(read_bytes(path, "URDF file")))
     except InputError as error:
-        text = str(error)
-        raise InputError(text if text.startswith(f"{path}:") else _in_file(path, text)) from None
-
-
-def _in_file(path: Path, text: str) -> str:
-    return "\n".join(f"{path}: {line}" for line in text.splitlines())
+        if str(error).startswith(f"{path}:"):
+            raise
+        raise InputError("\n".join(f"{path}: {line}" for line in str(error).splitlines())) from None
 
 
 def _root_element(content: bytes) -> Element:
@@ -229,8 +226,7 @@ def _triple(element: Element, key: str, default: Numbers3, label: str) -> Number
     parts = text.split()
     if len(parts) != 3:
         raise InputError(f'{label}: {key}: expected three numbers, found "{shown(text)}"')
-    x, y, z = (_finite(part, f"{label}: {key}") for part in parts)
-    return x, y, z
+    return three(_finite(part, f"{label}: {key}") for part in parts)
 
 
 def _finite(text: str, label: str) -> float:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Literal
 
@@ -10,8 +10,16 @@ import numpy as np
 
 from ...common.arrays import Array, as_floats
 from ...common.rotations import of_rpy
+from ...mbs.model.body import Body
 
 Numbers3 = tuple[float, float, float]
+
+
+def three(values: Iterable[float]) -> Numbers3:
+    """Three numbers of Python's own."""
+    x, y, z = map(float, values)
+    return x, y, z
+
 
 MOVING = ("revolute", "continuous", "prismatic", "planar", "floating")
 TYPES = (*MOVING, "fixed")
@@ -77,6 +85,16 @@ class Inertial:
 
 
 MASSLESS = Inertial(0.0, np.zeros(3), np.zeros((3, 3)))
+
+
+def inertial_of(body: Body, anchor: Array) -> Inertial:
+    """Of the undeformed body with what is attached to it; `anchor` (3,) is the link's frame in body axes, m.
+
+    J_c = J0 − m (c·c I − c cᵀ) about the center c = s0/m (parallel axes).
+    """
+    m, c = body.mass, body.first_moment / body.mass
+    J: Array = body.inertia - m * (c @ c * np.eye(3) - np.outer(c, c))
+    return Inertial(m, c - anchor, (J + J.T) / 2)
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ from ...common.rotations import rpy_of, smallest_turn
 from ...common.tables import shown
 from ...fe_models.modal_body import ModalBody
 from ...mesh.skins import loaded_skin
-from .robot import Inertial, MeshFile, Numbers3, Origin, Primitive, Robot, UrdfLink
+from .robot import Inertial, MeshFile, Origin, Primitive, Robot, UrdfLink, three
 
 if TYPE_CHECKING:
     import trimesh
@@ -124,10 +124,10 @@ def beam_visuals(body: ModalBody, anchor: Array) -> Iterator[Primitive]:
         length, center = float(np.linalg.norm(b - a)), (a + b) / 2 - anchor
         if is_round:
             yield Primitive(
-                "cylinder", (float(sizes[first].max()) / 2, length), Origin(_three(center), (0.0, np.pi / 2, 0.0))
+                "cylinder", (float(sizes[first].max()) / 2, length), Origin(three(center), (0.0, np.pi / 2, 0.0))
             )
         else:
-            yield Primitive("box", (length, float(height[first]), float(width[first])), Origin(_three(center)))
+            yield Primitive("box", (length, float(height[first]), float(width[first])), Origin(three(center)))
         first = end
 
 
@@ -136,14 +136,9 @@ def bars(points: Sequence[Array], radius: float) -> Iterator[Primitive]:
     away = [point for point in points if np.any(point)]
     for point in away:
         rpy = rpy_of(smallest_turn(point))
-        yield Primitive("cylinder", (radius, float(np.linalg.norm(point))), Origin(_three(point / 2), _three(rpy)))
+        yield Primitive("cylinder", (radius, float(np.linalg.norm(point))), Origin(three(point / 2), three(rpy)))
     if not away:
         yield Primitive("sphere", (2 * radius,), Origin())
-
-
-def _three(values: Sequence[float] | Array) -> Numbers3:
-    x, y, z = (float(value) for value in values)
-    return x, y, z
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from ...common.errors import InputError
 from ...mbs.joints.joint import MotorLimits
 from ...results.file import Results
 from ...results.joints import joint_coordinates
-from .figure_file import Curve
+from .figure_file import Curve, FigureRecord
 
 NO_DEFLECTION = 1e-6  # of the largest: points that the reference condition fixes are there but for round-off
 
@@ -102,6 +102,14 @@ def limits_of(results: Results, joint: str, datasets: Sequence[str]) -> MotorLim
     column = next((name.partition("[")[2].rstrip("]") for name in datasets), "")
     coordinates, number = joint_coordinates(results.scene, joint), int(column or 0)
     return coordinates[number].limits if number < len(coordinates) else MotorLimits()
+
+
+def motor_limits(results: Results, figure: FigureRecord) -> Array:
+    """What the motor of the joint of a torque-speed diagram can do, as `limit_curves`."""
+    assert figure.joint is not None
+    points = [curve_points(results, curve, figure.scale) for curve in figure.curves]
+    speed, moment = (max(float(abs(pair[i]).max()) for pair in points) for i in (0, 1))
+    return limit_curves(limits_of(results, figure.joint, [curve.data for curve in figure.curves]), speed, moment)
 
 
 def limit_curves(limits: MotorLimits, speed: float, moment: float) -> Array:

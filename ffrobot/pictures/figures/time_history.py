@@ -13,7 +13,7 @@ from ...common.errors import InputError
 from ...results.file import Results
 from ..projection import COLORS
 from .figure_file import Curve, FigureRecord
-from .shared import curve_points, limit_curves, limits_of, read_points
+from .shared import curve_points, motor_limits, read_points
 from .style import DASHES, legend, line_style, shades
 
 MANY, OFTEN = 4, 0.2  # columns, and part of the time at limits, above which lines hide each other
@@ -91,14 +91,10 @@ def _draw_map(axes: Axes, time: Array, values: Array, label: str, figure: Figure
 
 def draw_torque_speed(axes: Axes, figure: FigureRecord, results: Results) -> None:
     """Draw every curve of `figure` over its `x`, and the limits of the motor of `figure.joint`."""
-    assert figure.joint is not None
-    speed = moment = 0.0
     for k, curve in enumerate(figure.curves):
         x, values = curve_points(results, curve, figure.scale)
         axes.plot(x, values[:, 0], label=curve.label, **line_style(k, len(x), alone=len(figure.curves) == 1))
-        speed, moment = max(speed, float(abs(x).max())), max(moment, float(abs(values).max()))
-    limits = limit_curves(limits_of(results, figure.joint, [curve.data for curve in figure.curves]), speed, moment)
-    if len(limits):
+    if len(limits := motor_limits(results, figure)):
         axes.plot(*limits.T, color=COLORS[1], linestyle="--", label="limits")
     axes.set_xlabel(figure.x_label)
     axes.set_ylabel(figure.y_label)

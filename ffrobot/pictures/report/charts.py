@@ -16,7 +16,7 @@ from ...common.arrays import Array
 from ...results.file import Results
 from ...results.verdict import ROUND_OFF
 from ..figures.figure_file import Curve, FigureRecord
-from ..figures.shared import curve_points, file_name, limit_curves, limits_of
+from ..figures.shared import curve_points, file_name, motor_limits
 from ..figures.standard import standard_figures
 from ..motion import Target, targets
 from ..projection import COLORS
@@ -147,8 +147,8 @@ def history_charts(files: Sequence[Results]) -> list[Chart]:
             chart = charts.setdefault(record.name, _empty(record))
             for curve in record.curves:
                 _add(chart, results, record, curve, source, DASHES[number % len(DASHES)])
-            if record.joint is not None:
-                _add_limits(chart, results, record, source)
+            if record.joint is not None and len(limits := motor_limits(results, record)):
+                chart.add(f"{source}: limits" if source else "limits", *limits.T, line=limit_style())
     return list(charts.values())
 
 
@@ -191,16 +191,6 @@ def _add(chart: Chart, results: Results, record: FigureRecord, curve: Curve, sou
         for k, color in enumerate(shades(values.shape[1])):
             line = {"color": color, "width": 1, "dash": dash}
             chart.add(f"{label} {k + 1}", x, values[:, k], line=line)
-
-
-def _add_limits(chart: Chart, results: Results, record: FigureRecord, source: str) -> None:
-    """What the motor of the joint of a torque-speed diagram can do."""
-    assert record.joint is not None
-    points = [curve_points(results, curve, record.scale) for curve in record.curves]
-    speed, moment = (max(float(abs(pair[i]).max()) for pair in points) for i in (0, 1))
-    limits = limit_curves(limits_of(results, record.joint, [curve.data for curve in record.curves]), speed, moment)
-    if len(limits):
-        chart.add(f"{source}: limits" if source else "limits", *limits.T, line=limit_style())
 
 
 def _path_errors(files: Sequence[Results]) -> list[Chart]:
