@@ -21,9 +21,8 @@ from ..results.verdict import Verdict
 from ..run.mode_search import ModeChoice
 from ..run.solution import AnalysisResult, Solution
 from ..scene.pieces import BodyInPieces
-from .accuracy import error_budget, integrated
 from .control import control_lines, control_tables
-from .lines import alike, integrator_lines, plain_table, warning_lines
+from .lines import alike, error_budget, integrated, integrator_lines, plain_table, warning_lines
 
 
 def print_details(

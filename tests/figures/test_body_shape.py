@@ -11,8 +11,8 @@ from ffrobot.fe_models.link import make_link
 from ffrobot.fe_models.modal_body import PictureMesh
 from ffrobot.fe_models.modal_body_file import write_modal_body
 from ffrobot.pictures.figures.body_shape import FOLD, _outline, draw_mesh, draw_modes
-from ffrobot.pictures.figures.parallel import round_below
 from ffrobot.pictures.figures.plot import plot_file, plot_modal_body
+from ffrobot.pictures.figures.style import round_below
 
 LINK = """
 name = "arm"

@@ -11,9 +11,9 @@ from scipy.spatial import distance
 from ffrobot.common.errors import InputError
 from ffrobot.pictures.figures.configurations import draw_configurations
 from ffrobot.pictures.figures.figure_file import FigureRecord
-from ffrobot.pictures.figures.parallel import SceneAxes
 from ffrobot.pictures.figures.plot import draw, plot_results
 from ffrobot.pictures.figures.standard import main_figures, standard_figures
+from ffrobot.pictures.figures.style import SceneAxes
 from ffrobot.pictures.motion import moving_bodies, section_axes
 from ffrobot.pictures.projection import FRONT, PLANE, SIDE, SPACE
 from ffrobot.pictures.shapes import line_shape, shortest_tree, surface_shape

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from ffrobot.pictures.report.modes import MAX_TRIANGLES
+from ffrobot.pictures.report.mechanism import MAX_TRIANGLES
 from ffrobot.pictures.shapes import AMPLITUDE, body_surface, coarsened, drawn_mode
 from ffrobot.results.file import Results
 

@@ -13,8 +13,7 @@ from ...fe_models.modal_body import ModalBody
 from ...mesh.inspection import Inspection
 from ..projection import COLORS, LINK, View
 from ..shapes import AMPLITUDE, body_surface, drawn_mode
-from .parallel import EDGE, directions, lit, normals, projected
-from .style import ORDERED
+from .style import EDGE, ORDERED, directions, lit, normals, projected
 
 WIDTH = 7.0  # inches: both columns of a page
 BEAM_HEIGHT, SOLID_HEIGHT = 2.3, 3.0  # inches, of a view of a mesh

@@ -15,8 +15,7 @@ from ..motion import MovingBody, ground_places, moving_bodies, size_of, visible_
 from ..projection import COLORS, FRONT, PLANE, SIDE, SPACE
 from ..shapes import Shape, line_shape, surface_shape
 from .figure_file import Curve, FigureRecord
-from .parallel import SceneAxes
-from .style import SIZE, legend, line_style, new_axes, shades
+from .style import SIZE, SceneAxes, legend, line_style, new_axes, shades
 
 SIZE_3D = (2 * SIZE[0], 1.6 * SIZE[1])  # inches
 GREY = "#8b95a3"

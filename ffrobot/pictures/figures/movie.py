@@ -30,8 +30,7 @@ from ..motion import (
 from ..movie_file import Frame, MovieOptions, check_movie, movie_outputs, moving_analysis, write_movie
 from ..projection import AXIS_LENGTH, COLORS, PLANE, SPACE, TOOL_COLORS, TOOL_LENGTH
 from ..shapes import coarsened, surface_shape, thickened, triangles_of
-from .parallel import directions, lit, normals, projected
-from .style import literal, style
+from .style import directions, lit, literal, normals, projected, style
 
 SIZE, DPI = (8.0, 4.8), 120  # inches; 960 x 576 pixels
 MAX_TRIANGLES = 3000  # of a body

@@ -1,4 +1,9 @@
-"""How figures look: the width of a printed column, colours that everyone can tell apart."""
+"""How figures look: the width of a printed column, colours that everyone can tell apart.
+
+Parallel projection on plain axes: where points are on the page, how bright surfaces are, which way the axes go.
+
+True proportions of long thin bodies, which matplotlib's own third dimension squeezes into a cube.
+"""
 
 from __future__ import annotations
 
@@ -8,11 +13,16 @@ from contextlib import AbstractContextManager
 from typing import Any
 
 import matplotlib
+import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
+from matplotlib.patches import PathPatch
+from matplotlib.path import Path
 from matplotlib.ticker import ScalarFormatter
 
-from ..projection import COLORS
+from ...common.arrays import Array, Integers
+from ..projection import COLORS, View
 
 SIZE = (3.5, 2.7)  # inches: one column of a journal page
 
@@ -118,3 +128,117 @@ def legend(axes: Axes) -> None:
         columns = max(1, min(len(labels), int(room) // (max(map(len, labels)) + 6)))
         look: dict[str, Any] = {"ncols": columns, "handlelength": 1.8, "columnspacing": 1.0}
         figure.legend(handles, labels, loc="outside lower center", **look)
+
+
+BAR = 0.25  # of the width: about the length of the scale bar
+EDGE = "#30465c"
+DARKEST = 0.6  # how bright a cell is that the light passes along
+
+
+def projected(points: Array, view: View) -> Array:
+    """(…, 2) where points (…, 3) in m are on the page."""
+    return np.stack([points @ view.right, points @ view.up], axis=-1)
+
+
+def normals(points: Array, cells: Integers) -> Array:
+    """(c, 3) unit normals of triangles or quadrilaterals; zero where a cell has no area."""
+    first = points[cells[:, 0]]
+    found = np.cross(points[cells[:, 1]] - first, points[cells[:, -1]] - first)
+    return np.asarray(found / np.maximum(np.linalg.norm(found, axis=1, keepdims=True), 1e-300))
+
+
+def lit(points: Array, cells: Integers, colors: Array, view: View) -> Array:
+    """(c, 3) colours (c, 3) of cells in a light that comes from above the viewer.
+
+    Which way the normals of the cells point is unknown, and hidden cells are painted over.
+    """
+    light = (view.viewer + view.up) / np.linalg.norm(view.viewer + view.up)
+    return np.asarray(colors * (DARKEST + (1.0 - DARKEST) * np.abs(normals(points, cells) @ light))[:, None])
+
+
+def directions(axes: Axes, size: float, view: View) -> None:
+    """Arrows of `size` (m) along x, y and z below the picture, and a bar of a round length along x."""
+    (left, right), bottom = axes.get_xlim(), axes.get_ylim()[0]
+    x, y = left + 0.05 * (right - left), bottom - 2.0 * size
+    for axis, name in zip(np.eye(3), "xyz", strict=True):
+        dx, dy = size * projected(axis, view)
+        axes.annotate("", (x + dx, y + dy), (x, y), arrowprops={"arrowstyle": "->", "linewidth": 0.6, "shrinkB": 0})
+        axes.annotate(name, (x + 1.35 * dx, y + 1.35 * dy), ha="center", va="center", fontsize=7)
+    length = round_below(BAR * (right - left))
+    bar = np.array([x + 3.0 * size, y]) + np.array([[0.0, 0.0], length * projected(np.eye(3)[0], view)])
+    axes.plot(*bar.T, color=EDGE, linewidth=1.5, solid_capstyle="butt")
+    axes.annotate(f" {length:g} m", bar[1], va="center", fontsize=7)
+    axes.update_datalim([(x - 0.6 * size, y - 0.6 * size), *bar])
+    axes.autoscale_view()
+
+
+def round_below(value: float) -> float:
+    """The next of …, 0.1, 0.2, 0.5, 1, … not above a positive value."""
+    power = 10.0 ** np.floor(np.log10(value))
+    return float(power * max(step for step in (1.0, 2.0, 5.0) if step * power <= value * (1.0 + 1e-9)))
+
+
+FACING = 1e-3  # component of a unit normal towards the viewer from which on a cell is drawn
+FILL = 0.2  # opacity of bodies: what they cover stays visible
+ARROWS = 0.07  # of what is drawn: length of the arrows along x, y, z
+
+
+class SceneAxes:
+    """Axes for points (…, 3), m, in global axes, as a viewer sees them.
+
+    Against a coordinate axis the other two have numbers, from elsewhere all three have arrows. `finish` sets the
+    ranges, after everything is drawn.
+    """
+
+    def __init__(self, axes: Axes, view: View) -> None:
+        self.axes, self.view = axes, view
+        self.drawn: list[Array] = []
+
+    def plot(self, points: Array, *style: str, **options: Any) -> None:  # noqa: ANN401 (those of matplotlib's lines)
+        """A line through points (n, 3), or markers."""
+        self.drawn.append(seen := projected(points, self.view))
+        self.axes.plot(*seen.T, *style, **options)
+
+    def body(self, points: Array, cells: Integers, color: Any, width: float = 1.5) -> None:  # noqa: ANN401
+        """Points (p, 3) and cells on them: lines, or a surface, which shows what it covers."""
+        self.drawn.append(seen := projected(points, self.view))
+        if cells.shape[1] == 2:
+            self._lines(seen[cells], color, width)
+        elif cells.shape[1] > 2:
+            front = cells[normals(points, cells) @ self.view.viewer > FACING]
+            self.axes.add_artist(PathPatch(_covered(seen[front]), color=color, alpha=FILL, linewidth=0))
+            self._lines(seen[_ends(front)], color, 0.5 * width)
+
+    def _lines(self, ends: Array, color: Any, width: float) -> None:  # noqa: ANN401
+        lines = LineCollection(list(ends), colors=[color], linewidths=width, capstyle="round")
+        self.axes.add_collection(lines)
+
+    def finish(self, label_size: float | None = None, *, is_equal: bool = True) -> None:
+        """Ranges that hold all points, and labels; unless `is_equal` the scales of the two directions may differ."""
+        points = np.concatenate([part for part in self.drawn if len(part)] or [np.zeros((1, 2))])
+        self.axes.update_datalim(points)
+        if is_equal:
+            self.axes.set_aspect("equal", adjustable="datalim")
+        self.axes.autoscale_view()
+        if np.any(self.view.viewer == 1.0) or np.any(self.view.viewer == -1.0):
+            right, up = ("xyz"[int(np.argmax(np.abs(one)))] for one in (self.view.right, self.view.up))
+            self.axes.set_xlabel(f"{right} (m)", fontsize=label_size)
+            self.axes.set_ylabel(f"{up} (m)", fontsize=label_size)
+            self.axes.tick_params(labelsize=label_size)
+        else:
+            self.axes.set_axis_off()
+            directions(self.axes, ARROWS * float(np.ptp(points, axis=0).max()), self.view)
+
+
+def _covered(faces: Array) -> Path:
+    """One path around all faces (c, v, 2), so that neighbors are filled once, without a line between them."""
+    count, corners = faces.shape[:2]
+    codes = np.tile([Path.MOVETO, *[Path.LINETO] * (corners - 1), Path.CLOSEPOLY], count)
+    return Path(np.concatenate([faces, faces[:, :1]], axis=1).reshape(-1, 2), codes)
+
+
+def _ends(cells: Integers) -> Integers:
+    """(e, 2) the edges that one cell alone has: around what cells cover, and around their openings."""
+    edges = np.stack([cells, np.roll(cells, -1, axis=1)], axis=2).reshape(-1, 2)
+    number = int(cells.max(initial=0)) + 1
+    return np.asarray(edges[~np.isin(edges @ [number, 1], edges @ [1, number])], dtype=np.int64)

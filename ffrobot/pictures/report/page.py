@@ -16,8 +16,7 @@ from ...results.file import Results
 from ..studies.study import Study, read_study, study_files
 from .charts import Chart, folded, history_charts
 from .diagrams import DrawnDiagram, StudyPart, study_parts
-from .mechanism import mechanism
-from .modes import link_modes, surface_modes
+from .mechanism import link_modes, mechanism, surface_modes
 from .runs import runs, sources
 from .tables import (
     analyses_table,
