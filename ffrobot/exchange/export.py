@@ -18,8 +18,7 @@ from ..common.toml_files import read_text
 from ..fe_models.modal_body import ModalBody
 from ..fe_models.modal_body_file import FORMAT, is_modal_body_file, read_modal_body, write_modal_body
 from ..present.lines import plain_table
-from .bodies.craig_bampton import craig_bampton_file
-from .bodies.exudyn import exudyn_file
+from .bodies.matrices import craig_bampton_file, exudyn_file
 from .bodies.mbdyn import fem_text, read_fem
 from .bodies.sid import read_sid, sid_text
 from .fmu.forward_fmu import forward_fmu

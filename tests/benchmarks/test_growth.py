@@ -10,8 +10,8 @@ and 0.9 with modes from 50 on (what does not depend on their number still counts
 import numpy as np
 import pytest
 
-from bench.evaluation import start_at_rest
 from bench.growth import LINKS, MODES, MODES_IN_CHAINS, chain, evaluation_timer
+from bench.hand_written import start_at_rest
 from ffrobot.mbs.model.model import row_values
 
 pytestmark = pytest.mark.alone

@@ -14,8 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bench.evaluation import evaluation_seconds
-from bench.hand_written import STEPS, TIME, HandWritten, general_state
+from bench.hand_written import STEPS, TIME, HandWritten, evaluation_seconds, general_state
 from ffrobot.common.errors import InputError
 from ffrobot.mbs.analysis.context import Context
 from ffrobot.mbs.analysis.pcid import Pcid, run_pcid

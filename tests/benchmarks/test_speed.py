@@ -31,8 +31,7 @@ import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
 
-from bench.evaluation import evaluation_seconds, start_at_rest
-from bench.hand_written import TIME, general_state
+from bench.hand_written import TIME, evaluation_seconds, general_state, start_at_rest
 from ffrobot.mbs import _core
 from ffrobot.mbs.analysis.context import Context
 from ffrobot.mbs.analysis.fcid import Fcid, run_fcid

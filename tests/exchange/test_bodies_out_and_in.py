@@ -8,9 +8,8 @@ import pytest
 from material_points import random_cloud
 
 from ffrobot import InputError, make_link, solve
-from ffrobot.exchange.bodies.craig_bampton import craig_bampton_file
-from ffrobot.exchange.bodies.exudyn import exudyn_file
 from ffrobot.exchange.bodies.integrals import integrals_of
+from ffrobot.exchange.bodies.matrices import craig_bampton_file, exudyn_file
 from ffrobot.exchange.bodies.mbdyn import fem_text, read_fem
 from ffrobot.exchange.bodies.sid import read_sid, sid_text
 from ffrobot.fe_models.modal_body.craig_bampton import craig_bampton

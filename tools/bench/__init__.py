@@ -1,9 +1,8 @@
 """The parts of `ffrobot bench` that need ffrobot's source tree: they compile and run programs next to it.
 
-evaluation   time of one evaluation of the equations; ratios of times that were taken in turn
 evaluations  of several mechanisms in 2D and 3D, beside the two-link case written by hand
 growth       time per evaluation against modes and links, time of a run against outputs
-hand_written the two-link case written by hand, compiled
+hand_written time of one evaluation, also of the two-link case written by hand, compiled; ratios of times
 aims         ratios to it
 replays      forward runs with results of PCID, beside that
 peer         EXUDYN on the same modal bodies

@@ -15,8 +15,7 @@ from ffrobot.run.watcher import Watcher
 from ffrobot.scene.load import make_scene
 from ffrobot.scene.scene import Scene
 
-from .evaluation import State, evaluation_seconds, ratios
-from .hand_written import TIME, HandWritten, general_state
+from .hand_written import TIME, HandWritten, State, evaluation_seconds, general_state, ratios
 
 ACCURACY = 1e-4
 INTEGRATORS = ("auto", "dop853", "radau")

@@ -23,9 +23,8 @@ from ffrobot.run.solve import prepare_scene
 from ffrobot.run.watcher import Watcher
 from ffrobot.scene.load import load_scene, make_scene
 
-from .evaluation import evaluation_seconds, ratios, start_at_rest
 from .growth import LINKS, chain
-from .hand_written import TIME, HandWritten, general_state
+from .hand_written import TIME, HandWritten, evaluation_seconds, general_state, ratios, start_at_rest
 
 ROUNDS = 30
 SECONDS = 1e-3  # of a round, about

@@ -23,7 +23,7 @@ from ffrobot.run.watcher import Watcher
 from ffrobot.scene.load import make_scene
 from ffrobot.scene.scene import Scene
 
-from .evaluation import State, evaluation_seconds, start_at_rest
+from .hand_written import State, evaluation_seconds, start_at_rest
 
 MASS, LENGTH, STIFFNESS = 1.0, 1.0, 100.0  # kg, m, EI in N·m²
 MODES, LINKS, OUTPUTS = (2, 5, 10, 20, 50, 100, 200), (2, 5, 10, 20, 50), (100, 1000, 10_000, 100_000)

@@ -1,4 +1,4 @@
-"""The two-link case written by hand (tools/bench/hand_written.cpp), compiled; needs the source tree."""
+"""Times of one evaluation: of ours, and of the two-link case written by hand (hand_written.cpp), compiled; ratios."""
 
 from __future__ import annotations
 
@@ -6,9 +6,11 @@ import shutil
 import subprocess
 from collections.abc import Sequence
 from pathlib import Path
+from statistics import median
 
 import numpy as np
 
+from ffrobot.common.arrays import Array
 from ffrobot.common.errors import InputError, SolveError
 from ffrobot.mbs.model.body import Body
 from ffrobot.mbs.model.model import Model
@@ -16,7 +18,26 @@ from ffrobot.mbs.model.system import MultibodySystem
 from ffrobot.mbs.solve.posture import solve_posture, with_rates
 from ffrobot.mbs.solve.start import undeformed_posture
 
-from .evaluation import State
+State = tuple[MultibodySystem, Array, Array]
+"""Equations, q (n_q,) and v (n_v,)."""
+
+
+def start_at_rest(model: Model) -> State:
+    """Where a mechanism starts: on its path with undeformed links, at rest."""
+    return MultibodySystem(model), undeformed_posture(model).q, np.zeros(model.tree.n_v)
+
+
+def evaluation_seconds(state: State, t: float, evaluations: int) -> float:
+    """Seconds of one of so many `evaluations` as integrators make them, without loads."""
+    system, q, v = state
+    core, _, rows = system.integrated
+    return core.time_evaluations(q, v, system.target(t)[rows], evaluations)
+
+
+def ratios(seconds: Sequence[float], beside: Sequence[float]) -> tuple[float, float]:
+    """Ratio of the minima, and median of the ratios of neighbours: when they disagree, the machine was busy."""
+    return min(seconds) / min(beside), median(a / b for a, b in zip(seconds, beside, strict=True))
+
 
 SOURCE = Path("tools/bench/hand_written.cpp")
 FLAGS = ("-std=c++20", "-O3", "-march=native", "-fno-math-errno", "-fno-trapping-math")

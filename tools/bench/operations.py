@@ -48,8 +48,7 @@ def evaluate(core, count):
     module = importlib.util.module_from_spec(spec)
     sys.modules[spec.name] = ffrobot.mbs._core = module
     spec.loader.exec_module(module)
-    from bench.evaluation import evaluation_seconds
-    from bench.hand_written import TIME, general_state
+    from bench.hand_written import TIME, evaluation_seconds, general_state
 
     evaluation_seconds(general_state(two_link()), TIME, count)
 

@@ -14,7 +14,7 @@ from ffrobot.run.watcher import Watcher
 from ffrobot.scene.load import make_scene
 from ffrobot.scene.scene import Scene
 
-from .evaluation import ratios
+from .hand_written import ratios
 
 INTEGRATORS = ("dop853", "auto")
 TOLERANCE, TIGHTER, END, OUTPUT_STEP = 1e-4, 1e-6, 1.0, 0.001

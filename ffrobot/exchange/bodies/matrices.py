@@ -1,0 +1,115 @@
+"""Bodies as matrices in .npz files: for EXUDYN, and Craig–Bampton's for programs that take M, K and C.
+
+What EXUDYN's ObjectFFRFreducedOrderInterface.LoadFromFile reads, in the notation of A. Zwölfer and J. Gerstmayr (Acta
+Mech. 231, 2020): a~ is the matrix of the cross product with a, and of a mode ψ_l, three columns 3l … 3l + 2. Then
+∫ρ a~ᵀ b = −∫ρ a×b and ∫ρ a~ᵀ b~ = ∫ρ [(a·b) E − b aᵀ].
+
+Craig–Bampton coordinates: tx ty tz rx ry rz of each interface, root first, then the modes of the link held at all of
+them; the link is free in space, so that K has six eigenvalues of zero. This is the order of MATLAB's and Simscape's
+reduced order models and of Newton's `ModalGeneratorCraigBampton`.
+"""
+
+from __future__ import annotations
+
+import io
+from typing import Any
+
+import numpy as np
+
+from ...common.arrays import Array, as_floats
+from ...common.errors import InputError
+from ...common.rotations import skew
+from ...fe_models.modal_body import ModalBody
+from ...fe_models.modal_body.craig_bampton import AXES, CONDITION, ROOT, craig_bampton
+from .integrals import ShapeIntegrals, integrals_of, nodes_of
+
+REMARKS = (
+    "not carried by EXUDYN's file: rotations of sections at nodes, damping, geometric stiffness, stresses, the surface",
+)
+
+
+def exudyn_file(body: ModalBody) -> tuple[bytes, tuple[str, ...]]:
+    """The .npz file of a body, its nodes in the order of the remark, and what it does not carry."""
+    nodes, numbers = nodes_of(body)
+    arrays = reduced_order(integrals_of(body))
+    arrays |= {
+        "modeBasis": np.concatenate([node.at.translation for node in nodes]),
+        "xRef": np.concatenate([node.at.position for node in nodes]),
+        "trigList": np.zeros((0, 3), dtype=np.int64),
+        "postProcessingModes": np.array({}, dtype=object),
+        "infoList": np.array([body.mode_count, len(nodes), 3, 4, 7, 7 + body.mode_count]),
+        "rigidBodyNodeType": "NodeType.RotationEulerParameters",
+        "fileVersion": 1,
+        "type": "ObjectFFRFreducedOrderInterface",
+    }
+    content = io.BytesIO()
+    np.savez(content, **arrays)
+    names = ", ".join(f"{name} = {number - 1}" for name, number in numbers.items())
+    return content.getvalue(), (*REMARKS, f"numbers of nodes, from 0: {names}")
+
+
+def reduced_order(found: ShapeIntegrals) -> dict[str, Any]:
+    """The constant matrices of ObjectFFRFreducedOrder."""
+    n, S, one = found.n_modes, found.S_bar_kl, np.eye(3)
+    total = S[0, 0] + S[1, 1] + S[2, 2]
+    center = as_floats(found.first_moment / found.mass)
+    tilde_tilde = np.einsum("ab,lm->lamb", one, total) - np.einsum("balm->lamb", S)
+    return {
+        "massMatrixReduced": found.modal_mass,
+        "stiffnessMatrixReduced": found.stiffness,
+        "inertiaLocal": found.inertia,
+        "Mtt": found.mass * one,
+        "totalMass": found.mass,
+        "chiU": center,
+        "chiUtilde": skew(center),
+        "mPsiTildePsi": found.spin_slope.transpose(1, 0, 2).reshape(3 * n, n),
+        "mPsiTildePsiTilde": tilde_tilde.reshape(3 * n, 3 * n),
+        "mPhitTPsi": found.S_bar,
+        "mPhitTPsiTilde": skew(found.S_bar.T).transpose(1, 0, 2).reshape(3, 3 * n),
+        "mXRefTildePsi": -found.spin,
+        "mXRefTildePsiTilde": (found.gyroscopic / 2).transpose(0, 2, 1).reshape(3, 3 * n),
+    }
+
+
+LOST = (
+    "not carried by Craig–Bampton matrices: centrifugal and Coriolis terms of the deformation, geometric stiffness",
+)
+
+
+def craig_bampton_file(body: ModalBody) -> tuple[bytes, tuple[str, ...]]:
+    """An .npz file with M, K, C, origins, interfaces, coordinates and the recovery of displacements.
+
+    Raises:
+        InputError: the body has other modes, or its interfaces do not move in all six components.
+    """
+    if body.reference_condition != CONDITION:
+        raise InputError(
+            f'modal body {body.name}: expected one with [reference] condition = "{CONDITION}" in its link file,'
+            f' with fixed-interface modes, found "{body.reference_condition}"'
+        )
+    link = craig_bampton(body)
+    names = [ROOT, *(name for name in body.interfaces if name != ROOT)]
+    wanted = [f"{name}/{axis}" for name in names for axis in AXES]
+    if link.coordinates[: len(wanted)] != wanted:
+        missing = [name for name in wanted if name not in link.coordinates]
+        raise InputError(
+            f"modal body {body.name}: expected six coordinates of each interface, found none for {', '.join(missing)}:"
+            ' take [modes] family = "all"'
+        )
+    damping = np.diag(2 * body.damping_ratio * 2 * np.pi * body.frequency)
+    content = io.BytesIO()
+    np.savez(
+        content, M=link.mass, K=link.stiffness, C=link.recovery.T @ damping @ link.recovery,
+        origins=np.array([body.interfaces[name].position for name in names]), interfaces=np.array(names),
+        coordinates=np.array(link.coordinates), points=body.stations.position, recovery=_recovery(body, link.recovery),
+    )  # fmt: skip
+    return content.getvalue(), LOST
+
+
+def _recovery(body: ModalBody, modal: Array) -> Array:
+    """(3 k, m) displacements of the k stations by the coordinates: those of the root's frame, and of the modes."""
+    x, Phi = body.stations.position, body.stations.translation
+    shapes = np.einsum("ian,nm->iam", Phi, modal)
+    shapes[:, :, :3] += np.eye(3)
+    shapes[:, :, 3:6] -= skew(x - body.interfaces[ROOT].position)
+    return np.asarray(shapes.reshape(3 * len(x), -1))
