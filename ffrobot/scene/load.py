@@ -32,7 +32,7 @@ UNAVAILABLE = {
 
 
 def load_scene(path: AnyPath, *, allow_python: Sequence[AnyPath] = ()) -> Scene:
-    """Read and validate a scene file; paths in it come out relative to its folder.
+    """Read and validate a scene file; paths in it become relative to its folder.
 
     What depends on modal bodies (their points, the length of a link) is checked when these are known.
 
