@@ -126,7 +126,8 @@ def finished_row(folder: Path) -> Row | None:
 
 def _last_message(text: str, folder: Path) -> str:
     lines = [line for line in text.splitlines() if line.strip()]
-    return lines[-1].removeprefix("ffrobot: ").replace(f"{folder}{os.sep}", "") if lines else ""
+    message = lines[-1].removeprefix("ffrobot: ") if lines else ""
+    return message.replace(f"{folder.absolute()}{os.sep}", "").replace(f"{folder}{os.sep}", "")
 
 
 def _ended(code: int) -> str:

@@ -37,7 +37,7 @@ class Worker:
 
     def __init__(self) -> None:
         self.place = _place()
-        self._messages = TemporaryFile("a+b")  # noqa: SIM115 (as long as the worker)
+        self._messages = TemporaryFile()  # noqa: SIM115 (as long as the worker, which writes where this process is in it)
         command = [sys.executable, "-m", "ffrobot.worker"]
         environment = environment_without_mpi() | ALONE
         self._process = Popen(command, env=environment, stdin=PIPE, stdout=PIPE, stderr=self._messages)
@@ -47,7 +47,8 @@ class Worker:
 
     def perform(self, arguments: list[str]) -> Done:
         """`ffrobot ARGUMENTS`; exit code and messages are those of the worker where it ends with the run."""
-        self._messages.truncate(0)
+        self._messages.seek(0)
+        self._messages.truncate()
         answer = b""
         with suppress(BrokenPipeError):
             self._requests.write(json.dumps({"arguments": arguments}).encode() + b"\n")

@@ -264,3 +264,22 @@ def test_results_are_replaced_in_one_step(scene, tmp_path):
         assert perform(run, Watched()).status == "completed"
     assert seen == [b"", image]
     assert [path.name for path in run.folder.iterdir()] == ["results.h5"]
+
+
+def test_messages_name_files_of_the_run_without_its_folder(tmp_path, monkeypatch):
+    """The folder is relative, as `sweep -o DIR` has it, and the message has its whole path."""
+    (tmp_path / "sw").mkdir()
+    (tmp_path / "sw" / "scene.toml").write_text("nothing = 1\n", encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    row = perform(Run(0, (), Path("sw")), Workers())
+    assert row.status == "wrong input"
+    assert row.message.startswith("scene.toml: ")
+
+
+def test_messages_of_a_run_are_its_own(tmp_path):
+    """A worker that wrote messages of one run begins those of the next at their beginning."""
+    workers = Workers()
+    first, second = (workers.perform(["info", str(tmp_path / f"{name}.h5")]) for name in ("a_long_name", "b"))
+    assert first.code == second.code == 2
+    assert second.messages.startswith("ffrobot: ")
+    assert second.messages == first.messages.replace("a_long_name", "b")
