@@ -1,4 +1,4 @@
-"""The version of the program, as installed, and of its code."""
+"""The version of the program, and of its code."""
 
 from __future__ import annotations
 
@@ -6,13 +6,8 @@ import hashlib
 from functools import cache
 from pathlib import Path
 
-
-@cache
-def program_version() -> str:
-    """As files and reports state it. Read where it is asked for: the lookup takes longer than importing the package."""
-    from importlib.metadata import version
-
-    return version("ffrobot")
+VERSION = "0.2.0"
+"""As files and reports state it, and as the build reads it."""
 
 
 @cache

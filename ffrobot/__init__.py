@@ -65,9 +65,9 @@ __all__ = [
 
 def __getattr__(name: str) -> object:
     if name == "__version__":
-        from .common.version import program_version
+        from .common.version import VERSION
 
-        value: object = program_version()
+        value: object = VERSION
     elif name in _HOME:
         value = getattr(import_module(_HOME[name], __name__), name)
     else:

@@ -25,12 +25,13 @@ from .commands.sweep import sweep
 from .common.errors import FfrobotError
 from .common.interrupts import SIGNALS, EndOfCommand
 from .common.parallel import end_all, is_first
+from .common.version import VERSION
 from .present.failures import describe, ready_streams, without_output
 from .present.logs import LOGGER, log_warning
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"]})
-@click.version_option(package_name="ffrobot")
+@click.version_option(VERSION)
 def cli() -> None:
     """Dynamics of robots with flexible links: motor torques, vibrations and patch voltages for a path.
 

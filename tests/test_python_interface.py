@@ -3,6 +3,7 @@
 import subprocess
 import sys
 import tomllib
+from importlib.metadata import version
 from pathlib import Path
 
 import h5py
@@ -181,7 +182,7 @@ def test_every_public_name_is_there():
         assert getattr(ffrobot, name).__doc__
     with pytest.raises(AttributeError, match="no attribute 'sovle'"):
         ffrobot.sovle  # noqa: B018
-    assert ffrobot.__version__ == tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["version"]
+    assert ffrobot.__version__ == version("ffrobot")
 
 
 def test_results_may_be_left_open(tmp_path):

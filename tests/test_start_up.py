@@ -84,6 +84,9 @@ def test_a_solve_loads_what_its_scene_needs(ffrobot, tmp_path):
     kinds = {place.partition(":")[0] for place in KINDS.modules.values()}
     assert kinds & found == {"ffrobot.mbs.analysis.forward"}
     assert not {"rich", "scipy", "matplotlib", "ffrobot.present.details"} & found
+    of_others = ("actuation.patches.link_patches", "actuation.feasibility", "actuation.control.linear_model",
+                 "mbs.solve.stable_inversion", "mesh.part_mesh")  # fmt: skip
+    assert not {f"ffrobot.{module}" for module in of_others} & found
 
 
 def test_a_solve_costs_a_few_times_what_its_libraries_cost(ffrobot, tmp_path):

@@ -12,11 +12,11 @@ import scipy.sparse as sp
 
 from ...common.arrays import Array, as_floats
 from ...common.errors import InputError
-from ...common.version import program_version
+from ...common.version import VERSION
 from ...mesh.structured import graded_nodes, with_points
-from ..link_records import FAMILIES, BeamLink, Family
+from ..link_records import DEFAULT_COUNT, FAMILIES, BeamLink, Family
 from ..modal_body import Interface, ModalBody, PictureMesh, Stations
-from ..modal_body.attachment_modes import DEFAULT_COUNT, ascending
+from ..modal_body.attachment_modes import ascending
 from ..modal_body.damping import damping_ratio
 from ..modal_body.lumped_masses import lump_weights, lumps, with_lumped_masses, with_lumped_stiffness
 from ..modal_body.signs import canonical_signs
@@ -89,7 +89,7 @@ def beam_modal_body(link: BeamLink, path: Path, progress: Progress) -> ModalBody
         stress=beam_stresses(link, kept, omega**2, families, attached, residual, interfaces),
         stress_loads=stress_loads(link, interfaces),
         mesh=PictureMesh(position, stations.element[:, [0, 3]], translation),
-        ffrobot_version=program_version(),
+        ffrobot_version=VERSION,
     )
 
 

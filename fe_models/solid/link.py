@@ -12,7 +12,7 @@ from mpi4py import MPI
 
 from ...common.arrays import Array, Integers, as_floats
 from ...common.errors import InputError
-from ...common.version import program_version
+from ...common.version import VERSION
 
 # First of all that load dolfinx: mesh.compat sets PETSc up.
 from ...mesh.compat import lagrange_element, node_map
@@ -155,7 +155,7 @@ def solid_modal_body(
             if link.surface_patch
             else None
         ),
-        ffrobot_version=program_version(),
+        ffrobot_version=VERSION,
         remarks=solid.remarks,
     )
 

@@ -15,7 +15,7 @@ from rich.console import Console
 from ..common.files import write_atomically
 from ..common.tables import TableWriter
 from ..common.toml_files import load_toml
-from ..common.version import program_version
+from ..common.version import VERSION
 from ..pictures.studies.study import Diagram, Numbers, Study, StudyName, StudyTable, write_study
 from ..present.lines import print_table
 
@@ -114,7 +114,7 @@ class Finding(ABC):
         """Words, tables and diagrams."""
         facts = tuple(_fact(line) for line in self.remarks() if line)
         return Study(
-            ffrobot_version=program_version(), name=self.name, title=self.title, scene=str(self.scene),
+            ffrobot_version=VERSION, name=self.name, title=self.title, scene=str(self.scene),
             scene_name=str(load_toml(self.scene, "scene").get("name", self.scene.stem)), headline=self.headline(),
             good=self.good, facts=facts, tables=tuple(self.report_tables()), diagrams=tuple(self.diagrams()),
         )  # fmt: skip

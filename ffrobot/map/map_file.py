@@ -14,10 +14,10 @@ from ..common.checksum import MARK, sealed
 from ..common.checksum import METHOD as CHECKSUM
 from ..common.files import write_atomically
 from ..common.tables import TableWriter
-from ..common.version import program_version
+from ..common.version import VERSION
 from .pose_map import STATUS, PoseMap
 
-FORMAT, VERSION = "ffrobot-map", 1
+FORMAT, FORMAT_VERSION = "ffrobot-map", 1
 TABLE, FILE = "table.csv", "map.h5"
 UNITS = {
     "frequency": "Hz", "compliance": "m/N, rad/N, m/(N·m), rad/(N·m)", "stiffness": "N/m", "least_stiffness": "N/m",
@@ -36,8 +36,8 @@ def write_map(found: PoseMap) -> Path:
     """Both files in the folder of the plan; the HDF5 file."""
     plan = found.plan
     with h5py.File("map", "w", driver="core", backing_store=False) as file:
-        file.attrs.update({"format": FORMAT, "format_version": VERSION, MARK: CHECKSUM})
-        file.attrs.update({"ffrobot_version": program_version(), "scene": str(plan.scene), "point": plan.point})
+        file.attrs.update({"format": FORMAT, "format_version": FORMAT_VERSION, MARK: CHECKSUM})
+        file.attrs.update({"ffrobot_version": VERSION, "scene": str(plan.scene), "point": plan.point})
         file.attrs["axes"], file.attrs["motors"] = [axis.name for axis in plan.axes], list(found.motors)
         for axis in plan.axes:
             file[f"axes/{axis.name}"] = axis.values

@@ -90,9 +90,9 @@ def _log_file(context: click.Context, parameter: click.Parameter, path: Path | N
         _add(_LogFile(path, encoding="utf-8"), "%(asctime)s %(levelname)s %(message)s")
     except OSError as error:
         raise click.BadParameter(f"cannot write {path}: {error.strerror}") from None
-    from ..common.version import program_version
+    from ..common.version import VERSION
 
-    LOGGER.info("ffrobot %s, Python %s, %s", program_version(), platform.python_version(), platform.platform())
+    LOGGER.info("ffrobot %s, Python %s, %s", VERSION, platform.python_version(), platform.platform())
     LOGGER.info("%s", " ".join(sys.argv))
 
 

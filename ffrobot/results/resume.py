@@ -22,7 +22,7 @@ from ..common.errors import InputError
 from ..common.hdf5 import blaming
 from ..common.python_files import allowed_python, imported_files
 from ..common.tables import key_path
-from ..common.version import program_version
+from ..common.version import VERSION
 from ..mbs import _core
 from ..mbs.analysis.outcome import (
     METHOD_HISTORY,
@@ -106,8 +106,8 @@ def check_same_input(scene: Scene, bodies: Mapping[str, LoadedBody], file: Resul
 
 def _changes(scene: Scene, bodies: Mapping[str, LoadedBody], file: Results) -> Iterator[str]:
     """What of the input is not that of the results file."""
-    if file.ffrobot_version != program_version():
-        yield f"ffrobot {file.ffrobot_version}, now {program_version()},"
+    if file.ffrobot_version != VERSION:
+        yield f"ffrobot {file.ffrobot_version}, now {VERSION},"
     then, now = _without_limits(file.scene), _without_limits(tomllib.loads(scene.text))
     loc = _first_difference(then, now)
     if loc is not None:

@@ -13,7 +13,7 @@ import h5py
 from ..common.checksum import MARK, sealed
 from ..common.checksum import METHOD as CHECKSUM
 from ..common.files import write_atomically
-from ..common.version import program_version
+from ..common.version import VERSION
 from ..mbs.analysis.outcome import Outcome
 from ..mbs.fields.steps import DATASET, METHOD
 from ..mbs.quantities.motion import RobotMotion
@@ -64,7 +64,7 @@ def _write_head(file: h5py.File, solution: Solution) -> None:
     file.attrs["format"] = FORMAT
     file.attrs["format_version"] = FORMAT_VERSION
     file.attrs[MARK] = CHECKSUM
-    file.attrs["ffrobot_version"] = program_version()
+    file.attrs["ffrobot_version"] = VERSION
     file.attrs["name"] = solution.scene.name
     file.attrs["scene"] = solution.scene.text
     file.attrs["space"] = solution.scene.space

@@ -13,7 +13,7 @@ from typing import Any
 from ..common.errors import InputError
 from ..common.python_files import sha256_of
 from ..common.toml_files import parse_toml, read_text
-from ..common.version import program_version
+from ..common.version import VERSION
 from ..mesh.included import files_of as files_with_included
 
 FILE_KEYS = {"link", "modal", "waypoints", "file", "python", "table", "repeat_steps"}
@@ -70,7 +70,7 @@ def fingerprints(scene: Mapping[str, Any], path: Path) -> dict[str, str]:
     By the file's name, and `PROGRAM` for the version. TOML files count by their tables: comments change nothing.
     """
     files = dict.fromkeys(named_files(dict(scene), path.parent))
-    found = {PROGRAM: program_version(), str(path): digest_of_tables(scene)}
+    found = {PROGRAM: VERSION, str(path): digest_of_tables(scene)}
     return found | {os.path.normpath(file): digest_of_file(file) for file in files}
 
 

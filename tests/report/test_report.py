@@ -13,7 +13,7 @@ import pytest
 from ffrobot.cli import cli
 from ffrobot.common.checksum import seal
 from ffrobot.common.errors import InputError, SolveError
-from ffrobot.common.version import program_version
+from ffrobot.common.version import VERSION
 from ffrobot.pictures.figures.shared import bending_points
 from ffrobot.pictures.figures.standard import standard_figures
 from ffrobot.pictures.motion import targets, topology
@@ -89,7 +89,7 @@ def test_page_says_where_it_comes_from(two_link_page, two_link):
         file = Results(two_link.folder / "scene.results.h5").modal_files[name]
         assert file.sha256 in body
         assert file.input_hash in body
-    assert f"ffrobot {program_version()}" in body
+    assert f"ffrobot {VERSION}" in body
     assert "y = &#34;sqrt(3)/2*cos(pi*t/4)&#34;" in body  # the scene's text
 
 

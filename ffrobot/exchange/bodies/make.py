@@ -11,7 +11,7 @@ from scipy.linalg import eigh
 
 from ...common.arrays import Array
 from ...common.errors import InputError
-from ...common.version import program_version
+from ...common.version import VERSION
 from ...fe_models.modal_body import Interface, ModalBody, PictureMesh, Stations
 from ...fe_models.modal_body.craig_bampton import CONDITION as CRAIG_BAMPTON
 from ...fe_models.modal_body.craig_bampton import constraint_modes
@@ -65,7 +65,7 @@ def modal_body(
         interfaces=interfaces,
         stations=_stations(nodes, interfaces, length),
         mesh=_line(interfaces, found.n_modes),
-        ffrobot_version=program_version(),
+        ffrobot_version=VERSION,
         **sections,  # type: ignore[arg-type]
     )
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 import logging
 import platform
 import sys
-from importlib.metadata import version
 from pathlib import Path
 from uuid import NAMESPACE_URL, uuid5
 
 from ...common.errors import InputError, quoted
+from ...common.version import VERSION
 from ...mbs import _core
 from ...mbs.analysis.forward import Forward
 from ...mbs.model.gears import with_compliance
@@ -49,7 +49,7 @@ def forward_fmu(path: Path, analysis: str | None) -> tuple[bytes, str, str, tupl
     library = Path(str(_core.__file__)).with_name(LIBRARY)
     content = {
         "modelDescription.xml": forward_description(
-            unit, identifier, f"{scene.name}, {chosen.name}", chosen, f"ffrobot {version('ffrobot')}"
+            unit, identifier, f"{scene.name}, {chosen.name}", chosen, f"ffrobot {VERSION}"
         ),
         RESOURCE: unit.data.to_bytes(),
         f"binaries/{folder}/{identifier}{suffix}": library.read_bytes(),

@@ -10,7 +10,6 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Mapping
-from importlib.metadata import version
 from pathlib import Path
 from uuid import NAMESPACE_URL, uuid5
 
@@ -20,6 +19,7 @@ from scipy.linalg import matrix_balance
 from ...actuation.control.linear_model import LinearModel
 from ...common.arrays import Array
 from ...common.errors import InputError
+from ...common.version import VERSION
 from ...results.file import Results
 from .description import PLATFORMS, SOURCE, Unit, identifier_of, model_description, zipped
 from .forward_model import inputs_of, joint_units, outputs_of, states_of
@@ -50,7 +50,7 @@ def linear_fmu(path: Path, analysis: str | None) -> tuple[bytes, str, str, tuple
     unit = make_unit(str(scene["name"]), name, model, joint_units(scene))
     files = sources(unit)
     compiled = binary(unit, files)
-    content = {"modelDescription.xml": model_description(unit, f"ffrobot {version('ffrobot')}")}
+    content = {"modelDescription.xml": model_description(unit, f"ffrobot {VERSION}")}
     content |= {f"sources/{file}": text.encode() for file, text in files.items()}
     remarks = ["all values are deviations from the configuration that the model is about"]
     if isinstance(compiled, str):

@@ -11,7 +11,7 @@ from typing import Any
 from ...common.errors import InputError, SolveError
 from ...common.files import write_atomically
 from ...common.outputs import check_not_an_input
-from ...common.version import program_version
+from ...common.version import VERSION
 from ...results.file import Results
 from ..studies.study import Study, read_study, study_files
 from .charts import Chart, folded, history_charts
@@ -71,7 +71,7 @@ def report(files: Sequence[Results], studies: Sequence[tuple[Path, Study]] = ())
         player_js=(HERE / "player.js").read_text(encoding="utf-8"),
         mechanism_js=(HERE / "mechanism.js").read_text(encoding="utf-8"),
         page_css=(HERE / "page.css").read_text(encoding="utf-8"),
-        ffrobot_version=program_version(),
+        ffrobot_version=VERSION,
     )
 
 
