@@ -1,13 +1,16 @@
-"""How Ctrl-C and SIGTERM are answered: by an exception, later, or at once, by the end of the process."""
+"""How processes end: Ctrl-C and SIGTERM are answered by an exception, later, or at once, by the end of the process."""
 
 from __future__ import annotations
 
+import atexit
 import os
 import signal
+import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from types import FrameType
+from typing import NoReturn
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
@@ -88,3 +91,12 @@ def end_with_parent() -> None:
 
     with suppress(Exception):
         ctypes.CDLL(None).prctl(1, int(signal.SIGKILL), 0, 0, 0)  # PR_SET_PDEATHSIG
+
+
+def end_process(code: int) -> NoReturn:
+    """End this process as Python would, but for what the system frees by itself: a twentieth of a short command."""
+    atexit._run_exitfuncs()
+    for stream in (sys.stdout, sys.stderr):
+        with suppress(OSError, ValueError):
+            stream.flush()
+    os._exit(code)

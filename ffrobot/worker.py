@@ -9,7 +9,6 @@ runs print on the error stream goes where this process's does.
 
 from __future__ import annotations
 
-import atexit
 import gc
 import json
 import os
@@ -25,7 +24,7 @@ from types import FrameType
 from typing import Any, BinaryIO, NoReturn
 
 from .common.deferred import USED
-from .common.interrupts import SIGNALS, EndOfCommand, end_with_parent
+from .common.interrupts import SIGNALS, EndOfCommand, end_process, end_with_parent
 from .common.python_files import imported_files
 
 LOADED = (  # by every run; what else a run has loaded, the next one finds
@@ -105,11 +104,7 @@ def _run(arguments: Sequence[str], report: BinaryIO) -> NoReturn:
         report.flush()
     if "mpi4py.MPI" in loaded:  # it has to be finished where it was begun
         sys.exit(code)
-    atexit._run_exitfuncs()
-    for stream in (sys.stdout, sys.stderr):
-        with suppress(OSError, ValueError):
-            stream.flush()
-    os._exit(code)
+    end_process(code)
 
 
 def _private_streams() -> tuple[BinaryIO, BinaryIO]:
