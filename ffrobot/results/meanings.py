@@ -189,14 +189,16 @@ def meaning(name: str, table: Mapping[str, Meaning] = RESULTS) -> Meaning | None
     """Of a dataset by its name below its analysis, or in its file; None of one that is not known."""
     if name in table:
         return table[name]
-    parts = name.split("/")
-    return next((found for pattern, found in table.items() if _matches(parts, pattern.split("/"))), None)
+    return next((found for pattern, found in table.items() if _matches(name, pattern)), None)
 
 
-def _matches(parts: list[str], pattern: list[str]) -> bool:
-    if pattern[-1] == "**":
-        pattern, parts = pattern[:-1], parts[: len(pattern) - 1]
-    return len(parts) == len(pattern) and all(map(fnmatchcase, parts, pattern))
+def _matches(name: str, pattern: str) -> bool:
+    parts, wanted = name.split("/"), pattern.split("/")
+    if wanted[-1] == "**":
+        parts, wanted = parts[: len(wanted) - 1], wanted[:-1]
+    return len(parts) == len(wanted) and all(
+        part == of or ("*" in of and fnmatchcase(part, of)) for part, of in zip(parts, wanted, strict=True)
+    )
 
 
 PEAKING = (
@@ -243,7 +245,7 @@ def _write(group: h5py.Group, closer: h5py.Group) -> None:
     for name, values in _histories(closer, len(time)):
         if name in group and len(time):
             tops = np.array([largest(time, column) for column in values.T])
-            if fnmatchcase(name, VOLTAGE):  # cut off at its limit, it has no smooth top there
+            if _matches(name, VOLTAGE):  # cut off at its limit, it has no smooth top there
                 limit = group[name].parent.attrs.get("limit", np.inf)
                 tops[:, 0] = np.minimum(tops[:, 0], np.maximum(np.abs(values).max(axis=0), limit))
             means = np.array([root_mean_square(time, column) for column in values.T])
@@ -262,7 +264,7 @@ def _histories(group: h5py.Group, count: int) -> Iterator[tuple[str, Array]]:
     names: list[str] = []
     group.visititems(lambda name, item: names.append(name) if isinstance(item, h5py.Dataset) else None)
     for name in names:
-        if any(fnmatchcase(name, pattern) for pattern in PEAKING) and group[name].shape[0] == count:
+        if any(_matches(name, pattern) for pattern in PEAKING) and group[name].shape[0] == count:
             values = as_floats(group[name][()].reshape(count, -1))
             yield name, np.linalg.norm(values, axis=1, keepdims=True) if _is_vector(name) else values
 
