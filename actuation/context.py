@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 from ..fe_models.modal_body import ModalBody
 from ..mbs.analysis.context import Context
 from ..mbs.model.body import Body
-from .patches.link_patches import LinkPatches
+
+if TYPE_CHECKING:
+    from .patches.link_patches import LinkPatches
 
 
 @dataclass(frozen=True, kw_only=True)

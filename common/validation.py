@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from difflib import get_close_matches
 from os import PathLike
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, NamedTuple, TypeVar, get_args
@@ -207,6 +206,8 @@ def _describe(item: ErrorDetails, record: type[BaseModel], data: dict[str, Any],
     found = item["input"]
     if kind == "union_tag_not_found":
         tag_key = context["discriminator"].replace("'", "")
+        from difflib import get_close_matches
+
         near = get_close_matches(tag_key, list(item["input"]), n=1)
         instead = f'"{near[0]}" (did you mean "{tag_key}"?)' if near else "none"
         return _Problem(key_path((*loc, tag_key), data), f"expected {_EXPECTED['missing']}", f", found {instead}")

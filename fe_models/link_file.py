@@ -20,8 +20,16 @@ from ..common.toml_files import load_toml
 from ..common.validation import validate
 from ..mesh.records import RectangleSection, SectionRecord, TubeSection
 from .beam.section_stress import contains
-from .link_records import FAMILIES, BeamLink, Link, Material, OrthotropicMaterial, SolidLink, read_measured
-from .modal_body.attachment_modes import DEFAULT_COUNT
+from .link_records import (
+    DEFAULT_COUNT,
+    FAMILIES,
+    BeamLink,
+    Link,
+    Material,
+    OrthotropicMaterial,
+    SolidLink,
+    read_measured,
+)
 from .solid.constitutive import is_stable
 
 

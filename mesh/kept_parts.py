@@ -13,7 +13,7 @@ from contextlib import suppress
 from dataclasses import asdict
 from io import BytesIO
 from pathlib import Path
-from typing import Any, cast
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 from platformdirs import user_cache_path
@@ -21,10 +21,11 @@ from platformdirs import user_cache_path
 from ..common.errors import SolveError
 from ..common.files import write_atomically
 from ..common.version import digest_of_code
-from .cells import CELLS, CellName
 from .included import files_of
-from .part_mesh import PartMesh
 from .records import Outlines, PlaceRecord, SolidGeometry, SolidMeshRecord
+
+if TYPE_CHECKING:
+    from .part_mesh import PartMesh
 
 _ARRAYS = ("points", "cells", "cell_tag", "facets", "facet_tag")
 _NAMES = ("regions", "faces")
@@ -68,6 +69,9 @@ def kept_path(
 
 def kept_part(path: Path) -> PartMesh | None:
     """The mesh kept at `path`; None where there is none, or it is damaged."""
+    from .cells import CELLS, CellName
+    from .part_mesh import PartMesh
+
     try:
         with np.load(path, allow_pickle=False) as file:
             if str(file["cell"]) not in CELLS:

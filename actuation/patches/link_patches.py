@@ -7,7 +7,7 @@ by one named face. Modal forces on the other families are left as they are: volt
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -224,12 +224,6 @@ def on_pieces(
             Phi_V[:, which], turn[:, which] = of.Phi_V.T, of.turn.T
         bodies[name] = OnBody(Phi_V, turn, to_piece.T)
     return replace(whole, bodies=bodies)
-
-
-def by_body(layouts: Sequence[PztLayout]) -> Iterator[tuple[str, list[PztLayout]]]:
-    """Bodies with patches, in the order of their first layouts."""
-    for body in dict.fromkeys(layout.body for layout in layouts):
-        yield body, [layout for layout in layouts if layout.body == body]
 
 
 def with_count(path: Path, layout: PztLayout, body: ModalBody, spatial: Body, count: int) -> LinkPatches | None:

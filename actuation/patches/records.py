@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import lru_cache
 from typing import Annotated, Literal, NamedTuple, Self
 
@@ -281,3 +281,9 @@ class PztLayout(Record):
 
 def _toml(value: bool | tuple[str, ...]) -> str:
     return "true" if value is True else json.dumps(list(value or ()))
+
+
+def by_body(layouts: Sequence[PztLayout]) -> Iterator[tuple[str, list[PztLayout]]]:
+    """Bodies with patches, in the order of their first layouts."""
+    for body in dict.fromkeys(layout.body for layout in layouts):
+        yield body, [layout for layout in layouts if layout.body == body]

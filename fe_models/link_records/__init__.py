@@ -1,6 +1,7 @@
 """The link file as records: what stage 1 reads, checked key by key."""
 
 from .link import (
+    DEFAULT_COUNT,
     FAMILIES,
     HOLDING_ROOT,
     BeamLink,
@@ -17,6 +18,7 @@ from .link import (
 from .measured import Measured, MeasuredMode, paired, read_measured
 
 __all__ = [
+    "DEFAULT_COUNT",
     "FAMILIES",
     "HOLDING_ROOT",
     "BeamLink",

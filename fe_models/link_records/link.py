@@ -71,7 +71,10 @@ class SurfacePatches(Record):
 
 Family = Literal["in-plane-bending", "out-of-plane-bending", "axial", "torsion"]
 
-FAMILIES: tuple[Family, ...] = ("in-plane-bending", "out-of-plane-bending", "axial", "torsion")
+DEFAULT_COUNT: Mapping[Family, int] = {"in-plane-bending": 6, "out-of-plane-bending": 6, "axial": 1, "torsion": 1}
+"""Eigenmodes of each family where a link file leaves their number out: attachment modes have the statics."""
+
+FAMILIES: tuple[Family, ...] = tuple(DEFAULT_COUNT)
 
 Solver = Literal["block-lanczos", "slepc"]
 

@@ -31,13 +31,6 @@ STIFFEST = 1e4
 COUPLED = 1e-10
 # ω² that differ by less, relative, are equal but for rounding: bending of round and square sections in both planes.
 ALIKE = 1e-6
-# Eigenmodes of each family where the link file leaves their number out: attachment modes have the statics.
-DEFAULT_COUNT: Mapping[Family, int] = {
-    "in-plane-bending": 6,
-    "out-of-plane-bending": 6,
-    "axial": 1,
-    "torsion": 1,
-}
 # Components of a load at an interface that move a family: forces 0 … 2 along x, y, z, moments 3 … 5 about them.
 COMPONENTS: Mapping[Family, tuple[int, ...]] = {
     "in-plane-bending": (1, 5),

@@ -11,8 +11,8 @@ import numpy as np
 
 from ...common.arrays import Array
 from ...common.errors import InputError, quoted
-from ..link_records import FAMILIES, SolidLink
-from ..modal_body.attachment_modes import DEFAULT_COUNT, ResidualModes, ascending
+from ..link_records import DEFAULT_COUNT, FAMILIES, SolidLink
+from ..modal_body.attachment_modes import ResidualModes, ascending
 from ..modal_body.lanczos import BlockLanczos
 from .eigen import Inverse, Mass
 from .elasticity import SolidModel

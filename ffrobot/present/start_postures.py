@@ -15,7 +15,6 @@ from ..mbs.scene.space import SPACES
 from ..mbs.solve.branch_names import branch_names, in_words
 from ..mbs.solve.branches import start_postures
 from ..mbs.solve.start import undeformed_posture
-from ..mbs.solve.workspace import within_limits
 from ..results.file import Results
 from ..run.solve import prepare_scene
 from ..run.watcher import Watcher
@@ -36,6 +35,8 @@ def print_start(path: Path, watcher: Watcher, console: Console) -> None:
     if first.branch:
         console.print(in_words(first.branch), soft_wrap=True)
     if others:
+        from ..mbs.solve.workspace import within_limits
+
         console.print(f"other starts: {len(others)} found; a line of [initial] chooses one")
     for other in others:
         beyond = "" if within_limits(model, other.q[None])[0] else " (beyond joint limits)"

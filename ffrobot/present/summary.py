@@ -10,12 +10,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..actuation.motors import MotorFeasibility
 from ..results.verdict import ROUND_OFF, AnalysisVerdict, Verdict, millimeters, number
 from .lines import alike
 
 if TYPE_CHECKING:
     from rich.console import Console
+
+    from ..actuation.motors import MotorFeasibility
 
 PLAIN_WIDTH = 120  # columns where the output is no terminal
 LINES = 15  # that a summary has at most

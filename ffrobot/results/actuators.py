@@ -9,12 +9,6 @@ from typing import TYPE_CHECKING, Any
 import h5py
 import numpy as np
 
-from ..actuation.feasibility import Feasibility, Unsupplied
-from ..actuation.motors import MotorFeasibility
-from ..actuation.patches.composite import StructureEffect
-from ..actuation.patches.patches import PatchArray, Voltages
-from ..actuation.patches.records import PztLayout
-from ..actuation.points import PointForces, PointSet
 from ..common.arrays import Array
 from ..mbs.quantities.motion import RobotMotion
 from ..mbs.scene.space import SPACES, Space
@@ -23,6 +17,12 @@ from ..run.solution import Solution
 
 if TYPE_CHECKING:  # most scenes have none of these
     from ..actuation.control.placement import Placed
+    from ..actuation.feasibility import Feasibility, Unsupplied
+    from ..actuation.motors import MotorFeasibility
+    from ..actuation.patches.composite import StructureEffect
+    from ..actuation.patches.patches import PatchArray, Voltages
+    from ..actuation.patches.records import PztLayout
+    from ..actuation.points import PointForces, PointSet
     from ..mbs.analysis.tracking import TrackedPath
 
 
@@ -99,6 +99,8 @@ def _write_judgement(group: h5py.Group, judged: Feasibility, layouts: Mapping[st
 
 def read_motors(group: h5py.Group, joints: Sequence[str]) -> dict[str, MotorFeasibility]:
     """Of the feasibility of an analysis: what every motor has to do, in the order of `joints`."""
+    from ..actuation.motors import MotorFeasibility
+
     entries = group.get("joints", {})
     return {
         name: MotorFeasibility(
@@ -117,6 +119,8 @@ def read_unsupplied(group: h5py.Group) -> Unsupplied | None:
     """Of the feasibility of an analysis: what nothing supplies; None where there is nothing of the kind."""
     if "unsupplied" not in group:
         return None
+    from ..actuation.feasibility import Unsupplied
+
     attributes = group["unsupplied"].attrs.items()
     about: dict[str, Any] = {key: tuple(value) if np.ndim(value) else value for key, value in attributes}
     return Unsupplied(**about)

@@ -6,7 +6,6 @@ import hashlib
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass
-from html import escape
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -121,6 +120,8 @@ class Results(LinkAccess, AnalysisAccess):
 
     def _repr_html_(self) -> str:
         """The verdict, as notebooks show it."""
+        from html import escape
+
         if not self._file:
             return f"<p>{escape(repr(self))}</p>"
         return f"<p><b>{escape(self.name)}</b></p><pre>{escape(str(self.verdict))}</pre>"

@@ -4,18 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import h5py
 import numpy as np
 
-from ..actuation.motors import MotorFeasibility, judge_motion
 from ..common.arrays import Array
 from .actuators import read_motors, read_unsupplied
 from .joints import Coordinates, Scene, labelled_coordinates
 from .linear import held_in_words
 from .meanings import POWER, peak_of
 from .verdict import AnalysisVerdict, PatchNeed, Place, Verdict, millimeters, off_path_in_words, tool_error
+
+if TYPE_CHECKING:
+    from ..actuation.motors import MotorFeasibility
 
 FAR_BEYOND = 10.0  # times their limit: no realistic patch supplies that
 AT_REST = 0.3  # of the mean rate of a path: what its first and last steps have at most
@@ -70,6 +72,8 @@ def _motors(group: h5py.Group, coordinates: Coordinates) -> dict[str, MotorFeasi
     for label, (joint, coordinate) in coordinates.items():
         entry = group.get(f"joints/{joint}")
         if entry is not None and "moment" in entry and "rate" in entry:
+            from ..actuation.motors import judge_motion
+
             rate_of = "motor_rate" if "motor_rate" in entry else "rate"
             moment, rate = (coordinate.of(entry[dataset][()]) for dataset in ("moment", rate_of))
             found[label] = judge_motion(time, moment, rate, coordinate.limits, float(time[-1]))

@@ -10,13 +10,12 @@ from typing import TYPE_CHECKING, Any
 import h5py
 import numpy as np
 
-from ..actuation.control.linear_model import LinearModel, Zeros, save_arrays
 from ..common.arrays import Array
 from ..mbs.quantities.motion import RobotMotion
-from ..mbs.solve.joint_conditions import COMPLIANT, LOCKED, translational_stiffness
 
 if TYPE_CHECKING:  # most scenes have none of these
     from ..actuation.control.linear import LinearModels
+    from ..actuation.control.linear_model import LinearModel, Zeros
     from ..actuation.control.loop_record import LoopRecord
     from ..actuation.control.metrics import Metrics
     from ..mbs.analysis.static import RobotAtRest
@@ -55,6 +54,10 @@ def write_joint_conditions(group: h5py.Group, motion: RobotMotion, found: Linear
 
 def held_in_words(group: h5py.Group) -> str:
     """Natural frequencies with motors at rest, and the least stiffness of a point, at the first time of an analysis."""
+    if not any(key.startswith("joints_") for key in group):
+        return ""
+    from ..mbs.solve.joint_conditions import COMPLIANT, LOCKED, translational_stiffness
+
     texts = []
     for condition, name in ((LOCKED, "joints locked"), (COMPLIANT, "compliant gears")):
         if (held := group.get(f"joints_{condition}")) is None:
@@ -138,6 +141,8 @@ def _write_zeros(group: h5py.Group, name: str, pair: tuple[str, ...], found: tup
 
 def read_linear(file: h5py.File, analysis: str) -> tuple[LinearModel, ...]:
     """The linear models of an analysis that has them."""
+    from ..actuation.control.linear_model import LinearModel
+
     group, time = file[f"{analysis}/linear"], file[f"{analysis}/time"][()]
     states, inputs, outputs = (tuple(str(name) for name in group.attrs[key]) for key in NAMES)
     models = []
@@ -155,6 +160,8 @@ def save_models(models: Sequence[LinearModel], path: Path) -> None:
     stacked: dict[str, Array] = {
         key: np.array([getattr(model, key) for model in models]) for key in (*MATRICES, "time")
     }
+    from ..actuation.control.linear_model import save_arrays
+
     save_arrays(models[0].arrays() | stacked, path)
 
 

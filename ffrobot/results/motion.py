@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import h5py
 import numpy as np
@@ -16,8 +16,10 @@ from ..mbs.quantities.motion import RobotMotion
 from ..mbs.quantities.stress import BodyStress, Recovery, SectionLoads, mode_displacement
 from ..mbs.quantities.validity import Bending
 from ..mbs.scene.trajectories import Trajectory
-from ..mbs.solve.stable_inversion import Inversion
 from ..run.solution import AnalysisResult, Solution
+
+if TYPE_CHECKING:
+    from ..mbs.solve.stable_inversion import Inversion
 
 
 def write_bodies(group: h5py.Group, solution: Solution, result: AnalysisResult) -> None:

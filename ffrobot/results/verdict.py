@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import h5py
 import numpy as np
 
-from ..actuation.motors import MotorFeasibility
 from .actuators import read_unsupplied
 from .joints import Scene
+
+if TYPE_CHECKING:
+    from ..actuation.motors import MotorFeasibility
 
 ROUND_OFF = 1e-9  # m, N·m, rad/s, W: numbers below it are rounding
 

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..actuation.feasibility import Feasibility
-from ..actuation.judgement import judge_actuators, links_in_motion
-from ..actuation.patches.link_patches import LinkPatches, by_body, check_reach, link_patches, on_kept_modes
-from ..actuation.patches.patches import Voltages
+from ..actuation.patches.records import by_body
 from ..actuation.points import PointSet, make_point_set
 from ..common.arrays import Array
 from ..mbs.model.drives import Drive
@@ -20,6 +18,11 @@ from ..mbs.scene.analysis import Analysis
 from ..mbs.scene.space import SPACES
 from ..scene.scene import Scene
 from .bodies import LoadedBody
+
+if TYPE_CHECKING:
+    from ..actuation.feasibility import Feasibility
+    from ..actuation.patches.link_patches import LinkPatches
+    from ..actuation.patches.patches import Voltages
 
 Bodies = Mapping[str, LoadedBody]
 FORCES_AT_POINTS = ("trajectory", "points")  # values of `apply` that need no modal forces
@@ -42,6 +45,10 @@ class Actuation:
 
 def make_patches(scene: Scene, bodies: Bodies) -> dict[str, LinkPatches]:
     """By body. Raises `InputError` for layouts that do not fit their link, or do not serve what an analysis asks."""
+    if not scene.pzt:
+        return {}
+    from ..actuation.patches.link_patches import check_reach, link_patches, on_kept_modes
+
     found = {}
     for name, layouts in by_body(scene.pzt):
         body = bodies[name]
@@ -87,6 +94,8 @@ def find_actuation(
     Links with actuation points need no patches, and none does where a later analysis has the forces on the paths.
     `known`: voltages (T, k) by body, V.
     """
+    from ..actuation.judgement import judge_actuators, links_in_motion
+
     flexible = {name: (body.modal, body.carrying) for name, body in bodies.items() if body.modal is not None}
     links = links_in_motion(motion, flexible)
     voltages: dict[str, Voltages] = {}

@@ -6,13 +6,11 @@ import hashlib
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Protocol, TypeVar
+from typing import TYPE_CHECKING, Protocol, TypeVar
 
 import numpy as np
 
-from ..actuation.patches.composite import Placed, StructureEffect, patched_body, structure_effect_of
-from ..actuation.patches.link_patches import by_body, link_patches, placed_patches
-from ..actuation.patches.records import PztLayout
+from ..actuation.patches.records import PztLayout, by_body
 from ..common.errors import InputError, did_you_mean, of_file, quoted
 from ..fe_models.link_records import FAMILIES, Family
 from ..fe_models.modal_body import ModalBody
@@ -24,6 +22,9 @@ from ..mbs.model.projection import projected
 from ..mbs.model.tools import with_tool
 from ..mbs.scene.bodies import BodyKeys, tensor
 from ..scene.scene import Scene
+
+if TYPE_CHECKING:
+    from ..actuation.patches.composite import Placed, StructureEffect
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -172,6 +173,8 @@ def _with_payloads(scene: Scene, body: LoadedBody) -> LoadedBody:
 
 def _patched(scene: Scene, body: LoadedBody, layouts: Sequence[PztLayout]) -> LoadedBody:
     """With the mass and stiffness of its patches, as far as the scene asks for it."""
+    from ..actuation.patches.link_patches import link_patches, placed_patches
+
     assert body.modal is not None
     link_patches(scene.path, layouts, body.modal, body.carrying)  # refuses patches that do not fit
     return with_structure(body, placed_patches(scene.path, layouts, body.modal))
@@ -181,6 +184,8 @@ def with_structure(body: LoadedBody, placed: Sequence[Placed]) -> LoadedBody:
     """A link, or a piece of one, with the mass and stiffness of patches, as far as layouts say so."""
     if body.modal is None or not any(one.layout.adds_mass or one.layout.adds_stiffness for one in placed):
         return body
+    from ..actuation.patches.composite import patched_body, structure_effect_of
+
     spatial, carrying = (patched_body(of, body.modal, placed) for of in (body.spatial, body.carrying))
     effect = structure_effect_of(body.carrying, carrying)
     return replace(body, spatial=spatial, carrying=carrying, structure=effect)

@@ -10,8 +10,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from math import inf, sqrt
+from typing import TYPE_CHECKING
 
-from ..actuation.feasibility import Feasibility
 from ..common.errors import InputError, quoted
 from ..mbs.joints.joint import MotorLimits
 from ..mbs.model.model import Model
@@ -20,8 +20,11 @@ from ..mbs.scene.motion_keys import Shaper
 from ..mbs.solve.vibration import PathFrequencies, frequencies_along
 from ..scene.scene import Scene
 
-Judge = Callable[[Scene], Feasibility | None]
-"""Solves a scene with the one analysis that it has; None where there is no motion along the path."""
+if TYPE_CHECKING:
+    from ..actuation.feasibility import Feasibility
+
+    Judge = Callable[[Scene], Feasibility | None]
+    """Solves a scene with the one analysis that it has; None where there is no motion along the path."""
 
 GROWTH = 1.5  # of the stretch, until one is found that is too fast and one that is not
 NEAR = 1.005  # ratio of these two at which the search ends

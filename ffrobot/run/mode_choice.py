@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,8 +12,10 @@ from ..mbs.model.body import Body
 from ..mbs.model.truncation import loaded_points, with_fewer_modes
 from ..scene.scene import Scene
 from .bodies import LoadedBody
-from .mode_search import Reported
 from .solution import AnalysisResult
+
+if TYPE_CHECKING:
+    from .mode_search import Reported
 
 GROWTH = 1.5  # of the number of modes from one solve to the next
 ALIKE = 1e-9  # of ω²: of a round link, both planes of bending

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
-from ..actuation.patches.link_patches import LinkPatches, on_pieces
 from ..actuation.points import PointSet, with_points
 from ..mbs.model.body import Body
 from ..mbs.model.model import Model, build_model
@@ -18,6 +18,9 @@ from .bodies import LoadedBody, load_bodies, robot_damping_ratios, with_structur
 from .mode_choice import mode_levels
 from .solution import Solution
 from .watcher import Watcher
+
+if TYPE_CHECKING:
+    from ..actuation.patches.link_patches import LinkPatches
 
 Bodies = Mapping[str, LoadedBody]
 
@@ -91,6 +94,8 @@ def with_pieces(solution: Solution, counts: Mapping[str, int], watcher: Watcher)
 
 
 def _on_pieces(solution: Solution, body: BodyInPieces, patches: LinkPatches, parts: Bodies) -> LinkPatches:
+    from ..actuation.patches.link_patches import on_pieces
+
     link, pieces = solution.bodies[patches.body].modal, [parts[name].modal for name in body.names]
     assert link is not None
     starts = {

@@ -7,12 +7,10 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from math import hypot
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..actuation.patches.link_patches import LinkPatches
-from ..actuation.patches.patches import PatchArray
-from ..actuation.points import PointForces, PointSet
 from ..common.arrays import Array
 from ..fe_models.modal_body import ModalBody
 from ..mbs.analysis.gears import unresolved_gears
@@ -39,9 +37,14 @@ from ..mbs.quantities.validity import Bending, deflection_warning, doubts
 from ..mbs.scene.analysis import Analysis
 from ..scene.pieces import BodyInPieces
 from ..scene.scene import Scene
-from .actuation import Actuation
 from .bodies import LoadedBody, remarks_on_parts, rigid_in_words
-from .mode_search import ModeChoice
+
+if TYPE_CHECKING:  # most scenes have none of these
+    from ..actuation.patches.link_patches import LinkPatches
+    from ..actuation.patches.patches import PatchArray
+    from ..actuation.points import PointForces, PointSet
+    from .actuation import Actuation
+    from .mode_search import ModeChoice
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..actuation.context import ActuatedContext
-from ..actuation.feasibility import Feasibility, quasi_static_shift
 from ..actuation.points import forces_at_points, solve_points
 from ..common.arrays import Array
 from ..common.errors import FfrobotError, InputError, SolveError, of_file
@@ -28,7 +27,6 @@ from .actuation import find_actuation, missing_forces
 from .bodies import load_bodies
 from .fastest import with_paths
 from .mode_choice import mode_levels, reported_modes
-from .mode_search import ModeSearch, error_tolerances
 from .pieces import MotionOfLinks, bending_of_links, divided_links, wanted_pieces
 from .prepare import (
     made_solution,
@@ -44,6 +42,8 @@ from .whole_links import make_whole_links
 
 if TYPE_CHECKING:
     from scipy.interpolate import BSpline
+
+    from ..actuation.feasibility import Feasibility
 
 logger = logging.getLogger(__name__)
 
@@ -103,6 +103,8 @@ def run_analyses(solution: Solution, watcher: Watcher, keep: Keep | None = None)
 
 def _with_enough_modes(solution: Solution, interruption: Interruption) -> Solution:
     """The scene solved with as many modes as its tolerances need: see `mode_search`."""
+    from .mode_search import ModeSearch, error_tolerances
+
     search = ModeSearch(error_tolerances(solution.scene), mode_levels(solution.scene, solution.bodies))
     while True:
         solution = _completed(with_bodies(solution, search.bodies), interruption)
@@ -245,6 +247,8 @@ def _predicted_shift(solution: Solution, found: AnalysisResult) -> dict[str, Arr
     forces = {} if found.actuation is None else missing_forces(motion, found.actuation)
     if not forces:
         return {}
+    from ..actuation.feasibility import quasi_static_shift
+
     points = [f"{body}.{label}" for body, labels in motion.points.items() for label in labels]
     if (whole := make_whole_links(solution)) is not None:
         try:

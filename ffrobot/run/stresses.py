@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..actuation.patches.composite import Placed, section_loads
-from ..actuation.patches.link_patches import LinkPatches
-from ..actuation.patches.patches import PatchArray, voltage_gain
 from ..common.arrays import Array
 from ..fe_models.modal_body import ModalBody
 from ..mbs.model.body import Body
@@ -23,6 +21,10 @@ from ..mbs.quantities.stress import (
     mode_displacement,
 )
 from .bodies import LoadedBody
+
+if TYPE_CHECKING:
+    from ..actuation.patches.link_patches import LinkPatches
+    from ..actuation.patches.patches import PatchArray
 
 
 def find_stresses(
@@ -61,6 +63,9 @@ def _sections(of_link: LinkPatches, link: ModalBody, spatial: Body, p: Array, lo
 
     Voltages are those whose modal forces the motion shows.
     """
+    from ..actuation.patches.composite import Placed, section_loads
+    from ..actuation.patches.patches import voltage_gain
+
     array = _in_plane(of_link)
     if array is None or not np.isfinite(array.authority).all():
         return None
