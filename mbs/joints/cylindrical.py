@@ -4,12 +4,9 @@ from __future__ import annotations
 
 from typing import Literal
 
-import numpy as np
-
 from ...common.arrays import Array
-from ...common.rotations import about
 from ..fields.spelling import SPATIAL
-from .joint import GUIDED, Along, Place
+from .joint import GUIDED, Along
 from .moving_joint import AxialJoint
 
 
@@ -20,18 +17,9 @@ class CylindricalJoint(AxialJoint):
     only_in = SPATIAL
 
     units = ("rad", "m")
-    q_count = 2
-    freedoms = 2
+    axes = (2, 5)
     loop_equations = GUIDED
     along = (Along("turn", 2), Along("slide", 2))
-
-    def place(self, q: Array) -> Place:
-        """By q[0] along z, turned by q[1] about it."""
-        return Place(q[..., :1] * np.eye(3)[2], about(2, q[..., 1]))
-
-    def motion(self, q: Array) -> Array:
-        """Along z, and about it."""
-        return np.broadcast_to(np.eye(6)[:, [2, 5]], (*q.shape[:-1], 6, 2))
 
     def state(self, coordinates: Array) -> Array:
         """Way first."""

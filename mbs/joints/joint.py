@@ -7,7 +7,6 @@ single coordinates these themselves, of free orientations a quaternion, and the 
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Annotated, ClassVar, Literal, NamedTuple, Self, get_args
@@ -16,7 +15,7 @@ import numpy as np
 from pydantic import field_validator, model_validator
 
 from ...common.arrays import Array
-from ...common.rotations import of_rpy, smallest_turn
+from ...common.rotations import about, of_rpy, smallest_turn
 from ...common.validation import Record
 from ..fields.field_types import GROUND, Name, Quantity, Side, Vector3, split_point
 from ..fields.references import Reference, body_of, loaded_reference
@@ -91,7 +90,7 @@ GUIDED = (LoopEquation("slide", 0), LoopEquation("slide", 1), *ALIGNED)
 NOT_TURNED = LoopEquation("dot", 0, 1)  # beside ALIGNED
 
 
-class JointRecord(Record, ABC):
+class JointRecord(Record):
     """A joint between two points, or a point and the ground: two sides, and how it moves."""
 
     name: Name
@@ -109,6 +108,7 @@ class JointRecord(Record, ABC):
 
     units: ClassVar[tuple[str, ...]] = ()  # of its coordinates, "rad" or "m"
     guess_units: ClassVar[tuple[str, ...]] = ()  # of the numbers by which [initial] gives its place, where those differ
+    axes: ClassVar[tuple[int, ...]] = ()  # along (0, 1, 2) and about (5) which q moves it, in its order
     q_count: ClassVar[int] = 0
     freedoms: ClassVar[int] = 0
     loop_equations: ClassVar[tuple[LoopEquation, ...] | None] = None  # None where it cannot close a loop
@@ -127,6 +127,11 @@ class JointRecord(Record, ABC):
         if len(points) == 2 and "at" in self.model_fields_set:
             raise ValueError('expected the key "at" only in joints to "ground", found it between two bodies')
         return self
+
+    @classmethod
+    def __pydantic_init_subclass__(cls, **_: object) -> None:
+        if cls.axes:
+            cls.q_count = cls.freedoms = len(cls.axes)
 
     @classmethod
     def type_name(cls) -> str:
@@ -181,13 +186,19 @@ class JointRecord(Record, ABC):
         first, second = self.triads()
         return (second, first) if backwards else (first, second)
 
-    @abstractmethod
+    @property
+    def subspace(self) -> Array:
+        """S (6, freedoms), `motion` of a joint that moves alike everywhere: along all axes, about z."""
+        return np.eye(6)[:, list(self.axes)]
+
     def place(self, q: Array) -> Place:
         """Where q (…, q_count) puts the outer triad."""
+        moved = q @ self.subspace.T
+        return Place(moved[..., :3], about(2, moved[..., 5]))
 
-    @abstractmethod
     def motion(self, q: Array) -> Array:
         """(…, 6, freedoms): velocity and angular velocity of the outer triad by v, in axes of the inner one."""
+        return np.broadcast_to(self.subspace, (*q.shape[:-1], 6, self.freedoms))
 
     def action(self, q: Array) -> Array:
         """(…, 6, freedoms): force and moment of motors on the outer side, at its triad, by generalized forces along v.

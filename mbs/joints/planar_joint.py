@@ -7,9 +7,8 @@ from typing import Literal
 import numpy as np
 
 from ...common.arrays import Array
-from ...common.rotations import about
 from ..fields.spelling import SPATIAL
-from .joint import ALIGNED, Along, LoopEquation, Place
+from .joint import ALIGNED, Along, LoopEquation
 from .moving_joint import AxialJoint
 
 
@@ -24,19 +23,9 @@ class PlanarJoint(AxialJoint):
     only_in = SPATIAL
 
     units = ("m", "m", "rad")
-    q_count = 3
-    freedoms = 3
+    axes = (0, 1, 5)
     loop_equations = (LoopEquation("slide", 2), *ALIGNED)
     along = (Along("slide", 0), Along("slide", 1), Along("turn", 2))
-
-    def place(self, q: Array) -> Place:
-        """By q[0], q[1] along x, y, turned by q[2] about z."""
-        d = np.concatenate([q[..., :2], np.zeros((*q.shape[:-1], 1))], axis=-1)
-        return Place(d, about(2, q[..., 2]))
-
-    def motion(self, q: Array) -> Array:
-        """Along x and y, about z."""
-        return np.broadcast_to(np.eye(6)[:, [0, 1, 5]], (*q.shape[:-1], 6, 3))
 
     def turned_around(self, coordinates: Array) -> Array:
         """The way from the second side to the first, in the axes of the second."""

@@ -4,12 +4,9 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-import numpy as np
-
-from ...common.arrays import Array
 from ..fields.field_types import NotNegative, Positive, Vector2, Vector3
 from ..fields.spelling import Spelled, place
-from .joint import GUIDED, NOT_TURNED, Along, Place
+from .joint import GUIDED, NOT_TURNED, Along
 from .moving_joint import AxialJoint
 
 
@@ -42,15 +39,6 @@ class PrismaticJoint(AxialJoint):
         return "expected an axis that is not zero in a prismatic joint, found none" if key == "axis" else ""
 
     units = ("m",)
-    q_count = 1
-    freedoms = 1
+    axes = (2,)
     loop_equations = (*GUIDED, NOT_TURNED)
     along = (Along("slide", 2),)
-
-    def place(self, q: Array) -> Place:
-        """By q[0] along z."""
-        return Place(q[..., :1] * np.eye(3)[2], np.broadcast_to(np.eye(3), (*q.shape[:-1], 3, 3)))
-
-    def motion(self, q: Array) -> Array:
-        """Sliding along z."""
-        return np.broadcast_to(np.eye(6)[:, 2:3], (*q.shape[:-1], 6, 1))

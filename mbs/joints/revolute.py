@@ -4,13 +4,10 @@ from __future__ import annotations
 
 from typing import Literal
 
-import numpy as np
 from pydantic import model_validator
 
-from ...common.arrays import Array
-from ...common.rotations import about
 from ..fields.field_types import NotNegative, Positive
-from .joint import ALIGNED, POINT, Along, Place
+from .joint import ALIGNED, POINT, Along
 from .moving_joint import AxialJoint
 from .twist_spring import StiffnessSteps
 
@@ -43,15 +40,6 @@ class RevoluteJoint(AxialJoint):
         return self
 
     units = ("rad",)
-    q_count = 1
-    freedoms = 1
+    axes = (5,)
     loop_equations = (POINT, *ALIGNED)
     along = (Along("turn", 2),)
-
-    def place(self, q: Array) -> Place:
-        """Turned by q[0] about z."""
-        return Place(np.zeros((*q.shape[:-1], 3)), about(2, q[..., 0]))
-
-    def motion(self, q: Array) -> Array:
-        """Turning about z."""
-        return np.broadcast_to(np.eye(6)[:, 5:], (*q.shape[:-1], 6, 1))

@@ -8,9 +8,7 @@ import numpy as np
 from pydantic import model_validator
 
 from ...common.arrays import Array
-from ...common.rotations import about
 from ..fields.spelling import SPATIAL
-from .joint import Place
 from .moving_joint import AxialJoint
 
 
@@ -23,8 +21,7 @@ class ScrewJoint(AxialJoint):
     """Displacement along the axis per turn, m; positive: right-handed."""
 
     units = ("rad",)
-    q_count = 1
-    freedoms = 1
+    axes = (5,)
 
     @model_validator(mode="after")
     def _has_lead(self) -> ScrewJoint:
@@ -37,14 +34,10 @@ class ScrewJoint(AxialJoint):
         """The way h along the axis, m/rad."""
         return self.lead / (2 * np.pi)
 
-    def place(self, q: Array) -> Place:
-        """Turned by q[0] about z, and h q[0] along it."""
-        return Place(self.rise * q[..., :1] * np.eye(3)[2], about(2, q[..., 0]))
-
-    def motion(self, q: Array) -> Array:
+    @property
+    def subspace(self) -> Array:
         """Along and about z."""
-        unit = np.array([0.0, 0.0, self.rise, 0.0, 0.0, 1.0])[:, None]
-        return np.broadcast_to(unit, (*q.shape[:-1], 6, 1))
+        return np.array([[0.0, 0.0, self.rise, 0.0, 0.0, 1.0]]).T
 
     def action(self, q: Array) -> Array:
         """A moment about z: the thread makes of it what force there is."""

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from typing import Literal
 
-import numpy as np
 from pydantic import model_validator
 
-from ...common.arrays import Array
-from .joint import ALIGNED, NOT_TURNED, POINT, JointRecord, Place
+from .joint import ALIGNED, NOT_TURNED, POINT, JointRecord
 
 
 class WeldJoint(JointRecord):
@@ -25,12 +23,3 @@ class WeldJoint(JointRecord):
         return self
 
     loop_equations = (POINT, *ALIGNED, NOT_TURNED)
-
-    def place(self, q: Array) -> Place:
-        """At rest."""
-        shape = q.shape[:-1]
-        return Place(np.zeros((*shape, 3)), np.broadcast_to(np.eye(3), (*shape, 3, 3)))
-
-    def motion(self, q: Array) -> Array:
-        """None."""
-        return np.zeros((*q.shape[:-1], 6, 0))
