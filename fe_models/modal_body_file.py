@@ -28,7 +28,7 @@ FORMAT_VERSION = 1
 LARGEST = 1e100  # of any number: products of three of them are still finite
 
 _ATTRIBUTES = ("name", "kind", "reference_condition", "ffrobot_version", "input_hash")
-# Field of ModalBody → dataset.
+# Field of ModalBody → dataset; those with a default not all files have.
 _DATASETS = {
     "length": "length",
     "mass": "mass",
@@ -41,10 +41,20 @@ _DATASETS = {
     "S_bar": "invariants/S_bar",
     "I_bar": "invariants/I_bar",
     "S_bar_kl": "invariants/S_bar_kl",
+    "J_spin": "invariants/J_spin",
+    "h_spin": "invariants/h_spin",
+    "S_spin": "invariants/S_spin",
+    "surface_stress": "stress/surface",
+    "surface_static": "stress/surface_static",
+}
+_NAMES = {"stress_loads": "stress/loads", "remarks": "remarks"}
+_PARTS: dict[str, tuple[str, type[DataclassInstance]]] = {
+    "stations": ("stations", Stations),
+    "mesh": ("mesh", PictureMesh),
+    "measured": ("modes/measured", MeasuredValues),
+    "surface_patches": ("surface_patches", OutlinedPatches),
 }
 _KINDS = {"c": "complex ones", "O": "text", "S": "text", "V": "records"}
-# Those that files of earlier versions lack.
-_SPIN = {name: f"invariants/{name}" for name in ("J_spin", "h_spin", "S_spin")}
 _UNITS = {"length": "m", "mass": "kg", "first_moment": "kg m", "second_moment": "kg m2", "modes/frequency": "Hz"}
 
 
@@ -122,46 +132,31 @@ def _check_format(path: Path, attributes: h5py.AttributeManager) -> None:
 
 def _body(file: h5py.File) -> ModalBody:
     values: dict[str, Any] = {name: _text(file.attrs[name]) for name in _ATTRIBUTES}
-    values |= {name: _array(file, dataset) for name, dataset in _DATASETS.items()}
-    stations, interfaces = file["stations"], file["interfaces"]
+    known = {item.name: item for item in fields(ModalBody)}
+    for name, dataset in _DATASETS.items():
+        if known[name].default is MISSING or dataset in file:
+            values[name] = _array(file, dataset)
+    for name, (group, record) in _PARTS.items():
+        if known[name].default is MISSING or group in file:
+            values[name] = record(**_arrays(file[group], record))
+    values |= {name: _texts(file, dataset) for name, dataset in _NAMES.items() if dataset in file}
+    if "modes/residual" in file:
+        values["residual"] = _whole_numbers(file["modes/residual"])
+    if "damping_of" in file["modes"].attrs:
+        values["damping_of"] = _text(file["modes"].attrs["damping_of"])
+    points = file.get("stress/points", {})
     return ModalBody(
         **values,
         modes_hash=_text(file.attrs.get("modes_hash", "")),
-        family=tuple(_text(name) for name in read(file["modes/family"])),
+        family=_texts(file, "modes/family"),
         geometric_stiffness=_geometric_stiffness(file),
-        interfaces={name: _interface(interfaces[name]) for name in interfaces},
-        stations=Stations(**_arrays(stations, Stations)),
-        mesh=PictureMesh(**_arrays(file["mesh"], PictureMesh)),
-        **_optional(file),
+        interfaces={name: _interface(group) for name, group in file["interfaces"].items()},
+        stress={name: StressPoint(**_arrays(points[name], StressPoint)) for name in points},
     )
 
 
 def _interface(group: h5py.Group) -> Interface:
     return Interface(**_arrays(group, Interface) | {"coupling": _text(group.attrs.get("coupling", ""))})
-
-
-def _optional(file: h5py.File) -> dict[str, Any]:
-    """What not all files have: stresses, outlined patches; in old ones, attachment modes and spin inertia."""
-    found: dict[str, Any] = {name: _array(file, dataset) for name, dataset in _SPIN.items() if dataset in file}
-    points = file.get("stress/points", {})
-    found["stress"] = {name: StressPoint(**_arrays(points[name], StressPoint)) for name in points}
-    if "stress/surface" in file:
-        found["surface_stress"] = _array(file, "stress/surface")
-    if "stress/loads" in file:
-        found["stress_loads"] = tuple(_text(name) for name in read(file["stress/loads"]))
-    if "stress/surface_static" in file:
-        found["surface_static"] = _array(file, "stress/surface_static")
-    if "modes/residual" in file:
-        found["residual"] = _whole_numbers(file["modes/residual"])
-    if "damping_of" in file["modes"].attrs:
-        found["damping_of"] = _text(file["modes"].attrs["damping_of"])
-    if "measured" in file["modes"]:
-        found["measured"] = MeasuredValues(**_arrays(file["modes/measured"], MeasuredValues))
-    if "remarks" in file:
-        found["remarks"] = tuple(_text(remark) for remark in read(file["remarks"]))
-    if "surface_patches" in file:
-        found["surface_patches"] = OutlinedPatches(**_arrays(file["surface_patches"], OutlinedPatches))
-    return found
 
 
 def _arrays(group: h5py.Group, record: type[DataclassInstance]) -> dict[str, Any]:
@@ -209,6 +204,10 @@ def _text(value: object) -> str:
     return value.decode("utf-8") if isinstance(value, bytes) else str(value)
 
 
+def _texts(file: h5py.File, name: str) -> tuple[str, ...]:
+    return tuple(map(_text, read(file[name])))
+
+
 def _image(body: ModalBody) -> bytes:
     """The HDF5 file as bytes; the same body always gives the same bytes."""
     with h5py.File("modal body", "w", driver="core", backing_store=False) as file:
@@ -219,36 +218,31 @@ def _image(body: ModalBody) -> bytes:
             file.attrs[name] = getattr(body, name)
         if body.modes_hash:
             file.attrs["modes_hash"] = body.modes_hash
-        _write_arrays(file, {dataset: getattr(body, name) for name, dataset in (_DATASETS | _SPIN).items()})
+        _write_arrays(file, {dataset: getattr(body, name) for name, dataset in _DATASETS.items()})
         for dataset, unit in _UNITS.items():
             file[dataset].attrs["unit"] = unit
         _write_names(file, "modes/family", body.family)
         _write_arrays(file, {"modes/residual": body.residual})
         if body.damping_of != "link":
             file["modes"].attrs["damping_of"] = body.damping_of
+        for name, (path, _) in _PARTS.items():
+            if (part := getattr(body, name)) is not None:
+                _write_arrays(file.create_group(path), vars(part))
         if body.measured is not None:
-            group = file.create_group("modes/measured")
-            group.attrs["what"] = body.measured.in_words()
-            _write_arrays(group, vars(body.measured))
+            file["modes/measured"].attrs["what"] = body.measured.in_words()
         _write_arrays(file.create_group("geometric_stiffness"), dict(sorted(body.geometric_stiffness.items())))
         for name, interface in sorted(body.interfaces.items()):
             group = file.create_group(f"interfaces/{name}")
             _write_arrays(group, {key: value for key, value in vars(interface).items() if key != "coupling"})
             if interface.coupling:
                 group.attrs["coupling"] = interface.coupling
-        _write_arrays(file.create_group("stations"), vars(body.stations))
-        _write_arrays(file.create_group("mesh"), vars(body.mesh))
         for name, point in sorted(body.stress.items()):
             _write_arrays(file.create_group(f"stress/points/{name}"), vars(point))
-        _write_arrays(file, {"stress/surface": body.surface_stress, "stress/surface_static": body.surface_static})
-        if body.remarks:
-            _write_names(file, "remarks", body.remarks)
-        if body.stress_loads:
-            _write_names(file, "stress/loads", body.stress_loads)
+        for name, path in _NAMES.items():
+            if names := getattr(body, name):
+                _write_names(file, path, names)
         if body.reference_condition == "craig-bampton":
             _write_craig_bampton(file.create_group("craig_bampton"), body)
-        if body.surface_patches is not None:
-            _write_arrays(file.create_group("surface_patches"), vars(body.surface_patches))
         file.flush()
         image: bytes = file.id.get_file_image()
         return image

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from itertools import zip_longest
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ import numpy as np
 from ...common.arrays import Array, Integers
 from ...common.errors import InputError
 from .interpolation import AlongAxis, interpolate
-from .parts import Interface, MeasuredValues, OutlinedPatches, PictureMesh, Stations, StressPoint, freeze
+from .parts import Integrals, Interface, MeasuredValues, OutlinedPatches, PictureMesh, Stations, StressPoint, freeze
 from .unit_loads import unit_load_names
 
 # m_ff = I and the identities between invariants must hold to this.
@@ -19,21 +20,35 @@ IDENTITY_TOLERANCE = 1e-8
 POSITIVE_TOLERANCE = 1e-6  # of matrices that rounding, or a mesh, may leave indefinite
 INTERFACE_TOLERANCE = 1e-6
 
+# Axes of arrays: n modes, k stations, p points of the picture, l loads of static stresses, j patches, ? any number.
+OF_BODY = {
+    "length": "", "mass": "", "first_moment": "3", "second_moment": "33", "frequency": "n", "stiffness": "nn",
+    "modal_mass": "nn", "damping_ratio": "n", "residual": "n", "S_bar": "3n", "I_bar": "33n", "S_bar_kl": "33nn",
+    "J_spin": "", "h_spin": "n", "S_spin": "nn",
+}  # fmt: skip
+OF_SURFACE = {"surface_stress": "p6n", "surface_static": "p6l"}
+OF_PART: dict[type, dict[str, str]] = {
+    Stations: {
+        "position": "k3", "translation": "k3n", "rotation": "k3n", "height": "k", "outline": "k?2", "rigidity": "k2",
+        "width": "k", "out_of_plane_rigidity": "k", "torsional_rigidity": "k",
+    },
+    PictureMesh: {"points": "p3", "mode_shapes": "p3n", "edges": "?2"},
+    Interface: {"position": "3", "translation": "3n", "rotation": "3n"},
+    StressPoint: {"position": "3", "stress": "6n", "strain": "6n", "static": "6l"},
+    MeasuredValues: {"frequency": "n", "damping_ratio": "n", "computed_frequency": "n"},
+    OutlinedPatches: {"edges": "j2", "top": "jn", "bottom": "jn"},
+}  # fmt: skip
 
-@dataclass(frozen=True, eq=False)
-class ModalBody:
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class ModalBody(Integrals):
     """A flexible link in mass-orthonormal modal coordinates; immutable, checked when made. SI units, the link's frame.
-
-    Symbols: docs/theory.md, Inertia shape integrals (Shabana, Dynamics of Multibody Systems, ch. 5); n modes.
 
     Attributes:
         name: of the link.
         kind: "beam" or "solid".
         reference_condition: "cantilever", "simply-supported" or "craig-bampton".
         length: in m.
-        mass: m in kg.
-        first_moment: (3,) ∫ρ x dV in kg·m.
-        second_moment: (3, 3) ∫ρ x xᵀ dV in kg·m².
         frequency: (n,) in Hz.
         stiffness: (n, n) K_ff = diag(ω²).
         modal_mass: (n, n) m_ff = I to 1e-8.
@@ -41,12 +56,7 @@ class ModalBody:
         damping_of: "link", or "robot" where ζ is wanted of the vibrations of the assembled robot.
         family: n names; of a residual attachment mode, that of the loads behind it.
         residual: (n,) 0 of eigenmodes, 1 of residual attachment modes, which come after them; all 0 where not given.
-        S_bar: (3, n) ∫ρ Φ dV.
-        I_bar: (3, 3, n) ∫ρ x_k Φ_l dV at [k, l].
-        S_bar_kl: (3, 3, n, n) ∫ρ Φ_kᵀ Φ_l dV at [k, l].
-        J_spin: J_s = ∫ρI_p dx in kg·m² of lines of mass about their axis, not in `second_moment`; None: unknown.
-        h_spin: (n,) h_s = ∫ρI_p φ dx, with φ the twist of the modes.
-        S_spin: (n, n) S_s = ∫ρI_p φᵀφ dx; `S_bar_kl` holds it once more at [2, 2], where the plane needs it.
+        J_spin, h_spin, S_spin: as in `Invariants`; None: unknown. `S_bar_kl` has S_spin, too, at [2, 2], for the plane.
         geometric_stiffness: (n, n) for each unit load, by its name.
         interfaces: by name; `root` and `tip` always.
         stations: along the axis.
@@ -70,17 +80,11 @@ class ModalBody:
     kind: str
     reference_condition: str
     length: float
-    mass: float
-    first_moment: Array
-    second_moment: Array
     frequency: Array
     stiffness: Array
     modal_mass: Array
     damping_ratio: Array
     family: tuple[str, ...]
-    S_bar: Array
-    I_bar: Array
-    S_bar_kl: Array
     interfaces: Mapping[str, Interface]
     stations: Stations
     mesh: PictureMesh
@@ -159,8 +163,8 @@ class ModalBody:
 
 def _check(body: ModalBody) -> None:
     """All that must hold of a modal body, in one place."""
-    n, k, p = body.mode_count, body.stations.position.shape[0], body.mesh.points.shape[0]
-    for name, array, shape in [*_expected_shapes(body, n, k, p), *_expected_stresses(body, n, p)]:
+    k = body.stations.position.shape[0]
+    for name, array, shape in _expected_shapes(body):
         if np.shape(array) != shape:
             _fail(body, f"{name}: expected shape {shape}, found {np.shape(array)}")
         if not np.all(np.isfinite(array)):
@@ -188,7 +192,7 @@ def _check(body: ModalBody) -> None:
         _fail(body, "frequency: expected positive numbers")
     if np.any(body.damping_ratio < 0):
         _fail(body, "damping_ratio: expected numbers not below 0")
-    _check_identities(body, np.eye(n))
+    _check_identities(body)
     _check_inertia(body)
     _check_spin(body)
     _check_interfaces(body)
@@ -243,13 +247,13 @@ def _check_interfaces(body: ModalBody) -> None:
                 )
 
 
-def _check_identities(body: ModalBody, unit: Array) -> None:
+def _check_identities(body: ModalBody) -> None:
     squares = (2 * np.pi * body.frequency) ** 2
     total = body.S_bar_kl[0, 0] + body.S_bar_kl[1, 1] + body.S_bar_kl[2, 2]
     identities = [
         ("second_moment", "symmetric", body.second_moment, body.second_moment.T),
         ("stiffness", "diag((2π frequency)²)", body.stiffness, np.diag(squares)),
-        ("modal_mass", "the identity", body.modal_mass, unit),
+        ("modal_mass", "the identity", body.modal_mass, np.eye(body.mode_count)),
         ("S_bar_kl", "S_bar_kl[l, k] = S_bar_kl[k, l]ᵀ", body.S_bar_kl, body.S_bar_kl.transpose(1, 0, 3, 2)),
         ("S_bar_kl", "a sum S_bar_11 + S_bar_22 + S_bar_33 equal to modal_mass", total, body.modal_mass),
         *((f"geometric_stiffness/{k}", "symmetric", v, v.T) for k, v in body.geometric_stiffness.items()),
@@ -262,70 +266,28 @@ def _check_identities(body: ModalBody, unit: Array) -> None:
             _fail(body, f"{name}: expected {expected} to {IDENTITY_TOLERANCE:g}, found a difference of {error:.2g}")
 
 
-def _expected_shapes(body: ModalBody, n: int, k: int, p: int) -> list[tuple[str, Any, tuple[int, ...]]]:
-    shapes: list[tuple[str, Any, tuple[int, ...]]] = [
-        ("length", body.length, ()),
-        ("mass", body.mass, ()),
-        ("first_moment", body.first_moment, (3,)),
-        ("second_moment", body.second_moment, (3, 3)),
-        ("frequency", body.frequency, (n,)),
-        ("stiffness", body.stiffness, (n, n)),
-        ("modal_mass", body.modal_mass, (n, n)),
-        ("damping_ratio", body.damping_ratio, (n,)),
-        ("residual", body.residual, (n,)),
-        ("S_bar", body.S_bar, (3, n)),
-        ("I_bar", body.I_bar, (3, 3, n)),
-        ("S_bar_kl", body.S_bar_kl, (3, 3, n, n)),
-        ("stations.position", body.stations.position, (k, 3)),
-        ("stations.translation", body.stations.translation, (k, 3, n)),
-        ("stations.rotation", body.stations.rotation, (k, 3, n)),
-        ("stations.height", body.stations.height, (k,)),
-        ("mesh.points", body.mesh.points, (p, 3)),
-        ("mesh.mode_shapes", body.mesh.mode_shapes, (p, 3, n)),
-    ]
-    shapes += [(f"geometric_stiffness/{load}", matrix, (n, n)) for load, matrix in body.geometric_stiffness.items()]
-    for name, interface in body.interfaces.items():
-        shapes.append((f"interfaces/{name}/position", interface.position, (3,)))
-        shapes.append((f"interfaces/{name}/translation", interface.translation, (3, n)))
-        shapes.append((f"interfaces/{name}/rotation", interface.rotation, (3, n)))
-    if body.J_spin is not None:
-        shapes.append(("J_spin", body.J_spin, ()))
-    if body.h_spin is not None:
-        shapes.append(("h_spin", body.h_spin, (n,)))
-    if body.S_spin is not None:
-        shapes.append(("S_spin", body.S_spin, (n, n)))
-    if body.measured is not None:
-        shapes += [(f"measured.{name}", value, (n,)) for name, value in vars(body.measured).items()]
-    if body.stations.rigidity is not None:
-        shapes.append(("stations.rigidity", body.stations.rigidity, (k, 2)))
-    for name in ("width", "out_of_plane_rigidity", "torsional_rigidity"):
-        if (values := getattr(body.stations, name)) is not None:
-            shapes.append((f"stations.{name}", values, (k,)))
-    if body.mesh.edges is not None:
-        shapes.append(("mesh.edges", body.mesh.edges, (len(body.mesh.edges), 2)))
-    if (outline := body.stations.outline) is not None:
-        shapes.append(("stations.outline", outline, (k, *outline.shape[1:2], 2)))
-    if body.surface_patches is not None:
-        patches = np.shape(body.surface_patches.edges)[0]
-        shapes.append(("surface_patches/edges", body.surface_patches.edges, (patches, 2)))
-        for face in ("top", "bottom"):
-            if (values := getattr(body.surface_patches, face)) is not None:
-                shapes.append((f"surface_patches/{face}", values, (patches, n)))
-    return shapes
-
-
-def _expected_stresses(body: ModalBody, n: int, p: int) -> Iterator[tuple[str, Any, tuple[int, ...]]]:
-    loads = len(body.stress_loads)
-    for name, point in body.stress.items():
-        yield f"stress/points/{name}/position", point.position, (3,)
-        yield f"stress/points/{name}/stress", point.stress, (6, n)
-        yield f"stress/points/{name}/strain", point.strain, (6, n)
-        if point.static is not None or loads:
-            yield f"stress/points/{name}/static", point.static, (6, loads)
+def _expected_shapes(body: ModalBody) -> Iterator[tuple[str, Any, tuple[int, ...]]]:
+    """Name, value and wanted shape of all that the body has; static stresses of loads are demanded with their names."""
+    loads, patches = len(body.stress_loads), body.surface_patches
+    sizes = {"n": body.mode_count, "k": len(body.stations.position), "p": len(body.mesh.points), "l": loads}
+    sizes["j"] = 0 if patches is None else len(patches.edges)
+    records: list[tuple[str, object, Mapping[str, str]]] = [("", body, OF_BODY)]
     if body.surface_stress is not None:
-        yield "stress/surface", body.surface_stress, (p, 6, n)
-        if body.surface_static is not None or loads:
-            yield "stress/surface_static", body.surface_static, (p, 6, loads)
+        records.append(("stress/", body, OF_SURFACE))
+    parts = [("stations.", body.stations), ("mesh.", body.mesh), ("measured.", body.measured)]
+    parts += [(f"interfaces/{name}/", interface) for name, interface in body.interfaces.items()]
+    parts += [(f"stress/points/{name}/", point) for name, point in body.stress.items()]
+    parts.append(("surface_patches/", patches))
+    records += [(prefix, part, OF_PART[type(part)]) for prefix, part in parts if part is not None]
+    for prefix, record, axes_of in records:
+        for name, axes in axes_of.items():
+            value = getattr(record, name)
+            if value is not None or (axes.endswith("l") and loads):
+                of = zip_longest(axes, np.shape(value)[: len(axes)])
+                shape = tuple(sizes[axis] if axis in sizes else size if axis == "?" else int(axis) for axis, size in of)
+                yield prefix + name.removesuffix("_stress"), value, shape
+    for load, matrix in body.geometric_stiffness.items():
+        yield f"geometric_stiffness/{load}", matrix, (sizes["n"], sizes["n"])
 
 
 def _is_chain(element: Integers, stations: int) -> bool:

@@ -22,8 +22,7 @@ from ...common.errors import InputError
 from ..link_records import FAMILIES, Family
 from .attachment_modes import COMPONENTS, ascending, uncoupled
 from .body import ModalBody
-from .invariants import LEVI_CIVITA
-from .parts import Interface
+from .parts import LEVI_CIVITA, Interface
 
 CONDITION, ROOT = "craig-bampton", "root"
 AXES = ("x", "y", "z", "rx", "ry", "rz")

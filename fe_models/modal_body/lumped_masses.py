@@ -9,15 +9,16 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
 from ...common.arrays import Array
 from ..link_records import InterfaceRecord
-from .invariants import LEVI_CIVITA, Invariants
-from .parts import Interface
+from .parts import LEVI_CIVITA, Interface, Invariants
 from .unit_loads import PAIRS, inertia_wrenches, interface_load_names
+
+Of = TypeVar("Of", bound=Invariants)
 
 
 @dataclass(frozen=True)
@@ -65,8 +66,13 @@ def with_lumped_masses(integrals: Invariants, attached: Iterable[Lump]) -> Invar
     for lump in attached:
         at = lump.at
         added = attached_integrals(lump.mass, at.position, lump.spread, at.translation, at.rotation)
-        integrals = replace(integrals, **{key: getattr(integrals, key) + more for key, more in added.items()})
+        integrals = with_added(integrals, added)
     return integrals
+
+
+def with_added(integrals: Of, added: Mapping[str, Any]) -> Of:
+    """The integrals with more of those of these names."""
+    return replace(integrals, **{key: getattr(integrals, key) + more for key, more in added.items()})
 
 
 def attached_integrals(m: float, x: Array, E: Array, Phi: Array, phi: Array) -> dict[str, Any]:

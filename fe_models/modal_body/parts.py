@@ -1,4 +1,4 @@
-"""What a modal body is made of: interfaces, stations, what pictures and stresses need; read-only. NumPy only."""
+"""What a modal body is made of: inertia, interfaces, stations, what pictures and stresses need. NumPy only."""
 
 from __future__ import annotations
 
@@ -13,6 +13,46 @@ from ...common.arrays import Array, Integers
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
+
+
+# ε_abc, (3, 3, 3): (u × v)_a = ε_abc u_b v_c.
+LEVI_CIVITA = np.array([[[(a - b) * (b - c) * (c - a) / 2 for c in range(3)] for b in range(3)] for a in range(3)])
+
+
+@dataclass(frozen=True, kw_only=True)
+class Integrals:
+    """Inertia shape integrals of a link over its volume, in its axes (docs/theory.md; Shabana, ch. 5); n modes.
+
+    Attributes:
+        mass: m in kg.
+        first_moment: (3,) ∫ρ x dV in kg·m.
+        second_moment: (3, 3) ∫ρ x xᵀ dV in kg·m².
+        S_bar: (3, n) ∫ρ Φ dV.
+        I_bar: (3, 3, n) ∫ρ x_k Φ_l dV at [k, l].
+        S_bar_kl: (3, 3, n, n) ∫ρ Φ_kᵀ Φ_l dV at [k, l].
+    """
+
+    mass: float
+    first_moment: Array
+    second_moment: Array
+    S_bar: Array
+    I_bar: Array
+    S_bar_kl: Array
+
+
+@dataclass(frozen=True, kw_only=True)
+class Invariants(Integrals):
+    """With the inertia of lines of mass about their axis, along which φ is the twist of the modes.
+
+    Attributes:
+        J_spin: J_s = ∫ρI_p dx in kg·m².
+        h_spin: (n,) h_s = ∫ρI_p φ dx.
+        S_spin: (n, n) S_s = ∫ρI_p φᵀφ dx.
+    """
+
+    J_spin: float
+    h_spin: Array
+    S_spin: Array
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,7 +19,7 @@ from dolfinx.mesh import meshtags
 from ...common.arrays import Array
 from ...mesh.compat import compiled_form, geometry_degree, lagrange_element, lagrange_space, node_map
 from ...mesh.slices import section_quadratures
-from ..modal_body.invariants import LEVI_CIVITA
+from ..modal_body.parts import LEVI_CIVITA
 from .elasticity import SolidModel
 
 

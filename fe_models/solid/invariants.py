@@ -11,7 +11,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from ...common.arrays import Array
-from ..modal_body.invariants import Invariants
+from ..modal_body.parts import Invariants
 from ..modal_body.unit_loads import PAIRS, interface_load_names
 from .elasticity import SolidModel
 from .strain_energy import geometric_stiffness, internal_forces

@@ -13,7 +13,7 @@ import numpy as np
 from ...common.arrays import Array, as_floats
 from ...common.errors import InputError
 from ...fe_models.modal_body import ModalBody
-from ...fe_models.modal_body.invariants import LEVI_CIVITA
+from ...fe_models.modal_body.parts import LEVI_CIVITA, Invariants
 from . import stiffening as stiffenings
 from .stiffening import Stiffening
 
@@ -36,23 +36,15 @@ class BodyPoint:
         return not np.array_equal(self.triad, np.eye(3))
 
 
-@dataclass(frozen=True)
-class Body:
+@dataclass(frozen=True, kw_only=True)
+class Body(Invariants):
     """Constants of one body in the equations of motion in space (Shabana, Dynamics of Multibody Systems, ch. 5).
 
-    Arrays are over all n modes of the link; `m_ff` is the identity. Twist φ of a line of mass counts by the last three.
+    Arrays are over all n modes of the link; `m_ff` is the identity. `S_bar_kl` is without S_spin, which files book
+    at [2, 2].
 
     Attributes:
         name: of the body.
-        mass: m in kg.
-        first_moment: s0 (3,) = ∫ρ x dV in kg·m, body axes.
-        second_moment: (3, 3) ∫ρ x xᵀ dV in kg·m².
-        S_bar: (3, n) ∫ρ Φ dV.
-        I_bar: (3, 3, n) ∫ρ x_k Φ_l dV at [k, l].
-        S_bar_kl: (3, 3, n, n) ∫ρ Φ_kᵀΦ_l dV at [k, l], without S_spin, which files book at [2, 2].
-        J_spin: J_s = ∫ρI_p dx in kg·m², where x is the axis of a line of mass.
-        h_spin: (n,) ∫ρI_p φ dx.
-        S_spin: (n, n) ∫ρI_p φᵀφ dx.
         stiffness: K_ff (n,) in rad²/s².
         damping: D_ff (n, n) in 1/s.
         points: its sections by name.
@@ -64,15 +56,6 @@ class Body:
     """
 
     name: str
-    mass: float
-    first_moment: Array
-    second_moment: Array
-    S_bar: Array
-    I_bar: Array
-    S_bar_kl: Array
-    J_spin: float
-    h_spin: Array
-    S_spin: Array
     stiffness: Array
     damping: Array
     points: Mapping[str, BodyPoint]

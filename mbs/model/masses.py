@@ -9,15 +9,14 @@ parts of their body.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
 from ...common.arrays import Array, Indices
 from ...common.rotations import skew
-from ...fe_models.modal_body.lumped_masses import attached_integrals
+from ...fe_models.modal_body.lumped_masses import attached_integrals, with_added
 from ..joints.weld import WeldJoint
 from ..scene.bodies import Payload, tensor
 from ..scene.mechanism import MechanismKeys
@@ -55,7 +54,7 @@ def with_payload(body: Body, point: str, mass: float, center: Array, inertia: Ar
     added = attached_integrals(mass, x, E, Phi, phi)
     # J about the center counts as it is, however far the section turns: see `Stiffening.S_turned`
     added["S_bar_kl"] = mass * np.einsum("km,ln->klmn", Phi, Phi)
-    loaded = _with_integrals(body, added)
+    loaded = with_added(body, added)
     if body.stiffening is not None:
         stiffening = body.stiffening.with_payload(point, at.position, phi, mass, center, E)
         loaded = replace(loaded, stiffening=stiffening)
@@ -70,15 +69,11 @@ def with_line_masses(body: Body, points: Sequence[BodyPoint], masses: Array, spi
     m_ff, loaded = np.eye(body.n_modes), body
     for at, mass, spin in zip(points, masses, spins, strict=True):
         Phi, twist = at.translation, at.rotation[0]
-        loaded = _with_integrals(loaded, attached_integrals(mass, at.position, np.zeros((3, 3)), Phi, at.rotation))
+        loaded = with_added(loaded, attached_integrals(mass, at.position, np.zeros((3, 3)), Phi, at.rotation))
         about = {"J_spin": spin, "h_spin": spin * twist, "S_spin": spin * np.outer(twist, twist)}
-        loaded = _with_integrals(loaded, about)
+        loaded = with_added(loaded, about)
         m_ff += mass * Phi.T @ Phi + about["S_spin"]
     return _uncoupled(loaded, m_ff, stiffness)
-
-
-def _with_integrals(body: Body, added: Mapping[str, Any]) -> Body:
-    return replace(body, **{key: getattr(body, key) + more for key, more in added.items()})
 
 
 def _uncoupled(body: Body, m_ff: Array, added: Array | None = None) -> Body:

@@ -14,8 +14,8 @@ import numpy as np
 
 from ...common.arrays import Array, as_floats
 from ...fe_models.modal_body import ModalBody
-from ...fe_models.modal_body.invariants import LEVI_CIVITA
 from ...fe_models.modal_body.lumped_masses import attached_integrals
+from ...fe_models.modal_body.parts import LEVI_CIVITA
 
 IN_PLANE = ("t_x", "t_y", "r_z", "omega_zz")
 """Inertial loads of motion in the plane z = 0."""

@@ -19,7 +19,7 @@ from ...common.arrays import Array, as_floats
 from ...common.errors import InputError
 from ...common.tables import shown
 from ...fe_models.modal_body import Interface, ModalBody
-from ...fe_models.modal_body.invariants import LEVI_CIVITA
+from ...fe_models.modal_body.parts import LEVI_CIVITA
 from ...mbs.model.body import from_modal_body
 
 POSITIVE = 1e-9  # of the largest entry: less is rounding

@@ -17,7 +17,7 @@ from ...common.arrays import Array
 from ...common.errors import InputError
 from ...common.tables import shown
 from ...fe_models.modal_body import Interface, ModalBody
-from ...fe_models.modal_body.invariants import LEVI_CIVITA
+from ...fe_models.modal_body.parts import LEVI_CIVITA
 from .integrals import Node, ShapeIntegrals, about_center, integrals_of, nodes_of, noted, slopes, with_agreed_masses
 from .make import NOT_IN_THE_FILE, modal_body
 
