@@ -21,8 +21,7 @@ from ..common.errors import InputError, did_you_mean, quoted
 from ..common.validation import Record
 from ..fe_models.modal_body import ModalBody
 from ..mbs.analysis.outcome import Outcome
-from ..mbs.fields.field_types import Name
-from ..mbs.fields.references import Reference
+from ..mbs.fields.field_types import Name, Reference
 from ..mbs.fields.spelling import IN_PLANE, IN_SPACE
 from ..mbs.model.body import Body, BodyPoint
 from ..mbs.model.motors import path_forces, path_forces_on_bodies

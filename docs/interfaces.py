@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 import re
+from dataclasses import is_dataclass
 from pathlib import Path
 
 import click
@@ -94,7 +95,8 @@ def _class(one: type) -> str:
         text = inspect.getdoc(value)
         if text:
             members.append(f"* `{name}`: {' '.join(text.split())}")
-    return f"### {one.__name__}\n\n{_markdown(one)}\n\n" + "\n".join(members) + "\n"
+    own = "\n\n".join(_markdown(base) for base in one.__mro__ if base is one or is_dataclass(base))
+    return f"### {one.__name__}\n\n{own}\n\n" + "\n".join(members) + "\n"
 
 
 def _call(name: str, function: object) -> str:

@@ -18,8 +18,8 @@ import numpy as np
 from ..common.arrays import Array, Integers
 from ..common.errors import InputError
 from .cells import VOLUME_ELEMENTS
-from .defaults import CIRCLE, GROWTH
 from .jacobian import SLIVER, cell_quality
+from .records import CIRCLE, GROWTH
 from .source import RawMesh
 
 _MOST_PRINTED = 1 << 20  # bytes

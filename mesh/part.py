@@ -26,13 +26,20 @@ from .checks import (
     oriented,
     straightened,
 )
-from .defaults import default_order, default_size
 from .faces import named_faces
 from .kept_parts import keep_part, kept_part, kept_path
 from .mesh_files import read_mesh
 from .part_mesh import PartMesh
 from .part_reader import read_apart
-from .records import Outlines, PlaceRecord, RectangleSection, SolidGeometry, SolidMeshRecord
+from .records import (
+    Outlines,
+    PlaceRecord,
+    RectangleSection,
+    SolidGeometry,
+    SolidMeshRecord,
+    default_order,
+    default_size,
+)
 from .source import Source, source_from
 from .structured import Divisions, structured_box
 

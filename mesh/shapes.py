@@ -15,9 +15,10 @@ import gmsh
 from ..common.errors import InputError
 from ..common.validation import Record
 from .checks import check_size
-from .defaults import BAR, CIRCLE, default_order, default_size
 from .gmsh_session import extract_mesh, gmsh_session, mesh_model, volume_and_surface
 from .records import (
+    BAR,
+    CIRCLE,
     CircleSection,
     Hole,
     Outlines,
@@ -25,6 +26,8 @@ from .records import (
     SectionRecord,
     SolidGeometry,
     SolidMeshRecord,
+    default_order,
+    default_size,
 )
 from .source import Source, source_from
 

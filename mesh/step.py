@@ -13,10 +13,9 @@ import numpy as np
 from ..common.arrays import as_floats
 from ..common.errors import InputError
 from .checks import check_size
-from .defaults import default_order, default_size
 from .gmsh_session import extract_mesh, gmsh_session, mesh_model, volume_and_surface
 from .part_reader import MESHING, MESHING_CELL, allow
-from .records import SolidMeshRecord
+from .records import SolidMeshRecord, default_order, default_size
 from .source import Source, source_from
 
 # Units of length that a STEP file can declare, in mm: OpenCASCADE turns all numbers into millimetres.

@@ -16,7 +16,7 @@ import numpy as np
 
 from ffrobot.mbs.analysis.outcome import Motion, Outcome
 from ffrobot.mbs.fields.field_types import Positive
-from ffrobot.mbs.fields.references import Reference
+from ffrobot.mbs.fields.field_types import Reference
 from ffrobot.mbs.scene.analysis import TimedAnalysis
 
 

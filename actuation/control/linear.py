@@ -10,8 +10,7 @@ from typing import Literal
 from ...common.arrays import Array
 from ...mbs.analysis.operating_points import InstantAnalysis, OperatingPoints, find_operating_points, places_of
 from ...mbs.analysis.outcome import Details, Outcome
-from ...mbs.fields.field_types import PointReference
-from ...mbs.fields.references import Reference
+from ...mbs.fields.field_types import PointReference, Reference
 from ...mbs.model.model import Model, modal_directions
 from ...mbs.solve.joint_conditions import JointCondition, RobotModes, joint_conditions
 from ...mbs.solve.linearisation import LinearEquations, LinearMechanism

@@ -21,7 +21,7 @@ from ...common.errors import InputError, quoted
 from ...mbs.analysis.operating_points import InstantAnalysis, find_operating_points, of_earlier, row_at
 from ...mbs.analysis.outcome import Details, Outcome
 from ...mbs.analysis.replay import motor_forces_of
-from ...mbs.fields.references import Reference
+from ...mbs.fields.field_types import Reference
 from ...mbs.scene.analysis import Surroundings
 from ...mbs.solve.linearisation import LinearEquations
 from ..context import ActuatedContext

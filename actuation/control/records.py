@@ -21,9 +21,10 @@ from ...mbs.fields.field_types import (
     PatchCount,
     PointReference,
     Positive,
+    Reference,
     one_of,
+    under,
 )
-from ...mbs.fields.references import Reference, under
 from ...mbs.scene.analysis import ActuatedAnalysis, Analysis, Need
 from ...mbs.scene.loads import Load
 

@@ -14,10 +14,10 @@ from ...common.arrays import Array, as_floats
 from ...common.errors import InputError
 from ...mbs.analysis.outcome import Outcome
 from ...mbs.model.body import Body
+from ...mbs.model.gears import resistance
 from ...mbs.model.model import Model, build_model, row_values
 from ...mbs.model.rows import ConstraintRow
 from ...mbs.model.system import ZERO, MultibodySystem
-from ...mbs.model.transmission import resistance
 from ...mbs.solve.linearisation import LinearEquations, LinearMechanism, labelled
 from ..patches.link_patches import LinkPatches
 from ..patches.patches import voltage_gain

@@ -17,9 +17,8 @@ from ...mesh.structured import graded_nodes, with_points
 from ..link_records import DEFAULT_COUNT, FAMILIES, BeamLink, Family
 from ..modal_body import Interface, ModalBody, PictureMesh, Stations
 from ..modal_body.attachment_modes import ascending
-from ..modal_body.damping import damping_ratio
+from ..modal_body.damping import canonical_signs, damping_ratio
 from ..modal_body.lumped_masses import lump_weights, lumps, with_lumped_masses, with_lumped_stiffness
-from ..modal_body.signs import canonical_signs
 from .attachment_modes import attachment_modes, fixed_interfaces, ritz_modes
 from .beam import R_X, FamilyModel, family_model
 from .eigen import lowest_modes
@@ -259,3 +258,29 @@ def _interface(stations: Functions, fields: Array, position: float) -> Interface
 
 def _on_axis(x: Array) -> Array:
     return np.stack([x, np.zeros_like(x), np.zeros_like(x)], axis=1)
+
+
+GAP = 1e-3  # between neighbouring ω², relative: closer ones may turn into each other
+
+
+def fixed_mode_frequencies(links: Sequence[BeamLink], family: Family, number: int) -> Array | None:
+    """(n,) Hz of `links` by the mode `number`, from 1, of `family` of the first one: for derivatives.
+
+    With K x = λ M x and x held, the derivative of Rayleigh's quotient xᵀK(θ)x / xᵀM(θ)x at that beam is that of the
+    eigenvalue: no mode but the one is needed, as long as its eigenvalue is simple (Fox and Kapoor, AIAA Journal 6,
+    1968).
+    None where its frequency is not simple, or the links differ in their meshes.
+    """
+    model = loaded_models(links[0], [family])[0][family]
+    count = min(number + 1, model.K.shape[0])
+    omega2, X = lowest_modes(model.K, model.M, model.strain, count)
+    if np.any(np.diff(omega2)[max(0, number - 2) :] < GAP * omega2[number - 1]):
+        return None
+    x, found = X[:, number - 1], []
+    for link in links:
+        model = loaded_models(link, [family])[0][family]
+        if model.K.shape[0] != x.size:
+            return None
+        strain = model.strain @ x  # of which the quotient is free of rounding errors of K
+        found.append(float(np.sqrt((strain @ strain) / (x @ (model.M @ x)))) / (2 * np.pi))
+    return np.array(found)

@@ -56,7 +56,9 @@ class ModalBody(Integrals):
         damping_of: "link", or "robot" where ζ is wanted of the vibrations of the assembled robot.
         family: n names; of a residual attachment mode, that of the loads behind it.
         residual: (n,) 0 of eigenmodes, 1 of residual attachment modes, which come after them; all 0 where not given.
-        J_spin, h_spin, S_spin: as in `Invariants`; None: unknown. `S_bar_kl` has S_spin, too, at [2, 2], for the plane.
+        J_spin: J_s = ∫ρI_p dx in kg·m² of lines of mass about their axis, not in `second_moment`; None: unknown.
+        h_spin: (n,) h_s = ∫ρI_p φ dx, with φ the twist of the modes.
+        S_spin: (n, n) S_s = ∫ρI_p φᵀφ dx; `S_bar_kl` holds it once more at [2, 2], where the plane needs it.
         geometric_stiffness: (n, n) for each unit load, by its name.
         interfaces: by name; `root` and `tip` always.
         stations: along the axis.

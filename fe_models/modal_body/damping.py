@@ -1,4 +1,4 @@
-"""Damping ratios of modes."""
+"""What links say of their modes, or nothing does: damping ratios, and the sign, which eigensolvers leave open."""
 
 from __future__ import annotations
 
@@ -20,3 +20,22 @@ def damping_ratio(link: Link, omega: Array) -> Array:
     if ratio.ndim:
         ratio = np.pad(ratio, (0, omega.size - ratio.size), mode="edge")
     return np.broadcast_to(ratio, omega.shape).copy()
+
+
+def canonical_signs(fields: Array) -> Array:
+    """(n,) 1 or −1, to multiply each mode by.
+
+    The dominant translation is then positive at the station nearest the root where it exceeds half its largest value;
+    of a mode without translation, the dominant rotation.
+
+    Args:
+        fields: (6, k, n) displacement and rotation along x, y, z of n modes at k stations, root first.
+    """
+    signs = np.ones(fields.shape[2])
+    for k in range(signs.size):
+        rows = fields[:3, :, k]
+        if not np.any(rows):
+            rows = fields[3:, :, k]
+        dominant = rows[np.argmax(np.abs(rows).max(axis=1))]
+        signs[k] = np.sign(dominant[np.argmax(np.abs(dominant) > 0.5 * np.abs(dominant).max())])
+    return signs

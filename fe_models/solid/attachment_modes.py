@@ -18,9 +18,8 @@ from ..link_records import Family
 from ..modal_body.attachment_modes import COMPONENTS, Inertia, ResidualModes, residual_modes
 from ..modal_body.craig_bampton import ROOT, in_order
 from ..modal_body.unit_loads import interface_load_names
-from .eigen import Mass
 from .elasticity import SolidModel
-from .modes import SolidModes
+from .modes import Mass, SolidModes
 from .strain_energy import strain_energy
 from .supports import Flexibility
 

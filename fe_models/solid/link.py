@@ -16,21 +16,19 @@ from ...common.version import VERSION
 
 # First of all that load dolfinx: mesh.compat sets PETSc up.
 from ...mesh.compat import lagrange_element, node_map
-from ...mesh.defaults import default_order
+from ...mesh.records import default_order
 from ...mesh.solid_mesh import SolidMesh, solid_mesh
 from ...mesh.structured import with_points
 from ..link_records import HOLDING_ROOT, Coupling, SolidLink
 from ..modal_body import Interface, ModalBody, PictureMesh, Stations
-from ..modal_body.damping import damping_ratio
+from ..modal_body.damping import canonical_signs, damping_ratio
 from ..modal_body.lumped_masses import lump_weights, lumps, with_lumped_loads, with_lumped_masses, with_lumped_stiffness
-from ..modal_body.signs import canonical_signs
 from .attachment_modes import attachment_modes, fixed_interfaces, ritz_modes
-from .eigen import Mass
 from .elasticity import MaterialMap, SolidModel, material_map, solid_model
 from .families import section_motion
 from .functionals import Averages, face_averages, section_averages
 from .invariants import prestressed, shape_integrals, static_shapes, unit_loads
-from .modes import wanted_modes
+from .modes import Mass, wanted_modes
 from .stress import recovered_stresses
 from .supports import Flexibility, RigidFace
 from .surface_patches import outlined_patches

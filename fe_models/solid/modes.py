@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
@@ -14,13 +14,40 @@ from ...common.errors import InputError, quoted
 from ..link_records import DEFAULT_COUNT, FAMILIES, SolidLink
 from ..modal_body.attachment_modes import ResidualModes, ascending
 from ..modal_body.lanczos import BlockLanczos
-from .eigen import Inverse, Mass
 from .elasticity import SolidModel
 from .families import LOCAL, NEARLY, SectionMotion, aligned, names
 from .strain_energy import strain_energy
 
 if TYPE_CHECKING:
     from ..modal_body.krylov_schur import KrylovSchur
+    from .attachment_modes import FixedInterfaceFlexibility
+    from .supports import Flexibility
+
+    Inverse: TypeAlias = Flexibility | FixedInterfaceFlexibility
+
+
+class Mass:
+    """M, with what is attached to interfaces: M u + Σ Bᵀ diag(w) B u.
+
+    Args:
+        model: has the mass of the part itself.
+        attached: for each attached mass B (6, 3 owned), the mean motion of its interface, and w (6,), its weights.
+    """
+
+    def __init__(self, model: SolidModel, attached: Sequence[tuple[Array, Array]] = ()) -> None:
+        self.model, self.attached = model, attached
+
+    def __matmul__(self, U: Array) -> Array:
+        """M U of U (3 owned, n); collective."""
+        product = self.model.mass @ U
+        for B, weights in self.attached:
+            product = product + B.T @ (weights[:, None] * self.model.total(B @ U))
+        return product
+
+    def motion_of_attached(self, U: Array) -> list[tuple[Array, Array]]:
+        """For each attached mass its motion (6, n) and weights (6,); collective."""
+        return [(self.model.total(B @ U), weights) for B, weights in self.attached]
+
 
 # Mean motion of the sections, of modes (3 owned, n).
 Reader = Callable[[Array], SectionMotion]

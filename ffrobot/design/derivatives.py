@@ -24,7 +24,6 @@ import numpy as np
 
 from ..common.arrays import Array, as_floats
 from ..common.errors import InputError
-from ..fe_models.link import fixed_mode_frequencies
 from ..fe_models.link_records import BeamLink
 from ..sweep.files import LINKS
 from ..sweep.sweep import Key
@@ -322,6 +321,8 @@ def _of_beam(path: Path, base: Base, k: int, goal: Frequency, reading: Reading) 
     except InputError:  # on one side no value is allowed
         return None
     family, number = reading.mode.rsplit(" ", 1)
+    from ..fe_models.beam.link import fixed_mode_frequencies  # loads SciPy
+
     frequencies = fixed_mode_frequencies(links, next(one for one in links[0].families if one == family), int(number))
     if frequencies is None:
         return None

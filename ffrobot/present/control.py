@@ -12,8 +12,8 @@ from ..actuation.control.loop_record import LoopRecord
 from ..actuation.control.metrics import DEFINITIONS
 from ..actuation.control.placement import Placed
 from ..common.arrays import Array
+from ..mbs.analysis.operating_points import RobotAtRest
 from ..mbs.analysis.outcome import Details
-from ..mbs.analysis.static import RobotAtRest
 from ..mbs.solve.joint_conditions import translational_stiffness
 from .lines import LOOP_COLUMNS, loop_row, plain_table
 

@@ -12,8 +12,7 @@ from ..common.arrays import Array
 from ..common.rotations import rpy_of
 from ..mbs.model.model import Model
 from ..mbs.scene.space import SPACES
-from ..mbs.solve.branch_names import branch_names, in_words
-from ..mbs.solve.branches import start_postures
+from ..mbs.solve.branches import branch_names, in_words, start_postures
 from ..mbs.solve.start import undeformed_posture
 from ..results.file import Results
 from ..run.solve import prepare_scene

@@ -18,7 +18,7 @@ if TYPE_CHECKING:  # most scenes have none of these
     from ..actuation.control.linear_model import LinearModel, Zeros
     from ..actuation.control.loop_record import LoopRecord
     from ..actuation.control.metrics import Metrics
-    from ..mbs.analysis.static import RobotAtRest
+    from ..mbs.analysis.operating_points import RobotAtRest
 
 MATRICES = ("A", "B", "C", "D", "mass", "transformation")
 NAMES = ("state_names", "input_names", "output_names")

@@ -16,10 +16,9 @@ from ..fe_models.link_records import FAMILIES, Family
 from ..fe_models.modal_body import ModalBody
 from ..fe_models.modal_body_file import read_modal_body
 from ..mbs.fields.field_types import split_point
-from ..mbs.model.body import Body, from_modal_body, rigid_body
+from ..mbs.model.body import Body, from_modal_body, rigid_body, with_tool
 from ..mbs.model.masses import turns_as_a_body, with_payload
 from ..mbs.model.projection import projected
-from ..mbs.model.tools import with_tool
 from ..mbs.scene.bodies import BodyKeys, tensor
 from ..scene.scene import Scene
 

@@ -16,10 +16,10 @@ from ..fe_models.modal_body import ModalBody
 from ..mbs.analysis.gears import unresolved_gears
 from ..mbs.analysis.outcome import EarlierRun, Outcome
 from ..mbs.model.body import Body
+from ..mbs.model.known_motion import Wrench
 from ..mbs.model.model import Model
 from ..mbs.model.projection import vanishing_in_plane
 from ..mbs.model.truncation import modes_kept
-from ..mbs.model.wrench import Wrench
 from ..mbs.quantities.attachment_error import (
     Start,
     mode_error,

@@ -13,7 +13,7 @@ KINDS = Deferred(
         "pcid": "ffrobot.mbs.analysis.pcid:Pcid",
         "fcid": "ffrobot.mbs.analysis.fcid:Fcid",
         "forward": "ffrobot.mbs.analysis.forward:Forward",
-        "static": "ffrobot.mbs.analysis.static:Static",
+        "static": "ffrobot.mbs.analysis.operating_points:Static",
         "linear": "ffrobot.actuation.control.linear:Linear",
         "placement": "ffrobot.actuation.control.placement:PatchPlacement",
         "motors-only": "ffrobot.mbs.analysis.motors_only:MotorsOnly",

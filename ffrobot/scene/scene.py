@@ -8,8 +8,7 @@ from typing import Annotated
 from ..actuation.patches.records import PztLayout
 from ..actuation.points import ActuationPoints
 from ..common.deferred import Table
-from ..mbs.fields.field_types import NotEmpty
-from ..mbs.fields.references import Reference, under
+from ..mbs.fields.field_types import NotEmpty, Reference, under
 from ..mbs.scene.mechanism import MechanismKeys, MechanismScene
 from .kinds import AnyKind
 

@@ -16,8 +16,7 @@ from ...common.arrays import Array, as_floats, as_list
 from ...common.errors import InputError, SolveError
 from .. import _core
 from .._core import TimeFunction
-from ..fields.field_types import Expression, Name
-from ..fields.references import Reference
+from ..fields.field_types import Expression, Name, Reference
 from ..fields.waypoints import spline
 from ..model.body import Body
 from ..model.divided_link import DividedLink

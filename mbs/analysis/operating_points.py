@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 from pydantic import Field
@@ -14,19 +14,19 @@ from pydantic import Field
 from ...common.arrays import Array
 from ...common.errors import InputError, SolveError, did_you_mean, quoted
 from .._core import TimeFunction
-from ..fields.field_types import NotNegative
+from ..fields.field_types import NotNegative, PointReference, Reference
 from ..model.gears import with_compliance, with_prescribed_motors
 from ..model.model import Model, without_paths
 from ..model.rows import ConstraintRow
 from ..scene.analysis import Analysis, Surroundings, TimedAnalysis
-from ..solve.joint_conditions import robot_modes
+from ..solve.joint_conditions import JointCondition, joint_conditions, robot_modes
 from ..solve.linearisation import LinearEquations, LinearMechanism
 from ..solve.redundancy import resolved
 from ..solve.start import undeformed_posture
 from ..solve.statics import holding_multipliers, static_equilibrium, unstable_ways
 from .context import Context, place_of
 from .gears import with_motor_coordinates
-from .outcome import Motion, Outcome, Statistics
+from .outcome import Details, Motion, Outcome, Statistics
 
 
 def run_static(context: Context, analysis: Analysis) -> Outcome:
@@ -213,3 +213,42 @@ def locked_motors(model: Model, q: Array) -> list[ConstraintRow]:
                 )
             )  # fmt: skip
     return rows
+
+
+@dataclass(frozen=True)
+class RobotAtRest(Details):
+    """Natural frequencies and compliance in the equilibrium, by condition of its joints: see `joint_conditions`."""
+
+    conditions: tuple[Mapping[str, JointCondition], ...]
+    times = (0.0,)
+
+
+class Static(Analysis):
+    """The equilibrium at t = 0 with the torques, forces and voltages that it needs.
+
+    With it come natural frequencies and the compliance at points, with joints locked and behind compliant gears.
+    """
+
+    kind: Literal["static"]
+    points: tuple[PointReference, ...] | None = None
+    """Points whose compliance is computed; by default those of trajectories, or all tips; tools, payloads and loads."""
+
+    is_algebraic = True
+    allocates_patches = True
+
+    def references(self) -> Iterator[Reference]:
+        """The points."""
+        for point in self.points or ():
+            yield Reference("points", point)
+
+    def run(self, context: Context) -> Outcome:
+        """Motion and forces at t = 0."""
+        found = run_static(context, self)
+        try:
+            model, _, (q,), (v,), (a,) = linear_states(context.model, found, [0])
+            mechanism = LinearEquations(model, q, places_of(context, self.points, loaded=True)).at(0.0, q, v, a)
+        except (InputError, SolveError) as error:
+            text = f"no natural frequencies and no compliance: {error}"
+            statistics = replace(found.statistics, warnings=(*found.statistics.warnings, text))
+            return replace(found, statistics=statistics)
+        return replace(found, details=RobotAtRest((joint_conditions(mechanism),)))

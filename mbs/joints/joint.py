@@ -17,8 +17,17 @@ from pydantic import field_validator, model_validator
 from ...common.arrays import Array
 from ...common.rotations import about, of_rpy, smallest_turn
 from ...common.validation import Record
-from ..fields.field_types import GROUND, Name, Quantity, Side, Vector3, split_point
-from ..fields.references import Reference, body_of, loaded_reference
+from ..fields.field_types import (
+    GROUND,
+    Name,
+    Quantity,
+    Reference,
+    Side,
+    Vector3,
+    body_of,
+    loaded_reference,
+    split_point,
+)
 from ..fields.spelling import IN_SPACE, Vector
 
 

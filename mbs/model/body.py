@@ -12,8 +12,11 @@ import numpy as np
 
 from ...common.arrays import Array, as_floats
 from ...common.errors import InputError
+from ...common.rotations import about, of_rpy, skew
 from ...fe_models.modal_body import ModalBody
 from ...fe_models.modal_body.parts import LEVI_CIVITA, Invariants
+from ..fields.field_types import split_point
+from ..scene.bodies import Tool
 from . import stiffening as stiffenings
 from .stiffening import Stiffening
 
@@ -22,7 +25,7 @@ from .stiffening import Stiffening
 class BodyPoint:
     """A section of a body: position (3,) m, Φ as `translation` (3, n), Φ_r as `rotation` (3, n), in body axes.
 
-    `triad` (3, 3): its axes, columns, in those of the undeformed body; of a tool they may be others (see `tools`).
+    `triad` (3, 3): its axes, columns, in those of the undeformed body; of a tool they may be others (see `with_tool`).
     """
 
     position: Array
@@ -262,3 +265,23 @@ def bent_section(body: Body, point: str, p: Array) -> Section:
     return Section(
         u - second[..., :3], phi - second[..., 3:], at.translation - K_p[..., :3, :], at.rotation - K_p[..., 3:, :]
     )
+
+
+def orientation(tool: Tool) -> Array:
+    """(3, 3) its axes, columns, in those of the body."""
+    return about(2, tool.angle) @ of_rpy(*tool.rpy)
+
+
+def with_tool(body: Body, tool: Tool) -> Body:
+    """The body with one more point, d from a section that bending turns by φ = Φ_r p: it moves by Φp + φ × d.
+
+    With geometric stiffening also by ½ φ × (φ × d): see `Stiffening.with_tool`.
+    """
+    point = split_point(tool.point)[1]
+    at, d = body.points[point], np.array(tool.at)
+    translation = at.translation - skew(d) @ at.rotation
+    placed = replace(at, position=at.position + d, translation=translation, triad=orientation(tool))
+    stiffening = body.stiffening
+    if stiffening is not None and point in stiffening.K_points:
+        stiffening = stiffening.with_tool(tool.name, point, at.rotation, d)
+    return replace(body, points=MappingProxyType({**body.points, tool.name: placed}), stiffening=stiffening)

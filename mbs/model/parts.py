@@ -9,7 +9,7 @@ import numpy as np
 from ...common.arrays import Array
 from .. import _core
 from .body import Body
-from .transmission import rotor
+from .gears import rotor
 from .tree import Node, Section
 
 Placed = tuple[int, int]  # body, −1 the ground, and number of its marker

@@ -18,12 +18,12 @@ from ..joints.joint import Friction
 from ..scene.loads import OF_POINT, Load
 from .drives import NO_DRIVES, Command, Drive, Drives, PointDrive
 from .frame_motors import zero_order_hold
+from .gears import gear_forces, tree_resistance, tree_resistance_slope
 from .model import Model
 from .parts import CutPlace, ModelParts, Placed, carried_body, standing_marker
 from .plane import Plane, in_plane
 from .projection import EXACT
 from .rows import ConstraintRow
-from .transmission import gear_forces, tree_resistance, tree_resistance_slope
 from .tree import Section
 
 ZERO = _core.TimeFunction.constant(0.0)

@@ -15,11 +15,10 @@ import numpy as np
 from ...common.arrays import Array
 from ...fe_models.modal_body.unit_loads import PAIRS, interface_load_names
 from ..fields.field_types import split_point
-from ..model.known_motion import MotionForces, motion_forces, required_forces
+from ..model.known_motion import MotionForces, Wrench, motion_forces, required_forces
 from ..model.masses import turns_as_a_body
 from ..model.motors import split_forces
 from ..model.tree import Section
-from ..model.wrench import Wrench
 from ..scene.bodies import Payload, tensor
 from .motion import RobotMotion
 

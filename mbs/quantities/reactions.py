@@ -15,9 +15,8 @@ from typing import TypeVar
 import numpy as np
 
 from ...common.arrays import Array, Integers
-from ..model.known_motion import MotionForces, multiplier_forces
+from ..model.known_motion import MotionForces, Wrench, multiplier_forces, without_work
 from ..model.tree import Node
-from ..model.wrench import Wrench, without_work
 from ..scene.loads import OF_POINT
 from ..solve.posture import SINGULAR, robot_size, row_sizes
 from ..solve.statics import natural_sizes

@@ -24,14 +24,17 @@ from ..model.tree import Node
 from .link_loads import loads_in_equations
 from .motion import RobotMotion
 from .second_order import (
+    LoadedPoint,
     Missing,
+    ModalLoads,
     Rotations,
+    StiffnessChange,
     largest_displacement,
     largest_rotations,
     missing_to_first_order,
     missing_to_second_order,
+    stiffness_change,
 )
-from .stiffness_change import LoadedPoint, ModalLoads, StiffnessChange, stiffness_change
 
 NOTABLE_STIFFNESS_CHANGE = 0.01  # relative, of a link, from which on "auto" switches geometric stiffening on
 DEFLECTION_LIMIT = {False: 0.02, True: 0.05}  # of the length, from the chord; without and with geometric stiffening

@@ -16,8 +16,7 @@ from ...common.errors import did_you_mean, either, quoted
 from ...common.numbers import MOST_OUTPUTS, MOST_STEPS
 from ...common.validation import Record
 from .._core import TimeFunction
-from ..fields.field_types import KeptSteps, Name, Positive
-from ..fields.references import Reference
+from ..fields.field_types import KeptSteps, Name, Positive, Reference
 
 TIGHTEST_TOLERANCE = 1e-10  # rounding in the forces of stiff links is not far below
 

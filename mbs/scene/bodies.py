@@ -16,8 +16,17 @@ from ...common.numbers import MOST_MODES, SMALLEST
 from ...common.validation import InputFile, Record, existing_file
 from ...fe_models.link_file import LinkSource, LinkTable
 from ...fe_models.link_records import BeamLink, SolidLink
-from ..fields.field_types import Name, NotNegative, PointReference, Positive, Quantity, Vector3, one_of, split_point
-from ..fields.references import Reference
+from ..fields.field_types import (
+    Name,
+    NotNegative,
+    PointReference,
+    Positive,
+    Quantity,
+    Reference,
+    Vector3,
+    one_of,
+    split_point,
+)
 from ..fields.spelling import IN_PLANE, IN_SPACE, Spelled, Vector, inertia_about_z
 
 Inertia = Vector3 | tuple[Vector3, Vector3, Vector3]

@@ -10,9 +10,17 @@ from pydantic import ValidationInfo, model_validator
 from ...common.errors import quoted
 from ...common.validation import Record
 from .._core import TimeFunction
-from ..fields.field_types import Expression, Expressions, PointReference, one_of, only, present
+from ..fields.field_types import (
+    Expression,
+    Expressions,
+    PointReference,
+    Reference,
+    loaded_reference,
+    one_of,
+    only,
+    present,
+)
 from ..fields.functions import StateForce
-from ..fields.references import Reference, loaded_reference
 from ..fields.spelling import IN_SPACE, Spelled, as_written, is_planar, keys_here
 
 OF_POINT = ("x", "y", "z", "mx", "my", "mz")

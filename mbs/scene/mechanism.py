@@ -12,8 +12,7 @@ from pydantic import Field
 from ...common.deferred import Table
 from ...common.names import Title
 from ...common.validation import Record
-from ..fields.field_types import NotEmpty, Quantity
-from ..fields.references import Reference, under
+from ..fields.field_types import NotEmpty, Quantity, Reference, under
 from ..fields.spelling import IN_PLANE, Spelled, Vector, as_written
 from ..joints.joints import AnyJoint
 from .bodies import BodyKeys, Payload, Tool
@@ -22,7 +21,7 @@ from .topology import Edge, Topology, spanning_forest
 from .trajectories import Trajectory
 
 Word = Literal["up", "down", "right", "left", "noflip", "flip", "positive", "negative"]
-"""How a joint stands in one of several postures: see `solve.branch_names`."""
+"""How a joint stands in one of several postures: see `solve.branches`."""
 
 Numbers = Annotated[Quantity | tuple[Quantity, ...], Spelled(Quantity, as_written)]
 

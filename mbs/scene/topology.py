@@ -7,8 +7,7 @@ from dataclasses import dataclass
 from heapq import heappop, heappush
 from typing import NamedTuple
 
-from ..fields.field_types import GROUND
-from ..fields.references import body_of
+from ..fields.field_types import GROUND, body_of
 
 
 class Edge(NamedTuple):

@@ -13,11 +13,20 @@ from ...common.arrays import Array, as_rows
 from ...common.errors import InputError, quoted
 from ...common.rotations import of_rpy, smallest_turn
 from .._core import TimeFunction
-from ..fields.field_types import Expression, Name, PointReference, Quantity, Vector3, WaypointTable, one_of, present
+from ..fields.field_types import (
+    Expression,
+    Name,
+    PointReference,
+    Quantity,
+    Vector3,
+    WaypointTable,
+    loaded_reference,
+    one_of,
+    present,
+)
+from ..fields.field_types import Reference as RecordReference
 from ..fields.orientations import QUATERNION, OrientationLaw, Reference, about_their_middle, orientation_of
 from ..fields.piecewise import Piecewise
-from ..fields.references import Reference as RecordReference
-from ..fields.references import loaded_reference
 from ..fields.spelling import IN_SPACE, Spelled, as_written, is_planar, keys_here
 from ..fields.waypoints import Waypoints
 from .motion_keys import LIMITS, MotionKeys, OfPlaces, Place

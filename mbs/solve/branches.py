@@ -1,18 +1,33 @@
-"""The postures in which a robot can start: that of the scene, and others in which the links reach the same places."""
+"""The postures in which a robot can start: that of the scene, and others in which the links reach the same places.
+
+Names of these have a word for a joint each, which is right or wrong in any posture:
+
+    up, down           the joint is above or below the line between the joints (or the tool) next to it
+    right, left        a positive turn raises the end of the arm along the axis of the joint before, or lowers it
+    noflip, flip       a positive turn, of less than π, leads the axis of the joint before to that of the joint after
+                       (but for their inclination), or a negative one: the arm is singular in between
+    positive, negative the sign of the coordinate within ±π
+
+Right and left are those of C. S. G. Lee and M. Ziegler, Geometric approach in solving inverse kinematics of PUMA
+robots, IEEE Transactions on Aerospace and Electronic Systems 20 (1984) 695–706.
+"""
 
 from __future__ import annotations
 
 import tomllib
+from collections.abc import Mapping
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 
-from ...common.arrays import Array, Indices
+from ...common.arrays import Array, Indices, as_floats
 from ...common.errors import InputError
 from ..model.model import Model
+from ..model.tree import Node, Section
 from ..scene.mechanism import Word
-from .branch_names import branch_names, is_so
-from .posture import mobility
+from ..scene.space import SPACES
+from .posture import mobility, robot_size
 from .reach import as_guess, random_angles, regular_postures, turning_joints
 from .start import undeformed_posture
 
@@ -95,3 +110,149 @@ def _number(text: str | float) -> float:
 def _turn(q: Array, other: Array, columns: Indices) -> float:
     """The largest difference of angles without whole turns, rad."""
     return float(np.abs(np.angle(np.exp(1j * (q[columns] - other[columns])))).max())
+
+
+NEAR = 1e-9  # m: joints at one place
+MEETING = 1e-6  # of the size of the robot: axes that miss each other by less meet, and rad: that are parallel
+
+
+def branch_names(model: Model, q: Array) -> dict[str, Word]:
+    """By joint, how the arm that carries the tool stands at q (n_q,): shoulder, elbow and wrist, as far as it has them.
+
+    The wrist is the fifth of six turning joints. An arm whose first axis is not parallel to the next two has a shoulder
+    and an elbow, one whose first two are parallel an elbow.
+    """
+    joints = _turning(model)
+    axes = _lines(model, q, joints)[1]
+    parallel = [float(np.linalg.norm(np.cross(a, b))) < MEETING for a, b in pairwise(axes)]
+    found: dict[str, Word] = {}
+    if len(joints) >= 3 and parallel[:2] == [False, True]:
+        found[joints[1].joint.name] = "right" if _raises(model, q, joints[1]) else "left"
+        found[joints[2].joint.name] = "up" if _above(model, q, joints[2]) else "down"
+    elif len(joints) >= 2 and parallel[0]:
+        found[joints[1].joint.name] = "up" if _above(model, q, joints[1]) else "down"
+    if len(joints) == 6:
+        found[joints[4].joint.name] = "flip" if _flips(model, q, joints[4]) else "noflip"
+    return found
+
+
+def in_words(branch: Mapping[str, Word]) -> str:
+    """A line of [initial]."""
+    inside = ", ".join(f'{joint} = "{word}"' for joint, word in branch.items())
+    return f"branch = {{ {inside} }}"
+
+
+def is_so(model: Model, q: Array, node: Node, word: Word) -> bool:
+    """Whether the word is right of a joint of the tree in the posture q (n_q,)."""
+    if word in ("up", "down"):
+        return _above(model, q, node) == (word == "up")
+    if word in ("left", "right"):
+        return _raises(model, q, node) == (word == "right")
+    if word in ("flip", "noflip"):
+        return _flips(model, q, node) == (word == "flip")
+    return (_angle(q, node) >= 0.0) == (word == "positive")
+
+
+def _angle(q: Array, node: Node) -> float:
+    """The first coordinate of a joint as the scene counts it, within ±π."""
+    x = node.joint.coordinates(q[node.q])
+    x = node.joint.turned_around(x) if node.backwards else x
+    return float(np.angle(np.exp(1j * x[0])))
+
+
+def _turning(model: Model) -> list[Node]:
+    """The joints of the chain with one angle that no path of their own prescribes, as one does of a gripper."""
+    prescribed = {path.coordinate_of for path in model.scene.trajectory}
+    return [node for node in _chain(model) if node.joint.units == ("rad",) and node.joint.name not in prescribed]
+
+
+def _chain(model: Model) -> list[Node]:
+    """The joints of the tree from the ground to the body of the tool: that of the last path of a point, or the last."""
+    tree, found = model.tree, list[Node]()
+    point = _tool(model)
+    number = len(tree.nodes) - 1 if point is None else tree.index[point.partition(".")[0]]
+    while number >= 0:
+        found.append(tree.nodes[number])
+        number = found[-1].inner.body
+    return found[::-1]
+
+
+def _tool(model: Model) -> str | None:
+    """The point of the last path of one, or the last tool."""
+    tools = [tool.reference for tool in model.scene.tool]
+    return next(iter([*(path.point for path in reversed(model.scene.trajectory) if path.point), *tools[::-1]]), None)
+
+
+def _lines(model: Model, q: Array, joints: list[Node]) -> tuple[Array, Array]:
+    """Places (k, 3) of joints and directions (k, 3) of their positive turns, global axes."""
+    frames = model.tree.frames(q[None])
+    poses = [model.tree.pose(node.inner, q[None], frames) for node in joints]
+    signs = [-1.0 if node.backwards else 1.0 for node in joints]
+    places = np.reshape([pose.r[0] for pose in poses], (-1, 3))
+    return places, np.reshape([sign * pose.F[0, :, 2] for sign, pose in zip(signs, poses, strict=True)], (-1, 3))
+
+
+def _raises(model: Model, q: Array, node: Node) -> bool:
+    """Whether a positive turn of a joint moves the end of the arm along the axis of the turning joint before it."""
+    joints = _turning(model)
+    if node not in joints or joints.index(node) == 0:
+        return False
+    k = joints.index(node)
+    places, axes = _lines(model, q, joints)
+    arm = _end_of_arm(model, q, places, axes, k) - places[k]
+    return bool(axes[k - 1] @ np.cross(axes[k], arm) > 0.0)
+
+
+def _flips(model: Model, q: Array, node: Node) -> bool:
+    """Whether the axis after a joint is on the negative side of the axis before it, about its own."""
+    joints = _turning(model)
+    k = joints.index(node) if node in joints else 0
+    if not 0 < k < len(joints) - 1:
+        return _angle(q, node) < 0.0
+    axes = _lines(model, q, joints)[1]
+    return bool(axes[k] @ np.cross(axes[k - 1], axes[k + 1]) < 0.0)
+
+
+def _end_of_arm(model: Model, q: Array, places: Array, axes: Array, k: int) -> Array:
+    """Where the axes of a spherical wrist meet; else the second joint after number `k`, or the tool."""
+    if len(places) == 6:
+        P = np.eye(3) - np.einsum("ki,kj->kij", axes[3:], axes[3:])
+        meeting = np.linalg.lstsq(P.reshape(9, 3), np.einsum("kij,kj->ki", P, places[3:]).ravel(), rcond=None)[0]
+        missed = np.einsum("kij,kj->ki", P, meeting - places[3:])
+        if np.abs(missed).max() < MEETING * robot_size(model):
+            return as_floats(meeting)
+    if len(places) > k + 2:
+        return as_floats(places[k + 2])
+    point = _tool(model)
+    if point is None:
+        return as_floats(places[-1])
+    frames = model.tree.frames(q[None])
+    return as_floats(model.tree.pose(model.tree.section(point, np.eye(3)), q[None], frames).r[0])
+
+
+def _above(model: Model, q: Array, node: Node) -> bool:
+    """Whether a joint is above the line from the joint before to the one after it, or to the tool, against gravity."""
+    tree, frames = model.tree, model.tree.frames(q[None])
+
+    def place(section: Section) -> Array:
+        found: Array = tree.motion(section, q[None], frames).r[0]
+        return found
+
+    own, before, after = place(node.inner), node, node
+    while before.inner.body >= 0 and np.allclose(place(before.inner), own, atol=NEAR):
+        before = tree.nodes[before.inner.body]
+    start, end = place(before.inner), own
+    while np.allclose(end, own, atol=NEAR):
+        number = tree.index[after.body.name]
+        outer = next((other for other in tree.nodes if other.inner.body == number), None)
+        if outer is None:
+            point = _tool(model)
+            end = end if point is None else place(tree.section(point, np.eye(3)))
+            break
+        after, end = outer, place(outer.inner)
+    chord, offset, down = end - start, own - start, np.zeros(3)
+    down[: len(model.scene.gravity)] = model.scene.gravity
+    if not down.any():
+        down[1 if SPACES[model.scene.space].is_plane else 2] = -1.0
+    across = offset - chord * (offset @ chord) / max(float(chord @ chord), NEAR**2)
+    return bool(across @ down < 0.0)

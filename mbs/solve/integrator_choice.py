@@ -13,10 +13,10 @@ import numpy as np
 from ...common.arrays import Array
 from .. import _core
 from ..model.cut import cut_damping
+from ..model.gears import tree_resistance_slope
 from ..model.known_motion import State
 from ..model.model import Model
 from ..model.system import MultibodySystem
-from ..model.transmission import tree_resistance_slope
 from ..scene.analysis import IntegratedAnalysis
 from .integrators import ASKED_FOR, EXPLICIT, Choice, faster_of
 from .vibration import Vibrations, vibrations_of, without_rows

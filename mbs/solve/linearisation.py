@@ -24,11 +24,11 @@ from ...common.errors import InputError, SolveError
 from ...common.rotations import skew
 from ..model.cut import measured
 from ..model.frame_motors import turning_motors
+from ..model.gears import gear_matrices
 from ..model.known_motion import required_forces
 from ..model.model import Model, row_values
 from ..model.motors import FrameShare, frame_share
 from ..model.system import MultibodySystem
-from ..model.transmission import gear_matrices
 from ..model.tree import CompliantGear, Motion, Node
 from ..scene.space import SPACES
 

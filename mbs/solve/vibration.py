@@ -12,11 +12,10 @@ import numpy as np
 from ...common.arrays import Array, as_floats
 from ...common.errors import InputError, quoted
 from ..model.cut import cut_damping
-from ..model.gears import with_prescribed_motors
+from ..model.gears import gear_matrices, with_prescribed_motors
 from ..model.known_motion import State
 from ..model.model import Model, row_values
 from ..model.system import MultibodySystem
-from ..model.transmission import gear_matrices
 from .posture import solve_posture
 from .redundancy import resolved
 from .start import relaxed_gears, undeformed_posture

@@ -6,11 +6,10 @@ import pytest
 from scipy.linalg import eigh
 
 from ffrobot.common.errors import InputError
-from ffrobot.fe_models.link import make_link
+from ffrobot.fe_models.link import make_link, restated
 from ffrobot.fe_models.link_file import read_link
 from ffrobot.fe_models.modal_body.craig_bampton import craig_bampton
 from ffrobot.fe_models.modal_body.unit_loads import work_on_modes
-from ffrobot.fe_models.stages import restated
 
 E, RHO, L, H, B = 2.0e11, 7800.0, 0.4, 0.06, 0.02
 EI, EA, MASS = E * B * H**3 / 12, E * B * H, RHO * B * H

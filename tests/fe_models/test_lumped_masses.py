@@ -6,8 +6,8 @@ from scipy.optimize import brentq
 
 from ffrobot.fe_models.link import make_link
 from ffrobot.fe_models.modal_body import Interface
-from ffrobot.fe_models.modal_body.parts import Invariants
 from ffrobot.fe_models.modal_body.lumped_masses import Lump, with_lumped_loads, with_lumped_masses
+from ffrobot.fe_models.modal_body.parts import Invariants
 from ffrobot.mbs.model.body import from_modal_body
 from ffrobot.mbs.model.masses import with_payload
 

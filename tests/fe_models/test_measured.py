@@ -4,11 +4,10 @@ import numpy as np
 import pytest
 
 from ffrobot.common.errors import InputError
-from ffrobot.fe_models.link import make_link
+from ffrobot.fe_models.link import input_hash, make_link, modes_hash
 from ffrobot.fe_models.link_file import read_link
 from ffrobot.fe_models.modal_body_file import read_modal_body
 from ffrobot.fe_models.pieces import cut
-from ffrobot.fe_models.stages import input_hash, modes_hash
 from ffrobot.present.info import describe
 
 MEASURED = '[measured]\ntable = "modes.csv"\n'

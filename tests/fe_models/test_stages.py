@@ -9,9 +9,8 @@ import pytest
 
 from ffrobot.common.checksum import seal
 from ffrobot.common.version import digest_of_code
-from ffrobot.fe_models.link import cached_modal_body, make_link
+from ffrobot.fe_models.link import cached_modal_body, input_hash, make_link, modes_hash, restated
 from ffrobot.fe_models.link_file import read_link
-from ffrobot.fe_models.stages import input_hash, modes_hash, restated
 from ffrobot.mesh.kept_parts import kept_part, kept_path
 
 FINITE_ELEMENTS = ("dolfinx", "gmsh", "petsc4py", "slepc4py", "mpi4py", "basix", "ufl")
@@ -130,7 +129,7 @@ def test_what_another_state_of_the_program_made_is_not_up_to_date(link_file, cac
 
     cached_modal_body(link_file())
     assert not cached_modal_body(link_file()).computed
-    monkeypatch.setattr("ffrobot.fe_models.stages.digest_of_code", lambda _: before)
+    monkeypatch.setattr("ffrobot.fe_models.link.digest_of_code", lambda _: before)
     again = cached_modal_body(link_file())
     assert (again.computed, again.reused) == (True, "")
 

@@ -12,7 +12,7 @@ from tree_accelerations import Accelerated
 
 from ffrobot.common.arrays import Array
 from ffrobot.mbs.model.cut import measured
-from ffrobot.mbs.model.transmission import gear_forces, resistance, rotor
+from ffrobot.mbs.model.gears import gear_forces, resistance, rotor
 from ffrobot.mbs.model.tree import Section
 from ffrobot.mbs.quantities.energy import Energies, Momentum
 

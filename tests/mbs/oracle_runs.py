@@ -8,8 +8,8 @@ from mechanisms import always, assemble, random_state
 
 from ffrobot.mbs import _core
 from ffrobot.mbs.analysis.context import Context
+from ffrobot.mbs.analysis.operating_points import Static
 from ffrobot.mbs.analysis.outcome import Motion, Outcome
-from ffrobot.mbs.analysis.static import Static
 from ffrobot.mbs.model.model import row_values, target_rates
 from ffrobot.mbs.model.system import MultibodySystem
 from ffrobot.mbs.quantities.energy import totals

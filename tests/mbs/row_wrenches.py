@@ -3,8 +3,8 @@
 import numpy as np
 
 from ffrobot.common.rotations import left_jacobian
+from ffrobot.mbs.model.known_motion import Wrench
 from ffrobot.mbs.model.rows import turning_axis
-from ffrobot.mbs.model.wrench import Wrench
 
 
 def along_joint(tree, node, force, q, frames):

@@ -14,7 +14,7 @@ from rods import rod
 from ffrobot.common.errors import InputError
 from ffrobot.mbs.analysis.fcid import Fcid
 from ffrobot.mbs.analysis.motors_only import MotorsOnly
-from ffrobot.mbs.analysis.static import Static
+from ffrobot.mbs.analysis.operating_points import Static
 
 G = 9.81
 AT_REST = {"state": "static", "angles": ANGLES}

@@ -15,7 +15,7 @@ from ffrobot.actuation.motors import judge_motors
 from ffrobot.common.errors import InputError
 from ffrobot.mbs.analysis.gears import unresolved_gears, with_motor_coordinates
 from ffrobot.mbs.analysis.motors_only import MotorsOnly
-from ffrobot.mbs.analysis.static import Static
+from ffrobot.mbs.analysis.operating_points import Static
 from ffrobot.mbs.joints.twist_spring import StiffnessSteps, TwistSpring
 from ffrobot.mbs.model.gears import with_compliance
 from ffrobot.mbs.model.model import without_paths

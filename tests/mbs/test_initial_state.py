@@ -8,7 +8,7 @@ from oracle_runs import evaluated, point_motion, run
 from rods import rod, slider_crank
 
 from ffrobot.common.errors import InputError, SolveError
-from ffrobot.mbs.analysis.static import Static
+from ffrobot.mbs.analysis.operating_points import Static
 from ffrobot.mbs.solve.start import undeformed_posture
 from ffrobot.mbs.solve.statics import initial_state
 

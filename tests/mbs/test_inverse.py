@@ -11,10 +11,9 @@ from tree_reactions import carried, needed
 
 from ffrobot.mbs import _core
 from ffrobot.mbs.model.drives import Drive, Drives
-from ffrobot.mbs.model.gears import with_compliance
+from ffrobot.mbs.model.gears import gear_forces, with_compliance
 from ffrobot.mbs.model.motors import path_forces
 from ffrobot.mbs.model.system import MultibodySystem
-from ffrobot.mbs.model.transmission import gear_forces
 from ffrobot.mbs.quantities.energy import totals
 from ffrobot.mbs.quantities.motion import RobotMotion
 from ffrobot.mbs.quantities.reactions import reactions

@@ -4,7 +4,7 @@ import numpy as np
 from body_equations import accelerated, along_cut, body_forces, rotors
 from row_wrenches import row_wrenches
 
-from ffrobot.mbs.model.wrench import Wrench
+from ffrobot.mbs.model.known_motion import Wrench
 
 
 def carried(motion):

@@ -16,7 +16,7 @@ from table import at_most
 from units import SI, SYSTEMS, Units
 
 import ffrobot
-from ffrobot.mbs.analysis.static import Static
+from ffrobot.mbs.analysis.operating_points import Static
 
 OTHERS = [name for name in SYSTEMS if name != "SI"]
 STATIC = Static(name="rest", kind="static")

@@ -5,7 +5,7 @@
 Error: largest relative error of the first five in-plane bending frequencies, against cubic tetrahedra on a fine mesh
 (graded by nothing: the clamp's singularity leaves about 0.01 % unresolved). Time: assembly, factorisation and
 eigensolve, as stage 1 does them, forms compiled before; the least of the repeats. The table goes to elements.csv and
-elements.png beside this file; from it come the defaults in mesh/defaults.py.
+elements.png beside this file; from it come the defaults in mesh/records.py.
 """
 
 import argparse
