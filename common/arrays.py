@@ -1,4 +1,4 @@
-"""Names for the types of arrays, in annotations; shapes and units stand in docstrings."""
+"""Names for the types of arrays, in annotations (shapes and units stand in docstrings); null spaces."""
 
 from __future__ import annotations
 
@@ -27,3 +27,12 @@ def as_list(values: Array) -> list[float]:
 def as_rows(values: NDArray[Any]) -> list[list[Any]]:
     """Of a matrix (m, n), Python's own numbers by row."""
     return cast(list[list[Any]], values.tolist())
+
+
+def null_space(J: Array, tolerance: float, least: float = 0.0) -> Array:
+    """Orthonormal columns (k, m) that J (r, k) takes to zero: to `tolerance` of its largest singular value.
+
+    Singular values are not compared with less than `least`.
+    """
+    _, sizes, V = np.linalg.svd(J)
+    return as_floats(V[np.count_nonzero(sizes > tolerance * sizes.max(initial=least)) :].T)

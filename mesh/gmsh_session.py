@@ -160,7 +160,8 @@ def own_entities(dim: int = -1) -> list[tuple[int, int]]:
 def extract_mesh() -> RawMesh:
     """The model's volume elements, with the names of its physical groups; of all volumes where no group has any."""
     number, points = _points()
-    groups = {dim: {tag: _group_name(dim, tag) for _, tag in gmsh.model.getPhysicalGroups(dim)} for dim in (2, 3)}
+    named = [(dim, tag, gmsh.model.getPhysicalName(dim, tag)) for dim, tag in gmsh.model.getPhysicalGroups()]
+    groups = {dim: {tag: name or str(tag) for of, tag, name in named if of == dim} for dim in (2, 3)}
     blocks: list[tuple[str, Integers]] = []
     numbers: dict[int, Integers] = {}  # of the cells of each volume
     count = 0
@@ -189,10 +190,6 @@ def extract_mesh() -> RawMesh:
         for dim in (2, 1)
     )
     return RawMesh(points, tuple(blocks), regions, faces, {}, surfaces, lines)
-
-
-def _group_name(dim: int, tag: int) -> str:
-    return gmsh.model.getPhysicalName(dim, tag) or str(tag)
 
 
 def _points() -> tuple[Integers, Array]:

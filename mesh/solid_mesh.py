@@ -8,7 +8,7 @@ The boundary of the distributed mesh: its facets, and the triangles that a pictu
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -23,7 +23,7 @@ from ..common.errors import FfrobotError, InputError
 from .cells import CellName
 from .compat import coordinate_element, create_solid_mesh, geometry_nodes
 from .part import kept_or_new
-from .part_mesh import PartMesh, facet_keys
+from .part_mesh import PartMesh, Tags, facet_keys
 from .records import Outlines, PlaceRecord, SolidGeometry, SolidMeshRecord
 
 if TYPE_CHECKING:
@@ -221,7 +221,7 @@ def solid_mesh(
     outcome: PartMesh | FfrobotError | None = None
     if comm.rank == 0:
         try:
-            outcome = kept_or_new(geometry, record, places, outlines, path, progress or _silent, remesh=remesh)
+            outcome = kept_or_new(geometry, record, places, outlines, path, progress or (lambda _: None), remesh=remesh)
         except FfrobotError as error:
             outcome = error
     failure = comm.bcast(outcome if isinstance(outcome, FfrobotError) else None)
@@ -232,63 +232,36 @@ def solid_mesh(
 
 def distributed(part: PartMesh | None, comm: MPI.Comm = MPI.COMM_WORLD) -> SolidMesh:
     """The distributed mesh of `part`, which rank 0 gives and all others pass as None."""
-    described = comm.bcast(_description(part) if part is not None else None)
-    cell, degree, nodes = described["cell"], described["degree"], described["nodes"]
-    cells = part.cells if part is not None else np.empty((0, nodes), dtype=np.int64)
-    points = part.points if part is not None else np.empty((0, 3))
-    mesh = create_solid_mesh(comm, cell, degree, cells, points)
+    known, count, size, keys = comm.bcast(_known_to_all(part) if part is not None else None)
+    own = known if part is None else part
+    mesh = create_solid_mesh(comm, known.cell, known.degree, own.cells, own.points)
     local = np.arange(mesh.topology.index_map(3).size_local, dtype=np.int32)
     fewest = comm.allreduce(local.size, op=MPI.MIN)
     if not fewest:
         raise InputError(f"mpirun: expected fewer processes than {comm.size}: some got none of the mesh's elements")
-    cell_tag = described["cell_tag"][np.asarray(mesh.topology.original_cell_index)[: local.size]]
-    facets, facet_tag = _tagged_facets(mesh, described)
-    return SolidMesh(
-        mesh,
-        cell,
-        meshtags(mesh, 3, local, cell_tag.astype(np.int32)),
-        meshtags(mesh, 2, facets, facet_tag),
-        described["regions"],
-        described["faces"],
-        described["size"],
-        surface_of(mesh),
-        described["overlaps"],
-        described["remarks"],
-    )
+    cell_tag = known.cell_tag[np.asarray(mesh.topology.original_cell_index)[: local.size]]
+    facets, facet_tag = _tagged_facets(mesh, keys, known.facet_tag, count)
+    tags = meshtags(mesh, 3, local, cell_tag.astype(np.int32)), meshtags(mesh, 2, facets, facet_tag)
+    surface = surface_of(mesh)
+    return SolidMesh(mesh, known.cell, *tags, known.regions, known.faces, size, surface, known.overlaps, known.remarks)
 
 
-def _description(part: PartMesh) -> dict[str, Any]:
-    """What every process knows of the part besides its share of cells and points."""
-    x = part.points[part.corners, 0]
-    return {
-        "cell": part.cell,
-        "degree": part.degree,
-        "nodes": part.cells.shape[1],
-        "points": len(part.points),
-        "cell_tag": part.cell_tag,
-        "regions": dict(part.regions),
-        "overlaps": dict(part.overlaps),
-        "remarks": part.remarks,
-        "faces": dict(part.faces),
-        "keys": facet_keys(part.facets, len(part.points)),
-        "facet_tag": part.facet_tag,
-        "size": float(np.mean(x.max(axis=1) - x.min(axis=1))),
-    }
+def _known_to_all(part: PartMesh) -> tuple[PartMesh, int, float, Integers]:
+    """The part without cells and points, of which each process has its share; their number, size, and facets."""
+    x, count = part.points[part.corners, 0], len(part.points)
+    size = float(np.mean(x.max(axis=1) - x.min(axis=1)))
+    return replace(part, points=part.points[:0], cells=part.cells[:0]), count, size, facet_keys(part.facets, count)
 
 
-def _tagged_facets(mesh: Mesh, described: Mapping[str, Any]) -> tuple[Integers, Integers]:
-    """Local facets that belong to a face, ascending, and their tags."""
+def _tagged_facets(mesh: Mesh, known: Integers, tags: Tags, points: int) -> tuple[Integers, Integers]:
+    """Local facets that belong to a face, ascending, and their tags, by the keys `known` of facets with `tags`."""
     facets, cells, which = boundary(mesh)
     nodes = np.take_along_axis(geometry_nodes(mesh)[cells], reference_facets(mesh)[which], axis=1)
-    keys = facet_keys(np.asarray(mesh.geometry.input_global_indices)[nodes], described["points"])
-    order = np.argsort(described["keys"])
-    sorted_keys = described["keys"][order]
+    keys = facet_keys(np.asarray(mesh.geometry.input_global_indices)[nodes], points)
+    order = np.argsort(known)
+    sorted_keys = known[order]
     if not sorted_keys.size or not keys.size:
         return np.empty(0, dtype=np.int32), np.empty(0, dtype=np.int32)
     place = np.minimum(np.searchsorted(sorted_keys, keys), sorted_keys.size - 1)
     found = sorted_keys[place] == keys
-    return facets[found].astype(np.int32), described["facet_tag"][order[place[found]]].astype(np.int32)
-
-
-def _silent(_: str) -> None:
-    pass
+    return facets[found].astype(np.int32), tags[order[place[found]]].astype(np.int32)

@@ -55,7 +55,9 @@ def mesh_step(file: Path, record: SolidMeshRecord, scale: float, where: str) -> 
                 f"{where}: expected a STEP file, found one that OpenCASCADE cannot read: {error}"
             ) from None
         _check_volumes(text, where)
-        _check_complaints(printed(), where)
+        # Of a damaged file OpenCASCADE makes a part of what is left, and says so.
+        if complaints := [f"{what.lower()} ({count})" for what, count in _COMPLAINT.findall(printed())]:
+            raise InputError(f"{where}: expected a sound STEP file, found one damaged: {', '.join(complaints)}")
         _check_edges(where)
         remarks = tuple(_left_out(text))
         _join()
@@ -118,12 +120,6 @@ def _check_edges(where: str) -> None:
                     f"{where}: expected edges that lie on their faces and end at their vertices, found one"
                     f" {max(off):.3g} mm off, near ({place}) mm: a damaged file"
                 )
-
-
-def _check_complaints(printed: str, where: str) -> None:
-    """Check what OpenCASCADE has printed: of a damaged file it makes a part of what is left."""
-    if complaints := [f"{what.lower()} ({count})" for what, count in _COMPLAINT.findall(printed)]:
-        raise InputError(f"{where}: expected a sound STEP file, found one damaged: {', '.join(complaints)}")
 
 
 def _left_out(text: str) -> Iterator[str]:

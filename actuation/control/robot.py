@@ -16,7 +16,7 @@ from ...mbs.analysis.outcome import Outcome
 from ...mbs.model.body import Body
 from ...mbs.model.gears import resistance
 from ...mbs.model.model import Model, build_model, row_values
-from ...mbs.model.rows import ConstraintRow
+from ...mbs.model.rows import ConstraintRow, coordinate_row
 from ...mbs.model.system import ZERO, MultibodySystem
 from ...mbs.solve.linearisation import LinearEquations, LinearMechanism, labelled
 from ..patches.link_patches import LinkPatches
@@ -103,16 +103,10 @@ class RigidArm:
 
 def _motor_rows(model: Model) -> list[ConstraintRow]:
     """The coordinates of all motors."""
-    rows, nothing = [], np.zeros(3)
+    rows = []
     for joint, columns in model.motors.items():
         node = model.tree.nodes[model.tree.carried[joint]]
-        for k in map(int, columns):
-            rows.append(
-                ConstraintRow(
-                    joint, "coordinate", node.inner, node.outer, nothing, nothing, coordinate=k,
-                    q_index=node.q.start + k - node.v.start, sign=model.sign(joint), target=ZERO,
-                )
-            )  # fmt: skip
+        rows += [coordinate_row(joint, node, ZERO, k, model.sign(joint)) for k in columns.tolist()]
     return rows
 
 

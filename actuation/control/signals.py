@@ -52,7 +52,7 @@ class Sensing:
         self._order = np.array([read[k].order for k in self._linear], dtype=int)
         self._along = np.reshape([read[k].along for k in self._linear], (len(self._linear), tree.n_v))
         self._where = _places_in_q(tree)
-        sections = {signal.point: tree.section(signal.point, np.eye(3)) for signal in read if signal.point}
+        sections = {signal.point: tree.section(signal.point) for signal in read if signal.point}
         self._points: list[tuple[str, Section, list[tuple[int, int, int]]]] = [
             (point, section, [(k, s.order, s.axis) for k, s in enumerate(read) if s.point == point])
             for point, section in sections.items()
@@ -103,7 +103,7 @@ def make_signals(
     quality = order, sensor.resolution, sensor.noise
     if sensor.joint is not None:
         check_joint(model, sensor.joint)
-        sign = -1.0 if model.tree.nodes[model.tree.carried[sensor.joint]].backwards else 1.0
+        sign = model.tree.nodes[model.tree.carried[sensor.joint]].sign
         for name, k in labelled(model, sensor.joint):
             yield Signal(f"{name}{ending}", *quality, along=sign * np.eye(model.tree.n_v)[k])
     elif sensor.motor is not None:

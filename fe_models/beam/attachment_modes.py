@@ -11,7 +11,7 @@ import scipy.sparse as sp
 
 from ...common.arrays import Array
 from ..link_records import Family
-from ..modal_body.attachment_modes import COMPONENTS, Inertia, ResidualModes, residual_modes
+from ..modal_body.attachment_modes import COMPONENTS, Inertia, Modes, residual_modes
 from ..modal_body.craig_bampton import in_order
 from .beam import R_X, FamilyModel
 from .eigen import Flexibility
@@ -42,7 +42,7 @@ def attachment_modes(
 
 def _of_family(
     family: Family, model: FamilyModel, X: Array, places: list[int], length: float, twists_along: bool
-) -> ResidualModes:
+) -> Modes:
     rows = [row for row in COMPONENTS[family] if row in model.fields]
     loads = [model.fields[row][place].toarray()[0] * (1.0 if row < R_X else length) for place in places for row in rows]
     if twists_along and family == "torsion":  # along the link as its inertia about the axis
@@ -93,5 +93,5 @@ def ritz_modes(
     strain = model.strain @ X
     known = [False] * fixed.shape[1] + [True] * static.shape[1]
     found = in_order(strain.T @ strain, [family] * X.shape[1], known)
-    modes = [(float(square), family, x) for square, x in zip(found.omega2, (X @ found.turn).T, strict=True)]
+    modes = [(float(square), family, x) for square, x in zip(found.omega2, (X @ found.X).T, strict=True)]
     return modes[: fixed.shape[1]], modes[fixed.shape[1] :]

@@ -84,3 +84,8 @@ def hermite(nodes: Array) -> Functions:
     powers = np.array([[1, 0, -3, 2], [0, 1, -2, 1], [0, 0, 3, -2], [0, 0, -1, 1]], dtype=np.float64).T
     element = 2 * np.arange(nodes.size - 1)[:, None] + np.arange(4)
     return Functions(nodes, np.repeat(nodes, 2), element, powers, np.array([0, 1, 0, 1]))
+
+
+def on_axis(x: Array) -> Array:
+    """(k, 3) points of the axis at x (k,)."""
+    return np.stack([x, np.zeros_like(x), np.zeros_like(x)], axis=1)

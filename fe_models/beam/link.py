@@ -24,7 +24,7 @@ from .beam import R_X, FamilyModel, family_model
 from .eigen import lowest_modes
 from .geometric_stiffness import geometric_stiffness
 from .invariants import shape_integrals
-from .line import Functions, lagrange
+from .line import Functions, lagrange, on_axis
 from .sections import section_outlines, shear_modulus
 from .stress import beam_stresses, segments, stress_loads
 
@@ -65,7 +65,7 @@ def beam_modal_body(link: BeamLink, path: Path, progress: Progress) -> ModalBody
     integrals = with_lumped_masses(shape_integrals(link, stations, fields), attached)
     omega: Array = np.sqrt([mode.omega2 for mode in modes])
     translation, rotation = np.moveaxis(fields[:R_X], 0, 1), np.moveaxis(fields[R_X:], 0, 1)
-    position = _on_axis(stations.x)
+    position = on_axis(stations.x)
     families = tuple(mode.family for mode in modes)
     residual = np.repeat([0, 1], [count, omega.size - count])
     kept = _with_sections(link, stations, position, translation, rotation)
@@ -253,11 +253,7 @@ def _wanted(link: BeamLink, models: Mapping[Family, FamilyModel], path: Path) ->
 
 def _interface(stations: Functions, fields: Array, position: float) -> Interface:
     station = int(np.argmin(np.abs(stations.x - position)))
-    return Interface(_on_axis(np.array([position]))[0], fields[:R_X, station], fields[R_X:, station])
-
-
-def _on_axis(x: Array) -> Array:
-    return np.stack([x, np.zeros_like(x), np.zeros_like(x)], axis=1)
+    return Interface(on_axis(np.array([position]))[0], fields[:R_X, station], fields[R_X:, station])
 
 
 GAP = 1e-3  # between neighbouring ω², relative: closer ones may turn into each other

@@ -21,6 +21,7 @@ from ..modal_body import Interface, Stations, StressPoint, craig_bampton
 from ..modal_body.attachment_modes import interface_loads
 from ..modal_body.lumped_masses import Lump
 from ..modal_body.unit_loads import inertia_wrenches, unit_load_names
+from .line import on_axis
 from .section_stress import section_stress
 
 
@@ -93,7 +94,7 @@ class Material:
 
     def under_unit_motions(self) -> SectionLoads:
         """D'Alembert forces of unit motions of the frame, in the order of `unit_load_names`."""
-        wrench = np.stack([*inertia_wrenches(_on_axis(self.x), self.mass, self.inertia).values()], axis=2)
+        wrench = np.stack([*inertia_wrenches(on_axis(self.x), self.mass, self.inertia).values()], axis=2)
         return SectionLoads(self.x, wrench[:, :3], wrench[:, 3:])
 
 
@@ -204,10 +205,6 @@ def _material(link: BeamLink, stations: Stations, x: float) -> Material:
         translation.reshape(-1, 3, n),
         rotation.reshape(-1, 3, n),
     )
-
-
-def _on_axis(x: Array) -> Array:
-    return np.stack([x, np.zeros_like(x), np.zeros_like(x)], axis=1)
 
 
 def _line_inertia(link: BeamLink, segments: Integers) -> tuple[Array, Array]:

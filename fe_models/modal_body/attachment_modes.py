@@ -62,22 +62,25 @@ class Inertia:
 
 
 @dataclass(frozen=True)
-class ResidualModes:
-    """Attachment modes by frequency: ω² (r,) in rad²/s², the family of their loads, X (m, r) with XᵀMX = I."""
+class Modes:
+    """Modes, ascending: ω² (n,) in rad²/s², the family of each or of its loads, X (m, n) with XᵀMX = I."""
 
     omega2: Array
-    families: tuple[Family, ...]
+    families: tuple[str, ...]
     X: Array
 
-    def up_to(self, omega2: float) -> ResidualModes:
+    def up_to(self, omega2: float) -> Modes:
         """Those with at most that ω²."""
         count = int(np.searchsorted(self.omega2, omega2, side="right"))
-        return ResidualModes(self.omega2[:count], self.families[:count], self.X[:, :count])
+        return Modes(self.omega2[:count], self.families[:count], self.X[:, :count])
+
+    def followed_by(self, more: Modes) -> Modes:
+        """These, and others after them."""
+        omega2 = np.concatenate([self.omega2, more.omega2])
+        return Modes(omega2, (*self.families, *more.families), np.concatenate([self.X, more.X], axis=1))
 
 
-def residual_modes(
-    static: Mapping[Family, tuple[Array, Array]], X: Array, highest: float, inertia: Inertia
-) -> ResidualModes:
+def residual_modes(static: Mapping[Family, tuple[Array, Array]], X: Array, highest: float, inertia: Inertia) -> Modes:
     """Attachment modes from static shapes, by family of their loads.
 
     Args:
@@ -120,12 +123,12 @@ def _independent(shapes: Array, known: Array, inertia: Inertia) -> Array:
     return shapes
 
 
-def _uncoupled(X: Array, families: Sequence[Family], inertia: Inertia) -> ResidualModes:
+def _uncoupled(X: Array, families: Sequence[Family], inertia: Inertia) -> Modes:
     """Principal axes of the strain energy: in each family by itself, unless the link couples families."""
     of = np.array([FAMILIES.index(family) for family in families], dtype=np.int64)
     squares, turn, of = uncoupled(inertia.energy(X), of)
     order = ascending(squares, of)
-    return ResidualModes(squares[order], tuple(FAMILIES[of[k]] for k in order), X @ turn[:, order])
+    return Modes(squares[order], tuple(FAMILIES[of[k]] for k in order), X @ turn[:, order])
 
 
 def ascending(omega2: Array, family: Integers) -> Integers:

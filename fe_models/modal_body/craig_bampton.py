@@ -17,10 +17,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...common.arrays import Array, Integers
+from ...common.arrays import Array
 from ...common.errors import InputError
-from ..link_records import FAMILIES, Family
-from .attachment_modes import COMPONENTS, ascending, uncoupled
+from ..link_records import FAMILIES
+from .attachment_modes import COMPONENTS, Modes, ascending, uncoupled
 from .body import ModalBody
 from .parts import LEVI_CIVITA, Interface
 
@@ -28,25 +28,10 @@ CONDITION, ROOT = "craig-bampton", "root"
 AXES = ("x", "y", "z", "rx", "ry", "rz")
 
 
-@dataclass(frozen=True)
-class ModesInOrder:
-    """Columns X turn of a basis X: those that stand for eigenmodes, then as many of each family as loads brought.
+def in_order(K: Array, families: Sequence[str], is_static: Sequence[bool]) -> Modes:
+    """Modes in the space of a basis X, XᵀMX = I, of fixed-interface modes and static shapes, in coordinates of it.
 
-    Attributes:
-        omega2: (n,) in rad²/s².
-        families: of each.
-        turn: (n, n).
-        residual: (n,) 1 of the latter.
-    """
-
-    omega2: Array
-    families: list[Family]
-    turn: Array
-    residual: Integers
-
-
-def in_order(K: Array, families: Sequence[str], is_static: Sequence[bool]) -> ModesInOrder:
-    """Modes in the space of a basis X, XᵀMX = I, of fixed-interface modes and static shapes.
+    Those that stand for eigenmodes, then as many of each family as loads brought.
 
     Args:
         K: (n, n) XᵀKX.
@@ -63,7 +48,7 @@ def in_order(K: Array, families: Sequence[str], is_static: Sequence[bool]) -> Mo
         residual[own[np.argsort(squares[own], kind="stable")][own.size - static :]] = 1
     order = ascending(squares, of_modes)
     order = order[np.argsort(residual[order], kind="stable")]
-    return ModesInOrder(squares[order], [FAMILIES[of_modes[k]] for k in order], turn[:, order], residual[order])
+    return Modes(squares[order], tuple(FAMILIES[of_modes[k]] for k in order), turn[:, order])
 
 
 @dataclass(frozen=True)

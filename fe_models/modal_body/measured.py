@@ -18,7 +18,7 @@ from ...common.errors import InputError
 from ..link_records import FAMILIES, Link, MeasuredMode, paired, read_measured
 from .body import ModalBody
 from .damping import damping_ratio
-from .parts import MeasuredValues, StressPoint
+from .parts import MeasuredValues
 
 FARTHEST = 2.0  # times the computed frequency: beyond it the rows are of other modes, or the shapes of another link
 
@@ -65,13 +65,9 @@ def _with_frequency(body: ModalBody, frequency: Array) -> ModalBody:
         body,
         frequency=frequency,
         stiffness=np.diag((2 * np.pi * frequency) ** 2),
-        stress={name: _stiffer(point, stiffer) for name, point in body.stress.items()},
+        stress={name: replace(point, stress=point.stress * stiffer) for name, point in body.stress.items()},
         surface_stress=None if body.surface_stress is None else body.surface_stress * stiffer,
     )
-
-
-def _stiffer(point: StressPoint, factor: Array) -> StressPoint:
-    return replace(point, stress=point.stress * factor)
 
 
 def _check_distance(path: Path, row: MeasuredMode, computed: float) -> None:

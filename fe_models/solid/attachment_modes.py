@@ -15,11 +15,10 @@ import numpy as np
 
 from ...common.arrays import Array
 from ..link_records import Family
-from ..modal_body.attachment_modes import COMPONENTS, Inertia, ResidualModes, residual_modes
+from ..modal_body.attachment_modes import COMPONENTS, Inertia, Modes, residual_modes
 from ..modal_body.craig_bampton import ROOT, in_order
 from ..modal_body.unit_loads import interface_load_names
-from .elasticity import SolidModel
-from .modes import Mass, SolidModes
+from .elasticity import Mass, SolidModel
 from .strain_energy import strain_energy
 from .supports import Flexibility
 
@@ -27,13 +26,13 @@ from .supports import Flexibility
 def attachment_modes(
     families: Sequence[Family],
     mass: Mass,
-    modes: SolidModes,
+    modes: Modes,
     loads: Mapping[str, Array],
     shapes: Mapping[str, Array],
     interfaces: Sequence[str],
     length: float,
     twists_along: bool,
-) -> ResidualModes:
+) -> Modes:
     """Those of the loads that belong to `families`; collective.
 
     Args:
@@ -102,8 +101,8 @@ def fixed_interfaces(
     )
 
 
-def ritz_modes(model: SolidModel, both: SolidModes, count: int) -> SolidModes:
+def ritz_modes(model: SolidModel, both: Modes, count: int) -> Modes:
     """Modes in the space of `count` fixed-interface modes and static shapes behind them, in that order; collective."""
     K = strain_energy(model, np.ascontiguousarray(model.with_ghosts(both.X)))
     found = in_order(K, both.families, [k >= count for k in range(len(both.families))])
-    return SolidModes(found.omega2, list(found.families), both.X @ found.turn)
+    return Modes(found.omega2, found.families, both.X @ found.X)

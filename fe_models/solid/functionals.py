@@ -95,10 +95,9 @@ def section_averages(model: SolidModel, x: Array) -> Averages:
         ranges.append((section.y_range, section.z_range))
         density = model.materials.density[model.materials.of_cell[section.cells]]
         masses.append(w @ density)
-    low, high = _extremes(model, np.array(ranges))
-    extents = (high - low).T
-    averages = _averages(model, sp.vstack(rows, format="csr"), np.array(moments), extents, np.array(masses))
-    return averages
+    every = np.array(model.comm.allgather(np.array(ranges)))  # (processes, k, along y and z, from and to)
+    extents = (every[..., 1].max(axis=0) - every[..., 0].min(axis=0)).T
+    return _averages(model, sp.vstack(rows, format="csr"), np.array(moments), extents, np.array(masses))
 
 
 def _averages(model: SolidModel, weights: sp.csr_matrix, moments: Array, extents: Array, mass: Array) -> Averages:
@@ -133,9 +132,3 @@ def _face_weights(model: SolidModel, facet_tags: object, tag: int) -> tuple[Arra
             other.value[:] = another
             moments[row, column] = fem.assemble_scalar(moment)
     return np.array(weights), moments
-
-
-def _extremes(model: SolidModel, ranges: Array) -> tuple[Array, Array]:
-    """Over all ranks, of `ranges` (k, 2, 2) each, along y and along z; (k, 2)."""
-    every = np.array(model.comm.allgather(ranges))
-    return every[..., 0].min(axis=0), every[..., 1].max(axis=0)

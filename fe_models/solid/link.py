@@ -24,11 +24,11 @@ from ..modal_body import Interface, ModalBody, PictureMesh, Stations
 from ..modal_body.damping import canonical_signs, damping_ratio
 from ..modal_body.lumped_masses import lump_weights, lumps, with_lumped_loads, with_lumped_masses, with_lumped_stiffness
 from .attachment_modes import attachment_modes, fixed_interfaces, ritz_modes
-from .elasticity import MaterialMap, SolidModel, material_map, solid_model
+from .elasticity import Mass, MaterialMap, SolidModel, material_map, solid_model
 from .families import section_motion
 from .functionals import Averages, face_averages, section_averages
 from .invariants import prestressed, shape_integrals, static_shapes, unit_loads
-from .modes import Mass, wanted_modes
+from .modes import wanted_modes
 from .stress import recovered_stresses
 from .supports import Flexibility, RigidFace
 from .surface_patches import outlined_patches

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
@@ -12,9 +11,9 @@ import numpy as np
 from ...common.arrays import Array
 from ...common.errors import InputError, quoted
 from ..link_records import DEFAULT_COUNT, FAMILIES, SolidLink
-from ..modal_body.attachment_modes import ResidualModes, ascending
+from ..modal_body.attachment_modes import Modes, ascending
 from ..modal_body.lanczos import BlockLanczos
-from .elasticity import SolidModel
+from .elasticity import Mass
 from .families import LOCAL, NEARLY, SectionMotion, aligned, names
 from .strain_energy import strain_energy
 
@@ -26,57 +25,11 @@ if TYPE_CHECKING:
     Inverse: TypeAlias = Flexibility | FixedInterfaceFlexibility
 
 
-class Mass:
-    """M, with what is attached to interfaces: M u + Σ Bᵀ diag(w) B u.
-
-    Args:
-        model: has the mass of the part itself.
-        attached: for each attached mass B (6, 3 owned), the mean motion of its interface, and w (6,), its weights.
-    """
-
-    def __init__(self, model: SolidModel, attached: Sequence[tuple[Array, Array]] = ()) -> None:
-        self.model, self.attached = model, attached
-
-    def __matmul__(self, U: Array) -> Array:
-        """M U of U (3 owned, n); collective."""
-        product = self.model.mass @ U
-        for B, weights in self.attached:
-            product = product + B.T @ (weights[:, None] * self.model.total(B @ U))
-        return product
-
-    def motion_of_attached(self, U: Array) -> list[tuple[Array, Array]]:
-        """For each attached mass its motion (6, n) and weights (6,); collective."""
-        return [(self.model.total(B @ U), weights) for B, weights in self.attached]
-
-
 # Mean motion of the sections, of modes (3 owned, n).
 Reader = Callable[[Array], SectionMotion]
 
 
-@dataclass(frozen=True)
-class SolidModes:
-    """Modes in ascending order.
-
-    Attributes:
-        omega2: (n,) in rad²/s².
-        families: of each.
-        X: (3 owned, n), Xᵀ M X = I.
-    """
-
-    omega2: Array
-    families: list[str]
-    X: Array
-
-    def followed_by(self, residual: ResidualModes) -> SolidModes:
-        """The modes, and attachment modes after them."""
-        return SolidModes(
-            np.concatenate([self.omega2, residual.omega2]),
-            [*self.families, *residual.families],
-            np.concatenate([self.X, residual.X], axis=1),
-        )
-
-
-def wanted_modes(link: SolidLink, flexibility: Inverse, mass: Mass, read: Reader, where: str) -> SolidModes:
+def wanted_modes(link: SolidLink, flexibility: Inverse, mass: Mass, read: Reader, where: str) -> Modes:
     """The modes that `link.modes` asks for; collective.
 
     The search for the lowest modes goes on until the wanted ones are among them; for how many more follows from the
@@ -88,7 +41,8 @@ def wanted_modes(link: SolidLink, flexibility: Inverse, mass: Mass, read: Reader
     """
     family, model = "all" if link.modes.family == "all" else link.families, flexibility.model
     numbers = np.array(link.modes.indices or range(1, (link.modes.count or 0) + 1)) - 1
-    needed, available = (int(numbers[-1]) + 1 if numbers.size else _default_count(link)), flexibility.rank
+    default, available = sum(DEFAULT_COUNT[one] for one in link.families), flexibility.rank
+    needed = int(numbers[-1]) + 1 if numbers.size else default
     batch = needed + 2 if family == "all" else 2 * needed + 2
     key = "count" if link.modes.indices is None else "indices"
     most = min(available, 40 * needed + 200)  # far more than slender parts need
@@ -102,7 +56,9 @@ def wanted_modes(link: SolidLink, flexibility: Inverse, mass: Mass, read: Reader
                 f" all families, found {needed}"
             )
         found = min(found + batch, most)
-        omega2, X = _ritz(model, search.lowest(found))
+        X = search.lowest(found)
+        omega2, Q = np.linalg.eigh(strain_energy(model, model.with_ghosts(X)))
+        X = X @ Q
         motion = read(X)
         Q = aligned(omega2, motion, family)
         kinds = names(motion.turned(Q))
@@ -139,10 +95,6 @@ def _search(link: SolidLink, flexibility: Inverse, mass: Mass) -> BlockLanczos |
     )
 
 
-def _default_count(link: SolidLink) -> int:
-    return sum(DEFAULT_COUNT[family] for family in link.families)
-
-
 def _lowest_of_each(hits: Sequence[int], kinds: Sequence[str]) -> list[int]:
     """Of the modes `hits`, as many of each family as a link has by default."""
     taken: Counter[str] = Counter()
@@ -160,13 +112,7 @@ def _settled(omega2: Array) -> int:
     return int(gaps[-1]) + 1 if gaps.size else 0
 
 
-def _ritz(model: SolidModel, X: Array) -> tuple[Array, Array]:
-    """ω² and modes in the space of X, from strain energies."""
-    omega2, Q = np.linalg.eigh(strain_energy(model, model.with_ghosts(X)))
-    return omega2, X @ Q
-
-
-def _chosen(omega2: Array, X: Array, Q: Array, kinds: Sequence[str]) -> SolidModes:
+def _chosen(omega2: Array, X: Array, Q: Array, kinds: Sequence[str]) -> Modes:
     """Modes X Q, uncoupled among each other."""
     K = (Q.T * omega2) @ Q
     order = ascending(np.diag(K), np.array([[*FAMILIES, LOCAL].index(kind) for kind in kinds]))
@@ -175,4 +121,4 @@ def _chosen(omega2: Array, X: Array, Q: Array, kinds: Sequence[str]) -> SolidMod
     if not np.allclose(K, np.diag(squares), rtol=0, atol=1e-12 * squares.min()):
         squares, turn = np.linalg.eigh(K)
         Q = Q @ turn
-    return SolidModes(squares, [kinds[k] for k in order], X @ Q)
+    return Modes(squares, tuple(kinds[k] for k in order), X @ Q)

@@ -7,7 +7,7 @@ point on the border of two materials takes the mean of both.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -24,11 +24,10 @@ from ...mesh.compat import coordinate_element, geometry_nodes, lagrange_element,
 from ..link_records import SolidLink
 from ..modal_body import StressPoint
 from .elasticity import SolidModel
+from .strain_energy import VOIGT
 
 CHUNK = 4096  # points at a time: some 50 MB with 20 modes on cubic tetrahedra
 NEWTON_STEPS = 10
-# Rows xx, yy, zz, yz, xz, xy of a symmetric tensor: the two indices of each.
-VOIGT = ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))
 
 
 def modal_strains(space: FunctionSpace, cells: Integers, X: Array, modes: Array) -> Array:
@@ -44,7 +43,7 @@ def modal_strains(space: FunctionSpace, cells: Integers, X: Array, modes: Array)
     n = modes.shape[1]
     values = modes.reshape(-1, 3 * n)
     strains = np.empty((len(cells), 6, n))
-    for part in _chunks(len(cells)):
+    for part in (slice(start, start + CHUNK) for start in range(0, len(cells), CHUNK)):
         # ∂φ/∂x = J⁻ᵀ ∂φ/∂X; displacement gradient [j, (i, n)] = ∂u_i/∂x_j.
         J = jacobians(space.mesh, cells[part], X[part])
         basis = element.tabulate(1, X[part])[1:, :, :, 0].transpose(1, 0, 2)
@@ -108,10 +107,6 @@ def pulled_back(mesh: Mesh, cells: Integers, points: Array) -> Array:
         if np.abs(step).max(initial=0.0) < 1e-12:
             break
     return X
-
-
-def _chunks(size: int) -> Iterator[slice]:
-    return (slice(start, min(start + CHUNK, size)) for start in range(0, size, CHUNK))
 
 
 # Fractions of a cell's size: rounding, and how far a point on a curved face may be off the mesh of that face.

@@ -32,7 +32,7 @@ def warning_lines(bending: Mapping[str, Mapping[str, Bending]], warnings: Mappin
     """Of all analyses by name; of those whose links bend too much the worst in full, the others by name."""
     bent = {name: text for name, links in bending.items() if (text := deflection_warning(links))}
     if bent:
-        worst = max(bent, key=lambda name: max(link.position_error for link in bending[name].values()))
+        worst = max(bent, key=lambda name: max(link.missing.of_length for link in bending[name].values()))
         others = [name for name in bent if name != worst]
         yield f"{worst}: {bent[worst]}" + (f" (likewise, but less: {', '.join(others)})" if others else "")
     texts = ((name, text) for name, of in warnings.items() for text in of)
@@ -44,7 +44,7 @@ def deflection_in_words(bending: Iterable[Mapping[str, Bending]]) -> str:
     found = [worst for links in bending if (worst := largest(links)) is not None]
     if not found:
         return "links are rigid"
-    name, link = max(found, key=lambda item: (item[1].is_beyond, item[1].position_error))
+    name, link = max(found, key=lambda item: (item[1].is_beyond, item[1].missing.of_length))
     return "not small: see the warning" if link.is_beyond else f"{name} {link.in_words}: {link.estimate}"
 
 

@@ -49,8 +49,7 @@ def _joints(model: Model, q: Array) -> Iterator[tuple[str, ...]]:
             yield joint.name, "closes a loop", "", ""
             continue
         node = model.tree.nodes[model.tree.carried[joint.name]]
-        values = joint.coordinates(q[node.q])
-        values = joint.turned_around(values) if node.backwards else values
+        values = node.coordinates(q)
         guesses = np.atleast_1d(np.array(model.scene.initial.joints.get(joint.name, np.nan), dtype=float))
         for k, (value, unit) in enumerate(zip(values.tolist(), joint.units, strict=True)):
             guess = guesses[k] if k < len(guesses) else np.nan
@@ -70,7 +69,7 @@ def _points(model: Model, q: Array) -> Iterator[tuple[str, str, str]]:
     tree, frames, space = model.tree, model.tree.frames(q[None]), SPACES[model.scene.space]
     tools = [tool.reference for tool in model.scene.tool]
     for point in dict.fromkeys([*(path.point for path in model.scene.trajectory if path.point is not None), *tools]):
-        pose = tree.pose(tree.section(point, np.eye(3)), q[None], frames)
+        pose = tree.pose(tree.section(point), q[None], frames)
         angles = rpy_of(pose.F[0])[2:] if space.is_plane else rpy_of(pose.F[0])
         turned = ", ".join(_in(angle, "rad") for angle in angles) if point in tools else ""
         yield point, ", ".join(f"{round(x, 9) + 0.0:.5g}" for x in space.along(pose.r[0])), turned

@@ -58,8 +58,8 @@ def write_bending(group: h5py.Group, links: Mapping[str, Bending]) -> None:
                 "foreshortening": link.foreshortening,
                 "foreshortening_moment": link.foreshortening_moment,
                 "stiffness_change": link.stiffness_change,
-                "position_error": link.position_error,
-                "relative_error": link.relative_error,
+                "position_error": link.missing.of_length,
+                "relative_error": link.missing.of_deflections,
             }
         )
 

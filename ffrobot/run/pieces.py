@@ -275,7 +275,7 @@ def worst_of_pieces(bending: Mapping[str, Bending], divided: Mapping[str, BodyIn
     worst: dict[str, Bending] = {}
     for piece, found in bending.items():
         name = link_of.get(piece, piece)
-        if name not in worst or found.position_error > worst[name].position_error:
+        if name not in worst or found.missing.of_length > worst[name].missing.of_length:
             worst[name] = found
     return {
         name: replace(found, pieces=len(divided[name].names)) if name in divided else found

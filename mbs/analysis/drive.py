@@ -14,6 +14,7 @@ from .. import _core
 from .._core import TimeFunction
 from ..fields.waypoints import spline
 from ..model.drives import NO_DRIVES, Command, Drives, PointDrive, Replayed
+from ..model.frame_motors import zero_order_hold
 from ..model.known_motion import State
 from ..model.model import Model
 from ..model.motors import integrated_mechanism
@@ -184,7 +185,7 @@ def _between(
         chosen, of_rows = as_list(times[rows]), np.ascontiguousarray(states[rows])
         if control is None:
             return _core.tree_outputs(core, scene, chosen, of_rows, system.replay)
-        held = system.zero_order_hold(control.commands)
+        held = zero_order_hold(system.model, control.commands)
         return _core.tree_outputs_under(core, scene, chosen, of_rows, held, control.held(times[rows]))
 
     rows = worth_a_look(len(times), lambda rows: system.multipliers(at(rows).multipliers))
@@ -229,7 +230,7 @@ def _integrated(
         )  # fmt: skip
     return _core.tree_sampled(
         model=core, scene=scene, times=as_list(times), q=start.q, v=start.v, controls=controls,
-        carry_on=progress, held=system.zero_order_hold(control.commands), first_command=control.first,
+        carry_on=progress, held=zero_order_hold(system.model, control.commands), first_command=control.first,
         samples=as_list(control.times), delay=control.delay, controller=control.controller,
         between=continuation.samples,
     )  # fmt: skip

@@ -17,7 +17,7 @@ from .._core import TimeFunction
 from ..fields.field_types import NotNegative, PointReference, Reference
 from ..model.gears import with_compliance, with_prescribed_motors
 from ..model.model import Model, without_paths
-from ..model.rows import ConstraintRow
+from ..model.rows import ConstraintRow, coordinate_row
 from ..scene.analysis import Analysis, Surroundings, TimedAnalysis
 from ..solve.joint_conditions import JointCondition, joint_conditions, robot_modes
 from ..solve.linearisation import LinearEquations, LinearMechanism
@@ -203,15 +203,9 @@ def locked_motors(model: Model, q: Array) -> list[ConstraintRow]:
     rows = []
     for joint, columns in model.motors.items():
         node = model.tree.nodes[model.tree.carried[joint]]
-        for k in columns:
-            q_index = node.q.start + int(k) - node.v.start
-            target, nothing = TimeFunction.constant(float(q[q_index])), np.zeros(3)
-            rows.append(
-                ConstraintRow(
-                    joint, "coordinate", node.inner, node.outer, nothing, nothing, coordinate=int(k), q_index=q_index,
-                    target=target,
-                )
-            )  # fmt: skip
+        for k in columns.tolist():
+            now = float(q[node.q.start + k - node.v.start])
+            rows.append(coordinate_row(joint, node, TimeFunction.constant(now), k))
     return rows
 
 

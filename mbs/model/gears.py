@@ -48,10 +48,11 @@ def with_compliance(model: Model) -> Model:
         return model
     tree = model.tree.with_outputs([_output(node) for node in elastic])
     outputs = tree.nodes[-len(elastic) :]
-    rigid = {node.body.name: _without_rotor(node) for node in elastic}
+    without = {node.body.name: node.joint.model_copy(update={"rotor_inertia": 0.0}) for node in elastic}
+    rigid = {node.body.name: replace(node, joint=without[node.body.name]) for node in elastic}
     tree.nodes = tuple(rigid.get(node.body.name, node) for node in tree.nodes)
     tree.gears = tuple(
-        CompliantGear(output, rigid[node.body.name], -1.0 if node.backwards else 1.0, *of_gear)
+        CompliantGear(output, rigid[node.body.name], node.sign, *of_gear)
         for output, node in zip(outputs, elastic, strict=True)
         if (of_gear := compliance(node)) is not None
     )
@@ -111,10 +112,6 @@ def _output(node: Node) -> tuple[JointRecord, str, Section]:
         }
     )  # fmt: skip
     return joint, label, node.outer if node.backwards else node.inner
-
-
-def _without_rotor(node: Node) -> Node:
-    return replace(node, joint=node.joint.model_copy(update={"rotor_inertia": 0.0}))
 
 
 def rotor(node: Node) -> tuple[float, float]:

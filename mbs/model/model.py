@@ -18,6 +18,8 @@ import numpy as np
 from ...common.arrays import Array, Booleans
 from ...common.errors import InputError, did_you_mean, quoted
 from ...common.rotations import smallest_turn
+from .._core import TimeFunction
+from ..fields.field_types import GROUND
 from ..joints.free import FreeJoint
 from ..joints.joint import JointRecord
 from ..joints.planar_joint import PlanarJoint
@@ -28,7 +30,7 @@ from .body import Body
 from .cut import CutCoordinate, cut_coordinates, cut_row, with_auxiliary_rotors
 from .drives import Drive
 from .masses import welded_payloads
-from .rows import ConstraintRow, value_and_gradient
+from .rows import ConstraintRow, coordinate_row, value_and_gradient
 from .tree import KinematicTree, Motion, Node, Section
 
 T = TypeVar("T")
@@ -79,7 +81,7 @@ class Model:
 
     def sign(self, joint: str) -> float:
         """−1 where the tree has a joint's coordinates the other way round."""
-        return -1.0 if self.driven(joint).backwards else 1.0
+        return self.driven(joint).sign
 
     def driven(self, joint: str) -> Node:
         """What moments on a joint of the tree turn: the body that it carries, or its motor behind a compliant gear."""
@@ -157,17 +159,17 @@ def _loop_rows(scene: MechanismScene, tree: KinematicTree, joint: JointRecord) -
 
 
 def _path_rows(scene: MechanismScene, tree: KinematicTree, path: Trajectory) -> Iterator[ConstraintRow]:
-    unit, ground = np.eye(3), Section(-1, "", np.eye(3), np.zeros(3))
+    unit, ground = np.eye(3), tree.section(GROUND)
     if path.coordinate_of is not None:
         yield _coordinate_row(scene, tree, path, path.coordinate_of)
         return
     if path.angle is not None:
-        section, triad = tree.section(path.angle, np.eye(3)), smallest_turn(np.array(path.turning_axis))
+        section, triad = tree.section(path.angle), smallest_turn(np.array(path.turning_axis))
         target = path.components["value"]
         yield ConstraintRow(path.name, "turn", ground, section, triad[:, 2], triad[:, 0], target=target)
         return
     assert path.point is not None
-    section = tree.section(path.point, np.eye(3))
+    section = tree.section(path.point)
     for component, target in path.components.items():
         e = unit["xyz".index(component)]
         yield ConstraintRow(path.name, "point", ground, section, e, e, target=target)
@@ -190,13 +192,15 @@ def _coordinate_row(scene: MechanismScene, tree: KinematicTree, path: Trajectory
         )
     if path.motor is not None and joint not in scene.motor_joints:
         raise InputError(f'{label}: expected a joint with a motor, found "{joint.name}", which has none')
-    if joint.name not in tree.carried:  # a loop is cut there
-        return replace(cut_row(tree, joint), owner=path.name, is_trajectory=True, target=path.components["value"])
+    return row_of_joint(tree, joint, path.name, path.components["value"])
+
+
+def row_of_joint(tree: KinematicTree, joint: JointRecord, owner: str, target: TimeFunction) -> ConstraintRow:
+    """By which a joint with one coordinate follows `target`, also one at which a loop is cut."""
+    if joint.name not in tree.carried:
+        return replace(cut_row(tree, joint), owner=owner, is_trajectory=True, target=target)
     node = tree.nodes[tree.carried[joint.name]]
-    return ConstraintRow(
-        path.name, "coordinate", node.inner, node.outer, np.zeros(3), np.zeros(3), coordinate=node.v.start,
-        q_index=node.q.start, sign=-1.0 if node.backwards else 1.0, target=path.components["value"],
-    )  # fmt: skip
+    return coordinate_row(owner, node, target, sign=node.sign)
 
 
 def row_values(model: Model, q: Array, times: Array, frames: Sequence[Motion] | None = None) -> tuple[Array, Array]:

@@ -11,7 +11,7 @@ from ...common.arrays import Array
 from ...common.rotations import logarithm
 from .._core import TimeFunction
 from ..fields.orientations import OrientationLaw
-from .tree import Motion, Section
+from .tree import Motion, Node, Section
 
 ConstraintKind = Literal["point", "slide", "dot", "rotation", "turn", "coordinate"]
 
@@ -43,6 +43,17 @@ class ConstraintRow:
     sign: float = 1.0
     target: TimeFunction | None = None
     law: OrientationLaw | None = None
+
+
+def coordinate_row(
+    owner: str, node: Node, target: TimeFunction | None = None, column: int | None = None, sign: float = 1.0
+) -> ConstraintRow:
+    """By which v[`column`] of the joint of a node, by default the first of its own, follows `target`, `sign` times."""
+    k, none = node.v.start if column is None else column, np.zeros(3)
+    return ConstraintRow(
+        owner, "coordinate", node.inner, node.outer, none, none, coordinate=k, q_index=node.q.start + k - node.v.start,
+        sign=sign, target=target,
+    )  # fmt: skip
 
 
 def value_and_gradient(row: ConstraintRow, a: Motion, b: Motion, q: Array, times: Array) -> tuple[Array, Array]:

@@ -80,7 +80,7 @@ class MultibodySystem:
         at_loads = zip(self._at_points, loads, strict=False)
         self._of_motion = [(wrench, load.force) for (wrench, _), load in at_loads if load.force is not None]
         replayed = drives.replayed.at_points if drives.replayed else {}
-        self._numbers_at = [(self._wrench(tree.section(at, np.eye(3))), of) for at, of in replayed.items()]
+        self._numbers_at = [(self._wrench(tree.section(at)), of) for at, of in replayed.items()]
         self._cut = [one for one in model.cut if one.is_loaded]
         cut = tuple(self._cut_place(one.row) for one in self._cut)
         self._check()
@@ -142,7 +142,7 @@ class MultibodySystem:
             for name, number in numbers.items()
             for along, share in _shares(OF_POINT.index(name), self.plane)
         ]
-        return _core.Replay(self.replayed.source, self.zero_order_hold(self.replayed.commands), at_points)
+        return _core.Replay(self.replayed.source, zero_order_hold(self.model, self.replayed.commands), at_points)
 
     def multipliers(self, of_core: Array) -> Array:
         """(T, rows) of the model from those of `integrated`: 0 of rows that this has not, as of dependent ones."""
@@ -156,7 +156,7 @@ class MultibodySystem:
 
     def point_number(self, point: str) -> int:
         """Of "BODY.POINT", on which a load or a drive acts, among the core's wrenches."""
-        return self._wrenches.index(self._place(self.model.tree.section(point, np.eye(3))))
+        return self._wrenches.index(self._place(self.model.tree.section(point)))
 
     def forward_model(self) -> _core.ForwardModel:
         """The model for motions under held inputs, without loads of the scene; rows must follow nothing."""
@@ -267,7 +267,8 @@ class MultibodySystem:
         scene.has_loops = has_loops and plane is not None  # in space round-off moves rows that hold by themselves
         scene.keeps_all_rows = not has_loops  # `check_path` refuses paths whose rows depend on each other
         for number, law in self._turning:
-            scene.turn_marker(number, _turning_law(law))
+            kind, reference = getattr(_core.OrientationKind, law.kind), exponential(np.array(law.reference))
+            scene.turn_marker(number, _core.TurningLaw(kind, list(law.functions), reference))
         return scene
 
     def _act_along_cut(self, scene: _core.TreeScene, places: Sequence[CutPlace]) -> None:
@@ -278,10 +279,6 @@ class MultibodySystem:
             for load in one.loads:
                 scene.add_cut_load(number, load, one.row.sign)
 
-    def zero_order_hold(self, commands: Sequence[Command]) -> _core.ZeroOrderHold:
-        """Forces of commands that are held, in their order."""
-        return zero_order_hold(self.model, commands)
-
     def _drives(self, load: Load) -> Iterator[Drive]:
         """Directions (n_v,) and sizes of the moments of a joint."""
         assert load.joint is not None
@@ -290,7 +287,7 @@ class MultibodySystem:
 
     def _point_drive(self, drive: PointDrive) -> tuple[int, Mapping[str, TimeFunction]]:
         """Number of the wrench, and its components over time."""
-        return self._wrench(self.model.tree.section(drive.point, np.eye(3))), drive.components
+        return self._wrench(self.model.tree.section(drive.point)), drive.components
 
     def _cut_place(self, row: ConstraintRow) -> CutPlace:
         return CutPlace(self._wrench(row.a), self._wrench(row.b), row.kind == "turn", row.f)
@@ -337,8 +334,3 @@ class MultibodySystem:
 def _shares(component: int, plane: Plane | None) -> list[tuple[int, float]]:
     """Of a component of a wrench: those of the core, with shares; see `Plane.shares`."""
     return [(component, 1.0)] if plane is None else plane.shares(component)
-
-
-def _turning_law(law: OrientationLaw) -> _core.TurningLaw:
-    kind = getattr(_core.OrientationKind, law.kind)
-    return _core.TurningLaw(kind, list(law.functions), exponential(np.array(law.reference)))

@@ -23,6 +23,9 @@ from ..joints.twist_spring import TwistSpring
 from ..scene.topology import Topology
 from .body import Body, bent_section, rigid_body
 
+AXES = np.eye(3)
+AXES.setflags(write=False)
+
 
 class Section(NamedTuple):
     """A triad (3, 3), columns, on a section of body number `body`, or standing at `position` (m) on the ground (−1).
@@ -83,6 +86,16 @@ class Node:
     v: slice
     p_v: slice
 
+    @property
+    def sign(self) -> float:
+        """−1 where the tree has the joint's coordinates the other way round."""
+        return -1.0 if self.backwards else 1.0
+
+    def coordinates(self, q: Array) -> Array:
+        """Those of the joint (…, k) as the scene counts them, at q (…, n_q)."""
+        found = self.joint.coordinates(q[..., self.q])
+        return self.joint.turned_around(found) if self.backwards else found
+
 
 class CompliantGear(NamedTuple):
     """A compliant gear: `spring`, and damper `damping` c (N·m·s/rad), behind a motor of the tree.
@@ -132,8 +145,7 @@ class KinematicTree:
             body = by_name[name]
             joint = _at_origin(name, floating) if carrier is None else joints[carrier.joint]
             backwards = carrier is not None and joint.between[0] == carrier.own
-            at_rest = Section(-1, "", np.eye(3), np.zeros(3))
-            inner, outer = at_rest, Section(number, "", np.eye(3), np.zeros(3))
+            inner, outer = self.section(GROUND), Section(number, "", AXES, np.zeros(3))
             if carrier is not None:
                 triads = joint.outward_triads(backwards)
                 inner = self.section(carrier.other, triads[0], joint.at)
@@ -149,7 +161,7 @@ class KinematicTree:
         self.loops = tuple(joints[number] for number in topology.loop_joints)
         self.carried = {node.joint.name: number for number, node in enumerate(nodes)}
 
-    def section(self, side: str, triad: Array, at: Sequence[float] = (0.0, 0.0, 0.0)) -> Section:
+    def section(self, side: str, triad: Array = AXES, at: Sequence[float] = (0.0, 0.0, 0.0)) -> Section:
         """The triad, in the axes of what it is on: "BODY.POINT", the frame of "BODY" or "ground" `at` (m)."""
         if side == GROUND:
             return Section(-1, "", triad, np.array(at, dtype=float))

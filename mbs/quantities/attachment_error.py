@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...common.arrays import Array, as_floats
+from ...common.arrays import Array, as_floats, null_space
 from ...common.rotations import exponential, left_jacobian, logarithm
 from ...fe_models.modal_body import ModalBody
 from ..model.body import Body, bent_section
@@ -122,8 +122,7 @@ def start_vibrations(start: Start) -> Vibrations:
     The vibrations φ_i, ω_i have of the first accelerations those that bend links, z̈_i = φ_iᵀ K q̈/ω_i², and stand
     z̈_i/ω_i² from where they vibrate about: their amplitudes are z̈_i/ω_i in √(2 J).
     """
-    sizes, directions = np.linalg.svd(start.C_q)[1:]
-    free = directions[np.count_nonzero(sizes > DEPENDENT * sizes.max(initial=0.0)) :].T
+    free = null_space(start.C_q, DEPENDENT)
     inverse = np.linalg.inv(np.linalg.cholesky(free.T @ start.M @ free))
     squares, shapes = np.linalg.eigh(inverse @ (free.T * start.stiffness) @ free @ inverse.T)
     elastic = squares > RIGID * squares.max(initial=0.0)

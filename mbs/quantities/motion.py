@@ -221,12 +221,12 @@ class RobotMotion:
 
     def section(self, point: str) -> Motion:
         """Of the section "BODY.POINT"."""
-        return self.model.tree.motion(self.model.tree.section(point, np.eye(3)), self.q, self.frames)
+        return self.model.tree.motion(self.model.tree.section(point), self.q, self.frames)
 
     def point(self, point: str) -> PointMotion:
         """Of the section "BODY.POINT"."""
         tree = self.model.tree
-        found = tree.pose(tree.section(point, np.eye(3)), self.q, self.frames)
+        found = tree.pose(tree.section(point), self.q, self.frames)
         turned = None if self.space.is_plane else continuous(quaternions(found.F))
         return PointMotion(found.r, self.deflection(point), turned)
 
@@ -245,10 +245,10 @@ class RobotMotion:
         if number is None or not self.model.tree.nodes[number].joint.units:
             return None
         node = self.model.tree.nodes[number]
-        x, x_dot = (node.joint.coordinates(values) for values in (self.q[:, node.q], self.v[:, node.v]))
-        if not node.backwards:
-            return x, x_dot
-        return node.joint.turned_around(x), node.joint.rate_turned_around(x, x_dot)
+        rate = node.joint.coordinates(self.v[:, node.v])
+        if node.backwards:
+            rate = node.joint.rate_turned_around(node.joint.coordinates(self.q[:, node.q]), rate)
+        return node.coordinates(self.q), rate
 
     def path_force(self, trajectory: str) -> Array:
         """−λ (T, m) of its rows: forces on the point, then moments on the section about global axes."""

@@ -82,16 +82,6 @@ class Bending:
         return self.foreshortening / self.length
 
     @property
-    def relative_error(self) -> float:
-        """Estimated error of deflections, forces and moments, of their peaks."""
-        return self.missing.of_deflections
-
-    @property
-    def position_error(self) -> float:
-        """Estimated error of positions, of the link's length."""
-        return self.missing.of_length
-
-    @property
     def is_beyond(self) -> bool:
         """Whether small deformations end before."""
         return (
@@ -114,11 +104,11 @@ class Bending:
     @property
     def estimate(self) -> str:
         """How wrong results may be."""
-        if self.position_error > USELESS:
+        if self.missing.of_length > USELESS:
             return "results may be entirely wrong"
         return (
-            f"points may be off by {_percent(self.position_error)} of its length, deflections and moments by"
-            f" {_percent(self.relative_error)} of their peaks"
+            f"points may be off by {_percent(self.missing.of_length)} of its length, deflections and moments by"
+            f" {_percent(self.missing.of_deflections)} of their peaks"
         )
 
     @property
@@ -128,7 +118,7 @@ class Bending:
             return "consider geometric_stiffening = true"
         if not self.is_divisible:
             return "divide the link into shorter ones, welded"
-        if self.position_error > USELESS:  # it does not really bend as far as this run says
+        if self.missing.of_length > USELESS:  # it does not really bend as far as this run says
             return 'divide the link: pieces = "auto" in its [[body]]'
         return f"divide the link: pieces = {enough_pieces(self.shortening, self.pieces)} in its [[body]]"
 
@@ -256,7 +246,7 @@ def shape_from_chord(link: ModalBody, p: Array) -> tuple[Array, Array, Array]:
 
 def largest(bodies: Mapping[str, Bending]) -> tuple[str, Bending] | None:
     """The link whose results are worst, of those beyond small deformations where there are any; None of no links."""
-    return max(bodies.items(), key=lambda item: (item[1].is_beyond, item[1].position_error), default=None)
+    return max(bodies.items(), key=lambda item: (item[1].is_beyond, item[1].missing.of_length), default=None)
 
 
 def deflection_warning(bodies: Mapping[str, Bending]) -> str:

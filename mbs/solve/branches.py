@@ -155,9 +155,7 @@ def is_so(model: Model, q: Array, node: Node, word: Word) -> bool:
 
 def _angle(q: Array, node: Node) -> float:
     """The first coordinate of a joint as the scene counts it, within ±π."""
-    x = node.joint.coordinates(q[node.q])
-    x = node.joint.turned_around(x) if node.backwards else x
-    return float(np.angle(np.exp(1j * x[0])))
+    return float(np.angle(np.exp(1j * node.coordinates(q)[0])))
 
 
 def _turning(model: Model) -> list[Node]:
@@ -187,9 +185,8 @@ def _lines(model: Model, q: Array, joints: list[Node]) -> tuple[Array, Array]:
     """Places (k, 3) of joints and directions (k, 3) of their positive turns, global axes."""
     frames = model.tree.frames(q[None])
     poses = [model.tree.pose(node.inner, q[None], frames) for node in joints]
-    signs = [-1.0 if node.backwards else 1.0 for node in joints]
-    places = np.reshape([pose.r[0] for pose in poses], (-1, 3))
-    return places, np.reshape([sign * pose.F[0, :, 2] for sign, pose in zip(signs, poses, strict=True)], (-1, 3))
+    axes = [node.sign * pose.F[0, :, 2] for node, pose in zip(joints, poses, strict=True)]
+    return np.reshape([pose.r[0] for pose in poses], (-1, 3)), np.reshape(axes, (-1, 3))
 
 
 def _raises(model: Model, q: Array, node: Node) -> bool:
@@ -227,7 +224,7 @@ def _end_of_arm(model: Model, q: Array, places: Array, axes: Array, k: int) -> A
     if point is None:
         return as_floats(places[-1])
     frames = model.tree.frames(q[None])
-    return as_floats(model.tree.pose(model.tree.section(point, np.eye(3)), q[None], frames).r[0])
+    return as_floats(model.tree.pose(model.tree.section(point), q[None], frames).r[0])
 
 
 def _above(model: Model, q: Array, node: Node) -> bool:
@@ -247,7 +244,7 @@ def _above(model: Model, q: Array, node: Node) -> bool:
         outer = next((other for other in tree.nodes if other.inner.body == number), None)
         if outer is None:
             point = _tool(model)
-            end = end if point is None else place(tree.section(point, np.eye(3)))
+            end = end if point is None else place(tree.section(point))
             break
         after, end = outer, place(outer.inner)
     chord, offset, down = end - start, own - start, np.zeros(3)

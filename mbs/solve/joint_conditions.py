@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...common.arrays import Array, ComplexArray, Indices, as_floats
+from ...common.arrays import Array, ComplexArray, Indices, null_space
 from .linearisation import LinearMechanism
 
 RIGID = 1e-6  # of the highest frequency, below which a mode counts as without stiffness: round-off of a double zero
@@ -195,8 +195,7 @@ def _largest_real(modes: RobotModes) -> RobotModes:
 def free_directions(R: Array) -> Array:
     """(f, m) orthonormal directions z with R z = 0, of `R` (r, f), whose entries may depend on each other."""
     sizes = np.linalg.norm(R, axis=1, keepdims=True)
-    _, values, V = np.linalg.svd(R / np.where(sizes > 0.0, sizes, 1.0))
-    return as_floats(V[int(np.count_nonzero(values > DEPENDENT * values.max(initial=0.0))) :].T)
+    return null_space(R / np.where(sizes > 0.0, sizes, 1.0), DEPENDENT)
 
 
 def _compliance(K: Array, J: Array) -> Array:

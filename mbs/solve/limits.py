@@ -102,7 +102,7 @@ def _sampled_in_tree(model: Model, q: Array) -> Iterator[tuple[JointRecord, Arra
     """Joints of the tree that the core does not watch, with their coordinates (k, T)."""
     for node in model.tree.nodes:
         if _is_limited(node.joint) and _is_sampled(node):
-            yield node.joint, node.joint.turned_around(node.joint.coordinates(q[:, node.q])).T
+            yield node.joint, node.coordinates(q).T
 
 
 def _at_cuts(model: Model, times: Array, q: Array, v: Array) -> Iterator[tuple[JointRecord, Array]]:

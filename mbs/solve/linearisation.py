@@ -174,7 +174,7 @@ class LinearEquations:
         tree, found = self.model.tree, dict[str, Array]()
         for joint in self.model.scene.joint:
             if joint.name in tree.carried:
-                sign = -1.0 if tree.nodes[tree.carried[joint.name]].backwards else 1.0
+                sign = tree.nodes[tree.carried[joint.name]].sign
                 found |= {name: sign * H[k] for name, k in labelled(self.model, joint.name)}
         gradients = measured(tree, self.model.cut, state.q, state.frames)[1][0]
         for cut in tree.cut_joints:
@@ -188,7 +188,7 @@ class LinearEquations:
         tree, space, found, axes = self.model.tree, SPACES[self.model.scene.space], {}, {}
         components = [*space.translations, *(3 + k for k in space.rotations)]
         for point, place in self.points.items():
-            motion = tree.motion(tree.section(place, np.eye(3)), state.q, state.frames)
+            motion = tree.motion(tree.section(place), state.q, state.frames)
             found[point] = motion.L[0, components] @ H
             if place in tree.tools:
                 axes[point] = np.kron(np.eye(2), motion.F[0].T)[np.ix_(components, components)]
@@ -239,7 +239,7 @@ def _coordinates(model: Model) -> tuple[list[str], Array]:
             names[k] = f"modal/{node.body.name}/{number}"
         if node.joint.name in joints:
             for name, k in labelled(model, node.joint.name):
-                names[k], signs[k] = name, -1.0 if node.backwards else 1.0
+                names[k], signs[k] = name, node.sign
     for gear in model.tree.gears:
         names[gear.motor.v.start] = _of_motor(gear)
     return names, signs

@@ -77,7 +77,7 @@ class PoseEvaluator:
 
     def _place(self, q: Array) -> Array:
         tree = self.model.tree
-        motion = tree.motion(tree.section(self.point, np.eye(3)), q[None], tree.frames(q[None]))
+        motion = tree.motion(tree.section(self.point), q[None], tree.frames(q[None]))
         return self.space.along(motion.r[0])
 
     def _equilibrium(self, q: Array) -> tuple[LinearMechanism, LinearMechanism, Array]:
@@ -143,6 +143,6 @@ def _segments(model: Model, point: str) -> list[tuple[Section, Section]]:
     for number, node in enumerate(tree.nodes):
         ends = [other.inner for other in tree.nodes if other.inner.body == number]
         if point.partition(".")[0] == node.body.name:
-            ends.append(tree.section(point, np.eye(3)))
+            ends.append(tree.section(point))
         found += [(node.outer, end) for end in ends]
     return found

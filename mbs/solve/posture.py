@@ -9,10 +9,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ...common.arrays import Array, as_floats
+from ...common.arrays import Array, as_floats, null_space
 from ...common.errors import InputError, quoted
 from .._core import TimeFunction
-from ..joints.joint import JointRecord
 from ..model.known_motion import State
 from ..model.model import Model, row_values, target_rates, without_paths
 
@@ -88,10 +87,10 @@ def with_rates(model: Model, q: Array, v: Array, t: float = 0.0) -> State:
 
 def joint_scales(model: Model) -> Array:
     """(n_v,) natural size of the joints' coordinates: 1 rad, or the size of the robot; 0 of modes, which stay."""
-    scales = np.zeros(model.tree.n_v)
+    scales, length = np.zeros(model.tree.n_v), robot_size(model)
     for node in model.tree.nodes:
         units = node.joint.units or node.joint.guess_units
-        sizes = np.array([1.0 if unit == "rad" else robot_size(model) for unit in units])
+        sizes = np.array([1.0 if unit == "rad" else length for unit in units])
         scales[node.v] = node.joint.state(sizes) if node.joint.units else sizes
     return scales
 
@@ -118,15 +117,16 @@ class Mobility:
 def mobility(model: Model, q: Array) -> Mobility:
     """Of the mechanism with rigid links and gears at q (n_q,)."""
     J, is_loop = _scaled_rows(model, q), model.loop_rows
-    free, loop_rank = _null_space(J[is_loop])
+    free = null_space(J[is_loop], SINGULAR, 1.0)
     path = J[~is_loop] @ free
     values = np.linalg.svd(path, compute_uv=False)
-    still_free, followed = _null_space(path)
+    still_free = null_space(path, SINGULAR, 1.0)
     moving = np.abs(free @ still_free).max(axis=1, initial=0.0) > MOVES
     names = np.array([node.joint.name for node in model.tree.nodes for _ in range(node.joint.freedoms)])
     ratio = float(values[-1] / values[0]) if len(values) and values[0] > 0 else 1.0
-    freedom = free.shape[1] - len(model.tree.gears)
-    return Mobility(freedom, followed, ratio, tuple(dict.fromkeys(names[moving].tolist())), loop_rank)
+    count, left = free.shape[1], tuple(dict.fromkeys(names[moving].tolist()))
+    followed = count - still_free.shape[1]
+    return Mobility(count - len(model.tree.gears), followed, ratio, left, J.shape[1] - count)
 
 
 def describe_posture(model: Model, ratio: float, t: float, q: Array, *, is_end: bool) -> str:
@@ -137,7 +137,7 @@ def describe_posture(model: Model, ratio: float, t: float, q: Array, *, is_end: 
     if not ratio < NEARLY_SINGULAR:
         return ""
     J, is_loop = _scaled_rows(model, q, t), model.loop_rows
-    free, _ = _null_space(J[is_loop])
+    free = null_space(J[is_loop], SINGULAR, 1.0)
     least = np.abs(free @ np.linalg.svd(J[~is_loop] @ free)[2][-1])
     names = np.array([node.joint.name for node in model.tree.nodes for _ in range(node.joint.freedoms)])
     moving = quoted(dict.fromkeys(names[least > MOVING * least.max()].tolist()))
@@ -186,15 +186,6 @@ def _scaled_rows(model: Model, q: Array, t: float = 0.0) -> Array:
     return as_floats((C_v * joint_scales(model) / row_sizes(model)[:, None])[:, model.tree.joint_columns])
 
 
-def _null_space(J: Array) -> tuple[Array, int]:
-    """Orthonormal columns that J (m, k) takes to zero, and its rank."""
-    if not len(J):
-        return np.eye(J.shape[1]), 0
-    _, values, V = np.linalg.svd(J)
-    rank = int(np.count_nonzero(values > SINGULAR * max(values[0], 1.0)))
-    return V[rank:].T, rank
-
-
 def check_path(model: Model, q: Array, end: float) -> Iterator[str]:
     """Warnings on what paths and motors leave open at q.
 
@@ -238,16 +229,11 @@ def _check_motors(model: Model, found: Mobility) -> Iterator[str]:
             f" ({found.freedom}), found {count} ({quoted(motors)})"
         )
     if count < found.freedom and (named or model.scene.topology.is_open_chain):
-        moving = [joint.name for joint in _movable(model) if joint.name not in motors and joint.type != "free"]
+        joints = [node.joint for node in model.tree.nodes if node.joint.freedoms and node.joint.type != "free"]
+        moving = [joint.name for joint in joints if joint.name not in motors]
         if moving:
             names = ", ".join(moving)
             yield f"joints without motor: {names}: motor torques for the path are undetermined and not computed"
-
-
-def _movable(model: Model) -> Iterator[JointRecord]:
-    for node in model.tree.nodes:
-        if node.joint.freedoms:
-            yield node.joint
 
 
 SAMPLES = 2001

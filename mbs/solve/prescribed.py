@@ -11,7 +11,7 @@ from ...common.arrays import Array, as_list
 from ...common.errors import SolveError
 from .. import _core
 from ..model.model import Model
-from ..model.rows import ConstraintRow
+from ..model.rows import ConstraintRow, coordinate_row
 
 
 class Prescribed(NamedTuple):
@@ -26,7 +26,7 @@ class Prescribed(NamedTuple):
 
 def following_motors(model: Model) -> Model:
     """The robot with the coordinates of its motors in place of its paths; of planar joints between its sections."""
-    rows, zero = [row for row in model.rows if not row.is_trajectory], np.zeros(3)
+    rows = [row for row in model.rows if not row.is_trajectory]
     for joint, coordinates in model.motors.items():
         node = model.driven(joint)
         if node.joint.type == "planar":  # the core prescribes no coordinates whose axes turn
@@ -34,9 +34,7 @@ def following_motors(model: Model) -> Model:
             rows += [ConstraintRow(joint, "slide", node.inner, node.outer, f, f) for f in (x, y)]
             rows.append(ConstraintRow(joint, "turn", node.inner, node.outer, z, x))
             continue
-        for k in coordinates.tolist():
-            at = {"coordinate": k, "q_index": node.q.start + k - node.v.start}
-            rows.append(ConstraintRow(joint, "coordinate", node.inner, node.outer, zero, zero, **at))
+        rows += [coordinate_row(joint, node, column=k) for k in coordinates.tolist()]
     return replace(model, rows=tuple(rows))
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -147,8 +147,7 @@ def as_guess(nodes: Sequence[Node], q: Array) -> str:
 
 def _written(nodes: Sequence[Node], q: Array) -> Iterator[str]:
     for node in nodes:
-        x = node.joint.coordinates(q[node.q])
-        x = node.joint.turned_around(x) if node.backwards else x
+        x = node.coordinates(q)
         numbers = [
             f'"{round(np.degrees(value), 4) + 0.0:.6g}*deg"' if unit == "rad" else f"{value:.6g}"
             for value, unit in zip(x.tolist(), node.joint.units, strict=True)
@@ -168,9 +167,6 @@ def turned_guesses(scene: MechanismKeys) -> list[str]:
         f'initial.joints: {name} = {angle:g} rad is more than a turn (degrees are written "{angle:g}*deg")'
         for name, values in guesses
         if name not in followed
-        for angle in _turns(values.tolist(), units.get(name, ()))
+        for angle, unit in zip(values.tolist(), units.get(name, ()), strict=False)
+        if unit == "rad" and abs(angle) > 2 * np.pi
     ]
-
-
-def _turns(values: Iterable[float], units: Sequence[str]) -> list[float]:
-    return [value for value, unit in zip(values, units, strict=False) if unit == "rad" and abs(value) > 2 * np.pi]

@@ -13,13 +13,13 @@ from itertools import combinations
 
 import numpy as np
 
-from ...common.arrays import Array, as_floats
+from ...common.arrays import Array, as_floats, null_space
 from ...common.errors import InputError, SolveError
 from .. import _core
 from ..fields.waypoints import spline
 from ..model.model import Model, row_values, target_rates
 from ..model.motors import driven_mechanism
-from ..model.rows import ConstraintRow
+from ..model.rows import coordinate_row
 from ..model.tree import Node
 from .posture import Mobility, joint_scales, mobility
 from .prescribed import joint_places, prescribed_motion
@@ -84,15 +84,9 @@ def _check(model: Model, criterion: str, found: Mobility) -> None:
 
 def _with_prescribed_joints(model: Model, nodes: Sequence[Node], times: Array, q: Array, degree: int = 5) -> Model:
     """With rows by which the joints of `nodes` follow q (T, n_q) at `times` (T,), a spline between."""
-    signs = [-1.0 if node.backwards else 1.0 for node in nodes]
-    values = np.stack([sign * q[:, node.q.start] for sign, node in zip(signs, nodes, strict=True)], axis=1)
-    rows = [
-        ConstraintRow(
-            OWNER, "coordinate", node.inner, node.outer, np.zeros(3), np.zeros(3), coordinate=node.v.start,
-            q_index=node.q.start, sign=sign, target=target,
-        )
-        for sign, node, target in zip(signs, nodes, spline(times, values, degree), strict=True)
-    ]  # fmt: skip
+    values = np.stack([node.sign * q[:, node.q.start] for node in nodes], axis=1)
+    targets = zip(nodes, spline(times, values, degree), strict=True)
+    rows = [coordinate_row(OWNER, node, target, sign=node.sign) for node, target in targets]
     return replace(model, rows=(*model.rows, *rows))
 
 
@@ -162,23 +156,14 @@ def _least_torque(model: Model, nodes: Sequence[Node], times: Array, q: Array) -
     return moved(found.x, 0)
 
 
-def null_space(C_v: Array, scales: Array) -> Array:
-    """Orthonormal columns (n_v, k) of joints, where `scales` (n_v,) is above 0, that C_v (rows, n_v) takes to zero."""
-    joints = scales > 0
-    _, values, V = np.linalg.svd(C_v[:, joints])
-    rank = int(np.count_nonzero(values > RANK * max(values[0], 1e-300)))
-    found = np.zeros((len(scales), V.shape[0] - rank))
-    found[joints] = V[rank:].T
-    return found
-
-
 def _most_observable(model: Model, q: Array, times: Array, count: int) -> tuple[Node, ...]:
     """The `count` joints with one coordinate whose share in the motion left free is never small at q (T, n_q).
 
     Raises `SolveError` where no such joints tell it all along the path.
     """
     scales, C_v = joint_scales(model), row_values(model, q, times)[1]
-    free = [null_space(of_one * scales, scales) for of_one in C_v]
+    joints = np.eye(len(scales))[:, scales > 0]
+    free = [joints @ null_space(of_one * scales @ joints, RANK) for of_one in C_v]
     single = [node for node in model.tree.nodes if len(node.joint.units) == 1]
     best: tuple[float, tuple[Node, ...]] = (0.0, ())
     for nodes in combinations(single, count):

@@ -10,7 +10,7 @@ from ...common.arrays import Array, as_floats
 from ...common.errors import SolveError, quoted
 from ..model.known_motion import KnownStates, State, required_forces
 from ..model.model import Model, row_values
-from .posture import robot_size, row_sizes, with_rates
+from .posture import joint_scales, robot_size, row_sizes, with_rates
 from .start import undeformed_posture
 
 MOST_ITERATIONS = 60
@@ -108,23 +108,16 @@ def unstable_ways(model: Model, q: Array, multipliers: Array) -> Iterator[str]:
     if not len(found) or found.real.min() > UNSTABLE:
         return
     moved = np.abs(free @ shapes[:, found.real.argmin()])
-    node = max(tree.nodes, key=lambda node: float(moved[[*_columns(node.v), *_columns(node.p_v)]].max(initial=0.0)))
+    node = max(tree.nodes, key=lambda node: float(moved[np.r_[node.v, node.p_v]].max(initial=0.0)))
     bends = moved[node.p_v].max(initial=0.0) > moved[node.v].max(initial=0.0)
     what = f'"{node.body.name}" buckles' if bends else f'joint "{node.joint.name}" leaves it; start near another one'
     yield f"the equilibrium is unstable: at the slightest push {what}"
 
 
-def _columns(part: slice) -> range:
-    return range(part.start, part.stop)
-
-
 def natural_sizes(model: Model) -> Array:
     """(n_v,) natural sizes: 1 rad or the robot's size of joints, √J of modes, bent by about their length."""
-    sizes, length = np.ones(model.tree.n_v), robot_size(model)
+    sizes = joint_scales(model)
     for node in model.tree.nodes:
-        units = node.joint.units or node.joint.guess_units
-        of_joint = np.array([1.0 if unit == "rad" else length for unit in units])
-        sizes[node.v] = node.joint.state(of_joint) if node.joint.units else of_joint
         sizes[node.p_v] = np.sqrt(node.body.largest_moment)
     return sizes
 
@@ -145,11 +138,6 @@ def _equilibrated_solution(A: Array, b: Array) -> Array:
     return np.asarray(np.linalg.lstsq(scaled, b / rows, rcond=1e-14)[0] / columns)
 
 
-def _weight(model: Model) -> float:
-    """Of all bodies, N."""
-    return float(np.linalg.norm(model.scene.gravity)) * sum(node.body.mass for node in model.tree.nodes)
-
-
 def _force_scale(size: float, row_scales: Array) -> Array:
     return as_floats(max(size, 1e-300) / row_scales)
 
@@ -163,7 +151,8 @@ def _residual(model: Model, q: Array, t: float, multipliers: Array, row_scales: 
         elastic[:, node.p_v] = node.body.stiffness * q[:, node.p_q]
     size = max(float(np.abs(force * sizes).max(initial=0.0)) for force in (Q + elastic, elastic, held))
     if not any(node.body.n_modes for node in model.tree.nodes):  # where rigid bodies hang, all of them are
-        size = max(size, _weight(model) * robot_size(model))
+        weight = float(np.linalg.norm(model.scene.gravity)) * sum(node.body.mass for node in model.tree.nodes)
+        size = max(size, weight * robot_size(model))
     return np.concatenate([Q - held, C / row_scales], axis=1), size
 
 

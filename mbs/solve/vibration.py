@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...common.arrays import Array, as_floats
+from ...common.arrays import Array, as_floats, null_space
 from ...common.errors import InputError, quoted
 from ..model.cut import cut_damping
 from ..model.gears import gear_matrices, with_prescribed_motors
@@ -49,8 +49,7 @@ def vibrations_of(model: Model, unconstrained: MultibodySystem, t: float, q: Arr
     """
     M = np.linalg.inv(unconstrained.derivatives(t, q, np.zeros(model.tree.n_v), np.zeros(model.tree.n_v)).a_f)
     C_v = row_values(model, q[None], np.array([t]))[1][0]
-    _, sizes, V = np.linalg.svd(C_v) if len(C_v) else (None, np.zeros(0), np.eye(len(M)))
-    free = V[int(np.count_nonzero(sizes > DEPENDENT * sizes.max(initial=0.0))) :].T
+    free = null_space(C_v, DEPENDENT)
     K, D = _springs(model, q)
     L_inverse = np.linalg.inv(np.linalg.cholesky(free.T @ ((M + M.T) / 2) @ free))
     squares, vectors = np.linalg.eigh(L_inverse @ free.T @ K @ free @ L_inverse.T)

@@ -12,11 +12,10 @@ from ...common.arrays import Array, Booleans, Indices
 from ...common.errors import InputError
 from ...common.rotations import logarithm
 from .._core import TimeFunction
+from ..fields.field_types import GROUND
 from ..fields.orientations import OrientationLaw
-from ..model.cut import cut_row
-from ..model.model import Model, row_values, without_paths
+from ..model.model import Model, row_of_joint, row_values, without_paths
 from ..model.rows import ConstraintRow
-from ..model.tree import Section
 from .posture import solve_postures
 from .start import undeformed_posture
 
@@ -105,8 +104,8 @@ def _row(model: Model, axis: GridAxis, point: str, values: Array) -> ConstraintR
     """What keeps the coordinate of an axis at `values` (P,), by the number of the posture as its time."""
     target = _numbered(values)
     if axis.is_place:
-        e, ground = np.eye(3)["xyz".index(axis.name)], Section(-1, "", np.eye(3), np.zeros(3))
-        return ConstraintRow(axis.name, "point", ground, model.tree.section(point, np.eye(3)), e, e, target=target)
+        e, (ground, section) = np.eye(3)["xyz".index(axis.name)], map(model.tree.section, (GROUND, point))
+        return ConstraintRow(axis.name, "point", ground, section, e, e, target=target)
     joints = {joint.name: joint for joint in model.scene.joint}
     joint = joints[axis.name]
     if len(joint.units) != 1:
@@ -114,13 +113,7 @@ def _row(model: Model, axis: GridAxis, point: str, values: Array) -> ConstraintR
             f"{model.scene.path}: grid: expected a joint with one coordinate, found {joint.label} with"
             f" {len(joint.units)} coordinates"
         )
-    if joint.name not in model.tree.carried:  # a loop is cut there
-        return replace(cut_row(model.tree, joint), is_trajectory=True, target=target)
-    node = model.tree.nodes[model.tree.carried[joint.name]]
-    return ConstraintRow(
-        axis.name, "coordinate", node.inner, node.outer, np.zeros(3), np.zeros(3), coordinate=node.v.start,
-        q_index=node.q.start, sign=-1.0 if node.backwards else 1.0, target=target,
-    )  # fmt: skip
+    return row_of_joint(model.tree, joint, axis.name, target)
 
 
 def _numbered(values: Array) -> TimeFunction:
@@ -133,8 +126,8 @@ def _numbered(values: Array) -> TimeFunction:
 
 def _orientation(model: Model, point: str, start: Array) -> list[ConstraintRow]:
     """Rows by which the body of `point` is turned as at the start: about z in the plane, about all axes else."""
-    tree, ground = model.tree, Section(-1, "", np.eye(3), np.zeros(3))
-    section = tree.section(point, np.eye(3))
+    tree = model.tree
+    ground, section = map(tree.section, (GROUND, point))
     triad = tree.motion(section, start[None], tree.frames(start[None])).F[0]
     reference = logarithm(triad)
     law = OrientationLaw(
@@ -151,6 +144,6 @@ def within_limits(model: Model, q: Array) -> Booleans:
         if joint.name in model.tree.carried and len(joint.units) == 1:
             node = model.tree.nodes[model.tree.carried[joint.name]]
             lowest, highest = joint.position_limits[0]
-            value = (-1.0 if node.backwards else 1.0) * q[:, node.q.start]
+            value = node.sign * q[:, node.q.start]
             within &= (value >= lowest) & (value <= highest)
     return within

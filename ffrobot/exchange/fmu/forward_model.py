@@ -216,8 +216,7 @@ def _joints(model: Model) -> Iterator[tuple[Variable, _core.LinearOutput]]:
         node = tree.nodes[tree.carried[joint.name]] if joint.name in tree.carried else None
         if node is None or not has_own_coordinates(node):
             continue
-        columns = model.columns(joint.name)
-        sign = -1.0 if node.backwards else 1.0
+        columns, sign = model.columns(joint.name), node.sign
         for k, (column, unit) in enumerate(zip(columns, joint.units, strict=True), 1):
             name, entry = _numbered(joint.name, k, len(columns)), node.q.start + int(column) - node.v.start
             yield Variable(f"joint/{name}", unit, f"coordinate of joint {name}"), _core.LinearOutput([entry], [sign])
