@@ -281,11 +281,9 @@ def _position(run: Outcome, point: str) -> Array:
 
 
 def _default_tip(model: Model) -> str:
-    """The point of the first trajectory of one, or the first tool, or the last tip."""
-    driven = [trajectory.point for trajectory in model.scene.trajectory if trajectory.point is not None]
-    driven += [tool.reference for tool in model.scene.tool]
-    if driven:
-        return driven[0]
+    """The tool of the scene, or the last tip."""
+    if (tool := model.scene.tool_point) is not None:
+        return tool
     body = next(node.body for node in reversed(model.tree.nodes) if node.body.points)
     return f"{body.name}.{'tip' if 'tip' in body.points else next(iter(body.points))}"
 

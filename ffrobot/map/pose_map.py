@@ -151,14 +151,12 @@ def plan_map(
 
 
 def _default_point(scene: Scene) -> str:
-    """The last point that a trajectory leads; else the last tool, or a point of the last body: payload, tip, last."""
+    """The tool of the scene, or a point of the last body: payload, tip, last."""
     body = scene.body[-1]
     carried = [one.point for one in scene.payload if one.point.partition(".")[0] == body.name]
-    named = carried + [tool.reference for tool in scene.tool]
-    named += [one.point for one in scene.trajectory if one.point is not None]
     points = ["tip"] if body.rigid is None else list(body.rigid.points)
     last = "tip" if "tip" in points else points[-1]
-    return named[-1] if named else f"{body.name}.{last}"
+    return scene.tool_point or (carried[-1] if carried else f"{body.name}.{last}")
 
 
 def _keeps_orientation(scene: Scene, axes: tuple[GridAxis, ...], wanted: str) -> bool:

@@ -142,6 +142,12 @@ class MechanismKeys(Record):
         default = self.topology.is_open_chain
         return tuple(joint for joint in self.joint if joint.has_motor(default))
 
+    @property
+    def tool_point(self) -> str | None:
+        """Which point is the tool: that of the last path of one, else the last tool; None where there is neither."""
+        points = [*(tool.reference for tool in self.tool), *(path.point for path in self.trajectory if path.point)]
+        return points[-1] if points else None
+
     def references(self) -> Iterator[Reference]:
         """All that records of the scene refer to, with their full keys."""
         records: list[tuple[str, AnyJoint | Tool | Trajectory | Load | Payload]] = [

@@ -167,18 +167,12 @@ def _turning(model: Model) -> list[Node]:
 def _chain(model: Model) -> list[Node]:
     """The joints of the tree from the ground to the body of the tool: that of the last path of a point, or the last."""
     tree, found = model.tree, list[Node]()
-    point = _tool(model)
+    point = model.scene.tool_point
     number = len(tree.nodes) - 1 if point is None else tree.index[point.partition(".")[0]]
     while number >= 0:
         found.append(tree.nodes[number])
         number = found[-1].inner.body
     return found[::-1]
-
-
-def _tool(model: Model) -> str | None:
-    """The point of the last path of one, or the last tool."""
-    tools = [tool.reference for tool in model.scene.tool]
-    return next(iter([*(path.point for path in reversed(model.scene.trajectory) if path.point), *tools[::-1]]), None)
 
 
 def _lines(model: Model, q: Array, joints: list[Node]) -> tuple[Array, Array]:
@@ -220,7 +214,7 @@ def _end_of_arm(model: Model, q: Array, places: Array, axes: Array, k: int) -> A
             return as_floats(meeting)
     if len(places) > k + 2:
         return as_floats(places[k + 2])
-    point = _tool(model)
+    point = model.scene.tool_point
     if point is None:
         return as_floats(places[-1])
     frames = model.tree.frames(q[None])
@@ -243,7 +237,7 @@ def _above(model: Model, q: Array, node: Node) -> bool:
         number = tree.index[after.body.name]
         outer = next((other for other in tree.nodes if other.inner.body == number), None)
         if outer is None:
-            point = _tool(model)
+            point = model.scene.tool_point
             end = end if point is None else place(tree.section(point))
             break
         after, end = outer, place(outer.inner)
