@@ -18,7 +18,7 @@ from ..common.arrays import Integers
 from ..common.errors import InputError
 from .abaqus_deck import Keyword, Sets
 from .abaqus_model import Deck, Instance
-from .cells import TO_GMSH
+from .cells import in_gmsh_order
 from .included import number_of
 from .source import PointMass, RawMesh
 
@@ -76,9 +76,8 @@ class _Assembled:
         same, remarks = self._tied()
         blocks = list[tuple[str, Integers]]()
         for begin, end in _runs(kinds):
-            order = TO_GMSH.get(kinds[begin])
             block = same[np.array(cells[begin:end], dtype=np.int64)]
-            blocks.append((kinds[begin], block if order is None else block[:, order]))
+            blocks.append((kinds[begin], in_gmsh_order(kinds[begin], block)))
         faces = {name: [same[piece] for piece in pieces] for name, pieces in self._faces().items()}
         groups = {name: same[group] for name, group in self._node_sets().items()}
         return RawMesh(

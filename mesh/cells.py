@@ -6,7 +6,9 @@ hexahedron's lower face, then the upper one. See "Node ordering" in the manual o
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Literal
 
 import numpy as np
@@ -89,3 +91,10 @@ TO_GMSH = {
     "hexahedron27": [*_HEXAHEDRON20, 24, 22, 20, 21, 23, 25, 26],
 }
 """Type of element → which of VTK's nodes gmsh's nodes are."""
+
+
+def in_gmsh_order(kind: str, cells: Integers, as_vtk: Mapping[str, list[int]] = MappingProxyType({})) -> Integers:
+    """Cells (c, v) in VTK's order of nodes, or in one that `as_vtk` makes that, in gmsh's."""
+    for order in (as_vtk.get(kind), TO_GMSH.get(kind)):
+        cells = cells if order is None else cells[:, order]
+    return cells

@@ -20,7 +20,7 @@ from ..common.errors import InputError
 from .cells import VOLUME_ELEMENTS
 from .jacobian import SLIVER, cell_quality
 from .records import CIRCLE, GROWTH
-from .source import RawMesh
+from .source import MeshBlocks, RawMesh
 
 _MOST_PRINTED = 1 << 20  # bytes
 # gmsh's newer algorithm, HXT, makes better meshes faster, but other ones in every run.
@@ -159,37 +159,20 @@ def own_entities(dim: int = -1) -> list[tuple[int, int]]:
 
 def extract_mesh() -> RawMesh:
     """The model's volume elements, with the names of its physical groups; of all volumes where no group has any."""
-    number, points = _points()
-    named = [(dim, tag, gmsh.model.getPhysicalName(dim, tag)) for dim, tag in gmsh.model.getPhysicalGroups()]
-    groups = {dim: {tag: name or str(tag) for of, tag, name in named if of == dim} for dim in (2, 3)}
-    blocks: list[tuple[str, Integers]] = []
-    numbers: dict[int, Integers] = {}  # of the cells of each volume
-    count = 0
-    for _, volume in own_entities(3):
-        before = count
-        for kind, cells in _elements(3, volume, number):
-            blocks.append((VOLUME_ELEMENTS.get(kind, f"gmsh type {kind}"), cells))
-            count += len(cells)
-        numbers[int(volume)] = np.arange(before, count)
-    regions = {name: np.empty(0, dtype=np.int64) for name in groups[3].values()}
-    for tag, name in groups[3].items():
-        volumes = map(int, gmsh.model.getEntitiesForPhysicalGroup(3, tag))
-        regions[name] = np.concatenate([regions[name], *(numbers[volume] for volume in volumes)])
-    faces: dict[str, list[Integers]] = {}
-    for tag, name in groups[2].items():
-        for entity in gmsh.model.getEntitiesForPhysicalGroup(2, tag):
-            for kind, cells in _elements(2, int(entity), number):
-                corners = gmsh.model.mesh.getElementProperties(kind)[5]
-                faces.setdefault(name, []).append(cells[:, :corners])
-    surfaces, lines = (
-        tuple(
-            cells[:, : gmsh.model.mesh.getElementProperties(kind)[5]]
-            for _, entity in gmsh.model.getEntities(dim)
-            for kind, cells in _elements(dim, entity, number)
-        )
-        for dim in (2, 1)
-    )
-    return RawMesh(points, tuple(blocks), regions, faces, {}, surfaces, lines)
+    (number, points), found = _points(), MeshBlocks()
+    for dim, entity in [*own_entities(3), *gmsh.model.getEntities(2), *gmsh.model.getEntities(1)]:
+        tags = gmsh.model.getPhysicalGroupsForEntity(dim, entity)
+        names = [gmsh.model.getPhysicalName(dim, tag) or str(tag) for tag in tags]
+        for kind, cells in _elements(dim, entity, number):
+            groups = [(name, np.arange(len(cells))) for name in names]
+            corners = cells[:, : gmsh.model.mesh.getElementProperties(kind)[5]]
+            if dim == 3:
+                found.add_solids(VOLUME_ELEMENTS.get(kind, f"gmsh type {kind}"), cells, groups)
+            elif dim == 2:
+                found.add_surfaces(corners, groups)
+            else:
+                found.lines.append(corners)
+    return found.mesh(points, {})
 
 
 def _points() -> tuple[Integers, Array]:

@@ -15,8 +15,8 @@ import numpy as np
 
 from ..common.arrays import Integers
 from ..common.errors import InputError
-from .cells import TO_GMSH
-from .source import RawMesh
+from .cells import in_gmsh_order
+from .source import MeshBlocks, RawMesh
 
 # Types of cells with their nodes.
 _SOLIDS = {
@@ -59,37 +59,27 @@ def _mesh(file: h5py.File) -> RawMesh:
     step = mesh if "NOE" in mesh else _only(mesh, "step of the mesh")[1]
     points = _columns(step["NOE/COO"], 3).astype(np.float64)
     families = file["FAS"][name] if name in file.get("FAS", ()) else {}
-    blocks: list[tuple[str, Integers]] = []
-    regions, facets = dict[str, list[Integers]](), dict[str, list[Integers]]()
-    surfaces, lines = list[Integers](), list[Integers]()
-    polygons = False
-    groups, count = _groups(families.get("ELEME", {})), 0
+    found, polygons = MeshBlocks(), False
+    groups = _groups(families.get("ELEME", {}))
     for kind, of in step["MAI"].items():
         if _text(of.attrs, "PFL") not in ("", _WHOLE):
             raise InputError(f"expected all cells of type {kind}, found a profile of some")
         if kind in _SOLIDS:
             width, name = _SOLIDS[kind]
-            cells = _in_order(name, _cells(of, width))
-            blocks.append((name, cells))
-            for group, rows in _members(of, groups, len(cells)):
-                regions.setdefault(group, []).append(count + rows)
-            count += len(cells)
+            cells = in_gmsh_order(name, _cells(of, width), _AS_VTK)
+            found.add_solids(name, cells, _members(of, groups, len(cells)))
         elif kind in _SURFACES:
             width, corners = _SURFACES[kind]
-            surfaces.append(_cells(of, width)[:, :corners])
-            for group, rows in _members(of, groups, len(surfaces[-1])):
-                facets.setdefault(group, []).append(surfaces[-1][rows])
+            cells = _cells(of, width)[:, :corners]
+            found.add_surfaces(cells, _members(of, groups, len(cells)))
         elif kind in _LINES:
-            lines.append(_cells(of, _LINES[kind])[:, :2])
+            found.lines.append(_cells(of, _LINES[kind])[:, :2])
         elif kind.startswith("POG"):
             polygons = True
         elif kind != "PO1":  # points
             raise InputError(f"expected cells of {', '.join(_SOLIDS)}, found {kind} (polyhedra, or structure elements)")
     nodes = _members(step["NOE"], _groups(families.get("NOEUD", {})), len(points))
-    return RawMesh(
-        points, tuple(blocks), {group: np.concatenate(rows) for group, rows in regions.items()}, facets,
-        dict(nodes), tuple(surfaces), tuple(lines), tuple(_remarks(attributes, polygons)),
-    )  # fmt: skip
+    return found.mesh(points, dict(nodes), _remarks(attributes, polygons))
 
 
 def _only(parent: h5py.Group, what: str) -> tuple[str, Any]:
@@ -109,13 +99,6 @@ def _cells(of: h5py.Group, width: int) -> Integers:
     if nodes.dtype.kind not in "iu":
         raise InputError(f"expected whole numbers of nodes, found {nodes.dtype}")
     cells: Integers = nodes.astype(np.int64) - 1
-    return cells
-
-
-def _in_order(kind: str, cells: Integers) -> Integers:
-    """In gmsh's order of nodes."""
-    for order in (_AS_VTK.get(kind), TO_GMSH.get(kind)):
-        cells = cells if order is None else cells[:, order]
     return cells
 
 

@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 
 from ..common.arrays import Integers
 from ..common.errors import InputError
-from .cells import TO_GMSH
+from .cells import in_gmsh_order
 from .part_reader import read_apart
-from .source import RawMesh
+from .source import MeshBlocks, RawMesh
 
 if TYPE_CHECKING:
     import meshio
@@ -133,31 +133,21 @@ def _raw_mesh(mesh: meshio.Mesh) -> RawMesh:
     _check_ghosts(mesh.cell_data)
     points = np.zeros((len(mesh.points), 3))
     points[:, : mesh.points.shape[1]] = mesh.points
-    blocks: list[tuple[str, Integers]] = []
-    regions: dict[str, list[Integers]] = {}
-    faces: dict[str, list[Integers]] = {}
-    surfaces, lines = list[Integers](), list[Integers]()
-    count = 0
+    found = MeshBlocks()
     for block, groups in zip(mesh.cells, _groups(mesh), strict=True):
         cells = np.asarray(block.data, dtype=np.int64)
         if other := _OTHERS.fullmatch(block.type):
             if other[1] == "line":
-                lines.append(cells[:, :2])
+                found.lines.append(cells[:, :2])
             elif other[1] != "vertex":
-                surfaces.append(cells[:, : _CORNERS[other[1]]])
-                for name, rows in groups.items():
-                    faces.setdefault(name, []).append(surfaces[-1][rows])
+                found.add_surfaces(cells[:, : _CORNERS[other[1]]], groups.items())
         else:  # of unknown types, too: these are rejected by name
             kind = "hexahedron" if block.type == "voxel" else block.type
             kind = _LAGRANGE.get((kind, cells.shape[1]), kind)
-            order = _VOXEL if block.type == "voxel" else TO_GMSH.get(kind)
-            blocks.append((kind, cells if order is None else cells[:, order]))
-            for name, rows in groups.items():
-                regions.setdefault(name, []).append(count + rows)
-            count += len(cells)
-    whole = {name: np.concatenate(rows) for name, rows in regions.items()}
-    point_groups = {name: np.asarray(group, dtype=np.int64) for name, group in (mesh.point_sets or {}).items()}
-    return RawMesh(points, tuple(blocks), whole, faces, point_groups, tuple(surfaces), tuple(lines))
+            cells = cells[:, _VOXEL] if block.type == "voxel" else in_gmsh_order(kind, cells)
+            found.add_solids(kind, cells, groups.items())
+    sets = mesh.point_sets or {}
+    return found.mesh(points, {name: np.asarray(group, dtype=np.int64) for name, group in sets.items()})
 
 
 def _groups(mesh: meshio.Mesh) -> Iterator[Mapping[str, Integers]]:

@@ -18,7 +18,7 @@ from ..common.arrays import Array, Integers
 from ..common.errors import InputError
 from .cells import GMSH_CORNERS, GMSH_NODES, VOLUME_ELEMENTS
 from .gmsh_session import extract_mesh, gmsh_session, own_entities
-from .source import RawMesh
+from .source import MeshBlocks, RawMesh
 
 _HEADER = b"$MeshFormat"
 
@@ -109,34 +109,23 @@ class _Version2:
     def mesh(self) -> RawMesh:
         number, points = self._nodes()
         names = self._names()
-        blocks: list[tuple[str, Integers]] = []
-        regions: dict[str, list[Integers]] = {}
-        facets: dict[str, list[Integers]] = {}
-        surfaces, lines = list[Integers](), list[Integers]()
-        count = 0
-        partitions = set[int]()
+        found, partitions = MeshBlocks(), set[int]()
         for kind, tags, nodes in (self._binary_elements if self._is_binary else self._text_elements)():
             cells, volume = number(nodes), kind in VOLUME_ELEMENTS
-            groups = tags[:, 0] if tags.size else np.zeros(len(cells), dtype=np.int64)
+            of = tags[:, 0] if tags.size else np.zeros(len(cells), dtype=np.int64)
             partitions.update(tags[:, 3].tolist() if volume and tags.shape[1] > 3 else ())
-            for group in np.unique(groups[groups != 0]).tolist():
-                name = names.get((3 if volume else 2, abs(group)), str(abs(group)))
-                rows = np.flatnonzero(groups == group)
-                if volume:
-                    regions.setdefault(name, []).append(count + rows)
-                elif kind in GMSH_CORNERS:
-                    facets.setdefault(name, []).append(cells[rows, : GMSH_CORNERS[kind]])
+            groups = [
+                (names.get((3 if volume else 2, abs(tag)), str(abs(tag))), np.flatnonzero(of == tag))
+                for tag in np.unique(of[of != 0]).tolist()
+            ]
             if volume:
-                blocks.append((VOLUME_ELEMENTS[kind], cells))
-                count += len(cells)
+                found.add_solids(VOLUME_ELEMENTS[kind], cells, groups)
             elif kind in GMSH_CORNERS:
-                surfaces.append(cells[:, : GMSH_CORNERS[kind]])
+                found.add_surfaces(cells[:, : GMSH_CORNERS[kind]], groups)
             elif GMSH_NODES[kind] > 1:
-                lines.append(cells[:, :2])
-        whole = {name: np.concatenate(rows) for name, rows in regions.items()}
+                found.lines.append(cells[:, :2])
         remarks = [f"all cells are of partition {number}: others may be in separate files" for number in partitions]
-        remarks = remarks if len(remarks) == 1 else []
-        return RawMesh(points, tuple(blocks), whole, facets, {}, tuple(surfaces), tuple(lines), tuple(remarks))
+        return found.mesh(points, {}, remarks if len(remarks) == 1 else ())
 
     @staticmethod
     def _section(content: bytes, name: bytes) -> bytes:

@@ -19,7 +19,7 @@ import numpy as np
 
 from ..common.arrays import Array, Integers
 from ..common.errors import InputError
-from .cells import TO_GMSH
+from .cells import in_gmsh_order
 from .frames import GLOBAL, Frame, Kind
 from .included import Line, lines_of, number_of, whole_of
 from .source import PointMass, RawMesh
@@ -270,10 +270,7 @@ class _Deck:
             properties.setdefault(kind, []).append(card.whole(1, card.whole(0)))
         blocks = list[tuple[str, Integers]]()
         for kind, rows in cells.items():
-            block = np.array(rows, dtype=np.int64)
-            for order in (_AS_VTK.get(kind), TO_GMSH.get(kind)):
-                block = block if order is None else block[:, order]
-            blocks.append((kind, block))
+            blocks.append((kind, in_gmsh_order(kind, np.array(rows, dtype=np.int64), _AS_VTK)))
         owner = np.array([number for of in properties.values() for number in of], dtype=np.int64)
         regions = {str(number): np.flatnonzero(owner == number) for number in np.unique(owner).tolist()}
         faces: dict[str, list[Integers]] = {}

@@ -5,7 +5,8 @@ Names of element types are meshio's; nodes are in gmsh's order.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections import defaultdict
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -69,6 +70,38 @@ class RawMesh:
     lines: Sequence[Integers] = ()
     remarks: Sequence[str] = ()
     masses: Sequence[PointMass] = ()
+
+
+Groups = Iterable[tuple[str, Integers]]
+"""Names with their members (k,) in a block of elements."""
+
+
+class MeshBlocks:
+    """A `RawMesh` in the making, block by block of elements, as files have them."""
+
+    def __init__(self) -> None:
+        self.blocks, self.count = list[tuple[str, Integers]](), 0
+        self.regions, self.facets = (defaultdict[str, list[Integers]](list) for _ in range(2))
+        self.surfaces, self.lines = list[Integers](), list[Integers]()
+
+    def add_solids(self, kind: str, cells: Integers, groups: Groups = ()) -> None:
+        """Volume elements (c, v) in gmsh's order of nodes."""
+        self.blocks.append((kind, cells))
+        for name, members in groups:
+            self.regions[name].append(self.count + members)
+        self.count += len(cells)
+
+    def add_surfaces(self, corners: Integers, groups: Groups = ()) -> None:
+        """Triangles or quadrilaterals (k, 3 or 4)."""
+        self.surfaces.append(corners)
+        for name, members in groups:
+            self.facets[name].append(corners[members])
+
+    def mesh(self, points: Array, point_groups: Mapping[str, Integers], remarks: Iterable[str] = ()) -> RawMesh:
+        """Of elements that have these points (p, 3)."""
+        regions = {name: np.concatenate(members) for name, members in self.regions.items()}
+        groups = regions, self.facets, point_groups
+        return RawMesh(points, self.blocks, *groups, self.surfaces, self.lines, tuple(remarks))
 
 
 @dataclass(frozen=True)
