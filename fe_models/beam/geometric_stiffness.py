@@ -63,17 +63,11 @@ def geometric_stiffness(
 
 def _at_gauss_points(stations: Functions, fields: Array) -> tuple[Array, Array, Array, Array]:
     """Points x (g,) m with their weights (g,) m, and fields (6, g, n) there with their derivatives by x."""
-    x = stations.x[stations.element]  # (e, 4)
     nodes, weights = roots_legendre(POINTS)
-    start, length = x[:, :1], x[:, -1:] - x[:, :1]
-    X = 0.5 * (nodes + 1)
-    inverse = np.linalg.inv(((x - start) / length)[:, :, None] ** np.arange(4))  # coefficients of powers, by node
-    basis = X[:, None] ** np.arange(4) @ inverse  # (e, g, 4)
-    slope = np.arange(1, 4) * X[:, None] ** np.arange(3) @ inverse[:, 1:] / length[:, :, None]
-    of_element = fields[:, stations.element]  # (6, e, 4, n)
-    at = (start + length * X).ravel()
-    values, slopes = (np.reshape(B @ of_element, (6, at.size, -1)) for B in (basis, slope))
-    return at, (0.5 * length * weights).ravel(), values, slopes
+    lengths = stations.lengths[:, None]
+    at = (stations.nodes[:-1, None] + lengths * 0.5 * (nodes + 1)).ravel()
+    values, slopes = (np.array([stations.at(at, order) @ field for field in fields]) for order in (0, 1))
+    return at, (0.5 * lengths * weights).ravel(), values, slopes
 
 
 def _products(values: Array, slopes: Array) -> Array:

@@ -19,6 +19,7 @@ from ...common.arrays import Array, Booleans, Integers
 from ..link_records import BeamLink
 from ..modal_body import Interface, Stations, StressPoint, craig_bampton
 from ..modal_body.attachment_modes import interface_loads
+from ..modal_body.interpolation import through
 from ..modal_body.lumped_masses import Lump
 from ..modal_body.unit_loads import inertia_wrenches, unit_load_names
 from .line import on_axis
@@ -160,15 +161,9 @@ def _unit_loads(material: Material, attached: Sequence[Lump], interfaces: Mappin
     """All unit loads, (q, 3, l), in the order of `unit_load_names`."""
     moving = material.with_lumps(attached).under_unit_motions()
     places, motions = len(interfaces), moving.force.shape[2]
-    loads = np.zeros((places, 6, motions + 6 * places))
-    for k in range(places):
-        loads[k, :, motions + 6 * k : motions + 6 * (k + 1)] = np.eye(6)
-    at_interfaces = np.zeros((moving.x.size, 3, 6 * places))
-    widened = SectionLoads(
-        moving.x,
-        np.concatenate([moving.force, at_interfaces], axis=2),
-        np.concatenate([moving.moment, at_interfaces], axis=2),
-    )
+    loads = np.pad(np.eye(6 * places).reshape(places, 6, -1), ((0, 0), (0, 0), (motions, 0)))
+    force, moment = (np.pad(of, ((0, 0), (0, 0), (0, 6 * places))) for of in (moving.force, moving.moment))
+    widened = SectionLoads(moving.x, force, moment)
     return widened.beside([(at.position[0], load) for at, load in zip(interfaces.values(), loads, strict=True)])
 
 
@@ -192,19 +187,11 @@ def _material(link: BeamLink, stations: Stations, x: float) -> Material:
     gauss, weights = roots_legendre(3)  # exact: arm × cubic
     half = 0.5 * (end - start)[:, None]
     s = 0.5 * (start + end)[:, None] + half * gauss
-    shapes = _lagrange(nodes[element], s)
-    translation = np.einsum("egi,eikn->egkn", shapes, stations.translation[stations.element[element]])
-    rotation = np.einsum("egi,eikn->egkn", shapes, stations.rotation[stations.element[element]])
+    moved = through(stations, np.repeat(stations.element[element], gauss.size, axis=0), s.ravel())
     mass, inertia = _line_inertia(link, segments(link, 0.5 * (start + end)))
-    n = translation.shape[3]
     scale = half * weights
-    return Material(
-        s.ravel(),
-        (scale * mass[:, None]).ravel(),
-        (scale[:, :, None] * inertia[:, None]).reshape(-1, 3),
-        translation.reshape(-1, 3, n),
-        rotation.reshape(-1, 3, n),
-    )
+    spread = (scale * mass[:, None]).ravel(), (scale[:, :, None] * inertia[:, None]).reshape(-1, 3)
+    return Material(s.ravel(), *spread, moved.translation, moved.rotation)
 
 
 def _line_inertia(link: BeamLink, segments: Integers) -> tuple[Array, Array]:
@@ -234,13 +221,3 @@ def _with_support(link: BeamLink, loads: SectionLoads) -> SectionLoads:
         np.concatenate([loads.force, reaction[None]]),
         np.concatenate([loads.moment, np.zeros_like(reaction)[None]]),
     )
-
-
-def _lagrange(nodes: Array, s: Array) -> Array:
-    """(e, g, 4) values at s (e, g) of the cubics that are 1 at one of `nodes` (e, 4) and 0 at the others."""
-    values = np.ones((*s.shape, 4))
-    for i in range(4):
-        for j in range(4):
-            if i != j:
-                values[:, :, i] *= (s - nodes[:, None, j]) / (nodes[:, None, i] - nodes[:, None, j])
-    return values

@@ -25,10 +25,10 @@ def interpolate(stations: Stations, x: Array) -> AlongAxis:
         return _hermite(stations, x)
     beginnings = stations.position[element[:, 0], 0]
     index = np.clip(np.searchsorted(beginnings, x, side="right") - 1, 0, len(element) - 1)
-    return _through(stations, element[index], x)
+    return through(stations, element[index], x)
 
 
-def _through(stations: Stations, members: Integers, x: Array) -> AlongAxis:
+def through(stations: Stations, members: Integers, x: Array) -> AlongAxis:
     """The polynomials through the stations `members` (m, i), at x (Lagrange)."""
     nodes = stations.position[members, 0]
     others = ~np.eye(nodes.shape[1], dtype=bool)
@@ -47,7 +47,7 @@ def _hermite(stations: Stations, x: Array) -> AlongAxis:
     k = positions.size
     i = np.clip(np.searchsorted(positions, x, side="right") - 1, 0, k - 2)
     first = np.minimum(np.maximum(i - 1, 0), max(k - 4, 0))
-    near = _through(stations, first[:, None] + np.arange(min(4, k)), x)
+    near = through(stations, first[:, None] + np.arange(min(4, k)), x)
     h = (positions[i + 1] - positions[i])[:, None]
     s = (x[:, None] - positions[i][:, None]) / h
     for axis, turn, sign in ((1, 2, 1.0), (2, 1, -1.0)):

@@ -12,7 +12,7 @@ import numpy as np
 
 from ...common.arrays import Array
 from ..modal_body.parts import Invariants
-from ..modal_body.unit_loads import PAIRS, interface_load_names
+from ..modal_body.unit_loads import inertia_wrenches, interface_load_names
 from .elasticity import SolidModel
 from .strain_energy import geometric_stiffness, internal_forces
 from .supports import Flexibility
@@ -50,14 +50,8 @@ def unit_loads(model: SolidModel, interfaces: Mapping[str, Array]) -> dict[str, 
         model: of the solid.
         interfaces: B (6, 3 owned), mean motion of each; its transpose spreads a force.
     """
-    x, e = model.x, np.eye(3)
-    fields: dict[str, Array] = {}
-    for k, axis in enumerate("xyz"):
-        fields[f"t_{axis}"] = np.broadcast_to(-e[k], x.shape)
-        fields[f"r_{axis}"] = -np.cross(e[k], x)
-    for name, (k, j) in PAIRS.items():
-        turns = [(k, j)] if k == j else [(k, j), (j, k)]
-        fields[f"omega_{name}"] = -sum((np.cross(e[a], np.cross(e[b], x)) for a, b in turns), np.zeros_like(x))
+    wrenches = inertia_wrenches(model.x, np.ones(len(model.x)), np.zeros_like(model.x))
+    fields = {name: np.ascontiguousarray(wrench[:, :3]) for name, wrench in wrenches.items()}
     forces = model.mass @ np.stack([field.reshape(-1) for field in fields.values()], axis=1)
     loads = dict(zip(fields, forces.T, strict=True))
     for name, B in interfaces.items():

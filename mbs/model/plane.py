@@ -23,6 +23,8 @@ PLANAR = {
     _core.JointKind.weld: _core.JointKind.weld,
     _core.JointKind.planar: _core.JointKind.free,
 }
+SHARED = ("name", "parent", "parent_marker", "inboard_marker", "rotor_inertia", "gear_ratio", "driven", "of_section")
+"""What bodies are in the plane and in space alike."""
 
 
 class Plane(NamedTuple):
@@ -181,16 +183,7 @@ class _Reduction:
         data = body.data
         self._check_joint(body.joint, self._normal @ self._frames[number].carrier)
         found = _core.PlanarBody()
-        for key in (
-            "name",
-            "parent",
-            "parent_marker",
-            "inboard_marker",
-            "rotor_inertia",
-            "gear_ratio",
-            "driven",
-            "of_section",
-        ):
+        for key in SHARED:
             setattr(found, key, getattr(body, key))
         found.joint, found.data = PLANAR[body.joint], planar_data(data, axes)
         return found

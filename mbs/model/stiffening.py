@@ -16,6 +16,7 @@ from ...common.arrays import Array, as_floats
 from ...fe_models.modal_body import ModalBody
 from ...fe_models.modal_body.lumped_masses import attached_integrals
 from ...fe_models.modal_body.parts import LEVI_CIVITA
+from ...fe_models.modal_body.unit_loads import PAIRS, interface_load_names, unit_load_names
 
 IN_PLANE = ("t_x", "t_y", "r_z", "omega_zz")
 """Inertial loads of motion in the plane z = 0."""
@@ -84,14 +85,13 @@ def from_modal_body(body: ModalBody, *, is_planar: bool = False) -> Stiffening |
 
     With K of its d'Alembert loads: K_s,i = −K(t_i), K_r,i = −K(r_i), K_ω,ii = K(omega_ii), K_ω,ij = ½ K(omega_ij).
     """
-    pairs = {"xx": (0, 0), "yy": (1, 1), "zz": (2, 2), "xy": (0, 1), "xz": (0, 2), "yz": (1, 2)}
-    inertial = [f"t_{axis}" for axis in "xyz"] + [f"r_{axis}" for axis in "xyz"] + [f"omega_{pair}" for pair in pairs]
+    inertial = unit_load_names(())
     if any(load not in body.geometric_stiffness for load in (IN_PLANE if is_planar else inertial)):
         return None
     zero = np.zeros((body.mode_count, body.mode_count))
     K = dict.fromkeys(inertial, zero) | dict(body.geometric_stiffness)
     K_omega = np.zeros((3, 3, body.mode_count, body.mode_count))
-    for pair, (i, j) in pairs.items():
+    for pair, (i, j) in PAIRS.items():
         K_omega[i, j] = K_omega[j, i] = K[f"omega_{pair}"] * (1.0 if i == j else 0.5)
     K_r = -np.array([K[f"r_{axis}"] for axis in "xyz"])
     # J_ij = … − pᵀK_ω,ij p and h_a = … − pᵀK_r,a by their integrals of x_k G_l
@@ -100,11 +100,12 @@ def from_modal_body(body: ModalBody, *, is_planar: bool = False) -> Stiffening |
         - K_omega
         + 0.5 * np.einsum("abc,amn->bcmn", LEVI_CIVITA, K_r)
     )
-    loads = [f"{kind}/{{}}/{axis}" for kind in ("force", "moment") for axis in "xyz"]
+    loads = {name: interface_load_names([name]) for name in body.interfaces}
+    needed = (0, 1, 5) if is_planar else range(6)
     points = {
-        name: np.array([K.get(load.format(name), zero) for load in loads])
-        for name in body.interfaces
-        if all(load.format(name) in K for load in ([loads[k] for k in (0, 1, 5)] if is_planar else loads))
+        name: np.array([K.get(load, zero) for load in of_name])
+        for name, of_name in loads.items()
+        if all(of_name[k] in K for k in needed)
     }
     K_s = -np.array([K[f"t_{axis}"] for axis in "xyz"])
     return Stiffening(K_s, K_x, MappingProxyType(points), np.zeros_like(K_x))
