@@ -112,8 +112,52 @@ class ClosedLoop(SampledAnalysis):
     """
 
     def run(self, context: ActuatedContext) -> Outcome:
-        """Motion and commands."""
-        return run_closed_loop(context, self)
+        """The closed loop about the motion of an inverse analysis, from its initial state.
+
+        The run's details are a `LoopRecord`. One that diverges ends there and is kept. Raises `InputError` for
+        controllers that do not fit the robot, `SolveError` where a user's function fails.
+        """
+        assert self.actuation is not None
+        source = context.outcomes[self.actuation]
+        plant, robot, whole = _plant(context, source), _robot(context, source), context.whole
+        given, more = (
+            [s for sensor in sensors for s in make_signals(plant.model, context.patches, sensor, whole)]
+            for sensors in (self.sensor, needed_sensors(robot, self.controller))
+        )
+        read = merged(given, more)
+        sensing = Sensing(plant.model, read)
+        outputs, tip = replay_times(source, self), place_of(whole, self.tip) or _default_tip(plant.model)
+        models = loop_models(plant.model, source.time, plant.source)
+        place_at = _place_of_tip(self, plant.model, source, tip)
+        lowest = lowest_frequency(models, self.controller, self.sample_time, self.delay)
+        times, rows = times_of_run(outputs, place_at, lowest)
+        setup = _setup(context, self, source, robot, plant, read, outputs, sensing.read(*plant.source[:3]))
+        acting = [make_controller(record, setup, self.controller) for record in self.controller]
+        limit = np.full(len(setup.inputs), np.inf) if self.unlimited else _limits(context)
+        loop = Loop(setup, read, acting, limit, self.seed)
+        splits = plant.model.tree.n_q, plant.model.tree.n_q + plant.model.tree.n_v
+
+        def at_sample(k: int, t: float, state: Array) -> Array:
+            return loop(k, t, sensing.read(*(part[None] for part in np.split(state, splits)))[0])
+
+        held = partial(held_commands, setup=setup, loop=loop)
+        before, inputs = partial(held, after=-1e-9), actuator_commands(plant.model, context.patches)
+        control = Control(inputs, loop.first, setup.times, self.delay, at_sample, before)
+        disturbing = ((place_of(whole, str(load.point)), load.components) for load in self.disturbance)
+        drives = Drives(at_points=tuple(PointDrive(*load) for load in disturbing))
+        run = drive_robot(
+            plant.model, self, _start(context, self, plant), context.progress, drives=drives, times=times,
+            control=control,
+        )  # fmt: skip
+        closer, run = run.closer, run.at([k for k in rows if k < len(run.time)])
+        runs = _followed(run, place_at, held, tip), _followed(closer, place_at, held, tip)
+        record = loop_record(self, setup, loop, acting, runs, models, lowest, gears=bool(plant.model.tree.gears))
+
+        def completed(of: Outcome) -> Outcome:
+            commanded = _by_joint(context.model, held(of.time))
+            return replace(of, forces=replace(of.forces, commanded=commanded), details=record)
+
+        return replace(completed(run), look_closer=lambda: completed(closer))
 
 
 class _Plant(NamedTuple):
@@ -126,55 +170,6 @@ class _Plant(NamedTuple):
 
     model: Model
     source: MotorCoordinates
-
-
-def run_closed_loop(context: ActuatedContext, analysis: ClosedLoop) -> Outcome:
-    """The closed loop of `analysis` about the motion of an inverse analysis, from its initial state.
-
-    The run's details are a `LoopRecord`. One that diverges ends there and is kept. Raises `InputError` for controllers
-    that do not fit the robot, `SolveError` where a user's function fails.
-    """
-    assert analysis.actuation is not None
-    source = context.outcomes[analysis.actuation]
-    plant, robot, whole = _plant(context, source), _robot(context, source), context.whole
-    given, more = (
-        [s for sensor in sensors for s in make_signals(plant.model, context.patches, sensor, whole)]
-        for sensors in (analysis.sensor, needed_sensors(robot, analysis.controller))
-    )
-    read = merged(given, more)
-    sensing = Sensing(plant.model, read)
-    outputs, tip = replay_times(source, analysis), place_of(whole, analysis.tip) or _default_tip(plant.model)
-    models = loop_models(plant.model, source.time, plant.source)
-    place_at = _place_of_tip(analysis, plant.model, source, tip)
-    lowest = lowest_frequency(models, analysis.controller, analysis.sample_time, analysis.delay)
-    times, rows = times_of_run(outputs, place_at, lowest)
-    setup = _setup(context, analysis, source, robot, plant, read, outputs, sensing.read(*plant.source[:3]))
-    acting = [make_controller(record, setup, analysis.controller) for record in analysis.controller]
-    limit = np.full(len(setup.inputs), np.inf) if analysis.unlimited else _limits(context)
-    loop = Loop(setup, read, acting, limit, analysis.seed)
-    splits = plant.model.tree.n_q, plant.model.tree.n_q + plant.model.tree.n_v
-
-    def at_sample(k: int, t: float, state: Array) -> Array:
-        return loop(k, t, sensing.read(*(part[None] for part in np.split(state, splits)))[0])
-
-    held = partial(held_commands, setup=setup, loop=loop)
-    before, inputs = partial(held, after=-1e-9), actuator_commands(plant.model, context.patches)
-    control = Control(inputs, loop.first, setup.times, analysis.delay, at_sample, before)
-    disturbing = ((place_of(whole, str(load.point)), load.components) for load in analysis.disturbance)
-    drives = Drives(at_points=tuple(PointDrive(*load) for load in disturbing))
-    run = drive_robot(
-        plant.model, analysis, _start(context, analysis, plant), context.progress, drives=drives, times=times,
-        control=control,
-    )  # fmt: skip
-    closer, run = run.closer, run.at([k for k in rows if k < len(run.time)])
-    runs, gears = (_followed(run, place_at, held, tip), _followed(closer, place_at, held, tip)), plant.model.tree.gears
-    record = loop_record(analysis, setup, loop, acting, runs, models, lowest, gears=bool(gears))
-
-    def completed(of: Outcome) -> Outcome:
-        commanded = _by_joint(context.model, held(of.time))
-        return replace(of, forces=replace(of.forces, commanded=commanded), details=record)
-
-    return replace(completed(run), look_closer=lambda: completed(closer))
 
 
 def _robot(context: ActuatedContext, source: Outcome) -> Robot:

@@ -85,52 +85,47 @@ class Fcid(TimedAnalysis):
                 yield f"modal.{body}[{k}]", function, 2
 
     def run(self, context: Context) -> Outcome:
-        """Motion and forces."""
-        return run_fcid(context, self)
+        """Motion and forces for the trajectories and the prescribed shape.
 
+        Raises `InputError` where the trajectories do not fix the motion of the mechanism or cannot be followed,
+        `SolveError` where no posture, or no static shape, is found.
+        """
+        refuse_prescribed_motors(context.model, self)
+        model = resolved(context.model, self.last_time)
+        check_reach(model, self.last_time)
+        q = undeformed_posture(model).q
+        warnings = tuple(check_path(model, q, self.last_time))
+        freedom, rows = mobility(model, q).freedom, int(np.count_nonzero(~model.loop_rows))
+        if rows != freedom:
+            raise InputError(
+                f'{model.scene.path}: analysis "{self.name}": kind: expected as many trajectory components as the'
+                f' mechanism has degrees of freedom ({freedom}) for "fcid", found {rows}'
+            )
 
-def run_fcid(context: Context, analysis: Fcid) -> Outcome:
-    """Motion and forces for the trajectories and the shape that the analysis prescribes.
+        def equations() -> _core.SpatialPrescribedMotion:
+            return _core.SpatialPrescribedMotion(driven_mechanism(model), q)
 
-    Raises `InputError` where the trajectories do not fix the motion of the mechanism or cannot be followed,
-    `SolveError` where no posture, or no static shape, is found.
-    """
-    refuse_prescribed_motors(context.model, analysis)
-    model = resolved(context.model, analysis.last_time)
-    check_reach(model, analysis.last_time)
-    q = undeformed_posture(model).q
-    warnings = tuple(check_path(model, q, analysis.last_time))
-    freedom, rows = mobility(model, q).freedom, int(np.count_nonzero(~model.loop_rows))
-    if rows != freedom:
-        raise InputError(
-            f'{model.scene.path}: analysis "{analysis.name}": kind: expected as many trajectory components as the'
-            f' mechanism has degrees of freedom ({freedom}) for "fcid", found {rows}'
-        )
+        began = time.perf_counter()
+        has_motors = sum(len(columns) for columns in model.motors.values()) == freedom
+        motion = prescribed_by(fastest_mechanism(model, has_motors=has_motors), q)
+        shape = _shape(context, self, motion, q)
 
-    def equations() -> _core.SpatialPrescribedMotion:
-        return _core.SpatialPrescribedMotion(driven_mechanism(model), q)
+        def at(times: Array) -> Outcome:
+            found = prescribed_motion(model, motion, sampled(shape, times), times, q[None])
+            return Outcome(
+                analysis=self, model=model, forces=Forces(required=found.required),
+                motion=Motion(times, found.q, found.v, found.a, found.multipliers),
+                statistics=Statistics(warnings=warnings), prescribed=Prescription(equations, shape, q),
+            )  # fmt: skip
 
-    began = time.perf_counter()
-    has_motors = sum(len(columns) for columns in model.motors.values()) == freedom
-    motion = prescribed_by(fastest_mechanism(model, has_motors=has_motors), q)
-    shape = _shape(context, analysis, motion, q)
+        run = at(self.times)
+        run = replace(run, statistics=replace(run.statistics, wall_seconds=time.perf_counter() - began))
 
-    def at(times: Array) -> Outcome:
-        found = prescribed_motion(model, motion, sampled(shape, times), times, q[None])
-        return Outcome(
-            analysis=analysis, model=model, forces=Forces(required=found.required),
-            motion=Motion(times, found.q, found.v, found.a, found.multipliers),
-            statistics=Statistics(warnings=warnings), prescribed=Prescription(equations, shape, q),
-        )  # fmt: skip
+        @cache
+        def look_closer() -> Outcome:
+            return at(path_times(run.time, model.scene.trajectory, self.end))
 
-    run = at(analysis.times)
-    run = replace(run, statistics=replace(run.statistics, wall_seconds=time.perf_counter() - began))
-
-    @cache
-    def look_closer() -> Outcome:
-        return at(path_times(run.time, model.scene.trajectory, analysis.end))
-
-    return replace(run, look_closer=look_closer)
+        return replace(run, look_closer=look_closer)
 
 
 def _shape(context: Context, analysis: Fcid, motion: PrescribedMotion, q: Array) -> Shape:

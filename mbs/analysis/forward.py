@@ -60,8 +60,31 @@ class Forward(ActuatedAnalysis):
         return self
 
     def run(self, context: Context) -> Outcome:
-        """Motion alone: nothing is specified."""
-        return run_forward(context, self)
+        """Motion alone: nothing is specified. With an actuation it starts where the earlier analysis did.
+
+        Raises `InputError` where what is to be applied does not fit the robot, `SolveError` where there is no
+        equilibrium to start from.
+        """
+        model, progress = with_compliance(without_paths(context.model)), context.progress
+        if self.actuation is None:
+            start = initial_state(model)
+            texts = tuple(hanging_joints(model, start))
+            return drive_robot(model, self, start, progress, warnings=texts, earlier=context.earlier)
+        source = context.outcomes[self.actuation]
+        if model.tree.gears and not source.model.tree.gears:
+            return _behind_gears(source, model, self, context)
+        replayed = _replayed(context, source, self)
+        if self.apply == "trajectory" and source.recording is not None:  # others may ring where `source` did not
+            replayed = replayed._replace(integrator=source.statistics.integrator.at_end)
+        run = drive_robot(
+            model, self, State(source.q[0], source.v[0]), progress,
+            drives=Drives(replayed=replayed), times=replay_times(source, self), earlier=context.earlier,
+        )  # fmt: skip
+        if self.apply == "trajectory":  # others act without what makes up for vibrations
+            statistics = run.statistics
+            warnings = (*statistics.warnings, *left_paths(source, run))
+            run = replace(run, statistics=replace(statistics, warnings=warnings))
+        return run
 
     def needs(self) -> Iterator[Need]:
         """Patches or points for what is applied by them."""
@@ -78,34 +101,6 @@ class Forward(ActuatedAnalysis):
                 f'apply: expected {either(source.applicable)} with an analysis of kind "{source.kind}", found'
                 f' "{self.apply}"{why}'
             )
-
-
-def run_forward(context: Context, analysis: Forward) -> Outcome:
-    """Motion alone: nothing is specified. With an actuation it starts where the earlier analysis did.
-
-    Raises `InputError` where what is to be applied does not fit the robot, `SolveError` where there is no equilibrium
-    to start from.
-    """
-    model, progress = with_compliance(without_paths(context.model)), context.progress
-    if analysis.actuation is None:
-        start = initial_state(model)
-        texts = tuple(hanging_joints(model, start))
-        return drive_robot(model, analysis, start, progress, warnings=texts, earlier=context.earlier)
-    source = context.outcomes[analysis.actuation]
-    if model.tree.gears and not source.model.tree.gears:
-        return _behind_gears(source, model, analysis, context)
-    replayed = _replayed(context, source, analysis)
-    if analysis.apply == "trajectory" and source.recording is not None:  # others may ring where `source` did not
-        replayed = replayed._replace(integrator=source.statistics.integrator.at_end)
-    run = drive_robot(
-        model, analysis, State(source.q[0], source.v[0]), progress,
-        drives=Drives(replayed=replayed), times=replay_times(source, analysis), earlier=context.earlier,
-    )  # fmt: skip
-    if analysis.apply == "trajectory":  # others act without what makes up for vibrations
-        statistics = run.statistics
-        warnings = (*statistics.warnings, *left_paths(source, run))
-        run = replace(run, statistics=replace(statistics, warnings=warnings))
-    return run
 
 
 def _replayed(context: Context, source: Outcome, analysis: Forward) -> Replayed:

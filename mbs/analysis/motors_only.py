@@ -177,50 +177,46 @@ class MotorsOnly(TimedAnalysis):
         yield Need("kind", self.kind, "trajectory")
 
     def run(self, context: Context) -> Outcome:
-        """Motion and moments."""
-        return run_motors_only(context, self)
+        """Motion and motor forces for the trajectories, no other force acting; before and after the path it is held.
 
+        Raises `InputError` for a path that is not at rest where it has to be, motors that do not fit, a path out of
+        reach, and a given factor whose output is not minimum phase; `SolveError` where no equilibrium or no motion is
+        found.
+        """
+        model, began, reached = context.model, time.perf_counter(), 0.0
+        place = where(model.scene.path, self)
 
-def run_motors_only(context: Context, analysis: MotorsOnly) -> Outcome:
-    """Motion and motor forces for the trajectories, no other force acting; before and after the path it is held.
+        def progress(t: float | None = None) -> bool:
+            nonlocal reached
+            reached = reached if t is None else t
+            return context.progress(reached)
 
-    Raises `InputError` for a path that is not at rest where it has to be, motors that do not fit, a path out of reach,
-    and a given factor whose output is not minimum phase; `SolveError` where no equilibrium or no motion is found.
-    """
-    model, began, reached = context.model, time.perf_counter(), 0.0
-    place = where(model.scene.path, analysis)
+        refuse_prescribed_motors(model, self)
+        try:
+            servo, linear = choose_output(partial(make_servo, model, self.end, place, progress), self)
+            needs_future = bool(linear.is_future[0].any())
+            check_rest(servo, self, rests(self, needs_future))
+            given = self.pre_actuation, self.post_actuation
+            pre, post = durations(linear, given, self.output_step, needs_future=needs_future)
+            inversion = invert(servo, linear, pre, post, self.tolerance, progress)
+        except Stopped:
+            raise SolveError(f"{place}: stopped on request before any of its motion was found") from None
+        times = output_times(self.end, self.output_step, pre, post)
+        times = times[times <= inversion.curve.x[-1] + 1e-9 * self.end]  # what an integration reached
+        run = _run(self, model, inversion, times)
+        if not len(run.time):
+            raise SolveError(f"{servo.where}: no motion was found ({inversion.status}): {cause_of(inversion)}")
+        seconds = time.perf_counter() - began
 
-    def progress(t: float | None = None) -> bool:
-        nonlocal reached
-        reached = reached if t is None else t
-        return context.progress(reached)
+        around = AroundPath(pre_actuation=pre, post_actuation=post, inversion=inversion, held=inversion.servo.model)
 
-    refuse_prescribed_motors(model, analysis)
-    try:
-        servo, linear = choose_output(partial(make_servo, model, analysis.end, place, progress), analysis)
-        needs_future = bool(linear.is_future[0].any())
-        check_rest(servo, analysis, rests(analysis, needs_future))
-        given = analysis.pre_actuation, analysis.post_actuation
-        pre, post = durations(linear, given, analysis.output_step, needs_future=needs_future)
-        inversion = invert(servo, linear, pre, post, analysis.tolerance, progress)
-    except Stopped:
-        raise SolveError(f"{place}: stopped on request before any of its motion was found") from None
-    times = output_times(analysis.end, analysis.output_step, pre, post)
-    times = times[times <= inversion.curve.x[-1] + 1e-9 * analysis.end]  # what an integration reached
-    run = _run(analysis, model, inversion, times)
-    if not len(run.time):
-        raise SolveError(f"{servo.where}: no motion was found ({inversion.status}): {cause_of(inversion)}")
-    seconds = time.perf_counter() - began
+        @cache
+        def look_closer() -> Outcome:
+            between = path_times(run.time, model.scene.trajectory, self.end)
+            return replace(_run(self, model, inversion, between), details=around)
 
-    around = AroundPath(pre_actuation=pre, post_actuation=post, inversion=inversion, held=inversion.servo.model)
-
-    @cache
-    def look_closer() -> Outcome:
-        between = path_times(run.time, model.scene.trajectory, analysis.end)
-        return replace(_run(analysis, model, inversion, between), details=around)
-
-    statistics = replace(run.statistics, wall_seconds=seconds, warnings=_warnings(inversion, run))
-    return replace(run, details=around, statistics=statistics, look_closer=look_closer)
+        statistics = replace(run.statistics, wall_seconds=seconds, warnings=_warnings(inversion, run))
+        return replace(run, details=around, statistics=statistics, look_closer=look_closer)
 
 
 def _run(analysis: MotorsOnly, model: Model, inversion: Inversion[Servo], times: Array) -> Outcome:

@@ -36,21 +36,16 @@ class Pcid(IntegratedAnalysis):
         yield Need("kind", self.kind, "trajectory")
 
     def run(self, context: Context) -> Outcome:
-        """Motion and forces."""
-        return run_pcid(context, self)
+        """C_m and C_s hold, p is free; and compliant gears, where motors follow the trajectories.
 
-
-def run_pcid(context: Context, analysis: IntegratedAnalysis) -> Outcome:
-    """C_m and C_s hold, p is free; and compliant gears, where motors follow the trajectories.
-
-    Raises `InputError` where the trajectories cannot be followed, `SolveError` where there is no equilibrium to start
-    from.
-    """
-    rigid = resolved(context.model, analysis.last_time)
-    check_reach(rigid, analysis.last_time)
-    warnings = tuple(check_path(rigid, undeformed_posture(rigid).q, analysis.last_time))
-    model = with_prescribed_motors(rigid)
-    return drive_robot(
-        model, analysis, initial_state(model), context.progress, warnings=warnings, earlier=context.earlier,
-        is_recorded=context.is_replayed,
-    )  # fmt: skip
+        Raises `InputError` where the trajectories cannot be followed, `SolveError` where there is no equilibrium to
+        start from.
+        """
+        rigid = resolved(context.model, self.last_time)
+        check_reach(rigid, self.last_time)
+        warnings = tuple(check_path(rigid, undeformed_posture(rigid).q, self.last_time))
+        model = with_prescribed_motors(rigid)
+        return drive_robot(
+            model, self, initial_state(model), context.progress, warnings=warnings, earlier=context.earlier,
+            is_recorded=context.is_replayed,
+        )  # fmt: skip

@@ -30,7 +30,7 @@ from ..solve.tracking import Limits, Objective, Tracked, Transition, Weights, tr
 from ..solve.tracking_intervals import SETTLED, refined, settled, start_breaks
 from ..solve.zero_dynamics import LIGHT, Linearisation, Stopped, equilibrium, linearise
 from .context import Context, PatchedLink
-from .forward import Forward, run_forward
+from .forward import Forward
 from .motors_only import AroundPath, check_rest, durations, where
 from .outcome import Forces, Motion, Outcome, Prescription, Statistics
 from .samples import path_times
@@ -336,7 +336,7 @@ def _with_torques_alone(context: Context, run: Outcome, around: TrackedPath) -> 
         name="torques alone", kind="forward", actuation=analysis.name, apply="joints", end=analysis.end,
         output_step=analysis.output_step, tolerance=min(analysis.tolerance, REPLAYED),
     )  # fmt: skip
-    replay = run_forward(replace(context, outcomes={analysis.name: run}, earlier=None), alone)
+    replay = alone.run(replace(context, outcomes={analysis.name: run}, earlier=None))
     if replay.failed:
         return around
     off = max(float(np.abs(of).max(initial=0.0)) for of in path_errors(around.held, replay.time, replay.q).values())

@@ -17,7 +17,7 @@ import pytest
 from bench.hand_written import STEPS, TIME, HandWritten, evaluation_seconds, general_state
 from ffrobot.common.errors import InputError
 from ffrobot.mbs.analysis.context import Context
-from ffrobot.mbs.analysis.pcid import Pcid, run_pcid
+from ffrobot.mbs.analysis.pcid import Pcid
 from ffrobot.run.solve import prepare_scene
 from ffrobot.run.watcher import Watcher
 
@@ -83,7 +83,7 @@ def test_pcid_ratio(benchmark, two_link, program):
     outcomes, hand_written = [], []
 
     def both():
-        outcomes.append(run_pcid(context, analysis))
+        outcomes.append(analysis.run(context))
         hand_written.append(program(1, STEPS)[2:])
         return outcomes[-1].statistics.wall_seconds, hand_written[-1][0][0]
 

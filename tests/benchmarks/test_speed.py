@@ -34,8 +34,7 @@ from scipy.optimize import lsq_linear
 from bench.hand_written import TIME, evaluation_seconds, general_state, start_at_rest
 from ffrobot.mbs import _core
 from ffrobot.mbs.analysis.context import Context
-from ffrobot.mbs.analysis.fcid import Fcid, run_fcid
-from ffrobot.mbs.analysis.pcid import run_pcid
+from ffrobot.mbs.analysis.fcid import Fcid
 from ffrobot.run.solve import prepare_scene
 from ffrobot.run.watcher import Watcher
 
@@ -92,7 +91,7 @@ def test_right_hand_side(benchmark, scene):
 
 def test_pcid_of_one_second(benchmark, scene):
     context = context_of(scene)
-    outcome = benchmark(run_pcid, context, context.model.scene.analysis[0])
+    outcome = benchmark(context.model.scene.analysis[0].run, context)
     benchmark.extra_info |= {"steps": outcome.statistics.steps, "evaluations": outcome.statistics.evaluations}
     assert outcome.status == "completed"
     assert outcome.statistics.wall_seconds < 5 * outcome.statistics.evaluations * evaluation(context.model)
@@ -102,10 +101,10 @@ def test_pcid_of_one_second(benchmark, scene):
 def test_fcid_of_1000_outputs(benchmark, scene, shape, evaluations):
     context = context_of(scene)
     analysis = Fcid(name="fcid", kind="fcid", shape=shape, end=1.0, output_step=0.001)
-    outcome = benchmark(run_fcid, context, analysis)
+    outcome = benchmark(analysis.run, context)
     benchmark.extra_info |= {"solver": outcome.statistics.wall_seconds}
     assert len(outcome.time) == 1001
-    again = min(run_fcid(context, analysis).statistics.wall_seconds for _ in range(3))
+    again = min(analysis.run(context).statistics.wall_seconds for _ in range(3))
     assert again < evaluations * 1001 * evaluation(context.model)
 
 

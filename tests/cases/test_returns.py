@@ -10,9 +10,9 @@ from test_replays_3d import beam
 import ffrobot
 from ffrobot.mbs import _core
 from ffrobot.mbs.analysis.context import Context
-from ffrobot.mbs.analysis.fcid import Fcid, run_fcid
-from ffrobot.mbs.analysis.forward import Forward, run_forward
-from ffrobot.mbs.analysis.pcid import Pcid, run_pcid
+from ffrobot.mbs.analysis.fcid import Fcid
+from ffrobot.mbs.analysis.forward import Forward
+from ffrobot.mbs.analysis.pcid import Pcid
 from ffrobot.mbs.analysis.replay import motor_forces_of
 from ffrobot.mbs.fields.steps import Steps
 from ffrobot.mbs.model.frame_motors import motor_commands
@@ -75,7 +75,7 @@ def always(t):
 
 def inverse_of(model, tolerance, **keys):
     analysis = Pcid(name="inverse", kind="pcid", end=END, output_step=END / 50, tolerance=tolerance, **keys)
-    return run_pcid(Context(model=model, outcomes={}, progress=always, is_replayed=True), analysis)
+    return analysis.run(Context(model=model, outcomes={}, progress=always, is_replayed=True))
 
 
 def replay_of(model, inverse, apply, tolerance, patches=None, repeat_steps=None, **keys):
@@ -85,7 +85,7 @@ def replay_of(model, inverse, apply, tolerance, patches=None, repeat_steps=None,
     ).model_copy(update={"repeat_steps": repeat_steps})  # fmt: skip
     patches = full(model) if patches is None else patches
     context = Context(model=model, outcomes={"inverse": inverse}, progress=always, patches=patches)
-    found = run_forward(context, analysis)
+    found = analysis.run(context)
     assert found.status == "completed"
     return found
 
@@ -149,7 +149,7 @@ def test_loads_that_jump(solution):
 def test_a_prescribed_shape(solution, shape):
     """Links that ring in PCID keep it, held by forces on their modes."""
     analysis = Fcid(name="inverse", kind="fcid", shape=shape, end=END, output_step=END / 50)
-    inverse = run_fcid(Context(model=solution.model, outcomes={}, progress=always), analysis)
+    inverse = analysis.run(Context(model=solution.model, outcomes={}, progress=always))
     back = replay_of(solution.model, inverse, "joints+pzt", 1e-7)
     assert departure(inverse, back) < 1e-6
     modes = ~solution.model.tree.joint_columns

@@ -14,11 +14,9 @@ import numpy as np
 
 from ffrobot.bench.precision import Row
 from ffrobot.mbs.analysis.context import Context
-from ffrobot.mbs.analysis.pcid import run_pcid
 from ffrobot.mbs.model.body import Body, BodyPoint
 from ffrobot.mbs.model.model import Model, build_model
 from ffrobot.mbs.model.projection import projected
-from ffrobot.mbs.scene.analysis import IntegratedAnalysis
 from ffrobot.run.watcher import Watcher
 from ffrobot.scene.load import make_scene
 from ffrobot.scene.scene import Scene
@@ -119,9 +117,8 @@ def output_timer(outputs: int) -> Callable[[], float]:
     model = chain(2, MODES_IN_CHAINS, outputs=outputs)
     assert isinstance(model.scene, Scene)
     analysis = model.scene.analysis[0]
-    assert isinstance(analysis, IntegratedAnalysis)
     context = Context(model=model, outcomes={}, progress=lambda t: True)
-    return lambda: run_pcid(context, analysis).statistics.wall_seconds
+    return lambda: analysis.run(context).statistics.wall_seconds
 
 
 def measure_growth(repeat: int, display: Watcher) -> list[Row]:
