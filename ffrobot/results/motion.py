@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import h5py
 import numpy as np
@@ -119,7 +119,7 @@ def write_paths(group: h5py.Group, result: AnalysisResult) -> None:
         _write_path(entry, trajectory)
 
 
-def _write_zero_dynamics(group: h5py.Group, inversion: Inversion[Any]) -> None:
+def _write_zero_dynamics(group: h5py.Group, inversion: Inversion) -> None:
     """Of motors-only inverse dynamics: zero_dynamics/."""
     from ..mbs.analysis.motors_only import is_minimum_phase
 

@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, partial
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Literal, Self
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -27,9 +27,9 @@ from ..model.gears import refuse_prescribed_motors
 from ..model.model import Model, path_errors, without_paths
 from ..scene.analysis import Analysis, Check, Need, TimedAnalysis, output_times
 from ..solve.integrators import Choice
-from ..solve.servo import Servo, make_servo
-from ..solve.stable_inversion import Inversion, S, invert
-from ..solve.zero_dynamics import GROWTH, SAMPLES, Linearisation, Output, Stopped, is_unstable, linearise, shape_along
+from ..solve.servo import Servo, Stopped, make_servo
+from ..solve.stable_inversion import Inversion, invert
+from ..solve.zero_dynamics import GROWTH, SAMPLES, Linearisation, is_unstable, linearise, shape_along
 from .context import Context
 from .outcome import ADVICE, Details, Forces, Motion, Outcome, Prescription, Statistics
 from .samples import path_times
@@ -49,7 +49,7 @@ class AroundPath(Details):
     pre_actuation: float
     post_actuation: float
     held: Model = field(repr=False)
-    inversion: Inversion[Any] | None = field(default=None, repr=False)
+    inversion: Inversion | None = field(default=None, repr=False)
 
 
 def where(scene_path: Path, analysis: Analysis) -> str:
@@ -72,7 +72,7 @@ def describe_zeros(linear: Linearisation) -> str:
     return shown if len(shown) < 120 else ", ".join(shown.split(", ")[:4]) + f" … ({len(found)} in all)"
 
 
-def check_rest(servo: Output, analysis: TimedAnalysis, ends: Sequence[float]) -> None:
+def check_rest(servo: Servo, analysis: TimedAnalysis, ends: Sequence[float]) -> None:
     """Raise `InputError` for a path that moves at one of the `ends` (s), where the robot has to be at rest."""
     for target in servo.targets():
         values = target.function.sample(as_floats(np.linspace(0.0, analysis.end, 101)))[0]
@@ -106,7 +106,7 @@ def durations(
     return before, after
 
 
-def cause_of(inversion: Inversion[S]) -> str:
+def cause_of(inversion: Inversion) -> str:
     """Why no motion was found and when it was worst; where zeros change sides, no bounded one need exist."""
     linear = inversion.linearisation
     if inversion.status not in ("inversion not converged", "mesh too coarse"):
@@ -219,7 +219,7 @@ class MotorsOnly(TimedAnalysis):
         return replace(run, details=around, statistics=statistics, look_closer=look_closer)
 
 
-def _run(analysis: MotorsOnly, model: Model, inversion: Inversion[Servo], times: Array) -> Outcome:
+def _run(analysis: MotorsOnly, model: Model, inversion: Inversion, times: Array) -> Outcome:
     curve, servo = inversion.curve, inversion.servo
     modes = curve(times), curve.derivative(1)(times), curve.derivative(2)(times)
     found = servo.motion.motion(as_list(times), *modes, servo.postures(times))
@@ -241,7 +241,7 @@ def _run(analysis: MotorsOnly, model: Model, inversion: Inversion[Servo], times:
     )
 
 
-def _warnings(inversion: Inversion[Servo], run: Outcome) -> tuple[str, ...]:
+def _warnings(inversion: Inversion, run: Outcome) -> tuple[str, ...]:
     """How far a redefined output leaves the path itself."""
     texts = []
     if not run.failed and inversion.servo.factor < 1:
@@ -256,7 +256,7 @@ def _warnings(inversion: Inversion[Servo], run: Outcome) -> tuple[str, ...]:
     return tuple(texts)
 
 
-def choose_output(make: Callable[[float], S], analysis: MotorsOnly) -> tuple[S, Linearisation]:
+def choose_output(make: Callable[[float], Servo], analysis: MotorsOnly) -> tuple[Servo, Linearisation]:
     """The output the path is for: the point itself, or as near to it as is minimum phase or as the scene says.
 
     `make` gives the output of a factor.
@@ -285,7 +285,7 @@ def choose_output(make: Callable[[float], S], analysis: MotorsOnly) -> tuple[S, 
     )
 
 
-def _with_expected_deflections(servo: S, end: float) -> tuple[S, Linearisation]:
+def _with_expected_deflections(servo: Servo, end: float) -> tuple[Servo, Linearisation]:
     """The part of the deflections that the output leaves out, replaced by what the path's loads bend without vibration.
 
     A function of time alone: it changes the output's target, not its zeros.
@@ -297,7 +297,7 @@ def _with_expected_deflections(servo: S, end: float) -> tuple[S, Linearisation]:
     return servo, linearise(servo, end)
 
 
-def _check_relative_degree(servo: Output, linear: Linearisation) -> None:
+def _check_relative_degree(servo: Servo, linear: Linearisation) -> None:
     """Raise `InputError` where some time of the path the motors cannot accelerate its output."""
     values = np.linalg.svd(linear.dynamics.M, compute_uv=False)
     worst = int((values[:, -1] / values[:, 0]).argmin())

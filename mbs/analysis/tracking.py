@@ -24,11 +24,11 @@ from ..model.gears import elastic_joints
 from ..model.model import Model, modal_directions, path_errors, without_paths
 from ..scene.analysis import Check, Need, TimedAnalysis, output_times
 from ..solve.integrators import Choice
-from ..solve.servo import Servo, make_servo
+from ..solve.servo import Servo, Stopped, make_servo
 from ..solve.stable_inversion import shape_of
 from ..solve.tracking import Limits, Objective, Tracked, Transition, Weights, track
 from ..solve.tracking_intervals import SETTLED, refined, settled, start_breaks
-from ..solve.zero_dynamics import LIGHT, Linearisation, Stopped, equilibrium, linearise
+from ..solve.zero_dynamics import LIGHT, Linearisation, equilibrium, linearise
 from .context import Context, PatchedLink
 from .forward import Forward
 from .motors_only import AroundPath, check_rest, durations, where

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,13 +21,25 @@ from .posture import check_smooth, describe_posture, mobility, solve_posture
 from .prescribed import PrescribedMotion, following_motors
 from .reach import out_of_reach
 from .start import undeformed_posture
-from .zero_dynamics import Stopped, Target, by_differences, slopes_by_differences
 
 POSTURES = 201  # along the path, from which others are looked for
 EVERY = 10  # of these is looked at for singular ones
 PIECES = 400  # of a path that is slowed down
 TINY = 1e-12  # of its time
 MOST_STATES = 10_000  # that are evaluated at once, a fraction of a second
+DIFFERENCE = 1e-6  # of √J, by which a mode bends its link by about its length
+
+
+class Stopped(Exception):  # noqa: N818 (nothing is wrong)
+    """Whoever watches asked for an end."""
+
+
+class Target(NamedTuple):
+    """A function of time of a path: the trajectory that it is of, its component, and itself."""
+
+    owner: str
+    component: str
+    function: TimeFunction
 
 
 @dataclass(frozen=True)
@@ -60,7 +73,7 @@ class Servo:
 
     @property
     def mode_sizes(self) -> Array:
-        """√J of the bodies of all modes (n,), m·√kg."""
+        """√J of the bodies of all modes (n,), m·√kg: coordinates that bend a link by about its length."""
         nodes = self.model.tree.nodes
         largest = [np.linalg.eigvalsh(node.body.inertia)[-1] for node in nodes]
         return np.concatenate([np.full(node.body.n_modes, J**0.5) for node, J in zip(nodes, largest, strict=True)])
@@ -153,7 +166,7 @@ class Servo:
     def derivatives(self, times: Array, p: Array, v: Array, a: Array) -> tuple[Array, Array, Array]:
         """M, D and K (N, n, n) of these by p̈, ṗ and p: exact, unless motors turn frames or follow a redefined loop."""
         if not self._has_exact_slopes:
-            return by_differences(self, times, p, v, a)
+            return slopes_by_differences(self.residuals, self.mode_sizes, times, p, v, a)
         n = p.shape[1]
         M, D, K = self.slopes(times, p, v, a)
         return M[:, :n], D[:, :n], K[:, :n]
@@ -181,6 +194,33 @@ class Servo:
         found = self.motion.derivatives(as_list(times), p, v, a, self.postures(times))
         M, D, K = (x.reshape(len(times), -1, p.shape[1]) for x in found)
         return M, D, K
+
+
+def slopes_by_differences(
+    forces: Callable[[Array, Array, Array, Array], Array], sizes: Array, times: Array, p: Array, v: Array, a: Array
+) -> tuple[Array, Array, Array]:
+    """Derivatives (N, …, n) of `forces` (N, …) by p̈, ṗ and p; `sizes` (n,) of modes as in `Output.mode_sizes`."""
+    modes, one = np.array([p, v, a]), np.ones(p.shape[1])
+    K, D, M = (_derivative(forces, times, modes, k, step) for k, step in enumerate((DIFFERENCE * sizes, one, one)))
+    return M, D, K
+
+
+def stiffness(servo: Servo, times: Array, p: Array) -> Array:
+    """K (N, n, n) alone, at times (N,) and p (N, n) at rest."""
+    rest = np.array([p, 0 * p, 0 * p])
+    return _derivative(servo.residuals, times, rest, 0, DIFFERENCE * servo.mode_sizes)
+
+
+def _derivative(
+    forces: Callable[[Array, Array, Array, Array], Array], times: Array, modes: Array, k: int, step: Array
+) -> Array:
+    """Of `forces` by modes[k] (N, …, n), about `modes` (3, N, n)."""
+    n = len(step)
+    moved = np.repeat(modes[:, :, None], 2 * n, axis=2)
+    moved[k] += np.concatenate([np.diag(step), -np.diag(step)])
+    r = forces(np.repeat(times, 2 * n), *moved.reshape(3, -1, n)).reshape(len(times), 2, n, -1)
+    found: Array = ((r[:, 0] - r[:, 1]) / (2 * step[:, None])).transpose(0, 2, 1)
+    return found
 
 
 def make_servo(

@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import TYPE_CHECKING, Generic, TypeVar
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -20,7 +20,8 @@ from ...common.arrays import Array, Booleans, ComplexArray, as_floats
 from ...common.errors import SolveError
 from .. import _core
 from .collocation import GAUSS, OF_SECOND_ORDER, Boundary, Problem, collocate
-from .zero_dynamics import LinearDynamics, Linearisation, Output, Stopped, equilibrium, first_order, linear_dynamics
+from .servo import Servo, Stopped
+from .zero_dynamics import LinearDynamics, Linearisation, equilibrium, first_order, linear_dynamics
 
 if TYPE_CHECKING:
     from scipy.interpolate import PPoly
@@ -42,11 +43,8 @@ Derivatives = Callable[[Array], tuple[Array, Array, Array]]
 """M, D and K, each (N, n, n), at any times (N,)."""
 
 
-S = TypeVar("S", bound=Output)
-
-
 @dataclass(frozen=True)
-class Inversion(Generic[S]):
+class Inversion:
     """p(t) from −pre to end + post, and how it was found.
 
     `unmet` is the largest modal force that nobody supplies between collocation points, relative to the largest elastic
@@ -54,7 +52,7 @@ class Inversion(Generic[S]):
     start is: ‖(ω(p − p_0), ṗ)‖ relative to its peak.
     """
 
-    servo: S
+    servo: Servo
     linearisation: Linearisation
     curve: PPoly
     status: str
@@ -79,8 +77,8 @@ def shape_of(curve: PPoly, counts: Sequence[int]) -> list[list[_core.TimeFunctio
 
 
 def invert(
-    servo: S, linear: Linearisation, pre: float, post: float, tolerance: float, progress: Callable[[float], bool]
-) -> Inversion[S]:
+    servo: Servo, linear: Linearisation, pre: float, post: float, tolerance: float, progress: Callable[[float], bool]
+) -> Inversion:
     """Solve r(t, p, ṗ, p̈) = 0 on [−pre, end + post] until nothing above `tolerance` is left between the breaks.
 
     Raises `SolveError` where there is no equilibrium to start from or to end in, or where zeros change sides.
@@ -197,13 +195,13 @@ class _Solver:
         return largest
 
 
-def _along(servo: Output, states: States, breaks: Array) -> Derivatives:
+def _along(servo: Servo, states: States, breaks: Array) -> Derivatives:
     """Those about the motion `states`, at most `MOST_PLACES` breaks."""
     times = breaks[:: -(-len(breaks) // MOST_PLACES)]
     return linear_dynamics(servo, times, *states(times))
 
 
-def _about(servo: Output, along: LinearDynamics, t: float, y: Array) -> Derivatives:
+def _about(servo: Servo, along: LinearDynamics, t: float, y: Array) -> Derivatives:
     """Those `along` the path, with what the state y (2n,) at time t changes of them."""
     now, (p, v) = np.array([t]), y.reshape(2, 1, -1)
     here = linear_dynamics(servo, now, p, v, 0 * p)
@@ -216,7 +214,7 @@ def _about(servo: Output, along: LinearDynamics, t: float, y: Array) -> Derivati
     return derivatives
 
 
-def _boundaries(servo: Output, linear: Linearisation, first: float, last: float) -> tuple[Boundary, Boundary]:
+def _boundaries(servo: Servo, linear: Linearisation, first: float, last: float) -> tuple[Boundary, Boundary]:
     """What holds at the times `first` and `last`, 2n conditions in all.
 
     A zero that passes through infinity takes a condition away, or brings one: p̈ of a fast motion loses its factor
@@ -241,7 +239,7 @@ def _boundaries(servo: Output, linear: Linearisation, first: float, last: float)
     return found[0], found[1]
 
 
-def _boundary(servo: Output, t: float, s: ComplexArray, is_held: Booleans, count: int) -> Boundary:
+def _boundary(servo: Servo, t: float, s: ComplexArray, is_held: Booleans, count: int) -> Boundary:
     """No part of y − y_rest in the subspace of the zeros s (2n,) that are held, of the equilibrium at time t.
 
     An orthonormal basis of the left invariant subspace, from the ordered Schur form of 𝒜ᵀ with eigenvalues near s;
@@ -309,7 +307,7 @@ def _states(curve: PPoly) -> States:
     return lambda times: (curve(times), rate(times), acceleration(times))
 
 
-def _off_rest(servo: Output, curve: PPoly, rest: Array) -> float:
+def _off_rest(servo: Servo, curve: PPoly, rest: Array) -> float:
     p, v, _ = _states(curve)(curve.x)
     size = np.hypot(np.linalg.norm(servo.scale * (p - rest[: p.shape[1]]), axis=1), np.linalg.norm(v, axis=1))
     return float(size[0] / max(float(size.max()), TINY))

@@ -12,14 +12,15 @@ sag. Links rest at both ends. Output transition with free internal states: Perez
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Literal, Protocol
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
 from ...common.arrays import Array, Indices
 from .collocation import GAUSS, Elimination, piecewise, stage_states
 from .interior_point import GAP, Minimum, Program, minimize
-from .zero_dynamics import Output, shape_along
+from .servo import Servo
+from .zero_dynamics import shape_along
 
 if TYPE_CHECKING:
     from scipy.interpolate import PPoly
@@ -32,18 +33,6 @@ UNIQUE = 1e-7  # of the effort, which chooses among motions of the same least sh
 FEWEST_ITERATIONS = 6  # after which Newton's steps are taken to wander among these motions
 WANDERING = (1e-2, 1e-3)  # of the effort, one after the other, where they do
 WHILE_SETTLING = 1e-4  # of the last change of a share by Newton's steps, relative, where intervals are to change
-
-
-class Driven(Output, Protocol):
-    """A path that motors and patches carry."""
-
-    def forces(self, times: Array, p: Array, v: Array, a: Array, /) -> tuple[Array, Array]:
-        """Forces r (N, n) on modes that motors leave, and their torques τ (N, motors), at `times` (N,)."""
-        ...
-
-    def slopes(self, times: Array, p: Array, v: Array, a: Array, /) -> tuple[Array, Array, Array]:
-        """Derivatives (N, n + motors, n) of (r, τ) by p̈, ṗ and p."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -70,7 +59,7 @@ class Transition:
     `rate` is that of the slowest zero, 1/s: voltages matter less by e^{−rate t} at the time t from the nearer end.
     """
 
-    driven: Driven
+    driven: Servo
     Phi_V: Array  # (n, m)
     limits: Limits
     weights: Weights

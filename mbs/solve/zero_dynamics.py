@@ -11,91 +11,19 @@ vanish: the zero dynamics about a path that is held (Blajer and Kolodziejczyk 20
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple, Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...common.arrays import Array, Booleans, ComplexArray, as_floats
 from ...common.errors import SolveError
-from .._core import TimeFunction
+from .servo import Servo, stiffness
 
-DIFFERENCE = 1e-6  # of √J, by which a mode bends its link by about its length
 MOST_ITERATIONS = 50
 TOLERANCE = 1e-12  # of an equilibrium's last Newton step
 CENTRE = 1e-6  # |Re s| / |s| of zeros that count as undamped
-
-
-class Stopped(Exception):  # noqa: N818 (nothing is wrong)
-    """Whoever watches asked for an end."""
-
-
-class Target(NamedTuple):
-    """A function of time of a path: the trajectory that it is of, its component, and itself."""
-
-    owner: str
-    component: str
-    function: TimeFunction
-
-
-class Output(Protocol):
-    """A path that motors alone are to carry; `factor` and `offset` as in `servo.Servo`."""
-
-    @property
-    def factor(self) -> float:
-        """Share of the deflections in what follows the path."""
-        ...
-
-    @property
-    def scale(self) -> Array:
-        """Frequencies ω of all modes (n,), rad/s."""
-        ...
-
-    @property
-    def mode_sizes(self) -> Array:
-        """√J of the bodies of all modes (n,), m·√kg: coordinates that bend a link by about its length."""
-        ...
-
-    @property
-    def where(self) -> str:
-        """The scene, and the analysis where it is known, for messages."""
-        ...
-
-    @property
-    def mode_counts(self) -> list[int]:
-        """By body."""
-        ...
-
-    @property
-    def doubt(self) -> str:
-        """What is wrong with postures along the path; "" where nothing is."""
-        ...
-
-    def residuals(self, times: Array, p: Array, v: Array, a: Array, /) -> Array:
-        """Forces r (N, n) on modes that nobody supplies, at `times` (N,), p, ṗ and p̈ (N, n); NaN out of reach.
-
-        May raise `Stopped`.
-        """
-        ...
-
-    def derivatives(self, times: Array, p: Array, v: Array, a: Array, /) -> tuple[Array, Array, Array]:
-        """M, D and K, (N, n, n) each: derivatives of these by p̈, ṗ and p; exact, or `by_differences`."""
-        ...
-
-    def targets(self) -> Iterator[Target]:
-        """What the path follows."""
-        ...
-
-    def with_factor(self, factor: float) -> Self:
-        """The same with another factor."""
-        ...
-
-    def with_offset(self, offset: tuple[TimeFunction, ...]) -> Self:
-        """The same with what is expected of the deflections that the output leaves out."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -117,44 +45,12 @@ class LinearDynamics:
         return M, D, K
 
 
-def linear_dynamics(servo: Output, times: Array, p: Array, v: Array, a: Array) -> LinearDynamics:
+def linear_dynamics(servo: Servo, times: Array, p: Array, v: Array, a: Array) -> LinearDynamics:
     """Derivatives of r at N nodes: times (N,), p, ṗ, p̈ (N, n)."""
     return LinearDynamics(times, *servo.derivatives(times, p, v, a))
 
 
-def by_differences(servo: Output, times: Array, p: Array, v: Array, a: Array) -> tuple[Array, Array, Array]:
-    """M, D and K by central differences; r is quadratic in ṗ and linear in p̈, so that these are exact there."""
-    return slopes_by_differences(servo.residuals, servo.mode_sizes, times, p, v, a)
-
-
-def slopes_by_differences(
-    forces: Callable[[Array, Array, Array, Array], Array], sizes: Array, times: Array, p: Array, v: Array, a: Array
-) -> tuple[Array, Array, Array]:
-    """Derivatives (N, …, n) of `forces` (N, …) by p̈, ṗ and p; `sizes` (n,) of modes as in `Output.mode_sizes`."""
-    modes, one = np.array([p, v, a]), np.ones(p.shape[1])
-    K, D, M = (_derivative(forces, times, modes, k, step) for k, step in enumerate((DIFFERENCE * sizes, one, one)))
-    return M, D, K
-
-
-def stiffness(servo: Output, times: Array, p: Array) -> Array:
-    """K (N, n, n) alone, at times (N,) and p (N, n) at rest."""
-    rest = np.array([p, 0 * p, 0 * p])
-    return _derivative(servo.residuals, times, rest, 0, DIFFERENCE * servo.mode_sizes)
-
-
-def _derivative(
-    forces: Callable[[Array, Array, Array, Array], Array], times: Array, modes: Array, k: int, step: Array
-) -> Array:
-    """Of `forces` by modes[k] (N, …, n), about `modes` (3, N, n)."""
-    n = len(step)
-    moved = np.repeat(modes[:, :, None], 2 * n, axis=2)
-    moved[k] += np.concatenate([np.diag(step), -np.diag(step)])
-    r = forces(np.repeat(times, 2 * n), *moved.reshape(3, -1, n)).reshape(len(times), 2, n, -1)
-    found: Array = ((r[:, 0] - r[:, 1]) / (2 * step[:, None])).transpose(0, 2, 1)
-    return found
-
-
-def equilibrium(servo: Output, t: float) -> Array:
+def equilibrium(servo: Servo, t: float) -> Array:
     """Shape p (n,) at rest under path and loads as at time t. Raises `SolveError` where there is none."""
     p: Array = np.zeros((1, len(servo.scale)))
     rest, now = np.zeros_like(p), np.array([t])
@@ -172,7 +68,7 @@ def equilibrium(servo: Output, t: float) -> Array:
     raise SolveError(f"{servo.where}: no equilibrium under the motors was found at t = {t:g} s: {cause}")
 
 
-def cause_in_posture(servo: Output) -> str:
+def cause_in_posture(servo: Servo) -> str:
     """Why links that bend leave an output without a posture, and the cure, where postures are it; else ""."""
     return servo.doubt and f"{servo.doubt}, and cannot where links bend. Move the path, or start in another posture"
 
@@ -284,7 +180,7 @@ class Linearisation:
         return self.dynamics.times
 
 
-def shape_along(servo: Output, times: Array) -> Array:
+def shape_along(servo: Servo, times: Array) -> Array:
     """P (N, n) of links that follow their loads at `times` (N,) as springs would: r(t, p, 0, 0) = 0.
 
     Raises `SolveError` where they are too soft for that.
@@ -297,7 +193,7 @@ def shape_along(servo: Output, times: Array) -> Array:
     return p
 
 
-def linearise(servo: Output, end: float, samples: int = SAMPLES) -> Linearisation:
+def linearise(servo: Servo, end: float, samples: int = SAMPLES) -> Linearisation:
     """About `shape_along`. Raises `SolveError` as it does."""
     times = as_floats(np.linspace(0.0, end, samples))
     p = shape_along(servo, times)
@@ -306,7 +202,7 @@ def linearise(servo: Output, end: float, samples: int = SAMPLES) -> Linearisatio
     return Linearisation(dynamics, p, servo.scale)
 
 
-def _check_numbers(servo: Output, times: Array, *found: Array) -> None:
+def _check_numbers(servo: Servo, times: Array, *found: Array) -> None:
     """Raise `SolveError` for the first of the times (N,) at which one of `found` (N, …) is no number."""
     lost = np.any([~np.isfinite(x.reshape(len(times), -1)).all(axis=1) for x in found], axis=0)
     if lost.any():
