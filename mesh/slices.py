@@ -50,23 +50,17 @@ class SectionQuadrature:
     z_range: tuple[float, float]
 
 
-def section_quadrature(mesh: Mesh, x: float, degree: int) -> SectionQuadrature:
-    """Quadrature on the cross section at `x` (m), exact for polynomials of `degree` in the coordinates.
+def section_quadratures(mesh: Mesh, x: Array, degree: int) -> Iterator[SectionQuadrature]:
+    """Quadrature on each cross section at `x` (k,), m, exact for polynomials of `degree` in the coordinates.
 
     Where faces of cells lie in the plane, the section is that of the material towards larger x; at the end of the part
     that towards smaller x. All processes of the mesh must call.
 
     Args:
         mesh: of tetrahedra or hexahedra, of degree 1 or 2.
-        x: where the plane cuts; beyond the part the section is empty.
+        x: where planes cut; beyond the part the section is empty.
         degree: of the rule on each triangle that the section consists of.
     """
-    (section,) = section_quadratures(mesh, np.array([x]), degree)
-    return section
-
-
-def section_quadratures(mesh: Mesh, x: Array, degree: int) -> Iterator[SectionQuadrature]:
-    """The same on each of the cross sections at `x` (k,)."""
     nodes, coordinates = geometry_nodes(mesh), mesh.geometry.x
     begin, end = _extent(mesh)
     tolerance = IN_PLANE * (end - begin)

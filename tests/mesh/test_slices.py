@@ -10,7 +10,7 @@ from solid_parts import integrate, rectangle
 
 from ffrobot.mesh.compat import coordinate_element, create_solid_mesh, geometry_nodes
 from ffrobot.mesh.records import CircleSection, Hole, TubeSection
-from ffrobot.mesh.slices import section_quadrature
+from ffrobot.mesh.slices import section_quadratures
 from ffrobot.mesh.structured import structured_box
 
 CELLS = ("tetrahedron", "hexahedron")
@@ -18,6 +18,11 @@ CELLS = ("tetrahedron", "hexahedron")
 
 def dolfinx_mesh(part):
     return create_solid_mesh(MPI.COMM_SELF, part.cell, part.degree, part.cells, part.points)
+
+
+def section_quadrature(mesh, x, degree):
+    (section,) = section_quadratures(mesh, np.array([x]), degree)
+    return section
 
 
 def moments(section):

@@ -98,7 +98,7 @@ from mpi4py import MPI
 from ffrobot.common.errors import InputError
 from ffrobot.mesh.compat import coordinate_element, geometry_nodes
 from ffrobot.mesh.records import *
-from ffrobot.mesh.slices import section_quadrature
+from ffrobot.mesh.slices import section_quadratures
 from ffrobot.mesh.solid_mesh import solid_mesh
 
 comm = MPI.COMM_WORLD
@@ -122,8 +122,7 @@ numbers += [total(x[0] * ufl.dx(body.mesh)), body.size, len(body.surface.points)
 numbers += list((body.surface.points * np.arange(len(body.surface.points))[:, None]).sum(axis=0))
 numbers.append((body.surface.triangles * np.arange(len(body.surface.triangles))[:, None]).sum())
 numbers.append(comm.allreduce(len(body.surface.rows)) - len(body.surface.points))
-for at in (0.0, 0.3, 0.49, 0.5, 1.0):
-    section = section_quadrature(body.mesh, at, 4)
+for section in section_quadratures(body.mesh, np.array([0.0, 0.3, 0.49, 0.5, 1.0]), 4):
     numbers += [comm.allreduce(v) for v in (section.weights.sum(), section.weights @ section.points[:, 1] ** 2)]
     numbers.append(comm.allreduce(section.y_range[1], MPI.MAX))
 raised = comm.allreduce(int(raised))
