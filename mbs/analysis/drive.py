@@ -11,7 +11,6 @@ import numpy as np
 
 from ...common.arrays import Array, Indices, as_list
 from .. import _core
-from .._core import TimeFunction
 from ..fields.waypoints import spline
 from ..model.drives import NO_DRIVES, Command, Drives, PointDrive, Replayed
 from ..model.frame_motors import zero_order_hold
@@ -164,8 +163,7 @@ def _under(drives: Drives, run: Outcome, numbers: Array) -> Outcome:
     """The run with what a replay does on joints and points at its times."""
     if drives.replayed is None or not len(run.time):
         return run
-    constant = len(run.time) == 1
-    acting = [TimeFunction.constant(x) for x in numbers[0]] if constant else spline(run.time, numbers, 1)
+    acting = spline(run.time, numbers, 1)
     applied = (
         PointDrive(point, {component: acting[number] for component, number in of_point.items()})
         for point, of_point in drives.replayed.at_points.items()

@@ -185,7 +185,9 @@ def interpolated(nodes: Array, values: Array, degree: int = 5, at_rest: bool = T
 
 
 def spline(nodes: Array, values: Array, degree: int = 5, at_rest: bool = False) -> list[TimeFunction]:
-    """One function of time for each column of `values`: see `interpolated`."""
+    """One function of time for each column of `values`: see `interpolated`; constants through a single node."""
+    if len(nodes) == 1:
+        return [TimeFunction.constant(value) for value in values[0]]
     curve = interpolated(nodes, values, degree, at_rest)
     each = np.ascontiguousarray(np.moveaxis(curve.coefficients, 2, 0))  # (n, intervals, powers)
     return [TimeFunction.polynomial(curve.breaks, of_one) for of_one in each]

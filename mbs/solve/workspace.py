@@ -14,6 +14,7 @@ from ...common.rotations import logarithm
 from .._core import TimeFunction
 from ..fields.field_types import GROUND
 from ..fields.orientations import OrientationLaw
+from ..fields.waypoints import spline
 from ..model.model import Model, row_of_joint, row_values, without_paths
 from ..model.rows import ConstraintRow
 from .posture import solve_postures
@@ -102,7 +103,7 @@ def _neighbors(numbers: Indices, shape: tuple[int, ...]) -> tuple[Indices, Indic
 
 def _row(model: Model, axis: GridAxis, point: str, values: Array) -> ConstraintRow:
     """What keeps the coordinate of an axis at `values` (P,), by the number of the posture as its time."""
-    target = _numbered(values)
+    (target,) = spline(np.arange(float(len(values))), values[:, None], 1)
     if axis.is_place:
         e, (ground, section) = np.eye(3)["xyz".index(axis.name)], map(model.tree.section, (GROUND, point))
         return ConstraintRow(axis.name, "point", ground, section, e, e, target=target)
@@ -114,14 +115,6 @@ def _row(model: Model, axis: GridAxis, point: str, values: Array) -> ConstraintR
             f" {len(joint.units)} coordinates"
         )
     return row_of_joint(model.tree, joint, axis.name, target)
-
-
-def _numbered(values: Array) -> TimeFunction:
-    """Linear between `values` (P,) at the times 0, 1, …, P − 1."""
-    if len(values) == 1:
-        return TimeFunction.constant(float(values[0]))
-    coefficients = np.column_stack([np.diff(values), values[:-1]])
-    return TimeFunction.polynomial(np.arange(float(len(values))), np.ascontiguousarray(coefficients))
 
 
 def _orientation(model: Model, point: str, start: Array) -> list[ConstraintRow]:
