@@ -22,7 +22,7 @@ from ..model.body import Body
 from ..model.divided_link import DividedLink
 from ..model.gears import refuse_prescribed_motors
 from ..model.motors import driven_mechanism, fastest_mechanism
-from ..scene.analysis import Check, Need, TimedAnalysis
+from ..scene.analysis import Check, TimedAnalysis
 from ..solve.posture import check_path, mobility
 from ..solve.prescribed import PrescribedMotion, prescribed_by, prescribed_motion
 from ..solve.reach import check_reach
@@ -67,10 +67,6 @@ class Fcid(TimedAnalysis):
         if self.modal is None and self.shape == "given":
             raise ValueError('expected the key "modal" in shape = "given", found none')
         return self
-
-    def needs(self) -> Iterator[Need]:
-        """Something to follow."""
-        yield Need("kind", self.kind, "trajectory")
 
     def references(self) -> Iterator[Reference]:
         """The links whose shape is given."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, partial
 from pathlib import Path
@@ -25,7 +25,7 @@ from ..fields.field_types import NotNegative
 from ..fields.waypoints import spline
 from ..model.gears import refuse_prescribed_motors
 from ..model.model import Model, path_errors, without_paths
-from ..scene.analysis import Analysis, Check, Need, TimedAnalysis, output_times
+from ..scene.analysis import Analysis, Check, TimedAnalysis, output_times
 from ..solve.integrators import Choice
 from ..solve.servo import Servo, Stopped, make_servo
 from ..solve.stable_inversion import Inversion, invert
@@ -171,10 +171,6 @@ class MotorsOnly(TimedAnalysis):
     def times(self) -> Array:
         """Output times (T,), s: from 0 to `end`, and the pre- and post-actuation besides where they are given."""
         return output_times(self.end, self.output_step, self.pre_actuation or 0.0, self.post_actuation or 0.0)
-
-    def needs(self) -> Iterator[Need]:
-        """Something to follow."""
-        yield Need("kind", self.kind, "trajectory")
 
     def run(self, context: Context) -> Outcome:
         """Motion and motor forces for the trajectories, no other force acting; before and after the path it is held.

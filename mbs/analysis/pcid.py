@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import Literal
 
 from ..model.gears import with_prescribed_motors
-from ..scene.analysis import Check, IntegratedAnalysis, Need
+from ..scene.analysis import Check, IntegratedAnalysis
 from ..solve.posture import check_path
 from ..solve.reach import check_reach
 from ..solve.redundancy import resolved
@@ -30,10 +29,6 @@ class Pcid(IntegratedAnalysis):
     is_resumable = True
     allocates_patches = True
     applicable = ("joints", "joints+pzt", "trajectory", "points")
-
-    def needs(self) -> Iterator[Need]:
-        """Something to follow."""
-        yield Need("kind", self.kind, "trajectory")
 
     def run(self, context: Context) -> Outcome:
         """C_m and C_s hold, p is free; and compliant gears, where motors follow the trajectories.

@@ -117,8 +117,9 @@ class Analysis(Record):
         raise NotImplementedError
 
     def needs(self) -> Iterator[Need]:
-        """Tables without which the scene makes no sense."""
-        yield from ()
+        """Tables without which the scene makes no sense: of an inverse analysis, something to follow."""
+        if self.applicable:
+            yield Need("kind", self.kind, "trajectory")
 
     def references(self) -> Iterator[Reference]:
         """Bodies, points and joints that the analysis names."""
