@@ -154,7 +154,7 @@ class ClosedLoop(SampledAnalysis):
         record = loop_record(self, setup, loop, acting, runs, models, lowest, gears=bool(plant.model.tree.gears))
 
         def completed(of: Outcome) -> Outcome:
-            commanded = _by_joint(context.model, held(of.time))
+            commanded = context.model.by_motor(held(of.time))
             return replace(of, forces=replace(of.forces, commanded=commanded), details=record)
 
         return replace(completed(run), look_closer=lambda: completed(closer))
@@ -281,12 +281,3 @@ def _default_tip(model: Model) -> str:
         return tool
     body = next(node.body for node in reversed(model.tree.nodes) if node.body.points)
     return f"{body.name}.{'tip' if 'tip' in body.points else next(iter(body.points))}"
-
-
-def _by_joint(model: Model, held: Array) -> dict[str, Array]:
-    """Moments (T, k) of motors, of all commands (T, inputs)."""
-    found, column = {}, 0
-    for joint, columns in model.motors.items():
-        found[joint] = held[:, column : column + len(columns)]
-        column += len(columns)
-    return found

@@ -5,7 +5,6 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from functools import cache
 from pathlib import Path
 from typing import Literal, Self
 
@@ -30,7 +29,6 @@ from ..solve.redundancy import resolved
 from ..solve.start import undeformed_posture
 from .context import Context
 from .outcome import Forces, Motion, Outcome, Prescription, Statistics
-from .samples import path_times
 
 ZERO = TimeFunction.constant(0.0)
 FEWEST_NODES = 201  # of the spline through a static shape; half as many as outputs where that is more
@@ -115,13 +113,8 @@ class Fcid(TimedAnalysis):
             )  # fmt: skip
 
         run = at(self.times)
-        run = replace(run, statistics=replace(run.statistics, wall_seconds=time.perf_counter() - began))
-
-        @cache
-        def look_closer() -> Outcome:
-            return at(path_times(run.time, model.scene.trajectory, self.end))
-
-        return replace(run, look_closer=look_closer)
+        statistics = replace(run.statistics, wall_seconds=time.perf_counter() - began)
+        return replace(run, statistics=statistics).with_look(at)
 
 
 def _shape(context: Context, analysis: Fcid, motion: PrescribedMotion, q: Array) -> Shape:

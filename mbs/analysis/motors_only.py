@@ -11,9 +11,9 @@ import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cache, partial
+from functools import partial
 from pathlib import Path
-from typing import Annotated, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Literal, Self
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -28,11 +28,13 @@ from ..model.model import Model, path_errors, without_paths
 from ..scene.analysis import Analysis, Check, TimedAnalysis, output_times
 from ..solve.integrators import Choice
 from ..solve.servo import Servo, Stopped, make_servo
-from ..solve.stable_inversion import Inversion, invert
+from ..solve.stable_inversion import Inversion, invert, shape_of
 from ..solve.zero_dynamics import GROWTH, SAMPLES, Linearisation, is_unstable, linearise, shape_along
 from .context import Context
 from .outcome import ADVICE, Details, Forces, Motion, Outcome, Prescription, Statistics
-from .samples import path_times
+
+if TYPE_CHECKING:
+    from scipy.interpolate import PPoly
 
 DECAY = 23.0  # times the slowest time constant of zeros: what is left is 1e-10
 INFINITE = (
@@ -205,35 +207,36 @@ class MotorsOnly(TimedAnalysis):
         seconds = time.perf_counter() - began
 
         around = AroundPath(pre_actuation=pre, post_actuation=post, inversion=inversion, held=inversion.servo.model)
-
-        @cache
-        def look_closer() -> Outcome:
-            between = path_times(run.time, model.scene.trajectory, self.end)
-            return replace(_run(self, model, inversion, between), details=around)
-
         statistics = replace(run.statistics, wall_seconds=seconds, warnings=_warnings(inversion, run))
-        return replace(run, details=around, statistics=statistics, look_closer=look_closer)
+        run = replace(run, details=around, statistics=statistics)
+        return run.with_look(lambda between: replace(_run(self, model, inversion, between), details=around))
 
 
 def _run(analysis: MotorsOnly, model: Model, inversion: Inversion, times: Array) -> Outcome:
-    curve, servo = inversion.curve, inversion.servo
-    modes = curve(times), curve.derivative(1)(times), curve.derivative(2)(times)
-    found = servo.motion.motion(as_list(times), *modes, servo.postures(times))
-    is_met = np.isfinite(found.q).all(axis=1)
-    kept = slice(len(times) if is_met.all() else int(is_met.argmin()))
-
+    curve = inversion.curve
     how = "two-point problem" if inversion.linearisation.is_future[0].any() else "integrated forward"
     statistics = Statistics(
         inversion.status, Choice("collocation", how), steps=len(curve.x) - 1, evaluations=inversion.iterations,
         cause=cause_of(inversion),
     )  # fmt: skip
+    return outcome_along(curve, inversion.servo, analysis, model, statistics, times)
+
+
+def outcome_along(
+    curve: PPoly, servo: Servo, analysis: Analysis, model: Model, statistics: Statistics, times: Array
+) -> Outcome:
+    """The motion whose modes follow the curve, at `times` (T,), up to the first without a posture."""
+    modes = curve(times), curve.derivative(1)(times), curve.derivative(2)(times)
+    found = servo.motion.motion(as_list(times), *modes, servo.postures(times))
+    is_met = np.isfinite(found.q).all(axis=1)
+    kept = slice(len(times) if is_met.all() else int(is_met.argmin()))
     return Outcome(
         analysis=analysis,
         model=without_paths(model),
         motion=Motion(times, found.q, found.v, found.a, found.loops).at(kept),
         forces=Forces(required=found.required).at(kept),
         statistics=statistics,
-        prescribed=Prescription(servo.equations, inversion.shape, servo.near[0]),
+        prescribed=Prescription(servo.equations, shape_of(curve, servo.mode_counts), servo.near[0]),
     )
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cache
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple, Self
@@ -18,7 +19,7 @@ from ..model.drives import PointDrive
 from ..model.model import Model
 from ..scene.analysis import Analysis
 from ..solve.integrators import NOT_INTEGRATED, Choice
-from .samples import in_order
+from .samples import in_order, path_times
 
 if TYPE_CHECKING:
     from scipy.interpolate import BSpline
@@ -254,6 +255,15 @@ class Outcome:
     def closer(self) -> Outcome:
         """The run at its outputs and between: see `samples`. Itself where nothing is between."""
         return self if self.look_closer is None else self.look_closer()
+
+    def with_look(self, at: Callable[[Array], Outcome]) -> Self:
+        """The same that looks closer at a motion along paths, which `at` has at any times (T,), s."""
+
+        @cache
+        def look_closer() -> Outcome:
+            return at(path_times(self.time, self.model.scene.trajectory, self.analysis.last_time))
+
+        return replace(self, look_closer=look_closer)
 
     @property
     def time(self) -> Array:

@@ -10,30 +10,27 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cache
 from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import Field
 
-from ...common.arrays import Array, as_floats, as_list
+from ...common.arrays import Array, as_floats
 from ...common.errors import InputError, SolveError
 from ...common.validation import Record
 from ..fields.field_types import NotNegative, Positive
 from ..model.gears import elastic_joints
-from ..model.model import Model, modal_directions, path_errors, without_paths
+from ..model.model import Model, modal_directions, path_errors
 from ..scene.analysis import Check, Need, TimedAnalysis, output_times
 from ..solve.integrators import Choice
 from ..solve.servo import Servo, Stopped, make_servo
-from ..solve.stable_inversion import shape_of
 from ..solve.tracking import Limits, Objective, Tracked, Transition, Weights, track
 from ..solve.tracking_intervals import SETTLED, refined, settled, start_breaks
 from ..solve.zero_dynamics import LIGHT, Linearisation, equilibrium, linearise
 from .context import Context, PatchedLink
-from .forward import Forward
-from .motors_only import AroundPath, check_rest, durations, where
-from .outcome import Forces, Motion, Outcome, Prescription, Statistics
-from .samples import path_times
+from .forward import Forward, largest_moments
+from .motors_only import AroundPath, check_rest, durations, outcome_along, where
+from .outcome import Outcome, Statistics
 from .tracking_advice import Bounds, bounds_of_zeros, enough_path_time, enough_time, far_patches, rough_ends
 
 RATE = 0.005  # s, T_r where the scene does not say
@@ -179,14 +176,13 @@ def run_tracking(context: Context, analysis: Tracking) -> Outcome:
         raise SolveError(f"{place}: stopped on request before any of its motion was found") from None
     (pre, post), servo = posed.around, posed.servo
     has_limits, most = np.isfinite(posed.asked.limits.voltage).any(), float(posed.asked.units.max())
-    by_joint = np.cumsum([len(columns) for columns in model.motors.values()])[:-1]
     around = TrackedPath(
         pre_actuation=pre, post_actuation=post, least_voltage=least.share * most,
         least_voltage_doubt=least.doubt * least.share * most,
         least_share=least.share if has_limits else float("nan"), objective=objective, cost=found.cost,
         held=servo.model, unmet=found.unmet, bounds=bounds,
         voltage_prices={name: prices[0] for name, prices in _by_body(context, found.prices[0][None]).items()},
-        torque_prices=dict(zip(model.motors, np.split(found.prices[1], by_joint), strict=True)),
+        torque_prices=model.by_motor(found.prices[1]),
     )  # fmt: skip
     times = output_times(analysis.end, analysis.output_step, pre, post)
 
@@ -197,11 +193,7 @@ def run_tracking(context: Context, analysis: Tracking) -> Outcome:
     around = _with_torques_alone(context, run, around)
     statistics = replace(run.statistics, wall_seconds=time.perf_counter() - began, warnings=tuple(texts))
 
-    @cache
-    def look_closer() -> Outcome:
-        return at(path_times(run.time, model.scene.trajectory, analysis.end))
-
-    return replace(run, details=around, statistics=statistics, look_closer=look_closer)
+    return replace(run, details=around, statistics=statistics).with_look(at)
 
 
 def least_voltage(model: Model, patches: Mapping[str, PatchedLink], analysis: Tracking) -> tuple[float, float]:
@@ -352,10 +344,8 @@ def _patches(patches: Mapping[str, PatchedLink], servo: Servo) -> Array:
 
 
 def _limits(model: Model, patches: Mapping[str, PatchedLink]) -> Limits:
-    joints = {joint.name: joint for joint in model.scene.joint}
-    torque = np.array([of.moment for name in model.motors for of in joints[name].motor_limits])
     voltage = np.concatenate([of_link.limit for of_link in patches.values()] or [np.zeros(0)])
-    return Limits(voltage, torque)
+    return Limits(voltage, largest_moments(model, limits=True))
 
 
 def _weights(servo: Servo, analysis: Tracking, limits: Limits) -> Weights:
@@ -374,26 +364,13 @@ def _outcome(
     analysis: Tracking, model: Model, servo: Servo, tracked: Tracked, context: Context, times: Array
 ) -> Outcome:
     curve, voltage = tracked.curve, tracked.voltage
-    modes = curve(times), curve.derivative(1)(times), curve.derivative(2)(times)
-    found = servo.motion.motion(as_list(times), *modes, servo.postures(times))
-
-    breaks = voltage.x
-    return Outcome(
-        analysis=analysis,
-        model=without_paths(model),
-        motion=Motion(times, found.q, found.v, found.a, found.loops),
-        forces=Forces(required=found.required, voltages=_by_body(context, voltage(times))),
-        statistics=Statistics(
-            "completed",
-            Choice("collocation", "interior-point method"),
-            steps=len(curve.x) - 1,
-            evaluations=tracked.iterations,
-        ),
-        prescribed=Prescription(
-            servo.equations, shape_of(curve, servo.mode_counts), servo.near[0],
-            {body: (breaks, V) for body, V in _by_body(context, voltage(breaks)).items()},
-        ),
-    )  # fmt: skip
+    how, steps = Choice("collocation", "interior-point method"), len(curve.x) - 1
+    statistics = Statistics("completed", how, steps=steps, evaluations=tracked.iterations)
+    run, breaks = outcome_along(curve, servo, analysis, model, statistics, times), voltage.x
+    assert run.prescribed is not None
+    between = {body: (breaks, V) for body, V in _by_body(context, voltage(breaks)).items()}
+    forces = replace(run.forces, voltages=_by_body(context, voltage(times)))
+    return replace(run, forces=forces, prescribed=run.prescribed._replace(voltages=between))
 
 
 def _by_body(context: Context, V: Array) -> Mapping[str, Array]:

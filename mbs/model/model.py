@@ -59,6 +59,12 @@ class Model:
         """By joint with motors: indices in v of its coordinates, in the scene's order."""
         return {joint.name: _in_order(self.driven(joint.name)) for joint in self.scene.motor_joints}
 
+    def by_motor(self, values: Array) -> dict[str, Array]:
+        """By joint with motors: its columns of `values` (…, motors and whatever comes after them)."""
+        motors = self.motors
+        parts = np.split(values, np.cumsum([len(columns) for columns in motors.values()]), axis=-1)
+        return dict(zip(motors, parts[:-1], strict=True))
+
     def columns(self, joint: str) -> Array:
         """Indices in v of the coordinates of a joint of the tree, in the scene's order; none of a spherical one."""
         return _in_order(self.tree.nodes[self.tree.carried[joint]])

@@ -121,11 +121,7 @@ class SplitForces(NamedTuple):
 def split_forces(model: Model, q: Array, wanted: Array) -> SplitForces:
     """Gᵀτ + EᵀF_p − C_cᵀλ_c = `wanted` (T, n_v) at q (T, n_q), by the core (core/recursion/inverse/motors.h)."""
     tau, left, multipliers = driven_mechanism(model).split(q, wanted)
-    moments, first = {}, 0
-    for joint, coordinates in model.motors.items():
-        moments[joint] = tau[:, first : first + len(coordinates)]
-        first += len(coordinates)
-    return SplitForces(moments, left, multipliers)
+    return SplitForces(model.by_motor(tau), left, multipliers)
 
 
 def motor_forces(model: Model, q: Array, wanted: Array) -> MotorForces:

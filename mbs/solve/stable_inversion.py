@@ -61,11 +61,6 @@ class Inversion:
     worst: float
     off_rest: float
 
-    @property
-    def shape(self) -> list[list[_core.TimeFunction]]:
-        """p_k(t) of each body, for the core."""
-        return shape_of(self.curve, self.servo.mode_counts)
-
 
 def shape_of(curve: PPoly, counts: Sequence[int]) -> list[list[_core.TimeFunction]]:
     """Functions p_k(t) of each body, for the core; `counts` of modes by body."""
