@@ -1,7 +1,7 @@
 """Derivatives of goals by keys from runs beside the scene's own, with what there is to mind about each.
 
 Those of links' frequencies are exact, by their modes, without runs: of beams by Rayleigh's quotient
-(`fe_models.beam.rayleigh`), whose dependence on a key is a rational function that differences give to
+(`fe_models.beam.link`), whose dependence on a key is a rational function that differences give to
 rounding. By keys that no link knows of they are 0. Of solids, whose mesh changes with their shape, and of links with
 measured frequencies, runs give them.
 
