@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Literal, Protocol
+from typing import Literal
 
 import numpy as np
 from rich.console import Console
@@ -22,21 +22,6 @@ from .robot_target import Key, LinkTarget, RobotTarget
 DIGITS = 8  # of fitted values in files: more than measured ones have
 
 Motors = Literal["free", "held"]
-
-
-class Target(Protocol):
-    """A link or a robot, as its files describe it; `families` that a table of its modes may name."""
-
-    families: tuple[str, ...]
-
-    def start(self, key: Key) -> object:
-        """What the files say at `key`; None where it is not given."""
-
-    def modes(self, changes: dict[Key, float]) -> tuple[tuple[str, ...], Array]:
-        """Families and frequencies (Hz) of its modes, the lowest first, with some values changed."""
-
-    def files(self, changes: dict[Key, float], output: Path | None) -> dict[Path, str]:
-        """The text of new files with these values, by where they go."""
 
 
 def fit_measured(
@@ -110,7 +95,7 @@ def _target(path: Path, motors: Motors | None) -> LinkTarget | RobotTarget:
     return LinkTarget(path)
 
 
-def _start(path: Path, target: Target, key: Key) -> float:
+def _start(path: Path, target: LinkTarget | RobotTarget, key: Key) -> float:
     value = target.start(key)
     if isinstance(value, bool) or not isinstance(value, int | float) or value <= 0:
         found = "none" if value is None else repr(value)

@@ -6,7 +6,7 @@ import hashlib
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Protocol, TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
@@ -19,7 +19,7 @@ from ..mbs.fields.field_types import split_point
 from ..mbs.model.body import Body, from_modal_body, rigid_body, with_tool
 from ..mbs.model.masses import turns_as_a_body, with_payload
 from ..mbs.model.projection import projected
-from ..mbs.scene.bodies import BodyKeys, tensor
+from ..mbs.scene.bodies import BodyKeys, Payload, Tool, tensor
 from ..scene.scene import Scene
 
 if TYPE_CHECKING:
@@ -86,13 +86,7 @@ def rigid_in_words(bodies: Mapping[str, LoadedBody]) -> list[str]:
     ]
 
 
-class _OnPoint(Protocol):
-    @property
-    def point(self) -> str:
-        """Where it sits, "BODY.POINT"."""
-
-
-P = TypeVar("P", bound=_OnPoint)
+P = TypeVar("P", Payload, Tool)
 
 
 def records_on(
