@@ -104,8 +104,48 @@ class Tracking(TimedAnalysis):
         yield Need("kind", self.kind, "pzt")
 
     def run(self, context: Context) -> Outcome:
-        """Motion, torques and voltages."""
-        return run_tracking(context, self)
+        """Motion and forces of motors and patches for the trajectories, no other force acting.
+
+        Raises `InputError` for patches and motors that do not fit, a path that does not begin and end at rest, or is
+        out of reach; `SolveError` where no motion is found.
+        """
+        began, model = time.perf_counter(), context.model
+
+        def progress() -> bool:
+            return context.progress(0.0)
+
+        try:
+            posed = _pose(model, context.patches, self, progress)
+            least = settled(posed.asked, posed.coarse, progress)
+            _check_found(context, posed, least)
+            found, objective = _solve(posed, self, least)
+            if objective == "least-voltage":  # without the effort's share
+                least = replace(found, doubt=least.doubt)
+            texts = list(_warnings(context, posed, self, least))
+            texts += _of_mesh(found, self)
+            bounds = _bounds(posed)
+        except Stopped:
+            place = where(model.scene.path, self)
+            raise SolveError(f"{place}: stopped on request before any of its motion was found") from None
+        (pre, post), servo = posed.around, posed.servo
+        has_limits, most = np.isfinite(posed.asked.limits.voltage).any(), float(posed.asked.units.max())
+        around = TrackedPath(
+            pre_actuation=pre, post_actuation=post, least_voltage=least.share * most,
+            least_voltage_doubt=least.doubt * least.share * most,
+            least_share=least.share if has_limits else float("nan"), objective=objective, cost=found.cost,
+            held=servo.model, unmet=found.unmet, bounds=bounds,
+            voltage_prices={name: prices[0] for name, prices in _by_body(context, found.prices[0][None]).items()},
+            torque_prices=model.by_motor(found.prices[1]),
+        )  # fmt: skip
+        times = output_times(self.end, self.output_step, pre, post)
+
+        def at(times: Array) -> Outcome:
+            return replace(_outcome(self, model, servo, found, context, times), details=around)
+
+        run = at(times)
+        around = _with_torques_alone(context, run, around)
+        statistics = replace(run.statistics, wall_seconds=time.perf_counter() - began, warnings=tuple(texts))
+        return replace(run, details=around, statistics=statistics).with_look(at)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -150,52 +190,6 @@ class _Posed:
     coarse: Array
 
 
-def run_tracking(context: Context, analysis: Tracking) -> Outcome:
-    """Motion and forces of motors and patches for the trajectories, no other force acting.
-
-    Raises `InputError` for patches and motors that do not fit, a path that does not begin and end at rest, or is out of
-    reach; `SolveError` where no motion is found.
-    """
-    began, model = time.perf_counter(), context.model
-
-    def progress() -> bool:
-        return context.progress(0.0)
-
-    try:
-        posed = _pose(model, context.patches, analysis, progress)
-        least = settled(posed.asked, posed.coarse, progress)
-        _check_found(context, posed, least)
-        found, objective = _solve(posed, analysis, least)
-        if objective == "least-voltage":  # without the effort's share
-            least = replace(found, doubt=least.doubt)
-        texts = list(_warnings(context, posed, analysis, least))
-        texts += _of_mesh(found, analysis)
-        bounds = _bounds(posed)
-    except Stopped:
-        place = where(model.scene.path, analysis)
-        raise SolveError(f"{place}: stopped on request before any of its motion was found") from None
-    (pre, post), servo = posed.around, posed.servo
-    has_limits, most = np.isfinite(posed.asked.limits.voltage).any(), float(posed.asked.units.max())
-    around = TrackedPath(
-        pre_actuation=pre, post_actuation=post, least_voltage=least.share * most,
-        least_voltage_doubt=least.doubt * least.share * most,
-        least_share=least.share if has_limits else float("nan"), objective=objective, cost=found.cost,
-        held=servo.model, unmet=found.unmet, bounds=bounds,
-        voltage_prices={name: prices[0] for name, prices in _by_body(context, found.prices[0][None]).items()},
-        torque_prices=model.by_motor(found.prices[1]),
-    )  # fmt: skip
-    times = output_times(analysis.end, analysis.output_step, pre, post)
-
-    def at(times: Array) -> Outcome:
-        return replace(_outcome(analysis, model, servo, found, context, times), details=around)
-
-    run = at(times)
-    around = _with_torques_alone(context, run, around)
-    statistics = replace(run.statistics, wall_seconds=time.perf_counter() - began, warnings=tuple(texts))
-
-    return replace(run, details=around, statistics=statistics).with_look(at)
-
-
 def least_voltage(model: Model, patches: Mapping[str, PatchedLink], analysis: Tracking) -> tuple[float, float]:
     """V, and how uncertain, as in `TrackedPath`, of another model of the same robot; NaN where no motion is found."""
     posed = _pose(model, patches, analysis, lambda: True)
@@ -205,7 +199,7 @@ def least_voltage(model: Model, patches: Mapping[str, PatchedLink], analysis: Tr
 
 
 def _pose(model: Model, patches: Mapping[str, PatchedLink], analysis: Tracking, progress: Callable[[], bool]) -> _Posed:
-    """The least voltage on the first breaks. Raises as `run_tracking`, and `Stopped`."""
+    """The least voltage on the first breaks. Raises as `Tracking.run`, and `Stopped`."""
     place, end = where(model.scene.path, analysis), analysis.end
     if elastic := elastic_joints(model):
         raise InputError(
