@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import Literal
@@ -10,7 +10,7 @@ from typing import Literal
 from ...common.arrays import Array
 from ...mbs.analysis.operating_points import InstantAnalysis, OperatingPoints, find_operating_points, places_of
 from ...mbs.analysis.outcome import Details, Outcome
-from ...mbs.fields.field_types import PointReference, Reference
+from ...mbs.fields.field_types import PointReference
 from ...mbs.model.model import Model, modal_directions
 from ...mbs.solve.joint_conditions import JointCondition, RobotModes, joint_conditions
 from ...mbs.solve.linearisation import LinearEquations, LinearMechanism
@@ -103,11 +103,7 @@ class Linear(InstantAnalysis):
     """Points whose motion is an output and at which disturbances act; by default those of trajectories, or all tips."""
 
     needs_actuators = True
-
-    def references(self) -> Iterator[Reference]:
-        """The points."""
-        for point in self.points or ():
-            yield Reference("points", point)
+    refers_to = (("points", "body"),)
 
     def run(self, context: ActuatedContext) -> Outcome:
         """The operating points, with `LinearModels` about them. Raises `SolveError` in singular postures."""

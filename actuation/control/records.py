@@ -22,6 +22,7 @@ from ...mbs.fields.field_types import (
     PointReference,
     Positive,
     Reference,
+    Referring,
     one_of,
     under,
 )
@@ -87,12 +88,8 @@ class Sensor(Record):
             yield Reference("motor", self.motor, "elastic joint")
 
 
-class ControllerRecord(Record):
+class ControllerRecord(Referring):
     """Base of all controllers."""
-
-    def references(self) -> Iterator[Reference]:
-        """Joints and bodies that a controller names."""
-        yield from ()
 
 
 class JointPid(ControllerRecord):
@@ -153,11 +150,7 @@ class ModalVelocity(ControllerRecord):
     sensor: Literal["pzt", "ideal"] = "pzt"
     """Measured signals: voltages of the same patches, or modal coordinates and velocities directly."""
 
-    def references(self) -> Iterator[Reference]:
-        """The links."""
-        for body in self.bodies:
-            yield Reference("bodies", body)
-            yield Reference("bodies", body, "patched body")
+    refers_to = (("bodies", "body"), ("bodies", "patched body"))
 
 
 class Lqr(ControllerRecord):

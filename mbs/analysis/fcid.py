@@ -15,7 +15,7 @@ from ...common.arrays import Array, as_floats, as_list
 from ...common.errors import InputError, SolveError
 from .. import _core
 from .._core import TimeFunction
-from ..fields.field_types import Expression, Name, Reference
+from ..fields.field_types import Expression, Name
 from ..fields.waypoints import spline
 from ..model.body import Body
 from ..model.divided_link import DividedLink
@@ -57,6 +57,7 @@ class Fcid(TimedAnalysis):
     is_algebraic = True
     allocates_patches = True
     applicable = ("joints", "joints+pzt", "points")
+    refers_to = (("modal", "body"), ("modal", "flexible body"))
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
@@ -65,12 +66,6 @@ class Fcid(TimedAnalysis):
         if self.modal is None and self.shape == "given":
             raise ValueError('expected the key "modal" in shape = "given", found none')
         return self
-
-    def references(self) -> Iterator[Reference]:
-        """The links whose shape is given."""
-        for body in self.modal or ():
-            yield Reference("modal", body)
-            yield Reference("modal", body, "flexible body")
 
     def prescribed(self) -> Iterator[tuple[str, TimeFunction, int]]:
         """The given shape."""

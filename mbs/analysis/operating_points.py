@@ -14,7 +14,7 @@ from pydantic import Field
 from ...common.arrays import Array
 from ...common.errors import InputError, SolveError, did_you_mean, quoted
 from .._core import TimeFunction
-from ..fields.field_types import NotNegative, PointReference, Reference
+from ..fields.field_types import NotNegative, PointReference
 from ..model.gears import with_compliance, with_prescribed_motors
 from ..model.model import Model, without_paths
 from ..model.rows import ConstraintRow, coordinate_row
@@ -229,11 +229,7 @@ class Static(Analysis):
 
     is_algebraic = True
     allocates_patches = True
-
-    def references(self) -> Iterator[Reference]:
-        """The points."""
-        for point in self.points or ():
-            yield Reference("points", point)
+    refers_to = (("points", "body"),)
 
     def run(self, context: Context) -> Outcome:
         """Motion and forces at t = 0."""

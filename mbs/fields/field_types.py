@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated, Literal, TypeVar
+from typing import Annotated, ClassVar, Literal, TypeVar
 
 from pydantic import AfterValidator, PlainValidator, ValidationInfo
 
@@ -139,6 +139,9 @@ KeptSteps = Annotated[Steps, PlainValidator(_steps, json_schema_input_type=str)]
 NotEmpty = AfterValidator(_not_empty)
 
 
+Kind = Literal["body", "flexible body", "patches", "patched body", "joint", "elastic joint"]
+
+
 @dataclass(frozen=True)
 class Reference:
     """One reference: `key` of the record where it stands, `name` "BODY", "BODY.POINT" or the joint's.
@@ -149,7 +152,7 @@ class Reference:
 
     key: str
     name: str
-    kind: Literal["body", "flexible body", "patches", "patched body", "joint", "elastic joint"] = "body"
+    kind: Kind = "body"
     loaded: bool = False
 
     @property
@@ -161,6 +164,19 @@ class Reference:
 def loaded_reference(key: str, side: str | None) -> list[Reference]:
     """The reference to a point (or a body's frame) where forces act; none to the ground, or where nothing is given."""
     return [] if side is None or side == GROUND else [Reference(key, side, loaded=True)]
+
+
+class Referring(Record):
+    """Base of records that name bodies, points, joints or patches of their scene."""
+
+    refers_to: ClassVar[tuple[tuple[str, Kind | Literal["loaded"]], ...]] = ()  # keys, and what one or all values name
+
+    def references(self) -> Iterator[Reference]:
+        """What it names."""
+        for key, kind in self.refers_to:
+            value = getattr(self, key)
+            for name in () if value is None else (value,) if isinstance(value, str) else value:
+                yield from loaded_reference(key, name) if kind == "loaded" else [Reference(key, name, kind)]
 
 
 def body_of(side: str) -> str:

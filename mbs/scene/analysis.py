@@ -16,7 +16,7 @@ from ...common.errors import did_you_mean, either, quoted
 from ...common.numbers import MOST_OUTPUTS, MOST_STEPS
 from ...common.validation import Record
 from .._core import TimeFunction
-from ..fields.field_types import KeptSteps, Name, Positive, Reference
+from ..fields.field_types import KeptSteps, Name, Positive, Referring
 
 TIGHTEST_TOLERANCE = 1e-10  # rounding in the forces of stiff links is not far below
 
@@ -42,7 +42,7 @@ class Surroundings(NamedTuple):
         return either(kind.kind_name() for kind in found)
 
 
-class Analysis(Record):
+class Analysis(Referring):
     """One run. `tolerance`: the error aimed at, relative to the peak of each quantity.
 
     Class attributes say what the rest of the program has to know of a kind.
@@ -120,10 +120,6 @@ class Analysis(Record):
         """Tables without which the scene makes no sense: of an inverse analysis, something to follow."""
         if self.applicable:
             yield Need("kind", self.kind, "trajectory")
-
-    def references(self) -> Iterator[Reference]:
-        """Bodies, points and joints that the analysis names."""
-        yield from ()
 
     def prescribed(self) -> Iterator[tuple[str, TimeFunction, int]]:
         """Keys and functions of time that have to exist at all `times`, with so many derivatives."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated, Literal, Self
 
@@ -22,7 +21,7 @@ from ..fields.field_types import (
     PointReference,
     Positive,
     Quantity,
-    Reference,
+    Referring,
     Vector3,
     one_of,
     split_point,
@@ -173,7 +172,7 @@ class BodyKeys(Record):
         return self
 
 
-class Tool(Record):
+class Tool(Referring):
     """A frame that moves and turns with a point of a body, without mass: one more point of the body, "BODY.NAME"."""
 
     name: Name
@@ -187,17 +186,15 @@ class Tool(Record):
     angle: Annotated[Quantity, IN_PLANE] = 0.0
     """Angle of its x axis against that of the body, rad (or such as "90*deg")."""
 
+    refers_to = (("point", "body"),)
+
     @property
     def reference(self) -> str:
         """The point that it is, "BODY.NAME"."""
         return f"{split_point(self.point)[0]}.{self.name}"
 
-    def references(self) -> Iterator[Reference]:
-        """The point that carries it."""
-        yield Reference("point", self.point)
 
-
-class Payload(Record):
+class Payload(Referring):
     """A mass (kg) on a section of a body, with its inertia about its own center of mass (kg·m²)."""
 
     point: PointReference
@@ -210,12 +207,10 @@ class Payload(Record):
     """Inertia about that center, axes of the body or tool, kg·m²: [xx, yy, zz], or a 3 × 3 matrix; planar scenes about
     z."""
 
+    refers_to = (("point", "body"),)
+
     @field_validator("inertia")
     @classmethod
     def _is_of_a_body(cls, inertia: Inertia) -> Inertia:
         check_inertia(inertia, 0.0)
         return inertia
-
-    def references(self) -> Iterator[Reference]:
-        """The point that carries it."""
-        yield Reference("point", self.point)

@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import Annotated
 
 from pydantic import ValidationInfo, model_validator
 
 from ...common.errors import quoted
-from ...common.validation import Record
 from .._core import TimeFunction
 from ..fields.field_types import (
     Expression,
     Expressions,
     PointReference,
-    Reference,
-    loaded_reference,
+    Referring,
     one_of,
     only,
     present,
@@ -26,7 +23,7 @@ from ..fields.spelling import IN_SPACE, Spelled, as_written, is_planar, keys_her
 OF_POINT = ("x", "y", "z", "mx", "my", "mz")
 
 
-class Load(Record):
+class Load(Referring):
     """A prescribed load: force (N) and moment (N·m) on a section in global axes, joint torque, or voltages (V).
 
     `force` on a point, in scenes made in Python: a function of its motion, see `state_forces.state_function`.
@@ -58,6 +55,8 @@ class Load(Record):
     voltage: tuple[Expression, ...] | None = None
     """Voltages, V: one expression in t per patch of the layout."""
 
+    refers_to = (("point", "loaded"), ("joint", "joint"), ("pzt", "patches"))
+
     @model_validator(mode="after")
     def _consistent(self, info: ValidationInfo) -> Load:
         subject = one_of(self, ("point", "joint", "pzt"))
@@ -68,14 +67,6 @@ class Load(Record):
         if self.force is not None and len(found) > 1:
             raise ValueError(f'expected "force" alone with "point", found {quoted(found)}')
         return self
-
-    def references(self) -> Iterator[Reference]:
-        """Where it acts."""
-        yield from loaded_reference("point", self.point)
-        if self.joint is not None:
-            yield Reference("joint", self.joint, "joint")
-        if self.pzt is not None:
-            yield Reference("pzt", self.pzt, "patches")
 
     @property
     def components(self) -> dict[str, TimeFunction]:

@@ -12,7 +12,7 @@ from pydantic import Field
 from ...common.deferred import Table
 from ...common.names import Title
 from ...common.validation import Record
-from ..fields.field_types import NotEmpty, Quantity, Reference, under
+from ..fields.field_types import NotEmpty, Quantity, Reference, Referring, under
 from ..fields.spelling import IN_PLANE, Spelled, Vector, as_written
 from ..joints.joints import AnyJoint
 from .bodies import BodyKeys, Payload, Tool
@@ -26,7 +26,7 @@ Word = Literal["up", "down", "right", "left", "noflip", "flip", "positive", "neg
 Numbers = Annotated[Quantity | tuple[Quantity, ...], Spelled(Quantity, as_written)]
 
 
-class Initial(Record):
+class Initial(Referring):
     """State at t = 0; values of bodies and joints are guesses that the constraints correct.
 
     In planar scenes with `joints` or `joint_rates`, a frame without an own angle or rate follows the coordinate of its
@@ -54,14 +54,9 @@ class Initial(Record):
     positive or negative turn leads the axis of the joint before to that of the joint after. Any joint: "positive" or
     "negative", the sign of the coordinate within ±180°. Of those the nearest to the guess."""
 
-    def references(self) -> Iterator[Reference]:
-        """The bodies and joints with guesses."""
-        for table, of_bodies in (("angles", self.angles), ("rates", self.rates)):
-            for body in of_bodies:
-                yield Reference(table, body)
-        for table, guesses in (("joints", self.joints), ("joint_rates", self.joint_rates), ("branch", self.branch)):
-            for joint in guesses:
-                yield Reference(table, joint, "joint")
+    refers_to = (
+        ("angles", "body"), ("rates", "body"), ("joints", "joint"), ("joint_rates", "joint"), ("branch", "joint")
+    )  # fmt: skip
 
 
 class MechanismKeys(Record):

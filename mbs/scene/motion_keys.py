@@ -13,7 +13,7 @@ from pydantic import Field, ValidationInfo, field_validator, model_validator
 from ...common.arrays import Array
 from ...common.errors import quoted
 from ...common.validation import Record
-from ..fields.field_types import NotNegative, Positive, Quantity
+from ..fields.field_types import NotNegative, Positive, Quantity, Referring
 from ..fields.motion_laws import SMOOTHNESS, Limits
 from ..fields.paths import Legs, impulses, path_of, shaped
 from ..fields.piecewise import Piecewise
@@ -62,7 +62,7 @@ class Shaper(Record):
         return motion
 
 
-class MotionKeys(Record):
+class MotionKeys(Referring):
     """What a trajectory has beside what follows it."""
 
     via: Annotated[tuple[Place, ...], OfPlaces] | None = None

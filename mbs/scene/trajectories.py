@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from functools import cached_property
 from typing import Annotated
 
@@ -20,11 +19,9 @@ from ..fields.field_types import (
     Quantity,
     Vector3,
     WaypointTable,
-    loaded_reference,
     one_of,
     present,
 )
-from ..fields.field_types import Reference as RecordReference
 from ..fields.orientations import QUATERNION, OrientationLaw, Reference, about_their_middle, orientation_of
 from ..fields.piecewise import Piecewise
 from ..fields.spelling import IN_SPACE, Spelled, as_written, is_planar, keys_here
@@ -87,6 +84,8 @@ class Trajectory(MotionKeys):
     waypoints: WaypointTable | None = None
     """CSV file with the columns t (s) and x, y (m), in 3D scenes also z, and qw, qx, qy, qz for the orientation. Of a
     joint: with the column value, or one of the joint's name (rad, m)."""
+
+    refers_to = (("point", "loaded"), ("angle", "loaded"), ("joint", "joint"), ("motor", "joint"))
 
     @model_validator(mode="after")
     def _consistent(self, info: ValidationInfo) -> Trajectory:
@@ -162,14 +161,6 @@ class Trajectory(MotionKeys):
             paths = [path for path in (self.path, self._turning) if path is not None]
         if any(not (np.isfinite(path.coefficients).all() and np.isfinite(path.breaks).all()) for path in paths):
             raise ValueError("expected limits and times that fit each other in size, found infinite derivatives")
-
-    def references(self) -> Iterator[RecordReference]:
-        """What follows it."""
-        yield from loaded_reference("point", self.point)
-        yield from loaded_reference("angle", self.angle)
-        for key in ("joint", "motor"):
-            if (name := getattr(self, key)) is not None:
-                yield RecordReference(key, name, "joint")
 
     def changed(self, **keys: object) -> Trajectory:
         """The same with some keys replaced."""
