@@ -87,6 +87,9 @@ def test_a_solve_loads_what_its_scene_needs(ffrobot, tmp_path):
     of_others = ("actuation.patches.link_patches", "actuation.feasibility", "actuation.control.linear_model",
                  "mbs.solve.stable_inversion", "mesh.part_mesh")  # fmt: skip
     assert not {f"ffrobot.{module}" for module in of_others} & found
+    results = scene.with_suffix(".results.h5")
+    shown = loaded(f"sys.argv = ['ffrobot', 'info', {str(results)!r}]\nfrom ffrobot.cli import main\nmain()")
+    assert not {"pydantic", "ffrobot.mbs._core"} & shown
 
 
 def test_a_solve_costs_a_few_times_what_its_libraries_cost(ffrobot, tmp_path):

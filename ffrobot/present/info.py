@@ -22,7 +22,6 @@ from ..results.file import FORMAT as RESULTS_FORMAT
 from ..results.file import status_in_words
 from ..results.linear import read_metrics
 from ..results.meanings import MODAL_BODY, RESULTS, Meaning, meaning
-from .lines import LOOP_COLUMNS, loop_row
 
 
 def describe(path: Path) -> str:
@@ -111,7 +110,6 @@ def _results(file: h5py.File) -> str:
         lines.append(f"body {name}: {body['path']} (sha256 {body['sha256'][:12]})")
     analyses = Table("analysis", "kind", "status", "outputs", "up to t (s)", "steps", "evaluations", "wall (s)")
     datasets = Table("dataset", "shape", "unit", "what")
-    loops = Table(*LOOP_COLUMNS, box=None, padding=(0, 1, 0, 0))
     for name, group in file.items():
         time, attributes = group["time"], group.attrs
         analyses.add_row(
@@ -119,10 +117,15 @@ def _results(file: h5py.File) -> str:
             f"{attributes['steps']}", f"{attributes['evaluations']}",
             f"{attributes['wall_seconds']:.3f}",
         )  # fmt: skip
-        if "control/commands" in group:
-            loops.add_row(*loop_row(name, read_metrics(group["control"].attrs)))
         _add_datasets(datasets, group, RESULTS)
-    tables = [analyses, loops, datasets] if loops.row_count else [analyses, datasets]
+    tables = [analyses, datasets]
+    closed = {name: group["control"].attrs for name, group in file.items() if "control/commands" in group}
+    if closed:
+        from .lines import LOOP_COLUMNS, loop_row  # loads what solves
+
+        tables.insert(1, loops := Table(*LOOP_COLUMNS, box=None, padding=(0, 1, 0, 0)))
+        for name, attributes in closed.items():
+            loops.add_row(*loop_row(name, read_metrics(attributes)))
     return "\n".join(lines) + "\n" + "".join(map(_rendered, tables))
 
 

@@ -11,7 +11,6 @@ import h5py
 import numpy as np
 
 from ..common.arrays import Array
-from ..mbs.quantities.motion import RobotMotion
 
 if TYPE_CHECKING:  # most scenes have none of these
     from ..actuation.control.linear import LinearModels
@@ -19,6 +18,7 @@ if TYPE_CHECKING:  # most scenes have none of these
     from ..actuation.control.loop_record import LoopRecord
     from ..actuation.control.metrics import Metrics
     from ..mbs.analysis.operating_points import RobotAtRest
+    from ..mbs.quantities.motion import RobotMotion
 
 MATRICES = ("A", "B", "C", "D", "mass", "transformation")
 NAMES = ("state_names", "input_names", "output_names")
