@@ -51,6 +51,12 @@ class Command:
         options |= {"env": self.environment, "cwd": cwd, "timeout": timeout, "capture_output": True, "text": True}
         return subprocess.run([self.path, *arguments], **options)
 
+    def ok(self, *arguments, **options):
+        """As called; a command that does not end with 0 fails the test with what it wrote to stderr."""
+        done = self(*arguments, **options)
+        assert done.returncode == 0, done.stderr
+        return done
+
 
 @dataclass(frozen=True)
 class SolvedCase:
@@ -164,37 +170,39 @@ def _as_it_is(text):
 
 @pytest.fixture(scope="session")
 def solved(ffrobot, shared_folder, tmp_path_factory):
-    """Copy a case, edit the text of its scene and of its link files, run it; within `timeout` (s).
+    """Copy a case, edit the text of one of its scenes and of its link files, run it; within `timeout` (s).
 
     A case as it is runs once for all processes of the test session, in a folder that its tests share.
     """
     shared = shared_folder / "solved"
     shared.mkdir(exist_ok=True)
 
-    def solve(name, edit=_as_it_is, edit_link=_as_it_is, timeout=120):
+    def solve(name, edit=_as_it_is, edit_link=_as_it_is, timeout=120, scene="scene.toml"):
         if (edit, edit_link) != (_as_it_is, _as_it_is):
-            return run(name, tmp_path_factory.mktemp("solved"), edit, edit_link, timeout)
-        with (shared / f"{name}.lock").open("w") as lock:
+            return run(name, tmp_path_factory.mktemp("solved"), edit, edit_link, timeout, scene)
+        of = name if scene == "scene.toml" else f"{name} {scene}"
+        with (shared / f"{of}.lock").open("w") as lock:
             fcntl.flock(lock, fcntl.LOCK_EX)
-            told = shared / f"{name}.json"
+            told = shared / f"{of}.json"
             if not told.exists():
-                done = run(name, shared / f"of {name}", edit, edit_link, timeout)
+                done = run(name, shared / f"of {of}", edit, edit_link, timeout, scene)
                 done.file.close()
                 told.write_text(json.dumps([str(done.folder), done.stdout, done.stderr]), encoding="utf-8")
         folder, stdout, stderr = json.loads(told.read_text(encoding="utf-8"))
-        return SolvedCase(Path(folder), stdout, stderr, h5py.File(Path(folder, "scene.results.h5"), "r"))
+        return SolvedCase(Path(folder), stdout, stderr, h5py.File(results_of(Path(folder, scene)), "r"))
 
-    def run(name, folder, edit, edit_link, timeout):
-        scene = _copy(name, folder)
-        scene.write_text(edit(scene.read_text(encoding="utf-8")), encoding="utf-8")
-        for body in tomllib.loads(scene.read_text(encoding="utf-8"))["body"]:
-            if "link" in body:
-                link = scene.parent / body["link"]
+    def run(name, folder, edit, edit_link, timeout, scene):
+        path = _copy(name, folder).with_name(scene)
+        path.write_text(edit(path.read_text(encoding="utf-8")), encoding="utf-8")
+        for body in tomllib.loads(path.read_text(encoding="utf-8"))["body"]:
+            if "link" in body and edit_link is not _as_it_is:
+                link = path.parent / body["link"]
                 link.write_text(edit_link(link.read_text(encoding="utf-8")), encoding="utf-8")
-        done = ffrobot("solve", "scene.toml", "--verbose", cwd=scene.parent, timeout=timeout)
-        assert done.returncode == 0, done.stderr
-        file = h5py.File(scene.with_suffix(".results.h5"), "r")
-        return SolvedCase(scene.parent, done.stdout, done.stderr, file)
+        done = ffrobot.ok("solve", scene, "--verbose", cwd=path.parent, timeout=timeout)
+        return SolvedCase(path.parent, done.stdout, done.stderr, h5py.File(results_of(path), "r"))
+
+    def results_of(path):
+        return path.with_suffix(".results.h5")
 
     return solve
 
@@ -273,8 +281,7 @@ analysis = [{ name = "inverse", kind = "pcid", end = 0.02, output_step = 0.002 }
 """,
         encoding="utf-8",
     )
-    done = ffrobot("solve", "scene.toml", cwd=folder)
-    assert done.returncode == 0, done.stderr
+    ffrobot.ok("solve", "scene.toml", cwd=folder)
     return folder
 
 

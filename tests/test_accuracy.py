@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from beam_links import beam_link, rectangle
 from exact_rod import rigidities, tip_of
 
 import ffrobot as library
@@ -32,15 +33,7 @@ def drawn(seed):
 def solved(height, width, force, moment, body, keys, condition="cantilever", at="root"):
     """Displacement of the free end as seen from the clamped one, at root or tip, and attributes of the link."""
     free, turned = ("tip", 0.0) if at == "root" else ("root", np.pi)
-    link = {
-        "name": "rod",
-        "material": {"youngs_modulus": E, "poissons_ratio": NU, "density": 1e-3},
-        "geometry": {
-            "kind": "beam", "length": LENGTH, "section": {"shape": "rectangle", "height": height, "width": width},
-        },
-        "mesh": {"elements": 16},
-        "reference": {"condition": condition},
-    }  # fmt: skip
+    link = beam_link(LENGTH, rectangle(height, width), 16, E=E, nu=NU, rho=1e-3, condition=condition, name="rod")
     load = dict(zip(("x", "y", "z", "mx", "my", "mz"), map(str, (*force, *moment)), strict=True))
     scene = library.make_scene(
         name="rod", space="spatial", gravity=[0.0, 0.0, 0.0],

@@ -6,6 +6,7 @@ extrapolated; Pinocchio's algorithms for the dynamics, SciPy's Radau for the tim
 
 import numpy as np
 import pytest
+from beam_links import beam_link, rectangle
 
 import ffrobot
 
@@ -43,16 +44,10 @@ ARMS = {
 
 
 def link(name, damping, length, height, width, E, density):
-    return {
-        "name": name,
-        "material": {"youngs_modulus": E, "poissons_ratio": 0.3, "density": density},
-        "geometry": {
-            "kind": "beam", "length": length, "section": {"shape": "rectangle", "height": height, "width": width},
-        },
-        "mesh": {"elements": 16},
-        "reference": {"condition": "cantilever"},
-        "damping": {"rayleigh": [0.0, damping]},
-    }  # fmt: skip
+    return beam_link(
+        length, rectangle(height, width), 16, E=E, nu=0.3, rho=density, name=name,
+        damping={"rayleigh": [0.0, damping]}
+    )  # fmt: skip
 
 
 def solved(arm, pieces=None, **keys):

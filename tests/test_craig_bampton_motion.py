@@ -6,6 +6,7 @@ is, and with steel itself (sag 1.6 %) makes 2e-3 of a moment between any frame o
 
 import numpy as np
 import pytest
+from beam_links import beam_link, rectangle
 
 import ffrobot
 
@@ -15,14 +16,17 @@ CONDITIONS = ("craig-bampton", "cantilever", "simply-supported")
 
 def link(name, condition, length, count=6):
     """A steel link."""
-    return {
-        "name": name,
-        "material": {"youngs_modulus": E, "poissons_ratio": 0.3, "density": 7800.0},
-        "geometry": {"kind": "beam", "length": length, "section": {"shape": "rectangle", "height": H, "width": B}},
-        "mesh": {"elements": 16},
-        "reference": {"condition": condition},
-        "modes": {"count": count, "family": "in-plane-bending"},
-    }
+    return beam_link(
+        length,
+        rectangle(H, B),
+        16,
+        E=E,
+        nu=0.3,
+        rho=7800.0,
+        condition=condition,
+        name=name,
+        modes={"count": count, "family": "in-plane-bending"},
+    )
 
 
 def law(start, by):

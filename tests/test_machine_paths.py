@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from beam_links import beam_link, rectangle
 
 import ffrobot
 from ffrobot.common.errors import InputError
@@ -10,14 +11,13 @@ from ffrobot.run.fastest import least_stretch
 INERTIA, TURN = 0.3, 1.2
 RIGID = {"rigid": {"mass": 2.0, "inertia": INERTIA, "center": [0.0, 0.0], "points": {"root": [0.0, 0.0]}}}
 BEAM = {
-    "link": {
-        "material": {"youngs_modulus": 70e9, "poissons_ratio": 0.33, "density": 2700.0},
-        "geometry": {"kind": "beam", "length": 0.8, "section": {"shape": "rectangle", "height": 4e-3, "width": 0.03}},
-        "mesh": {"elements": 12},
-        "reference": {"condition": "cantilever"},
-        "modes": {"count": 3, "family": "in-plane-bending", "attachment_modes": False},
-        "damping": {"ratio": 0.005},
-    }
+    "link": beam_link(
+        0.8,
+        rectangle(4e-3, 0.03),
+        12,
+        modes={"count": 3, "family": "in-plane-bending", "attachment_modes": False},
+        damping={"ratio": 0.005},
+    )
 }
 
 

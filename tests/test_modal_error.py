@@ -1,6 +1,7 @@
 """The estimate of what missing modes make of results, against links with all modes of their mesh."""
 
 import pytest
+from beam_links import beam_link
 
 import ffrobot
 from ffrobot.run.modal_error import modal_errors
@@ -11,14 +12,18 @@ from ffrobot.run.solve import solve_scene
 
 def arm(modes, start):
     section = {"shape": "rectangle", "height": 0.012, "width": 0.03}
-    link = {
-        "name": "link",
-        "material": {"youngs_modulus": 2.1e11, "density": 7850.0},
-        "geometry": {"kind": "beam", "length": 0.8, "section": section},
-        "mesh": {"elements": 20},
-        "damping": {"ratio": 0.01},
-        "modes": {"family": "in-plane-bending"} | modes,
-    }
+    link = beam_link(
+        0.8,
+        section,
+        20,
+        E=2.1e11,
+        nu=None,
+        rho=7850.0,
+        condition=None,
+        name="link",
+        damping={"ratio": 0.01},
+        modes={"family": "in-plane-bending"} | modes,
+    )
     of = {"b1": "simply-supported", "b2": "cantilever"}
     s = "(10*(2*t)**3 - 15*(2*t)**4 + 6*(2*t)**5)"
     scene = ffrobot.make_scene(

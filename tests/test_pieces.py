@@ -6,6 +6,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+from beam_links import beam_link, rectangle
 
 from ffrobot import make_scene
 from ffrobot.common.errors import InputError
@@ -24,14 +25,18 @@ DRIVEN = [
 
 
 def link(modulus=SOFT, **keys):
-    return {
-        "name": "link",
-        "material": {"youngs_modulus": modulus, "poissons_ratio": 0.3, "density": 2700.0},
-        "geometry": {"kind": "beam", "length": 1.0, "section": {"shape": "rectangle", "height": 0.01, "width": 0.02}},
-        "mesh": {"elements": 16},
-        "reference": {"condition": "cantilever"},
-        "modes": {"count": 8, "family": "in-plane-bending"},
-    } | keys
+    return (
+        beam_link(
+            1.0,
+            rectangle(0.01, 0.02),
+            16,
+            E=modulus,
+            nu=0.3,
+            name="link",
+            modes={"count": 8, "family": "in-plane-bending"},
+        )
+        | keys
+    )
 
 
 def pendulum(pieces, of=None, analysis=None, **keys):
@@ -71,46 +76,6 @@ def test_soft_double_pendulum(pieces, bound, truth, tmp_path):
         deflection = file["fall/points/link2.tip/deflection"][()]
     assert np.linalg.norm(tip - truth, axis=1).max() < bound
     assert np.abs(deflection[:, 1]).max() == pytest.approx(0.136, abs=0.002)
-
-
-def shapes_of(group):
-    found = {}
-    group.visititems(lambda key, entry: found.update({key: getattr(entry, "shape", None)}))
-    return found
-
-
-def test_datasets_are_those_of_the_one_link(tmp_path):
-    """The same names and shapes; where the link is stiff, the same motion but for fast vibrations of the start."""
-    analysis = [{"name": "fall", "kind": "forward", "end": 0.1, "output_step": 0.05, "tolerance": 1e-5}]
-    with (
-        solved(pendulum(None, link(STIFF), analysis), tmp_path) as one,
-        solved(pendulum(3, link(STIFF), analysis), tmp_path) as three,
-    ):
-        assert shapes_of(one["fall"]) == shapes_of(three["fall"])
-        for key in ("bodies/link1/position", "bodies/link2/angle", "points/link1.mid/position"):
-            expected, found = one[f"fall/{key}"][()], three[f"fall/{key}"][()]
-            np.testing.assert_allclose(found, expected, atol=1e-3, err_msg=key)
-
-
-@pytest.mark.parametrize("condition", ["cantilever", "simply-supported"])
-def test_frame_and_modal_coordinates_tell_where_points_are(condition, tmp_path):
-    """R, θ and p of the one link, as found from the pieces: their rates are derivatives."""
-    stiff = link(STIFF, reference={"condition": condition})
-    analysis = [{"name": "fall", "kind": "forward", "end": 0.2, "output_step": 1e-4, "tolerance": 1e-7}]
-    with solved(pendulum(2, stiff, analysis), tmp_path) as file:
-        fall = file["fall"]
-        body = {key: fall[f"bodies/link2/{key}"][()] for key in fall["bodies/link2"]}
-        deflection = fall["points/link2.mid/deflection"][()]
-        time = fall["time"][()]
-    for key, rate in (("position", "velocity"), ("angle", "angular_velocity"), ("modal", "modal_velocity")):
-        difference = (body[key][2:] - body[key][:-2]) / (time[2] - time[0])
-        if difference.ndim == 2:
-            difference, rates = difference[:, :2], body[rate][1:-1, :2]
-        else:
-            rates = body[rate][1:-1]
-        assert np.abs(difference - rates).max() < 2e-2 * np.abs(rates).max(), key
-    if condition == "simply-supported":
-        assert np.abs(deflection).max() > 1e-4
 
 
 def test_a_path_is_followed_with_a_payload_and_named_interfaces(tmp_path):
@@ -165,38 +130,6 @@ def test_pieces_make_up_the_link():
     assert second["interface"][0]["position"] == pytest.approx(0.3)
 
 
-@pytest.mark.parametrize(
-    ("keys", "says"),
-    [
-        ({"actuation_points": [{"body": "link1"}]}, "expected none with subdivided bodies"),
-        ({"motors": "frame"}, 'motors: expected "section" with subdivided bodies'),
-        ({"trajectory": [{"name": "turn", "angle": "link1", "value": "t"}]}, "expected a point or a joint"),
-    ],
-)
-def test_what_cannot_be_had_is_refused(keys, says):
-    with pytest.raises(InputError, match=says):
-        solve_scene(pendulum(2, **keys))
-
-
-@pytest.mark.parametrize(
-    ("of", "says"),
-    [
-        (link(damping={"ratio": 0.01}), "damping: expected none or rayleigh"),
-        (link(modes={"count": 2, "family": "axial"}), 'modes.family: expected "in-plane-bending" among those'),
-        (
-            link(geometry={"kind": "solid", "length": 1.0,
-                           "section": {"shape": "rectangle", "height": 0.01, "width": 0.02}}, mesh={}),
-            'geometry.kind: expected "beam" of a subdivided body',
-        ),
-    ],
-)  # fmt: skip
-def test_links_that_cannot_be_cut_are_refused(of, says):
-    with pytest.raises(InputError, match=says):
-        solve_scene(pendulum(2, of))
-
-
-def test_pieces_of_a_rigid_body_are_refused():
-    rigid = {"mass": 1.0, "inertia": 0.1, "center": [0.5, 0.0], "points": {"root": [0.0, 0.0], "tip": [1.0, 0.0]}}
-    bodies = [{"name": name, "rigid": rigid, "pieces": 2} for name in ("link1", "link2")]
-    with pytest.raises(InputError, match='expected "pieces" with "link" alone, found "rigid"'):
-        pendulum(None, body=bodies)
+def test_paths_of_angles_are_refused():
+    with pytest.raises(InputError, match="expected a point or a joint"):
+        solve_scene(pendulum(2, trajectory=[{"name": "turn", "angle": "link1", "value": "t"}]))

@@ -5,6 +5,7 @@ import io
 import h5py
 import numpy as np
 import pytest
+from beam_links import beam_link, rectangle
 
 from ffrobot import make_scene
 from ffrobot.results.write import results_image
@@ -19,15 +20,16 @@ LOOP = {"kind": "closed-loop", "end": 0.2, "output_step": 0.01, "tolerance": 1e-
 
 
 def link(condition):
-    return {
-        "name": "link",
-        "material": {"youngs_modulus": 7e10, "poissons_ratio": 0.3, "density": 2700.0},
-        "geometry": {"kind": "beam", "length": 1.0, "section": {"shape": "rectangle", "height": 0.01, "width": 0.02}},
-        "mesh": {"elements": 16},
-        "reference": {"condition": condition},
-        "modes": {"count": 4, "family": "in-plane-bending"},
-        "damping": {"rayleigh": [0.0, 2e-4]},
-    }
+    return beam_link(
+        1.0,
+        rectangle(0.01, 0.02),
+        16,
+        nu=0.3,
+        condition=condition,
+        name="link",
+        modes={"count": 4, "family": "in-plane-bending"},
+        damping={"rayleigh": [0.0, 2e-4]},
+    )
 
 
 def solved(pieces, analyses, **keys):

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from beam_links import beam_link, tube
 from scipy.interpolate import CubicSpline
 
 from ffrobot import make_scene
@@ -12,18 +13,9 @@ TUBES = {"upper": (0.5, 0.06, 0.052), "fore": (0.4, 0.05, 0.044), "hand": (0.2, 
 
 
 def link(length, outer, inner):
-    return {
-        "material": {"youngs_modulus": 70e9, "poissons_ratio": 0.33, "density": 2700.0},
-        "geometry": {
-            "kind": "beam",
-            "length": length,
-            "section": {"shape": "tube", "outer": outer, "inner": inner},
-        },
-        "mesh": {"elements": 20},
-        "reference": {"condition": "cantilever"},
-        "modes": {"count": 4, "family": "in-plane-bending"},
-        "damping": {"ratio": 0.01},
-    }
+    return beam_link(
+        length, tube(outer, inner), 20, modes={"count": 4, "family": "in-plane-bending"}, damping={"ratio": 0.01}
+    )
 
 
 @pytest.fixture(scope="module")

@@ -27,8 +27,7 @@ def validator(ffrobot):
     """Validators of what the command prints."""
 
     def make(kind):
-        done = ffrobot("schema", kind)
-        assert done.returncode == 0, done.stderr
+        done = ffrobot.ok("schema", kind)
         printed = json.loads(done.stdout)
         assert printed == schema(kind)
         cls = jsonschema.validators.validator_for(printed)

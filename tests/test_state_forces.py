@@ -6,6 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from beam_links import beam_link, circle
 
 import ffrobot
 
@@ -50,13 +51,7 @@ def scene(force, *, joint, analysis, link=None, load=(), **keys):
 HINGE = {"name": "O", "type": "revolute", "between": ["ground", "arm.root"]}
 SLIDE = {"name": "O", "type": "prismatic", "between": ["ground", "arm.root"], "axis": [0.0, 1.0], "motor": False}
 FREE = {"name": "free", "kind": "forward", "end": 1.0, "tolerance": 1e-9}
-LINK = {
-    "material": {"youngs_modulus": 70e9, "poissons_ratio": 0.33, "density": 2700.0},
-    "geometry": {"kind": "beam", "length": 0.6, "section": {"shape": "circle", "diameter": 0.01}},
-    "mesh": {"elements": 4},
-    "reference": {"condition": "cantilever"},
-    "modes": {"count": 2, "family": "in-plane-bending"},
-}
+LINK = beam_link(0.6, circle(0.01), 4, modes={"count": 2, "family": "in-plane-bending"})
 
 
 @pytest.mark.parametrize("integrator", ["dop853", "radau"])
@@ -71,18 +66,6 @@ def test_compiled_is_python(compiled_spring, integrator):
     by_python, by_core = (run["free/points/arm.tip/position"] for run in runs)
     np.testing.assert_allclose(by_core, by_python, rtol=1e-12)
     assert np.ptp(by_core[:, 1]) > 1e-3  # it moves
-
-
-def test_moment_that_it_asks_of_the_motor():
-    """Held at an angle γ the hinge feels the spring: τ = −(r × F), F = −k (tip − anchor)."""
-    hold = {"name": "turn", "joint": "O", "value": "0.4"}
-    results = ffrobot.solve(
-        scene(spring, joint=HINGE, trajectory=[hold], analysis={"name": "held", "kind": "pcid", "end": 0.1})
-    )
-    tip = 0.6 * np.array([np.cos(0.4), np.sin(0.4)])
-    force = -K * (tip - ANCHOR)
-    moment = results["held/joints/O/moment"]
-    np.testing.assert_allclose(moment, -(tip[0] * force[1] - tip[1] * force[0]), rtol=1e-10)
 
 
 def test_moment_of_the_function_is_that_of_a_load():
@@ -186,11 +169,6 @@ def test_what_is_no_function(force, complaint):
     with pytest.raises(ffrobot.InputError) as error:
         scene(force, joint=HINGE, analysis=FREE)
     assert complaint in str(error.value)
-
-
-def test_stands_alone():
-    with pytest.raises(ffrobot.InputError, match='expected "force" alone with "point", found "x", "force"'):
-        scene(spring, joint=HINGE, analysis=FREE, load=[{"point": "arm.tip", "x": "1", "force": spring}])
 
 
 def test_wrong_returns_and_errors_come_through():

@@ -1,6 +1,7 @@
 """A cantilever strip of aluminium with patches on one face or on both, and its tip under their voltage."""
 
 import numpy as np
+from beam_links import beam_link, rectangle
 
 import ffrobot
 
@@ -16,15 +17,16 @@ def tip(height, face, modes, pieces=1, **keys):
 
 def solved(height, face, modes, pieces=1, places=(), **keys):
     """Results; stress points p0 … on the upper side at `places`."""
-    link = {
-        "name": "strip",
-        "material": {"youngs_modulus": E, "poissons_ratio": 0.3, "density": 2700.0},
-        "geometry": {"kind": "beam", "length": L, "section": {"shape": "rectangle", "height": height, "width": B}},
-        "mesh": {"elements": 40},
-        "reference": {"condition": "cantilever"},
-        "modes": {"family": "in-plane-bending"} | modes,
-        "stress": {"points": {f"p{k}": [x, height / 2, 0.0] for k, x in enumerate(places)}},
-    }
+    link = beam_link(
+        L,
+        rectangle(height, B),
+        40,
+        E=E,
+        nu=0.3,
+        name="strip",
+        modes={"family": "in-plane-bending"} | modes,
+        stress={"points": {f"p{k}": [x, height / 2, 0.0] for k, x in enumerate(places)}},
+    )
     centers, on = [(START + END) / 2], {"face": face} if face else {}
     pzt = {"body": "strip", "centers": centers, "length": END - START, "width": B, "thickness": T_P, **on, **keys}
     scene = ffrobot.make_scene(

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from beam_links import beam_link, tube
 
 import ffrobot
 from ffrobot.actuation.feasibility import PatchFeasibility, Remedies
@@ -254,18 +255,13 @@ def test_short_peaks_of_motors_only_are_laid_to_the_jerk():
 
 def three_links(law):
     """Upper arm, forearm and hand, their tip and their hand's angle led along a law of motion from 0 to 1."""
-    link = {
-        "material": {"youngs_modulus": 70e9, "poissons_ratio": 0.33, "density": 2700.0},
-        "geometry": {
-            "kind": "beam",
-            "length": 0.5,
-            "section": {"shape": "tube", "outer": 0.04, "inner": 0.034},
-        },
-        "mesh": {"elements": 10},
-        "reference": {"condition": "cantilever"},
-        "modes": {"count": 4, "attachment_modes": False, "family": "in-plane-bending"},
-        "damping": {"ratio": 0.01},
-    }
+    link = beam_link(
+        0.5,
+        tube(0.04, 0.034),
+        10,
+        modes={"count": 4, "attachment_modes": False, "family": "in-plane-bending"},
+        damping={"ratio": 0.01},
+    )
     hand = link | {"geometry": link["geometry"] | {"length": 0.15}}
     rotor = {"type": "revolute", "gear_ratio": 100.0}
     small = rotor | {"gear_ratio": 50.0, "rotor_inertia": 1e-5}

@@ -4,6 +4,7 @@ import warnings
 
 import numpy as np
 import pytest
+from beam_links import beam_link, rectangle
 
 import ffrobot
 from ffrobot.actuation.control.metrics import _settling, overshoot, ringing, vibration, watched
@@ -94,14 +95,10 @@ def test_settling_is_where_the_error_comes_down_to_its_share():
 def arm(*, space, thickness, step):
     """A soft arm turned by 4° in 0.3 s, its hub held by PD with a rotor of 10 kg m²."""
     spatial = {"space": "spatial", "gravity": [0.0, 0.0, 0.0]}
-    link = {
-        "material": {"youngs_modulus": 70e9, "poissons_ratio": 0.33, "density": 2700.0},
-        "geometry": {
-            "kind": "beam", "length": 0.6, "section": {"shape": "rectangle", "height": thickness, "width": 0.02},
-        },
-        "mesh": {"elements": 20}, "reference": {"condition": "cantilever"},
-        "modes": {"count": 2, "family": "in-plane-bending"}, "damping": {"ratio": 0.005},
-    }  # fmt: skip
+    link = beam_link(
+        0.6, rectangle(thickness, 0.02), 20, modes={"count": 2, "family": "in-plane-bending"},
+        damping={"ratio": 0.005}
+    )  # fmt: skip
     joint = {"name": "hub", "type": "revolute", "between": ["ground", "arm.root"], "gear_ratio": 100.0}
     return {
         "name": "arm", "gravity": [0.0, 0.0], "body": [{"name": "arm", "link": link}],

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from beam_links import beam_link, rectangle
 
 import ffrobot as library
 from ffrobot.run.solve import solve_scene
@@ -10,17 +11,10 @@ GEARED = {"gear_ratio": 80.0, "rotor_inertia": 2e-5}
 
 
 def link(name, length, height):
-    return {
-        "name": name,
-        "material": {"youngs_modulus": 70e9, "density": 2700.0},
-        "geometry": {
-            "kind": "beam", "length": length, "section": {"shape": "rectangle", "height": height, "width": 0.03},
-        },
-        "mesh": {"elements": 20},
-        "reference": {"condition": "cantilever"},
-        "modes": {"count": 4, "family": "in-plane-bending", "attachment_modes": False},
-        "damping": {"ratio": 0.01},
-    }  # fmt: skip
+    return beam_link(
+        length, rectangle(height, 0.03), 20, nu=None, name=name,
+        modes={"count": 4, "family": "in-plane-bending", "attachment_modes": False}, damping={"ratio": 0.01}
+    )  # fmt: skip
 
 
 def quintic(start, end, duration):

@@ -13,8 +13,7 @@ pytestmark = pytest.mark.alone
 @pytest.fixture(scope="module")
 def rows(ffrobot, tmp_path_factory):
     folder = tmp_path_factory.mktemp("evaluations")
-    done = ffrobot("bench", "--part", "evaluations", "--source", REPOSITORY, "-o", folder)
-    assert done.returncode == 0, done.stderr
+    ffrobot.ok("bench", "--part", "evaluations", "--source", REPOSITORY, "-o", folder)
     with (folder / "evaluations.csv").open(encoding="utf-8", newline="") as stream:
         return {row["what"]: row for row in csv.DictReader(stream)}
 

@@ -13,8 +13,7 @@ pytestmark = pytest.mark.alone
 @pytest.fixture(scope="module")
 def rows(ffrobot, tmp_path_factory):
     folder = tmp_path_factory.mktemp("replays")
-    done = ffrobot("bench", "--part", "replays", "--repeat", "2", "--source", REPOSITORY, "-o", folder)
-    assert done.returncode == 0, done.stderr
+    ffrobot.ok("bench", "--part", "replays", "--repeat", "2", "--source", REPOSITORY, "-o", folder)
     with (folder / "replays.csv").open(encoding="utf-8", newline="") as stream:
         keys = ("scene", "what", "integrator", "tolerance")
         return {tuple(row[key] for key in keys): row for row in csv.DictReader(stream)}

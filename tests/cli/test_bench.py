@@ -61,8 +61,7 @@ def folder(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def done(ffrobot, folder):
-    run = ffrobot("bench", "scene.toml", *RUN, cwd=folder)
-    assert run.returncode == 0, run.stderr
+    ffrobot.ok("bench", "scene.toml", *RUN, cwd=folder)
     return folder / "scene.bench"
 
 

@@ -39,8 +39,7 @@ def solved(case_copy_of_module, ffrobot):
     text = text.replace("LINK1", 'link = "link1.toml"').replace("LINK2", 'link = "link2.toml"')
     (folder / "scene.toml").write_text(text, encoding="utf-8")
     (folder / "figures.toml").unlink()
-    done = ffrobot("solve", "scene.toml", cwd=folder)
-    assert done.returncode == 0, done.stderr
+    ffrobot.ok("solve", "scene.toml", cwd=folder)
     return folder
 
 
@@ -49,8 +48,7 @@ def solved(case_copy_of_module, ffrobot):
     [("info",), ("feasibility",), ("report",), ("plot", "--format", "svg", "--only", "*"), ("view", "--frames", "2")],
 )
 def test_names_of_all_kinds(solved, ffrobot, command):
-    done = ffrobot(command[0], "scene.results.h5", *command[1:], cwd=solved)
-    assert done.returncode == 0, done.stderr
+    ffrobot.ok(command[0], "scene.results.h5", *command[1:], cwd=solved)
     if command[0] == "info":
         with h5py.File(solved / "scene.results.h5") as file:
             assert NAMES[4] in file
@@ -67,8 +65,7 @@ def test_byte_order_mark(case_copy, ffrobot):
     scene = case_copy("two_link")
     text = scene.read_text(encoding="utf-8").replace("end = 1.0", "end = 0.004")
     scene.write_text(text, encoding="utf-8-sig")
-    done = ffrobot("solve", scene)
-    assert done.returncode == 0, done.stderr
+    ffrobot.ok("solve", scene)
 
 
 @pytest.mark.parametrize("command", ["info", "feasibility"])

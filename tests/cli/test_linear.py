@@ -63,8 +63,7 @@ def scene(tmp_path):
 def test_a_rigid_arm_held_by_its_motor_and_in_motion(ffrobot, scene):
     """δθ̈ = (δτ + m g l sin θ δθ)/J: gravity's stiffness at the angle at which the arm is."""
     path = scene()
-    done = ffrobot("solve", path, "--verbose")
-    assert done.returncode == 0, done.stderr
+    done = ffrobot.ok("solve", path, "--verbose")
     assert "held: joint/hub → joint/hub: minimum phase" in done.stdout
     with Results(path.with_suffix(".results.h5")) as results:
         (held,), moving = results.linear("held"), results.linear("along")

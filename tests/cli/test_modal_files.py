@@ -42,8 +42,7 @@ def test_solve_uses_the_cache(two_link_copy, ffrobot, two_link):
     """The links were computed for the session's `two_link`; nothing is written beside the scene but the results."""
     folder = two_link_copy({"scene.toml": SHORT})
     before = {path.name for path in folder.iterdir()}
-    done = ffrobot("solve", "scene.toml", "--verbose", cwd=folder)
-    assert done.returncode == 0, done.stderr
+    done = ffrobot.ok("solve", "scene.toml", "--verbose", cwd=folder)
     assert "link1: stage 1, up to date" in done.stdout
     assert "link2: stage 1, up to date" in done.stdout
     assert {path.name for path in folder.iterdir()} - before == {"scene.results.h5"}
@@ -57,14 +56,12 @@ def test_damaged_cache_entry_is_made_again(two_link_copy, ffrobot):
     assert entry.is_relative_to(ffrobot.cache)
     content = entry.read_bytes()
     entry.write_bytes(content[:1000])
-    done = ffrobot("solve", "scene.toml", cwd=folder)
-    assert done.returncode == 0, done.stderr
+    ffrobot.ok("solve", "scene.toml", cwd=folder)
     assert entry.read_bytes() == content
 
 
 def test_scene_with_a_modal_file_gives_the_same(given, two_link_copy, ffrobot, two_link):
-    done = ffrobot("solve", "scene.toml", "-o", "mine.h5", cwd=given)
-    assert done.returncode == 0, done.stderr
+    ffrobot.ok("solve", "scene.toml", "-o", "mine.h5", cwd=given)
     assert not (given / "scene.results.h5").exists()
     with h5py.File(given / "mine.h5") as file:
         name = "inverse/points/link2.tip/deflection"

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from beam_links import beam_link, tube
 
 import ffrobot as program
 from ffrobot.fe_models.link_file import LinkTable, read_link
@@ -11,14 +12,7 @@ from ffrobot.scene.plausibility import remarks, remarks_on_link, remarks_on_memo
 
 CASES = Path(__file__).parents[2] / "cases"
 BAR = {"mass": 1.0, "inertia": 0.1, "center": [0.5, 0.0], "points": {"root": [0.0, 0.0], "tip": [1.0, 0.0]}}
-LINK = {
-    "name": "arm",
-    "material": {"youngs_modulus": 70e9, "density": 2700.0},
-    "geometry": {"kind": "beam", "length": 0.6, "section": {"shape": "tube", "outer": 0.02, "inner": 0.016}},
-    "mesh": {"elements": 4},
-    "reference": {"condition": "cantilever"},
-    "modes": {"count": 1, "family": "in-plane-bending"},
-}
+LINK = beam_link(0.6, tube(0.02, 0.016), 4, nu=None, name="arm", modes={"count": 1, "family": "in-plane-bending"})
 
 
 def arm(end=1.0, body=BAR, payload=(), tool=(), **path):

@@ -125,8 +125,7 @@ def test_two_link_case_moves_by_some_percent(ffrobot, case_copy):
         text = text.replace("end = 1.0", "end = 0.2").replace("tolerance = 1e-7", "tolerance = 1e-5")
         text = text.replace('motors = "section"', f'motors = "section"\ngeometric_stiffening = {key}')
         scene.write_text(text, encoding="utf-8")
-        done = ffrobot("solve", scene, "--verbose")
-        assert done.returncode == 0, done.stderr
+        done = ffrobot.ok("solve", scene, "--verbose")
         assert ("warning" in done.stdout) == (key == "false")
         with h5py.File(scene.with_suffix(".results.h5")) as file:
             forces[key] = file["inverse/trajectories/tip/force"][()]

@@ -54,8 +54,7 @@ def folder(tmp_path):
 
 def test_a_cantilever_under_its_weight_and_a_mass(folder, ffrobot):
     """M(x) = ρA g (L − x)²/2 + m g (L − x), pulling the upper side; V(0) = ρA g L + m g, in three modes."""
-    done = ffrobot("solve", "scene.toml", "--verbose", cwd=folder)
-    assert done.returncode == 0, done.stderr
+    done = ffrobot.ok("solve", "scene.toml", "--verbose", cwd=folder)
     weight, load, resistance = 7800.0 * 0.04 * 0.02 * 9.81, 3.0 * 9.81, 0.02 * 0.04**2 / 6
     moments = [weight * (2.0 - x) ** 2 / 2 + load * (2.0 - x) for x in (0.0, 1.0)]
     with h5py.File(folder / "scene.results.h5") as file:
@@ -86,8 +85,7 @@ def test_a_point_outside_the_section_is_refused(folder, refused):
 
 def test_without_stress_points_nothing_is_said(folder, ffrobot):
     (folder / "arm.toml").write_text(LINK.replace("[stress]\npoints", "[stress]\n# points"))
-    done = ffrobot("solve", "scene.toml", "--verbose", cwd=folder)
-    assert done.returncode == 0, done.stderr
+    done = ffrobot.ok("solve", "scene.toml", "--verbose", cwd=folder)
     assert "von Mises" not in done.stdout
     with h5py.File(folder / "scene.results.h5") as file:
         assert "stress" not in file["rest"]

@@ -54,8 +54,7 @@ def deflections(scene):
 
 
 def test_grid_over_link_and_scene(ffrobot, short_scene):
-    done = ffrobot("sweep", short_scene, "--vary", HEIGHTS, "--vary", MASSES)
-    assert done.returncode == 0, done.stderr
+    ffrobot.ok("sweep", short_scene, "--vary", HEIGHTS, "--vary", MASSES)
     rows = table(short_scene)
     assert [(row["links.rod.geometry.section.diameter"], row["body.crank.rigid.mass"]) for row in rows] == [
         (diameter, mass) for diameter in ("0.004", "0.006", "0.008") for mass in ("0.03", "0.04")
@@ -73,8 +72,7 @@ def test_keys_of_a_link_in_the_scene(ffrobot, short_scene):
     scene["body"][1]["link"] = tomllib.loads((short_scene.parent / scene["body"][1]["link"]).read_text("utf-8"))
     inline = short_scene.with_name("inline.toml")
     inline.write_text(tomli_w.dumps(scene), encoding="utf-8")
-    done = ffrobot("sweep", inline, "--vary", HEIGHTS)
-    assert done.returncode == 0, done.stderr
+    ffrobot.ok("sweep", inline, "--vary", HEIGHTS)
     assert deflections(inline) == expected
 
 
@@ -93,8 +91,7 @@ def test_what_is_varied_is_what_is_solved(ffrobot, short_scene, tmp_path):
 
 def test_failures_are_rows(ffrobot, short_scene):
     vary = ["--vary", "body.crank.rigid.mass=0.03,-1", "--vary", "analysis.inverse.max_steps=5,99999"]
-    done = ffrobot("sweep", short_scene, *vary)
-    assert done.returncode == 0, done.stderr
+    ffrobot.ok("sweep", short_scene, *vary)
     rows = table(short_scene)
     assert [row["status"] for row in rows] == ["failed", "completed", "wrong input", "wrong input"]
     assert "too many steps" in rows[0]["message"]
@@ -137,8 +134,7 @@ def test_latin_hypercube(ffrobot, short_scene):
     vary = ["--vary", "payload.0.mass=0.01:1:2:log", "--vary", 'trajectory.slider.x="0.35","0.3"']
     text = short_scene.read_text(encoding="utf-8") + '\n[[payload]]\npoint = "rod.mid"\nmass = 0.1\n'
     short_scene.write_text(text, encoding="utf-8")
-    done = ffrobot("sweep", short_scene, *vary, "--sample", 4, "--seed", 7)
-    assert done.returncode == 0, done.stderr
+    ffrobot.ok("sweep", short_scene, *vary, "--sample", 4, "--seed", 7)
     rows = table(short_scene)
     decades = sorted(float(row["payload.0.mass"]) for row in rows)
     assert all(0.01 * 100 ** (k / 4) <= mass < 0.01 * 100 ** ((k + 1) / 4) for k, mass in enumerate(decades))
@@ -256,8 +252,7 @@ def test_a_body_named_scene_has_its_own_file(ffrobot, short_scene):
     """In the folder of a run, where the scene has one of this name."""
     text = short_scene.read_text(encoding="utf-8").replace('"rod', '"scene').replace("rod = ", "scene = ")
     short_scene.write_text(text.replace('link = "scene.toml"', 'link = "rod.toml"'), encoding="utf-8")
-    done = ffrobot("sweep", short_scene, "--vary", HEIGHTS.replace("links.rod", "links.scene"))
-    assert done.returncode == 0, done.stderr
+    ffrobot.ok("sweep", short_scene, "--vary", HEIGHTS.replace("links.rod", "links.scene"))
     assert [row["status"] for row in table(short_scene)] == ["completed"] * 3
 
 
@@ -269,8 +264,7 @@ def test_spectra(ffrobot, tmp_path):
     (tmp_path / "scene.toml").write_text(PENDULUM, encoding="utf-8")
     asked = [f"at_rest/linear/frequency{one}" for one in (":first", ":last", ":rms", ":max", "[0]:first", "[1]:first")]
     collect = [word for one in asked for word in ("--collect", one)]
-    done = ffrobot("sweep", tmp_path / "scene.toml", "--vary", "gravity.1=-9.81,-1.62", *collect)
-    assert done.returncode == 0, done.stderr
+    ffrobot.ok("sweep", tmp_path / "scene.toml", "--vary", "gravity.1=-9.81,-1.62", *collect)
     for row, g in zip(table(tmp_path / "scene.toml"), (9.81, 1.62), strict=True):
         low, high = (math.sqrt((2 + sign * math.sqrt(2)) * g / 0.5) / (2 * math.pi) for sign in (-1, 1))
         found = [float(row[one.replace(":", " ")]) for one in asked]

@@ -120,8 +120,7 @@ def sweep(ffrobot, scene):
     def run(*functions, options=()):
         listed = ",".join(f'"{scene.parent}/mine.py:{name}"' for name in functions)
         vary = f"analysis.loop.controller.0.python={listed}"
-        done = ffrobot("sweep", scene, "--vary", vary, "--collect", "loop/joints/O/coordinate:last", "-j", 1, *options)
-        assert done.returncode == 0, done.stderr
+        ffrobot.ok("sweep", scene, "--vary", vary, "--collect", "loop/joints/O/coordinate:last", "-j", 1, *options)
         with (scene.with_suffix(".sweep") / "table.csv").open(encoding="utf-8") as file:
             return list(csv.DictReader(file))
 
@@ -163,8 +162,7 @@ def test_results_are_those_of_single_runs(sweep, scene, ffrobot, tmp_path):
     sweep("careless", "constant")
     run = scene.with_suffix(".sweep") / "runs" / "0001"
     single = tmp_path / "single.h5"
-    done = ffrobot("solve", run / "scene.toml", "-o", single, "--allow-python", scene.parent)
-    assert done.returncode == 0, done.stderr
+    ffrobot.ok("solve", run / "scene.toml", "-o", single, "--allow-python", scene.parent)
     expected, found = datasets(single), datasets(run / "results.h5")
     assert set(found) == set(expected)
     assert len(expected) > 10

@@ -1,14 +1,16 @@
 """What designs are sought for in these tests: a tube that swings, a cantilever under a force, a rigid arm."""
 
-TUBE = {
-    "name": "arm",
-    "material": {"youngs_modulus": 70e9, "density": 2700.0, "poissons_ratio": 0.3},
-    "geometry": {"kind": "beam", "length": 0.6, "section": {"shape": "tube", "outer": 0.02, "inner": 0.016}},
-    "mesh": {"elements": 6},
-    "reference": {"condition": "cantilever"},
-    "modes": {"count": 2, "family": "in-plane-bending", "attachment_modes": False},
-    "damping": {"ratio": 0.02},
-}
+from beam_links import beam_link, rectangle, tube
+
+TUBE = beam_link(
+    0.6,
+    tube(0.02, 0.016),
+    6,
+    nu=0.3,
+    name="arm",
+    modes={"count": 2, "family": "in-plane-bending", "attachment_modes": False},
+    damping={"ratio": 0.02},
+)
 SWING = {
     "name": "arm",
     "gravity": [0.0, -9.81],
@@ -21,15 +23,17 @@ SWING = {
 }
 
 L, E, RHO, FORCE = 0.5, 70e9, 2700.0, 20.0
-BEAM = {
-    "name": "beam",
-    "material": {"youngs_modulus": E, "density": RHO, "poissons_ratio": 0.3},
-    "geometry": {"kind": "beam", "length": L, "section": {"shape": "rectangle", "height": 0.02, "width": 0.02}},
-    "mesh": {"elements": 2},
-    "reference": {"condition": "cantilever"},
-    "modes": {"count": 2, "family": "in-plane-bending"},
-    "damping": {"ratio": 0.01},
-}
+BEAM = beam_link(
+    L,
+    rectangle(0.02, 0.02),
+    2,
+    E=E,
+    nu=0.3,
+    rho=RHO,
+    name="beam",
+    modes={"count": 2, "family": "in-plane-bending"},
+    damping={"ratio": 0.01},
+)
 CANTILEVER = {
     "name": "cantilever",
     "gravity": [0.0, 0.0],

@@ -102,8 +102,7 @@ def test_screening_of_a_rigid_arm(scene):
 )
 def test_keys_that_change_nothing(ffrobot, scene, by):
     """Payloads are not counted in the mass: no division by a variance of 0."""
-    done = ffrobot("uncertainty", scene, "--of", "mass", "--spread", f"{PAYLOAD}=±5%", "--no-figures", "--by", *by)
-    assert done.returncode == 0, done.stderr
+    done = ffrobot.ok("uncertainty", scene, "--of", "mass", "--spread", f"{PAYLOAD}=±5%", "--no-figures", "--by", *by)
     assert "note       mass: none of the keys changes it" in done.stdout
     assert "nan" not in done.stdout
 
@@ -115,8 +114,7 @@ def test_failed_runs_are_told_and_left_out(ffrobot, tmp_path):
     outer, inner = (f"links.arm.geometry.section.{name}" for name in ("outer", "inner"))
     spreads = ("--spread", f"{outer}=±0.0025", "--spread", f"{inner}=±0.0025")
     command = ("uncertainty", path, "--of", "mass", *spreads, "--by", "screening", "--trajectories", 8, "-j", 2)
-    done = ffrobot(*command)
-    assert done.returncode == 0, done.stderr
+    done = ffrobot.ok(*command)
     folder = tmp_path / "scene.uncertainty"
     with (folder / "table.csv").open(encoding="utf-8") as file:
         runs = list(csv.DictReader(file))

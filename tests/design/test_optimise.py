@@ -269,8 +269,7 @@ def test_going_on(ffrobot, write):
     assert "ended after" in stopped.stdout
     rows = {path: path.stat().st_mtime_ns for path in folder.glob("runs/*/row.json")}
     assert len(rows) <= 8
-    done = ffrobot(*command)
-    assert done.returncode == 0, done.stderr
+    done = ffrobot.ok(*command)
     assert "price      peak points.beam.tip.deflection: 0.00101 m instead of 0.001 saves" in done.stdout
     assert {path: path.stat().st_mtime_ns for path in rows} == rows
     with (folder / "designs.csv").open(encoding="utf-8") as file:

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import tomli_w
+from beam_links import beam_link, rectangle
 from scipy.stats.qmc import LatinHypercube
 
 import ffrobot
@@ -19,19 +20,17 @@ def flexibility(segments):
 
 
 def segment(k, segments):
-    return {
-        "name": f"s{k}",
-        "material": {"youngs_modulus": E, "density": RHO, "poissons_ratio": 0.3},
-        "geometry": {
-            "kind": "beam",
-            "length": LENGTH / segments,
-            "section": {"shape": "rectangle", "height": 0.012, "width": WIDTH},
-        },
-        "mesh": {"elements": 1},
-        "reference": {"condition": "cantilever"},
-        "modes": {"count": 2, "family": "in-plane-bending"},
-        "damping": {"ratio": 0.01},
-    }
+    return beam_link(
+        LENGTH / segments,
+        rectangle(0.012, WIDTH),
+        1,
+        E=E,
+        nu=0.3,
+        rho=RHO,
+        name=f"s{k}",
+        modes={"count": 2, "family": "in-plane-bending"},
+        damping={"ratio": 0.01},
+    )
 
 
 def weld(k):

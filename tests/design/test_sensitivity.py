@@ -253,8 +253,7 @@ def test_command(ffrobot, write):
     """The table on the screen, the file with all numbers, the picture; another key later runs only what is new."""
     scene = write(ARM)
     arguments = ("sensitivity", scene, "--of", "peak joints.shoulder.moment")
-    done = ffrobot(*arguments, "--to", "payload.0.mass", "-j", 2)
-    assert done.returncode == 0, done.stderr
+    done = ffrobot.ok(*arguments, "--to", "payload.0.mass", "-j", 2)
     assert "payload.0.mass" in done.stdout
     assert "4 runs" in done.stdout
     folder = scene.with_suffix(".sensitivity")

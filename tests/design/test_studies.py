@@ -117,8 +117,7 @@ def test_files_of_a_command(ffrobot, scene, tmp_path):
     with (folder / "designs.csv").open(encoding="utf-8") as table:
         masses = [float(row["mass"]) for row in csv.DictReader(table)]
     np.testing.assert_allclose(axes[1].values, masses, rtol=1e-12)
-    page = ffrobot("report", folder)
-    assert page.returncode == 0, page.stderr
+    ffrobot.ok("report", folder)
     assert (tmp_path / "found.html").stat().st_size > 1_000_000
 
 

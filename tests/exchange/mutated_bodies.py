@@ -16,6 +16,8 @@ import warnings
 from collections import Counter
 from pathlib import Path
 
+from beam_links import beam_link, circle
+
 import ffrobot
 from ffrobot.common.errors import InputError
 from ffrobot.exchange.bodies.mbdyn import fem_text
@@ -35,14 +37,14 @@ def texts():
     """A file of each format and reference condition, short ones."""
     found = {}
     for condition in CONDITIONS:
-        link = {
-            "name": "arm",
-            "material": {"youngs_modulus": 70e9, "poissons_ratio": 0.33, "density": 2700.0},
-            "geometry": {"kind": "beam", "length": 0.6, "section": {"shape": "circle", "diameter": 0.02}},
-            "mesh": {"elements": 2},
-            "reference": {"condition": condition},
-            "modes": {"count": 1, "family": ["in-plane-bending", "torsion"]},
-        }
+        link = beam_link(
+            0.6,
+            circle(0.02),
+            2,
+            condition=condition,
+            name="arm",
+            modes={"count": 1, "family": ["in-plane-bending", "torsion"]},
+        )
         body = ffrobot.make_link(link).body
         found[condition, ".SID_FEM"], found[condition, ".fem"] = sid_text(body)[0], fem_text(body)[0]
     return found

@@ -34,8 +34,7 @@ def robot(request, tmp_path_factory, ffrobot):
     if isinstance(request.param, int):
         rng, urdf = np.random.default_rng(request.param), folder / "random.urdf"
         urdf.write_text(random_urdf(rng))
-    done = ffrobot("import", urdf, "-o", folder / "out")
-    assert done.returncode == 0, done.stderr
+    ffrobot.ok("import", urdf, "-o", folder / "out")
     path = folder / "out" / "scene.toml"
     text = re.sub(r"^(viscous|coulomb)_friction = .*\n", "", path.read_text(), flags=re.MULTILINE)
     path.write_text(

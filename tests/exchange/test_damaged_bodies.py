@@ -6,6 +6,7 @@ import warnings
 import h5py
 import numpy as np
 import pytest
+from beam_links import beam_link, circle
 from mutated_bodies import campaign, texts
 
 import ffrobot
@@ -55,14 +56,7 @@ DATASETS = ("mass", "second_moment", "invariants/I_bar", "interfaces/tip/rotatio
 @pytest.mark.parametrize(("value", "found"), [(1e300, "1e+300"), (1 + 2j, "complex ones"), ("text", "text")])
 def test_numbers_of_modal_bodies(tmp_path, dataset, value, found):
     """By name, and in no words of NumPy's."""
-    link = {
-        "name": "arm",
-        "material": {"youngs_modulus": 70e9, "poissons_ratio": 0.33, "density": 2700.0},
-        "geometry": {"kind": "beam", "length": 0.6, "section": {"shape": "circle", "diameter": 0.02}},
-        "mesh": {"elements": 4},
-        "reference": {"condition": "cantilever"},
-        "modes": {"count": 2},
-    }
+    link = beam_link(0.6, circle(0.02), 4, name="arm", modes={"count": 2})
     path = tmp_path / "arm.h5"
     path.write_bytes(ffrobot.make_link(link).path.read_bytes())
     with h5py.File(path, "r+") as file:

@@ -131,15 +131,13 @@ def folder(ffrobot, tmp_path_factory):
     folder = tmp_path_factory.mktemp("fmu")
     (folder / "arm.toml").write_text(LINK)
     (folder / "scene.toml").write_text(SCENE)
-    done = ffrobot("solve", "scene.toml", cwd=folder)
-    assert done.returncode == 0, done.stderr
+    ffrobot.ok("solve", "scene.toml", cwd=folder)
     return folder
 
 
 @pytest.fixture(scope="module")
 def robot(ffrobot, folder):
-    done = ffrobot("export", "scene.results.h5", "--format", "fmu", cwd=folder)
-    assert done.returncode == 0, done.stderr
+    done = ffrobot.ok("export", "scene.results.h5", "--format", "fmu", cwd=folder)
     assert "written    scene.results.at_rest.fmu: at_rest, 14 states, 5 inputs, 9 outputs" in done.stdout
     assert "sources only" not in done.stdout
     return Robot(folder, folder / "scene.results.at_rest.fmu")
@@ -251,10 +249,9 @@ def test_an_instance_goes_back(robot):
 
 
 def test_the_same_model_is_the_same_file(robot, ffrobot):
-    done = ffrobot(
+    ffrobot.ok(
         "export", "scene.results.h5", "--analysis", "at_rest", "--format", "fmu", "-o", "again.fmu", cwd=robot.folder
     )
-    assert done.returncode == 0, done.stderr
     assert (robot.folder / "again.fmu").read_bytes() == robot.path.read_bytes()
 
 
@@ -290,8 +287,7 @@ def test_without_a_compiler_there_are_sources(robot, ffrobot, tmp_path, monkeypa
 
 def test_a_compiler_that_fails_is_told(robot, ffrobot, tmp_path, monkeypatch):
     monkeypatch.setenv("CC", "cc -no-such-option")
-    done = ffrobot("export", robot.folder / "scene.results.h5", "--format", "fmu", "-o", tmp_path / "x.fmu")
-    assert done.returncode == 0, done.stderr
+    done = ffrobot.ok("export", robot.folder / "scene.results.h5", "--format", "fmu", "-o", tmp_path / "x.fmu")
     assert "sources only, no binary: cc -no-such-option failed: " in done.stdout
 
 
@@ -332,8 +328,7 @@ analysis = [{ name = "at_rest", kind = "linear" }]
 def test_a_linear_model_in_3d(ffrobot, folder):
     (folder / "space.toml").write_text(IN_SPACE)
     for command in (("solve", "space.toml"), ("export", "space.results.h5", "--format", "fmu")):
-        done = ffrobot(*command, cwd=folder)
-        assert done.returncode == 0, done.stderr
+        ffrobot.ok(*command, cwd=folder)
     assert validate_fmu(str(folder / "space.results.at_rest.fmu")) == []
     variables = read_model_description(str(folder / "space.results.at_rest.fmu")).modelVariables
     units = {each.name: each.unit for each in variables}

@@ -122,8 +122,7 @@ rigid.inertia = [0.01, 0.02, 0.02]
 rigid.points.root = [0.0, 0.0, 0.0]
 """
     )
-    done = ffrobot("solve", tmp_path / "scene.toml")
-    assert done.returncode == 0, done.stderr
+    done = ffrobot.ok("solve", tmp_path / "scene.toml")
     assert "path.csv: times are those of a clock" in done.stdout
 
 
@@ -198,8 +197,7 @@ def test_joint_states_of_a_bag(version, tmp_path, ffrobot):
             none = np.zeros(0)
             message = of[kind](header, [name for name, _ in pairs], np.array([q for _, q in pairs]), none, none)
             writer.write(topic, EPOCH * 10**9 + k, types.serialize_cdr(message, kind))
-    done = ffrobot("import", tmp_path / "bag", "-o", tmp_path / "path.csv")
-    assert done.returncode == 0, done.stderr
+    done = ffrobot.ok("import", tmp_path / "bag", "-o", tmp_path / "path.csv")
     assert "measured positions of /joint_states" in done.stdout
     table = load_waypoints(tmp_path / "path.csv")
     assert table.columns == ("hip", "knee")

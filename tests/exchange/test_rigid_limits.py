@@ -90,13 +90,11 @@ def straight(request, tmp_path_factory, ffrobot):
     for name, link in links.items():
         (folder / f"{name}.toml").write_text(link)
         flexible += ["--flexible", f"{name}={folder / name}.toml"]
-    done = ffrobot("import", urdf, "-o", folder / "out", *flexible)
-    assert done.returncode == 0, done.stderr
+    ffrobot.ok("import", urdf, "-o", folder / "out", *flexible)
     scene = folder / "out" / "scene.toml"
     keys = re.sub(r"^(viscous|coulomb)_friction = .*\n", "", scene.read_text(), flags=re.MULTILINE)
     scene.write_text(with_motion(keys, *motion).replace('\nkind = "pcid"', '\nkind = "fcid"\nshape = "zero"'))
-    done = ffrobot("solve", scene)
-    assert done.returncode == 0, done.stderr
+    ffrobot.ok("solve", scene)
     with h5py.File(scene.with_suffix(".results.h5")) as file:
         found = np.array([file[f"inverse/joints/{name}/moment"][0] for name in names])
         assert set(links) <= {name for name, body in file["inverse/bodies"].items() if "modal" in body}

@@ -17,8 +17,7 @@ CLOSE = 1e-8
 def scene(tmp_path_factory, ffrobot):
     """The imported robot on compliant gears whose motors stand still; rotors without inertia, nearly."""
     folder = tmp_path_factory.mktemp("ur5")
-    done = ffrobot("import", ROBOTS / "ur5.urdf", "-o", folder / "out")
-    assert done.returncode == 0, done.stderr
+    ffrobot.ok("import", ROBOTS / "ur5.urdf", "-o", folder / "out")
     keys = tomllib.loads((folder / "out" / "scene.toml").read_text())
     for joint, stiffness in zip(keys["joint"], STIFFNESS, strict=True):
         joint |= {"gear_ratio": 1.0, "rotor_inertia": 1e-12, "stiffness": stiffness}

@@ -31,8 +31,7 @@ def ur5(tmp_path_factory, ffrobot):
         with_motion(scene.read_text(), *motion).replace("end = 1e-3", "end = 2.1").replace("step = 1e-3", "step = 0.7")
     )
     scene.write_text(text)
-    done = ffrobot("solve", scene)
-    assert done.returncode == 0, done.stderr
+    ffrobot.ok("solve", scene)
     return scene.with_suffix(".results.h5")
 
 
@@ -51,8 +50,7 @@ def table(path):
 @pytest.mark.parametrize("kind", ["ur5", "crank"])
 def test_csv_has_every_digit(kind, request, ffrobot, tmp_path):
     results = request.getfixturevalue(kind)
-    done = ffrobot("export", results, "--format", "csv", "-o", tmp_path / "out.csv")
-    assert done.returncode == 0, done.stderr
+    ffrobot.ok("export", results, "--format", "csv", "-o", tmp_path / "out.csv")
     found = table(tmp_path / "out.csv")
     with h5py.File(results) as file:
         analysis = "inverse"
@@ -67,8 +65,7 @@ def test_csv_has_every_digit(kind, request, ffrobot, tmp_path):
 @pytest.mark.parametrize("kind", ["ur5", "crank"])
 def test_joint_trajectory_is_the_message(kind, request, ffrobot, tmp_path):
     results = request.getfixturevalue(kind)
-    done = ffrobot("export", results, "--format", "joint-trajectory", "-o", tmp_path / "out.json")
-    assert done.returncode == 0, done.stderr
+    done = ffrobot.ok("export", results, "--format", "joint-trajectory", "-o", tmp_path / "out.json")
     message = json.loads((tmp_path / "out.json").read_text())
     assert list(message) == TRAJECTORY
     points, names = message["points"], message["joint_names"]
@@ -93,8 +90,7 @@ def test_a_rosbag2_has_the_message(ur5, ffrobot, tmp_path):
     from rosbags.highlevel import AnyReader
 
     for file_format, name in (("rosbag2", "bag"), ("joint-trajectory", "out.json")):
-        done = ffrobot("export", ur5, "--format", file_format, "-o", tmp_path / name)
-        assert done.returncode == 0, done.stderr
+        done = ffrobot.ok("export", ur5, "--format", file_format, "-o", tmp_path / name)
     expected = json.loads((tmp_path / "out.json").read_text())
     with AnyReader([tmp_path / "bag"]) as bag:
         ((connection, _, raw),) = bag.messages()
@@ -134,8 +130,7 @@ def test_each_analysis_has_a_file_and_none_is_replaced(crank, ffrobot, tmp_path)
     done = ffrobot("export", results, "--format", "csv", "--analysis", names[0])
     assert (done.returncode, made[0].read_text()) == (2, "mine\n")
     assert f"{made[0].name}: output: expected a new name, or --force to replace it" in done.stderr
-    done = ffrobot("export", results, "--format", "csv", "--analysis", names[0], "--force")
-    assert done.returncode == 0, done.stderr
+    done = ffrobot.ok("export", results, "--format", "csv", "--analysis", names[0], "--force")
     assert len(made[0].read_text().splitlines()) > 2
     motion = replace(robot_motion(results, names[0]), joints=(JointMotion("=cmd|' /C calc'!A0", *3 * (np.zeros(2),)),))
     assert csv_text(replace(motion, time=np.zeros(2))).startswith("time,'=cmd|' /C calc'!A0.coordinate,")

@@ -80,13 +80,11 @@ def solved(tmp_path_factory, ffrobot):
     scene, urdf = folder / "scene.toml", folder / "arm.urdf"
     scene.write_text(with_motion(ARM, *MOTION))
     for command in (("export", scene, "--format", "urdf", "-o", urdf), ("import", urdf, "-o", folder / "back")):
-        done = ffrobot(*command)
-        assert done.returncode == 0, done.stderr
+        ffrobot.ok(*command)
     back = folder / "back" / "scene.toml"
     back.write_text(with_motion(back.read_text(), *MOTION))
     for file in (scene, back):
-        done = ffrobot("solve", file)
-        assert done.returncode == 0, done.stderr
+        ffrobot.ok("solve", file)
     return urdf, *(Results(file.with_suffix(".results.h5")) for file in (scene, back))
 
 
@@ -132,8 +130,7 @@ def test_random_trees(seed, tmp_path, ffrobot):
     motion = [{name: float(rng.uniform(-1, 1)) for name in names} for _ in range(3)]
     assert ffrobot("import", first, "-o", scene.parent).returncode == 0
     scene.write_text(with_motion(scene.read_text(), *motion))
-    done = ffrobot("export", scene, "--format", "urdf", "-o", again)
-    assert done.returncode == 0, done.stderr
+    ffrobot.ok("export", scene, "--format", "urdf", "-o", again)
     expected = moments(first.read_text(), *motion)
     found = moments(again.read_text(), *motion)
     scale = max(map(abs, expected.values()))
@@ -170,8 +167,7 @@ def test_joints_in_steps(backwards, tmp_path, ffrobot):
     scene, urdf = tmp_path / "scene.toml", tmp_path / "chain.urdf"
     scene.write_text(CHAIN.format(bodies=BODIES, tube=tube, cross=cross))
     for command in (("solve", scene), ("export", scene, "--format", "urdf", "-o", urdf)):
-        done = ffrobot(*command)
-        assert done.returncode == 0, done.stderr
+        done = ffrobot.ok(*command)
     for text in ('"ball": 3 joints instead of a spherical one', "angles about x, y, z", '"tube": 2 joints instead'):
         assert text in done.stderr + done.stdout
     results, robot = Results(tmp_path / "scene.results.h5"), yourdfpy.URDF.load(str(urdf))

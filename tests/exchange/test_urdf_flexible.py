@@ -81,8 +81,7 @@ def test_a_stiff_link_carries_what_the_rigid_one_does(tmp_path, ffrobot):
             "[initial.joints]", '[initial]\nstate = "static"\n[initial.joints]'
         )
         scene.write_text(moved)
-        solved = ffrobot("solve", scene)
-        assert solved.returncode == 0, solved.stderr
+        ffrobot.ok("solve", scene)
         expected = moments(ARM, q, rest, rest)
         with h5py.File(scene.with_suffix(".results.h5")) as file:
             found = [file[f"inverse/joints/{name}/moment"][0] for name in names]
@@ -128,8 +127,7 @@ def test_links_of_any_name_get_files_of_their_own_in_the_folder(name, tmp_path, 
     assert import_with(ffrobot, tmp_path).returncode == 0
     plain = {path.name: tomllib.loads(path.read_text(encoding="utf-8")) for path in (tmp_path / "out").iterdir()}
     (tmp_path / "arm.urdf").write_text(ARM.replace('"upper"', f'"{name}"'.replace("\n", "&#10;")), encoding="utf-8")
-    done = ffrobot("import", "arm.urdf", "-o", "other", "--flexible", f"{name}=bar.toml", cwd=tmp_path)
-    assert done.returncode == 0, done.stderr
+    ffrobot.ok("import", "arm.urdf", "-o", "other", "--flexible", f"{name}=bar.toml", cwd=tmp_path)
     assert {path.name for path in tmp_path.iterdir()} == {"arm.urdf", "bar.toml", "out", "other"}
     found = {path.name: tomllib.loads(path.read_text(encoding="utf-8")) for path in (tmp_path / "other").iterdir()}
     (link,) = (value for key, value in found.items() if key != "scene.toml")

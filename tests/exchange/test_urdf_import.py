@@ -41,8 +41,7 @@ def imported(tmp_path, ffrobot):
     def run(text, *arguments):
         urdf = tmp_path / "robot.urdf"
         urdf.write_text(text)
-        done = ffrobot("import", urdf, "-o", tmp_path / "scene", *arguments)
-        assert done.returncode == 0, done.stderr
+        done = ffrobot.ok("import", urdf, "-o", tmp_path / "scene", *arguments)
         scene = tmp_path / "scene" / "scene.toml"
         keys = tomllib.loads(scene.read_text())
         validate(MechanismKeys, keys, scene)
@@ -66,8 +65,7 @@ def test_the_tool_frame_of_the_last_body(imported, tmp_path, ffrobot):
     scene = tmp_path / "scene" / "scene.toml"
     with scene.open("a") as file:
         file.write('\n[[analysis]]\nname = "rest"\nkind = "static"\n')
-    done = ffrobot("export", scene, "--format", "urdf", "-o", tmp_path / "back.urdf")
-    assert done.returncode == 0, done.stderr
+    ffrobot.ok("export", scene, "--format", "urdf", "-o", tmp_path / "back.urdf")
     again, _ = imported((tmp_path / "back.urdf").read_text(), "--force")
     np.testing.assert_allclose([*again["tool"][0]["at"], *again["tool"][0]["rpy"]], [*found["at"], *found["rpy"]])
 

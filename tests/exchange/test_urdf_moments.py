@@ -17,15 +17,13 @@ OTHERS = {
 
 def solved_moments(ffrobot, urdf, folder, motion, *, friction=False):
     """{joint: moment} at t = 0, with the friction of the URDF or without."""
-    done = ffrobot("import", urdf, "-o", folder)
-    assert done.returncode == 0, done.stderr
+    ffrobot.ok("import", urdf, "-o", folder)
     scene = folder / "scene.toml"
     text = scene.read_text()
     if not friction:
         text = re.sub(r"^(viscous|coulomb)_friction = .*\n", "", text, flags=re.MULTILINE)
     scene.write_text(with_motion(text, *motion))
-    done = ffrobot("solve", scene)
-    assert done.returncode == 0, done.stderr
+    ffrobot.ok("solve", scene)
     with h5py.File(scene.with_suffix(".results.h5")) as file:
         return {name: float(joint["moment"][0]) for name, joint in file["inverse/joints"].items() if "moment" in joint}
 

@@ -15,6 +15,7 @@ from petsc4py import PETSc
 from ffrobot.fe_models.link import make_link
 from ffrobot.fe_models.link_file import read_link
 from ffrobot.fe_models.modal_body.unit_loads import unit_load_names, work_on_modes
+from ffrobot.fe_models.modal_body_file import read_modal_body
 from ffrobot.fe_models.solid.constitutive import stiffness
 from ffrobot.fe_models.solid.stress import point_stresses
 from ffrobot.mesh.compat import lagrange_space
@@ -51,7 +52,7 @@ points = {{ {points} }}
 
 
 @pytest.fixture(scope="module")
-def bar(tmp_path_factory):
+def bar(tmp_path_factory, ffrobot):
     """The modal body of a bar, or its link file."""
     folder = tmp_path_factory.mktemp("bar")
 
@@ -60,7 +61,8 @@ def bar(tmp_path_factory):
         keys = {"kind": kind, "hole": hole, "mesh": mesh, "condition": condition}
         path = folder / "bar.toml"
         path.write_text(LINK.format(**keys, attachment=attachment, points=named, more=more))
-        return make_link(path, force=True).body, path
+        ffrobot.ok("link", path, "--force", "-o", folder / "bar.h5")  # with the memory of a process of its own
+        return read_modal_body(folder / "bar.h5"), path
 
     return compute
 

@@ -7,6 +7,7 @@ import re
 import h5py
 import numpy as np
 import pytest
+from beam_links import beam_link, circle
 
 import ffrobot
 
@@ -170,14 +171,17 @@ def test_beams(seed):
 @pytest.mark.parametrize("condition", ["cantilever", "simply-supported"])
 def test_bars_of_any_length_have_the_same_modes(condition, length):
     """In SI; frequencies go with 1/length. A cantilever has of each bending family two shapes of loads at its tip."""
-    keys = {
-        "name": "bar",
-        "material": {"youngs_modulus": 2.07e11, "density": 7850.0, "poissons_ratio": 0.3},
-        "geometry": {"kind": "beam", "length": length, "section": {"shape": "circle", "diameter": length / 35}},
-        "mesh": {"elements": 10},
-        "reference": {"condition": condition},
-        "modes": {"count": 2, "family": "in-plane-bending"},
-    }
+    keys = beam_link(
+        length,
+        circle(length / 35),
+        10,
+        E=2.07e11,
+        nu=0.3,
+        rho=7850.0,
+        condition=condition,
+        name="bar",
+        modes={"count": 2, "family": "in-plane-bending"},
+    )
     body = ffrobot.make_link(keys).body
     keys["geometry"] |= {"length": 1.0, "section": {"shape": "circle", "diameter": 1 / 35}}
     expected = ffrobot.make_link(keys).body.frequency / length

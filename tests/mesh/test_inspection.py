@@ -125,8 +125,7 @@ def test_what_has_no_ends(tmp_path):
 
 def test_the_command(tmp_path, ffrobot):
     plate(tmp_path / "plate.step")
-    done = ffrobot("link", "plate.step", "--inspect", "--density", "2700", "-o", "plate.toml", cwd=tmp_path)
-    assert done.returncode == 0, done.stderr
+    done = ffrobot.ok("link", "plate.step", "--inspect", "--density", "2700", "-o", "plate.toml", cwd=tmp_path)
     assert f"mass {2700 * VOLUME:.4f}"[:10] in done.stdout
     assert "drawn in mm" in done.stdout
     assert (tmp_path / "plate.faces.png").read_bytes().startswith(b"\x89PNG")

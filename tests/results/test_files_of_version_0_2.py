@@ -59,8 +59,7 @@ def test_they_are_read_as_new_ones(old):
     ],
 )
 def test_every_reader_opens_them(old, ffrobot, command):
-    done = ffrobot(*command, cwd=old)
-    assert done.returncode == 0, done.stderr
+    ffrobot.ok(*command, cwd=old)
 
 
 def test_stopped_ones_are_not_resumed(old):

@@ -8,6 +8,7 @@ import h5py
 import numpy as np
 import pytest
 import tomli_w
+from beam_links import beam_link
 from links import ANGLES, TIP, arm, quintic
 from mechanisms import relative
 from oracle_runs import run
@@ -147,15 +148,17 @@ def flexible_arm(seed, units, folder):
     for k in range(3):
         length, height = draw.uniform(0.3, 0.6), draw.uniform(0.012, 0.02)
         section = {"shape": "rectangle", "height": height * L, "width": height * L * draw.uniform(0.6, 2.0)}
-        link = {
-            "name": f"link{k}",
-            "material": {"youngs_modulus": 7e10 * M / L / T**2, "density": 2700 * M / L**3, "poissons_ratio": 0.33},
-            "geometry": {"kind": "beam", "length": length * L, "section": section},
-            "mesh": {"elements": 8},
-            "reference": {"condition": draw.choice(["cantilever", "simply-supported"])},
-            "modes": {"count": draw.randint(1, 4)},
-            "damping": {"rayleigh": [0.0, 1e-4 * T]},
-        }
+        link = beam_link(
+            length * L,
+            section,
+            8,
+            E=7e10 * M / L / T**2,
+            rho=2700 * M / L**3,
+            condition=draw.choice(["cantilever", "simply-supported"]),
+            name=f"link{k}",
+            modes={"count": draw.randint(1, 4)},
+            damping={"rayleigh": [0.0, 1e-4 * T]},
+        )
         (folder / f"link{k}.toml").write_text(tomli_w.dumps(link))
         bodies.append({"name": f"link{k}", "link": f"link{k}.toml"})
         before = "ground" if k == 0 else f"link{k - 1}.tip"

@@ -5,6 +5,7 @@ Many more robots, others each time: tests/campaigns/tolerance.py.
 
 import h5py
 import pytest
+from beam_links import beam_link
 from judging import largest_errors
 from links import ANGLES, TIP, arm, arm_links
 from mechanisms import relative
@@ -27,13 +28,16 @@ def test_robots_that_were_outside(number):
 
 
 def beam(name, length, section, modes, **keys):
-    table = {
-        "material": {"youngs_modulus": 2.1e11, "density": 7850.0},
-        "geometry": {"kind": "beam", "length": length, "section": section},
-        "mesh": {"elements": 14},
-        "reference": {"condition": "simply-supported"},
-        "modes": {"count": modes, "family": "in-plane-bending", "attachment_modes": False},
-    }
+    table = beam_link(
+        length,
+        section,
+        14,
+        E=2.1e11,
+        nu=None,
+        rho=7850.0,
+        condition="simply-supported",
+        modes={"count": modes, "family": "in-plane-bending", "attachment_modes": False},
+    )
     return {"name": name, "link": table | keys}
 
 

@@ -74,18 +74,6 @@ def test_tubes_are_where_they_were_solved(grids, arm_3r):
                 np.testing.assert_allclose(middle[k], expected, rtol=0, atol=DIGITS)
 
 
-def test_exaggeration_keeps_joints_shut(grids, arm_3r):
-    with Results(arm_3r.folder / "scene.results.h5") as results:
-        largest = 0.0
-        for _, points, data, _ in grids:
-            column, upper, fore = parts(points + 19.0 * data["exaggeration"], results)
-            assert np.linalg.norm(column - upper[0][0], axis=1).min() < 20 * DIGITS
-            np.testing.assert_allclose(fore[0][0], upper[0][-1], rtol=0, atol=20 * DIGITS)
-            tip = parts(points, results)[2][0][-1]
-            largest = max(largest, float(np.linalg.norm(fore[0][-1] - tip)))
-        assert largest > 0.05  # 19 times some millimetres
-
-
 @pytest.mark.usefixtures("can_draw")
 def test_picture_stands_upright(arm_3r, tmp_path):
     """The rigid column is drawn, pale: pixels one above the other, higher than broad; the arm goes to its right."""
@@ -133,8 +121,7 @@ def test_solid_in_3d_carries_the_stress_of_the_plane(solid_arm, ffrobot, tmp_pat
         folder = tmp_path / space
         folder.mkdir()
         (folder / "scene.toml").write_text(_at_rest(solid_arm, space), encoding="utf-8")
-        done = ffrobot("solve", "scene.toml", "--verbose", cwd=folder)
-        assert done.returncode == 0, done.stderr
+        done = ffrobot.ok("solve", "scene.toml", "--verbose", cwd=folder)
         assert "largest von Mises (MPa)" in done.stdout
         with Results(folder / "scene.results.h5") as results:
             (found[space],) = results["rest/stress/arm/surface/von_mises_max"]
