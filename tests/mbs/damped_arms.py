@@ -1,5 +1,7 @@
 """Arms whose links have the damping ratio RATIO, of their own modes or of the robot's vibrations."""
 
+from beam_links import beam_link
+
 import ffrobot
 
 RATIO = 0.01
@@ -7,18 +9,12 @@ RATIO = 0.01
 
 def link(name, condition, of, section=None, **modes):
     """A steel beam of 1 m that bends in the plane, unless `modes` says otherwise."""
-    return {
-        "name": name,
-        "material": {"youngs_modulus": 2.068e11, "poissons_ratio": 0.3, "density": 7850.0},
-        "geometry": {
-            "kind": "beam", "length": 1.0,
-            "section": section or {"shape": "rectangle", "height": 0.015, "width": 0.025},
-        },
-        "mesh": {"elements": 20},
-        "reference": {"condition": condition},
-        "modes": modes or {"count": 10, "family": "in-plane-bending", "attachment_modes": False},
-        "damping": {"ratio": RATIO, "of": of},
-    }  # fmt: skip
+    return beam_link(
+        1.0, section or {"shape": "rectangle", "height": 0.015, "width": 0.025}, 20, E=2.068e11, nu=0.3, rho=7850.0,
+        condition=condition, name=name,
+        modes=modes or {"count": 10, "family": "in-plane-bending", "attachment_modes": False},
+        damping={"ratio": RATIO, "of": of}
+    )  # fmt: skip
 
 
 def planar_arm(conditions, of, **keys):

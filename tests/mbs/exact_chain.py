@@ -11,11 +11,13 @@ of these (docs/theory.md; Shabana, Dynamics of Multibody Systems, ch. 5).
 import mpmath
 import numpy as np
 from links import eigenmode_link
-from mechanisms import assemble, make_model, relative, revolute
+from mechanisms import relative
 from mpmath import mp
-from recursion_trees import tree_of
 
-DIGITS = 40
+from ffrobot.mbs import _core as r
+
+DIGITS, GRAVITY = 40, (0.0, -9.81)
+INVARIANTS = ("mass", "inertia", "first_moment", "S_bar", "h", "j", "S_tilde", "m_xy", "stiffness", "damping")
 CHAINS = [
     (2, "simply-supported", 10),
     (2, "simply-supported", 50),
@@ -44,8 +46,7 @@ class Invariants:
     """Those of a `PlanarBody` without stiffening, to 40 digits."""
 
     def __init__(self, body):
-        names = ("mass", "inertia", "first_moment", "S_bar", "h", "j", "S_tilde", "m_xy", "stiffness", "damping")
-        for name in names:
+        for name in INVARIANTS:
             setattr(self, name, exact(getattr(body, name))[()])
         self.ends = {
             label: tuple(exact(getattr(body.points[label], part)) for part in ("position", "translation", "rotation"))
@@ -117,38 +118,48 @@ def motion_of(end, A, theta_rate, p, p_rate):
     return L, A @ (2 * theta_rate * TURN @ Phi @ p_rate - theta_rate**2 * u)
 
 
-def chain(count, condition, modes):
-    """Hinged links, the last tip on a path."""
-    links = [eigenmode_link(f"b{k + 1}", condition, modes) for k in range(count)]
-    ends = ["ground", *(f"{link.name}.tip" for link in links)]
-    return make_model(
-        links,
-        joint=[revolute(f"j{k}", ends[k], f"{link.name}.root") for k, link in enumerate(links)],
-        trajectory=[{"name": "tip", "point": ends[-1], "x": "1+0.3*t**2", "y": "0.5-0.2*t**2"}],
-    )
+def marker(position=(0.0, 0.0), translation=(), rotation=()):
+    made = r.PlanarMarker()
+    made.position, made.angle = np.array(position), 0.0
+    made.Phi = np.vstack([np.reshape(translation, (2, -1)), np.reshape(rotation, (1, -1))])
+    return made
+
+
+def chain(links):
+    """Hinged links, as the core has them in the plane; rows are x and y of the last tip."""
+    bodies, tip = [], r.MarkerAt(len(links) - 1, 2)
+    for k, link in enumerate(links):
+        body, data = r.PlanarBody(), r.PlanarData()
+        for name in INVARIANTS:
+            setattr(data, name, getattr(link, name))
+        ends = [link.points[label] for label in ("root", "tip")]
+        still = marker(translation=np.zeros((2, link.n_modes)), rotation=np.zeros(link.n_modes))
+        data.markers = [still, *(marker(end.position, end.translation, end.rotation) for end in ends)]
+        body.name, body.joint, body.data, body.parent = link.name, r.JointKind.revolute, data, k - 1
+        body.inboard_marker, body.parent_marker = 1, 2 if k else 0
+        bodies.append(body)
+    rows = [r.ConstraintModel() for _ in range(2)]
+    for row, f in zip(rows, np.eye(3), strict=False):
+        row.name, row.kind, row.f, row.a, row.b = "tip", r.ConstraintKind.point, f, r.MarkerAt(-1, 0), tip
+    return r.PlanarModel(bodies, [marker()], rows, [], np.array(GRAVITY))
 
 
 def errors(count, condition, modes, seed):
     """Relative errors of λ and q̈ by the recursion in a random state."""
-    rng, model = np.random.default_rng(seed), chain(count, condition, modes)
-    tree = tree_of(assembly := assemble(model))
-    q, v = rng.standard_normal(tree.model.n_q), rng.standard_normal(tree.model.n_v)
-    first = np.array(tree.model.first)
-    assert tree.bodies == list(range(count))
-    number = np.arange(1, modes + 1)
+    rng, links = np.random.default_rng(seed), [eigenmode_link(f"b{k + 1}", condition, modes) for k in range(count)]
+    model, number, target = chain(links), np.arange(1, modes + 1), np.array([0.6, -0.4])
+    q, v = rng.standard_normal(model.n_q), rng.standard_normal(model.n_v)
+    first = np.array(model.first)
     for _, at_q, _, at_v in first:  # higher modes bend less: 1 mm, 10 mm/s of the first
         q[at_q : at_q + modes] *= 1e-3 / number**2
         v[at_v : at_v + modes] *= 1e-2 / number
     p, p_rate = ([x[at : at + modes] for at in column] for x, column in ((q, first[:, 1]), (v, first[:, 3])))
-    rows = [assembly.constraints[i] for i in tree.rows]
-    x_y = np.argsort([row.measure.kind.name for row in rows])
-    target = np.array([row.target(1.0)[2] for row in rows])
-    a, lambda_ = tree.model.evaluate(q, v, target, None, None)
-    A = tree.from_tree(q, v, a)[2]
-    exact_a, exact_lambda = accelerations(
-        model.bodies, model.scene.gravity[:2], q[first[:, 0]], v[first[:, 2]], p, p_rate, target[x_y]
-    )
-    return float(relative(lambda_[x_y], exact_lambda)), float(relative(A, exact_a))
+    a, lambda_ = model.evaluate(q, v, target, None, None)
+    frames = zip(model.frames(q, v), first[:, 3], strict=True)
+    A = np.concatenate([[*frame.a[:2], frame.alpha[2], *a[at : at + modes]] for frame, at in frames])
+    angle, rate = q[first[:, 0]], v[first[:, 2]]
+    exact_a, exact_lambda = accelerations(links, GRAVITY, angle, rate, p, p_rate, target)
+    return float(relative(lambda_, exact_lambda)), float(relative(A, exact_a))
 
 
 def main():

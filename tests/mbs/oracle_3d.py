@@ -8,7 +8,7 @@ sections and joints: docs/theory.md.
 from dataclasses import dataclass, field
 
 import numpy as np
-from rotations import exponential, left_jacobian, left_jacobian_rate, rotation, skew, turned
+from rotations import exponential, left_jacobian, left_jacobian_rate, rotation, skew
 from triad_measures import Coordinates, RowState
 
 
@@ -189,17 +189,6 @@ class Mechanism:
     def body(self, name):
         return next(body for body in self.bodies if body.name == name)
 
-    def integrate(self, q, dv):
-        """Q moved by the small velocity-like step dv (N,)."""
-        moved = q.copy()
-        for name in self.coordinates.names:
-            R, e, p = self.coordinates.parts(moved, name)
-            dR, turn, dp = self.coordinates.rates(dv, name)
-            e[:] = turned(e, turn)
-            R += dR
-            p += dp
-        return moved
-
     def mass_matrix(self, q):
         M = np.zeros((self.size, self.size))
         for body in self.bodies:
@@ -232,7 +221,7 @@ class Mechanism:
         return Q
 
     def marker(self, at, q, v, t=0.0):
-        """A section's triad (`triad_measures.Section`), of a body or the ground, or one driven in time."""
+        """A section's triad (`triad_measures.Section`), of a body or the ground."""
         L = np.zeros((6, self.size))
         if at.body is None:
             r, F, velocity, acceleration = at.motion(t)
@@ -299,26 +288,6 @@ class Mechanism:
             solution = np.linalg.solve(augmented, right)
         return solution[: self.size], solution[self.size :]
 
-    def reaction(self, number, t, q, v, multiplier):
-        """Force and moment (6,) that constraint `number` puts on its second side there, global axes."""
-        return -multiplier * self.row(self.constraints[number][0], q, v, t).on_b
-
-    def required(self, t, q, forces, mechanical, motors):
-        """What motors and modal forces replace generalised `forces` (N,) = −C_sᵀλ_s: τ (k,), F_p by body.
-
-        mechanical: rows whose reactions may change; motors: gradients (k, N) of the motors' rates.
-        """
-        C_m = np.array([self.row(row, q, np.zeros(self.size), t).gradient for row in mechanical])
-        of_modes = np.zeros((0, self.size))
-        for body in self.bodies:
-            of_modes = np.vstack([of_modes, np.eye(self.size)[self.coordinates.columns(body.name)][6:]])
-        rows = np.vstack([C_m.reshape(-1, self.size), motors, of_modes])
-        solution = np.linalg.lstsq(rows.T, forces, rcond=None)[0]
-        first = len(mechanical) + len(motors)
-        sizes = np.cumsum([0] + [body.n_modes for body in self.bodies]) + first
-        F_p = {body.name: solution[sizes[k] : sizes[k + 1]] for k, body in enumerate(self.bodies)}
-        return solution[len(mechanical) : first], F_p
-
     def energies(self, q, v):
         """Kinetic, strain and gravitational energy."""
         strain = gravitational = 0.0
@@ -330,13 +299,3 @@ class Mechanism:
             strain += 0.5 * p @ (body.stiffness * p)
             gravitational -= (body.mass * R + rotation(e) @ s) @ self.gravity
         return np.array([0.5 * v @ self.mass_matrix(q) @ v, strain, gravitational])
-
-    def momentum(self, q, v):
-        """Linear momentum (3) and angular momentum about the origin (3), of all bodies together."""
-        total = np.zeros(6)
-        for body in self.bodies:
-            R, e, p = self.coordinates.parts(q, body.name)
-            P = body_mass_matrix(body, rotation(e), p) @ v[self.coordinates.columns(body.name)]
-            total[:3] += P[:3]
-            total[3:] += np.cross(R, P[:3]) + rotation(e) @ P[3:6]
-        return total

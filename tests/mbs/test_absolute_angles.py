@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from beam_links import beam_link, rectangle
 
 import ffrobot
 from ffrobot.common.rotations import smallest_turn
@@ -10,11 +11,7 @@ HAND = {"mass": 1.3, "center": [0.2, 0.03, -0.02], "inertia": [0.012, 0.03, 0.04
         "points": {"root": [0.0, 0.0, 0.0], "tip": [0.4, 0.0, 0.0]}}  # fmt: skip
 WRIST = {"mass": 0.4, "center": [0.01, 0.0, 0.05], "inertia": [2e-3, 2e-3, 1e-3],
          "points": {"root": [0.0, 0.0, 0.0], "top": [0.0, 0.0, 0.1]}}  # fmt: skip
-LINK = {
-    "material": {"youngs_modulus": 70e9, "poissons_ratio": 0.3, "density": 2700.0},
-    "geometry": {"kind": "beam", "length": 0.4, "section": {"shape": "rectangle", "height": 0.01, "width": 0.02}},
-    "mesh": {"elements": 8}, "reference": {"condition": "cantilever"}, "modes": {"count": 4, "family": "all"},
-}  # fmt: skip
+LINK = beam_link(0.4, rectangle(0.01, 0.02), 8, nu=0.3, modes={"count": 4, "family": "all"})  # fmt: skip
 TURN, TILT = "0.4 + 2*sin(3*t)", "0.6*cos(2*t) - 0.2"
 
 

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from beam_links import beam_link, rectangle
 
 import ffrobot
 from ffrobot.fe_models.link import cached_modal_body
@@ -26,19 +27,18 @@ def cache(tmp_path_factory):
 
 
 def link(condition, count, attachment, ratio=0.005):
-    return {
-        "name": condition,
-        "material": {"youngs_modulus": E, "density": RHO},
-        "geometry": {
-            "kind": "beam",
-            "length": 1.0,
-            "section": {"shape": "rectangle", "height": HEIGHT, "width": WIDTH},
-        },
-        "mesh": {"elements": 40},
-        "reference": {"condition": condition},
-        "modes": {"count": count, "family": "in-plane-bending", "attachment_modes": attachment},
-        "damping": {"ratio": ratio},
-    }
+    return beam_link(
+        1.0,
+        rectangle(HEIGHT, WIDTH),
+        40,
+        E=E,
+        nu=None,
+        rho=RHO,
+        condition=condition,
+        name=condition,
+        modes={"count": count, "family": "in-plane-bending", "attachment_modes": attachment},
+        damping={"ratio": ratio},
+    )
 
 
 def two_links(count, attachment, kept=None, **keys):

@@ -2,13 +2,11 @@
 
 import numpy as np
 import pytest
-from balances import OUTPUT_STEP, energy_and_losses
 from bodies_by_invariants import rigid_body
 from links import ANGLES, arm, arm_links
 from mechanisms import Assembly, checked_scene, forward, make_model, oracle_of, pcid, relative, revolute
 from oracle import mass_matrix
 from oracle_runs import evaluated, joint_forces, posture_of, run
-from patch_sets import Patches
 from rods import rod
 
 from ffrobot.common.errors import InputError
@@ -119,38 +117,6 @@ def test_motors_alone_carry_rotors_and_friction_along():
     replay = forward(actuation="servo", apply="joints", tolerance=1e-7)
     outcome = run(model, replay, source)
     assert source.q.shape == outcome.q.shape
-    assert relative(outcome.q, source.q) < 1e-5
-
-
-def test_friction_takes_the_energy_that_is_missing():
-    tolerance = 1e-8
-    model = geared_arm(
-        arm_links(), GEARED | FRICTION, GEARED | FRICTION, trajectory=[],
-        initial={"angles": {"link1": 0.3, "link2": 1.0}, "rates": {"link1": 2.0}},
-    )  # fmt: skip
-    outcome = run(model, forward(output_step=OUTPUT_STEP, tolerance=tolerance))
-    total, losses = energy_and_losses(outcome)
-    assert losses > 0.1
-    assert abs(losses + total[-1] - total[0]) < 10 * tolerance * np.ptp(total)
-
-
-@pytest.mark.parametrize("integrator", ["radau", "generalized-alpha"])
-def test_implicit_integrators_agree_with_explicit_ones(integrator):
-    keys = {"trajectory": [], "initial": {"angles": {"link1": 0.3, "link2": 1.0}}}
-    model = geared_arm(arm_links(), GEARED | FRICTION, GEARED | FRICTION, **keys)
-    reference = run(model, forward(end=0.3, tolerance=1e-8, integrator="dop853"))
-    outcome = run(model, forward(end=0.3, tolerance=1e-5, integrator=integrator))
-    assert outcome.status == "completed"
-    assert relative(outcome.q, reference.q) < 1e-4
-
-
-def test_inverse_moments_carry_out_the_motion_with_rotors_and_friction():
-    """Motor moments and modal forces of the partially constrained run bring the tip along its path, forwards again."""
-    model = geared_arm(arm_links(modes=2), GEARED | FRICTION, GEARED | FRICTION)
-    source = run(model, pcid(tolerance=1e-8, end=0.4))
-    assert np.abs(joint_forces(source, "O").motor).max() > 1.0
-    patches = {body.name: Patches(body.name, np.eye(2), np.full(2, np.inf)) for body in model.bodies}
-    outcome = run(model, forward(end=0.4, tolerance=1e-8, actuation="inverse", apply="joints+pzt"), source, patches)
     assert relative(outcome.q, source.q) < 1e-5
 
 

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from beam_links import beam_link
 
 from ffrobot.fe_models.link import cached_modal_body
 from ffrobot.fe_models.link_file import LinkTable
@@ -22,14 +23,15 @@ def planar(name, modal):
 def divided(condition, count, modes=MODES):
     """A link, its pieces, and its modes in theirs."""
     section = {"shape": "rectangle", "height": 0.01, "width": 0.02}
-    keys = {
-        "name": "link",
-        "material": {"youngs_modulus": 7e10, "density": 2700.0, "poissons_ratio": 0.3},
-        "geometry": {"kind": "beam", "length": 0.8, "section": section},
-        "mesh": {"elements": 24},
-        "reference": {"condition": condition},
-        "modes": {"count": modes, "family": "in-plane-bending", "attachment_modes": False},
-    }
+    keys = beam_link(
+        0.8,
+        section,
+        24,
+        nu=0.3,
+        condition=condition,
+        name="link",
+        modes={"count": modes, "family": "in-plane-bending", "attachment_modes": False},
+    )
     source = LinkTable(keys, Path("link.toml"))
     link, parts = cached_modal_body(source).body, cut(source, count)
     pieces = [

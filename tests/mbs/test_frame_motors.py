@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from beam_links import beam_link, rectangle
 from checkpoint_scenes import as_scene, coordinates, motor_on_frames, tree_model
 from random_mechanisms import random_tree
 from tree_accelerations import Accelerated
@@ -95,11 +96,7 @@ def test_linear_models_are_those_of_motions_beside_it(turned):
     assert np.abs(held.K - found.K).max() > 1e-4 * MOMENT
 
 
-LINK = {
-    "material": {"youngs_modulus": 70e9, "poissons_ratio": 0.3, "density": 2700.0},
-    "geometry": {"kind": "beam", "length": 0.4, "section": {"shape": "rectangle", "height": 0.01, "width": 0.02}},
-    "mesh": {"elements": 8}, "reference": {"condition": "cantilever"},
-}  # fmt: skip
+LINK = beam_link(0.4, rectangle(0.01, 0.02), 8, nu=0.3)  # fmt: skip
 
 
 def test_gears_do_not_give_between_frames_where_modes_tilt_their_axis():

@@ -2,15 +2,12 @@
 
 import numpy as np
 import pytest
+from beam_links import beam_link, rectangle
 
 import ffrobot
 
 LENGTH = 0.6
-LINK = {
-    "material": {"youngs_modulus": 70e9, "poissons_ratio": 0.3, "density": 2700.0},
-    "geometry": {"kind": "beam", "length": LENGTH, "section": {"shape": "rectangle", "height": 0.008, "width": 0.02}},
-    "mesh": {"elements": 8}, "reference": {"condition": "cantilever"}, "modes": {"count": 5, "family": "all"},
-}  # fmt: skip
+LINK = beam_link(LENGTH, rectangle(0.008, 0.02), 8, nu=0.3, modes={"count": 5, "family": "all"})  # fmt: skip
 VELOCITY, SPIN = np.array([0.3, -0.2, 0.5]), np.array([4.0, 1.0, -2.0])
 LOADS = [{"point": "link.tip", "z": "3*sin(40*t)", "mx": "0.1"}, {"point": "link.root", "y": "-0.5"}]
 

@@ -6,13 +6,12 @@ from body_equations import accelerated, body_forces, energies, momentum, require
 from checkpoint_scenes import as_scene, tree_model
 from moving_trees import NOW, SMALL, moving
 from random_mechanisms import TYPES, random_tree
-from tree_accelerations import Accelerated, row_accelerations
+from tree_accelerations import Accelerated
 from tree_reactions import carried, needed
 
 from ffrobot.mbs import _core
 from ffrobot.mbs.model.drives import Drive, Drives
 from ffrobot.mbs.model.gears import gear_forces, with_compliance
-from ffrobot.mbs.model.motors import path_forces
 from ffrobot.mbs.model.system import MultibodySystem
 from ffrobot.mbs.quantities.energy import totals
 from ffrobot.mbs.quantities.motion import RobotMotion
@@ -20,22 +19,6 @@ from ffrobot.mbs.quantities.reactions import reactions
 from ffrobot.mbs.solve.integrators import METHODS
 
 ONE = _core.TimeFunction.constant(1.0)
-
-
-@pytest.mark.parametrize("joint", TYPES)
-def test_accelerations_take_no_force(joint):
-    """M v̇ − Q of what the recursion finds is nothing, mode by mode and joint by joint."""
-    kinds = ("rigid", "beam") if joint == "free" else ("rigid", "solid", "beam", "supported beam")
-    rng = np.random.default_rng(TYPES.index(joint))
-    for _ in range(5):
-        motion, _ = moving(rng, [joint] * 3, kinds)
-        left = required_forces(motion.model, accelerated(motion), NOW)
-        still = required_forces(
-            motion.model, Accelerated(motion.model.tree, motion.q, 0 * motion.v, motion.a, motion.frames), NOW
-        )
-        np.testing.assert_allclose(left, 0, atol=1e-10 * np.abs(motion.a).max())
-        if np.abs(motion.v).max() > 0.1 and left.size > 3:
-            assert np.abs(still).max() > 1e-3  # velocities matter here
 
 
 @pytest.mark.parametrize("turned", [False, True])
@@ -90,18 +73,6 @@ def test_the_core_finds_the_same_forces(joint, as_built):
         expected = required_forces(model, state, NOW)
         found = system.core.required_forces(system.scene, NOW, q[None], v[None], a[None])
         np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12 * np.abs(expected).max())
-
-
-@pytest.mark.parametrize("seed", range(4))
-def test_rows_of_loops_keep_their_accelerations(seed):
-    motion, _ = moving(np.random.default_rng(seed), ["revolute"] * 3, ("rigid", "solid", "beam"), loops=1)
-    assert motion.model.rows
-    left = row_accelerations(motion.model, accelerated(motion), NOW)
-    np.testing.assert_allclose(left, 0, atol=1e-8 * np.abs(motion.a).max())
-    held = np.einsum("tij,ti->tj", motion.rows[1], motion.multipliers)
-    found = required_forces(motion.model, accelerated(motion), NOW) + held
-    np.testing.assert_allclose(found, 0, atol=1e-9 * max(np.abs(held).max(), np.abs(motion.a).max()))
-    np.testing.assert_array_equal(path_forces(motion.model, NOW, motion.q, motion.multipliers), 0)
 
 
 AS_BUILT = {
@@ -177,12 +148,3 @@ def test_loads_at_points_are_what_bodies_need(joint):
         of_body = motion.forces.of_body(number)
         for found, wanted in ((of_body.a, of_frame.r), (of_body.alpha, of_frame.Omega)):
             np.testing.assert_allclose(found, wanted, rtol=0, atol=1e-11 * np.abs(wanted).max(initial=1.0))
-
-
-def test_damping_takes_what_its_forces_do():
-    motion, _ = moving(np.random.default_rng(7), ["revolute"] * 2, ("beam",))
-    expected = sum(
-        motion.v[0, node.p_v] @ node.body.damping @ motion.v[0, node.p_v] for node in motion.model.tree.nodes
-    )
-    np.testing.assert_allclose(totals(motion)[0].dissipated_power, [expected])
-    assert expected > 0

@@ -5,15 +5,14 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from beam_links import beam_link, rectangle
 
 import ffrobot
 
-LINK = {
-    "material": {"youngs_modulus": 70e9, "poissons_ratio": 0.33, "density": 2700.0},
-    "geometry": {"kind": "beam", "length": 0.6, "section": {"shape": "rectangle", "height": 0.006, "width": 0.03}},
-    "mesh": {"elements": 12}, "reference": {"condition": "cantilever"}, "damping": {"ratio": 0.01},
-    "modes": {"count": 2, "family": "in-plane-bending", "attachment_modes": False},
-}  # fmt: skip
+LINK = beam_link(
+    0.6, rectangle(0.006, 0.03), 12, damping={"ratio": 0.01},
+    modes={"count": 2, "family": "in-plane-bending", "attachment_modes": False}
+)  # fmt: skip
 PATCHES = {"body": "a", "length": 0.05, "width": 0.02, "thickness": 5e-4, "modulus": 63e9, "d31": 110e-12}
 
 

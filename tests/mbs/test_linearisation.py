@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 import zoo
 from links import arm, arm_links, ritz_link
-from mechanisms import ModalLoad, make_model, oracle_of, pcid, relative, revolute
-from oracle_runs import evaluated, run
+from mechanisms import ModalLoad, make_model, pcid, revolute
+from oracle_runs import run
 
 from ffrobot.common.errors import SolveError
 from ffrobot.mbs import _core
@@ -32,13 +32,6 @@ def linearised(outcome, points=()):
     return LinearEquations(model, run.q[ROW], points).at(run.time[ROW], run.q[ROW], run.v[ROW], run.a[ROW])
 
 
-def test_forces_of_the_motion_are_those_of_the_inverse_analysis(motion):
-    _, outcome = motion
-    linear = linearised(outcome)
-    assert linear.names == ("joint/O", "joint/A", *(f"modal/link{b}/{k}" for b in (1, 2) for k in (1, 2, 3)))
-    assert relative(linear.force, np.concatenate([outcome.tau[ROW], outcome.F_p[ROW]])) < 1e-9
-
-
 def driven(outcome, is_stiffened, more):
     """The arm with the moments and modal forces of one output, and `more` moments, in place of its trajectory."""
     moments = zip("OA", outcome.tau[ROW] + more, strict=True)
@@ -50,34 +43,6 @@ def driven(outcome, is_stiffened, more):
     tables = outcome.robot.tables | {"trajectory": [], "load": load}
     del tables["body"]
     return make_model(links(is_stiffened), modal, **tables)
-
-
-def test_error_about_a_motion_falls_with_the_perturbation_squared(motion):
-    """The robot's coordinates are those of the linear model: angles of sections at joints, and p."""
-    is_stiffened, outcome = motion
-    linear, run = linearised(outcome), outcome.outcome
-    order = [run.model.columns(joint)[0] for joint in "OA"]
-    order += [k for node in run.model.tree.nodes for k in range(node.p_v.start, node.p_v.stop)]
-    s, s_dot, s_ddot = (x[ROW, order] for x in (run.q, run.v, run.a))
-    ds, ds_dot, du = np.random.default_rng(5).standard_normal((3, len(s)))
-    ds[2:] *= 0.01
-    inputs = np.column_stack([linear.inputs["joint/O"], linear.inputs["joint/A"]]) @ du[:2]
-    predicted = np.linalg.solve(linear.M, inputs - linear.D @ ds_dot - linear.K @ ds)
-
-    def error(size):
-        robot, (q, v) = driven(outcome, is_stiffened, size * du[:2]), np.zeros((2, len(s)))
-        q[order], v[order] = s + size * ds, s_dot + size * ds_dot
-        found = evaluated(robot, 0.0, q, v)
-        oracle = oracle_of(found.assembly)
-        a, _ = oracle.solve(0.0, found.q[0], found.v[0])
-        rows = [oracle.row(row, found.q[0], found.v[0]) for row in robot.motors.values()]
-        modes = np.setdiff1d(np.arange(len(a)), found.assembly.frame_coordinates)
-        accelerations = np.concatenate([[row.gradient @ a + row.bias for row in rows], a[modes]])
-        return np.linalg.norm(accelerations - s_ddot - size * predicted)
-
-    errors = np.array([error(size) for size in (4e-3, 2e-3, 1e-3)])
-    np.testing.assert_allclose(np.log2(errors[:-1] / errors[1:]), 2.0, atol=0.05)
-    assert errors[-1] < 1e-2 * np.linalg.norm(1e-3 * predicted)
 
 
 def test_outputs_and_inputs_are_dual(motion):

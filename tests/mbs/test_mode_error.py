@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from beam_links import beam_link, rectangle, tube
 
 import ffrobot as library
 from ffrobot.mbs.quantities.attachment_error import ModesInMotion, Start, mode_error, phase_error, start_jolt
@@ -15,17 +16,11 @@ def arm(modes, payload, attachment_modes=True, rise=1.0, state="static"):
 
     def link(name):
         length, height, condition = sizes[name]
-        return {
-            "name": name,
-            "material": {"youngs_modulus": 2.1e11, "density": 7850.0},
-            "geometry": {
-                "kind": "beam", "length": length, "section": {"shape": "rectangle", "height": height, "width": 0.03},
-            },
-            "mesh": {"elements": 40},
-            "reference": {"condition": condition},
-            "modes": {"count": modes, "family": "in-plane-bending", "attachment_modes": attachment_modes},
-            "damping": {"ratio": 0.005},
-        }  # fmt: skip
+        return beam_link(
+            length, rectangle(height, 0.03), 40, E=2.1e11, nu=None, rho=7850.0, condition=condition, name=name,
+            modes={"count": modes, "family": "in-plane-bending", "attachment_modes": attachment_modes},
+            damping={"ratio": 0.005}
+        )  # fmt: skip
 
     s = f"(t/{rise})"
     path = f"(10*{s}**3-15*{s}**4+6*{s}**5)"
@@ -90,14 +85,10 @@ def test_modes_that_ring_count_by_what_they_do():
 
 def swung(angle, modes=1, damping=0.0, attachment_modes=False):
     """A cantilever whose root follows `angle`, without gravity."""
-    link = {
-        "material": {"youngs_modulus": 2.1e11, "density": 7850.0},
-        "geometry": {
-            "kind": "beam", "length": 0.8, "section": {"shape": "rectangle", "height": 0.012, "width": 0.03},
-        },
-        "mesh": {"elements": 40}, "reference": {"condition": "cantilever"}, "damping": {"ratio": damping},
-        "modes": {"count": modes, "family": "in-plane-bending", "attachment_modes": attachment_modes},
-    }  # fmt: skip
+    link = beam_link(
+        0.8, rectangle(0.012, 0.03), 40, E=2.1e11, nu=None, rho=7850.0, damping={"ratio": damping},
+        modes={"count": modes, "family": "in-plane-bending", "attachment_modes": attachment_modes}
+    )  # fmt: skip
     return library.make_scene(
         name="swung", space="planar", gravity=[0.0, 0.0], body=[{"name": "link", "link": link}],
         joint=[{"name": "O", "type": "revolute", "between": ["ground", "link.root"]}],
@@ -144,12 +135,10 @@ def test_bending_that_no_motor_feels_is_told_by_reactions():
 
     def upright(modes):
         families = ["in-plane-bending", "out-of-plane-bending"]
-        link = {
-            "material": {"youngs_modulus": 2.1e11, "poissons_ratio": 0.3, "density": 7850.0},
-            "geometry": {"kind": "beam", "length": 0.65, "section": {"shape": "tube", "outer": 0.018, "inner": 0.014}},
-            "mesh": {"elements": 20}, "reference": {"condition": "cantilever"},
-            "modes": {"count": modes, "family": families, "attachment_modes": True},
-        }  # fmt: skip
+        link = beam_link(
+            0.65, tube(0.018, 0.014), 20, E=2.1e11, nu=0.3, rho=7850.0,
+            modes={"count": modes, "family": families, "attachment_modes": True}
+        )  # fmt: skip
         joint = {"name": "O", "type": "revolute", "between": ["ground", "link.root"], "axis": [0.0, 0.0, 1.0]}
         path = "0.004*(10*(t/0.05)**3 - 15*(t/0.05)**4 + 6*(t/0.05)**5)"
         return library.make_scene(

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from beam_links import beam_link, rectangle
 from row_wrenches import on_body, row_wrenches
 
 import ffrobot
@@ -15,13 +16,7 @@ MODES = {"count": 4, "family": "all", "attachment_modes": False}
 def beam(name, condition):
     return {
         "name": name,
-        "link": {
-            "name": name, "material": {"youngs_modulus": 7e10, "density": 2700.0, "poissons_ratio": 0.33},
-            "geometry": {
-                "kind": "beam", "length": 0.35, "section": {"shape": "rectangle", "height": 0.009, "width": 0.014}
-            },
-            "mesh": {"elements": 8}, "reference": {"condition": condition}, "modes": MODES,
-        },
+        "link": beam_link(0.35, rectangle(0.009, 0.014), 8, condition=condition, name=name, modes=MODES),
     }  # fmt: skip
 
 

@@ -5,20 +5,14 @@ from copy import deepcopy
 
 import numpy as np
 import pytest
+from beam_links import beam_link, tube
 
 import ffrobot
 
 J, M, C, G = 0.024, 0.2, 0.3, 9.81  # kg m² about the joint, kg, m, m/s²
 QUINTIC = 10 / np.sqrt(3)  # largest acceleration of a quintic over a unit way in a unit time
 ROD = {"mass": M, "inertia": J - M * C**2, "center": [C, 0.0], "points": {"root": [0.0, 0.0], "tip": [0.6, 0.0]}}
-LINK = {
-    "material": {"youngs_modulus": 70e9, "poissons_ratio": 0.33, "density": 2700.0},
-    "geometry": {"kind": "beam", "length": 0.6, "section": {"shape": "tube", "outer": 0.02, "inner": 0.016}},
-    "mesh": {"elements": 10},
-    "reference": {"condition": "cantilever"},
-    "modes": {"count": 3, "family": "in-plane-bending"},
-    "damping": {"ratio": 0.01},
-}
+LINK = beam_link(0.6, tube(0.02, 0.016), 10, modes={"count": 3, "family": "in-plane-bending"}, damping={"ratio": 0.01})
 
 
 def rod(path, step, kind="pcid", joint=(), **keys):

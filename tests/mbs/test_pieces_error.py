@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from beam_links import beam_link, rectangle
 from scipy.spatial.transform import Rotation
 
 from ffrobot.common.rotations import left_jacobian, logarithm
@@ -11,14 +12,15 @@ from ffrobot.mbs.model.body import from_modal_body
 from ffrobot.mbs.quantities.attachment_error import ends_in_equations, rod_ends
 
 L = 0.2
-PIECE = {
-    "name": "piece",
-    "material": {"youngs_modulus": 70e9, "poissons_ratio": 0.3, "density": 2700.0},
-    "geometry": {"kind": "beam", "length": L, "section": {"shape": "rectangle", "height": 0.005, "width": 0.008}},
-    "mesh": {"elements": 4},
-    "reference": {"condition": "simply-supported"},
-    "modes": {"count": 2, "family": ["in-plane-bending", "out-of-plane-bending", "torsion"], "attachment_modes": True},
-}
+PIECE = beam_link(
+    L,
+    rectangle(0.005, 0.008),
+    4,
+    nu=0.3,
+    condition="simply-supported",
+    name="piece",
+    modes={"count": 2, "family": ["in-plane-bending", "out-of-plane-bending", "torsion"], "attachment_modes": True},
+)
 
 
 @pytest.fixture(scope="module")

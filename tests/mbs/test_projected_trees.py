@@ -35,6 +35,21 @@ def assert_same(system, at):
     ):
         np.testing.assert_allclose(found, expected, rtol=0, atol=CLOSE * np.abs(expected).max(initial=0.0))
     assert_same_forces(system, at, plane.multipliers)
+    assert_same_derivatives(system, at[0])
+
+
+def assert_same_derivatives(system, state):
+    """Of accelerations by q, v and modal forces; those of space are compared with differences of its evaluations."""
+    q, v = np.split(state, [system.model.tree.n_q])
+    found, expected = (
+        core.derivatives(q, v, np.zeros(rows), np.zeros(len(v)), None)
+        for core, rows in ((system.integrated[0], len(system.integrated.rows)), (system.core, len(system.row_signs)))
+    )
+    modes = ~system.model.tree.joint_columns  # pins of the plane pass no moments on: none act there
+    for key, columns in (("a_q", slice(None)), ("a_v", slice(None)), ("a_f", modes)):
+        of_plane, of_space = (getattr(of, key)[:, columns] for of in (found, expected))
+        size = np.abs(of_space).max(initial=1.0)
+        np.testing.assert_allclose(of_plane, of_space, rtol=0, atol=1e-10 * size, err_msg=key)
 
 
 def assert_same_forces(system, at, multipliers):

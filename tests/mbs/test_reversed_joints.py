@@ -1,15 +1,11 @@
 """A scene in 3D does not depend on which side of a joint comes first in `between`."""
 
 import numpy as np
+from beam_links import beam_link, tube
 
 import ffrobot
 
-LINK = {
-    "name": "rod", "material": {"youngs_modulus": 70e9, "poissons_ratio": 0.33, "density": 2700.0},
-    "geometry": {"kind": "beam", "length": 0.5, "section": {"shape": "tube", "outer": 0.02, "inner": 0.016}},
-    "mesh": {"elements": 10}, "reference": {"condition": "cantilever"}, "modes": {"count": 4},
-    "damping": {"ratio": 0.01},
-}  # fmt: skip
+LINK = beam_link(0.5, tube(0.02, 0.016), 10, name="rod", modes={"count": 4}, damping={"ratio": 0.01})  # fmt: skip
 BOX = {"mass": 0.4, "center": [0.05, 0.01, 0.0], "inertia": [2e-4, 4e-4, 3e-4],
        "points": {"rim": [0.0, 0.0, 0.02], "tip": [0.1, 0.0, 0.0]}}  # fmt: skip
 

@@ -11,13 +11,6 @@ def linear(conditions, of):
     return vibrations_of(planar_arm(conditions, of))
 
 
-@pytest.mark.parametrize("conditions", CHOICES)
-def test_ratios_wanted_of_the_robot_are_met_whatever_the_frame(conditions):
-    """Within 3 % in the first ten, since damping between the links is left out."""
-    _, ratio = linear(conditions, "robot")
-    np.testing.assert_allclose(ratio[:10], RATIO, rtol=0.035)
-
-
 @pytest.mark.parametrize(
     ("conditions", "expected"),
     list(zip(CHOICES, [(0.0105, 0.0115), (0.0115, 0.0164), (0.0159, 0.0175)], strict=True)),
@@ -28,12 +21,6 @@ def test_ratios_of_the_links_are_others_in_the_robot(conditions, expected):
     _, ratio = linear(conditions, "link")
     np.testing.assert_allclose(ratio[:2], expected, rtol=0.01)
     assert np.all(ratio[:2] > 1.04 * RATIO)
-
-
-def test_frequencies_do_not_depend_on_the_frame():
-    first, *others = (linear(conditions, "robot")[0][:2] for conditions in CHOICES)
-    for frequency in others:
-        np.testing.assert_allclose(frequency, first, rtol=0.02)
 
 
 def test_the_summary_lists_ratios(tmp_path, ffrobot):
@@ -61,8 +48,7 @@ damping = { ratio = 0.02, of = "robot" }
 """,
         encoding="utf-8",
     )
-    done = ffrobot("solve", scene, "--verbose")
-    assert done.returncode == 0, done.stderr
+    done = ffrobot.ok("solve", scene, "--verbose")
     assert "damping ratios" in done.stdout
     assert "0.02, 0.02, 0.02" in done.stdout
     link = tmp_path / "link.toml"

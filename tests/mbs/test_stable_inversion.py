@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-import velocity_transformation
 from links import TIP, arm, arm_links, quintic, ritz_link
 from mechanisms import ZERO, Assembly, Constraint, assemble, forward, make_model, oracle_of, relative, revolute
 from numpy.polynomial import Polynomial
@@ -44,6 +43,13 @@ def at_rest(model, factor=1.0):
     servo = make_servo(model.model, 1.0, "scene", lambda: True, factor)
     p, rest = equilibrium(servo, 0.0), np.zeros((1, len(servo.scale)))
     return servo, linear_dynamics(servo, np.zeros(1), p[None], rest, rest)
+
+
+def velocity_transformation(mechanism, C_mq, T_q):
+    """D of q̇ = D (ȧ, ṗ) (Shabana 2022, Eqs. 18–21): C_mq D = 0, T_q D = (I, 0), the p rows of D = (0, I)."""
+    modes = [i for body in mechanism.bodies for i in range(*mechanism.columns[body.name].indices(mechanism.size))[3:]]
+    rows = np.vstack([C_mq, T_q, np.eye(mechanism.size)[modes]])
+    return np.linalg.solve(rows, np.eye(mechanism.size))[:, len(C_mq) :]
 
 
 def off_path(outcome):
@@ -171,7 +177,7 @@ def test_equations_of_motion_hold_with_the_motors_moments(carried):
         q, v, a = carried.q[k], carried.v[k], carried.a[k]
         C_mq = np.array([row.gradient for row in mechanism.rows(q, v)])[~is_path]
         T_q = np.array([mechanism.row(row, q, v).gradient for row in carried.robot.motors.values()])
-        D = velocity_transformation.by_definition(mechanism, C_mq, T_q)
+        D = velocity_transformation(mechanism, C_mq, T_q)
         Q = mechanism.forces(float(np.clip(carried.time[k], 0, 1)), q, v)
         supplied = np.concatenate([carried.tau[k], np.zeros(6)])
         assert relative(D.T @ (mechanism.mass_matrix(q) @ a - Q), supplied, np.abs(Q).max()) < 1e-6

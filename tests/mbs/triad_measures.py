@@ -5,7 +5,6 @@ unit force along it puts on a and b, so that its rate is on_a·(ṙ_a, Ω_a) + o
 second derivative is neither v̇ nor the triads' own bias. x, y, z (0, 1, 2) are columns of a triad; joint axes are z.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -34,17 +33,6 @@ class Ground:
 
     def motion(self, t):
         return np.asarray(self.position, dtype=float), self.triad, np.zeros(6), np.zeros(6)
-
-
-@dataclass(frozen=True)
-class Driven:
-    """A triad that moves as `path(t)` says: r (3,), A (3, 3), (ṙ, ω) (6,), (r̈, α) (6,), all in global axes."""
-
-    path: Callable
-    body = None
-
-    def motion(self, t):
-        return self.path(t)
 
 
 @dataclass

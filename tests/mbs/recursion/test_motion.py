@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 import zoo
-from mechanisms import assemble, oracle_of, relative
+from mechanisms import oracle_of, pcid, relative
+from oracle_runs import run
 from points_3d import J, Mechanism, r
 from random_bodies import ground, random_body, row, state_near_rest, three_links
-from recursion_trees import tree_of
 from rotations import exponential
 from scipy.integrate import solve_ivp
 
@@ -25,39 +25,18 @@ def on(t):
     return True
 
 
-def scene_of(tree):
-    """The targets of the rows of a tree, values moved by the measures' offsets."""
-    scene = _core.TreeScene()
-    for i in tree.rows:
-        scene.add_target(tree.assembly.constraints[i].target)
-    return scene
-
-
 @pytest.mark.parametrize("name", ["chain of 2", "tree"])
 def test_inverse_dynamics_of_plane_trees(name):
     """Motion and multipliers of the oracle, whose equations SciPy integrates in absolute coordinates."""
-    assembly = assemble(zoo.build(name))
-    tree = tree_of(assembly)
-    scene, model = scene_of(tree), tree.model
-    rng = np.random.default_rng(2)
-    q, v = 0.02 * rng.standard_normal(model.n_q), 0.1 * rng.standard_normal(model.n_v)
-    q[[joint for joint, *_ in model.first]] = [1.2, -1.9, 0.3][: len(model.first)]
-    q, v, left = _core.tree_projected(model, scene, 0.0, q, v)
-    assert left < 1e-12
-    times = np.linspace(0, 0.3, 4)
-    run = _core.tree_motion(model, scene, list(times), q, v, controls(), on)
-    assert run.status == _core.IntegrationStatus.completed
-    Q, V, _ = tree.from_tree(q, v)
-    oracle, n = oracle_of(assembly), len(Q)
+    found = run(zoo.build(name), pcid(end=0.3, output_step=0.1, tolerance=1e-10))
+    oracle, n, rows = oracle_of(found.assembly), found.q.shape[1], found.assembly.is_trajectory
     expected = solve_ivp(
         lambda t, y: np.concatenate([y[n:], oracle.solve(t, y[:n], y[n:])[0]]),
-        (times[0], times[-1]), np.concatenate([Q, V]), "DOP853", times, rtol=1e-10, atol=1e-12,
+        (0.0, 0.3), np.concatenate([found.q[0], found.v[0]]), "DOP853", found.time, rtol=1e-10, atol=1e-12,
     ).y  # fmt: skip
-    for i in range(len(times)):
-        Q, V, _ = tree.from_tree(run.states[i, : model.n_q], run.states[i, model.n_q :])
-        assert relative(Q, expected[:n, i]) < 1e-8
-        expected_lambda = oracle.solve(times[i], Q, V)[1]
-        assert relative(run.multipliers[i], expected_lambda[tree.rows]) < 1e-8
+    for t, q, v, multipliers, exact in zip(found.time, found.q, found.v, found.lambda_, expected.T, strict=True):
+        assert relative(q, exact[:n]) < 1e-8
+        assert relative(multipliers, oracle.solve(t, q, v)[1][rows]) < 1e-8
 
 
 def test_rows_are_kept_along_a_motion_in_3d():

@@ -8,12 +8,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import zoo
 from closed_chains import COUNT, FRICTION, closed_chain
-from mechanisms import assemble
 from points_3d import Body, J, Mechanism, r
 from random_bodies import GRAVITY, JOINTS, ground, random_body, random_state, row, three_links
-from recursion_trees import tree_of
+from trees_in_a_plane import planar_model
 
 from ffrobot.mbs import _core
 from ffrobot.mbs.model.system import MultibodySystem
@@ -178,23 +176,29 @@ def test_driven_coordinate_in_3d():
     check_mechanism(mechanism, rng)
 
 
-NAMES = [name for name in zoo.ALL if "as built" not in name and "loaded" not in name]
+MIXED = ["revolute", "prismatic", "revolute", "weld", "planar", "revolute"]
 
 
-@pytest.mark.parametrize("free", [False, True], ids=["tree", "rows"])
-@pytest.mark.parametrize("name", NAMES)
-def test_mechanisms_of_the_plane(name, free):
-    """Joints of the tree, or (`free`) free bodies under rows; springs and friction along all coordinates of joints."""
-    assembly = assemble(zoo.build(name))
-    tree = tree_of(assembly, free=free)
-    model, rng = tree.model, np.random.default_rng(1)
-    q, _ = tree.random_state(rng)
+@pytest.mark.parametrize("followed", [False, True], ids=["tree", "rows"])
+@pytest.mark.parametrize(("types", "sprung"), [(["revolute"] * 3, False), (["revolute"] * 3, True), (MIXED, True)])
+@pytest.mark.parametrize("seed", range(5))
+def test_mechanisms_of_the_plane(seed, types, sprung, followed):
+    """Bodies of all kinds; springs and friction along joints, or none: pins then pass no moments on."""
+    rng, resisted = np.random.default_rng(seed), {"viscous_friction": 1.0} if sprung else {}
+    ends = (("b1.tip", "x"), (f"b{len(types)}.tip", "y"))  # of which each moves by a joint of its own
+    paths = tuple({"name": f"along_{axis}", "point": point, axis: STILL} for point, axis in ends if followed)
+    tree_model = planar_model(
+        rng, types, normal=[0.0, 0.0, 1.0], joint_keys=dict.fromkeys(("revolute", "prismatic"), resisted),
+        trajectory=paths,
+    )  # fmt: skip
+    (model, *_), nodes = MultibodySystem(tree_model).integrated, tree_model.tree.nodes
+    q = 0.5 + 0.1 * rng.standard_normal(model.n_q)
     stiffness, damping, springs = np.zeros(model.n_v), np.zeros(model.n_v), []
-    for i, (joint_q, _, joint_v, p_v) in zip(tree.bodies, model.first, strict=True):
-        body = assembly.model.bodies[i]
-        here = slice(p_v, p_v + body.n_modes)
-        stiffness[here], damping[here] = body.stiffness, np.diag(body.damping)
-        springs += [(joint_q + k, joint_v + k, *rng.uniform(1, 9, 2)) for k in range(p_v - joint_v)]
+    for node in nodes:
+        stiffness[node.p_v], damping[node.p_v] = node.body.stiffness, np.diag(node.body.damping)
+        at = zip(range(node.q.start, node.q.stop), range(node.v.start, node.v.stop), strict=True)
+        springs += [(*of_one, *rng.uniform(1, 9, 2)) for of_one in at if sprung and node.joint.type != "planar"]
     for _, v, k, d in springs:
         stiffness[v], damping[v] = k, d
-    check(model, q, scene_of(len(tree.rows), springs), stiffness, damping, len(tree.rows))
+    rows = 2 * followed
+    check(model, q, scene_of(rows, springs), stiffness, damping, rows)
