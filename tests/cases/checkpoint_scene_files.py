@@ -26,8 +26,7 @@ def write_scene(name, folder, *changes, more=""):
 
 def solved(ffrobot, scene):
     """The results of a scene, which has to run."""
-    done = ffrobot("solve", scene)
-    assert done.returncode == 0, done.stderr
+    ffrobot.ok("solve", scene)
     return h5py.File(scene.with_suffix(".results.h5"))
 
 

@@ -5,6 +5,7 @@ from pathlib import Path
 import four_bar
 import numpy as np
 import scenes_in_3d
+from beam_links import beam_link, rectangle
 from checkpoints import CASES
 from scenes_in_3d import CRANK, TWO_LINK
 
@@ -104,12 +105,29 @@ def rough_loop(order):
 
 def link(**keys):
     """The keys of a beam."""
-    return {
-        "material": {"youngs_modulus": 7e10, "poissons_ratio": 0.3, "density": 2700.0},
-        "geometry": {"kind": "beam", "length": 0.7, "section": {"shape": "rectangle", "height": 0.01, "width": 0.02}},
-        "mesh": {"elements": 12}, "reference": {"condition": "cantilever"},
-        "modes": {"count": 3, "family": "in-plane-bending", "attachment_modes": False},
-    } | keys  # fmt: skip
+    return beam_link(
+        0.7, rectangle(0.01, 0.02), 12, nu=0.3,
+        modes={"count": 3, "family": "in-plane-bending", "attachment_modes": False}
+    ) | keys  # fmt: skip
+
+
+def pieces_under_control():
+    """A link in three pieces with patches across its cuts: linear models at rest and in motion, loops, a design."""
+    damper = {"kind": "modal-velocity", "bodies": ["link"], "modes": 1, "damping_ratio": 0.05, "sensor": "ideal"}
+    loop = (
+        LOOP | SHORT | {"unlimited": True, "tip": "link.tip", "disturbance": [{"point": "link.tip", "y": "sin(30*t)"}]}
+    )
+    loop |= {"sensor": [{"point": "link.tip"}, {"modal": "link"}, {"pzt": "link"}]}
+    pd = {"kind": "joint-pid", "proportional": {"O": 20.0}, "derivative": {"O": 0.5}}
+    more = [LINEAR, MOVING, loop | {"controller": [pd, damper]}]
+    tables = one_link(PCID | SHORT, {"pieces": 3}, stiffened=True, count=4, length=0.12, structural=["stiffness"])
+    return [of | {"analysis": of["analysis"] + more} for of in tables]
+
+
+def few_modes():
+    """Explicit numbers, of which voltages serve those left out, too."""
+    tables = pair("two_link", INVERSE, patches=True, state="static")
+    return [of | {"body": [body | {"modes": 3} for body in of["body"]]} for of in tables]
 
 
 def one_link(analysis, of_body=(), stiffened=False, **of_patches):
@@ -199,6 +217,8 @@ FEATURES = {  # what is compared in any case, beside motion and moments; the sce
     ),
     "finer check": ("deflection", lambda: one_link({"kind": "pcid", "check": "finer"}), 1e-6),
     "motors alone": ("moment", lambda: one_link({"kind": "motors-only"}, count=0), 1e-5),
+    "few modes": ("required_voltage", few_modes, 1e-7),
+    "pieces under control": ("commands", pieces_under_control, 1e-4),
     "pieces": ("deflection", lambda: one_link({"kind": "pcid"}, {"pieces": 3}, stiffened=True), 1e-5),
 }  # fmt: skip
 COMPARED = (

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from beam_links import beam_link, rectangle
 from planar_features import STRAIGHT, at_points
 
 import ffrobot
@@ -104,12 +105,10 @@ def test_forces_that_turn_a_strip_and_hold_it_straight():
     Turned about its root a strip takes no force, the moment m L²/3 θ̈ and θ̈ ∫ρA x w dx = θ̈ √m L 2/λ² on the mode.
     """
     L, m, at = 1.0, 2700.0 * 0.004 * 0.02, (0.3, 0.6, 1.0)
-    link = {
-        "name": "strip", "material": {"youngs_modulus": 70e9, "density": 2700.0, "poissons_ratio": 0.33},
-        "geometry": {"kind": "beam", "length": L, "section": {"shape": "rectangle", "height": 0.004, "width": 0.02}},
-        "mesh": {"elements": 24}, "reference": {"condition": "cantilever"},
-        "modes": {"family": "in-plane-bending", "count": 1, "attachment_modes": False},
-    }  # fmt: skip
+    link = beam_link(
+        L, rectangle(0.004, 0.02), 24, name="strip",
+        modes={"family": "in-plane-bending", "count": 1, "attachment_modes": False}
+    )  # fmt: skip
     scene = ffrobot.make_scene(
         name="strip", space="planar", gravity=[0.0, 0.0], body=[{"name": "arm", "link": link}],
         joint=[{"name": "hub", "type": "revolute", "between": ["ground", "arm.root"]}],

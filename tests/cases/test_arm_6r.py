@@ -36,8 +36,7 @@ def arm(solved):
 def held(arm, ffrobot):
     """The joints where those of the rigid arm are, as hold_joints.py makes it."""
     subprocess.run([sys.executable, CASE / "hold_joints.py", arm.folder], check=True)
-    done = ffrobot("solve", arm.folder / "held.toml", timeout=300)
-    assert done.returncode == 0, done.stderr
+    ffrobot.ok("solve", arm.folder / "held.toml", timeout=300)
     with Results(arm.folder / "held.results.h5") as results:
         yield results
 
@@ -58,8 +57,7 @@ def test_the_scene_is_what_import_makes(tmp_path, ffrobot):
     """Bodies, joints and link files: those of the command in the README, to the last letter."""
     files = {"upper_arm": CASE / "links" / "casting.toml", "forearm": CASE / "links" / "tube.toml"}
     flexible = [f"--flexible={link}={file}" for link, file in files.items()]
-    done = ffrobot("import", CASE / "arm.urdf", "-o", tmp_path, *flexible)
-    assert done.returncode == 0, done.stderr
+    ffrobot.ok("import", CASE / "arm.urdf", "-o", tmp_path, *flexible)
     made, kept = ((folder / "scene.toml").read_text(encoding="utf-8") for folder in (tmp_path, CASE))
     assert kept.startswith(made[: made.index("# What is to be computed")])
     for name in ("upper_arm.toml", "forearm.toml"):
@@ -151,8 +149,7 @@ def behind_gears(arm, ffrobot):
     subprocess.run([sys.executable, CASE / "behind_gears.py", arm.folder], check=True)
     groups = {}
     for name in ("gears", "swift", "slower", "shaped"):
-        done = ffrobot("solve", arm.folder / f"{name}.toml", timeout=300)
-        assert done.returncode == 0, done.stderr
+        ffrobot.ok("solve", arm.folder / f"{name}.toml", timeout=300)
         groups[name] = h5py.File(arm.folder / f"{name}.results.h5")[name]
     return groups
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from beam_links import beam_link, rectangle
 from exact_motion import tip_let_go
 from exact_rod import rigidities
 
@@ -19,17 +20,7 @@ TIMOSHENKO = (
 
 
 def link(height=0.004, density=2700.0):
-    return {
-        "name": "strip",
-        "material": {"youngs_modulus": E, "poissons_ratio": NU, "density": density},
-        "geometry": {
-            "kind": "beam",
-            "length": L,
-            "section": {"shape": "rectangle", "height": height, "width": 0.02},
-        },
-        "mesh": {"elements": 16},
-        "reference": {"condition": "cantilever"},
-    }
+    return beam_link(L, rectangle(height, 0.02), 16, E=E, nu=NU, rho=density, name="strip")
 
 
 def solved(strip, kind="static", pieces=None, **keys):

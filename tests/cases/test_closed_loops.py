@@ -130,31 +130,6 @@ def test_work_of_motors_and_forces_is_what_energies_gain(tmp_path):
         np.testing.assert_allclose(gained, work, atol=2e-3 * lost[-1] + 1e-7 * np.abs(work).max())
 
 
-def test_a_function_of_the_user_acts_like_the_same_controller_of_the_scene(tmp_path):
-    (tmp_path / "mine.py").write_text(
-        "import numpy as np\n\n"
-        "GAINS = {'waist': (300.0, 12.0), 'shoulder': (300.0, 12.0), 'elbow': (80.0, 3.0)}\n\n"
-        "def controller(setup):\n"
-        "    where = [(*setup.places(f'joint/{n}'), *setup.columns(f'joint/{n}', f'joint/{n}/rate')) for n in GAINS]\n"
-        "    def at_sample(k, y):\n"
-        "        u, e = np.zeros(len(setup.inputs)), setup.reference[k] - y\n"
-        "        for (place, value, rate), (P, D) in zip(where, GAINS.values()):\n"
-        "            u[place] = P * e[value] + D * e[rate]\n"
-        "        return u\n"
-        "    return at_sample\n"
-    )
-    sensor = [{"joint": name, "measure": measure} for name in GAINS for measure in ("value", "rate")]
-    mine = {"kind": "python", "python": "mine.py:controller"}
-    loops = [
-        held("theirs", HOLDS, sensor=sensor, disturbance=push(5.0)),
-        held("mine", mine, sensor=sensor, disturbance=push(5.0)),
-    ]
-    with solve(arm(HOLD, *loops, still=True), tmp_path) as found:
-        theirs, own = (found[f"{name}/control/commands"] for name in ("theirs", "mine"))
-        np.testing.assert_allclose(own, theirs, atol=1e-9 * np.abs(theirs).max())
-        assert np.abs(own - own[0]).max() > 0.1
-
-
 def test_both_angles_of_a_universal_joint(tmp_path):
     """Named one after the other; gains are those of the joint, u = P e + D ė of each."""
     points = {"root": [0.0, 0.0, 0.0], "tip": [0.0, 0.0, 0.5]}
@@ -186,33 +161,11 @@ def test_both_angles_of_a_universal_joint(tmp_path):
         assert found.attributes("fed/control")["gain_margin"] > 1
 
 
-def test_a_loop_that_diverges_is_kept_and_advised(tmp_path):
-    wild = {"kind": "joint-pid", "proportional": GAINS, "derivative": {name: 3000.0 for name in RATES}}
-    loops = [held("wild", wild, disturbance=push(5.0)), held("calm", HOLDS)]
-    with solve(arm(HOLD, *loops, still=True), tmp_path) as found:
-        about = found.attributes("wild/control")
-        assert about["verdict"] in ("grows", "diverges")
-        assert about["spectral_radius"] > 1
-        assert any("start with proportional" in text for text in about["advice"])
-        assert found.attributes("calm/control")["verdict"] == "stable"
-        assert list(found.verdict["wild"].warnings)
-
-
 MISTAKES = [
-    ({"delay": 0.6}, "expected a delay shorter than the run"),
-    ({"sensor": [{"point": "fore.tpi"}]}, 'found "fore.tpi".*did you mean'),
-    ({"sensor": [{"joint": "P"}]}, 'expected one of the joints .*found "P"'),
     ({"sensor": [{"motor": "waist"}]}, 'sensor no. 1: motor: expected a joint with stiffness .*found "waist"'),
-    ({"sensor": [{"pzt": "fore"}]}, "expected a layout of patches"),
     ({"sensor": [{"modal": "column"}]}, "expected a flexible body"),
-    ({"sensor": [{"joint": "waist", "measure": "acceleration"}]}, "measure"),
     ({"sensor": [{"joint": "waist", "resolution": -1.0}]}, "resolution"),
-    ({"controller": [{"kind": "joint-pid", "proportional": {"B": 1.0}}]}, 'found "B"'),
     ({"controller": [{"kind": "modal-velocity", "bodies": ["fore"], "damping_ratio": 1.0}]}, "a body with patches"),
-    ({"controller": [{"kind": "pid"}]}, "joint-pid"),
-    ({"feed_forward": "joints+pzt"}, "feed_forward"),
-    ({"tip": "fore.tpi"}, "fore.tpi"),
-    ({"disturbance": [{"joint": "waist", "moment": "1"}]}, "disturbances at points"),
     ({"disturbance": [{"point": "fore.tip", "force": "x"}]}, "force"),
     ({"disturbance": [{"point": "fore.tip", "z": "log(t - 1)"}]}, "disturbance no. 1: z"),
     ({"actuation": "nothing"}, "actuation"),

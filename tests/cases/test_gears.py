@@ -8,7 +8,6 @@ from checkpoints import CASES
 from scipy.integrate import simpson
 
 import ffrobot
-from ffrobot.common.errors import InputError
 
 J, N, K, C = 3e-3, 9.0, 500.0, 0.4
 GIVES = {"gear_ratio": N, "rotor_inertia": J, "stiffness": K}
@@ -301,17 +300,3 @@ def _rod(mass, length):
     inertia = [1e-6, mass * length**2 / 12, mass * length**2 / 12]
     points = {"root": STRAIGHT, "tip": [length, 0.0, 0.0]}
     return {"rigid": {"mass": mass, "center": [length / 2, 0.0, 0.0], "inertia": inertia, "points": points}}
-
-
-@pytest.mark.parametrize(
-    ("keys", "told"),
-    [
-        ({"stiffness": 10.0}, "rotor_inertia above 0 with stiffness"),
-        ({"damping": 1.0}, '"damping" only with stiffness'),
-        (GIVES | {"motor": False}, "stiffness: expected a joint with a motor, found one without"),
-    ],
-)
-def test_what_is_missing_beside_a_spring_is_told(tmp_path, keys, told):
-    tables = scene([rigid("b", [0.1, 0.1, 0.1])], [revolute("O", "ground", "b.root", AXIS, **keys)], RUN)
-    with pytest.raises(InputError, match=told):
-        solve(tables, tmp_path)

@@ -6,6 +6,7 @@ The plane is asked with links cut by hand and welded, which no code for links in
 from pathlib import Path
 
 import numpy as np
+from beam_links import beam_link, rectangle
 from scenes_in_3d import joint_keys
 
 import ffrobot
@@ -15,14 +16,7 @@ from ffrobot.mbs.fields.spelling import place
 
 S = "(10*(t/0.8)**3-15*(t/0.8)**4+6*(t/0.8)**5)"
 NAMES = "upper", "fore"
-LINK = {
-    "name": "link",
-    "material": {"youngs_modulus": 7e10, "poissons_ratio": 0.3, "density": 2700.0},
-    "geometry": {"kind": "beam", "length": 0.8, "section": {"shape": "rectangle", "height": 0.01, "width": 0.02}},
-    "mesh": {"elements": 8},
-    "reference": {"condition": "cantilever"},
-    "modes": {"count": 4, "family": "in-plane-bending"},
-}
+LINK = beam_link(0.8, rectangle(0.01, 0.02), 8, nu=0.3, name="link", modes={"count": 4, "family": "in-plane-bending"})
 RUN = {"end": 0.8, "output_step": 0.04}
 STATIC = {"name": "static", "kind": "fcid", "shape": "static", **RUN}
 ZERO = {"name": "zero", "kind": "fcid", "shape": "zero", **RUN}

@@ -34,8 +34,7 @@ def plate(name):
 def bodies(ffrobot, case_copy_of_module):
     folder = case_copy_of_module("lightened_arm").parent
     for name in MEASURES:
-        done = ffrobot("link", folder / f"{name}.toml")
-        assert done.returncode == 0, done.stderr
+        ffrobot.ok("link", folder / f"{name}.toml")
     return {name: read_modal_body(folder / f"{name}.h5") for name in MEASURES}
 
 

@@ -2,14 +2,8 @@
 
 import numpy as np
 import pytest
-import scenes_in_3d
-from checkpoints import CASES
-from scenes_in_3d import TWO_LINK
 
 import ffrobot
-
-RIGID_GEAR = {"gear_ratio": 60.0, "rotor_inertia": 2e-4}
-GEARED = RIGID_GEAR | {"stiffness": 3e3, "damping": 2.0}
 
 
 @pytest.mark.parametrize("turned", [False, True])
@@ -32,17 +26,3 @@ def test_a_motor_behind_its_gear_swings_against_a_body(tmp_path, turned):
         low = model.frequency_response(np.array([1e-3]), "joint/O", ["joint/O", "motor/O"])[0, :, 0]
         whole = np.ones(2) @ M @ np.ones(2)  # θ = γ: both turn together
         np.testing.assert_allclose(low, -1e6 / whole, rtol=1e-4)
-
-
-def test_what_cannot_be_had_is_refused(tmp_path):
-    planar = scenes_in_3d.read(CASES / "two_link" / "scene.toml")
-    planar.pop("pzt", None)
-    planar["analysis"] = [{"name": "rest", "kind": "linear"}]
-    spatial = scenes_in_3d.in_3d(planar) | {"initial": {"joints": TWO_LINK}, "analysis": planar["analysis"]}
-    for change, message in (
-        ({"analysis": [{"name": "rest", "kind": "linear", "points": ["link2.nose"]}]}, r'points: .*found "link2.nose"'),
-        ({"analysis": [{"name": "rest", "kind": "linear", "about": "inverse"}]}, "about: expected an earlier analysis"),
-    ):
-        path = scenes_in_3d.write(spatial | change, tmp_path / "spatial.toml")
-        with pytest.raises(ffrobot.InputError, match=message):
-            ffrobot.solve(path)

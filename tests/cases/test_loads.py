@@ -5,6 +5,7 @@ import re
 import h5py
 import numpy as np
 import pytest
+from beam_links import beam_link, rectangle
 from checkpoint_scene_files import solved, write_scene
 from scipy.interpolate import CubicSpline
 
@@ -79,8 +80,7 @@ tolerance = 1e-9
 def test_motors_carry_loads_friction_and_rotors(tmp_path, ffrobot):
     path = tmp_path / "scene.toml"
     path.write_text(SCENE)
-    done = ffrobot("solve", path)
-    assert done.returncode == 0, done.stderr
+    ffrobot.ok("solve", path)
     with h5py.File(path.with_suffix(".results.h5")) as file:
         t = file["inverse/time"][()]
         lift, turn = (file[f"inverse/joints/{name}/moment"][()] for name in ("lift", "turn"))
@@ -181,13 +181,7 @@ def test_moments_that_do_not_fit_their_joint(joint, load, says):
 @pytest.mark.parametrize("kind", ["prismatic", "universal"])
 def test_forces_on_the_ground_of_a_link_alone(kind, tmp_path):
     """They follow from nothing else that steps are judged by: unobserved, they erred by up to 78 tolerances."""
-    link = {
-        "material": {"youngs_modulus": 2.1e11, "density": 7850.0, "poissons_ratio": 0.3},
-        "geometry": {"kind": "beam", "length": 0.8, "section": {"shape": "rectangle", "height": 0.01, "width": 0.02}},
-        "mesh": {"elements": 14},
-        "reference": {"condition": "cantilever"},
-        "modes": {"count": 8, "family": "all"},
-    }
+    link = beam_link(0.8, rectangle(0.01, 0.02), 14, E=2.1e11, nu=0.3, rho=7850.0, modes={"count": 8, "family": "all"})
     joint = {"name": "O", "type": kind, "between": ["ground", "b.root"], "axis": [0.0, 0.6, 0.8]}
     runs = {"exact": 1e-9, "found": 1e-4}
     scene = ffrobot.make_scene(

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import scenes_in_3d
+from beam_links import beam_link, rectangle
 from checkpoints import CASES
 from scipy.integrate import solve_ivp
 
@@ -13,53 +14,20 @@ from ffrobot.mbs.fields.motion_laws import law_in, law_peak
 from ffrobot.mbs.fields.paths import Impulse, impulses
 
 RUN = {"name": "inverse", "kind": "pcid", "end": 0.5, "output_step": 0.002, "tolerance": 1e-10}
-GUESS = {"O": 0.0, "A": 1.0471975511965976}
-TURNS = {"O": [0.0, "20*deg", "-5*deg"], "A": ["60*deg", "40*deg", "70*deg"]}
-
-
-def both(trajectories, folder, guess=GUESS, **keys):
-    """Results of the two links of a case along other paths, in the plane and in 3D."""
-    planar = scenes_in_3d.read(CASES / "two_link" / "scene.toml") | keys
-    planar.pop("pzt", None)
-    planar |= {"trajectory": trajectories, "analysis": [RUN]}
-    spatial = scenes_in_3d.in_3d(planar) | {"initial": {"joints": guess}, "analysis": [RUN]}
-    return [
-        ffrobot.solve(scenes_in_3d.write(tables, folder / f"{name}.toml"))
-        for name, tables in (("planar", planar), ("spatial", spatial))
-    ]
-
-
-def same(plane, space, trajectories, share=1e-8):
-    """Targets, coordinates and deflections to 1e-8 of their peaks, moments to 1e-6."""
-    for path in trajectories:
-        name = f"inverse/trajectories/{path['name']}"
-        np.testing.assert_allclose(space[f"{name}/target"], plane[f"{name}/target"], atol=1e-12)
-        for key in ("begin", "end", "stretch", "shaper_frequency"):
-            if key in plane.attributes(name):
-                np.testing.assert_allclose(space.attributes(name)[key], plane.attributes(name)[key], rtol=1e-8)
-    for joint in GUESS:
-        for key, of_peak in (("coordinate", share), ("moment", 1e-6)):
-            name = f"inverse/joints/{joint}/{key}"
-            np.testing.assert_allclose(space[name], plane[name], rtol=0, atol=of_peak * np.abs(plane[name]).max())
-    name = "inverse/points/link2.tip/deflection"
-    np.testing.assert_allclose(space[name][:, :2], plane[name], rtol=0, atol=share * np.abs(plane[name]).max())
-
-
-def joints(**keys):
-    return [{"name": joint, "joint": joint, "via": places, **keys} for joint, places in TURNS.items()]
 
 
 @pytest.mark.parametrize("held", [{"value": "60*deg"}, {"waypoints": "constant.csv"}])
 def test_a_shaper_that_asks_the_robot_beside_a_held_joint(held, tmp_path):
-    """In the plane as in 3D: the motion is over half a period of the frequency later (a ZV shaper)."""
+    """The motion is over half a period of the frequency later (a ZV shaper)."""
     (tmp_path / "constant.csv").write_text(f"t,value\n0,{np.pi / 3!r}\n1,{np.pi / 3!r}\n", encoding="utf-8")
     moved = {"name": "O", "joint": "O", "via": [0.0, "20*deg"], "duration": 0.2, "shaper": {"kind": "zv"}}
-    plane, space = both([moved, {"name": "A", "joint": "A", **held}], tmp_path)
-    with plane, space:
-        same(plane, space, [moved])
-        kept = plane["inverse/joints/A/coordinate"]
-        np.testing.assert_allclose(kept, np.pi / 3, rtol=0, atol=1e-9)
-        about = plane.attributes("inverse/trajectories/O")
+    tables = scenes_in_3d.in_3d(scenes_in_3d.read(CASES / "two_link" / "scene.toml")) | {
+        "trajectory": [moved, {"name": "A", "joint": "A", **held}], "analysis": [RUN],
+        "initial": {"joints": scenes_in_3d.TWO_LINK},
+    }  # fmt: skip
+    with ffrobot.solve(scenes_in_3d.write(tables, tmp_path / "scene.toml")) as results:
+        np.testing.assert_allclose(results["inverse/joints/A/coordinate"], np.pi / 3, rtol=0, atol=1e-9)
+        about = results.attributes("inverse/trajectories/O")
         (frequency,) = about["shaper_frequency"]
         assert about["end"] - about["begin"] == pytest.approx(0.2 + 0.5 / frequency, rel=1e-3)  # half a period later
 
@@ -99,21 +67,15 @@ def test_fastest_rigid_arm_takes_its_limit(limit):
     assert np.abs(results["inverse/joints/shoulder/moment"]).max() <= limit * (1 + 1e-9)
 
 
-def test_what_cannot_be_made_faster_says_so():
-    with pytest.raises(InputError, match="expected limits of motors"):
-        ffrobot.solve(arm({"duration": 0.5, "fastest": True}))
-
-
 def test_shapers_know_the_robot():
     """With its joint held the arm is a cantilever: 1.8751² √(EI/ρA)/(2π L²) of its weaker plane, out of the swing."""
-    link = {
-        "material": {"youngs_modulus": 70e9, "poissons_ratio": 0.33, "density": 2700.0},
-        "geometry": {"kind": "beam", "length": 0.8, "section": {"shape": "rectangle", "height": 4e-3, "width": 3e-3}},
-        "mesh": {"elements": 12},
-        "reference": {"condition": "cantilever"},
-        "modes": {"count": 3, "family": ["in-plane-bending", "out-of-plane-bending"], "attachment_modes": False},
-        "damping": {"ratio": 0.005},
-    }
+    link = beam_link(
+        0.8,
+        rectangle(4e-3, 3e-3),
+        12,
+        modes={"count": 3, "family": ["in-plane-bending", "out-of-plane-bending"], "attachment_modes": False},
+        damping={"ratio": 0.005},
+    )
     found = ffrobot.solve(
         arm({"duration": 0.5, "shaper": {"kind": "zvd", "modes": 2}}, body={"name": "arm", "link": link})
     )

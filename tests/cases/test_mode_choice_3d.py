@@ -1,11 +1,10 @@
-"""`modes` of bodies in 3D: numbers as in the plane, and what is promised of "auto" holds."""
+"""`modes` of bodies in 3D: what is promised of "auto" holds."""
 
 import numpy as np
 import pytest
 import scenes_in_3d
 from checkpoints import CASES
 
-import ffrobot
 from ffrobot.common.errors import InputError
 from ffrobot.mbs.model.truncation import interface_loads, with_fewer_modes
 from ffrobot.run.bodies import load_bodies
@@ -15,47 +14,7 @@ from ffrobot.run.solve import solve_scene
 from ffrobot.run.watcher import Watcher
 from ffrobot.scene.load import load_scene
 
-S = "(10*t**3-15*t**4+6*t**5)"  # from rest to rest with zero acceleration at both ends
-QUINTIC = {"x": f"1.5-0.5*{S}", "y": f"sqrt(3)/2+0.3*{S}"}
-TWO_LINK = {"O": 0.0, "A": 1.0471975511965976}
 POINTS = ("root", "tip")
-
-
-def two_links(modes, **analysis):
-    """The paper's arm from rest, with patches: tables of the planar scene and of the same in 3D."""
-    planar = scenes_in_3d.read(CASES / "two_link" / "scene.toml")
-    for body in planar["body"]:
-        body["modes"] = modes
-    planar["initial"]["state"] = "static"
-    planar["trajectory"][0] |= QUINTIC
-    planar["analysis"] = [planar["analysis"][0] | {"end": 0.3} | analysis]
-    same = {key: planar[key] for key in ("pzt", "analysis")}
-    spatial = scenes_in_3d.in_3d(planar) | same | {"initial": {"state": "static", "joints": TWO_LINK}}
-    return planar, spatial
-
-
-def results_of(tables, folder, name):
-    return ffrobot.solve(scenes_in_3d.write(tables, folder / f"{name}.toml"))
-
-
-def close(found, expected, share):
-    np.testing.assert_allclose(found, expected, rtol=0, atol=share * np.abs(expected).max())
-
-
-def test_planar_arm_with_few_modes_in_3d(tmp_path):
-    """Explicit numbers: the same coordinates, hence the planar numbers; voltages serve the modes left out, too."""
-    planar, spatial = (results_of(t, tmp_path, n) for t, n in zip(two_links(3, tolerance=1e-10), "ps", strict=True))
-    with planar, spatial:
-        for joint in TWO_LINK:
-            close(spatial[f"inverse/joints/{joint}/moment"], planar[f"inverse/joints/{joint}/moment"], 1e-8)
-            close(spatial[f"inverse/joints/{joint}/reaction"][:, :2], planar[f"inverse/joints/{joint}/reaction"], 1e-8)
-        close(spatial["inverse/trajectories/tip/force"], planar["inverse/trajectories/tip/force"], 1e-8)
-        for link in ("link1", "link2"):
-            close(spatial.modal("inverse", link), planar.modal("inverse", link), 1e-8)
-            name = f"inverse/pzt/{link}/required_voltage"
-            close(spatial[name], planar[name], 1e-8)
-            kept = planar.attributes(f"inverse/bodies/{link}")["modes_kept"]
-            assert spatial.attributes(f"inverse/bodies/{link}")["modes_kept"] == kept
 
 
 ARM_MODES = '[modes]\nfamily = ["in-plane-bending", "out-of-plane-bending", "torsion"]\ncount = 18\n'
@@ -160,8 +119,9 @@ def test_coordinates_with_fewer_modes_are_orthonormal_and_their_forces_known(lin
 
 @pytest.mark.parametrize("modes", ["many", -1, 2.5])
 def test_wrong_numbers_of_modes_in_3d(modes, tmp_path):
-    tables = two_links(modes)[1]
-    with pytest.raises(InputError, match=r'body "link1": modes: expected "auto" or a .*number'):
+    tables = scenes_in_3d.read(CASES / "arm_3r" / "scene.toml")
+    tables["body"][1]["modes"] = modes
+    with pytest.raises(InputError, match=r'body "upper": modes: expected "auto" or a .*number'):
         load_scene(scenes_in_3d.write(tables, tmp_path / "wrong.toml"))
 
 

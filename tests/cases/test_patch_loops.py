@@ -3,18 +3,15 @@
 import numpy as np
 import pytest
 import scenes_in_3d
+from beam_links import beam_link, rectangle
 
 import ffrobot
 from ffrobot.common.errors import InputError
 
-ROD = {
-    "name": "rod", "material": {"youngs_modulus": 70e9, "density": 2700.0},
-    "geometry": {"kind": "beam", "length": 0.6, "section": {"shape": "rectangle", "height": 0.006, "width": 0.006}},
-    "mesh": {"elements": 24}, "reference": {"condition": "cantilever"},
-    "modes": {
-        "count": 4, "family": ["in-plane-bending", "out-of-plane-bending"],
-    },
-}  # fmt: skip
+ROD = beam_link(
+    0.6, rectangle(0.006, 0.006), 24, nu=None, name="rod",
+    modes={ "count": 4, "family": ["in-plane-bending", "out-of-plane-bending"]}
+)  # fmt: skip
 SIDE = {
     "body": "rod", "count": 4, "length": 0.06, "width": 0.006, "thickness": 0.3e-3, "modulus": 63e9, "d31": 110e-12,
     "structural": False, "allocation": "least-squares",

@@ -60,8 +60,7 @@ def solve_turned(folder, ffrobot, *, turned):
         "rpy": [-np.pi / 2, 0.0, 0.0] if turned else [0.0, 0.0, 0.0],
     }
     (folder / "scene.toml").write_text(ONE_LINK.format(layouts=layouts(*names), **keys))
-    done = ffrobot("solve", folder / "scene.toml", "--verbose")
-    assert done.returncode == 0, done.stderr
+    done = ffrobot.ok("solve", folder / "scene.toml", "--verbose")
     assert "voltages of" in done.stdout
     return folder / "scene.results.h5"
 
@@ -80,8 +79,7 @@ def test_turning_a_link_about_its_axis_exchanges_its_planes(straight, tmp_path, 
 
 
 def test_feasibility_of_a_scene_in_3d(straight, ffrobot):
-    done = ffrobot("feasibility", straight)
-    assert done.returncode == 0, done.stderr
+    done = ffrobot.ok("feasibility", straight)
     assert "yaw 1" in done.stdout  # motors of a universal joint, one for each axis
     for name in ("one", "other"):
         assert f"\n{name} " in done.stdout
@@ -135,8 +133,7 @@ def test_what_no_patch_reaches_is_told_mode_by_mode(tmp_path, ffrobot):
     link = LINK.format(name="link", length=0.4, modes=SEVEN.replace("7]", "7, 8]"), height=0.006, width=0.012)
     (tmp_path / "link.toml").write_text(link)
     (tmp_path / "scene.toml").write_text(WRIST.format(layouts=layouts("in-plane", "out-of-plane")))
-    done = ffrobot("solve", tmp_path / "scene.toml")
-    assert done.returncode == 0, done.stderr
+    done = ffrobot.ok("solve", tmp_path / "scene.toml")
     with Results(tmp_path / "scene.results.h5") as results, h5py.File(results.path) as file:
         force, left = results["inverse/bodies/link/modal_force"], results["inverse/pzt/one/residual_force"]
         torsion = list(file["inverse/pzt/one/residual_force"].attrs["columns"]).index("torsion")

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from beam_links import beam_link
 from scipy.integrate import solve_bvp
 
 import ffrobot
@@ -17,14 +18,19 @@ EI = SOFT * SIDE**4 / 12
 
 def link(modulus=SOFT, condition="cantilever", width=SIDE, **keys):
     section = {"shape": "rectangle", "height": SIDE, "width": width}
-    return {
-        "name": "link",
-        "material": {"youngs_modulus": modulus, "poissons_ratio": 0.3, "density": 2700.0},
-        "geometry": {"kind": "beam", "length": 1.0, "section": section},
-        "mesh": {"elements": 16},
-        "reference": {"condition": condition},
-        "modes": {"count": 8, "family": BENT_AND_TWISTED},
-    } | keys
+    return (
+        beam_link(
+            1.0,
+            section,
+            16,
+            E=modulus,
+            nu=0.3,
+            condition=condition,
+            name="link",
+            modes={"count": 8, "family": BENT_AND_TWISTED},
+        )
+        | keys
+    )
 
 
 def solved(body, pieces=None, **keys):
@@ -189,7 +195,7 @@ INVERSE = {"name": "inverse", "kind": "pcid", "end": 1.0, "output_step": 0.02, "
 def test_a_stiff_arm_in_pieces_is_that_of_the_links():
     """The same names, shapes and numbers as without, to what bending by 1 % of the length makes."""
     again = {"name": "again", "kind": "forward", "actuation": "inverse", "apply": "trajectory"}
-    analyses = [INVERSE | {"end": 0.3}, again]
+    analyses = [INVERSE | {"end": 0.2}, again]
     with arm(None, analysis=analyses) as one, arm(3, analysis=analyses) as three:
         assert one.columns("inverse").keys() == three.columns("inverse").keys()
         assert one.columns("again").keys() == three.columns("again").keys()
@@ -247,9 +253,21 @@ def test_auto_takes_as_many_as_the_deflection_needs():
         assert "pieces" not in results.attributes("rest/bodies/beam")
 
 
+RIGID = {
+    "mass": 1.0,
+    "inertia": [0.1] * 3,
+    "center": [0.5, 0.0, 0.0],
+    "points": {"root": [0.0] * 3, "tip": [1.0, 0, 0]},
+}
+SOLID = {"geometry": link()["geometry"] | {"kind": "solid"}}
 MISTAKES = {
     r'body "beam": expected "pieces" with "link" alone, found "modes"': {
         "body": [{"name": "beam", "link": link(), "pieces": 2, "modes": 2}]
+    },
+    r'expected "pieces" with "link" alone, found "rigid"': {"body": [{"name": "beam", "rigid": RIGID, "pieces": 2}]},
+    "expected none with subdivided bodies": {"actuation_points": [{"body": "beam"}]},
+    r'geometry.kind: expected "beam" of a subdivided body': {
+        "body": [{"name": "beam", "link": link(mesh={}) | SOLID, "pieces": 2}]
     },
     r'motors: expected "section" with subdivided bodies \("beam"\), found "frame"': {"motors": "frame"},
     r"damping: expected none or rayleigh = \[0.0, b\] of a subdivided body": {

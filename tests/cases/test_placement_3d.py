@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import scenes_in_3d
+from beam_links import beam_link, rectangle
 
 import ffrobot
 from ffrobot.common.errors import InputError
@@ -17,14 +18,10 @@ def solve(scene, folder, name="scene"):
     return ffrobot.solve(scenes_in_3d.write(scene, folder / f"{name}.toml"))
 
 
-STRIP = {
-    "name": "strip", "material": {"youngs_modulus": 70e9, "density": 2700.0},
-    "geometry": {
-        "kind": "beam", "length": 0.6, "section": {"shape": "rectangle", "height": 0.02, "width": 0.004},
-    },
-    "mesh": {"elements": 20}, "reference": {"condition": "cantilever"},
-    "modes": {"count": 4, "family": ["in-plane-bending", "out-of-plane-bending"]},
-}  # fmt: skip
+STRIP = beam_link(
+    0.6, rectangle(0.02, 0.004), 20, nu=None, name="strip",
+    modes={"count": 4, "family": ["in-plane-bending", "out-of-plane-bending"]}
+)  # fmt: skip
 LAYOUT = {
     "body": "arm", "count": 1, "length": 0.06, "width": 0.02, "thickness": 0.5e-3, "modulus": 63e9, "d31": 110e-12,
     "structural": False, "bends": "out-of-plane", "limit": 200.0, "allocation": "least-squares",

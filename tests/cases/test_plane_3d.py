@@ -13,12 +13,6 @@ from ffrobot.mbs.model import system
 CLOSE = 1e-9  # of the peak of each dataset; reactions and moments of each kind by the largest of them
 OUTPUTS = {"end": 0.02, "output_step": 0.001, "tolerance": 1e-10}
 INVERSE = {"name": "inverse", "kind": "pcid"} | OUTPUTS
-REPLAY = {"name": "replay", "kind": "forward", "actuation": "inverse", "apply": "joints"} | OUTPUTS
-PD = {"kind": "joint-pid", "proportional": {"O": 500.0, "A": 100.0}, "derivative": {"O": 40.0, "A": 8.0}}
-LOOP = {
-    "name": "loop", "kind": "closed-loop", "actuation": "inverse", "sample_time": 0.001, "delay": 0.0005,
-    "sensor": [{"joint": joint, "resolution": 9.587e-5} for joint in ("O", "A")], "controller": [PD],
-} | OUTPUTS  # fmt: skip
 ROUNDING = "constraint_violation"
 
 
@@ -74,12 +68,6 @@ def assert_same(plane, space, close=CLOSE):
             np.testing.assert_allclose(plane[name], expected, rtol=0, atol=close * peaks[kind], err_msg=name)
 
 
-def test_two_links_along_a_path_and_again_by_their_moments_and_by_its_forces(tmp_path, monkeypatch):
-    along_path = REPLAY | {"name": "along path", "apply": "trajectory"}
-    tables = tables_of("two_link", TWO_LINK, [INVERSE, REPLAY, along_path])
-    assert_same(*in_both(tables, tmp_path, monkeypatch))
-
-
 def test_implicit_integrator(tmp_path, monkeypatch):
     """Steps are the same, each as near to the solution of its equations as Newton's method goes."""
     chosen = {"integrator": "radau", "tolerance": 1e-6, "end": 0.01}
@@ -93,18 +81,6 @@ def test_gravity_across_the_plane_is_carried_by_the_joints(tmp_path, monkeypatch
     plane, space = in_both(tables, tmp_path, monkeypatch)
     assert_same(plane, space)
     assert np.abs(plane["inverse/joints/O/reaction"][:, 2]).max() > 1.0
-
-
-def test_slider_crank(tmp_path, monkeypatch):
-    """Of rows that close its loop those across the plane are left out."""
-    tables = tables_of("slider_crank", CRANK, [INVERSE])
-    assert_same(*in_both(tables, tmp_path, monkeypatch), 1e-8)
-
-
-def test_controlled_arm(tmp_path, monkeypatch):
-    """Samples read states of the plane, motors act on sections."""
-    tables = tables_of("two_link_closed_loop", TWO_LINK, [INVERSE, LOOP])
-    assert_same(*in_both(tables, tmp_path, monkeypatch), 1e-7)
 
 
 def rpy(C):

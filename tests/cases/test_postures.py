@@ -1,10 +1,9 @@
-"""Singular postures and limits of joints along a path in 3D: a wrist of three axes that turns its tool about y."""
+"""Singular postures along a path in 3D: of a wrist of three axes that turns its tool about y, and of an arm with it."""
 
 import re
 
 import h5py
 import numpy as np
-import pytest
 
 BODY = """
 [[body]]
@@ -20,7 +19,6 @@ name = "q{number}"
 type = "revolute"
 between = ["{inner}", "{name}.in"]
 axis = {axis}
-{keys}
 """
 HEAD = 'name = "wrist"\nspace = "spatial"\ngravity = [0.0, 0.0, -9.81]\n'
 PATH = """
@@ -41,63 +39,24 @@ tolerance = 1e-8
 """
 
 
-def wrist(folder, pitch, start, keys=""):
+def wrist(folder, pitch, start):
     axes = ("[0, 0, 1]", "[0, 1, 0]", "[0, 0, 1]")
     inner, text = "ground", HEAD
     for number, (name, axis) in enumerate(zip("abc", axes, strict=True), 1):
-        text += BODY.format(name=name, number=number, inner=inner, axis=axis, keys=keys if number == 2 else "")
+        text += BODY.format(name=name, number=number, inner=inner, axis=axis)
         inner = f"{name}.out"
     path = folder / "scene.toml"
     path.write_text(text + PATH.format(pitch=pitch, start=start))
     return path
 
 
-def results(path):
-    with h5py.File(path.with_suffix(".results.h5")) as file:
-        group = file["inverse"]
-        return (
-            group.attrs["status"],
-            list(group.attrs["warnings"]),
-            group["time"][()],
-            group["joints/q2/coordinate"][()],
-        )
-
-
-def test_a_singular_posture_ends_the_run(tmp_path, ffrobot):
-    """Axes 1 and 3 in line at t = 0.5: what there is before is kept."""
-    path = wrist(tmp_path, "0.5-t", 0.5)
-    done = ffrobot("solve", path)
-    assert done.returncode == 1
-    status, warnings, time, _ = results(path)
-    assert status == "diverged"
-    assert time[-1] > 0
-    (warning,) = warnings
-    assert 'a singular posture: motions of "q1", "q3" against each other' in warning
-    assert "at t = 0." in warning
-
-
 def test_a_nearly_singular_posture_is_told(tmp_path, ffrobot):
     path = wrist(tmp_path, "0.0005+0.4*exp(-(4*t)**2)", 0.4005)
-    done = ffrobot("solve", path)
-    assert done.returncode == 0, done.stderr
-    status, warnings, _, _ = results(path)
-    assert status == "completed"
+    ffrobot.ok("solve", path)
+    with h5py.File(path.with_suffix(".results.h5")) as file:
+        assert file["inverse"].attrs["status"] == "completed"
+        warnings = list(file["inverse"].attrs["warnings"])
     assert [text for text in warnings if "nearly a singular posture (ratio 2.5e-04)" in text and '"q1", "q3"' in text]
-
-
-@pytest.mark.parametrize(("pitch", "told"), [("0.5+0.3*t**2", True), ("0.5+0.1*t**2", False)])
-def test_limits_of_positions_are_watched(pitch, told, tmp_path, ffrobot):
-    path = wrist(tmp_path, pitch, 0.5, "position_limit = [0.0, 0.65]")
-    done = ffrobot("solve", path)
-    assert done.returncode == 0, done.stderr
-    _, warnings, _, _ = results(path)
-    if told:
-        (warning,) = warnings
-        first = np.sqrt(0.15 / 0.3)  # between outputs
-        assert f'joint "q2": leaves its position_limit [0, 0.65] rad at t = {first:.6g} s' in warning
-        assert "from 0.5 to 0.8 rad" in warning
-    else:
-        assert not warnings
 
 
 # 6R: yaw, two pitches, a wrist of roll, pitch and roll whose axes meet 0.15 m behind the tip.
@@ -174,8 +133,7 @@ def test_an_arm_whose_wrist_comes_into_line_stops_there(tmp_path, ffrobot):
 
 def test_an_arm_that_comes_near_such_a_posture_is_told(tmp_path, ffrobot):
     path = arm(tmp_path, "0.5005+0.4*exp(-(4*t)**2)", 0.9005)
-    done = ffrobot("solve", path)
-    assert done.returncode == 0, done.stderr
+    ffrobot.ok("solve", path)
     status, warnings, angle = of_arm(path)
     assert status == "completed"
     (warning,) = warnings

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from beam_links import beam_link, rectangle
 from scipy.spatial.transform import Rotation
 
 import ffrobot
@@ -135,15 +136,14 @@ def test_a_screw_jack_in_closed_form(unit):
 
 def test_motors_only_keeps_motors_out_of_reactions():
     """A beam on a hub: what the motor does there is no part of the reaction, as in the replay."""
-    link = {
-        "name": "arm",
-        "material": {"youngs_modulus": 7e10, "density": 2700.0, "poissons_ratio": 0.33},
-        "geometry": {"kind": "beam", "length": 0.5, "section": {"shape": "rectangle", "height": 0.01, "width": 0.02}},
-        "mesh": {"elements": 8},
-        "reference": {"condition": "cantilever"},
-        "modes": {"count": 2, "family": "in-plane-bending"},
-        "damping": {"ratio": 0.02},
-    }
+    link = beam_link(
+        0.5,
+        rectangle(0.01, 0.02),
+        8,
+        name="arm",
+        modes={"count": 2, "family": "in-plane-bending"},
+        damping={"ratio": 0.02},
+    )
     joint = {"name": "hub", "type": "revolute", "between": ["ground", "arm.root"], "axis": [0, 0, 1]}
     rest = "0.4*(10*(t/0.4)**3-15*(t/0.4)**4+6*(t/0.4)**5)"
     path = {"name": "t", "joint": "hub", "value": rest}

@@ -4,6 +4,7 @@ import re
 
 import numpy as np
 import pytest
+from beam_links import beam_link, circle
 
 import ffrobot
 
@@ -24,15 +25,14 @@ def bar(name, length, mass):
 def coupler(family):
     return {
         "name": "coupler",
-        "link": {
-            "name": "coupler",
-            "material": {"youngs_modulus": 70e9, "poissons_ratio": 0.33, "density": 2700.0},
-            "geometry": {"kind": "beam", "length": 0.4, "section": {"shape": "circle", "diameter": 0.012}},
-            "mesh": {"elements": 4},
-            "reference": {"condition": "cantilever"},
-            "modes": {"count": 2, "family": family},
-            "damping": {"rayleigh": [0.0, 2e-4]},
-        },
+        "link": beam_link(
+            0.4,
+            circle(0.012),
+            4,
+            name="coupler",
+            modes={"count": 2, "family": family},
+            damping={"rayleigh": [0.0, 2e-4]},
+        ),
     }
 
 

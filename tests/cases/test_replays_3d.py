@@ -3,6 +3,7 @@
 import h5py
 import numpy as np
 import pytest
+from beam_links import beam_link, rectangle
 
 import ffrobot
 
@@ -36,17 +37,10 @@ def rigid(rng, name):
 def beam(name, condition="cantilever"):
     return {
         "name": name,
-        "link": {
-            "name": name,
-            "material": {"youngs_modulus": 7e10, "density": 2700.0, "poissons_ratio": 0.33},
-            "geometry": {
-                "kind": "beam", "length": 0.35, "section": {"shape": "rectangle", "height": 0.009, "width": 0.014}
-            },
-            "mesh": {"elements": 8},
-            "reference": {"condition": condition},
-            "modes": {"count": 3, "family": "all", "attachment_modes": False},
-            "damping": {"ratio": 0.01},
-        },
+        "link": beam_link(
+            0.35, rectangle(0.009, 0.014), 8, condition=condition, name=name,
+            modes={"count": 3, "family": "all", "attachment_modes": False}, damping={"ratio": 0.01}
+        ),
     }  # fmt: skip
 
 

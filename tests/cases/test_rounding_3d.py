@@ -4,6 +4,7 @@ import re
 
 import numpy as np
 import pytest
+from beam_links import beam_link, rectangle
 
 import ffrobot
 
@@ -13,19 +14,15 @@ TIGHT = 1e-9
 def beam(name, length, height, width, condition, ratio):
     return {
         "name": name,
-        "link": {
-            "name": name,
-            "material": {"youngs_modulus": 70e9, "poissons_ratio": 0.33, "density": 2700.0},
-            "geometry": {
-                "kind": "beam",
-                "length": length,
-                "section": {"shape": "rectangle", "height": height, "width": width},
-            },
-            "mesh": {"elements": 8},
-            "reference": {"condition": condition},
-            "modes": {"count": 1, "attachment_modes": False},
-            "damping": {"ratio": ratio},
-        },
+        "link": beam_link(
+            length,
+            rectangle(height, width),
+            8,
+            condition=condition,
+            name=name,
+            modes={"count": 1, "attachment_modes": False},
+            damping={"ratio": ratio},
+        ),
     }
 
 

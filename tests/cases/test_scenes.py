@@ -4,6 +4,7 @@ import h5py
 import numpy as np
 import pytest
 import tomli_w
+from beam_links import beam_link, circle
 from checkpoint_mechanisms import load
 from checkpoint_scene_files import close, write_scene
 
@@ -22,8 +23,7 @@ SOLVED = (
 @pytest.fixture(scope="module", params=SOLVED)
 def solved(request, tmp_path_factory, ffrobot):
     scene = write_scene(request.param, tmp_path_factory.mktemp(request.param))
-    done = ffrobot("solve", scene, "--verbose")
-    assert done.returncode == 0, done.stderr
+    done = ffrobot.ok("solve", scene, "--verbose")
     told = [line for line in done.stdout.splitlines() if line.startswith("warning  ")]
     known = ("no actuator provides all modal forces", "bends by")  # no patches and stiffening, as the reference has it
     assert all(any(text in line for text in known) for line in told)
@@ -87,8 +87,7 @@ def test_bodies_and_points(solved):
 
 
 def test_info_and_python_read_them(solved, ffrobot):
-    done = ffrobot("info", solved[1].filename)
-    assert done.returncode == 0, done.stderr
+    ffrobot.ok("info", solved[1].filename)
     with Results(solved[1].filename) as results:
         np.testing.assert_array_equal(results["inverse/time"], solved[1]["inverse/time"])
 
@@ -100,22 +99,14 @@ def test_links_say_what_they_cannot_do(tmp_path, ffrobot):
     text = link.read_text().replace("indices = [1, 2, 3, 4, 5, 6, 11, 14]", "count = 2")
     link.write_text(text.replace('family = "all"', 'family = "out-of-plane-bending"'))
     scene.write_text(scene.read_text().replace("tolerance = 1e-08", "tolerance = 1e-5"))
-    done = ffrobot("solve", scene, "--verbose")
-    assert done.returncode == 0, done.stderr
+    done = ffrobot.ok("solve", scene, "--verbose")
     assert "fore: rigid in in-plane-bending, axial, torsion" in done.stdout.replace("\n", " ")
 
 
 @pytest.mark.parametrize(("family", "is_rigid"), [("axial", True), ("torsion", True), ("in-plane-bending", False)])
 def test_links_say_what_they_cannot_do_in_the_plane(tmp_path, ffrobot, family, is_rigid):
     """Likewise; and nothing is claimed of what modes that are not there would do."""
-    link = {
-        "name": "arm",
-        "material": {"youngs_modulus": 70e9, "poissons_ratio": 0.33, "density": 2700.0},
-        "geometry": {"kind": "beam", "length": 0.6, "section": {"shape": "circle", "diameter": 0.02}},
-        "mesh": {"elements": 8},
-        "reference": {"condition": "cantilever"},
-        "modes": {"count": 3, "family": family},
-    }
+    link = beam_link(0.6, circle(0.02), 8, name="arm", modes={"count": 3, "family": family})
     scene = {
         "name": "arm",
         "space": "planar",
@@ -128,8 +119,7 @@ def test_links_say_what_they_cannot_do_in_the_plane(tmp_path, ffrobot, family, i
     }
     for name, tables in (("arm", link), ("scene", scene)):
         (tmp_path / f"{name}.toml").write_text(tomli_w.dumps(tables))
-    done = ffrobot("solve", tmp_path / "scene.toml", "-o", tmp_path / "results.h5", "--verbose")
-    assert done.returncode == 0, done.stderr
+    done = ffrobot.ok("solve", tmp_path / "scene.toml", "-o", tmp_path / "results.h5", "--verbose")
     told = " ".join(done.stdout.split())
     assert ("arm: rigid in in-plane-bending, of which its file has no modes" in told) == is_rigid
     assert ("modes: not estimated: rigid without modes: arm in in-plane-bending" in told) == is_rigid

@@ -133,9 +133,6 @@ def both(case, analyses, guess, folder, payload=None, geometric_stiffening=True)
     ]
 
 
-POINT_MASS = {"point": "link2.tip", "mass": 0.3}
-
-
 @pytest.mark.parametrize("stiffened", [False, True])
 def test_two_links_bend_as_those_of_the_plane(stiffened, tmp_path):
     """How far, how much loads change their stiffness, what that may do to results, and what is said of it.

@@ -34,8 +34,7 @@ def link(ffrobot, case_copy_of_module):
     def make(case, name, edit=lambda text: text):
         path = case_copy_of_module(case).with_name(f"{name}.toml")
         path.write_text(edit(path.read_text(encoding="utf-8")), encoding="utf-8")
-        done = ffrobot("link", path)
-        assert done.returncode == 0, done.stderr
+        ffrobot.ok("link", path)
         return read_modal_body(path.with_suffix(".h5"))
 
     return make

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import scenes_in_3d
+from beam_links import beam_link, rectangle
 from moved_scenes import tables_of
 from random_robots import random_scene
 from robots_3d import random_scene_in_3d
@@ -33,13 +34,7 @@ BLOW = [{"point": "link2.tip", "y": "where(t < 0.02, 30*sin(pi*t/0.02), 0)"}]
 LOOP = {"name": "loop", "kind": "closed-loop", "actuation": "inverse", "sample_time": 0.001, "delay": 0.0005,
         "disturbance": BLOW, "controller": [PD], "sensor": ENCODERS, "tolerance": 1e-8}  # fmt: skip
 PATCHES = {"length": 0.05, "width": 0.02, "thickness": 5e-4, "modulus": 63e9, "d31": 110e-12, "density": 7600.0}
-LINK = {
-    "material": {"youngs_modulus": 7e10, "poissons_ratio": 0.3, "density": 2700.0},
-    "geometry": {"kind": "beam", "length": 0.5, "section": {"shape": "rectangle", "height": 0.008, "width": 0.02}},
-    "mesh": {"elements": 8},
-    "reference": {"condition": "cantilever"},
-    "damping": {"ratio": 0.01},
-}
+LINK = beam_link(0.5, rectangle(0.008, 0.02), 8, nu=0.3, damping={"ratio": 0.01})
 
 
 def bending(count=3, **of_link):
@@ -187,10 +182,6 @@ def arm_in_3d(*analyses, checkpoint="arm3_line_static", of_joints=(), of_bodies=
     found["joint"] = [joint | dict(of_joints) for joint in found["joint"]]
     found["body"] = [body | (dict(of_bodies) if "link" in body else {}) for body in found["body"]]
     return ffrobot.make_scene(**found | {"analysis": list(analyses)} | tables)
-
-
-def patched_in_3d(**layout):
-    return [{"body": name, "count": 3, "axis": "y"} | PATCHES | layout for name in ("upper", "fore")]
 
 
 def planar_case_in_3d(case, *analyses, **tables):

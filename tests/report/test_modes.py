@@ -54,9 +54,9 @@ def test_small_surfaces_stay_as_they_are():
     np.testing.assert_array_equal(points[kept][same], points[triangles])
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def shown(browser, page, solid_arm):
-    """The page of a solid link, its modes in 3D drawn."""
+    """The page of a solid link, its modes in 3D drawn: opened once for all tests."""
     browser.open(page(solid_arm / "scene.results.h5"))
     browser.run("modeStage.scrollIntoView()")
     browser.wait("modeStage.data && modeStage.data.length === 2")
@@ -95,6 +95,7 @@ def test_modes_are_those_of_the_link(shown, solid_arm):
 
 
 def test_picture_of_a_mode_moves_with_the_slider(shown):
+    choose(shown, "mode-number", 0)
     pictures = []
     for amplitude in (1, -1):
         shown.slide("mode-amplitude", amplitude)
@@ -108,6 +109,8 @@ def test_picture_of_a_mode_moves_with_the_slider(shown):
 
 
 def test_play_swings_the_mode(shown):
+    shown.slide("mode-amplitude", 1)
+    shown.wait("modeState.amplitude === 1")
     shown.run("document.getElementById('mode-play').click()")
     shown.wait("modeState.playing && modeState.amplitude !== 1")
     shown.run("document.getElementById('mode-play').click()")

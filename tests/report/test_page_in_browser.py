@@ -27,10 +27,17 @@ def draw_all(browser):
     browser.run("window.scrollTo(0, 0)")
 
 
-@pytest.fixture
-def paused(browser, two_link_page):
-    """The two-link page, standing still at t = 0, to scale."""
+@pytest.fixture(scope="module")
+def opened(browser, two_link_page):
+    """The two-link page, opened once for all tests that do not ask for another one."""
     browser.open(two_link_page)
+    return browser
+
+
+@pytest.fixture
+def paused(opened):
+    """The two-link page, standing still at t = 0, to scale."""
+    browser = opened
     browser.slide("exaggeration", 0)
     browser.slide("time", 0)
     return browser
@@ -84,6 +91,19 @@ def test_page_opens_without_a_complaint(browser, page, request, cases):
     assert browser.value('performance.getEntriesByType("resource").map((entry) => entry.name)') == []
 
 
+def test_names_are_shown_as_they_are(browser, page, two_link, tmp_path):
+    """A browser would take <b> for bold, and so would Plotly."""
+    path = Path(shutil.copy(two_link.folder / "scene.results.h5", tmp_path))
+    with h5py.File(path, "r+") as file:
+        file.attrs["name"] = "<b>A & B</b>"
+    seal(path)
+    browser.open(page(path, two_link.folder / "scene.results.h5"))
+    assert browser.value("document.querySelector('h1').textContent").startswith("<b>A & B</b>")
+    legend = "[...document.querySelectorAll('#mechanism .legendtext')].map((item) => item.textContent)"
+    assert "<b>A & B</b>: inverse" in browser.value(legend)
+    assert browser.complaints == []
+
+
 def test_mechanism_plays_by_itself(browser, two_link_page):
     browser.open(two_link_page)
     browser.wait("state.playing && state.t > 0")
@@ -123,13 +143,15 @@ def test_hidden_run_catches_up_when_shown(paused, two_link):
     show(paused, 1.0)
     hidden = joints_drawn(paused, "joints_only")["link2.tip"]
     np.testing.assert_allclose(hidden, solved(two_link, "link2.tip", 0.0), rtol=0, atol=1e-6)
-    paused.run(
+    visible = (
         "const run = MECHANISM.runs.findIndex((r) => r.label === 'joints_only');"
-        "Plotly.restyle(stage, { visible: true }, stage.data.map((_, i) => i).filter("
+        "Plotly.restyle(stage, { visible: arguments[0] }, stage.data.map((_, i) => i).filter("
         "(i) => i >= first[run] && (run + 1 === first.length || i < first[run + 1])))"
     )
+    paused.run(visible, True)
     paused.wait("Math.abs(stage.data[first[2] + 7].x.length - 1001) < 1")  # the path taken, up to the end
     shown = joints_drawn(paused, "joints_only")["link2.tip"]
+    paused.run(visible, "legendonly")
     np.testing.assert_allclose(shown, solved(two_link, "link2.tip", 1.0, "joints_only"), rtol=0, atol=1e-6)
 
 
@@ -155,19 +177,6 @@ def test_histories_show_what_the_file_holds(paused, two_link):
     drawn = np.array(paused.value(f"Array.from({curve}._inputArray || {curve}.y._inputArray || {curve}.y)"))
     expected = 1e3 * two_link.file["inverse/points/link2.tip/deflection"][:, 1]  # in mm
     np.testing.assert_allclose(drawn, expected, rtol=0, atol=1e-6 * np.abs(expected).max())
-
-
-def test_names_are_shown_as_they_are(browser, page, two_link, tmp_path):
-    """A browser would take <b> for bold, and so would Plotly."""
-    path = Path(shutil.copy(two_link.folder / "scene.results.h5", tmp_path))
-    with h5py.File(path, "r+") as file:
-        file.attrs["name"] = "<b>A & B</b>"
-    seal(path)
-    browser.open(page(path, two_link.folder / "scene.results.h5"))
-    assert browser.value("document.querySelector('h1').textContent").startswith("<b>A & B</b>")
-    legend = "[...document.querySelectorAll('#mechanism .legendtext')].map((item) => item.textContent)"
-    assert "<b>A & B</b>: inverse" in browser.value(legend)
-    assert browser.complaints == []
 
 
 def test_nothing_on_the_page_sends_data_away(paused):
