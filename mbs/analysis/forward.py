@@ -21,6 +21,7 @@ from ..model.known_motion import State
 from ..model.model import Model, modal_directions, without_paths
 from ..scene.analysis import ActuatedAnalysis, Analysis, Need
 from ..solve.posture import mobility
+from ..solve.start import displaced_joints
 from ..solve.statics import hanging_joints, initial_state
 from .context import Context, PatchedLink
 from .drive import drive_robot
@@ -68,7 +69,7 @@ class Forward(ActuatedAnalysis):
         model, progress = with_compliance(without_paths(context.model)), context.progress
         if self.actuation is None:
             start = initial_state(model)
-            texts = tuple(hanging_joints(model, start))
+            texts = (*displaced_joints(model), *hanging_joints(model, start))
             return drive_robot(model, self, start, progress, warnings=texts, earlier=context.earlier)
         source = context.outcomes[self.actuation]
         if model.tree.gears and not source.model.tree.gears:

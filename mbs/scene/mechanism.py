@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
-from pydantic import Field
+from pydantic import Field, PrivateAttr
 
 from ...common.deferred import Table
 from ...common.names import Title
@@ -29,6 +29,7 @@ Numbers = Annotated[Quantity | tuple[Quantity, ...], Spelled(Quantity, as_writte
 class Initial(Referring):
     """State at t = 0; values of bodies and joints are guesses that the constraints correct.
 
+    Where kinematic loops alone constrain, joints with values keep them if the other joints can close the loops.
     In planar scenes with `joints` or `joint_rates`, a frame without an own angle or rate follows the coordinate of its
     inboard joint (default 0); without them, its angle and rate are 0.
     """
@@ -57,6 +58,17 @@ class Initial(Referring):
     refers_to = (
         ("angles", "body"), ("rates", "body"), ("joints", "joint"), ("joint_rates", "joint"), ("branch", "joint")
     )  # fmt: skip
+    _named: dict[str, frozenset[str]] = PrivateAttr(default_factory=dict)
+
+    def named(self, table: Literal["joints", "joint_rates"]) -> frozenset[str]:
+        """The joints with values in the file: their own, or those of both bodies that they connect."""
+        return self._named.get(table, frozenset(getattr(self, table)))
+
+    def naming(self, **named: frozenset[str]) -> Self:
+        """The same with these joints in `named`, by table, which other joints have values beside."""
+        found = self.model_copy()
+        found._named = named
+        return found
 
 
 class MechanismKeys(Record):
@@ -101,16 +113,16 @@ class MechanismKeys(Record):
     def edges(self) -> list[Edge]:
         """The joints for a spanning forest.
 
-        Loops are cut at spherical joints, then where nothing acts along the joint, then where friction or loads do,
-        then where there is a rotor or a trajectory. The tree needs the coordinates of motors without rotors, and those
-        that analyses read.
+        Loops are cut at spherical joints, then where nothing acts along the joint, first of all where [initial] has no
+        value, then where friction or loads do, then where there is a rotor or a trajectory. The tree needs the
+        coordinates of motors without rotors, and those that analyses read.
         """
         return [Edge(joint.between, self._rank(joint)) for joint in self.joint]
 
     def _rank(self, joint: AnyJoint) -> int:
         followed = any(trajectory.coordinate_of == joint.name for trajectory in self.trajectory)
         if not joint.locates:
-            return 4
+            return 5
         if joint.loop_equations is None or joint.asks_for_coordinate:
             return 0
         if getattr(joint, "rotor_inertia", 0.0):
@@ -119,7 +131,9 @@ class MechanismKeys(Record):
             return 0
         if followed:
             return 1
-        return 2 if joint.frictions or any(load.joint == joint.name for load in self.load) else 3
+        if joint.frictions or any(load.joint == joint.name for load in self.load):
+            return 2
+        return 3 if joint.name in self.initial.named("joints") | self.initial.named("joint_rates") else 4
 
     @property
     def read_joints(self) -> frozenset[str]:

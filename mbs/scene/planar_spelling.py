@@ -37,16 +37,24 @@ def in_3d(scene: S) -> S:
         }
 
     start = {
-        "joints": initial.joints | guesses(angles),
-        "joint_rates": initial.joint_rates | guesses(rates),
+        "joints": guesses(angles) | initial.joints,
+        "joint_rates": guesses(rates) | initial.joint_rates,
         "angles": {},
         "rates": {},
     }
+
+    def named(of_joints: Mapping[str, Any], of_bodies: Values) -> frozenset[str]:
+        between = (joint.name for joint in turning if {*joint.bodies} <= {GROUND, *of_bodies})
+        return frozenset({*of_joints, *between})
+
+    kept = initial.naming(
+        joints=named(initial.joints, initial.angles), joint_rates=named(initial.joint_rates, initial.rates)
+    )
     joints = tuple(
         joint if _turns(joint) else joint.model_copy(update={"rpy": (0.0, 0.0, _turn(angles, joint))})
         for joint in scene.joint
     )
-    return scene.model_copy(update={"joint": joints, "initial": initial.model_copy(update=start)})
+    return scene.model_copy(update={"joint": joints, "initial": kept.model_copy(update=start)})
 
 
 def _turns(joint: JointRecord) -> bool:
@@ -62,12 +70,14 @@ def _turn(of_bodies: Values, joint: JointRecord) -> float:
 def _of_bodies(scene: MechanismKeys, given: Values, of_joints: Mapping[str, Any]) -> dict[str, float]:
     """Angles or rates by body: where not given, that of the body that carries it and what the joint between adds.
 
-    All others are 0 where joints have no guesses, too. Trees avoid prismatic joints.
+    All others are 0 where joints have no guesses, too. Trees avoid prismatic joints, then those without a guess.
     """
     found = dict(given)
     if not of_joints:
         return found
-    edges = [Edge(joint.between, int(joint.type == "prismatic")) for joint in scene.joint]
+    edges = [
+        Edge(joint.between, 2 * (joint.type == "prismatic") + (joint.name not in of_joints)) for joint in scene.joint
+    ]
     for body, carrier in spanning_forest([body.name for body in scene.body], edges).carriers.items():
         if carrier is not None and body not in found:
             joint = scene.joint[carrier.joint]

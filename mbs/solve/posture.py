@@ -44,19 +44,22 @@ def row_sizes(model: Model) -> Array:
     return np.array([length if model.measures_way(row) else 1.0 for row in model.rows])
 
 
-def solve_posture(model: Model, t: float, q: Array) -> Array | None:
-    """Q (n_q,) moved onto C(q, t) = 0 by least steps of the joints, p kept; None where that does not converge."""
-    found, is_met = solve_postures(model, np.array([t]), q[None])
+def solve_posture(model: Model, t: float, q: Array, held: BoolArray | None = None) -> Array | None:
+    """Q (n_q,) moved onto C(q, t) = 0 by least steps of the joints, p kept; None where that does not converge.
+
+    Coordinates `held` (n_v,) stay.
+    """
+    found, is_met = solve_postures(model, np.array([t]), q[None], held)
     return found[0] if is_met[0] else None
 
 
-def solve_postures(model: Model, times: Array, q: Array) -> tuple[Array, BoolArray]:
+def solve_postures(model: Model, times: Array, q: Array, held: BoolArray | None = None) -> tuple[Array, BoolArray]:
     """Q (T, n_q) moved onto C(q, t) = 0 at `times` (T,) as in `solve_posture`, and of which that converged (T,)."""
     q, left = np.array(q), np.full(len(q), np.inf)
     if not model.rows:
         return q, np.ones(len(q), dtype=bool)
     scales, row_scales = joint_scales(model), row_sizes(model)
-    going, joints = np.arange(len(q)), scales > 0
+    going, joints = np.arange(len(q)), scales > 0 if held is None else (scales > 0) & ~held
     farthest = np.inf if all(row.kind == "coordinate" for row in model.rows) else LARGEST_TURN  # these have no branches
     for _ in range(MOST_ITERATIONS):
         with np.errstate(over="ignore", invalid="ignore"):  # from anywhere: what is not finite ends there
@@ -75,11 +78,16 @@ def solve_postures(model: Model, times: Array, q: Array) -> tuple[Array, BoolArr
     return q, left <= 1e3 * TOLERANCE
 
 
-def with_rates(model: Model, q: Array, v: Array, t: float = 0.0) -> State:
-    """The state at q with the joints' rates moved onto Ċ = 0 at time t by the least change, ṗ kept."""
+def with_rates(model: Model, q: Array, v: Array, t: float = 0.0, held: BoolArray | None = None) -> State:
+    """The state at q with the joints' rates moved onto Ċ = 0 at time t by the least change, ṗ kept.
+
+    Those `held` (n_v,) stay.
+    """
     if not model.rows:
         return State(q, v)
     scales, now = joint_scales(model), np.array([t])
+    if held is not None:
+        scales[held] = 0.0
     C_v = row_values(model, q[None], now)[1][0]
     left = target_rates(model, q[None], now)[0] - C_v @ v
     return State(q, v + scales * np.linalg.lstsq(C_v * scales, left, rcond=1e-10)[0])

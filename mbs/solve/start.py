@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from typing import Literal
 
 import numpy as np
 
@@ -10,8 +11,10 @@ from ...common.arrays import Array
 from ...common.errors import InputError, quoted
 from ..model.known_motion import State
 from ..model.model import Model, row_values
-from .posture import MOST_ITERATIONS, solve_posture, with_rates
+from .posture import MOST_ITERATIONS, BoolArray, joint_scales, solve_posture, with_rates
 from .reach import check_reach, turned_guesses, working_guess
+
+AWAY = 0.1  # rad, sizes of the robot, and of the fastest rate: by more than links bend in equilibrium
 
 
 def undeformed_posture(model: Model) -> State:
@@ -21,7 +24,9 @@ def undeformed_posture(model: Model) -> State:
     """
     tree = model.tree
     guess = _with_slides(model, tree.at_rest(_numbers(model, model.scene.initial.joints, "joints")))
-    q = solve_posture(model, 0.0, guess)
+    named = _named(model, "joints")
+    q = solve_posture(model, 0.0, guess, named) if named.any() else None
+    q = solve_posture(model, 0.0, guess) if q is None else q
     if q is None:
         check_reach(model, 0.0)
         owners, advice = quoted(dict.fromkeys(row.owner for row in model.rows)), "; ".join(_advice(model, guess))
@@ -30,7 +35,41 @@ def undeformed_posture(model: Model) -> State:
             f" {owners} at t = 0, found none within {MOST_ITERATIONS} steps"
             f" ({advice or 'out of reach, or on another branch?'})"
         )
-    return relaxed_gears(model, with_rates(model, q, _guessed_rates(model)))
+    v, named = _guessed_rates(model), _named(model, "joint_rates")
+    start = with_rates(model, q, v)
+    if named.any():
+        kept = with_rates(model, q, with_rates(model, q, v, held=named).v)
+        start = kept if np.allclose(kept.v[named], v[named]) else start
+    return relaxed_gears(model, start)
+
+
+def _named(model: Model, table: Literal["joints", "joint_rates"]) -> BoolArray:
+    """(n_v,) of joints with values in [initial], where loops alone constrain and others can close them; else none."""
+    named = np.zeros(model.tree.n_v, dtype=bool)
+    if model.rows and model.loop_rows.all():
+        for node in model.tree.nodes:
+            named[node.v] = node.joint.name in model.scene.initial.named(table)
+    return named
+
+
+def displaced_joints(model: Model) -> Iterator[str]:
+    """A warning where loops cannot be closed with all values of [initial], and joints start elsewhere."""
+    if not model.loop_rows.any():
+        return
+    initial, start, scales = model.scene.initial, undeformed_posture(model), joint_scales(model)
+    guess, moved = State(model.tree.at_rest(_numbers(model, initial.joints, "joints")), _guessed_rates(model)), []
+    fastest = float(np.abs(guess.v / np.where(scales > 0, scales, np.inf)).max(initial=0.0))
+    for node in (node for node in model.tree.nodes if node.joint.units):
+        ways, rates = np.abs(start.q - guess.q)[node.q], np.abs(start.v - guess.v)[node.v]
+        name, most = node.joint.name, AWAY * scales[node.v]
+        is_elsewhere = name in initial.named("joints") and np.any(ways > most)
+        if is_elsewhere or (name in initial.named("joint_rates") and np.any(rates > fastest * most)):
+            moved.append(name)
+    if moved:
+        yield (
+            f"joints {quoted(moved)} start away from the values in [initial], with which no posture and rates close the"
+            " loops: give values of as many joints as can move independently, and the others follow"
+        )
 
 
 def _with_slides(model: Model, q: Array) -> Array:

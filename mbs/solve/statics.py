@@ -11,12 +11,11 @@ from ...common.errors import SolveError, quoted
 from ..model.known_motion import KnownStates, State, required_forces
 from ..model.model import Model, row_values
 from .posture import joint_scales, robot_size, row_sizes, with_rates
-from .start import undeformed_posture
+from .start import AWAY, undeformed_posture
 
 MOST_ITERATIONS = 60
 TOLERANCE = 1e-12  # residual forces relative to the largest of their terms, positions to the size of the robot
 LARGEST_STEP = 0.3  # rad, sizes of the robot, and of p the same in sizes of its own
-AWAY = 0.1  # rad, sizes of the robot: by more than links bend in equilibrium
 DIFFERENCE = 6e-6  # of natural sizes: central differences of first derivatives
 SLACK = 1e-3  # of the largest force over its natural size: less stiffness is none
 UNSTABLE = -1e-5  # of the stiffness of single coordinates: closer to none is rounding of differences
