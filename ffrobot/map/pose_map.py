@@ -168,9 +168,15 @@ def _keeps_orientation(scene: Scene, axes: tuple[GridAxis, ...], wanted: str) ->
 def make_map(plan: MapPlan, processes: int, watcher: Watcher) -> PoseMap:
     """All poses of the grid; parts that an earlier run of the same plan has judged are read from the folder.
 
-    Raises `InputError` for a point or an axis that the robot has not, `SolveError` where no pose is found at all.
+    Raises `InputError` for a point or an axis that the robot has not and without motors, `SolveError` where no pose is
+    found at all.
     """
     solution = prepare_scene(plan.scene, watcher)
+    if not solution.model.motors:
+        raise InputError(
+            f"{plan.scene}: joint: expected motors that keep the poses of a map, found none: joints of kinematic loops"
+            " have them with motor = true alone"
+        )
     _check_point(solution, plan.point)
     watcher.stage("postures")
     request = _request(plan)

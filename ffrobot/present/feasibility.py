@@ -30,6 +30,11 @@ def feasibility_tables(path: Path, analysis: str | None) -> Group:
             if file.attrs.get("format") != FORMAT:
                 raise InputError(f"{path}: expected a results file, found format {file.attrs.get('format')!r}")
             judged = [name for name, group in file.items() if "feasibility" in group]
+            if not judged:
+                raise InputError(
+                    f"{path}: expected an analysis with motors or patches, found none: joints of kinematic loops have"
+                    " motors with motor = true alone"
+                )
             if analysis is not None and analysis not in judged:
                 raise InputError(
                     f"{path}: --analysis: expected an analysis with motors or patches, {quoted(judged)}, found"

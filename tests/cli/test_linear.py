@@ -130,3 +130,12 @@ def test_bad_input(ffrobot, scene, mistake):
     for part in expected:
         assert part in done.stderr
     assert 'analysis "' in done.stderr
+
+
+def test_what_no_motor_does_is_not_judged(ffrobot, scene):
+    path = scene(edits={'"arm.root"]': '"arm.root"]\nmotor = false'})
+    path.write_text(path.read_text(encoding="utf-8").split('[[analysis]]\nname = "held"')[0], encoding="utf-8")
+    assert ffrobot("solve", path).returncode == 0
+    done = ffrobot("feasibility", path.with_suffix(".results.h5"))
+    assert done.returncode == 2
+    assert "expected an analysis with motors or patches, found none" in done.stderr

@@ -225,3 +225,13 @@ def test_the_tool_of_a_robot_without_path_is_on_its_last_body(tmp_path):
         )
         path.write_text(text + '[[analysis]]\nname = "rest"\nkind = "static"\n')
         assert plan_map(path, ("wrist=0:1:2",), tmp_path / "map").point == expected
+
+
+def test_poses_that_no_motor_keeps_are_refused(arm, tmp_path):
+    """Weight would take them elsewhere."""
+    limp = arm.with_name("limp.toml")
+    limp.write_text(
+        ARM.replace('type = "revolute"', 'type = "revolute"\nmotor = false').replace("stiffness = 3000.0", "")
+    )
+    with pytest.raises(InputError, match="expected motors that keep the poses of a map, found none"):
+        mapped(limp, tmp_path / "map", "shoulder=0.3")
