@@ -1,6 +1,6 @@
 """Convex quadratic programs along a time axis, by a primal-dual interior point method.
 
-    min  Σ_k ½ z_kᵀ H_k z_k + g_kᵀ z_k        z_k = (x_k, x_{k+1}),  k = 0 … N−1
+    min  Σ_k ½ z_kᵀ H_k z_k + g_kᵀ z_k        z_k = (x_k, the first r of x_{k+1}),  k = 0 … N−1
     with F_k x_k + G_k x_{k+1} = c_k,   R_0 x_0 = e_0,   R_N x_N = e_N,   C_k z_k ≤ d_k
 
 Predictor and corrector are Mehrotra's (Nocedal and Wright, *Numerical Optimization*, ch. 16.6). Newton's equations in
@@ -23,12 +23,13 @@ MOST_ITERATIONS = 60
 FEASIBLE = 1e-10  # of equations and inequalities, relative to their data
 GAP = 1e-9  # of the objective: closer, weights of dependent limits spoil the factors
 STATIONARY = 1e-8  # of the Lagrangian's gradient, relative to its terms
+HALFWAY = 1e-3  # of the objective: the gap where a similar program begins
 BACK = 0.995  # of the way to the nearest bound
 
 
 @dataclass(frozen=True)
 class Program:
-    """See above: H (N, 2s, 2s), g (N, 2s), F, G (N, e, s), c (N, e), C (N, i, 2s), d (N, i).
+    """See above: H (N, s + r, s + r), g (N, s + r), F, G (N, e, s), c (N, e), C (N, i, s + r), d (N, i).
 
     `start`, `end`: R (r, s) and e (r,).
     """
@@ -43,13 +44,26 @@ class Program:
     C: Array
     d: Array
 
+    def z(self, x: Array) -> Array:
+        """All z_k (N, s + r) of x (N+1, s)."""
+        return np.hstack([x[:-1], x[1:, : self.g.shape[1] - x.shape[1]]])
+
+    def objective(self, x: Array) -> float:
+        """At x (N+1, s)."""
+        z = self.z(x)
+        return float((z * (0.5 * _times(self.H, z) + self.g)).sum())
+
 
 class Minimum(NamedTuple):
-    """x (N+1, s), the multipliers (N, i) ≥ 0 of C z ≤ d, and whether the method converged."""
+    """x (N+1, s), the multipliers (N, i) ≥ 0 of C z ≤ d, and whether the method converged.
+
+    `halfway`: slack, multipliers, and all unknowns less those of the minimum, where bounds are not reached yet.
+    """
 
     x: Array
     multipliers: Array
     converged: bool
+    halfway: tuple[Array, Array, Array]
 
 
 class _Layout:
@@ -57,21 +71,27 @@ class _Layout:
 
     def __init__(self, program: Program) -> None:
         self.N, self.e, self.s = program.F.shape
+        self.r = program.g.shape[1] - self.s
         self.first, self.last = len(program.start[0]), len(program.end[0])
         self.period = self.s + self.e
         self.size = self.first + self.N * self.period + self.s + self.last
         self.x = self.first + self.period * np.arange(self.N + 1)[:, None] + np.arange(self.s)
         self.equations = self.first + self.s + self.period * np.arange(self.N)[:, None] + np.arange(self.e)
-        self.z = np.hstack([self.x[:-1], self.x[1:]])
         self.of_start, self.of_end = np.arange(self.first), self.size - self.last + np.arange(self.last)
-        self.band = max(2 * self.s + self.e, self.first + self.s, self.s + self.last) - 1
+        self.band = max(self.s + self.e + self.r, self.first + self.s, self.s + self.last) - 1
+
+    def add(self, to: Array, of_z: Array) -> None:
+        """What belongs to each z_k (N, s + r), to unknowns."""
+        to[self.x[:-1]] += of_z[:, : self.s]
+        to[self.x[1:, : self.r]] += of_z[:, self.s :]
 
 
 class _Band:
     """[H, Aᵀ; A, 0] as LAPACK stores bands, with room for pivots."""
 
     def __init__(self, program: Program, layout: _Layout) -> None:
-        self.layout, self.C = layout, program.C
+        used = np.flatnonzero(program.C.any(axis=(0, 1)))
+        self.layout, self.C = layout, program.C[:, :, : used.max(initial=-1) + 1]
         self.ab = np.zeros((layout.size, 3 * layout.band + 1)).T  # columns contiguous, as LAPACK takes them
         self._add_costs(self.ab, program.H)
         x, equations = layout.x[:, 0], layout.equations[0, 0]
@@ -114,51 +134,61 @@ class _Newton:
         self.lu, self.pivots, info = dgbtrf(ab, layout.band, layout.band, overwrite_ab=True)
         self.is_singular = info != 0
 
-    def solve(self, right: Array) -> Array:
+    def solve(self, right: Array, *, is_refined: bool = True) -> Array:
         """The unknowns, with one step of refinement: close to the end weights span many powers of ten."""
         from scipy.linalg.blas import dgbmv
         from scipy.linalg.lapack import dgbtrs
 
         b, size = self.layout.band, self.layout.size
         found: Array = dgbtrs(self.lu, b, b, right, self.pivots)[0]
+        if not is_refined:
+            return found
         left = right - dgbmv(size, size, b, b, 1.0, self.matrix, found)
         return found + as_floats(dgbtrs(self.lu, b, b, left, self.pivots)[0])
 
 
-def minimize(program: Program, x: Array, gap: float = GAP) -> Minimum:
-    """The minimum within `gap` of its value, from about x (N+1, s), which need not be feasible."""
-    way = _CentralPath(program, x, gap)
+def minimize(program: Program, gap: float = GAP, near: Minimum | None = None) -> Minimum:
+    """The minimum within `gap` of its value, by way of that of a program `near` in changes from its minimum."""
+    way = _CentralPath(program, gap, near)
+    halfway = way.slack, way.z, way.unknown
     for _ in range(MOST_ITERATIONS):
         if way.is_at_end() or not way.advance():
             break
+        if way.gap * way.count > HALFWAY * way.size():
+            halfway = way.slack, way.z, way.unknown
     multipliers = np.where(way.slack < way.z, way.z, 0.0)  # of bounds that are reached
-    return Minimum(way.unknown[way.layout.x], multipliers, way.is_at_end())
+    change = halfway[2].copy()
+    change[way.layout.x] -= way.unknown[way.layout.x]
+    return Minimum(way.unknown[way.layout.x], multipliers, way.is_at_end(), (*halfway[:2], change))
 
 
 class _CentralPath:
     """Unknowns, slack and multipliers z (N, i) of the inequalities on their way to the minimum."""
 
-    def __init__(self, program: Program, x: Array, relative_gap: float) -> None:
+    def __init__(self, program: Program, relative_gap: float, near: Minimum | None) -> None:
         self.program, self.layout, self.relative_gap = program, _Layout(program), relative_gap
         self.band = _Band(program, self.layout)
         self.reach = np.abs(program.d).max(initial=1.0)
         self.force = 1 + float(np.abs(program.g).sum())
+        self.count = max(1, program.d.size)
+        if near is not None:
+            self.slack, self.z, self.unknown = near.halfway
+        else:
+            self._begin()
+        self._look()
+
+    def _begin(self) -> None:
+        """At the minimum of ½ zᵀ H z + gᵀ z + ½ |slack|², with slack made positive."""
         self.unknown = np.zeros(self.layout.size)
-        self.unknown[self.layout.x] = x
-        # of min ½ zᵀ H z + gᵀ z + ½ |slack|², with slack made positive
-        slack = self._slack()
-        to = _residuals(program, self.layout, self.unknown, -slack)
-        self.unknown += self.band.newton(np.ones_like(slack)).solve(to)
+        to = _residuals(self.program, self.layout, self.unknown, -self.program.d)
+        self.unknown = self.band.newton(np.ones_like(self.program.d)).solve(to)
         slack = self._slack()
         least = 1e-1 * float(np.abs(slack).max(initial=self.reach))
         self.slack = slack + max(0.0, least - float(slack.min(initial=np.inf)))
-        self.count = max(1, slack.size)
         self.z = self.force * float(self.slack.sum()) / (self.count**2 * self.slack)  # on the central path
-        self._look()
 
     def _slack(self) -> Array:
-        left: Array = self.program.d - np.einsum("kia,ka->ki", self.program.C, self.unknown[self.layout.z])
-        return left
+        return self.program.d - _times(self.program.C, self.program.z(self.unknown[self.layout.x]))
 
     def _look(self) -> None:
         """Take what equations and inequalities leave here, and the mean of slack × z."""
@@ -171,14 +201,15 @@ class _CentralPath:
         off = np.abs(right[layout.equations]).max(initial=0.0) / (1 + np.abs(program.c).max(initial=0.0))
         if max(off, np.abs(self.of_slack).max(initial=0.0) / self.reach) > FEASIBLE:
             return False
-        if self.gap * self.count > self._small_gap():
+        if self.gap * self.count > self.relative_gap * self.size():
             return False
         multipliers = np.abs(self.unknown[layout.equations])
-        terms = np.einsum("kea,ke->ka", np.abs(program.F), multipliers).max(initial=self.force)
+        terms = _transposed_times(np.abs(program.F), multipliers).max(initial=self.force)
         return bool(np.abs(right[layout.x]).max() <= STATIONARY * terms)
 
-    def _small_gap(self) -> float:
-        return self.relative_gap * (1 + abs(_objective(self.program, self.unknown[self.layout.z])))
+    def size(self) -> float:
+        """What gaps are small against."""
+        return 1 + abs(self.program.objective(self.unknown[self.layout.x]))
 
     def advance(self) -> bool:
         """One step of predictor and corrector; False where there is none."""
@@ -186,49 +217,51 @@ class _CentralPath:
         newton = self.band.newton(z / slack)
         if newton.is_singular or not np.isfinite(self.gap):
             return False
-        _, d_slack, dz = self._toward(newton, slack * z)
+        _, d_slack, dz = self._toward(newton, slack * z, is_refined=False)
         ways = min(1.0, _way(slack, d_slack)), min(1.0, _way(z, dz))
         after = float(((slack + ways[0] * d_slack) * (z + ways[1] * dz)).sum()) / self.count
         target = self.gap * (after / self.gap) ** 3 if self.gap else 0.0
-        target = max(
-            target, 0.5 * self._small_gap() / self.count
-        )  # less spoils the factors, whose weights are z / slack
+        target = max(target, 0.5 * self.relative_gap * self.size() / self.count)  # less spoils the factors' weights
         dx, d_slack, dz = self._toward(newton, slack * z + d_slack * dz - target)
         step = min(1.0, BACK * min(_way(slack, d_slack), _way(z, dz)))
         self.unknown, self.slack, self.z = self.unknown + step * dx, slack + step * d_slack, z + step * dz
         self._look()
         return True
 
-    def _toward(self, newton: _Newton, products: Array) -> tuple[Array, Array, Array]:
+    def _toward(self, newton: _Newton, products: Array, *, is_refined: bool = True) -> tuple[Array, Array, Array]:
         """Steps of unknowns, slack and z by which slack × z loses `products`."""
         pull = (products + self.z * self.of_slack) / self.slack
         to = self.right.copy()
-        np.add.at(to, self.layout.z, np.einsum("kia,ki->ka", self.program.C, pull))
-        dx = newton.solve(to)
-        d_slack = self.of_slack - np.einsum("kia,ka->ki", self.program.C, dx[self.layout.z])
+        self.layout.add(to, _transposed_times(self.program.C, pull))
+        dx = newton.solve(to, is_refined=is_refined)
+        d_slack = self.of_slack - _times(self.program.C, self.program.z(dx[self.layout.x]))
         return dx, d_slack, -(products + self.z * d_slack) / self.slack
 
 
 def _residuals(program: Program, layout: _Layout, unknown: Array, z: Array) -> Array:
     """Minus the gradient of the Lagrangian by all unknowns."""
     left = np.zeros(layout.size)
-    x, of_z = unknown[layout.x], unknown[layout.z]
-    gradient = program.g + np.einsum("kab,kb->ka", program.H, of_z) + np.einsum("kia,ki->ka", program.C, z)
-    np.add.at(left, layout.z, gradient)
-    multiplier = unknown[layout.equations]
-    np.add.at(left, layout.x[:-1], np.einsum("kea,ke->ka", program.F, multiplier))
-    np.add.at(left, layout.x[1:], np.einsum("kea,ke->ka", program.G, multiplier))
+    x, multiplier = unknown[layout.x], unknown[layout.equations]
+    layout.add(left, program.g + _times(program.H, program.z(x)) + _transposed_times(program.C, z))
+    left[layout.x[:-1]] += _transposed_times(program.F, multiplier)
+    left[layout.x[1:]] += _transposed_times(program.G, multiplier)
     for (rows, values), at, k in ((program.start, layout.of_start, 0), (program.end, layout.of_end, -1)):
         left[layout.x[k]] += rows.T @ unknown[at]
         left[at] = rows @ x[k] - values
-    left[layout.equations] = (
-        np.einsum("kea,ka->ke", program.F, x[:-1]) + np.einsum("kea,ka->ke", program.G, x[1:]) - program.c
-    )
+    left[layout.equations] = _times(program.F, x[:-1]) + _times(program.G, x[1:]) - program.c
     return -left
 
 
-def _objective(program: Program, z: Array) -> float:
-    return float(0.5 * np.einsum("ka,kab,kb->", z, program.H, z) + (program.g * z).sum())
+def _times(A: Array, x: Array) -> Array:
+    """A_k x_k (N, i) of A (N, i, a) and x (N, a)."""
+    found: Array = (A @ x[:, :, None])[:, :, 0]
+    return found
+
+
+def _transposed_times(A: Array, y: Array) -> Array:
+    """A_kᵀ y_k (N, a) of A (N, i, a) and y (N, i)."""
+    found: Array = (y[:, None] @ A)[:, 0]
+    return found
 
 
 def _way(values: Array, step: Array) -> float:

@@ -150,7 +150,7 @@ class Servo:
 
     def postures(self, times: Array) -> Array:
         """Those along the path without deflections, (T, n_q), nearest to `times` (T,)."""
-        found: Array = self.near[np.abs(times[:, None] - self.near_times).argmin(axis=1)]
+        found: Array = self.near[np.searchsorted((self.near_times[1:] + self.near_times[:-1]) / 2, times)]
         return found
 
     def residuals(self, times: Array, p: Array, v: Array, a: Array) -> Array:
@@ -250,20 +250,23 @@ def make_servo(
     for path in model.scene.trajectory:
         targets = ((f'trajectory "{path.name}": {name}', target) for name, target in path.targets)
         check_smooth(model.scene.path, targets, end)
+    if not goes_on():
+        raise Stopped
     times = as_floats(np.linspace(0.0, end, POSTURES))
-    near = [start]
-    for t in times[1:]:
-        if not goes_on():
-            raise Stopped
-        q = solve_posture(held, float(t), near[-1])
+    servo = Servo(held, end, factor, times, start[None], where, goes_on)
+    modes = np.tile(np.concatenate([start[node.p_q] for node in model.tree.nodes]), (POSTURES, 1))
+    rest = np.zeros_like(modes)
+    near: Array = servo.with_factor(1.0).motion.motion(as_list(times), modes, rest, rest, start[None]).q
+    for k in np.flatnonzero(~np.isfinite(near).all(axis=1)):  # where rates have no limits, as in singular postures
+        q = solve_posture(held, float(times[k]), near[k - 1] if k else start)
         if q is None:
             far = out_of_reach(held, times)
             raise InputError(
-                f"{where}: trajectory: expected a path within reach, found no posture at t = {t:.6g} s"
+                f"{where}: trajectory: expected a path within reach, found no posture at t = {times[k]:.6g} s"
                 + (f": {far}" if far else "")
             )
-        near.append(q)
-    return Servo(held, end, factor, times, np.array(near), where, goes_on)
+        near[k] = q
+    return replace(servo, near=near)
 
 
 def _with_functions(row: ConstraintRow, change: Callable[[TimeFunction], TimeFunction]) -> ConstraintRow:

@@ -11,7 +11,7 @@ sag. Links rest at both ends. Output transition with free internal states: Perez
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -33,6 +33,7 @@ UNIQUE = 1e-7  # of the effort, which chooses among motions of the same least sh
 FEWEST_ITERATIONS = 6  # after which Newton's steps are taken to wander among these motions
 WANDERING = (1e-2, 1e-3)  # of the effort, one after the other, where they do
 WHILE_SETTLING = 1e-4  # of the last change of a share by Newton's steps, relative, where intervals are to change
+ROUGH_GAP = 1e-6  # of the objective, there
 
 
 @dataclass(frozen=True)
@@ -85,6 +86,8 @@ class Tracked:
         prices: by how much less J, or σ, is for a limit that is larger by one: of patches (m,) 1/V, of motors
             (motors,) 1/(N·m) or 1/N; zero where a limit is not reached.
         unmet: largest force on modes that nobody supplies between Gauss points, relative to the largest elastic one.
+        objective: what was made small.
+        step, found: the last Newton step, relative, and its minimum; the next step is about the square of it.
         added: what the effort adds to the objective "least-…".
         doubt: of the share, relative: twice its change by the last finer intervals, and what the effort may add.
     """
@@ -96,14 +99,20 @@ class Tracked:
     share: float
     cost: float
     prices: tuple[Array, Array]
+    objective: Objective
     unmet: float = np.nan
+    step: float = np.inf
+    found: Minimum | None = field(default=None, repr=False)
     added: float = 0.0
     doubt: float = np.inf
 
 
-def track(asked: Transition, breaks: Array, near: Tracked | None = None, calm: float | None = None) -> Tracked:
+def track(
+    asked: Transition, breaks: Array, near: Tracked | None = None, calm: float | None = None, within: float = TOLERANCE
+) -> Tracked:
     """Solve on `breaks` (N + 1,), from a motion `near`, or from links as they sag and no voltages.
 
+    Newton's method ends with a step `within` that share of the peaks.
     With `calm`, such a share of the effort joins a least share, which a few steps find within `WHILE_SETTLING`. That of
     voltages grows to one away from the ends: with equal weights, forces are left over between Gauss points (theory.md).
     """
@@ -120,12 +129,15 @@ def track(asked: Transition, breaks: Array, near: Tracked | None = None, calm: f
         p, v, u = near.curve(breaks), near.curve(breaks, 1), near.voltage(breaks)
         K = near.curve(flat, 2).reshape(K.shape)
     steps = _Steps(asked, breaks, tau_qs, size)
+    steps.tolerance = within if calm is None else WHILE_SETTLING
+    steps.gap = GAP if calm is None else ROUGH_GAP
     start = _Iterate(p, v, K, u, near.share if near is not None and steps.has_share else 1.0)
+    if near is not None and near.objective == asked.objective and np.array_equal(near.voltage.x, breaks):
+        start = replace(start, moved=near.step, found=near.found)
     if calm is not None:
         middle = 0.5 * (breaks[1:] + breaks[:-1])
         away = asked.rate * np.minimum(middle - breaks[0], breaks[-1] - middle)
         steps.unique, steps.of_voltages = calm, np.minimum(1.0, calm * np.exp(away)) / calm
-        steps.tolerance, steps.gap = WHILE_SETTLING, 1e-4 * WHILE_SETTLING
         return _newton(steps, start, FEWEST_ITERATIONS).tracked(steps)
     last = _newton(steps, start, FEWEST_ITERATIONS if steps.has_share else MOST_ITERATIONS)
     if steps.has_share and not last.converged:
@@ -150,6 +162,7 @@ class _Iterate:
     found: Minimum | None = None
     converged: bool = False
     iterations: int = 0
+    moved: float = np.inf
 
     def tracked(self, steps: _Steps) -> Tracked:
         """As piecewise polynomials."""
@@ -162,6 +175,7 @@ class _Iterate:
         return Tracked(
             piecewise(GAUSS, breaks, self.p, self.v, self.K), PPoly(np.array([slope, self.V[:-1]]), breaks),
             self.converged, self.iterations, self.share, 0.0 if steps.has_share else cost, steps.prices(self.found),
+            steps.asked.objective, step=self.moved, found=self.found,
             added=steps.unique * cost if steps.has_share else 0.0,
         )  # fmt: skip
 
@@ -169,14 +183,14 @@ class _Iterate:
 def _newton(steps: _Steps, start: _Iterate, most: int) -> _Iterate:
     """Newton's steps from `start`, no more than `most`, counted on from it."""
     scale, size = steps.asked.driven.scale, steps.size
-    now, steps.sigma, previous, previous_share = replace(start, converged=False), start.share, np.inf, np.inf
+    now, steps.sigma, previous, previous_share = replace(start, converged=False), start.share, start.moved, np.inf
     for iteration in range(start.iterations + 1, start.iterations + most + 1):
         old = now
-        p, v, K, V, found = steps.take((old.p, old.v, old.K), old.V)
+        p, v, K, V, found = steps.take(old)
         moved = max(float(np.abs(scale * (p - old.p)).max()), float(np.abs(v - old.v).max())) / max(
             float(np.abs(scale * p).max()), float(np.abs(v).max()), size
         )
-        now = _Iterate(p, v, K, V, steps.sigma, found, iterations=iteration)
+        now = _Iterate(p, v, K, V, steps.sigma, found, iterations=iteration, moved=moved)
         if not (np.isfinite(moved) and found.converged):
             break
         if steps.has_share:  # V(t) of linear programs is not unique
@@ -190,7 +204,9 @@ def _newton(steps: _Steps, start: _Iterate, most: int) -> _Iterate:
 
 
 class _Steps:
-    """Newton's steps, each the minimum of the linearized problem in x = (p, ṗ, V, σ) at breaks.
+    """Newton's steps, each the minimum of the linearized problem in x = (V, p, ṗ, σ) at breaks.
+
+    What happens between two breaks depends on z_k = (x_k, V_{k+1}).
 
     σ, the share of limits, is a constant, and there where it is the objective. A little of the effort then picks one of
     many V(t); where Newton's steps would wander among them, enough of it for steps that shrink, and then less.
@@ -207,59 +223,53 @@ class _Steps:
         self.asked, self.breaks, self.h, self.tau_qs, self.size = asked, breaks, np.diff(breaks), tau_qs, size
         self.n, self.m = asked.Phi_V.shape
         self.has_share = asked.objective != "effort"
-        self.y, self.V = slice(0, 2 * self.n), slice(2 * self.n, 2 * self.n + self.m)
+        self.V, self.y = slice(0, self.m), slice(self.m, self.m + 2 * self.n)
         self.width = 2 * self.n + self.m + self.has_share
         self.y_unit = np.concatenate([size / asked.driven.scale, np.full(self.n, size)])
         volts = np.full(self.m, asked.weights.voltage)
-        self.unit = np.concatenate([self.y_unit, volts, np.ones(int(self.has_share))])
+        self.unit = np.concatenate([volts, self.y_unit, np.ones(int(self.has_share))])
+        self.unit_z = np.concatenate([self.unit, volts])
         self.sigma = 1.0
 
-    def take(self, state: tuple[Array, Array, Array], u: Array) -> tuple[Array, Array, Array, Array, Minimum]:
+    def take(self, now: _Iterate) -> tuple[Array, Array, Array, Array, Minimum]:
         """The next p, ṗ at breaks, K at stages and V at breaks, and the minimum they come from."""
-        (p, v, K), n, h, width = state, self.n, self.h, self.width
+        p, v, K, u, n, h = now.p, now.v, now.K, now.V, self.n, self.h
         N, s, _ = K.shape
         times = (self.breaks[:-1, None] + h[:, None] * GAUSS.c).ravel()
         at = [*(x.reshape(-1, n) for x in stage_states(GAUSS, h, p, v, K)), K.reshape(-1, n)]
         r, tau = self.asked.driven.forces(times, *at)
         slopes = [x.reshape(N, s, -1, n) for x in self.asked.driven.slopes(times, *at)]
         stages = Elimination(GAUSS, h, [x[:, :, :n] for x in slopes])
-        y = np.concatenate([p, v], axis=1)
-        x = np.concatenate([y, u, np.full((N + 1, int(self.has_share)), self.sigma)], axis=1)
+        x = np.concatenate([u, p, v, np.full((N + 1, int(self.has_share)), self.sigma)], axis=1)
         V = u[:-1, None] + GAUSS.c[:, None] * np.diff(u, axis=0)[:, None]
         left = (r.reshape(N, s, n) - V @ self.asked.Phi_V.T).reshape(N, s * n, 1)
         moved = -(stages.E_inverse @ left).reshape(N, s, n)  # of K, with p, ṗ and V at breaks as they are
         K_z = self._stages_by_z(stages)
-        # stages and ends for changes of z = (x_k, x_{k+1})
-        starts = np.zeros((2, n, 2 * width))
-        starts[0, :, :n], starts[1, :, n : 2 * n] = np.eye(n), np.eye(n)
+        starts = np.zeros((2, n, len(self.unit_z)))
+        starts[:, :, self.y] = np.eye(2 * n).reshape(2, n, 2 * n)
         ends = np.concatenate(stages.at_end(starts[0], starts[1], K_z), axis=1)
-        offset = np.concatenate(stages.at_end(p[:-1], v[:-1], K + moved), axis=1) - y[1:]
-        forward = np.zeros((2 * n, 2 * width))
-        forward[:, width : width + 2 * n] = np.eye(2 * n)
+        offset = np.concatenate(stages.at_end(p[:-1], v[:-1], K + moved), axis=1) - x[1:, self.y]
         tau_z = self._torques(tau.reshape(N, s, -1), [of[:, :, n:] for of in slopes], moved, (starts, K_z))
-        self.program = self._program(forward - ends, offset, *tau_z, x)
-        found = minimize(self.program, np.zeros_like(x), self.gap)
+        self.program = self._program(ends, offset, *tau_z, x)
+        found = minimize(self.program, self.gap, now.found)
         change = found.x * self.unit
-        K_new = K + moved + np.einsum("Nsnz,Nz->Nsn", K_z, np.hstack([change[:-1], change[1:]]))
+        K_new = K + moved + np.einsum("Nsnz,Nz->Nsn", K_z, self.program.z(change), optimize=True)
         x = x + change
         self.sigma = float(x[0, -1]) if self.has_share else 1.0
-        return x[:, :n], x[:, n : 2 * n], K_new, x[:, self.V], found
+        return *np.split(x[:, self.y], 2, axis=1), K_new, x[:, self.V], found
 
     def _stages_by_z(self, stages: Elimination) -> Array:
-        """Derivatives (N, s, n, 2 width) of K by z."""
+        """Derivatives (N, s, n, width + m) of K by z."""
         N, s, n, _ = stages.response.shape
         shares = np.stack([1 - GAUSS.c, GAUSS.c])  # of V at both ends
         by_V = np.einsum("es,nm->snem", shares, self.asked.Phi_V).reshape(s * n, 2 * self.m)
         K_by_V = (stages.E_inverse @ by_V).reshape(N, s, n, 2, self.m)
-        found = np.zeros((N, s, n, 2 * self.width))
-        found[..., self.y] = stages.response
-        for end in (0, 1):
-            first = end * self.width
-            found[..., first + self.V.start : first + self.V.stop] = K_by_V[..., end, :]
-        return found
+        return np.concatenate(
+            [K_by_V[..., 0, :], stages.response, np.zeros((N, s, n, int(self.has_share))), K_by_V[..., 1, :]], axis=3
+        )
 
     def _torques(self, tau: Array, slopes: list[Array], moved: Array, by_z: tuple[Array, Array]) -> tuple[Array, Array]:
-        """τ (N, s, motors) at stages once K has `moved`, and its derivatives (N, s, motors, 2 width) by z."""
+        """τ (N, s, motors) at stages once K has `moved`, and its derivatives (N, s, motors, width + m) by z."""
         starts, K_z = by_z
         h = self.h[:, None, None, None]
         once, twice = (np.einsum("ij,Nj...->Ni...", a, K_z) for a in (GAUSS.stage_once, GAUSS.stage_twice))
@@ -267,18 +277,19 @@ class _Steps:
         v_z = starts[1] + h * once
         h = h[..., 0]
         once, twice = (np.einsum("ij,Nj...->Ni...", a, moved) for a in (GAUSS.stage_once, GAUSS.stage_twice))
-        found = np.zeros((*tau.shape, 2 * self.width))
+        found = np.zeros((*tau.shape, len(self.unit_z)))
         for by, of_z, of_moved in zip(slopes[::-1], (p_z, v_z, K_z), (h**2 * twice, h * once, moved), strict=True):
             found = found + by @ of_z
             tau = tau + np.einsum("Nstn,Nsn->Nst", by, of_moved)
         return tau, found
 
-    def _program(self, continuity: Array, offset: Array, tau_0: Array, tau_z: Array, x: Array) -> Program:
+    def _program(self, ends: Array, offset: Array, tau_0: Array, tau_z: Array, x: Array) -> Program:
         """For changes of `x` (N+1, width) in `unit`: what is left stays small against what cancels."""
         n, width, N = self.n, self.width, len(offset)
-        tau_z = tau_z * np.tile(self.unit, 2)
-        scaled = continuity * np.tile(self.unit, 2) / self.y_unit[:, None]
-        F, G = scaled[..., :width], scaled[..., width:]
+        tau_z = tau_z * self.unit_z
+        ends = ends * self.unit_z / self.y_unit[:, None]
+        F, G = -ends[..., :width], np.zeros((N, 2 * n, width))
+        G[..., self.V], G[..., self.y] = -ends[..., width:], np.eye(2 * n)
         c = offset / self.y_unit
         now = x / self.unit
         H, g = self._effort(tau_0, tau_z, now)
@@ -289,11 +300,10 @@ class _Steps:
             keep[..., -1] = 1.0
             F, G, c = np.hstack([F, -keep]), np.hstack([G, keep]), np.hstack([c, np.zeros((N, 1))])
         C, d = self._inequalities(tau_0, tau_z, now)
-        rows = np.eye(width)[: 2 * n if self.asked.is_free else 2 * n + self.m]
-        ends = zip(self.asked.rest, (now[0], now[-1]), strict=True)
-        start, end = (
-            np.concatenate([p / self.y_unit[:n], np.zeros(len(rows) - n)]) - at[: len(rows)] for p, at in ends
-        )
+        rows = np.eye(width)[self.y if self.asked.is_free else slice(self.y.stop)]
+        rest = np.zeros((2, width))
+        rest[:, self.y.start : self.y.start + n] = self.asked.rest / self.y_unit[:n]
+        start, end = (rest - now[[0, -1]]) @ rows.T
         return Program(H, g, F, G, c, (rows, start), (rows, end), C, d)
 
     def _effort(self, tau_0: Array, tau_z: Array, now: Array) -> tuple[Array, Array]:
@@ -305,7 +315,7 @@ class _Steps:
         H = np.einsum("Ns,Nsta,Nstb->Nab", b, tau_z, tau_z, optimize=True)
         g = np.einsum("Ns,Nsta,Nst->Na", b, tau_z, off, optimize=True)
         of_voltages = np.zeros_like(H)
-        first = np.arange(self.V.start, self.V.stop)
+        first = np.arange(self.m)
         second = first + self.width
         rate = weights.rate**2 / self.h
         same, other = (self.of_voltages * size / whole for size in (self.h / 3 + rate, self.h / 6 - rate))  # V / V_ref
@@ -316,7 +326,7 @@ class _Steps:
             (second, first, other),
         ):
             of_voltages[:, i, j] += size[:, None]
-        z = np.hstack([now[:-1], now[1:]])[..., None]
+        z = np.hstack([now[:-1], now[1:, self.V]])[..., None]
         pull = (of_voltages @ z)[..., 0]
         constant = 0.5 * float(np.einsum("Ns,Nst->", b, off**2) + (pull * z[..., 0]).sum())
         self.effort = H + of_voltages, g + pull, constant
@@ -336,12 +346,12 @@ class _Steps:
             places.append((slice(-1, None), width))  # no interval begins at the last break
         for sign in (1.0, -1.0):
             for of_intervals, first in places:
-                of = np.zeros((N, len(bounded), 2 * width))
-                of[of_intervals, at, first + self.V.start + bounded] = sign / limit
+                of = np.zeros((N, len(bounded), width + self.m))
+                of[of_intervals, at, first + bounded] = sign / limit
                 if is_shared:
                     of[of_intervals, :, width - 1] = -1.0
                 rows.append(of)
-                reached = (of @ np.hstack([now[:-1], now[1:]])[..., None])[..., 0]
+                reached = (of @ np.hstack([now[:-1], now[1:, self.V]])[..., None])[..., 0]
                 most.append(np.where(of.any(axis=2) & is_shared, 0.0, 1.0) - reached)
                 owners.append(bounded)
         is_shared = asked.objective == "least-torque"
@@ -351,7 +361,7 @@ class _Steps:
             of = sign * tau_z[:, :, motors] / limit[:, None]
             if is_shared:
                 of[..., width - 1] = -1.0
-            rows.append(of.reshape(N, -1, 2 * width))
+            rows.append(of.reshape(N, -1, width + self.m))
             share = self.sigma if is_shared else 1.0
             most.append((share - sign * tau_0[:, :, motors] / limit).reshape(N, -1))
             owners.append(self.m + np.tile(motors, tau_z.shape[1]))
@@ -372,5 +382,5 @@ class _Steps:
 
     def cost(self, found: Minimum) -> float:
         """J, with what `of_voltages` adds."""
-        (H, g, constant), z = self.effort, np.hstack([found.x[:-1], found.x[1:]])
-        return float(0.5 * np.einsum("ka,kab,kb->", z, H, z) + (g * z).sum()) + constant
+        (H, g, constant), z = self.effort, self.program.z(found.x)
+        return float((z * (0.5 * (H @ z[..., None])[..., 0] + g)).sum()) + constant

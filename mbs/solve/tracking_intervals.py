@@ -9,7 +9,7 @@ import numpy as np
 
 from ...common.arrays import Array, as_floats
 from .stable_inversion import PROBES, cut, halved
-from .tracking import Tracked, Transition, track
+from .tracking import TOLERANCE, Tracked, Transition, track
 
 GRADING = 2.5  # of breaks to both ends: tanh
 MOST_INTERVALS = 1500
@@ -37,20 +37,27 @@ def refined(asked: Transition, breaks: Array, tolerance: float, goes_on: Callabl
 
     Nor are torques then further beyond the limits asked for than by this share of them, between Gauss points.
     """
-    driven, found = asked.driven, near
+    found, within = near, tolerance**0.5  # Newton's next step is about the square of the last one
     while True:
-        found = track(asked, breaks, found)
-        times = (breaks[:-1, None] + np.diff(breaks)[:, None] * PROBES).ravel()
-        motion = [found.curve(times, k) for k in range(3)]
-        r, tau = driven.forces(times, *motion)
-        r = r - found.voltage(times) @ asked.Phi_V.T
-        largest = float(np.abs(driven.scale**2 * motion[0]).max())
-        unmet = np.abs(r).max(axis=1).reshape(len(breaks) - 1, -1).max(axis=1)
-        beyond = (np.abs(tau) / asked.limits.torque - 1.0).max(axis=1, initial=0.0).reshape(len(unmet), -1).max(axis=1)
-        finer = cut(breaks, np.maximum(unmet / largest, beyond) / tolerance)
-        if not found.converged or not len(breaks) < len(finer) <= MOST_INTERVALS or not goes_on():
-            return replace(found, unmet=float(unmet.max()) / largest)
-        breaks = finer
+        found = track(asked, breaks, found, within=within)
+        unmet, excess = _left_over(asked, found, tolerance)
+        finer = cut(breaks, excess)
+        is_fine = not len(breaks) < len(finer) <= MOST_INTERVALS or not goes_on()
+        if not found.converged or (is_fine and within == TOLERANCE):
+            return replace(found, unmet=unmet)
+        breaks, within = (breaks, TOLERANCE) if is_fine else (finer, within)
+
+
+def _left_over(asked: Transition, found: Tracked, tolerance: float) -> tuple[float, Array]:
+    """`Tracked.unmet`, and by interval (N,) that, or torques beyond their limits, as multiples of the tolerance."""
+    breaks = found.voltage.x
+    times = (breaks[:-1, None] + np.diff(breaks)[:, None] * PROBES).ravel()
+    motion = [found.curve(times, k) for k in range(3)]
+    r, tau = asked.driven.forces(times, *motion)
+    r = r - found.voltage(times) @ asked.Phi_V.T
+    unmet = np.abs(r).max(axis=1) / float(np.abs(asked.driven.scale**2 * motion[0]).max())
+    beyond = (np.abs(tau) / asked.limits.torque - 1.0).max(axis=1, initial=0.0)
+    return float(unmet.max()), np.maximum(unmet, beyond).reshape(len(breaks) - 1, -1).max(axis=1) / tolerance
 
 
 def settled(asked: Transition, breaks: Array, goes_on: Callable[[], bool]) -> Tracked:

@@ -22,7 +22,7 @@ from ...common.errors import SolveError
 from .servo import Servo, stiffness
 
 MOST_ITERATIONS = 50
-TOLERANCE = 1e-12  # of an equilibrium's last Newton step
+TOLERANCE = 1e-12  # of the last Newton step to an equilibrium, relative
 CENTRE = 1e-6  # |Re s| / |s| of zeros that count as undamped
 
 
@@ -126,13 +126,12 @@ class Linearisation:
         through infinity and comes back elsewhere counts at each time as it is then. So do conjugates of which one
         was a motion that the future tells, and the other was not.
         """
-        from scipy.integrate import trapezoid
-
         places, jumps = self._followed
         s, T = np.take_along_axis(self.zeros, places, axis=1), float(self.times[-1])
         most = np.maximum(GROWTH, np.log(np.maximum(np.abs(s).mean(axis=0) * T / 100, TINY)))
         light = np.take_along_axis(self.is_light, places, axis=1)
-        future = np.where(light.any(axis=0), trapezoid(s.real, self.times, axis=0) > most, is_unstable(s[0]))
+        growth = 0.5 * np.diff(self.times) @ (s.real[1:] + s.real[:-1])
+        future = np.where(light.any(axis=0), growth > most, is_unstable(s[0]))
         flags = np.where(jumps, is_unstable(s) & ~light, future)
         found = np.zeros(s.shape, dtype=bool)
         np.put_along_axis(found, places, flags, axis=1)
@@ -189,7 +188,10 @@ def shape_along(servo: Servo, times: Array) -> Array:
     p, K = rest, stiffness(servo, times, rest)
     for _ in range(SHAPE_ITERATIONS):
         _check_numbers(servo, times, K, p)
-        p = p - np.linalg.solve(K, servo.residuals(times, p, rest, rest)[:, :, None])[:, :, 0]
+        step = np.linalg.solve(K, servo.residuals(times, p, rest, rest)[:, :, None])[:, :, 0]
+        p = p - step
+        if np.abs(servo.scale * step).max() <= TOLERANCE * np.abs(servo.scale * p).max():
+            break
     return p
 
 

@@ -32,7 +32,7 @@ def to_one(most, *, is_effort):
 
 def test_least_effort():
     """u = 6 − 12 t, ½ ∫ u² = 6."""
-    found = minimize(to_one(1e3, is_effort=True), np.zeros((N + 1, 4)))
+    found = minimize(to_one(1e3, is_effort=True))
     assert found.converged
     assert np.abs(found.x[:, 2] - (6 - 12 * np.linspace(0, 1, N + 1))).max() < 1e-6
 
@@ -40,7 +40,7 @@ def test_least_effort():
 def test_least_effort_within_limits():
     """At the limit up to t₁ and from 1 − t₁ on, u = most (1 − 2t)/(1 − 2t₁) between; x(1) = 1 fixes t₁."""
     most = 5.0
-    found = minimize(to_one(most, is_effort=True), np.zeros((N + 1, 4)))
+    found = minimize(to_one(most, is_effort=True))
     # x(1) = ∫ (1 − t) u dt = most/4 − most (1 − 2 t₁)²/12 = 1
     first = 0.5 * (1 - np.sqrt(12 * (most / 4 - 1) / most))
     t = np.linspace(0, 1, N + 1)
@@ -52,11 +52,11 @@ def test_least_effort_within_limits():
 
 def test_least_limit():
     """Bang and bang: 4, for an even number of intervals but for the one in which u changes sign."""
-    found = minimize(to_one(0.0, is_effort=False), np.zeros((N + 1, 4)))
+    found = minimize(to_one(0.0, is_effort=False))
     assert found.converged
     assert found.x[0, 3] == pytest.approx(4.0, rel=2e-4)
     assert found.x[0, 3] >= 4.0
 
 
 def test_nothing_is_found_beyond_what_limits_allow():
-    assert not minimize(to_one(3.9, is_effort=True), np.zeros((N + 1, 4))).converged
+    assert not minimize(to_one(3.9, is_effort=True)).converged
