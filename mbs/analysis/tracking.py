@@ -31,7 +31,15 @@ from .context import Context, PatchedLink
 from .forward import Forward, largest_moments
 from .motors_only import AroundPath, check_rest, durations, outcome_along, where
 from .outcome import Outcome, Statistics
-from .tracking_advice import Bounds, bounds_of_zeros, enough_path_time, enough_time, far_patches, rough_ends
+from .tracking_advice import (
+    Bounds,
+    bounds_of_zeros,
+    enough_path_time,
+    enough_time,
+    far_patches,
+    rough_ends,
+    singular_times,
+)
 
 RATE = 0.005  # s, T_r where the scene does not say
 VOLT = 200.0  # V_ref where patches have no limits
@@ -118,7 +126,7 @@ class Tracking(TimedAnalysis):
             posed = _pose(model, context.patches, self, progress)
             least = settled(posed.asked, posed.coarse, progress)
             _check_found(context, posed, least)
-            found, objective = _solve(posed, self, least)
+            found, objective = _solve(context, posed, self, least)
             if objective == "least-voltage":  # without the effort's share
                 least = replace(found, doubt=least.doubt)
             texts = list(_warnings(context, posed, self, least))
@@ -244,18 +252,23 @@ def _check_found(context: Context, posed: _Posed, least: Tracked) -> None:
                 f"{posed.servo.where}: no motion follows the path within the motors' limits, whatever the voltages:"
                 " slow the path down, or raise moment_limit"
             )
-    causes = [*rough_ends(posed.servo), *far_patches(context, posed.linear.zeros[[0, -1]])]
     raise SolveError(
         f"{posed.servo.where}: no motion of motors and patches was found: "
-        + ("; ".join(causes) or "slow the path down, or allow pre_actuation and post_actuation")
+        + (_causes(context, posed) or "slow the path down, or allow pre_actuation and post_actuation")
     )
+
+
+def _causes(context: Context, posed: _Posed) -> str:
+    """Why no motion is found."""
+    zeros = posed.linear.zeros[[0, -1]]
+    return "; ".join([*singular_times(posed.linear), *rough_ends(posed.servo), *far_patches(context, zeros)])
 
 
 def _is_beyond(posed: _Posed, least: Tracked) -> bool:
     return least.share > 1.0 + ENOUGH and bool(np.isfinite(posed.asked.limits.voltage).any())
 
 
-def _solve(posed: _Posed, analysis: Tracking, least: Tracked) -> tuple[Tracked, Objective]:
+def _solve(context: Context, posed: _Posed, analysis: Tracking, least: Tracked) -> tuple[Tracked, Objective]:
     """The motion of least effort or what else is wanted; of the least voltage where limits do not allow that."""
     objective: Objective = "least-torque" if analysis.objective == "least-moment" else analysis.objective
     if _is_beyond(posed, least):
@@ -267,7 +280,8 @@ def _solve(posed: _Posed, analysis: Tracking, least: Tracked) -> tuple[Tracked, 
     found = refined(asked, breaks, analysis.tolerance, posed.servo.goes_on, least)
     if not found.converged:
         what = analysis.objective.removeprefix("least-")
-        raise SolveError(f"{posed.servo.where}: the motion of least {what} was not found: loosen limits or tolerance")
+        cure = _causes(context, posed) or "loosen limits or tolerance"
+        raise SolveError(f"{posed.servo.where}: the motion of least {what} was not found: {cure}")
     return found, objective
 
 

@@ -142,6 +142,16 @@ def rough_ends(servo: Servo) -> Iterator[str]:
         yield (f"the path's {names[order]} jumps {where}: {cost}. Smoother ends: 35*s**4 - 84*s**5 + 70*s**6 - 20*s**7")
 
 
+def singular_times(linear: Linearisation) -> Iterator[str]:
+    """Where the inertia that motors leave to the modes changes its sign, and the cure."""
+    for k in linear.singular_after[:1]:
+        yield (
+            f"between t = {linear.times[k]:.4g} and {linear.times[k + 1]:.4g} s a zero of the modes passes through"
+            " infinity. Put less mass behind flexible links, take another number of modes in the link files, or another"
+            " path"
+        )
+
+
 def far_patches(context: Context, zeros: ComplexArray) -> Iterator[str]:
     """A warning for each point of a path that is far from the last patch: voltages need not converge with modes.
 

@@ -32,6 +32,8 @@ TOLERANCE = 1e-8  # of the last Newton step, relative to the peak of its quantit
 UNIQUE = 1e-7  # of the effort, which chooses among motions of the same least share
 FEWEST_ITERATIONS = 6  # after which Newton's steps are taken to wander among these motions
 WANDERING = (1e-2, 1e-3)  # of the effort, one after the other, where they do
+SLOW = 0.5  # of the step before: what moves more is damped
+DAMPING = 0.01  # of the square of changes, in the effort; four times as much with each such step
 WHILE_SETTLING = 1e-4  # of the last change of a share by Newton's steps, relative, where intervals are to change
 ROUGH_GAP = 1e-6  # of the objective, there
 
@@ -199,6 +201,8 @@ def _newton(steps: _Steps, start: _Iterate, most: int) -> _Iterate:
         shrinks = moved**2 <= steps.tolerance * previous < np.inf  # so does the next step, which is not taken
         if moved <= steps.tolerance or (shrinks and not steps.has_share) or (moved <= 1e-7 and moved > 0.3 * previous):
             return replace(now, converged=True)
+        if not steps.has_share and moved > SLOW * previous:
+            steps.damping = max(DAMPING, 4 * steps.damping)
         previous = moved
     return now
 
@@ -210,12 +214,13 @@ class _Steps:
 
     σ, the share of limits, is a constant, and there where it is the objective. A little of the effort then picks one of
     many V(t); where Newton's steps would wander among them, enough of it for steps that shrink, and then less.
+    Steps of the effort leave out how constraints curve; where that matters they need not shrink, and are damped.
     """
 
     program: Program
     tolerance, gap = TOLERANCE, GAP
     effort: tuple[Array, Array, float]  # H, g, and the constant that the program leaves out
-    unique = UNIQUE
+    unique, damping = UNIQUE, 0.0
     of_voltages: float | Array = 1.0  # (N,) times the share of the effort
     owners: Indices  # of inequalities (i,): patches, then motors
 
@@ -329,6 +334,8 @@ class _Steps:
         z = np.hstack([now[:-1], now[1:, self.V]])[..., None]
         pull = (of_voltages @ z)[..., 0]
         constant = 0.5 * float(np.einsum("Ns,Nst->", b, off**2) + (pull * z[..., 0]).sum())
+        each = np.arange(self.y.stop)
+        H[:, each, each] += self.damping * self.h[:, None] / whole
         self.effort = H + of_voltages, g + pull, constant
         return self.effort[:2]
 

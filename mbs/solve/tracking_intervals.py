@@ -15,6 +15,7 @@ GRADING = 2.5  # of breaks to both ends: tanh
 MOST_INTERVALS = 1500
 SETTLED = 0.02  # change of the least share of voltages by finer intervals, relative
 CALM = (1e-3, 1e-2, 0.1)  # of the effort in these steps, each where they wander with those before
+LOST = 0.2  # of the largest elastic force: where more is left over between Gauss points, no motion is near
 TURNING = 0.3  # of the largest voltage: by so much one changes in intervals that are then halved
 
 
@@ -64,7 +65,8 @@ def settled(asked: Transition, breaks: Array, goes_on: Callable[[], bool]) -> Tr
     """The least voltage, on intervals that are halved where voltages turn until that changes it by at most `SETTLED`.
 
     V is linear on each interval: finer ones allow more voltages, so that the least share falls. Where steps wander,
-    more of the effort joins it, on intervals that are all halved. All that converge are motions: the least one counts.
+    more of the effort joins it, on intervals that are all halved. All that converge count, and the least one is taken;
+    where much is `LOST` between Gauss points it is no motion and did not converge.
     """
     best, is_settled = _descend(asked, breaks, CALM[0], goes_on)
     for calm in CALM[1:]:
@@ -72,7 +74,9 @@ def settled(asked: Transition, breaks: Array, goes_on: Callable[[], bool]) -> Tr
             break
         calmer, is_settled = _descend(asked, halved(breaks), calm, goes_on)
         best = min(best, calmer, key=lambda one: one.share if one.converged else np.inf)
-    return best if best.converged else track(asked, breaks)
+    best = best if best.converged else track(asked, breaks)
+    unmet = _left_over(asked, best, 1.0)[0] if best.converged else np.inf
+    return replace(best, unmet=unmet, converged=unmet <= LOST)
 
 
 def _descend(asked: Transition, breaks: Array, calm: float, goes_on: Callable[[], bool]) -> tuple[Tracked, bool]:

@@ -121,10 +121,10 @@ def five_bar():
     )  # fmt: skip
 
 
-def slider_crank():
+def slider_crank(mass=0.01):
     """A soft crank about a slanted axis moves a slider beside it: a loop in 3D."""
     T = 0.25
-    rod = {"mass": 0.01, "center": [0.55, 0.0, 0.0], "inertia": [2e-6, 1e-3, 1e-3],
+    rod = {"mass": mass, "center": [0.55, 0.0, 0.0], "inertia": [2e-4 * mass, 0.1 * mass, 0.1 * mass],
            "points": {"root": ORIGIN, "tip": [1.1, 0.0, 0.0]}}  # fmt: skip
     slider = {"mass": 0.05, "center": ORIGIN, "inertia": [1e-4] * 3, "points": {"pin": ORIGIN}}
     slanted = {  # about z of axes that the rotation vector (0.5, 0.2, 0) turns
@@ -177,6 +177,12 @@ def test_replay_follows_the_path(robot):
     assert about["objective"] == "effort"
     assert off < 1e-8 * way
     assert about["without_patches"] > 100 * off
+
+
+def test_zeros_that_pass_through_infinity():
+    """A heavier rod: where the inertia of the modes is singular, no motion is near, and the message says why."""
+    with pytest.raises(ffrobot.SolveError, match=r"between t = 0\.00\d+ and 0\.01\d+ s a zero .* Put less mass"):
+        ffrobot.solve(ffrobot.make_scene(**slider_crank(1.0)))
 
 
 @pytest.mark.parametrize(

@@ -224,6 +224,18 @@ def test_what_does_not_fit(scene, changes, message):
         ffrobot.solve(scene(*changes))
 
 
+@pytest.mark.slow
+def test_steps_of_the_effort_that_grow(scene):
+    """Jerk that jumps, eight modes: full steps wander on the finest intervals, damped ones end on the path."""
+    quintic, limit = "10*(t/0.6)**3 - 15*(t/0.6)**4 + 6*(t/0.6)**5", 600.0
+    changes = [(SEPTIC, quintic), ("limit = 200.0 ", f"limit = {limit} "), ("tolerance = 1e-4", "tolerance = 1e-3")]
+    with ffrobot.solve(scene(*changes, link=[("count = 2", "count = 8")])) as results:
+        about = results.attributes("carried/tracking")
+        assert about["objective"] == "effort"
+        assert results.peak("carried/pzt/arm/required_voltage")[0] <= limit
+        assert off_path(results, "replay") < 1e-5
+
+
 def test_motors_that_are_too_weak(scene):
     with pytest.raises(SolveError, match="within the motors' limits, whatever the voltages: slow"):
         ffrobot.solve(scene(("moment_limit = 2.0", "moment_limit = 0.8")))
