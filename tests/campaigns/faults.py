@@ -89,7 +89,7 @@ FAULTS = [
         "s * c**3 + (2 * S_22",
         "tests/actuation/test_patched_links_3d.py",
     ),
-    Fault(f"{PATCHES}/voltages.py", "required = F_p @", "required = 2.0 * F_p @", PATCHED),
+    Fault(f"{PATCHES}/patches.py", "required = F_p @", "required = 2.0 * F_p @", PATCHED),
     Fault(
         "actuation/control/lqr.py",
         "np.eye(len(R)) + B.T @ X @ B, B.T",
