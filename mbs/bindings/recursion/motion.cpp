@@ -10,7 +10,6 @@
 #include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
 
-#include "bindings/changes.h"
 #include "bindings/recursion/tree_run.h"
 
 namespace nb = nanobind;
@@ -89,12 +88,11 @@ newton_step(const Model<Space> &model, const Scene &scene, double t, const Vecto
   RecursiveMotion<Space> motion(model.mechanism, scene, t, q.data(), v.data());
   check_size("r", r.size(), motion.n_stiff());
   check_size("c", c.size(), motion.constraints());
-  VectorXd state(q.size() + v.size()), z(motion.size()), slope(motion.size());
+  VectorXd state(q.size() + v.size()), z(motion.size());
   state << q, v;
   motion.local().set_centre(state.data());
   motion.local().from_state(state.data(), z.data());
-  motion.remember_slopes();
-  motion.slope(t, z.data(), slope.data());
+  motion.linearise(t, z.data());
   motion.factorise(damping_factor, stiffness_factor);
   Eigen::Matrix<Scalar, Eigen::Dynamic, 1> x(v.size());
   if constexpr (std::is_same_v<Scalar, double>)
@@ -188,7 +186,7 @@ void bind_checkpoint(nb::module_ &m) {
           "(4 limits,) of each: least and largest value, whether it has left its range, and when.");
 }
 
-void bind_run_and_laws(nb::module_ &m) {
+void bind_run(nb::module_ &m) {
   nb::class_<TreeRun>(m, "TreeRun", "A motion in joint coordinates at outputs, as far as it got.")
       .def_prop_ro("status", [](const TreeRun &r) { return r.report.status; })
       .def_prop_ro("steps", [](const TreeRun &r) { return r.report.steps; })
@@ -201,7 +199,13 @@ void bind_run_and_laws(nb::module_ &m) {
           "rounding", [](const TreeRun &r) { return r.report.rounding; },
           "What rounding may have added to errors, in the unit of the tolerance.")
       .def_prop_ro(
-          "changes", [](const TreeRun &r) { return changes_of(r.report); },
+          "changes",
+          [](const TreeRun &r) {
+            std::vector<std::tuple<double, MethodKind, MethodKind, double>> changes;
+            for (const auto &[time, from, to, mean_step] : r.report.changes)
+              changes.emplace_back(time, from, to, mean_step);
+            return changes;
+          },
           "Of integrators: (time, from, to, mean step before) of each.")
       .def_prop_ro(
           "step_ends", [](const TreeRun &r) { return r.report.step_ends; },
@@ -228,6 +232,9 @@ void bind_run_and_laws(nb::module_ &m) {
       .def_ro("accelerations", &TreeRun::accelerations, "(T, n_v)")
       .def_ro("multipliers", &TreeRun::lambda, "(T, rows); 0 of rows that depend on others.")
       .def_ro("replayed", &TreeRun::replayed, "(T, numbers) of the source of a replay.");
+}
+
+void bind_orientation_laws(nb::module_ &m) {
   nb::enum_<OrientationKind>(m, "OrientationKind")
       .value("rotation_vector", OrientationKind::rotation_vector)
       .value("rpy", OrientationKind::rpy)
@@ -250,11 +257,7 @@ void bind_run_and_laws(nb::module_ &m) {
           "t"_a, "(A (3, 3), omega (3,), alpha (3,)) at time t, global axes.");
 }
 
-} // namespace
-
-void bind_tree_motion(nb::module_ &m) {
-  bind_checkpoint(m);
-  bind_run_and_laws(m);
+void bind_scene(nb::module_ &m) {
   nb::class_<Scene>(m, "TreeScene", "What a mechanism in joint coordinates follows and what acts on it.")
       .def(nb::init<>())
       .def(
@@ -329,6 +332,15 @@ void bind_tree_motion(nb::module_ &m) {
       .def(
           "turn_marker", [](Scene &s, int marker, const OrientationLaw &law) { s.driven.push_back({marker, law}); },
           "marker"_a, "law"_a, "How a marker of the ground turns, which the model says it does.");
+}
+
+} // namespace
+
+void bind_tree_motion(nb::module_ &m) {
+  bind_checkpoint(m);
+  bind_run(m);
+  bind_orientation_laws(m);
+  bind_scene(m);
   bind_motion<Planar>(m);
   bind_motion<Spatial>(m);
 }

@@ -12,6 +12,7 @@ namespace {
 constexpr int most_iterations = 12;
 constexpr double newton_share = 0.01; // of the step's tolerance that the iteration may leave
 constexpr double rounding = 1e-14;
+constexpr double slow_contraction = 0.02; // geometry is taken anew when Newton's method is slower than this
 
 } // namespace
 
@@ -21,9 +22,7 @@ GeneralizedAlpha::GeneralizedAlpha(ImplicitSystem &system, double spectral_radiu
       gamma_(0.5 + alpha_f_ - alpha_m_), leading_((1 - alpha_m_) / (1 - alpha_f_)), v_dot_(n_), next_v_dot_(n_),
       previous_v_dot_(n_), drift_(n_), a_(n_), next_a_(n_), position_correction_(n_), end_(2 * n_), start_(2 * n_),
       first_slope_(2 * n_), last_slope_(2 * n_), change_(2 * n_), excess_(n_), force_(system.n_stiff()), x_(n_),
-      value_(system.constraints()), rate_(value_), c_(value_) {
-  system.remember_slopes();
-}
+      value_(system.constraints()), rate_(value_), c_(value_) {}
 
 // Consistent initial accelerations, C_tt included, are the first slope. The method's own lie alpha_m - alpha_f steps
 // ahead: their rate is taken from a difference.
@@ -34,7 +33,6 @@ void GeneralizedAlpha::start(double t, const double *y, double h) {
   system_.slope(t + shift, end_.data(), change_.data());
   drift_ = (alpha_m_ - alpha_f_) / shift * (change_.tail(n_) - v_dot_);
   started_ = true;
-  at_start_ = false;
 }
 
 void GeneralizedAlpha::advance(const double *y, double h) {
@@ -49,12 +47,41 @@ void GeneralizedAlpha::stiff_force(const VectorXd &x) {
   force_.array() *= (damping_factor_ * system_.damping() + stiffness_factor_ * system_.stiffness()).array();
 }
 
+// One iteration of Newton's method: change_ of the state, and what it does to accelerations and positions. True where
+// positions moved.
+bool GeneralizedAlpha::iterate(double t, const double *y, double h, bool is_first) {
+  advance(y, h);
+  system_.slope(t + h, end_.data(), change_.data());
+  system_.constraint_values(t + h, end_.data(), value_.data(), rate_.data());
+  // M v_dot + C_q^T lambda = Q, less the same with the accelerations that C_ddot = 0 would ask for: what is left is
+  // M excess + C_q^T (...), and the multipliers are free to meet C_dot = 0.
+  excess_ = (next_v_dot_ - change_.tail(n_)) / leading_;
+  system_.constrain(excess_.data(), c_.data());
+  c_ -= rate_ / (h * gamma_);
+  stiff_force(excess_);
+  system_.solve(force_.data(), c_.data(), x_.data());
+  change_.tail(n_) = x_ - excess_;
+  next_a_ += change_.tail(n_);
+  c_ = h * beta_ / gamma_ * rate_ - value_;
+  // Once a step, and again only where it matters: rounding would move stiff modes, and their forces, for ever.
+  const bool moved = c_.size() > 0 && (is_first || !(system_.value_size(end_.data(), c_) <= 1e-9));
+  x_.setZero();
+  if (moved) {
+    force_.setZero();
+    system_.solve(force_.data(), c_.data(), x_.data());
+    position_correction_ += x_;
+  }
+  change_.head(n_) = h * h * beta_ * change_.tail(n_) + x_;
+  change_.tail(n_) *= h * gamma_;
+  return moved;
+}
+
 bool GeneralizedAlpha::step(double t, const double *y, double h, double tolerance) {
   if (!started_)
     start(t, y, h);
-  if (!at_start_)
-    system_.slope(t, y, change_.data());
-  at_start_ = false;
+  if (stale_)
+    system_.linearise(t, y);
+  stale_ = true;
   damping_factor_ = h * gamma_ / leading_;
   stiffness_factor_ = h * h * beta_ / leading_;
   system_.factorise(damping_factor_, stiffness_factor_);
@@ -64,29 +91,7 @@ bool GeneralizedAlpha::step(double t, const double *y, double h, double toleranc
   double previous_size = 0;
   bool moved_before = false;
   for (int iteration = 0; iteration < most_iterations; ++iteration) {
-    advance(y, h);
-    system_.slope(t + h, end_.data(), change_.data());
-    system_.constraint_values(t + h, end_.data(), value_.data(), rate_.data());
-    // M v_dot + C_q^T lambda = Q, less the same with the accelerations that C_ddot = 0 would ask for: what is left is
-    // M excess + C_q^T (...), and the multipliers are free to meet C_dot = 0.
-    excess_ = (next_v_dot_ - change_.tail(n_)) / leading_;
-    system_.constrain(excess_.data(), c_.data());
-    c_ -= rate_ / (h * gamma_);
-    stiff_force(excess_);
-    system_.solve(force_.data(), c_.data(), x_.data());
-    change_.tail(n_) = x_ - excess_;
-    next_a_ += change_.tail(n_);
-    c_ = h * beta_ / gamma_ * rate_ - value_;
-    // Once a step, and again only where it matters: rounding would move stiff modes, and their forces, for ever.
-    const bool moved = c_.size() > 0 && (iteration == 0 || !(system_.value_size(end_.data(), c_) <= 1e-9));
-    x_.setZero();
-    if (moved) {
-      force_.setZero();
-      system_.solve(force_.data(), c_.data(), x_.data());
-      position_correction_ += x_;
-    }
-    change_.head(n_) = h * h * beta_ * change_.tail(n_) + x_;
-    change_.tail(n_) *= h * gamma_;
+    const bool moved = iterate(t, y, h, iteration == 0);
     const double size = system_.change_size(y, change_.data(), 1 / h);
     if (!std::isfinite(size))
       return false;
@@ -95,6 +100,7 @@ bool GeneralizedAlpha::step(double t, const double *y, double h, double toleranc
       // Where stiff forces are nothing but rounding, their size does not shrink: then the change of state has to do.
       const double left = rate < 1 ? rate / (1 - rate) * size : system_.change_size(y, change_.data(), 0);
       if (left <= std::max(newton_share * tolerance, rounding)) {
+        stale_ = !(rate < slow_contraction);
         advance(y, h);
         return true;
       }
@@ -142,7 +148,6 @@ void GeneralizedAlpha::accept(double h) {
   v_dot_ = next_v_dot_;
   drift_ = (next_a_ - next_v_dot_) / h;
   previous_step_ = h;
-  at_start_ = true;
 }
 
 void GeneralizedAlpha::prepare_dense(double t, const double *y, double h) {

@@ -35,7 +35,8 @@ public:
 
 private:
   void start(double t, const double *y, double h);
-  void advance(const double *y, double h);    // end_ from the accelerations
+  void advance(const double *y, double h); // end_ from the accelerations
+  bool iterate(double t, const double *y, double h, bool is_first);
   void stiff_force(const Eigen::VectorXd &x); // force_, with B^T force_ = (N - M) x
 
   ImplicitSystem &system_;
@@ -47,7 +48,7 @@ private:
   Eigen::VectorXd v_dot_, next_v_dot_, previous_v_dot_, drift_, a_, next_a_, position_correction_;
   Eigen::VectorXd end_, start_, first_slope_, last_slope_, change_, excess_, force_, x_, value_, rate_, c_;
   double previous_step_ = 0, t0_ = 0, h_ = 0;
-  bool started_ = false, at_start_ = true;
+  bool started_ = false, stale_ = true; // the geometry of the last factorisation
 };
 
 } // namespace ffrobot

@@ -72,7 +72,7 @@ private:
 // What implicit methods need besides: M v_dot + C_q^T lambda = Q under constraints, and its stiff terms.
 //
 // The stiff terms of Q are -B^T (K B q + D B v) with diagonals K and D, zero on rotations, and B the identity over the
-// rows of coupling()^T: along coordinates that v does not have. D is as at the last factorisation, where friction is
+// rows of coupling()^T: along coordinates that v does not have. D is as at the last linearise(), where friction is
 // among them. Newton's method on the equations of a step meets N = M + B^T (damping_factor D + stiffness_factor K) B,
 // real or complex, under C_q: block-arrow without coupling.
 class ImplicitSystem : public OdeSystem {
@@ -80,17 +80,14 @@ public:
   explicit ImplicitSystem(const ConfigurationSpace &space) : OdeSystem(space), uncoupled_(n_v(), 0) {}
   using Complex = std::complex<double>;
 
-  // To be said before the slopes whose states factorise() goes by: explicit methods do without.
-  void remember_slopes() { remembers_slopes_ = true; }
-  bool remembers_slopes() const { return remembers_slopes_; }
-
   virtual Eigen::Index constraints() const = 0;                          // rows of C, and of multipliers
   virtual const Eigen::VectorXd &stiffness() const = 0;                  // (n_stiff), zero where nothing is stiff
   virtual const Eigen::VectorXd &damping() const = 0;                    // (n_stiff)
   virtual const Eigen::MatrixXd &coupling() const { return uncoupled_; } // (n_v, n_stiff - n_v)
   Eigen::Index n_stiff() const { return n_v() + coupling().cols(); }
 
-  // M and C_q are those of the last slope(): there has to be one.
+  // M, C_q and D of the next factorisations are those at (t, z).
+  virtual void linearise(double t, const double *z) = 0;
   virtual void factorise(double damping_factor, double stiffness_factor) = 0;
   virtual void factorise(Complex damping_factor, Complex stiffness_factor) = 0;
 
@@ -99,7 +96,7 @@ public:
   virtual void solve(const double *r, const double *c, double *x) = 0;
   virtual void solve(const Complex *r, Complex *x) = 0;
 
-  // c (constraints) = C_q x, with C_q of the last real factorisation
+  // c (constraints) = C_q x
   virtual void constrain(const double *x, double *c) = 0;
 
   // C and C_dot, both (constraints)
@@ -110,7 +107,6 @@ public:
   virtual double rate_size(const double *z, const Eigen::VectorXd &rate) const = 0;
 
 private:
-  bool remembers_slopes_ = false;
   Eigen::MatrixXd uncoupled_;
 };
 

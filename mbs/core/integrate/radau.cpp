@@ -51,9 +51,7 @@ Radau::Radau(ImplicitSystem &system)
     : system_(system), project_(system), n_(system.n_v()), Z_(Eigen::MatrixXd::Zero(2 * n_, 3)), W_(Z_), F_(Z_),
       change_(Z_), collocation_(Z_), slopes_(Z_), previous_slopes_(Z_), stage_(2 * n_), end_(2 * n_), start_(2 * n_),
       first_slope_(2 * n_), last_slope_(2 * n_), real_(2 * n_), force_(system.n_stiff()), unknown_(n_),
-      complex_(2 * n_), complex_force_(system.n_stiff()), complex_unknown_(n_) {
-  system.remember_slopes();
-}
+      complex_(2 * n_), complex_force_(system.n_stiff()), complex_unknown_(n_) {}
 
 // With b = r_v + mu r_q the equation (mu I - J) (dq, dv) = (r_q, r_v) is N dq + C_q^T nu = (M b + D r_q) / mu^2,
 // C_q dq = C_q b / mu^2, N = M + D / mu + K / mu^2; dq = b / mu^2 + x leaves forces on the modes alone.
@@ -93,10 +91,10 @@ template <class Scalar> void Radau::solve(Scalar mu, Eigen::Matrix<Scalar, Eigen
 }
 
 void Radau::factorise(double t, const double *y, double h) {
-  if (!stale_ && h == factorised_step_)
+  if (stale_)
+    system_.linearise(t, y);
+  else if (h == factorised_step_)
     return;
-  if (!at_start_)
-    system_.slope(t, y, stage_.data()); // a step that failed left its stages behind
   const double real = h / mu_real;
   const Complex complex = h / mu_complex;
   system_.factorise(real, real * real);
@@ -150,10 +148,9 @@ void Radau::iterate(double t, const double *y, double h) {
   change_ += Z_;
 }
 
-bool Radau::step(double t, const double *y, double h, double tolerance) {
+bool Radau::solve_stages(double t, const double *y, double h, double tolerance) {
   constexpr double epsilon = std::numeric_limits<double>::epsilon();
   factorise(t, y, h);
-  at_start_ = false;
   predict(h);
   W_.noalias() = Z_ * T_inverse.transpose();
   contraction_ =
@@ -184,6 +181,12 @@ bool Radau::step(double t, const double *y, double h, double tolerance) {
   stale_ = true;
   contraction_ = 1;
   return false;
+}
+
+// Where iterations with a geometry of earlier steps do not converge, they begin again with that of this one.
+bool Radau::step(double t, const double *y, double h, double tolerance) {
+  const bool is_new = stale_;
+  return solve_stages(t, y, h, tolerance) || (!is_new && solve_stages(t, y, h, tolerance));
 }
 
 bool Radau::correct(double t) {
@@ -245,7 +248,6 @@ void Radau::accept(double h) {
   collocation_.noalias() = Z_ * polynomial;
   previous_slopes_ = slopes_;
   previous_step_ = h;
-  at_start_ = true;
 }
 
 void Radau::prepare_dense(double t, const double *y, double h) {

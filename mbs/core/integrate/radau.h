@@ -37,7 +37,8 @@ private:
   using Complex = ImplicitSystem::Complex;
 
   void factorise(double t, const double *y, double h);
-  bool correct(double t); // moves end_ back onto the invariants
+  bool solve_stages(double t, const double *y, double h, double tolerance); // by Newton's method, from predict()
+  bool correct(double t);                                                   // moves end_ back onto the invariants
   void predict(double h);
   void iterate(double t, const double *y, double h);
   double largest_change(const double *y, double rate) const;
@@ -53,7 +54,7 @@ private:
   Eigen::VectorXd stage_, end_, start_, first_slope_, last_slope_, real_, force_, unknown_;
   Eigen::VectorXcd complex_, complex_force_, complex_unknown_;
   double factorised_step_ = 0, previous_step_ = 0, contraction_ = 1, t0_ = 0, h_ = 0, weight_ = 1;
-  bool stale_ = true, at_start_ = true;
+  bool stale_ = true; // the geometry of the last factorisation
 };
 
 } // namespace ffrobot

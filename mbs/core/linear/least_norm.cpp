@@ -15,35 +15,24 @@ constexpr double dependent = 1e-10; // of the largest pivot: rounding leaves 1e-
 
 void LeastNorm::compute(const MatrixXd &A) {
   is_square_ = A.rows() == A.cols();
-  if (is_square_)
-    return lu_.factorise(A);
+  if (is_square_) {
+    lu_.compute(A);
+    return;
+  }
   Eigen::CompleteOrthogonalDecomposition<MatrixXd> factors;
   pseudo_inverse_ = factors.setThreshold(dependent).compute(A).pseudoInverse();
 }
 
 MatrixXd LeastNorm::solve(const MatrixXd &b) const {
-  if (!is_square_)
-    return pseudo_inverse_ * b;
-  MatrixXd x = b;
-  for (auto column : x.colwise())
-    lu_.solve(column.data());
-  return x;
+  return is_square_ ? MatrixXd(lu_.solve(b)) : MatrixXd(pseudo_inverse_ * b);
 }
 
 VectorXd LeastNorm::solve(const VectorXd &b) const {
-  if (!is_square_)
-    return pseudo_inverse_ * b;
-  VectorXd x = b;
-  lu_.solve(x.data());
-  return x;
+  return is_square_ ? VectorXd(lu_.solve(b)) : VectorXd(pseudo_inverse_ * b);
 }
 
 VectorXd LeastNorm::solve_transposed(const VectorXd &c) const {
-  if (!is_square_)
-    return pseudo_inverse_.transpose() * c;
-  VectorXd x = c;
-  lu_.solve_transposed(x.data());
-  return x;
+  return is_square_ ? VectorXd(lu_.transpose().solve(c)) : VectorXd(pseudo_inverse_.transpose() * c);
 }
 
 } // namespace ffrobot

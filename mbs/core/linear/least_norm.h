@@ -2,7 +2,7 @@
 // closest the ones of least norm.
 #pragma once
 
-#include "core/linear/lu.h"
+#include <Eigen/LU>
 
 namespace ffrobot {
 
@@ -15,7 +15,7 @@ public:
 
 private:
   bool is_square_ = true;
-  Lu<double> lu_;
+  Eigen::PartialPivLU<Eigen::MatrixXd> lu_;
   Eigen::MatrixXd pseudo_inverse_; // where A is not square
 };
 

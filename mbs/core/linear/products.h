@@ -10,8 +10,7 @@ using ConstMatrix = Eigen::Ref<const Eigen::MatrixXd>;
 
 Eigen::MatrixXd matrix_product(const ConstMatrix &A, const ConstMatrix &B); // A B
 
-// To `to`: factor A B and factor A^T B
-void add_product(const ConstMatrix &A, const ConstMatrix &B, Eigen::Ref<Eigen::MatrixXd> to, double factor = 1);
+// To `to`: factor A^T B
 void add_transposed_product(const ConstMatrix &A, const ConstMatrix &B, Eigen::Ref<Eigen::MatrixXd> to,
                             double factor = 1);
 

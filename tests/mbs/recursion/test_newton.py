@@ -1,7 +1,7 @@
-"""The matrix of Newton's method in implicit integrators, eliminated body by body, against dense matrices.
+"""The matrix of Newton's method in implicit integrators against dense matrices of all coordinates.
 
-N x + C_qᵀν = r, C_q x = c with N = M + E has x = P (r − E x) + R c: what evaluations at rest say of P and R, column by
-column, is compared with a solution of one factorisation.
+N x + C_qᵀν = r, C_q x = c with N = M + E: M from forces that accelerations require (Newton and Euler), C_q from rates
+of rows, and one factorization of all.
 """
 
 from dataclasses import replace
@@ -30,39 +30,43 @@ def scene_of(rows, springs=()):
     return scene
 
 
-def responses(model, q, rows):
-    """P (n_v, n_v) and R (n_v, rows): what forces do under rows that hold, and accelerations of rows."""
-    rest, large = np.zeros(model.n_v), 1e4  # beside what acts at q without them, which is subtracted
-
-    def a(force, target):
-        return model.evaluate(q, rest, target, force, None)[0]
-
-    start = a(rest, np.zeros(rows))
-    P = [(a(large * unit, np.zeros(rows)) - start) / large for unit in np.eye(model.n_v)]
-    R = [(a(rest, large * unit) - start) / large for unit in np.eye(rows)]
-    return np.array(P).T, np.array(R).reshape(rows, model.n_v).T
+def required(system, scene, q, v, a):
+    return system.required_forces(scene, [0.0], q[None], v[None], a[None])[0]
 
 
-def solved(N, r):
-    """N⁻¹ r, and what it may be off: n ε cond(N), beside the rounding of what N is made of."""
-    x = np.linalg.solve(N, r)
-    return x, (1e-12 + len(x) * np.finfo(float).eps * np.linalg.cond(N)) * np.abs(x).max()
+def mass_and_gradients(model, q, scene):
+    """M (n_v, n_v) and C_q (rows, n_v)."""
+    rest, large = np.zeros(model.n_v), 1e7  # beside what is required at rest, which is subtracted
+    start, rates = required(model, scene, q, rest, rest), model.measure(q, rest)[1]
+    M = [(required(model, scene, q, rest, large * unit) - start) / large for unit in np.eye(model.n_v)]
+    C = [model.measure(q, unit)[1] - rates for unit in np.eye(model.n_v)]
+    return np.array(M).T, np.array(C).T
+
+
+def agree(found, N, C, r, c):
+    """To 1e-10 of the largest entry, in units in which N has ones on its diagonal."""
+    size = 1 / np.sqrt(np.abs(np.diag(N)))
+    A = C * size
+    of_row = 1 / np.linalg.norm(A, axis=1)
+    A = A * of_row[:, None]
+    whole = np.block([[N * size * size[:, None], A.T], [A, np.zeros((len(C), len(C)))]])
+    expected = np.linalg.solve(whole, np.concatenate([size * r, of_row * c]))[: len(N)]
+    np.testing.assert_allclose(found / size, expected, rtol=0, atol=1e-10 * np.abs(expected).max())
 
 
 def check(model, q, scene, stiffness, damping, rows, seed=1):
     """`stiffness` and `damping` (n_v) of modes and joints; forces act where these are."""
     rng = np.random.default_rng(seed)
     n = model.n_v
-    P, R = responses(model, q, rows)
+    M, C = mass_and_gradients(model, q, scene_of(rows))
     stiff = (stiffness != 0) | (damping != 0)
     for of_damping, of_stiffness in FACTORS:
         E = np.diag(of_damping * damping + of_stiffness * stiffness)
         force, c = stiff * rng.standard_normal(n), rng.standard_normal(rows)
         if isinstance(of_damping, complex):
             force, c = force + 1j * stiff * rng.standard_normal(n), np.zeros(rows)
-        expected, error = solved(np.eye(n) + P @ E, P @ force + R @ c)
         found = _core.tree_newton_step(model, scene, 0.0, q, np.zeros(n), of_damping, of_stiffness, force, c)
-        np.testing.assert_allclose(found, expected, rtol=0, atol=error)
+        agree(found, M + E, C, force, c)
 
 
 def check_mechanism(mechanism, rng, with_springs=True):
@@ -131,30 +135,29 @@ def test_rotors(clamped):
     [(("revolute", "universal", "cylindrical", "universal"), ("rigid",)), (("revolute", "cylindrical"), ("beam",))],
 )
 def test_friction_where_a_loop_is_cut(types, kinds):
-    """What it takes at unit rates is found from accelerations with it and without; forces on modes alone."""
+    """What it takes at unit rates is what motion requires with it and without; forces on modes alone."""
     rng = np.random.default_rng(1)
     chain = closed_chain(rng, types, kinds)
     rough, smooth = (with_friction(chain, viscous) for viscous in (0.4, 0.0))
     q, n = chain.position(rough.model), rough.model.tree.n_v
     rough.core.keep_independent_rows(q, np.zeros(n))
     rows = len(rough.row_signs)
-    P, R = responses(rough.core, q, rows)
-
-    def a(system, v):
-        return _core.tree_outputs(system.core, system.scene, [0.0], np.concatenate([q, v])[None]).accelerations[0]
-
-    P_friction = np.array([a(smooth, unit) - a(rough, unit) for unit in np.eye(n)]).T
+    M, C = mass_and_gradients(rough.core, q, rough.scene)
+    rest = np.zeros(n)
+    of_friction = [
+        required(rough.core, rough.scene, q, unit, rest) - required(smooth.core, smooth.scene, q, unit, rest)
+        for unit in np.eye(n)
+    ]
     stiffness, damping = np.zeros(n), np.zeros(n)
     for node in rough.model.tree.nodes:
         stiffness[node.p_v], damping[node.p_v] = node.body.stiffness, np.diag(node.body.damping)
     force, c = (stiffness > 0) * rng.standard_normal(n), rng.standard_normal(rows)
     force[0] = 1.0  # along a joint of the tree
     for of_damping, of_stiffness in FACTORS[:2]:
-        N = np.eye(n) + of_damping * (P * damping + P_friction) + of_stiffness * P * stiffness
-        expected, error = solved(N, P @ force + R @ c)
+        N = M + of_damping * (np.diag(damping) + np.array(of_friction).T) + of_stiffness * np.diag(stiffness)
         r = np.append(force, np.zeros(COUNT[types[-1]]))
-        found = _core.tree_newton_step(rough.core, rough.scene, 0.0, q, np.zeros(n), of_damping, of_stiffness, r, c)
-        np.testing.assert_allclose(found, expected, rtol=0, atol=error)
+        found = _core.tree_newton_step(rough.core, rough.scene, 0.0, q, rest, of_damping, of_stiffness, r, c)
+        agree(found, N, C, force, c)
 
 
 def with_friction(chain, viscous):

@@ -93,7 +93,7 @@ void evaluate_in_blocks(const Mechanism<Space> &m, const T *q, const T *v, const
     for (int r = 0; r < n; ++r)
       for (int c = 0; c <= r; ++c)
         w.delassus[r * n + c] = w.delassus[c * n + r] = S_all[r * n + c];
-  factorise(S_all, n), solve_again(S_all, n, lambda);
+  factorise(S_all, n), solve_factorised(S_all, n, lambda);
   for (int r = 0; r < n; ++r)
     w.lambda[w.active[r]] = lambda[r];
   accelerate_in_blocks<false>(m, q, w, a);

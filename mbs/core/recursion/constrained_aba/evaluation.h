@@ -3,6 +3,7 @@
 #pragma once
 
 #include "core/recursion/constrained_aba/blocks.h"
+#include "core/recursion/constrained_aba/loop_joint_forces.h"
 #include "core/recursion/constrained_aba/multipliers.h"
 
 #include <algorithm>
@@ -120,7 +121,7 @@ void respond(const Mechanism<Space> &m, const T *q, const T *lambda, Workspace<S
 template <class Space, class T>
 void response(const Mechanism<Space> &m, const T *q, const T *residual, Workspace<Space, T> &w, T *dq) {
   put_active(residual, w);
-  solve_again(w.factor.data(), w.factored(), w.y.data() + 1);
+  solve_factorised(w.factor.data(), w.factored(), w.y.data() + 1);
   respond(m, q, w, dq);
 }
 
@@ -237,5 +238,23 @@ template <class Space, class T> void Workspace<Space, T>::keep(std::vector<int> 
     first = last;
   }
 }
+
+#define FFROBOT_EVALUATION(Space, T)                                                                                   \
+  template struct Workspace<Space, T>;                                                                                 \
+  template Placed<Space, T> place_all(const Mechanism<Space> &, const T *, const T *, const T *,                       \
+                                      Workspace<Space, T> &);                                                          \
+  template void accelerations(const Placed<Space, T> &, const T *, const T *, T *);                                    \
+  template void accelerations(const Mechanism<Space> &, const T *, const T *, const Forces<T> &, const T *,            \
+                              Workspace<Space, T> &, T *);                                                             \
+  template Placed<Space, T> measure(const Mechanism<Space> &, const T *, const T *, Workspace<Space, T> &, T *, T *);  \
+  template Pose<T> wrench_pose(const Placed<Space, T> &, int);                                                         \
+  template void cut_rates(const Placed<Space, T> &, const std::vector<CutJoint> &, T *);                               \
+  template void add_along_cuts(const Placed<Space, T> &, const std::vector<CutJoint> &, const T *, T *)
+
+// Of doubles besides
+#define FFROBOT_RESPONSES(Space)                                                                                       \
+  template void respond(const Mechanism<Space> &, const double *, const double *, Workspace<Space, double> &,          \
+                        double *);                                                                                     \
+  template void response(const Mechanism<Space> &, const double *, const double *, Workspace<Space, double> &, double *)
 
 } // namespace ffrobot::recursion

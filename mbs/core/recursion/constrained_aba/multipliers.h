@@ -6,23 +6,25 @@
 
 namespace ffrobot::recursion {
 
-// The lower half of a symmetric matrix (m, m) becomes L and 1/D.
+// The lower half of a symmetric matrix (m, m), by rows, becomes L and 1/D; what is above becomes D L^T.
 template <class T> inline void factorise(T *M, int m) {
   for (int j = 0; j < m; ++j) {
     const T inverse = T(1.) / M[j * m + j];
+    T *above = M + j * m; // column j side by side
+    for (int r = j + 1; r < m; ++r)
+      above[r] = M[r * m + j];
     for (int r = j + 1; r < m; ++r) {
       const T x = M[r * m + j] * inverse;
       for (int c = j + 1; c <= r; ++c)
-        M[r * m + c] -= x * M[c * m + j];
+        M[r * m + c] -= x * above[c];
+      M[r * m + j] = x;
     }
-    for (int r = j + 1; r < m; ++r)
-      M[r * m + j] *= inverse;
-    M[j * m + j] = inverse;
+    above[j] = inverse;
   }
 }
 
 // With these factors: m numbers
-template <class T> inline void solve_again(const T *factor, int m, T *x) {
+template <class T> inline void solve_factorised(const T *factor, int m, T *x) {
   for (int r = 0; r < m; ++r)
     for (int c = 0; c < r; ++c)
       x[r] -= factor[r * m + c] * x[c];
@@ -51,7 +53,7 @@ template <class T, int W> FFROBOT_INLINE void solve_multipliers(const Pack<T, W>
       for (int c = 0; c <= r; ++c)
         factor[r * m + c] = S[r + 1][c + 1];
     factorise(factor, m);
-    solve_again(factor, m, x);
+    solve_factorised(factor, m, x);
     return;
   }
   if constexpr (m == 2)

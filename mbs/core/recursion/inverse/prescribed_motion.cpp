@@ -1,5 +1,7 @@
 #include "core/recursion/inverse/prescribed_motion.h"
 
+#include "core/recursion/constrained_aba/gradients.h"
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -59,8 +61,7 @@ PrescribedMotion<Space>::PrescribedMotion(DrivenMechanism<Space> driven, const V
     for (const auto &numbers : space_.numbers())
       if (v >= numbers.v && v < numbers.v + numbers.count)
         modes_in_q_.push_back(v + static_cast<int>(numbers.q - numbers.v));
-  lambda_ = value_ = rate_ = unit_ = VectorXd::Zero(equations);
-  C_J_.resize(equations, static_cast<Index>(driven_.of_joints.size()));
+  lambda_ = value_ = rate_ = VectorXd::Zero(equations);
   targets_.resize(driven_.mechanism.constraints.size());
   state_.head(q.size()) = q;
   if (!driven_.motors.empty())
@@ -92,16 +93,8 @@ template <class Space> void PrescribedMotion<Space>::measure() {
   }
 }
 
-// C_J, equation by equation from the generalized forces of its unit multiplier, at the state that was measured.
 template <class Space> void PrescribedMotion<Space>::factorise() {
-  for (Index r = 0; r < lambda_.size(); ++r) {
-    unit_[r] = -1;
-    forces_.load(unit_.data(), nullptr, w_);
-    forces_.project_on_joints(q(), w_, Q_.data());
-    C_J_.row(r) = Q_(driven_.of_joints).transpose();
-    unit_[r] = 0;
-  }
-  factors_.compute(C_J_);
+  factors_.compute(gradients(driven_.mechanism, q(), driven_.of_joints, w_)); // C_J
 }
 
 template <class Space> void PrescribedMotion<Space>::go(double factor, const VectorXd &values) {

@@ -102,8 +102,7 @@ private:
   std::vector<int> modes_in_q_, angles_; // of of_modes; of of_joints, by numbers there
   std::vector<Jet> targets_;
   Eigen::VectorXd state_, a_, lambda_, required_, f_, value_, rate_;
-  Eigen::VectorXd unit_, Q_, step_; // (equations) zero between calls, (n_v), (n_v) zero along modes
-  Eigen::MatrixXd C_J_;             // (equations, joint coordinates)
+  Eigen::VectorXd Q_, step_; // (n_v), (n_v) zero along modes
   LeastNorm factors_;
   double time_ = 0, first_, last_;
   bool goes_on_ = false;

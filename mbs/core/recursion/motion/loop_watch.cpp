@@ -1,6 +1,11 @@
 #include "core/recursion/motion/loop_watch.h"
 
+#include "core/recursion/constrained_aba/gradients.h"
+
+#include <Eigen/LU>
+
 #include <cmath>
+#include <numeric>
 
 namespace ffrobot::recursion {
 
@@ -27,14 +32,14 @@ template <class Space> double volume(const Workspace<Space, double> &w) {
 
 template <class Space>
 LoopWatch<Space>::LoopWatch(const Mechanism<Space> &mechanism, const Workspace<Space, double> &w)
-    : mechanism_(mechanism), posture_(mechanism),
-      multiplier_(VectorXd::Zero(static_cast<Index>(mechanism.constraints.size()))), answer_(mechanism.n_v),
-      least_volume_(singular * volume(w)) {}
+    : mechanism_(mechanism), multiplier_(VectorXd::Zero(static_cast<Index>(mechanism.constraints.size()))),
+      answer_(mechanism.n_v), least_volume_(singular * volume(w)) {}
 
 template <class Space>
 void LoopWatch<Space>::begin_at(const double *q, const Workspace<Space, double> &w, Workspace<Space, double> &other) {
-  posture_.take(q, other);
-  C_0_ = posture_.gradients()(w.active, Eigen::all);
+  std::vector<int> all(static_cast<std::size_t>(mechanism_.n_v));
+  std::iota(all.begin(), all.end(), 0);
+  C_0_ = gradients(mechanism_, q, all, other)(w.active, Eigen::all);
   product_.resize(C_0_.rows(), C_0_.rows());
   volume_ = volume(w), cosine_ = 1;
 }
@@ -49,8 +54,7 @@ template <class Space> double LoopWatch<Space>::cosine(const double *q, Workspac
     multiplier_[w.active[k]] = 0;
     product_.col(static_cast<Index>(k)).noalias() = C_0_ * -answer_;
   }
-  lu_.factorise(product_);
-  return cosine_ = lu_.determinant() / (volume_ * now);
+  return cosine_ = product_.determinant() / (volume_ * now);
 }
 
 template class LoopWatch<Planar>;

@@ -5,8 +5,7 @@
 // than constraints are kept, and a step can change to another one, along which the sign stays: so none ends there.
 #pragma once
 
-#include "core/linear/lu.h"
-#include "core/recursion/newton/newton_posture.h"
+#include "core/recursion/constrained_aba/workspace.h"
 
 namespace ffrobot::recursion {
 
@@ -27,11 +26,9 @@ public:
 
 private:
   const Mechanism<Space> &mechanism_;
-  NewtonPosture<Space> posture_;
   Eigen::MatrixXd C_0_, product_;       // (active constraints, n_v), (active constraints, active constraints)
   Eigen::VectorXd multiplier_, answer_; // (constraints), (n_v)
-  Lu<double> lu_;
-  double least_volume_, volume_ = 0; // sqrt(det C M^-1 C^T): next to singular postures; where C_0 is
+  double least_volume_, volume_ = 0;    // sqrt(det C M^-1 C^T): next to singular postures; where C_0 is
   double cosine_ = 1;
 };
 

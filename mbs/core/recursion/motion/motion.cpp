@@ -97,8 +97,6 @@ template <class Space> void RecursiveMotion<Space>::slope(double t, const double
   evaluate_here(t, q, v, z_dot + n_v());
   if (loops_ && !loops_->has_begun())
     loops_->begin_at(q, workspace_, newton_.workspace());
-  if (remembers_slopes())
-    newton_.set_state(q, v);
 }
 
 template <class Space>
@@ -252,19 +250,9 @@ template <class Space> void RecursiveMotion<Space>::go_on(const MotionHistory &h
   postures_ = history.postures;
 }
 
-template <class Space> void RecursiveMotion<Space>::check_slopes() const {
-  if (!remembers_slopes())
-    throw std::logic_error("factorise: expected remember_slopes() before the slope");
-}
-
-template <class Space> void RecursiveMotion<Space>::factorise(double damping_factor, double stiffness_factor) {
-  check_slopes();
-  newton_.factorise(damping_factor, stiffness_factor);
-}
-
-template <class Space> void RecursiveMotion<Space>::factorise(Complex damping_factor, Complex stiffness_factor) {
-  check_slopes();
-  newton_.factorise(damping_factor, stiffness_factor);
+template <class Space> void RecursiveMotion<Space>::linearise(double t, const double *z) {
+  go_to(t);
+  newton_.linearise(local().state(z), z + n_v());
 }
 
 template <class Space>

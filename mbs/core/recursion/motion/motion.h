@@ -51,8 +51,9 @@ public:
   const Eigen::VectorXd &stiffness() const override { return newton_.stiffness(); }
   const Eigen::VectorXd &damping() const override { return newton_.damping(); }
   const Eigen::MatrixXd &coupling() const override { return newton_.coupling(); }
-  void factorise(double damping_factor, double stiffness_factor) override;
-  void factorise(Complex damping_factor, Complex stiffness_factor) override;
+  void linearise(double t, const double *z) override;
+  void factorise(double of_damping, double of_stiffness) override { newton_.factorise(of_damping, of_stiffness); }
+  void factorise(Complex of_damping, Complex of_stiffness) override { newton_.factorise(of_damping, of_stiffness); }
   void solve(const double *r, const double *c, double *x) override { newton_.solve(r, c, x); }
   void solve(const Complex *r, Complex *x) override { newton_.solve(r, x); }
   void constrain(const double *x, double *c) override { newton_.constrain(x, c); }
@@ -87,7 +88,6 @@ private:
   void evaluate_here(double t, const double *q, const double *v, double *a); // evaluate(), inline
   Placed<Space, double> residuals(double t, const double *q, const double *v, Workspace<Space, double> &w);
   double project(double t, double *q, double *v, Workspace<Space, double> &w); // w: where residuals are measured
-  void check_slopes() const;
   const Eigen::VectorXd *motors_at(const double *q); // of the last evaluation; null where they are not judged
 
   const Mechanism<Space> &mechanism_;

@@ -1,34 +1,53 @@
 #include "core/recursion/motion/newton_system.h"
 
+#include "core/recursion/constrained_aba/multipliers.h"
+
 namespace ffrobot::recursion {
 
 using Eigen::Index;
+using Eigen::MatrixXd;
 using Eigen::VectorXd;
+
+namespace {
+
+// N, N m: a force beside which what acts at rest is small, so that differences of accelerations keep their digits
+constexpr double large_force = 1e4;
+
+// A x, A real
+VectorXd product(const MatrixXd &A, const VectorXd &x) { return A * x; }
+Eigen::VectorXcd product(const MatrixXd &A, const Eigen::VectorXcd &x) {
+  Eigen::VectorXcd y(A.rows());
+  y.real() = A * x.real(), y.imag() = A * x.imag();
+  return y;
+}
+
+} // namespace
 
 template <class Space>
 NewtonSystem<Space>::NewtonSystem(const Mechanism<Space> &mechanism, const Scene &scene)
-    : mechanism_(mechanism), scene_(scene), w_(mechanism), posture_(mechanism), q_(VectorXd::Zero(mechanism.n_q)),
-      v_(VectorXd::Zero(mechanism.n_v)) {
+    : mechanism_(mechanism), scene_(scene), w_(mechanism), q_(VectorXd::Zero(mechanism.n_q)),
+      rest_(VectorXd::Zero(mechanism.n_v)) {
   find_stiff_terms();
 }
 
 // Of elastic and damping forces of modes, of springs in joints
 template <class Space> void NewtonSystem<Space>::find_stiff_terms() {
   const auto cuts = static_cast<Index>(scene_.cut_joints.size());
-  stiffness_ = damping_ = VectorXd::Zero(v_.size() + cuts);
-  coupling_.setZero(v_.size(), cuts);
+  stiffness_ = damping_ = VectorXd::Zero(rest_.size() + cuts);
+  coupling_.setZero(rest_.size(), cuts);
+  std::vector<char> is_stiff(static_cast<std::size_t>(rest_.size() + cuts));
+  std::fill(is_stiff.end() - cuts, is_stiff.end(), 1);
   for (const Node<Space> &node : mechanism_.nodes)
     for (int i = 0; i < node.n(); ++i) {
       stiffness_[node.p_v() + i] = node.body.K[i];
       damping_[node.p_v() + i] = node.body.D_full.size() ? node.body.D_full(i, i) : node.body.D[i];
+      is_stiff[static_cast<std::size_t>(node.p_v() + i)] = 1;
     }
   for (const JointForce &joint : scene_.joint_forces)
-    stiffness_[joint.v] += joint.stiffness;
-  take_friction(VectorXd::Zero(stiffness_.size())); // at rest, where none that acts has a slope of zero
-  std::size_t node = 0;
-  for (const Node<Space> &joint : mechanism_.nodes)
-    if (posture_.body(node++).turn.size() > 0 && (stiffness_[joint.v] != 0 || damping_[joint.v] != 0))
-      turned_.push_back(joint.v);
+    stiffness_[joint.v] += joint.stiffness, is_stiff[static_cast<std::size_t>(joint.v)] = 1;
+  for (std::size_t i = 0; i < is_stiff.size(); ++i)
+    if (is_stiff[i])
+      stiff_.push_back(static_cast<Index>(i));
 }
 
 // Of friction in joints, at rates (n_v, then cut joints). Near rest dry friction is a stiff damper: a light link's end
@@ -39,20 +58,14 @@ template <class Space> void NewtonSystem<Space>::take_friction(const VectorXd &r
   for (const JointForce &joint : scene_.joint_forces)
     damping_[joint.v] += joint.friction.slope(rates[joint.v]);
   for (std::size_t k = 0; k < scene_.cut_joints.size(); ++k) {
-    const Index i = v_.size() + static_cast<Index>(k);
+    const Index i = rest_.size() + static_cast<Index>(k);
     damping_[i] = scene_.cut_joints[k].friction.slope(rates[i]);
   }
 }
 
-template <class Space> void NewtonSystem<Space>::set_state(const double *q, const double *v) {
-  std::copy_n(q, q_.size(), q_.data());
-  std::copy_n(v, v_.size(), v_.data());
-  posture_is_old_ = true;
-}
-
 template <class Space> void NewtonSystem<Space>::find_coupling() {
-  VectorXd unit = VectorXd::Zero(v_.size()), rates(coupling_.cols());
-  for (Index i = 0; i < v_.size(); ++i) {
+  VectorXd unit = rest_, rates(coupling_.cols());
+  for (Index i = 0; i < unit.size(); ++i) {
     unit[i] = 1;
     cut_rates(place_all(mechanism_, q_.data(), unit.data(), nullptr, w_), scene_.cut_joints, rates.data());
     coupling_.row(i) = rates.transpose();
@@ -60,73 +73,96 @@ template <class Space> void NewtonSystem<Space>::find_coupling() {
   }
 }
 
-template <class Space> void NewtonSystem<Space>::take_posture() {
-  if (!posture_is_old_)
-    return;
-  posture_.take(q_.data(), w_);
+template <class Space> template <class Matrix> Matrix NewtonSystem<Space>::along_stiff(const Matrix &x) const {
+  Matrix found(static_cast<Index>(stiff_.size()), x.cols());
+  for (Index s = 0; s < found.rows(); ++s)
+    if (const Index i = stiff_[static_cast<std::size_t>(s)]; i < rest_.size())
+      found.row(s) = x.row(i);
+    else
+      found.row(s) = coupling_.col(i - rest_.size()).transpose() * x;
+  return found;
+}
+
+template <class Space> void NewtonSystem<Space>::find_responses() {
+  const auto equations = static_cast<Index>(mechanism_.constraints.size());
+  const VectorXd none = VectorXd::Zero(equations);
+  const auto evaluate = [&](const VectorXd &force) {
+    VectorXd a(rest_.size());
+    accelerations(mechanism_, q_.data(), rest_.data(), Forces<double>{force.data(), nullptr}, none.data(), w_,
+                  a.data());
+    return a;
+  };
+  const VectorXd start = evaluate(rest_);
+  P_.resize(rest_.size(), static_cast<Index>(stiff_.size()));
+  for (Index s = 0; s < P_.cols(); ++s) {
+    VectorXd force = rest_;
+    if (const Index i = stiff_[static_cast<std::size_t>(s)]; i < rest_.size())
+      force[i] = large_force;
+    else
+      force = large_force * coupling_.col(i - rest_.size());
+    P_.col(s) = (evaluate(force) - start) / large_force;
+  }
+  G_ = along_stiff(P_);
+  R_.setZero(rest_.size(), equations);
+  VectorXd unit = none;
+  for (const int r : w_.active) {
+    unit[r] = -1;
+    response(mechanism_, q_.data(), unit.data(), w_, R_.col(r).data());
+    unit[r] = 0;
+  }
+}
+
+template <class Space> void NewtonSystem<Space>::linearise(const double *q, const double *v) {
+  q_ = Eigen::Map<const VectorXd>(q, q_.size());
+  const Eigen::Map<const VectorXd> v_(v, rest_.size());
   if (coupling_.size() > 0)
     find_coupling();
-  const auto kept = static_cast<Index>(w_.active.size()), turned = static_cast<Index>(turned_.size());
-  C_.setZero(kept + coupling_.cols() + turned, v_.size());
-  C_.topRows(kept) = posture_.gradients()(w_.active, Eigen::all);
-  C_.middleRows(kept, coupling_.cols()) = coupling_.transpose();
-  for (Index k = 0; k < turned; ++k)
-    C_(kept + coupling_.cols() + k, turned_[static_cast<std::size_t>(k)]) = 1;
-  posture_is_old_ = false;
+  VectorXd rates(stiffness_.size());
+  rates << v_, coupling_.transpose() * v_;
+  take_friction(rates);
+  find_responses();
 }
 
 template <class Space>
 template <class Scalar>
-void NewtonSystem<Space>::factorise(NewtonMatrix<Space, Scalar> &matrix, Scalar damping_factor,
-                                    Scalar stiffness_factor) {
-  using Vector = Eigen::Matrix<Scalar, Eigen::Dynamic, 1>;
-  take_posture();
-  VectorXd rates(stiffness_.size());
-  rates << v_, coupling_.transpose() * v_;
-  take_friction(rates);
-  const Vector E = damping_factor * damping_ + stiffness_factor * stiffness_;
-  Vector of_tree = E.head(v_.size()), extra(coupling_.cols() + static_cast<Index>(turned_.size()));
-  extra << E.tail(coupling_.cols()), of_tree(turned_);
-  of_tree(turned_).setZero();
-  matrix.factorise(posture_, C_, of_tree, extra);
+void NewtonSystem<Space>::factorise(Scalar damping_factor, Scalar stiffness_factor, Factors<Scalar> &to) const {
+  const Vector<Scalar> E = damping_factor * damping_(stiff_) + stiffness_factor * stiffness_(stiff_);
+  to.S = E.cwiseSqrt();
+  to.symmetric = to.S.asDiagonal() * G_ * to.S.asDiagonal();
+  to.symmetric.diagonal().array() += Scalar(1);
+  recursion::factorise(to.symmetric.data(), static_cast<int>(E.size()));
 }
 
-template <class Space> void NewtonSystem<Space>::factorise(double damping_factor, double stiffness_factor) {
-  factorise(real_, damping_factor, stiffness_factor);
-}
-
-template <class Space> void NewtonSystem<Space>::factorise(Complex damping_factor, Complex stiffness_factor) {
-  factorise(complex_, damping_factor, stiffness_factor);
-}
-
-// x = B^T r
-template <class Space> template <class Scalar> void NewtonSystem<Space>::spread(const Scalar *r, Scalar *x) const {
-  using Vector = Eigen::Matrix<Scalar, Eigen::Dynamic, 1>;
-  Eigen::Map<Vector> x_(x, v_.size());
-  x_ = Eigen::Map<const Vector>(r, v_.size());
-  if (coupling_.cols() > 0)
-    x_ += coupling_ * Eigen::Map<const Vector>(r + v_.size(), coupling_.cols());
+// `along`: B R c in, of which y is made
+template <class Space>
+template <class Scalar>
+typename NewtonSystem<Space>::template Vector<Scalar>
+NewtonSystem<Space>::forces(const Factors<Scalar> &factors, const Scalar *r, Vector<Scalar> along) const {
+  Vector<Scalar> f = Eigen::Map<const Vector<Scalar>>(r, stiffness_.size())(stiff_);
+  along = factors.S.cwiseProduct(along + product(G_, f));
+  solve_factorised(factors.symmetric.data(), static_cast<int>(f.size()), along.data());
+  f -= factors.S.cwiseProduct(along);
+  return f;
 }
 
 template <class Space> void NewtonSystem<Space>::solve(const double *r, const double *c, double *x) {
-  spread(r, x);
-  if (!c) {
-    real_.solve(nullptr, x);
-    return;
-  }
-  const auto equations = static_cast<Index>(mechanism_.constraints.size());
-  const VectorXd kept = Eigen::Map<const VectorXd>(c, equations)(w_.active);
-  real_.solve(kept.data(), x);
+  Eigen::Map<VectorXd> x_(x, rest_.size());
+  x_.setZero();
+  if (c)
+    x_ = R_ * Eigen::Map<const VectorXd>(c, R_.cols());
+  x_ += P_ * forces(real_, r, along_stiff<VectorXd>(x_));
 }
 
 template <class Space> void NewtonSystem<Space>::solve(const Complex *r, Complex *x) {
-  spread(r, x);
-  complex_.solve(nullptr, x);
+  const Vector<Complex> zero = Vector<Complex>::Zero(P_.cols());
+  Eigen::Map<Vector<Complex>>(x, rest_.size()) = product(P_, forces(complex_, r, zero));
 }
 
 template <class Space> void NewtonSystem<Space>::constrain(const double *x, double *c) {
-  const Eigen::MatrixXd &C = posture_.gradients();
-  Eigen::Map<VectorXd>(c, C.rows()) = C * Eigen::Map<const VectorXd>(x, v_.size());
+  VectorXd value(R_.cols()), at_rest(R_.cols());
+  measure(mechanism_, q_.data(), rest_.data(), w_, value.data(), at_rest.data());
+  measure(mechanism_, q_.data(), x, w_, value.data(), c);
+  Eigen::Map<VectorXd>(c, R_.cols()) -= at_rest; // of markers that turn
 }
 
 template class NewtonSystem<Planar>;

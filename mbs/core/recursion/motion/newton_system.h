@@ -1,9 +1,12 @@
-// The matrix of Newton's method in implicit integrators (newton/newton.h) at states of a motion: what is stiff, which
-// constraint equations it is under, and the posture by which it was factorised last.
+// The matrix of Newton's method in implicit integrators, N = M + B^T E B under C_q: E is a diagonal, zero but at a few
+// stiff coordinates B x: modes, joints with springs or friction, and joints at which loops are cut. N is never made;
+// what evaluations at rest say suffices, with G = B P and forces f = r - E B x:
+//     N x + C_q^T nu = B^T r, C_q x = c:     x = P f + R c,     (1 + G E) B x = G r + B R c
+// P (n_v, stiff) are accelerations by unit forces along these coordinates while the constraint equations hold, R (n_v,
+// equations) those by which an equation alone accelerates. With y = S B x, S S = E, the matrix is symmetric: 1 + S G S.
 #pragma once
 
 #include "core/recursion/motion/scene.h"
-#include "core/recursion/newton/newton.h"
 
 #include <complex>
 
@@ -17,40 +20,49 @@ public:
 
   void keep(const std::vector<int> &equations) { w_.keep(equations); } // these alone
 
-  // Diagonals (n_v, then cut joints); damping of friction as at the last factorisation
+  // Diagonals (n_v, then cut joints); damping of friction as at the last linearise()
   const Eigen::VectorXd &stiffness() const { return stiffness_; }
   const Eigen::VectorXd &damping() const { return damping_; }
   const Eigen::MatrixXd &coupling() const { return coupling_; } // (n_v, cut joints) their rates are coupling^T v
 
-  void set_state(const double *q, const double *v); // by which the next factorisations go
-  void factorise(double damping_factor, double stiffness_factor);
-  void factorise(Complex damping_factor, Complex stiffness_factor);
-  void solve(const double *r, const double *c, double *x); // as ImplicitSystem has these
+  // As ImplicitSystem has these
+  void linearise(const double *q, const double *v);
+  void factorise(double damping_factor, double stiffness_factor) { factorise(damping_factor, stiffness_factor, real_); }
+  void factorise(Complex damping_factor, Complex stiffness_factor) {
+    factorise(damping_factor, stiffness_factor, complex_);
+  }
+  void solve(const double *r, const double *c, double *x);
   void solve(const Complex *r, Complex *x);
   void constrain(const double *x, double *c);
 
-  Workspace<Space, double> &workspace() { return w_; } // of the posture, at rest
+  Workspace<Space, double> &workspace() { return w_; } // for evaluations at rest
 
 private:
+  template <class Scalar> using Vector = Eigen::Matrix<Scalar, Eigen::Dynamic, 1>;
+  template <class Scalar> struct Factors {
+    Vector<Scalar> S;                                                // (stiff)
+    Eigen::Matrix<Scalar, Eigen::Dynamic, Eigen::Dynamic> symmetric; // 1 + S G S as L and 1/D (multipliers.h)
+  };
+
   void find_stiff_terms();
   void take_friction(const Eigen::VectorXd &rates);
-  void take_posture();
   void find_coupling();
+  void find_responses();
+  template <class Matrix> Matrix along_stiff(const Matrix &x) const; // B x
   template <class Scalar>
-  void factorise(NewtonMatrix<Space, Scalar> &matrix, Scalar damping_factor, Scalar stiffness_factor);
-  template <class Scalar> void spread(const Scalar *r, Scalar *x) const;
+  void factorise(Scalar damping_factor, Scalar stiffness_factor, Factors<Scalar> &factors) const;
+  template <class Scalar>
+  Vector<Scalar> forces(const Factors<Scalar> &factors, const Scalar *r, Vector<Scalar> along) const; // f
 
   const Mechanism<Space> &mechanism_;
   const Scene &scene_;
   Workspace<Space, double> w_;
-  NewtonPosture<Space> posture_;
-  bool posture_is_old_ = true; // the state is newer
-  Eigen::VectorXd q_, v_, stiffness_, damping_;
+  Eigen::VectorXd q_, rest_, stiffness_, damping_; // (n_q), (n_v) zeros
   Eigen::MatrixXd coupling_;
-  std::vector<Eigen::Index> turned_; // stiff coordinates along pins whose section modes turn
-  Eigen::MatrixXd C_;                // (kept equations, cut joints, turned_; n_v)
-  NewtonMatrix<Space, double> real_;
-  NewtonMatrix<Space, Complex> complex_;
+  std::vector<Eigen::Index> stiff_; // of the diagonals: entries that may not be zero, ascending
+  Eigen::MatrixXd P_, G_, R_;       // R of all equations, zero of those that are not kept
+  Factors<double> real_;
+  Factors<Complex> complex_;
 };
 
 extern template class NewtonSystem<Planar>;

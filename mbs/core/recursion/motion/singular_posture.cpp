@@ -1,6 +1,8 @@
 #include "core/recursion/motion/singular_posture.h"
 
 #include "core/linear/singular_values.h"
+#include "core/recursion/constrained_aba/gradients.h"
+#include "core/recursion/motion/natural_sizes.h"
 
 #include <Eigen/LU>
 
@@ -16,35 +18,21 @@ namespace {
 
 constexpr double singular = 1e-10; // of the largest singular value: rank of the loops' constraints
 
-// Rates of constraints by the joints' velocities (constraints, joint coordinates), lengths in
-// units of `length`
+// Rates of constraints by the joints' velocities (constraints, joint coordinates), lengths in units of `length`
 template <class Space>
-MatrixXd gradients(const Mechanism<Space> &m, double length, const double *q, Workspace<Space, double> &w) {
-  const auto rows = static_cast<Index>(m.constraints.size());
-  VectorXd v = VectorXd::Zero(m.n_v), value(rows), at_rest = VectorXd::Zero(rows);
-  if (m.has_moving_constraints) // markers that turn have a rate of their own
-    measure(m, q, v.data(), w, value.data(), at_rest.data());
-  Index freedoms = 0, j = 0;
+MatrixXd gradients_by_joints(const Mechanism<Space> &m, double length, const double *q, Workspace<Space, double> &w) {
+  std::vector<int> joints, ways;
   for (const Node<Space> &node : m.nodes)
-    freedoms += node.shape.freedoms.count;
-  MatrixXd J(rows, freedoms);
-  for (const Node<Space> &node : m.nodes)
-    for (int k = 0; k < node.shape.freedoms.count; ++k, ++j) {
-      v[node.v + k] = 1;
-      measure(m, q, v.data(), w, value.data(), J.col(j).data());
-      v[node.v + k] = 0;
-      J.col(j) -= at_rest;
+    for (int k = 0; k < node.shape.freedoms.count; ++k) {
       if (node.shape.freedoms.component[k] < Space::linear)
-        J.col(j) *= length;
+        ways.push_back(static_cast<int>(joints.size()));
+      joints.push_back(node.v + k);
     }
-  for (Index r = 0; r < rows; ++r) {
-    const Constraint &row = m.constraints[static_cast<std::size_t>(r)];
-    bool is_way = row.model.kind == ConstraintKind::point || row.model.kind == ConstraintKind::slide;
-    if (row.model.kind == ConstraintKind::coordinate)
-      is_way = m.nodes[static_cast<std::size_t>(row.node)].shape.freedoms.component[row.freedom] < Space::linear;
-    if (is_way)
-      J.row(r) /= length;
-  }
+  MatrixXd J = gradients(m, q, joints, w);
+  J(Eigen::all, ways) *= length;
+  for (std::size_t r = 0; r < m.constraints.size(); ++r)
+    if (!is_moment(m, m.constraints[r]))
+      J.row(static_cast<Index>(r)) /= length;
   return J;
 }
 
@@ -62,7 +50,7 @@ template <class Space>
 Posture posture_at(const Mechanism<Space> &m, const PostureWatch &watch, const double *q, Workspace<Space, double> &w) {
   if (std::none_of(watch.is_path.begin(), watch.is_path.end(), [](char is_path) { return is_path; }))
     return {};
-  MatrixXd followed = gradients(m, watch.length, q, w);
+  MatrixXd followed = gradients_by_joints(m, watch.length, q, w);
   const bool has_loops = !std::all_of(watch.is_path.begin(), watch.is_path.end(), [](char is_path) { return is_path; });
   if (has_loops) {
     const MatrixXd loops = rows_of(followed, watch.is_path, false);
