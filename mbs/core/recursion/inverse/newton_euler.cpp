@@ -36,12 +36,7 @@ std::array<double, Space::dim> acceleration_of_joint(const Node<Space> &node, co
     const auto inner = along;
     to_outer_axes(node, q, inner.data(), along.data());
   }
-  if constexpr (Space::dim == 6) {
-    if (node.joint == JointKind::universal)
-      from_cross(hinge, along.data());
-    else if (node.joint == JointKind::screw)
-      along[2] += node.lead * along[5];
-  }
+  acceleration_from_freedoms(node, hinge, along.data());
   return along;
 }
 
@@ -123,7 +118,7 @@ void NewtonEuler<Space>::accelerate(const double *q, const double *a, const Work
     add(acceleration_of_joint(node, hinge, q + node.q, a + node.v), A);
     for (std::size_t k = 0; k < A.size(); ++k)
       A[k] += hinge.c[k];
-    const VectorXd u_ddot = elastic_accelerations(body, bodies_[i], s, a + node.p_v());
+    const VectorXd u_ddot = elastic_accelerations(body, s, a + node.p_v());
     if (node.inboard >= 0) { // from the section to the frame
       Vector at_port;
       inboard_tilt(node, s).apply(A.data(), at_port.data());
@@ -214,12 +209,7 @@ typename NewtonEuler<Space>::Vector NewtonEuler<Space>::along_joint(std::size_t 
   Vector along = of_joint_[i], found{};
   if (node.shape.in_inner_axes)
     to_inner_axes(node, q + node.q, of_joint_[i].data(), along.data());
-  if constexpr (Space::dim == 6) {
-    if (node.joint == JointKind::universal)
-      to_cross(w.hinges[i], along.data());
-    else if (node.joint == JointKind::screw)
-      along[5] += node.lead * along[2];
-  }
+  forces_to_freedoms(node, w.hinges[i], along.data());
   for (std::size_t k = 0; k < static_cast<std::size_t>(node.shape.freedoms.count); ++k)
     found[k] = along[static_cast<std::size_t>(node.shape.freedoms.component[k])];
   return found;
@@ -239,23 +229,16 @@ void NewtonEuler<Space>::on_constraints(std::size_t i, const Workspace<Space, do
     on_tilt(node.body, at_section_[i], act);
 }
 
-template <class Space>
-void NewtonEuler<Space>::project_on_joints(const double *q, const Workspace<Space, double> &w, double *Q) {
+template <class Space> void NewtonEuler<Space>::project(const double *q, const Workspace<Space, double> &w, double *Q) {
   transmit(w, false);
   for (std::size_t i = 0; i < mechanism_.nodes.size(); ++i) {
     const Node<Space> &node = mechanism_.nodes[i];
     const Vector along = along_joint(i, q, w);
     for (int k = 0; k < node.shape.freedoms.count; ++k)
       Q[node.v + k] = on_coordinates_[node.v + k] - along[static_cast<std::size_t>(k)];
+    if (node.n() > 0)
+      put_on_modes(node.body, w.bodies[i], [&](const auto &act) { on_constraints(i, w, act); }, Q + node.p_v());
   }
-}
-
-template <class Space> void NewtonEuler<Space>::project(const double *q, const Workspace<Space, double> &w, double *Q) {
-  project_on_joints(q, w, Q);
-  for (std::size_t i = 0; i < mechanism_.nodes.size(); ++i)
-    if (const Node<Space> &node = mechanism_.nodes[i]; node.n() > 0)
-      put_on_modes(
-          node.body, bodies_[i], w.bodies[i], [&](const auto &act) { on_constraints(i, w, act); }, Q + node.p_v());
 }
 
 template <class Space>
@@ -293,7 +276,7 @@ void NewtonEuler<Space>::residual_of_modes(std::size_t i, const double *q, const
   const Node<Space> &node = mechanism_.nodes[i];
   for (std::size_t k = 0; k < frames_[i].size(); ++k)
     z[static_cast<Index>(k)] -= frames_[i][k];
-  modal_residual(node.body, bodies_[i], q + node.p_q(), a + node.p_v(), z.data(), w.bodies[i], f + node.p_v());
+  modal_residual(node, q + node.p_q(), a + node.p_v(), z.data(), w.bodies[i], f + node.p_v());
 }
 
 template <class Space>
@@ -304,7 +287,7 @@ void NewtonEuler<Space>::add_joint_moment_on_modes(std::size_t i, double moment,
     if (node.n() == 0)
       return;
     VectorXd modal(node.n());
-    put_on_modes(node.body, bodies_[at], w.bodies[at], put, modal.data());
+    put_on_modes(node.body, w.bodies[at], put, modal.data());
     Eigen::Map<VectorXd>(Q + node.p_v(), node.n()) += modal;
   };
   const Node<Space> &node = mechanism_.nodes[i];
@@ -369,7 +352,7 @@ template <class Space> VectorXd NewtonEuler<Space>::on_body(std::size_t i, const
       on_tilt(node.body, by_joint, act);
   };
   if (node.n() > 0)
-    put_on_modes(node.body, bodies_[i], s, on_rows_of_body, Q.data() + Space::dim);
+    put_on_modes(node.body, s, on_rows_of_body, Q.data() + Space::dim);
   return Q;
 }
 

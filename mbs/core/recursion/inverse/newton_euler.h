@@ -4,8 +4,7 @@
 #pragma once
 
 #include "core/recursion/constrained_aba/workspace.h"
-#include "core/recursion/planar/known_motion.h"
-#include "core/recursion/spatial/known_motion.h"
+#include "core/recursion/inverse/known_body.h"
 
 #include <Eigen/Core>
 
@@ -45,9 +44,8 @@ public:
   // loads alone are.
   void transmit(const Workspace<Space, double> &w, bool with_inertia = true);
 
-  // Inward: generalized forces Q (n_v) of the loads; only those along joints, others in Q are left as they are.
+  // Inward: generalized forces Q (n_v) of the loads
   void project(const double *q, const Workspace<Space, double> &w, double *Q);
-  void project_on_joints(const double *q, const Workspace<Space, double> &w, double *Q);
 
   // Inward, after accelerate() and load(): M a - Q (n_v), with Q of gravity, elasticity, damping, the loads, and the
   // generalized forces on modes of prepare(), not those along joints.

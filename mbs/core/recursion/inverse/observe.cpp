@@ -92,16 +92,9 @@ Vector3d joint_axis(const Mechanism<Space> &m, std::size_t i, const Workspace<Sp
 } // namespace
 
 template <class Space>
-const std::vector<Pose<double>> &frame_poses(const Mechanism<Space> &m, const double *q, const double *v,
-                                             Workspace<Space, double> &w) {
-  place_all(m, q, v, nullptr, w);
-  return w.frames;
-}
-
-template <class Space>
 std::vector<FrameMotion> frame_motions(const Mechanism<Space> &m, const double *q, const double *v,
                                        Workspace<Space, double> &w) {
-  frame_poses(m, q, v, w);
+  place_all(m, q, v, nullptr, w);
   Vector3d g = Vector3d::Zero();
   g.head(m.gravity.size()) = m.gravity;
   std::vector<FrameMotion> all;
@@ -191,8 +184,6 @@ RowMajor totals_of_states(const Mechanism<Space> &m, const Scene &scene, const R
   return found;
 }
 
-template const std::vector<Pose<double>> &frame_poses(const Mechanism<Planar> &, const double *, const double *,
-                                                      Workspace<Planar, double> &);
 template std::vector<FrameMotion> frame_motions(const Mechanism<Planar> &, const double *, const double *,
                                                 Workspace<Planar, double> &);
 template std::vector<FrameMotion> frame_motions(const Mechanism<Spatial> &, const double *, const double *,

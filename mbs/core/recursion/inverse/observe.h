@@ -15,11 +15,6 @@ struct FrameMotion {
   Eigen::Vector3d a_origin;
 };
 
-// Where all frames are and how they move, accelerations aside: w.frames.
-template <class Space>
-const std::vector<Pose<double>> &frame_poses(const Mechanism<Space> &m, const double *q, const double *v,
-                                             Workspace<Space, double> &w);
-
 template <class Space>
 std::vector<FrameMotion> frame_motions(const Mechanism<Space> &m, const double *q, const double *v,
                                        Workspace<Space, double> &w);

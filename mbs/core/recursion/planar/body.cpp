@@ -54,7 +54,7 @@ Body::Body(const PlanarData &data, const std::vector<int> &used, int tilted) : n
   blocks = 1 + static_cast<int>(used.size()) / 2;
   padded = (n + 7) / 8 * 8;
   fill_rows(data, used, tilted);
-  fill_damping(data);
+  take_damping(data, *this);
   if (n && !vanishes(data.j, std::sqrt(J))) // a unit mode with all motion turning
     j = data.j;
   if (n && !vanishes(data.S_tilde, 1))
@@ -122,24 +122,6 @@ void Body::fill_products(const MatrixXd &W) {
   for (int r = 0; r < 3; ++r)
     for (int c = 0; c < 3; ++c)
       residual[r][c] = less(M[r][c], W.row(r), W.row(c));
-}
-
-void Body::fill_damping(const PlanarData &data) {
-  K.assign(static_cast<std::size_t>(padded), 0.0), D = K;
-  for (int i = 0; i < n; ++i)
-    K[static_cast<std::size_t>(i)] = data.stiffness[i];
-  if (data.damping.cols() == 1 && n && !vanishes(data.damping, 0)) {
-    is_damped = true;
-    for (int i = 0; i < n; ++i)
-      D[static_cast<std::size_t>(i)] = data.damping(i, 0);
-  } else if (data.damping.cols() > 1) {
-    if (data.damping.isDiagonal(0)) {
-      is_damped = !vanishes(data.damping, 0);
-      for (int i = 0; i < n; ++i)
-        D[static_cast<std::size_t>(i)] = data.damping(i, i);
-    } else
-      D_full = data.damping;
-  }
 }
 
 } // namespace ffrobot::recursion::planar

@@ -5,12 +5,13 @@
 //     W = [S_bar_x; S_bar_y; h; Phi_x, Phi_y, Phi_rotation of port 0; of port 1; ...]
 // and G = W W^T, both constant (but for h where S_tilde is not zero, and with stiffening: stiffened.h). They lie
 // in blocks of eight: the frame's three and port 0, ports 1 and 2, ports 3 and 4 … Where modes turn the section of a
-// pin (pin_joints.h), that rotation is row TILT of the first block; FORCE is a row of zeros, but in stiffened.h.
+// pin (pin_joints.h), that rotation is row TILT of the first block; the row after it is zero (bent_modes.h: FORCE).
 #pragma once
 
 #include "core/recursion/numbers/register.h"
 #include "core/recursion/numbers/small.h"
 #include "core/recursion/planar/stiffening.h"
+#include "core/recursion/spatial/bent_modes.h"
 
 #include <memory>
 
@@ -25,7 +26,7 @@ struct Port {
 };
 
 struct Body {
-  enum { Sx, Sy, H, TILT = 6, FORCE = 7 };
+  enum { Sx, Sy, H, TILT = 6 };
   Body() = default;
   // `used`: markers of `data` that are ports; `tilted`: that of the section that the joint holds, -1 where the frame
   // turns with it
@@ -50,11 +51,11 @@ struct Body {
 
   int width() const { return 8 * blocks; }
   int row_count() const { return width(); }
+  const double *constant_rows() const { return columns.data(); } // transposed
 
 private:
   void fill_rows(const PlanarData &data, const std::vector<int> &used, int tilted);
   void fill_products(const Eigen::MatrixXd &W);
-  void fill_damping(const PlanarData &data);
 };
 
 // The same body with its frame at `position`, turned by `angle`.
@@ -66,11 +67,9 @@ template <class T> struct Inertia {
 };
 
 // Of a body with geometric stiffening (stiffened.h); names as in stiffening.h
-template <class T> struct Bent {
+template <class T> struct Bent : BentModes<T> {
   using Fields = Pack<T, fields>;
-  explicit Bent(int n, int width)
-      : p(padded(n), T(0.)), v(p), K_p(p), K_v(p), F(n * fields, T(0.)), rows(n * width, T(0.)), solved(rows),
-        factor(n * n, T(0.)), curvature(width, T(0.)) {}
+  Bent(int n, int width) : BentModes<T>(n, width), p(padded(n), T(0.)), v(p), K_p(p), K_v(p), F(n * fields, T(0.)) {}
 
   struct Affine { // of the fields
     Fields g, g_dot;
@@ -78,13 +77,9 @@ template <class T> struct Bent {
   Affine linear, all; // without and with terms of second order
   Fields bending;     // p_dot^T K p_dot
   Inertia<T> inertia;
-  Aligned<T> p, v;      // padded
-  Aligned<T> K_p, K_v;  // one after the other
-  Aligned<T> F;         // (n, 4) F(p) transposed
-  Aligned<T> rows;      // (n, width) W(p) transposed, with Q_f in lane FORCE
-  Aligned<T> solved;    // (n, width) L^-1 of these
-  Aligned<T> factor;    // (n, n) m_ff = L D L^T: L, with 1/D in the place of its diagonal
-  Aligned<T> curvature; // (width) p_dot^T K p_dot of rows
+  Aligned<T> p, v;     // padded
+  Aligned<T> K_p, K_v; // one after the other
+  Aligned<T> F;        // (n, 4) F(p) transposed
 };
 
 template <class T> struct State {

@@ -102,7 +102,7 @@ template <class T> FFROBOT_INLINE Inertia<T> inertia(const Body &b, const State<
 template <bool by_multipliers>
 FFROBOT_INLINE void modal_accelerations(const Body &b, const double *p, double *z, State<double> &s, double *a) {
   if (b.has_more && b.stiffening)
-    return bent_accelerations<by_multipliers>(b, z, s, a);
+    return s.bent.accelerate(z, by_multipliers, a);
   const double ww = s.omega * s.omega, *elastic = s.elastic.data();
   const long stride = b.padded, last = b.width() - 2;
   in_registers(b.n, [&]<int w>(long i) {
@@ -126,7 +126,7 @@ FFROBOT_INLINE void modal_accelerations(const Body &b, const double *p, double *
 template <bool by_multipliers, class T>
 inline void modal_accelerations(const Body &b, const T *p, T *z, State<T> &s, T *a) {
   if (b.has_more && b.stiffening)
-    return bent_accelerations<by_multipliers>(b, z, s, a);
+    return s.bent.accelerate(z, by_multipliers, a);
   const T ww = s.omega * s.omega;
   for (int i = 0; i < b.n; ++i) {
     T sum = by_multipliers ? T(0.) : T(ww * p[i] - s.elastic[i]);

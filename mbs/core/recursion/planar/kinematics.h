@@ -145,14 +145,10 @@ template <class T> FFROBOT_INLINE void ground_acceleration(const Mechanism<Plana
   A[0] = T(-m.gravity[0]), A[1] = T(-m.gravity[1]), A[2] = T(0.);
 }
 
-// y = R x from axes of a port to global ones, and back
+// y = R x from axes of a port to global ones
 template <class X, class T>
 FFROBOT_INLINE void port_to_global(const planar::Body &, int, const planar::State<T> &s, const X *x, X *y) {
   PlanarTurn<T>{s.absolute_cosine, s.absolute_sine}.apply(x, y);
-}
-template <class X, class T>
-FFROBOT_INLINE void global_to_port(const planar::Body &, int, const planar::State<T> &s, const X *x, X *y) {
-  PlanarTurn<T>{s.absolute_cosine, s.absolute_sine}.back(x, y);
 }
 
 // Lift an acceleration from unit freedoms of the outer section to the rates of joint coordinates, and the reverse for

@@ -1,4 +1,4 @@
-// What a known motion takes of one body in the plane, for the recursive Newton-Euler algorithm (newton_euler.h).
+// What a known motion takes of one body in the plane; of its modes: inverse/known_body.h.
 #pragma once
 
 #include "core/recursion/planar/kinematics.h"
@@ -20,17 +20,6 @@ struct KnownBody {
 inline std::array<double, 2> place(const Port &port, const State<double> &s) {
   const auto row = static_cast<std::size_t>(port.row);
   return {port.x + s.u[row], port.y + s.u[row + 1]};
-}
-
-// Of rows of W: W p_ddot, with geometric stiffening less p_dot^T K p_dot
-inline Eigen::VectorXd elastic_accelerations(const Body &b, const KnownBody &, const State<double> &s,
-                                             const double *p_ddot) {
-  if (b.n == 0)
-    return Eigen::VectorXd::Zero(b.width());
-  Eigen::VectorXd found = rows_of(b, s).lazyProduct(Eigen::Map<const Eigen::VectorXd>(p_ddot, b.n));
-  if (b.stiffening)
-    found -= Eigen::Map<const Eigen::VectorXd>(s.bent.curvature.data(), found.size());
-  return found;
 }
 
 // Of a port against the frame: what its acceleration has beside the frame's linear one. alpha: of the frame
@@ -96,37 +85,6 @@ template <class Act> void put_on_rows(const Body &b, int i, const State<double> 
 template <class Act> void on_tilt(const Body &b, const Vector &f, const Act &act) {
   if (b.is_tilted)
     act(Body::TILT, f[2]);
-}
-
-// Generalized forces on the modes: each(act) calls act(row of W, force).
-template <class Each>
-void put_on_modes(const Body &b, const KnownBody &, const State<double> &s, const Each &each, double *modal) {
-  if (b.stiffening) {
-    const auto W = rows_of(b, s);
-    Eigen::Map<Eigen::VectorXd> sum(modal, b.n);
-    sum.setZero();
-    each([&](Eigen::Index row, double force) { sum += force * W.row(row).transpose(); });
-  } else
-    in_registers(b.n, [&]<int width>(long k) { // the same of rows that are constant
-      using Part = Pack<double, width>;
-      const double *W = b.rows.data() + k;
-      Part sum = Part::zero();
-      each([&](Eigen::Index row, double force) { sum += force * Part::read(W + row * b.padded); });
-      sum.write(modal + k);
-    });
-}
-
-// m_ff p_ddot + m^T A - Q_f - sum of P^T f (n). z: by rows of W, -A and forces on ports
-inline void modal_residual(const Body &b, const KnownBody &, const double *p, const double *p_ddot, double *z,
-                           State<double> &s, double *to) {
-  Eigen::VectorXd by_forces(b.n);
-  modal_accelerations<false>(b, p, z, s, by_forces.data());
-  const Eigen::VectorXd beside = Eigen::Map<const Eigen::VectorXd>(p_ddot, b.n) - by_forces;
-  Eigen::Map<Eigen::VectorXd> residual(to, b.n);
-  if (b.stiffening)
-    residual = bent_mass(b, s) * beside;
-  else
-    residual = beside;
 }
 
 inline void body_to_global(const State<double> &s, const double *x, double *y) {

@@ -3,7 +3,6 @@
 // of the modes is then no longer 1: products of rows are W m_ff^-1 W^T, found at every evaluation with m_ff = L D L^T.
 #pragma once
 
-#include "core/recursion/constrained_aba/multipliers.h"
 #include "core/recursion/planar/body.h"
 
 namespace ffrobot::recursion::planar {
@@ -72,7 +71,7 @@ template <class T> inline void bend_forces(const Body &b, const T *p, const T *v
                  F_p = Fields::read(bent.F.data() + fields * i);
     T *row = bent.rows.data() + i * b.width();
     row[Body::H] = b.columns[i * b.width() + Body::H] + s.h[i] + (turned * F_p - turned_linear * F).sum();
-    row[Body::FORCE] = ww * p[i] - s.elastic[i] + s.more[i] + (y_linear * F - y * F_p).sum();
+    row[Bent<T>::FORCE] = ww * p[i] - s.elastic[i] + s.more[i] + (y_linear * F - y * F_p).sum();
     h_p_dot += row[Body::H] * v[i];
     s.h[i] = T(0.); // is part of row h
   }
@@ -82,44 +81,21 @@ template <class T> inline void bend_forces(const Body &b, const T *p, const T *v
   bent.curvature[Body::H] = (turned * bent.bending).sum();
 }
 
-// L and 1/D of m_ff = 1 - F^T F + F(p)^T F(p), and L^-1 of the rows
+// m_ff = 1 - F^T F + F(p)^T F(p), products of rows, X of ports, and what rows accelerate by: W m_ff^-1 Q_f less
+// curvature
 template <class T> inline void eliminate_modes(const Body &b, State<T> &s) {
-  using Block = Pack<T, 8>;
   Bent<T> &bent = s.bent;
   const int n = b.n, width = b.width();
-  T *L = bent.factor.data();
   for (int i = 0; i < n; ++i) {
     const auto F_i = Pack<T, fields>::read(bent.F.data() + fields * i);
     for (int j = 0; j <= i; ++j)
-      L[i * n + j] =
+      bent.factor[i * n + j] =
           b.stiffening->m_ff_rest[i * n + j] + (F_i * Pack<T, fields>::read(bent.F.data() + fields * j)).sum();
   }
-  factorise(L, n);
-  for (int i = 0; i < n; ++i)
-    for (int block = 0; block < width; block += 8) {
-      Block x = Block::read(bent.rows.data() + i * width + block);
-      for (int l = 0; l < i; ++l)
-        x -= L[i * n + l] * Block::read(bent.solved.data() + l * width + block);
-      x.write(bent.solved.data() + i * width + block);
-    }
-}
-
-// W m_ff^-1 W^T, X of ports, and what rows accelerate by: W m_ff^-1 Q_f less curvature
-template <class T> inline void multiply_rows(const Body &b, State<T> &s) {
-  using Block = Pack<T, 8>;
-  Bent<T> &bent = s.bent;
-  const int n = b.n, width = b.width();
-  for (int block = 0; block < width; block += 8)
-    for (int r = 0; r < width; ++r) {
-      Block sum = Block::zero();
-      for (int i = 0; i < n; ++i) {
-        const T *x = bent.solved.data() + i * width;
-        sum += (bent.factor[i * n + i] * x[r]) * Block::read(x + block);
-      }
-      sum.write(s.products.data() + r * width + block);
-    }
+  bent.eliminate();
+  bent.multiply(s.products.data());
   for (int r = 0; r < width; ++r)
-    s.Q[r] = s.gram(b, r, Body::FORCE) - bent.curvature[r];
+    s.Q[r] = s.gram(b, r, Bent<T>::FORCE) - bent.curvature[r];
   T *X = s.products.data() + width * width;
   for (const Port &port : b.ports) {
     const double rigid[3][3] = {{1, 0, -port.y}, {0, 1, port.x}, {0, 0, 1}};
@@ -132,7 +108,7 @@ template <class T> inline void multiply_rows(const Body &b, State<T> &s) {
 // What `inertia` answers then, after `modal_forces`
 template <class T> FFROBOT_NOINLINE Inertia<T> bent_inertia(const Body &b, const T *p, const T *v, State<T> &s) {
   bend_forces(b, p, v, s);
-  eliminate_modes(b, s), multiply_rows(b, s);
+  eliminate_modes(b, s);
   const T ww = s.omega * s.omega, w2 = 2. * s.omega;
   const T sx = b.sx + s.u[Body::Sx], sy = b.sy + s.u[Body::Sy];
   const T *G = s.products.data(), *Q = s.Q.data();
@@ -145,38 +121,10 @@ template <class T> FFROBOT_NOINLINE Inertia<T> bent_inertia(const Body &b, const
   return M;
 }
 
-// As `modal_accelerations`: m_ff^-1 of forces along the rows
-template <bool by_multipliers, class T>
-FFROBOT_NOINLINE void bent_accelerations(const Body &b, T *z, State<T> &s, T *a) {
-  using Block = Pack<T, 8>;
-  const Bent<T> &bent = s.bent;
-  const int n = b.n, width = b.width();
-  z[Body::FORCE] = T(by_multipliers ? 0. : 1.);
-  for (int i = 0; i < n; ++i) {
-    Block sum = Block::zero();
-    for (int block = 0; block < width; block += 8)
-      sum += Block::read(z + block) * Block::read(bent.solved.data() + i * width + block);
-    a[i] = bent.factor[i * n + i] * sum.sum();
-  }
-  for (int i = n - 1; i > 0; --i)
-    for (int l = 0; l < i; ++l)
-      a[l] -= bent.factor[i * n + l] * a[i];
-}
-
 // What m_ff has beyond 1, in 1/2 p_dot^T m_ff p_dot
 inline double bending_energy(const State<double> &s) {
   const auto &all = s.bent.all, &linear = s.bent.linear;
   return 0.5 * (all.g_dot * all.g_dot - linear.g_dot * linear.g_dot).sum();
-}
-
-// W at p, (width, n), and m_ff, of a state that `inertia` has seen
-inline Eigen::Map<const Eigen::MatrixXd> rows_of(const Body &b, const State<double> &s) {
-  return {b.stiffening ? s.bent.rows.data() : b.columns.data(), b.width(), b.n};
-}
-inline Eigen::MatrixXd bent_mass(const Body &b, const State<double> &s) {
-  const Eigen::Map<const Eigen::MatrixXd> rest(b.stiffening->m_ff_rest.data(), b.n, b.n);
-  const Eigen::Map<const Eigen::MatrixXd> F(s.bent.F.data(), fields, b.n);
-  return rest + F.transpose() * F;
 }
 
 } // namespace ffrobot::recursion::planar

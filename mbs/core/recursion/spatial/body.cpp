@@ -158,7 +158,7 @@ Body::Body(const SpatialData &data, const std::vector<int> &used) : n(static_cas
     stiffening = std::make_shared<const Stiffening>(data, used);
   fill_rows(data, used, complete_I_bar(data));
   fill_residuals(data, used);
-  fill_damping(data);
+  take_damping(data, *this);
   if (n)
     fill_tensors(along_axes, data.axes, g);
 }
@@ -236,20 +236,6 @@ void Body::fill_residuals(const SpatialData &data, const std::vector<int> &used)
       for (int c = 0; c < 6; ++c)
         ports[i].T[r][c] = stiffening ? X(r, c) : static_cast<double>(X(r, c) - gram_(ports[i].row + r, c));
   }
-}
-
-void Body::fill_damping(const SpatialData &data) {
-  K.assign(static_cast<std::size_t>(padded(n)), 0.0), D = K;
-  for (int k = 0; k < n; ++k)
-    K[static_cast<std::size_t>(k)] = data.stiffness[k];
-  if (n == 0 || data.damping.size() == 0 || data.damping.cwiseAbs().maxCoeff() == 0)
-    return;
-  is_damped = data.damping.cols() == 1 || data.damping.isDiagonal(0);
-  if (!is_damped)
-    D_full = data.damping;
-  else
-    for (int k = 0; k < n; ++k)
-      D[static_cast<std::size_t>(k)] = data.damping.cols() == 1 ? data.damping(k, 0) : data.damping(k, k);
 }
 
 // The row of W that is g from now on

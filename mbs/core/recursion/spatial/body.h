@@ -72,13 +72,13 @@ struct Body {
   std::shared_ptr<const Stiffening> stiffening; // null without
 
   int row_count() const { return width; }
+  const double *constant_rows() const { return W.data(); } // transposed
   const double *gram(int r, int c) const { return G.data() + r * width + c; }
 
 private:
   bool is_curved(int row) const;
   void fill_rows(const SpatialData &data, const std::vector<int> &used, const Eigen::MatrixXd &I_bar);
   void fill_residuals(const SpatialData &data, const std::vector<int> &used);
-  void fill_damping(const SpatialData &data);
   void fill_tensors(const SpatialData &data, const Eigen::Matrix3d &axes, const Eigen::MatrixXd &g);
   int add_to_W(const Eigen::VectorXd &g);
 };

@@ -176,7 +176,7 @@ FFROBOT_NOINLINE void evaluate_inertia(const Node<Spatial> &node, const T *, con
 }
 
 template <bool by_multipliers, class T>
-FFROBOT_NOINLINE void modes(const Node<Spatial> &node, const T *, const T *z, spatial::State<T> &s, T *a) {
+FFROBOT_NOINLINE void modes(const Node<Spatial> &node, const T *, T *z, spatial::State<T> &s, T *a) {
   modal_accelerations<by_multipliers>(node.body, z, s, a);
 }
 
@@ -186,18 +186,12 @@ template <class T> FFROBOT_INLINE void ground_acceleration(const Mechanism<Spati
     A[i] = T(-g[i]), A[3 + i] = T(0.);
 }
 
-// y = R x from axes of a port to global ones, and back
+// y = R x from axes of a port to global ones
 template <class X, class T>
 FFROBOT_INLINE void port_to_global(const spatial::Body &b, int port, const spatial::State<T> &s, const X *x, X *y) {
   SpatialTurn<T> axes;
   product(s.absolute, b.ports[port].R, axes.R);
   axes.apply(x, y);
-}
-template <class X, class T>
-FFROBOT_INLINE void global_to_port(const spatial::Body &b, int port, const spatial::State<T> &s, const X *x, X *y) {
-  SpatialTurn<T> axes;
-  product(s.absolute, b.ports[port].R, axes.R);
-  axes.back(x, y);
 }
 
 // As in the plane; x, y (6): translations

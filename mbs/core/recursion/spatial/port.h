@@ -135,11 +135,10 @@ FFROBOT_INLINE void accelerate(const Body &b, int stride, const T *z, const T *a
 }
 
 // p_ddot = Q_f - m^T A + sum of P^T f, by multipliers without Q_f; z holds, by rows of W, -A and forces on ports, and
-// zeros elsewhere
-template <bool by_multipliers, class T>
-inline void modal_accelerations(const Body &b, const T *z, const State<T> &s, T *a) {
+// zeros elsewhere (and becomes another with geometric stiffening)
+template <bool by_multipliers, class T> inline void modal_accelerations(const Body &b, T *z, const State<T> &s, T *a) {
   if (b.stiffening)
-    return bent_accelerations<by_multipliers>(b, z, s, a);
+    return s.bent.accelerate(z, by_multipliers, a);
   T along[3];
   for (std::size_t c = 0; c < b.twists.size(); ++c) {
     const double *axis = b.twists[c].axis + 3;

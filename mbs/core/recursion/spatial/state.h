@@ -1,28 +1,25 @@
 // What of a spatial body changes from evaluation to evaluation.
 #pragma once
 
+#include "core/recursion/spatial/bent_modes.h"
 #include "core/recursion/spatial/body.h"
 #include "core/recursion/spatial/section.h"
 
 namespace ffrobot::recursion::spatial {
 
-// Of a body with geometric stiffening; names as in stiffening.h. Rows over modes are padded.
-template <class T> struct Bent {
+// Of a body with geometric stiffening; names as in stiffening.h
+template <class T> struct Bent : BentModes<T> {
   explicit Bent(const Body &b)
-      : F(b.stiffening ? 3 * b.stiffening->fields * padded(b.n) : 0, T(0.)),
-        rows(b.stiffening ? b.width * padded(b.n) : 0, T(0.)), gram(b.stiffening ? b.width * b.width : 0, T(0.)),
-        factor(b.stiffening ? b.n * padded(b.n) : 0, T(0.)), curvature(b.stiffening ? b.width : 0, T(0.)) {}
+      : BentModes<T>(b.stiffening ? b.n : 0, b.stiffening ? b.width : 0),
+        F(b.stiffening ? 3 * b.stiffening->fields * padded(b.n) : 0, T(0.)), gram(this->width * this->width, T(0.)) {}
 
   struct Affine { // of the fields, by axis and field
     T g[3][most_fields], g_dot[3][most_fields];
   };
   Affine linear, all;        // without and with terms of second order
   T bending[3][most_fields]; // p_dot^T K p_dot
-  Aligned<T> F;              // (3 fields, n) F(p)
-  Aligned<T> rows;           // (width, n) W(p); then W(p) L^-T
+  Aligned<T> F;              // (3 fields, padded n) F(p)
   Aligned<T> gram;           // (width, width) W(p) m_ff^-1 W(p)^T
-  Aligned<T> factor;         // (n, n) m_ff = L L^T
-  Aligned<T> curvature;      // (width) p_dot^T K p_dot of rows of ports
 };
 
 template <class T> struct State {

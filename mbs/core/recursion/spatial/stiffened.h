@@ -1,6 +1,6 @@
 // What geometric stiffening changes of a body in space: its inertia, rows and forces are those of the linear body, less
 // what affine fields have of them there, and what they have with terms of second order (stiffening.h). The mass matrix
-// of the modes is then no longer 1; with its factor L the modes are taken as L^T p, for which it is.
+// of the modes is then no longer 1 (bent_modes.h).
 #pragma once
 
 #include "core/recursion/spatial/state.h"
@@ -10,8 +10,8 @@
 namespace ffrobot::recursion::spatial {
 
 // s.b and s.h_change[0] are used in between.
-template <class T> inline Curve<T> curve(const ModeMatrix &K, int n, State<T> &s, T *row) {
-  return curve<T>(K, n, s.p.data(), s.v.data(), s.b.data(), s.h_change[0].data(), row, 1);
+template <class T> inline Curve<T> curve(const ModeMatrix &K, int n, State<T> &s, T *row, int stride) {
+  return curve<T>(K, n, s.p.data(), s.v.data(), s.b.data(), s.h_change[0].data(), row, stride);
 }
 
 // F(p), and g with its rate, of the linear body and with terms of second order
@@ -24,7 +24,7 @@ template <class T> inline void bend_fields(const Body &b, State<T> &s) {
       T *row = bent.F.data() + i * padded(b.n), moved(0.), rate(0.);
       for (int j = 0; j < b.n; ++j)
         row[j] = T(F[j]), moved += F[j] * s.p[j], rate += F[j] * s.v[j];
-      const auto second = curve(k.K[i], b.n, s, row);
+      const auto second = curve(k.K[i], b.n, s, row, 1);
       bent.linear.g[c][f] = moved + k.g[c][f], bent.linear.g_dot[c][f] = rate;
       bent.all.g[c][f] = bent.linear.g[c][f] - second.half, bent.all.g_dot[c][f] = rate - second.rate;
       bent.bending[c][f] = second.bending;
@@ -36,20 +36,18 @@ template <class T> FFROBOT_NOINLINE void bend(const Body &b, State<T> &s) {
   const Stiffening &k = *b.stiffening;
   Bent<T> &bent = s.bent;
   bend_fields(b, s);
-  for (int r = 0; r < b.width; ++r) {
-    T *row = bent.rows.data() + r * padded(b.n);
-    for (int j = 0; j < b.n; ++j)
-      row[j] = T(b.rows[r * padded(b.n) + j]);
-    if (r < lanes || r >= lanes + static_cast<int>(k.at_ports.size()))
-      continue;
-    const auto second = curve(k.at_ports[r - lanes], b.n, s, row);
+  for (int j = 0; j < b.n; ++j)
+    for (int r = 0; r < b.width; ++r)
+      bent.rows[j * b.width + r] = T(b.rows[r * padded(b.n) + j]);
+  for (int r = lanes; r < lanes + static_cast<int>(k.at_ports.size()); ++r) {
+    const auto second = curve(k.at_ports[r - lanes], b.n, s, bent.rows.data() + r, b.width);
     s.u[r] -= second.half, s.u_dot[r] -= second.rate;
     bent.curvature[r] = second.bending;
   }
   for (int c = 0; c < 3; ++c) {
     s.u[c] = k.root_mass * bent.all.g[c][0] - b.s0[c], s.u_dot[c] = k.root_mass * bent.all.g_dot[c][0];
     for (int j = 0; j < b.n; ++j)
-      bent.rows[c * padded(b.n) + j] = k.root_mass * bent.F[c * k.fields * padded(b.n) + j];
+      bent.rows[j * b.width + c] = k.root_mass * bent.F[c * k.fields * padded(b.n) + j];
   }
 }
 
@@ -59,7 +57,7 @@ template <class T, class X>
 inline void add_affine(const Body &b, double sign, const X *F, const typename Bent<T>::Affine &affine,
                        const T (&y)[3][most_fields], State<T> &s, FrameTerms<T> &to) {
   const int fields = b.stiffening->fields, stride = padded(b.n);
-  T *h = s.bent.rows.data() + Body::h * stride, *Q_f = s.Q_f.data();
+  T *h = s.bent.rows.data() + Body::h, *Q_f = s.Q_f.data();
   for (int f = 0; f < fields; ++f) {
     const T g[3] = {sign * affine.g[0][f], sign * affine.g[1][f], sign * affine.g[2][f]};
     for (int c = 0; c < 3; ++c) {
@@ -71,7 +69,7 @@ inline void add_affine(const Body &b, double sign, const X *F, const typename Be
       const T force = sign * y[c][f];
       for (int k = 0; k < b.n; ++k) {
         Q_f[k] -= force * row[k];
-        h[d * stride + k] += g[e] * row[k], h[e * stride + k] -= g[d] * row[k];
+        h[k * b.width + d] += g[e] * row[k], h[k * b.width + e] -= g[d] * row[k];
       }
     }
   }
@@ -91,68 +89,28 @@ inline void field_accelerations(const T *w, const typename Bent<T>::Affine &affi
   }
 }
 
-// L of m_ff = 1 - F^T F + F(p)^T F(p), by the rows of F that change
-template <class T> inline void factorise(const Body &b, State<T> &s) {
-  using std::sqrt;
+// m_ff = 1 - F^T F + F(p)^T F(p), by the rows of F that change, products of rows, and what rows accelerate by
+template <class T> inline void eliminate_modes(const Body &b, State<T> &s) {
   const Stiffening &k = *b.stiffening;
-  const int stride = padded(b.n);
-  T *L = s.bent.factor.data();
-  for (int i = 0; i < b.n; ++i)
+  Bent<T> &bent = s.bent;
+  const int stride = padded(b.n), n = b.n;
+  for (int i = 0; i < n; ++i)
     for (int j = 0; j <= i; ++j)
-      L[i * stride + j] = T(k.m_ff_rest[i * stride + j]);
+      bent.factor[i * n + j] = T(k.m_ff_rest[i * stride + j]);
   for (int r = 0; r < 3 * k.fields; ++r)
     if (k.K[r].kind != ModeMatrix::Kind::zero) {
-      const T *F = s.bent.F.data() + r * stride;
-      for (int i = 0; i < b.n; ++i)
+      const T *F = bent.F.data() + r * stride;
+      for (int i = 0; i < n; ++i)
         for (int j = 0; j <= i; ++j)
-          L[i * stride + j] += F[i] * F[j];
+          bent.factor[i * n + j] += F[i] * F[j];
     }
-  for (int i = 0; i < b.n; ++i) {
-    T *row = L + i * stride;
-    for (int j = 0; j <= i; ++j) {
-      const T *other = L + j * stride;
-      T sum = row[j];
-      for (int l = 0; l < j; ++l)
-        sum -= row[l] * other[l];
-      row[j] = j < i ? sum / other[j] : T(sqrt(sum));
-    }
-  }
-}
-
-// x <- L^-1 x
-template <class T> inline void lower_solve(const Body &b, const State<T> &s, T *x) {
-  for (int i = 0; i < b.n; ++i) {
-    const T *row = s.bent.factor.data() + i * padded(b.n);
-    T sum = x[i];
-    for (int l = 0; l < i; ++l)
-      sum -= row[l] * x[l];
-    x[i] = sum / row[i];
-  }
-}
-
-// Rows, forces on modes and what they do to rows with the factor of m_ff taken into them; gram
-template <class T> inline void take_factor(const Body &b, State<T> &s) {
-  Bent<T> &bent = s.bent;
-  const int stride = padded(b.n);
-  lower_solve(b, s, s.Q_f.data());
-  for (int r = 0; r < b.width; ++r) {
-    if (r % lanes >= 6)
-      continue;
-    T *row = bent.rows.data() + r * stride;
-    lower_solve(b, s, row);
-    T sum(0.);
-    for (int k = 0; k < b.n; ++k)
-      sum += row[k] * s.Q_f[k];
-    s.Q[r] = sum - bent.curvature[r];
-    for (int c = 0; c <= r; ++c) {
-      if (c % lanes >= 6)
-        continue;
-      const T *other = bent.rows.data() + c * stride;
-      T product(0.);
-      for (int k = 0; k < b.n; ++k)
-        product += row[k] * other[k];
-      bent.gram[r * b.width + c] = bent.gram[c * b.width + r] = product;
-    }
+  for (int i = 0; i < n; ++i)
+    bent.rows[i * b.width + bent.FORCE] = s.Q_f[i];
+  bent.eliminate();
+  bent.multiply(bent.gram.data());
+  for (int r = 0; r < b.width; ++r) { // rows of gram go through registers with zeros behind their six numbers
+    T &by_force = bent.gram[r * b.width + bent.FORCE];
+    s.Q[r] = by_force - bent.curvature[r], by_force = T(0.);
   }
 }
 
@@ -161,14 +119,14 @@ template <class T> inline void take_factor(const Body &b, State<T> &s) {
 template <class T> FFROBOT_NOINLINE void bent_inertia(const Body &b, State<T> &s, const T *Fw, FrameTerms<T> &to) {
   Bent<T> &bent = s.bent;
   const T *w = s.omega;
-  const int stride = padded(b.n), fields = b.stiffening->fields;
-  T *h = bent.rows.data() + Body::h * stride;
+  const int fields = b.stiffening->fields;
+  T *h = bent.rows.data() + Body::h;
   int change = 0;
   for (const Twist &of : b.twists) {
     const T *h_c = s.h_change[change++].data();
     for (int c = 0; c < 3; ++c)
       for (int k = 0; k < b.n; ++k)
-        h[c * stride + k] += of.axis[3 + c] * h_c[k];
+        h[k * b.width + c] += of.axis[3 + c] * h_c[k];
   }
   T spin[3];
   symmetric_turn(to.J, w, spin);
@@ -186,9 +144,9 @@ template <class T> FFROBOT_NOINLINE void bent_inertia(const Body &b, State<T> &s
   for (int i = 0; i < 3; ++i) {
     to.bias[i] = b.stiffening->root_mass * y[i][0], s.h_rate[i] = T(0.);
     for (int k = 0; k < b.n; ++k)
-      s.h_rate[i] += h[i * stride + k] * s.v[k];
+      s.h_rate[i] += h[k * b.width + i] * s.v[k];
   }
-  factorise(b, s), take_factor(b, s);
+  eliminate_modes(b, s);
 
   for (int i = 0; i < 3; ++i) { // s~_kj = s_i
     const int j = (i + 1) % 3, k = (i + 2) % 3;
@@ -203,26 +161,6 @@ template <class T> FFROBOT_NOINLINE void bent_inertia(const Body &b, State<T> &s
   }
   for (int i = 0; i < 6; ++i)
     to.bias[i] += s.Q[i];
-}
-
-// As `modal_accelerations`: L^-T of those of L^T p
-template <bool by_multipliers, class T>
-FFROBOT_NOINLINE void bent_accelerations(const Body &b, const T *z, const State<T> &s, T *a) {
-  const int stride = padded(b.n);
-  for (int k = 0; k < b.n; ++k)
-    a[k] = by_multipliers ? T(0.) : s.Q_f[k];
-  for (int r = 0; r < b.width; ++r)
-    if (r % lanes < 6) {
-      const T *row = s.bent.rows.data() + r * stride;
-      for (int k = 0; k < b.n; ++k)
-        a[k] += z[r] * row[k];
-    }
-  for (int i = b.n - 1; i >= 0; --i) {
-    const T *row = s.bent.factor.data() + i * stride;
-    a[i] = a[i] / row[i];
-    for (int l = 0; l < i; ++l)
-      a[l] -= row[l] * a[i];
-  }
 }
 
 // What m_ff has beyond 1, in 1/2 p_dot^T m_ff p_dot
