@@ -94,9 +94,9 @@ double time_of(Model<Space> &model, const VectorXd &q, const VectorXd &v, const 
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count() / repetitions;
 }
 
-template <class Space> auto bind_model(nb::module_ &m, const char *name, const char *body_name, const char *text) {
+template <class Space> void bind_body(nb::module_ &m, const char *name) {
   using Body = BodyModel<typename Space::Data>;
-  nb::class_<Body>(m, body_name, "A body of a tree and its inboard joint; see mbs/core/recursion/mechanism/model.h.")
+  nb::class_<Body>(m, name, "A body of a tree and its inboard joint; see mbs/core/recursion/mechanism/model.h.")
       .def(nb::init<>())
       .def_rw("name", &Body::name)
       .def_rw("parent", &Body::parent)
@@ -109,6 +109,10 @@ template <class Space> auto bind_model(nb::module_ &m, const char *name, const c
       .def_rw("driven", &Body::driven)
       .def_rw("of_section", &Body::of_section)
       .def_rw("data", &Body::data);
+}
+
+template <class Space> nb::class_<Model<Space>> bind_model(nb::module_ &m, const char *name, const char *text) {
+  using Body = BodyModel<typename Space::Data>;
   return nb::class_<Model<Space>>(m, name, text)
       .def(nb::init<const std::vector<Body> &, const std::vector<typename Space::Marker> &,
                     const std::vector<ConstraintModel> &, const std::vector<MarkerAt> &, const VectorXd &>(),
@@ -149,7 +153,12 @@ template <class Space> auto bind_model(nb::module_ &m, const char *name, const c
       .def("derivatives", &derivatives_at<Space>, "q"_a, "v"_a, "target"_a, "force"_a.none(), "wrench"_a.none(),
            "scene"_a.none() = nb::none(), "t"_a = 0.0,
            "At a state under given forces and what acts along the cut joints of a scene at time t, while rows follow "
-           "`target` (rows): exact.")
+           "`target` (rows): exact.");
+}
+
+// At states that are known
+template <class Space> void bind_outputs(nb::class_<Model<Space>> model) {
+  model
       .def(
           "frames",
           [](Model<Space> &model, const VectorXd &q, const VectorXd &v) {
@@ -205,8 +214,9 @@ void bind_recursion(nb::module_ &m) {
       .def_ro("a_f", &Derivatives::a_f)
       .def_ro("value_q", &Derivatives::value_q)
       .def_ro("rate_q", &Derivatives::rate_q);
-  bind_model<Planar>(m, "PlanarModel", "PlanarBody", "A mechanism in the plane, in joint coordinates.");
-  bind_model<Spatial>(m, "SpatialModel", "SpatialBody", "A mechanism in space, in joint coordinates.");
+  bind_body<Planar>(m, "PlanarBody"), bind_body<Spatial>(m, "SpatialBody");
+  bind_outputs(bind_model<Planar>(m, "PlanarModel", "A mechanism in the plane, in joint coordinates."));
+  bind_outputs(bind_model<Spatial>(m, "SpatialModel", "A mechanism in space, in joint coordinates."));
   bind_replay(m);
   bind_tree_motion(m);
   bind_tree_sampled(m);

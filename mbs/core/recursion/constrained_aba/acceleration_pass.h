@@ -30,12 +30,7 @@ inline void accelerate_joint(const Node<Space> &node, const T *q, Hinge<Space, T
                              const Pack<T, W> &y, T *A, T *a) {
   constexpr int d = Space::dim;
   T x[6];
-  if constexpr (d == 6) {
-    if (node.joint == JointKind::universal)
-      to_cross(hinge, A);
-    else if (node.joint == JointKind::screw)
-      A[2] -= node.lead * A[5];
-  }
+  acceleration_to_freedoms(node, hinge, A);
   if (node.is_single_grounded) {
     const auto by_section = symmetric_product<d, T>(hinge.Lambda, A);
     for (int i = 0; i < d; ++i)
@@ -53,12 +48,7 @@ inline void accelerate_joint(const Node<Space> &node, const T *q, Hinge<Space, T
     x[k] = node.rotor_inertia == 0 ? found - before : found;
     A[f] = node.rotor_inertia == 0 ? found : before + found;
   }
-  if constexpr (d == 6) {
-    if (node.joint == JointKind::universal)
-      from_cross(hinge, A);
-    else if (node.joint == JointKind::screw)
-      A[2] += node.lead * A[5];
-  }
+  acceleration_from_freedoms(node, hinge, A);
   if (node.shape.in_inner_axes) {
     const int linear = node.joint == JointKind::free ? Space::linear : 2;
     T u[6] = {x[0], x[1], T(0.), T(0.), T(0.), T(0.)}, turned[6];

@@ -21,6 +21,45 @@ template <class T, class X> FFROBOT_INLINE void from_cross(const Hinge<Spatial, 
   }
 }
 
+// Forces f and accelerations A of a section, from its own axes to those in which the freedoms of its joint are single
+// components, and back: the cross of a universal joint; of a screw, a_z is less what the turn does, a_z - lead alpha_z
+template <class Space, class T, class X>
+FFROBOT_INLINE void forces_to_freedoms(const Node<Space> &node, const Hinge<Space, T> &hinge, X *f) {
+  if constexpr (Space::dim == 6) {
+    if (node.joint == JointKind::universal)
+      to_cross(hinge, f);
+    else if (node.joint == JointKind::screw)
+      f[5] += node.lead * f[2];
+  }
+}
+template <class Space, class T, class X>
+FFROBOT_INLINE void forces_from_freedoms(const Node<Space> &node, const Hinge<Space, T> &hinge, X *f) {
+  if constexpr (Space::dim == 6) {
+    if (node.joint == JointKind::universal)
+      from_cross(hinge, f);
+    else if (node.joint == JointKind::screw)
+      f[5] -= node.lead * f[2];
+  }
+}
+template <class Space, class T>
+FFROBOT_INLINE void acceleration_to_freedoms(const Node<Space> &node, const Hinge<Space, T> &hinge, T *A) {
+  if constexpr (Space::dim == 6) {
+    if (node.joint == JointKind::universal)
+      to_cross(hinge, A);
+    else if (node.joint == JointKind::screw)
+      A[2] -= node.lead * A[5];
+  }
+}
+template <class Space, class T>
+FFROBOT_INLINE void acceleration_from_freedoms(const Node<Space> &node, const Hinge<Space, T> &hinge, T *A) {
+  if constexpr (Space::dim == 6) {
+    if (node.joint == JointKind::universal)
+      from_cross(hinge, A);
+    else if (node.joint == JointKind::screw)
+      A[2] += node.lead * A[5];
+  }
+}
+
 // Symmetric matrix of rows, from both sides
 template <class F, int d, class T> FFROBOT_INLINE void both_sides(const F &change, Pack<T, d> *M) {
   change(M);
@@ -128,17 +167,15 @@ inline void eliminate_joint(const Mechanism<Space> &m, const Node<Space> &node, 
         applied[k] = outer[k];
     }
   }
-  const bool universal = d == 6 && node.joint == JointKind::universal, screw = d == 6 && node.joint == JointKind::screw;
+  const bool universal = node.joint == JointKind::universal, screw = node.joint == JointKind::screw;
+  const auto change = [&](const auto &of_forces) { // of M from both sides, of H
+    both_sides<decltype(of_forces), d, T>(of_forces, M), of_forces(H);
+  };
   if constexpr (d == 6) {
-    if (universal) {
-      const auto change = [&](auto *x) { to_cross(hinge, x); };
-      both_sides<decltype(change), d, T>(change, M);
-      change(H);
-    } else if (screw) { // a_z = a_z' + lead alpha_z: the free direction is the last axis
-      const auto change = [&](auto *x) { x[5] += node.lead * x[2]; };
-      both_sides<decltype(change), d, T>(change, M);
-      change(H);
-    }
+    if (universal)
+      change([&](auto *x) { to_cross(hinge, x); });
+    else if (screw)
+      change([&](auto *x) { x[5] += node.lead * x[2]; });
   }
   for (int k = node.shape.freedoms.count - 1; k >= 0; --k)
     if (std::is_same_v<T, double> && node.shape.freedoms.component[k] == Space::axis)
@@ -152,15 +189,10 @@ inline void eliminate_joint(const Mechanism<Space> &m, const Node<Space> &node, 
     for (int i = 0; i < d; ++i)
       H[i].write(w.stored.data() + (node.ground_slot() + i) * stride_of(W));
   if constexpr (d == 6) {
-    if (universal) {
-      const auto change = [&](auto *x) { from_cross(hinge, x); };
-      both_sides<decltype(change), d, T>(change, M);
-      change(H);
-    } else if (screw) {
-      const auto change = [&](auto *x) { x[5] -= node.lead * x[2]; };
-      both_sides<decltype(change), d, T>(change, M);
-      change(H);
-    }
+    if (universal)
+      change([&](auto *x) { from_cross(hinge, x); });
+    else if (screw)
+      change([&](auto *x) { x[5] -= node.lead * x[2]; });
   }
 }
 

@@ -2,7 +2,7 @@
 // axes.
 #pragma once
 
-#include "core/recursion/constrained_aba/delassus.h"
+#include "core/recursion/constrained_aba/joint_elimination.h"
 
 namespace ffrobot::recursion {
 
@@ -48,15 +48,7 @@ FFROBOT_NOINLINE int factors(const Node<Space> &child, const Hinge<Space, T> &hi
       c[i] = T(0.);
     for (int i = 0; i < count; ++i)
       c[kept[i]] = L[i][j];
-    if (child.joint == JointKind::screw && !full)
-      c[d - 1] = -(child.lead * c[2]);
-    if (child.joint == JointKind::universal) { // from axes of the cross
-      const T c0 = c[0], c3 = c[3];
-      c[0] = hinge.cross_cosine * c0 - hinge.cross_sine * c[2],
-      c[2] = hinge.cross_sine * c0 + hinge.cross_cosine * c[2];
-      c[3] = hinge.cross_cosine * c3 - hinge.cross_sine * c[5],
-      c[5] = hinge.cross_sine * c3 + hinge.cross_cosine * c[5];
-    }
+    forces_from_freedoms(child, hinge, c);
     Space::template Turn<T>::add_moment(hinge.r, c);
     hinge.turn.apply(c, turned);
     C[j] = Pack<T, d>::zero(); // lanes beyond d are summed up, too

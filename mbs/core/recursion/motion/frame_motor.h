@@ -1,9 +1,9 @@
 // What a motor that turns frames does on modes, beside its moment along the joint.
 #pragma once
 
-#include <Eigen/Dense>
+#include "core/recursion/spatial/section.h"
 
-#include <cmath>
+#include <Eigen/Dense>
 
 namespace ffrobot::recursion {
 
@@ -23,12 +23,9 @@ struct FrameShare {
   }
 
 private:
-  // J_l(phi) axis, by series where |phi| is small.
-  Eigen::Vector3d turned(const Eigen::Vector3d &phi) const {
-    const double y = phi.squaredNorm(), angle = std::sqrt(y);
-    const bool small = y < 1e-4;
-    const double a = small ? 0.5 - y / 24 * (1 - y / 30) : (1 - std::cos(angle)) / y;
-    const double b = small ? 1. / 6 - y / 120 * (1 - y / 42) : (angle - std::sin(angle)) / (y * angle);
+  Eigen::Vector3d turned(const Eigen::Vector3d &phi) const { // J_l(phi) axis
+    double a, b, a_rate, b_rate;
+    spatial::rotation_series(phi.squaredNorm(), a, b, a_rate, b_rate);
     const Eigen::Vector3d across = phi.cross(axis);
     return axis + a * across + b * phi.cross(across);
   }

@@ -1,8 +1,10 @@
 #include "core/recursion/motion/orientation.h"
 
+#include "core/recursion/spatial/section.h"
+
 #include <Eigen/Geometry>
 
-#include <cmath>
+#include <algorithm>
 
 namespace ffrobot::recursion {
 
@@ -15,39 +17,18 @@ struct Components {
   Vector3d x, rate, acceleration;
 };
 
-// (1 - cos)/|psi|^2 for m = 2, (|psi| - sin)/|psi|^3 for m = 3, and their derivatives by x = |psi|^2. For small x by
-// the sum of (-x)^k / (2 k + m)!, which is exact to rounding there; closed forms lose digits there, and only there.
-std::pair<double, double> series(int m, double x) {
-  if (x > 1) {
-    const double angle = std::sqrt(x), a = (1 - std::cos(angle)) / x, sinc = std::sin(angle) / angle;
-    const double b = (1 - sinc) / x;
-    return m == 2 ? std::pair{a, 0.5 * (sinc - 2 * a) / x} : std::pair{b, 0.5 * (a - 3 * b) / x};
-  }
-  constexpr int terms = 10;
-  double value = 0, slope = 0;
-  for (int k = terms; k >= 0; --k) { // value = 1/m! - x/(m + 2)! + …, by Horner with ratios of neighbours
-    const double ratio = 1.0 / ((2 * k + m + 1) * (2 * k + m + 2));
-    slope = -ratio * (value + x * slope);
-    value = 1 - ratio * x * value;
-  }
-  const double first = m == 2 ? 0.5 : 1.0 / 6;
-  return {first * value, first * slope};
-}
-
 Matrix3d skew(const Vector3d &x) { return (Matrix3d() << 0, -x[2], x[1], x[2], 0, -x[0], -x[1], x[0], 0).finished(); }
 
 Matrix3d about(int axis, double angle) { return Eigen::AngleAxisd(angle, Vector3d::Unit(axis)).toRotationMatrix(); }
 
-// A = exp(psi~), omega = J_l psi_dot, alpha = J_l psi_ddot + (dJ_l/dt) psi_dot with J_l = I + a psi~ + b psi~^2
+// A = exp(psi~), omega = J_l psi_dot, alpha = J_l psi_ddot + (dJ_l/dt) psi_dot: as the section of a port turns
 Turning by_vector(const Components &psi) {
-  const double x = psi.x.squaredNorm(), x_dot = 2 * psi.x.dot(psi.rate);
-  const auto [a, a_slope] = series(2, x);
-  const auto [b, b_slope] = series(3, x);
-  const Matrix3d S = skew(psi.x), square = S * S, J_l = Matrix3d::Identity() + a * S + b * square;
-  const Vector3d across = psi.x.cross(psi.rate);
-  return {Matrix3d::Identity() + (1 - x * b) * S + a * square, J_l * psi.rate,
-          J_l * psi.acceleration + x_dot * (a_slope * across + b_slope * psi.x.cross(across)) +
-              b * psi.rate.cross(across)};
+  using Axes = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>;
+  spatial::PortMotion<double> section;
+  std::copy_n(psi.x.data(), 3, section.phi), std::copy_n(psi.rate.data(), 3, section.phi_dot);
+  turn_section(section);
+  return {Axes(section.turn[0]), Vector3d(section.rate),
+          psi.acceleration + Axes(section.excess[0]) * psi.acceleration + Vector3d(section.drift)};
 }
 
 // omega = yaw_dot e_z + pitch_dot R_z e_y + roll_dot R_z R_y e_x

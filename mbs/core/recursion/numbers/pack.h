@@ -66,24 +66,6 @@ template <class T, int n> struct Pack {
   }
 };
 
-template <> struct Pack<double, 1> {
-  double x;
-
-  FFROBOT_INLINE static Pack zero() { return {0}; }
-  FFROBOT_INLINE static Pack read(const double *from) { return {*from}; }
-  FFROBOT_INLINE void write(double *to) const { *to = x; }
-  FFROBOT_INLINE double operator[](int) const { return x; }
-  FFROBOT_INLINE void set(int, double value) { x = value; }
-  FFROBOT_INLINE void add(int, double value) { x += value; }
-  FFROBOT_INLINE Pack &operator+=(const Pack &o) { return x += o.x, *this; }
-  FFROBOT_INLINE Pack &operator-=(const Pack &o) { return x -= o.x, *this; }
-  FFROBOT_INLINE friend Pack operator+(Pack a, const Pack &b) { return a += b; }
-  FFROBOT_INLINE friend Pack operator-(Pack a, const Pack &b) { return a -= b; }
-  FFROBOT_INLINE friend Pack operator*(double s, Pack a) { return {s * a.x}; }
-  FFROBOT_INLINE friend Pack operator*(Pack a, const Pack &b) { return {a.x * b.x}; }
-  FFROBOT_INLINE double sum() const { return x; }
-};
-
 // In a register of 2, 4, 8 … lanes; `read` and `write` need room for all of them.
 template <int n>
   requires(n > 1)
