@@ -129,9 +129,14 @@ def _long(length: float, label: str) -> Iterator[str]:
 
 
 def _angles(scene: Scene) -> Iterator[str]:
-    """Paths of angles that come to rest many turns away."""
+    """Paths of angles that come to rest many turns away, and of poses more than half a turn apart."""
     turning = {joint.name for joint in scene.joint if joint.type == "revolute"}
     for one in scene.trajectory:
+        if one.largest_turn_of_poses > np.pi:
+            yield (
+                f'trajectory "{one.name}": an angle in via changes by {np.degrees(one.largest_turn_of_poses):.4g}° from'
+                " one pose to the next: the section turns the shorter way, half a turn at most; add poses between"
+            )
         if (
             getattr(one, "angle", None) is None
             and one.joint not in turning

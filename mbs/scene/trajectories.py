@@ -239,6 +239,11 @@ class Trajectory(MotionKeys):
         return len(self.components) + turning
 
     @property
+    def largest_turn_of_poses(self) -> float:
+        """Largest change of roll, pitch or yaw from one pose in `via` to the next, rad; 0 without poses."""
+        return float(np.abs(np.diff(self._places[:, 3:], axis=0)).max()) if self._has_poses else 0.0
+
+    @property
     def _has_poses(self) -> bool:
         return self.via is not None and self._places.shape[1] == POSE
 

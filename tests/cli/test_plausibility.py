@@ -58,6 +58,27 @@ def test_scenes(path, expected):
     assert expected is None or expected in found[0]
 
 
+@pytest.mark.parametrize(("yaw", "turns"), [(3.2, True), (3.1, False), (-3.1, False)])
+def test_poses_more_than_half_a_turn_apart(yaw, turns):
+    """Of 3.2 rad to the left the shorter way is the one to the right: the section ends where it should, turned back."""
+    point = {"mass": 1.0, "center": [0.0] * 3, "inertia": [0.1] * 3, "points": {"root": [0.0] * 3}}
+    scene = program.make_scene(
+        name="turned",
+        space="spatial",
+        gravity=[0.0] * 3,
+        body=[{"name": "hand", "rigid": point}],
+        joint=[{"name": "air", "type": "free", "between": ["ground", "hand.root"]}],
+        trajectory=[
+            {"name": "pose", "point": "hand.root", "via": [[0.0] * 6, [0.1] + [0.0] * 4 + [yaw]], "duration": 1.0}
+        ],
+        analysis=[{"name": "inverse", "kind": "pcid", "end": 1.0, "output_step": 0.5}],
+    )
+    found = [text for text in remarks(scene) if "turns the shorter way" in text]
+    assert len(found) == turns
+    _, _, _, half = program.solve(scene)["inverse/points/hand.root/quaternion"][1]
+    assert np.sign(half) == (-1 if turns else np.sign(yaw))
+
+
 def test_waypoints_before_and_after_the_run(tmp_path):
     for times, expected in (((-2.0, -1.0), "before the run begins"), ((-1.0, 1.0), "what is before 0 s"), ((0, 1), "")):
         rows = [f"{t},{value}" for t, value in zip(np.linspace(*times, 4), (0, 0.1, 0.2, 0.3), strict=True)]
