@@ -199,7 +199,7 @@ class Servo:
 def slopes_by_differences(
     forces: Callable[[Array, Array, Array, Array], Array], sizes: Array, times: Array, p: Array, v: Array, a: Array
 ) -> tuple[Array, Array, Array]:
-    """Derivatives (N, …, n) of `forces` (N, …) by p̈, ṗ and p; `sizes` (n,) of modes as in `Output.mode_sizes`."""
+    """Derivatives (N, …, n) of `forces` (N, …) by p̈, ṗ and p; `sizes` (n,) of modes as in `Servo.mode_sizes`."""
     modes, one = np.array([p, v, a]), np.ones(p.shape[1])
     K, D, M = (_derivative(forces, times, modes, k, step) for k, step in enumerate((DIFFERENCE * sizes, one, one)))
     return M, D, K
