@@ -38,10 +38,9 @@ def check_not_an_input(path: Path) -> None:
     """Raise `InputError` where `path` is, or leads to, one of the `protected` files, or to nowhere in a circle."""
     try:
         target = path.resolve()
-        if path.is_symlink():
-            os.stat(path)
-    except FileNotFoundError:
-        pass
+        with suppress(FileNotFoundError):
+            if path.is_symlink():
+                os.stat(path)
     except (OSError, RuntimeError, ValueError) as error:
         raise InputError(f"{shown(str(path))}: output: expected a file name, found {why_no_file(error)}") from None
     for source in _inputs.get():

@@ -1,6 +1,7 @@
 """No output replaces an input of its command, or a file of another kind, by whatever name."""
 
 import os
+from pathlib import Path
 
 import pytest
 
@@ -67,3 +68,13 @@ def test_writing_itself_refuses(tmp_path):
         with pytest.raises(InputError, match="found one of kind html"):
             write_atomically(tmp_path / "page", content, "other")
     assert source.read_bytes() == b"input"
+
+
+def test_a_folder_that_is_gone_takes_no_output(tmp_path, monkeypatch):
+    from ffrobot.common.errors import InputError
+    from ffrobot.common.outputs import check_not_an_input, protected
+
+    monkeypatch.chdir(tmp_path)
+    tmp_path.rmdir()
+    with protected([Path("scene.toml")]), pytest.raises(InputError, match="expected a file name, found No such file"):
+        check_not_an_input(Path("out.h5"))
