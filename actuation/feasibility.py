@@ -80,13 +80,8 @@ def quasi_static_shift(motion: RobotMotion, modal: Mapping[str, Array], points: 
     To first order, and slowly: δp = −K⁻¹ r and δr = (∂r/∂p) δp. Vibration that a sudden lack of force starts can be
     twice as large. ∂r/∂p with motors at rest is what a unit force on the point takes of modes (virtual work).
     """
-    bent, found = _bent(motion, modal), {}
-    for point in points:
-        L = motion.section(point).L[:, :3]
-        q = np.repeat(motion.q, 3, axis=0)
-        by_modes = split_forces(motion.model, q, L.reshape(-1, L.shape[2])).left.reshape(L.shape)
-        found[point] = np.einsum("tkn,tn->tk", by_modes, bent)
-    return found
+    shift = _held(motion, modal).shift
+    return {point: np.einsum("tkn,tn->tk", motion.section(point).L[:, :3], shift) for point in points}
 
 
 def freed_shift(motion: RobotMotion, modal: Mapping[str, Array], point: str, rows: slice) -> Array:
@@ -95,14 +90,10 @@ def freed_shift(motion: RobotMotion, modal: Mapping[str, Array], point: str, row
     δq = δq_held + R γ with Rᵀ M δq = 0, R = ∂q/∂γ: unmet modal forces do no work while p stands still, and no momentum
     comes from within.
     """
-    bent, q, L = _bent(motion, modal)[rows], motion.q[rows], motion.section(point).L[rows, :3]
-    T, n_v = bent.shape
-    split = split_forces(motion.model, np.repeat(q, n_v, axis=0), np.tile(np.eye(n_v), (T, 1)))
-    R = np.concatenate(list(split.moments.values()), axis=1).reshape(T, n_v, -1)
-    shift = np.einsum("tkn,tn->tk", split.left.reshape(T, n_v, n_v), bent)
-    MR = mass_matrices(motion.model, q) @ R
+    shift, R = _held(motion, modal, rows)
+    MR = mass_matrices(motion.model, motion.q[rows]) @ R
     gamma = np.linalg.solve(np.swapaxes(R, 1, 2) @ MR, np.einsum("tki,tk->ti", MR, shift)[:, :, None])
-    found: Array = np.einsum("tik,tk->ti", L, shift - (R @ gamma)[:, :, 0])
+    found: Array = np.einsum("tik,tk->ti", motion.section(point).L[rows, :3], shift - (R @ gamma)[:, :, 0])
     return found
 
 
@@ -123,13 +114,27 @@ def seen_at_points(
     )
 
 
-def _bent(motion: RobotMotion, modal: Mapping[str, Array]) -> Array:
-    """(T, n_v) −K⁻¹ r of the modes of these bodies, else 0."""
-    found = np.zeros((len(motion.time), motion.model.tree.n_v))
+class _Held(NamedTuple):
+    """δq (T, n_v) by −K⁻¹ r of modes where motors stand still, and R = ∂q/∂γ (T, n_v, motors) where they turn by γ."""
+
+    shift: Array
+    R: Array
+
+
+def _held(motion: RobotMotion, modal: Mapping[str, Array], rows: slice = slice(None)) -> _Held:
+    """By virtual work: what modes and motors take of a unit force along each joint coordinate; modes take their own."""
+    tree, q = motion.model.tree, motion.q[rows]
+    joints = np.flatnonzero(tree.joint_columns)
+    T, count = len(q), len(joints)
+    split = split_forces(motion.model, np.repeat(q, count, axis=0), np.tile(np.eye(tree.n_v)[joints], (T, 1)))
+    moments = np.concatenate([np.zeros((T * count, 0)), *split.moments.values()], axis=1)
+    shift, R = np.zeros((T, tree.n_v)), np.zeros((T, tree.n_v, moments.shape[1]))
     for name, r in modal.items():
         node = motion.node(name)
-        found[:, node.p_v] = -(r @ node.body.modal_transform) / node.body.stiffness
-    return found
+        shift[:, node.p_v] = -(r[rows] @ node.body.modal_transform) / node.body.stiffness
+    shift[:, joints] = np.einsum("tjn,tn->tj", split.left.reshape(T, count, -1), shift)
+    R[:, joints] = moments.reshape(T, count, -1)
+    return _Held(shift, R)
 
 
 def _length(value: float) -> str:

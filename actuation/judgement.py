@@ -46,7 +46,7 @@ def links_in_motion(motion: RobotMotion, bodies: Mapping[str, tuple[ModalBody, B
     forces, found = motion.motor_forces, {}
     assert forces is not None
     for name, (modal, spatial) in bodies.items():
-        found[name] = LinkInMotion(modal, spatial, motion.body(name).modal, forces.modal[name])
+        found[name] = LinkInMotion(modal, spatial, motion.modal(name), forces.modal[name])
     return found
 
 

@@ -250,9 +250,9 @@ def test_results_that_lack_something(results, members, tmp_path, command):
     from ffrobot.common.hdf5 import reading
     from ffrobot.pictures.report import write_report
     from ffrobot.pictures.view import Options, view_file
+    from ffrobot.present.console import summary_console
     from ffrobot.present.feasibility import print_feasibility
     from ffrobot.present.info import describe
-    from ffrobot.present.summary import summary_console
 
     def linear(path):
         with Results(path) as opened:

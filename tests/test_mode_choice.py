@@ -9,8 +9,8 @@ import pytest
 
 from ffrobot import make_scene
 from ffrobot.common import checksum
+from ffrobot.present.console import summary_console
 from ffrobot.present.details import print_details
-from ffrobot.present.summary import summary_console
 from ffrobot.results.file import Results
 from ffrobot.results.write import results_image
 from ffrobot.run.mode_choice import reported_modes

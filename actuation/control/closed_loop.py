@@ -272,7 +272,7 @@ def _place_of_tip(analysis: ClosedLoop, model: Model, source: Outcome, tip: str)
 
 def _position(run: Outcome, point: str) -> Array:
     tree = run.model.tree
-    return tree.pose(tree.section(point), run.q, tree.frames(run.q)).r
+    return tree.pose(tree.section(point), run.q, tree.poses(run.q)).r
 
 
 def _default_tip(model: Model) -> str:

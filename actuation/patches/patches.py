@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from itertools import pairwise
 
 import numpy as np
 
 from ...common.arrays import Array, Indices, as_floats
 from ...common.errors import InputError
+from ...fe_models.link_records import Family
 from ...fe_models.modal_body import ModalBody
 from ...mbs import _core
 from ...mbs.model.body import Body
@@ -125,6 +126,7 @@ def check_all_served(key: str, reach: Reach) -> None:
         )
 
 
+KEPT = 4  # links: numbers of patches are tried on one after the other
 OUT_OF_REACH = 1e-9  # of the largest modal force per volt: less is rounding
 
 
@@ -162,7 +164,12 @@ class ReachedModes:
 def reached_modes(per_volt: Array, body: ModalBody, spatial: Body) -> ReachedModes:
     """By modal forces per volt (k, n) on the modes of the modal body: the families in which any is not 0."""
     size = np.abs(per_volt).max(axis=0)
-    families = {body.family[k] for k in np.flatnonzero(size > OUT_OF_REACH * size.max())}
+    return _modes_of(frozenset(body.family[k] for k in np.flatnonzero(size > OUT_OF_REACH * size.max())), body, spatial)
+
+
+@lru_cache(maxsize=KEPT)
+def _modes_of(families: frozenset[Family], body: ModalBody, spatial: Body) -> ReachedModes:
+    """Those of a link that moves in these families alone."""
     moving = spatial.modal_transform.any(axis=1)
     rows = np.flatnonzero([moves and family in families for moves, family in zip(moving, body.family, strict=True)])
     T_inverse, square = spatial.on_file, np.ix_(rows, rows)
@@ -187,6 +194,10 @@ class Voltages:
     within_limit: Array
     unmet: Array
     served: int
+
+    def at(self, rows: Indices) -> Voltages:
+        """These rows alone."""
+        return Voltages(self.required[rows], self.within_limit[rows], self.unmet[rows], self.served)
 
     @property
     def residual(self) -> Array:

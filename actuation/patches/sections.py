@@ -14,7 +14,7 @@ Faces are driven against each other to bend, alike to twist.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -28,6 +28,7 @@ from .records import PztLayout
 BEND_Y, STRETCH, TWIST, BEND_Z = range(4)
 """Strains of a section, e = (φ_z', u', φ_x', −φ_y'): curvature towards y, stretch, twist, curvature towards z."""
 
+KEPT = 4  # links of which sections are remembered
 ROUND = 1e-6  # of the radius: corners of an outline that are so far from the axis are on a circle
 
 
@@ -52,7 +53,7 @@ class LinkSections:
         """(k,) between the faces with that normal, m."""
         return self.height if normal == "y" else self.width
 
-    @property
+    @cached_property
     def alike(self) -> Indices:
         """(k,) of each station the first one with the same section."""
         of_station = np.column_stack([self.height, self.width, self.is_round, self.rigidity])
@@ -71,6 +72,7 @@ class LinkSections:
         return _lever_of_rectangle(*((high, wide) if normal == "y" else (wide, high)), patch_width)
 
 
+@lru_cache(maxsize=KEPT)
 def link_sections(body: ModalBody) -> LinkSections:
     """Of a modal body."""
     stations = body.stations

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 LEVI_CIVITA = np.array([[[(a - b) * (b - c) * (c - a) / 2 for c in range(3)] for b in range(3)] for a in range(3)])
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Integrals:
     """Inertia shape integrals of a link over its volume, in its axes (docs/theory.md; Shabana, ch. 5); n modes.
 
@@ -40,7 +40,7 @@ class Integrals:
     S_bar_kl: Array
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Invariants(Integrals):
     """With the inertia of lines of mass about their axis, along which φ is the twist of the modes.
 

@@ -77,8 +77,8 @@ def bench(
     """
     from ..bench.campaign import Campaign, Settings
     from ..bench.precision import INTEGRATORS, TOLERANCES
+    from ..present.console import summary_console
     from ..present.progress import Display
-    from ..present.summary import summary_console
     from ..run.inputs import files_of
 
     if scene_file is not None and (peer or set(parts) - set(OF_A_SCENE)):

@@ -45,8 +45,8 @@ def _study(
 
     Raises `SolveError` where that is not what was asked for.
     """
+    from ..present.console import summary_console
     from ..present.progress import Display
-    from ..present.summary import summary_console
     from ..run.inputs import files_of
 
     protect(files_of(scene_file))

@@ -73,7 +73,7 @@ def import_(
     from ..exchange.export import MOTIONS, READERS, import_body, import_motion, print_export, print_import
     from ..exchange.urdf.import_urdf import import_urdf
     from ..exchange.urdf.shape_masses import Filling
-    from ..present.summary import summary_console
+    from ..present.console import summary_console
 
     links = _links(flexible)
     of_urdf = links or fix_inertia or density or radius or keep_rest
@@ -150,7 +150,7 @@ def export(file: Path, file_format: str, analysis: str | None, output: Path | No
     """  # noqa: D301 (click wants the backspace itself)
     from ..common.hdf5 import reading
     from ..exchange.export import export_file, print_export
-    from ..present.summary import summary_console
+    from ..present.console import summary_console
 
     with reading(file):
         print_export(export_file(file, file_format, analysis, output, force=force), summary_console())

@@ -38,7 +38,7 @@ def fit(
     Prints uncertainties of the values, and rejects keys that the frequencies cannot distinguish.
     """  # noqa: D301 (click wants the backspace itself)
     from ..fit.fitting import fit_measured, print_fit
-    from ..present.summary import summary_console
+    from ..present.console import summary_console
     from ..run.inputs import files_of
 
     protect([*files_of(file), measured])

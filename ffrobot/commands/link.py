@@ -73,8 +73,8 @@ def _inspect(file: Path, output: Path | None, unit: Unit | None, density: float 
     """Print what a part's file holds; write a draft of its link file, and a picture with the numbers of the faces."""
     from ..exchange.part_draft import draft_link
     from ..mesh.inspection import inspect_part
+    from ..present.console import summary_console
     from ..present.part import LISTED, print_inspection
-    from ..present.summary import summary_console
 
     protect([file])
     if output is not None:

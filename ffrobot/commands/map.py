@@ -65,9 +65,9 @@ def map_(
     """  # noqa: D301 (click wants the backspace itself)
     from ..map.map_file import TABLE, write_map
     from ..map.pose_map import make_map, plan_map
+    from ..present.console import summary_console
     from ..present.pose_map import print_map
     from ..present.progress import Display
-    from ..present.summary import summary_console
     from ..run.inputs import files_of
 
     folder = output or scene_file.with_suffix(".map")

@@ -31,8 +31,8 @@ def feasibility(results_file: Path, analysis: str | None, catalog: Path | None) 
     With a catalog: motors and gears that can do it, for each joint.
     """
     from ..common.hdf5 import reading
+    from ..present.console import summary_console
     from ..present.feasibility import print_feasibility
-    from ..present.summary import summary_console
 
     with reading(results_file):
         if catalog is None:
@@ -64,9 +64,9 @@ def linear(results_file: Path, analysis: str | None, output: Path | None) -> Non
 @logging_options
 def pose(scene_file: Path) -> None:
     """Print the posture in which a scene starts, and the other ones that reach the same places (elbow, wrist)."""
+    from ..present.console import summary_console
     from ..present.progress import Display
     from ..present.start_postures import print_start
-    from ..present.summary import summary_console
     from ..run.inputs import files_of
 
     protect(files_of(scene_file))

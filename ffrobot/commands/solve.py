@@ -52,10 +52,11 @@ def solve(scene_file: Path, output: Path | None, *, resume: bool, strict: bool) 
 def _solve(scene_file: Path, path: Path, again: str, *, resume: bool, strict: bool) -> None:
     """Solve, write and tell; `again` is the command that goes on with it."""
     from ..common.errors import SolveError, StoppedError
+    from ..present.console import summary_console, summary_width
     from ..present.lines import error_budget
     from ..present.progress import Display
     from ..present.start_postures import chosen_posture
-    from ..present.summary import summary_console, summary_lines, summary_width
+    from ..present.summary import summary_lines
     from ..results.file import Results
     from ..results.resume import how_to_go_on, resume_scene
     from ..results.write import write_results

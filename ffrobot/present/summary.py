@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterable, Iterator, Sequence
-from shutil import get_terminal_size
 from textwrap import wrap
 from typing import TYPE_CHECKING
 
@@ -14,11 +12,8 @@ from ..results.verdict import ROUND_OFF, AnalysisVerdict, Verdict, millimeters, 
 from .lines import alike
 
 if TYPE_CHECKING:
-    from rich.console import Console
-
     from ..actuation.motors import MotorFeasibility
 
-PLAIN_WIDTH = 120  # columns where the output is no terminal
 LINES = 15  # that a summary has at most
 MOTORS = 6  # rows of motors for which analyses make room
 TEXTS = 2  # lines of warnings and advice, likewise
@@ -28,18 +23,6 @@ ANALYSES = ("analysis", "kind", "answer", "tip error, controlled", "tip error, o
 MOTOR = ("motor", "peak", "RMS", "speed", "power", "of limits", "in")
 
 Row = tuple[str, ...]
-
-
-def summary_width() -> int:
-    """Columns of the standard output; what goes to a file is not squeezed into 80."""
-    return get_terminal_size().columns if sys.stdout.isatty() else PLAIN_WIDTH
-
-
-def summary_console() -> Console:
-    """The standard output; names in a scene are no markup."""
-    from rich.console import Console
-
-    return Console(width=summary_width(), markup=False, highlight=False, emoji=False)
 
 
 def summary_lines(

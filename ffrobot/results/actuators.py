@@ -26,12 +26,12 @@ if TYPE_CHECKING:  # most scenes have none of these
     from ..mbs.analysis.tracking import TrackedPath
 
 
-def write_actuation(group: h5py.Group, solution: Solution, actuation: Actuation) -> None:
-    """Of an analysis: pzt/, by layout, and feasibility/.
+def write_voltages(group: h5py.Group, solution: Solution, actuation: Actuation) -> None:
+    """Of an analysis: pzt/, by layout.
 
     `pzt/LAYOUT/residual_force` (T, n) is what all patches of the link leave, on the modes of its file.
     """
-    layouts, space = {}, SPACES[solution.scene.space]
+    space = SPACES[solution.scene.space]
     for body, of_link in solution.patches.items():
         families = [str(name) for name in solution.links[body].family]
         for name, array in of_link.arrays.items():
@@ -40,14 +40,18 @@ def write_actuation(group: h5py.Group, solution: Solution, actuation: Actuation)
             unmet = actuation.unmet[body]
             if space.is_plane:  # modes of the equations
                 unmet = unmet @ solution.bodies[body].spatial.modal_transform
-            _write_voltages(entry, array, voltages, unmet)
+            _write_layout(entry, array, voltages, unmet)
             if not space.is_plane:
                 entry["residual_force"].attrs.create("columns", families, dtype=h5py.string_dtype())
             entry.attrs.update({"body": body, "bends": array.layout.acts_in})
-            layouts[name] = array.layout
+
+
+def write_feasibility(group: h5py.Group, solution: Solution, judged: Feasibility) -> None:
+    """Of an analysis: feasibility/."""
     entry = group.create_group("feasibility")
-    _write_verdict(entry, actuation.feasibility)
-    _write_judgement(entry, actuation.feasibility, layouts)
+    layouts = {name: array.layout for of_link in solution.patches.values() for name, array in of_link.arrays.items()}
+    _write_verdict(entry, judged)
+    _write_judgement(entry, judged, layouts)
     for joint in solution.scene.motor_joints:
         for k, unit in enumerate(joint.units):
             name = joint.name if len(joint.units) == 1 else f"{joint.name} {k + 1}"
@@ -61,7 +65,7 @@ def write_structure(group: h5py.Group, effects: Mapping[str, StructureEffect]) -
             group[f"patch_structure/{body}/{key}"] = pair
 
 
-def _write_voltages(group: h5py.Group, patches: PatchArray, voltages: Voltages, unmet: Array) -> None:
+def _write_layout(group: h5py.Group, patches: PatchArray, voltages: Voltages, unmet: Array) -> None:
     """Of one layout, and the modal forces `unmet` (T, n) that it leaves."""
     group["voltage"] = voltages.within_limit
     group["required_voltage"] = voltages.required

@@ -14,7 +14,7 @@ import h5py
 import numpy as np
 
 from ..common.arrays import Array, as_floats
-from ..common.peaks import largest, root_mean_square
+from ..common.peaks import largest, shares
 
 LABELS: Mapping[str, tuple[str, ...]] = MappingProxyType({
     "axis": ("x", "y", "z"),
@@ -248,7 +248,7 @@ def _write(group: h5py.Group, closer: h5py.Group) -> None:
             if _matches(name, VOLTAGE):  # cut off at its limit, it has no smooth top there
                 limit = group[name].parent.attrs.get("limit", np.inf)
                 tops[:, 0] = np.minimum(tops[:, 0], np.maximum(np.abs(values).max(axis=0), limit))
-            means = np.array([root_mean_square(time, column) for column in values.T])
+            means = np.sqrt(shares(time) @ values**2)
             single = values.shape[1] == 1
             attributes = group[name].attrs
             for key, found in (("peak", tops[:, 0]), ("peak_time", tops[:, 1]), ("rms", means)):
@@ -262,10 +262,10 @@ def _write(group: h5py.Group, closer: h5py.Group) -> None:
 def _histories(group: h5py.Group, count: int) -> Iterator[tuple[str, Array]]:
     """Name and values (T, columns) of what has peaks."""
     names: list[str] = []
-    group.visititems(lambda name, item: names.append(name) if isinstance(item, h5py.Dataset) else None)
+    group.visit(names.append)
     for name in names:
-        if any(_matches(name, pattern) for pattern in PEAKING) and group[name].shape[0] == count:
-            values = as_floats(group[name][()].reshape(count, -1))
+        if any(_matches(name, pattern) for pattern in PEAKING) and (found := group[name]).shape[0] == count:
+            values = as_floats(found[()].reshape(count, -1))
             yield name, np.linalg.norm(values, axis=1, keepdims=True) if _is_vector(name) else values
 
 

@@ -19,7 +19,14 @@ from ..mbs.fields.steps import DATASET, METHOD
 from ..mbs.quantities.motion import RobotMotion
 from ..mbs.solve.redundancy import resolving_joints
 from ..run.solution import AnalysisResult, Solution
-from .actuators import write_actuation, write_placement, write_point_forces, write_structure, write_tracking
+from .actuators import (
+    write_feasibility,
+    write_placement,
+    write_point_forces,
+    write_structure,
+    write_tracking,
+    write_voltages,
+)
 from .file import FORMAT
 from .linear import write_joint_conditions, write_linear, write_loop
 from .meanings import write_peaks
@@ -87,6 +94,8 @@ def _write_analysis(group: h5py.Group, solution: Solution, result: AnalysisResul
     write_bodies(group, solution, result)
     write_bending(group, result.bending)
     _write_forces(group, solution, result)
+    if result.actuation is not None:
+        write_feasibility(group, solution, result.actuation.feasibility)
     write_structure(group, {name: body.structure for name, body in solution.bodies.items() if body.structure})
     for point, shift in result.predicted_shift.items():
         group[f"points/{point}/predicted_shift"] = motion.space.along(shift)
@@ -110,7 +119,7 @@ def _write_peaking(group: h5py.Group, solution: Solution, result: AnalysisResult
 
 
 def _write_forces(group: h5py.Group, solution: Solution, result: AnalysisResult) -> None:
-    """Of an analysis: joints/, trajectories/, actuation_points/, stress/, pzt/ and feasibility/."""
+    """Of an analysis: joints/, trajectories/, actuation_points/, stress/ and pzt/."""
     write_joints(group, solution, result)
     for body, forces in result.point_forces.items():
         points = group.create_group(f"actuation_points/{body}")
@@ -119,7 +128,7 @@ def _write_forces(group: h5py.Group, solution: Solution, result: AnalysisResult)
         write_stress(group.create_group(f"stress/{body}"), stress)
     write_paths(group, result)
     if result.actuation is not None:
-        write_actuation(group, solution, result.actuation)
+        write_voltages(group, solution, result.actuation)
 
 
 def _write_run(group: h5py.Group, outcome: Outcome, warnings: Sequence[str], notes: Sequence[str]) -> None:

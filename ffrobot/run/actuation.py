@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..actuation.patches.records import by_body
 from ..actuation.points import PointSet, make_point_set
-from ..common.arrays import Array
+from ..common.arrays import Array, Indices
 from ..mbs.model.drives import Drive
 from ..mbs.model.model import Model, modal_directions
 from ..mbs.quantities.motion import RobotMotion
@@ -41,6 +41,11 @@ class Actuation:
     voltages: Mapping[str, Voltages]
     unmet: Mapping[str, Array]
     feasibility: Feasibility
+
+    def at(self, rows: Indices) -> Actuation:
+        """These rows alone; the feasibility stays that of all."""
+        voltages = {name: of_layout.at(rows) for name, of_layout in self.voltages.items()}
+        return replace(self, voltages=voltages, unmet={name: values[rows] for name, values in self.unmet.items()})
 
 
 def make_patches(scene: Scene, bodies: Bodies) -> dict[str, LinkPatches]:

@@ -82,6 +82,10 @@ class MotionOfLinks(RobotMotion):
         """Of a body's frame and modes, or of a link's."""
         return self._links[name] if name in self.divided else super().body(name)
 
+    def modal(self, body: str) -> Array:
+        """P (T, n) of a body, or of a link, in the modes of its file."""
+        return self._links[body].modal if body in self.divided else super().modal(body)
+
     def modal_velocity(self, body: str) -> Array:
         """Rates (T, n) of the modes that a body, or the whole link, has in the equations."""
         if body not in self.divided:
@@ -182,7 +186,7 @@ def _missing(solution: Solution, motion: RobotMotion, name: str) -> Missing:
         pieces.append(PieceInMotion(modal, node.body, motion.q[:, node.p_q], *ends))
     of_length = float(np.linalg.norm(missed_by_pieces(pieces), axis=1).max(initial=0.0)) / link.length
     of_length *= 1.0 if motion.is_at_rest else IN_MOTION
-    whole = largest_displacement(link, motion.body(name).modal)
+    whole = largest_displacement(link, motion.modal(name))
     return Missing(of_length, min(1.0, of_length / whole) if whole else 0.0)
 
 
@@ -191,7 +195,7 @@ def _shortening(solution: Solution, name: str) -> float:
     modal = (solution.parts or solution.bodies)[name].modal
     assert modal is not None
     found = [
-        shape_from_chord(modal, RobotMotion.body(result.motion, name).modal)[2].max(initial=0.0)
+        shape_from_chord(modal, RobotMotion.modal(result.motion, name))[2].max(initial=0.0)
         for result in solution.analyses.values()
     ]
     return float(max(found, default=0.0)) / modal.length

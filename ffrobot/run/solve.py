@@ -8,7 +8,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
 
 from ..actuation.context import ActuatedContext
 from ..actuation.points import forces_at_points, solve_points
@@ -17,13 +19,13 @@ from ..common.errors import FfrobotError, InputError, SolveError, of_file
 from ..mbs.analysis.outcome import Outcome
 from ..mbs.quantities.energy import totals
 from ..mbs.quantities.motion import RobotMotion
-from ..mbs.quantities.reactions import reactions, shared_evenly
+from ..mbs.quantities.reactions import Sharing, reactions, shared_evenly
 from ..mbs.quantities.validity import NOTABLE_STIFFNESS_CHANGE
 from ..mbs.scene.analysis import Analysis
 from ..mbs.solve.reach import turned_guesses
 from ..scene.load import load_scene
 from ..scene.scene import Scene
-from .actuation import find_actuation, missing_forces
+from .actuation import Actuation, find_actuation, missing_forces
 from .bodies import load_bodies
 from .fastest import with_paths
 from .mode_choice import mode_levels, reported_modes
@@ -225,17 +227,18 @@ def _context(
 
 def _with_peaks(solution: Solution, run: Outcome) -> AnalysisResult:
     """What is read off a run; what is judged by peaks, by those between outputs."""
-    found, closer = _evaluated(solution, run), run.closer
-    found = replace(found, predicted_shift=_predicted_shift(solution, found))
-    twists = {joint: gear.curve for joint, gear in found.motion.gears.items()}  # splines through outputs
+    moving, closer, between = _moving(solution, run), run.closer, None
+    twists = {joint: gear.curve for joint, gear in moving.motion.gears.items()}  # splines through outputs
     known = {joint: curve for joint, curve in twists.items() if curve is not None}
-    if closer is run or len(known) < len(twists):
-        return replace(found, bending=bending_of_links(solution, found.motion))
-    between = _evaluated(solution, closer, known)
-    actuation = found.actuation
-    if actuation is not None and between.actuation is not None:
-        actuation = replace(actuation, feasibility=between.actuation.feasibility)
-    return replace(found, actuation=actuation, bending=bending_of_links(solution, between.motion), closer=between)
+    if closer is not run and len(known) == len(twists):
+        among = _moving(solution, closer, known)
+        between = _evaluated(solution, closer, among, _actuation(solution, closer, among.motion))
+        actuation = between.actuation and between.actuation.at(np.searchsorted(closer.time, run.time))
+    else:
+        actuation = _actuation(solution, run, moving.motion)
+    found = _evaluated(solution, run, moving, actuation)
+    bending = bending_of_links(solution, (between or found).motion)
+    return replace(found, predicted_shift=_predicted_shift(solution, found), bending=bending, closer=between)
 
 
 def _predicted_shift(solution: Solution, found: AnalysisResult) -> dict[str, Array]:
@@ -259,25 +262,39 @@ def _predicted_shift(solution: Solution, found: AnalysisResult) -> dict[str, Arr
     return quasi_static_shift(motion, forces, points)
 
 
-def _evaluated(solution: Solution, run: Outcome, twists: Mapping[str, BSpline] | None = None) -> AnalysisResult:
-    """What is read off a run; `twists` of compliant gears where they are known."""
+class _Moving(NamedTuple):
+    motion: MotionOfLinks
+    sharing: Sharing | None
+
+
+def _moving(solution: Solution, run: Outcome, twists: Mapping[str, BSpline] | None = None) -> _Moving:
+    """The motion of a run, with its forces; `twists` of compliant gears where they are known."""
     forces = run.forces
     found = MotionOfLinks(
         run.model, run.time, run.q, run.v, run.a, run.multipliers, forces.required, run.motion.is_at_rest,
         forces.applied, forces.commanded, twists or {}, divided_links(solution),
     )  # fmt: skip
-    motion, sharing = shared_evenly(found)
-    actuation = None
-    is_judged = motion.motor_forces is not None and run.analysis.is_motion
-    if is_judged:  # else nothing is asked of motors and patches
-        actuation = find_actuation(
-            solution.scene, motion, run.analysis, solution.bodies, solution.patches, forces.voltages
-        )
-        if (missed := actuation.feasibility.unsupplied) is not None and missed.point:
-            from ..mbs.analysis.operating_points import open_loop_growth
+    return _Moving(*shared_evenly(found))
 
-            missed = replace(missed, growth=open_loop_growth(run))
-            actuation = replace(actuation, feasibility=replace(actuation.feasibility, unsupplied=missed))
+
+def _actuation(solution: Solution, run: Outcome, motion: MotionOfLinks) -> Actuation | None:
+    """What a run asks of motors and patches; None where nothing is asked of them."""
+    if motion.motor_forces is None or not run.analysis.is_motion:
+        return None
+    actuation = find_actuation(
+        solution.scene, motion, run.analysis, solution.bodies, solution.patches, run.forces.voltages
+    )
+    if (missed := actuation.feasibility.unsupplied) is not None and missed.point:
+        from ..mbs.analysis.operating_points import open_loop_growth
+
+        missed = replace(missed, growth=open_loop_growth(run))
+        actuation = replace(actuation, feasibility=replace(actuation.feasibility, unsupplied=missed))
+    return actuation
+
+
+def _evaluated(solution: Solution, run: Outcome, moving: _Moving, actuation: Actuation | None) -> AnalysisResult:
+    """What is read off a run with its motion."""
+    motion, sharing = moving
     whole = {name: body for name, body in solution.bodies.items() if name not in solution.divided}
     stresses = find_stresses(motion, whole, solution.patches)
     at_points = {}

@@ -42,7 +42,7 @@ def find_stresses(
     loads = loads_on_links(motion, known) if known else {}
     found = {}
     for name, link in links.items():
-        p, spatial = motion.body(name).modal, bodies[name].spatial
+        p, spatial = motion.modal(name), bodies[name].spatial
         recovery = mode_displacement(p)
         if name in loads and _is_known(link, loads[name].sizes):
             sections = _sections(stiff[name], link, spatial, p, loads[name]) if name in stiff else None

@@ -18,6 +18,8 @@ from ..common.parallel import environment_without_mpi
 ALONE = {
     "OMP_NUM_THREADS": "1",  # several runs go side by side
     "OPENBLAS_NUM_THREADS": "1",
+    "MALLOC_MMAP_THRESHOLD_": "33554432",  # of glibc: a run keeps memory that it frees, and pages come in once
+    "MALLOC_TRIM_THRESHOLD_": "268435456",
     "OMPI_MCA_pml": "ob1",  # Open MPI opens no network, and nothing that several processes share: runs are one process
     "OMPI_MCA_btl": "self",
     "OMPI_MCA_ess_singleton_isolated": "1",  # nor a daemon

@@ -27,7 +27,7 @@ from ..solve.posture import NEARLY_SINGULAR, SINGULAR, describe_posture, robot_s
 from ..solve.reach import out_of_reach
 from .earlier_check import check_earlier, going_on
 from .outcome import Continuation, EarlierRun, Forces, Motion, Outcome, Statistics
-from .samples import in_order, new_samples, reached_samples, stops, worth_a_look
+from .samples import about_highest, in_order, new_samples, reached_samples, some_of, stops
 
 Progress = Callable[[float], bool]
 """Called now and then with the time reached; False stops the run."""
@@ -186,9 +186,14 @@ def _between(
         held = zero_order_hold(system.model, control.commands)
         return _core.tree_outputs_under(core, scene, chosen, of_rows, held, control.held(times[rows]))
 
-    rows = worth_a_look(len(times), lambda rows: system.multipliers(at(rows).multipliers))
-    run = at(rows)
-    return replace(found, motion=_motion(system, run, times[rows])), run.replayed
+    some = some_of(len(times))
+    run = at(some)
+    motion, replayed = _motion(system, run, times[some]), run.replayed
+    if (more := about_highest(some, motion.multipliers)).size:
+        others, order = at(more), np.argsort(np.concatenate([some, more]))
+        motion = motion.with_rows_of(_motion(system, others, times[more]), order)
+        replayed = np.concatenate([replayed, others.replayed])[order]
+    return replace(found, motion=motion), replayed
 
 
 def _judged(system: MultibodySystem) -> _core.PlanarDriven | _core.SpatialDriven | None:

@@ -6,7 +6,7 @@ where steps are long. A prescribed motion is known at any time: it is looked at 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 
 import numpy as np
 
@@ -48,19 +48,17 @@ def reached_samples(samples: _core.Samples | None, time: Array) -> tuple[Array, 
     return (times[:reached], samples.states.reshape(len(times), -1)[:reached]) if reached else None
 
 
-def worth_a_look(count: int, read: Callable[[Indices], Array]) -> Indices:
-    """Which of `count` samples to evaluate: some of all, and all about the highest values of the columns of `read`.
+def some_of(count: int) -> Indices:
+    """Numbers of some of `count` samples, the first and the last among them."""
+    found: Indices = np.unique(np.append(np.arange(0, count, -(-count // LOOKED_AT)), count - 1))
+    return found
 
-    `read` gives quantities (T, columns) at samples (T,).
-    """
-    every = -(-count // LOOKED_AT)
-    some: Indices = np.unique(np.append(np.arange(0, count, every), count - 1))
-    if every == 1:
-        return some
-    sizes = np.abs(read(some))
-    tops = {k for column in sizes.T for k in _highest(column)}
-    about = [np.arange(some[max(k - 1, 0)], some[min(k + 1, len(some) - 1)] + 1) for k in sorted(tops)]
-    found: Indices = np.unique(np.concatenate([some, *about]))
+
+def about_highest(some: Indices, quantities: Array) -> Indices:
+    """All other samples about the highest of `quantities` (T, columns), which were found at `some` (T,)."""
+    tops = sorted({k for column in np.abs(quantities).T for k in _highest(column)})
+    about = [np.arange(some[max(k - 1, 0)], some[min(k + 1, len(some) - 1)] + 1) for k in tops]
+    found: Indices = np.setdiff1d(np.concatenate([some[:0], *about]), some)
     return found
 
 

@@ -39,7 +39,7 @@ class BodyPoint:
         return not np.array_equal(self.triad, np.eye(3))
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Body(Invariants):
     """Constants of one body in the equations of motion in space (Shabana, Dynamics of Multibody Systems, ch. 5).
 

@@ -13,7 +13,7 @@ from ...common.arrays import Array, as_floats
 from .. import _core
 from .model import Model
 from .system import MultibodySystem
-from .tree import KinematicTree, Motion, Node, Section
+from .tree import KinematicTree, Node, Pose, Section
 
 
 class Wrench(NamedTuple):
@@ -37,12 +37,12 @@ def _in_global_axes(F: Array, node: Node, force: Array, q: Array) -> Wrench:
     return Wrench(*(np.einsum("tij,tj->ti", F, part) for part in (acting[:, :3], acting[:, 3:])))
 
 
-def without_work(tree: KinematicTree, node: Node, on_outer: Wrench, q: Array, frames: Sequence[Motion]) -> Wrench:
+def without_work(tree: KinematicTree, node: Node, on_outer: Wrench, q: Array, poses: Sequence[Pose]) -> Wrench:
     """What a joint does to its outer side, about where that is, less what of it does work along the joint.
 
     That is what drives, loads and brakes it along its coordinates: Sᵀ (force, moment) is 0 of the rest, S = `motion`.
     """
-    F = tree.pose(node.inner, q, frames).F
+    F = tree.pose(node.inner, q, poses).F
     in_axes = np.hstack([np.einsum("tji,tj->ti", F, part) for part in on_outer])
     along = np.einsum("tik,ti->tk", node.joint.motion(q[:, node.q]), in_axes)
     return on_outer.plus(_in_global_axes(F, node, along, q), -1.0)
@@ -155,10 +155,10 @@ def rotor_torques(model: Model, states: States, times: Array) -> Array:
     """J u̇ (T, bodies) N·m about the axis of each rotor in a revolute joint, by the body that the joint carries."""
     tree, system = model.tree, MultibodySystem(model)
     forces = motion_forces(system, states, times, np.zeros((len(times), len(model.rows))))
-    frames, found = tree.frames(states.q), np.zeros((len(times), len(tree.nodes)))
+    poses, found = tree.poses(states.q), np.zeros((len(times), len(tree.nodes)))
     for number, node in enumerate(tree.nodes):
         if node.joint.type == "revolute":
-            axis = tree.pose(node.inner, states.q, frames).F[:, :, 2]
+            axis = tree.pose(node.inner, states.q, poses).F[:, :, 2]
             found[:, number] = np.sum(axis * forces.of_rotor(number), axis=1)
     return found
 

@@ -88,7 +88,7 @@ class InCore(NamedTuple):
 
 def frames_in_core(model: Model, core: _core.SpatialModel, q: Array) -> list[InCore]:
     """Of all bodies, found at q (n_q,)."""
-    of_core, frames = core.frames(q, np.zeros(model.tree.n_v)), model.tree.frames(q[None])
+    of_core, frames = core.frames(q, np.zeros(model.tree.n_v)), model.tree.poses(q[None])
     return [
         InCore(frame.R.T @ own.F[0], frame.R.T @ (own.r[0] - frame.r))
         for frame, own in zip(of_core, frames, strict=True)

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...common.arrays import Array, Booleans
+from ...common.arrays import Array, Booleans, as_floats
 from ...common.rotations import exponential, left_jacobian, of_quaternion, quaternions, skew
 from ..fields.field_types import GROUND
 from ..joints.free import FreeJoint
@@ -232,32 +232,35 @@ class KinematicTree:
             own[..., straight:] = np.where(same, e, -e)
         return moved
 
-    def frames(self, q: Array) -> list[Motion]:
-        """Motion of each body's frame; L is of (Ṙ, Ω)."""
-        found: list[Motion] = []
+    def poses(self, q: Array) -> list[Pose]:
+        """Place and axes of each body's frame."""
+        found: list[Pose] = []
         for node in self.nodes:
-            inner = self.motion(node.inner, q, found)
-            place, S = node.joint.place(q[..., node.q]), node.joint.motion(q[..., node.q])
-            d = np.einsum("...ij,...j->...i", inner.F, place.d)
+            inner, place = self.pose(node.inner, q, found), node.joint.place(q[..., node.q])
+            u, E = _bent(node.body, node.outer, q[..., node.p_q])
+            A = inner.F @ place.C @ np.swapaxes(E @ node.outer.triad, -1, -2)
+            found.append(Pose(inner.r + _turned(inner.F, place.d) - _turned(A, u), A))
+        return found
+
+    def frames(self, q: Array, poses: Sequence[Pose] | None = None) -> list[Motion]:
+        """Motion of each body's frame, of which `poses` may be known; L is of (Ṙ, Ω)."""
+        found: list[Motion] = []
+        for node, (r, A) in zip(self.nodes, poses or self.poses(q), strict=True):
+            inner, S = self.motion(node.inner, q, found), node.joint.motion(q[..., node.q])
+            d = _turned(inner.F, node.joint.place(q[..., node.q]).d)
             L = inner.L.copy()
             L[..., :3, :] -= skew(d) @ inner.L[..., 3:, :]
             L[..., :3, node.v] += inner.F @ S[..., :3, :]
             L[..., 3:, node.v] += inner.F @ S[..., 3:, :]
-            found.append(self._frame_of(node, q, Motion(inner.r + d, inner.F @ place.C, L)))
+            if node.outer.point:  # from the section at the joint to the frame
+                Phi, turning = _by_modes(node.body, node.outer, q[..., node.p_q])
+                L[..., 3:, node.p_v] -= A @ turning
+                L[..., :3, :] += skew(inner.r + d - r) @ L[..., 3:, :]
+                L[..., :3, node.p_v] -= A @ Phi
+            found.append(Motion(r, A, L))
         return found
 
-    def _frame_of(self, node: Node, q: Array, outer: Motion) -> Motion:
-        """The frame of a body from the motion of its section at the joint."""
-        p = q[..., node.p_q]
-        (u, E), (Phi, turning) = _bent(node.body, node.outer, p), _by_modes(node.body, node.outer, p)
-        A = outer.F @ np.swapaxes(E @ node.outer.triad, -1, -2)
-        arm, L = np.einsum("...ij,...j->...i", A, u), outer.L.copy()
-        L[..., 3:, node.p_v] -= A @ turning
-        L[..., :3, :] += skew(arm) @ L[..., 3:, :]
-        L[..., :3, node.p_v] -= A @ Phi
-        return Motion(outer.r - arm, A, L)
-
-    def pose(self, section: Section, q: Array, frames: Sequence[Motion]) -> Pose:
+    def pose(self, section: Section, q: Array, frames: Sequence[Pose | Motion]) -> Pose:
         """Of a section's triad, for less than its motion."""
         if section.body < 0:
             shape = q.shape[:-1]
@@ -265,11 +268,11 @@ class KinematicTree:
         arm, F = self._from_frame(section, q, frames)
         return Pose(frames[section.body].r + arm, F)
 
-    def _from_frame(self, section: Section, q: Array, frames: Sequence[Motion]) -> tuple[Array, Array]:
+    def _from_frame(self, section: Section, q: Array, frames: Sequence[Pose | Motion]) -> tuple[Array, Array]:
         """From the origin of its body's frame to a section, (…, 3), and the axes (…, 3, 3) of its triad."""
         node, A = self.nodes[section.body], frames[section.body].F
         u, E = _bent(node.body, section, q[..., node.p_q])
-        return np.einsum("...ij,...j->...i", A, u), A @ E @ section.triad
+        return _turned(A, u), A @ E @ section.triad
 
     def motion(self, section: Section, q: Array, frames: Sequence[Motion]) -> Motion:
         """Of a section's triad."""
@@ -283,6 +286,11 @@ class KinematicTree:
         L[..., :3, node.p_v] += frame.F @ Phi
         L[..., 3:, node.p_v] += frame.F @ turning
         return Motion(frame.r + arm, F, L)
+
+
+def _turned(A: Array, vectors: Array) -> Array:
+    """A (…, 3, 3) times vectors (…, 3)."""
+    return as_floats(np.einsum("...ij,...j->...i", A, vectors))
 
 
 def _bent(body: Body, section: Section, p: Array) -> tuple[Array, Array]:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...common.arrays import Array
+from ...common.arrays import Array, as_floats
 from ...common.rotations import quaternions
 from ..analysis.gears import Supplied, supplied_through_gears, with_motors
 from ..analysis.outcome import GearMotion
@@ -26,7 +26,7 @@ from ..model.masses import turns_as_a_body
 from ..model.model import Model, row_values, target_rates
 from ..model.motors import MotorForces, path_forces
 from ..model.system import MultibodySystem
-from ..model.tree import Motion, Node, Section
+from ..model.tree import Motion, Node, Pose, Section
 from ..scene.space import SPACES, Space
 from ..scene.trajectories import Trajectory
 from ..solve.posture import mobility
@@ -122,9 +122,14 @@ class RobotMotion:
     twists: Mapping[str, BSpline] = field(default_factory=dict)
 
     @cached_property
+    def poses(self) -> list[Pose]:
+        """Of the frames of all bodies, in the order of the tree."""
+        return self.model.tree.poses(self.q)
+
+    @cached_property
     def frames(self) -> list[Motion]:
-        """Of all bodies, in the order of the tree."""
-        return self.model.tree.frames(self.q)
+        """Likewise with what moves them, which takes longer."""
+        return self.model.tree.frames(self.q, self.poses)
 
     @cached_property
     def system(self) -> MultibodySystem:
@@ -180,11 +185,15 @@ class RobotMotion:
         """Of a body's frame and modes."""
         node, frame = self.node(name), self.frames[self.model.tree.index[name]]
         velocity = np.einsum("tij,tj->ti", frame.L, self.v)
-        stored = node.body.modal_transform.T
         return BodyMotion(
             frame.r, continuous(quaternions(frame.F)), velocity[:, :3], velocity[:, 3:],
-            self.q[:, node.p_q] @ stored, self.v[:, node.p_v] @ stored,
+            RobotMotion.modal(self, name), self.v[:, node.p_v] @ node.body.modal_transform.T,
         )  # fmt: skip
+
+    def modal(self, body: str) -> Array:
+        """P (T, n) of a body, in the modes of its modal body file."""
+        node = self.node(body)
+        return as_floats(self.q[:, node.p_q] @ node.body.modal_transform.T)
 
     def modal_velocity(self, body: str) -> Array:
         """Rates (T, n) of the modes that a body has in the equations."""
@@ -202,7 +211,7 @@ class RobotMotion:
         node = self.node(body)
         coordinate = self.joint(node.joint.name)
         if node.joint.freedoms and coordinate is None:
-            A = self.frames[self.model.tree.index[body]].F
+            A = self.poses[self.model.tree.index[body]].F
             return np.unwrap(np.arctan2(A[:, 1, 0], A[:, 0, 0]))
         turn = node.joint.rpy[2] + np.zeros(len(self.time))
         if coordinate is not None and node.joint.units == ("rad",):
@@ -226,7 +235,7 @@ class RobotMotion:
     def point(self, point: str) -> PointMotion:
         """Of the section "BODY.POINT"."""
         tree = self.model.tree
-        found = tree.pose(tree.section(point), self.q, self.frames)
+        found = tree.pose(tree.section(point), self.q, self.poses)
         turned = None if self.space.is_plane else continuous(quaternions(found.F))
         return PointMotion(found.r, self.deflection(point), turned)
 

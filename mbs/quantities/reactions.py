@@ -49,7 +49,7 @@ def _carried(motion: RobotMotion, forces: MotionForces) -> dict[str, Wrench]:
     loops = {joint.name for joint in model.tree.loops}
     for number, node in enumerate(model.tree.nodes):
         if node.joint.name not in loops:
-            carried = without_work(model.tree, node, forces.of_joint(number), motion.q, motion.frames)
+            carried = without_work(model.tree, node, forces.of_joint(number), motion.q, motion.poses)
             found[node.joint.name] = _on_second(motion, node, carried)
     return found
 
@@ -58,7 +58,7 @@ def _on_second(motion: RobotMotion, node: Node, on_outer: Wrench) -> Wrench:
     """Of what acts on the outer side of the joint that carries a body: the same, or what answers it, on the second."""
     if not node.backwards:
         return on_outer
-    outer, inner = (motion.model.tree.pose(section, motion.q, motion.frames).r for section in (node.outer, node.inner))
+    outer, inner = (motion.model.tree.pose(section, motion.q, motion.poses).r for section in (node.outer, node.inner))
     return Wrench(-on_outer.force, -on_outer.moment).seen_from(outer - inner)
 
 

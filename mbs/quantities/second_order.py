@@ -176,7 +176,7 @@ def largest_rotations(link: ModalBody, p: Array) -> Rotations:
     stations, x = link.stations, link.stations.position[:, 0]
     chord = (stations.translation[-1] - stations.translation[0]) / (x[-1] - x[0])
     shapes = stations.rotation - np.stack([stations.rotation[0, 0], -chord[2], chord[1]])  # (k, 3, n)
-    return Rotations(*(float(np.abs(p @ shapes[:, axis].T).max()) for axis in range(3)))
+    return Rotations(*(float(np.abs(p @ about.T).max()) if about.any() else 0.0 for about in shapes.swapaxes(0, 1)))
 
 
 def largest_displacement(link: ModalBody, p: Array) -> float:
@@ -194,5 +194,5 @@ def _worst_outputs(loads: ModalLoads, p: Array) -> Indices:
 
 def _largest(p: Array, shapes: Array) -> float:
     """Largest displacement (m) of stations of `shapes` (k, 3, n)."""
-    squares = sum((p @ shapes[:, axis].T) ** 2 for axis in range(shapes.shape[1]))
+    squares = sum((p @ along.T) ** 2 for along in shapes.swapaxes(0, 1) if along.any())
     return float(np.sqrt(np.max(squares, initial=0.0)))

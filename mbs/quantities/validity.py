@@ -232,16 +232,17 @@ def shape_from_chord(link: ModalBody, p: Array) -> tuple[Array, Array, Array]:
     Across along y and z: v' = φ_z, w' = −φ_y.
     """
     stations, x = link.stations, link.stations.position[:, 0]
-    off, turned, squares = (np.zeros((len(p), len(x))) for _ in range(3))
+    shares = 0.5 * (np.append(np.diff(x), 0.0) + np.append(0.0, np.diff(x)))  # of the length, by the trapezoidal rule
+    off, turned = np.zeros((2, len(p), len(x)))
+    G = np.zeros((p.shape[1], p.shape[1]))
     for axis in (1, 2):
-        w, slope = p @ stations.translation[:, axis].T, p @ stations.rotation[:, 3 - axis].T
-        slope = slope if axis == 1 else -slope
-        chord = (w[:, -1:] - w[:, :1]) / (x[-1] - x[0])
-        off += (w - w[:, :1] - chord * (x - x[0])) ** 2
-        turned += (slope - chord) ** 2
-        squares += slope**2
-    shortening = 0.5 * (0.5 * (squares[:, 1:] + squares[:, :-1])) @ np.diff(x)
-    return np.sqrt(off.max(axis=1)), np.sqrt(turned.max(axis=1)), shortening
+        across, slopes = stations.translation[:, axis], (-1) ** (axis + 1) * stations.rotation[:, 3 - axis]
+        if across.any() or slopes.any():
+            chord = (across[-1] - across[0]) / (x[-1] - x[0])
+            off += (p @ (across - across[0] - np.outer(x - x[0], chord)).T) ** 2
+            turned += (p @ (slopes - chord).T) ** 2
+            G += slopes.T @ (shares[:, None] * slopes)
+    return np.sqrt(off.max(axis=1)), np.sqrt(turned.max(axis=1)), 0.5 * ((p @ G) * p).sum(axis=1)
 
 
 def largest(bodies: Mapping[str, Bending]) -> tuple[str, Bending] | None:
@@ -300,7 +301,7 @@ def _violated(motion: RobotMotion, allowed: float) -> Iterator[str]:
 
 def _extent(motion: RobotMotion) -> float:
     """A length (m) of the robot: its largest body, or the space in which its bodies move."""
-    places: Array = np.concatenate([frame.r for frame in motion.frames])
+    places: Array = np.concatenate([pose.r for pose in motion.poses])
     bodies = [
         np.ptp([at.position for at in node.body.points.values()], axis=0)
         for node in motion.model.tree.nodes

@@ -137,7 +137,7 @@ Prescribed states_of(PrescribedMotion<Space> &motion, const std::vector<double> 
 }
 
 // each(i, motors, workspace) at postures q (T, n_q); markers that constraint equations follow are where they are at
-// `times` (T), if there are any.
+// `times` (T), if there are any. A posture that comes again, without times, is placed once.
 template <class Space, class Each>
 void at_postures(const DrivenMechanism<Space> &driven, const std::vector<double> &times, const RowMajorMatrix &q,
                  const Each &each) {
@@ -152,9 +152,11 @@ void at_postures(const DrivenMechanism<Space> &driven, const std::vector<double>
     if (!times.empty())
       for (const DrivenMarker &marker : driven.scene.driven)
         w.turning[static_cast<std::size_t>(marker.marker)] = marker.law(times[static_cast<std::size_t>(i)]);
-    const auto at = place_all(driven.mechanism, q.row(i).data(), v.data(), nullptr, w);
-    // for the mass matrix of the modes of stiffened bodies, and their rows
-    accelerations(at, nullptr, target.data(), a.data());
+    if (i == 0 || !times.empty() || q.row(i) != q.row(i - 1)) {
+      const auto at = place_all(driven.mechanism, q.row(i).data(), v.data(), nullptr, w);
+      // for the mass matrix of the modes of stiffened bodies, and their rows
+      accelerations(at, nullptr, target.data(), a.data());
+    }
     each(i, motors, w);
   }
 }

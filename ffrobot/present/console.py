@@ -1,0 +1,24 @@
+"""The standard output as a console; importing this loads nothing of an analysis."""
+
+from __future__ import annotations
+
+import sys
+from shutil import get_terminal_size
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+PLAIN_WIDTH = 120  # columns where the output is no terminal
+
+
+def summary_width() -> int:
+    """Columns of the standard output; what goes to a file is not squeezed into 80."""
+    return get_terminal_size().columns if sys.stdout.isatty() else PLAIN_WIDTH
+
+
+def summary_console() -> Console:
+    """The standard output; names in a scene are no markup."""
+    from rich.console import Console
+
+    return Console(width=summary_width(), markup=False, highlight=False, emoji=False)
