@@ -15,7 +15,7 @@ GRADING = 2.5  # of breaks to both ends: tanh
 MOST_INTERVALS = 1500
 SETTLED = 0.02  # change of the least share of voltages by finer intervals, relative
 CALM = (1e-3, 1e-2, 0.1)  # of the effort in these steps, each where they wander with those before
-LOST = 0.2  # of the largest elastic force: where more is left over between Gauss points, no motion is near
+LOST = 0.5  # of the largest elastic force: where more is left over between Gauss points, no motion is near
 TURNING = 0.3  # of the largest voltage: by so much one changes in intervals that are then halved
 
 
