@@ -140,7 +140,10 @@ typename NewtonSystem<Space>::template Vector<Scalar>
 NewtonSystem<Space>::forces(const Factors<Scalar> &factors, const Scalar *r, Vector<Scalar> along) const {
   Vector<Scalar> f = Eigen::Map<const Vector<Scalar>>(r, stiffness_.size())(stiff_);
   along = factors.S.cwiseProduct(along + product(G_, f));
-  solve_factorised(factors.symmetric.data(), static_cast<int>(f.size()), along.data());
+  const auto &LT = factors.symmetric; // by columns what factorise() has by rows
+  LT.transpose().template triangularView<Eigen::UnitLower>().solveInPlace(along);
+  along.array() *= LT.diagonal().array();
+  LT.template triangularView<Eigen::UnitUpper>().solveInPlace(along);
   f -= factors.S.cwiseProduct(along);
   return f;
 }
