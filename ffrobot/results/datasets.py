@@ -158,7 +158,7 @@ class Datasets:
 
         Of all columns, of one of them, `name[k]`, or of the length of a deflection or a reaction.
         """
-        from .meanings import peak_of
+        from .peaks import peak_of
 
         match = COLUMN.fullmatch(name)
         dataset = match["dataset"] if match else name

@@ -13,7 +13,7 @@ from ..common.arrays import Array
 from .actuators import read_motors, read_unsupplied
 from .joints import Coordinates, Scene, labelled_coordinates
 from .linear import held_in_words
-from .meanings import POWER, peak_of
+from .peaks import POWER, peak_of
 from .verdict import AnalysisVerdict, PatchNeed, Place, Verdict, millimeters, off_path_in_words, tool_error
 
 if TYPE_CHECKING:

@@ -29,8 +29,8 @@ from .actuators import (
 )
 from .file import FORMAT
 from .linear import write_joint_conditions, write_linear, write_loop
-from .meanings import write_peaks
 from .motion import write_bending, write_bodies, write_joints, write_paths, write_stress
+from .peaks import write_peaks
 from .resume import write_state
 
 FORMAT_VERSION = 1

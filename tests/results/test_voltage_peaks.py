@@ -3,7 +3,7 @@
 import h5py
 import numpy as np
 
-from ffrobot.results.meanings import write_peaks
+from ffrobot.results.peaks import write_peaks
 
 
 def test_no_peak_of_a_voltage_lies_above_its_limit():
