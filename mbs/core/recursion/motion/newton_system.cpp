@@ -140,10 +140,7 @@ typename NewtonSystem<Space>::template Vector<Scalar>
 NewtonSystem<Space>::forces(const Factors<Scalar> &factors, const Scalar *r, Vector<Scalar> along) const {
   Vector<Scalar> f = Eigen::Map<const Vector<Scalar>>(r, stiffness_.size())(stiff_);
   along = factors.S.cwiseProduct(along + product(G_, f));
-  const auto &LT = factors.symmetric; // by columns what factorise() has by rows
-  LT.transpose().template triangularView<Eigen::UnitLower>().solveInPlace(along);
-  along.array() *= LT.diagonal().array();
-  LT.template triangularView<Eigen::UnitUpper>().solveInPlace(along);
+  solve_factorised(factors.symmetric.data(), static_cast<int>(f.size()), along.data());
   f -= factors.S.cwiseProduct(along);
   return f;
 }
