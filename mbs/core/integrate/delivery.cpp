@@ -5,12 +5,6 @@
 
 namespace ffrobot {
 
-namespace {
-
-constexpr std::size_t room = 1 << 22; // numbers of a recording: what is never reached costs nothing, copies do
-
-} // namespace
-
 void Delivery::outputs_at(double t, const double *z) {
   while (!is_complete() && next_time() <= t)
     output(z);
@@ -28,8 +22,6 @@ void Delivery::record(double t, const double *z) {
   if (!recording_)
     return;
   const double *y = state(z);
-  if (recording_->states.empty())
-    recording_->states.reserve(room);
   recording_->times.push_back(t);
   recording_->states.insert(recording_->states.end(), y, y + system_.local().state_size());
 }
