@@ -5,14 +5,14 @@ Motors behind compliant gears are coordinates of their own, with springs to thos
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from ...common.arrays import Array
 from ...common.errors import InputError
-from ..joints.joint import JointRecord
+from ..joints.joint import Friction, JointRecord
 from ..joints.revolute import RevoluteJoint
 from ..joints.twist_spring import TwistSpring
 from ..scene.analysis import Analysis
@@ -137,19 +137,19 @@ def resistance(model: Model, q: Array, v: Array, frames: Sequence[Motion] | None
 
 def tree_resistance(tree: KinematicTree, v: Array) -> Array:
     """The same of the joints that have coordinates, along these."""
-    found = np.zeros_like(v)
-    for node in tree.nodes:
-        for column, friction in zip(range(node.v.start, node.v.stop), node.joint.frictions, strict=False):
-            found[:, column] = friction.resistance(v[:, column])
-    return found
+    return _of_frictions(tree, v, Friction.resistance)
 
 
 def tree_resistance_slope(tree: KinematicTree, v: Array) -> Array:
     """Its derivative (T, n_v) by v, coordinate by coordinate."""
+    return _of_frictions(tree, v, Friction.slope)
+
+
+def _of_frictions(tree: KinematicTree, v: Array, of: Callable[[Friction, Array], Array]) -> Array:
     found = np.zeros_like(v)
     for node in tree.nodes:
         for column, friction in zip(range(node.v.start, node.v.stop), node.joint.frictions, strict=False):
-            found[:, column] = friction.slope(v[:, column])
+            found[:, column] = of(friction, v[:, column])
     return found
 
 
