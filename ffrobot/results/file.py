@@ -67,9 +67,8 @@ class LinkAccess(Datasets):
 
     def modal(self, analysis: str, body: str) -> Array:
         """P (T, n) of a flexible body in the modes of its modal body file, however many of them the solve used."""
-        from .motion import (
-            read_modal,  # here, as below: what writes a group loads the core, which reading can do without
-        )
+        # Here, as below: what writes a group loads the core, which reading can do without.
+        from .motion import read_modal
 
         self[f"{analysis}/bodies/{body}/modal"]  # raises where there is none
         return read_modal(self._file[analysis], body)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from itertools import islice
+from itertools import chain, islice
 from typing import Any
 
 import numpy as np
@@ -37,11 +37,12 @@ def standard_figures(results: Results) -> tuple[FigureRecord, ...]:
 
 def _drawn(results: Results, of: Figures) -> tuple[FigureRecord, ...]:
     """The figures of `of`, without histories of a single instant: static analyses have numbers, no curves."""
-    return tuple(
-        record if record.curves == curves else record.model_copy(update={"curves": curves})
-        for record in (record for figures in of for record in figures(results))
-        if (curves := tuple(curve for curve in record.curves if len(results.time(curve.data)) > 1)) or not record.curves
-    )
+    found = []
+    for record in chain.from_iterable(figures(results) for figures in of):
+        curves = tuple(curve for curve in record.curves if len(results.time(curve.data)) > 1)
+        if curves or not record.curves:
+            found.append(record.model_copy(update={"curves": curves}))
+    return tuple(found)
 
 
 def _histories(
