@@ -160,7 +160,8 @@ def test_a_killed_map_goes_on_and_is_the_same(arm, tmp_path):
     after = {file.name: file.stat().st_mtime_ns for file in parts.glob("*.npz")}
     assert before.items() <= after.items()
     for name, values in whole.values.items():
-        np.testing.assert_array_equal(again.values[name], values)
+        # Postures found in two processes can differ in their last bit.
+        np.testing.assert_allclose(again.values[name], values, rtol=0, atol=1e-12 * np.nanmax(np.abs(values)))
 
 
 def test_poses_judged_before_stay_where_inverse_kinematics_rounds_otherwise(arm, tmp_path, monkeypatch):
