@@ -295,8 +295,8 @@ class Problem:
 
     def excess(self, values: Sequence[float]) -> Array:
         """(m) how far goals are beyond their limits, of these; below 0 within."""
-        bounds = np.array([limit.bound for limit in self.limits])
-        return as_floats(self._senses[1:] * (np.array(values[1:]) - bounds) / np.abs(self._sizes[1:]))
+        bounds, senses = (np.array([getattr(limit, of) for limit in self.limits]) for of in ("bound", "sense"))
+        return as_floats(senses * (np.array(values[1:]) - bounds) / np.abs(self._sizes[1:]))
 
     @property
     def _senses(self) -> Array:

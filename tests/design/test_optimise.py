@@ -109,6 +109,30 @@ def test_gear_ratio_of_matched_inertias(write, method):
     assert not np.isfinite(found.bound_prices).any()
 
 
+@pytest.mark.parametrize("method", ["slsqp", "enumeration"])
+def test_limits_below_zero(write, method):
+    """The lightest mass whose weight is behind a moment of −M: m = M/(9.81 · 0.3), ∂m/∂bound = −1/(9.81 · 0.3).
+
+    The scene's own moment, −5.886 N m, is beyond the limit; more mass is within it.
+    """
+    scene = ARM | {"gravity": [0.0, -9.81]}
+    scene["trajectory"] = [{"name": "swing", "joint": "shoulder", "value": "pi"}]  # the arm points to −x
+    found = ffrobot.optimise(
+        write(scene),
+        ["body.arm.rigid.mass=1:4" if method == "slsqp" else "body.arm.rigid.mass in {1.5, 2.5, 2.8, 3.5}"],
+        minimise="mass",
+        subject_to=["at 0.1 joints.shoulder.moment <= -8", "at 0.1 joints.shoulder.moment >= -12"],
+        processes=2,
+    )
+    least = 8.0 / (9.81 * 0.3)
+    assert found.feasible
+    if method == "slsqp":
+        assert found.value == pytest.approx(least, rel=2e-6)
+        assert found.prices[0] == pytest.approx(-1.0 / (9.81 * 0.3), rel=1e-4)
+    else:
+        assert found.value == 2.8
+
+
 def test_lightest_cantilever(write):
     """w h³ ≥ a = 4 F L³/(E δ): h as high as it may be, and w = a/h³: m = ρ L a/h², ∂m/∂δ = −m/δ, ∂m/∂h = −2 m/h."""
     found = ffrobot.optimise(
