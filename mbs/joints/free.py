@@ -43,6 +43,10 @@ class FreeJoint(JointRecord):
         """Place, and the quaternion of a rotation vector."""
         return np.concatenate([coordinates[..., :3], quaternions(exponential(coordinates[..., 3:]))], axis=-1)
 
+    def velocity(self, rates: Array) -> Array:
+        """The velocity in axes of the first side, and the angular velocity, given in those of the second one."""
+        return np.concatenate([rates[:3], self.orientation @ rates[3:]])
+
     def turned_around(self, coordinates: Array) -> Array:
         """The place of the first side, and its rotation vector, in the axes of the second."""
         C = exponential(coordinates[..., 3:])

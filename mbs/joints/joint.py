@@ -229,6 +229,10 @@ class JointRecord(Record):
         """Q (q_count,) from the numbers by which the scene gives its place."""
         return coordinates
 
+    def velocity(self, rates: Array) -> Array:
+        """V (freedoms,) from the numbers by which the scene gives its rates."""
+        return self.state(rates)
+
     def coordinates(self, q: Array) -> Array:
         """Its coordinates (…, k) in the scene's order, from q (…, q_count); likewise rates from v."""
         return q

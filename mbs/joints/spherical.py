@@ -6,7 +6,7 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from ...common.arrays import Array
+from ...common.arrays import Array, as_floats
 from ...common.rotations import exponential, of_quaternion, quaternions
 from ..fields.spelling import SPATIAL
 from .joint import POINT, JointRecord, Place
@@ -37,3 +37,7 @@ class SphericalJoint(JointRecord):
     def state(self, coordinates: Array) -> Array:
         """The quaternion of a rotation vector."""
         return quaternions(exponential(coordinates))
+
+    def velocity(self, rates: Array) -> Array:
+        """The angular velocity, which the scene gives in the axes of the second side."""
+        return as_floats(self.orientation @ rates)

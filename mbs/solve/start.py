@@ -137,5 +137,5 @@ def _guessed_rates(model: Model) -> Array:
                 f"{model.scene.path}: initial.joint_rates.{name}: expected the side nearer to the ground first in"
                 f" between of a {node.joint.type} joint with rates, found it second"
             )
-        v[node.v] = -rates if node.backwards else (node.joint.state(rates) if node.joint.units else rates)
+        v[node.v] = -rates if node.backwards else node.joint.velocity(rates)
     return v
