@@ -4,10 +4,10 @@ from typing import NamedTuple
 
 import numpy as np
 from body_equations import required_forces
+from row_wrenches import spin_of_modes
 from tree_accelerations import Accelerated, row_accelerations
 
 from ffrobot.common.arrays import Array
-from ffrobot.common.rotations import left_jacobian
 from ffrobot.mbs.model.model import row_values, target_rates
 from ffrobot.mbs.solve.posture import solve_postures
 
@@ -72,13 +72,6 @@ def split(model, found, motors):
                 if section.body >= 0:
                     turn = side * motor.sign * tau[:, k, None] * axis
                     left[:, model.tree.nodes[section.body].p_v] += np.einsum(
-                        "ti,tij->tj", turn, _spin(model, found.q, frames, section)
+                        "ti,tij->tj", turn, spin_of_modes(model, found.q, frames, section)
                     )
     return tau, loops, left
-
-
-def _spin(model, q, frames, section):
-    """A J_l Φ_r (T, 3, n): the section's angular velocity by ṗ."""
-    node = model.tree.nodes[section.body]
-    Phi_r = node.body.points[section.point].rotation
-    return frames[section.body].F @ left_jacobian(q[:, node.p_q] @ Phi_r.T) @ Phi_r

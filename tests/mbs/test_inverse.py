@@ -133,9 +133,10 @@ def check_carried(motion):
 def test_loads_at_points_are_what_bodies_need(joint):
     """All that acts at the points of a body moves it, and its frame and modes as they do."""
     motion = anything_moving(np.random.default_rng(90 + TYPES.index(joint)), joint, turned=True)
-    tree, state, gravity = motion.model.tree, accelerated(motion), np.array(motion.model.scene.gravity)
-    for number, (node, of_frame) in enumerate(zip(tree.nodes, state.of_frames(), strict=True)):
-        expected, force, moment = body_forces(node, state, of_frame, gravity), 0.0, 0.0
+    tree, state = motion.model.tree, accelerated(motion)
+    of_bodies = body_forces(state, motion.model.scene.gravity)
+    for number, (node, of_frame, expected) in enumerate(zip(tree.nodes, state.of_frames(), of_bodies, strict=True)):
+        force, moment = 0.0, 0.0
         for section, acting in motion.forces.at_points[number]:
             place = tree.motion(section, motion.q, motion.frames)
             at_frame = acting.seen_from(place.r - motion.frames[number].r)

@@ -1,7 +1,7 @@
 """What joints of trees in 3D carry, by sums over the equations of bodies about the origin: an oracle of the core."""
 
 import numpy as np
-from body_equations import accelerated, along_cut, body_forces, rotors
+from body_equations import accelerated, along_cut, body_forces, rotor_moments
 from row_wrenches import row_wrenches
 
 from ffrobot.mbs.model.known_motion import Wrench
@@ -51,18 +51,18 @@ def _workless(node, total, inner, outer, q):
 
 def needed(motion):
     """By body what it and the rotors on it need for their motion, less loads; moments about the global origin."""
-    tree, state, gravity, totals = motion.model.tree, accelerated(motion), np.array(motion.model.scene.gravity), []
-    for node, of_frame, frame in zip(tree.nodes, state.of_frames(), motion.frames, strict=True):
-        of_body = body_forces(node, state, of_frame, gravity)
-        totals.append(Wrench(of_body.force, of_body.moment).seen_from(frame.r))
+    tree, state = motion.model.tree, accelerated(motion)
+    of_bodies = body_forces(state, motion.model.scene.gravity)
+    totals = [Wrench(*of[:2]).seen_from(frame.r) for of, frame in zip(of_bodies, motion.frames, strict=True)]
     for load in motion.model.scene.load:
         if load.point is not None:
             body, acting = tree.index[load.point.partition(".")[0]], of_load(motion, load)
             totals[body] = totals[body].plus(acting, -1.0)
-    for rotor in rotors(state):
-        if rotor.first.body >= 0:
-            moment = rotor.torque[:, None] * rotor.axis + rotor.gyroscopic
-            totals[rotor.first.body] = totals[rotor.first.body].plus(Wrench(np.zeros_like(moment), moment))
+    for node in tree.nodes:
+        first = (node.outer if node.backwards else node.inner).body
+        if first >= 0:
+            moment = rotor_moments(state, node)
+            totals[first] = totals[first].plus(Wrench(np.zeros_like(moment), moment))
     return totals
 
 
