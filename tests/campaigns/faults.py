@@ -19,7 +19,7 @@ from typing import NamedTuple
 ROOT = Path(__file__).parents[2]
 PROJECTION, MASSES, LOADS = "mbs/model/projection.py", "mbs/model/masses.py", "mbs/quantities/link_loads.py"
 PATCHES, CORE = "actuation/patches", "mbs/core"
-STIFFENED = "tests/mbs/recursion/test_stiffened_bodies.py"
+STIFFENED = "tests/mbs/recursion/test_space.py"
 PROJECTED = "tests/mbs/test_projection.py tests/mbs/test_projected_trees.py"
 POINTS = "tests/cases/test_actuation_points.py"
 ARM = "tests/references/test_references.py::test_made_scenes[arm]"

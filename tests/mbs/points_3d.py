@@ -67,17 +67,16 @@ def stacked(rows):
 
 
 def tilde(x):
-    zero = x[0] - x[0]
-    rows = [[zero, zero - x[2], x[1]], [x[2], zero, zero - x[0]], [zero - x[1], x[0], zero]]
-    return stacked([stacked(row) for row in rows])
+    return Series(np.cross(x.c[:, None], np.eye(3), axisa=-1).swapaxes(1, 2))
 
 
 def exponential(x):
     """exp of a rotation vector, by its series."""
     term = total = Series.constant(np.eye(3))
+    turn = tilde(x)
     for k in range(1, 25):
-        term = term @ tilde(x) * (1 / k)
-        total = total + term
+        term = Series((term @ turn).c / k)
+        total = Series(total.c + term.c)
     return total
 
 
@@ -262,13 +261,15 @@ class Mechanism:
         c = value.c.sum(axis=-1)
         return np.array([c[1], 2 * c[2]])
 
-    def residual(self, model, q, v, a, lambda_, force=None, wrench=None):
-        """Violation of d'Alembert's principle (n_v), over the size of its terms, and accelerations of rows."""
-        Q, size, accelerations = self.forces(model, q, v, a, lambda_, force, wrench)
-        return Q / size, accelerations
+    def directions(self, model, q):
+        """`motion` along each coordinate in turn."""
+        return [self.motion(model, q, [Series([0.0, x, 0.0]) for x in unit]) for unit in np.eye(model.n_v)]
 
-    def forces(self, model, q, v, a, lambda_, force=None, wrench=None):
-        """Forces along v that this motion takes beside the given ones, the size of their terms, and what rows do."""
+    def forces(self, model, along, q, v, a, lambda_, force=None, wrench=None):
+        """Forces along v that this motion takes beside the given ones, the size of their terms, and what rows do.
+
+        `along` are the directions at q.
+        """
         n_v, bodies = model.n_v, self.bodies
         z = [Series([0.0, v[k], a[k] / 2]) for k in range(n_v)]
         frames, points = self.motion(model, q, z)
@@ -278,9 +279,7 @@ class Mechanism:
             here = slice(p_v, p_v + body.n)
             Q[here] += body.stiffness * q[p_q : p_q + body.n] + body.damping @ v[here]
         size = np.abs(Q).max()
-        for k in range(n_v):
-            along = [Series([0.0, float(j == k), 0.0]) for j in range(n_v)]
-            there, moved = self.motion(model, q, along)
+        for k, (there, moved) in enumerate(along):
             for body, at, change in zip(bodies, points, moved, strict=True):
                 terms = body.mass[:, None] * (2 * at.c[2] - self.gravity) * change.c[1]
                 Q[k] += terms.sum()

@@ -1,7 +1,7 @@
 """Random spatial bodies of material points, their joints, states and rows."""
 
 import numpy as np
-from points_3d import Body, J, r
+from points_3d import Body, J, Mechanism, r
 
 JOINTS = [J.revolute, J.prismatic, J.screw, J.cylindrical, J.universal, J.spherical, J.planar, J.weld, J.free]
 GRAVITY = np.array([0.3, 1.0, -9.81])
@@ -86,6 +86,35 @@ def three_links(rng, modes=3, **keys):
     ]
 
 
+def random_tree(rng, **keys):
+    """Of random joints, rigid bodies and bodies of up to five modes, clamped or not; of keys that are None, any."""
+    bodies = []
+    for i in range(6):
+        parent = int(rng.integers(-1, i)) if i else -1
+        at = {"parent": parent, "parent_marker": 0 if parent < 0 else int(rng.integers(1, 3))}
+        joint = JOINTS[int(rng.integers(len(JOINTS)))]
+        drawn = {key: value if isinstance(value, bool) else bool(rng.integers(2)) for key, value in keys.items()}
+        bodies.append(random_body(rng, int(rng.integers(0, 6)), joint, bool(rng.integers(2)), **at, **drawn))
+    return with_rows(rng, bodies, [], bases=1)
+
+
+def with_rows(rng, bodies, rows, bases=2):
+    """The bodies on `bases` sections of the ground, under rows as `row` makes them."""
+    return Mechanism(bodies, ground(rng, bases), GRAVITY, [x for x, _ in rows], [x for _, x in rows])
+
+
+def rows_of_every_kind(rng, **keys):
+    """Path of a point, two rotations, a slide to the ground, a right angle between bodies."""
+    K = r.ConstraintKind
+    rows = [
+        *(row(K.point, (-1, 1), (2, 1), axis) for axis in np.eye(3)),
+        *(row(K.rotation, (-1, 1), (2, 2), axis) for axis in np.eye(3)[:2]),
+        row(K.slide, (0, 2), (1, 2), (0.6, 0.8, 0)),
+        row(K.dot, (0, 1), (2, 1), (0, 0, 1), (0.6, 0, 0.8)),
+    ]
+    return with_rows(rng, three_links(rng, 4, **keys), rows)
+
+
 def check_balance(mechanism, rng, bound=1e-11, force=False, deflection=0.1):
     """Accelerations of the recursion, and forces that others take, against d'Alembert's principle over all points."""
     model = mechanism.model()
@@ -94,19 +123,22 @@ def check_balance(mechanism, rng, bound=1e-11, force=False, deflection=0.1):
     applied = rng.standard_normal(model.n_v) if force else None
     wrench = rng.standard_normal(6 * len(mechanism.wrenches))
     a, lambda_ = model.evaluate(q, v, target, applied, wrench)
-    residual, accelerations = mechanism.residual(model, q, v, a, lambda_, applied, wrench)
-    assert np.abs(residual).max() < bound
+    along = mechanism.directions(model, q)
+    left, size, accelerations = mechanism.forces(model, along, q, v, a, lambda_, applied, wrench)
+    assert np.abs(left).max() < bound * size
     if len(target):
         assert np.abs(accelerations - target).max() < bound * (1 + np.abs(a).max())
-    check_known_motion(mechanism, model, q, v, a + rng.standard_normal(len(a)), bound)
+    check_known_motion(mechanism, model, along, q, v, a + rng.standard_normal(len(a)), bound)
 
 
-def check_known_motion(mechanism, model, q, v, a, bound):
+def check_known_motion(mechanism, model, along, q, v, a, bound):
     """Newton–Euler: M a − Q and second derivatives of rows at accelerations that no forces of the mechanism make."""
     scene, unloaded = r.TreeScene(), np.zeros(6 * len(mechanism.wrenches))
     for _ in mechanism.rows:
         scene.add_target(r.TimeFunction.constant(0.0), 1.0)
-    expected, size, accelerations = mechanism.forces(model, q, v, a, np.zeros(len(mechanism.rows)), None, unloaded)
+    expected, size, accelerations = mechanism.forces(
+        model, along, q, v, a, np.zeros(len(mechanism.rows)), None, unloaded
+    )
     state = [0.0], q[None], v[None], a[None]
     required, of_rows = model.required_forces(scene, *state)[0], model.row_accelerations(scene, *state)[0]
     np.testing.assert_allclose(required, expected, rtol=0, atol=bound * size)

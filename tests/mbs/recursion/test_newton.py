@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from closed_chains import COUNT, FRICTION, closed_chain
 from points_3d import Body, J, Mechanism, r
-from random_bodies import GRAVITY, JOINTS, ground, random_body, random_state, row, three_links
+from random_bodies import GRAVITY, ground, random_body, random_state, random_tree, row, rows_of_every_kind
 from trees_in_a_plane import planar_model
 
 from ffrobot.mbs import _core
@@ -85,29 +85,14 @@ def check_mechanism(mechanism, rng, with_springs=True):
 @pytest.mark.parametrize("curved", [False, True], ids=["", "stiffened"])
 @pytest.mark.parametrize("seed", range(6))
 def test_trees_in_3d(seed, curved):
-    """Random joints, rigid bodies and bodies of up to five modes, clamped or not."""
     rng = np.random.default_rng(seed)
-    bodies = []
-    for i in range(6):
-        parent = int(rng.integers(-1, i)) if i else -1
-        keys = {"parent": parent, "parent_marker": 0 if parent < 0 else int(rng.integers(1, 3)), "curved": curved}
-        joint = JOINTS[int(rng.integers(len(JOINTS)))]
-        bodies.append(random_body(rng, int(rng.integers(0, 6)), joint, bool(rng.integers(2)), **keys))
-    check_mechanism(Mechanism(bodies, ground(rng), GRAVITY), rng)
+    check_mechanism(random_tree(rng, curved=curved), rng)
 
 
 @pytest.mark.parametrize("curved", [False, True], ids=["", "stiffened"])
 def test_rows_of_every_kind_in_3d(curved):
     rng = np.random.default_rng(4)
-    K = r.ConstraintKind
-    rows = [
-        *(row(K.point, (-1, 1), (2, 1), axis) for axis in np.eye(3)),
-        *(row(K.rotation, (-1, 1), (2, 2), axis) for axis in np.eye(3)[:2]),
-        row(K.slide, (0, 2), (1, 2), (0.6, 0.8, 0)),
-        row(K.dot, (0, 1), (2, 1), (0, 0, 1), (0.6, 0, 0.8)),
-    ]
-    bodies = three_links(rng, 4, curved=curved)
-    check_mechanism(Mechanism(bodies, ground(rng, 2), GRAVITY, [x for x, _ in rows], [x for _, x in rows]), rng)
+    check_mechanism(rows_of_every_kind(rng, curved=curved), rng)
 
 
 class Geared(Body):

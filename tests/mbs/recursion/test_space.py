@@ -1,9 +1,29 @@
-"""The recursion in 3D against d'Alembert's principle over material points: all joints, trees, loops, rows, loads."""
+"""The recursion in 3D against d'Alembert's principle over material points: all joints, trees, loops, rows, loads.
+
+Points of bodies with geometric stiffening move to second order by an affine field, of which the core has all.
+"""
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
-from points_3d import J, Mechanism, r
-from random_bodies import GRAVITY, JOINTS, check_balance, ground, random_body, random_state, row, three_links
+from points_3d import J, Mechanism, Series, r
+from random_bodies import (
+    GRAVITY,
+    JOINTS,
+    check_balance,
+    ground,
+    random_body,
+    random_state,
+    random_tree,
+    row,
+    rows_of_every_kind,
+    three_links,
+    with_rows,
+)
+
+curved_or_not = pytest.mark.parametrize("curved", [False, True], ids=["", "stiffened"])
+FAR = {False: 0.1, True: 0.3}  # modal coordinates
 
 
 @pytest.mark.parametrize("modes", [0, 3])
@@ -20,6 +40,21 @@ def test_each_joint_at_the_ground_and_between_bodies(joint, modes, clamped):
     check_balance(Mechanism(bodies, ground(rng), GRAVITY), rng)
 
 
+@pytest.mark.parametrize("joint", JOINTS, ids=[joint.name for joint in JOINTS])
+@pytest.mark.parametrize("clamped", [False, True], ids=["free modes", "clamped"])
+@pytest.mark.parametrize("line", [False, True], ids=["solid", "line of mass"])
+def test_each_joint_of_stiffened_bodies(joint, clamped, line):
+    """The same, under forces along coordinates and at markers."""
+    rng, keys = np.random.default_rng(1), {"clamped": clamped, "curved": True, "line": line}
+    bodies = [
+        random_body(rng, 3, joint, **keys),
+        random_body(rng, 4, J.revolute, parent=0, parent_marker=1, **keys),
+        random_body(rng, 3, joint, parent=1, parent_marker=2, **keys),
+    ]
+    mechanism = Mechanism(bodies, ground(rng), GRAVITY, wrenches=[(2, 2), (1, 1)])
+    check_balance(mechanism, rng, force=True, deflection=0.3)
+
+
 def test_rows_in_several_blocks():
     """Six bodies, free in the tree, that 18 rows of points hold to each other, one along an axis that turns."""
     rng = np.random.default_rng(3)
@@ -30,7 +65,7 @@ def test_rows_in_several_blocks():
         for axis in np.eye(3)[: 3 if k else 2]
     ]
     rows.append(row(r.ConstraintKind.slide, (-1, 0), (5, 1), (0.6, 0.8, 0.0)))
-    check_balance(Mechanism(bodies, ground(rng, 2), GRAVITY, [x for x, _ in rows], [x for _, x in rows]), rng)
+    check_balance(with_rows(rng, bodies, rows), rng)
 
 
 @pytest.mark.parametrize("joint", JOINTS, ids=[joint.name for joint in JOINTS])
@@ -58,47 +93,31 @@ def test_bodies_without_inertia_about_an_axis(joint, points, outboard):
     check_balance(mechanism, rng)
 
 
+@pytest.mark.parametrize("curved", [False, None], ids=["", "some stiffened"])
 @pytest.mark.parametrize("seed", range(6))
-def test_trees(seed):
-    """Random trees of random joints, rigid bodies and bodies of up to five modes."""
+def test_trees(seed, curved):
     rng = np.random.default_rng(seed)
-    bodies = []
-    for i in range(6):
-        parent = int(rng.integers(-1, i)) if i else -1
-        joint = JOINTS[int(rng.integers(len(JOINTS)))]
-        keys = {"parent": parent, "parent_marker": 0 if parent < 0 else int(rng.integers(1, 3))}
-        bodies.append(random_body(rng, int(rng.integers(0, 6)), joint, bool(rng.integers(2)), **keys))
-    check_balance(Mechanism(bodies, ground(rng), GRAVITY), rng)
+    check_balance(random_tree(rng, curved=curved), rng, deflection=0.1 if curved is False else 0.3)
 
 
-def test_rows_of_every_kind():
-    """Path of a point, two rotations, a slide to the ground, a right angle between bodies, a joint's coordinate."""
+@curved_or_not
+def test_rows_of_every_kind(curved):
     rng = np.random.default_rng(4)
-    K = r.ConstraintKind
-    rows = [
-        *(row(K.point, (-1, 1), (2, 1), axis) for axis in np.eye(3)),
-        *(row(K.rotation, (-1, 1), (2, 2), axis) for axis in np.eye(3)[:2]),
-        row(K.slide, (0, 2), (1, 2), (0.6, 0.8, 0)),
-        row(K.dot, (0, 1), (2, 1), (0, 0, 1), (0.6, 0, 0.8)),
-    ]
-    mechanism = Mechanism(three_links(rng, 4), ground(rng, 2), GRAVITY, [x for x, _ in rows], [x for _, x in rows])
-    check_balance(mechanism, rng)
+    check_balance(rows_of_every_kind(rng, curved=curved), rng, deflection=FAR[curved])
 
 
-@pytest.mark.parametrize("modes", [0, 3])
-def test_a_loop(modes):
+@pytest.mark.parametrize(("modes", "curved"), [(0, False), (3, False), (3, True)])
+def test_a_loop(modes, curved):
     """Two arms of different length on the ground, closed by a spherical joint; the first driven."""
-    rng = np.random.default_rng(5)
+    rng, keys = np.random.default_rng(5), {"curved": curved}
     bodies = [
-        random_body(rng, modes, J.revolute),
-        random_body(rng, modes, J.spherical, parent=0, parent_marker=1),
-        random_body(rng, modes, J.universal),
-        random_body(rng, modes, J.cylindrical, parent=2, parent_marker=2),
+        random_body(rng, modes, J.revolute, **keys),
+        random_body(rng, modes, J.spherical, parent=0, parent_marker=1, **keys),
+        random_body(rng, modes, J.universal, parent_marker=1, **keys),
+        random_body(rng, modes, J.cylindrical, parent=2, parent_marker=2, **keys),
     ]
-    bodies[2].parent_marker = 1
     rows = [row(r.ConstraintKind.point, (3, 1), (1, 2), axis) for axis in np.eye(3)]
-    mechanism = Mechanism(bodies, ground(rng, 2), GRAVITY, [x for x, _ in rows], [x for _, x in rows])
-    check_balance(mechanism, rng)
+    check_balance(with_rows(rng, bodies, rows), rng, deflection=FAR[curved])
 
 
 def test_a_driven_joint_coordinate():
@@ -115,42 +134,73 @@ def test_a_driven_joint_coordinate():
     assert abs(a[coordinate] - 0.7) < 1e-12
     mechanism.rows, force = [], np.zeros(model.n_v)
     force[coordinate] = -lambda_[0]
-    residual, _ = mechanism.residual(mechanism.model(), q, v, a, [], force, None)
-    assert np.abs(residual).max() < 1e-11
+    along = mechanism.directions(model, q)
+    left, size, _ = mechanism.forces(mechanism.model(), along, q, v, a, [], force, None)
+    assert np.abs(left).max() < 1e-11 * size
 
 
-def test_momentum_and_energy_of_a_free_tree():
-    """Without gravity and damping the rates of energy and momentum vanish: differences of order 2 along the motion."""
+def test_fields_that_vanish_change_nothing():
+    """K of zeros takes the path of stiffened bodies: the numbers are those of the other one."""
+    rng = np.random.default_rng(6)
+    plain = three_links(rng, 4)
+    zero = [replace(body, G=np.zeros((4, 3, 4, 4)), K=[np.zeros((6, 4, 4))] * 3) for body in plain]
+    models = [Mechanism(bodies, ground(np.random.default_rng(0)), GRAVITY).model() for bodies in (plain, zero)]
+    q, v = random_state(rng, Mechanism(plain, [], GRAVITY), models[0])
+    a, b = (model.evaluate(q, v, np.zeros(0), None, None)[0] for model in models)
+    np.testing.assert_allclose(a, b, rtol=0, atol=1e-12 * np.abs(a).max())
+
+
+@curved_or_not
+def test_energy_and_momentum_of_points(curved):
+    """Totals of free bodies in a tree are sums over their points."""
     rng = np.random.default_rng(7)
-    bodies = three_links(rng)
-    bodies[0].joint = J.free
-    for body in bodies:
-        body.damping *= 0
-    mechanism = Mechanism(bodies, ground(rng), np.zeros(3))
+    bodies = [random_body(rng, 4, J.free, curved=curved), random_body(rng, 3, J.universal, curved=curved, parent=0)]
+    mechanism = Mechanism(bodies, ground(rng), GRAVITY)
     model = mechanism.model()
-    q, v = random_state(rng, mechanism, model)
-    a, _ = model.evaluate(q, v, np.zeros(0), None, None)
-    step = 1e-4
+    q, v = random_state(rng, mechanism, model, deflection=0.3)
+    z = [Series([0.0, rate, 0.0]) for rate in v]
+    kinetic, gravitational, momentum, angular = 0.0, 0.0, np.zeros(3), np.zeros(3)
+    for body, points in zip(bodies, mechanism.motion(model, q, z)[1], strict=True):
+        place, velocity = points.c[0], points.c[1]
+        kinetic += 0.5 * body.mass @ np.sum(velocity**2, axis=1)
+        gravitational -= body.mass @ place @ GRAVITY
+        momentum += body.mass @ velocity
+        angular += body.mass @ np.cross(place, velocity)
+    found = model.totals(q, v)
+    np.testing.assert_allclose([found.kinetic, found.gravitational], [kinetic, gravitational], rtol=1e-12)
+    np.testing.assert_allclose(found.momentum, momentum, rtol=1e-11)
+    np.testing.assert_allclose(found.angular_momentum, angular, rtol=1e-11)
 
-    def after(h):
-        there, rates = q.copy(), v + h * a
-        middle = v + 0.5 * h * a
-        for body, (joint_q, p_q, joint_v, p_v) in zip(mechanism.bodies, model.first, strict=True):
-            linear = 3 if body.joint == J.free else 0
-            there[p_q : p_q + body.n] += h * middle[p_v : p_v + body.n]
-            if body.joint in (J.spherical, J.free):
-                there[joint_q : joint_q + linear] += h * middle[joint_v : joint_v + linear]
-                x = h * middle[joint_v + linear : joint_v + linear + 3]
-                angle = np.linalg.norm(x)
-                w1, v1 = q[joint_q + linear], q[joint_q + linear + 1 : p_q]
-                w2, v2 = np.cos(angle / 2), np.sin(angle / 2) * x / angle
-                there[joint_q + linear : p_q] = [w1 * w2 - v1 @ v2, *(w1 * v2 + w2 * v1 + np.cross(v1, v2))]
-            else:
-                there[joint_q:p_q] += h * middle[joint_v:p_v]
-        totals = model.totals(there, rates)
-        return np.array([totals.kinetic + totals.strain, *totals.momentum, *totals.angular_momentum])
 
-    rate = (after(step) - after(-step)) / (2 * step)
-    finer = (after(step / 2) - after(-step / 2)) / step
-    assert np.abs((4 * finer - rate) / 3).max() < 1e-8 * np.abs(after(step)).max()  # of order step^4, and rounding
-    assert np.abs(rate).max() > 1e-8 * np.abs(after(step)).max()
+def test_derivatives_of_stiffened_bodies_by_differences():
+    """Dual numbers through the same equations; quaternions aside, which are turned as without stiffening."""
+    rng = np.random.default_rng(8)
+    joints = (J.revolute, J.universal, J.prismatic)
+    bodies = [
+        random_body(rng, 3, joint, curved=True, line=k == 1, parent=k - 1, parent_marker=min(k, 1))
+        for k, joint in enumerate(joints)
+    ]
+    rows = [row(r.ConstraintKind.point, (-1, 1), (2, 1), (0.6, 0.8, 0))]
+    mechanism = with_rows(rng, bodies, rows)
+    model = mechanism.model()
+    q, v = random_state(rng, mechanism, model, deflection=0.3)
+    target, force, h = np.zeros(1), rng.standard_normal(model.n_v), 1e-6
+    found = model.derivatives(q, v, target, force, None)
+
+    def slope(of):
+        return np.array([(of(h * e) - of(-h * e)) / (2 * h) for e in np.eye(model.n_v)]).T
+
+    def a(q, v, force):
+        return model.evaluate(q, v, target, force, None)[0]
+
+    by = {
+        "a_q": slope(lambda e: a(q + e, v, force)),
+        "a_v": slope(lambda e: a(q, v + e, force)),
+        "a_f": slope(lambda e: a(q, v, force + e)),
+        "value_q": slope(lambda e: model.measure(q + e, v)[0]),
+        "rate_q": slope(lambda e: model.measure(q + e, v)[1]),
+    }
+    for key, expected in by.items():
+        np.testing.assert_allclose(
+            getattr(found, key), expected, rtol=0, atol=2e-8 * np.abs(expected).max(), err_msg=key
+        )
