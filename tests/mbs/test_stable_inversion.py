@@ -245,31 +245,26 @@ def test_joint_trajectories_need_no_future():
     assert np.abs(off_path(replayed)).max() < 1e-6
 
 
-def test_path_that_does_not_start_at_rest_is_refused():
-    with pytest.raises(InputError, match=r'trajectory "tip": y: .* at rest at t = 0 s.*found the rate 0.3'):
-        run(single_link("0.3*t*(1-t)**2"), motors_only())
-
-
-def test_path_that_does_not_end_at_rest_is_refused():
-    with pytest.raises(InputError, match=r"at rest at t = 1 s.*found the rate 0.6"):
-        run(single_link("0.3*t**2"), motors_only())
-
-
-def test_too_few_motors_are_refused():
-    joints = [revolute("O", "ground", "link.root", motor=False)]
-    with pytest.raises(InputError, match=r"as many motors as .* \(1\), found 0"):
-        run(single_link(quintic(0, 0.1), joint=joints), motors_only())
-
-
-def test_too_few_trajectory_components_are_refused():
-    model = arm(trajectory=[{"name": "tip", "point": "link2.tip", "y": "0.5+0*t"}])
-    with pytest.raises(InputError, match=r"trajectory components .* \(2\), found 1"):
-        run(model, motors_only())
-
-
-def test_rigid_arms_are_sent_to_pcid():
-    with pytest.raises(InputError, match=r'at least one flexible body.*kind = "pcid"'):
-        run(single_link(quintic(0, 0.1), modes=0), motors_only())
+@pytest.mark.parametrize(
+    ("robot", "message"),
+    [
+        (lambda: single_link("0.3*t*(1-t)**2"), r'trajectory "tip": y: .* at rest at t = 0 s.*found the rate 0.3'),
+        (lambda: single_link("0.3*t**2"), r"at rest at t = 1 s.*found the rate 0.6"),
+        (
+            lambda: single_link(quintic(0, 0.1), joint=[revolute("O", "ground", "link.root", motor=False)]),
+            r"as many motors as .* \(1\), found 0",
+        ),
+        (
+            lambda: arm(trajectory=[{"name": "tip", "point": "link2.tip", "y": "0.5+0*t"}]),
+            r"trajectory components .* \(2\), found 1",
+        ),
+        (lambda: single_link(quintic(0, 0.1), modes=0), r'at least one flexible body.*kind = "pcid"'),
+    ],
+    ids=["start", "end", "motors", "components", "rigid"],
+)
+def test_what_motors_alone_cannot_do_is_refused(robot, message):
+    with pytest.raises(InputError, match=message):
+        run(robot(), motors_only())
 
 
 def in_a_hurry(EI):
