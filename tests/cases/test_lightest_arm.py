@@ -51,7 +51,6 @@ def test_the_chosen_tubes_are_at_the_optimum(arm):
     found = ffrobot.optimise(
         arm / "scene.toml", vary, minimise="mass",
         subject_to=[f"rms held.tip_error <= {TIP['scene']}", f"rms held.joints.shoulder.moment <= {MOTOR}"],
-        processes=2,
     )  # fmt: skip
     assert found.converged
     assert found.feasible
@@ -81,6 +80,7 @@ def test_chosen_tubes_keep_the_limits(arm, scene):
     assert moment < MOTOR
 
 
+@pytest.mark.nightly
 def test_solids_from_step_do_the_same(arm, solved):
     """Tubes as gmsh meshes them, against Timoshenko beams: masses of the drawing, and the tip error."""
     with_holes(arm, CHOSEN)
