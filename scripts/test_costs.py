@@ -15,7 +15,8 @@ def main() -> None:
     folders: Counter[str] = Counter()
     files: Counter[str] = Counter()
     tests: Counter[str] = Counter()
-    largest = peak = (0.0, "")
+    largest, grown = (0.0, ""), Counter[str]()
+    peak = 0.0
     for case in ET.parse(sys.argv[1]).iter("testcase"):
         about = {found.get("name"): float(found.get("value", 0.0)) for found in case.iter("property")}
         file = case.get("classname", "").removeprefix("tests.").replace(".", "/")
@@ -24,13 +25,13 @@ def main() -> None:
         files[file] += seconds
         tests[f"{file}::{case.get('name')}"] += seconds
         largest = max(largest, (about.get("megabytes", 0.0), file))
-        if (reached := about.get("peak", 0.0)) > 1.1 * peak[0]:  # by the test that reached it first
-            peak = (reached, file)
-    seconds, ((megabytes, at), (most, within)) = sum(folders.values()), (largest, peak)
-    print(f"{len(tests)} tests, {seconds:.0f} s of processors")
-    print(f"at most {megabytes:.0f} MB of a process after a test ({at}), {most:.0f} MB within one ({within})")
-    for title, counted in (("folder", folders), ("file", files), ("test", tests)):
-        print(f"\ns of processors by {title}")
+        peak = max(peak, about.get("peak", 0.0))
+        grown[file] += about.get("grown", 0.0)
+    print(f"{len(tests)} tests, {sum(folders.values()):.0f} s of processors")
+    print(f"at most {largest[0]:.0f} MB of a process after a test ({largest[1]}), {peak:.0f} MB within one")
+    counts = {"s of processors by folder": folders, "s of processors by file": files, "s of processors by test": tests}
+    for title, counted in (counts | {"MB by which the largest size of a process grew, by file": grown}).items():
+        print(f"\n{title}")
         for name, seconds in counted.most_common(MOST):
             print(f"{seconds:8.1f}  {name}")
 

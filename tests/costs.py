@@ -1,7 +1,7 @@
 """What tests cost, for the report of `pytest --junitxml` (scripts/test_costs.py sums it up), and less of it.
 
 Each test has the properties `seconds`, of processors, of the commands it ran, too, and of its process `megabytes`, at
-its end, and `peak`, the most so far.
+its end, `peak`, the most so far, and `grown`, by how much that is more than before it.
 """
 
 import ctypes
@@ -15,7 +15,7 @@ LIBC = ctypes.CDLL(None)
 MEMORY_MAP_THRESHOLD, LARGE = -3, 1 << 20
 if hasattr(LIBC, "mallopt"):  # the GNU C library: arrays of that many bytes go back to the system when they are deleted
     LIBC.mallopt(MEMORY_MAP_THRESHOLD, LARGE)
-BEGAN = pytest.StashKey[float]()
+BEGAN = pytest.StashKey[tuple[float, float]]()
 
 
 def pytest_collection_finish():
@@ -26,7 +26,7 @@ def pytest_collection_finish():
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_runtest_setup(item):
-    item.stash[BEGAN] = processor_time()
+    item.stash[BEGAN] = processor_time(), peak()
 
 
 @pytest.hookimpl(wrapper=True, trylast=True)
@@ -38,12 +38,12 @@ def pytest_runtest_teardown(item, nextitem):
             gc.collect()
             if hasattr(LIBC, "malloc_trim"):
                 LIBC.malloc_trim(0)
-        seconds = processor_time() - item.stash.get(BEGAN, processor_time())
-        peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024  # kB on Linux
+        began, before = item.stash.get(BEGAN, (processor_time(), peak()))
         item.user_properties += [
-            ("seconds", f"{seconds:.2f}"),
+            ("seconds", f"{processor_time() - began:.2f}"),
             ("megabytes", f"{memory():.0f}"),
-            ("peak", f"{peak:.0f}"),
+            ("peak", f"{peak():.0f}"),
+            ("grown", f"{peak() - before:.0f}"),
         ]
 
 
@@ -51,6 +51,11 @@ def processor_time():
     """Seconds of this process, of processes that it started and that have ended, and of all commands."""
     used = [resource.getrusage(of) for of in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
     return sum(one.ru_utime + one.ru_stime for one in used) + Commands.seconds
+
+
+def peak():
+    """The most megabytes that this process has had."""
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024  # kB on Linux
 
 
 def memory():
