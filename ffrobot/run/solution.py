@@ -155,7 +155,11 @@ class AnalysisResult:
     @property
     def notes(self) -> tuple[str, ...]:
         """What is worth knowing of results that are right, a text each."""
-        return () if self.sharing is None else (self.sharing.in_words,)
+        model = self.motion.model
+        texts = () if self.sharing is None else (self.sharing.in_words,)
+        if self.motion.is_prescribed and model.tree.loops and not model.motors:
+            return (*texts, "no motors, so no torques: joints of kinematic loops have motors with motor = true alone")
+        return texts
 
     @cached_property
     def _doubts(self) -> tuple[str, ...]:

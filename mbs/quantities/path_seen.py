@@ -13,6 +13,7 @@ from ..scene.analysis import TimedAnalysis
 from ..scene.trajectories import Trajectory
 
 MISSED = 1.5  # times the largest rate at outputs: faster motion between them
+SLOWER = 1e-9  # relative
 STILL = 0.5  # of a run, in which way points are over: the other part is rest
 
 
@@ -22,6 +23,7 @@ def path_warnings(analysis: object, times: Array, paths: Iterable[Trajectory]) -
         return  # it ended before the path began
     for path in paths:
         yield from _outside(path, analysis)
+        yield from _slower_than_stops(path)
         yield from _unseen(path, times, analysis)
 
 
@@ -38,6 +40,16 @@ def _outside(path: Trajectory, analysis: TimedAnalysis) -> Iterator[str]:
         yield f'{where}: is over at t = {over:g} s, beyond the end of "{analysis.name}" at {end:g} s, which has {share}'
     elif path.waypoints is not None and over < STILL * end:
         yield f'{where}: its waypoints are over at t = {over:g} s, and "{analysis.name}" rests until {end:g} s'
+
+
+def _slower_than_stops(path: Trajectory) -> Iterator[str]:
+    """A rounded path that takes longer than one with stops: where one corner passes a limit, all legs are slower."""
+    if path.path is None or path.stopping is None or path.path.end <= (1 + SLOWER) * path.stopping.end:
+        return
+    yield (
+        f'trajectory "{path.name}": blend = {path.blend:g} takes until t = {path.path.end:.4g} s, stops at all places'
+        f" {path.stopping.end:.4g} s: one corner is too fast for the limits, and all path segments are slower for it"
+    )
 
 
 def _unseen(path: Trajectory, times: Array, analysis: TimedAnalysis) -> Iterator[str]:

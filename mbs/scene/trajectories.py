@@ -195,6 +195,11 @@ class Trajectory(MotionKeys):
         return Piecewise(whole.breaks, whole.coefficients[:, :, places])
 
     @cached_property
+    def stopping(self) -> Piecewise | None:
+        """`path` with a stop at each place; None where it has them anyway."""
+        return self.model_copy(update={"blend": 0.0}).through(self._places[:, :3]) if self.blend else None
+
+    @cached_property
     def components(self) -> dict[str, TimeFunction]:
         """The specified functions of time by component: "x", "y", "z", or "value"."""
         if self.path is None:

@@ -58,7 +58,8 @@ class StartPosture(NamedTuple):
 def start_postures(model: Model) -> list[StartPosture]:
     """The start of the scene, then all others that are found, the nearest first.
 
-    Others are looked for where constraint equations determine every joint at t = 0; their angles are within ±π.
+    Others are looked for where constraint equations determine every joint at t = 0; their angles are within ±π. Of
+    those with the same names the nearest has them alone, as `chosen_start` takes it.
     Raises `InputError` where the scene has no start.
     """
     start = undeformed_posture(model).q
@@ -72,7 +73,9 @@ def start_postures(model: Model) -> list[StartPosture]:
         if all(_turn(q, one.q, columns) > SAME for one in found):
             q[columns] = np.angle(np.exp(1j * q[columns]))
             found.append(StartPosture(q, as_guess(nodes, q), _turn(q, start, columns), branch_names(model, q)))
-    return sorted(found, key=lambda one: one.away)
+    found.sort(key=lambda one: one.away)
+    names = [one.branch for one in found]
+    return [one if one.branch not in names[:k] else one._replace(branch={}) for k, one in enumerate(found)]
 
 
 def chosen_start(model: Model) -> StartPosture | None:
@@ -221,6 +224,12 @@ def _end_of_arm(model: Model, q: Array, places: Array, axes: Array, k: int) -> A
     return as_floats(model.tree.pose(model.tree.section(point), q[None], frames).r[0])
 
 
+def _cut_point(model: Model, body: str) -> str | None:
+    """Point of the body in a joint at which a loop is cut; None where it has none."""
+    sides = (side for joint in model.tree.loops for side in joint.between)
+    return next((side for side in sides if side.partition(".")[0] == body), None)
+
+
 def _above(model: Model, q: Array, node: Node) -> bool:
     """Whether a joint is above the line from the joint before to the one after it, or to the tool, against gravity."""
     tree, frames = model.tree, model.tree.frames(q[None])
@@ -237,7 +246,7 @@ def _above(model: Model, q: Array, node: Node) -> bool:
         number = tree.index[after.body.name]
         outer = next((other for other in tree.nodes if other.inner.body == number), None)
         if outer is None:
-            point = model.scene.tool_point
+            point = _cut_point(model, after.body.name) or model.scene.tool_point
             end = end if point is None else place(tree.section(point))
             break
         after, end = outer, place(outer.inner)

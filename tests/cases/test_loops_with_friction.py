@@ -181,3 +181,12 @@ def test_damping_of_a_cut_joint_is_its_resistance():
     expected = cut_resistance(model.tree, model.cut, q[None], v[None])[0]
     assert np.abs(expected).max() > 0.1
     np.testing.assert_allclose(cut_damping(model.tree, model.cut, q) @ v, expected, rtol=1e-12)
+
+
+@pytest.mark.parametrize("tables", [planar, in_3d])
+def test_loops_without_motors_have_no_torques_and_say_so(tables):
+    analyses = [{"name": "inverse", "kind": "pcid", "end": 0.02, "output_step": 0.01}]
+    for has_motor in (True, False):
+        keys = tables({"A": {"motor": has_motor}} | {name: {} for name in "BCD"}, analyses)
+        found = ffrobot.solve(ffrobot.make_scene(**keys)).verdict["inverse"].notes
+        assert any(text.startswith("no motors, so no torques") for text in found) != has_motor

@@ -142,3 +142,14 @@ def test_a_posture_that_nobody_chose_is_told(two_link_copy, ffrobot):
 
 def test_plotting_a_scene(two_link_copy, refused):
     assert "scene.toml, which writes .results.h5)" in refused(two_link_copy(), "plot", "scene.toml")
+
+
+def test_blends_that_take_longer_than_stops_are_told():
+    """Both segments go the same way: while they overlap, speeds add up to twice the limit, and all get slower."""
+    motion = {"via": [7.0, -2.0, -7.0], "profile": "trapezoid", "speed": 1.0, "acceleration": 4.0}
+    stops, blended = (program.solve(arm(end=30.0, blend=blend, **motion)) for blend in (0.0, 0.1))
+    assert not [text for text in stops.verdict["inverse"].warnings if "blend" in text]
+    (text,) = [text for text in blended.verdict["inverse"].warnings if "blend" in text]
+    ends = [results.attributes("inverse/trajectories/turn")["end"] for results in (blended, stops)]
+    assert ends[0] > ends[1]
+    assert f"blend = 0.1 takes until t = {ends[0]:.4g} s, stops at all places {ends[1]:.4g} s" in text

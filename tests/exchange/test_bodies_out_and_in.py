@@ -169,14 +169,15 @@ def masses_in_order(text, points):
     return [float(points.mass[np.abs(points.x[:, 0] - value).argmin()]) for value in x]
 
 
-def test_the_other_dialect_of_sid(bodies):
-    """J as (3, 3) and M1 as (row, column, mode)."""
+@pytest.mark.parametrize("structure", [3, 2])
+def test_the_other_dialect_of_sid(structure, bodies):
+    """J as (3, 3), whole or by its upper triangle, and M1 as (row, column, mode)."""
     body = bodies["cloud"]
     text, _ = sid_text(body)
     turned = re.sub(r"m1\(\s*(\d+),\s*(\d+),\s*(\d+)\s*\)", r"m1(\1,\3,\2)", text)
     head, J, tail = re.split(r"(?s)(\n\s+J\n.*?end J\n)", turned, maxsplit=1)
     places = {1: (1, 1), 2: (2, 2), 3: (3, 3), 4: (1, 2), 5: (1, 3), 6: (2, 3)}
-    J = re.sub(r"(nrow +)= +6", r"\1= 3", J)
+    J = re.sub(r"(structure +)= +3", rf"\1= {structure}", re.sub(r"(nrow +)= +6", r"\1= 3", J))
     lines = []
     for line in re.sub(r"(ncol +)= +1", r"\1= 3", J).splitlines():
         entry = re.match(r"\s+m([01])\(\s*(\d+),\s*1\s*(?:,(\s*\d+))?\) += (.*)", line)
@@ -185,9 +186,24 @@ def test_the_other_dialect_of_sid(bodies):
             continue
         a, b = places[int(entry[2])]
         mode = f",{entry[3]}" if entry[3] else ""
-        lines += [f"m{entry[1]}({row},{column}{mode}) = {entry[4]}" for row, column in {(a, b), (b, a)}]
+        lines += [f"m{entry[1]}({row},{column}{mode}) = {entry[4]}" for row, column in {(a, b), (b, a)}
+                  if structure == 3 or row <= column]  # fmt: skip
     back, _ = read_sid(head + "\n".join(lines) + "\n" + tail, body.name)
     assert max(differences(integrals_of(body), integrals_of(back), vars(integrals_of(body))).values()) < EXACT
+
+
+def test_axes_of_nodes_that_are_turned_are_told(bodies):
+    """A_P of node 2, turned by 90° about z; interfaces have no axes of their own."""
+    text, _ = sid_text(bodies["line"])
+    head, node = re.split(r"(?=\n.*new node +=     2)", text, maxsplit=1)
+    node = re.sub(
+        r"m0\( 1, 1\)( +)=.*\n(.*)m0\( 2, 2\)( +)=.*", r"m0( 1, 2)\1= -1.0D0\n\2m0( 2, 1)\3= 1.0D0", node, count=1
+    )
+    turned, remarks = read_sid(head + node, "line")
+    assert [text for text in remarks if text.startswith("AP: turned axes of nodes 2 left out")]
+    straight, none = read_sid(text, "line")
+    assert not [text for text in none if text.startswith("AP")]
+    assert differences(integrals_of(straight), integrals_of(turned), ["S_bar"]) == {"S_bar": 0.0}
 
 
 def test_craig_bampton_matrices(bodies, tmp_path):

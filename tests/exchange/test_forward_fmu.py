@@ -404,6 +404,14 @@ def test_results_of_a_forward_analysis(robot):
         export_file(robot[1].with_name("loaded.results.h5"), "fmu", "swing", None)
 
 
+def test_a_start_away_from_the_guess_is_told(tmp_path):
+    """No path keeps the joints in the equilibrium that an FMU starts from."""
+    scene = tmp_path / "scene.toml"
+    scene.write_text(scene_text("arm") + '\n[initial]\nstate = "static"\n')
+    (text,) = [text for text in export_file(scene, "fmu", None, None).remarks if "hang" in text]
+    assert text.startswith('starts in the equilibrium in which joints "shoulder", "elbow" hang, away from [initial]')
+
+
 def test_the_archive_is_the_library_and_the_model(robot):
     """The binary is that of the installation: no compiler is asked for. The same scene gives the same bytes."""
     import ffrobot.mbs._core as core

@@ -207,3 +207,17 @@ def test_joint_states_of_a_bag(version, tmp_path, ffrobot):
     (tmp_path / "bag" / "metadata.yaml").write_text("not: a bag\n")
     broken = ffrobot("import", tmp_path / "bag", "-o", tmp_path / "other.csv")
     assert (broken.returncode, "expected a bag of ROS" in broken.stderr) == (2, True)
+
+
+def test_motions_that_move_at_their_ends_are_told(tmp_path):
+    """A sine begins at its largest rate and ends at rest after a quarter of its period."""
+    times = np.linspace(0.0, 1.0, 11)
+    points = [
+        {"positions": [np.sin(np.pi / 2 * t), 0.0], "velocities": [np.pi / 2 * np.cos(np.pi / 2 * t), 0.0],
+         "time_from_start": t}
+        for t in times
+    ]  # fmt: skip
+    path = tmp_path / "motion.json"
+    path.write_text(json.dumps({"joint_names": ["hip", "knee"], "points": points}), encoding="utf-8")
+    (remark,) = read_motion(path).remarks
+    assert remark.startswith('"hip" at the first point: velocities of up to 1.57 left out: waypoints begin and')

@@ -28,6 +28,36 @@ def test_elbow_up_and_down(tmp_path):
     np.testing.assert_allclose(second.away, np.radians(120.0), rtol=1e-12)
 
 
+@pytest.mark.parametrize(
+    ("path", "words"),
+    [
+        ({"joint": "D", "value": "1.4"}, ("up", "down")),
+        ({"point": "b.m", "y": "0.25"}, ("down", "up")),
+    ],
+)
+def test_elbows_of_a_loop_next_to_where_it_is_cut(path, words):
+    """Of four bars B is between A and C, at which the loop is cut: above or below the line of these two."""
+    ends = {"a": ([0.2, 0.0], {}), "b": ([0.5, 0.0], {"m": [0.25, 0.1]}), "c": ([0.4, 0.0], {})}
+    model = prepare_scene(make_scene(
+        name="four bars", gravity=[0.0, -9.81],
+        body=[{"name": name, "rigid": {"mass": 1.0, "inertia": 0.02, "center": [0.1, 0.0],
+                                       "points": {"p": [0.0, 0.0], "q": end} | more}}
+              for name, (end, more) in ends.items()],
+        joint=[{"name": name, "type": "revolute", "between": list(sides)} | ({"at": [0.5, 0.0]} if name == "D" else {})
+               for name, *sides in (("A", "ground", "a.p"), ("B", "a.q", "b.p"), ("C", "b.q", "c.q"),
+                                    ("D", "ground", "c.p"))],
+        trajectory=[{"name": "t"} | path],
+        initial={"joints": {"A": 1.0, "B": -0.7, "D": 1.5}},
+        analysis=[{"name": "i", "kind": "pcid", "end": 0.5, "output_step": 0.1}],
+    )).model  # fmt: skip
+    found = start_postures(model)
+    assert [one.branch for one in found] == [{"B": word} for word in words]
+    for one, word in zip(found, words, strict=True):
+        A, B = (model.tree.nodes[model.tree.carried[name]].coordinates(one.q)[0] for name in "AB")
+        b, c = np.exp(1j * A) * 0.2, np.exp(1j * A) * 0.2 + np.exp(1j * (A + B)) * 0.5
+        assert (b.imag > b.real * c.imag / c.real) == (word == "up")
+
+
 @pytest.fixture(scope="module")
 def links_of_six_axes(solved):
     """In the cache: meshing them takes 0.7 GB, of a command here."""

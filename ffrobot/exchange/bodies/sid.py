@@ -23,7 +23,7 @@ from .make import NOT_IN_THE_FILE, modal_body
 ROWS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 """Entries of a symmetric matrix in the six rows of J."""
 LARGEST_ASYMMETRY = 1e-6  # of C_r's M1: a symmetric part is geometric stiffness, or wrong
-SAME = 1e-3  # symmetric parts of G_e and C_r, of the largest
+SAME = 1e-3  # symmetric parts of G_e and C_r, of the largest; rad
 
 
 def sid_text(body: ModalBody) -> tuple[str, tuple[str, ...]]:
@@ -101,7 +101,7 @@ def read_sid(text: str, name: str) -> tuple[ModalBody, tuple[str, ...]]:
         raise InputError("frame: expected at least one node, found none")
     condition, numbers = noted(head, nodes)
     agreed, texts = with_agreed_masses(found)
-    remarks = (NOT_IN_THE_FILE, *texts, *_checks(modal, found, layout))
+    remarks = (NOT_IN_THE_FILE, *texts, *_turned_nodes(modal, layout), *_checks(modal, found, layout))
     return modal_body(name, agreed, nodes, numbers, condition), remarks
 
 
@@ -114,6 +114,16 @@ def _node(section: Section, layout: Layout) -> Node:
     number = int(section.number("number"))
     phi, psi = (taylor(section[key], layout, (3, layout.modes)).m0 for key in ("phi", "psi"))
     return Node(number, Interface(taylor(section["origin"], layout, (3, 1)).m0[:, 0], phi, psi))
+
+
+def _turned_nodes(modal: Section, layout: Layout) -> Iterator[str]:
+    """A line on nodes whose own axes, A_P, are not those of the body, which interfaces here have."""
+    nodes = ((node, part) for node in modal["frame"].inside for part in node.inside if part.name.lower() == "ap")
+    turned = [
+        node.keys["number"] for node, axes in nodes if np.abs(taylor(axes, layout, (3, 3)).m0 - np.eye(3)).max() > SAME
+    ]
+    if turned:
+        yield f"AP: turned axes of nodes {', '.join(turned)} left out: joints there have those of the body"
 
 
 def _integrals(modal: Section, layout: Layout) -> ShapeIntegrals:
@@ -293,7 +303,7 @@ def taylor(section: Section, layout: Layout, *sizes: tuple[int, int]) -> Taylor:
             at = ", ".join(str(k + 1) for k in index)
             raise InputError(f"{section.name}: expected m{order} within {target.shape}, found m{order}({at})")
         target[index] = value
-        if structure == SYMMETRIC and not order:
+        if structure == SYMMETRIC:
             target[index[::-1]] = value
     return found
 

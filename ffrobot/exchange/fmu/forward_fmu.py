@@ -13,7 +13,9 @@ from ...common.version import VERSION
 from ...mbs import _core
 from ...mbs.analysis.forward import Forward
 from ...mbs.model.gears import with_compliance
+from ...mbs.model.known_motion import State
 from ...mbs.model.model import Model, without_paths
+from ...mbs.solve.statics import hanging_joints
 from ...run.mode_choice import mode_levels
 from ...run.prepare import with_bodies
 from ...run.solve import prepare_scene
@@ -55,7 +57,7 @@ def forward_fmu(path: Path, analysis: str | None) -> tuple[bytes, str, str, tupl
         f"binaries/{folder}/{identifier}{suffix}": library.read_bytes(),
     }
     what = f"{chosen.name}, {len(unit.inputs)} inputs, {len(unit.outputs)} outputs"
-    return zipped(content), chosen.name, what, tuple(_remarks(unit, _silent(model), folder))
+    return zipped(content), chosen.name, what, tuple(_remarks(model, unit, folder))
 
 
 class _Logged(Watcher):
@@ -117,10 +119,11 @@ def _check(path: Path, scene: Scene) -> None:
         raise InputError(f'{path}: motors: expected "section" of a scene for an FMU, found "frame"')
 
 
-def _remarks(unit: ForwardUnit, silent: list[str], folder: str) -> list[str]:
+def _remarks(model: Model, unit: ForwardUnit, folder: str) -> list[str]:
     found = [f"inputs are constant over a communication step; binary for {folder} alone, without sources"]
     if not unit.inputs:
         found.append("there are no inputs: no joint has a motor, no link patches")
-    if silent:
+    if silent := _silent(model):
         found.append(f"{quoted(silent)}: no outputs of their coordinates, as they are none of the state")
+    found += hanging_joints(model, State(unit.data.q, unit.data.v))
     return [*found, "limits of motors and patches do not act"]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import json
 import tempfile
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -21,6 +21,7 @@ from ...results.file import Results
 
 TRAJECTORY = "trajectory_msgs/msg/JointTrajectory"
 STATES = "sensor_msgs/msg/JointState"
+MOVING = 0.01  # of the largest rate: less is rest
 NESTED = ("goal", "planned_trajectory", "joint_trajectory", "trajectory")
 """Keys under which messages of planners have a JointTrajectory."""
 
@@ -88,12 +89,27 @@ def _from_json(path: Path) -> JointPath:
         raise InputError(f"expected points with positions and time_from_start, found others: {error!r}") from None
 
 
-def _of_points(joints: Sequence[str], points: Iterable[Mapping[str, Any]]) -> JointPath:
+def _of_points(joints: Sequence[str], points: Sequence[Mapping[str, Any]]) -> JointPath:
     rows = [(_seconds(point["time_from_start"]), point["positions"]) for point in points]
     found = {len(positions) for _, positions in rows}
     if found - {len(joints)}:
         raise InputError(f"expected {len(joints)} positions in each point, found {sorted(found)}")
-    return _motion(joints, [time for time, _ in rows], [positions for _, positions in rows])
+    remarks = _moving_at_ends(joints, [point.get("velocities") for point in points])
+    return _motion(joints, [time for time, _ in rows], [positions for _, positions in rows], *remarks)
+
+
+def _moving_at_ends(joints: Sequence[str], velocities: Sequence[Any]) -> Iterator[str]:
+    """Of motions that begin or end elsewhere than at rest, where all points have velocities."""
+    if any(rates is None or len(rates) != len(joints) for rates in velocities) or not len(velocities):
+        return
+    rates = np.abs(np.array(velocities, dtype=float))
+    for k, end in ((0, "first"), (-1, "last")):
+        moving = [name for name, rate in zip(joints, rates[k], strict=True) if rate > MOVING * rates.max()]
+        if moving:
+            yield (
+                f"{quoted(moving)} at the {end} point: velocities of up to {rates[k].max():.3g} left out: waypoints"
+                " begin and end at rest, so that accelerations there are larger than those of the motion"
+            )
 
 
 def _motion(joints: Sequence[str], times: Sequence[float], positions: Sequence[Any], *remarks: str) -> JointPath:
@@ -141,6 +157,7 @@ def _trajectory(messages: Iterator[Any], topic: str) -> JointPath:
     first, *others = messages
     times = [point.time_from_start.sec + point.time_from_start.nanosec / NANO for point in first.points]
     remarks = [f"{len(others)} later messages on {topic} left out"] if others else []
+    remarks += _moving_at_ends(first.joint_names, [point.velocities for point in first.points])
     return _motion(first.joint_names, times, [point.positions for point in first.points], *remarks)
 
 
