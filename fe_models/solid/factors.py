@@ -21,8 +21,8 @@ from ...common.locks import is_running, this_process
 # Unknowns above which the factors are kept in files: measured, that takes as long and a quarter of the memory.
 OUT_OF_CORE = 300_000
 _ICNTL_OUT_OF_CORE = 22
-# Columns solved for at once, for each of which the factors are read.
-COLUMNS = 16
+# Columns solved for at once, as many as MUMPS takes: it reads the factors once for them.
+COLUMNS = 32
 
 
 class Factors:

@@ -18,8 +18,8 @@ from ...common.arrays import Array
 from ...mesh.compat import coordinate_element, geometry_degree, geometry_nodes, lagrange_element, node_map
 from .elasticity import SolidModel, strain_degree
 
-# Numbers that a chunk of gradients may have: some 10 MB, which stay in the cache.
-CHUNK = 1_000_000
+# Numbers that a chunk of gradients may have: 2 MB, with products of modes as large, which stay in the cache.
+CHUNK = 250_000
 
 # Rows xx, yy, zz, yz, xz, xy.
 VOIGT = ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))
@@ -56,7 +56,7 @@ class Gradients:
         if self.inverse.shape[1] == 1:
             reference = np.swapaxes(self.inverse[:, 0], 1, 2) @ tensor.reshape(c, 3, -1)
         else:
-            reference = np.einsum("cqja,cjqm->caqm", self.inverse, tensor.reshape(c, 3, q, -1), optimize=True)
+            reference = _at_points(np.swapaxes(self.inverse, 2, 3), tensor.reshape(c, 3, q, -1))
         slopes = self.shapes.reshape(-1, self.shapes.shape[2]).T
         return np.asarray(slopes @ reference.reshape(c, 3 * q, -1)).reshape(c, -1, 3, k)
 
@@ -91,9 +91,13 @@ def gradients(model: SolidModel, fields: Array) -> Iterator[Gradients]:
         if straight:
             physical = inverse[:, 0] @ reference.reshape(len(weights), 3, -1)
         else:
-            reference = reference.reshape(len(weights), 3, len(rule), -1)
-            physical = np.einsum("cqja,caqk->cjqk", inverse, reference, optimize=True)
+            physical = _at_points(inverse, reference.reshape(len(weights), 3, len(rule), -1))
         yield Gradients(part, weights, physical.reshape(len(weights), 3, len(rule), 3, k), inverse, shapes)
+
+
+def _at_points(inverse: Array, gradient: Array) -> Array:
+    """(c, 3, q, k): (3, 3) matrices `inverse` (c, q, 3, 3) times `gradient` (c, 3, q, k), point by point."""
+    return np.swapaxes(inverse @ np.swapaxes(gradient, 1, 2), 1, 2)
 
 
 def stresses(model: SolidModel, piece: Gradients, strains: Array) -> Array:
@@ -121,9 +125,9 @@ def internal_forces(model: SolidModel, fields: Array) -> Array:
     total = np.zeros((fields.shape[0] // 3, 3 * k))
     for piece in gradients(model, fields):
         stress = stresses(model, piece, piece.strains()) * piece.weights[:, None, :, None]
-        row = nodes[piece.cells].ravel()
-        collect = sp.csr_matrix((np.ones(row.size), (row, np.arange(row.size))), shape=(len(total), row.size))
-        total += collect @ piece.forces(stress).reshape(row.size, 3 * k)
+        here, row = np.unique(nodes[piece.cells].ravel(), return_inverse=True)
+        collect = sp.csr_matrix((np.ones(row.size), (row, np.arange(row.size))), shape=(here.size, row.size))
+        total[here] += collect @ piece.forces(stress).reshape(row.size, 3 * k)
     return np.ascontiguousarray(model.to_owners(total.T).T).reshape(-1, k)
 
 
