@@ -1,6 +1,6 @@
 #include "core/recursion/motion/newton_system.h"
 
-#include "core/recursion/constrained_aba/multipliers.h"
+#include "core/linear/symmetric_factors.h"
 
 namespace ffrobot::recursion {
 
@@ -12,6 +12,8 @@ namespace {
 
 // N, N m: a force beside which what acts at rest is small, so that differences of accelerations keep their digits
 constexpr double large_force = 1e4;
+
+constexpr double least_root = 1e-100; // of E: B x is found as y / S
 
 // A x, A real
 VectorXd product(const MatrixXd &A, const VectorXd &x) { return A * x; }
@@ -46,8 +48,7 @@ template <class Space> void NewtonSystem<Space>::find_stiff_terms() {
   for (const JointForce &joint : scene_.joint_forces)
     stiffness_[joint.v] += joint.stiffness, is_stiff[static_cast<std::size_t>(joint.v)] = 1;
   for (std::size_t i = 0; i < is_stiff.size(); ++i)
-    if (is_stiff[i])
-      stiff_.push_back(static_cast<Index>(i));
+    (is_stiff[i] ? stiff_ : free_).push_back(static_cast<Index>(i));
 }
 
 // Of friction in joints, at rates (n_v, then cut joints). Near rest dry friction is a stiff damper: a light link's end
@@ -93,16 +94,17 @@ template <class Space> void NewtonSystem<Space>::find_responses() {
     return a;
   };
   const VectorXd start = evaluate(rest_);
-  P_.resize(rest_.size(), static_cast<Index>(stiff_.size()));
-  for (Index s = 0; s < P_.cols(); ++s) {
+  MatrixXd P(rest_.size(), static_cast<Index>(stiff_.size()));
+  for (Index s = 0; s < P.cols(); ++s) {
     VectorXd force = rest_;
     if (const Index i = stiff_[static_cast<std::size_t>(s)]; i < rest_.size())
       force[i] = large_force;
     else
       force = large_force * coupling_.col(i - rest_.size());
-    P_.col(s) = (evaluate(force) - start) / large_force;
+    P.col(s) = (evaluate(force) - start) / large_force;
   }
-  G_ = along_stiff(P_);
+  G_ = along_stiff(P);
+  P_ = P(free_, Eigen::all);
   R_.setZero(rest_.size(), equations);
   VectorXd unit = none;
   for (const int r : w_.active) {
@@ -127,22 +129,26 @@ template <class Space>
 template <class Scalar>
 void NewtonSystem<Space>::factorise(Scalar damping_factor, Scalar stiffness_factor, Factors<Scalar> &to) const {
   const Vector<Scalar> E = damping_factor * damping_(stiff_) + stiffness_factor * stiffness_(stiff_);
-  to.S = E.cwiseSqrt();
+  to.S = E.cwiseSqrt().array() + least_root;
   to.symmetric = to.S.asDiagonal() * G_ * to.S.asDiagonal();
   to.symmetric.diagonal().array() += Scalar(1);
-  recursion::factorise(to.symmetric.data(), static_cast<int>(E.size()));
+  factorise_symmetric(to.symmetric);
 }
 
-// `along`: B R c in, of which y is made
+// x: R c in, zero where it is complex
 template <class Space>
 template <class Scalar>
-typename NewtonSystem<Space>::template Vector<Scalar>
-NewtonSystem<Space>::forces(const Factors<Scalar> &factors, const Scalar *r, Vector<Scalar> along) const {
+void NewtonSystem<Space>::solve(const Factors<Scalar> &factors, const Scalar *r, Eigen::Map<Vector<Scalar>> x) const {
   Vector<Scalar> f = Eigen::Map<const Vector<Scalar>>(r, stiffness_.size())(stiff_);
-  along = factors.S.cwiseProduct(along + product(G_, f));
-  solve_factorised(factors.symmetric.data(), static_cast<int>(f.size()), along.data());
-  f -= factors.S.cwiseProduct(along);
-  return f;
+  Vector<Scalar> y = product(G_, f);
+  if constexpr (std::is_same_v<Scalar, double>)
+    y += along_stiff<VectorXd>(x);
+  y.array() *= factors.S.array();
+  solve_symmetric(factors.symmetric, y);
+  f -= factors.S.cwiseProduct(y);
+  x(free_) += product(P_, f);
+  for (std::size_t s = 0; s < stiff_.size() && stiff_[s] < x.size(); ++s)
+    x[stiff_[s]] = y[static_cast<Index>(s)] / factors.S[static_cast<Index>(s)];
 }
 
 template <class Space> void NewtonSystem<Space>::solve(const double *r, const double *c, double *x) {
@@ -150,12 +156,13 @@ template <class Space> void NewtonSystem<Space>::solve(const double *r, const do
   x_.setZero();
   if (c)
     x_ = R_ * Eigen::Map<const VectorXd>(c, R_.cols());
-  x_ += P_ * forces(real_, r, along_stiff<VectorXd>(x_));
+  solve(real_, r, x_);
 }
 
 template <class Space> void NewtonSystem<Space>::solve(const Complex *r, Complex *x) {
-  const Vector<Complex> zero = Vector<Complex>::Zero(P_.cols());
-  Eigen::Map<Vector<Complex>>(x, rest_.size()) = product(P_, forces(complex_, r, zero));
+  Eigen::Map<Vector<Complex>> x_(x, rest_.size());
+  x_.setZero();
+  solve(complex_, r, x_);
 }
 
 template <class Space> void NewtonSystem<Space>::constrain(const double *x, double *c) {

@@ -4,6 +4,7 @@
 //     N x + C_q^T nu = B^T r, C_q x = c:     x = P f + R c,     (1 + G E) B x = G r + B R c
 // P (n_v, stiff) are accelerations by unit forces along these coordinates while the constraint equations hold, R (n_v,
 // equations) those by which an equation alone accelerates. With y = S B x, S S = E, the matrix is symmetric: 1 + S G S.
+// P and R are used for the other coordinates, of x along stiff ones y tells.
 #pragma once
 
 #include "core/recursion/motion/scene.h"
@@ -41,7 +42,7 @@ private:
   template <class Scalar> using Vector = Eigen::Matrix<Scalar, Eigen::Dynamic, 1>;
   template <class Scalar> struct Factors {
     Vector<Scalar> S;                                                // (stiff)
-    Eigen::Matrix<Scalar, Eigen::Dynamic, Eigen::Dynamic> symmetric; // 1 + S G S as L and 1/D (multipliers.h)
+    Eigen::Matrix<Scalar, Eigen::Dynamic, Eigen::Dynamic> symmetric; // 1 + S G S as L and 1/D (symmetric_factors.h)
   };
 
   void find_stiff_terms();
@@ -52,15 +53,15 @@ private:
   template <class Scalar>
   void factorise(Scalar damping_factor, Scalar stiffness_factor, Factors<Scalar> &factors) const;
   template <class Scalar>
-  Vector<Scalar> forces(const Factors<Scalar> &factors, const Scalar *r, Vector<Scalar> along) const; // f
+  void solve(const Factors<Scalar> &factors, const Scalar *r, Eigen::Map<Vector<Scalar>> x) const;
 
   const Mechanism<Space> &mechanism_;
   const Scene &scene_;
   Workspace<Space, double> w_;
   Eigen::VectorXd q_, rest_, stiffness_, damping_; // (n_q), (n_v) zeros
   Eigen::MatrixXd coupling_;
-  std::vector<Eigen::Index> stiff_; // of the diagonals: entries that may not be zero, ascending
-  Eigen::MatrixXd P_, G_, R_;       // R of all equations, zero of those that are not kept
+  std::vector<Eigen::Index> stiff_, free_; // of the diagonals: entries that may not be zero, ascending; others
+  Eigen::MatrixXd P_, G_, R_;              // P (free, stiff); R of all equations, zero of those that are not kept
   Factors<double> real_;
   Factors<Complex> complex_;
 };

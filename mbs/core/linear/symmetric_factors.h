@@ -1,0 +1,16 @@
+// L D L^T of a dense symmetric matrix without pivoting, real or complex: A = L D L^T, not L D L^H.
+#pragma once
+
+#include <Eigen/Core>
+
+namespace ffrobot {
+
+// The lower half of A (n, n) becomes L and 1/D.
+template <class Scalar> void factorise_symmetric(Eigen::Matrix<Scalar, Eigen::Dynamic, Eigen::Dynamic> &A);
+
+// x (n) in place, with these factors
+template <class Scalar>
+void solve_symmetric(const Eigen::Matrix<Scalar, Eigen::Dynamic, Eigen::Dynamic> &factors,
+                     Eigen::Matrix<Scalar, Eigen::Dynamic, 1> &x);
+
+} // namespace ffrobot
