@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import csv
+import io
 from collections.abc import Iterable, Iterator, Sequence
 from datetime import date, time
-from typing import Any, TextIO
+from typing import Any
 
 DEEPEST = 32  # tables and lists within each other
 LONGEST_TEXT = 20_000  # characters; expressions have a limit of their own below this
@@ -18,20 +19,15 @@ FORMULA = ("=", "+", "-", "@", "\t", "\r")
 """Begins what spreadsheets take for a formula, which may run programs (OWASP, CSV Injection)."""
 
 
-class TableWriter:
-    """Lines of a CSV file (RFC 4180) to `stream`; text that a spreadsheet would run has an apostrophe before it."""
+def as_csv(rows: Iterable[Iterable[object]]) -> str:
+    """Lines of a CSV file (RFC 4180), numbers with all their digits.
 
-    def __init__(self, stream: TextIO) -> None:
-        self._writer = csv.writer(stream, lineterminator="\n")
-
-    def writerow(self, cells: Iterable[object]) -> None:
-        """One line; numbers with all their digits."""
-        self._writer.writerow([f"'{cell}" if _is_formula(cell) else cell for cell in cells])
-
-    def writerows(self, rows: Iterable[Iterable[object]]) -> None:
-        """A line each."""
-        for row in rows:
-            self.writerow(row)
+    Text that a spreadsheet would run has an apostrophe before it.
+    """
+    text = io.StringIO()
+    cells = ([f"'{cell}" if _is_formula(cell) else cell for cell in row] for row in rows)
+    csv.writer(text, lineterminator="\n").writerows(cells)
+    return text.getvalue()
 
 
 def _is_formula(cell: object) -> bool:

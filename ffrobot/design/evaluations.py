@@ -8,7 +8,6 @@ minimax problem: Nocedal & Wright, Numerical Optimization, 2006, section 17.2, l
 
 from __future__ import annotations
 
-import io
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -19,7 +18,7 @@ import numpy as np
 from ..common.arrays import Array, as_floats
 from ..common.errors import InputError
 from ..common.files import write_atomically
-from ..common.tables import TableWriter
+from ..common.tables import as_csv
 from ..results.file import Results
 from ..sweep.runs import RESULTS
 from ..sweep.sweep import Key
@@ -234,17 +233,17 @@ class Evaluations:
 
 def write_designs(found: Evaluations, path: Path) -> None:
     """One line for each design of a search: values of keys and goals, the largest excess of a limit, its folder."""
-    problem, text = found.problem, io.StringIO()
-    writer = TableWriter(text)
+    problem = found.problem
     goals = [problem.objective.text, *(limit.text for limit in problem.limits)]
-    writer.writerow(["design", *map(".".join, found.space.keys), "status", *goals, "violation", "folder", "message"])
+    columns = ["design", *map(".".join, found.space.keys), "status", *goals, "violation", "folder", "message"]
+    rows: list[list[object]] = []
     for k, one in enumerate(found.searched):
         row = one.design.row
         values = one.values if one.completed else ("",) * len(goals)
         violation = problem.violation(one.readings) if one.completed else ""
         status = row.status if one.completed or row.status != "completed" else "failed"
-        writer.writerow([k, *row.values, status, *values, violation, one.design.folder.name, one.failure])
-    write_atomically(path, text.getvalue().encode(), "table of designs", ours=True)
+        rows.append([k, *row.values, status, *values, violation, one.design.folder.name, one.failure])
+    write_atomically(path, as_csv([columns, *rows]).encode(), "table of designs", ours=True)
 
 
 def number(value: object) -> str:

@@ -13,7 +13,7 @@ import numpy as np
 from rich.console import Console
 
 from ..common.files import write_atomically
-from ..common.tables import TableWriter
+from ..common.tables import as_csv
 from ..common.toml_files import load_toml
 from ..common.version import VERSION
 from ..pictures.studies.study import Diagram, Numbers, Study, StudyName, StudyTable, write_study
@@ -103,11 +103,7 @@ class Finding(ABC):
     def write_tables(self, folder: Path) -> Iterator[Path]:
         """Write the tables with all numbers; the files one after the other."""
         for file in self.csv_files():
-            text = io.StringIO()
-            writer = TableWriter(text)
-            writer.writerow(file.columns)
-            writer.writerows(file.rows)
-            write_atomically(folder / file.name, text.getvalue().encode(), file.what, ours=True)
+            write_atomically(folder / file.name, as_csv([file.columns, *file.rows]).encode(), file.what, ours=True)
             yield folder / file.name
 
     def study(self) -> Study:
@@ -152,7 +148,8 @@ def file_name(text: str) -> str:
 def failed_runs(failures: Sequence[str], runs: int) -> Iterator[str]:
     """A line about runs that failed, if any did."""
     if failures:
-        yield f"failed     {len(failures)} of {runs} runs, left out: {failures[0]}"
+        more = f", and {len(failures) - 1} more in the table of runs" if len(failures) > 1 else ""
+        yield f"failed     {len(failures)} of {runs} runs, left out: {failures[0]}{more}"
 
 
 def _say(console: Console, line: str) -> None:

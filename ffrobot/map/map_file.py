@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 from pathlib import Path
 from typing import NamedTuple
 
@@ -13,7 +12,7 @@ from ..common.arrays import Array, as_floats
 from ..common.checksum import MARK, sealed
 from ..common.checksum import METHOD as CHECKSUM
 from ..common.files import write_atomically
-from ..common.tables import TableWriter
+from ..common.tables import as_csv
 from ..common.version import VERSION
 from .pose_map import STATUS, PoseMap
 
@@ -56,19 +55,18 @@ def write_map(found: PoseMap) -> Path:
 
 def _table(found: PoseMap) -> str:
     """A line for each pose: the grid's coordinates, how it went, and all that is not a matrix."""
-    plan, text = found.plan, io.StringIO()
+    plan = found.plan
     grid = np.stack(np.meshgrid(*(axis.values for axis in plan.axes), indexing="ij"), axis=-1)
     names = [axis.name for axis in plan.axes]
     columns = {name: column for name, column in zip(names, grid.reshape(-1, len(names)).T, strict=True)}
     for name, values in {**found.values, "torque_share": torque_share(found)}.items():
         if name.rpartition("/")[2] not in NOT_IN_TABLE:
             columns |= _columns(found, name, values)
-    writer = TableWriter(text)
-    writer.writerow([*names, "status", *(name for name in columns if name not in names)])
+    lines: list[list[object]] = [[*names, "status", *(name for name in columns if name not in names)]]
     rows = zip(*(column.tolist() for column in columns.values()), strict=True)
     for status, row in zip(found.status, rows, strict=True):
-        writer.writerow([*row[: len(names)], STATUS[status], *("" if x != x else x for x in row[len(names) :])])
-    return text.getvalue()
+        lines.append([*row[: len(names)], STATUS[status], *("" if x != x else x for x in row[len(names) :])])
+    return as_csv(lines)
 
 
 def _columns(found: PoseMap, name: str, values: Array) -> dict[str, Array]:

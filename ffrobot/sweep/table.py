@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -10,7 +9,7 @@ from rich.console import Console
 from rich.table import Table
 
 from ..common.files import write_atomically
-from ..common.tables import TableWriter
+from ..common.tables import as_csv
 from .runs import Row
 
 SHOWN = 5  # quantities on the screen
@@ -20,13 +19,11 @@ GAP = 2  # between columns
 def write_table(path: Path, keys: Sequence[str], rows: Sequence[Row]) -> None:
     """One line for each run: number, values of the keys, status, quantities, message."""
     quantities = _quantities(rows)
-    text = io.StringIO()
-    writer = TableWriter(text)
-    writer.writerow(["run", *keys, "status", *quantities, "message"])
+    lines: list[list[object]] = [["run", *keys, "status", *quantities, "message"]]
     for row in rows:
         found = [row.quantities.get(name, "") for name in quantities]
-        writer.writerow([row.number, *row.values, row.status, *found, row.message])
-    write_atomically(path, text.getvalue().encode(), "table of the sweep", ours=True)
+        lines.append([row.number, *row.values, row.status, *found, row.message])
+    write_atomically(path, as_csv(lines).encode(), "table of the sweep", ours=True)
 
 
 def print_table(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import json
 import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -15,7 +14,7 @@ import numpy as np
 from ...common.arrays import Array, as_list, as_rows
 from ...common.errors import InputError, did_you_mean, quoted
 from ...common.extras import extras
-from ...common.tables import TableWriter, shown
+from ...common.tables import as_csv, shown
 from ...common.toml_files import read_text
 from ...results.file import Results
 
@@ -37,11 +36,8 @@ class JointPath:
 
     def csv_text(self) -> str:
         """Columns t and the joints' names, with all digits."""
-        text = io.StringIO()
-        table = TableWriter(text)
-        table.writerow(["t", *self.joints])
-        table.writerows([time, *row] for time, row in zip(self.time.tolist(), as_rows(self.positions), strict=True))
-        return text.getvalue()
+        rows = ([time, *row] for time, row in zip(self.time.tolist(), as_rows(self.positions), strict=True))
+        return as_csv([["t", *self.joints], *rows])
 
 
 def read_motion(path: Path) -> JointPath:
@@ -250,10 +246,7 @@ def csv_text(motion: RobotMotion) -> str:
         columns |= {f"{joint.name}.coordinate": joint.coordinate, f"{joint.name}.rate": joint.rate}
         if joint.moment is not None:
             columns[f"{joint.name}.moment"] = joint.moment
-    text = io.StringIO()
-    TableWriter(text).writerow(columns)
-    lines = [",".join(map(repr, row)) for row in as_rows(np.stack(list(columns.values()), axis=1))]
-    return text.getvalue() + "\n".join(lines) + "\n"
+    return as_csv([columns, *as_rows(np.stack(list(columns.values()), axis=1))])
 
 
 NANO = 1_000_000_000
