@@ -117,8 +117,8 @@ def test_results_say_what_their_modal_coordinates_are(reduced, tmp_path):
 
 
 def test_the_summary_tells_the_number_the_estimate_and_what_is_saved(reduced, tmp_path, capsys):
-    verdict = Results.from_image(results_image(reduced), tmp_path / "x.h5").verdict
-    print_details(reduced, verdict, tmp_path / "x.h5", reduced.seconds, summary_console())
+    results = Results.from_image(results_image(reduced), tmp_path / "x.h5")
+    print_details(reduced, results, reduced.seconds, summary_console())
     printed = " ".join(capsys.readouterr().out.split())
     assert "link1: 3 of 10 modes and 2 static shapes for the others; link2: 3 of 10 modes" in printed
     assert "inverse: error of leaving out the others, estimated: deflections" in printed

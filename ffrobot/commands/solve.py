@@ -88,14 +88,15 @@ def _solve(scene_file: Path, path: Path, again: str, *, resume: bool, strict: bo
     if solution is None:
         click.echo(f"{path}: complete, nothing to go on with")
         return
+    verbose = click.get_current_context().meta.get(VERBOSE)
     with Results(path) as results:
         verdict, posture = results.verdict, chosen_posture(results, solution.model)
-    if click.get_current_context().meta.get(VERBOSE):
-        from ..present.details import print_details
+        if verbose:
+            from ..present.details import print_details
 
-        print_details(solution, verdict, path, {**solution.seconds, "writing": writing}, summary_console())
-        click.echo(f"note       {posture}" if posture else "", nl=bool(posture))
-    else:
+            print_details(solution, results, {**solution.seconds, "writing": writing}, summary_console())
+            click.echo(f"note       {posture}" if posture else "", nl=bool(posture))
+    if not verbose:
         notes = [*solution.path_notes, *solution.link_notes, *([posture] if posture else [])]
         accuracy = "; ".join(error_budget(solution))
         lines = summary_lines(verdict, notes, accuracy, str(path), summary_width(), len(remarked))

@@ -15,7 +15,8 @@ from ..common.arrays import Array
 from ..mbs.analysis.operating_points import RobotAtRest
 from ..mbs.analysis.outcome import Details
 from ..mbs.solve.joint_conditions import translational_stiffness
-from .lines import LOOP_COLUMNS, loop_row, plain_table
+from ..results.tables import Cells, loop_cells
+from .lines import named_tables
 
 FREQUENCIES = 5  # that are listed, and damping ratios
 TRANSFERS = 3  # of one motor to one output, whose zeros are listed: those with the slowest to the right
@@ -24,56 +25,51 @@ UNDAMPED = 1e-9  # ratios below are rounding
 
 def control_tables(details: Mapping[str, Details]) -> Iterator[Table]:
     """A table of each kind that was found, from what analyses found by name."""
-    loops = [loop_row(name, found.metrics) for name, found in details.items() if isinstance(found, LoopRecord)]
-    linear = [row for name, found in details.items() if isinstance(found, LinearModels) for row in _linear(name, found)]
-    at_rest = [
-        row
-        for name, found in details.items()
-        if isinstance(found, LinearModels | RobotAtRest)
-        for row in _condition_rows(name, found)
-    ]
-    placements = [_placement(name, found) for name, found in details.items() if isinstance(found, Placed)]
-    for columns, rows in (
-        (LOOP_COLUMNS, loops),
-        (LINEAR_COLUMNS, linear),
-        (CONDITION_COLUMNS, at_rest),
-        (PLACEMENT_COLUMNS, placements),
-    ):
-        if rows:
-            table = plain_table(*columns)
-            for row in rows:
-                table.add_row(*row)
-            yield table
+    kinds = {"closed loop": _loop, "linear model": _linear, "joints": _conditions, "placement": _placement}
+    for first, rows_of in kinds.items():
+        yield from named_tables(first, (row for name, found in details.items() for row in rows_of(name, found)))
 
 
-LINEAR_COLUMNS = ("linear model", "t (s)", "DOF", "lowest frequencies (Hz)", "largest Re(pole)\n(1/s)")
+Rows = Iterator[tuple[str, Cells]]
 
 
-def _linear(name: str, found: LinearModels) -> Iterator[tuple[str, ...]]:
+def _loop(name: str, found: Details) -> Rows:
+    if isinstance(found, LoopRecord):
+        yield name, loop_cells(found.metrics)
+
+
+def _linear(name: str, found: Details) -> Rows:
     """Frequencies and growth at every time."""
-    for model, modes in zip(found.models, found.modes, strict=True):
-        vibrating = modes.frequency[modes.frequency > 0.0]
-        lowest = ", ".join(f"{f:.4g}" for f in vibrating[:FREQUENCIES])
-        yield name, f"{model.time:g}", f"{model.freedom}", lowest, f"{modes.growth:.3g}" if modes.growth else ""
+    pairs = zip(found.models, found.modes, strict=True) if isinstance(found, LinearModels) else ()
+    for model, modes in pairs:
+        cells = {
+            "t (s)": f"{model.time:g}",
+            "DOF": f"{model.freedom}",
+            "lowest frequencies (Hz)": _lowest(modes.frequency),
+            "largest Re(pole)\n(1/s)": f"{modes.growth:.3g}" if modes.growth else "",
+        }
+        yield name, cells
 
 
-CONDITION_COLUMNS = (
-    "joints", "t (s)", "natural frequencies (Hz)", "at", "stiffness along axes\n(N/mm)", "least, along",
-)  # fmt: skip
+def _lowest(frequency: Array) -> str:
+    return ", ".join(f"{f:.4g}" for f in frequency[frequency > 0.0][:FREQUENCIES])
 
 
-def _condition_rows(name: str, found: LinearModels | RobotAtRest) -> Iterator[tuple[str, ...]]:
+def _conditions(name: str, found: Details) -> Rows:
     """Natural frequencies with motors at rest, and the stiffness of points, at every time."""
-    for t, at in zip(found.times, found.conditions, strict=True):
+    pairs = zip(found.times, found.conditions, strict=True) if isinstance(found, LinearModels | RobotAtRest) else ()
+    for t, at in pairs:
         for condition, held in at.items():
-            frequency = held.modes.frequency
-            lowest = ", ".join(f"{f:.4g}" for f in frequency[frequency > 0.0][:FREQUENCIES]) or "none"
-            label = (f"{name}: {condition}", f"{t:g}", lowest)
-            for point, C in held.compliance.items():
-                yield (*label, point, *_stiffness(C))
-                label = ("", "", "")
-            if not held.compliance:
-                yield (*label, "", "", "")
+            stiffness = [(point, *_stiffness(C)) for point, C in held.compliance.items()] or [("", "", "")]
+            for k, (point, along, least) in enumerate(stiffness):
+                cells = {
+                    "t (s)": "" if k else f"{t:g}",
+                    "natural frequencies (Hz)": "" if k else _lowest(held.modes.frequency) or "none",
+                    "at": point,
+                    "stiffness along axes\n(N/mm)": along,
+                    "least, along": least,
+                }
+                yield "" if k else f"{name}: {condition}", cells
 
 
 def _stiffness(compliance: Array) -> tuple[str, str]:
@@ -86,20 +82,21 @@ def _stiffness(compliance: Array) -> tuple[str, str]:
     return ", ".join(f"{k / 1e3:.4g}" for k in along), f"{least / 1e3:.4g} ({way})"
 
 
-PLACEMENT_COLUMNS = ("placement", "on", "by", "optimum", "evenly spaced", "sets tried")
-
-
-def _placement(name: str, placed: Placed) -> tuple[str, ...]:
+def _placement(name: str, placed: Details) -> Rows:
     """The patches found against as many spread evenly: reach of modes, or the largest voltage of the path."""
+    if not isinstance(placed, Placed):
+        return
     over_path = placed.wanted.criterion == "voltage"
     pair = placed.largest_voltage if over_path else (placed.best.value, placed.even.value)
-    return (
-        name,
-        placed.wanted.body,
-        "voltage" if over_path else f"{placed.wanted.measure} reach",
-        *(f"{value:.4g}" + (" V" if over_path else "") for value in pair),
-        f"{placed.sets}" + (" (evolution)" if placed.method == "evolution" else ""),
-    )
+    best, even = (f"{value:.4g}" + (" V" if over_path else "") for value in pair)
+    cells = {
+        "on": placed.wanted.body,
+        "by": "voltage" if over_path else f"{placed.wanted.measure} reach",
+        "optimum": best,
+        "evenly spaced": even,
+        "sets tried": f"{placed.sets}" + (" (evolution)" if placed.method == "evolution" else ""),
+    }
+    yield name, cells
 
 
 def control_lines(details: Mapping[str, Details]) -> Iterator[str]:

@@ -2,41 +2,42 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from pathlib import Path
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from ..actuation.patches.patches import PatchArray, Voltages
-from ..common.arrays import Array
 from ..mbs.analysis.motors_only import AroundPath, describe_zeros, is_minimum_phase
 from ..mbs.analysis.outcome import Details, Outcome
 from ..mbs.model.body import Body
 from ..mbs.model.model import path_errors
 from ..mbs.model.truncation import modes_kept
-from ..mbs.quantities.stress import BodyStress
-from ..results.verdict import Verdict
+from ..results.file import Results
+from ..results.tables import Cells, analysis_cells, voltage_cells
 from ..run.mode_search import ModeChoice
 from ..run.solution import AnalysisResult, Solution
 from ..scene.pieces import BodyInPieces
 from .control import control_lines, control_tables
-from .lines import alike, error_budget, integrated, integrator_lines, plain_table, warning_lines
+from .lines import alike, error_budget, integrated, integrator_lines, named_tables, warning_lines
+
+OF_FILE = ("status", "outputs", "rejected")  # of analyses: for the table of a report alone
 
 
-def print_details(
-    solution: Solution, verdict: Verdict, path: Path, seconds: Mapping[str, float], console: Console
-) -> None:
+def print_details(solution: Solution, results: Results, seconds: Mapping[str, float], console: Console) -> None:
     """Tables of the analyses and what they found, wall time per stage, what was skipped, where the results are."""
-    console.print(_analyses(solution, verdict))
+    verdict = results.verdict
+    rows = ((one.name, analysis_cells(results, one)) for one in verdict.analyses)
+    shown = ((name, {key: text for key, text in cells.items() if key not in OF_FILE}) for name, cells in rows)
+    for table in named_tables("analysis", shown):
+        console.print(table)
     bending = {name: result.bending for name, result in solution.analyses.items()}
     texts = {name: result.warnings for name, result in solution.analyses.items()}
     for line in warning_lines(bending, texts):
         console.print(f"warning    {line}")
     for line in alike((name, text) for name, result in solution.analyses.items() for text in result.notes):
         console.print(f"note       {line}")
-    for table in _tables(solution):
+    for table in _tables(solution, results):
         console.print()
         console.print(table)
     console.print()
@@ -49,12 +50,7 @@ def print_details(
         notes.add_row(title, text)
     console.print()
     console.print(notes)
-    console.print(f"results    {path}", soft_wrap=True)
-
-
-def _closest(solution: Solution) -> Iterator[tuple[str, AnalysisResult]]:
-    """The analyses by name, at outputs and between."""
-    yield from ((name, one.closer or one) for name, one in solution.analyses.items())
+    console.print(f"results    {results.path}", soft_wrap=True)
 
 
 def _details(solution: Solution) -> dict[str, Details]:
@@ -62,17 +58,12 @@ def _details(solution: Solution) -> dict[str, Details]:
     return {name: result.run.details for name, result in solution.analyses.items()}
 
 
-def _tables(solution: Solution) -> Iterator[Table]:
+def _tables(solution: Solution, results: Results) -> Iterator[Table]:
     """What was found of each kind, where there is any."""
-    voltages = voltage_table(
-        (name, layout, array, result.actuation.voltages[layout])
-        for name, result in _closest(solution)
-        if result.actuation is not None
-        for of_link in solution.patches.values()
-        for layout, array in of_link.arrays.items()
-    )
-    stresses = stress_table((name, one.run.time, one.stresses) for name, one in _closest(solution))
-    yield from (table for table in (voltages, stresses) if table.row_count)
+    rows = ((name, cells) for name in results.analyses for cells in voltage_cells(results, name))
+    yield from named_tables("voltages of", rows)
+    analyses = solution.analyses.items()
+    yield from named_tables("stress in", (row for name, result in analyses for row in _stresses(name, result)))
     yield from control_tables(_details(solution))
 
 
@@ -112,58 +103,16 @@ def _inversion(run: Outcome, around: AroundPath) -> str:
     )
 
 
-def _analyses(solution: Solution, verdict: Verdict) -> Table:
-    table = plain_table(
-        "analysis",
-        "kind",
-        "integrator",
-        "end (s)",
-        "steps",
-        "evaluations",
-        "tolerance",
-        "constraint\nviolation",
-        "wall (s)",
-    )
-    for name, result in solution.analyses.items():
-        analysis, run, is_integrated = result.analysis, result.run.statistics, result.analysis.is_integrated
-        table.add_row(
+def _stresses(name: str, result: AnalysisResult) -> Iterator[tuple[str, Cells]]:
+    """The largest stress of each body, at outputs and between."""
+    closest = result.closer or result
+    for body, stress in closest.stresses.items():
+        value, k, place = stress.largest()
+        most, at, by = f"{value / 1e6:.4g}", f"{closest.run.time[k]:g}", stress.recovery.method
+        yield (
             name,
-            analysis.kind,
-            run.integrator.in_words if is_integrated else "",
-            verdict[name].reached_in_words,
-            f"{run.steps}" if is_integrated else "",
-            f"{run.evaluations}" if is_integrated else "",
-            f"{analysis.tolerance:.0e}" if is_integrated else "",
-            f"{result.motion.violation.max(initial=0.0):.0e}",
-            f"{run.wall_seconds:.3f}",
+            {"of": body, "largest von Mises (MPa)": most, "at": place, "t (s)": at, "by": by},
         )
-    return table
-
-
-def voltage_table(found: Iterable[tuple[str, str, PatchArray, Voltages]]) -> Table:
-    """Of analyses and layouts, by name, with their patches."""
-    table = plain_table("voltages of", "on", "largest (V)", "limit (V)", "required /\nlimit", "condition\nnumber")
-    for analysis, layout, patches, values in found:
-        limit = patches.limit.min()
-        table.add_row(
-            analysis,
-            layout,
-            f"{values.largest:.0f}" if values.largest >= 1e3 else f"{values.largest:.3g}",
-            "none" if limit == np.inf else f"{limit:g}",
-            "" if limit == np.inf else f"{np.abs(values.required / patches.limit).max():.3g}",
-            f"{patches.condition_number:.3g}",
-        )
-    return table
-
-
-def stress_table(analyses: Iterable[tuple[str, Array, Mapping[str, BodyStress]]]) -> Table:
-    """Of each analysis its name, times (T,) in s, and stresses by body."""
-    table = plain_table("stress in", "of", "largest von Mises (MPa)", "at", "t (s)", "by")
-    for name, time, stresses in analyses:
-        for body, stress in stresses.items():
-            value, k, place = stress.largest()
-            table.add_row(name, body, f"{value / 1e6:.4g}", place, f"{time[k]:g}", stress.recovery.method)
-    return table
 
 
 def chosen_modes(bodies: Sequence[Body], choice: ModeChoice) -> str:

@@ -121,11 +121,12 @@ def _results(file: h5py.File) -> str:
     tables = [analyses, datasets]
     closed = {name: group["control"].attrs for name, group in file.items() if "control/commands" in group}
     if closed:
-        from .lines import LOOP_COLUMNS, loop_row  # loads what solves
+        from ..results.tables import loop_cells  # loads the records of scenes
 
-        tables.insert(1, loops := Table(*LOOP_COLUMNS, box=None, padding=(0, 1, 0, 0)))
-        for name, attributes in closed.items():
-            loops.add_row(*loop_row(name, read_metrics(attributes)))
+        cells = {name: loop_cells(read_metrics(attributes)) for name, attributes in closed.items()}
+        tables.insert(1, loops := Table("closed loop", *next(iter(cells.values())), box=None, padding=(0, 1, 0, 0)))
+        for name, of_loop in cells.items():
+            loops.add_row(name, *of_loop.values())
     return "\n".join(lines) + "\n" + "".join(map(_rendered, tables))
 
 

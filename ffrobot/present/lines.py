@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from ..mbs.quantities.attachment_error import JOLT
 from ..mbs.quantities.validity import Bending, deflection_warning, largest
 from ..mbs.solve.integrators import Choice
@@ -15,8 +13,6 @@ from ..run.solution import AnalysisResult, Solution
 if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
-
-    from ..actuation.control.metrics import Metrics
 
 
 def alike(lines: Iterable[tuple[str, str]]) -> Iterator[str]:
@@ -66,6 +62,16 @@ def plain_table(*headers: str) -> Table:
     return table
 
 
+def named_tables(first: str, rows: Iterable[tuple[str, Mapping[str, str]]]) -> Iterator[Table]:
+    """A table of rows by heading (`results.tables`), below `first` their names; none of no rows."""
+    named = list(rows)
+    if named:
+        table = plain_table(first, *named[0][1])
+        for name, cells in named:
+            table.add_row(name, *cells.values())
+        yield table
+
+
 def print_table(console: Console, headers: Iterable[str], rows: Iterable[Iterable[str]]) -> None:
     """Print `rows` below their headers, and an empty line."""
     table = plain_table(*headers)
@@ -73,26 +79,6 @@ def print_table(console: Console, headers: Iterable[str], rows: Iterable[Iterabl
         table.add_row(*row)
     console.print(table, highlight=False)
     console.print()
-
-
-LOOP_COLUMNS = (
-    "closed loop", "verdict", "rms (m)", "max (m)", "settling\n(s)", "overshoot\n(m)", "vibration\n(m)",
-    "final (m)", "work (J)", "torque\n(N·m)", "voltage\n(V)", "at\nlimits",
-)  # fmt: skip
-
-
-def loop_row(name: str, metrics: Metrics) -> Iterator[str]:
-    """One run as text, below `LOOP_COLUMNS`."""
-    yield name
-    yield metrics.verdict
-    for value in (metrics.tip_error_rms, metrics.tip_error_max):
-        yield f"{value:.3g}"
-    yield "no" if np.isnan(metrics.settling_time) else f"{metrics.settling_time:.3g}"
-    yield from (
-        f"{value:.3g}" for value in (metrics.overshoot, metrics.vibration, metrics.residual, metrics.motor_work)
-    )
-    yield from (f"{value:.3g}" for value in (metrics.peak_moment, metrics.peak_voltage))
-    yield f"{100 * metrics.saturated:.2g} %"
 
 
 NOT_ESTIMATED = "not estimated"

@@ -96,7 +96,7 @@ def _of_results(files: Sequence[Results]) -> tuple[dict[str, Any], list[Chart]]:
     all_runs = runs(files)
     is_plane = _is_plane(files)
     moving = mechanism(all_runs)
-    modes, histories = link_modes(all_runs), history_charts(files)
+    modes, histories, answers = link_modes(all_runs), history_charts(files), verdicts(all_runs)
     shapes = surface_modes(modes)
     content = {
         "mechanism": _script_data(moving.data),
@@ -105,8 +105,8 @@ def _of_results(files: Sequence[Results]) -> tuple[dict[str, Any], list[Chart]]:
         "modes_3d": _script_data(shapes),
         "histories": folded(histories),
         "modes": modes,
-        "analyses": analyses_table(all_runs),
-        "verdicts": verdicts(all_runs),
+        "analyses": analyses_table(all_runs, answers),
+        "verdicts": answers,
         "loops": loops_table(all_runs),
         "zeros": zeros_table(all_runs),
         "warnings": warnings_table(all_runs),

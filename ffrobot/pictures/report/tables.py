@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
 from ...common.peaks import largest
-from ...results.file import Results, status_in_words
+from ...results.file import Results
 from ...results.joints import joint_coordinates
+from ...results.linear import read_metrics
+from ...results.tables import Cells, analysis_cells, loop_cells, voltage_cells
 from ...results.verdict import AnalysisVerdict, millimeters, number
 from ..figures.shared import bending_points
 from ..motion import targets
@@ -27,21 +27,17 @@ class Table:
     rows: Sequence[tuple[str, ...]]
 
 
-def analyses_table(runs: Sequence[Run]) -> Table:
-    """One row for each run, as the summary of a solve has it."""
-    heading = ("analysis", "kind", "status", "reached (s)", "outputs", "steps", "rejected", "evaluations",
-               "tolerance", "constraint violation", "wall (s)")  # fmt: skip
-    rows = []
-    for run in runs:
-        about, time = run.results.attributes(run.analysis), run.results.time(run.analysis)
-        integrated = about["integrator"] != "none"
-        counts = tuple(f"{about.get(key, '')}" if integrated else "" for key in ("steps", "rejected", "evaluations"))
-        violation = run.results[f"{run.analysis}/constraint_violation"].max(initial=0.0)
-        rows.append(
-            (run.label, about["kind"], status_in_words(about), f"{time[-1]:g}", f"{len(time)}", *counts,
-             f"{about['tolerance']:.0e}" if integrated else "", f"{violation:.0e}", f"{about['wall_seconds']:.3f}")
-        )  # fmt: skip
-    return Table(heading, rows)
+def _named(first: str, rows: Iterable[tuple[str, Cells]]) -> Table:
+    """Of rows by heading, below `first` the names of their runs."""
+    named = list(rows)
+    heading = (first, *(key.replace("\n", " ") for key in named[0][1])) if named else ()
+    return Table(heading, [(name, *cells.values()) for name, cells in named])
+
+
+def analyses_table(runs: Sequence[Run], verdicts: Sequence[RunVerdict]) -> Table:
+    """One row for each run, as `ffrobot solve --verbose` has it, with more columns."""
+    pairs = zip(runs, verdicts, strict=True)
+    return _named("analysis", ((run.label, analysis_cells(run.results, one.verdict)) for run, one in pairs))
 
 
 def warnings_table(runs: Sequence[Run]) -> Table:
@@ -97,25 +93,8 @@ def _peaks(run: Run) -> Iterator[tuple[str, str, float]]:
 
 def voltages_table(runs: Sequence[Run]) -> Table:
     """What the patches of every link should give, and what they can."""
-    heading = (
-        "analysis",
-        "patches on",
-        "largest required (V)",
-        "limit (V)",
-        "required /\nlimit",
-        "condition number of Φ_V",
-    )
-    rows = []
-    for run in runs:
-        for body in run.results.names(f"{run.analysis}/pzt"):
-            group = f"{run.analysis}/pzt/{body}"
-            about, patches = run.results.attributes(group), range(run.results[f"{group}/required_voltage"].shape[1])
-            required = np.array([run.results.peak(f"{group}/required_voltage[{k}]")[0] for k in patches])
-            limits = np.atleast_1d(about["limit"])  # one for all patches, or one each
-            times = np.max(required / limits)
-            limit = (f"{limits.min():g}", f"{times:.3g}") if np.isfinite(limits).any() else ("none", "")
-            rows.append((run.label, body, f"{required.max():.4g}", *limit, f"{about['condition_number']:.3g}"))
-    return Table(heading, rows)
+    cells = ((run.label, of) for run in runs for of in voltage_cells(run.results, run.analysis))
+    return _named("voltages of", cells)
 
 
 def origins_table(files: Sequence[Results], studies: Sequence[StudyPart]) -> Table:
@@ -137,21 +116,6 @@ def origins_table(files: Sequence[Results], studies: Sequence[StudyPart]) -> Tab
 
 def _sha256(content: bytes) -> str:
     return hashlib.sha256(content).hexdigest()
-
-
-LOOP_KEYS = (
-    ("verdict", "verdict", 0.0),
-    ("tip error, RMS (mm)", "tip_error_rms", 1e3),
-    ("largest (mm)", "tip_error_max", 1e3),
-    ("settled (s)", "settling_time", 1.0),
-    ("vibration (mm)", "vibration", 1e3),
-    ("at the end (mm)", "residual", 1e3),
-    ("work (J)", "motor_work", 1.0),
-    ("peak torque (N·m)", "peak_moment", 1.0),
-    ("largest voltage (V)", "peak_voltage", 1.0),
-    ("at limits (% of samples)", "saturated", 100.0),
-)
-"""Heading, attribute of control/, and what it is multiplied by (0: a word)."""
 
 
 @dataclass(frozen=True)
@@ -186,13 +150,9 @@ def verdicts(runs: Sequence[Run]) -> list[RunVerdict]:
 
 def loops_table(runs: Sequence[Run]) -> Table:
     """Closed loops, one row each."""
-    rows = []
-    for run in runs:
-        if run.results.has(f"{run.analysis}/control/commands"):
-            about = run.results.attributes(f"{run.analysis}/control")
-            cells = (f"{scale * about[key]:.4g}" if scale else str(about[key]) for _, key, scale in LOOP_KEYS)
-            rows.append((run.label, *("no" if cell == "nan" else cell for cell in cells)))
-    return Table(("closed loop", *(heading for heading, _, _ in LOOP_KEYS)), rows)
+    closed = (run for run in runs if run.results.has(f"{run.analysis}/control/commands"))
+    metrics = ((run.label, run.results.attributes(f"{run.analysis}/control")) for run in closed)
+    return _named("closed loop", ((label, loop_cells(read_metrics(about))) for label, about in metrics))
 
 
 def zeros_table(runs: Sequence[Run]) -> Table:

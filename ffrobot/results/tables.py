@@ -1,0 +1,71 @@
+"""Tables of a results file as terminal and report have them: rows of text by their headings."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from .file import Results, status_in_words
+from .verdict import AnalysisVerdict
+
+if TYPE_CHECKING:
+    from ..actuation.control.metrics import Metrics
+
+Cells = dict[str, str]
+"""A row by heading, without the name of the analysis."""
+
+
+def analysis_cells(results: Results, verdict: AnalysisVerdict) -> Cells:
+    """How an analysis went, and what it took."""
+    from ..mbs.solve.integrators import Choice  # loads the core
+
+    about, time = results.attributes(verdict.name), results.time(verdict.name)
+    integrated, violation = about["integrator"] != "none", results[f"{verdict.name}/constraint_violation"]
+    of_steps = {key: f"{about.get(key, '')}" if integrated else "" for key in ("steps", "rejected", "evaluations")}
+    return {
+        "kind": str(about["kind"]),
+        "status": status_in_words(about),
+        "integrator": Choice(str(about["integrator"]), "").in_words if integrated else "",
+        "end (s)": verdict.reached_in_words,
+        "outputs": f"{len(time)}",
+        **of_steps,
+        "tolerance": f"{about['tolerance']:.0e}" if integrated else "",
+        "constraint\nviolation": f"{violation.max(initial=0.0):.0e}",
+        "wall (s)": f"{about['wall_seconds']:.3f}",
+    }
+
+
+def voltage_cells(results: Results, analysis: str) -> Iterator[Cells]:
+    """What the patches of every layout should give, and what they can."""
+    for layout in results.names(f"{analysis}/pzt"):
+        group = f"{analysis}/pzt/{layout}"
+        about, patches = results.attributes(group), range(results[f"{group}/required_voltage"].shape[1])
+        required = np.array([results.peak(f"{group}/required_voltage[{k}]")[0] for k in patches])
+        limits = np.atleast_1d(about["limit"])  # one for all patches, or one each
+        is_limited = np.isfinite(limits).any()
+        yield {
+            "on": layout,
+            "largest (V)": f"{required.max():.0f}" if required.max() >= 1e3 else f"{required.max():.3g}",
+            "limit (V)": f"{limits.min():g}" if is_limited else "none",
+            "required /\nlimit": f"{np.max(required / limits):.3g}" if is_limited else "",
+            "condition\nnumber": f"{about['condition_number']:.3g}",
+        }
+
+
+def loop_cells(metrics: Metrics) -> Cells:
+    """How well a closed loop follows its reference, and what that takes."""
+    return {
+        "verdict": metrics.verdict,
+        "rms (m)": f"{metrics.tip_error_rms:.3g}",
+        "max (m)": f"{metrics.tip_error_max:.3g}",
+        "settling\n(s)": "no" if np.isnan(metrics.settling_time) else f"{metrics.settling_time:.3g}",
+        "overshoot\n(m)": f"{metrics.overshoot:.3g}",
+        "vibration\n(m)": f"{metrics.vibration:.3g}",
+        "final (m)": f"{metrics.residual:.3g}",
+        "work (J)": f"{metrics.motor_work:.3g}",
+        "torque\n(N·m)": f"{metrics.peak_moment:.3g}",
+        "voltage\n(V)": f"{metrics.peak_voltage:.3g}",
+        "at\nlimits": f"{100 * metrics.saturated:.2g} %",
+    }
