@@ -77,17 +77,19 @@ class LinkTarget:
 
     def files(self, changes: dict[Key, float], output: Path | None) -> dict[Path, str]:
         """The text of the new link file, by where it goes."""
-        path = output or fitted_name(self._path)
-        if path.parent.resolve() != self._path.parent.resolve():
-            raise InputError(
-                f"{path}: output: expected a file next to {self._path}, to which its file names are relative"
-            )
-        return {path: with_values(read_text(self._path, "link file"), dict(changes))}
+        return {_beside(self._path, output): with_values(read_text(self._path, "link file"), dict(changes))}
 
 
 def fitted_name(path: Path, more: str = "") -> Path:
     """LINK.fitted.toml of LINK.toml, `more` before the ending."""
     return path.with_name(f"{path.stem}{more}.fitted.toml")
+
+
+def _beside(path: Path, output: Path | None) -> Path:
+    """`output`, or the fitted file of `path`. Raises `InputError` for one elsewhere."""
+    if output is not None and output.parent.resolve() != path.parent.resolve():
+        raise InputError(f"{output}: output: expected a file next to {path}, to which its file names are relative")
+    return output or fitted_name(path)
 
 
 ANALYSIS = {"name": "fit", "kind": "linear"}
@@ -130,11 +132,7 @@ class RobotTarget:
 
     def files(self, changes: dict[Key, float], output: Path | None) -> dict[Path, str]:
         """The text of the new scene file and of the link files that change, by where they go."""
-        path = output or fitted_name(self._path)
-        if path.parent.resolve() != self._path.parent.resolve():
-            raise InputError(
-                f"{path}: output: expected a file next to {self._path}, to which its file names are relative"
-            )
+        path = _beside(self._path, output)
         of_scene: dict[Key, float | str] = {}
         of_links: dict[str, dict[Key, float | str]] = {}
         for key, value in changes.items():
