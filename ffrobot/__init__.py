@@ -21,11 +21,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from .api import plot_results, solve, view_file, write_movie, write_report, write_study
     from .common.errors import FfrobotError, FfrobotWarning, InputError, SolveError
-    from .design.front import trade_off
-    from .design.optimise import optimise
-    from .design.screening import screening
-    from .design.sensitivity import sensitivity
-    from .design.uncertainty import uncertainty
+    from .design.studies import optimise, screening, sensitivity, trade_off, uncertainty
     from .fe_models.link import make_link
     from .fe_models.modal_body import ModalBody
     from .fe_models.modal_body_file import read_modal_body
@@ -40,11 +36,6 @@ if TYPE_CHECKING:
 _NAMES = {
     ".api": ("plot_results", "solve", "view_file", "write_movie", "write_report", "write_study"),
     ".common.errors": ("FfrobotError", "FfrobotWarning", "InputError", "SolveError"),
-    ".design.front": ("trade_off",),
-    ".design.optimise": ("optimise",),
-    ".design.screening": ("screening",),
-    ".design.sensitivity": ("sensitivity",),
-    ".design.uncertainty": ("uncertainty",),
     ".fe_models.link": ("make_link",),
     ".fe_models.modal_body": ("ModalBody",),
     ".fe_models.modal_body_file": ("read_modal_body",),
@@ -53,6 +44,7 @@ _NAMES = {
     ".run.watcher": ("Watcher",),
     ".scene.load": ("load_scene", "make_scene"),
     ".scene.scene": ("Scene",),
+    ".design.studies": ("optimise", "screening", "sensitivity", "trade_off", "uncertainty"),
 }  # fmt: skip
 _HOME = {name: module for module, names in _NAMES.items() for name in names}
 

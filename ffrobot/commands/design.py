@@ -1,6 +1,6 @@
 """The commands that compare designs: `sensitivity`, `optimise` and `uncertainty`.
 
-Options have the names of the arguments of the functions in `design` that do the work, which have the defaults, too.
+Options are parameters of the functions of `design.studies` that do the work.
 """
 
 # ruff: noqa: ANN401 (what those functions take, they check)
@@ -14,8 +14,9 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ..common.errors import InputError, SolveError
+from ..design import studies
 from ..present.logs import FILE, logging_options, python_option
-from .options import F, protect, runs_options
+from .options import F, options_of, protect, runs_options
 
 if TYPE_CHECKING:
     from ..design.finding import Finding
@@ -60,20 +61,7 @@ def _study(
 
 
 @click.command()
-@click.option("--of", metavar="RESPONSE", multiple=True, required=True, help="Scalar response; repeatable.")
-@click.option("--to", metavar="KEY,KEY …", multiple=True, required=True, help="Parameters; repeatable.")
-@click.option(
-    "--step",
-    type=click.FloatRange(1e-6, 0.2),
-    default=0.01,
-    show_default=True,
-    help="Largest change of a parameter, relative to its value.",
-)
-@click.option(
-    "--tolerance",
-    type=click.FloatRange(1e-10, 1e-3),
-    help="Tolerance of the runs, if the scene has a larger one.  [default: 1e-07 with reused time steps, else 1e-09]",
-)
+@options_of(studies.sensitivity, "of", "to", "step", "tolerance")
 @study_options("SCENE.sensitivity", "Tornado diagrams.")
 def sensitivity(scene_file: Path, of: tuple[str, ...], to: tuple[str, ...], output: Path | None, **how: Any) -> None:
     """Sensitivity analysis: derivatives of scalar responses by parameters of a scene and its links.
@@ -91,39 +79,14 @@ def sensitivity(scene_file: Path, of: tuple[str, ...], to: tuple[str, ...], outp
     time; a note reports if another peak becomes the largest. The same command resumes a stopped study and recomputes
     changed runs.
     """  # noqa: D301 (click wants the backspace itself)
-    from ..design.sensitivity import sensitivity as find
-
     keys = [key for text in to for key in text.split(",")]
-    _study(find, scene_file, of, keys, folder=output or scene_file.with_suffix(".sensitivity"), **how)
-
-
-METHODS = ("auto", "slsqp", "trust-constr", "differential-evolution", "all")
+    _study(studies.sensitivity, scene_file, of, keys, folder=output or scene_file.with_suffix(".sensitivity"), **how)
 
 
 @click.command()
-@click.option("--minimise", "--minimize", metavar="RESPONSE", help="Response to minimize, as in sensitivity.")
-@click.option("--maximise", "--maximize", metavar="RESPONSE", help="Response to maximize.")
-@click.option("--against", metavar="RESPONSE", help="Second response to minimize: Pareto front of both.")
-@click.option(
-    "--points", type=click.IntRange(3, 1000), default=8, show_default=True, help="Number of designs on that front."
-)
-@click.option("--subject-to", metavar='"RESPONSE <= NUMBER"', multiple=True, help='Limit, or with ">="; repeatable.')
-@click.option(
-    "--vary", metavar="KEY=LOW:HIGH", multiple=True, required=True, help="Parameter with its range or set; repeatable."
-)
-@click.option("--method", type=click.Choice(METHODS), default="auto", show_default=True, help="The optimiser.")
-@click.option("--starts", type=click.IntRange(1, 1000), default=1, show_default=True, help="Searches along gradients.")
-@click.option("--seed", type=click.IntRange(0, 2**32 - 1), default=0, show_default=True, help="Seed of random numbers.")
-@click.option(
-    "--runs", type=click.IntRange(1, 100_000), default=1000, show_default=True, help="Largest number of runs."
-)
-@click.option(
-    "--tolerance",
-    type=click.FloatRange(1e-10, 1e-3),
-    default=1e-8,
-    show_default=True,
-    help="Tolerance of the runs, if the scene has a larger one.",
-)
+@options_of(studies.optimise, "minimise", "maximise")
+@options_of(studies.trade_off, "against", "points")
+@options_of(studies.optimise, "subject_to", "vary", "method", "starts", "seed", "runs", "tolerance")
 @study_options("SCENE.optimum", "Diagrams of the designs.")
 def optimise(scene_file: Path, vary: tuple[str, ...], output: Path | None, **how: Any) -> None:
     """Optimisation: parameters and discrete choices that minimize an objective within limits.
@@ -146,13 +109,9 @@ def optimise(scene_file: Path, vary: tuple[str, ...], output: Path | None, **how
     """  # noqa: D301 (click wants the backspace itself)
     folder, points = output or scene_file.with_suffix(".optimum"), how.pop("points")
     if how["against"] is None:
-        from ..design.optimise import optimise as find
-
         del how["against"]
-        _study(find, scene_file, vary, folder=folder, **how)
+        _study(studies.optimise, scene_file, vary, folder=folder, **how)
         return
-    from ..design.front import trade_off
-
     method, starts, maximised, _ = (how.pop(key) for key in ("method", "starts", "maximise", "seed"))
     if maximised is not None or how["minimise"] is None:
         raise InputError("--against: expected --minimise RESPONSE with it: both responses are minimized")
@@ -160,31 +119,17 @@ def optimise(scene_file: Path, vary: tuple[str, ...], output: Path | None, **how
         raise InputError(
             "--against: expected --method slsqp and one start: each search begins at its neighbour's design"
         )
-    _study(trade_off, scene_file, vary, folder=folder, points=points, **how)
+    _study(studies.trade_off, scene_file, vary, folder=folder, points=points, **how)
 
 
 @click.command()
-@click.option("--of", metavar="RESPONSE|HISTORY", multiple=True, required=True, help="Response or history; repeatable.")
-@click.option(
-    "--spread",
-    metavar="KEY=SPREAD",
-    multiple=True,
-    required=True,
-    help="Uncertain parameter with its distribution; repeatable.",
-)
-@click.option(
-    "--samples", metavar="N", type=int, default=200, show_default=True, help="Number of samples of a Latin hypercube."
-)
-@click.option("--seed", type=click.IntRange(0, 2**63 - 1), default=0, show_default=True, help="Seed of the samples.")
+@options_of(studies.uncertainty, "of", "spread", "samples", "seed")
 @click.option(
     "--by", type=click.Choice(["samples", "gradients", "screening"]), default="samples", show_default=True,
     help="Method: samples, two runs per parameter, or elementary effects of many parameters (Morris).",
 )  # fmt: skip
-@click.option("--indices", is_flag=True, help="Sobol indices, with N/2 more runs per parameter.")
-@click.option(
-    "--trajectories", metavar="R", type=int, default=10, show_default=True,
-    help="Number of trajectories of --by screening, each with one run per parameter and one more.",
-)  # fmt: skip
+@options_of(studies.uncertainty, "indices")
+@options_of(studies.screening, "trajectories")
 @study_options("SCENE.uncertainty", "Diagrams of bands and rankings.")
 def uncertainty(
     scene_file: Path, of: tuple[str, ...], spread: tuple[str, ...], output: Path | None, trajectories: int, **how: Any
@@ -204,13 +149,9 @@ def uncertainty(
     """  # noqa: D301 (click wants the backspace itself)
     folder = output or scene_file.with_suffix(".uncertainty")
     if how["by"] == "screening":
-        from ..design.screening import screening
-
         if how["indices"]:
             raise InputError("uncertainty: --indices: expected --by samples next to it, found --by screening")
         rest = {key: value for key, value in how.items() if key not in ("samples", "by", "indices")}
-        _study(screening, scene_file, of, spread, folder=folder, trajectories=trajectories, **rest)
+        _study(studies.screening, scene_file, of, spread, folder=folder, trajectories=trajectories, **rest)
         return
-    from ..design.uncertainty import uncertainty as find
-
-    _study(find, scene_file, of, spread, folder=folder, **how)
+    _study(studies.uncertainty, scene_file, of, spread, folder=folder, **how)

@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING
 import click
 
 from ..common.errors import InputError
-from ..common.parallel import processors
 from ..present.logs import FILE, logging_options, python_option
-from .options import protect
+from .options import processes_option, protect
 
 if TYPE_CHECKING:
     from ..common.arrays import Array
@@ -36,10 +35,7 @@ if TYPE_CHECKING:
     help="Frequency response of the point, with these frequencies (Hz).",
 )
 @click.option("--figures/--no-figures", default=True, show_default=True, help="Pictures of the map.")
-@click.option(
-    "-j", "--processes", type=click.IntRange(1, 1000), default=processors, show_default="one for each processor",
-    help="Number of parallel processes.",
-)  # fmt: skip
+@processes_option("Number of parallel processes.")
 @click.option("-o", "--output", metavar="DIR", type=FILE, help="Folder of the map [SCENE.map next to the input].")
 @python_option
 @logging_options

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+import inspect
+import re
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
-from typing import TypeVar
+from typing import Annotated, Any, Literal, TypeVar, get_args, get_origin
 
 import click
 
@@ -17,6 +19,14 @@ F = TypeVar("F", bound=Callable[..., object])
 POSITIVE = click.FloatRange(0.0, min_open=True)
 
 
+def processes_option(text: str) -> Callable[[F], F]:
+    """Give a command `-j`."""
+    return click.option(
+        "-j", "--processes", type=click.IntRange(1, 1000), default=processors, show_default="one for each processor",
+        help=text,
+    )  # fmt: skip
+
+
 def runs_options(folder: str, of: str = "Folder") -> Callable[[F], F]:
     """Give a command `-j`, `--retry` and `-o`, by default `folder`; `of`: what is in it."""
 
@@ -24,19 +34,43 @@ def runs_options(folder: str, of: str = "Folder") -> Callable[[F], F]:
         for option in (
             click.option("-o", "--output", metavar="DIR", type=FILE, help=f"{of} [{folder} next to the input]."),
             click.option("--retry", is_flag=True, help="Repetition of failed runs."),
-            click.option(
-                "-j",
-                "--processes",
-                type=click.IntRange(1, 1000),
-                default=processors,
-                show_default="one for each processor",
-                help="Number of parallel runs.",
-            ),
+            processes_option("Number of parallel runs."),
         ):
             command = option(command)
         return command
 
     return add
+
+
+def options_of(function: Callable[..., object], *names: str) -> Callable[[F], F]:
+    """Give a command parameters of a function as options, with types, defaults and texts (see `design.studies`)."""
+    parameters = inspect.signature(function).parameters
+    args = (inspect.getdoc(function) or "").partition("Args:\n")[2].partition("\n\n")[0]
+    entries = dict(re.findall(r"^ {4}(\w+): (.+(?:\n {8}.+)*)", args, re.MULTILINE))
+
+    def add(command: F) -> F:
+        for name in reversed(names):
+            flags = dict.fromkeys(f"--{one.replace('_', '-')}" for one in (name, name.replace("mise", "mize")))
+            command = click.option(*flags, **_settings(parameters[name], entries[name]))(command)
+        return command
+
+    return add
+
+
+def _settings(parameter: inspect.Parameter, entry: str) -> dict[str, Any]:
+    """What click wants to know of one; its entry of Args begins with the help: a sentence, and maybe a bracket."""
+    annotation, needed = parameter.annotation, parameter.kind is parameter.POSITIONAL_OR_KEYWORD
+    kind, *about = get_args(annotation) if get_origin(annotation) is Annotated else (annotation,)
+    default = None if parameter.default is parameter.empty else parameter.default
+    several = get_origin(kind) is Sequence
+    match = re.match(r"(.+?)(\.(?=\s|$)(?:  \[.*\])?)", re.sub(r"\n +", " ", entry))
+    assert match is not None
+    text = match[1][0].upper() + match[1][1:] + "; repeatable" * several + match[2]
+    found = {"help": text, "multiple": several, "is_flag": kind is bool, "required": needed, "default": default}
+    found["show_default"] = not (default is None or several or kind is bool)
+    if get_origin(kind) is Literal:
+        found["type"] = click.Choice(get_args(kind))
+    return found | {"metavar" if isinstance(one, str) else "type": one for one in about}
 
 
 def protect(paths: Iterable[Path]) -> None:

@@ -15,16 +15,15 @@ import numpy as np
 
 from ..common.arrays import Array, as_floats
 from ..common.errors import InputError, SolveError
-from ..common.files import AnyPath
 from ..pictures.studies.study import Diagram, Points
 from ..run.watcher import Watcher
-from .designs import Designs, changes_for, may_repeat, runs_of
+from .designs import Designs, Runs, changes_for, may_repeat
 from .evaluations import Evaluated, Evaluations, SpentError, number
 from .finding import CsvFile, Finding, Section, floats, numbers, with_unit
 from .goals import KEPT, Limit, Problem, parse_goal, read_problem
-from .local_search import AIM, search_from
-from .optimality import Differentiation, Optimality
-from .optimise import MOST, TOLERANCE, check_bounds, check_start
+from .local_search import AIM, Local, search_from
+from .optimality import Differentiation
+from .optimise import check_bounds, check_start
 from .optimum_record import parallel, states_of
 from .readings import Goal, Reading
 from .variables import Place, Space, read_space
@@ -148,69 +147,25 @@ def _state(one: FrontPoint) -> str:
     return "beyond a limit" if not one.feasible else "" if one.converged else "not converged"
 
 
-POINTS = 8
 SAME = 1e-6  # of the second goal: ends of a front that are one design
 
 
-def trade_off(
-    scene: AnyPath,
-    vary: Sequence[str],
-    output: AnyPath | None = None,
-    *,
-    minimise: str,
-    against: str,
-    points: int = POINTS,
-    subject_to: Sequence[str] = (),
-    runs: int = MOST,
-    tolerance: float = TOLERANCE,
-    processes: int = 1,
-    retry: bool = False,
-    allow_python: Sequence[AnyPath] = (),
-    watcher: Watcher | None = None,
-) -> Front:
-    """Pareto front: the least of one response for each of `points` values of another: `ffrobot optimise … --against`.
-
-    Args:
-        scene: the scene file.
-        vary: parameters, as in `optimise`.
-        output: folder of the designs, which a later call reuses; None: they are not kept.
-        minimise: the first response.
-        against: the second response.
-        points: number of designs on the front.
-        subject_to: limits, as in `optimise`.
-        runs: largest number of runs of all searches together.
-        tolerance: of the runs, if the scene has a larger one.
-        processes: runs in parallel.
-        retry: whether to repeat designs that failed before.
-        allow_python: as in `solve`.
-        watcher: an object that observes progress and can stop the study.
-
-    Returns:
-        The designs of the front.
-
-    Raises:
-        InputError: as in `optimise`; discrete sets; fewer than three points; responses with the same optimum.
-        SolveError: a design with which a search begins does not complete.
-
-    Example:
-        front = ffrobot.trade_off(
-            "scene.toml", ["joint.1.gear_ratio=10:200"], minimise="mass", against="rms tip_error", points=6
-        )
-    """
-    if points < 3:
-        raise InputError(f"optimise: --points: expected at least 3, found {points}")
-    with runs_of("optimise", scene, output, allow_python, processes, retry, watcher) as runner:
-        path, problem = runner.path, read_problem(minimise, None, subject_to)
-        space, other = read_space(path, vary), parse_goal(against, "--against")
-        if other.text == problem.objective.text:
-            raise InputError(f'--against: expected another response than "{other.text}", which is minimized')
-        if catalogue := next((v for v in space.variables if v.is_catalogue), None):
-            raise InputError(f"--against: expected numbers between bounds, found the discrete set of {catalogue.name}")
-        check_start(path, space, "slsqp")
-        fixed = changes_for(path, (*problem.goals, other), tolerance, keep_steps=may_repeat(space.keys))
-        designs = Designs(runner, space.keys, space.own, fixed)
-        check_bounds(designs, space)
-        return _Searches(path, space, designs, problem, other, runs, tolerance, runner.watcher).front(points)
+def find_front(
+    runner: Runs, vary: Sequence[str], minimise: str, against: str, points: int, subject_to: Sequence[str], runs: int,
+    tolerance: float,
+) -> Front:  # fmt: skip
+    """See `ffrobot.trade_off`."""
+    path, problem = runner.path, read_problem(minimise, None, subject_to)
+    space, other = read_space(path, vary), parse_goal(against, "--against")
+    if other.text == problem.objective.text:
+        raise InputError(f'--against: expected another response than "{other.text}", which is minimized')
+    if catalogue := next((v for v in space.variables if v.is_catalogue), None):
+        raise InputError(f"--against: expected numbers between bounds, found the discrete set of {catalogue.name}")
+    check_start(path, space, "slsqp")
+    fixed = changes_for(path, (*problem.goals, other), tolerance, keep_steps=may_repeat(space.keys))
+    designs = Designs(runner, space.keys, space.own, fixed)
+    check_bounds(designs, space)
+    return _Searches(path, space, designs, problem, other, runs, tolerance, runner.watcher).front(points)
 
 
 @dataclass
@@ -232,8 +187,8 @@ class _Searches:
         """The ends, then from the first one on to the second."""
         start = tuple(float(u or 0.0) for u in self.space.start())
         first = self._least(self.problem, start, f"1 of {count}")
-        last = self._least(replace(self.problem, objective=self.against), first.best.place, f"{count} of {count}")
-        high, low = (self._read(self.against, one.best).value for one in (first, last))
+        last = self._least(replace(self.problem, objective=self.against), first.design.place, f"{count} of {count}")
+        high, low = first.against, last.against
         if high - low <= SAME * abs(high):
             raise InputError(
                 f'--against: expected responses with different optima: where "{self.problem.objective.text}" is'
@@ -242,17 +197,15 @@ class _Searches:
         found = [first]
         for k, bound in enumerate(_between(high, low, count), start=2):
             limits = (Limit(self.against, 1.0, bound), *self.problem.limits)
-            found.append(self._least(replace(self.problem, limits=limits), found[-1].best.place, f"{k} of {count}"))
-        units = [self._read(goal, first.best).unit for goal in (self.problem.objective, self.against)]
-        middle = [self._point(one, self._price(one)) for one in found[1:]]
+            found.append(self._least(replace(self.problem, limits=limits), found[-1].design.place, f"{k} of {count}"))
+        units = [self._read(goal, first.design).unit for goal in (self.problem.objective, self.against)]
         return Front(
             self.path, (self.problem.objective.text, self.against.text), (units[0], units[1]),
-            tuple(map(".".join, self.space.keys)),
-            (self._point(first, np.nan), *middle, self._point(last, np.nan)), len(self.ran), self.tolerance,
-            self.space, self.problem, tuple(map(self._with_both, self.tried.values())),
+            tuple(map(".".join, self.space.keys)), (*found, last), len(self.ran), self.tolerance, self.space,
+            self.problem, tuple(map(self._with_both, self.tried.values())),
         )  # fmt: skip
 
-    def _least(self, problem: Problem, start: Place, title: str) -> Search:
+    def _least(self, problem: Problem, start: Place, title: str) -> FrontPoint:
         evaluations = Evaluations(self.designs, self.space, problem, self.most - len(self.ran))
         differentiation = Differentiation(self.path, evaluations, self.tolerance)
         try:
@@ -266,23 +219,19 @@ class _Searches:
         self.tried |= {one.design.folder: one for one in evaluations.searched}
         if not found.best.completed:
             raise SolveError(f"{self.path}: no design could be run to its end: {found.message}")
-        return Search(found.best, found.optimality, found.message, evaluations.problem)
-
-    @staticmethod
-    def _price(one: Search) -> float:
-        """∂goal/∂limit of the second goal, the first of the limits; 0 where it is not reached."""
-        if one.optimality is None:
-            return np.nan
-        scale = one.problem.limits[0].scale * one.problem.factors(one.best.values)[0]
-        return float(-np.nan_to_num(one.optimality.limits[0]) / scale)
-
-    def _point(self, one: Search, price: float) -> FrontPoint:
-        goal, against = (self._read(goal, one.best).value for goal in (self.problem.objective, self.against))
-        stands = one.optimality
+        goal, against = (self._read(goal, found.best).value for goal in (self.problem.objective, self.against))
         return FrontPoint(
-            self.space.point(one.best.place), goal, against, price, stands is not None and stands.reached(AIM),
-            one.problem.violation(one.best.readings) <= KEPT, one.message, one.best,
+            self.space.point(found.best.place), goal, against, self._price(found, evaluations.problem),
+            found.optimality is not None and found.optimality.reached(AIM),
+            evaluations.problem.violation(found.best.readings) <= KEPT, found.message, found.best,
         )  # fmt: skip
+
+    def _price(self, found: Local, problem: Problem) -> float:
+        """∂goal/∂limit of the second goal, the first of the limits; 0 where it is not reached, NaN at the ends."""
+        if found.optimality is None or not problem.limits or problem.limits[0].goal is not self.against:
+            return np.nan
+        scale = problem.limits[0].scale * problem.factors(found.best.values)[0]
+        return float(-np.nan_to_num(found.optimality.limits[0]) / scale)
 
     def _with_both(self, one: Evaluated) -> Evaluated:
         """With readings of all goals, those of the limits, and the second one."""
@@ -295,16 +244,6 @@ class _Searches:
     def _read(goal: Goal, design: Evaluated) -> Reading:
         with design.design.results() as results:
             return goal.read(results)
-
-
-@dataclass(frozen=True)
-class Search:
-    """One search: the best of its designs, how that stands, why it ended where not there, what was asked."""
-
-    best: Evaluated
-    optimality: Optimality | None
-    message: str
-    problem: Problem
 
 
 def _between(high: float, low: float, count: int) -> Array:

@@ -76,11 +76,6 @@ class OfHistory(Goal):
     name: str
     times: str = ""  # what its unit is that of the history times
 
-    @property
-    def analysis(self) -> str:  # type: ignore[override]
-        """The first part of the name."""
-        return self.name.replace("/", ".").partition(".")[0]
-
     def read(self, results: Results) -> Reading:
         """Of the history's only column."""
         history = read_history(results, self.name, f'"{self.text}"')

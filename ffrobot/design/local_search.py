@@ -56,11 +56,6 @@ class ConflictError(Exception):
         self.design, self.conflict = design, found
 
 
-def better(evaluations: Evaluations, one: Evaluated, other: Evaluated) -> bool:
-    """Whether `one` keeps limits that the other does not, exceeds them less, or is lower where both keep them."""
-    return rank(evaluations, one) < rank(evaluations, other)
-
-
 def rank(evaluations: Evaluations, one: Evaluated) -> tuple[int, float]:
     """In which completed designs are sorted: those within limits first, by the objective, then by their violation."""
     if not one.completed:
@@ -145,8 +140,7 @@ class Steps:
         if not one.completed:
             worse = np.isin(np.arange(len(evaluations.split.goals)), self._tops) * FAILED
             return as_floats(evaluations.split.scaled(evaluations.row_values(self._good)) + worse)
-        if better(evaluations, one, self.best):
-            self.best = one
+        self.best = best_of(evaluations, [self.best, one])
         return evaluations.split.scaled(evaluations.row_values(one))
 
     def _row_gradients(self, x: Array) -> Array:

@@ -11,15 +11,13 @@ from collections.abc import Sequence
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
-from typing import Literal
 
 from scipy.stats.qmc import LatinHypercube
 
 from ..common.errors import InputError, SolveError
-from ..common.files import AnyPath
 from ..run.watcher import Watcher
 from ..sweep.files import run_files
-from .designs import Designs, Runs, changes_for, may_repeat, runs_of
+from .designs import Designs, Runs, changes_for, may_repeat
 from .evaluations import Evaluations, SpentError, write_designs
 from .goals import read_problem, with_motors
 from .local_search import Local, best_of, combinations, evolve, rank, search_from, try_all
@@ -27,90 +25,37 @@ from .optimality import Differentiation
 from .optimum_record import Optimum
 from .variables import Place, Space, read_space
 
-Method = Literal["auto", "slsqp", "trust-constr", "differential-evolution", "all"]
-
-TOLERANCE = 1e-8  # of the runs: steps of differences follow from it
-MOST = 1000  # runs
 BEST = "best"  # folder of the best design's scene
 EVERY = 500  # combinations of rows: more are sought among
 
 
-def optimise(
-    scene: AnyPath,
-    vary: Sequence[str],
-    output: AnyPath | None = None,
-    *,
-    minimise: str | None = None,
-    maximise: str | None = None,
-    subject_to: Sequence[str] = (),
-    method: Method = "auto",
-    starts: int = 1,
-    seed: int = 0,
-    runs: int = MOST,
-    tolerance: float = TOLERANCE,
-    processes: int = 1,
-    retry: bool = False,
-    allow_python: Sequence[AnyPath] = (),
-    watcher: Watcher | None = None,
-) -> Optimum:
-    """The design with the least, or largest, objective within limits: `ffrobot optimise`.
-
-    Args:
-        scene: the scene file.
-        vary: parameters, such as "links.arm.geometry.section.outer=0.02:0.08" or "joint.1.gear_ratio in {50, 80, 100}".
-        output: folder of the designs, which a later call reuses; None: they are not kept.
-        minimise: the objective, or
-        maximise: the objective.
-        subject_to: limits, such as "peak joints.elbow.moment <= 20".
-        method: of the search; "auto" is "slsqp", and with discrete sets "all" of them or
-            "differential-evolution".
-        starts: number of gradient searches, from the scene and from a Latin hypercube with `seed`.
-        seed: of random numbers.
-        runs: largest number of runs.
-        tolerance: of the runs, if the scene has a larger one.
-        processes: runs in parallel.
-        retry: whether to repeat designs that failed before.
-        allow_python: as in `solve`.
-        watcher: an object that observes progress and can stop the study.
-
-    Returns:
-        The best design. If no design satisfies the limits it is the nearest one, and not `feasible`.
-
-    Raises:
-        InputError: responses, limits or keys are wrong, or bounds exclude all designs.
-        SolveError: no design completed.
-
-    Example:
-        best = ffrobot.optimise(
-            "scene.toml",
-            ["links.arm.geometry.section.outer=0.02:0.08"],
-            minimise="mass",
-            subject_to=["peak joints.elbow.moment <= 20"],
-        )
-    """
-    with runs_of("optimise", scene, output, allow_python, processes, retry, watcher) as runner:
-        path, problem = runner.path, read_problem(minimise, maximise, subject_to)
-        space = read_space(path, vary)
-        problem = with_motors(problem, space)
-        chosen = _method(space, method, runs)
-        check_start(path, space, chosen)
-        fixed = changes_for(path, problem.goals, tolerance, keep_steps=may_repeat(space.keys))
-        designs = Designs(runner, space.keys, space.own, fixed)
-        check_bounds(designs, space)
-        evaluations = Evaluations(designs, space, problem, runs)
-        differentiation = Differentiation(path, evaluations, tolerance)
-        try:
-            searches = _search(chosen, differentiation, _starts(space, starts, seed), seed, runner.watcher)
-        finally:
-            if evaluations.searched:
-                write_designs(evaluations, runner.folder / "designs.csv")
-        best = min(searches, key=lambda one: rank(evaluations, one.best))
-        if not best.best.completed:
-            raise SolveError(f"{path}: no design could be run to its end; the first one: {evaluations.failures[0]}")
-        return _optimum(runner, chosen, evaluations, best, searches, tolerance)
+def find_optimum(
+    runner: Runs, vary: Sequence[str], minimise: str | None, maximise: str | None, subject_to: Sequence[str],
+    method: str, starts: int, seed: int, runs: int, tolerance: float,
+) -> Optimum:  # fmt: skip
+    """See `ffrobot.optimise`."""
+    path, problem = runner.path, read_problem(minimise, maximise, subject_to)
+    space = read_space(path, vary)
+    problem = with_motors(problem, space)
+    chosen = _method(space, method, runs)
+    check_start(path, space, chosen)
+    fixed = changes_for(path, problem.goals, tolerance, keep_steps=may_repeat(space.keys))
+    designs = Designs(runner, space.keys, space.own, fixed)
+    check_bounds(designs, space)
+    evaluations = Evaluations(designs, space, problem, runs)
+    differentiation = Differentiation(path, evaluations, tolerance)
+    try:
+        searches = _search(chosen, differentiation, _starts(space, starts, seed), seed, runner.watcher)
+    finally:
+        if evaluations.searched:
+            write_designs(evaluations, runner.folder / "designs.csv")
+    best = min(searches, key=lambda one: rank(evaluations, one.best))
+    if not best.best.completed:
+        raise SolveError(f"{path}: no design could be run to its end; the first one: {evaluations.failures[0]}")
+    return _optimum(runner, chosen, evaluations, best, searches, tolerance)
 
 
-def _method(space: Space, method: Method, most: int) -> Method:
+def _method(space: Space, method: str, most: int) -> str:
     catalogues, combined = any(v.is_catalogue for v in space.variables), combinations(space)
     if method == "auto":
         return "slsqp" if not catalogues else "all" if 0 < combined <= min(EVERY, most) else "differential-evolution"
@@ -125,7 +70,7 @@ def _method(space: Space, method: Method, most: int) -> Method:
     return method
 
 
-def check_start(path: Path, space: Space, method: Method) -> None:
+def check_start(path: Path, space: Space, method: str) -> None:
     """Raise `InputError` where a search along gradients could not begin at the scene itself."""
     for variable, start in zip(space.variables, space.start(), strict=True):
         if start is None and method in ("slsqp", "trust-constr"):
@@ -165,7 +110,7 @@ def _starts(space: Space, count: int, seed: int) -> list[Place]:
 
 
 def _search(
-    method: Method, differentiation: Differentiation, starts: Sequence[Place], seed: int, watcher: Watcher
+    method: str, differentiation: Differentiation, starts: Sequence[Place], seed: int, watcher: Watcher
 ) -> list[Local]:
     """The searches that `method` means; of catalogues one, which goes on along gradients of numbers."""
     evaluations = differentiation.evaluations
@@ -201,7 +146,7 @@ def _tell(watcher: Watcher, title: str, text: str) -> None:
 
 
 def _optimum(
-    runs: Runs, method: Method, evaluations: Evaluations, best: Local, searches: Sequence[Local], tolerance: float
+    runs: Runs, method: str, evaluations: Evaluations, best: Local, searches: Sequence[Local], tolerance: float
 ) -> Optimum:
     space, problem = evaluations.space, evaluations.problem
     with best.best.design.results() as results:

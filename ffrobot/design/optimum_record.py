@@ -12,7 +12,7 @@ from ..common.arrays import Array, as_floats
 from ..pictures.studies.study import Axis, Diagram, Numbers, Parallel, Progress, State, StudyTable, axis_of_goal
 from ..results.verdict import Verdict
 from .evaluations import Evaluated, number
-from .finding import CsvFile, Finding, Section, numbers, with_unit
+from .finding import CsvFile, Finding, Section, failed_runs, numbers, with_unit
 from .goals import KEPT, Limit, Problem
 from .local_search import AIM, Local
 from .optimality import Conflict, Optimality
@@ -234,8 +234,7 @@ class Optimum(Finding):
             yield f"note       {self.message}"
         if len(self.searches) > 1:
             yield f"starts     {self._starts()}"
-        if failed := len(self.failures):
-            yield f"failed     {failed} of {self.runs} runs, passed over: {self.failures[0]}"
+        yield from failed_runs(self.failures, self.runs)
         runs = f"{self.runs} runs with a tolerance of at most {self.tolerance:g}"
         yield f"how        {self.method}, {runs}; {self._standing()}"
         yield ""

@@ -68,10 +68,15 @@ class Goal:
     """One scalar; `text` is what the user calls it."""
 
     text: str
-    analysis: str | None = None
-    """Name that its history begins with, where that may be one of an analysis."""
+    name: str = ""
+    """Of its history, if it has one."""
     needs_motion = True
     """Whether an analysis has to be run for it."""
+
+    @property
+    def analysis(self) -> str:
+        """What its history begins with, which may be the name of an analysis."""
+        return self.name.replace("/", ".").partition(".")[0]
 
     def read(self, results: Results) -> Reading:
         """Its value. Raises `InputError` where the results do not have it."""
@@ -202,11 +207,6 @@ class Peak(Goal):
 
     text: str
     name: str
-
-    @property
-    def analysis(self) -> str:  # type: ignore[override]
-        """The first part of the name."""
-        return self.name.replace("/", ".").partition(".")[0]
 
     def read(self, results: Results) -> Reading:
         """The value, when it is reached, and in which column."""

@@ -19,10 +19,8 @@ from numpy.typing import NDArray
 
 from ..common.arrays import Array, Integers, as_floats
 from ..common.errors import InputError, SolveError
-from ..common.files import AnyPath
 from ..pictures.studies.study import Points
-from ..run.watcher import Watcher
-from .designs import runs_of
+from .designs import Runs
 from .finding import CsvFile, Finding, Section, failed_runs, file_name, floats, with_unit
 from .goals import parse_goal
 from .readings import Reading
@@ -195,43 +193,8 @@ def _moments(effects: Array, known: NDArray[np.bool_]) -> tuple[Array, Array]:
 FEWEST = 2  # trajectories: of one there is no σ
 
 
-def screening(
-    scene: AnyPath,
-    of: Sequence[str],
-    spread: Sequence[str],
-    output: AnyPath | None = None,
-    *,
-    trajectories: int = 10,
-    seed: int = 0,
-    processes: int = 1,
-    retry: bool = False,
-    allow_python: Sequence[AnyPath] = (),
-    watcher: Watcher | None = None,
-) -> Screening:
-    """Elementary effects of many uncertain keys (Morris): `ffrobot uncertainty --by screening`.
-
-    Args:
-        scene: the scene file.
-        of: responses.
-        spread: keys with their distributions, as in `uncertainty`.
-        output: folder of the runs, which a later call reuses; None: they are not kept.
-        trajectories: number R of trajectories; each has one run per key and one more.
-        seed: of the trajectories.
-        processes: runs in parallel.
-        retry: whether to repeat designs that failed before.
-        allow_python: as in `solve`.
-        watcher: an object that observes progress and can stop the study.
-
-    Returns:
-        μ*, σ and μ of each key and response.
-
-    Raises:
-        InputError: responses, keys or distributions are wrong; a whole history.
-        SolveError: the scene with nominal values, or all others, cannot be solved.
-
-    Example:
-        found = ffrobot.screening("scene.toml", ["peak joints.elbow.moment"], ["payload.0.mass=±5%"], trajectories=10)
-    """
+def find_effects(runs: Runs, of: Sequence[str], spread: Sequence[str], trajectories: int, seed: int) -> Screening:
+    """See `ffrobot.screening`."""
     if trajectories < FEWEST:
         raise InputError(f"uncertainty: --trajectories: expected at least {FEWEST}, found {trajectories}")
     names = list(dict.fromkeys(of))
@@ -240,16 +203,15 @@ def screening(
             f'--of: expected responses for --by screening, such as "peak {histories[0]}", found the history'
             f' "{histories[0]}", whose band --by samples or --by gradients computes'
         )
-    with runs_of("uncertainty", scene, output, allow_python, processes, retry, watcher) as runs:
-        goals, spreads = tuple(map(parse_goal, names)), read_spreads(runs.path, spread)
-        if not goals or not spreads:
-            raise InputError("uncertainty: expected at least one response (--of) and one key (--spread)")
-        designs = SpreadDesigns(runs, spreads, goals)
-        taken = draw_trajectories(len(spreads), trajectories, seed)
-        low, high = np.array([one.ends for one in spreads]).T
-        points = (low + (high - low) * taken.points).reshape(-1, len(spreads))
-        found = designs.run([tuple(map(float, point)) for point in points])
-        values = np.array([designs.read(design) for design in found]).reshape(trajectories, -1, len(goals))
+    goals, spreads = tuple(map(parse_goal, names)), read_spreads(runs.path, spread)
+    if not goals or not spreads:
+        raise InputError("uncertainty: expected at least one response (--of) and one key (--spread)")
+    designs = SpreadDesigns(runs, spreads, goals)
+    taken = draw_trajectories(len(spreads), trajectories, seed)
+    low, high = np.array([one.ends for one in spreads]).T
+    points = (low + (high - low) * taken.points).reshape(-1, len(spreads))
+    found = designs.run([tuple(map(float, point)) for point in points])
+    values = np.array([designs.read(design) for design in found]).reshape(trajectories, -1, len(goals))
     effects = elementary_effects(taken, as_floats(values))
     if not effects.count.any():
         raise SolveError(f"{runs.path}: no two runs of a trajectory side by side completed: {designs.failures[0]}")

@@ -27,9 +27,7 @@ import numpy as np
 
 from ..common.arrays import Array, as_floats
 from ..common.errors import InputError
-from ..common.files import AnyPath
 from ..pictures.studies.study import Bars, Series
-from ..run.watcher import Watcher
 from ..sweep.files import number_at
 from ..sweep.runs import RESULTS
 from ..sweep.sweep import Key
@@ -49,8 +47,8 @@ from .derivatives import (
     wants_larger_steps,
     wants_smaller_steps,
 )
-from .designs import Designs, Point, Runs, changes_for, may_repeat, parse_key, repeated_steps, runs_of
-from .finding import CsvFile, Finding, Section, file_name, numbers
+from .designs import Designs, Point, Runs, changes_for, may_repeat, parse_key, repeated_steps
+from .finding import CsvFile, Finding, Section, failed_runs, file_name, numbers
 from .goals import parse_goal
 from .readings import Goal, Reading
 
@@ -176,10 +174,7 @@ class Sensitivity(Finding):
         for goal, row in zip(self.goals, self.entries, strict=True):
             for key, one in zip(self.keys, row, strict=True):
                 yield from (f"note       {goal} by {key}: {text}" for text in one.notes)
-        if failed := len(self.failures):
-            yield f"failed     {failed} of {self.runs} runs, left out: {self.failures[0]}" + (
-                f", and {failed - 1} more in the table of runs" if failed > 1 else ""
-            )
+        yield from failed_runs(self.failures, self.runs)
         methods = {one.method for row in self.entries for one in row}
         texts = [words for method, words in HOW.items() if method in methods]
         yield (
@@ -197,60 +192,25 @@ def _number(value: float, form: str) -> str:
     return "" if np.isnan(value) else format(value, form)
 
 
-STEP = 0.01  # of a key's value, the largest; of keys that are 0, in their unit
 FINER = ((0.125, 0.0625), (0.03125, 0.015625))  # of those that follow where these are too large
 TOLERANCE = 1e-9  # of the runs: below, rounding in forces of stiff links is not far
 TOLERANCE_REPEATED = 1e-7  # of those that take the same steps: their noise is none of its
 
 
-def sensitivity(
-    scene: AnyPath,
-    of: Sequence[str],
-    to: Sequence[str],
-    output: AnyPath | None = None,
-    *,
-    processes: int = 1,
-    step: float = STEP,
-    tolerance: float | None = None,
-    retry: bool = False,
-    allow_python: Sequence[AnyPath] = (),
-    watcher: Watcher | None = None,
+def find_sensitivity(
+    runs: Runs, of: Sequence[str], to: Sequence[str], step: float, tolerance: float | None
 ) -> Sensitivity:
-    """Derivatives of scalar responses by keys of a scene and its links: `ffrobot sensitivity`.
-
-    Args:
-        scene: the scene file.
-        of: responses, such as "peak joints.elbow.moment".
-        to: keys with dots, such as "payload.0.mass".
-        output: folder of the runs, which a later call reuses; None: they are not kept.
-        step: largest change of a key, relative to its value.
-        tolerance: of the runs, if the scene has a larger one; None: 1e-7 with reused time steps, else 1e-9.
-        processes: runs in parallel.
-        retry: whether to repeat designs that failed before.
-        allow_python: as in `solve`.
-        watcher: an object that observes progress and can stop the study.
-
-    Returns:
-        Derivatives with their errors.
-
-    Raises:
-        InputError: responses or keys are wrong, or a key has no other valid value.
-        SolveError: the scene itself cannot be solved.
-
-    Example:
-        found = ffrobot.sensitivity("scene.toml", ["peak joints.elbow.moment"], ["payload.0.mass"])
-    """
-    with runs_of("sensitivity", scene, output, allow_python, processes, retry, watcher) as runs:
-        goals = tuple(parse_goal(text) for text in dict.fromkeys(of))
-        keys = tuple(parse_key(text, "--to") for text in dict.fromkeys(to))
-        if not goals or not keys:
-            raise InputError("sensitivity: expected at least one response (--of) and one key (--to)")
-        point = tuple(number_at(runs.path, key, "--to") for key in keys)
-        steps = tuple(step * (abs(value) or 1.0) for value in point)
-        designs, readings, repeats, again = _base(runs, goals, keys, point, tolerance)
-        base = Base(goals, readings, keys, point, steps, repeats=repeats, again=again)
-        _check_steps(designs, base)
-        known = _all_known(designs, base, exact_entries(runs.path, base))
+    """See `ffrobot.sensitivity`."""
+    goals = tuple(parse_goal(text) for text in dict.fromkeys(of))
+    keys = tuple(parse_key(text, "--to") for text in dict.fromkeys(to))
+    if not goals or not keys:
+        raise InputError("sensitivity: expected at least one response (--of) and one key (--to)")
+    point = tuple(number_at(runs.path, key, "--to") for key in keys)
+    steps = tuple(step * (abs(value) or 1.0) for value in point)  # of keys that are 0, in their unit
+    designs, readings, repeats, again = _base(runs, goals, keys, point, tolerance)
+    base = Base(goals, readings, keys, point, steps, repeats=repeats, again=again)
+    _check_steps(designs, base)
+    known = _all_known(designs, base, exact_entries(runs.path, base))
     failures = tuple(
         f"{'.'.join(keys[one.k])} = {point[one.k] + one.offset:.6g}: {one.failure}"
         for one in known.samples

@@ -9,15 +9,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
 from ..common.arrays import Array, as_floats
 from ..common.errors import InputError, SolveError
-from ..common.files import AnyPath
-from ..run.watcher import Watcher
-from .designs import Design, Point, runs_of
+from .designs import Design, Point, Runs
 from .goals import parse_goal
 from .readings import Goal, History, read_history
 from .spreads import (
@@ -31,7 +28,7 @@ from .spreads import (
     spread_points,
     statistics,
 )
-from .uncertainty_record import Band, Uncertainty
+from .uncertainty_record import Band, LinearOrSampled, Uncertainty
 
 TOLERANCE = 1e-8  # of runs for gradients, at most: differences of one standard deviation
 FEWEST = 8  # samples for a quantile of 5 %
@@ -42,11 +39,7 @@ class Curve(Goal):
     """A history as a whole."""
 
     text: str
-
-    @property
-    def analysis(self) -> str:  # type: ignore[override]
-        """The first part of the name."""
-        return self.text.replace("/", ".").partition(".")[0]
+    name: str
 
     def history(self, results_of: Design) -> History:
         """Of one column."""
@@ -58,61 +51,23 @@ class Curve(Goal):
         return found
 
 
-def uncertainty(
-    scene: AnyPath,
-    of: Sequence[str],
-    spread: Sequence[str],
-    output: AnyPath | None = None,
-    *,
-    samples: int = 200,
-    seed: int = 0,
-    by: Literal["samples", "gradients"] = "samples",
-    indices: bool = False,
-    processes: int = 1,
-    retry: bool = False,
-    allow_python: Sequence[AnyPath] = (),
-    watcher: Watcher | None = None,
+def find_uncertainty(
+    runs: Runs, of: Sequence[str], spread: Sequence[str], samples: int, seed: int, by: LinearOrSampled, *, indices: bool
 ) -> Uncertainty:
-    """Statistics of responses and histories for uncertain keys: `ffrobot uncertainty`.
-
-    Args:
-        scene: the scene file.
-        of: responses, and histories such as "joints.elbow.moment".
-        spread: keys with their distributions, such as "payload.0.mass=±5%".
-        output: folder of the runs, which a later call reuses; None: they are not kept.
-        samples: number of samples of a Latin hypercube.
-        seed: of the samples.
-        by: "samples", or "gradients" with two runs per key.
-        indices: whether to compute Sobol indices, with N/2 more runs per key.
-        processes: runs in parallel.
-        retry: whether to repeat designs that failed before.
-        allow_python: as in `solve`.
-        watcher: an object that observes progress and can stop the study.
-
-    Returns:
-        Mean, deviation and quantiles of responses, and bands of histories.
-
-    Raises:
-        InputError: responses, keys or distributions are wrong.
-        SolveError: the scene with nominal values, or all others, cannot be solved.
-
-    Example:
-        found = ffrobot.uncertainty("scene.toml", ["peak joints.elbow.moment"], ["payload.0.mass=±5%"], samples=100)
-    """
+    """See `ffrobot.uncertainty`."""
     if by == "samples" and samples < FEWEST:
         raise InputError(f"uncertainty: expected at least {FEWEST} samples, found {samples}")
     if by == "gradients" and indices:
         raise InputError("uncertainty: expected Sobol indices of samples, found --by gradients")
     names = list(dict.fromkeys(of))
     goals = tuple(parse_goal(text) for text in names if not is_history(text))
-    curves = tuple(Curve(text) for text in names if is_history(text))
-    with runs_of("uncertainty", scene, output, allow_python, processes, retry, watcher) as runs:
-        spreads = read_spreads(runs.path, spread)
-        if not names or not spreads:
-            raise InputError("uncertainty: expected at least one response or history (--of) and one key (--spread)")
-        tolerance = TOLERANCE if by == "gradients" else None
-        study = _Study(SpreadDesigns(runs, spreads, goals, others=curves, tolerance=tolerance), curves)
-        return study.by_gradients() if by == "gradients" else study.by_samples(samples, seed, indices=indices)
+    curves = tuple(Curve(text, text) for text in names if is_history(text))
+    spreads = read_spreads(runs.path, spread)
+    if not names or not spreads:
+        raise InputError("uncertainty: expected at least one response or history (--of) and one key (--spread)")
+    tolerance = TOLERANCE if by == "gradients" else None
+    study = _Study(SpreadDesigns(runs, spreads, goals, others=curves, tolerance=tolerance), curves)
+    return study.by_gradients() if by == "gradients" else study.by_samples(samples, seed, indices=indices)
 
 
 def is_history(text: str) -> bool:
@@ -157,9 +112,8 @@ class _Study:
         bands = tuple(self._band(m, statistics(of)) for m, of in enumerate(histories))
         blocks = values.reshape(-1, count // 2, len(self._goals)) if indices else None
         found = sobol_indices(blocks[0], blocks[1], blocks[2:], seed) if blocks is not None else None
-        return self._found(
-            "samples", statistics(values[:n][whole]), bands, shares, explained, found, values[:n], 1 + len(points)
-        )
+        found_of_all = statistics(values[:n][whole])
+        return self._found("samples", found_of_all, bands, shares, explained, found, values[:n], 1 + len(points))
 
     def by_gradients(self) -> Uncertainty:
         """Of the linear model, whose errors a quadratic one without products of keys tells."""
@@ -220,16 +174,9 @@ class _Study:
         return Band(nominal.name, nominal.unit, nominal.time, nominal.values[:, 0], found)
 
     def _found(
-        self,
-        method: Literal["samples", "gradients"],
-        found: Statistics,
-        bands: tuple[Band, ...],
-        shares: Array,
-        explained: Array,
-        indices: Indices | None,
-        samples: Array,
-        runs: int,
-    ) -> Uncertainty:
+        self, method: LinearOrSampled, found: Statistics, bands: tuple[Band, ...], shares: Array, explained: Array,
+        indices: Indices | None, samples: Array, runs: int,
+    ) -> Uncertainty:  # fmt: skip
         return Uncertainty(
             self._designs.path, self._spreads, method, tuple(goal.text for goal in self._goals), self._readings, found,
             bands, shares, explained, indices, samples, tuple(self._designs.failures),

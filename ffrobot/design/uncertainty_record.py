@@ -16,6 +16,7 @@ from .finding import CsvFile, Finding, Section, failed_runs, file_name, floats, 
 from .readings import Reading
 from .spreads import LEVELS, Indices, Spread, Statistics
 
+LinearOrSampled = Literal["samples", "gradients"]
 NAMES = tuple(f"{100 * level:g}%" for level in LEVELS)
 ROUNDING = 1e-13  # of a goal: smaller deviations are none
 UNCHANGED = "none of the keys changes it"
@@ -58,7 +59,7 @@ class Uncertainty(Finding):
 
     scene: Path
     spreads: tuple[Spread, ...]
-    method: Literal["samples", "gradients"]
+    method: LinearOrSampled
     goals: tuple[str, ...]
     readings: tuple[Reading, ...]
     statistics: Statistics

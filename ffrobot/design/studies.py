@@ -1,0 +1,255 @@
+"""The design commands for use from Python. Their signatures, ranges and texts are those of the command line, too.
+
+`commands.options.options_of` reads annotations, which are evaluated here; an entry of Args begins with the help.
+"""
+
+import inspect
+from collections.abc import Callable, Sequence
+from functools import wraps
+from typing import TYPE_CHECKING, Annotated, Literal, ParamSpec, TypedDict, TypeVar, Unpack
+
+from click import BadParameter, FloatRange, IntRange, ParamType
+
+from ..common.errors import InputError
+from ..common.files import AnyPath
+
+if TYPE_CHECKING:
+    from ..run.watcher import Watcher
+    from .front import Front
+    from .optimum_record import Optimum
+    from .screening import Screening
+    from .sensitivity import Sensitivity
+    from .uncertainty_record import Uncertainty
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+Method = Literal["auto", "slsqp", "trust-constr", "differential-evolution", "all"]
+
+
+class RunOptions(TypedDict, total=False):
+    """What all studies take besides."""
+
+    processes: int
+    retry: bool
+    allow_python: Sequence[AnyPath]
+    watcher: "Watcher | None"
+
+
+def _checked(function: Callable[P, R]) -> Callable[P, R]:
+    """Raise `InputError` for numbers out of the ranges of a signature."""
+    signature = inspect.signature(function)
+
+    @wraps(function)
+    def call(*args: P.args, **given: P.kwargs) -> R:
+        for name, value in signature.bind(*args, **given).arguments.items():
+            for about in getattr(signature.parameters[name].annotation, "__metadata__", ()):
+                try:
+                    if isinstance(about, ParamType) and value is not None:
+                        about.convert(value, None, None)
+                except BadParameter as error:
+                    raise InputError(f"{function.__name__}: {name}: {error.message}") from None
+        return function(*args, **given)
+
+    return call
+
+
+Responses = Annotated[Sequence[str], "RESPONSE"]
+Spreads = Annotated[Sequence[str], "KEY=SPREAD"]
+Ranges = Annotated[Sequence[str], "KEY=LOW:HIGH"]
+Limits = Annotated[Sequence[str], '"RESPONSE <= NUMBER"']
+MostRuns = Annotated[int, IntRange(1, 100_000)]
+Tolerance = FloatRange(1e-10, 1e-3)
+
+
+@_checked
+def sensitivity(
+    scene: AnyPath, of: Responses, to: Annotated[Sequence[str], "KEY,KEY …"], output: AnyPath | None = None, *,
+    step: Annotated[float, FloatRange(1e-6, 0.2)] = 0.01, tolerance: Annotated[float | None, Tolerance] = None,
+    **how: Unpack[RunOptions],
+) -> "Sensitivity":  # fmt: skip
+    """Derivatives of scalar responses by keys of a scene and its links: `ffrobot sensitivity`.
+
+    Args:
+        scene: the scene file.
+        of: scalar response. A sequence, such as ["peak joints.elbow.moment"].
+        to: parameters. Keys with dots, such as "payload.0.mass".
+        output: folder of the runs, which a later call reuses; None: they are not kept.
+        step: largest change of a parameter, relative to its value.
+        tolerance: tolerance of the runs, if the scene has a larger one.  [default: 1e-07 with reused time steps, else
+            1e-09]
+        how: `processes`, runs in parallel; `retry`, whether to repeat designs that failed before; `allow_python`, as in
+            `solve`; `watcher`, an object that observes progress and can stop the study.
+
+    Returns:
+        Derivatives with their errors.
+
+    Raises:
+        InputError: responses or keys are wrong, or a key has no other valid value.
+        SolveError: the scene itself cannot be solved.
+
+    Example:
+        found = ffrobot.sensitivity("scene.toml", ["peak joints.elbow.moment"], ["payload.0.mass"])
+    """
+    from .designs import runs_of
+    from .sensitivity import find_sensitivity
+
+    with runs_of("sensitivity", scene, output, **how) as runs:
+        return find_sensitivity(runs, of, to, step, tolerance)
+
+
+@_checked
+def optimise(
+    scene: AnyPath, vary: Ranges, output: AnyPath | None = None, *,
+    minimise: Annotated[str | None, "RESPONSE"] = None, maximise: Annotated[str | None, "RESPONSE"] = None,
+    subject_to: Limits = (), method: Method = "auto", starts: Annotated[int, IntRange(1, 1000)] = 1,
+    seed: Annotated[int, IntRange(0, 2**32 - 1)] = 0, runs: MostRuns = 1000,
+    tolerance: Annotated[float, Tolerance] = 1e-8, **how: Unpack[RunOptions],
+) -> "Optimum":  # fmt: skip
+    """The design with the least, or largest, objective within limits: `ffrobot optimise`.
+
+    Args:
+        scene: the scene file.
+        vary: parameter with its range or set. A sequence, such as ["links.arm.geometry.section.outer=0.02:0.08",
+            "joint.1.gear_ratio in {50, 80, 100}"].
+        output: folder of the designs, which a later call reuses; None: they are not kept.
+        minimise: response to minimize, as in sensitivity.
+        maximise: response to maximize.
+        subject_to: limit, or with ">=". A sequence, such as ["peak joints.elbow.moment <= 20"].
+        method: the optimiser. "auto" is "slsqp", and with discrete sets "all" of them or "differential-evolution".
+        starts: searches along gradients. They begin at the scene and at points of a Latin hypercube.
+        seed: seed of random numbers.
+        runs: largest number of runs.
+        tolerance: tolerance of the runs, if the scene has a larger one.
+        how: as in `sensitivity`.
+
+    Returns:
+        The best design. If no design satisfies the limits it is the nearest one, and not `feasible`.
+
+    Raises:
+        InputError: responses, limits or keys are wrong, or bounds exclude all designs.
+        SolveError: no design completed.
+
+    Example:
+        best = ffrobot.optimise(
+            "scene.toml",
+            ["links.arm.geometry.section.outer=0.02:0.08"],
+            minimise="mass",
+            subject_to=["peak joints.elbow.moment <= 20"],
+        )
+    """
+    from .designs import runs_of
+    from .optimise import find_optimum
+
+    with runs_of("optimise", scene, output, **how) as runner:
+        return find_optimum(runner, vary, minimise, maximise, subject_to, method, starts, seed, runs, tolerance)
+
+
+@_checked
+def trade_off(
+    scene: AnyPath, vary: Ranges, output: AnyPath | None = None, *,
+    minimise: str, against: Annotated[str, "RESPONSE"], points: Annotated[int, IntRange(3, 1000)] = 8,
+    subject_to: Limits = (), runs: MostRuns = 1000, tolerance: Annotated[float, Tolerance] = 1e-8,
+    **how: Unpack[RunOptions],
+) -> "Front":  # fmt: skip
+    """Pareto front: the least of one response for each of `points` values of another: `ffrobot optimise … --against`.
+
+    Args:
+        scene: the scene file.
+        vary: parameters, as in `optimise`.
+        output: folder of the designs, which a later call reuses; None: they are not kept.
+        minimise: the first response.
+        against: second response to minimize: Pareto front of both.
+        points: number of designs on that front.
+        subject_to: limits, as in `optimise`.
+        runs: largest number of runs of all searches together.
+        tolerance: of the runs, if the scene has a larger one.
+        how: as in `sensitivity`.
+
+    Returns:
+        The designs of the front.
+
+    Raises:
+        InputError: as in `optimise`; discrete sets; responses with the same optimum.
+        SolveError: a design with which a search begins does not complete.
+
+    Example:
+        front = ffrobot.trade_off(
+            "scene.toml", ["joint.1.gear_ratio=10:200"], minimise="mass", against="rms tip_error", points=6
+        )
+    """
+    from .designs import runs_of
+    from .front import find_front
+
+    with runs_of("optimise", scene, output, **how) as runner:
+        return find_front(runner, vary, minimise, against, points, subject_to, runs, tolerance)
+
+
+@_checked
+def uncertainty(
+    scene: AnyPath, of: Annotated[Sequence[str], "RESPONSE|HISTORY"], spread: Spreads, output: AnyPath | None = None,
+    *,
+    samples: Annotated[int, "N"] = 200, seed: Annotated[int, IntRange(0, 2**63 - 1)] = 0,
+    by: Literal["samples", "gradients"] = "samples", indices: bool = False, **how: Unpack[RunOptions],
+) -> "Uncertainty":  # fmt: skip
+    """Statistics of responses and histories for uncertain keys: `ffrobot uncertainty`.
+
+    Args:
+        scene: the scene file.
+        of: response or history. A sequence, such as ["peak joints.elbow.moment", "joints.elbow.moment"].
+        spread: uncertain parameter with its distribution. A sequence, such as ["payload.0.mass=±5%"].
+        output: folder of the runs, which a later call reuses; None: they are not kept.
+        samples: number of samples of a Latin hypercube.
+        seed: seed of the samples.
+        by: "samples", or "gradients" with two runs per key.
+        indices: Sobol indices, with N/2 more runs per parameter.
+        how: as in `sensitivity`.
+
+    Returns:
+        Mean, deviation and quantiles of responses, and bands of histories.
+
+    Raises:
+        InputError: responses, keys or distributions are wrong.
+        SolveError: the scene with nominal values, or all others, cannot be solved.
+
+    Example:
+        found = ffrobot.uncertainty("scene.toml", ["peak joints.elbow.moment"], ["payload.0.mass=±5%"], samples=100)
+    """
+    from .designs import runs_of
+    from .uncertainty import find_uncertainty
+
+    with runs_of("uncertainty", scene, output, **how) as runs:
+        return find_uncertainty(runs, of, spread, samples, seed, by, indices=indices)
+
+
+@_checked
+def screening(
+    scene: AnyPath, of: Responses, spread: Spreads, output: AnyPath | None = None, *,
+    trajectories: Annotated[int, "R"] = 10, seed: int = 0, **how: Unpack[RunOptions],
+) -> "Screening":  # fmt: skip
+    """Elementary effects of many uncertain keys (Morris): `ffrobot uncertainty --by screening`.
+
+    Args:
+        scene: the scene file.
+        of: responses.
+        spread: keys with their distributions, as in `uncertainty`.
+        output: folder of the runs, which a later call reuses; None: they are not kept.
+        trajectories: number of trajectories of --by screening, each with one run per parameter and one more.
+        seed: of the trajectories.
+        how: as in `sensitivity`.
+
+    Returns:
+        μ*, σ and μ of each key and response.
+
+    Raises:
+        InputError: responses, keys or distributions are wrong; a whole history.
+        SolveError: the scene with nominal values, or all others, cannot be solved.
+
+    Example:
+        found = ffrobot.screening("scene.toml", ["peak joints.elbow.moment"], ["payload.0.mass=±5%"], trajectories=10)
+    """
+    from .designs import runs_of
+    from .screening import find_effects
+
+    with runs_of("uncertainty", scene, output, **how) as runs:
+        return find_effects(runs, of, spread, trajectories, seed)
