@@ -41,3 +41,4 @@ FRONT, SIDE = View(_X, _Z, -_Y), View(_Y, _Z, _X)  # z goes up, as well; from ab
 # Okabe and Ito, "Color universal design" (2008), without the yellow that paper swallows, and a gray that
 # is seen on light and dark pages for black.
 COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#7A7A7A")
+LIMIT = COLORS[6]  # of what motors and patches can do

@@ -52,6 +52,22 @@ def test_deflections_are_drawn_by_axes_of_the_body(arm):
     assert labels == {f"inverse, {c}": f"inverse/points/fore.tip/deflection[{k}]" for k, c in ((1, "y"), (2, "z"))}
 
 
+def test_what_floats_has_no_ground(arm, slewing_appendage):
+    with Results(slewing_appendage.folder / "scene.results.h5") as floating:
+        for results, count in ((arm, 1), (floating, 0)):
+            labels = [text.get_text() for text in draw(main_figures(results)[0], results).legends[0].get_texts()]
+            assert labels.count("ground") == count
+
+
+def test_motors_that_suffice_leave_no_modal_force_to_draw(solved):
+    """Of stable inversion it is round-off, of the force that pulls the tip what patches would have to supply."""
+    with Results(solved("flexible_arm_inversion").folder / "scene.results.h5") as results:
+        names = {record.name for record in standard_figures(results)}
+    assert "modal_force_force_at_tip_arm" in names
+    assert not {"modal_force_exact_arm", "modal_force_redefined_arm"} & names
+    assert {"modal_exact_arm", "modal_redefined_arm"} <= names
+
+
 def test_main_figures_answer_the_first_questions(arm):
     """Where is the robot, does the tool follow, what do the motors do, how far do the links bend: one each."""
     assert [record.name for record in main_figures(arm)] == [

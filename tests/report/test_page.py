@@ -10,6 +10,7 @@ from selenium.webdriver import ActionChains
 
 from ffrobot.common.errors import InputError
 from ffrobot.pictures.motion import joint_markers, moving_bodies
+from ffrobot.pictures.projection import COLORS
 from ffrobot.pictures.report import write_report
 from ffrobot.pictures.report.charts import history_charts
 from ffrobot.pictures.report.runs import runs
@@ -160,6 +161,19 @@ def test_charts_and_tables_of_the_arm(arm_3r):
     assert unit == "N·m"
     assert float(value) == pytest.approx(largest, rel=1e-3)
     assert rows["distance of fore.tip from its path"] == ["<", "1e-06", "mm"]
+
+
+def test_a_run_has_one_colour_on_the_page(two_link):
+    """In all charts that compare runs that of the mechanism, whatever else is drawn there."""
+    with Results(two_link.folder / "scene.results.h5") as results:
+        charts = {chart.name: chart for chart in history_charts([results])}
+    expected = dict(zip(("inverse", "forward", "joints_only"), COLORS, strict=False))
+    for name in ("path_tip", "error_tip", "moment_O", "deflection_link2.tip", "coordinate_A", "angle_link1"):
+        found = {trace["name"].removesuffix(", y"): trace["line"]["color"] for trace in charts[name].traces}
+        assert {run: found[run] for run in expected} == expected
+    target = charts["path_tip"].traces[0]
+    assert target["name"] == "prescribed path"
+    assert target["line"]["color"] not in COLORS
 
 
 def test_verdict_of_a_loop(slider_crank_3d):

@@ -199,6 +199,9 @@ def test_on_paper_charts_stand_in_two_columns(paused):
     paused.run("window.dispatchEvent(new Event('beforeprint'))")
     paused.wait(f"{widths}.length === places.length && {widths}.every((w) => w === 340)")
     assert paused.value("[...document.querySelectorAll('details')].every((fold) => fold.open)")
+    cut = "(c) => c.querySelector('.gtitle').getBoundingClientRect().right > c.getBoundingClientRect().right"
+    assert not paused.value(f"drawn().filter((c) => c.dataset.chart).some({cut})")
+    assert not paused.value("drawn().some((c) => +c.querySelector('.scrollbar')?.getAttribute('height') > 0)")
     paused.run("window.dispatchEvent(new Event('afterprint'))")
     paused.wait(f"{widths}.every((w) => w > 340)")
 

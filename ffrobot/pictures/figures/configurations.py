@@ -41,7 +41,8 @@ def draw_configurations(figure: FigureRecord, results: Results) -> Figure:
     for axes in views:
         for label, path, style in paths:
             axes.plot(path, label=label, **style)
-        axes.plot(ground, "^", color=GREY, markersize=6, label="ground")
+        if len(ground):  # else the robot floats
+            axes.plot(ground, "^", color=GREY, markersize=6, label="ground")
         for k, color in enumerate(colors):
             has_surface = axes is views[0] and k in (0, len(frames) - 1)
             for body, shape, carried in zip(bodies, surfaces if has_surface else lines, shift, strict=True):

@@ -137,14 +137,17 @@ def _deflection(results: Results, point: str) -> Iterator[FigureRecord]:
 
 
 def _modes(results: Results) -> Iterator[FigureRecord]:
-    """Modal coordinates, and the modal forces that patches would have to supply."""
+    """Modal coordinates, and the modal forces that patches would have to supply; where motors suffice, none."""
     for analysis in results.analyses:
+        of_motors = results.attributes(analysis)["kind"] == "motors-only"
         for body in results.names(f"{analysis}/bodies"):
             for dataset, title, y_label in (
                 ("modal", "modal coordinates", "modal coordinate (m·√kg)"),
                 ("modal_force", "required modal forces", "modal force (N/√kg)"),
             ):
                 data = f"{analysis}/bodies/{body}/{dataset}"
+                if of_motors and dataset == "modal_force":
+                    continue  # round-off
                 if results.has(data) and results.data(data).any():
                     curve, of = Curve(data=data, label="mode"), f"{title} of {body}, {analysis}"
                     yield from _histories((dataset, analysis, body), of, [curve], y_label)

@@ -11,14 +11,14 @@ from matplotlib.image import NonUniformImage
 from ...common.arrays import Array
 from ...common.errors import InputError
 from ...results.file import Results
-from ..projection import COLORS
+from ..projection import COLORS, LIMIT
 from .figure_file import Curve, FigureRecord
 from .shared import curve_points, motor_limits, read_points
 from .style import DASHES, legend, line_style, shades
 
 MANY, OFTEN = 4, 0.2  # columns, and part of the time at limits, above which lines hide each other
 NEAR = 1e-3  # of a limit: how close values are that are at it
-SHADE = 0.12  # opacity
+SHADE = 0.25  # opacity
 NAMED = 6  # columns: of more, the legend has the first and the last
 
 
@@ -36,7 +36,7 @@ def draw_time_history(axes: Axes, figure: FigureRecord, results: Results) -> Non
     axes.set_xlabel(figure.x_label)
     if not axes.images:
         for k, limit in enumerate(figure.limits):
-            axes.axhline(limit, color=COLORS[1], linestyle="--", label="limit" if k == 0 else None)
+            axes.axhline(limit, color=LIMIT, linestyle="--", label="limit" if k == 0 else None)
         axes.set_ylabel(figure.y_label)
         legend(axes)
 
@@ -49,7 +49,7 @@ def _draw_columns(axes: Axes, curve: Curve, k: int, figure: FigureRecord, result
         return
     if len(time) > 1 and (at := is_at_limit(values, figure.limits).any(axis=1)).any():
         label = None if axes.collections else "at a limit"
-        look: dict[str, Any] = {"color": COLORS[1], "alpha": SHADE, "linewidth": 0, "label": label}
+        look: dict[str, Any] = {"color": LIMIT, "alpha": SHADE, "linewidth": 0, "label": label}
         axes.fill_between(time, 0.0, 1.0, where=at, transform=axes.get_xaxis_transform(), **look)
     count = values.shape[1]
     if count == 1:
@@ -62,9 +62,10 @@ def _draw_columns(axes: Axes, curve: Curve, k: int, figure: FigureRecord, result
 
 
 def is_at_limit(values: Array, limits: tuple[float, ...]) -> Array:
-    """Where values (T, n) are at one of the limits: (T, n)."""
+    """Where values (T, n) are at one of the limits: (T, n). What goes beyond them passes them, and is at none."""
     near = np.isclose(values[..., None], limits or np.inf, rtol=NEAR, atol=0.0)
-    return np.asarray(near.any(axis=-1))
+    is_within = np.abs(values).max(initial=0.0) <= (1.0 + NEAR) * np.abs(limits).max(initial=0.0)
+    return np.asarray(near.any(axis=-1) & is_within)
 
 
 def is_crowded(values: Array, limits: tuple[float, ...]) -> bool:
@@ -95,7 +96,7 @@ def draw_torque_speed(axes: Axes, figure: FigureRecord, results: Results) -> Non
         x, values = curve_points(results, curve, figure.scale)
         axes.plot(x, values[:, 0], label=curve.label, **line_style(k, len(x), alone=len(figure.curves) == 1))
     if len(limits := motor_limits(results, figure)):
-        axes.plot(*limits.T, color=COLORS[1], linestyle="--", label="limits")
+        axes.plot(*limits.T, color=LIMIT, linestyle="--", label="limits")
     axes.set_xlabel(figure.x_label)
     axes.set_ylabel(figure.y_label)
     legend(axes)

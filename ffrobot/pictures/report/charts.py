@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from base64 import b64encode
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from html import escape
 from itertools import pairwise
@@ -19,7 +20,7 @@ from ..figures.figure_file import Curve, FigureRecord
 from ..figures.shared import curve_points, file_name, motor_limits
 from ..figures.standard import standard_figures
 from ..motion import Target, targets
-from ..projection import COLORS
+from ..projection import COLORS, LIMIT
 from .runs import Run, runs, sources
 
 MAX_POINTS = 4000  # of a curve; more cannot be told apart on a screen
@@ -69,8 +70,8 @@ class Chart:
             for limit in self.limits
         ]  # fmt: skip
         if lines:
-            text = "limits " + ", ".join(f"{limit:g}" for limit in self.limits)
-            lines[0]["label"] = {"text": text, "textposition": "start", "font": {"color": COLORS[1]}}
+            text = "limits " + ", ".join(f"{limit:g}".replace("-", "−") for limit in self.limits)
+            lines[0]["label"] = {"text": text, "textposition": "start"}
         y_axis: dict[str, Any] = {"title": {"text": self.y_label}, "automargin": True, "exponentformat": "power"}
         if self.includes:
             y_axis |= {"autorangeoptions": {"include": list(self.includes)}}
@@ -101,13 +102,17 @@ def encoded(values: NDArray[Any], kind: str = "f4") -> dict[str, str]:
 
 def limit_style() -> dict[str, Any]:
     """Of lines that say what a motor or a patch can do."""
-    return {"color": COLORS[1], "dash": "dash", "width": 1.5}
+    return {"color": LIMIT, "dash": "dash", "width": 1.5}
 
 
-def style(k: int) -> dict[str, Any]:
-    """Colour, dashes and width of the k-th curve of a chart: thinner and thinner, so that none hides another."""
-    width = max(1.2, 3.6 * 0.75**k)
-    return {"line": {"color": COLORS[k % len(COLORS)], "dash": DASHES[k // len(COLORS) % len(DASHES)], "width": width}}
+def style(k: int, color: int | None = None, part: int = 0) -> dict[str, Any]:
+    """Of the k-th curve of a chart: its width, so that none hides another, its colour and its dashes.
+
+    The k-th colour unless `color` is that of a run, which then has `part` curves before this one.
+    """
+    color = k if color is None else color
+    line = {"color": COLORS[color % len(COLORS)], "dash": DASHES[(color // len(COLORS) + part) % len(DASHES)]}
+    return {"line": line | {"width": max(1.2, 3.6 * 0.75**k)}}
 
 
 def shades(count: int) -> list[str]:
@@ -139,14 +144,17 @@ def _coordinates(x: Array, y: Array) -> dict[str, Any]:
 def history_charts(files: Sequence[Results]) -> list[Chart]:
     """Path errors, paths, angles, deflections, forces, moments, voltages and energies."""
     charts = {chart.name: chart for chart in _path_errors(files)}
+    colors = {(run.source, run.analysis): k for k, run in enumerate(runs(files))}
     for number, (results, source) in enumerate(zip(files, sources(files), strict=True)):
         records = {record.name: record for record in standard_figures(results)}
         for record in records.values():
             if record.kind == "configurations" or not record.curves:  # the mechanism moves instead; no histories
                 continue
+            if record.name == "tip_error" and any(chart.name.startswith("error_") for chart in charts.values()):
+                continue  # the distance from the path again
             chart = charts.setdefault(record.name, _empty(record))
-            for curve in record.curves:
-                _add(chart, results, record, curve, source, DASHES[number % len(DASHES)])
+            for curve, look in _looks(record, source, colors, len(chart.traces)):
+                _add(chart, results, record, curve, source, look, DASHES[number % len(DASHES)])
             if record.joint is not None and len(limits := motor_limits(results, record)):
                 chart.add(f"{source}: limits" if source else "limits", *limits.T, line=limit_style())
     return list(charts.values())
@@ -177,16 +185,39 @@ def _empty(record: FigureRecord) -> Chart:
     return Chart(record.name, record.title, record.y_label, record.x_label, limits=record.limits)
 
 
-def _add(chart: Chart, results: Results, record: FigureRecord, curve: Curve, source: str, dash: str) -> None:
+PRESCRIBED = {"color": "#a9b3c0", "width": 4}
+
+
+def _looks(
+    record: FigureRecord, source: str, colors: dict[tuple[str, str], int], before: int
+) -> Iterator[tuple[Curve, dict[str, Any]]]:
+    """Every curve with its style: a run has the same colour in all charts that compare runs, as in the mechanism.
+
+    `colors` are by (source, analysis); `before`: curves that the chart has already.
+    """
+    names = [curve.data.partition("/")[0] for curve in record.curves]
+    is_one = len(set(names)) == 1 and len(names) > 1  # components of one run
+    parts: Counter[str] = Counter()
+    for k, (curve, name) in enumerate(zip(record.curves, names, strict=True), before):
+        if is_prescribed := curve.data.partition("[")[0].endswith("/target"):
+            yield curve, {"line": PRESCRIBED | {"dash": DASHES[parts["/"] % len(DASHES)]}}
+        else:
+            yield curve, style(k) if is_one else style(k, colors[source, name], parts[name])
+        parts["/" if is_prescribed else name] += 1
+
+
+def _add(
+    chart: Chart, results: Results, record: FigureRecord, curve: Curve, source: str, look: dict[str, Any], dash: str
+) -> None:
     """Add what `curve` draws: one line, or a shade for each column of its dataset."""
     label = f"{source}: {curve.label}" if source else curve.label
     if record.kind == "path":
         values = results.data(curve.data)
-        chart.add(label, values[:, 0], values[:, 1], **style(len(chart.traces)))
+        chart.add(label, values[:, 0], values[:, 1], **look)
         return
     x, values = curve_points(results, curve, record.scale)
     if values.shape[1] == 1:
-        chart.add(label, x, values[:, 0], **style(len(chart.traces)))
+        chart.add(label, x, values[:, 0], **look)
     else:
         for k, color in enumerate(shades(values.shape[1])):
             line = {"color": color, "width": 1, "dash": dash}
@@ -196,14 +227,14 @@ def _add(chart: Chart, results: Results, record: FigureRecord, curve: Curve, sou
 def _path_errors(files: Sequence[Results]) -> list[Chart]:
     """Distance of every point with a trajectory from where it should be."""
     charts: dict[str, Chart] = {}
-    for run in runs(files):
+    for k, run in enumerate(runs(files)):
         time = run.results.time(run.analysis)
         for target in targets(run.results, run.analysis) if len(time) > 1 else ():
             name, title = target.trajectory, f"distance of {target.point} from its path"
             empty = Chart(file_name("error", name), title, "distance (mm)", includes=(0.0, 1e3 * ROUND_OFF))
             chart = charts.setdefault(name, empty)
             error = path_error(run, target)
-            chart.add(run.label, time[: len(error)], 1e3 * error, **style(len(chart.traces)))
+            chart.add(run.label, time[: len(error)], 1e3 * error, **style(len(chart.traces), k))
     return list(charts.values())
 
 

@@ -100,16 +100,16 @@ function scenery() {
     for (const path of run.paths)
       if (path.target && !wanted[path.name])
         wanted[path.name] = {
-          type: "scatter3d", mode: "lines", name: "path wanted of " + path.name, hoverinfo: "name",
+          type: "scatter3d", mode: "lines", name: "prescribed path of " + path.name, hoverinfo: "name",
           line: { color: pageColor("--ink"), width: 3, dash: "dash" },
           x: every(path.target, 3, 0), y: every(path.target, 3, 1), z: every(path.target, 3, 2).map((z) => z + MECHANISM.above),
         };
-  return [ground, ...Object.values(wanted)];
+  return [...(MECHANISM.ground.length ? [ground] : []), ...Object.values(wanted)];
 }
 
 const { right, up, viewer } = MECHANISM.view, FLAT = MECHANISM.is_plane;
 const SEEN = FLAT ? 2 : 1.74; // of the height, in Plotly's unit
-const LABELS = FLAT ? [150, 100] : [60, 55]; // pixels of the width and of the height that labels of the axes take
+const LABELS = FLAT ? [150, 100] : [60, 95]; // pixels of the width and of the height that labels of the axes take
 const PAPER = [690, 400]; // pixels
 const still = scenery();
 const first = []; // number of the first trace of each run

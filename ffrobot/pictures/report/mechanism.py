@@ -195,7 +195,7 @@ def _charts(body: ModalBody, prefix: str) -> list[Chart]:
             shape = shapes[:, axis, k]
             largest = float(np.max(np.abs(shape)))
             line = {"color": color, "width": 1.5}
-            label = f"mode {k + 1}: {body.frequency[k]:.4g} Hz"
+            label = f"mode {k + 1}: {body.frequency[k]:.5g} Hz"
             chart.add(label, x, shape / (largest or 1.0), line=line)
         charts.append(chart)
     return charts

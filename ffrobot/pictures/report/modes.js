@@ -57,7 +57,7 @@ function drawModes() {
     // Small triangles are no degenerate ones: their normals count.
     lighting: { ambient: 0.6, diffuse: 0.6, specular: 0.1, facenormalsepsilon: 0, vertexnormalsepsilon: 0 },
     hoverinfo: "x+y+z",
-    colorbar: { title: { text: "size" }, thickness: 12, len: 0.7 },
+    colorbar: { title: { text: "displacement" }, thickness: 12, len: 0.7 },
   };
   const layout = { ...paint(), margin: { l: 0, r: 0, t: 10, b: 0 }, scene: modeAxes(link) };
   return Plotly.react(modeStage, [rest, shape], layout, CONFIG);
