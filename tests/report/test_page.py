@@ -171,9 +171,16 @@ def test_a_run_has_one_colour_on_the_page(two_link):
     for name in ("path_tip", "error_tip", "moment_O", "deflection_link2.tip", "coordinate_A", "angle_link1"):
         found = {trace["name"].removesuffix(", y"): trace["line"]["color"] for trace in charts[name].traces}
         assert {run: found[run] for run in expected} == expected
-    target = charts["path_tip"].traces[0]
-    assert target["name"] == "prescribed path"
-    assert target["line"]["color"] not in COLORS
+    assert charts["path_tip"].traces[0]["line"]["color"] not in COLORS  # the prescribed path
+
+
+def test_a_single_run_has_its_colour_beside_the_prescribed_path(slider_crank_3d):
+    with Results(slider_crank_3d.folder / "scene.results.h5") as results:
+        charts = {chart.name: chart for chart in history_charts([results])}
+    prescribed, reached = charts["path_slider"].traces
+    assert [prescribed["name"], reached["name"]] == ["prescribed, x", "inverse, x"]
+    assert prescribed["line"]["color"] not in COLORS
+    assert reached["line"]["color"] == COLORS[0]
 
 
 def test_verdict_of_a_loop(slider_crank_3d):

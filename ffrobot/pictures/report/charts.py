@@ -72,7 +72,11 @@ class Chart:
         if lines:
             text = "limits " + ", ".join(f"{limit:g}".replace("-", "−") for limit in self.limits)
             lines[0]["label"] = {"text": text, "textposition": "start"}
-        y_axis: dict[str, Any] = {"title": {"text": self.y_label}, "automargin": True, "exponentformat": "power"}
+        y_axis: dict[str, Any] = {
+            "title": {"text": self.y_label, "standoff": 8},
+            "automargin": True,
+            "exponentformat": "power",
+        }
         if self.includes:
             y_axis |= {"autorangeoptions": {"include": list(self.includes)}}
         if self.equal_axes:
@@ -195,15 +199,20 @@ def _looks(
 
     `colors` are by (source, analysis); `before`: curves that the chart has already.
     """
-    names = [curve.data.partition("/")[0] for curve in record.curves]
+    names = [_run_of(curve) for curve in record.curves]
     is_one = len(set(names)) == 1 and len(names) > 1  # components of one run
     parts: Counter[str] = Counter()
     for k, (curve, name) in enumerate(zip(record.curves, names, strict=True), before):
-        if is_prescribed := curve.data.partition("[")[0].endswith("/target"):
-            yield curve, {"line": PRESCRIBED | {"dash": DASHES[parts["/"] % len(DASHES)]}}
+        if not name:
+            yield curve, {"line": PRESCRIBED | {"dash": DASHES[parts[name] % len(DASHES)]}}
         else:
             yield curve, style(k) if is_one else style(k, colors[source, name], parts[name])
-        parts["/" if is_prescribed else name] += 1
+        parts[name] += 1
+
+
+def _run_of(curve: Curve) -> str:
+    """The analysis of a curve; of a prescribed path, which all have, none."""
+    return "" if curve.data.partition("[")[0].endswith("/target") else curve.data.partition("/")[0]
 
 
 def _add(

@@ -109,7 +109,7 @@ function scenery() {
 
 const { right, up, viewer } = MECHANISM.view, FLAT = MECHANISM.is_plane;
 const SEEN = FLAT ? 2 : 1.74; // of the height, in Plotly's unit
-const LABELS = FLAT ? [150, 100] : [60, 95]; // pixels of the width and of the height that labels of the axes take
+const LABELS = FLAT ? [150, 100] : [100, 95]; // pixels of the width and of the height that labels of the axes take
 const PAPER = [690, 400]; // pixels
 const still = scenery();
 const first = []; // number of the first trace of each run
@@ -142,6 +142,8 @@ function start() {
     first.push(all.length);
     traces(run, 0, state.s).forEach((at, i) => all.push({ ...styles(run)[i], ...at }));
   }
+  const rows = Math.ceil((MECHANISM.runs.length - 4) / 3); // of the legend, beyond what the height is for
+  if (NARROW && rows > 0) stage.style.height = `calc(22rem + ${20 * rows}px)`;
   const xyz = ([x, y, z]) => ({ x, y, z });
   const camera = {
     eye: xyz(viewer.map((value) => 2.1 * value)), up: xyz(FLAT ? up : [0, 0, 1]), center: xyz(FLAT ? [0, -0.1, 0] : [0, 0, -0.14]),

@@ -9,7 +9,10 @@ const pageColor = (name) => getComputedStyle(document.documentElement).getProper
 const COMMON_LAYOUT = {
   margin: { l: 70, r: 15, t: 55, b: 50 },
   colorway: ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#7A7A7A"],
-  legend: { orientation: "h", yref: "container", y: 0, yanchor: "bottom", font: { size: 11 } },
+  legend: {
+    orientation: "h", yref: "container", y: 0, yanchor: "bottom", font: { size: NARROW ? 10 : 11 },
+    ...(NARROW ? { xref: "container", x: 0, entrywidth: 0.5, entrywidthmode: "fraction" } : {}), // two columns
+  },
   hovermode: "closest",
 };
 const paint = () => ({ font: { size: 12, color: pageColor("--ink") }, plot_bgcolor: pageColor("--paper"), paper_bgcolor: pageColor("--paper") });
@@ -93,7 +96,7 @@ const SIZES = {
     broad: { width: null, height: null, "title.font.size": NARROW ? 13 : 14 },
     long: { width: null, "title.font.size": NARROW ? 13 : 14 },
     chart: {
-      width: null, height: null, "legend.font.size": 11, "title.font.size": NARROW ? 13 : 14,
+      width: null, height: null, "legend.font.size": NARROW ? 10 : 11, "title.font.size": NARROW ? 13 : 14,
       "title.xref": NARROW ? "container" : "paper",
     },
   },
