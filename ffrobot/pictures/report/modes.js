@@ -33,7 +33,9 @@ function modeAxes(link) {
   });
   const longest = Math.max(...ranges.map(([a, b]) => b - a));
   const axis = (c, name) => ({ ...axis3D(), range: ranges[c], title: { text: `${name} (m)` }, showbackground: false });
-  const ratio = (c) => (2.6 * (ranges[c][1] - ranges[c][0])) / longest;
+  // The height of the picture is two units; beside the link there is the color bar. On phones the width decides.
+  const length = 2.6 * Math.min(1, (modeStage.clientWidth - 80) / (1.3 * modeStage.clientHeight));
+  const ratio = (c) => (length * (ranges[c][1] - ranges[c][0])) / longest;
   return {
     xaxis: axis(0, "x"), yaxis: axis(1, "y"), zaxis: axis(2, "z"),
     aspectmode: "manual", aspectratio: { x: ratio(0), y: ratio(1), z: ratio(2) },
@@ -57,7 +59,7 @@ function drawModes() {
     // Small triangles are no degenerate ones: their normals count.
     lighting: { ambient: 0.6, diffuse: 0.6, specular: 0.1, facenormalsepsilon: 0, vertexnormalsepsilon: 0 },
     hoverinfo: "x+y+z",
-    colorbar: { title: { text: "displacement" }, thickness: 12, len: 0.7 },
+    colorbar: { title: { text: "displacement", side: "right" }, thickness: 12, len: 0.7 },
   };
   const layout = { ...paint(), margin: { l: 0, r: 0, t: 10, b: 0 }, scene: modeAxes(link) };
   return Plotly.react(modeStage, [rest, shape], layout, CONFIG);
