@@ -189,7 +189,7 @@ def _empty(record: FigureRecord) -> Chart:
     return Chart(record.name, record.title, record.y_label, record.x_label, limits=record.limits)
 
 
-PRESCRIBED = {"color": "#a9b3c0", "width": 4}
+PRESCRIBED = {"color": "#8b95a3", "width": 4}
 
 
 def _looks(
