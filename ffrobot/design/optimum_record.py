@@ -230,6 +230,9 @@ class Optimum(Finding):
         yield from (f"price      {text}" for text in self._prices_in_words())
         if self.optimality is not None:
             yield from (f"note       {text}" for text in self.optimality.kinks)
+        for goal, reading in zip(self.problem.goals, self.best.readings, strict=False):
+            if reading.remark:
+                yield f"note       {goal.text}: {reading.remark}"
         if self.message:
             yield f"note       {self.message}"
         if len(self.searches) > 1:

@@ -40,6 +40,7 @@ class Reading:
         column, sign: of its history, and of the value there.
         mode: of a frequency, the family and its number in it.
         coarse: of a peak, its value by every second output; NaN of all else.
+        between: of a peak, the largest value of all times that the run looked at; NaN where that is not known.
     """
 
     value: float
@@ -50,6 +51,15 @@ class Reading:
     sign: float = 1.0
     mode: str = ""
     coarse: float = float("nan")
+    between: float = float("nan")
+
+    @property
+    def remark(self) -> str:
+        """That outputs miss a peak; empty where they do not."""
+        if not self.between > self.value * (1.0 + MISSED):
+            return ""
+        found = f"found {self.value:.6g} near outputs, {self.between:.6g} between them"
+        return f"{found}: a smaller output_step resolves the peak"
 
 
 @dataclass(frozen=True)
@@ -92,17 +102,22 @@ POWER = "power"
 """What joints have besides their datasets: the power of their motors, W."""
 
 SAME = 1e-6  # of an output step: times that are one
+MISSED = 1e-3  # of a peak: a larger value between outputs that is worth a note
 SUPPORT = 6  # outputs that a value between outputs is made from
 
 
 @dataclass(frozen=True)
 class History:
-    """`values` (T, columns) at `time` (T,), s; of a vector its length, one column."""
+    """`values` (T, columns) at `time` (T,), s; of a vector its length, one column.
+
+    `largest`: of all columns and of all times that the run looked at; NaN where that is not known.
+    """
 
     name: str
     unit: str
     time: Array
     values: Array
+    largest: float = float("nan")
 
     def at(self, t: float, column: int, every: int = 1) -> float:
         """The value at t: that of an output, or of the polynomial through the six nearest (Lagrange).
@@ -138,15 +153,18 @@ def read_history(results: Results, name: str, option: str) -> History:
             f'{option}: expected the name of a history, such as "{_example(known)}", found'
             f' "{wanted}"{did_you_mean(wanted.replace("/", "."), known)}'
         )
-    values = _power(results, found) if found.endswith(f"/{POWER}") else results.data(found)
+    is_power = found.endswith(f"/{POWER}")
+    values = _power(results, found) if is_power else results.data(found)
+    peaks = np.atleast_1d(np.nan if is_power else results.attributes(found).get("peak", np.nan))
     if match:
         k = int(match["column"])
         if k >= values.shape[1]:
             raise InputError(f'{option}: expected a column below {values.shape[1]} of "{wanted}", found {k}')
+        peaks = peaks[k : k + 1] if len(peaks) == values.shape[1] else np.array([np.nan])  # that of a vector's length
         values = values[:, k : k + 1]
     elif is_vector(results, found, values):
         values = np.linalg.norm(values, axis=1, keepdims=True)
-    return History(name, _unit(results, found), results.time(found), as_floats(values))
+    return History(name, _unit(results, found), results.time(found), as_floats(values), float(peaks.max()))
 
 
 def _known(results: Results) -> dict[str, str]:
@@ -216,7 +234,7 @@ class Peak(Goal):
         _, time = top_at(history.time, history.values[:, column], k)
         edge: Literal["", "first", "last"] = "first" if k == 0 else "last" if k == history.time.size - 1 else ""
         value, coarse = (sign * history.at(time, column, every) for every in (1, COARSE))
-        return Reading(value, history.unit, time, edge, column, sign, coarse=coarse)
+        return Reading(value, history.unit, time, edge, column, sign, coarse=coarse, between=history.largest)
 
     def follow(self, results: Results, nominal: Reading) -> Followed:
         """At the time, in the column and with the sign of the `nominal` peak."""

@@ -82,7 +82,8 @@ class _Study:
         self._designs, self._curves = designs, curves
         self._spreads, self._goals, self._readings = designs.spreads, designs.goals, designs.readings
         self._nominal = tuple(curve.history(designs.middle) for curve in curves)
-        self._notes: dict[str, str] = {}
+        pairs = zip(self._goals, self._readings, strict=True)
+        self._notes = {f"peak of {g.text}": f"{g.text}: {one.remark}" for g, one in pairs if one.remark}
 
     def by_samples(self, count: int, seed: int, *, indices: bool) -> Uncertainty:
         """Of a Latin hypercube (McKay, Beckman & Conover 1979) of `count` points, keys paired for low discrepancy."""

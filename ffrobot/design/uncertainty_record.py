@@ -51,7 +51,7 @@ class Uncertainty(Finding):
         indices: Sobol indices, if requested.
         samples: (n, g) the responses, NaN for failed runs; (0, g) by gradients.
         failures: failed runs in words; `runs` is the number of all, `table` their file.
-        notes: peaks that other peaks exceed near the nominal values (by gradients).
+        notes: peaks between outputs; peaks that others exceed near the nominal values (by gradients).
     """
 
     name = "uncertainty"

@@ -1,12 +1,13 @@
 """`ffrobot optimise`: optima in closed form, prices of limits, catalogues, designs that fail, going on."""
 
 import csv
+import re
 import tomllib
 from copy import deepcopy
 
 import numpy as np
 import pytest
-from small_robots import BEAM, CANTILEVER, FORCE, RHO, E, L
+from small_robots import BEAM, CANTILEVER, FORCE, RHO, SWING, E, L
 
 import ffrobot
 
@@ -333,3 +334,24 @@ def test_evolution_keeps_limits_and_tells_the_best_of_all_designs_when_runs_end(
     kept = [one for one in found.tried if one.completed and found.problem.violation(one.readings) <= 1e-6]
     assert 0 < len(kept) < len(found.tried)
     assert found.value == min(one.values[0] for one in kept)
+
+
+def test_peaks_that_outputs_miss_are_told(write):
+    """A blow of 2 ms in 8 s, whose peak lies between outputs every 8 ms: the note has that of outputs every 0.1 ms."""
+    blow = {"point": "arm.tip", "y": "where(t < 0.0051, 0, where(t < 0.0071, -100, 0))"}
+    scene = SWING | {"load": [blow]}
+    scene["trajectory"] = [{"name": "rest", "joint": "shoulder", "value": "0"}]
+    of = {"name": "inverse", "kind": "pcid"}
+    scene["analysis"] = [of | {"end": 0.05, "output_step": 1e-4}]
+    results = ffrobot.solve(ffrobot.make_scene(**scene))
+    peak = np.abs(results["inverse/joints/shoulder/moment"]).max()
+    scene["analysis"] = [of | {"end": 8.0, "output_step": 0.1}]
+    path, moment = write(scene), "peak joints.shoulder.moment"
+    found = ffrobot.optimise(path, ["payload.0.mass in {0.5}"], minimise=moment)
+    (note,) = (line for line in str(found).splitlines() if line.startswith("note"))
+    told = re.fullmatch(rf"note +{moment}: found (\S+) near outputs, (\S+) between them: a smaller .*", note)
+    assert float(told[1]) == pytest.approx(found.value, rel=1e-5)
+    assert found.value < 0.99 * peak
+    assert float(told[2]) == pytest.approx(peak, rel=1e-4)
+    spread = ffrobot.uncertainty(path, [moment], ["payload.0.mass=±1%"], by="gradients")
+    assert f"{told[2]} between them" in spread.notes[0]
