@@ -1,53 +1,24 @@
-"""The linear equations about a planar motion against the oracle's: errors fall with the perturbation squared."""
+"""Coordinates, inputs and outputs of the linear equations about a planar motion."""
 
 import numpy as np
 import pytest
 import zoo
 from links import arm, arm_links, ritz_link
-from mechanisms import ModalLoad, make_model, pcid, revolute
+from mechanisms import make_model, pcid, revolute
 from oracle_runs import run
 
 from ffrobot.common.errors import SolveError
-from ffrobot.mbs import _core
 from ffrobot.mbs.model.model import without_paths
 from ffrobot.mbs.solve.linearisation import LinearEquations
 from ffrobot.mbs.solve.start import undeformed_posture
 
-constant = _core.TimeFunction.constant
-ROW = 2  # of the outputs: an instant at which everything moves
 
-
-def links(is_stiffened):
-    return arm_links(damping_ratio=0.02, stiffening=is_stiffened)
-
-
-@pytest.fixture(scope="module", params=[False, True], ids=["plain", "stiffened"])
-def motion(request):
-    """The arm's inverse dynamics."""
-    return request.param, run(arm(links(request.param)), pcid(end=0.4, output_step=0.1))
-
-
-def linearised(outcome, points=()):
-    run, model = outcome.outcome, without_paths(outcome.robot.model)
-    return LinearEquations(model, run.q[ROW], points).at(run.time[ROW], run.q[ROW], run.v[ROW], run.a[ROW])
-
-
-def driven(outcome, is_stiffened, more):
-    """The arm with the moments and modal forces of one output, and `more` moments, in place of its trajectory."""
-    moments = zip("OA", outcome.tau[ROW] + more, strict=True)
-    modal = [
-        ModalLoad(body.name, outcome.F_p[ROW, outcome.modal_columns(body.name)], constant(1.0))
-        for body in outcome.robot.bodies
-    ]
-    load = [{"joint": joint, "moment": repr(float(moment))} for joint, moment in moments]
-    tables = outcome.robot.tables | {"trajectory": [], "load": load}
-    del tables["body"]
-    return make_model(links(is_stiffened), modal, **tables)
-
-
-def test_outputs_and_inputs_are_dual(motion):
+@pytest.mark.parametrize("stiffened", [False, True])
+def test_outputs_and_inputs_are_dual(stiffened):
     """A force at a point works on the point's motion: one gradient serves both."""
-    linear = linearised(motion[1], ("link2.tip",))
+    found = run(arm(arm_links(damping_ratio=0.02, stiffening=stiffened)), pcid(end=0.2, output_step=0.1))
+    one, model = found.outcome, without_paths(found.robot.model)
+    linear = LinearEquations(model, one.q[-1], ("link2.tip",)).at(one.time[-1], one.q[-1], one.v[-1], one.a[-1])
     for axis in "xy":
         np.testing.assert_array_equal(
             linear.inputs[f"force/link2.tip/{axis}"], linear.outputs[f"point/link2.tip/{axis}"]
