@@ -1,4 +1,4 @@
-"""Closed loops to be added to the two-link case."""
+"""Closed loops: to be added to the two-link case, and of a wheel."""
 
 # With a controller from own.py beside the scene.
 OWN_CONTROLLER = """
@@ -10,3 +10,20 @@ sample_time = 0.001
 controller = [{ kind = "python", python = "own.py:controller" }]
 sensor = [{ joint = "O" }]
 """
+
+
+def wheel(python, **loop):
+    """Keys of a scene: a wheel in a closed loop with a controller in Python, FILE:FUNCTION."""
+    body = {"mass": 1.0, "inertia": 0.5, "center": [0.0, 0.0], "points": {"root": [0.0, 0.0]}}
+    closed = {"name": "loop", "kind": "closed-loop", "actuation": "inverse", "sample_time": 0.01, **loop}
+    return {
+        "name": "wheel",
+        "gravity": [0.0, 0.0],
+        "body": [{"name": "w", "rigid": body}],
+        "joint": [{"name": "O", "type": "revolute", "between": ["ground", "w.root"]}],
+        "trajectory": [{"name": "turn", "joint": "O", "value": "t**2"}],
+        "analysis": [
+            {"name": "inverse", "kind": "pcid", "end": 0.1, "output_step": 0.01},
+            closed | {"controller": [{"kind": "python", "python": python}]},
+        ],
+    }

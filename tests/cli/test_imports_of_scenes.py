@@ -1,11 +1,10 @@
 """What a scene's Python file imports from below its folder counts as part of it: in sweeps, studies, resumes."""
 
 import csv
-import tomllib
 
 import pytest
 import tomli_w
-from loops import OWN_CONTROLLER
+from loops import wheel
 
 import ffrobot as program
 from ffrobot.common.python_files import digest_of_function
@@ -36,19 +35,17 @@ WAYS = {
 
 
 @pytest.fixture
-def folder(case_copy):
-    """Writes the two-link case, short, with a controller whose gain comes from elsewhere."""
+def folder(tmp_path):
+    """Writes a wheel, with a controller whose gain comes from elsewhere."""
 
     def write(way, gain):
         file, head, inside = WAYS[way]
-        folder = case_copy("two_link").parent
-        text = (folder / "scene.toml").read_text(encoding="utf-8").partition("# The same moments")[0]
-        text = text.replace("end = 1.0", "end = 0.004")
-        (folder / "scene.toml").write_text(text + OWN_CONTROLLER, encoding="utf-8")
-        (folder / "own.py").write_text(
-            "import numpy as np\n" + head + CONTROLLER.format(inside=inside), encoding="utf-8"
-        )
-        (folder / file).parent.mkdir(exist_ok=True, parents=True)
+        folder = tmp_path / "scene"
+        (folder / file).parent.mkdir(parents=True)
+        scene = tomli_w.dumps(wheel("own.py:controller", sensor=[{"joint": "O"}]))
+        (folder / "scene.toml").write_text(scene, encoding="utf-8")
+        own = "import numpy as np\n" + head + CONTROLLER.format(inside=inside)
+        (folder / "own.py").write_text(own, encoding="utf-8")
         if file == "deep.py":
             (folder / "helper.py").write_text("from deep import GAIN\n", encoding="utf-8")
         (folder / file).write_text(f"GAIN = {gain}\n", encoding="utf-8")
@@ -98,16 +95,14 @@ def test_failed_imports(ffrobot, folder):
 
 def test_studies(ffrobot, folder):
     scene, helper = folder("name", 5.0)
-    command = ["sensitivity", scene, "--of", "peak loop/joints.O.moment", "--to", "payload.0.mass"]
-    text = tomllib.loads(scene.read_text(encoding="utf-8"))
-    text["payload"] = [{"point": "link2.tip", "mass": 1.0}]
-    scene.write_text(tomli_w.dumps(text), encoding="utf-8")
+    command = ["uncertainty", scene, "--of", "peak loop/joints.O.moment", "--by", "gradients"]
+    command += ["--spread", "body.w.rigid.inertia=±1%"]
     ffrobot.ok(*command)
-    before = rows(scene.with_suffix(".sensitivity"))
+    before = rows(scene.with_suffix(".uncertainty"))
     helper.write_text("GAIN = 400.0\n", encoding="utf-8")
     assert ffrobot(*command).returncode == 0
     assert ffrobot(*command, "-o", scene.parent / "new").returncode == 0
-    assert rows(scene.with_suffix(".sensitivity")) == rows(scene.parent / "new") != before
+    assert rows(scene.with_suffix(".uncertainty")) == rows(scene.parent / "new") != before
 
 
 @pytest.mark.parametrize("moved", [False, True])

@@ -12,6 +12,7 @@ import h5py
 import numpy as np
 import pytest
 import tomli_w
+from loops import wheel
 
 import ffrobot
 from ffrobot.sweep.runs import Run, perform
@@ -95,21 +96,8 @@ def waiting(setup):
 def scene(tmp_path):
     """A wheel with a controller of the user's."""
     (tmp_path / "mine.py").write_text(CONTROLLER, encoding="utf-8")
-    body = {"mass": 1.0, "inertia": 0.5, "center": [0.0, 0.0], "points": {"root": [0.0, 0.0]}}
-    loop = {"name": "loop", "kind": "closed-loop", "actuation": "inverse", "sample_time": 0.01}
-    tables = {
-        "name": "wheel",
-        "gravity": [0.0, 0.0],
-        "body": [{"name": "w", "rigid": body}],
-        "joint": [{"name": "O", "type": "revolute", "between": ["ground", "w.root"]}],
-        "trajectory": [{"name": "turn", "joint": "O", "value": "t**2"}],
-        "analysis": [
-            {"name": "inverse", "kind": "pcid", "end": 0.1, "output_step": 0.01},
-            loop | {"controller": [{"kind": "python", "python": "mine.py:constant"}]},
-        ],
-    }
     path = tmp_path / "scene.toml"
-    path.write_text(tomli_w.dumps(tables), encoding="utf-8")
+    path.write_text(tomli_w.dumps(wheel("mine.py:constant")), encoding="utf-8")
     return path
 
 
