@@ -25,6 +25,7 @@ pytest_plugins = ["costs"]
 MANY_SEEDS = 6
 TOGETHER = {"stress": "tests/stress/", "cases": ("tests/references/test_references", "tests/results/test_summary")}
 CASES = Path(__file__).parent.parent / "cases"
+STUDIES = ("sweep", "sensitivity", "uncertainty", "optimise")
 OTHER_COMMAND = os.environ.get("FFROBOT_COMMAND")  # an older version's, to see whether a test fails there
 
 
@@ -46,6 +47,8 @@ class Command:
 
     def __call__(self, *arguments, cwd=None, timeout=120, **options):
         arguments = [str(argument) for argument in arguments]
+        if arguments and arguments[0] in STUDIES and "-j" not in arguments:  # tests go side by side already
+            arguments += ["-j", "1"]
         if not options and OTHER_COMMAND is None:
             return self.forks.run(arguments, self.environment, cwd, timeout)
         options |= {"env": self.environment, "cwd": cwd, "timeout": timeout, "capture_output": True, "text": True}

@@ -21,8 +21,11 @@ LOADED = (
     "h5py", "scipy.linalg", "scipy.optimize", "scipy.interpolate", "matplotlib.backends.backend_agg",
     "ffrobot.cli", "ffrobot.run.solve", "ffrobot.run.inputs", "ffrobot.results.write", "ffrobot.results.resume",
     "ffrobot.fe_models.link", "ffrobot.present.details", "ffrobot.present.summary",
-    "ffrobot.pictures.figures.plot", "ffrobot.pictures.report",
+    "ffrobot.pictures.figures.plot", "ffrobot.pictures.report", "ffrobot.present.console", "ffrobot.present.progress",
+    "ffrobot.present.start_postures", "ffrobot.scene.plausibility", "ffrobot.results.judging", "ffrobot.sweep.sweep",
+    "ffrobot.actuation.feasibility", "scipy.integrate", "scipy.signal", "email.message", "concurrent.futures.thread",
 )  # fmt: skip
+CASES = Path(__file__).parent.parent / "cases"
 BEFORE_LOADING = ("PYTHON", "OMP_", "OPENBLAS_", "LD_", "MPL")  # begin variables that are read as a process starts
 
 
@@ -87,6 +90,10 @@ def main():
     os.dup2(2, 1)
     for module in LOADED:
         import_module(module)
+    from ffrobot.scene.load import load_scene
+
+    for case in ("two_link_closed_loop", "slider_crank_3d"):  # validators of tables are built with the first of a kind
+        load_scene(CASES / case / "scene.toml")
     gc.freeze()
     for line in sys.stdin:
         child = os.fork()
