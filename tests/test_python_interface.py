@@ -4,7 +4,6 @@ import subprocess
 import sys
 import tomllib
 from importlib.metadata import version
-from pathlib import Path
 
 import h5py
 import numpy as np
@@ -14,7 +13,6 @@ import ffrobot
 from ffrobot.cli import cli
 from ffrobot.present import progress
 
-ROOT = Path(__file__).parents[1]
 SECTION = {"shape": "tube", "outer": 0.02, "inner": 0.016}
 KEYS = {"time", "bodies/arm/angle", "points/arm.tip/position[0]", "joints/shoulder/moment", "energy/kinetic"}
 

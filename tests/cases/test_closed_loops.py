@@ -10,7 +10,6 @@ import ffrobot
 from ffrobot.common.errors import InputError
 
 BLOW = [{"point": "link2.tip", "y": "where(t < 0.02, 0, where(t < 0.03, 30*sin(pi*(t - 0.02)/0.01), 0))"}]
-PD = {"kind": "joint-pid", "proportional": {"O": 500.0, "A": 100.0}, "derivative": {"O": 40.0, "A": 8.0}}
 
 
 def loop(name, *controllers, actuation="split", **keys):

@@ -4,11 +4,9 @@ import re
 
 import numpy as np
 import pytest
-from checkpoints import CASES
 
 import ffrobot
 
-CASE = CASES / "lightest_arm"
 DENSITY, OUTER = 2700.0, 0.04
 LENGTHS = {"upper_arm": 0.5, "forearm": 0.4}
 CHOSEN = {"upper_arm": 0.0329, "forearm": 0.0372}  # m, holes as make_parts.py draws them

@@ -285,14 +285,6 @@ actuation = "carried"
 feed_forward = "{given}"
 sample_time = {step}
 """
-PD = """
-[[analysis.controller]]
-kind = "joint-pid"
-proportional = { hub = 5.0 }
-derivative = { hub = 0.05 }
-[[analysis.sensor]]
-joint = "hub"
-"""
 
 
 def test_feed_forward_of_a_closed_loop(scene):

@@ -4,7 +4,6 @@ import json
 from functools import cache
 from pathlib import Path
 
-import numpy as np
 import scene_of
 
 from ffrobot.fe_models.link import cached_modal_body
@@ -22,8 +21,3 @@ def load(name):
 @cache
 def modal_body(link):
     return cached_modal_body(FOLDER / link).body
-
-
-def still(A, omega, alpha):
-    zero = np.zeros(3)
-    return zero, A, np.concatenate([zero, omega]), np.concatenate([zero, alpha])

@@ -211,6 +211,5 @@ def oracle_of(assembly):
         [(load.body, load.vector, load.magnitude) for load in robot.modal_loads],
         robot.rotors,
         robot.frictions,
-        (),
         robot.state_forces,
     )

@@ -132,18 +132,16 @@ class RowState:
 class Mechanism:
     """Bodies with constraints (row, target), loads (row, size) and modal loads (body name, vector, size).
 
-    Joints as built: rotors (row, inertia), whose rate is the row's, friction (row, Friction) along rows, springs
-    (row a, row b, stiffness, damping) of the twist a − b. Forces of the motion (marker, function) as scenes have them.
+    Joints as built: rotors (row, inertia), whose rate is the row's, friction (row, Friction) along rows. Forces of the
+    motion (marker, function) as scenes have them.
     """
 
-    def __init__(
-        self, bodies, gravity, constraints=(), loads=(), modal_loads=(), rotors=(), frictions=(), springs=(), forces=()
-    ):
+    def __init__(self, bodies, gravity, constraints=(), loads=(), modal_loads=(), rotors=(), frictions=(), forces=()):
         self.bodies = list(bodies)
         self.gravity = np.array(gravity)
         self.constraints, self.loads, self.modal_loads = list(constraints), list(loads), list(modal_loads)
         self.rotors, self.frictions = list(rotors), list(frictions)
-        self.springs, self.state_forces = list(springs), list(forces)
+        self.state_forces = list(forces)
         sizes = [3 + body.n_modes for body in self.bodies]
         ends = np.cumsum(sizes)
         self.size = int(ends[-1])
@@ -179,9 +177,6 @@ class Mechanism:
         for row, friction in self.frictions:
             state = self.row(row, q, v)
             Q -= state.gradient * resistance(friction, state.rate)
-        for *rows, stiffness, damping in self.springs:
-            a, b = (self.row(row, q, v) for row in rows)
-            Q -= (a.gradient - b.gradient) * (stiffness * (a.value - b.value) + damping * (a.rate - b.rate))
         for end, function in self.state_forces:
             marker = self.marker(end, q, v)
             Q += marker.L.T @ np.array(function(t, list(marker.position), list(marker.velocity)))
@@ -267,10 +262,6 @@ class Mechanism:
         for row, friction in self.frictions:
             rate = self.row(row, q, v).rate
             dissipated += resistance(friction, rate) * rate
-        for *rows, stiffness, damping in self.springs:
-            a, b = (self.row(row, q, v) for row in rows)
-            strain += 0.5 * stiffness * (a.value - b.value) ** 2
-            dissipated += damping * (a.rate - b.rate) ** 2
         return np.array([kinetic, strain, gravitational, dissipated])
 
     def momentum(self, q, v):

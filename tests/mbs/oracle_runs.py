@@ -170,11 +170,3 @@ def on_rows(robot, q, v):
     C_v = row_values(model, q[None], at)[1][0]
     rates = target_rates(model, q[None], at)[0]
     return q, v - np.linalg.lstsq(C_v, C_v @ v - rates, rcond=None)[0]
-
-
-def freely(robot, q, v):
-    """The state of the tree of one body that nothing holds, on its planar joint, from (R, θ, p) and their rates."""
-    (node,) = robot.model.tree.nodes
-    in_tree = np.zeros((2, robot.model.tree.n_v))
-    in_tree[:, node.v], in_tree[:, node.p_v] = (q[:3], v[:3]), (q[3:], v[3:])
-    return in_tree

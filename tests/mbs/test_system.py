@@ -67,16 +67,6 @@ def test_modes_accelerate_as_the_oracle_says(joint):
 STIFFENED = ("stiffened solid", "stiffened beam", "stiffened supported beam")
 
 
-@pytest.mark.parametrize("joint", TYPES)
-def test_stiffened_modes_accelerate_as_the_oracle_says(joint):
-    """Free bodies hang on sections that do not move: beams alone."""
-    kinds = ("stiffened beam",) if joint == "free" else STIFFENED
-    rng = np.random.default_rng(TYPES.index(joint))
-    for _ in range(4):
-        pair, scale, _ = systems(random_tree(rng, [joint] * 2, kinds, chain=True, size=SMALL))
-        assert_same(pair, scale)
-
-
 @pytest.mark.parametrize("seed", range(5))
 def test_trees_of_stiffened_bodies(seed):
     """Beside plain and rigid ones."""

@@ -160,17 +160,6 @@ def as_built(mechanism):
     return build
 
 
-GEARED = ("chain of 3", "backwards", "mixed", "mixed backwards", "tree", "loaded")
-
-
-def geared(name, motor=None, **keys):
-    """A mechanism of `ALL` whose revolute joints have motors behind compliant gears; rotors come with the analysis."""
-    gear = {"gear_ratio": 7.0, "rotor_inertia": 0.02, "stiffness": 90.0, "damping": 0.3, "viscous_friction": 0.2}
-    gear |= {} if motor is None else {"motor": motor}
-    joints = build(name).tables["joint"]
-    return build(name, joint=[joint | gear if joint["type"] == "revolute" else joint for joint in joints], **keys)
-
-
 def random_stiffening(rng, body, size=0.05):
     """Symmetric matrices for every unit load."""
 
