@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...common.arrays import Array
+from ...common.arrays import Array, Indices
 from ...common.errors import InputError
 from ...fe_models.modal_body import ModalBody
 from .composite import Placed, composite, place_of
@@ -52,13 +52,12 @@ def _straight(key: str, placed: Placed, body: ModalBody) -> Effects:
     """On a link held straight: the loads of a volt times the differences of what they work on, stretch by stretch."""
     layout, edges = placed
     own, sections = own_row(layout), link_sections(body)
-    stretches = [_stretches(key, layout, body, sections, k + 1, *edge) for k, edge in enumerate(edges)]
-    starts, ends = (np.concatenate([x[side] for x, _ in stretches]) for side in (slice(None, -1), slice(1, None)))
-    first = np.cumsum([0, *(len(stations) for _, stations in stretches[:-1])])
-    alike, which = np.unique(sections.alike[np.concatenate([on for _, on in stretches])], return_inverse=True)
+    starts, ends, stations, first = _stretches(key, layout, body, sections, edges)
+    alike, which = np.unique(sections.alike[stations], return_inverse=True)
     places = np.array([place_of(layout, sections, station) for station in alike.tolist()])
     loads = np.array([straight_loads(layout, *place) for place in places])[which]
-    differences = potentials(body, ends) - potentials(body, starts)
+    before, after = np.split(potentials(body, np.concatenate([starts, ends])), 2)
+    differences = after - before
     of_stretch = np.stack([places[:, 0], load_per_volt(layout, *places.T), places[:, 1]])[:, which]
     extent, c, lever = np.add.reduceat(of_stretch * (ends - starts), first, axis=1) / np.add.reduceat(
         ends - starts, first
@@ -70,27 +69,44 @@ def _straight(key: str, placed: Placed, body: ModalBody) -> Effects:
     return Effects(extent, c, lever / 2 if layout.acts_in == "twist" else np.ones(len(edges)), turn, Phi_V)
 
 
-def _stretches(
-    key: str, layout: PztLayout, body: ModalBody, sections: LinkSections, number: int, start: float, end: float
-) -> tuple[Array, Array]:
-    """The ends (m + 1,) of stretches into which a change of the link's extent cuts a patch, and their stations (m,)."""
-    x = body.stations.position[:, 0]
-    slack = min(1e-9 * body.length, 0.25 * (end - start))
-    covered = np.flatnonzero((x[1:] > start + slack) & (x[:-1] < end - slack))
-    if not len(covered):  # rounding: it begins where it ends
+class _Stretches(NamedTuple):
+    """Of k patches, one after the other, each m of one extent: `starts`, `ends` (m,), m; `first` (k,) of each patch."""
+
+    starts: Array
+    ends: Array
+    stations: Indices
+    first: Indices
+
+
+def _stretches(key: str, layout: PztLayout, body: ModalBody, sections: LinkSections, edges: Array) -> _Stretches:
+    """Stretches into which changes of the link's extent cut patches between `edges` (k, 2), and their stations."""
+    x, (starts, ends) = body.stations.position[:, 0], edges.T
+    slack = np.minimum(1e-9 * body.length, 0.25 * (ends - starts))
+    covered = (x[1:] > (starts + slack)[:, None]) & (x[:-1] < (ends - slack)[:, None])
+    if not covered.any(axis=1).all():  # rounding: it begins where it ends
         raise InputError(f"{key}: length: expected patches that can be seen on a link of {body.length:g} m, found less")
-    extents = sections.extent(layout.normal)[covered]
+    extents = sections.extent(layout.normal)[:-1]
     jump = np.abs(np.diff(extents)) / np.maximum(extents[1:], extents[:-1])
-    if jump.max(initial=0.0) > STEP:
-        k = int(jump.argmax())
+    jumps = np.where(covered[:, 1:] & covered[:, :-1], jump, 0.0)
+    if jumps.max(initial=0.0) > STEP:
+        number = int((jumps > STEP).any(axis=1).argmax())
+        k = int(jumps[number].argmax())
         what = "height" if layout.normal == "y" else "width"
         raise InputError(
-            f"{key}: expected patches on one section each, found patch {number} ({start:g} to {end:g} m) across a step"
-            f" of the {what} from {extents[k]:g} to {extents[k + 1]:g} m at {x[covered[k + 1]]:g} m"
+            f"{key}: expected patches on one section each, found patch {number + 1} ({starts[number]:g} to"
+            f" {ends[number]:g} m) across a step of the {what} from {extents[k]:g} to {extents[k + 1]:g} m at"
+            f" {x[k + 1]:g} m"
         )
-    changes = np.flatnonzero(jump > 1e-9)
-    ends = np.concatenate([[max(start, 0.0)], x[covered[changes + 1]], [min(end, body.length)]])
-    return ends, covered[np.append(changes, len(extents) - 1)]
+    last, cut = covered.copy(), covered.copy()
+    last[:, :-1] &= ~covered[:, 1:]
+    cut[:, :-1] &= last[:, :-1] | (jumps > 1e-9)
+    patch, stations = np.nonzero(cut)
+    is_last = last[patch, stations]
+    found = np.where(is_last, np.minimum(ends, body.length)[patch], x[stations + 1])
+    first = np.append(0, np.flatnonzero(is_last)[:-1] + 1)
+    begin = np.append(0.0, found[:-1])
+    begin[first] = np.maximum(starts, 0.0)
+    return _Stretches(begin, found, stations, first)
 
 
 def _outlined(key: str, layout: PztLayout, body: ModalBody, edges: Array) -> Array:
