@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from typing import TYPE_CHECKING
 
@@ -31,12 +31,12 @@ OUTPUT = 5e3  # bytes for each body and output, while results are evaluated: a l
 
 def remarks(scene: Scene) -> Iterator[str]:
     """Of a scene that is valid, one line each: units of links, bodies and tools, angles, times of paths."""
+    links: dict[str, Link] = {}
     for body in scene.body:
         if body.link is not None:
-            try:
-                yield from remarks_on_link(read_link(body.link), f'link "{body.name}"')
-            except InputError:  # which stage 1 tells
-                continue
+            with suppress(InputError):  # which stage 1 tells
+                links[body.name] = read_link(body.link)
+                yield from remarks_on_link(links[body.name], f'link "{body.name}"')
         elif body.rigid is not None:
             places = [body.rigid.center, *body.rigid.points.values()]
             yield from _long(max(float(np.linalg.norm(place)) for place in places), f'body "{body.name}"')
@@ -45,8 +45,7 @@ def remarks(scene: Scene) -> Iterator[str]:
         yield from _long(float(np.linalg.norm(tool.at)), label)
         if (angle := max(map(abs, (*tool.rpy, tool.angle)))) > TURNS / 2:
             yield f"{label} is turned by {angle:g} rad: angles are in rad; is it in degrees (45*deg)?"
-    with suppress(InputError):  # of links, which stage 1 tells
-        yield from _masses(scene)
+    yield from _masses(scene, links)
     yield from _angles(scene)
     yield from _times(scene)
     for analysis in scene.analysis:
@@ -86,7 +85,7 @@ def _beam(link: BeamLink, label: str) -> Iterator[str]:
         )
 
 
-def _masses(scene: Scene) -> Iterator[str]:
+def _masses(scene: Scene, links: Mapping[str, Link]) -> Iterator[str]:
     """Payloads that are far heavier than the robot that carries them, and bodies heavier than any."""
     robot = 0.0
     for body in scene.body:
@@ -94,7 +93,7 @@ def _masses(scene: Scene) -> Iterator[str]:
             robot += body.rigid.mass
             if body.rigid.mass > HEAVIEST_BODY:
                 yield f'body "{body.name}" has a mass of {body.rigid.mass:g} kg: units are SI; is it in g?'
-        elif body.link is not None and isinstance(link := read_link(body.link), BeamLink):
+        elif isinstance(link := links.get(body.name), BeamLink):
             robot += link.material.density * link.sections[0].area * link.geometry.length
         else:
             return  # known after stage 1 alone
