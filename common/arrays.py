@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any, cast
+from typing import Any, TypeVar, cast
 
 import numpy as np
-from numpy.typing import NDArray
 
+Scalar = TypeVar("Scalar", bound=np.generic)
+
+NDArray = np.ndarray[Any, np.dtype[Scalar]]  # as numpy.typing has it, which every start would wait for
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 Integers = NDArray[np.int64]

@@ -11,9 +11,9 @@ from typing import Any
 
 import h5py
 import numpy as np
-from numpy.typing import NDArray
 
 from . import checksum
+from .arrays import NDArray
 from .errors import FfrobotError, InputError
 from .outputs import check_regular, protected
 

@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import h5py
 import numpy as np
-from numpy.typing import NDArray
 
-from ..common.arrays import Array, Integers
+from ..common.arrays import Array, Integers, NDArray
 from ..common.checksum import MARK, METHOD, sealed
 from ..common.errors import InputError
 from ..common.files import AnyPath, write_atomically

@@ -13,10 +13,9 @@ from typing import NoReturn
 
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
-from ..common.arrays import Array, Integers
+from ..common.arrays import Array, Integers, NDArray
 from ..common.errors import InputError, did_you_mean, quoted
 from .part_mesh import PartMesh, boundary_facets, facet_geometry, facet_keys
 from .records import Outlines, PlaceRecord, RectangleSection, SolidGeometry

@@ -14,9 +14,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..common.arrays import Integers
+from ..common.arrays import Integers, NDArray
 from ..common.errors import InputError
 from .cells import in_gmsh_order
 from .part_reader import read_apart

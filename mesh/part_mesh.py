@@ -6,9 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..common.arrays import Array, Integers
+from ..common.arrays import Array, Integers, NDArray
 from .cells import CELLS, Cell, CellName
 
 Tags = NDArray[np.int32]

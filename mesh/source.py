@@ -10,9 +10,8 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..common.arrays import Array, Integers
+from ..common.arrays import Array, Integers, NDArray
 from ..common.errors import InputError
 from .cells import CELLS, CellName
 from .part_mesh import PartMesh, facet_keys

@@ -18,10 +18,9 @@ from dolfinx import fem
 from dolfinx.fem import petsc as fem_petsc
 from dolfinx.mesh import Mesh
 from mpi4py import MPI
-from numpy.typing import NDArray
 from petsc4py import PETSc
 
-from ...common.arrays import Array, Integers
+from ...common.arrays import Array, Integers, NDArray
 from ...mesh.compat import compiled_form, constant_space, geometry_degree, lagrange_space, node_map
 from ..link_records import Material, OrthotropicMaterial
 from .constitutive import stiffness

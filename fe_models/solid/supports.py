@@ -20,10 +20,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from dolfinx import fem
-from numpy.typing import NDArray
 from petsc4py import PETSc
 
-from ...common.arrays import Array, Integers, as_floats
+from ...common.arrays import Array, Integers, NDArray, as_floats
 from .elasticity import SolidModel, stiffness_matrix
 from .factors import Factors
 

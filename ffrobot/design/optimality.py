@@ -29,10 +29,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import nnls
 
-from ..common.arrays import Array, as_floats
+from ..common.arrays import Array, NDArray, as_floats
 from ..sweep.sweep import Key
 from .derivatives import Base, exact_entries, weights
 from .evaluations import Evaluated, Evaluations

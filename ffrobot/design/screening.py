@@ -15,9 +15,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..common.arrays import Array, Integers, as_floats
+from ..common.arrays import Array, Integers, NDArray, as_floats
 from ..common.errors import InputError, SolveError
 from ..pictures.studies.study import Points
 from .designs import Runs

@@ -10,9 +10,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..common.arrays import Indices
+from ..common.arrays import Indices, NDArray
 from ..common.errors import InputError, SolveError, did_you_mean
 from ..common.files import write_atomically
 from ..common.outputs import check_not_an_input

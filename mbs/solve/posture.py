@@ -7,9 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ...common.arrays import Array, as_floats, null_space
+from ...common.arrays import Array, NDArray, as_floats, null_space
 from ...common.errors import InputError, quoted
 from .._core import TimeFunction
 from ..model.known_motion import State

@@ -15,9 +15,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ...common.arrays import Array, Booleans, ComplexArray, as_floats
+from ...common.arrays import Array, Booleans, ComplexArray, NDArray, as_floats
 from ...common.errors import SolveError
 from .servo import Servo, stiffness
 

@@ -11,9 +11,8 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ...common.arrays import Array
+from ...common.arrays import Array, NDArray
 from ...results.file import Results
 from ...results.verdict import ROUND_OFF
 from ..figures.figure_file import Curve, FigureRecord

@@ -11,9 +11,8 @@ from dataclasses import dataclass, field
 
 import h5py
 import numpy as np
-from numpy.typing import NDArray
 
-from ...common.arrays import Array, Indices, Integers
+from ...common.arrays import Array, Indices, Integers, NDArray
 from ...common.errors import InputError
 from ...fe_models.modal_body import ModalBody
 from ...mbs.quantities.stress import surface_stress, von_mises
