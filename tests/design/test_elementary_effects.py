@@ -89,7 +89,7 @@ def scene(tmp_path):
 def test_screening_of_a_rigid_arm(scene):
     """The moment at the start is linear in both masses: μ* is the slope times the whole spread, a normal one ±2σ."""
     spreads = [f"{MASS}=±10%", f"{PAYLOAD}=normal:5%"]
-    found = ffrobot.screening(scene, ["peak joints.shoulder.moment"], spreads, trajectories=3, processes=2)
+    found = ffrobot.screening(scene, ["peak joints.shoulder.moment"], spreads, trajectories=3)
     slopes = np.array([9.81 * 0.3 + 2.0 * 0.3**2, 9.81 * 0.6 + 2.0 * 0.6**2])
     np.testing.assert_allclose(found.effects.mu[0], slopes * [0.4, 0.1], rtol=1e-6)
     assert found.effects.sigma.max() < 1e-6

@@ -62,9 +62,7 @@ def test_a_motor_from_a_catalog(write, tmp_path, what, column):
     (tmp_path / "motors.csv").write_text(CATALOG)
     scene = deepcopy(ARM)
     scene["analysis"][0]["output_step"] = 0.02
-    found = ffrobot.optimise(
-        write(scene), [f"motor shoulder in {tmp_path / 'motors.csv'}"], minimise=f"motors {what}", processes=2
-    )
+    found = ffrobot.optimise(write(scene), [f"motor shoulder in {tmp_path / 'motors.csv'}"], minimise=f"motors {what}")
     fitting = [one for one in choices_by_hand() if one[0] <= 1.0]
     assert {one[1] for one in fitting} == {"slow", "good", "best"}
     best = min(fitting, key=lambda one: one[column])
@@ -84,7 +82,7 @@ def test_the_mass_of_a_motor_loads_the_joint_before_it(write, tmp_path):
     scene = deepcopy(ARM) | {"payload": [{"point": "arm.tip", "mass": 0.5}]}
     scene["analysis"][0]["output_step"] = 0.02
     vary = [f"motor shoulder, payload.0.mass in {tmp_path / 'motors.csv'}"]
-    found = ffrobot.optimise(write(scene), vary, minimise="motors share", processes=2)
+    found = ffrobot.optimise(write(scene), vary, minimise="motors share")
     shares = {}
     for line in CATALOG.splitlines()[1:]:
         name, rated, _, fastest, rotor, ratios, mass, _ = (cell.strip() for cell in line.split(","))
@@ -102,7 +100,7 @@ def test_goals_of_motors_want_motors(write):
 @pytest.mark.parametrize("method", ["slsqp", "trust-constr"])
 def test_gear_ratio_of_matched_inertias(write, method):
     """Of a motor with inertia J_m behind a gear, α (J/N + J_m N) is least at N = √(J/J_m): 2 α √(J J_m)."""
-    found = ffrobot.optimise(write(ARM), [f"{RATIO}=20:500:log"], minimise=MOTOR, method=method, processes=2)
+    found = ffrobot.optimise(write(ARM), [f"{RATIO}=20:500:log"], minimise=MOTOR, method=method)
     assert found.values[0] == pytest.approx(np.sqrt(J / 2e-5), rel=1e-4)
     assert found.value == pytest.approx(2.0 * 2.0 * np.sqrt(J * 2e-5), rel=1e-8)
     assert found.converged
@@ -141,7 +139,6 @@ def test_lightest_cantilever(write):
         [f"{HEIGHT}=0.01:0.04", f"{WIDTH}=0.002:0.05"],
         minimise="mass",
         subject_to=[STIFF, "frequency 1 beam >= 10"],
-        processes=2,
     )
     a, h = 4.0 * FORCE * L**3 / (E * DEFLECTION), 0.04
     mass = RHO * L * a / h**2
@@ -177,9 +174,7 @@ def test_rows_of_a_catalogue(write):
     """Gears with their rotors: 2 (J/N + J_m N) of each row, by hand."""
     rows = [(30, 1e-5), (60, 5e-5), (90, 2e-5), (160, 2.5e-5)]
     text = ", ".join(f"{ratio}:{inertia}" for ratio, inertia in rows)
-    found = ffrobot.optimise(
-        write(ARM), [f"{RATIO},joint.shoulder.rotor_inertia in {{{text}}}"], minimise=MOTOR, processes=2
-    )
+    found = ffrobot.optimise(write(ARM), [f"{RATIO},joint.shoulder.rotor_inertia in {{{text}}}"], minimise=MOTOR)
     moments = [2.0 * (J / ratio + inertia * ratio) for ratio, inertia in rows]
     assert found.values == rows[int(np.argmin(moments))]
     assert found.value == pytest.approx(min(moments), rel=1e-8)
@@ -189,7 +184,7 @@ def test_rows_of_a_catalogue(write):
 def test_catalogue_beside_a_number(write):
     """Of each rotor the best gear has 4 √(J J_m): the lightest rotor, with the gear between bounds found to 1e-4."""
     vary = ["joint.shoulder.rotor_inertia in {5e-5, 1e-5, 3e-5}", f"{RATIO}=20:500:log"]
-    found = ffrobot.optimise(write(ARM), vary, minimise=MOTOR, processes=2, seed=3)
+    found = ffrobot.optimise(write(ARM), vary, minimise=MOTOR, seed=3)
     assert found.method == "differential-evolution"
     assert found.values[0] == 1e-5
     assert found.values[1] == pytest.approx(np.sqrt(J / 1e-5), rel=1e-4)
@@ -236,7 +231,7 @@ def test_places_of_patches(write, tmp_path):
     rows = ", ".join(f"{a}:{b}" for a in places for b in places if b - a > 0.0999)
     found = ffrobot.optimise(
         path, [f"pzt.beam.centers.0,pzt.beam.centers.1 in {{{rows}}}"],
-        minimise="peak pzt.beam.required_voltage", processes=2,
+        minimise="peak pzt.beam.required_voltage",
     )  # fmt: skip
     assert found.values == pytest.approx(best)
     assert found.value == pytest.approx(-float(voltage), rel=1e-3)  # the criterion, to be largest, is that of outputs
@@ -254,7 +249,6 @@ def test_shortest_path_time(write):
         ["trajectory.swing.duration=0.2:1.0"],
         minimise="value trajectory.swing.duration",
         subject_to=["peak joints.shoulder.moment <= 5"],
-        processes=2,
     )
     assert found.value == pytest.approx(np.sqrt(10.0 / np.sqrt(3.0) * J * 1.2 / 5.0), rel=1e-5)
     assert found.limits[0] <= 5.0 * (1.0 + 1e-6)
@@ -271,17 +265,15 @@ def test_starts(write):
     del scene["trajectory"][0]["value"]
     scene["trajectory"][0] |= {"via": [0.0, 2.5], "duration": 2.0, "smoothness": 2}
     scene["analysis"][0] |= {"end": 2.0, "output_step": 0.2}
-    task = {"minimise": "at 1.6 joints.shoulder.moment", "processes": 2}
-    vary = ["trajectory.swing.via.1=1:12"]
+    goal, vary = "at 1.6 joints.shoulder.moment", ["trajectory.swing.via.1=1:12"]
     s, acceleration, weight = 0.94208, -1.44, 2.0 * 9.81 * 0.3
     tilt = np.arcsin(-J * acceleration / (weight * s))
-    near = ffrobot.optimise(write(scene), vary, **task)
-    assert near.values[0] == pytest.approx((np.pi + tilt) / s, rel=1e-4)
-    found = ffrobot.optimise(write(scene), vary, starts=4, seed=1, **task)
+    found = ffrobot.optimise(write(scene), vary, minimise=goal, starts=2, seed=2)
+    assert found.space.point(found.searches[0].best.place)[0] == pytest.approx((np.pi + tilt) / s, rel=1e-4)
     x = (3.0 * np.pi + tilt) / s
     assert found.values[0] == pytest.approx(x, rel=1e-4)
     assert found.value == pytest.approx(J * acceleration * x + weight * np.cos(x * s), rel=1e-8)
-    assert len(found.searches) == 4
+    assert len(found.searches) == 2
 
 
 def test_going_on(ffrobot, write):
@@ -310,7 +302,7 @@ def test_no_design_keeps_the_limits(ffrobot, write):
     scene = write(CANTILEVER)
     done = ffrobot(
         "optimise", scene, "--minimise", "mass", "--subject-to", "peak points.beam.tip.deflection <= 1e-5",
-        "--vary", f"{WIDTH}=0.01:0.03", "-j", 2,
+        "--vary", f"{WIDTH}=0.01:0.03",
     )  # fmt: skip
     assert done.returncode == 1
     assert "no design found that keeps all limits" in done.stderr
@@ -327,7 +319,7 @@ def test_evolution_keeps_limits_and_tells_the_best_of_all_designs_when_runs_end(
     vary = ["joint.shoulder.rotor_inertia in {5e-5, 1e-5, 3e-5}", f"{RATIO}=20:500:log"]
     bound = 1.2 * 4.0 * np.sqrt(J * 1e-5)
     found = ffrobot.optimise(
-        write(ARM), vary, minimise="value joint.shoulder.gear_ratio", subject_to=[f"{MOTOR} <= {bound}"], processes=2,
+        write(ARM), vary, minimise="value joint.shoulder.gear_ratio", subject_to=[f"{MOTOR} <= {bound}"],
         method="differential-evolution", runs=40, seed=3,
     )  # fmt: skip
     assert found.runs <= 40

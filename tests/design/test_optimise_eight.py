@@ -65,7 +65,7 @@ def test_lightest_stepped_cantilever(tmp_path, segments):
     path.write_text(tomli_w.dumps(stepped(segments)), encoding="utf-8")
     vary = [f"links.s{k}.geometry.section.height={LOW}:{HIGH}:log" for k in range(segments)]
     limit = f"peak points.s{segments - 1}.tip.position[1] <= {DEFLECTION}"
-    found = ffrobot.optimise(path, vary, minimise="mass", subject_to=[limit], processes=2)
+    found = ffrobot.optimise(path, vary, minimise="mass", subject_to=[limit])
     roots = flexibility(segments) ** 0.25
     best = roots * (roots.sum() / DEFLECTION) ** (1.0 / 3.0)
     np.testing.assert_allclose(found.values, best, rtol=1e-4)

@@ -200,7 +200,7 @@ ARM = {
 def test_moment_of_a_rigid_arm(write):
     """M = 2 (J + m c² + m_p a²) + (m c + m_p a) g cos t²: largest at the start, where its angle is 0."""
     keys = ["payload.0.mass", "body.arm.rigid.center.0", "body.arm.rigid.inertia"]
-    found = ffrobot.sensitivity(write(ARM), ["peak joints.shoulder.moment", "mass"], keys, processes=2)
+    found = ffrobot.sensitivity(write(ARM), ["peak joints.shoulder.moment", "mass"], keys)
     expected = [2 * 0.36 + 0.6 * 9.81, 2 * 2.0 * 2 * 0.3 + 2.0 * 9.81, 2.0]
     rounding = 1e-10 * found.value[0] / np.array([0.5, 0.3, 0.05])  # of differences with a key 1e-4 of it larger
     assert np.all(np.abs(found.derivative[0] - expected) < rounding)
@@ -216,7 +216,7 @@ def test_a_kink_is_told(write):
         "gravity": [0.0, 0.0],
         "trajectory": [{"name": "swing", "joint": "shoulder", "value": "-0.01*sin(4*pi*t)"}],
     }
-    found = ffrobot.sensitivity(write(scene), ["peak joints.shoulder.moment"], ["gravity.1"], processes=2)
+    found = ffrobot.sensitivity(write(scene), ["peak joints.shoulder.moment"], ["gravity.1"])
     (entry,) = found.entries[0]
     assert any("a kink: with gravity.1 = " in note for note in entry.notes)
     time = found.readings[0].time
@@ -234,7 +234,7 @@ def test_a_design_that_fails_is_kept_and_told(write, tmp_path):
     scene["joint"][0] |= {"viscous_friction": 0.0}
     folder = tmp_path / "designs"
     of, to = ["at 0.25 joints.shoulder.moment"], ["joint.shoulder.viscous_friction"]
-    found = ffrobot.sensitivity(write(scene), of, to, folder, processes=2)
+    found = ffrobot.sensitivity(write(scene), of, to, folder)
     (entry,) = found.entries[0]
     assert entry.method == "one-sided"
     assert entry.derivative == pytest.approx(0.5, rel=1e-9)  # the rate, 2 t
@@ -263,7 +263,7 @@ def test_command(ffrobot, write):
     assert float(row["percent_per_percent"]) == pytest.approx(0.5 * float(row["derivative"]) / float(row["value"]))
     assert (folder / "tornado_peak_joints_shoulder_moment.png").exists()
     runs = set(folder.glob("runs/*"))
-    assert ffrobot(*arguments, "--to", "payload.0.mass,gravity.1", "-j", 2).returncode == 0
+    assert ffrobot(*arguments, "--to", "payload.0.mass,gravity.1").returncode == 0
     assert len(set(folder.glob("runs/*")) - runs) == 3
 
 

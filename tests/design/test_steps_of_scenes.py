@@ -80,6 +80,6 @@ def test_runs_that_cannot_be_repeated_choose_their_own_steps(tmp_path):
     keys = SCENE | {"analysis": [SCENE["analysis"][0] | {"integrator": "radau", "end": 0.02}]}
     path = tmp_path / "scene.toml"
     path.write_text(tomli_w.dumps(keys), encoding="utf-8")
-    found = ffrobot.sensitivity(path, ["rms joints.shoulder.moment"], ["payload.0.mass"], processes=2)
+    found = ffrobot.sensitivity(path, ["rms joints.shoulder.moment"], ["payload.0.mass"])
     assert {entry.method for row in found.entries for entry in row} == {"differences"}
     assert found.tolerance == 1e-9

@@ -37,7 +37,7 @@ def searched(scene):
     """Every tube of two catalogues: wide holes in narrow tubes fail, thin walls are beyond the limit."""
     vary = [f"{OUTER} in {{0.015, 0.02, 0.025}}", f"{INNER},{DENSITY} in {{0.010:2700.0, 0.016:2700.0, 0.0195:7800.0}}"]
     limits = ["frequency 1 arm >= 40"]
-    return ffrobot.optimise(scene, vary, minimise="mass", subject_to=limits, processes=2)
+    return ffrobot.optimise(scene, vary, minimise="mass", subject_to=limits)
 
 
 def diagrams(study):
@@ -104,7 +104,7 @@ def test_files_of_a_command(ffrobot, scene, tmp_path):
     folder = tmp_path / "found"
     done = ffrobot(
         "optimise", scene, "--minimise", "mass", "--subject-to", "frequency 1 arm >= 60",
-        "--vary", f"{OUTER}=0.017:0.03:log", "-o", folder, "-j", 2,
+        "--vary", f"{OUTER}=0.017:0.03:log", "-o", folder,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     for name in ("designs.png", "designs.pdf", "convergence.png"):
@@ -123,14 +123,13 @@ def test_files_of_a_command(ffrobot, scene, tmp_path):
 
 def test_tornado_bands_and_screening(scene, tmp_path):
     """From Python: `write_study` writes what the commands do."""
-    matters = ffrobot.sensitivity(scene, ["mass"], [OUTER, INNER], processes=2)
+    matters = ffrobot.sensitivity(scene, ["mass"], [OUTER, INNER])
     (tornado,) = matters.study().diagrams
     assert isinstance(tornado, Bars)
     assert tornado.labels == (OUTER, INNER)
     np.testing.assert_allclose(tornado.series[0].values, [2.0 / 0.36, -2.0 * 0.64 / 0.36], rtol=1e-6)
     sure = ffrobot.uncertainty(
         scene, ["mass", "joints.shoulder.moment"], ["payload.0.mass=±5%", f"{DENSITY}=normal:1%"], by="gradients",
-        processes=2,
     )  # fmt: skip
     study = sure.study()
     band = diagrams(study)["band_joints_shoulder_moment"]
@@ -141,7 +140,7 @@ def test_tornado_bands_and_screening(scene, tmp_path):
         assert low < inner_low < middle < inner_high < high
     deviations = np.array(sure.bands[0].statistics.deviation)
     assert np.all(np.array(band.highest) - band.nominal <= 2.0 * np.sqrt(2.0) * deviations)
-    screened = ffrobot.screening(scene, ["mass"], [f"{OUTER}=±1%", f"{INNER}=±1%"], trajectories=2, processes=2)
+    screened = ffrobot.screening(scene, ["mass"], [f"{OUTER}=±1%", f"{INNER}=±1%"], trajectories=2)
     (points,) = screened.study().diagrams
     assert isinstance(points, Points)
     assert points.labels[0] == OUTER

@@ -64,7 +64,7 @@ def test_where_to_put_the_center_of_mass(write):
     size = np.abs(moment(center))
     tops = (size[1:-1] >= size[:-2]) & (size[1:-1] >= size[2:]) & (size[1:-1] > (1.0 - 1e-5) * peak)
     assert tops.sum() + (size[[0, -1]] > (1.0 - 1e-5) * peak).sum() >= 3
-    found = ffrobot.optimise(write(ARM), VARY, minimise=MOMENT, processes=2)
+    found = ffrobot.optimise(write(ARM), VARY, minimise=MOMENT)
     assert found.value == pytest.approx(peak, rel=1e-5)
     np.testing.assert_allclose(found.values, center, atol=2e-4)
     assert found.converged
@@ -74,7 +74,7 @@ def test_where_to_put_the_center_of_mass(write):
 def test_a_limit_of_peaks_that_take_turns(write):
     """The largest first coordinate whose least peak, over the second one, is below 1.5 N m."""
     found = ffrobot.optimise(
-        write(ARM), VARY, maximise="value body.arm.rigid.center.0", subject_to=[f"{MOMENT} <= 1.5"], processes=2
+        write(ARM), VARY, maximise="value body.arm.rigid.center.0", subject_to=[f"{MOMENT} <= 1.5"]
     )
     best = minimize(
         lambda z: -z[0], [-0.15, -0.04], method="SLSQP", bounds=[(-0.5, 0.5)] * 2, options={"ftol": 1e-12},
@@ -101,7 +101,6 @@ def test_limits_that_no_design_keeps_together(write):
         [f"{HEIGHT}=0.01:{h}", f"{WIDTH}=0.002:0.08"],
         minimise="mass",
         subject_to=[f"peak points.beam.tip.deflection <= {deflection}", f"mass <= {mass}", "frequency 1 beam >= 10"],
-        processes=2,
     )
     excess = np.sqrt(4.0 * FORCE * L**3 / E * RHO * L / (h**2 * deflection * mass)) - 1.0
     assert not found.feasible
@@ -120,7 +119,7 @@ def test_limits_that_are_kept_elsewhere(write):
     """A start far beyond a limit that designs can keep is no conflict."""
     found = ffrobot.optimise(
         write(CANTILEVER), [f"{WIDTH}=0.002:0.08"], minimise="mass",
-        subject_to=["peak points.beam.tip.deflection <= 4e-4"], processes=2,
+        subject_to=["peak points.beam.tip.deflection <= 4e-4"],
     )  # fmt: skip
     assert found.feasible
     assert found.conflict is None

@@ -151,7 +151,7 @@ def test_linear_goals(write, tmp_path):
 def test_sobol_indices_of_a_scene(write):
     """The moment is a sum: what a key does alone is all it does."""
     spreads = [f"{MASS}=±10%", f"{PAYLOAD}=normal:5%"]
-    found = ffrobot.uncertainty(write(ARM), [f"peak {MOMENT}"], spreads, samples=48, indices=True, processes=2)
+    found = ffrobot.uncertainty(write(ARM), [f"peak {MOMENT}"], spreads, samples=48, indices=True)
     assert found.runs == 1 + 24 * 4
     parts = (SLOPES * [0.2 / sqrt(3.0), 0.025]) ** 2
     expected = parts / parts.sum()
@@ -204,7 +204,7 @@ def test_frequency_of_a_beam(write, tmp_path):
 def test_bands_of_two_link_by_gradients_and_by_samples(case_copy, tmp_path):
     """Within 5 %, peaks, means and the band of a moment, from rest with everything ±2 %: nothing rings much.
 
-    40 samples are enough for a hundredth: pairs of low discrepancy, and nearly sums of functions of one key.
+    20 samples are enough for a few hundredths: pairs of low discrepancy, and nearly sums of functions of one key.
     """
     path = case_copy("two_link")
     text = path.read_text(encoding="utf-8").partition("# The same moments")[0]
@@ -215,8 +215,8 @@ def test_bands_of_two_link_by_gradients_and_by_samples(case_copy, tmp_path):
     names = ("links.link2.material.density", "links.link2.material.youngs_modulus", "gravity.1", "pzt.0.thickness")
     spreads = [f"{name}=±2%" for name in names]
     of = ["peak joints.O.moment", "rms pzt.link1.required_voltage[0]", "joints.O.moment"]
-    sampled = ffrobot.uncertainty(path, of, spreads, tmp_path / "runs", samples=40, processes=2)
-    near = ffrobot.uncertainty(path, of, spreads, tmp_path / "runs", by="gradients", processes=2)
+    sampled = ffrobot.uncertainty(path, of, spreads, tmp_path / "runs", samples=20)
+    near = ffrobot.uncertainty(path, of, spreads, tmp_path / "runs", by="gradients")
     assert near.runs == 9
     np.testing.assert_allclose(near.statistics.deviation, sampled.statistics.deviation, rtol=0.05)
     np.testing.assert_allclose(near.shares, sampled.shares, atol=0.05)
