@@ -3,6 +3,7 @@
 import h5py
 import numpy as np
 import scenes_in_3d
+from checkpoint_scenes import rpy
 from checkpoints import CASES
 from scenes_in_3d import CRANK, TWO_LINK
 
@@ -81,14 +82,6 @@ def test_gravity_across_the_plane_is_carried_by_the_joints(tmp_path, monkeypatch
     plane, space = in_both(tables, tmp_path, monkeypatch)
     assert_same(plane, space)
     assert np.abs(plane["inverse/joints/O/reaction"][:, 2]).max() > 1.0
-
-
-def rpy(C):
-    return [
-        float(np.arctan2(C[2, 1], C[2, 2])),
-        float(-np.arcsin(C[2, 0])),
-        float(np.arctan2(C[1, 0], C[0, 0])),
-    ]
 
 
 def test_a_loop_in_a_plane_that_stands_askew(tmp_path):

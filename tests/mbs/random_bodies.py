@@ -2,6 +2,7 @@
 
 import numpy as np
 from points_3d import Body, J, Mechanism, r
+from random_mechanisms import symmetric
 
 JOINTS = [J.revolute, J.prismatic, J.screw, J.cylindrical, J.universal, J.spherical, J.planar, J.weld, J.free]
 GRAVITY = np.array([0.3, 1.0, -9.81])
@@ -40,12 +41,6 @@ def random_body(rng, modes, joint, clamped=False, curved=False, line=False, **ke
         keys["G"] = symmetric(rng, 4, 3, modes) / modes
         keys["K"] = [symmetric(rng, 6, modes) * (0 if clamped and k == 0 else 1 / modes) for k in range(3)]
     return Body(mass, x, Phi, stiffness, C @ C.T, markers, joint, lead=0.13, **keys)
-
-
-def symmetric(rng, *shape):
-    """Matrices (*shape, n), n the last of `shape`, of numbers of order one."""
-    K = rng.standard_normal((*shape, shape[-1]))
-    return (K + K.swapaxes(-1, -2)) / 2
 
 
 def ground(rng, count=1):
