@@ -10,14 +10,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..common.arrays import Array
+from ..common.arrays import Array, Indices
 from ..mbs.model.known_motion import mass_matrices
 from ..mbs.model.motors import split_forces
 from ..mbs.quantities.motion import RobotMotion
 from .motors import MotorFeasibility, first_time
 from .patches.patches import PatchArray, Voltages
 
-ROWS = 50  # of a run, at most, at which mass matrices are made
+ROWS = 50  # of a run, about, at which mass matrices are made, and at twice as many around the largest shift
 RINGING = 2.0  # times the static shift, of a force that is missing all at once
 
 
@@ -84,7 +84,7 @@ def quasi_static_shift(motion: RobotMotion, modal: Mapping[str, Array], points: 
     return {point: np.einsum("tkn,tn->tk", motion.section(point).L[:, :3], shift) for point in points}
 
 
-def freed_shift(motion: RobotMotion, modal: Mapping[str, Array], point: str, rows: slice) -> Array:
+def freed_shift(motion: RobotMotion, modal: Mapping[str, Array], point: str, rows: Indices) -> Array:
     """The same of one point at these rows, where motors keep their moments: the robot recoils by γ.
 
     δq = δq_held + R γ with Rᵀ M δq = 0, R = ∂q/∂γ: unmet modal forces do no work while p stands still, and no momentum
@@ -103,8 +103,11 @@ def seen_at_points(
     """With what modal forces r (T, n) that are left do to these points: `point` is the one that is farthest off."""
     shift = {name: np.linalg.norm(found, axis=1) for name, found in quasi_static_shift(motion, modal, points).items()}
     point = max(shift, key=lambda name: float(shift[name].max()))
-    kept, rows = shift[point], slice(None, None, max(1, len(motion.time) // ROWS))
-    freed = np.linalg.norm(freed_shift(motion, modal, point, rows), axis=1)
+    kept, step = shift[point], max(1, len(motion.time) // ROWS)
+    coarse = np.arange(0, len(motion.time), step)
+    top = coarse[np.linalg.norm(freed_shift(motion, modal, point, coarse), axis=1).argmax()]
+    near_top = np.unique(np.linspace(max(0, top - step), min(len(motion.time) - 1, top + step), 2 * ROWS).astype(int))
+    freed = np.linalg.norm(freed_shift(motion, modal, point, near_top), axis=1)
     return replace(
         about,
         point=point,
@@ -121,7 +124,7 @@ class _Held(NamedTuple):
     R: Array
 
 
-def _held(motion: RobotMotion, modal: Mapping[str, Array], rows: slice = slice(None)) -> _Held:
+def _held(motion: RobotMotion, modal: Mapping[str, Array], rows: Indices | slice = slice(None)) -> _Held:
     """By virtual work: what modes and motors take of a unit force along each joint coordinate; modes take their own."""
     tree, q = motion.model.tree, motion.q[rows]
     joints = np.flatnonzero(tree.joint_columns)

@@ -181,7 +181,7 @@ def _compared(entries, sensitive):
 
 
 def _difference(name, found, expected, scales, sensitive):
-    if (found.shape, found.text) != (expected.shape, expected.text):
+    if (found.shape, _words(name, found)) != (expected.shape, _words(name, expected)):
         before, after = (f"{of.shape} {of.text}".strip() for of in (expected, found))
         return Difference(name, 0.0, 0.0, f"expected {before}, found {after}")
     analysis, kind = quantity(name)
@@ -195,6 +195,11 @@ def _difference(name, found, expected, scales, sensitive):
     with np.errstate(invalid="ignore"):
         apart = np.where(is_same, 0.0, np.abs(found.numbers - expected.numbers))
     return Difference(name, float(np.nan_to_num(apart, nan=np.inf).max(initial=0.0)), allowed)
+
+
+def _words(name, of):
+    """The text; of integrators in any order: round-off decides which of two that take turns makes the last step."""
+    return sorted(of.text.split()) if name.endswith("@integrator") else of.text
 
 
 def quantity(name):
