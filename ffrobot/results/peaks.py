@@ -18,8 +18,6 @@ PEAKING = (
 )  # fmt: skip
 """Datasets with peaks: of each column, of vectors of the length; the moment in a joint of the plane is its own."""
 
-_BY_ENDS = {(pattern.split("/")[0], pattern.split("/")[-1]): pattern for pattern in PEAKING}
-
 VOLTAGE = "pzt/*/voltage"
 
 POWER = "peak_power"
@@ -56,14 +54,13 @@ def _write(group: h5py.Group, closer: h5py.Group) -> None:
     time = closer["time"][()]
     for name, values in _histories(closer, len(time)):
         if name in group and len(time):
-            dataset = group[name]
             tops = np.array([largest(time, column) for column in values.T])
             if matches(name, VOLTAGE):  # cut off at its limit, it has no smooth top there
-                limit = dataset.parent.attrs.get("limit", np.inf)
+                limit = group[name].parent.attrs.get("limit", np.inf)
                 tops[:, 0] = np.minimum(tops[:, 0], np.maximum(np.abs(values).max(axis=0), limit))
             means = np.sqrt(shares(time) @ values**2)
             single = values.shape[1] == 1
-            attributes = dataset.attrs
+            attributes = group[name].attrs
             for key, found in (("peak", tops[:, 0]), ("peak_time", tops[:, 1]), ("rms", means)):
                 attributes[key] = found[0] if single else found
     for name, joint in closer.get("joints", {}).items():
@@ -77,10 +74,9 @@ def _histories(group: h5py.Group, count: int) -> Iterator[tuple[str, Array]]:
     names: list[str] = []
     group.visit(names.append)
     for name in names:
-        pattern = _BY_ENDS.get((name.partition("/")[0], name.rpartition("/")[2]), "")
-        if matches(name, pattern) and (found := group[name]).shape[0] == count:
+        if any(matches(name, pattern) for pattern in PEAKING) and (found := group[name]).shape[0] == count:
             values = as_floats(found[()].reshape(count, -1))
-            yield name, np.linalg.norm(values, axis=1, keepdims=True) if _is_vector(pattern) else values
+            yield name, np.linalg.norm(values, axis=1, keepdims=True) if _is_vector(name) else values
 
 
 def _is_vector(name: str) -> bool:
