@@ -217,7 +217,7 @@ private:
       ++next_stop_;
     if (next_stop_ < controls_.stops.size())
       end_at(controls_.stops[next_stop_]);
-    const double wanted = next_step(method_->cheap_step(steps_.next_step), target - t_, lands);
+    const double wanted = next_step(steps_.next_step, target - t_, lands);
     const double fastest = system_.local().fastest_rotation(z_.data() + system_.n_v());
     const double step = std::min(step_limit_.of(t_, wanted), most_turn / fastest);
     const bool is_limited = step < wanted;

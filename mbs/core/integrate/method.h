@@ -50,9 +50,6 @@ public:
   // Whether a step leaves little of vibrations that it does not resolve. They are an error once, not at every step.
   virtual bool damps() const { return false; }
 
-  // A step about as long as `wanted` that takes less to make.
-  virtual double cheap_step(double wanted) const { return wanted; }
-
   // The step just made was accepted: its corrected end and last slope are those of the next step's start.
   virtual void accept(double) {}
 

@@ -43,7 +43,6 @@ constexpr int most_iterations = 12;
 constexpr double newton_share = 0.01; // of the step's tolerance that the iteration may leave
 constexpr double noise_share = 0.1;   // the same where only noise is left, which differs from step to step
 constexpr double rounding = 1e-14;
-constexpr double same_step = 1e-3;        // relative difference that leaves Newton's method as fast as it is
 constexpr double slow_contraction = 0.02; // geometry is taken anew when Newton's method is slower than this
 
 } // namespace
@@ -94,7 +93,7 @@ template <class Scalar> void Radau::solve(Scalar mu, Eigen::Matrix<Scalar, Eigen
 void Radau::factorise(double t, const double *y, double h) {
   if (stale_)
     system_.linearise(t, y);
-  else if (std::abs(h - factorised_step_) <= same_step * h)
+  else if (h == factorised_step_)
     return;
   const double real = h / mu_real;
   const Complex complex = h / mu_complex;
@@ -102,11 +101,6 @@ void Radau::factorise(double t, const double *y, double h) {
   system_.factorise(complex, complex * complex);
   factorised_step_ = h;
   stale_ = false;
-}
-
-// A step that may grow by less than a fifth stays as it is, and so do its factors (Hairer and Wanner, 1996, IV.8).
-double Radau::cheap_step(double wanted) const {
-  return wanted >= factorised_step_ && wanted <= 1.2 * factorised_step_ ? factorised_step_ : wanted;
 }
 
 // Stages from the polynomial of the step before.

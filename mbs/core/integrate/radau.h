@@ -21,7 +21,6 @@ public:
   // motion grow to phases of the fastest.
   double error_share(double fraction) const override { return 0.75 * fraction; }
   bool damps() const override { return true; }
-  double cheap_step(double wanted) const override;
   void accept(double h) override;
   void restart() override { previous_step_ = 0; }
   void recentred() override { restart(); } // slopes of earlier steps are rates of other coordinates
