@@ -5,7 +5,6 @@ import numpy as np
 import pytest
 
 from ffrobot.common.checksum import seal
-from ffrobot.common.errors import InputError
 from ffrobot.fe_models.link import make_link
 from ffrobot.fe_models.modal_body_file import read_modal_body
 
@@ -61,13 +60,6 @@ def test_end_moments_of_a_simply_supported_beam_are_exact(modal_body, count):
         assert turn == pytest.approx(-L / (6 * E * I_Z), rel=1e-9)
     assert body.mode_count == count + 2  # the forces at the supports do no work
     check_identities(body)
-
-
-def test_eigenmodes_alone_are_wrong_there(link_file):
-    """What attachment modes are for: ten modes lack 6 % of the rotation under an end moment."""
-    body = make_link(link_file()).body
-    assert not body.residual.any()
-    assert flexibility(body, "tip")[5, 5] / (L / (3 * E * I_Z)) == pytest.approx(0.94, abs=0.01)
 
 
 def test_eigenmodes_stay_as_they_are(link_file, modal_body):
@@ -128,11 +120,6 @@ def test_list_of_families_and_default_count(modal_body):
     check_identities(body)
 
 
-def test_count_must_be_given_without_attachment_modes(link_file):
-    with pytest.raises(InputError, match="modes: expected either count or indices, found neither"):
-        make_link(link_file(replace={"count = 10": ""}))
-
-
 def test_timoshenko_with_masses(modal_body):
     more = '[model]\ntheory = "timoshenko"\n[[interface]]\nname = "tip"\nmass = 2.0\ninertia = [0.0, 0.0, 0.01]\n'
     body = modal_body(condition="cantilever", count=3, more=more)
@@ -161,25 +148,6 @@ def test_damping(modal_body):
     assert rayleigh.damping_ratio == pytest.approx(0.5 / omega + 0.5e-5 * omega)
 
 
-def test_same_modes_with_other_damping_and_stress(link_file):
-    """Stage 1 is not run again, and says the same as if it were."""
-    points = "[stress.points]\nend = [0.9, 0.0075, 0.0]\n"
-    path = link_file(replace=ATTACHED)
-    make_link(path)
-    path.write_text(path.read_text() + points)
-    again = make_link(path)
-    assert again.reused == "modes"
-    anew = make_link(path, force=True)
-    assert np.allclose(again.body.stress["end"].stress, anew.body.stress["end"].stress, rtol=1e-12)
-
-
-def test_switching_is_another_link(link_file):
-    path = link_file(replace=ATTACHED)
-    assert make_link(path).body.mode_count == 12
-    path.write_text(path.read_text().replace("[modes]\n", "[modes]\nattachment_modes = false\n"))
-    assert make_link(path).body.mode_count == 10
-
-
 def test_file_keeps_the_marks_and_old_files_have_none(link_file):
     outcome = make_link(link_file(replace=ATTACHED))
     assert read_modal_body(outcome.path).residual.tolist() == [0] * 10 + [1] * 2
@@ -187,11 +155,3 @@ def test_file_keeps_the_marks_and_old_files_have_none(link_file):
         del file["modes/residual"]
     seal(outcome.path)
     assert not read_modal_body(outcome.path).residual.any()
-
-
-def test_marks_must_stand_behind(modal_body):
-    from dataclasses import replace
-
-    body = modal_body()
-    with pytest.raises(InputError, match="residual: expected 0 of each eigenmode, then 1"):
-        replace(body, residual=body.residual[::-1])

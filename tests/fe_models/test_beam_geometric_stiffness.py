@@ -170,32 +170,3 @@ def test_work_of_every_load_is_that_on_the_exact_motion(tmp_path, theory, condit
         for load, work in expected.items():
             scale = max(abs(w) for name, w in expected.items() if name.split("/")[0] == load.split("/")[0])
             assert -0.5 * p @ K[load] @ p == pytest.approx(work, rel=2e-5, abs=2e-6 * scale), load
-
-
-def test_closed_forms(tmp_path):
-    """Of v = x³, w = x², φ = x and φ₂ = x² on a uniform clamped link, by hand."""
-    V, W, PHI, PHI_2 = range(4)
-    rho_A = RHO * 0.009 * 0.015
-    expected = {
-        "force/tip/x": {(V, V): 9 * L**5 / 5, (W, W): 4 * L**3 / 3},
-        "force/tip/y": {(W, PHI): L**3 / 3},
-        "force/tip/z": {(V, PHI): -(L**4) / 2},
-        "moment/tip/x": {(V, W): L**3},
-        "moment/tip/y": {(V, PHI): L**3 / 2},
-        "moment/tip/z": {(W, PHI): 0.0, (W, PHI_2): -(L**3) / 3},
-        "t_y": {(W, PHI): -rho_A * L**4 / 12},
-        "t_z": {(V, PHI): rho_A * L**5 / 10},
-        "omega_xy": {(W, PHI): -rho_A * L**5 / 15},  # of −½ K_ω,xy − ½ K_r,z = K_x at [x, y]
-        "r_z": {(W, PHI): -rho_A * L**5 / 15},
-    }
-    link = link_of(tmp_path, replace=("height = 0.012, width = 0.02", "height = 0.009, width = 0.015"))
-    stations = lagrange(np.linspace(0.0, L, 5), 3)
-    x, fields = stations.x, np.zeros((6, stations.x.size, 4))
-    fields[1, :, V], fields[5, :, V] = x**3, 3 * x**2
-    fields[2, :, W], fields[4, :, W] = x**2, -2 * x
-    fields[3, :, PHI], fields[3, :, PHI_2] = x, x**2
-    K = geometric_stiffness(link, stations, fields, PLACES)
-    for load, entries in expected.items():
-        for (i, j), value in entries.items():
-            assert K[load][i, j] == pytest.approx(value, rel=1e-12, abs=1e-13), load
-            assert K[load][j, i] == K[load][i, j]

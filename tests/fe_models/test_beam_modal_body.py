@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from ffrobot.common.errors import InputError
 from ffrobot.fe_models.link import make_link
 
 STEPPED = """
@@ -49,22 +48,6 @@ def test_the_papers_link(modal_body):
     np.testing.assert_allclose(np.einsum("kkmn->mn", body.S_bar_kl), np.eye(10), atol=1e-13)
     assert body.family == ("in-plane-bending",) * 10
     assert np.all(body.stations.height == 0.015)
-
-
-def test_slider_crank_rod(link_file):
-    """Formulation.md, section 10 (the paper's Table 1, steel of 200 GPa): four elements, all digits."""
-    path = link_file(
-        section='{ shape = "circle", diameter = 0.006 }',
-        elements=4,
-        count=6,
-        replace={
-            "length = 1.0": "length = 0.35",
-            "youngs_modulus = 2.068427e11": "youngs_modulus = 2.0e11",
-            "density = 7850.0": "density = 7800.0",
-        },
-    )
-    expected = [612.11831, 2457.49897, 5608.27301, 10867.59568, 17273.99655, 27316.59532]
-    np.testing.assert_allclose(2 * np.pi * make_link(path).body.frequency, expected, rtol=0, atol=6e-6)
 
 
 CASES = {
@@ -121,13 +104,6 @@ def test_torsion_free_of_mass_about_the_axis_as_the_modes_grow(modal_body):
         left.append(1 - body.h_spin @ np.linalg.solve(body.S_spin, body.h_spin) / body.J_spin)
     assert left[0] == pytest.approx(1 - 8 / np.pi**2, rel=1e-4)
     assert left[1] == pytest.approx(1 - 8 / np.pi**2 * sum((2 * k - 1) ** -2.0 for k in range(1, 6)), rel=1e-3)
-
-
-def test_sections_with_mass_beside_the_axis_need_no_spin_inertia(modal_body):
-    body = modal_body(family="all", count=10, more=TIMOSHENKO)
-    assert body.J_spin == 0.0
-    assert not np.any(body.h_spin)
-    assert not np.any(body.S_spin)
 
 
 @pytest.mark.parametrize("condition", ["simply-supported", "cantilever"])
@@ -201,10 +177,6 @@ def test_stations_lie_at_elements_middle_ends_and_interfaces(modal_body):
     np.testing.assert_array_equal(grip.rotation, body.interfaces["grip"].rotation)
 
 
-def test_an_interface_inside_an_element_changes_no_mode(modal_body):
-    np.testing.assert_array_equal(modal_body(more=GRIP).frequency, modal_body().frequency)
-
-
 @pytest.mark.parametrize("condition", ["simply-supported", "cantilever"])
 def test_rotations_are_the_slopes(modal_body, condition):
     """Euler–Bernoulli: rotation = (twist, −w', v'), against central differences of the interpolated displacement."""
@@ -234,53 +206,6 @@ def test_extents_and_rigidities_of_the_sections(modal_body):
     np.testing.assert_allclose(stations.torsional_rigidity, E / 2.6 * J, rtol=4e-3)
 
 
-def test_static_deflection_under_a_tip_force(modal_body):
-    """All modes of a cantilever under a unit tip force give FL³/(3EI), all of a rod FL/(EA): the modes are complete."""
-    bending = modal_body(condition="cantilever", elements=4, count=8)
-    tip = bending.interfaces["tip"].translation[1]
-    EI = 2.068427e11 * 0.025 * 0.015**3 / 12
-    assert tip @ (tip / np.diag(bending.stiffness)) == pytest.approx(1 / (3 * EI), rel=1e-10)
-    axial = modal_body(family="axial", elements=4, count=12)
-    tip = axial.interfaces["tip"].translation[0]
-    assert tip @ (tip / np.diag(axial.stiffness)) == pytest.approx(1 / (2.068427e11 * 0.015 * 0.025), rel=1e-10)
-
-
-def test_geometric_stiffness_of_axial_loads(modal_body):
-    """Against ∫N v'v' by Simpson: spinning, N = ρA(L² − x²)/2; accelerating, N = −ρA(L − x); N = 1 up to a force.
-
-    Of bending alone: with twist and stretch in test_beam_geometric_stiffness.py.
-    """
-    both = {'"all"': '["in-plane-bending", "out-of-plane-bending"]'}
-    body = modal_body(family="all", count=12, condition="cantilever", more=GRIP, replace=both)
-    x, weights, _, rotation = sampled(body, 3001)
-    rhoA = 7850.0 * 0.015 * 0.025
-    slopes = np.stack([rotation[:, 2], -rotation[:, 1]], axis=1)
-    on_grip = np.where(x < 0.333 - 1e-9, 1.0, np.where(x > 0.333 + 1e-9, 0.0, 0.5))
-    loads = {
-        "omega_zz": rhoA * (1 - x**2) / 2,
-        "omega_yy": rhoA * (1 - x**2) / 2,
-        "t_x": -rhoA * (1 - x),
-        "force/tip/x": np.ones_like(x),
-    }
-    for name, N in loads.items():
-        expected = np.einsum("i,ikm,ikn->mn", weights * N, slopes, slopes)
-        np.testing.assert_allclose(
-            body.geometric_stiffness[name], expected, rtol=1e-6, atol=1e-6 * np.abs(expected).max()
-        )
-    expected = np.einsum("i,ikm,ikn->mn", weights * on_grip, slopes, slopes)
-    difference = np.abs(body.geometric_stiffness["force/grip/x"] - expected).max()
-    assert difference < 1e-3 * np.abs(expected).max()  # Simpson across the jump
-    for name in ("t_y", "r_z", "omega_xx", "omega_xy", "force/tip/y", "moment/tip/z", "force/root/x"):
-        assert np.abs(body.geometric_stiffness[name]).max() < 1e-12 * np.abs(expected).max()
-
-
-def test_more_modes_than_available(link_file):
-    path = link_file(elements=4, count=9)
-    with pytest.raises(InputError, match=r"modes\.count: expected at most 8.*found 9"):
-        make_link(path)
-    assert not path.with_suffix(".h5").exists()
-
-
 @pytest.mark.parametrize(
     ("change", "factor"),
     [
@@ -293,14 +218,6 @@ def test_no_value_is_too_small(modal_body, change, factor):
     """Frequencies of bending go with the height, and with the root of E."""
     expected = modal_body().frequency * factor
     np.testing.assert_allclose(modal_body(replace=dict([change])).frequency, expected, rtol=1e-8)
-
-
-def test_damping(modal_body):
-    each = modal_body(count=3, more="[damping]\nratio = [0.01, 0.02, 0.03]")
-    np.testing.assert_array_equal(each.damping_ratio, [0.01, 0.02, 0.03])
-    rayleigh = modal_body(count=3, more="[damping]\nrayleigh = [2.0, 1e-4]")
-    omega = 2 * np.pi * rayleigh.frequency
-    np.testing.assert_allclose(2 * rayleigh.damping_ratio * omega, 2.0 + 1e-4 * omega**2, rtol=1e-13)
 
 
 def test_user_given_nodes(modal_body):

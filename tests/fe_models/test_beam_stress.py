@@ -49,40 +49,6 @@ def test_simply_supported_beam_away_from_nodes(body):
     np.testing.assert_allclose(side.strain[5], side.stress[5] * 2 * (1 + NU) / E, rtol=1e-14)
 
 
-def test_axial_modes(body):
-    found = body({"a": (0.2, 0, 0)}, family="axial", condition="cantilever", count=2).stress["a"].stress
-    k = np.pi * np.array([0.5, 1.5])
-    np.testing.assert_allclose(found[0], E * np.sqrt(2 / RHO_A) * k * np.cos(0.2 * k), rtol=1e-6)
-    np.testing.assert_array_equal(found[1:], 0.0)
-
-
-def test_torsion_of_a_circle(body):
-    points = {"side": (0.2, 0, 0.01), "top": (0.2, 0.01, 0)}
-    stress = body(points, section=CIRCLE, family="torsion", condition="cantilever", count=2).stress
-    k, G, polar = np.pi * np.array([0.5, 1.5]), E / 2 / (1 + NU), np.pi * 0.01**4 / 2
-    tau = G * 0.01 * np.sqrt(2 / (RHO * polar)) * k * np.cos(0.2 * k)
-    np.testing.assert_allclose(stress["top"].stress[4], tau, rtol=1e-6)
-    np.testing.assert_allclose(stress["side"].stress[5], -tau, rtol=1e-6)
-
-
-def test_out_of_plane_bending_turns_the_other_way(body):
-    """A square section bends alike about both axes: σ at +z of one is σ at +y of the other."""
-    square = '{ shape = "rectangle", height = 0.02, width = 0.02 }'
-    keys = {"section": square, "condition": "cantilever", "count": 1}
-    up = body({"a": (0, 0.01, 0)}, family="in-plane-bending", **keys).stress["a"].stress
-    out = body({"a": (0, 0, 0.01)}, family="out-of-plane-bending", **keys).stress["a"].stress
-    np.testing.assert_allclose(out[0], up[0], rtol=1e-9)
-
-
-def test_heavy_tip_mass_bends_the_root(body):
-    """Of a mass that dwarfs the beam, mode 1: M = ω² m v L to about ρAL/m."""
-    more = '[[interface]]\nname = "tip"\nmass = 3000.0\n'
-    heavy = body({"top": (0, H / 2, 0)}, condition="cantilever", count=1, more=more)
-    omega2 = (2 * np.pi * heavy.frequency[0]) ** 2
-    M = omega2 * 3000.0 * heavy.interfaces["tip"].translation[1, 0] * L
-    assert heavy.stress["top"].stress[0, 0] == pytest.approx(-M * H / 2 / (B * H**3 / 12), rel=1e-3)
-
-
 def test_hub_on_a_simply_supported_root_takes_the_moment(body):
     more = '[[interface]]\nname = "root"\ninertia = [0.0, 0.0, 0.01]\n'
     hub = body({"top": (0, H / 2, 0)}, count=3, more=more, elements=40)

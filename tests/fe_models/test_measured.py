@@ -144,13 +144,3 @@ def test_what_cannot_be_measured_is_refused(measured_link, tmp_path):
     (tmp_path / "modes.csv").unlink()
     with pytest.raises(InputError, match=r'measured.table: expected an existing file, found "modes.csv"'):
         read_link(tmp_path / "link1.toml")
-
-
-def test_a_link_file_without_modes_has_their_defaults(link_file):
-    head, _, rest = link_file().read_text().partition("[modes]")
-    path = link_file()
-    path.write_text(head)
-    assert rest
-    assert read_link(path).modes.attachment_modes
-    body = make_link(path).body
-    assert [body.family.count(name) for name in ("in-plane-bending", "axial")] >= [6, 1]

@@ -145,6 +145,7 @@ WRONG = {
     "stiffness": (np.eye(2), "stiffness: expected diag"),
     "modal_mass": (np.eye(2) * (1 + 1e-7), "modal_mass: expected the identity"),
     "damping_ratio": (np.array([0.0, -0.1]), "damping_ratio"),
+    "residual": (np.array([1, 0]), "residual: expected 0 of each eigenmode, then 1"),
     "S_bar": (np.full((3, 2), np.nan), "S_bar: expected finite numbers"),
     "S_bar_kl": (np.zeros((3, 3, 2, 2)), "S_bar_kl: expected a sum"),
     "interfaces": ({}, "interfaces: expected one named root, found none"),

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from ffrobot.common.checksum import seal
-from ffrobot.common.errors import InputError, SolveError
+from ffrobot.common.errors import InputError
 from ffrobot.fe_models.link import make_link
 from ffrobot.fe_models.modal_body import OutlinedPatches, StressPoint
 from ffrobot.fe_models.modal_body_file import read_modal_body, write_modal_body
@@ -222,34 +222,6 @@ def test_wrong_dataset(outcome, value):
     seal(outcome.path)
     with pytest.raises(InputError, match=r"link1\.h5: "):
         read_modal_body(outcome.path)
-
-
-def test_disk_full_leaves_the_old_file_and_nothing_else(outcome):
-    """The limit on the size of files makes the kernel refuse the write halfway, as a full disk does."""
-    before = outcome.path.read_bytes()
-    code = f"""
-import resource, sys
-from pathlib import Path
-from ffrobot.common.errors import SolveError
-from ffrobot.fe_models.modal_body_file import read_modal_body, write_modal_body
-path = Path({str(outcome.path)!r})
-body = read_modal_body(path)
-resource.setrlimit(resource.RLIMIT_FSIZE, (8192, 8192))
-try:
-    write_modal_body(path, body)
-except SolveError as error:
-    print(error)
-"""
-    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert "link1.h5: cannot write the modal body file: File too large" in result.stdout
-    assert result.stderr == ""
-    assert outcome.path.read_bytes() == before
-    assert {entry.name for entry in outcome.path.parent.iterdir()} == {"link1.toml", "link1.h5"}
-
-
-def test_unwritable_folder(outcome, tmp_path):
-    with pytest.raises(SolveError, match=r"cannot write the modal body file"):
-        write_modal_body(tmp_path / "nowhere" / "link1.h5", outcome.body)
 
 
 def test_reading_needs_no_finite_elements(outcome):

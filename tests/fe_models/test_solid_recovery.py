@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from ffrobot.common.errors import InputError
 from ffrobot.fe_models.link import make_link
 
 LINK = """
@@ -104,10 +103,3 @@ def test_surface_holds_what_the_points_on_it_have(pair):
     # Bending: σ_xx is proportional to y, and changes along x over these 5 mm by up to 7 %, in mode 3.
     expected = solid.mesh.points[near, 1, None] / edge.position[1] * edge.stress[0]
     np.testing.assert_allclose(solid.surface_stress[near, 0], expected, atol=0.08 * np.abs(edge.stress).max())
-
-
-def test_point_outside_the_solid(body):
-    with pytest.raises(
-        InputError, match=r"arm\.toml: stress\.points\.off: expected a point of the part, found .* m from"
-    ):
-        body(SOLID, points="off = [0.5, 0.02, 0.0]")

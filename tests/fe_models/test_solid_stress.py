@@ -1,10 +1,5 @@
 """Strains, stresses and surface patches of solids: fields known exactly, on boxes; patches bend them as beam theory."""
 
-import os
-import subprocess
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
 import ufl
@@ -103,40 +98,6 @@ def test_point_next_to_a_curved_face(curved):
     assert not len(locate(curved, 1.01 * face[None], 1e-6)[0])
     with pytest.raises(InputError, match="expected a point of the part"):
         point_stresses(space, C, modes, {"off": tuple(1.1 * inside)}, PATH)
-
-
-def test_two_processes_give_the_same(tmp_path):
-    """Each cell's strains are summed by the process that owns it: nothing depends on how the mesh is shared out."""
-    script = """
-import sys
-import numpy as np
-from mpi4py import MPI
-from fields import C, PATH, L, H, B, bending, box, field, patch_tags
-from ffrobot.mesh.compat import lagrange_space
-from ffrobot.fe_models.solid.stress import point_stresses
-from ffrobot.fe_models.solid.surface_patches import outlined_patches
-space = lagrange_space(box("tetrahedron", (8, 2, 2)), 1, vector=True)
-modes = field(space, bending)
-points = {{"a": (0.5, H / 2, 0.0), "b": (0.33, 0.01, 0.02), "c": (L, 0.0, 0.0)}}
-strain = [p.strain[:, 0] for p in point_stresses(space, C, modes, points, PATH).values()]
-tags, faces, record = patch_tags(space.mesh)
-patches = outlined_patches(space, tags, faces, record, L, modes, PATH)
-if MPI.COMM_WORLD.rank == 0:
-    np.save({output!r}, np.concatenate([*strain, patches.top.ravel(), patches.bottom.ravel()]))
-"""
-    # This process has started MPI itself, which leaves its mark in the environment.
-    environment = {key: value for key, value in os.environ.items() if not key.startswith(("OMPI_", "PMIX_", "PRTE_"))}
-    environment["PYTHONPATH"] = str(Path(__file__).parent)
-    results = []
-    for count in (1, 2):
-        output = str(tmp_path / f"{count}.npy")
-        text = script.format(output=output)
-        command = ["mpirun", "--allow-run-as-root", "--oversubscribe", "-n", str(count), sys.executable, "-c", text]
-        done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=100)
-        assert done.returncode == 0, done.stderr
-        results.append(np.load(output))
-    assert np.abs(results[0]).max() > 0.05
-    np.testing.assert_allclose(results[1], results[0], rtol=0, atol=1e-12)
 
 
 @pytest.mark.parametrize("cell", CELLS)

@@ -1,8 +1,5 @@
 """The distributed mesh: regions, faces and surface are the part's, whatever the number of processes."""
 
-import shutil
-import subprocess
-import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -88,58 +85,3 @@ def test_errors_reach_the_caller(solid):
     lost = PlaceRecord(name="a", position=(0.5, 1.0, 0.0), normal=(0.0, 1.0, 0.0))
     with pytest.raises(InputError, match=r"link.toml: interface.position of a"):
         solid_mesh(solid(section=rectangle()), SolidMeshRecord(), (lost,), None, LINK)
-
-
-PARALLEL = """
-import sys, numpy as np, ufl
-from pathlib import Path
-from dolfinx import fem
-from mpi4py import MPI
-from ffrobot.common.errors import InputError
-from ffrobot.mesh.compat import coordinate_element, geometry_nodes
-from ffrobot.mesh.records import *
-from ffrobot.mesh.slices import section_quadratures
-from ffrobot.mesh.solid_mesh import solid_mesh
-
-comm = MPI.COMM_WORLD
-geometry = SolidGeometry(kind="solid", length=1.0, section=RectangleSection(shape="rectangle", height=0.06, width=0.02),
-                         hole=(Hole(position=0.5, diameter=0.04),))
-grip = PlaceRecord(name="grip", position=(0.5, 0.0, 0.0), normal=(0.0, 0.0, 1.0))
-lost = PlaceRecord(name="lost", position=(0.5, 9.0, 0.0), normal=(0.0, 0.0, 1.0))
-try:
-    solid_mesh(geometry, SolidMeshRecord(), (lost,), None, Path("link.toml"), comm)
-    raised = False
-except InputError:
-    raised = True
-body = solid_mesh(geometry, SolidMeshRecord(), (grip,), Outlines(((0.225, 0.275), (0.725, 0.775)), 0.02),
-                  Path("link.toml"), comm)
-ds = ufl.Measure("ds", domain=body.mesh, subdomain_data=body.facet_tags)
-x = ufl.SpatialCoordinate(body.mesh)
-def total(form):
-    return comm.allreduce(fem.assemble_scalar(fem.form(form)))
-numbers = [total(x[0] * ds(tag)) for tag in body.faces.values()]
-numbers += [total(x[0] * ufl.dx(body.mesh)), body.size, len(body.surface.points), len(body.surface.triangles)]
-numbers += list((body.surface.points * np.arange(len(body.surface.points))[:, None]).sum(axis=0))
-numbers.append((body.surface.triangles * np.arange(len(body.surface.triangles))[:, None]).sum())
-numbers.append(comm.allreduce(len(body.surface.rows)) - len(body.surface.points))
-for section in section_quadratures(body.mesh, np.array([0.0, 0.3, 0.49, 0.5, 1.0]), 4):
-    numbers += [comm.allreduce(v) for v in (section.weights.sum(), section.weights @ section.points[:, 1] ** 2)]
-    numbers.append(comm.allreduce(section.y_range[1], MPI.MAX))
-raised = comm.allreduce(int(raised))
-if comm.rank == 0:
-    np.savetxt(sys.argv[1], numbers)
-    assert raised == comm.size
-"""
-
-
-@pytest.mark.skipif(shutil.which("mpirun") is None, reason="no mpirun here")
-def test_two_processes_see_what_one_sees(ffrobot, tmp_path):
-    (tmp_path / "run.py").write_text(PARALLEL)
-    environment = ffrobot.environment | {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
-    results = []
-    for count in (1, 2):
-        command = ["mpirun", "--oversubscribe", "-n", str(count), sys.executable, "run.py", f"{count}.txt"]
-        done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=300)
-        assert done.returncode == 0, done.stderr
-        results.append(np.loadtxt(tmp_path / f"{count}.txt"))
-    np.testing.assert_allclose(results[1], results[0], rtol=1e-10, atol=1e-14)
