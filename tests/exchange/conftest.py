@@ -4,8 +4,8 @@ from functools import partial
 
 import pytest
 from other_codes import pinocchio_dynamics as dynamics
-from other_codes import pinocchio_moments, python_with_pinocchio
 from other_codes import pinocchio_stiffness as stiffness
+from other_codes import python_with_pinocchio
 
 
 @pytest.fixture(scope="session")
@@ -13,12 +13,6 @@ def python_of_pinocchio(pytestconfig, tmp_path_factory):
     """Its interpreter; the environment is kept in pytest's cache if there is one."""
     cache = getattr(pytestconfig, "cache", None)
     return python_with_pinocchio(tmp_path_factory.mktemp("pinocchio") if cache is None else cache.mkdir("pinocchio"))
-
-
-@pytest.fixture(scope="session")
-def pinocchio(python_of_pinocchio):
-    """Motor moments by Pinocchio of (urdf, names, motion)."""
-    return partial(pinocchio_moments, python_of_pinocchio)
 
 
 @pytest.fixture(scope="session")

@@ -8,7 +8,7 @@ import pytest
 from beam_links import beam_link, tube
 from material_points import random_cloud
 
-from ffrobot import InputError, make_link, solve
+from ffrobot import InputError, make_link
 from ffrobot.exchange.bodies.integrals import integrals_of
 from ffrobot.exchange.bodies.matrices import craig_bampton_file, exudyn_file
 from ffrobot.exchange.bodies.mbdyn import fem_text, read_fem
@@ -71,33 +71,6 @@ def test_there_and_back(file_format, name, bodies):
     assert any("geometric stiffness" in line for line in left_out)
     assert any("not in the file" in line for line in remarks)
     assert not any(" off " in line for line in remarks)  # what SID says twice
-
-
-SLEW = """
-name = "slew"
-space = "spatial"
-gravity = [0.0, 0.0, -9.81]
-body = [{{ name = "arm", modal = "{}.h5" }}]
-joint = [{{ name = "hinge", type = "revolute", between = ["ground", "arm.root"], axis = [1.0, 2.0, 2.0] }}]
-payload = [{{ point = "arm.tip", mass = 0.1 }}]
-trajectory = [{{ name = "turn", joint = "hinge", value = "pi/2*(t - sin(2*pi*t)/(2*pi))" }}]
-analysis = [{{ name = "run", kind = "pcid", end = 1.0, output_step = 0.05, tolerance = 1e-10 }}]
-"""
-"""About an oblique axis: all integrals take part."""
-
-
-def test_a_slew_is_the_same_there_and_back(tmp_path, bodies):
-    """With the same steps, so that integrals equal to 1e-12 leave motions and forces equal to 1e-10."""
-    versions, runs = {"own": bodies["loaded"]}, {}
-    versions |= {name: read(write(bodies["loaded"])[0], "arm")[0] for name, (write, read) in FORMATS.items()}
-    for name, body in versions.items():
-        write_modal_body(tmp_path / f"{name}.h5", body)
-        (tmp_path / f"{name}.toml").write_text(SLEW.format(name))
-        runs[name] = solve(tmp_path / f"{name}.toml")
-    for key in ("points/arm.tip/deflection", "bodies/arm/modal", "joints/hinge/moment", "joints/hinge/reaction_moment"):
-        own = runs["own"][f"run/{key}"]
-        for file_format in FORMATS:
-            assert np.abs(runs[file_format][f"run/{key}"] - own).max() < 1e-10 * np.abs(own).max(), (file_format, key)
 
 
 def test_modes_of_any_normalisation_become_orthonormal(bodies):

@@ -49,13 +49,6 @@ def flat_pin(name, first, second, **keys):
 ROOT, TIP = [0.0, 0.0, 0.02], [0.3, 0.01, 0.0]
 PLANE = {"space": "planar", "gravity": [0.0, -9.81]}
 PLANAR = {
-    # soft links that bend far, with geometric stiffening
-    "flat soft": PLANE | {
-        "geometric_stiffening": True,
-        "body": [{"name": "upper", "link": flat_link("upper", 2)}, {"name": "fore", "link": flat_link("fore", 2)}],
-        "joint": [flat_pin("shoulder", "ground", "upper.root"), flat_pin("elbow", "upper.tip", "fore.root")],
-        "initial": {"angles": {"upper": -0.4, "fore": 0.3}},
-    },
     # fewer modes than the link has, an outer first side, a rotor behind a stiff gear, friction, patches with mass and
     # stiffness, a payload with inertia, a weld and a way that are turned, a trajectory that nothing follows, rates
     "flat arm": PLANE | {
@@ -89,20 +82,16 @@ PLANAR = {
             flat_pin("elbow", "upper.tip", "fore.root", stiffness=30.0, rotor_inertia=1e-5, gear_ratio=40.0),
         ],
     },
-    # a body without joints, which starts turned and turns
-    "flat flyer": PLANE | {
-        "body": [{"name": "upper", "link": flat_link("upper", 1)}, {"name": "flyer", "rigid": flat_box()}],
-        "joint": [flat_pin("shoulder", "ground", "upper.root")],
-        "initial": {"angles": {"upper": -0.4, "flyer": 0.6}, "rates": {"flyer": 2.0}},
-    },
-    # two links welded at an angle hang from a pin, from static equilibrium; implicit steps
+    # two soft links welded at an angle hang from a pin in static equilibrium, with geometric stiffening; implicit steps
     "flat rest": PLANE | {
+        "geometric_stiffening": True,
         "body": [{"name": "upper", "link": flat_link("upper", 1)}, {"name": "fore", "link": flat_link("fore", 1)}],
         "joint": [flat_pin("pin", "ground", "upper.root", coulomb_friction=0.02),
                   {"name": "bend", "type": "weld", "between": ["upper.tip", "fore.root"]}],
         "initial": {"state": "static", "joints": {"pin": -1.9}, "angles": {"fore": -0.8}},
     },
-    # a crank that drives a slider, from a guess of angles that does not close the loop, with friction where it is cut
+    # a crank that drives a slider, from a guess of angles that does not close the loop, with friction where it is cut;
+    # a body without joints, which starts turned and turns
     "flat loop": PLANE | {
         "body": [{"name": "slider", "rigid": flat_box(pin=[0.0, 0.0])},
                  {"name": "crank", "rigid": flat_box(a=[0.0, 0.0], b=[0.1, 0.0])},
@@ -114,7 +103,7 @@ PLANAR = {
             flat_pin("knee", "crank.b", "rod.root", viscous_friction=0.002),
             flat_pin("out", "slider.pin", "rod.tip", viscous_friction=0.003),
         ],
-        "initial": {"angles": {"crank": 1.2, "rod": -0.3}},
+        "initial": {"angles": {"crank": 1.2, "rod": -0.3, "flyer": 0.6}, "rates": {"flyer": 2.0}},
     },
 }  # fmt: skip
 SCENES = PLANAR | {
@@ -186,9 +175,7 @@ INPUTS = {
     "radau": {"joint/shoulder/moment": (-1.2, -0.2, 0.6)},
     "flat arm": {"joint/shoulder/moment": (1.0, -3.0, 2.0), "joint/elbow/moment": (0.5, -1.5, 1.0),
                  "joint/way/moment": (4.0, 6.0, 3.0), "pzt/upper/2": (150.0, -200.0, 0.0)},
-    "flat soft": {"joint/shoulder/moment": (-3.0, -1.0, 2.0), "joint/elbow/moment": (0.5, -1.5, 1.0)},
     "flat gears": {"joint/shoulder/moment": (4.0, -5.0, 1.0), "joint/elbow/moment": (-1.0, 2.0, 0.0)},
-    "flat flyer": {"joint/shoulder/moment": (1.0, -3.0, 2.0)},
     "flat rest": {"joint/pin/moment": (0.0, 0.5, -0.3)},
     "flat loop": {"joint/drive/moment": (0.3, -1.0, 1.5)},
 }  # fmt: skip
@@ -452,17 +439,3 @@ def test_what_cannot_be_exported(tmp_path, keys, analysis, message):
     scene.write_text(tomli_w.dumps(tomllib.loads(scene_text("radau")) | keys))
     with pytest.raises(InputError, match=message):
         export_file(scene, "fmu", analysis, None)
-
-
-@pytest.mark.parametrize(
-    ("keys", "message"),
-    [
-        ({"motors": "frame"}, 'motors: expected "section"'),
-        ({"load": [{"joint": "elbow", "moment": "1"}]}, "load: expected none of a scene for an FMU"),
-    ],
-)
-def test_what_cannot_be_exported_of_planar_scenes(tmp_path, keys, message):
-    scene = tmp_path / "scene.toml"
-    scene.write_text(tomli_w.dumps(tomllib.loads(scene_text("flat gears")) | keys))
-    with pytest.raises(InputError, match=message):
-        export_file(scene, "fmu", "swing", None)

@@ -314,28 +314,6 @@ def test_names_that_are_no_identifiers(tmp_path):
     assert len({each.name for each in unit.variables}) == len(unit.variables)
 
 
-IN_SPACE = """
-name = "in 3D"
-space = "spatial"
-gravity = [0.0, 0.0, 0.0]
-body = [{ name = "arm", link = "arm.toml" }]
-joint = [{ name = "shaft", type = "cylindrical", between = ["ground", "arm.root"], axis = [0.0, 0.0, 1.0] }]
-payload = [{ point = "arm.tip", mass = 0.05 }]
-analysis = [{ name = "at_rest", kind = "linear" }]
-"""
-
-
-def test_a_linear_model_in_3d(ffrobot, folder):
-    (folder / "space.toml").write_text(IN_SPACE)
-    for command in (("solve", "space.toml"), ("export", "space.results.h5", "--format", "fmu")):
-        ffrobot.ok(*command, cwd=folder)
-    assert validate_fmu(str(folder / "space.results.at_rest.fmu")) == []
-    variables = read_model_description(str(folder / "space.results.at_rest.fmu")).modelVariables
-    units = {each.name: each.unit for each in variables}
-    assert [units[name] for name in ("joint/shaft 1", "joint/shaft 2", "point/arm.tip/z")] == ["rad", "m", "m"]
-    assert units["force/arm.tip/z"] == "N"
-
-
 def test_units_of_every_type_of_joint():
     """Joints with several coordinates have angles and ways among them."""
     types = ("revolute", "prismatic", "screw", "cylindrical", "universal", "spherical", "planar", "weld", "free")

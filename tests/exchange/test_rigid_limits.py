@@ -107,9 +107,3 @@ def test_straight_links_move_as_rigid_ones(straight):
     np.testing.assert_allclose(found, expected, atol=1e-10 * np.abs(expected).max())
     of_urdf = moments(urdf.read_text(), *motion)
     np.testing.assert_allclose(found, [of_urdf[name] for name in names], atol=1e-12 * np.abs(expected).max())
-
-
-def test_straight_links_against_pinocchio(straight, pinocchio):
-    _, urdf, names, motion, found = straight
-    expected = pinocchio(urdf, names, motion)
-    np.testing.assert_allclose(found, expected, atol=1e-10 * np.abs(expected).max())

@@ -238,14 +238,6 @@ def test_wrong_files(text, expected, tmp_path):
     assert not (tmp_path / "scene").exists()
 
 
-def test_a_wrong_file_ends_the_command(tmp_path, ffrobot):
-    (tmp_path / "robot.urdf").write_text(WRONG["two roots"][0])
-    done = ffrobot("import", "robot.urdf", "-o", "scene", cwd=tmp_path)
-    assert done.returncode == 2
-    assert done.stderr.startswith("ffrobot: robot.urdf: expected one link that no joint carries, found 2")
-    assert not (tmp_path / "scene").exists()
-
-
 def test_units_in_a_wrong_scale_are_told(imported):
     """Millimetres in place of metres, kg·mm² in place of kg·m²."""
     _, out = imported(robot(BASE, ARM, joint("j", "base", "arm", at="0 0 425")))

@@ -65,12 +65,6 @@ def test_random_trees(tree):
     np.testing.assert_allclose([found[name] for name in names], [expected[name] for name in names], atol=1e-11 * scale)
 
 
-def test_random_trees_against_pinocchio(tree, pinocchio):
-    urdf, names, motion, found = tree
-    expected = pinocchio(urdf, names, motion)
-    np.testing.assert_allclose([found[name] for name in names], expected, atol=1e-10 * np.abs(expected).max())
-
-
 def test_friction_of_joints(tmp_path, ffrobot):
     """<dynamics> of the Z1, damping c and friction τ_c, at rest and beside v_s = 0.01 rad/s: c q̇ + τ_c tanh(q̇/v_s)."""
     urdf = ROBOTS / "z1.urdf"
