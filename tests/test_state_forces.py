@@ -49,7 +49,6 @@ def scene(force, *, joint, analysis, link=None, load=(), **keys):
 
 
 HINGE = {"name": "O", "type": "revolute", "between": ["ground", "arm.root"]}
-SLIDE = {"name": "O", "type": "prismatic", "between": ["ground", "arm.root"], "axis": [0.0, 1.0], "motor": False}
 FREE = {"name": "free", "kind": "forward", "end": 1.0, "tolerance": 1e-9}
 LINK = beam_link(0.6, circle(0.01), 4, modes={"count": 2, "family": "in-plane-bending"})
 
@@ -75,19 +74,6 @@ def test_moment_of_the_function_is_that_of_a_load():
     with_moment = scene(lambda t, x, v: (0.0, 0.0, 3.0 + t), joint=HINGE, trajectory=[hold], analysis=analysis)
     moment = ffrobot.solve(with_moment)["held/joints/O/moment"]
     np.testing.assert_allclose(moment, -3.0 - np.linspace(0.0, 0.1, 11), rtol=1e-12)
-
-
-def test_static_equilibrium_and_linear_model(compiled_spring):
-    """A slide sags by m g / k, and stays there; it vibrates with ω² = k / m and damping c / m."""
-    static = {"initial": {"state": "static"}, "gravity": [0.0, -9.81]}
-    sagged = ffrobot.solve(scene(compiled_spring, joint=SLIDE, analysis=FREE, **static))
-    np.testing.assert_allclose(sagged["free/points/arm.tip/position"][:, 1], -MASS * 9.81 / K, rtol=1e-10)
-    about = {"name": "rest", "kind": "linear", "output_step": None}
-    results = ffrobot.solve(scene(compiled_spring, joint=SLIDE | {"motor": True}, analysis=about))
-    eigenvalues = np.linalg.eigvals(results["rest/linear/A"][0])
-    decay = C / (2 * MASS)
-    np.testing.assert_allclose(np.sort(eigenvalues.real), [-decay, -decay], rtol=1e-6)
-    np.testing.assert_allclose(np.abs(eigenvalues), np.sqrt(K / MASS), rtol=1e-6)
 
 
 AT = np.array([0.6, 0.1, -0.2])

@@ -1,8 +1,5 @@
 """Modal body files on the way to a solve: given by name, made when needed, damaged."""
 
-import json
-from pathlib import Path
-
 import h5py
 import numpy as np
 import pytest
@@ -46,18 +43,6 @@ def test_solve_uses_the_cache(two_link_copy, ffrobot, two_link):
     assert "link1: stage 1, up to date" in done.stdout
     assert "link2: stage 1, up to date" in done.stdout
     assert {path.name for path in folder.iterdir()} - before == {"scene.results.h5"}
-
-
-def test_damaged_cache_entry_is_made_again(two_link_copy, ffrobot):
-    folder = two_link_copy({"scene.toml": SHORT})
-    assert ffrobot("solve", "scene.toml", cwd=folder).returncode == 0
-    with h5py.File(folder / "scene.results.h5") as file:
-        entry = Path(json.loads(file.attrs["modal_bodies"])["link1"]["path"])
-    assert entry.is_relative_to(ffrobot.cache)
-    content = entry.read_bytes()
-    entry.write_bytes(content[:1000])
-    ffrobot.ok("solve", "scene.toml", cwd=folder)
-    assert entry.read_bytes() == content
 
 
 def test_scene_with_a_modal_file_gives_the_same(given, two_link_copy, ffrobot, two_link):

@@ -8,25 +8,6 @@ import pytest
 FORBIDDEN = ("dolfinx", "gmsh", "petsc4py", "slepc4py", "mpi4py", "matplotlib")
 
 
-@pytest.mark.parametrize(
-    ("arguments", "told"),
-    [
-        (["--help"], ["link", "solve", "info", "plot", "report", "schema", "Stage 1", "Stage 2"]),
-        (["link", "--help"], ["LINK.toml", "-o, --output BODY.h5", "--force", "up to date"]),
-        (["solve", "--help"], ["SCENE.toml", "-o, --output RESULTS.h5", "SCENE.results.h5", "Stage 1"]),
-        (["info", "-h"], ["FILE.h5", "modal body", "results"]),
-        (["plot", "-h"], ["RESULTS.h5", "-o, --output DIR", "--format png,pdf,svg"]),
-        (["report", "-h"], ["RESULTS.h5|FOLDER …", "-o, --output FILE.html", "self-contained"]),
-    ],
-)
-def test_help(ffrobot, arguments, told):
-    done = ffrobot(*arguments)
-    assert done.returncode == 0
-    for text in told:
-        assert text in done.stdout
-    assert max(map(len, done.stdout.splitlines())) <= 80
-
-
 def test_summary(two_link):
     """Every number a reader asks for first, in whole words."""
     out = two_link.stdout
@@ -87,27 +68,6 @@ def test_info_of_a_modal_body(two_link, ffrobot):
 def short_scene(two_link_copy, two_link):
     """The folder of a short two-link scene; its modal bodies are in the cache since `two_link`."""
     return two_link_copy({"scene.toml": {"end = 1.0": "end = 0.01"}})
-
-
-def _loaded(program, cwd, environment):
-    """Which of the forbidden packages a Python program loads."""
-    program += f"\nimport sys; print(*sorted(set(sys.modules) & {set(FORBIDDEN)!r}), file=sys.stderr)"
-    done = subprocess.run(
-        [sys.executable, "-c", program], cwd=cwd, env=environment, capture_output=True, text=True, timeout=120
-    )
-    assert done.returncode == 0, done.stderr
-    return done.stderr.split()
-
-
-def test_stage_2_loads_no_finite_elements(short_scene, ffrobot, tmp_path):
-    assert _loaded("import ffrobot.mbs, ffrobot.scene.kinds", tmp_path, ffrobot.environment) == []
-    solve = f"""
-import sys
-sys.argv = ["ffrobot", "solve", "scene.toml", "-o", {str(tmp_path / "r.h5")!r}]
-from ffrobot.cli import main
-main()
-"""
-    assert _loaded(solve, short_scene, ffrobot.environment) == []
 
 
 def test_stage_2_works_where_stage_1_is_not_installed(short_scene, ffrobot, tmp_path):

@@ -76,16 +76,3 @@ def test_info_names_the_points(folder, ffrobot):
     assert ffrobot("link", "arm.toml", cwd=folder).returncode == 0
     told = ffrobot("info", "arm.h5", cwd=folder).stdout
     assert "modal and static stresses at root_top, (0, 0.02, 0) m" in told
-
-
-def test_a_point_outside_the_section_is_refused(folder, refused):
-    (folder / "arm.toml").write_text(LINK.replace("[1.0, -0.02, 0.0]", "[1.0, -0.03, 0.0]"))
-    assert "arm.toml: stress.points.middle: expected y, z within the section" in refused(folder, "link", "arm.toml")
-
-
-def test_without_stress_points_nothing_is_said(folder, ffrobot):
-    (folder / "arm.toml").write_text(LINK.replace("[stress]\npoints", "[stress]\n# points"))
-    done = ffrobot.ok("solve", "scene.toml", "--verbose", cwd=folder)
-    assert "von Mises" not in done.stdout
-    with h5py.File(folder / "scene.results.h5") as file:
-        assert "stress" not in file["rest"]

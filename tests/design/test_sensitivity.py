@@ -5,7 +5,7 @@ from copy import deepcopy
 
 import numpy as np
 import pytest
-from small_robots import SWING, TUBE
+from small_robots import ARM, SWING, TUBE
 
 import ffrobot
 from ffrobot.design.readings import read_history
@@ -183,18 +183,6 @@ def test_frequencies_of_a_cantilever(write):
     beta = 1.875104068711961  # of cos β cosh β = −1
     frequency = beta**2 / (2 * np.pi * 0.6**2) * np.sqrt(70e9 * 0.02**2 / 12 / 2700.0)
     assert found.value[0] == pytest.approx(frequency, rel=1e-5)
-
-
-RIGID = {"mass": 2.0, "center": [0.3, 0.0], "inertia": 0.05, "points": {"root": [0.0, 0.0], "tip": [0.6, 0.0]}}
-ARM = {
-    "name": "arm",
-    "gravity": [0.0, -9.81],
-    "body": [{"name": "arm", "rigid": RIGID}],
-    "joint": [{"name": "shoulder", "type": "revolute", "between": ["ground", "arm.root"]}],
-    "payload": [{"point": "arm.tip", "mass": 0.5}],
-    "trajectory": [{"name": "swing", "joint": "shoulder", "value": "t**2"}],
-    "analysis": [{"name": "inverse", "kind": "pcid", "end": 0.5, "output_step": 0.05}],
-}
 
 
 def test_moment_of_a_rigid_arm(write):
