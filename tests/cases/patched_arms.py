@@ -1,67 +1,30 @@
-"""Parts of files of arms in 3D with patches: links, layouts of patches, an arm of a waist and a shoulder."""
+"""Tables of arms in 3D with patches: a link, layouts of patches, an arm of a waist and a shoulder."""
 
-LINK = """
-name = "{name}"
-[material]
-youngs_modulus = 70e9
-poissons_ratio = 0.33
-density = 2700.0
-[geometry]
-kind = "beam"
-length = {length}
-section = {{ shape = "rectangle", height = {height}, width = {width} }}
-[mesh]
-elements = 4
-[reference]
-condition = "cantilever"
-[modes]
-{modes}
-attachment_modes = false
-[damping]
-ratio = 0.01
-"""
-PZT = """
-[[pzt]]
-body = "{body}"
-{keys}
-count = 4
-length = 0.06
-width = 0.01
-thickness = 0.5e-3
-modulus = 63e9
-d31 = 110e-12
-density = 7600.0
-limit = {limit}
-"""
-SEVEN = 'indices = [1, 2, 3, 4, 5, 6, 7]\nfamily = "all"'
-ARM = """
-name = "arm"
-space = "spatial"
-gravity = [0.0, 0.0, -9.81]
-motors = "{motors}"
-[[body]]
-name = "column"
-[body.rigid]
-mass = 1.0
-center = [0.0, 0.0, 0.1]
-inertia = [0.01, 0.01, 0.01]
-points = {{ root = [0.0, 0.0, 0.0], top = [0.0, 0.0, 0.2] }}
-[[body]]
-name = "link"
-link = "link.toml"
-[[joint]]
-name = "waist"
-type = "revolute"
-between = ["ground", "column.root"]
-axis = [0.0, 0.0, 1.0]
-[[joint]]
-name = "shoulder"
-type = "revolute"
-between = ["column.top", "link.root"]
-axis = [0.0, -1.0, 0.0]
-[[payload]]
-point = "link.tip"
-mass = 0.1
-[initial]
-joints = {{ waist = 0.0, shoulder = 0.0 }}
-"""
+from beam_links import beam_link, rectangle
+from tables_3d import ORIGIN, Y, Z, revolute, rigid, scene
+
+SEVEN = {"indices": [1, 2, 3, 4, 5, 6, 7], "family": "all"}
+TWO_IN_EACH_PLANE = {"count": 2, "family": ["in-plane-bending", "out-of-plane-bending"]}
+
+
+def link(modes, height=0.006, width=0.012):
+    section, modes = rectangle(height, width), modes | {"attachment_modes": False}
+    return {"name": "link", "link": beam_link(0.4, section, 4, modes=modes, damping={"ratio": 0.01})}
+
+
+def pzt(name, bends, **keys):
+    return {
+        "body": "link", "name": name, "bends": bends, "count": 4, "length": 0.06, "width": 0.01, "thickness": 0.5e-3,
+        "modulus": 63e9, "d31": 110e-12, "density": 7600.0, "limit": 200.0,
+    } | keys  # fmt: skip
+
+
+def arm(*analyses, **tables):
+    column = rigid("column", 1.0, [0.01] * 3, [0.0, 0.0, 0.1], top=[0.0, 0.0, 0.2])
+    joints = [
+        revolute("waist", "ground", "column.root", Z),
+        revolute("shoulder", "column.top", "link.root", [-y for y in Y]),
+    ]
+    payload = [{"point": "link.tip", "mass": 0.1, "center": ORIGIN}]
+    keys = {"payload": payload, "initial": {"joints": {"waist": 0.0, "shoulder": 0.0}}}
+    return scene([column, link(TWO_IN_EACH_PLANE)], joints, *analyses, **keys | tables)

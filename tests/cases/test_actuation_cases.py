@@ -1,11 +1,8 @@
 """One case per capability of actuation, each through `ffrobot solve`; the tables of their READMEs hold."""
 
-import re
-
-import h5py
 import numpy as np
 import pytest
-from checkpoints import CASES, check_table, peak, tip_error
+from checkpoints import check_table, peak, tip_error
 
 
 def vibration(file, analysis, window=100):
@@ -141,23 +138,6 @@ def test_table_of_what_actuators_can_do(slew, ffrobot):
     assert any(line.startswith("sufficient alone: a limit of") for line in lines)
 
 
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (("nowhere.h5",), "expected a results file, found no such file"),
-        (("scene.toml",), "expected a results file, found not a readable HDF5 file"),
-        (
-            ("scene.results.h5", "--analysis", "limited"),
-            'expected an analysis with motors or patches, "straight"',
-        ),
-    ],
-)
-def test_tables_that_are_not_there(slew, ffrobot, arguments, message):
-    done = ffrobot("feasibility", *arguments, cwd=slew.folder)
-    assert done.returncode == 2
-    assert message in done.stderr
-
-
 @pytest.mark.parametrize("weights", ["point_weights = { tip = 1.0 }", ""])
 def test_more_patches_than_modes_saturate_as_well(solved, weights):
     """Twelve pairs for six modes, one limit: many voltages would do, few are within it; forward runs go through."""
@@ -180,23 +160,3 @@ def test_more_patches_than_modes_saturate_as_well(solved, weights):
     assert deflection["unlimited"] < 1e-9
     # 20 V hold a third of what they would without the patches' own stiffness, ψ = 4.4
     assert 1e-3 < deflection["limited"] < 0.9 * deflection["motor"]
-
-
-CASE_NAMES = [
-    "straight_slew",
-    *(f"two_link_{name}" for name in ("fcid", "points", "patched", "split", "linear", "placement")),
-]
-
-
-@pytest.mark.parametrize("case", CASE_NAMES)
-def test_figures_of_the_case_are_there(case):
-    readme = (CASES / case / "README.md").read_text(encoding="utf-8")
-    shown = re.findall(r"\(figures/([\w.]+)\)", readme)
-    assert shown
-    assert {path.name for path in (CASES / case / "figures").glob("*.png")} == set(shown)
-
-
-def test_nothing_else_is_in_the_files(slew):
-    """Groups of analyses only, as in every results file."""
-    assert isinstance(slew.file, h5py.File)
-    assert set(slew.file) == {"straight", "motor", "unlimited", "limited"}

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 from beam_links import beam_link, rectangle
-from planar_features import STRAIGHT, at_points
 
 import ffrobot
 
@@ -57,16 +56,6 @@ def test_forces_along_three_axes_carry_an_arm(case_copy, ffrobot, monkeypatch):
         np.testing.assert_allclose(results[f"points/{name}"], results[f"inverse/{name}"], rtol=0, atol=1e-6)
 
 
-def test_forces_at_points_hold_links_straight():
-    """A replay of a shape that the path's force does not give by itself: what holds it acts at the points, too."""
-    tables, _ = at_points()
-    again = {"name": "again", "kind": "forward", "actuation": "straight", "apply": "points", "tolerance": 1e-8}
-    with ffrobot.solve(ffrobot.make_scene(**tables | {"analysis": [STRAIGHT, again]})) as results:
-        for point in ("link1.tip", "link2.mid", "link2.tip"):
-            found, expected = (results[f"{name}/points/{point}/position"] for name in ("again", "straight"))
-            np.testing.assert_allclose(found, expected, rtol=0, atol=1e-7)
-
-
 MISTAKES = {
     "axis of the plane": ('body = "fore"\naxial = ["tip"]', "axial: expected no such key .* along x, y and z"),
     "point that is none": ('body = "fore"\nx = ["top"]', r'expected a point of the body \(.*tip.*\), found "top"'),
@@ -90,13 +79,6 @@ def test_mistakes(case_copy, ffrobot, monkeypatch, what):
     keys, message = MISTAKES[what]
     with pytest.raises(library.InputError, match=message):
         library.solve(arm(case_copy, f"[[actuation_points]]\n{keys}\n"))
-
-
-def test_forces_at_points_need_points(case_copy):
-    import ffrobot as library
-
-    with pytest.raises(library.InputError, match=r'apply: expected at least one \[\[actuation_points\]\] for "points"'):
-        library.load_scene(arm(case_copy, ""))
 
 
 def test_forces_that_turn_a_strip_and_hold_it_straight():

@@ -129,37 +129,6 @@ def test_work_of_motors_and_forces_is_what_energies_gain(tmp_path):
         np.testing.assert_allclose(gained, work, atol=2e-3 * lost[-1] + 1e-7 * np.abs(work).max())
 
 
-def test_both_angles_of_a_universal_joint(tmp_path):
-    """Named one after the other; gains are those of the joint, u = P e + D ė of each."""
-    points = {"root": [0.0, 0.0, 0.0], "tip": [0.0, 0.0, 0.5]}
-    body = {
-        "name": "b",
-        "rigid": {"mass": 1.0, "center": [0.0, 0.0, 0.2], "inertia": [0.02, 0.03, 0.01], "points": points},
-    }
-    joint = {
-        "name": "U", "type": "universal", "between": ["ground", "b.root"], "axis": [1.0, 0.0, 0.0],
-        "second_axis": [0.0, 1.0, 0.0], "motor": True,
-    }  # fmt: skip
-    path = {"name": "tip", "point": "b.tip", "x": "0.1*sin(3*t)", "y": "0.1*sin(2*t)"}
-    pd = {"kind": "joint-pid", "proportional": {"U": 20.0}, "derivative": {"U": 1.0}}
-    tables = {
-        "name": "u", "space": "spatial", "gravity": [0.0, 0.0, -9.81], "body": [body], "joint": [joint],
-        "trajectory": [path],
-        "analysis": [HOLD, held("loop", pd, tip="b.tip", feed_forward="none"), held("fed", pd, tip="b.tip")],
-    }  # fmt: skip
-    with solve(tables, tmp_path) as found:
-        about = found.attributes("loop/control")
-        assert list(about["inputs"]) == ["joint/U 1", "joint/U 2"]
-        outputs = list(about["outputs"])
-        e = found["loop/control/reference"] - found["loop/control/readings"]
-        at = {name: e[:, outputs.index(name)] for name in outputs}
-        expected = np.column_stack([20.0 * at[f"joint/U {k}"] + at[f"joint/U {k}/rate"] for k in (1, 2)])
-        np.testing.assert_allclose(found["loop/control/commands"], expected, atol=1e-12)
-        np.testing.assert_allclose(found["loop/joints/U/moment"].shape, (len(found["loop/time"]), 2))
-        assert found["fed/tip_error"].max() < 1e-6 < found["loop/tip_error"].max()
-        assert found.attributes("fed/control")["gain_margin"] > 1
-
-
 MISTAKES = [
     ({"sensor": [{"motor": "waist"}]}, 'sensor no. 1: motor: expected a joint with stiffness .*found "waist"'),
     ({"sensor": [{"modal": "column"}]}, "expected a flexible body"),

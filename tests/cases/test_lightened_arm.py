@@ -6,7 +6,7 @@ import sys
 import gmsh
 import numpy as np
 import pytest
-from checkpoints import CASES, check_motion
+from checkpoints import CASES
 
 from ffrobot.fe_models.modal_body_file import read_modal_body
 from ffrobot.mesh.gmsh_session import gmsh_session
@@ -126,8 +126,3 @@ def test_stress_is_that_of_bending_beside_a_hole(arm):
     nominal = moment * height / 2 / (WIDTHS["forearm"] * height**3 * (1 - 0.6**3) / 12)
     found = group["stress/forearm/surface/von_mises_max"][-1]
     assert nominal.max() < found < 2 * nominal.max()
-
-
-def test_layout(arm):
-    for analysis in ("inverse", "motors_alone"):
-        check_motion(arm.file[analysis], 701, {"upper_arm": 8, "forearm": 8}, {})

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from drawn_arms import drawn_arm, posed
-from patched_arms import ARM, LINK
+from patched_arms import arm
 from rod_chain_3d import Body, RodChain, X, Y, Z, bar
 from scipy.interpolate import CubicSpline
 
@@ -11,35 +11,20 @@ import ffrobot
 from ffrobot.run.solve import solve_scene
 from ffrobot.run.watcher import Watcher
 
-PATH = """
-[[trajectory]]
-name = "tip"
-point = "link.tip"
-y = "0.1*({s})"
-z = "0.25 - 0.15*({s})"
-[[analysis]]
-name = "exact"
-kind = "motors-only"
-end = 0.4
-output_step = 0.01
-tolerance = 1e-6
-[[analysis]]
-name = "again"
-kind = "forward"
-actuation = "exact"
-apply = "joints"
-tolerance = 1e-7
-"""
 S = "10*(t/0.4)**3 - 15*(t/0.4)**4 + 6*(t/0.4)**5"
+PATH = {"name": "tip", "point": "link.tip", "y": f"0.1*({S})", "z": f"0.25 - 0.15*({S})"}
+EXACT = {"name": "exact", "kind": "motors-only", "end": 0.4, "output_step": 0.01, "tolerance": 1e-6}
+AGAIN = {"name": "again", "kind": "forward", "actuation": "exact", "apply": "joints", "tolerance": 1e-7}
+
+
+def scene(*analyses, path=PATH, **tables):
+    return ffrobot.make_scene(**arm(*analyses, trajectory=[path], **tables))
 
 
 @pytest.mark.parametrize("motors", ["section", "frame"])
-def test_moments_carry_the_arm_along_its_path_and_to_rest(motors, tmp_path):
+def test_moments_carry_the_arm_along_its_path_and_to_rest(motors):
     """A link that bends in both planes, yaw and pitch: motors alone keep its tip on the path, and it rests after."""
-    modes = 'count = 2\nfamily = ["in-plane-bending", "out-of-plane-bending"]'
-    (tmp_path / "link.toml").write_text(LINK.format(name="link", length=0.4, modes=modes, height=0.006, width=0.012))
-    (tmp_path / "scene.toml").write_text(ARM.format(motors=motors) + PATH.format(s=S))
-    with ffrobot.solve(tmp_path / "scene.toml") as results:
+    with ffrobot.solve(scene(EXACT, AGAIN, motors=motors)) as results:
         t, tip = results["again/time"], results["again/points/link.tip/position"]
         assert t[0] < -0.03
         assert t[-1] > 0.43
@@ -53,21 +38,15 @@ def test_moments_carry_the_arm_along_its_path_and_to_rest(motors, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "message"),
+    ("path", "message"),
     [
-        ('z = "0.25', '# z = "0.25', "trajectory components as the mechanism has degrees of freedom (2), found 1"),
-        ('y = "0.1*', 'y = "0.1*t + 0*', "expected a path at rest at t = 0 s"),
+        ({k: PATH[k] for k in ("name", "point", "y")}, r"as the mechanism has degrees of freedom \(2\), found 1"),
+        (PATH | {"y": f"0.1*t + 0*({S})"}, "expected a path at rest at t = 0 s"),
     ],
 )
-def test_mistakes(old, new, message, tmp_path):
-    modes = 'count = 2\nfamily = ["in-plane-bending", "out-of-plane-bending"]'
-    (tmp_path / "link.toml").write_text(LINK.format(name="link", length=0.4, modes=modes, height=0.006, width=0.012))
-    text = ARM.format(motors="section") + PATH.format(s=S)
-    assert old in text
-    (tmp_path / "scene.toml").write_text(text.replace(old, new))
-    with pytest.raises(ffrobot.InputError) as error:
-        ffrobot.solve(tmp_path / "scene.toml")
-    assert message in " ".join(str(error.value).split())
+def test_mistakes(path, message):
+    with pytest.raises(ffrobot.InputError, match=message):
+        ffrobot.solve(scene(EXACT, path=path))
 
 
 @pytest.fixture(scope="module")
@@ -101,17 +80,17 @@ def test_moments_carry_an_arm_of_rods_along_the_same_line(leaning_arm):
     column = Body(np.zeros(3), Z, 4.0, 0.2 * Z, np.diag([0.06, 0.06, 0.02]))
     upper = bar(0.5, 0.010, 0.014, 3, np.array([0.0, 0.1, 0.4]), -Y)
     fore = bar(0.4, 0.008, 0.010, 3, 0.5 / 6 * X, axis, payload=0.2)
-    arm = RodChain([column, *upper, *fore], 0.4 / 6 * X, [0, 1, 1 + len(upper)])
+    chain = RodChain([column, *upper, *fore], 0.4 / 6 * X, [0, 1, 1 + len(upper)])
     file, names = leaning_arm.file, ("waist", "shoulder", "elbow")
     t = file["exact/time"][()]
     t = t[t < 0.55]
     found = np.array([file[f"exact/joints/{name}/moment"][: len(t)] for name in names]).T
     guess = [file[f"exact/joints/{name}/coordinate"][0] for name in names]
     target = file["exact/points/fore.tip/position"][: len(t)]
-    q, holding = arm.at_rest(target[0], guess)
+    q, holding = chain.at_rest(target[0], guess)
     np.testing.assert_allclose(holding, found[0], atol=1e-4)  # N·m of 2: the weight alone
     moments = CubicSpline(t, found - found[0] + holding)
-    tip = arm.moved(moments, t, q, damping=0.0)
+    tip = chain.moved(moments, t, q, damping=0.0)
     assert np.linalg.norm(tip - target, axis=1).max() < 0.15e-3
 
 
@@ -174,6 +153,7 @@ def universal_arm(folder):
     return posed(scene, postures, "wrist3.tip", 0.8, folder / "arm.toml", 1e-8), "wrist3.tip"
 
 
+@pytest.mark.nightly
 def test_arm_with_six_joints_and_links_that_bend_and_twist_follows_poses(tmp_path):
     """Place and orientation of the tool, a payload, gravity: the replay in the nonlinear model.
 
@@ -208,23 +188,15 @@ class StopsAfter(Watcher):
         return self.questions > 0 and t < self.time
 
 
-def stopped(tmp_path, watcher, analysis=""):
-    modes = 'count = 2\nfamily = ["in-plane-bending", "out-of-plane-bending"]'
-    (tmp_path / "link.toml").write_text(LINK.format(name="link", length=0.4, modes=modes, height=0.006, width=0.012))
-    path = PATH.format(s=S).partition('[[analysis]]\nname = "again"')[0] + analysis
-    (tmp_path / "scene.toml").write_text(ARM.format(motors="section") + path)
-    return solve_scene(tmp_path / "scene.toml", watcher)
-
-
 @pytest.mark.parametrize("questions", [1, 3, 6])
-def test_stop_before_a_motion_is_found_says_so(questions, tmp_path):
+def test_stop_before_a_motion_is_found_says_so(questions):
     """Before the postures, and in the linearization."""
     with pytest.raises(ffrobot.SolveError, match=r'analysis "exact": stopped on request before any of its motion'):
-        stopped(tmp_path, StopsAfter(questions))
+        solve_scene(scene(EXACT), StopsAfter(questions))
 
 
-def test_stop_keeps_the_motion_that_was_found(tmp_path):
-    run = stopped(tmp_path, StopsAfter(time=0.1), 'output = "redefined"\n').outcomes["exact"]
+def test_stop_keeps_the_motion_that_was_found():
+    run = solve_scene(scene(EXACT | {"output": "redefined"}), StopsAfter(time=0.1)).outcomes["exact"]
     assert run.status == "interrupted"
     assert 0.1 < run.time[-1] < 0.4
     assert np.isfinite(run.q).all()

@@ -9,11 +9,6 @@ import ffrobot
 from ffrobot.common.errors import InputError
 
 
-def in_3d(planar, **keys):
-    spatial = scenes_in_3d.in_3d(planar) | {"pzt": planar["pzt"], "analysis": planar["analysis"]}
-    return spatial | {"initial": {"joints": {"O": 0.0, "A": np.pi / 3}}} | keys
-
-
 def solve(scene, folder, name="scene"):
     return ffrobot.solve(scenes_in_3d.write(scene, folder / f"{name}.toml"))
 

@@ -50,15 +50,6 @@ def wrist(folder, pitch, start):
     return path
 
 
-def test_a_nearly_singular_posture_is_told(tmp_path, ffrobot):
-    path = wrist(tmp_path, "0.0005+0.4*exp(-(4*t)**2)", 0.4005)
-    ffrobot.ok("solve", path)
-    with h5py.File(path.with_suffix(".results.h5")) as file:
-        assert file["inverse"].attrs["status"] == "completed"
-        warnings = list(file["inverse"].attrs["warnings"])
-    assert [text for text in warnings if "nearly a singular posture (ratio 2.5e-04)" in text and '"q1", "q3"' in text]
-
-
 # 6R: yaw, two pitches, a wrist of roll, pitch and roll whose axes meet 0.15 m behind the tip.
 ARM = (("[0, 0, 1]", 0.0), ("[0, 1, 0]", 0.4), ("[0, 1, 0]", 0.35), ("[1, 0, 0]", 0.0), ("[0, 1, 0]", 0.0),
        ("[1, 0, 0]", 0.15))  # fmt: skip

@@ -86,23 +86,6 @@ def test_bodies_and_points(solved):
         close(file[f"inverse/points/{name}/deflection"], [sample["points"][name]["deflection"] for sample in samples])
 
 
-def test_info_and_python_read_them(solved, ffrobot):
-    ffrobot.ok("info", solved[1].filename)
-    with Results(solved[1].filename) as results:
-        np.testing.assert_array_equal(results["inverse/time"], solved[1]["inverse/time"])
-
-
-def test_links_say_what_they_cannot_do(tmp_path, ffrobot):
-    """A link with one family of modes is rigid in the others, which the summary tells."""
-    scene = write_scene("arm3_line_undeformed", tmp_path)
-    link = tmp_path / "fore.toml"
-    text = link.read_text().replace("indices = [1, 2, 3, 4, 5, 6, 11, 14]", "count = 2")
-    link.write_text(text.replace('family = "all"', 'family = "out-of-plane-bending"'))
-    scene.write_text(scene.read_text().replace("tolerance = 1e-08", "tolerance = 1e-5"))
-    done = ffrobot.ok("solve", scene, "--verbose")
-    assert "fore: rigid in in-plane-bending, axial, torsion" in done.stdout.replace("\n", " ")
-
-
 @pytest.mark.parametrize(("family", "is_rigid"), [("axial", True), ("torsion", True), ("in-plane-bending", False)])
 def test_links_say_what_they_cannot_do_in_the_plane(tmp_path, ffrobot, family, is_rigid):
     """Likewise; and nothing is claimed of what modes that are not there would do."""

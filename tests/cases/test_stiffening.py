@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 import scenes_in_3d
 from bodies_by_invariants import from_modal_body as planar_body
-from checkpoints import CASES
 from rod_chain import falling_tip
-from scenes_in_3d import REST, STRAIGHT, TIGHT, TWO_LINK
+from scenes_in_3d import REST
 from scipy.linalg import eigh
 
 import ffrobot
@@ -117,59 +116,6 @@ def test_links_that_bend_far_across_the_plane(tmp_path):
     assert np.abs(tip[:, [0, 2]] - expected).max() < 2e-4
     assert np.abs(tip[:, 1]).max() < 1e-9
     assert np.abs(energy - energy[0]).max() < 1e-6 * exchanged
-
-
-def both(case, analyses, guess, folder, payload=None, geometric_stiffening=True):
-    """Results of a planar scene with geometric stiffening, and of the same in 3D."""
-    keys = {"geometric_stiffening": geometric_stiffening, "analysis": analyses}
-    planar = scenes_in_3d.read(CASES / case / "scene.toml") | keys
-    planar.pop("pzt", None)
-    spatial = scenes_in_3d.in_3d(planar) | {"initial": {"joints": guess}} | keys
-    if payload is not None:
-        planar["payload"] = spatial["payload"] = [payload]
-    return [
-        ffrobot.solve(scenes_in_3d.write(tables, folder / f"{name}.toml"))
-        for name, tables in (("planar", planar), ("spatial", spatial))
-    ]
-
-
-@pytest.mark.parametrize("stiffened", [False, True])
-def test_two_links_bend_as_those_of_the_plane(stiffened, tmp_path):
-    """How far, how much loads change their stiffness, what that may do to results, and what is said of it.
-
-    In motion the largest values are those of steps, which plane and space end at other times.
-    """
-    planar, spatial = both("two_link", [TIGHT, STRAIGHT, REST], TWO_LINK, tmp_path, geometric_stiffening=stiffened)
-    with planar, spatial:
-        for analysis, rel in (("inverse", 1e-3), ("straight", 1e-3), ("rest", 1e-7)):
-            effects = [of.attributes(analysis)["stiffening_effect"] for of in (spatial, planar)]
-            assert effects[0] == pytest.approx(effects[1], rel=rel)
-            for link in ("link1", "link2"):
-                found, expected = (of.attributes(f"{analysis}/bodies/{link}") for of in (spatial, planar))
-                for key in WRITTEN:
-                    assert found[key] == pytest.approx(expected[key], rel=rel, abs=1e-15), (analysis, link, key)
-            _same_errors(spatial, planar, analysis, rel)
-        told = [
-            {name: [text for text in texts if "bends by" in text] for name, texts in of.warnings.items()}
-            for of in (spatial, planar)
-        ]
-    assert told[0] == told[1]
-    assert bool(told[0]["inverse"]) == (not stiffened)  # loads change their stiffness by more than 1 %
-
-
-WRITTEN = (
-    "largest_deflection", "largest_rotation", "foreshortening", "foreshortening_moment", "stiffness_change",
-)  # fmt: skip
-
-
-def _same_errors(spatial, planar, analysis, rel):
-    """In motion the worst link sets the relative error of all in 3D; in 2D each has its own."""
-    errors = [
-        [of.attributes(f"{analysis}/bodies/{link}")["relative_error"] for link in ("link1", "link2")]
-        for of in (spatial, planar)
-    ]
-    expected = errors[1] if analysis == "rest" else [max(errors[1])] * 2
-    np.testing.assert_allclose(errors[0], expected, rtol=rel, atol=1e-15)
 
 
 def test_how_far_a_cantilever_bends_in_an_oblique_plane(tmp_path):
