@@ -105,10 +105,9 @@ def _inversion(run: Outcome, around: AroundPath) -> str:
 
 def _stresses(name: str, result: AnalysisResult) -> Iterator[tuple[str, Cells]]:
     """The largest stress of each body, at outputs and between."""
-    closest = result.closer or result
-    for body, stress in closest.stresses.items():
+    for body, stress in result.histories.stresses.items():
         value, k, place = stress.largest()
-        most, at, by = f"{value / 1e6:.4g}", f"{closest.run.time[k]:g}", stress.recovery.method
+        most, at, by = f"{value / 1e6:.4g}", f"{result.histories.run.time[k]:g}", stress.recovery.method
         yield (
             name,
             {"of": body, "largest von Mises (MPa)": most, "at": place, "t (s)": at, "by": by},

@@ -66,9 +66,7 @@ def write_structure(group: h5py.Group, effects: Mapping[str, StructureEffect]) -
 
 
 def _write_layout(group: h5py.Group, patches: PatchArray, voltages: Voltages, unmet: Array) -> None:
-    """Of one layout, and the modal forces `unmet` (T, n) that it leaves."""
-    group["voltage"] = voltages.within_limit
-    group["required_voltage"] = voltages.required
+    """Of one layout what has no peaks, and the modal forces `unmet` (T, n) that it leaves."""
     group["residual"] = voltages.residual
     group["edges"] = patches.edges
     group["moment_per_volt"] = patches.moment_per_volt
@@ -131,8 +129,7 @@ def read_unsupplied(group: h5py.Group) -> Unsupplied | None:
 
 
 def write_point_forces(group: h5py.Group, points: PointSet, forces: PointForces, space: Space) -> None:
-    """Of the actuation points of one body, what the `space` of the scene has."""
-    group["force"] = forces.force
+    """Of the actuation points of one body what has no peaks, as far as the `space` of the scene has it."""
     group["residual"] = forces.residual
     group["residual_force"] = forces.unmet
     group["position"] = space.along(np.array([point.position for point in points.points]))

@@ -9,10 +9,9 @@ from typing import TYPE_CHECKING
 import h5py
 import numpy as np
 
-from ..common.arrays import Array
+from ..common.arrays import Array, Indices
 from ..mbs.model.model import path_errors
 from ..mbs.model.truncation import modes_kept
-from ..mbs.quantities.motion import RobotMotion
 from ..mbs.quantities.stress import BodyStress, Recovery, SectionLoads, mode_displacement
 from ..mbs.quantities.validity import Bending
 from ..mbs.scene.trajectories import Trajectory
@@ -45,7 +44,8 @@ def write_bodies(group: h5py.Group, solution: Solution, result: AnalysisResult) 
             group[f"bodies/{name}"].attrs["pieces"] = len(solution.divided[name].names)
         for label in points:
             for key, values in motion.point(f"{name}.{label}").within(motion.space).datasets.items():
-                group[f"points/{name}.{label}/{key}"] = values
+                if key != "deflection":  # which has peaks
+                    group[f"points/{name}.{label}/{key}"] = values
 
 
 def write_bending(group: h5py.Group, links: Mapping[str, Bending]) -> None:
@@ -82,22 +82,21 @@ def read_recovery(group: h5py.Group, body: str) -> Recovery:
     return Recovery(str(entry.attrs["method"]), entry["modal"][()], names, entry["loads"][()], sections)
 
 
-def write_stress(group: h5py.Group, stress: BodyStress) -> None:
-    """Of one body, at its stress points and on its surface, and what they were computed from."""
-    group.attrs["method"] = stress.recovery.method
-    group["modal"] = stress.recovery.modal
-    group["loads"] = stress.recovery.sizes
-    group["loads"].attrs.create("columns", list(stress.recovery.loads), dtype=h5py.string_dtype())
-    if stress.recovery.sections is not None:
-        for key, values in vars(stress.recovery.sections).items():
+def write_stress(group: h5py.Group, stress: BodyStress, outputs: Indices) -> None:
+    """Of one body, at its stress points and on its surface at `outputs`, and what they were computed from."""
+    recovery = stress.recovery.at(outputs)
+    group.attrs["method"] = recovery.method
+    group["modal"] = recovery.modal
+    group["loads"] = recovery.sizes
+    group["loads"].attrs.create("columns", list(recovery.loads), dtype=h5py.string_dtype())
+    if recovery.sections is not None:
+        for key, values in vars(recovery.sections).items():
             group[f"layers/{key}"] = values
     for name, point in stress.points.items():
-        for key, values in vars(point).items():
-            group[f"points/{name}/{key}"] = values
+        group[f"points/{name}/stress"] = point.stress[outputs]
         group[f"points/{name}/stress"].attrs["columns"] = ["xx", "yy", "zz", "yz", "xz", "xy"]
     if stress.surface is not None:
-        for key, values in vars(stress.surface).items():
-            group[f"surface/{key}"] = values
+        group["surface/position_of_max"] = stress.surface.position_of_max[outputs]
 
 
 def write_paths(group: h5py.Group, result: AnalysisResult) -> None:
@@ -111,8 +110,6 @@ def write_paths(group: h5py.Group, result: AnalysisResult) -> None:
         entry = group.create_group(f"trajectories/{trajectory.name}")
         if errors:
             entry["error"] = errors[trajectory.name]
-        else:
-            entry["force"] = motion.path_force(trajectory.name)
         entry.attrs["components"] = list(trajectory.force_components)
         if functions := list(trajectory.components.values()):
             entry["target"] = np.stack([function.sample(inside)[0] for function in functions], axis=1)
@@ -144,34 +141,16 @@ def _write_path(entry: h5py.Group, trajectory: Trajectory) -> None:
 
 
 def write_joints(group: h5py.Group, solution: Solution, result: AnalysisResult) -> None:
-    """Of an analysis: joints/."""
-    motion, motors = result.motion, solution.scene.motor_joints
+    """Of an analysis: joints/, what has no peaks."""
+    motion = result.motion
     for joint in solution.scene.joint:
         entry = group.create_group(f"joints/{joint.name}")
         entry.attrs["type"] = joint.type
-        acting = result.reactions[joint.name]
-        entry["reaction"] = motion.space.along(acting.force)
-        if not (motion.space.is_plane and joint.type == "revolute"):  # it carries no moment about its axis
-            entry["reaction_moment"] = motion.space.about(acting.moment)
         if result.sharing is not None and joint.name in result.sharing.components:
             entry.attrs["indeterminate"] = list(result.sharing.components[joint.name])
         if (found := motion.joint(joint.name)) is not None:
-            entry["coordinate"], entry["rate"] = (
-                np.squeeze(values, 1) if len(joint.units) == 1 else values for values in found
-            )
-        moment = motion.motor_moments.get(joint.name)
-        if moment is not None and joint in motors:
-            entry["moment"] = np.squeeze(moment, 1) if len(joint.units) == 1 else moment
-            if joint.given_gear_ratio is not None:
-                entry["motor_moment"] = entry["moment"][()] / joint.given_gear_ratio
-        _write_gear(entry, motion, joint.name)
-
-
-def _write_gear(entry: h5py.Group, motion: RobotMotion, joint: str) -> None:
-    """What a compliant gear adds to a joint."""
-    if (motor := motion.motor_motion(joint)) is not None:
-        entry["motor_angle"], entry["motor_rate"] = motor
-    if (moment := motion.gear_moment(joint)) is not None:
-        entry["gear_moment"] = moment
-    if (gear := motion.gears.get(joint)) is not None:
-        entry.attrs["unresolved"] = gear.unresolved
+            entry["coordinate"] = np.squeeze(found[0], 1) if len(joint.units) == 1 else found[0]
+        if (motor := motion.motor_motion(joint.name)) is not None:
+            entry["motor_angle"] = motor[0]
+        if (gear := motion.gears.get(joint.name)) is not None:
+            entry.attrs["unresolved"] = gear.unresolved

@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING
 
 import h5py
 import numpy as np
 
-from ..common.arrays import Array, as_floats
+from ..common.arrays import Array, Indices, as_floats
 from ..common.peaks import largest, shares
 from .meanings import matches, meaning
 
-PEAKING = (
-    "points/*/deflection", "joints/*/rate", "joints/*/moment", "joints/*/motor_moment", "joints/*/motor_rate",
-    "joints/*/gear_moment", "joints/*/reaction", "joints/*/reaction_moment", "pzt/*/voltage", "pzt/*/required_voltage",
-    "trajectories/*/force", "actuation_points/*/force", "stress/*/points/*/von_mises", "stress/*/surface/von_mises_max",
-)  # fmt: skip
-"""Datasets with peaks: of each column, of vectors of the length; the moment in a joint of the plane is its own."""
+if TYPE_CHECKING:  # reading can do without the core
+    from ..mbs.joints.joint import JointRecord
+    from ..run.solution import Histories, Solution
 
 VOLTAGE = "pzt/*/voltage"
 
@@ -24,17 +22,46 @@ POWER = "peak_power"
 """Attribute of a joint with one coordinate: the largest power of its motor, W."""
 
 
-def write_peaks(group: h5py.Group, write: Callable[[h5py.Group], None] | None) -> None:
-    """Attributes `peak`, `peak_time`, `rms` of the histories of an analysis, each of every column or of the length.
+def peaking(solution: Solution, of: Histories) -> Iterator[tuple[str, Array]]:
+    """Name in its analysis and values (T, …) of all that has peaks; the moment in a joint of the plane is its own."""
+    motion, space = of.motion, of.motion.space
+    for body, labels in motion.points.items():
+        for point in (f"{body}.{label}" for label in labels):
+            yield f"points/{point}/deflection", space.along(motion.deflection(point))
+    for joint in solution.scene.joint:
+        for key, values in _of_joint(solution, of, joint):
+            yield f"joints/{joint.name}/{key}", values
+    for trajectory in motion.followed:
+        yield f"trajectories/{trajectory.name}/force", motion.path_force(trajectory.name)
+    for body, forces in of.point_forces.items():
+        yield f"actuation_points/{body}/force", forces.force
+    for body, stress in of.stresses.items():
+        for point, at in stress.points.items():
+            yield f"stress/{body}/points/{point}/von_mises", at.von_mises
+        if stress.surface is not None:
+            yield f"stress/{body}/surface/von_mises_max", stress.surface.von_mises_max
+    for name, voltages in ({} if of.actuation is None else of.actuation.voltages).items():
+        yield f"pzt/{name}/voltage", voltages.within_limit
+        yield f"pzt/{name}/required_voltage", voltages.required
 
-    `write` writes the same analysis at closer times to a group; None where there are none.
-    """
-    if write is None:
-        _write(group, group)
-        return
-    with h5py.File("closer", "w", driver="core", backing_store=False) as file:
-        write(file)
-        _write(group, file)
+
+def _of_joint(solution: Solution, of: Histories, joint: JointRecord) -> Iterator[tuple[str, Array]]:
+    motion, acting, is_single = of.motion, of.reactions[joint.name], len(joint.units) == 1
+    yield "reaction", motion.space.along(acting.force)
+    if not (motion.space.is_plane and joint.type == "revolute"):  # it carries no moment about its axis
+        yield "reaction_moment", motion.space.about(acting.moment)
+    if (found := motion.joint(joint.name)) is not None:
+        yield "rate", np.squeeze(found[1], 1) if is_single else found[1]
+    moment = motion.motor_moments.get(joint.name)
+    if moment is not None and joint in solution.scene.motor_joints:
+        moment = np.squeeze(moment, 1) if is_single else moment
+        yield "moment", moment
+        if joint.given_gear_ratio is not None:
+            yield "motor_moment", moment / joint.given_gear_ratio
+    if (motor := motion.motor_motion(joint.name)) is not None:
+        yield "motor_rate", motor[1]
+    if (moment := motion.gear_moment(joint.name)) is not None:
+        yield "gear_moment", moment
 
 
 def peak_of(dataset: h5py.Dataset, time: Array, column: int | None = None) -> tuple[float, float]:
@@ -50,33 +77,28 @@ def peak_of(dataset: h5py.Dataset, time: Array, column: int | None = None) -> tu
     return float(peaks[k]), float(times[k])
 
 
-def _write(group: h5py.Group, closer: h5py.Group) -> None:
-    time = closer["time"][()]
-    for name, values in _histories(closer, len(time)):
-        if name in group and len(time):
-            tops = np.array([largest(time, column) for column in values.T])
+def write_peaks(group: h5py.Group, time: Array, found: Mapping[str, Array], outputs: Indices) -> None:
+    """To an analysis histories `found` at `time` (T,), s: those of them that are outputs, and peaks of all.
+
+    Attributes `peak`, `peak_time`, `rms` are of every column, of vectors of the length.
+    """
+    for name, values in found.items():
+        dataset = group.create_dataset(name, data=values[outputs])
+        if len(time):
+            columns = as_floats(values.reshape(len(time), -1))
+            columns = np.linalg.norm(columns, axis=1, keepdims=True) if _is_vector(name) else columns
+            tops = np.array([largest(time, column) for column in columns.T])
             if matches(name, VOLTAGE):  # cut off at its limit, it has no smooth top there
-                limit = group[name].parent.attrs.get("limit", np.inf)
-                tops[:, 0] = np.minimum(tops[:, 0], np.maximum(np.abs(values).max(axis=0), limit))
-            means = np.sqrt(shares(time) @ values**2)
-            single = values.shape[1] == 1
-            attributes = group[name].attrs
-            for key, found in (("peak", tops[:, 0]), ("peak_time", tops[:, 1]), ("rms", means)):
-                attributes[key] = found[0] if single else found
-    for name, joint in closer.get("joints", {}).items():
-        rate = joint.get("motor_rate", joint.get("rate"))
-        if "moment" in joint and rate is not None and rate.ndim == 1 and len(time):
-            group[f"joints/{name}"].attrs[POWER] = largest(time, joint["moment"][()] * rate[()])[0]
-
-
-def _histories(group: h5py.Group, count: int) -> Iterator[tuple[str, Array]]:
-    """Name and values (T, columns) of what has peaks."""
-    names: list[str] = []
-    group.visit(names.append)
-    for name in names:
-        if any(matches(name, pattern) for pattern in PEAKING) and (found := group[name]).shape[0] == count:
-            values = as_floats(found[()].reshape(count, -1))
-            yield name, np.linalg.norm(values, axis=1, keepdims=True) if _is_vector(name) else values
+                limit = dataset.parent.attrs.get("limit", np.inf)
+                tops[:, 0] = np.minimum(tops[:, 0], np.maximum(np.abs(columns).max(axis=0), limit))
+            means = np.sqrt(shares(time) @ columns**2)
+            for key, sizes in (("peak", tops[:, 0]), ("peak_time", tops[:, 1]), ("rms", means)):
+                dataset.attrs[key] = sizes[0] if len(sizes) == 1 else sizes
+    for name, joint in group.get("joints", {}).items():
+        of = f"joints/{name}/"
+        moment, rate = found.get(of + "moment"), found.get(of + "motor_rate", found.get(of + "rate"))
+        if moment is not None and rate is not None and rate.ndim == 1 and len(time):
+            joint.attrs[POWER] = largest(time, moment * rate)[0]
 
 
 def _is_vector(name: str) -> bool:

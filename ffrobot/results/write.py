@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Sequence
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -30,7 +29,7 @@ from .actuators import (
 from .file import FORMAT
 from .linear import write_joint_conditions, write_linear, write_loop
 from .motion import write_bending, write_bodies, write_joints, write_paths, write_stress
-from .peaks import write_peaks
+from .peaks import peaking, write_peaks
 from .resume import write_state
 
 FORMAT_VERSION = 1
@@ -55,9 +54,7 @@ def results_image(solution: Solution) -> bytes:
     with h5py.File("results", "w", driver="core", backing_store=False) as file:
         _write_head(file, solution)
         for name, result in solution.analyses.items():
-            group, closer = file.create_group(name), result.closer
-            _write_analysis(group, solution, result)
-            write_peaks(group, None if closer is None else partial(_write_peaking, solution=solution, result=closer))
+            _write_analysis(file.create_group(name), solution, result)
         if (run := solution.unread) is not None:
             _write_run(file.create_group(run.analysis.name), run, run.statistics.warnings, ())
         write_state(file, solution)
@@ -109,26 +106,19 @@ def _write_analysis(group: h5py.Group, solution: Solution, result: AnalysisResul
         write(group, motion, run.details)
 
 
-def _write_peaking(group: h5py.Group, solution: Solution, result: AnalysisResult) -> None:
-    """Of an analysis what has peaks."""
-    group["time"], motion = result.run.time, result.motion
-    for body, labels in motion.points.items():
-        for point in (f"{body}.{label}" for label in labels):
-            group[f"points/{point}/deflection"] = motion.space.along(motion.deflection(point))
-    _write_forces(group, solution, result)
-
-
 def _write_forces(group: h5py.Group, solution: Solution, result: AnalysisResult) -> None:
-    """Of an analysis: joints/, trajectories/, actuation_points/, stress/ and pzt/."""
+    """Of an analysis: joints/, trajectories/, actuation_points/, stress/ and pzt/, and all that has peaks."""
+    histories = result.histories
     write_joints(group, solution, result)
     for body, forces in result.point_forces.items():
         points = group.create_group(f"actuation_points/{body}")
         write_point_forces(points, solution.points[body], forces, result.motion.space)
-    for body, stress in result.stresses.items():
-        write_stress(group.create_group(f"stress/{body}"), stress)
+    for body, stress in histories.stresses.items():
+        write_stress(group.create_group(f"stress/{body}"), stress, histories.outputs)
     write_paths(group, result)
     if result.actuation is not None:
         write_voltages(group, solution, result.actuation)
+    write_peaks(group, histories.run.time, dict(peaking(solution, histories)), histories.outputs)
 
 
 def _write_run(group: h5py.Group, outcome: Outcome, warnings: Sequence[str], notes: Sequence[str]) -> None:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..common.arrays import Array
+from ..common.arrays import Array, Indices
 from ..fe_models.modal_body import ModalBody
 from ..mbs.analysis.gears import unresolved_gears
 from ..mbs.analysis.outcome import EarlierRun, Outcome
@@ -75,37 +75,65 @@ class FinerCheck:
 
 
 @dataclass(frozen=True)
+class Histories:
+    """What has peaks, at outputs of an analysis and at times between them.
+
+    Attributes:
+        run, motion: at these times.
+        outputs: (T,) which of the times are outputs.
+        reactions: forces in joints by name.
+        actuation: what patches have to do, and whether motors and patches can; None where nothing is prescribed.
+        stresses: by body, where modal body files hold modal stresses.
+        point_forces: at actuation points, by body.
+    """
+
+    run: Outcome
+    motion: RobotMotion
+    outputs: Indices
+    reactions: Mapping[str, Wrench]
+    actuation: Actuation | None
+    stresses: Mapping[str, BodyStress]
+    point_forces: Mapping[str, PointForces]
+
+
+@dataclass(frozen=True)
 class AnalysisResult:
     """What was computed of one analysis.
 
     Attributes:
         run: how it went, and states.
         motion: what is read off them.
-        reactions: forces in joints by name.
         energies, momentum: of the robot.
-        actuation: what patches have to do, and whether motors and patches can; None where nothing is prescribed.
-        stresses: by body, where modal body files hold modal stresses.
+        histories: what has peaks.
         point_forces: at actuation points, by body.
         check: what a replay on finer links found, where that is asked for.
         bending: how far flexible bodies leave small deformations, and what loads do to their stiffness.
         sharing: reactions that redundant constraints leave open; None where there are none.
         predicted_shift: by point, (T, 3) m: what voltages within their limits leave undone.
-        closer: the same at the outputs and between, from which all peaks are; None where nothing is between.
     """
 
     run: Outcome
     motion: RobotMotion
-    reactions: Mapping[str, Wrench]
     energies: Energies
     momentum: Momentum
-    actuation: Actuation | None
-    stresses: Mapping[str, BodyStress] = field(default_factory=dict)
+    histories: Histories = field(repr=False)
     point_forces: Mapping[str, PointForces] = field(default_factory=dict)
     check: FinerCheck | None = None
     bending: Mapping[str, Bending] = field(default_factory=dict)
     sharing: Sharing | None = None
     predicted_shift: Mapping[str, Array] = field(default_factory=dict)
-    closer: AnalysisResult | None = field(default=None, repr=False)
+
+    @cached_property
+    def reactions(self) -> Mapping[str, Wrench]:
+        """Forces in joints by name."""
+        of, outputs = self.histories.reactions, self.histories.outputs
+        return {joint: Wrench(acting.force[outputs], acting.moment[outputs]) for joint, acting in of.items()}
+
+    @cached_property
+    def actuation(self) -> Actuation | None:
+        """What patches have to do, and whether motors and patches can; None where nothing is prescribed."""
+        found = self.histories.actuation
+        return None if found is None else found.at(self.histories.outputs)
 
     @property
     def analysis(self) -> Analysis:

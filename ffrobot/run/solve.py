@@ -8,13 +8,13 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..actuation.context import ActuatedContext
-from ..actuation.points import forces_at_points, solve_points
-from ..common.arrays import Array
+from ..actuation.points import PointForces, forces_at_points, solve_points
+from ..common.arrays import Array, Indices
 from ..common.errors import FfrobotError, InputError, SolveError, of_file
 from ..mbs.analysis.outcome import Outcome
 from ..mbs.quantities.energy import totals
@@ -37,7 +37,7 @@ from .prepare import (
     with_scene,
     with_stiffening,
 )
-from .solution import AnalysisResult, Solution
+from .solution import AnalysisResult, Histories, Solution
 from .stresses import find_stresses
 from .watcher import Interruption, Watcher
 from .whole_links import make_whole_links
@@ -171,7 +171,7 @@ def _run_all(solution: Solution, interruption: Interruption) -> Solution | None:
             return replace(solution, analyses=results, seconds=seconds, failure=error)
         try:
             with of_file(solution.scene.path):
-                result = _with_peaks(solution, run)
+                result = _result(solution, run)
         except Exception as error:  # raised once the integration is kept
             return _unread(replace(solution, analyses=results, seconds=seconds), run, error)
         automatic = solution.scene.geometric_stiffening == "auto" and not solution.stiffened
@@ -225,20 +225,20 @@ def _context(
     )
 
 
-def _with_peaks(solution: Solution, run: Outcome) -> AnalysisResult:
-    """What is read off a run; what is judged by peaks, by those between outputs."""
-    moving, closer, between = _moving(solution, run), run.closer, None
-    twists = {joint: gear.curve for joint, gear in moving.motion.gears.items()}  # splines through outputs
+def _result(solution: Solution, run: Outcome) -> AnalysisResult:
+    """What is read off a run; what has peaks at its outputs and between, as far as that is known."""
+    motion, sharing = _moving(solution, run)
+    twists = {joint: gear.curve for joint, gear in motion.gears.items()}  # splines through outputs
     known = {joint: curve for joint, curve in twists.items() if curve is not None}
-    if closer is not run and len(known) == len(twists):
-        among = _moving(solution, closer, known)
-        between = _evaluated(solution, closer, among, _actuation(solution, closer, among.motion))
-        actuation = between.actuation and between.actuation.at(np.searchsorted(closer.time, run.time))
-    else:
-        actuation = _actuation(solution, run, moving.motion)
-    found = _evaluated(solution, run, moving, actuation)
-    bending = bending_of_links(solution, (between or found).motion)
-    return replace(found, predicted_shift=_predicted_shift(solution, found), bending=bending, closer=between)
+    closest, among = run, motion
+    if run.closer is not run and len(known) == len(twists):
+        closest, among = run.closer, _moving(solution, run.closer, known)[0]
+    histories = _histories(solution, closest, among, np.searchsorted(closest.time, run.time))
+    found = AnalysisResult(
+        run, motion, *totals(motion), histories, sharing=sharing, bending=bending_of_links(solution, among),
+        point_forces=histories.point_forces if closest is run else _point_forces(solution, run),
+    )  # fmt: skip
+    return replace(found, predicted_shift=_predicted_shift(solution, found))
 
 
 def _predicted_shift(solution: Solution, found: AnalysisResult) -> dict[str, Array]:
@@ -262,19 +262,16 @@ def _predicted_shift(solution: Solution, found: AnalysisResult) -> dict[str, Arr
     return quasi_static_shift(motion, forces, points)
 
 
-class _Moving(NamedTuple):
-    motion: MotionOfLinks
-    sharing: Sharing | None
-
-
-def _moving(solution: Solution, run: Outcome, twists: Mapping[str, BSpline] | None = None) -> _Moving:
+def _moving(
+    solution: Solution, run: Outcome, twists: Mapping[str, BSpline] | None = None
+) -> tuple[MotionOfLinks, Sharing | None]:
     """The motion of a run, with its forces; `twists` of compliant gears where they are known."""
     forces = run.forces
     found = MotionOfLinks(
         run.model, run.time, run.q, run.v, run.a, run.multipliers, forces.required, run.motion.is_at_rest,
         forces.applied, forces.commanded, twists or {}, divided_links(solution),
     )  # fmt: skip
-    return _Moving(*shared_evenly(found))
+    return shared_evenly(found)
 
 
 def _actuation(solution: Solution, run: Outcome, motion: MotionOfLinks) -> Actuation | None:
@@ -292,18 +289,18 @@ def _actuation(solution: Solution, run: Outcome, motion: MotionOfLinks) -> Actua
     return actuation
 
 
-def _evaluated(solution: Solution, run: Outcome, moving: _Moving, actuation: Actuation | None) -> AnalysisResult:
-    """What is read off a run with its motion."""
-    motion, sharing = moving
+def _histories(solution: Solution, run: Outcome, motion: MotionOfLinks, outputs: Indices) -> Histories:
     whole = {name: body for name, body in solution.bodies.items() if name not in solution.divided}
-    stresses = find_stresses(motion, whole, solution.patches)
-    at_points = {}
-    if run.analysis.allocates_patches and any(row.is_trajectory for row in run.model.rows):
-        at_points = {name: solve_points(points, run) for name, points in solution.points.items()}
-    return AnalysisResult(
-        run, motion, reactions(motion), *totals(motion), actuation, stresses, at_points,
-        sharing=sharing,
+    return Histories(
+        run, motion, outputs, reactions(motion), _actuation(solution, run, motion),
+        find_stresses(motion, whole, solution.patches), _point_forces(solution, run),
     )  # fmt: skip
+
+
+def _point_forces(solution: Solution, run: Outcome) -> dict[str, PointForces]:
+    if run.analysis.allocates_patches and any(row.is_trajectory for row in run.model.rows):
+        return {name: solve_points(points, run) for name, points in solution.points.items()}
+    return {}
 
 
 def _log(outcome: Outcome) -> None:

@@ -151,6 +151,8 @@ class RobotMotion:
     @cached_property
     def cut(self) -> list[tuple[CutCoordinate, CutMotion]]:
         """Coordinates of joints at which loops are cut."""
+        if not self.model.cut:  # saves the motion of all frames
+            return []
         motions = cut_motions(self.model, self.q, self.v, self.time, self.frames)
         return list(zip(self.model.cut, motions, strict=True))
 
