@@ -23,10 +23,11 @@ if TYPE_CHECKING:
 
 def write_bodies(group: h5py.Group, solution: Solution, result: AnalysisResult) -> None:
     """Of an analysis: bodies/ and points/; modes of planar scenes are those that move in the plane."""
-    motion = result.motion
+    motion, histories = result.motion, result.histories
+    forces = histories.motion.motor_forces
     for name, points in motion.points.items():
         body, moved = solution.bodies[name].spatial, motion.body(name)
-        F_p, T = None if motion.motor_forces is None else motion.motor_forces.modal[name], body.modal_transform
+        F_p, T = None if forces is None else forces.modal[name][histories.outputs], body.modal_transform
         about = "modes of the modal body file"
         if motion.space.is_plane and T.shape[1] < T.shape[0]:  # of those that move in the plane
             group[f"bodies/{name}/modal_transform"] = T

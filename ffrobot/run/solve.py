@@ -246,9 +246,9 @@ def _predicted_shift(solution: Solution, found: AnalysisResult) -> dict[str, Arr
 
     None where the joints of whole links cannot say how the pieces move.
     """
-    motion = found.motion
-    forces = {} if found.actuation is None else missing_forces(motion, found.actuation)
-    if not forces:
+    motion, of = found.motion, found.histories
+    missing = {} if of.actuation is None else missing_forces(of.motion, of.actuation)
+    if not missing:
         return {}
     from ..actuation.feasibility import quasi_static_shift
 
@@ -259,7 +259,7 @@ def _predicted_shift(solution: Solution, found: AnalysisResult) -> dict[str, Arr
         except InputError:
             return {}
         motion = RobotMotion(as_links.model, as_links.time, as_links.q, as_links.v, as_links.a, as_links.multipliers)
-    return quasi_static_shift(motion, forces, points)
+    return quasi_static_shift(motion, {name: forces[of.outputs] for name, forces in missing.items()}, points)
 
 
 def _moving(

@@ -11,6 +11,7 @@ from __future__ import annotations
 import copy
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TypeVar
 
 import numpy as np
@@ -54,7 +55,7 @@ class Model:
         """(rows,) which rows close loops."""
         return np.array([not row.is_trajectory for row in self.rows], dtype=bool)
 
-    @property
+    @cached_property
     def motors(self) -> dict[str, Array]:
         """By joint with motors: indices in v of its coordinates, in the scene's order."""
         return {joint.name: _in_order(self.driven(joint.name)) for joint in self.scene.motor_joints}

@@ -20,7 +20,7 @@ from ..model.body import bent_section
 from ..model.cut import CutCoordinate
 from ..model.cut_motion import CutMotion, cut_motions
 from ..model.drives import Drives, PointDrive
-from ..model.gears import with_compliance
+from ..model.gears import compliance, with_compliance
 from ..model.known_motion import MotionForces, motion_forces, row_accelerations
 from ..model.masses import turns_as_a_body
 from ..model.model import Model, row_values, target_rates
@@ -315,7 +315,8 @@ class RobotMotion:
     @property
     def gears(self) -> Mapping[str, GearMotion]:
         """By joint, of inverse analyses and equilibria with compliant gears."""
-        return {} if self._supplied is None else self._supplied.gears
+        are_rigid = all(compliance(node) is None for node in self.model.tree.nodes)
+        return {} if are_rigid or self._supplied is None else self._supplied.gears
 
     @cached_property
     def behind_gears(self) -> RobotMotion:

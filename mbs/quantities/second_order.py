@@ -14,6 +14,8 @@ none left (Bathe, Finite Element Procedures, §6.8.2, linearised buckling).
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -42,7 +44,8 @@ class LoadedPoint(NamedTuple):
     K: Array
 
 
-class ModalLoads(NamedTuple):
+@dataclass(frozen=True)
+class ModalLoads:
     """Loads of sizes f (T, J) with geometric stiffness K (J, n, n), on modes of stiffness K_ff (n,).
 
     `held`: where the inner joint carries the link; rotations that the joint leaves free are 0 there.
@@ -54,17 +57,17 @@ class ModalLoads(NamedTuple):
     points: tuple[LoadedPoint, ...] = ()
     held: LoadedPoint | None = None
 
-    @property
+    @cached_property
     def relative(self) -> Array:
         """(J, n, n) K_ff^-½ K K_ff^-½."""
         root = 1 / np.sqrt(self.stiffness)
         return as_floats(self.K * root * root[:, None])
 
-    @property
+    @cached_property
     def squares(self) -> Array:
         """(T,) squares of the Frobenius norms of K_ff^-½ S K_ff^-½."""
         flat = self.relative.reshape(len(self.K), -1)
-        return as_floats(np.maximum(np.einsum("tj,jk,tk->t", self.f, flat @ flat.T, self.f, optimize=True), 0.0))
+        return as_floats(np.maximum(((self.f @ (flat @ flat.T)) * self.f).sum(axis=1), 0.0))
 
 
 def stiffness_change(loads: ModalLoads) -> StiffnessChange:
