@@ -1,4 +1,9 @@
-"""Keys of link files of beams, as tests of all parts write them."""
+"""Keys of link files of beams, as tests of all parts write them, and their modal bodies."""
+
+from pathlib import Path
+
+from ffrobot.fe_models.link import cached_modal_body
+from ffrobot.fe_models.link_file import LinkTable
 
 
 def rectangle(height, width):
@@ -21,3 +26,15 @@ def beam_link(length, section, elements, *, E=70e9, nu=0.33, rho=2700.0, conditi
     if condition is not None:
         found["reference"] = {"condition": condition}
     return found | keys
+
+
+def paper_link(condition="cantilever", count=10, family="in-plane-bending", *, attachment_modes=False, **keys):
+    """A steel link of the paper's manipulator, 1 m long."""
+    modes = {"count": count, "family": family, "attachment_modes": attachment_modes}
+    section = rectangle(0.015, 0.025)
+    return beam_link(1.0, section, 20, E=2.068427e11, nu=0.3, rho=7850.0, condition=condition, modes=modes) | keys
+
+
+def modal_body(keys):
+    """By stage 1, of the keys of a link file."""
+    return cached_modal_body(LinkTable({"name": "link"} | keys, Path("link.toml"))).body

@@ -23,7 +23,7 @@ from ffrobot.mesh import form_cache
 
 pytest_plugins = ["costs"]
 MANY_SEEDS = 6
-TOGETHER = {"stress": "tests/stress/", "cases": ("tests/references/test_references", "tests/results/test_summary")}
+TOGETHER = {"cases": ("tests/references/test_references", "tests/results/test_summary")}
 CASES = Path(__file__).parent.parent / "cases"
 STUDIES = ("sweep", "sensitivity", "uncertainty", "optimise")
 OTHER_COMMAND = os.environ.get("FFROBOT_COMMAND")  # an older version's, to see whether a test fails there
@@ -120,7 +120,7 @@ def pytest_runtest_protocol(item):
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_make_scheduler(config, log):
-    """With --dist loadfile some files go as one: those of tests/stress fill a table, two solve all cases."""
+    """With --dist loadfile two files go as one: both solve all cases."""
     from xdist.scheduler import LoadFileScheduling
 
     class Scheduling(LoadFileScheduling):

@@ -2,22 +2,19 @@
 
 import numpy as np
 import pytest
+from beam_links import modal_body, paper_link
 from patches_on_links import SCENE, on_link, planar_body
 
 from ffrobot.actuation.patches.link_patches import check_reach, on_kept_modes
 from ffrobot.actuation.patches.patches import voltage_gain
 from ffrobot.common.errors import InputError
-from ffrobot.fe_models.link import cached_modal_body
 from ffrobot.mbs.model.truncation import with_fewer_modes
 
 
 @pytest.fixture
-def bodies(link_file):
+def bodies():
     """The modal body with ten eigenmodes and two attachment modes, and the one without these."""
-    path = link_file("attached")
-    plain = cached_modal_body(path).body
-    path.write_text(path.read_text().replace("attachment_modes = false\n", ""))
-    return cached_modal_body(path).body, plain
+    return [modal_body(paper_link(attachment_modes=has_some)) for has_some in (True, False)]
 
 
 def test_ten_patches_on_ten_modes_are_exact(bodies):

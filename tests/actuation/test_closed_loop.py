@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from beam_links import paper_link
 from scipy.linalg import expm, solve_discrete_are
 
 from ffrobot.actuation.context import ActuatedContext
@@ -304,7 +305,7 @@ def held_link(link, *analyses, **keys):
     hit = [{"point": "link.tip", "y": "where(t < 0.002, 20*sin(pi*t/0.002), 0)"}]
     joint = {"name": "O", "type": "revolute", "between": ["ground", "link.root"], "rotor_inertia": 1e4}
     return make_scene(
-        name="held", gravity=[0.0, -9.81], body=[{"name": "link", "link": str(link)}], joint=[joint],
+        name="held", gravity=[0.0, -9.81], body=[{"name": "link", "link": link}], joint=[joint],
         trajectory=[{"name": "stand", "joint": "O", "value": "0"}], pzt=[PATCHES | keys.pop("pzt", {})],
         analysis=[inverse, *(analysis | {"disturbance": hit, "tolerance": 1e-6} for analysis in analyses)], **keys,
     )  # fmt: skip
@@ -321,21 +322,20 @@ def decay(solution, name):
 
 
 @pytest.mark.parametrize("sensor", ["ideal", "pzt"])
-def test_patches_add_the_damping_that_is_asked_for(link_file, sensor):
+def test_patches_add_the_damping_that_is_asked_for(sensor):
     control = {"kind": "modal-velocity", "bodies": ["link"], "modes": 1, "damping_ratio": 0.05, "sensor": sensor}
-    link = link_file("cantilever3", count=3)
-    scene = held_link(link, loop(sample_time=1e-4, controller=[control]), loop("free", sample_time=1e-4))
+    scene = held_link(paper_link(count=3), loop(sample_time=1e-4, controller=[control]), loop("free", sample_time=1e-4))
     solution = solve_scene(scene)
     assert abs(decay(solution, "free")) < 1e-4
     assert decay(solution, "loop") == pytest.approx(0.05, rel=0.05)
 
 
-def test_all_integrators_go_from_sample_to_sample_alike(link_file):
+def test_all_integrators_go_from_sample_to_sample_alike():
     """Loads jump at every sample: methods that look back must not look across."""
     control = {"kind": "modal-velocity", "bodies": ["link"], "damping_ratio": 0.05, "sensor": "ideal"}
     names = ["dop853", "dopri5", "radau", "generalized-alpha"]
     loops = [loop(name, integrator=name, sample_time=2e-3, controller=[control]) for name in names]
-    solution = solve_scene(held_link(link_file("cantilever3", count=3), *loops, end=0.1))
+    solution = solve_scene(held_link(paper_link(count=3), *loops, end=0.1))
     first = solution.outcomes["dop853"].q
     sag = solution.outcomes["inverse"].q
     for name in names[1:]:
@@ -358,9 +358,9 @@ def test_lqr_names_the_modes_out_of_reach():
         assert any(word in line and f"({frequency:.4g} Hz)" in line for line in lines), lines
 
 
-def test_a_patch_reads_the_charge_of_its_bending(link_file):
+def test_a_patch_reads_the_charge_of_its_bending():
     """A force at the tip of a cantilever turns its sections by F (L x − x²/2)/(E I)."""
-    solution = prepare_scene(held_link(link_file("cantilever10"), loop()))
+    solution = prepare_scene(held_link(paper_link(), loop()))
     of_link, link = solution.patches["link"], solution.bodies["link"].carrying
     EI = 2.068427e11 * 0.025 * 0.015**3 / 12
     p = link.modal_transform @ (link.points["tip"].translation[1] / link.stiffness)

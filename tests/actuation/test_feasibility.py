@@ -2,7 +2,8 @@
 
 import numpy as np
 import pytest
-from beam_links import beam_link, tube
+from beam_links import beam_link, paper_link, tube
+from patches_on_links import CERAMIC
 
 import ffrobot
 from ffrobot.actuation.feasibility import PatchFeasibility, Remedies
@@ -11,70 +12,29 @@ from ffrobot.actuation.patches.link_patches import link_patches, with_count
 from ffrobot.run.solve import solve_scene
 
 LIMIT = 200.0
-SCENE = """
-name = "arm"
-space = "planar"
-gravity = [0.0, -9.81]
-
-[[body]]
-name = "link"
-link = "{link}"
-
-[[joint]]
-name = "O"
-type = "revolute"
-between = ["ground", "link.root"]
-{motor}
-
-[[trajectory]]
-name = "turn"
-{trajectory}
-
-[[pzt]]
-body = "link"
-count = 10
-length = 0.05
-width = 0.025
-thickness = 0.75e-3
-modulus = 63e9
-d31 = 110e-12
-structural = false
-limit = {limit}
-depoling_field = 5e5
-{own}
-{load}
-[[analysis]]
-name = "motion"
-kind = "{kind}"
-{times}
-"""
-RUN = "end = 0.5\noutput_step = 0.01"
-MOTOR = "moment_limit = 10.0\nspeed_limit = 0.2\npower_limit = 1e3"
-TURN = 'joint = "O"\nvalue = "0.1*sin(2*t)"'
+RUN = {"end": 0.5, "output_step": 0.01}
+STRAIGHT = {"kind": "fcid", "shape": "zero"} | RUN
+MOTOR = {"moment_limit": 10.0, "speed_limit": 0.2, "power_limit": 1e3}
+TURN = {"joint": "O", "value": "0.1*sin(2*t)"}
+STILL = {"joint": "O", "value": "0"}
 
 
-@pytest.fixture(scope="module")
-def arm(link_file, tmp_path_factory):
+def arm(analysis=STRAIGHT, trajectory=TURN, limit=LIMIT, load=(), motor=MOTOR):
     """One horizontal link of the paper, its motor moved as `trajectory` says."""
-
-    def run(kind="fcid", times=f'shape = "zero"\n{RUN}', trajectory=TURN, limit=LIMIT, own="", load="", motor=MOTOR):
-        scene = tmp_path_factory.mktemp("scene") / "scene.toml"
-        link = link_file("arm", "cantilever")
-        scene.write_text(
-            SCENE.format(
-                link=link, kind=kind, times=times, trajectory=trajectory, limit=limit, own=own, load=load, motor=motor
-            )
-        )
-        return solve_scene(scene)
-
-    return run
+    patches = CERAMIC | {"count": 10, "structural": False, "limit": limit, "depoling_field": 5e5}
+    return solve_scene(ffrobot.make_scene(
+        name="arm", gravity=[0.0, -9.81], body=[{"name": "link", "link": paper_link()}],
+        joint=[{"name": "O", "type": "revolute", "between": ["ground", "link.root"]} | motor],
+        trajectory=[{"name": "turn"} | trajectory], pzt=[{"body": "link"} | patches], load=list(load),
+        analysis=[{"name": "motion"} | analysis],
+    ))  # fmt: skip
 
 
 def judged_of(solution):
     return solution.analyses["motion"].actuation.feasibility
 
 
-def test_patches_peak_by_peak(arm):
+def test_patches_peak_by_peak():
     solution = arm(limit=3000.0)
     judged = judged_of(solution).patches["link"]
     outcome = solution.outcomes["motion"]
@@ -106,9 +66,9 @@ def test_patches_peak_by_peak(arm):
     assert np.all(judged.strain == 0.0)  # held straight
 
 
-def test_strain_under_a_static_load_is_that_of_the_beam(arm):
+def test_strain_under_a_static_load_is_that_of_the_beam():
     """ε = (t_b/2 + t_p) M(x)/EI with M of the weight, averaged along the patch (Euler–Bernoulli)."""
-    solution = arm(times=f'shape = "static"\n{RUN}', trajectory='joint = "O"\nvalue = "0"')
+    solution = arm(STRAIGHT | {"shape": "static"}, STILL)
     x = np.linspace(0.025, 0.075, 201)  # the first patch
     M = 7850.0 * 0.025 * 0.015 * 9.81 * (1 - x) ** 2 / 2
     expected = (0.0075 + 0.75e-3) * M.mean() / (2.068427e11 * 0.025 * 0.015**3 / 12)
@@ -121,7 +81,7 @@ def modal_forces(solution):
 
 
 @pytest.mark.parametrize("word", ["limit", "layers", "thickness"])
-def test_remedies_do(arm, word):
+def test_remedies_do(word):
     """With the limit, layers or thickness named, and nothing else changed, the worst patch just suffices."""
     solution = arm()
     layout, F_p = solution.patches["link"].arrays["link"].layout, modal_forces(solution)
@@ -143,7 +103,7 @@ def test_remedies_do(arm, word):
             assert factor(thickness=remedies.thickness, limit=same_field) == pytest.approx(1.0, rel=1e-9)
 
 
-def test_number_of_patches_that_would_do(arm):
+def test_number_of_patches_that_would_do():
     """Found by trying; a limit between the needs of 10 and of 20 patches has an answer, a lower one has none."""
     solution = arm()
     layout, body = solution.patches["link"].arrays["link"].layout, solution.bodies["link"]
@@ -163,7 +123,7 @@ def test_number_of_patches_that_would_do(arm):
     assert without.most_factor == pytest.approx(needs(20) / (0.9 * least), rel=1e-9)
 
 
-def test_motors_peak_by_peak(arm):
+def test_motors_peak_by_peak():
     """τ = J θ̈ + m g L/2 cos θ of a link held straight, θ̇ = 0.2 cos 2t, and their product."""
     motor = judged_of(arm()).motors["O"]
     t = np.arange(51) * 0.01
@@ -178,20 +138,20 @@ def test_motors_peak_by_peak(arm):
     assert motor.saturation_time == 0.0
 
 
-def test_motors_without_limits_are_never_short(arm):
-    motor = judged_of(arm(motor="")).motors["O"]
+def test_motors_without_limits_are_never_short():
+    motor = judged_of(arm(motor={})).motors["O"]
     assert motor.factor == 0.0
     assert np.isnan(motor.saturation_time)
 
 
-def test_predicted_shift_of_the_tip_is_what_happens(arm):
+def test_predicted_shift_of_the_tip_is_what_happens():
     """Held by its motor under its weight: patches at their limits against patches without, each solved statically."""
-    straight = arm(times=f'shape = "zero"\n{RUN}', trajectory='joint = "O"\nvalue = "0"')
+    straight = arm(trajectory=STILL)
     voltages = straight.analyses["motion"].actuation.voltages["link"]
     tips = []
     for volts in (voltages.required[0], voltages.within_limit[0]):
-        load = '\n[[load]]\npzt = "link"\nvoltage = [' + ", ".join(f'"{v!r}"' for v in volts.tolist()) + "]\n"
-        held = arm(kind="static", times="", trajectory='joint = "O"\nvalue = "0"', load=load)
+        load = {"pzt": "link", "voltage": [f"{v!r}" for v in volts.tolist()]}
+        held = arm({"kind": "static"}, STILL, load=[load])
         tips.append(held.analyses["motion"].motion.point("link.tip").deflection[0, 1])
     assert abs(tips[0]) < 1e-12  # straight
     np.testing.assert_allclose(
@@ -199,9 +159,9 @@ def test_predicted_shift_of_the_tip_is_what_happens(arm):
     )
 
 
-def test_predicted_shift_of_an_inclined_tip(arm):
+def test_predicted_shift_of_an_inclined_tip():
     """The shift across the link is the deflection that unmet modal forces leave."""
-    solution = arm(trajectory='point = "link.tip"\ny = "0.1*sin(2*t)"')
+    solution = arm(trajectory={"point": "link.tip", "y": "0.1*sin(2*t)"})
     result, body = solution.analyses["motion"], solution.bodies["link"].carrying
     unmet = result.actuation.unmet["link"]
     deflection = -(unmet @ body.modal_transform / body.stiffness) @ body.points["tip"].translation[1]
@@ -210,12 +170,12 @@ def test_predicted_shift_of_an_inclined_tip(arm):
     np.testing.assert_allclose(result.predicted_shift["link.tip"], expected, atol=1e-9 * np.abs(expected).max())
 
 
-def test_rms_and_shares_of_time_by_hand(arm):
+def test_rms_and_shares_of_time_by_hand():
     """τ = m g L/2 + J θ̈ at θ ≈ 0 over whole periods; speed 0.2 |cos 2t| against a limit of 0.1: beyond for 2/3."""
     solution = arm(
-        times='shape = "zero"\nend = 3.141592653589793\noutput_step = 0.0015707963267948967',
-        trajectory='joint = "O"\nvalue = "1e-3*sin(2*t)"',
-        motor="speed_limit = 1e-3",
+        STRAIGHT | {"end": np.pi, "output_step": np.pi / 2000},
+        trajectory={"joint": "O", "value": "1e-3*sin(2*t)"},
+        motor={"speed_limit": 1e-3},
     )
     motor = judged_of(solution).motors["O"]
     m = 7850.0 * 0.025 * 0.015
@@ -232,9 +192,8 @@ def test_rms_and_shares_of_time_by_hand(arm):
         ("0.1*sin(2*t)**2*t**2", ""),
     ],
 )
-def test_jump_of_a_path_is_seen(arm, value, jump):
-    found = arm(times='shape = "zero"\nend = 0.5\noutput_step = 0.01', trajectory=f'joint = "O"\nvalue = "{value}"')
-    result = found.analyses["motion"]
+def test_jump_of_a_path_is_seen(value, jump):
+    result = arm(trajectory={"joint": "O", "value": value}).analyses["motion"]
     assert path_jump(result.motion, result.analysis, 0) == jump
 
 

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from bodies_by_invariants import with_payload
 from links import arm, arm_links, ritz_link
 from mechanisms import make_model, revolute
 from oracle_runs import energies, evaluated
@@ -11,6 +10,7 @@ from scipy.optimize import brentq
 
 from ffrobot.actuation.control.linear_model import controllability, observability, robot_modes, state_space, zeros
 from ffrobot.common.errors import InputError
+from ffrobot.mbs.model.masses import with_payload
 from ffrobot.mbs.model.model import without_paths
 from ffrobot.mbs.solve.linearisation import LinearEquations
 from ffrobot.mbs.solve.start import undeformed_posture
@@ -30,7 +30,7 @@ def at_rest(robot, points=("link2.tip",)):
 def hub_and_beam(ratio, modes=8, damping_ratio=0.0):
     """A beam on a motor whose rotor has `ratio` times ρA L³ of inertia; no gravity."""
     link = ritz_link("arm", "cantilever", LENGTH, MASS, EI, modes, damping_ratio, extra=6)
-    link = with_payload(link, "root", 0.0, ratio * MASS * LENGTH**2)
+    link = with_payload(link, "root", 0.0, np.zeros(3), np.diag([0.0, 0.0, ratio * MASS * LENGTH**2]))
     model = make_model([link], gravity=(0.0, 0.0), joint=[revolute("hub", "ground", "arm.root")])
     return at_rest(model, ("arm.tip",))
 

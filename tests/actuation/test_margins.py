@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from beam_links import beam_link, tube
 
 from ffrobot.actuation.control.linear_model import LinearModel, locked_frequencies
 from ffrobot.actuation.control.margins import (
@@ -22,20 +23,6 @@ from ffrobot.run.solve import solve_scene
 from ffrobot.scene.load import make_scene
 
 INERTIA, T = 0.5, 0.01
-LINK = {
-    "material": {"youngs_modulus": 70e9, "density": 2700.0},
-    "mesh": {"elements": 10},
-    "reference": {"condition": "cantilever"},
-    "modes": {"count": 3, "family": "in-plane-bending"},
-    "damping": {"ratio": 0.01},
-}
-
-
-@pytest.fixture(autouse=True, scope="module")
-def cache(tmp_path_factory):
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("cache")))
-        yield
 
 
 def models(scene):
@@ -63,8 +50,8 @@ def links(rng, count, payload, rotors, analysis, **keys):
     bodies, joints, before = [], [], "ground"
     for k in range(count):
         outer, length = rng.uniform(0.015, 0.04), rng.uniform(0.3, 0.8)
-        section = {"shape": "tube", "outer": outer, "inner": 0.85 * outer}
-        link = LINK | {"name": f"a{k}", "geometry": {"kind": "beam", "length": length, "section": section}}
+        modes = {"count": 3, "family": "in-plane-bending"}
+        link = beam_link(length, tube(outer, 0.85 * outer), 10, nu=None, modes=modes, damping={"ratio": 0.01})
         bodies.append({"name": f"a{k}", "link": link})
         rotor = {"rotor_inertia": rotors[k]} if rotors[k] else {}
         joints.append({"name": f"J{k}", "type": "revolute", "between": [before, f"a{k}.root"]} | rotor)

@@ -2,39 +2,15 @@
 
 import numpy as np
 import pytest
+from beam_links import modal_body, paper_link, rectangle
 from patches_on_links import SCENE, planar_body
 
 from ffrobot.actuation.patches.composite import patched_body, structure_effect_of
 from ffrobot.actuation.patches.link_patches import placed_patches
 from ffrobot.actuation.patches.records import PztLayout
-from ffrobot.fe_models.link import cached_modal_body
 
 E, RHO, H, B = 2.068427e11, 7850.0, 0.015, 0.025
 E_P, RHO_P, T_P = 63e9, 7600.0, 0.75e-3
-
-LINK = """
-name = "patched"
-[material]
-youngs_modulus = {E}
-poissons_ratio = 0.3
-density = {RHO}
-[geometry]
-kind = "beam"
-length = 1.0
-{segments}
-[mesh]
-elements = 40
-[reference]
-condition = "cantilever"
-[modes]
-attachment_modes = false
-count = 10
-family = "in-plane-bending"
-"""
-SEGMENT = """[[geometry.segment]]
-until = {until!r}
-section = {{ shape = "rectangle", height = {height!r}, width = {width!r} }}
-"""
 
 
 def layout(**keys):
@@ -46,7 +22,7 @@ def with_patches(bare, body, one):
     return patched_body(bare, body, placed_patches(SCENE, [one], body))
 
 
-def composite_link(tmp_path, faces, mass, stiffness):
+def composite_link(faces, mass, stiffness):
     """A steel link with a rectangle under each patch that has the same EI and ρA as the composite section."""
     EI, rho_A = E * B * H**3 / 12, RHO * B * H
     outer, inner = H / 2 + T_P, H / 2
@@ -56,14 +32,12 @@ def composite_link(tmp_path, faces, mass, stiffness):
     rho_A_p = rho_A + mass * faces * RHO_P * B * T_P
     height = np.sqrt(12 * EI_p / E * RHO / rho_A_p)
     sections = [(H, B), (float(height), float(rho_A_p / (RHO * height)))]
-    ends = [*np.round(np.arange(0.025, 1.0, 0.05), 3), 1.0]  # ten patches of 0.05 m, gaps as long between them
-    segments = "".join(
-        SEGMENT.format(until=float(end), height=sections[k % 2][0], width=sections[k % 2][1])
-        for k, end in enumerate(ends)
+    ends = [*np.round(np.arange(0.025, 1.0, 0.05), 3).tolist(), 1.0]  # ten patches of 0.05 m, gaps as long between them
+    segments = [{"until": end, "section": rectangle(*sections[k % 2])} for k, end in enumerate(ends)]
+    link = paper_link()
+    return modal_body(
+        link | {"geometry": {"kind": "beam", "length": 1.0, "segment": segments}, "mesh": {"elements": 40}}
     )
-    path = tmp_path / "patched.toml"
-    path.write_text(LINK.format(E=E, RHO=RHO, segments=segments))
-    return cached_modal_body(path).body
 
 
 def ritz_stiffness(bare, patched):
@@ -74,13 +48,12 @@ def ritz_stiffness(bare, patched):
 
 @pytest.mark.parametrize("face", [None, "both"])
 @pytest.mark.parametrize("structural", [("mass",), ("stiffness",), ("mass", "stiffness")])
-def test_frequencies_are_those_of_the_composite_link(cantilever, tmp_path, monkeypatch, face, structural):
+def test_frequencies_are_those_of_the_composite_link(cantilever, face, structural):
     """Ritz with 20 modes of the bare link: curvature has steps at patch edges that smooth modes only come near."""
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     body = cantilever(20)
     bare = planar_body(body)
     patched = with_patches(bare, body, layout(face=face, structural=structural))
-    reference = composite_link(tmp_path, 2 if face else 1, "mass" in structural, "stiffness" in structural)
+    reference = composite_link(2 if face else 1, "mass" in structural, "stiffness" in structural)
     effect = structure_effect_of(bare, patched)
     ritz, exact = effect.frequency[1, :5], reference.frequency[:5]
     assert np.all(ritz > exact * (1 - 1e-9))  # Rayleigh's principle

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from beam_links import beam_link, modal_body, rectangle, tube
 
 from ffrobot.actuation.patches.composite import patched_body
 from ffrobot.actuation.patches.link_patches import check_reach, link_patches, placed_patches
@@ -12,7 +13,6 @@ from ffrobot.actuation.patches.records import Fibres, PztLayout, fibre_lamina
 from ffrobot.common.errors import InputError
 from ffrobot.common.validation import validate
 from ffrobot.fe_models.beam.section_stress import surface_shear
-from ffrobot.fe_models.link import cached_modal_body
 from ffrobot.mbs.model.body import from_modal_body
 
 SCENE = Path("scene.toml")
@@ -24,45 +24,12 @@ FIBRES = {
     "modulus": 30.3e9, "modulus_across": 15.9e9, "shear_modulus": 5.5e9, "poissons_ratio": 0.31, "d33": 400e-12,
     "d31": -170e-12, "thickness": 0.3e-3, "electrode_spacing": 0.5e-3,
 }  # fmt: skip
-LINK = """
-name = "{name}"
-[material]
-youngs_modulus = 70e9
-poissons_ratio = 0.33
-density = 2700.0
-[geometry]
-kind = "beam"
-length = 0.4
-section = {section}
-[mesh]
-elements = 10
-[reference]
-condition = "cantilever"
-[modes]
-count = {count}
-family = "{family}"
-"""
+SQUAT = rectangle(0.006, 0.014)
+TUBE = tube(0.020, 0.018)
 
 
-def rectangle(height, width):
-    return f'{{ shape = "rectangle", height = {height}, width = {width} }}'
-
-
-TUBE = '{ shape = "tube", outer = 0.020, inner = 0.018 }'
-
-
-@pytest.fixture(scope="module")
-def link(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("links")
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("XDG_CACHE_HOME", str(folder / "cache"))
-
-        def make(section, count=12, family="all"):
-            path = folder / "link.toml"
-            path.write_text(LINK.format(name="link", section=section, count=count, family=family))
-            return cached_modal_body(path).body
-
-        yield make
+def link(section, count=12, family="all"):
+    return modal_body(beam_link(L, section, 10, nu=NU, modes={"count": count, "family": family}))
 
 
 def layout(**keys):
@@ -96,7 +63,7 @@ def bending(h, b, w, faces):
 
 @pytest.mark.parametrize(("bends", "axis", "names"), [("in-plane", 1, ("+y", "-y")), ("out-of-plane", 2, ("+z", "-z"))])
 @pytest.mark.parametrize("face", [None, "both", 0, 1])
-def test_tip_of_a_cantilever_in_both_planes(link, bends, axis, names, face):
+def test_tip_of_a_cantilever_in_both_planes(bends, axis, names, face):
     """w(L) = κ (x2 − x1)(L − (x1 + x2)/2) of the composite section: towards +y or +z on whichever face patches lie."""
     h, b = 0.006, 0.014
     body = link(rectangle(h, b))
@@ -139,7 +106,7 @@ def test_layer_of_fibres_at_an_angle(angle):
 
 
 @pytest.mark.parametrize("angle", [np.pi / 4, -np.pi / 4, 0.4])
-def test_tube_with_fibres_at_an_angle_twists(link, angle):
+def test_tube_with_fibres_at_an_angle_twists(angle):
     """Layers on both faces of a tube, γ = r φ': (u', φ') of the section with stiffness and coupling of the layers."""
     body, w, t = link(TUBE), 0.01, FIBRES["thickness"]
     _, rotation = tip(body, [layout(bends="twist", face="both", fibre_angle=angle)])
@@ -154,7 +121,7 @@ def test_tube_with_fibres_at_an_angle_twists(link, angle):
     assert np.abs(rotation[1:]).max() < 1e-9 * abs(rotation[0])
 
 
-def test_thin_strip_with_fibres_at_45_degrees_twists_like_a_plate(link):
+def test_thin_strip_with_fibres_at_45_degrees_twists_like_a_plate():
     """κ_xy = 2φ' of plates: GJ φ' = 2 (h + t) w N_xs V/2 on each face; beyond the strip's edges GJ is St Venant's."""
     h, b, w, t = 0.001, 0.03, 0.02, FIBRES["thickness"]
     body = link(rectangle(h, b))
@@ -173,17 +140,17 @@ def test_shear_around_a_rectangle(ratio):
     assert around == pytest.approx(2 * h * b, rel=1e-4)
 
 
-def test_fibres_along_the_axis_bend_as_plain_ceramic_does(link):
+def test_fibres_along_the_axis_bend_as_plain_ceramic_does():
     """E_1 d33 (t/s) in the place of E d31, with the stiffness of E_1."""
-    body = link(rectangle(0.006, 0.014))
+    body = link(SQUAT)
     fibres = layout(face="both", fibre_angle=0.0)
     d31 = FIBRES["d33"] * FIBRES["thickness"] / FIBRES["electrode_spacing"]
     plain = layout(face="both", modulus=FIBRES["modulus"], d31=d31, thickness=FIBRES["thickness"])
     np.testing.assert_allclose(tip(body, [fibres])[0], tip(body, [plain])[0], rtol=1e-9, atol=1e-15)
 
 
-def test_layouts_side_by_side_are_one_layout(link):
-    body = link(rectangle(0.006, 0.014), 8)
+def test_layouts_side_by_side_are_one_layout():
+    body = link(SQUAT, 8)
     one = layout(centers=[0.1, 0.22, 0.34], length=0.06, face="+y")
     parts = [layout(name=f"part{k}", centers=[x], length=0.06, face="+y") for k, x in enumerate((0.1, 0.22, 0.34))]
     V = [30.0, -70.0, 50.0]
@@ -191,15 +158,15 @@ def test_layouts_side_by_side_are_one_layout(link):
         np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-13)
 
 
-def test_both_faces_driven_apart_are_the_layout_on_both(link):
+def test_both_faces_driven_apart_are_the_layout_on_both():
     """Two layouts on the same stretch of the link, a little longer one below: they share it, and stretch cancels."""
-    body = link(rectangle(0.006, 0.014), 8)
+    body = link(SQUAT, 8)
     both = tip(body, [layout(face="both")])
     apart = tip(body, [layout(name="above", face="+y"), layout(name="below", face="-y")])
     np.testing.assert_allclose(apart[0], both[0], atol=1e-9 * np.abs(both[0]).max())
 
 
-def test_overlap_of_layouts_is_shared(link):
+def test_overlap_of_layouts_is_shared():
     """Of patches that overlap in part each stretch has its own composite section: curvatures add up to the tip."""
     h, b = 0.006, 0.014
     body = link(rectangle(h, b), 8)
@@ -210,7 +177,7 @@ def test_overlap_of_layouts_is_shared(link):
     np.testing.assert_allclose(together, alone, rtol=1e-7, atol=1e-12)
 
 
-def test_round_links_do_not_mix_their_planes(link):
+def test_round_links_do_not_mix_their_planes():
     """Frequencies in the two planes are equal; patches in one leave the other's modes alone, payload or not."""
     body = link(TUBE)
     spatial = patched_body(
@@ -220,9 +187,9 @@ def test_round_links_do_not_mix_their_planes(link):
     assert not spatial.modal_transform[families[:, None] != families].any()
 
 
-def test_mass_of_layers(link):
+def test_mass_of_layers():
     """∫ρ(y² + z²) over the layers; modes stay orthonormal."""
-    body = link(rectangle(0.006, 0.014))
+    body = link(SQUAT)
     keys = {"count": 5, "length": 0.05, "structural": True, "density": 7600.0, "face": "both"}
     spatial = patched_body(from_modal_body("link", body), body, placed_patches(SCENE, [layout(**keys)], body))
     A, I = 2 * 0.01 * 0.5e-3, 2 * 0.01 * (0.0035**3 - 0.003**3) / 3  # noqa: E741
@@ -233,9 +200,9 @@ def test_mass_of_layers(link):
                                atol=1e-9)  # fmt: skip
 
 
-def test_voltages_of_two_planes_do_not_disturb_each_other(link):
+def test_voltages_of_two_planes_do_not_disturb_each_other():
     """Each plane finds its voltages as if alone; torsion and stretch are left as they are, mode by mode."""
-    body = link(rectangle(0.006, 0.014))
+    body = link(SQUAT)
     spatial = from_modal_body("link", body)
     side, up = (
         layout(name="side", count=4, length=0.05, limit=200.0),
@@ -279,8 +246,8 @@ def test_isotropic_layers_twist_at_no_angle():
             layout(bends="twist", fibre_angle=float(angle), **alike, shear_modulus=60e9 / 2.6)
 
 
-def test_patches_that_do_not_fit_their_link(link):
-    body = link(rectangle(0.006, 0.014))
+def test_patches_that_do_not_fit_their_link():
+    body = link(SQUAT)
     spatial = from_modal_body("link", body)
     with pytest.raises(InputError, match=r'pzt "up": expected patches within the link'):
         link_patches(SCENE, [layout(name="up", centers=[0.39], length=0.06)], body, spatial)
@@ -289,7 +256,7 @@ def test_patches_that_do_not_fit_their_link(link):
     old = replace(body, stations=replace(body.stations, width=None, outline=None))
     with pytest.raises(InputError, match="recompute it from its link file"):
         link_patches(SCENE, [layout(bends="out-of-plane")], old, spatial)
-    upright = link(rectangle(0.006, 0.014), 4, "out-of-plane-bending")
+    upright = link(SQUAT, 4, "out-of-plane-bending")
     for allocation in ("exact", "least-squares"):
         with pytest.raises(InputError, match=r'bends: expected modes of the link that patches for "in-plane" reach'):
             link_patches(SCENE, [layout(allocation=allocation)], upright, from_modal_body("link", upright))

@@ -5,12 +5,12 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from beam_links import modal_body, paper_link
 from patches_on_links import SCENE, bent, layout, modes_in_the_plane, on_link, patches, planar_body, tip_deflection
 
 from ffrobot.actuation.patches.link_patches import check_reach, link_patches
 from ffrobot.actuation.patches.patches import solve_voltages
 from ffrobot.common.errors import InputError
-from ffrobot.fe_models.link import cached_modal_body
 from ffrobot.fe_models.modal_body import OutlinedPatches
 from ffrobot.mbs.model.masses import with_payload
 
@@ -33,36 +33,6 @@ def test_cantilever_bends_as_in_closed_form(cantilever, start):
     assert tip_deflection(planar, array, np.array([100.0])) == pytest.approx(expected, rel=1e-7)
     if start == 0.0:
         assert expected == pytest.approx(4.573e-6, rel=2e-4)
-
-
-def test_deflection_converges_with_the_number_of_modes(cantilever):
-    exact = C * 100.0 * 0.05 * 0.975 / EI
-    errors = []
-    for count in (3, 6, 12, 24):
-        body = cantilever(count)
-        deflection = tip_deflection(planar_body(body), on_link(body, centers=(0.025,)), np.array([100.0]))
-        errors.append(abs(deflection / exact - 1))
-    assert errors[0] > errors[1] > errors[2] > errors[3]
-    assert errors[3] < 1e-3
-
-
-def test_signs_of_modes_do_not_matter_to_voltages(cantilever):
-    body = cantilever(10)
-    signs = np.where(np.arange(10) % 3 == 0, -1.0, 1.0)
-    flipped = replace(
-        body,
-        S_bar=body.S_bar * signs,
-        I_bar=body.I_bar * signs,
-        S_bar_kl=body.S_bar_kl * np.outer(signs, signs),
-        interfaces={k: replace(i, translation=i.translation * signs, rotation=i.rotation * signs)
-                    for k, i in body.interfaces.items()},
-        stations=replace(body.stations, translation=body.stations.translation * signs,
-                         rotation=body.stations.rotation * signs),
-        geometric_stiffness={},
-    )  # fmt: skip
-    F_p = np.random.default_rng(0).standard_normal((3, 10))
-    one, other = on_link(body).voltages(F_p)["link"], on_link(flipped).voltages(F_p * signs)["link"]
-    np.testing.assert_allclose(other.required, one.required, rtol=1e-9, atol=1e-9 * one.largest)
 
 
 def test_a_payload_changes_the_modes_and_not_the_deflection(cantilever):
@@ -105,9 +75,9 @@ def test_more_modes_than_patches_need_least_squares(cantilever):
     check_reach(SCENE, on_link(body, count=14))
 
 
-def test_modes_that_no_patch_reaches_are_named(link_file):
+def test_modes_that_no_patch_reaches_are_named():
     """Mode 4 of a supported beam has nodes of curvature at its quarters, where all four patches are."""
-    body = cached_modal_body(link_file("supported4", "simply-supported", 4)).body
+    body = modal_body(paper_link("simply-supported", 4))
     layouts = [layout(name="three", centers=(0.25, 0.5, 0.75)), layout(name="one", centers=(0.25,))]
     of_link = link_patches(SCENE, layouts, body, planar_body(body))
     assert list(of_link.reach.unreached_modes) == [3]

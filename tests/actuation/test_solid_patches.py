@@ -2,50 +2,20 @@
 
 import numpy as np
 import pytest
+from beam_links import modal_body, paper_link
 from patches_on_links import on_link
 
-from ffrobot.fe_models.link import cached_modal_body
 
-LINK = """
-name = "link"
-[material]
-youngs_modulus = 2.068427e11
-poissons_ratio = 0.3
-density = 7850.0
-[geometry]
-length = 1.0
-section = { shape = "rectangle", height = 0.015, width = 0.025 }
-KIND
-[reference]
-condition = "simply-supported"
-[modes]
-attachment_modes = false
-count = 6
-family = "in-plane-bending"
-"""
-BEAM = 'kind = "beam"\n[mesh]\nelements = 40\n[model]\ntheory = "timoshenko"'
-SOLID = (
-    'kind = "solid"\n[mesh]\nsize = 0.025\n[surface_patch]\ncount = 10\nlength = 0.05\nwidth = 0.025\nfaces = "FACES"'
-)
-
-
-@pytest.fixture(scope="module")
-def arrays(tmp_path_factory):
-    """Φ_V of ten patches: of a beam or of a solid with patches on `faces`, by either coupling."""
-    folder = tmp_path_factory.mktemp("solid")
-    bodies = {}
-
-    def compute(faces=None, coupling="rotation"):
-        if faces not in bodies:
-            path = folder / f"{faces}.toml"
-            path.write_text(LINK.replace("KIND", BEAM if faces is None else SOLID.replace("FACES", faces)))
-            with pytest.MonkeyPatch.context() as patch:
-                patch.setenv("XDG_CACHE_HOME", str(folder / "cache"))
-                bodies[faces] = cached_modal_body(path).body
-        body = bodies[faces]
-        return on_link(body, coupling=coupling).Phi_V
-
-    return compute
+def Phi_V(faces=None, coupling="rotation"):
+    """Of ten patches on a beam, or on a solid that has them outlined on `faces`, by either coupling."""
+    keys = paper_link("simply-supported", 6)
+    if faces is None:
+        keys |= {"mesh": {"elements": 40}, "model": {"theory": "timoshenko"}}
+    else:
+        keys["geometry"] |= {"kind": "solid"}
+        keys |= {"mesh": {"size": 0.025}}
+        keys["surface_patch"] = {"count": 10, "length": 0.05, "width": 0.025, "faces": faces}
+    return on_link(modal_body(keys), coupling=coupling).Phi_V
 
 
 def difference(found, expected):
@@ -53,20 +23,20 @@ def difference(found, expected):
     return np.abs(found - expected).max(axis=1) / np.abs(expected).max(axis=1)
 
 
-def test_section_rotations_are_those_of_the_beam(arrays):
-    assert difference(arrays("both"), arrays()).max() < 2e-3
+def test_section_rotations_are_those_of_the_beam():
+    assert difference(Phi_V("both"), Phi_V()).max() < 2e-3
 
 
 @pytest.mark.parametrize(("faces", "limit"), [("both", 4e-3), ("top", 4e-3)])
-def test_surface_strain_agrees_with_section_rotations(arrays, faces, limit):
+def test_surface_strain_agrees_with_section_rotations(faces, limit):
     """Found: 8e-5 in mode 1, growing with the square of its number to 3e-3 in mode 6: shear warps the sections."""
-    found = difference(arrays(faces, "surface"), arrays(faces))
+    found = difference(Phi_V(faces, "surface"), Phi_V(faces))
     assert found[0] < 2e-4
     assert found.max() < limit
 
 
-def test_one_face_or_two_bend_alike(arrays):
+def test_one_face_or_two_bend_alike():
     """Bending modes of a symmetric link have no mean axial strain for a single face to work on."""
     np.testing.assert_allclose(
-        arrays("top", "surface"), arrays("both", "surface"), atol=1e-3 * np.abs(arrays("both", "surface")).max()
+        Phi_V("top", "surface"), Phi_V("both", "surface"), atol=1e-3 * np.abs(Phi_V("both", "surface")).max()
     )

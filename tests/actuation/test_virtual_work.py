@@ -2,118 +2,43 @@
 
 import numpy as np
 import pytest
+from beam_links import paper_link
+from patches_on_links import CERAMIC
 
+import ffrobot
 from ffrobot.actuation.points import find_driving_forces
 from ffrobot.run.solve import solve_scene
 
-SCENE = """
-name = "two_link"
-space = "planar"
-gravity = [0.0, -9.81]
-motors = "{motors}"
-
-[[body]]
-name = "link1"
-link = "{link1}"
-
-[[body]]
-name = "link2"
-link = "{link2}"
-
-[[joint]]
-name = "O"
-type = "revolute"
-between = ["ground", "link1.root"]
-
-[[joint]]
-name = "A"
-type = "revolute"
-between = ["link1.tip", "link2.root"]
-
-[initial]
-angles = {{ link1 = 0.0, link2 = 1.0471975511965976 }}
-
-[[trajectory]]
-name = "tip"
-point = "link2.tip"
-x = "1.5*cos(pi*t/4)"
-y = "sqrt(3)/2*cos(pi*t/4)"
-{patches}
-{points}
-[[analysis]]
-name = "inverse"
-kind = "pcid"
-end = 0.1
-output_step = 0.02
-tolerance = 1e-6
-
-[[analysis]]
-name = "straight"
-kind = "fcid"
-shape = "zero"
-end = 0.1
-output_step = 0.02
-
-[[analysis]]
-name = "sagging"
-kind = "fcid"
-shape = "static"
-end = 0.1
-output_step = 0.02
-"""
-POINTS = """
-[[actuation_points]]
-body = "link1"
-{own}
-
-[[actuation_points]]
-body = "link2"
-{own}
-"""
-PATCHES = """
-[[pzt]]
-body = "{body}"
-count = 10
-length = 0.05
-width = 0.025
-thickness = 0.75e-3
-modulus = 63e9
-d31 = 110e-12
-structural = false
-{own}
-"""
+ANALYSES, BODIES = ("inverse", "straight", "sagging"), ("link1", "link2")
 
 
-@pytest.fixture(scope="module")
-def solved_with(link_file, tmp_path_factory):
+def solved_with(motors="section", points=(), **of_patches):
     """The two-link arm with keys of its own for patches and points."""
-    links = {"link1": link_file("link1", "simply-supported"), "link2": link_file("link2", "cantilever")}
-
-    def run(motors="section", pzt="", points=""):
-        scene = tmp_path_factory.mktemp("scene") / "scene.toml"
-        patches = "".join(PATCHES.format(body=body, own=pzt) for body in links)
-        text = SCENE.format(motors=motors, patches=patches, points=POINTS.format(own=points), **links)
-        scene.write_text(text)
-        return solve_scene(scene)
-
-    return run
+    shapes = {"straight": "zero", "sagging": "static"}
+    run = {"end": 0.1, "output_step": 0.02}
+    return solve_scene(ffrobot.make_scene(
+        name="two_link", gravity=[0.0, -9.81], motors=motors,
+        body=[{"name": "link1", "link": paper_link("simply-supported")}, {"name": "link2", "link": paper_link()}],
+        joint=[{"name": "O", "type": "revolute", "between": ["ground", "link1.root"]},
+               {"name": "A", "type": "revolute", "between": ["link1.tip", "link2.root"]}],
+        initial={"angles": {"link1": 0.0, "link2": np.pi / 3}},
+        trajectory=[{"name": "tip", "point": "link2.tip", "x": "1.5*cos(pi*t/4)", "y": "sqrt(3)/2*cos(pi*t/4)"}],
+        pzt=[CERAMIC | {"body": body, "count": 10, "structural": False} | of_patches for body in BODIES],
+        actuation_points=[{"body": body} | dict(points) for body in BODIES],
+        analysis=[{"name": "inverse", "kind": "pcid", "tolerance": 1e-6} | run,
+                  *({"name": name, "kind": "fcid", "shape": shape} | run for name, shape in shapes.items())],
+    ))  # fmt: skip
 
 
 @pytest.fixture(scope="module", params=["section", "frame"])
-def solution(request, solved_with):
+def solution(request):
     return solved_with(request.param)
 
 
 @pytest.fixture(scope="module")
-def limited(solved_with):
+def limited():
     """Patches at ±200 V; points too few to carry Q_a."""
-    return solved_with(pzt="limit = 200.0", points='transverse = [0.25, 0.5, "tip"]')
-
-
-ANALYSES = ["inverse", "straight", "sagging"]
-
-
-BODIES = ("link1", "link2")
+    return solved_with(limit=200.0, points={"transverse": [0.25, 0.5, "tip"]})
 
 
 def velocity(result, body):

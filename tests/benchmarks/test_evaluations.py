@@ -22,12 +22,6 @@ def seconds(rows, what):
     return float(rows[what]["seconds_min"])
 
 
-def test_time_grows_linearly_with_links(rows):
-    """Ten times the links take about ten times as long; wide bounds for caches and a busy machine."""
-    few, many = (seconds(rows, f"chain of {n} links × 10 modes, 2 constraints") for n in (5, 50))
-    assert 6.0 < many / few < 16.0
-
-
 def test_more_is_slower(rows):
     """Six links than three, flexible ones than rigid; the program written by hand is the least and its own measure."""
     arms = [f"arm of {n} links × 10 modes in 3D, {n} constraints" for n in (3, 6)]

@@ -12,13 +12,12 @@ estimates it to be, without knowing the reference. Arms that bend by more than
 
 from __future__ import annotations
 
-import argparse
 import time
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from record import record
+from record import options, record
 
 import ffrobot
 from ffrobot.common.arrays import Array
@@ -101,13 +100,7 @@ def largest_deflection(solution: Solution, found: Any) -> float:
 
 def main() -> None:
     """Print a line for each arm, and how many are within the aim."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--arms", type=int, default=60)
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--seconds", type=float, default=480.0, help="after which no further arm is begun")
-    parser.add_argument("--plain", type=int, default=10, help="eigenmodes of the arm without attachment modes")
-    parser.add_argument("--record", action="store_true", help="keep the counts for docs/developer/stress_tests.md")
-    parser.add_argument("--reference", type=int, default=10, help="eigenmodes that the reference keeps")
+    parser = options(__doc__, arms=60, seed=1, seconds=480.0, plain=10, reference=10)
     asked, began = parser.parse_args(), time.perf_counter()
     rng = np.random.default_rng(asked.seed)
     errors, plain_errors, starts, passed_over, misjudged, told = [], [], [], 0, 0, 0

@@ -7,7 +7,6 @@ integrators in turn; evaluations are those of the equations of motion. A run by 
 the evaluations of "auto", which always completes.
 """
 
-import argparse
 import json
 import sys
 import time
@@ -20,7 +19,7 @@ sys.path.append(str(Path(__file__).parents[1] / "mbs"))
 from links import ANGLES, TIP, arm, arm_links, quintic, ritz_link
 from mechanisms import forward, make_model, pcid, revolute
 from oracle_runs import run
-from record import record
+from record import options, record
 
 from ffrobot.mbs.analysis.motors_only import MotorsOnly
 
@@ -159,10 +158,8 @@ def against_best(one):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = options(__doc__, repeat=3)
     parser.add_argument("file", type=Path, help="a JSON record per run; those in it are not run again")
-    parser.add_argument("--repeat", type=int, default=3)
-    parser.add_argument("--record", action="store_true", help="write the counts, for docs/developer/stress_tests.md")
     asked = parser.parse_args()
     text = asked.file.read_text() if asked.file.exists() else ""
     records = [json.loads(line) for line in text.splitlines()]

@@ -6,7 +6,6 @@ Each try damages one of the FILEs in one of the ways below and reads all of it i
 a signal or take for ever. Exit code 1 where anything but a refusal was found.
 """
 
-import argparse
 import os
 import random
 import signal
@@ -17,7 +16,7 @@ from pathlib import Path
 
 import h5py
 import numpy as np
-from record import record
+from record import options, record
 
 from ffrobot.common.errors import FfrobotError
 from ffrobot.fe_models.modal_body_file import is_modal_body_file, read_modal_body
@@ -115,13 +114,8 @@ def outcome(path: Path) -> str:
 
 def main() -> None:
     """Prints what was found."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = options(__doc__, tries=1000, seed=0)
     parser.add_argument("files", metavar="FILE.h5", type=Path, nargs="+")
-    parser.add_argument("--tries", type=int, default=1000)
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument(
-        "--record", action="store_true", help="write what was found, for docs/developer/stress_tests.md"
-    )
     asked = parser.parse_args()
     chance, found = random.Random(asked.seed), Counter[str]()
     damage = Damage(chance)

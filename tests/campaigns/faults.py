@@ -46,9 +46,9 @@ FAULTS = [
         MASSES,
         "np.eye(body.n_modes) + mass * Phi.T",
         "np.eye(body.n_modes) - mass * Phi.T",
-        "tests/mbs/test_payload.py",
+        "tests/mbs/test_body.py",
     ),
-    Fault(MASSES, "E = 0.5 * np.trace(inertia)", "E = np.trace(inertia)", "tests/mbs/test_payload.py"),
+    Fault(MASSES, "E = 0.5 * np.trace(inertia)", "E = np.trace(inertia)", "tests/mbs/test_body.py"),
     Fault(
         LOADS,
         "force = -payload.mass * (of_point.a",
@@ -154,7 +154,7 @@ FAULTS = [
         f"{CORE}/recursion/inverse/motors.cpp",
         "tau = motor.sign * Q_[motor.coordinate],",
         "tau = Q_[motor.coordinate],",
-        "tests/mbs/test_reversed_joints.py",
+        "tests/mbs/test_prescribed.py",
     ),
     Fault(
         f"{CORE}/recursion/constrained_aba/joint_elimination.h",

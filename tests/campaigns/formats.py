@@ -8,7 +8,6 @@ mass (of which it prints seven digits), 1e-5 in second moments or 1e-4 in freque
 integrates by one point, may be 1 % off in both.
 """
 
-import argparse
 import re
 import subprocess
 import sys
@@ -21,7 +20,7 @@ import numpy as np
 
 sys.path.append(str(Path(__file__).parents[1] / "mesh"))
 from decks import bar, elements, fixed, free, nodes, tetrahedra
-from record import record
+from record import options, record
 
 from ffrobot.fe_models.link import computed_modal_body
 from ffrobot.mesh.gmsh_session import gmsh_session
@@ -129,8 +128,7 @@ def by_calculix(folder, points):
 
 
 def main():
-    parser = argparse.ArgumentParser()
-    parser.add_argument("--record", action="store_true")
+    parser = options(__doc__)
     arguments = parser.parse_args()
     worst, formats, wrong = np.zeros(5), 0, False
     for part, exact, kind, cells in parts():

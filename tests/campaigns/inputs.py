@@ -9,7 +9,6 @@ names that lead elsewhere, and text that programs would run: a file CANARY must 
 folder. Commands run as in mutations.py. Exit code 1 where anything fell over.
 """
 
-import argparse
 import os
 import random
 import shutil
@@ -24,7 +23,7 @@ import numpy as np
 import trimesh
 from forked_command import BAD, load_once, outcome, run
 from hostile import Damage
-from record import record
+from record import options, record
 
 from ffrobot.common.checksum import seal
 
@@ -243,25 +242,20 @@ KINDS = ("urdf", "skin", "motion", "bag", "csv", "modal", "results", "sid", "fem
 
 def main() -> None:
     """Prints what was found."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--count", type=int, default=100)
-    parser.add_argument("--seed", type=int, default=0)
+    parser = options(__doc__, count=100, seed=0)
     parser.add_argument("--kind", action="append", choices=KINDS, help="only this one; repeatable")
-    parser.add_argument(
-        "--record", action="store_true", help="write what was found, for docs/developer/stress_tests.md"
-    )
-    options = parser.parse_args()
+    asked = parser.parse_args()
     load_once()
-    kinds = options.kind or KINDS
+    kinds = asked.kind or KINDS
     with tempfile.TemporaryDirectory() as folder:
-        campaign = Campaign(Path(folder), options.seed)
-        for number in range(options.count):
+        campaign = Campaign(Path(folder), asked.seed)
+        for number in range(asked.count):
             campaign.one(kinds[number % len(kinds)], number)
     for name, count in sorted(campaign.counts.items()):
         print(f"{name}: {count}")
-    if options.record:
+    if asked.record:
         found = ", ".join(f"{name} {count}" for name, count in sorted(campaign.counts.items()))
-        record("inputs", tried=f"{options.count} changed files and arguments", found=found)
+        record("inputs", tried=f"{asked.count} changed files and arguments", found=found)
     sys.exit(1 if campaign.bad else 0)
 
 

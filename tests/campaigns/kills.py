@@ -7,7 +7,6 @@ random part of the time that it takes, looks at every file, and runs the same co
 code 1 where anything was found.
 """
 
-import argparse
 import os
 import random
 import re
@@ -22,7 +21,7 @@ from pathlib import Path
 from subprocess import DEVNULL, PIPE, Popen
 
 import numpy as np
-from record import record
+from record import options, record
 
 from ffrobot.fe_models.modal_body_file import is_modal_body_file, read_modal_body
 from ffrobot.results.file import Results
@@ -51,19 +50,8 @@ analysis = [
     { name = "linear", kind = "linear", about = "inverse", times = [0.05] },
 ]
 """
-SPACE = """
-name = "space"
-space = "spatial"
-gravity = [0.0, 0.0, -9.81]
-body = [{ name = "arm", link = "arm.toml" }]
-joint = [{ name = "shoulder", type = "revolute", between = ["ground", "arm.root"], axis = [0, 1, 0] }]
-payload = [{ point = "arm.tip", mass = 0.1 }]
-trajectory = [{ name = "swing", joint = "shoulder", value = "0.1 + 0.08*(1 - cos(10*pi*t))" }]
-analysis = [
-    { name = "inverse", kind = "pcid", end = 0.5, output_step = 2e-5 },
-    { name = "again", kind = "pcid", end = 0.5, output_step = 2e-5 },
-]
-"""
+SPACE = SCENE.replace("gravity = [0.0, -9.81]", 'space = "spatial"\ngravity = [0.0, 0.0, -9.81]')
+SPACE = SPACE.replace('"arm.root"] }', '"arm.root"], axis = [0, 1, 0] }')
 ROBOT = """<robot name="two">
 <link name="base"/>
 <link name="arm"><inertial><origin xyz="0.2 0 0"/><mass value="1"/>
@@ -200,12 +188,7 @@ def _is_whole(path: Path) -> bool:
 
 def main() -> None:
     """Prints what was found."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--tries", type=int, default=100)
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument(
-        "--record", action="store_true", help="write what was found, for docs/developer/stress_tests.md"
-    )
+    parser = options(__doc__, tries=100, seed=0)
     asked = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         campaign = Campaign(Path(folder), asked.seed)

@@ -8,7 +8,6 @@ or crash, no end within four minutes of processor time, words on stderr, a scrip
 without a remark is listed to be judged: another number, or a line less, may describe another part in its own right.
 """
 
-import argparse
 import json
 import os
 import random
@@ -24,7 +23,7 @@ import meshio
 import numpy as np
 from decks import HEIGHT, VOLUME, bar, elements, fixed, free, nodes, tetrahedra
 from hostile import Damage
-from record import record
+from record import options, record
 
 from ffrobot.common.errors import InputError
 from ffrobot.mesh.part import part_mesh
@@ -143,13 +142,8 @@ def _answer(path: Path) -> tuple[str, str]:
 
 def main() -> None:
     """Prints what was found."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--count", type=int, default=100)
-    parser.add_argument("--seed", type=int, default=0)
+    parser = options(__doc__, count=100, seed=0)
     parser.add_argument("--kind", action="append", help="only files of this name or ending; repeatable")
-    parser.add_argument(
-        "--record", action="store_true", help="write what was found, for docs/developer/stress_tests.md"
-    )
     asked = parser.parse_args()
     counts: Counter[str] = Counter()
     with tempfile.TemporaryDirectory() as temporary:

@@ -9,7 +9,6 @@ limits of time and memory, and after `solve` the commands that read its results.
 traceback, a crash, no end within a minute of processor time, a message that names no file, other words on stderr.
 """
 
-import argparse
 import copy
 import json
 import os
@@ -28,7 +27,7 @@ from typing import Any
 import tomli_w
 from forked_command import BAD, GOOD, load_once, outcome, run
 from hostile import Mutator, known_keys, places
-from record import record
+from record import options, record
 
 sys.path.append(str(Path(__file__).parents[1] / "checkpoints" / "spatial"))
 from scene_of import scene
@@ -193,14 +192,9 @@ def campaign(seed: int, count: int, cases: list[str] | None = None, folder: Path
 
 def main() -> None:
     """Prints what was found."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--count", type=int, default=100)
-    parser.add_argument("--seed", type=int, default=0)
+    parser = options(__doc__, count=100, seed=0)
     parser.add_argument("--case", action="append", help="only this one; repeatable")
     parser.add_argument("--folder", type=Path, help="where the cases and their links, ready for use, are and stay")
-    parser.add_argument(
-        "--record", action="store_true", help="write what was found, for docs/developer/stress_tests.md"
-    )
     asked = parser.parse_args()
     load_once()
     found = campaign(asked.seed, asked.count, asked.case, asked.folder)

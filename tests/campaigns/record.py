@@ -4,10 +4,11 @@ A campaign (a script in this folder, run by hand with seeds of its own) takes an
 
     record("kills", tried="100 signals at random times …", found="0 half-written files, …")
 
-Counts belong into both texts. The table of the page then takes it in with `python tests/stress/table.py`, which
+Counts belong into both texts. The table of the page then takes it in with `python tests/campaigns/table.py`, which
 reads all files in `records/`; both are committed. A campaign of several parts has a name for each: "tolerance-radau".
 """
 
+import argparse
 import json
 import shlex
 import subprocess
@@ -16,6 +17,17 @@ from datetime import date
 from pathlib import Path
 
 HERE = Path(__file__).parent
+
+
+def options(doc: str, **defaults: object) -> argparse.ArgumentParser:
+    """Options of a campaign: one for each default, of its type, and `--record`."""
+    parser = argparse.ArgumentParser(description=doc, formatter_class=argparse.RawDescriptionHelpFormatter)
+    for name, default in defaults.items():
+        parser.add_argument(f"--{name}", type=type(default), default=default)
+    parser.add_argument("--record", action="store_true", help="keep what was found for docs/developer/stress_tests.md")
+    return parser
+
+
 RECORDS = HERE / "records"
 
 

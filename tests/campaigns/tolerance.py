@@ -8,7 +8,6 @@ the largest of their kind count in parts of that. Modal velocities count relativ
 body where that is larger than their own peak, rates of joints to 0.01 rad in the time of the run.
 """
 
-import argparse
 import json
 import tempfile
 from collections import defaultdict
@@ -18,7 +17,7 @@ import h5py
 import numpy as np
 from judging import largest_errors, nothing_of_rounding, peaks, record_of_run, with_body_velocity, with_slow_rates
 from random_robots import random_scene
-from record import record
+from record import options, record
 from robots_3d import random_scene_in_3d
 
 import ffrobot
@@ -139,13 +138,11 @@ def counts(records):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = options(__doc__, count=200)
     parser.add_argument("file", type=Path, help="a JSON record per robot; those in it are not run again")
     parser.add_argument("--space", action="store_true", help="robots in space")
-    parser.add_argument("--count", type=int, default=200, help="robots of each seed")
     parser.add_argument("--seeds", type=int, nargs="+", default=[1])
     parser.add_argument("--integrators", choices=list(RUNS), nargs="+")
-    parser.add_argument("--record", action="store_true", help="write the counts, for docs/developer/stress_tests.md")
     asked = parser.parse_args()
     of_all = RUNS_IN_SPACE if asked.space else RUNS
     text = asked.file.read_text() if asked.file.exists() else ""

@@ -9,7 +9,6 @@ others welded, which keeps runs short. Right values are those of Newton and Eule
 code 1 where torques differ or there is a traceback.
 """
 
-import argparse
 import sys
 import traceback
 from collections import Counter
@@ -22,7 +21,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parent.parent / "exchange"))
 
 from other_codes import pinocchio_moments
-from record import record
+from record import options, record
 from rigid_robots import moments, with_motion
 
 from ffrobot import FfrobotError
@@ -80,12 +79,10 @@ def different_files(folder):
 
 
 def main():
-    parser = argparse.ArgumentParser()
+    parser = options(__doc__, seed=1)
     parser.add_argument("folder", type=Path)
-    parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--pinocchio", type=Path)
     parser.add_argument("--fix", action="store_true")
-    parser.add_argument("--record", action="store_true")
     arguments = parser.parse_args()
     rng, found, worst = np.random.default_rng(arguments.seed), Counter(), 0.0
     files = different_files(arguments.folder)

@@ -10,7 +10,7 @@ of these (docs/theory.md; Shabana, Dynamics of Multibody Systems, ch. 5).
 
 import mpmath
 import numpy as np
-from links import eigenmode_link
+from bodies_by_invariants import PlanarBody, PlanarPoint
 from mechanisms import relative
 from mpmath import mp
 
@@ -40,6 +40,37 @@ def rotation(theta):
 
 
 TURN = np.array([[0, -1], [1, 0]], dtype=object)  # A_θ = A TURN
+
+
+def eigenmode_link(name, condition, modes, length=1.0, mass=1.0, EI=30.0):
+    """An Euler–Bernoulli beam in its exact modes, any number of them.
+
+    Integrals and slopes of the shapes: Blevins, Formulas for Natural Frequency and Mode Shape, table 8-1.
+    """
+    k = np.arange(1, modes + 1)
+    sign, one = (-1.0) ** (k + 1), np.ones(modes)
+    if condition == "simply-supported":
+        beta = k * np.pi
+        ends, slopes = (0 * one, 0 * one), (np.sqrt(2) * beta, -np.sqrt(2) * beta * sign)
+        mean, moment = np.sqrt(2) * (1 + sign) / beta, np.sqrt(2) * sign / beta
+    else:
+        beta = np.array(
+            [float(mpmath.findroot(lambda x: mpmath.cos(x) + mpmath.sech(x), (n - 0.5) * np.pi)) for n in k]
+        )
+        sigma = np.array([float((mpmath.cosh(x) + mpmath.cos(x)) / (mpmath.sinh(x) + mpmath.sin(x))) for x in beta])
+        ends, slopes = (0 * one, 2 * sign), (0 * one, 2 * sign * sigma * beta)
+        mean, moment = 2 * sigma / beta, 2 / beta**2
+    zero, root = np.zeros((modes, modes)), np.sqrt(mass)
+    points = {
+        label: PlanarPoint(np.array([at * length, 0.0]), np.array([0 * one, end / root]), slope / (length * root), zero)
+        for label, at, end, slope in zip(("root", "tip"), (0.0, 1.0), ends, slopes, strict=True)
+    }
+    return PlanarBody(
+        name=name, mass=mass, inertia=mass * length**2 / 3, first_moment=np.array([mass * length / 2, 0.0]),
+        stiffness=EI / (mass * length**3) * beta**4, damping=zero, S_bar=root * np.array([0 * one, mean]),
+        h=root * length * moment, j=0 * one, S_tilde=zero, m_xy=np.eye(modes), points=points,
+        length=length, K_s=zero, K_stretch=zero, K_turn=zero,
+    )  # fmt: skip
 
 
 class Invariants:

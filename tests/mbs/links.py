@@ -2,11 +2,12 @@
 
 from types import MappingProxyType
 
-import mpmath
 import numpy as np
-from bodies_by_invariants import GeometricStiffening, PlanarBody, PlanarPoint
 from mechanisms import make_model, revolute
 from numpy.polynomial import Legendre, Polynomial
+
+from ffrobot.mbs.model.body import Body, BodyPoint
+from ffrobot.mbs.model.stiffening import Stiffening
 
 CLAMPED = Polynomial([0, 0, 1])  # ξ²: deflection and slope vanish at the root
 SUPPORTED = Polynomial([0, 1, -1])  # ξ (1 − ξ): deflection vanishes at both ends
@@ -27,80 +28,37 @@ def ritz_link(name, condition, length=1.0, mass=1.0, EI=30.0, modes=3, damping_r
     T = (L_inverse.T @ vectors)[:, :modes]
     stiffness, n = stiffness[:modes], modes
 
+    def across(values, row):  # (3, n) of one nonzero row
+        found = np.zeros((3, n))
+        found[row] = values
+        return found
+
     def point(at):
         bend = np.array([f(at) for f in basis]) @ T
         slope = np.array([f.deriv()(at) for f in basis]) @ T / length
-        return PlanarPoint(np.array([at * length, 0.0]), np.array([np.zeros(n), bend]), slope)
+        return BodyPoint(np.array([at * length, 0.0, 0.0]), across(bend, 1), across(slope, 2))
 
-    w_1 = np.array([f.deriv()(xi) for f in basis]).T @ T / length
-
-    def stiffness_of(force):  # ∫N w'w' dx for N by ξ
-        return length / mass * w_1.T @ ((weight * force)[:, None] * w_1)
-
-    def point_stiffness(at):  # of a force at ξ = at
+    def stiffness_below(force, end=1.0):  # ∫N w'w' dx up to ξ = end, for N by ξ
         nodes, weights = np.polynomial.legendre.leggauss(modes + extra + 4)
-        slopes = np.array([f.deriv()((nodes + 1) / 2 * at) for f in basis]).T @ T / length
-        return length * at / 2 * slopes.T @ (weights[:, None] * slopes)
+        at = (nodes + 1) / 2 * end
+        slopes = np.array([f.deriv()(at) for f in basis]).T @ T / length
+        return length * end / 2 * slopes.T @ ((weights * force(at))[:, None] * slopes)
 
-    zero = np.zeros((n, n))
-    axial = GeometricStiffening(
-        K_omega=stiffness_of(mass * length * (1 - xi**2) / 2),
-        K_s=np.array([stiffness_of(mass * (1 - xi)), zero]),
-        K_h=zero,
-        K_points={
-            "root": np.zeros((3, n, n)),
-            "mid": np.array([point_stiffness(0.5), zero, zero]),
-            "tip": np.array([stiffness_of(np.ones_like(xi)), zero, zero]),
-        },
-        rotary=zero,
-    )
-    return PlanarBody(
-        name=name,
-        mass=mass,
-        inertia=mass * length**2 / 3,
-        first_moment=np.array([mass * length / 2, 0.0]),
-        stiffness=stiffness,
-        damping=np.diag(2 * damping_ratio * np.sqrt(stiffness)),
-        S_bar=np.array([np.zeros(n), (w * weight).sum(axis=1) @ T]),
-        h=(w * weight * xi).sum(axis=1) @ T * length,
-        j=np.zeros(n),
-        S_tilde=zero,
-        m_xy=np.eye(n),
-        points=MappingProxyType({"root": point(0.0), "mid": point(0.5), "tip": point(1.0)}),
-        modal_transform=np.eye(n),
-        length=length,
-        stiffening=axial if stiffening else None,
-    )
-
-
-def eigenmode_link(name, condition, modes, length=1.0, mass=1.0, EI=30.0):
-    """The same beam in its exact modes, any number of them.
-
-    Integrals and slopes of the shapes: Blevins, Formulas for Natural Frequency and Mode Shape, table 8-1.
-    """
-    k = np.arange(1, modes + 1)
-    sign, one = (-1.0) ** (k + 1), np.ones(modes)
-    if condition == "simply-supported":
-        beta = k * np.pi
-        ends, slopes = (0 * one, 0 * one), (np.sqrt(2) * beta, -np.sqrt(2) * beta * sign)
-        mean, moment = np.sqrt(2) * (1 + sign) / beta, np.sqrt(2) * sign / beta
-    else:
-        beta = np.array(
-            [float(mpmath.findroot(lambda x: mpmath.cos(x) + mpmath.sech(x), (n - 0.5) * np.pi)) for n in k]
-        )
-        sigma = np.array([float((mpmath.cosh(x) + mpmath.cos(x)) / (mpmath.sinh(x) + mpmath.sin(x))) for x in beta])
-        ends, slopes = (0 * one, 2 * sign), (0 * one, 2 * sign * sigma * beta)
-        mean, moment = 2 * sigma / beta, 2 / beta**2
-    zero, root = np.zeros((modes, modes)), np.sqrt(mass)
-    points = {
-        label: PlanarPoint(np.array([at * length, 0.0]), np.array([0 * one, end / root]), slope / (length * root))
-        for label, at, end, slope in zip(("root", "tip"), (0.0, 1.0), ends, slopes, strict=True)
-    }
-    return PlanarBody(
-        name=name, mass=mass, inertia=mass * length**2 / 3, first_moment=np.array([mass * length / 2, 0.0]),
-        stiffness=EI / (mass * length**3) * beta**4, damping=zero, S_bar=root * np.array([0 * one, mean]),
-        h=root * length * moment, j=0 * one, S_tilde=zero, m_xy=np.eye(modes), points=MappingProxyType(points),
-        modal_transform=np.eye(modes), length=length, stiffening=None,
+    K_s, K_x = np.zeros((3, n, n)), np.zeros((3, 3, n, n))
+    K_s[0] = stiffness_below(lambda x: mass * (1 - x))
+    K_x[0, 0] = stiffness_below(lambda x: mass * length * (1 - x**2) / 2)
+    ends = {"root": 0.0, "mid": 0.5, "tip": 1.0}
+    pulled = {label: np.array([stiffness_below(np.ones_like, at), *np.zeros((5, n, n))]) for label, at in ends.items()}
+    zero, second = np.zeros((3, 3, n, n)), np.diag([mass * length**2 / 3, 0.0, 0.0])
+    sums, moments, products = across((w * weight).sum(axis=1) @ T, 1), np.zeros((3, 3, n)), zero.copy()
+    moments[0, 1] = (w * weight * xi).sum(axis=1) @ T * length
+    products[1, 1] = np.eye(n)
+    return Body(
+        name=name, mass=mass, first_moment=np.array([mass * length / 2, 0.0, 0.0]), second_moment=second,
+        S_bar=sums, I_bar=moments, S_bar_kl=products, J_spin=0.0, h_spin=np.zeros(n), S_spin=np.zeros((n, n)),
+        stiffness=stiffness, damping=np.diag(2 * damping_ratio * np.sqrt(stiffness)),
+        points=MappingProxyType({label: point(at) for label, at in ends.items()}), modal_transform=np.eye(n),
+        length=length, stiffening=Stiffening(K_s, K_x, MappingProxyType(pulled), zero) if stiffening else None,
     )  # fmt: skip
 
 

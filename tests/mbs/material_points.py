@@ -3,9 +3,9 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from bodies_by_invariants import from_modal_body
 
 from ffrobot.fe_models.modal_body import Interface, ModalBody, PictureMesh, Stations
+from ffrobot.mbs.model.body import from_modal_body
 
 NAMED = ("root", "tip", "side")
 
@@ -62,8 +62,8 @@ class PointCloud:
             mesh=PictureMesh(x, np.zeros((0, 2), dtype=int), Phi),
         )
 
-    def planar_body(self):
-        """By way of the three-dimensional modal body, with the dense damping put in."""
+    def body(self):
+        """By way of the modal body, with the dense damping put in."""
         return replace(from_modal_body(self.name, self.modal_body()), damping=self.damping)
 
 

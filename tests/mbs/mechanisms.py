@@ -1,10 +1,10 @@
-"""Planar robots written in Python, of bodies given by their invariants: as the oracle has them, and as models in 3D."""
+"""Planar robots written in Python, of bodies of their own: as models, and as the oracle has them."""
 
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from bodies_by_invariants import in_3d
+from bodies_by_invariants import in_plane
 from marker_measures import (
     Kind,
     Marker,
@@ -24,6 +24,7 @@ from ffrobot.mbs.analysis.forward import Forward
 from ffrobot.mbs.analysis.pcid import Pcid
 from ffrobot.mbs.model.drives import Drive
 from ffrobot.mbs.model.model import Model, build_model
+from ffrobot.mbs.model.projection import projected
 from ffrobot.scene.load import make_scene
 
 PLACEHOLDER = {"mass": 1.0, "inertia": 1.0, "center": (0.0, 0.0)}  # the bodies themselves are passed beside the scene
@@ -52,19 +53,23 @@ class ModalLoad:
 
 @dataclass(frozen=True)
 class Robot:
-    """A scene with `PlanarBody`s: rows by `marker_measures`, and the model in 3D, projected on the plane."""
+    """A scene with `Body`s of its own: the model; and bodies and rows as the oracle has them."""
 
     scene: object
-    bodies: tuple
+    own: tuple
     modal_loads: tuple = ()
     tables: object = None  # keys of the scene
+
+    @cached_property
+    def bodies(self):
+        return tuple(map(in_plane, self.own))
 
     def body(self, name):
         return next(body for body in self.bodies if body.name == name)
 
     @cached_property
     def model(self) -> Model:
-        model = build_model(self.scene, [in_3d(body) for body in self.bodies])
+        model = build_model(self.scene, self.own)
         return replace(model, modal_loads=tuple(_drive(model, load) for load in self.modal_loads))
 
     @property
@@ -153,7 +158,7 @@ def make_model(bodies, modal_loads=(), **keys):
         {"name": body.name, "rigid": PLACEHOLDER | {"points": {name: (0.0, 0.0) for name in body.points}}}
         for body in bodies
     ]
-    return Robot(make_scene(**tables), tuple(bodies), tuple(modal_loads), tables)
+    return Robot(make_scene(**tables), tuple(map(projected, bodies)), tuple(modal_loads), tables)
 
 
 def checked_scene(joints, bodies=("a",)):

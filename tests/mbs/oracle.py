@@ -8,6 +8,7 @@ Coordinates q = (R, θ, p) of one body after the other; symbols as in Shabana, D
 from dataclasses import dataclass
 
 import numpy as np
+from bodies_by_invariants import PlanarPoint
 
 
 def rotation(theta):
@@ -35,20 +36,16 @@ class Fields:
 
 def fields(body, p):
     n = body.n_modes
-    m_xy, K = body.m_xy, np.zeros((2, n, n), dtype=complex)
-    if body.stiffening is not None:
-        m_xy = m_xy + body.stiffening.rotary
-        K[0] = body.stiffening.K_s[0] + 1j * body.stiffening.K_s[1]
-        K[1] = body.stiffening.K_omega + body.stiffening.rotary + 1j * body.stiffening.K_h
+    K = np.array([body.K_s[0] + 1j * body.K_s[1], body.K_stretch + 1j * body.K_turn])
     s0 = complex(*body.first_moment)
     of_modes = np.array([body.S_bar[0] + 1j * body.S_bar[1], body.j + 1j * body.h])
     affine = np.array([[body.mass, s0], [s0.conjugate(), body.inertia]])
-    H = np.block([[affine, of_modes], [of_modes.conj().T, m_xy + 1j * body.S_tilde]])
+    H = np.block([[affine, of_modes], [of_modes.conj().T, body.m_xy + 1j * body.S_tilde]])
     curvature = np.zeros((2 + n, n, n), dtype=complex)
     curvature[:2] = -np.einsum("ij,jkl->ikl", np.linalg.pinv(affine, hermitian=True), K)
     u = np.concatenate([[0, 1], p]) + 0.5 * p @ curvature @ p
     u_p = np.vstack([np.zeros((2, n)), np.eye(n)]) + curvature @ p
-    return Fields(H, u, u_p, curvature, np.eye(n) - m_xy)
+    return Fields(H, u, u_p, curvature, np.eye(n) - body.m_xy)
 
 
 def directions(f, p):
@@ -58,18 +55,9 @@ def directions(f, p):
     return np.column_stack([first, 1j * first, 1j * f.u, f.u_p])
 
 
-def point_stiffness(body, label):
-    """K (3, n, n) of forces along x and y and of a moment at a point."""
-    n = body.n_modes
-    if body.stiffening is None or not label:
-        return np.zeros((3, n, n))
-    return body.stiffening.K_points[label]
-
-
 def first_moment(body, p):
     """s = ∫ρ (x + Φp − ½ pᵀK p) and its derivative with respect to p."""
-    K_s = np.zeros((2, len(p), len(p))) if body.stiffening is None else body.stiffening.K_s
-    return body.first_moment + body.S_bar @ p - 0.5 * p @ K_s @ p, body.S_bar - K_s @ p
+    return body.first_moment + body.S_bar @ p - 0.5 * p @ body.K_s @ p, body.S_bar - body.K_s @ p
 
 
 def in_global_axes(theta, force):
@@ -190,13 +178,11 @@ class Mechanism:
             return Marker(np.array([*end.position, 0.0]), np.zeros(3), L, np.zeros(3))
         body, i = self.body(end.body), self.columns[end.body]
         (R, theta, p), (theta_dot, p_dot) = (q[i][:2], q[i][2], q[i][3:]), (v[i][2], v[i][3:])
-        if end.point:
-            point = body.points[end.point]
-            x, Phi, phi = point.position, point.translation, point.rotation
-        else:
-            x, Phi, phi = np.zeros(2), np.zeros((2, body.n_modes)), np.zeros(body.n_modes)
+        n = body.n_modes
+        frame = PlanarPoint(np.zeros(2), np.zeros((2, n)), np.zeros(n), np.zeros((3, n, n)))
+        point = body.points[end.point] if end.point else frame
+        x, Phi, phi, K = point.position, point.translation, point.rotation, point.K
         A, A_theta = rotation(theta), rotation_derivative(theta)
-        K = point_stiffness(body, end.point)
         u, Phi_p, phi_p = x + Phi @ p - 0.5 * p @ K[:2] @ p, Phi - K[:2] @ p, phi - K[2] @ p
         L[:2, i] = np.column_stack([np.eye(2), A_theta @ u, A @ Phi_p])
         L[2, i] = np.concatenate([[0, 0, 1], phi_p])

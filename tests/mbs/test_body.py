@@ -53,24 +53,27 @@ def test_rigid_body_about_its_origin():
     assert body.n_modes == 0
 
 
-def test_payload_has_the_energy_of_a_body_on_the_section():
-    """½ m |v_c|² + ½ Ωᵀ J Ω more than without, at any velocity of the straight link; modes are uncoupled again."""
+@pytest.mark.parametrize(("center", "bent"), [((0.03, -0.02, 0.05), 0.0), ((0.0, 0.0, 0.0), 1.0)])
+def test_payload_has_the_energy_of_a_body_on_the_section(center, bent):
+    """½ m |v_c|² + ½ Ωᵀ J Ω more than without, at any velocity; a point mass at any deflection. Modes are uncoupled."""
     rng = np.random.default_rng(4)
     bare = from_modal_body("upper", modal_body("links/upper.toml"))
-    center, J, m = np.array([0.03, -0.02, 0.05]), np.diag([2e-3, 3e-3, 4e-3]), 0.6
+    center, J, m = np.array(center), np.diag([2e-3, 3e-3, 4e-3]) * (1.0 - bent), 0.6
     loaded = with_payload(bare, "tip", m, center, J)
-    v = rng.standard_normal(6 + bare.n_modes)
-    p_dot = loaded.modal_transform @ v[6:]
+    v, p = rng.standard_normal(6 + bare.n_modes), bent * rng.standard_normal(bare.n_modes)
+    own, p_dot = loaded.modal_transform @ p, loaded.modal_transform @ v[6:]
     A = np.eye(3)
 
-    def energy(body, v):
-        return 0.5 * v @ body_mass_matrix(body, A, np.zeros(body.n_modes)) @ v
+    def energy(body, p, v):
+        return 0.5 * v @ body_mass_matrix(body, A, p) @ v
 
     at = bare.points["tip"]
     Omega = v[3:6] + at.rotation @ p_dot
-    v_c = v[:3] + np.cross(v[3:6], at.position) + at.translation @ p_dot + np.cross(Omega, center)
-    expected = energy(bare, np.concatenate([v[:6], p_dot])) + 0.5 * m * v_c @ v_c + 0.5 * Omega @ J @ Omega
-    assert energy(loaded, v) == pytest.approx(expected, rel=1e-12)
+    v_c = v[:3] + np.cross(v[3:6], at.position + at.translation @ own) + at.translation @ p_dot
+    v_c += np.cross(Omega, center)
+    expected = energy(bare, own, np.concatenate([v[:6], p_dot])) + 0.5 * m * v_c @ v_c + 0.5 * Omega @ J @ Omega
+    assert energy(loaded, p, v) == pytest.approx(expected, rel=1e-12)
+    np.testing.assert_allclose(loaded.first_moment, bare.first_moment + m * (at.position + center), rtol=1e-14)
     K = loaded.modal_transform.T @ np.diag(bare.stiffness) @ loaded.modal_transform
     np.testing.assert_allclose(K, np.diag(loaded.stiffness), atol=1e-9 * loaded.stiffness.max())
     assert np.all(loaded.stiffness < bare.stiffness * (1 + 1e-12))

@@ -59,56 +59,57 @@ def test_elbows_of_a_loop_next_to_where_it_is_cut(path, words):
 
 
 @pytest.fixture(scope="module")
-def links_of_six_axes(solved):
-    """In the cache: meshing them takes 0.7 GB, of a command here."""
+def six_axes(solved):
+    """The model of an arm with a spherical wrist and its starts; meshing its links takes 0.7 GB, of a command here."""
     solved("arm_6r")
-
-
-@pytest.mark.usefixtures("links_of_six_axes")
-def test_shoulder_elbow_and_wrist_of_six_axes():
-    """Each turn of the wrist comes in two, each elbow, each shoulder: all hold the tool in the same place and triad."""
     model = prepare_scene(CASES / "arm_6r" / "scene.toml").model
-    found = start_postures(model)
-    assert len(found) == 8
-    tree, section = model.tree, model.tree.section("flange.tool", np.eye(3))
-    held = [tree.motion(section, one.q[None], tree.frames(one.q[None])) for one in found]
-    for motion in held:
-        np.testing.assert_allclose(motion.r, held[0].r, atol=1e-10)
-        np.testing.assert_allclose(motion.F, held[0].F, atol=1e-10)
-    wrist = np.array([one.q[tree.nodes[tree.carried["wrist_pitch"]].q.start] for one in found])
-    np.testing.assert_allclose(np.sort(wrist), -np.sort(wrist)[::-1], atol=1e-9)
+    return model, start_postures(model)
 
 
-def test_all_eight_starts_of_six_axes_have_names_of_their_own(tmp_path):
-    """Each name leads to its start; the geometry of a spherical wrist behind a shoulder beside the first axis.
+def test_shoulder_elbow_and_wrist_of_six_axes(six_axes):
+    """Each turn of the wrist comes in two, each elbow, each shoulder: all hold the tool in the same place and triad.
 
     Left and right: the wrist's center is on one side or the other of the plane through the first axis along that of
-    the shoulder; flips of the wrist change its angle's sign and turn the joints next to it by half a turn.
+    the shoulder; flips of the wrist change its angle's sign and turn the joints next to it by half a turn; elbows are
+    up where they are above the line from the shoulder to the wrist.
     """
-    model = prepare_scene(CASES / "arm_6r" / "scene.toml").model
-    found, tree = start_postures(model), model.tree
-    names = [tuple(one.branch.items()) for one in found]
-    joints = ["shoulder", "elbow", "wrist_pitch"]
-    assert [list(one.branch) for one in found] == [joints] * 8
-    assert len(set(names)) == 8
-    by_name = {tuple(one.branch.values()): one.q[[tree.nodes[tree.carried[n]].q.start for n in tree.carried]]
-               for one in found}  # fmt: skip
-    for (shoulder, elbow, _), q in by_name.items():
-        waist, pitch = q[0], q[4]
-        forward = abs(np.angle(np.exp(1j * (waist - found[0].q[0])))) < np.pi / 2
+    model, found = six_axes
+    tree = model.tree
+    assert [list(one.branch) for one in found] == [["shoulder", "elbow", "wrist_pitch"]] * 8
+    angles = {tuple(one.branch.values()): one.q[[tree.nodes[tree.carried[n]].q.start for n in tree.carried]]
+              for one in found}  # fmt: skip
+    assert len(angles) == 8
+    tool = tree.section("flange.tool", np.eye(3))
+    pivots = [tree.nodes[tree.carried[name]].inner for name in ("shoulder", "elbow", "wrist_pitch")]
+    held = []
+    for one, ((shoulder, elbow, wrist), q) in zip(found, angles.items(), strict=True):
+        at = [tree.motion(section, one.q[None], tree.frames(one.q[None])) for section in (tool, *pivots)]
+        held.append(at[0])
+        a, b, c = (motion.r[0] for motion in at[1:])
+        middle = a + (c - a) * ((b - a) @ (c - a)) / ((c - a) @ (c - a))
+        assert (b[2] > middle[2]) == (elbow == "up")
+        forward = abs(np.angle(np.exp(1j * (q[0] - found[0].q[0])))) < np.pi / 2
         assert forward == (shoulder == "left")
-        other = by_name[shoulder, elbow, "noflip" if q[4] < 0 else "flip"]
+        other = angles[shoulder, elbow, "flip" if wrist == "noflip" else "noflip"]
         turned = np.angle(np.exp(1j * (other - q)))
         np.testing.assert_allclose(turned[:3], 0.0, atol=1e-8)
         np.testing.assert_allclose(np.abs(turned[[3, 5]]), np.pi, atol=1e-8)
-        np.testing.assert_allclose(other[4], -pitch, atol=1e-8)
+        np.testing.assert_allclose(other[4], -q[4], atol=1e-8)
+    for motion in held:
+        np.testing.assert_allclose(motion.r, held[0].r, atol=1e-10)
+        np.testing.assert_allclose(motion.F, held[0].F, atol=1e-10)
+
+
+@pytest.mark.parametrize("wrist", ["noflip", "positive"])
+def test_a_start_of_six_axes_by_name(six_axes, tmp_path, wrist):
+    """By the names of all three, and by the sign of an angle."""
+    _, found = six_axes
+    *_, wanted = (one for one in found[1:] if one.branch["wrist_pitch"] == "noflip")
+    inside = ", ".join(f'{joint} = "{word}"' for joint, word in (wanted.branch | {"wrist_pitch": wrist}).items())
     text = (CASES / "arm_6r" / "scene.toml").read_text(encoding="utf-8")
     text = text.replace('link = "', f'link = "{CASES / "arm_6r"}/')
-    wanted = found[5]
-    path = tmp_path / "scene.toml"
-    inside = ", ".join(f'{joint} = "{word}"' for joint, word in wanted.branch.items())
-    path.write_text(text.replace("[initial]\n", f"[initial]\nbranch = {{ {inside} }}\n"), encoding="utf-8")
-    q = undeformed_posture(prepare_scene(path).model).q
+    (tmp_path / "scene.toml").write_text(text.replace("[initial]\n", f"[initial]\nbranch = {{ {inside} }}\n"))
+    q = undeformed_posture(prepare_scene(tmp_path / "scene.toml").model).q
     np.testing.assert_allclose(np.exp(1j * q), np.exp(1j * wanted.q), atol=1e-7)
 
 
@@ -157,32 +158,6 @@ def test_an_elbow_by_name(word, side):
         assert results["rest/joints/A/coordinate"][0] == pytest.approx(-side * angle, abs=1e-6)
         y = results["rest/points/a.tip/position"][0, 1]
         assert (y > 0.1 * 0.5) == (side == 1)
-
-
-@pytest.mark.usefixtures("links_of_six_axes")
-def test_elbow_and_wrist_of_six_axes_by_name(tmp_path):
-    """Of the eight starts those that are so; the tool is where the path begins in each of them."""
-    text = (CASES / "arm_6r" / "scene.toml").read_text(encoding="utf-8")
-    text = text.replace('link = "', f'link = "{CASES / "arm_6r"}/')
-    wrists, places = set(), []
-    for elbow in ("up", "down"):
-        for wrist in ("positive", "negative"):
-            path = tmp_path / f"{elbow}_{wrist}.toml"
-            named = f'[initial]\nbranch = {{ elbow = "{elbow}", wrist_pitch = "{wrist}" }}\n'
-            path.write_text(text.replace("[initial]\n", named), encoding="utf-8")
-            model = prepare_scene(path).model
-            tree, q = model.tree, undeformed_posture(model).q
-            angle = q[tree.nodes[tree.carried["wrist_pitch"]].q.start]
-            assert (angle > 0.0) == (wrist == "positive")
-            wrists.add((elbow, wrist, round(float(angle), 3)))
-            section = tree.section("flange.tool", np.eye(3))
-            places.append(tree.motion(section, q[None], tree.frames(q[None])).r[0])
-            inner = [tree.nodes[tree.carried[name]].inner for name in ("shoulder", "elbow", "wrist_pitch")]
-            a, b, c = (tree.motion(one, q[None], tree.frames(q[None])).r[0] for one in inner)
-            middle = a + (c - a) * ((b - a) @ (c - a)) / ((c - a) @ (c - a))
-            assert (b[2] > middle[2]) == (elbow == "up")
-    assert len(wrists) == 4
-    np.testing.assert_allclose(places, np.tile(places[0], (4, 1)), atol=1e-7)
 
 
 def test_a_branch_that_is_not_there(tmp_path):

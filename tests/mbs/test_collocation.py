@@ -54,31 +54,6 @@ def test_intervals_need_not_resolve_fast_growing_and_decaying_motions():
     assert error_at_breaks(40)[1] < 1e-4
 
 
-def unmet(intervals):
-    """Largest |r| / σ² of each component at the Gauss points and between them."""
-    breaks = np.linspace(0, 2, intervals + 1)
-    problem = dichotomy()
-    curve = collocate(problem, breaks, zero).curve
-    t = (breaks[:-1, None] + np.diff(breaks)[:, None] * np.linspace(0.01, 0.99, 12)).ravel()
-    r = problem.residual(t, curve(t), curve.derivative()(t), curve.derivative(2)(t))
-    return np.abs(r / SIGMA**2).max(axis=0)
-
-
-def test_what_the_curve_leaves_of_the_equations_falls_as_that_of_a_cubic():
-    """p̈ is a cubic on each interval: h⁴ where intervals resolve the motion, and h³ where σh is a thousand."""
-    slow, fast = np.log2(unmet(40) / unmet(80))
-    assert slow > 3.9
-    assert fast > 3.0
-
-
-def test_curve_is_smooth():
-    breaks = np.linspace(0, 2, 41)
-    curve = collocate(dichotomy(), breaks, zero).curve
-    for derivative in (curve, curve.derivative()):
-        jumps = derivative(breaks[1:-1]) - derivative(np.nextafter(breaks[1:-1], 0))
-        assert np.abs(jumps).max() < 1e-9
-
-
 def vibration(omega, zeta, state, breaks):
     """p̈ + 2ζω ṗ + ω² p = 0 from (p, ṗ) at the first break: both at the last."""
     one = np.array([omega])
@@ -99,12 +74,6 @@ def pade(z):
     """The diagonal Padé approximant (4, 4) of e^z, by which a step of Gauss's method multiplies solutions of ẏ = λy."""
     P = np.polynomial.Polynomial([1, 1 / 2, 3 / 28, 1 / 84, 1 / 1680])
     return P(z) / P(-z)
-
-
-def test_initial_value_problem_is_that_of_gauss_method():
-    """p̈ = −ω² p from p = 1, ṗ = 0: Re R(iωh)ⁿ, with R of Hairer, Nørsett and Wanner, II.7."""
-    breaks = np.linspace(0, 3, 31)
-    assert vibration(7.0, 0.0, [1.0, 0.0], breaks)[0] == pytest.approx((pade(0.7j) ** 30).real, abs=1e-12)
 
 
 @pytest.mark.parametrize("zeta", [-0.01, 0.0, 0.01])

@@ -5,7 +5,7 @@ import pytest
 from balances import energy_and_losses
 from links import ANGLES, TIP, arm, arm_links, quintic
 from mechanisms import checked_scene, forward, make_model, pcid, relative, revolute
-from oracle_runs import joint_forces, point_motion, run
+from oracle_runs import point_motion, run
 from patch_sets import Patches
 from rods import rod
 
@@ -86,15 +86,6 @@ def test_stiff_gears_approach_rigid_ones_as_one_over_their_stiffness():
     np.testing.assert_allclose(order, 1.0, atol=0.1)
 
 
-@pytest.mark.parametrize("integrator", ["radau", "generalized-alpha"])
-def test_implicit_integrators_agree_with_explicit_ones(integrator):
-    model = geared_arm(GEARED, trajectory=[], initial={"angles": {"link1": 0.3, "link2": 1.0}})
-    reference = run(model, forward(end=0.2, tolerance=1e-8, integrator="dop853"))
-    outcome = run(model, forward(end=0.2, tolerance=1e-5, integrator=integrator))
-    assert outcome.status == "completed"
-    assert relative(outcome.q, reference.q) < 1e-4
-
-
 def carried_out(model, end=1.0):
     """Distance (T,) of the tip from its path when the motors do what the inverse analysis says; and that analysis."""
     source = run(model, pcid(tolerance=1e-9, end=end, output_step=0.0025))
@@ -171,13 +162,6 @@ def test_equilibrium_winds_the_gears():
     assert np.abs(np.delete(mechanism.force, along)).max() < 1e-9 * mechanism.force[along].max()
 
 
-def test_static_moments_are_those_of_the_gears():
-    analysis = Static(name="static", kind="static")
-    static = run(geared_arm(GEARED), analysis)
-    for joint in "OA":
-        np.testing.assert_allclose(static.motion.gears[joint].gear_moment, joint_forces(static, joint).motor)
-
-
 @pytest.mark.parametrize(
     ("keys", "expected"),
     [
@@ -243,16 +227,6 @@ def test_a_gear_that_stiffens_swings_as_two_sinusoids():
     work = tau * outcome.motion.motor_motion("O")[0]
     energies, _ = energy_and_losses(outcome)
     np.testing.assert_allclose(energies - energies[0], work - work[0], atol=1e-7 * np.abs(work).max())
-
-
-def test_one_step_without_torques_is_a_linear_gear():
-    tau = "2*sin(20*t)"
-    twists = []
-    for stiffness in (K, {"values": [K]}, {"values": [K, 2 * K], "torques": [1e6]}):
-        outcome = run(pendulum(tau, stiffness=stiffness), forward(tolerance=1e-9))
-        twists.append(outcome.motion.motor_motion("O")[0] - outcome.q[:, 2])
-    for other in twists[1:]:
-        np.testing.assert_allclose(other, twists[0], atol=1e-11 * np.abs(twists[0]).max())
 
 
 @pytest.mark.parametrize(("torque", "slope"), [(0.2, K1), (-0.2, K1), (3.0, K2), (-3.0, K2)])

@@ -55,7 +55,7 @@ def test_the_guess_picks_the_elbow(angles, elbow):
 def test_a_closed_loop_takes_the_branch_of_the_guess(side):
     """The crank above or below the axis, same slider position."""
     path = {"name": "slider", "point": "slider.pin", "x": "0.6"}
-    q, _, oracle = started(slider_crank(path, {"crank": 0.9 * side, "rod": -0.3 * side}))
+    q, _, oracle = started(slider_crank(path, initial={"angles": {"crank": 0.9 * side, "rod": -0.3 * side}}))
     # 0.5² = 0.2² + 0.6² − 2 · 0.2 · 0.6 cos φ
     expected = side * np.arccos((0.04 + 0.36 - 0.25) / 0.24)
     assert q[oracle.columns["crank"]][2] == pytest.approx(expected, abs=1e-12)
@@ -92,19 +92,6 @@ def test_static_start_is_at_rest():
     assert np.abs(outcome.a[0]).max() < 1e-8
     assert np.abs(outcome.q - outcome.q[0]).max() < 1e-10
     assert np.abs(outcome.lambda_ - outcome.lambda_[0]).max() < 1e-8 * np.abs(outcome.lambda_).max()
-
-
-def test_undeformed_start_rings():
-    """What the static start avoids."""
-    outcome = run(arm(trajectory=[HOLD]), pcid())
-    assert np.abs(outcome.lambda_ - outcome.lambda_[0]).max() > np.abs(outcome.lambda_[0]).max()
-
-
-def test_static_start_of_a_moving_robot_meets_its_rates():
-    model = arm(trajectory=[to("1.2-0.3*t", "0.9+0.5*t")], initial={"angles": ANGLES, "state": "static"})
-    q, v, oracle = seen_start(model, initial_state(model.model))
-    C, rate, _ = oracle.constraint_values(0.0, q, v)
-    assert max(np.abs(C).max(), np.abs(rate).max()) < 1e-12
 
 
 def test_robot_without_equilibrium_is_refused():

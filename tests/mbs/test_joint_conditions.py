@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
+from beam_links import beam_link, rectangle
 from scipy.linalg import eigh
 from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
-from strip_link import LINK
 
-from ffrobot import solve
+from ffrobot import make_scene, solve
 from ffrobot.mbs.solve.poses import PoseEvaluator
 from ffrobot.mbs.solve.start import undeformed_posture
 from ffrobot.run.solve import prepare_scene
@@ -17,27 +17,27 @@ G = E / (2 * (1 + NU))
 GEAR = 3000.0  # N·m/rad
 
 
-def write(folder, scene, **links):
-    """The results of a scene with these links: by name length, number of modes, families."""
-    for name, (length, count, family) in links.items():
-        text = LINK.format(name=name, length=length, elements=20, count=count, family=family)
-        (folder / f"{name}.toml").write_text(text)
-    path = folder / "scene.toml"
-    path.write_text(scene)
-    return solve(path)
+REST = {"name": "rest", "kind": "static"}
+POINTS = {"root": [0.0, 0.0], "tip": [0.8, 0.0]}
 
 
-def bodies_and_joints(names, axes, **keys):
-    """A chain of links along x, each on a motor about one of the axes."""
-    more = "".join(f"{key} = {value}\n" for key, value in keys.items())
-    text, before = "", ("ground", [0.0, 0.0, 0.0])
-    for name, axis in zip(names, axes, strict=True):
-        at = "at = [0.0, 0.0, 0.0]\n" if before[0] == "ground" else ""
-        text += f'[[body]]\nname = "{name}"\nlink = "{name}.toml"\n'
-        text += f'[[joint]]\nname = "to_{name}"\ntype = "revolute"\nbetween = ["{before[0]}", "{name}.root"]\n{at}'
-        text += f"axis = {axis}\nrotor_inertia = 1e-4\ngear_ratio = 50.0\n{more}"
-        before = (f"{name}.tip", None)
-    return text
+def pin(name, first, second, **keys):
+    return {"name": name, "type": "revolute", "between": [first, second]} | keys
+
+
+def strip(length, family="in-plane-bending", count=8):
+    return beam_link(length, rectangle(HEIGHT, WIDTH), 20, nu=NU, modes={"count": count, "family": family})
+
+
+def scene(body, joint, **keys):
+    """In no field of gravity; links or rigid bodies by name."""
+    bodies = [{"name": name, "rigid" if "mass" in of_body else "link": of_body} for name, of_body in body.items()]
+    keys = {"gravity": [0.0, 0.0], "analysis": [REST]} | keys
+    return make_scene(name="robot", body=bodies, joint=joint, **keys)
+
+
+def in_space(body, joint, **keys):
+    return scene(body, joint, space="spatial", gravity=[0.0, 0.0, 0.0], **keys)
 
 
 def of_beam(length):
@@ -53,15 +53,12 @@ def of_beam(length):
     return found
 
 
-def test_a_beam_with_a_load_behind_a_gear(tmp_path):
+def test_a_beam_with_a_load_behind_a_gear():
     """Compliance by the static shape; frequency by the characteristic equation of a cantilever with a tip mass."""
     mass = 1.0
-    scene = 'name = "one"\nspace = "planar"\ngravity = [0.0, 0.0]\n'
-    scene += '[[body]]\nname = "arm"\nlink = "arm.toml"\n'
-    scene += '[[joint]]\nname = "hub"\ntype = "revolute"\nbetween = ["ground", "arm.root"]\nrotor_inertia = 6e-5\n'
-    scene += f"gear_ratio = 100.0\nstiffness = {GEAR}\n"
-    scene += f'[[payload]]\npoint = "arm.tip"\nmass = {mass}\n'
-    scene += '[[analysis]]\nname = "rest"\nkind = "static"\n[[analysis]]\nname = "linear"\nkind = "linear"\n'
+    hub = pin("hub", "ground", "arm.root", rotor_inertia=6e-5, gear_ratio=100.0, stiffness=GEAR)
+    payload = [{"point": "arm.tip", "mass": mass}]
+    robot = scene({"arm": strip(1.0)}, [hub], payload=payload, analysis=[REST, {"name": "linear", "kind": "linear"}])
     EI, L, rho_A = E * WIDTH * HEIGHT**3 / 12, 1.0, RHO * HEIGHT * WIDTH
     bending = np.array([[L**3 / 3, L**2 / 2], [L**2 / 2, L]]) / EI
     gear = np.array([[L * L, L], [L, 1.0]]) / GEAR
@@ -71,7 +68,7 @@ def test_a_beam_with_a_load_behind_a_gear(tmp_path):
         return 1 + np.cos(b) * np.cosh(b) + mass / (rho_A * L) * b * rest
 
     first = brentq(characteristic, 0.5, 1.8, xtol=1e-14) ** 2 * np.sqrt(EI / (rho_A * L**4)) / (2 * np.pi)
-    with write(tmp_path, scene, arm=(L, 8, '"in-plane-bending"')) as results:
+    with solve(robot) as results:
         for analysis in ("rest", "linear"):
             locked, geared = (
                 results[f"{analysis}/joints_{name}/compliance/arm.tip"][0] for name in ("locked", "compliant")
@@ -83,15 +80,21 @@ def test_a_beam_with_a_load_behind_a_gear(tmp_path):
         assert shape.shape[0] == results["rest/joints_locked/frequency"].shape[1]
 
 
-def test_compliance_of_a_chain_in_space(tmp_path):
+def test_compliance_of_a_chain_in_space():
     """That of each beam and gear, carried to the tool as rigid motion: C = Σ Xᵢ Cᵢ Xᵢᵀ + Σ aⱼ aⱼᵀ / kⱼ."""
     names, axes = ("a", "b", "c"), ([0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0])
     lengths, angles = {"a": 0.7, "b": 0.5, "c": 0.4}, (0.4, -0.7, 0.9)
-    scene = 'name = "chain"\nspace = "spatial"\ngravity = [0.0, 0.0, 0.0]\n'
-    scene += bodies_and_joints(names, axes, stiffness=GEAR)
-    start = ", ".join(f"to_{name} = {angle}" for name, angle in zip(names, angles, strict=True))
-    scene += f"[initial]\njoints = {{ {start} }}\n"
-    scene += '[[analysis]]\nname = "rest"\nkind = "static"\npoints = ["c.tip"]\n'
+    motor, ends = {"rotor_inertia": 1e-4, "gear_ratio": 50.0, "stiffness": GEAR}, ("ground", "a.tip", "b.tip")
+    joints = [
+        pin(f"to_{name}", end, f"{name}.root", axis=axis, **motor)
+        for name, end, axis in zip(names, ends, axes, strict=True)
+    ]
+    families = ["axial", "in-plane-bending", "out-of-plane-bending", "torsion"]
+    robot = in_space(
+        {name: strip(length, families) for name, length in lengths.items()}, joints,
+        initial={"joints": dict(zip(("to_a", "to_b", "to_c"), angles, strict=True))},
+        analysis=[REST | {"points": ["c.tip"]}],
+    )  # fmt: skip
     R, place, frames = np.eye(3), np.zeros(3), []
     for name, axis, angle in zip(names, axes, angles, strict=True):
         root, R = place, R @ Rotation.from_rotvec(angle * np.array(axis)).as_matrix()
@@ -105,58 +108,51 @@ def test_compliance_of_a_chain_in_space(tmp_path):
         links += X @ of_beam(lengths[name]) @ X.T
         a = np.concatenate([np.cross(axis, place - root), axis])
         gears += np.outer(a, a) / GEAR
-    families = '["axial", "in-plane-bending", "out-of-plane-bending", "torsion"]'
-    with write(tmp_path, scene, **{name: (lengths[name], 8, families) for name in names}) as results:
+    with solve(robot) as results:
         locked, geared = (results[f"rest/joints_{name}/compliance/c.tip"][0] for name in ("locked", "compliant"))
     np.testing.assert_allclose(geared - locked, gears, atol=1e-8 * np.abs(gears).max())
     np.testing.assert_allclose(locked, links, atol=1e-7 * np.abs(links).max())
 
 
-def test_a_pendulum_without_motors_hangs_on_its_weight(tmp_path):
-    """Compliance and frequency of a rigid one: L²/(m g l), √(m g l / J)."""
+def test_a_pendulum_without_motors_hangs_on_its_weight():
+    """Compliance and frequency of a rigid one: L²/(m g l), √(m g l / J); without a weight there is no stiffness."""
     m, length, J = 2.0, 0.8, 0.1
-    scene = 'name = "pendulum"\nspace = "planar"\ngravity = [0.0, -9.81]\n'
-    scene += f'[[body]]\nname = "bob"\nrigid = {{ mass = {m}, center = [0.5, 0.0], inertia = {J}, '
-    scene += f"points = {{ root = [0.0, 0.0], tip = [{length}, 0.0] }} }}\n"
-    scene += '[[joint]]\nname = "pin"\ntype = "revolute"\nbetween = ["ground", "bob.root"]\nmotor = false\n'
-    scene += '[initial]\nstate = "static"\nangles = { bob = -1.5 }\n[[analysis]]\nname = "rest"\nkind = "static"\n'
-    with write(tmp_path, scene) as results:
+    bob = {"mass": m, "center": [0.5, 0.0], "inertia": J, "points": POINTS}
+    pivot, start = [pin("pin", "ground", "bob.root", motor=False)], {"state": "static", "angles": {"bob": -1.5}}
+    with solve(scene({"bob": bob}, pivot)) as results:
+        assert np.isinf(results["rest/joints_locked/compliance/bob.tip"][0]).all()
+        assert results["rest/joints_locked/frequency"][0] == pytest.approx([0.0])
+    with solve(scene({"bob": bob}, pivot, gravity=[0.0, -9.81], initial=start)) as results:
         stiffness = m * 9.81 * 0.5
         C, f = results["rest/joints_locked/compliance/bob.tip"][0], results["rest/joints_locked/frequency"][0]
     np.testing.assert_allclose(C[0, 0], length**2 / stiffness, rtol=1e-9)
     np.testing.assert_allclose(f, [np.sqrt(stiffness / (J + m * 0.25)) / (2 * np.pi)], rtol=1e-9)
 
 
-def test_a_free_joint_without_motor_has_no_stiffness(tmp_path):
-    scene = 'name = "free"\nspace = "planar"\ngravity = [0.0, 0.0]\n[[body]]\nname = "bob"\n'
-    scene += "rigid = { mass = 2.0, center = [0.5, 0.0], inertia = 0.1, "
-    scene += "points = { root = [0.0, 0.0], tip = [0.8, 0.0] } }\n"
-    scene += '[[joint]]\nname = "pin"\ntype = "revolute"\nbetween = ["ground", "bob.root"]\nmotor = false\n'
-    scene += '[[analysis]]\nname = "rest"\nkind = "static"\n'
-    with write(tmp_path, scene) as results:
-        assert np.isinf(results["rest/joints_locked/compliance/bob.tip"][0]).all()
-        assert results["rest/joints_locked/frequency"][0] == pytest.approx([0.0])
-
-
-def test_frequencies_of_a_rigid_arm_of_six_axes_on_compliant_gears(tmp_path):
+def test_frequencies_of_a_rigid_arm_of_six_axes_on_compliant_gears():
     """M = Σ m JᵥᵀJᵥ + JωᵀI Jω of the links assembled here, K of the gears: rotors stand still, gravity is off."""
     rng = np.random.default_rng(6)
     axes = np.eye(3)[[2, 1, 1, 0, 1, 0]]
     offsets, angles = rng.uniform(-0.3, 0.5, (6, 3)), rng.uniform(-1.2, 1.2, 6)
     masses, centers = rng.uniform(1.0, 6.0, 6), rng.uniform(-0.1, 0.2, (6, 3))
     stiffness, inertias = rng.uniform(2e3, 3e4, 6), []
-    scene, before = 'name = "six"\nspace = "spatial"\ngravity = [0.0, 0.0, 0.0]\n', "ground"
     for k in range(6):
         turn = Rotation.random(random_state=k).as_matrix()
         inertias.append(turn @ np.diag(masses[k] * np.array([2e-3, 3e-3, 4e-3])) @ turn.T)
-        rows = inertias[k].tolist()
-        scene += f'[[body]]\nname = "b{k}"\nrigid = {{ mass = {masses[k]!r}, center = {centers[k].tolist()}, '
-        scene += f"inertia = {rows}, points = {{ root = [0.0, 0.0, 0.0], tip = {offsets[k].tolist()} }} }}\n"
-        scene += f'[[joint]]\nname = "j{k}"\ntype = "revolute"\nbetween = ["{before}", "b{k}.root"]\n'
-        scene += f"axis = {axes[k].tolist()}\ngear_ratio = 80.0\nrotor_inertia = 3e-5\nstiffness = {stiffness[k]!r}\n"
-        before = f"b{k}.tip"
-    start = ", ".join(f"j{k} = {angle!r}" for k, angle in enumerate(angles.tolist()))
-    scene += f'[initial]\njoints = {{ {start} }}\n[[analysis]]\nname = "rest"\nkind = "static"\npoints = ["b5.tip"]\n'
+    robot = in_space(
+        {
+            f"b{k}": {"mass": float(masses[k]), "center": centers[k].tolist(), "inertia": inertias[k].tolist(),
+                      "points": {"root": [0.0, 0.0, 0.0], "tip": offsets[k].tolist()}}
+            for k in range(6)
+        },
+        [
+            pin(f"j{k}", f"b{k - 1}.tip" if k else "ground", f"b{k}.root", axis=axes[k].tolist(), gear_ratio=80.0,
+                rotor_inertia=3e-5, stiffness=float(stiffness[k]))
+            for k in range(6)
+        ],
+        initial={"joints": {f"j{k}": angle for k, angle in enumerate(angles.tolist())}},
+        analysis=[REST | {"points": ["b5.tip"]}],
+    )  # fmt: skip
     R, place, joints, M = np.eye(3), np.zeros(3), [], np.zeros((6, 6))
     for k in range(6):
         axis = R @ axes[k]
@@ -171,52 +167,17 @@ def test_frequencies_of_a_rigid_arm_of_six_axes_on_compliant_gears(tmp_path):
         place = place + R @ offsets[k]
     J = np.array([np.concatenate([np.cross(about, place - at), about]) for at, about in joints]).T
     expected = np.sqrt(eigh(np.diag(stiffness), M, eigvals_only=True)) / (2 * np.pi)
-    with write(tmp_path, scene) as results:
+    with solve(robot) as results:
         np.testing.assert_allclose(results["rest/joints_compliant/frequency"][0], expected, rtol=1e-10)
         C = results["rest/joints_compliant/compliance/b5.tip"][0]
         assert results["rest/joints_locked/frequency"].shape == (1, 0)
     np.testing.assert_allclose(C, J @ np.diag(1 / stiffness) @ J.T, atol=1e-10 * np.abs(C).max())
 
 
-STRIP = """name = "{name}"
-material = {{ youngs_modulus = 2.4e11, density = 4000.0 }}
-geometry = {{ kind = "beam", length = {length}, section = {{ shape = "rectangle", height = 0.001, width = 0.05 }} }}
-mesh = {{ elements = {elements} }}
-reference = {{ condition = "cantilever" }}
-modes = {{ count = {count}, family = "in-plane-bending", attachment_modes = {attachment} }}
-damping = {{ ratio = {damping} }}
-"""  # EI = 1 N·m², ρA = 0.2 kg/m
-
-
-def strip(folder, name, length, elements, count, damping=0.0, attachment="true"):
-    text = STRIP.format(
-        name=name, length=length, elements=elements, count=count, damping=damping, attachment=attachment
-    )
-    (folder / f"{name}.toml").write_text(text)
-
-
-@pytest.mark.parametrize(
-    ("mass", "inertia", "published"), [(1.2, 0.1 + 0.1 * 0.25 / 3 + 0.0005 + 0.1 * 0.25, [0.48, 1.80]),
-                                       (0.1, 0.0005, [2.18, 15.91])]
-)  # fmt: skip
-def test_published_frequencies_of_a_two_link_arm(tmp_path, mass, inertia, published):
-    """De Luca and Siciliano (1991), IEEE Trans. Syst. Man Cybern. 21(4): links of 0.5 m, 0.2 kg/m, EI = 1 N·m².
-
-    The first link carries hub, second link and payload (1.2 kg; inertia of the stretched link about the joint), the
-    second one the payload. The paper has two decimals.
-    """
-    strip(tmp_path, "arm", 0.5, 20, 6)
-    scene = 'name = "one"\nspace = "planar"\ngravity = [0.0, 0.0]\n[[body]]\nname = "arm"\nlink = "arm.toml"\n'
-    scene += '[[body]]\nname = "hub"\n'
-    scene += (
-        f"rigid = {{ mass = {mass}, inertia = {inertia}, center = [0.0, 0.0], points = {{ root = [0.0, 0.0] }} }}\n"
-    )
-    scene += '[[joint]]\nname = "O"\ntype = "revolute"\nbetween = ["ground", "arm.root"]\n'
-    scene += '[[joint]]\nname = "w"\ntype = "weld"\nbetween = ["arm.tip", "hub.root"]\n'
-    scene += '[[analysis]]\nname = "rest"\nkind = "static"\npoints = ["arm.tip"]\n'
-    with write(tmp_path, scene) as results:
-        found = results["rest/joints_locked/frequency"][0, :2]
-    np.testing.assert_allclose(found, published, atol=0.0051)
+def thin(length, elements, count, **keys):
+    """EI = 1 N·m², ρA = 0.2 kg/m."""
+    modes = {"count": count, "family": "in-plane-bending"} | keys.pop("modes", {})
+    return beam_link(length, rectangle(0.001, 0.05), elements, E=2.4e11, nu=None, rho=4000.0, modes=modes, **keys)
 
 
 def beam_matrices(length, elements):
@@ -237,22 +198,20 @@ def beam_matrices(length, elements):
     return K[2:, 2:], M[2:, 2:], sums[2:], moments[2:]
 
 
-def test_frequencies_and_compliance_of_two_links_against_an_assembly_to_1e_8(tmp_path):
+def test_frequencies_and_compliance_of_two_links_against_an_assembly_to_1e_8():
     """Links at an angle, a payload, gears: Hermite beams, clamped at their roots, assembled here; all modes are kept.
 
     ṙ = n₁ ẇ₁(L₁) + (φ̇₁ + γ̇₂)(x n₂) + n₂ ẇ₂(x), with φ₁ the slope at the tip of the first link and γ the twist of gears.
     """
     L1, L2, elements, turn, mass, rotor, gear = 0.5, 0.4, 4, 0.8, 0.3, 1e-5, 4.0
-    for name, length in (("a", L1), ("b", L2)):
-        strip(tmp_path, name, length, elements, 2 * elements, attachment="false")
-    scene = 'name = "two"\nspace = "planar"\ngravity = [0.0, 0.0]\n'
-    for name, before in (("a", "ground"), ("b", "a.tip")):
-        scene += f'[[body]]\nname = "{name}"\nlink = "{name}.toml"\n[[joint]]\nname = "to_{name}"\ntype = "revolute"\n'
-        scene += (
-            f'between = ["{before}", "{name}.root"]\nstiffness = {gear}\nrotor_inertia = {rotor}\ngear_ratio = 10.0\n'
-        )
-    scene += f'[initial]\njoints = {{ to_b = {turn} }}\n[[payload]]\npoint = "b.tip"\nmass = {mass}\n'
-    scene += '[[analysis]]\nname = "rest"\nkind = "static"\npoints = ["b.tip"]\n'
+    robot = scene(
+        {name: thin(length, elements, 2 * elements, modes={"attachment_modes": False})
+         for name, length in (("a", L1), ("b", L2))},
+        [pin(f"to_{name}", before, f"{name}.root", stiffness=gear, rotor_inertia=rotor, gear_ratio=10.0)
+         for name, before in (("a", "ground"), ("b", "a.tip"))],
+        initial={"joints": {"to_b": turn}}, payload=[{"point": "b.tip", "mass": mass}],
+        analysis=[REST | {"points": ["b.tip"]}],
+    )  # fmt: skip
     (K1, M1, _, m1), (K2, M2, s2, m2) = (beam_matrices(length, elements) for length in (L1, L2))
     n, c, s = 2 * elements, np.cos(turn), np.sin(turn)
     K, M = np.zeros((2 * n + 2, 2 * n + 2)), np.zeros((2 * n + 2, 2 * n + 2))  # of w₁, w₂, γ₁, γ₂
@@ -273,7 +232,7 @@ def test_frequencies_and_compliance_of_two_links_against_an_assembly_to_1e_8(tmp
     end = np.array([np.zeros(2 * n + 2), tip])  # x, y of the tip of b, n₁ = (0, 1), n₂ = (−s, c)
     end += np.outer([-s, c], L2 * spin + np.eye(2 * n + 2)[2 * n - 2])
     M += mass * end.T @ end + rotor * np.outer(slope, slope)
-    with write(tmp_path, scene) as results:
+    with solve(robot) as results:
         for condition, kept in (("locked", slice(0, 2 * n)), ("compliant", slice(0, 2 * n + 2))):
             expected = np.sqrt(eigh(K[kept, kept], M[kept, kept], eigvals_only=True)) / (2 * np.pi)
             found = results[f"rest/joints_{condition}/frequency"][0]
@@ -285,21 +244,20 @@ def test_frequencies_and_compliance_of_two_links_against_an_assembly_to_1e_8(tmp
 
 
 @pytest.mark.parametrize(("condition", "frequency"), [("locked", 1.0), ("locked", 4.0), ("compliant", 1.0)])
-def test_frequency_response_against_time_integration(tmp_path, condition, frequency):
+def test_frequency_response_against_time_integration(condition, frequency):
     """A small oscillating force at the tip; after the transient the amplitude of the tip is |H|."""
-    strip(tmp_path, "arm", 0.5, 10, 3, damping=0.2)
     path = "motor" if condition == "compliant" else "joint"
-    gear = "stiffness = 4.0\ndamping = 0.5\nrotor_inertia = 1e-5\ngear_ratio = 10.0\n" * (condition == "compliant")
+    gear = {"stiffness": 4.0, "damping": 0.5, "rotor_inertia": 1e-5, "gear_ratio": 10.0} if path == "motor" else {}
     omega, force = 2 * np.pi * frequency, 1e-4
-    scene = 'name = "one"\nspace = "planar"\ngravity = [0.0, 0.0]\n[[body]]\nname = "arm"\nlink = "arm.toml"\n'
-    scene += f'[[joint]]\nname = "O"\ntype = "revolute"\nbetween = ["ground", "arm.root"]\n{gear}'
-    scene += '[[payload]]\npoint = "arm.tip"\nmass = 0.1\n'
-    scene += f'[[load]]\npoint = "arm.tip"\ny = "{force}*sin({omega}*t)"\n'
-    scene += f'[[trajectory]]\nname = "held"\n{path} = "O"\nvalue = "0"\n'
-    scene += '[[analysis]]\nname = "shaken"\nkind = "pcid"\nend = 12.0\noutput_step = 0.01\ntolerance = 1e-8\n'
-    with write(tmp_path, scene) as results:
+    robot = scene(
+        {"arm": thin(0.5, 10, 3, damping={"ratio": 0.2})}, [pin("O", "ground", "arm.root", **gear)],
+        payload=[{"point": "arm.tip", "mass": 0.1}], load=[{"point": "arm.tip", "y": f"{force}*sin({omega}*t)"}],
+        trajectory=[{"name": "held", path: "O", "value": "0"}],
+        analysis=[{"name": "shaken", "kind": "pcid", "end": 12.0, "output_step": 0.01, "tolerance": 1e-8}],
+    )  # fmt: skip
+    with solve(robot) as results:
         time, y = results["shaken/time"], results["shaken/points/arm.tip/position"][:, 1]
-    model = prepare_scene(tmp_path / "scene.toml").model
+    model = prepare_scene(robot).model
     found = PoseEvaluator(model, undeformed_posture(model).q, "arm.tip", count=1, omega=np.array([omega]))
     expected = found.at(undeformed_posture(model).q)[f"joints_{condition}/response"][0, 1]
     late = time > 10.0

@@ -6,7 +6,7 @@ import zoo
 from links import arm, arm_links
 from mechanisms import forward, pcid
 from oracle import elastic_forces, gravity_forces, mass_matrix, quadratic_velocity_forces
-from oracle_runs import joint_forces, run
+from oracle_runs import run
 
 from ffrobot.common.rotations import rotation
 from ffrobot.mbs.quantities.link_loads import loads_on_links
@@ -73,14 +73,3 @@ def test_inverse_dynamics_counts_what_motors_and_patches_do():
         np.testing.assert_allclose(link_loads(outcome, [body.name])[body.name].modal_force, F_p, atol=1e-9 * largest)
     np.testing.assert_allclose(at_point(link_loads(outcome, ["link2"])["link2"].sizes, "tip"), 0.0, atol=1e-9)
     assert np.abs(outcome.lambda_).max() > 1.0
-
-
-def test_forces_in_joints_are_those_of_the_multipliers():
-    """Of a forward run, whose multipliers are the reactions themselves; moments of the motors come with the loads."""
-    outcome = run(arm(trajectory=[], load=LOADS), forward(output_step=0.1))
-    loads, columns = link_loads(outcome, ["link2"])["link2"].sizes, outcome.coordinates("link2")
-    turns = [rotation(-theta) for theta in outcome.q[:, columns][:, 2]]
-    reaction = np.einsum("tij,tj->ti", turns, joint_forces(outcome, "A").reaction)
-    found = at_point(loads, "root")
-    np.testing.assert_allclose(found[:, :2], reaction, rtol=1e-8, atol=1e-9 * np.abs(reaction).max())
-    np.testing.assert_allclose(found[:, 2], 4 * np.sin(5 * outcome.time), atol=1e-9 * np.abs(reaction).max())

@@ -1,7 +1,5 @@
 """What is read off a motion in 3D, at the states and path forces of independent numbers."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from checkpoint_mechanisms import CASES, load
@@ -66,13 +64,3 @@ def test_quaternions_do_not_jump():
     e = np.stack([np.cos(angle / 2), np.sin(angle / 2), 0 * angle, 0 * angle], axis=1)
     jumping = e * np.where(e[:, :1] < 0, -1.0, 1.0)
     np.testing.assert_allclose(continuous(jumping), e, atol=1e-15)
-
-
-def test_coordinates_are_those_of_the_sides_as_named():
-    """A joint named from the outside in has the opposite coordinate, and rate."""
-    motion, data = motion_of("stanford")
-    for number, name in enumerate(("q1", "q2", "q3")):
-        x, rate = motion.joint(name)
-        close(x[:, 0], [sample["joints"][number] for sample in data["samples"]])
-        close(rate[:, 0], [sample["joint_rates"][number] for sample in data["samples"]])
-    assert replace(motion, time=motion.time).joint("nothing") is None

@@ -56,6 +56,10 @@ def test_slider_crank_moves_as_its_geometry_says():
     assert np.abs(outcome.v[:, slider][:, 0] - x_dot).max() < 1e-10
     assert np.abs(outcome.q[:, slider][:, 1:]).max() < 1e-10
     assert np.abs(outcome.q[:, rod_][:, 2] - np.arcsin(-r * np.sin(phi) / length)).max() < 1e-10
+    guide, crank = (outcome.motion.joint(name) for name in ("rail", "O"))
+    assert np.abs(guide[0][:, 0] - guide[0][0] - (x - x[0])).max() < 1e-10
+    assert np.abs(crank[0][:, 0] - phi).max() < 1e-10  # turns are counted
+    assert np.abs(crank[1] - phi_dot).max() < 1e-9
 
 
 def test_slider_crank_force_and_crank_moment_do_the_same_work():

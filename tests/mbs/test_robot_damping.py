@@ -1,14 +1,47 @@
-"""Damping ratios of an assembled robot: of its links' modes, and as `of = "robot"` wants them."""
+"""Damping ratios of an assembled robot: of its links' modes, and those that `of = "robot"` asks for."""
 
 import numpy as np
 import pytest
-from damped_arms import RATIO, planar_arm, vibrations_of
+from beam_links import beam_link
+
+import ffrobot
+from ffrobot.common.errors import InputError
+from ffrobot.run.solve import prepare_scene
+
+RATIO = 0.01
+
+
+def link(name, condition, of, section=None, **modes):
+    """A steel beam of 1 m that bends in the plane, unless `modes` says otherwise."""
+    return beam_link(
+        1.0, section or {"shape": "rectangle", "height": 0.015, "width": 0.025}, 20, E=2.068e11, nu=0.3, rho=7850.0,
+        condition=condition, name=name,
+        modes=modes or {"count": 10, "family": "in-plane-bending", "attachment_modes": False},
+        damping={"ratio": RATIO, "of": of}
+    )  # fmt: skip
+
+
+def planar_arm(conditions, of):
+    """The two-link arm of docs/theory.md, Damping."""
+    names = ("link1", "link2")
+    return {
+        "name": "arm", "gravity": [0.0, 0.0],
+        "body": [{"name": n, "link": link(n, c, of)} for n, c in zip(names, conditions, strict=True)],
+        "joint": [{"name": "O", "type": "revolute", "between": ["ground", "link1.root"]},
+                  {"name": "A", "type": "revolute", "between": ["link1.tip", "link2.root"]}],
+        "payload": [{"point": "link2.tip", "mass": 2.0}], "initial": {"angles": {"link1": 0.4, "link2": -0.6}},
+        "analysis": [{"name": "at_rest", "kind": "linear"}],
+    }  # fmt: skip
+
+
+def vibrations_of(scene):
+    """Frequencies (Hz) and damping ratios of the linear model of a scene, without rigid motion."""
+    with ffrobot.solve(ffrobot.make_scene(**scene)) as results:
+        frequency, ratio = (results[f"at_rest/linear/{key}"][0] for key in ("frequency", "damping_ratio"))
+    return frequency[frequency > 0.0], ratio[frequency > 0.0]
+
 
 CHOICES = [("simply-supported", "simply-supported"), ("simply-supported", "cantilever"), ("cantilever", "cantilever")]
-
-
-def linear(conditions, of):
-    return vibrations_of(planar_arm(conditions, of))
 
 
 @pytest.mark.parametrize(
@@ -18,41 +51,76 @@ def linear(conditions, of):
 )
 def test_ratios_of_the_links_are_others_in_the_robot(conditions, expected):
     """The numbers of docs/theory.md; that they depend on the frame is the point."""
-    _, ratio = linear(conditions, "link")
+    _, ratio = vibrations_of(planar_arm(conditions, "link"))
     np.testing.assert_allclose(ratio[:2], expected, rtol=0.01)
     assert np.all(ratio[:2] > 1.04 * RATIO)
 
 
-def test_the_summary_lists_ratios(tmp_path, ffrobot):
-    scene = tmp_path / "scene.toml"
-    scene.write_text(
-        """
-name = "arm"
-space = "planar"
-gravity = [0.0, 0.0]
-body = [{ name = "link", link = "link.toml" }]
-joint = [{ name = "O", type = "revolute", between = ["ground", "link.root"] }]
-analysis = [{ name = "at_rest", kind = "linear" }]
-""",
-        encoding="utf-8",
-    )
-    (tmp_path / "link.toml").write_text(
-        """
-name = "link"
-material = { youngs_modulus = 70e9, density = 2700.0 }
-geometry = { kind = "beam", length = 0.5, section = { shape = "rectangle", height = 0.01, width = 0.02 } }
-mesh = { elements = 10 }
-reference = { condition = "cantilever" }
-modes = { count = 3, family = "in-plane-bending", attachment_modes = false }
-damping = { ratio = 0.02, of = "robot" }
-""",
-        encoding="utf-8",
-    )
-    done = ffrobot.ok("solve", scene, "--verbose")
-    assert "damping ratios" in done.stdout
-    assert "0.02, 0.02, 0.02" in done.stdout
-    link = tmp_path / "link.toml"
-    link.write_text(link.read_text(encoding="utf-8").replace("ratio = 0.02", "ratio = [0.1, 0.1, 0.1]"))
-    done = ffrobot("solve", scene, "--verbose")
-    assert done.returncode == 2
-    assert 'damping: expected one ratio, with of = "robot"' in done.stderr
+def test_a_robot_has_one_ratio():
+    tables = planar_arm(("cantilever", "cantilever"), "robot")
+    tables["body"][0]["link"]["damping"]["ratio"] = [0.1] * 10
+    with pytest.raises(InputError, match='damping: expected one ratio, with of = "robot"'):
+        prepare_scene(ffrobot.make_scene(**tables))
+
+
+TUBE = {"shape": "tube", "outer": 0.03, "inner": 0.024}
+SIDES = ("simply-supported", "cantilever")
+
+
+def arm_in_3d(conditions, of):
+    """Yaw, pitch and, with two links, pitch; tubes that bend in both planes, stretch and twist."""
+    modes = {"family": "all", "count": 6}
+    points = {"root": [0.0, 0.0, 0.0], "top": [0.0, 0.0, 0.3]}
+    column = {"mass": 5.0, "center": [0.0, 0.0, 0.15], "inertia": [0.05, 0.05, 0.02], "points": points}
+    names = ("upper", "fore")[: len(conditions)]
+    between = (("waist", "column.top", "upper.root"), ("elbow", "upper.tip", "fore.root"))
+    return {
+        "name": "arm",
+        "space": "spatial",
+        "gravity": [0.0, 0.0, 0.0],
+        "body": [
+            {"name": "column", "rigid": column},
+            *({"name": n, "link": link(n, c, of, TUBE, **modes)} for n, c in zip(names, conditions, strict=True)),
+        ],
+        "joint": [
+            {"name": "turn", "type": "revolute", "between": ["ground", "column.root"], "axis": [0.0, 0.0, 1.0]},
+            *(
+                {"name": name, "type": "revolute", "between": sides, "axis": [0.0, -1.0, 0.0]}
+                for name, *sides in between[: len(conditions)]
+            ),
+        ],
+        "payload": [
+            {"point": f"{names[-1]}.tip", "mass": 1.0, "center": [0.0, 0.05, 0.02], "inertia": [1e-3, 2e-3, 2e-3]}
+        ],
+        "initial": {"joints": {"turn": 0.3, "waist": 0.7} | ({"elbow": -1.1} if len(conditions) > 1 else {})},
+        "analysis": [{"name": "at_rest", "kind": "linear"}],
+    }
+
+
+@pytest.mark.parametrize("condition", SIDES)
+def test_one_flexible_link_has_the_ratio_in_all_its_vibrations(condition):
+    """Bent, twisted and stretched at once by a payload beside its axis, on joints and bodies that move with it."""
+    _, ratio = vibrations_of(arm_in_3d([condition], "robot"))
+    _, of_link = vibrations_of(arm_in_3d([condition], "link"))
+    np.testing.assert_allclose(ratio, RATIO, rtol=1e-6)
+    assert np.abs(of_link[:6] / RATIO - 1).max() > 0.3
+
+
+def test_a_slender_link_on_a_stout_one():
+    """The square of the highest frequency is 2e10 times that of the lowest: slow vibrations are damped all the same."""
+    arm = arm_in_3d(SIDES[1:] * 2, "robot")
+    for body, length, diameter in zip(arm["body"][1:], (0.1, 1.0), (0.05, 0.004), strict=True):
+        section = {"shape": "circle", "diameter": diameter}
+        body["link"]["geometry"] = body["link"]["geometry"] | {"length": length, "section": section}
+    frequency, ratio = vibrations_of(arm)
+    assert (frequency[-1] / frequency[0]) ** 2 > 1e10
+    np.testing.assert_allclose(ratio[:6], RATIO, rtol=1e-3)
+
+
+def test_ratios_of_two_links_do_not_depend_on_their_frames():
+    """Damping between links is left out: of two vibrations that twist the same link one gets more, the other less."""
+    (_, first), (_, second) = (vibrations_of(arm_in_3d(sides, "robot")) for sides in (SIDES, SIDES[1:] * 2))
+    np.testing.assert_allclose(second[:8], first[:8], rtol=5e-3)
+    assert 0.6 * RATIO < first[:8].min() < first[:8].max() < 2.0 * RATIO
+    _, of_links = vibrations_of(arm_in_3d(SIDES, "link"))
+    assert of_links[:8].min() < 0.3 * RATIO

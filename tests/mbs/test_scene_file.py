@@ -187,6 +187,11 @@ MISTAKES = [
     # joints
     ('"weld"', '"wled"', 'joint "W": type: expected "revolute", "prismatic" or "weld", found "wled"', '"weld"?'),
     ('"weld"', '"weld"\nmotor = true', 'joint "W": expected no motor', "found motor = true"),
+    *(
+        ('"weld"', f'"weld"\n{key} = 1.0', 'joint "W": ', f'"{key}" only in revolute or prismatic joints, found it in a weld')
+        for key in ("moment_limit", "gear_ratio", "rotor_inertia", "viscous_friction")
+    ),
+    ('"weld"', '"weld"\nwy = 1.0', 'joint "W": wy: expected one of the keys', ""),
     ('"weld"', '"prismatic"', 'joint "W": expected an axis that is not zero', "found none"),
     ('"weld"', '"weld"\naxis = [1, 0]', 'joint "W": expected the key "axis" only in prismatic', "found it in a weld"),
     ('"weld"', '"weld"\nat = [1, 0]', 'joint "W": expected the key "at" only in joints to "ground"', "found it between"),
@@ -209,6 +214,7 @@ MISTAKES = [
     ('point = "link2.tip"', 'point = "link2.tip"\njoint = "O"', 'trajectory "tip": expected exactly one', '"point", "joint"'),
     ('point = "link2.tip"', 'joint = "O"', 'trajectory "tip": expected the keys "value", "waypoints", "via" with "joint"', '"x", "y"'),
     ('point = "link2.tip"', 'point = "link3.tip"', 'trajectory "tip": point: expected one of the bodies', '"link3.tip"'),
+    (TIP, 'joint = "W"\nvalue = "t"', 'trajectory "tip": joint: expected a joint that moves', 'found "W", a weld'),
     (TIP, 'joint = "B"\nvalue = "t"', 'trajectory "tip": joint: expected one of the joints "O", "A"', '"B"'),
     (TIP, 'angle = "B"\nvalue = "t"', 'trajectory "tip": angle: expected one of the bodies', '"B"'),
     ('x = "1.5*cos(pi*t/4)"', 'waypoints = "path.csv"', 'trajectory "tip": expected either waypoints, via or expr', '"y", "way'),
@@ -224,6 +230,7 @@ MISTAKES = [
     ('["10*t", 5]', '["10*t"]', "load no. 1: voltage: expected 2 expressions", "found 1"),
     ('["10*t", 5]', '["10*t", "v"]', "load no. 1: voltage[1]: expected an expression in t, found 'v'", "unknown name"),
     ('["10*t", 5]', '["log(t)", 5]', "load no. 1: voltage[0]: expected a finite value", "found none at t = 0 s"),
+    ('pzt = "link1"\nvoltage = ["10*t", 5]', 'joint = "W"\nmoment = 1', "load no. 1: joint: expected a joint that moves", "weld"),
     ('pzt = "link1"', 'joint = "O"', 'load no. 1: expected the keys "moment" with "joint", found "voltage"', ""),
     ("mass = 0.5", "", "payload no. 1: mass: expected a value, since this key is required, found none", ""),
     # analyses

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
+from beam_links import beam_link, rectangle
 from scipy.spatial.transform import Rotation
-from strip_link import LINK
 
 from ffrobot import make_scene, solve
 from ffrobot.common.errors import InputError
@@ -96,12 +96,14 @@ def test_payloads_and_joints_on_a_tool_are_in_its_axes():
     np.testing.assert_allclose(found[0], found[2], rtol=1e-9, atol=1e-9)
 
 
-def strip(folder, **keys):
-    (folder / "strip.toml").write_text(
-        LINK.format(name="strip", length=LENGTH, elements=20, count=4, family='"in-plane-bending"')
-    )
+def link(elements=20, count=4, family="in-plane-bending"):
+    modes = {"count": count, "family": family}
+    return beam_link(LENGTH, rectangle(HEIGHT, 0.03), elements, nu=0.3, name="strip", modes=modes)
+
+
+def strip(**keys):
     scene = {
-        "name": "strip", "gravity": [0.0, 0.0], "body": [{"name": "strip", "link": str(folder / "strip.toml")}],
+        "name": "strip", "gravity": [0.0, 0.0], "body": [{"name": "strip", "link": link()}],
         "joint": [{"name": "hub", "type": "revolute", "between": ["ground", "strip.root"]}],
         "tool": [{"name": "nose", "point": "strip.tip", "at": [BEYOND, 0.0], "angle": 0.6}],
         "initial": {"joints": {"hub": 0.4}},
@@ -111,7 +113,7 @@ def strip(folder, **keys):
     return make_scene(**(scene | keys))
 
 
-def test_compliance_at_a_tool_beyond_the_tip(tmp_path):
+def test_compliance_at_a_tool_beyond_the_tip():
     """A rigid nose on a cantilever: ∫ (L + d − x)²/EI dx across, L/EI in rotation; in the tool's axes, by F Cᵀ Fᵀ."""
     EI = E * 0.03 * HEIGHT**3 / 12
     a = LENGTH + BEYOND
@@ -119,14 +121,14 @@ def test_compliance_at_a_tool_beyond_the_tip(tmp_path):
     C = np.array([[0.0, 0.0, 0.0], [0.0, across, mixed], [0.0, mixed, LENGTH / EI]])
     c, s = np.cos(0.6), np.sin(0.6)
     own = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
-    with solve(strip(tmp_path)) as results:
+    with solve(strip()) as results:
         assert results.has("rest/joints_locked/compliance/strip.tip")
         found = results["rest/joints_locked/compliance/strip.nose"][0]
     np.testing.assert_allclose(found, own @ C @ own.T, rtol=1e-8, atol=1e-14)
 
 
-def test_a_map_and_static_have_one_compliance_at_a_tool(tmp_path):
-    scene = strip(tmp_path, gravity=[0.0, -9.81])
+def test_a_map_and_static_have_one_compliance_at_a_tool():
+    scene = strip(gravity=[0.0, -9.81])
     with solve(scene) as results:
         static = results["rest/joints_locked/compliance/strip.nose"][0]
     model = prepare_scene(scene).model
@@ -136,14 +138,12 @@ def test_a_map_and_static_have_one_compliance_at_a_tool(tmp_path):
 
 
 @pytest.mark.parametrize("arm", [(0.0, 0.0, 0.2), (0.1, -0.05, 0.15)])
-def test_the_bent_place_of_a_tool_is_exact_to_second_order(tmp_path, arm):
+def test_the_bent_place_of_a_tool_is_exact_to_second_order(arm):
     """With geometric stiffening, u = u_tip + exp(φ~) d but for terms of third order: an eighth of half the bending."""
-    family = '["in-plane-bending", "out-of-plane-bending", "torsion"]'
-    text = LINK.format(name="strip", length=LENGTH, elements=10, count=6, family=family)
-    (tmp_path / "strip.toml").write_text(text)
+    blade = link(10, 6, ["in-plane-bending", "out-of-plane-bending", "torsion"])
     scene = make_scene(
         name="strip", space="spatial", gravity=[0.0, 0.0, 0.0], geometric_stiffening=True,
-        body=[{"name": "strip", "link": str(tmp_path / "strip.toml")}],
+        body=[{"name": "strip", "link": blade}],
         joint=[{"name": "hub", "type": "revolute", "between": ["ground", "strip.root"], "axis": [0.0, 0.0, 1.0]}],
         tool=[{"name": "nose", "point": "strip.tip", "at": list(arm)}],
         analysis=[{"name": "rest", "kind": "static"}],
@@ -157,16 +157,16 @@ def test_the_bent_place_of_a_tool_is_exact_to_second_order(tmp_path, arm):
     assert off[1] < 0.14 * off[0]
 
 
-def test_a_tool_on_a_link_in_pieces(tmp_path):
+def test_a_tool_on_a_link_in_pieces():
     """Where the tip is, in the same axes."""
     paths = {"trajectory": [{"name": "swing", "joint": "hub", "value": "0.4 + 0.2*t**3"}],
              "analysis": [{"name": "move", "kind": "pcid", "end": 0.2, "output_step": 0.02}]}  # fmt: skip
     places = []
     for pieces in (None, 3):
         more = {} if pieces is None else {"pieces": pieces}
-        body = {"name": "strip", "link": str(tmp_path / "strip.toml"), **more}
+        body = {"name": "strip", "link": link(), **more}
         path = {"name": "tool", "point": "strip.nose", "y": "0.33 + 0.1*t**3"}
-        with solve(strip(tmp_path, body=[body], **(paths | {"trajectory": [path]}))) as results:
+        with solve(strip(body=[body], **(paths | {"trajectory": [path]}))) as results:
             places.append(results["move/points/strip.nose/position"])
     np.testing.assert_allclose(places[0], places[1], atol=1e-5)
     np.testing.assert_allclose(places[1][:, 1], 0.33 + 0.1 * np.linspace(0, 0.2, 11) ** 3, atol=1e-9)
@@ -186,12 +186,12 @@ def test_wrong_tools(keys, message):
         solve(wrist(tool=[tool(**keys)], trajectory=[{"name": "a", "joint": "to_a", "value": "0"}]))
 
 
-def test_compliance_where_payloads_and_loads_are(tmp_path):
+def test_compliance_where_payloads_and_loads_are():
     """Half way along a cantilever a³/3EI, by its modes; beside them the point of the path stays the first."""
     EI, a = E * 0.03 * HEIGHT**3 / 12, LENGTH / 2
     keys = {"payload": [{"point": "strip.mid", "mass": 0.1}], "load": [{"point": "strip.tip", "y": "0"}], "tool": []}
     path = [{"name": "still", "point": "strip.tip", "y": "0.6*sin(0.4)"}]
-    with solve(strip(tmp_path, trajectory=path, **keys)) as results:
+    with solve(strip(trajectory=path, **keys)) as results:
         names = [name.rpartition("/")[2] for name in results.keys() if "joints_locked/compliance/" in name]  # noqa: SIM118
         C = results["rest/joints_locked/compliance/strip.mid"][0]
     assert names == ["strip.mid", "strip.tip"]

@@ -1,13 +1,12 @@
 """Mechanisms of random bodies with every kind of joint, trajectory and load, on the ground's either side."""
 
-from dataclasses import replace
-
 import numpy as np
-from bodies_by_invariants import GeometricStiffening, with_payload
 from material_points import random_cloud
 from mechanisms import ModalLoad, make_model, revolute
+from random_mechanisms import stiffened as with_stiffening
 
 from ffrobot.mbs.fields.expressions import parse_expression
+from ffrobot.mbs.model.masses import with_payload
 
 LOADS = (
     {"point": "b1.side", "x": "3*sin(t)+1", "y": "-2*cos(t)", "moment": "0.7"},
@@ -16,7 +15,7 @@ LOADS = (
 
 
 def clouds(rng, count, **keys):
-    return [random_cloud(rng, f"b{k}", **keys).planar_body() for k in range(1, count + 1)]
+    return [random_cloud(rng, f"b{k}", **keys).body() for k in range(1, count + 1)]
 
 
 def serial_joints(count):
@@ -117,7 +116,7 @@ def tree(rng, **keys):
 def loaded(rng, **keys):
     """Forces and moments on a point, a joint moment, modal loads as patches make them, and a payload."""
     bodies = clouds(rng, 2)
-    bodies[1] = with_payload(bodies[1], "tip", mass=0.6, inertia=0.02)
+    bodies[1] = with_payload(bodies[1], "tip", 0.6, np.zeros(3), np.diag([0.0, 0.0, 0.02]))
     patches = [ModalLoad("b1", rng.standard_normal(bodies[0].n_modes), parse_expression(f"2-{k}*t")) for k in range(2)]
     tables = {"trajectory": [tip_path("b2")], "load": LOADS, "initial": {"angles": {"b1": 1.2, "b2": -0.7}}}
     return make_model(bodies, patches, **({"joint": serial_joints(2)} | tables | keys))
@@ -125,8 +124,8 @@ def loaded(rng, **keys):
 
 def stiffened(rng, **keys):
     """A chain of three bodies whose modes stiffen under every kind of load, with a payload and loads."""
-    bodies = [replace(body, stiffening=random_stiffening(rng, body)) for body in clouds(rng, 3)]
-    bodies[1] = with_payload(bodies[1], "tip", mass=0.6, inertia=0.02)
+    bodies = [with_stiffening(rng, body) for body in clouds(rng, 3)]
+    bodies[1] = with_payload(bodies[1], "tip", 0.6, np.zeros(3), np.diag([0.0, 0.0, 0.02]))
     angles = {f"b{k}": 1.2 * (-0.6) ** (k - 1) for k in range(1, 4)}
     tables = {"trajectory": [tip_path("b3")], "load": LOADS, "initial": {"angles": angles}}
     return make_model(bodies, **({"joint": serial_joints(3)} | tables | keys))
@@ -158,19 +157,6 @@ def as_built(mechanism):
         return mechanism(rng, **({"joint": built(bare.tables["joint"])} | keys))
 
     return build
-
-
-def random_stiffening(rng, body, size=0.05):
-    """Symmetric matrices for every unit load."""
-
-    def symmetric(*shape):
-        K = size * rng.standard_normal((*shape, body.n_modes, body.n_modes))
-        return K + K.swapaxes(-1, -2)
-
-    n = body.n_modes
-    return GeometricStiffening(
-        symmetric(), symmetric(2), symmetric(), {label: symmetric(3) for label in body.points}, np.zeros((n, n))
-    )
 
 
 def free_flying(rng, **keys):

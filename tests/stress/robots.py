@@ -1,13 +1,11 @@
 """Closed loops of rods or flexible links, runs of them, and what they keep."""
 
 import numpy as np
-from bodies_by_invariants import rigid_body
+import rods
 from links import arm, ritz_link
 from mechanisms import forward, make_model, oracle_of, pcid, revolute
 from oracle_runs import energies, run
-from rods import rod
-
-CRANK, ROD = 0.2, 0.5
+from rods import CRANK, ROD, rod
 
 
 def inverse(model, **keys):
@@ -31,18 +29,9 @@ def reaching(x, y="0", angles=(-0.7, 0.7), **keys):
 
 def slider_crank(trajectory=None, *, flexible=True, angle=0.9, **initial):
     """Crank and rod in one line at x = 0.7 and 0.3; `trajectory` drives slider or crank."""
-    joints = [
-        revolute("O", "ground", "crank.root", motor=True),
-        revolute("A", "crank.tip", "rod.root"),
-        revolute("B", "rod.tip", "slider.pin"),
-        {"name": "rail", "type": "prismatic", "between": ("ground", "slider.pin"), "axis": (1.0, 0.0)},
-    ]
-    slider = rigid_body("slider", 0.4, 0.01, (0.0, 0.0), {"pin": (0.0, 0.0)})
     flexible_rod = ritz_link("rod", "simply-supported", ROD, 1.5, damping_ratio=0.01)
-    bodies = [rod("crank", CRANK, 1.0), flexible_rod if flexible else rod("rod", ROD, 1.5), slider]
-    angles = {"crank": angle, "rod": -np.arcsin(CRANK * np.sin(angle) / ROD)}
-    paths = [] if trajectory is None else [trajectory]
-    return make_model(bodies, joint=joints, trajectory=paths, initial={"angles": angles, **initial})
+    initial |= {"angles": {"crank": angle, "rod": -np.arcsin(CRANK * np.sin(angle) / ROD)}}
+    return rods.slider_crank(trajectory, rod("rod", ROD, 1.5) if not flexible else flexible_rod, initial=initial)
 
 
 def through_dead_centre(speed):

@@ -1,38 +1,17 @@
 """Scenes at random: what holds for every mechanism holds for each of them."""
 
-import os
-
 import numpy as np
-import pytest
 import zoo
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from links import arm, quintic, ritz_link
 from mechanisms import forward, oracle_of, pcid, relative
 from oracle_runs import energies, evaluated, posture_of, random_tree_state, run
 from patch_sets import FULL
-from table import at_most
 
-GROUP = "Random scenes"
-SCENES = 40
-# The same scenes every time in continuous integration (.ci/run), others in every other run; one that fails is printed
-# with the line `@reproduce_failure(…)` to paste above its test.
-random_scenes = settings(
-    max_examples=SCENES,
-    deadline=None,
-    derandomize="CI" in os.environ,
-    database=None,
-    print_blob=True,
-    suppress_health_check=list(HealthCheck),
-)
+random_scenes = settings.get_profile("scenes")
 T = 0.37
 BOUNDS = {"residual": 1e-10, "power": 1e-5, "round_trip": 1e-6}
-worst = {}  # of all scenes so far
-
-
-def check(what, value):
-    worst[what] = max(worst.get(what, 0.0), float(value))
-    assert value <= BOUNDS[what]
 
 
 @st.composite
@@ -66,8 +45,9 @@ def test_accelerations_are_those_of_the_equations(system):
     of_joints = C_q[~is_path]
     carried = np.linalg.lstsq(of_joints.T, -left, rcond=None)[0] if len(of_joints) else np.zeros(0)
     size = max(np.abs(M @ a).max(), np.abs(of_joints.T @ carried).max(initial=0.0), np.abs(Q).max())
-    check("residual", np.abs(left + of_joints.T @ carried).max() / size)
-    check("residual", np.abs(C_q @ a - gamma).max(initial=0.0) / max(np.abs(a).max(), np.abs(v).max() ** 2, 1.0))
+    assert np.abs(left + of_joints.T @ carried).max() / size < BOUNDS["residual"]
+    size = max(np.abs(a).max(), np.abs(v).max() ** 2, 1.0)
+    assert np.abs(C_q @ a - gamma).max(initial=0.0) / size < BOUNDS["residual"]
 
 
 @random_scenes
@@ -95,7 +75,7 @@ def test_power_is_the_rate_of_energy(system):
     power += sum(V[oracle.columns[m.body]][3:] @ m.vector * m.magnitude(T)[0] for m in robot.modal_loads)
     terms = np.abs(V) @ np.abs(oracle.mass_matrix(Q) @ A) + abs(power)
     rounding = 1e-15 * energy(0.0)[1] / h  # of the differences; allowed beside the bound on the rest
-    check("power", abs(rate - power) / max(terms + rounding / BOUNDS["power"], 1e-300))
+    assert abs(rate - power) / max(terms + rounding / BOUNDS["power"], 1e-300) < BOUNDS["power"]
 
 
 @settings(random_scenes, max_examples=6)
@@ -119,17 +99,4 @@ def test_forward_follows_inverse(seed):
     replay = run(model, forward(tolerance=1e-6, actuation="inverse", apply="joints+pzt"), inverse, FULL)
     inverse.check_completed()
     replay.check_completed()
-    check("round_trip", relative(replay.q, inverse.q))
-
-
-def test_they_are_in_the_table(record):
-    """Bounds, since the scenes are others in every run; what was found is none of it zero, and below them."""
-    if worst.keys() != BOUNDS.keys():
-        pytest.skip("only after the others")
-    assert min(worst.values()) > 0.0
-    record(
-        GROUP,
-        f"{SCENES} random mechanisms each: equations of motion, power; 6 arms: PCID → forward",
-        "at most: residuals {residual}, power {power}, round trip {round_trip}",
-        **{what: at_most(BOUNDS[what], value) for what, value in worst.items()},
-    )
+    assert relative(replay.q, inverse.q) < BOUNDS["round_trip"]
