@@ -8,8 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from oracle_3d import Mechanism
 from rotations import quaternion
-from tree_accelerations import Accelerated
-from triad_measures import Ground, Section, Spinning
+from triad_measures import Ground, Joint, Section, Spinning
 
 from ffrobot.common.arrays import Array
 from ffrobot.mbs.model.cut import measured
@@ -17,8 +16,17 @@ from ffrobot.mbs.model.gears import gear_forces, resistance, rotor
 from ffrobot.mbs.quantities.energy import Energies, Momentum
 
 
+class Accelerated(NamedTuple):
+    """States q (T, n_q), v and a (T, n_v) of a tree, with the motion of its frames."""
+
+    tree: object
+    q: Array
+    v: Array
+    a: Array
+    frames: object
+
+
 def accelerated(motion) -> Accelerated:
-    """A motion with what accelerations are read off."""
     return Accelerated(motion.model.tree, motion.q, motion.v, motion.a, motion.frames)
 
 
@@ -67,11 +75,25 @@ def absolute_states(mechanism, state):
 
 
 def absolute_accelerations(mechanism, state) -> Array:
-    """V̇ (T, N) of all bodies."""
-    found = np.zeros((len(state.q), mechanism.size))
-    for node, frame, a in zip(state.tree.nodes, state.frames, state.of_frames(), strict=True):
-        own = np.einsum("tji,tj->ti", frame.F, a.Omega)
-        found[:, mechanism.coordinates.columns(node.body.name)] = np.hstack([a.r, own, state.a[:, node.p_v]])
+    """V̇ (T, N) of all bodies, by rows of the joints, which hold, and of their coordinates, which accelerate by a."""
+    tree, found, modes = state.tree, np.zeros((len(state.q), mechanism.size)), []
+    joints = []
+    for node in tree.nodes:
+        sides = triad(tree, node.inner), triad(tree, node.outer)
+        lead = getattr(node.joint, "lead", 0.0) / (2 * np.pi)
+        joints.append(Joint(node.joint.name, node.joint.type, *sides, lead))
+    held, moved = ([row for joint in joints for row in rows(joint)] for rows in (Joint.rows, Joint.coordinates))
+    for node in tree.nodes:
+        modes += range(*mechanism.coordinates.columns(node.body.name).indices(mechanism.size))[6:]
+    of_modes = np.concatenate([np.r_[node.p_v] for node in tree.nodes]).astype(int)
+    for k, at in enumerate(absolute_states(mechanism, state)):
+        known = {}
+        C, G = ([mechanism.row(row, at.q, at.v, 0.0, known) for row in rows] for rows in (held, moved))
+        gradients = np.array([row.gradient for row in (*C, *G)]).reshape(-1, mechanism.size)
+        right = -np.array([row.bias for row in (*C, *G)])
+        right[len(C) :] += gradients[len(C) :] @ at.B @ state.a[k]
+        rows = np.vstack([gradients, np.eye(mechanism.size)[modes]])
+        found[k] = np.linalg.solve(rows, np.concatenate([right, state.a[k, of_modes]]))
     return found
 
 

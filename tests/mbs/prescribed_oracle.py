@@ -1,11 +1,19 @@
 """Prescribed motion in 3D in NumPy, an oracle of the core: pseudoinverses of Jacobians, bodies by Kane's equations."""
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from body_equations import required_forces
+from body_equations import (
+    Accelerated,
+    absolute_accelerations,
+    absolute_states,
+    mechanism_of,
+    required_forces,
+    triad,
+)
 from row_wrenches import spin_of_modes
-from tree_accelerations import Accelerated, row_accelerations
+from triad_measures import Along, Dot, Way
 
 from ffrobot.common.arrays import Array
 from ffrobot.mbs.model.model import row_values, target_rates
@@ -44,6 +52,46 @@ def prescribed_motion(model, modes, times, near):
     required = required_forces(model, Accelerated(tree, q, v, a, frames), times)
     multipliers = -np.einsum("tji,tj->ti", by_joints, required[:, joints])
     return Prescribed(q, v, a, multipliers, required, C_v)
+
+
+def row_accelerations(model, state, times):
+    """C̈ (T, rows) at `times` (T,), less what their targets ask for: 0 where the motion keeps to the constraints."""
+    mechanism = mechanism_of(state.tree, np.zeros(3))
+    accelerations, found = absolute_accelerations(mechanism, state), np.zeros((len(times), len(model.rows)))
+    for r, row in enumerate(model.rows):
+        if row.kind == "coordinate":
+            found[:, r] = row.sign * state.a[:, row.coordinate]
+        measures = [] if row.kind == "coordinate" else measures_of(state.tree, row)
+        for k, at in enumerate(absolute_states(mechanism, state) if measures else ()):
+            rows = [mechanism.row(one, at.q, at.v) for one in measures]
+            second = [of.gradient @ accelerations[k] + of.bias for of in rows]
+            found[k, r] = second[0] if len(rows) == 1 else angle_acceleration(*rows, *second)
+        if row.target is not None:
+            found[:, r] -= row.target.sample(times)[2]
+    return found
+
+
+def measures_of(tree, row):
+    """Rows between triads whose axes are directions of the row: its value, or cosine and sine of an angle."""
+
+    def along(section, direction):
+        at = triad(tree, section)
+        return replace(at, triad=np.outer(at.triad @ direction, [1.0, 0.0, 0.0]))
+
+    if row.kind == "point":
+        return [Along(triad(tree, row.a), triad(tree, row.b), row.f)]
+    if row.kind == "slide":
+        return [Way(along(row.a, row.f), triad(tree, row.b), 0)]
+    if row.kind == "dot":
+        return [Dot(along(row.a, row.f), along(row.b, row.g), 0, 0)]
+    return [Dot(along(row.a, x), along(row.b, row.g), 0, 0) for x in (row.g, np.cross(row.f, row.g))]
+
+
+def angle_acceleration(cosine, sine, of_cosine, of_sine):
+    """d²/dt² of atan2(s, c), by their second derivatives."""
+    c, c_dot, s, s_dot = cosine.value, cosine.rate, sine.value, sine.rate
+    found = (c * of_sine - s * of_cosine) / (c**2 + s**2)
+    return found - 2 * (c * c_dot + s * s_dot) * (c * s_dot - s * c_dot) / (c**2 + s**2) ** 2
 
 
 class Motor(NamedTuple):

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from beam_links import beam_link, rectangle
+from body_equations import Accelerated
 from checkpoint_scenes import as_scene, coordinates, motor_on_frames, tree_model
 from random_mechanisms import random_tree
-from tree_accelerations import Accelerated
 
 import ffrobot
 from ffrobot.mbs import _core

@@ -2,11 +2,19 @@
 
 import numpy as np
 import pytest
-from body_equations import accelerated, body_forces, energies, momentum, required_forces
+from body_equations import (
+    Accelerated,
+    absolute_accelerations,
+    accelerated,
+    body_forces,
+    energies,
+    mechanism_of,
+    momentum,
+    required_forces,
+)
 from checkpoint_scenes import as_scene, tree_model
 from moving_trees import NOW, SMALL, moving
 from random_mechanisms import TYPES, random_tree
-from tree_accelerations import Accelerated
 from tree_reactions import carried, needed
 
 from ffrobot.mbs import _core
@@ -135,7 +143,9 @@ def test_loads_at_points_are_what_bodies_need(joint):
     motion = anything_moving(np.random.default_rng(90 + TYPES.index(joint)), joint, turned=True)
     tree, state = motion.model.tree, accelerated(motion)
     of_bodies = body_forces(state, motion.model.scene.gravity)
-    for number, (node, of_frame, expected) in enumerate(zip(tree.nodes, state.of_frames(), of_bodies, strict=True)):
+    mechanism = mechanism_of(tree, np.zeros(3))
+    of_all = absolute_accelerations(mechanism, state)
+    for number, (node, expected) in enumerate(zip(tree.nodes, of_bodies, strict=True)):
         force, moment = 0.0, 0.0
         for section, acting in motion.forces.at_points[number]:
             place = tree.motion(section, motion.q, motion.frames)
@@ -147,5 +157,7 @@ def test_loads_at_points_are_what_bodies_need(joint):
         modal = motion.forces.found.modal[:, node.p_v]
         np.testing.assert_allclose(modal, expected.modal, rtol=0, atol=1e-12 * np.abs(expected.modal).max(initial=1.0))
         of_body = motion.forces.of_body(number)
-        for found, wanted in ((of_body.a, of_frame.r), (of_body.alpha, of_frame.Omega)):
+        a, alpha, _ = np.split(of_all[:, mechanism.coordinates.columns(node.body.name)], [3, 6], axis=1)
+        alpha = np.einsum("tij,tj->ti", motion.frames[number].F, alpha)
+        for found, wanted in ((of_body.a, a), (of_body.alpha, alpha)):
             np.testing.assert_allclose(found, wanted, rtol=0, atol=1e-11 * np.abs(wanted).max(initial=1.0))

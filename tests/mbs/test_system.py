@@ -1,13 +1,10 @@
 """The recursion, as scenes in 3D make it, against the oracle in absolute coordinates: random trees, all joints."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
-from body_equations import absolute_accelerations, absolute_states
+from body_equations import Accelerated, absolute_accelerations, absolute_states
 from checkpoint_scenes import as_scene, coordinates, tree_model
 from random_mechanisms import TYPES, placed, random_tree
-from tree_accelerations import Accelerated
 from triad_measures import UNIT, About, Along, Ground, Section, Spinning
 
 from ffrobot.mbs import _core
@@ -44,7 +41,7 @@ def systems(tree, turned=False, joint_keys=None, loads=(), acting=lambda plain: 
     ((_, _, velocity, _),) = absolute_states(mechanism, state)
     pair = absolute_accelerations(mechanism, state)[0], mechanism.solve(AT, absolute, velocity)[0]
     left = required_forces(model, state, np.array([AT]))  # nothing, where nothing is prescribed
-    moved = required_forces(model, replace(state, a=np.zeros_like(state.a)), np.array([AT]))
+    moved = required_forces(model, state._replace(a=np.zeros_like(state.a)), np.array([AT]))
     assert np.abs(left).max(initial=0) < 1e-10 * np.abs(moved).max(initial=1)
     energies = system.core.states_totals(system.scene, q[None], v[None])[0, :3]
     return pair, np.abs(state.a).max(initial=1.0), (energies, mechanism.energies(absolute, velocity))

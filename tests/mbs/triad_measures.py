@@ -195,6 +195,19 @@ class Spinning:
 
 
 @dataclass(frozen=True)
+class Spin:
+    """Along axis f of b, the angular velocity of b less that of a: its rate; there is no such coordinate."""
+
+    a: object
+    b: object
+    f: int
+
+    def between(self, a, b):
+        f, Omega = b.F[:, self.f], b.velocity[3:] - a.velocity[3:]
+        return Found(0.0, wrench(None, -f), wrench(None, f), np.cross(b.velocity[3:], f) @ Omega)
+
+
+@dataclass(frozen=True)
 class Joint:
     """A joint of a type of the scene file between triads a and b, h = lead/2π of a screw (m/rad)."""
 
@@ -222,15 +235,18 @@ class Joint:
         }[self.type]
 
     def coordinates(self):
-        """Rows whose values are the joint's coordinates; of spherical and free joints, none."""
+        """Rows whose values are the joint's coordinates; of spherical and free joints some have rates alone."""
         a, b = self.a, self.b
+        spins, ways = [Spin(a, b, f) for f in (X, Y, Z)], [Way(a, b, f) for f in (X, Y, Z)]
         return {
             "universal": [FirstAngle(a, b), SecondAngle(a, b)],
             "revolute": [Turn(a, b)],
-            "cylindrical": [Turn(a, b), Way(a, b, Z)],
-            "prismatic": [Way(a, b, Z)],
+            "cylindrical": [Turn(a, b), ways[Z]],
+            "prismatic": [ways[Z]],
             "screw": [Turn(a, b)],
-            "planar": [Way(a, b, X), Way(a, b, Y), Turn(a, b)],
+            "planar": [*ways[:2], Turn(a, b)],
+            "spherical": spins,
+            "free": [*ways, *spins],
         }.get(self.type, [])
 
 
