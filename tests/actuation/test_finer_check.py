@@ -74,6 +74,7 @@ def test_error_is_that_of_the_modes_left_out(gravity):
     assert 1e-7 < errors[1] < 1e-3
 
 
+@pytest.mark.nightly
 def test_links_with_all_that_matters_leave_nothing():
     """Motors alone in a horizontal plane, eight modes: what sixteen add is below the tolerance of the replay."""
     check = solve_scene(arm(8, kind="motors-only", patches=False)).analyses["inverse"].check
@@ -93,18 +94,7 @@ def test_it_is_told_and_kept(tmp_path, ffrobot):
 
 
 def test_modal_body_files_cannot_be_refined(tmp_path):
-    (tmp_path / "link.toml").write_text(
-        """
-name = "link1"
-material = { youngs_modulus = 70e9, density = 2700.0 }
-geometry = { kind = "beam", length = 0.7, section = { shape = "rectangle", height = 0.006, width = 0.02 } }
-mesh = { elements = 20 }
-reference = { condition = "simply-supported" }
-modes = { count = 2, family = "in-plane-bending", attachment_modes = false }
-""",
-        encoding="utf-8",
-    )
-    library.make_link(tmp_path / "link.toml")
+    library.make_link(link("link1", 0.7, "simply-supported", 2), tmp_path / "link.h5")
     bodies = [
         {"name": "link1", "modal": str(tmp_path / "link.h5")},
         {"name": "link2", "link": link("link2", 0.5, "cantilever", 2)},

@@ -141,9 +141,9 @@ def grows(record, calm):
     return last.max() > min(second.max(), 100 * shaking(calm).max())
 
 
-@pytest.mark.parametrize(("sample_time", "delay"), [(0.002, 0.0), (0.002, 0.003)])
-def test_margin_is_where_the_simulated_loop_begins_to_grow(sample_time, delay):
-    gains = {"proportional": {"J0": 2.0}, "derivative": {"J0": 0.2}}
+@pytest.mark.parametrize("delay", [pytest.param(0.0, marks=pytest.mark.nightly), 0.003])
+def test_margin_is_where_the_simulated_loop_begins_to_grow(delay):
+    sample_time, gains = 0.002, {"proportional": {"J0": 2.0}, "derivative": {"J0": 0.2}}
     record = simulated(3, gains, sample_time, delay).outcomes["loop"].details
     assert (record.metrics.verdict, record.advice) == ("stable", ())
     factor, later = record.margins.gain, record.margins.delay
@@ -155,25 +155,22 @@ def test_margin_is_where_the_simulated_loop_begins_to_grow(sample_time, delay):
             assert grows(run.outcomes["loop"].details, record) == (part > 1.0)
 
 
-def test_suggested_gains_are_stable_on_random_arms():
-    """Twenty-four arms of one to three links, with and without rotors: by the linear model, twice the gains too."""
-    rng, found = np.random.default_rng(24), 0
-    for _ in range(24):
-        count, sample_time = int(rng.integers(1, 4)), float(rng.choice([5e-4, 1e-3, 2e-3]))
-        delay = float(rng.choice([0.0, 0.5, 1.0]) * sample_time)
-        rotors = [float(rng.choice([0.0, 0.01, 0.1])) for _ in range(count)]
-        plants = models(links(rng, count, float(rng.uniform(0.1, 2.0)), rotors, [{"name": "linear", "kind": "linear"}]))
-        suggestion = suggested_gains(plants, sample_time, delay)
-        if suggestion is None:
-            assert 0.0 in rotors  # roots without inertia leave no gain that is stable
-            continue
-        found += 1
-        names = suggestion.proportional
-        record = JointPid(kind="joint-pid", proportional=names, derivative=suggestion.derivative)
-        for factor in (1.0, 2.0):
-            gains = joint_gains(plants[0], [record]).times(factor)
-            assert max(spectral_radius(plant, gains, sample_time, delay) for plant in plants) < 1.0
-    assert found >= 12
+@pytest.mark.parametrize("seed", range(24))
+def test_suggested_gains_are_stable_on_random_arms(seed):
+    """Of one to three links, with and without rotors: by the linear model, twice the gains too."""
+    rng = np.random.default_rng(seed)
+    count, sample_time = int(rng.integers(1, 4)), float(rng.choice([5e-4, 1e-3, 2e-3]))
+    delay = float(rng.choice([0.0, 0.5, 1.0]) * sample_time)
+    rotors = [float(rng.choice([0.0, 0.01, 0.1])) if seed % 2 else 0.03 for _ in range(count)]
+    plants = models(links(rng, count, float(rng.uniform(0.1, 2.0)), rotors, [{"name": "linear", "kind": "linear"}]))
+    suggestion = suggested_gains(plants, sample_time, delay)
+    if suggestion is None:
+        assert 0.0 in rotors  # roots without inertia leave no gain that is stable
+        return
+    record = JointPid(kind="joint-pid", proportional=suggestion.proportional, derivative=suggestion.derivative)
+    for factor in (1.0, 2.0):
+        gains = joint_gains(plants[0], [record]).times(factor)
+        assert max(spectral_radius(plant, gains, sample_time, delay) for plant in plants) < 1.0
 
 
 def test_suggested_gains_hold_the_simulated_arm():

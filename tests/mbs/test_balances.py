@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from balances import OUTPUT_STEP, energy_and_losses
 from links import arm, arm_links
-from mechanisms import forward, make_model, oracle_of, pcid, revolute
+from mechanisms import forward, oracle_of, pcid
 from oracle_runs import run
 from scipy.integrate import simpson
 
@@ -36,16 +36,3 @@ def test_work_of_given_loads_is_energy_gained_and_dissipated():
     work, (total, losses) = simpson(power, x=outcome.time), energy_and_losses(outcome)
     assert losses > 1e-3
     assert abs(work - losses - (total[-1] - total[0])) < 10 * tolerance * np.ptp(total)
-
-
-def test_center_of_mass_of_a_free_chain_falls_as_a_stone():
-    model = make_model(
-        arm_links(),
-        joint=[revolute("A", "link1.tip", "link2.root")],
-        initial={"angles": {"link1": 0.3, "link2": 1.0}, "rates": {"link1": 3.0}},
-    )
-    outcome = run(model, forward(tolerance=1e-9))
-    mechanism = oracle_of(outcome.assembly)
-    momentum = np.array([mechanism.momentum(q, v)[:2] for q, v in zip(outcome.q, outcome.v, strict=True)])
-    fall = momentum[0] + np.outer(outcome.time, 2.0 * np.array([0.0, -9.81]))
-    np.testing.assert_allclose(momentum, fall, atol=1e-8)

@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 from bodies_by_invariants import rigid_body
 from links import ANGLES, arm, arm_links
-from mechanisms import Assembly, checked_scene, forward, make_model, oracle_of, pcid, relative, revolute
-from oracle import mass_matrix
-from oracle_runs import evaluated, joint_forces, posture_of, run
+from mechanisms import checked_scene, forward, make_model, pcid, relative, revolute
+from oracle_runs import joint_forces, run
 from rods import rod
 
 from ffrobot.common.errors import InputError
@@ -40,41 +39,6 @@ def test_swing_of_a_pendulum_with_a_geared_rotor():
     outcome = run(model, forward(end=2.0, tolerance=1e-9))
     swing = outcome.q[:, 2] + np.pi / 2
     assert np.abs(swing - angle * np.cos(omega * outcome.time)).max() < 1e-7 * angle
-
-
-@pytest.mark.parametrize("motors", ["section", "frame"])
-def test_accelerations_are_those_of_the_whole_mass_matrix(motors):
-    """M + Σ J d dᵀ with d from the rates of the rotors, inverted as it stands."""
-    model = geared_arm(trajectory=[], motors=motors)
-    found = evaluated(model, 0.0, *posture_of(model, np.random.default_rng(3), modal=0.01))
-    assembly, q, v, n = found.assembly, found.q[0], found.v[0], found.assembly.size
-    M = np.zeros((n, n))
-    for body in model.bodies:
-        block = found.coordinates(body.name)
-        M[block, block] = mass_matrix(body, q[block])
-    d = np.array([oracle_of(assembly).row(row, q, v).gradient for row, _ in model.rotors])
-    J = np.array([inertia for _, inertia in model.rotors])
-    turning = d @ v  # rates of the rotors: the second's are those of sections (or frames) of both links
-    link1, link2 = (found.coordinates(body.name) for body in model.bodies)
-    rate1, rate2 = v[link1][2], v[link2][2]
-    if motors == "section":
-        rate1_root = rate1 + model.bodies[0].points["root"].rotation @ v[link1][3:]
-        rate1 += model.bodies[0].points["tip"].rotation @ v[link1][3:]
-        rate2 += model.bodies[1].points["root"].rotation @ v[link2][3:]
-    else:
-        rate1_root = rate1
-    np.testing.assert_allclose(turning, [60 * rate1_root, 60 * rate2 - 59 * rate1], rtol=1e-12)
-
-    without = Assembly(geared_arm(first={}, second={}, trajectory=[], motors=motors), assembly.constraints)
-    C_q = np.array([row.gradient for row in oracle_of(without).rows(q, v)])
-    a_bare, lambda_bare = oracle_of(without).solve(0.0, q, v)
-    Q = M @ a_bare + C_q.T @ lambda_bare
-    m = len(C_q)
-    whole = np.block([[M + d.T @ (J[:, None] * d), C_q.T], [C_q, np.zeros((m, m))]])
-    expected = np.linalg.solve(whole, np.concatenate([Q, C_q @ a_bare]))
-    assert relative(found.a[0], expected[:n]) < 1e-10
-    for joint, at in zip("OA", (n, n + 2), strict=True):
-        assert relative(joint_forces(found, joint).reaction[0], -expected[at : at + 2]) < 1e-9
 
 
 def test_geared_two_link_arm_needs_the_moments_of_spong():

@@ -21,15 +21,19 @@ def assert_solved(robot, q, v, share=1e-12):
 
 
 @pytest.mark.parametrize("name", zoo.ALL)
-def test_accelerations_multipliers_and_energies(name):
-    """Where loops close: equations say nothing of states in which they are open."""
-    robot, rng = zoo.build(name), np.random.default_rng(1)
-    is_closed = robot.model.loop_rows.any()
-    q, v = posture_of(robot, rng) if is_closed else random_tree_state(rng, robot)
-    assert_solved(robot, q, v, 1e-11 if is_closed else 1e-12)
-    found = evaluated(robot, T, q, v)
-    expected = oracle_of(found.assembly).energies(found.q[0], found.v[0])
+def test_accelerations_multipliers_energies_and_rows(name):
+    """Where loops close; in a state on all joints and paths C and Ċ vanish, and the residual that results have of C̈."""
+    robot = zoo.build(name)
+    q, v = posture_of(robot, np.random.default_rng(1))
+    assert_solved(robot, q, v, 1e-11 if robot.model.loop_rows.any() else 1e-12)
+    found = evaluated(robot, 0.0, q, v)
+    oracle = oracle_of(found.assembly)
+    expected = oracle.energies(found.q[0], found.v[0])
     assert relative(np.ravel(list(energies(found).values())), expected) < 1e-12
+    C, C_dot, _ = oracle.constraint_values(0.0, found.q[0], found.v[0])
+    assert np.abs(C).max(initial=0.0) < 1e-12
+    assert np.abs(C_dot).max(initial=0.0) < 1e-11
+    assert found.motion.violation.max() < 1e-11
 
 
 @pytest.mark.parametrize("seed", range(20))
@@ -49,14 +53,3 @@ def test_mode_counts_and_damping(modes, dense_damping):
     load = ModalLoad("b2", rng.standard_normal(modes), parse_expression("3+t"))
     robot = zoo.make_model(bodies, [load], joint=zoo.serial_joints(2), trajectory=[zoo.tip_path("b2")], load=zoo.LOADS)
     assert_solved(robot, *random_tree_state(rng, robot))
-
-
-@pytest.mark.parametrize("name", zoo.ALL)
-def test_rows_hold_in_the_oracle_s_coordinates(name):
-    """C and Ċ of all joints and paths in a state on them; the residual that results have of C̈ is round-off, too."""
-    robot = zoo.build(name)
-    found = evaluated(robot, 0.0, *posture_of(robot, np.random.default_rng(2)))
-    C, C_dot, _ = oracle_of(found.assembly).constraint_values(0.0, found.q[0], found.v[0])
-    assert np.abs(C).max(initial=0.0) < 1e-12
-    assert np.abs(C_dot).max(initial=0.0) < 1e-11
-    assert found.motion.violation.max() < 1e-11

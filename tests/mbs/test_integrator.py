@@ -187,14 +187,6 @@ def test_where_steps_collapse_does_not_depend_on_max_steps():
     assert runs[0].statistics.time_reached == runs[1].statistics.time_reached
 
 
-def test_a_run_stops_when_asked_to():
-    asked = []
-    outcome = run(arm(), pcid(tolerance=1e-10), progress=lambda t: asked.append(t) or t < 0.2)
-    assert outcome.status == "interrupted"
-    assert 0.2 <= asked[-1] < 1
-    assert outcome.time[-1] <= asked[-1]
-
-
 @pytest.mark.parametrize("tolerance", [1e-6, 1e-8, TIGHTEST_TOLERANCE])
 def test_a_start_at_rest_costs_no_more_steps_than_the_motion(tolerance):
     """Vibration starts from nothing there: its rounding once drove the step below any size."""

@@ -34,50 +34,42 @@ def chain(rng, count, **keys):
     return make_model(clouds(rng, count), **(tables | keys))
 
 
+def swapped(joints):
+    """The same joints named from the outside in: axes ride on the outer bodies, the ground comes second."""
+    return [joint | {"between": joint["between"][::-1]} for joint in joints]
+
+
 def backwards(rng, **keys):
-    """Joints named from the outside in: ground second, each new link first."""
-    joints = [
-        revolute("j1", "b1.root", "ground", at=(0.2, -0.1)),
-        revolute("j2", "b2.root", "b1.tip"),
-    ]
-    tables = {"joint": joints, "trajectory": [tip_path("b2")], "initial": {"angles": {"b1": 1.2, "b2": -0.7}}}
-    return make_model(clouds(rng, 2), **(tables | keys))
+    return chain(rng, 2, **({"joint": swapped(serial_joints(2))} | keys))
+
+
+MIXED = (
+    {"name": "j1", "type": "prismatic", "between": ("ground", "b1.root"), "at": (0.1, 0.0), "axis": (2.0, 1.0)},
+    {"name": "w", "type": "weld", "between": ("b1.tip", "b2.root")},
+    revolute("j2", "b2.tip", "b3.root"),
+    {"name": "j3", "type": "prismatic", "between": ("b3.tip", "b4.root"), "axis": (-1.0, 0.4)},
+)
 
 
 def mixed(rng, **keys):
     """Prismatic to the ground, weld, revolute, prismatic between bodies; a path, a section angle, a way."""
-    joints = [
-        {"name": "j1", "type": "prismatic", "between": ("ground", "b1.root"), "at": (0.1, 0.0), "axis": (2.0, 1.0)},
-        {"name": "w", "type": "weld", "between": ("b1.tip", "b2.root")},
-        revolute("j2", "b2.tip", "b3.root"),
-        {"name": "j3", "type": "prismatic", "between": ("b3.tip", "b4.root"), "axis": (-1.0, 0.4)},
-    ]
     trajectories = [
         {"name": "way", "joint": "j3", "value": "0.3*sin(2*t)"},
         {"name": "turn", "angle": "b3.side", "value": "0.1+0.2*t"},
         {"name": "lift", "point": "b4.side", "y": "0.6*cos(t)"},
     ]
     angles = {"b1": 0.3, "b2": 0.9, "b3": -0.4, "b4": 0.2}
-    tables = {"joint": joints, "trajectory": trajectories, "initial": {"angles": angles}} | keys
+    tables = {"joint": MIXED, "trajectory": trajectories, "initial": {"angles": angles}} | keys
     return make_model(clouds(rng, 4), **tables)
 
 
 def mixed_backwards(rng, **keys):
-    """The same joints with their sides exchanged: prismatic axes ride on the outer bodies, the ground comes second."""
-    joints = [
-        {"name": "j1", "type": "prismatic", "between": ("b1.root", "ground"), "at": (0.1, 0.0), "axis": (2.0, 1.0)},
-        {"name": "w", "type": "weld", "between": ("b2.root", "b1.tip")},
-        revolute("j2", "b3.root", "b2.tip"),
-        {"name": "j3", "type": "prismatic", "between": ("b4.root", "b3.tip"), "axis": (-1.0, 0.4)},
-    ]
     trajectories = [
         {"name": "way", "joint": "j1", "value": "0.3*sin(2*t)"},
         {"name": "frame", "angle": "b3", "value": "0.1+0.2*t"},
         {"name": "turn", "point": "b4.tip", "x": "0.4*t"},
     ]
-    angles = {"b1": 0.3, "b2": 0.9, "b3": -0.4, "b4": 0.2}
-    tables = {"joint": joints, "trajectory": trajectories, "initial": {"angles": angles}} | keys
-    return make_model(clouds(rng, 4), **tables)
+    return mixed(rng, **({"joint": swapped(MIXED), "trajectory": trajectories} | keys))
 
 
 def four_bar(rng, **keys):
@@ -181,6 +173,7 @@ ALL = {
     "slider-crank, as built": as_built(slider_crank),
     "stiffened, as built": as_built(stiffened),
     "driven, as built": as_built(stiffened_and_driven),
+    "driven, as built, frame motors": lambda rng, **keys: as_built(stiffened_and_driven)(rng, motors="frame", **keys),
 }
 
 

@@ -231,31 +231,14 @@ def sprung_tree(rng):
     return model, scene, q, v
 
 
-@pytest.mark.parametrize(("methods", "tolerance", "within"), [(RADAU, 1e-8, 1e-7), (GENERALIZED_ALPHA, 1e-5, 1e-4)])
-def test_implicit_methods_find_the_same_motion(methods, tolerance, within):
+def test_implicit_methods_find_the_same_motion():
     model, scene, q, v = sprung_tree(np.random.default_rng(11))
-    times = list(np.linspace(0, 0.2, 5))
+    times = list(np.linspace(0, 0.1, 5))
     expected = _core.tree_motion(model, scene, times, q, v, controls(1e-11), on)
-    found = _core.tree_motion(model, scene, times, q, v, controls(tolerance, methods), on)
-    assert found.status == _core.IntegrationStatus.completed
-    assert relative(found.states[:, : model.n_q], expected.states[:, : model.n_q]) < within
-
-
-def test_steps_of_radau_are_not_bound_by_what_is_stiff():
-    """An overdamped joint: a tenth of the steps that the explicit method takes."""
-    rng = np.random.default_rng(12)
-    body = random_body(rng, 1, J.revolute)
-    body.driven = True
-    model = Mechanism([body], ground(rng), np.array([0, 0, -9.81])).model()
-    scene = _core.TreeScene()
-    joint_q, _, joint_v, _ = model.first[0]
-    scene.add_joint_force(joint_q, joint_v, 1e8, 0.0, 1e6, 0.0, 1.0)
-    q, v = np.zeros(model.n_q), np.zeros(model.n_v)
-    explicit, implicit = (
-        _core.tree_motion(model, scene, [0.0, 0.05], q, v, controls(1e-6, method), on) for method in (DOP853, RADAU)
-    )
-    assert implicit.steps < 0.1 * explicit.steps
-    assert relative(implicit.states[-1, : model.n_q], explicit.states[-1, : model.n_q]) < 1e-5
+    for methods, tolerance, within in ((RADAU, 1e-8, 1e-7), (GENERALIZED_ALPHA, 1e-5, 1e-4)):
+        found = _core.tree_motion(model, scene, times, q, v, controls(tolerance, methods), on)
+        assert found.status == _core.IntegrationStatus.completed
+        assert relative(found.states[:, : model.n_q], expected.states[:, : model.n_q]) < within
 
 
 def test_a_force_that_begins_at_zero_in_a_run_from_before():

@@ -3,7 +3,7 @@
 import pytest
 from exact_chain import errors
 
-STATES = 4
+STATES = 2
 
 
 # λ, then q̈: four times the worst of 20 states (docs/developer/kernel.md)
