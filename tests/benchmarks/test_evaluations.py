@@ -1,21 +1,13 @@
 """`ffrobot bench --part evaluations`: every mechanism has its row, measured beside the program written by hand."""
 
-import csv
-from pathlib import Path
-
 import pytest
-
-REPOSITORY = Path(__file__).parents[2]
 
 pytestmark = pytest.mark.alone
 
 
 @pytest.fixture(scope="module")
-def rows(ffrobot, tmp_path_factory):
-    folder = tmp_path_factory.mktemp("evaluations")
-    ffrobot.ok("bench", "--part", "evaluations", "--source", REPOSITORY, "-o", folder)
-    with (folder / "evaluations.csv").open(encoding="utf-8", newline="") as stream:
-        return {row["what"]: row for row in csv.DictReader(stream)}
+def rows(bench):
+    return {row["what"]: row for row in bench("evaluations")}
 
 
 def seconds(rows, what):

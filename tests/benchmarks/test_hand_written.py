@@ -34,12 +34,10 @@ def two_link(case_folder):
 
 
 @pytest.fixture(scope="module")
-def case_folder(tmp_path_factory, ffrobot):
+def case_folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("hand_written") / "two_link"
     shutil.copytree(ROOT / "cases" / "two_link", folder, ignore=shutil.ignore_patterns("*.h5", "*.figures"))
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("XDG_CACHE_HOME", str(ffrobot.cache))
-        yield folder
+    return folder
 
 
 @pytest.fixture(scope="module")

@@ -1,22 +1,14 @@
 """`ffrobot bench --part replays`: replays are measured beside the PCID that they follow."""
 
-import csv
-from pathlib import Path
-
 import pytest
-
-REPOSITORY = Path(__file__).parents[2]
 
 pytestmark = pytest.mark.alone
 
 
 @pytest.fixture(scope="module")
-def rows(ffrobot, tmp_path_factory):
-    folder = tmp_path_factory.mktemp("replays")
-    ffrobot.ok("bench", "--part", "replays", "--repeat", "2", "--source", REPOSITORY, "-o", folder)
-    with (folder / "replays.csv").open(encoding="utf-8", newline="") as stream:
-        keys = ("scene", "what", "integrator", "tolerance")
-        return {tuple(row[key] for key in keys): row for row in csv.DictReader(stream)}
+def rows(bench):
+    keys = ("scene", "what", "integrator", "tolerance")
+    return {tuple(row[key] for key in keys): row for row in bench("replays", "--repeat", "2")}
 
 
 @pytest.mark.parametrize(("apply", "largest"), [("trajectory", 2.9), ("joints+pzt", 4.0)])

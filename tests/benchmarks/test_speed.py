@@ -74,9 +74,8 @@ def imports(code):
 
 
 @pytest.fixture
-def scene(case_copy, ffrobot, monkeypatch):
-    """The two-link case with the inverse analysis only; modal files and forms come from the session's cache."""
-    monkeypatch.setenv("XDG_CACHE_HOME", str(ffrobot.cache))
+def scene(case_copy):
+    """The two-link case with the inverse analysis only; modal files and forms come from the cache of the tests."""
     path = case_copy("two_link")
     head = path.read_text(encoding="utf-8").split("[[analysis]]")[0]
     path.write_text(head + INVERSE, encoding="utf-8")

@@ -23,6 +23,7 @@ import numpy as np
 import trimesh
 from forked_command import BAD, load_once, outcome, run
 from hostile import Damage
+from kills import LINK
 from record import options, record
 
 from ffrobot.common.checksum import seal
@@ -57,14 +58,6 @@ joint = [{ name = "shoulder", type = "revolute", between = ["ground", "arm.root"
 trajectory = [{ name = "swing", joint = "shoulder", waypoints = "path.csv" }]
 payload = [{ point = "arm.tip", mass = 0.5 }]
 analysis = [{ name = "inverse", kind = "pcid", end = 0.05, output_step = 0.005, tolerance = 1e-4, max_steps = 20000 }]
-"""
-LINK = """
-name = "arm"
-material = { youngs_modulus = 70e9, poissons_ratio = 0.33, density = 2700.0 }
-geometry = { kind = "beam", length = 0.6, section = { shape = "tube", outer = 0.02, inner = 0.016 } }
-mesh = { elements = 6 }
-reference = { condition = "cantilever" }
-modes = { count = 2, family = "in-plane-bending" }
 """
 BODIES = {".SID_FEM": "sid", ".fem": "mbdyn"}
 ROBOT = """<robot name="r"><link name="base"/><link name="arm">

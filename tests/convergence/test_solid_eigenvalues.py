@@ -18,7 +18,8 @@ from ffrobot.fe_models.beam.link import beam_modal_body
 from ffrobot.fe_models.link_file import read_link
 from ffrobot.fe_models.solid.elasticity import stiffness_matrix
 
-FV5 = {"E": 200e9, "rho": 8000.0, "length": 10.0, "height": 2.0, "width": 2.0, "family": "all", "count": 9}
+STEEL = {"E": 200e9, "rho": 8000.0, "length": 10.0, "cell": "hexahedron", "order": 2}
+FV5 = STEEL | {"height": 2.0, "width": 2.0, "family": "all", "count": 9}
 
 
 def frequencies(body, family):
@@ -30,7 +31,7 @@ def frequencies(body, family):
 )
 def test_nafems_fv5(tmp_path, cell, order, meshes):
     bodies = [
-        body_of(write_solid(tmp_path, **FV5, cell=cell, order=order, divisions=(n, across, across)))
+        body_of(write_solid(tmp_path, **(FV5 | {"cell": cell, "order": order}), divisions=(n, across, across)))
         for n, across in meshes
     ]
     fine = bodies[-1]
@@ -52,8 +53,7 @@ def test_nafems_fv5_lies_between_soft_and_rigid_ends(tmp_path):
     contracting.
     """
     mean, rigid = (
-        body_of(write_solid(tmp_path, **FV5, cell="hexahedron", order=2, divisions=(10, 4, 4), coupling=coupling))
-        for coupling in ("mean", "rigid")
+        body_of(write_solid(tmp_path, **FV5, divisions=(10, 4, 4), coupling=coupling)) for coupling in ("mean", "rigid")
     )
     for family, known in (("torsion", 71.20), ("axial", 125.00)):
         soft, hard = frequencies(mean, family)[0], frequencies(rigid, family)[0]
@@ -69,19 +69,9 @@ def test_nafems_fv32(tmp_path):
         errors = []
         for n in (8, 16):
             path = write_solid(
-                tmp_path,
-                E=200e9,
-                rho=8000.0,
-                length=10.0,
-                height=5.0,
-                width=0.05,
-                cell="hexahedron",
-                order=2,
-                divisions=(n, n // 2, 1),
-                condition="cantilever",
-                family=family,
-                count=len(target),
-            )
+                tmp_path, **STEEL, height=5.0, width=0.05, divisions=(n, n // 2, 1), condition="cantilever",
+                family=family, count=len(target),
+            )  # fmt: skip
             text = path.read_text()
             taper = 'tip_section = { shape = "rectangle", height = 1.0, width = 0.05 }\n\n[mesh]'
             path.write_text(text.replace("\n[mesh]", taper))
@@ -95,18 +85,7 @@ def test_nafems_fv52(tmp_path):
     expected = [45.897, 109.44, 109.44, 167.89, 193.59, 206.19, 206.19]
     found = []
     for n in (4, 8):
-        path = write_solid(
-            tmp_path,
-            E=200e9,
-            rho=8000.0,
-            length=10.0,
-            height=1.0,
-            width=10.0,
-            cell="hexahedron",
-            order=2,
-            divisions=(n, 1, n),
-        )
-        model, _ = model_of(path)
+        model, _ = model_of(write_solid(tmp_path, **STEEL, height=1.0, width=10.0, divisions=(n, 1, n)))
         x, y, z = model.x.T
         edges = (np.abs(y + 0.5) < 1e-9) & ((np.abs(x * (x - 10)) < 1e-6) | (np.abs(np.abs(z) - 5) < 1e-9))
         free = np.setdiff1d(np.arange(3 * model.owned), 3 * np.flatnonzero(edges) + 1)

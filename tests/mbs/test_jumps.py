@@ -90,27 +90,21 @@ def test_acceleration_of_a_path_that_jumps():
 # Parts of the run; the shortest spans two of the thousand samples by which steps are limited.
 @pytest.mark.parametrize("width", [0.002, 0.02, 0.1])
 @pytest.mark.parametrize("integrator", [*METHODS, "generalized-alpha"])
-def test_pulse_while_nothing_moves(integrator, width):
-    """The error estimate of a step over it sees nothing: its stages stand beside it."""
-    chance = np.random.default_rng(8)
-    for begin in chance.uniform(0.2, 0.8, 4):
-        begin, end = float(begin), float(begin + width)
-        moment = f"where(t > {begin!r}, where(t <= {end!r}, {MOMENT}, 0), 0)"
-        outcome = free_run(driven_rod(moment), tolerance=1e-3, integrator=integrator)
-        exact = angle_behind([(begin, 1), (end, -1)], outcome.time)
-        assert relative(outcome.q[:, 2], exact) < (1e-3 if integrator == "generalized-alpha" else 1e-12)
+def test_moments_that_come_and_go_while_nothing_moves(integrator, width):
+    """The error estimate of a step over a pulse sees nothing: its stages stand beside it.
 
-
-@pytest.mark.parametrize("width", [0.004, 0.02, 0.1])
-@pytest.mark.parametrize("integrator", [*METHODS, "generalized-alpha"])
-def test_hump_while_nothing_moves(integrator, width):
-    """As smooth as loads get, so that nothing jumps: M sin²; the speed behind it is M/I times half its width."""
-    chance = np.random.default_rng(9)
-    for begin in chance.uniform(0.2, 0.8, 4):
+    Nor over a hump M sin², as smooth as loads get; the speed behind it is M/I times half its width.
+    """
+    close = 1e-3 if integrator == "generalized-alpha" else 1e-12
+    for begin in np.random.default_rng(8).uniform(0.2, 0.8, 3):
         begin, end = float(begin), float(begin + width)
-        hump = f"where(t > {begin!r}, where(t < {end!r}, {MOMENT}*sin(pi*(t-{begin!r})/{width!r})**2, 0), 0)"
-        outcome = free_run(driven_rod(hump), tolerance=1e-3, integrator=integrator)
-        assert outcome.v[-1, 2] == pytest.approx(MOMENT / INERTIA * width / 2, rel=1e-3)
+        within = f"where(t > {begin!r}, where(t <= {end!r}, {MOMENT}*{{}}, 0), 0)"
+        pulse = free_run(driven_rod(within.format("1")), tolerance=1e-3, integrator=integrator)
+        assert relative(pulse.q[:, 2], angle_behind([(begin, 1), (end, -1)], pulse.time)) < close
+        if width > 0.002:
+            of_hump = within.format(f"sin(pi*(t-{begin!r})/{width!r})**2")
+            hump = free_run(driven_rod(of_hump), tolerance=1e-3, integrator=integrator)
+            assert hump.v[-1, 2] == pytest.approx(MOMENT / INERTIA * width / 2, rel=1e-3)
 
 
 def test_loads_that_do_not_bend_limit_no_step():

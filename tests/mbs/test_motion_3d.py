@@ -5,18 +5,16 @@ import pytest
 from checkpoint_mechanisms import CASES, load
 from checkpoint_scenes import checkpoint_scene
 
-from ffrobot.mbs.model.model import build_model, row_values
+from ffrobot.mbs.model.model import build_model
 from ffrobot.mbs.quantities.motion import RobotMotion, continuous
 from ffrobot.run.bodies import load_bodies
 
 CLOSE = 2e-9  # of the peak: the digits in which two step sizes of the numbers agree
 
 
-def motion_of(name, motors="section"):
-    """The samples of a checkpoint as a motion: multipliers of paths are their forces, those of loops are left 0."""
-    scene, data = checkpoint_scene(name), load(name)
-    if motors == "frame":
-        scene = scene.model_copy(update={"motors": "frame"})
+def motion_of(name):
+    """The samples of a checkpoint as a motion, its motors between frames: multipliers of paths are their forces."""
+    scene, data = checkpoint_scene(name).model_copy(update={"motors": "frame"}), load(name)
     model = build_model(scene, [body.spatial for body in load_bodies(scene, lambda _: None)])
     tree, samples = model.tree, data["samples"]
     time = np.array([sample["t"] for sample in samples])
@@ -24,23 +22,14 @@ def motion_of(name, motors="section"):
     angles, rates = (np.array([sample[key] for sample in samples]) for key in ("joints", "joint_rates"))
     first = 0
     for node in tree.nodes:
-        body = samples[0]["bodies"].get(node.body.name)
-        if body is None:  # the slider of the slider-crank: its way is that of the rod's tip
-            continue
         count = node.joint.freedoms
         q[:, node.q], v[:, node.v] = angles[:, first : first + count], rates[:, first : first + count]
         first += count
         if node.body.n_modes:
             q[:, node.p_q] = [sample["bodies"][node.body.name]["modal"] for sample in samples]
             v[:, node.p_v] = [sample["bodies"][node.body.name]["modal_velocity"] for sample in samples]
-    if name == "slider_crank_3d":
-        guide = tree.nodes[tree.index["slider"]]
-        q[:, guide.q] = row_values(model, q, time)[0][:, :1] * -1.0  # rod tip to slider pin along x
-        q[:, guide.q] *= np.sign(guide.inner.triad[0, 2])
     forces = np.array([sample["path_force"] for sample in samples])
-    multipliers = np.zeros((len(time), len(model.rows)))
-    count = int(np.count_nonzero(~model.loop_rows))
-    multipliers[:, ~model.loop_rows] = -forces[:, :count]
+    multipliers = -forces[:, : len(model.rows)]
     return RobotMotion(model, time, q, v, np.zeros_like(v), multipliers), data
 
 
@@ -52,7 +41,7 @@ def close(found, expected, scale=None):
 @pytest.mark.parametrize("name", [name for name in CASES if name != "slider_crank_3d"])
 def test_motors_between_frames(name):
     """The same moments, other modal forces: no angle, but a virtual work."""
-    motion, data = motion_of(name, "frame")
+    motion, data = motion_of(name)
     close(np.hstack(list(motion.motor_forces.moments.values())), [sample["moments"] for sample in data["samples"]])
     for body, values in motion.motor_forces.modal.items():
         if values.shape[1]:
