@@ -140,7 +140,7 @@ def test_an_arm_that_rings_below_ten_hertz_is_said_to(space, thickness, hertz):
 CONTINUOUS = ("vibration", "vibration_window", "lowest_frequency", "settling_time", "overshoot", "tip_error_rms")
 
 
-@pytest.mark.parametrize(("space", "thickness"), [(False, 0.004), (True, 0.007)])
+@pytest.mark.parametrize(("space", "thickness"), [pytest.param(False, 0.004, marks=pytest.mark.nightly), (True, 0.007)])
 def test_metrics_change_as_little_as_their_input(space, thickness):
     """A payload heavier by 1e-12 changes the number of steps, no more."""
     found = []

@@ -83,7 +83,7 @@ def finer(scene, step):
     return new
 
 
-@pytest.mark.parametrize("space", [False, True])
+@pytest.mark.parametrize("space", [pytest.param(False, marks=pytest.mark.nightly), True])
 def test_peaks_of_a_ringing_arm_are_those_of_a_hundred_times_as_many_outputs(space):
     fine = solve(flexible(5e-5, space))
     moment = np.abs(fine["inverse/joints/O/moment"])
