@@ -1,4 +1,4 @@
-"""Keys of link files of beams, as tests of all parts write them, and their modal bodies."""
+"""Keys of link files of beams and solids, as tests of all parts write them, and their modal bodies."""
 
 from pathlib import Path
 
@@ -18,11 +18,21 @@ def circle(diameter):
     return {"shape": "circle", "diameter": diameter}
 
 
-def beam_link(length, section, elements, *, E=70e9, nu=0.33, rho=2700.0, condition="cantilever", **keys):
+def beam_link(length, section, elements, **keys):
+    """Of so many elements; the rest as for `link_keys`."""
+    return link_keys("beam", length, section, {"elements": elements}, **keys)
+
+
+def solid_link(length, section, mesh, *, hole=None, **keys):
+    """Of a mesh table, with holes or without; the rest as for `link_keys`."""
+    found = link_keys("solid", length, section, mesh, **keys)
+    return found if hole is None else found | {"geometry": found["geometry"] | {"hole": hole}}
+
+
+def link_keys(kind, length, section, mesh, *, E=70e9, nu=0.33, rho=2700.0, condition="cantilever", **keys):
     """Of aluminum unless said otherwise; `nu`, `condition`: None leaves the key out; `keys` are those of the file."""
     material = {"youngs_modulus": E, "density": rho} | ({} if nu is None else {"poissons_ratio": nu})
-    found = {"material": material, "geometry": {"kind": "beam", "length": length, "section": section}}
-    found["mesh"] = {"elements": elements}
+    found = {"material": material, "geometry": {"kind": kind, "length": length, "section": section}, "mesh": mesh}
     if condition is not None:
         found["reference"] = {"condition": condition}
     return found | keys

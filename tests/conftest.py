@@ -158,6 +158,30 @@ def ffrobot(own_cache):
     command.forks.end()
 
 
+@pytest.fixture
+def refused(ffrobot):
+    """Run a command that must be refused, and return its message.
+
+    One message without traceback on stderr, nothing on stdout, every file of the folder as it was.
+    """
+
+    def run(folder, *arguments, code=2, **options):
+        before = _files(folder)
+        done = ffrobot(*arguments, cwd=folder, **options)
+        assert done.returncode == code, done.stdout + done.stderr
+        assert done.stdout == ""
+        assert done.stderr.startswith("ffrobot: ")
+        assert "Traceback" not in done.stderr
+        assert _files(folder) == before
+        return done.stderr
+
+    return run
+
+
+def _files(folder):
+    return {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
 @pytest.fixture(scope="session")
 def mpirun():
     """How a command is started on two processes that share this machine."""

@@ -16,17 +16,8 @@ CONDITIONS = ("craig-bampton", "cantilever", "simply-supported")
 
 def link(name, condition, length, count=6):
     """A steel link."""
-    return beam_link(
-        length,
-        rectangle(H, B),
-        16,
-        E=E,
-        nu=0.3,
-        rho=7800.0,
-        condition=condition,
-        name=name,
-        modes={"count": count, "family": "in-plane-bending"},
-    )
+    modes = {"count": count, "family": "in-plane-bending"}
+    return beam_link(length, rectangle(H, B), 16, E=E, nu=0.3, rho=7800.0, condition=condition, name=name, modes=modes)
 
 
 def law(start, by):

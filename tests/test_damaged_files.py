@@ -282,18 +282,6 @@ def test_results_that_lack_something(results, members, tmp_path, command):
     assert refused or command not in ("feasibility", "linear")
 
 
-def test_what_lacks_is_named(results):
-    from ffrobot.common.hdf5 import reading
-    from ffrobot.present.info import describe
-
-    with h5py.File(results, "r+") as file:
-        del file["inverse"].attrs["wall_seconds"]
-    checksum.seal(results)
-    assert checksum.state(results) == "changed"
-    with pytest.raises(InputError, match='expected the attribute "wall_seconds", found none'), reading(results):
-        describe(results)
-
-
 @pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize("dataset", ["modes/frequency", "stations/rotation", "geometric_stiffness/omega_zz", "length"])
 def test_complex_numbers_are_refused(modal, dataset):

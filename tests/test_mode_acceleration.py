@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from beam_links import beam_link, rectangle
 
 import ffrobot
 from ffrobot.fe_models.modal_body import StressPoint
@@ -16,16 +17,10 @@ PLACES = (0.0, 0.1, 0.2, 0.398, 0.4)
 
 def link(condition="cantilever", modes=None, places=PLACES, **keys):
     """A steel bar with stress points on its upper side, y = H/2."""
-    return {
-        "name": "arm",
-        "material": {"youngs_modulus": E, "poissons_ratio": 0.3, "density": RHO},
-        "geometry": {"kind": "beam", "length": L, "section": {"shape": "rectangle", "height": H, "width": B}},
-        "mesh": {"elements": 20},
-        "reference": {"condition": condition},
-        "modes": modes or {"count": 10, "family": "in-plane-bending", "attachment_modes": False},
-        "stress": {"points": {f"x{k}": [x, H / 2, 0.0] for k, x in enumerate(places)}},
-        **keys,
-    }
+    modes = modes or {"count": 10, "family": "in-plane-bending", "attachment_modes": False}
+    stress = {"points": {f"x{k}": [x, H / 2, 0.0] for k, x in enumerate(places)}}
+    bar = beam_link(L, rectangle(H, B), 20, E=E, nu=0.3, rho=RHO, condition=condition, name="arm", modes=modes)
+    return bar | {"stress": stress} | keys
 
 
 def solved(folder, body, joint="weld", kind=None, body_keys=None, **keys):

@@ -7,6 +7,8 @@ from io import BytesIO
 import h5py
 import numpy as np
 import pytest
+import tomli_w
+from beam_links import link_keys, rectangle
 
 from ffrobot import make_scene
 from ffrobot.fe_models.link import make_link
@@ -15,25 +17,6 @@ from ffrobot.mbs.model.system import MultibodySystem
 from ffrobot.results.write import results_image
 from ffrobot.run.solve import prepare_scene, solve_scene
 
-LINK = """
-name = "{name}"
-[material]
-youngs_modulus = 70e9
-poissons_ratio = 0.3
-density = 2700.0
-[geometry]
-kind = "{kind}"
-length = 0.5
-section = {{ shape = "rectangle", height = 0.01, width = 0.014 }}
-[mesh]
-{mesh}
-[reference]
-condition = "cantilever"
-[modes]
-attachment_modes = false
-count = {count}
-family = "{family}"
-"""
 STICK = {"mass": 0.4, "inertia": 0.01, "center": [0.25, 0.0], "points": {"root": [0.0, 0.0], "tip": [0.5, 0.0]}}
 FAR = ("dolfinx", "gmsh", "petsc4py", "slepc4py", "mpi4py", "basix", "ufl", "matplotlib", "plotly", "pandas", "sphinx")
 
@@ -42,14 +25,16 @@ FAR = ("dolfinx", "gmsh", "petsc4py", "slepc4py", "mpi4py", "basix", "ufl", "mat
 def folder(tmp_path_factory):
     """Beams with modes in all directions and with bending alone, and a solid."""
     folder = tmp_path_factory.mktemp("links")
-    beam, solid = "elements = 12", 'cell = "hexahedron"\norder = 1\ndivisions = [12, 2, 2]'
+    beam, solid = {"elements": 12}, {"cell": "hexahedron", "order": 1, "divisions": [12, 2, 2]}
     for name, kind, mesh, family, count in (
         ("all", "beam", beam, "all", 14),
         ("bending", "beam", beam, "in-plane-bending", 8),
         ("solid", "solid", solid, "in-plane-bending", 8),
     ):
+        modes = {"count": count, "family": family, "attachment_modes": False}
+        keys = link_keys(kind, 0.5, rectangle(0.01, 0.014), mesh, nu=0.3, name=name, modes=modes)
         path = folder / f"{name}.toml"
-        path.write_text(LINK.format(name=name, kind=kind, mesh=mesh, family=family, count=count))
+        path.write_text(tomli_w.dumps(keys))
         make_link(path)
     return folder
 

@@ -7,6 +7,7 @@ import pytest
 from checkpoint_mechanisms import load
 from checkpoint_scene_files import close, solved, write_scene
 from robots_3d import random_scene_in_3d
+from tables_3d import Y, revolute, rigid, scene
 
 import ffrobot
 
@@ -105,16 +106,6 @@ def test_forward_motion_under_given_moments(tmp_path, ffrobot):
         assert "moment" not in group["joints/q1"]
 
 
-def rigid(text):
-    """The arm of the checkpoints with rigid links of about the same masses."""
-    for name, length, mass in (("upper", 0.7, 0.06), ("fore", 0.6, 0.04)):
-        across = mass * length**2 / 12
-        body = f"mass = {mass}, center = [{length / 2}, 0.0, 0.0], inertia = [1e-5, {across}, {across}]"
-        points = f"points = {{ root = [0.0, 0.0, 0.0], tip = [{length}, 0.0, 0.0] }}"
-        text = text.replace(f'link = "{name}.toml"', f"rigid = {{ {body}, {points} }}")
-    return text
-
-
 REPLAY = '\n[[analysis]]\nname = "again"\nkind = "forward"\nactuation = "inverse"\napply = "joints"\ntolerance = 1e-8\n'
 
 
@@ -165,23 +156,13 @@ def test_equilibrium_whose_forces_are_all_of_the_links(seed, number):
 )
 def test_a_double_pendulum_has_one_stable_equilibrium(kind, upper, lower, is_stable):
     """Both bars down, of four; joints about y carry x to -z."""
-    bar = {"mass": 1.0, "inertia": [0.1] * 3, "center": [0.25, 0, 0], "points": {"root": [0] * 3, "tip": [0.5, 0, 0]}}
-    hinge = {"type": "revolute", "axis": [0.0, 1.0, 0.0], "motor": False}
-    scene = ffrobot.make_scene(
-        name="pendulum",
-        space="spatial",
-        gravity=[0.0, 0.0, -9.81],
-        body=[{"name": "a", "rigid": bar}, {"name": "b", "rigid": bar}],
-        joint=[
-            {"name": "A", "between": ["ground", "a.root"], **hinge},
-            {"name": "B", "between": ["a.tip", "b.root"], **hinge},
-        ],
-        initial={"joints": {"A": upper, "B": lower}},
-        analysis=[{"name": "rest", "kind": kind}],
-    )
+    bodies = [rigid(name, center=[0.25, 0.0, 0.0], tip=[0.5, 0.0, 0.0]) for name in "ab"]
+    joints = [revolute("A", "ground", "a.root", Y, motor=False), revolute("B", "a.tip", "b.root", Y, motor=False)]
+    start = {"joints": {"A": upper, "B": lower}}
+    made = ffrobot.make_scene(**scene(bodies, joints, {"name": "rest", "kind": kind}, initial=start))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ffrobot.FfrobotWarning)
-        results = ffrobot.solve(scene)
+        results = ffrobot.solve(made)
     told = [text for text in results.warnings.get("rest", ()) if "equilibrium is unstable" in text]
     assert len(told) == (not is_stable)
     angles = [results[f"rest/joints/{name}/coordinate"][0] for name in "AB"]

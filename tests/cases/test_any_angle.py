@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
+from tables_3d import ORIGIN, X, Z, joint, revolute, rigid, scene
 
 import ffrobot
 from ffrobot.exchange.urdf.read import read_urdf
@@ -15,13 +16,13 @@ from ffrobot.run.watcher import Watcher
 W = 20 * np.pi  # rad/s: ten turns in a second
 
 
-def bar(name, length=0.5, **keys):
-    body = {"mass": 1.0, "inertia": [0.1, 0.2, 0.25], "center": [length / 2, 0.0, 0.0], **keys}
-    return {"name": name, "rigid": body | {"points": {"root": [0.0, 0.0, 0.0], "tip": [length, 0.0, 0.0]}}}
+def bar(name, length=0.5, mass=1.0, center=None):
+    center = [length / 2, 0.0, 0.0] if center is None else center
+    return rigid(name, mass, [0.1, 0.2, 0.25], center, tip=[length, 0.0, 0.0])
 
 
-def solved(**tables):
-    return ffrobot.solve(ffrobot.make_scene(name="s", space="spatial", gravity=[0.0, 0.0, 0.0], **tables))
+def solved(body, joint, analysis, **tables):
+    return ffrobot.solve(ffrobot.make_scene(**scene(body, joint, *analysis, gravity=ORIGIN, **tables)))
 
 
 def analysis(kind, **keys):
@@ -33,30 +34,23 @@ def turns(results, body):
 
 
 @pytest.mark.parametrize(
-    ("kind", "joint", "rates", "lead"),
+    ("kind", "of_type", "rates", "lead"),
     [
         ("pcid", "revolute", W, 0.0), ("pcid", "screw", W, 0.01), ("forward", "revolute", W, 0.0),
         ("forward", "screw", W, 0.01), ("forward", "cylindrical", [W, 0.3], 0.0), ("forward", "planar", [0, 0, W], 0.0),
     ],
 )  # fmt: skip
-def test_bodies_are_where_their_joints_have_turned_them(kind, joint, rates, lead):
+def test_bodies_are_where_their_joints_have_turned_them(kind, of_type, rates, lead):
     """By the closed form, ten turns from zero, the joint itself turned by an rpy of 30 rad."""
-    keys = {"lead": lead} if joint == "screw" else {}
-    record = {
-        "name": "j",
-        "type": joint,
-        "between": ["ground", "a.root"],
-        "axis": [0, 0, 1],
-        "rpy": [0, 0, 30.0],
-        **keys,
-    }
-    center = {"center": [0.0, 0.0, 0.0]} if joint == "planar" else {}
-    tables = {"body": [bar("a", **center)], "joint": [record | keys], "initial": {"joint_rates": {"j": rates}}}
+    keys = {"lead": lead} if of_type == "screw" else {}
+    record = {"name": "j", "type": of_type, "between": ["ground", "a.root"], "axis": Z, "rpy": [0, 0, 30.0], **keys}
+    center = {"center": [0.0, 0.0, 0.0]} if of_type == "planar" else {}
+    tables = {"body": [bar("a", **center)], "joint": [record], "initial": {"joint_rates": {"j": rates}}}
     if kind == "pcid":
         tables["trajectory"] = [{"name": "t", "joint": "j", "value": f"{W}*t"}]
     results = solved(**tables, analysis=analysis(kind))
     t = results["a/time"]
-    angle, rise = 30.0 + W * t, {"screw": lead * W / 2 / np.pi, "cylindrical": 0.3}.get(joint, 0.0)
+    angle, rise = 30.0 + W * t, {"screw": lead * W / 2 / np.pi, "cylindrical": 0.3}.get(of_type, 0.0)
     tip = np.stack([0.5 * np.cos(angle), 0.5 * np.sin(angle), rise * t], axis=1)
     np.testing.assert_allclose(results["a/points/a.tip/position"], tip, atol=1e-9)
     (told,) = results.attributes("a")["warnings"]
@@ -65,7 +59,7 @@ def test_bodies_are_where_their_joints_have_turned_them(kind, joint, rates, lead
 
 @pytest.mark.parametrize("initial", [{}, {"joints": {"j": "20*pi"}}], ids=["", "guessed"])
 def test_a_path_may_begin_many_turns_from_zero(initial):
-    joint = {"name": "j", "type": "revolute", "between": ["ground", "a.root"], "axis": [0, 0, 1]}
+    joint = revolute("j", "ground", "a.root")
     path = {"name": "t", "joint": "j", "value": "20*pi+0.3+t**2"}
     results = solved(body=[bar("a")], joint=[joint], trajectory=[path], initial=initial, analysis=analysis("pcid"))
     angle = 0.3 + results["a/time"] ** 2
@@ -161,20 +155,15 @@ def test_turns_that_outputs_do_not_show_are_told(outputs):
 @pytest.mark.parametrize("what", ["angle", "way", "point"])
 def test_constraints_that_do_not_hold_are_told(what, unit):
     """Of a motion that is off by a known share of the robot's size, or rad; whatever the unit of length is."""
-    joints = [
-        {"name": "A", "type": "revolute", "between": ["ground", "a.root"], "axis": [0, 0, 1]},
-        {"name": "S", "type": "prismatic", "between": ["a.tip", "b.root"], "axis": [1, 0, 0]},
-    ]
+    joints = [revolute("A", "ground", "a.root"), joint("S", "prismatic", "a.tip", "b.root", axis=X)]
     path = {
         "angle": {"joint": "A", "value": "0.1*t"},
         "way": {"joint": "S", "value": f"{0.1 * unit}*t"},
         "point": {"point": "b.tip", "x": f"{unit}*(2+0.1*t)"},
     }[what]
-    scene = ffrobot.make_scene(
-        name="s", space="spatial", gravity=[0.0, 0.0, 0.0], body=[bar("a", unit), bar("b", unit)], joint=joints,
-        trajectory=[{"name": "t"} | path], analysis=analysis("pcid", tolerance=1e-5),
-    )  # fmt: skip
-    (result,) = solve_scene(scene, Watcher()).analyses.values()
+    run = {"name": "a", "kind": "pcid", "end": 1.0, "output_step": 0.05, "tolerance": 1e-5}
+    tables = scene([bar("a", unit), bar("b", unit)], joints, run, gravity=ORIGIN, trajectory=[{"name": "t"} | path])
+    (result,) = solve_scene(ffrobot.make_scene(**tables), Watcher()).analyses.values()
     assert not list(doubts(result.motion, 1e-5))
     column = result.motion.node("a" if what == "angle" else "b").q.start
     for off, is_told in ((3e-6, False), (1e-4, True), (1e20, True), (np.nan, True)):

@@ -160,6 +160,7 @@ def after_path(group):
     return group["time"][late], 1e3 * group["points/flange.tool/position"][late]
 
 
+@pytest.mark.nightly
 def test_twists_at_rest_are_moments_over_stiffness(behind_gears):
     """At the start, in equilibrium: τ = k (θ_m − γ); motors are where the path has them."""
     for joint, (stiffness, *_) in runpy.run_path(str(CASE / "behind_gears.py"))["GEARS"].items():
@@ -168,6 +169,7 @@ def test_twists_at_rest_are_moments_over_stiffness(behind_gears):
         assert stiffness * twist == pytest.approx(entry["moment"][0], rel=1e-6, abs=1e-4)
 
 
+@pytest.mark.nightly
 def test_the_shaper_is_for_the_frequency_with_which_the_tool_swings(behind_gears):
     """Zero crossings of the fastest direction of swing, about those along the path."""
     t, place = after_path(behind_gears["slower"])
@@ -180,6 +182,7 @@ def test_the_shaper_is_for_the_frequency_with_which_the_tool_swings(behind_gears
     assert 0.93 * lowest < frequency < 1.07 * second  # means along the path, over which they change by 7 %
 
 
+@pytest.mark.nightly
 def test_numbers_behind_gears(behind_gears):
     way, turn = deviation(behind_gears["gears"])
     check_table("arm_6r", "gears", {"motors on q_r(t)": [way[0], way.max(), way[-1], turn.max()]})

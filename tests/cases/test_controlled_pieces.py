@@ -3,13 +3,11 @@
 import numpy as np
 import pytest
 from beam_links import beam_link, rectangle
-from scenes_in_3d import joint_keys
+from tables_3d import ORIGIN, revolute, scene
 
 import ffrobot
-from ffrobot.mbs.fields.spelling import place
 
 S = "(10*t**3-15*t**4+6*t**5)"
-CONDITIONS = {"link1": "simply-supported", "link2": "cantilever"}
 INVERSE = {"name": "inverse", "kind": "pcid", "end": 0.1, "output_step": 0.01, "tolerance": 1e-8}
 REST = {"name": "rest", "kind": "linear", "points": ["link2.tip", "link1.tip"]}
 LOOP = {
@@ -25,49 +23,28 @@ LQR = {"kind": "lqr", "modes": 2, "moment": 0.1, "voltage": 10.0, "angle": 0.2, 
 DESIGN = LOOP | {"name": "design", "controller": [LQR], "end": 0.003, "output_step": 0.001}
 
 
-def arm(pieces, analyses, family="in-plane-bending", count=4, **changes):
-    """Two planar links whose joints are driven, from equilibrium."""
-    link = beam_link(
-        1.0,
-        rectangle(0.01, 0.02),
-        12,
-        nu=0.3,
-        condition=None,
-        name="link",
-        modes={"count": count, "family": family},
-        damping={"rayleigh": [0.0, 2e-4]},
-    )
+def arm(pieces, *analyses):
+    """Two links whose joints are driven, from equilibrium."""
+    families = ["in-plane-bending", "out-of-plane-bending", "torsion"]
+    keys = {"nu": 0.3, "modes": {"count": 12, "family": families}, "damping": {"rayleigh": [0.0, 2e-4]}}
     divided = {} if pieces is None else {"pieces": pieces}
-    return {
-        "name": "arm",
-        "space": "planar",
-        "gravity": [0.0, -9.81],
-        "geometric_stiffening": True,
-        "body": [
-            {"name": name, "link": link | {"reference": {"condition": condition}}, **divided}
-            for name, condition in CONDITIONS.items()
-        ],
-        "joint": [
-            {"name": "O", "type": "revolute", "between": ["ground", "link1.root"]},
-            {"name": "A", "type": "revolute", "between": ["link1.tip", "link2.root"]},
-        ],
-        "payload": [{"point": "link2.tip", "mass": 0.2}],
-        "initial": {"state": "static", "angles": {"link1": 0.1, "link2": 0.6}},
-        "trajectory": [
+    bodies = [
+        {"name": name, "link": beam_link(1.0, rectangle(0.01, 0.02), 12, condition=condition, **keys), **divided}
+        for name, condition in (("link1", "simply-supported"), ("link2", "cantilever"))
+    ]
+    return scene(
+        bodies,
+        [revolute("O", "ground", "link1.root", [0.0, 0.6, 0.8]), revolute("A", "link1.tip", "link2.root")],
+        *analyses,
+        gravity=ORIGIN,
+        geometric_stiffening=True,
+        payload=[{"point": "link2.tip", "mass": 0.2, "center": [0.0, 0.05, 0.02]}],
+        initial={"state": "static", "joints": {"O": 0.1, "A": 0.5}},
+        trajectory=[
             {"name": "first", "joint": "O", "value": f"0.1+0.4*{S}"},
             {"name": "second", "joint": "A", "value": f"0.5-0.6*{S}"},
         ],
-        "analysis": analyses,
-    } | changes
-
-
-def in_3d(tables, **changes):
-    return tables | {
-        "space": "spatial",
-        "gravity": place(tables["gravity"]),
-        "joint": [joint_keys(joint) for joint in tables["joint"]],
-        "initial": {"state": "static", "joints": {"O": 0.1, "A": 0.5}},
-    } | changes  # fmt: skip
+    )
 
 
 def test_an_arm_that_bends_in_both_planes_and_twists():
@@ -75,14 +52,7 @@ def test_an_arm_that_bends_in_both_planes_and_twists():
 
     Without gravity: sag couples bending and twist of pieces, but not of the one link, whose file does not say so.
     """
-    axes = {"O": [0.0, 0.6, 0.8], "A": [0.0, 0.0, 1.0]}
-    found = []
-    for pieces in (None, 3):
-        tables = arm(pieces, [INVERSE, REST, DESIGN], ["in-plane-bending", "out-of-plane-bending", "torsion"], 12)
-        payload = [{"point": "link2.tip", "mass": 0.2, "center": [0.0, 0.05, 0.02]}]
-        tables = in_3d(tables, gravity=[0.0, 0.0, 0.0], payload=payload)
-        tables["joint"] = [joint | {"axis": axes[joint["name"]]} for joint in tables["joint"]]
-        found.append(ffrobot.solve(ffrobot.make_scene(**tables)))
+    found = [ffrobot.solve(ffrobot.make_scene(**arm(pieces, INVERSE, REST, DESIGN))) for pieces in (None, 3)]
     with found[0] as one, found[1] as two:
         expected, frequency = (of["rest/linear/frequency"][0, :9] for of in (one, two))
         np.testing.assert_allclose(frequency[2:], expected[2:], rtol=2e-3)

@@ -3,8 +3,10 @@
 import numpy as np
 import pytest
 from checkpoint_mechanisms import load
-from checkpoint_scene_files import FOLDER, close, solved
+from checkpoint_scene_files import FOLDER, close
+from tables_3d import ORIGIN, joint, rigid, scene
 
+import ffrobot
 from ffrobot.common.rotations import of_quaternion
 from ffrobot.mbs.analysis.drive import drive_robot
 from ffrobot.mbs.analysis.forward import Forward
@@ -15,42 +17,23 @@ from ffrobot.mbs.quantities.motion import RobotMotion
 from ffrobot.run.bodies import load_bodies
 from ffrobot.scene.load import validated_scene
 
-RIGID = """
-name = "top"
-space = "spatial"
-gravity = [0.0, 0.0, 0.0]
-[[body]]
-name = "top"
-rigid = {{ mass = {mass}, center = [0.0, 0.0, 0.0], inertia = {inertia}, points = {{ middle = [0.0, 0.0, 0.0] }} }}
-[[joint]]
-name = "floats"
-type = "free"
-between = ["ground", "top.middle"]
-[initial]
-joint_rates = {{ floats = [0.0, 0.0, 0.0, {omega}] }}
-[[analysis]]
-name = "spin"
-kind = "forward"
-end = 4.0
-output_step = 0.1
-tolerance = 1e-8
-"""
 
-
-def test_rigid_top(tmp_path, ffrobot):
-    """Euler's equations through the command; joint_rates of a free joint are in the axes of its body."""
-    data, scene = load("top_rigid"), tmp_path / "scene.toml"
+def test_rigid_top():
+    """Euler's equations; joint_rates of a free joint are in the axes of its body."""
+    data = load("top_rigid")
     samples = data["samples"]
-    omega = ", ".join(str(x) for x in samples[0]["angular_velocity_body"])
-    scene.write_text(RIGID.format(mass=data["mass"], inertia=data["inertia"], omega=omega))
-    with solved(ffrobot, scene) as file:
-        group = file["spin/bodies/top"]
-        e, expected = group["quaternion"][()], np.array([sample["quaternion"] for sample in samples])
+    spin = {"name": "spin", "kind": "forward", "end": 4.0, "output_step": 0.1, "tolerance": 1e-8}
+    rates = {"joint_rates": {"floats": [0.0, 0.0, 0.0, *samples[0]["angular_velocity_body"]]}}
+    floats = joint("floats", "free", "ground", "top.root")
+    tables = scene([rigid("top", data["mass"], data["inertia"])], [floats], spin, gravity=ORIGIN, initial=rates)
+    with ffrobot.solve(ffrobot.make_scene(**tables)) as results:
+        group = {key: results[f"spin/bodies/top/{key}"] for key in ("quaternion", "angular_velocity")}
+        e, expected = group["quaternion"], np.array([sample["quaternion"] for sample in samples])
         np.testing.assert_allclose(np.abs(np.sum(e * expected, axis=1)), 1, atol=1e-12)
-        spin = np.einsum("tji,tj->ti", of_quaternion(e), group["angular_velocity"][()])
+        spin = np.einsum("tji,tj->ti", of_quaternion(e), group["angular_velocity"])
         close(spin, [sample["angular_velocity_body"] for sample in samples])
-        close(file["spin/momentum/angular"], [sample["angular_momentum"] for sample in samples])
-        np.testing.assert_allclose(file["spin/energy/kinetic"], samples[0]["energy"], rtol=1e-8)
+        close(results["spin/momentum/angular"], [sample["angular_momentum"] for sample in samples])
+        np.testing.assert_allclose(results["spin/energy/kinetic"], samples[0]["energy"], rtol=1e-8)
 
 
 @pytest.fixture(scope="module")

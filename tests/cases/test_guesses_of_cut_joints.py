@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from tables_3d import revolute, rigid, scene
 
 import ffrobot
 
@@ -22,18 +23,14 @@ CUT = {
 def test_a_loop_is_cut_at_a_joint_with_a_guess(kind):
     """A bar turned by 0.4 rad on a pin of the ground, with a second joint beside the pin that closes a loop."""
     keys, guess, expected = CUT[kind]
-    bar = {"mass": 1.0, "center": [0.0, 0.0, 0.0], "inertia": [0.1, 0.1, 0.1], "points": {"root": [0.0, 0.0, 0.0]}}
-    pin = {"name": "pin", "type": "revolute", "between": ["ground", "bar.root"], "motor": False, **AXIS}
-    scene = ffrobot.make_scene(
-        name="cut",
-        space="spatial",
-        gravity=[0.0, 0.0, -9.81],
-        body=[{"name": "bar", "rigid": bar}],
-        joint=[pin, {"name": "other", "type": kind, "between": ["ground", "bar.root"], **keys}],
-        initial={"joints": {"pin": 0.4} | ({} if guess is None else {"other": guess})},
-        analysis=[{"name": "rest", "kind": "forward", "end": 0.02, "output_step": 0.01}],
-    )
-    results = ffrobot.solve(scene)
+    joints = [
+        revolute("pin", "ground", "bar.root", motor=False),
+        {"name": "other", "type": kind, "between": ["ground", "bar.root"], **keys},
+    ]
+    rest = {"name": "rest", "kind": "forward", "end": 0.02, "output_step": 0.01}
+    start = {"joints": {"pin": 0.4} | ({} if guess is None else {"other": guess})}
+    made = ffrobot.make_scene(**scene([rigid("bar")], joints, rest, initial=start))
+    results = ffrobot.solve(made)
     assert results.has("rest/joints/other/coordinate") == (expected is not None)
     if expected is not None:
         found = results["rest/joints/other/coordinate"].reshape(3, -1)

@@ -1,18 +1,17 @@
 """Links in pieces in 3D whose shape is prescribed, that motors alone move, or that get patches elsewhere.
 
-The plane is asked with links cut by hand and welded, which no code for links in pieces touches.
+They are compared with links cut by hand and welded, which no code for links in pieces touches.
 """
 
 from pathlib import Path
 
 import numpy as np
 from beam_links import beam_link, rectangle
-from scenes_in_3d import joint_keys
+from tables_3d import joint, revolute, scene
 
 import ffrobot
 from ffrobot.fe_models.link_file import LinkTable
 from ffrobot.fe_models.pieces import cut
-from ffrobot.mbs.fields.spelling import place
 
 S = "(10*(t/0.8)**3-15*(t/0.8)**4+6*(t/0.8)**5)"
 NAMES = "upper", "fore"
@@ -26,47 +25,28 @@ PATCHES = {"body": "fore", "count": 4, "length": 0.1, "width": 0.02, "thickness"
 }  # fmt: skip
 
 
-def planar(bodies, welds, ends, analyses, **changes):
+def arm(bodies, welds, ends, analyses, **tables):
     """Two links on a path of the tip; `ends` are root and tip of each."""
     upper, fore = ends
-    joints = [
-        {"name": "O", "type": "revolute", "between": ["ground", upper[0]], "motor": True},
-        {"name": "A", "type": "revolute", "between": [upper[1], fore[0]], "motor": True},
-    ]
-    path = {"x": f"1.46-0.1*{S}", "y": f"0.53+0.1*{S}"}
-    return {
-        "name": "arm",
-        "space": "planar",
-        "gravity": [0.0, -9.81],
-        "geometric_stiffening": True,
-        "body": bodies,
-        "joint": joints + welds,
-        "payload": [{"point": fore[1], "mass": 0.1}],
-        "initial": {"angles": {body["name"]: 0.6 if body["name"].startswith("fore") else 0.1 for body in bodies}},
-        "trajectory": [{"name": "tip", "point": fore[1], **path}],
-        "analysis": analyses,
-    } | changes
+    joints = [revolute("O", "ground", upper[0], motor=True), revolute("A", upper[1], fore[0], motor=True)]
+    path = {"name": "tip", "point": fore[1], "x": f"1.46-0.1*{S}", "y": f"0.53+0.1*{S}"}
+    keys = {"gravity": [0.0, -9.81, 0.0], "payload": [{"point": fore[1], "mass": 0.1}], "trajectory": [path]}
+    keys |= {"geometric_stiffening": True, "initial": {"joints": {"O": 0.1, "A": 0.5}}}
+    return scene(bodies, joints + welds, *analyses, **keys | tables)
 
 
-def in_pieces(analyses, count=2, link=LINK, **changes):
-    """In space."""
+def in_pieces(analyses, count=2, **tables):
     divided = {} if count is None else {"pieces": count}
-    bodies = [{"name": name, "link": link, **divided} for name in NAMES]
-    tables = planar(bodies, [], [(f"{name}.root", f"{name}.tip") for name in NAMES], analyses)
-    return tables | {
-        "space": "spatial",
-        "gravity": place(tables["gravity"]),
-        "joint": [joint_keys(joint) for joint in tables["joint"]],
-        "initial": {"joints": {"O": 0.1, "A": 0.5}},
-    } | changes  # fmt: skip
+    bodies = [{"name": name, "link": LINK, **divided} for name in NAMES]
+    return arm(bodies, [], [(f"{name}.root", f"{name}.tip") for name in NAMES], analyses, **tables)
 
 
 def by_hand(analyses):
-    """In the plane, of links in two pieces."""
+    """Of links in two pieces."""
     tables = [dict(table.keys) for table in cut(LinkTable(LINK, Path("link.toml")), 2).tables]
     bodies = [{"name": f"{name}{k}", "link": tables[k]} for name in NAMES for k in range(2)]
-    welds = [{"name": name, "type": "weld", "between": [f"{name}0.tip", f"{name}1.root"]} for name in NAMES]
-    return planar(bodies, welds, [(f"{name}0.root", f"{name}1.tip") for name in NAMES], analyses)
+    welds = [joint(name, "weld", f"{name}0.tip", f"{name}1.root") for name in NAMES]
+    return arm(bodies, welds, [(f"{name}0.root", f"{name}1.tip") for name in NAMES], analyses)
 
 
 def solved(tables):
@@ -80,13 +60,12 @@ def agree(found, expected, share, at=slice(None)):
 def test_motors_and_tips_are_those_of_links_cut_by_hand():
     """Under static shapes, none, and motors alone, which leave the path by what bends."""
     analyses = [STATIC, ZERO, ALONE]
-    with solved(in_pieces(analyses)) as space, solved(by_hand(analyses)) as plane:
+    with solved(in_pieces(analyses)) as pieces, solved(by_hand(analyses)) as hand:
         for name in ("static", "zero", "alone"):
             for joint in "OA":
-                found, expected = (of[f"{name}/joints/{joint}/moment"].ravel() for of in (space, plane))
+                found, expected = (of[f"{name}/joints/{joint}/moment"].ravel() for of in (pieces, hand))
                 agree(found, expected, 1e-8)
-            found, expected = space[f"{name}/points/fore.tip/position"], plane[f"{name}/points/fore1.tip/position"]
-            agree(found[:, :2], expected, 1e-8)
+            agree(pieces[f"{name}/points/fore.tip/position"], hand[f"{name}/points/fore1.tip/position"], 1e-8)
 
 
 def test_a_shape_is_given_in_the_modes_of_the_whole_link():

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import scenes_in_3d
+import tables_3d
 from beam_links import beam_link, rectangle
 from checkpoints import CASES
 from scipy.integrate import solve_ivp
@@ -34,26 +35,15 @@ def test_a_shaper_that_asks_the_robot_beside_a_held_joint(held, tmp_path):
 
 INERTIA, TURN = 0.3, 1.2
 STILL = [0.0, 0.0, 0.0]
-BODY = {
-    "name": "arm",
-    "rigid": {"mass": 2.0, "inertia": [0.2, 0.2, INERTIA], "center": STILL, "points": {"root": STILL}},
-}
+BODY = tables_3d.rigid("arm", 2.0, [0.2, 0.2, INERTIA])
 
 
 def arm(path, joint=None, end=2.0, body=BODY, **keys):
     """One body on a shoulder about z."""
-    shoulder = {"name": "shoulder", "type": "revolute", "between": ["ground", "arm.root"], "axis": [0.0, 0.0, 1.0]}
-    return ffrobot.make_scene(
-        name="arm",
-        space="spatial",
-        gravity=STILL,
-        body=[body],
-        joint=[shoulder | (joint or {})],
-        trajectory=[
-            {"name": "swing", "via": [0.0, TURN], **({} if "motor" in path else {"joint": "shoulder"}), **path}
-        ],
-        analysis=[{"name": "inverse", "kind": "pcid", "end": end, "output_step": 1e-3, **keys}],
-    )
+    shoulder = tables_3d.revolute("shoulder", "ground", "arm.root", **(joint or {}))
+    swing = {"name": "swing", "via": [0.0, TURN]} | ({} if "motor" in path else {"joint": "shoulder"}) | path
+    run = {"name": "inverse", "kind": "pcid", "end": end, "output_step": 1e-3, **keys}
+    return ffrobot.make_scene(**tables_3d.scene([body], [shoulder], run, gravity=STILL, trajectory=[swing]))
 
 
 @pytest.mark.parametrize("limit", [0.5, 30.0])

@@ -2,6 +2,8 @@
 
 import numpy as np
 import pytest
+import tables_3d
+from beam_links import beam_link
 from drawn_arms import drawn_arm, posed
 from patched_arms import arm
 from rod_chain_3d import Body, RodChain, X, Y, Z, bar
@@ -118,19 +120,14 @@ def universal_arm(folder):
     Along x where all angles are zero: axes z, y, y, y, z, y with d_1, a_2, a_3, d_4, d_5, d_6 (Denavit and Hartenberg).
     """
     d1, a2, a3, d4, d5, d6 = 0.09, 0.42, 0.39, 0.11, 0.095, 0.08
-    stiff = {"youngs_modulus": 70e9, "density": 2700.0, "poissons_ratio": 0.33}
 
     def tube(name, length, outer):
         section = {"shape": "tube", "outer": outer, "inner": outer - 0.006}
-        geometry = {"kind": "beam", "length": length, "section": section}
         modes = {"count": 1, "family": ["in-plane-bending", "out-of-plane-bending", "torsion"]}
-        link = {"name": name, "material": stiff, "geometry": geometry, "mesh": {"elements": 8}, "modes": modes}
-        return {"name": name, "link": link | {"reference": {"condition": "cantilever"}, "damping": {"ratio": 0.01}}}
+        return {"name": name, "link": beam_link(length, section, 8, name=name, modes=modes, damping={"ratio": 0.01})}
 
     def drive(name, mass, tip):
-        center = [0.5 * x for x in tip]
-        rigid = {"mass": mass, "center": center, "inertia": [0.004 * mass, 0.004 * mass, 0.003 * mass]}
-        return {"name": name, "rigid": rigid | {"points": {"root": [0.0, 0.0, 0.0], "tip": tip}}}
+        return tables_3d.rigid(name, mass, [0.004 * mass, 0.004 * mass, 0.003 * mass], [0.5 * x for x in tip], tip=tip)
 
     bodies = [
         drive("shoulder", 3.7, [0.0, 0.135, 0.0]), tube("upper", a2, 0.07), tube("fore", a3, 0.055),
@@ -139,10 +136,9 @@ def universal_arm(folder):
     ]  # fmt: skip
     points = ["ground", *(f"{body['name']}.tip" for body in bodies)]
     joints = [
-        {"name": f"j{k}", "type": "revolute", "between": [points[k], f"{body['name']}.root"],
-         "axis": [float(axis == "x"), float(axis == "y"), float(axis == "z")]}
-        for k, (body, axis) in enumerate(zip(bodies, "zyyyzy", strict=True))
-    ]  # fmt: skip
+        tables_3d.revolute(f"j{k}", points[k], f"{body['name']}.root", getattr(tables_3d, axis))
+        for k, (body, axis) in enumerate(zip(bodies, "ZYYYZY", strict=True))
+    ]
     joints[0]["at"] = [0.0, 0.0, d1]
     angles = [0.2, -1.2, 1.6, -0.9, 0.7, 0.1], [0.6, -0.9, 1.3, -0.8, 0.9, 0.3]
     postures = [{f"j{k}": angle for k, angle in enumerate(of)} for of in angles]

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from beam_links import beam_link
 from scipy.integrate import solve_bvp
+from tables_3d import joint, scene
 
 import ffrobot
 from ffrobot.common.errors import InputError
@@ -18,32 +19,15 @@ EI = SOFT * SIDE**4 / 12
 
 def link(modulus=SOFT, condition="cantilever", width=SIDE, **keys):
     section = {"shape": "rectangle", "height": SIDE, "width": width}
-    return (
-        beam_link(
-            1.0,
-            section,
-            16,
-            E=modulus,
-            nu=0.3,
-            condition=condition,
-            name="link",
-            modes={"count": 8, "family": BENT_AND_TWISTED},
-        )
-        | keys
-    )
+    modes = {"count": 8, "family": BENT_AND_TWISTED}
+    return beam_link(1.0, section, 16, E=modulus, nu=0.3, condition=condition, name="link", modes=modes) | keys
 
 
 def solved(body, pieces=None, **keys):
     divided = {} if pieces is None else {"pieces": pieces}
     bodies = body if isinstance(body, list) else [{"name": "beam", "link": body} | divided]
-    tables = {
-        "name": "pieces",
-        "space": "spatial",
-        "gravity": [0.0, 0.0, 0.0],
-        "body": bodies,
-        "joint": [{"name": "wall", "type": "weld", "between": ["ground", "beam.root"], "rpy": RPY}],
-        "analysis": [{"name": "rest", "kind": "static"}],
-    }
+    wall = joint("wall", "weld", "ground", "beam.root", rpy=RPY)
+    tables = scene(bodies, [wall], {"name": "rest", "kind": "static"}, gravity=[0.0, 0.0, 0.0])
     return ffrobot.solve(ffrobot.make_scene(**(tables | keys)))
 
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from beam_links import beam_link, rectangle
 from scipy.spatial.transform import Rotation
+from tables_3d import revolute, rigid, scene
 
 import ffrobot
 
@@ -13,8 +14,7 @@ KINDS = ["rest", "straight", "inverse", "again", "along", "held"]
 
 
 def body(name, tip):
-    tensor = {"mass": 0.7, "inertia": [4e-3, 5e-3, 6e-3], "center": [0.1, 0.02, -0.01]}
-    return {"name": name, "rigid": tensor | {"points": {"root": [0.0, 0.0, 0.0], "tip": tip}}}
+    return rigid(name, 0.7, [4e-3, 5e-3, 6e-3], [0.1, 0.02, -0.01], tip=tip)
 
 
 def analyses(paths_only):
@@ -76,15 +76,15 @@ def along_joint(results, analysis, joint):
 
 @pytest.mark.parametrize("turned", [False, True], ids=["outwards", "inwards"])
 def test_reactions_do_no_work_along_joints_that_follow_paths(turned):
-    scene = chain(["prismatic", "screw", "revolute", "screw"], turned)
-    scene["trajectory"] = [
+    tables = chain(["prismatic", "screw", "revolute", "screw"], turned)
+    tables["trajectory"] = [
         {"name": f"t{k}", "joint": joint["name"], "value": f"{POSE[joint['type']]}+0.3*t**2*sin({k + 4}*t)"}
-        for k, joint in enumerate(scene["joint"])
+        for k, joint in enumerate(tables["joint"])
     ]
-    stiff = {joint["name"]: 5.0 for joint in scene["joint"]}
-    results = ffrobot.solve(ffrobot.make_scene(**scene, analysis=analyses(stiff)))
+    stiff = {joint["name"]: 5.0 for joint in tables["joint"]}
+    results = ffrobot.solve(ffrobot.make_scene(**tables, analysis=analyses(stiff)))
     for name in KINDS:
-        for joint in scene["joint"]:
+        for joint in tables["joint"]:
             assert np.abs(results[f"{name}/joints/{joint['name']}/moment"]).max() > 1e-3
             assert np.abs(along_joint(results, name, joint)).max() < 1e-7, (name, joint["name"])
 
@@ -92,18 +92,18 @@ def test_reactions_do_no_work_along_joints_that_follow_paths(turned):
 @pytest.mark.parametrize("turned", [False, True], ids=["outwards", "inwards"])
 def test_reactions_do_no_work_along_joints_with_several_coordinates(turned):
     """A tool in six coordinates that follows a pose, or motors that do."""
-    scene = chain(["cylindrical", "universal", "revolute", "prismatic"], turned)
-    joints, tip = scene["joint"], f"b{len(scene['joint']) - 1}.tip"
+    tables = chain(["cylindrical", "universal", "revolute", "prismatic"], turned)
+    joints, tip = tables["joint"], f"b{len(tables['joint']) - 1}.tip"
     start = ffrobot.solve(
-        ffrobot.make_scene(**scene, analysis=[{"name": "a", "kind": "forward", "end": 1e-3, "output_step": 1e-3}])
+        ffrobot.make_scene(**tables, analysis=[{"name": "a", "kind": "forward", "end": 1e-3, "output_step": 1e-3}])
     )
     x = start[f"a/points/{tip}/position"][0]
     turn = Rotation.from_quat(np.roll(start[f"a/points/{tip}/quaternion"][0], -1)).as_rotvec()
     path = {key: f"{value}+0.4*t**2" for key, value in zip("xyz", x, strict=True)}
     path |= {"rotation_vector": ["t**2", "0", "-t**2"], "reference_rotation_vector": turn.tolist()}
-    scene["trajectory"] = [{"name": "t", "point": tip, **path}]
+    tables["trajectory"] = [{"name": "t", "point": tip, **path}]
     stiff = {f"{joint['name']}": 5.0 for joint in joints}
-    results = ffrobot.solve(ffrobot.make_scene(**scene, analysis=analyses(stiff)))
+    results = ffrobot.solve(ffrobot.make_scene(**tables, analysis=analyses(stiff)))
     for name in KINDS:
         for joint in joints:
             assert np.abs(along_joint(results, name, joint)).max() < 1e-7, (name, joint["name"])
@@ -136,25 +136,13 @@ def test_a_screw_jack_in_closed_form(unit):
 
 def test_motors_only_keeps_motors_out_of_reactions():
     """A beam on a hub: what the motor does there is no part of the reaction, as in the replay."""
-    link = beam_link(
-        0.5,
-        rectangle(0.01, 0.02),
-        8,
-        name="arm",
-        modes={"count": 2, "family": "in-plane-bending"},
-        damping={"ratio": 0.02},
-    )
-    joint = {"name": "hub", "type": "revolute", "between": ["ground", "arm.root"], "axis": [0, 0, 1]}
-    rest = "0.4*(10*(t/0.4)**3-15*(t/0.4)**4+6*(t/0.4)**5)"
-    path = {"name": "t", "joint": "hub", "value": rest}
+    keys = {"modes": {"count": 2, "family": "in-plane-bending"}, "damping": {"ratio": 0.02}}
+    bodies = [{"name": "arm", "link": beam_link(0.5, rectangle(0.01, 0.02), 8, **keys)}]
+    path = {"name": "t", "joint": "hub", "value": "0.4*(10*(t/0.4)**3-15*(t/0.4)**4+6*(t/0.4)**5)"}
     only = {"name": "only", "kind": "motors-only", "end": 0.4, "output_step": 0.02, "tolerance": 1e-6}
     again = {"name": "again", "kind": "forward", "actuation": "only", "apply": "joints", "tolerance": 1e-8}
-    results = ffrobot.solve(
-        ffrobot.make_scene(
-            name="arm", space="spatial", gravity=[0.0, 0.0, -9.81], body=[{"name": "arm", "link": link}],
-            joint=[joint], trajectory=[path], analysis=[only, again],
-        )
-    )  # fmt: skip
+    tables = scene(bodies, [revolute("hub", "ground", "arm.root")], only, again, trajectory=[path])
+    results = ffrobot.solve(ffrobot.make_scene(**tables))
     for name in ("only", "again"):
         assert np.abs(results[f"{name}/joints/hub/moment"]).max() > 0.1
         assert np.abs(results[f"{name}/joints/hub/reaction_moment"][:, 2]).max() < 1e-6
@@ -167,13 +155,13 @@ ROUGH = {"viscous_friction": 3.0, "coulomb_friction": 2.0, "friction_speed": 0.0
 @pytest.mark.parametrize("turned", [False, True], ids=["outwards", "inwards"])
 def test_friction_loads_and_rotors_along_joints_are_no_reactions(turned):
     """They do work along the joints as motors do, and no reaction does."""
-    scene = chain(["prismatic", "screw", "revolute", "cylindrical"], turned)
-    for joint in scene["joint"]:
+    tables = chain(["prismatic", "screw", "revolute", "cylindrical"], turned)
+    for joint in tables["joint"]:
         joint |= ROUGH | ({"rotor_inertia": 0.02} if joint["type"] in ("revolute", "prismatic") else {})
-    scene["load"] = [{"joint": "j0", "moment": "7*cos(9*t)"}, {"joint": "j2", "moment": "3*cos(9*t)"}]
+    tables["load"] = [{"joint": "j0", "moment": "7*cos(9*t)"}, {"joint": "j2", "moment": "3*cos(9*t)"}]
     fall = {"name": "fall", "kind": "forward", "end": END, "output_step": STEP, "tolerance": 1e-9}
-    results = ffrobot.solve(ffrobot.make_scene(**scene, analysis=[fall]))
-    for joint in scene["joint"]:
+    results = ffrobot.solve(ffrobot.make_scene(**tables, analysis=[fall]))
+    for joint in tables["joint"]:
         assert np.abs(results[f"fall/joints/{joint['name']}/rate"]).max() > 1e-2
         assert np.abs(along_joint(results, "fall", joint)).max() < 1e-7, joint["name"]
 

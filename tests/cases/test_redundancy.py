@@ -5,6 +5,7 @@ import pytest
 import scenes_in_3d
 from checkpoint_scene_files import write_scene
 from scipy.integrate import simpson
+from tables_3d import revolute, rigid
 
 import ffrobot
 from ffrobot.common.errors import InputError
@@ -43,13 +44,9 @@ def arm(*analyses, **keys):
     for k, (axis, length) in enumerate(zip(AXES, LENGTHS, strict=True)):
         mass = 0.3 + 2 * length
         inertia = [2e-3, 2e-3 + mass * length**2 / 12, 3e-3 + mass * length**2 / 12]
-        points = {"root": [0.0, 0.0, 0.0], "tip": [length, 0.0, 0.0]}
-        center = [length / 2, 0.01, -0.005]
-        bodies.append(
-            {"name": f"l{k}", "rigid": {"mass": mass, "center": center, "inertia": inertia, "points": points}}
-        )
+        bodies.append(rigid(f"l{k}", mass, inertia, [length / 2, 0.01, -0.005], tip=[length, 0.0, 0.0]))
         inner = "ground" if k == 0 else f"l{k - 1}.tip"
-        joints.append({"name": JOINTS[k], "type": "revolute", "between": [inner, f"l{k}.root"], "axis": axis.tolist()})
+        joints.append(revolute(JOINTS[k], inner, f"l{k}.root", axis.tolist()))
     joints[0]["at"] = [0.0, 0.0, 0.4]
     _, _, A, tip = places(GUESS)
     turn = [float(x) for x in np.array([A[2, 1] - A[1, 2], A[0, 2] - A[2, 0], A[1, 0] - A[0, 1]])]

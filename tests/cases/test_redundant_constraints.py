@@ -5,61 +5,47 @@ import re
 import numpy as np
 import pytest
 from beam_links import beam_link, circle
+from tables_3d import ORIGIN, revolute, rigid, scene
 
 import ffrobot
 
-Z = {"axis": [0.0, 0.0, 1.0], "motor": False}
 WEIGHT, ARM, HEIGHT = 50.0, 0.4, 1.8
 NAMES = ("j1", "j2", "j3", "j4")
 
 
+def pin(name, inner, outer, motor=False, **keys):
+    return revolute(name, inner, outer, motor=motor, **keys)
+
+
 def bar(name, length, mass):
-    inertia = [1e-4, mass * length**2 / 12, mass * length**2 / 12]
-    points = {"root": [0.0, 0.0, 0.0], "tip": [length, 0.0, 0.0], "mid": [length / 2, 0.0, 0.0]}
-    return {
-        "name": name,
-        "rigid": {"mass": mass, "center": [length / 2, 0.0, 0.0], "inertia": inertia, "points": points},
-    }
+    across, middle = mass * length**2 / 12, [length / 2, 0.0, 0.0]
+    return rigid(name, mass, [1e-4, across, across], middle, tip=[length, 0.0, 0.0], mid=middle)
 
 
 def coupler(family):
-    return {
-        "name": "coupler",
-        "link": beam_link(
-            0.4,
-            circle(0.012),
-            4,
-            name="coupler",
-            modes={"count": 2, "family": family},
-            damping={"rayleigh": [0.0, 2e-4]},
-        ),
-    }
+    keys = {"modes": {"count": 2, "family": family}, "damping": {"rayleigh": [0.0, 2e-4]}}
+    return {"name": "coupler", "link": beam_link(0.4, circle(0.012), 4, **keys)}
 
 
 def four_bar(middle, gravity, order="1234", third=False, unsolved=False):
     """Cranks of 0.2 m and a coupler of 0.4 m on four parallel axes; the third crank stands in the middle."""
     joints = {
-        "1": {"name": "j1", "type": "revolute", "between": ["ground", "left.root"], **Z, "motor": True},
-        "2": {"name": "j2", "type": "revolute", "between": ["left.tip", "coupler.root"], **Z},
-        "3": {"name": "j3", "type": "revolute", "between": ["coupler.tip", "right.tip"], **Z},
-        "4": {"name": "j4", "type": "revolute", "between": ["ground", "right.root"], "at": [0.4, 0.0, 0.0], **Z},
+        "1": pin("j1", "ground", "left.root", motor=True),
+        "2": pin("j2", "left.tip", "coupler.root"),
+        "3": pin("j3", "coupler.tip", "right.tip"),
+        "4": pin("j4", "ground", "right.root", at=[0.4, 0.0, 0.0]),
     }
     bodies, joints = [bar("left", 0.2, 0.5), middle, bar("right", 0.2, 0.6)], [joints[k] for k in order]
+    guess = {"j1": 0.9, "j2": -0.9, "j3": 0.9, "j4": 0.9}
     if third:
         bodies.append(bar("third", 0.2, 0.3))
-        joints.append({"name": "j5", "type": "revolute", "between": ["ground", "third.root"], "at": [0.2, 0, 0], **Z})
-        joints.append({"name": "j6", "type": "revolute", "between": ["third.tip", "coupler.mid"], **Z})
-    scene = ffrobot.make_scene(
-        name="four_bar",
-        space="spatial",
-        gravity=gravity,
-        body=bodies,
-        joint=joints,
-        trajectory=[{"name": "t", "joint": "j1", "value": "0.9 + 0.5*sin(4*t)"}],
-        initial={"joints": {"j1": 0.9, "j2": -0.9, "j3": 0.9, "j4": 0.9} | ({"j5": 0.9, "j6": -0.9} if third else {})},
-        analysis=[{"name": "inv", "kind": "pcid", "end": 0.3, "output_step": 0.1}],
-    )
-    return scene if unsolved else ffrobot.solve(scene)
+        joints += [pin("j5", "ground", "third.root", at=[0.2, 0.0, 0.0]), pin("j6", "third.tip", "coupler.mid")]
+        guess |= {"j5": 0.9, "j6": -0.9}
+    run = {"name": "inv", "kind": "pcid", "end": 0.3, "output_step": 0.1}
+    path = [{"name": "t", "joint": "j1", "value": "0.9 + 0.5*sin(4*t)"}]
+    tables = scene(bodies, joints, run, gravity=gravity, trajectory=path, initial={"joints": guess})
+    made = ffrobot.make_scene(**tables)
+    return made if unsolved else ffrobot.solve(made)
 
 
 def opened(results):
@@ -73,20 +59,11 @@ def redundant(results):
 
 def test_a_door_on_two_hinges():
     """Of the least 2F² + 2m²/h² with Fh + 2m = Wb, where each hinge has F across and m: F = Wb/5h, m = 2Wb/5."""
-    hinges = {"low": [0.0, 0.0, 0.0], "high": [0.0, 0.0, HEIGHT]}
-    leaf = {"mass": WEIGHT / 10, "center": [ARM, 0.0, HEIGHT / 2], "inertia": [1.0, 1.0, 1.0], "points": hinges}
-    scene = ffrobot.make_scene(
-        name="door",
-        space="spatial",
-        gravity=[0.0, 0.0, -10.0],
-        body=[{"name": "leaf", "rigid": leaf}],
-        joint=[
-            {"name": name, "type": "revolute", "between": ["ground", f"leaf.{name}"], "at": at, **Z}
-            for name, at in hinges.items()
-        ],
-        analysis=[{"name": "inv", "kind": "forward", "end": 0.1, "output_step": 0.1}],
-    )
-    results = ffrobot.solve(scene)
+    hinges = {"low": ORIGIN, "high": [0.0, 0.0, HEIGHT]}
+    leaf = rigid("leaf", WEIGHT / 10, [1.0] * 3, [ARM, 0.0, HEIGHT / 2], **hinges)
+    joints = [pin(name, "ground", f"leaf.{name}", at=at) for name, at in hinges.items()]
+    run = {"name": "inv", "kind": "forward", "end": 0.1, "output_step": 0.1}
+    results = ffrobot.solve(ffrobot.make_scene(**scene([leaf], joints, run, gravity=[0.0, 0.0, -10.0])))
     assert re.search(r'5 constraints .* redundant.*"low" \(x, y, z, mx, my\)', redundant(results)[0])
     for name, sign in (("low", 1.0), ("high", -1.0)):
         found = [results[f"inv/joints/{name}/{part}"][0] for part in ("reaction", "reaction_moment")]
@@ -147,8 +124,8 @@ def test_modes_settle_what_they_carry(family, at_cranks, at_coupler):
 
 def test_strict_ends_with_0_where_only_constraints_are_redundant(ffrobot, tmp_path):
     """The motion is right and the split stated: a note. The door's hinge that breaks apart would be a warning."""
-    scene = four_bar(bar("coupler", 0.4, 0.8), [0.0, -9.81, 0.0], unsolved=True)
-    (tmp_path / "scene.toml").write_text(scene.text)
+    made = four_bar(bar("coupler", 0.4, 0.8), [0.0, -9.81, 0.0], unsolved=True)
+    (tmp_path / "scene.toml").write_text(made.text)
     done = ffrobot("solve", tmp_path / "scene.toml", "--strict")
     assert (done.returncode, "warning" in done.stdout) == (0, False)
     assert re.search(r"(?m)^note       inv: 3 constraints of kinematic loops are redundant", done.stdout)

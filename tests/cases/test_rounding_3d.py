@@ -5,6 +5,7 @@ import re
 import numpy as np
 import pytest
 from beam_links import beam_link, rectangle
+from tables_3d import rigid
 
 import ffrobot
 
@@ -12,18 +13,8 @@ TIGHT = 1e-9
 
 
 def beam(name, length, height, width, condition, ratio):
-    return {
-        "name": name,
-        "link": beam_link(
-            length,
-            rectangle(height, width),
-            8,
-            condition=condition,
-            name=name,
-            modes={"count": 1, "attachment_modes": False},
-            damping={"ratio": ratio},
-        ),
-    }
+    keys = {"modes": {"count": 1, "attachment_modes": False}, "damping": {"ratio": ratio}}
+    return {"name": name, "link": beam_link(length, rectangle(height, width), 8, condition=condition, **keys)}
 
 
 def joint(name, type_, between, rpy, **keys):
@@ -102,23 +93,16 @@ def arm_of_six_joints(tolerance):
     """Two tubes between rigid parts; the pose of the last one is prescribed, from the equilibrium on."""
 
     def part(name, mass, size, end):
-        points = {"a": [0.0, 0.0, 0.0], "b": end}
-        return {
-            "name": name,
-            "rigid": {"mass": mass, "center": [0, 0.02, 0.01], "inertia": [size] * 3, "points": points},
-        }
+        return rigid(name, mass, [size] * 3, [0, 0.02, 0.01], end=end)
 
     def tube(name, length, outer, inner):
-        link = beam(name, length, 0.1, 0.1, "cantilever", 0.0)["link"]
         section = {"shape": "tube", "outer": outer, "inner": inner}
-        link["geometry"]["section"], link["mesh"] = section, {"elements": 16}
-        link["damping"] = {"rayleigh": [0.0, 1.5e-4]}
-        del link["modes"]
-        return {"name": name, "link": link}
+        return {"name": name, "link": beam_link(length, section, 16, damping={"rayleigh": [0.0, 1.5e-4]})}
 
     axes = [[0, 0, 1], [0.1, 1, 0.05], [0.05, 1, -0.12], [1, 0.1, 0.2], [0.1, 0.9, 0.3], [1, -0.2, 0.15]]
     turns = [[0, 0, 0], [0.1, -1.2, 0.2], [-0.2, 1.4, 0.1], [0.3, 0.2, -0.4], [0, 0.1, 0.7], [0.2, 0, 0]]
-    ends = ["ground", "t.a", "t.b", "up.root", "up.tip", "e.a", "e.b", "fo.root", "fo.tip", "w.a", "w.b", "f.a"]
+    ends = ["ground", "t.root", "t.end", "up.root", "up.tip", "e.root", "e.end", "fo.root", "fo.tip", "w.root", "w.end"]
+    ends.append("f.root")
     joints = [
         {"name": f"j{k + 1}", "type": "revolute", "between": ends[2 * k : 2 * k + 2], "axis": axes[k], "rpy": turns[k]}
         for k in range(6)
@@ -141,7 +125,7 @@ def arm_of_six_joints(tolerance):
         ],
         joint=joints,
         initial={"state": "static", "joints": {f"j{k + 1}": angle for k, angle in enumerate(guess)}},
-        trajectory=[{"name": "p", "point": "f.b", "x": x, "y": y, "z": z, "rpy": rpy}],
+        trajectory=[{"name": "p", "point": "f.end", "x": x, "y": y, "z": z, "rpy": rpy}],
         analysis=[
             {"name": "inv", "kind": "pcid", "end": 0.85, "output_step": 0.05, "tolerance": tolerance, "max_steps": 9000}
         ],

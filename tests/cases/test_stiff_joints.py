@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from tables_3d import Y, revolute, rigid, scene
 
 import ffrobot
 
@@ -9,18 +10,13 @@ MASS, ARM, G = 2.0, 0.3, 9.81
 
 
 def pendulum(initial=None, analysis=None, **joint):
-    rod = {"mass": MASS, "center": [ARM, 0.0, 0.0], "inertia": [1e-3, 0.02, 0.02], "points": {"root": [0.0, 0.0, 0.0]}}
-    pin = {"name": "pin", "type": "revolute", "between": ["ground", "rod.root"], "axis": [0.0, 1.0, 0.0]}
+    pin = revolute("pin", "ground", "rod.root", Y) | joint
     free = {"name": "fall", "kind": "forward", "end": 0.5, "output_step": 0.1, "tolerance": 1e-8}
-    return ffrobot.make_scene(
-        name="pendulum",
-        space="spatial",
-        gravity=[0.0, 0.0, -G],
-        body=[{"name": "rod", "rigid": rod}],
-        joint=[pin | joint],
-        analysis=[free | (analysis or {})],
-        **({} if initial is None else {"initial": initial}),
+    rod, start = (
+        rigid("rod", MASS, [1e-3, 0.02, 0.02], [ARM, 0.0, 0.0]),
+        {} if initial is None else {"initial": initial},
     )
+    return ffrobot.make_scene(**scene([rod], [pin], free | (analysis or {}), **start))
 
 
 @pytest.mark.parametrize("friction", [1e6, 1e9])
@@ -45,9 +41,9 @@ def test_dry_friction_that_holds_at_once():
     ],
 )
 def test_steps_that_friction_stops(friction, advice):
-    scene = pendulum(analysis={"integrator": "dop853"}, **friction)
+    made = pendulum(analysis={"integrator": "dop853"}, **friction)
     with pytest.raises(ffrobot.SolveError, match=f'friction of joint "pin" brings it to rest within .*{advice}'):
-        ffrobot.solve(scene)
+        ffrobot.solve(made)
 
 
 def test_an_axis_of_any_length():
@@ -58,9 +54,9 @@ def test_an_axis_of_any_length():
 
 def test_a_start_that_hangs_is_told():
     """Nothing holds the joint in the static start of a forward run: at π/2 the rod hangs."""
-    scene = pendulum(initial={"state": "static", "joints": {"pin": 1.2}})
+    made = pendulum(initial={"state": "static", "joints": {"pin": 1.2}})
     with pytest.warns(ffrobot.FfrobotWarning, match=r'"pin" hang, away from \[initial\].*undeformed'):
-        results = ffrobot.solve(scene)
+        results = ffrobot.solve(made)
     np.testing.assert_allclose(results["fall/joints/pin/coordinate"], np.pi / 2, atol=1e-9)
 
 

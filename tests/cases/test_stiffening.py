@@ -1,54 +1,40 @@
 """Geometric stiffening in 3D: blades that spin, links that bend far, planar scenes put there, bad input."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
-import scenes_in_3d
+from beam_links import beam_link, rectangle
 from rod_chain import falling_tip
 from scenes_in_3d import REST
 from scipy.linalg import eigh
+from tables_3d import ORIGIN, Y, revolute, scene
 
 import ffrobot
-from ffrobot.fe_models.link import computed_modal_body
 from ffrobot.fe_models.modal_body_file import write_modal_body
 from ffrobot.mbs.model.body import from_modal_body
 
-LINK = """
-name = "blade"
-material = {{ youngs_modulus = {E}, poissons_ratio = 0.3, density = 2700.0 }}
-geometry = {{ kind = "beam", length = 1.0, section = {{ shape = "rectangle", height = {height}, width = {width} }} }}
-mesh = {{ elements = 40 }}
-reference = {{ condition = "cantilever" }}
-modes = {{ count = {count}, family = {family} }}
-damping = {{ ratio = 0.0 }}
-"""
-BOTH = '["in-plane-bending", "out-of-plane-bending"]'
+BOTH = ["in-plane-bending", "out-of-plane-bending"]
 
 
-def write_link(folder, E=7e10, height=0.01, width=0.01, count=24, family=BOTH):
-    path = folder / "blade.toml"
-    path.write_text(LINK.format(E=E, height=height, width=width, count=count, family=family))
-    return str(path)
+def link(E=7e10, height=0.01, width=0.01, count=24, family=BOTH):
+    modes = {"count": count, "family": family}
+    return beam_link(1.0, rectangle(height, width), 40, E=E, nu=0.3, name="blade", modes=modes)
 
 
-def blade(folder, **keys):
+def blade(**tables):
     """A link on a hub that turns about z."""
-    tables = {
-        "name": "blade",
-        "space": "spatial",
-        "gravity": [0.0, 0.0, 0.0],
-        "geometric_stiffening": True,
-        "body": [{"name": "blade", "link": write_link(folder)}],
-        "joint": [{"name": "hub", "type": "revolute", "between": ["ground", "blade.root"], "axis": [0.0, 0.0, 1.0]}],
-        "trajectory": [{"name": "spin", "joint": "hub", "value": "1.0*t"}],
-        "analysis": [
-            {"name": "turning", "kind": "pcid", "end": 1e-3, "output_step": 1e-3},
-            {"name": "about", "kind": "linear", "about": "turning", "times": [0.0]},
-        ],
-    }
-    return tables | keys
+    spin = {"name": "spin", "joint": "hub", "value": "1.0*t"}
+    turning = {"name": "turning", "kind": "pcid", "end": 1e-3, "output_step": 1e-3}
+    about = {"name": "about", "kind": "linear", "about": "turning", "times": [0.0]}
+    keys = {"gravity": ORIGIN, "geometric_stiffening": True, "trajectory": [spin]}
+    return scene(
+        [{"name": "blade", "link": link()}], [revolute("hub", "ground", "blade.root")], turning, about
+    ) | keys | tables  # fmt: skip
+
+
+def solve(**tables):
+    return ffrobot.solve(ffrobot.make_scene(**tables))
 
 
 # Spin and frequencies over √(EI/ρAL⁴), hub radius 0: first and second flap (Wright, Smith, Thresher, Wang, Vibration
@@ -63,12 +49,11 @@ FLAP = {
 
 
 @pytest.mark.parametrize("spin", FLAP)
-def test_frequencies_of_a_rotating_cantilever(spin, tmp_path):
+def test_frequencies_of_a_rotating_cantilever(spin):
     """Across the plane (flap), and in it with the hub held (lag): ω_lag² = ω_flap² − Ω²."""
     unit = np.sqrt(7e10 * 0.01**4 / 12 / (2700 * 0.01**2))
     path = [{"name": "spin", "joint": "hub", "value": f"{float(spin * unit)!r}*t"}]
-    scene = scenes_in_3d.write(blade(tmp_path, trajectory=path), tmp_path / "scene.toml")
-    with ffrobot.solve(scene) as results:
+    with solve(**blade(trajectory=path)) as results:
         flap = 2 * np.pi * results["about/linear/frequency"][0] / unit
         zeros = np.sort(np.abs(results["about/linear/zeros/1"][0]).max(axis=-1)) / unit  # from the hub's motor to it
     expected = np.array(FLAP[spin])
@@ -78,36 +63,26 @@ def test_frequencies_of_a_rotating_cantilever(spin, tmp_path):
         assert np.abs(zeros / lag - 1).min() < 1e-4
 
 
-def test_modal_forces_of_small_loads_are_those_without_stiffening(tmp_path):
+def test_modal_forces_of_small_loads_are_those_without_stiffening():
     """What forces along a link change goes to zero with them."""
     path = [{"name": "tip", "point": "blade.tip", "y": "1e-3*t**2"}]
     analysis = [{"name": "turning", "kind": "pcid", "end": 0.02, "output_step": 0.005}]
     found = []
     for stiffened in (True, False):
-        tables = blade(tmp_path, trajectory=path, analysis=analysis, geometric_stiffening=stiffened)
-        with ffrobot.solve(ffrobot.make_scene(**tables)) as results:
+        with solve(**blade(trajectory=path, analysis=analysis, geometric_stiffening=stiffened)) as results:
             found.append(results["turning/bodies/blade/modal_force"])
     assert np.abs(found[1]).max() > 0
     np.testing.assert_allclose(found[0], found[1], rtol=0, atol=1e-5 * np.abs(found[1]).max())
 
 
-def test_links_that_bend_far_across_the_plane(tmp_path):
+def test_links_that_bend_far_across_the_plane():
     """Two cantilevers of eight shapes each fall about y: a chain of rigid rods, and their energy, which stays."""
     E = 7e9
-    link = write_link(tmp_path, E, 0.02, 0.01, 8, '"out-of-plane-bending"')
-    joints = [("O", "ground", "link1.root"), ("A", "link1.tip", "link2.root")]
-    scene = {
-        "name": "falling",
-        "space": "spatial",
-        "gravity": [0.0, 0.0, -9.81],
-        "geometric_stiffening": True,
-        "body": [{"name": name, "link": link} for name in ("link1", "link2")],
-        "joint": [
-            {"name": name, "type": "revolute", "between": [a, b], "axis": [0.0, 1.0, 0.0]} for name, a, b in joints
-        ],
-        "analysis": [{"name": "fall", "kind": "forward", "end": 0.5, "output_step": 0.05, "tolerance": 1e-7}],
-    }
-    with ffrobot.solve(scenes_in_3d.write(scene, tmp_path / "scene.toml")) as results:
+    soft = link(E, 0.02, 0.01, 8, "out-of-plane-bending")
+    joints = [revolute("O", "ground", "link1.root", Y), revolute("A", "link1.tip", "link2.root", Y)]
+    fall = {"name": "fall", "kind": "forward", "end": 0.5, "output_step": 0.05, "tolerance": 1e-7}
+    bodies = [{"name": name, "link": soft} for name in ("link1", "link2")]
+    with solve(**scene(bodies, joints, fall, geometric_stiffening=True)) as results:
         tip = results["fall/points/link2.tip/position"]
         energy = sum(results[f"fall/energy/{key}"] for key in ("kinetic", "strain", "gravitational"))
         exchanged = np.ptp(results["fall/energy/gravitational"])
@@ -117,13 +92,13 @@ def test_links_that_bend_far_across_the_plane(tmp_path):
     assert np.abs(energy - energy[0]).max() < 1e-6 * exchanged
 
 
-def test_how_far_a_cantilever_bends_in_an_oblique_plane(tmp_path):
+def test_how_far_a_cantilever_bends_in_an_oblique_plane():
     """Under P at its tip: 0.06415 PL³/EI from its chord, shorter by P²L⁵/15(EI)² (w = P(3Lx² − x³)/6EI)."""
     EI, P = 7e10 * 0.01**4 / 12, 2.0
     wall = [{"name": "wall", "type": "weld", "between": ["ground", "blade.root"]}]
     force = {"y": repr(float(P * np.cos(0.8))), "z": repr(float(P * np.sin(0.8)))}
     rest = {"load": [{"point": "blade.tip", **force}], "joint": wall, "trajectory": [], "analysis": [REST]}
-    with ffrobot.solve(scenes_in_3d.write(blade(tmp_path, **rest), tmp_path / "scene.toml")) as results:
+    with solve(**blade(**rest)) as results:
         found = results.attributes("rest/bodies/blade")
     at = 1 - 1 / np.sqrt(3)
     from_chord = P / EI * (2 * at + at**3 - 3 * at**2) / 6
@@ -143,14 +118,13 @@ def softest_under_spin():
 
 
 @pytest.mark.parametrize(("spin", "stiffened"), [(0.05, False), (3.0, True)])
-def test_auto_where_loads_change_the_stiffness(spin, stiffened, tmp_path):
+def test_auto_where_loads_change_the_stiffness(spin, stiffened):
     """A spin Ω pulls the blade with ρAΩ²(L² − x²)/2: much or little of the stiffness of the shape it stiffens most."""
     unit = np.sqrt(7e10 * 0.01**4 / 12 / (2700 * 0.01**2))
     path = [{"name": "spin", "joint": "hub", "value": f"{float(spin * unit)!r}*t"}]
     frequencies = []
     for key in ("auto", stiffened):
-        tables = blade(tmp_path, trajectory=path, geometric_stiffening=key)
-        with ffrobot.solve(scenes_in_3d.write(tables, tmp_path / "scene.toml")) as results:
+        with solve(**blade(trajectory=path, geometric_stiffening=key)) as results:
             assert results.attributes("/")["geometric_stiffening"] == stiffened
             effect = results.attributes("turning")["stiffening_effect"]
             frequencies.append(results["about/linear/frequency"][0])
@@ -158,9 +132,9 @@ def test_auto_where_loads_change_the_stiffness(spin, stiffened, tmp_path):
     np.testing.assert_array_equal(*frequencies)
 
 
-def test_what_a_file_of_a_beam_says_of_the_plane_and_of_space(tmp_path):
+def test_what_a_file_of_a_beam_says_of_the_plane_and_of_space():
     """∫ρxG_x of a straight beam is that of the spin about z, ∫ρG_x that of a pull; nothing else, in any plane."""
-    modal = computed_modal_body(Path(write_link(tmp_path)))
+    modal = ffrobot.make_link(link()).body
     in_3d = from_modal_body("b", modal, stiffened=True).stiffening
     chosen = np.ix_(*[np.flatnonzero(np.array(modal.family) == "in-plane-bending")] * 2)
     peak = np.abs(modal.geometric_stiffness["omega_zz"]).max()
@@ -186,17 +160,13 @@ REFUSED = {
 
 
 @pytest.mark.parametrize("case", REFUSED)
-def test_bad_input(case, tmp_path):
+def test_bad_input(case):
     keys, says = REFUSED[case]
-    scene = scenes_in_3d.write(blade(tmp_path, **keys), tmp_path / "scene.toml")
     with pytest.raises(ffrobot.InputError, match=says):
-        ffrobot.solve(scene)
+        solve(**blade(**keys))
 
 
 def test_files_without_geometric_stiffness_are_named(tmp_path):
-    scene = blade(tmp_path)
-    bare = replace(computed_modal_body(tmp_path / "blade.toml"), geometric_stiffness={})
-    write_modal_body(tmp_path / "blade.h5", bare)
-    scene["body"] = [{"name": "blade", "modal": "blade.h5"}]
+    write_modal_body(tmp_path / "blade.h5", replace(ffrobot.make_link(link()).body, geometric_stiffness={}))
     with pytest.raises(ffrobot.InputError, match=r'geometric_stiffening: expected modal bodies .* of "blade"'):
-        ffrobot.solve(scenes_in_3d.write(scene, tmp_path / "scene.toml"))
+        solve(**blade(body=[{"name": "blade", "modal": str(tmp_path / "blade.h5")}]))

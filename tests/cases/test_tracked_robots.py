@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from beam_links import link_keys, rectangle
 
 import ffrobot
 from ffrobot.mbs.analysis.motors_only import decay_times
@@ -27,16 +28,9 @@ def septic(T):
 
 
 def strip(length, height, width, *, solid=False, **modes):
-    return {
-        "name": "strip", "material": {"youngs_modulus": 70e9, "poissons_ratio": 0.33, "density": 2700.0},
-        "geometry": {
-            "kind": "solid" if solid else "beam", "length": length,
-            "section": {"shape": "rectangle", "height": height, "width": width},
-        },
-        "mesh": {"size": 0.02} if solid else {"elements": 12}, "reference": {"condition": "cantilever"},
-        "modes": {"family": "in-plane-bending", "count": 2, "attachment_modes": False} | modes,
-        "damping": {"ratio": ZETA},
-    }  # fmt: skip
+    kind, mesh = ("solid", {"size": 0.02}) if solid else ("beam", {"elements": 12})
+    modes = {"family": "in-plane-bending", "count": 2, "attachment_modes": False} | modes
+    return link_keys(kind, length, rectangle(height, width), mesh, name="strip", modes=modes, damping={"ratio": ZETA})
 
 
 def patches(body, width, length=0.08, **keys):

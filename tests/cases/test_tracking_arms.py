@@ -224,7 +224,7 @@ def test_what_does_not_fit(scene, changes, message):
         ffrobot.solve(scene(*changes))
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_steps_of_the_effort_that_grow(scene):
     """Jerk that jumps, eight modes: full steps wander on the finest intervals, damped ones end on the path."""
     quintic, limit = "10*(t/0.6)**3 - 15*(t/0.6)**4 + 6*(t/0.6)**5", 600.0

@@ -168,20 +168,9 @@ def test_sample_of_the_campaign(tmp_path):
     assert "solve: rejected" in done.stdout
 
 
-@pytest.fixture
-def small_disk(tmp_path):
-    """A folder on a disk of 300 kB; skips where this user may not mount one."""
-    folder = tmp_path / "small"
-    folder.mkdir()
-    if subprocess.run(["mount", "-t", "tmpfs", "-o", "size=300k", "tmpfs", folder], check=False).returncode:
-        pytest.skip("may not mount")
-    yield folder
-    subprocess.run(["umount", folder], check=True)
-
-
 def test_a_cache_without_room_does_no_harm(two_link_copy, ffrobot, small_disk):
     """Forms are compiled elsewhere; where there is no room at all, one message names the folder."""
-    folder = two_link_copy()
+    folder, small_disk = two_link_copy(), small_disk("300k")
     shutil.copy(Path(__file__).parents[2] / "cases" / "two_link_solid" / "link1.toml", folder)
     link, cache = ("link", "link1.toml", "-o", "one.h5"), {"XDG_CACHE_HOME": str(small_disk)}
     run = [ffrobot.path, *link]

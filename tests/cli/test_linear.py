@@ -8,38 +8,17 @@ from ffrobot.results.file import Results
 SCENE = """
 name = "arm"
 gravity = [0.0, -9.81]
-
+joint = [{ name = "hub", type = "revolute", between = ["ground", "arm.root"] }]
+load = [{ joint = "hub", moment = "3.0" }]
+initial = { angles = { arm = 0.5 } }
+analysis = [
+    { name = "swing", kind = "forward", end = 0.2, output_step = 0.1 },
+    { name = "held", kind = "linear" },
+    { name = "along", kind = "linear", about = "swing", times = [0.1, 0.2] },
+]
 [[body]]
 name = "arm"
 rigid = { mass = 2.0, inertia = 0.3, center = [0.5, 0.0], points = { root = [0.0, 0.0], tip = [1.0, 0.0] } }
-
-[[joint]]
-name = "hub"
-type = "revolute"
-between = ["ground", "arm.root"]
-
-[initial]
-angles = { arm = 0.5 }
-
-[[load]]
-joint = "hub"
-moment = "3.0"
-
-[[analysis]]
-name = "swing"
-kind = "forward"
-end = 0.2
-output_step = 0.1
-
-[[analysis]]
-name = "held"
-kind = "linear"
-
-[[analysis]]
-name = "along"
-kind = "linear"
-about = "swing"
-times = [0.1, 0.2]
 """
 INERTIA, WEIGHT = 0.3 + 2.0 * 0.5**2, 2.0 * 9.81 * 0.5
 
@@ -100,23 +79,23 @@ MISTAKES = {
         ['times: expected at most 0.2, where "swing" ends, found 0.3'],
     ),
     "no output time": ({"[0.1, 0.2]": "[0.15]"}, ['expected output times of "swing", every 0.1 s', "found 0.15"]),
-    "no times": ({"times = [0.1, 0.2]": ""}, ['times: expected the times of "swing"', "found none"]),
-    "times at rest": ({'about = "swing"\n': ""}, ['times: expected none about "static"']),
+    "no times": ({", times = [0.1, 0.2]": ""}, ['times: expected the times of "swing"', "found none"]),
+    "times at rest": ({', about = "swing"': ""}, ['times: expected none about "static"']),
     "times of a forward run": (
-        {"end = 0.2": "end = 0.2\ntimes = [0.1]"},
+        {"end = 0.2": "end = 0.2, times = [0.1]"},
         ['expected the key "times" only in kind = "linear" or "placement", found kind = "forward"'],
     ),
-    "nothing to act with": ({'type = "revolute"': 'type = "revolute"\nmotor = false'}, ["expected motors or [[pzt]]"]),
+    "nothing to act with": ({'type = "revolute"': 'type = "revolute", motor = false'}, ["expected motors or [[pzt]]"]),
     "unknown point": (
-        {'about = "swing"': 'about = "swing"\npoints = ["arm.tpi"]'},
+        {'about = "swing"': 'about = "swing", points = ["arm.tpi"]'},
         ['"arm.tpi"', 'did you mean "tip"'],
     ),
     "an end": (
-        {'kind = "linear"\nabout': 'kind = "linear"\nend = 1.0\nabout'},
+        {'kind = "linear", about': 'kind = "linear", end = 1.0, about'},
         ['expected the key "end" only in kind = "pcid", "fcid", "forward", "motors-only", "tracking" or "closed-loop"'],
     ),
     "placement without patches": (
-        {'kind = "linear"\nabout': 'kind = "placement"\nplacement = { body = "arm" }\nabout'},
+        {'kind = "linear", about': 'kind = "placement", placement = { body = "arm" }, about'},
         ["placement.body: expected a body with patches, none"],
     ),
 }
@@ -133,8 +112,8 @@ def test_bad_input(ffrobot, scene, mistake):
 
 
 def test_what_no_motor_does_is_not_judged(ffrobot, scene):
-    path = scene(edits={'"arm.root"]': '"arm.root"]\nmotor = false'})
-    path.write_text(path.read_text(encoding="utf-8").split('[[analysis]]\nname = "held"')[0], encoding="utf-8")
+    linear = SCENE[SCENE.index('    { name = "held"') : SCENE.index("]\n[[body]]")]
+    path = scene(edits={'"arm.root"]': '"arm.root"], motor = false', linear: ""})
     assert ffrobot("solve", path).returncode == 0
     done = ffrobot("feasibility", path.with_suffix(".results.h5"))
     assert done.returncode == 2

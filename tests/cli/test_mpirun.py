@@ -31,15 +31,15 @@ def arrays(path):
 ALL_THAT_CELLS_ARE_SUMMED_FOR = """
 [stress]
 surface = true
-points = { inside = [0.33, 0.004, 0.006], corner = [1.0, 0.0075, 0.0125] }
+points = { inside = [0.1, 0.004, 0.006], corner = [0.3, 0.0075, 0.0125] }
 [[interface]]
 name = "grip"
-position = [0.7, 0.0, 0.0125]
+position = [0.2, 0.0, 0.0125]
 normal = [0.0, 0.0, 1.0]
 coupling = "mean"
 [surface_patch]
-centers = [0.25, 0.5]
-length = 0.1
+centers = [0.075, 0.15]
+length = 0.05
 width = 0.02
 """
 
@@ -47,7 +47,7 @@ width = 0.02
 @pytest.mark.parametrize("condition", ["cantilever", pytest.param("simply-supported", marks=pytest.mark.nightly)])
 def test_two_processes_make_the_same_file(ffrobot, link_on_two, tmp_path, condition):
     """Also sections, faces, patches and stresses, to which cells of both contribute."""
-    link = write_solid(tmp_path, condition=condition, order=2, count=4, more=ALL_THAT_CELLS_ARE_SUMMED_FOR)
+    link = write_solid(tmp_path, length=0.3, condition=condition, order=2, count=4, more=ALL_THAT_CELLS_ARE_SUMMED_FOR)
     link.write_text(link.read_text().replace("divisions = [36, 1, 1]", "size = 0.02"))
     one, two = tmp_path / "one.h5", tmp_path / "two.h5"
     assert ffrobot("link", link, "-o", one).returncode == 0

@@ -3,52 +3,28 @@
 import h5py
 import numpy as np
 import pytest
+import tomli_w
+from beam_links import beam_link, rectangle
 
-LINK = """
-name = "arm"
-[material]
-youngs_modulus = 2.0e11
-poissons_ratio = 0.3
-density = 7800.0
-[geometry]
-kind = "beam"
-length = 2.0
-section = { shape = "rectangle", height = 0.04, width = 0.02 }
-[mesh]
-elements = 30
-[reference]
-condition = "cantilever"
-[modes]
-attachment_modes = false
-count = 3
-family = "in-plane-bending"
-[stress]
-points = { root_top = [0.0, 0.02, 0.0], middle = [1.0, -0.02, 0.0], axis = [0.0, 0.0, 0.0] }
-[[interface]]
-name = "tip"
-mass = 3.0
-"""
-
-SCENE = """
-name = "sag"
-gravity = [0.0, -9.81]
-[[body]]
-name = "arm"
-link = "arm.toml"
-[[joint]]
-name = "wall"
-type = "weld"
-between = ["ground", "arm.root"]
-[[analysis]]
-name = "rest"
-kind = "static"
-"""
+STATIONS = {"root_top": [0.0, 0.02, 0.0], "middle": [1.0, -0.02, 0.0], "axis": [0.0, 0.0, 0.0]}
+LINK = beam_link(
+    2.0, rectangle(0.04, 0.02), 30, E=2.0e11, nu=0.3, rho=7800.0, name="arm", stress={"points": STATIONS},
+    modes={"count": 3, "family": "in-plane-bending", "attachment_modes": False},
+    interface=[{"name": "tip", "mass": 3.0}],
+)  # fmt: skip
+SCENE = {
+    "name": "sag",
+    "gravity": [0.0, -9.81],
+    "body": [{"name": "arm", "link": "arm.toml"}],
+    "joint": [{"name": "wall", "type": "weld", "between": ["ground", "arm.root"]}],
+    "analysis": [{"name": "rest", "kind": "static"}],
+}
 
 
 @pytest.fixture
 def folder(tmp_path):
-    (tmp_path / "arm.toml").write_text(LINK)
-    (tmp_path / "scene.toml").write_text(SCENE)
+    (tmp_path / "arm.toml").write_text(tomli_w.dumps(LINK))
+    (tmp_path / "scene.toml").write_text(tomli_w.dumps(SCENE))
     return tmp_path
 
 

@@ -13,19 +13,12 @@ import ffrobot
 
 RIGID = {"mass": 2.0, "center": [0.3, 0.0], "inertia": 0.05, "points": {"root": [0.0, 0.0], "tip": [0.6, 0.0]}}
 J = 0.05 + 2.0 * 0.3**2  # of the arm about its joint
+SHOULDER = {"name": "shoulder", "type": "revolute", "between": ["ground", "arm.root"]}
 ARM = {
     "name": "arm",
     "gravity": [0.0, 0.0],
     "body": [{"name": "arm", "rigid": RIGID}],
-    "joint": [
-        {
-            "name": "shoulder",
-            "type": "revolute",
-            "between": ["ground", "arm.root"],
-            "gear_ratio": 50.0,
-            "rotor_inertia": 2e-5,
-        }
-    ],
+    "joint": [SHOULDER | {"gear_ratio": 50.0, "rotor_inertia": 2e-5}],
     "trajectory": [{"name": "swing", "joint": "shoulder", "value": "t**2"}],
     "analysis": [{"name": "inverse", "kind": "pcid", "end": 0.2, "output_step": 0.1}],
 }
@@ -181,6 +174,7 @@ def test_rows_of_a_catalogue(write):
     assert (found.method, found.runs) == ("all", 4)
 
 
+@pytest.mark.nightly
 def test_catalogue_beside_a_number(write):
     """Of each rotor the best gear has 4 √(J J_m): the lightest rotor, with the gear between bounds found to 1e-4."""
     vary = ["joint.shoulder.rotor_inertia in {5e-5, 1e-5, 3e-5}", f"{RATIO}=20:500:log"]

@@ -71,6 +71,7 @@ def test_where_to_put_the_center_of_mass(write):
     assert found.runs <= 60  # with the largest peak alone 124, and no word of convergence
 
 
+@pytest.mark.nightly
 def test_a_limit_of_peaks_that_take_turns(write):
     """The largest first coordinate whose least peak, over the second one, is below 1.5 N m."""
     found = ffrobot.optimise(

@@ -181,7 +181,7 @@ def test_failed_samples_are_told_and_left_out(write, ffrobot, tmp_path):
     assert float(row["deviation"]) == pytest.approx(masses[masses > 0.0].std(ddof=1), rel=1e-12)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_frequency_of_a_beam(write, tmp_path):
     """f ∝ h/L²: with both uniform, E[h] E[L⁻²] and E[h²] E[L⁻⁴] are closed forms."""
     body = [{"name": "arm", "link": BEAM}]

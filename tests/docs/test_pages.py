@@ -11,6 +11,8 @@ from pathlib import Path
 import pytest
 
 DOCS = Path(__file__).parents[2] / "docs"
+# Half a minute of studies, whose commands the tests of studies run as well.
+LONG = {"design"}
 PAGES = [DOCS / "tutorial.md", DOCS / "tutorial_urdf.md", *sorted((DOCS / "howto").glob("*.md"))]
 
 BLOCK = re.compile(r"^```(?P<language>\w+)\n(?P<content>.*?)^```$", re.DOTALL | re.MULTILINE)
@@ -75,7 +77,10 @@ class Reader:
         self.ran += len(test.examples)
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+@pytest.mark.parametrize(
+    "page",
+    [pytest.param(page, id=page.stem, marks=[pytest.mark.nightly] * (page.stem in LONG)) for page in PAGES],
+)
 def test_page_does_what_it_says(page, ffrobot, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("XDG_CACHE_HOME", str(ffrobot.cache))

@@ -5,7 +5,10 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+import tables_3d
+import tomli_w
 import yourdfpy
+from beam_links import beam_link, tube
 from rigid_robots import moments, random_urdf, with_motion
 
 from ffrobot import InputError, Results
@@ -184,25 +187,13 @@ def test_joints_in_steps(backwards, tmp_path, ffrobot):
         np.testing.assert_allclose(T[:3, :3], rotation(results["fall/points/three.c/quaternion"][k]), atol=1e-10)
 
 
-LINK = {
-    "name": "rod", "material": {"youngs_modulus": 70e9, "poissons_ratio": 0.33, "density": 2700.0},
-    "geometry": {"kind": "beam", "length": 0.6, "section": {"shape": "tube", "outer": 0.02, "inner": 0.016}},
-    "mesh": {"elements": 20}, "reference": {"condition": "cantilever"}, "modes": {"count": 4},
-    "damping": {"ratio": 0.01},
-}  # fmt: skip
-
-
 def test_a_flexible_link_is_its_undeformed_self(tmp_path):
     """Mass, center and inertia of a tube: m L²/12 across, ρ I_p L along its axis; drawn as a cylinder."""
-    import tomli_w
-
-    rod = {"name": "rod", "link": LINK}
-    joint = {"name": "a", "type": "revolute", "between": ["ground", "rod.root"], "axis": [0.0, 0.0, 1.0],
-             "rotor_inertia": 0.1}  # fmt: skip
-    analysis = {"name": "rest", "kind": "static"}
-    scene = tmp_path / "rod.toml"
-    keys = {"name": "rod", "space": "spatial", "gravity": [0.0, 0.0, 9.81], "body": [rod], "joint": [joint]}
-    scene.write_text(tomli_w.dumps(keys | {"analysis": [analysis]}))
+    link = beam_link(0.6, tube(0.02, 0.016), 20, name="rod", modes={"count": 4}, damping={"ratio": 0.01})
+    joint = tables_3d.revolute("a", "ground", "rod.root", rotor_inertia=0.1)
+    scene, analysis = tmp_path / "rod.toml", {"name": "rest", "kind": "static"}
+    bodies = [{"name": "rod", "link": link}]
+    scene.write_text(tomli_w.dumps(tables_3d.scene(bodies, [joint], analysis, gravity=[0.0, 0.0, 9.81])))
     told = export_file(scene, "urdf", None, None)
     assert told.path == tmp_path / "rod.urdf"
     for part in ('"rod": rigid in the URDF', "rotor_inertia", "gravity [0.0, 0.0, 9.81] left out"):

@@ -15,23 +15,11 @@ DENSITY, SIDE = 7850.0, 0.03  # a square bar, so stiff that it is rigid
 LENGTH = 0.5
 MASS, J_X = DENSITY * SIDE**2 * LENGTH, DENSITY * SIDE**4 / 6 * LENGTH
 BAR = f"""
-[material]
-youngs_modulus = 2e14
-poissons_ratio = 0.3
-density = {DENSITY}
-
-[geometry]
-kind = "beam"
-section = {{ shape = "rectangle", height = {SIDE}, width = {SIDE} }}
-
-[mesh]
-elements = 10
-
-[reference]
-condition = "cantilever"
-
-[modes]
-count = 6
+material = {{ youngs_modulus = 2e14, poissons_ratio = 0.3, density = {DENSITY} }}
+geometry = {{ kind = "beam", section = {{ shape = "rectangle", height = {SIDE}, width = {SIDE} }} }}
+mesh = {{ elements = 10 }}
+reference = {{ condition = "cantilever" }}
+modes = {{ count = 6 }}
 """
 # The bar lies along (0, 0.6, 0.8) of its link: its inertia in the axes of the link, its center half way.
 ALONG = np.array([0.0, 0.6, 0.8])
@@ -104,7 +92,7 @@ def test_the_link_file_gets_length_and_interfaces(tmp_path, ffrobot):
 
 
 WRONG = {
-    "another length": ({"link": BAR.replace('kind = "beam"', 'kind = "beam"\nlength = 0.4')},
+    "another length": ({"link": BAR.replace('kind = "beam"', 'kind = "beam", length = 0.4')},
                        'geometry.length: expected 0.5 m, the distance to joint "elbow", or no such key, found 0.4'),
     "unknown link": ({"name": "uper"}, 'expected a link of the URDF, found none of this name (did you mean "upper"?)'),
     "joint off the axis": ({"text": ARM.replace("0 0.12 0.16", "0.1 0.12 0.16")},

@@ -1,59 +1,41 @@
 """Craig–Bampton: closed forms of its matrices, identities, stresses, and what is refused."""
 
+from pathlib import Path
+
 import h5py
 import numpy as np
 import pytest
+from beam_links import beam_link, link_keys, rectangle
 from scipy.linalg import eigh
 
+import ffrobot
 from ffrobot.common.errors import InputError
-from ffrobot.fe_models.link import make_link, restated
-from ffrobot.fe_models.link_file import read_link
+from ffrobot.fe_models.link import restated
+from ffrobot.fe_models.link_file import LinkTable, read_link
 from ffrobot.fe_models.modal_body.craig_bampton import craig_bampton
 from ffrobot.fe_models.modal_body.unit_loads import work_on_modes
 
 E, RHO, L, H, B = 2.0e11, 7800.0, 0.4, 0.06, 0.02
 EI, EA, MASS = E * B * H**3 / 12, E * B * H, RHO * B * H
-LINK = """
-name = "bar"
-[material]
-youngs_modulus = 2.0e11
-poissons_ratio = 0.3
-density = 7800.0
-[geometry]
-kind = "{kind}"
-length = 0.4
-section = {{ shape = "rectangle", height = 0.06, width = 0.02 }}
-[mesh]
-{mesh}
-[reference]
-condition = "{condition}"
-[modes]
-count = {count}
-family = {family}
-{more}
-"""
-GRIP = '[[interface]]\nname = "grip"\nposition = 0.25\nmass = 0.5\ninertia = [1e-3, 1e-3, 1e-3]\n'
-IN_PLANE = '["in-plane-bending", "axial"]'
-POINT = "[stress]\npoints = { a = [0.17, 0.02, 0.005] }\n"
+GRIP = {"name": "grip", "position": 0.25, "mass": 0.5, "inertia": [1e-3, 1e-3, 1e-3]}
+POINT = {"points": {"a": [0.17, 0.02, 0.005]}}
 
 
-@pytest.fixture
-def bar(tmp_path):
-    """The modal body of a bar, and its link file."""
-
-    def make(kind="beam", condition="craig-bampton", count=8, family=IN_PLANE, more="", elements=20):
-        mesh = f"elements = {elements}" if kind == "beam" else "size = 0.02"
-        path = tmp_path / "bar.toml"
-        keys = {"kind": kind, "condition": condition, "count": count, "family": family}
-        path.write_text(LINK.format(mesh=mesh, more=more, **keys))
-        return make_link(path, force=True).body, path
-
-    return make
+def bar(kind="beam", condition="craig-bampton", count=8, elements=20, interface=(), modes=None, **keys):
+    """The keys of a bar that bends in the plane and stretches."""
+    modes = {"count": count, "family": ["in-plane-bending", "axial"]} | (modes or {})
+    keys |= {"name": "bar", "modes": modes, "interface": list(interface)}
+    mesh = {"elements": elements} if kind == "beam" else {"size": 0.02}
+    return link_keys(kind, L, rectangle(H, B), mesh, E=E, nu=0.3, rho=RHO, condition=condition, **keys)
 
 
-def test_interface_stiffness_of_a_beam(bar):
+def body_of(*args, **keys):
+    return ffrobot.make_link(bar(*args, **keys)).body
+
+
+def test_interface_stiffness_of_a_beam():
     """The beam element of the textbook between its two interfaces: condensed statically, nothing is lost."""
-    found = craig_bampton(bar()[0])
+    found = craig_bampton(body_of())
     names = ["root/x", "root/y", "root/rz", "tip/x", "tip/y", "tip/rz"]
     rows = [found.coordinates.index(name) for name in names]
     a, b, c, d = 12 * EI / L**3, 6 * EI / L**2, 4 * EI / L, 2 * EI / L
@@ -65,9 +47,9 @@ def test_interface_stiffness_of_a_beam(bar):
     np.testing.assert_allclose(found.stiffness[np.ix_(rows, modes)], 0.0, atol=1e-8 * found.stiffness.max())
 
 
-def test_fixed_interface_modes_are_those_of_a_clamped_beam(bar):
+def test_fixed_interface_modes_are_those_of_a_clamped_beam():
     """β of 1 − cos β cosh β = 0; bending modes, and one along it at c/(2L)."""
-    found = craig_bampton(bar(count=4, elements=40)[0])
+    found = craig_bampton(body_of(count=4, elements=40))
     modes = [k for k, name in enumerate(found.coordinates) if name.startswith("mode/")]
     beta = np.array([4.730040744862704, 7.853204624095838, 10.995607838001671])
     expected = np.append(beta**2 * np.sqrt(EI / MASS) / L**2, np.pi / L * np.sqrt(E / RHO))
@@ -76,9 +58,9 @@ def test_fixed_interface_modes_are_those_of_a_clamped_beam(bar):
 
 
 @pytest.mark.parametrize("kind", ["beam", "solid"])
-def test_free_in_3d(bar, kind):
+def test_free_in_3d(kind):
     """Rigid motions strain nothing and weigh what the link weighs; eigenfrequencies are those of the free link."""
-    body, _ = bar(kind, count=12, more=GRIP)
+    body = body_of(kind, count=12, interface=[GRIP])
     found = craig_bampton(body)
     rigid = np.zeros((len(found.coordinates), 3))
     for k, name in enumerate(found.coordinates):
@@ -93,7 +75,7 @@ def test_free_in_3d(bar, kind):
     np.testing.assert_allclose(rigid.T @ found.mass @ rigid, expected, atol=1e-8 * body.mass)
     kept = [k for k, name in enumerate(found.coordinates) if name not in ("root/z", "root/rx", "root/ry")]
     omega2 = eigh(found.stiffness[np.ix_(kept, kept)], found.mass[np.ix_(kept, kept)], eigvals_only=True)
-    other, _ = bar(kind, "cantilever", count=12, more=GRIP)
+    other = body_of(kind, "cantilever", count=12, interface=[GRIP])
     np.testing.assert_allclose(np.sqrt(omega2[3:5]), free_frequencies(other)[:2], rtol=5e-4)
 
 
@@ -109,9 +91,10 @@ def free_frequencies(body):
 
 
 @pytest.mark.parametrize("kind", ["beam", "solid"])
-def test_flexibility_at_interfaces_is_that_of_the_finite_element_model(bar, kind):
+def test_flexibility_at_interfaces_is_that_of_the_finite_element_model(kind):
     """The same as with attachment modes under a cantilever's condition, with one mode and interfaces in between."""
-    one, many = bar(kind, count=1, more=GRIP)[0], bar(kind, "cantilever", count=6, more=GRIP)[0]
+    one = body_of(kind, count=1, interface=[GRIP])
+    many = body_of(kind, "cantilever", count=6, interface=[GRIP])
     rows = [np.concatenate([body.interfaces[n].translation[:2] for n in ("grip", "tip")]) for body in (one, many)]
     found, expected = (row / np.diag(body.stiffness) @ row.T for row, body in zip(rows, (one, many), strict=True))
     np.testing.assert_allclose(found, expected, atol=1e-7 * np.abs(expected).max())
@@ -120,22 +103,24 @@ def test_flexibility_at_interfaces_is_that_of_the_finite_element_model(bar, kind
 
 
 @pytest.mark.parametrize("kind", ["beam", "solid"])
-def test_stresses_of_its_modes(bar, kind):
+def test_stresses_of_its_modes(kind):
     """K⁻¹b = Φ K_ff⁻¹ Φᵀb holds of stresses of interface loads; beams have both from equilibrium alone."""
-    body, path = bar(kind, more=GRIP + POINT)
+    keys = bar(kind, interface=[GRIP], stress=POINT)
+    body = ffrobot.make_link(keys).body
     work = work_on_modes(body.S_bar, body.I_bar, body.interfaces)
     for load in ("force/tip/x", "force/tip/y", "moment/tip/z", "force/grip/y", "moment/grip/z"):
         expected = body.stress["a"].static[:, body.stress_loads.index(load)]
         found = body.stress["a"].stress / np.diag(body.stiffness) @ work[load]
         np.testing.assert_allclose(found, expected, atol=1e-5 * np.abs(expected).max(), err_msg=load)
-    again = restated(body, read_link(path))
+    again = restated(body, read_link(LinkTable(keys, Path("bar.toml"))))
     np.testing.assert_allclose(again.stress["a"].stress, body.stress["a"].stress, rtol=1e-9, atol=1e-3)
 
 
-def test_file_has_it_for_exchange(bar, tmp_path):
-    body, path = bar(more=GRIP)
+def test_file_has_it_for_exchange():
+    made = ffrobot.make_link(bar(interface=[GRIP]))
+    body = made.body
     found = craig_bampton(body)
-    with h5py.File(path.with_suffix(".h5")) as file:
+    with h5py.File(made.path) as file:
         group = file["craig_bampton"]
         assert [name.decode() for name in group["coordinates"]] == found.coordinates
         for name in ("mass", "stiffness", "recovery"):
@@ -146,39 +131,23 @@ def test_file_has_it_for_exchange(bar, tmp_path):
     np.testing.assert_allclose(body.interfaces["grip"].translation @ column, 0.0, atol=1e-9)
 
 
-def test_without_attachment_modes_is_refused(bar):
+def test_without_attachment_modes_is_refused():
     with pytest.raises(InputError, match=r"modes\.attachment_modes: expected true, or nothing, with condition"):
-        bar(more="attachment_modes = false")
+        body_of(modes={"attachment_modes": False})
 
 
-def test_interfaces_at_one_place_are_refused(bar):
-    near = '[[interface]]\nname = "grip"\nposition = 0.39999999\n'
+def test_interfaces_at_one_place_are_refused():
     with pytest.raises(InputError, match="expected interfaces that can move freely"):
-        bar(more=near)
+        body_of(interface=[{"name": "grip", "position": 0.39999999}])
 
 
 @pytest.mark.parametrize("theory", ["euler-bernoulli", "timoshenko"])
-def test_a_shaft_that_turns_about_itself(tmp_path, theory):
+def test_a_shaft_that_turns_about_itself(theory):
     """ρI_pL [1/3, 1/6; 1/6, 1/3] of the twist of its ends; a rigid turn has ρI_pL, and no motion is without energy."""
     length, height, width, rho = 0.6, 0.02, 0.01, 2700.0
-    path = tmp_path / "shaft.toml"
-    path.write_text(f"""
-        name = "shaft"
-        material = {{ youngs_modulus = 70e9, poissons_ratio = 0.33, density = {rho} }}
-        [geometry]
-        kind = "beam"
-        length = {length}
-        section = {{ shape = "rectangle", height = {height}, width = {width} }}
-        [mesh]
-        elements = 20
-        [model]
-        theory = "{theory}"
-        [reference]
-        condition = "craig-bampton"
-        [modes]
-        count = 12
-    """)
-    found = craig_bampton(make_link(path).body)
+    keys = {"model": {"theory": theory}, "modes": {"count": 12}, "name": "shaft"}
+    link = beam_link(length, rectangle(height, width), 20, condition="craig-bampton", rho=rho, **keys)
+    found = craig_bampton(ffrobot.make_link(link).body)
     spin = rho * (height * width**3 + width * height**3) / 12 * length
     ends = [found.coordinates.index(name) for name in ("root/rx", "tip/rx")]
     expected = spin * np.array([[1 / 3, 1 / 6], [1 / 6, 1 / 3]])

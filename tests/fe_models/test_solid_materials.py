@@ -5,39 +5,26 @@ import numpy as np
 import pytest
 from solids import body_of, write_solid
 
+import ffrobot
 from ffrobot.common.errors import InputError
 
 ISOTROPIC = "youngs_modulus = 206842700000.0\npoissons_ratio = 0.3\n"
 E, RHO, LENGTH = 2.0e11, 8000.0, 1.0
 
-TWO_HALVES = """
-name = "halves"
 
-[material]
-youngs_modulus = {E}
-poissons_ratio = 0.0
-density = {rho}
-
-[[region]]
-group = "outer"
-material = {{ youngs_modulus = {E_outer}, poissons_ratio = 0.0, density = {rho_outer} }}
-
-[geometry]
-kind = "solid"
-length = 1.0
-file = "halves.msh"
-
-[mesh]
-order = 2
-
-[reference]
-condition = "cantilever"
-
-[modes]
-attachment_modes = false
-count = 2
-family = "axial"
-"""
+def halves(folder, E_outer=4 * E, rho_outer=4 * RHO, group="outer"):
+    """The body of a rod whose outer half has a material of its own, by name of its group."""
+    two_halves(folder / "halves.msh")
+    outer = {"youngs_modulus": E_outer, "poissons_ratio": 0.0, "density": rho_outer}
+    return ffrobot.make_link({
+        "name": "halves",
+        "material": {"youngs_modulus": E, "poissons_ratio": 0.0, "density": RHO},
+        "region": [{"group": group, "material": outer}],
+        "geometry": {"kind": "solid", "length": 1.0, "file": str(folder / "halves.msh")},
+        "mesh": {"order": 2},
+        "reference": {"condition": "cantilever"},
+        "modes": {"count": 2, "family": "axial", "attachment_modes": False},
+    }).body  # fmt: skip
 
 
 def orthotropic(path, E, nu, G):
@@ -85,10 +72,7 @@ def test_each_family_has_its_own_modulus(tmp_path):
 
 def test_a_rod_of_two_materials(tmp_path):
     """Clamped rod whose outer half has Z = ρcA four times as large, at equal c: tan²(ωL/2c) = Z_inner / Z_outer."""
-    two_halves(tmp_path / "halves.msh")
-    path = tmp_path / "halves.toml"
-    path.write_text(TWO_HALVES.format(E=E, rho=RHO, E_outer=4 * E, rho_outer=4 * RHO))
-    body = body_of(path)
+    body = halves(tmp_path)
     assert body.mass == pytest.approx(0.02 * 0.02 * 0.5 * 5 * RHO, rel=1e-12)
     c = np.sqrt(E / RHO)
     angle = np.arctan(0.5)
@@ -97,11 +81,8 @@ def test_a_rod_of_two_materials(tmp_path):
 
 
 def test_a_region_that_is_not_in_the_mesh_is_refused(tmp_path):
-    two_halves(tmp_path / "halves.msh")
-    path = tmp_path / "halves.toml"
-    path.write_text(TWO_HALVES.format(E=E, rho=RHO, E_outer=E, rho_outer=RHO).replace('"outer"', '"outer_half"'))
     with pytest.raises(InputError, match=r"region.group: expected a volume group of the mesh \(inner, outer\), found"):
-        body_of(path)
+        halves(tmp_path, group="outer_half")
 
 
 def two_halves(path):

@@ -2,57 +2,28 @@
 
 import numpy as np
 import pytest
+from beam_links import beam_link, rectangle, solid_link
 
-from ffrobot.fe_models.link import make_link
+import ffrobot
 
-LINK = """
-name = "arm"
-[material]
-youngs_modulus = 2.0e11
-poissons_ratio = 0.3
-density = 7800.0
-[geometry]
-length = 1.0
-section = { shape = "rectangle", height = 0.03, width = 0.02 }
-KIND
-[reference]
-condition = "simply-supported"
-[modes]
-attachment_modes = false
-count = 3
-family = "in-plane-bending"
-[[interface]]
-name = "tip"
-mass = 0.7
-inertia = [2e-3, 1e-3, 3e-3]
-[[interface]]
-name = "hub"
-position = 0.4
-mass = 0.3
-[stress]
-points = { POINTS }
-SURFACE
-"""
-BEAM = 'kind = "beam"\n[mesh]\nelements = 40\n[model]\ntheory = "timoshenko"'
-SOLID = 'kind = "solid"\n[mesh]\nsize = 0.025'
-POINTS = "top = [0.3, 0.015, 0.0], edge = [0.62, -0.015, 0.01], axis = [0.2, 0.0, 0.0]"
+KEYS = {
+    "name": "arm",
+    "modes": {"count": 3, "family": "in-plane-bending", "attachment_modes": False},
+    "interface": [
+        {"name": "tip", "mass": 0.7, "inertia": [2e-3, 1e-3, 3e-3]},
+        {"name": "hub", "position": 0.4, "mass": 0.3},
+    ],
+}
+STEEL = {"E": 2.0e11, "nu": 0.3, "rho": 7800.0, "condition": "simply-supported"}
+POINTS = {"top": [0.3, 0.015, 0.0], "edge": [0.62, -0.015, 0.01], "axis": [0.2, 0.0, 0.0]}
 
 
 @pytest.fixture(scope="module")
-def body(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("arm")
-
-    def compute(kind, points=POINTS, surface=""):
-        path = folder / "arm.toml"
-        path.write_text(LINK.replace("KIND", kind).replace("POINTS", points).replace("SURFACE", surface))
-        return make_link(path, force=True).body
-
-    return compute
-
-
-@pytest.fixture(scope="module")
-def pair(body):
-    return body(BEAM), body(SOLID, surface="surface = true")
+def pair():
+    section, stress = rectangle(0.03, 0.02), {"points": POINTS}
+    beam = beam_link(1.0, section, 40, **STEEL, **KEYS, model={"theory": "timoshenko"}, stress=stress)
+    solid = solid_link(1.0, section, {"size": 0.025}, **STEEL, **KEYS, stress=stress | {"surface": True})
+    return [ffrobot.make_link(link).body for link in (beam, solid)]
 
 
 def test_masses_are_those_of_the_beam(pair):

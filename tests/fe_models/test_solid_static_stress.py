@@ -6,13 +6,14 @@ loads and modes nothing is shared. Stresses are read off as the program does, wh
 
 import numpy as np
 import pytest
+import tomli_w
 import ufl
+from beam_links import beam_link, rectangle, solid_link
 from dolfinx import fem
 from dolfinx.fem import petsc as fem_petsc
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from ffrobot.fe_models.link import make_link
 from ffrobot.fe_models.link_file import read_link
 from ffrobot.fe_models.modal_body.unit_loads import unit_load_names, work_on_modes
 from ffrobot.fe_models.modal_body_file import read_modal_body
@@ -26,29 +27,7 @@ LOADS = (
     *("force/tip/x", "force/grip/y", "moment/tip/z", "moment/grip/y"),
     *("t_x", "t_y", "t_z", "r_z", "omega_zz", "omega_xy"),
 )
-TIMOSHENKO = '[mesh]\nelements = 40\n[model]\ntheory = "timoshenko"'
-LINK = """
-name = "bar"
-[material]
-youngs_modulus = 2.0e11
-poissons_ratio = 0.3
-density = 7800.0
-[geometry]
-kind = "{kind}"
-length = 0.4
-section = {{ shape = "rectangle", height = 0.06, width = 0.02 }}
-{hole}
-{mesh}
-[reference]
-condition = "{condition}"
-[modes]
-count = 10
-family = "all"
-attachment_modes = {attachment}
-[stress]
-points = {{ {points} }}
-{more}
-"""
+TIMOSHENKO = {"theory": "timoshenko"}
 
 
 @pytest.fixture(scope="module")
@@ -56,11 +35,15 @@ def bar(tmp_path_factory, ffrobot):
     """The modal body of a bar, or its link file."""
     folder = tmp_path_factory.mktemp("bar")
 
-    def compute(points, kind="solid", hole="", mesh="", condition="cantilever", attachment="false", more=""):
-        named = ", ".join(f"{name} = {list(map(float, at))}" for name, at in points.items())
-        keys = {"kind": kind, "hole": hole, "mesh": mesh, "condition": condition}
+    def compute(points, mesh=None, elements=None, hole=None, attachment=False, **keys):
+        keys |= {"name": "bar", "stress": {"points": points}, "E": E, "nu": NU, "rho": RHO}
+        keys = {"modes": {"count": 10, "family": "all", "attachment_modes": attachment}} | keys
+        if elements is None:
+            link = solid_link(L, rectangle(H, B), mesh or {}, hole=hole, **keys)
+        else:
+            link = beam_link(L, rectangle(H, B), elements, **keys)
         path = folder / "bar.toml"
-        path.write_text(LINK.format(**keys, attachment=attachment, points=named, more=more))
+        path.write_text(tomli_w.dumps(link))
         ffrobot.ok("link", path, "--force", "-o", folder / "bar.h5")  # with the memory of a process of its own
         return read_modal_body(folder / "bar.h5"), path
 
@@ -102,10 +85,10 @@ def clamped(path):
 
 def hole(place):
     """30 mm wide, in the middle of the bar's height."""
-    return f"hole = [{{ position = {place}, diameter = 0.03 }}]"
+    return [{"position": place, "diameter": 0.03}]
 
 
-@pytest.mark.parametrize(("cut", "bound"), [("", 1e-9), (hole(0.34), 2e-5)], ids=["whole", "hole"])
+@pytest.mark.parametrize(("cut", "bound"), [(None, 1e-9), (hole(0.34), 2e-5)], ids=["whole", "hole"])
 def test_bar_against_a_plain_solution(bar, cut, bound):
     """At the edge of the hole, beside it and near the loaded end; root clamped, tractions uniform and linear.
 
@@ -113,7 +96,7 @@ def test_bar_against_a_plain_solution(bar, cut, bound):
     integrals depend on the quadrature.
     """
     points = {"edge": (0.34, 0.015, 0.0), "outer": (0.34, 0.03, 0.0), "end": (0.38, 0.03, 0.0)}
-    body, path = bar(points, hole=cut, mesh="[mesh]\nsize = 0.012\norder = 2")
+    body, path = bar(points, hole=cut, mesh={"size": 0.012, "order": 2})
     space, u = clamped(path)
     exact = point_stresses(space, stiffness(read_link(path).material), u, points, path)
     for k, load in enumerate(("force/tip/y", "moment/tip/z")):
@@ -139,10 +122,11 @@ def test_bar_with_a_hole_against_calculix(bar, place, load, size, point, expecte
 @pytest.mark.parametrize("condition", ["cantilever", "simply-supported"])
 def test_solid_and_beam_agree_far_from_ends(bar, condition):
     """Under loads at the tip and inertia loads, a lump on an interface included, to 1 % of the largest of each."""
-    more = '[[interface]]\nname = "grip"\nposition = 0.3\nmass = 0.5\ninertia = [1e-3, 1e-3, 1e-3]\n'
+    keys = {"interface": [{"name": "grip", "position": 0.3, "mass": 0.5, "inertia": [1e-3] * 3}]}
+    keys["condition"] = condition
     points = {"low": (0.15, 0.03, 0.004), "side": (0.2, 0.01, 0.01)}
-    beam, _ = bar(points, "beam", mesh=TIMOSHENKO, condition=condition, more=more)
-    solid, _ = bar(points, mesh="[mesh]\nsize = 0.01", condition=condition, more=more)
+    beam, _ = bar(points, elements=40, model=TIMOSHENKO, **keys)
+    solid, _ = bar(points, {"size": 0.01}, **keys)
     assert set(beam.stress_loads) == set(solid.stress_loads) == set(unit_load_names(solid.interfaces))
     for load in LOADS:
         expected = np.array([static(beam, name, load)[0] for name in points])
@@ -154,8 +138,8 @@ def test_solid_and_beam_agree_far_from_ends(bar, condition):
 @pytest.mark.parametrize("condition", ["cantilever", "simply-supported"])
 def test_attachment_modes_have_the_static_stress_of_interface_loads(bar, kind, condition):
     """An identity: K⁻¹b = Φ K_ff⁻¹ Φᵀb, with Φᵀb from what the file says of interfaces; beams find both otherwise."""
-    mesh = "[mesh]\nelements = 20" if kind == "beam" else "[mesh]\nsize = 0.02"
-    body, _ = bar({"a": (0.23, 0.02, 0.005)}, kind, mesh=mesh, condition=condition, attachment="true")
+    mesh = {"elements": 20} if kind == "beam" else {"mesh": {"size": 0.02}}
+    body, _ = bar({"a": (0.23, 0.02, 0.005)}, condition=condition, attachment=True, **mesh)
     work = work_on_modes(body.S_bar, body.I_bar, body.interfaces)
     for load in body.stress_loads:
         if load.startswith(("force/tip", "moment/tip", "moment/root")):
@@ -167,9 +151,8 @@ def test_attachment_modes_have_the_static_stress_of_interface_loads(bar, kind, c
 
 def test_modes_come_to_the_static_stress_of_inertia_loads(bar):
     """Series of fifty eigenmodes, all families: Φᵀb from the invariants, static stresses from sections of the beam."""
-    body, path = bar({"a": (0.11, 0.02, 0.005)}, "beam", mesh=TIMOSHENKO)
-    path.write_text(path.read_text().replace("count = 10", "count = 50"))
-    body = make_link(path, force=True).body
+    modes = {"count": 50, "family": "all", "attachment_modes": False}
+    body, _ = bar({"a": (0.11, 0.02, 0.005)}, elements=40, model=TIMOSHENKO, modes=modes)
     work = work_on_modes(body.S_bar, body.I_bar, body.interfaces)
     for load in ("t_x", "t_y", "t_z", "r_y", "r_z", "omega_yy", "omega_zz", "omega_xy", "omega_xz"):
         exact, of_modes = static(body, "a", load), body.stress["a"].stress / np.diag(body.stiffness) @ work[load]

@@ -17,25 +17,13 @@ FINITE_ELEMENTS = ("dolfinx", "gmsh", "petsc4py", "slepc4py", "mpi4py", "basix",
 
 SOLID = """
 name = "bar"
-[material]
-youngs_modulus = 70e9
-poissons_ratio = 0.33
-density = 2700.0
-[geometry]
-kind = "solid"
-length = 0.2
-section = { shape = "circle", diameter = 0.02 }
-[mesh]
-size = 0.02
-order = 1
-[reference]
-condition = "cantilever"
-[modes]
-count = 3
-[damping]
-ratio = 0.01
-[stress]
-points = { top = [0.1, 0.005, 0.0], root = [0.01, 0.0, 0.0] }
+material = { youngs_modulus = 70e9, poissons_ratio = 0.33, density = 2700.0 }
+geometry = { kind = "solid", length = 0.2, section = { shape = "circle", diameter = 0.02 } }
+mesh = { size = 0.02, order = 1 }
+reference = { condition = "cantilever" }
+modes = { count = 3 }
+damping = { ratio = 0.01 }
+stress = { points = { top = [0.1, 0.005, 0.0], root = [0.01, 0.0, 0.0] } }
 """
 
 

@@ -4,33 +4,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from beam_links import beam_link, rectangle
 
+import ffrobot
 from ffrobot.cli import cli
 from ffrobot.common.errors import InputError
-from ffrobot.fe_models.link import make_link
 from ffrobot.fe_models.modal_body import PictureMesh
 from ffrobot.fe_models.modal_body_file import write_modal_body
 from ffrobot.pictures.figures.body_shape import FOLD, _outline, draw_mesh, draw_modes
 from ffrobot.pictures.figures.plot import plot_file, plot_modal_body
 from ffrobot.pictures.figures.style import round_below
-
-LINK = """
-name = "arm"
-[material]
-youngs_modulus = 2.0e11
-poissons_ratio = 0.3
-density = 7800.0
-[geometry]
-kind = "beam"
-length = 1.0
-section = { shape = "rectangle", height = 0.1, width = 0.05 }
-[mesh]
-elements = 10
-[reference]
-condition = "cantilever"
-[modes]
-count = 8
-"""
 
 # Faces of a unit cube, their corners in order around each.
 CUBE = np.array([[0, 1, 3, 2], [4, 5, 7, 6], [0, 1, 5, 4], [2, 3, 7, 6], [0, 2, 6, 4], [1, 3, 7, 5]])
@@ -38,10 +21,9 @@ CORNERS = np.array([[x, y, z] for x in (0.0, 1.0) for y in (0.0, 1.0) for z in (
 
 
 @pytest.fixture(scope="module")
-def beam(tmp_path_factory):
-    path = tmp_path_factory.mktemp("link") / "arm.toml"
-    path.write_text(LINK)
-    return make_link(path).body
+def beam():
+    keys = {"E": 2.0e11, "nu": 0.3, "rho": 7800.0, "name": "arm", "modes": {"count": 8}}
+    return ffrobot.make_link(beam_link(1.0, rectangle(0.1, 0.05), 10, **keys)).body
 
 
 @pytest.fixture(params=["triangles", "quadrilaterals"])

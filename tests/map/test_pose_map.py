@@ -9,7 +9,8 @@ import time
 import h5py
 import numpy as np
 import pytest
-from strip_link import LINK
+import tomli_w
+from beam_links import beam_link, rectangle
 
 from ffrobot import solve
 from ffrobot.common.errors import InputError
@@ -22,12 +23,9 @@ from ffrobot.run.watcher import Watcher
 ARM = """name = "arm"
 space = "planar"
 gravity = [0.0, -9.81]
-[[body]]
-name = "upper"
-link = "upper.toml"
-[[body]]
-name = "fore"
-link = "fore.toml"
+body = [{ name = "upper", link = "upper.toml" }, { name = "fore", link = "fore.toml" }]
+initial = { joints = { shoulder = 0.3, elbow = 0.8 } }
+analysis = [{ name = "rest", kind = "static" }]
 [[joint]]
 name = "shoulder"
 type = "revolute"
@@ -42,11 +40,6 @@ type = "revolute"
 between = ["upper.tip", "fore.root"]
 position_limit = [-2.5, 2.5]
 moment_limit = 10.0
-[initial]
-joints = { shoulder = 0.3, elbow = 0.8 }
-[[analysis]]
-name = "rest"
-kind = "static"
 """
 
 
@@ -54,9 +47,9 @@ kind = "static"
 def arm(tmp_path_factory):
     folder = tmp_path_factory.mktemp("arm")
     for name, length in (("upper", 0.6), ("fore", 0.4)):
-        (folder / f"{name}.toml").write_text(
-            LINK.format(name=name, length=length, elements=10, count=4, family='"in-plane-bending"')
-        )
+        modes = {"count": 4, "family": "in-plane-bending"}
+        link = beam_link(length, rectangle(0.02, 0.03), 10, nu=0.3, name=name, modes=modes)
+        (folder / f"{name}.toml").write_text(tomli_w.dumps(link))
     (folder / "scene.toml").write_text(ARM)
     return folder / "scene.toml"
 

@@ -7,6 +7,19 @@ from ffrobot.mesh.jacobian import jacobians, reference_nodes
 from ffrobot.mesh.part_mesh import facet_geometry
 from ffrobot.mesh.records import RectangleSection
 
+VOLUME = 0.015 * 0.025  # m³, of `bar`
+
+
+def bar(occ, begin=0, end=1000):
+    """A bar of the paper's section, in millimetres."""
+    occ.addBox(begin, -7.5, -12.5, end - begin, 15, 25)
+
+
+def two_bars(occ):
+    """The same bar in two parts that touch."""
+    bar(occ, 0, 400)
+    bar(occ, 400, 1000)
+
 
 def rectangle(height=0.015, width=0.025, **more):
     return RectangleSection(shape="rectangle", height=height, width=width, **more)

@@ -91,7 +91,7 @@ class Browser:
         return self.driver.find_element("css selector", selector).screenshot_as_png
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def browser():
     if CHROMIUM is None or DRIVER is None:
         pytest.skip("chromium and chromium-driver are not installed; test.sh installs them")
