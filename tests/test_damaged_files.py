@@ -163,41 +163,13 @@ def stopped(stopped_once, tmp_path):
     return stopped_once, shutil.copy(stopped_once.with_name("r.h5"), tmp_path / "r.h5")
 
 
-PEAKS = [f"checkpoint/{name}_peaks" for name in ("state", "force")]
-RESUMED = ["checkpoint/state", *PEAKS, "q", "v", "a", "multipliers"]
-CHANGES = {
-    "empty": lambda values: values[:0],
-    "short": lambda values: values[:-1],
-    "long": lambda values: np.concatenate([values, values]),
-    "NaN": lambda values: np.full_like(values, np.nan),
-    "flat": lambda values: values.reshape(1, -1, 1),
-}
-
-
-@pytest.mark.parametrize("change", CHANGES)
-@pytest.mark.parametrize("name", [*RESUMED, "recording/times", "recording/states"])
-def test_resume_checks_every_size(stopped, name, change):
+def test_a_changed_file_is_not_resumed(stopped):
+    """The core takes the numbers of a file that ffrobot has written as they are."""
     scene, path = stopped
     with h5py.File(path, "r+") as file:
-        group = file["inverse/resume"]
-        values = group[name][()]
-        changed = CHANGES[change](values)
-        if changed.shape == values.shape and not values.size:
-            pytest.skip("nothing to change: the body is rigid")
-        del group[name]
-        group[name] = changed
+        file["inverse/resume/q"][:] = 0.0
     checksum.seal(path)
-    with pytest.raises(ffrobot.InputError, match=r"r\.h5: inverse"):
-        ffrobot.solve(scene, path, resume=True)
-
-
-@pytest.mark.parametrize("attribute", [{"outputs": 5000}, {"outputs": 2**31}, {"time": -1.0}, {"time": np.nan}])
-def test_resume_checks_where_it_goes_on(stopped, attribute):
-    scene, path = stopped
-    with h5py.File(path, "r+") as file:
-        file["inverse/resume/checkpoint"].attrs.update(attribute)
-    checksum.seal(path)
-    with pytest.raises(ffrobot.InputError, match=r"r\.h5: inverse"):
+    with pytest.raises(ffrobot.InputError, match=r"r\.h5: resume: .* found that the file itself has changed"):
         ffrobot.solve(scene, path, resume=True)
 
 

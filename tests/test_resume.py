@@ -7,7 +7,6 @@ import pytest
 from stopped_runs import SAME, Stops, check_attributes, differences, edit, go_on, stop
 
 import ffrobot
-from ffrobot.common.checksum import seal
 from ffrobot.mbs.solve.integrators import METHODS, Choice
 
 END = 0.12
@@ -124,18 +123,6 @@ def test_other_kinds_and_searches_for_modes_start_again(arm):
     assert 'resume=True) runs "inverse" again from its start' in stop(scene, "inverse", 0.0)
     results = go_on(scene)
     assert results.attributes("inverse")["status"] == "completed"
-
-
-@pytest.mark.parametrize(("old", "new"), [("multipliers", "lambda_"), ("q", "checkpoint/peaks/velocity")])
-def test_runs_in_coordinates_of_earlier_versions_are_refused(arm, old, new):
-    """Of planar scenes 0.2 has kept λ of its own equations in the plane, versions before it peaks of bodies."""
-    scene = arm()
-    stop(scene, "inverse", 0.03)
-    with h5py.File(scene.with_suffix(".h5"), "a") as file:
-        file[f"inverse/resume/{new}"] = file[f"inverse/resume/{old}"]
-    seal(scene.with_suffix(".h5"))
-    with pytest.raises(ffrobot.InputError, match=r"found one that an earlier version of ffrobot has stopped: solve"):
-        go_on(scene)
 
 
 @pytest.mark.parametrize("first", range(6))

@@ -25,7 +25,6 @@ from ..solve.integrators import beyond_rounding, integration_controls, with_step
 from ..solve.limits import left_ranges, watch_limits
 from ..solve.posture import NEARLY_SINGULAR, SINGULAR, describe_posture, robot_size
 from ..solve.reach import out_of_reach
-from .earlier_check import check_earlier, going_on
 from .outcome import Continuation, EarlierRun, Forces, Motion, Outcome, Statistics
 from .samples import about_highest, in_order, new_samples, reached_samples, some_of, stops
 
@@ -103,10 +102,7 @@ def drive_robot(
     recording = _core.Recording() if is_recorded else None
     continuation = Continuation(_core.TreeCheckpoint(), recording, new_samples(times, analysis))
     continuation = continuation if earlier is None else earlier.continuation
-    if earlier is not None:
-        check_earlier(earlier, model, times, is_recorded=is_recorded)
-    with going_on(earlier, times):
-        run = _integrated(system, times, start, controls, control, progress, continuation)
+    run = _integrated(system, times, start, controls, control, progress, continuation)
     motion = _motion(system, run, times)
     motion = motion if earlier is None else earlier.motion.followed_by(motion)
     in_posture = _ends_in_posture(run)

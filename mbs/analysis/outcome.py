@@ -156,15 +156,11 @@ class Continuation:
 
 @dataclass(frozen=True)
 class EarlierRun:
-    """What an earlier run of an analysis has computed, complete or not: it is taken over, or gone on with.
-
-    `where` is what messages call the place that it was read from.
-    """
+    """What an earlier run of an analysis has computed, complete or not: it is taken over, or gone on with."""
 
     motion: Motion
     statistics: Statistics
     continuation: Continuation
-    where: str
 
 
 @dataclass(frozen=True)

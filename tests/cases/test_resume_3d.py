@@ -1,6 +1,5 @@
 """Runs in 3D that were stopped go on from their results file as if they had never been."""
 
-import h5py
 import numpy as np
 import pytest
 from stopped_runs import SAME, Stops, differences, edit, go_on, stop
@@ -105,55 +104,6 @@ def test_runs_behind_gears_that_give_go_on(arm):
     found = dict(differences(go_on(scene), expected))
     assert found["joints/elbow/motor_angle"] < 1e-12
     assert found["joints/elbow/moment"] < 1e-12
-
-
-def _cut_rows(group):
-    for name in ("q", "v"):
-        values = group[name][()][:-1]
-        del group[name]
-        group[name] = values
-
-
-def _shorten(name):
-    def edit(group):
-        values = group[name][()][:-1]
-        del group[name]
-        group[name] = values
-
-    return edit
-
-
-def _attribute(name, value):
-    return lambda group: group["checkpoint"].attrs.__setitem__(name, value)
-
-
-@pytest.mark.parametrize(
-    ("edit", "names"),
-    [
-        (_cut_rows, "resume/q: expected finite numbers"),
-        (_shorten("checkpoint/state"), "resume/checkpoint/state: expected finite numbers"),
-        (_shorten("checkpoint/force_peaks"), "resume/checkpoint: expected what a run of this scene remembers"),
-        (_shorten("checkpoint/singular_posture"), "resume/checkpoint/singular_posture: expected a posture or none"),
-        (_attribute("time", 99.0), "resume/checkpoint: expected a time after"),
-        (_shorten("samples/times"), "resume/samples/states: expected finite numbers"),
-        (lambda group: group["samples"].attrs.__setitem__("every", 0), "resume/samples: expected states between"),
-        (_attribute("next_step", np.nan), "resume/checkpoint: expected finite numbers"),
-        (_attribute("outputs", 2), "expected as many outputs as times"),
-        (lambda group: group.__delitem__("a"), "resume/a: expected a dataset, found none"),
-        (
-            lambda group: group["checkpoint"].attrs.__delitem__("accepted"),
-            'resume/checkpoint: expected the attribute "accepted", found none',
-        ),
-    ],
-)
-def test_files_that_are_damaged(arm, edit, names):
-    scene = arm()
-    stop(scene, "inverse", 0.02)
-    with h5py.File(scene.with_suffix(".h5"), "r+") as file:
-        edit(file["inverse/resume"])
-        file.attrs.pop("checksum", None)
-    with pytest.raises(ffrobot.InputError, match=names):
-        go_on(scene)
 
 
 def test_on_the_command_line(arm, ffrobot):
