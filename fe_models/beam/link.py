@@ -254,29 +254,3 @@ def _wanted(link: BeamLink, models: Mapping[Family, FamilyModel], path: Path) ->
 def _interface(stations: Functions, fields: Array, position: float) -> Interface:
     station = int(np.argmin(np.abs(stations.x - position)))
     return Interface(on_axis(np.array([position]))[0], fields[:R_X, station], fields[R_X:, station])
-
-
-GAP = 1e-3  # between neighbouring ω², relative: closer ones may turn into each other
-
-
-def fixed_mode_frequencies(links: Sequence[BeamLink], family: Family, number: int) -> Array | None:
-    """(n,) Hz of `links` by the mode `number`, from 1, of `family` of the first one: for derivatives.
-
-    With K x = λ M x and x held, the derivative of Rayleigh's quotient xᵀK(θ)x / xᵀM(θ)x at that beam is that of the
-    eigenvalue: no mode but the one is needed, as long as its eigenvalue is simple (Fox and Kapoor, AIAA Journal 6,
-    1968).
-    None where its frequency is not simple, or the links differ in their meshes.
-    """
-    model = loaded_models(links[0], [family])[0][family]
-    count = min(number + 1, model.K.shape[0])
-    omega2, X = lowest_modes(model.K, model.M, model.strain, count)
-    if np.any(np.diff(omega2)[max(0, number - 2) :] < GAP * omega2[number - 1]):
-        return None
-    x, found = X[:, number - 1], []
-    for link in links:
-        model = loaded_models(link, [family])[0][family]
-        if model.K.shape[0] != x.size:
-            return None
-        strain = model.strain @ x  # of which the quotient is free of rounding errors of K
-        found.append(float(np.sqrt((strain @ strain) / (x @ (model.M @ x)))) / (2 * np.pi))
-    return np.array(found)

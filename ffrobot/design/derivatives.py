@@ -1,10 +1,5 @@
 """Derivatives of goals by keys from runs beside the scene's own, with what there is to mind about each.
 
-Those of links' frequencies are exact, by their modes, without runs: of beams by Rayleigh's quotient
-(`fe_models.beam.link`), whose dependence on a key is a rational function that differences give to
-rounding. By keys that no link knows of they are 0. Of solids, whose mesh changes with their shape, and of links with
-measured frequencies, runs give them.
-
 Derivatives by differences that are extrapolated, with an estimate of their error.
 
 Of values at offsets x_i from the place where the derivative is wanted: that of the polynomial through them, exact for
@@ -17,18 +12,13 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import combinations
-from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
 from ..common.arrays import Array, as_floats
-from ..common.errors import InputError
-from ..fe_models.link_records import BeamLink
-from ..sweep.files import LINKS
 from ..sweep.sweep import Key
-from .designs import Design, Point, link_with
-from .goals import Frequency
+from .designs import Design, Point
 from .readings import Followed, Goal, Reading
 
 LEVELS = 3  # sizes of steps that one extrapolation takes at most
@@ -106,9 +96,8 @@ ROUGH = 1e-2  # of a derivative: beyond, the goal is hardly smooth
 class Base:
     """The place where derivatives are taken: k `keys` with their values `point`, and g `goals` with their `readings`.
 
-    `steps` (k) are the largest ones. `changes`: what differs there from the scene, by key. `repeats`: the tolerance of
-    runs that take the steps of the scene's own again; 0 where they choose their own. `again`: the changes of their
-    scenes with which they do.
+    `steps` (k) are the largest ones. `repeats`: the tolerance of runs that take the steps of the scene's own again; 0
+    where they choose their own. `again`: the changes of their scenes with which they do.
     """
 
     goals: tuple[Goal, ...]
@@ -116,7 +105,6 @@ class Base:
     keys: tuple[Key, ...]
     point: Point
     steps: tuple[float, ...]
-    changes: Mapping[Key, Any] = field(default_factory=dict)
     repeats: float = 0.0
     again: Mapping[Key, Any] = field(default_factory=dict)
 
@@ -135,7 +123,7 @@ class Sample:
     failure: str = ""
 
 
-Method = Literal["differences", "repeated steps", "one-sided", "exact", "none"]
+Method = Literal["differences", "repeated steps", "one-sided", "none"]
 """How a derivative was found; "repeated steps": differences of runs with the same steps of integration."""
 
 
@@ -175,20 +163,15 @@ def values_of(goals: Sequence[Followed]) -> Array:
     return np.array([goal.value for goal in goals]) if goals else np.array(np.nan)
 
 
-Exact = Mapping[tuple[int, int], Entry]
-"""Entries that are known without runs, by numbers of goal and key."""
-
-
 @dataclass
 class Known:
-    """What there is so far: `samples` beside the base, `exact` entries, and of `pairs` what their check has `left`.
+    """What there is so far: `samples` beside the base, and of `pairs` what their check has `left`.
 
     Attributes:
         pairs: h_k by number of the key: with ±h_k there are samples.
         left: (g,) how far the sum of central differences is off a difference along the sum of their steps.
     """
 
-    exact: Exact
     samples: list[Sample] = field(default_factory=list)
     pairs: Mapping[int, float] = field(default_factory=dict)
     left: Array = field(default_factory=lambda: np.zeros(0))
@@ -204,11 +187,8 @@ class Known:
 
 
 def entries(base: Base, known: Known) -> tuple[tuple[Entry, ...], ...]:
-    """[goal][key]: exact ones, and the others by differences."""
-    return tuple(
-        tuple(known.exact.get((g, k)) or _entry(base, g, k, known) for k in range(len(base.keys)))
-        for g in range(len(base.goals))
-    )
+    """[goal][key]."""
+    return tuple(tuple(_entry(base, g, k, known) for k in range(len(base.keys))) for g in range(len(base.goals)))
 
 
 def wants_smaller_steps(base: Base, known: Known) -> list[int]:
@@ -288,43 +268,3 @@ def _is_rough(base: Base, g: int, k: int, error: float, value: float) -> bool:
 def _relative(error: float, base: Base, g: int, k: int) -> float:
     """|`error`| of percent per percent; of a goal or a key that is 0 in its unit."""
     return abs(error) * (abs(base.point[k]) or 1.0) / (abs(base.readings[g].value) or 1.0)
-
-
-FINE = 0.1  # of the steps of runs: there is no noise but rounding
-
-
-def exact_entries(path: Path, base: Base) -> Exact:
-    """Entries of the scene at `path` that are known without runs, by numbers of goal and key."""
-    found: dict[tuple[int, int], Entry] = {}
-    for g, (goal, reading) in enumerate(zip(base.goals, base.readings, strict=True)):
-        if not isinstance(goal, Frequency):
-            continue
-        for k, key in enumerate(base.keys):
-            if key[0] not in (LINKS, "body") or (key[0] == LINKS and key[1] != goal.body):
-                found[g, k] = Entry(0.0, 0.0, 0.0, "exact")
-            elif key[0] == LINKS and (entry := _of_beam(path, base, k, goal, reading)):
-                found[g, k] = entry
-    return found
-
-
-def _of_beam(path: Path, base: Base, k: int, goal: Frequency, reading: Reading) -> Entry | None:
-    """By a key of the link itself; None where it is no beam, or the mode is not alone."""
-    steps = FINE * base.steps[k] * np.array(SIZES)
-    offsets = np.array([0.0, *steps, *-steps])
-    links = []
-    try:
-        for offset in offsets:
-            link = link_with(path, goal.body, {**base.changes, base.keys[k]: base.point[k] + float(offset)})
-            if not isinstance(link, BeamLink) or link.measured or link.reference.condition == "craig-bampton":
-                return None
-            links.append(link)
-    except InputError:  # on one side no value is allowed
-        return None
-    family, number = reading.mode.rsplit(" ", 1)
-    from ..fe_models.beam.link import fixed_mode_frequencies  # loads SciPy
-
-    frequencies = fixed_mode_frequencies(links, next(one for one in links[0].families if one == family), int(number))
-    if frequencies is None:
-        return None
-    found = derivative(offsets, frequencies)
-    return Entry(*found, "exact")

@@ -17,8 +17,6 @@ from ..common.outputs import protected
 from ..common.parallel import processes as of_mpi
 from ..common.python_files import allowed_python, python_allowed
 from ..common.tables import DEEPEST
-from ..fe_models.link_file import LinkTable, read_link
-from ..fe_models.link_records import Link
 from ..mbs.analysis.tracking import Tracking
 from ..mbs.fields.steps import DATASET
 from ..mbs.scene.analysis import IntegratedAnalysis, TimedAnalysis
@@ -80,18 +78,6 @@ def repeated_steps(results: Results, path: Path) -> dict[Key, Any] | None:
     if not (repeated and smooth):
         return None
     return {("analysis", name, "repeat_steps"): str(path.absolute()) for name in stepping}
-
-
-def link_with(path: Path, body: str, changes: Mapping[Key, float]) -> Link | None:
-    """The link of a body of the scene at `path` with some values changed; None where it comes from a modal body."""
-    files = run_files(path, changes, path.parent)
-    source = next(entry.get("link") for entry in files.scene["body"] if entry["name"] == body)
-    if source is None or (isinstance(source, str) and not source.endswith(".toml")):
-        return None
-    if isinstance(source, dict):
-        return read_link(LinkTable(source, path))
-    changed = files.links.get(Path(source))
-    return read_link(Path(source) if changed is None else LinkTable(changed, Path(source)))
 
 
 def _needed(scene: Scene, goals: Sequence[Goal]) -> set[str]:

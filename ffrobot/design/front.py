@@ -207,7 +207,7 @@ class _Searches:
 
     def _least(self, problem: Problem, start: Place, title: str) -> FrontPoint:
         evaluations = Evaluations(self.designs, self.space, problem, self.most - len(self.ran))
-        differentiation = Differentiation(self.path, evaluations, self.tolerance)
+        differentiation = Differentiation(evaluations, self.tolerance)
         try:
             found = search_from(start, "slsqp", differentiation, lambda text: self.watcher.stage(f"{title}: {text}"))
             spent = found.spent

@@ -18,14 +18,13 @@ error.
 
 Runs that choose their own steps differ by their tolerance. There the first gradient of a search takes pairs; their
 second differences take the curvature out of later one-sided ones. Peaks are followed at their own time (envelope
-theorem). Frequencies of beams have exact derivatives, without runs.
+theorem).
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -33,7 +32,7 @@ from scipy.optimize import nnls
 
 from ..common.arrays import Array, NDArray, as_floats
 from ..sweep.sweep import Key
-from .derivatives import Base, exact_entries, weights
+from .derivatives import weights
 from .evaluations import Evaluated, Evaluations
 from .goals import KEPT
 from .readings import Followed
@@ -44,7 +43,6 @@ Beside = dict[float, Sequence[Followed]]
 
 ROUNDING = 1e-11  # of goals: differs between runs with the same steps
 DOUBTFUL = 1e-2  # of differences: what the run with all of them may leave
-EXACT_STEP = 0.01  # of a number: the largest where frequencies are differentiated without runs
 
 
 @dataclass(frozen=True)
@@ -62,13 +60,12 @@ class Slopes:
 
 @dataclass
 class Differentiation:
-    """Gradients in one search of the scene at `path`; `tolerance` of its runs.
+    """Gradients in one search; `tolerance` of its runs.
 
     `repeats`: whether designs beside take the steps of the base again, where they can: until differences so made turn
     out to be none. `curvature` (r, n) holds the second derivatives that the last central pairs gave, NaN before.
     """
 
-    path: Path
     evaluations: Evaluations
     tolerance: float
     repeats: bool = True
@@ -86,25 +83,20 @@ class Differentiation:
 
     def slopes(self, base: Evaluated, *, judged: bool = False) -> Slopes:
         """At a design that completed; `judged`: with an estimate of the error by further runs."""
-        exact = self._exact(base)
-        wanted = [
-            j
-            for j, variable in enumerate(self.evaluations.space.variables)
-            if not variable.is_catalogue and np.isnan(exact[:, j]).any()
-        ]
+        wanted = [j for j, variable in enumerate(self.evaluations.space.variables) if not variable.is_catalogue]
         if self.repeats and base.again is not None and wanted:
-            found = self._by_repeated_steps(base, wanted, exact, judged=judged or not self._tried)
+            found = self._by_repeated_steps(base, wanted, judged=judged or not self._tried)
             self._tried = True
             if self.repeats:
                 return found
-        return self._by_own_steps(base, wanted, exact, pairs=judged or bool(np.isnan(self.curvature[:, wanted]).any()))
+        return self._by_own_steps(base, wanted, pairs=judged or bool(np.isnan(self.curvature[:, wanted]).any()))
 
-    def _by_repeated_steps(self, base: Evaluated, wanted: Sequence[int], exact: Array, *, judged: bool) -> Slopes:
+    def _by_repeated_steps(self, base: Evaluated, wanted: Sequence[int], *, judged: bool) -> Slopes:
         """One-sided differences; `judged`: by one run more, of which `repeats` may become false."""
         step = {j: self._step(base, j, ROUNDING) for j in wanted}
         samples = self._samples(base, {j: [_side(base, j, h) * h] for j, h in step.items()}, base.again)
-        gradient, error = exact.copy(), np.where(np.isnan(exact), np.nan, 0.0)
         own = np.array(self.evaluations.row_values(base))
+        gradient, error = np.full((2, own.size, len(self.evaluations.space.variables)), np.nan)
         for j, beside in samples.items():
             _differentiate(own, j, beside, gradient, error, ROUNDING)
         if judged and all(samples.values()):
@@ -112,8 +104,7 @@ class Differentiation:
             moved = sum(np.abs(gradient[:, j]) * abs(x) for j, beside in samples.items() for x in beside)
             self.repeats = bool(np.all(left <= DOUBTFUL * moved + ROUNDING * np.abs(own)))
             for j, beside in samples.items():
-                missing = np.isnan(exact[:, j])
-                error[missing, j] += left[missing] / abs(next(iter(beside)))
+                error[:, j] += left / abs(next(iter(beside)))
         return Slopes(gradient, error, self._kinks(samples))
 
     def _left_of_sum(self, base: Evaluated, samples: Mapping[int, Beside]) -> Array:
@@ -130,12 +121,12 @@ class Differentiation:
             left += np.array([one.value for one in values]) - own
         return as_floats(np.abs(np.nan_to_num(left)))
 
-    def _by_own_steps(self, base: Evaluated, wanted: Sequence[int], exact: Array, *, pairs: bool) -> Slopes:
+    def _by_own_steps(self, base: Evaluated, wanted: Sequence[int], *, pairs: bool) -> Slopes:
         """With central `pairs`, or one design beside where curvatures are known."""
         offsets = {j: self._offsets(base, j, pairs=pairs) for j in wanted}
         samples = self._samples(base, offsets, None)
-        gradient, error = exact.copy(), np.where(np.isnan(exact), np.nan, 0.0)
         own = np.array(self.evaluations.row_values(base))
+        gradient, error = np.full((2, own.size, len(self.evaluations.space.variables)), np.nan)
         for j, beside in samples.items():
             bent = np.nan_to_num(self.curvature[:, j])
             curvature = _differentiate(own, j, beside, gradient, error, self.tolerance, bent)
@@ -168,25 +159,6 @@ class Differentiation:
         """Of one coordinate of the unit cube."""
         return self.evaluations.space.variables[j].step(base.place[j], 2.0 * float(np.sqrt(noise)))
 
-    def _exact(self, base: Evaluated) -> Array:
-        """(r, n) what is known without runs, NaN elsewhere."""
-        space, goals = self.evaluations.space, self.evaluations.split.goals
-        point, numbers = space.point(base.place), [v for v in space.variables if not v.is_catalogue]
-        changes = {k: x for k, x, own in zip(space.keys, point, space.own, strict=True) if x != own}
-        values = dict(zip(space.keys, point, strict=True))
-        keys = [key for variable in numbers for key in variable.keys]
-        steps = tuple(EXACT_STEP * (abs(values[key]) or 1.0) for key in keys)
-        at = Base(goals, self.evaluations.rows(base), tuple(keys), tuple(values[key] for key in keys), steps, changes)
-        entries = exact_entries(self.path, at)
-        found = np.full((len(goals), len(space.variables)), np.nan)
-        for g in range(len(goals)):
-            for j, variable in enumerate(space.variables):
-                parts = [entries.get((g, keys.index(key))) for key in variable.keys if key in keys]
-                if parts and all(part is not None for part in parts):
-                    slope = variable.slope(base.place[j])
-                    found[g, j] = slope * sum(part.derivative for part in parts if part is not None)
-        return found
-
     def _kinks(self, samples: Mapping[int, Beside]) -> tuple[str, ...]:
         goals = self.evaluations.split.goals
         found = [
@@ -202,7 +174,7 @@ class Differentiation:
 def _differentiate(
     own: Array, j: int, beside: Beside, gradient: Array, error: Array, noise: float, bent: Array | float = 0.0
 ) -> Array | None:
-    """Fill column j of what is not exact; NaN stays where no design beside completed. The curvature (r), by pairs.
+    """Fill column j; NaN stays where no design beside completed. The curvature (r), by pairs.
 
     `own` (r): values at the design itself.
     `bent`: the curvature that is known before, of which one-sided differences are freed.
@@ -218,8 +190,7 @@ def _differentiate(
         curvature = 2.0 * ((f[1] - f[0]) / x[1] - (f[2] - f[0]) / x[2]) / (x[1] - x[2])
     else:
         slope, uncertain = slope - 0.5 * bent * x[1], uncertain + np.abs(0.5 * bent * x[1])
-    missing = np.isnan(gradient[:, j])
-    gradient[missing, j], error[missing, j] = slope[missing], uncertain[missing]
+    gradient[:, j], error[:, j] = slope, uncertain
     return curvature
 
 

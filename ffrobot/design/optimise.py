@@ -43,7 +43,7 @@ def find_optimum(
     designs = Designs(runner, space.keys, space.own, fixed)
     check_bounds(designs, space)
     evaluations = Evaluations(designs, space, problem, runs)
-    differentiation = Differentiation(path, evaluations, tolerance)
+    differentiation = Differentiation(evaluations, tolerance)
     try:
         searches = _search(chosen, differentiation, _starts(space, starts, seed), seed, runner.watcher)
     finally:

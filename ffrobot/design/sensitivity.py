@@ -36,11 +36,9 @@ from .derivatives import (
     SIZES,
     Base,
     Entry,
-    Exact,
     Known,
     Sample,
     entries,
-    exact_entries,
     followed,
     sample,
     values_of,
@@ -60,7 +58,6 @@ HEADING = ("key", "value", "% per %", "derivative", "error", "by")
 HOW = {
     "repeated steps": "repeated steps: differences of runs with the same time steps",
     "differences": "differences: central, extrapolated",
-    "exact": "exact: by modes, without runs",
 }
 ERRORS = "errors: by differences of lower order or of all keys at once, noise, and the tolerance of reused time steps"
 
@@ -210,7 +207,7 @@ def find_sensitivity(
     designs, readings, repeats, again = _base(runs, goals, keys, point, tolerance)
     base = Base(goals, readings, keys, point, steps, repeats=repeats, again=again)
     _check_steps(designs, base)
-    known = _all_known(designs, base, exact_entries(runs.path, base))
+    known = _all_known(designs, base)
     failures = tuple(
         f"{'.'.join(keys[one.k])} = {point[one.k] + one.offset:.6g}: {one.failure}"
         for one in known.samples
@@ -263,11 +260,10 @@ def _check_steps(designs: Designs, base: Base) -> None:
             raise InputError(f"--to: expected keys that may be a little larger or smaller, found {name}:\n{problem}")
 
 
-def _all_known(designs: Designs, base: Base, exact: Exact) -> Known:
+def _all_known(designs: Designs, base: Base) -> Known:
     """All that derivatives need, with other steps where the first ones are not good enough."""
-    known = Known(exact)
-    wanted = [k for k in range(len(base.keys)) if any((g, k) not in exact for g in range(len(base.goals)))]
-    if base.repeats and wanted:
+    known, wanted = Known(), list(range(len(base.keys)))
+    if base.repeats:
         take_pairs(designs, base, known, wanted)
         for parts in OTHERS:
             wanted = wants_larger_steps(base, known)

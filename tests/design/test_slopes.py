@@ -28,7 +28,7 @@ def differentiation(tmp_path, scene):
     designs = Designs(Runs(path, tmp_path / "runs", processes=2), space.keys, space.own, fixed)
     evaluations = Evaluations(designs, space, problem, 100)
     (first,) = evaluations.at([tuple(float(u) for u in space.start())])
-    found = Differentiation(path, evaluations, 1e-7)
+    found = Differentiation(evaluations, 1e-7)
     found.split_at(first)
     return found, first
 
