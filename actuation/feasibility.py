@@ -93,8 +93,7 @@ def freed_shift(motion: RobotMotion, modal: Mapping[str, Array], point: str, row
     shift, R = _held(motion, modal, rows)
     MR = mass_matrices(motion.model, motion.q[rows]) @ R
     gamma = np.linalg.solve(np.swapaxes(R, 1, 2) @ MR, np.einsum("tki,tk->ti", MR, shift)[:, :, None])
-    found: Array = np.einsum("tik,tk->ti", motion.section(point).L[rows, :3], shift - (R @ gamma)[:, :, 0])
-    return found
+    return np.einsum("tik,tk->ti", motion.section(point).L[rows, :3], shift - (R @ gamma)[:, :, 0])
 
 
 def seen_at_points(
@@ -215,8 +214,7 @@ class PatchFeasibility:
         Infinite where no patch reaches the mode, 0 where nothing is required of it.
         """
         without = np.where(self.mode_required > 0, np.inf, 0.0)
-        found: Array = np.divide(self.mode_required, self.mode_available, out=without, where=self.mode_available > 0)
-        return found
+        return np.divide(self.mode_required, self.mode_available, out=without, where=self.mode_available > 0)
 
 
 @dataclass(frozen=True)

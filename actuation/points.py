@@ -109,8 +109,7 @@ class PointSet:
 
     def scaled(self, p: Array) -> Array:
         """L_a (T, 6 + n, c) at p (T, n), its rows as forces in N."""
-        found: Array = self.scale[:, None] * self.L_a(p)
-        return found
+        return self.scale[:, None] * self.L_a(p)
 
 
 def make_point_set(

@@ -48,8 +48,7 @@ def loaded(record: type[BaseModel] | str) -> type[BaseModel]:
     if not isinstance(record, str):
         return record
     module, _, name = record.partition(":")
-    found: type[BaseModel] = getattr(import_module(module), name)
-    return found
+    return getattr(import_module(module), name)
 
 
 def _deferred(record: type[BaseModel] | str) -> CoreSchema:

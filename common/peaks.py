@@ -43,8 +43,7 @@ def shares(time: Array) -> Array:
     if len(time) < 2:
         return np.ones(len(time))
     steps = np.diff(time)
-    found: Array = (np.append(steps, 0.0) + np.append(0.0, steps)) / (2 * (time[-1] - time[0]))
-    return found
+    return (np.append(steps, 0.0) + np.append(0.0, steps)) / (2 * (time[-1] - time[0]))
 
 
 def root_mean_square(time: Array, values: Array) -> float:

@@ -53,8 +53,7 @@ def left_jacobian_rate(vectors: Array, rates: Array) -> Array:
     x, x_dot = np.sum(np.square(vectors), axis=-1)[..., None], 2 * np.sum(vectors * rates, axis=-1)[..., None]
     across = np.cross(vectors, rates)
     (_, a_slope), (b, b_slope) = series(2, x), series(3, x)
-    found: Array = x_dot * (a_slope * across + b_slope * np.cross(vectors, across)) + b * np.cross(rates, across)
-    return found
+    return x_dot * (a_slope * across + b_slope * np.cross(vectors, across)) + b * np.cross(rates, across)
 
 
 def series(m: int, x: Array) -> tuple[Array, Array]:
@@ -87,16 +86,14 @@ def _closed(m: int, x: Array) -> Array:
 def _of_skew(vectors: Array, first: int, second: int) -> Array:
     """The sum c_first φ~ + c_second φ~²."""
     S, x = skew(vectors), np.sum(np.square(vectors), axis=-1)[..., None, None]
-    found: Array = _value(first, x) * S + _value(second, x) * (S @ S)
-    return found
+    return _value(first, x) * S + _value(second, x) * (S @ S)
 
 
 def of_quaternion(e: Array) -> Array:
     """The matrices (…, 3, 3) of unit quaternions e (…, 4)."""
     e0, v = e[..., 0, None, None], e[..., 1:]
     outer = v[..., :, None] * v[..., None, :]
-    found: Array = (e0**2 - np.sum(v * v, axis=-1)[..., None, None]) * np.eye(3) + 2 * outer + 2 * e0 * skew(v)
-    return found
+    return (e0**2 - np.sum(v * v, axis=-1)[..., None, None]) * np.eye(3) + 2 * outer + 2 * e0 * skew(v)
 
 
 def quaternions(C: Array) -> Array:
@@ -113,8 +110,7 @@ def quaternions(C: Array) -> Array:
     largest = squares.argmax(axis=-1)[..., None, None]
     row = np.take_along_axis(products, np.broadcast_to(largest, (*C.shape[:-2], 1, 4)), axis=-2)[..., 0, :]
     row = row / np.linalg.norm(row, axis=-1)[..., None]
-    found: Array = np.where(row[..., :1] < 0, -row, row)
-    return found
+    return np.where(row[..., :1] < 0, -row, row)
 
 
 def logarithm(C: Array) -> Array:
@@ -123,8 +119,7 @@ def logarithm(C: Array) -> Array:
     size = np.linalg.norm(e[..., 1:], axis=-1)
     angle = 2 * np.arctan2(size, e[..., 0])
     factor = np.divide(angle, size, out=np.full_like(size, 2.0), where=size > 0)
-    found: Array = e[..., 1:] * factor[..., None]
-    return found
+    return e[..., 1:] * factor[..., None]
 
 
 def about(axis: int, angles: Array | float) -> Array:
@@ -169,8 +164,7 @@ def smallest_turn(axis: Array) -> Array:
         return as_floats(np.eye(3) + S + S @ S / (1.0 + cosine))
     if square == 0.0:
         return np.diag([1.0, -1.0, -1.0])
-    found: Array = np.eye(3) + S + S @ S * ((1.0 - cosine) / square)
-    return found
+    return np.eye(3) + S + S @ S * ((1.0 - cosine) / square)
 
 
 def rotation(theta: float) -> Array:

@@ -48,8 +48,7 @@ class Record(BaseModel):
 
 def space_of(info: ValidationInfo) -> str | None:
     """The `space` of the scene that is being read, "planar" or "spatial"; None of records made in Python."""
-    found: str | None = (info.context or {}).get("space")
-    return found
+    return (info.context or {}).get("space")
 
 
 def as_tuples(value: Any) -> Any:  # noqa: ANN401 (any part of a JSON document)

@@ -243,8 +243,7 @@ def _image(body: ModalBody) -> bytes:
         if body.reference_condition == "craig-bampton":
             _write_craig_bampton(file.create_group("craig_bampton"), body)
         file.flush()
-        image: bytes = file.id.get_file_image()
-        return image
+        return file.id.get_file_image()
 
 
 def _write_arrays(group: h5py.Group, arrays: Mapping[str, NDArray[np.generic] | None]) -> None:

@@ -44,7 +44,7 @@ def scene_in(space: str | None) -> dict[str, Any]:
     described: dict[str, Any] = TypeAdapter(SceneKeys).json_schema(schema_generator=generator)
     for link in ("BeamLink", "SolidLink"):
         described["$defs"][link]["required"].remove("name")  # that of the body
-    return _for_toml(described)  # type: ignore[no-any-return]
+    return _for_toml(described)
 
 
 def _scene() -> dict[str, Any]:
@@ -76,7 +76,7 @@ def _file(kind: str) -> dict[str, Any]:
         from .pictures.figures.figure_file import FigureFile
 
         described = TypeAdapter(FigureFile).json_schema(schema_generator=_Described)
-    return _for_toml(described)  # type: ignore[no-any-return]
+    return _for_toml(described)
 
 
 class _Described(GenerateJsonSchema):

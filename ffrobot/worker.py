@@ -60,8 +60,7 @@ def _report(report: BinaryIO) -> dict[str, Any]:
     """What a run has left in `report`: nothing where it was killed, or the disk is full."""
     report.seek(0)
     with suppress(ValueError):
-        found: dict[str, Any] = json.loads(report.read())
-        return found
+        return json.loads(report.read())
     return {}
 
 

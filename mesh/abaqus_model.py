@@ -210,8 +210,7 @@ class Instance:
     def points(self) -> Array:
         """(p, 3) of its nodes, in the assembly."""
         own = np.array(list(self.scope.nodes.values()), dtype=np.float64).reshape(-1, 3) + self.moved
-        placed: Array = self.center + self.rotation.apply(own - self.center) if len(own) else own
-        return placed
+        return self.center + self.rotation.apply(own - self.center) if len(own) else own
 
 
 class Deck:

@@ -231,8 +231,7 @@ def check_volume(part: PartMesh, curved: PartMesh, where: str) -> None:
 def _determinants(part: PartMesh) -> Array:
     """(c, s) determinants of the Jacobian at the corners, and in curved cells at the other nodes of degree 2 too."""
     at = reference_nodes(part.cell, part.degree)
-    determinants: Array = np.linalg.det(jacobians(part.points[part.cells], part.cell, part.degree, at))
-    return determinants
+    return np.linalg.det(jacobians(part.points[part.cells], part.cell, part.degree, at))
 
 
 def _reject_cells(part: PartMesh, bad: Booleans, what: str, expected: str, where: str) -> NoReturn:

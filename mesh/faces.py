@@ -262,8 +262,7 @@ def _joined(boundary: Boundary) -> NDArray[np.int32]:
     smooth = np.einsum("fi,fi->f", boundary.normal[first], boundary.normal[second]) > _SMOOTH
     links = (np.ones(smooth.sum(), dtype=np.int8), (first[smooth], second[smooth]))
     _, number = connected_components(sp.coo_matrix(links, shape=(len(facets), len(facets))), directed=False)
-    result: NDArray[np.int32] = number
-    return result
+    return number
 
 
 def _reject(where: str, expected: str, found: str, boundary: Boundary) -> NoReturn:

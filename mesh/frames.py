@@ -52,8 +52,7 @@ class Frame:
             across = a * np.sin(np.radians(b))
             around = np.radians(c)
             local = np.stack([across * np.cos(around), across * np.sin(around), a * np.cos(np.radians(b))], axis=1)
-        placed: Array = self.origin + local @ self.C.T
-        return placed
+        return self.origin + local @ self.C.T
 
 
 GLOBAL = Frame(np.zeros(3), np.eye(3))

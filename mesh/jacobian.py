@@ -39,8 +39,7 @@ def _exponents(cell: CellName, degree: int) -> list[tuple[int, ...]]:
 def jacobians(nodes: Array, cell: CellName, degree: int, X: Array) -> Array:
     """(c, q, 3, 3) derivatives ∂x_i/∂X_d of cells with `nodes` (c, v, 3), at `X` (q, 3)."""
     slopes = _monomial_slopes(cell, degree, X) @ _coefficients(cell, degree)  # (3, q, v)
-    J: Array = np.einsum("dqv,cvi->cqid", slopes, nodes, optimize=True)
-    return J
+    return np.einsum("dqv,cvi->cqid", slopes, nodes, optimize=True)
 
 
 def volume_of_tetrahedra(nodes: Array, degree: int) -> float:
@@ -64,11 +63,9 @@ def cell_quality(corners: Array, cell: CellName) -> Array:
     if cell == "tetrahedron":
         edges = corners[:, CELLS[cell].edges]
         squares = np.sum((edges[:, :, 1] - edges[:, :, 0]) ** 2, axis=2)
-        quality: Array = np.sqrt(2) * determinants.min(axis=1) / np.maximum(squares.mean(axis=1), 1e-200) ** 1.5
-        return quality
+        return np.sqrt(2) * determinants.min(axis=1) / np.maximum(squares.mean(axis=1), 1e-200) ** 1.5
     sides = np.prod(np.linalg.norm(J, axis=2), axis=2)
-    scaled: Array = np.min(determinants / np.maximum(sides, 1e-300), axis=1)
-    return scaled
+    return np.min(determinants / np.maximum(sides, 1e-300), axis=1)
 
 
 def _coefficients(cell: CellName, degree: int) -> Array:

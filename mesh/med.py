@@ -85,8 +85,7 @@ def _mesh(file: h5py.File) -> RawMesh:
 def _only(parent: h5py.Group, what: str) -> tuple[str, Any]:
     if len(parent) != 1:
         raise InputError(f"expected one {what}, found {len(parent)}: {', '.join(parent)}")
-    found: tuple[str, Any] = next(iter(parent.items()))
-    return found
+    return next(iter(parent.items()))
 
 
 def _columns(data: h5py.Dataset, width: int) -> Any:  # noqa: ANN401 (of the type in the file)
@@ -98,8 +97,7 @@ def _cells(of: h5py.Group, width: int) -> Integers:
     nodes = _columns(of["NOD"], width)
     if nodes.dtype.kind not in "iu":
         raise InputError(f"expected whole numbers of nodes, found {nodes.dtype}")
-    cells: Integers = nodes.astype(np.int64) - 1
-    return cells
+    return nodes.astype(np.int64) - 1
 
 
 def _groups(families: Mapping[str, Any]) -> dict[int, list[str]]:

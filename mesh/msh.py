@@ -159,8 +159,7 @@ class _Version2:
             place = np.minimum(np.searchsorted(ordered, wanted), max(len(ordered) - 1, 0))
             if not len(ordered) or np.any(ordered[place] != wanted):
                 raise InputError("expected elements of the nodes in $Nodes, found some of others")
-            found: Integers = order[place]
-            return found
+            return order[place]
 
         return number, points
 

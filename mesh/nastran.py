@@ -343,8 +343,7 @@ class _Deck:
             raise InputError(f"{asked}: expected grid points that are there, found {number}")
         card = self.grids[number]
         given = np.array([[card.real(k) for k in (2, 3, 4)]])
-        point: Array = self._frame(card.whole(1, self.system), card).points(given)[0]
-        return point
+        return self._frame(card.whole(1, self.system), card).points(given)[0]
 
     def _left_out(self) -> Iterator[str]:
         if self.others:

@@ -53,8 +53,7 @@ def read_apart(read: Callable[..., Found], size: int, where: str, *arguments: ob
         found = pickle.loads(done.stdout)
         if isinstance(found, FfrobotError):
             raise found
-        result: Found = found
-        return result
+        return found
     if done.returncode == -signal.SIGXCPU:
         seconds = done.stderr.decode().split()[-1]
         raise InputError(

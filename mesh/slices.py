@@ -103,8 +103,7 @@ class _Cells:
 
     def basis(self, X: Array, derivatives: int) -> Array:
         """(1 + 3 or 1, q, v) values, and derivatives along X, of the shape functions at `X` (q, 3)."""
-        table: Array = self.element.tabulate(derivatives, X)[..., 0]
-        return table
+        return self.element.tabulate(derivatives, X)[..., 0]
 
     def distance(self, cell: Integers, X: Array) -> tuple[Array, Array]:
         """Distance from the plane (q,) and its gradient (q, 3) along X, at `X` (q, 3) in `cell` (q,)."""

@@ -96,8 +96,7 @@ def joint_mobility(setup: Setup) -> Array:
         return rest
     arm = setup.robot.rigid()
     M, _ = arm.terms(arm.angles(), rest)
-    mobility: Array = np.diag(np.linalg.inv(M))
-    return mobility
+    return np.diag(np.linalg.inv(M))
 
 
 class ClosedLoop(SampledAnalysis):

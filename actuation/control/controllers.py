@@ -249,8 +249,7 @@ def load_function(reference: str, folder: Path) -> Callable[[Setup], Callable[[i
         imported_files()  # as they are now
     if not callable(found.get(name)):
         raise InputError(f'{path}: controller: expected the function "{name}", found none')
-    function: Callable[[Setup], Callable[[int, Array], Array]] = found[name]
-    return function
+    return found[name]
 
 
 class Loop:

@@ -332,8 +332,7 @@ def zeros(model: LinearModel, inputs: Names, outputs: Names) -> Zeros:
 
 def _null_space(rows: Array) -> Array:
     """Orthonormal basis (f, f − rows) of what `rows` map to zero."""
-    basis: Array = np.linalg.qr(rows.T, mode="complete")[0][:, len(rows) :]
-    return basis
+    return np.linalg.qr(rows.T, mode="complete")[0][:, len(rows) :]
 
 
 def _eigenvalues(M: Array, D: Array, K: Array) -> ComplexArray:

@@ -50,14 +50,12 @@ class LoopRecord(Details):
 
 def sample_times(outputs: Array, T: float) -> Array:
     """(K,) s: every T, from the first output to before the last."""
-    times: Array = outputs[0] + np.arange(int(np.ceil(np.ptp(outputs) / T * (1 - 1e-12)))) * T
-    return times
+    return outputs[0] + np.arange(int(np.ceil(np.ptp(outputs) / T * (1 - 1e-12)))) * T
 
 
 def held_until(times: Array, analysis: SampledAnalysis, end: float) -> Array:
     """The middle of the time for which the command of each sample is held, up to `end`, s."""
-    middle: Array = np.minimum(times + analysis.delay + analysis.sample_time / 2, end)
-    return middle
+    return np.minimum(times + analysis.delay + analysis.sample_time / 2, end)
 
 
 def between(times: Array, known: Array, values: Array) -> Array:
@@ -66,8 +64,7 @@ def between(times: Array, known: Array, values: Array) -> Array:
         return np.zeros((len(times), values.shape[1]))
     from scipy.interpolate import CubicSpline
 
-    result: Array = CubicSpline(known, values)(times)
-    return result
+    return CubicSpline(known, values)(times)
 
 
 def held_commands(times: Array, setup: Setup, loop: Loop, after: float = 1e-9) -> Array:

@@ -37,8 +37,7 @@ def gains(model: SampledModel, Q: Array, R: Array) -> Array:
     except LinAlgError as error:
         raise ValueError(str(error)) from None
     K = np.linalg.solve(np.eye(len(R)) + B.T @ X @ B, B.T @ X @ A)
-    result: Array = unit[:, None] * K / scale
-    return result
+    return unit[:, None] * K / scale
 
 
 class LqrControl:

@@ -126,8 +126,7 @@ def _without_aliases(z: ComplexArray, model: LinearModel, T: float) -> ComplexAr
     s = np.linalg.eigvals(model.A)
     aliases = np.exp(s[np.abs(s.imag) * T > np.pi] * T)
     distance = np.abs(z[:, np.newaxis] - aliases).min(axis=1, initial=np.inf)
-    found: ComplexArray = z[distance > ALIAS * np.abs(z)]
-    return found
+    return z[distance > ALIAS * np.abs(z)]
 
 
 def loop_eigenvalues(model: LinearModel, gains: JointGains, T: float, delay: float) -> ComplexArray:

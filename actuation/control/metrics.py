@@ -154,8 +154,7 @@ def watched(end: float, window: float, lowest: float) -> Array:
     """(2 `WATCHED` + 1,) s: times over the `window` (s) before `end`, the last half of them in a period of `lowest`."""
     begin = end - (min(window, 1.0 / lowest) if lowest > 0.0 else window)
     before = np.linspace(end - window, begin, WATCHED, endpoint=False)
-    found: Array = np.concatenate([before, np.linspace(begin, end, WATCHED + 1)])
-    return found
+    return np.concatenate([before, np.linspace(begin, end, WATCHED + 1)])
 
 
 def vibration(time: Array, error: Array, window: float, lowest: float) -> float:
@@ -189,8 +188,7 @@ def _slower(t: Array, values: Array, lowest: float) -> Array:
     least = np.array([EXPLAINED * lefts[0], *lefts[1:]]) + np.finfo(float).eps * float(((weights * values) ** 2).sum())
     if not least.any():
         return np.zeros_like(values)
-    found: Array = np.average(cubics, axis=0, weights=(least.min() / least) ** PICKY)
-    return found
+    return np.average(cubics, axis=0, weights=(least.min() / least) ** PICKY)
 
 
 def overshoot(time: Array, place: Array, error: Array) -> float:
@@ -227,8 +225,7 @@ def _slow(t: Array, values: Array, window: float) -> Array:
     count = 2 * round(window / (2 * (t[1] - t[0]))) + 1 if len(t) > 1 else 1
     if not CUBIC < count <= len(t):
         return np.broadcast_to(values.mean(axis=0), values.shape)
-    smooth: Array = savgol_filter(values, count, CUBIC, axis=0)
-    return smooth
+    return savgol_filter(values, count, CUBIC, axis=0)
 
 
 def _settling(t: Array, distance: Array) -> float:

@@ -60,8 +60,7 @@ class RigidArm:
 
     def angles(self) -> Array:
         """(motors,) where it stands."""
-        found: Array = row_values(self._model, self._q[None], np.zeros(1))[0][0, self._motors]
-        return found
+        return row_values(self._model, self._q[None], np.zeros(1))[0][0, self._motors]
 
     def place(self, gamma: Array) -> tuple[Array, Array]:
         """Coordinates q (n_q,) and C_v at motor angles gamma, by Newton from the last place."""
@@ -88,8 +87,7 @@ class RigidArm:
         def moments(target: Array) -> Array:
             signs = self._system.row_signs
             multipliers = self._system.core.evaluate(q, v, signs * target, friction, None)[1]
-            found: Array = -(signs * multipliers)[self._motors]
-            return found
+            return -(signs * multipliers)[self._motors]
 
         h = moments(np.zeros(len(C_v)))
         return np.column_stack([moments(unit) - h for unit in np.eye(len(C_v))[self._motors]]), h
@@ -97,8 +95,7 @@ class RigidArm:
     def moments(self, gamma: Array, gamma_dot: Array, gamma_ddot: Array) -> Array:
         """τ (motors,) N·m, or N."""
         M, h = self.terms(gamma, gamma_dot)
-        tau: Array = M @ gamma_ddot + h
-        return tau
+        return M @ gamma_ddot + h
 
 
 def _motor_rows(model: Model) -> list[ConstraintRow]:

@@ -149,8 +149,7 @@ class ReachedModes:
 
     def forces(self, F_p: Array) -> Array:
         """(T, m) on the p' from those on the modes of the modal body (T, n)."""
-        on_modes: Array = F_p[:, self.rows] @ self.T
-        return on_modes
+        return F_p[:, self.rows] @ self.T
 
     def coordinates(self, p: Array) -> Array:
         """(T, m) p' from those of the modal body (T, n)."""
@@ -202,8 +201,7 @@ class Voltages:
     @property
     def residual(self) -> Array:
         """(T,) norm of the modal force on modes to be served that `within_limit` leaves unmet."""
-        norms: Array = np.linalg.norm(self.unmet[:, : self.served], axis=1)
-        return norms
+        return np.linalg.norm(self.unmet[:, : self.served], axis=1)
 
     @property
     def largest(self) -> float:
@@ -227,8 +225,7 @@ def voltage_gain(patches: Reach) -> Array:
         return as_floats(np.linalg.inv(patches.Phi_V[:served]) @ np.eye(served, n))
     W_sqrt = patches.in_order if patches.serves_all else patches.W_sqrt
     scale = voltage_scale(patches)
-    gain: Array = scale[:, None] * np.linalg.pinv(W_sqrt @ patches.Phi_V * scale) @ W_sqrt
-    return gain
+    return scale[:, None] * np.linalg.pinv(W_sqrt @ patches.Phi_V * scale) @ W_sqrt
 
 
 def allocation(patches: Reach, *, limited: bool) -> _core.Allocation:
@@ -336,8 +333,7 @@ def patch_edges(layout: PztLayout, length: float) -> Array:
         centers = np.array(layout.centers)
     else:
         centers = (np.arange(layout.patch_count) + 0.5) * length / layout.patch_count
-    edges: Array = centers[:, None] + np.array([-0.5, 0.5]) * layout.length
-    return edges
+    return centers[:, None] + np.array([-0.5, 0.5]) * layout.length
 
 
 def check_edges(key: str, edges: Array, length: float) -> None:

@@ -58,8 +58,7 @@ class LinkSections:
         """(k,) of each station the first one with the same section."""
         of_station = np.column_stack([self.height, self.width, self.is_round, self.rigidity])
         _, first, same = np.unique(of_station, axis=0, return_index=True, return_inverse=True)
-        found: Indices = first[same.ravel()]
-        return found
+        return first[same.ravel()]
 
     def shear_lever(self, station: int, normal: Literal["y", "z"], patch_width: float) -> float:
         """β: mean shear of the surface under a patch, of unit twist, over its distance from the axis.

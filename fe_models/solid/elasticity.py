@@ -104,8 +104,7 @@ class SolidModel:
     @property
     def comm(self) -> MPI.Comm:
         """Communicator of the mesh."""
-        comm: MPI.Comm = self.mesh.comm
-        return comm
+        return self.mesh.comm
 
     @property
     def owned(self) -> int:

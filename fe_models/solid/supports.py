@@ -103,8 +103,7 @@ class Flexibility:
 
     def __matmul__(self, loads: Array) -> Array:
         """F f of loads (3 owned, k); collective."""
-        result: Array = self._projected(self._condensed_solve(self.supported(loads)))
-        return result
+        return self._projected(self._condensed_solve(self.supported(loads)))
 
     @property
     def rank(self) -> int:

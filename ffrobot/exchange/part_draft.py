@@ -127,8 +127,7 @@ def _across(part: Inspection, root: PartFace, x: Array) -> Array:
     if np.linalg.norm(z) < SQUARE:
         z = np.eye(3)[np.abs(x).argmin()]
         z = z - (z @ x) * x
-    y: Array = np.cross(z / np.linalg.norm(z), x)
-    return y
+    return np.cross(z / np.linalg.norm(z), x)
 
 
 def _squared(part: Inspection, direction: Array) -> Array:

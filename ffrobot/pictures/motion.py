@@ -54,8 +54,7 @@ class MovingBody:
 
     def turned(self, vectors: Array) -> Array:
         """A times vectors (T, …, 3) of the frame: in global axes."""
-        found: Array = np.einsum("tij,t...j->t...i", self.axes, vectors)
-        return found
+        return np.einsum("tij,t...j->t...i", self.axes, vectors)
 
     def placed(self, places: Array) -> Array:
         """R + A x of places x (T, k, 3) in the frame, m: in global axes."""
@@ -68,8 +67,7 @@ class MovingBody:
 
     def exaggerated(self, shift: Array, s: float) -> Array:
         """Where the points are (T, k, 3), m, with deflections s times as large; joints stay shut by `shift` (T, 3)."""
-        found: Array = self.placed(self.points + s * self.deflection) + (s - 1.0) * shift[:, None]
-        return found
+        return self.placed(self.points + s * self.deflection) + (s - 1.0) * shift[:, None]
 
     def global_deflection(self, point: str) -> Array:
         """A Φ p of a point (T, 3), in m: how much a unit of s moves it in global axes."""
@@ -224,8 +222,7 @@ class Marker:
 
     def exaggerated(self, s: float) -> Array:
         """Where it is (T, 3), m, with deflections s times as large."""
-        found: Array = self.position + (s - 1.0) * self.exaggeration
-        return found
+        return self.position + (s - 1.0) * self.exaggeration
 
 
 def joint_markers(scene: Mapping[str, Any], bodies: Sequence[MovingBody], shift: Sequence[Array]) -> list[Marker]:

@@ -73,8 +73,7 @@ def _tube(rings: int, q: int) -> Integers:
     after = (corner + 1) % q
     sides = np.stack([ring + corner, ring + after, ring + q + after, ring + q + corner], axis=2).reshape(-1, 4)
     fan = np.array([[0, j, j + 1, j + 2] for j in range(1, q - 1, 2)])
-    cells: Integers = np.concatenate([fan[:, ::-1], sides, (rings - 1) * q + fan]).astype(np.int64)
-    return cells
+    return np.concatenate([fan[:, ::-1], sides, (rings - 1) * q + fan]).astype(np.int64)
 
 
 LAYERS = 4  # clusters that remain at least over each of the three dimensions of a link
@@ -236,8 +235,7 @@ def _bar() -> Integers:
     after = (k + 1) % SIDES
     sides = np.concatenate([np.stack([k, after, SIDES + after], 1), np.stack([k, SIDES + after, SIDES + k], 1)])
     fan = np.stack([np.zeros(SIDES - 2, dtype=np.int64), k[1:-1], k[2:]], axis=1)
-    found: Integers = np.concatenate([sides, fan[:, ::-1], SIDES + fan]).astype(np.int64)
-    return found
+    return np.concatenate([sides, fan[:, ::-1], SIDES + fan]).astype(np.int64)
 
 
 def shortest_tree(points: Array) -> Integers:

@@ -238,8 +238,7 @@ def joint_tasks(results: Results, analysis: str) -> Iterator[tuple[str, JointTas
 def _derivative(time: Array, values: Array) -> Array:
     from scipy.interpolate import CubicSpline
 
-    found: Array = CubicSpline(time, values)(time, 1)
-    return found
+    return CubicSpline(time, values)(time, 1)
 
 
 def _peak(results: Results, dataset: str) -> float:

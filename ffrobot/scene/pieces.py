@@ -108,7 +108,7 @@ def _renamed(value: T, places: Mapping[str, str]) -> T:
         new = tuple(_renamed(entry, places) for entry in value)
     elif isinstance(value, Record):
         new = value.model_copy(update={key: _renamed(getattr(value, key), places) for key in value.model_fields_set})
-    return new  # type: ignore[no-any-return]
+    return new
 
 
 def _problems(scene: Scene, divided: Mapping[str, BodyInPieces]) -> Iterator[str]:

@@ -50,16 +50,14 @@ def reached_samples(samples: _core.Samples | None, time: Array) -> tuple[Array, 
 
 def some_of(count: int) -> Indices:
     """Numbers of some of `count` samples, the first and the last among them."""
-    found: Indices = np.unique(np.append(np.arange(0, count, -(-count // LOOKED_AT)), count - 1))
-    return found
+    return np.unique(np.append(np.arange(0, count, -(-count // LOOKED_AT)), count - 1))
 
 
 def about_highest(some: Indices, quantities: Array) -> Indices:
     """All other samples about the highest of `quantities` (T, columns), which were found at `some` (T,)."""
     tops = sorted({k for column in np.abs(quantities).T for k in _highest(column)})
     about = [np.arange(some[max(k - 1, 0)], some[min(k + 1, len(some) - 1)] + 1) for k in tops]
-    found: Indices = np.setdiff1d(np.concatenate([some[:0], *about]), some)
-    return found
+    return np.setdiff1d(np.concatenate([some[:0], *about]), some)
 
 
 def _highest(values: Array) -> list[int]:
@@ -78,8 +76,7 @@ def in_order(outputs: Array, samples: Array) -> Indices:
     padded = np.concatenate([[-np.inf], outputs, [np.inf]])
     apart = np.minimum(samples - padded[after], padded[after + 1] - samples) > SAME * np.abs(times).max(initial=0.0)
     rows = np.concatenate([np.arange(len(outputs)), len(outputs) + np.flatnonzero(apart)])
-    found: Indices = rows[np.unique(times[rows], return_index=True)[1]]
-    return found
+    return rows[np.unique(times[rows], return_index=True)[1]]
 
 
 def stops(times: Array, paths: Iterable[Trajectory], loads: Iterable[TimeFunction]) -> Array:
@@ -97,8 +94,7 @@ def stops(times: Array, paths: Iterable[Trajectory], loads: Iterable[TimeFunctio
             brief = (last < BRIEF * duration) & (way * duration > FAR * last * way.max(initial=0.0))
             found.append(np.linspace(breaks[:-1][brief], breaks[1:][brief], PARTS + 1).ravel())
     every = np.unique(np.concatenate([np.zeros(0), *found]))
-    within: Array = every[(every > times[0]) & (every < times[-1])]
-    return within
+    return every[(every > times[0]) & (every < times[-1])]
 
 
 def path_times(times: Array, paths: Iterable[Trajectory], end: float) -> Array:

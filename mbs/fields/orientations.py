@@ -49,8 +49,7 @@ class OrientationLaw:
         if self.kind == "rotation_vector":
             return exponential(x) @ exponential(np.array(self.reference))
         if self.kind == "rpy":
-            found: Array = about(2, x[:, 2]) @ about(1, x[:, 1]) @ about(0, x[:, 0])
-            return found
+            return about(2, x[:, 2]) @ about(1, x[:, 1]) @ about(0, x[:, 0])
         return turned_to(x)
 
     def rates(self, times: Array) -> tuple[Array, Array]:

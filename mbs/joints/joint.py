@@ -50,13 +50,11 @@ class Friction:
 
     def resistance(self, rate: Array) -> Array:
         """C γ̇ + τ_c tanh(γ̇/γ̇_s) at rates γ̇ of any shape."""
-        found: Array = self.viscous * rate + self.coulomb * np.tanh(rate / self.speed)
-        return found
+        return self.viscous * rate + self.coulomb * np.tanh(rate / self.speed)
 
     def slope(self, rate: Array) -> Array:
         """Its derivative by γ̇: c + τ_c/γ̇_s / cosh²(γ̇/γ̇_s)."""
-        found: Array = self.viscous + self.coulomb / self.speed * (1.0 - np.tanh(rate / self.speed) ** 2)
-        return found
+        return self.viscous + self.coulomb / self.speed * (1.0 - np.tanh(rate / self.speed) ** 2)
 
 
 RecordType = type[Record]  # `type` is a key below

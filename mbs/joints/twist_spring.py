@@ -67,8 +67,7 @@ class TwistSpring:
 
     def slope(self, twist: Array) -> Array:
         """N·m/rad at twists of any shape, rad."""
-        found: Array = np.array(self.slopes)[np.searchsorted(self.knots, np.abs(twist))]
-        return found
+        return np.array(self.slopes)[np.searchsorted(self.knots, np.abs(twist))]
 
 
 def _piecewise(x: Array, slopes: tuple[float, ...], knots: tuple[float, ...]) -> Array:
@@ -76,5 +75,4 @@ def _piecewise(x: Array, slopes: tuple[float, ...], knots: tuple[float, ...]) ->
     total = slopes[0] * size
     for knot, change in zip(knots, np.diff(slopes), strict=True):
         total = total + change * np.maximum(size - knot, 0.0)
-    found: Array = np.copysign(total, x)
-    return found
+    return np.copysign(total, x)

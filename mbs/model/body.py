@@ -108,8 +108,7 @@ class Body(Invariants):
     @property
     def inertia_slope(self) -> Array:
         """J1 (3, 3, n): J1_ij = 2δ_ij tr Ī − Ī_ij − Ī_ji."""
-        slope: Array = 2 * np.einsum("ij,kkn->ijn", np.eye(3), self.I_bar) - self.I_bar - self.I_bar.transpose(1, 0, 2)
-        return slope
+        return 2 * np.einsum("ij,kkn->ijn", np.eye(3), self.I_bar) - self.I_bar - self.I_bar.transpose(1, 0, 2)
 
     @property
     def spin(self) -> Array:

@@ -83,8 +83,7 @@ class Model:
 
     def along(self, joint: str) -> Array:
         """Directions in v (k, n_v) of moments on the second side of a joint along its k coordinates."""
-        directions: Array = self.sign(joint) * np.eye(self.tree.n_v)[_in_order(self.driven(joint))]
-        return directions
+        return self.sign(joint) * np.eye(self.tree.n_v)[_in_order(self.driven(joint))]
 
     def sign(self, joint: str) -> float:
         """−1 where the tree has a joint's coordinates the other way round."""

@@ -95,13 +95,11 @@ def _measured(row: ConstraintRow, a: Motion, b: Motion, q: Array, times: Array) 
 def turned_by(row: ConstraintRow, a: Motion, b: Motion) -> Array:
     """The angle (T,) of a "turn" row, within ±π: that of b's g about a's f, from a's g on."""
     axis, zero, turned = a.F @ row.f, a.F @ row.g, b.F @ row.g
-    found: Array = np.arctan2(np.sum(np.cross(axis, zero) * turned, axis=-1), np.sum(zero * turned, axis=-1))
-    return found
+    return np.arctan2(np.sum(np.cross(axis, zero) * turned, axis=-1), np.sum(zero * turned, axis=-1))
 
 
 def turning_axis(row: ConstraintRow, a: Motion, b: Motion) -> Array:
     """Its rate (T, 3) by the angular velocity of b against a; core/recursion/constrained_aba/constraints.h."""
     axis, turned = a.F @ row.f, b.F @ row.g
     along = np.sum(axis * turned, axis=-1, keepdims=True)
-    found: Array = axis - along / (1.0 - along**2) * (turned - along * axis)
-    return found
+    return axis - along / (1.0 - along**2) * (turned - along * axis)

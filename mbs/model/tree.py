@@ -44,8 +44,7 @@ class Section(NamedTuple):
         if not self.still:
             return rotation
         z = self.triad[:, 2]
-        found: Array = rotation - z[:, None] * np.einsum("i,...ij->...j", z, rotation)[..., None, :]
-        return found
+        return rotation - z[:, None] * np.einsum("i,...ij->...j", z, rotation)[..., None, :]
 
 
 class Pose(NamedTuple):

@@ -59,8 +59,7 @@ def with_fewer_modes(body: Body, lowest: int, loaded: Sequence[str]) -> Body:
 
 def _lift(T: Array, B_T: Array) -> Array:
     """(n, m) modal forces on all modes from those on the m coordinates, exact for forces of the loads Bᵀ."""
-    lift: Array = T + (B_T - T @ (T.T @ B_T)) @ np.linalg.pinv(T.T @ B_T)
-    return lift
+    return T + (B_T - T @ (T.T @ B_T)) @ np.linalg.pinv(T.T @ B_T)
 
 
 def modes_kept(body: Body) -> str:

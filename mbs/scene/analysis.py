@@ -76,8 +76,7 @@ class Analysis(Referring):
     @classmethod
     def kind_name(cls) -> str:
         """The value of `kind` of all analyses of this record."""
-        name: str = get_args(cls.model_fields["kind"].annotation)[0]
-        return name
+        return get_args(cls.model_fields["kind"].annotation)[0]
 
     @classmethod
     def refuse_key(cls, key: str, others: Sequence[type[Record]]) -> str:

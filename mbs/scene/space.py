@@ -31,13 +31,11 @@ class Space:
 
     def along(self, vectors: Array) -> Array:
         """Of places, velocities or forces (…, 3) the components along its axes (…, d)."""
-        found: Array = vectors[..., list(self.translations)]
-        return found
+        return vectors[..., list(self.translations)]
 
     def about(self, vectors: Array) -> Array:
         """Of angular velocities or moments (…, 3) the components about its axes (…, 3), in the plane one (…)."""
-        found: Array = vectors[..., self.rotations[0]] if self.is_plane else vectors[..., list(self.rotations)]
-        return found
+        return vectors[..., self.rotations[0]] if self.is_plane else vectors[..., list(self.rotations)]
 
 
 PLANE = Space((0, 1), (2,))

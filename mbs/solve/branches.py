@@ -235,8 +235,7 @@ def _above(model: Model, q: Array, node: Node) -> bool:
     tree, frames = model.tree, model.tree.frames(q[None])
 
     def place(section: Section) -> Array:
-        found: Array = tree.motion(section, q[None], frames).r[0]
-        return found
+        return tree.motion(section, q[None], frames).r[0]
 
     own, before, after = place(node.inner), node, node
     while before.inner.body >= 0 and np.allclose(place(before.inner), own, atol=NEAR):

@@ -121,13 +121,11 @@ def _excitation(system: MultibodySystem, start: State, found: Vibrations) -> Arr
         carried = [np.append(of, alone[node.p_v]) for of, node in zip(carried, bodies, strict=True)]
     sizes = np.array([np.linalg.norm(of) for of in carried]) + of_each.sum(axis=1)
     sizes = np.maximum(sizes, max(1e-3 * float(sizes.max()), 1e-300))
-    largest: Array = (of_each / sizes[:, None]).max(axis=0)
-    return largest
+    return (of_each / sizes[:, None]).max(axis=0)
 
 
 def _acceleration(system: MultibodySystem, t: float, state: State, replay: _core.Replay | None) -> Array:
     """(n_v,) at time t."""
     states = np.concatenate([state.q, state.v])[None]
     core, scene, _ = system.integrated
-    found: Array = _core.tree_outputs(core, scene, [t], states, replay).accelerations[0]
-    return found
+    return _core.tree_outputs(core, scene, [t], states, replay).accelerations[0]

@@ -254,14 +254,12 @@ def _residuals(program: Program, layout: _Layout, unknown: Array, z: Array) -> A
 
 def _times(A: Array, x: Array) -> Array:
     """A_k x_k (N, i) of A (N, i, a) and x (N, a)."""
-    found: Array = (A @ x[:, :, None])[:, :, 0]
-    return found
+    return (A @ x[:, :, None])[:, :, 0]
 
 
 def _transposed_times(A: Array, y: Array) -> Array:
     """A_kᵀ y_k (N, a) of A (N, i, a) and y (N, i)."""
-    found: Array = (y[:, None] @ A)[:, 0]
-    return found
+    return (y[:, None] @ A)[:, 0]
 
 
 def _way(values: Array, step: Array) -> float:

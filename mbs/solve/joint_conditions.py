@@ -42,8 +42,7 @@ class RobotModes:
     def frequency(self) -> Array:
         """(f,) √(λ₁ λ₂)/2π, Hz: the undamped one; 0 where the robot moves without stiffness, or falls."""
         omega = np.sqrt(self.poles.prod(axis=1).real.clip(min=0.0))
-        result: Array = np.where(omega < RIGID * omega.max(initial=0.0), 0.0, omega) / (2 * np.pi)
-        return result
+        return np.where(omega < RIGID * omega.max(initial=0.0), 0.0, omega) / (2 * np.pi)
 
     @property
     def growth(self) -> float:

@@ -261,8 +261,7 @@ def _independent(model: Model, q: Array) -> Indices:
             rank = int(np.count_nonzero(np.abs(np.diag(R)) > DEPENDENT * size))
             left = Q[:, rank:].T @ left
         free.append(np.sort(group[order[rank:]]))
-    chosen: Indices = np.concatenate([free[1], free[0], free[2]]).astype(np.intp)
-    return chosen
+    return np.concatenate([free[1], free[0], free[2]]).astype(np.intp)
 
 
 def _bracket(nodes: Sequence[Node], v: Array) -> Array:

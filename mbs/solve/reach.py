@@ -136,8 +136,7 @@ def regular_postures(model: Model, q: Array) -> Array:
     found = found[is_met]
     J = row_values(model, found, np.zeros(len(found)))[1][:, :, joints] * scales / row_sizes(model)[:, None]
     values = np.linalg.svd(J, compute_uv=False)
-    regular: Array = found[values[:, -1] > REGULAR * values[:, 0]]
-    return regular
+    return found[values[:, -1] > REGULAR * values[:, 0]]
 
 
 def as_guess(nodes: Sequence[Node], q: Array) -> str:

@@ -107,8 +107,7 @@ def _least_motion(model: Model, q: Array, times: Array) -> Array:
 
     run = solve_ivp(rates, (0.0, float(times[-1])), 0 * q, "DOP853", times, rtol=TOLERANCE, atol=TOLERANCE)
     if run.success:
-        found: Array = q + run.y.T
-        return found
+        return q + run.y.T
     raise SolveError(
         f"{model.scene.path}: redundancy: the motion of least size ends at t = {run.t[-1]:.6g} s: the joints cannot"
         " follow the path there; start in another posture, or prescribe a joint by a trajectory"
@@ -145,8 +144,7 @@ def _least_torque(model: Model, nodes: Sequence[Node], times: Array, q: Array) -
             motion = prescribed_motion(held, mechanism, still, times[::STRIDE], moved(c, 1))
         except SolveError:  # out of reach: worse than anything within it
             return np.full(weights.size, OUT_OF_REACH)
-        found: Array = (weights * motion.required).ravel() / size
-        return found
+        return (weights * motion.required).ravel() / size
 
     size = 1.0
     size = float(np.linalg.norm(moments(np.zeros((count - 2) * len(places))))) or 1.0

@@ -68,8 +68,7 @@ class Servo:
     @cached_property
     def scale(self) -> Array:
         """Frequencies ω of all modes (n,), rad/s."""
-        omega: Array = np.sqrt(np.concatenate([node.body.stiffness for node in self.model.tree.nodes]))
-        return omega
+        return np.sqrt(np.concatenate([node.body.stiffness for node in self.model.tree.nodes]))
 
     @property
     def mode_sizes(self) -> Array:
@@ -150,8 +149,7 @@ class Servo:
 
     def postures(self, times: Array) -> Array:
         """Those along the path without deflections, (T, n_q), nearest to `times` (T,)."""
-        found: Array = self.near[np.searchsorted((self.near_times[1:] + self.near_times[:-1]) / 2, times)]
-        return found
+        return self.near[np.searchsorted((self.near_times[1:] + self.near_times[:-1]) / 2, times)]
 
     def residuals(self, times: Array, p: Array, v: Array, a: Array) -> Array:
         """Modal forces r (N, n) that motors do not supply; NaN where no posture is found. Raises `Stopped`."""
@@ -219,8 +217,7 @@ def _derivative(
     moved = np.repeat(modes[:, :, None], 2 * n, axis=2)
     moved[k] += np.concatenate([np.diag(step), -np.diag(step)])
     r = forces(np.repeat(times, 2 * n), *moved.reshape(3, -1, n)).reshape(len(times), 2, n, -1)
-    found: Array = ((r[:, 0] - r[:, 1]) / (2 * step[:, None])).transpose(0, 2, 1)
-    return found
+    return ((r[:, 0] - r[:, 1]) / (2 * step[:, None])).transpose(0, 2, 1)
 
 
 def make_servo(

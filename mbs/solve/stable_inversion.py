@@ -186,8 +186,7 @@ class _Solver:
         """Largest |r| between the collocation points of each interval (N,)."""
         times = (curve.x[:-1, None] + np.diff(curve.x)[:, None] * PROBES).ravel()
         r = np.abs(self.problem.residual(times, *_states(curve)(times))).max(axis=1)
-        largest: Array = np.nan_to_num(r, nan=np.inf).reshape(-1, len(PROBES)).max(axis=1)
-        return largest
+        return np.nan_to_num(r, nan=np.inf).reshape(-1, len(PROBES)).max(axis=1)
 
 
 def _along(servo: Servo, states: States, breaks: Array) -> Derivatives:
@@ -265,16 +264,14 @@ def _invariant(A: Array, s: ComplexArray, is_held: Booleans) -> Array:
     from scipy.linalg import schur
 
     _, U, count = schur(A.T, sort=lambda re, im: bool(is_held[np.abs(s - complex(re, abs(im))).argmin()]))
-    found: Array = U[:, :count]
-    return found
+    return U[:, :count]
 
 
 def _breaks(pre: float, end: float, post: float) -> Array:
     """Even breaks before, on and after the path, whose ends are breaks; (N+1,)."""
     parts = [(-pre, 0.0), (0.0, end), (end, end + post)]
     pieces = [np.linspace(a, b, FIRST_INTERVALS + 1) for a, b in parts if b > a]
-    breaks: Array = np.unique(np.concatenate(pieces))
-    return breaks
+    return np.unique(np.concatenate(pieces))
 
 
 def cut(breaks: Array, excess: Array) -> Array:

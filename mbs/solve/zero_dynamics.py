@@ -90,8 +90,7 @@ def zeros(dynamics: LinearDynamics, scale: Array) -> ComplexArray:
     s = np.linalg.eigvals(np.array([first_order(dynamics, k, scale) for k in range(len(dynamics.times))]))
     with np.errstate(divide="ignore"):
         size = np.log(np.abs(s)).round(8)  # as far as rounding lets it be known: pairs ± s have one
-    found: ComplexArray = np.take_along_axis(s, np.lexsort((s.imag, s.real, size), axis=1), axis=1)
-    return found
+    return np.take_along_axis(s, np.lexsort((s.imag, s.real, size), axis=1), axis=1)
 
 
 def is_unstable(s: ComplexArray) -> Booleans:
@@ -144,8 +143,7 @@ class Linearisation:
     def _is_parted(self, flags: Booleans) -> Booleans:
         """Which zeros (N, 2n) have another flag than their conjugates: two real ones of both sides that have met."""
         apart = np.abs(self.zeros[:, :, None] - self.zeros[:, None].conj())
-        parted: Booleans = flags != np.take_along_axis(flags, apart.argmin(axis=2), axis=1)
-        return parted
+        return flags != np.take_along_axis(flags, apart.argmin(axis=2), axis=1)
 
     @property
     def _followed(self) -> tuple[NDArray[np.int_], Booleans]:
@@ -168,8 +166,7 @@ class Linearisation:
     @property
     def is_light(self) -> Booleans:
         """Which of the zeros (N, 2n) are those of lightly damped vibrations, or lightly growing ones."""
-        light: Booleans = np.abs(self.zeros.real) <= LIGHT * np.abs(self.zeros)
-        return light
+        return np.abs(self.zeros.real) <= LIGHT * np.abs(self.zeros)
 
     @property
     def singular_after(self) -> tuple[int, ...]:

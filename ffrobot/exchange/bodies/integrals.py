@@ -68,8 +68,7 @@ class ShapeIntegrals:
         """(3, 3, n) ∫ρ x_k Φ_l dV at [k, l]: its symmetric part is in J_l, the other one in C_r0."""
         trace = np.einsum("aan->n", self.inertia_slope) / 4
         symmetric = trace * np.eye(3)[:, :, None] - self.inertia_slope / 2
-        found: Array = symmetric + 0.5 * np.einsum("abc,an->bcn", LEVI_CIVITA, self.spin)
-        return found
+        return symmetric + 0.5 * np.einsum("abc,an->bcn", LEVI_CIVITA, self.spin)
 
     @property
     def gyroscopic(self) -> Array:

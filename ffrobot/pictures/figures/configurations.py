@@ -202,8 +202,7 @@ def _way(results: Results, group: str, body: MovingBody, shape: Shape, k: int, m
     arm = shape.placed(body)[0] - body.position[0]
     is_flexible = len(d_p) == shape.shapes.shape[2]  # bodies drawn through their points do not show it
     bent = body.turned((shape.shapes @ d_p)[None])[0] if is_flexible else np.zeros_like(arm)
-    found: Array = in_3d(d_position) + np.cross(turn, arm) + bent
-    return found
+    return in_3d(d_position) + np.cross(turn, arm) + bent
 
 
 def _nearest(results: Results, figure: FigureRecord) -> int:

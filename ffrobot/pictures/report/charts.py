@@ -249,5 +249,4 @@ def _path_errors(files: Sequence[Results]) -> list[Chart]:
 def path_error(run: Run, target: Target) -> Array:
     """Distance (T,) in m between a point and its target, in the components that the target has."""
     reached = run.results.data(f"{run.analysis}/points/{target.point}/position")[:, target.columns]
-    distance: Array = np.linalg.norm(reached[: len(target.wanted)] - target.wanted, axis=1)
-    return distance
+    return np.linalg.norm(reached[: len(target.wanted)] - target.wanted, axis=1)

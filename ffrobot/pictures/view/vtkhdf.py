@@ -59,8 +59,7 @@ def vtkhdf_image(grid: Grid) -> bytes:
         if grid.time is not None:
             _write_steps(root, grid, grid.time)
         file.flush()
-        image: bytes = file.id.get_file_image()
-        return image
+        return file.id.get_file_image()
 
 
 def _write_cells(root: h5py.Group, grid: Grid) -> None:
