@@ -152,16 +152,16 @@ class Effects:
     count: Integers
 
 
-def draw_trajectories(keys: int, count: int, seed: int, levels: int = LEVELS) -> Trajectories:
+def draw_trajectories(keys: int, count: int, seed: int) -> Trajectories:
     """So many of them; a Latin hypercube has them begin at all levels of every key alike."""
     from scipy.stats.qmc import LatinHypercube
 
-    start = np.floor(levels * LatinHypercube(keys, seed=seed).random(count)).astype(int)
-    step = np.where(start < levels // 2, levels // 2, -(levels // 2))  # from the lower half up, else down
+    start = np.floor(LEVELS * LatinHypercube(keys, seed=seed).random(count)).astype(int)
+    step = np.where(start < LEVELS // 2, LEVELS // 2, -(LEVELS // 2))  # from the lower half up, else down
     order = np.random.default_rng(seed).permuted(np.tile(np.arange(keys), (count, 1)), axis=1)
     turn = np.argsort(order, axis=1)  # (r, k) when each key is changed
     changed = np.arange(keys + 1)[None, :, None] > turn[:, None, :]
-    points = (start[:, None, :] + changed * step[:, None, :]) / (levels - 1)
+    points = (start[:, None, :] + changed * step[:, None, :]) / (LEVELS - 1)
     return Trajectories(as_floats(points), order)
 
 

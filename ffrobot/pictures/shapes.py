@@ -239,19 +239,12 @@ def _bar() -> Integers:
 
 
 def shortest_tree(points: Array) -> Integers:
-    """(p − 1, 2) which of points (p, 3) to join so that all are connected by the shortest lines (Prim 1957)."""
+    """(p − 1, 2) which of points (p, 3) to join so that all are connected by the shortest lines."""
+    from scipy.sparse.csgraph import minimum_spanning_tree
+
     distance = np.linalg.norm(points[:, None] - points, axis=2)
-    nearest, way = np.zeros(len(points), dtype=np.int64), distance[0].copy()
-    way[0] = np.inf
-    edges = []
-    for _ in range(len(points) - 1):
-        k = int(np.argmin(way))
-        edges.append((int(nearest[k]), k))
-        joined = np.isinf(way) | (np.arange(len(points)) == k)
-        closer = ~joined & (distance[k] < way)
-        nearest[closer], way[closer] = k, distance[k][closer]
-        way[k] = np.inf
-    return np.array(edges, dtype=np.int64).reshape(-1, 2)
+    tree = minimum_spanning_tree(1.0 + distance / max(distance.max(), 1e-300))  # 0 would be no edge: points may be one
+    return np.array(tree.nonzero(), dtype=np.int64).T
 
 
 def _modal_body(results: Results, body: MovingBody, notes: list[str]) -> ModalBody | None:

@@ -105,11 +105,11 @@ def _not_empty(entries: tuple[T, ...]) -> tuple[T, ...]:
     return entries
 
 
-def one_of(record: Record, keys: tuple[str, ...], why: str = "") -> str:
+def one_of(record: Record, keys: tuple[str, ...]) -> str:
     """The one key of `keys` that is set. Raises `ValueError` when there is none or more than one."""
     found = [key for key in keys if getattr(record, key) is not None]
     if len(found) != 1:
-        raise ValueError(f"expected exactly one of the keys {quoted(keys)}{why}, found {quoted(found)}")
+        raise ValueError(f"expected exactly one of the keys {quoted(keys)}, found {quoted(found)}")
     return found[0]
 
 

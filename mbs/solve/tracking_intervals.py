@@ -19,9 +19,9 @@ LOST = 0.5  # of the largest elastic force: where more is left over between Gaus
 TURNING = 0.3  # of the largest voltage: by so much one changes in intervals that are then halved
 
 
-def graded(start: float, end: float, intervals: int, grading: float = GRADING) -> Array:
+def graded(start: float, end: float, intervals: int) -> Array:
     """Breaks (intervals + 1,), closer together at both ends."""
-    u = np.tanh(grading * np.linspace(-1.0, 1.0, intervals + 1)) / np.tanh(grading)
+    u = np.tanh(GRADING * np.linspace(-1.0, 1.0, intervals + 1)) / np.tanh(GRADING)
     return as_floats(start + 0.5 * (end - start) * (1.0 + u))
 
 

@@ -5,8 +5,6 @@ import pytest
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from PIL import Image
-from scipy.sparse.csgraph import minimum_spanning_tree
-from scipy.spatial import distance
 
 from ffrobot.common.errors import InputError
 from ffrobot.pictures.figures.configurations import draw_configurations
@@ -128,10 +126,15 @@ def test_sections_have_the_axes_of_the_file(crank):
 def test_tree_of_points_is_the_shortest():
     points = np.random.default_rng(7).normal(size=(9, 3))
     edges = shortest_tree(points)
-    length = np.linalg.norm(points[edges[:, 0]] - points[edges[:, 1]], axis=1).sum()
-    expected = minimum_spanning_tree(distance.squareform(distance.pdist(points))).sum()
-    assert length == pytest.approx(expected, rel=1e-12)
-    assert len({int(k) for k in edges.ravel()}) == 9
+    assert edges.shape == (8, 2)
+    for first, last in edges:
+        one_side = {int(first)}  # without this edge
+        for _ in edges:
+            one_side |= {int(k) for edge in edges if {*edge} != {first, last} and one_side & {*edge} for k in edge}
+        across = [np.linalg.norm(points[i] - points[j]) for i in one_side for j in {*range(9)} - one_side]
+        assert last not in one_side
+        assert min(across) == pytest.approx(np.linalg.norm(points[first] - points[last]))
+    assert shortest_tree(np.zeros((3, 3))).shape == (2, 2)
     assert shortest_tree(points[:1]).shape == (0, 2)
 
 
