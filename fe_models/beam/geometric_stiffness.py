@@ -16,7 +16,7 @@ have besides, N (I_p/A) φ'² of fibres that twist shortens, is left out, as in 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 from scipy.special import roots_legendre
@@ -30,6 +30,12 @@ from .beam import R_X
 from .invariants import weighted
 from .line import Functions
 from .sections import Property
+
+ROTARY: Sequence[tuple[Property, Sequence[float]]] = (
+    (lambda s: s.I_yy, (1.0, 0.0, 1.0)),
+    (lambda s: s.I_zz, (1.0, 1.0, 0.0)),
+)
+"""Second moments of a section, and about which axes they make it inert."""
 
 POINTS = 5  # Gauss points of an element: exact, since of cubics no product is of a degree above 8
 
@@ -48,9 +54,9 @@ def geometric_stiffness(
         interfaces: position of each in m.
     """
     x, weight, values, slopes = _at_gauss_points(stations, fields)
-    section_forces = _section_forces(link, x, interfaces)
+    forces = section_forces(link, x, interfaces, ROTARY if link.model.theory == "timoshenko" else ())
     names, n = unit_load_names(interfaces), fields.shape[2]
-    weighted_forces = np.array([section_forces[name] for name in names]) * weight  # (loads, 6, g)
+    weighted_forces = np.array([forces[name] for name in names]) * weight  # (loads, 6, g)
     total = np.zeros((len(names), n, n))
     for row, products in enumerate(_products(values, slopes)):
         total += np.tensordot(weighted_forces[:, row], products, axes=1)
@@ -81,22 +87,27 @@ def _products(values: Array, slopes: Array) -> Array:
     return np.concatenate([on_forces, on_moments])
 
 
-def _section_forces(link: BeamLink, x: Array, interfaces: dict[str, float]) -> dict[str, Array]:
-    """(6, g) n and m at x (g,) in the straight link under each unit load, as its reference condition holds it."""
-    found = _of_inertia(link, x)
+def section_forces(
+    link: BeamLink, x: Array, interfaces: Mapping[str, float], rotary: Sequence[tuple[Property, Sequence[float]]]
+) -> dict[str, Array]:
+    """(6, g) n and m at x (g,) in the straight link under each unit load, as its reference condition holds it.
+
+    Loads at the tip act on the section there, too. `rotary`: the inertia of sections that turn, see `ROTARY`.
+    """
+    found, length = _of_inertia(link, x, rotary), link.geometry.length
     for name, position in interfaces.items():
-        beyond = np.where(x < position, 1.0, 0.0)
-        for load, unit in zip(interface_load_names([name]), np.eye(6), strict=True):
-            found[load] = _of_load(unit, position - x) * beyond, _of_load(unit, np.array([position]))[:, 0]
+        beyond = np.where((x < position) | (position == length), 1.0, 0.0)
+        for load, unit in zip(interface_load_names([name]), np.eye(6)[:, :, None], strict=True):
+            found[load] = of_load(unit, position - x) * beyond, of_load(unit, np.array([position]))
     if link.reference.holds_root:
         return {load: forces for load, (forces, _) in found.items()}
-    return {load: forces + _of_tip_support(link, x, at_root) for load, (forces, at_root) in found.items()}
+    return {load: forces + of_tip_support(link, x, at_root) for load, (forces, at_root) in found.items()}
 
 
-def _of_load(unit: Array, arm: Array) -> Array:
-    """(6, g) of a force and moment (6,) that act further along the axis by arm (g,)."""
-    force, moment = unit[:3, None], unit[3:, None]
-    return np.concatenate([np.broadcast_to(force, (3, arm.size)), moment + _lever(force * arm)])
+def of_load(load: Array, arm: Array) -> Array:
+    """(6, g) of forces and moments, (6, 1) or (6, g), that act further along the axis by arm (g,)."""
+    force, moment = load[:3] * np.ones_like(arm), load[3:]
+    return np.concatenate([force, moment + _lever(force * arm)])
 
 
 def _lever(force: Array) -> Array:
@@ -104,23 +115,24 @@ def _lever(force: Array) -> Array:
     return np.stack([np.zeros_like(force[0]), -force[2], force[1]])
 
 
-def _of_tip_support(link: BeamLink, x: Array, at_root: Array) -> Array:
-    """(6, g) of the forces across with which a support at the tip takes the moments of a load about the root (6,)."""
-    L = link.geometry.length
-    return _of_load(np.array([0.0, -at_root[5] / L, at_root[4] / L, 0.0, 0.0, 0.0]), L - x)
+def of_tip_support(link: BeamLink, x: Array, at_root: Array) -> Array:
+    """(6, g) of the forces across with which a support at the tip takes moments about the root, (6, 1) or (6, g)."""
+    L, none = link.geometry.length, np.zeros_like(at_root[0])
+    return of_load(np.stack([none, -at_root[5] / L, at_root[4] / L, none, none, none]), L - x)
 
 
-def _of_inertia(link: BeamLink, x: Array) -> dict[str, tuple[Array, Array]]:
-    """(6, g) of d'Alembert's loads on the link held at its root, and their sums about the root (6,).
+def _of_inertia(
+    link: BeamLink, x: Array, rotary: Sequence[tuple[Property, Sequence[float]]]
+) -> dict[str, tuple[Array, Array]]:
+    """(6, g) of d'Alembert's loads on the link held at its root, and their sums about the root (6, 1).
 
     Sections at s bear forces ρA (a + b s), of small bodies at 0 and 1 m, and, with rotary inertia, moments.
     """
     e1, nothing = np.eye(3)[:1], np.zeros(1)
     M = [_beyond(link, np.append(x, 0.0), lambda s: s.area, power) for power in range(3)]
-    extents = [(lambda s: s.I_yy, [1.0, 0.0, 1.0]), (lambda s: s.I_zz, [1.0, 1.0, 0.0])]
-    rotary = [
+    turning = [
         (_beyond(link, np.append(x, 0.0), moment, 0), inertia_wrenches(0 * e1, nothing, np.array([inertia])))
-        for moment, inertia in (extents if link.model.theory == "timoshenko" else [])
+        for moment, inertia in rotary
     ]
     at_0, at_1 = (inertia_wrenches(place, np.ones(1), np.zeros((1, 3))) for place in (0 * e1, e1))
     found = {}
@@ -129,9 +141,9 @@ def _of_inertia(link: BeamLink, x: Array) -> dict[str, tuple[Array, Array]]:
         b = at_1[load][0, :3, None] - a
         n = a * M[0] + b * M[1]
         m = _lever(a * M[1] + b * M[2] - np.append(x, 0.0) * n)
-        m = m + sum(wrenches[load][0, 3:, None] * J for J, wrenches in rotary)
+        m = m + sum(wrenches[load][0, 3:, None] * J for J, wrenches in turning)
         both = np.concatenate([n, m])
-        found[load] = both[:, :-1], both[:, -1]
+        found[load] = both[:, :-1], both[:, -1:]
     return found
 
 
@@ -147,7 +159,7 @@ def _beyond(link: BeamLink, x: Array, moment: Property, power: int) -> Array:
 
 def _of_turning_sections(link: BeamLink, stations: Functions, phi: Array) -> Iterator[tuple[str, Array]]:
     """What sections with rotary inertia that turn by φ (3, k, n) add to K (n, n) of d'Alembert's loads."""
-    for k, moment in ((1, lambda s: s.I_yy), (2, lambda s: s.I_zz)):
+    for k, (moment, _) in enumerate(ROTARY, start=1):
         W = weighted(link, stations, moment, link.material.density)
         products = np.array([[a.T @ (W @ b) for b in phi] for a in phi])
         yield from of_turning(np.diag(np.eye(3)[k]), products).items()
