@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from ..common.errors import InputError
+from ..common.tables import shown
 
 _ABAQUS = re.compile(  # the keyword line goes on after a comma at its end
     r"""^[ \t]*\*(?:[^*\n,]|,[ \t]*+(?:\r?\n)?+)*?\bINPUT[ \t]*=[ \t]*["']?([^"',\r\n]+)""",
@@ -120,7 +121,7 @@ def number_of(token: str, place: str) -> float:
         exponent = re.fullmatch(r"([+-]?(?:\d+\.?\d*|\.\d+))[DdEe]?([+-]?\d+)", token.strip())
         value = float(f"{exponent[1]}e{exponent[2]}") if exponent else math.nan
     if not math.isfinite(value):
-        raise InputError(f'{place}: expected a number, found "{token}"')
+        raise InputError(f'{place}: expected a finite number, found "{shown(token.strip())}"')
     return value
 
 

@@ -276,7 +276,7 @@ WRONG = {
     "not a .fem file": (read_fem, lambda _: "hello", "expected a .fem file of MBDyn"),
     "records cut off": (read_fem, replaced(r"\*\* RECORD GROUP 14.*", ""), "which couple modes with rigid motion"),
     "too few numbers": (read_fem, replaced(r"\*\* RECORD GROUP 10", "1\n** RECORD GROUP 10"), "record 9: expected 16"),
-    "words": (read_fem, replaced(r"MODAL MASS MATRIX\n", "\nx "), 'record 9: expected numbers, found "x"'),
+    "words": (read_fem, replaced(r"MODAL MASS MATRIX\n", "\nx "), 'record 9: expected a finite number, found "x"'),
 }
 
 

@@ -143,7 +143,7 @@ def test_nodes_on_edges(read, card, cells, edges):
         (PLAIN + "CTETRA,99,1,1,2,3\n", r'CTETRA, line \d+: expected a whole number, found ""'),
         (PLAIN + "CTETRA,99,1,1,2,3,4,5\n", "expected midside grid points on all edges or none, found 1"),
         (PLAIN + "CTETRA,99,1,1,2,3,4,5,6\n,7,8,9,10,11,12\n", "expected 4 or 10 grid points"),
-        (PLAIN.replace("-0.1", "-0.x", 1), 'GRID, line 1: expected a number, found "-0.x"'),
+        (PLAIN.replace("-0.1", "-0.x", 1), 'GRID, line 1: expected a finite number, found "-0.x"'),
         (fixed(POINTS, CELLS, wide=True).replace("*       -0.05           \n", "", 1), "line 1: .* continues this one"),
         (PLAIN.replace("GRID,2,,0", "GRID,2,,0,0,0,,,,0", 1), "line 2: expected 8 fields in a line at most, found 11"),
         (PLAIN + "GRID,99,,0,0,0,0,0,0\n,1,1,1\n", "expected 8 fields of a grid point at most, found 11"),

@@ -15,9 +15,9 @@ import numpy as np
 
 from ...common.arrays import Array
 from ...common.errors import InputError
-from ...common.tables import shown
 from ...fe_models.modal_body import Interface, ModalBody
 from ...fe_models.modal_body.parts import LEVI_CIVITA
+from ...mesh.included import number_of
 from .integrals import Node, ShapeIntegrals, about_center, integrals_of, nodes_of, noted, slopes, with_agreed_masses
 from .make import NOT_IN_THE_FILE, modal_body
 
@@ -137,15 +137,7 @@ def _records(text: str) -> dict[int, list[str]]:
 
 
 def _numbers(records: dict[int, list[str]], number: int, count: int | None = None) -> Array:
-    values = []
-    for word in records[number]:
-        try:
-            values.append(float(word.replace("D", "E").replace("d", "e")))
-        except ValueError:
-            raise InputError(f'record {number}: expected numbers, found "{shown(word)}"') from None
-    found = np.array(values)
-    if not np.all(np.isfinite(found)):
-        raise InputError(f"record {number}: expected finite numbers")
+    found = np.array([number_of(word, f"record {number}") for word in records[number]])
     if count is not None and len(found) != count:
         raise InputError(f"record {number}: expected {count} numbers, found {len(found)}")
     return found

@@ -17,6 +17,7 @@ from ...common.arrays import Array
 from ...common.errors import InputError
 from ...common.tables import shown
 from ...fe_models.modal_body import Interface, ModalBody
+from ...mesh.included import number_of
 from .integrals import Node, ShapeIntegrals, integrals_of, nodes_of, noted, with_agreed_masses
 from .make import NOT_IN_THE_FILE, modal_body
 
@@ -235,18 +236,7 @@ class Section:
         """The value of a key."""
         if key not in self.keys:
             raise InputError(f"{self.name}: expected the key {key}, found none")
-        return real(self.keys[key], f"{self.name}: {key}")
-
-
-def real(text: str, label: str) -> float:
-    """A number with Fortran's exponents."""
-    try:
-        value = float(text.replace("D", "E").replace("d", "e"))
-    except ValueError:
-        value = float("nan")
-    if not np.isfinite(value):
-        raise InputError(f'{label}: expected a finite number, found "{shown(text.strip())}"')
-    return value
+        return number_of(self.keys[key], f"{self.name}: {key}")
 
 
 def parse(text: str) -> tuple[str, Section]:
@@ -316,7 +306,7 @@ def _entries(section: Section) -> Iterator[tuple[int, tuple[int, ...], float]]:
                 index = tuple(int(part) - 1 for part in match[2].split(","))
             except ValueError:
                 raise InputError(f'{section.name}: expected whole numbers in indices, found "{shown(key)}"') from None
-            yield int(match[1]), index, real(value, f"{section.name}: {key}")
+            yield int(match[1]), index, number_of(value, f"{section.name}: {key}")
 
 
 def layout_of(modal: Section, modes: int) -> Layout:
