@@ -5,6 +5,8 @@ import json
 import re
 
 import pytest
+import tomli_w
+from beam_links import beam_link, rectangle
 
 from ffrobot import InputError
 from ffrobot.bench.campaign import TIME, as_text
@@ -12,14 +14,8 @@ from ffrobot.bench.measuring import Run
 from ffrobot.bench.precision import Point, _is_hopeless
 from ffrobot.cli import cli
 
-LINK = """
-name = "arm"
-material = { youngs_modulus = 70e9, density = 2700.0 }
-geometry = { kind = "beam", length = 0.5, section = { shape = "rectangle", height = 0.01, width = 0.02 } }
-mesh = { elements = 4 }
-reference = { condition = "cantilever" }
-modes = { count = 2, family = "in-plane-bending", attachment_modes = false }
-"""
+MODES = {"count": 2, "family": "in-plane-bending", "attachment_modes": False}
+LINK = beam_link(0.5, rectangle(0.01, 0.02), 4, nu=None, name="arm", modes=MODES)
 SCENE = """
 name = "arm"
 gravity = [0.0, -9.81]
@@ -54,7 +50,7 @@ INTEGRATES = "expected one that integrates over time, pcid or forward, found"
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("bench")
-    (folder / "arm.toml").write_text(LINK, encoding="utf-8")
+    (folder / "arm.toml").write_text(tomli_w.dumps(LINK), encoding="utf-8")
     (folder / "scene.toml").write_text(SCENE, encoding="utf-8")
     return folder
 
@@ -164,7 +160,7 @@ def test_refused(folder, monkeypatch, arguments, named):
 
 
 def test_nothing_to_integrate_is_refused(tmp_path, refused):
-    (tmp_path / "arm.toml").write_text(LINK, encoding="utf-8")
+    (tmp_path / "arm.toml").write_text(tomli_w.dumps(LINK), encoding="utf-8")
     (tmp_path / "scene.toml").write_text(SCENE[: SCENE.index('[[analysis]]\nname = "inverse"')], encoding="utf-8")
     assert f'scene.toml: analysis: {INTEGRATES} "static"' in refused(tmp_path, "bench", "scene.toml")
 

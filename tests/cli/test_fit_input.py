@@ -1,15 +1,10 @@
 """Wrong input of `ffrobot fit`: one message, nothing written."""
 
 import pytest
+import tomli_w
+from beam_links import beam_link, tube
 
-LINK = """
-name = "arm"
-material = { youngs_modulus = 70e9, density = 2700.0 }
-geometry = { kind = "beam", length = 0.6, section = { shape = "tube", outer = 0.02, inner = 0.016 } }
-mesh = { elements = 10 }
-reference = { condition = "cantilever" }
-modes = { count = 4, family = "in-plane-bending" }
-"""
+LINK = beam_link(0.6, tube(0.02, 0.016), 10, nu=None, name="arm", modes={"count": 4, "family": "in-plane-bending"})
 
 WRONG = {
     ("fit", "arm.toml", "--measured", "nowhere.csv", "--vary", "material.density"): "nowhere.csv: table of measured",
@@ -37,7 +32,7 @@ WRONG = {
 
 @pytest.mark.parametrize("arguments", WRONG)
 def test_wrong_input_is_refused(tmp_path, refused, arguments):
-    (tmp_path / "arm.toml").write_text(LINK)
+    (tmp_path / "arm.toml").write_text(tomli_w.dumps(LINK))
     (tmp_path / "modes.csv").write_text("mode,frequency\n1,49\n2,307\n")
     (tmp_path / "many.csv").write_text("mode,frequency\n9,1e4\n")
     (tmp_path / "half.csv").write_text("mode,frequency,uncertainty\n1,49,0.1\n2,307,\n")

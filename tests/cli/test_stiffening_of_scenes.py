@@ -3,20 +3,17 @@
 import h5py
 import numpy as np
 import pytest
+import tomli_w
+from beam_links import beam_link, rectangle
 
 from ffrobot.fe_models.modal_body_file import read_modal_body
 from ffrobot.mbs.model.body import from_modal_body
 
 # E A = 5.03e6 N, E I = 566.6 N·m², ρ A = 0.2019 kg/m
-LINK = """
-name = "beam"
-material = { youngs_modulus = 6.895e10, poissons_ratio = 0.3, density = 2767.67 }
-geometry = { kind = "beam", length = 8.0, section = { shape = "rectangle", height = 0.036766, width = 0.001984 } }
-mesh = { elements = 20 }
-reference = { condition = "cantilever" }
-modes = { count = 6, family = "in-plane-bending" }
-damping = { ratio = 0.0 }
-"""
+LINK = beam_link(
+    8.0, rectangle(0.036766, 0.001984), 20, E=6.895e10, nu=0.3, rho=2767.67, name="beam", damping={"ratio": 0.0},
+    modes={"count": 6, "family": "in-plane-bending"},
+)  # fmt: skip
 SCENE = """
 name = "spin_up"
 space = "planar"
@@ -49,7 +46,7 @@ tolerance = 1e-5
 @pytest.fixture
 def spin_up(tmp_path, ffrobot):
     """Run the scene with a line of its own; returns the finished process and the results file."""
-    (tmp_path / "beam.toml").write_text(LINK, encoding="utf-8")
+    (tmp_path / "beam.toml").write_text(tomli_w.dumps(LINK), encoding="utf-8")
 
     def run(key):
         scene = tmp_path / "scene.toml"
@@ -88,7 +85,7 @@ def test_spin_up_without_it(spin_up, key):
 
 def test_loads_of_the_file_have_their_signs(spin_up, tmp_path, ffrobot):
     """Euler's and the own-weight buckling load from the modal body file: π²/4 and 7.837 EI/L² (Timoshenko, Gere)."""
-    (tmp_path / "beam.toml").write_text(LINK, encoding="utf-8")
+    (tmp_path / "beam.toml").write_text(tomli_w.dumps(LINK), encoding="utf-8")
     assert ffrobot("link", tmp_path / "beam.toml").returncode == 0
     body = from_modal_body("beam", read_modal_body(tmp_path / "beam.h5"), stiffened=True)
     K, stiffening = np.diag(body.stiffness), body.stiffening

@@ -2,15 +2,9 @@
 
 from beam_links import beam_link, rectangle, tube
 
-TUBE = beam_link(
-    0.6,
-    tube(0.02, 0.016),
-    6,
-    nu=0.3,
-    name="arm",
-    modes={"count": 2, "family": "in-plane-bending", "attachment_modes": False},
-    damping={"ratio": 0.02},
-)
+MODES = {"count": 2, "family": "in-plane-bending"}
+FREE = MODES | {"attachment_modes": False}
+TUBE = beam_link(0.6, tube(0.02, 0.016), 6, nu=0.3, name="arm", modes=FREE, damping={"ratio": 0.02})
 SWING = {
     "name": "arm",
     "gravity": [0.0, -9.81],
@@ -23,17 +17,7 @@ SWING = {
 }
 
 L, E, RHO, FORCE = 0.5, 70e9, 2700.0, 20.0
-BEAM = beam_link(
-    L,
-    rectangle(0.02, 0.02),
-    2,
-    E=E,
-    nu=0.3,
-    rho=RHO,
-    name="beam",
-    modes={"count": 2, "family": "in-plane-bending"},
-    damping={"ratio": 0.01},
-)
+BEAM = beam_link(L, rectangle(0.02, 0.02), 2, nu=0.3, rho=RHO, name="beam", modes=MODES, damping={"ratio": 0.01}, E=E)
 CANTILEVER = {
     "name": "cantilever",
     "gravity": [0.0, 0.0],
@@ -44,23 +28,14 @@ CANTILEVER = {
     "analysis": [{"name": "still", "kind": "static"}],
 }
 
+RIGID = {"mass": 2.0, "center": [0.3, 0.0], "inertia": 0.05, "points": {"root": [0.0, 0.0], "tip": [0.6, 0.0]}}
 ARM = {
     "name": "arm",
     "gravity": [0.0, -9.81],
+    "body": [{"name": "arm", "rigid": RIGID}],
     "payload": [{"point": "arm.tip", "mass": 0.5}],
     "joint": [{"name": "shoulder", "type": "revolute", "between": ["ground", "arm.root"]}],
     "trajectory": [{"name": "swing", "joint": "shoulder", "value": "t**2"}],
     "analysis": [{"name": "inverse", "kind": "pcid", "end": 0.5, "output_step": 0.05}],
-    "body": [
-        {
-            "name": "arm",
-            "rigid": {
-                "mass": 2.0,
-                "center": [0.3, 0.0],
-                "inertia": 0.05,
-                "points": {"root": [0.0, 0.0], "tip": [0.6, 0.0]},
-            },
-        }
-    ],
 }
 MASS, PAYLOAD = "body.arm.rigid.mass", "payload.0.mass"

@@ -7,11 +7,10 @@ from copy import deepcopy
 
 import numpy as np
 import pytest
-from small_robots import BEAM, CANTILEVER, FORCE, RHO, SWING, E, L
+from small_robots import BEAM, CANTILEVER, FORCE, RHO, RIGID, SWING, E, L
 
 import ffrobot
 
-RIGID = {"mass": 2.0, "center": [0.3, 0.0], "inertia": 0.05, "points": {"root": [0.0, 0.0], "tip": [0.6, 0.0]}}
 J = 0.05 + 2.0 * 0.3**2  # of the arm about its joint
 SHOULDER = {"name": "shoulder", "type": "revolute", "between": ["ground", "arm.root"]}
 ARM = {

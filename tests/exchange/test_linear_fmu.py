@@ -10,6 +10,8 @@ from xml.etree import ElementTree
 import fmpy
 import numpy as np
 import pytest
+import tomli_w
+from beam_links import beam_link, rectangle
 from fmpy import extract, read_model_description, simulate_fmu
 from fmpy.fmi2 import FMU2Model, FMU2Slave
 from fmpy.validation import validate_fmu
@@ -21,15 +23,10 @@ from ffrobot.actuation.control.linear_model import LinearModel
 from ffrobot.exchange.fmu.forward_model import joint_units
 from ffrobot.exchange.fmu.linear_fmu import make_unit
 
-LINK = """
-name = "arm"
-material = { youngs_modulus = 70e9, density = 2700.0 }
-geometry = { kind = "beam", length = 0.6, section = { shape = "rectangle", height = 0.004, width = 0.02 } }
-mesh = { elements = 20 }
-reference = { condition = "cantilever" }
-modes = { count = 4, family = "in-plane-bending" }
-damping = { ratio = 0.005 }
-"""
+LINK = beam_link(
+    0.6, rectangle(0.004, 0.02), 20, nu=None, name="arm", damping={"ratio": 0.005},
+    modes={"count": 4, "family": "in-plane-bending"},
+)  # fmt: skip
 SCENE = """
 name = "one arm"
 gravity = [0.0, 0.0]
@@ -129,7 +126,7 @@ def difference(found, expected):
 @pytest.fixture(scope="module")
 def folder(ffrobot, tmp_path_factory):
     folder = tmp_path_factory.mktemp("fmu")
-    (folder / "arm.toml").write_text(LINK)
+    (folder / "arm.toml").write_text(tomli_w.dumps(LINK))
     (folder / "scene.toml").write_text(SCENE)
     ffrobot.ok("solve", "scene.toml", cwd=folder)
     return folder

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from beam_links import link_keys, rectangle
 
 from ffrobot.fe_models.link import computed_modal_body
 from ffrobot.fe_models.link_file import LinkTable
@@ -13,20 +14,14 @@ FAMILIES = {"in-plane-bending": 2, "out-of-plane-bending": 2, "torsion": 1}
 
 def bar(kind, condition, coupling, folder):
     """8 × 12 × 200 mm, with its lowest modes of each family."""
-    solid = {"mesh": {"divisions": [40, 2, 3], "order": 2}, "interface": [{"name": "tip", "coupling": coupling}]}
-    beam = {"mesh": {"elements": 30}, "model": {"theory": "timoshenko"}}
-    table = {
-        "name": "bar",
-        "material": {"youngs_modulus": 70e9, "poissons_ratio": 0.3, "density": 2700.0},
-        "geometry": {
-            "kind": kind,
-            "length": 0.2,
-            "section": {"shape": "rectangle", "height": 0.008, "width": 0.012},
-        },
-        "reference": {"condition": condition},
-        "modes": {"count": 7, "family": list(FAMILIES), "attachment_modes": False},
-    }
-    return computed_modal_body(LinkTable(table | (solid if kind == "solid" else beam), Path(folder / "bar.toml")))
+    mesh = {"divisions": [40, 2, 3], "order": 2} if kind == "solid" else {"elements": 30}
+    more = {"interface": [{"name": "tip", "coupling": coupling}]}
+    if kind == "beam":
+        more = {"model": {"theory": "timoshenko"}}
+    modes = {"count": 7, "family": list(FAMILIES), "attachment_modes": False}
+    section = rectangle(0.008, 0.012)
+    table = link_keys(kind, 0.2, section, mesh, nu=0.3, condition=condition, name="bar", modes=modes, **more)
+    return computed_modal_body(LinkTable(table, Path(folder / "bar.toml")))
 
 
 def of_families(body):

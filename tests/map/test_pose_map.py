@@ -134,7 +134,7 @@ def test_files_and_pictures(arm, tmp_path):
 
 
 def test_a_killed_map_goes_on_and_is_the_same(arm, tmp_path):
-    over = ("shoulder=-1:1:20", "elbow=0.2:1.4:20")
+    over = ("shoulder=-1:1:12", "elbow=0.2:1.4:16")
     whole = mapped(arm, tmp_path / "whole", *over)
     folder = tmp_path / "killed"
     command = [sys.executable, "-m", "ffrobot", "map", str(arm), "-o", str(folder), "--no-figures", "-j", "1"]

@@ -23,6 +23,17 @@ def tetrahedra(cells):
     return cells[:, SPLIT].reshape(-1, 4)
 
 
+EDGES = [(0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3)]  # of a tetrahedron, in the order of Nastran and VTK
+
+
+def with_middles(points, cells, edges=EDGES):
+    """Nodes in the middle of all `edges`, behind the corners of each cell."""
+    pairs = np.sort(cells[:, edges].reshape(-1, 2), axis=1)
+    unique, number = np.unique(pairs, axis=0, return_inverse=True)
+    more = len(points) + number.reshape(len(cells), -1)
+    return np.concatenate([points, points[unique].mean(axis=1)]), np.concatenate([cells, more], axis=1)
+
+
 def nodes(points, head="*NODE", first=1):
     return f"{head}\n" + "".join(f"{first + k}, {x:.12g}, {y:.12g}, {z:.12g}\n" for k, (x, y, z) in enumerate(points))
 
@@ -36,9 +47,9 @@ def free(points, cells, card="CHEXA", cp=""):
     """Nastran in free field, over as many lines as it takes."""
     text = "".join(f"GRID,{k + 1},{cp},{x:.9g},{y:.9g},{z:.9g}\n" for k, (x, y, z) in enumerate(points))
     for k, cell in enumerate(cells):
-        entries = [card, k + 1, 1, *(node + 1 for node in cell)]
-        first, rest = entries[:9], entries[9:]
-        text += ",".join(map(str, first)) + "\n" + ("," + ",".join(map(str, rest)) + "\n" if rest else "")
+        entries = [k + 1, 1, *(node + 1 for node in cell)]
+        lines = [",".join(map(str, entries[at : at + 8])) for at in range(0, len(entries), 8)]
+        text += f"{card}," + "\n,".join(lines) + "\n"
     return text
 
 

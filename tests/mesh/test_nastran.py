@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from decks import VOLUME, bar, fixed, free, tetrahedra
+from decks import EDGES, VOLUME, bar, fixed, free, tetrahedra, with_middles
 from solid_parts import face_area, integrate
 
 from ffrobot.common.errors import InputError
@@ -102,32 +102,18 @@ def test_nested_coordinate_systems(read):
     np.testing.assert_allclose(part.points, POINTS, atol=1e-7)
 
 
-def with_middles(points, cells, edges):
-    """Nodes in the middle of all `edges`, behind the corners of each cell."""
-    pairs = np.sort(cells[:, edges].reshape(-1, 2), axis=1)
-    unique, number = np.unique(pairs, axis=0, return_inverse=True)
-    more = len(points) + number.reshape(len(cells), -1)
-    return np.concatenate([points, points[unique].mean(axis=1)]), np.concatenate([cells, more], axis=1)
-
-
 LOWER, UPPER = [(0, 1), (1, 2), (2, 3), (3, 0)], [(4, 5), (5, 6), (6, 7), (7, 4)]
 
 
 @pytest.mark.parametrize(
     ("card", "cells", "edges"),
     [
-        ("CTETRA", tetrahedra(CELLS), [(0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3)]),
+        ("CTETRA", tetrahedra(CELLS), EDGES),
         ("CHEXA", CELLS, [*LOWER, (0, 4), (1, 5), (2, 6), (3, 7), *UPPER]),
     ],
 )
 def test_nodes_on_edges(read, card, cells, edges):
-    points, cells = with_middles(POINTS, cells, edges)
-    text = "".join(f"GRID,{k + 1},,{x:.9g},{y:.9g},{z:.9g}\n" for k, (x, y, z) in enumerate(points))
-    for k, cell in enumerate(cells):
-        fields = [k + 1, 1, *(node + 1 for node in cell)]
-        lines = [",".join(map(str, fields[at : at + 8])) for at in range(0, len(fields), 8)]
-        text += f"{card}," + "\n,".join(lines) + "\n"
-    part = read(text)
+    part = read(free(*with_middles(POINTS, cells, edges), card))
     assert part.degree == 1  # in the middle: straight
     assert integrate(part) == pytest.approx(VOLUME, rel=1e-6)
 

@@ -6,6 +6,7 @@ import gmsh
 import meshio
 import numpy as np
 import pytest
+from decks import with_middles
 from solid_parts import VOLUME, bar, face_area, integrate, two_bars
 
 from ffrobot.common.errors import InputError
@@ -223,12 +224,9 @@ def test_unknown_endings_are_named(solid, mesh_part, tmp_path, name):
 
 def with_mid_sides(box, bend=0.0):
     """The tetrahedra of `box` with 10 nodes, as meshio numbers them; `bend` makes its upper edge a parabola."""
-    edges = [(0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3)]
-    pairs = np.sort(box.cells[:, edges].reshape(-1, 2), axis=1)
-    unique, number = np.unique(pairs, axis=0, return_inverse=True)
-    points = np.concatenate([box.points, box.points[unique].mean(axis=1)])
+    points, cells = with_middles(box.points, box.cells)
     points[:, 1] *= 1 + bend * points[:, 0] ** 2
-    return points, np.concatenate([box.cells, len(box.points) + number.reshape(-1, 6)], axis=1)
+    return points, cells
 
 
 @pytest.mark.parametrize("ending", ["inp", "vtu"])
