@@ -115,7 +115,12 @@ def validate(
         # By way of JSON, whose strict mode reads lists as tuples and text as paths; TOML has no types for these either.
         return record.model_validate_json(json.dumps(data, default=str), context=context)
     except ValidationError as error:
-        problems = [_describe(item, record, data, space) for item in error.errors(include_url=False)]
+        items = error.errors(include_url=False)
+        within = [item["loc"] for item in items]
+        whole = [  # entries that are wrong count as missing ones, too
+            item for item in items if item["type"] != "too_short" or all(loc[:-1] != item["loc"] for loc in within)
+        ]
+        problems = [_describe(item, record, data, space) for item in whole]
         raise InputError("\n".join(f"{path}: {line}" for line in _merge(problems))) from None
 
 
@@ -126,6 +131,8 @@ def plain(value: Any, functions: dict[str, object] | None = None) -> Any:  # noq
     """
     if isinstance(value, Mapping):
         return {key: plain(item, functions) for key, item in value.items() if item is not None}
+    if isinstance(value, np.longdouble):  # whose tolist() is itself
+        return float(value)
     if isinstance(value, np.ndarray | np.generic):
         return plain(value.tolist(), functions)
     if isinstance(value, list | tuple):
@@ -189,7 +196,7 @@ def _describe(item: ErrorDetails, record: type[BaseModel], data: dict[str, Any],
         return _Problem(key, str(context["error"]), "")
     if kind == "extra_forbidden":
         if refusal := _refusal(record, loc, space):
-            return _Problem(key_path(loc[:-1], data, kind=""), refusal, "")
+            return _Problem(key_path(loc[:-1], data, kind=""), "", refusal)
         known = _known_keys(_alternatives(record, loc[:-1])[0], space)
         return _Problem(
             key,

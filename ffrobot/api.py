@@ -60,7 +60,11 @@ def solve(
     from .run.solve import solve_scene
     from .run.watcher import Watcher
     from .scene.load import load_scene
+    from .scene.scene import Scene
 
+    if not isinstance(scene, str | PathLike | Scene):
+        found = type(scene).__name__
+        raise InputError(f"solve: scene: expected a scene file, or a scene from make_scene(**keys), found {found}")
     path = None if output is None else Path(output)
     inputs = files_of(Path(scene)) if isinstance(scene, str | PathLike) else files_of_tables(scene.path, scene.text)
     if path is not None:

@@ -299,3 +299,29 @@ def test_progress_in_a_log_is_a_line_now_and_then(capsys, monkeypatch):
     lines = capsys.readouterr().err.splitlines()
     told = [line.partition(" (")[0] for line in lines]
     assert told == ['ffrobot: analysis "inverse"', 'ffrobot: analysis "inverse", 0.25 of 1']
+
+
+def test_numbers_of_numpy_with_more_digits(folder):
+    """`tolist` leaves them as they are."""
+    payload = [{"point": "arm.tip", "mass": np.longdouble("0.5"), "center": np.array([0.1, 0.0], np.longdouble)}]
+    assert swing(folder, payload=payload).payload == swing(folder, payload=[payload[0] | {"mass": 0.5}]).payload
+
+
+@pytest.mark.parametrize(
+    ("wrong", "says"),
+    [
+        ({"method": "SLSQP"}, r'method: expected "auto", "slsqp", .* or "all", found \'SLSQP\''),
+        ({"vary": "a=1:2"}, "vary: expected a list of texts, found 'a=1:2'"),
+        ({"starts": 1.5}, "starts: expected a whole number, found 1.5"),
+        ({"processes": 0}, "processes: 0 is not in the range"),
+        ({"tolerance": float("nan")}, "tolerance: nan is not a finite number"),
+    ],
+)
+def test_arguments_of_another_kind(wrong, says):
+    with pytest.raises(ffrobot.InputError, match=f"^optimise: {says}"):
+        ffrobot.optimise("scene.toml", **{"vary": ["a=1:2"]} | wrong)
+
+
+def test_tables_are_no_scene():
+    with pytest.raises(ffrobot.InputError, match=r"expected a scene file, or a scene .*, found dict"):
+        ffrobot.solve({"name": "x"})

@@ -315,7 +315,13 @@ class SampledAnalysis(ActuatedAnalysis):
                 yield f"disturbance no. {k}: {component}", function, 0
 
     def replay_problems(self, source: Analysis) -> Iterator[str]:
-        """Whether `source` found what is to be fed forward."""
+        """Whether `source` found what is to be fed forward, and is there when a controller is designed."""
+        for k, record in enumerate(self.controller, 1):
+            if isinstance(record, Lqr) and record.time > source.last_time * (1 + 1e-9):
+                yield (
+                    f'controller no. {k}: time: expected at most {source.last_time!r}, where "{source.name}" ends,'
+                    f" found {record.time!r}"
+                )
         if self.feed_forward == "joints+pzt" and source.applicable and self.feed_forward not in source.applicable:
             yield (
                 f'feed_forward: expected "joints" with an analysis of kind "{source.kind}", found "{self.feed_forward}"'

@@ -12,11 +12,12 @@ import click
 
 from ..common.outputs import protected
 from ..common.parallel import processors
+from ..design.studies import FiniteRange
 from ..present.logs import FILE
 
 F = TypeVar("F", bound=Callable[..., object])
 
-POSITIVE = click.FloatRange(0.0, min_open=True)
+POSITIVE = FiniteRange(0.0, min_open=True)
 
 
 def processes_option(text: str) -> Callable[[F], F]:

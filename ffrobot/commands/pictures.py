@@ -7,7 +7,10 @@ from pathlib import Path
 from typing import Any
 
 import click
+from click.core import ParameterSource
 
+from ..common.errors import InputError
+from ..design.studies import FiniteRange
 from ..present.logs import FILE
 
 MOST = 100_000  # frames of a view
@@ -15,12 +18,12 @@ MOST = 100_000  # frames of a view
 
 def movie_options(command: Callable[..., Any]) -> Callable[..., Any]:
     """Which movie, of what, and how."""
-    seconds = click.FloatRange(0.1, 600.0)
+    seconds, scale = FiniteRange(0.1, 600.0), FiniteRange(0.0)
     for option in (
         click.option("--movie", metavar="FILE.gif|.mp4", type=FILE, help="Movie of the motion, and no other file."),
         click.option("--seconds", metavar="S", type=seconds, default=8.0, help="Duration of the movie [8]."),
         click.option("--analysis", metavar="NAME", help="Analysis of the movie, or of the grid."),
-        click.option("--scale", metavar="S", type=float, help="Scale of deflections [chosen for visibility]."),
+        click.option("--scale", metavar="S", type=scale, help="Scale of deflections [chosen for visibility]."),
     ):
         command = option(command)
     return command
@@ -56,6 +59,9 @@ def plot(
         if movie is not None:
             _tell([movie], write_motion(file, movie, MovieOptions(**options)))
             return
+        source = click.get_current_context().get_parameter_source
+        if given := [name for name in options if source(name) is not ParameterSource.DEFAULT]:
+            raise InputError(f"--{given[0]}: expected it with --movie only, found figures")
         paths = plot_file(file, output or file.with_suffix(".figures"), formats.lower().split(","), only)
     _tell(paths)
 
@@ -66,7 +72,7 @@ def plot(
 @click.option(
     "--frames", metavar="N", type=click.IntRange(1, MOST), default=201, help="Largest number of time steps [201]."
 )
-@click.option("--time", metavar="SECONDS", type=float, help="Time of the picture [largest deflections].")
+@click.option("--time", metavar="SECONDS", type=FiniteRange(), help="Time of the picture [largest deflections].")
 @click.option("--pictures/--no-pictures", default=None, help="PNG pictures [if PyVista can draw].")
 @movie_options
 def view(

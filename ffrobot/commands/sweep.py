@@ -52,7 +52,7 @@ def sweep(
     from ..present.console import summary_console
     from ..present.progress import Display
     from ..run.inputs import files_of
-    from ..sweep import drop_results, forget_failures, plan_sweep, print_table, run_sweep, stale_rows
+    from ..sweep import drop_results, forget_failures, missing_columns, plan_sweep, print_table, run_sweep, stale_rows
 
     folder = output or scene_file.with_suffix(".sweep")
     protect(files_of(scene_file))
@@ -65,6 +65,8 @@ def sweep(
         rows = run_sweep(plan, processes, display)
     if not is_first():
         return
+    for line in missing_columns(rows, plan.collect, plan.folder):
+        click.echo(f"ffrobot: {line}", err=True)
     if not keep:
         drop_results(plan)
     print_table(plan.table, plan.keys, rows, plan.collected, summary_console())

@@ -25,6 +25,7 @@ from ..mbs.joints.joints import JOINT_TYPES
 from ..results.datasets import COLUMN
 from ..results.file import Results
 from ..results.meanings import meaning
+from ..results.peaks import POWER as PEAK_POWER
 from ..sweep.runs import is_vector
 
 
@@ -40,7 +41,7 @@ class Reading:
         column, sign: of its history, and of the value there.
         mode: of a frequency, the family and its number in it.
         coarse: of a peak, its value by every second output; NaN of all else.
-        between: of a peak, the largest value of all times that the run looked at; NaN where that is not known.
+        missed_by: of a peak between outputs, the largest value near them; NaN of all else.
     """
 
     value: float
@@ -51,15 +52,20 @@ class Reading:
     sign: float = 1.0
     mode: str = ""
     coarse: float = float("nan")
-    between: float = float("nan")
+    missed_by: float = float("nan")
+
+    @property
+    def is_between(self) -> bool:
+        """Whether it is a peak that outputs miss: it has no place, and is compared with those of other runs."""
+        return bool(np.isfinite(self.missed_by))
 
     @property
     def remark(self) -> str:
         """That outputs miss a peak; empty where they do not."""
-        if not self.between > self.value * (1.0 + MISSED):
+        if not self.is_between:
             return ""
-        found = f"found {self.value:.6g} near outputs, {self.between:.6g} between them"
-        return f"{found}: a smaller output_step resolves the peak"
+        found = f"found {self.missed_by:.6g} near outputs, {self.value:.6g} between them, which counts"
+        return f"{found}: with a smaller output_step histories have the peak, too"
 
 
 @dataclass(frozen=True)
@@ -102,7 +108,7 @@ POWER = "power"
 """What joints have besides their datasets: the power of their motors, W."""
 
 SAME = 1e-6  # of an output step: times that are one
-MISSED = 1e-3  # of a peak: a larger value between outputs that is worth a note
+MISSED = 1e-3  # of a peak: how much larger values between outputs are that count as the peak
 SUPPORT = 6  # outputs that a value between outputs is made from
 
 
@@ -155,7 +161,8 @@ def read_history(results: Results, name: str, option: str) -> History:
         )
     is_power = found.endswith(f"/{POWER}")
     values = _power(results, found) if is_power else results.data(found)
-    peaks = np.atleast_1d(np.nan if is_power else results.attributes(found).get("peak", np.nan))
+    about = results.attributes(found.removesuffix(f"/{POWER}"))
+    peaks = np.atleast_1d(about.get(PEAK_POWER if is_power else "peak", np.nan))
     if match:
         k = int(match["column"])
         if k >= values.shape[1]:
@@ -229,16 +236,21 @@ class Peak(Goal):
     def read(self, results: Results) -> Reading:
         """The value, when it is reached, and in which column."""
         history = self._history(results)
-        k, column = _largest(self._seen(history).values)
+        seen = self._seen(history)
+        k, column = _largest(seen.values)
         sign = -1.0 if history.values[k, column] < 0.0 else 1.0
         _, time = top_at(history.time, history.values[:, column], k)
         edge: Literal["", "first", "last"] = "first" if k == 0 else "last" if k == history.time.size - 1 else ""
         value, coarse = (sign * history.at(time, column, every) for every in (1, COARSE))
-        return Reading(value, history.unit, time, edge, column, sign, coarse=coarse, between=history.largest)
+        if seen.largest > value * (1.0 + MISSED):
+            return Reading(seen.largest, history.unit, missed_by=value)
+        return Reading(value, history.unit, time, edge, column, sign, coarse=coarse)
 
     def follow(self, results: Results, nominal: Reading) -> Followed:
-        """At the time, in the column and with the sign of the `nominal` peak."""
+        """At the time, in the column and with the sign of the `nominal` peak; of one between outputs the largest."""
         history = self._history(results)
+        if nominal.is_between:
+            return Followed(float(np.fmax(history.largest, np.abs(history.values).max())))
         time = {"first": history.time[0], "last": history.time[-1]}.get(nominal.edge, nominal.time)
         if not history.time[0] <= time <= history.time[-1]:
             return Followed(float("nan"), f"the run ends at t = {history.time[-1]:g} s")
@@ -280,14 +292,17 @@ class PartOfPeak(Peak):
 
     def _seen(self, history: History) -> History:
         mask = np.sum([window.mask(history) for window in self.windows], axis=0)
-        return replace(history, values=history.values * (1.0 - mask if self.outside else mask))
+        return replace(history, values=history.values * (1.0 - mask if self.outside else mask), largest=np.nan)
 
 
 def parts(peak: Peak, results: Results) -> tuple[Peak, ...]:
     """Windows of local peaks that are at least `NEAR` the largest, the `MOST` highest, and what they leave.
 
-    The least values between two of them part their windows, so that each local peak may move within its own.
+    The least values between two of them part their windows, so that each local peak may move within its own. A peak
+    that outputs miss stays whole.
     """
+    if peak.read(results).is_between:
+        return (peak,)
     history = peak._history(results)
     size = np.abs(history.values)
     found = [(k, column) for column in range(size.shape[1]) for k in _local(size[:, column], NEAR * float(size.max()))]

@@ -4,14 +4,27 @@
 """
 
 import inspect
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import wraps
-from typing import TYPE_CHECKING, Annotated, Literal, ParamSpec, TypedDict, TypeVar, Unpack
+from math import isfinite
+from typing import (
+    TYPE_CHECKING,
+    Annotated,
+    Any,
+    Literal,
+    ParamSpec,
+    TypedDict,
+    TypeVar,
+    Unpack,
+    get_args,
+    get_origin,
+)
 
-from click import BadParameter, FloatRange, IntRange, ParamType
+from click import BadParameter, Context, FloatRange, IntRange, Parameter, ParamType
 
-from ..common.errors import InputError
+from ..common.errors import InputError, either
 from ..common.files import AnyPath
+from ..common.tables import shown
 
 if TYPE_CHECKING:
     from ..run.watcher import Watcher
@@ -27,31 +40,64 @@ R = TypeVar("R")
 Method = Literal["auto", "slsqp", "trust-constr", "differential-evolution", "all"]
 
 
+class FiniteRange(FloatRange):
+    """Numbers from one bound to another, or beyond one; no NaN, no infinity."""
+
+    def convert(self, value: Any, param: Parameter | None, ctx: Context | None) -> Any:  # noqa: ANN401 (as of click)
+        """The number."""
+        found = super().convert(value, param, ctx)
+        if not isfinite(found):
+            self.fail(f"{found} is not a finite number.", param, ctx)
+        return found
+
+    def _describe_range(self) -> str:
+        return "" if self.min is None and self.max is None else super()._describe_range()
+
+
 class RunOptions(TypedDict, total=False):
     """What all studies take besides."""
 
-    processes: int
+    processes: Annotated[int, IntRange(1, 1000)]
     retry: bool
     allow_python: Sequence[AnyPath]
     watcher: "Watcher | None"
 
 
 def _checked(function: Callable[P, R]) -> Callable[P, R]:
-    """Raise `InputError` for numbers out of the ranges of a signature."""
+    """Raise `InputError` for what a signature does not have: numbers out of ranges, other choices, text for lists."""
     signature = inspect.signature(function)
 
     @wraps(function)
     def call(*args: P.args, **given: P.kwargs) -> R:
-        for name, value in signature.bind(*args, **given).arguments.items():
-            for about in getattr(signature.parameters[name].annotation, "__metadata__", ()):
-                try:
-                    if isinstance(about, ParamType) and value is not None:
-                        about.convert(value, None, None)
-                except BadParameter as error:
-                    raise InputError(f"{function.__name__}: {name}: {error.message}") from None
+        bound = signature.bind(*args, **given).arguments
+        options = bound.get("how", {})
+        annotations = {name: signature.parameters[name].annotation for name in bound.keys() - {"how"}}
+        annotations |= {name: RunOptions.__annotations__[name] for name in options.keys() & {"processes"}}
+        for name, annotation in annotations.items():
+            if problem := _problem(annotation, {**bound, **options}[name]):
+                raise InputError(f"{function.__name__}: {name}: {problem}")
         return function(*args, **given)
 
     return call
+
+
+def _problem(annotation: object, value: object) -> str:
+    """What is wrong with the value of a parameter; empty if nothing is."""
+    kind, *about = get_args(annotation) if get_origin(annotation) is Annotated else (annotation,)
+    if get_origin(kind) is Literal and value not in get_args(kind):
+        return f"expected {either(get_args(kind))}, found {value!r}"
+    texts = list(value) if isinstance(value, Iterable) and not isinstance(value, str | Mapping) else [None]
+    if get_origin(kind) is Sequence and not all(isinstance(one, str) for one in texts):
+        return f"expected a list of texts, found {shown(repr(value))}"
+    if isinstance(value, float) and kind is int:
+        return f"expected a whole number, found {value:g}"
+    for one in about:
+        try:
+            if isinstance(one, ParamType) and value is not None:
+                one.convert(value, None, None)
+        except BadParameter as error:
+            return error.message
+    return ""
 
 
 Responses = Annotated[Sequence[str], "RESPONSE"]
@@ -59,13 +105,13 @@ Spreads = Annotated[Sequence[str], "KEY=SPREAD"]
 Ranges = Annotated[Sequence[str], "KEY=LOW:HIGH"]
 Limits = Annotated[Sequence[str], '"RESPONSE <= NUMBER"']
 MostRuns = Annotated[int, IntRange(1, 100_000)]
-Tolerance = FloatRange(1e-10, 1e-3)
+Tolerance = FiniteRange(1e-10, 1e-3)
 
 
 @_checked
 def sensitivity(
     scene: AnyPath, of: Responses, to: Annotated[Sequence[str], "KEY,KEY …"], output: AnyPath | None = None, *,
-    step: Annotated[float, FloatRange(1e-6, 0.2)] = 0.01, tolerance: Annotated[float | None, Tolerance] = None,
+    step: Annotated[float, FiniteRange(1e-6, 0.2)] = 0.01, tolerance: Annotated[float | None, Tolerance] = None,
     **how: Unpack[RunOptions],
 ) -> "Sensitivity":  # fmt: skip
     """Derivatives of scalar responses by keys of a scene and its links: `ffrobot sensitivity`.

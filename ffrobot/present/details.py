@@ -13,6 +13,7 @@ from ..mbs.analysis.outcome import Details, Outcome
 from ..mbs.model.body import Body
 from ..mbs.model.model import path_errors
 from ..mbs.model.truncation import modes_kept
+from ..mbs.solve.zero_dynamics import is_unstable
 from ..results.file import Results
 from ..results.tables import Cells, analysis_cells, voltage_cells
 from ..run.mode_search import ModeChoice
@@ -95,7 +96,10 @@ def _inversion(run: Outcome, around: AroundPath) -> str:
     left = f"largest error of the path {error:.2g}"
     if is_minimum_phase(linear):
         output = "the path's own points" if factor == 1 else f"the output with {factor:.2g} times the vibration"
-        return f"{output}: minimum phase, integrated forward; {left}"
+        phase = "minimum phase"
+        if is_unstable(linear.zeros).any():
+            phase += f" at rest, zeros of up to {linear.zeros.real.max():.2g} 1/s on the way grow too little to matter"
+        return f"{output}: {phase}, integrated forward; {left}"
     return (
         f"not minimum phase, zeros at {describe_zeros(linear)} 1/s; stable inversion with"
         f" {around.pre_actuation:.3g} s of pre- and {around.post_actuation:.3g} s of post-actuation"

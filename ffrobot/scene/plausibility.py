@@ -12,6 +12,7 @@ import numpy as np
 from ..common.errors import InputError
 from ..fe_models.link_file import read_link
 from ..fe_models.link_records import BeamLink, Link
+from ..mbs.scene.bodies import ROUNDING, RigidBody, tensor
 
 if TYPE_CHECKING:  # remarks on links do without the records of scenes
     from .scene import Scene
@@ -24,6 +25,11 @@ SLOWEST, FASTEST = 20.0, 5e4  # m/s, √(E/ρ): silicone rubber has 30, diamond 
 SLOW, QUICK = 0.02, 1e5  # Hz: the first frequency of a link that is clamped at its root
 HEAVIEST_BODY = 1e5  # kg
 CARRIED = 100.0  # times its own mass: no robot carries more
+WIDEST = 3.0  # radius of gyration over the length of all bodies: kg·cm² in place of kg·m² is a factor of 100
+HEAVIEST_ROTOR = 10.0  # kg·m²: motors of 100 kW have less
+HEAVIEST_FALL = 100.0  # m/s²: Jupiter has 25
+OVERDAMPED = 1.0  # damping ratio: links have less
+SOFTEST_PATCH, LARGEST_D31 = 1e7, 1e-7  # Pa, m/V: polymers have 2e9, single crystals 1e-9
 RESTING = 3.0  # how many times longer than its path a run may take
 SAMPLES = 201
 OUTPUT = 5e3  # bytes for each body and output, while results are evaluated: a link of four modes in space takes 5.5e3
@@ -38,14 +44,18 @@ def remarks(scene: Scene) -> Iterator[str]:
                 links[body.name] = read_link(body.link)
                 yield from remarks_on_link(links[body.name], f'link "{body.name}"')
         elif body.rigid is not None:
-            places = [body.rigid.center, *body.rigid.points.values()]
-            yield from _long(max(float(np.linalg.norm(place)) for place in places), f'body "{body.name}"')
+            yield from _long(_size(body.rigid), f'body "{body.name}"')
+    if (fall := float(np.linalg.norm(scene.gravity))) > HEAVIEST_FALL:
+        yield f"gravity of {fall:g} m/s²: units are SI; is it in mm/s²?"
+    yield from _joints(scene)
     for tool in scene.tool:
         label = f'tool "{tool.name}"'
         yield from _long(float(np.linalg.norm(tool.at)), label)
         if (angle := max(map(abs, (*tool.rpy, tool.angle)))) > TURNS / 2:
             yield f"{label} is turned by {angle:g} rad: angles are in rad; is it in degrees (45*deg)?"
     yield from _masses(scene, links)
+    yield from _inertias(scene, links)
+    yield from _patches(scene, links)
     yield from _angles(scene)
     yield from _times(scene)
     for analysis in scene.analysis:
@@ -55,8 +65,10 @@ def remarks(scene: Scene) -> Iterator[str]:
 
 
 def remarks_on_link(link: Link, label: str) -> Iterator[str]:
-    """Of a link, which `label` names: its length, its material."""
+    """Of a link, which `label` names: its length, its material, its damping."""
     yield from _long(link.geometry.length, label)
+    if (ratio := float(np.max(link.damping.ratio or 0.0))) >= OVERDAMPED:
+        yield f"{label}: a damping ratio of {ratio:g} is above critical damping, 1: is it in per cent?"
     density, modulus = link.material.density, float(np.max(link.material.youngs_modulus))
     if not LIGHTEST <= density <= HEAVIEST:
         yield f"{label}: density {density:g} kg/m³: units are SI; is it in g/cm³ or t/mm³?"
@@ -105,6 +117,70 @@ def _masses(scene: Scene, links: Mapping[str, Link]) -> Iterator[str]:
             )
 
 
+def _size(rigid: RigidBody) -> float:
+    """How far a point of a rigid body is from its origin, m."""
+    return max(float(np.linalg.norm(place)) for place in (rigid.center, *rigid.points.values()))
+
+
+def _inertias(scene: Scene, links: Mapping[str, Link]) -> Iterator[str]:
+    """Radii of gyration beyond the robot, and moments of inertia of an interface that no body has."""
+    lengths = [links[body.name].geometry.length for body in scene.body if body.name in links]
+    lengths += [_size(body.rigid) for body in scene.body if body.rigid is not None]
+    of_bodies = [(f'body "{one.name}"', one.rigid.mass, one.rigid.inertia) for one in scene.body if one.rigid]
+    of_payloads = [(f'payload at "{one.point}"', one.mass, one.inertia) for one in scene.payload if one.mass]
+    for label, mass, inertia in (*of_bodies, *of_payloads):
+        radius = float(np.sqrt(np.linalg.eigvalsh(tensor(inertia)).max() / mass))
+        if radius > WIDEST * sum(lengths) > 0.0:
+            yield f"{label}: its radius of gyration is {radius:.3g} m: units are SI; is its inertia in kg cm² or g mm²?"
+    for body, link in links.items() if scene.space == "spatial" else ():
+        for record in link.interface:
+            if max(record.inertia) > (1.0 + ROUNDING) * sum(record.inertia) / 2:
+                moments = ", ".join(f"{moment:g}" for moment in record.inertia)
+                yield (
+                    f'link "{body}": interface "{record.name}": no body has the moments of inertia {moments} kg m²: one'
+                    " is larger than the sum of the others"
+                )
+
+
+def _joints(scene: Scene) -> Iterator[str]:
+    """Places, rotors, ranges and first angles of joints."""
+    for joint in scene.joint:
+        label = f'joint "{joint.name}"'
+        if (away := float(np.linalg.norm(joint.at))) > LONGEST:
+            yield f"{label} is {away:g} m from the origin: units are SI; is this in mm?"
+        if (rotor := getattr(joint, "rotor_inertia", 0.0)) > HEAVIEST_ROTOR:
+            yield f"{label}: a rotor_inertia of {rotor:g} kg m²: units are SI; is it in kg cm² or g cm²?"
+        if joint.type != "revolute":
+            continue
+        for low, high in joint.position_limits:
+            if TURNS < max(abs(low), abs(high)) < np.inf:
+                yield f"{label}: a position_limit of {low:g} … {high:g} rad is many turns: is it in degrees (180*deg)?"
+        first = float(np.abs(scene.initial.joints.get(joint.name, 0.0)).max())
+        if scene.space == "spatial" and first > TURNS:
+            yield f"{label} begins at {first:g} rad: angles are in rad; is it in degrees (45*deg)?"
+    for payload in scene.payload:
+        yield from _long(float(np.linalg.norm(payload.center)), f'payload at "{payload.point}": center')
+
+
+def _patches(scene: Scene, links: Mapping[str, Link]) -> Iterator[str]:
+    """Patches larger than their face, or of another unit."""
+    for layout in scene.pzt:
+        label = f'pzt "{layout.label}"'
+        if layout.modulus < SOFTEST_PATCH:
+            yield f"{label}: a modulus of {layout.modulus:g} Pa: units are SI; is it in GPa?"
+        if abs(layout.d31) > LARGEST_D31:
+            yield f"{label}: a d31 of {layout.d31:g} m/V: units are SI; is it in pm/V?"
+        if not isinstance(link := links.get(layout.body), BeamLink):
+            continue
+        extents = max(one.height for one in link.sections), max(one.width for one in link.sections)
+        thick, wide = extents if layout.normal == "y" else extents[::-1]
+        face = np.pi * wide if link.shapes[0].shape != "rectangle" else wide
+        if layout.width > face * (1.0 + ROUNDING):
+            yield f"{label}: patches {layout.width:g} m wide on a face of {face:.3g} m: units are SI; is this in mm?"
+        if (layers := layout.layers * layout.thickness) > thick:
+            yield f"{label}: patches {layers:g} m thick on a link of {thick:g} m: units are SI; is this in mm?"
+
+
 def remarks_on_memory(outputs: int, bodies: int, available: float, label: str) -> Iterator[str]:
     """Of an analysis with so many outputs, where they may take more than half of the `available` bytes."""
     if (needed := outputs * bodies * OUTPUT) > available / 2:
@@ -130,19 +206,24 @@ def _long(length: float, label: str) -> Iterator[str]:
 def _angles(scene: Scene) -> Iterator[str]:
     """Paths of angles that come to rest many turns away, and of poses more than half a turn apart."""
     turning = {joint.name for joint in scene.joint if joint.type == "revolute"}
+    sliding = {joint.name for joint in scene.joint if joint.type == "prismatic"}
     for one in scene.trajectory:
         if one.largest_turn_of_poses > np.pi:
             yield (
                 f'trajectory "{one.name}": an angle in via changes by {np.degrees(one.largest_turn_of_poses):.4g}° from'
                 " one pose to the next: the section turns the shorter way, half a turn at most; add poses between"
             )
+        last = max((analysis.last_time for analysis in scene.analysis if analysis.follows_trajectories), default=0.0)
+        if one.joint in sliding:
+            for function in one.components.values():
+                value = np.abs(function.sample(np.linspace(0.0, last, SAMPLES))[0])
+                yield from _long(float(np.nan_to_num(value).max()), f'the way of trajectory "{one.name}"')
         if (
             getattr(one, "angle", None) is None
             and one.joint not in turning
             and getattr(one, "motor", None) not in turning
         ):
             continue
-        last = max((analysis.last_time for analysis in scene.analysis if analysis.follows_trajectories), default=0.0)
         for function in one.components.values():
             value, rate, _ = np.abs(function.sample(np.linspace(0.0, last, SAMPLES)))
             spins = rate[-1] > SPINNING * rate.max() > 0

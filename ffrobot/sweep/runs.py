@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from ..common.arrays import Array
-from ..common.errors import InputError
+from ..common.errors import InputError, did_you_mean
 from ..common.files import write_atomically
 from ..common.locks import is_running, this_process
 from ..results.file import Results
@@ -148,8 +148,31 @@ def _quantities(path: Path, collect: Sequence[str]) -> dict[str, float]:
                 found[f"{name} max"] = _reduce(results, name, "max")
         for request in collect:
             name, reduction = collected(request)
-            found[f"{name} {reduction}"] = _reduce(results, name, reduction)
+            found[f"{name} {reduction}"] = _reduce(results, _meant(results, name), reduction)
     return found
+
+
+def _meant(results: Results, name: str) -> str:
+    """The dataset, also with dots for "/", and of the first analysis without its name; `name` where there is none."""
+    wanted, bracket, column = name.partition("[")
+    known = {dataset.replace("/", "."): dataset for dataset in results}
+    dotted = wanted.replace("/", ".")
+    found = known.get(dotted) or known.get(".".join((*results.analyses[:1], dotted)))
+    return name if found is None else f"{found}{bracket}{column}"
+
+
+def missing_columns(rows: Sequence[Row], requests: Sequence[str], folder: Path) -> Iterator[str]:
+    """What `--collect` asks for and no completed run in `folder` has, a line each."""
+    completed = [row for row in rows if row.status == "completed"]
+    for request in requests:
+        name, reduction = collected(request)
+        if completed and all(np.isnan(row.quantities.get(f"{name} {reduction}", np.nan)) for row in completed):
+            known: list[str] = []
+            for path in (folder / "runs").glob(f"*/{RESULTS}"):
+                with suppress(InputError), Results(path) as results:
+                    known = known or list(results)
+            near = did_you_mean(name, known)
+            yield f'--collect: expected the name of a dataset, found no "{name}" in any run{near}'
 
 
 def _standard(results: Results, analysis: str) -> Iterator[str]:

@@ -103,6 +103,9 @@ def plan_sweep(
     """
     check_folder(folder)
     variations = tuple(parse_variation(text) for text in vary)
+    keys = [key for variation in variations for key in variation.keys]
+    if twice := next((key for key in keys if keys.count(key) > 1), None):
+        raise InputError(f"--vary: expected every key once, found {'.'.join(twice)} several times")
     for request in collect:
         collected(request)
     points = tuple(grid(variations) if sample is None else latin_hypercube(variations, sample, seed))

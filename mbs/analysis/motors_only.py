@@ -242,17 +242,20 @@ def outcome_along(
 
 def _warnings(inversion: Inversion, run: Outcome) -> tuple[str, ...]:
     """How far a redefined output leaves the path itself."""
-    texts = []
-    if not run.failed and inversion.servo.factor < 1:
-        off = max(
-            float(np.abs(of).max(initial=0.0)) for of in path_errors(inversion.servo.model, run.time, run.q).values()
-        )
-        if off > PATH_TOLERANCE:
-            texts.append(
-                f"a point with {inversion.servo.factor:.2g} of the vibration follows the path: that of the trajectory"
-                f" is off by up to {off:.3g} (m or rad)"
-            )
-    return tuple(texts)
+    if run.failed or inversion.servo.factor == 1:
+        return ()
+    held = inversion.servo.model
+    errors = {name: float(np.abs(off).max(initial=0.0)) for name, off in path_errors(held, run.time, run.q).items()}
+    farthest = max(held.scene.trajectory, key=lambda path: errors[path.name])
+    if errors[farthest.name] <= PATH_TOLERANCE:
+        return ()
+    joint = next((one for one in held.scene.joint if one.name == farthest.joint), None)
+    turns = farthest.angle is not None if joint is None else joint.units == ("rad",)
+    unit = "m or rad" if farthest.orientation is not None else "rad" if turns else "m"
+    return (
+        f"a point with {inversion.servo.factor:.2g} of the vibration follows the path: that of trajectory"
+        f' "{farthest.name}" is off by up to {errors[farthest.name]:.3g} {unit}',
+    )
 
 
 def choose_output(make: Callable[[float], Servo], analysis: MotorsOnly) -> tuple[Servo, Linearisation]:

@@ -82,11 +82,12 @@ def in_order(outputs: Array, samples: Array) -> Indices:
 def stops(times: Array, paths: Iterable[Trajectory], loads: Iterable[TimeFunction]) -> Array:
     """(n,) s within `times`, at which steps of integrations end.
 
-    Steps look at paths and loads at their stages alone, and might pass a pulse. So they end where conditions of loads
-    change, t < 0.1 at 0.1 s, and along parts of brief pieces in which a path moves far.
+    Steps look at paths and loads at their stages alone, and might pass a pulse. So they end where conditions of paths
+    and loads change, t < 0.1 at 0.1 s, and along parts of brief pieces in which a path moves far.
     """
     duration, found = times[-1] - times[0], [np.array(load.switches()) for load in loads]
     for path in paths:
+        found += [np.array(target.switches()) for target in targets_of(path)]
         if path.path is not None and duration > 0.0:
             breaks = path.path.breaks
             way = np.abs(np.diff(path.path.sample(breaks), axis=0)).max(axis=1, initial=0.0)
@@ -102,9 +103,9 @@ def path_times(times: Array, paths: Iterable[Trajectory], end: float) -> Array:
     paths = list(paths)
     found = _with_others(times, np.linspace(times[0], times[-1], FEWEST + 1))
     for path in paths:
-        if path.path is not None:
-            breaks = path.path.breaks
-            found = _with_others(found, breaks[(breaks > times[0]) & (breaks < times[-1])])
+        breaks = np.zeros(0) if path.path is None else path.path.breaks
+        breaks = np.unique(np.concatenate([breaks, *(target.switches() for target in targets_of(path))]))
+        found = _with_others(found, breaks[(breaks > times[0]) & (breaks < times[-1])])
     moving = (found >= 0.0) & (found <= end)
     inside = found[moving]
     if len(inside) > 1:  # a run may end before the path begins

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import math
 import re
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -26,6 +27,7 @@ SINCE_1970 = ((1e17, 1e-9), (1e14, 1e-6), (1e11, 1e-3), (1e8, 1.0))
 OF_A_JOINT = ("value", "{0}", "{0}.coordinate", "{0}.position", "position", "positions", "angle")
 """Names of the column of a joint, {0} being the joint's, the first that is there."""
 MANY, GAP = 20, 20.0  # intervals of a table with a usual step; how many times this a gap is
+ABRUPT = 3.0  # times the accelerations of a record: what its spline needs next to an end, where it rests
 SAMPLES, LOST = 6, 2.5  # the same where at least three of four steps are equal, as those of records are
 
 
@@ -91,7 +93,7 @@ def load_waypoints(path: Path) -> Waypoints:
         )
     if len(times) < 2:
         raise InputError(f"{path}: expected at least 2 waypoints, found {len(times)}")
-    remarks += _gaps(times, np.any(np.diff(values, axis=0), axis=1))
+    remarks += [*_gaps(times, np.any(np.diff(values, axis=0), axis=1)), *_moving_ends(times, values)]
     return Waypoints(tuple(columns[1:]), times, values, tuple(f"{path.name}: {remark}" for remark in remarks))
 
 
@@ -122,6 +124,23 @@ def _gaps(times: Array, moves: Booleans) -> list[str]:
         f"no rows between t = {times[k]:g} and {times[k + 1]:g} s, where others are {usual:.3g} s apart: the path there"
         " is the spline's alone"
     ]
+
+
+def _moving_ends(times: Array, values: Array) -> Iterator[str]:
+    """Remarks on a record that moves at an end, by a cubic through four rows there: its spline rests there."""
+    if len(times) < MANY:
+        return
+    steps = np.diff(times)[:, None]
+    accelerations = np.abs(np.diff(np.diff(values, axis=0) / steps, axis=0) / (0.5 * (steps[1:] + steps[:-1])))
+    for at, ends, step in ((times[0], slice(0, 4), steps[0, 0]), (times[-1], slice(-4, None), steps[-1, 0])):
+        rates = np.abs(np.polyfit((times[ends] - at) / step, values[ends], 3)[-2]) / step
+        abrupt = rates / step > ABRUPT * accelerations.max(axis=0)
+        if abrupt.any():
+            rate = rates[abrupt].max()
+            yield (
+                f"rows move at t = {at:g} s by {rate:.3g} per s: the path is at rest there, and changes to that speed"
+                f" within {step:.3g} s"
+            )
 
 
 def _from_zero(part: Piecewise, first: Array) -> Array:

@@ -63,7 +63,7 @@ def _unseen(path: Trajectory, times: Array, analysis: TimedAnalysis) -> Iterator
             yield (
                 f'trajectory "{path.name}": moves between outputs, at t = {between[k]:.4g} s with a rate of'
                 f" {rate[k]:.4g}, but at outputs at most {at_outputs:.4g} (SI units). Peaks and verdicts include it,"
-                f" histories and figures do not; use an output_step of {_enough(target, between, k):.1g} s does"
+                f" histories and figures do not; an output_step of {_enough(target, between, k):.1g} s shows it"
             )
             return
 

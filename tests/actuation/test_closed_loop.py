@@ -275,6 +275,7 @@ def test_slow_sampling_is_warned_of():
         ({"controller": [{"kind": "python", "python": "nowhere.py"}]}, "FILE.py:FUNCTION"),
         ({"feed_forward": "joints+pzt"}, "feed_forward"),
         ({"apply": "joints"}, 'expected the key "apply" only in kind = "forward", found kind = "closed-loop"'),
+        ({"controller": [{"kind": "lqr", "time": 7.0}]}, "controller no. 1: time: expected at most .* ends, found 7.0"),
         ({"tip": "w.tpi"}, "w.tpi"),
         ({"disturbance": [{"joint": "O", "moment": "1"}]}, "disturbances at points"),
     ],
@@ -282,6 +283,19 @@ def test_slow_sampling_is_warned_of():
 def test_bad_keys_are_refused(keys, expected):
     with pytest.raises(InputError, match=expected):
         prepare_scene(wheel(loop(**keys)))
+
+
+def test_keys_of_other_kinds_are_named_one_by_one():
+    """Not those that an actuation would bring along; of a list with a wrong entry nothing else."""
+    keys = {"actuation": "inverse", "times": [-1.0], "sample_time": 1.0}
+    with pytest.raises(InputError) as caught:
+        prepare_scene(wheel({"name": "c", "kind": "linear", "about": "inverse", **keys}))
+    lines = [line.partition('analysis "c": ')[2] for line in str(caught.value).splitlines()]
+    assert lines == [
+        "times[0]: expected a number of at least 0, found -1.0",
+        'expected the key "actuation" only in kind = "forward" or "closed-loop", found kind = "linear"',
+        'expected the key "sample_time" only in kind = "closed-loop", found kind = "linear"',
+    ]
 
 
 def test_keys_of_a_closed_loop_are_refused_elsewhere():

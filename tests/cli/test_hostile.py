@@ -134,6 +134,21 @@ def test_arguments(two_link_copy, refused, arguments, named):
 
 
 @pytest.mark.parametrize(
+    ("arguments", "named"),
+    [
+        (("plot", "--movie", "m.gif", "--seconds", "nan"), "'--seconds': nan is not a finite number"),
+        (("view", "--scale", "inf"), "'--scale': inf is not a finite number"),
+        (("plot", "--analysis", "none"), "--analysis: expected it with --movie only"),
+        (("plot", "--scale", "3"), "--scale: expected it with --movie only"),
+    ],
+)
+def test_options_of_pictures(solved, ffrobot, arguments, named):
+    done = ffrobot(arguments[0], solved / "scene.results.h5", *arguments[1:], cwd=solved)
+    assert done.returncode == 2
+    assert named in done.stderr
+
+
+@pytest.mark.parametrize(
     ("code", "named"),
     [
         (

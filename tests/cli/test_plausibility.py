@@ -15,14 +15,14 @@ BAR = {"mass": 1.0, "inertia": 0.1, "center": [0.5, 0.0], "points": {"root": [0.
 LINK = beam_link(0.6, tube(0.02, 0.016), 4, nu=None, name="arm", modes={"count": 1, "family": "in-plane-bending"})
 
 
-def arm(end=1.0, body=BAR, payload=(), tool=(), **path):
+def arm(end=1.0, body=BAR, payload=(), tool=(), joint=(), gravity=-9.81, **path):
     return program.make_scene(
         name="arm",
-        gravity=[0.0, -9.81],
+        gravity=[0.0, gravity],
         body=[{"name": "arm", "rigid": body}],
         payload=payload,
         tool=[{"name": "pen", "point": "arm.tip", **keys} for keys in tool],
-        joint=[{"name": "hub", "type": "revolute", "between": ["ground", "arm.root"]}],
+        joint=[{"name": "hub", "type": "revolute", "between": ["ground", "arm.root"], **dict(joint)}],
         trajectory=[{"name": "turn", "joint": "hub", **path}],
         analysis=[{"name": "inverse", "kind": "pcid", "end": end, "output_step": 0.1}],
     )
@@ -44,6 +44,19 @@ def arm(end=1.0, body=BAR, payload=(), tool=(), **path):
         ({"value": "t", "tool": [{"at": [120.0, 0.0]}]}, 'tool "pen" is 120 m long'),
         ({"value": "t", "tool": [{"angle": 45}]}, 'tool "pen" is turned by 45 rad'),
         ({"value": "t", "tool": [{"at": [0.12, 0.0], "angle": "45*deg"}]}, None),
+        ({"value": "t", "payload": [{"point": "arm.tip", "mass": 0.1, "center": [70.0, 0]}]}, "center is 70 m long"),
+        ({"value": "t", "payload": [{"point": "arm.tip", "mass": 0.1, "inertia": 9e3}]}, "radius of gyration is 300 m"),
+        ({"value": "t", "body": {**BAR, "inertia": 1e4}}, "radius of gyration is 100 m"),
+        ({"value": "t", "joint": {"position_limit": [-180, 180]}}, "a position_limit of -180 … 180 rad is many turns"),
+        ({"value": "t", "joint": {"position_limit": ["-180*deg", "180*deg"]}}, None),
+        ({"value": "t", "joint": {"rotor_inertia": 140.0}}, "a rotor_inertia of 140 kg m²"),
+        ({"value": "t", "joint": {"at": [300.0, 0.0]}}, 'joint "hub" is 300 m from the origin'),
+        ({"value": "t", "joint": {"type": "prismatic", "axis": [1.0, 0.0]}}, None),
+        (
+            {"value": "300*t**3", "joint": {"type": "prismatic", "axis": [1.0, 0.0]}},
+            'trajectory "turn" is 300 m',
+        ),
+        ({"value": "t", "gravity": -9810.0}, "gravity of 9810 m/s²: units are SI; is it in mm/s²?"),
         ({"value": "45*pi/180*t"}, None),
         ({"value": "-45*deg"}, None),
         ({"value": "45*deg*(1 - cos(pi*t))"}, None),
@@ -102,12 +115,49 @@ def test_waypoints_before_and_after_the_run(tmp_path):
             {"geometry": {**LINK["geometry"], "length": 40.0, "section": {"shape": "circle", "diameter": 2e-5}}},
             "Hz as a cantilever",
         ),
+        ({"damping": {"ratio": 2.0}}, "a damping ratio of 2 is above critical damping"),
+        ({"damping": {"ratio": 0.02}}, None),
         ({"material": {"youngs_modulus": 1e6, "density": 1100.0}}, None),  # silicone rubber
         ({"material": {"youngs_modulus": 1050e9, "density": 3515.0}}, None),  # diamond
     ],
 )
 def test_links(keys, expected, tmp_path):
     found = list(remarks_on_link(read_link(LinkTable({**LINK, **keys}, tmp_path / "arm.toml")), "arm"))
+    assert len(found) == (expected is not None)
+    assert expected is None or expected in found[0]
+
+
+PATCH = {"body": "arm", "count": 2, "length": 0.05, "thickness": 3e-4, "width": 0.01, "modulus": 63e9, "d31": 110e-12}
+
+
+@pytest.mark.parametrize(
+    ("patch", "interface", "joints", "expected"),
+    [
+        ({"width": 8.0}, [], 0.0, "patches 8 m wide on a face of 0.0628 m"),
+        ({"width": 0.06}, [], 0.0, None),  # around a tube
+        ({"thickness": 0.3}, [], 0.0, "patches 0.3 m thick on a link of 0.02 m"),
+        ({"modulus": 63.0}, [], 0.0, "a modulus of 63 Pa: units are SI; is it in GPa?"),
+        ({"d31": 110.0}, [], 0.0, "a d31 of 110 m/V: units are SI; is it in pm/V?"),
+        ({}, [1.0, 1.0, 2.5], 0.0, 'interface "lump": no body has the moments of inertia 1, 1, 2.5 kg m²'),
+        ({}, [1.0, 1.0, 2.0], 0.0, None),
+        ({}, [], 90.0, 'joint "hub" begins at 90 rad'),
+        ({}, [], np.pi, None),
+    ],
+)
+def test_flexible_scenes_in_3d(patch, interface, joints, expected):
+    lump = [{"name": "lump", "position": 0.3, "mass": 0.1, "inertia": interface}] if interface else []
+    scene = program.make_scene(
+        name="arm",
+        space="spatial",
+        gravity=[0.0, 0.0, -9.81],
+        body=[{"name": "arm", "link": LINK | {"interface": lump}}],
+        joint=[{"name": "hub", "type": "revolute", "between": ["ground", "arm.root"], "axis": [0.0, 0.0, 1.0]}],
+        pzt=[PATCH | patch],
+        initial={"joints": {"hub": joints}},
+        trajectory=[{"name": "turn", "joint": "hub", "value": "t"}],
+        analysis=[{"name": "inverse", "kind": "pcid", "end": 1.0, "output_step": 0.1}],
+    )
+    found = list(remarks(scene))
     assert len(found) == (expected is not None)
     assert expected is None or expected in found[0]
 

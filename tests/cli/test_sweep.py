@@ -160,6 +160,24 @@ def test_wrong_variations(refused, short_scene, vary, message):
     assert message in refused(short_scene.parent, "sweep", "scene.toml", "--vary", vary)
 
 
+def test_a_key_varied_twice(refused, short_scene):
+    twice = ("--vary", "gravity.1=1,2", "--vary", "gravity.1=3")
+    assert "expected every key once, found gravity.1 several times" in refused(
+        short_scene.parent, "sweep", "scene.toml", *twice
+    )
+
+
+def test_names_of_collected_datasets(ffrobot, short_scene):
+    """With dots, without the analysis; of no dataset a message, and NaN."""
+    names = ("inverse/points/rod.mid/deflection", "points.rod.mid.deflection", "points.rod.mid.deflektion")
+    options = [text for name in names for text in ("--collect", name)]
+    done = ffrobot.ok("sweep", short_scene, "--vary", "gravity.1=-9.81", *options)
+    (row,) = table(short_scene)
+    assert row[f"{names[0]} max"] == row[f"{names[1]} max"] != ""
+    assert row[f"{names[2]} max"] in ("", "nan")
+    assert f'found no "{names[2]}" in any run (did you mean "inverse/points/rod.mid/deflection"?)' in done.stderr
+
+
 def test_wrong_reduction_and_folder(refused, ffrobot, short_scene):
     folder = short_scene.parent
     message = refused(folder, "sweep", "scene.toml", "--vary", MASSES, "--collect", "inverse/time:mean")

@@ -76,6 +76,7 @@ def test_rows_twice_and_gaps(tmp_path):
         "path.csv: line 11: 1 rows that repeat the one before count once",
         "path.csv: no rows between t = 0.39 and 5 s, where others are 0.01 s apart: the path there is the spline's"
         " alone",
+        "path.csv: rows move at t = 0 s by 2 per s: the path is at rest there, and changes to that speed within 0.01 s",
     )
     with pytest.raises(InputError, match=r"line 3: expected times that increase, found t = 0 after 0"):
         load_waypoints(write(tmp_path / "path.csv", "t,value", [(0, 1), (0, 2)]))
@@ -90,6 +91,24 @@ def test_samples_lost_of_a_record(lost, tmp_path):
     assert [remark.partition(": ")[2].startswith(says) for remark in table.remarks] == [True] * (lost > 1)
     still = [(t, 0.08) if 0.035 < t < 0.051 + 0.01 * lost else (t, q) for t, q in rows]
     assert load_waypoints(write(tmp_path / "path.csv", "t,value", still)).remarks == ()
+
+
+@pytest.mark.parametrize(
+    ("path", "rates"),
+    [
+        (lambda t: np.sin(2 * np.pi * t), [2 * np.pi] * 2),
+        (lambda t: 3 * t, [3.0, 3.0]),
+        (lambda t: t**2, [2.0]),
+        (lambda t: 1 - np.cos(2 * np.pi * t), []),  # at rest, under acceleration
+        (lambda t: 10 * t**3 - 15 * t**4 + 6 * t**5, []),
+    ],
+)
+def test_records_that_move_at_their_ends(path, rates, tmp_path):
+    rows = [(t, path(t)) for t in np.linspace(0.0, 1.0, 101)]
+    table = load_waypoints(write(tmp_path / "path.csv", "t,value", rows))
+    says = [f"by {rate:.3g} per s: the path is at rest there" for rate in rates]
+    assert len(table.remarks) == len(says)
+    assert all(text in remark for text, remark in zip(says, table.remarks, strict=True))
 
 
 @pytest.mark.parametrize("epoch", [0, EPOCH])

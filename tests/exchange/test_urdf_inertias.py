@@ -149,3 +149,15 @@ def test_no_remarks_on_sound_robots(tmp_path):
 def test_no_masses_at_all(tmp_path):
     with pytest.raises(FfrobotError, match=re.escape("found no <inertial> with one in the whole file")):
         imported(tmp_path, '<link name="base"/><link name="a"/>', joint("j", "base", "a"))
+
+
+def test_elements_that_stand_there_twice_are_told(tmp_path):
+    """The first one counts: 1 kg of both."""
+    twice = link("arm").replace("</link>", '<inertial><mass value="3"/></inertial></link>')
+    found = imported(tmp_path, link("base"), twice, joint("j", "base", "arm", more='<axis xyz="1 0 0"/>'))
+    assert [remark for remark in found.remarks if "first counts" in remark] == [
+        'link "arm": 2 <inertial>: the first counts, the others do not',
+        'joint "j": 2 <axis>: the first counts, the others do not',
+    ]
+    assert [body["rigid"]["mass"] for body in found.scene["body"]] == [1.0]
+    assert found.scene["joint"][0]["axis"] == [0.0, 0.0, 1.0]

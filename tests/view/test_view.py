@@ -196,6 +196,8 @@ def test_what_is_refused(solid_arm, tmp_path):
     path = solid_arm / "scene.results.h5"
     with pytest.raises(InputError, match='expected one of inverse, found "invers"'):
         view_file(path, tmp_path / "a", Options(analysis="invers"))
+    with pytest.raises(InputError, match=r"time: expected one of the run, 0 to .* s, found 99 s"):
+        view_file(path, tmp_path / "a", Options(time=99.0))
     with pytest.raises(InputError, match="expected a folder, found a file"):
         view_file(path, path)
     with pytest.raises(InputError, match="expected a results file, found no such file"):

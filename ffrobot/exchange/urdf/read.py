@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from xml.etree import ElementTree
@@ -20,6 +21,9 @@ from .robot import TYPES, Inertial, MeshFile, Mimic, Numbers3, Origin, Primitive
 Element = ElementTree.Element
 
 _ENCODING = re.compile(rb"""(?:\xef\xbb\xbf)?<\?xml[^>]*?\sencoding=["']([\w.-]+)["']""")
+ONCE = {
+    "inertial", "origin", "mass", "inertia", "parent", "child", "axis", "limit", "dynamics", "mimic",
+}  # fmt: skip
 ENTRIES = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
 
 
@@ -75,7 +79,7 @@ def robot_of(root: Element) -> Robot:
     check_mimics(by_name)
     base = root_of([link.name for link in links], joints)
     name = root.get("name", "").strip() or base
-    return Robot(name, {link.name: link for link in links}, by_name, base, tuple(_turned(root)))
+    return Robot(name, {link.name: link for link in links}, by_name, base, (*_turned(root), *_repeated(root)))
 
 
 def _turned(root: Element) -> Iterable[str]:
@@ -86,6 +90,18 @@ def _turned(root: Element) -> Iterable[str]:
         if max(map(abs, rpy)) > 2 * math.pi:
             angles = " ".join(f"{angle:g}" for angle in rpy)
             yield f'{each.tag} "{shown(_name(each))}": rpy {angles} is more than a turn: URDF has rad, not degrees'
+
+
+def _repeated(root: Element) -> Iterable[str]:
+    """Remarks on elements that count once and stand there several times: urdfdom takes the first, too."""
+    for each in (*root.findall("link"), *root.findall("joint")):
+        for part in (each, *each.findall("inertial")):
+            inside = "" if part is each else " in <inertial>"
+            tags = Counter(child.tag for child in part if child.tag in ONCE)
+            for tag, count in tags.items():
+                if count > 1:
+                    told = f"{count} <{tag}>{inside}: the first counts, the others do not"
+                    yield f'{each.tag} "{shown(_name(each))}": {told}'
 
 
 def _check_once(kind: str, names: Iterable[str]) -> None:

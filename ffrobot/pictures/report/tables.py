@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 from ...common.peaks import largest
+from ...mbs.solve.zero_dynamics import is_unstable
 from ...results.file import Results
 from ...results.joints import joint_coordinates
 from ...results.linear import read_metrics
@@ -162,7 +163,9 @@ def zeros_table(runs: Sequence[Run]) -> Table:
         group = f"{run.analysis}/zero_dynamics"
         if run.results.has(group):
             about, zeros = run.results.attributes(group), run.results[f"{group}/zeros"]
-            kind = "minimum phase" if about["minimum_phase"] else "not minimum phase: stable inversion"
+            at_rest = " at rest; what grows on the way does too little to matter"
+            phase = f"minimum phase{at_rest if is_unstable(zeros @ (1.0, 1.0j)).any() else ''}"
+            kind = phase if about["minimum_phase"] else "not minimum phase: stable inversion"
             largest, least = zeros[..., 0].max(), abs(zeros[..., 0]).min()
             rows.append((run.label, kind, f"{about['factor']:.3g}", f"{largest:.4g}", f"{least:.4g}"))
     heading = ("motors only", "zeros along the path", "of the vibration in the output", "largest real part (1/s)",

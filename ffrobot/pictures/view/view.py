@@ -87,7 +87,12 @@ def _modal_body(path: Path) -> Iterator[View]:
 
 def _results(path: Path, options: Options, notes: list[str]) -> Iterator[View]:
     with Results(path) as results:
-        for analysis in _analyses(results, options.analysis):
+        analyses = _analyses(results, options.analysis)
+        times = np.concatenate([results.time(name) for name in analyses])
+        if options.time is not None and not times.min() <= options.time <= times.max():
+            span = f"{times.min():g} to {times.max():g} s"
+            raise InputError(f"{path}: time: expected one of the run, {span}, found {options.time:g} s")
+        for analysis in analyses:
             frames = _frames(results, analysis, options.frames)
             grid, name = results_grid(results, analysis, frames, notes), file_name(analysis)
             pictures = [_snapshot(results, analysis, frames, grid, options, color) for color in _colors(grid)]
