@@ -56,6 +56,7 @@ def remarks(scene: Scene) -> Iterator[str]:
     yield from _masses(scene, links)
     yield from _inertias(scene, links)
     yield from _patches(scene, links)
+    yield from _voltages(scene)
     yield from _angles(scene)
     yield from _times(scene)
     for analysis in scene.analysis:
@@ -181,6 +182,22 @@ def _patches(scene: Scene, links: Mapping[str, Link]) -> Iterator[str]:
             yield f"{label}: patches {layers:g} m thick on a link of {thick:g} m: units are SI; is this in mm?"
 
 
+def _voltages(scene: Scene) -> Iterator[str]:
+    """Prescribed voltages beyond the limit of their patches."""
+    layouts = {layout.label: layout for layout in scene.pzt}
+    last = max((analysis.last_time for analysis in scene.analysis), default=0.0)
+    for k, load in enumerate(scene.load, 1):
+        layout = layouts.get(load.pzt or "")
+        if layout is None or layout.limit is None:
+            continue
+        limits = np.broadcast_to(layout.limit, layout.patch_count)
+        functions = [function for name, function in load.components.items() if name.startswith("voltage")]
+        for number, (function, limit) in enumerate(zip(functions, limits, strict=False), 1):
+            most = float(np.abs(np.nan_to_num(function.sample(np.linspace(0.0, last, SAMPLES))[0])).max())
+            if most > limit * (1.0 + ROUNDING):
+                yield f"load no. {k}: patch {number} gets {most:.4g} V, beyond its limit of {limit:g} V"
+
+
 def remarks_on_memory(outputs: int, bodies: int, available: float, label: str) -> Iterator[str]:
     """Of an analysis with so many outputs, where they may take more than half of the `available` bytes."""
     if (needed := outputs * bodies * OUTPUT) > available / 2:
@@ -207,13 +224,13 @@ def _angles(scene: Scene) -> Iterator[str]:
     """Paths of angles that come to rest many turns away, and of poses more than half a turn apart."""
     turning = {joint.name for joint in scene.joint if joint.type == "revolute"}
     sliding = {joint.name for joint in scene.joint if joint.type == "prismatic"}
+    last = max((analysis.last_time for analysis in scene.analysis if analysis.follows_trajectories), default=0.0)
     for one in scene.trajectory:
         if one.largest_turn_of_poses > np.pi:
             yield (
                 f'trajectory "{one.name}": an angle in via changes by {np.degrees(one.largest_turn_of_poses):.4g}° from'
                 " one pose to the next: the section turns the shorter way, half a turn at most; add poses between"
             )
-        last = max((analysis.last_time for analysis in scene.analysis if analysis.follows_trajectories), default=0.0)
         if one.joint in sliding:
             for function in one.components.values():
                 value = np.abs(function.sample(np.linspace(0.0, last, SAMPLES))[0])
