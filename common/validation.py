@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
@@ -143,6 +143,14 @@ def plain(value: Any, functions: dict[str, object] | None = None) -> Any:  # noq
         functions[name] = value
         return name
     return str(value) if isinstance(value, PathLike) else value
+
+
+def check_texts(value: object, label: str) -> None:
+    """Raise `InputError`, which begins with `label`, for what is no list of texts: one text, too, whose letters are."""
+    texts = value if isinstance(value, Collection) else ()  # generators can be read once
+    is_list = isinstance(value, Iterable) and not isinstance(value, str | Mapping)
+    if not (is_list and all(isinstance(one, str) for one in texts)):
+        raise InputError(f"{label}: expected a list of texts, found {shown(repr(value))}")
 
 
 class _Problem(NamedTuple):

@@ -137,7 +137,10 @@ def plot_results(
         ffrobot.plot_results("scene.results.h5", "figures", ["svg"], only=["moment_*"])
     """
     from .common.extras import extras
+    from .common.validation import check_texts
 
+    check_texts(formats, "plot_results: formats")
+    check_texts(only, "plot_results: only")
     with extras(), _files(results) as (path,):
         from .pictures.figures.plot import plot_results
 

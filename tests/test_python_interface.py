@@ -325,3 +325,10 @@ def test_arguments_of_another_kind(wrong, says):
 def test_tables_are_no_scene():
     with pytest.raises(ffrobot.InputError, match=r"expected a scene file, or a scene .*, found dict"):
         ffrobot.solve({"name": "x"})
+
+
+def test_one_text_is_no_list(results):
+    with pytest.raises(ffrobot.InputError, match="plot_results: formats: expected a list of texts, found 'png'"):
+        ffrobot.plot_results(results, "figures", "png")
+    with pytest.raises(ffrobot.InputError, match="fit_measured: vary: expected a list of texts"):
+        ffrobot.fit_measured("arm.toml", "modes.csv", "material.youngs_modulus")

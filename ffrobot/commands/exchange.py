@@ -89,6 +89,8 @@ def import_(
         protect([file])
         print_export(import_body(file, output), summary_console())
         return
+    if instead := ELSEWHERE.get(file.suffix.lower()):
+        raise InputError(f"{file}: expected a URDF, a body or a motion, found none of these: {instead}")
     if radius and density is None:
         raise InputError("--radius: expected --density with it, found none")
     if keep_rest and not links:
@@ -112,6 +114,14 @@ def _links(pairs: tuple[str, ...]) -> Mapping[str, Path]:
             raise InputError(f'--flexible: expected one file for link "{name}", found two')
         found[name] = Path(path)
     return found
+
+
+ELSEWHERE = {
+    ".csv": 'trajectories take tables as they are, waypoints = "PATH.csv"',
+    ".toml": "ffrobot solve takes scenes, ffrobot link takes links",
+    **dict.fromkeys((".step", ".stp", ".msh", ".inp", ".bdf"), "ffrobot link --inspect drafts a link file of a part"),
+}
+"""What takes files that need no import, by their suffix."""
 
 
 @click.command()

@@ -4,7 +4,7 @@
 """
 
 import inspect
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from functools import wraps
 from math import isfinite
 from typing import (
@@ -24,7 +24,7 @@ from click import BadParameter, Context, FloatRange, IntRange, Parameter, ParamT
 
 from ..common.errors import InputError, either
 from ..common.files import AnyPath
-from ..common.tables import shown
+from ..common.validation import check_texts
 
 if TYPE_CHECKING:
     from ..run.watcher import Watcher
@@ -74,6 +74,8 @@ def _checked(function: Callable[P, R]) -> Callable[P, R]:
         annotations = {name: signature.parameters[name].annotation for name in bound.keys() - {"how"}}
         annotations |= {name: RunOptions.__annotations__[name] for name in options.keys() & {"processes"}}
         for name, annotation in annotations.items():
+            if get_origin(_kind(annotation)) is Sequence:
+                check_texts(bound[name], f"{function.__name__}: {name}")
             if problem := _problem(annotation, {**bound, **options}[name]):
                 raise InputError(f"{function.__name__}: {name}: {problem}")
         return function(*args, **given)
@@ -81,14 +83,16 @@ def _checked(function: Callable[P, R]) -> Callable[P, R]:
     return call
 
 
+def _kind(annotation: object) -> object:
+    """Without what is said of it."""
+    return get_args(annotation)[0] if get_origin(annotation) is Annotated else annotation
+
+
 def _problem(annotation: object, value: object) -> str:
     """What is wrong with the value of a parameter; empty if nothing is."""
-    kind, *about = get_args(annotation) if get_origin(annotation) is Annotated else (annotation,)
+    kind, about = _kind(annotation), getattr(annotation, "__metadata__", ())
     if get_origin(kind) is Literal and value not in get_args(kind):
         return f"expected {either(get_args(kind))}, found {value!r}"
-    texts = list(value) if isinstance(value, Iterable) and not isinstance(value, str | Mapping) else [None]
-    if get_origin(kind) is Sequence and not all(isinstance(one, str) for one in texts):
-        return f"expected a list of texts, found {shown(repr(value))}"
     if isinstance(value, float) and kind is int:
         return f"expected a whole number, found {value:g}"
     for one in about:

@@ -14,6 +14,7 @@ from ..common.arrays import Array, as_floats
 from ..common.errors import FfrobotError, InputError
 from ..common.files import AnyPath, check_new_file, write_atomically
 from ..common.toml_files import load_toml
+from ..common.validation import check_texts
 from ..fe_models.link_records import MeasuredMode, paired, read_measured
 from ..present.lines import plain_table
 from .least_squares import Fit, fit_frequencies
@@ -54,6 +55,7 @@ def fit_measured(
         fit = ffrobot.fit_measured("arm.toml", "modes.csv", ["material.youngs_modulus"])
         fit.value, fit.relative_deviation
     """
+    check_texts(vary, "fit_measured: vary")
     path, table, place = Path(file), Path(measured), None if output is None else Path(output)
     target = _target(path, motors)
     groups = [tuple(tuple(name.strip().split(".")) for name in text.split("=")) for text in vary]

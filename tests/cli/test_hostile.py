@@ -119,6 +119,7 @@ def test_library_that_is_not_installed(solved, ffrobot, library, command, extra)
         (("solve", "loop"), "loop: expected the name of a file, found links that lead in a circle"),
         (("solve", "scene.toml", "-o", "loop"), "loop: expected the name of a file, found links that lead in a circle"),
         (("info", "a" * 300), "File name too long"),
+        (("import", "scene.toml", "-o", "robot"), "found none of these: ffrobot solve takes scenes"),
         (("sweep", "scene.toml", "--vary", "gravity.1=0:1:1000000000"), "expected at most 100000 values"),
         (("sweep", "scene.toml", *("--vary", "gravity.1=0:1:1000", "--vary", "gravity.0=0:1:1000")), "100000 runs"),
         (("sweep", "scene.toml", "--vary", "gravity.1=" + "[" * 3000), "expected FIRST:LAST:COUNT"),
