@@ -226,6 +226,8 @@ def test_redefined_output_is_minimum_phase_and_tells_what_is_left(two_links):
     left = np.abs(off_path(outcome))
     assert 1e-4 < left.max() < 0.05  # m, of a path of 1 m
     assert left[0].max() < 1e-6  # at rest nothing is left
+    (told,) = outcome.statistics.warnings
+    assert told.endswith(f" is off by up to {left.max():.3g} m")
     replayed = exact_forward(model, outcome)
     same = np.abs(off_path(replayed))
     np.testing.assert_allclose(same, left, atol=1e-6)
