@@ -61,7 +61,7 @@ def test_elbows_of_a_loop_next_to_where_it_is_cut(path, words):
 @pytest.fixture(scope="module")
 def six_axes(solved):
     """The model of an arm with a spherical wrist and its starts; meshing its links takes 0.7 GB, of a command here."""
-    solved("arm_6r")
+    solved("arm_6r", timeout=600)
     model = prepare_scene(CASES / "arm_6r" / "scene.toml").model
     return model, start_postures(model)
 
