@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import KW_ONLY, field
 from typing import TYPE_CHECKING
 
+from ..common.structs import struct
 from ..fe_models.modal_body import ModalBody
 from ..mbs.analysis.context import Context
 from ..mbs.model.body import Body
@@ -14,10 +15,11 @@ if TYPE_CHECKING:
     from .patches.link_patches import LinkPatches
 
 
-@dataclass(frozen=True, kw_only=True)
+@struct
 class ActuatedContext(Context):
     """With the `patches` of links by body, the modal bodies of `links`, bodies `carrying` all their payloads."""
 
+    _: KW_ONLY
     patches: Mapping[str, LinkPatches] = field(default_factory=dict)
     links: Mapping[str, ModalBody] = field(default_factory=dict)
     carrying: Mapping[str, Body] = field(default_factory=dict)

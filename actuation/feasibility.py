@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, replace
-from dataclasses import field as described
+from dataclasses import replace
 from functools import cached_property, partial
 from typing import NamedTuple
 
 import numpy as np
 
 from ..common.arrays import Array, Indices
+from ..common.structs import struct
 from ..mbs.model.known_motion import mass_matrices
 from ..mbs.model.motors import split_forces
 from ..mbs.quantities.motion import RobotMotion
@@ -21,7 +21,7 @@ ROWS = 50  # of a run, about, at which mass matrices are made, and at twice as m
 RINGING = 2.0  # times the static shift, of a force that is missing all at once
 
 
-@dataclass(frozen=True)
+@struct
 class Unsupplied:
     """What motors, with the patches that there are, miss of a path whose modal forces nothing supplies.
 
@@ -152,7 +152,7 @@ ROUND_OFF = 1e-12  # rad
 MOST_PATCHES = 200  # that are tried on one link
 
 
-@dataclass(frozen=True)
+@struct
 class Remedies:
     """What alone would make the patches suffice; infinite or 0 where the word has no meaning.
 
@@ -173,7 +173,7 @@ class Remedies:
     most_factor: float
 
 
-@dataclass(frozen=True)
+@struct
 class PatchFeasibility:
     """What is asked of the patches of one body in one analysis; k patches, n modes, peaks over time.
 
@@ -195,7 +195,7 @@ class PatchFeasibility:
     strain: Array
     mode_required: Array
     mode_available: Array
-    find_remedies: Callable[[], Remedies] = described(repr=False)
+    find_remedies: Callable[[], Remedies]
 
     @cached_property
     def remedies(self) -> Remedies:
@@ -217,7 +217,7 @@ class PatchFeasibility:
         return np.divide(self.mode_required, self.mode_available, out=without, where=self.mode_available > 0)
 
 
-@dataclass(frozen=True)
+@struct
 class Feasibility:
     """Everything that one analysis asks of the actuators: motors by joint, patches by body.
 

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Container, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 from ..common.arrays import Array
+from ..common.structs import struct
 from ..fe_models.modal_body import ModalBody
 from ..mbs.model.body import Body
 from ..mbs.quantities.motion import RobotMotion
@@ -24,7 +25,7 @@ ROUNDING = 1e-6  # of the largest modal force: less is what ill-conditioned patc
 NEGLIGIBLE = 1e-6  # of the length of a link, of a deflection; rad
 
 
-@dataclass(frozen=True)
+@struct
 class LinkInMotion:
     """A link with modes, over time.
 

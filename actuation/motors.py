@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from ..common.arrays import Array, Booleans, as_floats
 from ..common.peaks import largest, root_mean_square, shares
+from ..common.structs import struct
 from ..mbs._core import TimeFunction
 from ..mbs.joints.joint import MotorLimits
 from ..mbs.model.gears import rotor
@@ -24,7 +25,7 @@ ROWS = 50  # of a run, at most, at which inertias are computed
 JUMP = 0.05  # of the largest acceleration or jerk of the path: less is none
 
 
-@dataclass(frozen=True)
+@struct
 class MotorFeasibility:
     """What one motor has to do at the joint, against its limits (infinite where none): N·m, rad/s, W; N, m/s of forces.
 

@@ -8,7 +8,7 @@ it, and those that hold a shape.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import combinations
 from pathlib import Path
 from types import MappingProxyType
@@ -18,6 +18,7 @@ import numpy as np
 
 from ..common.arrays import Array
 from ..common.errors import InputError, did_you_mean, quoted
+from ..common.structs import struct
 from ..common.validation import Record
 from ..fe_models.modal_body import ModalBody
 from ..mbs.analysis.outcome import Outcome
@@ -69,7 +70,7 @@ class ActuationPoints(Record):
                 yield Reference(key, f"{self.body}.{place}")
 
 
-@dataclass(frozen=True)
+@struct
 class PointSet:
     """Components of force at points of one body.
 
@@ -222,7 +223,7 @@ def _point(key: str, place: Place, body: ModalBody | None, spatial: Body) -> Bod
     return BodyPoint(at.position, at.translation @ T, at.rotation @ T)
 
 
-@dataclass(frozen=True)
+@struct
 class PointForces:
     """Forces at the actuation points of one body over time.
 

@@ -16,7 +16,7 @@ import json
 import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -28,6 +28,7 @@ from ..common.errors import FfrobotError, SolveError, of_file
 from ..common.files import AnyPath, check_output
 from ..common.interrupts import deferred_interrupts, ending_at_once
 from ..common.parallel import on_first, processes, without_daemon
+from ..common.structs import struct
 from ..common.validation import plain
 from ..common.version import digest_of_code
 from ..mesh.kept_parts import digest_of_mesh_code, geometry_content, kept_path
@@ -42,7 +43,7 @@ from .modal_body_file import FORMAT, read_modal_body, write_modal_body
 Progress = Callable[[str], None]
 
 
-@dataclass(frozen=True)
+@struct
 class LinkOutcome:
     """Result of stage 1.
 

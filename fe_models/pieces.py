@@ -8,12 +8,12 @@ of a piece turns with it, and leaves small deflections and few steps (docs/theor
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from math import ceil
 from pathlib import Path
 from typing import Any
 
 from ..common.errors import InputError, quoted
+from ..common.structs import struct
 from .link_file import LinkSource, LinkTable, link_path, read_link
 from .link_records import BeamLink, Family, Link
 
@@ -21,7 +21,7 @@ BENDING: tuple[Family, ...] = ("in-plane-bending", "out-of-plane-bending")
 ON_A_CUT = 1e-9  # of the length
 
 
-@dataclass(frozen=True)
+@struct
 class CutLink:
     """A link in pieces.
 

@@ -73,7 +73,7 @@ def main() -> None:
 
     Exit code 0, 1 where a solve failed, 2 for wrong input, 130 after Ctrl-C, 143 after SIGTERM.
     """
-    gc.set_threshold(100_000)  # what a command loads stays: searching it repeatedly costs a sixth of the start
+    gc.set_threshold(200_000)  # what a command loads stays: searching it repeatedly costs a sixth of the start
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")  # it would read the metadata of all packages
     stop = EndOfCommand()
     LOGGER.propagate = False  # libraries give the root logger handlers of their own

@@ -7,18 +7,18 @@ hexahedron's lower face, then the upper one. See "Node ordering" in the manual o
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Literal
 
 import numpy as np
 
 from ..common.arrays import Array, Integers
+from ..common.structs import struct
 
 CellName = Literal["tetrahedron", "hexahedron"]
 
 
-@dataclass(frozen=True)
+@struct
 class Cell:
     """Topology of a cell in gmsh's order of nodes.
 

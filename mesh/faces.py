@@ -6,7 +6,7 @@ All sources are treated alike: the facets that only one cell has, their normals,
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from typing import NoReturn
@@ -17,6 +17,7 @@ from scipy.sparse.csgraph import connected_components
 
 from ..common.arrays import Array, Integers, NDArray
 from ..common.errors import InputError, did_you_mean, quoted
+from ..common.structs import struct
 from .part_mesh import PartMesh, boundary_facets, facet_geometry, facet_keys
 from .records import Outlines, PlaceRecord, RectangleSection, SolidGeometry
 from .source import Source
@@ -34,7 +35,7 @@ _NEAR = 0.02
 _LISTED = 12
 
 
-@dataclass(frozen=True)
+@struct
 class Boundary:
     """The boundary of a part.
 
@@ -65,7 +66,7 @@ class Boundary:
         return sorted(faces, key=lambda face: -face.area)
 
 
-@dataclass(frozen=True)
+@struct
 class SmoothFace:
     """A smooth face: its `facets` (k,) of the boundary, `center` (3,), `area`, mean outward `normal` (3,), `axis`.
 

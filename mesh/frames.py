@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
 from ..common.arrays import Array
+from ..common.structs import struct
 
 Kind = Literal["rectangular", "cylindrical", "spherical"]
 
 
-@dataclass(frozen=True)
+@struct
 class Frame:
     """Axes `C` (3, 3; columns are the axes) at `origin` (3,), both in global axes, and what coordinates mean in them.
 

@@ -6,7 +6,7 @@ The faces are those that interfaces of a link choose from (`faces.Boundary.smoot
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Literal
 
@@ -15,6 +15,7 @@ from scipy.optimize import least_squares
 
 from ..common.arrays import Array, Integers, as_floats
 from ..common.errors import InputError
+from ..common.structs import struct
 from .checks import METRES, check_connected, check_neighbours, check_quality, oriented, straightened
 from .faces import Boundary, SmoothFace
 from .jacobian import volume_of_tetrahedra
@@ -27,7 +28,7 @@ LONGEST = 5.0  # m of a link: a larger number is in mm
 FLAT = 1e-4  # how far normals of a plane face are from their mean, and points of a bore from its radius, relative
 
 
-@dataclass(frozen=True, eq=False)
+@struct
 class PartFace:
     """A smooth face in the axes of the file, m.
 
@@ -48,7 +49,7 @@ class PartFace:
     radius: float | None
 
 
-@dataclass(frozen=True, eq=False)
+@struct
 class Inspection:
     """A part as its file has it; lengths in m, axes of the file.
 

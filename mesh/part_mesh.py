@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 
 import numpy as np
 
 from ..common.arrays import Array, Integers, NDArray
+from ..common.structs import struct
 from .cells import CELLS, Cell, CellName
 
 Tags = NDArray[np.int32]
 
 
-@dataclass(frozen=True)
+@struct
 class PartMesh:
     """A solid part, meshed.
 

@@ -9,13 +9,13 @@ A solid has a `section` as a beam has, drawn out along x, or comes from a `file`
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Annotated, Literal
 
 from pydantic import Field
 
 from ..common.names import Name, Title
 from ..common.numbers import NotNegative, Positive, Vector3
+from ..common.structs import struct
 from ..common.validation import InputFile, Record
 from .cells import CellName
 
@@ -167,7 +167,7 @@ class PlaceRecord(Record):
     """Physical surface group of the mesh file with the face (solids)."""
 
 
-@dataclass(frozen=True)
+@struct
 class Outlines:
     """Rectangles to outline in the mesh of a solid, on the faces at its largest or smallest y, about z = 0.
 

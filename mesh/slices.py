@@ -11,7 +11,6 @@ Importing this loads dolfinx.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
@@ -19,6 +18,7 @@ import basix
 import numpy as np
 
 from ..common.arrays import Array, Booleans, Integers
+from ..common.structs import struct
 from .cells import HEXAHEDRON, KUHN, TETRAHEDRON
 from .compat import coordinate_element, geometry_degree, geometry_nodes
 
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 IN_PLANE = 1e-9
 
 
-@dataclass(frozen=True)
+@struct
 class SectionQuadrature:
     """Quadrature on the part of a cross section that lies in this process's cells.
 
@@ -111,7 +111,7 @@ class _Cells:
         return table[0], table[1:].T
 
 
-@dataclass(frozen=True)
+@struct
 class _Triangles:
     """Pieces of the section, in reference coordinates.
 

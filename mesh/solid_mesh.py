@@ -8,7 +8,7 @@ The boundary of the distributed mesh: its facets, and the triangles that a pictu
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -20,6 +20,7 @@ from mpi4py import MPI
 
 from ..common.arrays import Array, Integers
 from ..common.errors import FfrobotError, InputError
+from ..common.structs import struct
 from .cells import CellName
 from .compat import coordinate_element, create_solid_mesh, geometry_nodes
 from .part import kept_or_new
@@ -36,7 +37,7 @@ _FINEST = 4
 _COINCIDENT = 1e-6
 
 
-@dataclass(frozen=True)
+@struct
 class Surface:
     """Triangles on the boundary of the whole part, the same on every process, and which points each process knows.
 
@@ -158,7 +159,7 @@ Progress = Callable[[str], None]
 MeshTags = Any  # dolfinx 0.5 and 0.9 name this class differently
 
 
-@dataclass(frozen=True)
+@struct
 class SolidMesh:
     """A solid part as the finite element models take it.
 

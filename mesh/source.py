@@ -7,12 +7,12 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from ..common.arrays import Array, Integers, NDArray
 from ..common.errors import InputError
+from ..common.structs import struct
 from .cells import CELLS, CellName
 from .part_mesh import PartMesh, facet_keys
 
@@ -29,7 +29,7 @@ STRAIGHT = 5e-6
 _LISTED = 5  # concentrated masses, one by one
 
 
-@dataclass(frozen=True, eq=False)
+@struct
 class PointMass:
     """A concentrated mass, which a link can have on an interface.
 
@@ -44,7 +44,7 @@ class PointMass:
     point: Array
 
 
-@dataclass(frozen=True)
+@struct
 class RawMesh:
     """What a source gives.
 
@@ -103,7 +103,7 @@ class MeshBlocks:
         return RawMesh(points, self.blocks, *groups, self.surfaces, self.lines, tuple(remarks))
 
 
-@dataclass(frozen=True)
+@struct
 class Source:
     """A part, and the groups of facets or points that its file names.
 

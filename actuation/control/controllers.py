@@ -21,7 +21,6 @@ from __future__ import annotations
 import runpy
 import traceback
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
@@ -30,6 +29,7 @@ import numpy as np
 from ...common.arrays import Array, Indices
 from ...common.errors import InputError, SolveError, quoted
 from ...common.python_files import count_failed, count_imports, imported_files
+from ...common.structs import struct
 from ...mbs.analysis.outcome import Outcome
 from ...mbs.model.model import Model
 from ..patches.link_patches import LinkPatches
@@ -50,7 +50,7 @@ class Controller(Protocol):
         """Commands u (inputs,) at sample k for the readings y (outputs,); they are added to the feed-forward."""
 
 
-@dataclass(frozen=True)
+@struct
 class Setup:
     """What a controller may know when it is made.
 

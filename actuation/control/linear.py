@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import combinations
 from typing import Literal
 
 from ...common.arrays import Array
+from ...common.structs import struct
 from ...mbs.analysis.operating_points import InstantAnalysis, OperatingPoints, find_operating_points, places_of
 from ...mbs.analysis.outcome import Details, Outcome
 from ...mbs.fields.field_types import PointReference
@@ -20,7 +21,7 @@ from .linear_model import LinearModel, Reach, Zeros, controllability, observabil
 from .margins import Suggestion, unhurried_gains
 
 
-@dataclass(frozen=True)
+@struct
 class LinearModels(Details):
     """Linear models at the times of an analysis, with their modes, reach and zeros, one of each per time.
 

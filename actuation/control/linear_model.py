@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,6 +12,7 @@ from ...common.arrays import Array, ComplexArray, as_floats
 from ...common.errors import InputError, did_you_mean, quoted
 from ...common.extras import extras
 from ...common.files import write_atomically
+from ...common.structs import struct
 from ...mbs.solve.joint_conditions import RIGID, RobotModes, free_directions
 from ...mbs.solve.joint_conditions import robot_modes as modes_of
 from ...mbs.solve.linearisation import LinearMechanism
@@ -24,7 +24,7 @@ Names = str | Sequence[str]
 SHOWN = 4  # names in the line that a model prints
 
 
-@dataclass(frozen=True, repr=False)
+@struct
 class LinearModel:
     """x = (δs, δṡ) about a configuration or one instant of a motion, frozen there; f coordinates s.
 
@@ -166,7 +166,7 @@ def _numbers(kind: str, names: Names, known: tuple[str, ...]) -> list[int]:
     return [known.index(name) for name in wanted]
 
 
-@dataclass(frozen=True)
+@struct
 class SampledModel:
     """x(k+1) = A x(k) + B u(k) of a model whose inputs are held, u acting after a delay.
 
@@ -231,7 +231,7 @@ def locked_frequencies(model: LinearModel) -> Array:
     return as_floats(omega[omega > RIGID * omega.max(initial=0.0)] / (2 * np.pi))
 
 
-@dataclass(frozen=True)
+@struct
 class Reach:
     """How well inputs reach, or outputs see, each mode: (f,) between 0 and 1, and names of the modes out of reach.
 
@@ -280,7 +280,7 @@ INFINITE = 1e3  # times the largest pole: zeros beyond belong to modes that the 
 MARGIN = 1e-6  # of a zero's size (and MARGIN of the largest pole, for those near 0): real parts below are rounding
 
 
-@dataclass(frozen=True)
+@struct
 class Zeros:
     """The finite zeros (k,) rad/s from inputs to outputs, slowest first.
 

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from ...common.arrays import Array
+from ...common.structs import struct
 from ...mbs.analysis.outcome import Details
 from ...mbs.analysis.samples import in_order
 from .controllers import Controller, Loop, Setup
@@ -19,7 +20,7 @@ from .records import ComputedTorque, JointPid, Lqr, SampledAnalysis
 SAMPLES_PER_PERIOD = 10  # of the fastest motion that a controller acts on (Franklin, Powell and Workman ask for 20)
 
 
-@dataclass(frozen=True)
+@struct
 class LoopRecord(Details):
     """What happened at the samples of a closed loop.
 

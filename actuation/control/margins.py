@@ -14,12 +14,12 @@ rigid robot. The sampled model has the last word (see `margins`).
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
 from ...common.arrays import Array, ComplexArray, as_floats
+from ...common.structs import struct
 from .linear_model import LinearModel, locked_frequencies, sampled
 from .records import ControllerRecord, JointPid, ModalVelocity
 
@@ -34,7 +34,7 @@ SAMPLED = 0.99  # of half the sampling frequency, where eigenvalues are that of 
 RIGID = 1e-6  # of the fastest eigenvalue: slower ones are rounding of motion without stiffness
 
 
-@dataclass(frozen=True)
+@struct
 class JointGains:
     """u = −(P y + D ẏ + D' (y − y₋)/T + I Σ T y) with matrices (motors, outputs); y are the joints' errors."""
 
@@ -48,7 +48,7 @@ class JointGains:
         return JointGains(*(factor * matrix for matrix in (self.P, self.D, self.difference, self.integral)))
 
 
-@dataclass(frozen=True)
+@struct
 class Margins:
     """How far a loop is from its stability bound, the worst of several configurations.
 
@@ -189,7 +189,7 @@ SAMPLE_TIMES = (1e-2, 5e-3, 2e-3, 1e-3, 5e-4, 2e-4, 1e-4, 5e-5, 2e-5, 1e-5)  # s
 LIGHT = 0.02  # of the inertia with rigid links: what a joint feels at once, below which its root has no inertia
 
 
-@dataclass(frozen=True)
+@struct
 class Suggestion:
     """PD gains to start with, by joint, N·m/rad and N·m·s/rad (N/m, N·s/m), for a `bandwidth` in Hz."""
 

@@ -11,13 +11,13 @@ they are read at times that do not depend on the steps (`watched`), and no fit i
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ...common.arrays import Array
 from ...common.peaks import largest, root_mean_square, shares
+from ...common.structs import struct
 
 if TYPE_CHECKING:  # metrics are read from files, too, by what does not control
     from .controllers import Loop, Setup
@@ -43,7 +43,7 @@ DEFINITIONS = (
 )
 
 
-@dataclass(frozen=True)
+@struct
 class Metrics:
     """One run in numbers; see `DEFINITIONS`.
 
@@ -78,7 +78,7 @@ class Metrics:
     vibration_window: float = np.nan
 
 
-@dataclass(frozen=True)
+@struct
 class Followed:
     """What a loop did, at the outputs of its run and between.
 

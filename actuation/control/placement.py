@@ -8,7 +8,7 @@ Mass and stiffness of patches, where the scene adds them to the link, stay where
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import combinations_with_replacement
 from math import ceil, comb
 from pathlib import Path
@@ -18,6 +18,7 @@ import numpy as np
 
 from ...common.arrays import Array, Indices
 from ...common.errors import InputError, quoted
+from ...common.structs import struct
 from ...mbs.analysis.operating_points import InstantAnalysis, find_operating_points, of_earlier, row_at
 from ...mbs.analysis.outcome import Details, Outcome
 from ...mbs.analysis.replay import motor_forces_of
@@ -37,7 +38,7 @@ SEED = 0  # of the evolution: the same scene gives the same patches
 STEPS = 2  # candidates per length of a patch, where the scene gives no spacing
 
 
-@dataclass(frozen=True)
+@struct
 class PatchableLink:
     """A link that is to get patches, by the m coordinates p that these reach.
 
@@ -60,7 +61,7 @@ class PatchableLink:
     patches: Callable[..., PatchArray]
 
 
-@dataclass(frozen=True)
+@struct
 class Candidates:
     """Places (k,) m for the centre of one patch, `gap` of which two patches lie apart at least, and Φ_V there.
 
@@ -72,7 +73,7 @@ class Candidates:
     Phi_V: Array
 
 
-@dataclass(frozen=True)
+@struct
 class Evaluation:
     """A set of patches: centres (count,) m, reach (modes,) and the value of the criterion, to be as large as can be."""
 
@@ -81,7 +82,7 @@ class Evaluation:
     value: float
 
 
-@dataclass(frozen=True)
+@struct
 class Placed(Details):
     """What a search found.
 
@@ -107,7 +108,7 @@ class Placed(Details):
     method: str
 
 
-@dataclass(frozen=True)
+@struct
 class ModalReach:
     """Modes to be reached: frequency (modes,) Hz, shape (modes, n) of the link in them, its share (modes,) in them."""
 

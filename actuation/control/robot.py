@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
@@ -12,6 +12,7 @@ import numpy as np
 
 from ...common.arrays import Array, as_floats
 from ...common.errors import InputError
+from ...common.structs import struct
 from ...mbs.analysis.outcome import Outcome
 from ...mbs.model.body import Body
 from ...mbs.model.gears import resistance
@@ -118,7 +119,7 @@ def _rigid(body: Body) -> Body:
     )  # fmt: skip
 
 
-@dataclass(frozen=True)
+@struct
 class LinkModes:
     """A flexible link: `mass` (kg), `length` (m), and the `stiffness` ω² (n,) (rad²/s²) of its modal coordinates p."""
 
@@ -127,7 +128,7 @@ class LinkModes:
     stiffness: Array
 
 
-@dataclass(frozen=True)
+@struct
 class PatchedLink:
     """The k patches of one link, and the m coordinates of it that they are to serve, the lowest first.
 
@@ -148,7 +149,7 @@ class PatchedLink:
     own: Array
 
 
-@dataclass(frozen=True)
+@struct
 class Robot:
     """A robot about the motion of an inverse analysis.
 

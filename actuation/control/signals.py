@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 
 from ...common.arrays import Array, Indices
 from ...common.errors import InputError
+from ...common.structs import struct
 from ...mbs.analysis.context import WholeLinks, place_of
 from ...mbs.model.drives import Drives, PointDrive
 from ...mbs.model.known_motion import KnownStates, motion_forces
@@ -24,7 +25,7 @@ from .records import PERMITTIVITY, Sensor
 ORDERS = {"value": 0, "rate": 1, "acceleration": 2}
 
 
-@dataclass(frozen=True)
+@struct
 class Signal:
     """One reading: the coordinate `axis` (0, 1, 2) of a `point`, or `along` (n_v,) times joint and modal coordinates.
 

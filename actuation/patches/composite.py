@@ -22,12 +22,12 @@ stretch the link, too.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
 from ...common.arrays import Array, as_floats
+from ...common.structs import struct
 from ...fe_models.modal_body import ModalBody
 from ...mbs.model.body import Body, BodyPoint
 from ...mbs.model.masses import with_line_masses
@@ -68,7 +68,7 @@ class GaussPoint(NamedTuple):
     station: int
 
 
-@dataclass(frozen=True)
+@struct
 class Composite:
     """What k patches and their link do to each other, over the n modes of the modal body.
 
@@ -242,7 +242,7 @@ def _strains(body: ModalBody, x: Array) -> Array:
     return as_floats(rise / (2 * h)[:, None, None])
 
 
-@dataclass(frozen=True)
+@struct
 class StructureEffect:
     """What patches change of a link, bare → with patches.
 

@@ -8,13 +8,14 @@ by one named face. Modal forces on the other families are left as they are: volt
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from ...common.arrays import Array, Indices, as_floats
 from ...common.errors import InputError
+from ...common.structs import struct
 from ...fe_models.modal_body import ModalBody
 from ...mbs import _core
 from ...mbs.model.body import Body
@@ -41,7 +42,7 @@ from .records import PztLayout
 from .sections import check_sections
 
 
-@dataclass(frozen=True)
+@struct
 class OnBody:
     """What all k patches of a link do to one body that may carry them, on the n modes of the body's file.
 
@@ -56,7 +57,7 @@ class OnBody:
     to_link: Array
 
 
-@dataclass(frozen=True)
+@struct
 class LinkPatches:
     """All patches of one link, k in all, on the n modes of its modal body.
 

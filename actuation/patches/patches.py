@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import KW_ONLY
 from functools import cached_property, lru_cache
 from itertools import pairwise
 
@@ -11,6 +11,7 @@ import numpy as np
 
 from ...common.arrays import Array, Indices, as_floats
 from ...common.errors import InputError
+from ...common.structs import struct
 from ...fe_models.link_records import Family
 from ...fe_models.modal_body import ModalBody
 from ...mbs import _core
@@ -27,7 +28,7 @@ OF_STATIC_SHAPES = 1e-3  # root of the weight of attachment modes beside modes: 
 ENERGY_WEIGHT = 1e-4  # of the strain energy rᵀ K⁻¹ r beside weights of points, for the same reason
 
 
-@dataclass(frozen=True, kw_only=True)
+@struct
 class Reach:
     """What k patches do to n modes, and what is wanted of them.
 
@@ -39,6 +40,7 @@ class Reach:
         served: number of modes, the first ones, that the patches are to serve: attachment modes are not among them.
     """
 
+    _: KW_ONLY
     Phi_V: Array
     limit: Array
     W_sqrt: Array
@@ -130,7 +132,7 @@ KEPT = 4  # links: numbers of patches are tried on one after the other
 OUT_OF_REACH = 1e-9  # of the largest modal force per volt: less is rounding
 
 
-@dataclass(frozen=True)
+@struct
 class ReachedModes:
     """The modes of a link that moves in some of its families alone, with what it carries.
 
@@ -178,7 +180,7 @@ def _modes_of(families: frozenset[Family], body: ModalBody, spatial: Body) -> Re
     return ReachedModes(rows, T[:, modes_first], stiffness[modes_first], served)
 
 
-@dataclass(frozen=True)
+@struct
 class Voltages:
     """Voltages of patches over time.
 
@@ -242,7 +244,7 @@ def solve_voltages(patches: Reach, F_p: Array) -> Voltages:
     return Voltages(required, within_limit, F_p - within_limit @ patches.Phi_V.T, patches.served)
 
 
-@dataclass(frozen=True)
+@struct
 class PatchArray(Reach):
     """The patches of one layout.
 

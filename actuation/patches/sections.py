@@ -13,7 +13,6 @@ Faces are driven against each other to bend, alike to twist.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import Literal, NamedTuple
 
@@ -21,6 +20,7 @@ import numpy as np
 
 from ...common.arrays import Array, Indices
 from ...common.errors import InputError
+from ...common.structs import struct
 from ...fe_models.beam.section_stress import surface_shear
 from ...fe_models.modal_body import ModalBody
 from .records import PztLayout
@@ -32,7 +32,7 @@ KEPT = 4  # links of which sections are remembered
 ROUND = 1e-6  # of the radius: corners of an outline that are so far from the axis are on a circle
 
 
-@dataclass(frozen=True)
+@struct
 class LinkSections:
     """From each of k stations on; NaN where not known.
 

@@ -9,12 +9,12 @@ BᵀB of values at Gauss points, which integrate them exactly; `dolfinx_forms` a
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
 
 from ...common.arrays import Array
+from ...common.structs import struct
 from ..link_records import BeamLink, Family, Solver
 from .line import gram, hermite, lagrange
 from .sections import Property, cellwise, link_modulus, rod_properties, second_moment, shear_modulus
@@ -23,7 +23,7 @@ from .sections import Property, cellwise, link_modulus, rod_properties, second_m
 U_X, U_Y, U_Z, R_X, R_Y, R_Z = range(6)
 
 
-@dataclass(frozen=True)
+@struct
 class FamilyModel:
     """One family's eigenproblem K x = ω² M x over its m free degrees of freedom.
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from math import perm
 
 import numpy as np
@@ -10,12 +9,13 @@ import scipy.sparse as sp
 from scipy.special import roots_legendre
 
 from ...common.arrays import Array, Integers
+from ...common.structs import struct
 
 # Points of an element: exact for products of two cubics.
 GAUSS = 4
 
 
-@dataclass(frozen=True)
+@struct
 class Functions:
     """Continuous functions on the elements between neighbouring nodes, from their degrees of freedom.
 

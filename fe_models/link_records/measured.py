@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from math import isfinite
 from pathlib import Path
 
 from ...common.errors import InputError, did_you_mean, quoted
+from ...common.structs import struct
 from ...common.tables import LARGEST, shown
 from ...common.toml_files import read_text
 from ...common.validation import InputFile, Record
@@ -24,7 +24,7 @@ class Measured(Record):
     modes are counted by family."""
 
 
-@dataclass(frozen=True)
+@struct
 class MeasuredMode:
     """One row of the table.
 

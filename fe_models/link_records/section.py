@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from math import pi, tanh
 
+from ...common.structs import struct
 
-@dataclass(frozen=True)
+
+@struct
 class Section:
     """A cross section whose principal axes are y and z, through the centroid.
 

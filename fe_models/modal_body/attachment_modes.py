@@ -13,11 +13,11 @@ whole finite element model, however few eigenmodes there are (MacNeal, Comput. S
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from ...common.arrays import Array, Integers
+from ...common.structs import struct
 from ..link_records import FAMILIES, Family
 from .parts import Interface
 
@@ -40,7 +40,7 @@ COMPONENTS: Mapping[Family, tuple[int, ...]] = {
 }
 
 
-@dataclass(frozen=True)
+@struct
 class Inertia:
     """M and strain energy of a finite element model with m degrees of freedom, of which a process may own a part.
 
@@ -61,7 +61,7 @@ class Inertia:
         return U
 
 
-@dataclass(frozen=True)
+@struct
 class Modes:
     """Modes, ascending: ω² (n,) in rad²/s², the family of each or of its loads, X (m, n) with XᵀMX = I."""
 

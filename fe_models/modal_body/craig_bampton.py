@@ -13,12 +13,12 @@ attachment modes. The way back, p = T (d, η), follows from what they do at inte
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from ...common.arrays import Array
 from ...common.errors import InputError
+from ...common.structs import struct
 from ..link_records import FAMILIES
 from .attachment_modes import COMPONENTS, Modes, ascending, uncoupled
 from .body import ModalBody
@@ -51,7 +51,7 @@ def in_order(K: Array, families: Sequence[str], is_static: Sequence[bool]) -> Mo
     return Modes(squares[order], tuple(FAMILIES[of_modes[k]] for k in order), turn[:, order])
 
 
-@dataclass(frozen=True)
+@struct
 class InterfaceCoordinates:
     """What the modes of a body make of interface motion.
 
@@ -136,7 +136,7 @@ def interface_loads(
     return W, loads
 
 
-@dataclass(frozen=True)
+@struct
 class CraigBampton:
     """A link in interface coordinates and fixed-interface modes, for other programs; SI units, the link's frame.
 

@@ -8,12 +8,13 @@ material points x_I + ξ move by Φ0 + φ × ξ, with translation Φ0 and rotati
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, TypeVar
 
 import numpy as np
 
 from ...common.arrays import Array
+from ...common.structs import struct
 from ..link_records import InterfaceRecord
 from .parts import LEVI_CIVITA, Interface, Invariants
 from .unit_loads import PAIRS, inertia_wrenches, interface_load_names
@@ -21,7 +22,7 @@ from .unit_loads import PAIRS, inertia_wrenches, interface_load_names
 Of = TypeVar("Of", bound=Invariants)
 
 
-@dataclass(frozen=True)
+@struct
 class Lump:
     """A mass on the interface `name`.
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...common.arrays import Array, Integers
+from ...common.structs import struct
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
@@ -55,7 +56,7 @@ class Invariants(Integrals):
     S_spin: Array
 
 
-@dataclass(frozen=True, eq=False)
+@struct
 class Interface:
     """What the modes do at one point of the axis, in the link's frame.
 
@@ -75,7 +76,7 @@ class Interface:
         freeze(self)
 
 
-@dataclass(frozen=True, eq=False)
+@struct
 class Stations:
     """Points along the axis, ascending in x, at which the modes are known.
 
@@ -109,7 +110,7 @@ class Stations:
         freeze(self)
 
 
-@dataclass(frozen=True, eq=False)
+@struct
 class PictureMesh:
     """What a picture of the link needs.
 
@@ -129,7 +130,7 @@ class PictureMesh:
         freeze(self)
 
 
-@dataclass(frozen=True, eq=False)
+@struct
 class StressPoint:
     """Stress and strain at one point of the link, in the link's frame; rows xx, yy, zz, yz, xz, xy.
 
@@ -150,7 +151,7 @@ class StressPoint:
         freeze(self)
 
 
-@dataclass(frozen=True, eq=False)
+@struct
 class MeasuredValues:
     """Which values of the modes were measured, and what the finite element model says in the place of frequencies.
 
@@ -175,7 +176,7 @@ class MeasuredValues:
         return " and ".join(parts)
 
 
-@dataclass(frozen=True, eq=False)
+@struct
 class OutlinedPatches:
     """Piezoelectric patches whose outlines are edges of the mesh, on the faces at largest (top) and smallest y.
 

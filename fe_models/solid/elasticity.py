@@ -8,7 +8,6 @@ blocks), which takes half the memory and, measured, a third of the time of the g
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -21,6 +20,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from ...common.arrays import Array, Integers, NDArray
+from ...common.structs import struct
 from ...mesh.compat import compiled_form, constant_space, geometry_degree, lagrange_space, node_map
 from ..link_records import Material, OrthotropicMaterial
 from .constitutive import stiffness
@@ -28,7 +28,7 @@ from .constitutive import stiffness
 AnyMaterial = Material | OrthotropicMaterial
 
 
-@dataclass(frozen=True)
+@struct
 class MaterialMap:
     """Which material each cell of this rank (ghosts too) is made of.
 
@@ -43,7 +43,7 @@ class MaterialMap:
     of_cell: Integers
 
 
-@dataclass(frozen=True)
+@struct
 class ScalarMass:
     """M_ab = ∫ρ N_a N_b dV over the nodes, rows of this rank's own nodes.
 
@@ -73,7 +73,7 @@ class ScalarMass:
         return np.asarray(self.csr @ np.concatenate([U, foreign]).reshape(-1, 3 * n)).reshape(-1, n)
 
 
-@dataclass(frozen=True)
+@struct
 class SolidModel:
     """Nodes, materials and matrices of a solid, before it is held anywhere.
 

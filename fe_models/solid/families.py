@@ -10,11 +10,11 @@ The largest names the family; where together they carry less than half, the mode
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from ...common.arrays import Array, Integers
+from ...common.structs import struct
 from ..link_records import FAMILIES
 from .functionals import Averages
 
@@ -27,7 +27,7 @@ NEARLY = 1e-3
 SIMPSON = np.array([1.0, 3.0, 3.0, 1.0]) / 8
 
 
-@dataclass(frozen=True)
+@struct
 class SectionMotion:
     """Mean motion of the cross sections at the k stations, weighted such that sums of squares are energies.
 

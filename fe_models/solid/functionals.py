@@ -8,7 +8,6 @@ need no more than ∫N_a ds and ∫x N_a ds of each shape function N_a.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
@@ -17,13 +16,14 @@ from dolfinx import fem
 from dolfinx.mesh import meshtags
 
 from ...common.arrays import Array
+from ...common.structs import struct
 from ...mesh.compat import compiled_form, geometry_degree, lagrange_element, lagrange_space, node_map
 from ...mesh.slices import section_quadratures
 from ..modal_body.parts import LEVI_CIVITA
 from .elasticity import SolidModel
 
 
-@dataclass(frozen=True)
+@struct
 class Averages:
     """Mean motion of k plane figures: faces, or cross sections.
 

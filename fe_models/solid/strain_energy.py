@@ -8,13 +8,14 @@ entries are up to (length / element size)⁴ as large as the lowest ω².
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import basix
 import numpy as np
 import scipy.sparse as sp
 
 from ...common.arrays import Array
+from ...common.structs import struct
 from ...mesh.compat import coordinate_element, geometry_degree, geometry_nodes, lagrange_element, node_map
 from .elasticity import SolidModel, strain_degree
 
@@ -25,7 +26,7 @@ CHUNK = 250_000
 VOIGT = ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))
 
 
-@dataclass(frozen=True)
+@struct
 class Gradients:
     """Displacement gradients of k fields in some cells.
 

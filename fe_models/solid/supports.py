@@ -16,18 +16,18 @@ so that only sparse symmetric positive definite matrices are factorised and B ne
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from dolfinx import fem
 from petsc4py import PETSc
 
 from ...common.arrays import Array, Integers, NDArray, as_floats
+from ...common.structs import struct
 from .elasticity import SolidModel, stiffness_matrix
 from .factors import Factors
 
 
-@dataclass(frozen=True)
+@struct
 class RigidFace:
     """A face that moves as a plate.
 

@@ -29,8 +29,11 @@ class _FileName(click.Path):
         return check_file_name(os.fspath(value))
 
 
+# Shared by all commands: click looks for a translation of each type's name.
 FILE = _FileName(path_type=Path)
 """The type of arguments that are files."""
+_THERE = click.Path(path_type=Path, exists=True)
+_LOG = click.Path(dir_okay=False, writable=True, path_type=Path)
 
 F = TypeVar("F", bound=Callable[..., object])
 
@@ -47,7 +50,7 @@ def python_option(command: F) -> F:
         "--allow-python",
         metavar="PATH",
         multiple=True,
-        type=click.Path(path_type=Path, exists=True),
+        type=_THERE,
         expose_value=False,
         callback=_allow_python,
         help="Run Python files that the scene names from here too [its own folder]; repeatable.",
@@ -63,12 +66,11 @@ def _allow_python(context: click.Context, parameter: click.Parameter, paths: tup
 
 def logging_options(command: F) -> F:
     """Give a command the options `--verbose` and `--log-file`."""
-    path = click.Path(dir_okay=False, writable=True, path_type=Path)
     verbose = click.option(
         "-v", "--verbose", is_flag=True, expose_value=False, callback=_verbose, help="Verbose output."
     )
     log_file = click.option(
-        "--log-file", metavar="FILE", type=path, expose_value=False, callback=_log_file, help="Append a log to FILE."
+        "--log-file", metavar="FILE", type=_LOG, expose_value=False, callback=_log_file, help="Append a log to FILE."
     )
     return verbose(log_file(command))
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,6 +13,7 @@ import h5py
 
 from ..common.arrays import Array
 from ..common.errors import InputError, did_you_mean
+from ..common.structs import struct
 from ..fe_models.modal_body import ModalBody
 from ..fe_models.modal_body_file import read_mass, read_modal_body
 from .analyses import AnalysisAccess
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from ..mbs.scene.space import Space
 
 
-@dataclass(frozen=True)
+@struct
 class ModalFile:
     """The modal body file that a body of the scene came from, as it was then."""
 

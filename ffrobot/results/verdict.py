@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import h5py
 import numpy as np
 
+from ..common.structs import struct
 from .actuators import read_unsupplied
 from .joints import Scene
 
@@ -32,7 +32,7 @@ AXES = "xyz"
 SAME_TIME = 9  # digits of output times (s) that count
 
 
-@dataclass(frozen=True)
+@struct
 class ToolError:
     """The largest distance of a point from its path in an analysis, m; None where the analysis does not ask for it.
 
@@ -102,7 +102,7 @@ Place = tuple[float, str, float]
 """A largest value, where it is, and when (s)."""
 
 
-@dataclass(frozen=True)
+@struct
 class PatchNeed:
     """What patches of a body need, times their limit (0 without), since when (s), and a limit (V) that would do."""
 
@@ -111,7 +111,7 @@ class PatchNeed:
     limit: float
 
 
-@dataclass(frozen=True)
+@struct
 class AnalysisVerdict:
     """What one analysis says.
 
@@ -199,7 +199,7 @@ class AnalysisVerdict:
         return {name: _motor(motor, self.units[name], interval) for name, motor in self.motors.items()}
 
 
-@dataclass(frozen=True)
+@struct
 class Verdict:
     """What every analysis of a results file says, in the order of the scene. Printed, it is that text."""
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,6 +11,7 @@ import numpy as np
 from ..actuation.patches.records import by_body
 from ..actuation.points import PointSet, make_point_set
 from ..common.arrays import Array, Indices
+from ..common.structs import struct
 from ..mbs.model.drives import Drive
 from ..mbs.model.model import Model, modal_directions
 from ..mbs.quantities.motion import RobotMotion
@@ -28,7 +29,7 @@ Bodies = Mapping[str, LoadedBody]
 FORCES_AT_POINTS = ("trajectory", "points")  # values of `apply` that need no modal forces
 
 
-@dataclass(frozen=True)
+@struct
 class Actuation:
     """What an analysis asks of motors and patches.
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import KW_ONLY, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
@@ -12,6 +12,7 @@ import numpy as np
 
 from ..actuation.patches.records import PztLayout, by_body
 from ..common.errors import InputError, did_you_mean, of_file, quoted
+from ..common.structs import struct
 from ..fe_models.link_records import FAMILIES, Family
 from ..fe_models.modal_body import ModalBody
 from ..fe_models.modal_body_file import read_modal_body
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
     from ..actuation.patches.composite import Placed, StructureEffect
 
 
-@dataclass(frozen=True, kw_only=True)
+@struct
 class LoadedBody:
     """A body of the scene.
 
@@ -39,6 +40,7 @@ class LoadedBody:
         motions: the families of motion that the scene can ask of a link.
     """
 
+    _: KW_ONLY
     spatial: Body
     carrying: Body
     structure: StructureEffect | None = None

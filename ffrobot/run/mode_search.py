@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..common.arrays import Array
+from ..common.structs import struct
 from ..mbs.model.body import Body
 
 if TYPE_CHECKING:
@@ -22,7 +23,7 @@ Errors = Mapping[str, Mapping[str, float]]
 """By analysis and kind of quantity, relative to peaks."""
 
 
-@dataclass(frozen=True)
+@struct
 class ModeChoice:
     """What the search for the number of modes found.
 

@@ -8,7 +8,7 @@ modal coordinates are those whose shape is nearest to the link's; its points are
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import cached_property
 
 import numpy as np
@@ -16,6 +16,7 @@ import numpy as np
 from ..common.arrays import Array, as_floats
 from ..common.errors import InputError
 from ..common.rotations import exponential, left_jacobian, logarithm, of_quaternion, quaternions
+from ..common.structs import struct
 from ..fe_models.link_records import HOLDING_ROOT
 from ..fe_models.modal_body import ModalBody
 from ..mbs.model.body import BodyPoint
@@ -34,7 +35,7 @@ AT_END = 1e-9  # of the length
 X = np.array([1.0, 0.0, 0.0])
 
 
-@dataclass(frozen=True)
+@struct
 class Divided:
     """A link in pieces: its modal body, how it is cut, and the modal bodies of its pieces from the root to the tip.
 
@@ -49,7 +50,7 @@ class Divided:
     points: Mapping[str, BodyPoint]
 
 
-@dataclass(frozen=True)
+@struct
 class SectionMotion:
     """A section over time: place r (T, 3), axes A (T, 3, 3), their velocity (T, 3) and angular velocity (T, 3)."""
 
@@ -59,7 +60,7 @@ class SectionMotion:
     omega: Array
 
 
-@dataclass(frozen=True)
+@struct
 class MotionOfLinks(RobotMotion):
     """A motion of pieces, in which links in pieces are the one link each."""
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property
 from math import hypot
 from typing import TYPE_CHECKING
@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..common.arrays import Array, Indices
+from ..common.structs import struct
 from ..fe_models.modal_body import ModalBody
 from ..mbs.analysis.gears import unresolved_gears
 from ..mbs.analysis.outcome import EarlierRun, Outcome
@@ -47,7 +48,7 @@ if TYPE_CHECKING:  # most scenes have none of these
     from .mode_search import ModeChoice
 
 
-@dataclass(frozen=True)
+@struct
 class FinerCheck:
     """What a replay on twice the modes found.
 
@@ -74,7 +75,7 @@ class FinerCheck:
         return f"forward simulation on {modes} modes{ended}: {self.point} is off by {1e3 * self.error:.2g} mm{least}"
 
 
-@dataclass(frozen=True)
+@struct
 class Histories:
     """What has peaks, at outputs of an analysis and at times between them.
 
@@ -96,7 +97,7 @@ class Histories:
     point_forces: Mapping[str, PointForces]
 
 
-@dataclass(frozen=True)
+@struct
 class AnalysisResult:
     """What was computed of one analysis.
 
@@ -199,7 +200,7 @@ class AnalysisResult:
         return max((link.stiffness_change for link in self.bending.values()), default=0.0)
 
 
-@dataclass(frozen=True)
+@struct
 class Solution:
     """Everything a solve of a scene in space computed.
 

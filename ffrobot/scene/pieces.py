@@ -6,10 +6,11 @@ What computes motions gets the scene of pieces; what is said of them is of the o
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, TypeVar
 
 from ..common.errors import InputError
+from ..common.structs import struct
 from ..common.validation import Record
 from ..fe_models.link_records import FAMILIES
 from ..fe_models.pieces import IN_PLANE, CutLink, cut
@@ -20,7 +21,7 @@ from ..mbs.scene.mechanism import MechanismKeys
 from .scene import Scene
 
 
-@dataclass(frozen=True)
+@struct
 class BodyInPieces:
     """How a body of a scene is cut, and the names of its pieces as bodies, from the root to the tip."""
 

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import KW_ONLY, field
 from typing import Protocol, TypeVar
 
 from ...common.arrays import Array
+from ...common.structs import struct
 from .. import _core
 from ..model.divided_link import DividedLink
 from ..model.model import Model
@@ -59,7 +60,7 @@ def no_points(run: Outcome) -> Mapping[str, Array]:
     return {}
 
 
-@dataclass(frozen=True)
+@struct
 class WholeLinks:
     """Of a model in which links are in pieces: the robot with the whole links, as scenes and controllers name it.
 
@@ -76,7 +77,7 @@ class WholeLinks:
     as_links: Callable[[Outcome], Outcome]
 
 
-@dataclass(frozen=True, kw_only=True)
+@struct
 class Context:
     """What the run of an analysis starts from.
 
@@ -92,6 +93,7 @@ class Context:
         whole: the links, where `model` has pieces of some.
     """
 
+    _: KW_ONLY
     progress: Progress
     model: Model
     outcomes: Mapping[str, Outcome]

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
 
 from ...common.arrays import Array, Indices, as_list
+from ...common.structs import struct
 from .. import _core
 from ..fields.waypoints import spline
 from ..model.drives import NO_DRIVES, Command, Drives, PointDrive, Replayed
@@ -40,7 +41,7 @@ STATUS = {
 }
 
 
-@dataclass(frozen=True)
+@struct
 class Control:
     """What acts on motors and patches from sample to sample.
 
@@ -90,7 +91,7 @@ def drive_robot(
     )
     if earlier is not None:  # with the same candidates, and what they have become since
         known = earlier.statistics.integrator
-        integrator = replace(integrator, name=known.name, reason=known.reason)
+        integrator = integrator._replace(name=known.name, reason=known.reason)
     controls = integration_controls(analysis, integrator)
     paths = model.scene.trajectory if any(row.is_trajectory for row in model.rows) else ()
     loads = (size for load in model.scene.load for size in load.components.values())

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import KW_ONLY, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal, Self
@@ -21,6 +21,7 @@ from pydantic import Field, model_validator
 from ...common.arrays import Array, as_floats, as_list
 from ...common.errors import InputError, SolveError
 from ...common.numbers import MOST_OUTPUTS
+from ...common.structs import struct
 from ..fields.field_types import NotNegative
 from ..fields.waypoints import spline
 from ..model.gears import refuse_prescribed_motors
@@ -44,14 +45,15 @@ INFINITE = (
 REST = 1e-9  # speed of a path at rest, relative to its mean speed
 
 
-@dataclass(frozen=True, kw_only=True)
+@struct
 class AroundPath(Details):
     """How long motors act before and after the path, s, and how the path was inverted for motors alone."""
 
+    _: KW_ONLY
     pre_actuation: float
     post_actuation: float
-    held: Model = field(repr=False)
-    inversion: Inversion | None = field(default=None, repr=False)
+    held: Model
+    inversion: Inversion | None = None
 
 
 def where(scene_path: Path, analysis: Analysis) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Literal, NamedTuple
 
@@ -13,6 +13,7 @@ from pydantic import Field
 
 from ...common.arrays import Array
 from ...common.errors import InputError, SolveError, did_you_mean, quoted
+from ...common.structs import struct
 from .._core import TimeFunction
 from ..fields.field_types import NotNegative, PointReference
 from ..model.gears import with_compliance, with_prescribed_motors
@@ -209,7 +210,7 @@ def locked_motors(model: Model, q: Array) -> list[ConstraintRow]:
     return rows
 
 
-@dataclass(frozen=True)
+@struct
 class RobotAtRest(Details):
     """Natural frequencies and compliance in the equilibrium, by condition of its joints: see `joint_conditions`."""
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import KW_ONLY, field, replace
 from functools import cache
 from pathlib import Path
 from types import MappingProxyType
@@ -13,6 +13,7 @@ import numpy as np
 
 from ...common.arrays import Array, Indices
 from ...common.errors import SolveError
+from ...common.structs import struct
 from .. import _core
 from .._core import TimeFunction
 from ..model.drives import PointDrive
@@ -63,7 +64,7 @@ class _Rows:
         return replace(self, **{name: found([getattr(x, name) for x in of_all]) for name in vars(self)})  # type: ignore[type-var]
 
 
-@dataclass(frozen=True)
+@struct
 class Motion(_Rows):
     """One row per output time, SI units.
 
@@ -82,7 +83,7 @@ class Motion(_Rows):
     is_at_rest: bool = False
 
 
-@dataclass(frozen=True)
+@struct
 class Forces(_Rows):
     """What actuators have to supply, and what acts beside the loads of the scene.
 
@@ -101,7 +102,7 @@ class Forces(_Rows):
     voltages: Mapping[str, Array] = field(default_factory=dict)
 
 
-@dataclass(frozen=True)
+@struct
 class Statistics:
     """How a run went. `cause` is what was found wrong at `time_reached` (s, the last step's) where it ended early.
 
@@ -117,7 +118,7 @@ class Statistics:
     wall_seconds: float = 0.0
     time_reached: float | None = None
     cause: str = ""
-    step_ends: Array = field(default_factory=lambda: np.zeros(0), repr=False, compare=False)
+    step_ends: Array = field(default_factory=lambda: np.zeros(0))
     warnings: tuple[str, ...] = ()
 
     def added_to(self, earlier: Statistics) -> Statistics:
@@ -145,7 +146,7 @@ SAMPLED = ("longest", "most", "steps", "every")
 """Numbers of the core's `Samples` beside its times and states."""
 
 
-@dataclass(frozen=True)
+@struct
 class Continuation:
     """Where an integration resumes, its steps where a later analysis replays them, and states between outputs."""
 
@@ -154,7 +155,7 @@ class Continuation:
     samples: _core.Samples | None = None
 
 
-@dataclass(frozen=True)
+@struct
 class EarlierRun:
     """What an earlier run of an analysis has computed, complete or not: it is taken over, or gone on with."""
 
@@ -163,7 +164,7 @@ class EarlierRun:
     continuation: Continuation
 
 
-@dataclass(frozen=True)
+@struct
 class GearMotion:
     """What an elastic gear does in an inverse analysis, one row per output.
 
@@ -217,7 +218,7 @@ class Prescription(NamedTuple):
     voltages: Mapping[str, tuple[Array, Array]] = MappingProxyType({})
 
 
-@dataclass(frozen=True, kw_only=True)
+@struct
 class Outcome:
     """What an analysis computed.
 
@@ -227,15 +228,16 @@ class Outcome:
         look_closer: the same with times between its outputs; None where nothing is between.
     """
 
+    _: KW_ONLY
     analysis: Analysis
     model: Model
     motion: Motion
-    forces: Forces = Forces()
-    statistics: Statistics = Statistics()
-    details: Details = field(default=Details(), repr=False)
-    continuation: Continuation | None = field(default=None, repr=False)
-    prescribed: Prescription | None = field(default=None, repr=False)
-    look_closer: Callable[[], Outcome] | None = field(default=None, repr=False)
+    forces: Forces = field(default=Forces())
+    statistics: Statistics = field(default=Statistics())
+    details: Details = field(default=Details())
+    continuation: Continuation | None = None
+    prescribed: Prescription | None = None
+    look_closer: Callable[[], Outcome] | None = None
 
     @property
     def path(self) -> Path:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import KW_ONLY, replace
 from typing import Annotated, Literal
 
 import numpy as np
@@ -17,6 +17,7 @@ from pydantic import Field
 
 from ...common.arrays import Array, as_floats
 from ...common.errors import InputError, SolveError
+from ...common.structs import struct
 from ...common.validation import Record
 from ..fields.field_types import NotNegative, Positive
 from ..model.gears import elastic_joints
@@ -156,7 +157,7 @@ class Tracking(TimedAnalysis):
         return replace(run, details=around, statistics=statistics).with_look(at)
 
 
-@dataclass(frozen=True, kw_only=True)
+@struct
 class TrackedPath(AroundPath):
     """How a path is carried.
 
@@ -173,6 +174,7 @@ class TrackedPath(AroundPath):
         is_needed: whether that is more than the tolerance times the path's way.
     """
 
+    _: KW_ONLY
     least_voltage: float
     least_voltage_doubt: float
     least_share: float
@@ -186,7 +188,7 @@ class TrackedPath(AroundPath):
     is_needed: bool = True
 
 
-@dataclass(frozen=True)
+@struct
 class _Posed:
     """What is asked for, on which breaks (s), `coarse` ones for a least voltage; time before and after the path (s)."""
 

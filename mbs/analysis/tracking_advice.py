@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from ...common.arrays import Array, ComplexArray, as_floats
 from ...common.errors import SolveError
+from ...common.structs import struct
 from ..solve.servo import Servo
 from ..solve.stable_inversion import invert
 from ..solve.tracking import Transition
@@ -24,7 +25,7 @@ FAR = 0.1  # of the time constant of the slowest zero: t_ℓ of patches whose vo
 INVERTED = 1e-6  # tolerance of stable inversion
 
 
-@dataclass(frozen=True)
+@struct
 class Bounds:
     """Voltages (k,) V that zeros (k,) 1/s need at least, the largest first, at the `times` (k,) s when they count."""
 

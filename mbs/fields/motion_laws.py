@@ -9,13 +9,13 @@ h/T₁, acceleration h/(T₁T₂), jerk h/(T₁T₂T₃)).
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from math import factorial, inf, sqrt
 from typing import Literal
 
 import numpy as np
 
 from ...common.arrays import Array, as_floats
+from ...common.structs import struct
 from .piecewise import SAME_TIME, Piecewise, merged, shifted
 
 Profile = Literal["rest-to-rest", "s-curve", "trapezoid"]
@@ -26,7 +26,7 @@ SHORTEST = 1e-9  # of a motion's duration: what is shorter would be lost by roun
 HALF = 0.5  # of each time of averaging to the one before, where no limit says otherwise
 
 
-@dataclass(frozen=True)
+@struct
 class Limits:
     """Of the speed, acceleration and jerk along the way: m/s or rad/s, and so on; infinite where there is none."""
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -18,6 +17,7 @@ from ...common.rotations import (
     of_quaternion,
     quaternions,
 )
+from ...common.structs import struct
 from .._core import TimeFunction
 from .waypoints import Waypoints
 
@@ -28,7 +28,7 @@ Reference = tuple[float, float, float]
 WIDEST = 2.8  # rad from the middle of all orientations of a table: a rotation vector is smooth well below π
 
 
-@dataclass(frozen=True)
+@struct
 class OrientationLaw:
     """A triad A(t), or its third axis alone ("direction").
 

@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import exp, pi, sqrt
 from typing import Literal, NamedTuple
 
 import numpy as np
 
 from ...common.arrays import Array
+from ...common.structs import struct
 from .motion_laws import Limits, Profile, check_durations, law_in, law_within
 from .piecewise import Piecewise, superposed
 
 SAMPLES = 64  # of each polynomial, to find where a rounded path is fastest
 
 
-@dataclass(frozen=True)
+@struct
 class Legs:
     """A path through `places` (k + 1, n), m or rad, from the first, where it is until `start` (s).
 

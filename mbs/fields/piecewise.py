@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from math import perm
 
 import numpy as np
 
 from ...common.arrays import Array, as_floats
+from ...common.structs import struct
 from .._core import TimeFunction
 
 SAME_TIME = 1e-12  # of a motion's duration: breaks nearer to each other are one
 
 
-@dataclass(frozen=True)
+@struct
 class Piecewise:
     """n components over time: polynomials between `breaks` (k + 1,), s; at rest outside, with their values there.
 

@@ -8,7 +8,6 @@ single coordinates these themselves, of free orientations a quaternion, and the 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from typing import Annotated, ClassVar, Literal, NamedTuple, Self, get_args
 
 import numpy as np
@@ -16,6 +15,7 @@ from pydantic import field_validator, model_validator
 
 from ...common.arrays import Array
 from ...common.rotations import about, of_rpy, smallest_turn
+from ...common.structs import struct
 from ...common.validation import Record
 from ..fields.field_types import (
     GROUND,
@@ -31,7 +31,7 @@ from ..fields.field_types import (
 from ..fields.spelling import IN_SPACE, Vector
 
 
-@dataclass(frozen=True)
+@struct
 class MotorLimits:
     """Largest moment (N·m), speed (rad/s) and power (W) at the joint, infinite without a limit; N, m/s of a force."""
 
@@ -40,7 +40,7 @@ class MotorLimits:
     power: float = np.inf
 
 
-@dataclass(frozen=True)
+@struct
 class Friction:
     """−(c γ̇ + τ_c tanh(γ̇/γ̇_s)) on the coordinate γ of a joint: `viscous` c (N·m·s), `coulomb` τ_c (N·m), γ̇_s."""
 

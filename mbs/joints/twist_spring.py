@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from pydantic import Field, model_validator
 
 from ...common.arrays import Array
+from ...common.structs import struct
 from ...common.validation import Record
 from ..fields.field_types import Positive
 
@@ -31,7 +30,7 @@ class StiffnessSteps(Record):
         return self
 
 
-@dataclass(frozen=True)
+@struct
 class TwistSpring:
     """Torque of a twist, odd and piecewise linear.
 

@@ -13,6 +13,7 @@ import numpy as np
 from ...common.arrays import Array, as_floats
 from ...common.errors import InputError
 from ...common.rotations import about, of_rpy, skew
+from ...common.structs import struct
 from ...fe_models.modal_body import ModalBody
 from ...fe_models.modal_body.parts import LEVI_CIVITA, Invariants
 from ..fields.field_types import split_point
@@ -21,7 +22,7 @@ from . import stiffening as stiffenings
 from .stiffening import Stiffening
 
 
-@dataclass(frozen=True)
+@struct
 class BodyPoint:
     """A section of a body: position (3,) m, Φ as `translation` (3, n), Φ_r as `rotation` (3, n), in body axes.
 
@@ -124,7 +125,7 @@ class Body(Invariants):
         return np.array([S[1, 2] - S[2, 1], S[2, 0] - S[0, 2], S[0, 1] - S[1, 0]])
 
 
-@dataclass(frozen=True)
+@struct
 class Reduction:
     """How a body came by fewer modes: see `truncation.with_fewer_modes`.
 

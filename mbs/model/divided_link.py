@@ -9,19 +9,19 @@ static shape does no work with that load), and so are turns of sections from cut
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
 from ...common.arrays import Array, as_floats
+from ...common.structs import struct
 from ...fe_models.modal_body import ModalBody
 from .body import Body
 
 INTERVALS = 32  # of a piece, over which strains are taken as constant
 
 
-@dataclass(frozen=True)
+@struct
 class DividedLink:
     """The n modal coordinates of a link and the N of its pieces, side by side from the root to the tip.
 

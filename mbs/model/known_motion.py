@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple, Protocol
 
 import numpy as np
 
 from ...common.arrays import Array, as_floats
+from ...common.structs import struct
 from .. import _core
 from .model import Model
 from .system import MultibodySystem
@@ -48,7 +48,7 @@ def without_work(tree: KinematicTree, node: Node, on_outer: Wrench, q: Array, po
     return on_outer.plus(_in_global_axes(F, node, along, q), -1.0)
 
 
-@dataclass(frozen=True)
+@struct
 class State:
     """Positions q (n_q,) and velocities v (n_v,) of the tree: m, rad, √kg·m and these per s."""
 
@@ -88,7 +88,7 @@ class SectionMotion(NamedTuple):
     omega: Array
 
 
-@dataclass(frozen=True)
+@struct
 class MotionForces:
     """What bodies and joints do to each other over states (T, …), global axes.
 

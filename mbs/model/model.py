@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from typing import TypeVar
 
@@ -19,6 +19,7 @@ import numpy as np
 from ...common.arrays import Array, Booleans
 from ...common.errors import InputError, did_you_mean, quoted
 from ...common.rotations import smallest_turn
+from ...common.structs import struct
 from .._core import TimeFunction
 from ..fields.field_types import GROUND
 from ..joints.free import FreeJoint
@@ -37,7 +38,7 @@ from .tree import KinematicTree, Motion, Node, Section
 T = TypeVar("T")
 
 
-@dataclass(frozen=True)
+@struct
 class Model:
     """A scene in space with its bodies: everything analyses share.
 

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
 from ...common.arrays import Array, as_list
 from ...common.rotations import left_jacobian, left_jacobian_slope
+from ...common.structs import struct
 from .. import _core
 from .drives import Command
 from .frame_motors import turning_motors
@@ -17,7 +17,7 @@ from .model import Model
 from .system import MultibodySystem
 
 
-@dataclass(frozen=True)
+@struct
 class MotorForces:
     """τ (T, k) by joint, N·m or N, on its second side, and F_p (T, n) by body, what patches would have to supply.
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
 from ...common.arrays import Array
 from ...common.rotations import logarithm
+from ...common.structs import struct
 from .._core import TimeFunction
 from ..fields.orientations import OrientationLaw
 from .tree import Motion, Node, Section
@@ -16,7 +16,7 @@ from .tree import Motion, Node, Section
 ConstraintKind = Literal["point", "slide", "dot", "rotation", "turn", "coordinate"]
 
 
-@dataclass(frozen=True)
+@struct
 class ConstraintRow:
     """One constraint: a measure of section b on section a that follows `target`, or is 0.
 

@@ -7,12 +7,13 @@ load is Φp − ½ pᵀK p (docs/theory.md, Geometric stiffness). SI units, axes
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from types import MappingProxyType
 
 import numpy as np
 
 from ...common.arrays import Array, as_floats
+from ...common.structs import struct
 from ...fe_models.modal_body import ModalBody
 from ...fe_models.modal_body.lumped_masses import attached_integrals
 from ...fe_models.modal_body.parts import LEVI_CIVITA
@@ -22,7 +23,7 @@ IN_PLANE = ("t_x", "t_y", "r_z", "omega_zz")
 """Inertial loads of motion in the plane z = 0."""
 
 
-@dataclass(frozen=True)
+@struct
 class Stiffening:
     """Integrals of G in the modal coordinates of a `Body`; K is positive where it stiffens under that load.
 

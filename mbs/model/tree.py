@@ -8,13 +8,14 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
 from ...common.arrays import Array, Booleans, as_floats
 from ...common.rotations import exponential, left_jacobian, of_quaternion, quaternions, skew
+from ...common.structs import struct
 from ..fields.field_types import GROUND
 from ..joints.free import FreeJoint
 from ..joints.joint import JointRecord
@@ -62,7 +63,7 @@ class Motion(NamedTuple):
     L: Array
 
 
-@dataclass(frozen=True)
+@struct
 class Node:
     """A body on the joint that carries it.
 

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from ...common.arrays import Array
+from ...common.structs import struct
 from .motion import RobotMotion
 
 
-@dataclass(frozen=True)
+@struct
 class Energies:
     """Kinetic, strain and gravitational energy (T,) J, and the power (T,) W that modes, gears, friction dissipate.
 
@@ -21,7 +20,7 @@ class Energies:
     dissipated_power: Array
 
 
-@dataclass(frozen=True)
+@struct
 class Momentum:
     """Linear (T, 3) kg·m/s, and angular about the global origin (T, 3) kg·m²/s."""
 

@@ -8,11 +8,11 @@ along its trajectories: loops then transmit their share of M v̇ − Q (`split_f
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 
 import numpy as np
 
 from ...common.arrays import Array
+from ...common.structs import struct
 from ...fe_models.modal_body.unit_loads import PAIRS, interface_load_names
 from ..fields.field_types import split_point
 from ..model.known_motion import MotionForces, Wrench, motion_forces, required_forces
@@ -23,7 +23,7 @@ from ..scene.bodies import Payload, tensor
 from .motion import RobotMotion
 
 
-@dataclass(frozen=True)
+@struct
 class LinkLoads:
     """What acts on a link over a motion.
 

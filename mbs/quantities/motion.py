@@ -6,7 +6,7 @@ All arrays are over the output times (T, …), SI units, global axes unless a na
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -14,6 +14,7 @@ import numpy as np
 
 from ...common.arrays import Array, as_floats
 from ...common.rotations import quaternions
+from ...common.structs import struct
 from ..analysis.gears import Supplied, supplied_through_gears, with_motors
 from ..analysis.outcome import GearMotion
 from ..model.body import bent_section
@@ -35,7 +36,7 @@ if TYPE_CHECKING:
     from scipy.interpolate import BSpline
 
 
-@dataclass(frozen=True)
+@struct
 class BodyMotion:
     """Motion of a body's frame and modes, one row per output, in global axes.
 
@@ -71,7 +72,7 @@ class BodyMotion:
         )
 
 
-@dataclass(frozen=True)
+@struct
 class PointMotion:
     """Motion of a point of a body: position (T, d) m, deflection Φ p (T, d) m in body axes.
 
@@ -99,7 +100,7 @@ def _named(found: dict[str, Array]) -> dict[str, Array]:
     return {kinds[values.ndim] if key == "orientation" else key: values for key, values in found.items()}
 
 
-@dataclass(frozen=True)
+@struct
 class RobotMotion:
     """States q (T, n_q), v and a (T, n_v) of a model's tree, and multipliers (T, rows) of its rows, at `time` (T,).
 

@@ -9,12 +9,13 @@ joints and modes, multipliers λ0 with C_vᵀ λ0 = 0 change reactions without c
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TypeVar
 
 import numpy as np
 
 from ...common.arrays import Array, Integers
+from ...common.structs import struct
 from ..model.known_motion import MotionForces, Wrench, multiplier_forces, without_work
 from ..model.tree import Node
 from ..scene.loads import OF_POINT
@@ -68,7 +69,7 @@ SAMPLES = 5  # outputs that are looked at: constraints that depend on each other
 M = TypeVar("M", bound=RobotMotion)
 
 
-@dataclass(frozen=True)
+@struct
 class Sharing:
     """What redundant constraints of loops leave open.
 

@@ -14,13 +14,13 @@ none left (Bathe, Finite Element Procedures, §6.8.2, linearised buckling).
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
 from ...common.arrays import Array, Indices, as_floats
+from ...common.structs import struct
 from ...fe_models.modal_body import ModalBody
 
 AT_ONCE = 64  # outputs whose eigenvalues are found together
@@ -44,7 +44,7 @@ class LoadedPoint(NamedTuple):
     K: Array
 
 
-@dataclass(frozen=True)
+@struct
 class ModalLoads:
     """Loads of sizes f (T, J) with geometric stiffness K (J, n, n), on modes of stiffness K_ff (n,).
 

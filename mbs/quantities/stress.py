@@ -11,18 +11,19 @@ the mode displacement method.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from ...common.arrays import Array, Indices, Integers
+from ...common.structs import struct
 from ...fe_models.modal_body import ModalBody
 from ...fe_models.modal_body.unit_loads import work_on_modes
 
 CHUNK_BYTES = 32e6  # of surface stresses at a time; more leaves the cache
 
 
-@dataclass(frozen=True)
+@struct
 class PointStress:
     """Stress at a point over time, in the body frame; columns xx, yy, zz, yz, xz, xy."""
 
@@ -30,7 +31,7 @@ class PointStress:
     von_mises: Array  # (T,) Pa
 
 
-@dataclass(frozen=True)
+@struct
 class SurfaceStress:
     """Where on the surface the von Mises stress is largest, over time."""
 
@@ -38,7 +39,7 @@ class SurfaceStress:
     position_of_max: Array  # (T, 3) m, undeformed, in the link's frame
 
 
-@dataclass(frozen=True)
+@struct
 class BodyStress:
     """Stresses of one body in one analysis, as far as its modal body file has modal stresses, and what of."""
 
@@ -59,7 +60,7 @@ class BodyStress:
         return max(found, key=lambda entry: entry[0])
 
 
-@dataclass(frozen=True)
+@struct
 class SectionLoads:
     """Moments and forces that layers on a link put on its sections, and on no others: what patches do that stiffen it.
 
@@ -89,7 +90,7 @@ class SectionLoads:
         return found
 
 
-@dataclass(frozen=True)
+@struct
 class Recovery:
     """What stresses of a body are computed from, one row per output.
 

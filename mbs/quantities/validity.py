@@ -10,13 +10,13 @@ than a link on simple supports.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from math import ceil, sqrt
 from typing import NamedTuple
 
 import numpy as np
 
 from ...common.arrays import Array
+from ...common.structs import struct
 from ...fe_models.modal_body import ModalBody
 from ...fe_models.modal_body.unit_loads import interface_load_names
 from ..model.body import Body
@@ -43,7 +43,7 @@ USELESS = 0.1  # of the length, in the position of points
 ENOUGH = 1e-3  # shortening of a piece by bending: tips are then right to some 1e-4 of the length (docs/theory.md)
 
 
-@dataclass(frozen=True)
+@struct
 class Bending:
     """Largest values of one flexible link over a run.
 

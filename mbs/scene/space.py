@@ -6,13 +6,13 @@ Motions are computed in 3D; those of a scene with `space = "planar"` stay in the
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from types import MappingProxyType
 
 from ...common.arrays import Array
+from ...common.structs import struct
 
 
-@dataclass(frozen=True)
+@struct
 class Space:
     """A space by its axes among x, y, z (0, 1, 2).
 

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from heapq import heappop, heappush
 from typing import NamedTuple
 
+from ...common.structs import struct
 from ..fields.field_types import GROUND, body_of
 
 
@@ -30,7 +30,7 @@ class Carrier(NamedTuple):
         return body_of(self.other)
 
 
-@dataclass(frozen=True)
+@struct
 class Topology:
     """The spanning forest of a mechanism, and what is beside it.
 

@@ -11,12 +11,12 @@ p̈ for a moment, as where a zero passes through infinity.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from ...common.arrays import Array
+from ...common.structs import struct
 
 if TYPE_CHECKING:
     from scipy.interpolate import PPoly
@@ -62,7 +62,7 @@ def gauss(stages: int = STAGES, *, of_second_order: bool = False) -> Scheme:
 GAUSS, OF_SECOND_ORDER = gauss(), gauss(of_second_order=True)
 
 
-@dataclass(frozen=True)
+@struct
 class Problem:
     """The equations, for N nodes at once: times (N,), p, ṗ, p̈ (N, n).
 
@@ -81,7 +81,7 @@ class Problem:
     scheme: Scheme = GAUSS
 
 
-@dataclass(frozen=True)
+@struct
 class Found:
     """p(t) as piecewise polynomials, (n,) values; whether Newton's method converged, and its iterations.
 

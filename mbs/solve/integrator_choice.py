@@ -6,8 +6,6 @@ above the tolerance. The rule estimates the number of steps of both; a wrong one
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from ...common.arrays import Array
@@ -71,7 +69,7 @@ def choose_integrator(
     excited = _excitation(system, start, found)
     choice = faster_of(found.frequency, found.damping_ratio, excited, analysis, outputs, COST_OF_RADAU)
     # Under a replay the length of steps says less of what they cost: no integrator takes over.
-    return choice if replayed is None else replace(choice, candidates=())
+    return choice if replayed is None else choice._replace(candidates=())
 
 
 def fastest_friction(system: MultibodySystem, at: State) -> tuple[float, str]:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 
@@ -40,8 +40,7 @@ MOST_TOLD = 3  # changes
 CHANGED, IN_ALL = " from t = ", "; changed "  # in reasons
 
 
-@dataclass(frozen=True)
-class Candidate:
+class Candidate(NamedTuple):
     """An integrator for a run: what a step of it costs, and how far it is expected to get for that, s per cost."""
 
     name: str
@@ -49,8 +48,7 @@ class Candidate:
     pace: float = 0.0
 
 
-@dataclass(frozen=True)
-class Choice:
+class Choice(NamedTuple):
     """An integrator by its name in scenes, and why it was chosen.
 
     Of two `candidates` the second takes over during the run where it turns out faster, and the first again. The name
@@ -92,7 +90,7 @@ class Choice:
         ]
         count = known + len(run.changes)
         reason = "; ".join([earlier, *texts]) + (f"{IN_ALL}{count} times in all" if count > MOST_TOLD else "")
-        return replace(self, name=f"{last}{AFTER}{' and '.join(before)}", reason=reason)
+        return self._replace(name=f"{last}{AFTER}{' and '.join(before)}", reason=reason)
 
 
 NOT_INTEGRATED = Choice("none", "nothing to integrate")
@@ -152,7 +150,7 @@ def with_steps_of(analysis: IntegratedAnalysis, end: float, choose: Callable[[],
             )
         return Choice(steps.method, REPEATED)
     choice = choose()
-    return replace(choice, candidates=()) if analysis.keep_steps and choice.name in EXPLICIT else choice
+    return choice._replace(candidates=()) if analysis.keep_steps and choice.name in EXPLICIT else choice
 
 
 def beyond_order(choice: Choice, analysis: IntegratedAnalysis) -> str:

@@ -10,7 +10,6 @@ side need it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from itertools import product
 from typing import NamedTuple
 
@@ -18,6 +17,7 @@ import numpy as np
 from numpy.lib.stride_tricks import as_strided
 
 from ...common.arrays import Array, as_floats
+from ...common.structs import struct
 
 MOST_ITERATIONS = 60
 FEASIBLE = 1e-10  # of equations and inequalities, relative to their data
@@ -27,7 +27,7 @@ HALFWAY = 1e-3  # of the objective: the gap where a similar program begins
 BACK = 0.995  # of the way to the nearest bound
 
 
-@dataclass(frozen=True)
+@struct
 class Program:
     """See above: H (N, s + r, s + r), g (N, s + r), F, G (N, e, s), c (N, e), C (N, i, s + r), d (N, i).
 

@@ -8,12 +8,13 @@ With the coordinates of motors fixed, R δs = 0, the linear equations M δs̈ + 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
 from ...common.arrays import Array, ComplexArray, Indices, null_space
+from ...common.structs import struct
 from .linearisation import LinearMechanism
 
 RIGID = 1e-6  # of the highest frequency, below which a mode counts as without stiffness: round-off of a double zero
@@ -21,7 +22,7 @@ LOCKED, COMPLIANT = "locked", "compliant"
 DEPENDENT = 1e-9  # of the largest singular value: below it a coordinate follows from others
 
 
-@dataclass(frozen=True)
+@struct
 class RobotModes:
     """The f modes of a robot, slowest first; two real poles that follow each other make one.
 
@@ -100,7 +101,7 @@ class FreeCoordinates(NamedTuple):
     D: Array
 
 
-@dataclass(frozen=True)
+@struct
 class JointCondition:
     """Of a robot at one instant, with the joints that have motors locked, or the motors alone behind compliant gears.
 

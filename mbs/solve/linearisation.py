@@ -13,7 +13,6 @@ these do on modes turns with the sections at them.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from types import MappingProxyType
 from typing import NamedTuple
 
@@ -22,6 +21,7 @@ import numpy as np
 from ...common.arrays import Array, Indices, as_floats
 from ...common.errors import InputError, SolveError
 from ...common.rotations import skew
+from ...common.structs import struct
 from ..model.cut import measured
 from ..model.frame_motors import turning_motors
 from ..model.gears import gear_matrices
@@ -35,7 +35,7 @@ from ..scene.space import SPACES
 DEPENDENT = 1e-8  # of a row's gradient, what others must leave of it to count as independent
 
 
-@dataclass(frozen=True)
+@struct
 class LinearMechanism:
     """M δs̈ + D δṡ + K δs = inputs · δu about (time, q, v, a); f independent coordinates s.
 

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from ...common.arrays import Array, NDArray, as_floats, null_space
 from ...common.errors import InputError, quoted
+from ...common.structs import struct
 from .._core import TimeFunction
 from ..model.known_motion import State
 from ..model.model import Model, row_values, target_rates, without_paths
@@ -102,7 +102,7 @@ def joint_scales(model: Model) -> Array:
     return scales
 
 
-@dataclass(frozen=True)
+@struct
 class Mobility:
     """How the rigid mechanism can move in a posture.
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -11,6 +11,7 @@ import numpy as np
 
 from ...common.arrays import Array, Indices, as_floats, as_list
 from ...common.errors import InputError
+from ...common.structs import struct
 from .. import _core
 from .._core import TimeFunction
 from ..model.frame_motors import turning_motors
@@ -42,7 +43,7 @@ class Target(NamedTuple):
     function: TimeFunction
 
 
-@dataclass(frozen=True)
+@struct
 class Servo:
     """The robot under its path, held before 0 and after `end`; `factor` 1 takes the path's own points as output.
 

@@ -10,7 +10,7 @@ initial value problem, solved window by window, each with intervals as short as 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -18,6 +18,7 @@ import numpy as np
 
 from ...common.arrays import Array, Booleans, ComplexArray, as_floats
 from ...common.errors import SolveError
+from ...common.structs import struct
 from .. import _core
 from .collocation import GAUSS, OF_SECOND_ORDER, Boundary, Problem, collocate
 from .servo import Servo, Stopped
@@ -43,7 +44,7 @@ Derivatives = Callable[[Array], tuple[Array, Array, Array]]
 """M, D and K, each (N, n, n), at any times (N,)."""
 
 
-@dataclass(frozen=True)
+@struct
 class Inversion:
     """p(t) from −pre to end + post, and how it was found.
 

@@ -11,12 +11,13 @@ sag. Links rest at both ends. Output transition with free internal states: Perez
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
 from ...common.arrays import Array, Indices
+from ...common.structs import struct
 from .collocation import GAUSS, Elimination, piecewise, stage_states
 from .interior_point import GAP, Minimum, Program, minimize
 from .servo import Servo
@@ -38,7 +39,7 @@ WHILE_SETTLING = 1e-4  # of the last change of a share by Newton's steps, relati
 ROUGH_GAP = 1e-6  # of the objective, there
 
 
-@dataclass(frozen=True)
+@struct
 class Limits:
     """Of patches (m,) V, and of motors (motors,) N·m or N; infinite where there are none."""
 
@@ -46,7 +47,7 @@ class Limits:
     torque: Array
 
 
-@dataclass(frozen=True)
+@struct
 class Weights:
     """τ_ref (N·m), V_ref (V) and T_r (s)."""
 
@@ -55,7 +56,7 @@ class Weights:
     rate: float
 
 
-@dataclass(frozen=True)
+@struct
 class Transition:
     """What is asked for: `rest` are p at both ends, `is_free` whether V may begin and end at any value.
 
@@ -78,7 +79,7 @@ class Transition:
         return np.where(np.isfinite(limit), limit, self.weights.voltage)
 
 
-@dataclass(frozen=True)
+@struct
 class Tracked:
     """p(t) and V(t) as piecewise polynomials, and how they were found.
 
@@ -104,7 +105,7 @@ class Tracked:
     objective: Objective
     unmet: float = np.nan
     step: float = np.inf
-    found: Minimum | None = field(default=None, repr=False)
+    found: Minimum | None = None
     added: float = 0.0
     doubt: float = np.inf
 
@@ -152,7 +153,7 @@ def track(
     return last.tracked(steps)
 
 
-@dataclass(frozen=True)
+@struct
 class _Iterate:
     """p, ṗ, V at breaks (N+1, …), p̈ at stages (N, 4, n) and σ, and the minimum they come from."""
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -11,6 +11,7 @@ import numpy as np
 
 from ...common.arrays import Array, as_floats, null_space
 from ...common.errors import InputError, quoted
+from ...common.structs import struct
 from ..model.cut import cut_damping
 from ..model.gears import gear_matrices, with_prescribed_motors
 from ..model.known_motion import State
@@ -85,7 +86,7 @@ def strained(K: Array, free: Array) -> int:
 INSTANTS = 9
 
 
-@dataclass(frozen=True)
+@struct
 class PathFrequencies:
     """The lowest vibrations of the undeformed robot at instants of a path: (instants, modes), Hz and damping ratios."""
 

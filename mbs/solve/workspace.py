@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -11,6 +11,7 @@ import numpy as np
 from ...common.arrays import Array, Booleans, Indices
 from ...common.errors import InputError
 from ...common.rotations import logarithm
+from ...common.structs import struct
 from .._core import TimeFunction
 from ..fields.field_types import GROUND
 from ..fields.orientations import OrientationLaw
@@ -23,7 +24,7 @@ from .start import undeformed_posture
 TOGETHER = 500  # postures that are solved at once
 
 
-@dataclass(frozen=True)
+@struct
 class GridAxis:
     """One direction of a grid: a joint's coordinate, or "x", "y" or "z" of the point; `unit` is "rad" or "m"."""
 

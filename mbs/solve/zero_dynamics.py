@@ -11,13 +11,13 @@ vanish: the zero dynamics about a path that is held (Blajer and Kolodziejczyk 20
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from ...common.arrays import Array, Booleans, ComplexArray, NDArray, as_floats
 from ...common.errors import SolveError
+from ...common.structs import struct
 from .servo import Servo, stiffness
 
 MOST_ITERATIONS = 50
@@ -25,7 +25,7 @@ TOLERANCE = 1e-12  # of the last Newton step to an equilibrium, relative
 CENTRE = 1e-6  # |Re s| / |s| of zeros that count as undamped
 
 
-@dataclass(frozen=True)
+@struct
 class LinearDynamics:
     """M δp̈ + D δṗ + K δp = 0 of the internal dynamics at `times` (N,): each (N, n, n)."""
 
@@ -106,7 +106,7 @@ SHAPE_ITERATIONS = 8  # of that shape, each a hundred times closer for links tha
 TINY = 1e-300
 
 
-@dataclass(frozen=True)
+@struct
 class Linearisation:
     """The internal dynamics along the path, with the shape (N, n) that links sag to there; `scale` of the output."""
 

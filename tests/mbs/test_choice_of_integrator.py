@@ -1,7 +1,5 @@
 """`integrator = "auto"`: what it looks at, and what it chooses."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 import zoo
@@ -19,7 +17,7 @@ AT_REST = {"angles": ANGLES, "state": "static"}
 def chosen(model, **keys):
     """What a run begins with; it may change."""
     choice = run(model, pcid(**keys)).statistics.integrator
-    return replace(choice, name=choice.candidates[0].name) if choice.candidates else choice
+    return choice._replace(name=choice.candidates[0].name) if choice.candidates else choice
 
 
 def test_vibrations_solve_the_linearised_equations():
