@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from functools import cached_property, partial
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -15,7 +15,9 @@ from ..mbs.model.known_motion import mass_matrices
 from ..mbs.model.motors import split_forces
 from ..mbs.quantities.motion import RobotMotion
 from .motors import MotorFeasibility, first_time
-from .patches.patches import PatchArray, Voltages
+
+if TYPE_CHECKING:
+    from .patches.patches import PatchArray, Voltages
 
 ROWS = 50  # of a run, about, at which mass matrices are made, and at twice as many around the largest shift
 RINGING = 2.0  # times the static shift, of a force that is missing all at once

@@ -6,6 +6,7 @@ from collections.abc import Container, Mapping
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,9 +18,11 @@ from ..mbs.quantities.motion import RobotMotion
 from ..mbs.scene.analysis import Analysis
 from .feasibility import Feasibility, ModalMotion, PatchFeasibility, Unsupplied, judge_patches, seen_at_points
 from .motors import judge_motors
-from .patches.link_patches import LinkPatches, on_kept_modes, with_count
-from .patches.patches import Voltages, voltage_gain
-from .patches.records import PztLayout
+
+if TYPE_CHECKING:  # robots without patches do without them
+    from .patches.link_patches import LinkPatches
+    from .patches.patches import Voltages
+    from .patches.records import PztLayout
 
 ROUNDING = 1e-6  # of the largest modal force: less is what ill-conditioned patches leave
 NEGLIGIBLE = 1e-6  # of the length of a link, of a deflection; rad
@@ -80,6 +83,9 @@ def _largest_voltage(
     path: Path, motion: RobotMotion, link: LinkInMotion, layout: PztLayout, count: int
 ) -> float | None:
     """V, that so many patches of a layout would need alone, evenly spread; None where they have no room."""
+    from .patches.link_patches import on_kept_modes, with_count
+    from .patches.patches import voltage_gain
+
     found = with_count(path, layout, link.modal, link.spatial, count)
     if found is None:
         return None

@@ -22,8 +22,8 @@ USED: set[type[BaseModel]] = set()
 class Deferred:
     """Marks the record of a table, or a union of records that the key `tag` tells apart.
 
-    `modules` has the records by the value of that key, "MODULE:RECORD", where no union does. A module is imported when
-    a file has such a table.
+    `modules` has the records by the value of that key, "MODULE:RECORD", where no union does; without `tag`, the one
+    record by "". A module is imported when a file has such a table.
     """
 
     tag: str = ""
@@ -31,7 +31,7 @@ class Deferred:
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:  # noqa: ANN401
         if not self.tag:
-            return _deferred(source)
+            return _deferred(self.modules.get("", source))
         of_union = {get_args(one.model_fields[self.tag].annotation)[0]: one for one in get_args(source)}
         records = self.modules or of_union
         return core_schema.tagged_union_schema(

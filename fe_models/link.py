@@ -32,8 +32,11 @@ from ..common.structs import struct
 from ..common.validation import plain
 from ..common.version import digest_of_code
 from ..mesh.kept_parts import digest_of_mesh_code, geometry_content, kept_path
-from .link_file import LinkSource, LinkTable, link_path, read_link
-from .link_records import FAMILIES, BeamLink, Link, SolidLink, read_measured
+from .link_file import read_link
+from .link_records.families import FAMILIES
+from .link_records.link import BeamLink, Link, SolidLink
+from .link_records.measured import read_measured
+from .link_source import LinkSource, LinkTable, link_path
 from .modal_body import ModalBody, StressPoint
 from .modal_body.damping import damping_ratio
 from .modal_body.lumped_masses import lumps

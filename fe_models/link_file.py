@@ -1,61 +1,23 @@
-"""The link file: read, and checked for all that one key alone cannot tell (the records check the keys).
-
-Its content may stand elsewhere, as a table of a scene or a dictionary of Python.
-"""
+"""The link file: read, and checked for all that one key alone cannot tell (the records check the keys)."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from copy import deepcopy
-from dataclasses import dataclass
 from itertools import pairwise
 from math import isclose
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import NoReturn
 
 import numpy as np
 
 from ..common.errors import InputError
-from ..common.toml_files import load_toml
 from ..common.validation import validate
 from ..mesh.records import RectangleSection, SectionRecord, TubeSection
 from .beam.section_stress import contains
-from .link_records import (
-    DEFAULT_COUNT,
-    FAMILIES,
-    BeamLink,
-    Link,
-    Material,
-    OrthotropicMaterial,
-    SolidLink,
-    read_measured,
-)
+from .link_records.families import DEFAULT_COUNT, FAMILIES
+from .link_records.link import BeamLink, Link, Material, OrthotropicMaterial, SolidLink
+from .link_records.measured import read_measured
+from .link_source import LinkSource, link_keys, link_path
 from .solid.constitutive import is_stable
-
-
-@dataclass(frozen=True)
-class LinkTable:
-    """The `keys` of a link file that stand elsewhere.
-
-    Messages call them `path`, in whose folder files are that they name.
-    """
-
-    keys: Mapping[str, Any]
-    path: Path
-
-
-LinkSource = Path | LinkTable
-"""A link file, or its content."""
-
-
-def link_path(source: LinkSource) -> Path:
-    """What messages call a link."""
-    return source.path if isinstance(source, LinkTable) else source
-
-
-def link_keys(source: LinkSource) -> dict[str, Any]:
-    """The content of a link file, unchecked. Raises `InputError` where it cannot be read."""
-    return deepcopy(dict(source.keys)) if isinstance(source, LinkTable) else load_toml(source, "link file")
 
 
 def read_link(source: LinkSource) -> Link:

@@ -14,8 +14,10 @@ from typing import Any
 
 from ..common.errors import InputError, quoted
 from ..common.structs import struct
-from .link_file import LinkSource, LinkTable, link_path, read_link
-from .link_records import BeamLink, Family, Link
+from .link_file import read_link
+from .link_records.families import Family
+from .link_records.link import BeamLink, Link
+from .link_source import LinkSource, LinkTable, link_path
 
 BENDING: tuple[Family, ...] = ("in-plane-bending", "out-of-plane-bending")
 ON_A_CUT = 1e-9  # of the length

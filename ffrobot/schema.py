@@ -68,7 +68,7 @@ def _scene() -> dict[str, Any]:
 def _file(kind: str) -> dict[str, Any]:
     """Of link files and of figure files."""
     if kind == "link":
-        from .fe_models.link_records import Link
+        from .fe_models.link_records.link import Link
 
         described = TypeAdapter(Link).json_schema(schema_generator=_Described)
         described["oneOf"] = described.pop("anyOf")  # geometry.kind tells beam and solid apart

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from ffrobot.fe_models.link import cached_modal_body
-from ffrobot.fe_models.link_file import LinkTable
+from ffrobot.fe_models.link_source import LinkTable
 
 
 def rectangle(height, width):

@@ -12,7 +12,7 @@ import numpy as np
 from ...common.arrays import Array, Indices, as_floats
 from ...common.errors import InputError
 from ...common.structs import struct
-from ...fe_models.link_records import Family
+from ...fe_models.link_records.families import Family
 from ...fe_models.modal_body import ModalBody
 from ...mbs import _core
 from ...mbs.model.body import Body

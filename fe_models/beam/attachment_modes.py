@@ -10,7 +10,7 @@ import scipy.linalg
 import scipy.sparse as sp
 
 from ...common.arrays import Array
-from ..link_records import Family
+from ..link_records.families import Family
 from ..modal_body.attachment_modes import COMPONENTS, Inertia, Modes, residual_modes
 from ..modal_body.craig_bampton import in_order
 from .beam import R_X, FamilyModel

@@ -15,7 +15,8 @@ import scipy.sparse as sp
 
 from ...common.arrays import Array
 from ...common.structs import struct
-from ..link_records import BeamLink, Family, Solver
+from ..link_records.families import Family
+from ..link_records.link import BeamLink, Solver
 from .line import gram, hermite, lagrange
 from .sections import Property, cellwise, link_modulus, rod_properties, second_moment, shear_modulus
 

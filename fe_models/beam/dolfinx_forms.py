@@ -12,7 +12,8 @@ from mpi4py import MPI
 
 from ...common.arrays import Array
 from ...mesh.compat import compiled_form, constant_space, lagrange_space
-from ..link_records import BeamLink, Family
+from ..link_records.families import Family
+from ..link_records.link import BeamLink
 from .line import Functions, hermite, lagrange
 from .sections import Property, cellwise, link_modulus, rod_properties, second_moment, shear_modulus
 

@@ -8,7 +8,7 @@ from scipy.sparse.linalg import splu
 
 from ...common.arrays import Array
 from ...common.errors import SolveError
-from ..link_records import Solver
+from ..link_records.link import Solver
 from ..modal_body.lanczos import BlockLanczos
 
 # Multipliers amplify relative errors of the model data some 400 times within 0.2 s of the two-link case.

@@ -22,7 +22,7 @@ import numpy as np
 from scipy.special import roots_legendre
 
 from ...common.arrays import Array
-from ..link_records import BeamLink
+from ..link_records.link import BeamLink
 from ..modal_body.lumped_masses import of_turning
 from ..modal_body.parts import LEVI_CIVITA
 from ..modal_body.unit_loads import inertia_wrenches, interface_load_names, unit_load_names

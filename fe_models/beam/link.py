@@ -14,7 +14,8 @@ from ...common.arrays import Array, as_floats
 from ...common.errors import InputError
 from ...common.version import VERSION
 from ...mesh.structured import graded_nodes, with_points
-from ..link_records import DEFAULT_COUNT, FAMILIES, BeamLink, Family
+from ..link_records.families import DEFAULT_COUNT, FAMILIES, Family
+from ..link_records.link import BeamLink
 from ..modal_body import Interface, ModalBody, PictureMesh, Stations
 from ..modal_body.attachment_modes import ascending
 from ..modal_body.damping import canonical_signs, damping_ratio

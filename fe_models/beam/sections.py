@@ -8,7 +8,8 @@ import numpy as np
 
 from ...common.arrays import Array
 from ...mesh.records import RectangleSection, SectionRecord
-from ..link_records import BeamLink, Family
+from ..link_records.families import Family
+from ..link_records.link import BeamLink
 from ..link_records.section import Section
 
 Property = Callable[[Section], float]

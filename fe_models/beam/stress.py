@@ -15,7 +15,7 @@ import numpy as np
 from scipy.special import roots_legendre
 
 from ...common.arrays import Array, Integers
-from ..link_records import BeamLink
+from ..link_records.link import BeamLink
 from ..modal_body import Interface, Stations, StressPoint, craig_bampton
 from ..modal_body.attachment_modes import interface_loads
 from ..modal_body.interpolation import through

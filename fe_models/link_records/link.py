@@ -22,6 +22,7 @@ from ...mesh.records import (
     SolidMeshRecord,
     TubeSection,
 )
+from .families import FAMILIES, HOLDING_ROOT, Family
 from .measured import Measured
 from .section import Section, rectangle, tube
 
@@ -68,13 +69,6 @@ class SurfacePatches(Record):
         """What the mesh of a solid of `length` (m) outlines for them."""
         return Outlines(tuple(self.edges(length)), self.width, self.faces)
 
-
-Family = Literal["in-plane-bending", "out-of-plane-bending", "axial", "torsion"]
-
-DEFAULT_COUNT: Mapping[Family, int] = {"in-plane-bending": 6, "out-of-plane-bending": 6, "axial": 1, "torsion": 1}
-"""Eigenmodes of each family where a link file leaves their number out: attachment modes have the statics."""
-
-FAMILIES: tuple[Family, ...] = tuple(DEFAULT_COUNT)
 
 Solver = Literal["block-lanczos", "slepc"]
 
@@ -134,10 +128,6 @@ class BeamModel(Record):
 
     theory: Literal["euler-bernoulli", "timoshenko"] = "euler-bernoulli"
     """Beam theory: without shear, or with shear and rotary inertia of the sections."""
-
-
-HOLDING_ROOT = ("cantilever", "craig-bampton")
-"""Reference conditions under which the root's section stays where it is in the frame."""
 
 
 class Reference(Record):

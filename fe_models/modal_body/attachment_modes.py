@@ -18,7 +18,7 @@ import numpy as np
 
 from ...common.arrays import Array, Integers
 from ...common.structs import struct
-from ..link_records import FAMILIES, Family
+from ..link_records.families import FAMILIES, Family
 from .parts import Interface
 
 # Of the energy (its square root) of the static shape of a load, what a combination of residuals must have to be kept.

@@ -19,7 +19,7 @@ import numpy as np
 from ...common.arrays import Array
 from ...common.errors import InputError
 from ...common.structs import struct
-from ..link_records import FAMILIES
+from ..link_records.families import FAMILIES
 from .attachment_modes import COMPONENTS, Modes, ascending, uncoupled
 from .body import ModalBody
 from .parts import LEVI_CIVITA, Interface

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...common.arrays import Array
-from ..link_records import Link
+from ..link_records.link import Link
 
 
 def damping_ratio(link: Link, omega: Array) -> Array:

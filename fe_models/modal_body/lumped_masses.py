@@ -9,15 +9,17 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
 from ...common.arrays import Array
 from ...common.structs import struct
-from ..link_records import InterfaceRecord
 from .parts import LEVI_CIVITA, Interface, Invariants
 from .unit_loads import PAIRS, inertia_wrenches, interface_load_names
+
+if TYPE_CHECKING:  # stage 2 does without the records of links
+    from ..link_records.link import InterfaceRecord
 
 Of = TypeVar("Of", bound=Invariants)
 

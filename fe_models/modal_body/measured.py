@@ -15,7 +15,9 @@ import numpy as np
 
 from ...common.arrays import Array
 from ...common.errors import InputError
-from ..link_records import FAMILIES, Link, MeasuredMode, paired, read_measured
+from ..link_records.families import FAMILIES
+from ..link_records.link import Link
+from ..link_records.measured import MeasuredMode, paired, read_measured
 from .body import ModalBody
 from .damping import damping_ratio
 from .parts import MeasuredValues

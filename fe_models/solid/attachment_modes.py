@@ -14,7 +14,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from ...common.arrays import Array
-from ..link_records import Family
+from ..link_records.families import Family
 from ..modal_body.attachment_modes import COMPONENTS, Inertia, Modes, residual_modes
 from ..modal_body.craig_bampton import ROOT, in_order
 from ..modal_body.unit_loads import interface_load_names

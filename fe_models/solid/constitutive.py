@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...common.arrays import Array
-from ..link_records import Material, OrthotropicMaterial
+from ..link_records.link import Material, OrthotropicMaterial
 
 
 def stiffness(material: Material | OrthotropicMaterial) -> Array:

@@ -22,7 +22,7 @@ from petsc4py import PETSc
 from ...common.arrays import Array, Integers, NDArray
 from ...common.structs import struct
 from ...mesh.compat import compiled_form, constant_space, geometry_degree, lagrange_space, node_map
-from ..link_records import Material, OrthotropicMaterial
+from ..link_records.link import Material, OrthotropicMaterial
 from .constitutive import stiffness
 
 AnyMaterial = Material | OrthotropicMaterial

@@ -15,7 +15,7 @@ import numpy as np
 
 from ...common.arrays import Array, Integers
 from ...common.structs import struct
-from ..link_records import FAMILIES
+from ..link_records.families import FAMILIES
 from .functionals import Averages
 
 LOCAL = "local"

@@ -19,7 +19,8 @@ from ...mesh.compat import lagrange_element, node_map
 from ...mesh.records import default_order
 from ...mesh.solid_mesh import SolidMesh, solid_mesh
 from ...mesh.structured import with_points
-from ..link_records import HOLDING_ROOT, Coupling, SolidLink
+from ..link_records.families import HOLDING_ROOT
+from ..link_records.link import Coupling, SolidLink
 from ..modal_body import Interface, ModalBody, PictureMesh, Stations
 from ..modal_body.damping import canonical_signs, damping_ratio
 from ..modal_body.lumped_masses import lump_weights, lumps, with_lumped_loads, with_lumped_masses, with_lumped_stiffness

@@ -10,7 +10,8 @@ import numpy as np
 
 from ...common.arrays import Array
 from ...common.errors import InputError, quoted
-from ..link_records import DEFAULT_COUNT, FAMILIES, SolidLink
+from ..link_records.families import DEFAULT_COUNT, FAMILIES
+from ..link_records.link import SolidLink
 from ..modal_body.attachment_modes import Modes, ascending
 from ..modal_body.lanczos import BlockLanczos
 from .elasticity import Mass

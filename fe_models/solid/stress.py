@@ -21,7 +21,7 @@ from scipy.spatial import cKDTree
 from ...common.arrays import Array, Integers
 from ...common.errors import InputError
 from ...mesh.compat import coordinate_element, geometry_nodes, lagrange_element, node_map
-from ..link_records import SolidLink
+from ..link_records.link import SolidLink
 from ..modal_body import StressPoint
 from .elasticity import SolidModel
 from .strain_energy import VOIGT

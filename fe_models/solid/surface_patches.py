@@ -19,7 +19,7 @@ from mpi4py import MPI
 from ...common.arrays import Array
 from ...common.errors import SolveError
 from ...mesh.compat import compiled_form
-from ..link_records import SurfacePatches
+from ..link_records.link import SurfacePatches
 from ..modal_body import OutlinedPatches
 
 if TYPE_CHECKING:

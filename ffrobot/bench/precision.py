@@ -15,7 +15,7 @@ import tomli_w
 
 from ..common.arrays import Array
 from ..common.errors import FfrobotError, SolveError
-from ..fe_models.link_file import link_keys, link_path
+from ..fe_models.link_source import link_keys, link_path
 from ..mbs.scene.analysis import TIGHTEST_TOLERANCE, IntegratedAnalysis
 from ..run.watcher import Watcher
 from ..scene.scene import Scene

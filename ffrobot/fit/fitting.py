@@ -15,7 +15,7 @@ from ..common.errors import FfrobotError, InputError
 from ..common.files import AnyPath, check_new_file, write_atomically
 from ..common.toml_files import load_toml
 from ..common.validation import check_texts
-from ..fe_models.link_records import MeasuredMode, paired, read_measured
+from ..fe_models.link_records.measured import MeasuredMode, paired, read_measured
 from ..present.lines import plain_table
 from .least_squares import Fit, fit_frequencies
 from .robot_target import Key, LinkTarget, RobotTarget

@@ -19,8 +19,8 @@ from ..common.arrays import Array, as_floats
 from ..common.errors import InputError
 from ..common.toml_files import load_toml, read_text
 from ..fe_models.link import computed_modal_body
-from ..fe_models.link_file import LinkTable
-from ..fe_models.link_records import FAMILIES
+from ..fe_models.link_records.families import FAMILIES
+from ..fe_models.link_source import LinkTable
 from ..run.solve import solve_scene
 from ..run.watcher import Watcher
 from ..scene.load import load_scene, make_scene

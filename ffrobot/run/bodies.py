@@ -13,7 +13,7 @@ import numpy as np
 from ..actuation.patches.records import PztLayout, by_body
 from ..common.errors import InputError, did_you_mean, of_file, quoted
 from ..common.structs import struct
-from ..fe_models.link_records import FAMILIES, Family
+from ..fe_models.link_records.families import FAMILIES, Family
 from ..fe_models.modal_body import ModalBody
 from ..fe_models.modal_body_file import read_modal_body
 from ..mbs.fields.field_types import split_point

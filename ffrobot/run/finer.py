@@ -11,7 +11,7 @@ import numpy as np
 
 from ..common.arrays import Array
 from ..common.errors import InputError
-from ..fe_models.link_file import LinkTable, link_keys, link_path
+from ..fe_models.link_source import LinkTable, link_keys, link_path
 from ..fe_models.modal_body import ModalBody
 from ..mbs.analysis.drive import drive_robot
 from ..mbs.analysis.forward import Forward, actuator_commands, largest_moments

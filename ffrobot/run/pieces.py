@@ -17,7 +17,7 @@ from ..common.arrays import Array, as_floats
 from ..common.errors import InputError
 from ..common.rotations import exponential, left_jacobian, logarithm, of_quaternion, quaternions
 from ..common.structs import struct
-from ..fe_models.link_records import HOLDING_ROOT
+from ..fe_models.link_records.families import HOLDING_ROOT
 from ..fe_models.modal_body import ModalBody
 from ..mbs.model.body import BodyPoint
 from ..mbs.model.divided_link import spread_of

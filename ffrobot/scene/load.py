@@ -13,7 +13,7 @@ from ..common.files import AnyPath
 from ..common.python_files import python_allowed
 from ..common.toml_files import load_toml, parse_toml, read_text
 from ..common.validation import plain, validate
-from ..fe_models.link_file import LinkTable, read_link
+from ..fe_models.link_source import LinkTable
 from ..mbs.fields.spelling import PLANAR, SPATIAL
 from ..mbs.scene.planar_spelling import in_3d
 from .checks import check_functions, problems
@@ -97,6 +97,8 @@ def validated_scene(
     _raise(problems(keys), path)
     for link in (body.link for body in keys.body):
         if isinstance(link, LinkTable):
+            from ..fe_models.link_file import read_link
+
             read_link(link)
     check_functions(keys, path)
     return Scene.model_construct(**dict(in_3d(keys)), path=path.absolute(), text=text)  # the keys are validated

@@ -7,18 +7,20 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from ..common.errors import InputError
 from ..common.structs import struct
 from ..common.validation import Record
-from ..fe_models.link_records import FAMILIES
-from ..fe_models.pieces import IN_PLANE, CutLink, cut
+from ..fe_models.link_records.families import FAMILIES
 from ..mbs.fields.field_types import split_point
 from ..mbs.joints.weld import WeldJoint
 from ..mbs.scene.bodies import BodyKeys
 from ..mbs.scene.mechanism import MechanismKeys
 from .scene import Scene
+
+if TYPE_CHECKING:
+    from ..fe_models.pieces import CutLink
 
 
 @struct
@@ -39,6 +41,10 @@ def bodies_in_pieces(scene: Scene, counts: Mapping[str, int]) -> dict[str, BodyI
 
     Raises `InputError` where a link or the scene allows no pieces.
     """
+    if not counts:
+        return {}
+    from ..fe_models.pieces import IN_PLANE, cut
+
     found, families = {}, IN_PLANE if scene.is_planar else FAMILIES
     for body in scene.body:
         if body.link is not None and body.name in counts:

@@ -5,16 +5,15 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeGuard
 
 import numpy as np
 
 from ..common.errors import InputError
-from ..fe_models.link_file import read_link
-from ..fe_models.link_records import BeamLink, Link
 from ..mbs.scene.bodies import ROUNDING, RigidBody, tensor
 
-if TYPE_CHECKING:  # remarks on links do without the records of scenes
+if TYPE_CHECKING:  # scenes of rigid bodies do without the records of links, remarks on links without those of scenes
+    from ..fe_models.link_records.link import BeamLink, Link
     from .scene import Scene
 
 TURNS = 4 * np.pi  # rad: joints of robots that come to rest do so within two turns
@@ -40,6 +39,8 @@ def remarks(scene: Scene) -> Iterator[str]:
     links: dict[str, Link] = {}
     for body in scene.body:
         if body.link is not None:
+            from ..fe_models.link_file import read_link
+
             with suppress(InputError):  # which stage 1 tells
                 links[body.name] = read_link(body.link)
                 yield from remarks_on_link(links[body.name], f'link "{body.name}"')
@@ -79,8 +80,12 @@ def remarks_on_link(link: Link, label: str) -> Iterator[str]:
             f"{label}: youngs_modulus {modulus:g} Pa, at {density:g} kg/m³ a speed of sound of {speed:.2g} m/s: units"
             f" are SI; is {likely}?"
         )
-    elif isinstance(link, BeamLink):
+    elif _is_beam(link):
         yield from _beam(link, label)
+
+
+def _is_beam(link: Link | None) -> TypeGuard[BeamLink]:
+    return link is not None and link.geometry.kind == "beam"
 
 
 def _beam(link: BeamLink, label: str) -> Iterator[str]:
@@ -106,7 +111,7 @@ def _masses(scene: Scene, links: Mapping[str, Link]) -> Iterator[str]:
             robot += body.rigid.mass
             if body.rigid.mass > HEAVIEST_BODY:
                 yield f'body "{body.name}" has a mass of {body.rigid.mass:g} kg: units are SI; is it in g?'
-        elif isinstance(link := links.get(body.name), BeamLink):
+        elif _is_beam(link := links.get(body.name)):
             robot += link.material.density * link.sections[0].area * link.geometry.length
         else:
             return  # known after stage 1 alone
@@ -171,7 +176,7 @@ def _patches(scene: Scene, links: Mapping[str, Link]) -> Iterator[str]:
             yield f"{label}: a modulus of {layout.modulus:g} Pa: units are SI; is it in GPa?"
         if abs(layout.d31) > LARGEST_D31:
             yield f"{label}: a d31 of {layout.d31:g} m/V: units are SI; is it in pm/V?"
-        if not isinstance(link := links.get(layout.body), BeamLink):
+        if not _is_beam(link := links.get(layout.body)):
             continue
         extents = max(one.height for one in link.sections), max(one.width for one in link.sections)
         thick, wide = extents if layout.normal == "y" else extents[::-1]

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from pydantic import Field, PlainValidator, ValidationInfo, field_validator, model_validator
 
 from ...common.arrays import Array
-from ...common.deferred import Table
+from ...common.deferred import Deferred, Table
 from ...common.names import PathName
 from ...common.numbers import MOST_MODES, SMALLEST
 from ...common.validation import InputFile, Record, existing_file
-from ...fe_models.link_file import LinkSource, LinkTable
-from ...fe_models.link_records import BeamLink, SolidLink
+from ...fe_models.link_source import LinkSource, LinkTable
 from ..fields.field_types import (
     Name,
     NotNegative,
@@ -126,7 +125,9 @@ def _link(value: object, info: ValidationInfo) -> LinkSource:
     return LinkTable({"name": name, **value}, path.with_name(f'{path.name}: body "{name}": link'))
 
 
-LinkInput = Annotated[LinkSource, PlainValidator(_link, json_schema_input_type=str | BeamLink | SolidLink)]
+# The records of links are loaded where stage 1 or the schema of files takes them.
+LinkKeys = Annotated[Any, Deferred(modules={"": "ffrobot.fe_models.link_records.link:Link"})]
+LinkInput = Annotated[LinkSource, PlainValidator(_link, json_schema_input_type=str | LinkKeys)]
 
 
 ModeCount = Literal["auto"] | Annotated[int, Field(ge=0, le=MOST_MODES)]

@@ -9,7 +9,7 @@ from beam_links import beam_link, rectangle
 from checkpoints import CASES
 from scenes_in_3d import CRANK, TWO_LINK
 
-from ffrobot.fe_models.link_file import link_keys
+from ffrobot.fe_models.link_source import link_keys
 from ffrobot.mbs.fields.spelling import place
 
 SHORT = {"end": 0.05, "output_step": 0.005}

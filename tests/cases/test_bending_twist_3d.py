@@ -8,7 +8,7 @@ from exact_rod import rigidities
 
 import ffrobot
 from ffrobot.fe_models.link import computed_modal_body
-from ffrobot.fe_models.link_file import LinkTable
+from ffrobot.fe_models.link_source import LinkTable
 
 CALCULIX = np.array([-0.00738836e-3, 0.3931271e-3, -1.681775e-3])  # m: tools/bench/peers/calculix_strip.py
 BENDING = ("in-plane-bending", "out-of-plane-bending")

@@ -10,7 +10,7 @@ from beam_links import beam_link, rectangle
 from tables_3d import joint, revolute, scene
 
 import ffrobot
-from ffrobot.fe_models.link_file import LinkTable
+from ffrobot.fe_models.link_source import LinkTable
 from ffrobot.fe_models.pieces import cut
 
 S = "(10*(t/0.8)**3-15*(t/0.8)**4+6*(t/0.8)**5)"

@@ -7,7 +7,8 @@ import pytest
 from beam_links import beam_link, tube
 
 import ffrobot as program
-from ffrobot.fe_models.link_file import LinkTable, read_link
+from ffrobot.fe_models.link_file import read_link
+from ffrobot.fe_models.link_source import LinkTable
 from ffrobot.scene.plausibility import remarks, remarks_on_link, remarks_on_memory
 
 CASES = Path(__file__).parents[2] / "cases"

@@ -11,7 +11,7 @@ from ffrobot.common.errors import SolveError
 from ffrobot.common.validation import validate
 from ffrobot.fe_models.beam.beam import family_model
 from ffrobot.fe_models.beam.eigen import lowest_modes
-from ffrobot.fe_models.link_records import BeamLink
+from ffrobot.fe_models.link_records.link import BeamLink
 
 E, NU, RHO, LENGTH = 2.068427e11, 0.3, 7850.0, 1.0
 HEIGHT, WIDTH = 0.015, 0.025

@@ -6,7 +6,7 @@ import numpy as np
 from dolfinx import fem, mesh
 from mpi4py import MPI
 
-from ffrobot.fe_models.link_records import Material, SurfacePatches
+from ffrobot.fe_models.link_records.link import Material, SurfacePatches
 from ffrobot.fe_models.solid.constitutive import stiffness
 
 E, NU = 2.0e11, 0.3

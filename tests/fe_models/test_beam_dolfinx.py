@@ -8,7 +8,8 @@ import pytest
 from ffrobot.common.validation import validate
 from ffrobot.fe_models.beam.beam import family_model
 from ffrobot.fe_models.beam.eigen import lowest_modes
-from ffrobot.fe_models.link_records import FAMILIES, BeamLink
+from ffrobot.fe_models.link_records.families import FAMILIES
+from ffrobot.fe_models.link_records.link import BeamLink
 
 E, NU, RHO, L, STEP = 7.0e10, 0.33, 2700.0, 0.8, 0.3
 NODES = np.array([0.0, 0.05, 0.17, STEP, 0.42, 0.5, 0.66, 0.71, L])

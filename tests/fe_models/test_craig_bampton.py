@@ -11,7 +11,8 @@ from scipy.linalg import eigh
 import ffrobot
 from ffrobot.common.errors import InputError
 from ffrobot.fe_models.link import restated
-from ffrobot.fe_models.link_file import LinkTable, read_link
+from ffrobot.fe_models.link_file import read_link
+from ffrobot.fe_models.link_source import LinkTable
 from ffrobot.fe_models.modal_body.craig_bampton import craig_bampton
 from ffrobot.fe_models.modal_body.unit_loads import work_on_modes
 

@@ -7,7 +7,7 @@ import pytest
 from beam_links import link_keys, rectangle
 
 from ffrobot.fe_models.link import computed_modal_body
-from ffrobot.fe_models.link_file import LinkTable
+from ffrobot.fe_models.link_source import LinkTable
 
 FAMILIES = {"in-plane-bending": 2, "out-of-plane-bending": 2, "torsion": 1}
 

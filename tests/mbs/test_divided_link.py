@@ -7,7 +7,7 @@ import pytest
 from beam_links import beam_link
 
 from ffrobot.fe_models.link import cached_modal_body
-from ffrobot.fe_models.link_file import LinkTable
+from ffrobot.fe_models.link_source import LinkTable
 from ffrobot.fe_models.pieces import cut
 from ffrobot.mbs.model.body import from_modal_body
 from ffrobot.mbs.model.divided_link import PieceOfLink, divided_link_of

@@ -7,7 +7,7 @@ from scipy.spatial.transform import Rotation
 
 from ffrobot.common.rotations import left_jacobian, logarithm
 from ffrobot.fe_models.link import computed_modal_body
-from ffrobot.fe_models.link_file import LinkTable
+from ffrobot.fe_models.link_source import LinkTable
 from ffrobot.mbs.model.body import from_modal_body
 from ffrobot.mbs.quantities.attachment_error import ends_in_equations, rod_ends
 

@@ -14,7 +14,7 @@ from beam_links import beam_link, rectangle
 
 import ffrobot
 from ffrobot.common.arrays import as_list
-from ffrobot.fe_models.link_file import link_keys
+from ffrobot.fe_models.link_source import link_keys
 from ffrobot.mbs.analysis.fcid import sampled
 from ffrobot.mbs.analysis.tracking_advice import bounds_of_zeros
 from ffrobot.mbs.model.model import modal_directions

@@ -18,7 +18,8 @@ from ...common.arrays import Array
 from ...common.errors import InputError, did_you_mean
 from ...common.tables import shown
 from ...common.toml_files import load_toml
-from ...fe_models.link_file import LinkTable, read_link
+from ...fe_models.link_file import read_link
+from ...fe_models.link_source import LinkTable
 from ...mesh.checks import METRES
 from ...mesh.inspection import PartFace, inspect_part
 from .names import Names

@@ -14,7 +14,7 @@ from ...common.errors import FfrobotError, InputError, of_file
 from ...common.files import check_folder, write_atomically
 from ...common.tables import beyond_limits, shown
 from ...fe_models.link import cached_modal_body
-from ...fe_models.link_file import LinkTable
+from ...fe_models.link_source import LinkTable
 from ...mbs.model.body import Body, from_modal_body
 from .bodies import is_possible, mechanism
 from .flexible import FlexibleLink, flexible_link

@@ -17,7 +17,7 @@ import matplotlib as mpl
 import numpy as np
 
 from ffrobot.common.validation import validate
-from ffrobot.fe_models.link_records import SolidLink
+from ffrobot.fe_models.link_records.link import SolidLink
 from ffrobot.fe_models.solid.link import solid_modal_body
 
 mpl.use("Agg")

@@ -1,0 +1,36 @@
+"""Where the keys of a link are: in a link file, or elsewhere, as a table of a scene or a dictionary of Python."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from copy import deepcopy
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from ..common.toml_files import load_toml
+
+
+@dataclass(frozen=True)
+class LinkTable:
+    """The `keys` of a link file that stand elsewhere.
+
+    Messages call them `path`, in whose folder files are that they name.
+    """
+
+    keys: Mapping[str, Any]
+    path: Path
+
+
+LinkSource = Path | LinkTable
+"""A link file, or its content."""
+
+
+def link_path(source: LinkSource) -> Path:
+    """What messages call a link."""
+    return source.path if isinstance(source, LinkTable) else source
+
+
+def link_keys(source: LinkSource) -> dict[str, Any]:
+    """The content of a link file, unchecked. Raises `InputError` where it cannot be read."""
+    return deepcopy(dict(source.keys)) if isinstance(source, LinkTable) else load_toml(source, "link file")
