@@ -5,8 +5,6 @@ on R and on the rotation, both in axes of the body, and on its modes. Q_a are th
 it, and those that hold a shape.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import combinations

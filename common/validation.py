@@ -24,7 +24,8 @@ from .toml_files import check_limits
 class Record(BaseModel):
     """Base of every record of an input file: immutable, no unknown keys, finite numbers, no silent conversions.
 
-    Validators of a record raise `ValueError("expected …, found …")`; `validate` puts file and key in front.
+    Validators of a record raise `ValueError("expected …, found …")`; `validate` puts file and key in front. Modules of
+    records import no `annotations` from `__future__`: pydantic would compile them again, whenever a command starts.
     """
 
     model_config = ConfigDict(defer_build=True, extra="forbid", frozen=True, strict=True, allow_inf_nan=False)

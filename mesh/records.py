@@ -7,8 +7,6 @@ end of the segment before (from the root, for the first) to `until` (m from the 
 A solid has a `section` as a beam has, drawn out along x, or comes from a `file`.
 """
 
-from __future__ import annotations
-
 from typing import Annotated, Literal
 
 from pydantic import Field

@@ -1,7 +1,5 @@
 """Patches of a scene file, key by key: which way they bend their link, and fibers at an angle. SI units."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterator, Sequence
 from functools import lru_cache

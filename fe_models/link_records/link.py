@@ -1,7 +1,5 @@
 """A whole link file as records: what stage 1 reads, checked key by key. `geometry.kind` picks beam or solid."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Annotated, Literal, Self
 

@@ -1,7 +1,5 @@
 """A scene file as a whole, in 3D and, in the same records, in the plane; its tables are records of their own."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Annotated
 

@@ -1,7 +1,5 @@
 """Cylindrical joints: the second side turns about an axis of the first and slides along it, each as it likes."""
 
-from __future__ import annotations
-
 from typing import Literal
 
 from ...common.arrays import Array

@@ -1,7 +1,5 @@
 """Free joints: they constrain nothing and say where a body is."""
 
-from __future__ import annotations
-
 from typing import ClassVar, Literal
 
 import numpy as np

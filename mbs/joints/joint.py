@@ -5,8 +5,6 @@ triad and y of the outer one. `q` (…, q_count) and `v` (…, freedoms) are the
 single coordinates these themselves, of free orientations a quaternion, and the angular velocity in outer axes.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from typing import Annotated, ClassVar, Literal, NamedTuple, Self, get_args
 

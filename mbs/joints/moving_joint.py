@@ -1,9 +1,7 @@
 """Joints that move along an axis: keys of the axis, of limits, motors and friction."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
-from typing import Annotated, TypeVar
+from typing import Annotated, Self, TypeVar
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -41,13 +39,13 @@ class MovingJoint(JointRecord):
     """Rate at which dry friction has 76 % of its size, tanh 1, rad/s (sliding: m/s)."""
 
     @model_validator(mode="after")
-    def _has_friction(self) -> MovingJoint:
+    def _has_friction(self) -> Self:
         if "friction_speed" in self.model_fields_set and not self.coulomb_friction:
             raise ValueError('expected the key "friction_speed" only with coulomb_friction, found it alone')
         return self
 
     @model_validator(mode="after")
-    def _limits_fit(self) -> MovingJoint:
+    def _limits_fit(self) -> Self:
         count = len(self.units)
         for key in ("moment_limit", "speed_limit", "power_limit"):
             value = getattr(self, key)
@@ -106,7 +104,7 @@ class AxialJoint(MovingJoint):
     """Axis of motion in the axes of the first of `between` (ground: global), of any length."""
 
     @model_validator(mode="after")
-    def _axis_has_direction(self) -> AxialJoint:
+    def _axis_has_direction(self) -> Self:
         check_direction("axis", self.axis)
         return self
 

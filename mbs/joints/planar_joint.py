@@ -1,7 +1,5 @@
 """Planar joints: the second point moves in a plane of the first side, and the second side turns about its normal."""
 
-from __future__ import annotations
-
 from typing import Literal
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Prismatic joints: the second side slides along an axis of the first and does not turn on it."""
 
-from __future__ import annotations
-
 from typing import Annotated, Literal
 
 from ..fields.field_types import NotNegative, Positive, Vector2, Vector3

@@ -1,8 +1,6 @@
 """Revolute joints: two points coincide, the second side turns about an axis of the first."""
 
-from __future__ import annotations
-
-from typing import Literal
+from typing import Literal, Self
 
 from pydantic import model_validator
 
@@ -32,7 +30,7 @@ class RevoluteJoint(AxialJoint):
     """Damping of that gear, N·m·s/rad."""
 
     @model_validator(mode="after")
-    def _has_rotor_behind_spring(self) -> RevoluteJoint:
+    def _has_rotor_behind_spring(self) -> Self:
         if self.stiffness is None and self.damping:
             raise ValueError('expected the key "damping" only with stiffness, found it alone')
         if self.stiffness is not None and not self.rotor_inertia:

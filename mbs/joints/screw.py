@@ -1,8 +1,6 @@
 """Screw joints: the second side turns about an axis of the first and moves along it in proportion."""
 
-from __future__ import annotations
-
-from typing import Literal
+from typing import Literal, Self
 
 import numpy as np
 from pydantic import model_validator
@@ -24,7 +22,7 @@ class ScrewJoint(AxialJoint):
     axes = (5,)
 
     @model_validator(mode="after")
-    def _has_lead(self) -> ScrewJoint:
+    def _has_lead(self) -> Self:
         if self.lead == 0.0:
             raise ValueError("expected a lead that is not 0, found 0: without it the joint is a revolute one")
         return self

@@ -1,7 +1,5 @@
 """Spherical joints: two points coincide."""
 
-from __future__ import annotations
-
 from typing import ClassVar, Literal
 
 import numpy as np

@@ -1,6 +1,6 @@
 """The spring of a compliant gear: linear, or stiffer in steps of its torque, as strain-wave gears are."""
 
-from __future__ import annotations
+from typing import Self
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -20,7 +20,7 @@ class StiffnessSteps(Record):
     """Torques at the joint from which on the next value counts, N·m, in rising order."""
 
     @model_validator(mode="after")
-    def _fit(self) -> StiffnessSteps:
+    def _fit(self) -> Self:
         if len(self.values) != len(self.torques) + 1:
             raise ValueError(
                 f"expected one value more than torques, found {len(self.values)} values and {len(self.torques)} torques"
@@ -43,7 +43,7 @@ class TwistSpring:
     knots: tuple[float, ...] = ()
 
     @classmethod
-    def of(cls, stiffness: float | StiffnessSteps) -> TwistSpring:
+    def of(cls, stiffness: float | StiffnessSteps) -> "TwistSpring":
         """With the stiffness that a joint has."""
         if not isinstance(stiffness, StiffnessSteps):
             return cls((stiffness,))

@@ -1,8 +1,6 @@
 """Universal joints: two points coincide, the second side turns about an axis of the first and one of its own."""
 
-from __future__ import annotations
-
-from typing import Literal
+from typing import Literal, Self
 
 import numpy as np
 from pydantic import model_validator
@@ -36,7 +34,7 @@ class UniversalJoint(AxialJoint):
     along = (Along("turn", 0, 1), Along("turn", 1, 0, of_outer=True))
 
     @model_validator(mode="after")
-    def _axes_are_square(self) -> UniversalJoint:
+    def _axes_are_square(self) -> Self:
         check_direction("second_axis", self.second_axis)
         x, y = unit(np.array(self.axis)), unit(self.orientation @ self.second_axis)
         cosine = float(x @ y)

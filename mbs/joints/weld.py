@@ -1,8 +1,6 @@
 """Welds: the second side is fixed to the first."""
 
-from __future__ import annotations
-
-from typing import Literal
+from typing import Literal, Self
 
 from pydantic import model_validator
 
@@ -17,7 +15,7 @@ class WeldJoint(JointRecord):
     """Only `false`: a weld cannot be driven."""
 
     @model_validator(mode="after")
-    def _has_no_motor(self) -> WeldJoint:
+    def _has_no_motor(self) -> Self:
         if self.motor:
             raise ValueError("expected no motor in a weld, which cannot move, found motor = true")
         return self

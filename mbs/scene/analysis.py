@@ -3,8 +3,6 @@
 THE list of kinds is `ffrobot.scene.kinds`. Times in s.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Self, get_args
 
@@ -32,9 +30,9 @@ class Need(NamedTuple):
 class Surroundings(NamedTuple):
     """Where an analysis stands: those before it, itself and those after it, and what returns all kinds."""
 
-    earlier: Sequence[Analysis]
-    later: Sequence[Analysis]
-    kinds: Callable[[], Sequence[type[Analysis]]]
+    earlier: Sequence["Analysis"]
+    later: Sequence["Analysis"]
+    kinds: Callable[[], Sequence[type["Analysis"]]]
 
     def replayable(self, way: str | None = None) -> str:
         """The kinds whose findings forward runs can apply, in this `way` or in any: `"pcid" or "fcid"`."""

@@ -1,7 +1,5 @@
 """Bodies and payloads of a scene, key by key. SI units."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
@@ -90,7 +88,7 @@ class Visual(Record):
     """Roll, pitch and yaw of the shape about the fixed axes x, y, z of the body, rad."""
 
     @model_validator(mode="after")
-    def _is_one_shape(self) -> Visual:
+    def _is_one_shape(self) -> Self:
         one_of(self, ("mesh", *PRIMITIVES))
         return self
 

@@ -1,8 +1,6 @@
 """Given loads of a scene, key by key. SI units."""
 
-from __future__ import annotations
-
-from typing import Annotated
+from typing import Annotated, Self
 
 from pydantic import ValidationInfo, model_validator
 
@@ -58,7 +56,7 @@ class Load(Referring):
     refers_to = (("point", "loaded"), ("joint", "joint"), ("pzt", "patches"))
 
     @model_validator(mode="after")
-    def _consistent(self, info: ValidationInfo) -> Load:
+    def _consistent(self, info: ValidationInfo) -> Self:
         subject = one_of(self, ("point", "joint", "pzt"))
         of_point = keys_here(self, (*OF_POINT, "force"), info)
         moment = ("moment",) if is_planar(info) else ()

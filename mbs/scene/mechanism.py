@@ -1,7 +1,5 @@
 """What a scene says of a mechanism: bodies, joints, trajectories, loads, and the state it starts from."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path

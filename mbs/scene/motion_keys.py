@@ -1,11 +1,9 @@
 """Keys of a trajectory by places it goes through: law of motion, limits, holds, shaping. SI units; angles in rad."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from itertools import pairwise
 from math import inf
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
 import numpy as np
 from pydantic import Field, ValidationInfo, field_validator, model_validator
@@ -43,7 +41,7 @@ class Shaper(Record):
     """Number of the robot's lowest vibrations."""
 
     @model_validator(mode="after")
-    def _consistent(self) -> Shaper:
+    def _consistent(self) -> Self:
         if self.frequency is not None and "modes" in self.model_fields_set:
             raise ValueError('expected one of the keys "frequency" and "modes", found both')
         return self

@@ -1,9 +1,7 @@
 """Trajectories of a scene, key by key: motion that is specified. SI units; angles in rad."""
 
-from __future__ import annotations
-
 from functools import cached_property
-from typing import Annotated
+from typing import Annotated, Self
 
 import numpy as np
 from pydantic import ValidationInfo, model_validator
@@ -88,7 +86,7 @@ class Trajectory(MotionKeys):
     refers_to = (("point", "loaded"), ("angle", "loaded"), ("joint", "joint"), ("motor", "joint"))
 
     @model_validator(mode="after")
-    def _consistent(self, info: ValidationInfo) -> Trajectory:
+    def _consistent(self, info: ValidationInfo) -> Self:
         subject = one_of(self, keys_here(self, SUBJECTS, info))
         if self.axis is not None and (self.angle is None or not any(self.axis)):
             raise ValueError(f'expected the key "axis" only with angle, a direction, found {list(self.axis)}')
@@ -162,9 +160,9 @@ class Trajectory(MotionKeys):
         if any(not (np.isfinite(path.coefficients).all() and np.isfinite(path.breaks).all()) for path in paths):
             raise ValueError("expected limits and times that fit each other in size, found infinite derivatives")
 
-    def changed(self, **keys: object) -> Trajectory:
+    def changed(self, **keys: object) -> Self:
         """The same with some keys replaced."""
-        return Trajectory(**({key: getattr(self, key) for key in self.model_fields_set} | keys))
+        return type(self)(**({key: getattr(self, key) for key in self.model_fields_set} | keys))
 
     @property
     def coordinate_of(self) -> str | None:
