@@ -1,9 +1,9 @@
-"""Tables whose validators are built when a file has such a table: most files have few of the kinds that there are."""
+"""Validators and schemas that are built when they are used: files have few of the kinds of tables that there are."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from importlib import import_module
 from typing import Annotated, Any, TypeVar, get_args
@@ -22,8 +22,8 @@ USED: set[type[BaseModel]] = set()
 class Deferred:
     """Marks the record of a table, or a union of records that the key `tag` tells apart.
 
-    `modules` has the records by the value of that key, "MODULE:RECORD", where no union does; without `tag`, the one
-    record by "". A module is imported when a file has such a table.
+    `modules` has the records by the value of that key, "MODULE:RECORD", where no union does. A module is imported when
+    a file has such a table.
     """
 
     tag: str = ""
@@ -31,7 +31,7 @@ class Deferred:
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:  # noqa: ANN401
         if not self.tag:
-            return _deferred(self.modules.get("", source))
+            return _deferred(source)
         of_union = {get_args(one.model_fields[self.tag].annotation)[0]: one for one in get_args(source)}
         records = self.modules or of_union
         return core_schema.tagged_union_schema(
@@ -41,6 +41,20 @@ class Deferred:
     def records(self) -> list[type[Any]]:
         """All of `modules`, imported."""
         return [loaded(place) for place in self.modules.values()]
+
+
+@dataclass(frozen=True)
+class ReadBy:
+    """Marks a value that `function` makes of what a file says, which `written` is: a type, or "MODULE:TYPE".
+
+    Pydantic's PlainValidator would look up both whenever a command starts.
+    """
+
+    function: Callable[[Any, ValidationInfo], Any]
+    written: Any = field(hash=False)
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:  # noqa: ANN401
+        return core_schema.with_info_plain_validator_function(self.function, metadata={RECORD: self.written})
 
 
 def loaded(record: type[BaseModel] | str) -> type[BaseModel]:

@@ -61,15 +61,16 @@ def read(dataset: h5py.Dataset) -> Any:  # noqa: ANN401 (as h5py)
     Raises `InputError` where its data are elsewhere (virtual and external datasets), fewer than its shape says, or
     complex, which ffrobot never writes.
     """
-    name = f"{dataset.file.filename}: dataset {dataset.name}"
-    if dataset.is_virtual or dataset.external:
-        raise InputError(f"{name}: expected data in the file itself, found a virtual or external dataset")
-    if dataset.dtype.kind == "c":
-        raise InputError(f"{name}: expected real numbers, found complex ones")
     stored, declared = dataset.id.get_storage_size(), math.prod(dataset.shape or ()) * dataset.dtype.itemsize
-    if declared > stored * (MOST_COMPRESSED if dataset.id.get_create_plist().get_nfilters() else 1):
-        raise InputError(f"{name}: expected {declared:.4g} bytes, as its shape {dataset.shape} says, found {stored}")
-    return dataset[()]
+    if dataset.is_virtual or dataset.external:
+        problem = "expected data in the file itself, found a virtual or external dataset"
+    elif dataset.dtype.kind == "c":
+        problem = "expected real numbers, found complex ones"
+    elif declared > stored * (MOST_COMPRESSED if dataset.id.get_create_plist().get_nfilters() else 1):
+        problem = f"expected {declared:.4g} bytes, as its shape {dataset.shape} says, found {stored}"
+    else:
+        return dataset[()]
+    raise InputError(f"{dataset.file.filename}: dataset {dataset.name}: {problem}")
 
 
 def numbers(item: object, name: str) -> NDArray[np.float64]:

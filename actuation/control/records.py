@@ -6,8 +6,9 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, PlainValidator, ValidationInfo, model_validator
+from pydantic import Field, ValidationInfo, model_validator
 
+from ...common.deferred import ReadBy
 from ...common.errors import quoted
 from ...common.numbers import MOST_OUTPUTS
 from ...common.python_files import check_python_file
@@ -202,7 +203,7 @@ class PythonController(ControllerRecord):
     """
 
     kind: Literal["python"]
-    python: Annotated[Any, PlainValidator(_python_function, json_schema_input_type=str)]
+    python: Annotated[Any, ReadBy(_python_function, str)]
     """Function as "FILE.py:FUNCTION" with the file next to the scene, or the function itself in scenes made in Python.
     """
 

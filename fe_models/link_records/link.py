@@ -297,6 +297,8 @@ class SolidLink(_Link):
 
 
 Link = BeamLink | SolidLink
+LinkInScene = str | Link
+"""Of a body: a link file, or its keys."""
 
 
 def _properties(record: RectangleSection | CircleSection | TubeSection, nu: float) -> Section:

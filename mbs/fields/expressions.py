@@ -10,7 +10,6 @@ import ast
 import math
 import re
 from collections.abc import Sequence
-from difflib import get_close_matches
 from typing import NoReturn
 
 from .._core import Op, TimeFunction
@@ -247,5 +246,7 @@ class _Translation:
 
 
 def _suggest(name: str) -> str:
+    from difflib import get_close_matches
+
     close = get_close_matches(name, _WORDS, n=1)
     return f"did you mean {close[0]!r}?" if close else "available: " + " ".join(_WORDS)

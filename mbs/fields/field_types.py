@@ -8,8 +8,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, ClassVar, Literal, TypeVar
 
-from pydantic import AfterValidator, PlainValidator, ValidationInfo
+from pydantic import AfterValidator, ValidationInfo
 
+from ...common.deferred import ReadBy
 from ...common.errors import quoted
 from ...common.names import Name as Name  # offered here, with the other types of keys
 from ...common.numbers import ModeCount as ModeCount
@@ -58,7 +59,7 @@ def _time_functions(value: object, info: ValidationInfo) -> TimeFunction | tuple
     return _time_function(value, info)
 
 
-def _quantity(value: object) -> float:
+def _quantity(value: object, _: ValidationInfo) -> float:
     """A number, or an expression without t, such as "30*deg"."""
     if isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value):
         return float(value)
@@ -128,14 +129,14 @@ def present(**functions: TimeFunction | None) -> dict[str, TimeFunction]:
 
 PointReference = Annotated[str, AfterValidator(_point)]
 Side = Annotated[str, AfterValidator(_side)]
-Quantity = Annotated[float, PlainValidator(_quantity, json_schema_input_type=str | float)]
-Expression = Annotated[TimeFunction, PlainValidator(_time_function, json_schema_input_type=str | float)]
+Quantity = Annotated[float, ReadBy(_quantity, str | float)]
+Expression = Annotated[TimeFunction, ReadBy(_time_function, str | float)]
 Expressions = Annotated[
     TimeFunction | tuple[TimeFunction, ...],
-    PlainValidator(_time_functions, json_schema_input_type=str | float | list[str | float]),
+    ReadBy(_time_functions, str | float | list[str | float]),
 ]
-WaypointTable = Annotated[Waypoints, PlainValidator(_waypoints, json_schema_input_type=str)]
-KeptSteps = Annotated[Steps, PlainValidator(_steps, json_schema_input_type=str)]
+WaypointTable = Annotated[Waypoints, ReadBy(_waypoints, str)]
+KeptSteps = Annotated[Steps, ReadBy(_steps, str)]
 NotEmpty = AfterValidator(_not_empty)
 
 

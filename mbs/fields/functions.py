@@ -6,9 +6,10 @@ from collections.abc import Callable, Sequence
 from typing import Annotated
 
 import numpy as np
-from pydantic import PlainValidator, ValidationInfo
+from pydantic import ValidationInfo
 
 from ...common.arrays import Array, Booleans, as_floats
+from ...common.deferred import ReadBy
 from ...common.errors import InputError
 from ...common.tables import shown
 from ...common.validation import space_of
@@ -177,4 +178,4 @@ def _named(value: object, info: ValidationInfo) -> StateFunction:
     return state_function(objects[value], is_planar=space_of(info) != SPATIAL)
 
 
-StateForce = Annotated[StateFunction, PlainValidator(_named, json_schema_input_type=str)]
+StateForce = Annotated[StateFunction, ReadBy(_named, str)]

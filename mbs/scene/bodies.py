@@ -1,13 +1,13 @@
 """Bodies and payloads of a scene, key by key. SI units."""
 
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Literal, Self
 
 import numpy as np
-from pydantic import Field, PlainValidator, ValidationInfo, field_validator, model_validator
+from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from ...common.arrays import Array
-from ...common.deferred import Deferred, Table
+from ...common.deferred import ReadBy, Table
 from ...common.names import PathName
 from ...common.numbers import MOST_MODES, SMALLEST
 from ...common.validation import InputFile, Record, existing_file
@@ -123,9 +123,7 @@ def _link(value: object, info: ValidationInfo) -> LinkSource:
     return LinkTable({"name": name, **value}, path.with_name(f'{path.name}: body "{name}": link'))
 
 
-# The records of links are loaded where stage 1 or the schema of files takes them.
-LinkKeys = Annotated[Any, Deferred(modules={"": "ffrobot.fe_models.link_records.link:Link"})]
-LinkInput = Annotated[LinkSource, PlainValidator(_link, json_schema_input_type=str | LinkKeys)]
+LinkInput = Annotated[LinkSource, ReadBy(_link, "ffrobot.fe_models.link_records.link:LinkInScene")]
 
 
 ModeCount = Literal["auto"] | Annotated[int, Field(ge=0, le=MOST_MODES)]
