@@ -24,7 +24,6 @@ from click import BadParameter, Context, FloatRange, IntRange, Parameter, ParamT
 
 from ..common.errors import InputError, either
 from ..common.files import AnyPath
-from ..common.validation import check_texts
 
 if TYPE_CHECKING:
     from ..run.watcher import Watcher
@@ -69,6 +68,8 @@ def _checked(function: Callable[P, R]) -> Callable[P, R]:
 
     @wraps(function)
     def call(*args: P.args, **given: P.kwargs) -> R:
+        from ..common.validation import check_texts  # loads pydantic, which --help does without
+
         bound = signature.bind(*args, **given).arguments
         options = bound.get("how", {})
         annotations = {name: signature.parameters[name].annotation for name in bound.keys() - {"how"}}
