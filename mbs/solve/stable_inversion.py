@@ -86,15 +86,21 @@ def invert(
     schemes = [OF_SECOND_ORDER] if not linear.is_light.any() else [GAUSS]
     if linear.singular_after:  # either may lose the p̈ that has no factor for a moment
         schemes = [GAUSS, OF_SECOND_ORDER]
+    corners = np.unique([t for target in servo.targets() for t in target.function.switches()])
     for scheme in schemes:
         problem = Problem(servo.residuals, linear.dynamics, servo.scale, size, start, finish, scheme)
         solver = _Solver(problem, tolerance * force, progress)
         try:
             if len(finish.rows):
                 about = partial(_along, servo)
-                solver.solve(_breaks(pre, end, post), _constant(start.state[: len(servo.scale)]), about)
+                solver.solve(
+                    _with_corners(_breaks(pre, end, post), corners), _constant(start.state[: len(servo.scale)]), about
+                )
             else:
-                solver.march(np.unique([-pre, 0.0, end, end + post]), partial(_about, servo, linear.dynamics))
+                solver.march(
+                    _with_corners(np.unique([-pre, 0.0, end, end + post]), corners),
+                    partial(_about, servo, linear.dynamics),
+                )
         except Stopped:
             if solver.curve is None:
                 raise
@@ -273,6 +279,13 @@ def _breaks(pre: float, end: float, post: float) -> Array:
     parts = [(-pre, 0.0), (0.0, end), (end, end + post)]
     pieces = [np.linspace(a, b, FIRST_INTERVALS + 1) for a, b in parts if b > a]
     return np.unique(np.concatenate(pieces))
+
+
+def _with_corners(breaks: Array, corners: Array) -> Array:
+    """The breaks, and those of `corners` within the path that are not next to one: there conditions of paths change."""
+    near = np.abs(breaks[:, None] - corners).min(axis=0) <= SHORTEST * (breaks[-1] - breaks[0])
+    within = (corners > breaks[0]) & (corners < breaks[-1])
+    return np.union1d(breaks, corners[within & ~near])
 
 
 def cut(breaks: Array, excess: Array) -> Array:

@@ -162,3 +162,15 @@ def test_a_jolt_of_a_path_between_outputs(step, kind):
     rate = np.pi / 6e-4
     jolt = f"where(t < 0.1001, 0, where(t < 0.1007, 1e-6*sin({rate}*(t - 0.1001))**4, 0))"
     assert motor(solve(rod({"value": jolt}, step, kind))).moment == pytest.approx(4e-6 * rate**2 * J, rel=1e-3)
+
+
+def test_a_jolt_of_a_joint_that_only_motors_move():
+    """A path of joints leaves links to themselves, as inverse dynamics does; collocation has a break at the jolt."""
+    rate = np.pi / 6e-4
+    scene = flexible(0.1, space=False)
+    jolt = f"where(t < 0.1001, 0, where(t < 0.1007, 1e-6*sin({rate}*(t - 0.1001))**4, 0))"
+    scene["trajectory"] = [{"name": "swing", "joint": "O", "value": jolt}]
+    (inverse,) = scene["analysis"]
+    kinds = [{"analysis": [inverse | {"kind": kind}]} for kind in ("pcid", "motors-only")]
+    by_inverse, by_motors = (motor(solve(scene | kind)).moment for kind in kinds)
+    assert by_motors == pytest.approx(by_inverse, rel=1e-4)
