@@ -13,19 +13,17 @@ namespace ffrobot::recursion {
 
 // A body with its inboard joint.
 template <class Space> struct Node {
-  std::string name;
   typename Space::Body body;
   JointKind joint = JointKind::revolute;
   JointShape shape{0, 0, -1, {}};
   double lead = 0, rotor_inertia = 0, gear_ratio = 1;
   double rotor_turns = 1; // of a rotor per turn of the inner section: 0 in prismatic joints
 
-  int index = 0;            // among the nodes
-  int parent = -1;          // node, or -1
-  int parent_port = 0;      // of all ports; on the ground: of ground markers
-  int first_port = 0;       // of all ports; outboard ones first
-  int outboard = 0;         // how many
-  std::vector<int> markers; // of the body's data: of its outboard ports, then of the section that the joint holds
+  int index = 0;       // among the nodes
+  int parent = -1;     // node, or -1
+  int parent_port = 0; // of all ports; on the ground: of ground markers
+  int first_port = 0;  // of all ports; outboard ones first
+  int outboard = 0;    // how many
   int inboard =
       -1; // its port (of the body) where modes move the section that the joint holds; else its frame sits there
   int q = 0, v = 0; // first of the joint; those of the modes follow
@@ -49,6 +47,10 @@ template <class Space> struct Node {
   bool is_weightless = false;      // a rotor's inertia alone and no child: what carries it feels no inertia
   Eigen::Vector3d origin = Eigen::Vector3d::Zero(); // of the body's data, in axes of the frame
   double turn = 0;                                  // in the plane: of the frame's axes in those of the body's data
+
+  // Evaluations do not read these
+  std::string name;
+  std::vector<int> markers; // of the body's data: of its outboard ports, then of the section that the joint holds
 
   int n() const { return body.n; }
   int body_width() const { return body.row_count(); } // rows of W
