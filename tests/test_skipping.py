@@ -114,7 +114,7 @@ def test_only_runs_that_are_replayed_are_recorded(folder):
     )
     assert solution.outcomes["first"].continuation.recording is not None
     assert solution.outcomes["second"].continuation.recording is None
-    assert not solution.analyses["first"].stresses  # the modal body file has no modal stresses
+    assert not solution.analyses["first"].histories.stresses  # the modal body file has no modal stresses
     assert not solution.analyses["first"].actuation.voltages  # no patches
 
 

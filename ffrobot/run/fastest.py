@@ -110,8 +110,7 @@ def judging(scene: Scene) -> TimedAnalysis:
         raise InputError(
             f"{where}: expected an inverse analysis (pcid, fcid, motors-only) with feasibility results, found none"
         )
-    limits = [joint.motor_limits for joint in scene.motor_joints]  # in space one for each coordinate
-    limited = any(of != MotorLimits() for each in limits for of in ([each] if isinstance(each, MotorLimits) else each))
+    limited = any(of != MotorLimits() for joint in scene.motor_joints for of in joint.motor_limits)
     if not limited and not any(layout.limit for layout in scene.pzt):
         raise InputError(f"{where}: expected limits of motors (moment_limit, speed_limit, …) or of patches, found none")
     if any(body.modes == "auto" for body in scene.body):

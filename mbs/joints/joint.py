@@ -29,8 +29,7 @@ from ..fields.field_types import (
 from ..fields.spelling import IN_SPACE, Vector
 
 
-@struct
-class MotorLimits:
+class MotorLimits(NamedTuple):
     """Largest moment (N·m), speed (rad/s) and power (W) at the joint, infinite without a limit; N, m/s of a force."""
 
     moment: float = np.inf
