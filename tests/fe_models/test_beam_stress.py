@@ -39,6 +39,20 @@ def test_cantilever_at_its_root(body):
     assert errors[1].max() < 5e-5
 
 
+def test_axial_and_torsional_modes(body):
+    """Of a clamped bar of the length 1: sin(kx), k = π/2, 3π/2, scaled to ∫ ρA u² = 1, or ∫ ρI_p φ² = 1."""
+    k = np.pi * np.array([0.5, 1.5])
+    axial = body({"a": (0.2, 0, 0)}, family="axial", condition="cantilever", count=2).stress["a"].stress
+    np.testing.assert_allclose(axial[0], E * np.sqrt(2 / RHO_A) * k * np.cos(0.2 * k), rtol=1e-6)
+    np.testing.assert_array_equal(axial[1:], 0.0)
+    points = {"side": (0.2, 0, 0.01), "top": (0.2, 0.01, 0)}
+    torsion = body(points, section=CIRCLE, family="torsion", condition="cantilever", count=2).stress
+    G, I_p = E / 2 / (1 + NU), np.pi * 0.01**4 / 2
+    tau = G * 0.01 * np.sqrt(2 / (RHO * I_p)) * k * np.cos(0.2 * k)
+    np.testing.assert_allclose(torsion["top"].stress[4], tau, rtol=1e-6)
+    np.testing.assert_allclose(torsion["side"].stress[5], -tau, rtol=1e-6)
+
+
 def test_simply_supported_beam_away_from_nodes(body):
     k = np.pi * np.arange(1, 5)
     top, side = (body({"a": (0.33, y, 0.01)}, count=4, elements=40).stress["a"] for y in (H / 2, 0.0))
