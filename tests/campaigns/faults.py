@@ -56,12 +56,12 @@ FAULTS = [
         "tests/test_mode_acceleration.py",
     ),
     Fault(LOADS, "left -= wrench @", "left += wrench @", "tests/mbs/test_link_loads.py"),
-    Fault("ffrobot/results/motion.py", "motion.space.along(acting.force)", "motion.space.along(-acting.force)", ARM),
+    Fault("ffrobot/results/peaks.py", "motion.space.along(acting.force)", "motion.space.along(-acting.force)", ARM),
     Fault("ffrobot/results/motion.py", "function.sample(inside)[0]", "function.sample(inside)[1]", ARM),
     Fault(
-        "ffrobot/results/meanings.py",
-        "largest(time, column) for column in values.T",
-        "largest(time, column) for column in values.T[::-1]",
+        "ffrobot/results/peaks.py",
+        "largest(time, column) for column in columns.T",
+        "largest(time, column) for column in columns.T[::-1]",
         ARM,
     ),
     Fault(
@@ -176,8 +176,8 @@ FAULTS = [
     ),
     Fault(
         f"{CORE}/recursion/motion/newton_system.cpp",
-        "f -= factors.S.cwiseProduct(along);",
-        "f += factors.S.cwiseProduct(along);",
+        "f -= factors.S.cwiseProduct(y);",
+        "f += factors.S.cwiseProduct(y);",
         "tests/mbs/recursion/test_newton.py",
     ),
 ]
