@@ -148,7 +148,7 @@ FAULTS = [
         f"{CORE}/recursion/inverse/observe.cpp",
         "to.J(2, 2) += s.p_p;",
         "to.J(2, 2) += 0;",
-        "tests/mbs/test_system.py",
+        "tests/mbs/test_projection.py",
     ),
     Fault(
         f"{CORE}/recursion/inverse/motors.cpp",
