@@ -20,7 +20,7 @@ from ..common.errors import InputError
 from ..common.numbers import MOST_RUNS
 from ..common.tables import shown
 from ..sweep.files import number_at, value_at
-from ..sweep.sweep import Key
+from ..sweep.sweep import Key, check_once
 from .designs import Point, parse_key
 
 Place = tuple[float, ...]
@@ -125,9 +125,7 @@ def read_space(path: Path, vary: Sequence[str]) -> Space:
     variables = tuple(parse_variable(text) for text in vary)
     if not variables:
         raise InputError(f"optimise: expected at least one --vary, {FORMS}")
-    keys = [key for variable in variables for key in variable.keys]
-    if twice := next((key for key in keys if keys.count(key) > 1), None):
-        raise InputError(f"--vary: expected every key once, found {'.'.join(twice)} several times")
+    check_once([key for variable in variables for key in variable.keys])
     return Space(variables, tuple(_own(path, v, key) for v in variables for key in v.keys))
 
 

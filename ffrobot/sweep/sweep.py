@@ -88,6 +88,12 @@ class Sweep:
         return hashlib.sha256(json.dumps(changes, sort_keys=True).encode()).hexdigest()[:16]
 
 
+def check_once(keys: Sequence[Key]) -> None:
+    """Raise `InputError` for a key that `--vary` names several times."""
+    if twice := next((key for key in keys if keys.count(key) > 1), None):
+        raise InputError(f"--vary: expected every key once, found {'.'.join(twice)} several times")
+
+
 def plan_sweep(
     scene: Path,
     vary: Sequence[str],
@@ -103,9 +109,7 @@ def plan_sweep(
     """
     check_folder(folder)
     variations = tuple(parse_variation(text) for text in vary)
-    keys = [key for variation in variations for key in variation.keys]
-    if twice := next((key for key in keys if keys.count(key) > 1), None):
-        raise InputError(f"--vary: expected every key once, found {'.'.join(twice)} several times")
+    check_once([key for variation in variations for key in variation.keys])
     for request in collect:
         collected(request)
     points = tuple(grid(variations) if sample is None else latin_hypercube(variations, sample, seed))
