@@ -86,21 +86,17 @@ def invert(
     schemes = [OF_SECOND_ORDER] if not linear.is_light.any() else [GAUSS]
     if linear.singular_after:  # either may lose the p̈ that has no factor for a moment
         schemes = [GAUSS, OF_SECOND_ORDER]
-    corners = np.unique([t for target in servo.targets() for t in target.function.switches()])
+    is_marched = not len(finish.rows)
+    breaks = np.unique([-pre, 0.0, end, end + post]) if is_marched else _breaks(pre, end, post)
+    breaks = _with_corners(breaks, np.unique([t for target in servo.targets() for t in target.function.switches()]))
     for scheme in schemes:
         problem = Problem(servo.residuals, linear.dynamics, servo.scale, size, start, finish, scheme)
         solver = _Solver(problem, tolerance * force, progress)
         try:
-            if len(finish.rows):
-                about = partial(_along, servo)
-                solver.solve(
-                    _with_corners(_breaks(pre, end, post), corners), _constant(start.state[: len(servo.scale)]), about
-                )
+            if is_marched:
+                solver.march(breaks, partial(_about, servo, linear.dynamics))
             else:
-                solver.march(
-                    _with_corners(np.unique([-pre, 0.0, end, end + post]), corners),
-                    partial(_about, servo, linear.dynamics),
-                )
+                solver.solve(breaks, _constant(start.state[: len(servo.scale)]), partial(_along, servo))
         except Stopped:
             if solver.curve is None:
                 raise
