@@ -57,7 +57,7 @@ def triad(tree, section):
     """A section of the tree as the oracle has it."""
     if section.body < 0:
         return Ground(section.position, section.triad)
-    return Section(tree.nodes[section.body].body.name, section.point, section.triad)
+    return Section(tree.nodes[section.body].body.name, section.point, section.triad, section.still)
 
 
 def absolute_states(mechanism, state):

@@ -8,9 +8,10 @@ of these (docs/theory.md; Shabana, Dynamics of Multibody Systems, ch. 5).
     python tests/mbs/exact_chain.py     the table of docs/developer/kernel.md, a few minutes
 """
 
+from types import SimpleNamespace
+
 import mpmath
 import numpy as np
-from bodies_by_invariants import PlanarBody, PlanarPoint
 from mechanisms import relative
 from mpmath import mp
 
@@ -62,27 +63,24 @@ def eigenmode_link(name, condition, modes, length=1.0, mass=1.0, EI=30.0):
         mean, moment = 2 * sigma / beta, 2 / beta**2
     zero, root = np.zeros((modes, modes)), np.sqrt(mass)
     points = {
-        label: PlanarPoint(np.array([at * length, 0.0]), np.array([0 * one, end / root]), slope / (length * root), zero)
+        label: (np.array([at * length, 0.0]), np.array([0 * one, end / root]), slope / (length * root))
         for label, at, end, slope in zip(("root", "tip"), (0.0, 1.0), ends, slopes, strict=True)
     }
-    return PlanarBody(
+    return SimpleNamespace(
         name=name, mass=mass, inertia=mass * length**2 / 3, first_moment=np.array([mass * length / 2, 0.0]),
         stiffness=EI / (mass * length**3) * beta**4, damping=zero, S_bar=root * np.array([0 * one, mean]),
         h=root * length * moment, j=0 * one, S_tilde=zero, m_xy=np.eye(modes), points=points,
-        length=length, K_s=zero, K_stretch=zero, K_turn=zero,
+        n_modes=modes,
     )  # fmt: skip
 
 
 class Invariants:
-    """Those of a `PlanarBody` without stiffening, to 40 digits."""
+    """Those of a link, to 40 digits."""
 
     def __init__(self, body):
         for name in INVARIANTS:
             setattr(self, name, exact(getattr(body, name))[()])
-        self.ends = {
-            label: tuple(exact(getattr(body.points[label], part)) for part in ("position", "translation", "rotation"))
-            for label in ("root", "tip")
-        }
+        self.ends = {label: tuple(map(exact, body.points[label])) for label in ("root", "tip")}
         self.n = body.n_modes
 
 
@@ -109,7 +107,7 @@ def accelerations(bodies, gravity, angle, rate, p, p_rate, target):
     """q̈ = (R̈, θ̈, p̈) of all bodies and λ (2,) of the path of the last tip, at angles and rates of the joints.
 
     Args:
-        bodies: n `PlanarBody`s, each hinged with its root to the tip before, the first to the origin.
+        bodies: n links, each hinged with its root to the tip before, the first to the origin.
         gravity: (2,).
         angle, rate: (n,) of a body's frame against the section before it.
         p, p_rate: n arrays, the modal coordinates.
@@ -165,7 +163,7 @@ def chain(links):
             setattr(data, name, getattr(link, name))
         ends = [link.points[label] for label in ("root", "tip")]
         still = marker(translation=np.zeros((2, link.n_modes)), rotation=np.zeros(link.n_modes))
-        data.markers = [still, *(marker(end.position, end.translation, end.rotation) for end in ends)]
+        data.markers = [still, *(marker(*end) for end in ends)]
         body.name, body.joint, body.data, body.parent = link.name, r.JointKind.revolute, data, k - 1
         body.inboard_marker, body.parent_marker = 1, 2 if k else 0
         bodies.append(body)

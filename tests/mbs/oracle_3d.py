@@ -79,7 +79,8 @@ def products_of_shapes(body):
     """H (3, 3, 4 + n, 4 + n) at [c, d]: ∫ρ of products of 1, x, y, z, Φ_c with 1, x, y, z, Φ_d."""
     N = np.block([[np.array([[body.mass]]), body.first_moment[None]], [body.first_moment[:, None], body.second_moment]])
     F = np.concatenate([body.S_bar[None], body.I_bar])  # (4, 3, n)
-    return np.array([[np.block([[N, F[:, d]], [F[:, c].T, body.S_bar_kl[c, d]]]) for d in range(3)] for c in range(3)])
+    S = body.S_bar_kl + body.stiffening.S_turned
+    return np.array([[np.block([[N, F[:, d]], [F[:, c].T, S[c, d]]]) for d in range(3)] for c in range(3)])
 
 
 def affine_part(body):
@@ -120,19 +121,22 @@ def velocity_map(body, A, p):
     return T
 
 
-def spinning(body):
-    """Matrix (6 + n, 6 + n) of the energy ½∫ρI_p (ω̄_x + φ̇)² dx that a line of mass has besides."""
-    M, n = np.zeros((6 + body.n_modes, 6 + body.n_modes)), body.n_modes
+def spinning(body, S):
+    """Matrix (6 + n, 6 + n) of the energy ½∫ρI_p (ω̄_x + φ̇)² dx that a line of mass has besides.
+
+    And of what its modes move otherwise, across the plane on which it is projected: they have a mass of 1 in all, of
+    which S (n, n) is in the shapes.
+    """
+    M = np.zeros((6 + body.n_modes, 6 + body.n_modes))
     M[3, 3], M[3, 6:], M[6:, 3] = body.J_spin, body.h_spin, body.h_spin
-    M[6:, 6:] = body.S_spin if n else 0.0
+    M[6:, 6:] = np.eye(body.n_modes) - S
+    assert np.linalg.eigvalsh(M[6:, 6:] - body.S_spin).min(initial=0.0) > -1e-9
     return M
 
 
 def stiffened_mass_matrix(body, A, p):
     T, H = velocity_map(body, A, p), products_of_shapes(body)
-    missing = np.eye(body.n_modes) - np.einsum("ccmn->mn", body.S_bar_kl) - body.S_spin  # nothing, but for rounding
-    assert np.abs(missing).max(initial=0.0) < 1e-9
-    return np.einsum("bcim,cdij,bdjk->mk", T, H, T) + spinning(body)
+    return np.einsum("bcim,cdij,bdjk->mk", T, H, T) + spinning(body, np.einsum("ccmn->mn", H[:, :, 4:, 4:]))
 
 
 def stiffened_forces(body, A, p, omega, p_dot, g):
@@ -235,6 +239,8 @@ class Mechanism:
             x, Phi, Phi_r = section.position, section.translation, section.rotation
         else:
             x, Phi, Phi_r, K = np.zeros(3), np.zeros((3, n)), np.zeros((3, n)), np.zeros((6, n, n))
+        if at.still:
+            Phi_r, K = 0 * Phi_r, K * np.repeat([1, 0], 3)[:, None, None]
         u, u_p = x + Phi @ p - 0.5 * p @ K[:3] @ p, Phi - K[:3] @ p
         phi, phi_p = Phi_r @ p - 0.5 * p @ K[3:] @ p, Phi_r - K[3:] @ p
         phi_dot, J_l = phi_p @ p_dot, left_jacobian(phi)

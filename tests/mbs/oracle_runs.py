@@ -1,10 +1,10 @@
-"""Analyses of planar robots, and what they found in absolute coordinates (R, θ, p), as the oracle has them."""
+"""Analyses of planar robots, and what they found in coordinates (R, θ, p) of one body after the other."""
 
 from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from mechanisms import always, assemble, random_state
+from mechanisms import always, random_state
 
 from ffrobot.mbs import _core
 from ffrobot.mbs.analysis.context import Context
@@ -35,10 +35,6 @@ class Seen:
 
     def __getattr__(self, name):
         return getattr(self.outcome, name)
-
-    @cached_property
-    def assembly(self):
-        return assemble(self.robot)
 
     @cached_property
     def motion(self):
@@ -79,25 +75,26 @@ class Seen:
         return self._of_bodies(frame, self.outcome.a, "p_v")
 
     def coordinates(self, body):
-        first = self.assembly.first[self.assembly.index[body]]
+        first, names = 0, [one.name for one in self.robot.bodies]
+        for one in self.robot.bodies[: names.index(body)]:
+            first += 3 + one.n_modes
         return slice(first, first + 3 + self.robot.body(body).n_modes)
 
     def modal_columns(self, body):
         """Of `F_p`."""
-        here = self.coordinates(body)
-        before = 3 * self.assembly.index[body]
+        here, before = self.coordinates(body), 3 * [one.name for one in self.robot.bodies].index(body)
         return slice(here.start - before, here.stop - before - 3)
 
     @property
     def tau(self):
         """(T, motors)."""
-        return np.column_stack([self.motion.motor_moments[joint][:, 0] for joint in self.robot.motors])
+        return np.column_stack([self.motion.motor_moments[joint.name][:, 0] for joint in self.robot.scene.motor_joints])
 
     @property
     def F_p(self):
         """(T, modes of all bodies), what patches would have to supply."""
         modal = self.motion.motor_forces.modal
-        return np.hstack([modal[body.name] @ body.modal_transform for body in self.robot.own])
+        return np.hstack([modal[body.name] @ body.modal_transform for body in self.robot.bodies])
 
     @property
     def lambda_(self):

@@ -1,4 +1,7 @@
-"""Prescribed motion in 3D in NumPy, an oracle of the core: pseudoinverses of Jacobians, bodies by Kane's equations."""
+"""Motions under rows in NumPy, an oracle of the core: what is left of forces and rows, and prescribed motion.
+
+Pseudoinverses of Jacobians, bodies by Kane's equations.
+"""
 
 from dataclasses import replace
 from typing import NamedTuple
@@ -8,6 +11,7 @@ from body_equations import (
     Accelerated,
     absolute_accelerations,
     absolute_states,
+    accelerated,
     mechanism_of,
     required_forces,
     triad,
@@ -20,6 +24,17 @@ from ffrobot.mbs.model.model import row_values, target_rates
 from ffrobot.mbs.solve.posture import solve_postures
 
 RANK = 1e-10  # of the largest singular value
+
+
+def residuals(motion):
+    """Of the first instant M v̇ − Q + C_vᵀλ, and C̈ less what targets ask for, both relative to their largest terms."""
+    state, at = accelerated(motion), motion.time[:1]
+    needed, at_rest = (required_forces(motion.model, state._replace(a=a), at)[0] for a in (state.a, 0 * state.a))
+    of_rows = motion.rows[1][0].T @ motion.multipliers[0]
+    forces = max(np.abs(x).max(initial=0.0) for x in (needed - at_rest, at_rest, of_rows))
+    accelerations = max(np.abs(state.a).max(), np.abs(state.v).max() ** 2, 1.0)
+    left = row_accelerations(motion.model, state, at)
+    return np.abs(needed + of_rows).max() / forces, np.abs(left).max(initial=0.0) / accelerations
 
 
 class Prescribed(NamedTuple):
@@ -66,6 +81,8 @@ def row_accelerations(model, state, times):
             rows = [mechanism.row(one, at.q, at.v) for one in measures]
             second = [of.gradient @ accelerations[k] + of.bias for of in rows]
             found[k, r] = second[0] if len(rows) == 1 else angle_acceleration(*rows, *second)
+        if measures and row.coordinate >= 0:  # of a rotor beside the joint that closes a loop
+            found[:, r] -= state.a[:, row.coordinate]
         if row.target is not None:
             found[:, r] -= row.target.sample(times)[2]
     return found

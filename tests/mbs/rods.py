@@ -1,9 +1,18 @@
 """Rigid rods, and a slider-crank of them."""
 
-from bodies_by_invariants import rigid_body
+import numpy as np
 from mechanisms import make_model, revolute
 
+from ffrobot.mbs.fields.spelling import place
+from ffrobot.mbs.model import body as bodies
+
 CRANK, ROD = 0.2, 0.5
+
+
+def rigid_body(name, mass, inertia, center, points):
+    """A body without modes, `inertia` about its center."""
+    places = {label: place(position) for label, position in points.items()}
+    return bodies.rigid_body(name, mass, place(center), inertia * np.eye(3), places)
 
 
 def rod(name, length, mass):

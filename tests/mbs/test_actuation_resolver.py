@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import zoo
-from mechanisms import oracle_of, pcid, relative
+from mechanisms import pcid, relative
 from oracle_runs import evaluated, posture_of, run
 
 from ffrobot.common.errors import InputError
@@ -22,16 +22,6 @@ def test_motors_at_frames_and_sections_share_moments_and_differ_in_modal_forces(
     assert relative(frame.q, section.q) < 1e-12
     assert relative(frame.tau[0], section.tau[0]) < 1e-12
     assert relative(frame.F_p[0], section.F_p[0]) > 1e-2
-
-
-def test_rates_of_joints_are_those_of_the_motors():
-    """Of sections, and of frames, which turn otherwise where links bend."""
-    for motors in ("section", "frame"):
-        robot = zoo.build("chain of 2", motors=motors)
-        found = evaluated(robot, 0.0, *posture_of(robot, np.random.default_rng(0)))
-        for name, row in robot.motors.items():
-            rate = oracle_of(found.assembly).row(row, found.q[0], found.v[0]).rate
-            np.testing.assert_allclose(found.motion.joint(name)[1][0], rate, rtol=1e-12)
 
 
 def test_too_few_named_motors_are_refused():

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 from balances import OUTPUT_STEP, energy_and_losses
+from body_equations import given_forces
 from links import arm, arm_links
-from mechanisms import forward, oracle_of, pcid
+from mechanisms import forward, pcid
 from oracle_runs import run
 from scipy.integrate import simpson
 
@@ -12,7 +13,7 @@ from scipy.integrate import simpson
 @pytest.mark.parametrize("tolerance", [1e-4, 1e-6, 1e-8])
 def test_work_of_the_trajectory_forces_is_energy_gained_and_dissipated(tolerance):
     outcome = run(arm(arm_links(damping_ratio=0.02)), pcid(output_step=OUTPUT_STEP, tolerance=tolerance))
-    rates = np.column_stack([held.target.sample(outcome.time)[1] for held in outcome.robot.trajectories])
+    rates = np.column_stack([row.target.sample(outcome.time)[1] for row in outcome.model.rows])
     power = np.sum(-outcome.lambda_ * rates, axis=1)
     work, (total, losses) = simpson(power, x=outcome.time), energy_and_losses(outcome)
     assert losses > 1e-3
@@ -28,11 +29,9 @@ def test_work_of_given_loads_is_energy_gained_and_dissipated():
     ]
     model = arm(arm_links(damping_ratio=0.02), trajectory=[], load=loads)
     outcome = run(model, forward(output_step=OUTPUT_STEP, tolerance=tolerance))
-    mechanism = oracle_of(outcome.assembly)
-    power = [
-        sum(mechanism.row(row, q, v).rate * size(t)[0] for row, size in model.loads)
-        for t, q, v in zip(outcome.time, outcome.q, outcome.v, strict=True)
-    ]
+    run_of = outcome.outcome
+    given = given_forces(model.model, run_of.q, model.model.tree.frames(run_of.q), run_of.time)
+    power = np.sum(given * run_of.v, axis=1)
     work, (total, losses) = simpson(power, x=outcome.time), energy_and_losses(outcome)
     assert losses > 1e-3
     assert abs(work - losses - (total[-1] - total[0])) < 10 * tolerance * np.ptp(total)

@@ -2,11 +2,10 @@
 
 import numpy as np
 import pytest
-from bodies_by_invariants import rigid_body
 from links import ANGLES, arm, arm_links
 from mechanisms import checked_scene, forward, make_model, pcid, relative, revolute
 from oracle_runs import joint_forces, run
-from rods import rod
+from rods import rigid_body, rod
 
 from ffrobot.common.errors import InputError
 from ffrobot.mbs.analysis.fcid import Fcid

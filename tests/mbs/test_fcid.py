@@ -76,13 +76,13 @@ def test_zero_shape_is_the_rigid_arm_in_closed_form():
     s, c = np.sin(theta), np.cos(theta)
     root = L * np.array([-s[0] * alpha[0] - c[0] * w[0] ** 2, c[0] * alpha[0] - s[0] * w[0] ** 2])  # R̈ of link 2
     across = -s[1] * root[0] + c[1] * (root[1] + g)
-    F_p = np.outer(across, link2.S_bar[1]) + np.outer(alpha[1], link2.h)
+    F_p = np.outer(across, link2.S_bar[1]) + np.outer(alpha[1], link2.spin[2])
     assert relative(outcome.F_p[:, outcome.modal_columns("link2")], F_p) < 1e-10
 
     # Link 1: the same, and what joint and motors do to its ends (simply supported: nothing but moments and rotations).
     link1 = model.body("link1")
-    F_p = np.outer(c[0] * g, link1.S_bar[1]) + np.outer(alpha[0], link1.h)
-    ends = [link1.points[name].rotation for name in ("root", "tip")]
+    F_p = np.outer(c[0] * g, link1.S_bar[1]) + np.outer(alpha[0], link1.spin[2])
+    ends = [link1.points[name].rotation[2] for name in ("root", "tip")]
     F_p += -np.outer(shoulder, ends[0]) + np.outer(elbow, ends[1])
     assert relative(outcome.F_p[:, outcome.modal_columns("link1")], F_p) < 1e-10
 

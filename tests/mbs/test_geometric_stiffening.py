@@ -15,7 +15,7 @@ def test_tip_is_on_its_path_with_what_bending_takes_off():
     model = arm(arm_links(stiffening=True))
     outcome = run(model, pcid(tolerance=1e-6))
     tip = point_motion(outcome, "link2.tip")
-    targets = np.column_stack([c.target.sample(outcome.time)[0] for c in model.trajectories])
+    targets = np.column_stack([row.target.sample(outcome.time)[0] for row in model.model.rows])
     assert np.abs(tip.deflection[:, 0]).max() > 1e-5
     np.testing.assert_allclose(tip.position, targets, atol=1e-10)
 

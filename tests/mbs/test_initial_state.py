@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from links import ANGLES, TIP, arm, arm_links
-from mechanisms import make_model, oracle_of, pcid, revolute
+from mechanisms import make_model, pcid, revolute
 from oracle_runs import evaluated, run
 from rods import rod, slider_crank
 
@@ -23,31 +23,29 @@ def to(x, y, name="tip"):
     return {"name": name, "point": "link2.tip", "x": x, "y": y}
 
 
-def seen_start(robot, state):
-    """(q, v) of a state of the tree in absolute coordinates, with the oracle's mechanism."""
-    found = evaluated(robot, 0.0, state.q, state.v)
-    return found.q[0], found.v[0], oracle_of(found.assembly)
-
-
 def started(robot):
-    return seen_start(robot, undeformed_posture(robot.model))
+    state = undeformed_posture(robot.model)
+    return evaluated(robot, 0.0, state.q, state.v)
+
+
+def angle(found, body):
+    return found.q[0, found.coordinates(body)][2]
 
 
 def test_start_meets_constraints_and_rates_undeformed():
-    robot = arm(trajectory=[to("1.2-0.3*t", "0.9+0.5*t")])
-    q, v, oracle = started(robot)
-    C, rate, _ = oracle.constraint_values(0.0, q, v)
-    assert np.abs(C).max() < 1e-13
-    assert np.abs(rate).max() < 1e-13
-    for body in robot.bodies:
-        assert not np.any(q[oracle.columns[body.name]][3:])
-        assert not np.any(v[oracle.columns[body.name]][3:])
+    found = started(arm(trajectory=[to("1.2-0.3*t", "0.9+0.5*t")]))
+    tip = found.motion.section("link2.tip")
+    np.testing.assert_allclose(tip.r[0, :2], [1.2, 0.9], atol=1e-13)
+    np.testing.assert_allclose(tip.L[0, :2] @ found.outcome.v[0], [-0.3, 0.5], atol=1e-13)
+    for name in ANGLES:
+        assert not np.any(found.q[0, found.coordinates(name)][3:])
+        assert not np.any(found.v[0, found.coordinates(name)][3:])
 
 
 @pytest.mark.parametrize(("angles", "elbow"), [({"link1": -0.2, "link2": 1.4}, 1), ({"link1": 1.4, "link2": -0.2}, -1)])
 def test_the_guess_picks_the_elbow(angles, elbow):
-    q, _, oracle = started(arm(trajectory=[to("1.2", "0.9")], initial={"angles": angles}))
-    turn = q[oracle.columns["link2"]][2] - q[oracle.columns["link1"]][2]
+    found = started(arm(trajectory=[to("1.2", "0.9")], initial={"angles": angles}))
+    turn = angle(found, "link2") - angle(found, "link1")
     assert turn == pytest.approx(elbow * 2 * np.arccos(0.75), abs=1e-12)  # law of cosines: 1.5 = 2 cos(turn/2)
 
 
@@ -55,10 +53,10 @@ def test_the_guess_picks_the_elbow(angles, elbow):
 def test_a_closed_loop_takes_the_branch_of_the_guess(side):
     """The crank above or below the axis, same slider position."""
     path = {"name": "slider", "point": "slider.pin", "x": "0.6"}
-    q, _, oracle = started(slider_crank(path, initial={"angles": {"crank": 0.9 * side, "rod": -0.3 * side}}))
+    found = started(slider_crank(path, initial={"angles": {"crank": 0.9 * side, "rod": -0.3 * side}}))
     # 0.5² = 0.2² + 0.6² − 2 · 0.2 · 0.6 cos φ
     expected = side * np.arccos((0.04 + 0.36 - 0.25) / 0.24)
-    assert q[oracle.columns["crank"]][2] == pytest.approx(expected, abs=1e-12)
+    assert angle(found, "crank") == pytest.approx(expected, abs=1e-12)
 
 
 def test_stretched_arm_is_refused():
@@ -129,7 +127,7 @@ def test_a_guess_of_a_way_places_what_slides():
             {"name": "S", "type": "prismatic", "between": between, "axis": (1.0, 0.0)},
         ]
         initial = {"joints": {"O": 0.5, "S": way}, "joint_rates": {"O": 2.0, "S": way / 0.3}}
-        q, v, _ = started(make_model(rods, joint=joints, initial=initial))
+        found = started(make_model(rods, joint=joints, initial=initial))
         along, across = np.array([np.cos(0.5), np.sin(0.5)]), np.array([-np.sin(0.5), np.cos(0.5)])
-        np.testing.assert_allclose(q[3:], [*(1.3 * along), 0.5], atol=1e-12)
-        np.testing.assert_allclose(v[3:], [*(along + 2.6 * across), 2.0], atol=1e-12)
+        np.testing.assert_allclose(found.q[0, 3:], [*(1.3 * along), 0.5], atol=1e-12)
+        np.testing.assert_allclose(found.v[0, 3:], [*(along + 2.6 * across), 2.0], atol=1e-12)

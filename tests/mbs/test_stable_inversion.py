@@ -2,13 +2,15 @@
 
 import numpy as np
 import pytest
+from body_equations import absolute_states, accelerated, mechanism_of, required_forces
 from links import TIP, arm, arm_links, quintic, ritz_link
-from mechanisms import ZERO, Assembly, Constraint, assemble, forward, make_model, oracle_of, relative, revolute
+from mechanisms import forward, make_model, relative, revolute
 from numpy.polynomial import Polynomial
 from oracle_runs import evaluated, point_motion, run
 
 from ffrobot.common.errors import InputError, SolveError
 from ffrobot.mbs.analysis.motors_only import MotorsOnly, is_minimum_phase
+from ffrobot.mbs.model.model import row_values
 from ffrobot.mbs.solve import stable_inversion
 from ffrobot.mbs.solve.servo import make_servo
 from ffrobot.mbs.solve.zero_dynamics import (
@@ -45,20 +47,10 @@ def at_rest(model, factor=1.0):
     return servo, linear_dynamics(servo, np.zeros(1), p[None], rest, rest)
 
 
-def velocity_transformation(mechanism, C_mq, T_q):
-    """D of q̇ = D (ȧ, ṗ) (Shabana 2022, Eqs. 18–21): C_mq D = 0, T_q D = (I, 0), the p rows of D = (0, I)."""
-    modes = [i for body in mechanism.bodies for i in range(*mechanism.columns[body.name].indices(mechanism.size))[3:]]
-    rows = np.vstack([C_mq, T_q, np.eye(mechanism.size)[modes]])
-    return np.linalg.solve(rows, np.eye(mechanism.size))[:, len(C_mq) :]
-
-
 def off_path(outcome):
-    """How far (T, components) points, joints and angles themselves are from their path, by the oracle."""
-    mechanism, is_path, rest = oracle_of(outcome.assembly), outcome.assembly.is_trajectory, 0 * outcome.q[0]
+    """How far (T, components) points, joints and angles themselves are from their path."""
     times = np.clip(outcome.time, 0.0, outcome.analysis.end)
-    return np.array(
-        [mechanism.constraint_values(t, q, rest)[0][np.array(is_path)] for t, q in zip(times, outcome.q, strict=True)]
-    )
+    return row_values(outcome.robot.model, outcome.outcome.q, times)[0]
 
 
 def exact_forward(model, outcome, **keys):
@@ -91,24 +83,18 @@ def test_zeros_of_joint_motion_are_the_frequencies_with_the_joint_locked():
 
 
 def test_internal_dynamics_are_those_of_the_constrained_and_driven_rows():
-    """M of r is Lᵀ M Z: Z keeps C_m and C_s, L C_m and the motors' coordinates (docs/theory.md, Motors alone)."""
+    """M of r is Lᵀ M Z along the tree: Z keeps C_s, L the motors' coordinates (docs/theory.md, Motors alone)."""
     model = arm()
     servo, dynamics = at_rest(model)
     p = equilibrium(servo, 0.0)[None]
     found = servo.motion.motion([0.0], p, 0 * p, 0 * p, servo.near[:1])
-    q = evaluated(model, 0.0, found.q[0], 0 * found.v[0]).q[0]
-
-    def keeps(assembly):
-        mechanism, frames = oracle_of(assembly), assembly.frame_coordinates
-        modes = np.setdiff1d(np.arange(len(q)), frames)
-        rows = np.array([row.gradient for row in mechanism.rows(q, np.zeros_like(q))])
-        basis = np.zeros((len(q), len(modes)))
-        basis[modes] = np.eye(len(modes))
-        basis[frames] = -np.linalg.solve(rows[:, frames], rows[:, modes])
-        return basis, mechanism.mass_matrix(q)
-
-    motors = [Constraint(row, ZERO, name, "motor", is_trajectory=False) for name, row in model.motors.items()]
-    (Z, M), (L, _) = keeps(assemble(model)), keeps(Assembly(model, [*model.joints, *motors]))
+    motion, tree = evaluated(model, 0.0, found.q[0], 0 * found.v[0]).motion, model.model.tree
+    mechanism, joints = mechanism_of(tree, np.zeros(3)), tree.joint_columns
+    (state,) = absolute_states(mechanism, accelerated(motion))
+    M, C_s = state.B.T @ mechanism.mass_matrix(state.q) @ state.B, motion.rows[1][0]
+    L, Z = np.zeros((2, tree.n_v, np.count_nonzero(~joints)))
+    L[~joints] = Z[~joints] = np.eye(L.shape[1])
+    Z[joints] = -np.linalg.solve(C_s[:, joints], C_s[:, ~joints])
     np.testing.assert_allclose(dynamics.M[0], L.T @ M @ Z, atol=1e-9)
 
 
@@ -120,11 +106,11 @@ def smooth_step():
 
 def tip_per_moment(body, omega):
     """G(iω) of a link on a hub, linear: from its invariants alone."""
-    n, h = body.n_modes, body.h
-    M = np.block([[np.atleast_2d(body.inertia), h[None]], [h[:, None], np.eye(n)]])
+    n, h = body.n_modes, body.spin[2]
+    M = np.block([[np.atleast_2d(body.inertia[2, 2]), h[None]], [h[:, None], np.eye(n)]])
     K, D = np.zeros((2, n + 1, n + 1))
     K[1:, 1:], D[1:, 1:] = np.diag(body.stiffness), body.damping
-    T = np.array([1.0, *body.points["root"].rotation])
+    T = np.array([1.0, *body.points["root"].rotation[2]])
     y = np.array([body.points["tip"].position[0], *body.points["tip"].translation[1]])
     return np.array([y @ np.linalg.solve(K - w**2 * M + 1j * w * D, T) for w in omega])
 
@@ -170,17 +156,13 @@ def test_tip_follows_its_path_with_the_motors_alone(two_links, carried):
 
 
 def test_equations_of_motion_hold_with_the_motors_moments(carried):
-    """Dᵀ (M q̈ − Q) = (τ, 0), by the oracle alone, and the path by kinematics."""
-    mechanism = oracle_of(carried.assembly)
-    is_path = np.array(carried.assembly.is_trajectory)
-    for k in range(0, len(carried.time), 17):
-        q, v, a = carried.q[k], carried.v[k], carried.a[k]
-        C_mq = np.array([row.gradient for row in mechanism.rows(q, v)])[~is_path]
-        T_q = np.array([mechanism.row(row, q, v).gradient for row in carried.robot.motors.values()])
-        D = velocity_transformation(mechanism, C_mq, T_q)
-        Q = mechanism.forces(float(np.clip(carried.time[k], 0, 1)), q, v)
-        supplied = np.concatenate([carried.tau[k], np.zeros(6)])
-        assert relative(D.T @ (mechanism.mass_matrix(q) @ a - Q), supplied, np.abs(Q).max()) < 1e-6
+    """M v̇ − Q = (τ, 0), by the oracle alone, and the path by kinematics."""
+    motion, tree = carried.motion, carried.robot.model.tree
+    needed = required_forces(carried.robot.model, accelerated(motion), motion.time)
+    given = np.zeros_like(needed)
+    given[:, tree.joint_columns] = carried.tau
+    elastic = max(np.abs(motion.q[:, node.p_q] * node.body.stiffness).max() for node in tree.nodes)
+    assert relative(needed, given, elastic) < 1e-6
     assert np.abs(off_path(carried)).max() < 1e-12
 
 

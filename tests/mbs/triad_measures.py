@@ -16,11 +16,15 @@ UNIT = np.eye(3)
 
 @dataclass(frozen=True)
 class Section:
-    """A triad B (columns, axes of the section) on a section of a body; "" is the body's frame."""
+    """A triad B (columns, axes of the section) on a section of a body; "" is the body's frame.
+
+    One that is `still` is moved by modes, but not turned.
+    """
 
     body: str
     point: str
     triad: np.ndarray = field(default_factory=lambda: np.eye(3))
+    still: bool = False
 
 
 @dataclass(frozen=True)

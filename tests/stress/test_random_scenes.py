@@ -2,12 +2,14 @@
 
 import numpy as np
 import zoo
+from body_equations import accelerated, given_forces, required_forces
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from links import arm, quintic, ritz_link
-from mechanisms import forward, oracle_of, pcid, relative
+from mechanisms import forward, pcid, relative
 from oracle_runs import energies, evaluated, posture_of, random_tree_state, run
 from patch_sets import FULL
+from prescribed_oracle import residuals
 
 random_scenes = settings.get_profile("scenes")
 T = 0.37
@@ -31,23 +33,9 @@ def systems(draw):
 @random_scenes
 @given(systems())
 def test_accelerations_are_those_of_the_equations(system):
-    """Against the augmented system M q̈ + C_qᵀ λ = Q, C_q q̈ = γ, by its residual: conditioning is the scene's."""
+    """By the equations of each body and rows in NumPy, by the residual: conditioning is the scene's."""
     robot, q, v = system
-    found = evaluated(robot, T, q, v)
-    oracle, q, v, a = oracle_of(found.assembly), found.q[0], found.v[0], found.a[0]
-    rows, is_path = oracle.rows(q, v), np.array(found.assembly.is_trajectory, dtype=bool)
-    C_q = np.array([row.gradient for row in rows]).reshape(-1, len(q))
-    gamma = np.array([target(T)[2] - row.bias for row, (_, target) in zip(rows, oracle.constraints, strict=True)])
-    M, Q = oracle.mass_matrix(q), oracle.forces(T, q, v)
-    left = M @ a - Q
-    if is_path.any():
-        left += C_q[is_path].T @ found.lambda_[0]
-    of_joints = C_q[~is_path]
-    carried = np.linalg.lstsq(of_joints.T, -left, rcond=None)[0] if len(of_joints) else np.zeros(0)
-    size = max(np.abs(M @ a).max(), np.abs(of_joints.T @ carried).max(initial=0.0), np.abs(Q).max())
-    assert np.abs(left + of_joints.T @ carried).max() / size < BOUNDS["residual"]
-    size = max(np.abs(a).max(), np.abs(v).max() ** 2, 1.0)
-    assert np.abs(C_q @ a - gamma).max(initial=0.0) / size < BOUNDS["residual"]
+    assert max(residuals(evaluated(robot, T, q, v).motion)) < BOUNDS["residual"]
 
 
 @random_scenes
@@ -67,13 +55,10 @@ def test_power_is_the_rate_of_energy(system):
         return parts[:3].sum(), np.abs(parts[:3]).sum(), parts[3]
 
     rate = (energy(h)[0] - energy(-h)[0]) / (2 * h)
-    oracle, Q, V, A = oracle_of(found.assembly), found.q[0], found.v[0], found.a[0]
-    power = -energy(0.0)[2]
-    if robot.trajectories:
-        power -= found.lambda_[0] @ [oracle.row(path.measure, Q, V).rate for path in robot.trajectories]
-    power += sum(oracle.row(row, Q, V).rate * size(T)[0] for row, size in robot.loads)
-    power += sum(V[oracle.columns[m.body]][3:] @ m.vector * m.magnitude(T)[0] for m in robot.modal_loads)
-    terms = np.abs(V) @ np.abs(oracle.mass_matrix(Q) @ A) + abs(power)
+    motion, power = found.motion, -energy(0.0)[2]
+    given = given_forces(motion.model, motion.q, motion.frames, motion.time)[0]
+    power += given @ v - motion.multipliers[0] @ motion.rows[1][0] @ v
+    terms = np.abs(v) @ np.abs(required_forces(motion.model, accelerated(motion), motion.time)[0] + given) + abs(power)
     rounding = 1e-15 * energy(0.0)[1] / h  # of the differences; allowed beside the bound on the rest
     assert abs(rate - power) / max(terms + rounding / BOUNDS["power"], 1e-300) < BOUNDS["power"]
 

@@ -1,14 +1,11 @@
-"""Motions in joint coordinates: against the oracle, closed forms, identities."""
+"""Motions in joint coordinates: closed forms, identities."""
 
 import numpy as np
 import pytest
-import zoo
-from mechanisms import oracle_of, pcid, relative
-from oracle_runs import run
+from mechanisms import relative
 from points_3d import J, Mechanism, r
 from random_bodies import ground, random_body, row, state_near_rest, three_links
 from rotations import exponential
-from scipy.integrate import solve_ivp
 
 from ffrobot.mbs import _core
 from ffrobot.mbs.fields.expressions import parse_expression
@@ -23,20 +20,6 @@ def controls(tolerance=1e-10, methods=DOP853):
 
 def on(t):
     return True
-
-
-@pytest.mark.parametrize("name", ["chain of 2", "tree"])
-def test_inverse_dynamics_of_plane_trees(name):
-    """Motion and multipliers of the oracle, whose equations SciPy integrates in absolute coordinates."""
-    found = run(zoo.build(name), pcid(end=0.3, output_step=0.1, tolerance=1e-10))
-    oracle, n, rows = oracle_of(found.assembly), found.q.shape[1], found.assembly.is_trajectory
-    expected = solve_ivp(
-        lambda t, y: np.concatenate([y[n:], oracle.solve(t, y[:n], y[n:])[0]]),
-        (0.0, 0.3), np.concatenate([found.q[0], found.v[0]]), "DOP853", found.time, rtol=1e-10, atol=1e-12,
-    ).y  # fmt: skip
-    for t, q, v, multipliers, exact in zip(found.time, found.q, found.v, found.lambda_, expected.T, strict=True):
-        assert relative(q, exact[:n]) < 1e-8
-        assert relative(multipliers, oracle.solve(t, q, v)[1][rows]) < 1e-8
 
 
 def test_rows_are_kept_along_a_motion_in_3d():
@@ -205,40 +188,6 @@ def test_a_run_ends_where_it_is_told_to():
     assert 0 < len(run.states) == len(run.multipliers) == np.searchsorted(times, asked[-1], "right")
     with pytest.raises(ZeroDivisionError):
         _core.tree_motion(model, _core.TreeScene(), times, q, v, controls(), lambda t: 1 / 0)
-
-
-RADAU = [(_core.MethodKind.radau, 1.0, 0.0)]
-GENERALIZED_ALPHA = [(_core.MethodKind.generalized_alpha, 1.0, 0.0)]
-
-
-def sprung_tree(rng):
-    """(model, scene, q, v): three damped links, the last in a moving plane, a stiff spring in the first joint."""
-    rows = [row(r.ConstraintKind.point, (-1, 1), (2, 1), np.eye(3)[2])]
-    bodies = three_links(rng)
-    bodies[0].driven = True
-    bases = ground(rng, 2)
-    mechanism = Mechanism(bodies, bases, np.array([0, 0, -9.81]), [x for x, _ in rows], [x for _, x in rows])
-    model = mechanism.model()
-    q, v = np.zeros(model.n_q), np.zeros(model.n_v)
-    q[model.first[1][0]] = 1
-    value, _ = model.measure(q, v)
-    scene = _core.TreeScene()
-    scene.add_target(parse_expression(f"{float(value[0])!r}+0.1*sin(3*t)"))
-    joint_q, _, joint_v, _ = model.first[0]
-    scene.add_joint_force(joint_q, joint_v, 2e4, 0.0, 5.0, 0.0, 1.0)
-    q, v, left = _core.tree_projected(model, scene, 0.0, q, v)
-    assert left < 1e-12
-    return model, scene, q, v
-
-
-def test_implicit_methods_find_the_same_motion():
-    model, scene, q, v = sprung_tree(np.random.default_rng(11))
-    times = list(np.linspace(0, 0.1, 5))
-    expected = _core.tree_motion(model, scene, times, q, v, controls(1e-11), on)
-    for methods, tolerance, within in ((RADAU, 1e-8, 1e-7), (GENERALIZED_ALPHA, 1e-5, 1e-4)):
-        found = _core.tree_motion(model, scene, times, q, v, controls(tolerance, methods), on)
-        assert found.status == _core.IntegrationStatus.completed
-        assert relative(found.states[:, : model.n_q], expected.states[:, : model.n_q]) < within
 
 
 def test_a_force_that_begins_at_zero_in_a_run_from_before():
