@@ -25,32 +25,23 @@ RINGING = 2.0  # times the static shift, of a force that is missing all at once
 
 @struct
 class Unsupplied:
-    """What motors, with the patches that there are, miss of a path whose modal forces nothing supplies.
+    """What motors, with the patches that there are, miss of a path whose modal forces nothing supplies."""
 
-    Attributes:
-        bodies: links without patches or points, or with too few, for the modal forces that were found.
-        with_patches: whether any link has patches.
-        point: of a trajectory (of any body where trajectories are of angles), the one that misses most.
-        angles_kept: m, largest distance from the path where the motors keep the angles that were found, quasi-static.
-        at_start: m, likewise at the first output: what the links sag by.
-        moments_repeated: m, likewise where they repeat the moments that were found: the first vibration. The robot
-            drifts away from there, which no quasi-static estimate knows.
-        growth: 1/s, of deviations under these moments (`open_loop_growth`); 0 where none grows, nan if unknown.
-        families: in 3D, of each body, those of the modes concerned, in words.
-        deflection: in 3D, m, of each, the largest of a point by Φ K⁻¹ r, quasi-static, the link held as its modes are.
-        rotation: in 3D, rad, likewise, of a section.
-    """
-
-    bodies: tuple[str, ...]
-    with_patches: bool
-    point: str = ""
+    bodies: tuple[str, ...]  # links without patches or points, or with too few, for the modal forces that were found
+    with_patches: bool  # whether any link has patches
+    point: str = ""  # of a trajectory (of any body where trajectories are of angles), the one that misses most
+    # m, largest distance from the path where the motors keep the angles that were found, quasi-static
     angles_kept: float = 0.0
-    at_start: float = 0.0
+    at_start: float = 0.0  # m, likewise at the first output: what the links sag by
+    # m, likewise where they repeat the moments that were found: the first vibration. The robot drifts away from there,
+    # which no quasi-static estimate knows
     moments_repeated: float = 0.0
+    # 1/s, of deviations under these moments (`open_loop_growth`); 0 where none grows, nan if unknown
     growth: float = 0.0
-    families: tuple[str, ...] = ()
+    families: tuple[str, ...] = ()  # in 3D, of each body, those of the modes concerned, in words
+    # in 3D, m, of each, the largest of a point by Φ K⁻¹ r, quasi-static, the link held as its modes are
     deflection: tuple[float, ...] = ()
-    rotation: tuple[float, ...] = ()
+    rotation: tuple[float, ...] = ()  # in 3D, rad, likewise, of a section
 
     @property
     def drift(self) -> str:
@@ -156,48 +147,32 @@ MOST_PATCHES = 200  # that are tried on one link
 
 @struct
 class Remedies:
-    """What alone would make the patches suffice; infinite or 0 where the word has no meaning.
+    """What alone would make the patches suffice; infinite or 0 where the word has no meaning."""
 
-    Attributes:
-        limit: largest voltage, V, of the patch that needs most.
-        layers: number of layers of the same thickness, at the same voltage.
-        thickness: of one layer, m, with the voltage raised in proportion (at the same field).
-        count: patches of the same size, evenly spread; 0 where even as many as have room do not do, or none are tried.
-        most_count: as many as have room.
-        most_factor: by how much those still fall short.
-    """
-
-    limit: float
-    layers: int
-    thickness: float
+    limit: float  # largest voltage, V, of the patch that needs most
+    layers: int  # number of layers of the same thickness, at the same voltage
+    thickness: float  # of one layer, m, with the voltage raised in proportion (at the same field)
+    # patches of the same size, evenly spread; 0 where even as many as have room do not do, or none are tried
     count: int
-    most_count: int
-    most_factor: float
+    most_count: int  # as many as have room
+    most_factor: float  # by how much those still fall short
 
 
 @struct
 class PatchFeasibility:
-    """What is asked of the patches of one body in one analysis; k patches, n modes, peaks over time.
+    """What is asked of the patches of one body in one analysis; k patches, n modes, peaks over time."""
 
-    Attributes:
-        required_moment, available_moment: (k,) N·m, c times the required voltage, c times the limit.
-        saturation_time: (k,) s, when the limit is first exceeded; NaN where it never is.
-        field: (k,) V/m in a layer at the required voltage.
-        limited_field: (k,) V/m at the voltage within the limit.
-        strain: (k,) of the outer surface, from the bending of the link, its mean along the patch.
-        mode_required, mode_available: (n,) N/√kg, modal forces: wanted, and with every patch at its limit.
-        find_remedies: finds `remedies`.
-    """
-
+    # required_moment, available_moment: (k,) N·m, c times the required voltage, c times the limit
     required_moment: Array
     available_moment: Array
-    saturation_time: Array
-    field: Array
-    limited_field: Array
-    strain: Array
+    saturation_time: Array  # (k,) s, when the limit is first exceeded; NaN where it never is
+    field: Array  # (k,) V/m in a layer at the required voltage
+    limited_field: Array  # (k,) V/m at the voltage within the limit
+    strain: Array  # (k,) of the outer surface, from the bending of the link, its mean along the patch
+    # mode_required, mode_available: (n,) N/√kg, modal forces: wanted, and with every patch at its limit
     mode_required: Array
     mode_available: Array
-    find_remedies: Callable[[], Remedies]
+    find_remedies: Callable[[], Remedies]  # finds `remedies`
 
     @cached_property
     def remedies(self) -> Remedies:

@@ -30,19 +30,12 @@ NEGLIGIBLE = 1e-6  # of the length of a link, of a deflection; rad
 
 @struct
 class LinkInMotion:
-    """A link with modes, over time.
+    """A link with modes, over time."""
 
-    Attributes:
-        modal: its modal body.
-        spatial: its equations.
-        p: (T, n) coordinates of the modes of the modal body.
-        F_p: (T, n) modal forces on these that patches would have to supply.
-    """
-
-    modal: ModalBody
-    spatial: Body
-    p: Array
-    F_p: Array
+    modal: ModalBody  # its modal body
+    spatial: Body  # its equations
+    p: Array  # (T, n) coordinates of the modes of the modal body
+    F_p: Array  # (T, n) modal forces on these that patches would have to supply
 
 
 def links_in_motion(motion: RobotMotion, bodies: Mapping[str, tuple[ModalBody, Body]]) -> dict[str, LinkInMotion]:

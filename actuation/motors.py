@@ -27,33 +27,25 @@ JUMP = 0.05  # of the largest acceleration or jerk of the path: less is none
 
 @struct
 class MotorFeasibility:
-    """What one motor has to do at the joint, against its limits (infinite where none): N·m, rad/s, W; N, m/s of forces.
+    """What one motor has to do at the joint, against its limits (infinite without): N·m, rad/s, W; N, m/s of forces."""
 
-    Attributes:
-        moment, speed, power: largest absolute values.
-        saturation_time: when a limit is first exceeded, s; NaN where none is.
-        rms_moment: root mean square over the path, from t = 0 to the end of the analysis: losses in the windings go
-            with its square, so that a constant moment of this size heats the motor as much (thermal-equivalent moment).
-        usual_moment: that is not exceeded for 99 % of the time, pre- and post-actuation included.
-        moment_time: when the moment is largest, s.
-        share_beyond: of the time that any of them is.
-        load_inertia: largest of the robot along the joint, with other joints locked and links rigid, without the rotor,
-            kg·m² (kg); NaN where loops share it among joints.
-        jump: "acceleration" or "jerk" of the path where that jumps at a short peak which follows from it; else "".
-    """
-
-    moment: float
+    moment: float  # largest absolute value, as those of speed and power
     moment_limit: float
     speed: float
     speed_limit: float
     power: float
     power_limit: float
-    saturation_time: float
+    saturation_time: float  # when a limit is first exceeded, s; NaN where none is
+    # root mean square over the path, from t = 0 to the end of the analysis: losses in the windings go with its square,
+    # so that a constant moment of this size heats the motor as much (thermal-equivalent moment)
     rms_moment: float = np.nan  # these are not in files of version 0.1
-    usual_moment: float = np.nan
-    moment_time: float = np.nan
-    share_beyond: float = np.nan
+    usual_moment: float = np.nan  # that is not exceeded for 99 % of the time, pre- and post-actuation included
+    moment_time: float = np.nan  # when the moment is largest, s
+    share_beyond: float = np.nan  # of the time that any of them is
+    # largest of the robot along the joint, with other joints locked and links rigid, without the rotor, kg·m² (kg); NaN
+    # where loops share it among joints
     load_inertia: float = np.nan
+    # "acceleration" or "jerk" of the path where that jumps at a short peak which follows from it; else ""
     jump: str = ""
 
     @property

@@ -70,21 +70,13 @@ class ActuationPoints(Record):
 
 @struct
 class PointSet:
-    """Components of force at points of one body.
+    """Components of force at points of one body."""
 
-    Attributes:
-        body: its name.
-        names: of the points, one for each component.
-        axes: "x", "y" or "z", likewise.
-        points: likewise, in the coordinates of the `Body`.
-        scale: (6 + n) factors that make the rows of L_a forces in N: 1, 1/length, √mass.
-    """
-
-    body: str
-    names: tuple[str, ...]
-    axes: tuple[str, ...]
-    points: tuple[BodyPoint, ...]
-    scale: Array
+    body: str  # its name
+    names: tuple[str, ...]  # of the points, one for each component
+    axes: tuple[str, ...]  # "x", "y" or "z", likewise
+    points: tuple[BodyPoint, ...]  # likewise, in the coordinates of the `Body`
+    scale: Array  # (6 + n) factors that make the rows of L_a forces in N: 1, 1/length, √mass
 
     @property
     def direction(self) -> Array:
@@ -223,22 +215,15 @@ def _point(key: str, place: Place, body: ModalBody | None, spatial: Body) -> Bod
 
 @struct
 class PointForces:
-    """Forces at the actuation points of one body over time.
+    """Forces at the actuation points of one body over time."""
 
-    Attributes:
-        force: (T, c) N along each component, body axes.
-        unmet: (T, 6 + n) Q_a − L_a F_a on R and on the rotation, both in axes of the body, and on p: N, N·m, N/√kg; in
-            the plane (T, 3 + n) on (R, θ, p), R in global axes.
-        residual: (T,) its norm with the scale of the set, N.
-        rank: least rank of the scaled L_a.
-        condition_number: largest of the scaled L_a.
-    """
-
-    force: Array
+    force: Array  # (T, c) N along each component, body axes
+    # (T, 6 + n) Q_a − L_a F_a on R and on the rotation, both in axes of the body, and on p: N, N·m, N/√kg; in the plane
+    # (T, 3 + n) on (R, θ, p), R in global axes
     unmet: Array
-    residual: Array
-    rank: int
-    condition_number: float
+    residual: Array  # (T,) its norm with the scale of the set, N
+    rank: int  # least rank of the scaled L_a
+    condition_number: float  # largest of the scaled L_a
 
 
 def solve_points(chosen: PointSet, run: Outcome) -> PointForces:

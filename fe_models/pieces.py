@@ -25,17 +25,11 @@ ON_A_CUT = 1e-9  # of the length
 
 @struct
 class CutLink:
-    """A link in pieces.
+    """A link in pieces."""
 
-    Attributes:
-        tables: the link of each piece, from the root to the tip.
-        starts: where each begins, m from the root.
-        places: of each interface, and of "mid", the number of the piece and the name there.
-    """
-
-    tables: tuple[LinkTable, ...]
-    starts: tuple[float, ...]
-    places: Mapping[str, tuple[int, str]]
+    tables: tuple[LinkTable, ...]  # the link of each piece, from the root to the tip
+    starts: tuple[float, ...]  # where each begins, m from the root
+    places: Mapping[str, tuple[int, str]]  # of each interface, and of "mid", the number of the piece and the name there
 
 
 IN_PLANE: tuple[Family, ...] = ("in-plane-bending", "axial")

@@ -20,19 +20,12 @@ CellName = Literal["tetrahedron", "hexahedron"]
 
 @struct
 class Cell:
-    """Topology of a cell in gmsh's order of nodes.
+    """Topology of a cell in gmsh's order of nodes."""
 
-    Attributes:
-        corners: (v, 3) of the reference cell.
-        facets: (m, 3 or 4) corners of each facet, counter-clockwise seen from outside.
-        edges: (e, 2) corners of each edge; the node of degree 2 on edge k is number v + k.
-        nodes: number of nodes by degree.
-    """
-
-    corners: Array
-    facets: Integers
-    edges: Integers
-    nodes: dict[int, int]
+    corners: Array  # (v, 3) of the reference cell
+    facets: Integers  # (m, 3 or 4) corners of each facet, counter-clockwise seen from outside
+    edges: Integers  # (e, 2) corners of each edge; the node of degree 2 on edge k is number v + k
+    nodes: dict[int, int]  # number of nodes by degree
 
 
 TETRAHEDRON = Cell(

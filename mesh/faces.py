@@ -37,20 +37,14 @@ _LISTED = 12
 
 @struct
 class Boundary:
-    """The boundary of a part.
+    """The boundary of a part."""
 
-    Attributes:
-        points: (p, 3) of the part.
-        facets: (b, 3 or 4) corners, counter-clockwise seen from outside.
-        centroid, normal: (b, 3); normals point outward.
-        area: (b,) in m², of the straight facets.
-    """
-
-    points: Array
-    facets: Integers
+    points: Array  # (p, 3) of the part
+    facets: Integers  # (b, 3 or 4) corners, counter-clockwise seen from outside
+    # centroid, normal: (b, 3); normals point outward
     centroid: Array
     normal: Array
-    area: Array
+    area: Array  # (b,) in m², of the straight facets
 
     @classmethod
     def of(cls, part: PartMesh) -> Boundary:

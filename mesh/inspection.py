@@ -30,55 +30,38 @@ FLAT = 1e-4  # how far normals of a plane face are from their mean, and points o
 
 @struct
 class PartFace:
-    """A smooth face in the axes of the file, m.
+    """A smooth face in the axes of the file, m."""
 
-    Attributes:
-        kind: plane, bore (hollow) and shaft (solid) for closed cylinders, else curved.
-        center: (3,).
-        point: (3,) by which an interface finds it: the center of a bore or shaft, else a place on it near its center.
-        direction: (3,) outward normal of a plane face, axis of a bore or shaft, mean normal of others; of length one.
-        area: m².
-        radius: of a bore or shaft, m; None of others.
-    """
-
+    # plane, bore (hollow) and shaft (solid) for closed cylinders, else curved
     kind: Literal["plane", "bore", "shaft", "curved"]
-    center: Array
+    center: Array  # (3,)
+    # (3,) by which an interface finds it: the center of a bore or shaft, else a place on it near its center
     point: Array
+    # (3,) outward normal of a plane face, axis of a bore or shaft, mean normal of others; of length one
     direction: Array
-    area: float
-    radius: float | None
+    area: float  # m²
+    radius: float | None  # of a bore or shaft, m; None of others
 
 
 @struct
 class Inspection:
-    """A part as its file has it; lengths in m, axes of the file.
+    """A part as its file has it; lengths in m, axes of the file."""
 
-    Attributes:
-        unit: of the file's numbers.
-        is_declared: whether the file says so; else it is a guess by the size.
-        low, high: (3,) corners of the bounding box.
-        volume: m³, of the mesh, whose cells may be curved.
-        center: (3,) of the volume within straight facets.
-        faces: largest first.
-        points, facets: (p, 3), (b, 3 or 4) of the boundary; `face_of` (b,) is the number of each facet's face.
-        groups: names of volumes and faces in the file.
-        remarks: on what the file holds besides.
-        masses: concentrated ones of the file, as it has them but for their points, m.
-    """
-
-    unit: Unit
-    is_declared: bool
+    unit: Unit  # of the file's numbers
+    is_declared: bool  # whether the file says so; else it is a guess by the size
+    # low, high: (3,) corners of the bounding box
     low: Array
     high: Array
-    volume: float
-    center: Array
-    faces: Sequence[PartFace]
+    volume: float  # m³, of the mesh, whose cells may be curved
+    center: Array  # (3,) of the volume within straight facets
+    faces: Sequence[PartFace]  # largest first
+    # points, facets: (p, 3), (b, 3 or 4) of the boundary; `face_of` (b,) is the number of each facet's face
     points: Array
     facets: Integers
     face_of: Integers
-    groups: Sequence[str]
-    remarks: Sequence[str]
-    masses: Sequence[PointMass] = ()
+    groups: Sequence[str]  # names of volumes and faces in the file
+    remarks: Sequence[str]  # on what the file holds besides
+    masses: Sequence[PointMass] = ()  # concentrated ones of the file, as it has them but for their points, m
 
 
 def inspect_part(file: Path, unit: Unit | None = None) -> Inspection:

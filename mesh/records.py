@@ -167,17 +167,11 @@ class PlaceRecord(Record):
 
 @struct
 class Outlines:
-    """Rectangles to outline in the mesh of a solid, on the faces at its largest or smallest y, about z = 0.
+    """Rectangles to outline in the mesh of a solid, on the faces at its largest or smallest y, about z = 0."""
 
-    Attributes:
-        edges: begin and end of each along x, m from the root.
-        width: of all along z, m.
-        faces: "top" at the largest y, "bottom" at the smallest.
-    """
-
-    edges: tuple[tuple[float, float], ...]
-    width: float
-    faces: Literal["top", "bottom", "both"] = "both"
+    edges: tuple[tuple[float, float], ...]  # begin and end of each along x, m from the root
+    width: float  # of all along z, m
+    faces: Literal["top", "bottom", "both"] = "both"  # "top" at the largest y, "bottom" at the smallest
 
 
 # Elements along a full circle of a curved face, and along that of a solid bar: there, where a cell has two edges on the

@@ -31,23 +31,14 @@ IN_PLANE = 1e-9
 
 @struct
 class SectionQuadrature:
-    """Quadrature on the part of a cross section that lies in this process's cells.
+    """Quadrature on the part of a cross section that lies in this process's cells."""
 
-    Attributes:
-        cells: (q,) local cell of each point.
-        X: (q, 3) its reference coordinates there.
-        weights: (q,) in m²; their sum over all processes is the area of the section.
-        points: (q, 3) in m.
-        y_range: smallest and largest y of the section, in m; (inf, −inf) where no cell is cut.
-        z_range: likewise.
-    """
-
-    cells: Integers
-    X: Array
-    weights: Array
-    points: Array
-    y_range: tuple[float, float]
-    z_range: tuple[float, float]
+    cells: Integers  # (q,) local cell of each point
+    X: Array  # (q, 3) its reference coordinates there
+    weights: Array  # (q,) in m²; their sum over all processes is the area of the section
+    points: Array  # (q, 3) in m
+    y_range: tuple[float, float]  # smallest and largest y of the section, in m; (inf, −inf) where no cell is cut
+    z_range: tuple[float, float]  # likewise
 
 
 def section_quadratures(mesh: Mesh, x: Array, degree: int) -> Iterator[SectionQuadrature]:
@@ -113,17 +104,11 @@ class _Cells:
 
 @struct
 class _Triangles:
-    """Pieces of the section, in reference coordinates.
+    """Pieces of the section, in reference coordinates."""
 
-    Attributes:
-        cell: (t,) which of the cut cells each lies in.
-        ends: (t, 3, 2, 3) ends, above and below the plane, of the edges that the corners lie on.
-        corners: (t, 3, 3).
-    """
-
-    cell: Integers
-    ends: Array
-    corners: Array
+    cell: Integers  # (t,) which of the cut cells each lies in
+    ends: Array  # (t, 3, 2, 3) ends, above and below the plane, of the edges that the corners lie on
+    corners: Array  # (t, 3, 3)
 
 
 # Edges (above, below) that carry the corners of the triangles, by how many of a tetrahedron's four corners lie above;

@@ -39,23 +39,14 @@ _COINCIDENT = 1e-6
 
 @struct
 class Surface:
-    """Triangles on the boundary of the whole part, the same on every process, and which points each process knows.
+    """Triangles on the boundary of the whole part, the same on every process, and which points each process knows."""
 
-    Attributes:
-        points: (p, 3) in m; the order does not depend on the number of processes.
-        triangles: (t, 3) rows of `points`, counter-clockwise seen from outside.
-        edges: (e, 2) rows of `points`: the borders of the facets, of which triangles may be a finer division.
-        rows: (k,) the points that this process evaluates fields at: each belongs to one process.
-        cells: (k,) local cell of each of these.
-        X: (k, 3) reference coordinates there.
-    """
-
-    points: Array
-    triangles: Integers
-    edges: Integers
-    rows: Integers
-    cells: Integers
-    X: Array
+    points: Array  # (p, 3) in m; the order does not depend on the number of processes
+    triangles: Integers  # (t, 3) rows of `points`, counter-clockwise seen from outside
+    edges: Integers  # (e, 2) rows of `points`: the borders of the facets, of which triangles may be a finer division
+    rows: Integers  # (k,) the points that this process evaluates fields at: each belongs to one process
+    cells: Integers  # (k,) local cell of each of these
+    X: Array  # (k, 3) reference coordinates there
 
 
 def boundary(mesh: Mesh) -> tuple[Integers, Integers, Integers]:
@@ -161,32 +152,22 @@ MeshTags = Any  # dolfinx 0.5 and 0.9 name this class differently
 
 @struct
 class SolidMesh:
-    """A solid part as the finite element models take it.
+    """A solid part as the finite element models take it."""
 
-    Attributes:
-        mesh: of tetrahedra or hexahedra, distributed, without ghost cells; coordinates in m in the link's frame.
-        cell: shape of the cells.
-        cell_tags: region of every local cell.
-        facet_tags: the facets of the named faces, all of them on the boundary.
-        regions: volume group → tag in `cell_tags`, the largest group first; cells of none have the tag 0.
-        faces: "root", "tip", the interfaces that are faces, "patch/K/top", "patch/K/bottom" → tag in `facet_tags`; two
-            names may have one tag.
-        size: mean extent of the cells along x, in m.
-        surface: what a picture shows.
-        overlaps: volume group → further tags in `cell_tags`, of its cells that belong to other groups too.
-        remarks: what the part's file holds and the link does not, a sentence each.
-    """
-
-    mesh: Mesh
-    cell: CellName
-    cell_tags: MeshTags
-    facet_tags: MeshTags
+    mesh: Mesh  # of tetrahedra or hexahedra, distributed, without ghost cells; coordinates in m in the link's frame
+    cell: CellName  # shape of the cells
+    cell_tags: MeshTags  # region of every local cell
+    facet_tags: MeshTags  # the facets of the named faces, all of them on the boundary
+    # volume group → tag in `cell_tags`, the largest group first; cells of none have the tag 0
     regions: Mapping[str, int]
+    # "root", "tip", the interfaces that are faces, "patch/K/top", "patch/K/bottom" → tag in `facet_tags`; two names may
+    # have one tag
     faces: Mapping[str, int]
-    size: float
-    surface: Surface
+    size: float  # mean extent of the cells along x, in m
+    surface: Surface  # what a picture shows
+    # volume group → further tags in `cell_tags`, of its cells that belong to other groups too
     overlaps: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
-    remarks: tuple[str, ...] = ()
+    remarks: tuple[str, ...] = ()  # what the part's file holds and the link does not, a sentence each
 
     def cells_of(self, region: str) -> tuple[int, ...]:
         """The tags in `cell_tags` of all cells of a volume group."""

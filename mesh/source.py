@@ -31,44 +31,27 @@ _LISTED = 5  # concentrated masses, one by one
 
 @struct
 class PointMass:
-    """A concentrated mass, which a link can have on an interface.
+    """A concentrated mass, which a link can have on an interface."""
 
-    Attributes:
-        label: what the file calls it, and where.
-        mass: in the file's unit, kg where lengths are in m.
-        point: (3,) in the source's unit and axes.
-    """
-
-    label: str
-    mass: float
-    point: Array
+    label: str  # what the file calls it, and where
+    mass: float  # in the file's unit, kg where lengths are in m
+    point: Array  # (3,) in the source's unit and axes
 
 
 @struct
 class RawMesh:
-    """What a source gives.
+    """What a source gives."""
 
-    Attributes:
-        points: (p, 3) in the source's unit and axes; some may belong to no volume.
-        blocks: of volume elements: type, (c, v) points.
-        regions: name → (k,) elements, counted through all `blocks`; an element may belong to several.
-        facet_groups: name → facets, as arrays (k, ≥ 3) of corners.
-        point_groups: name → (k,) points: a face is what has all its corners among them.
-        surfaces: corners of all triangles and quadrilaterals, as arrays (k, 3 or 4).
-        lines: ends of all elements that are lines, as arrays (k, 2).
-        remarks: what the file holds and the link does not, a sentence each.
-        masses: concentrated ones, which the link does not have either.
-    """
-
-    points: Array
-    blocks: Sequence[tuple[str, Integers]]
+    points: Array  # (p, 3) in the source's unit and axes; some may belong to no volume
+    blocks: Sequence[tuple[str, Integers]]  # of volume elements: type, (c, v) points
+    # name → (k,) elements, counted through all `blocks`; an element may belong to several
     regions: Mapping[str, Integers]
-    facet_groups: Mapping[str, Sequence[Integers]]
-    point_groups: Mapping[str, Integers]
-    surfaces: Sequence[Integers] = ()
-    lines: Sequence[Integers] = ()
-    remarks: Sequence[str] = ()
-    masses: Sequence[PointMass] = ()
+    facet_groups: Mapping[str, Sequence[Integers]]  # name → facets, as arrays (k, ≥ 3) of corners
+    point_groups: Mapping[str, Integers]  # name → (k,) points: a face is what has all its corners among them
+    surfaces: Sequence[Integers] = ()  # corners of all triangles and quadrilaterals, as arrays (k, 3 or 4)
+    lines: Sequence[Integers] = ()  # ends of all elements that are lines, as arrays (k, 2)
+    remarks: Sequence[str] = ()  # what the file holds and the link does not, a sentence each
+    masses: Sequence[PointMass] = ()  # concentrated ones, which the link does not have either
 
 
 Groups = Iterable[tuple[str, Integers]]
@@ -105,19 +88,12 @@ class MeshBlocks:
 
 @struct
 class Source:
-    """A part, and the groups of facets or points that its file names.
+    """A part, and the groups of facets or points that its file names."""
 
-    Attributes:
-        part: not placed yet, no faces named.
-        facet_groups: name → (k, 3 or 4) corners.
-        point_groups: name → (k,) points.
-        masses: concentrated ones that the part does not have.
-    """
-
-    part: PartMesh
-    facet_groups: Mapping[str, Integers]
-    point_groups: Mapping[str, Integers]
-    masses: Sequence[PointMass] = ()
+    part: PartMesh  # not placed yet, no faces named
+    facet_groups: Mapping[str, Integers]  # name → (k, 3 or 4) corners
+    point_groups: Mapping[str, Integers]  # name → (k,) points
+    masses: Sequence[PointMass] = ()  # concentrated ones that the part does not have
 
 
 def source_from(raw: RawMesh, where: str) -> Source:

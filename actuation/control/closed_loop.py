@@ -160,14 +160,10 @@ class ClosedLoop(SampledAnalysis):
 
 
 class _Plant(NamedTuple):
-    """The robot as it moves: gears are compliant where the scene says so.
+    """The robot as it moves: gears are compliant where the scene says so."""
 
-    Attributes:
-        model: its equations of motion.
-        source: the motion of the inverse analysis in its coordinates, and what that found of compliant gears.
-    """
-
-    model: Model
+    model: Model  # its equations of motion
+    # the motion of the inverse analysis in its coordinates, and what that found of compliant gears
     source: MotorCoordinates
 
 

@@ -22,31 +22,21 @@ SAMPLES_PER_PERIOD = 10  # of the fastest motion that a controller acts on (Fran
 
 @struct
 class LoopRecord(Details):
-    """What happened at the samples of a closed loop.
+    """What happened at the samples of a closed loop."""
 
-    Attributes:
-        inputs, outputs: names of commands and readings.
-        time: (K,) s; the last sample is the last that was taken.
-        readings: (K, outputs); reference: (K, outputs) what they would be on the reference motion.
-        commands: (K, inputs) within limits; wanted: before.
-        metrics: how well it went; `tip_error` (T,) m at the outputs of the run.
-        warnings: one line each.
-        margins: by the linear model, of loops of joint PID controllers alone; else None.
-        advice: what to try, a text each, where the loop is not stable.
-    """
-
+    # inputs, outputs: names of commands and readings
     inputs: tuple[str, ...]
     outputs: tuple[str, ...]
-    time: Array
-    readings: Array
-    reference: Array
-    commands: Array
-    wanted: Array
+    time: Array  # (K,) s; the last sample is the last that was taken
+    readings: Array  # (K, outputs)
+    reference: Array  # (K, outputs) what they would be on the reference motion
+    commands: Array  # (K, inputs) within limits
+    wanted: Array  # before
     tip_error: Array
-    metrics: Metrics
-    warnings: tuple[str, ...]
-    margins: Margins | None = None
-    advice: tuple[str, ...] = ()
+    metrics: Metrics  # how well it went; `tip_error` (T,) m at the outputs of the run
+    warnings: tuple[str, ...]  # one line each
+    margins: Margins | None = None  # by the linear model, of loops of joint PID controllers alone; else None
+    advice: tuple[str, ...] = ()  # what to try, a text each, where the loop is not stable
 
 
 def sample_times(outputs: Array, T: float) -> Array:

@@ -50,17 +50,11 @@ class JointGains:
 
 @struct
 class Margins:
-    """How far a loop is from its stability bound, the worst of several configurations.
+    """How far a loop is from its stability bound, the worst of several configurations."""
 
-    Attributes:
-        radius: the spectral radius; below 1 the loop is stable.
-        gain: factor by which all gains may grow; below 1 the factor that would make it stable, 0 where none does.
-        delay: s, by which the delay may grow; 0 where the loop is not stable.
-    """
-
-    radius: float
-    gain: float
-    delay: float
+    radius: float  # the spectral radius; below 1 the loop is stable
+    gain: float  # factor by which all gains may grow; below 1 the factor that would make it stable, 0 where none does
+    delay: float  # s, by which the delay may grow; 0 where the loop is not stable
 
     @property
     def is_stable(self) -> bool:

@@ -45,60 +45,39 @@ DEFINITIONS = (
 
 @struct
 class Metrics:
-    """One run in numbers; see `DEFINITIONS`.
+    """One run in numbers; see `DEFINITIONS`."""
 
-    Attributes:
-        verdict: "stable", "grows" (vibration, quarter by quarter of an undisturbed run) or "diverges".
-        tip_error_rms, tip_error_max: distance of the tip from its place, m.
-        settling_time: s, after which that stays below 5 % of its largest value; NaN where it does not before the end.
-        vibration: of the tip at the end of the run, peak to peak, m.
-        residual: distance of the tip from its place at the end of the run, m.
-        motor_work: ∫ Σ |τ γ̇| dt, J.
-        voltage_effort: ∫ Σ V² dt, V² s.
-        peak_moment: N·m; peak_voltage: V.
-        saturated: part of the samples at which a command was cut.
-        overshoot: of the tip beyond its last place along the line from the first place to it, m.
-        lowest_frequency: about which vibration is measured, Hz, see `ringing`; NaN where the linear model has none.
-        vibration_window: before the end of the run, over which what is slower is found, s.
-    """
-
-    verdict: str
+    verdict: str  # "stable", "grows" (vibration, quarter by quarter of an undisturbed run) or "diverges"
+    # tip_error_rms, tip_error_max: distance of the tip from its place, m
     tip_error_rms: float
     tip_error_max: float
+    # s, after which that stays below 5 % of its largest value; NaN where it does not before the end
     settling_time: float
-    vibration: float
-    residual: float
-    motor_work: float
-    voltage_effort: float
-    peak_moment: float
-    peak_voltage: float
-    saturated: float
+    vibration: float  # of the tip at the end of the run, peak to peak, m
+    residual: float  # distance of the tip from its place at the end of the run, m
+    motor_work: float  # ∫ Σ |τ γ̇| dt, J
+    voltage_effort: float  # ∫ Σ V² dt, V² s
+    peak_moment: float  # N·m
+    peak_voltage: float  # V
+    saturated: float  # part of the samples at which a command was cut
+    # of the tip beyond its last place along the line from the first place to it, m
     overshoot: float = np.nan  # these are not in files of version 0.1
+    # about which vibration is measured, Hz, see `ringing`; NaN where the linear model has none
     lowest_frequency: float = np.nan
-    vibration_window: float = np.nan
+    vibration_window: float = np.nan  # before the end of the run, over which what is slower is found, s
 
 
 @struct
 class Followed:
-    """What a loop did, at the outputs of its run and between.
+    """What a loop did, at the outputs of its run and between."""
 
-    Attributes:
-        time: (T,) s.
-        error: (T, d) m, of the tip from its place.
-        place_at: (T, d) m at times (T,), where the tip should be.
-        rates: (T, motors) rad/s, m/s.
-        held: (T, inputs) commands.
-        completed: whether it came to its end.
-        is_disturbed: by loads that the reference does not know.
-    """
-
-    time: Array
-    error: Array
-    place_at: Callable[[Array], Array]
-    rates: Array
-    held: Array
-    completed: bool
-    is_disturbed: bool
+    time: Array  # (T,) s
+    error: Array  # (T, d) m, of the tip from its place
+    place_at: Callable[[Array], Array]  # (T, d) m at times (T,), where the tip should be
+    rates: Array  # (T, motors) rad/s, m/s
+    held: Array  # (T, inputs) commands
+    completed: bool  # whether it came to its end
+    is_disturbed: bool  # by loads that the reference does not know
 
 
 def measure(run: Followed, setup: Setup, loop: Loop, lowest: float) -> Metrics:

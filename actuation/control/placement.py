@@ -40,24 +40,17 @@ STEPS = 2  # candidates per length of a patch, where the scene gives no spacing
 
 @struct
 class PatchableLink:
-    """A link that is to get patches, by the m coordinates p that these reach.
+    """A link that is to get patches, by the m coordinates p that these reach."""
 
-    Attributes:
-        name, length: of the link, m.
-        bodies: whose modal coordinates are those of the link in linear models: itself, or its pieces.
-        layout: of the patches.
-        stiffness: (m,) of p, and `served` how many of p, the first ones, patches are to serve.
-        own: (m, n) p from the modal coordinates of the `bodies`, side by side, as linear models have them.
-        patches: elsewhere, by the keys "count" or "centers"; `InputError` where they do not fit the link.
-    """
-
+    # name, length: of the link, m
     name: str
     length: float
-    bodies: tuple[str, ...]
-    layout: PztLayout
-    stiffness: Array
+    bodies: tuple[str, ...]  # whose modal coordinates are those of the link in linear models: itself, or its pieces
+    layout: PztLayout  # of the patches
+    stiffness: Array  # (m,) of p, and `served` how many of p, the first ones, patches are to serve
     served: int
-    own: Array
+    own: Array  # (m, n) p from the modal coordinates of the `bodies`, side by side, as linear models have them
+    # elsewhere, by the keys "count" or "centers"; `InputError` where they do not fit the link
     patches: Callable[..., PatchArray]
 
 
@@ -84,28 +77,19 @@ class Evaluation:
 
 @struct
 class Placed(Details):
-    """What a search found.
+    """What a search found."""
 
-    Attributes:
-        wanted: the keys of the scene.
-        best, even: the patches found, and as many spread evenly.
-        frequency: (modes,) Hz of the modes that count, and `share` (modes,) of their strain energy in the link.
-        largest_voltage: (2,) V of best and even over the path; nan without one.
-        candidates: (k,) m centres that were allowed, and `candidate_reach` (modes, k) of a single patch there.
-        sets: how many sets of patches were compared.
-        method: "all sets" or "evolution".
-    """
-
-    wanted: Placement
+    wanted: Placement  # the keys of the scene
+    # best, even: the patches found, and as many spread evenly
     best: Evaluation
     even: Evaluation
-    frequency: Array
+    frequency: Array  # (modes,) Hz of the modes that count, and `share` (modes,) of their strain energy in the link
     share: Array
-    largest_voltage: Array
-    candidates: Array
+    largest_voltage: Array  # (2,) V of best and even over the path; nan without one
+    candidates: Array  # (k,) m centres that were allowed, and `candidate_reach` (modes, k) of a single patch there
     candidate_reach: Array
-    sets: int
-    method: str
+    sets: int  # how many sets of patches were compared
+    method: str  # "all sets" or "evolution"
 
 
 @struct

@@ -130,38 +130,23 @@ class LinkModes:
 
 @struct
 class PatchedLink:
-    """The k patches of one link, and the m coordinates of it that they are to serve, the lowest first.
+    """The k patches of one link, and the m coordinates of it that they are to serve, the lowest first."""
 
-    Attributes:
-        inputs: names of their voltages, which are those of their readings.
-        layouts: names that sensors know them by.
-        omega: (m,) rad/s of these coordinates.
-        gain: (k, m) volts per force on each of these coordinates.
-        volts: (k, m) that the patches read per unit of each.
-        own: (m, n) these coordinates from all modal coordinates p of the link.
-    """
-
-    inputs: tuple[str, ...]
-    layouts: tuple[str, ...]
-    omega: Array
-    gain: Array
-    volts: Array
-    own: Array
+    inputs: tuple[str, ...]  # names of their voltages, which are those of their readings
+    layouts: tuple[str, ...]  # names that sensors know them by
+    omega: Array  # (m,) rad/s of these coordinates
+    gain: Array  # (k, m) volts per force on each of these coordinates
+    volts: Array  # (k, m) that the patches read per unit of each
+    own: Array  # (m, n) these coordinates from all modal coordinates p of the link
 
 
 @struct
 class Robot:
-    """A robot about the motion of an inverse analysis.
+    """A robot about the motion of an inverse analysis."""
 
-    Attributes:
-        model: its constraint equations are those of loops alone, its gears do not give.
-        of_links: patches by link.
-        source: the inverse analysis.
-    """
-
-    model: Model
-    of_links: Mapping[str, LinkPatches]
-    source: Outcome
+    model: Model  # its constraint equations are those of loops alone, its gears do not give
+    of_links: Mapping[str, LinkPatches]  # patches by link
+    source: Outcome  # the inverse analysis
 
     @property
     def path(self) -> Path:

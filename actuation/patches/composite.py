@@ -70,14 +70,10 @@ class GaussPoint(NamedTuple):
 
 @struct
 class Composite:
-    """What k patches and their link do to each other, over the n modes of the modal body.
+    """What k patches and their link do to each other, over the n modes of the modal body."""
 
-    Attributes:
-        stiffness: (n, n) that the patches add.
-        shortfall: (k, n) modal forces per volt that the layers' own stiffness takes of those on a link held straight.
-    """
-
-    stiffness: Array
+    stiffness: Array  # (n, n) that the patches add
+    # (k, n) modal forces per volt that the layers' own stiffness takes of those on a link held straight
     shortfall: Array
 
 
@@ -244,17 +240,11 @@ def _strains(body: ModalBody, x: Array) -> Array:
 
 @struct
 class StructureEffect:
-    """What patches change of a link, bare → with patches.
+    """What patches change of a link, bare → with patches."""
 
-    Attributes:
-        mass: (2,) kg.
-        inertia: (2,) about the body's z axis, kg·m².
-        frequency: (2, n) Hz.
-    """
-
-    mass: Array
-    inertia: Array
-    frequency: Array
+    mass: Array  # (2,) kg
+    inertia: Array  # (2,) about the body's z axis, kg·m²
+    frequency: Array  # (2, n) Hz
 
 
 def patched_body(spatial: Body, body: ModalBody, placed: Sequence[Placed]) -> Body:

@@ -18,21 +18,13 @@ STEP = 0.1  # of the extent, from one station to the next; less is a taper
 
 
 class Effects(NamedTuple):
-    """Of k patches on the n modes of a modal body.
+    """Of k patches on the n modes of a modal body."""
 
-    Attributes:
-        extent: (k,) t_b, of the link along their normal under each patch, its mean, m.
-        per_volt: (k,) c, the load that each is there for, N·m/V.
-        lever: (k,) strain of the surface by unit curvature and distance; by twist, β/2, of its diagonals.
-        turn: (k, n) by how much the sections at the patch's ends turn against each other in its own sense, rad.
-        Phi_V: (k, n) modal forces per volt, less what the layers' own stiffness takes.
-    """
-
-    extent: Array
-    per_volt: Array
-    lever: Array
-    turn: Array
-    Phi_V: Array
+    extent: Array  # (k,) t_b, of the link along their normal under each patch, its mean, m
+    per_volt: Array  # (k,) c, the load that each is there for, N·m/V
+    lever: Array  # (k,) strain of the surface by unit curvature and distance; by twist, β/2, of its diagonals
+    turn: Array  # (k, n) by how much the sections at the patch's ends turn against each other in its own sense, rad
+    Phi_V: Array  # (k, n) modal forces per volt, less what the layers' own stiffness takes
 
 
 def effects(key: str, placed: Sequence[Placed], body: ModalBody) -> list[Effects]:

@@ -44,17 +44,11 @@ from .sections import check_sections
 
 @struct
 class OnBody:
-    """What all k patches of a link do to one body that may carry them, on the n modes of the body's file.
+    """What all k patches of a link do to one body that may carry them, on the n modes of the body's file."""
 
-    Attributes:
-        Phi_V: (n, k) modal forces per volt.
-        turn: (n, k) by how much each mode turns the ends of each patch against each other, rad.
-        to_link: modal forces on the modes of the link's file by those on these, (modes of the link, n).
-    """
-
-    Phi_V: Array
-    turn: Array
-    to_link: Array
+    Phi_V: Array  # (n, k) modal forces per volt
+    turn: Array  # (n, k) by how much each mode turns the ends of each patch against each other, rad
+    to_link: Array  # modal forces on the modes of the link's file by those on these, (modes of the link, n)
 
 
 @struct
@@ -62,23 +56,15 @@ class LinkPatches:
     """All patches of one link, k in all, on the n modes of its modal body.
 
     Voltages serve the modes of the link. They act on whichever of the `bodies` a model has: the link, or its pieces.
-
-    Attributes:
-        arrays: by layout, each on the modes that it reaches, `modes`.
-        modes: by layout.
-        reach: of all patches side by side on the modes that they reach together, `reached`.
-        reached: likewise.
-        bodies: by name, the link and, where it is divided, its pieces.
-        slowness: √(ρA/EI) of the link, in s/m².
-        on_kept: (n, n) of modal forces the part that the equations keep, where the patches serve that alone.
     """
 
-    arrays: Mapping[str, PatchArray]
-    modes: Mapping[str, ReachedModes]
-    reach: Reach
-    reached: ReachedModes
-    bodies: Mapping[str, OnBody]
-    slowness: float
+    arrays: Mapping[str, PatchArray]  # by layout, each on the modes that it reaches, `modes`
+    modes: Mapping[str, ReachedModes]  # by layout
+    reach: Reach  # of all patches side by side on the modes that they reach together, `reached`
+    reached: ReachedModes  # likewise
+    bodies: Mapping[str, OnBody]  # by name, the link and, where it is divided, its pieces
+    slowness: float  # √(ρA/EI) of the link, in s/m²
+    # (n, n) of modal forces the part that the equations keep, where the patches serve that alone
     on_kept: Array | None = None
 
     @property

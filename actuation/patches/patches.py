@@ -30,22 +30,14 @@ ENERGY_WEIGHT = 1e-4  # of the strain energy rᵀ K⁻¹ r beside weights of poi
 
 @struct
 class Reach:
-    """What k patches do to n modes, and what is wanted of them.
-
-    Attributes:
-        Phi_V: (n, k) modal forces per volt.
-        limit: (k,) largest voltages, V; infinite where the scene gives none.
-        W_sqrt: (rows, n) what of the modal forces left unmet counts: |W_sqrt r|² is made small.
-        frequency: (n,) of the modes, Hz.
-        served: number of modes, the first ones, that the patches are to serve: attachment modes are not among them.
-    """
+    """What k patches do to n modes, and what is wanted of them."""
 
     _: KW_ONLY
-    Phi_V: Array
-    limit: Array
-    W_sqrt: Array
-    frequency: Array
-    served: int
+    Phi_V: Array  # (n, k) modal forces per volt
+    limit: Array  # (k,) largest voltages, V; infinite where the scene gives none
+    W_sqrt: Array  # (rows, n) what of the modal forces left unmet counts: |W_sqrt r|² is made small
+    frequency: Array  # (n,) of the modes, Hz
+    served: int  # number of modes, the first ones, that the patches are to serve: attachment modes are not among them
 
     @property
     def condition_number(self) -> float:
@@ -134,20 +126,14 @@ OUT_OF_REACH = 1e-9  # of the largest modal force per volt: less is rounding
 
 @struct
 class ReachedModes:
-    """The modes of a link that moves in some of its families alone, with what it carries.
+    """The modes of a link that moves in some of its families alone, with what it carries."""
 
-    Attributes:
-        rows: (m,) numbers (from 0) of the modes of the modal body in these families.
-        T: (m, m) p of these rows from the coordinates p' in which m_ff is the identity and K_ff diagonal; (m, fewer) of
-            the coordinates that equations keep, see `link_patches.on_kept_modes`.
-        stiffness: (m,) of the p'.
-        served: number of them, the first ones: the others are attachment modes.
-    """
-
-    rows: Indices
+    rows: Indices  # (m,) numbers (from 0) of the modes of the modal body in these families
+    # (m, m) p of these rows from the coordinates p' in which m_ff is the identity and K_ff diagonal; (m, fewer) of the
+    # coordinates that equations keep, see `link_patches.on_kept_modes`
     T: Array
-    stiffness: Array
-    served: int
+    stiffness: Array  # (m,) of the p'
+    served: int  # number of them, the first ones: the others are attachment modes
 
     def forces(self, F_p: Array) -> Array:
         """(T, m) on the p' from those on the modes of the modal body (T, n)."""
@@ -182,19 +168,12 @@ def _modes_of(families: frozenset[Family], body: ModalBody, spatial: Body) -> Re
 
 @struct
 class Voltages:
-    """Voltages of patches over time.
+    """Voltages of patches over time."""
 
-    Attributes:
-        required: (T, k) V, with no limit; of least size or least residual where patches and modes differ in number.
-        within_limit: (T, k) V, the best within the limits of the patches.
-        unmet: (T, n) modal forces that `within_limit` leaves.
-        served: number of modes, the first ones, that the patches are to serve.
-    """
-
-    required: Array
-    within_limit: Array
-    unmet: Array
-    served: int
+    required: Array  # (T, k) V, with no limit; of least size or least residual where patches and modes differ in number
+    within_limit: Array  # (T, k) V, the best within the limits of the patches
+    unmet: Array  # (T, n) modal forces that `within_limit` leaves
+    served: int  # number of modes, the first ones, that the patches are to serve
 
     def at(self, rows: Indices) -> Voltages:
         """These rows alone."""
@@ -246,25 +225,15 @@ def solve_voltages(patches: Reach, F_p: Array) -> Voltages:
 
 @struct
 class PatchArray(Reach):
-    """The patches of one layout.
+    """The patches of one layout."""
 
-    Attributes:
-        layout: the keys of the scene.
-        edges: (k, 2) where each patch begins and ends along the link, m.
-        height: (k,) t_b, of the link along their normal under each patch, its mean, m.
-        moment_per_volt: (k,) c in N·m/V.
-        turn: (n, k) φ'(x2) − φ'(x1) of the n modes of the body, rad per unit of modal coordinate; of twist φ_x.
-        link: the modal body of the link that they are on.
-        lever: (k,) strain of the surface by unit turn per length and distance: 1 of bending.
-    """
-
-    layout: PztLayout
-    edges: Array
-    height: Array
-    moment_per_volt: Array
-    turn: Array
-    link: ModalBody
-    lever: Array
+    layout: PztLayout  # the keys of the scene
+    edges: Array  # (k, 2) where each patch begins and ends along the link, m
+    height: Array  # (k,) t_b, of the link along their normal under each patch, its mean, m
+    moment_per_volt: Array  # (k,) c in N·m/V
+    turn: Array  # (n, k) φ'(x2) − φ'(x1) of the n modes of the body, rad per unit of modal coordinate; of twist φ_x
+    link: ModalBody  # the modal body of the link that they are on
+    lever: Array  # (k,) strain of the surface by unit turn per length and distance: 1 of bending
 
     @property
     def body(self) -> str:

@@ -17,15 +17,10 @@ from ...mbs.fields.spelling import IN_SPACE, Spelled, as_written
 
 
 class Lamina(NamedTuple):
-    """Stress (σ_x, τ_xs) = C (ε_x, γ_xs) − C Λ V in a layer; x along the link, s across it in the layer.
+    """Stress (σ_x, τ_xs) = C (ε_x, γ_xs) − C Λ V in a layer; x along the link, s across it in the layer."""
 
-    Attributes:
-        C: (2, 2) Pa.
-        per_volt: (2,) C Λ, Pa/V: the stress that a volt takes off a layer which is held.
-    """
-
-    C: Array
-    per_volt: Array
+    C: Array  # (2, 2) Pa
+    per_volt: Array  # (2,) C Λ, Pa/V: the stress that a volt takes off a layer which is held
 
 
 class Fibres(NamedTuple):

@@ -34,20 +34,14 @@ ROUND = 1e-6  # of the radius: corners of an outline that are so far from the ax
 
 @struct
 class LinkSections:
-    """From each of k stations on; NaN where not known.
+    """From each of k stations on; NaN where not known."""
 
-    Attributes:
-        x: (k,) m.
-        height, width: (k,) along y and z, m.
-        is_round: (k,) whether a circle bounds the section.
-        rigidity: (k, 4) of the strains e: EI in plane, EA, GJ, EI out of plane, N·m² and N.
-    """
-
-    x: Array
+    x: Array  # (k,) m
+    # height, width: (k,) along y and z, m
     height: Array
     width: Array
-    is_round: Array
-    rigidity: Array
+    is_round: Array  # (k,) whether a circle bounds the section
+    rigidity: Array  # (k, 4) of the strains e: EI in plane, EA, GJ, EI out of plane, N·m² and N
 
     def extent(self, normal: Literal["y", "z"]) -> Array:
         """(k,) between the faces with that normal, m."""

@@ -26,20 +26,15 @@ U_X, U_Y, U_Z, R_X, R_Y, R_Z = range(6)
 
 @struct
 class FamilyModel:
-    """One family's eigenproblem K x = ω² M x over its m free degrees of freedom.
+    """One family's eigenproblem K x = ω² M x over its m free degrees of freedom."""
 
-    Attributes:
-        K, M: (m, m).
-        strain: (s, m) the strains at Gauss points, scaled such that K = strainᵀ strain.
-        fields: for each of the rows U_X … R_Z that the family moves, (k, m): the field at k stations from x.
-        solver: of the eigenproblem.
-    """
-
+    # K, M: (m, m)
     K: sp.csr_matrix
     M: sp.csr_matrix
-    strain: sp.csr_matrix
+    strain: sp.csr_matrix  # (s, m) the strains at Gauss points, scaled such that K = strainᵀ strain
+    # for each of the rows U_X … R_Z that the family moves, (k, m): the field at k stations from x
     fields: Mapping[int, sp.csr_matrix]
-    solver: Solver = "block-lanczos"
+    solver: Solver = "block-lanczos"  # of the eigenproblem
 
 
 def family_model(link: BeamLink, family: Family, nodes: Array, stations: Array) -> FamilyModel:

@@ -17,21 +17,13 @@ GAUSS = 4
 
 @struct
 class Functions:
-    """Continuous functions on the elements between neighbouring nodes, from their degrees of freedom.
+    """Continuous functions on the elements between neighbouring nodes, from their degrees of freedom."""
 
-    Attributes:
-        nodes: (e + 1,) ascending, in m.
-        x: (size,) where the degrees of freedom are, ascending, in m.
-        element: (e, d) degrees of freedom of each element, numbered along the axis.
-        powers: (p, d) coefficients of the powers of X ∈ [0, 1] in each shape function.
-        slopes: (d,) 1 of degrees of freedom that are derivatives by x, else 0.
-    """
-
-    nodes: Array
-    x: Array
-    element: Integers
-    powers: Array
-    slopes: Integers
+    nodes: Array  # (e + 1,) ascending, in m
+    x: Array  # (size,) where the degrees of freedom are, ascending, in m
+    element: Integers  # (e, d) degrees of freedom of each element, numbered along the axis
+    powers: Array  # (p, d) coefficients of the powers of X ∈ [0, 1] in each shape function
+    slopes: Integers  # (d,) 1 of degrees of freedom that are derivatives by x, else 0
 
     @property
     def lengths(self) -> Array:

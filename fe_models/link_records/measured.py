@@ -26,22 +26,14 @@ class Measured(Record):
 
 @struct
 class MeasuredMode:
-    """One row of the table.
+    """One row of the table."""
 
-    Attributes:
-        line: of the file.
-        number: of the mode, from 1, the lowest first: among those of `family`, or among all where that is empty.
-        frequency: Hz; None where not measured.
-        damping_ratio: ζ; None where not measured.
-        uncertainty: standard deviation of the frequency, Hz; None where not known.
-    """
-
-    line: int
-    number: int
+    line: int  # of the file
+    number: int  # of the mode, from 1, the lowest first: among those of `family`, or among all where that is empty
     family: str
-    frequency: float | None
-    damping_ratio: float | None
-    uncertainty: float | None
+    frequency: float | None  # Hz; None where not measured
+    damping_ratio: float | None  # ζ; None where not measured
+    uncertainty: float | None  # standard deviation of the frequency, Hz; None where not known
 
     @property
     def label(self) -> str:

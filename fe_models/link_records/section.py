@@ -9,25 +9,15 @@ from ...common.structs import struct
 
 @struct
 class Section:
-    """A cross section whose principal axes are y and z, through the centroid.
+    """A cross section whose principal axes are y and z, through the centroid."""
 
-    Attributes:
-        area: A in m².
-        I_yy: ∫y² dA in m⁴: in-plane bending (displacement along y) works against E I_yy.
-        I_zz: ∫z² dA in m⁴: out-of-plane bending works against E I_zz.
-        torsion: J in m⁴, St Venant's torsion constant: twisting works against G J.
-        height: extent along y, in m.
-        width: extent along z, in m.
-        shear: Timoshenko's shear coefficient k, the same along y and z for all shapes here.
-    """
-
-    area: float
-    I_yy: float
-    I_zz: float
-    torsion: float
-    height: float
-    width: float
-    shear: float
+    area: float  # A in m²
+    I_yy: float  # ∫y² dA in m⁴: in-plane bending (displacement along y) works against E I_yy
+    I_zz: float  # ∫z² dA in m⁴: out-of-plane bending works against E I_zz
+    torsion: float  # J in m⁴, St Venant's torsion constant: twisting works against G J
+    height: float  # extent along y, in m
+    width: float  # extent along z, in m
+    shear: float  # Timoshenko's shear coefficient k, the same along y and z for all shapes here
 
     @property
     def I_p(self) -> float:

@@ -53,19 +53,12 @@ def in_order(K: Array, families: Sequence[str], is_static: Sequence[bool]) -> Mo
 
 @struct
 class InterfaceCoordinates:
-    """What the modes of a body make of interface motion.
+    """What the modes of a body make of interface motion."""
 
-    Attributes:
-        names: of the c coordinates d: "tip/y" … "tip/rz", of interfaces other than the root.
-        rows: (c, n) d = rows p.
-        constraint: (n, c) p of each constraint mode, rows constraint = 1.
-        fixed: (n, n − c) p of each fixed-interface mode, rows fixed = 0, orthonormal in M, uncoupled in K.
-    """
-
-    names: list[str]
-    rows: Array
-    constraint: Array
-    fixed: Array
+    names: list[str]  # of the c coordinates d: "tip/y" … "tip/rz", of interfaces other than the root
+    rows: Array  # (c, n) d = rows p
+    constraint: Array  # (n, c) p of each constraint mode, rows constraint = 1
+    fixed: Array  # (n, n − c) p of each fixed-interface mode, rows fixed = 0, orthonormal in M, uncoupled in K
 
 
 # Of the largest motion of its kind: less is rounding, of a coordinate that modes do not move.
@@ -138,19 +131,12 @@ def interface_loads(
 
 @struct
 class CraigBampton:
-    """A link in interface coordinates and fixed-interface modes, for other programs; SI units, the link's frame.
+    """A link in interface coordinates and fixed-interface modes, for other programs; SI units, the link's frame."""
 
-    Attributes:
-        coordinates: names of the m coordinates: "root/x" … "root/rz", "tip/y" …, then "mode/1" … .
-        mass: (m, m).
-        stiffness: (m, m); zero for rigid motions.
-        recovery: (n, m) modal coordinates p of the floating frame on the root, whose motion is that of the root.
-    """
-
-    coordinates: list[str]
-    mass: Array
-    stiffness: Array
-    recovery: Array
+    coordinates: list[str]  # names of the m coordinates: "root/x" … "root/rz", "tip/y" …, then "mode/1" …
+    mass: Array  # (m, m)
+    stiffness: Array  # (m, m); zero for rigid motions
+    recovery: Array  # (n, m) modal coordinates p of the floating frame on the root, whose motion is that of the root
 
 
 def craig_bampton(body: ModalBody) -> CraigBampton:

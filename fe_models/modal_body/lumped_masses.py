@@ -26,18 +26,12 @@ Of = TypeVar("Of", bound=Invariants)
 
 @struct
 class Lump:
-    """A mass on the interface `name`.
-
-    Attributes:
-        at: what the modes do there.
-        mass: m in kg.
-        inertia: (3,) J_x, J_y, J_z about the interface, in kg·m².
-    """
+    """A mass on the interface `name`."""
 
     name: str
-    at: Interface
-    mass: float
-    inertia: Array
+    at: Interface  # what the modes do there
+    mass: float  # m in kg
+    inertia: Array  # (3,) J_x, J_y, J_z about the interface, in kg·m²
 
     @property
     def weights(self) -> Array:

@@ -30,33 +30,22 @@ AnyMaterial = Material | OrthotropicMaterial
 
 @struct
 class MaterialMap:
-    """Which material each cell of this rank (ghosts too) is made of.
+    """Which material each cell of this rank (ghosts too) is made of."""
 
-    Attributes:
-        C: (r, 6, 6) stiffness of each material, as in `constitutive.stiffness`.
-        density: (r,) in kg/m³.
-        of_cell: (c,) row of `C` and `density`.
-    """
-
-    C: Array
-    density: Array
-    of_cell: Integers
+    C: Array  # (r, 6, 6) stiffness of each material, as in `constitutive.stiffness`
+    density: Array  # (r,) in kg/m³
+    of_cell: Integers  # (c,) row of `C` and `density`
 
 
 @struct
 class ScalarMass:
-    """M_ab = ∫ρ N_a N_b dV over the nodes, rows of this rank's own nodes.
+    """M_ab = ∫ρ N_a N_b dV over the nodes, rows of this rank's own nodes."""
 
-    Attributes:
-        csr: (owned, owned + foreign).
-        scatter: fetches the foreign nodes' displacements of a vector into `foreign`; None on one process.
-        comm: of the processes.
-    """
-
-    csr: sp.csr_matrix
+    csr: sp.csr_matrix  # (owned, owned + foreign)
+    # fetches the foreign nodes' displacements of a vector into `foreign`; None on one process
     scatter: PETSc.Scatter | None
     foreign: PETSc.Vec
-    comm: Any
+    comm: Any  # of the processes
 
     def __matmul__(self, U: Array) -> Array:
         """M U of displacements U (3 owned, n), the same matrix for each component; collective."""
@@ -75,31 +64,19 @@ class ScalarMass:
 
 @struct
 class SolidModel:
-    """Nodes, materials and matrices of a solid, before it is held anywhere.
+    """Nodes, materials and matrices of a solid, before it is held anywhere."""
 
-    Attributes:
-        mesh: distributed over `comm`.
-        order: polynomial order of the displacements.
-        V: their space, three components at each node.
-        x: (owned, 3) nodes that this rank owns, in m.
-        nodes: (c, d) nodes of each cell, numbered as this rank sees them: its own first, ghosts behind.
-        materials: of the cells.
-        mass: scalar mass matrix.
-        pattern: number of blocks in each row of the stiffness matrix: in this rank's columns and in later ranks'.
-        local_to_global: numbers of the nodes that this rank sees.
-        stiffness_form: compiled.
-    """
-
-    mesh: Mesh
-    order: int
-    V: fem.FunctionSpace
-    x: Array
-    nodes: Integers
-    materials: MaterialMap
-    mass: ScalarMass
+    mesh: Mesh  # distributed over `comm`
+    order: int  # polynomial order of the displacements
+    V: fem.FunctionSpace  # their space, three components at each node
+    x: Array  # (owned, 3) nodes that this rank owns, in m
+    nodes: Integers  # (c, d) nodes of each cell, numbered as this rank sees them: its own first, ghosts behind
+    materials: MaterialMap  # of the cells
+    mass: ScalarMass  # scalar mass matrix
+    # number of blocks in each row of the stiffness matrix: in this rank's columns and in later ranks'
     pattern: tuple[Integers, Integers]
-    local_to_global: PETSc.LGMap
-    stiffness_form: Any
+    local_to_global: PETSc.LGMap  # numbers of the nodes that this rank sees
+    stiffness_form: Any  # compiled
 
     @property
     def comm(self) -> MPI.Comm:

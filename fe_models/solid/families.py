@@ -29,13 +29,9 @@ SIMPSON = np.array([1.0, 3.0, 3.0, 1.0]) / 8
 
 @struct
 class SectionMotion:
-    """Mean motion of the cross sections at the k stations, weighted such that sums of squares are energies.
+    """Mean motion of the cross sections at the k stations, weighted such that sums of squares are energies."""
 
-    Attributes:
-        families: by the order of `FAMILIES`, (rows, n) each.
-    """
-
-    families: tuple[Array, ...]
+    families: tuple[Array, ...]  # by the order of `FAMILIES`, (rows, n) each
 
     def energy(self) -> Array:
         """(4, n) share of each family in the modal mass."""

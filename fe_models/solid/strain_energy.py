@@ -28,21 +28,13 @@ VOIGT = ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))
 
 @struct
 class Gradients:
-    """Displacement gradients of k fields in some cells.
+    """Displacement gradients of k fields in some cells."""
 
-    Attributes:
-        cells: which, of this rank's own.
-        weights: (c, q) quadrature weight times volume in m³.
-        values: (c, 3, q, 3, k): ∂u_i/∂x_j at [:, j, :, i].
-        inverse: (c, 1 or q, 3, 3) ∂X_a/∂x_j at [:, :, j, a].
-        shapes: (3, q, d) slopes of the shape functions on the reference cell.
-    """
-
-    cells: slice
-    weights: Array
-    values: Array
-    inverse: Array
-    shapes: Array
+    cells: slice  # which, of this rank's own
+    weights: Array  # (c, q) quadrature weight times volume in m³
+    values: Array  # (c, 3, q, 3, k): ∂u_i/∂x_j at [:, j, :, i]
+    inverse: Array  # (c, 1 or q, 3, 3) ∂X_a/∂x_j at [:, :, j, a]
+    shapes: Array  # (3, q, d) slopes of the shape functions on the reference cell
 
     def only(self, fields: slice) -> Gradients:
         """Of some of the fields."""

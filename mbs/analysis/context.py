@@ -62,47 +62,29 @@ def no_points(run: Outcome) -> Mapping[str, Array]:
 
 @struct
 class WholeLinks:
-    """Of a model in which links are in pieces: the robot with the whole links, as scenes and controllers name it.
+    """Of a model in which links are in pieces: the robot with the whole links, as scenes and controllers name it."""
 
-    Attributes:
-        model: the robot with one body for each link.
-        divided: the links in pieces by name.
-        places: which point of which piece "BODY.POINT" of such a link is.
-        as_links: an outcome of the pieces as one of the links; `InputError` where their joints lack coordinates.
-    """
-
-    model: Model
-    divided: Mapping[str, DividedLink]
-    places: Mapping[str, str]
+    model: Model  # the robot with one body for each link
+    divided: Mapping[str, DividedLink]  # the links in pieces by name
+    places: Mapping[str, str]  # which point of which piece "BODY.POINT" of such a link is
+    # an outcome of the pieces as one of the links; `InputError` where their joints lack coordinates
     as_links: Callable[[Outcome], Outcome]
 
 
 @struct
 class Context:
-    """What the run of an analysis starts from.
-
-    Attributes:
-        progress: see `drive.Progress`.
-        is_replayed: whether a later analysis takes its actuation.
-        earlier: an earlier run of the same analysis, to go on with; None from the start.
-        model: the robot, with the constraint equations of all joints that close loops and of all trajectories.
-        outcomes: of the analyses before, by name.
-        patches: of links by body.
-        points: actuation points by body.
-        at_points: what driving forces are there.
-        whole: the links, where `model` has pieces of some.
-    """
+    """What the run of an analysis starts from."""
 
     _: KW_ONLY
-    progress: Progress
-    model: Model
-    outcomes: Mapping[str, Outcome]
-    is_replayed: bool = False
-    earlier: EarlierRun | None = None
-    patches: Mapping[str, PatchedLink] = field(default_factory=dict)
-    points: Mapping[str, ActuationPoints] = field(default_factory=dict)
-    at_points: ForcesAtPoints = no_points
-    whole: WholeLinks | None = None
+    progress: Progress  # see `drive.Progress`
+    model: Model  # the robot, with the constraint equations of all joints that close loops and of all trajectories
+    outcomes: Mapping[str, Outcome]  # of the analyses before, by name
+    is_replayed: bool = False  # whether a later analysis takes its actuation
+    earlier: EarlierRun | None = None  # an earlier run of the same analysis, to go on with; None from the start
+    patches: Mapping[str, PatchedLink] = field(default_factory=dict)  # of links by body
+    points: Mapping[str, ActuationPoints] = field(default_factory=dict)  # actuation points by body
+    at_points: ForcesAtPoints = no_points  # what driving forces are there
+    whole: WholeLinks | None = None  # the links, where `model` has pieces of some
 
 
 def place_of(whole: WholeLinks | None, point: Point) -> Point:

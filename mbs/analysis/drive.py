@@ -43,22 +43,15 @@ STATUS = {
 
 @struct
 class Control:
-    """What acts on motors and patches from sample to sample.
+    """What acts on motors and patches from sample to sample."""
 
-    Attributes:
-        commands: what a unit of each does.
-        first: (inputs,) before those of the first sample act.
-        times: (K,) s, of the samples; the commands of each act `delay` (s) later.
-        controller: commands (inputs,) from sample number, time and what was read: q (n_q,), v (n_v,), a (n_v,) in one.
-        held: commands (T, inputs) that have acted up to times (T,), s, after a run.
-    """
-
-    commands: tuple[Command, ...]
-    first: Array
-    times: Array
+    commands: tuple[Command, ...]  # what a unit of each does
+    first: Array  # (inputs,) before those of the first sample act
+    times: Array  # (K,) s, of the samples; the commands of each act `delay` (s) later
     delay: float
+    # commands (inputs,) from sample number, time and what was read: q (n_q,), v (n_v,), a (n_v,) in one
     controller: Callable[[int, float, Array], Array]
-    held: Callable[[Array], Array]
+    held: Callable[[Array], Array]  # commands (T, inputs) that have acted up to times (T,), s, after a run
 
 
 def drive_robot(

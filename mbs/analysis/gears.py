@@ -35,15 +35,10 @@ CONTRACTS = 0.5  # of one change the next one at most, where rotors on outer bod
 
 
 class Supplied(NamedTuple):
-    """What motors and modes supply in a motion of the links: see `supplied_through_gears`.
+    """What motors and modes supply in a motion of the links: see `supplied_through_gears`."""
 
-    Attributes:
-        forces: τ, of motors in front of compliant gears, and F_p.
-        gears: by joint with such a gear.
-    """
-
-    forces: MotorForces
-    gears: Mapping[str, GearMotion]
+    forces: MotorForces  # τ, of motors in front of compliant gears, and F_p
+    gears: Mapping[str, GearMotion]  # by joint with such a gear
 
 
 def supplied_through_gears(
@@ -134,19 +129,14 @@ def _in_motor_coordinates(compliant: Model, state: States, gears: Mapping[str, G
 
 
 class MotorCoordinates(NamedTuple):
-    """A motion in the coordinates of a robot whose gears give.
+    """A motion in the coordinates of a robot whose gears give."""
 
-    Attributes:
-        q, v, a: (T, n_q), (T, n_v), (T, n_v).
-        gears: by joint, those that are rigid in the motion; none where they give in it, too.
-        moments: (T, k) by joint, of all motors where gears are rigid in the motion.
-    """
-
+    # q, v, a: (T, n_q), (T, n_v), (T, n_v)
     q: Array
     v: Array
     a: Array
-    gears: Mapping[str, GearMotion]
-    moments: Mapping[str, Array]
+    gears: Mapping[str, GearMotion]  # by joint, those that are rigid in the motion; none where they give in it, too
+    moments: Mapping[str, Array]  # (T, k) by joint, of all motors where gears are rigid in the motion
 
 
 def with_motor_coordinates(run: Outcome, model: Model) -> MotorCoordinates:

@@ -66,39 +66,27 @@ class _Rows:
 
 @struct
 class Motion(_Rows):
-    """One row per output time, SI units.
+    """One row per output time, SI units."""
 
-    Attributes:
-        time: (T,) s.
-        q, v, a: (T, n_q), (T, n_v), (T, n_v) of the model's tree.
-        multipliers: (T, constraint equations).
-        is_at_rest: whether targets stand still, as in an equilibrium.
-    """
-
-    time: Array
+    time: Array  # (T,) s
+    # q, v, a: (T, n_q), (T, n_v), (T, n_v) of the model's tree
     q: Array
     v: Array
     a: Array
-    multipliers: Array
-    is_at_rest: bool = False
+    multipliers: Array  # (T, constraint equations)
+    is_at_rest: bool = False  # whether targets stand still, as in an equilibrium
 
 
 @struct
 class Forces(_Rows):
-    """What actuators have to supply, and what acts beside the loads of the scene.
+    """What actuators have to supply, and what acts beside the loads of the scene."""
 
-    Attributes:
-        required: (T, n_v) generalized forces that a prescribed shape takes; None where those of the paths are
-            all.
-        applied: on points.
-        commanded: (T, k) moments by joint that act along joints, N·m or N: what a controller commands, or a replay
-            applies.
-        voltages: (T, k) V by body, of patches where the analysis itself finds them.
-    """
-
+    # (T, n_v) generalized forces that a prescribed shape takes; None where those of the paths are all
     required: Array | None = None
-    applied: tuple[PointDrive, ...] = ()
+    applied: tuple[PointDrive, ...] = ()  # on points
+    # (T, k) moments by joint that act along joints, N·m or N: what a controller commands, or a replay applies
     commanded: Mapping[str, Array] = field(default_factory=dict)
+    # (T, k) V by body, of patches where the analysis itself finds them
     voltages: Mapping[str, Array] = field(default_factory=dict)
 
 
@@ -166,77 +154,54 @@ class EarlierRun:
 
 @struct
 class GearMotion:
-    """What an elastic gear does in an inverse analysis, one row per output.
+    """What an elastic gear does in an inverse analysis, one row per output."""
 
-    Attributes:
-        gear_moment: (T,) τ_s = k (θ_m − γ) + c (θ̇_m − γ̇), N·m: what the gear does to the second body.
-        angle, rate, acceleration: (T,) of the motor behind its gear, θ_m, rad.
-        moment: (T,) τ_s + J N ψ̈ of the motor, behind its gear.
-        unresolved: part of the largest moment by which it changes when only every second output is known.
-        twist: (T, 3) δ = θ_m − γ and its derivatives.
-        curve: δ(t) between outputs; None where there are too few.
-    """
-
-    gear_moment: Array
+    gear_moment: Array  # (T,) τ_s = k (θ_m − γ) + c (θ̇_m − γ̇), N·m: what the gear does to the second body
+    # angle, rate, acceleration: (T,) of the motor behind its gear, θ_m, rad
     angle: Array
     rate: Array
     acceleration: Array
-    moment: Array
-    unresolved: float
-    twist: Array
-    curve: BSpline | None
+    moment: Array  # (T,) τ_s + J N ψ̈ of the motor, behind its gear
+    unresolved: float  # part of the largest moment by which it changes when only every second output is known
+    twist: Array  # (T, 3) δ = θ_m − γ and its derivatives
+    curve: BSpline | None  # δ(t) between outputs; None where there are too few
 
 
 class Details:
-    """Base of what only one kind of analysis finds; itself what a kind has that finds nothing besides.
+    """Base of what only one kind of analysis finds; itself what a kind has that finds nothing besides."""
 
-    Attributes:
-        pre_actuation, post_actuation: s for which motors act before and after the path.
-        held: the robot whose constraint equations hold it on a path that the run follows with an error.
-        warnings: why it may be wrong, a text each.
-    """
-
+    # pre_actuation, post_actuation: s for which motors act before and after the path
     pre_actuation: float = 0.0
     post_actuation: float = 0.0
+    # the robot whose constraint equations hold it on a path that the run follows with an error
     held: Model | None = None
-    warnings: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()  # why it may be wrong, a text each
 
 
 class Prescription(NamedTuple):
-    """A motion of which the modes are functions of time.
+    """A motion of which the modes are functions of time."""
 
-    Attributes:
-        motion: makes its equations, each time new ones.
-        shape: p(t) of each body.
-        near: (n_q,) a posture near the first.
-        voltages: by body times (B,), s, and V (B, k), linear between, of patches where the analysis itself finds them.
-    """
-
-    motion: Callable[[], _core.SpatialPrescribedMotion]
-    shape: Sequence[Sequence[TimeFunction]]
-    near: Array
+    motion: Callable[[], _core.SpatialPrescribedMotion]  # makes its equations, each time new ones
+    shape: Sequence[Sequence[TimeFunction]]  # p(t) of each body
+    near: Array  # (n_q,) a posture near the first
+    # by body times (B,), s, and V (B, k), linear between, of patches where the analysis itself finds them
     voltages: Mapping[str, tuple[Array, Array]] = MappingProxyType({})
 
 
 @struct
 class Outcome:
-    """What an analysis computed.
-
-    Attributes:
-        model: with the constraint equations of its run.
-        prescribed: what moves it, where that is known without steps.
-        look_closer: the same with times between its outputs; None where nothing is between.
-    """
+    """What an analysis computed."""
 
     _: KW_ONLY
     analysis: Analysis
-    model: Model
+    model: Model  # with the constraint equations of its run
     motion: Motion
     forces: Forces = field(default=Forces())
     statistics: Statistics = field(default=Statistics())
     details: Details = field(default=Details())
     continuation: Continuation | None = None
-    prescribed: Prescription | None = None
+    prescribed: Prescription | None = None  # what moves it, where that is known without steps
+    # the same with times between its outputs; None where nothing is between
     look_closer: Callable[[], Outcome] | None = None
 
     @property

@@ -159,33 +159,22 @@ class Tracking(TimedAnalysis):
 
 @struct
 class TrackedPath(AroundPath):
-    """How a path is carried.
-
-    Attributes:
-        least_voltage: V, the largest voltage that is needed at least, of the patch next to its limit.
-        least_voltage_doubt: V, by how much a finer mesh may change it, estimated; infinite where it did not settle.
-        least_share: the same as a share of the limits; NaN where no patch has any.
-        objective: what was made small, `effort` unless limits do not allow it.
-        cost: the effort, without unit.
-        unmet: see `Tracked`.
-        bounds: what each zero requires, V; None where motors alone have no bounded motion.
-        voltage_prices, torque_prices: `Tracked.prices` by body, and by joint.
-        without_patches: m or rad, how far off the path the same torques alone are at most; NaN where not found.
-        is_needed: whether that is more than the tolerance times the path's way.
-    """
+    """How a path is carried."""
 
     _: KW_ONLY
-    least_voltage: float
-    least_voltage_doubt: float
-    least_share: float
-    objective: Objective
-    cost: float
-    unmet: float
-    bounds: Bounds | None
+    least_voltage: float  # V, the largest voltage that is needed at least, of the patch next to its limit
+    least_voltage_doubt: float  # V, by how much a finer mesh may change it, estimated; infinite where it did not settle
+    least_share: float  # the same as a share of the limits; NaN where no patch has any
+    objective: Objective  # what was made small, `effort` unless limits do not allow it
+    cost: float  # the effort, without unit
+    unmet: float  # see `Tracked`
+    bounds: Bounds | None  # what each zero requires, V; None where motors alone have no bounded motion
+    # voltage_prices, torque_prices: `Tracked.prices` by body, and by joint
     voltage_prices: Mapping[str, Array]
     torque_prices: Mapping[str, Array]
+    # m or rad, how far off the path the same torques alone are at most; NaN where not found
     without_patches: float = float("nan")
-    is_needed: bool = True
+    is_needed: bool = True  # whether that is more than the tolerance times the path's way
 
 
 @struct

@@ -30,18 +30,13 @@ WIDEST = 2.8  # rad from the middle of all orientations of a table: a rotation v
 
 @struct
 class OrientationLaw:
-    """A triad A(t), or its third axis alone ("direction").
+    """A triad A(t), or its third axis alone ("direction")."""
 
-    Attributes:
-        kind: what `functions` are: a rotation vector ψ, A = exp(ψ~) exp(reference~); roll, pitch and yaw about fixed
-            axes; or components of a direction of any length.
-        functions: three functions of time, rad.
-        reference: rotation vector (3,), rad.
-    """
-
+    # what `functions` are: a rotation vector ψ, A = exp(ψ~) exp(reference~); roll, pitch and yaw about fixed axes; or
+    # components of a direction of any length
     kind: Literal["rotation_vector", "rpy", "direction"]
-    functions: tuple[TimeFunction, ...]
-    reference: Reference = (0.0, 0.0, 0.0)
+    functions: tuple[TimeFunction, ...]  # three functions of time, rad
+    reference: Reference = (0.0, 0.0, 0.0)  # rotation vector (3,), rad
 
     def sample(self, times: Array) -> Array:
         """A (T, 3, 3), columns its axes; of a direction z is along it, by the smallest turn."""

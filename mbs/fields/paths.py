@@ -19,27 +19,20 @@ SAMPLES = 64  # of each polynomial, to find where a rounded path is fastest
 
 @struct
 class Legs:
-    """A path through `places` (k + 1, n), m or rad, from the first, where it is until `start` (s).
-
-    Attributes:
-        profile, smoothness: law of motion of each leg, and its number of continuous derivatives.
-        limits: of the speed along the path and its derivatives.
-        durations: (k,) s of each leg; None: as long as the limits ask for.
-        holds: (k − 1,) s at the places between.
-        blend: share of the shorter of two legs for which they overlap where there is no hold: the path then passes the
-            place between them within the triangle of the three, without a stop.
-        stretch: factor of the times of all legs, not of holds.
-    """
+    """A path through `places` (k + 1, n), m or rad, from the first, where it is until `start` (s)."""
 
     places: Array
     start: float
+    # profile, smoothness: law of motion of each leg, and its number of continuous derivatives
     profile: Profile
     smoothness: int
-    limits: Limits
-    durations: tuple[float, ...] | None
-    holds: tuple[float, ...]
+    limits: Limits  # of the speed along the path and its derivatives
+    durations: tuple[float, ...] | None  # (k,) s of each leg; None: as long as the limits ask for
+    holds: tuple[float, ...]  # (k − 1,) s at the places between
+    # share of the shorter of two legs for which they overlap where there is no hold: the path then passes the place
+    # between them within the triangle of the three, without a stop
     blend: float = 0.0
-    stretch: float = 1.0
+    stretch: float = 1.0  # factor of the times of all legs, not of holds
 
 
 def path_of(legs: Legs) -> Piecewise:

@@ -32,15 +32,10 @@ class StiffnessSteps(Record):
 
 @struct
 class TwistSpring:
-    """Torque of a twist, odd and piecewise linear.
+    """Torque of a twist, odd and piecewise linear."""
 
-    Attributes:
-        slopes: N·m/rad, from no twist on; one of a linear spring.
-        knots: rad, the twists from which on the next slope counts.
-    """
-
-    slopes: tuple[float, ...]
-    knots: tuple[float, ...] = ()
+    slopes: tuple[float, ...]  # N·m/rad, from no twist on; one of a linear spring
+    knots: tuple[float, ...] = ()  # rad, the twists from which on the next slope counts
 
     @classmethod
     def of(cls, stiffness: float | StiffnessSteps) -> "TwistSpring":

@@ -46,28 +46,17 @@ class Body(Invariants):
 
     Arrays are over all n modes of the link; `m_ff` is the identity. `S_bar_kl` is without S_spin, which files book
     at [2, 2].
-
-    Attributes:
-        name: of the body.
-        stiffness: K_ff (n,) in rad²/s².
-        damping: D_ff (n, n) in 1/s.
-        points: its sections by name.
-        modal_transform: (n_file, n) p of the modal file is this times p.
-        length: of a link in m; None of a rigid body.
-        reduction: where it has fewer modes than its file.
-        attachment_modes: how many of the n, after all others, are static shapes of loads at interfaces.
-        stiffening: what bending does to second order; left out of the equations where None.
     """
 
-    name: str
-    stiffness: Array
-    damping: Array
-    points: Mapping[str, BodyPoint]
-    modal_transform: Array
-    length: float | None = None
-    reduction: Reduction | None = None
-    attachment_modes: int = 0
-    stiffening: Stiffening | None = None
+    name: str  # of the body
+    stiffness: Array  # K_ff (n,) in rad²/s²
+    damping: Array  # D_ff (n, n) in 1/s
+    points: Mapping[str, BodyPoint]  # its sections by name
+    modal_transform: Array  # (n_file, n) p of the modal file is this times p
+    length: float | None = None  # of a link in m; None of a rigid body
+    reduction: Reduction | None = None  # where it has fewer modes than its file
+    attachment_modes: int = 0  # how many of the n, after all others, are static shapes of loads at interfaces
+    stiffening: Stiffening | None = None  # what bending does to second order; left out of the equations where None
 
     @property
     def n_modes(self) -> int:
@@ -127,19 +116,13 @@ class Body(Invariants):
 
 @struct
 class Reduction:
-    """How a body came by fewer modes: see `truncation.with_fewer_modes`.
+    """How a body came by fewer modes: see `truncation.with_fewer_modes`."""
 
-    Attributes:
-        whole: the body with all n modes of its file.
-        lowest: how many of these it kept; the other coordinates stand for the rest.
-        T: (n, m) coordinates of `whole` from the m that it has, TᵀT = 1.
-        lift: (n, m) modal forces on all modes from those on the m coordinates, Tᵀ lift = 1: exact for forces that come
-            from loads at the loaded points.
-    """
-
-    whole: Body
-    lowest: int
-    T: Array
+    whole: Body  # the body with all n modes of its file
+    lowest: int  # how many of these it kept; the other coordinates stand for the rest
+    T: Array  # (n, m) coordinates of `whole` from the m that it has, TᵀT = 1
+    # (n, m) modal forces on all modes from those on the m coordinates, Tᵀ lift = 1: exact for forces that come from
+    # loads at the loaded points
     lift: Array
 
 

@@ -22,19 +22,12 @@ from .tree import KinematicTree, Motion
 
 
 class CutCoordinate(NamedTuple):
-    """A coordinate of a joint at which a loop is cut.
+    """A coordinate of a joint at which a loop is cut."""
 
-    Attributes:
-        joint: whose it is; of the second of its sides on the first.
-        row: measures `row.sign` times the coordinate.
-        friction: along it.
-        loads: given forces of time along it, N·m or N.
-    """
-
-    joint: JointRecord
-    row: ConstraintRow
-    friction: Friction | None
-    loads: tuple[TimeFunction, ...]
+    joint: JointRecord  # whose it is; of the second of its sides on the first
+    row: ConstraintRow  # measures `row.sign` times the coordinate
+    friction: Friction | None  # along it
+    loads: tuple[TimeFunction, ...]  # given forces of time along it, N·m or N
 
     @property
     def is_loaded(self) -> bool:

@@ -14,17 +14,11 @@ from .tree import Motion
 
 
 class CutMotion(NamedTuple):
-    """Of a coordinate along a joint at which a loop is cut.
+    """Of a coordinate along a joint at which a loop is cut."""
 
-    Attributes:
-        coordinate: (T,), full turns counted.
-        rate: (T,).
-        is_counted: whether the times are close enough together to count its turns.
-    """
-
-    coordinate: Array
-    rate: Array
-    is_counted: bool
+    coordinate: Array  # (T,), full turns counted
+    rate: Array  # (T,)
+    is_counted: bool  # whether the times are close enough together to count its turns
 
 
 def cut_motions(

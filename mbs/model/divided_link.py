@@ -23,18 +23,14 @@ INTERVALS = 32  # of a piece, over which strains are taken as constant
 
 @struct
 class DividedLink:
-    """The n modal coordinates of a link and the N of its pieces, side by side from the root to the tip.
+    """The n modal coordinates of a link and the N of its pieces, side by side from the root to the tip."""
 
-    Attributes:
-        bodies: names of the pieces.
-        spread: (N, n) p of the pieces where the link bends in its modes. Its transpose makes modal forces on the link
-            of those on the pieces: virtual work.
-        gathered: (n, N) p of the link that are nearest to those of the pieces, in strain energy; the smallest where the
-            link has more modes than its pieces.
-    """
-
-    bodies: tuple[str, ...]
+    bodies: tuple[str, ...]  # names of the pieces
+    # (N, n) p of the pieces where the link bends in its modes. Its transpose makes modal forces on the link of those on
+    # the pieces: virtual work
     spread: Array
+    # (n, N) p of the link that are nearest to those of the pieces, in strain energy; the smallest where the link has
+    # more modes than its pieces
     gathered: Array
 
 

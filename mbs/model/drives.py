@@ -35,21 +35,15 @@ class Command(NamedTuple):
 
 
 class Replayed(NamedTuple):
-    """Numbers that an earlier analysis found, and what they do in another run.
+    """Numbers that an earlier analysis found, and what they do in another run."""
 
-    Attributes:
-        source: of the numbers, at any time.
-        commands: what a unit of each does; of those at points nothing.
-        at_points: by "BODY.POINT" the number of each component ("x" … "mz"), global axes.
-        moments: by joint those that act along its coordinates, N·m or N on its second side.
-        integrator: with which the earlier analysis ended, where this run repeats its motion; else empty.
-    """
-
-    source: ForceSource
-    commands: tuple[Command, ...]
+    source: ForceSource  # of the numbers, at any time
+    commands: tuple[Command, ...]  # what a unit of each does; of those at points nothing
+    # by "BODY.POINT" the number of each component ("x" … "mz"), global axes
     at_points: Mapping[str, Mapping[str, int]] = MappingProxyType({})
+    # by joint those that act along its coordinates, N·m or N on its second side
     moments: Mapping[str, Sequence[int]] = MappingProxyType({})
-    integrator: str = ""
+    integrator: str = ""  # with which the earlier analysis ended, where this run repeats its motion; else empty
 
 
 class Drives(NamedTuple):

@@ -16,18 +16,13 @@ Placed = tuple[int, int]  # body, −1 the ground, and number of its marker
 
 
 class CutPlace(NamedTuple):
-    """Where a coordinate of a joint at which a loop is cut is measured, and what acts along it acts.
+    """Where a coordinate of a joint at which a loop is cut is measured, and what acts along it acts."""
 
-    Attributes:
-        a, b: its sections, by numbers of wrenches.
-        turns: whether it is an angle.
-        axis: (3,) of it, in axes of a.
-    """
-
+    # a, b: its sections, by numbers of wrenches
     a: int
     b: int
-    turns: bool
-    axis: Array
+    turns: bool  # whether it is an angle
+    axis: Array  # (3,) of it, in axes of a
 
 
 class ModelParts(NamedTuple):

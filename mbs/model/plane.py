@@ -28,20 +28,14 @@ SHARED = ("name", "parent", "parent_marker", "inboard_marker", "rotor_inertia", 
 
 
 class Plane(NamedTuple):
-    """A mechanism of the core in the plane.
+    """A mechanism of the core in the plane."""
 
-    Attributes:
-        model: of it.
-        axes: (3, 3) rows: its axes x and y and its normal, global axes.
-        followed: by its rows: which row of the mechanism in space says what they follow.
-        spread: (rows in space, its rows) multipliers of the rows in space by its own; 0 of those that do nothing in it.
-        cut: joints at which loops are cut, with axes of planar markers: of angles the component along the normal.
-    """
-
-    model: _core.PlanarModel
-    axes: Array
-    followed: Integers
+    model: _core.PlanarModel  # of it
+    axes: Array  # (3, 3) rows: its axes x and y and its normal, global axes
+    followed: Integers  # by its rows: which row of the mechanism in space says what they follow
+    # (rows in space, its rows) multipliers of the rows in space by its own; 0 of those that do nothing in it
     spread: Array
+    # joints at which loops are cut, with axes of planar markers: of angles the component along the normal
     cut: tuple[CutPlace, ...]
 
     def shares(self, component: int) -> list[tuple[int, float]]:

@@ -18,30 +18,25 @@ ConstraintKind = Literal["point", "slide", "dot", "rotation", "turn", "coordinat
 
 @struct
 class ConstraintRow:
-    """One constraint: a measure of section b on section a that follows `target`, or is 0.
+    """One constraint: a measure of section b on section a that follows `target`, or is 0."""
 
-    Attributes:
-        owner: the joint or trajectory.
-        kind: "point", f·(r_b − r_a) with f in global axes; "slide", the same with f in axes of a; "dot", f·g with f in
-            axes of a and g in axes of b; "rotation", the turn of b against a about f, global axes; "turn", the angle of
-            g of b about f of a, unit vectors across each other in axes of both; "coordinate", the joint coordinate
-            v[coordinate], `sign` times.
-        coordinate, q_index: in v and q; of "turn" and "slide" rows it is taken off, where there is one.
-        target: of points, angles and coordinates.
-        law: an orientation in time: of "rotation" rows that of a, whose triad is then A(t); of "dot" rows that of b.
-    """
-
-    owner: str
+    owner: str  # the joint or trajectory
+    # "point", f·(r_b − r_a) with f in global axes; "slide", the same with f in axes of a; "dot", f·g with f in axes of
+    # a and g in axes of b; "rotation", the turn of b against a about f, global axes; "turn", the angle of g of b about
+    # f of a, unit vectors across each other in axes of both; "coordinate", the joint coordinate v[coordinate], `sign`
+    # times
     kind: ConstraintKind
     a: Section
     b: Section
     f: Array
     g: Array
     is_trajectory: bool = True
+    # coordinate, q_index: in v and q; of "turn" and "slide" rows it is taken off, where there is one
     coordinate: int = -1
     q_index: int = -1
     sign: float = 1.0
-    target: TimeFunction | None = None
+    target: TimeFunction | None = None  # of points, angles and coordinates
+    # an orientation in time: of "rotation" rows that of a, whose triad is then A(t); of "dot" rows that of b
     law: OrientationLaw | None = None
 
 

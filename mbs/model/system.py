@@ -30,20 +30,15 @@ ZERO = _core.TimeFunction.constant(0.0)
 
 
 class Derivatives(NamedTuple):
-    """By increments δ of q, by v and by generalized forces, all along v (n_v).
+    """By increments δ of q, by v and by generalized forces, all along v (n_v)."""
 
-    Attributes:
-        a_q, a_v, a_f: (n_v, n_v) of accelerations; joints with friction resist more the faster they are. Springs in
-            gears are left as they are: see `gear_matrices`.
-        value_q: (rows, n_v) of the values of rows, and of their rates by v.
-        rate_q: (rows, n_v) of their rates.
-    """
-
+    # a_q, a_v, a_f: (n_v, n_v) of accelerations; joints with friction resist more the faster they are. Springs in gears
+    # are left as they are: see `gear_matrices`
     a_q: Array
     a_v: Array
     a_f: Array
-    value_q: Array
-    rate_q: Array
+    value_q: Array  # (rows, n_v) of the values of rows, and of their rates by v
+    rate_q: Array  # (rows, n_v) of their rates
 
 
 class Integrated(NamedTuple):

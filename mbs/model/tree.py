@@ -65,25 +65,17 @@ class Motion(NamedTuple):
 
 @struct
 class Node:
-    """A body on the joint that carries it.
+    """A body on the joint that carries it."""
 
-    Attributes:
-        body: its constants.
-        joint: that carries it; where the scene has none a free one at the origin, in planar scenes a planar one.
-        backwards: whether the joint's first side is on this body.
-        inner: the joint's triad on what carries it.
-        outer: its triad on this body.
-        q, v: where the joint's coordinates stand in states; `p_q` and `p_v` those of the modes.
-    """
-
-    body: Body
+    body: Body  # its constants
+    # that carries it; where the scene has none a free one at the origin, in planar scenes a planar one
     joint: JointRecord
-    backwards: bool
-    inner: Section
-    outer: Section
-    q: slice
-    p_q: slice
-    v: slice
+    backwards: bool  # whether the joint's first side is on this body
+    inner: Section  # the joint's triad on what carries it
+    outer: Section  # its triad on this body
+    q: slice  # where the joint's coordinates stand in q
+    p_q: slice  # and those of the modes
+    v: slice  # likewise in v
     p_v: slice
 
     @property

@@ -25,15 +25,10 @@ from .motion import RobotMotion
 
 @struct
 class LinkLoads:
-    """What acts on a link over a motion.
+    """What acts on a link over a motion."""
 
-    Attributes:
-        sizes: (T,) of unit loads by their names (`fe_models.modal_body.unit_loads`).
-        modal_force: (T, n) N/√kg, what else acts on its modes, in the coordinates of the equations: patches.
-    """
-
-    sizes: Mapping[str, Array]
-    modal_force: Array
+    sizes: Mapping[str, Array]  # (T,) of unit loads by their names (`fe_models.modal_body.unit_loads`)
+    modal_force: Array  # (T, n) N/√kg, what else acts on its modes, in the coordinates of the equations: patches
 
 
 def loads_on_links(motion: RobotMotion, bodies: Iterable[str]) -> dict[str, LinkLoads]:

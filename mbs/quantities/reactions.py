@@ -71,14 +71,10 @@ M = TypeVar("M", bound=RobotMotion)
 
 @struct
 class Sharing:
-    """What redundant constraints of loops leave open.
+    """What redundant constraints of loops leave open."""
 
-    Attributes:
-        redundant: how many constraints depend on others.
-        components: by joint those of its reaction that nothing determines: x, y, z, mx, my, mz, global axes.
-    """
-
-    redundant: int
+    redundant: int  # how many constraints depend on others
+    # by joint those of its reaction that nothing determines: x, y, z, mx, my, mz, global axes
     components: Mapping[str, tuple[str, ...]]
 
     @property

@@ -62,23 +62,14 @@ class BodyStress:
 
 @struct
 class SectionLoads:
-    """Moments and forces that layers on a link put on its sections, and on no others: what patches do that stiffen it.
+    """Moments and forces that layers on a link put on its sections, and on no others, as patches that stiffen it."""
 
-    Attributes:
-        edges: (k, 2) where each patch begins and ends, m from the root.
-        patch: (g,) number of the patch of each place, from 0.
-        x: (g,) the places, ascending within a patch, m.
-        moment: (T, g) of the section at each place, N·m, positive with φ'.
-        force: (T, g) along the link, N, positive in tension.
-        modal_force: (T, n) what they do to the modes of the modal body file, N/√kg.
-    """
-
-    edges: Array
-    patch: Integers
-    x: Array
-    moment: Array
-    force: Array
-    modal_force: Array
+    edges: Array  # (k, 2) where each patch begins and ends, m from the root
+    patch: Integers  # (g,) number of the patch of each place, from 0
+    x: Array  # (g,) the places, ascending within a patch, m
+    moment: Array  # (T, g) of the section at each place, N·m, positive with φ'
+    force: Array  # (T, g) along the link, N, positive in tension
+    modal_force: Array  # (T, n) what they do to the modes of the modal body file, N/√kg
 
     def shares(self, x: Array) -> Array:
         """(m, g) what each place counts for the sections at x (m,): straight lines between those under one patch."""
@@ -92,21 +83,13 @@ class SectionLoads:
 
 @struct
 class Recovery:
-    """What stresses of a body are computed from, one row per output.
+    """What stresses of a body are computed from, one row per output."""
 
-    Attributes:
-        method: "mode acceleration" or "mode displacement".
-        modal: (T, n) p − p_s, in the modes of the modal body file.
-        loads: names of the unit loads beside it that are not zero; none in the mode displacement method.
-        sizes: (T, l) of these.
-        sections: what layers on the link do to its sections; None where there are none.
-    """
-
-    method: str
-    modal: Array
-    loads: tuple[str, ...]
-    sizes: Array
-    sections: SectionLoads | None = None
+    method: str  # "mode acceleration" or "mode displacement"
+    modal: Array  # (T, n) p − p_s, in the modes of the modal body file
+    loads: tuple[str, ...]  # names of the unit loads beside it that are not zero; none in the mode displacement method
+    sizes: Array  # (T, l) of these
+    sections: SectionLoads | None = None  # what layers on the link do to its sections; None where there are none
 
     @property
     def cases(self) -> Array:

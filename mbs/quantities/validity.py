@@ -45,36 +45,22 @@ ENOUGH = 1e-3  # shortening of a piece by bending: tips are then right to some 1
 
 @struct
 class Bending:
-    """Largest values of one flexible link over a run.
+    """Largest values of one flexible link over a run."""
 
-    Attributes:
-        deflection: distance of its axis from its chord, of its length.
-        rotation: angle between a section's normal and the chord, rad.
-        foreshortening: ½∫w'² dx over its length, in its own frame, m.
-        foreshortening_moment: N·m, that times the largest force at an interface at the same time: what moments miss.
-        stiffness_change: by the loads of the run, relative, of the shape where it is largest; 0 where the modal body
-            file does not tell.
-        length: m, of the link.
-        is_stiffened: whether geometric stiffening is in the equations.
-        missing: errors as `second_order` estimates them.
-        rotations: largest rotations of sections.
-        pieces: into how many it is divided; the values are then those of its worst piece.
-        is_divisible: whether the scene lets it be divided.
-        buckling: how many times the loads under which the link buckles are reached, from 1 on.
-    """
-
-    deflection: float
-    rotation: float
-    foreshortening: float
+    deflection: float  # distance of its axis from its chord, of its length
+    rotation: float  # angle between a section's normal and the chord, rad
+    foreshortening: float  # ½∫w'² dx over its length, in its own frame, m
+    # N·m, that times the largest force at an interface at the same time: what moments miss
     foreshortening_moment: float
+    # by the loads of the run, relative, of the shape where it is largest; 0 where the modal body file does not tell
     stiffness_change: float
-    length: float
-    is_stiffened: bool
-    missing: Missing
-    rotations: Rotations
-    pieces: int = 1
-    is_divisible: bool = False
-    buckling: float = 0.0
+    length: float  # m, of the link
+    is_stiffened: bool  # whether geometric stiffening is in the equations
+    missing: Missing  # errors as `second_order` estimates them
+    rotations: Rotations  # largest rotations of sections
+    pieces: int = 1  # into how many it is divided; the values are then those of its worst piece
+    is_divisible: bool = False  # whether the scene lets it be divided
+    buckling: float = 0.0  # how many times the loads under which the link buckles are reached, from 1 on
 
     @property
     def shortening(self) -> float:

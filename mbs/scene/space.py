@@ -14,15 +14,10 @@ from ...common.structs import struct
 
 @struct
 class Space:
-    """A space by its axes among x, y, z (0, 1, 2).
+    """A space by its axes among x, y, z (0, 1, 2)."""
 
-    Attributes:
-        translations: along which points move and forces act.
-        rotations: about which bodies turn and moments act.
-    """
-
-    translations: tuple[int, ...]
-    rotations: tuple[int, ...]
+    translations: tuple[int, ...]  # along which points move and forces act
+    rotations: tuple[int, ...]  # about which bodies turn and moments act
 
     @property
     def is_plane(self) -> bool:

@@ -32,16 +32,12 @@ class Carrier(NamedTuple):
 
 @struct
 class Topology:
-    """The spanning forest of a mechanism, and what is beside it.
+    """The spanning forest of a mechanism, and what is beside it."""
 
-    Attributes:
-        carriers: of each body the joint on the way to the root of its tree, None of a root; bodies stand in an order in
-            which each comes after its parent, those on the ground first.
-        loop_joints: numbers of the joints that are in no tree: each closes a loop.
-    """
-
+    # of each body the joint on the way to the root of its tree, None of a root; bodies stand in an order in which each
+    # comes after its parent, those on the ground first
     carriers: dict[str, Carrier | None]
-    loop_joints: tuple[int, ...]
+    loop_joints: tuple[int, ...]  # numbers of the joints that are in no tree: each closes a loop
 
     @property
     def is_open_chain(self) -> bool:

@@ -24,20 +24,14 @@ DEPENDENT = 1e-9  # of the largest singular value: below it a coordinate follows
 
 @struct
 class RobotModes:
-    """The f modes of a robot, slowest first; two real poles that follow each other make one.
+    """The f modes of a robot, slowest first; two real poles that follow each other make one."""
 
-    Attributes:
-        poles: (f, 2) complex, 1/s.
-        shape: (f, f) complex, δs of the first pole's eigenvector by mode, of unit kinetic amplitude (δsᴴ M δs = 1) and
-            with its largest entry real.
-        motion: (f, coordinates) complex, the same as δq of all bodies.
-        rounding: 1/s, by which a double pole at 0 may be off: `RIGID` √max(‖K̂‖, ‖D̂‖).
-    """
-
-    poles: ComplexArray
+    poles: ComplexArray  # (f, 2) complex, 1/s
+    # (f, f) complex, δs of the first pole's eigenvector by mode, of unit kinetic amplitude (δsᴴ M δs = 1) and with its
+    # largest entry real
     shape: ComplexArray
-    motion: ComplexArray
-    rounding: float
+    motion: ComplexArray  # (f, coordinates) complex, the same as δq of all bodies
+    rounding: float  # 1/s, by which a double pole at 0 may be off: `RIGID` √max(‖K̂‖, ‖D̂‖)
 
     @property
     def frequency(self) -> Array:
@@ -103,19 +97,13 @@ class FreeCoordinates(NamedTuple):
 
 @struct
 class JointCondition:
-    """Of a robot at one instant, with the joints that have motors locked, or the motors alone behind compliant gears.
+    """Of a robot at one instant, with its joints with motors locked, or the motors alone behind compliant gears."""
 
-    Attributes:
-        modes: of the robot, its coordinates s left free; `modes.frequency` in Hz, the lowest first.
-        compliance: (k, k) by "BODY.POINT": translations (m) along the axes of the space, of a tool its own, then
-            rotations (rad) about them, by forces (N) and moments (N·m); infinite where a joint without a motor lets
-            the robot move.
-        free: the coordinates that the condition leaves free.
-    """
-
-    modes: RobotModes
+    modes: RobotModes  # of the robot, its coordinates s left free; `modes.frequency` in Hz, the lowest first
+    # (k, k) by "BODY.POINT": translations (m) along the axes of the space, of a tool its own, then rotations (rad)
+    # about them, by forces (N) and moments (N·m); infinite where a joint without a motor lets the robot move
     compliance: Mapping[str, Array]
-    free: FreeCoordinates
+    free: FreeCoordinates  # the coordinates that the condition leaves free
 
 
 class Stiffness(NamedTuple):

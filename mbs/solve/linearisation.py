@@ -37,36 +37,29 @@ DEPENDENT = 1e-8  # of a row's gradient, what others must leave of it to count a
 
 @struct
 class LinearMechanism:
-    """M δs̈ + D δṡ + K δs = inputs · δu about (time, q, v, a); f independent coordinates s.
-
-    Attributes:
-        M, D, K: (f, f).
-        inputs: (f,) per unit of each motor ("joint/NAME") and force at a point ("force/BODY.POINT/x", "…/y").
-        outputs: (f,) derivatives of joint coordinates ("joint/NAME"), of motors behind compliant gears ("motor/NAME"),
-            and places of points ("point/BODY.POINT/x", …).
-        points: (k, f) by "BODY.POINT": translations along the axes of the space, then rotations about them.
-        tool_axes: (k, k) by those points that have axes of their own: their components from those of the space.
-        transformation: H = ∂q/∂s (coordinates, f).
-        transformation_rate: its rate along the motion: δv = H δṡ + H_dot δs.
-        force: (f,) what drives the motion itself: forces along the independent rows, modal forces beside the loads.
-        names: (f,) of s: "joint/NAME" (or what was chosen instead), then "modal/BODY/k", k from 1.
-    """
+    """M δs̈ + D δṡ + K δs = inputs · δu about (time, q, v, a); f independent coordinates s."""
 
     time: float
     q: Array
     v: Array
     a: Array
+    # M, D, K: (f, f)
     M: Array
     D: Array
     K: Array
+    # (f,) per unit of each motor ("joint/NAME") and force at a point ("force/BODY.POINT/x", "…/y")
     inputs: Mapping[str, Array]
+    # (f,) derivatives of joint coordinates ("joint/NAME"), of motors behind compliant gears ("motor/NAME"), and places
+    # of points ("point/BODY.POINT/x", …)
     outputs: Mapping[str, Array]
+    # (k, f) by "BODY.POINT": translations along the axes of the space, then rotations about them
     points: Mapping[str, Array]
+    # (k, k) by those points that have axes of their own: their components from those of the space
     tool_axes: Mapping[str, Array]
-    transformation: Array
-    transformation_rate: Array
-    force: Array
-    names: tuple[str, ...]
+    transformation: Array  # H = ∂q/∂s (coordinates, f)
+    transformation_rate: Array  # its rate along the motion: δv = H δṡ + H_dot δs
+    force: Array  # (f,) what drives the motion itself: forces along the independent rows, modal forces beside the loads
+    names: tuple[str, ...]  # (f,) of s: "joint/NAME" (or what was chosen instead), then "modal/BODY/k", k from 1
 
     def of_tool(self, point: str) -> Array:
         """(k, f) as `points`, but in the axes of a point that has its own."""

@@ -104,21 +104,14 @@ def joint_scales(model: Model) -> Array:
 
 @struct
 class Mobility:
-    """How the rigid mechanism can move in a posture.
+    """How the rigid mechanism can move in a posture."""
 
-    Attributes:
-        freedom: degrees of freedom that joints and loops leave.
-        followed: how many of these the trajectories take.
-        ratio: smallest of largest singular value of the path's rows in these freedoms, lengths in sizes of the robot.
-        left: joints that still move with all trajectories held.
-        loop_rank: how many rows of the loops are independent with rigid links.
-    """
-
-    freedom: int
-    followed: int
+    freedom: int  # degrees of freedom that joints and loops leave
+    followed: int  # how many of these the trajectories take
+    # smallest of largest singular value of the path's rows in these freedoms, lengths in sizes of the robot
     ratio: float
-    left: tuple[str, ...]
-    loop_rank: int
+    left: tuple[str, ...]  # joints that still move with all trajectories held
+    loop_rank: int  # how many rows of the loops are independent with rigid links
 
 
 def mobility(model: Model, q: Array) -> Mobility:

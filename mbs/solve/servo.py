@@ -49,22 +49,17 @@ class Servo:
 
     A smaller factor takes where they would be with the same motor coordinates and the deflections `factor` p +
     `offset`, which is what is expected of the rest (Wang and Vidyasagar 1991; De Luca and Siciliano 1993).
-
-    Attributes:
-        near_times, near: along the path, (N,) s, postures without deflections (N, n_q).
-        where: scene and analysis, for messages.
-        goes_on: is asked again and again whether to go on.
-        offset: one for each mode of all bodies, or none.
     """
 
     model: Model
     end: float
     factor: float
+    # near_times, near: along the path, (N,) s, postures without deflections (N, n_q)
     near_times: Array
     near: Array
-    where: str
-    goes_on: Callable[[], bool]
-    offset: tuple[TimeFunction, ...] = ()
+    where: str  # scene and analysis, for messages
+    goes_on: Callable[[], bool]  # is asked again and again whether to go on
+    offset: tuple[TimeFunction, ...] = ()  # one for each mode of all bodies, or none
 
     @cached_property
     def scale(self) -> Array:

@@ -81,32 +81,25 @@ class Transition:
 
 @struct
 class Tracked:
-    """p(t) and V(t) as piecewise polynomials, and how they were found.
-
-    Attributes:
-        share: σ, the least share of limits (`objective` "least-…"), or of V_ref or τ_ref where there are none.
-        cost: J; 0 where it is not the objective.
-        prices: by how much less J, or σ, is for a limit that is larger by one: of patches (m,) 1/V, of motors
-            (motors,) 1/(N·m) or 1/N; zero where a limit is not reached.
-        unmet: largest force on modes that nobody supplies between Gauss points, relative to the largest elastic one.
-        objective: what was made small.
-        step, found: the last Newton step, relative, and its minimum; the next step is about the square of it.
-        added: what the effort adds to the objective "least-…".
-        doubt: of the share, relative: twice its change by the last finer intervals, and what the effort may add.
-    """
+    """p(t) and V(t) as piecewise polynomials, and how they were found."""
 
     curve: PPoly
     voltage: PPoly
     converged: bool
     iterations: int
-    share: float
-    cost: float
+    share: float  # σ, the least share of limits (`objective` "least-…"), or of V_ref or τ_ref where there are none
+    cost: float  # J; 0 where it is not the objective
+    # by how much less J, or σ, is for a limit that is larger by one: of patches (m,) 1/V, of motors (motors,) 1/(N·m)
+    # or 1/N; zero where a limit is not reached
     prices: tuple[Array, Array]
-    objective: Objective
+    objective: Objective  # what was made small
+    # largest force on modes that nobody supplies between Gauss points, relative to the largest elastic one
     unmet: float = np.nan
+    # step, found: the last Newton step, relative, and its minimum; the next step is about the square of it
     step: float = np.inf
     found: Minimum | None = None
-    added: float = 0.0
+    added: float = 0.0  # what the effort adds to the objective "least-…"
+    # of the share, relative: twice its change by the last finer intervals, and what the effort may add
     doubt: float = np.inf
 
 
